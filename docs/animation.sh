@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes docs/animation.png: a star from place to place on a base that stands still, and on one that morphs.
+# Draws docs/animation.png: a star that moves on a base at rest, and on a base that morphs.
 # animation.sh COMMAND FOLDER
 set -eu
 levelsmith=$1
@@ -8,21 +8,21 @@ mkdir -p "$out"
 here=$(cd "$(dirname "$0")" && pwd)
 cd "$out"
 
-# A starfish: five arms, the box of which is the unit cube of u, v, w.
+# A starfish with five arms. Its box is the unit cube of u, v, w.
 star='capsule --from 0,0,0 --to 4,0,0 --radius 0.8 --voxel 0.2'
 for arm in 1.236,3.804 -3.236,2.351 -3.236,-2.351 1.236,-3.804; do
   star="$star ! capsule --from 0,0,0 --to $arm,0 --radius 0.8 --voxel 0.2 ! blend --op union --radius 0.5"
 done
 "$levelsmith" --quiet $star ! write star.vdb
 
-# From one end of a bone to the other, half a turn on the way.
+# From one end of a bone to the other, with half a turn.
 "$levelsmith" --quiet sphere --radius 6 --center -9,0,0 --voxel 0.4 ! capsule --from -9,0,0 --to 9,0,0 --radius 4 --voxel 0.4 \
   ! blend --op union --radius 3 ! sphere --radius 6 --center 9,0,0 --voxel 0.4 ! blend --op union --radius 3 --as bone \
   ! read star.vdb --as star ! patch @bone --at -11,-2.5,5 --size 7,7 --height 1.4 --layers 3 --as from \
   ! patch @bone --at 11,-2.5,5 --size 7,7 --rotate 180 --height 1.4 --layers 3 --as to \
   ! animate @bone @star @from @to --frames 4 --carry rigid --voxel 0.3 --blend 0.4 --out place_#.vdb
 
-# On a ball that becomes a ring, from its top to its rim.
+# From top to rim of a ball that becomes a ring.
 "$levelsmith" --quiet sphere --radius 9 --voxel 0.4 --as ball ! torus --radius 9 --tube 4 --voxel 0.4 --as ring \
   ! morph @ball @ring --steps 6 --keep-steps step_#.vdb --as last ! read star.vdb --as star \
   ! patch @ball --at 0,-3,8.5 --size 8,8 --height 1.6 --layers 3 --as from \

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes docs/styles.png: a dragon in the styles of 'render', a solid cut along the rays, and a slice.
+# Draws docs/styles.png: a dragon in the styles of 'render', a CSG expression along the rays, and a slice.
 # styles.sh COMMAND FOLDER
 set -eu
 levelsmith=$1
@@ -19,7 +19,7 @@ dragon() {  # dragon NAME OPTIONS...
 }
 for style in mean gauss principal accessibility tone; do dragon "$style" --style "$style"; done
 dragon ink --style ink --curvature-range 350
-# A ball that is drawn by the light is as good a matcap as any.
+# A shaded ball serves as the matcap.
 "$levelsmith" --quiet sphere --radius 1 --voxel 0.02 ! render "$out/ball.png" --size 256x256 --from 0,0,5 --to 0,0,0 --ortho 2 --samples 16
 dragon matcap --style matcap --matcap "$out/ball.png"
 "$levelsmith" --quiet read "$out/dragon.vdb" --as dragon ! sphere --radius 0.055 --center 0.03,0.15,0.05 --voxel 0.0005 --as ball \

@@ -1,10 +1,10 @@
 #!/bin/sh
-# Makes docs/textures.png, the six ready-made textures on one sheet. textures.sh COMMAND FOLDER
+# Draws docs/textures.png, the six generated textures on one sheet. textures.sh COMMAND FOLDER
 set -eu
 levelsmith=$1
 out=$2
 mkdir -p "$out"
-draw() {  # draw NAME CHAIN...: one picture from above and aside
+draw() {  # draw NAME CHAIN...: one oblique picture from above
   name=$1
   shift
   "$levelsmith" --quiet "$@" ! render "$out/$name.png" --size 420x320 --from 9,-14,13 --to 0,0,-0.3 \

@@ -1,5 +1,5 @@
 #!/bin/sh
-# A dozen baby dragons or more on their mother, blended with her [Brodersen07 fig. 8.12].
+# At least a dozen baby dragons on their mother, blended with her [Brodersen07 fig. 8.12].
 . "$(dirname "$0")/case.sh"
 standing_dragon 512
 standing_dragon 120

@@ -1,6 +1,6 @@
 #!/bin/sh
-# A bunny on a bunny's back, particles 6, 3, 1.5 and 0.75 voxels of the base apart, tetrahedra and
-# radial functions [Brodersen07 fig. 9.5, tables 9.1 and 9.2].
+# A bunny on a bunny's back, with particle spacings of 6, 3, 1.5 and 0.75 voxels of the base.
+# Compares tetrahedra and radial basis functions [Brodersen07 fig. 9.5, tables 9.1 and 9.2].
 . "$(dirname "$0")/case.sh"
 bunny 100
 standing_bunny 190
@@ -19,8 +19,8 @@ lay 0.75 29 shell "52896, 2.266, 12.641"
 lay 6 5 rbf "361, –, 102.828 with set-up"
 lay 3 8 rbf "–"
 lay 1.5 15 rbf "–"
-lay 0.75 29 rbf "–"  # the proof that nothing folds takes 20 CPU minutes of it
-for spacing in 6 3 1.5 0.75; do  # the thesis' figure
+lay 0.75 29 rbf "–"  # 20 CPU minutes of this time prove the absence of folds
+for spacing in 6 3 1.5 0.75; do  # figure of the thesis
   expect "bunny-shell-$spacing" operations_per_point "<=" 2.8
   expect "bunny-shell-$spacing" min_jacobian ">" 0.3
   expect "bunny-rbf-$spacing" min_jacobian ">" 0.3

@@ -1,5 +1,5 @@
 #!/bin/sh
-# A bunny in scales: four hundred, larger on the body than on the ears and paws, pointing downwards.
+# A bunny with four hundred scales that point downwards. They are larger on the body than on the ears and paws.
 . "$(dirname "$0")/case.sh"
 standing_bunny 200
 make scale sphere --radius 1 --voxel 0.06 ! transform --scale 1,1.35,0.35 --bake

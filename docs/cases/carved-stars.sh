@@ -1,9 +1,9 @@
 #!/bin/sh
-# Stars cut out of a hollow ball, through its wall [Brodersen07 fig. 11.3].
+# Stars cut through the wall of a hollow ball [Brodersen07 fig. 11.3].
 . "$(dirname "$0")/case.sh"
 . "$here/stars.sh"
 star "$out/star" 1
-make star read "$out/star.ply" ! level-set --resolution 80 ! open --radius 0.06  # tips that the lantern's grid can hold
+make star read "$out/star.ply" ! level-set --resolution 80 ! open --radius 0.06  # rounds the tips so that the lantern's grid resolves them
 make lantern sphere --radius 10 --voxel 0.1 ! shell --thickness 0.8
 echo "| | stars | particles | mapping s | merging s |"
 echo "|---|--:|--:|--:|--:|"
@@ -15,7 +15,7 @@ echo "| thesis | – | – | a couple each | – |"
 expect carved-stars patches = 32
 expect carved-stars min_jacobian ">" 0.5
 solid carved-stars
-expect carved-stars-solid shells = 1  # nothing is cut loose
+expect carved-stars-solid shells = 1  # no piece is cut off
 expect carved-stars-solid euler = -60
 picture carved-stars
 sheet carved-stars 1 "carved-stars=thirty-two stars cut through the wall"

@@ -1,5 +1,5 @@
-# Sourced by the cases with "$@": CASE.sh COMMAND FOLDER. Solids, reports and pictures go to FOLDER,
-# the sheet of pictures to docs/cases, the table to standard output.
+# The cases source this file with "$@": CASE.sh COMMAND FOLDER. It writes solids, reports and pictures to FOLDER,
+# the sheet of pictures to docs/cases, and the table to standard output.
 set -eu
 levelsmith=$1
 out=$2
@@ -11,25 +11,25 @@ mkdir -p "$out"
   exit 1
 }
 
-make() {  # make NAME CHAIN...: NAME.vdb, once
+make() {  # make NAME CHAIN...: writes NAME.vdb unless it exists
   name=$1
   shift
   [ -f "$out/$name.vdb" ] || "$levelsmith" --quiet "$@" ! write "$out/$name.vdb"
 }
 
-map() {  # map NAME CHAIN...: NAME.vdb and its report
+map() {  # map NAME CHAIN...: writes NAME.vdb and its report
   name=$1
   shift
   "$levelsmith" --quiet --report "$out/$name.json" "$@" ! write "$out/$name.vdb"
 }
 
-picture() {  # picture NAME OPTIONS...: of NAME.vdb
+picture() {  # picture NAME OPTIONS...: draws NAME.vdb
   name=$1
   shift
   "$levelsmith" --quiet read "$out/$name.vdb" ! render "$out/$name.png" --size 480x360 "$@"
 }
 
-solid() {  # solid NAME: NAME-solid.json tells components, cavities and Euler characteristic of NAME.vdb
+solid() {  # solid NAME: writes components, cavities and Euler characteristic of NAME.vdb to NAME-solid.json
   "$levelsmith" --quiet --report "$out/$1-solid.json" read "$out/$1.vdb" ! measure > /dev/null
 }
 
@@ -37,20 +37,21 @@ sheet() {  # sheet NAME COLUMNS PICTURE=TITLE...
   "${PYTHON:-python3}" "$here/figures.py" sheet "$out" "$here/$@"
 }
 
-row() {  # row NAME FIELD... "'text'": one line of the table from NAME's report, of its last texture
+row() {  # row NAME FIELD... "'text'": prints a row of the table from the last texture in NAME's report
   "${PYTHON:-python3}" "$here/figures.py" row "$out" "$@"
 }
 
-# expect NAME FIELD OPERATOR VALUE: exits 5 with a sentence unless NAME's report says so of each texture; <, <=, =, >=, >
+# expect NAME FIELD OPERATOR VALUE: exits 5 with a message unless the comparison (<, <=, =, >=, >) holds for each
+# texture in NAME's report
 expect() {
   "${PYTHON:-python3}" "$here/figures.py" expect "$out" "$@"
 }
 
-bunny() {  # bunny VOXELS: lying on its side of the base, as scanned
+bunny() {  # bunny VOXELS: in the orientation of the scan
   make "bunny$1" read "$models/bunny.obj" ! level-set --resolution "$1"
 }
 
-standing_bunny() {  # standing_bunny VOXELS: z is up, as textures want it
+standing_bunny() {  # standing_bunny VOXELS: z is up, as required for textures
   make "standing$1" read "$models/bunny.obj" ! transform --rotate 90,0,0 ! level-set --resolution "$1"
 }
 

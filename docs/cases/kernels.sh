@@ -1,5 +1,5 @@
 #!/bin/sh
-# A dragon on the bunny's side under all six kernels, with what each does to it [Brodersen07 fig. 8.17, table 8.1].
+# A dragon on the bunny's side with all six kernels, and the distortion of each [Brodersen07 fig. 8.17, table 8.1].
 . "$(dirname "$0")/case.sh"
 bunny 150
 standing_dragon 200

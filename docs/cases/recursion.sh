@@ -1,5 +1,5 @@
 #!/bin/sh
-# A bunny on a bunny on a bunny on a bunny: what was mapped is the next base [Brodersen07 fig. 8.10].
+# Four bunnies on top of each other: each result is the next base [Brodersen07 fig. 8.10].
 . "$(dirname "$0")/case.sh"
 bunny 120
 standing_bunny 150

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Fifty-five starfish strewn over a bunny [Brodersen07 fig. 8.11].
+# Fifty-five starfish scattered over a bunny [Brodersen07 fig. 8.11].
 . "$(dirname "$0")/case.sh"
 bunny 200
 arm() { awk -v i="$1" 'BEGIN { a = atan2(0, -1) * 2 * i / 5; printf "%.6f,%.6f,0", sin(a), cos(a) }'; }

@@ -1,4 +1,4 @@
-# star NAME HEIGHT: a five-pointed prism as a mesh, NAME.ply
+# star NAME HEIGHT: writes a prism over a five-pointed star to NAME.ply
 star() {
   awk -v h="$2" 'BEGIN {
     pi = atan2(0, -1)

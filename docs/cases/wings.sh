@@ -5,7 +5,7 @@ bunny 150
 make feathers scales --length 1 --columns 4 --rows 6 --thickness 0.12 --tip 0.5 --voxel 0.02 ! transform --rotate 90,0,0
 echo "| posture | particles | mapping s | least Jacobian | stretch 1 % | 99 % | thesis: particles, mapping s |"
 echo "|---|--:|--:|--:|--:|--:|---|"
-lay() {  # lay POSTURE LEFT RIGHT: points of the two splines
+lay() {  # lay POSTURE LEFT RIGHT: LEFT and RIGHT are the points of the two splines
   map "wings-$1" read "$out/bunny150.vdb" --as base ! read "$out/feathers.vdb" --as feathers \
     ! patch @base --at 0.35,0.0,0.55 --size 0.5,0.12 --rotate 180 --particles spline --spline "$2" --fade --height 1 --layers 12 --as left \
     ! patch @base --at 0.35,0.0,-0.3 --size 0.5,0.12 --particles spline --spline "$3" --fade --height 1 --layers 12 --as right \

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Runs a benchmark and prints its CPU times beside those of OpenVDB's tools in the same run. Exits 1
-# when a ratio passes its bound or cannot be told.
+# when a ratio exceeds its bound or is missing.
 #   beside.sh "NAME=BOUND …" BENCH [ARGUMENT …]
 set -eu
 [ $# -ge 2 ] || { sed -n '2,4s/^# *//p' "$0"; exit 2; }

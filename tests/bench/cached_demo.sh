@@ -1,6 +1,6 @@
 #!/bin/sh
-# The main demo with a cache, twice: cached_demo.sh LEVELSMITH. Ends with 1 where the second run, which has
-# nothing to compute, takes a second or more, or leaves other files.
+# Runs the main demo with a cache twice: cached_demo.sh LEVELSMITH. The second run has nothing to compute.
+# Exits 1 when it takes a second or more, or when its files differ.
 set -eu
 levelsmith=$(realpath "$1")
 demo=$(dirname "$0")/../../apps/demo.sh

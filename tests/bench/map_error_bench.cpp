@@ -5,6 +5,7 @@
 // percentile and the maximum over 2000 positions well inside. Direct sums above 10⁴ particles × 10⁷
 // points are timed on a sample of the blocks, and marked. Exits 1 when the fast sum differs from
 // the direct sum by more than 0.05 texture voxel at any point that both evaluate.
+//
 //   map_error_bench [POINTS = 100000000] > map-error.csv
 
 #include <fmt/core.h>

@@ -2,15 +2,15 @@
 // map. Uses one thread, and a third of a cylinder's wall with a texture of 256 x 256 x 64 voxels.
 // Solving is timed separately. The direct sum runs on a hundredth of the blocks. A random choice
 // (seed 7) keeps grid patterns out of the sample, and each run has the same sample.
+//
 //   mapping_bench [PARTICLES = 10000] [POINTS = 10000000] [SOLVED = 100000]
+//
 // Then times the six kernels on a tenth of the points with 2000 particles. Last, times the
-// iterative solution for SOLVED particles on all threads (0: skipped). Exits 1 in any of these
-// cases:
-// - the fast sum is less than 30 times as fast as the direct sum, or off by more than 0.05 texture
-// voxel
-// - tetrahedra are less than 5 times as fast
-// - a mesh maps less than 5 million vertices a second, with or without normals and texture
-// coordinates
+// iterative solution for SOLVED particles on all threads (0: skipped).
+//
+// Exits 1 when the fast sum is less than 30 times as fast as the direct one, or off by more than
+// 0.05 texture voxel. Exits 1 when tetrahedra are less than 5 times as fast. Exits 1 when a mesh
+// maps less than 5 million vertices a second, with or without normals and texture coordinates.
 
 #include <fmt/core.h>
 #include <tbb/global_control.h>

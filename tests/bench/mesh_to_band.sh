@@ -1,6 +1,6 @@
 #!/bin/sh
-# CPU seconds of mesh to band beside Debian's vdb_tool (package libopenvdb-tools), medians, file
-# reading apart. Exits 1 when `closed` passes 1.0 or `winding` 2.0 times vdb_tool's.
+# Compares the CPU seconds of mesh to band with Debian's vdb_tool (package libopenvdb-tools). Prints medians
+# without file reading. Exits 1 when `closed` exceeds 1.0 or `winding` 2.0 times the time of vdb_tool.
 #   mesh_to_band.sh BENCH MESH.ply[.gz] [DIM = 512] [RUNS = 3]
 set -eu
 [ $# -ge 2 ] || { sed -n '2,4s/^# *//p' "$0"; exit 2; }
@@ -30,7 +30,7 @@ search=$("$bench" "$work/mesh.ply" "$voxel" "$runs" search)
 awk -v w="$whole" -v r="$reading" -v c="$closed" -v n="$winding" -v s="$search" -v h="$voxel" 'BEGIN {
   t = w - r
   printf "voxel %s\n", h
-  printf "vdb_tool -mesh2ls   %7.2f CPU s (reading, %.2f s, taken off)\n", t, r
+  printf "vdb_tool -mesh2ls   %7.2f CPU s (without reading, %.2f s)\n", t, r
   printf "closed              %7.2f CPU s, ratio %.2f (at most 1.00)\n", c, c / t
   printf "winding             %7.2f CPU s, ratio %.2f (at most 2.00)\n", n, n / t
   printf "self-intersections  %7.2f CPU s\n", s

@@ -1,5 +1,7 @@
 // Converts a mesh several times and prints the median CPU seconds of a conversion, without reading.
+//
 //   mesh_to_band_bench FILE VOXEL RUNS closed
+//
 // winding
 // search
 

@@ -1,10 +1,10 @@
 #!/bin/sh
-# What the pipeline costs beside what it runs: pipeline.sh LEVELSMITH. Ends with 1 where a bound is missed.
-# - Twelve branches of which the output needs three take as long as the three alone (within 10 %).
-# - Of a wide band that is offset and clipped, what is needed takes at most half of the CPU time and of the memory
-#   of the whole, and gives the same file.
-# - Branches side by side give the same files; how much sooner, beside one thread, is told.
-# - A step costs less than 1 ms beside its work.
+# Measures the overhead of the pipeline: pipeline.sh LEVELSMITH. Exits 1 when a bound is exceeded.
+# - Twelve branches, three of which the output needs, take as long as the three alone (within 10 %).
+# - The region of interest of a wide band that is offset and clipped takes at most half of the CPU time and of the
+#   memory of the complete band, and gives the same file.
+# - Branches on several threads give the same files as on one thread. Both times are printed.
+# - A step has an overhead below 1 ms.
 set -eu
 levelsmith=$(realpath "$1")
 folder=$(mktemp -d)
@@ -18,7 +18,7 @@ needed="$(branch 1.1) $(branch 1.2) $(branch 1.3)"
 others=""
 for radius in 1.4 1.5 1.6 1.7 1.8 1.9 2.1 2.2 2.3; do others="$others $(branch $radius)"; done
 
-# CPU seconds, the least of five: the machine may be busy.
+# Least CPU seconds of five runs, because the machine may be busy.
 cost() {
   for _ in 1 2 3 4 5; do
     { /usr/bin/env time -f '%U %S' "$levelsmith" -q "$@" >/dev/null; } 2>&1 | tail -1
@@ -27,7 +27,7 @@ cost() {
 alone=$(cost $needed $(three))
 of_twelve=$(cost $others $needed $(three))
 
-# A part of a large solid, made as far as it is needed and made whole (--no-roi).
+# A part of a large solid: the region of interest alone, and the complete solid (--no-roi).
 part="sphere --radius 2 --voxel 0.01 --half-width 10 ! offset 0.1 ! clip --box"
 memory() { { /usr/bin/env time -f '%M' "$levelsmith" -q "$@" >/dev/null; } 2>&1 | tail -1; }
 needed_time=$(cost $part "1.5,-0.5,-0.5 3,0.5,0.5" ! mesh ! write part.ply)
@@ -36,7 +36,7 @@ needed_memory=$(memory $part "1.5,-0.5,-0.5 3,0.5,0.5" ! mesh ! write part.ply)
 whole_memory=$(memory --no-roi $part "1.5,-0.5,-0.5 3,0.5,0.5" ! mesh ! write whole.ply)
 cmp part.ply whole.ply
 
-# Three branches with parts that no thread shares; on one thread, and on all.
+# Three independent branches, on one thread and on all.
 wall() {
   for _ in 1 2 3; do
     { /usr/bin/env time -f '%e' "$levelsmith" -q "$@" >/dev/null; } 2>&1 | tail -1
@@ -47,9 +47,9 @@ beside="gyroid --cell 1 --columns 2 --rows 2 --layers 2 --voxel 0.02 --as g ! to
 one_wall=$(wall --threads 1 $beside write one.vdb ! mesh ! write one.ply)
 all_wall=$(wall $beside write all.vdb ! mesh ! write all.ply)
 cmp one.ply all.ply
-echo "three branches on one thread $one_wall s, side by side on $(nproc): $all_wall s"
+echo "three branches on one thread $one_wall s, on $(nproc) threads $all_wall s"
 
-# A hundred steps that do next to nothing, beside one.
+# A hundred steps with almost no work, compared with one.
 small="sphere --radius 1 --voxel 0.5"
 many="$small --as s"
 for i in $(seq 100); do many="$many ! transform @s --translate $i,0,0"; done
@@ -59,14 +59,14 @@ awk -v needed="$needed_time" -v whole="$whole_time" -v part="$needed_memory" -v 
   time = whole / needed
   memory = all / part
   met = (time >= 2) && (memory >= 2)
-  printf "offset and clip: whole %.2f s of CPU and %.0f MB, what is needed %.2f s and %.0f MB: %.1f times and %.1f times, bound >= 2%s\n", whole, all / 1024, needed, part / 1024, time, memory, met ? "" : "  missed"
+  printf "offset and clip: complete %.2f s of CPU and %.0f MB, region of interest %.2f s and %.0f MB: %.1f times and %.1f times, bound >= 2%s\n", whole, all / 1024, needed, part / 1024, time, memory, met ? "" : "  missed"
   exit !met
 }' || missed=1
 awk -v alone="$alone" -v twelve="$of_twelve" -v one="$one" -v hundred="$hundred" 'BEGIN {
   ratio = twelve / alone
   printf "three branches alone %.2f s of CPU, of twelve %.2f s: ratio %.2f, bound <= 1.10%s\n", alone, twelve, ratio, ratio <= 1.1 ? "" : "  missed"
   step = (hundred - one) / 99 * 1000
-  printf "a step costs %.2f ms beside its work, bound <= 1%s\n", step, step <= 1 ? "" : "  missed"
+  printf "the overhead of a step is %.2f ms, bound <= 1%s\n", step, step <= 1 ? "" : "  missed"
   exit ratio > 1.1 || step > 1
 }' || missed=1
 exit $missed

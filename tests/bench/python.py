@@ -1,5 +1,5 @@
-"""What a call of the Python module costs before anything is computed, beside its bound; and what
-the way of a result through the interpreter adds. Exits 1 when a bound is missed."""
+"""Measures the time of a call of the Python module before any computation, and compares it with a bound.
+Also measures the transfer of a result to the interpreter. Exits 1 when a bound is exceeded."""
 
 import sys
 import timeit

@@ -1,7 +1,7 @@
 #!/bin/sh
-# Primary rays beside OpenVDB's vdb_render on one thread, of the same bands and views; exits 1 when
-# a bound is missed. vdb_render shades and writes its picture too, its start-up (a picture of 48
-# pixels) is taken off.
+# Compares primary rays with OpenVDB's vdb_render on one thread, for the same bands and views. Exits 1 when
+# a bound is exceeded. vdb_render also shades and writes its picture. Its start-up time, measured with a
+# picture of 48 pixels, is subtracted.
 #   render.sh RENDER_BENCH LEVELSMITH DRAGON.ply.gz
 set -eu
 [ $# -eq 3 ] || { sed -n '2,5s/^# *//p' "$0"; exit 2; }
@@ -12,7 +12,7 @@ trap 'rm -rf "$folder"' EXIT
 "$levelsmith" -q sphere --radius 400 --center 0.3,0.2,0.1 --voxel 1 ! write "$folder/sphere400.vdb"
 "$levelsmith" -q read "$dragon" ! level-set --resolution 512 ! write "$folder/dragon.vdb"
 
-# CPU seconds of the least of three runs: seconds SIZE FILE VIEW…
+# Least CPU seconds of three runs: seconds SIZE FILE VIEW…
 seconds() {
   size=$1 file=$2
   shift 2

@@ -2,6 +2,7 @@
 // one thread, of the kernel on the GPU, and of the judge, and the memory of the tables. With Mesa's
 // llvmpipe in place of a GPU, its seconds are CPU time too. render.sh compares them with
 // vdb_render.
+//
 //   render_bench FILE.vdb            a table on standard output: NAME VALUE
 //   render_bench --view FILE.vdb     the view, as vdb_render takes it
 

@@ -3,6 +3,7 @@
 // ball's surface grows with the square of its size, its volume with the cube. Outlines come from
 // one, four, sixteen, … balls in the same frame. Exits 1 when a ball of 4096 times the volume costs
 // more than four times as much, or when cost grows faster than the number of pixels.
+//
 //   render_cost_bench > render-cost.csv
 
 #include <fmt/core.h>

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Every benchmark beside its peer; goes on past a bound that is missed and exits 1 then. run.sh BUILD
+# Runs every benchmark beside its peer: run.sh BUILD. Continues after an exceeded bound, and then exits 1.
 set -u
 build=$1
 here=$(dirname "$0")

@@ -1,7 +1,7 @@
 #!/bin/sh
-# A hundred scales or more strewn over the dragon at 512 voxels, from its mesh to the solid in a file, in five
-# minutes and 8 GB at the most. It is CPU time of all threads, so that a shared machine does not matter:
-# more than what a clock would show on two cores.
+# Scatters at least a hundred scales over the dragon at 512 voxels, from its mesh to the solid in a file.
+# Accepts at most five minutes and 8 GB. The time is CPU time of all threads, which does not depend on other load
+# of the machine and exceeds the wall-clock time on two cores.
 # scales_on_dragon.sh LEVELSMITH MODEL [PICTURE]
 set -eu
 levelsmith=$1
@@ -12,7 +12,7 @@ trap 'rm -rf "$work"' EXIT
   ! scatter @dragon --count 106 --size 0.011,0.008 --along "0,-1,0" --jitter 10 --height 0.0022 --layers 3 --as places \
   ! sphere --radius 1 --voxel 0.04 --as scale \
   ! texture @dragon @scale @places --voxel 0.0004 --embed 0.0006 --skip-folds ! write "$work/scales.vdb"
-# Some places fold and are left out.
+# Patches that fold are left out.
 scales=$(sed -n 's/.*"patches": *\([0-9]*\),*/\1/p' "$work/report.json" | tail -n 1)
 echo "$scales scales"
 [ "$scales" -ge 100 ]

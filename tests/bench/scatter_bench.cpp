@@ -1,6 +1,8 @@
 // Measures the cost of one patch among many. Maps equal studs on equal patches of a sphere: one at
 // a time, ten at once and a hundred at once, on one thread.
+//
 //   scatter_bench
+//
 // Exits 1 when each of the patches 11 to 100 costs more than 1.2 times as much as the first. The
 // cost includes construction of the patch, mapping, and union with the base.
 

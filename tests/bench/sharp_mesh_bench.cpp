@@ -1,5 +1,6 @@
 // Tests sharp meshing at random positions and rotations. Round solids must show no edge, cubes and
 // cylinders must show theirs.
+//
 //   sharp_mesh_bench [SOLIDS OF EACH KIND]
 
 #include <fmt/core.h>

@@ -1,7 +1,7 @@
 #!/bin/bash
-# How long `levelsmith help` takes, beside an empty program that links OpenVDB: medians of 20 runs.
-# Exits 1 when the CPU time passes 50 ms. The loader's work on the 69000 symbols of OpenVDB, which
-# Debian binds at once, is most of it (2026-11-23, two shared cores: 39 ms, of which 33).
+# Compares the time of `levelsmith help` with an empty program that links OpenVDB: medians of 20 runs.
+# Exits 1 when the CPU time exceeds 50 ms. Most of it is the loader's work on the 69000 symbols of OpenVDB,
+# which Debian binds at start-up (2026-11-23, two shared cores: 33 of 39 ms).
 #   startup.sh LEVELSMITH
 set -eu
 [ $# -eq 1 ] || { sed -n '2,5s/^# *//p' "$0"; exit 2; }
@@ -10,7 +10,7 @@ trap 'rm -r "$folder"' EXIT
 echo 'int main() {}' >"$folder/empty.cpp"
 ${CXX:-c++} -O2 "$folder/empty.cpp" -o "$folder/empty" -Wl,--no-as-needed -lopenvdb
 
-medians() {  # medians COMMAND…: wall and CPU, ms
+medians() {  # medians COMMAND…: wall-clock and CPU time, ms
   local i TIMEFORMAT='%3R %3U %3S'
   for ((i = 0; i < 20; ++i)); do { time "$@" >/dev/null 2>&1; } 2>&1; done |
     awk '{ print $1 * 1000, ($2 + $3) * 1000 }' >"$folder/times"

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""What actions take on solids of some million voxels, beside what --explain says before.
+"""Compares the time and memory of actions on solids of several million voxels with the estimate of --explain.
 
 usage: step_costs.py LEVELSMITH [ACTION ...]
-One thread; CPU seconds and the process' peak of memory less that of the action before, with the
-ratios of what was said to what was taken. Costs are rough: their ratios should lie between 0.4
-and 2.5, else the figures of the action (Operator::cost) want measuring again. rc 1 if one does not.
+Uses one thread. Prints CPU seconds, the peak memory of the process less the peak of the previous action, and the
+ratios of estimate to measurement. Costs are rough: their ratios should lie between 0.4 and 2.5. Otherwise the
+figures of the action (Operator::cost) must be measured again. Exits 1 if a ratio is outside this range.
 """
 
 import json
@@ -42,9 +42,9 @@ CHAINS = {
     "smooth, taubin": TORUS + "smooth --kind taubin --sigma 1vx",
     "smooth, faceted": FACETED + "smooth --sigma 2vx",
     "reinitialize": TORUS + "reinitialize",
-    "widen": TORUS + "widen --half-width 10",
-    "march": TORUS + "march --to 8vx",
-    "sweep": TORUS + "sweep --to 8vx",
+    "rebuild-band": TORUS + "rebuild-band --half-width 10",
+    "fast-marching": TORUS + "fast-marching --to 8vx",
+    "fast-sweeping": TORUS + "fast-sweeping --to 8vx",
     "closest-point": TORUS + "closest-point",
     "transform --bake": TORUS + "transform --rotate 30 --bake",
     "resample": TORUS + "resample --voxel {h}",
@@ -63,7 +63,7 @@ def words(chain, voxel):
 
 
 def said(command, chain):
-    """Seconds and bytes of the last action, as --explain tells them."""
+    """Seconds and bytes of the last action, as estimated by --explain."""
     told = subprocess.run([command, "--explain", *chain], capture_output=True, text=True, check=True).stdout
     row = told.splitlines()[-2]
     seconds = re.search(r"; ([0-9.e+-]+) s", row)

@@ -1,6 +1,8 @@
 // Prints the requested tolerance, the reported error and the true error of runs with --tolerance.
 // The solids are sphere, torus, nested solids and models, compared with exact surfaces.
+//
 //   tolerance_bench [MODELS]
+//
 // Exits 1 if a true error exceeds the requested tolerance, or if most errors are below a tenth of
 // it.
 

@@ -1,11 +1,11 @@
 #!/bin/sh
-# Configures the project with modules left out, and what only these need made unfindable: nothing of
-# them may be built or looked for. options.sh SOURCE WORK
+# Configures the project without some modules, and hides the packages that only these modules need. No part of
+# these modules may be built or searched for. options.sh SOURCE WORK
 set -eu
 source=$1
 work=$2
 
-configure() {  # configure NAME OPTIONS…: leaves what would be built in NAME.plan
+configure() {  # configure NAME OPTIONS…: lists the files to build in NAME.plan
   name=$1
   shift
   rm -rf "${work:?}/$name"
@@ -14,9 +14,9 @@ configure() {  # configure NAME OPTIONS…: leaves what would be built in NAME.p
   grep -q levelset_tests "$work/$name.plan"
 }
 
-lacks() {  # lacks NAME FOLDER: nothing is built in it
+lacks() {  # lacks NAME FOLDER: fails if a file in FOLDER would be built
   if grep -q " $2/" "$work/$1.plan"; then
-    echo "$1: $2/ was left out, yet it would be built:" >&2
+    echo "$1: $2/ is disabled but would be built:" >&2
     grep -m 3 " $2/" "$work/$1.plan" >&2
     exit 1
   fi

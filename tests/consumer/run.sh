@@ -1,12 +1,12 @@
 #!/bin/sh
-# Installs a build in parts, and builds the consumer against what was installed. run.sh BUILD SOURCE
+# Installs a build in parts, and builds the consumer with the installed files. run.sh BUILD SOURCE
 set -eu
 build=$1
 source=$2
 work=$build/consumer
 rm -rf "$work"
 
-# With levelset alone, nothing else may be looked for.
+# With levelset alone, no other module may be searched for.
 cmake --install "$build" --prefix "$work/some" --component levelset >/dev/null
 [ ! -d "$work/some/include/levelsmith/render" ]
 cmake -S "$source" -B "$work/build-some" -G Ninja -DCMAKE_PREFIX_PATH="$work/some" -DCMAKE_CXX_COMPILER_LAUNCHER=ccache >/dev/null

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Builds the fuzzed readers by the preset `fuzz`, with the modules of another build. build.sh BUILD
-# Ends with 77 (ctest: skipped) where there is no clang; in CI that is an error.
+# Builds the readers for the fuzzer with the preset `fuzz` and the modules of another build. build.sh BUILD
+# Exits 77 (ctest: skipped) if clang is missing. In CI that is an error.
 set -eu
 modules=$(cd "$1" && pwd)
 cd "$(dirname "$0")/../.."

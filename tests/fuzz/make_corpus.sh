@@ -1,6 +1,6 @@
 #!/bin/sh
-# The seeds that our own writers make, small ones. make_corpus.sh LEVELSMITH
-# The others in tests/fuzz/corpus were written by hand, or are inputs that once showed a defect.
+# Writes small seeds with Levelsmith's own writers. make_corpus.sh LEVELSMITH
+# The other seeds in tests/fuzz/corpus are written by hand, or are inputs that once revealed a defect.
 set -eu
 levelsmith="$1 --quiet --threads 1"
 cd "$(dirname "$0")/corpus"
@@ -8,7 +8,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir -p ply obj stl off gzip vdb nvdb png exr patch scene graph cache
 
-# In one octant, of which a file holds an inner node of a few kB.
+# Inside one octant, so that the file has one inner node of a few kB.
 solid="box --size 1,1,1 --center 2,2,2 --voxel 0.5 --as a"
 for format in ply obj stl off; do
   $levelsmith $solid ! mesh ! write "$format/box.$format"
@@ -17,7 +17,7 @@ $levelsmith $solid ! mesh ! write "$work/box.off.gz"
 mv "$work/box.off.gz" gzip/box.off.gz
 $levelsmith $solid ! write vdb/box.vdb ! write "$work/box.nvdb"
 head -c 1000 "$work/box.nvdb" >nvdb/head.nvdb
-$levelsmith $solid ! march --to 1 ! write vdb/march.vdb
+$levelsmith $solid ! fast-marching --to 1 ! write vdb/march.vdb
 $levelsmith $solid ! closest-point ! write vdb/closest-point.vdb
 $levelsmith $solid ! render exr/box.exr --size 4x3 --samples 1 --renderer cpu --png png/box.png
 $levelsmith sphere --radius 1 --voxel 0.25 ! patch --at 0,0,1 --size 0.6,0.6 --height 0.2 --spacing 0.3 --layers 2 ! \
@@ -30,6 +30,6 @@ $levelsmith --cache "$work/cache" box --size 1,1,1 --voxel 0.5 ! mesh ! measure 
 for entry in "$work"/cache/results/*.json; do
   target=cache/$(sed -n 's/.*"action": "\([a-z]*\)".*/\1/p' "$entry")
   cp "$entry" "$target"
-  mesh="${entry%.json}.mesh"  # its digest, of 32 letters, is made by the reader
+  mesh="${entry%.json}.mesh"  # the reader computes its digest of 32 letters
   [ ! -f "$mesh" ] || { printf '\0'; tail -c +33 "$mesh"; } >>"$target"
 done

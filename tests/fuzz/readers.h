@@ -5,9 +5,8 @@
 #include <string_view>
 #include <vector>
 
-/// Readers of files and texts from others, each under one name, tested with arbitrary bytes.
-/// libFuzzer runs them (fuzz_main.cpp), and the unit tests run them on the corpus
-/// (replay_test.cpp).
+/// Readers of files and texts from others, each under one name, tested with arbitrary bytes. The
+/// fuzzer runs them (fuzz_main.cpp), and the unit tests run them on the corpus (replay_test.cpp).
 namespace fuzz {
 
 /// Memory limit given to each reader, bytes.

@@ -1,7 +1,7 @@
 #!/bin/sh
-# One reader under libFuzzer. run.sh PROGRAM READER SECONDS [libFuzzer's options]
-# New inputs go to a folder beside the program, which is kept from run to run; an input that shows a
-# defect goes there too, and its name is printed.
+# Runs one reader under libFuzzer. run.sh PROGRAM READER SECONDS [libFuzzer's options]
+# Stores new inputs in a folder beside the program, which is kept from run to run. Stores an input that
+# reveals a defect there too, and prints its name.
 set -eu
 program=$1 reader=$2 seconds=$3
 shift 3
@@ -27,8 +27,8 @@ esac
   for word in $words; do cat "$here/dictionaries/$word.dict"; done
 } >"$found.dict"
 
-# What a reader may use is 64 MB (kMaxMemory). The limits are of one piece, and of the whole process with
-# what the sanitizers shadow and keep: freed memory for a while, pages of it for longer.
+# A reader may use 64 MB (kMaxMemory). The first limit is for one allocation. The second is for the complete
+# process with the memory of the sanitizers: shadow memory, and freed blocks and pages that they keep.
 export ASAN_OPTIONS="quarantine_size_mb=32:allocator_release_to_os_interval_ms=200:detect_leaks=1:${ASAN_OPTIONS:-}"
 exec "$program" "--reader=$reader" -max_total_time="$seconds" -timeout=5 -malloc_limit_mb=160 -rss_limit_mb=2048 \
   -dict="$found.dict" -artifact_prefix="$found-" -print_final_stats=1 -verbosity="${VERBOSITY:-0}" "$@" \

@@ -8,7 +8,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def actions(levelsmith):
-    """What the last run computed."""
+    """Actions that the last run computed."""
     return [step["action"] for step in levelsmith.last_report()["steps"]]
 
 
@@ -26,7 +26,7 @@ def ball(ls):
 
 @pytest.fixture
 def model():
-    """The path of a model, or the test is skipped."""
+    """Returns the path of a model, or skips the test."""
 
     def find(name):
         path = ROOT / "data" / "models" / name

@@ -1,4 +1,4 @@
-"""Between numpy and values."""
+"""Conversion between numpy arrays and values."""
 
 import gc
 import math
@@ -15,7 +15,7 @@ FACES = numpy.array(
 )  # fmt: skip
 
 
-def test_meshes_are_made_of_arrays(ls):
+def test_meshes_from_arrays(ls):
     for places in (numpy.float32, numpy.float64):
         for corners in (numpy.int32, numpy.int64, numpy.uint32, numpy.uint8):
             mesh = ls.Mesh(CUBE.astype(places), FACES.astype(corners))
@@ -58,12 +58,12 @@ def test_views_share_memory_and_outlive_the_mesh(ls):
         ([["a"] * 3] * 8, FACES),
     ],
 )
-def test_other_arrays_are_refused(ls, vertices, faces):
+def test_invalid_arrays_are_refused(ls, vertices, faces):
     with pytest.raises(ls.InputError, match="^Mesh: "):
         ls.Mesh(vertices, faces)
 
 
-def test_arrays_of_a_solid_know_where_they_lie(ls, ball):
+def test_arrays_of_a_solid_have_their_position(ls, ball):
     phi = ball.array()
     assert phi.dtype == numpy.float32 and phi.voxel == 0.05
     index = numpy.argwhere(numpy.abs(phi) < 0.1)
@@ -80,7 +80,7 @@ def test_arrays_of_a_solid_know_where_they_lie(ls, ball):
         ball.array(box=((-1e4,) * 3, (1e4,) * 3))
 
 
-def test_arrays_go_round(ls, ball):
+def test_arrays_are_restored_after_conversion(ls, ball):
     phi = ball.array()
     again = ls.from_array(phi, phi.voxel, phi.origin)
     assert not again.is_computed
@@ -91,7 +91,7 @@ def test_arrays_go_round(ls, ball):
     assert ls.compare(cut, ls.from_array(phi, phi.voxel, phi.origin))["hausdorff"] < 0.75 * 0.05
 
 
-def test_only_signs_and_slopes_beside_the_surface_matter(ls):
+def test_only_signs_and_slopes_near_the_surface_matter(ls):
     h = 0.1
     x = numpy.stack(numpy.meshgrid(*[numpy.arange(-15, 16) * h] * 3, indexing="ij"), -1)
     distance = numpy.linalg.norm(x, axis=-1) - 1
@@ -105,7 +105,7 @@ def test_only_signs_and_slopes_beside_the_surface_matter(ls):
 
 
 @pytest.mark.parametrize("reach, radius", [(10, 0.998), (10, 0.92), (11, 1.05), (12, 1.1)])
-def test_surfaces_beside_the_border_stay_where_they_are(ls, reach, radius):
+def test_surfaces_near_the_border_do_not_move(ls, reach, radius):
     h = 0.1
     x = numpy.stack(numpy.meshgrid(*[numpy.arange(-reach, reach + 1) * h] * 3, indexing="ij"), -1)
     distance = numpy.linalg.norm(x, axis=-1) - radius
@@ -114,7 +114,7 @@ def test_surfaces_beside_the_border_stay_where_they_are(ls, reach, radius):
 
 
 def test_a_solid_larger_than_its_band_stays_full(ls):
-    """Blocks without samples are inside, too."""
+    """Blocks without samples are inside too."""
     phi = ls.box(size=(8, 8, 8), voxel=0.1).array()
     solid = ls.from_array(phi, phi.voxel, phi.origin)
     assert solid.measure()["volume"] == pytest.approx(512, rel=1e-3)
@@ -122,7 +122,7 @@ def test_a_solid_larger_than_its_band_stays_full(ls):
     assert solid.array(((0, 0, 0), (0.1, 0.1, 0.1)))[0, 0, 0] < 0
 
 
-def test_arrays_that_are_no_solid_are_refused(ls):
+def test_arrays_without_a_solid_are_refused(ls):
     good = numpy.full((20, 20, 20), 0.3)
     good[5:15, 5:15, 5:15] = -0.3
     ls.from_array(good, 0.1).compute()
@@ -160,7 +160,7 @@ def test_functions_become_solids(ls):
     assert sum(calls) < 0.7 * 125**3
 
 
-def test_functions_of_any_slope(ls):
+def test_functions_with_any_slope(ls):
     def torus(p):
         r = numpy.hypot(p[:, 0], p[:, 1]) - 2
         return numpy.hypot(r, p[:, 2]) - 0.5
@@ -182,7 +182,7 @@ def test_thin_and_full_parts_of_functions_are_found(ls):
     assert cube.measure()["volume"] == pytest.approx(512, rel=2e-3)
 
 
-def test_functions_that_cannot_be_used_are_refused(ls):
+def test_invalid_functions_are_refused(ls):
     bounds = ((-2, -2, -2), (2, 2, 2))
 
     def refuse(f, bounds=bounds, voxel=0.2, kind=ls.InputError):

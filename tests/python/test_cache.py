@@ -1,4 +1,4 @@
-"""Results of earlier runs, in a folder."""
+"""Cache of results in a folder."""
 
 import pickle
 
@@ -9,14 +9,14 @@ from conftest import actions
 
 @pytest.fixture
 def kept(ls, tmp_path):
-    """The folder of results; none afterwards."""
+    """Sets the cache folder, and removes the setting afterwards."""
     ls.set_cache(tmp_path / "kept")
     yield tmp_path / "kept"
     ls.set_cache()
 
 
 def ran(ls):
-    """What the last run computed, but for what was known."""
+    """Actions that the last run computed, without cached ones."""
     return [step["action"] for step in ls.last_report()["steps"] if not step.get("known")]
 
 
@@ -39,7 +39,7 @@ def test_the_second_run_computes_nothing(ls, kept):
     assert (again.vertices == mesh.vertices).all() and (again.faces == mesh.faces).all()
 
 
-def test_what_is_held_and_not_needed_can_be_asked_for_later(ls, kept):
+def test_unneeded_values_can_be_computed_later(ls, kept):
     base = part(ls)
     grown = base.offset(0.1)
     grown.compute()
@@ -52,7 +52,7 @@ def test_what_is_held_and_not_needed_can_be_asked_for_later(ls, kept):
     assert "blend" not in ran(ls)
 
 
-def test_values_of_arrays_are_known_by_what_they_hold(ls, kept):
+def test_values_from_arrays_are_cached_by_content(ls, kept):
     phi = ls.sphere(radius=1, voxel=0.1).array()
 
     def work(phi):
@@ -95,7 +95,7 @@ def test_a_damaged_entry_is_computed_again(ls, kept):
     assert solid.compute().info()["hash"] == expected
 
 
-def test_a_folder_that_cannot_be_is_refused(ls, tmp_path):
+def test_an_invalid_folder_is_refused(ls, tmp_path):
     (tmp_path / "file").write_text("")
     ls.set_cache(tmp_path / "file")
     try:

@@ -1,4 +1,4 @@
-"""Refusals: class, exit code, and the sentences of the command line."""
+"""Errors: class, exit code, and the messages of the command line."""
 
 import logging
 import subprocess
@@ -22,7 +22,7 @@ def test_classes_and_exit_codes(ls):
     assert all(issubclass(c, ls.Error) for c in (ls.UsageError, ls.FileError, ls.ResourceError))
 
 
-def test_usage_is_refused_when_the_node_is_made(ls, ball):
+def test_usage_errors_are_raised_when_the_node_is_created(ls, ball):
     text, error = refusal(ls.UsageError, lambda: ls.sphere(radius=-1, voxel=0.1))
     assert text == "sphere: --radius: '-1' must be positive" and error.exit_code == 2
     text, _ = refusal(ls.UsageError, lambda: ls.sphere(raduis=1, voxel=0.1))
@@ -39,16 +39,16 @@ def test_usage_is_refused_when_the_node_is_made(ls, ball):
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), "nan", "1 2", [], True, b"1", object(), "１"])
-def test_no_such_value_is_a_length(ls, value):
+def test_invalid_lengths_are_refused(ls, value):
     refusal(ls.UsageError, lambda: ls.sphere(radius=value, voxel=0.1))
 
 
 @pytest.mark.parametrize("value", [(0, 0), (0, 0, float("nan")), "0,0", 1, (0, 0, None), {}, ((0, 0, 0),) * 2])
-def test_no_such_value_is_a_point(ls, value):
+def test_invalid_points_are_refused(ls, value):
     refusal(ls.UsageError, lambda: ls.sphere(radius=1, voxel=0.1, center=value))
 
 
-def test_what_fails_while_it_runs(ls, ball, tmp_path):
+def test_errors_during_the_run(ls, ball, tmp_path):
     text, _ = refusal(ls.FileError, lambda: ls.read(tmp_path / "none.ply").compute())
     assert text.startswith("read: there is no file") and text.endswith("check the name")
     refusal(OSError, lambda: ball.save(tmp_path / "no-such-folder" / "a.vdb"))
@@ -65,7 +65,7 @@ def test_what_fails_while_it_runs(ls, ball, tmp_path):
     refusal(ls.InputError, lambda: ls.read(tmp_path / "bad.ply").compute())
 
 
-def test_warnings_are_warnings(ls, ball, tmp_path):
+def test_warnings_are_python_warnings(ls, ball, tmp_path):
     import numpy
 
     mesh = ls.Mesh(numpy.eye(3), [[0, 1, 2]])
@@ -81,8 +81,8 @@ def test_notes_are_logged(ls, ball, caplog):
     assert any(record.name == "levelsmith" for record in caplog.records)
 
 
-def test_an_ended_interpreter_is_calm(ls):
-    """Values that live to the end, computed or not."""
+def test_interpreter_exit_is_silent(ls):
+    """Values may exist at interpreter exit, computed or not."""
     code = "import levelsmith as ls; a = ls.sphere(radius=1, voxel=0.1); b = a.compute().mesh()"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")

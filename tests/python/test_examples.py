@@ -1,4 +1,4 @@
-"""Every example runs, coarsely, and leaves pictures that show something."""
+"""Every example runs at low resolution and writes pictures with visible content."""
 
 import re
 import subprocess
@@ -21,7 +21,7 @@ COARSE = {
 }
 
 
-def test_what_the_readme_shows(tmp_path, monkeypatch):
+def test_readme_example(tmp_path, monkeypatch):
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     monkeypatch.chdir(tmp_path)
@@ -33,7 +33,7 @@ def test_what_the_readme_shows(tmp_path, monkeypatch):
     assert names["part"].measure()["components"] == 1
 
 
-def test_what_the_documentation_shows(tmp_path):
+def test_documentation_examples(tmp_path):
     pytest.importorskip("distributed")
     text = (ROOT / "docs/python.md").read_text(encoding="utf-8")
     script = tmp_path / "shown.py"
@@ -45,7 +45,7 @@ def test_what_the_documentation_shows(tmp_path):
 
 
 def check_tiles(folder):
-    """They are the picture that one run draws, but for a few pixels of the outline."""
+    """Expects that the tiles equal the picture of a single run, except for a few pixels of the outline."""
     import levelsmith as ls
     import matplotlib.image
     import numpy

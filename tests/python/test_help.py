@@ -1,4 +1,4 @@
-"""What is generated from the registry."""
+"""Functions and help generated from the registry."""
 
 import ast
 import inspect
@@ -45,7 +45,7 @@ def test_signatures(ls):
     assert rod.measure()["components"] == 1
 
 
-def test_the_stub_is_in_step_with_the_registry(ls):
+def test_the_stub_matches_the_registry(ls):
     path = Path(ls.__file__).with_name("__init__.pyi")
     tree = ast.parse(path.read_text())
     functions = {n.name: n for n in tree.body if isinstance(n, ast.FunctionDef)}
@@ -79,7 +79,7 @@ def test_the_stub_is_in_step_with_the_registry(ls):
             assert hasattr(getattr(ls, cls), member)
 
 
-def test_what_the_package_exports_is_documented(ls):
+def test_exported_names_are_documented(ls):
     for name in ls.__all__:
         assert getattr(ls, name).__doc__, name
 

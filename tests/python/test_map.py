@@ -1,4 +1,4 @@
-"""One graph over many parameters, here and on the workers of a cluster, of which one is killed."""
+"""Runs one graph over many parameters, locally and on a cluster, also while a worker is killed."""
 
 import json
 import os
@@ -34,14 +34,14 @@ def client():
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """The caller's folder, which is not that of the workers."""
+    """Folder of the caller, which differs from that of the workers."""
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
     return tmp_path / "here"
 
 
 def contents(folder):
-    """All that is in it, hidden files too."""
+    """Contents of the folder, hidden files included."""
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
@@ -50,7 +50,7 @@ def printed(reports):
 
 
 def kill_one_that_works(client, killed, is_over):
-    """Ends a process in the middle of a job."""
+    """Kills a worker process during a job."""
 
     def running(dask_worker):
         return [key for key, task in dask_worker.state.tasks.items() if task.state == "executing"]
@@ -119,7 +119,7 @@ def test_a_page_of_a_pipeline_has_pictures(ls, tmp_path):
     assert json.loads(data)["versions"]["OpenVDB"]
 
 
-def test_values_are_written_as_chains_have_them(ls, folder):
+def test_values_are_written_as_in_chains(ls, folder):
     text = "box --size ${size} --voxel ${voxel}\ntransform --translate ${to}\nmeasure --json\n"
     given = {"size": (1, 2, 1.5), "voxel": numpy.float32(0.125), "to": numpy.array([1, 2, 3.0])}
     (report,) = ls.map(text, [given])
@@ -128,7 +128,7 @@ def test_values_are_written_as_chains_have_them(ls, folder):
         ls.map(text, [{**given, "voxel": object()}])
 
 
-def test_a_function_returns_what_can_be_handed_over(ls):
+def test_functions_return_transferable_results(ls):
     def make(radius, deep=False):
         ball = ls.sphere(radius=radius, voxel=0.1)
         return {"solid": ball, "more": [ball.mesh(), ball.measure()["volume"]]} if deep else ball
@@ -145,7 +145,7 @@ def test_a_function_returns_what_can_be_handed_over(ls):
 def test_refusals_name_the_parameters(ls, folder):
     with pytest.raises(ls.UsageError, match=r"--radius: '-1'.*line 3.*\(parameters\[1\], radius = -1\)"):
         ls.map(PARTS, [{"radius": 1}, {"radius": -1}])
-    assert contents(folder) == {}  # all are checked before the first one runs
+    assert contents(folder) == {}  # all sets are checked before the first run
     with pytest.raises(ls.UsageError, match="^map: raduis=1: no variable .* did you mean 'radius'"):
         ls.map(PARTS, [{"raduis": 1}])
     with pytest.raises(ls.InputError, match=r"parameters\[1\], box = "):
@@ -181,7 +181,7 @@ def test_a_cache_is_shared(ls, folder):
     assert not any(step.get("known") for step in first[0]["steps"])
 
 
-def test_a_cluster_does_the_same(ls, client, tmp_path, monkeypatch):
+def test_a_cluster_gives_the_same_results(ls, client, tmp_path, monkeypatch):
     here, there = tmp_path / "here", tmp_path / "there"
     reports = []
     for place, where in ((here, None), (there, client)):
@@ -192,7 +192,7 @@ def test_a_cluster_does_the_same(ls, client, tmp_path, monkeypatch):
     assert contents(here) == contents(there) and len(contents(there)) == 8
 
 
-def test_functions_go_to_a_cluster(ls, client):
+def test_functions_run_on_a_cluster(ls, client):
     def make(radius):
         import levelsmith as ls
 
@@ -203,12 +203,12 @@ def test_functions_go_to_a_cluster(ls, client):
     for a, b in zip(here, there):
         assert a[0].info()["hash"] == b[0].info()["hash"]
         assert (a[1].vertices == b[1].vertices).all() and a[2] != b[2]
-    base = ls.sphere(radius=1, voxel=0.1)  # values go there, too
+    base = ls.sphere(radius=1, voxel=0.1)  # values are sent to workers too
     (grown,) = ls.map(lambda solid: solid.offset(0.1), [{"solid": base}], client)
     assert grown.info()["hash"] == base.offset(0.1).info()["hash"]
 
 
-def test_refusals_come_back_from_a_cluster(ls, client, folder):
+def test_errors_are_returned_from_a_cluster(ls, client, folder):
     text = "read ${file}\nmesh\nwrite ${file:stem}.ply\n"
     ls.sphere(radius=1, voxel=0.2).save("good.vdb")
     (folder / "bad.vdb").write_text("no grid")
@@ -226,7 +226,7 @@ def test_refusals_come_back_from_a_cluster(ls, client, folder):
         ls.map("sphere --radius ${radius} --voxel 0.1\n", RADII[:1], client)
 
 
-def test_what_was_told_before_a_refusal_is_told(ls, client):
+def test_messages_before_an_error_are_reported(ls, client):
     def work():
         import levelsmith as ls
 
@@ -250,7 +250,7 @@ def test_workers_share_a_cache(ls, client, folder):
 
 
 def test_the_job_of_a_killed_worker_is_run_again(ls, client, tmp_path):
-    """Each job leaves a mark before it computes and one behind it, with the process it ran in."""
+    """Each job writes a mark with its process id before its computation, and another after it."""
     marks = tmp_path / "marks"
     marks.mkdir()
 
@@ -270,9 +270,9 @@ def test_the_job_of_a_killed_worker_is_run_again(ls, client, tmp_path):
     begun = [path.name.split("-")[1:] for path in marks.glob("begun-*")]
     done = [path.name.split("-")[1:] for path in marks.glob("done-*")]
     cut = [i for i, process in begun if int(process) == pid and [i, process] not in done]
-    assert len(cut) == 1  # it was in the middle of that one,
-    assert [i for i, _ in done].count(cut[0]) == 1 and len(done) == 4  # which another one did
-    assert not list(marks.glob(".*"))  # nothing half written
+    assert len(cut) == 1  # the killed worker was running this job,
+    assert [i for i, _ in done].count(cut[0]) == 1 and len(done) == 4  # which another worker repeated
+    assert not list(marks.glob(".*"))  # no partial files
     (tmp_path / "here").mkdir()
     expected = ls.map(work, [{"i": i, "marks": tmp_path / "here"} for i in range(4)])
     for i, (a, b) in enumerate(zip(solids, expected)):
@@ -280,10 +280,11 @@ def test_the_job_of_a_killed_worker_is_run_again(ls, client, tmp_path):
         assert (marks / f"solid-{i}.vdb").read_bytes() == (tmp_path / f"here/solid-{i}.vdb").read_bytes()
 
 
-def test_a_job_that_kills_every_worker_is_given_up(ls, client):
+def test_a_job_that_kills_every_worker_is_abandoned(ls, client):
     with pytest.raises(ls.ResourceError, match=r"every worker that took this job died.*\(parameters\[1\], i = 1\)"):
         ls.map(lambda i: os.kill(os.getpid(), signal.SIGKILL) if i else i, [{"i": 0}, {"i": 1}], client)
-    client.wait_for_workers(2, timeout=60)  # of three: a nanny may give up on one that dies as it begins
+    # Two of three, because a nanny may give up on a worker that dies during start-up.
+    client.wait_for_workers(2, timeout=60)
     assert ls.map(lambda i: i, [{"i": 7}], client) == [7]
 
 
@@ -307,9 +308,9 @@ measure
     assert contents(tmp_path / "here") == contents(tmp_path / "there")
 
 
-def test_what_dead_processes_left_is_removed(ls, folder):
-    """As a job that was killed while it wrote leaves it."""
-    dead = 2**22 - 7  # beyond what a process is numbered
+def test_files_of_dead_processes_are_removed(ls, folder):
+    """Removes a file like the one that a job leaves when it is killed during writing."""
+    dead = 2**22 - 7  # larger than any process id
     for name in (f".part_0.8.vdb.{dead}-0.tmp", f".other.vdb.{dead}-0.tmp", f".part_0.8.vdb.{os.getpid()}-0.tmp"):
         (folder / name).write_text("half")
     ls.map(PARTS, RADII[:1])

@@ -1,4 +1,4 @@
-"""Progress, interruption, threads, the cost of a call, neighbours in the process."""
+"""Progress, interruption, threads, the time of a call, and OpenVDB in the same process."""
 
 import os
 import signal
@@ -12,11 +12,11 @@ import pytest
 
 
 def slow(ls):
-    """Takes seconds."""
+    """Value that takes seconds to compute."""
     return ls.box(size=(4, 4, 4), voxel=0.05).curvature_flow(time=0.5)
 
 
-def test_progress_is_told_in_the_calling_thread(ls):
+def test_progress_is_reported_in_the_calling_thread(ls):
     told = []
 
     def progress(action, fraction):
@@ -28,7 +28,7 @@ def test_progress_is_told_in_the_calling_thread(ls):
     assert all(0 <= fraction <= 1 for _, fraction in told)
 
 
-def test_progress_may_end_a_run(ls):
+def test_progress_can_cancel_a_run(ls):
     solid = slow(ls)
     start = time.monotonic()
     with pytest.raises(ls.Cancelled) as caught:
@@ -38,7 +38,7 @@ def test_progress_may_end_a_run(ls):
     assert not solid.is_computed
 
 
-def test_what_progress_raises_is_raised(ls):
+def test_exceptions_of_progress_propagate(ls):
     def progress(action, fraction):
         raise RuntimeError("mine")
 
@@ -62,10 +62,10 @@ def test_ctrl_c_ends_a_run_soon(ls):
     print(f"KeyboardInterrupt after {late * 1e3:.0f} ms")
     assert late < 3
     assert not solid.is_computed
-    ls.sphere(radius=1, voxel=0.1).compute()  # and all goes on
+    ls.sphere(radius=1, voxel=0.1).compute()  # later runs are not affected
 
 
-def test_other_threads_go_on_meanwhile(ls):
+def test_other_threads_continue_during_a_run(ls):
     done, beats = threading.Event(), []
 
     def beat():
@@ -84,7 +84,7 @@ def test_other_threads_go_on_meanwhile(ls):
     assert len(beats) > 10 and max(gaps) < max(0.2, 0.5 * spent)
 
 
-def test_threads_may_compute_the_same(ls):
+def test_threads_can_compute_the_same_value(ls):
     base = ls.sphere(radius=1, voxel=0.05)
     found, failures = [], []
 
@@ -125,8 +125,8 @@ def test_a_lazy_node_costs_microseconds(ls, ball):
         assert cost < 200e-6  # 20 µs on an idle machine; see tests/bench/python.py
 
 
-def test_it_lives_beside_openvdb(ls, tmp_path):
-    """Debian's python3-openvdb in the same process, in either order; they exchange files."""
+def test_module_works_beside_openvdb(ls, tmp_path):
+    """Imports Debian's python3-openvdb in the same process, in either order, and exchanges files."""
     probe = subprocess.run([sys.executable, "-c", "import pyopenvdb"], capture_output=True)
     if probe.returncode != 0:
         pytest.skip("python3-openvdb is not installed")

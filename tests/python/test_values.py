@@ -1,4 +1,4 @@
-"""Operators against closed forms, laziness, sharing, kinds."""
+"""Operators compared with closed forms, lazy evaluation, sharing, and kinds."""
 
 import gc
 import json
@@ -24,7 +24,7 @@ def test_a_ball_has_the_volume_of_a_ball(ball):
 def test_csg_has_the_volumes_of_closed_forms(ls):
     h = 0.05
     a, b = ls.sphere(radius=1, voxel=h), ls.sphere(radius=1, center=(1, 0, 0), voxel=h)
-    lens = 5 * math.pi / 12  # of two unit balls, a unit apart
+    lens = 5 * math.pi / 12  # intersection of two unit balls, a unit apart
     assert volume(a & b) == pytest.approx(lens, rel=2e-3)
     assert volume(a | b) == pytest.approx(2 * BALL - lens, rel=1e-3)
     assert volume(a - b) == pytest.approx(BALL - lens, rel=1e-2)
@@ -46,7 +46,7 @@ def test_methods_are_the_functions(ls, ball):
     assert more.measure()["components"] == 1
 
 
-def test_nothing_runs_before_it_is_asked_for(ls, ball):
+def test_no_action_runs_before_it_is_needed(ls, ball):
     made = (ball.offset(0.1) | ball.offset(-0.1)).mesh()
     assert not made.is_computed and not ball.is_computed
     report = ls.compute(made)
@@ -55,7 +55,7 @@ def test_nothing_runs_before_it_is_asked_for(ls, ball):
     assert ls.compute(made)["steps"] == []
 
 
-def test_what_is_held_is_computed_once(ls, ball):
+def test_referenced_values_are_computed_once(ls, ball):
     grown = ball.offset(0.1)
     a, b = grown.mesh(), grown.offset(0.1)
     ls.compute(a)
@@ -67,7 +67,7 @@ def test_what_is_held_is_computed_once(ls, ball):
     assert actions(ls) == ["mesh"]
 
 
-def test_what_only_unborn_values_need_is_computed_once_too(ls):
+def test_operands_of_uncomputed_values_are_computed_once(ls):
     base = ls.sphere(radius=1, voxel=0.1)
     a, b = base.mesh(), base.offset(0.2)
     del base
@@ -77,7 +77,7 @@ def test_what_only_unborn_values_need_is_computed_once_too(ls):
     assert actions(ls) == ["offset"]
 
 
-def test_what_nobody_can_ask_for_is_let_go(ls):
+def test_unreachable_results_are_released(ls):
     """Intermediate results of a long chain do not stay in memory."""
     solid = ls.sphere(radius=1, voxel=0.1)
     for _ in range(5):
@@ -98,8 +98,8 @@ def test_long_chains_neither_overflow_nor_leak(ls):
     gc.collect()
 
 
-def test_graphs_of_any_shape_and_order_give_what_they_should(ls):
-    """Balls about one centre, by unions, intersections and offsets; names come and go between runs."""
+def test_graphs_of_any_shape_and_order_give_correct_results(ls):
+    """Combines concentric balls by unions, intersections and offsets. Names appear and disappear between runs."""
     random = Random(3)
     base = {r: ls.sphere(radius=r, voxel=0.2) for r in (1.0, 1.6)}
     for _ in range(12):
@@ -121,7 +121,7 @@ def test_graphs_of_any_shape_and_order_give_what_they_should(ls):
             assert steps == []
 
 
-def test_a_failed_run_keeps_what_it_made(ls, ball):
+def test_a_failed_run_keeps_its_results(ls, ball):
     bad = ball.offset(-5)
     with pytest.raises(ls.InputError):
         bad.compute()
@@ -169,7 +169,7 @@ def test_the_graph_runs_again_on_the_command_line(ls, ball):
     assert nodes[2]["inputs"] == [0, 1]
 
 
-def test_names_are_told(ls, ball):
+def test_names_are_reported(ls, ball):
     ball.name = "ball"
     assert "'ball'" in repr(ball)
     scene = ls.scene(ball, ball.mesh())

@@ -1,4 +1,4 @@
-"""`pip install .`: the wheel holds what is needed, and works from where it is unpacked."""
+"""`pip install .`: the wheel contains all required files and works from the folder where it is unpacked."""
 
 import importlib.util
 import os

@@ -17,7 +17,7 @@ NarrowBand unitSphere(double voxelSize) {
                              {Imath::V3d(-1), Imath::V3d(1)}, voxelSize);
 }
 
-TEST(NarrowBand, CopiesShareUntilOneIsEdited) {
+TEST(NarrowBand, CopiesShareStorageUntilOneIsEdited) {
   const NarrowBand original = unitSphere(0.1);
   NarrowBand copy = original;
   EXPECT_EQ(&vdb(original), &vdb(copy));
@@ -27,7 +27,7 @@ TEST(NarrowBand, CopiesShareUntilOneIsEdited) {
   EXPECT_EQ(original.contentHash(), unitSphere(0.1).contentHash());
 }
 
-TEST(NarrowBand, KnowsItsFigures) {
+TEST(NarrowBand, ReportsItsProperties) {
   const NarrowBand band = unitSphere(0.1);
   EXPECT_DOUBLE_EQ(band.voxelSize(), 0.1);
   EXPECT_NEAR(band.halfWidth(), 3, 1e-6);

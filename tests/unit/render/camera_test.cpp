@@ -21,7 +21,7 @@ Camera tiltedCamera() {
   return camera;
 }
 
-/// NDC of the points along a ray is the image position the ray was made for.
+/// Expects that the NDC of points along a ray are the image position of the ray.
 void expectNdcMatchesRays(const Camera& camera) {
   for (const double x : {0.0, 17.25, 200.0, 400.0}) {
     for (const double y : {0.0, 150.0, 299.5}) {
@@ -42,13 +42,13 @@ TEST(Camera, RaysAgreeWithNdc) {
   expectNdcMatchesRays(camera);
 }
 
-TEST(Camera, SeesUpAboveAndRightToTheRight) {
+TEST(Camera, HasUpAboveAndRightToTheRight) {
   const Camera camera;
   EXPECT_GT(camera.ray(512, 0).direction.y, 0.1);
   EXPECT_GT(camera.ray(1024, 512).direction.x, 0.1);
   V3d p;
   camera.worldToCamera().multVecMatrix(V3d(1, 2, 0), p);
-  EXPECT_NEAR((p - V3d(1, 2, 5)).length(), 0, 1e-14);  // x right, y up, z along the view
+  EXPECT_NEAR((p - V3d(1, 2, 5)).length(), 0, 1e-14);  // x points right, y up, z along the view
 }
 
 TEST(Camera, FieldOfViewIsVertical) {
@@ -59,7 +59,7 @@ TEST(Camera, FieldOfViewIsVertical) {
   EXPECT_NEAR(std::acos(top.dot(camera.axis())), camera.verticalFov / 2, 1e-14);
 }
 
-TEST(Camera, SeesBetweenTwoPlanes) {
+TEST(Camera, SeesBetweenItsPlanes) {
   Camera camera = tiltedCamera();
   EXPECT_EQ(camera.ray(3, 5).near, 0);
   EXPECT_EQ(camera.ray(3, 5).far, Camera::kNoDepth);
@@ -96,7 +96,7 @@ TEST(Camera, FramesABoxAtAnyAspect) {
   }
 }
 
-TEST(Camera, RefusesWhatCannotSee) {
+TEST(Camera, RefusesInvalidCameras) {
   const auto refused = [](auto&& change) {
     Camera camera = tiltedCamera();
     change(camera);

@@ -24,7 +24,7 @@ std::size_t at(int x, int y) {
   return static_cast<std::size_t>(y * kSize + x);
 }
 
-/// A disc of radius 20 pixels, five units away.
+/// Disc with a radius of 20 pixels at a distance of five units.
 Image disc() {
   Image image(kSize, kSize);
   auto& depth = image.addChannel("Z", kMiss);
@@ -52,7 +52,7 @@ const LayerComparison& layerOf(const ImageComparison& found, const std::string& 
   return *layer;
 }
 
-TEST(CompareImages, FindsNothingBetweenAPictureAndItself) {
+TEST(CompareImages, FindsNoDifferenceBetweenAPictureAndItself) {
   const Image image = disc();
   for (const bool exact : {false, true}) {
     const ImageComparison found = compareImages(image, image, {.exact = exact});
@@ -64,7 +64,7 @@ TEST(CompareImages, FindsNothingBetweenAPictureAndItself) {
   }
 }
 
-TEST(CompareImages, ForgivesNoLeakAndNoFalseHit) {
+TEST(CompareImages, AcceptsNoLeakAndNoFalseHit) {
   const Image image = disc();
   Image leak = disc();
   leak.channels["Z"][at(30, 40)] = kMiss;
@@ -81,8 +81,8 @@ TEST(CompareImages, ForgivesNoLeakAndNoFalseHit) {
   EXPECT_EQ(haunted.difference.channels.at("coverage")[at(2, 3)], -1);
 }
 
-TEST(CompareImages, ForgivesRoundingAtTheOutline) {
-  // The outermost pixels of the row: one of 4096 may differ, ⌈1e-5 of them⌉.
+TEST(CompareImages, ToleratesRoundingAtTheOutline) {
+  // Of the 4096 pixels, ⌈1e-5 × 4096⌉ = 1 may differ: the outermost pixel of the row.
   Image other = disc();
   auto& depth = other.channels["Z"];
   int first = 0;
@@ -96,7 +96,7 @@ TEST(CompareImages, ForgivesRoundingAtTheOutline) {
   EXPECT_FALSE(compareImages(disc(), other).agrees());
 }
 
-TEST(CompareImages, TellsSharesAndTheWorstPixels) {
+TEST(CompareImages, ReportsSharesAndTheWorstPixels) {
   Image other = disc();
   auto& depth = other.channels["Z"];
   std::size_t changed = 0;
@@ -107,7 +107,7 @@ TEST(CompareImages, TellsSharesAndTheWorstPixels) {
   const LayerComparison& layer = layerOf(found, "Z");
   EXPECT_EQ(layer.median, 0);
   EXPECT_EQ(layer.p99, 0);
-  EXPECT_NEAR(layer.p999, 0.04 / 5.04, 1e-6);  // of 1256 the second largest
+  EXPECT_NEAR(layer.p999, 0.04 / 5.04, 1e-6);  // the second largest of 1256
   EXPECT_NEAR(layer.largest, 0.05 / 5.05, 1e-6);
   ASSERT_EQ(layer.worst.size(), 5u);
   for (std::size_t i = 1; i < 5; ++i) EXPECT_GT(layer.worst[i - 1].value, layer.worst[i].value);
@@ -117,7 +117,7 @@ TEST(CompareImages, TellsSharesAndTheWorstPixels) {
   EXPECT_FALSE(compareImages(disc(), other, {.tolerances = {{"Z", {0.02, 0.005}}}}).agrees());
 }
 
-TEST(CompareImages, MeasuresAnglesAndCurvaturesByTheVoxel) {
+TEST(CompareImages, MeasuresAnglesAndCurvaturesInVoxels) {
   Image other = disc();
   const std::size_t i = at(31, 31);
   other.channels["N.X"][i] = static_cast<float>(std::sin(1e-4));
@@ -129,7 +129,7 @@ TEST(CompareImages, MeasuresAnglesAndCurvaturesByTheVoxel) {
   EXPECT_TRUE(found.agrees()) << found.reason();
 }
 
-TEST(CompareImages, NeverTakesNaNForAgreement) {
+TEST(CompareImages, NeverAcceptsNaNAsAgreement) {
   Image other = disc();
   other.channels["curvature.gauss"][at(31, 31)] = std::nanf("");
   for (const bool swapped : {false, true}) {
@@ -143,7 +143,7 @@ TEST(CompareImages, NeverTakesNaNForAgreement) {
   }
 }
 
-TEST(CompareImages, TakesADepthThatIsNoneForNeitherHitNorMiss) {
+TEST(CompareImages, CountsAnInvalidDepthAsNeitherHitNorMiss) {
   for (const float broken : {std::nanf(""), -kMiss})
     for (const auto& [x, y] : {std::pair{31, 31}, {0, 0}}) {
       Image other = disc();
@@ -156,8 +156,8 @@ TEST(CompareImages, TakesADepthThatIsNoneForNeitherHitNorMiss) {
     }
 }
 
-TEST(CompareImages, ForgivesRoundingAtInnerOutlinesToo) {
-  // A step in the middle of the disc, and one pixel beside it on the other side.
+TEST(CompareImages, ToleratesRoundingAtInnerOutlinesToo) {
+  // A step in the middle of the disc. One pixel beside it belongs to the other side.
   const auto stepped = [](int column) {
     Image image = disc();
     for (int y = 0; y < kSize; ++y)
@@ -174,23 +174,23 @@ TEST(CompareImages, ForgivesRoundingAtInnerOutlinesToo) {
   const ImageComparison one = compareImages(stepped(32), other);
   EXPECT_EQ(one.unlikeAtOutline, 1u);
   EXPECT_TRUE(one.agrees()) << one.reason();
-  // A depth that neither side has, or two pixels away from the step: wrong.
+  // A depth that neither side has, or a pixel two pixels away from the step, is wrong.
   other.channels["Z"][at(32, 30)] = 4.5f;
   EXPECT_FALSE(compareImages(stepped(32), other).agrees());
   other = stepped(32);
   other.channels["Z"][at(34, 30)] = 5;
   EXPECT_FALSE(compareImages(stepped(32), other).agrees());
-  // A whole column is too many.
+  // A complete column exceeds the tolerance.
   EXPECT_FALSE(compareImages(stepped(32), stepped(33)).agrees());
 }
 
-TEST(CompareImages, AsksIdsToBeTheSame) {
+TEST(CompareImages, RequiresEqualIds) {
   Image other = disc();
   other.ids["id"][at(31, 31)] = 8;
   EXPECT_FALSE(compareImages(disc(), other).agrees());
 }
 
-TEST(CompareImages, AsksForTheSameBitsAndChannels) {
+TEST(CompareImages, RequiresEqualBitsAndChannels) {
   Image zero = disc();
   zero.channels["N.X"][at(0, 0)] = -0.0f;
   EXPECT_TRUE(compareImages(disc(), zero).agrees());
@@ -216,7 +216,7 @@ TEST(CompareImages, Refuses) {
                  levelset::UsageError);
 }
 
-TEST(CompareImages, SeesThatSamplesOfColourLeaveTheGeometry) {
+TEST(CompareImages, AcceptsGeometryThatColourSamplesDoNotChange) {
   render::Scene scene;
   scene.camera.width = scene.camera.height = 48;
   scene.solids.push_back({.band = levelset::makeSphere(1, Imath::V3d(0), 0.1)});

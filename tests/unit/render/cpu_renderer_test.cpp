@@ -1,4 +1,4 @@
-// Pictures of the kernel against those of the judge, layer by layer, by the tolerances of
+// Compares pictures of the kernel with those of the judge, layer by layer, with the tolerances of
 // docs/rendering.md.
 
 #include "render/cpu/cpu_renderer.h"
@@ -25,7 +25,7 @@ using namespace render;
 
 const RenderOptions kDataOnly = {.samples = 1, .ambientSamples = 0, .shadowSamples = 0};
 
-/// Why they differ; empty where they agree.
+/// Reason for a difference from the judge; empty if the pictures agree.
 std::string disagreement(const Scene& scene) {
   const Image ours = renderCpu(scene, kDataOnly), judge = renderEmbree(scene, kDataOnly);
   const ImageComparison found = compareImages(ours, judge);
@@ -39,7 +39,7 @@ TEST(CpuRenderer, AgreesWithTheJudge) {
   EXPECT_EQ(disagreement(sceneOf(levelset::makeBox(V3d(30, 30, 0.7), V3d(0.1, 0.2, 0.3), 1))), "");
 }
 
-TEST(CpuRenderer, AgreesWhateverTheUnitTheTurnAndThePlace) {
+TEST(CpuRenderer, AgreesForAnyUnitRotationAndPosition) {
   EXPECT_EQ(disagreement(sceneOf(levelset::makeSphere(2e-5, V3d(0), 1e-6))), "");
   const NarrowBand solid = rings();
   for (const double scale : {1e-3, 1.0, 1e6}) {
@@ -52,7 +52,7 @@ TEST(CpuRenderer, AgreesWhateverTheUnitTheTurnAndThePlace) {
   }
 }
 
-TEST(CpuRenderer, AgreesFromWithinFarAwayAndAlongTheLattice) {
+TEST(CpuRenderer, AgreesFromInsideFarAwayAndAlongTheLattice) {
   Scene scene = sceneOf(rings());
   scene.camera.from = V3d(24, 0.1, 0.2);  // inside the tube
   scene.camera.to = V3d(20, 10, 1);
@@ -76,7 +76,7 @@ TEST(CpuRenderer, HasNoHoleInAFaceOfTheBoxAcrossTheView) {
     }
 }
 
-TEST(CpuRenderer, AgreesCloseUpToAWideSolid) {
+TEST(CpuRenderer, AgreesCloseToAWideSolid) {
   Scene scene = sceneOf(levelset::makeBox(V3d(0.4, 0.4, 8), V3d(0.001, 0.002, 0.0037), 0.01));
   scene.camera.from = V3d(0.01, 0.03, 4.2);
   scene.camera.to = V3d(0, 0, 4);
@@ -96,11 +96,11 @@ TEST(CpuRenderer, DrawsTheNearerOfTwoSolids) {
   for (const std::uint32_t id : image.ids.at("id")) ++count[id];
   EXPECT_GT(count[7], 1000u);
   EXPECT_GT(count[2], 1000u);
-  EXPECT_EQ(count[3], 0u);  // the same place: the lower id counts
+  EXPECT_EQ(count[3], 0u);  // same position: the lower id wins
 }
 
-TEST(CpuRenderer, ColoursAsTheJudgeDoes) {
-  // Rays to the lights are the same, so only what rounding blocks or frees differs.
+TEST(CpuRenderer, HasTheColoursOfTheJudge) {
+  // Rays to the lights are the same, so only rounding at occluders causes differences.
   const Scene scene = sceneOf(rings(), 96, 72);
   const RenderOptions options = {.samples = 2, .ambientSamples = 8, .shadowSamples = 2};
   const Image ours = renderCpu(scene, options), judge = renderEmbree(scene, options);
@@ -125,7 +125,7 @@ TEST(CpuRenderer, Refuses) {
   EXPECT_THROW((void)renderCpu(sceneOf(apart)), levelset::ResourceLimit);
   Scene scene = sceneOf(levelset::makeSphere(20, V3d(0), 1), 32, 24);
   RenderOptions little = kDataOnly;
-  little.maxBytes = 200000;  // room for the picture
+  little.maxBytes = 200000;  // enough for the picture only
   EXPECT_THROW((void)renderCpu(scene, little), levelset::ResourceLimit);
   scene.camera.to = scene.camera.from;
   EXPECT_THROW((void)renderCpu(scene), levelset::UsageError);

@@ -1,5 +1,5 @@
-// Solids of solids along each ray: the expression, all crossings in their order, and pictures
-// against exact shapes, the judge and the GPU.
+// CSG expressions evaluated along each ray: the parser, all crossings in order, and pictures
+// compared with exact shapes, the judge and the GPU.
 
 #include <gtest/gtest.h>
 
@@ -33,7 +33,7 @@ using namespace render;
 const std::vector<std::string> kNames = {"a", "b", "c"};
 const RenderOptions kDataOnly = {.samples = 1, .ambientSamples = 0, .shadowSamples = 0};
 
-/// Of a, b and c at all eight points, a the lowest bit.
+/// Truth table of the expression over a, b and c at all eight points. `a` is the lowest bit.
 unsigned truthOf(const std::string& text) {
   const CsgExpression csg(text, kNames);
   unsigned table = 0;
@@ -45,18 +45,18 @@ unsigned truthOf(const std::string& text) {
   return table;
 }
 
-TEST(CsgExpression, SaysWhatItsWordsSay) {
+TEST(CsgExpression, EvaluatesAsWritten) {
   const unsigned a = 0xaa, b = 0xcc, c = 0xf0;
   EXPECT_EQ(truthOf("a"), a);
   EXPECT_EQ(truthOf(" a|b "), a | b);
   EXPECT_EQ(truthOf("a & b"), a & b);
   EXPECT_EQ(truthOf("a - b - c"), a & ~b & ~c & 0xff);
   EXPECT_EQ(truthOf("a - (b - c)"), a & ~(b & ~c) & 0xff);
-  EXPECT_EQ(truthOf("a | b & c - a"), a | (b & (c & ~a)));  // as Python reads it
+  EXPECT_EQ(truthOf("a | b & c - a"), a | (b & (c & ~a)));  // operator precedence of Python
   EXPECT_EQ(truthOf("((a | b)) & c"), (a | b) & c);
 }
 
-TEST(CsgExpression, RefusesWhatItCannotRead) {
+TEST(CsgExpression, RefusesInvalidExpressions) {
   for (const char* text : {"", "a |", "| a", "a b", "(a", "a)", "a - d", "a + b", "a - 1", "a.b"})
     EXPECT_THROW(CsgExpression(text, kNames), levelset::UsageError) << text;
   EXPECT_THROW(CsgExpression(std::string(1000, '(') + "a", kNames), levelset::UsageError);
@@ -67,7 +67,7 @@ TEST(CsgExpression, RefusesWhatItCannotRead) {
   EXPECT_THROW(CsgExpression("a - (" + closed + ")", kNames), levelset::UsageError);
 }
 
-TEST(CsgExpression, TellsWhereItIs) {
+TEST(CsgExpression, ReportsThePositionOfAnError) {
   const auto box = [](double low, double high) { return Imath::Box3d(V3d(low), V3d(high)); };
   const std::vector<Imath::Box3d> boxes = {box(0, 2), box(1, 5), box(7, 8)};
   const auto boundsOf = [&](const char* text) { return CsgExpression(text, kNames).bounds(boxes); };
@@ -78,7 +78,7 @@ TEST(CsgExpression, TellsWhereItIs) {
   EXPECT_EQ(boundsOf("a & c | b"), box(1, 5));
 }
 
-/// Two solids a and b, seen from where a scene of a alone is.
+/// Scene of two solids a and b, with the camera of a scene of `a` alone.
 Scene sceneOfTwo(const NarrowBand& a, const NarrowBand& b, const std::string& csg) {
   Scene scene = support::sceneOf(a);
   scene.solids[0].name = "a";
@@ -87,7 +87,7 @@ Scene sceneOfTwo(const NarrowBand& a, const NarrowBand& b, const std::string& cs
   return scene;
 }
 
-/// A ball with a ball of another grid taken away towards the eye.
+/// Ball minus a ball of another grid on the side of the eye.
 Scene bittenBall() {
   Scene scene = sceneOfTwo(levelset::makeSphere(20, V3d(0.1, 0.2, 0.3), 1),
                            levelset::makeSphere(8, V3d(0.4, 0.5, 20), 0.37), "a - b");
@@ -96,24 +96,24 @@ Scene bittenBall() {
   return scene;
 }
 
-/// Along the view's axis, for each kind of renderer.
+/// Checks the pixel on the view axis.
 void expectBitten(const Image& image, const char* what) {
   const std::size_t middle =
       static_cast<std::size_t>(image.height / 2) * static_cast<std::size_t>(image.width) +
       static_cast<std::size_t>(image.width / 2);
   EXPECT_NEAR(image.channels.at("Z")[middle], 88, 0.05) << what;
-  EXPECT_NEAR(image.channels.at("N.Z")[middle], 1, 0.01) << what;  // out of what is left
+  EXPECT_NEAR(image.channels.at("N.Z")[middle], 1, 0.01) << what;  // normal of the concave cut
   EXPECT_NEAR(image.channels.at("curvature.mean")[middle], -1.0 / 8, 0.004) << what;
   EXPECT_EQ(image.ids.at("id")[middle], 2u) << what;
 }
 
-TEST(CsgScene, ShowsTheInsideOfWhatIsTakenAway) {
+TEST(CsgScene, ShowsTheInsideOfASubtractedSolid) {
   const Scene scene = bittenBall();
   expectBitten(renderCpu(scene, kDataOnly), "cpu");
   expectBitten(renderEmbree(scene, kDataOnly), "embree");
 }
 
-TEST(CsgScene, IsTheSameOfTheProcessorTheGpuAndTheJudge) {
+TEST(CsgScene, AgreesOnProcessorGpuAndJudge) {
   const NarrowBand ball = levelset::makeSphere(20, V3d(0.1, 0.2, 0.3), 1),
                    box = levelset::makeBox(V3d(24), V3d(8.1, 6.3, 9.2), 0.61);
   for (const char* csg : {"a | b", "a & b", "a - b", "b - a", "(a - b) | (b - a)"}) {
@@ -131,7 +131,7 @@ TEST(CsgScene, IsTheSameOfTheProcessorTheGpuAndTheJudge) {
   }
 }
 
-TEST(CsgScene, OfFacesInOnePlaceShowsTheLowerId) {
+TEST(CsgScene, OfCoplanarFacesShowsTheLowerId) {
   const NarrowBand ball = levelset::makeSphere(20, V3d(0.1, 0.2, 0.3), 1);
   Scene scene = sceneOfTwo(ball, ball, "a & b");
   scene.solids[0].id = 9;
@@ -149,7 +149,7 @@ TEST(CsgScene, HasTheBitsOfTheGpuInItsShadowsToo) {
   EXPECT_TRUE(found.agrees()) << found.reason();
 }
 
-TEST(CsgScene, IsTheSolidOfTheGridsOperator) {
+TEST(CsgScene, MatchesTheOperatorOnGrids) {
   const NarrowBand a = levelset::makeSphere(20, V3d(0.1, 0.2, 0.3), 0.5),
                    b = levelset::makeSphere(15, V3d(12.3, 4, 9), 0.5);
   const Scene scene = sceneOfTwo(a, b, "a - b");
@@ -163,13 +163,13 @@ TEST(CsgScene, IsTheSolidOfTheGridsOperator) {
     if (std::isfinite(z[i]) != std::isfinite(w[i])) ++unlike;
     if (!std::isfinite(z[i]) || !std::isfinite(w[i])) continue;
     ++hits;
-    if (std::abs(z[i] - w[i]) > 0.5f) ++unlike;  // the crease, which the grid rounds off
+    if (std::abs(z[i] - w[i]) > 0.5f) ++unlike;  // the crease, which the grid rounds
   }
   EXPECT_GT(hits, z.size() / 10);
   EXPECT_LT(unlike, hits / 50);
 }
 
-TEST(CsgScene, ShowsNothingOfWhatIsNotThere) {
+TEST(CsgScene, DrawsNothingForAnEmptyResult) {
   const NarrowBand ball = levelset::makeSphere(20, V3d(0), 1),
                    far = levelset::makeSphere(5, V3d(50, 0, 0), 1),
                    larger = levelset::makeSphere(30, V3d(0), 1);
@@ -178,8 +178,8 @@ TEST(CsgScene, ShowsNothingOfWhatIsNotThere) {
       for (const float z : image.channels.at("Z")) ASSERT_FALSE(std::isfinite(z));
 }
 
-TEST(CsgScene, CastsNoShadowOfWhatIsTakenAwayAndHidesNothingBehindIt) {
-  // A slab between the light and the ball counts only where it is joined.
+TEST(CsgScene, SubtractedPartsCastNoShadowAndHideNothing) {
+  // A slab between the light and the ball counts only in a union.
   const NarrowBand ball = levelset::makeSphere(20, V3d(0), 1),
                    slab = levelset::makeBox(V3d(80, 4, 80), V3d(0, 40, 0), 1);
   const auto brightness = [&](const char* csg, bool isJudge) {
@@ -199,8 +199,9 @@ TEST(CsgScene, CastsNoShadowOfWhatIsTakenAwayAndHidesNothingBehindIt) {
   }
 }
 
-TEST(CsgScene, DarkensAHollowWhoseWallsAreFarWithinTheOtherSolid) {
-  // Rays to the sky end within the ball: only what comes behind their end tells that it is there.
+TEST(CsgScene, DarkensAHollowWhoseWallsAreDeepInTheOtherSolid) {
+  // Rays to the sky end inside the ball. Only the crossing beyond their end shows that the ball is
+  // there.
   Scene scene = sceneOfTwo(levelset::makeSphere(40, V3d(0), 1),
                            levelset::makeCapsule(V3d(0, 0, -10), V3d(0, 0, 60), 5, 1), "a - b");
   scene.camera.from = V3d(0, 0, 200);
@@ -217,8 +218,8 @@ TEST(CsgScene, DarkensAHollowWhoseWallsAreFarWithinTheOtherSolid) {
   }
 }
 
-TEST(Thickness, IsThatOfTheExactSolids) {
-  // Through a ball, and through what a smaller one of another grid leaves of it.
+TEST(Thickness, MatchesTheExactSolids) {
+  // Through a ball, and through the same ball minus a smaller ball of another grid.
   const NarrowBand ball = levelset::makeSphere(20, V3d(0), 0.5),
                    hole = levelset::makeSphere(8, V3d(0), 0.3);
   RenderOptions options = kDataOnly;
@@ -252,7 +253,7 @@ TEST(Thickness, IsThatOfTheExactSolids) {
   }
 }
 
-TEST(Thickness, IsTheSameOfAllRenderersAndFromWithin) {
+TEST(Thickness, AgreesOnAllRenderersAlsoFromInside) {
   RenderOptions options = kDataOnly;
   options.thickness = true;
   Scene scene = support::sceneOf(support::rings());
@@ -268,7 +269,7 @@ TEST(Thickness, IsTheSameOfAllRenderersAndFromWithin) {
     for (const LayerComparison& layer : found.layers)
       EXPECT_TRUE(layer.layer != "thickness" || layer.median < 1e-6) << layer.median;
     if (!isWithin) continue;
-    // From within, all the way to the first wall at least.
+    // From inside, the thickness extends at least to the first wall.
     for (std::size_t i = 0; i < cpu.pixelCount(); ++i)
       if (std::isfinite(cpu.channels.at("Z")[i])) {
         ASSERT_GE(cpu.channels.at("thickness")[i], cpu.channels.at("Z")[i] * 0.999f);
@@ -282,7 +283,7 @@ struct Crossing {
   std::array<int, 3> cell;
 };
 
-/// The crossings of one ray, one after another, by the kernel.
+/// All crossings of one ray in order, by the kernel.
 std::vector<Crossing> allCrossings(const KernelSolid& solid, float x, float y) {
   const CpuTracer tracer;
   std::vector<Crossing> all;
@@ -302,7 +303,7 @@ std::vector<Crossing> allCrossings(const KernelSolid& solid, float x, float y) {
   return all;
 }
 
-/// A ball of noise, whose cells hold several sheets each.
+/// A ball of noise with several sheets in each cell.
 NarrowBand noise() {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> even(-1, 1);
@@ -314,7 +315,7 @@ NarrowBand noise() {
       Imath::Box3d(V3d(-10), V3d(10)), 1);
 }
 
-TEST(CsgScene, IsTheSameOfNoise) {
+TEST(CsgScene, AgreesOnNoise) {
   const Scene scene = sceneOfTwo(noise(), levelset::makeSphere(7, V3d(3, 2, 1), 0.7), "a - b");
   const Image cpu = renderCpu(scene, kDataOnly);
   EXPECT_TRUE(compareImages(cpu, renderGpu(scene, kDataOnly), {.exact = true}).agrees());
@@ -330,7 +331,7 @@ TEST(CsgScene, IsTheSameOfNoise) {
   EXPECT_LE(unlike, both / 1000);  // rays that graze a sheet
 }
 
-TEST(AllCrossings, ComeInTheirOrderInAndOut) {
+TEST(AllCrossings, AreOrderedAndAlternateInAndOut) {
   for (const Filter filter : {Filter::Trilinear, Filter::BSpline, Filter::BSplineQi}) {
     std::size_t most = 0, inOneCell = 0, crossed = 0;
     for (const Scene& scene : {support::sceneOf(support::rings()), support::sceneOf(noise())}) {

@@ -37,7 +37,7 @@ TEST(CubicRoot, TakesTheFirstOfThree) {
   EXPECT_NEAR(firstSignChange(withRoots(0.9, 0.2, 0.5)), 0.2, 1e-14);
 }
 
-TEST(CubicRoot, SeesTwoRootsBetweenEqualSigns) {
+TEST(CubicRoot, FindsTwoRootsBetweenEqualSigns) {
   for (const double gap : {1e-1, 1e-3, 1e-6}) {
     const BernsteinCubic cubic = withRoots(0.37 - gap, 0.37 + gap, 3);
     EXPECT_TRUE(hasSignChange(cubic));
@@ -46,7 +46,7 @@ TEST(CubicRoot, SeesTwoRootsBetweenEqualSigns) {
   }
 }
 
-TEST(CubicRoot, SeesNoneWhereThereIsNone) {
+TEST(CubicRoot, FindsNoRootWhereThereIsNone) {
   for (const BernsteinCubic& cubic :
        {BernsteinCubic{1, 2, 3, 4}, BernsteinCubic{-1, -2, -1, -4}, BernsteinCubic{0, 0, 0, 0},
         BernsteinCubic{1, -0.3, -0.3, 1}, withRoots(-1e-9, -1, -2), withRoots(0.5, 0.5, -1)}) {

@@ -1,5 +1,5 @@
-// What is nearer than the near plane or beyond the far one is not seen: exact shapes, what casts
-// shadows, and the renderers against each other.
+// Surfaces before the near plane or beyond the far plane are invisible. Tested with exact shapes,
+// shadow casters, and the renderers against each other.
 
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ const RenderOptions kData = {
     .samples = 1, .ambientSamples = 0, .shadowSamples = 0, .thickness = true};
 constexpr double kRadius = 20, kAway = 100, kHeight = 50;
 
-/// A ball, seen along −z from kAway.
+/// A ball seen along −z from kAway.
 Scene ballScene(double near, std::optional<double> far) {
   Scene scene = support::sceneOf(levelset::makeSphere(kRadius, V3d(0), 0.5));
   scene.solids[0].name = "a";
@@ -36,7 +36,8 @@ Scene ballScene(double near, std::optional<double> far) {
   return scene;
 }
 
-/// Calls judge(pixel, r²) with the distance from the axis of pixels off the ball's outline.
+/// Calls judge(pixel, r²) with the squared distance from the axis, for pixels off the ball's
+/// outline.
 void forEachPixel(const Image& image, const std::function<void(std::size_t, double)>& judge) {
   const double pixel = kHeight / image.height;
   for (int y = 0; y < image.height; ++y)
@@ -55,7 +56,7 @@ double at(const Image& image, const char* channel, std::size_t i) {
   return static_cast<double>(image.channels.at(channel)[i]);
 }
 
-TEST(DepthRange, CutsABallBetweenItsPlanes) {
+TEST(DepthRange, CutsABallAtItsPlanes) {
   struct Range {
     double near;
     std::optional<double> far;
@@ -76,13 +77,13 @@ TEST(DepthRange, CutsABallBetweenItsPlanes) {
         ASSERT_EQ(std::isfinite(at(image, "Z", i)), seesFront || seesBack) << near << ' ' << r2;
         if (!seesFront && !seesBack) return;
         ASSERT_NEAR(at(image, "Z", i), seesFront ? in : out, 0.1);
-        // Outwards, as it is from within.
+        // The normal points outwards, also from inside.
         ASSERT_NEAR(at(image, "N.Z", i), (seesFront ? half : -half) / kRadius, 0.01);
       });
   }
 }
 
-/// The picture of a scene by all renderers, which are to have it alike.
+/// Expects that all renderers draw the scene alike.
 void expectAlike(const Scene& scene, const std::string& what, Filter filter = Filter::Trilinear) {
   RenderOptions data = kData, lit = {.samples = 2, .ambientSamples = 2, .shadowSamples = 1};
   data.filter = lit.filter = filter;
@@ -101,7 +102,7 @@ void expectAlike(const Scene& scene, const std::string& what, Filter filter = Fi
       << what;
 }
 
-TEST(DepthRange, IsTheSameOfAllRenderers) {
+TEST(DepthRange, AgreesOnAllRenderers) {
   for (const bool isOrtho : {false, true}) {
     Scene scene = support::sceneOf(support::rings());
     const double away = (scene.camera.to - scene.camera.from).length();
@@ -114,7 +115,7 @@ TEST(DepthRange, IsTheSameOfAllRenderers) {
   }
 }
 
-TEST(DepthRange, IsTheSameOfSolidsOfCsgAndOfSplines) {
+TEST(DepthRange, AgreesForCsgAndSplines) {
   Scene scene = support::sceneOf(levelset::makeSphere(20, V3d(0.1, 0.2, 0.3), 1));
   scene.solids.push_back({.band = levelset::makeBox(V3d(24), V3d(8.1, 6.3, 9.2), 0.61), .id = 2});
   const double away = (scene.camera.to - scene.camera.from).length();
@@ -157,7 +158,7 @@ TEST(DepthRange, CutsMeshesBesideSolids) {
   EXPECT_EQ(idOfMiddle(125, 129, z), 0u);
 }
 
-TEST(DepthRange, LeavesShadowsAsTheyAre) {
+TEST(DepthRange, DoesNotChangeShadows) {
   // A roof before the near plane, between the ball and the light.
   const auto brightness = [](bool hasRoof, bool isJudge) {
     Scene scene = ballScene(79, {});
@@ -178,7 +179,7 @@ TEST(DepthRange, LeavesShadowsAsTheyAre) {
     EXPECT_LT(brightness(true, isJudge), 0.8 * brightness(false, isJudge));
 }
 
-TEST(DepthRange, StandsInThePicturesHeader) {
+TEST(DepthRange, IsStoredInThePictureHeader) {
   const Image whole = renderCpu(ballScene(0, {}), kData),
               cut = renderCpu(ballScene(90, 112.5), kData);
   EXPECT_FALSE(whole.attributes.contains("ls:near") || whole.attributes.contains("ls:far"));

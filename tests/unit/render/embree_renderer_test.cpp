@@ -25,7 +25,7 @@ Scene sphereScene(int width, int height) {
   return scene;
 }
 
-/// A ball over a slab: shadows and occlusion.
+/// A ball over a slab, with shadows and occlusion.
 Scene ballOverSlab(int width, int height) {
   Scene scene;
   scene.solids.push_back(
@@ -76,8 +76,8 @@ TEST(EmbreeRenderer, LayersOfASphere) {
   EXPECT_EQ(image.matrices.at("worldToNDC").size(), 16u);
 }
 
-// Z is measured along the axis, P lies on the pixel's ray, for both kinds of camera.
-TEST(EmbreeRenderer, DepthAndPositionBelongTogether) {
+// Z is measured along the axis, and P lies on the pixel's ray, for both kinds of camera.
+TEST(EmbreeRenderer, DepthAndPositionAreConsistent) {
   Scene scene = sphereScene(40, 30);
   scene.camera.from = {2, 3, 4};
   for (const bool isOrthographic : {false, true}) {
@@ -102,7 +102,7 @@ TEST(EmbreeRenderer, DepthAndPositionBelongTogether) {
   }
 }
 
-// Under the sky alone a convex solid sees all of it: occlusion must not darken one pixel.
+// Under uniform light all of a convex solid sees the sky, so occlusion must not darken any pixel.
 TEST(EmbreeRenderer, ConvexSolidIsUnoccluded) {
   Scene scene = sphereScene(48, 48);
   scene.key.strength = 0;
@@ -138,7 +138,7 @@ TEST(EmbreeRenderer, SamePixelsForAnyThreadCount) {
   expectSameImage(one, withThreads(4));
 }
 
-TEST(EmbreeRenderer, ReportsAndCancels) {
+TEST(EmbreeRenderer, ReportsProgressAndCancels) {
   const Scene scene = sphereScene(64, 64);
   double last = 0;
   RenderOptions options{.samples = 1, .ambientSamples = 0, .shadowSamples = 0};

@@ -26,7 +26,7 @@ Scene sceneOf(const NarrowBand& band) {
   return scene;
 }
 
-/// The interpolant, written down once more and as plainly as can be.
+/// The trilinear interpolant, written in the simplest form.
 double trilinear(const NarrowBand& band, const V3d& world) {
   const openvdb::FloatGrid& grid = levelset::vdb(band);
   const openvdb::Vec3d p = grid.worldToIndex(levelset::toVdb(world));
@@ -46,9 +46,9 @@ V3d randomDirection(std::mt19937& random) {
   return V3d(normal(random), normal(random), normal(random)).normalized();
 }
 
-// Rays towards the centre meet the sphere at right angles, so the error of the depth is that of the
-// interpolant: h²/8 times the Laplacian, which is 2/r within the cell, and the rounding of the
-// values.
+// Rays towards the centre meet the sphere at right angles, so the depth has the error of the
+// interpolant. This error is h²/8 times the Laplacian, which is 2/r within the cell, plus the
+// rounding of the values.
 TEST(EmbreeScene, SphereDepthConvergesSecondOrder) {
   const V3d centre(0.013, -0.021, 0.007);
   double previous = 0;
@@ -90,10 +90,10 @@ TEST(EmbreeScene, HitsLieOnTheInterpolant) {
   EXPECT_GT(hits, 1000);
 }
 
-// Origins on lattice points, lattice-aligned, diagonal and nearly axial directions; grid values
-// that are exactly zero. A ray must hit where the exact sphere is clearly met, miss where it is
-// clearly missed, and in between the interpolant itself is marched.
-TEST(EmbreeScene, LatticeRaysNeitherLeakNorInvent) {
+// Origins are on lattice points, directions are axial, diagonal or nearly axial, and grid values
+// may be exactly zero. A ray must hit if it clearly meets the exact sphere, and miss if it clearly
+// misses it. In between, the test steps along the interpolant itself.
+TEST(EmbreeScene, LatticeRaysNeitherLeakNorHitFalsely) {
   const double radius = 50;
   const NarrowBand band = sphereBand(V3d(0), radius, 1);
   const EmbreeScene scene(sceneOf(band));
@@ -133,7 +133,7 @@ TEST(EmbreeScene, LatticeRaysNeitherLeakNorInvent) {
             least = std::min(least, value);
           }
           missed += isInside && !hit.found;
-          extra += hit.found && least > 1e-6;  // the march steps over what is shallower
+          extra += hit.found && least > 1e-6;  // the step length exceeds the width of such a hit
         }
       }
     }
@@ -168,9 +168,9 @@ TEST(EmbreeScene, ThinSheetHasNoHoles) {
   }
 }
 
-// The saddle c - (x - 1/2)(y - 1/2) is its own trilinear interpolant and has exact grid values;
-// rays cross the same cell's surface twice, between ends of one sign.
-TEST(EmbreeScene, SeesBothCrossingsWithinOneCell) {
+// The saddle c - (x - 1/2)(y - 1/2) equals its trilinear interpolant and has exact grid values.
+// Rays cross the surface twice in one cell, between ends of equal sign.
+TEST(EmbreeScene, FindsBothCrossingsWithinOneCell) {
   const double c = 1.0 / 64;
   const EmbreeScene scene(sceneOf(support::sampleBand(
       [=](const V3d& p) { return c - (p.x - 0.5) * (p.y - 0.5); }, {V3d(-2), V3d(2)}, 1)));
@@ -184,7 +184,7 @@ TEST(EmbreeScene, SeesBothCrossingsWithinOneCell) {
     const double qa = -d.x * d.y, qb = -(u * d.y + v * d.x), qc = c - u * v;
     const double discriminant = qb * qb - 4 * qa * qc;
     if (std::abs(discriminant) < 1e-9 || std::abs(qc) < 1e-6) continue;
-    // How far the cell reaches along the ray.
+    // Length of the ray within the cell.
     double leave = 10;
     for (int a = 0; a < 3; ++a) leave = std::min(leave, ((d[a] > 0 ? 1 : 0) - start[a]) / d[a]);
     double roots[2] = {10, 10};
@@ -209,7 +209,7 @@ TEST(EmbreeScene, SeesBothCrossingsWithinOneCell) {
   EXPECT_GT(missing, 1000);
 }
 
-TEST(EmbreeScene, RayFromInsideHitsWhereItLeaves) {
+TEST(EmbreeScene, RayFromInsideHitsTheExit) {
   const EmbreeScene scene(sceneOf(sphereBand(V3d(0), 1, 0.05)));
   std::mt19937 random(17);
   for (int i = 0; i < 500; ++i) {
@@ -217,7 +217,7 @@ TEST(EmbreeScene, RayFromInsideHitsWhereItLeaves) {
     const Hit hit = scene.intersect(V3d(0), d);
     ASSERT_TRUE(hit.found);
     ASSERT_NEAR(hit.distance, 1, 0.25 * 0.05 * 0.05 + 1e-7);
-    ASSERT_GT(hit.normal.dot(d), 0.999);  // outwards
+    ASSERT_GT(hit.normal.dot(d), 0.999);  // points outwards
   }
 }
 
@@ -234,7 +234,7 @@ TEST(EmbreeScene, NearAndFarLimitTheSearch) {
   EXPECT_FALSE(scene.isOccluded(origin, d, back.distance + 1e-9, 1e9));
 }
 
-TEST(EmbreeScene, DistanceDoesNotCoarsenTheHit) {
+TEST(EmbreeScene, DistanceDoesNotReducePrecision) {
   const NarrowBand band = sphereBand(V3d(0), 1, 0.05);
   const EmbreeScene scene(sceneOf(band));
   const V3d d = V3d(0.3, -0.4, 0.8).normalized();
@@ -344,7 +344,7 @@ TEST(EmbreeScene, EmptySceneHasNoHits) {
   EXPECT_FALSE(scene.isOccluded(V3d(0), V3d(1, 0, 0), 0, 1));
 }
 
-TEST(EmbreeScene, RefusesRaysThatLeadNowhere) {
+TEST(EmbreeScene, RefusesInvalidRays) {
   const EmbreeScene scene(sceneOf(sphereBand(V3d(0), 1, 0.2)));
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW((void)scene.intersect(V3d(nan, 0, 0), V3d(1, 0, 0)), levelset::UsageError);

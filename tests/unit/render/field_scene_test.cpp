@@ -1,4 +1,5 @@
-// Soft CSG and morphs along each ray: against the judge, beside meshes, and where they are refused.
+// Soft CSG and morphs along each ray: comparison with the judge, scenes with meshes, and invalid
+// scenes.
 
 #include <gtest/gtest.h>
 
@@ -24,7 +25,7 @@ namespace field_scene_test {
 
 using namespace support::fields;
 
-/// Grids of three resolutions, two of them turned.
+/// Grids of three resolutions, two of them rotated.
 std::vector<NarrowBand> threeGrids() {
   const auto turn = [](const V3d& angles) { return Imath::M44d().rotate(angles); };
   return {
@@ -43,7 +44,7 @@ TEST(FieldJudge, AgreesOnThreeGrids) {
     expectJudged(blended(threeGrids(), csg, 2.5, 160, 120), csg);
 }
 
-TEST(FieldJudge, AgreesFromWithinFromFarAndAlongTheSurface) {
+TEST(FieldJudge, AgreesFromInsideFromFarAndAlongTheSurface) {
   Scene scene = blended(threeGrids(), "(a | b) - c", 3);
   const Camera outside = scene.camera;
   scene.camera.from = V3d(0.3, 2.2, -3.1);
@@ -53,7 +54,7 @@ TEST(FieldJudge, AgreesFromWithinFromFarAndAlongTheSurface) {
   scene.camera.from = outside.to + (outside.from - outside.to).normalized() * 1e5;
   scene.camera.verticalFov = 1.2 * scene.bounds().size().length() / 1e5;
   expectJudged(scene, "from far");
-  // Just above the ball's top.
+  // Slightly above the top of the ball.
   scene = blended({exactBall(V3d(0), 20, 1), exactBall(V3d(30, 0, 0), 14, 0.7)}, "a | b", 4);
   scene.camera.from = V3d(-60, 0.2, 20.02);
   scene.camera.to = V3d(60, 0.1, 20.05);
@@ -84,7 +85,7 @@ TEST(FieldJudge, AgreesAlongTheLattice) {
 }
 
 TEST(FieldJudge, AgreesOnNoise) {
-  // Cells that hold several sheets each, and slopes far from 1.
+  // Cells with several sheets each, and slopes far from 1.
   std::mt19937 random(5);
   std::uniform_real_distribution<double> even(-1, 1);
   const NarrowBand noise = support::sampleBand(
@@ -115,7 +116,7 @@ TEST(FieldJudge, AgreesInThicknessAndShadows) {
   const ImageComparison found =
       compareImages(renderCpu(scene, options), renderEmbree(scene, options));
   EXPECT_TRUE(found.agrees()) << found.reason();
-  // Of a ball that a capsule is taken from, the hollow is dark, in the one as in the other.
+  // The hollow of a ball minus a capsule is dark in both pictures.
   options = {.samples = 1, .ambientSamples = 32, .shadowSamples = 4};
   scene = blended({levelset::makeSphere(20, V3d(0), 1),
                    levelset::makeCapsule(V3d(0, 0, -5), V3d(0, 0, 40), 5, 0.7, {.halfWidth = 5})},
@@ -127,7 +128,7 @@ TEST(FieldJudge, AgreesInThicknessAndShadows) {
     const std::size_t i = static_cast<std::size_t>(y) * 96 + static_cast<std::size_t>(x);
     return static_cast<double>(image.channels.at("R")[i] + image.channels.at("G")[i]);
   };
-  std::size_t unlike = 0;  // a ray to the light that grazes
+  std::size_t unlike = 0;  // rays to the light that graze the surface
   for (int y = 0; y < 72; ++y)
     for (int x = 0; x < 96; ++x)
       unlike += std::abs(lightAt(cpu, x, y) - lightAt(judge, x, y)) > 1e-3;
@@ -135,7 +136,8 @@ TEST(FieldJudge, AgreesInThicknessAndShadows) {
   EXPECT_LT(lightAt(cpu, 48, 36), 0.5 * lightAt(cpu, 48, 22));
 }
 
-/// A ball of radius 20 about the origin, half way between two others, seen along −z from 100.
+/// A ball of radius 20 about the origin as a morph half way between two others, seen along −z from
+/// 100.
 Scene halfWayBall(double near, std::optional<double> far) {
   Scene scene = morphed(exactBall(V3d(0), 19.5, 0.5, 10), exactBall(V3d(0), 20.5, 0.4, 12), 0.5);
   scene.camera.from = V3d(0, 0, 100);
@@ -146,7 +148,7 @@ Scene halfWayBall(double near, std::optional<double> far) {
   return scene;
 }
 
-TEST(FieldDepths, CutABallBetweenTheirPlanes) {
+TEST(FieldDepths, CutABallAtTheirPlanes) {
   struct Depths {
     double near;
     std::optional<double> far;
@@ -163,7 +165,7 @@ TEST(FieldDepths, CutABallBetweenTheirPlanes) {
         if (std::abs(r2 - 400) < 20) continue;
         const double half = r2 < 400 ? std::sqrt(400 - r2) : 0, in = 100 - half, out = 100 + half,
                      end = far.value_or(1e9);
-        // On a plane either is right.
+        // On a plane both results are correct.
         if (std::min(std::min(std::abs(in - near), std::abs(in - end)),
                      std::min(std::abs(out - near), std::abs(out - end))) < 0.1)
           continue;
@@ -176,14 +178,14 @@ TEST(FieldDepths, CutABallBetweenTheirPlanes) {
         ASSERT_EQ(pixel.has_value(), seesFront || seesBack) << near << ' ' << r2;
         if (!pixel) continue;
         ASSERT_NEAR(image.channels.at("Z")[i], seesFront ? in : out, 0.02);
-        // Outwards, and convex, as from without.
+        // The normal points outwards and the surface is convex, as from outside.
         ASSERT_NEAR(pixel->normal.z, (seesFront ? half : -half) / 20, 1e-3);
         ASSERT_NEAR(image.channels.at("curvature.mean")[i], 0.05, 1e-3);
       }
   }
 }
 
-TEST(FieldDepths, AreJudged) {
+TEST(FieldDepths, AgreeWithTheJudge) {
   for (const bool isOrtho : {false, true}) {
     Scene scene = blended(threeGrids(), "(a | b) - c", 3, 160, 120);
     const double away = (scene.camera.to - scene.camera.from).length();
@@ -206,7 +208,7 @@ TEST(FieldDepths, AreJudged) {
   }
 }
 
-TEST(FieldDepths, LeaveShadowsAsTheyAre) {
+TEST(FieldDepths, DoNotChangeShadows) {
   // A roof before the near plane, between the ball and the light.
   const NarrowBand ball = levelset::makeSphere(20, V3d(0), 1),
                    roof = levelset::makeBox(V3d(80, 80, 4), V3d(0, 30, 50), 1);
@@ -242,7 +244,7 @@ TEST(FieldScene, IsSeenThroughMeshesAndHidesThem) {
   meshAlone.morph.reset();
   meshAlone.meshes = {{sheet(30), {0.1f, 0.2f, 0.7f}, 3, "front"}};
   const Image ofBall = renderCpu(ball, kDataOnly), ofMesh = renderCpu(meshAlone, kDataOnly);
-  // In front, within and behind.
+  // In front, inside and behind.
   Scene scene = ball;
   for (const double z : {30.0, 0.0, -30.0}) {
     scene.meshes = {{sheet(z), {0.1f, 0.2f, 0.7f}, 3, "sheet", 0.4}};
@@ -257,7 +259,8 @@ TEST(FieldScene, IsSeenThroughMeshesAndHidesThem) {
       }
     }
   }
-  // Cut off with the ball's front; within the ball; behind the wall that is seen from within.
+  // The near plane cuts the ball's front, lies inside the ball, and lies behind the wall that is
+  // visible from inside.
   scene.camera.near = 95;
   scene.meshes = {{sheet(20), {}, 3, "cut", 0.4},
                   {sheet(2), {0.1f, 0.2f, 0.7f}, 4, "within", 0.4},
@@ -284,7 +287,7 @@ TEST(FieldScene, IsSeenThroughMeshesAndHidesThem) {
 }
 
 TEST(FieldScene, IsLitThroughMeshes) {
-  // Light in its share through a sheet between it and the ball.
+  // A sheet between the light and the ball transmits its share of the light.
   for (const auto& draw : {renderCpu, renderEmbree}) {
     const auto brightness = [&](double opacity) {
       Scene scene = halfWayBall(65, {});
@@ -300,14 +303,14 @@ TEST(FieldScene, IsLitThroughMeshes) {
   }
 }
 
-TEST(FieldScene, HasNoOpacity) {
+TEST(FieldScene, RejectsOpacity) {
   Scene scene = halfWayBall(0, {});
   scene.solids[1].opacity = 0.5;
   for (const auto& draw : {renderCpu, renderEmbree, renderGpu})
     EXPECT_THROW((void)draw(scene, kDataOnly), levelset::UsageError);
 }
 
-TEST(FieldScene, IsDrawnOfCoarseValuesByBothRenderers) {
+TEST(FieldScene, BothRenderersUseValuesOfFewBits) {
   for (const int bits : {16, 8})
     for (const bool isMorph : {false, true}) {
       Scene scene = isMorph ? morphed(threeGrids()[0], threeGrids()[2], 0.4)
@@ -335,8 +338,8 @@ TEST(FieldScene, IsDrawnOfCoarseValuesByBothRenderers) {
     }
 }
 
-TEST(FieldScene, HasTheNormalsOfTheFinerGridWhereItIs) {
-  // A coarse ball and a fine bump on it: the bump's normals are as good as alone.
+TEST(FieldScene, UsesTheNormalsOfTheFinerGrid) {
+  // A coarse ball with a fine bump. The normals of the bump are as accurate as without the ball.
   const NarrowBand coarse = exactBall(V3d(0), 20, 2, 3),
                    fine = exactBall(V3d(0, 0, 20), 3, 0.2, 10);
   Scene scene = blended({coarse, fine}, "a | b", 1.5, 160, 120);
@@ -356,11 +359,11 @@ TEST(FieldScene, HasTheNormalsOfTheFinerGridWhereItIs) {
   EXPECT_GT(seen, 5000u);
 }
 
-TEST(FieldScene, IsRefusedWhereItCannotBe) {
+TEST(FieldScene, RefusesInvalidScenes) {
   const NarrowBand ball = levelset::makeSphere(8, V3d(0), 1),
                    fine = levelset::makeSphere(8, V3d(9, 0, 0), 0.5);
   EXPECT_NO_THROW((void)renderCpu(blended({ball, fine}, "a | b", 1.4, 8, 8), kDataOnly));
-  // Five steps within each other may take up to 5/4 K off the narrower band's 1.5.
+  // Five nested smoothing steps may subtract up to 5/4 K from the 1.5 of the narrower band.
   EXPECT_THROW(
       (void)renderCpu(blended({ball, fine}, "a | b | a | b | a | b", 1.4, 8, 8), kDataOnly),
       levelset::InvalidInput);
@@ -381,7 +384,7 @@ TEST(FieldScene, IsRefusedWhereItCannotBe) {
   EXPECT_THROW((void)renderGpu(morphed(ball, fine, 0.5, 8, 8), kDataOnly), levelset::UsageError);
 }
 
-TEST(KernelScene, TakesTheFinerGridFirst) {
+TEST(KernelScene, EvaluatesTheFinerGridFirst) {
   Scene scene = blended({levelset::makeSphere(8, V3d(0), 1), levelset::makeSphere(8, V3d(0), 0.5),
                          levelset::makeSphere(8, V3d(0), 1)},
                         "", 0, 8, 8);

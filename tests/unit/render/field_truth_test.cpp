@@ -1,4 +1,4 @@
-// Soft CSG and morphs along each ray: against closed forms and the solids alone.
+// Soft CSG and morphs along each ray: comparison with closed forms and with the solids alone.
 
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@ namespace field_truth_test {
 
 using namespace support::fields;
 
-/// Two balls of 8 and 6, joined softly: value and gradient in closed form.
+/// Smooth union of balls of radius 8 and 6: value and gradient in closed form.
 struct TwoBalls {
   V3d a{0.13, 0.27, 0.31}, b{11.2, 2.4, 1.7};
   double radiusA = 8, radiusB = 6, softness = 3;
@@ -25,15 +25,15 @@ struct TwoBalls {
     const V3d toA = p - a, toB = p - b;
     const double u = toA.length() - radiusA, v = toB.length() - radiusB;
     const double overlap = std::max(softness - std::abs(u - v), 0.0);
-    const double later = overlap / (2 * softness);  // the share of the larger one
+    const double later = overlap / (2 * softness);  // weight of the larger ball
     const double shareOfA = u < v ? 1 - later : later;
     gradient = toA.normalized() * shareOfA + toB.normalized() * (1 - shareOfA);
     return std::min(u, v) - overlap * overlap / (4 * softness);
   }
 };
 
-TEST(SoftCsg, OfBallsGoesToTheClosedFormWithTheSecondOrder) {
-  // Derivatives read up to three voxels beyond where the fields blend.
+TEST(SoftCsg, OfBallsConvergesToTheClosedFormInSecondOrder) {
+  // Derivatives read up to three voxels beyond the blended region.
   const TwoBalls exact;
   for (const bool isJudge : {false, true}) {
     std::vector<double> depths, normals;
@@ -51,7 +51,7 @@ TEST(SoftCsg, OfBallsGoesToTheClosedFormWithTheSecondOrder) {
         deepest = std::max(deepest, std::abs(exact.phi(pixel->place, gradient)));
         turned = std::max(turned, (pixel->normal - gradient.normalized()).length());
         ++hits;
-        joint += image.channels.at("curvature.k2")[i] < -0.02f;  // the saddle between them
+        joint += image.channels.at("curvature.k2")[i] < -0.02f;  // the saddle between the balls
       }
       EXPECT_GT(hits, 3000u);
       EXPECT_GT(joint, 100u);
@@ -67,8 +67,8 @@ TEST(SoftCsg, OfBallsGoesToTheClosedFormWithTheSecondOrder) {
   }
 }
 
-TEST(SoftCsg, BridgesAGapWhereNeitherSolidIs) {
-  // 1 apart: the smooth minimum in the middle is 0.5 − K/4.
+TEST(SoftCsg, BridgesAGapBetweenSolids) {
+  // Distance 1 apart: the smooth minimum in the middle is 0.5 − K/4.
   const NarrowBand a = levelset::makeSphere(10, V3d(-10.5, 0, 0), 0.5, {.halfWidth = 8}),
                    b = levelset::makeSphere(10, V3d(10.5, 0, 0), 0.31, {.halfWidth = 13});
   for (const double softness : {1.6, 3.6}) {
@@ -85,14 +85,14 @@ TEST(SoftCsg, BridgesAGapWhereNeitherSolidIs) {
       EXPECT_NEAR(pixel->place.z, std::sqrt(std::pow(10 + 0.25 * softness, 2) - 10.5 * 10.5), 0.05);
       EXPECT_NEAR(pixel->normal.z, 1, 1e-3);
       EXPECT_LT(image->channels.at("curvature.k2")[middle], -0.1f);
-      // Of both colours alike.
+      // Both colours have equal weight.
       EXPECT_NEAR(image->channels.at("R")[middle] / image->channels.at("G")[middle], 1, 0.2);
     }
     EXPECT_TRUE(compareImages(cpu, judge).agrees()) << compareImages(cpu, judge).reason();
   }
 }
 
-TEST(SoftCsg, GoesToHardCsgWhereNothingIsSoft) {
+TEST(SoftCsg, ConvergesToHardCsgAsTheSoftnessVanishes) {
   const NarrowBand ball = levelset::makeSphere(20, V3d(0.1, 0.2, 0.3), 1),
                    box = levelset::makeBox(V3d(24), V3d(8.1, 6.3, 9.2), 0.61);
   for (const char* csg : {"a | b", "a & b", "a - b", "b - a"}) {
@@ -139,7 +139,7 @@ TEST(Morph, BeginsAndEndsAtTheSolids) {
   }
 }
 
-TEST(Morph, OfBallsAboutOneMiddleIsABall) {
+TEST(Morph, OfConcentricBallsIsABall) {
   const double voxel = 0.25;
   for (const double share : {0.25, 0.5, 0.8}) {
     const double radius = 8 + share;
@@ -162,8 +162,8 @@ TEST(Morph, OfBallsAboutOneMiddleIsABall) {
   }
 }
 
-TEST(Morph, TellsWhereTheBandsEnd) {
-  // 10 apart in bands of 3: in between neither knows how far it is.
+TEST(Morph, ReportsWhereTheBandsEnd) {
+  // Solids 10 apart in bands of 3. Between them neither distance is known.
   const Scene scene =
       morphed(levelset::makeSphere(10, V3d(0), 1), levelset::makeSphere(20, V3d(0), 1), 0.3);
   for (const Image& image : {renderCpu(scene, kDataOnly), renderEmbree(scene, kDataOnly)}) {

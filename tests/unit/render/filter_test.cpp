@@ -1,5 +1,5 @@
-// What the filters promise, against closed forms: places, normals and curvatures on a ball, a
-// torus, a cylinder and a quartic, and how they converge; and the kernel against the judge.
+// Accuracy of the filters, against closed forms: positions, normals and curvatures on a ball, a
+// torus, a cylinder and a quartic, and their convergence. Also compares the kernel with the judge.
 
 #include "render/filter.h"
 
@@ -35,7 +35,7 @@ V3d vectorAt(const Image& image, const std::string& name, std::size_t i) {
           image.channels.at(name + ".Z")[i]};
 }
 
-/// Least and largest radius of a ball of that radius, less it, in voxels.
+/// Smallest and largest radius of a drawn ball less its exact radius, in voxels.
 struct Shift {
   double least = HUGE_VAL, most = -HUGE_VAL;
   [[nodiscard]] double worst() const { return std::max(-least, most); }
@@ -55,9 +55,10 @@ Shift shiftOf(double radius, Filter filter) {
   return shift;
 }
 
-TEST(Filters, LieWhereTheyPromise) {
-  // The trilinear interpolant is off by an eighth of the second differences at the most, the plain
-  // spline by a sixth of the Laplacian everywhere, the quasi-interpolating one to fourth order.
+TEST(Filters, HaveTheStatedPositionError) {
+  // The trilinear interpolant is off by at most an eighth of the second differences. The plain
+  // spline is off by a sixth of the Laplacian everywhere. The quasi-interpolating spline is
+  // fourth-order accurate.
   for (const double radius : {10.0, 20.0, 40.0}) {
     const Shift linear = shiftOf(radius, Filter::Trilinear);
     EXPECT_LE(linear.worst(), 0.26 / radius) << radius;
@@ -68,19 +69,19 @@ TEST(Filters, LieWhereTheyPromise) {
   }
   const double coarse = shiftOf(10, Filter::BSplineQi).worst();
   EXPECT_LE(coarse, 1e-4);
-  EXPECT_GE(coarse / shiftOf(20, Filter::BSplineQi).worst(), 6);  // 8 but for single precision
+  EXPECT_GE(coarse / shiftOf(20, Filter::BSplineQi).worst(), 6);  // 8 except for single precision
 }
 
-/// A smooth function whose zero set is drawn.
+/// Smooth function whose zero set is drawn.
 struct Formula {
   std::string name;
   std::function<double(const V3d&)> value;
   std::function<V3d(const V3d&)> normal;
   std::function<double(const V3d&)> mean, gauss;
-  V3d half;  ///< of its box
+  V3d half;  ///< half the size of its box
 };
 
-/// Mean and Gauss curvature of f = 0 from gradient and the diagonal of a diagonal Hessian.
+/// Mean and Gaussian curvature of f = 0, from the gradient and the diagonal of a diagonal Hessian.
 double meanOf(const V3d& g, const V3d& h) {
   const double gHg = g.x * g.x * h.x + g.y * g.y * h.y + g.z * g.z * h.z;
   return (g.length2() * (h.x + h.y + h.z) - gHg) / (2 * std::pow(g.length(), 3));
@@ -94,8 +95,9 @@ std::vector<Formula> formulas() {
   const auto radial = [](const V3d& p) {
     return p.x == 0 && p.y == 0 ? V3d(1, 0, 0) : V3d(p.x, p.y, 0).normalized();
   };
-  const auto ring = [=](const V3d& p) { return p - radial(p); };  // from the circle of radius 1
-  // Goursat's x⁴ + y⁴ + z⁴ = 1, over its slope: near to a distance.
+  // Offset from the circle of radius 1.
+  const auto ring = [=](const V3d& p) { return p - radial(p); };
+  // Goursat's x⁴ + y⁴ + z⁴ = 1, divided by its slope, which is close to a distance.
   const auto g = [](const V3d& p) {
     return V3d(p.x * p.x * p.x, p.y * p.y * p.y, p.z * p.z * p.z) * 4.0;
   };
@@ -124,11 +126,11 @@ std::vector<Formula> formulas() {
 }
 
 struct ShapeErrors {
-  double normal = 0, mean = 0, gauss = 0;  ///< root mean squares: radians, world units
+  double normal = 0, mean = 0, gauss = 0;  ///< root mean square errors: radians, world units
 };
 
 ShapeErrors errorsOf(const Formula& formula, double voxel, Filter filter) {
-  // Of four voxels: what a band of three cuts off reaches into the curvature's fourth digit.
+  // A band of four voxels. With three, the cut-off affects the fourth digit of the curvature.
   const NarrowBand band =
       support::sampleBand(formula.value, {-formula.half, formula.half}, voxel, 4);
   Scene scene = support::sceneOf(band, 80, 60);
@@ -138,7 +140,7 @@ ShapeErrors errorsOf(const Formula& formula, double voxel, Filter filter) {
   for (std::size_t i = 0; i < image.pixelCount(); ++i) {
     if (!std::isfinite(image.channels.at("Z")[i])) continue;
     const V3d p = vectorAt(image, "P", i);
-    // The ends of the cylinder are where its box ends.
+    // The ends of the cylinder lie at the ends of its box.
     if (formula.name == "cylinder" && std::abs(p.z) > 0.3) continue;
     const auto squared = [](double v) { return v * v; };
     sum.normal += (vectorAt(image, "N", i) - formula.normal(p)).length2();
@@ -158,7 +160,7 @@ TEST(Filters, NormalsAndCurvaturesConverge) {
                         fine = errorsOf(formula, 0.025, filter);
       const auto order = [](double a, double b) { return std::log2(a / b); };
       const std::string what = formula.name + ", " + filterName(filter);
-      // Where the trilinear interpolant lies the normal is another: of second order with it.
+      // At the trilinear interpolant's position the normal differs, also in second order.
       EXPECT_GE(order(coarse.normal, fine.normal) / 2, 1.8) << what;
       EXPECT_GE(order(coarse.mean, middle.mean), 1.5) << what;
       EXPECT_GE(order(middle.mean, fine.mean), 1.5) << what;
@@ -170,7 +172,7 @@ TEST(Filters, NormalsAndCurvaturesConverge) {
     }
 }
 
-/// The kernel's bits on both processors, and the judge.
+/// Expects the same bits of the kernel on both processors, and agreement with the judge.
 void expectProven(const Scene& scene, Filter filter, const std::string& what) {
   const RenderOptions options = optionsOf(filter);
   const Image ours = renderCpu(scene, options);
@@ -181,7 +183,7 @@ void expectProven(const Scene& scene, Filter filter, const std::string& what) {
       << filterName(filter) << ", " << what;
 }
 
-TEST(Filters, OfSplinesAreProvenLikeTheOther) {
+TEST(Filters, OfSplinesAgreeWithTheJudge) {
   const NarrowBand sheet = levelset::makeBox(V3d(30, 30, 1.2), V3d(0.1, 0.2, 0.3), 1),
                    needle = levelset::makeCapsule(V3d(-40, 3, 2), V3d(40, 7, 5), 1, 1);
   for (const Filter filter : {Filter::BSpline, Filter::BSplineQi}) {
@@ -191,8 +193,8 @@ TEST(Filters, OfSplinesAreProvenLikeTheOther) {
       for (const V3d& from : {V3d(100, 0, 0), V3d(0, 0, -100)})
         expectProven(support::alongTheLattice(band, from), filter, name);
     }
-    // Faces on planes of grid points, some of them between blocks: no ray slips through where
-    // rounding alone tells the side. (Rays that lie in such a face have no side.)
+    // Faces lie on planes of grid points, some of them between blocks. No ray may slip through
+    // where only rounding decides the side. (Rays within such a face have no side.)
     for (const auto& [name, band] : {std::pair{"cube", levelset::makeBox(V3d(32), V3d(0), 1)},
                                      {"plate", support::latticeBox()}}) {
       Scene scene = support::sceneOf(band, 200, 150);

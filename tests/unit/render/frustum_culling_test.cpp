@@ -1,4 +1,4 @@
-// What a picture does not need is not held, and nobody sees that it is not.
+// Blocks that do not affect a picture are not stored, and the picture is unchanged.
 
 #include "render/kernel/frustum_culling.h"
 
@@ -26,7 +26,7 @@ Image painted(const Scene& scene, const KernelScene& surfaces, const RenderOptio
   return paintPicture(scene, surfaces, CpuTracer(), 16, "cpu", options);
 }
 
-/// A long floor with a wall across it that shades one end, of which a part fills the frame.
+/// A long floor with a wall across it that shades one end. A part of the floor fills the frame.
 Scene closeUp(const V3d& from, const V3d& to) {
   const NarrowBand floor = levelset::makeBox(V3d(1200, 8, 60), V3d(0), 1),
                    wall = levelset::makeBox(V3d(20, 60, 50), V3d(500, 30, 0), 1);
@@ -37,13 +37,13 @@ Scene closeUp(const V3d& from, const V3d& to) {
   return scene;
 }
 
-/// In the camera's space.
+/// Position in camera space.
 V3d seenBy(const Camera& camera, const V3d& world) {
   const V3d axis = camera.axis(), right = axis.cross(camera.up).normalized();
   return {world.dot(right), world.dot(right.cross(axis)), -world.dot(axis)};
 }
 
-/// @param unseen  at least that share of what is crossed
+/// @param unseen  least share of the crossed blocks that must be left out
 void expectTheSame(const Scene& scene, const RenderOptions& options, double unseen,
                    const std::string& what) {
   const KernelScene whole(scene), part(scene, options);
@@ -60,7 +60,7 @@ void expectTheSame(const Scene& scene, const RenderOptions& options, double unse
   EXPECT_TRUE(found.agrees()) << what << ": " << found.reason();
 }
 
-TEST(FrustumCulling, LeavesNothingOutThatTellsInThePicture) {
+TEST(FrustumCulling, KeepsBlocksThatAffectThePicture) {
   const RenderOptions options = {.samples = 2, .ambientSamples = 4, .shadowSamples = 4};
   Scene scene = closeUp(V3d(560, 90, 10), V3d(550, 4, 0));
   scene.key.direction = seenBy(scene.camera, V3d(0.5, 1, 0.1));
@@ -77,8 +77,8 @@ TEST(FrustumCulling, LeavesNothingOutThatTellsInThePicture) {
                 "from within");
 }
 
-TEST(FrustumCulling, KeepsWhatShadesFromOutsideTheFrame) {
-  // The wall is out of the frame, and its shadow is not.
+TEST(FrustumCulling, KeepsOccludersOutsideTheFrame) {
+  // The wall is outside the frame, but its shadow is inside.
   Scene scene = closeUp(V3d(540, 90, 0), V3d(539, 4, 0));
   scene.camera.verticalFov = 0.3;
   scene.key.direction = seenBy(scene.camera, V3d(-1, 0.8, 0));
@@ -92,8 +92,9 @@ TEST(FrustumCulling, KeepsWhatShadesFromOutsideTheFrame) {
           .agrees());
 }
 
-TEST(FrustumCulling, KeepsWhatShadesTheStartOfARayOffACoarseSurface) {
-  // Rays to the light start far off the coarse ball, by voxels of the fine sheet that shades it.
+TEST(FrustumCulling, KeepsOccludersNearTheStartOfShadowRays) {
+  // Rays to the light start far off the coarse ball, measured in voxels of the fine sheet that
+  // shades it.
   Scene scene;
   scene.solids.push_back({.band = levelset::makeSphere(4, V3d(0), 1), .id = 1});
   scene.solids.push_back(
@@ -108,7 +109,7 @@ TEST(FrustumCulling, KeepsWhatShadesTheStartOfARayOffACoarseSurface) {
   expectTheSame(scene, {.samples = 2, .ambientSamples = 0, .shadowSamples = 4}, 0.1, "coarse");
 }
 
-TEST(FrustumCulling, LeavesNothingOutOfAnExpressionThatTellsInThePicture) {
+TEST(FrustumCulling, KeepsBlocksOfExpressionsThatAffectThePicture) {
   Scene scene = closeUp(V3d(560, 90, 10), V3d(550, 4, 0));
   scene.solids[0].name = "a";
   scene.solids.push_back(
@@ -118,12 +119,12 @@ TEST(FrustumCulling, LeavesNothingOutOfAnExpressionThatTellsInThePicture) {
   scene.csg = CsgExpression("a - b | c", {"a", "b", "c"});
   const RenderOptions lit = {.samples = 2, .ambientSamples = 0, .shadowSamples = 4};
   expectTheSame(scene, lit, 0.5, "shadows through an expression");
-  // Rays to the sky go on to the end of the last solid.
+  // Rays to the sky continue to the end of the last solid.
   const RenderOptions open = {.samples = 1, .ambientSamples = 2, .shadowSamples = 0};
   EXPECT_EQ(KernelScene(scene, open).counts().unseen, 0u);
 }
 
-TEST(FrustumCulling, HoldsNothingOfASolidBehindTheCamera) {
+TEST(FrustumCulling, StoresNoBlockOfASolidBehindTheCamera) {
   Scene scene = closeUp(V3d(560, 90, 10), V3d(550, 4, 0));
   scene.solids.push_back({.band = levelset::makeSphere(20, V3d(600, 300, 40), 1), .id = 2});
   const RenderOptions unlit = {.samples = 1, .ambientSamples = 0, .shadowSamples = 0};

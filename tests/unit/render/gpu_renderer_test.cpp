@@ -1,5 +1,5 @@
-// The compute shader against its twin for the processor: the same bits on every layer, the colours
-// too. Mesa's llvmpipe draws where there is no GPU.
+// Compares the compute shader with the same code on the processor: equal bits on every layer,
+// colours included. Mesa's llvmpipe replaces a missing GPU.
 
 #include "render/gpu/gpu_renderer.h"
 
@@ -44,7 +44,7 @@ TEST(GpuRenderer, HasTheBitsOfTheProcessor) {
   expectSameBits(sceneOf(levelset::makeCapsule(V3d(-40, 3, 2), V3d(40, 7, 5), 0.5, 1)), "needle");
 }
 
-TEST(GpuRenderer, HasTheBitsOfTheProcessorFromWithinFarAwayAndAlongTheLattice) {
+TEST(GpuRenderer, HasTheBitsOfTheProcessorFromInsideFarAwayAndAlongTheLattice) {
   Scene scene = sceneOf(rings());
   scene.camera.from = V3d(24, 0.1, 0.2);
   scene.camera.to = V3d(20, 10, 1);
@@ -63,7 +63,7 @@ TEST(GpuRenderer, HasTheBitsOfTheProcessorForSeveralSolids) {
   expectSameBits(scene, "three solids");
 }
 
-/// What the NanoVDB grids themselves give, without bricks.
+/// Compares with a picture from the NanoVDB grids themselves, without bricks.
 void expectTheBitsOfNanoVdb(const Scene& scene, const std::string& what) {
   RenderOptions options = {.samples = 1, .ambientSamples = 1, .shadowSamples = 1};
   const Image bricks = renderCpu(scene, options);
@@ -136,17 +136,17 @@ TEST(GpuTracer, RefusesGridsThatDoNotFit) {
   const Scene scene = sceneOf(levelset::makeSphere(30, V3d(0.3, 0.2, 0.1), 1));
   const KernelScene surfaces(scene);
   const GlContext context;
-  // A NanoVDB grid has no other tables that could be too large.
+  // With a NanoVDB grid no other table can be too large.
   const std::string refusal = refusalOf([&] { GpuTracer(context, surfaces, 1u << 14, &scene); });
   EXPECT_NE(refusal.find("buffer textures"), std::string::npos) << refusal;
-  // The table of blocks alone is larger than that.
+  // The table of blocks alone exceeds this limit.
   EXPECT_NE(refusalOf([&] { GpuTracer(context, surfaces, 1u << 10); }).find("cpu"),
             std::string::npos);
-  // Nothing is wrong with the context after that.
+  // The context remains usable after these errors.
   const GpuTracer good(context, surfaces);
 }
 
-TEST(GlContext, OutlivesAnother) {
+TEST(GlContext, OutlivesAnotherContext) {
   const Scene scene = sceneOf(levelset::makeSphere(20, V3d(0.3, 0.2, 0.1), 1));
   const KernelScene surfaces(scene);
   const GlContext first;
@@ -162,7 +162,7 @@ TEST(GlContext, OutlivesAnother) {
   EXPECT_EQ(hits.found[0], -1);
 }
 
-TEST(GlContext, SaysWhatDoesNotCompile) {
+TEST(GlContext, ReportsShadersThatDoNotCompile) {
   const GlContext context;
   const GlContext::Current current(context);
   const std::string words = refusalOf(

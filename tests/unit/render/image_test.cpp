@@ -53,7 +53,7 @@ Image gradientImage() {
 using ImageExr = ImageFiles;
 using ImagePng = ImageFiles;
 
-TEST_F(ImageExr, ComesBackToTheBit) {
+TEST_F(ImageExr, IsReadBackToTheBit) {
   const Image image = gradientImage();
   writeImage(file("a.exr"), image);
   const Image back = readExr(file("a.exr"));
@@ -74,7 +74,7 @@ TEST_F(ImageExr, SameBytesEveryTime) {
   EXPECT_EQ(bytes.find("capDate"), std::string::npos);
 }
 
-TEST_F(ImagePng, HoldsToneCurveAndAlpha) {
+TEST_F(ImagePng, HasToneCurveAndAlpha) {
   Image image(3, 2);
   for (const char* name : {"R", "G", "B"}) image.addChannel(name);
   image.addChannel("A");
@@ -97,7 +97,7 @@ TEST_F(ImagePng, HoldsToneCurveAndAlpha) {
   std::vector<std::uint8_t> pixels(PNG_IMAGE_SIZE(png));
   ASSERT_TRUE(png_image_finish_read(&png, nullptr, pixels.data(), 0, nullptr));
   const auto pixel = [&](std::size_t i) { return std::pair{pixels[4 * i], pixels[4 * i + 3]}; };
-  EXPECT_EQ(pixel(0), (std::pair<std::uint8_t, std::uint8_t>{188, 255}));  // sRGB of one half
+  EXPECT_EQ(pixel(0), (std::pair<std::uint8_t, std::uint8_t>{188, 255}));  // sRGB of 0.5
   EXPECT_EQ(pixel(1), (std::pair<std::uint8_t, std::uint8_t>{188, 64}));
   EXPECT_EQ(pixel(2), (std::pair<std::uint8_t, std::uint8_t>{255, 255}));
   EXPECT_EQ(pixel(3), (std::pair<std::uint8_t, std::uint8_t>{0, 255}));
@@ -113,7 +113,7 @@ TEST_F(ImagePng, IsTheSameInMemory) {
   EXPECT_THROW((void)pngBytes(Image()), levelset::InvalidInput);
 }
 
-TEST_F(ImageFiles, RefusesWhatItCannotWrite) {
+TEST_F(ImageFiles, RefusesUnwritableImages) {
   const Image image = gradientImage();
   EXPECT_THROW(writeImage(file("a.jpg"), image), levelset::UsageError);
   EXPECT_THROW(writeImage(file("a"), image), levelset::UsageError);
@@ -131,7 +131,7 @@ TEST_F(ImageFiles, RefusesWhatItCannotWrite) {
   EXPECT_TRUE(fs::is_empty(folder_));
 }
 
-TEST_F(ImageFiles, RefusesWhatItCannotRead) {
+TEST_F(ImageFiles, RefusesUnreadableImages) {
   EXPECT_THROW((void)readExr(file("missing.exr")), levelset::IoError);
   EXPECT_THROW((void)readExr(folder_), levelset::IoError);
   std::ofstream(file("text.exr")) << "not an image at all";
@@ -144,7 +144,7 @@ TEST_F(ImageFiles, RefusesWhatItCannotRead) {
     std::ofstream(file("cut.exr"), std::ios::binary).write(bytes.data(), static_cast<long>(size));
     EXPECT_THROW((void)readExr(file("cut.exr")), levelset::InvalidInput) << size;
   }
-  // A header that promises 8192 x 8192 pixels: the four numbers of the data window.
+  // A header that declares 8192 x 8192 pixels: the four numbers of the data window.
   std::string greedy = bytes;
   const std::size_t window = greedy.find(std::string("dataWindow\0box2i", 16)) + 21;
   greedy.replace(window, 16, std::string("\0\0\0\0\0\0\0\0\xff\x1f\0\0\xff\x1f\0\0", 16));

@@ -1,5 +1,5 @@
-// The kernel's first crossings against the judge, which shares no code with it, and against itself
-// on every instruction set.
+// Compares the kernel's first crossings with the judge, which shares no code with it, and across
+// instruction sets.
 
 #include <gtest/gtest.h>
 
@@ -27,12 +27,12 @@ using render::BrickPool;
 using render::HitBlock;
 using render::RayBlock;
 
-/// A ray in index space, t from where it enters the bricks' box.
+/// Ray in index space. t is measured from its entry into the bricks' box.
 struct IndexRay {
   V3d origin, direction;
 };
 
-/// How far a ray has gone when it enters the box of the crossing cells.
+/// Distance of a ray to its entry into the box of the crossing cells.
 struct Way {
   double enter = 0, leave = std::numeric_limits<double>::infinity();
 };
@@ -54,7 +54,7 @@ Way wayThrough(const BrickPool& pool, const IndexRay& ray) {
   return way;
 }
 
-/// Distances to the first crossing; infinite for none.
+/// Distances to the first crossing; infinite if there is none.
 std::vector<double> traced(const BrickPool& pool, const std::vector<IndexRay>& rays,
                            render::InstructionSet set, HitBlock* raw = nullptr) {
   RayBlock block(rays.size());
@@ -90,7 +90,7 @@ std::vector<double> traced(const BrickPool& pool, const std::vector<IndexRay>& r
   return result;
 }
 
-/// Views of what lies within `reach` of the origin, from all around.
+/// Rays from all around towards the region within `reach` of the origin.
 std::vector<IndexRay> views(double reach, std::size_t count) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
@@ -126,7 +126,7 @@ struct Disagreement {
   double worst = 0;
 };
 
-/// With the judge on the same interpolant, whose distances are exact.
+/// Difference from the judge on the same interpolant, whose distances are exact.
 Disagreement disagreementOf(const NarrowBand& solid, const std::vector<IndexRay>& rays) {
   const BrickPool pool = render::makeBricks(solid);
   const std::vector<double> ours = traced(pool, rays, render::instructionSets().back());
@@ -153,9 +153,9 @@ TEST(KernelTrace, AgreesWithTheJudgeFromAllAround) {
   const auto rays = views(40, 20000);
   const Disagreement off = disagreementOf(ball(40), rays);
   EXPECT_GT(off.hits, 5000u);
-  EXPECT_LE(off.missed, 1u);  // grazing
+  EXPECT_LE(off.missed, 1u);  // a grazing ray
   EXPECT_LE(off.worst, 0.02);
-  // A pair of tori through each other, with a crease.
+  // Two linked tori with a crease.
   const NarrowBand rings =
       levelset::unite(levelset::makeTorus(24, 8, V3d(0), V3d(0, 0, 1), 1),
                       levelset::makeTorus(24, 8, V3d(9, 0, 3), V3d(0, 1, 0), 1));
@@ -179,8 +179,8 @@ TEST(KernelTrace, LosesNoRayOfTheLattice) {
   EXPECT_LE(off.worst, 5e-4);
 }
 
-TEST(KernelTrace, SeesASheetThinnerThanAVoxel) {
-  // 0.6 voxels thick: both sides within one cell, for some rays.
+TEST(KernelTrace, FindsASheetThinnerThanAVoxel) {
+  // 0.6 voxels thick: some rays have both sides within one cell.
   const NarrowBand sheet = levelset::makeBox(V3d(60, 60, 0.6), V3d(0.1, 0.2, 0.1), 1);
   const auto rays = views(20, 5000);
   const Disagreement off = disagreementOf(sheet, rays);
@@ -213,10 +213,11 @@ TEST(KernelTrace, HasTheSameBitsOnEveryInstructionSet) {
   }
 }
 
-TEST(BrickPool, HoldsWhatTheSurfaceCrosses) {
+TEST(BrickPool, HoldsTheBlocksThatTheSurfaceCrosses) {
   const NarrowBand solid = ball(40);
   const BrickPool pool = render::makeBricks(solid);
-  // Leaves that the surface does not cross are no bricks, and the others held only beside these.
+  // Leaves that the surface does not cross are stored only as neighbours of crossed leaves, never
+  // as bricks of their own.
   const std::size_t leaves = levelset::vdb(solid).tree().leafCount();
   EXPECT_GT(leaves, pool.brickCount() + 100);
   EXPECT_EQ(pool.brickCount() + pool.haloCount + pool.blocksOmitted, leaves);
@@ -241,8 +242,8 @@ TEST(BrickPool, HoldsWhatTheSurfaceCrosses) {
   EXPECT_EQ(render::makeBricks(NarrowBand()).brickCount(), 0u);
 }
 
-TEST(BrickPool, HoldsWhatTellsTheCurvature) {
-  // A wall of three voxels across a block's face, so that windows reach over its whole band.
+TEST(BrickPool, HoldsTheSamplesOfCurvature) {
+  // A wall of three voxels across a block's face, so that windows extend over its complete band.
   for (const NarrowBand& solid : {ball(40), levelset::makeBox(V3d(60, 50, 3), V3d(0, 0, 7), 1)}) {
     const BrickPool pool = render::makeBricks(solid);
     const auto& tree = levelset::vdb(solid).tree();
@@ -274,7 +275,8 @@ TEST(BrickPool, HoldsWhatTellsTheCurvature) {
             for (int j = -2; j <= 3; ++j)
               for (int k = -2; k <= 3; ++k) {
                 const auto isOuter = [](int n) { return n == -2 || n == 3; };
-                if (isOuter(i) + isOuter(j) + isOuter(k) > 1) continue;  // of no use to a stencil
+                // No stencil uses this sample.
+                if (isOuter(i) + isOuter(j) + isOuter(k) > 1) continue;
                 wrong += valueAt(x + i, y + j, z + k) != at(i, j, k);
               }
         }

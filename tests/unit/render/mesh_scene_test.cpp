@@ -1,4 +1,4 @@
-// Meshes beside level sets: depth, light and the same picture of all renderers.
+// Meshes beside level sets: depth, lighting and equal pictures of all renderers.
 
 #include <gtest/gtest.h>
 
@@ -10,9 +10,9 @@
 #include "levelset/solids/shapes.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/embree/embree_renderer.h"
-#include "render/meshes/mesh_rays.h"
 #include "render/gpu/gpu_renderer.h"
 #include "render/images/compare_images.h"
+#include "render/meshes/mesh_rays.h"
 #include "tests/support/render_scenes.h"
 
 namespace mesh_scene_test {
@@ -22,7 +22,7 @@ using namespace render;
 
 const RenderOptions kDataOnly = {.samples = 1, .ambientSamples = 0, .shadowSamples = 0};
 
-/// A rectangle about `middle` with sides along `a` and `b`, from half of them to half of them.
+/// Rectangle with centre `middle`. `a` and `b` are half of its side vectors.
 levelset::TriMesh sheet(const V3d& middle, const V3d& a, const V3d& b) {
   levelset::TriMesh mesh;
   mesh.positions = {middle - a - b, middle + a - b, middle + a + b, middle - a + b};
@@ -30,7 +30,7 @@ levelset::TriMesh sheet(const V3d& middle, const V3d& a, const V3d& b) {
   return mesh;
 }
 
-/// A ball of a level set, seen along −z, and a sheet that leans through it.
+/// A level-set ball seen along −z, and an oblique sheet through it.
 Scene leaningScene(double unit = 1, const V3d& place = V3d(0), double away = 100) {
   Scene scene;
   scene.solids.push_back({.band = levelset::makeSphere(20 * unit, place, unit)});
@@ -45,7 +45,7 @@ Scene leaningScene(double unit = 1, const V3d& place = V3d(0), double away = 100
   return scene;
 }
 
-/// Both where they are nearer than the other.
+/// Expects that each of the two is visible where it is nearer.
 void expectMutualDepth(const Image& image, double unit, double away) {
   std::size_t onMesh = 0, onSolid = 0;
   for (int y = 0; y < image.height; ++y)
@@ -85,7 +85,7 @@ TEST(MeshScene, HidesAndIsHiddenByDepth) {
   expectMutualDepth(renderCpu(leaningScene(1, V3d(0), 1e5), kDataOnly), 1, 1e5);
 }
 
-TEST(MeshScene, IsTheSameOfAllRenderers) {
+TEST(MeshScene, AgreesOnAllRenderers) {
   const RenderOptions options = {.samples = 2, .ambientSamples = 3, .shadowSamples = 2};
   Scene scene = leaningScene();
   const ImageComparison same =
@@ -112,7 +112,7 @@ TEST(MeshScene, NeedsNoLevelSet) {
   }
 }
 
-TEST(MeshScene, StandsAloneWhereNoSolidOfTheExpressionHasASurface) {
+TEST(MeshScene, IsDrawnAloneIfTheExpressionIsEmpty) {
   Scene scene = leaningScene();
   scene.solids[0].band = {};
   scene.csg = CsgExpression("a", {"a"});
@@ -121,7 +121,7 @@ TEST(MeshScene, StandsAloneWhereNoSolidOfTheExpressionHasASurface) {
     EXPECT_EQ(image.ids.at("id")[45 * 120 + 60], 2u);
 }
 
-TEST(MeshScene, CastsShadowsOnLevelSetsAndTakesTheirs) {
+TEST(MeshScene, ExchangesShadowsWithLevelSets) {
   const auto brightnessOf = [](const Scene& scene, std::uint32_t id) {
     const RenderOptions options = {.samples = 1, .ambientSamples = 0, .shadowSamples = 4};
     double sums[2] = {0, 0};
@@ -142,7 +142,7 @@ TEST(MeshScene, CastsShadowsOnLevelSetsAndTakesTheirs) {
   Scene shaded = ball;
   shaded.meshes.push_back({meshOf(V3d(0, 45, 0), V3d(80, 0, 0), V3d(0, 0, 80)), {}, 2, "roof"});
   EXPECT_LT(brightnessOf(shaded, 1), 0.9 * brightnessOf(ball, 1));
-  // A sheet behind a ball, which lies towards the light.
+  // A sheet behind a ball, with the ball towards the light.
   Scene sheetAlone = leaningScene();
   sheetAlone.solids.clear();
   sheetAlone.meshes[0].mesh = meshOf(V3d(0), V3d(30, 0, 0), V3d(0, 25, 0));
@@ -151,7 +151,7 @@ TEST(MeshScene, CastsShadowsOnLevelSetsAndTakesTheirs) {
   EXPECT_LT(brightnessOf(shadedSheet, 2), 0.95 * brightnessOf(sheetAlone, 2));
 }
 
-TEST(MeshRays, TakeNormalsAndColoursOfVertices) {
+TEST(MeshRays, UseNormalsAndColoursOfVertices) {
   levelset::TriMesh mesh = sheet(V3d(0), V3d(1, 0, 0), V3d(0, 1, 0));
   mesh.attributes.normals = {V3d(-1, 0, 1), V3d(1, 0, 1), V3d(1, 0, 1), V3d(-1, 0, 1)};
   mesh.attributes.colors = {Imath::V4f(1, 0, 0, 1), Imath::V4f(0, 0, 1, 1), Imath::V4f(0, 0, 1, 1),

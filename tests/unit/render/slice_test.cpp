@@ -20,7 +20,7 @@ const levelset::NarrowBand& ball() {
   return band;
 }
 
-TEST(Slice, HoldsTheDistanceAtItsPlaces) {
+TEST(Slice, HasTheDistanceAtItsPixels) {
   for (const V3d& normal : {V3d(0, 0, 2), V3d(1, 0, 0), V3d(0, -3, 0), V3d(1, 2, -1)}) {
     const V3d point(0.5, 0.1, 0.2);
     const Image image =
@@ -44,7 +44,7 @@ TEST(Slice, HoldsTheDistanceAtItsPlaces) {
   }
 }
 
-TEST(Slice, IsSeenFromWhereTheNormalPoints) {
+TEST(Slice, IsSeenFromTheSideOfTheNormal) {
   const auto cornersOf = [](const V3d& normal) {
     const Image image = drawSlice(ball(), {.normal = normal, .width = 100, .height = 80});
     const auto at = [&](std::size_t x, std::size_t y) {
@@ -64,7 +64,7 @@ TEST(Slice, IsSeenFromWhereTheNormalPoints) {
 }
 
 TEST(Slice, HasABlackZeroLineAndALineForEachStep) {
-  // Outwards from the middle of the ball, through 3 voxels of either side.
+  // Outwards from the middle of the ball, through 3 voxels on either side.
   const Image image =
       drawSlice(ball(), {.point = V3d(0, 0, 0.1), .width = 1200, .height = 1200, .step = 0.05});
   const std::vector<float>&red = image.channels.at("R"), &phi = image.channels.at("phi");
@@ -78,10 +78,10 @@ TEST(Slice, HasABlackZeroLineAndALineForEachStep) {
     if (red[i] < red[i - 1] - 0.02f && red[i] <= red[i + 1]) ++minima;
   }
   EXPECT_EQ(zeroLines, 1);
-  EXPECT_GE(minima, 5);  // −2 … 2 steps
+  EXPECT_GE(minima, 5);  // steps −2 … 2
 }
 
-TEST(Slice, RefusesWhatCannotBe) {
+TEST(Slice, RefusesInvalidSlices) {
   EXPECT_THROW((void)drawSlice(ball(), {.normal = V3d(0)}), levelset::UsageError);
   EXPECT_THROW((void)drawSlice(ball(), {.point = V3d(std::nan(""))}), levelset::UsageError);
   EXPECT_THROW((void)drawSlice(ball(), {.width = 0}), levelset::UsageError);

@@ -1,4 +1,4 @@
-// Colours of styles against what they are to tell.
+// Checks that the colours of styles show the intended property.
 
 #include "render/shading/style.h"
 
@@ -38,12 +38,13 @@ TEST(Styles, ColourCurvaturesBySignAndSize) {
     const C3f saddle = gaussColour(sampleOf(size, -size), 1);
     EXPECT_GT(saddle.y - saddle.x, flat.y - flat.x);
   }
-  EXPECT_EQ(gaussColour(sampleOf(5, 0), 1), flat);  // a cylinder is flat to Gauss
+  EXPECT_EQ(gaussColour(sampleOf(5, 0), 1), flat);  // a cylinder has zero Gaussian curvature
   EXPECT_EQ(principalColour(sampleOf(0, 0), 1), flat);
-  EXPECT_EQ(meanColour(sampleOf(3, 3), 3), meanColour(sampleOf(1, 1), 1));  // the range is the unit
+  // Colours depend on the ratio of curvature to range.
+  EXPECT_EQ(meanColour(sampleOf(3, 3), 3), meanColour(sampleOf(1, 1), 1));
 }
 
-TEST(Styles, TellFiveKindsOfShapeApart) {
+TEST(Styles, DistinguishFiveKindsOfShape) {
   const C3f dome = principalColour(sampleOf(1, 1), 1), ridge = principalColour(sampleOf(1, 0), 1),
             saddle = principalColour(sampleOf(1, -1), 1),
             groove = principalColour(sampleOf(0, -1), 1),
@@ -56,14 +57,14 @@ TEST(Styles, TellFiveKindsOfShapeApart) {
   EXPECT_GT(bowl.z, 2 * bowl.y);  // blue
 }
 
-TEST(Styles, DarkenWhereLargeBallsDoNotTouch) {
+TEST(Styles, DarkenPointsThatLargeBallsCannotTouch) {
   EXPECT_EQ(accessibilityOf(sampleOf(7, 0), 1), 1);
   EXPECT_GT(accessibilityOf(sampleOf(0, -0.1), 1), 0.9);
   EXPECT_LT(accessibilityOf(sampleOf(0, -100), 1), 0.01);
   EXPECT_GT(accessibilityOf(sampleOf(0, -1), 1), accessibilityOf(sampleOf(0, -2), 1));
 }
 
-TEST(Styles, DrawSilhouettesOfAnEvenWidth) {
+TEST(Styles, DrawSilhouettesOfUniformWidth) {
   for (const double radius : {1.0, 5.0, 40.0}) {
     const double width = 0.25;
     for (const double inside : {0.1, 0.2, 0.24, 0.26, 0.3, 0.5}) {
@@ -72,17 +73,18 @@ TEST(Styles, DrawSilhouettesOfAnEvenWidth) {
       EXPECT_EQ(silhouetteOf(cosine, 1 / radius, width), inside < width ? 1 : 0) << inside;
     }
   }
-  EXPECT_EQ(silhouetteOf(0.5, -1, 1), 0);  // bent towards the eye
+  EXPECT_EQ(silhouetteOf(0.5, -1, 1), 0);  // curved towards the eye
   EXPECT_EQ(silhouetteOf(0.5, 0, 1), 0);
-  EXPECT_EQ(silhouetteOf(1, 1e9, 1), 1);  // thinner than the line: all of it is
+  EXPECT_EQ(silhouetteOf(1, 1e9, 1), 1);  // thinner than the line: entirely silhouette
 }
 
-TEST(Styles, KnowTheCurvatureAlongTheView) {
+TEST(Styles, ComputeTheCurvatureAlongTheView) {
   const double h = 0.05, radius = 1;
   const Scene scene = support::sceneOf(levelset::makeCylinder(radius, 8, V3d(0), V3d(0, 0, 1), h));
   const EmbreeScene rays(scene);
   for (const double slope : {0.0, 0.3, 1.0, 3.0}) {
-    // Onto the side at (1, 0, 0), more and more along the axis: the tangent part of the ray.
+    // The ray towards the side at (1, 0, 0) is increasingly axial. Its tangential part defines the
+    // direction.
     const V3d target(radius, 0, 0.1), aside = V3d(0, 1, slope).normalized();
     const V3d direction = (V3d(-1, 0, 0) + aside).normalized();
     const Hit hit = rays.intersect(target - direction * 3.0, direction);
@@ -91,7 +93,7 @@ TEST(Styles, KnowTheCurvatureAlongTheView) {
   }
 }
 
-/// An orthographic view of a ball of radius 1 along z, a pixel 0.02.
+/// Orthographic view along z of a ball of radius 1, with pixels of 0.02.
 Scene ballScene() {
   Scene scene = support::sceneOf(levelset::makeSphere(1, V3d(0), 0.05), 120, 120);
   scene.camera.from = V3d(0, 0, 5);
@@ -106,7 +108,7 @@ C3f pixelOf(const Image& image, int x, int y) {
   return {image.channels.at("R")[i], image.channels.at("G")[i], image.channels.at("B")[i]};
 }
 
-TEST(Styles, InkTheRimOfABallAsWideAsAsked) {
+TEST(Styles, InkTheRimOfABallInTheRequestedWidth) {
   for (const double width : {2.0, 6.0}) {
     RenderOptions options = {.samples = 1};
     options.style.style = Style::Ink;
@@ -125,7 +127,7 @@ TEST(Styles, InkTheRimOfABallAsWideAsAsked) {
 class MatcapFile {
  public:
   MatcapFile() {
-    // Red grows to the right, green downwards.
+    // Red increases to the right, green downwards.
     Image image(64, 64);
     for (const char* name : {"R", "G", "B"}) image.addChannel(name, 0.1f);
     for (std::size_t i = 0; i < image.pixelCount(); ++i) {
@@ -139,7 +141,7 @@ class MatcapFile {
       std::filesystem::temp_directory_path() / "levelsmith-matcap-test.png";
 };
 
-TEST(Styles, ShowTheMatcapOnABall) {
+TEST(Styles, DrawTheMatcapOnABall) {
   const MatcapFile file;
   RenderOptions options = {.samples = 1};
   options.style.style = Style::Matcap;
@@ -156,7 +158,7 @@ TEST(Styles, ShowTheMatcapOnABall) {
   }
 }
 
-TEST(Styles, RefuseWhatIsNoPicture) {
+TEST(Styles, RefuseInvalidPictures) {
   EXPECT_THROW((void)readColourPng("/nowhere/at/all.png"), levelset::IoError);
   const std::filesystem::path path =
       std::filesystem::temp_directory_path() / "levelsmith-style-test.png";
@@ -177,7 +179,7 @@ TEST(Styles, RefuseWhatIsNoPicture) {
   EXPECT_THROW((void)renderCpu(ballScene(), options), levelset::UsageError);
 }
 
-TEST(Styles, AreTheSameOfGpuAndProcessor) {
+TEST(Styles, AgreeOnGpuAndProcessor) {
   const MatcapFile file;
   for (const Style style : kStyles) {
     RenderOptions options = {.samples = 2, .ambientSamples = 2, .shadowSamples = 1};

@@ -1,4 +1,4 @@
-// Surfaces that are seen through: what they add up to, in closed form, and of all renderers.
+// Transparent surfaces: their sum in closed form, and on all renderers.
 
 #include <gtest/gtest.h>
 
@@ -22,7 +22,7 @@ using Imath::V3d;
 using levelset::NarrowBand;
 using namespace render;
 
-/// A colour depends on the normal alone.
+/// Without rays to lights, a colour depends on the normal alone.
 const RenderOptions kNoRays = {.samples = 1, .ambientSamples = 0, .shadowSamples = 0};
 const RenderOptions kLit = {.samples = 2, .ambientSamples = 3, .shadowSamples = 2};
 
@@ -33,7 +33,7 @@ std::shared_ptr<const levelset::TriMesh> sheet(double z) {
   return std::make_shared<const levelset::TriMesh>(mesh);
 }
 
-/// Slabs across the view along −z, the first one in front.
+/// Slabs across the view along −z, from front to back.
 Scene slabs(const std::vector<double>& opacities) {
   Scene scene;
   const Imath::C3f colours[] = {{0.7f, 0.2f, 0.1f}, {0.1f, 0.6f, 0.3f}, {0.2f, 0.3f, 0.8f}};
@@ -61,7 +61,7 @@ Seen middleOf(const Image& image) {
   return {at("R"), at("G"), at("B"), at("A")};
 }
 
-/// The part of that number alone, and opaque.
+/// Colours of that solid alone, opaque.
 Seen aloneOf(Scene scene, std::size_t number) {
   Scene one = scene;
   one.meshes.clear();
@@ -93,25 +93,25 @@ TEST(Transparency, OfSlabsAddsUpFrontToBack) {
   const Scene scene = slabs({0.3, 0.6, 0.45});
   Seen wanted{0, 0, 0, 0};
   for (std::size_t i = 3; i-- > 0;)
-    for (int side = 0; side < 2; ++side)  // each has a front and a back
+    for (int side = 0; side < 2; ++side)  // each slab has a front and a back
       wanted = over(aloneOf(scene, i), scene.solids[i].opacity, wanted);
   EXPECT_NEAR(wanted.a, 1 - std::pow(0.7 * 0.4 * 0.55, 2), 1e-12);
   expectSeen(scene, wanted);
 }
 
-TEST(Transparency, EndsAtWhatIsOpaqueAndAtWhatIsAsGood) {
+TEST(Transparency, EndsAtOpaqueAndNearlyOpaqueSurfaces) {
   const Scene opaqueInside = slabs({0.3, 1, 0.45});
   const Seen front = aloneOf(opaqueInside, 0), back = aloneOf(opaqueInside, 1);
   expectSeen(opaqueInside, over(front, 1 - 0.7 * 0.7, back));
-  const Scene dense = slabs({0.9, 0.9});  // a third surface leaves less than 1/512
+  const Scene dense = slabs({0.9, 0.9});  // a third surface would contribute less than 1/512
   const Seen first = aloneOf(dense, 0), second = aloneOf(dense, 1);
   Seen wanted = over(first, 1 - 0.1 * 0.1, over(second, 0.9, {0, 0, 0, 0}));
   EXPECT_NEAR(wanted.a, 1 - 1e-3, 1e-12);
   expectSeen(dense, wanted);
 }
 
-TEST(Transparency, IsThatOfTheSurfacesThatAnExpressionLeaves) {
-  // The slabs overlap: a union has two surfaces where they alone have four.
+TEST(Transparency, AppliesToTheSurfacesOfAnExpression) {
+  // The slabs overlap. Their union has two surfaces, the slabs alone have four.
   Scene scene = slabs({0.3, 0.6});
   scene.solids[1].band = levelset::makeBox(V3d(60, 60, 4), V3d(0, 0, -2.2), 0.7);
   scene.csg = CsgExpression("a | b", {"a", "b"});
@@ -146,10 +146,10 @@ TEST(Transparency, ShowsMeshesBehindSolidsAndSolidsBehindMeshes) {
   expectSeen(scene, wanted);
 }
 
-TEST(Transparency, KeepsToTheRangeOfDepths) {
+TEST(Transparency, RespectsTheDepthRange) {
   Scene scene = slabs({0.3, 0.6, 0.45});
-  scene.camera.near = 100;  // within the first
-  scene.camera.far = 112;   // within the second
+  scene.camera.near = 100;  // inside the first slab
+  scene.camera.far = 112;   // inside the second slab
   const Seen a = aloneOf(slabs({1}), 0), b = aloneOf(slabs({1, 1}), 1);
   expectSeen(scene, over(a, 0.3, over(b, 0.6, {0, 0, 0, 0})));
 }
@@ -165,7 +165,7 @@ Scene ringsAroundABall() {
   return scene;
 }
 
-TEST(Transparency, LeavesDataToTheFirstSurface) {
+TEST(Transparency, LeavesDataLayersToTheFirstSurface) {
   for (const char* csg : {"", "a | b", "b - a"}) {
     Scene scene = ringsAroundABall();
     if (*csg) scene.csg = CsgExpression(csg, {"a", "b"});
@@ -180,7 +180,7 @@ TEST(Transparency, LeavesDataToTheFirstSurface) {
   }
 }
 
-/// But for samples on outlines, which are one or the other.
+/// Expects the judge's colours, except for samples on outlines, which belong to either side.
 void expectColoursOfTheJudge(const Image& ours, const Image& judge, const char* what) {
   std::size_t unlike = 0;
   for (std::size_t i = 0; i < ours.pixelCount(); ++i) {
@@ -192,7 +192,8 @@ void expectColoursOfTheJudge(const Image& ours, const Image& judge, const char* 
   EXPECT_LE(unlike, ours.pixelCount() / 1000) << what;
 }
 
-/// Rays to lights start at places that differ, so that single pixels do.
+/// Expects the same light on average. Rays to lights start at different positions, so that single
+/// pixels differ.
 void expectSameLight(const Image& ours, const Image& judge, const char* what) {
   for (const char* name : {"R", "G", "B", "A"}) {
     double a = 0, b = 0;
@@ -204,7 +205,7 @@ void expectSameLight(const Image& ours, const Image& judge, const char* what) {
   }
 }
 
-TEST(Transparency, IsTheSameOfAllRenderers) {
+TEST(Transparency, AgreesOnAllRenderers) {
   for (const char* csg : {"", "a | b", "a - b"}) {
     Scene scene = ringsAroundABall();
     if (*csg) scene.csg = CsgExpression(csg, {"a", "b"});
@@ -219,7 +220,7 @@ TEST(Transparency, IsTheSameOfAllRenderers) {
   }
 }
 
-/// Of the ground under a roof, from below which nothing of the roof is seen.
+/// Brightness of the ground under a roof, seen from below the roof.
 double brightnessUnder(const Scene& shaded, bool isJudge) {
   const RenderOptions options = {.samples = 1, .ambientSamples = 0, .shadowSamples = 4};
   const Image image = isJudge ? renderEmbree(shaded, options) : renderCpu(shaded, options);
@@ -231,7 +232,7 @@ double brightnessUnder(const Scene& shaded, bool isJudge) {
   return sum;
 }
 
-TEST(Transparency, DimsShadowsByWhatComesThrough) {
+TEST(Transparency, DimsShadowsByTheTransmittedLight) {
   Scene ground = slabs({1});
   ground.key.direction = V3d(0, 1, 1);
   const auto withRoof = [&](double opacity, const char* csg) {
@@ -263,7 +264,7 @@ TEST(Transparency, DimsShadowsByWhatComesThrough) {
   }
 }
 
-TEST(Transparency, RefusesWhatIsNoOpacity) {
+TEST(Transparency, RefusesInvalidOpacities) {
   for (const double opacity : {0.0, -0.5, 1.5, std::numeric_limits<double>::quiet_NaN()}) {
     EXPECT_THROW((void)renderCpu(slabs({opacity}), kNoRays), levelset::UsageError);
     EXPECT_THROW((void)renderEmbree(slabs({opacity}), kNoRays), levelset::UsageError);

@@ -1,4 +1,4 @@
-// Values in 16 and in 8 bits: the same surface for all renderers, as far off as is said.
+// Values of 16 and 8 bits: the same surface on all renderers, with the stated error.
 
 #include "render/images/value_bits.h"
 
@@ -33,7 +33,7 @@ Scene coarseScene(const NarrowBand& band, int bits) {
   return scene;
 }
 
-TEST(ValueBits, KeepSignsAndHoldWhatTheyMake) {
+TEST(ValueBits, KeepSignsAndTheirOwnRoundedValues) {
   for (const int bits : {8, 16}) {
     const ValueBits held{.bits = bits, .step = std::ldexp(3.0f, 1 - bits)};
     for (int code = 0; code < 1 << bits; ++code) EXPECT_EQ(held.codeOf(held.valueOf(code)), code);
@@ -44,7 +44,7 @@ TEST(ValueBits, KeepSignsAndHoldWhatTheyMake) {
   }
 }
 
-TEST(ValueBits, MoveTheSurfaceByHalfAStepAtMost) {
+TEST(ValueBits, MoveTheSurfaceByAtMostHalfAStep) {
   for (const double voxel : {1.0, 0.01}) {
     const NarrowBand band = levelset::makeSphere(40 * voxel, V3d(0.3, 0.2, 0.1) * voxel, voxel);
     double last = 1;
@@ -55,7 +55,8 @@ TEST(ValueBits, MoveTheSurfaceByHalfAStepAtMost) {
                   1e-6 * step);  // a band of three voxels on each side
       EXPECT_LE(coarse.shift.largest, 0.5 * step * 1.01);
       EXPECT_GT(coarse.shift.largest, 0.4 * step);
-      // Even over the step: a third of the half step, squared, less what two values average out.
+      // Uniform rounding gives an RMS of half a step divided by √3, less the effect of averaging
+      // two values.
       EXPECT_GT(coarse.shift.rms, 0.15 * step);
       EXPECT_LT(coarse.shift.rms, 0.29 * step);
       EXPECT_LT(coarse.shift.largest, last / 50);
@@ -76,7 +77,7 @@ TEST(ValueBits, MakeTheTablesSmaller) {
     const double share = static_cast<double>(coarse.solids()[0].pool.valueBytes()) /
                          static_cast<double>(whole.solids()[0].pool.valueBytes());
     EXPECT_NEAR(share, bits / 32.0, 1e-9);
-    // What the tables hold are the band's values.
+    // The tables contain the values of the band.
     const BrickPool pool = makeBricks(coarseScene(band, bits).solids[0].band);
     const BrickPool& codes = coarse.solids()[0].pool;
     for (std::size_t i = 0; i < pool.value.size(); ++i) {
@@ -89,7 +90,7 @@ TEST(ValueBits, MakeTheTablesSmaller) {
   }
 }
 
-TEST(ValueBits, AreDrawnAlikeByAllRenderers) {
+TEST(ValueBits, AgreeOnAllRenderers) {
   for (const int bits : {8, 16}) {
     for (const NarrowBand& band :
          {levelset::makeSphere(20, V3d(0.3, 0.2, 0.1), 1), support::rings(),
@@ -106,7 +107,7 @@ TEST(ValueBits, AreDrawnAlikeByAllRenderers) {
   }
 }
 
-TEST(ValueBits, HoldTheCoefficientsOfTheSplineThatAreValues) {
+TEST(ValueBits, SupportSplinesWhoseCoefficientsAreValues) {
   for (const int bits : {8, 16})
     EXPECT_NO_THROW((void)renderCpu(coarseScene(levelset::makeSphere(9, V3d(0), 1), bits),
                                     {.samples = 1, .filter = Filter::BSpline}));

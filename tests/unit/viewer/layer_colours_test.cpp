@@ -35,7 +35,7 @@ Bytes pixel(const Bytes& all, std::size_t i) {
           all.begin() + static_cast<std::ptrdiff_t>(4 * i + 4)};
 }
 
-TEST(LayerColours, ShowNormalsByTheirParts) {
+TEST(LayerColours, ShowNormalsByComponent) {
   const Bytes bytes = layerColours(threePixels(), Layer::Normal, 1);
   EXPECT_EQ(pixel(bytes, 0), (Bytes{128, 128, 255, 255}));
   EXPECT_EQ(pixel(bytes, 1), (Bytes{255, 128, 128, 255}));
@@ -49,17 +49,17 @@ TEST(LayerColours, ShowDepthsFromWhiteToDark) {
   EXPECT_EQ(pixel(bytes, 2)[3], 0);
 }
 
-TEST(LayerColours, ShowPositionsWithinWhatIsSeen) {
+TEST(LayerColours, ShowPositionsWithinTheVisibleBounds) {
   const Bytes bytes = layerColours(threePixels(), Layer::Position, 1);
   EXPECT_EQ(pixel(bytes, 0), (Bytes{0, 128, 128, 255}));
   EXPECT_EQ(pixel(bytes, 1), (Bytes{255, 128, 128, 255}));
 }
 
-TEST(LayerColours, ShowCurvaturesByTheExtent) {
+TEST(LayerColours, ScaleCurvaturesByTheExtent) {
   render::Image image = threePixels();
   image.channels["curvature.mean"] = {20, -20, 0};
   image.channels["curvature.gauss"] = {400, 0, 0};
-  // The same solid ten times as large shows the same colours.
+  // The same solid ten times as large has the same colours.
   render::Image large = image;
   large.channels["curvature.mean"] = {2, -2, 0};
   large.channels["curvature.gauss"] = {4, 0, 0};
@@ -73,7 +73,7 @@ TEST(LayerColours, ShowCurvaturesByTheExtent) {
   }
 }
 
-TEST(LayerColours, DivergeFromWhiteAndEnd) {
+TEST(LayerColours, DivergeFromWhiteAndAreClamped) {
   const DisplayColour middle = divergingColour(0);
   for (const double c : middle) EXPECT_GT(c, 0.9);
   EXPECT_GT(divergingColour(0.5)[0], divergingColour(0.5)[2]);
@@ -93,13 +93,13 @@ TEST(LayerColours, GiveEachSolidAColourOfItsOwn) {
   EXPECT_EQ(pixel(bytes, 2)[3], 0);
 }
 
-TEST(LayerColours, HaveNamesThatAreReadBack) {
+TEST(LayerColours, HaveNamesThatCanBeParsed) {
   for (const Layer layer : kLayers) EXPECT_EQ(layerNamed(layerName(layer)), layer);
   EXPECT_THROW((void)layerNamed("colours"), levelset::UsageError);
   EXPECT_THROW((void)layerNamed(""), levelset::UsageError);
 }
 
-TEST(LayerColours, OfNothingAreNothing) {
+TEST(LayerColours, OfAnEmptyImageAreEmpty) {
   render::Image image = threePixels();
   image.channels["Z"].assign(3, std::numeric_limits<float>::infinity());
   for (const Layer layer : kLayers)

@@ -27,13 +27,13 @@ void expectNear(const V3d& a, const V3d& b, double tolerance) {
       << a.x << ',' << a.y << ',' << a.z << " and " << b.x << ',' << b.y << ',' << b.z;
 }
 
-/// Where in the picture a place is seen, pixels.
+/// Pixel position of a point in the picture.
 V2d pixelOf(const Camera& camera, const V3d& place) {
   const V3d ndc = place * camera.worldToNdc();
   return {ndc.x * camera.width, ndc.y * camera.height};
 }
 
-TEST(OrbitCamera, LeavesACameraAloneUntilItIsMoved) {
+TEST(OrbitCamera, KeepsACameraUntilItIsMoved) {
   const Camera given = startCamera();
   const Camera seen = OrbitCamera(given).camera(kWidth, kHeight);
   EXPECT_EQ(seen.from, given.from);
@@ -42,7 +42,7 @@ TEST(OrbitCamera, LeavesACameraAloneUntilItIsMoved) {
   EXPECT_EQ(seen.width, kWidth);
 }
 
-TEST(OrbitCamera, TurnsAroundItsTargetAtTheSameDistance) {
+TEST(OrbitCamera, RotatesAroundItsTargetAtConstantDistance) {
   OrbitCamera orbit(startCamera());
   const double distance = orbit.targetDepth();
   for (int i = 0; i < 50; ++i) orbit.orbit(0.3, 0.1 * std::sin(i));
@@ -51,7 +51,7 @@ TEST(OrbitCamera, TurnsAroundItsTargetAtTheSameDistance) {
   EXPECT_NEAR(orbit.targetDepth(), distance, 1e-12 * distance);
 }
 
-TEST(OrbitCamera, ComesBackAfterAWholeTurn) {
+TEST(OrbitCamera, ReturnsAfterAFullTurn) {
   OrbitCamera orbit(startCamera());
   for (int i = 0; i < 8; ++i) orbit.orbit(std::numbers::pi / 4, 0);
   expectNear(orbit.camera(1, 1).from, startCamera().from, 1e-12);
@@ -67,18 +67,18 @@ TEST(OrbitCamera, MovesTheEyeToTheRightAndUp) {
   expectNear(orbit.camera(1, 1).from, {0, 2.5, 5 * std::cos(std::numbers::pi / 6)}, 1e-12);
 }
 
-TEST(OrbitCamera, StopsAtThePolesAndTurnsThere) {
+TEST(OrbitCamera, StopsAtThePolesAndRotatesThere) {
   OrbitCamera orbit((Camera()));
   orbit.orbit(0, 10);
   expectNear(orbit.camera(1, 1).from, {0, 5, 0}, 1e-12);
   expectNear(orbit.camera(1, 1).up, {0, 0, -1}, 1e-12);
   orbit.orbit(std::numbers::pi / 2, 0);
   expectNear(orbit.camera(1, 1).up, {-1, 0, 0}, 1e-9);
-  orbit.orbit(0, -std::numbers::pi / 2);  // down again, to where it has turned
+  orbit.orbit(0, -std::numbers::pi / 2);  // down again, in the new direction
   expectNear(orbit.camera(1, 1).from, {5, 0, 0}, 1e-8);
 }
 
-TEST(OrbitCamera, PansSoThatWhatIsPickedStaysUnderThePointer) {
+TEST(OrbitCamera, PansSoThatThePickedPointStaysUnderThePointer) {
   for (const bool isOrtho : {false, true}) {
     OrbitCamera orbit(startCamera());
     if (isOrtho) orbit.toggleOrtho();
@@ -116,7 +116,7 @@ TEST(OrbitCamera, ZoomsTowardsThePointer) {
   }
 }
 
-TEST(OrbitCamera, FramesAllOfABoxInPicturesOfAnyShape) {
+TEST(OrbitCamera, FramesABoxInPicturesOfAnyShape) {
   const Imath::Box3d box(V3d(-3, 0, 1), V3d(4, 1, 2));
   for (const bool isOrtho : {false, true})
     for (const auto& [width, height] : {std::pair(640, 480), {300, 900}, {1, 1}}) {
@@ -136,7 +136,7 @@ TEST(OrbitCamera, FramesAllOfABoxInPicturesOfAnyShape) {
     }
 }
 
-TEST(OrbitCamera, LooksAgainstAxesAndGoesOnTurningFromThere) {
+TEST(OrbitCamera, LooksAlongAxesAndContinuesToRotate) {
   OrbitCamera orbit(startCamera());
   const double distance = orbit.targetDepth();
   for (const V3d& axis : {V3d(1, 0, 0), V3d(0, 1, 0), V3d(0, 0, -1), V3d(0, -1, 0)}) {
@@ -159,7 +159,7 @@ TEST(OrbitCamera, KeepsTheSizeOfTheTargetBetweenPerspectives) {
   expectNear(orbit.camera(1, 1).from, before.from, 1e-12);
 }
 
-TEST(OrbitCamera, DoesNotDoWhatLeavesTheRangeOfNumbers) {
+TEST(OrbitCamera, RefusesMovesThatOverflow) {
   OrbitCamera orbit(startCamera());
   const double infinite = std::numeric_limits<double>::infinity();
   const auto expectStill = [&] {

@@ -1,4 +1,4 @@
-// What the viewer shows beside surfaces: clip planes, patches, points; and what it reads.
+// Parts of the viewer beside surfaces: clip planes, patches, points, and input files.
 
 #include <gtest/gtest.h>
 
@@ -54,7 +54,7 @@ std::shared_ptr<const Frame> finished(const ProgressivePicture& picture, const V
   return nullptr;
 }
 
-TEST(ProgressivePicture, FinishesWhatIsWantedLast) {
+TEST(ProgressivePicture, CompletesTheLastRequest) {
   ProgressivePicture picture(Renderer::Cpu);
   const auto model = ballModel();
   View view = ballView(model);
@@ -85,7 +85,7 @@ TEST(ProgressivePicture, ShowsAnotherLayerOfTheSamePicture) {
   EXPECT_NEAR(second->canvas.colours[middle + 2], 255, 2);
 }
 
-TEST(ProgressivePicture, SaysWhyAViewCannotBeDrawnAndGoesOn) {
+TEST(ProgressivePicture, ReportsWhyAViewCannotBeDrawnAndContinues) {
   ProgressivePicture picture(Renderer::Cpu);
   const auto model = ballModel();
   View view = ballView(model), blind = view;
@@ -99,7 +99,7 @@ TEST(ProgressivePicture, SaysWhyAViewCannotBeDrawnAndGoesOn) {
   EXPECT_NE(finished(picture, view), nullptr);
 }
 
-TEST(ProgressivePicture, DrawsPicturesOfOnePixelAndOfNothing) {
+TEST(ProgressivePicture, DrawsPicturesOfOnePixelAndEmptyPictures) {
   ProgressivePicture picture(Renderer::Cpu);
   View view = ballView(ballModel());
   view.camera.width = view.camera.height = 1;
@@ -120,7 +120,7 @@ TEST(ClipPlane, ShowsThePlaneAndTheDistanceInIt) {
     picture.request(view, {});
     const auto frame = finished(picture, view);
     ASSERT_NE(frame, nullptr);
-    for (const int x : {32, 38}) {  // in the ball's section
+    for (const int x : {32, 38}) {  // inside the section of the ball
       const auto picked = pick(*frame, x, 24);
       ASSERT_TRUE(picked);
       EXPECT_NEAR(picked->position.z, 0.25, 1e-5);
@@ -133,7 +133,7 @@ TEST(ClipPlane, ShowsThePlaneAndTheDistanceInIt) {
   }
 }
 
-TEST(ClipPlane, FacesTheEyeWhereverItIs) {
+TEST(ClipPlane, FacesTheEyeFromAnySide) {
   const Imath::Box3d bounds(V3d(-1), V3d(1));
   render::Camera camera;
   for (const double side : {-5.0, 5.0}) {
@@ -148,7 +148,7 @@ TEST(ClipPlane, FacesTheEyeWhereverItIs) {
   EXPECT_NEAR(plane.normal.dot(camera.axis()), -1, 1e-15);
 }
 
-TEST(ClipPlane, CutsWhatAnExpressionMakes) {
+TEST(ClipPlane, CutsTheResultOfAnExpression) {
   render::Scene scene;
   scene.solids.push_back({.band = levelset::makeSphere(1, {0, 0, 0}, kVoxel), .name = "a"});
   scene.solids.push_back({.band = levelset::makeSphere(1, {0.5, 0, 0}, kVoxel), .name = "b"});
@@ -202,7 +202,7 @@ TEST(PatchOverlay, DrawsBeforeASurfaceAndFaintlyBehindIt) {
   EXPECT_LT(behind, 60);
 }
 
-TEST(PatchOverlay, SurvivesWhatLiesBehindTheEyeAndBesideThePicture) {
+TEST(PatchOverlay, HandlesPointsBehindTheEyeAndOutsideThePicture) {
   render::Image picture(1, 1);
   picture.addChannel("Z", std::numeric_limits<float>::infinity());
   mapping::Patch patch = flatPatch();
@@ -248,14 +248,14 @@ TEST(Pick, WritesPointsAsTheCommandLineTakesThem) {
             R"({"position":[1.0,2.0,3.0],"normal":[0.0,0.0,1.0],"phi":0.5,"solid":"a\"b"})");
 }
 
-TEST(FileWatch, TellsOnceWhenAFileLiesStillAgain) {
+TEST(FileWatch, ReportsAChangeOnceTheFileIsStable) {
   const support::TemporaryFolder folder;
   const auto file = folder.path() / "a.txt";
   std::ofstream(file) << "one";
   FileWatch watch({file});
   EXPECT_FALSE(watch.hasChanged());
   std::ofstream(file) << "longer";
-  EXPECT_FALSE(watch.hasChanged());  // it may still be written
+  EXPECT_FALSE(watch.hasChanged());  // it may still be incomplete
   EXPECT_TRUE(watch.hasChanged());
   EXPECT_FALSE(watch.hasChanged());
   std::filesystem::remove(file);
@@ -268,7 +268,7 @@ TEST(FileWatch, TellsOnceWhenAFileLiesStillAgain) {
   EXPECT_FALSE(FileWatch().hasChanged());
 }
 
-TEST(OpenModel, RefusesWhatItCannotShow) {
+TEST(OpenModel, RefusesUnsupportedFiles) {
   const support::TemporaryFolder folder;
   const auto file = [&](const char* name) { return folder.path() / name; };
   for (const char* name : {"broken.vdb", "broken.ply", "broken.json", "broken.patch", "a.txt"})
@@ -284,14 +284,14 @@ TEST(OpenModel, RefusesWhatItCannotShow) {
   EXPECT_EQ(openModel({file("ball.vdb")}).scene.solids[0].name, "ball");
 }
 
-TEST(OpenModel, PutsPatchesOnTopAndSolidsInPlace) {
+TEST(OpenModel, PutsPatchesOnTopAndSolidsInPosition) {
   using Files = std::vector<std::filesystem::path>;
   EXPECT_EQ(filesWith({"a.vdb"}, "p.patch"), (Files{"a.vdb", "p.patch"}));
   EXPECT_EQ(filesWith({"a.vdb", "p.patch"}, "p.patch"), (Files{"a.vdb", "p.patch"}));
   EXPECT_EQ(filesWith({"a.vdb", "p.patch"}, "b.ply"), (Files{"b.ply"}));
 }
 
-TEST(ViewerArguments, AreRefusedWithASentence) {
+TEST(ViewerArguments, AreRefusedWithAMessage) {
   using Words = std::vector<std::string>;
   for (const Words& words : {Words{"--layer"},
                              {"--layer", "x"},

@@ -1,4 +1,4 @@
-// The viewer from the command line, in a window of a display in memory.
+// Runs the viewer from the command line, in a window of a virtual display.
 
 #include <gtest/gtest.h>
 #include <png.h>
@@ -54,7 +54,7 @@ class ViewerCommand : public support::ShellTest {
     if (std::system("command -v xvfb-run >/dev/null 2>&1") == 0) return;
     const char* ci = std::getenv("CI");
     if (ci && std::string(ci) == "true")
-      FAIL() << "xvfb-run is not there, and the viewer has to be tested: install xvfb and xauth";
+      FAIL() << "xvfb-run is missing, and the viewer must be tested: install xvfb and xauth";
     GTEST_SKIP() << "the viewer needs a display: install xvfb and xauth";
   }
 
@@ -63,7 +63,7 @@ class ViewerCommand : public support::ShellTest {
     ASSERT_EQ(made.code, 0) << made.err;
   }
 
-  /// One display for all lines, in which `view` is the viewer.
+  /// Runs all lines on one display. `view` stands for the viewer.
   Outcome onDisplay(const std::string& lines) {
     writeFile("lines.sh", "view() { '" LEVELSMITH_VIEWER_COMMAND "' \"$@\"; }\n" + lines);
     return shell("xvfb-run -a bash lines.sh");
@@ -72,7 +72,7 @@ class ViewerCommand : public support::ShellTest {
   [[nodiscard]] Picture png(const std::string& name) const { return readPng(folder_ / name); }
 };
 
-TEST_F(ViewerCommand, DrawsPicksAndWritesWhatTheCommandDraws) {
+TEST_F(ViewerCommand, DrawsPicksAndWritesTheCommandsPicture) {
   makeBall();
   const std::string camera = "--from 0.5,1,5 --to 0,0,0 --fov 30 --size 200x150";
   const Outcome seen = onDisplay("set -e; view ball.vdb " + camera +
@@ -94,7 +94,7 @@ TEST_F(ViewerCommand, DrawsPicksAndWritesWhatTheCommandDraws) {
   ASSERT_EQ(drawn.code, 0) << drawn.err;
   EXPECT_EQ(picture.bytes, png("b.png").bytes);
 
-  // The ray through the middle goes towards the origin.
+  // The ray through the middle points towards the origin.
   const std::size_t end = seen.out.find('\n');
   const Json json = Json::parse(seen.out.substr(0, end));
   const double distance = std::sqrt(0.5 * 0.5 + 1 + 25);
@@ -145,16 +145,16 @@ TEST_F(ViewerCommand, OpensMeshesScenesAndPatches) {
       "view p.patch b.ply --resolution 40 --from 0,0,6 --size 80x60 --screenshot p.png\n"
       "view p.patch --from 0,0,6 --size 80x60 --screenshot alone.png --pick 40,30");
   ASSERT_EQ(seen.code, 0) << seen.err;
-  EXPECT_EQ(png("s.png").width, 80);  // as the scene says
+  EXPECT_EQ(png("s.png").width, 80);  // size of the scene file
   EXPECT_GT(brightness(png("m.png").middle()), 250);
   EXPECT_NE(png("p.png").bytes, png("m.png").bytes);
   EXPECT_GT(png("alone.png").middle()[3], 0);
-  // The mesh stands out of the plane, which cuts solids only.
+  // The mesh extends beyond the plane, which cuts solids only.
   EXPECT_EQ(seen.out.find("\"solid\":\"m\"") != std::string::npos, true) << seen.out;
   EXPECT_TRUE(seen.out.ends_with("\"solid\":\"m\"}\nnull\n")) << seen.out;
 }
 
-TEST_F(ViewerCommand, RefusesWhatItCannotDo) {
+TEST_F(ViewerCommand, RefusesInvalidRequests) {
   makeBall();
   writeFile("broken.vdb", "no grid");
   writeFile("broken.ply", "ply\n");
@@ -176,16 +176,16 @@ TEST_F(ViewerCommand, RefusesWhatItCannotDo) {
   EXPECT_FALSE(exists("a.png"));
 }
 
-TEST_F(ViewerCommand, NeedsADisplayAndSaysSo) {
+TEST_F(ViewerCommand, ReportsAMissingDisplay) {
   makeBall();
   const Outcome seen =
       shell("unset DISPLAY WAYLAND_DISPLAY; '" LEVELSMITH_VIEWER_COMMAND "' ball.vdb");
   EXPECT_REFUSED(seen, 4, "levelsmith render");
 }
 
-TEST_F(ViewerCommand, StaysOpenUntilItIsEnded) {
+TEST_F(ViewerCommand, StaysOpenUntilItIsClosed) {
   makeBall();
-  // A window without a file, one whose file goes away, and one that is interrupted.
+  // A window without a file, one whose file disappears, and one that is interrupted.
   const Outcome seen = onDisplay("timeout --preserve-status -s INT 2 '" LEVELSMITH_VIEWER_COMMAND
                                  "'; echo $?\n"
                                  "(sleep 1; rm ball.vdb; sleep 1; echo garbage >ball.vdb) &\n"

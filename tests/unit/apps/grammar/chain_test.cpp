@@ -10,7 +10,7 @@ using levelset::UsageError;
 using pipeline::Graph;
 using pipeline::parseChain;
 
-/// Splits at blanks; words in 'quotes' stay together.
+/// Splits at blanks. Words in 'quotes' stay together.
 Graph parse(const std::string& line) {
   std::vector<std::string> words;
   std::string word;
@@ -50,7 +50,7 @@ TEST(Chain, SplitsActionsOptionsAndGlobals) {
   EXPECT_EQ(graph.nodes[2].options.at("file"), "out.vdb");
 }
 
-TEST(Chain, TakesUniqueBeginningsOfOptions) {
+TEST(Chain, AcceptsUniquePrefixesOfOptions) {
   EXPECT_EQ(parse("sphere --rad 1 --vox 0.1").nodes[0].options.at("radius"), "1");
   EXPECT_REFUSAL("sphere --r 1 --voxel 0.1", "may mean");
 }
@@ -83,7 +83,7 @@ TEST(Chain, RefusesMalformedChains) {
   EXPECT_REFUSAL("sphere --voxel 0.1", "needs --radius");
 }
 
-TEST(Chain, RefusesNumbersBeforeAnythingRuns) {
+TEST(Chain, RefusesInvalidNumbersBeforeTheRun) {
   for (const char* bad : {"nan", "inf", "-1", "0", "abc", "1e999", "1,5", "", "0x10"})
     EXPECT_NE(refusal(std::string("sphere --voxel 0.1 --radius=") + bad), "accepted") << bad;
   EXPECT_REFUSAL("sphere --radius 1 --voxel 2vx", "cannot be given in voxels");
@@ -126,7 +126,7 @@ TEST(Chain, ChecksOperandsAndTheirKinds) {
                  "is taken");
 }
 
-TEST(Chain, GivesStandardStreamsToOneUserOnly) {
+TEST(Chain, GivesStandardStreamsToOneActionOnly) {
   EXPECT_REFUSAL("sphere --radius 1 --voxel 1 ! write - --format vdb ! measure --json",
                  "standard output is already used");
   EXPECT_REFUSAL("--report - sphere --radius 1 --voxel 1 ! measure --json", "--report");

@@ -41,16 +41,16 @@ TEST_F(Command, MeasuresASphere) {
   EXPECT_DOUBLE_EQ(m["half_width"], 3);
 }
 
-TEST_F(Command, TakesOlderMinusNewer) {
+TEST_F(Command, SubtractsTheNewerOperandFromTheOlder) {
   const Json m =
       measure("box --size 3,3,3 --voxel 0.1 ! sphere --radius 1 --voxel 0.1 ! difference");
-  // The mesh of the box cuts at most h²/2 off its 36 units of edges.
+  // The mesh of the box removes at most h²/2 along its 36 units of edges.
   EXPECT_NEAR(m["volume"], 27 - 4 * kPi / 3, 36 * 0.1 * 0.1 / 2);
   EXPECT_EQ(m["cavities"], 1);
   EXPECT_EQ(m["shells"], 2);
 }
 
-TEST_F(Command, ChangesOnlyWhatTheMaskReaches) {
+TEST_F(Command, ChangesOnlyMaskedPoints) {
   const std::string box = "box --size 2,2,2 --voxel 0.1";
   const double before = measure(box)["volume"];
   for (const std::string action : {"open 0.5", "shell --thickness 0.3", "close 0.3"}) {
@@ -60,8 +60,8 @@ TEST_F(Command, ChangesOnlyWhatTheMaskReaches) {
     const double everywhere = volume("");
     EXPECT_NEAR(volume(" --mask x --mask-min 8 --mask-max 9"), before, 1e-3) << action;
     EXPECT_NEAR(volume(" --mask x --mask-min -9 --mask-max -8"), everywhere, 1e-3) << action;
-    // Half of a solid that is the same on both sides; a cavity's new wall of 1.4² lies within half
-    // a voxel of the middle.
+    // Half of a solid that is symmetric. The new wall of 1.4² of a cavity lies within half a voxel
+    // of the middle.
     const double right = volume(" --mask x --mask-min -0.05 --mask-max 0.05");
     EXPECT_NEAR(right, volume(" --mask x --mask-min -0.05 --mask-max 0.05 --mask-invert"), 0.01)
         << action;
@@ -80,7 +80,7 @@ TEST_F(Command, ResolvesLengthsInVoxelsAndPercent) {
   }
 }
 
-TEST_F(Command, ReadsBackWhatItWrites) {
+TEST_F(Command, ReadsItsOwnFiles) {
   ASSERT_EQ(levelsmith("torus --radius 2 --tube 0.7 --voxel 0.1 ! write a.vdb ! mesh ! write a.ply "
                        "! write a.obj.gz ! write a.stl ! write a.off")
                 .code,
@@ -89,7 +89,7 @@ TEST_F(Command, ReadsBackWhatItWrites) {
   const double exact = 2 * kPi * kPi * 2 * 0.7 * 0.7;
   EXPECT_NEAR(band["volume"], exact, 1e-4 * exact);
   EXPECT_EQ(band["euler"], 0);
-  // Flat triangles cut the round off.
+  // Flat triangles lie inside the curved surface.
   const double flat = measure("read a.ply")["volume"];
   EXPECT_NEAR(flat, exact, 5e-3 * exact);
   for (const char* file : {"a.ply", "a.obj.gz", "a.stl", "a.off"}) {
@@ -108,14 +108,14 @@ TEST_F(Command, PipesThroughStandardStreams) {
   EXPECT_NEAR(Json::parse(outcome.out)["volume"], 4 * kPi / 3, 0.05);
 }
 
-TEST_F(Command, KeepsDataApartFromTextOnStandardOutput) {
+TEST_F(Command, KeepsDataApartFromMessagesOnStandardOutput) {
   const auto outcome = levelsmith("sphere --radius 1 --voxel 0.1 ! check ! measure --json");
   EXPECT_EQ(outcome.code, 0);
   EXPECT_TRUE(Json::accept(outcome.out)) << outcome.out;
   EXPECT_NE(outcome.err.find("ok"), std::string::npos);
 }
 
-TEST_F(Command, NamesWhoSpeaksOnce) {
+TEST_F(Command, NamesTheActionOfAMessageOnce) {
   const std::string ball = "sphere --radius 1 --voxel 0.1 ! ";
   const auto cut = levelsmith("--report r.json sphere --radius 1 --voxel 0.1 --half-width 4 ! " +
                               ball + "union ! measure");
@@ -138,7 +138,7 @@ TEST_F(Command, NamesWhoSpeaksOnce) {
   says(levelsmith("info empty.ply"), "levelsmith: info: 'empty.ply' is empty");
 }
 
-TEST_F(Command, WarnsOfValuesThatNobodyUses) {
+TEST_F(Command, WarnsOfUnusedValues) {
   const auto outcome = levelsmith("sphere --radius 1 --voxel 0.1");
   EXPECT_EQ(outcome.code, 0);
   EXPECT_NE(outcome.err.find("not used"), std::string::npos);
@@ -162,13 +162,13 @@ TEST_F(Command, WritesAReport) {
   EXPECT_LT(offset["errors"][0]["value"], 0.1);
   ASSERT_EQ(levelsmith("--report r.html sphere --radius 1 --voxel 0.1 ! measure").code, 0);
   EXPECT_NE(support::slurp(folder_ / "r.html").find("<table>"), std::string::npos);
-  // The voxel size is known only after the lengths that it follows from.
+  // The voxel size is known only after the lengths that determine it.
   ASSERT_EQ(levelsmith("--report r.json sphere --radius 1 --resolution 100 ! measure").code, 0);
   const Json sphere = Json::parse(support::slurp(folder_ / "r.json"))["steps"][0]["resolved"];
   EXPECT_DOUBLE_EQ(sphere["radius"]["voxels"], 50);
 }
 
-TEST_F(Command, WarnsOfAFileThatIsWrittenTwice) {
+TEST_F(Command, WarnsOfAFileWrittenTwice) {
   const auto outcome = levelsmith(
       "sphere --radius 1 --voxel 0.1 ! write a.vdb ! offset 0.1 ! write ./a.vdb ! measure");
   EXPECT_EQ(outcome.code, 0);
@@ -184,9 +184,9 @@ TEST_F(Command, WarnsOfAFileThatIsWrittenTwice) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "b.vdb"));
 }
 
-// A terminal made by script(1): bars come after a second, and are wiped away.
+// script(1) provides a terminal. Progress bars appear after a second and are erased afterwards.
 TEST_F(Command, ShowsABarOnATerminal) {
-  // Several seconds on any machine: the bar waits for one.
+  // Takes several seconds on any machine, because the bar waits for one second.
   const std::string slow = " torus --radius 2 --tube 0.8 --voxel 0.006 ! measure";
   ASSERT_EQ(shell("script -qec '" + command() + slow + "' typed < /dev/null > /dev/null").code, 0);
   const std::string typed = support::slurp(folder_ / "typed");
@@ -195,7 +195,7 @@ TEST_F(Command, ShowsABarOnATerminal) {
 }
 
 TEST_F(Command, ReportsTheCertificateOfARefusedMesh) {
-  // A box without its top, whose sign is a guess along the hole.
+  // A box without its top. Along the hole its sign is uncertain.
   writeFile("open.off",
             "OFF\n8 10 0\n-1 -1 -1\n1 -1 -1\n1 1 -1\n-1 1 -1\n-1 -1 1\n1 -1 1\n1 1 1\n-1 1 1\n"
             "3 0 2 1\n3 0 3 2\n3 0 1 5\n3 0 5 4\n3 1 2 6\n3 1 6 5\n3 2 3 7\n3 2 7 6\n3 3 0 4\n"
@@ -207,7 +207,7 @@ TEST_F(Command, ReportsTheCertificateOfARefusedMesh) {
   EXPECT_GT(report["steps"][1]["certificate"]["ambiguous_share"], 1e-3);
 }
 
-TEST_F(Command, PlansATurnedBandWhereItLies) {
+TEST_F(Command, PlansARotatedBandAtItsPosition) {
   ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.1 --half-width 5 ! transform --rotate "
                        "30 ! transform --translate 100,0,0 ! write a.vdb")
                 .code,
@@ -239,17 +239,17 @@ TEST_F(Command, DryRunResolvesEveryLength) {
   EXPECT_EQ(steps[2]["resolved"]["spacing"]["world"], 1);
   EXPECT_EQ(steps[3]["resolved"]["sink"]["world"], 0.5);
   EXPECT_EQ(steps[3]["resolved"]["blend"]["voxels"], 2);
-  // The rings, 11 across, become at least so much wider on the patch.
+  // The rings are 11 wide, and the patch enlarges them to at least this size.
   EXPECT_NEAR(steps[3]["result"]["voxel_size"], 0.25 * 20 / 11, 1e-9);
   EXPECT_NEAR(steps[5]["resolved"]["radius"]["world"], 2 * 0.25 * 20 / 11, 1e-9);
   EXPECT_TRUE(steps[6]["resolved"].contains("sigma"));
-  // Once each.
+  // Each note appears once.
   const std::size_t first = outcome.err.find("voxel = "), end = outcome.err.find('\n');
   EXPECT_LT(first, end) << outcome.err;
   EXPECT_GT(outcome.err.find("voxel = ", first + 1), end) << outcome.err;
 }
 
-TEST_F(Command, DryRunRefusesAsTheRunWould) {
+TEST_F(Command, DryRunRefusesLikeTheRun) {
   for (const char* run : {"", "--dry-run "}) {
     EXPECT_REFUSED(levelsmith(std::string(run) + "sphere --radius 1 --voxel 5"), 3,
                    "larger than the longest side of the shape");
@@ -259,7 +259,7 @@ TEST_F(Command, DryRunRefusesAsTheRunWould) {
   }
 }
 
-TEST_F(Command, TellsTheProgressOfWhateverMayTakeLong) {
+TEST_F(Command, ReportsProgressOfLongActions) {
   ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.05 ! write a.vdb").code, 0);
   const auto outcome = levelsmith(
       "--progress json read a.vdb ! keep --largest 1 ! fill-cavities ! clip --plane \"0,0,0 "
@@ -272,7 +272,7 @@ TEST_F(Command, TellsTheProgressOfWhateverMayTakeLong) {
         << outcome.err;
 }
 
-TEST_F(Command, EndsWhereItsProgressIsCancelled) {
+TEST_F(Command, StopsWhenItsProgressIsCancelled) {
   const levelset::Progress half = [](double fraction) { return fraction < 0.45; };
   const levelset::NarrowBand ball = levelset::makeSphere(1, Imath::V3d(0), 0.05);
   levelset::writeBand(folder_ / "a.vdb", ball);
@@ -312,7 +312,7 @@ TEST_F(Command, OutputMayEqualInput) {
   EXPECT_NEAR(measure("read a.vdb")["bounds"]["max"][0], 1.2, 0.01);
 }
 
-TEST_F(Command, TellsWhatIsInAFile) {
+TEST_F(Command, ReportsTheContentsOfAFile) {
   ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.1 ! write a.vdb ! mesh ! write a.ply").code, 0);
   const Json vdb = Json::parse(levelsmith("info a.vdb --json").out);
   EXPECT_NEAR(vdb["grids"][0]["voxel_size"], 0.1, 1e-9);
@@ -325,7 +325,7 @@ TEST_F(Command, TransformsExactlyAndBakesOnRequest) {
       measure("box --size 2,1,1 --voxel 0.05 ! transform --rotate 90 --translate 1,0,0")["bounds"]
                                                                                         ["max"][1],
       1, 0.003);
-  // Both lose the same at their edges, which are cut off within a voxel.
+  // Both lose the same at their edges, which are rounded within a voxel.
   const double whole = measure("box --size 2,1,1 --voxel 0.05")["volume"];
   EXPECT_NEAR(measure("box --size 1,1,1 --voxel 0.05 ! transform --scale 2,1,1 --bake")["volume"],
               whole, 0.005);

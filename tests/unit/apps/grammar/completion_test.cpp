@@ -1,4 +1,5 @@
-// Completion in shells: `levelsmith help --completion bash|zsh`.
+// Completion in shells: `levelsmith help --completion bash
+// zsh`.
 
 #include "apps/pipeline/help/completion.h"
 
@@ -19,8 +20,8 @@ class Completion : public support::ShellTest {
     writeFile("complete.bash", pipeline::completionScript("bash"));
   }
 
-  /// What bash would offer for the last word, sorted, with blanks between. Words as bash splits
-  /// them: at = and @ too.
+  /// Completions that bash offers for the last word, sorted and separated by blanks. The words are
+  /// split as in bash, at = and @ too.
   std::string offered(const std::string& words) {
     const auto outcome = shell("source ./complete.bash\nCOMP_WORDS=(levelsmith " + words +
                                ")\nCOMP_CWORD=$((${#COMP_WORDS[@]} - 1))\n_levelsmith levelsmith\n"
@@ -52,7 +53,7 @@ TEST_F(Completion, OffersOptionsOfTheAction) {
   EXPECT_EQ(offered("sphere --ra"), "--radius");
   EXPECT_EQ(offered("sphere --radius 1 ! box --si"), "--size");
   EXPECT_EQ(offered("--th"), "--threads");
-  EXPECT_EQ(offered("sphere --th"), "");  // only before the first action
+  EXPECT_EQ(offered("sphere --th"), "");  // global options only before the first action
   EXPECT_EQ(offered("sphere ! --th"), "");
   EXPECT_EQ(offered("sphere --a"), "--as");
   EXPECT_EQ(offered("measure --a"), "");
@@ -68,9 +69,9 @@ TEST_F(Completion, OffersChoices) {
   EXPECT_EQ(offered("level-set --sign ''"), "auto closed winding");
   EXPECT_EQ(offered("level-set --sign = w"), "winding");
   EXPECT_EQ(offered("level-set --sign ="), "auto closed winding");
-  EXPECT_EQ(offered("level-set --sig w"), "winding");  // a beginning of its name
+  EXPECT_EQ(offered("level-set --sig w"), "winding");  // prefix of its name
   EXPECT_EQ(offered("sphere --radius ''"), "");
-  EXPECT_EQ(offered("sphere --radius --"), "");  // it is the value
+  EXPECT_EQ(offered("sphere --radius --"), "");  // the word is a value
   EXPECT_EQ(offered("measure --json --"), offered("measure --"));
   EXPECT_EQ(offered("help --completion ''"), "bash zsh");
 }
@@ -106,7 +107,7 @@ TEST_F(Completion, IsLoadedByBash) {
   EXPECT_REFUSED(levelsmith("help --completion"), 2, "needs a shell");
 }
 
-TEST_F(Completion, KnowsTheSameInZsh) {
+TEST_F(Completion, OffersTheSameInZsh) {
   const std::string zsh = pipeline::completionScript("zsh"),
                     bash = pipeline::completionScript("bash");
   EXPECT_TRUE(zsh.starts_with("#compdef levelsmith\n"));
@@ -117,13 +118,13 @@ TEST_F(Completion, KnowsTheSameInZsh) {
   EXPECT_EQ(table(zsh), table(bash));
   for (const auto& op : pipeline::operators())
     EXPECT_NE(zsh.find("\n  '" + op.name + ":"), std::string::npos) << op.name;
-  if (shell("command -v zsh").code != 0) GTEST_SKIP() << "there is no zsh here";
+  if (shell("command -v zsh").code != 0) GTEST_SKIP() << "zsh is missing";
   writeFile("_levelsmith", zsh);
   const auto outcome = shell("zsh -n _levelsmith");
   EXPECT_EQ(outcome.code, 0) << outcome.err;
 }
 
-// The tables are words of a shell.
+// The tables are words of a shell and contain no special characters.
 TEST(CompletionWords, NeedNoQuotes) {
   for (const auto& op : pipeline::operators())
     for (const auto& param : op.params)

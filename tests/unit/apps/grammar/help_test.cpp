@@ -22,7 +22,7 @@ TEST_F(Help, ListsEveryAction) {
     EXPECT_NE(outcome.out.find("  " + op.name), std::string::npos) << op.name;
 }
 
-TEST_F(Help, EveryDeclarationIsWhole) {
+TEST_F(Help, EveryDeclarationIsComplete) {
   std::set<std::string> names;
   for (const auto& op : pipeline::operators()) {
     EXPECT_TRUE(names.insert(op.name).second) << op.name << " is declared twice";
@@ -59,15 +59,15 @@ TEST_F(Help, KnowsRun) {
   EXPECT_NE(levelsmith("help --search comment").out.find("run"), std::string::npos);
 }
 
-TEST_F(Help, FindsWordsAndGuesses) {
+TEST_F(Help, FindsWordsAndSuggestsCorrections) {
   EXPECT_NE(levelsmith("help --search winding").out.find("level-set"), std::string::npos);
   EXPECT_REFUSED(levelsmith("help ofset"), 2, "did you mean 'offset'");
 }
 
-TEST_F(Help, IsTheReference) {
+TEST_F(Help, MatchesTheReference) {
   const std::string page = levelsmith("help --markdown").out;
   EXPECT_TRUE(page == support::slurp(LEVELSMITH_REFERENCE))
-      << "docs/reference.md is not what the program declares; renew it with\n  '" << command()
+      << "docs/reference.md differs from the registry; regenerate it with\n  '" << command()
       << "' help --markdown > '" << LEVELSMITH_REFERENCE << "'";
   for (const auto& op : pipeline::operators())
     EXPECT_NE(page.find("\n### " + op.name + "\n"), std::string::npos) << op.name;
@@ -75,7 +75,7 @@ TEST_F(Help, IsTheReference) {
   EXPECT_REFUSED(levelsmith("help offset --markdown"), 2, "alone");
 }
 
-/// As it stands in the README, on several lines.
+/// True if the README contains the example, possibly on several lines.
 bool isInReadme(const std::string& example) {
   const auto words = [](const std::string& text) {
     std::istringstream in(text);
@@ -87,8 +87,8 @@ bool isInReadme(const std::string& example) {
   return words(support::slurp(LEVELSMITH_README)).find(words(example)) != std::string::npos;
 }
 
-// The dragon's file is not in the tree: its example is run by the main job. Those that the README
-// shows are run for its sake.
+// The dragon's file is not in the tree; the main job runs its example. The README test runs the
+// examples that the README shows.
 TEST_F(Help, ExamplesRun) {
   for (const auto& op : pipeline::operators()) {
     ASSERT_TRUE(op.example.starts_with("levelsmith ")) << op.name;

@@ -1,4 +1,4 @@
-// The examples of the README and of docs/ are what people try first.
+// Runs the examples of the README and of docs/, because users try them first.
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@
 
 namespace readme_test {
 
-/// The text between ``` and ```, and what stands behind the first.
+/// Text between ``` and ```, and the words after the first ```.
 struct Block {
   std::string kind, text;
 };
@@ -36,7 +36,8 @@ std::vector<Block> blocksOf(const std::filesystem::path& page) {
 
 class Readme : public support::ShellTest {
  protected:
-  /// Runs the blocks of `sh chain`. @return how many
+  /// Runs the blocks of `sh chain`.
+  /// @return number of blocks
   std::size_t runChains(const std::filesystem::path& page) {
     std::size_t count = 0;
     for (const Block& block : blocksOf(page)) {
@@ -69,7 +70,7 @@ TEST_F(Readme, ExamplesRun) {
   ASSERT_EQ(runChains(LEVELSMITH_README), 3u);
   for (const char* file : {"plate.ply", "ring.ply", "ring.vdb", "out.vdb", "out.ply", "out.png"})
     EXPECT_TRUE(exists(file)) << file;
-  // The rings on the base, as the README maps them.
+  // The rings on the base, as in the README.
   const auto outcome = levelsmith("read out.ply ! measure --json");
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const auto m = nlohmann::json::parse(outcome.out);
@@ -77,7 +78,7 @@ TEST_F(Readme, ExamplesRun) {
   EXPECT_EQ(m["shells"], 1);
   EXPECT_EQ(m["components"], 1);
   EXPECT_GT(m["volume"], 40 * 40 * 10);
-  EXPECT_NEAR(m["bounds"]["max"][2], 5 + 8 - 0.5, 0.05);  // sunk by a voxel of the base
+  EXPECT_NEAR(m["bounds"]["max"][2], 5 + 8 - 0.5, 0.05);  // embedded by a voxel of the base
 }
 
 TEST_F(Docs, ExamplesRun) {
@@ -91,7 +92,7 @@ TEST_F(Docs, ExamplesRun) {
   EXPECT_GE(count, 7u);
 }
 
-// Those too that need a model or a display.
+// Includes examples that need a model or a display.
 TEST_F(Docs, ExamplesAreChains) {
   std::size_t count = 0;
   for (const auto& page : files(".md")) {
@@ -101,7 +102,7 @@ TEST_F(Docs, ExamplesAreChains) {
         for (const pipeline::ScriptWord& word : line.words)
           for (std::string& text = words.emplace_back(); const pipeline::WordPart& part : word)
             text += part.text;
-        // <(…) is the shell's business.
+        // <(…) is syntax of the shell.
         const bool isChain = words[0] == "levelsmith" &&
                              block.text.find("<(") == std::string::npos && words.size() > 1 &&
                              words[1] != "help" &&

@@ -1,5 +1,5 @@
-// Every row of the exit-code table, and the inputs that break other tools: each ends with its code
-// and a sentence, and leaves no file behind.
+// Tests every row of the exit-code table, and inputs that break other tools. Each run ends with its
+// code and a message, and leaves no file.
 
 #include <gtest/gtest.h>
 
@@ -17,7 +17,7 @@ namespace refusal_test {
 
 class Refusal : public support::ShellTest {
  protected:
-  /// A tetrahedron of edge about 1 as ascii PLY, with one vertex replaced.
+  /// Writes a tetrahedron of edge about 1 as ascii PLY, with one vertex replaced.
   void writeTetrahedron(const std::string& name, const std::string& apex = "0 0 1",
                         const std::string& type = "float") {
     writeFile(name, "ply\nformat ascii 1.0\nelement vertex 4\nproperty " + type + " x\nproperty " +
@@ -26,7 +26,7 @@ class Refusal : public support::ShellTest {
                         "0 0\n1 0 0\n0 1 0\n" +
                         apex + "\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n");
   }
-  /// An unpierced strip with a half twist.
+  /// Writes a Möbius strip.
   void writeMoebius(const std::string& name) {
     std::string text;
     constexpr int kSteps = 48;
@@ -51,7 +51,7 @@ class Refusal : public support::ShellTest {
   void expectNothingWritten(std::size_t inputs) { EXPECT_EQ(fileCount(), inputs); }
 };
 
-TEST_F(Refusal, UsageIsTwo) {
+TEST_F(Refusal, UsageErrorsExitWithTwo) {
   EXPECT_REFUSED(levelsmith("spere --radius 1"), 2, "did you mean");
   EXPECT_REFUSED(levelsmith("sphere --colour red"), 2, "no option");
   EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 0.1 ! union"), 2, "operand");
@@ -71,13 +71,13 @@ TEST_F(Refusal, UsageIsTwo) {
   expectNothingWritten(1);
 }
 
-TEST_F(Refusal, PatchesAboutAPointOfASolidThatIsTooSmallSayThatItBends) {
+TEST_F(Refusal, PatchesLargerThanTheirSolidReportItsCurvature) {
   const std::string ball = "sphere --radius 1 --voxel 0.1 --as ball ! ";
   for (const char* rest :
        {"patch @ball --at 1,0,0 --size 4,4 --height 0.2 ! mesh ! write a.ply",
         "patch-grid @ball --at 1,0,0 --size 4,4 --count 2,2 --height 0.2 ! mesh ! write a.ply"})
     EXPECT_REFUSED(levelsmith(ball + rest), 3, "bends too much about 1,0,0");
-  // Its diagonals go round the ball more than once and end the right way round again.
+  // Its diagonals go around the ball more than once and end in the right orientation again.
   EXPECT_REFUSED(levelsmith(ball + "patch @ball --at 0,0,1 --size 10,10 --height 0.1 ! mesh ! "
                                    "write a.ply"),
                  3, "bends too much for a patch of size 10,10");
@@ -86,7 +86,7 @@ TEST_F(Refusal, PatchesAboutAPointOfASolidThatIsTooSmallSayThatItBends) {
                  3, "no patch could be built");
 }
 
-TEST_F(Refusal, TexturesSunkThroughTheirBaseEndAtOnce) {
+TEST_F(Refusal, TexturesEmbeddedThroughTheirBaseEndAtOnce) {
   EXPECT_REFUSED(
       levelsmith("sphere --radius 1 --voxel 0.1 --as ball ! sphere --radius 1 --voxel 0.1 "
                  "--as t ! patch @ball --at 1,0,0 --size 1,1 --height 0.2 --as p ! "
@@ -95,9 +95,9 @@ TEST_F(Refusal, TexturesSunkThroughTheirBaseEndAtOnce) {
       3, "exceeds the diagonal of the base");
 }
 
-/// A chain whose end cannot work is refused before its beginning runs: within a second, though the
-/// sphere would take many.
-TEST_F(Refusal, WhatCanBeToldComesBeforeTheWork) {
+/// A chain with an invalid end is refused within a second, before the sphere at its beginning,
+/// which would take many seconds.
+TEST_F(Refusal, DetectableErrorsPrecedeTheRun) {
   const std::string large = "sphere --radius 1 --voxel 0.001 ! ";
   const auto soon = [&](const std::string& rest, int code, const char* part) {
     EXPECT_REFUSED(levelsmith(large + rest, 5), code, part);
@@ -154,7 +154,7 @@ TEST_F(Refusal, WhatCanBeToldComesBeforeTheWork) {
   expectNothingWritten(2);
 }
 
-TEST_F(Refusal, AReportThatCannotBeWrittenComesBeforeTheWork) {
+TEST_F(Refusal, AnUnwritableReportIsRefusedBeforeTheRun) {
   const std::string large = "sphere --radius 1 --voxel 0.001 ! write out.vdb";
   writeFile("there.json", "kept");
   for (const char* globals : {"--report . ", "--report /dev/full ", "--report nowhere/r.json ",
@@ -170,7 +170,7 @@ TEST_F(Refusal, AReportThatCannotBeWrittenComesBeforeTheWork) {
   expectNothingWritten(1);
 }
 
-TEST_F(Refusal, GridsThatAreNoBandsAreThree) {
+TEST_F(Refusal, InvalidBandsExitWithThree) {
   const auto save = [&](const char* name, const std::function<void(openvdb::FloatGrid&)>& spoil) {
     openvdb::initialize();
     auto grid =
@@ -203,7 +203,7 @@ TEST_F(Refusal, AFailureIsNotHiddenByItsReport) {
   EXPECT_NE(support::slurp(folder_ / "r.json").find("\"exit_code\": 3"), std::string::npos);
 }
 
-TEST_F(Refusal, CorruptMeshFilesAreThree) {
+TEST_F(Refusal, CorruptMeshFilesExitWithThree) {
   writeFile("empty.ply", "");
   writeFile("empty.obj", "");
   writeFile("empty.stl", "");
@@ -227,7 +227,7 @@ TEST_F(Refusal, CorruptMeshFilesAreThree) {
   for (const char* file : {"empty.ply", "empty.obj", "empty.stl", "words.ply", "nan.ply", "inf.ply",
                            "range.obj", "zero.obj", "claims.ply", "cut.ply", "cut.stl"})
     EXPECT_REFUSED(levelsmith(toBand(file), 10), 3, file);
-  // Whoever only asks what is in them hears of it too, where the size of the file tells.
+  // `info` reports it too if the size of the file reveals it.
   writeFile("faces.ply", ply.substr(0, ply.find("face ") + 5) + "3000000000" +
                              ply.substr(ply.find("\nproperty list")));
   std::string claims = stl;
@@ -241,7 +241,7 @@ TEST_F(Refusal, CorruptMeshFilesAreThree) {
   EXPECT_FALSE(exists("out.vdb"));
 }
 
-TEST_F(Refusal, CorruptBandFilesAreThree) {
+TEST_F(Refusal, CorruptBandFilesExitWithThree) {
   ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.1 ! write whole.vdb").code, 0);
   const std::string vdb = support::slurp(folder_ / "whole.vdb");
   for (int part = 0; part < 10; ++part) {
@@ -253,7 +253,7 @@ TEST_F(Refusal, CorruptBandFilesAreThree) {
   EXPECT_REFUSED(levelsmith("read whole.vdb --grid density ! measure"), 3, "density");
 }
 
-TEST_F(Refusal, MeshesThatCannotBeUsedAsAskedAreThree) {
+TEST_F(Refusal, UnusableMeshesExitWithThree) {
   writeFile("triangle.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   EXPECT_REFUSED(levelsmith(toBand("triangle.obj")), 3, "the mesh encloses no volume");
   writeFile("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n");
@@ -269,7 +269,7 @@ TEST_F(Refusal, MeshesThatCannotBeUsedAsAskedAreThree) {
   EXPECT_FALSE(exists("out.vdb"));
 }
 
-TEST_F(Refusal, CoordinatesTooCoarseForTheVoxelAreThree) {
+TEST_F(Refusal, CoordinatesTooCoarseForTheVoxelExitWithThree) {
   std::string obj;
   writeFile("far.ply",
             "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty "
@@ -282,7 +282,7 @@ TEST_F(Refusal, CoordinatesTooCoarseForTheVoxelAreThree) {
   EXPECT_FALSE(exists("out.vdb"));
 }
 
-TEST_F(Refusal, ResourcesAreFour) {
+TEST_F(Refusal, ResourceLimitsExitWithFour) {
   writeTetrahedron("tetra.ply");
   EXPECT_REFUSED(levelsmith(toBand("tetra.ply", "--voxel 1e-9"), 10), 4,
                  "level-set: needs about 1.7e+11 GB");
@@ -298,7 +298,7 @@ TEST_F(Refusal, ResourcesAreFour) {
   expectNothingWritten(1);
 }
 
-TEST_F(Refusal, OneVertexFarAwayEndsAtOnce) {
+TEST_F(Refusal, OneDistantVertexIsRefusedAtOnce) {
   writeTetrahedron("far.ply", "0 0 1e30");
   const auto outcome = levelsmith(toBand("far.ply"), 10);
   EXPECT_REFUSED(outcome, 4,
@@ -306,23 +306,23 @@ TEST_F(Refusal, OneVertexFarAwayEndsAtOnce) {
   EXPECT_FALSE(exists("out.vdb"));
 }
 
-/// What no estimate foresees ends when it is there.
-TEST_F(Refusal, MemoryInUseIsFour) {
+/// A use of memory that no estimate predicts ends the run when it occurs.
+TEST_F(Refusal, MemoryUseAboveTheLimitExitsWithFour) {
   ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.005 ! write in.vdb").code, 0);
   EXPECT_REFUSED(levelsmith("--max-memory 110M read in.vdb ! mesh ! write out.ply"), 4,
                  "memory in use exceeds --max-memory");
   expectNothingWritten(1);
 }
 
-// A thread that the system refuses is thrown where nobody can catch it.
-TEST_F(Refusal, ThreadsThatCannotBeHadAreFour) {
+// If the system refuses a thread, the exception is thrown where no caller can catch it.
+TEST_F(Refusal, UnavailableThreadsExitWithFour) {
   EXPECT_REFUSED(levelsmith("--threads 100000 sphere --radius 1 --voxel 0.1 ! measure"), 2,
                  "--threads: 100000");
   const std::string chain = " sphere --radius 1 --voxel 0.02 ! measure";
   bool isRefused = false, isTried = false;
   for (int kilobytes = 140'000; kilobytes < 280'000; kilobytes += 20'000) {
     const std::string under = "ulimit -v " + std::to_string(kilobytes) + "; " + command();
-    if (shell(under + " --version").code != 0) continue;  // its libraries alone take more
+    if (shell(under + " --version").code != 0) continue;  // its libraries alone exceed the limit
     isTried = true;
     const auto outcome = shell(under + chain);
     EXPECT_TRUE(outcome.code == 0 || outcome.code == 4) << kilobytes << outcome.err;
@@ -336,8 +336,8 @@ TEST_F(Refusal, ThreadsThatCannotBeHadAreFour) {
   EXPECT_TRUE(isRefused);
 }
 
-TEST_F(Refusal, TellingWhatIsInAFileReadsLittleOfIt) {
-  // Sparse: 3 GB of zeros that take no room.
+TEST_F(Refusal, ReportingTheContentsOfAFileReadsLittleOfIt) {
+  // A sparse file: 3 GB of zeros that occupy no disk space.
   ASSERT_EQ(shell("truncate -s 3G z.vdb").code, 0);
   EXPECT_REFUSED(levelsmith("--max-memory 300M info z.vdb"), 3, "not an OpenVDB file");
   ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.1 ! write a.vdb").code, 0);
@@ -352,8 +352,8 @@ TEST_F(Refusal, TellingWhatIsInAFileReadsLittleOfIt) {
                  "--report");
 }
 
-TEST_F(Refusal, PermissionsAreSix) {
-  // Root may read and write everything.
+TEST_F(Refusal, MissingPermissionsExitWithSix) {
+  // Root may read and write every file.
   const std::string drop = getuid() == 0 ? "setpriv --reuid=65534 --clear-groups " : "";
   const std::string sphere = " sphere --radius 1 --voxel 0.2 ! ";
   ASSERT_EQ(levelsmith(sphere + "write in.vdb ! mesh ! write in.ply").code, 0);
@@ -368,7 +368,7 @@ TEST_F(Refusal, PermissionsAreSix) {
   expectNothingWritten(3);
 }
 
-TEST_F(Refusal, FilesAreSix) {
+TEST_F(Refusal, FileErrorsExitWithSix) {
   EXPECT_REFUSED(levelsmith("read missing.ply ! measure"), 6, "missing.ply");
   ASSERT_EQ(shell("mkdir folder.ply").code, 0);
   EXPECT_REFUSED(levelsmith("read folder.ply ! measure"), 6, "folder.ply");
@@ -390,23 +390,23 @@ TEST_F(Refusal, FilesAreSix) {
   expectNothingWritten(2);
 }
 
-/// Runs the chain and interrupts it after so many seconds; 99 if it then goes on for longer than
-/// half a second. With job control, since a shell without it starts background jobs that ignore the
-/// signal until they ask for it.
+/// Runs the chain and interrupts it after `delay` seconds. Prints 99 if it continues for more than
+/// half a second afterwards. Uses job control, because without it a shell starts background jobs
+/// that ignore the signal at first.
 std::string interrupted(const std::string& command, const std::string& delay) {
   return "set -m; " + command + " & pid=$!; sleep " + delay +
          "; kill -INT $pid; s=$(date +%s%N); wait $pid; code=$?; e=$(date +%s%N); "
          "[ $(( (e - s) / 1000000 )) -lt 500 ] || exit 99; exit $code";
 }
 
-TEST_F(Refusal, InterruptedIsOneHundredAndThirty) {
+TEST_F(Refusal, InterruptionExitsWithOneHundredAndThirty) {
   writeFile("out.vdb", "what was there");
   for (const char* delay : {"0", "0.2", "0.7", "1.5"}) {
     const auto outcome = shell(interrupted(
         command() + " --quiet sphere --radius 1 --voxel 0.004 ! offset 3vx ! write out.vdb",
         delay));
     EXPECT_EQ(outcome.code, 130) << delay << outcome.err;
-    // Before the command listens, the signal ends it without a word.
+    // Before the command handles the signal, it ends without a message.
     if (std::string(delay) >= "0.7") {
       EXPECT_NE(outcome.err.find("interrupted"), std::string::npos) << delay;
     }
@@ -439,7 +439,7 @@ TEST_F(Refusal, EveryLongActionEndsWithinHalfASecond) {
   }
 }
 
-TEST_F(Refusal, NestedShellsKeepTheirCavity) {
+TEST_F(Refusal, NestedComponentsKeepTheirCavity) {
   ASSERT_EQ(levelsmith("box --size 3,3,3 --voxel 0.1 ! sphere --radius 1 --voxel 0.1 ! difference "
                        "! mesh ! write nested.ply")
                 .code,

@@ -1,5 +1,5 @@
-// Same bits with 1, 2 and 4 threads, each action ten times. Several actions share a process, since
-// its start takes longer than most of them.
+// Equal bits with 1, 2 and 4 threads, each action ten times. Several actions share a process,
+// because start-up takes longer than most of them.
 
 #include <gtest/gtest.h>
 
@@ -14,10 +14,10 @@ namespace repeat_test {
 struct Case {
   const char* name;
   const char* chain;
-  std::vector<const char*> outputs;  ///< files that it writes
+  std::vector<const char*> outputs;  ///< output files of the action
 };
 
-// Named in full by the tests' output, rather than as bytes.
+// The test output shows the name instead of bytes.
 void PrintTo(const Case& c, std::ostream* out) {
   *out << c.chain;
 }
@@ -84,7 +84,7 @@ INSTANTIATE_TEST_SUITE_P(
              "! write blend.vdb "
              "! blend @a @b --radius 0.9 --method fillet ! write fillet.vdb",
              {"blend.vdb", "fillet.vdb"}},
-        // At voxels of 0.07 and 0.3 three of them are no float.
+        // At voxels of 0.07 and 0.3 three voxels are no float.
         Case{"offset",
              "read in.vdb ! offset 3vx ! write offset.vdb "
              "! read coarse.vdb --as a ! offset @a --by \"0.3+0.2*x\" ! write offset_by.vdb "
@@ -143,7 +143,7 @@ INSTANTIATE_TEST_SUITE_P(
              "read in.vdb ! render out.exr --size 96x64 ! read coarse.vdb "
              "! render png.exr --size 48x32 --png out.png",
              {"out.exr", "out.png"}},
-        // One to a process: standard output takes one document.
+        // One action per process, because standard output takes one document.
         Case{"info", "info in.ply --json > out.json", {"out.json"}},
         Case{"patch",
              "read in.vdb ! patch --at 0,0,3 --size 1,1 --height 0.4 ! info --json > out.json",

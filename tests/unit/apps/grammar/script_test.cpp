@@ -22,7 +22,7 @@ class Script : public support::ShellTest {
     return pipeline::readScript(folder_ / "chain.txt", settings).words;
   }
 
-  /// The words but the `!`, with blanks between them.
+  /// The words except `!`, separated by blanks.
   std::string line(const std::string& text, const Settings& settings = {}) {
     std::string all;
     for (const std::string& word : words(text, settings))
@@ -42,7 +42,7 @@ class Script : public support::ShellTest {
 
 using Words = std::vector<std::string>;
 
-TEST_F(Script, OneActionALine) {
+TEST_F(Script, HasOneActionPerLine) {
   EXPECT_EQ(words("sphere --radius 1\n\n  measure  # volume\n# nothing\nwrite a.vdb"),
             (Words{"sphere", "--radius", "1", "!", "measure", "!", "write", "a.vdb"}));
   EXPECT_EQ(words("sphere --radius \\\n 1\r\nmeasure\r\n"),
@@ -52,12 +52,12 @@ TEST_F(Script, OneActionALine) {
             (Words{"sphere", "!", "offset", "1", "!", "measure"}));
 }
 
-TEST_F(Script, QuotesAsAShellDoes) {
+TEST_F(Script, QuotesLikeAShell) {
   EXPECT_EQ(words("clip --plane \"0,0,0 0,0,1\" 'a b' c\\ d \"x\\\"y\" e#f ''"),
             (Words{"clip", "--plane", "0,0,0 0,0,1", "a b", "c d", "x\"y", "e#f", ""}));
 }
 
-TEST_F(Script, RunsAsTheCommandLineDoes) {
+TEST_F(Script, RunsLikeTheCommandLine) {
   writeFile("make.txt",
             "--quiet\nsphere --radius 1 --voxel 0.1 --as ball\nbox --size 1,1,3 --voxel 0.1\n"
             "difference @ball  # the stack's comes first\nwrite 'of script.vdb'\n");
@@ -70,7 +70,7 @@ TEST_F(Script, RunsAsTheCommandLineDoes) {
   EXPECT_EQ(shell(command() + " --threads 1 run - < make.txt").code, 0);
 }
 
-TEST_F(Script, TellsTheLineOfAMistake) {
+TEST_F(Script, ReportsTheLineOfAnError) {
   writeFile("bad.txt", "# a ball\nsphere --radius 1 --voxel 0.1\n\noffset much\nmeasure\n");
   EXPECT_REFUSED(levelsmith("run bad.txt"), 2, "(bad.txt, line 4)");
   writeFile("open.txt", "sphere --radius 1 --voxel 0.1\nwrite 'a.vdb\n");
@@ -117,11 +117,11 @@ TEST_F(Script, RefusesVariablesWithoutAValue) {
   EXPECT_TOLD(refusal("set voxel 1\nbox", {{"voxl", "2"}}), "did you mean 'voxel'?");
   EXPECT_TOLD(refusal("box", {{"voxl", "2"}}), "it has no variables");
   EXPECT_TOLD(refusal("for i in 1\nbox ${i}\nend", {{"i", "2"}}),
-              "has no variable i");  // it is the loop's
+              "has no variable i");  // it belongs to the loop
   EXPECT_EQ(line("repeat 0\nbox ${v}\nend\nball", {{"v", "2"}}), "ball");
 }
 
-TEST_F(Script, GoesThroughLoops) {
+TEST_F(Script, ExpandsLoops) {
   EXPECT_EQ(line("repeat 3\nbox ${i}\nend"), "box 0 box 1 box 2");
   EXPECT_EQ(line("repeat 2 as n\nrepeat 2\nbox ${n}${i} --as p${n}${i}\nend\nend\nunion @p00"),
             "box 00 --as p00 box 01 --as p01 box 10 --as p10 box 11 --as p11 union @p00");
@@ -151,7 +151,7 @@ TEST_F(Script, CountsWithoutRounding) {
   EXPECT_TOLD(refusal("for x in 0..100000\nbox\nend"), "more than 100000 numbers");
 }
 
-TEST_F(Script, FindsFiles) {
+TEST_F(Script, ExpandsFilePatterns) {
   for (const char* file : {"b.ply", "a.ply", "a b.ply", "c.obj", "x[1].ply"}) writeFile(file, "");
   const auto list = [&](const std::string& words) {
     const std::string in = folder_.string() + "/";
@@ -180,8 +180,8 @@ TEST_F(Script, RefusesMalformedLoops) {
   EXPECT_TOLD(refusal("repeat 2\nset i 3\nbox\nend"), "the variable of a loop");
 }
 
-// Words or a refusal, whatever stands in a file.
-TEST_F(Script, SurvivesWhateverAFileHolds) {
+// Any file yields words or an error.
+TEST_F(Script, SurvivesArbitraryFiles) {
   const std::vector<std::string> parts = {
       "repeat", "for",  "end", "set",  "in",  "as", "step", "x",    "i",       "2",  "0..2", "..",
       "${",     "${x}", "$${", "${i:", "}",   "'",  "\"",   "\\",   "\n",      "\n", "\n",   " ",
@@ -199,7 +199,7 @@ TEST_F(Script, SurvivesWhateverAFileHolds) {
   EXPECT_GT(accepted, 20u);
 }
 
-TEST_F(Script, BoundsWhatLoopsComeTo) {
+TEST_F(Script, LimitsTheExpansionOfLoops) {
   EXPECT_TOLD(refusal("repeat 900\nrepeat 90\nbox\nball\nend\nend"), "more than 100000 actions");
   EXPECT_TOLD(refusal("box\nrepeat 1000\nrepeat 1000\nend\nend"), "more than 100000 iterations");
   EXPECT_TOLD(refusal("repeat 100001\nbox\nend"), "not a count from 0 to 100000");
@@ -211,7 +211,7 @@ TEST_F(Script, BoundsWhatLoopsComeTo) {
   EXPECT_TOLD(refusal("box\n" + deep), "more than 64 deep");
 }
 
-TEST_F(Script, BoundsWhereItsPatternsLook) {
+TEST_F(Script, LimitsTheSearchOfPatterns) {
   for (const char* name : {"a", "b", "c", "d"}) std::filesystem::create_directory(folder_ / name);
   std::string pattern = folder_.string();
   for (int i = 0; i < 10; ++i) pattern += "/*/..";
@@ -220,18 +220,18 @@ TEST_F(Script, BoundsWhereItsPatternsLook) {
             8 * 3 - 1u);
 }
 
-TEST_F(Script, TellsTheRoundOfAMistake) {
+TEST_F(Script, ReportsTheIterationOfAnError) {
   writeFile(
       "loop.txt",
       "for r in 1 2\n  repeat 2\n    sphere --radius ${r} --voxel 0.5 --as p${i}\n  end\nend\n");
   EXPECT_REFUSED(levelsmith("run loop.txt"), 2, "'p0' is taken");
   EXPECT_REFUSED(levelsmith("run loop.txt"), 2, "(loop.txt, line 3, r = 2, i = 0)");
-  // What shows only when it runs.
+  // Errors that appear during the run only.
   writeFile("run.txt", "for f in a.ply b.ply\n  read ${f}\nend\n");
   writeFile("a.ply", "ply\n");
   EXPECT_REFUSED(levelsmith("run run.txt"), 3, "(run.txt, line 2, f = a.ply)");
   EXPECT_EQ(levelsmith("read a.ply").err.find("("), std::string::npos);
-  // What shows before anything runs.
+  // Errors that appear before the run.
   writeFile("to.txt", "sphere --radius 1 --voxel 0.5\nfor d in . no\nwrite ${d}/a.vdb\nend\n");
   EXPECT_REFUSED(levelsmith("run to.txt"), 6, "(to.txt, line 3, d = no)");
   EXPECT_FALSE(exists("a.vdb"));
@@ -242,7 +242,7 @@ TEST_F(Script, TellsTheRoundOfAMistake) {
       << over.err;
 }
 
-TEST_F(Script, TellsTheRoundInReportsAndOfChecks) {
+TEST_F(Script, ReportsTheIterationInReportsAndChecks) {
   writeFile("loop.txt",
             "for r in 1 2\n  sphere --radius ${r} --voxel 0.2 --as ball${r}\n"
             "  offset ${r}vx\n  compare @ball${r} --tolerance 0.3\nend\n");
@@ -258,7 +258,7 @@ TEST_F(Script, GivesNoVariablesToGraphs) {
   EXPECT_REFUSED(levelsmith("run g.json --set voxel=1"), 2, "a graph has no variables");
 }
 
-// Each round takes what the last one left.
+// Each iteration takes the result of the previous one.
 TEST_F(Script, RunsLoopsAndSettings) {
   writeFile("grow.txt",
             "set radius 1\nsphere --radius ${radius} --voxel 0.1\nrepeat 3\n  offset 0.25\nend\n"

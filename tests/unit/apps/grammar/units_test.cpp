@@ -24,14 +24,14 @@ TEST(Units, ReadsLengthsInThreeUnits) {
     EXPECT_THROW((void)parseLength(bad, "t"), UsageError) << bad;
 }
 
-TEST(Units, UsesPointsWhateverTheLocale) {
+TEST(Units, UsesPointsForAnyLocale) {
   const auto expectPoints = [] {
     EXPECT_DOUBLE_EQ(parseNumber("1.5", "t"), 1.5);
     EXPECT_DOUBLE_EQ(parseNumber("1234.5", "t"), 1234.5);
     EXPECT_THROW((void)parseNumber("1,5", "t"), UsageError);
   };
   expectPoints();
-  // Few machines have such a locale; streams take one that is made here.
+  // Few machines have such a locale; streams take this one.
   struct Comma : std::numpunct<char> {
     char do_decimal_point() const override { return ','; }
     char do_thousands_sep() const override { return '.'; }
@@ -45,7 +45,7 @@ TEST(Units, UsesPointsWhateverTheLocale) {
   std::setlocale(LC_ALL, "C");
 }
 
-TEST(Units, RefusesWhatIsNoNumber) {
+TEST(Units, RefusesInvalidNumbers) {
   for (const char* bad :
        {"", " 1", "1 ", "nan", "NaN", "inf", "-inf", "1e400", "--1", "one", "0x10", "1.2.3"})
     EXPECT_THROW((void)parseNumber(bad, "t"), UsageError) << bad;
@@ -73,7 +73,7 @@ TEST(Units, ReadsBoxesAndMatrices) {
   EXPECT_THROW((void)parseMatrix("1 2 3", "t"), UsageError);
 }
 
-TEST(Units, GuessesWhatWasMeant) {
+TEST(Units, SuggestsCorrections) {
   EXPECT_EQ(didYouMean("spehre", {"sphere", "box"}), "sphere");
   EXPECT_EQ(didYouMean("zzz", {"sphere", "box"}), "");
 }

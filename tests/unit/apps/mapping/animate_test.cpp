@@ -12,7 +12,7 @@ namespace animate_test {
 
 using Json = nlohmann::json;
 
-/// A ball, a ring, and two patches, of one voxel size.
+/// A ball, a ring and two patches, all with one voxel size.
 const std::string kScene =
     "sphere --radius 5 --voxel 0.5 --as ball ! torus --radius 2 --tube 0.8 --voxel 0.5 --as ring "
     "! patch @ball --at 0,0,5 --size 4,4 --height 1.5 --levels 2 --spacing 1 --particles "
@@ -32,7 +32,7 @@ class Animate : public support::ShellTest {
   std::string bytes(const std::string& file) { return support::slurp(folder_ / file); }
 };
 
-/// The middle of the patch at a frame, on a ball of that radius.
+/// Middle of the patch in a frame, on a ball of that radius.
 Imath::V3d middleOf(const Json& details, std::size_t frame, double radius = 5) {
   Imath::V3d sum(0);
   for (const Json& corner : details["frame"][frame]["corners"]) {
@@ -78,7 +78,7 @@ TEST_F(Animate, BeginsAndEndsAsTheTextureOnItsPatches) {
   EXPECT_NEAR(details["frame"][1]["corners"][0][1].get<double>(), -2.36, 0.02);
 }
 
-TEST_F(Animate, CarriesThePatchOnBasesFromFiles) {
+TEST_F(Animate, MovesThePatchOnBasesFromFiles) {
   ASSERT_EQ(levelsmith("sphere --radius 5.2 --voxel 0.5 ! write base_01.vdb ! write base_02.vdb "
                        "! sphere --radius 5.4 --voxel 0.5 ! write base_03.vdb")
                 .code,
@@ -87,13 +87,13 @@ TEST_F(Animate, CarriesThePatchOnBasesFromFiles) {
     const Json details = reportOf(
         kScene + "animate @ball @ring @here --frames 4 --base-frames base_##.vdb --carry " + rule +
         " --voxel 0.5 --out " + rule + "_#.ply");
-    EXPECT_EQ(details["reused"], 1) << "base 2 is base 1";
+    EXPECT_EQ(details["reused"], 1) << "base 2 equals base 1";
     EXPECT_EQ(details["patches_made"], 2);
     EXPECT_EQ(bytes(rule + "_1.ply"), bytes(rule + "_2.ply"));
     EXPECT_NE(bytes(rule + "_2.ply"), bytes(rule + "_3.ply"));
     EXPECT_NEAR(details["frame"][3]["drift"][1].get<double>(), rule == "rigid" ? 1 : 5.4 / 5, 0.01);
   }
-  // Both together: the other patch stands on the last base.
+  // Both options together: the other patch is on the last base.
   const Json both =
       reportOf(kScene +
                "read base_03.vdb --as last ! patch @last --at 5.4,0,0 --size 3,3 --rotate -90 "
@@ -105,7 +105,7 @@ TEST_F(Animate, CarriesThePatchOnBasesFromFiles) {
   EXPECT_EQ(bytes("both_3.vdb"), bytes("goal.vdb"));
 }
 
-TEST_F(Animate, PlaysTexturesAndReusesWhatStays) {
+TEST_F(Animate, PlaysTexturesAndReusesUnchangedFrames) {
   ASSERT_EQ(levelsmith("torus --radius 2 --tube 0.8 --voxel 0.5 ! write ring_1.vdb "
                        "! torus --radius 2 --tube 0.6 --voxel 0.5 ! write ring_2.vdb")
                 .code,
@@ -122,7 +122,8 @@ TEST_F(Animate, PlaysTexturesAndReusesWhatStays) {
 
 TEST_F(Animate, MovesMeshesDecalsGridsAndPatchesFromFiles) {
   const std::string tail = " --frames 3 --voxel 0.5 --out f_#.vdb";
-  // Half way from the pole to the equator, to a quarter of a voxel: corners go apart on a ball.
+  // Half way from the pole to the equator, to a quarter of a voxel, because corners move apart on a
+  // ball.
   const Imath::V3d between = Imath::V3d(1, 0, 1).normalized() * 5;
   const Json mesh =
       reportOf(kScene +
@@ -166,7 +167,7 @@ TEST_F(Animate, MovesMeshesDecalsGridsAndPatchesFromFiles) {
   EXPECT_NE(outcome.err.find("not in its file"), std::string::npos) << outcome.err;
 }
 
-TEST_F(Animate, ComparesAndKeepsWhatMeshesCarry) {
+TEST_F(Animate, ComparesAndKeepsMeshAttributes) {
   writeFile("t_0.ply", tent(200));
   writeFile("t_1.ply", tent(100));
   writeFile("t_2.ply", tent(100));
@@ -193,14 +194,14 @@ TEST_F(Animate, HoldsTheLastPatchAndPlaysOneFrame) {
   EXPECT_EQ(bytes("f_2.vdb"), bytes("last.vdb"));
   EXPECT_EQ(bytes("f_3.vdb"), bytes("last.vdb"));
   EXPECT_EQ(bytes("g_0.vdb"), bytes("f_0.vdb"));
-  // To the end of the row.
+  // To the end of the file sequence.
   reportOf(
       kScene +
       "animate @ball @ring @here @there --frames 3 --key-frames 0,2 --voxel 0.5 --out h_#.vdb");
   EXPECT_EQ(bytes("h_2.vdb"), bytes("last.vdb"));
 }
 
-TEST_F(Animate, RefusesPatchesThatWereMadeInAnotherWay) {
+TEST_F(Animate, RefusesPatchesBuiltDifferently) {
   const auto refusal = [&](const std::string& other) {
     return levelsmith(kScene + other +
                       " --as x ! animate @ball @ring @here @x --frames 3 --out "
@@ -218,14 +219,14 @@ TEST_F(Animate, RefusesPatchesThatWereMadeInAnotherWay) {
           "--spacing 1 --particles conforming"),
       2, "one of patch 2 and the first patch is mirrored");
   EXPECT_EQ(fileCount(), 0u);
-  // What is only finer is told.
+  // A patch that is only finer is reported.
   const auto outcome = refusal(patch + "--particles reduced");
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_NE(outcome.err.find("patch 2 has another --particles than the first"), std::string::npos)
       << outcome.err;
 }
 
-TEST_F(Animate, TellsWhatFramesLack) {
+TEST_F(Animate, ReportsMissingFrames) {
   ASSERT_EQ(levelsmith("sphere --radius 5 --voxel 0.5 ! write base_1.vdb").code, 0);
   openvdb::initialize();
   openvdb::io::File file((folder_ / "base_1.vdb").string());
@@ -235,7 +236,7 @@ TEST_F(Animate, TellsWhatFramesLack) {
   grid->tree().addTile(1, openvdb::Coord(800, 0, 0), -0.25f, true);
   openvdb::io::File((folder_ / "base_1.vdb").string()).write({grid});
   std::filesystem::copy_file(folder_ / "base_1.vdb", folder_ / "base_2.vdb");
-  // They are read twice: on the way back from the goal, and when their frame is made.
+  // Bases are read twice: on the way back from the goal, and for their frame.
   const auto outcome = levelsmith(kScene +
                                   "animate @ball @ring @here @here --frames 3 --base-frames "
                                   "base_#.vdb --voxel 0.5 --out f_#.vdb");
@@ -243,7 +244,7 @@ TEST_F(Animate, TellsWhatFramesLack) {
   EXPECT_EQ(countOf("frame 1: 1 active tiles of base_1.vdb", outcome.err), 1u) << outcome.err;
 }
 
-TEST_F(Animate, TakesNumbersFromTheNameOfTheFileOnly) {
+TEST_F(Animate, TakesNumbersFromTheFileNameOnly) {
   std::filesystem::create_directory(folder_ / "take#1");
   reportOf(kScene + "animate @ball @ring @here --frames 2 --voxel 0.5 --out take#1/f_##.vdb");
   EXPECT_TRUE(exists("take#1/f_01.vdb"));
@@ -251,7 +252,7 @@ TEST_F(Animate, TakesNumbersFromTheNameOfTheFileOnly) {
                  "put # where the number goes");
 }
 
-TEST_F(Animate, RefusesBeforeAnythingIsComputed) {
+TEST_F(Animate, RefusesBeforeTheComputation) {
   const std::string head = kScene + "animate @ball @ring @here ";
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --out frame.vdb"), 2, "put # where the number goes");
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --out f_#.txt"), 2,
@@ -278,7 +279,7 @@ TEST_F(Animate, RefusesBeforeAnythingIsComputed) {
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --drift 0.5 --out f_#.vdb"), 2, "--drift");
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --carve --alone --out f_#.vdb"), 2,
                  "animate: --carve and --alone");
-  // What only the run can find: the file of a frame, before the first is made.
+  // Errors that only the run can find: the file of a frame, before the first frame.
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --base-frames b_#.vdb --out f_#.vdb"), 6, "b_1.vdb");
   EXPECT_REFUSED(
       levelsmith(kScene + "patch @ball --corners \"-2,-2,4 2,-2,4 2,2,4 -2,2,4\" --side0 0,-3,4 "
@@ -288,7 +289,7 @@ TEST_F(Animate, RefusesBeforeAnythingIsComputed) {
   EXPECT_EQ(fileCount(), 0u);
 }
 
-TEST_F(Animate, TellsTheFrameAndLeavesTheFramesBefore) {
+TEST_F(Animate, NamesTheFrameAndKeepsTheFramesBefore) {
   ASSERT_EQ(levelsmith("sphere --radius 5.1 --voxel 0.5 ! write base_1.vdb ! sphere --radius 1 "
                        "--center 60,0,0 --voxel 0.5 ! write base_2.vdb")
                 .code,
@@ -313,7 +314,7 @@ TEST_F(Animate, DryRunPlansAndWritesNothing) {
                                   "not_there_#.vdb --out f_#.vdb");
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_EQ(fileCount(), 0u);
-  // What the scene takes is there, what the frames take is not.
+  // The scene fits into the limit, the frames do not.
   const std::string limit = "--max-memory 200M ";
   const std::string fine =
       kScene + "animate @ball @ring @here --frames 9 --voxel 0.005 --out f_#.vdb";
@@ -321,7 +322,7 @@ TEST_F(Animate, DryRunPlansAndWritesNothing) {
   const auto planned = levelsmith(limit + "--dry-run " + fine);
   EXPECT_EQ(planned.code, 4);
   EXPECT_NE(planned.err.find("animate: needs about"), std::string::npos) << planned.err;
-  EXPECT_REFUSED(levelsmith(limit + fine), 4, "animate: needs about");  // before anything runs
+  EXPECT_REFUSED(levelsmith(limit + fine), 4, "animate: needs about");  // before the run
   EXPECT_EQ(fileCount(), 0u);
 }
 

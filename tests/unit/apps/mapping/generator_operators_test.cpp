@@ -1,4 +1,4 @@
-// Ready-made textures as the command makes them, and what a height map reads.
+// Texture generators on the command line, and files for height maps.
 
 #include <gtest/gtest.h>
 
@@ -12,14 +12,14 @@ using Json = nlohmann::json;
 
 class Generators : public support::ShellTest {
  protected:
-  /// Writes a file from its bytes in hexadecimal digits.
+  /// Writes a file from bytes in hexadecimal digits.
   void writeHex(const std::string& name, const std::string& digits) {
     std::string bytes;
     for (std::size_t i = 0; i + 1 < digits.size(); i += 2)
       bytes += static_cast<char>(std::stoi(digits.substr(i, 2), nullptr, 16));
     writeFile(name, bytes);
   }
-  /// Of a plate of 4 × 2 on a base of 1, its picture up to 2 high.
+  /// Volume of a plate of 4 × 2 with a base of 1 and a picture of height up to 2.
   double volume(const std::string& options) {
     const auto outcome =
         levelsmith("heightmap --size 4,2 --height 2 --base 1 --interpolation " +
@@ -29,7 +29,7 @@ class Generators : public support::ShellTest {
   }
 };
 
-// A grid rounds the edges off, by this much at most.
+// Largest volume that the grid removes at edges.
 constexpr double kEdges = 0.06;
 
 TEST_F(Generators, ReadGreyPicturesOfAllDepths) {
@@ -40,7 +40,7 @@ TEST_F(Generators, ReadGreyPicturesOfAllDepths) {
       "60304e630062000404013381e2ce4a0000000049454e44ae426082");
   EXPECT_NEAR(volume("--image 8.png"), 8 * (1 + 2 * 0.2), kEdges);
   EXPECT_NEAR(volume("--image 8.png --invert"), 8 * (1 + 2 * 0.8), kEdges);
-  // 25828 of 65535 everywhere: the larger byte alone would be 100 of 255, a little less.
+  // 25828 of 65535 everywhere. The high byte alone would be 100 of 255, slightly less.
   writeHex(
       "16.png",
       "89504e470d0a1a0a0000000d4948445200000002000000021000000000074d8ebb000000104944415478da63"
@@ -54,7 +54,7 @@ TEST_F(Generators, ReadGreyPicturesOfAllDepths) {
   EXPECT_NEAR(volume("--image 1.png"), 8 * (1 + 2 * 0.5), kEdges);
 }
 
-TEST_F(Generators, TakeWhatIsTransparentForTheGround) {
+TEST_F(Generators, TakeTransparentPixelsAsTheGround) {
   // White and opaque on the left, white and transparent on the right.
   writeHex(
       "a.png",
@@ -71,7 +71,7 @@ TEST_F(Generators, ReadLinesOfNumbers) {
   EXPECT_NEAR(volume("--image flat.txt"), 8, kEdges);
 }
 
-TEST_F(Generators, RefuseWhatTellsNoHeights) {
+TEST_F(Generators, RefuseInvalidHeightFiles) {
   const std::string heightmap = "heightmap --size 4,2 --height 2 --voxel 0.1 --image ";
   writeHex(
       "c.png",
@@ -93,7 +93,7 @@ TEST_F(Generators, RefuseWhatTellsNoHeights) {
   }
 }
 
-TEST_F(Generators, AreRefusedByADryRunAsByARun) {
+TEST_F(Generators, AreRefusedByADryRunLikeByARun) {
   for (const char* run : {"", "--dry-run "}) {
     const std::string start = run;
     EXPECT_REFUSED(levelsmith(start + "knurl --pitch 0.15 --columns 20 --voxel 0.1"), 3,
@@ -108,7 +108,7 @@ TEST_F(Generators, AreRefusedByADryRunAsByARun) {
   }
 }
 
-TEST_F(Generators, TellWhatRepeats) {
+TEST_F(Generators, ReportTheirPeriod) {
   const auto outcome = levelsmith(
       "knurl --pattern straight --pitch 1 --base 0.5 --columns 2 --rows 3 --overlap 4vx --voxel "
       "0.1 "

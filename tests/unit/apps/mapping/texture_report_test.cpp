@@ -1,4 +1,4 @@
-// What --report tells of patches, of the texture on them, and of folds.
+// Contents of --report for patches, textures on them, and folds.
 
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@ const std::string kRing = "torus --radius 4 --tube 1.5 --voxel 0.5 --as t ! ";
 
 class TextureReport : public support::ShellTest {
  protected:
-  /// The details of the last step that has any, and in `warnings` and `notes` what was said.
+  /// Details of the last step that has any. `warnings` and `notes` contain its messages.
   json detailsOf(const std::string& chain) {
     const auto outcome = levelsmith("--report r.json " + chain);
     EXPECT_EQ(outcome.code, 0) << outcome.err;
@@ -44,7 +44,7 @@ void expectSpread(const json& spread) {
   EXPECT_GT(spread["median"], 0);
 }
 
-TEST_F(TextureReport, TellsDistortionCostAndErrorOfEachMap) {
+TEST_F(TextureReport, ReportsDistortionCostAndErrorOfEachMap) {
   for (const std::string map : {"rbf", "shell"}) {
     const json details =
         detailsOf(kBall + patch("--height 3 --levels 4") + kRing + "texture @b @t @p --map " + map);
@@ -63,7 +63,7 @@ TEST_F(TextureReport, TellsDistortionCostAndErrorOfEachMap) {
   }
 }
 
-TEST_F(TextureReport, TellsWhatRelaxingGains) {
+TEST_F(TextureReport, ReportsTheGainOfRelaxation) {
   const json details = detailsOf(kBall + patch("--height 4 --levels 3") + kRing +
                                  "texture @b @t @p --relax texture --unfold --map shell");
   EXPECT_LT(details["relax"][0]["after"]["energy"], details["relax"][0]["before"]["energy"]);
@@ -72,8 +72,8 @@ TEST_F(TextureReport, TellsWhatRelaxingGains) {
   EXPECT_GT(details["improvement_cpu_s"], 0);
 }
 
-TEST_F(TextureReport, TellsThatUnfoldingFailed) {
-  // One side crosses the one across from it on the surface, where both are to stay.
+TEST_F(TextureReport, ReportsThatUntanglingFailed) {
+  // One side crosses the opposite side on the surface, where both are fixed.
   const json details = detailsOf(
       "box --size 40,40,10 --voxel 0.5 --as b ! patch @b --corners \"-4,-4,5 4,-4,5 4,4,5 "
       "-4,4,5\" --side0 0,7,5 --height 3 --levels 3 --as p ! " +
@@ -84,20 +84,20 @@ TEST_F(TextureReport, TellsThatUnfoldingFailed) {
   EXPECT_NE(said.find("--unfold cannot mend the patch"), std::string::npos) << said;
 }
 
-TEST_F(TextureReport, TellsOfFoldsHowLengthsSpread) {
+TEST_F(TextureReport, ReportsTheDistributionOfLengthsWithFolds) {
   for (const char* map :
        {"--map rbf", "--map shell", "--map mesh", "--map rbf --kernel thin-plate"}) {
     const json details =
         detailsOf(kBall + patch("--height 3 --levels 4") + "folds @b @p " + map + " ! info");
     expectSpread(details["jacobian"]);
     expectSpread(details["stretch"]);
-    // A patch against its own size: its sides keep their lengths on the surface.
+    // A patch relative to its own size: its sides keep their lengths on the surface.
     EXPECT_NEAR(details["stretch"]["median"], 1.1, 0.2) << map;
     EXPECT_TRUE(details.contains("certificate")) << map;
   }
 }
 
-TEST_F(TextureReport, TellsOfPatchesWhetherTheyCameToRest) {
+TEST_F(TextureReport, ReportsWhetherPatchesConverged) {
   const json details = detailsOf(kBall + patch("--height 3") + "info");
   EXPECT_EQ(details["relaxed"], true);
   EXPECT_EQ(details["slowed"], 0);

@@ -60,7 +60,7 @@ TEST(Fields, AreNumbersFormulasOrValues) {
   EXPECT_NEAR(pipeline::scalarField(band, "speed")(V3d(1.1, 0, 0)), 0.1, 0.01);
 }
 
-TEST(Fields, WrongOnesAreRefused) {
+TEST(Fields, InvalidOnesAreRefused) {
   const auto check = [](const char* param, const char* text) {
     pipeline::checkText(*probe().find(param), text, "probe");
   };
@@ -90,7 +90,7 @@ TEST(Fields, MakeMasks) {
 
 class FieldCommand : public support::ShellTest {};
 
-TEST_F(FieldCommand, ReadsTellsAndWritesFields) {
+TEST_F(FieldCommand, ReadsReportsAndWritesFields) {
   levelset::writeField(folder_ / "wind.vdb", constantField(true), {.name = "wind"});
   const auto info = levelsmith("read wind.vdb --grid wind ! write again.vdb ! info --json");
   EXPECT_EQ(info.code, 0) << info.err;
@@ -107,7 +107,7 @@ TEST_F(FieldCommand, ReadsTellsAndWritesFields) {
   EXPECT_REFUSED(levelsmith("read wind.vdb --grid wind ! write a.ply"), 2, "write .vdb");
 }
 
-TEST_F(FieldCommand, CarriesVectorsOffTheSurface) {
+TEST_F(FieldCommand, ExtendsVectorsOffTheSurface) {
   const auto outcome = levelsmith(
       "sphere --radius 1 --voxel 0.1 --as ball ! closest-point --half-width 3 --as feet ! sweep "
       "@ball "
@@ -116,13 +116,13 @@ TEST_F(FieldCommand, CarriesVectorsOffTheSurface) {
   EXPECT_EQ(nlohmann::json::parse(outcome.out)["values"], "vectors");
 }
 
-TEST_F(FieldCommand, TellsWhereAnAttributeIsNotFinite) {
+TEST_F(FieldCommand, ReportsWhereAnAttributeIsNotFinite) {
   const auto outcome = levelsmith("sphere --radius 1 --voxel 0.1 ! sweep --extend \"1/x\"");
   EXPECT_REFUSED(outcome, 3, "sweep: --extend: '1/x' is");
   EXPECT_NE(outcome.err.find("on the surface at 0,"), std::string::npos) << outcome.err;
 }
 
-TEST_F(FieldCommand, CountsTheGridPointsThatTheFrontReaches) {
+TEST_F(FieldCommand, CountsGridPointsTheFrontArrivesAt) {
   for (const char* front : {"march", "sweep --speed 1"}) {
     ASSERT_EQ(levelsmith(std::string("--report r.json sphere --radius 1 --voxel 0.1 ! ") + front +
                          " --to 1vx ! info --json > info.json")
@@ -144,7 +144,7 @@ TEST_F(FieldCommand, CountsGridPointsThatFallBackToFirstOrder) {
       const auto report = nlohmann::json::parse(support::slurp(folder_ / "r.json"));
       const auto& details = report["steps"][1]["details"];
       const double reached = details["reached"], fellBack = details["first_order"];
-      // Six layers of the ball, less what the start gives.
+      // Six layers of the ball, less the initial values.
       if (order == "1")
         EXPECT_EQ(fellBack, 0) << front;
       else

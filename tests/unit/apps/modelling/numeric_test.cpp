@@ -21,7 +21,7 @@ TEST_F(Numeric, FieldThatIsNoDistanceFailsTheCheck) {
   EXPECT_FALSE(exists("after.vdb"));
 }
 
-TEST_F(Numeric, ToleranceNotReachedKeepsTheBestAndFails) {
+TEST_F(Numeric, UnreachedToleranceKeepsTheBestResultAndFails) {
   const std::string flow =
       "--report r.json sphere --radius 1 --voxel 0.1 ! curvature-flow --time 0.02 --tolerance ";
   const auto missed = levelsmith(flow + "1e-12 ! write best.vdb");

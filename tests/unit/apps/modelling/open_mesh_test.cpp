@@ -1,4 +1,4 @@
-// What meshes carry, and open ones as bases, as the command has it.
+// Mesh attributes and open meshes as bases, on the command line.
 
 #include <gtest/gtest.h>
 
@@ -26,7 +26,7 @@ class OpenMesh : public support::ShellTest {
   }
 };
 
-TEST_F(OpenMesh, AttributesAreToldAndMayBeLeftOut) {
+TEST_F(OpenMesh, AttributesAreReportedAndOptional) {
   const auto refused = levelsmith("read sheet.obj ! info");
   EXPECT_EQ(refused.code, 3);
   EXPECT_NE(refused.err.find("line 8: a coordinate of a normal is nan"), std::string::npos)
@@ -44,7 +44,7 @@ TEST_F(OpenMesh, AttributesAreToldAndMayBeLeftOut) {
   EXPECT_EQ(levelsmith("read s.vdb --bare ! info").code, 2);
 }
 
-TEST_F(OpenMesh, SeamsAreClosedAndWhatIsLeftAsideIsTold) {
+TEST_F(OpenMesh, SeamsAreClosedAndIgnoredPropertiesReported) {
   writeFile("roof.obj",
             "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 -1\nvn 0 -1 0\nvn -1 0 0\nvn 1 1 1\n"
             "vn 9 9 9\nf 1//1 3//1 2//1\nf 1//2 2//2 4//2\nf 1//3 4//3 3//3\nf 2//4 3//4 4//4\n");
@@ -63,7 +63,7 @@ TEST_F(OpenMesh, SeamsAreClosedAndWhatIsLeftAsideIsTold) {
   }
 }
 
-TEST_F(OpenMesh, DefaultsOfBandAndPatchGoTogether) {
+TEST_F(OpenMesh, DefaultsOfBandAndPatchAreCompatible) {
   const std::string land =
       "heightmap --image hills.txt --size 20,20 --height 4 --voxel 1 --sheet ! surface-band ";
   EXPECT_EQ(levelsmith(land + "--voxel 1 ! patch --at 0,0,0 --size 6,6 --height 5 ! info").code, 0);
@@ -73,7 +73,7 @@ TEST_F(OpenMesh, DefaultsOfBandAndPatchGoTogether) {
 }
 
 TEST_F(OpenMesh, TreesStandOnTerrain) {
-  // The example of docs/texture-mapping.md, fewer trees.
+  // The example of docs/texture-mapping.md with fewer trees.
   const auto outcome = levelsmith(
       "heightmap --image hills.txt --size 40,40 --height 8 --base 0 --voxel 0.5 --sheet --as "
       "ground "
@@ -86,7 +86,7 @@ TEST_F(OpenMesh, TreesStandOnTerrain) {
   const Json m = Json::parse(outcome.out);
   EXPECT_EQ(m["components"], 8);
   EXPECT_EQ(m["closed_manifold"], true);
-  // A foot may stand a voxel beyond the border, and a tree leans by its height at the most.
+  // A foot may be a voxel beyond the border, and a tree leans by at most its height.
   for (const int axis : {0, 1}) {
     EXPECT_GT(m["bounds"]["min"][axis], -20 - 0.5 - 6);
     EXPECT_LT(m["bounds"]["max"][axis], 20 + 0.5 + 6);

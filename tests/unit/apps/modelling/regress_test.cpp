@@ -38,7 +38,7 @@ Figures errorsOf(const levelset::NarrowBand& band, const Truth& truth) {
 TEST(RegressErrors, VanishForTheExactBand) {
   const Figures f = errorsOf(exactBand(ball(kCentre, 1), kVoxel), ball(kCentre, 1));
   for (const char* column : {"band_in_linf_vx", "band_out_linf_vx"}) EXPECT_LE(f.at(column), 1e-6);
-  // Tricubic interpolation of a sphere of 16 voxels' radius.
+  // Tricubic interpolation of a sphere with a radius of 16 voxels.
   EXPECT_LE(f.at("surface_l1_vx"), 1e-3);
   EXPECT_GT(f.at("surface_l1_vx"), 0);
   EXPECT_EQ(f.at("missed_hits"), 0);
@@ -56,20 +56,20 @@ TEST(RegressExactBand, EndsBelowTheBackground) {
     ASSERT_LT(std::abs(*it), grid.background()) << it.getCoord();
 }
 
-TEST(RegressErrors, AreThoseOfAWrongRadius) {
+TEST(RegressErrors, MatchAWrongRadius) {
   const double off = 0.3 * kVoxel;
   const Figures f = errorsOf(exactBand(ball(kCentre, 1), kVoxel), ball(kCentre, 1 + off));
   for (const char* column :
        {"band_in_l1_vx", "band_in_linf_vx", "band_out_linf_vx", "surface_l1_vx", "surface_linf_vx"})
     EXPECT_NEAR(f.at(column), 0.3, 0.01) << column;
-  // The outermost grid points are at the background already.
+  // The outermost grid points have the background value already.
   EXPECT_NEAR(f.at("band_out_l1_vx"), 0.285, 0.01);
   EXPECT_NEAR(f.at("surface_l1"), off, 0.01 * kVoxel);
   EXPECT_NEAR(f.at("volume_error"), std::pow(1 + off, -3) - 1, 3e-3);
 }
 
-TEST(RegressErrors, TellTheSidesApart) {
-  // Distances inside are too short by a tenth of a voxel at the most, those outside exact.
+TEST(RegressErrors, SeparateTheTwoSides) {
+  // Distances inside are too short by at most a tenth of a voxel, those outside are exact.
   const Truth exact = ball(kCentre, 1);
   Truth bent = exact;
   bent.distance = [&](const V3d& p) {
@@ -81,8 +81,8 @@ TEST(RegressErrors, TellTheSidesApart) {
   EXPECT_LE(f.at("band_out_linf_vx"), 1e-6);
 }
 
-TEST(RegressErrors, SeeABandThatIsTooNarrow) {
-  // One and a half voxels of distances on a background that claims three.
+TEST(RegressErrors, DetectABandThatIsTooNarrow) {
+  // Distances up to 1.5 voxels, on a background of three voxels.
   const Truth exact = ball(kCentre, 1);
   Truth clipped = exact;
   clipped.distance = [&](const V3d& p) {
@@ -92,7 +92,7 @@ TEST(RegressErrors, SeeABandThatIsTooNarrow) {
   EXPECT_GE(errorsOf(exactBand(clipped, kVoxel), exact).at("band_out_linf_vx"), 1.4);
 }
 
-/// Without the leaves whose origins have x ≥ 0: background.
+/// The band without the leaves whose origins have x ≥ 0.
 levelset::NarrowBand half(levelset::NarrowBand band) {
   openvdb::FloatGrid& grid = levelset::editVdb(band);
   std::vector<openvdb::Coord> origins;
@@ -106,9 +106,9 @@ double gaps(const levelset::NarrowBand& band, const Truth& truth) {
   return missingShare(bandRegion(truth, band.halfWidth(), band.voxelSize()), levelset::vdb(band));
 }
 
-TEST(RegressErrors, CountWhatTheBandLacks) {
+TEST(RegressErrors, CountMissingGridPoints) {
   const Truth exact = ball(kCentre, 1);
-  // What is left has no error.
+  // The remaining part has no error.
   const Figures f = errorsOf(half(exactBand(exact, kVoxel)), exact);
   EXPECT_NEAR(f.at("missing_band"), 0.5, 0.05);
   EXPECT_LE(f.at("band_in_linf_vx"), 1e-6);
@@ -119,13 +119,13 @@ TEST(RegressGaps, AreNoneInTheExactBand) {
   const Truth exact = ball(kCentre, 1);
   for (const double halfWidth : {1.0, 1.5, 3.0, 6.0})
     EXPECT_EQ(gaps(exactBand(exact, kVoxel, halfWidth), exact), 0) << halfWidth;
-  // Places that are not compared are not missed.
+  // Positions without comparison do not count as missing.
   Truth left = exact;
   left.compared = [](const V3d& p) { return p.x < -0.1; };
   EXPECT_EQ(gaps(half(exactBand(exact, kVoxel)), left), 0);
 }
 
-TEST(RegressGaps, SeeASingleGridPointButAtTheEndOfTheBand) {
+TEST(RegressGaps, DetectASingleGridPointExceptAtTheEndOfTheBand) {
   const Truth exact = ball(kCentre, 1);
   for (const double distance : {0.4, 2.5}) {
     levelset::NarrowBand band = exactBand(exact, kVoxel);
@@ -138,7 +138,7 @@ TEST(RegressGaps, SeeASingleGridPointButAtTheEndOfTheBand) {
   }
 }
 
-TEST(RegressGaps, SeeAFrontThatStopsHalfWay) {
+TEST(RegressGaps, DetectAFrontThatStopsHalfWay) {
   const auto grid = levelset::emptyLevelSet(levelset::uniformTransform(kVoxel), 3);
   const auto times = [](const V3d& p) { return (p - kCentre).length(); };
   for (openvdb::Coord c(-20); c[0] < 20; ++c[0])
@@ -151,21 +151,21 @@ TEST(RegressGaps, SeeAFrontThatStopsHalfWay) {
   EXPECT_NEAR(missingShare(whole, *grid), 1 - 0.125, 0.01);
 }
 
-TEST(RegressErrors, MissWhatIsNotThere) {
+TEST(RegressErrors, CountAMissingSurface) {
   const Truth pair = apart(ball(V3d(-1.5, 0, 0), 1), ball(V3d(1.5, 0, 0), 1));
   const Figures f = errorsOf(exactBand(ball(V3d(-1.5, 0, 0), 1), kVoxel), pair);
   EXPECT_NEAR(f.at("missed_hits"), 0.5, 0.1);
   EXPECT_NEAR(f.at("volume_error"), -0.5, 0.01);
 }
 
-TEST(RegressErrors, DoNotSetZerosTooManyAgainstZerosTooFew) {
-  // One ball is missing, another as large is there for it: as many zeros, on other rays.
+TEST(RegressErrors, DoNotBalanceExtraAgainstMissingZeros) {
+  // One ball is replaced by a ball of the same size elsewhere: as many zeros, on other rays.
   const Truth left = ball(V3d(-1.5, 0, 0), 1), pair = apart(left, ball(V3d(1.5, 0, 0), 1));
   const Truth other = apart(left, ball(V3d(0, 1.45, 0), 1));
   EXPECT_GE(errorsOf(exactBand(other, kVoxel), pair).at("missed_hits"), 0.6);
 }
 
-TEST(RegressDeviation, IsZeroOnlyForTheSameBand) {
+TEST(RegressDeviation, IsZeroOnlyForEqualBands) {
   const auto a = exactBand(ball(kCentre, 1), kVoxel);
   EXPECT_EQ(deviation(a, a), 0);
   EXPECT_NEAR(deviation(a, exactBand(ball(kCentre, 1 + 0.2 * kVoxel), kVoxel)), 0.2, 1e-5);
@@ -175,15 +175,17 @@ TEST(RegressDeviation, IsZeroOnlyForTheSameBand) {
 TEST(RegressRays, FindTheZerosOfTheExactSolid) {
   const Truth ring = torus(kCentre, V3d(1, 2, 3), 0.7, 0.3);
   const RayHits hits = shootRays(exactBand(ring, 1.0 / 24), ring);
-  // Crofton: lines spread evenly over a ball's cross 2 A / 4πR² times a surface of area A within.
+  // Crofton: uniformly distributed lines through a ball of radius R cross a surface of area A
+  // inside it 2 A / 4πR² times on average.
   const double radius = ring.reach + 4.0 / 24;
   const double expected = kRayCount * *ring.area / (2 * std::numbers::pi * radius * radius);
   EXPECT_NEAR(hits.exactHits, expected, 0.01 * expected);
-  // Rays that graze the surface may go either way.
+  // Rays that graze the surface may hit or miss.
   EXPECT_NEAR(static_cast<double>(hits.errors.size()), hits.exactHits, 0.002 * hits.exactHits);
 }
 
-/// Volume of a truth by counting grid points, and slope of its distance.
+/// Compares the volume of a truth with a count of grid points, and the slope of its distance with
+/// 1.
 void expectConsistent(const Truth& truth, const char* name) {
   const double h = 1.0 / 40;
   const int n = static_cast<int>(std::ceil(truth.reach / h)) + 1;
@@ -226,8 +228,8 @@ Row rowOf(int resolution, int phase, double error) {
           {}};
 }
 
-TEST(RegressErrors, CompareWithABandThatWasCarried) {
-  // A third of a turn about an axis off the ball, and standing still.
+TEST(RegressErrors, CompareWithATransportedBand) {
+  // A third of a turn about an axis outside the ball, and no motion.
   const V3d centre(0.5, 0.1, -0.2);
   const auto turn = levelset::rotationVelocity(V3d(0), V3d(1, 1, 1), 3);
   const auto still = [](const V3d&, double) { return V3d(0); };
@@ -242,7 +244,7 @@ TEST(RegressErrors, CompareWithABandThatWasCarried) {
     EXPECT_LE(near.at("value_error"), 5e-3);
     addDifferences(exactBand(ball(there + V3d(kVoxel, 0, 0), 0.4), kVoxel), reference, far);
     EXPECT_NEAR(far.at("surface_linf_vx"), 1, 0.1);
-    // π R² times the way on each side.
+    // π R² times the distance on each side.
     EXPECT_NEAR(far.at("value_error"), 1.5 * kVoxel / 0.4, 0.05);
   }
 }
@@ -258,7 +260,7 @@ TEST(RegressSummary, TakesTheWorstPlacementAndTheOrder) {
   EXPECT_DOUBLE_EQ(summary[1].figures.at("order_volume"), 2);
 }
 
-TEST(RegressJudge, FailsBoundsThatAreMissedOrFitNothing) {
+TEST(RegressJudge, FailsExceededBoundsAndUnknownFigures) {
   Case c{.name = "c", .quick = {8}, .full = {8, 16}};
   c.bounds = {{"v", "surface_l1", 0.2},
               {"v", "surface_l1", 0.1, 8},
@@ -275,14 +277,14 @@ TEST(RegressJudge, FailsBoundsThatAreMissedOrFitNothing) {
   EXPECT_EQ(judge(c, summary, Budget::Full).size(), 5u);
 }
 
-TEST(RegressJudge, FailsASurfaceThatIsNotThere) {
+TEST(RegressJudge, FailsAMissingSurface) {
   Case c{.name = "c", .quick = {8, 16}, .bounds = {{"v", "surface_l1", 1}}};
   Row row = rowOf(8, 0, 0.1);
   row.figures["missed_hits"] = 0.8 * kMostMissed;
   EXPECT_TRUE(judge(c, {row}, Budget::Quick).at(1).passed);
   row.figures["missed_hits"] = 1.2 * kMostMissed;
   EXPECT_FALSE(judge(c, {row}, Budget::Quick).at(1).passed);
-  // Edges: at each resolution as much less as the voxel is smaller.
+  // At edges the bound decreases in proportion to the voxel size.
   allowAtEdges(c.bounds, "v", 0.4, {8});
   EXPECT_TRUE(judge(c, {row}, Budget::Quick).at(1).passed);
   row.figures["missed_hits"] = 0.06;
@@ -292,37 +294,37 @@ TEST(RegressJudge, FailsASurfaceThatIsNotThere) {
   EXPECT_FALSE(judge(c, {row}, Budget::Quick).back().passed);
 }
 
-TEST(RegressJudge, FailsABandThatIsNotThere) {
+TEST(RegressJudge, FailsAMissingBand) {
   Case c{.name = "c", .bounds = {{"v", "band_in_l1", 1}}};
   Row row = rowOf(8, 0, 0.1);
   row.figures["missing_band"] = 0;
   EXPECT_TRUE(judge(c, {row}, Budget::Quick).at(1).passed);
   row.figures["missing_band"] = 1e-6;
   EXPECT_FALSE(judge(c, {row}, Budget::Quick).at(1).passed);
-  // A case may allow for some, by a bound of its own.
+  // A case may permit missing points by a bound of its own.
   c.bounds.push_back({"v", "missing_band", 0.1});
   const auto allowed = judge(c, {row}, Budget::Quick);
   ASSERT_EQ(allowed.size(), 2u);
   EXPECT_TRUE(allowed[1].passed);
   row.figures["missing_band"] = 0.5;
   EXPECT_FALSE(judge(c, {row}, Budget::Quick).at(1).passed);
-  // Where no error of the band is judged, nor is what is missing.
+  // Without a bound on band errors, missing points are not tested either.
   c.bounds = {{"v", "surface_l1", 1}};
   EXPECT_EQ(judge(c, {row}, Budget::Quick).size(), 1u);
 }
 
-TEST(RegressJudge, FailsWhatWasRefused) {
+TEST(RegressJudge, FailsRefusedRuns) {
   const Case c{.name = "c"};
   Row refused = rowOf(8, 0, 0);
   refused.failure = "offset: no";
   EXPECT_FALSE(judge(c, {refused}, Budget::Quick).at(0).passed);
 }
 
-TEST(RegressCases, AreWhole) {
+TEST(RegressCases, AreComplete) {
   std::set<std::string> names, columnNames;
   for (const Column& column : columns()) columnNames.insert(column.name);
   for (const Case& c : cases()) {
-    EXPECT_TRUE(names.insert(c.name).second) << c.name << " is there twice";
+    EXPECT_TRUE(names.insert(c.name).second) << c.name << " is registered twice";
     EXPECT_FALSE(c.group.empty() || c.title.empty() || c.definition.empty() || c.citation.empty())
         << c.name;
     EXPECT_TRUE(c.run) << c.name;

@@ -1,5 +1,5 @@
-// The renderers against each other on models that are not made of formulas: the kernel on the
-// processor and as a shader to the bit, both against the judge within what a picture may differ by.
+// Compares the renderers on models without formulas. The kernel on the processor and as a shader
+// must agree to the bit. Both must agree with the judge within the tolerances of pictures.
 
 #include <gtest/gtest.h>
 
@@ -42,7 +42,7 @@ NarrowBand model(const char* name, double resolution) {
   return levelset::meshToBand(mesh, std::max({size.x, size.y, size.z}) / resolution).band;
 }
 
-/// A cylinder with a knurl rolled around it.
+/// A cylinder with a knurl around it.
 NarrowBand knurledCylinder() {
   const NarrowBand base = levelset::makeCylinder(1, 3.05, V3d(0), V3d(0, 0, 1), 0.05);
   const mapping::Knurl knurl{.depth = 0.2, .flankAngle = 2, .base = 0.3, .tiling = {2, 1, 0.15}};
@@ -56,7 +56,7 @@ NarrowBand knurledCylinder() {
       .band;
 }
 
-/// Three bands of different voxels in one picture, and a box with a bite out of it.
+/// Three bands of different voxel sizes in one picture, and a box from which a part is subtracted.
 Scene csgScene(int width, int height) {
   const NarrowBand cut =
       levelset::subtract(levelset::makeBox(V3d(60, 40, 30), V3d(0), 1),
@@ -67,7 +67,7 @@ Scene csgScene(int width, int height) {
   return scene;
 }
 
-/// A ball, a ring and a box of three voxel sizes, turned against each other, for an expression.
+/// A ball, a ring and a box of three voxel sizes, rotated against each other, for an expression.
 Scene sceneAlongRays(const std::string& csg) {
   const auto turned = [](const NarrowBand& band, const V3d& axis, double angle, double scale) {
     return levelset::transform(
@@ -89,7 +89,7 @@ Scene sceneAlongRays(const std::string& csg) {
 
 const RenderOptions kData = {.samples = 1, .ambientSamples = 0, .shadowSamples = 0};
 
-/// Neither an outline nor so steep that a pixel spans voxels.
+/// True for pixels on no outline and on no surface so steep that a pixel spans voxels.
 bool isOffOutlines(const Image& image, const Scene& scene, int x, int y) {
   constexpr double kSteep = 0.1;
   const auto index = [&](int u, int v) {
@@ -105,7 +105,7 @@ bool isOffOutlines(const Image& image, const Scene& scene, int x, int y) {
   return -normal.dot(scene.camera.ray(x + 0.5, y + 0.5).direction) > kSteep;
 }
 
-/// What the issue of the ray-caster asks for at 1024x768.
+/// Tests the required agreement at 1024x768.
 void expectAgreement(const Scene& scene, const std::string& what) {
   const Image ours = renderCpu(scene, kData), judge = renderEmbree(scene, kData);
   const ImageComparison found = compareImages(ours, judge);
@@ -175,7 +175,7 @@ TEST(Agreement, OfTheBunny) {
   if (!std::filesystem::exists(modelPath("bunny.obj"))) GTEST_SKIP() << "no models";
   const NarrowBand bunny = model("bunny.obj", 256);
   expectProven(support::sceneOf(bunny), "bunny");
-  // From within: an ear before the eye.
+  // From inside, with an ear in front of the eye.
   Scene scene = support::sceneOf(bunny, 320, 240);
   const Imath::Box3d box = bunny.zeroSetBounds();
   scene.camera.from = box.center();
@@ -190,10 +190,10 @@ TEST(Agreement, OfTheDragon) {
   expectSameBits(support::seenFromFar(dragon), "dragon from 1e5 away");
 }
 
-/// Pictures of a scene from places all around it, some within.
+/// Pictures of a scene from positions all around it, some of them inside.
 class ManyPlaces {
  public:
-  /// @param change  made to the view, with a number in [0, 1)
+  /// @param change  changes the view by a random number in [0, 1)
   template <typename Change>
   void look(Scene& scene, const Change& change) {
     const V3d way = V3d(normal_(random_), normal_(random_), normal_(random_)).normalized();
@@ -204,15 +204,15 @@ class ManyPlaces {
     const ImageComparison found =
         compareImages(renderCpu(scene, kData), renderEmbree(scene, kData));
     EXPECT_EQ(found.unlikeElsewhere, 0u)
-        << "place " << places_ << ", pixel " << (found.unlike.empty() ? 0 : found.unlike[0].x)
+        << "position " << positions_ << ", pixel " << (found.unlike.empty() ? 0 : found.unlike[0].x)
         << "," << (found.unlike.empty() ? 0 : found.unlike[0].y);
-    ++places_;
+    ++positions_;
     pixels_ += found.pixels;
     hit_ += found.bothHit;
     atOutline_ += found.unlikeAtOutline;
   }
-  /// A pixel that one hits and the other misses is a hole or a false hit, but along an outline,
-  /// where rounding decides.
+  /// Fails if one renderer hits and the other misses at a pixel, which is a hole or a false hit.
+  /// Along outlines rounding decides.
   void expectNoLeak() const {
     EXPECT_GT(hit_, pixels_ / 10);
     EXPECT_LE(static_cast<double>(atOutline_), 1e-5 * static_cast<double>(pixels_));
@@ -222,10 +222,10 @@ class ManyPlaces {
   std::mt19937 random_{5};
   std::normal_distribution<double> normal_;
   std::uniform_real_distribution<double> even_{0, 1};
-  std::size_t places_ = 0, pixels_ = 0, hit_ = 0, atOutline_ = 0;
+  std::size_t positions_ = 0, pixels_ = 0, hit_ = 0, atOutline_ = 0;
 };
 
-TEST(Agreement, From200PlacesNothingLeaks) {
+TEST(Agreement, From200PositionsNothingLeaks) {
   Scene scene = support::sceneOf(support::rings(), 96, 72);
   scene.solids.push_back(
       {.band = levelset::makeBox(V3d(70, 40, 0.7), V3d(0.1, 0.2, -13), 1), .id = 2});

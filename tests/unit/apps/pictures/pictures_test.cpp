@@ -1,4 +1,4 @@
-// Pictures from the command line, and what is the same between them.
+// Pictures from the command line, and the relations between them.
 
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ class Pictures : public support::ShellTest {
   }
 };
 
-TEST_F(Pictures, OfTheSameSolidAgreeButForTheColour) {
+TEST_F(Pictures, OfTheSameSolidAgreeExceptForTheColour) {
   draw("sphere --radius 1", "a.exr --samples 1");
   draw("sphere --radius 1", "b.exr --samples 2");
   const Outcome same = levelsmith("compare-images a.exr b.exr --json --difference d.exr");
@@ -38,7 +38,7 @@ TEST_F(Pictures, OfTheSameSolidAgreeButForTheColour) {
   EXPECT_EQ(levelsmith("compare-images a.exr a.exr --exact").code, 0);
 }
 
-TEST_F(Pictures, AreTheSameBitsByGpuAndProcessorAndJudgedByEmbree) {
+TEST_F(Pictures, HaveEqualBitsOnGpuAndProcessorAndAgreeWithEmbree) {
   draw("torus --radius 1 --tube 0.4", "g.exr --samples 2 --renderer gpu");
   draw("torus --radius 1 --tube 0.4", "c.exr --samples 2 --renderer cpu");
   draw("torus --radius 1 --tube 0.4", "e.exr --renderer embree");
@@ -51,7 +51,7 @@ TEST_F(Pictures, AreTheSameBitsByGpuAndProcessorAndJudgedByEmbree) {
   EXPECT_EQ(levelsmith("compare-images g.exr b.exr").code, 0);
 }
 
-TEST_F(Pictures, OfTheNanoVdbGridHaveTheSameBits) {
+TEST_F(Pictures, OfTheNanoVdbGridHaveEqualBits) {
   draw("torus --radius 1 --tube 0.4", "n.exr --renderer both --tables nanovdb --samples 1");
   draw("torus --radius 1 --tube 0.4", "c.exr --renderer cpu --samples 1");
   EXPECT_EQ(levelsmith("compare-images n.exr c.exr --exact").code, 0);
@@ -61,7 +61,7 @@ TEST_F(Pictures, OfTheNanoVdbGridHaveTheSameBits) {
   EXPECT_EQ(levelsmith(chain + "--renderer gpu --value-bits 8").code, 2);
 }
 
-TEST_F(Pictures, OfValuesInFewBitsTellHowFarTheSurfaceMoved) {
+TEST_F(Pictures, OfValuesInFewBitsReportTheShiftOfTheSurface) {
   const std::string chain = "sphere --radius 1 --voxel 0.05 ! render v.exr --size 64x48 ";
   for (const char* bits : {"16", "8"}) {
     const Outcome drawn = levelsmith("-v " + chain + "--renderer both --value-bits " + bits);
@@ -87,7 +87,7 @@ TEST_F(Pictures, WithoutOpenGlAreRefusedOrDrawnByTheProcessor) {
   EXPECT_TRUE(exists("o.exr"));
 }
 
-TEST_F(Pictures, OfOthersDifferAndEverythingIsWritten) {
+TEST_F(Pictures, OfDifferentSolidsDifferAndAllOutputsAreWritten) {
   const std::string view = " --from 0,0,6 --to 0,0,0";
   draw("sphere --radius 1", "a.exr" + view);
   draw("sphere --radius 1.02", "b.exr" + view);
@@ -98,11 +98,11 @@ TEST_F(Pictures, OfOthersDifferAndEverythingIsWritten) {
   EXPECT_NE(unlike.out.find("curvature.mean"), std::string::npos);
   EXPECT_TRUE(exists("d.exr"));
   EXPECT_TRUE(exists("r.json"));
-  // The difference is a picture itself.
+  // The picture of the difference can be read again.
   EXPECT_EQ(levelsmith("compare-images d.exr a.exr").code, 5);
 }
 
-TEST_F(Pictures, AreRefusedBeforeAnythingIsWritten) {
+TEST_F(Pictures, AreRefusedBeforeAnyFileIsWritten) {
   draw("sphere --radius 1", "a.exr");
   ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.1 ! render small.exr --size 32x48").code, 0);
   writeFile("broken.exr", "no picture");

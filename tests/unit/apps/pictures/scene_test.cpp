@@ -1,4 +1,4 @@
-// Scenes from the command line: made, saved, read again, drawn, refused.
+// Scenes on the command line: building, saving, reading, drawing and errors.
 
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ class Scenes : public support::ShellTest {
                    "--samples 1 --renderer cpu");
     ASSERT_EQ(made.code, 0) << made.err;
   }
-  /// Exit code and complaint for the scene with one word put for another.
+  /// Exit code and message for the scene file with one word replaced.
   Outcome readChanged(const std::string& word, const std::string& other) {
     std::string text = shell("cat cut.json").out;
     const std::size_t at = text.find(word);
@@ -35,7 +35,7 @@ class Scenes : public support::ShellTest {
   }
 };
 
-TEST_F(Scenes, AreTheSameAfterTheyWereSaved) {
+TEST_F(Scenes, AreUnchangedAfterSavingAndReading) {
   make();
   const Outcome again =
       levelsmith("read cut.json ! render b.exr --samples 1 --renderer cpu ! info --json");
@@ -49,7 +49,7 @@ TEST_F(Scenes, AreTheSameAfterTheyWereSaved) {
   EXPECT_NE(levelsmith("compare-images a.exr d.exr").code, 0);
 }
 
-TEST_F(Scenes, AreSeenBetweenTwoPlanes) {
+TEST_F(Scenes, AreCutByNearAndFarPlanes) {
   const Outcome made =
       levelsmith(kTwo +
                  "--csg 'b - s' --from 0,0,5 --to 0,0,0 --near 4.5 --far 5.5 --size 64x48 "
@@ -67,7 +67,7 @@ TEST_F(Scenes, AreSeenBetweenTwoPlanes) {
   EXPECT_EQ(readChanged("\"near\": 4.5", "\"near\": 6").code, 3);
 }
 
-TEST_F(Scenes, HoldMeshesToo) {
+TEST_F(Scenes, ContainMeshesToo) {
   const Outcome made =
       levelsmith(kTwo.substr(0, kTwo.find("! scene")) +
                  "! sphere --radius 0.4 --center 1,1,1 --voxel 0.1 ! mesh --as m ! scene @b @s @m "
@@ -144,7 +144,7 @@ TEST_F(Scenes, AreBlended) {
   EXPECT_EQ(readChanged("\"id\": 1", "\"opacity\": 0.5, \"id\": 1").code, 3);
 }
 
-TEST_F(Scenes, AreSeenThrough) {
+TEST_F(Scenes, AreTransparent) {
   const Outcome made = levelsmith(kTwo +
                                   "--csg 'b - s' --opacities '1 0.25' --from 4,3,5 --to 0,0,0 "
                                   "--size 64x48 ! write cut.json ! render a.exr --samples 2 "
@@ -160,7 +160,7 @@ TEST_F(Scenes, AreSeenThrough) {
   EXPECT_EQ(levelsmith(kTwo + "--opacities '0.5 thin' ! render a.png").code, 2);
 }
 
-TEST_F(Scenes, TellWhatIsInThem) {
+TEST_F(Scenes, ReportTheirContents) {
   const Outcome told = levelsmith(kTwo + "--csg 's | b' ! info --json");
   ASSERT_EQ(told.code, 0) << told.err;
   const Json json = Json::parse(told.out);
@@ -169,7 +169,7 @@ TEST_F(Scenes, TellWhatIsInThem) {
   EXPECT_EQ(json["solids"][1]["name"], "s");
 }
 
-TEST_F(Scenes, AreMovedByTheFile) {
+TEST_F(Scenes, CanBeMovedInTheFile) {
   make();
   const Outcome moved =
       readChanged("\"file\": \"cut-b.vdb\"",
@@ -178,7 +178,7 @@ TEST_F(Scenes, AreMovedByTheFile) {
   EXPECT_NE(moved.out.find("100.9"), std::string::npos) << moved.out;
 }
 
-TEST_F(Scenes, ThatCannotBeAreRefused) {
+TEST_F(Scenes, AreRefusedIfInvalid) {
   EXPECT_EQ(levelsmith(kTwo + "--csg 'b - t' ! render a.png").code, 2);
   EXPECT_EQ(levelsmith(kTwo + "--csg 'b -' ! render a.png").code, 2);
   EXPECT_EQ(levelsmith(kTwo + "--names 'one' ! render a.png").code, 2);

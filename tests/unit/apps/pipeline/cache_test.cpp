@@ -1,4 +1,4 @@
-// Results of earlier runs: the same as if they were computed, whatever happened to the folder.
+// Results of earlier runs equal computed results, whatever happens to the cache folder.
 
 #include "apps/pipeline/cache/cache.h"
 
@@ -23,7 +23,7 @@ using support::ShellTest;
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-TEST(MeshBytes, BringTheMeshBackBitForBit) {
+TEST(MeshBytes, RestoreTheMeshBitForBit) {
   levelset::TriMesh mesh;
   mesh.positions = {{0, 0, 0}, {1, 0.1, -0.0}, {0, 1e-300, 1e300}};
   mesh.triangles = {{0, 1, 2}};
@@ -44,7 +44,7 @@ TEST(MeshBytes, BringTheMeshBackBitForBit) {
   }
 }
 
-TEST(CacheEntry, IsAbsentWhateverByteOfItIsDamaged) {
+TEST(CacheEntry, IsIgnoredIfAnyByteIsDamaged) {
   const fs::path folder = fs::temp_directory_path() / ("cache-entry-" + std::to_string(::getpid()));
   const pipeline::Cache cache(folder);
   ASSERT_EQ(
@@ -66,13 +66,13 @@ TEST(CacheEntry, IsAbsentWhateverByteOfItIsDamaged) {
 
 class CacheRun : public ShellTest {
  protected:
-  /// Level sets, a mesh, a field and what is printed.
+  /// Chain with level sets, a mesh, a field and printed values.
   static std::string chain(const std::string& size = "1,1,3") {
     return "sphere --radius 1 --voxel 0.05 --as a ! box --size " + size +
            " --voxel 0.05 ! difference @a ! write o.vdb ! render o.exr --size 64x48 --samples 1 "
            "--renderer cpu ! mesh ! write o.ply ! measure --json";
   }
-  /// What a run leaves, all of it.
+  /// All output of a run.
   std::string left(const Outcome& outcome) {
     std::string all = outcome.out;
     for (const char* file : {"o.vdb", "o.exr", "o.ply"}) all += support::slurp(folder_ / file);
@@ -81,7 +81,7 @@ class CacheRun : public ShellTest {
   void clear() {
     for (const char* file : {"o.vdb", "o.exr", "o.ply"}) fs::remove(folder_ / file);
   }
-  /// @return how many steps ran
+  /// @return number of steps that ran
   std::size_t ran() {
     const Json report = Json::parse(support::slurp(folder_ / "r.json"));
     std::size_t count = 0;
@@ -90,7 +90,7 @@ class CacheRun : public ShellTest {
   }
 };
 
-TEST_F(CacheRun, GivesTheSameAndComputesNothingTwice) {
+TEST_F(CacheRun, GivesTheSameResultsAndComputesNothingTwice) {
   const Outcome plain = levelsmith(chain());
   ASSERT_EQ(plain.code, 0) << plain.err;
   const std::string expected = left(plain);
@@ -104,18 +104,18 @@ TEST_F(CacheRun, GivesTheSameAndComputesNothingTwice) {
   EXPECT_NE(second.err.find("nothing was computed: all 8 results come from an earlier run"),
             std::string::npos)
       << second.err;
-  // A file that went missing, or that somebody changed, is written anew from what is known.
+  // A missing or changed output file is written again from the cache.
   fs::remove(folder_ / "o.ply");
   std::ofstream(folder_ / "o.exr") << "other";
   EXPECT_TRUE(left(levelsmith("--cache c --report r.json " + chain())) == expected);
   EXPECT_EQ(ran(), 2u);
-  // What does not depend on a parameter stays.
+  // Results that do not depend on the changed parameter are kept.
   const Outcome changed = levelsmith("--cache c --report r.json " + chain("1,1,2.5"));
   EXPECT_EQ(ran(), 7u);
   EXPECT_TRUE(left(changed) == left(levelsmith(chain("1,1,2.5"))));
 }
 
-TEST_F(CacheRun, GoesByWhatFilesHold) {
+TEST_F(CacheRun, DependsOnTheContentsOfFiles) {
   ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.1 ! write s.vdb ! mesh ! write s.ply").code, 0);
   const std::string both =
       "--cache c --report r.json read s.vdb ! offset 0.1 ! write a.vdb ! read s.ply ! level-set "
@@ -125,7 +125,7 @@ TEST_F(CacheRun, GoesByWhatFilesHold) {
   ASSERT_EQ(shell("touch s.vdb s.ply").code, 0);
   ASSERT_EQ(levelsmith(both).code, 0);
   EXPECT_EQ(ran(), 0u);
-  // Another tree, another mesh.
+  // Another tree and another mesh.
   ASSERT_EQ(levelsmith("sphere --radius 1.1 --voxel 0.1 ! write s.vdb").code, 0);
   ASSERT_EQ(levelsmith(both).code, 0);
   EXPECT_EQ(ran(), 3u);
@@ -134,12 +134,12 @@ TEST_F(CacheRun, GoesByWhatFilesHold) {
   EXPECT_LE(ran(), 3u);
 }
 
-TEST_F(CacheRun, DoesNotTakeAFileForWhatAnActionBeforeMakesOfIt) {
+TEST_F(CacheRun, DistinguishesAFileFromItsLaterContents) {
   const std::string ball = "sphere --radius 1 --voxel 0.1 ! write a.vdb",
                     box = "box --size 1,2,3 --voxel 0.1 ! write a.vdb",
                     rest = " ! read a.vdb ! offset 0.1 ! measure --json";
   ASSERT_EQ(levelsmith(ball).code, 0);
-  const auto ofBox = levelsmith("--cache c " + box + rest);  // a ball is there before
+  const auto ofBox = levelsmith("--cache c " + box + rest);  // the file contains a ball at first
   ASSERT_EQ(ofBox.code, 0) << ofBox.err;
   ASSERT_EQ(levelsmith(ball).code, 0);
   const auto ofBall = levelsmith("--cache c " + rest.substr(3));
@@ -156,11 +156,11 @@ TEST_F(CacheRun, KeepsFieldsNotesAndWarnings) {
   ASSERT_EQ(first.code, 0) << first.err;
   EXPECT_EQ(second.out, first.out);
   EXPECT_EQ(ran(), 0u);
-  // Notes are told again, and one more.
+  // Notes are repeated, with one more.
   EXPECT_EQ(second.err.find(first.err), 0u) << second.err;
 }
 
-TEST_F(CacheRun, DoesNotKeepWhatFails) {
+TEST_F(CacheRun, DoesNotKeepFailures) {
   const std::string line =
       "--cache c --report r.json sphere --radius 1 --voxel 0.2 ! render a.exr --size 0x0";
   EXPECT_EQ(levelsmith(line).code, 2);
@@ -171,7 +171,7 @@ TEST_F(CacheRun, DoesNotKeepWhatFails) {
   EXPECT_EQ(levelsmith("--cache file sphere --radius 1 --voxel 0.2 ! measure").code, 6);
 }
 
-TEST_F(CacheRun, TakesDamagedEntriesForAbsent) {
+TEST_F(CacheRun, IgnoresDamagedEntries) {
   const std::string expected = left(levelsmith("--cache c " + chain()));
   std::mt19937 random(3);
   std::size_t files = 0;
@@ -197,7 +197,7 @@ TEST_F(CacheRun, TakesDamagedEntriesForAbsent) {
   EXPECT_GT(files, 60u);
 }
 
-TEST_F(CacheRun, SurvivesBeingKilledAtAnyMoment) {
+TEST_F(CacheRun, SurvivesBeingKilledAtAnyTime) {
   const std::string expected = left(levelsmith(chain()));
   std::mt19937 random(11);
   int killed = 0;
@@ -215,7 +215,7 @@ TEST_F(CacheRun, SurvivesBeingKilledAtAnyMoment) {
   EXPECT_GT(killed, 10);
 }
 
-TEST_F(CacheRun, IsSharedByRunsAtTheSameTime) {
+TEST_F(CacheRun, IsSharedByConcurrentRuns) {
   const std::string expected = left(levelsmith(chain()));
   std::string line;
   for (const char* part : {"a", "b", "c", "d"})
@@ -231,7 +231,7 @@ TEST_F(CacheRun, IsSharedByRunsAtTheSameTime) {
   }
 }
 
-TEST_F(CacheRun, IsListedAndShrunk) {
+TEST_F(CacheRun, CanBeListedAndReduced) {
   ASSERT_EQ(levelsmith("--cache c " + chain()).code, 0);
   const Json all = Json::parse(levelsmith("cache list c --json").out);
   EXPECT_EQ(all["entries"], 8);
@@ -244,7 +244,7 @@ TEST_F(CacheRun, IsListedAndShrunk) {
   EXPECT_EQ(levelsmith("cache list c --max-size 1K").code, 2);
   EXPECT_EQ(levelsmith("cache list nowhere").code, 6);
   EXPECT_EQ(levelsmith("cache list .").code, 6);
-  // Without a name there is nothing to make, and nothing is made.
+  // Without a name no folder is created.
   EXPECT_FALSE(exists("results"));
 }
 

@@ -1,4 +1,5 @@
-// The JSON Schema of graphs: it takes what the reader takes, and refuses what it can tell.
+// JSON Schema of graphs: it accepts all input that the reader accepts, and refuses errors that a
+// schema can express.
 
 #include "apps/pipeline/help/graph_schema.h"
 
@@ -16,7 +17,7 @@ namespace graph_schema_test {
 
 using Json = nlohmann::json;
 
-/// As much of draft 2020-12 as the schema says.
+/// The subset of draft 2020-12 that the schema uses.
 class Validator {
  public:
   explicit Validator(Json schema) : root_(std::move(schema)) {}
@@ -95,14 +96,14 @@ Json graphOf(Json nodes) {
   return {{"format", "levelsmith graph"}, {"version", 1}, {"nodes", std::move(nodes)}};
 }
 
-/// A graph of the action with such options, behind enough balls for its operands.
+/// A graph of the action with these options, after enough balls for its operands.
 bool takesOptions(const std::string& op, const Json& options) {
   return schema().takes(graphOf({{{"op", op}, {"options", options}, {"inputs", Json::array()}}}));
 }
 
-TEST(GraphSchema, TakesEveryExample) {
+TEST(GraphSchema, AcceptsEveryExample) {
   for (const auto& op : pipeline::operators()) {
-    if (op.example.find("<(") != std::string::npos) continue;  // the shell's business
+    if (op.example.find("<(") != std::string::npos) continue;  // syntax of the shell
     std::vector<std::string> words;
     for (const auto& line : pipeline::splitScript(op.example, op.name))
       for (const auto& word : line.words)
@@ -113,7 +114,7 @@ TEST(GraphSchema, TakesEveryExample) {
   }
 }
 
-TEST(GraphSchema, TakesDefaultsAndForms) {
+TEST(GraphSchema, AcceptsDefaultsAndForms) {
   for (const auto& op : pipeline::operators()) {
     const Json node =
         Json::parse(pipeline::graphSchema())["$defs"][op.name]["properties"]["options"];
@@ -138,7 +139,7 @@ TEST(GraphSchema, TakesDefaultsAndForms) {
   EXPECT_FALSE(takesOptions("sphere", {{"radius", "1"}, {"voxel", "2vx"}}));
 }
 
-TEST(GraphSchema, RefusesWhatTheReaderRefuses) {
+TEST(GraphSchema, RefusesGraphsThatTheReaderRefuses) {
   const Json ball = {{"op", "sphere"}, {"options", {{"radius", "1"}, {"voxel", "0.1"}}}};
   EXPECT_TRUE(schema().takes(graphOf({ball})));
   EXPECT_FALSE(schema().takes(graphOf(Json::array())));
@@ -149,7 +150,7 @@ TEST(GraphSchema, RefusesWhatTheReaderRefuses) {
   const auto behind = [&](const Json& node) { return schema().takes(graphOf({ball, node})); };
   EXPECT_TRUE(behind({{"op", "measure"}, {"inputs", {0}}, {"options", {{"json", true}}}}));
   EXPECT_FALSE(behind({{"op", "measure"}, {"inputs", {0}}, {"options", {{"json", "yes"}}}}));
-  EXPECT_FALSE(behind({{"op", "measure"}, {"inputs", {0}}, {"as", "m"}}));  // makes nothing
+  EXPECT_FALSE(behind({{"op", "measure"}, {"inputs", {0}}, {"as", "m"}}));  // has no result
   EXPECT_FALSE(behind({{"op", "measure"}}));
   EXPECT_FALSE(behind({{"op", "measure"}, {"inputs", {0, 0}}}));
   EXPECT_TRUE(behind({{"op", "union"}, {"inputs", {0, 0, 0}}, {"as", "u"}}));

@@ -1,5 +1,5 @@
-// Graphs: the same from a chain and from a file, only what is needed of them is run, and files that
-// are none are refused.
+// Graphs: equal from a chain and from a file, evaluated only where needed, and invalid files are
+// refused.
 
 #include "apps/pipeline/graph/graph.h"
 
@@ -32,7 +32,7 @@ const std::vector<std::string> kFork = {
     "offset", "0.2",      "!",  "box",     "--size", "1,1,1", "--voxel", "0.1",
     "!",      "union",    "@a", "!",       "write",  "o.vdb"};
 
-TEST(Graph, KeepsWhatIsTakenOffTheStackAndByName) {
+TEST(Graph, RecordsOperandsFromTheStackAndByName) {
   const Graph graph = parseChain(kFork);
   ASSERT_EQ(graph.nodes.size(), 6u);
   EXPECT_EQ(graph.nodes[2].inputs, (std::vector<std::size_t>{1}));
@@ -42,12 +42,12 @@ TEST(Graph, KeepsWhatIsTakenOffTheStackAndByName) {
   EXPECT_EQ(countUses(graph, neededNodes(graph)), (std::vector<std::size_t>{1, 0, 0, 1, 1, 0}));
 }
 
-TEST(Graph, NeedsAllOfAChainThatEndsInAValue) {
+TEST(Graph, NeedsTheEntireChainThatEndsInAValue) {
   const Graph graph = parseChain({"sphere", "--radius", "1", "--voxel", "0.1", "!", "offset", "1"});
   EXPECT_EQ(neededNodes(graph), (std::vector<char>{1, 1}));
 }
 
-TEST(Graph, NeedsResultsBesideWhatActsOutside) {
+TEST(Graph, NeedsResultsAndActionsWithSideEffects) {
   Graph graph = parseChain(kFork);
   graph.results = {1};
   EXPECT_EQ(neededNodes(graph), (std::vector<char>{1, 1, 0, 1, 1, 1}));
@@ -56,7 +56,7 @@ TEST(Graph, NeedsResultsBesideWhatActsOutside) {
   EXPECT_EQ(neededNodes(graph), (std::vector<char>{1, 0}));
 }
 
-TEST(Graph, TakesValuesThatAreGivenAndHandsOutResults) {
+TEST(Graph, TakesGivenValuesAndReturnsResults) {
   Graph graph =
       parseChain({"sphere", "--radius", "9", "--voxel", "0.1", "!", "offset", "0.5", "!", "mesh"});
   graph.nodes[0].op = &pipeline::givenOperator();
@@ -76,7 +76,7 @@ TEST(Graph, TakesValuesThatAreGivenAndHandsOutResults) {
   EXPECT_NEAR(made.at(1).plan().bounds.max.x, 1.5, 1e-3);
 }
 
-TEST(Graph, EndsAnActionThatIsNotToGoOn) {
+TEST(Graph, CancelsAnAction) {
   const Graph graph = parseChain({"sphere", "--radius", "1", "--voxel", "0.02"});
   pipeline::RunSettings settings;
   settings.shouldContinue = [] { return false; };
@@ -85,7 +85,7 @@ TEST(Graph, EndsAnActionThatIsNotToGoOn) {
   EXPECT_EQ(report.exitCode, 130);
 }
 
-TEST(Graph, IsTheSameFromJson) {
+TEST(Graph, IsUnchangedThroughJson) {
   const Graph graph = parseChain(kFork);
   const std::string text = graphJson(graph);
   const Graph again = graphFromJson(text, "g.json");
@@ -100,7 +100,7 @@ TEST(Graph, IsTheSameFromJson) {
   }
 }
 
-TEST(Graph, KeepsValuesThatOptionsName) {
+TEST(Graph, KeepsValuesNamedByOptions) {
   const Graph graph =
       parseChain({"sphere", "--radius", "1", "--voxel", "0.1", "--as", "s", "!", "box", "--size",
                   "1,1,1", "--voxel", "0.1", "!", "smooth", "--sigma", "1vx", "--mask", "@s"});
@@ -110,7 +110,7 @@ TEST(Graph, KeepsValuesThatOptionsName) {
   EXPECT_EQ(again.nodes[2].options, graph.nodes[2].options);
 }
 
-/// @return the exit code that a text leads to, or 0
+/// @return exit code for a text, or 0
 int refusalOf(const std::string& text) {
   try {
     (void)graphFromJson(text, "g.json");
@@ -134,7 +134,7 @@ TEST(Graph, TakesNumbersAndFlags) {
   EXPECT_EQ(graph.nodes[1].options.at("json"), "true");
 }
 
-TEST(Graph, RefusesWhatIsNone) {
+TEST(Graph, RefusesInvalidGraphs) {
   const std::string sphere = R"({"op": "sphere", "options": {"radius": "1", "voxel": "0.1"}})";
   EXPECT_EQ(refusalOf(withNodes(sphere)), 0);
   for (const char* text : {"", "{", "[]", "null", "7", "{}", R"({"format": "levelsmith scene"})"})
@@ -161,13 +161,13 @@ TEST(Graph, RefusesWhatIsNone) {
             3);
 }
 
-TEST(Graph, SurvivesWhateverAFileHolds) {
+TEST(Graph, SurvivesArbitraryFiles) {
   const std::string whole = graphJson(parseChain(kFork));
   std::mt19937 random(7);
   int taken = 0;
   for (int i = 0; i < 2000; ++i) {
     std::string text = whole;
-    if (i % 2 == 0) {  // a digit for a digit leaves something to be read
+    if (i % 2 == 0) {  // a digit replaces a digit, so that a readable text remains
       std::size_t place = random() % text.size();
       while (!std::isdigit(static_cast<unsigned char>(text[place]))) place = random() % text.size();
       text[place] = static_cast<char>('0' + random() % 10);
@@ -179,7 +179,7 @@ TEST(Graph, SurvivesWhateverAFileHolds) {
       const std::string written = graphJson(graphFromJson(text, "g.json"));
       EXPECT_EQ(graphJson(graphFromJson(written, "g.json")), written) << text;
       ++taken;
-    } catch (const levelset::Error& error) {  // a sentence, and nothing else
+    } catch (const levelset::Error& error) {  // an error message is the only accepted exception
       EXPECT_NE(std::string(error.what()).find("g.json"), std::string::npos) << error.what();
     }
   }
@@ -189,7 +189,7 @@ TEST(Graph, SurvivesWhateverAFileHolds) {
 
 class GraphRun : public ShellTest {};
 
-TEST_F(GraphRun, DoesFromAFileWhatTheChainDoes) {
+TEST_F(GraphRun, RunsAFileLikeTheChain) {
   const std::string chain =
       "sphere --radius 1 --voxel 0.1 --as a ! box --size 1,1,3 --voxel 0.1 ! difference @a ! ";
   const auto direct = levelsmith("--save-graph g.json " + chain + "write a.vdb ! measure --json");
@@ -206,7 +206,7 @@ TEST_F(GraphRun, DoesFromAFileWhatTheChainDoes) {
   EXPECT_EQ(levelsmith("--save-graph g.json --report g.json " + chain + "write a.vdb").code, 2);
 }
 
-TEST_F(GraphRun, RunsWhatIsNeededAlone) {
+TEST_F(GraphRun, RunsNeededNodesOnly) {
   std::string chain = "--report r.json ";
   for (int i = 0; i < 9; ++i)
     chain += "sphere --radius 1 --voxel 0.1 --as s" + std::to_string(i) + " ! offset 0.1 ! ";

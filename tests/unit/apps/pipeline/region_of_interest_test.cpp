@@ -1,4 +1,4 @@
-// Only what is needed of a value is made, and it is the same to the bit.
+// Only the region of interest of a value is computed, and it is equal to the bit.
 
 #include "apps/pipeline/graph/regions_of_interest.h"
 
@@ -51,7 +51,7 @@ std::string text(const V3d& p) {
 
 // === One operator at a time
 
-/// A solid of a few shapes, with edges, ridges and hollows; voxels of 0.1.
+/// A random solid of several shapes with edges, ridges and hollows, in voxels of 0.1.
 NarrowBand someSolid(Random& random, double halfWidth) {
   using namespace levelset;
   const ShapeOptions options{.halfWidth = halfWidth};
@@ -61,7 +61,7 @@ NarrowBand someSolid(Random& random, double halfWidth) {
   return subtract(solid, makeSphere(0.9, pointIn(random, 1.5), 0.1, options));
 }
 
-/// How to call an operator that reads parts, in many ways.
+/// Many calls of each operator that supports a region of interest.
 using Options = std::map<std::string, std::string>;
 const std::map<std::string, std::function<Options(Random&)>> kCalls = {
     {"union", [](Random&) { return Options{}; }},
@@ -128,9 +128,9 @@ const std::map<std::string, std::function<Options(Random&)>> kCalls = {
      }},
 };
 
-/// The part of two bands is the same, voxel by voxel.
+/// Expects that the region of interest of two bands is equal, voxel by voxel.
 /// @param tolerance  voxels
-/// @return how many were compared
+/// @return number of compared voxels
 std::size_t expectSamePart(const NarrowBand& whole, const NarrowBand& made,
                            const RegionOfInterest& part, double tolerance,
                            const std::string& what) {
@@ -147,7 +147,7 @@ std::size_t expectSamePart(const NarrowBand& whole, const NarrowBand& made,
     float u = 0, v = 0;
     const bool uOn = a.probeValue(*c, u), vOn = b.probeValue(*c, v);
     const double apart = static_cast<double>(std::abs(u - v)) / whole.voxelSize();
-    // A value may pass the end of the band by as little.
+    // Rounding may move a value across the end of the band.
     if (apart <= tolerance && (uOn == vOn || tolerance > 0)) continue;
     ++different;
     largest = std::max(largest, apart);
@@ -156,7 +156,7 @@ std::size_t expectSamePart(const NarrowBand& whole, const NarrowBand& made,
   return compared;
 }
 
-/// @return how many values were compared
+/// @return number of compared values
 /// @param tolerance  voxels
 std::size_t tryOperator(const Operator& op, const std::function<Options(Random&)>& call,
                         unsigned seed, double tolerance) {
@@ -171,7 +171,7 @@ std::size_t tryOperator(const Operator& op, const std::function<Options(Random&)
   try {
     all = op.run(whole);
   } catch (const levelset::InvalidInput&) {
-    return 0;  // nothing is left of it
+    return 0;  // the result is empty
   }
   RegionOfInterest of;
   if (all.kind() == pipeline::Kind::Band) {
@@ -190,7 +190,7 @@ std::size_t tryOperator(const Operator& op, const std::function<Options(Random&)
   for (std::size_t i = 0; i < operands.size(); ++i) {
     const RegionOfInterest read = op.regionOfInterest(part, i, of);
     less.emplace_back(levelset::cropped(operands[i].band(), read));
-    if (less.back().band().isEmpty()) return 0;  // it would be made whole
+    if (less.back().band().isEmpty()) return 0;  // it would be computed completely
   }
   part.operands = less;
   part.isPartial = less[0].band().halfWidth() < operands[0].band().halfWidth() * (1 - 1e-5);
@@ -201,29 +201,31 @@ std::size_t tryOperator(const Operator& op, const std::function<Options(Random&)
   try {
     made = op.run(part);
   } catch (const levelset::InvalidInput&) {
-    return 0;  // as well
+    return 0;  // the complete result is refused too
   }
   if (all.kind() == pipeline::Kind::Mesh) {
     EXPECT_TRUE(all.mesh().positions == made.mesh().positions) << what;
     EXPECT_TRUE(all.mesh().triangles == made.mesh().triangles) << what;
     return all.mesh().triangles.size();
   }
-  // Thinner bands are made thicker, the part for itself.
+  // Thin bands are widened, and the region is widened separately, which permits larger differences.
+  // Tolerance of thick bands, voxels.
   constexpr double kOfThickBands = 1e-6;
   if (halfWidth >= 3) tolerance = std::min(tolerance, kOfThickBands);
   return expectSamePart(all.band(), levelset::cropped(made.band(), of), of, tolerance, what);
 }
 
-TEST(RegionOfInterest, EveryOperatorThatReadsAPartMakesThatPartTheSame) {
+TEST(RegionOfInterest, EveryOperatorComputesTheSameRegion) {
   for (const Operator& op : pipeline::operators()) {
-    if (!op.regionOfInterest || op.flow == pipeline::Flow::PassesThrough) continue;  // those: below
-    ASSERT_TRUE(kCalls.contains(op.name)) << op.name << " reads parts, and no call of it is tried";
+    if (!op.regionOfInterest || op.flow == pipeline::Flow::PassesThrough) continue;  // tested below
+    ASSERT_TRUE(kCalls.contains(op.name))
+        << op.name << " supports a region of interest, but has no test call";
   }
   for (const auto& [name, call] : kCalls) {
     const Operator& op = *pipeline::findOperator(name.substr(0, name.find(' ')));
     ASSERT_TRUE(op.regionOfInterest) << name;
     const double tolerance = name == "transform" ? 0 : op.partTolerance;
-    const unsigned rounds = tolerance == 0 || name == "offset" ? 20 : 6;  // others take longer
+    const unsigned rounds = tolerance == 0 || name == "offset" ? 20 : 6;  // the others take longer
     unsigned compared = 0;
     for (unsigned seed = 0; seed < rounds; ++seed)
       compared += tryOperator(op, call, seed, tolerance) > 100 ? 1 : 0;
@@ -231,13 +233,13 @@ TEST(RegionOfInterest, EveryOperatorThatReadsAPartMakesThatPartTheSame) {
   }
 }
 
-// === Whole graphs
+// === Complete graphs
 
 std::vector<std::string> words(const std::string& text) {
   std::vector<std::string> all;
   std::istringstream in(text);
   for (std::string word; in >> word;) {
-    std::replace(word.begin(), word.end(), '_', ' ');  // within a word
+    std::replace(word.begin(), word.end(), '_', ' ');  // blank within a word
     all.push_back(word);
   }
   return all;
@@ -254,8 +256,9 @@ class Demands : public support::ShellTest {
   }
   std::string path(const char* name) { return (folder_ / name).string(); }
 
-  /// Runs the chain both ways. @return what was run with parts
-  /// @param tolerance  of values, voxels; 0: the same bytes
+  /// Runs the chain with and without regions of interest.
+  /// @param tolerance  of values, voxels; 0: equal bytes
+  /// @return report of the run with regions of interest
   pipeline::RunReport expectSame(const std::string& chain, const char* extension,
                                  double tolerance = 0) {
     const std::string part = path("part") + extension, whole = path("whole") + extension;
@@ -280,14 +283,14 @@ class Demands : public support::ShellTest {
   }
 };
 
-TEST_F(Demands, OffsetAndClipAskForTheBoxAndTheBandThatTheyRead) {
+TEST_F(Demands, OffsetAndClipRequestTheBoxAndTheBandTheyRead) {
   const pipeline::RunReport report = expectSame(
       "sphere --radius 2 --voxel 0.05 --half-width 20 ! offset 0.5 ! clip --box "
       "1.5,-0.5,-0.5_3,0.5,0.5 ! mesh",
       ".ply");
   ASSERT_EQ(report.steps.size(), 5u);
   EXPECT_EQ(report.steps[0].halfWidth, 6);
-  const double rim = (20 + 2) * 0.05;  // voxels of the band, of which a seam reads all
+  const double rim = (20 + 2) * 0.05;  // voxels of the band; a seam reads all of them
   EXPECT_EQ(report.steps[1].roi.region,
             Box3d(V3d(1.5, -0.5, -0.5) - V3d(rim), V3d(3, 0.5, 0.5) + V3d(rim)));
   EXPECT_EQ(report.steps[2].halfWidth, 1.5);
@@ -296,8 +299,8 @@ TEST_F(Demands, OffsetAndClipAskForTheBoxAndTheBandThatTheyRead) {
   EXPECT_LT(report.steps[0].activeVoxels, 0.3 * whole.steps[0].activeVoxels);
 }
 
-TEST_F(Demands, WhatShowsNoSurfaceInTheBoxIsMadeWhole) {
-  // The box lies within the ball: of that no surface is needed, but its inside is.
+TEST_F(Demands, ValuesWithoutSurfaceInTheBoxAreComputedCompletely) {
+  // The box lies inside the ball. It contains no surface, but it is inside.
   expectSame("sphere --radius 2 --voxel 0.1 ! clip --box -0.5,-0.5,-0.5_0.5,0.5,0.5 ! mesh",
              ".ply");
   expectSame("sphere --radius 2 --voxel 0.1 ! offset 0.3 ! clip --box -1,-1,-1_1,1,1 ! mesh",
@@ -305,8 +308,8 @@ TEST_F(Demands, WhatShowsNoSurfaceInTheBoxIsMadeWhole) {
   expectSame("sphere --radius 2 --voxel 0.1 ! clip --box 5,5,5_6,6,6 ! mesh", ".ply");
 }
 
-TEST_F(Demands, PartsOfLargeSolidsKeepTheirInsides) {
-  // Nodes of a tree without any of the band have both sides in them where a part ends.
+TEST_F(Demands, RegionsOfLargeSolidsKeepTheirInsides) {
+  // At the end of a region, tree nodes without band voxels contain both sides.
   for (const char* chain :
        {"sphere --radius 3 --voxel 0.05 ! clip --box -2,-2,-2_4,2,2 ! clip --box "
         "-1,-1,-1_4.2,1,1 ! mesh",
@@ -324,8 +327,9 @@ TEST_F(Demands, PartsOfLargeSolidsKeepTheirInsides) {
   }
 }
 
-TEST_F(Demands, PartsThatAreCutWithinTheSolidKeepTheirSigns) {
-  // OpenVDB's own union floods signs from where a node of 128³ begins, which may be such a cut.
+TEST_F(Demands, RegionsThatEndInsideTheSolidKeepTheirSigns) {
+  // OpenVDB's union flood-fills signs from the origin of a node of 128³, which may be at the end of
+  // a region.
   const std::string rod = "capsule --from .4,-9,.4 --to .4,12,.4 --radius .8 --voxel .1 ! ",
                     clip = "clip --box -1,6,-1_6,7,3";
   for (const char* action :
@@ -348,7 +352,7 @@ TEST_F(Demands, MeshesHaveTheSameTrianglesInTheSameOrder) {
                ".ply");
 }
 
-TEST_F(Demands, OpenMeshesAreMadeWhole) {
+TEST_F(Demands, OpenMeshesAreConvertedCompletely) {
   std::ofstream file(path("open.off"));
   constexpr int kRows = 16, kColumns = 32, kTop = 10;  // a ball without its cap
   file << "OFF\n" << (kTop + 1) * kColumns << " " << 2 * kTop * kColumns << " 0\n";
@@ -372,7 +376,7 @@ TEST_F(Demands, OpenMeshesAreMadeWhole) {
   expectSame(made + "clip --box -0.5,-0.5,-2_0.5,0.5,0.5 ! mesh", ".ply");
 }
 
-TEST_F(Demands, PicturesAskForWhatTheFrameSees) {
+TEST_F(Demands, PicturesRequestTheVisibleRegion) {
   const std::string solid = "torus --radius 2 --tube 0.6 --voxel 0.05 ! ",
                     view = " --from 2,0.1,6 --to 2.1,0,0 --fov 9 --size 160x120 --samples 2 ";
   const auto draw = [&](const char* name, const std::string& look, bool whole) {
@@ -380,7 +384,7 @@ TEST_F(Demands, PicturesAskForWhatTheFrameSees) {
   };
   const auto shareMade = [&](const std::string& look) {
     const auto part = draw("part.exr", look, false), whole = draw("whole.exr", look, true);
-    // The kernel counts from where its tables begin, which shows in last bits.
+    // The kernel's coordinates start at its tables, which affects the last bits.
     const bool isExact = look.find("cpu") == std::string::npos;
     const render::ImageComparison found = render::compareImages(
         render::readExr(path("part.exr")), render::readExr(path("whole.exr")), {.exact = isExact});
@@ -392,13 +396,13 @@ TEST_F(Demands, PicturesAskForWhatTheFrameSees) {
                            "--style tone --ortho 0.5 --renderer cpu",
                            "--style ink --curvature-range 3 --filter bspline-qi --renderer cpu"})
     EXPECT_LT(shareMade(look), 0.25) << look;
-  // These are by the size of the whole, or lit from beside the frame.
+  // These depend on the size of the complete solid, or on light from beside the frame.
   for (const char* look : {"--style ink", "--style mean --curvature-range 3", "",
                            "--style tone --value-bits 16 --renderer cpu"})
     EXPECT_EQ(shareMade(look), 1) << look;
 }
 
-TEST_F(Demands, ErrorsAreMeasuredWhereThereIsABandToMeasure) {
+TEST_F(Demands, ErrorsAreMeasuredInsideTheBandOnly) {
   const std::string chain = " torus --radius 2 --tube 0.6 --voxel 0.1 ! mesh ! write t.ply";
   const auto errorsOf = [&](const std::string& options) {
     EXPECT_EQ(levelsmith("--report r.json " + options + chain).code, 0);
@@ -410,11 +414,11 @@ TEST_F(Demands, ErrorsAreMeasuredWhereThereIsABandToMeasure) {
   EXPECT_GT(part[0][0]["value"], 0);
 }
 
-TEST_F(Demands, PlansAreRefusedAndToldBeforeAnythingRuns) {
+TEST_F(Demands, PlansAreRefusedAndReportedBeforeTheRun) {
   const std::string needle =
       "sphere --radius 2 --voxel 0.002 ! clip --box \"1.9,-0.05,-0.05 2.1,0.05,0.05\" ! write "
       "a.vdb";
-  // The whole would take more than a GB.
+  // The complete solid would take more than a GB.
   const auto told = levelsmith("--max-memory 200M --explain " + needle);
   EXPECT_EQ(told.code, 0) << told.err;
   EXPECT_NE(told.out.find("; only 1.8"), std::string::npos) << told.out;
@@ -423,7 +427,7 @@ TEST_F(Demands, PlansAreRefusedAndToldBeforeAnythingRuns) {
   EXPECT_TRUE(exists("a.vdb"));
   EXPECT_EQ(levelsmith("--max-memory 200M --whole " + needle).code, 4);
 
-  // Of a mesh a part is made, too.
+  // A mesh has a region of interest too.
   ASSERT_EQ(levelsmith("sphere --radius 2 --voxel 0.1 ! mesh ! write s.ply").code, 0);
   const std::string part =
       "read s.ply ! level-set --voxel 0.003 ! clip --box \"1.9,-0.05,-0.05 2.1,0.05,0.05\" ! write "
@@ -457,8 +461,8 @@ TEST_F(Demands, PlansAreRefusedAndToldBeforeAnythingRuns) {
   EXPECT_FALSE(exists("r.json"));
 }
 
-TEST_F(Demands, PlansTellWhatActionsTake) {
-  // What is made of a part takes less, and what takes its operand whole takes the same.
+TEST_F(Demands, PlansReportTheMemoryOfActions) {
+  // Actions on a region take less memory. Actions that read their complete operand take the same.
   const auto plan = [&](const std::string& chain) {
     const auto told = levelsmith("--explain " + chain);
     EXPECT_EQ(told.code, 0) << told.err;
@@ -495,8 +499,9 @@ TEST_F(Demands, PlansTellWhatActionsTake) {
   EXPECT_GT(figure(masked, "mesh", " MB; "), 0) << masked;
 }
 
-TEST_F(Demands, FilesThatAnActionBehindWritesAreNotReadAgain) {
-  // What is refused of a part is tried whole, when the file is another already.
+TEST_F(Demands, FilesWrittenByLaterActionsAreNotReadAgain) {
+  // An action that fails on a region is retried on the complete value. By then the file has
+  // changed.
   const std::string file = "sphere --radius 2 --voxel .05 ! write a.vdb",
                     chain =
                         "read a.vdb --as m ! sphere --radius .3 --center 1.6,0,0 --voxel .05 "
@@ -512,13 +517,13 @@ TEST_F(Demands, FilesThatAnActionBehindWritesAreNotReadAgain) {
   EXPECT_EQ(told[2], told[0]);
 }
 
-TEST_F(Demands, FilesThatAnActionBeforeWritesAreReadAsItLeavesThem) {
+TEST_F(Demands, FilesAreReadAsEarlierActionsLeaveThem) {
   for (const char* file : {"a.ply", "a.vdb"}) {
     const std::string solid = std::string(file) == "a.vdb" ? " " : " ! mesh ";
     ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.1" + solid + "! write " + file).code, 0);
     const std::string chain = std::string("box --size 1,2,3 --voxel 0.1") + solid + "! write " +
                               file + " ! read ./" + file + " ! measure --json";
-    const auto again = levelsmith(chain);  // a ball is there before
+    const auto again = levelsmith(chain);  // the file contains a ball at first
     ASSERT_EQ(again.code, 0) << again.err;
     std::filesystem::remove(path(file));
     const auto fresh = levelsmith(chain);
@@ -546,7 +551,8 @@ TEST_F(Demands, GraphsOfAnyShapeGiveTheSameFiles) {
     for (int i = 0; i < 4; ++i) {
       const char* const ops[] = {"union",  "difference", "intersection", "transform",   "offset",
                                  "smooth", "open",       "shell",        "reinitialize"};
-      const std::string op = ops[random() % (seed % 2 ? 9 : 4)];  // every other one to the bit
+      // Every other graph is compared to the bit.
+      const std::string op = ops[random() % (seed % 2 ? 9 : 4)];
       std::string step = op;
       const std::string length = " " + std::to_string(between(random, 0.11, 0.25));
       if (op == "offset")

@@ -28,7 +28,7 @@ pipeline::RunReport runDrawn(const std::string& chain) {
   return support::runWords(chain, {.measureErrors = true, .thumbnails = 100});
 }
 
-/// Of what came of a run, but for what it cost.
+/// The report of a run without its costs.
 pipeline::RunReport withoutCosts(pipeline::RunReport report) {
   for (pipeline::StepReport& step : report.steps)
     step.wallSeconds = step.cpuSeconds = step.peakBytes = 0;
@@ -37,11 +37,12 @@ pipeline::RunReport withoutCosts(pipeline::RunReport report) {
   return report;
 }
 
-/// Well-formed, of Unicode, without a network or scripts, and told to those who see no pictures.
+/// Expects a well-formed Unicode page without network access or scripts, and with text alternatives
+/// for pictures.
 void expectSound(const std::string& source) {
   const HtmlPage page(source);
   EXPECT_EQ(page.fault(), "");
-  EXPECT_NO_THROW((void)Json(source).dump());  // refuses what is no UTF-8
+  EXPECT_NO_THROW((void)Json(source).dump());  // throws unless the text is valid UTF-8
   for (const char* name : {"script", "link", "iframe", "object", "form"})
     EXPECT_TRUE(page.all(name).empty()) << name;
   for (const HtmlTag& image : page.all("img")) {
@@ -70,7 +71,7 @@ std::string fromBase64(const std::string& text) {
   return bytes;
 }
 
-/// Of a page, in order.
+/// Pictures of a page, in order.
 std::vector<std::string> picturesOf(const std::string& source) {
   const std::string start = "data:image/png;base64,";
   std::vector<std::string> pictures;
@@ -79,7 +80,7 @@ std::vector<std::string> picturesOf(const std::string& source) {
   return pictures;
 }
 
-/// A picture of a shaded thing: of the right size, with much of it covered by many colours.
+/// Expects a picture of a shaded object: the right size, and many colours over a large part.
 void expectPicture(const std::string& png) {
   const support::TemporaryFolder folder;
   support::writeText(folder / "a.png", png);
@@ -97,7 +98,7 @@ void expectPicture(const std::string& png) {
   EXPECT_LT(covered, image.pixels.size());
 }
 
-TEST(HtmlText, EncodesAsTheStandardSays) {
+TEST(HtmlText, EncodesLikeTheStandard) {
   const std::vector<std::pair<std::string, std::string>> vectors = {{"", ""},
                                                                     {"f", "Zg=="},
                                                                     {"fo", "Zm8="},
@@ -109,13 +110,14 @@ TEST(HtmlText, EncodesAsTheStandardSays) {
   EXPECT_EQ(apps::base64(std::string("\x00\xFF\x10", 3)), "AP8Q");
 }
 
-TEST(HtmlText, KeepsUnicodeAndReplacesTheRest) {
+TEST(HtmlText, KeepsUnicodeAndReplacesInvalidBytes) {
   const std::string kMark = "\xEF\xBF\xBD";
   EXPECT_EQ(apps::escapedHtml("a<b>&\"'"), "a&lt;b&gt;&amp;&quot;&#39;");
   for (const std::string good :
        {"größe ≤ 3", "\xF0\x9F\x8D\xA9", "\xED\x9F\xBF", "\xF4\x8F\xBF\xBF"})
     EXPECT_EQ(apps::escapedHtml(good), good);
-  // A lone continuation, overlong forms, a surrogate, beyond Unicode, cut off.
+  // A lone continuation byte, overlong forms, a surrogate, a value beyond Unicode, and a truncated
+  // sequence.
   for (const std::string bad : {"\x80", "\xC0\xAF", "\xE0\x80\xAF", "\xED\xA0\x80",
                                 "\xF4\x90\x80\x80", "\xE2\x82", "\xF0\x9F\x8D", "\xFF"})
     EXPECT_TRUE(apps::escapedHtml(bad).starts_with(kMark)) << Json(apps::base64(bad));
@@ -123,7 +125,7 @@ TEST(HtmlText, KeepsUnicodeAndReplacesTheRest) {
   EXPECT_EQ(apps::escapedHtml("\xE2\x82<"), kMark + kMark + "&lt;");
 }
 
-TEST(ReportPage, TellsEveryStepOfARun) {
+TEST(ReportPage, ReportsEveryStepOfARun) {
   const support::TemporaryFolder folder;
   const std::string file = (folder / "a.ply").string();
   const std::string source = pipeline::reportPage(
@@ -143,11 +145,11 @@ TEST(ReportPage, TellsEveryStepOfARun) {
   EXPECT_TRUE(page.says("\"closed\": true"));
   EXPECT_TRUE(page.says("levelsmith run graph.json"));
   EXPECT_TRUE(page.says("\"op\": \"level-set\""));
-  EXPECT_EQ(page.all("tbody").size(), 6u + 1);  // and that of the versions
+  EXPECT_EQ(page.all("tbody").size(), 6u + 1);  // and the row of the versions
   EXPECT_EQ(page.all("img").size(), 5u);
 }
 
-TEST(ReportPage, HoldsTheGraphAsAFile) {
+TEST(ReportPage, ContainsTheGraphAsAFile) {
   const pipeline::RunReport report = runDrawn("sphere --radius 1 --voxel 0.2 --as ball");
   const std::string start = "data:application/json;base64,";
   const std::vector<HtmlTag> links = HtmlPage(pipeline::reportPage(report)).all("a");
@@ -157,7 +159,7 @@ TEST(ReportPage, HoldsTheGraphAsAFile) {
   EXPECT_EQ(Json::parse(graph)["nodes"][0]["as"], "ball");
 }
 
-TEST(ReportPage, EscapesWhatOthersWrote) {
+TEST(ReportPage, EscapesTextFromOthers) {
   const std::string evil = "\"><script>alert('1')</script>&amp;\n' onerror='x\xFF\x01";
   const std::string shown =
       "\"><script>alert('1')</script>&amp;\n' onerror='x\xEF\xBF\xBD\xEF\xBF\xBD";
@@ -187,12 +189,12 @@ TEST(ReportPage, EscapesWhatOthersWrote) {
   const std::string source = pipeline::reportPage(report);
   expectSound(source);
   const HtmlPage page(source);
-  // 4 + 1 + 2 + 2 + 2 + 2 of each step; one reason against a picture; the rest once.
+  // 4 + 1 + 2 + 2 + 2 + 2 for each step, one reason for a missing picture, and the rest once.
   EXPECT_EQ(page.countOf(shown), 2 * 13u + 1 + 4 + 6);
   EXPECT_NE(page.all("img").at(0).attributes.at("alt").find(shown), std::string::npos);
 }
 
-TEST(ReportPage, WritesActionsAsAShellTakesThem) {
+TEST(ReportPage, WritesActionsAsAShellAcceptsThem) {
   pipeline::RunReport report;
   const auto add = [&](const std::string& action, std::map<std::string, std::string> parameters) {
     report.steps.emplace_back();
@@ -210,7 +212,7 @@ TEST(ReportPage, WritesActionsAsAShellTakesThem) {
   EXPECT_TRUE(page.says("offset -0.2"));
 }
 
-TEST(ReportPage, ShowsWhatWasMadeBesideWhatWasNeeded) {
+TEST(ReportPage, ShowsComputedAndNeededRegions) {
   const support::TemporaryFolder folder;
   const std::string file = (folder / "a.ply").string();
   const std::string chain =
@@ -235,7 +237,7 @@ TEST(ReportPage, ShowsWhatWasMadeBesideWhatWasNeeded) {
                                     sphere.roi.halfWidth * 0.1)));
   EXPECT_TRUE(page.says(fmt::format("{:.6g}, {:.6g}, {:.6g}", sphere.roi.region.min.x,
                                     sphere.roi.region.min.y, sphere.roi.region.min.z)));
-  // Of a band that was made for itself nothing less is needed.
+  // A band computed for itself is needed completely.
   const HtmlPage whole(pipeline::reportPage(runDrawn("sphere --radius 1 --voxel 0.1")));
   EXPECT_TRUE(whole.says("±3 vx = ±0.3all"));
   EXPECT_FALSE(whole.says("the box from"));
@@ -252,7 +254,7 @@ TEST(ReportPage, DrawsLevelSetsMeshesAndScenes) {
   EXPECT_EQ(pictures[2], pictures[3]);  // a scene of the sphere alone
 }
 
-TEST(ReportPage, SaysWhyThereIsNoPicture) {
+TEST(ReportPage, StatesWhyAPictureIsMissing) {
   const auto missing = [](const pipeline::Value& value,
                           std::size_t memory = levelset::kNoMemoryLimit) {
     const pipeline::Thumbnail picture = pipeline::thumbnailOf(value, memory);
@@ -273,7 +275,7 @@ TEST(ReportPage, SaysWhyThereIsNoPicture) {
   EXPECT_TRUE(page.says("no picture: a field has no thumbnail"));
 }
 
-TEST(ReportPage, DrawsAsManyAsAskedFor) {
+TEST(ReportPage, DrawsTheRequestedNumberOfPictures) {
   const std::string chain = "sphere --radius 1 --voxel 0.2 ! offset 0.1";
   const auto drawn = [&](std::size_t count, bool dryRun) {
     const std::string page =
@@ -287,13 +289,13 @@ TEST(ReportPage, DrawsAsManyAsAskedFor) {
   EXPECT_EQ(drawn(9, true), 0u);
 }
 
-TEST(ReportPage, IsTheSameForTheSameRun) {
+TEST(ReportPage, IsEqualForEqualRuns) {
   const std::string chain = "torus --radius 2 --tube 0.7 --voxel 0.1 ! offset 0.1 ! mesh";
   const auto page = [&] { return pipeline::reportPage(withoutCosts(runDrawn(chain))); };
   EXPECT_EQ(page(), page());
 }
 
-TEST(ReportPage, TellsOfADryRun) {
+TEST(ReportPage, ReportsADryRun) {
   const std::string source = pipeline::reportPage(
       support::runWords("sphere --radius 1 --voxel 0.1 ! offset 1vx", {.dryRun = true}));
   expectSound(source);
@@ -304,7 +306,7 @@ TEST(ReportPage, TellsOfADryRun) {
   EXPECT_FALSE(page.says("picture"));
 }
 
-TEST(ReportPage, TellsWhatAToleranceCameTo) {
+TEST(ReportPage, ReportsTheResultOfATolerance) {
   const support::ToleranceRun run =
       support::runToTolerance("1%", "sphere --radius 1 ! mesh", {.thumbnails = 100});
   ASSERT_EQ(run.refusal, "");
@@ -345,7 +347,7 @@ TEST(ReportPage, NamesTheVersionsOfItsParts) {
 
 class ReportPageCommand : public support::ShellTest {};
 
-TEST_F(ReportPageCommand, IsWrittenOfARunThatFails) {
+TEST_F(ReportPageCommand, IsWrittenForAFailedRun) {
   writeFile("broken.ply", "ply\nformat ascii 1.0\nend_header\n");
   const auto outcome = levelsmith(
       "--report r.html sphere --radius 1 --voxel 0.1 ! write a.vdb ! read broken.ply ! measure");
@@ -362,7 +364,7 @@ TEST_F(ReportPageCommand, IsWrittenOfARunThatFails) {
   expectPicture(picturesOf(source)[0]);
 }
 
-TEST_F(ReportPageCommand, ShowsNamesThatAreHostile) {
+TEST_F(ReportPageCommand, EscapesHostileNames) {
   const auto outcome = levelsmith(
       "--report 'r.html' sphere --radius 1 --voxel 0.2 ! write $'<b>\"\\xff&lt;.vdb' ! measure");
   ASSERT_EQ(outcome.code, 0) << outcome.err;
@@ -371,7 +373,7 @@ TEST_F(ReportPageCommand, ShowsNamesThatAreHostile) {
   EXPECT_TRUE(HtmlPage(source).says("write '<b>\"\xEF\xBF\xBD&lt;.vdb'"));
 }
 
-TEST_F(ReportPageCommand, TellsWhatIsOfAnEarlierRun) {
+TEST_F(ReportPageCommand, ReportsResultsOfAnEarlierRun) {
   const std::string chain =
       "--cache kept --report r.html sphere --radius 1 --voxel 0.1 ! offset 0.1 ! write ";
   ASSERT_EQ(levelsmith(chain + "a.vdb").code, 0);
@@ -380,11 +382,11 @@ TEST_F(ReportPageCommand, TellsWhatIsOfAnEarlierRun) {
   const std::string source = support::slurp(folder_ / "r.html");
   expectSound(source);
   EXPECT_EQ(HtmlPage(source).countOf("from an earlier run"), 2u);
-  ASSERT_EQ(picturesOf(source).size(), 1u);  // of what was taken from there
+  ASSERT_EQ(picturesOf(source).size(), 1u);  // the picture of the cached result
   expectPicture(picturesOf(source)[0]);
 }
 
-TEST_F(ReportPageCommand, TellsWhereInAScriptAStepStands) {
+TEST_F(ReportPageCommand, ReportsTheScriptLineOfAStep) {
   writeFile("a.pipeline",
             "sphere --radius 1 --voxel 0.2\n\nmeasure\ntorus --radius 2 --tube 1 --voxel 0.5\n");
   ASSERT_EQ(levelsmith("--report r.html run a.pipeline").code, 0);

@@ -148,7 +148,7 @@ TEST(TaskScheduler, RespectsEveryDependency) {
   for (int round = 0; round < 300; ++round) {
     const std::size_t count = 1 + random() % 30;
     std::vector<Task> tasks(count);
-    std::vector<int> outcomes(count, 0);  // 1: is left, 2: fails
+    std::vector<int> outcomes(count, 0);  // 1: skipped, 2: fails
     for (std::size_t i = 0; i < count; ++i) {
       for (std::size_t before = 0; before < i; ++before)
         if (random() % 6 == 0) tasks[i].dependencies.push_back(before);
@@ -254,7 +254,8 @@ TEST(TaskScheduler, DoesNotRunFarAhead) {
                                 ++taken;
                                 return true;
                               }
-                              const int now = ++made;  // before it asks what is taken
+                              // Incremented before the check of the consumed count.
+                              const int now = ++made;
                               raise(most, now - taken);
                               return true;
                             },
@@ -300,7 +301,7 @@ TEST_F(Branches, GiveTheResultsOfOneThread) {
   }
 }
 
-TEST_F(Branches, StopAtTheFirstErrorWithAllBeforeItDone) {
+TEST_F(Branches, StopAtTheFirstErrorWithAllEarlierStepsDone) {
   const std::string chain = balls(3) +
                             " ! sphere --radius 1 --voxel 0.05 ! offset -2 ! write bad.vdb"
                             " ! sphere --radius 1 --voxel 0.05 ! write after.vdb";

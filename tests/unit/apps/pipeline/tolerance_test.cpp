@@ -26,7 +26,7 @@ std::filesystem::path modelPath(const char* name) {
   return std::filesystem::path(LEVELSMITH_DATA_DIR) / "models" / name;
 }
 
-/// Counts how often the true error is below a tenth of what was asked for.
+/// Counts how often the true error is below a tenth of the requested tolerance.
 class Tally {
  public:
   void add(const support::ToleranceRun& run, double truth) {
@@ -43,7 +43,7 @@ class Tally {
   int all_ = 0, low_ = 0;
 };
 
-TEST(Tolerance, IsKeptBySphereAndTorus) {
+TEST(Tolerance, IsMetBySphereAndTorus) {
   Tally tally;
   for (const char* asked : {"2%", "0.5%", "0.1%", "0.02", "0.003"}) {
     const support::ToleranceRun ball = runToTolerance(asked, "sphere --radius 1 ! mesh");
@@ -54,7 +54,7 @@ TEST(Tolerance, IsKeptBySphereAndTorus) {
   EXPECT_TRUE(tally.mostAreNear());
 }
 
-TEST(Tolerance, IsKeptByWhatTheChainMakes) {
+TEST(Tolerance, IsMetByChainsOfOperators) {
   Tally tally;
   for (const char* asked : {"1%", "0.2%"}) {
     const support::ToleranceRun grown =
@@ -97,7 +97,7 @@ TEST(Tolerance, HoldsForTheZeroSetOfALevelSetToo) {
   EXPECT_GE(worst, 0.0004);
 }
 
-TEST(Tolerance, IsKeptByTheBunny) {
+TEST(Tolerance, IsMetByTheBunny) {
   const std::filesystem::path file = modelPath("bunny.obj");
   if (!std::filesystem::exists(file)) GTEST_SKIP() << "no models";
   const levelset::TriMesh exact = levelset::readMesh(file);
@@ -111,7 +111,8 @@ TEST(Tolerance, IsKeptByTheBunny) {
   EXPECT_TRUE(tally.mostAreNear());
 }
 
-/// Against the same chain with voxels of a quarter. @param chain  HERE stands for the voxel size
+/// Compares with the same chain at a quarter of the voxel size.
+/// @param chain  HERE stands for the voxel size
 void addAgainstFinerRun(const std::string& asked, const std::string& chain, Tally& tally) {
   const auto with = [&](const std::string& voxel) {
     return std::string(chain).replace(chain.find("HERE"), 4, voxel);
@@ -122,7 +123,7 @@ void addAgainstFinerRun(const std::string& asked, const std::string& chain, Tall
                      run.mesh, support::meshOf(with("--voxel " + std::to_string(fine))), fine));
 }
 
-TEST(SlowTolerance, IsKeptByTheBunnyFinely) {
+TEST(SlowTolerance, IsMetByTheBunnyFinely) {
   const std::filesystem::path file = modelPath("bunny.obj");
   if (!std::filesystem::exists(file)) GTEST_SKIP() << "no models";
   Tally tally;
@@ -135,8 +136,8 @@ TEST(SlowTolerance, IsKeptByTheBunnyFinely) {
   EXPECT_TRUE(tally.mostAreNear());
 }
 
-// Its mesh has parts inside of the solid, so that a finer run is the truth.
-TEST(SlowTolerance, IsKeptByTheDragon) {
+// Its mesh has parts inside the solid, so that a finer run serves as truth.
+TEST(SlowTolerance, IsMetByTheDragon) {
   const std::filesystem::path file = modelPath("dragon_vrip_res4.ply.gz");
   if (!std::filesystem::exists(file)) GTEST_SKIP() << "no models";
   Tally tally;
@@ -145,11 +146,11 @@ TEST(SlowTolerance, IsKeptByTheDragon) {
   EXPECT_TRUE(tally.mostAreNear());
 }
 
-TEST(Tolerance, TellsCreasesApart) {
+TEST(Tolerance, SeparatesErrorsAtCreases) {
   const support::ToleranceRun box = runToTolerance("0.01", "box --size 2,1.5,1.1 ! mesh");
   ASSERT_EQ(box.exitCode, 0) << box.refusal;
   const double h = box.told().voxelSize;
-  EXPECT_LE(h, 0.04);  // not as large as the flat faces alone would let it be
+  EXPECT_LE(h, 0.04);  // smaller than the flat faces alone would require
   EXPECT_LT(box.output().achieved, 1e-6);
   EXPECT_GT(box.output().crease, 0.1 * h);
   EXPECT_LT(box.output().crease, 2 * h);
@@ -159,7 +160,7 @@ TEST(Tolerance, TellsCreasesApart) {
   const support::ToleranceRun pair = runToTolerance(
       "0.01", "sphere --radius 1 ! sphere --radius 1 --center 1.2,0,0 ! union ! mesh");
   ASSERT_EQ(pair.exitCode, 0) << pair.refusal;
-  double worst = 0;  // of the triangles, away from the seam
+  double worst = 0;  // largest error of the triangles away from the seam
   for (const V3d& p : pair.mesh.positions)
     if (std::abs(p.x - 0.6) > 3 * pair.told().voxelSize)
       worst = std::max(worst, std::abs(std::min(p.length(), (p - V3d(1.2, 0, 0)).length()) - 1));
@@ -174,7 +175,7 @@ TEST(Tolerance, OfAMeshIsMeasuredAgainstIt) {
                      "OFF\n8 6 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n"
                      "4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n");
   const std::string chain = "read " + file + " ! level-set ! mesh";
-  // Its edges included, as far as memory goes.
+  // Includes its edges, within the memory limit.
   const support::ToleranceRun whole = runToTolerance("0.01", chain);
   ASSERT_EQ(whole.exitCode, 0) << whole.refusal;
   EXPECT_TRUE(whole.output().isMeasured);
@@ -188,7 +189,7 @@ TEST(Tolerance, OfAMeshIsMeasuredAgainstIt) {
   EXPECT_GT(flat.output().crease, 0.0005);
 }
 
-TEST(Tolerance, CountsWhatDecimationAdds) {
+TEST(Tolerance, IncludesTheErrorOfDecimation) {
   const std::string solid = "sphere --radius 1 ! mesh";
   const support::ToleranceRun uniform = runToTolerance("0.01", solid),
                               adaptive = runToTolerance("0.01", solid + " --adaptivity 0.5");
@@ -197,7 +198,7 @@ TEST(Tolerance, CountsWhatDecimationAdds) {
   EXPECT_LE(adaptive.told().voxelSize, uniform.told().voxelSize);
 }
 
-TEST(Tolerance, LeavesVoxelSizesThatAreGiven) {
+TEST(Tolerance, KeepsGivenVoxelSizes) {
   const support::TemporaryFolder folder;
   const std::string file = (folder / "both.ply").string();
   const pipeline::RunReport report = support::runWords(
@@ -214,7 +215,7 @@ TEST(Tolerance, LeavesVoxelSizesThatAreGiven) {
   EXPECT_SAYS(limited.refusal, "--voxel 0.3");
 }
 
-TEST(Tolerance, ThatCannotBeReachedLeavesTheBest) {
+TEST(Tolerance, KeepsTheBestResultIfUnreachable) {
   pipeline::RunSettings settings;
   settings.maxMemory = std::size_t{200} << 20;
   const support::ToleranceRun run = runToTolerance("1e-6", "sphere --radius 1 ! mesh", settings);
@@ -257,7 +258,7 @@ TEST(Tolerance, Refuses) {
               "writes files while it computes its result");
 }
 
-TEST(Tolerance, StaysWithTheGraph) {
+TEST(Tolerance, IsStoredInTheGraph) {
   const pipeline::Graph graph =
       pipeline::parseChain(support::wordsOf("--tolerance 0.5% sphere --radius 1 ! measure"));
   const std::string json = pipeline::graphJson(graph);
@@ -277,7 +278,7 @@ TEST(Tolerance, StaysWithTheGraph) {
               "must be positive");
 }
 
-TEST(ErrorModels, NameCasesOfTheSuite) {
+TEST(ErrorModels, NameCasesOfTheRegressionSuite) {
   for (const char* action : {"sphere", "level-set", "union", "offset", "smooth", "mesh"}) {
     const pipeline::ErrorModel& model = pipeline::errorModel(action);
     EXPECT_STREQ(model.action, action);
@@ -290,15 +291,15 @@ TEST(ErrorModels, NameCasesOfTheSuite) {
 TEST(ErrorModels, PickTheFirstVoxelSize) {
   const pipeline::Graph graph = pipeline::parseChain(
       support::wordsOf("--tolerance 0.01 sphere --radius 4 ! torus --radius 4 --tube 1 ! union"));
-  // 0.35 h²/R, as measured.
+  // 0.35 h²/R, a measured constant.
   EXPECT_NEAR(pipeline::modelVoxelSize(graph.nodes[0], 0.01), std::sqrt(0.01 * 4 / 0.35), 1e-12);
   EXPECT_NEAR(pipeline::modelVoxelSize(graph.nodes[1], 0.01), std::sqrt(0.01 / 0.35), 1e-12);
-  EXPECT_EQ(pipeline::modelVoxelSize(graph.nodes[2], 0.01), 0);  // nobody told a radius
+  EXPECT_EQ(pipeline::modelVoxelSize(graph.nodes[2], 0.01), 0);  // no radius is known
 }
 
 class ToleranceCommand : public support::ShellTest {};
 
-TEST_F(ToleranceCommand, ReportsWhatItDid) {
+TEST_F(ToleranceCommand, ReportsItsSteps) {
   const auto outcome = levelsmith(
       "-v --report r.json --tolerance 0.3% torus --radius 1 --tube 0.3 --as ring ! offset @ring "
       "0.1 --as fat ! write @ring a.vdb ! write @fat b.vdb ! measure @fat");
@@ -333,14 +334,14 @@ TEST_F(ToleranceCommand, RunsScriptsAndGraphs) {
   EXPECT_NE(open.err.find("--tolerance"), std::string::npos) << open.err;
 }
 
-TEST_F(ToleranceCommand, TellsInADryRunWhatTheModelsPick) {
+TEST_F(ToleranceCommand, ReportsTheModelsChoiceInADryRun) {
   const auto told = levelsmith("--dry-run --tolerance 0.1% sphere --radius 1 ! write no.vdb");
   EXPECT_EQ(told.code, 0) << told.err;
   EXPECT_NE(told.err.find("the error models choose voxels of"), std::string::npos) << told.err;
   EXPECT_FALSE(exists("no.vdb"));
 }
 
-TEST_F(ToleranceCommand, EndsWithFiveAndTheBestWhereMemoryEnds) {
+TEST_F(ToleranceCommand, ExitsWithFiveAndTheBestResultIfMemoryIsShort) {
   const auto outcome = levelsmith(
       "--max-memory 150M --report r.json --tolerance 1e-7 sphere --radius 1 ! write best.vdb");
   EXPECT_EQ(outcome.code, 5) << outcome.err;

@@ -1,4 +1,4 @@
-// The nearest of many points and triangles, against looking at each.
+// Compares the nearest of many points and triangles with a linear search.
 
 #include "levelset/geometry/box_tree.h"
 
@@ -32,7 +32,8 @@ Vec3d rounded(const Vec3d& p) {
   return {std::round(p[0]), std::round(p[1]), std::round(p[2])};
 }
 
-/// Clouds, flat ones, some on a grid with many as far as each other, and many in one place.
+/// Random clouds: some flat, some on a grid with many equal distances, some with many points at one
+/// position.
 std::vector<Vec3d> somePoints(Random& random, const Vec3d& about) {
   std::vector<Vec3d> points;
   const int count = 1 + static_cast<int>(random() % 300), kind = static_cast<int>(random() % 4);
@@ -106,8 +107,8 @@ TEST(TriangleTree, FindsTheNearestPoint) {
   }
 }
 
-/// Splitting planes alone look at all points of a flat surface that is as far as it is wide.
-TEST(BoxTree, LooksAtFewPointsOfAFarFlatSurface) {
+/// Splitting planes alone would visit all points of a flat surface whose distance equals its width.
+TEST(BoxTree, VisitsFewPointsOfAFarFlatSurface) {
   constexpr int kSide = 200;
   std::vector<Vec3d> points;
   for (int x = 0; x < kSide; ++x)

@@ -30,7 +30,7 @@ using support::refusal;
 using support::TemporaryFolder;
 using support::writeText;
 
-/// A tetrahedron that carries everything.
+/// Tetrahedron with all attributes.
 TriMesh dressed(CoordinatePrecision precision, ColorPrecision colors, bool hasAlpha) {
   TriMesh mesh;
   mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0.25, -2.25}};
@@ -66,7 +66,7 @@ void expectEqual(const TriMesh& a, const TriMesh& b, const std::string& name) {
 
 // === Files
 
-TEST(MeshAttributes, FilesKeepThemToTheBit) {
+TEST(MeshAttributes, FilesKeepAttributesToTheBit) {
   const TemporaryFolder folder;
   for (const auto precision : {CoordinatePrecision::Float, CoordinatePrecision::Double})
     for (const auto colors : {ColorPrecision::Byte, ColorPrecision::Float})
@@ -79,7 +79,7 @@ TEST(MeshAttributes, FilesKeepThemToTheBit) {
       }
 }
 
-TEST(MeshAttributes, EachAloneSurvives) {
+TEST(MeshAttributes, EachAttributeAloneIsKept) {
   const TemporaryFolder folder;
   const TriMesh all = dressed(CoordinatePrecision::Double, ColorPrecision::Byte, false);
   for (int kept = 0; kept < 3; ++kept) {
@@ -97,7 +97,7 @@ TEST(MeshAttributes, EachAloneSurvives) {
   EXPECT_EQ(describe(all.attributes), "normals, texture coordinates and colours");
 }
 
-TEST(MeshAttributes, AllBytesOfColoursComeBack) {
+TEST(MeshAttributes, AllByteValuesOfColoursAreKept) {
   // Text in OBJ, then bytes again in PLY.
   const TemporaryFolder folder;
   TriMesh mesh;
@@ -113,7 +113,7 @@ TEST(MeshAttributes, AllBytesOfColoursComeBack) {
   EXPECT_EQ(readMesh(folder / "a.ply").attributes.colors, mesh.attributes.colors);
 }
 
-TEST(MeshAttributes, PlyOfOtherProgramsIsUnderstood) {
+TEST(MeshAttributes, PlyOfOtherProgramsIsRead) {
   const TriMesh mesh = parse(
       "a.ply",
       "ply\nformat ascii 1.0\nelement vertex 3\nproperty uchar red\nproperty float x\n"
@@ -132,7 +132,7 @@ TEST(MeshAttributes, PlyOfOtherProgramsIsUnderstood) {
   EXPECT_FALSE(mesh.attributes.hasAlpha);
 }
 
-TEST(MeshAttributes, HalfAGroupIsNone) {
+TEST(MeshAttributes, IncompleteGroupsAreIgnored) {
   const TriMesh mesh =
       parse("a.ply",
             "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
@@ -143,7 +143,7 @@ TEST(MeshAttributes, HalfAGroupIsNone) {
   EXPECT_TRUE(mesh.attributes.isEmpty());
 }
 
-TEST(MeshAttributes, GarbageIsRefusedWithItsPlace) {
+TEST(MeshAttributes, InvalidValuesAreRefusedWithTheirPosition) {
   const auto ply = [](const char* type, const char* names, const std::string& values) {
     std::string header =
         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
@@ -179,7 +179,7 @@ TEST(MeshAttributes, GarbageIsRefusedWithItsPlace) {
             1u);
 }
 
-TEST(MeshAttributes, ListsThatDoNotFitAreRefused) {
+TEST(MeshAttributes, ListsOfWrongLengthAreRefused) {
   const TemporaryFolder folder;
   const TriMesh mesh = dressed(CoordinatePrecision::Float, ColorPrecision::Byte, false);
   TriMesh bad = mesh;
@@ -199,7 +199,8 @@ TEST(MeshAttributes, ListsThatDoNotFitAreRefused) {
 }
 
 TEST(MeshAttributes, ObjSplitsVerticesAtSeams) {
-  // Two triangles that share an edge; its ends have two normals each and one of them two uvs.
+  // Two triangles that share an edge. Both ends of the edge have two normals, and one end has two
+  // texture coordinates.
   const TriMesh mesh = parse("a.obj",
                              "v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0 0 0 1\nv 1 1 0\nvt 0 0\nvt 1 1\n"
                              "vn 0 0 1\nvn 0 0 2\nvn 7 7 7\n"
@@ -211,14 +212,14 @@ TEST(MeshAttributes, ObjSplitsVerticesAtSeams) {
             (std::vector<V3d>{{0, 0, 1}, {0, 0, 1}, {0, 0, 1}, {0, 0, 2}, {0, 0, 2}, {0, 0, 2}}));
   EXPECT_EQ(mesh.attributes.uvs,
             (std::vector<V2d>{{0, 0}, {0, 0}, {0, 0}, {0, 0}, {0, 0}, {1, 1}}));
-  // White where there is no colour; a split vertex has that of its own.
+  // Vertices without a colour are white; a split vertex keeps the colour of the original.
   EXPECT_EQ(
       mesh.attributes.colors,
       (std::vector<V4f>{
           {1, 0, 0, 1}, {1, 1, 1, 1}, {0, 0, 1, 1}, {1, 1, 1, 1}, {0, 0, 1, 1}, {1, 1, 1, 1}}));
 }
 
-/// A cube with a normal to each face, as polygons: seams along all edges.
+/// A cube with a normal for each face, as polygons. All edges are seams.
 std::string cubeObj() {
   return "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n"
          "vn 0 0 -1\nvn 0 0 1\nvn 0 -1 0\nvn 0 1 0\nvn -1 0 0\nvn 1 0 0\n"
@@ -226,7 +227,7 @@ std::string cubeObj() {
          "f 3//4 7//4 8//4 4//4\nf 1//5 5//5 7//5 3//5\nf 2//6 4//6 8//6 6//6\n";
 }
 
-TEST(MeshAttributes, SeamsDoNotOpenASolid) {
+TEST(MeshAttributes, SeamsKeepASolidClosed) {
   const TriMesh mesh = parse("a.obj", cubeObj()),
                 bare = parse("a.obj", cubeObj(), {.attributes = false});
   EXPECT_EQ(bare.positions.size(), 8u);
@@ -246,8 +247,8 @@ TEST(MeshAttributes, SeamsDoNotOpenASolid) {
   EXPECT_EQ(band.band.contentHash(), plain.band.contentHash());
 }
 
-TEST(MeshAttributes, ManyPairsAtOneVertexAreQuick) {
-  // A fan whose hub has a texture coordinate to each face.
+TEST(MeshAttributes, ManyPairsAtOneVertexAreFast) {
+  // A fan whose hub has a texture coordinate for each face.
   std::string text = "v 0 0 0\n";
   const int count = 20000;
   for (int i = 0; i < count; ++i)
@@ -263,7 +264,7 @@ TEST(MeshAttributes, ManyPairsAtOneVertexAreQuick) {
 
 // === Transforms
 
-TEST(MeshAttributes, TransformKeepsNormalsAcross) {
+TEST(MeshAttributes, TransformKeepsNormalsPerpendicular) {
   const TriMesh mesh = parse("a.obj", cubeObj());
   M44d matrix;
   matrix.setScale(V3d(2, 0.5, -1));  // mirrors
@@ -290,19 +291,21 @@ TEST(MeshAttributes, TransformKeepsNormalsAcross) {
 TEST(MeshAttributes, CarriedNormalsSurviveAnyScale) {
   const V3d n(1, 2, -3);
   for (const double scale : {1e-150, 1.0, 1e150})
-    EXPECT_LT((levelset::transformedNormal(n * scale,
-                                       {V3d(scale, 0, 0), V3d(0, scale, 0), V3d(0, 0, scale)}, 1) -
+    EXPECT_LT((levelset::transformedNormal(
+                   n * scale, {V3d(scale, 0, 0), V3d(0, scale, 0), V3d(0, 0, scale)}, 1) -
                n.normalized())
                   .length(),
               1e-15);
-  // A thin map is no flat one.
-  EXPECT_EQ(levelset::transformedNormal({1, 0, 0}, {V3d(1, 0, 0), V3d(0, 1e-9, 0), V3d(0, 0, 1e-9)}, 1),
-            V3d(1, 0, 0));
-  EXPECT_EQ(levelset::transformedNormal({0, 0, 1}, {V3d(1, 2, 0.1), V3d(3, 6, 0.3), V3d(0, 0, 1)}, 1),
-            V3d(0));
+  // A map with a small extent in one direction is not flat.
+  EXPECT_EQ(
+      levelset::transformedNormal({1, 0, 0}, {V3d(1, 0, 0), V3d(0, 1e-9, 0), V3d(0, 0, 1e-9)}, 1),
+      V3d(1, 0, 0));
+  EXPECT_EQ(
+      levelset::transformedNormal({0, 0, 1}, {V3d(1, 2, 0.1), V3d(3, 6, 0.3), V3d(0, 0, 1)}, 1),
+      V3d(0));
 }
 
-TEST(MeshAttributes, AppendKeepsWhatBothCarry) {
+TEST(MeshAttributes, AppendKeepsCommonAttributes) {
   TriMesh all;
   const TriMesh mesh = dressed(CoordinatePrecision::Float, ColorPrecision::Byte, false);
   append(all, mesh);

@@ -24,7 +24,7 @@ using support::refusal;
 using support::TemporaryFolder;
 using support::writeText;
 
-/// The cube [0, 1]³ with a normal to each face: seams along all edges.
+/// The cube [0, 1]³ with a normal for each face. All edges are seams.
 TriMesh cube() {
   return parse("a.obj",
                "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n"
@@ -41,7 +41,7 @@ void expectCubes(const TriMesh& mesh, std::size_t count) {
   EXPECT_NEAR(m.volume, static_cast<double>(count), 1e-12);
 }
 
-TEST(MeshSeams, AreClosedWhereTheirAttributesAreDropped) {
+TEST(MeshSeams, AreClosedWhenAttributesAreDropped) {
   const TemporaryFolder folder;
   ASSERT_EQ(cube().positions.size(), 24u);
   levelset::writeMesh(folder / "c.off", cube());
@@ -56,7 +56,7 @@ TEST(MeshSeams, AreClosedWhereTheirAttributesAreDropped) {
   EXPECT_EQ(readMesh(folder / "c.ply").positions.size(), 24u);
 }
 
-TEST(MeshSeams, OfPartsThatTouchStayApart) {
+TEST(MeshSeams, OfTouchingPartsStayApart) {
   const auto with = [](std::initializer_list<V3d> places) {
     TriMesh mesh;
     for (const V3d& place : places) append(mesh, transform(cube(), M44d().setTranslation(place)));
@@ -72,8 +72,8 @@ TEST(MeshSeams, OfPartsThatTouchStayApart) {
   }
 }
 
-TEST(MeshSeams, OfClosedMeshesThatTouchAreNotTouched) {
-  // Nothing to close: two balls that share points, with normals of their vertices.
+TEST(MeshSeams, OfTouchingClosedMeshesAreKept) {
+  // No seam to close: two balls that share points, with vertex normals.
   TriMesh mesh = support::sphereMesh(1, V3d(0), 8), other = support::sphereMesh(1, V3d(0, 0, 2), 8);
   mesh.attributes.normals.assign(mesh.positions.size(), V3d(0, 0, 1));
   other.attributes.normals.assign(other.positions.size(), V3d(0, 0, 1));
@@ -82,8 +82,8 @@ TEST(MeshSeams, OfClosedMeshesThatTouchAreNotTouched) {
   EXPECT_EQ(measure(mesh).components, 2u);
 }
 
-TEST(MeshSeams, FinsAndFlippedFacesAreTold) {
-  // Every triangle with corners and normals of its own.
+TEST(MeshSeams, FinsAndFlippedFacesAreReported) {
+  // Every triangle with its own corners and normals.
   const auto soup = [](const std::vector<std::array<V3d, 3>>& triangles) {
     TriMesh mesh;
     for (const auto& t : triangles) {
@@ -104,7 +104,7 @@ TEST(MeshSeams, FinsAndFlippedFacesAreTold) {
 }
 
 TEST(MeshSeams, ObjSplitsByValue) {
-  // Each corner has a vt and a vn of its own, all equal at a vertex.
+  // Each corner has its own vt and vn, all equal at a vertex.
   const TriMesh mesh = parse("a.obj",
                              "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n"
                              "vt 0 0\nvt 1 0\nvt 0 1\nvt 1 0\nvt 1 1\nvt 0 1\n"
@@ -116,7 +116,7 @@ TEST(MeshSeams, ObjSplitsByValue) {
 }
 
 TEST(MeshSeams, MemoryOfSplitsIsBounded) {
-  // A strip of 4000 faces, each with texture coordinates of its own: 4002 vertices become 12000.
+  // A strip of 4000 faces, each with its own texture coordinates. 4002 vertices become 12000.
   std::string text;
   const int count = 4000;
   for (int i = 0; i < count + 2; ++i) text += fmt::format("v {} {} 0\n", i, i % 2);
@@ -124,7 +124,7 @@ TEST(MeshSeams, MemoryOfSplitsIsBounded) {
   for (int i = 1; i <= count; ++i)
     text += fmt::format("f {1}/{0} {2}/{0} {3}/{0}\n", i, i, i + 1, i + 2);
   EXPECT_EQ(parse("a.obj", text).positions.size(), 12000u);
-  // Less than text, the values of both lists and the final lists take together.
+  // Less than the sum of the text, the values of both lists and the final lists.
   EXPECT_THROW((void)parse("a.obj", text, {.maxMemory = text.size() + 12000 * (16 + 8 + 16)}),
                levelset::ResourceLimit);
   EXPECT_EQ(parse("a.obj", text, {.maxMemory = 8 << 20}).positions.size(), 12000u);
@@ -143,7 +143,7 @@ std::string ply(const std::string& properties, const std::string& values,
   return text + "3 0 1 2" + behind + "\n";
 }
 
-TEST(MeshSeams, PlyTakesTheFirstWholePairOfTextureCoordinates) {
+TEST(MeshSeams, PlyUsesTheFirstCompletePairOfTextureCoordinates) {
   const auto uvOf = [](const std::string& names, const std::string& values) {
     std::string properties;
     for (std::size_t i = 0; i < names.size(); i += 2)
@@ -157,7 +157,7 @@ TEST(MeshSeams, PlyTakesTheFirstWholePairOfTextureCoordinates) {
   EXPECT_EQ(uvOf("s v", "1 2"), V2d(-1));
 }
 
-TEST(MeshSeams, PlyBeyondItsTypesIsRefused) {
+TEST(MeshSeams, PlyWithUnknownTypesIsRefused) {
   const std::string normal = "property float nx\nproperty double ny\nproperty float nz\n";
   EXPECT_SAYS(refusal<InvalidInput>([&] { (void)parse("a.ply", ply(normal, "1e39 0 1")); }),
               "1e+39 exceeds the range");
@@ -173,7 +173,7 @@ TEST(MeshSeams, PlyBeyondItsTypesIsRefused) {
               "the element 'vertex' occurs twice");
 }
 
-TEST(MeshSeams, WhatIsLeftAsideIsTold) {
+TEST(MeshSeams, IgnoredPropertiesAreReported) {
   std::vector<std::string> told;
   (void)parse("a.ply",
               ply("", "",
@@ -193,7 +193,7 @@ TEST(MeshSeams, WhatIsLeftAsideIsTold) {
   EXPECT_TRUE(told.empty());
 }
 
-TEST(MeshSeams, AppendedMeshesAreAsCoarseAsTheCoarser) {
+TEST(MeshSeams, AppendedMeshesUseTheCoarserPrecision) {
   TriMesh all = support::sphereMesh(1, V3d(0), 4), coarse = all;
   all.spacing = 1e-9;
   coarse.precision = levelset::CoordinatePrecision::Float;

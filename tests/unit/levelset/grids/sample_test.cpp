@@ -12,7 +12,8 @@ namespace sample_test {
 using namespace levelset;
 using Imath::V3d;
 
-/// Turned, scaled by h and moved, so that index and world differ in every way that a band allows.
+/// A rotation, a scaling by h and a translation, so that index and world space differ in every way
+/// a band permits.
 Imath::M44d skewedPlacement(double h) {
   Imath::M44d scale, turn, move;
   scale.setScale(h);
@@ -21,7 +22,7 @@ Imath::M44d skewedPlacement(double h) {
   return scale * turn * move;
 }
 
-/// Every grid point of a cube about the index origin is active and samples `phi`.
+/// Cube about the index origin in which every grid point is active and samples `phi`.
 NarrowBand sampleCube(const std::function<double(const V3d&)>& phi, const Imath::M44d& placement) {
   const auto transform =
       openvdb::math::Transform::createLinearTransform(openvdb::math::Mat4d(&placement[0][0]));
@@ -72,7 +73,7 @@ TEST(Sample, TricubicReproducesQuadrics) {
   }
 }
 
-TEST(Sample, GradientIsTheSlopeOfTheValue) {
+TEST(Sample, GradientIsTheDerivativeOfTheValue) {
   const Imath::M44d placement = skewedPlacement(0.5);
   const NarrowBand band =
       sampleCube([](const V3d& p) { return std::sin(p.x) + p.y * p.z; }, placement);
@@ -125,18 +126,18 @@ TEST(Sample, IsConstantOutsideTheBand) {
     EXPECT_EQ(sampler.gradient(V3d(0)), V3d(0));
     EXPECT_EQ(sampler.normal(V3d(0)), V3d(0));
     EXPECT_TRUE(std::isnan(sampler.value(V3d(std::nan(""), 0, 0))));
-    // Moved, the sampler still holds the band.
+    // After a move the new sampler owns the band.
     BandSampler moved = std::move(sampler);
     EXPECT_NEAR(moved.value(V3d(1, 0, 0)), 0, 1e-3 * 0.05);
   }
 }
 
-TEST(Sample, TellsWhichPositionsAllSamplesCover) {
+TEST(Sample, ReportsWhichPositionsAllSamplesCover) {
   const double h = 0.125;
   NarrowBand band = sampleCube([](const V3d& p) { return p.x; }, Imath::M44d().setScale(h));
   editVdb(band).tree().setValueOff(openvdb::Coord(6, 6, 6), 1.0f);
   const BandSampler linear(band), cubic(band, Interpolation::Tricubic);
-  // Against the definition, over cells within one leaf and across leaves.
+  // Compared with the definition, over cells within one leaf and across leaves.
   for (const openvdb::Coord& c : openvdb::CoordBBox(openvdb::Coord(2), openvdb::Coord(12))) {
     const V3d p = (toImath(c.asVec3d()) + V3d(0.5)) * h;
     const auto holds = [&](int before, int after) {

@@ -31,7 +31,7 @@ std::string failures(const CheckReport& report) {
   return names;
 }
 
-TEST(Check, PassesSoundShape) {
+TEST(Check, AcceptsSoundShapes) {
   const CheckReport report = checkGrid(sphereGrid());
   EXPECT_EQ(failures(report), "");
   EXPECT_TRUE(report.passed());
@@ -39,7 +39,7 @@ TEST(Check, PassesSoundShape) {
   EXPECT_LT(report.eikonalMean, 0.01);
 }
 
-TEST(Check, PassesKinksAndNarrowBands) {
+TEST(Check, AcceptsCreasesAndNarrowBands) {
   const auto box = [](const Imath::V3d& p) {
     const Imath::V3d q(std::abs(p.x) - 6.3, std::abs(p.y) - 2.2, std::abs(p.z) - 4.4);
     const Imath::V3d outer(std::max(q.x, 0.), std::max(q.y, 0.), std::max(q.z, 0.));
@@ -52,7 +52,8 @@ TEST(Check, PassesKinksAndNarrowBands) {
   }
 }
 
-// One grid plane is inside: beside it, the difference towards the surface is that across the plate.
+// One grid plane is inside. The difference beside it towards the surface is the difference across
+// the plate.
 TEST(Check, MeasuresPlatesThinnerThanAVoxel) {
   const auto plate = [](double scale) {
     return [=](const Imath::V3d& p) {
@@ -69,7 +70,7 @@ TEST(Check, MeasuresPlatesThinnerThanAVoxel) {
     EXPECT_GT(check(support::sampleBand(plate(scale), extent, 1)).eikonalMean, 0.1) << scale;
 }
 
-TEST(Check, TakesNoiseForNoDistance) {
+TEST(Check, RejectsNoise) {
   std::mt19937 random(1);
   std::uniform_real_distribution<float> value(-1.5f, 1.5f);
   auto grid = sphereGrid();
@@ -93,7 +94,7 @@ TEST(Check, FindsVoxelsThatAreNotCubes) {
 
 TEST(Check, FindsBackground) {
   auto grid = sphereGrid();
-  grid->transform().preScale(10);  // three voxels become a third
+  grid->transform().preScale(10);  // a background of three voxels becomes a third of a voxel
   EXPECT_NE(failures(checkGrid(grid)).find("positive background;"), std::string::npos);
 }
 
@@ -135,7 +136,7 @@ TEST(Check, FindsWrongSlope) {
   EXPECT_EQ(failures(checkGrid(grid)), "unit slope at the zero set;eikonal residual;");
 }
 
-TEST(Check, SaysThatThereIsNoGrid) {
+TEST(Check, ReportsAMissingGrid) {
   EXPECT_FALSE(check(NarrowBand()).passed());
 }
 

@@ -33,7 +33,7 @@ NarrowBand block(const V3d& half, const V3d& centre, double voxelSize) {
       {centre - half, centre + half}, voxelSize);
 }
 
-TEST(Compare, FindsNothingBetweenEquals) {
+TEST(Compare, FindsNoDifferenceBetweenEquals) {
   const NarrowBand a = ball(12, V3d(0.3, 0.1, -0.2), 1);
   const Comparison c = compare(a, a);
   EXPECT_LT(c.hausdorff(), 1e-3);
@@ -41,7 +41,7 @@ TEST(Compare, FindsNothingBetweenEquals) {
   EXPECT_LT(c.symmetricDifference, 1e-9);
 }
 
-TEST(Compare, FindsNothingBetweenEqualsWithEdges) {
+TEST(Compare, FindsNoDifferenceBetweenEqualsWithEdges) {
   for (const V3d& centre : {V3d(0), V3d(0.31, -0.17, 0.43)}) {
     const NarrowBand cube = block(V3d(10), centre, 1);
     NarrowBand turned = transform(cube, Imath::M44d().setEulerAngles(V3d(0.3, 0.5, 0.7)));
@@ -54,7 +54,7 @@ TEST(Compare, FindsNothingBetweenEqualsWithEdges) {
   }
 }
 
-TEST(Compare, KnowsConcentricSpheres) {
+TEST(Compare, MeasuresConcentricSpheres) {
   for (const double gap : {0.01, 0.4, 6.0}) {
     const Comparison c = compare(ball(20, V3d(0.2), 1), ball(20 + gap, V3d(0.2), 1));
     for (const double found : {c.hausdorffAtoB, c.hausdorffBtoA, c.meanAtoB, c.meanBtoA})
@@ -64,20 +64,24 @@ TEST(Compare, KnowsConcentricSpheres) {
   }
 }
 
-TEST(Compare, KnowsShiftedSpheresOnDifferentGrids) {
-  // ∫ |‖R n + d‖ − R| over a sphere: R² − …; Hausdorff both ways is the shift.
+TEST(Compare, MeasuresShiftedSpheresOnDifferentGrids) {
+  // ∫
+  // ‖R n + d‖ − R
+  //  over a sphere is R² − …. Both Hausdorff distances equal the shift.
   const double radius = 10, shift = 2.5;
   const NarrowBand a = ball(radius, V3d(0), 0.5);
   for (const double voxelSize : {0.5, 0.4, 0.8}) {
     const Comparison c = compare(a, ball(radius, V3d(shift, 0, 0), voxelSize));
     EXPECT_NEAR(c.hausdorffAtoB, shift, 0.01);
     EXPECT_NEAR(c.hausdorffBtoA, shift, 0.01);
-    // Both means: |√(R² + s² − 2 R s u) − R| for u uniform in [−1, 1], by substitution.
+    // Both means:
+    // √(R² + s² − 2 R s u) − R
+    //  for u uniform in [−1, 1], by substitution.
     const auto part = [&](double u) {
       const double r = std::sqrt(radius * radius + shift * shift - 2 * radius * shift * u);
       return -(r * r * r / 3 - radius * r * r / 2) / (radius * shift);
     };
-    const double middle = shift / (2 * radius);  // where r = R
+    const double middle = shift / (2 * radius);  // position at which r = R
     const double mean = (part(middle) - part(-1) - (part(1) - part(middle))) / 2;
     EXPECT_NEAR(c.meanAtoB, mean, 5e-3);
     EXPECT_NEAR(c.meanBtoA, mean, 5e-3);
@@ -88,16 +92,17 @@ TEST(Compare, KnowsShiftedSpheresOnDifferentGrids) {
   }
 }
 
-TEST(Compare, TellsDirectionsApart) {
-  // A box and the same with a spike on top: all of the first is near the second.
+TEST(Compare, DistinguishesTheTwoDirections) {
+  // A box, and the same box with a spike on top. All of the first box is near the second solid.
   const NarrowBand a = block(V3d(10), V3d(0), 0.5), b = block(V3d(10, 10, 14), V3d(0, 0, 4), 0.5);
   const Comparison c = compare(a, b);
-  EXPECT_NEAR(c.hausdorffAtoB, 8, 0.05);  // its top, from inside the second's: to the walls or top
+  // From the first box's top, inside the second solid, to the walls or the top of the spike.
+  EXPECT_NEAR(c.hausdorffAtoB, 8, 0.05);
   EXPECT_NEAR(c.hausdorffBtoA, 8, 0.05);
   EXPECT_NEAR(c.symmetricDifference, 8 * 20 * 20, 0.01 * 8 * 20 * 20);
   const NarrowBand small = ball(1.5, V3d(20, 0, 0), 0.5);
   const Comparison apart = compare(a, small);
-  EXPECT_NEAR(apart.hausdorffBtoA, 11.5, 0.05);  // between two samples of a small ball
+  EXPECT_NEAR(apart.hausdorffBtoA, 11.5, 0.05);  // measured between two samples of a small ball
   EXPECT_NEAR(apart.hausdorffAtoB, V3d(30, 10, 10).length() - 1.5, 0.6);
   EXPECT_NEAR(apart.symmetricDifference, 8000 + 4 * pi / 3 * 3.375, 0.002 * 8000);
 }

@@ -24,7 +24,7 @@ double torusDistance(const V3d& p, double radius, double tube) {
   return std::hypot(std::hypot(p.x, p.y) - radius, p.z) - tube;
 }
 
-/// Solid sphere with a cavity in which another solid floats.
+/// Solid sphere with a cavity that contains another solid.
 NarrowBand nested(double h) {
   return support::sampleBand(
       [](const V3d& p) {
@@ -36,9 +36,9 @@ NarrowBand nested(double h) {
 
 TriMesh tetrahedron();
 
-TEST(Measure, TellsTheTiniestVoidsFromSolids) {
-  // One grid point within a ball, or far from it, barely on the other side: what bends so much has
-  // no volume to speak of.
+TEST(Measure, DistinguishesTinyCavitiesFromSolids) {
+  // One grid point inside a ball, or far from it, has a small value of the other sign. A surface of
+  // such curvature has a negligible volume.
   for (const float value : {1e-4f, 0.01f, 0.1f, 0.4f, 0.9f}) {
     for (const bool isVoid : {true, false}) {
       NarrowBand ball = sphere(8, 1, V3d(0.3, 0.2, 0.1));
@@ -83,8 +83,9 @@ TEST(Measure, SphereConvergesFourthOrder) {
   EXPECT_GT(std::log2(error[0][2] / error[1][2]), 1.8);
 }
 
-/// Exact moments of inertia of a torus with unit density about its axis and across it.
-TEST(Measure, KnowsCentroidAndInertia) {
+/// Compares with the exact moments of inertia of a torus of unit density about its axis and across
+/// it.
+TEST(Measure, MeasuresCentroidAndInertia) {
   const double radius = 12, tube = 5, volume = 2 * pi * pi * radius * tube * tube;
   const V3d centre(0.3, -2.6, 7.1);
   const NarrowBand torus =
@@ -99,7 +100,7 @@ TEST(Measure, KnowsCentroidAndInertia) {
   EXPECT_NEAR(m.inertia[0][1], 0, 1e-4 * across);
   EXPECT_NEAR(m.meanCurvature, 2 * pi * pi * radius, 5e-3 * 2 * pi * pi * radius);
 
-  // The same in voxels of 0.1 and turned a quarter about z.
+  // The same torus in voxels of 0.1, rotated by 90 degrees about z.
   auto grid = vdb(torus).deepCopy();
   for (auto it = grid->beginValueAll(); it; ++it) it.setValue(*it * 0.1f);
   grid->setTransform(openvdb::math::Transform::createLinearTransform(
@@ -110,7 +111,7 @@ TEST(Measure, KnowsCentroidAndInertia) {
   EXPECT_NEAR(small.meanCurvature, 0.1 * m.meanCurvature, 1e-6 * m.meanCurvature);
 }
 
-TEST(Measure, KnowsMomentsOfBoxes) {
+TEST(Measure, MeasuresMomentsOfBoxes) {
   const V3d half(9, 12, 15.5), centre(1, 2, 3);
   const NarrowBand box = support::sampleBand(
       [&](const V3d& p) {
@@ -122,7 +123,7 @@ TEST(Measure, KnowsMomentsOfBoxes) {
       {centre - half, centre + half}, 1);
   const double volume = 8 * half.x * half.y * half.z;
   const double curvature = pi / 2 * 2 * (half.x + half.y + half.z);  // ½ Σ length × π/2 of 12 edges
-  // A band's edges are cut off by their cells, half a voxel² of them: nearly 1 % here.
+  // The cells of a band round its edges by half a voxel² of the cross-section, nearly 1 % here.
   const std::array<std::pair<Measurement, double>, 2> cases = {
       {{measure(box), 2e-2}, {measure(bandToMesh(box, {.sharp = true})), 1e-3}}};
   for (const auto& [m, tolerance] : cases) {
@@ -134,7 +135,7 @@ TEST(Measure, KnowsMomentsOfBoxes) {
   }
 }
 
-TEST(Measure, TellsTopologyOfTorusAndNestedShells) {
+TEST(Measure, ReportsTopologyOfTorusAndNestedComponents) {
   const Measurement torus =
       measure(support::sampleBand([](const V3d& p) { return torusDistance(p, 12, 5); },
                                   {V3d(-17, -17, -5), V3d(17, 17, 5)}, 1));
@@ -152,7 +153,7 @@ TEST(Measure, TellsTopologyOfTorusAndNestedShells) {
   EXPECT_NEAR(shells.volume, exact, 3e-3 * exact);
 }
 
-TEST(Measure, KnowsFiguresOfTheBand) {
+TEST(Measure, ReportsFiguresOfTheBand) {
   const NarrowBand band = sphere(5, 0.5, V3d(1, 2, 3));
   const Measurement m = measure(band);
   EXPECT_EQ(m.activeVoxels, band.activeVoxelCount());
@@ -180,7 +181,7 @@ TEST(Measure, IsTheSameFarFromOrigin) {
 }
 
 TEST(Measure, AgreesWithItsMesh) {
-  // The mesh lies inside the curved surface by a quarter of the curvature at most.
+  // The mesh lies inside the curved surface by at most a quarter of the curvature.
   const NarrowBand band = nested(1);
   const Measurement ofBand = measure(band), ofMesh = measure(bandToMesh(band));
   EXPECT_NEAR(ofBand.volume, ofMesh.volume, 5e-3 * ofBand.volume);
@@ -227,7 +228,7 @@ TEST(Manifoldness, CountsEachDefect) {
   EXPECT_EQ(manifoldness(fin).nonManifoldEdges, 1u);
   EXPECT_EQ(manifoldness(fin).boundaryEdges, 2u);
 
-  TriMesh bowTie = tetrahedron();  // a second one that shares vertex 0
+  TriMesh bowTie = tetrahedron();  // a second tetrahedron that shares vertex 0
   for (const V3d& p : {V3d(-1, 0, 0), V3d(0, -1, 0), V3d(0, 0, -1)}) bowTie.positions.push_back(p);
   for (const auto& t : tetrahedron().triangles) {
     const auto moved = [](std::uint32_t v) { return v ? v + 3 : 0; };

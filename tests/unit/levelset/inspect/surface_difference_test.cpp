@@ -30,18 +30,18 @@ SurfaceDifference differ(const TriMesh& a, const TriMesh& b, double spacing,
 }
 
 TEST(SurfaceDifference, OfConcentricSpheresIsThatOfTheirRadii) {
-  // Triangles of both are inside of their spheres by up to 0.35 h²/R.
+  // Triangles of both spheres lie inside them by up to 0.35 h²/R.
   const double h = 0.05, sag = 0.35 * h * h;
   EXPECT_NEAR(differ(sphere(1, h), sphere(1.2, h), h).smooth, 0.2, 2 * sag);
 }
 
-TEST(SurfaceDifference, IsTheSameBothWaysAndNothingOfASurfaceAndItself) {
+TEST(SurfaceDifference, IsSymmetricAndZeroForEqualSurfaces) {
   const TriMesh a = sphere(1, 0.1), b = sphere(0.9, 0.07, V3d(0.2, 0, 0.1));
   EXPECT_EQ(differ(a, b, 0.05).smooth, differ(b, a, 0.05).smooth);
-  EXPECT_LT(differ(a, a, 0.05).smooth, 1e-9);  // what slivers leave
+  EXPECT_LT(differ(a, a, 0.05).smooth, 1e-9);  // contribution of slivers
 }
 
-TEST(SurfaceDifference, FindsWhatOnlyOneOfThemHas) {
+TEST(SurfaceDifference, FindsPartsOnOneSurfaceOnly) {
   TriMesh both = sphere(1, 0.1);
   append(both, sphere(0.3, 0.1, V3d(3, 0, 0)));
   EXPECT_NEAR(differ(both, sphere(1, 0.1), 0.1).smooth, 2.3, 0.02);
@@ -60,8 +60,9 @@ TEST(SurfaceDifference, DistancesAreThoseToTheNearestTriangle) {
           (closestOnTriangle(p, mesh.positions[a], mesh.positions[b], mesh.positions[c]).point - p)
               .length());
     EXPECT_NEAR(surface.distance(p, 1e100), nearest, 1e-12);
-    EXPECT_NEAR(surface.distance(p, nearest), nearest, 1e-12);      // the limit is met
-    EXPECT_NEAR(surface.distance(p, nearest / 2), nearest, 1e-12);  // and one that is wrong
+    EXPECT_NEAR(surface.distance(p, nearest), nearest, 1e-12);  // equals the limit
+    // Also correct for a limit that is too small.
+    EXPECT_NEAR(surface.distance(p, nearest / 2), nearest, 1e-12);
   }
 }
 
@@ -71,12 +72,12 @@ TEST(SurfaceDifference, HasTheSameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(support::onThreads(1, measure), support::onThreads(4, measure));
 }
 
-TEST(SurfaceDifference, RefusesNoSurface) {
+TEST(SurfaceDifference, RefusesEmptySurfaces) {
   EXPECT_SAYS(support::refusal<InvalidInput>([] { (void)TriangleSurface(TriMesh()); }),
               "no surface");
 }
 
-TEST(SurfaceDifference, TellsApartWhatIsBesideCreases) {
+TEST(SurfaceDifference, SeparatesErrorsBesideCreases) {
   const TriMesh a = sphere(1, 0.1), b = sphere(1.1, 0.1);
   const SurfaceDifference all = differ(a, b, 0.1, {V3d(0)}, 5);
   EXPECT_EQ(all.smooth, 0);
@@ -90,7 +91,7 @@ TEST(SurfaceDifference, TellsApartWhatIsBesideCreases) {
 
 double edgeDistance(const V3d& p, const V3d& half) {
   const V3d d(half.x - std::abs(p.x), half.y - std::abs(p.y), half.z - std::abs(p.z));
-  // From the nearest edge: across the two sides that are least far.
+  // Distance from the nearest edge, across the two sides with the smallest distances.
   std::array<double, 3> sides{std::abs(d.x), std::abs(d.y), std::abs(d.z)};
   std::sort(sides.begin(), sides.end());
   return std::hypot(sides[0], sides[1]);
@@ -105,7 +106,7 @@ TEST(Creases, OfABoxAreItsEdges) {
   ASSERT_FALSE(creases.empty());
   for (const V3d& p : creases)
     EXPECT_LT(edgeDistance(p - V3d(0.011, 0.007, 0.013), size / 2), 2.5 * h);
-  // Each part of an edge has one beside it.
+  // Each section of an edge has a crease beside it.
   for (double t = -0.9; t < 0.9; t += 0.05) {
     const V3d onEdge = V3d(t, 0.8, 0.6) + V3d(0.011, 0.007, 0.013);
     double nearest = 1e300;
@@ -114,7 +115,7 @@ TEST(Creases, OfABoxAreItsEdges) {
   }
 }
 
-TEST(Creases, AreNotFoundOnWhatIsRound) {
+TEST(Creases, AreNotFoundOnRoundSurfaces) {
   for (const double h : {0.2, 0.1, 0.05}) {
     const TriMesh fine = bandToMesh(makeTorus(1, 0.4, V3d(0), V3d(0, 0, 1), h)),
                   coarse = bandToMesh(makeTorus(1, 0.4, V3d(0), V3d(0, 0, 1), 2 * h));

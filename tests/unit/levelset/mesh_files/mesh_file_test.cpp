@@ -39,7 +39,7 @@ TriMesh tetrahedron(CoordinatePrecision precision = CoordinatePrecision::Float) 
   return mesh;
 }
 
-/// Each triangle as nine numbers, rotated so that the least corner leads, sorted.
+/// Triangles as nine numbers each, rotated so that the smallest corner leads, and sorted.
 std::vector<std::array<double, 9>> canonical(const TriMesh& mesh) {
   std::vector<std::array<double, 9>> result;
   for (const auto& t : mesh.triangles) {
@@ -57,7 +57,7 @@ std::vector<std::array<double, 9>> canonical(const TriMesh& mesh) {
 
 // === Round trips
 
-TEST(MeshFile, WritesWhatItReads) {
+TEST(MeshFile, PreservesMeshesThroughWritingAndReading) {
   const TemporaryFolder folder;
   for (const auto precision : {CoordinatePrecision::Float, CoordinatePrecision::Double}) {
     const TriMesh mesh = tetrahedron(precision);
@@ -83,7 +83,7 @@ TEST(MeshFile, WritesStlAndMergesItsVertices) {
   EXPECT_EQ(std::filesystem::file_size(folder / "a.stl"), 84u + 4 * 50);
 }
 
-TEST(MeshFile, RefusesStlWhereSinglePrecisionIsTooCoarse) {
+TEST(MeshFile, RefusesStlIfSinglePrecisionIsTooCoarse) {
   const TemporaryFolder folder;
   TriMesh far = tetrahedron(CoordinatePrecision::Double);
   for (auto& p : far.positions) p.x += 1e8;
@@ -93,7 +93,7 @@ TEST(MeshFile, RefusesStlWhereSinglePrecisionIsTooCoarse) {
     EXPECT_THROW(levelset::writeMesh(folder / "far.stl", *mesh), levelset::InvalidInput);
     EXPECT_FALSE(std::filesystem::exists(folder / "far.stl"));
   }
-  // What came from single precision goes back as it was.
+  // Coordinates that came from single precision are written unchanged.
   far.precision = CoordinatePrecision::Float;
   levelset::writeMesh(folder / "far.stl", far);
   EXPECT_TRUE(std::filesystem::exists(folder / "far.stl"));
@@ -147,8 +147,8 @@ void appendAs(std::string& bytes, const std::string& type, double value, bool bi
   ADD_FAILURE() << "unknown type " << type;
 }
 
-/// The tetrahedron with a stranger's properties, another element before the faces, and one of its
-/// faces joined to a list of no corners.
+/// PLY of the tetrahedron with unknown properties, another element before the faces, and a fifth
+/// face with an empty list of corners.
 std::string strangePly(const std::string& count, const std::string& index, const std::string& real,
                        bool bigEndian) {
   std::string ply = fmt::format(
@@ -214,7 +214,7 @@ TEST(MeshFile, ReadsAsciiPly) {
   EXPECT_EQ(parse("a.ply", kAsciiPly.substr(0, kAsciiPly.size() - 1)).triangles, mesh.triangles);
 }
 
-TEST(MeshFile, RefusesWhatGoesOnBehindItsHeader) {
+TEST(MeshFile, RefusesDataBeyondTheHeader) {
   const std::string binary = strangePly("uchar", "int", "float", false);
   for (const std::string& ply : {kAsciiPly, binary}) {
     EXPECT_SAYS(refused("a.ply", ply + "junk"), "has data after the elements");
@@ -226,7 +226,7 @@ TEST(MeshFile, RefusesWhatGoesOnBehindItsHeader) {
   ply = kAsciiPly;
   ply.replace(ply.find("face 2"), 6, "face 1");
   EXPECT_SAYS(refused("a.ply", ply), "has data after the elements");
-  // Elements that no mesh needs are read to find the end.
+  // Elements that a mesh does not use are read to find the end.
   ply = kAsciiPly + "1 2\n3\n";
   ply.replace(ply.find("end_header"), 10, "element tag 2\nproperty list int int marks\nend_header");
   EXPECT_SAYS(refused("a.ply", ply), "the file ends within the elements 'tag'");
@@ -248,13 +248,13 @@ TEST(MeshFile, ReadsTextBehindAByteOrderMark) {
                             "vertex 0 1 0\nendloop\nendfacet\nendsolid x\n")
           .triangles.size(),
       1u);
-  // Of other encodings none is read.
+  // No other encoding is read.
   EXPECT_SAYS(refused("a.ply", std::string("\xFF\xFEp\0l\0y\0\n\0", 10)),
               "does not begin with 'ply'");
   EXPECT_SAYS(refused("a.obj", std::string("\xFF\xFEv\0 \0", 6)), "binary data");
 }
 
-TEST(MeshFile, RefusesAnyCutOfPly) {
+TEST(MeshFile, RefusesAnyTruncationOfPly) {
   const std::string whole = strangePly("uchar", "int", "float", false);
   for (std::size_t size = 1; size < whole.size() - 4; ++size)  // without the last quality
     ASSERT_FALSE(refused("a.ply", whole.substr(0, size)).empty()) << size;
@@ -262,7 +262,7 @@ TEST(MeshFile, RefusesAnyCutOfPly) {
     ASSERT_FALSE(refused("a.ply", kAsciiPly.substr(0, size)).empty()) << size;
 }
 
-TEST(MeshFile, RefusesPlyThatPromisesTooMuch) {
+TEST(MeshFile, RefusesPlyWithExcessiveCounts) {
   for (const std::string count : {"5000000000", "18446744073709551615", "99"}) {
     std::string ply = kAsciiPly;
     ply.replace(ply.find("vertex 4"), 8, "vertex " + count);
@@ -311,7 +311,7 @@ TEST(MeshFile, KeepsExtremeButFiniteCoordinates) {
 
 // === OBJ
 
-TEST(MeshFile, ReadsObjInAllItsForms) {
+TEST(MeshFile, ReadsEveryFormOfObj) {
   const std::string text =
       "\xEF\xBB\xBF# made by hand\r\nmtllib a.mtl\r\no thing\\\r\n\r\n"
       "v 0 0 0\r\nv 1 0 0 0.5 0.5 0.5\r\n v\t1 \\\r\n 1 0 # corner\r\nv 0 1 0 1\r\n"
@@ -319,7 +319,7 @@ TEST(MeshFile, ReadsObjInAllItsForms) {
       "f 1 2 3\r\nf 1/1 2/1 3/1\r\nf 1//1 2//1 3//1\r\nf 1/1/1 2/1/1 3/1/1\r\n"
       "f -4 -3 -2\r\nf 1 2 \\\r\n3\r\nf -1/-1/-1 1// 3/\r\nf 1 2\r\nf\r\n"
       "f 1 2 3 4 # quad\r\nl 1 2\r\nf 1 2 3";
-  // Two of the first three vertices' pairs of vt and vn are others than the first.
+  // Two of the first three vertices have pairs of vt and vn that differ from the first pair.
   const TriMesh whole = parse("a.obj", text), mesh = parse("a.obj", text, {.attributes = false});
   ASSERT_EQ(whole.positions.size(), 4u + 3 * 2);
   ASSERT_EQ(whole.triangles.size(), mesh.triangles.size());
@@ -360,7 +360,7 @@ TEST(MeshFile, RefusesBrokenObj) {
   EXPECT_SAYS(refused("a.obj", std::string("v 0 0 0\n\0\1", 10)), "binary data");
 }
 
-TEST(MeshFile, TellsThePrecisionOfText) {
+TEST(MeshFile, ReportsThePrecisionOfText) {
   const std::string rest = "v 1 0 0\nv 0 1 0\nf 1 2 3\n";
   EXPECT_EQ(parse("a.obj", "v 0.5 0 0\n" + rest).precision, CoordinatePrecision::Float);
   EXPECT_EQ(parse("a.obj", "v 0.1 0 0\n" + rest).precision, CoordinatePrecision::Double);
@@ -394,7 +394,7 @@ TEST(MeshFile, ReadsAsciiStl) {
   EXPECT_EQ(parse("a.stl", kAsciiStl + kAsciiStl).triangles.size(), 4u);
 }
 
-TEST(MeshFile, ReadsBinaryStlWhateverItsHeader) {
+TEST(MeshFile, ReadsBinaryStlWithAnyHeader) {
   const std::array<float, 9> triangle = {0, 0, 0, 1, 0, 0, 0, 1, -0.f};
   for (const std::string header : {"made by hand", "solid made by hand", "solid a\nfacet normal"}) {
     const TriMesh mesh = parse("a.stl", binaryStl(header, {triangle, triangle}, 2));
@@ -449,7 +449,8 @@ TEST(MeshFile, RefusesBrokenOff) {
   EXPECT_SAYS(refused("a.off", body), "does not begin with 'OFF'");
   EXPECT_SAYS(refused("a.off", "OFF\n3000000000 1 0\n0 0 0\n"), "promises 3000000000 vertices");
   EXPECT_SAYS(refused("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"), "refers to vertex 3");
-  EXPECT_SAYS(refused("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 -1 2\n"), "non-negative integer");
+  EXPECT_SAYS(refused("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 -1 2\n"),
+              "non-negative integer");
   EXPECT_SAYS(refused("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1"), "the file ends");
 }
 
@@ -473,12 +474,12 @@ TEST(MeshFile, RefusesEmptyMissingAndUnreadable) {
                levelset::UsageError);
 }
 
-TEST(MeshFile, ReadsByTheFormatGiven) {
+TEST(MeshFile, ReadsByTheGivenFormat) {
   EXPECT_EQ(parse("noname", kAsciiPly, {.format = "ply"}).triangles.size(), 2u);
   EXPECT_EQ(parse("a.obj", kAsciiPly, {.format = "ply.gz"}).triangles.size(), 2u);
 }
 
-TEST(MeshFile, TellsFormatsByName) {
+TEST(MeshFile, RecognizesFormatsByName) {
   for (const char* name : {"x.ply", "x.PLY.gz", "ply", "dir.x/a.obj", "stl.gz", "a.b.off"})
     EXPECT_TRUE(levelset::isMeshFormat(name)) << name;
   for (const char* name : {"x.vdb", "x.ply.bz2", "", "x", "x.gz", "a.ply/x"})
@@ -508,7 +509,7 @@ TEST(MeshFile, RefusesDamagedCompression) {
   EXPECT_SAYS(refused("a.ply.gz", damaged), "is damaged");
 }
 
-TEST(MeshFile, EndsAGzipBombAtTheMemoryLimit) {
+TEST(MeshFile, StopsAGzipBombAtTheMemoryLimit) {
   const std::string bomb = gzip(std::string(64 << 20, '\n'));
   EXPECT_LT(bomb.size(), 100000u);
   const auto sentence = refusal<levelset::ResourceLimit>(
@@ -516,7 +517,7 @@ TEST(MeshFile, EndsAGzipBombAtTheMemoryLimit) {
   EXPECT_SAYS(sentence, "when decompressed exceeds the memory limit");
 }
 
-TEST(MeshFile, KeepsToTheMemoryLimit) {
+TEST(MeshFile, RespectsTheMemoryLimit) {
   std::string obj;
   for (int i = 0; i < 200000; ++i) obj += "v 0 0 0\n";
   obj += "f 1 2 3\n";
@@ -544,7 +545,7 @@ TEST(MeshFile, ReportsProgressAndCancels) {
       levelset::Cancelled);
 }
 
-TEST(MeshFile, TellsWhatHeadersSay) {
+TEST(MeshFile, ReportsTheContentsOfHeaders) {
   const TemporaryFolder folder;
   const auto info = [&](const std::string& name) { return levelset::meshFileInfo(folder / name); };
   for (const std::string name : {"a.ply", "a.ply.gz", "a.stl", "a.obj", "a.off"})
@@ -558,14 +559,14 @@ TEST(MeshFile, TellsWhatHeadersSay) {
   EXPECT_THROW(static_cast<void>(info("missing.ply")), levelset::IoError);
 }
 
-TEST(MeshFile, StepsOverControlCharacters) {
+TEST(MeshFile, SkipsControlCharacters) {
   const auto mesh = support::parse("a.obj", "v 0 0 0 \x02\nv 1 0 0\nv 0 1 0 \\ \nf 1 2 3 \x01\n",
                                    {.attributes = false});
   EXPECT_EQ(mesh.positions.size(), 3u);
   EXPECT_EQ(mesh.triangles.size(), 1u);
 }
 
-TEST(MeshFile, NamesTheFaceThatGoesAstray) {
+TEST(MeshFile, NamesTheFaceWithAnInvalidIndex) {
   const std::string header =
       "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty uchar x\nproperty uchar y\n"
       "property uchar z\nelement face 1\nproperty list uchar uchar vertex_indices\nend_header\n";
@@ -574,7 +575,7 @@ TEST(MeshFile, NamesTheFaceThatGoesAstray) {
   EXPECT_SAYS(sentence, "face 0: a face refers to vertex 7");
 }
 
-TEST(MeshFile, RefusesWhatItsSeamsHeldOpen) {
+TEST(MeshFile, RefusesMeshesWithoutFacesOnceSeamsAreClosed) {
   const std::string header =
       "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float "
       "z\n"
@@ -587,7 +588,7 @@ TEST(MeshFile, RefusesWhatItsSeamsHeldOpen) {
   EXPECT_SAYS(sentence, "none remains");
 }
 
-TEST(MeshFile, SaysThatTheDiskIsFull) {
+TEST(MeshFile, ReportsThatTheDiskIsFull) {
   const auto sentence = refusal<levelset::IoError>(
       [] { levelset::writeMesh("/dev/full", tetrahedron(), {.format = "ply"}); });
   EXPECT_SAYS(sentence, "No space left");

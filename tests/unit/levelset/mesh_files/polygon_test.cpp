@@ -1,4 +1,4 @@
-// How readers split polygons into triangles.
+// Splitting of polygons into triangles by readers.
 
 #include <fmt/core.h>
 
@@ -25,13 +25,13 @@ double area(const TriMesh& mesh) {
   for (const auto& t : mesh.triangles) {
     const Imath::V3d a = mesh.positions[t[0]];
     const double part = (mesh.positions[t[1]] - a).cross(mesh.positions[t[2]] - a).z / 2;
-    EXPECT_GE(part, 0) << "a triangle is turned over";
+    EXPECT_GE(part, 0) << "a triangle is reversed";
     sum += part;
   }
   return sum;
 }
 
-/// A flat polygon of those corners, in the plane z = 3.
+/// Flat polygon with these corners, in the plane z = 3.
 TriMesh polygon(const std::vector<Imath::V2d>& corners) {
   std::string obj, face = "f";
   for (std::size_t i = 0; i < corners.size(); ++i) {
@@ -42,7 +42,7 @@ TriMesh polygon(const std::vector<Imath::V2d>& corners) {
 }
 
 TEST(Polygon, SplitsConcavePolygonsWithinThem) {
-  // Areas by the shoelace formula; a fan from the first corner would turn triangles over.
+  // Areas by the shoelace formula. A fan from the first corner would reverse triangles.
   EXPECT_DOUBLE_EQ(area(polygon({{0, 0}, {4, 0}, {1, 1}, {0, 4}})), 4);
   EXPECT_DOUBLE_EQ(area(polygon({{1, 1}, {0, 4}, {0, 0}, {4, 0}})), 4);
   EXPECT_DOUBLE_EQ(area(polygon({{4, 0}, {1, 1}, {0, 4}, {0, 0}})), 4);
@@ -54,7 +54,7 @@ TEST(Polygon, SplitsConcavePolygonsWithinThem) {
   EXPECT_DOUBLE_EQ(area(mesh), 7 + 4 * 2);
 }
 
-TEST(Polygon, SplitsAStarOfAThousandCornersInAnyTurn) {
+TEST(Polygon, SplitsAStarOfAThousandCornersInEitherOrientation) {
   std::vector<Imath::V2d> star;
   double twice = 0;
   for (int i = 0; i < 1000; ++i) {
@@ -63,25 +63,25 @@ TEST(Polygon, SplitsAStarOfAThousandCornersInAnyTurn) {
   }
   for (std::size_t i = 0; i < star.size(); ++i) twice += star[i].cross(star[(i + 1) % star.size()]);
   EXPECT_NEAR(area(polygon(star)), twice / 2, 1e-9);
-  std::reverse(star.begin(), star.end());  // seen from below: turned over as a whole
+  std::reverse(star.begin(), star.end());  // seen from below: reversed completely
   const TriMesh mesh = polygon(star);
   EXPECT_EQ(mesh.triangles.size(), 998u);
 }
 
-TEST(Polygon, SplitsHugeConvexPolygonsAtOnce) {
+TEST(Polygon, SplitsHugeConvexPolygonsFast) {
   std::vector<Imath::V2d> circle;
   for (int i = 0; i < 200000; ++i)
     circle.emplace_back(std::cos(2 * M_PI * i / 200000), std::sin(2 * M_PI * i / 200000));
   const TriMesh mesh = polygon(circle);
   EXPECT_NEAR(area(mesh), M_PI, 1e-8);
-  // Not as a fan: its triangles would all lie in each other's bounding boxes.
+  // The result is no fan, in which all triangles would lie in each other's bounding boxes.
   std::vector<std::size_t> faces(circle.size(), 0);
   for (const auto& t : mesh.triangles)
     for (const std::uint32_t v : t) ++faces[v];
   EXPECT_LT(*std::max_element(faces.begin(), faces.end()), 50u);
 }
 
-TEST(Polygon, RefusesAPolygonTooIntricateToSplit) {
+TEST(Polygon, RefusesPolygonsThatAreTooComplexToSplit) {
   std::string obj, face = "f";
   for (int i = 0; i < 60000; ++i) {
     obj += fmt::format("v {} {} 0\n", i / 2, i % 2 ? 1 : 50);

@@ -28,8 +28,8 @@ NarrowBand sphere(double radius, double voxelSize, const V3d& centre = V3d(0)) {
                              {centre - V3d(radius), centre + V3d(radius)}, voxelSize);
 }
 
-/// Random values, hence all 256 patterns of signs, with zeros on grid points and the rest near
-/// them.
+/// Random values, so that all 256 sign patterns occur. Some zeros lie on grid points, the others
+/// near them.
 NarrowBand noise(int size, unsigned seed, bool withZeros) {
   auto grid = emptyLevelSet(uniformTransform(1), 3);
   std::mt19937 random(seed);
@@ -82,7 +82,7 @@ TEST(BandToMesh, IsClosedManifoldForEveryPatternOfSigns) {
 }
 
 TEST(BandToMesh, KeepsPlanesThroughGridPointsExact) {
-  // A box whose faces lie on grid planes: zeros are outside.
+  // A box with faces on grid planes. Zeros count as outside.
   const auto box = [](const V3d& p) {
     const V3d q(std::abs(p.x) - 4, std::abs(p.y) - 4, std::abs(p.z) - 4);
     const V3d outer(std::max(q.x, 0.), std::max(q.y, 0.), std::max(q.z, 0.));
@@ -96,7 +96,7 @@ TEST(BandToMesh, KeepsPlanesThroughGridPointsExact) {
 }
 
 TEST(BandToMesh, ClosesThinSheetsAndSingleVoxels) {
-  // Thinner than a voxel: two crossings on one edge cannot be seen, one grid layer can.
+  // Thinner than a voxel. Two crossings on one edge are not resolved, a single grid layer is.
   const auto sheet = [](const V3d& p) {
     return std::max({std::abs(p.x) - 0.3, std::abs(p.y) - 9.5, std::abs(p.z) - 9.5});
   };
@@ -108,8 +108,8 @@ TEST(BandToMesh, ClosesThinSheetsAndSingleVoxels) {
   EXPECT_EQ(voxel.triangles.size(), 8u);
 }
 
-TEST(BandToMesh, ClosesBandsThatWereCutOpen) {
-  // Inactive values and tiles count with their sign, so a cut gets a lid.
+TEST(BandToMesh, ClosesTruncatedBands) {
+  // Inactive values and tiles count with their sign, so that a cut is closed.
   const NarrowBand whole = sphere(20, 1);
   auto grid = vdb(whole).deepCopy();
   grid->fill(openvdb::CoordBBox(openvdb::Coord(-40, -40, 5), openvdb::Coord(40, 40, 40)),
@@ -162,7 +162,7 @@ TEST(BandToMesh, GivesSameBitsForAnyNumberOfThreads) {
   }
 }
 
-/// Distance to a cube of that half edge; a turned copy of it is what grids find hard.
+/// Distance to a cube with half edge `half`. A rotated copy of it is difficult for grids.
 double cubeDistance(const V3d& p, double half) {
   const V3d q(std::abs(p.x) - half, std::abs(p.y) - half, std::abs(p.z) - half);
   const V3d outer(std::max(q.x, 0.), std::max(q.y, 0.), std::max(q.z, 0.));
@@ -175,7 +175,7 @@ Imath::M44d turned() {
   return m;
 }
 
-/// Largest distance of the points of a triangle mesh from the cube, on four points to a side.
+/// Largest distance of points of a triangle mesh from the cube, with four samples along each side.
 double meshToCube(const TriMesh& mesh, const Imath::M44d& back, double half) {
   double worst = 0;
   for (const auto& t : mesh.triangles) {
@@ -203,9 +203,9 @@ double triangleDistance(const V3d& p, const V3d& a, const V3d& b, const V3d& c) 
   return isOver ? std::abs(normal.dot(p - a)) / normal.length() : nearest;
 }
 
-/// Largest distance of the points of the cube's edges, corners among them, from the mesh.
+/// Largest distance from the mesh of points on the cube's edges, corners included.
 double cubeEdgesToMesh(const TriMesh& mesh, const Imath::M44d& back, double half) {
-  std::vector<std::array<V3d, 3>> beside;  // triangles near an edge, in the cube's own frame
+  std::vector<std::array<V3d, 3>> beside;  // triangles near an edge, in the cube's frame
   for (const auto& t : mesh.triangles) {
     const std::array<V3d, 3> corners = {mesh.positions[t[0]] * back, mesh.positions[t[1]] * back,
                                         mesh.positions[t[2]] * back};
@@ -232,7 +232,7 @@ double cubeEdgesToMesh(const TriMesh& mesh, const Imath::M44d& back, double half
   return worst;
 }
 
-/// Area of the triangles whose normal is more than 60° off that of the cube's face under them.
+/// Area of the triangles whose normal deviates by more than 60° from the cube's face below them.
 double foldedArea(const TriMesh& mesh, const Imath::M44d& back) {
   double sum = 0;
   for (const auto& t : mesh.triangles) {
@@ -247,7 +247,7 @@ double foldedArea(const TriMesh& mesh, const Imath::M44d& back) {
   return sum;
 }
 
-TEST(BandToMesh, SharpKeepsEdgesAndCornersOfTurnedCubes) {
+TEST(BandToMesh, SharpKeepsEdgesAndCornersOfRotatedCubes) {
   std::mt19937 random(11);
   const auto draw = [&] { return static_cast<double>(random() % 2001) / 1000 - 1; };
   for (int turn = 0; turn < 8; ++turn) {
@@ -270,7 +270,7 @@ TEST(BandToMesh, SharpKeepsEdgesAndCornersOfTurnedCubes) {
 }
 
 TEST(BandToMesh, SharpKeepsConcaveEdges) {
-  // A cube without one of its octants: nine faces, three concave edges.
+  // A cube without one of its octants: nine faces and three concave edges.
   const Imath::M44d matrix = turned(), back = matrix.inverse();
   const double half = 15.3;
   const auto box = [&](const V3d& centre) {
@@ -299,7 +299,7 @@ TEST(BandToMesh, SharpKeepsAWedge) {
   double worst = 0;
   for (const V3d& p : mesh.positions) worst = std::max(worst, std::abs(planes(p)));
   EXPECT_LT(worst, 0.05);
-  // What is cut off between the vertices is missing from the volume.
+  // The volume lacks the parts between the vertices and the exact edge.
   const double exact = 4 * length * length * std::tan(slope) * 2 * depth;
   EXPECT_NEAR(signedVolume(mesh), exact, 1e-4 * exact);
 }
@@ -322,12 +322,13 @@ TEST(BandToMesh, SharpLeavesRoundedEdgesRound) {
     const TriMesh mesh = bandToMesh(solid.band(), {.sharp = true});
     double worst = 0;
     for (const V3d& p : mesh.positions) worst = std::max(worst, std::abs(solid.distance(p)));
-    // An edge where a box is rounded by a voxel would be off by 0.41, a corner by 0.73.
+    // At an edge of a box rounded by a voxel a sharp vertex would be off by 0.41, at a corner by
+    // 0.73.
     EXPECT_LT(worst, 0.2) << solid.name;
   }
 }
 
-// Round faces that meet: no planes, and vertices beside the edge that are easily put out of order.
+// The round faces are no planes, and vertices near the edge are easily put in the wrong order.
 TEST(BandToMesh, SharpKeepsTheRimsOfCylinders) {
   for (const double radius : {12.7, 15.2, 20.0}) {
     const auto cylinder = [=](const V3d& p) {
@@ -352,7 +353,7 @@ TEST(BandToMesh, SharpKeepsTheRimsOfCylinders) {
     }
     EXPECT_LE(turnedOver, 4u) << radius;
     EXPECT_LT(longest, 4) << radius;
-    // A uniform mesh cuts the rims off.
+    // A uniform mesh cuts the rims.
     const double exact = M_PI * radius * radius * 2 * 8.3,
                  lost = std::abs(signedVolume(mesh) - exact),
                  lostByUniform = std::abs(signedVolume(bandToMesh(band)) - exact);
@@ -374,7 +375,7 @@ TEST(BandToMesh, SharpDoesNotDependOnThreads) {
 }
 
 TEST(BandToMesh, SharpFindsNoEdgesOnSmoothSurfaces) {
-  // A quadrilateral for each crossed edge, and nothing inserted.
+  // One quadrilateral for each crossed edge, and no inserted vertex.
   const auto torus = [](const V3d& p) { return std::hypot(std::hypot(p.x, p.y) - 24, p.z) - 9.3; };
   const std::array<NarrowBand, 2> bands = {
       sphere(12.4, 1, V3d(0.3, 0.1, -0.4)),
@@ -386,7 +387,7 @@ TEST(BandToMesh, SharpFindsNoEdgesOnSmoothSurfaces) {
   }
 }
 
-TEST(BandToMesh, AdaptiveCoarsensFlatPartsWithinBound) {
+TEST(BandToMesh, AdaptiveCoarsensFlatPartsWithinTheBound) {
   const double adaptivity = 0.2;
   const NarrowBand box =
       support::sampleBand([](const V3d& p) { return cubeDistance(p, 12.3); }, cube(13), 1);
@@ -406,7 +407,7 @@ TEST(BandToMesh, AdaptiveCoarsensFlatPartsWithinBound) {
   EXPECT_TRUE(manifoldness(rough).isClosedManifold());
 }
 
-TEST(BandToMesh, SharpIsAsExactOnSphere) {
+TEST(BandToMesh, SharpIsEquallyAccurateOnASphere) {
   const double h = 1. / 32;
   const TriMesh mesh = bandToMesh(sphere(1, h, V3d(0.3 * h, 0.1 * h, -0.4 * h)), {.sharp = true});
   EXPECT_TRUE(manifoldness(mesh).isClosedManifold());
@@ -435,7 +436,7 @@ TEST(BandToMesh, SharpIsClosedManifoldForEveryPatternOfSigns) {
   }
 }
 
-TEST(BandToMesh, RefusesWhatItCannotMesh) {
+TEST(BandToMesh, RefusesInvalidBands) {
   const NarrowBand band = sphere(5, 1);
   EXPECT_THROW((void)bandToMesh(NarrowBand()), InvalidInput);
   EXPECT_THROW((void)bandToMesh(makeBand(emptyLevelSet(uniformTransform(1), 3))), InvalidInput);

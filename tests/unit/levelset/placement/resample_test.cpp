@@ -23,7 +23,8 @@ double sphere(const V3d& p) {
 }
 
 struct BandError {
-  double surface = 0, band = 0;  ///< largest, voxels: within one voxel of the surface, and anywhere
+  /// Largest errors, voxels: within one voxel of the surface, and anywhere.
+  double surface = 0, band = 0;
 };
 
 template <typename Phi>
@@ -37,7 +38,7 @@ BandError errorOf(const NarrowBand& band, const Phi& phi) {
   return error;
 }
 
-/// Tree and background are those of a sphere of radius one; the inside is filled.
+/// Expects that tree and background are those of a sphere of radius one, with a filled inside.
 void expectUnitSphere(const NarrowBand& band, double voxelSize, double halfWidth) {
   EXPECT_NEAR(band.voxelSize(), voxelSize, 1e-12);
   EXPECT_NEAR(band.halfWidth(), halfWidth, 1e-5);
@@ -61,13 +62,13 @@ TEST(Resample, KeepsASphereAtAnyVoxelSize) {
     const NarrowBand result = resample(source, factor * h);
     expectUnitSphere(result, factor * h, 3);
     const BandError error = errorOf(result, sphere);
-    // In voxels of the source, or of the result where those are larger.
+    // In voxels of the source, or of the result if those are larger.
     EXPECT_LT(error.surface * std::min(factor, 1.0), 0.02) << "factor " << factor;
     EXPECT_LT(error.band * std::min(factor, 1.0), 0.05) << "factor " << factor;
   }
 }
 
-TEST(Resample, TurnedAndMovedGridHoldsTheSameSolid) {
+TEST(Resample, RotatedAndMovedGridHoldsTheSameSolid) {
   const double h = 1.0 / 24;
   const NarrowBand source = makeSphere(1, V3d(0), h, {.halfWidth = 4});
   const Imath::M44d placement = Imath::M44d().setScale(0.8 * h) *
@@ -102,7 +103,7 @@ TEST(Resample, WidensAndNarrowsTheBand) {
     expectUnitSphere(result, 0.05, halfWidth);
     EXPECT_LT(errorOf(result, sphere).band, 0.05);
   }
-  // A band of one voxel holds too few samples: it is widened first.
+  // A band of one voxel holds too few samples and is widened first.
   const NarrowBand thin = makeSphere(1, V3d(0), 0.05, {.halfWidth = 1});
   expectUnitSphere(resample(thin, 0.04, {.halfWidth = 3}), 0.04, 3);
 }
@@ -112,7 +113,7 @@ TEST(Resample, OwnGridIsTheSameSolid) {
   EXPECT_EQ(resampleLike(source, makeBox(V3d(1), V3d(0), 0.1)).contentHash(), source.contentHash());
 }
 
-// A cubic through samples on both sides of an edge swings over, by a quarter of a new voxel.
+// A cubic through samples on both sides of an edge overshoots, by a quarter of a new voxel.
 TEST(Resample, KeepsFacesFlatUpToTheirEdges) {
   const NarrowBand box = makeBox(V3d(20, 20, 6), V3d(0), 0.5);
   const Imath::Box3d bounds = measure(resample(box, 0.25)).bounds;
@@ -133,14 +134,14 @@ TEST(Resample, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(hashes[0], hashes[2]);
 }
 
-TEST(Resample, RefusesWhatCannotBe) {
+TEST(Resample, RefusesInvalidArguments) {
   const NarrowBand source = makeSphere(1, V3d(0.5), 0.1);
   for (const double bad : {0.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity()}) {
     EXPECT_THROW((void)resample(source, bad), UsageError);
     EXPECT_THROW((void)resample(source, 0.1, {.halfWidth = bad}), UsageError);
   }
   EXPECT_THROW((void)resample(makeSphere(0.2, V3d(0.5), 0.05), 1), InvalidInput)
-      << "nothing is left";
+      << "the result is empty";
   EXPECT_THROW((void)resample(NarrowBand(), 0.1), InvalidInput);
   EXPECT_THROW((void)resampleTo(source, Imath::M44d().setScale(V3d(1, 1, 2))), InvalidInput);
   EXPECT_THROW((void)resampleTo(source, Imath::M44d().setScale(V3d(1, 1, -1))), InvalidInput);

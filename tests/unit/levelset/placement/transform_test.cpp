@@ -16,7 +16,7 @@ using namespace levelset;
 using Imath::M44d;
 using Imath::V3d;
 
-TEST(Transform, MovesTurnsAndScalesExactly) {
+TEST(Transform, TranslatesRotatesAndScalesExactly) {
   const NarrowBand ball = makeSphere(1, V3d(1, 0, 0), 0.1);
   const M44d matrix = M44d().setScale(2.5) * M44d().setEulerAngles(V3d(0, 0, M_PI / 2)) *
                       M44d().setTranslation(V3d(10, 20, 30));
@@ -28,14 +28,14 @@ TEST(Transform, MovesTurnsAndScalesExactly) {
     ASSERT_NEAR(phi, (p - V3d(10, 22.5, 30)).length() - 2.5, 1e-5);
   });
   EXPECT_LT(vdb(moved).tree().getValue(openvdb::Coord(10, 0, 0)), 0);
-  // The operand stays, and a rotation leaves every distance as it is.
+  // The operand is unchanged, and a rotation keeps every distance.
   EXPECT_EQ(ball.contentHash(), makeSphere(1, V3d(1, 0, 0), 0.1).contentHash());
   const NarrowBand turned = transform(ball, M44d().setEulerAngles(V3d(0.1, 0.2, 0.3)));
   EXPECT_EQ(vdb(turned).tree().getValue({20, 0, 1}), vdb(ball).tree().getValue({20, 0, 1}));
   EXPECT_EQ(transform(ball, M44d()).contentHash(), ball.contentHash());
 }
 
-TEST(Transform, RefusesWhatAGridCannotHold) {
+TEST(Transform, RefusesTransformsThatAGridCannotHold) {
   const NarrowBand ball = makeSphere(1, V3d(0), 0.1);
   M44d shear;
   shear[1][0] = 0.3;
@@ -53,9 +53,9 @@ TEST(Transform, RefusesWhatAGridCannotHold) {
   EXPECT_THROW((void)bake(ball, M44d().setScale(0.01), 0.3), InvalidInput);
 }
 
-TEST(Transform, RefusesPlacesThatNumbersCannotTell) {
+TEST(Transform, RefusesPositionsBeyondTheirPrecision) {
   const NarrowBand ball = makeSphere(1, V3d(0), 0.1);
-  // A hundred million voxels from the origin all is well.
+  // A hundred million voxels from the origin positions are still precise.
   const NarrowBand far = transform(ball, M44d().setTranslation(V3d(1e7, 0, 0)));
   EXPECT_NEAR(measure(far).volume, measure(ball).volume, 1e-6);
   for (const double shift : {1e10, 1e12, 1e15, 1e16, 1e300})
@@ -76,7 +76,7 @@ TEST(Transform, BakedEllipsoidIsADistance) {
   EXPECT_NEAR(measure(baked).volume, 4 * M_PI / 3 * 1.4, 0.01);
   const auto accessor = vdb(baked).getConstAccessor();
   support::forEachActive(baked, [&](const V3d& p, double phi) {
-    // On the axes the distance of the nearer ends is plain.
+    // On the axes the distance to the nearer end is known.
     if (p.x == 0 && p.y == 0 && phi > -0.1) {
       EXPECT_NEAR(phi, std::abs(p.z) - 0.7, 0.02 * h);
     }
@@ -98,7 +98,7 @@ TEST(Transform, BakedMirrorIsTheMirroredSolid) {
   });
 }
 
-TEST(Transform, MirroredMeshStillFacesOut) {
+TEST(Transform, MirroredMeshStillFacesOutwards) {
   TriMesh tetrahedron;
   tetrahedron.positions = {V3d(0, 0, 0), V3d(1, 0, 0), V3d(0, 1, 0), V3d(0, 0, 1)};
   tetrahedron.triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};

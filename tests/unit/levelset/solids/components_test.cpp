@@ -33,7 +33,8 @@ double ballVolume(double radius) {
   return 4 * pi / 3 * radius * radius * radius;
 }
 
-/// A shell of radii 24 and 18 that holds a shell of 10 and 5, and a ball of 6 beside it.
+/// Distance to a hollow ball of radii 24 and 18 that contains a hollow ball of radii 10 and 5, and
+/// to a ball of radius 6 beside it.
 double nestedDistance(const V3d& p) {
   const double r = p.length();
   return std::min({std::max(r - 24, 18 - r), std::max(r - 10, 5 - r), ball(p, V3d(40, 0, 0), 6)});
@@ -42,8 +43,8 @@ NarrowBand nestedShells() {
   return sample(nestedDistance, 46);
 }
 
-/// Largest difference from the exact distance over the band, in voxels, and that the band is as
-/// wide as it should be.
+/// Expects a small difference, in voxels, from the exact distance over the band, and the correct
+/// half width.
 void expectDistance(const NarrowBand& band, const Distance& exact, double tolerance) {
   double worst = 0;
   std::size_t count = 0;
@@ -58,7 +59,7 @@ void expectDistance(const NarrowBand& band, const Distance& exact, double tolera
   EXPECT_NEAR(static_cast<double>(count), expected, 2e-3 * expected);
 }
 
-TEST(Topology, CountsNestedShells) {
+TEST(Topology, CountsNestedComponents) {
   const Topology t = topology(nestedShells());
   EXPECT_EQ(t.components, 3u);
   EXPECT_EQ(t.surfaces, 5u);
@@ -67,8 +68,8 @@ TEST(Topology, CountsNestedShells) {
   EXPECT_EQ(none.components + none.surfaces + none.cavities, 0u);
 }
 
-TEST(Topology, TellsDiagonalNeighboursApart) {
-  // Two inside voxels that share the diagonal of a face are two solids.
+TEST(Topology, SeparatesDiagonalNeighbours) {
+  // Two inside voxels that share only the diagonal of a face are two solids.
   auto grid = emptyLevelSet(uniformTransform(1), 3);
   grid->tree().setValueOn(openvdb::Coord(7, 7, 7), -0.5f);
   grid->tree().setValueOn(openvdb::Coord(8, 8, 7), -0.5f);
@@ -77,7 +78,7 @@ TEST(Topology, TellsDiagonalNeighboursApart) {
   EXPECT_EQ(topology(makeBand(grid)).components, 1u);
 }
 
-TEST(KeepLargest, DropsSmallerSolidsAndKeepsBitsOfTheRest) {
+TEST(KeepLargest, RemovesSmallerSolidsAndKeepsBitsOfTheRest) {
   const NarrowBand solid = nestedShells();
   const NarrowBand one = keepLargest(solid, 1);
   const Topology t = topology(one);
@@ -101,8 +102,8 @@ TEST(KeepLargest, DropsSmallerSolidsAndKeepsBitsOfTheRest) {
   EXPECT_EQ(keepLargest(solid, 99).contentHash(), solid.contentHash());
 }
 
-TEST(KeepLargest, KeepsSolidInsideADroppedOne) {
-  // The outer shell is thinner in volume than the ball that floats in it.
+TEST(KeepLargest, KeepsASolidInsideARemovedOne) {
+  // The outer hollow ball has less volume than the ball inside it.
   const auto thin = [](const V3d& p) { return std::max(p.length() - 30, 29 - p.length()); };
   const auto inner = [](const V3d& p) { return p.length() - 22; };
   const NarrowBand kept =
@@ -111,8 +112,9 @@ TEST(KeepLargest, KeepsSolidInsideADroppedOne) {
   EXPECT_EQ(kept.contentHash(), sample(inner, 31).contentHash());
 }
 
-TEST(KeepLargest, RestoresDistanceBesideDroppedSolid) {
-  // The two bands meet: what belonged to the small one is measured from the large one again.
+TEST(KeepLargest, RestoresDistanceBesideARemovedSolid) {
+  // The two bands meet. Values that belonged to the small solid are measured from the large solid
+  // again.
   const auto large = [](const V3d& p) { return ball(p, V3d(-0.3, 0.2, 0.1), 16); };
   const auto small = [](const V3d& p) { return ball(p, V3d(20.1, 0, 0), 2.8); };
   const NarrowBand both = sample([&](const V3d& p) { return std::min(large(p), small(p)); }, 24);
@@ -125,7 +127,7 @@ TEST(KeepLargest, RestoresDistanceBesideDroppedSolid) {
   support::forEachActive(kept, [&](const V3d& p, double phi) {
     changed += static_cast<float>(phi) != static_cast<float>(large(p));
   });
-  EXPECT_LT(changed, 400u);  // only beside the small one
+  EXPECT_LT(changed, 400u);  // only beside the small solid
 }
 
 TEST(KeepLargest, BreaksTiesByPosition) {
@@ -135,7 +137,7 @@ TEST(KeepLargest, BreaksTiesByPosition) {
   EXPECT_LT(keepLargest(twins, 1).zeroSetBounds().max.x, 0);
 }
 
-TEST(KeepLargest, RefusesNothingToKeep) {
+TEST(KeepLargest, RefusesAnEmptyResult) {
   EXPECT_THROW((void)keepLargest(nestedShells(), 0), UsageError);
   EXPECT_THROW((void)keepLargest(NarrowBand(), 1), InvalidInput);
 }
@@ -149,7 +151,8 @@ TEST(FillCavities, FillsAllOrOnlySmallOnes) {
       full.contentHash(),
       sample([](const V3d& p) { return std::min(p.length() - 24, ball(p, V3d(40, 0, 0), 6)); }, 46)
           .contentHash());
-  // The void of radius 5 holds 524, the one around the inner shell 18² 4π/3 less what floats in it.
+  // The cavity of radius 5 has volume 524. The cavity around the inner solid has 18² 4π/3 less the
+  // volume of that solid.
   const NarrowBand small = fillCavities(solid, 1.02 * ballVolume(5));
   EXPECT_EQ(topology(small).surfaces, 4u);
   EXPECT_EQ(topology(small).cavities, 1u);
@@ -171,7 +174,7 @@ TEST(FillCavities, RestoresDistanceUnderThinWalls) {
   EXPECT_NEAR(measure(filled).volume, ballVolume(14.2), 5e-3 * ballVolume(14.2));
 }
 
-TEST(FillCavities, LeavesOpenHollowsAndEmptyBands) {
+TEST(FillCavities, KeepsOpenHollowsAndEmptyBands) {
   const NarrowBand cup = sample(
       [](const V3d& p) {
         const double hole = std::max(std::hypot(p.x, p.y) - 3, -p.z);
@@ -185,8 +188,8 @@ TEST(FillCavities, LeavesOpenHollowsAndEmptyBands) {
   EXPECT_THROW((void)fillCavities(cup, std::numeric_limits<double>::quiet_NaN()), UsageError);
 }
 
-TEST(FillCavities, FindsVoidsMadeOfTilesOnly) {
-  // A void of many thousand voxels across: its middle is one large tile.
+TEST(FillCavities, FindsCavitiesOfTilesOnly) {
+  // A cavity many thousand voxels wide. Its middle is one large tile.
   auto grid =
       vdb(sample([](const V3d& p) { return std::max(p.length() - 60, 50 - p.length()); }, 61))
           .deepCopy();

@@ -47,28 +47,28 @@ double largestError(const NarrowBand& band, const std::function<double(const V3d
   return worst;
 }
 
-TEST(Opening, KeepsWhatItsBallFitsInto) {
+TEST(Opening, KeepsPartsThatContainItsBall) {
   const NarrowBand sphere = ball(20);
   const NarrowBand same = opening(sphere, 12);
   EXPECT_LT(largestError(same, [](const V3d& p) { return (p - kCentre).length() - 20; }), 0.02);
   EXPECT_EQ(openvdb::tools::checkLevelSet(vdb(same), 6), "");
-  // The edges of a box become as round as the ball: the box shrunk by r, grown by r.
+  // The edges of a box get the radius of the ball: the box shrunk by r, then grown by r.
   const double radius = 6;
   const NarrowBand rounded = opening(box(V3d(16)), radius);
   const auto exact = [&](const V3d& p) {
     return boxDistance(p - kCentre, V3d(16 - radius)) - radius;
   };
-  EXPECT_LT(largestError(rounded, exact), 0.75);  // edges as sharp as the grid shows them
+  EXPECT_LT(largestError(rounded, exact), 0.75);  // edges are only as sharp as the grid resolves
   const double volume = measure(rounded).volume;
   const double edge = 2 * (16 - radius);
   const double truth = edge * edge * edge + 6 * edge * edge * radius +
                        3 * edge * pi * radius * radius + 4 * pi / 3 * radius * radius * radius;
   EXPECT_NEAR(volume, truth, 2e-2 * truth);
-  // Opening twice is opening once.
+  // A second opening changes nothing.
   EXPECT_LT(compare(opening(rounded, radius), rounded).chamfer(), 0.1);
 }
 
-TEST(Opening, DropsThinParts) {
+TEST(Opening, RemovesThinParts) {
   // A ball with a plate through it.
   const NarrowBand plated = unite(ball(14), box(V3d(26, 26, 2)));
   const NarrowBand opened = opening(plated, 4);
@@ -82,17 +82,17 @@ TEST(Closing, FillsNarrowGaps) {
   EXPECT_EQ(measure(apart).components, 2u);
   const NarrowBand closed = closing(apart, 5);
   EXPECT_EQ(measure(closed).components, 1u);
-  EXPECT_NEAR(measure(closed).volume, 36 * 16 * 16, 0.03 * 36 * 16 * 16);  // but for the rim
+  EXPECT_NEAR(measure(closed).volume, 36 * 16 * 16, 0.03 * 36 * 16 * 16);  // up to the rim
   EXPECT_EQ(openvdb::tools::checkLevelSet(vdb(closed), 6), "");
   const NarrowBand still = closing(apart, 1);
   EXPECT_EQ(measure(still).components, 2u);
-  // What is convex stays.
+  // Convex parts are unchanged.
   EXPECT_LT(
       largestError(closing(ball(15), 8), [](const V3d& p) { return (p - kCentre).length() - 15; }),
       0.02);
 }
 
-TEST(Shell, IsAWallOfItsThickness) {
+TEST(Shell, IsAWallOfTheGivenThickness) {
   const double radius = 18, thickness = 4;
   const NarrowBand sphere = ball(radius);
   const struct {
@@ -121,12 +121,12 @@ TEST(Shell, HollowsABoxWithSharpCavity) {
   EXPECT_EQ(m.cavities, 1u);
   const Measurement thin = measure(shell(ball(15), 1.5));
   const double skin = 4 * pi / 3 * (15. * 15 * 15 - 13.5 * 13.5 * 13.5);
-  EXPECT_NEAR(thin.volume, skin, 6e-2 * skin);  // both surfaces in one stencil
+  EXPECT_NEAR(thin.volume, skin, 6e-2 * skin);  // both surfaces are in one stencil
 }
 
-// At these voxel sizes three voxels are no float, and the bands of intermediate results must still
-// end in the same place to the bit.
-TEST(Morphology, GivesSoundBandsOfAnyVoxelSize) {
+// At these voxel sizes three voxels are no float. The bands of intermediate results must still end
+// at the same position to the bit.
+TEST(Morphology, BuildsSoundBandsAtAnyVoxelSize) {
   for (const double voxel : {0.07, 0.13, 0.14, 0.15, 0.3}) {
     const NarrowBand solid = makeSphere(12.3 * voxel, V3d(0), voxel);
     EXPECT_EQ(solid.halfWidth(), 3) << voxel;
@@ -159,7 +159,7 @@ TEST(Morphology, Refuses) {
   for (const auto& run : {+[](const OffsetOptions& o) { (void)closing(NarrowBand(), 1, o); },
                           +[](const OffsetOptions& o) { (void)shell(NarrowBand(), 1, {}, o); }})
     EXPECT_THROW(run({}), InvalidInput);
-  // A hundred times the object: refused by the estimate, before anything is allocated.
+  // A hundred times the object: the estimate refuses it before any allocation.
   OffsetOptions small;
   small.maxMemory = std::size_t{1} << 30;
   EXPECT_THROW((void)closing(sphere, 1200, small), ResourceLimit);

@@ -91,7 +91,7 @@ TEST(Offset, KeepsACubeSharpInwards) {
   EXPECT_LE(all, 0.1);
 }
 
-/// A cube turned by Euler angles.
+/// Cube rotated by Euler angles.
 Shape turnedBox(double half, int turn) {
   Imath::M44d back;
   back.setEulerAngles(V3d(0.3 + 0.37 * turn, 0.5 + 0.11 * turn, 0.7 - 0.23 * turn));
@@ -103,7 +103,7 @@ Shape turnedBox(double half, int turn) {
   };
 }
 
-TEST(Offset, KeepsATurnedCubeSharp) {
+TEST(Offset, KeepsARotatedCubeSharp) {
   for (int turn = 0; turn < 5; ++turn) {
     const NarrowBand cube = sample(turnedBox(20, turn), 36);
     const BandError shrunk = bandError(offset(cube, -5), turnedBox(15, turn));
@@ -117,7 +117,7 @@ TEST(Offset, KeepsATurnedCubeSharp) {
 }
 
 TEST(Offset, DoesNotSharpenRoundSolids) {
-  // Curvatures of a third to a fifth of a voxel: bent, but no edge.
+  // Curvatures of 1/3 to 1/5 per voxel: curved, but no edge.
   for (const double radius : {3.0, 4.0, 5.0}) {
     const NarrowBand ball = sample(sphere(radius), radius + 1);
     EXPECT_LE(bandError(offset(ball, 2), sphere(radius + 2)).linf, 0.05) << radius;
@@ -134,24 +134,24 @@ TEST(Offset, AddsUpOnConvexSolids) {
   EXPECT_LE(sum / count, 5e-3);
 }
 
-TEST(Offset, ComesBackOnSmoothSolids) {
+TEST(Offset, RestoresSmoothSolidsOnTheWayBack) {
   const BandError e = bandError(offset(offset(sample(sphere(30), 32), 8), -8), sphere(30));
   EXPECT_LE(e.l1, 2e-3);
 }
 
-/// A prism 40 high over a square of 44 without its quarter x, y > −2, turned about z. Of its edges
-/// along z five are convex and one is concave.
+/// Prism of height 40 over a square of side 44 without its quarter x, y > −2, rotated about z. Five
+/// of its edges along z are convex and one is concave.
 struct Angle {
   static constexpr double kHalf = 22, kNotch = -2, kHeight = 20;
   double turn;
 
-  /// Seen from the middle, along the prism's own axes.
+  /// Position relative to the centre, along the prism's own axes.
   [[nodiscard]] V3d own(const V3d& p) const {
     const V3d r = p - kCentre;
     return {r.x * std::cos(turn) + r.y * std::sin(turn),
             r.y * std::cos(turn) - r.x * std::sin(turn), r.z};
   }
-  /// Distance from outside to what is left of the two arms when each side is moved inwards by d.
+  /// Distance from outside to the two arms after each side moves inwards by d.
   static double toArms(const V3d& q, double d) {
     const auto arm = [=](double x, double y) {
       return std::hypot(std::max({x - kHalf + d, -kHalf + d - x, 0.0}),
@@ -159,7 +159,7 @@ struct Angle {
     };
     return std::min(arm(q.x, q.y), arm(q.y, q.x));
   }
-  /// Distance from inside to all that is outside: the sides of the square and the notch.
+  /// Distance from inside to the outside: the sides of the square and the notch.
   static double toOutside(const V3d& q) {
     const double notch = std::hypot(std::max(kNotch - q.x, 0.0), std::max(kNotch - q.y, 0.0));
     return std::min({kHalf - std::abs(q.x), kHalf - std::abs(q.y), notch});
@@ -176,14 +176,15 @@ struct Angle {
              std::min(0.0, std::max(side, end));
     };
   }
-  /// Of the section of the solid grown by d, to where it was: all that a band of three holds.
+  /// Distance in the cross-section of the solid grown by d, for positions within a band of three
+  /// voxels.
   static double grown(const V3d& q, double d) {
     const double away = toArms(q, 0), x = q.x - kNotch, y = q.y - kNotch;
     const bool isInNotch = x > 0 && y > 0 && q.x < kHalf && q.y < kHalf;
     if (away >= d || !isInNotch) return away - d;
     return -std::hypot(std::max(d - x, 0.0), std::max(d - y, 0.0));  // sharp
   }
-  /// Of the section of the solid shrunk by d.
+  /// Distance in the cross-section of the solid shrunk by d.
   static double shrunk(const V3d& q, double d) {
     const double inside = toOutside(q), x = q.x - kNotch, y = q.y - kNotch;
     if (inside >= d || (x < 0 && y < 0 && std::hypot(x, y) < d)) return d - inside;  // round
@@ -191,7 +192,7 @@ struct Angle {
   }
 };
 
-/// In the middle of the prism, all and about the concave edge.
+/// Errors in the middle of the prism: of all points, and near the concave edge.
 struct EdgeError {
   double all = 0, concave = 0;
 };
@@ -223,13 +224,13 @@ TEST(Offset, KeepsConcaveEdgesSharpOutwardsAndConvexOnesInwards) {
   }
 }
 
-TEST(Offset, FusesWhatComesNear) {
+TEST(Offset, MergesSurfacesThatMeet) {
   const Shape pair = [](const V3d& p) {
     return std::min((p - V3d(-14, 0, 0)).length(), (p - V3d(14, 0, 0)).length()) - 10;
   };
   const NarrowBand grown = offset(sample(pair, 26), 5);
   EXPECT_LT(vdb(grown).tree().getValue(openvdb::Coord(0)), 0);
-  // Where the fronts met there is a crease, on which the distance is that of the circle.
+  // The fronts meet in a crease, on which the distance is that to the circle.
   double worst = 0;
   support::forEachActive(grown, [&](const V3d& p, double value) {
     const V3d q(std::abs(p.x), p.y, p.z);
@@ -241,7 +242,7 @@ TEST(Offset, FusesWhatComesNear) {
   EXPECT_LE(worst, 0.5);
 }
 
-TEST(Offset, KeepsTheSolidForZero) {
+TEST(Offset, KeepsTheSolidForDistanceZero) {
   const NarrowBand ball = sample(sphere(10), 12);
   EXPECT_EQ(offset(ball, 0).contentHash(), ball.contentHash());
   EXPECT_NEAR(offset(ball, 0, {.halfWidth = 5}).halfWidth(), 5, 1e-6);
@@ -295,9 +296,10 @@ TEST(Offset, Refuses) {
   EXPECT_THROW((void)offset(ball, 5, {.progress = [](double) { return false; }}), Cancelled);
 }
 
-// === By a length of each point's own
+// === Offset by a variable distance
 
-/// Where the zero set lies along rays from the centre, less what is expected there; the largest.
+/// Largest difference between the position of the zero set along rays from the centre and the
+/// expected position.
 double radialError(const NarrowBand& band, const std::function<double(const V3d&)>& radius) {
   const BandSampler phi(band, Interpolation::Tricubic);
   double worst = 0;
@@ -310,7 +312,7 @@ double radialError(const NarrowBand& band, const std::function<double(const V3d&
   return worst;
 }
 
-TEST(OffsetBy, AgreesWithTheConstant) {
+TEST(OffsetBy, AgreesWithTheConstantOffset) {
   const NarrowBand ball = sample(sphere(20), 22);
   for (const double distance : {4.0, -4.0, 0.0}) {
     const NarrowBand moved = offsetBy(ball, [=](const V3d&) { return distance; });
@@ -320,7 +322,7 @@ TEST(OffsetBy, AgreesWithTheConstant) {
 
 TEST(OffsetBy, DisplacesASphereAlongItsNormals) {
   const NarrowBand ball = sample(sphere(20), 22);
-  // Read at the closest point: a field that has other values off the surface must not matter.
+  // The field is read at the closest point, so that its values off the surface must not matter.
   const auto length = [](const V3d& n) { return 1 + 3 * n.z * n.z - 4 * n.x; };
   const NarrowBand moved = offsetBy(ball, [&](const V3d& p) {
     const double off = (p - kCentre).length() - 20;
@@ -346,7 +348,7 @@ TEST(OffsetBy, ConvergesToTheDisplacedSurface) {
   }
 }
 
-TEST(OffsetBy, LeavesWhatIsNotReached) {
+TEST(OffsetBy, KeepsPartsWithZeroDistance) {
   const NarrowBand ball = sample(sphere(15), 17);
   const NarrowBand moved =
       offsetBy(ball, [](const V3d& p) { return std::clamp(p.x / 2 - 2, 0.0, 2.0); });

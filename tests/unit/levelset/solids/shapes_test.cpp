@@ -17,8 +17,8 @@ namespace shapes_test {
 using namespace levelset;
 using Imath::V3d;
 
-/// Nearest of many points on the surface, `spacing` apart: an independent, if slow, bound on the
-/// distance from both sides.
+/// Distance to the nearest of many surface points, `spacing` apart. An independent, slow bound on
+/// the distance from both sides.
 double nearest(const std::vector<V3d>& surface, const V3d& p) {
   double best = std::numeric_limits<double>::max();
   for (const V3d& s : surface) best = std::min(best, (s - p).length2());
@@ -36,7 +36,7 @@ void expectDistances(const NarrowBand& band, const std::vector<V3d>& surface, do
   EXPECT_GT(count, 1000u);
 }
 
-/// Points of a surface of revolution about the z axis from points (r, z) of its profile.
+/// Points of a surface of revolution about the z axis, from points (r, z) of its profile.
 std::vector<V3d> revolve(const std::vector<std::pair<double, double>>& profile, int turns) {
   std::vector<V3d> points;
   for (const auto& [r, z] : profile)
@@ -47,7 +47,8 @@ std::vector<V3d> revolve(const std::vector<std::pair<double, double>>& profile, 
   return points;
 }
 
-/// Same grid points active, same values as the formula everywhere, both sides.
+/// Expects the same active grid points and the same values as the formula everywhere, on both
+/// sides.
 void expectSampled(const NarrowBand& band, const std::function<double(const V3d&)>& phi,
                    const Imath::Box3d& box) {
   const NarrowBand truth = support::sampleBand(phi, box, band.voxelSize(), band.halfWidth());
@@ -88,7 +89,7 @@ TEST(Shapes, BoxIsExactAtEdgesAndAcrossItsMedialAxis) {
   expectDistances(makeBox(half * 2, V3d(0.01, 0.02, 0.03), 0.05, {.halfWidth = 5}), surface, 0.015);
 }
 
-TEST(Shapes, TorusTurnsAboutItsAxis) {
+TEST(Shapes, TorusFollowsItsAxis) {
   const double radius = 0.6, tube = 0.25;
   std::vector<std::pair<double, double>> circle;
   for (int i = 0; i < 200; ++i)
@@ -126,7 +127,7 @@ TEST(Shapes, CylinderIsExactAtRimAndMedialAxis) {
     profile.emplace_back(radius * i / 80.0, -height / 2);
   }
   std::vector<V3d> surface;
-  for (const V3d& p : revolve(profile, 250)) surface.emplace_back(p.y, p.z, p.x);  // z to y
+  for (const V3d& p : revolve(profile, 250)) surface.emplace_back(p.y, p.z, p.x);  // maps z to y
   expectDistances(makeCylinder(radius, height, V3d(0), V3d(0, -1, 0), 0.04, {.halfWidth = 6}),
                   surface, 0.015);
 }
@@ -147,7 +148,7 @@ TEST(Shapes, LargeSphereFillsItsInsideWithTiles) {
   const NarrowBand band = makeSphere(300, V3d(0.3), 1);
   EXPECT_NEAR(static_cast<double>(band.activeVoxelCount()), 4 * M_PI * 300 * 300 * 6, 4e4);
   EXPECT_LT(static_cast<double>(band.memoryUse()), 3.2e7 * 4)
-      << "no more than the leaves at the surface";
+      << "memory exceeds that of the surface leaves";
   for (int x = -299; x < 300; x += 13)
     for (int y = -299; y < 300; y += 17) {
       const double phi = (V3d(x, y, 5) - V3d(0.3)).length() - 300;
@@ -155,7 +156,7 @@ TEST(Shapes, LargeSphereFillsItsInsideWithTiles) {
     }
 }
 
-TEST(Shapes, FarFromTheOriginNothingIsLost) {
+TEST(Shapes, FarFromTheOriginPrecisionIsKept) {
   const V3d far(1e6, -1e6, 1e6);
   const NarrowBand here = makeSphere(1, V3d(0), 0.0625), there = makeSphere(1, far, 0.0625);
   EXPECT_EQ(here.activeVoxelCount(), there.activeVoxelCount());
@@ -164,7 +165,8 @@ TEST(Shapes, FarFromTheOriginNothingIsLost) {
 }
 
 TEST(Shapes, ScaleWithTheirVoxels) {
-  // Powers of two scale every intermediate exactly: the same tree, values scaled to the bit.
+  // Powers of two scale every intermediate result exactly: the same tree, and values scaled to the
+  // bit.
   const NarrowBand small = makeTorus(0.6, 0.25, V3d(0.1), V3d(1, 2, 3), 1.0 / 32);
   const NarrowBand large = makeTorus(0.6 * 1024, 0.25 * 1024, V3d(102.4), V3d(1, 2, 3), 32);
   ASSERT_TRUE(vdb(small).tree().hasSameTopology(vdb(large).tree()));
@@ -182,7 +184,7 @@ TEST(Shapes, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(hashes[0], hashes[2]);
 }
 
-TEST(Shapes, RefuseWhatIsNoLength) {
+TEST(Shapes, RefuseInvalidLengths) {
   const double nan = std::nan(""), infinite = std::numeric_limits<double>::infinity();
   for (const double bad : {0.0, -1.0, nan, infinite}) {
     EXPECT_THROW((void)makeSphere(bad, V3d(0), 0.1), UsageError) << bad;
@@ -202,21 +204,21 @@ TEST(Shapes, RefuseWhatIsNoLength) {
 TEST(Shapes, RefuseVoxelsThatMissTheShape) {
   EXPECT_THROW((void)makeSphere(1, V3d(0), 2.1), InvalidInput);
   EXPECT_THROW((void)makeBox(V3d(10, 10, 0.1), V3d(0, 0, 0.25), 0.5), InvalidInput)
-      << "between two layers of grid points";
+      << "no grid point is inside";
   EXPECT_NO_THROW((void)makeBox(V3d(10, 10, 0.1), V3d(0), 0.5));
 }
 
-TEST(Shapes, RefuseWhatDoesNotFit) {
+TEST(Shapes, RefuseShapesThatExceedMemory) {
   EXPECT_THROW((void)makeSphere(1, V3d(0), 1e-9), ResourceLimit);
   EXPECT_THROW((void)makeSphere(1, V3d(1e12, 0, 0), 0.1), ResourceLimit);
   EXPECT_THROW((void)makeSphere(1, V3d(0), 0.001, {.maxMemory = 100'000'000}), ResourceLimit);
-  // The estimate is no less than what is taken, and not twice as much.
+  // The estimate is at least the actual memory, and less than twice as much.
   const NarrowBand band = makeSphere(1, V3d(0), 0.01);
   EXPECT_THROW((void)makeSphere(1, V3d(0), 0.01, {.maxMemory = band.memoryUse()}), ResourceLimit);
   EXPECT_NO_THROW((void)makeSphere(1, V3d(0), 0.01, {.maxMemory = 2 * band.memoryUse()}));
 }
 
-TEST(Shapes, StopWhenAsked) {
+TEST(Shapes, StopWhenCancelled) {
   EXPECT_THROW((void)makeSphere(1, V3d(0), 0.01, {.progress = [](double) { return false; }}),
                Cancelled);
   double last = 0;

@@ -49,7 +49,7 @@ V3d centreOf(const Patch& patch) {
   return (patch.corners[0] + patch.corners[1] + patch.corners[2] + patch.corners[3]) / 4.0;
 }
 
-// === Carrying
+// === Footprints that follow the base
 
 TEST(CarryFootprint, FollowsATranslationAlongItsNormal) {
   const V3d at = V3d(2, 3, 6) / 7.0;
@@ -67,12 +67,12 @@ TEST(CarryFootprint, FollowsATranslationAlongItsNormal) {
     EXPECT_LT((rigid.corners[i] - first.corners[i] - step * 5).length(), 0.02 * kVoxel);
     drifted = std::max(drifted, (free.corners[i] - first.corners[i] - step * 5).length());
   }
-  // Corners by themselves go along their own normals, and so apart.
+  // Corners without coupling move along their own normals, and therefore apart.
   EXPECT_GT(drifted, 0.2 * kVoxel);
   EXPECT_LT(mapping::driftBetween(first, rigid).factor(), 1.002);
 }
 
-TEST(CarryFootprint, GoesAlongTheRadiiOfAGrowingBall) {
+TEST(CarryFootprint, FollowsTheRadiiOfAGrowingBall) {
   const Footprint first = footprint(ballAt(V3d(0)), V3d(0.3, -0.5, 0.8), 0.8);
   for (const CarryRule rule : {CarryRule::Corners, CarryRule::Rigid}) {
     Footprint now = first;
@@ -84,7 +84,7 @@ TEST(CarryFootprint, GoesAlongTheRadiiOfAGrowingBall) {
       for (std::size_t i = 0; i < 4; ++i)
         EXPECT_LT((now.corners[i] - first.corners[i].normalized() * 2).length(), 0.03 * kVoxel);
       EXPECT_NEAR(mapping::driftBetween(first, now).most, 2, 0.01);
-    } else {  // the shape stays: the ways from the centre are as long as before
+    } else {  // the shape is kept: distances from the centre are unchanged
       for (std::size_t i = 0; i < 4; ++i) {
         const double way = 2 * std::acos(now.corners[i].normalized().dot(now.centre.normalized()));
         EXPECT_NEAR(way, std::acos(first.corners[i].normalized().dot(first.centre.normalized())),
@@ -94,7 +94,7 @@ TEST(CarryFootprint, GoesAlongTheRadiiOfAGrowingBall) {
   }
 }
 
-/// A plane with a hump across it at x = `place`, near enough a distance.
+/// Plane with a hump across it at x = `place`, close to a distance.
 NarrowBand wave(double place) {
   const double height = 0.8, width = 0.5;
   const auto phi = [=](const V3d& p) {
@@ -104,8 +104,8 @@ NarrowBand wave(double place) {
   return support::sampleBand(phi, {V3d(-2.5, -1, -0.4), V3d(2.5, 1, 1.2)}, kVoxel, 4);
 }
 
-TEST(CarryFootprint, HoldsPatchesTogetherUnderAWave) {
-  // It drags corners along its flanks, as in the thesis; the patch as a whole keeps its size.
+TEST(CarryFootprint, KeepsPatchesTogetherUnderAWave) {
+  // The wave drags corners along its flanks, as in the thesis. The complete patch keeps its size.
   const Footprint first = footprint(wave(-2.5), V3d(0), 0.8);
   Footprint free = first, rigid = first;
   double drifted = 0, held = 0;
@@ -126,8 +126,8 @@ TEST(CarryFootprint, HoldsPatchesTogetherUnderAWave) {
   EXPECT_LT(held, 0.05);
 }
 
-TEST(CarryFootprint, StaysWhereTheSurfaceMovesAlongItself) {
-  // A ball that turns, and the same ball on another grid: nothing tells that it has turned.
+TEST(CarryFootprint, StaysWhereTheSurfaceMovesTangentially) {
+  // A rotating ball, and the same ball on another grid. The zero set does not show the rotation.
   const NarrowBand ball = ballAt(V3d(0));
   const Footprint first = footprint(ball, V3d(0, 0, 1));
   for (const CarryRule rule : {CarryRule::Corners, CarryRule::Rigid}) {
@@ -136,7 +136,7 @@ TEST(CarryFootprint, StaysWhereTheSurfaceMovesAlongItself) {
   }
 }
 
-TEST(CarryFootprint, TellsWhereThereIsNoSurface) {
+TEST(CarryFootprint, ReportsAMissingSurface) {
   const Footprint first = footprint(ballAt(V3d(0)), V3d(0, 0, 1));
   const NarrowBand far = ballAt(V3d(0, 0, 50));
   EXPECT_THROW((void)mapping::carryFootprint(far, first, CarryRule::Corners),
@@ -145,7 +145,7 @@ TEST(CarryFootprint, TellsWhereThereIsNoSurface) {
                levelset::InvalidInput);
 }
 
-TEST(Footprint, KnowsItsCornersFromItsCentre) {
+TEST(Footprint, ComputesItsCornersFromItsCentre) {
   const NarrowBand ball = ballAt(V3d(0));
   const Footprint f = footprint(ball, V3d(0.6, 0, 0.8), 0.8);
   ASSERT_TRUE(f.reach);
@@ -158,7 +158,7 @@ TEST(Footprint, KnowsItsCornersFromItsCentre) {
 
 // === Key frames
 
-TEST(PatchPath, MovesAlongGreatCircles) {
+TEST(PatchPath, FollowsGreatCircles) {
   const NarrowBand ball = ballAt(V3d(0), 1, 0.05);
   const Footprint a = footprint(ball, V3d(0, 0, 1)),
                   b = footprint(ball, V3d(1, 0.2, 0.1), 0.5, 0.4);
@@ -179,8 +179,8 @@ TEST(PatchPath, MovesAlongGreatCircles) {
   }
 }
 
-TEST(PatchPath, TurnsRigidPatchesEvenly) {
-  // On a plane: a quarter turn on the way, and twice as large at its end.
+TEST(PatchPath, RotatesRigidPatchesUniformly) {
+  // On a plane: a quarter turn during the motion, and twice the size at its end.
   const NarrowBand slab = support::sampleBand([](const V3d& p) { return p.z; },
                                               {V3d(-3, -3, -0.4), V3d(3, 3, 0.4)}, 0.1, 6);
   const Footprint a = footprint(slab, V3d(-1.5, 0, 0), 1),
@@ -201,8 +201,8 @@ NarrowBand pipe() {
   return levelset::makeCylinder(1, 6, V3d(0), V3d(0, 0, 1), kVoxel);
 }
 
-TEST(PatchPath, GoesOneWayAroundAPipe) {
-  // On opposite sides: of the shortest ways of the corners, two go left and two go right.
+TEST(PatchPath, TakesOneSideAroundAPipe) {
+  // Keys on opposite sides. Of the corners' shortest paths two go left and two go right.
   const NarrowBand base = pipe();
   const Footprint a = footprint(base, V3d(1, 0, 0)),
                   b = footprint(base, V3d(-1, 0.001, 0), 0.8, kPi);
@@ -213,7 +213,7 @@ TEST(PatchPath, GoesOneWayAroundAPipe) {
     ASSERT_FALSE(alone.empty());
     sides += alone[alone.size() / 2].y > 0 ? 1 : -1;
   }
-  EXPECT_LT(std::abs(sides), 4) << "the corners by themselves all go the same way";
+  EXPECT_LT(std::abs(sides), 4) << "all corners take the same side on their own";
   for (const CarryRule rule : {CarryRule::Corners, CarryRule::Rigid}) {
     const PatchPath path(base, a, b, rule);
     EXPECT_TRUE(path.isAlike());
@@ -223,7 +223,7 @@ TEST(PatchPath, GoesOneWayAroundAPipe) {
       if (n == 5) {
         for (const V3d& corner : f.corners) EXPECT_GT(corner.y * side, 0.5);
       }
-      // As wide as the part of the way says, around the pipe and along it.
+      // Width interpolated over the path, around the pipe and along it.
       const double width = 0.6 + 0.2 * n / 10;
       const V3d &p = f.corners[0], &q = f.corners[1], &r = f.corners[2];
       EXPECT_NEAR(
@@ -235,7 +235,7 @@ TEST(PatchPath, GoesOneWayAroundAPipe) {
   }
 }
 
-TEST(PatchPath, KeepsToTheSideOfItsGuide) {
+TEST(PatchPath, StaysOnTheSideOfItsGuide) {
   const NarrowBand base = pipe();
   const Footprint a = footprint(base, V3d(1, 0, 0));
   const PatchPath left(base, a, footprint(base, V3d(-1, 0.05, 0)), CarryRule::Rigid);
@@ -247,7 +247,7 @@ TEST(PatchPath, KeepsToTheSideOfItsGuide) {
   EXPECT_GT(guided.at(0.5).centre.y, 0.9);
 }
 
-TEST(PatchPath, RefusesAnotherComponent) {
+TEST(PatchPath, RefusesAnotherSurfaceComponent) {
   const NarrowBand two = levelset::unite(ballAt(V3d(-2, 0, 0)), ballAt(V3d(2, 0, 0)));
   const Footprint a = footprint(two, V3d(-2, 0, 1)), b = footprint(two, V3d(2, 0, 1));
   EXPECT_NE(support::refusal<levelset::Error>([&] {
@@ -270,12 +270,12 @@ TEST(AnimatePatches, BeginsAndEndsOnItsKeysToTheBit) {
       EXPECT_EQ(played.patches[frame].layers[layer].positions, patch->layers[layer].positions);
   EXPECT_EQ(played.report.patchesMade, 3u);
   EXPECT_TRUE(played.report.warnings.empty());
-  // Half way from the first to the second.
+  // Half way from the first to the second key.
   EXPECT_LT((centreOf(played.patches[1]).normalized() - V3d(1, 0, 1).normalized()).length(), 0.01);
 }
 
-TEST(AnimatePatches, CarriesBothWaysOnAGrowingBase) {
-  // The second patch stands on the last, larger ball.
+TEST(AnimatePatches, FollowsAGrowingBaseForwardsAndBackwards) {
+  // The second patch is on the last, larger ball.
   const auto radius = [](std::size_t f) { return 1 + 0.05 * static_cast<double>(f); };
   const NarrowBand first = ballAt(V3d(0)), last = ballAt(V3d(0), radius(4));
   const Patch a = patchAt(first, V3d(0, 0, 1)), b = patchAt(last, V3d(1.2, 0, 0), 0.6, -kPi / 2);
@@ -287,7 +287,8 @@ TEST(AnimatePatches, CarriesBothWaysOnAGrowingBase) {
     const V3d centre = V3d(std::sin(angle), 0, std::cos(angle)) * radius(f);
     for (const V3d& corner : played.patches[f].corners)
       EXPECT_NEAR(corner.length(), radius(f), 0.02 * kVoxel) << f;
-    // The corners' great circles are not quite as far from each other as from the middle.
+    // The great circles of the corners have a slightly different distance from each other than from
+    // the middle.
     EXPECT_LT((centreOf(played.patches[f]).normalized() * radius(f) - centre).length(),
               0.25 * kVoxel)
         << f;
@@ -295,10 +296,10 @@ TEST(AnimatePatches, CarriesBothWaysOnAGrowingBase) {
   EXPECT_EQ(played.patches[4].layers[0].positions, b.layers[0].positions);
 }
 
-TEST(AnimatePatches, MakesNothingAgainThatStands) {
+TEST(AnimatePatches, ReusesUnchangedFrames) {
   const NarrowBand ball = ballAt(V3d(0));
   const Patch a = patchAt(ball, V3d(0, 0, 1));
-  // Two of the bases are the one before, though made anew.
+  // Two of the bases equal their predecessors but are built anew.
   const auto bases = [](std::size_t f) { return ballAt(V3d(0), f < 2 ? 1 : 1.05); };
   const Played played = play(ball, {keyOf(a)}, {.frames = 4, .bases = bases});
   EXPECT_EQ(played.report.patchesMade, 1u);
@@ -306,17 +307,17 @@ TEST(AnimatePatches, MakesNothingAgainThatStands) {
   EXPECT_FALSE(played.report.frames[1].isRemade);
   EXPECT_TRUE(played.report.frames[2].isRemade);
   EXPECT_EQ(played.patches[1].layers[1].positions, a.layers[1].positions);
-  // Held between two keys that are one.
+  // At rest between two equal keys.
   const Played held = play(ball, {keyOf(a), keyOf(a, 3)}, {.frames = 4});
   EXPECT_EQ(held.report.patchesMade, 0u);
   EXPECT_EQ(held.report.reused, 3u);
-  // Of a height whose parts do not add up to it: 1.5 · 0.8 + 1.5 · 0.2 < 1.5.
+  // A height whose rounded parts do not add up to it: 1.5 · 0.8 + 1.5 · 0.2 < 1.5.
   const Patch tall = patchAt(ball, V3d(0, 0, 1), 0.6, 0, 1.5);
   EXPECT_EQ(play(ball, {keyOf(tall), keyOf(tall, 5)}, {.frames = 6}).report.patchesMade, 0u);
 }
 
-TEST(AnimatePatches, TellsTheFrameOfWhatItRefuses) {
-  // A peanut that splits between the corners: the third frame is two balls.
+TEST(AnimatePatches, NamesTheFrameOfAnError) {
+  // A peanut that splits between the corners. In the third frame it is two balls.
   const auto base = [](double apart) {
     return levelset::unite(ballAt(V3d(-apart, 0, 0)), ballAt(V3d(apart, 0, 0)));
   };
@@ -332,14 +333,14 @@ TEST(AnimatePatches, TellsTheFrameOfWhatItRefuses) {
   EXPECT_NE(torn.find("animate: frame 2: "), std::string::npos) << torn;
   EXPECT_NE(torn.find("the same surface component"), std::string::npos) << torn;
   EXPECT_EQ(torn.find("frame"), torn.rfind("frame")) << torn;
-  // Nothing is left.
+  // No solid is left.
   const NarrowBand ball = ballAt(V3d(0));
   const std::string gone = support::refusal<levelset::Error>([&] {
     (void)play(ball, {keyOf(patchAt(ball, V3d(0, 0, 1)))},
                {.frames = 3, .bases = [&](std::size_t f) { return f < 2 ? ball : NarrowBand(); }});
   });
   EXPECT_NE(gone.find("animate: frame 2: the base has no surface"), std::string::npos) << gone;
-  // The keys on two parts.
+  // The keys are on different components.
   const NarrowBand two = base(1.3);
   std::size_t made = 0;
   const std::string apart = support::refusal<levelset::Error>([&] {
@@ -352,8 +353,8 @@ TEST(AnimatePatches, TellsTheFrameOfWhatItRefuses) {
       << apart;
 }
 
-TEST(AnimatePatches, WarnsOfPatchesThatDrift) {
-  // Every corner goes along its radius, so the patch grows with the ball.
+TEST(AnimatePatches, WarnsOfDriftingPatches) {
+  // Every corner moves along its radius, so that the patch grows with the ball.
   const auto bases = [](std::size_t f) {
     return ballAt(V3d(0), 1 + 0.24 * static_cast<double>(f));
   };
@@ -369,8 +370,8 @@ TEST(AnimatePatches, WarnsOfPatchesThatDrift) {
   EXPECT_TRUE(rigid.report.warnings.empty());
 }
 
-TEST(AnimatePatches, WarnsOfCornersThatTurn) {
-  // Half a turn on the way: the corners' own ways cross in the middle.
+TEST(AnimatePatches, WarnsOfRotatedCorners) {
+  // Half a turn during the motion. The corners' own paths cross in the middle.
   const NarrowBand ball = ballAt(V3d(0));
   const Patch a = patchAt(ball, V3d(0, 0, 1), 0.8), b = patchAt(ball, V3d(0.3, 0, 1), 0.8, 2);
   const std::vector<AnimationKey> keys = {keyOf(a), keyOf(b, 2)};
@@ -387,7 +388,7 @@ TEST(AnimatePatches, WarnsOfCornersThatTurn) {
   EXPECT_LT(size(free.patches[1]), 0.7 * size(a));
 }
 
-TEST(AnimatePatches, RefusesKeysThatDoNotGoTogether) {
+TEST(AnimatePatches, RefusesIncompatibleKeys) {
   const NarrowBand ball = ballAt(V3d(0));
   const Patch a = patchAt(ball, V3d(0, 0, 1));
   const auto refusal = [&](const std::vector<AnimationKey>& keys) {
@@ -403,7 +404,7 @@ TEST(AnimatePatches, RefusesKeysThatDoNotGoTogether) {
   mirrored.patches[0].mirrored = true;
   EXPECT_NE(refusal({keyOf(a), mirrored}).find("one of patch 2 and the first patch is mirrored"),
             std::string::npos);
-  // Tiles have one outline, and each counts.
+  // Tiles share one outline, and each of them counts.
   AnimationKey tiles = keyOf(a), others = keyOf(a, 3);
   tiles.patches.push_back(a);
   EXPECT_NE(refusal({tiles, others}).find("a set of 1 tiles, the first patch a set of 2"),
@@ -411,7 +412,7 @@ TEST(AnimatePatches, RefusesKeysThatDoNotGoTogether) {
   others.patches.push_back(a);
   others.patches[1].mirrored = true;
   EXPECT_NE(refusal({tiles, others}).find("in member 2"), std::string::npos);
-  // Of another number of layers: the frames between jump, so it is told.
+  // A different number of layers makes frames jump, so it is reported.
   mapping::PatchOptions finer = support::thinPatch();
   finer.layers = 3;
   const Patch b = makePatch(ball, a.corners, a.height, finer).patch;
@@ -420,7 +421,7 @@ TEST(AnimatePatches, RefusesKeysThatDoNotGoTogether) {
   EXPECT_NE(played.report.warnings[0].find("3 layers and the first patch 2"), std::string::npos);
 }
 
-TEST(AnimatePatches, RefusesKeysOfAnotherBaseBeforeAFrameIsMade) {
+TEST(AnimatePatches, RefusesKeysOfAnotherBaseBeforeTheFirstFrame) {
   const NarrowBand ball = ballAt(V3d(0)), other = ballAt(V3d(0), 1.4);
   const Patch a = patchAt(ball, V3d(0, 0, 1)), b = patchAt(other, V3d(1.4, 0, 0));
   std::size_t made = 0;
@@ -442,7 +443,7 @@ TEST(AnimatePatches, RefusesKeysOfAnotherBaseBeforeAFrameIsMade) {
   EXPECT_EQ(made, 0u);
 }
 
-TEST(AnimatePatches, TellsTheFrameOnceWhateverRefuses) {
+TEST(AnimatePatches, NamesTheFrameOnceForAnyError) {
   const NarrowBand ball = ballAt(V3d(0));
   const AnimationKey key = keyOf(patchAt(ball, V3d(0, 0, 1)));
   const auto throwing = [&](const auto& error) {
@@ -480,8 +481,8 @@ TEST(AnimatePatches, HoldsOneBaseBesideTheFirst) {
   EXPECT_GE(read, 5u);
 }
 
-TEST(AnimatePatches, CountsTheDriftOfTheGoal) {
-  // The ball grows by a quarter a frame: the goal, as it would be on the second, is 5/8 as large.
+TEST(AnimatePatches, IncludesTheDriftOfTheGoal) {
+  // The ball grows by a quarter per frame. The goal is 5/8 as large on the second ball.
   const NarrowBand first = ballAt(V3d(0)), last = ballAt(V3d(0), 2);
   const Patch a = patchAt(first, V3d(0, 0, 1)), b = patchAt(last, V3d(2, 0, 0), 1.2);
   const auto bases = [](std::size_t f) {
@@ -493,7 +494,7 @@ TEST(AnimatePatches, CountsTheDriftOfTheGoal) {
   EXPECT_NEAR(played.report.frames[4].drift.factor(), 1, 1e-12);
 }
 
-TEST(AnimatePatches, IsCancelledBetweenTheBasesOnItsWayBack) {
+TEST(AnimatePatches, CanBeCancelledBetweenBasesOnItsWayBack) {
   const NarrowBand ball = ballAt(V3d(0));
   const Patch a = patchAt(ball, V3d(0, 0, 1)), b = patchAt(ball, V3d(1, 0, 0));
   std::size_t read = 0;
@@ -529,7 +530,7 @@ TEST(AnimatePatches, PlaysOneFrame) {
   EXPECT_EQ(played.report.patchesMade, 0u);
 }
 
-TEST(AnimatePatches, MakesReadPatchesWithAsManyParticles) {
+TEST(AnimatePatches, BuildsReadPatchesWithTheSameNumberOfParticles) {
   const NarrowBand ball = ballAt(V3d(0));
   const Patch a = patchAt(ball, V3d(0, 0, 1), 0.8);
   const mapping::PatchOptions like = mapping::optionsLike(a);

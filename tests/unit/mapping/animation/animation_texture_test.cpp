@@ -50,7 +50,7 @@ mapping::TextureOptions coarse() {
   return {.map = mapping::TextureMap::Rbf, .voxelSize = kVoxel};
 }
 
-TEST(AnimateTexture, IsTheTextureOnItsKeysAtBothEnds) {
+TEST(AnimateTexture, EqualsTheTextureOnItsKeysAtBothEnds) {
   const NarrowBand ball = ballAt(V3d(0)), stud = ballAt(V3d(0), 0.5);
   const Patch a = patchAt(ball, V3d(0, 0, 1)), b = patchAt(ball, V3d(1, 0, 0), 0.5, -kPi / 2);
   const Shown shown =
@@ -62,7 +62,7 @@ TEST(AnimateTexture, IsTheTextureOnItsKeysAtBothEnds) {
   EXPECT_EQ(shown.report.reused, 0u);
 }
 
-TEST(AnimateTexture, ReusesFramesThatDoNotChange) {
+TEST(AnimateTexture, ReusesUnchangedFrames) {
   const NarrowBand ball = ballAt(V3d(0)), stud = ballAt(V3d(0), 0.5);
   const Patch a = patchAt(ball, V3d(0, 0, 1));
   const auto textures = [](std::size_t f) { return ballAt(V3d(0), f < 2 ? 0.5 : 0.4); };
@@ -82,7 +82,7 @@ TEST(AnimateTexture, GivesTheSameBitsForAnyThreads) {
   const NarrowBand ball = ballAt(V3d(0)), stud = ballAt(V3d(0), 0.5);
   const Patch a = patchAt(ball, V3d(0, 0, 1)), b = patchAt(ball, V3d(1, 0, 0), 0.5, -kPi / 2);
   const Patch c = patchAt(ballAt(V3d(0), 1.1), V3d(1, 0, 0), 0.5, -kPi / 2);
-  // Corners on a base that stands, whole patches on one that grows.
+  // Separate corners on a base at rest, entire patches on a growing base.
   std::vector<std::uint64_t> first, firstMoved;
   for (const std::size_t threads : {1, 2}) {
     support::onThreads(threads, [&] {
@@ -104,7 +104,7 @@ TEST(AnimateTexture, GivesTheSameBitsForAnyThreads) {
   EXPECT_NE(first, firstMoved);
 }
 
-TEST(AnimateTexture, ShowsTexturesThatGrowAndShrink) {
+TEST(AnimateTexture, ScalesTexturesThatGrowAndShrink) {
   const NarrowBand ball = ballAt(V3d(0)), stud = ballAt(V3d(0), 0.5);
   const Patch a = patchAt(ball, V3d(0, 0, 1));
   const auto textures = [](std::size_t f) { return ballAt(V3d(0), f == 1 ? 0.35 : 0.7); };
@@ -132,7 +132,7 @@ TEST(AnimateTexture, ShowsTexturesThatGrowAndShrink) {
       ASSERT_EQ(report.warnings.size(), 1u);
       EXPECT_NE(report.warnings[0].find("frame 2: the texture extends beyond"), std::string::npos);
     }
-    // A box that is given is kept.
+    // A given box is kept.
     options.texture.textureBox = ballAt(V3d(0), 0.7).zeroSetBounds();
     const AnimationReport given = mapping::animateTexture(ball, stud, {keyOf(a)}, options,
                                                           [](std::size_t, const auto&, bool) {});
@@ -140,7 +140,7 @@ TEST(AnimateTexture, ShowsTexturesThatGrowAndShrink) {
   }
 }
 
-TEST(AnimateTexture, ImprovesPatchesOnceWhileTheyStand) {
+TEST(AnimateTexture, ImprovesPatchesOnceWhileTheyAreAtRest) {
   const NarrowBand ball = ballAt(V3d(0)), stud = ballAt(V3d(0), 0.5);
   const Patch a = patchAt(ball, V3d(0, 0, 1));
   std::vector<std::size_t> improved;
@@ -160,13 +160,13 @@ TEST(AnimateTexture, ImprovesPatchesOnceWhileTheyStand) {
   EXPECT_EQ(shown.report.reused, 0u);
   EXPECT_EQ(improved, (std::vector<std::size_t>{0, 3}));
   EXPECT_TRUE(hasProgress);
-  // As without, since it changed nothing.
+  // The same result as without improvement, because it changed nothing.
   options.improve = {};
   EXPECT_EQ(show(ball, stud, {keyOf(a)}, options).hashes, shown.hashes);
 }
 
-TEST(AnimateTexture, TellsWhatItsFramesSay) {
-  // Of two patches one folds, on every frame.
+TEST(AnimateTexture, ReportsNotesOfItsFrames) {
+  // One of two patches folds in every frame.
   const NarrowBand ball = ballAt(V3d(0)), stud = ballAt(V3d(0), 0.5);
   const Patch a = patchAt(ball, V3d(0, 0, 1));
   Patch folded = patchAt(ball, V3d(1, 0, 0));
@@ -187,7 +187,7 @@ TEST(AnimateTexture, TellsWhatItsFramesSay) {
   for (const mapping::FrameReport& frame : report.frames) EXPECT_EQ(frame.skipped, 1u);
 }
 
-TEST(FrameNotes, TellsEachSentenceOfTheFirstFrameThatSaysIt) {
+TEST(FrameNotes, ReportsEachNoteForItsFirstFrame) {
   mapping::FrameNotes notes;
   std::vector<std::string> told;
   notes.add(2, "3 of 5 patches fold", told);
@@ -198,7 +198,7 @@ TEST(FrameNotes, TellsEachSentenceOfTheFirstFrameThatSaysIt) {
                                             "frame 4: 0.2 of the volume is 1e-05 wide, see 7"}));
 }
 
-TEST(AnimateTexture, EndsWhereItIsCancelled) {
+TEST(AnimateTexture, StopsWhenCancelled) {
   const NarrowBand ball = ballAt(V3d(0)), stud = ballAt(V3d(0), 0.5);
   const Patch a = patchAt(ball, V3d(0, 0, 1)), b = patchAt(ball, V3d(1, 0, 0), 0.5, -kPi / 2);
   double last = 0;

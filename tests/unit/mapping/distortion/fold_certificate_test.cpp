@@ -60,9 +60,9 @@ FoldCertificate rbfOf(const Patch& patch, double sink = 0) {
   return certifyRbf(mapping::patchToTexture(patch), patch, sink);
 }
 
-TEST(TrilinearVolume, FindsWhatItsCornersHide) {
-  // Cubes with shaken corners, against a dense grid of samples; some fold between their corners
-  // only.
+TEST(TrilinearVolume, FindsFoldsBetweenCorners) {
+  // Compares cubes with random corners with a dense grid of samples. Some fold between their
+  // corners only.
   std::mt19937 random(7);
   std::uniform_real_distribution<double> unit(-0.75, 0.75);
   int folded = 0, hidden = 0;
@@ -110,21 +110,21 @@ TEST(TrilinearVolume, FindsWhatItsCornersHide) {
   EXPECT_GT(hidden, 0);
 }
 
-TEST(TrilinearVolume, AFlatCubeFolds) {
+TEST(TrilinearVolume, DetectsAFlatCubeAsFolded) {
   std::array<V3d, 8> corners = unitCube();
   for (V3d& c : corners) c.z = 0;
   EXPECT_TRUE(mapping::signOfTrilinear(corners, 0, 1).folds);
   corners = unitCube();
   EXPECT_FALSE(mapping::signOfTrilinear(corners, 0, 1).folds);
   EXPECT_TRUE(mapping::signOfTrilinear(corners, 0, -1).folds);
-  // Corners that may be off by more than the cube is thick prove nothing.
+  // Corners with an uncertainty above the cube's thickness prove nothing.
   for (V3d& c : corners) c.z *= 1e-3;
   EXPECT_FALSE(mapping::signOfTrilinear(corners, 1e-6, 1).folds);
   EXPECT_TRUE(mapping::signOfTrilinear(corners, 1e-3, 1).folds);
 }
 
-TEST(FoldCertificate, TetrahedraAreJudgedExactly) {
-  // One particle goes through the face opposite of it, and by how little does not matter.
+TEST(FoldCertificate, TetrahedraAreDecidedExactly) {
+  // A particle crosses the opposite face. The result does not depend on how far.
   Patch patch = patchAt(box, 3, 3, 3);
   V3d& p = patch.layers[1].positions[4];
   p = V3d(0.5, 0.5, 0);
@@ -138,7 +138,7 @@ TEST(FoldCertificate, TetrahedraAreJudgedExactly) {
   EXPECT_EQ(shellOf(patch).verdict(), FoldVerdict::Folds);
 }
 
-TEST(FoldCertificate, CertifiesBoxesAndWhatIsBentGently) {
+TEST(FoldCertificate, CertifiesBoxesAndGentlyBentPatches) {
   const auto bent = [](const V3d& t) {
     const double angle = 2 * (t.x - 0.5), r = 2 + t.z;
     return V3d(r * std::sin(angle), 3 * t.y, r * std::cos(angle));
@@ -158,8 +158,9 @@ TEST(FoldCertificate, CertifiesBoxesAndWhatIsBentGently) {
   }
 }
 
-TEST(FoldCertificate, LeastJacobianOfACylinderIsThatOfItsFormula) {
-  // Volumes go with the radius, from 2 to 3; the chords' ends are at 2 · sin(α) / α.
+TEST(FoldCertificate, LeastJacobianOfACylinderMatchesItsFormula) {
+  // Volumes are proportional to the radius, from 2 to 3. The ends of the chords are at 2 · sin(α) /
+  // α.
   const auto bent = [](const V3d& t) {
     const double angle = 2 * (t.x - 0.5), r = 2 + t.z;
     return V3d(r * std::sin(angle), 3 * t.y, r * std::cos(angle));
@@ -169,8 +170,8 @@ TEST(FoldCertificate, LeastJacobianOfACylinderIsThatOfItsFormula) {
   EXPECT_NEAR(shellOf(patch).leastJacobian, 2 / 2.5, 0.01);
 }
 
-TEST(FoldCertificate, TellsThePlaceOfAFold) {
-  // One cell's corner is pushed through the cell.
+TEST(FoldCertificate, ReportsThePositionOfAFold) {
+  // One corner of a cell is moved through the cell.
   const auto pushed = [](double way) {
     Patch patch = patchAt([](const V3d& t) { return V3d(4 * t.x, 4 * t.y, t.z); }, 9, 9, 3);
     patch.layers[1].positions[4 * 9 + 4] += V3d(way, way, 0);
@@ -191,9 +192,9 @@ TEST(FoldCertificate, TellsThePlaceOfAFold) {
     EXPECT_EQ(certificate.verdict(), FoldVerdict::Certified);
 }
 
-TEST(FoldCertificate, SmoothMapsAreJudgedAsTheirSlopesSay) {
-  // Where the certificate says that a map does not fold, no sample does; where it says that it
-  // does, the slopes at the place are turned over.
+TEST(FoldCertificate, VerdictsOnSmoothMapsMatchTheirDerivatives) {
+  // Where the certificate proves the absence of folds, no sample folds. Where it finds a fold, the
+  // Jacobian at the reported position is negative.
   int certified = 0, folded = 0;
   for (const double way : {0.0, 0.1, 0.25, 0.6, 1.2}) {
     Patch patch = patchAt([](const V3d& t) { return V3d(2 * t.x, 2 * t.y, t.z); }, 6, 6, 4);
@@ -232,8 +233,8 @@ TEST(FoldCertificate, SmoothMapsAreJudgedAsTheirSlopesSay) {
   EXPECT_GE(folded, 1);
 }
 
-TEST(FoldCertificate, FoldsThatTheSamplesMissAreRefused) {
-  // One cell with shaken corners, until one folds where nobody looked.
+TEST(FoldCertificate, FoldsBetweenSamplesAreRefused) {
+  // Moves the corners of one cell at random until it folds between the samples.
   levelset::TriMesh triangle;
   triangle.positions = {V3d(0.1, 0.1, 0.1), V3d(0.9, 0.1, 0.5), V3d(0.1, 0.9, 0.9)};
   triangle.triangles = {{0, 1, 2}};
@@ -250,9 +251,10 @@ TEST(FoldCertificate, FoldsThatTheSamplesMissAreRefused) {
     ++missed;
     try {
       (void)mapping::mapMesh(triangle, patch, {.textureBox = whole});
-      ADD_FAILURE() << "a fold was let pass";
+      ADD_FAILURE() << "a fold was accepted";
     } catch (const levelset::InvalidInput& error) {
-      EXPECT_NE(std::string(error.what()).find("folds between the"), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("folds between the"), std::string::npos)
+          << error.what();
     }
     const auto allowed =
         mapping::mapMesh(triangle, patch, {.textureBox = whole, .allowFolds = true});
@@ -262,7 +264,7 @@ TEST(FoldCertificate, FoldsThatTheSamplesMissAreRefused) {
   EXPECT_GT(missed, 0);
 }
 
-TEST(FoldCertificate, LayersOfUnlikeCountsAreCutWhereEitherEnds) {
+TEST(FoldCertificate, LayersWithDifferentCountsAreSplitAtTheBordersOfBoth) {
   Patch patch = patchAt(box, 5, 4, 3);
   patch.layers[1] = patchAt(box, 4, 6, 3).layers[1];
   const mapping::PrismCells cells(patch, 0.1);
@@ -300,7 +302,7 @@ TEST(FoldCertificate, MirroredPatchesAreNotFolded) {
   }
 }
 
-TEST(FoldCertificate, TheSmallestPatchAndOneWithoutVolume) {
+TEST(FoldCertificate, HandlesTheSmallestPatchAndOneWithoutVolume) {
   const Patch smallest = patchAt(box, 2, 2, 2);
   EXPECT_EQ(certifyLayers(smallest, 0).verdict(), FoldVerdict::Certified);
   EXPECT_EQ(shellOf(smallest).verdict(), FoldVerdict::Certified);
@@ -313,7 +315,7 @@ TEST(FoldCertificate, TheSmallestPatchAndOneWithoutVolume) {
   }
 }
 
-TEST(FoldCertificate, DoesNotDependOnPlaceScaleOrThreads) {
+TEST(FoldCertificate, DoesNotDependOnPositionScaleOrThreads) {
   const auto wavy = [](const V3d& t) {
     return V3d(t.x + 0.1 * std::sin(3 * t.y), t.y, t.z * (1 + 0.3 * t.x * t.y));
   };
@@ -335,8 +337,9 @@ TEST(FoldCertificate, DoesNotDependOnPlaceScaleOrThreads) {
   }
 }
 
-TEST(RbfTaylor, PolynomialsOfDistancesConvergeAsTheySay) {
-  // Half as far, a sixty-fourth of the error of the value: the next term is of degree six.
+TEST(RbfTaylor, PolynomialsOfDistancesHaveTheStatedOrder) {
+  // At half the distance the error of the value falls to a sixty-fourth, because the next term has
+  // degree six.
   const V3d way(1.5, -2, 0.5), weight(1, -0.5, 2), direction(0.3, 0.4, -0.2);
   mapping::TaylorPolynomial polynomial;
   polynomial.addDistance(way, weight);
@@ -362,7 +365,7 @@ TEST(RbfTaylor, PolynomialsOfDistancesConvergeAsTheySay) {
   }
 }
 
-TEST(RbfTaylor, CubesKeepTheirBounds) {
+TEST(RbfTaylor, CubesSatisfyTheirBounds) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> unit(0, 1);
   const auto wavy = [](const V3d& t) {
@@ -396,7 +399,7 @@ TEST(RbfTaylor, CubesKeepTheirBounds) {
   EXPECT_TRUE(hasFar);
 }
 
-TEST(RbfTaylor, EvaluatesManyPlacesAsTheMapDoes) {
+TEST(RbfTaylor, EvaluatesManyPositionsLikeTheMap) {
   const Patch patch =
       patchAt([](const V3d& t) { return V3d(3 * t.x, 3 * t.y, t.z + 0.3 * t.x * t.x); }, 14, 14, 4);
   const mapping::RbfMap map = mapping::patchToTexture(patch);
@@ -415,8 +418,8 @@ TEST(RbfTaylor, EvaluatesManyPlacesAsTheMapDoes) {
   }
 }
 
-TEST(JacobianField, HoldsTheJacobianOfEachMap) {
-  // Heights grow with x: the Jacobian of texture → patch is (1 + x) / 1.5, its median 1.
+TEST(JacobianField, HasTheJacobianOfEachMap) {
+  // Heights increase with x. The Jacobian of texture → patch is (1 + x) / 1.5, with median 1.
   const auto wedge = [](const V3d& t) { return V3d(t.x, t.y, t.z * (1 + t.x)); };
   const Patch patch = patchAt(wedge, 17, 5, 3);
   const mapping::JacobianFieldOptions options{.voxelSize = 0.05};
@@ -430,7 +433,7 @@ TEST(JacobianField, HoldsTheJacobianOfEachMap) {
   const FoldCertificate proof = certifyRbf(map, patch, 0);
   const auto smooth =
       levelset::asScalarField(mapping::jacobianField(patch, map, proof, options), "test");
-  // Of patch → texture, half of the volume lies below x = √2.5 − 1.
+  // For patch → texture, half of the volume is below x = √2.5 − 1.
   EXPECT_NEAR(proof.unit, 1 / std::sqrt(2.5), 0.05);
   for (const double x : {0.25, 0.5, 0.75}) {
     const V3d place(x, 0.5, 0.5);
@@ -444,8 +447,9 @@ TEST(JacobianField, HoldsTheJacobianOfEachMap) {
                levelset::ResourceLimit);
 }
 
-TEST(FoldCertificate, OfASmoothMapShowsWhereWhatItCountsFolds) {
-  // Higher than the trough is wide: cubes that turn over lie across the texture's border, too.
+TEST(FoldCertificate, OfASmoothMapShowsEveryCountedFold) {
+  // The patch is higher than the trough is wide. Folded cubes also lie across the border of the
+  // texture.
   const levelset::NarrowBand trough =
       levelset::subtract(levelset::makeBox(V3d(8, 8, 2), V3d(0, 0, -1), 0.2),
                          levelset::makeCylinder(1.5, 12, V3d(0), V3d(0, 1, 0), 0.2));
@@ -453,7 +457,7 @@ TEST(FoldCertificate, OfASmoothMapShowsWhereWhatItCountsFolds) {
                                       V3d(-1, 1, -1.12)};
   const Patch patch = mapping::makePatch(trough, corners, 2.5, {.layers = 4}).patch;
   const FoldCertificate proof = certifyRbf(mapping::patchToTexture(patch), patch, 0.1);
-  // Whatever is counted as folded has a place to show; what may only fold outside is not certified.
+  // Every counted fold has a visible position. A possible fold outside is not certified.
   EXPECT_EQ(proof.foldedShare > 0, proof.verdict() == FoldVerdict::Folds);
   EXPECT_EQ(proof.leastJacobian <= 0, proof.verdict() == FoldVerdict::Folds);
   EXPECT_NE(proof.verdict(), FoldVerdict::Certified);

@@ -32,7 +32,7 @@ using support::expectSound;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-// === What all of them promise
+// === Properties of all generators
 
 using Make = std::function<NarrowBand(double voxel, const ShapeOptions&)>;
 
@@ -97,20 +97,20 @@ TEST(Generators, DoNotDependOnThreads) {
 }
 
 TEST(Generators, KeepTheirShapeFarFromTheOrigin) {
-  // Multiples of the voxel, so that the same grid points lie at the same places of the solid;
-  // beside the grid, lest faces run through its points.
+  // Shifts by multiples of the voxel, so that the same grid points are at the same positions of the
+  // solid. The solid is off the grid, so that no face runs through grid points.
   const V3d aside(0.011, 0.017, 0.013), far(3 * 524288, -3 * 524288, 3 * 262144);
   const auto here = all(aside), there = all(far + aside);
   for (std::size_t i = 0; i < here.size(); ++i) {
     const Measurement a = levelset::measure(here[i].second(0.09375, {})),
                       b = levelset::measure(there[i].second(0.09375, {}));
-    // No part of the surface has moved by a thousandth of a voxel.
+    // No part of the surface moves by a thousandth of a voxel.
     EXPECT_NEAR(a.volume, b.volume, 1e-3 * 0.09375 * a.area) << here[i].first;
     EXPECT_EQ(a.euler, b.euler) << here[i].first;
   }
 }
 
-TEST(Generators, StopWhenAskedAndMindTheMemory) {
+TEST(Generators, StopWhenCancelledAndRespectMemory) {
   for (const auto& [name, make] : all()) {
     EXPECT_THROW((void)make(0.08, {.progress = [](double) { return false; }}), levelset::Cancelled)
         << name;
@@ -130,14 +130,14 @@ TEST(Generators, StopWhenAskedAndMindTheMemory) {
   }
 }
 
-TEST(Generators, RefuseCentresThatAreNowhere) {
+TEST(Generators, RefuseCentresThatAreNotFinite) {
   for (const auto& [name, make] : all(V3d(0, kNan, 0)))
     EXPECT_THROW((void)make(0.05, {}), levelset::UsageError) << name;
 }
 
 // === Ring
 
-TEST(Ring, IsATorusAndKeepsItsSection) {
+TEST(Ring, IsATorusAndKeepsItsCrossSection) {
   const Measurement round = levelset::measure(makeRing({.radius = 1, .tube = 0.2}, V3d(0), 0.04));
   const double exact = 2 * M_PI * M_PI * 0.04;
   EXPECT_NEAR(round.volume, exact, 1e-4 * exact);
@@ -149,7 +149,7 @@ TEST(Ring, IsATorusAndKeepsItsSection) {
                          2 * M_PI * 0.12);
   EXPECT_LT(errors[0], 0.02);
   EXPECT_LT(errors[1], errors[0] / 3);
-  // A leaning ring is as wide and as high as its turn says.
+  // Width and height of an inclined ring follow from its angle.
   const Measurement leaning =
       levelset::measure(makeRing({.radius = 1, .tube = 0.2, .lean = 0.5}, V3d(3, 0, 0), 0.04));
   EXPECT_NEAR(leaning.bounds.max.y, std::cos(0.5) + 0.2, 0.004);
@@ -157,7 +157,7 @@ TEST(Ring, IsATorusAndKeepsItsSection) {
   EXPECT_NEAR(leaning.centroid.x, 3, 1e-3);
 }
 
-/// How often the first closed line winds about the second, by Gauss' integral.
+/// Linking number of two closed curves, by Gauss' integral.
 double linking(const Ring& ring, V2d first, V2d second) {
   constexpr int n = 200;
   const auto at = [&](V2d which, int i) {
@@ -176,9 +176,9 @@ double linking(const Ring& ring, V2d first, V2d second) {
   return sum / (4 * M_PI);
 }
 
-TEST(Ring, HoldsFourOthersInMail) {
+TEST(Ring, IsLinkedWithFourOthersInMail) {
   const Ring mail{.radius = 1, .tube = 0.15, .columns = 5, .rows = 7};
-  // Ring (2, 3) stands half a spacing to the right of rows 2 and 4.
+  // Ring (2, 3) is half a spacing to the right of rows 2 and 4.
   for (int row = 0; row < 7; ++row)
     for (int column = 0; column < 5; ++column) {
       if (row == 3 && column == 2) continue;
@@ -188,7 +188,7 @@ TEST(Ring, HoldsFourOthersInMail) {
     }
 }
 
-TEST(Ring, LeavesItsClearanceBetweenRings) {
+TEST(Ring, KeepsItsClearanceBetweenRings) {
   const Ring mail{.radius = 1, .tube = 0.15, .columns = 3, .rows = 4};
   const double clearance = ringClearance(mail);
   EXPECT_NEAR(clearance, 0.5022 - 0.3, 1e-4);
@@ -216,19 +216,21 @@ TEST(Ring, LeavesItsClearanceBetweenRings) {
   EXPECT_EQ(m.components, 12u);
   EXPECT_EQ(m.euler, 0);
   EXPECT_NEAR(m.volume, 12 * 2 * M_PI * M_PI * 0.15 * 0.15, 2e-3 * m.volume);
-  // The distance of two neighbours is in the band: nowhere between them less than half of it.
+  // Half of the distance between two neighbours lies in the band. Between them the value is at
+  // least half of the clearance everywhere.
   const TileBox box = ringBox(mail, V3d(0));
   EXPECT_NEAR(m.bounds.max.x, box.whole.max.x, 0.01);
   EXPECT_NEAR(m.bounds.max.z, box.whole.max.z, 0.01);
 }
 
-TEST(Ring, RefusesWiresThatMeet) {
+TEST(Ring, RefusesIntersectingWires) {
   const auto refused = [](const Ring& ring) {
     return support::refusal<levelset::UsageError>([&] { (void)makeRing(ring, V3d(0), 0.04); });
   };
   EXPECT_NE(refused({.tube = 0.26, .columns = 2, .rows = 2}).find("the clearance between wires"),
             std::string::npos);
-  EXPECT_NE(refused({.tube = 0.15, .columns = 2, .rows = 2, .clearance = 0.3}).find("--clearance requires 0.3"),
+  EXPECT_NE(refused({.tube = 0.15, .columns = 2, .rows = 2, .clearance = 0.3})
+                .find("--clearance requires 0.3"),
             std::string::npos);
   EXPECT_NE(refused({.tube = 0.1, .columns = 2, .rows = 2, .spacing = V2d(3, 3)}).find("hold"),
             std::string::npos);
@@ -248,7 +250,7 @@ double gyroidFormula(const V3d& p) {
          std::sin(q.z) * std::cos(q.x);
 }
 
-TEST(Gyroid, DistanceIsThatOfTheSurface) {
+TEST(Gyroid, HasTheDistanceOfItsSurface) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> uniform(-1, 1);
   int looked = 0;
@@ -270,12 +272,12 @@ TEST(Gyroid, DistanceIsThatOfTheSurface) {
     ASSERT_TRUE(isReached) << p << " " << distance;
   }
   EXPECT_GT(looked, 300);
-  // Between a strut's thinnest place and the surface, the constant of the openings.
+  // Distance between a strut's thinnest position and the surface: the constant of the openings.
   EXPECT_NEAR(gyroidDistance(V3d(0.25, 0, 0.125), 1), kThickestGyroidWall / 2, 1e-4);
 }
 
 TEST(Gyroid, SheetHasTheVolumeOfSteinersFormula) {
-  // V = A t + 2πχ t³/12 with χ = −8 in a cell; the box's sides cut the band's edges.
+  // V = A t + 2πχ t³/12 with χ = −8 per cell. The sides of the box cut the band's edges.
   const Gyroid gyroid{.cell = 2, .thickness = 0.24};
   const double t = 0.12, exact = (3.0968 * t - 8 * 2 * M_PI / 12 * t * t * t) * 8;
   const Measurement coarse = levelset::measure(makeGyroid(gyroid, V3d(0), 0.05)),
@@ -284,7 +286,7 @@ TEST(Gyroid, SheetHasTheVolumeOfSteinersFormula) {
   EXPECT_NEAR(fine.volume, exact, 0.012 * exact);
 }
 
-TEST(Gyroid, NetworkFillsHalfWhereItMeetsTheSurface) {
+TEST(Gyroid, NetworkAtTheSurfaceFillsHalf) {
   const Gyroid half{.kind = GyroidKind::Network, .thickness = kThickestGyroidWall};
   const Measurement m = levelset::measure(makeGyroid(half, V3d(0), 0.03));
   EXPECT_NEAR(m.volume, 0.5, 0.01);
@@ -299,7 +301,7 @@ TEST(Gyroid, RepeatsFromCellToCell) {
   expectPeriodic(band, V3d(1, 0, 0), {V3d(-1.3, -0.7, -0.7), V3d(0.3, 0.7, 0.7)});
 }
 
-TEST(Gyroid, RefusesWallsThatCloseIt) {
+TEST(Gyroid, RefusesInvalidWallsAndCells) {
   EXPECT_THROW((void)makeGyroid({.thickness = 0.25}, V3d(0), 0.02), levelset::UsageError);
   EXPECT_THROW((void)makeGyroid({.thickness = 0}, V3d(0), 0.02), levelset::UsageError);
   EXPECT_THROW((void)makeGyroid({.cell = kNan}, V3d(0), 0.02), levelset::UsageError);
@@ -345,7 +347,7 @@ TEST(Heightmap, IsExactOnPlanesRampsAndParabolas) {
 }
 
 TEST(Heightmap, KeepsCliffsAndTheirSides) {
-  // A step of a twentieth of the width, far steeper than anything beside it.
+  // A step of a twentieth of the width, far steeper than its neighbourhood.
   HeightGrid step{21, 2, {}};
   for (int j = 0; j < 2; ++j)
     for (int i = 0; i < 21; ++i) step.heights.push_back(i < 10 ? 0 : 1);
@@ -361,8 +363,8 @@ TEST(Heightmap, KeepsCliffsAndTheirSides) {
   EXPECT_NEAR(m.volume, 4 * 0.5 + (2 + 0.1) * 2, 0.04);
 }
 
-TEST(Heightmap, StandsWhereItsPictureDoes) {
-  // One bright corner: first row on top, last column to the right.
+TEST(Heightmap, HasTheOrientationOfItsPicture) {
+  // One bright corner: first row at the top, last column on the right.
   HeightGrid corner{3, 3, {0, 0, 1, 0, 0, 0, 0, 0, 0}};
   const Heightmap map{.grid = corner, .interpolation = HeightInterpolation::Linear};
   EXPECT_EQ(heightAt(map, 1, 1), 1);
@@ -371,7 +373,7 @@ TEST(Heightmap, StandsWhereItsPictureDoes) {
   EXPECT_DOUBLE_EQ(heightAt(map, 0.75, 0.75), 0.25);
 }
 
-TEST(Heightmap, RefusesWhatIsNoGrid) {
+TEST(Heightmap, RefusesInvalidGrids) {
   const auto refused = [](const Heightmap& heightmap) {
     return support::refusal<levelset::UsageError>(
         [&] { (void)makeHeightmap(heightmap, V3d(0), 0.05); });
@@ -385,7 +387,7 @@ TEST(Heightmap, RefusesWhatIsNoGrid) {
             std::string::npos);
   EXPECT_THROW((void)makeHeightmap({.grid = {2, 2, {0, 0, 0, 0}}}, V3d(0, 0, 0.01), 0.05),
                levelset::InvalidInput)
-      << "nothing is left of it";
+      << "the result is empty";
 }
 
 }  // namespace generators_test

@@ -12,7 +12,7 @@
 #include "tests/support/files.h"
 #include "tests/support/generators.h"
 
-// Patterns without end that a tile cuts off.
+// Infinite patterns that a tile cuts off.
 namespace tile_generators_test {
 
 using namespace mapping;
@@ -26,7 +26,7 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 // === Knurl
 
-/// Height below the crests, by the grooves' distance from their middles.
+/// Depth below the crests, from the distance to the middles of the grooves.
 double knurlHeight(const Knurl& knurl, const V3d& fromCorner) {
   const double c = std::cos(knurl.grooveAngle), s = std::sin(knurl.grooveAngle);
   double height = 0;
@@ -39,7 +39,7 @@ double knurlHeight(const Knurl& knurl, const V3d& fromCorner) {
   return height;
 }
 
-TEST(Knurl, IsExactlyAsFarAsItsFlanks) {
+TEST(Knurl, HasTheExactDistanceOfItsFlanks) {
   for (const double depth : {0.0, 0.3}) {
     const Knurl knurl{.pitch = 1, .depth = depth, .base = 0.2};
     const V3d center(0.1, 0.2, -0.3);
@@ -55,7 +55,7 @@ TEST(Knurl, IsExactlyAsFarAsItsFlanks) {
 }
 
 TEST(Knurl, HasTheVolumeOfItsPyramids) {
-  // A land of width a between grooves of a sharp profile: the mean of the smaller of two heights.
+  // Lands of width a between grooves of a sharp profile: the mean of the smaller of two heights.
   const Knurl knurl{.pitch = 1, .base = 0.4, .tiling = {1, 1, 0}};
   const double area = 1 / (std::cos(knurl.grooveAngle) * std::sin(knurl.grooveAngle));
   const double exact = area * (0.4 + sharpDepth(knurl) / 3);
@@ -64,14 +64,14 @@ TEST(Knurl, HasTheVolumeOfItsPyramids) {
     errors[i] =
         std::abs(levelset::measure(makeKnurl(knurl, V3d(0), i ? 0.01 : 0.04)).volume - exact);
   EXPECT_LT(errors[0], 0.01 * exact);
-  EXPECT_LT(errors[1], errors[0] / 3) << "edges are rounded by the grid: second order";
+  EXPECT_LT(errors[1], errors[0] / 3) << "the grid rounds edges: second order";
   const Knurl straight{.pattern = KnurlPattern::Straight, .pitch = 1, .base = 0.4};
   EXPECT_NEAR(levelset::measure(makeKnurl(straight, V3d(0), 0.02)).volume,
               0.4 + sharpDepth(straight) / 2, 0.005);
 }
 
-TEST(Knurl, GoesOnAcrossTheSidesOfItsTile) {
-  // tan = 3/4: periods of 5/4 and 5/3 pitches, whole numbers of voxels.
+TEST(Knurl, ContinuesAcrossTheSidesOfItsTile) {
+  // tan = 3/4: periods of 5/4 and 5/3 pitches, which are whole numbers of voxels.
   for (const KnurlPattern pattern : {KnurlPattern::Diamond, KnurlPattern::Diagonal}) {
     Knurl knurl{.pattern = pattern, .pitch = 0.96, .base = 0.3, .tiling = {1, 1, 0.5}};
     knurl.grooveAngle = std::atan(0.75);
@@ -88,7 +88,7 @@ TEST(Knurl, GoesOnAcrossTheSidesOfItsTile) {
   EXPECT_NEAR(box.whole.size().x, box.tile.size().x + 1, 1e-12);
 }
 
-TEST(Knurl, RefusesWhatNoWheelMakes) {
+TEST(Knurl, RefusesPatternsThatNoWheelCuts) {
   const auto refused = [](const Knurl& knurl) {
     return support::refusal<levelset::UsageError>([&] { (void)makeKnurl(knurl, V3d(0), 0.05); });
   };
@@ -107,7 +107,7 @@ TEST(Knurl, RefusesWhatNoWheelMakes) {
 
 // === Scales
 
-TEST(Scales, StandOnOnePlateAndGoOnAcrossTheTile) {
+TEST(Scales, ShareOnePlateAndContinueAcrossTheTile) {
   const Scales scales{.length = 1.6, .width = 1.2, .step = 0.8, .tiling = {2, 2, 0.6}};
   const NarrowBand band = makeScales(scales, V3d(0), 0.04);
   const Measurement m = levelset::measure(band);
@@ -121,7 +121,7 @@ TEST(Scales, StandOnOnePlateAndGoOnAcrossTheTile) {
   expectPeriodic(band, V3d(0, 1.6, 0), near);
 }
 
-TEST(Scales, AreAsFarFromOutsideAsTheirSurface) {
+TEST(Scales, HaveTheExactDistanceOutside) {
   for (const double tip : {0.0, 1.0}) {
     const Scales scales{
         .length = 1.4, .thickness = 0.12, .tip = tip, .rounding = tip > 0 ? 0.05 : 0};
@@ -137,8 +137,8 @@ TEST(Scales, AreAsFarFromOutsideAsTheirSurface) {
   }
 }
 
-TEST(Scales, LeaveRoomUnderTheirTips) {
-  // The undercut: a ray upwards before a tip leaves the plate, meets air, and then the scale.
+TEST(Scales, HaveFreeSpaceUnderTheirTips) {
+  // Undercut: a ray upwards before a tip leaves the plate, passes air, and then enters the scale.
   const Scales scales{.length = 2, .thickness = 0.2, .tilt = 0.4, .tiling = {1, 2, 0}};
   const NarrowBand band = makeScales(scales, V3d(0), 0.04);
   const auto values = levelset::vdb(band).getConstAccessor();
@@ -157,7 +157,7 @@ TEST(Scales, LeaveRoomUnderTheirTips) {
             1.1 * levelset::measure(band).volume);
 }
 
-TEST(Scales, RefuseWhatDoesNotOverlap) {
+TEST(Scales, RefuseScalesWithoutOverlap) {
   const auto refused = [](const Scales& scales) {
     return support::refusal<levelset::UsageError>([&] { (void)makeScales(scales, V3d(0), 0.05); });
   };
@@ -187,19 +187,20 @@ TEST(Hexagons, HaveTheVolumeOfTheirPrisms) {
   EXPECT_NEAR(levelset::measure(makeHexagons(comb, V3d(0), 0.025)).volume, walls, 0.01 * walls);
 }
 
-TEST(Hexagons, CountTheirHoles) {
-  // With the overlap two rows of three whole cells, and between them one of four.
+TEST(Hexagons, HaveTheRightNumberOfHoles) {
+  // With the overlap: two rows of three complete cells, and one row of four between them.
   const Hexagons comb{.kind = HexagonKind::Honeycomb, .base = 0, .tiling = {3, 2, 0.7}};
   const Measurement m = levelset::measure(makeHexagons(comb, V3d(0), 0.04));
   EXPECT_EQ(m.components, 1u);
   EXPECT_EQ(m.euler, 2 - 2 * 10);
-  // Without a plate, pillars are apart: two halves below, and above a half between two quarters.
+  // Without a plate, pillars are separate: two halves below, and above a half between two quarters.
   const Hexagons pillars{.base = 0, .tiling = {2, 1, 0}};
   EXPECT_EQ(levelset::measure(makeHexagons(pillars, V3d(0), 0.04)).components, 2u + 3u);
 }
 
-TEST(Hexagons, RepeatAndRoundTheirEdges) {
-  // A spacing whose row distance is a whole number of voxels to five digits only: along x.
+TEST(Hexagons, RepeatAndHaveRoundedEdges) {
+  // The row distance is a whole number of voxels to five digits only, so this tests repetition
+  // along x.
   const Hexagons hexagons{.size = 1, .gap = 0.2, .rounding = 0.1, .tiling = {1, 2, 0.6}};
   const NarrowBand band = makeHexagons(hexagons, V3d(0), 0.05);
   expectPeriodic(band, V3d(1.2, 0, 0), {V3d(-0.9, -1.2, -1), V3d(-0.3, 1.2, 1)});

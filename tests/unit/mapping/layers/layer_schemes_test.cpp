@@ -83,8 +83,9 @@ double spacingOf(const ParticleLayer& layer) {
   return mapping::meanSpacing(patch);
 }
 
-TEST(LayerDensity, StaysThatOfTheSurfaceWhateverALayersSize) {
-  // Two and a half times as wide at the top of the ball's patch, or a third by taper.
+TEST(LayerDensity, EqualsTheDensityOfTheSurface) {
+  // Layers two and a half times as wide at the top of the ball's patch, or a third as wide by
+  // taper.
   const double side = std::sin(0.5) / std::sqrt(2.0), up = std::cos(0.5);
   const NarrowBand ball = makeBall(1, 0.05), ground = makeGround(0.05);
   const std::array<V3d, 4> onBall = square(side, up), onGround = square(1, 0);
@@ -128,7 +129,7 @@ TEST(LayerDensity, StaysThatOfTheSurfaceWhateverALayersSize) {
     EXPECT_NEAR(cells(layers.back()) / cells(layers.front()), made.topStretch, 0.1);
     EXPECT_EQ(foldsOf(made.result.patch), 0u);
   }
-  // What the budget of all layers does not allow is left out where nobody asks for it.
+  // A layer count that exceeds the budget of all layers is reduced unless it is requested.
   const PatchResult chosen =
       mapping::makePatch(ball, onBall, 1.5, {.layers = 12, .scheme = LayerScheme::Conforming});
   EXPECT_LE(chosen.patch.particleCount(), 2600u);
@@ -147,8 +148,8 @@ TEST(LayerDensity, StaysThatOfTheSurfaceWhateverALayersSize) {
   }
 }
 
-TEST(LayerResampling, KeepsWhatIsQuadraticAndItsRim) {
-  // x and y are texture coordinates, z a paraboloid; Catmull-Rom reproduces both.
+TEST(LayerResampling, PreservesQuadraticsAndTheirRim) {
+  // x and y are texture coordinates, z is a paraboloid. Catmull-Rom reproduces both.
   const auto place = [](double u, double v) { return V3d(u, 2 * v, u * u - u * v + 3 * v * v); };
   const auto sampled = [&](int columns, int rows) {
     ParticleLayer layer;
@@ -171,15 +172,15 @@ TEST(LayerResampling, KeepsWhatIsQuadraticAndItsRim) {
   for (int j = -1; j <= 12; ++j)
     for (int i = -1; i <= 15; ++i)
       EXPECT_LE((fine.beyond(i, j) - expected.beyond(i, j)).length(), 1e-12) << i << ' ' << j;
-  // Fewer: the rim lies beyond the given one, straight on.
+  // With fewer particles the new rim continues straight beyond the given one.
   const ParticleLayer few = mapping::withCounts(coarse, 4, 4);
   const V3d end = coarse.beyond(-1, 0), next = coarse.at(0, 0);
   EXPECT_LE((few.beyond(-1, 0) - (end + (end - next) * (4.0 / 3))).length(), 1e-12);
   EXPECT_LE((few.at(3, 3) - coarse.at(7, 6)).length(), 1e-12);
 }
 
-TEST(ConformingLayers, SpreadWhereReducedOnesStayEven) {
-  // On bumpy ground: the thesis shows it in a figure, the cells' areas say it in a number.
+TEST(ConformingLayers, SpreadWhereReducedLayersStayEven) {
+  // On bumpy ground. The thesis shows this effect in a figure; the test uses the areas of cells.
   const NarrowBand ground = makeGround(0.12);
   const PatchOptions even{.scheme = LayerScheme::Reduced, .spacing = 0.12},
       faithful{.scheme = LayerScheme::Conforming, .spacing = 0.12};
@@ -190,7 +191,8 @@ TEST(ConformingLayers, SpreadWhereReducedOnesStayEven) {
 }
 
 TEST(ConformingLayers, SlowDownTowardsTheMedialAxis) {
-  // A trough whose walls meet above: reduced layers are refused there, these fold and say so.
+  // A trough whose walls meet above. Reduced layers are refused there, conforming layers fold and
+  // report it.
   const NarrowBand trough =
       support::sampleBand([](const V3d& p) { return 1.5 - std::hypot(p.x, p.z - 1.5); },
                           {V3d(-1.6, -2, -0.2), V3d(1.6, 2, 3.2)}, 0.1);
@@ -205,7 +207,7 @@ TEST(ConformingLayers, SlowDownTowardsTheMedialAxis) {
   EXPECT_EQ(foldsOf(shallow), 0u);
 }
 
-TEST(SplineLayers, GoStraightUpByThemselves) {
+TEST(SplineLayers, AreStraightByDefault) {
   const PatchOptions options{.layers = 4, .scheme = LayerScheme::Spline};
   const Patch patch = mapping::makePatch(makeGround(0), square(1), 1.5, options).patch;
   for (const ParticleLayer& layer : patch.layers)
@@ -215,8 +217,8 @@ TEST(SplineLayers, GoStraightUpByThemselves) {
     }
 }
 
-TEST(SplineLayers, TravelAsRigidBodies) {
-  // A quarter of a circle of radius 3, the patch well within it.
+TEST(SplineLayers, MoveAsRigidBodies) {
+  // A quarter of a circle of radius 3, with the patch well inside it.
   std::vector<V3d> arc;
   for (int i = 1; i <= 6; ++i)
     arc.emplace_back(3 - 3 * std::cos(i * M_PI / 12), 0, 3 * std::sin(i * M_PI / 12));
@@ -230,7 +232,7 @@ TEST(SplineLayers, TravelAsRigidBodies) {
   for (const ParticleLayer& layer : layers)
     for (std::size_t n = 0; n < layer.positions.size(); ++n)
       EXPECT_NEAR(spread(layer, n), spread(layers.front(), n), 1e-9);
-  // At the end it faces along x, as far along as the circle says.
+  // At the end the layer faces along x, at the distance along the circle.
   V3d low(10), high(-10);
   for (const V3d& p : layers.back().positions)
     for (int axis = 0; axis < 3; ++axis)
@@ -241,8 +243,8 @@ TEST(SplineLayers, TravelAsRigidBodies) {
   EXPECT_EQ(foldsOf(made.patch), 0u);
 }
 
-TEST(SplineLayers, SlowWhatWouldCross) {
-  // A bend of radius 0.5 under a patch that reaches out by 1.
+TEST(SplineLayers, SlowParticlesThatWouldCross) {
+  // A bend of radius 0.5 under a patch that extends outwards by 1.
   const std::vector<V3d> bend = {V3d(0, 0, 0.5), V3d(0.15, 0, 0.85), V3d(0.5, 0, 1),
                                  V3d(1.5, 0, 1)};
   const PatchOptions options{.layers = 9, .scheme = LayerScheme::Spline, .spline = bend};
@@ -267,7 +269,7 @@ TEST(SplineLayers, FadeToAPlane) {
   };
   const double first = relief(patch.layers.front());
   EXPECT_GT(first, 0.3);
-  EXPECT_LE(relief(patch.layers.back()), 1e-5);             // the normal is known to that
+  EXPECT_LE(relief(patch.layers.back()), 1e-5);             // accuracy of the normal
   EXPECT_NEAR(relief(patch.layers[3]), 0.4 * first, 1e-3);  // w = 0.6
 }
 
@@ -276,7 +278,7 @@ TEST(LayerTransform, TwistsTapersAndBends) {
   for (const LayerScheme scheme :
        {LayerScheme::Reduced, LayerScheme::Conforming, LayerScheme::Spline}) {
     const auto top = [&](const mapping::LayerTransform& transform) {
-      // Of given counts: each particle has its like in the other patches.
+      // With fixed counts each particle has a counterpart in the other patches.
       const PatchOptions options{
           .layers = 5, .scheme = scheme, .transform = transform, .cells = {12, 12}};
       return mapping::makePatch(ground, square(1), 1, options).patch.layers.back();
@@ -287,7 +289,7 @@ TEST(LayerTransform, TwistsTapersAndBends) {
       const V3d p = plain.positions[n];
       EXPECT_LE((twisted.positions[n] - V3d(-p.y, p.x, p.z)).length(), 2e-3);
       EXPECT_LE((tapered.positions[n] - V3d(0.5 * p.x, 0.5 * p.y, p.z)).length(), 2e-3);
-      // The axis as an arc of length 1 through an angle of 1.
+      // The axis is an arc of length 1 and angle 1.
       const V3d expected(1 - std::cos(1.0) + p.x * std::cos(1.0), p.y,
                          std::sin(1.0) - p.x * std::sin(1.0));
       EXPECT_LE((bent.positions[n] - expected).length(), 2e-3);
@@ -295,7 +297,7 @@ TEST(LayerTransform, TwistsTapersAndBends) {
   }
 }
 
-TEST(LayerSchemes, RefuseWhatMakesNoSense) {
+TEST(LayerSchemes, RefuseInvalidOptions) {
   const NarrowBand ground = makeGround(0);
   const auto refused = [&](const PatchOptions& options) {
     try {

@@ -21,7 +21,7 @@ using mapping::Patch;
 using mapping::PrismMap;
 using mapping::Tetrahedron;
 
-/// A third of a cylinder of radius 2.
+/// Position on a third of a cylinder of radius 2.
 V3d onCylinder(const V3d& uvw) {
   const double angle = 2.1 * (uvw.x - 0.5), r = 2 + uvw.z;
   return {r * std::sin(angle), 3 * uvw.y, r * std::cos(angle)};
@@ -74,7 +74,7 @@ TEST(Lattice, TetrahedraFillTheirCells) {
   forEachTetrahedron(lattice, [&](const Tetrahedron& t) {
     world += std::abs(volumeOf(lattice.corners(t)));
     texture += std::abs(volumeOf(lattice.textureCorners(t)));
-    // One turning on either side: the map does not fold.
+    // Equal orientation on both sides: the map does not fold.
     ASSERT_GT(volumeOf(lattice.corners(t)) * volumeOf(lattice.textureCorners(t)), 0);
   });
   EXPECT_NEAR(texture, 1, 1e-12);
@@ -87,7 +87,7 @@ TEST(Lattice, RefinesLayersOfFewerParticles) {
   patch.layers[1] = coarse.layers[1];
   const Lattice lattice(patch, {});
   EXPECT_EQ(lattice.nodeCount(), 17u * 9 * 3);
-  // On the cylinder to third order, where chords would leave it by 0.02.
+  // Particles are on the cylinder to third order. Chords would be off by 0.02.
   double worst = 0;
   forEachTetrahedron(lattice, [&](const Tetrahedron& t) {
     const Lattice::Corners world = lattice.corners(t), texture = lattice.textureCorners(t);
@@ -97,7 +97,7 @@ TEST(Lattice, RefinesLayersOfFewerParticles) {
   EXPECT_LE(worst, 0.003);
 }
 
-TEST(PrismMap, GoesBothWays) {
+TEST(PrismMap, MapsInBothDirections) {
   const PrismMap map(support::patchAt(onCylinder, 9, 7, 4), {.embedDepth = 0.2, .rim = 0.3});
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(0, 1);
@@ -112,7 +112,8 @@ TEST(PrismMap, GoesBothWays) {
 }
 
 TEST(PrismMap, FollowsTheCylinder) {
-  // u, v and w within half a per cent of the height: chords of 64 cells stand off by 3e-4.
+  // u, v and w are accurate to half a per cent of the height. The chords of 64 cells are off by
+  // 3e-4.
   const PrismMap map(support::patchAt(onCylinder, 65, 33, 6), {.embedDepth = 0.1, .rim = 0.1});
   std::mt19937 random(5);
   std::uniform_real_distribution<double> unit(0, 1);
@@ -122,8 +123,9 @@ TEST(PrismMap, FollowsTheCylinder) {
   }
 }
 
-/// Compares all leaf blocks below a block with the map's points; NaN only where that has it too.
-/// @param bounds  of the blocks that hold it
+/// Compares all leaf blocks below a block with the map at single points. NaN is permitted only
+/// where the map has NaN too.
+/// @param bounds  bounds of the blocks that contain the position
 void expectLeaves(const PrismMap& map, const GridBlock& block, const mapping::BlockMap& at,
                   std::vector<Imath::Box3d> bounds, std::size_t& tests, std::size_t& inside) {
   bounds.push_back(at.imageBounds());
@@ -150,7 +152,7 @@ void expectLeaves(const PrismMap& map, const GridBlock& block, const mapping::Bl
   EXPECT_TRUE(here == 512 || !at.isTotal());
 }
 
-TEST(PrismMap, KnowsBlocksThatLieInsideIt) {
+TEST(PrismMap, FindsBlocksInsideIt) {
   const PrismMap map(support::patchAt(onCylinder, 40, 40, 9), {.embedDepth = 0.2, .rim = 0.1});
   GridBlock block{V3d(-0.1, 1.4, 2.4), Imath::M33d(), 16};
   for (int i = 0; i < 3; ++i) block.rows[i][i] = 0.01;
@@ -169,12 +171,12 @@ TEST(PrismMap, BlocksAgreeWithPoints) {
     std::size_t tests = 0, inside = 0;
     expectLeaves(map, block, *map.restrictTo(block, 0), {}, tests, inside);
     EXPECT_GT(inside, 10000u);
-    // The published 2.8 tests a point came from boxes; going from cell to cell takes fewer.
+    // The published 2.8 tests per point are for boxes. Walking from cell to cell needs fewer.
     EXPECT_LE(static_cast<double>(tests) / static_cast<double>(inside), 2.8) << columns;
   }
 }
 
-TEST(PrismMap, TellsEveryTetrahedronThatFolds) {
+TEST(PrismMap, ReportsEveryFoldedTetrahedron) {
   const Patch sound = support::patchAt(onCylinder, 9, 9, 4);
   const Distortion distortion =
       mapping::surveyDistortion(PrismMap(sound, {.embedDepth = 0.1, .rim = 0.1}).samples(), V3d(1));
@@ -192,7 +194,7 @@ TEST(PrismMap, TellsEveryTetrahedronThatFolds) {
   EXPECT_LT(folds.jacobian.least, 0);
   EXPECT_LE((folds.foldUvw - V3d(4.0 / 8, 4.0 / 8, 2.0 / 3)).length(), 0.4);
 
-  // Turned over as a whole, on purpose: no fold.
+  // An intentionally mirrored patch is no fold.
   const Patch mirrored = support::patchAt(
       [](const V3d& t) {
         return onCylinder({1 - t.x, t.y, t.z});

@@ -53,7 +53,7 @@ TEST(PatchFile, KeepsEveryBit) {
   }
 }
 
-TEST(PatchFile, RefusesWhatIsNoPatch) {
+TEST(PatchFile, RefusesInvalidFiles) {
   const support::TemporaryFolder folder;
   const std::filesystem::path file = folder.path() / "bad.patch";
   writePatches(file, twoPatches());
@@ -89,7 +89,7 @@ TEST(PatchFile, RefusesWhatIsNoPatch) {
   };
   for (const auto& [broken, word] : cases)
     EXPECT_NE(refusal(broken).find(word), std::string::npos) << word << ": " << refusal(broken);
-  // Cut off or damaged anywhere: refused, or patches that are whole.
+  // Truncated or damaged at any position, a file is refused or yields complete patches.
   std::mt19937 random(1);
   for (int n = 0; n < 200; ++n) {
     std::string broken = text;
@@ -111,7 +111,7 @@ TEST(PatchFile, RefusesWhatIsNoPatch) {
   EXPECT_THROW((void)readPatches(file, 1000), levelset::ResourceLimit);
 }
 
-TEST(PatchFile, WritesNothingHalf) {
+TEST(PatchFile, WritesNoPartialFile) {
   const support::TemporaryFolder folder;
   std::vector<Patch> patches = twoPatches();
   patches[1].layers[0].positions[3].y = std::numeric_limits<double>::quiet_NaN();
@@ -121,7 +121,7 @@ TEST(PatchFile, WritesNothingHalf) {
   patches = twoPatches();
   patches[0].layers[1].w = std::numeric_limits<double>::infinity();
   EXPECT_THROW(writePatches(file, patches), InvalidInput);
-  // What was there is there still, and nothing else.
+  // The earlier file is unchanged, and no other file exists.
   EXPECT_EQ(readPatches(file).size(), 2u);
   EXPECT_EQ(folder.fileCount(), 1u);
 }

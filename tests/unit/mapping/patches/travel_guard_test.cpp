@@ -30,17 +30,17 @@ double closest(const std::vector<V3d>& places) {
   return least;
 }
 
-TEST(TravelGuard, LetsTwoThatTouchGoOnSideBySide) {
-  // At 1 apart, each would go past the other and far beyond in one step.
+TEST(TravelGuard, LetsTouchingParticlesMoveOnTogether) {
+  // At a distance of 1, each particle would pass the other in one step, by far.
   const std::vector<V3d> places = {V3d(0), V3d(1, 0, 0)};
   std::vector<V3d> moves = {V3d(6, 0, 0), V3d(-3, 0, 0)};
   TravelGuard guard(kDiameter, 2);
   guard.limit(places, moves);
-  // They touch after a tenth of the step; then both go on with the mean of the two speeds.
+  // They touch after a tenth of the step. Then both move on with the mean of the two speeds.
   EXPECT_NEAR(moves[0].x, 0.6 + 0.9 * 1.5, 1e-12);
   EXPECT_NEAR(moves[1].x, -0.3 + 0.9 * 1.5, 1e-12);
   EXPECT_EQ(guard.slowed(), (std::vector<char>{1, 1}));
-  // What goes along the contact stays.
+  // Motion along the contact is kept.
   moves = {V3d(0.9, 0, 2), V3d(0, 0, 2)};
   guard.limit(places, moves);
   EXPECT_EQ(moves[1], V3d(0, 0, 2));
@@ -49,7 +49,7 @@ TEST(TravelGuard, LetsTwoThatTouchGoOnSideBySide) {
   EXPECT_NEAR(moves[0].x, 0.45, 1e-12);
   EXPECT_NEAR(moves[1].x, -0.45, 1e-12);
   EXPECT_EQ(moves[0].z, 2);
-  // Past each other at more than the diameter, or one behind the other: nothing to stop.
+  // They pass each other at more than the diameter, or one follows the other: no contact.
   moves = {V3d(1, 0, 0), V3d(-1, 0.2, 0)};
   TravelGuard beside(kDiameter, 2);
   beside.limit(std::vector<V3d>{V3d(0), V3d(1, 0.05, 0)}, moves);
@@ -60,16 +60,16 @@ TEST(TravelGuard, LetsTwoThatTouchGoOnSideBySide) {
   EXPECT_EQ(beside.slowed(), (std::vector<char>{0, 0}));
 }
 
-TEST(TravelGuard, LeavesOneThatIsThereTwiceAlone) {
+TEST(TravelGuard, IgnoresADuplicateParticle) {
   std::vector<V3d> moves = {V3d(1, 1e-12, 0), V3d(1, 0, 0)};
   TravelGuard guard(kDiameter, 2);
   guard.limit(std::vector<V3d>{V3d(0), V3d(1e-9, 1e-9, 0)}, moves);
   EXPECT_EQ(moves[1], V3d(1, 0, 0));
 }
 
-TEST(TravelGuard, LetsNoCrowdComeTogetherAndLeavesNobodyBehind) {
-  // A lattice that runs together in its middle, with noise, on its way upwards: those in front hold
-  // up those behind, and all get there.
+TEST(TravelGuard, KeepsACrowdApartAndLeavesNoParticleBehind) {
+  // A lattice that contracts towards its middle, with noise, while it moves upwards. The leading
+  // particles delay the others, and all of them arrive.
   std::mt19937 random(1);
   std::uniform_real_distribution<double> noise(-0.05, 0.05);
   std::vector<V3d> places;
@@ -93,8 +93,8 @@ TEST(TravelGuard, LetsNoCrowdComeTogetherAndLeavesNobodyBehind) {
   for (const V3d& p : places) EXPECT_LT((p - middle).length(), 2.2);
 }
 
-TEST(TravelGuard, KeepsASplinesParticlesApartWhereItsPlaneTurnsOnItself) {
-  // The curve turns on a tenth of the patch's width: those inside would run into each other.
+TEST(TravelGuard, KeepsSplineParticlesApartWhereTheCurveTurns) {
+  // The curve turns within a tenth of the patch's width. The inner particles would collide.
   const levelset::NarrowBand ground = support::sampleBand([](const V3d& p) { return p.z; },
                                                           {V3d(-3, -3, -0.5), V3d(3, 3, 0.5)}, 0.1);
   const PatchResult made = mapping::makePatch(

@@ -28,12 +28,12 @@ using mapping::PatchResult;
 constexpr double kPi = std::numbers::pi;
 const PatchOptions kThin = {.layers = 2, .scheme = LayerScheme::Conforming};
 
-/// −1 … 1.
+/// Parameter from −1 to 1.
 double shareOf(std::size_t i, std::size_t count) {
   return 2 * static_cast<double>(i) / static_cast<double>(count - 1) - 1;
 }
 
-/// Calls visit(u, v, position), u and v from −radius to radius.
+/// Calls visit(u, v, position) for u and v from −radius to radius.
 template <typename Visit>
 void forEachParticle(const ParticleLayer& layer, double radius, const Visit& visit) {
   for (std::size_t j = 0; j < layer.rows; ++j)
@@ -59,10 +59,10 @@ TEST(Decal, IsTheIdentityOnAPlane) {
 }
 
 TEST(Decal, KeepsDistancesAndAnglesOnASphere) {
-  // Up to 115 degrees from the centre, in the corners.
+  // Up to 115 degrees from the centre, at the corners.
   for (const double voxel : {0.1, 0.05}) {
     const NarrowBand ball = support::makeBall(1, voxel);
-    const V3d at = V3d(1, 2, 2) / 3.0, direction(1, 0.5, -1);  // at right angles
+    const V3d at = V3d(1, 2, 2) / 3.0, direction(1, 0.5, -1);  // perpendicular
     const double radius = 1.42;
     const PatchResult result = makeDecal(ball, at, direction, radius, 0.2, kThin);
     const V3d u = direction.normalized(), v = at.cross(u);
@@ -91,7 +91,7 @@ TEST(Decal, UnrollsACylinder) {
 }
 
 TEST(Decal, UnfoldsAnEdge) {
-  // A roof with a right angle along y: beyond the edge the plane goes on as if it were flat.
+  // A roof with a right angle along y. Beyond the edge the plane continues as if it were flat.
   const NarrowBand roof = support::sampleBand(
       [](const V3d& p) { return std::max(p.x + p.z, p.z - p.x) * std::sqrt(0.5); },
       {V3d(-2), V3d(2)}, 0.05);
@@ -112,7 +112,7 @@ TEST(Decal, UnfoldsAnEdge) {
   EXPECT_LT(worst, 0.25 * 0.05);
 }
 
-TEST(Decal, CarriesItsFrameByTheLeastTurn) {
+TEST(Decal, TransportsItsFrameByTheLeastRotation) {
   // Around a right-angled corner of a box the angles of the faces are kept.
   const V3d x(1, 0, 0), y(0, 1, 0), z(0, 0, 1);
   const double c = std::cos(0.4), s = std::sin(0.4);
@@ -136,7 +136,7 @@ TEST(Decal, LayersOfReducedDistortionGrowWithTheSurface) {
   }
 }
 
-TEST(Decal, MirroredRunsTheOtherWayRound) {
+TEST(Decal, MirroredHasTheOppositeOrientation) {
   PatchOptions options = kThin;
   const PatchResult straight = makeDecal(slab(), V3d(0), V3d(1, 0, 0), 0.6, 0.3, options);
   options.mirror = true;
@@ -146,7 +146,7 @@ TEST(Decal, MirroredRunsTheOtherWayRound) {
   EXPECT_LT((a.at(0, 0) - b.at(0, b.rows - 1)).length(), 1e-9);
 }
 
-TEST(Decal, CarriesMapsLikeAnyPatch) {
+TEST(Decal, SupportsMapsLikeAnyPatch) {
   const PatchResult result = makeDecal(support::makeBall(1, 0.05, 12), V3d(0, 0, 1), V3d(1, 0, 0),
                                        0.5, 0.3, {.layers = 4, .spacing = 0.1});
   const mapping::PrismMap map(result.patch, {});
@@ -166,7 +166,7 @@ TEST(Decal, GivesTheSameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(many.patch.layers[1].rim, one.patch.layers[1].rim);
 }
 
-TEST(Decal, LiesFarFromTheOriginAsItDoesThere) {
+TEST(Decal, HasTheSameShapeFarFromTheOrigin) {
   const V3d away(1e6, -1e6, 1e6);
   const NarrowBand near = levelset::makeSphere(10, V3d(0), 1),
                    far = levelset::makeSphere(10, away, 1);
@@ -187,7 +187,7 @@ TEST(Decal, RefusesADirectionAlongTheNormal) {
   EXPECT_THROW((void)makeDecal(band, V3d(NAN), V3d(1, 0, 0), 0.5, 0.2), levelset::UsageError);
 }
 
-TEST(Decal, RefusesLengthsThatMakeNone) {
+TEST(Decal, RefusesInvalidLengths) {
   const NarrowBand band = slab();
   const V3d x(1, 0, 0);
   for (const double bad : {0.0, -1.0, std::nan(""), HUGE_VAL}) {
@@ -201,15 +201,15 @@ TEST(Decal, RefusesLengthsThatMakeNone) {
                levelset::ResourceLimit);
 }
 
-/// The radius that a refusal names last.
+/// The radius at the end of an error message.
 double advisedRadius(const std::string& message) {
   const std::string words = "use a radius below ";
   const std::size_t at = message.rfind(words);
   return at == std::string::npos ? 0 : std::stod(message.substr(at + words.size()));
 }
 
-TEST(Decal, RefusesToGoBeyondTheCutLocus) {
-  // On a ball the ways from a pole meet at the other one, half a circle away.
+TEST(Decal, RefusesRadiiBeyondTheCutLocus) {
+  // On a ball the geodesics from a pole meet at the other pole, half a circle away.
   PatchOptions options = kThin;
   options.spacing = 0.2;
   const NarrowBand ball = support::makeBall(1, 0.1);
@@ -220,7 +220,7 @@ TEST(Decal, RefusesToGoBeyondTheCutLocus) {
   EXPECT_GT(advisedRadius(fold), 1.5) << fold;
   EXPECT_NO_THROW((void)makeDecal(ball, z, x, 0.99 * advisedRadius(fold), 0.1, options)) << fold;
 
-  // On a pipe they do not cross, but come round.
+  // On a pipe they do not cross, but go around it.
   const NarrowBand pipe = support::sampleBand([](const V3d& p) { return std::hypot(p.x, p.y) - 1; },
                                               {V3d(-1, -1, -5), V3d(1, 1, 5)}, 0.1);
   EXPECT_NO_THROW((void)makeDecal(pipe, x, V3d(0, 1, 0), 0.93 * kPi, 0.1, options));
@@ -232,8 +232,8 @@ TEST(Decal, RefusesToGoBeyondTheCutLocus) {
       << round;
 }
 
-TEST(Decal, RefusesToRunOffTheSurface) {
-  const NarrowBand band = slab();  // ends at x, y = ±2 and some voxels
+TEST(Decal, RefusesToLeaveTheSurface) {
+  const NarrowBand band = slab();  // ends some voxels beyond x, y = ±2
   const std::string message = support::refusal<levelset::Error>(
       [&] { (void)makeDecal(band, V3d(0), V3d(1, 0, 0), 3, 0.2, kThin); });
   EXPECT_NE(message.find("breaks off"), std::string::npos) << message;
@@ -244,7 +244,8 @@ TEST(Decal, RefusesToRunOffTheSurface) {
 }
 
 TEST(Decal, GoesAroundAnEarThatItsParticlesResolve) {
-  // A plate of thickness 6 voxels with a round edge, the centre 0.4 from where the edge begins.
+  // A plate of thickness 6 voxels with a round edge. The centre is 0.4 from the beginning of the
+  // edge.
   const double voxel = 0.05, half = 0.15;
   const NarrowBand plate = support::sampleBand(
       [=](const V3d& p) {
@@ -257,7 +258,7 @@ TEST(Decal, GoesAroundAnEarThatItsParticlesResolve) {
       plate, at, x, 1.2, 0.05, {.layers = 2, .scheme = LayerScheme::Conforming, .spacing = 0.06});
   const ParticleLayer& layer = fine.patch.layers.front();
   const V3d end = layer.at(layer.columns - 1, layer.rows / 2);
-  // 0.4 to the edge, half a circle around it, the rest back below.
+  // 0.4 to the edge, half a circle around it, and the rest back below.
   EXPECT_NEAR(end.z, -half, 0.01);
   EXPECT_NEAR(end.x, 1 - (1.2 - 0.4 - kPi * half), 0.01);
   const std::string coarse = support::refusal<levelset::Error>([&] {

@@ -26,7 +26,7 @@ using support::makeBall;
 
 constexpr double kVoxel = 0.1, kRadius = 3;
 
-/// On a ball, at an angle from +x towards +y.
+/// Patch on a ball, at an angle from +x towards +y.
 Patch patchAt(const NarrowBand& ball, double angle, double side = 1) {
   const V3d place(kRadius * std::cos(angle), kRadius * std::sin(angle), 0);
   const auto corners = mapping::cornersAround(ball, place, side, side);
@@ -37,7 +37,7 @@ NarrowBand stud() {
   return makeBall(0.8, kVoxel);
 }
 
-TEST(ManyPatches, AreTheUnionOfEach) {
+TEST(ManyPatches, EqualTheUnionOfEach) {
   const NarrowBand ball = makeBall(kRadius, kVoxel);
   std::vector<Patch> patches;
   for (int n = 0; n < 5; ++n) patches.push_back(patchAt(ball, 2 * M_PI * n / 5));
@@ -52,7 +52,7 @@ TEST(ManyPatches, AreTheUnionOfEach) {
     const mapping::TextureResult one = mapTexture(ball, stud(), patch, alone);
     volume += levelset::measure(one.band).volume;
     particles += one.report.particles;
-    // Every one is in its place: nothing of it stands out of the whole.
+    // Every texture is at its position: the union with it changes nothing.
     const NarrowBand both = levelset::unite(all.band, one.band);
     EXPECT_NEAR(levelset::measure(both).volume, many.volume, 1e-6 * many.volume);
   }
@@ -83,7 +83,7 @@ TEST(ManyPatches, MayOverlap) {
   EXPECT_LT(both.volume, 1.9 * levelset::measure(one).volume);
 }
 
-TEST(ManyPatches, TakeTheFinestVoxelThatOneNeeds) {
+TEST(ManyPatches, UseTheFinestVoxelSizeOfTheirTextures) {
   const NarrowBand ball = makeBall(kRadius, kVoxel), texture = makeBall(0.8, 2 * kVoxel);
   const std::vector<Patch> patches = {patchAt(ball, 0, 1), patchAt(ball, 2, 0.4)};
   const mapping::TextureOptions alone = {.merge = TextureMerge::Alone};
@@ -111,7 +111,7 @@ TEST(ManyPatches, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(hash(5), one);
 }
 
-TEST(ManyPatches, OfMeshesFollowEachOther) {
+TEST(ManyPatches, OfMeshesAreAppendedInOrder) {
   const NarrowBand ball = makeBall(kRadius, kVoxel);
   const std::vector<Patch> patches = {patchAt(ball, 0), patchAt(ball, 2)};
   const levelset::TriMesh tile = {
@@ -126,7 +126,7 @@ TEST(ManyPatches, OfMeshesFollowEachOther) {
   EXPECT_NEAR(levelset::signedVolume(both), volume, 1e-12);
 }
 
-TEST(ManyPatches, RefusesNone) {
+TEST(ManyPatches, RefuseAnEmptyList) {
   const NarrowBand ball = makeBall(kRadius, 0.2);
   const std::vector<Patch> none;
   EXPECT_THROW((void)mapTexture(ball, stud(), none), levelset::UsageError);

@@ -33,7 +33,7 @@ using support::square;
 
 constexpr double kVoxel = 0.1;
 
-/// z = height(x, y) over [−half, half]².
+/// Surface z = height(x, y) over [−half, half]².
 TriMesh terrain(double half, unsigned cells, const std::function<double(double, double)>& height) {
   return patchMesh(cells + 1, cells + 1, false, false, [=](double s, double t) {
     const double x = half * (2 * s - 1), y = half * (2 * t - 1);
@@ -47,7 +47,7 @@ NarrowBand plane(double half = 2, double halfWidth = 12) {
       .band;
 }
 
-TEST(OpenSurface, PatchOnAPlaneIsThatOnABox) {
+TEST(OpenSurface, PatchOnAPlaneEqualsThatOnABox) {
   const NarrowBand box = levelset::makeBox(V3d(4, 4, 2), V3d(0, 0, -1), kVoxel);
   const std::array<V3d, 4> corners = {V3d(-1, -0.7, 0.02), V3d(1.1, -0.5, 0), V3d(0.9, 0.8, 0),
                                       V3d(-1, 0.5, 0)};
@@ -66,7 +66,7 @@ TEST(OpenSurface, PatchOnAPlaneIsThatOnABox) {
   }
 }
 
-/// Half a cylinder about the y axis, open below and at its ends, facing out.
+/// Half a cylinder around the y axis, open below and at its ends, facing outwards.
 TriMesh halfCylinder(double radius, double length) {
   return patchMesh(200, 3, false, false, [=](double u, double v) {
     const double a = M_PI * (u - 0.5);
@@ -75,7 +75,8 @@ TriMesh halfCylinder(double radius, double length) {
 }
 
 TEST(OpenSurface, PatchOnHalfACylinderIsExact) {
-  // Chords of 200 cells: a sagitta of 6e-5. Rows run around, columns along, layers out.
+  // Chords of 200 cells have a sagitta of 6e-5. Rows run around the cylinder, columns along it,
+  // layers outwards.
   const double radius = 2, height = 0.6, arc = 0.9;
   const NarrowBand band =
       levelset::surfaceBand(halfCylinder(radius, 4), kVoxel, {.halfWidth = 13}).band;
@@ -104,7 +105,7 @@ TEST(OpenSurface, PatchesMayEndAtTheBorder) {
     for (const V3d& p : layer.positions) EXPECT_NEAR(p.z, layer.height, 0.01 * kVoxel);
 }
 
-TEST(OpenSurface, PatchesOverTheBorderAreRefusedWithThePlace) {
+TEST(OpenSurface, PatchesOverTheBorderAreRefusedWithThePosition) {
   const NarrowBand band = plane();
   const std::string corner =
       refusal<InvalidInput>([&] { (void)makePatch(band, square(2.5), 0.5); });
@@ -124,7 +125,7 @@ TEST(OpenSurface, PatchesOverTheBorderAreRefusedWithThePlace) {
             0u);
 }
 
-TEST(OpenSurface, PatchesOverAHoleAreRefusedWithThePlace) {
+TEST(OpenSurface, PatchesOverAHoleAreRefusedWithThePosition) {
   TriMesh sheet = terrain(2, 20, [](double, double) { return 0.0; });
   std::erase_if(sheet.triangles, [&](const auto& t) {
     const V3d middle =
@@ -140,7 +141,7 @@ TEST(OpenSurface, PatchesOverAHoleAreRefusedWithThePlace) {
 }
 
 TEST(OpenSurface, PatchesOverASlitAreRefused) {
-  // What goes on from both of its sides meets: the band is whole, and the surface is not.
+  // The continuations of both sides of the slit meet. The band is complete, the surface is not.
   for (const double width : {4.0, 5.0, 6.0}) {
     TriMesh sheet = terrain(2, 4, [](double, double) { return 0.0; });
     TriMesh halves;
@@ -177,7 +178,7 @@ TEST(OpenSurface, PatchesMayEndAtTheCornersOfTiltedSheets) {
       EXPECT_NEAR((p - shift).dot(normal), layer.height, 0.01 * kVoxel);
 }
 
-TEST(OpenSurface, ClosestPointsLieWithin) {
+TEST(OpenSurface, ClosestPointsLieOnTheSurface) {
   const NarrowBand band = plane();
   EXPECT_LT(
       (mapping::closestSurfacePoint(band, V3d(0.3, 1.9, 5), "test") - V3d(0.3, 1.9, 0)).length(),
@@ -189,14 +190,14 @@ TEST(OpenSurface, ClosestPointsLieWithin) {
   EXPECT_THROW((void)mapping::closestSurfacePoint(band, V3d(0, 2.4, 2), "test"), InvalidInput);
 }
 
-TEST(OpenSurface, TexturesStandOnIt) {
+TEST(OpenSurface, CarriesTextures) {
   const NarrowBand band = plane();
   const Patch patch = makePatch(band, square(1), 0.5, {.layers = 2, .spacing = 0.4}).patch;
   const NarrowBand ball = support::makeBall(1, kVoxel);
   const NarrowBand alone =
       mapping::mapTexture(band, ball, patch, {.merge = mapping::TextureMerge::Alone}).band;
   EXPECT_FALSE(alone.isOpenSurface());
-  // The ball's cube becomes a box of 2 x 2 x 0.5, sunk by a voxel.
+  // The ball's cube becomes a box of 2 x 2 x 0.5, embedded by a voxel.
   const Imath::Box3d bounds = alone.zeroSetBounds();
   EXPECT_NEAR(bounds.min.z, -kVoxel, 0.1 * kVoxel);
   EXPECT_NEAR(bounds.max.z, 0.5 - kVoxel, 0.1 * kVoxel);
@@ -210,7 +211,7 @@ TEST(OpenSurface, TexturesStandOnIt) {
 }
 
 TEST(OpenSurface, TreesStandOnTerrain) {
-  // Upright trunks on hills, by the spline scheme, moved as meshes.
+  // Vertical trunks on hills, with the spline scheme, mapped as meshes.
   const auto hills = [](double x, double y) { return 0.4 * std::sin(1.3 * x) * std::cos(y); };
   const NarrowBand band = levelset::surfaceBand(terrain(4, 80, hills), kVoxel).band;
   mapping::ScatterOptions options;
@@ -225,8 +226,8 @@ TEST(OpenSurface, TreesStandOnTerrain) {
   for (const Patch& patch : forest.patches)
     for (const V3d& p : patch.layers.front().positions) {
       EXPECT_LE(std::max(std::abs(p.x), std::abs(p.y)), 4 + kVoxel);
-      // Facets of 0.1 by 0.1 on curvatures of up to 0.7: a sagitta of up to 0.002. Beyond the
-      // border the hills go on straight.
+      // Facets of 0.1 by 0.1 with curvatures of up to 0.7 have a sagitta of up to 0.002. Beyond the
+      // border the hills continue straight.
       const bool isBeyond = std::max(std::abs(p.x), std::abs(p.y)) > 4;
       EXPECT_NEAR(p.z, hills(p.x, p.y), 0.004 + (isBeyond ? 0.5 * 0.7 * kVoxel * kVoxel : 0));
     }
@@ -236,7 +237,7 @@ TEST(OpenSurface, TreesStandOnTerrain) {
   EXPECT_GT(levelset::signedVolume(trees), 0);
 }
 
-TEST(OpenSurface, SheetsOfHeightmapsPassTheirPixels) {
+TEST(OpenSurface, SheetsOfHeightmapsPassThroughTheirPixels) {
   mapping::Heightmap map;
   map.grid = {3, 3, {0, 0.2, 0, 0.3, 1, 0.1, 0, 0.4, 0}};
   map.size = {4, 2};
@@ -253,7 +254,7 @@ TEST(OpenSurface, SheetsOfHeightmapsPassTheirPixels) {
     EXPECT_NEAR(sheet.positions[n].z, 3 - 1 + 0.5 + 1.5 * mapping::heightAt(map, uv.x, uv.y),
                 1e-12);
   }
-  // The pixel in the first row's middle lies at the largest y.
+  // The pixel in the middle of the first row has the largest y.
   EXPECT_NEAR(sheet.positions[4 * 9 + 4].z, 2.5 + 1.5 * 0.2, 1e-12);
   for (const auto& t : sheet.triangles)
     EXPECT_GT((sheet.positions[t[1]] - sheet.positions[t[0]])
@@ -267,7 +268,7 @@ TEST(OpenSurface, SheetsOfHeightmapsPassTheirPixels) {
 }
 
 TEST(OpenSurface, TilesGoAroundAPipe) {
-  // A pipe of no thickness, open at both ends.
+  // A pipe of zero thickness, open at both ends.
   const TriMesh pipe = patchMesh(100, 3, true, false, [](double u, double v) {
     const double a = 2 * M_PI * u;
     return V3d(std::cos(a), std::sin(a), 4 * v - 2);

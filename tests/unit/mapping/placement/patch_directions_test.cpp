@@ -1,4 +1,4 @@
-// Corners that rise in directions of their own [Brodersen07 fig. 8.4].
+// Patches whose corners rise in given directions [Brodersen07 fig. 8.4].
 
 #include <gtest/gtest.h>
 
@@ -47,12 +47,12 @@ void expectCornersRise(const Patch& patch, const std::array<V3d, 4>& directions)
   }
 }
 
-TEST(PatchDirections, ParallelCornersRiseAlongTheMiddlesNormal) {
+TEST(PatchDirections, ParallelCornersRiseAlongTheNormalInTheMiddle) {
   const Patch patch = makePatch(ball(), corners(), kHeight, {.parallel = true}).patch;
   const V3d up(0, 0, 1);
   expectCornersRise(patch, {up, up, up, up});
-  // The layers do not spread: their corners stay above each other, where by themselves they would
-  // be 1.4 times as far apart.
+  // The layers do not spread: their corners stay above each other. By default their distance would
+  // be 1.4 times as large.
   const Patch spread = makePatch(ball(), corners(), kHeight).patch;
   const auto width = [](const Patch& p) {
     const std::array<V3d, 4> at = cornersOf(p.layers.back());
@@ -62,7 +62,7 @@ TEST(PatchDirections, ParallelCornersRiseAlongTheMiddlesNormal) {
   EXPECT_NEAR(width(spread), 1 + kHeight, 2e-3);
 }
 
-TEST(PatchDirections, OneForAllAndOneEach) {
+TEST(PatchDirections, OneForAllOrOneForEachCorner) {
   const V3d leaning(0.3, -0.1, 1);
   expectCornersRise(makePatch(ball(), corners(), kHeight, {.directions = {leaning}}).patch,
                     {leaning, leaning, leaning, leaning});
@@ -87,7 +87,7 @@ TEST(PatchDirections, ShearAPlane) {
   }
 }
 
-TEST(PatchDirections, TakePointsOnTheSidesAlong) {
+TEST(PatchDirections, MovePointsOnTheSidesToo) {
   PatchOptions options{.parallel = true};
   options.sides[0] = {V3d(0, -0.75, std::sqrt(1 - 0.75 * 0.75))};
   const Patch patch = makePatch(ball(), corners(), kHeight, options).patch;
@@ -98,7 +98,7 @@ TEST(PatchDirections, TakePointsOnTheSidesAlong) {
   EXPECT_LE(nearest, patch.spacing);
 }
 
-TEST(PatchDirections, RefuseWhatLeadsNowhere) {
+TEST(PatchDirections, RefuseInvalidDirections) {
   const auto refusal = [](const PatchOptions& options) {
     return support::refusal<UsageError>(
         [&] { (void)makePatch(ball(), corners(), kHeight, options); });

@@ -34,8 +34,8 @@ NarrowBand pipe() {
   return levelset::makeCylinder(1, 4, V3d(0), V3d(0, 0, 1), 0.1, {.halfWidth = 8});
 }
 
-/// Borders on all layers: the right one of `a` is the left one of `b`, to the bit, and each rim
-/// lies on the other's particles.
+/// Expects equal borders on all layers. The right border of `a` equals the left border of `b` to
+/// the bit, and the rim of each equals particles of the other.
 void expectSameSeam(const Patch& a, const Patch& b) {
   ASSERT_EQ(a.layers.size(), b.layers.size());
   for (std::size_t k = 0; k < a.layers.size(); ++k) {
@@ -85,7 +85,7 @@ TEST(PatchGrid, NeighboursShareTheirBorders) {
   }
 }
 
-TEST(PatchGrid, MirroredTilesRunBackAndForth) {
+TEST(PatchGrid, MirroredTilesAlternateTheirDirection) {
   const PatchGridResult grid =
       makePatchGrid(slab(), support::square(1), 0.3,
                     {.columns = 2, .rows = 2, .mirrorU = true, .mirrorV = true}, {.layers = 2});
@@ -98,7 +98,7 @@ TEST(PatchGrid, MirroredTilesRunBackAndForth) {
   EXPECT_TRUE(grid.patches[1].mirrored);
   EXPECT_TRUE(grid.patches[2].mirrored);
   EXPECT_FALSE(grid.patches[3].mirrored);
-  // The rim of the turned tile is turned with it.
+  // The rim of a rotated tile is rotated with it.
   EXPECT_EQ(second.beyond(static_cast<int>(last) + 1, 0), first.at(last - 1, 0));
 }
 
@@ -133,7 +133,7 @@ TEST(PatchGrid, ClosesAroundACylinder) {
 }
 
 TEST(PatchGrid, GoesAroundAVaseAndShiftsRowsLikeBricks) {
-  // A spindle, round about a slanted axis.
+  // A spindle, round about an inclined axis.
   const V3d along = V3d(1, 2, 2) / 3.0;
   const NarrowBand vase = support::sampleBand(
       [=](const V3d& p) {
@@ -148,7 +148,7 @@ TEST(PatchGrid, GoesAroundAVaseAndShiftsRowsLikeBricks) {
   ASSERT_EQ(grid.patches.size(), 12u);
   for (std::size_t n = 0; n < 6; ++n) {
     expectSameSeam(grid.patches[6 + n], grid.patches[6 + (n + 1) % 6]);
-    // A shifted tile begins in the middle of the one below.
+    // A shifted tile begins in the middle of the tile below.
     const ParticleLayer &low = grid.patches[n].layers[0], &high = grid.patches[6 + n].layers[0];
     for (std::size_t i = 0; i <= 3; ++i) EXPECT_EQ(high.at(i, 0), low.at(i + 3, low.rows - 1));
     for (const V3d& p : low.positions)
@@ -158,7 +158,7 @@ TEST(PatchGrid, GoesAroundAVaseAndShiftsRowsLikeBricks) {
   EXPECT_LT(grid.report.cellAreaVariation, 0.35);
 }
 
-TEST(PatchGrid, RefusesWhatMakesNoGrid) {
+TEST(PatchGrid, RefusesInvalidGrids) {
   const NarrowBand band = slab(), round = pipe();
   const auto square = support::square(1);
   const V3d low(0, 0, -1), high(0, 0, 1);
@@ -182,7 +182,7 @@ TEST(PatchGrid, RefusesWhatMakesNoGrid) {
   EXPECT_THROW((void)makePatchGridAround(round, low, high, 0, 0.1, {.columns = 4},
                                          {.scheme = LayerScheme::Spline}),
                levelset::UsageError);
-  // Beyond the ends of the cylinder there is nothing, and beside it neither.
+  // Beyond the ends of the cylinder and beside it there is no surface.
   EXPECT_THROW((void)makePatchGridAround(round, low, V3d(0, 0, 3), 0, 0.1, {.columns = 4}),
                levelset::InvalidInput);
   EXPECT_THROW(
@@ -192,7 +192,7 @@ TEST(PatchGrid, RefusesWhatMakesNoGrid) {
                levelset::InvalidInput);
 }
 
-TEST(PatchMesh, OfAShellIsClosedAndHoldsThePatchsVolume) {
+TEST(PatchMesh, OfOffsetLayersIsClosedAndHasThePatchsVolume) {
   const auto patch = mapping::makePatch(support::makeBall(1, 0.05, 16), support::cap(0.6), 0.5,
                                         {.layers = 4, .spacing = 0.08})
                          .patch;
@@ -209,7 +209,7 @@ TEST(PatchMesh, OfAShellIsClosedAndHoldsThePatchsVolume) {
   for (const auto& t : mesh.triangles)
     for (const auto v : t) isUsed[v] = 1;
   EXPECT_EQ(std::count(isUsed.begin(), isUsed.end(), 0), 0);
-  // A pyramid of a spherical square: its solid angle, from four corners on the unit sphere.
+  // A pyramid over a spherical square: its solid angle, from four corners on the unit sphere.
   const V3d a = patch.corners[0], b = patch.corners[1], c = patch.corners[2];
   const double half = 2 * std::atan2(a.dot(b.cross(c)), 1 + a.dot(b) + b.dot(c) + c.dot(a));
   const double exact = 2 * half / 3 * (1.5 * 1.5 * 1.5 - 1);

@@ -25,7 +25,8 @@ using support::cap;
 
 constexpr double kVoxel = 0.05;
 
-/// Distances as far as `reach` in all of the box: what redistance makes for patch space.
+/// Band with distances up to `reach` everywhere in the box, as redistancing computes for patch
+/// space.
 NarrowBand wideBand(const std::function<double(const V3d&)>& phi, const Imath::Box3d& box,
                     double reach, double voxel = kVoxel) {
   return support::sampleBand(phi, box, voxel, reach / voxel);
@@ -64,7 +65,8 @@ TEST(Patch, IsALatticeOnAPlane) {
   EXPECT_LE(result.patch.particleCount(), 2600u);
 }
 
-/// All four sides of a layer about a ball's centre, in steps of one length.
+/// Expects that all four sides of a layer are great circles about a ball's centre, with equal
+/// steps.
 void expectEvenGreatCircles(const ParticleLayer& layer) {
   std::array<std::vector<V3d>, 4> sides;
   for (std::size_t i = 0; i < layer.columns; ++i) {
@@ -110,7 +112,7 @@ TEST(Patch, LayersOnASphereAreConcentricAndSymmetric) {
   EXPECT_NEAR(result.report.vLength, angle, 1e-3 * angle);
 }
 
-TEST(Patch, RelaxationMakesCellsEven) {
+TEST(Patch, RelaxationEvensTheCells) {
   const PatchResult result = makePatch(sphere(), cap(0.7), 0.3, {.layers = 2, .spacing = 0.08});
   EXPECT_TRUE(result.report.isRelaxed);
   EXPECT_LT(result.report.cellAreaVariation, 0.12);
@@ -126,7 +128,7 @@ TEST(Patch, KeepsDensityFromLayerToLayer) {
 }
 
 TEST(Patch, SidesRunOverAnEdge) {
-  // Two corners on top of a box, two on its side: the sides go over the edge, not through the box.
+  // Two corners on top of a box, two on its side. The sides go over the edge, not through the box.
   const auto box = [](const V3d& p) {
     const V3d d(std::abs(p.x) - 1, std::abs(p.y) - 1, std::abs(p.z) - 1);
     const V3d out(std::max(d.x, 0.0), std::max(d.y, 0.0), std::max(d.z, 0.0));
@@ -138,13 +140,13 @@ TEST(Patch, SidesRunOverAnEdge) {
                 0.3, {.layers = 3, .spacing = 0.1});
   EXPECT_NEAR(result.report.uLength, 2, 0.05);
   EXPECT_NEAR(result.report.vLength, 0.8, 0.01);
-  // A tricubic's zero set has a bead 0.1012 voxel high along an edge.
+  // The zero set of the tricubic interpolant has a bead of height 0.1012 voxel along an edge.
   for (const V3d& p : result.patch.layers.front().positions)
     EXPECT_LT(std::abs(box(p)), 0.1015 * kVoxel);
 }
 
 TEST(Patch, ProjectsCornersFromFarAway) {
-  // Three voxels of band; the corners are given twelve voxels off.
+  // The band has three voxels, the corners are twelve voxels off.
   const NarrowBand thin = sphere(3 * kVoxel);
   const V3d far(0.2, 0.3, 1.5);
   const auto corners = mapping::cornersAround(thin, far, 0.3, 0.2);
@@ -157,7 +159,7 @@ TEST(Patch, ProjectsCornersFromFarAway) {
   EXPECT_THROW((void)mapping::cornersAround(thin, V3d(0, 0, 9), 0.3, 0.2), levelset::InvalidInput);
 }
 
-TEST(Patch, CornersAroundAPointHaveTheSizeAsked) {
+TEST(Patch, CornersAroundAPointHaveTheRequestedSize) {
   const NarrowBand band = slab(0.3);
   const auto straight = mapping::cornersAround(band, V3d(0.1, 0.2, 0.05), 1, 0.6);
   EXPECT_LT((straight[0] - V3d(-0.4, -0.1, 0)).length(), 1e-3 * 0.1);
@@ -181,7 +183,7 @@ TEST(Patch, RefusesCornersThatRunClockwise) {
   EXPECT_TRUE(mirrored.patch.mirrored);
 }
 
-TEST(Patch, RefusesWhatSpansNoPatch) {
+TEST(Patch, RefusesInvalidCorners) {
   const NarrowBand band = slab();
   const std::array<V3d, 4> sound = {V3d(-1, -0.5, 0), V3d(1, -0.5, 0), V3d(1, 0.5, 0),
                                     V3d(-1, 0.5, 0)};
@@ -207,7 +209,7 @@ TEST(Patch, RefusesWhatSpansNoPatch) {
   EXPECT_THROW((void)makePatch(NarrowBand(), sound, 0.3), levelset::InvalidInput);
 }
 
-TEST(Patch, RefusesCornersOnSeparateParts) {
+TEST(Patch, RefusesCornersOnSeparateComponents) {
   const NarrowBand two = wideBand(
       [](const V3d& p) {
         return std::min((p - V3d(-0.8, 0, 0)).length(), (p - V3d(0.8, 0, 0)).length()) - 0.5;
@@ -219,7 +221,7 @@ TEST(Patch, RefusesCornersOnSeparateParts) {
 }
 
 TEST(Patch, RefusesHeightsBeyondTheMedialAxis) {
-  // In a trough of radius 1 no point is further from the wall than 1.
+  // In a trough of radius 1 no point is farther from the wall than 1.
   const NarrowBand trough = wideBand([](const V3d& p) { return 1 - std::hypot(p.y, p.z); },
                                      {V3d(-1, -1, -1), V3d(1, 1, 1)}, 1.3);
   const double y = 0.5, z = -std::sqrt(0.75);
@@ -230,11 +232,11 @@ TEST(Patch, RefusesHeightsBeyondTheMedialAxis) {
                levelset::InvalidInput);
 }
 
-TEST(Patch, SidesPassThePointsGiven) {
+TEST(Patch, SidesPassThroughTheGivenPoints) {
   const std::array<V3d, 4> corners = {V3d(-1, -0.5, 0), V3d(1, -0.5, 0), V3d(1, 0.5, 0),
                                       V3d(-1, 0.5, 0)};
   mapping::PatchOptions options{.layers = 2, .spacing = 0.1};
-  options.sides[0] = {V3d(0, -1, 0.3)};  // projected: beside the surface
+  options.sides[0] = {V3d(0, -1, 0.3)};  // beside the surface; it is projected
   options.sides[1] = {V3d(1.3, -0.2, 0), V3d(1.3, 0.2, 0)};
   const PatchResult result = makePatch(slab(), corners, 0.4, options);
   for (const ParticleLayer& layer : result.patch.layers) {
@@ -252,7 +254,7 @@ TEST(Patch, SidesPassThePointsGiven) {
     }
   }
   EXPECT_NEAR(result.report.vLength, 0.5 * (1 + 0.4 + 2 * std::hypot(0.3, 0.3)), 1e-3);
-  options.sides[2] = {V3d(1, 0.5, 0)};  // where the side ends anyway
+  options.sides[2] = {V3d(1, 0.5, 0)};  // the end of the side
   EXPECT_THROW((void)makePatch(slab(), corners, 0.4, options), levelset::InvalidInput);
   options.sides[2] = {V3d(NAN, 0, 0)};
   EXPECT_THROW((void)makePatch(slab(), corners, 0.4, options), levelset::UsageError);
@@ -275,7 +277,7 @@ TEST(Patch, WrapsAThinEar) {
                           [](const V3d& p) { return p.x > 1.3; }));
 }
 
-TEST(Patch, HasAsManyCellsAsAsked) {
+TEST(Patch, HasTheRequestedNumberOfCells) {
   const PatchResult result = makePatch(sphere(), cap(0.6), 0.4, {.layers = 3, .cells = {7, 5}});
   for (const ParticleLayer& layer : result.patch.layers) {
     EXPECT_EQ(layer.columns, 8u);

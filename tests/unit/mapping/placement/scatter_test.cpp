@@ -55,14 +55,14 @@ TEST(ScatteredPoints, LieOnTheSurface) {
   }
 }
 
-TEST(ScatteredPoints, KeepTheirDistanceAndLeaveNoRoom) {
+TEST(ScatteredPoints, KeepTheirDistanceAndLeaveNoSpace) {
   const double distance = 0.5;
   const auto result = scatterPoints(ball(), {.distance = distance});
   ASSERT_EQ(result.points.size(), result.wanted);
   const double least = leastApart(result.points, result.wanted);
   EXPECT_GE(least, distance * (1 - 2e-3));
   EXPECT_NEAR(result.distance, least, 2e-3 * least);
-  // Nowhere is there room for a disc of twice the distance.
+  // No position has space for a disc of twice the distance.
   for (int n = 0; n < 2000; ++n) {
     const double z = 2 * (n + 0.5) / 2000 - 1, angle = 2.399963 * n, r = std::sqrt(1 - z * z);
     const V3d place = V3d(r * std::cos(angle), r * std::sin(angle), z) * kRadius;
@@ -73,15 +73,15 @@ TEST(ScatteredPoints, KeepTheirDistanceAndLeaveNoRoom) {
   }
 }
 
-TEST(ScatteredPoints, OfACountAreSpreadAsDiscsAre) {
-  // Blue noise keeps at least 0.65 of the distance that the densest packing has.
+TEST(ScatteredPoints, OfAFixedCountAreSpreadLikeDiscs) {
+  // Blue noise keeps at least 0.65 of the distance of the densest packing.
   for (const std::size_t count : {20u, 100u, 400u}) {
     const auto result = scatterPoints(ball(), {.count = count});
     ASSERT_EQ(result.wanted, count);
     const double densest =
         std::sqrt(4 * M_PI * kRadius * kRadius * 2 / (std::sqrt(3.0) * static_cast<double>(count)));
     EXPECT_GT(leastApart(result.points, count), 0.65 * densest) << count;
-    // By area: as many above as below.
+    // Uniform by area: equally many above and below.
     const auto above = std::count_if(result.points.begin(),
                                      result.points.begin() + static_cast<std::ptrdiff_t>(count),
                                      [](const SurfacePoint& p) { return p.position.z > 0; });
@@ -96,7 +96,8 @@ TEST(ScatteredPoints, FollowScaleAndWeight) {
   double above = 0, below = 0;
   for (const SurfacePoint& p : points) (p.position.z > 0 ? above : below) += 1;
   EXPECT_NEAR(above / below, 4, 0.6);  // discs of half the radius
-  // A small place at a small scale has room for as many as it has with that scale everywhere.
+  // A small region of a small scale holds as many points as it does if that scale applies
+  // everywhere.
   const auto inCap = [](const std::vector<SurfacePoint>& all) {
     return static_cast<double>(
         std::count_if(all.begin(), all.end(), [](const auto& p) { return p.position.x > 1.8; }));
@@ -114,7 +115,7 @@ TEST(ScatteredPoints, FollowScaleAndWeight) {
   for (const SurfacePoint& p : weighted.points) EXPECT_GT(p.position.x, 1.49);
 }
 
-TEST(ScatteredPoints, AreThoseOfTheirSeed) {
+TEST(ScatteredPoints, DependOnTheSeedOnly) {
   const auto places = [](std::uint64_t seed) {
     std::vector<double> result;
     for (const SurfacePoint& p : scatterPoints(ball(), {.count = 30, .seed = seed}).points)
@@ -127,8 +128,8 @@ TEST(ScatteredPoints, AreThoseOfTheirSeed) {
             support::onThreads(5, [&] { return places(1); }));
 }
 
-TEST(ScatteredPoints, DoNotSeeThroughThinWalls) {
-  // Both sides of a plate of two voxels get their own.
+TEST(ScatteredPoints, DoNotInteractThroughThinWalls) {
+  // Both sides of a plate of two voxels get points of their own.
   const NarrowBand plate = support::sampleBand(
       [](const V3d& p) {
         return std::max({std::abs(p.x) - 2, std::abs(p.y) - 2, std::abs(p.z) - 0.1});
@@ -143,7 +144,7 @@ TEST(ScatteredPoints, DoNotSeeThroughThinWalls) {
   EXPECT_LT(near, 0.9);
 }
 
-TEST(ScatteredPoints, RefuseWhatMakesNoSense) {
+TEST(ScatteredPoints, RefuseInvalidOptions) {
   EXPECT_THROW((void)scatterPoints(ball(), {}), UsageError);
   EXPECT_THROW((void)scatterPoints(ball(), {.count = 3, .distance = 1}), UsageError);
   EXPECT_THROW((void)scatterPoints(ball(), {.distance = std::nan("")}), UsageError);
@@ -166,7 +167,7 @@ mapping::ScatterOptions small(std::size_t count) {
           .patch = {.layers = 2, .spacing = 0.2}};
 }
 
-TEST(Scatter, LaysPatchesOfTheSizeAsked) {
+TEST(Scatter, PlacesPatchesOfTheRequestedSize) {
   mapping::ScatterOptions options = small(12);
   options.direction = [](const V3d&, double) { return V3d(0, 0, 1); };
   const auto result = mapping::scatter(ball(), 0.3, options);
@@ -176,7 +177,7 @@ TEST(Scatter, LaysPatchesOfTheSizeAsked) {
     const mapping::ParticleLayer& layer = patch.layers.front();
     const V3d first = layer.at(0, 0), last = layer.at(layer.columns - 1, 0);
     EXPECT_NEAR(greatCircle(first, last), 0.8, 0.05);
-    // u runs towards the pole, if that is not too near.
+    // u points towards the pole, except close to it.
     const V3d center = layer.at(layer.columns / 2, layer.rows / 2);
     if (std::abs(center.z) > 1.6) continue;
     const V3d u = (layer.at(layer.columns - 1, layer.rows / 2) - layer.at(0, layer.rows / 2));
@@ -186,13 +187,13 @@ TEST(Scatter, LaysPatchesOfTheSizeAsked) {
   }
 }
 
-TEST(Scatter, RefusesDirectionsThatAreNone) {
+TEST(Scatter, RefusesInvalidDirections) {
   mapping::ScatterOptions options = small(3);
   options.direction = [](const V3d&, double) { return V3d(std::nan(""), 0, 0); };
   EXPECT_THROW((void)mapping::scatter(ball(), 0.3, options), UsageError);
 }
 
-TEST(Scatter, ScalesPatchesAndTurnsThem) {
+TEST(Scatter, ScalesAndRotatesPatches) {
   mapping::ScatterOptions options = small(10);
   options.density.scale = [](const V3d& p) { return p.x > 0 ? 1.0 : 0.5; };
   options.jitter = M_PI;
@@ -211,15 +212,16 @@ TEST(Scatter, ScalesPatchesAndTurnsThem) {
     EXPECT_EQ(again[n].layers.front().positions, result.patches[n].layers.front().positions);
 }
 
-TEST(Scatter, LeavesOutWhatBearsNoPatchAndFillsTheGaps) {
-  // Beside a ball, a ball too small for the patches.
+TEST(Scatter, LeavesOutUnsuitableSitesAndFillsTheGaps) {
+  // A ball, and beside it a ball too small for the patches.
   const NarrowBand two = support::sampleBand(
       [](const V3d& p) {
         return std::min(p.length() - kRadius, (p - V3d(4, 0, 0)).length() - 0.2);
       },
       {V3d(-2, -2, -2), V3d(4.4, 2, 2)}, 0.1);
   mapping::ScatterOptions options = small(20);
-  options.density.scale = [](const V3d& p) { return p.x > 3 ? 0.4 : 1; };  // not to miss it
+  // Dense enough that sites hit the small ball.
+  options.density.scale = [](const V3d& p) { return p.x > 3 ? 0.4 : 1; };
   options.uSize = options.vSize = 2;
   const auto result = mapping::scatter(two, 0.3, options);
   EXPECT_GT(result.leftOut, 0u);
@@ -246,7 +248,7 @@ TEST(Scatter, SkipsPatchesThatFold) {
   EXPECT_THROW((void)mapping::mapTexture(base, stud, patches[1], skipping), InvalidInput);
 }
 
-/// Between corners of layers: the counts between them may be rounded another way.
+/// Largest difference between corners of layers. The rounding of counts between corners may differ.
 double worstApart(const Patch& one, const Patch& other) {
   if (one.layers.size() != other.layers.size()) return HUGE_VAL;
   const auto cornersOf = [](const mapping::ParticleLayer& layer) {
@@ -261,7 +263,7 @@ double worstApart(const Patch& one, const Patch& other) {
   return worst;
 }
 
-TEST(Scatter, PatchesThatShareDistancesStandAsThoseAlone) {
+TEST(Scatter, PatchesThatShareDistancesEqualSeparateOnes) {
   const NarrowBand base = ball();
   mapping::ScatterOptions options;
   options.density.count = 16;
@@ -278,7 +280,8 @@ TEST(Scatter, PatchesThatShareDistancesStandAsThoseAlone) {
       const mapping::PatchSite& site = together.sites[n];
       const Patch alone =
           mapping::makePatch(base, site.corners, height * site.scale, options.patch).patch;
-      // The tall ones alone take voxels of twice the size; together, those of the lowest.
+      // Tall patches alone use voxels of twice the size. Together, all use the voxels of the lowest
+      // patch.
       const double voxel = (height > 4 ? 2 : 1) * base.voxelSize();
       EXPECT_LT(worstApart(alone, together.patches[n]), 0.02 * voxel) << height;
     }
@@ -298,8 +301,8 @@ TEST(PatchSpace, IsSharedWhereThatCostsLess) {
   EXPECT_GE(many->halfWidth() * many->voxelSize(), 1.6 - 1e-9);
   EXPECT_FALSE(isShared(1, 1, 1));
   EXPECT_FALSE(isShared(40, 1, 1, 1000));
-  EXPECT_FALSE(isShared(40, 0.1, -1));  // reached as it is
-  // As coarse as the lowest of them may be, and no coarser.
+  EXPECT_FALSE(isShared(40, 0.1, -1));  // the band covers it already
+  // As coarse as the lowest patch permits, and no coarser.
   const auto tall = isShared(40, 4.5, 6);
   ASSERT_TRUE(tall);
   EXPECT_DOUBLE_EQ(tall->voxelSize(), 2 * base.voxelSize());
@@ -308,7 +311,7 @@ TEST(PatchSpace, IsSharedWhereThatCostsLess) {
   EXPECT_DOUBLE_EQ(mixed->voxelSize(), base.voxelSize());
 }
 
-TEST(PatchSpace, IsItsOwnWhereTheSharedOneDoesNotDo) {
+TEST(PatchSpace, IsSeparateWhereTheSharedOneIsUnsuitable) {
   const NarrowBand base = ball();
   const std::vector<V3d> border = {V3d(0, 0, kRadius), V3d(0.3, 0, std::sqrt(4 - 0.09))};
   const auto voxelOf = [&](const NarrowBand& shared, double height) {
@@ -319,10 +322,11 @@ TEST(PatchSpace, IsItsOwnWhereTheSharedOneDoesNotDo) {
   EXPECT_DOUBLE_EQ(voxelOf(wide, 1), base.voxelSize());  // too coarse
   const NarrowBand low = mapping::sweepSharedSpace(base, {40, 0.5, 0.5, 1, 1}, {}).value();
   const NarrowBand made = mapping::sweepPatchSpace(base, border, 0.1, 1.5, {.shared = &low});
-  EXPECT_GE(made.halfWidth() * made.voxelSize(), 2.1 - 1e-9);  // it does not reach
+  // The shared space is not high enough.
+  EXPECT_GE(made.halfWidth() * made.voxelSize(), 2.1 - 1e-9);
 }
 
-TEST(PatchSpace, IsSweptAboutThePatchOnly) {
+TEST(PatchSpace, IsComputedAroundThePatchOnly) {
   const NarrowBand base = ball();
   const double height = 0.8, bulge = 0.1;
   const auto at = [](double x, double y) {
@@ -332,18 +336,18 @@ TEST(PatchSpace, IsSweptAboutThePatchOnly) {
       base, std::vector<V3d>{at(-0.3, -0.3), at(0.3, -0.3), at(0.3, 0.3), at(-0.3, 0.3)}, bulge,
       height);
   const levelset::BandSampler sampler(own);
-  // As far as patch space reaches, and no further than what the sweep has to look at.
+  // Valid within the extent of patch space, and little beyond the region that the sweep needs.
   EXPECT_NEAR(sampler.value(V3d(0.4, 0, kRadius + height)),
               V3d(0.4, 0, kRadius + height).length() - kRadius, 0.01);
   const NarrowBand all =
       mapping::sweepSharedSpace(base, {40, 0.5, 0.5, height, height}, {}).value();
-  // The box is 0.6 + 2 (height + bulge) = 2.4 wide: of the ball's 4π 2² seen from above, a ninth;
-  // the room above it spreads to about twice that.
+  // The box is 0.6 + 2 (height + bulge) = 2.4 wide, a ninth of the ball's 4π 2² seen from above.
+  // The space above it spreads to about twice that.
   EXPECT_LT(static_cast<double>(own.activeVoxelCount()),
             0.25 * static_cast<double>(all.activeVoxelCount()));
 }
 
-TEST(Scatter, RefusesAHeightThatIsNoneBeforeItSweeps) {
+TEST(Scatter, RefusesInvalidHeightsBeforeTheSweep) {
   for (const double height : {-1.0, std::nan(""), HUGE_VAL})
     EXPECT_THROW((void)mapping::scatter(ball(), height, small(40)), UsageError);
 }

@@ -45,8 +45,8 @@ class Kernel : public ::testing::TestWithParam<RbfKernel> {
 INSTANTIATE_TEST_SUITE_P(All, Kernel, ::testing::ValuesIn(support::kKernels),
                          ::testing::PrintToStringParamName());
 
-// Σ a_i a_j φ has one sign for weights that are orthogonal to the linear polynomials: it is what λ
-// is added to.
+// Σ a_i a_j φ has one sign for weights that are orthogonal to the linear polynomials. λ is added to
+// this quadratic form.
 TEST_P(Kernel, IsConditionallyDefiniteWithItsSign) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> unit(-1, 1);
@@ -55,7 +55,8 @@ TEST_P(Kernel, IsConditionallyDefiniteWithItsSign) {
     for (int trial = 0; trial < 20; ++trial) {
       std::array<V3d, 5> p;
       for (V3d& q : p) q = V3d(unit(random), unit(random), unit(random)) * size;
-      // Five points in space have one linear relation: barycentric coordinates of the last.
+      // Five points in space have one linear relation: the barycentric coordinates of the last
+      // point.
       const V3d a = p[1] - p[0], b = p[2] - p[0], c = p[3] - p[0], d = p[4] - p[0];
       const double volume = a.dot(b.cross(c));
       const double x = d.dot(b.cross(c)) / volume, y = a.dot(d.cross(c)) / volume,
@@ -69,7 +70,7 @@ TEST_P(Kernel, IsConditionallyDefiniteWithItsSign) {
     }
 }
 
-TEST_P(Kernel, SlopeIsTheSlope) {
+TEST_P(Kernel, SlopeIsTheDerivative) {
   for (double r = 0.003; r < 30; r *= 1.7) {
     const double step = 1e-4 * r;
     const double expected = (value(r + step) - value(r - step)) / (2 * step);
@@ -94,7 +95,7 @@ TEST_P(Kernel, BoundsHold) {
     }
 }
 
-/// Along a line, the divided difference of seven values is f⁽⁶⁾/6! at some place between them.
+/// Along a line, the divided difference of seven values equals f⁽⁶⁾/6! at a position between them.
 TEST_P(Kernel, SixthDerivativeIsBounded) {
   std::mt19937 random(9);
   std::uniform_real_distribution<double> unit(0, 1);
@@ -118,12 +119,12 @@ TEST_P(Kernel, SixthDerivativeIsBounded) {
     if (rounding < 0.01 * sixth(nearest))
       closest = std::max(closest, std::abs(difference[0]) / sixth(nearest));
   }
-  // Sharp for the homogeneous kernels, far off for the sums of exponentials.
+  // Sharp for the homogeneous kernels, far from sharp for the sums of exponentials.
   const bool isSharp = GetParam() != RbfKernel::Laplacian && GetParam() != RbfKernel::Gaussian;
   EXPECT_GT(closest, isSharp ? 0.8 : 0);
 }
 
-TEST_P(Kernel, VectorCodeAgreesWithIt) {
+TEST_P(Kernel, VectorCodeAgreesWithScalarCode) {
   const std::vector<mapping::RbfParticle> particle = {{V3d(0), V3d(1, -2, 0.5)}};
   const std::vector<std::uint32_t> chosen = {0};
   std::vector<double> radii = {0, 1e-140, 1e-20, 1, std::sqrt(0.5), 25, 400};
@@ -143,7 +144,8 @@ TEST_P(Kernel, VectorCodeAgreesWithIt) {
   }
 }
 
-// Sums of many particles, near and far, at counts of points that fill no vector and no tile.
+// Sums of many particles, near and far, with counts of points that are no multiple of a vector or a
+// tile.
 TEST_P(Kernel, EveryInstructionSetGivesTheSameBits) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> unit(-1, 1);
@@ -183,7 +185,7 @@ TEST_P(Kernel, EveryInstructionSetGivesTheSameBits) {
   }
 }
 
-TEST(RbfAdders, AreAllThatTheProcessorCanRun) {
+TEST(RbfAdders, IncludeEveryInstructionSetOfTheProcessor) {
   std::vector<std::string> expected = {"plain"};
 #if defined(__x86_64__)
   if (__builtin_cpu_supports("avx2")) expected.emplace_back("avx2");
@@ -197,7 +199,7 @@ TEST(RbfAdders, AreAllThatTheProcessorCanRun) {
   EXPECT_EQ(found, expected);
 }
 
-// The limit at 0 that the closed form cannot be evaluated at, and the far field of a point charge.
+// The limit at 0, where the closed form cannot be evaluated, and the far field of a point charge.
 TEST(LaplacianKernel, HasItsLimits) {
   using mapping::rbf::kLaplacian;
   using mapping::rbf::Laplacian;

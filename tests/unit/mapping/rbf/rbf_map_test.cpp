@@ -45,7 +45,7 @@ TEST_P(KernelMap, IsExactAtParticlesWithoutRelaxation) {
   EXPECT_TRUE(report.notes.empty());
 }
 
-TEST_P(KernelMap, ReproducesAffineMapsWhateverTheRelaxation) {
+TEST_P(KernelMap, ReproducesAffineMapsForAnyRelaxation) {
   const V3d shift(1e4, -2e4, 3e4);
   for (const double lambda : {0.0, 0.25, 0.5, 100.0}) {
     const Cloud cloud = lattice(5, affine, shift);
@@ -56,7 +56,7 @@ TEST_P(KernelMap, ReproducesAffineMapsWhateverTheRelaxation) {
   }
 }
 
-/// Largest error of the map through edge³ particles of the unit cube, away from its sides.
+/// Largest error, away from the sides, of the map through edge³ particles of the unit cube.
 double quadraticError(int edge, RbfKernel kernel) {
   const auto quadratic = [](const V3d& p) {
     return V3d(p.x * p.x - 0.5 * p.y * p.z, p.y + p.z * p.z, p.z - p.x * p.y);
@@ -75,9 +75,9 @@ double quadraticError(int edge, RbfKernel kernel) {
   return worst;
 }
 
-// Polynomials of degree one are reproduced whatever the kernel, so that what is left of a quadratic
-// map falls like h² where the kernel shrinks with the spacing; those that grow see all particles.
-TEST_P(KernelMap, ConvergesAsItPromises) {
+// Polynomials of degree one are reproduced for any kernel. The error of a quadratic map falls like
+// h² if the kernel scales with the spacing. Growing kernels depend on all particles.
+TEST_P(KernelMap, ConvergesWithTheStatedOrder) {
   const bool isLocal = GetParam() == RbfKernel::Laplacian || GetParam() == RbfKernel::Gaussian;
   const double coarse = quadraticError(5, GetParam()), middle = quadraticError(8, GetParam()),
                fine = quadraticError(11, GetParam());
@@ -98,7 +98,8 @@ TEST_P(KernelMap, ResidualGrowsWithRelaxation) {
   EXPECT_LT(last, 0.3);
 }
 
-// The experiment behind the erratum: φ(r) = r needs φ − λ, the others φ + λ; else noise would grow.
+// Numerical evidence for the erratum: φ(r) = r needs φ − λ, the others need φ + λ. The wrong sign
+// amplifies noise.
 TEST_P(KernelMap, RelaxationRemovesNoise) {
   std::mt19937 random(3);
   std::normal_distribution<double> noise(0, 0.1);
@@ -110,7 +111,7 @@ TEST_P(KernelMap, RelaxationRemovesNoise) {
   const auto error = [&](double lambda) {
     const RbfMap map = fit(cloud, lambda, GetParam());
     double sum = 0;
-    for (int i = 0; i < 125; ++i) {  // between the particles, where noise is not given
+    for (int i = 0; i < 125; ++i) {  // between the particles, where no noise is given
       const V3d p(i / 25 * 0.8 + 0.4, i / 5 % 5 * 0.8 + 0.4, i % 5 * 0.8 + 0.4);
       sum += (map(p) - 0.2 * p).length2() / 3;
     }
@@ -120,7 +121,7 @@ TEST_P(KernelMap, RelaxationRemovesNoise) {
   EXPECT_LT(error(0.5), error(0.1));
 }
 
-TEST_P(KernelMap, JacobianIsTheSlope) {
+TEST_P(KernelMap, JacobianIsTheDerivative) {
   const Cloud cloud = lattice(5, bend);
   const RbfMap map = fit(cloud, 0.1, GetParam());
   const double step = 1e-5;
@@ -134,7 +135,7 @@ TEST_P(KernelMap, JacobianIsTheSlope) {
       for (int k = 0; k < 3; ++k) EXPECT_NEAR(jacobian[k][axis], slope[k], 1e-6);
     }
   }
-  // All but r are smooth at particles, r's kink there counts nothing.
+  // All kernels except r are smooth at particles. The kink of r contributes zero there.
   const V3d p = cloud.points[62];
   for (int k = 0; k < 3; ++k) {
     const V3d around = (map(p + V3d(0, step, 0)) - map(p - V3d(0, step, 0))) / (2 * step);
@@ -142,7 +143,7 @@ TEST_P(KernelMap, JacobianIsTheSlope) {
   }
 }
 
-TEST_P(KernelMap, DoesNotDependOnUnitPlaceAndTurn) {
+TEST_P(KernelMap, DoesNotDependOnUnitPositionAndRotation) {
   const Cloud cloud = lattice(5, bend);
   const RbfMap map = fit(cloud, 0.2, GetParam());
   for (const double unit : {1e-6, 3.0, 2e5}) {
@@ -157,7 +158,7 @@ TEST_P(KernelMap, DoesNotDependOnUnitPlaceAndTurn) {
   }
 }
 
-/// A block of a grid that is turned and sheared a little.
+/// Block of a grid that is rotated and slightly sheared.
 GridBlock blockAt(const V3d& origin, double step, int edge) {
   GridBlock block{origin, M33d(), edge};
   for (int i = 0; i < 3; ++i) block.rows[i][i] = step;
@@ -165,7 +166,7 @@ GridBlock blockAt(const V3d& origin, double step, int edge) {
   return block;
 }
 
-TEST_P(KernelMap, BoundsHoldTheImage) {
+TEST_P(KernelMap, BoundsContainTheImage) {
   const RbfMap map = fit(lattice(5, bend), 0, GetParam());
   std::mt19937 random(11);
   std::uniform_real_distribution<double> unit(0, 1);
@@ -179,15 +180,15 @@ TEST_P(KernelMap, BoundsHoldTheImage) {
           const V3d x = origin + block.row(0) * t.x + block.row(1) * t.y + block.row(2) * t.z;
           EXPECT_TRUE(box.intersects(map(x))) << size << " " << edge;
         }
-        // A bound that holds is not enough: it has to be near, or it excludes nothing.
-        // The Laplacian's peaks are as wide as the smallest block.
+        // A valid bound must also be tight, or it excludes nothing.
+        // The peaks of the Laplacian are as wide as the smallest block.
         if (size < 0.5) {
           EXPECT_LT(box.size().x, (GetParam() == RbfKernel::Laplacian ? 2 : 1.6) * size);
         }
       }
 }
 
-/// Largest difference between the map's points and its leaf blocks.
+/// Largest difference between the map at points and in its leaf blocks.
 double leafError(const RbfMap& map, const GridBlock& block, const mapping::BlockMap& at,
                  std::size_t& near) {
   double worst = 0;
@@ -219,7 +220,7 @@ TEST_P(KernelMap, BlocksAgreeWithPoints) {
         std::size_t near = 0;
         const double error = leafError(map, block, *map.restrictTo(block, tolerance), near);
         EXPECT_LE(error, tolerance + 1e-12) << edge;
-        // The more may be off, the fewer particles are left to the grid points.
+        // A larger tolerance leaves fewer particles to single grid points.
         if (tolerance == 0) {
           EXPECT_EQ(near, map.size() * static_cast<std::size_t>(leaves));
         }
@@ -230,7 +231,7 @@ TEST_P(KernelMap, BlocksAgreeWithPoints) {
     }
 }
 
-TEST(RbfMap, RefusesWhatHasNoMap) {
+TEST(RbfMap, RefusesInvalidParticles) {
   EXPECT_THROW((void)fit({}, 0), levelset::InvalidInput);
   Cloud nan = lattice(3, affine);
   nan.points[4].y = std::numeric_limits<double>::quiet_NaN();

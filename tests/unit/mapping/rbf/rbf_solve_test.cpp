@@ -51,14 +51,14 @@ bool isSound(const RbfMap& map) {
   return true;
 }
 
-/// Lengthens by 1.7, turns by 3-4-5 angles and moves.
+/// Scales by 1.7, rotates by 3-4-5 angles and translates.
 V3d similarity(const V3d& p) {
   const V3d turned(0.6 * p.x - 0.8 * p.y, 0.8 * p.x + 0.6 * p.y, p.z);
   return V3d(turned.x, 0.6 * turned.y - 0.8 * turned.z, 0.8 * turned.y + 0.6 * turned.z) * 1.7 +
          V3d(3, -1, 2);
 }
 
-TEST_P(Solve, ParticlesOfOnePlaceAndTargetAreOne) {
+TEST_P(Solve, EqualParticlesCountOnce) {
   const Cloud cloud = lattice(4, bend);
   Cloud twice = cloud;
   for (const std::size_t i : {9u, 40u, 9u}) {
@@ -74,7 +74,7 @@ TEST_P(Solve, ParticlesOfOnePlaceAndTargetAreOne) {
   for (const V3d& x : kPlaces) EXPECT_LT((map(x) - once(x)).length(), 1e-9);
 }
 
-TEST_P(Solve, ParticlesOfOnePlaceAreAveraged) {
+TEST_P(Solve, ParticlesAtOnePositionAreAveraged) {
   const Cloud cloud = lattice(4, bend);
   Cloud twice = cloud, mean = cloud;
   const V3d off(0.1, -0.05, 0.02);
@@ -85,30 +85,30 @@ TEST_P(Solve, ParticlesOfOnePlaceAreAveraged) {
   EXPECT_TRUE(says(map.solveReport(), "1 particles share the position of another"));
   for (const V3d& x : kPlaces) EXPECT_LT((map(x) - expected(x)).length(), 1e-9);
   EXPECT_NEAR(map.maxResidual(), off.length() / 2, 1e-9);
-  // Neighbours are about 1 apart in texture coordinates, too.
+  // Neighbours are about 1 apart in texture coordinates too.
   twice.targets.back() += V3d(9, 0, 0);
   EXPECT_THROW((void)fit(twice, 0, GetParam()), levelset::InvalidInput);
 }
 
-TEST_P(Solve, FlatCloudsGoOnAtRightAngles) {
+TEST_P(Solve, FlatCloudsAreExtendedPerpendicularly) {
   Cloud cloud;
   for (const Cloud source = lattice(5, similarity); const V3d& p : source.points)
     if (p.z < 0.5) {
-      const V3d q(p.x, p.y, 0.5 * p.x - 0.3 * p.y);  // in a plane askew
+      const V3d q(p.x, p.y, 0.5 * p.x - 0.3 * p.y);  // on an inclined plane
       cloud.add(q, similarity(q));
     }
   const RbfMap map = fit(cloud, 0.1, GetParam());
   EXPECT_EQ(map.solveReport().directions, 2);
   EXPECT_TRUE(says(map.solveReport(), "in one plane"));
   for (const V3d& x : kPlaces) EXPECT_LT((map(x) - similarity(x)).length(), 1e-9);
-  // What bends in the plane is followed in the plane.
+  // A curved map of the plane is followed within the plane.
   for (std::size_t i = 0; i < cloud.points.size(); ++i) cloud.targets[i] = bend(cloud.points[i]);
   const RbfMap bent = fit(cloud, 0, GetParam());
   EXPECT_LT(bent.maxResidual(), 1e-9);
   EXPECT_TRUE(isSound(bent));
 }
 
-TEST_P(Solve, LinesTurnAndScaleSpaceAsTheyDo) {
+TEST_P(Solve, LinesRotateAndScaleSpaceLikeTheirMap) {
   const auto scaled = [](const V3d& p) { return 2.5 * p + V3d(1, 2, 3); };
   const auto turned = [](const V3d& p) { return V3d(-p.y, p.x, p.z) * 0.5; };
   Cloud along, about;
@@ -123,7 +123,7 @@ TEST_P(Solve, LinesTurnAndScaleSpaceAsTheyDo) {
     EXPECT_LT((stretch(x) - scaled(x)).length(), 1e-9);
     EXPECT_LT((turn(x) - turned(x)).length(), 1e-9);
   }
-  // Turned right round, any half turn will do: lengths stay.
+  // For a reversed line any half turn is correct; lengths are kept.
   Cloud back;
   for (const double t : {0.0, 1.0, 2.0}) back.add(V3d(t, 0, 0), V3d(-t, 0, 0));
   const RbfMap reversed = fit(back, 0, GetParam());
@@ -132,7 +132,7 @@ TEST_P(Solve, LinesTurnAndScaleSpaceAsTheyDo) {
   EXPECT_GT(reversed.jacobian(V3d(0.3)).determinant(), 0.99);
 }
 
-TEST_P(Solve, AFewParticlesHaveAMap) {
+TEST_P(Solve, AFewParticlesDefineAMap) {
   Cloud cloud;
   cloud.add(V3d(1, 2, 3), V3d(0.5, 0.25, 1));
   const RbfMap one = fit(cloud, 0.2, GetParam());
@@ -140,7 +140,7 @@ TEST_P(Solve, AFewParticlesHaveAMap) {
   EXPECT_TRUE(says(one.solveReport(), "constant"));
   for (const V3d& x : kPlaces) EXPECT_LT((one(x) - V3d(0.5, 0.25, 1)).length(), 1e-15);
   cloud.add(V3d(1, 2, 4), V3d(0.5, 0.25, 3));
-  const RbfMap two = fit(cloud, 0.2, GetParam());  // lengthens by 2, turns nothing
+  const RbfMap two = fit(cloud, 0.2, GetParam());  // scales by 2, without rotation
   for (const V3d& x : kPlaces) EXPECT_LT((two(x) - (2.0 * x - V3d(1.5, 3.75, 5))).length(), 1e-12);
   cloud.add(V3d(2, 2, 3), V3d(2.5, 0.25, 1));
   const RbfMap three = fit(cloud, 0.2, GetParam());
@@ -150,9 +150,9 @@ TEST_P(Solve, AFewParticlesHaveAMap) {
   EXPECT_LT(fit(cloud, 0.2, GetParam()).maxResidual(), 1e-12);
 }
 
-// Pairs at all distances down to the least that are told apart, each with the targets of a smooth
-// map: whatever the condition, the map passes them and is finite.
-TEST_P(Solve, ClusteredParticlesAreSolvedFor) {
+// Pairs at all distances down to the smallest that is resolved, with the targets of a smooth map.
+// For any condition number the map interpolates them and is finite.
+TEST_P(Solve, ClusteredParticlesAreSolved) {
   for (const double gap : {1e-2, 1e-4, 1e-6, 1e-7, 2e-8}) {
     Cloud cloud = lattice(5, bend);
     for (const std::size_t i : {12u, 62u, 100u})
@@ -172,7 +172,7 @@ TEST_P(Solve, ClusteredParticlesAreSolvedFor) {
   }
 }
 
-/// A bent slab of particles, as a patch's are.
+/// A curved slab of particles, like that of a patch.
 Cloud slab(int side) {
   Cloud cloud;
   for (int k = 0; k < 5; ++k)
@@ -187,7 +187,7 @@ Cloud slab(int side) {
   return cloud;
 }
 
-TEST_P(Solve, IterationAgreesWithFactors) {
+TEST_P(Solve, IterationAgreesWithFactorization) {
   const Cloud cloud = slab(14);
   const V3d centre(1.6, 2.1, 1.3);
   for (const auto& [lambda, tolerance] : {std::pair(0.0, 1e-4), std::pair(0.25, 1e-8)}) {
@@ -208,7 +208,7 @@ TEST_P(Solve, IterationAgreesWithFactors) {
   }
 }
 
-TEST(IterativeSolve, HasTheSameBitsForAnyNumberOfThreads) {
+TEST(IterativeSolve, SameBitsForAnyNumberOfThreads) {
   const Cloud cloud = slab(16);
   const auto solve = [&] { return fit(cloud, 0.1, {.denseLimit = 600}); };
   const RbfMap one = support::onThreads(1, solve), many = support::onThreads(7, solve);
@@ -217,7 +217,7 @@ TEST(IterativeSolve, HasTheSameBitsForAnyNumberOfThreads) {
   for (const V3d& x : kPlaces) EXPECT_EQ(one(x), many(x));
 }
 
-TEST(IterativeSolve, StandsInWhereMemoryForbidsFactors) {
+TEST(IterativeSolve, ReplacesFactorizationWhenMemoryIsLimited) {
   const Cloud cloud = slab(24);
   const RbfMap map = fit(cloud, 0.1, {.maxMemory = 20'000'000});
   EXPECT_EQ(map.size(), 2880u);
@@ -229,12 +229,12 @@ TEST(IterativeSolve, StandsInWhereMemoryForbidsFactors) {
   EXPECT_THROW((void)fit(cloud, 0.1, {.maxMemory = 1'000'000}), levelset::ResourceLimit);
 }
 
-TEST(IterativeSolve, RefusesWhatItDoesNotReach) {
+TEST(IterativeSolve, RefusesWithoutConvergence) {
   EXPECT_THROW((void)fit(slab(12), 0.1, {.denseLimit = 600, .solveTolerance = 1e-30}),
                levelset::NumericalError);
 }
 
-TEST(ClusterSum, IsNearTheDirectSum) {
+TEST(ClusterSum, ApproximatesTheDirectSum) {
   const Cloud cloud = slab(30);
   std::mt19937 random(4);
   std::normal_distribution<double> normal;

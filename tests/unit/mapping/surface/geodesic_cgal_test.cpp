@@ -1,5 +1,5 @@
-// Geodesics against CGAL's exact ones on a mesh of the same zero set, an implementation that shares
-// nothing with ours. In an executable of its own: CGAL asks for -frounding-math.
+// Compares geodesics with CGAL's exact geodesics on a mesh of the same zero set, an independent
+// implementation. Built as a separate executable, because CGAL requires -frounding-math.
 
 #include <CGAL/AABB_face_graph_triangle_primitive.h>
 #include <CGAL/AABB_traits.h>
@@ -29,7 +29,7 @@ using ShortestPath =
     CGAL::Surface_mesh_shortest_path<CGAL::Surface_mesh_shortest_path_traits<Kernel, Polyhedron>>;
 using TreeTraits = CGAL::AABB_traits<Kernel, CGAL::AABB_face_graph_triangle_primitive<Polyhedron>>;
 
-/// Shortest ways on a mesh.
+/// Shortest paths on a mesh.
 class Judge {
  public:
   explicit Judge(const levelset::TriMesh& mesh) {
@@ -58,7 +58,7 @@ class Judge {
   std::unique_ptr<ShortestPath> paths_;
 };
 
-/// Of all ways between the places, the worst difference to the mesh's, in parts of it.
+/// Largest relative difference from the mesh's path length, over all pairs of positions.
 double worstDifference(const NarrowBand& band, const levelset::TriMesh& mesh,
                        std::vector<V3d> places) {
   Judge judge(mesh);
@@ -78,7 +78,7 @@ double worstDifference(const NarrowBand& band, const levelset::TriMesh& mesh,
 }
 
 TEST(GeodesicCgal, AgreesOnABox) {
-  // Between some of these, ways over three, four and five faces differ by one or two per cent.
+  // Between some of these, paths over three, four and five faces differ by one or two per cent.
   const std::vector<V3d> places = {V3d(-15, 0.5, 5), V3d(15, -0.3, -4), V3d(3, -2, 6),
                                    V3d(4, 6, 1)};
   const levelset::TriMesh mesh = support::boxMesh(V3d(-15, -6, -6), V3d(15, 6, 6));
@@ -89,7 +89,7 @@ TEST(GeodesicCgal, AgreesOnABox) {
 }
 
 TEST(GeodesicCgal, AgreesOnATorus) {
-  // Ways around, through and over the tube that are about as long.
+  // Paths around, through and over the tube of similar lengths.
   const std::vector<V3d> places = {V3d(2.7, 0, 0), V3d(-1.3, 0.2, 0), V3d(-1.9, -1.9, 0.1)};
   const levelset::TriMesh mesh = support::torusMesh(2, 0.7, 72, 30);
   for (const double voxel : {0.2, 0.14, 0.1})

@@ -21,7 +21,8 @@ using mapping::SurfaceField;
 constexpr double kPi = std::numbers::pi;
 constexpr double kOnePercent = 0.01;
 
-/// Length / exact − 1 between two points beside the surface; every point of the path lies on it.
+/// Length / exact − 1 between two points near the surface. Expects every point of the path on the
+/// surface.
 double excess(const NarrowBand& band, V3d a, V3d b, double exact) {
   const SurfaceField field(band);
   EXPECT_TRUE(field.project(a, 0) && field.project(b, 0));
@@ -44,10 +45,10 @@ TEST(Geodesic, IsAGreatCircleOnASphere) {
     }
   }
   EXPECT_LT(worst[0], 0.1 * kOnePercent);
-  EXPECT_LT(worst[1], 0.4 * worst[0]);  // chords, second order
+  EXPECT_LT(worst[1], 0.4 * worst[0]);  // chords are second-order accurate
 }
 
-TEST(Geodesic, IsNoneWhereItIsLongerThanWanted) {
+TEST(Geodesic, IsEmptyIfItIsLongerThanTheLimit) {
   const NarrowBand ball = support::makeBall(1, 0.05);
   const SurfaceField field(ball);
   V3d a(1, 0, 0), b(std::cos(2.5), std::sin(2.5), 0);
@@ -56,7 +57,7 @@ TEST(Geodesic, IsNoneWhereItIsLongerThanWanted) {
   EXPECT_NEAR(pathLength(geodesic(field, 0, a, b, 3)), 2.5, 2.5 * kOnePercent);
 }
 
-TEST(Geodesic, IsAHelixOnACylinderTheShorterWayRound) {
+TEST(Geodesic, IsTheShorterHelixOnACylinder) {
   const NarrowBand pipe = support::sampleBand([](const V3d& p) { return std::hypot(p.x, p.y) - 1; },
                                               {V3d(-1, -1, -3), V3d(1, 1, 3)}, 0.1);
   for (const double turn : {0.3, 0.45, 0.49, 0.51, 0.55})
@@ -68,8 +69,8 @@ TEST(Geodesic, IsAHelixOnACylinderTheShorterWayRound) {
     }
 }
 
-TEST(Geodesic, PassesAConesApexByTheSide) {
-  // Unrolled, the cone is a sector and the way straight.
+TEST(Geodesic, PassesAConesApexOnOneSide) {
+  // The unrolled cone is a sector, and the path is straight.
   for (const double half : {0.3, 0.6}) {
     const double s = std::sin(half), c = std::cos(half);
     const NarrowBand cone = support::sampleBand(
@@ -88,8 +89,9 @@ TEST(Geodesic, PassesAConesApexByTheSide) {
   }
 }
 
-TEST(Geodesic, TakesTheSpidersWayAroundABox) {
-  // Dudeney's spider and fly: over five faces it is 40 feet, straight down and along 42.
+TEST(Geodesic, SolvesTheSpiderProblemOnABox) {
+  // Dudeney's spider and fly: the path over five faces is 40 feet, the path straight down and along
+  // is 42.
   const NarrowBand room = levelset::makeBox(V3d(30, 12, 12), V3d(0), 0.5);
   EXPECT_LT(std::abs(excess(room, V3d(-15, 0, 5), V3d(15, 0, -5), 40)), kOnePercent);
 }
@@ -128,7 +130,7 @@ TEST(Geodesic, FollowsATorusInsideOutsideAndThrough) {
     return V3d(radius * std::cos(angle), radius * std::sin(angle), 0);
   };
   EXPECT_LT(std::abs(excess(torus, at(2.7, 0), at(2.7, 0.7), 2.7 * 0.7)), 0.1 * kOnePercent);
-  // Saddles all along: the inner equator is the shortest way as far as it goes.
+  // Saddle points everywhere: the inner equator is the shortest path up to its conjugate point.
   for (const double angle : {1.0, 3.0})
     EXPECT_LT(std::abs(excess(torus, at(1.3, 0), at(1.3, angle), 1.3 * angle)), 0.2 * kOnePercent);
   EXPECT_LT(std::abs(excess(torus, at(1.3, 0), at(1.3, 3.3), 1.3 * (2 * kPi - 3.3))),
@@ -146,12 +148,12 @@ TEST(Geodesic, FollowsASaddlesParabolas) {
   const double arc = 0.5 * std::sqrt(5.0) + std::asinh(2.0) / 4;
   EXPECT_LT(std::abs(excess(saddle, V3d(-1, 0, 1), V3d(1, 0, 1), 2 * arc)), 0.2 * kOnePercent);
   EXPECT_LT(std::abs(excess(saddle, V3d(0, -1, -1), V3d(0, 1, -1), 2 * arc)), 0.2 * kOnePercent);
-  // The lines in a saddle.
+  // The straight lines in a saddle.
   EXPECT_LT(std::abs(excess(saddle, V3d(-1, -1, 0), V3d(1, 1, 0), std::sqrt(8.0))),
             0.01 * kOnePercent);
 }
 
-TEST(Geodesic, GoesAroundAThinEarAndNotThrough) {
+TEST(Geodesic, GoesAroundAThinEarAndNotThroughIt) {
   // Two points above each other on a plate of 2.5 to 6 voxels with round edges.
   for (const double thickness : {6.0, 3.0, 2.5}) {
     const double voxel = 0.05, half = thickness * voxel / 2;
@@ -165,7 +167,7 @@ TEST(Geodesic, GoesAroundAThinEarAndNotThrough) {
                               std::hypot(1 + kPi * half, 0.1))),
               kOnePercent)
         << thickness;
-    // Three edges are nearly as near.
+    // Three edges are at almost the same distance.
     EXPECT_LT(std::abs(excess(ear, V3d(0.1, 0.05, half), V3d(0.1, 0.05, -half), 1.8 + kPi * half)),
               kOnePercent)
         << thickness;
@@ -183,7 +185,7 @@ TEST(Geodesic, IsTheSameFromEitherEnd) {
   EXPECT_NEAR(there, back, 0.002 * there);
 }
 
-TEST(Geodesic, IsEmptyBetweenSeparateParts) {
+TEST(Geodesic, IsEmptyBetweenSeparateComponents) {
   const NarrowBand two = support::sampleBand(
       [](const V3d& p) {
         return std::min((p - V3d(-0.8, 0, 0)).length(), (p - V3d(0.8, 0, 0)).length()) - 0.5;
@@ -192,8 +194,8 @@ TEST(Geodesic, IsEmptyBetweenSeparateParts) {
   EXPECT_TRUE(geodesic(SurfaceField(two), 0, V3d(-0.8, 0, 0.5), V3d(0.8, 0, 0.5)).empty());
 }
 
-TEST(Geodesic, OfOneLikeAnotherStaysOnItsSide) {
-  // Half a turn has two ways; the one that is asked for is taken, on another layer too.
+TEST(Geodesic, GuidedByAnotherStaysOnItsSide) {
+  // Half a turn has two shortest paths. The requested one is used, on another layer too.
   const NarrowBand pipe = support::sampleBand([](const V3d& p) { return std::hypot(p.x, p.y) - 1; },
                                               {V3d(-1, -1, -1), V3d(1, 1, 1)}, 0.1, 6);
   const SurfaceField field(pipe);
@@ -209,7 +211,7 @@ TEST(Geodesic, OfOneLikeAnotherStaysOnItsSide) {
   }
 }
 
-TEST(SurfaceWalk, ComesBackAroundASphere) {
+TEST(SurfaceWalk, ReturnsAroundASphere) {
   const NarrowBand ball = support::makeBall(1, 0.1);
   const SurfaceField field(ball);
   const V3d start = V3d(1, 2, 2) / 3.0;
@@ -221,11 +223,11 @@ TEST(SurfaceWalk, ComesBackAroundASphere) {
   EXPECT_NEAR(walk.walked(), 2 * kPi, 1e-9);
 }
 
-TEST(SurfaceWalk, KeepsItsAngleWithAnEdgeThatItCrosses) {
+TEST(SurfaceWalk, KeepsItsAngleAtAnEdge) {
   const NarrowBand box = levelset::makeBox(V3d(30, 30, 12), V3d(0), 0.25);
   const SurfaceField field(box);
   for (const double angle : {0.2, 0.7, 1.2}) {
-    // From 4 before the edge at x = 15, as far again beyond it.
+    // From 4 before the edge at x = 15, to the same distance beyond it.
     const V3d way(std::cos(angle), std::sin(angle), 0);
     mapping::SurfaceWalk walk(field, 0, V3d(11, -6, 6), way);
     ASSERT_TRUE(walk.advance(8 / way.x));
@@ -235,7 +237,7 @@ TEST(SurfaceWalk, KeepsItsAngleWithAnEdgeThatItCrosses) {
   }
 }
 
-TEST(SurfaceWalk, StandsStillWithoutADirection) {
+TEST(SurfaceWalk, StaysWithoutADirection) {
   const NarrowBand ball = support::makeBall(1, 0.1);
   const SurfaceField field(ball);
   mapping::SurfaceWalk walk(field, 0, V3d(0, 0, 1), V3d(0, 0, 5));

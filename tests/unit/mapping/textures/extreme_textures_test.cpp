@@ -1,6 +1,6 @@
-// Stiff and extreme textures and patches, each with its stated outcome. Those that concern one room
-// alone are beside its other tests: corners (Patch.Refuses…), ears (Patch.WrapsAThinEar), offsets
-// past the medial axis (Patch.RefusesHeightsBeyondTheMedialAxis, Untangle.MendsOffsets…).
+// Stiff and extreme textures and patches, each with its stated outcome. Cases that concern a single
+// module are tested beside it: corners (Patch.Refuses…), ears (Patch.WrapsAThinEar), and offsets
+// beyond the medial axis (Patch.RefusesHeightsBeyondTheMedialAxis, Untangle.RepairsOffsets…).
 
 #include <gtest/gtest.h>
 
@@ -42,7 +42,7 @@ const NarrowBand& slab() {
   return band;
 }
 
-constexpr double kTrough = 1.5;  // its radius
+constexpr double kTrough = 1.5;  // radius of the groove
 
 /// A slab with a round groove along y.
 NarrowBand makeTrough(const NarrowBand& plate) {
@@ -51,7 +51,7 @@ NarrowBand makeTrough(const NarrowBand& plate) {
   return levelset::combine(levelset::CsgOperation::Difference, both).band;
 }
 
-/// Near its bottom, as far along it as `half` on both sides.
+/// Corners near the bottom of the groove, up to `half` along it on both sides.
 std::array<V3d, 4> troughCorners(double half) {
   return {V3d(-1, -half, -1.12), V3d(1, -half, -1.12), V3d(1, half, -1.12), V3d(-1, half, -1.12)};
 }
@@ -66,7 +66,7 @@ Measurement measureAlone(const NarrowBand& base, const NarrowBand& texture, cons
 }
 
 TEST(ExtremeTextures, UnitsOfTheTextureDoNotMatter) {
-  // A texture in kilometres or microns on a patch in metres: only its proportions count.
+  // A texture in kilometres or microns on a patch in metres. Only its proportions count.
   const Patch patch = makePatch(slab(), square(1.5), 1, {.layers = 3}).patch;
   const auto of = [&](double unit) {
     return measureAlone(slab(),
@@ -83,9 +83,9 @@ TEST(ExtremeTextures, UnitsOfTheTextureDoNotMatter) {
 }
 
 TEST(ExtremeTextures, AThousandTimesFinerThanTheBase) {
-  // The texture's voxels come out a thousandth of the base's: alone it is mapped as it is; joined,
-  // the base would have to be that fine too, which is refused before anything is allocated. With
-  // the base's voxels there would be nothing of the texture: refused, and not left out in silence.
+  // The voxels of the texture become a thousandth of the base's. Alone the texture is mapped at
+  // this size. The union would need the same voxels for the base, which is refused before any
+  // allocation. With the base's voxels no part of the texture would remain, which is refused too.
   const Patch patch = makePatch(slab(), square(0.3), 0.3, {.layers = 3}).patch;
   const NarrowBand texture = levelset::makeSphere(1, V3d(0), 0.1);
   mapping::TextureOptions options = {.merge = TextureMerge::Alone,
@@ -101,8 +101,9 @@ TEST(ExtremeTextures, AThousandTimesFinerThanTheBase) {
   EXPECT_THROW((void)mapTexture(slab(), texture, patch, options), levelset::InvalidInput);
 }
 
-TEST(ExtremeTextures, CoarseVoxelsShowWhatTheyCan) {
-  // A texture of seven times too many voxels is right to second order in the voxels of the result.
+TEST(ExtremeTextures, CoarseVoxelsKeepWhatTheyResolve) {
+  // A texture with seven times too many voxels is second-order accurate in the voxels of the
+  // result.
   const Patch patch = makePatch(slab(), square(1), 1, {.layers = 3}).patch;
   const NarrowBand texture = levelset::makeSphere(1, V3d(0), 0.03);
   const Measurement mapped = measureAlone(slab(), texture, patch, 0.2);
@@ -110,7 +111,8 @@ TEST(ExtremeTextures, CoarseVoxelsShowWhatTheyCan) {
 }
 
 TEST(ExtremeTextures, AThousandTimesCoarserThanTheBase) {
-  // A unit a thousand times larger, and six voxels of texture over a patch: as round as those are.
+  // A unit a thousand times larger, and six voxels of texture over a patch. The result is as round
+  // as these permit.
   const NarrowBand fine = levelset::makeSphere(1, V3d(0), 0.04);
   const Patch patch = makePatch(fine, cap(0.5), 0.5, {.layers = 3}).patch;
   const NarrowBand rough = levelset::makeSphere(3000, V3d(0), 1000);
@@ -122,11 +124,14 @@ TEST(ExtremeTextures, AThousandTimesCoarserThanTheBase) {
 }
 
 TEST(ExtremeTextures, VoxelsFortyTimesTheBasesGiveASmoothSurface) {
-  // Six voxels of texture laid over 250 of the base's. What is mapped is the interpolant of the
-  // texture's distances. A straight one in each axis lies h²/12 |x|'' = h²/(6 r) above |x| on
-  // average, which takes h²/(2 R²) = 1/18 of the volume from a ball of R = 3 h. The tricubic one is
-  // exact for parabolas: what is left is of third order and changes its sign from cell to cell, and
-  // a hundredth is far more than that.
+  // Six voxels of texture over 250 of the base's. The mapped solid is the interpolant of the
+  // texture's distances. The trilinear interpolant lies h²/12
+  // x
+  // '' = h²/(6 r) above
+  // x
+  //  on average, which removes h²/(2 R²) = 1/18 of the volume from a ball of R = 3 h. The tricubic
+  //  interpolant is exact for parabolas. Its error is of third order and changes sign from cell to
+  //  cell, far below a hundredth.
   const double voxel = 0.01, half = 1.25, height = 0.25;
   const NarrowBand base = levelset::makeBox(V3d(2.7, 2.7, 0.1), V3d(0, 0, -0.05), voxel);
   const NarrowBand rough = levelset::makeSphere(3, V3d(0), 1);
@@ -142,7 +147,7 @@ TEST(ExtremeTextures, VoxelsFortyTimesTheBasesGiveASmoothSurface) {
   const double ball = 4 * kPi / 3 * half * half * height / 2;
   EXPECT_NEAR(mapped.volume, ball, 0.01 * ball);
   EXPECT_EQ(mapped.euler, 2);
-  // Nowhere is it off the mapped ball by more than a tenth of the texture's voxel.
+  // The surface is within a tenth of the texture's voxel of the mapped ball.
   const levelset::BandSampler sampler(result.band);
   for (int i = 0; i < 60; ++i)
     for (int j = 0; j < 30; ++j) {
@@ -153,8 +158,9 @@ TEST(ExtremeTextures, VoxelsFortyTimesTheBasesGiveASmoothSurface) {
     }
 }
 
-TEST(ExtremeTextures, HolesAndHandlesStay) {
-  // A plate with a hole and a handle over it: a surface of genus two, on a bent patch, by all maps.
+TEST(ExtremeTextures, HolesAndHandlesAreKept) {
+  // A plate with a hole and a handle over it, a surface of genus two. On a bent patch, with all
+  // maps.
   const double voxel = 0.1;
   const NarrowBand plate = levelset::makeBox(V3d(3, 2, 0.5), V3d(0), voxel),
                    hole = levelset::makeCylinder(0.4, 2, V3d(-0.8, 0, 0), V3d(0, 0, 1), voxel),
@@ -173,8 +179,8 @@ TEST(ExtremeTextures, HolesAndHandlesStay) {
     EXPECT_EQ(measureAlone(ball, texture, patch, 0.1, map).euler, -2);
 }
 
-TEST(ExtremeTextures, ASpikeUnderAVoxelIsLostAndNothingElse) {
-  // A needle a fifth of a voxel wide: no grid point is inside, so it is not there; the rest is.
+TEST(ExtremeTextures, ASpikeThinnerThanAVoxelIsLostAndNothingElse) {
+  // A needle a fifth of a voxel wide contains no grid point, so it disappears. The rest is kept.
   const double voxel = 0.1;
   const std::array<NarrowBand, 2> both = {
       levelset::makeSphere(1, V3d(0), voxel),
@@ -191,9 +197,9 @@ TEST(ExtremeTextures, ASpikeUnderAVoxelIsLostAndNothingElse) {
   EXPECT_TRUE(std::isfinite(mapped.area));
 }
 
-TEST(ExtremeTextures, ASplineThroughItselfIsRefusedWithThePlace) {
-  // A loop that comes back through its own stem. No cell folds, but where the two cross the texture
-  // has two values: the smooth map cannot pass through both, the tetrahedra overlap.
+TEST(ExtremeTextures, ASplineThroughItselfIsRefusedWithThePosition) {
+  // A loop that returns through its own stem. No cell folds, but at the crossing the texture has
+  // two values. The smooth map cannot interpolate both, and the tetrahedra overlap.
   const NarrowBand base = support::makeBall(4, 0.2);
   mapping::PatchOptions options = {
       .layers = 24,
@@ -213,13 +219,13 @@ TEST(ExtremeTextures, ASplineThroughItselfIsRefusedWithThePlace) {
   EXPECT_NE(refusal(11, TextureMap::Rbf).find("folds at"), std::string::npos);
   const std::string shell = refusal(11, TextureMap::Prism);
   EXPECT_NE(shell.find("passes through itself"), std::string::npos) << shell;
-  // Seven units of it stay clear.
+  // The first seven units of the loop do not overlap.
   EXPECT_EQ(refusal(7, TextureMap::Prism), "");
 }
 
-TEST(ExtremeTextures, OverACreaseNothingTears) {
-  // Across the right-angled edge of a box, by both maps: one closed piece that stands on both
-  // sides, and joined one solid without cavities.
+TEST(ExtremeTextures, OverACreaseNoTextureTears) {
+  // Across the right-angled edge of a box, with both maps: one closed component on both sides of
+  // the edge, and after the union one solid without cavities.
   const std::array<V3d, 4> corners = {V3d(2.5, -1, 0), V3d(4, -1, -1.2), V3d(4, 1, -1.2),
                                       V3d(2.5, 1, 0)};
   const Patch patch = makePatch(slab(), corners, 0.6, {.layers = 4}).patch;
@@ -238,9 +244,10 @@ TEST(ExtremeTextures, OverACreaseNothingTears) {
 }
 
 TEST(ExtremeTextures, OffsetsBeyondTheCurvatureRadiusAreRefusedWithTheCause) {
-  // In a trough the particles of a patch 2 high meet on the axis and stay there: the map
-  // squeezes the texture to nothing without folding it. Voxels that show it would be too many,
-  // and the refusal tells the place; with voxels that are asked for, what can be seen is mapped.
+  // In a trough the particles of a patch of height 2 meet on the axis and stay there. The map
+  // compresses the texture to zero thickness without folds. Voxels that resolve it would be too
+  // many, and the error names the position. With a requested voxel size the resolved part is
+  // mapped.
   const NarrowBand trough = makeTrough(slab());
   const Patch patch = makePatch(trough, troughCorners(1), 2,
                                 {.layers = 4, .scheme = mapping::LayerScheme::Conforming})
@@ -259,9 +266,9 @@ TEST(ExtremeTextures, OffsetsBeyondTheCurvatureRadiusAreRefusedWithTheCause) {
 }
 
 TEST(ExtremeTextures, LayersBeyondTheCurvatureRadiusThatFoldAreRefused) {
-  // In such a trough the corners of reduced layers meet over the axis and climb there: the sides
-  // of the layers above lie upon each other, and cells turn over. Samples and certificate both see
-  // it, of both maps; who asks for it gets what can be mapped, with the folds counted.
+  // In such a trough the corners of reduced layers meet over the axis and climb there. The sides of
+  // the layers above overlap, and cells fold. Samples and certificate both find this, for both
+  // maps. On request the texture is mapped anyway, with a count of the folds.
   constexpr double kHeight = 2.5;
   const NarrowBand trough = makeTrough(levelset::makeBox(V3d(4, 3, 2), V3d(0, 0, -1), 0.2));
   const Patch patch =

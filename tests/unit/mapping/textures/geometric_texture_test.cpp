@@ -57,7 +57,7 @@ NarrowBand makeSlab(double voxel) {
 }
 
 TEST(GeometricTexture, FlatPatchIsTheIdentity) {
-  // A torus with a tube of 16 voxels, its box laid onto the same box on a slab's top.
+  // A torus with a tube of 16 voxels. Its box is mapped onto an equal box on top of a slab.
   const double voxel = 0.0625, tube = 1, radius = 2;
   const NarrowBand base = makeSlab(voxel), ring = makeRing(radius, tube, voxel);
   const Patch patch = mapping::makePatch(base, square(radius + tube), 2 * tube).patch;
@@ -76,7 +76,7 @@ TEST(GeometricTexture, FlatPatchIsTheIdentity) {
       if (std::abs(truth) < 1.5 * voxel) worst = std::max(worst, std::abs(phi - truth));
     });
     EXPECT_LT(worst, 0.02 * voxel);
-    // And the other way: every place of the torus lies on the zero set.
+    // In the other direction every point of the torus lies on the zero set.
     const levelset::BandSampler sampler(result.band, levelset::Interpolation::Tricubic);
     double missed = 0;
     for (int i = 0; i < 360; ++i)
@@ -113,7 +113,7 @@ TEST(GeometricTexture, OtherKernelsMapAFlatPatchStraight) {
   }
 }
 
-// Solved by iteration, to a tenth of the map's tolerance, the texture is the same.
+// The iterative solution, to a tenth of the map's tolerance, gives the same texture.
 TEST(GeometricTexture, IterationGivesTheSameTexture) {
   const double voxel = 0.125;
   const NarrowBand base = makeBall(5, voxel), ring = makeRing(2, 1, voxel);
@@ -134,7 +134,7 @@ TEST(GeometricTexture, IterationGivesTheSameTexture) {
   EXPECT_LT(worst, 0.03 * voxel);
 }
 
-TEST(GeometricTexture, ShellsEndBeyondTheTexturesBand) {
+TEST(GeometricTexture, PrismMapsExtendBeyondTheTexturesBand) {
   // Particles a voxel apart: one cell around the patch would be narrower than the band.
   const double voxel = 0.125;
   const NarrowBand base = makeSlab(voxel), ring = makeRing(2, 1, voxel);
@@ -149,8 +149,8 @@ TEST(GeometricTexture, ShellsEndBeyondTheTexturesBand) {
   EXPECT_LT(worst, 0.02 * voxel);
 }
 
-TEST(GeometricTexture, WhatLiesBesideTheTextureDoesNotFoldTheMap) {
-  // Below the texture a shell goes on to where the base's axis is; the texture does not.
+TEST(GeometricTexture, FoldsBesideTheTextureDoNotCount) {
+  // Below the texture a prism map extends to the axis of the base. The texture does not.
   for (const double radius : {0.5, 0.75, 1.0}) {
     const NarrowBand rod = support::sampleBand(
         [=](const V3d& p) { return std::max(std::hypot(p.x, p.y) - radius, std::abs(p.z) - 4); },
@@ -161,7 +161,8 @@ TEST(GeometricTexture, WhatLiesBesideTheTextureDoesNotFoldTheMap) {
         rod, makeBall(1, 0.1), patch, {.merge = TextureMerge::Alone, .map = TextureMap::Prism});
     EXPECT_EQ(result.report.distortion.folded, 0u) << radius;
   }
-  // The rim of a patch that ends beside an edge does not go round to the other side of a thin ear.
+  // The rim of a patch that ends beside an edge does not extend around to the other side of a thin
+  // ear.
   const NarrowBand plate =
       support::sampleBand([](const V3d& p) { return boxDistance(p, V3d(10, 10, 0.375)); },
                           {V3d(-10, -10, -0.375), V3d(10, 10, 0.375)}, 0.25);
@@ -204,7 +205,7 @@ TEST(GeometricTexture, CylinderCoordinatesAreThoseOfTheCylinder) {
     V3d worst(0);
     for (int i = 0; i <= 20; ++i)
       for (int j = 0; j <= 4; ++j)
-        for (int k = -4; k <= 10; ++k) {  // below the surface, where a texture is sunk
+        for (int k = -4; k <= 10; ++k) {  // below the surface, where a texture is embedded
           const V3d uvw(i / 20.0, j / 4.0, k / 10.0);
           const V3d place =
               at(angle * (2 * uvw.x - 1), half * (2 * uvw.y - 1), uvw.z) * (1 - 1e-12);
@@ -219,7 +220,7 @@ TEST(GeometricTexture, CylinderCoordinatesAreThoseOfTheCylinder) {
   }
 }
 
-/// @param halfWidth  of the sphere's band: beyond it distances are swept out for the patch
+/// @param halfWidth  of the sphere's band; the patch needs distances computed beyond it
 void expectRadialCoordinates(double halfWidth) {
   const double radius = 2, height = 1, voxel = 0.1, polar = 0.5;
   const NarrowBand base = makeBall(radius, voxel, halfWidth);
@@ -250,7 +251,7 @@ void expectRadialCoordinates(double halfWidth) {
     const char* name = map == &shell ? "shell" : "rbf";
     EXPECT_LE(worstW, 0.005) << name;
     EXPECT_LE(worstU, 0.005) << name;
-    // Cells are cut into tetrahedra along one of their diagonals, which no mirror keeps.
+    // Cells are cut into tetrahedra along one of their diagonals, which breaks mirror symmetry.
     EXPECT_LE(worstPlane, map == &shell ? 0.005 : 1e-3) << name;
   }
 }
@@ -266,11 +267,11 @@ TEST(GeometricTexture, BendsATorusOntoASphere) {
   const NarrowBand ring = makeRing(1, 0.25, 0.05);
   const Patch patch = mapping::makePatch(base, cap(0.6, radius), height).patch;
   const TextureResult result = mapTexture(base, ring, patch, {.merge = TextureMerge::Alone});
-  // It sits one voxel deep in the sphere and is as high as the patch, all around.
+  // Its lowest point is a voxel deep in the sphere, its top at the height of the patch, all around.
   double low = 10, high = 0;
   support::forEachActive(result.band, [&](const V3d& p, double phi) {
     if (std::abs(phi) > 0.5 * voxel) return;
-    // Outwards is downwards below and upwards above.
+    // Outwards is downwards at the bottom and upwards at the top.
     low = std::min(low, p.length() + phi);
     high = std::max(high, p.length() - phi);
   });
@@ -283,7 +284,7 @@ TEST(GeometricTexture, BendsATorusOntoASphere) {
 }
 
 TEST(GeometricTexture, FillsTheInsideOfTheTexture) {
-  // Blocks that the band does not touch are inside as a whole.
+  // Blocks outside the band may lie completely inside the texture.
   const double voxel = 0.06;
   const NarrowBand base = makeSlab(0.1), ball = makeBall(1, voxel, 3);
   const Patch patch = mapping::makePatch(base, square(2), 4).patch;
@@ -297,7 +298,7 @@ TEST(GeometricTexture, FillsTheInsideOfTheTexture) {
 }
 
 TEST(GeometricTexture, HonoursTheTextureBox) {
-  // A box twice as large in u leaves the texture half as wide.
+  // A box twice as large in u halves the width of the texture.
   const double voxel = 0.1;
   const NarrowBand base = makeSlab(voxel), ball = makeBall(1, voxel, 3);
   const Patch patch = mapping::makePatch(base, square(2), 2).patch;
@@ -340,7 +341,7 @@ TEST(GeometricTexture, RefusesPatchesThatFold) {
                     trough, {V3d(-0.5, -y, z), V3d(0.5, -y, z), V3d(0.5, y, z), V3d(-0.5, y, z)},
                     0.9, {.layers = 4, .spacing = 0.15})
                     .patch;
-  // Straight on past the axis, as explicit offsets would go.
+  // Straight on past the axis, like explicit offsets.
   for (mapping::ParticleLayer& layer : patch.layers)
     for (V3d& p : layer.positions) {
       const double r = std::hypot(p.y, p.z);
@@ -363,8 +364,8 @@ TEST(GeometricTexture, UnionIsOneSolidAndCarvingLeavesAHole) {
   const auto measured = [&](const mapping::TextureOptions& options) {
     return levelset::measure(mapTexture(base, ring, patch, options).band);
   };
-  // Sunk by 0.2, the ring melts into the ball; Euler's number tells the handle of none from a
-  // ring's.
+  // Embedded by 0.2, the ring merges with the ball. Euler's number distinguishes the handle from a
+  // separate ring.
   const levelset::Measurement united = measured({.embedDepth = 0.2, .voxelSize = voxel});
   EXPECT_EQ(united.components, 1u);
   EXPECT_EQ(united.surfaces, 1u);
@@ -378,14 +379,15 @@ TEST(GeometricTexture, UnionIsOneSolidAndCarvingLeavesAHole) {
       measured({.merge = TextureMerge::Carve, .embedDepth = 0.2, .voxelSize = voxel});
   EXPECT_EQ(carved.components, 1u);
   EXPECT_LT(carved.volume, before.volume);
-  // What carving takes away and union adds are the two parts of the ring.
+  // The volumes that carving removes and that the union adds are the two parts of the ring.
   const levelset::Measurement alone =
       measured({.merge = TextureMerge::Alone, .embedDepth = 0.2, .voxelSize = voxel});
   EXPECT_NEAR(united.volume - carved.volume, alone.volume, 0.02 * alone.volume);
 }
 
-TEST(GeometricTexture, SunkTexturesHaveTheVolumeOfTheirShareOfTheShell) {
-  // A box that fills the unit cube, on a ball: a cone's part between two radii, up to the sides.
+TEST(GeometricTexture, EmbeddedTexturesHaveTheVolumeOfTheirShareOfTheOffsetLayer) {
+  // A box that fills the unit cube, on a ball: the part of a cone between two radii, up to the
+  // sides.
   const double radius = 10, height = 2, voxel = 0.25;
   const NarrowBand base = makeBall(radius, voxel, 3), box = levelset::makeBox(V3d(4), V3d(0), 0.1);
   const Patch patch = mapping::makePatch(base, cap(0.4, radius), height).patch;
@@ -402,13 +404,13 @@ TEST(GeometricTexture, SunkTexturesHaveTheVolumeOfTheirShareOfTheShell) {
     for (const double sink : {0.5, 1.5, 2.0})
       EXPECT_NEAR(volume(map, sink) / flush, cubes(sink) / cubes(0), 0.005)
           << static_cast<int>(map) << " sunk by " << sink;
-    // Raised, with nothing of the map's own below.
+    // Lifted, without any part of the map below.
     EXPECT_NEAR(volume(map, -1) / flush, cubes(-1) / cubes(0), 0.01) << static_cast<int>(map);
   }
 }
 
-TEST(GeometricTexture, CarvedFlushItLeavesNoSkins) {
-  // The texture ends in the base's surface, but for what the map errs.
+TEST(GeometricTexture, CarvedWithoutEmbeddingItLeavesNoSkins) {
+  // The texture ends in the base's surface, up to the error of the map.
   const NarrowBand ball = makeBall(8, 0.25, 3), box = levelset::makeBox(V3d(4), V3d(0), 0.1);
   const Patch patch = mapping::makePatch(ball, cap(0.6, 8), 2).patch;
   for (const TextureMap map : {TextureMap::Rbf, TextureMap::Prism}) {
@@ -427,8 +429,8 @@ TEST(GeometricTexture, CarvedFlushItLeavesNoSkins) {
   }
 }
 
-TEST(GeometricTexture, AResultIsTheNextBase) {
-  // Three layers of recursion: each ball stands on the one before.
+TEST(GeometricTexture, AResultCanBeTheNextBase) {
+  // Three layers of recursion: each ball is on the previous one.
   NarrowBand base = makeBall(2, 0.1, 3);
   V3d top(0, 0, 2);
   double volume = levelset::measure(base).volume;
@@ -439,7 +441,7 @@ TEST(GeometricTexture, AResultIsTheNextBase) {
     const levelset::Measurement result = levelset::measure(base);
     EXPECT_EQ(result.components, 1u) << size;
     EXPECT_EQ(result.euler, 2) << size;
-    // A ball in a shell that widens upwards, less what is sunk.
+    // A ball in an offset layer that widens upwards, less the embedded part.
     const double ball = std::numbers::pi / 6 * size * size * size;
     EXPECT_GT(result.volume - volume, 0.9 * ball) << size;
     EXPECT_LT(result.volume - volume, 1.9 * ball) << size;
@@ -464,7 +466,7 @@ TEST(GeometricTexture, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(hashes.size(), 1u);
 }
 
-TEST(GeometricTexture, RefusesWhatCannotBeMapped) {
+TEST(GeometricTexture, RefusesInvalidTexturesAndOptions) {
   const double voxel = 0.1;
   const NarrowBand base = makeSlab(voxel), ball = makeBall(1, voxel, 3);
   const Patch patch = mapping::makePatch(base, square(2), 1, {.layers = 2, .spacing = 0.5}).patch;

@@ -1,5 +1,5 @@
-// A knurl rolled all around a cylinder: patches that close, a texture that goes on across their
-// borders, and an exact relief to hold the result to.
+// A knurl around a complete cylinder: patches that close, a texture that continues across their
+// borders, and comparison with the exact relief.
 
 #include <gtest/gtest.h>
 
@@ -28,7 +28,8 @@ using mapping::TextureMap;
 
 // The ends of the cylinder, at 1.525, lie between two planes of grid points.
 constexpr double kVoxel = 0.05, kHalfLength = 0.6, kHeight = 0.2, kSink = 0.05;
-// A quarter turn maps the grid to itself, so what tiles differ by is not the grid's doing.
+// A quarter turn maps the grid to itself, so that differences between tiles do not come from the
+// grid.
 constexpr std::size_t kTiles = 4, kRows = 2;
 constexpr int kAngles = 360;
 
@@ -38,7 +39,7 @@ Knurl knurl() {
   return knurl;
 }
 
-/// The radius of the relief: its height over the place in the tile.
+/// Radius of the relief, from its height at the position in the tile.
 double exactRadius(double angle, double z) {
   const Knurl shape = knurl();
   const V3d size = mapping::knurlBox(shape, V3d(0)).tile.size();
@@ -54,7 +55,7 @@ double exactRadius(double angle, double z) {
   return 1 - kSink + kHeight * height / size.z;
 }
 
-/// Where the surface is on a ray from the axis.
+/// Radius of the surface on a ray from the axis.
 double radiusOf(const levelset::BandSampler& sampler, double angle, double z) {
   double low = 0.9, high = 1.4;
   for (int n = 0; n < 30; ++n) {
@@ -64,7 +65,7 @@ double radiusOf(const levelset::BandSampler& sampler, double angle, double z) {
   return (low + high) / 2;
 }
 
-/// @param change  what is done to the patches first
+/// @param change  applied to the patches first
 void expectKnurled(
     TextureMap map,
     const std::function<void(const NarrowBand&, std::vector<mapping::Patch>&)>& change = {}) {
@@ -87,7 +88,7 @@ void expectKnurled(
   EXPECT_EQ(measured.cavities, 0u);
   EXPECT_EQ(measured.euler, 2);
 
-  if (change) return;  // the relief is another
+  if (change) return;  // the relief is changed
   const levelset::BandSampler sampler(result, levelset::Interpolation::Tricubic);
   double worst = 0, mostUneven = 0;
   V3d at(0);
@@ -118,7 +119,7 @@ TEST(KnurledCylinder, ClosesByTetrahedra) {
 }
 
 TEST(KnurledCylinder, StaysClosedWhenItsPatchesAreRelaxed) {
-  // Each by itself, and their common particles joined again.
+  // Each patch is relaxed separately. Then their common particles are joined again.
   expectKnurled(TextureMap::Rbf, [](const NarrowBand& base, std::vector<mapping::Patch>& patches) {
     const std::vector<mapping::Patch> before = patches;
     for (mapping::Patch& patch : patches)

@@ -24,7 +24,7 @@ using mapping::Patch;
 using support::cap;
 using support::makeBall;
 
-/// A torus about the z axis, as triangles.
+/// Torus around the z axis, as triangles.
 TriMesh makeRing(double radius, double tube, std::uint32_t around, std::uint32_t across) {
   TriMesh mesh;
   for (std::uint32_t i = 0; i < around; ++i)
@@ -42,7 +42,7 @@ TriMesh makeRing(double radius, double tube, std::uint32_t around, std::uint32_t
 }
 
 TEST(MeshTexture, AgreesWithTheImplicitMap) {
-  // Semi-implicit and implicit results of one model: within a voxel, both ways.
+  // Semi-implicit and implicit results of one model agree within a voxel, in both directions.
   const double radius = 2, voxel = 0.05;
   const NarrowBand base = makeBall(radius, voxel);
   const TriMesh ring = makeRing(1, 0.25, 200, 60);
@@ -76,17 +76,17 @@ TEST(MeshTexture, AgreesWithTheImplicitMap) {
 }
 
 TEST(MeshTexture, StaysInThePatch) {
-  // Trilinear positions never leave the hull of the particles about them.
+  // Trilinear positions never leave the convex hull of the surrounding particles.
   const double radius = 2, height = 0.5;
   const Patch patch = mapping::makePatch(makeBall(radius, 0.1), cap(0.5, radius), height).patch;
   const TriMesh mesh = mapping::mapMesh(makeRing(1, 0.3, 40, 20), patch).mesh;
   for (const V3d& p : mesh.positions) {
     EXPECT_LE(p.length(), radius + height + 1e-6);
-    EXPECT_GE(p.length(), radius - 0.02);  // chords of the particles
+    EXPECT_GE(p.length(), radius - 0.02);  // chords between the particles
   }
 }
 
-TEST(MeshTexture, FacesAsBeforeOnAMirroredPatch) {
+TEST(MeshTexture, KeepsItsOrientationOnAMirroredPatch) {
   const NarrowBand base = makeBall(2, 0.1);
   std::array<V3d, 4> corners = cap(0.5, 2);
   std::swap(corners[1], corners[3]);
@@ -110,7 +110,7 @@ TEST(MeshTexture, LeavesOutPatchesThatFold) {
                levelset::InvalidInput);
 }
 
-TEST(MeshTexture, RefusesWhatCannotBeMoved) {
+TEST(MeshTexture, RefusesInvalidMeshes) {
   const Patch patch = mapping::makePatch(makeBall(2, 0.1), cap(0.5, 2), 0.5).patch;
   const TriMesh ring = makeRing(1, 0.3, 12, 8);
   EXPECT_THROW((void)mapping::mapMesh({}, patch), levelset::InvalidInput);
@@ -120,7 +120,7 @@ TEST(MeshTexture, RefusesWhatCannotBeMoved) {
   TriMesh flat = ring;
   for (V3d& p : flat.positions) p.z = 0;
   EXPECT_THROW((void)mapping::mapMesh(flat, patch), levelset::InvalidInput);
-  // A flat mesh has a place too, once its box is told.
+  // A flat mesh can be mapped too, with an explicit box.
   const Imath::Box3d box(V3d(-1.3, -1.3, 0), V3d(1.3, 1.3, 1));
   for (const V3d& p : mapping::mapMesh(flat, patch, {.textureBox = box}).mesh.positions)
     EXPECT_NEAR(p.length(), 2, 0.02);
@@ -132,9 +132,9 @@ TEST(MeshTexture, RefusesWhatCannotBeMoved) {
                levelset::Cancelled);
 }
 
-// === What vertices carry
+// === Vertex attributes
 
-/// Particles of a smooth map, `cells` to each side, one on top of the other in three layers.
+/// Particles of a smooth map, `cells` along each side, in three layers.
 Patch patchOf(const std::function<V3d(const V3d&)>& place, std::size_t cells, double height) {
   Patch patch;
   patch.height = height;
@@ -152,7 +152,7 @@ Patch patchOf(const std::function<V3d(const V3d&)>& place, std::size_t cells, do
   return patch;
 }
 
-/// A flat sheet in the unit cube at w = `height`, with normals up, its own places as texture
+/// Flat sheet in the unit cube at w = `height`. It has normals upwards, its positions as texture
 /// coordinates, and colours.
 TriMesh sheet(std::uint32_t cells, double height) {
   TriMesh mesh;
@@ -173,9 +173,10 @@ TriMesh sheet(std::uint32_t cells, double height) {
 
 const Imath::Box3d kUnitBox(V3d(0), V3d(1));
 
-/// The greatest angle between the sheet's normals and `truth` of their places, radians.
+/// Largest angle between the sheet's normals and `truth` at their positions, radians.
 double worstAngle(const Patch& patch, const std::function<V3d(const V3d&)>& truth) {
-  // 29 is prime to the cells, so vertices lie anywhere in them and on their borders.
+  // 29 and the number of cells are coprime, so that vertices lie anywhere in cells and on their
+  // borders.
   const TriMesh mesh = mapping::mapMesh(sheet(29, 0.7), patch, {.textureBox = kUnitBox}).mesh;
   double worst = 0;
   for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
@@ -203,8 +204,9 @@ TEST(MeshTextureAttributes, NormalsOfAStraightMapAreExact) {
 }
 
 TEST(MeshTextureAttributes, NormalsOfASheetAreRadial) {
-  // Cells are straight, so normals are off by up to half of the angle that a cell spans, on the
-  // ball along its diagonal, and a little more where that shears: first order in the spacing.
+  // Cells are straight, so normals are off by up to half of the angle that a cell spans. On the
+  // ball this is along its diagonal, with a small addition from shear. It is of first order in the
+  // spacing.
   const double arc = 1.2;
   const auto cylinder = [&](const V3d& p) {
     const double a = arc * (p.x - 0.5), r = 2 + 0.5 * p.z;
@@ -252,13 +254,13 @@ TEST(MeshTextureAttributes, NormalsStayOnTheSideOfTheirTriangles) {
                            .cross(mesh.positions[t[2]] - mesh.positions[t[0]]);
       for (const std::uint32_t v : t) across[v] += area;
     }
-    // Facets of 18 degrees on a tube that is stretched.
+    // Facets of 18 degrees on a stretched tube.
     for (std::size_t v = 0; v < across.size(); ++v)
       ASSERT_GT(across[v].normalized().dot(mesh.attributes.normals[v]), 0.97) << v << mirrored;
   }
 }
 
-TEST(MeshTextureAttributes, ManyPatchesCarryThemOneBehindTheOther) {
+TEST(MeshTextureAttributes, ManyPatchesAppendTheirAttributes) {
   const Patch one = patchOf([](const V3d& p) { return p; }, 4, 1);
   const Patch other = patchOf([](const V3d& p) { return V3d(p.x + 3, p.z, -p.y); }, 4, 1);
   const TriMesh mesh = sheet(3, 0.5);
@@ -274,7 +276,7 @@ TEST(MeshTextureAttributes, ManyPatchesCarryThemOneBehindTheOther) {
   }
 }
 
-TEST(MeshTextureAttributes, WhatHasNoDirectionStaysZeroAndGarbageIsRefused) {
+TEST(MeshTextureAttributes, NormalsOfLengthZeroStayZeroAndNaNIsRefused) {
   const Patch patch = patchOf([](const V3d& p) { return p; }, 4, 1);
   TriMesh mesh = sheet(3, 0.5);
   mesh.attributes.normals[5] = V3d(0);
@@ -295,7 +297,7 @@ TEST(MeshTextureAttributes, WhatHasNoDirectionStaysZeroAndGarbageIsRefused) {
                levelset::InvalidInput);
 }
 
-TEST(MeshTextureAttributes, PositionsAreThoseWithoutThem) {
+TEST(MeshTextureAttributes, PositionsDoNotDependOnAttributes) {
   const Patch patch = mapping::makePatch(makeBall(2, 0.1), cap(0.5, 2), 0.5).patch;
   TriMesh mesh = sheet(37, 0.37);
   const TriMesh with = mapping::mapMesh(mesh, patch, {.textureBox = kUnitBox}).mesh;

@@ -29,7 +29,7 @@ using mapping::Untangling;
 using support::makeSlab;
 using support::patchAt;
 
-/// Two by two, one high, on a slab.
+/// Patch of 2 × 2 and height 1 on a slab.
 Patch flatPatch(std::size_t columns, std::size_t layers, double scale = 1) {
   return patchAt([=](const V3d& t) { return V3d(2 * t.x - 1, 2 * t.y - 1, t.z) * scale; }, columns,
                  columns, layers, scale);
@@ -41,7 +41,7 @@ void expectCertified(const Patch& patch) {
             FoldVerdict::Certified);
 }
 
-/// How far the surface's particles are from where a formula has them.
+/// Largest distance between corresponding particles of two patches.
 double farthestFrom(const Patch& a, const Patch& b) {
   double most = 0;
   for (std::size_t k = 0; k < a.layers.size(); ++k)
@@ -79,18 +79,18 @@ TEST(PrismElements, RotationsHaveNoDistortionAndFoldsAreForbidden) {
   EXPECT_NEAR(mapping::symmetricDirichlet(turned).value, 6, 1e-14);
   for (const V3d& column : mapping::symmetricDirichlet(turned).stress)
     EXPECT_LE(column.length(), 1e-14);
-  // 2² + 1 + 1 and its reciprocals.
+  // 2² + 1 + 1 and the reciprocals of these.
   EXPECT_NEAR(mapping::symmetricDirichlet({V3d(2, 0, 0), V3d(0, 1, 0), V3d(0, 0, 1)}).value,
               6 + 2.25, 1e-14);
   const ElementSlopes mirrored = {V3d(-1, 0, 0), V3d(0, 1, 0), V3d(0, 0, 1)};
   EXPECT_EQ(mapping::symmetricDirichlet(mirrored).value, std::numeric_limits<double>::infinity());
-  // The other energy goes to that of a box, 3 + 2, and without bounds at a fold.
+  // The other energy tends to 3 + 2 for a box, and to infinity at a fold.
   EXPECT_NEAR(mapping::foldoverEnergy(turned, 1e-9).value, 5, 1e-9);
   EXPECT_GT(mapping::foldoverEnergy(mirrored, 1e-3).value, 1e5);
   EXPECT_TRUE(std::isfinite(mapping::foldoverEnergy(mirrored, 1e-3).value));
 }
 
-TEST(Untangle, APatchThatDoesNotFoldStays) {
+TEST(Untangle, KeepsAPatchWithoutFolds) {
   const Patch patch = flatPatch(7, 4);
   const Untangling result = untangle(makeSlab(2, 0.1), patch);
   EXPECT_EQ(result.before.folded, 0u);
@@ -99,7 +99,7 @@ TEST(Untangle, APatchThatDoesNotFoldStays) {
   EXPECT_EQ(farthestFrom(result.patch, patch), 0);
 }
 
-TEST(Untangle, MendsParticlesThatWentThroughTheirNeighbours) {
+TEST(Untangle, RepairsParticlesBeyondTheirNeighbours) {
   Patch patch = flatPatch(9, 4);
   patch.layers[1].positions[4 * 9 + 4] += V3d(0.9, 0.4, 0.5);
   patch.layers[3].positions[2 * 9 + 6] += V3d(-0.2, 0.6, -0.9);
@@ -112,7 +112,7 @@ TEST(Untangle, MendsParticlesThatWentThroughTheirNeighbours) {
   EXPECT_GT(result.after.leastJacobian, 0.3);
   EXPECT_GT(result.farthestMove, 0.2);
   expectCertified(result.patch);
-  // The sides on the surface stay, and all that was on it.
+  // The sides on the surface stay in place, and all surface particles stay on the surface.
   const mapping::ParticleLayer &surface = result.patch.layers[0], &before = patch.layers[0];
   for (std::size_t i = 0; i < 9; ++i) {
     EXPECT_EQ(surface.at(i, 0), before.at(i, 0));
@@ -121,8 +121,8 @@ TEST(Untangle, MendsParticlesThatWentThroughTheirNeighbours) {
   for (const V3d& p : surface.positions) EXPECT_NEAR(p.z, 0, 1e-5);
 }
 
-TEST(Untangle, MendsOffsetsPastTheMedialAxis) {
-  // Above the axis of a trough of radius 1 the sides have crossed.
+TEST(Untangle, RepairsOffsetsBeyondTheMedialAxis) {
+  // Above the axis of a trough of radius 1 the sides cross.
   const NarrowBand trough = support::sampleBand(
       [](const V3d& p) { return std::max(1 - std::hypot(p.y, p.z + 1e-9), -0.5); },
       {V3d(-1, -1, -1), V3d(1, 1, 1)}, 0.05);
@@ -140,8 +140,8 @@ TEST(Untangle, MendsOffsetsPastTheMedialAxis) {
   for (const V3d& p : result.patch.layers[0].positions) EXPECT_NEAR(std::hypot(p.y, p.z), 1, 1e-3);
 }
 
-TEST(Untangle, SaysWhereItCannot) {
-  // Two sides cross on the surface itself, and they stay.
+TEST(Untangle, ReportsWhereItFails) {
+  // Two fixed sides cross on the surface itself.
   const auto crossed = [](const V3d& t) {
     return V3d((2 * t.x - 1) * (1 - 2 * t.y), 2 * t.y - 1, t.z);
   };
@@ -154,9 +154,9 @@ TEST(Untangle, SaysWhereItCannot) {
   EXPECT_EQ(mapping::countFolds(result.patch).folded, result.after.folded);
 }
 
-TEST(Untangle, CellsWithoutVolumeAndClockwisePatches) {
+TEST(Untangle, HandlesCellsWithoutVolumeAndClockwisePatches) {
   const NarrowBand base = makeSlab(2, 0.1);
-  // All of the top lies upon the layer below it.
+  // The complete top layer coincides with the layer below.
   Patch flat = flatPatch(5, 3);
   flat.layers[2].positions = flat.layers[1].positions;
   const Untangling raised = untangle(base, flat);
@@ -183,7 +183,7 @@ TEST(Untangle, CellsWithoutVolumeAndClockwisePatches) {
 }
 
 TEST(Untangle, RimsFollowTheirNeighbours) {
-  // A patch with rims is moved as a whole where it is mended, and its rims with it.
+  // If untangling moves a patch with rims, the rims move with it.
   const NarrowBand base = support::makeBall(2, 0.1);
   Patch patch = mapping::makePatch(base, support::cap(0.5, 2), 0.5, {.spacing = 0.3}).patch;
   ASSERT_TRUE(patch.layers[3].hasRim());
@@ -218,12 +218,12 @@ TEST(Untangle, SameBitsForAnyNumberOfThreadsAndScale) {
   EXPECT_LE(farthestFrom(one, large), 1e-9);
 }
 
-TEST(MinimiseDistortion, IsometriesStay) {
+TEST(MinimiseDistortion, KeepsIsometries) {
   const Patch patch = flatPatch(8, 4);
   const DistortionGain result = minimiseDistortion(makeSlab(2, 0.1), patch);
   EXPECT_NEAR(result.before.mean, 6, 1e-12);
   EXPECT_EQ(farthestFrom(result.patch, patch), 0);
-  // The surface of a cylinder, and as thin a shell upon it that its top is no longer either.
+  // The surface of a cylinder, with an offset layer so thin that its top is almost isometric too.
   const double height = 1e-3;
   const NarrowBand rod = support::sampleBand([](const V3d& p) { return std::hypot(p.x, p.z) - 1; },
                                              {V3d(-1, -1, -1), V3d(1, 1, 1)}, 0.05);
@@ -234,7 +234,8 @@ TEST(MinimiseDistortion, IsometriesStay) {
       },
       13, 9, 3, height);
   const DistortionGain thin = minimiseDistortion(rod, bent);
-  // The chords of twelve cells lean by a twenty-fourth of the angle against what stands on them.
+  // Chords of twelve cells are inclined to the perpendicular direction by a twenty-fourth of the
+  // angle.
   EXPECT_NEAR(thin.before.mean, 6 + 2 * 0.05 * 0.05, 1e-3);
   EXPECT_LE(thin.after.mean, thin.before.mean);
   for (std::size_t n = 0; n < bent.layers[0].positions.size(); ++n)
@@ -259,7 +260,7 @@ TEST(MinimiseDistortion, ADistortedPlaneBecomesUniformAgain) {
   EXPECT_NEAR(result.farthestMove, farthestFrom(result.patch, distorted), 1e-12);
 }
 
-TEST(MinimiseDistortion, TheEnergyOnlyFalls) {
+TEST(MinimiseDistortion, TheEnergyNeverIncreases) {
   const NarrowBand base = support::makeBall(2, 0.1);
   const Patch patch = mapping::makePatch(base, support::cap(0.6, 2), 1, {.spacing = 0.3}).patch;
   double last = HUGE_VAL;
@@ -272,8 +273,8 @@ TEST(MinimiseDistortion, TheEnergyOnlyFalls) {
   }
 }
 
-TEST(MinimiseDistortion, ACapGains) {
-  // A shell half as high as the ball's radius over a cap of 0.6 loses three fifths of its
+TEST(MinimiseDistortion, ImprovesACap) {
+  // A patch with half the height of the ball's radius over a cap of 0.6 loses three fifths of its
   // distortion.
   const NarrowBand base = support::makeBall(2, 0.1);
   const Patch patch =
@@ -289,7 +290,7 @@ TEST(MinimiseDistortion, ACapGains) {
     for (const V3d& p : relaxed->layers[0].positions) EXPECT_NEAR(p.length(), 2, 1e-3);
 }
 
-TEST(MinimiseDistortion, OverACreaseItGainsAndStaysOnBothSides) {
+TEST(MinimiseDistortion, ImprovesOverACreaseAndStaysOnBothSides) {
   // The crease lies between rows of particles.
   const auto corner = [](const V3d& p) {
     const double x = p.x, z = p.z;
@@ -308,8 +309,8 @@ TEST(MinimiseDistortion, OverACreaseItGainsAndStaysOnBothSides) {
   for (const V3d& p : result.patch.layers[0].positions) EXPECT_NEAR(corner(p), 0, 0.02);
 }
 
-TEST(MinimiseDistortion, ThinEarsKeepTheirSides) {
-  // A plate three voxels thick, whose other side is nearer than the next particle.
+TEST(MinimiseDistortion, KeepsTheSidesOfThinEars) {
+  // A plate three voxels thick. Its other side is nearer than the next particle.
   const auto plate = [](const V3d& p) {
     const V3d d(std::abs(p.x) - 5, std::abs(p.y) - 5, std::abs(p.z) - 0.375);
     return std::max({d.x, d.y, d.z});
@@ -328,17 +329,17 @@ TEST(MinimiseDistortion, ThinEarsKeepTheirSides) {
     for (const V3d& p : found->layers[0].positions) EXPECT_NEAR(p.z, 0.375, 1e-4);
 }
 
-TEST(MinimiseDistortion, ProportionsScaleAndThreads) {
+TEST(MinimiseDistortion, DependsOnNeitherScaleNorThreads) {
   const NarrowBand base = makeSlab(2, 0.1);
   const Patch patch = flatPatch(7, 3);
-  // Only proportions count, and those of the patch itself are no distortion.
+  // Only proportions matter. The patch's own proportions count as zero distortion.
   for (const double scale : {0.01, 100.0}) {
     const DistortionGain same =
         minimiseDistortion(base, patch, {.proportions = V3d(2, 2, 1) * scale});
     EXPECT_NEAR(same.before.mean, 6, 1e-12);
     EXPECT_LE(farthestFrom(same.patch, patch), 1e-6);
   }
-  // A texture that is twice as high pulls the top up.
+  // A texture twice as high moves the top up.
   const DistortionGain higher = minimiseDistortion(base, patch, {.proportions = V3d(2, 2, 2)});
   EXPECT_LT(higher.after.mean, higher.before.mean);
   EXPECT_GT(higher.patch.layers[2].at(3, 3).z, 1.2);
@@ -356,7 +357,7 @@ TEST(MinimiseDistortion, ProportionsScaleAndThreads) {
   EXPECT_NEAR(run(1e5).after.mean, one.after.mean, 1e-6);
 }
 
-TEST(MinimiseDistortion, RefusesWhatItCannotRelax) {
+TEST(MinimiseDistortion, RefusesInvalidPatches) {
   const NarrowBand base = makeSlab(2, 0.1);
   Patch folded = flatPatch(5, 3);
   folded.layers[1].positions[12] += V3d(1, 1, 0);
