@@ -11,6 +11,7 @@
 #include "levelset/mesh_files/mesh_file.h"
 #include "levelset/placement/transform.h"
 #include "tests/support/files.h"
+#include "tests/support/measured.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/meshes.h"
 
@@ -277,7 +278,7 @@ TEST(MeshAttributes, TransformKeepsNormalsPerpendicular) {
                            .cross(moved.positions[t[2]] - moved.positions[t[0]])
                            .normalized();
     for (const std::uint32_t v : t)
-      EXPECT_LT((moved.attributes.normals[v] - normal).length(), 1e-14);
+      EXPECT_LT((moved.attributes.normals[v] - normal).length(), support::doubleRounding(1));
   }
   TriMesh full = dressed(CoordinatePrecision::Float, ColorPrecision::Byte, true);
   const TriMesh shifted = transform(full, M44d().setTranslation(V3d(1, 2, 3)));
@@ -295,7 +296,7 @@ TEST(MeshAttributes, CarriedNormalsSurviveAnyScale) {
                    n * scale, {V3d(scale, 0, 0), V3d(0, scale, 0), V3d(0, 0, scale)}, 1) -
                n.normalized())
                   .length(),
-              1e-15);
+              support::doubleRounding(1));
   // A map with a small extent in one direction is not flat.
   EXPECT_EQ(
       levelset::transformedNormal({1, 0, 0}, {V3d(1, 0, 0), V3d(0, 1e-9, 0), V3d(0, 0, 1e-9)}, 1),
