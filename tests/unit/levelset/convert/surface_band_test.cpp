@@ -164,7 +164,7 @@ TEST(SurfaceBand, RefusesSurfacesWithoutTwoSides) {
   fin.positions.emplace_back(0, 0.5, 1);
   fin.triangles.push_back({4, 5, 9});  // third face of the edge from (0, 0) to (0, 1)
   EXPECT_SAYS(refusal<InvalidInput>([&] { (void)surfaceBand(fin, 0.1); }),
-              "at the edge from (0, 0, 0) to (0, 1, 0) 3 faces meet");
+              "at the edge from (0, 0, 0) to (0, 1, 0), 3 faces meet");
   EXPECT_SAYS(refusal<InvalidInput>([&] { (void)surfaceBand(support::sphereMesh(1), 0.1); }),
               "'level-set' converts a closed mesh");
 }
