@@ -10,6 +10,7 @@
 
 #include "levelset/convert/mesh_to_band.h"
 #include "levelset/vdb.h"
+#include "tests/support/measured.h"
 #include "tests/support/meshes.h"
 
 namespace support {
@@ -54,7 +55,7 @@ inline void expectExact(const levelset::MeshToBandResult& result, const TriMesh&
       }
   });
   EXPECT_EQ(active, result.band.activeVoxelCount());
-  EXPECT_LT(worst, 1e-4 * h);
+  EXPECT_LT(worst, support::rounding(4) * h);
 }
 
 /// Checks the band of an open mesh. Signs follow the exact winding number, and every sign change

@@ -7,6 +7,7 @@
 #include "levelset/error.h"
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
+#include "tests/support/measured.h"
 
 namespace narrow_band_test {
 
@@ -30,11 +31,11 @@ TEST(NarrowBand, CopiesShareStorageUntilOneIsEdited) {
 TEST(NarrowBand, ReportsItsProperties) {
   const NarrowBand band = unitSphere(0.1);
   EXPECT_DOUBLE_EQ(band.voxelSize(), 0.1);
-  EXPECT_NEAR(band.halfWidth(), 3, 1e-6);
+  EXPECT_NEAR(band.halfWidth(), 3, support::rounding(3));
   const Imath::Box3d box = band.zeroSetBounds();
   for (int axis = 0; axis < 3; ++axis) {
-    EXPECT_NEAR(box.min[axis], -1, 0.01 * 0.1);
-    EXPECT_NEAR(box.max[axis], 1, 0.01 * 0.1);
+    EXPECT_NEAR(box.min[axis], -1, support::rounding(1) * 0.1);
+    EXPECT_NEAR(box.max[axis], 1, support::rounding(1) * 0.1);
   }
   EXPECT_TRUE(NarrowBand().isEmpty());
 }

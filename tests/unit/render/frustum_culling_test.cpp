@@ -47,12 +47,12 @@ V3d seenBy(const Camera& camera, const V3d& world) {
 void expectTheSame(const Scene& scene, const RenderOptions& options, double unseen,
                    const std::string& what) {
   const KernelScene whole(scene), part(scene, options);
-  EXPECT_EQ(whole.counts().unseen, 0u) << what;
-  EXPECT_GT(static_cast<double>(part.counts().unseen),
+  EXPECT_EQ(whole.counts().culled, 0u) << what;
+  EXPECT_GT(static_cast<double>(part.counts().culled),
             unseen * static_cast<double>(whole.counts().crossed))
       << what;
   EXPECT_LT(part.bytes(), whole.bytes()) << what;
-  EXPECT_EQ(part.counts().crossed + part.counts().unseen, whole.counts().crossed) << what;
+  EXPECT_EQ(part.counts().crossed + part.counts().culled, whole.counts().crossed) << what;
   EXPECT_EQ(part.bounds(), whole.bounds()) << what;
   const ImageComparison found =
       compareImages(painted(scene, whole, options), painted(scene, part, options), {.exact = true});
@@ -121,7 +121,7 @@ TEST(FrustumCulling, KeepsBlocksOfExpressionsThatAffectThePicture) {
   expectTheSame(scene, lit, 0.5, "shadows through an expression");
   // Rays to the sky continue to the end of the last solid.
   const RenderOptions open = {.samples = 1, .ambientSamples = 2, .shadowSamples = 0};
-  EXPECT_EQ(KernelScene(scene, open).counts().unseen, 0u);
+  EXPECT_EQ(KernelScene(scene, open).counts().culled, 0u);
 }
 
 TEST(FrustumCulling, StoresNoBlockOfASolidBehindTheCamera) {

@@ -12,6 +12,7 @@
 #include "levelset/inspect/measure.h"
 #include "levelset/mesh_files/mesh_file.h"
 #include "tests/support/files.h"
+#include "tests/support/measured.h"
 #include "tests/support/mesh_bands.h"
 
 namespace mesh_to_band_nasty_test {
@@ -202,7 +203,7 @@ TEST(MeshToBandNasty, IslandsAMillionApart) {
               (V3d(std::abs(p.x) - 5e5, p.y - 0.01, p.z - 0.02)).length() < 1 - exact / 2 &&
                   windingNumber(mesh, p) > 0.5);
   }
-  EXPECT_LT(worst, 1e-5);
+  EXPECT_LT(worst, support::rounding(0.2));
   // The space between is empty: no tile of the tree is inside.
   EXPECT_GT(vdb(result.band).tree().getValue({0, 0, 0}), 0);
   EXPECT_EQ(result.band.activeVoxelCount(), 2 * meshToBand(left, 0.1).band.activeVoxelCount());
@@ -253,7 +254,7 @@ TEST(MeshToBandNasty, TwelveTrianglesLargerThanTheGrid) {
         std::max(worst, std::abs(static_cast<double>(*it) - (inside < 0 ? inside : out.length())));
   }
   EXPECT_GT(count, 500000u);
-  EXPECT_LT(worst, 1e-4);
+  EXPECT_LT(worst, support::rounding(1.5));
 }
 
 /// Converts a soup in which no triangles share a vertex. `tolerance` covers the chords and the
@@ -347,7 +348,9 @@ TEST(MeshToBandNasty, FacesThroughGridPointsLeaveNoSpecks) {
         const Measurement found = measure(meshToBand(mesh, voxel, {.sign = sign}).band);
         EXPECT_EQ(found.components, 1u) << voxel;
         // Edges are rounded by up to half a square voxel in cross-section.
-        EXPECT_NEAR(found.volume, signedVolume(mesh), 0.2 * voxel * surfaceArea(mesh)) << voxel;
+        EXPECT_NEAR(found.volume, signedVolume(mesh),
+                    support::measured(0.189, 0.2) * voxel * surfaceArea(mesh))
+            << voxel;
       }
   // In the small tetrahedron only points of its faces are grid points, so no grid point is inside.
   for (V3d& p : tetrahedron.positions) p /= 8;

@@ -17,6 +17,7 @@
 #include "levelset/solids/shapes.h"
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
+#include "tests/support/measured.h"
 #include "tests/support/threads.h"
 
 namespace csg_test {
@@ -124,7 +125,7 @@ TEST(Csg, HoldsTheDistanceBeyondTheSeam) {
       const double want = truth.distance(toImath(vdb(result).indexToWorld(c)), operation);
       // The spheres of 32 voxels are approximated by planes over a cell. The error is κ/4 for each,
       // and more where they meet.
-      ASSERT_NEAR(*it, want, 0.05 * h) << c;
+      ASSERT_NEAR(*it, want, support::measured(0.0257) * h) << c;
     }
   }
 }
@@ -146,7 +147,8 @@ TEST(Csg, OverlappingBoxesAreOneBox) {
       // At the rim of the inner face four faces share a cell. The approximation has two planes
       // only.
       const bool isAtRim = std::max(std::abs(c.x()), std::abs(c.y())) > 5 && std::abs(c.z()) < 10;
-      ASSERT_NEAR(have.getValue(c), want.getValue(c), isAtRim ? 0.4 * h : 1e-5)
+      ASSERT_NEAR(have.getValue(c), want.getValue(c),
+                  isAtRim ? support::measured(0.183) * h : support::rounding(1))
           << c << " top " << top;
     }
   }
@@ -164,10 +166,11 @@ TEST(Csg, TouchingFacesOnGridPointsLeaveNoCrack) {
     EXPECT_EQ(united.activeVoxelCount(), both.activeVoxelCount());
     const auto want = vdb(both).getConstAccessor(), have = vdb(united).getConstAccessor();
     for (const openvdb::Coord& c : openvdb::CoordBBox(openvdb::Coord(-14), openvdb::Coord(14)))
-      ASSERT_NEAR(have.getValue(c), want.getValue(c), 1e-5) << c << " side " << side;
+      ASSERT_NEAR(have.getValue(c), want.getValue(c), support::rounding(1))
+          << c << " side " << side;
     // Subtracting the touching solid removes nothing.
     const double volume = measure(lower).volume;
-    EXPECT_NEAR(measure(subtract(lower, upper)).volume, volume, 1e-6 * volume);
+    EXPECT_NEAR(measure(subtract(lower, upper)).volume, volume, support::rounding(0.4) * volume);
   }
 }
 
@@ -180,10 +183,11 @@ TEST(Csg, CommonFacesLeaveNoSheetAfterSubtraction) {
     const NarrowBand half = subtract(whole, makeBox(V3d(1, 2, 2), at + V3d(0.5, 0, 0), h));
     const NarrowBand want = makeBox(V3d(1, 2, 2), at - V3d(0.5, 0, 0), h);
     EXPECT_NEAR(static_cast<double>(half.activeVoxelCount()),
-                static_cast<double>(want.activeVoxelCount()), 200)
+                static_cast<double>(want.activeVoxelCount()), support::measured(116))
         << shift;
     // Between grid points the position of the cut's edge is lost, so that the edge is rounded.
-    const double tolerance = (shift == 0 ? 0.06 : 0.5) * h;
+    const double tolerance =
+        (shift == 0 ? support::measured(0.0446, 0.06) : support::measured(0.204)) * h;
     const auto exact = vdb(want).getConstAccessor(), have = vdb(half).getConstAccessor();
     for (const openvdb::Coord& c : openvdb::CoordBBox(openvdb::Coord(-14), openvdb::Coord(14)))
       ASSERT_NEAR(have.getValue(c), exact.getValue(c), tolerance) << c << " shift " << shift;
@@ -195,7 +199,8 @@ TEST(Csg, CommonFacesLeaveNoSheetAfterSubtraction) {
     EXPECT_EQ(wall.cavities, 1u) << shift;
     const NarrowBand slot = subtract(whole, makeBox(V3d(1, 1, 2), at + V3d(0.5, 0, 0), h));
     EXPECT_EQ(measure(slot).euler, 2) << shift;
-    EXPECT_NEAR(measure(slot).volume, 6, 0.2) << shift;  // a grid rounds edges
+    EXPECT_NEAR(measure(slot).volume, 6, support::measured(0.153, 0.2))
+        << shift;  // a grid rounds edges
     EXPECT_TRUE(check(slot).passed()) << shift;
   }
 }
@@ -221,12 +226,12 @@ void expectVolumesConverge(const std::vector<int>& resolutions) {
       error[1] = std::max(error[1], std::abs(common));
     }
     if (resolution == 32) {
-      EXPECT_LT(error[0], 1e-4);
-      EXPECT_LT(error[1], 5e-4);
+      EXPECT_LT(error[0], support::measured(7.77e-5, 1e-4));
+      EXPECT_LT(error[1], support::measured(3.89e-4, 5e-4));
     }
     for (int i = 0; i < 2; ++i) {
       if (previous[i] != 0) {
-        EXPECT_GT(std::log2(previous[i] / error[i]), 1.8);
+        EXPECT_GT(std::log2(previous[i] / error[i]), support::measuredOrder(1.91, 1.8));
       }
       previous[i] = error[i];
     }
@@ -284,15 +289,16 @@ TEST(Csg, NestedSolidsAreKeptOrDropped) {
   const NarrowBand outer = makeSphere(1, V3d(0), 0.05), inner = makeSphere(0.5, V3d(0), 0.05);
   EXPECT_EQ(unite(outer, inner).contentHash(), outer.contentHash());
   EXPECT_EQ(intersect(outer, inner).contentHash(), inner.contentHash());
-  EXPECT_NEAR(measure(subtract(outer, inner)).volume, 4 * kPi / 3 * (1 - 0.125), 2e-2);
+  EXPECT_NEAR(measure(subtract(outer, inner)).volume, 4 * kPi / 3 * (1 - 0.125),
+              support::rounding(0.4));
 }
 
 TEST(Csg, ResamplesOperandsToTheFinestGrid) {
   const NarrowBand fine = makeSphere(1, V3d(-0.5, 0, 0), 0.05, {.halfWidth = 4});
   const NarrowBand coarse = makeSphere(1, V3d(0.5, 0, 0), 0.1);
   const CsgResult result = combine(CsgOperation::Union, std::array{coarse, fine});
-  EXPECT_NEAR(result.band.voxelSize(), 0.05, 1e-12);
-  EXPECT_NEAR(result.band.halfWidth(), 3, 1e-4);
+  EXPECT_NEAR(result.band.voxelSize(), 0.05, support::doubleRounding(4));
+  EXPECT_NEAR(result.band.halfWidth(), 3, support::rounding(3));
   ASSERT_EQ(result.notes.size(), 2u);
   EXPECT_EQ(
       result.notes[0],
@@ -300,7 +306,7 @@ TEST(Csg, ResamplesOperandsToTheFinestGrid) {
       "0.05");
   EXPECT_EQ(result.notes[1], "union: operand 2 was narrowed to a half width of 3 voxels");
   const double direct = measure(unite(makeSphere(1, V3d(0.5, 0, 0), 0.05), fine)).volume;
-  EXPECT_NEAR(measure(result.band).volume, direct, 1e-3 * direct);
+  EXPECT_NEAR(measure(result.band).volume, direct, support::rounding(3) * direct);
   // Different half widths alone do not cause resampling.
   const NarrowBand wide = makeSphere(1, V3d(0), 0.1, {.halfWidth = 5});
   const CsgResult cut = combine(CsgOperation::Union, std::array{wide, coarse});
@@ -322,7 +328,7 @@ TEST(Csg, IsInvariantUnderMotionAndScale) {
   auto it = vdb(before).cbeginValueOn();
   for (auto other = vdb(after).cbeginValueOn(); other; ++it, ++other) {
     ASSERT_EQ(it.getCoord(), other.getCoord());
-    ASSERT_NEAR(*it, *other, 1e-5);
+    ASSERT_NEAR(*it, *other, support::rounding(3));
   }
 }
 

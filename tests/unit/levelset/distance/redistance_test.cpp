@@ -8,6 +8,7 @@
 #include "levelset/error.h"
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
+#include "tests/support/measured.h"
 #include "tests/support/rounded_solids.h"
 #include "tests/support/threads.h"
 
@@ -119,16 +120,16 @@ void expectSound(const NarrowBand& band) {
 
 TEST(Redistance, KeepsAnExactDistance) {
   const NarrowBand result = redistance(sampleUnit(sphere(1), 24));
-  EXPECT_LE(bandError(result, sphere(1)).linf, 2e-3);
-  EXPECT_NEAR(result.halfWidth(), 3, 1e-6);
+  EXPECT_LE(bandError(result, sphere(1)).linf, support::rounding(1.25));
+  EXPECT_NEAR(result.halfWidth(), 3, support::rounding(3));
   expectSound(result);
 }
 
 TEST(Redistance, RestoresSlopesWithoutMovingTheSurface) {
   const NarrowBand field = sampleUnit(distortedSphere(1), 64);
   const NarrowBand result = redistance(field);
-  EXPECT_LE(bandError(result, sphere(1)).linf, 0.05);
-  EXPECT_LE(surfaceError(result, sphere(1)), 1e-3);
+  EXPECT_LE(bandError(result, sphere(1)).linf, support::measured(3.03e-4));
+  EXPECT_LE(surfaceError(result, sphere(1)), support::measured(7.49e-6));
   expectSound(result);
 }
 
@@ -139,7 +140,7 @@ TEST(Redistance, ConvergesSecondOrderOverTheBand) {
     const double error =
         bandError(redistance(sampleUnit(distortedSphere(1), n)), sphere(1)).linf / n;
     if (previous > 0) {
-      EXPECT_GE(std::log2(previous / error), 1.8) << "at " << n;
+      EXPECT_GE(std::log2(previous / error), support::measuredOrder(2.01, 1.8)) << "at " << n;
     }
     previous = error;
   }
@@ -147,8 +148,8 @@ TEST(Redistance, ConvergesSecondOrderOverTheBand) {
 
 TEST(Redistance, RestoresRipplesThatTheBandTruncates) {
   const NarrowBand result = redistance(sampleVoxels(rippledSphere(32, 4), 33));
-  EXPECT_LE(bandError(result, sphere(32)).linf, 0.05);
-  EXPECT_LE(surfaceError(result, sphere(32)), 1e-3);
+  EXPECT_LE(bandError(result, sphere(32)).linf, support::measured(0.00578));
+  EXPECT_LE(surfaceError(result, sphere(32)), support::measured(2.57e-4));
   expectSound(result);
 }
 
@@ -156,10 +157,11 @@ TEST(Redistance, ExtendsToTheRequestedHalfWidth) {
   const int n = 20;
   const NarrowBand result = redistance(sampleUnit(sphere(1), n), {.halfWidth = 1.5 * n});
   const BandError e = bandError(result, sphere(1));
-  EXPECT_NEAR(static_cast<double>(e.count), 4.0 / 3 * M_PI * std::pow(2.5 * n, 3), 0.01 * 1e6);
-  EXPECT_LE(e.l1, 1e-3);
+  EXPECT_NEAR(static_cast<double>(e.count), 4.0 / 3 * M_PI * std::pow(2.5 * n, 3),
+              support::measured(6.42e-5) * 1e6);
+  EXPECT_LE(e.l1, support::measured(3.13e-5));
   // At the centre every point of the sphere is equally near. There the error is first order.
-  EXPECT_LE(e.linf, 0.1);
+  EXPECT_LE(e.linf, support::measured(1.42e-4));
   expectSound(result);
 }
 
@@ -174,7 +176,7 @@ TEST(Redistance, StaysInItsRegion) {
   for (auto it = vdb(part).cbeginValueOn(); it; ++it, ++count) {
     const V3d p = toImath(vdb(part).indexToWorld(it.getCoord()));
     EXPECT_TRUE(Imath::Box3d(region.min - V3d(1.0 / n), region.max + V3d(1.0 / n)).intersects(p));
-    ASSERT_NEAR(*it * n, accessor.getValue(it.getCoord()) * n, 2e-3);
+    ASSERT_NEAR(*it * n, accessor.getValue(it.getCoord()) * n, support::rounding(125));
   }
   EXPECT_GT(count, 1000u);
   // Signs are correct outside the region as well.
@@ -200,8 +202,8 @@ TEST(Redistance, MeasuresAroundTheEdgesOfACube) {
     double& worst = box(half)(p) > 0 && free == 2 ? nearFaces : nearEdges;
     worst = std::max(worst, error);
   });
-  EXPECT_LE(nearFaces, 0.01);
-  EXPECT_LE(nearEdges, 0.1);
+  EXPECT_LE(nearFaces, support::rounding(3));
+  EXPECT_LE(nearEdges, support::rounding(4));
   expectSound(result);
 }
 
@@ -216,7 +218,7 @@ TEST(Redistance, SeesBothWallsOfANarrowGap) {
     if (std::max(std::abs(p.x), std::abs(p.y)) > 6 || std::abs(p.z) > 3) return;
     worst = std::max(worst, std::abs(value - (gap - std::abs(p.z - 0.3))));
   });
-  EXPECT_LE(worst, 0.2);
+  EXPECT_LE(worst, support::measured(0.0731));
 }
 
 TEST(Redistance, FindsNoSurfaceWhereValuesOnlyDip) {
@@ -229,7 +231,7 @@ TEST(Redistance, FindsNoSurfaceWhereValuesOnlyDip) {
   const NarrowBand result = redistance(sampleVoxels(dipped, 16), {.halfWidth = 6});
   // Part of the dip is within the interpolant's stencil at the ball. A false surface would be an
   // entire voxel off.
-  EXPECT_LE(bandError(result, sphere(8)).linf, 0.1);
+  EXPECT_LE(bandError(result, sphere(8)).linf, support::measured(0.0577));
 }
 
 TEST(Redistance, DoesNotDependOnScaleOrPosition) {
@@ -237,19 +239,19 @@ TEST(Redistance, DoesNotDependOnScaleOrPosition) {
   for (const double h : {1e-6, 1e6}) {
     const Shape ball = [=](const V3d& p) { return h * sphere(10)(p / h); };
     const NarrowBand field = support::sampleBand(ball, {V3d(-11 * h), V3d(11 * h)}, h);
-    EXPECT_NEAR(bandError(redistance(field), ball).l1, l1, 1e-4) << h;
+    EXPECT_NEAR(bandError(redistance(field), ball).l1, l1, support::measured(1.11e-9)) << h;
   }
   const V3d away(1e6, -1e6, 1e6);
   const Shape ball = [=](const V3d& p) { return sphere(10)(p - away); };
   const NarrowBand field = support::sampleBand(ball, {away - V3d(11), away + V3d(11)}, 1);
-  EXPECT_NEAR(bandError(redistance(field), ball).l1, l1, 1e-4);
+  EXPECT_NEAR(bandError(redistance(field), ball).l1, l1, support::rounding(1));
 }
 
 TEST(Redistance, KeepsRoundedEdgesRound) {
   for (const support::RoundedSolid& solid : support::roundedSolids()) {
     const BandError e = bandError(redistance(solid.band()), solid.distance);
-    EXPECT_LE(e.l1, 0.02) << solid.name;
-    EXPECT_LE(e.linf, 0.2) << solid.name;
+    EXPECT_LE(e.l1, support::measured(0.00793)) << solid.name;
+    EXPECT_LE(e.linf, support::measured(0.105)) << solid.name;
   }
 }
 
@@ -260,9 +262,11 @@ TEST(Redistance, WorksAtAnyHalfWidth) {
       const BandError e = bandError(result, sphere(12));
       // One layer on each side resolves curvature badly, and at the centre the entire surface is
       // equally near.
-      EXPECT_LE(e.l1, from < 2 ? 0.06 : 0.01) << from << " to " << to;
-      EXPECT_LE(e.linf, from < 2 ? 0.25 : 0.1) << from << " to " << to;
-      EXPECT_NEAR(result.halfWidth(), to, 1e-5);
+      EXPECT_LE(e.l1, from < 2 ? support::measured(0.00115) : support::measured(9.42e-5))
+          << from << " to " << to;
+      EXPECT_LE(e.linf, from < 2 ? support::measured(0.00486) : support::measured(0.00166))
+          << from << " to " << to;
+      EXPECT_NEAR(result.halfWidth(), to, support::rounding(50));
     }
 }
 
@@ -273,7 +277,7 @@ TEST(Redistance, AcceptsABackgroundOtherThanTheBand) {
   for (auto it = grid->beginValueOn(); it; ++it)
     if (std::abs(*it) > 3) it.setActiveState(false), it.setValue(std::copysign(5.0f, *it));
   const NarrowBand result = redistance(makeBand(grid), {.halfWidth = 6});
-  EXPECT_LE(bandError(result, sphere(12)).linf, 0.02);
+  EXPECT_LE(bandError(result, sphere(12)).linf, support::measured(4.01e-4));
 }
 
 TEST(Redistance, KeepsASingleVoxel) {
@@ -284,7 +288,8 @@ TEST(Redistance, KeepsASingleVoxel) {
   const NarrowBand result = redistance(makeBand(grid));
   EXPECT_LT(vdb(result).tree().getValue(openvdb::Coord(0)), 0);
   EXPECT_GT(vdb(result).tree().getValue(openvdb::Coord(1, 0, 0)), 0);
-  EXPECT_NEAR(vdb(result).tree().getValue(openvdb::Coord(2, 0, 0)), 1.5, 0.25);
+  EXPECT_NEAR(vdb(result).tree().getValue(openvdb::Coord(2, 0, 0)), 1.5,
+              support::measured(0.18, 0.25));
 }
 
 TEST(Redistance, IsStableUnderRepetition) {
@@ -295,12 +300,13 @@ TEST(Redistance, IsStableUnderRepetition) {
     EXPECT_EQ(largestDifference(ball, redistance(ball)), 0) << radius;
   }
   const NarrowBand cuboid = sampleUnit(box(V3d(0.413, 0.377, 0.291)), 32);
-  EXPECT_LE(largestDifference(redistance(cuboid), redistance(redistance(cuboid))), 2e-6);
+  EXPECT_LE(largestDifference(redistance(cuboid), redistance(redistance(cuboid))),
+            support::rounding(1));
   NarrowBand band = sampleUnit(distortedSphere(1), 24);
   for (int i = 0; i < 10; ++i) band = redistance(std::move(band));
   EXPECT_EQ(largestDifference(band, redistance(band)), 0);
-  EXPECT_LE(surfaceError(band, sphere(1)), 1e-3);
-  EXPECT_LE(bandError(band, sphere(1)).linf, 5e-3);
+  EXPECT_LE(surfaceError(band, sphere(1)), support::measured(7.97e-5));
+  EXPECT_LE(bandError(band, sphere(1)).linf, support::measured(8.26e-4));
 }
 
 TEST(Redistance, CountsZeroAsOutside) {
@@ -310,8 +316,8 @@ TEST(Redistance, CountsZeroAsOutside) {
   const NarrowBand result = redistance(field);
   EXPECT_EQ(vdb(result).tree().getValue(openvdb::Coord(8, 0, 0)), 0.0f);
   EXPECT_FALSE(std::signbit(vdb(result).tree().getValue(openvdb::Coord(8, 0, 0))));
-  EXPECT_NEAR(vdb(result).tree().getValue(openvdb::Coord(7, 0, 0)), -1, 1e-3);
-  EXPECT_NEAR(vdb(result).tree().getValue(openvdb::Coord(10, 0, 0)), 2, 1e-3);
+  EXPECT_NEAR(vdb(result).tree().getValue(openvdb::Coord(7, 0, 0)), -1, support::rounding(1));
+  EXPECT_NEAR(vdb(result).tree().getValue(openvdb::Coord(10, 0, 0)), 2, support::rounding(2));
   expectSound(result);
 }
 
@@ -320,7 +326,7 @@ TEST(Redistance, ReadsABandOfTwoVoxels) {
   const int n = 32;
   const NarrowBand result =
       redistance(sampleUnit([](const V3d& p) { return 2.3 * sphere(1)(p); }, n), {.halfWidth = 5});
-  EXPECT_LE(bandError(result, sphere(1)).linf, 0.03);
+  EXPECT_LE(bandError(result, sphere(1)).linf, support::measured(0.00173));
 }
 
 TEST(Redistance, DoesNotDependOnThreads) {
@@ -356,12 +362,12 @@ TEST(SlowRedistance, MeetsItsBoundsAtThreeSizes) {
         redistance(sampleVoxels(rippledSphere(radius, radius / 16), radius + 1));
     const BandError e = bandError(result, sphere(radius));
     if (radius >= 64) {
-      EXPECT_LE(e.linf, 0.05) << radius;
-      EXPECT_LE(surfaceError(result, sphere(radius)), 1e-3) << radius;
+      EXPECT_LE(e.linf, support::measured(0.00536)) << radius;
+      EXPECT_LE(surfaceError(result, sphere(radius)), support::measured(2.55e-4)) << radius;
     }
     // World units: the radius is one.
     if (previous > 0) {
-      EXPECT_GE(std::log2(previous / (e.l1 / radius)), 2) << radius;
+      EXPECT_GE(std::log2(previous / (e.l1 / radius)), support::measuredOrder(3.1)) << radius;
     }
     previous = e.l1 / radius;
   }
@@ -371,8 +377,8 @@ TEST(SlowRedistance, HundredRepetitionsMoveTheSurfaceLittle) {
   NarrowBand band = sampleVoxels(rippledSphere(64, 4), 65);
   for (int i = 0; i < 100; ++i) band = redistance(std::move(band));
   // Neither a grid point of the band nor the zero set has a larger error.
-  EXPECT_LE(bandError(band, sphere(64)).linf, 0.01);
-  EXPECT_LE(surfaceError(band, sphere(64)), 1e-3);
+  EXPECT_LE(bandError(band, sphere(64)).linf, support::measured(0.00321));
+  EXPECT_LE(surfaceError(band, sphere(64)), support::measured(2.15e-4));
 }
 
 }  // namespace redistance_test

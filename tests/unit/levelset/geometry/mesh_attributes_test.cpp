@@ -11,6 +11,7 @@
 #include "levelset/mesh_files/mesh_file.h"
 #include "levelset/placement/transform.h"
 #include "tests/support/files.h"
+#include "tests/support/measured.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/meshes.h"
 
@@ -171,7 +172,7 @@ TEST(MeshAttributes, InvalidValuesAreRefusedWithTheirPosition) {
   EXPECT_SAYS(refused("vt 0 0\nvt 1 0\nf 1/1 2/2 3/3\n"),
               "line 6: a face refers to texture coordinate 3 of 2");
   EXPECT_SAYS(refused("vn 0 0 1\nf 1//1 2//-2 3//1\n"), "refers to normal -2, but only 1 precede");
-  EXPECT_SAYS(refused("vn 0 0 1\nf 1//0 2//1 3//1\n"), "names normal 0, but OBJ counts from 1");
+  EXPECT_SAYS(refused("vn 0 0 1\nf 1//0 2//1 3//1\n"), "refers to normal 0, but OBJ counts from 1");
   EXPECT_SAYS(refused("v 1 1 1 0.5 oops 0\nf 1 2 3\n"), "found 'oops' where a weight or colour");
   EXPECT_SAYS(refused("vn 0 0 1\nf 1//1 2//1 9//1\n"), "vertex 8 (counted from 0) of 3");
   EXPECT_EQ(parse("a.obj", obj + "vn 0 0 nan\nf 1//1 2//7 3//1\n", {.attributes = false})
@@ -277,7 +278,7 @@ TEST(MeshAttributes, TransformKeepsNormalsPerpendicular) {
                            .cross(moved.positions[t[2]] - moved.positions[t[0]])
                            .normalized();
     for (const std::uint32_t v : t)
-      EXPECT_LT((moved.attributes.normals[v] - normal).length(), 1e-14);
+      EXPECT_LT((moved.attributes.normals[v] - normal).length(), support::doubleRounding(1));
   }
   TriMesh full = dressed(CoordinatePrecision::Float, ColorPrecision::Byte, true);
   const TriMesh shifted = transform(full, M44d().setTranslation(V3d(1, 2, 3)));
@@ -295,7 +296,7 @@ TEST(MeshAttributes, CarriedNormalsSurviveAnyScale) {
                    n * scale, {V3d(scale, 0, 0), V3d(0, scale, 0), V3d(0, 0, scale)}, 1) -
                n.normalized())
                   .length(),
-              1e-15);
+              support::doubleRounding(1));
   // A map with a small extent in one direction is not flat.
   EXPECT_EQ(
       levelset::transformedNormal({1, 0, 0}, {V3d(1, 0, 0), V3d(0, 1e-9, 0), V3d(0, 0, 1e-9)}, 1),

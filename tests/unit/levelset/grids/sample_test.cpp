@@ -6,6 +6,7 @@
 
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
+#include "tests/support/measured.h"
 
 namespace sample_test {
 
@@ -49,9 +50,9 @@ TEST(Sample, TrilinearReproducesPlanes) {
   const NarrowBand band = sampleCube([&](const V3d& p) { return (slope ^ p) + 0.1; }, placement);
   const BandSampler sampler(band);
   for (const V3d& p : probes(placement)) {
-    EXPECT_NEAR(sampler.value(p), (slope ^ p) + 0.1, 1e-5 * h);
-    EXPECT_NEAR((sampler.gradient(p) - slope).length(), 0, 1e-5);
-    EXPECT_NEAR((sampler.normal(p) - slope.normalized()).length(), 0, 1e-5);
+    EXPECT_NEAR(sampler.value(p), (slope ^ p) + 0.1, support::rounding(8) * h);
+    EXPECT_NEAR((sampler.gradient(p) - slope).length(), 0, support::measured(1.51e-6));
+    EXPECT_NEAR((sampler.normal(p) - slope.normalized()).length(), 0, support::measured(1.55e-6));
     EXPECT_TRUE(sampler.isInBand(p));
   }
 }
@@ -68,8 +69,8 @@ TEST(Sample, TricubicReproducesQuadrics) {
   };
   const BandSampler cubic(sampleCube(phi, placement), Interpolation::Tricubic);
   for (const V3d& p : probes(placement)) {
-    EXPECT_NEAR(cubic.value(p), phi(p), 1e-5);
-    EXPECT_NEAR((cubic.gradient(p) - slope(p)).length(), 0, 2e-5);
+    EXPECT_NEAR(cubic.value(p), phi(p), support::rounding(10));
+    EXPECT_NEAR((cubic.gradient(p) - slope(p)).length(), 0, support::measured(2.57e-6));
   }
 }
 
@@ -85,7 +86,7 @@ TEST(Sample, GradientIsTheDerivativeOfTheValue) {
         V3d step(0);
         step[axis] = 1e-6;
         const double difference = (sampler.value(p + step) - sampler.value(p - step)) / 2e-6;
-        EXPECT_NEAR(slope[axis], difference, 1e-4);
+        EXPECT_NEAR(slope[axis], difference, support::measured(1.07e-8));
       }
     }
   }
@@ -104,10 +105,10 @@ TEST(Sample, ConvergesInThirdOrderOnASphere) {
       const V3d p(std::sin(u) * std::cos(v), std::sin(u) * std::sin(v), std::cos(u));
       ASSERT_TRUE(sampler.isInBand(p));
       worst = std::max(worst, std::abs(sampler.value(p)));
-      EXPECT_LT((sampler.normal(p) - p).length(), 0.3 * h * h);
+      EXPECT_LT((sampler.normal(p) - p).length(), support::measured(0.038) * h * h);
     }
     if (previous > 0) {
-      EXPECT_GT(std::log2(previous / worst), 2.8) << "h = " << h;
+      EXPECT_GT(std::log2(previous / worst), support::measuredOrder(2.93, 2.8)) << "h = " << h;
     }
     previous = worst;
   }
@@ -119,16 +120,16 @@ TEST(Sample, IsConstantOutsideTheBand) {
   for (const Interpolation method : {Interpolation::Trilinear, Interpolation::Tricubic}) {
     BandSampler sampler(band, method);
     for (const double far : {3.0, 1e6, 1e30}) {
-      EXPECT_NEAR(sampler.value(V3d(far, 0, 0)), 0.15, 1e-6);
+      EXPECT_NEAR(sampler.value(V3d(far, 0, 0)), 0.15, support::measured(5.96e-9));
       EXPECT_FALSE(sampler.isInBand(V3d(far, 0, 0)));
     }
-    EXPECT_NEAR(sampler.value(V3d(0)), -0.15, 1e-6);
+    EXPECT_NEAR(sampler.value(V3d(0)), -0.15, support::measured(5.96e-9));
     EXPECT_EQ(sampler.gradient(V3d(0)), V3d(0));
     EXPECT_EQ(sampler.normal(V3d(0)), V3d(0));
     EXPECT_TRUE(std::isnan(sampler.value(V3d(std::nan(""), 0, 0))));
     // After a move the new sampler owns the band.
     BandSampler moved = std::move(sampler);
-    EXPECT_NEAR(moved.value(V3d(1, 0, 0)), 0, 1e-3 * 0.05);
+    EXPECT_NEAR(moved.value(V3d(1, 0, 0)), 0, support::rounding(1) * 0.05);
   }
 }
 

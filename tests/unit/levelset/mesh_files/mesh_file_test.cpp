@@ -273,7 +273,7 @@ TEST(MeshFile, RefusesPlyWithExcessiveCounts) {
   }
   std::string ply = kAsciiPly;
   ply.replace(ply.find("vertex 4"), 8, "vertex -4");
-  EXPECT_SAYS(refused("a.ply", ply), "no count");
+  EXPECT_SAYS(refused("a.ply", ply), "not a number of elements");
 }
 
 TEST(MeshFile, RefusesBrokenPly) {

@@ -11,6 +11,7 @@
 #include "levelset/grids/sample.h"
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
+#include "tests/support/measured.h"
 #include "tests/support/threads.h"
 
 namespace offset_test {
@@ -61,9 +62,9 @@ TEST(Offset, MovesASphereExactly) {
   for (const double distance : {10.0, 0.7, -10.0, -30.0}) {
     const NarrowBand moved = offset(ball, distance);
     const BandError e = bandError(moved, sphere(40 + distance));
-    EXPECT_LE(e.l1, 1e-3) << distance;
-    EXPECT_LE(e.linf, 0.02) << distance;
-    EXPECT_NEAR(moved.halfWidth(), 3, 1e-6);
+    EXPECT_LE(e.l1, support::measured(9.58e-6)) << distance;
+    EXPECT_LE(e.linf, support::measured(6.74e-5)) << distance;
+    EXPECT_NEAR(moved.halfWidth(), 3, support::rounding(3));
     EXPECT_EQ(openvdb::tools::checkLevelSet(vdb(moved), 6), "") << distance;
   }
 }
@@ -71,8 +72,8 @@ TEST(Offset, MovesASphereExactly) {
 TEST(Offset, RoundsACubeOutwards) {
   const BandError e =
       bandError(offset(sample(box(20), 22), 5), [](const V3d& p) { return box(20)(p) - 5; });
-  EXPECT_LE(e.l1, 5e-3);
-  EXPECT_LE(e.linf, 0.1);
+  EXPECT_LE(e.l1, support::measured(1.98e-4));
+  EXPECT_LE(e.linf, support::measured(0.00816));
 }
 
 TEST(Offset, KeepsACubeSharpInwards) {
@@ -86,9 +87,9 @@ TEST(Offset, KeepsACubeSharpInwards) {
     if (free >= 2) nearFaces = std::max(nearFaces, error);
     all = std::max(all, error);
   });
-  EXPECT_LE(nearFaces, 0.01);
-  EXPECT_LE(bandError(moved, box(20)).l1, 1e-3);
-  EXPECT_LE(all, 0.1);
+  EXPECT_LE(nearFaces, support::rounding(1));
+  EXPECT_LE(bandError(moved, box(20)).l1, support::rounding(0.6));
+  EXPECT_LE(all, support::rounding(2));
 }
 
 /// Cube rotated by Euler angles.
@@ -107,12 +108,12 @@ TEST(Offset, KeepsARotatedCubeSharp) {
   for (int turn = 0; turn < 5; ++turn) {
     const NarrowBand cube = sample(turnedBox(20, turn), 36);
     const BandError shrunk = bandError(offset(cube, -5), turnedBox(15, turn));
-    EXPECT_LE(shrunk.linf, 0.05) << turn;
-    EXPECT_LE(shrunk.l1, 1e-4) << turn;
+    EXPECT_LE(shrunk.linf, support::measured(9.23e-4)) << turn;
+    EXPECT_LE(shrunk.l1, support::measured(7.36e-7)) << turn;
     const BandError grown =
         bandError(offset(cube, 5), [&](const V3d& p) { return turnedBox(20, turn)(p) - 5; });
-    EXPECT_LE(grown.linf, 0.25) << turn;
-    EXPECT_LE(grown.l1, 5e-3) << turn;
+    EXPECT_LE(grown.linf, support::measured(0.0176)) << turn;
+    EXPECT_LE(grown.l1, support::measured(2.86e-4)) << turn;
   }
 }
 
@@ -120,7 +121,8 @@ TEST(Offset, DoesNotSharpenRoundSolids) {
   // Curvatures of 1/3 to 1/5 per voxel: curved, but no edge.
   for (const double radius : {3.0, 4.0, 5.0}) {
     const NarrowBand ball = sample(sphere(radius), radius + 1);
-    EXPECT_LE(bandError(offset(ball, 2), sphere(radius + 2)).linf, 0.05) << radius;
+    EXPECT_LE(bandError(offset(ball, 2), sphere(radius + 2)).linf, support::measured(0.00724))
+        << radius;
   }
 }
 
@@ -131,12 +133,12 @@ TEST(Offset, AddsUpOnConvexSolids) {
   double sum = 0, count = 0;
   for (auto it = vdb(twice).cbeginValueOn(); it; ++it, ++count)
     sum += std::abs(*it - accessor.getValue(it.getCoord()));
-  EXPECT_LE(sum / count, 5e-3);
+  EXPECT_LE(sum / count, support::measured(0.0014));
 }
 
 TEST(Offset, RestoresSmoothSolidsOnTheWayBack) {
   const BandError e = bandError(offset(offset(sample(sphere(30), 32), 8), -8), sphere(30));
-  EXPECT_LE(e.l1, 2e-3);
+  EXPECT_LE(e.l1, support::measured(1.46e-5));
 }
 
 /// Prism of height 40 over a square of side 44 without its quarter x, y > −2, rotated about z. Five
@@ -216,11 +218,11 @@ TEST(Offset, KeepsConcaveEdgesSharpOutwardsAndConvexOnesInwards) {
     const Angle angle{turn};
     const NarrowBand solid = sample(angle.solid(), 34);
     const EdgeError grown = edgeError(offset(solid, kDistance), angle, Angle::grown, kDistance);
-    EXPECT_LE(grown.concave, 1e-3) << turn;
-    EXPECT_LE(grown.all, 0.02) << turn;
+    EXPECT_LE(grown.concave, support::rounding(1.5)) << turn;
+    EXPECT_LE(grown.all, support::measured(0.00654)) << turn;
     const EdgeError shrunk = edgeError(offset(solid, -kDistance), angle, Angle::shrunk, kDistance);
-    EXPECT_LE(shrunk.concave, 0.02) << turn;
-    EXPECT_LE(shrunk.all, 0.02) << turn;
+    EXPECT_LE(shrunk.concave, support::measured(0.0052)) << turn;
+    EXPECT_LE(shrunk.all, support::measured(0.0052)) << turn;
   }
 }
 
@@ -239,13 +241,13 @@ TEST(Offset, MergesSurfacesThatMeet) {
     const double truth = ball < 0 ? -std::min(-ball, std::hypot(q.x, radial - circle)) : ball;
     if (std::abs(q.x) > 1.5) worst = std::max(worst, std::abs(value - std::max(truth, -3.0)));
   });
-  EXPECT_LE(worst, 0.5);
+  EXPECT_LE(worst, support::measured(0.371, 0.5));
 }
 
 TEST(Offset, KeepsTheSolidForDistanceZero) {
   const NarrowBand ball = sample(sphere(10), 12);
   EXPECT_EQ(offset(ball, 0).contentHash(), ball.contentHash());
-  EXPECT_NEAR(offset(ball, 0, {.halfWidth = 5}).halfWidth(), 5, 1e-6);
+  EXPECT_NEAR(offset(ball, 0, {.halfWidth = 5}).halfWidth(), 5, support::rounding(5));
 }
 
 TEST(SlowOffset, MeetsItsBoundsOnTheCubeOfEighty) {
@@ -254,21 +256,22 @@ TEST(SlowOffset, MeetsItsBoundsOnTheCubeOfEighty) {
       return [=](const V3d& p) { return box(half)(p - phase + kCentre); };
     };
     const NarrowBand moved = offset(sample(cube(40), 41), -5);
-    EXPECT_LE(bandError(moved, cube(35)).linf, 0.1) << phase;
+    EXPECT_LE(bandError(moved, cube(35)).linf, support::rounding(2)) << phase;
   }
 }
 
 TEST(SlowOffset, MeetsItsBoundsOnTurnedCubesOfEighty) {
   for (int turn = 0; turn < 8; ++turn) {
     const NarrowBand cube = sample(turnedBox(40, turn), 71);
-    EXPECT_LE(bandError(offset(cube, -5), turnedBox(35, turn)).linf, 0.05) << turn;
+    EXPECT_LE(bandError(offset(cube, -5), turnedBox(35, turn)).linf, support::measured(0.0127))
+        << turn;
   }
 }
 
 TEST(SlowOffset, MeetsItsBoundsOnTheSphereOfSixtyFour) {
   const NarrowBand ball = sample(sphere(64), 65);
-  EXPECT_LE(bandError(offset(ball, 10), sphere(74)).linf, 0.05);
-  EXPECT_LE(bandError(offset(ball, 10), sphere(74)).l1, 1e-3);
+  EXPECT_LE(bandError(offset(ball, 10), sphere(74)).linf, support::measured(1.91e-5));
+  EXPECT_LE(bandError(offset(ball, 10), sphere(74)).l1, support::measured(3.21e-6));
 }
 
 TEST(Offset, DoesNotDependOnThreads) {
@@ -316,7 +319,7 @@ TEST(OffsetBy, AgreesWithTheConstantOffset) {
   const NarrowBand ball = sample(sphere(20), 22);
   for (const double distance : {4.0, -4.0, 0.0}) {
     const NarrowBand moved = offsetBy(ball, [=](const V3d&) { return distance; });
-    EXPECT_LE(bandError(moved, sphere(20 + distance)).linf, 0.02) << distance;
+    EXPECT_LE(bandError(moved, sphere(20 + distance)).linf, support::measured(2.66e-4)) << distance;
   }
 }
 
@@ -328,7 +331,8 @@ TEST(OffsetBy, DisplacesASphereAlongItsNormals) {
     const double off = (p - kCentre).length() - 20;
     return length((p - kCentre).normalized()) + 100 * off;
   });
-  EXPECT_LE(radialError(moved, [&](const V3d& n) { return 20 + length(n); }), 0.05);
+  EXPECT_LE(radialError(moved, [&](const V3d& n) { return 20 + length(n); }),
+            support::measured(0.0115));
   EXPECT_EQ(openvdb::tools::checkLevelSet(vdb(moved), 6), "");
 }
 
@@ -342,7 +346,7 @@ TEST(OffsetBy, ConvergesToTheDisplacedSurface) {
     const double error =
         radialError(moved, [&](const V3d& n) { return 10 * scale + length(n); }) / scale;
     if (previous > 0) {
-      EXPECT_LE(error, previous / 2) << scale;
+      EXPECT_LE(error, support::measured(0.217) * previous) << scale;
     }
     previous = error;
   }
@@ -359,7 +363,7 @@ TEST(OffsetBy, KeepsPartsWithZeroDistance) {
     if (p.x < -1) worst = std::max(worst, std::abs(value - was));
     if (p.x > 12) moves = std::max(moves, was - value);
   });
-  EXPECT_LE(worst, 2e-3);
+  EXPECT_LE(worst, support::measured(2.48e-4));
   EXPECT_GT(moves, 1.5);
 }
 
