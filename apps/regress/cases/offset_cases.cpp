@@ -99,48 +99,96 @@ Bounds offsetCubeBounds() {
       .measured("cube, -5 voxels", "band_in_linf_vx", {{14, 0.0563}})
       .rounding("cube, -5 voxels", "band_in_linf_vx", 1.5, 20)
       .rounding("cube, -5 voxels", "band_in_linf_vx", 2, 32)
+      .rounding("cube, -5 voxels", "band_in_linf_vx", 1.5, 40)
+      .rounding("cube, -5 voxels", "band_in_linf_vx", 1.5, 80)
+      .rounding("cube, -5 voxels", "band_in_linf_vx", 1.5, 160)
       .measured("cube, -5 voxels", "band_out_linf_vx", {{14, 0.772}})
       .rounding("cube, -5 voxels", "band_out_linf_vx", 2, 20)
       .rounding("cube, -5 voxels", "band_out_linf_vx", 2, 32)
+      .rounding("cube, -5 voxels", "band_out_linf_vx", 2, 40)
+      .rounding("cube, -5 voxels", "band_out_linf_vx", 2, 80)
+      .rounding("cube, -5 voxels", "band_out_linf_vx", 2, 160)
       .measured("rotated cube, -5 voxels", "band_in_linf_vx",
-                {{14, 0.0208}, {20, 1.79e-5}, {32, 0.000116}})
+                {{14, 0.0208},
+                 {20, 1.79e-5},
+                 {32, 0.000116},
+                 {40, 0.00134},
+                 {80, 0.000299},
+                 {160, 0.000253}})
       .measured("rotated cube, -5 voxels", "band_out_linf_vx",
-                {{14, 0.322}, {20, 0.000335}, {32, 0.000297}})
-      .measured("cube, +5 voxels", "band_in_linf_vx", {{14, 0.0139}, {20, 0.00854}, {32, 0.00854}})
-      .measured("cube, +5 voxels", "band_out_linf_vx", {{14, 0.0125}, {20, 0.00748}, {32, 0.00748}})
-      .measured("rotated cube, +5 voxels", "band_in_linf_vx",
-                {{14, 0.0147}, {20, 0.0107}, {32, 0.0138}})
+                {{14, 0.322},
+                 {20, 0.000335},
+                 {32, 0.000297},
+                 {40, 0.00435},
+                 {80, 0.00181},
+                 {160, 0.00154}})
+      .measured(
+          "cube, +5 voxels", "band_in_linf_vx",
+          {{14, 0.0139}, {20, 0.00854}, {32, 0.00854}, {40, 0.0139}, {80, 0.0139}, {160, 0.0139}})
+      .measured(
+          "cube, +5 voxels", "band_out_linf_vx",
+          {{14, 0.0125}, {20, 0.00748}, {32, 0.00748}, {40, 0.0125}, {80, 0.0125}, {160, 0.0125}})
+      .measured(
+          "rotated cube, +5 voxels", "band_in_linf_vx",
+          {{14, 0.0147}, {20, 0.0107}, {32, 0.0138}, {40, 0.0135}, {80, 0.0123}, {160, 0.0127}})
       .measured("rotated cube, +5 voxels", "band_out_linf_vx",
-                {{14, 0.013}, {20, 0.0114}, {32, 0.0119}})
-      .measured("cube, +5 voxels", "surface_l1_vx", {{14, 0.00171}, {20, 0.00104}, {32, 0.000753}})
+                {{14, 0.013}, {20, 0.0114}, {32, 0.0119}, {40, 0.015}, {80, 0.0124}, {160, 0.0137}})
+      .measured("cube, +5 voxels", "surface_l1_vx",
+                {{14, 0.00171},
+                 {20, 0.00104},
+                 {32, 0.000753},
+                 {40, 0.000804},
+                 {80, 0.000467},
+                 {160, 0.000254}})
       .measured("rotated cube, +5 voxels", "surface_l1_vx",
-                {{14, 0.00116}, {20, 0.000877}, {32, 0.000632}})
-      .measured("cube, +5 voxels", "missed_hits", {{14, 0.000795}});
+                {{14, 0.00116},
+                 {20, 0.000877},
+                 {32, 0.000632},
+                 {40, 0.00054},
+                 {80, 0.000298},
+                 {160, 0.000159}})
+      .measured("cube, +5 voxels", "missed_hits", {{14, 0.000795}, {40, 0.000348}})
+      .measured("rotated cube, +5 voxels", "missed_hits", {{40, 0.000176}});
 }
 
 Bounds offsetLawsBounds() {
   return Bounds()
       .measured("sphere, +3 then +4", "surface_l1_vx",
                 {{6, 0.000347}, {8, 0.000179}, {12, 8.25e-5}})
+      .unmeasured("sphere, +3 then +4", "surface_l1_vx", 0.002, {16, 32, 64})
       .measured("sphere, +3 then +4", "deviation_vx", {{6, 0.00178}, {8, 0.00116}, {12, 0.000566}})
       .ceiling(0.002)
+      .unmeasured("sphere, +3 then +4", "deviation_vx", 0.002, {16, 32, 64})
       .measured("sphere, +5 then -5", "surface_l1_vx",
                 {{6, 0.000558}, {8, 0.000288}, {12, 0.000118}})
+      .unmeasured("sphere, +5 then -5", "surface_l1_vx", 0.002, {16, 32, 64})
       .measured("sphere, +3 then +4", "band_in_linf_vx",
                 {{6, 0.00179}, {8, 0.00101}, {12, 0.00046}})
+      .unmeasured("sphere, +3 then +4", "band_in_linf_vx", 0.005, {16, 32, 64})
       .measured("sphere, +3 then +4", "band_out_linf_vx",
                 {{6, 0.00175}, {8, 0.000993}, {12, 0.000484}})
+      .unmeasured("sphere, +3 then +4", "band_out_linf_vx", 0.005, {16, 32, 64})
       .measured("sphere, +5 then -5", "band_in_linf_vx",
                 {{6, 0.00294}, {8, 0.00102}, {12, 0.000469}})
+      .unmeasured("sphere, +5 then -5", "band_in_linf_vx", 0.005, {16, 32, 64})
       .measured("sphere, +5 then -5", "band_out_linf_vx",
                 {{6, 0.00291}, {8, 0.00112}, {12, 0.000495}})
+      .unmeasured("sphere, +5 then -5", "band_out_linf_vx", 0.005, {16, 32, 64})
       .measured("box, +3 then +4", "band_in_linf_vx", {{6, 0.0276}, {8, 0.0223}, {12, 0.0207}})
+      .unmeasured("box, +3 then +4", "band_in_linf_vx", 0.05, {16, 32, 64})
       .measured("box, +3 then +4", "band_out_linf_vx", {{6, 0.0275}, {8, 0.0217}, {12, 0.0212}})
+      .unmeasured("box, +3 then +4", "band_out_linf_vx", 0.05, {16, 32, 64})
       .measured("box, +3 then +4", "surface_l1_vx", {{6, 0.00515}, {8, 0.00355}, {12, 0.00322}})
+      .unmeasured("box, +3 then +4", "surface_l1_vx", 0.01, {16, 32, 64})
       .measured("box, +5 then -5", "band_in_linf_vx", {{6, 0.00338}, {8, 0.00119}, {12, 0.00103}})
+      .unmeasured("box, +5 then -5", "band_in_linf_vx", 0.05, {16, 32, 64})
       .measured("box, +5 then -5", "band_out_linf_vx", {{6, 0.0132}, {8, 0.00223}, {12, 0.00345}})
+      .unmeasured("box, +5 then -5", "band_out_linf_vx", 0.05, {16, 32, 64})
       .measured("sphere, +3 then +4", "missed_hits", {{6, 0.00068}})
-      .measured("box, +3 then +4", "missed_hits", {{6, 0.000822}, {12, 0.000778}});
+      .unmeasured("sphere, +3 then +4", "missed_hits", 0.025, {16, 32, 64})
+      .unmeasured("sphere, +5 then -5", "missed_hits", 0.025, {16, 32, 64})
+      .measured("box, +3 then +4", "missed_hits", {{6, 0.000822}, {12, 0.000778}})
+      .unmeasured("box, +3 then +4", "missed_hits", 0.025, {16, 32, 64});
 }
 
 }  // namespace

@@ -64,9 +64,21 @@ Bounds redistanceBounds() {
 
 Bounds redistanceAgainBounds() {
   return Bounds()
-      .measured("1 time", "surface_l1_vx", {{8, 0.000384}, {10, 0.000364}, {12, 0.000317}})
-      .measured("10 times", "surface_linf_vx", {{8, 0.00212}, {10, 0.00226}, {12, 0.00197}})
-      .measured("100 times", "surface_linf_vx", {{8, 0.00172}});
+      .measured("1 time", "surface_l1_vx",
+                {{8, 0.000384},
+                 {10, 0.000364},
+                 {12, 0.000317},
+                 {16, 0.000226},
+                 {32, 0.000308},
+                 {64, 0.000268}})
+      .measured(
+          "10 times", "surface_linf_vx",
+          {{8, 0.00212}, {10, 0.00226}, {12, 0.00197}, {16, 0.0015}, {32, 0.00346}, {64, 0.00314}})
+      .measured("100 times", "surface_linf_vx",
+                {{8, 0.00172}, {16, 0.0015}, {32, 0.00346}, {64, 0.00361}})
+      .measured("1 time", "missed_hits", {{32, 0.000127}})
+      .measured("10 times", "missed_hits", {{32, 0.000127}})
+      .measured("100 times", "missed_hits", {{32, 0.000127}});
 }
 
 }  // namespace

@@ -252,7 +252,7 @@ TEST(PatchPath, RefusesAnotherSurfaceComponent) {
   const Footprint a = footprint(two, V3d(-2, 0, 1)), b = footprint(two, V3d(2, 0, 1));
   EXPECT_NE(support::refusal<levelset::Error>([&] {
               PatchPath(two, a, b, CarryRule::Corners);
-            }).find("no geodesic"),
+            }).find("the surface does not connect"),
             std::string::npos);
 }
 
