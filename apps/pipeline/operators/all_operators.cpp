@@ -8,6 +8,7 @@
 #include "levelset/csg/blend.h"
 #include "levelset/csg/clip.h"
 #include "levelset/csg/csg.h"
+#include "levelset/csg/smooth_csg.h"
 #include "levelset/curvature/curvature_flow.h"
 #include "levelset/curvature/smooth.h"
 #include "levelset/distance/closest_points.h"
@@ -39,6 +40,9 @@ std::vector<Operator> allOperators() {
       levelSetOperator<levelset::IntersectionOperator>(),
       levelSetOperator<levelset::DifferenceOperator>(),
       levelSetOperator<levelset::BlendOperator>(),
+      levelSetOperator<levelset::SmoothUnionOperator>(),
+      levelSetOperator<levelset::SmoothIntersectionOperator>(),
+      levelSetOperator<levelset::SmoothDifferenceOperator>(),
       levelSetOperator<levelset::OffsetOperator>(),
       levelSetOperator<levelset::OpenOperator>(),
       levelSetOperator<levelset::CloseOperator>(),

@@ -1,10 +1,16 @@
 #include "levelset/csg/csg.h"
 
+#include <fmt/core.h>
+
 #include <array>
+#include <cmath>
+#include <functional>
+#include <numbers>
 
 #include "apps/regress/peers/peer.h"
 #include "apps/regress/recorder.h"
 #include "apps/regress/truth/exact_band.h"
+#include "levelset/csg/smooth_csg.h"
 
 namespace regress {
 
@@ -51,6 +57,121 @@ void combineBalls(Recorder& out) {
                     [&] { return peer::combine(op.operation, first, second); });
     }
   }
+}
+
+/// Zero set of smin(a, b) in a plane that both surfaces cross at right angles [Quilez13]. Between
+/// the parts where one distance alone counts it is an arc. Along the arc a − b runs from −K to K.
+struct SmoothArc {
+  double radius = 0;                                     ///< K
+  std::function<V3d(double a, double b)> position = {};  ///< in the plane, from both distances
+
+  [[nodiscard]] V3d at(double difference) const {
+    const double gap = radius - std::abs(difference), less = gap * gap / (4 * radius);
+    return difference > 0 ? position(less + difference, less) : position(less, less - difference);
+  }
+
+  /// Distance of a point in the plane: the best of 64 intervals, refined by golden sections.
+  [[nodiscard]] double distance(const V3d& p) const {
+    constexpr int kIntervals = 64;
+    const auto squared = [&](double d) { return (at(d) - p).length2(); };
+    const auto node = [&](int i) { return radius * (2.0 * i / kIntervals - 1); };
+    int best = 0;
+    for (int i = 1; i <= kIntervals; ++i)
+      if (squared(node(i)) < squared(node(best))) best = i;
+    double low = node(std::max(best - 1, 0)), high = node(std::min(best + 1, kIntervals));
+    constexpr double kGolden = 0.6180339887498949;
+    for (int i = 0; i < 60; ++i) {
+      const double left = high - kGolden * (high - low), right = low + kGolden * (high - low);
+      (squared(left) < squared(right) ? high : low) = squared(left) < squared(right) ? right : left;
+    }
+    return std::sqrt(squared(0.5 * (low + high)));
+  }
+};
+
+double smoothMinimum(double a, double b, double radius) {
+  const double gap = std::max(radius - std::abs(a - b), 0.0);
+  return std::min(a, b) - gap * gap / (4 * radius);
+}
+
+/// Smooth union of two balls: a surface of revolution about the line through their centres.
+Truth smoothBalls(const V3d& centreA, double radiusA, const V3d& centreB, double radiusB,
+                  double radius) {
+  const double apart = (centreB - centreA).length();
+  const V3d axis = (centreB - centreA) / apart;
+  const SmoothArc arc{radius, [=](double a, double b) {
+                        const double u = radiusA + a, v = radiusB + b;
+                        const double x = (u * u - v * v + apart * apart) / (2 * apart);
+                        return V3d(x, std::sqrt(std::max(u * u - x * x, 0.0)), 0);
+                      }};
+  const auto distance = [=](const V3d& p) {
+    const double x = (p - centreA).dot(axis), y = (p - centreA - x * axis).length();
+    const V3d in(x, y, 0), b(apart, 0, 0);
+    const double toA = in.length() - radiusA, toB = (in - b).length() - radiusB;
+    double least = arc.distance(in);
+    // The nearest point of a ball counts where the other ball is K or more away.
+    const V3d footA = in.normalized() * radiusA, footB = b + (in - b).normalized() * radiusB;
+    if ((footA - b).length() - radiusB >= radius) least = std::min(least, std::abs(toA));
+    if (footB.length() - radiusA >= radius) least = std::min(least, std::abs(toB));
+    return std::copysign(least, smoothMinimum(toA, toB, radius));
+  };
+  return {.distance = distance, .centre = (centreA + centreB) / 2.0, .reach = apart + 1.5};
+}
+
+/// Smooth union of two half spaces with the angle θ of the free space between them, compared near
+/// the edge, which runs along z.
+Truth smoothPlanes(const V3d& corner, double degrees, double radius) {
+  const double half = degrees / 2 * std::numbers::pi / 180;
+  const V3d normalA(std::sin(half), -std::cos(half), 0), normalB(std::sin(half), std::cos(half), 0);
+  const SmoothArc arc{radius, [=](double a, double b) {
+                        return V3d((a + b) / (2 * std::sin(half)), (b - a) / (2 * std::cos(half)),
+                                   0);
+                      }};
+  const auto distance = [=](const V3d& p) {
+    const V3d in(p.x - corner.x, p.y - corner.y, 0);
+    const double toA = in.dot(normalA), toB = in.dot(normalB);
+    double least = arc.distance(in);
+    if ((in - toA * normalA).dot(normalB) >= radius) least = std::min(least, std::abs(toA));
+    if ((in - toB * normalB).dot(normalA) >= radius) least = std::min(least, std::abs(toB));
+    return std::copysign(least, smoothMinimum(toA, toB, radius));
+  };
+  Truth truth{.distance = distance, .centre = corner, .reach = 1};
+  truth.compared = [=](const V3d& p) { return (p - corner).length() < 1; };
+  return truth;
+}
+
+/// A slab whose upper face goes through the corner, much larger than the blend.
+Truth slabBelow(const V3d& corner, double degrees, double side) {
+  Imath::M44d turn, shift;
+  turn.setAxisAngle(V3d(0, 0, 1), side * (90 - degrees / 2) * std::numbers::pi / 180);
+  shift.setTranslation(corner);
+  return moved(box(V3d(-1, 0, 0), V3d(2, 4, 4)), turn * shift);
+}
+
+void smoothlyUniteBalls(Recorder& out) {
+  constexpr double kRadius = 0.4;
+  for (const Sample& at : out.samples()) {
+    const V3d a = at.shift, b = at.shift + kApart;
+    const NarrowBand first = exactBand(ball(a, 1), at.voxelSize),
+                     second = exactBand(ball(b, 0.8), at.voxelSize);
+    out.measure({"balls", at, smoothBalls(a, 1, b, 0.8, kRadius)}, kOurs, [&] {
+      return levelset::smoothCombine(CsgOperation::Union, first, second, {.radius = kRadius}).band;
+    });
+  }
+}
+
+void smoothlyUnitePlanes(Recorder& out) {
+  constexpr double kRadius = 0.4;
+  for (const Sample& at : out.samples())
+    for (const double degrees : {60.0, 90.0, 120.0}) {
+      const NarrowBand first = exactBand(slabBelow(at.shift, degrees, -1), at.voxelSize),
+                       second = exactBand(slabBelow(at.shift, degrees, 1), at.voxelSize);
+      const Subject subject{fmt::format("planes, {:.0f} degrees", degrees), at,
+                            smoothPlanes(at.shift, degrees, kRadius)};
+      out.measure(subject, kOurs, [&] {
+        return levelset::smoothCombine(CsgOperation::Union, first, second, {.radius = kRadius})
+            .band;
+      });
+    }
 }
 
 void laws(Recorder& out) {
@@ -120,6 +241,33 @@ Bounds csgBallsBounds() {
       .unmeasured("difference", "volume_error", 0.002, {64});
 }
 
+Bounds smoothBallsBounds() {
+  return Bounds()
+      .measured("balls", "band_in_linf_vx", {{8, 0.00517}, {16, 0.00231}, {32, 0.00112}})
+      .measured("balls", "band_out_linf_vx", {{8, 0.00515}, {16, 0.00236}, {32, 0.00113}})
+      .measured("balls", "surface_l1_vx", {{8, 0.000499}, {16, 0.000117}, {32, 3.03e-05}});
+}
+
+Bounds smoothPlanesBounds() {
+  return Bounds()
+      .measured("planes, 120 degrees", "band_in_linf_vx",
+                {{8, 0.00651}, {12, 0.00381}, {16, 0.00306}})
+      .measured("planes, 120 degrees", "band_out_linf_vx",
+                {{8, 0.00623}, {12, 0.00321}, {16, 0.00299}})
+      .measured("planes, 120 degrees", "surface_l1_vx",
+                {{8, 0.000788}, {12, 0.000246}, {16, 0.000232}})
+      .measured("planes, 60 degrees", "band_in_linf_vx", {{8, 0.0206}, {12, 0.0118}, {16, 0.00958}})
+      .measured("planes, 60 degrees", "band_out_linf_vx", {{8, 0.0203}, {12, 0.0121}, {16, 0.0094}})
+      .measured("planes, 60 degrees", "surface_l1_vx", {{8, 0.00422}, {12, 0.00253}, {16, 0.0016}})
+      .measured("planes, 90 degrees", "band_in_linf_vx",
+                {{8, 0.0123}, {12, 0.00831}, {16, 0.00645}})
+      .measured("planes, 90 degrees", "band_out_linf_vx", {{8, 0.013}, {12, 0.0084}, {16, 0.00636}})
+      .measured("planes, 90 degrees", "surface_l1_vx",
+                {{8, 0.00297}, {12, 0.00103}, {16, 0.000691}})
+      .measured("planes, 60 degrees", "missed_hits", {{8, 0.000917}})
+      .measured("planes, 90 degrees", "missed_hits", {{8, 0.000848}});
+}
+
 Bounds csgLawsBounds() {
   return Bounds()
       .zero("A ∪ A = A", "deviation_vx")
@@ -158,6 +306,31 @@ void addCsgCases(std::vector<Case>& all) {
        .full = {16, 32, 64},
        .bounds = csgLawsBounds(),
        .run = laws});
+  all.push_back({.name = "smooth-csg-balls",
+                 .group = "smooth CSG",
+                 .title = "two balls flow into each other",
+                 .definition =
+                     "Balls of radius 1 and 0.8, (0.9, 0.3, 0.2) apart, and the smooth "
+                     "union with K = 0.4: the zero set of min(a, b) − max(K − |a − b|, 0)² "
+                     "/ 4K of their distances a and b. The exact distance to it is a "
+                     "minimum along its meridian.",
+                 .citation = "Dekkers04, Quilez13",
+                 .quick = {8, 16, 32},
+                 .full = {16, 32, 64},
+                 .bounds = smoothBallsBounds(),
+                 .run = smoothlyUniteBalls});
+  all.push_back({.name = "smooth-csg-planes",
+                 .group = "smooth CSG",
+                 .title = "two planes flow into each other",
+                 .definition =
+                     "Two half spaces at 60°, 90° and 120° of free space, K = 0.4: the "
+                     "smooth union is a parabola between the planes. Compared within 1 of "
+                     "the edge's middle.",
+                 .citation = "Dekkers04, Quilez13",
+                 .quick = {8, 12, 16},
+                 .full = {16, 24, 32},
+                 .bounds = smoothPlanesBounds(),
+                 .run = smoothlyUnitePlanes});
 }
 
 }  // namespace regress

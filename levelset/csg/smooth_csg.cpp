@@ -1,0 +1,216 @@
+#include "levelset/csg/smooth_csg.h"
+
+#include <fmt/core.h>
+#include <openvdb/tree/LeafManager.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+#include "levelset/csg/csg_vdb.h"
+#include "levelset/csg/seam_operands.h"
+#include "levelset/distance/distance_transform.h"
+#include "levelset/distance/redistance.h"
+#include "levelset/error.h"
+#include "levelset/vdb.h"
+
+namespace levelset {
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using openvdb::FloatGrid;
+using SmoothLeaf = openvdb::FloatTree::LeafNodeType;
+
+// On the smooth surface the smaller distance is at most K/4, and the other at most K more.
+constexpr double kReadRadii = 1.25;
+
+const char* smoothName(CsgOperation operation) {
+  switch (operation) {
+    case CsgOperation::Union:
+      return "smooth-union";
+    case CsgOperation::Intersection:
+      return "smooth-intersection";
+    case CsgOperation::Difference:
+      return "smooth-difference";
+  }
+  return "";
+}
+
+/// Index box of the grid points where the zero set of a solid is at most `extent` voxels away.
+CoordBBox boxAround(const FloatGrid& grid, double extent) {
+  CoordBBox box = grid.evalActiveVoxelBoundingBox();
+  if (!box.empty()) box.expand(static_cast<int>(std::ceil(std::min(extent, 1e8))));
+  return box;
+}
+
+/// Distances of a solid up to `width` voxels inside a box of grid points.
+FloatGrid::Ptr widenedIn(const CoordBBox& box, const NarrowBand& solid, double width,
+                         const char* action, const SmoothCsgOptions& options,
+                         const Progress& progress) {
+  if (solid.halfWidth() >= width) return vdb(solid).deepCopy();
+  eikonal::DistanceRequest request;
+  request.action = action;
+  request.halfWidth = width;
+  request.region = box;
+  request.maxMemory = options.maxMemory;
+  request.progress = progress;
+  return eikonal::distanceTransform(vdb(solid), request);
+}
+
+/// Replaces the hard minimum by the smooth one where both distances are known and differ by less
+/// than K.
+/// @param width   world units up to which `a` and `b` hold distances
+/// @return        the number of changed values
+std::size_t applySmoothMinimum(FloatGrid& field, const FloatGrid& a, const FloatGrid& b,
+                               const CsgSigns& signs, double radius, double width) {
+  std::set<Coord> origins;
+  for (auto leaf = a.tree().cbeginLeaf(); leaf; ++leaf)
+    if (b.tree().probeConstLeaf(leaf->origin())) origins.insert(leaf->origin());
+  const float background = field.background();
+  std::size_t changed = 0;
+  for (const Coord& origin : origins) {
+    const SmoothLeaf& leafA = *a.tree().probeConstLeaf(origin);
+    const SmoothLeaf& leafB = *b.tree().probeConstLeaf(origin);
+    SmoothLeaf* target = nullptr;
+    for (openvdb::Index n = 0; n < SmoothLeaf::SIZE; ++n) {
+      const double u = signs.first * leafA.getValue(n), v = signs.second * leafB.getValue(n);
+      const double gap = radius - std::abs(u - v);
+      if (!(gap > 0) || std::abs(u) >= width || std::abs(v) >= width) continue;
+      const double smooth = signs.result * (std::min(u, v) - gap * gap / (4 * radius));
+      if (std::abs(smooth) >= background) {
+        // Beyond the band only the sign counts.
+        const float hard = field.tree().getValue(origin + SmoothLeaf::offsetToLocalCoord(n));
+        if (std::abs(hard) >= background && (hard < 0) == (smooth < 0)) continue;
+      }
+      if (!target) target = field.tree().touchLeaf(origin);
+      ++changed;
+      if (std::abs(smooth) < background)
+        target->setValueOn(n, static_cast<float>(smooth));
+      else
+        target->setValueOff(n, static_cast<float>(std::copysign(background, smooth)));
+    }
+  }
+  return changed;
+}
+
+void checkOperands(const NarrowBand& a, const NarrowBand& b, const SmoothCsgOptions& options,
+                   const char* action) {
+  if (!std::isfinite(options.radius) || options.radius < 0)
+    throw UsageError(
+        fmt::format("{}: the radius is {}; give a length of zero or more", action, options.radius));
+  requireSolid(a, action);
+  requireSolid(b, action);
+  if (a.isEmpty() || b.isEmpty())
+    throw InvalidInput(fmt::format("{}: a solid is empty; give two solids", action));
+}
+
+}  // namespace
+
+CsgResult smoothCombine(CsgOperation operation, const NarrowBand& first, const NarrowBand& second,
+                        const SmoothCsgOptions& options) {
+  const char* action = smoothName(operation);
+  checkOperands(first, second, options, action);
+
+  // === The hard result, which is right where the distances differ by K or more
+  const solids::SeamOperands operands = solids::onOneGrid(
+      first, second, {action, options.maxMemory, subProgress(options.progress, 0, 0.2)});
+  const std::array<NarrowBand, 2> pair = {operands.a, operands.b};
+  CsgResult result = combine(
+      operation, pair,
+      {.maxMemory = options.maxMemory, .progress = subProgress(options.progress, 0.2, 0.4)});
+  result.notes.insert(result.notes.begin(), operands.notes.begin(), operands.notes.end());
+  if (options.radius == 0) return result;
+
+  // === Distances up to where the smooth surface and its stencils read them
+  const double voxel = result.band.voxelSize();
+  const double width = kReadRadii * options.radius / voxel + kReadBySurface + 2;
+  CoordBBox box = boxAround(vdb(operands.a), width);
+  box.intersect(boxAround(vdb(operands.b), width));
+  if (box.empty()) return result;
+  FloatGrid::Ptr a, b;
+  try {
+    a = widenedIn(box, operands.a, width, action, options,
+                  subProgress(options.progress, 0.4, 0.55));
+    b = widenedIn(box, operands.b, width, action, options,
+                  subProgress(options.progress, 0.55, 0.7));
+  } catch (const InvalidInput&) {
+    return result;  // a surface does not reach the box, as that of a ball deep inside another
+  }
+
+  // === The smooth minimum, and distances to its zero set
+  const FloatGrid::Ptr field = vdb(result.band).deepCopy();
+  const double known = std::min<double>(a->background(), b->background());
+  if (applySmoothMinimum(*field, *a, *b, csgSigns(operation), options.radius, known) == 0)
+    return result;
+  if (!eikonal::hasZeroCrossing(field->tree()))
+    throw InvalidInput(
+        fmt::format("{}: nothing is left of the solids with a radius of {}; give a smaller one",
+                    action, options.radius));
+  eikonal::DistanceRequest request;
+  request.action = action;
+  request.halfWidth = result.band.halfWidth();
+  request.maxMemory = options.maxMemory;
+  request.progress = subProgress(options.progress, 0.7, 1);
+  result.band = makeBand(eikonal::distanceTransform(*field, request));
+  return result;
+}
+
+template <CsgOperation operation>
+NarrowBand SmoothCsgOperator<operation>::run(std::vector<NarrowBand> operands,
+                                             const Options& options, OperatorRun& run) {
+  CsgResult result = smoothCombine(
+      operation, operands[0], operands[1],
+      {.radius = options.radius, .maxMemory = run.maxMemory, .progress = run.progress});
+  run.notes = std::move(result.notes);
+  return std::move(result.band);
+}
+
+template <CsgOperation operation>
+ValuePlan SmoothCsgOperator<operation>::plan(const Options&, Plans operands, const OperatorRun&) {
+  return planCombined(operation, operands);
+}
+
+template struct SmoothCsgOperator<CsgOperation::Union>;
+template struct SmoothCsgOperator<CsgOperation::Intersection>;
+template struct SmoothCsgOperator<CsgOperation::Difference>;
+
+namespace {
+
+constexpr const char* kSmoothDetails =
+    "The surface is the zero set of a smooth minimum (or maximum) of both exact distances. It "
+    "changes only where the distances differ by less than the radius, by a quarter of the radius "
+    "at most. Unlike 'blend', it joins solids that do not touch where the gap is below half the "
+    "radius.";
+
+}  // namespace
+
+const OperatorText SmoothUnionOperator::text{
+    .name = "smooth-union",
+    .group = "Solids",
+    .summary = "union of two solids that flow into each other",
+    .details = kSmoothDetails,
+    .example =
+        "levelsmith sphere --radius 1 --voxel 0.05 ! sphere --radius 0.7 --center 1.3,0,0 --voxel "
+        "0.05 ! smooth-union --radius 0.4 ! measure"};
+
+const OperatorText SmoothIntersectionOperator::text{
+    .name = "smooth-intersection",
+    .group = "Solids",
+    .summary = "intersection of two solids with a smooth edge",
+    .details = kSmoothDetails,
+    .example =
+        "levelsmith sphere --radius 1 --voxel 0.05 ! sphere --radius 1 --center 1.2,0,0 --voxel "
+        "0.05 ! smooth-intersection --radius 0.2 ! measure"};
+
+const OperatorText SmoothDifferenceOperator::text{
+    .name = "smooth-difference",
+    .group = "Solids",
+    .summary = "the first solid minus the second, with a smooth edge",
+    .details = kSmoothDetails,
+    .example =
+        "levelsmith sphere --radius 1 --voxel 0.05 ! sphere --radius 0.7 --center 1.1,0,0 --voxel "
+        "0.05 ! smooth-difference --radius 0.2 ! measure"};
+
+}  // namespace levelset
