@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/pipeline/registry/cost.h"
+#include "apps/pipeline/registry/step_cost.h"
 #include "apps/pipeline/values/value.h"
 #include "levelset/operator/description.h"
 #include "levelset/region_of_interest.h"
@@ -131,7 +131,7 @@ struct Operator {
 /// The action `run FILE`, for help only: parseChain() replaces it by the actions of the file.
 [[nodiscard]] const Operator& runOperator();
 
-/// Builds all operators, in the order of the help. apps/pipeline/operators/all_operators.cpp has
+/// Builds all operators, in the order of the help. apps/pipeline/all_operators.cpp has
 /// one line for each.
 [[nodiscard]] std::vector<Operator> allOperators();
 

@@ -119,7 +119,7 @@ TEST(Chain, ChecksOperandsAndTheirKinds) {
       onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --map shell --kernel sum",
       "--kernel says nothing to --map shell");
   EXPECT_REFUSAL(onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --sides free",
-                 "goes with --unfold or --relax");
+                 "goes with --untangle or --relax");
   EXPECT_REFUSAL(onto + "folds @b @p --relax texture", "needs a texture");
   EXPECT_REFUSAL(onto + "folds @b @p --map mesh --lambda-near 1", "says nothing to --map mesh");
   EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 --as a ! sphere --radius 1 --voxel 0.1 --as a",

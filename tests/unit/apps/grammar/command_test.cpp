@@ -172,12 +172,12 @@ TEST_F(Command, WarnsOfAFileWrittenTwice) {
   const auto outcome = levelsmith(
       "sphere --radius 1 --voxel 0.1 ! write a.vdb ! offset 0.1 ! write ./a.vdb ! measure");
   EXPECT_EQ(outcome.code, 0);
-  EXPECT_NE(outcome.err.find("written by an action before"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("an earlier action writes"), std::string::npos) << outcome.err;
   const auto device = levelsmith(
       "sphere --radius 1 --voxel 0.1 ! write /dev/null --format vdb ! write /dev/null --format "
       "vdb");
   EXPECT_EQ(device.code, 0);
-  EXPECT_EQ(device.err.find("written by an action before"), std::string::npos) << device.err;
+  EXPECT_EQ(device.err.find("an earlier action writes"), std::string::npos) << device.err;
   const auto never = levelsmith(
       "--no-clobber sphere --radius 1 --voxel 0.1 ! write b.vdb ! measure ! write b.vdb");
   EXPECT_EQ(never.code, 6);
@@ -237,7 +237,7 @@ TEST_F(Command, DryRunResolvesEveryLength) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const Json steps = Json::parse(support::slurp(folder_ / "r.json"))["steps"];
   EXPECT_EQ(steps[2]["resolved"]["spacing"]["world"], 1);
-  EXPECT_EQ(steps[3]["resolved"]["sink"]["world"], 0.5);
+  EXPECT_EQ(steps[3]["resolved"]["embed"]["world"], 0.5);
   EXPECT_EQ(steps[3]["resolved"]["blend"]["voxels"], 2);
   // The rings are 11 wide, and the patch enlarges them to at least this size.
   EXPECT_NEAR(steps[3]["result"]["voxel_size"], 0.25 * 20 / 11, 1e-9);

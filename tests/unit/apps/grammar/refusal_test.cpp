@@ -132,7 +132,7 @@ TEST_F(Refusal, DetectableErrorsPrecedeTheRun) {
   soon("march --order 3", 2, "--order");
   soon("sweep --extend x --speed 2", 2, "--speed has no meaning");
   soon("march --extend x --order 1", 2, "--order has no meaning");
-  soon("march --speed \"1 + t\"", 2, "march: --speed: the formula '1 + t'");
+  soon("march --speed \"1 + t\"", 2, "fast-marching: --speed: the formula '1 + t'");
   soon("offset --by \"0.3*t\"", 2, "use x, y, z, r, numbers");
   soon("advect --field vortex --time 1 --factor \"1 +\"", 2, "advect: --factor");
   soon("advect --field vortex --time 1 --factor \"x*t\"", 2, "use t, numbers");

@@ -249,12 +249,12 @@ TEST_F(Animate, TakesNumbersFromTheFileNameOnly) {
   reportOf(kScene + "animate @ball @ring @here --frames 2 --voxel 0.5 --out take#1/f_##.vdb");
   EXPECT_TRUE(exists("take#1/f_01.vdb"));
   EXPECT_REFUSED(levelsmith(kScene + "animate @ball @ring @here --frames 2 --out take#1/f.vdb"), 2,
-                 "put # where the number goes");
+                 "write # for the number");
 }
 
 TEST_F(Animate, RefusesBeforeTheComputation) {
   const std::string head = kScene + "animate @ball @ring @here ";
-  EXPECT_REFUSED(levelsmith(head + "--frames 3 --out frame.vdb"), 2, "put # where the number goes");
+  EXPECT_REFUSED(levelsmith(head + "--frames 3 --out frame.vdb"), 2, "write # for the number");
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --out f_#.txt"), 2,
                  "is not a sequence of such files");
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --out no/where_#.vdb"), 6, "where_0.vdb");

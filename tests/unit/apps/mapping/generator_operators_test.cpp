@@ -83,7 +83,7 @@ TEST_F(Generators, RefuseInvalidHeightFiles) {
   EXPECT_REFUSED(levelsmith(heightmap + "none.png"), 6, "No such file");
   EXPECT_REFUSED(levelsmith(heightmap + "."), 6, "is a folder");
   for (const auto& [text, part] :
-       {std::pair<const char*, const char*>{"1 2\n3\n", "line 2: it has 1 numbers"},
+       {std::pair<const char*, const char*>{"1 2\n3\n", "line 2: the line has 1 numbers"},
         {"1 2\n3 nan\n", "line 2: 'nan' is not a finite number"},
         {"1 2\n3 x\n", "'x' is not a finite number"},
         {"1 2 3\n", "3 columns and 1 rows"},

@@ -118,7 +118,7 @@ TEST_F(FieldCommand, ExtendsVectorsOffTheSurface) {
 
 TEST_F(FieldCommand, ReportsWhereAnAttributeIsNotFinite) {
   const auto outcome = levelsmith("sphere --radius 1 --voxel 0.1 ! sweep --extend \"1/x\"");
-  EXPECT_REFUSED(outcome, 3, "sweep: --extend: '1/x' is");
+  EXPECT_REFUSED(outcome, 3, "fast-sweeping: --extend: '1/x' is");
   EXPECT_NE(outcome.err.find("on the surface at 0,"), std::string::npos) << outcome.err;
 }
 

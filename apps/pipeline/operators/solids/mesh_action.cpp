@@ -1,4 +1,4 @@
-#include "apps/pipeline/operators/solids/mesh_operator.h"
+#include "apps/pipeline/operators/solids/mesh_action.h"
 
 #include "apps/pipeline/operators/level_set_operator.h"
 #include "levelset/error.h"

@@ -1,4 +1,4 @@
-#include "apps/pipeline/registry/cost.h"
+#include "apps/pipeline/registry/step_cost.h"
 
 #include <algorithm>
 

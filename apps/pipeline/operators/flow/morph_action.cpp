@@ -1,4 +1,4 @@
-#include "apps/pipeline/operators/flow/morph_operator.h"
+#include "apps/pipeline/operators/flow/morph_action.h"
 
 #include <fmt/core.h>
 
