@@ -17,6 +17,7 @@
 #include "mapping/surface/geodesic.h"
 #include "tests/support/animation_scenes.h"
 #include "tests/support/files.h"
+#include "tests/support/measured.h"
 #include "tests/support/patches.h"
 
 namespace animation_test {
@@ -64,12 +65,13 @@ TEST(CarryFootprint, FollowsATranslationAlongItsNormal) {
   }
   double drifted = 0;
   for (std::size_t i = 0; i < 4; ++i) {
-    EXPECT_LT((rigid.corners[i] - first.corners[i] - step * 5).length(), 0.02 * kVoxel);
+    EXPECT_LT((rigid.corners[i] - first.corners[i] - step * 5).length(),
+              support::measured(4.94e-4) * kVoxel);
     drifted = std::max(drifted, (free.corners[i] - first.corners[i] - step * 5).length());
   }
   // Corners without coupling move along their own normals, and therefore apart.
   EXPECT_GT(drifted, 0.2 * kVoxel);
-  EXPECT_LT(mapping::driftBetween(first, rigid).factor(), 1.002);
+  EXPECT_LT(mapping::driftBetween(first, rigid).factor(), support::measured(1, 1.002));
 }
 
 TEST(CarryFootprint, FollowsTheRadiiOfAGrowingBall) {
@@ -79,16 +81,17 @@ TEST(CarryFootprint, FollowsTheRadiiOfAGrowingBall) {
     for (int i = 1; i <= 10; ++i)
       now = mapping::carryFootprint(ballAt(V3d(0), 1 + 0.1 * i), now, rule);
     const V3d centre = first.centre.normalized() * 2;
-    EXPECT_LT((now.centre - centre).length(), 0.02 * kVoxel);
+    EXPECT_LT((now.centre - centre).length(), support::measured(7.36e-4) * kVoxel);
     if (rule == CarryRule::Corners) {
       for (std::size_t i = 0; i < 4; ++i)
-        EXPECT_LT((now.corners[i] - first.corners[i].normalized() * 2).length(), 0.03 * kVoxel);
-      EXPECT_NEAR(mapping::driftBetween(first, now).most, 2, 0.01);
+        EXPECT_LT((now.corners[i] - first.corners[i].normalized() * 2).length(),
+                  support::measured(0.00125) * kVoxel);
+      EXPECT_NEAR(mapping::driftBetween(first, now).most, 2, support::measured(1.61e-4));
     } else {  // the shape is kept: distances from the centre are unchanged
       for (std::size_t i = 0; i < 4; ++i) {
         const double way = 2 * std::acos(now.corners[i].normalized().dot(now.centre.normalized()));
         EXPECT_NEAR(way, std::acos(first.corners[i].normalized().dot(first.centre.normalized())),
-                    0.02 * kVoxel);
+                    support::measured(5.38e-5) * kVoxel);
       }
     }
   }
@@ -123,7 +126,7 @@ TEST(CarryFootprint, KeepsPatchesTogetherUnderAWave) {
     held = std::max(held, change(rigid));
   }
   EXPECT_GT(drifted, 0.35);
-  EXPECT_LT(held, 0.05);
+  EXPECT_LT(held, support::measured(0.00189));
 }
 
 TEST(CarryFootprint, StaysWhereTheSurfaceMovesTangentially) {
@@ -132,7 +135,7 @@ TEST(CarryFootprint, StaysWhereTheSurfaceMovesTangentially) {
   const Footprint first = footprint(ball, V3d(0, 0, 1));
   for (const CarryRule rule : {CarryRule::Corners, CarryRule::Rigid}) {
     const Footprint now = mapping::carryFootprint(ballAt(V3d(0), 1, 0.09), first, rule);
-    EXPECT_LT(mapping::farthestMove(first, now), 0.02 * kVoxel);
+    EXPECT_LT(mapping::farthestMove(first, now), support::measured(3.3e-4) * kVoxel);
   }
 }
 
@@ -151,8 +154,8 @@ TEST(Footprint, ComputesItsCornersFromItsCentre) {
   ASSERT_TRUE(f.reach);
   const double signs[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
   for (std::size_t i = 0; i < 4; ++i) {
-    EXPECT_NEAR((*f.reach)[i].x, 0.4 * signs[i][0], 0.02 * kVoxel);
-    EXPECT_NEAR((*f.reach)[i].y, 0.4 * signs[i][1], 0.02 * kVoxel);
+    EXPECT_NEAR((*f.reach)[i].x, 0.4 * signs[i][0], support::measured(2.45e-4) * kVoxel);
+    EXPECT_NEAR((*f.reach)[i].y, 0.4 * signs[i][1], support::measured(3.16e-5) * kVoxel);
   }
 }
 
@@ -172,9 +175,10 @@ TEST(PatchPath, FollowsGreatCircles) {
     const V3d across = p.cross(q).normalized();
     for (int n = 1; n < 6; ++n) {
       const V3d at = path.at(n / 6.0).corners[i];
-      EXPECT_NEAR(at.length(), 1, 0.01 * 0.05);
-      EXPECT_LT(std::abs(at.dot(across)), 0.005);
-      EXPECT_NEAR(std::acos(at.normalized().dot(p.normalized())), angle * n / 6, 0.005 * angle);
+      EXPECT_NEAR(at.length(), 1, support::measured(1.02e-4) * 0.05);
+      EXPECT_LT(std::abs(at.dot(across)), support::measured(5.73e-4));
+      EXPECT_NEAR(std::acos(at.normalized().dot(p.normalized())), angle * n / 6,
+                  support::measured(1.01e-6) * angle);
     }
   }
 }
@@ -191,9 +195,12 @@ TEST(PatchPath, RotatesRigidPatchesUniformly) {
     const double half = 0.5 * (1 + t), angle = kPi / 2 * t;
     const V3d u(std::cos(angle), std::sin(angle), 0), v(-u.y, u.x, 0);
     const V3d centre(-1.5 + 3 * t, 0, 0);
-    EXPECT_LT((f.corners[0] - (centre - u * half - v * half)).length(), 0.02 * kVoxel);
-    EXPECT_LT((f.corners[1] - (centre + u * half - v * half)).length(), 0.02 * kVoxel);
-    EXPECT_LT((f.corners[2] - (centre + u * half + v * half)).length(), 0.02 * kVoxel);
+    EXPECT_LT((f.corners[0] - (centre - u * half - v * half)).length(),
+              support::measured(2.45e-14) * kVoxel);
+    EXPECT_LT((f.corners[1] - (centre + u * half - v * half)).length(),
+              support::doubleRounding(100) * kVoxel);
+    EXPECT_LT((f.corners[2] - (centre + u * half + v * half)).length(),
+              support::doubleRounding(80) * kVoxel);
   }
 }
 
@@ -213,7 +220,7 @@ TEST(PatchPath, TakesOneSideAroundAPipe) {
     ASSERT_FALSE(alone.empty());
     sides += alone[alone.size() / 2].y > 0 ? 1 : -1;
   }
-  EXPECT_LT(std::abs(sides), 4) << "all corners take the same side on their own";
+  EXPECT_LT(std::abs(sides), support::rounding(1)) << "all corners take the same side on their own";
   for (const CarryRule rule : {CarryRule::Corners, CarryRule::Rigid}) {
     const PatchPath path(base, a, b, rule);
     EXPECT_TRUE(path.isAlike());
@@ -228,9 +235,9 @@ TEST(PatchPath, TakesOneSideAroundAPipe) {
       const V3d &p = f.corners[0], &q = f.corners[1], &r = f.corners[2];
       EXPECT_NEAR(
           std::acos((p.x * q.x + p.y * q.y) / (std::hypot(p.x, p.y) * std::hypot(q.x, q.y))), width,
-          0.02)
+          support::measured(1.73e-4))
           << n;
-      EXPECT_NEAR(std::abs(r.z - q.z), width, 0.02) << n;
+      EXPECT_NEAR(std::abs(r.z - q.z), width, support::measured(1.32e-4)) << n;
     }
   }
 }
@@ -271,7 +278,8 @@ TEST(AnimatePatches, BeginsAndEndsOnItsKeysToTheBit) {
   EXPECT_EQ(played.report.patchesMade, 3u);
   EXPECT_TRUE(played.report.warnings.empty());
   // Half way from the first to the second key.
-  EXPECT_LT((centreOf(played.patches[1]).normalized() - V3d(1, 0, 1).normalized()).length(), 0.01);
+  EXPECT_LT((centreOf(played.patches[1]).normalized() - V3d(1, 0, 1).normalized()).length(),
+            support::measured(0.00773, 0.01));
 }
 
 TEST(AnimatePatches, FollowsAGrowingBaseForwardsAndBackwards) {
@@ -286,11 +294,11 @@ TEST(AnimatePatches, FollowsAGrowingBaseForwardsAndBackwards) {
     const double angle = kPi / 2 * static_cast<double>(f) / 4;
     const V3d centre = V3d(std::sin(angle), 0, std::cos(angle)) * radius(f);
     for (const V3d& corner : played.patches[f].corners)
-      EXPECT_NEAR(corner.length(), radius(f), 0.02 * kVoxel) << f;
+      EXPECT_NEAR(corner.length(), radius(f), support::measured(2.15e-4) * kVoxel) << f;
     // The great circles of the corners have a slightly different distance from each other than from
     // the middle.
     EXPECT_LT((centreOf(played.patches[f]).normalized() * radius(f) - centre).length(),
-              0.25 * kVoxel)
+              support::measured(0.143) * kVoxel)
         << f;
   }
   EXPECT_EQ(played.patches[4].layers[0].positions, b.layers[0].positions);
@@ -363,8 +371,8 @@ TEST(AnimatePatches, WarnsOfDriftingPatches) {
   const Played free = play(ball, {keyOf(a)}, {.frames = 5, .bases = bases});
   ASSERT_EQ(free.report.warnings.size(), 1u);
   EXPECT_NE(free.report.warnings[0].find("frame 3"), std::string::npos) << free.report.warnings[0];
-  EXPECT_NEAR(free.report.frames[4].drift.most, 1.96, 0.01);
-  EXPECT_NEAR(free.report.frames[4].farthestMove, 0.24, 0.1 * kVoxel);
+  EXPECT_NEAR(free.report.frames[4].drift.most, 1.96, support::measured(2.18e-4));
+  EXPECT_NEAR(free.report.frames[4].farthestMove, 0.24, support::measured(7.46e-5) * kVoxel);
   const Played rigid =
       play(ball, {keyOf(a)}, {.frames = 5, .carry = CarryRule::Rigid, .bases = bases});
   EXPECT_TRUE(rigid.report.warnings.empty());
@@ -384,7 +392,7 @@ TEST(AnimatePatches, WarnsOfRotatedCorners) {
   const auto size = [](const Patch& patch) {
     return (patch.corners[2] - patch.corners[0]).length();
   };
-  EXPECT_NEAR(size(rigid.patches[1]), size(a), 0.01);
+  EXPECT_NEAR(size(rigid.patches[1]), size(a), support::measured(5.61e-5));
   EXPECT_LT(size(free.patches[1]), 0.7 * size(a));
 }
 
@@ -489,9 +497,9 @@ TEST(AnimatePatches, IncludesTheDriftOfTheGoal) {
     return ballAt(V3d(0), 1 + 0.25 * static_cast<double>(f));
   };
   const Played played = play(first, {keyOf(a), keyOf(b, 4)}, {.frames = 5, .bases = bases});
-  EXPECT_NEAR(played.report.frames[1].drift.least, 0.625, 0.01);
-  EXPECT_NEAR(played.report.frames[3].drift.most, 1.75, 0.01);
-  EXPECT_NEAR(played.report.frames[4].drift.factor(), 1, 1e-12);
+  EXPECT_NEAR(played.report.frames[1].drift.least, 0.625, support::measured(9.07e-5));
+  EXPECT_NEAR(played.report.frames[3].drift.most, 1.75, support::measured(3.93e-4));
+  EXPECT_NEAR(played.report.frames[4].drift.factor(), 1, support::doubleRounding(4));
 }
 
 TEST(AnimatePatches, CanBeCancelledBetweenBasesOnItsWayBack) {

@@ -24,6 +24,7 @@
 #include "mapping/textures/mesh_texture.h"
 #include "mapping/untangle/prism_cells.h"
 #include "tests/support/component_counts.h"
+#include "tests/support/measured.h"
 #include "tests/support/threads.h"
 
 namespace fold_certificate_test {
@@ -97,13 +98,14 @@ TEST(TrilinearVolume, FindsFoldsBetweenCorners) {
       hidden += leastCorner > 0;
       EXPECT_TRUE(sign.folds) << trial;
       EXPECT_LE(sign.least, 0.5 * least) << trial;
-      EXPECT_NEAR(sign.negative + sign.undecided / 2, negative / std::pow(kSteps + 1, 3), 0.1);
+      EXPECT_NEAR(sign.negative + sign.undecided / 2, negative / std::pow(kSteps + 1, 3),
+                  support::measured(0.0425));
     } else if (least > 1e-3) {
       EXPECT_FALSE(sign.folds) << trial;
       EXPECT_EQ(sign.negative, 0) << trial;
       EXPECT_EQ(sign.undecided, 0) << trial;
     }
-    EXPECT_NEAR(determinantAt(sign.at), sign.least, 1e-12);
+    EXPECT_NEAR(determinantAt(sign.at), sign.least, support::doubleRounding(2));
   }
   EXPECT_GT(folded, 15);
   EXPECT_LT(folded, 135);
@@ -166,8 +168,8 @@ TEST(FoldCertificate, LeastJacobianOfACylinderMatchesItsFormula) {
     return V3d(r * std::sin(angle), 3 * t.y, r * std::cos(angle));
   };
   const Patch patch = patchAt(bent, 65, 5, 33);
-  EXPECT_NEAR(certifyLayers(patch, 0).leastJacobian, 2 / 2.5, 0.01);
-  EXPECT_NEAR(shellOf(patch).leastJacobian, 2 / 2.5, 0.01);
+  EXPECT_NEAR(certifyLayers(patch, 0).leastJacobian, 2 / 2.5, support::measured(0.00497));
+  EXPECT_NEAR(shellOf(patch).leastJacobian, 2 / 2.5, support::measured(0.00497));
 }
 
 TEST(FoldCertificate, ReportsThePositionOfAFold) {
@@ -181,12 +183,13 @@ TEST(FoldCertificate, ReportsThePositionOfAFold) {
     ASSERT_EQ(certificate.verdict(), FoldVerdict::Folds);
     ASSERT_FALSE(certificate.worst.empty());
     EXPECT_LE(certificate.worst.size(), FoldCertificate::kMostPoints);
-    EXPECT_LE((certificate.worst[0].uvw - V3d(0.5)).length(), 0.5);
-    EXPECT_LE((certificate.worst[0].position - V3d(2, 2, 0.5)).length(), 1.3);
+    EXPECT_LE((certificate.worst[0].uvw - V3d(0.5)).length(), support::measured(0.254));
+    EXPECT_LE((certificate.worst[0].position - V3d(2, 2, 0.5)).length(),
+              support::measured(1.13, 1.3));
     EXPECT_DOUBLE_EQ(certificate.worst[0].jacobian, certificate.leastJacobian);
     EXPECT_LT(certificate.leastJacobian, 0);
     EXPECT_GT(certificate.foldedShare, 0);
-    EXPECT_LT(certificate.foldedShare, 0.1);
+    EXPECT_LT(certificate.foldedShare, support::measured(0.0104));
   }
   for (const FoldCertificate& certificate : {shellOf(pushed(0.2)), certifyLayers(pushed(0.2), 0)})
     EXPECT_EQ(certificate.verdict(), FoldVerdict::Certified);
@@ -219,10 +222,10 @@ TEST(FoldCertificate, VerdictsOnSmoothMapsMatchTheirDerivatives) {
     if (certificate.verdict() == FoldVerdict::Folds) {
       ++folded;
       for (const mapping::FoldPoint& fold : certificate.worst) {
-        EXPECT_LE((map(fold.position) - fold.uvw).length(), 1e-2);
+        EXPECT_LE((map(fold.position) - fold.uvw).length(), support::rounding(0.8));
         EXPECT_LE(map.jacobian(fold.position).determinant(), 0);
         EXPECT_NEAR(map.jacobian(fold.position).determinant() / certificate.unit, fold.jacobian,
-                    1e-9);
+                    support::doubleRounding(3));
       }
     }
     if (least < 0) {
@@ -279,11 +282,11 @@ TEST(FoldCertificate, LayersWithDifferentCountsAreSplitAtTheBordersOfBoth) {
                     corner & 2 ? cell.box.max.y : cell.box.min.y,
                     corner & 4 ? cell.box.max.z : cell.box.min.z);
       const V3d place = mapping::positionOf(cell.corners[corner], positions);
-      EXPECT_LE((place - mapping::layerPosition(patch, uvw)).length(), 1e-14);
-      EXPECT_LE((place - uvw).length(), 1e-14);
+      EXPECT_LE((place - mapping::layerPosition(patch, uvw)).length(), support::doubleRounding(2));
+      EXPECT_LE((place - uvw).length(), support::doubleRounding(2));
     }
   }
-  EXPECT_NEAR(volume, 1.1, 1e-12);
+  EXPECT_NEAR(volume, 1.1, support::doubleRounding(3));
   EXPECT_EQ(certifyLayers(patch, 0.1).verdict(), FoldVerdict::Certified);
 }
 
@@ -292,13 +295,13 @@ TEST(FoldCertificate, MirroredPatchesAreNotFolded) {
   for (const FoldCertificate& certificate :
        {shellOf(patch), certifyLayers(patch, 0), rbfOf(patch)}) {
     EXPECT_EQ(certificate.verdict(), FoldVerdict::Folds);
-    EXPECT_NEAR(certificate.foldedShare, 1, 1e-12);
+    EXPECT_NEAR(certificate.foldedShare, 1, support::doubleRounding(4));
   }
   patch.mirrored = true;
   for (const FoldCertificate& certificate :
        {shellOf(patch), certifyLayers(patch, 0), rbfOf(patch)}) {
     EXPECT_EQ(certificate.verdict(), FoldVerdict::Certified);
-    EXPECT_NEAR(certificate.leastJacobian, 1, 1e-9);
+    EXPECT_NEAR(certificate.leastJacobian, 1, support::doubleRounding(10));
   }
 }
 
@@ -310,7 +313,7 @@ TEST(FoldCertificate, HandlesTheSmallestPatchAndOneWithoutVolume) {
   const Patch flat = patchAt([](const V3d& t) { return V3d(t.x, t.y, 0); }, 4, 4, 3);
   for (const FoldCertificate& certificate : {shellOf(flat), certifyLayers(flat, 0)}) {
     EXPECT_EQ(certificate.verdict(), FoldVerdict::Folds);
-    EXPECT_NEAR(certificate.foldedShare, 1, 1e-12);
+    EXPECT_NEAR(certificate.foldedShare, 1, support::doubleRounding(4));
     EXPECT_EQ(certificate.leastJacobian, 0);
   }
 }
@@ -325,7 +328,8 @@ TEST(FoldCertificate, DoesNotDependOnPositionScaleOrThreads) {
     const auto scaled = [&](const V3d& t) { return wavy(t) * scale + V3d(1e3 * scale); };
     const Patch moved = patchAt(scaled, 7, 6, 4, scale);
     EXPECT_EQ(certifyLayers(moved, 0.05).verdict(), FoldVerdict::Certified);
-    EXPECT_NEAR(certifyLayers(moved, 0.05).leastJacobian, layers.leastJacobian, 1e-8);
+    EXPECT_NEAR(certifyLayers(moved, 0.05).leastJacobian, layers.leastJacobian,
+                support::measured(8.83e-13));
     EXPECT_EQ(shellOf(moved).verdict(), FoldVerdict::Certified);
     EXPECT_EQ(rbfOf(moved, 0.05).verdict(), rbf.verdict());
   }
@@ -349,18 +353,20 @@ TEST(RbfTaylor, PolynomialsOfDistancesHaveTheStatedOrder) {
     const V3d exact = weight * (way + s).length();
     const double error = (polynomial.value(s) - exact).length();
     if (last > 0) {
-      EXPECT_NEAR(std::log2(last / error), 6, 0.7);
+      EXPECT_NEAR(std::log2(last / error), 6, support::measured(0.123));
     }
     last = error;
     mapping::TaylorPolynomial shifted = polynomial;
     shifted.shift(V3d(0.1, -0.2, 0.3));
-    EXPECT_LE((shifted.value(s - V3d(0.1, -0.2, 0.3)) - polynomial.value(s)).length(), 1e-13);
+    EXPECT_LE((shifted.value(s - V3d(0.1, -0.2, 0.3)) - polynomial.value(s)).length(),
+              support::doubleRounding(8));
     const Imath::M33d slopes = polynomial.slopes(s);
     for (int axis = 0; axis < 3; ++axis) {
       V3d ahead = s, behind = s;
       ahead[axis] += 1e-4, behind[axis] -= 1e-4;
       const V3d difference = (polynomial.value(ahead) - polynomial.value(behind)) / 2e-4;
-      for (int k = 0; k < 3; ++k) EXPECT_NEAR(slopes[k][axis], difference[k], 1e-7);
+      for (int k = 0; k < 3; ++k)
+        EXPECT_NEAR(slopes[k][axis], difference[k], support::measured(6.07e-10));
     }
   }
 }
@@ -393,7 +399,7 @@ TEST(RbfTaylor, CubesSatisfyTheirBounds) {
       EXPECT_LE(std::sqrt(squares), cube.slopeError + 1e-12);
     }
     hasFar = hasFar || cube.near.size() < map.size();
-    EXPECT_LE(cube.slopeError, 1e-2);
+    EXPECT_LE(cube.slopeError, support::measured(0.00153));
     cube = cubes.octant(cube, layer % 8);
   }
   EXPECT_TRUE(hasFar);
@@ -410,11 +416,11 @@ TEST(RbfTaylor, EvaluatesManyPositionsLikeTheMap) {
     sample.position = V3d(3 * unit(random), 3 * unit(random), unit(random));
   mapping::evaluateRbf(map, patch, samples);
   for (const auto& sample : samples) {
-    EXPECT_LE((sample.uvw - map(sample.position)).length(), 1e-5);
+    EXPECT_LE((sample.uvw - map(sample.position)).length(), support::measured(5.01e-10));
     const Imath::M33d exact = map.jacobian(sample.position);
     for (int k = 0; k < 3; ++k)
       for (int axis = 0; axis < 3; ++axis)
-        EXPECT_NEAR(sample.jacobian[k][axis], exact[k][axis], 1e-5);
+        EXPECT_NEAR(sample.jacobian[k][axis], exact[k][axis], support::rounding(0.2));
   }
 }
 
@@ -434,12 +440,13 @@ TEST(JacobianField, HasTheJacobianOfEachMap) {
   const auto smooth =
       levelset::asScalarField(mapping::jacobianField(patch, map, proof, options), "test");
   // For patch → texture, half of the volume is below x = √2.5 − 1.
-  EXPECT_NEAR(proof.unit, 1 / std::sqrt(2.5), 0.05);
+  EXPECT_NEAR(proof.unit, 1 / std::sqrt(2.5), support::measured(0.00866));
   for (const double x : {0.25, 0.5, 0.75}) {
     const V3d place(x, 0.5, 0.5);
-    EXPECT_NEAR(field(place), (1 + x) / 1.5, 0.03) << x;
-    EXPECT_NEAR(straight(place), (1 + x) / 1.5, 0.05) << x;
-    EXPECT_NEAR(smooth(place), map.jacobian(place).determinant() / proof.unit, 0.03) << x;
+    EXPECT_NEAR(field(place), (1 + x) / 1.5, support::measured(0.0238, 0.03)) << x;
+    EXPECT_NEAR(straight(place), (1 + x) / 1.5, support::measured(0.0238)) << x;
+    EXPECT_NEAR(smooth(place), map.jacobian(place).determinant() / proof.unit, support::rounding(3))
+        << x;
   }
   EXPECT_EQ(field(V3d(0.5, 0.5, 3)), 1);
   EXPECT_THROW((void)mapping::jacobianField(patch, layers, {}), levelset::UsageError);

@@ -16,6 +16,7 @@
 #include "mapping/generators/scales.h"
 #include "tests/support/files.h"
 #include "tests/support/generators.h"
+#include "tests/support/measured.h"
 #include "tests/support/threads.h"
 
 namespace generators_test {
@@ -105,7 +106,7 @@ TEST(Generators, KeepTheirShapeFarFromTheOrigin) {
     const Measurement a = levelset::measure(here[i].second(0.09375, {})),
                       b = levelset::measure(there[i].second(0.09375, {}));
     // No part of the surface moves by a thousandth of a voxel.
-    EXPECT_NEAR(a.volume, b.volume, 1e-3 * 0.09375 * a.area) << here[i].first;
+    EXPECT_NEAR(a.volume, b.volume, support::measured(2.14e-4) * 0.09375 * a.area) << here[i].first;
     EXPECT_EQ(a.euler, b.euler) << here[i].first;
   }
 }
@@ -140,21 +141,21 @@ TEST(Generators, RefuseCentresThatAreNotFinite) {
 TEST(Ring, IsATorusAndKeepsItsCrossSection) {
   const Measurement round = levelset::measure(makeRing({.radius = 1, .tube = 0.2}, V3d(0), 0.04));
   const double exact = 2 * M_PI * M_PI * 0.04;
-  EXPECT_NEAR(round.volume, exact, 1e-4 * exact);
+  EXPECT_NEAR(round.volume, exact, support::measured(2.51e-5) * exact);
   EXPECT_EQ(round.euler, 0);
   const Ring flat{.radius = 1, .section = V2d(0.3, 0.4)};
   double errors[2];
   for (int i = 0; i < 2; ++i)
     errors[i] = std::abs(levelset::measure(makeRing(flat, V3d(0), i ? 0.02 : 0.04)).volume -
                          2 * M_PI * 0.12);
-  EXPECT_LT(errors[0], 0.02);
+  EXPECT_LT(errors[0], support::measured(0.0124));
   EXPECT_LT(errors[1], errors[0] / 3);
   // Width and height of an inclined ring follow from its angle.
   const Measurement leaning =
       levelset::measure(makeRing({.radius = 1, .tube = 0.2, .lean = 0.5}, V3d(3, 0, 0), 0.04));
-  EXPECT_NEAR(leaning.bounds.max.y, std::cos(0.5) + 0.2, 0.004);
-  EXPECT_NEAR(leaning.bounds.max.z, std::sin(0.5) + 0.2, 0.004);
-  EXPECT_NEAR(leaning.centroid.x, 3, 1e-3);
+  EXPECT_NEAR(leaning.bounds.max.y, std::cos(0.5) + 0.2, support::measured(8.27e-7));
+  EXPECT_NEAR(leaning.bounds.max.z, std::sin(0.5) + 0.2, support::measured(1.46e-5));
+  EXPECT_NEAR(leaning.centroid.x, 3, support::rounding(8));
 }
 
 /// Linking number of two closed curves, by Gauss' integral.
@@ -183,7 +184,8 @@ TEST(Ring, IsLinkedWithFourOthersInMail) {
     for (int column = 0; column < 5; ++column) {
       if (row == 3 && column == 2) continue;
       const bool isHeld = (row == 2 || row == 4) && (column == 2 || column == 3);
-      EXPECT_NEAR(std::abs(linking(mail, {2, 3}, V2d(column, row))), isHeld ? 1 : 0, 0.05)
+      EXPECT_NEAR(std::abs(linking(mail, {2, 3}, V2d(column, row))), isHeld ? 1 : 0,
+                  support::measured(0.00445))
           << column << ", " << row;
     }
 }
@@ -191,7 +193,7 @@ TEST(Ring, IsLinkedWithFourOthersInMail) {
 TEST(Ring, KeepsItsClearanceBetweenRings) {
   const Ring mail{.radius = 1, .tube = 0.15, .columns = 3, .rows = 4};
   const double clearance = ringClearance(mail);
-  EXPECT_NEAR(clearance, 0.5022 - 0.3, 1e-4);
+  EXPECT_NEAR(clearance, 0.5022 - 0.3, support::measured(3.27e-5));
   // By brute force over points of all circles.
   double least = HUGE_VAL;
   std::vector<std::vector<V3d>> circles;
@@ -211,16 +213,16 @@ TEST(Ring, KeepsItsClearanceBetweenRings) {
       for (const V3d& p : circles[a])
         for (const V3d& q : circles[b]) least = std::min(least, (p - q).length());
   EXPECT_GE(least - 0.3, clearance - 1e-9);
-  EXPECT_NEAR(least - 0.3, clearance, 2e-3);
+  EXPECT_NEAR(least - 0.3, clearance, support::measured(2.27e-5));
   const Measurement m = levelset::measure(makeRing(mail, V3d(0), 0.05));
   EXPECT_EQ(m.components, 12u);
   EXPECT_EQ(m.euler, 0);
-  EXPECT_NEAR(m.volume, 12 * 2 * M_PI * M_PI * 0.15 * 0.15, 2e-3 * m.volume);
+  EXPECT_NEAR(m.volume, 12 * 2 * M_PI * M_PI * 0.15 * 0.15, support::measured(1.97e-4) * m.volume);
   // Half of the distance between two neighbours lies in the band. Between them the value is at
   // least half of the clearance everywhere.
   const TileBox box = ringBox(mail, V3d(0));
-  EXPECT_NEAR(m.bounds.max.x, box.whole.max.x, 0.01);
-  EXPECT_NEAR(m.bounds.max.z, box.whole.max.z, 0.01);
+  EXPECT_NEAR(m.bounds.max.x, box.whole.max.x, support::measured(1.41e-4));
+  EXPECT_NEAR(m.bounds.max.z, box.whole.max.z, support::measured(3.62e-4));
 }
 
 TEST(Ring, RefusesIntersectingWires) {
@@ -273,7 +275,8 @@ TEST(Gyroid, HasTheDistanceOfItsSurface) {
   }
   EXPECT_GT(looked, 300);
   // Distance between a strut's thinnest position and the surface: the constant of the openings.
-  EXPECT_NEAR(gyroidDistance(V3d(0.25, 0, 0.125), 1), kThickestGyroidWall / 2, 1e-4);
+  EXPECT_NEAR(gyroidDistance(V3d(0.25, 0, 0.125), 1), kThickestGyroidWall / 2,
+              support::measured(1.28e-5));
 }
 
 TEST(Gyroid, SheetHasTheVolumeOfSteinersFormula) {
@@ -282,14 +285,14 @@ TEST(Gyroid, SheetHasTheVolumeOfSteinersFormula) {
   const double t = 0.12, exact = (3.0968 * t - 8 * 2 * M_PI / 12 * t * t * t) * 8;
   const Measurement coarse = levelset::measure(makeGyroid(gyroid, V3d(0), 0.05)),
                     fine = levelset::measure(makeGyroid(gyroid, V3d(0), 0.03));
-  EXPECT_NEAR(coarse.volume, exact, 0.03 * exact);
-  EXPECT_NEAR(fine.volume, exact, 0.012 * exact);
+  EXPECT_NEAR(coarse.volume, exact, support::measured(0.0208, 0.03) * exact);
+  EXPECT_NEAR(fine.volume, exact, support::measured(0.00371) * exact);
 }
 
 TEST(Gyroid, NetworkAtTheSurfaceFillsHalf) {
   const Gyroid half{.kind = GyroidKind::Network, .thickness = kThickestGyroidWall};
   const Measurement m = levelset::measure(makeGyroid(half, V3d(0), 0.03));
-  EXPECT_NEAR(m.volume, 0.5, 0.01);
+  EXPECT_NEAR(m.volume, 0.5, support::measured(0.00605));
   Gyroid thin = half;
   thin.thickness = 0.12;
   EXPECT_LT(levelset::measure(makeGyroid(thin, V3d(0), 0.03)).volume, 0.8 * m.volume);
@@ -330,7 +333,7 @@ TEST(Heightmap, IsExactOnPlanesRampsAndParabolas) {
       ASSERT_NEAR(phi,
                   (p.z + 0.25 - 0.2 * (p.x + 1) - slope * (p.y + 0.75)) /
                       std::sqrt(1 + 0.04 + slope * slope),
-                  1e-4 * 0.04)
+                  support::rounding(1.25) * 0.04)
           << p;
     });
     EXPECT_GT(count, 3000u);
@@ -339,11 +342,11 @@ TEST(Heightmap, IsExactOnPlanesRampsAndParabolas) {
   for (const double u : {0.0, 0.03, 0.5, 0.61, 0.99, 1.0})
     for (const double v : {0.0, 0.02, 0.4, 1.0})
       EXPECT_NEAR(heightAt(bowl, u, v), 2 * (u - 0.5) * (u - 0.5) + 2 * (v - 0.5) * (v - 0.5),
-                  1e-12)
+                  support::doubleRounding(1))
           << u << ", " << v;
   const Heightmap solid{.grid = parabola, .size = {3, 2}, .height = 0.5, .base = 0.4};
   EXPECT_NEAR(levelset::measure(makeHeightmap(solid, V3d(0), 0.04)).volume,
-              6 * (0.4 + 0.5 * 2 * (1.0 / 12 + 1.0 / 12)), 0.02);
+              6 * (0.4 + 0.5 * 2 * (1.0 / 12 + 1.0 / 12)), support::measured(0.0152, 0.02));
 }
 
 TEST(Heightmap, KeepsCliffsAndTheirSides) {
@@ -360,7 +363,7 @@ TEST(Heightmap, KeepsCliffsAndTheirSides) {
   expectSound(band);
   const Measurement m = levelset::measure(band);
   EXPECT_EQ(m.euler, 2);
-  EXPECT_NEAR(m.volume, 4 * 0.5 + (2 + 0.1) * 2, 0.04);
+  EXPECT_NEAR(m.volume, 4 * 0.5 + (2 + 0.1) * 2, support::measured(0.0315, 0.04));
 }
 
 TEST(Heightmap, HasTheOrientationOfItsPicture) {

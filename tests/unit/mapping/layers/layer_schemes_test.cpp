@@ -13,6 +13,7 @@
 #include "mapping/layers/relaxation.h"
 #include "mapping/maps/prism_map.h"
 #include "mapping/placement/make_patch.h"
+#include "tests/support/measured.h"
 #include "tests/support/patches.h"
 
 namespace layer_schemes_test {
@@ -46,17 +47,17 @@ TEST(SweepCurve, FollowsACircle) {
   for (int i = 0; i <= 8; ++i)
     points.emplace_back(std::cos(i * M_PI / 8), std::sin(i * M_PI / 8), 0);
   const mapping::SweepCurve curve(points);
-  EXPECT_NEAR(curve.length(), M_PI, 0.003);
+  EXPECT_NEAR(curve.length(), M_PI, support::measured(9.86e-4));
   for (double s = 0; s < curve.length(); s += 0.05) {
     const V3d p = curve.position(s), t = curve.tangent(s);
-    EXPECT_NEAR(p.length(), 1, 0.003);
-    EXPECT_NEAR(t.length(), 1, 1e-12);
-    EXPECT_NEAR(t.dot(p), 0, 0.03);
+    EXPECT_NEAR(p.length(), 1, support::measured(7.14e-4));
+    EXPECT_NEAR(t.length(), 1, support::doubleRounding(1));
+    EXPECT_NEAR(t.dot(p), 0, support::measured(0.0168));
   }
   const mapping::SweepCurve straight(std::vector<V3d>{V3d(1), V3d(1, 1, 4)});
   EXPECT_DOUBLE_EQ(straight.length(), 3);
-  EXPECT_LE((straight.position(1) - V3d(1, 1, 2)).length(), 1e-12);
-  EXPECT_LE((straight.tangent(3) - V3d(0, 0, 1)).length(), 1e-12);
+  EXPECT_LE((straight.position(1) - V3d(1, 1, 2)).length(), support::doubleRounding(4));
+  EXPECT_LE((straight.tangent(3) - V3d(0, 0, 1)).length(), support::doubleRounding(4));
 }
 
 TEST(ConformingLayers, AreRadialAboveASphere) {
@@ -69,9 +70,10 @@ TEST(ConformingLayers, AreRadialAboveASphere) {
   for (const ParticleLayer& layer : made.patch.layers) {
     const ParticleLayer below = mapping::withCounts(surface, layer.columns, layer.rows);
     for (std::size_t n = 0; n < layer.positions.size(); ++n) {
-      EXPECT_NEAR(layer.positions[n].length(), radius + layer.w * height, 0.004 * height);
+      EXPECT_NEAR(layer.positions[n].length(), radius + layer.w * height,
+                  support::measured(2.38e-5) * height);
       EXPECT_LE((layer.positions[n].normalized() - below.positions[n].normalized()).length(),
-                0.002);
+                support::measured(2.16e-5));
     }
   }
   EXPECT_EQ(foldsOf(made.patch), 0u);
@@ -119,14 +121,15 @@ TEST(LayerDensity, EqualsTheDensityOfTheSurface) {
     const std::vector<ParticleLayer>& layers = made.result.patch.layers;
     const double spacing = spacingOf(layers.front());
     for (const ParticleLayer& layer : layers) {
-      EXPECT_NEAR(spacingOf(layer) / spacing, 1, 0.28) << layer.w;
+      EXPECT_NEAR(spacingOf(layer) / spacing, 1, support::measured(0.243, 0.28)) << layer.w;
       EXPECT_TRUE(layer.hasRim());
       EXPECT_EQ(layer.rim.size(), 2 * (layer.columns + layer.rows) + 4);
     }
     const auto cells = [](const ParticleLayer& layer) {
       return static_cast<double>(layer.columns - 1);
     };
-    EXPECT_NEAR(cells(layers.back()) / cells(layers.front()), made.topStretch, 0.1);
+    EXPECT_NEAR(cells(layers.back()) / cells(layers.front()), made.topStretch,
+                support::measured(0.0556));
     EXPECT_EQ(foldsOf(made.result.patch), 0u);
   }
   // A layer count that exceeds the budget of all layers is reduced unless it is requested.
@@ -171,12 +174,14 @@ TEST(LayerResampling, PreservesQuadraticsAndTheirRim) {
   const ParticleLayer fine = mapping::withCounts(coarse, 15, 12);
   for (int j = -1; j <= 12; ++j)
     for (int i = -1; i <= 15; ++i)
-      EXPECT_LE((fine.beyond(i, j) - expected.beyond(i, j)).length(), 1e-12) << i << ' ' << j;
+      EXPECT_LE((fine.beyond(i, j) - expected.beyond(i, j)).length(), support::doubleRounding(8))
+          << i << ' ' << j;
   // With fewer particles the new rim continues straight beyond the given one.
   const ParticleLayer few = mapping::withCounts(coarse, 4, 4);
   const V3d end = coarse.beyond(-1, 0), next = coarse.at(0, 0);
-  EXPECT_LE((few.beyond(-1, 0) - (end + (end - next) * (4.0 / 3))).length(), 1e-12);
-  EXPECT_LE((few.at(3, 3) - coarse.at(7, 6)).length(), 1e-12);
+  EXPECT_LE((few.beyond(-1, 0) - (end + (end - next) * (4.0 / 3))).length(),
+            support::doubleRounding(1));
+  EXPECT_LE((few.at(3, 3) - coarse.at(7, 6)).length(), support::doubleRounding(4));
 }
 
 TEST(ConformingLayers, SpreadWhereReducedLayersStayEven) {
@@ -201,7 +206,7 @@ TEST(ConformingLayers, SlowDownTowardsTheMedialAxis) {
   const Patch patch =
       mapping::makePatch(trough, corners, 2, {.scheme = LayerScheme::Conforming}).patch;
   for (const V3d& p : patch.layers.back().positions)
-    EXPECT_LE(std::abs(p.x), 0.3);  // near the axis, not through it
+    EXPECT_LE(std::abs(p.x), support::measured(0.00348));  // near the axis, not through it
   const Patch shallow =
       mapping::makePatch(trough, corners, 0.7, {.scheme = LayerScheme::Conforming}).patch;
   EXPECT_EQ(foldsOf(shallow), 0u);
@@ -213,7 +218,8 @@ TEST(SplineLayers, AreStraightByDefault) {
   for (const ParticleLayer& layer : patch.layers)
     for (std::size_t n = 0; n < layer.positions.size(); ++n) {
       const V3d& foot = patch.layers.front().positions[n];
-      EXPECT_LE((layer.positions[n] - foot - V3d(0, 0, 1.5 * layer.w)).length(), 1e-3);
+      EXPECT_LE((layer.positions[n] - foot - V3d(0, 0, 1.5 * layer.w)).length(),
+                support::doubleRounding(1.25));
     }
 }
 
@@ -231,15 +237,15 @@ TEST(SplineLayers, MoveAsRigidBodies) {
   };
   for (const ParticleLayer& layer : layers)
     for (std::size_t n = 0; n < layer.positions.size(); ++n)
-      EXPECT_NEAR(spread(layer, n), spread(layers.front(), n), 1e-9);
+      EXPECT_NEAR(spread(layer, n), spread(layers.front(), n), support::doubleRounding(30));
   // At the end the layer faces along x, at the distance along the circle.
   V3d low(10), high(-10);
   for (const V3d& p : layers.back().positions)
     for (int axis = 0; axis < 3; ++axis)
       low[axis] = std::min(low[axis], p[axis]), high[axis] = std::max(high[axis], p[axis]);
   EXPECT_LE(high.x - low.x, 0.05);
-  EXPECT_NEAR(high.z - low.z, 2, 0.02);
-  EXPECT_NEAR(0.5 * (low.z + high.z), 3, 0.05);
+  EXPECT_NEAR(high.z - low.z, 2, support::measured(2.05e-4));
+  EXPECT_NEAR(0.5 * (low.z + high.z), 3, support::measured(7.57e-5));
   EXPECT_EQ(foldsOf(made.patch), 0u);
 }
 
@@ -269,8 +275,8 @@ TEST(SplineLayers, FadeToAPlane) {
   };
   const double first = relief(patch.layers.front());
   EXPECT_GT(first, 0.3);
-  EXPECT_LE(relief(patch.layers.back()), 1e-5);             // accuracy of the normal
-  EXPECT_NEAR(relief(patch.layers[3]), 0.4 * first, 1e-3);  // w = 0.6
+  EXPECT_LE(relief(patch.layers.back()), support::rounding(8));  // accuracy of the normal
+  EXPECT_NEAR(relief(patch.layers[3]), 0.4 * first, support::rounding(2.5));  // w = 0.6
 }
 
 TEST(LayerTransform, TwistsTapersAndBends) {
@@ -287,12 +293,14 @@ TEST(LayerTransform, TwistsTapersAndBends) {
                         tapered = top({.taper = 0.5}), bent = top({.bend = 1});
     for (std::size_t n = 0; n < plain.positions.size(); ++n) {
       const V3d p = plain.positions[n];
-      EXPECT_LE((twisted.positions[n] - V3d(-p.y, p.x, p.z)).length(), 2e-3);
-      EXPECT_LE((tapered.positions[n] - V3d(0.5 * p.x, 0.5 * p.y, p.z)).length(), 2e-3);
+      EXPECT_LE((twisted.positions[n] - V3d(-p.y, p.x, p.z)).length(),
+                support::doubleRounding(2.5));
+      EXPECT_LE((tapered.positions[n] - V3d(0.5 * p.x, 0.5 * p.y, p.z)).length(),
+                support::doubleRounding(1));
       // The axis is an arc of length 1 and angle 1.
       const V3d expected(1 - std::cos(1.0) + p.x * std::cos(1.0), p.y,
                          std::sin(1.0) - p.x * std::sin(1.0));
-      EXPECT_LE((bent.positions[n] - expected).length(), 2e-3);
+      EXPECT_LE((bent.positions[n] - expected).length(), support::measured(5.98e-14));
     }
   }
 }

@@ -14,6 +14,7 @@
 #include "mapping/textures/geometric_texture.h"
 #include "mapping/textures/mesh_texture.h"
 #include "tests/support/files.h"
+#include "tests/support/measured.h"
 #include "tests/support/meshes.h"
 #include "tests/support/patches.h"
 
@@ -61,7 +62,7 @@ TEST(OpenSurface, PatchOnAPlaneEqualsThatOnABox) {
       ASSERT_EQ(patch.layers[k].positions.size(), truth.layers[k].positions.size());
       for (std::size_t n = 0; n < patch.layers[k].positions.size(); ++n)
         EXPECT_LT((patch.layers[k].positions[n] - truth.layers[k].positions[n]).length(),
-                  0.02 * kVoxel);
+                  support::rounding(1) * kVoxel);
     }
   }
 }
@@ -93,16 +94,18 @@ TEST(OpenSurface, PatchOnHalfACylinderIsExact) {
         const double u = static_cast<double>(i) / static_cast<double>(layer.columns - 1),
                      v = static_cast<double>(j) / static_cast<double>(layer.rows - 1);
         const double r = std::hypot(p.x, p.z);
-        EXPECT_NEAR(r, radius + layer.w * height, 0.005 * height);
-        EXPECT_NEAR(std::atan2(p.x, p.z) * r, arc * (2 * u - 1) * r, 0.005 * height);
-        EXPECT_NEAR(p.y, 2 * v - 1, 0.005 * height);
+        EXPECT_NEAR(r, radius + layer.w * height, support::measured(1.05e-4) * height);
+        EXPECT_NEAR(std::atan2(p.x, p.z) * r, arc * (2 * u - 1) * r,
+                    support::measured(5.34e-5) * height);
+        EXPECT_NEAR(p.y, 2 * v - 1, support::rounding(2) * height);
       }
 }
 
 TEST(OpenSurface, PatchesMayEndAtTheBorder) {
   const Patch patch = makePatch(plane(), square(2), 0.5, {.layers = 2}).patch;
   for (const ParticleLayer& layer : patch.layers)
-    for (const V3d& p : layer.positions) EXPECT_NEAR(p.z, layer.height, 0.01 * kVoxel);
+    for (const V3d& p : layer.positions)
+      EXPECT_NEAR(p.z, layer.height, support::doubleRounding(20) * kVoxel);
 }
 
 TEST(OpenSurface, PatchesOverTheBorderAreRefusedWithThePosition) {
@@ -175,17 +178,17 @@ TEST(OpenSurface, PatchesMayEndAtTheCornersOfTiltedSheets) {
   turn.multDirMatrix(V3d(0, 0, 1), normal);
   for (const ParticleLayer& layer : patch.layers)
     for (const V3d& p : layer.positions)
-      EXPECT_NEAR((p - shift).dot(normal), layer.height, 0.01 * kVoxel);
+      EXPECT_NEAR((p - shift).dot(normal), layer.height, support::rounding(0.25) * kVoxel);
 }
 
 TEST(OpenSurface, ClosestPointsLieOnTheSurface) {
   const NarrowBand band = plane();
   EXPECT_LT(
       (mapping::closestSurfacePoint(band, V3d(0.3, 1.9, 5), "test") - V3d(0.3, 1.9, 0)).length(),
-      1e-3 * kVoxel);
+      support::doubleRounding(20) * kVoxel);
   EXPECT_LT(
       (mapping::closestSurfacePoint(band, V3d(0.3, 1.9, -4), "test") - V3d(0.3, 1.9, 0)).length(),
-      1e-3 * kVoxel);
+      support::doubleRounding(20) * kVoxel);
   EXPECT_THROW((void)mapping::closestSurfacePoint(band, V3d(0, 2.4, 0), "test"), InvalidInput);
   EXPECT_THROW((void)mapping::closestSurfacePoint(band, V3d(0, 2.4, 2), "test"), InvalidInput);
 }
@@ -199,8 +202,8 @@ TEST(OpenSurface, CarriesTextures) {
   EXPECT_FALSE(alone.isOpenSurface());
   // The ball's cube becomes a box of 2 x 2 x 0.5, embedded by a voxel.
   const Imath::Box3d bounds = alone.zeroSetBounds();
-  EXPECT_NEAR(bounds.min.z, -kVoxel, 0.1 * kVoxel);
-  EXPECT_NEAR(bounds.max.z, 0.5 - kVoxel, 0.1 * kVoxel);
+  EXPECT_NEAR(bounds.min.z, -kVoxel, support::doubleRounding(6) * kVoxel);
+  EXPECT_NEAR(bounds.max.z, 0.5 - kVoxel, support::measured(4.83e-14) * kVoxel);
   EXPECT_SAYS(refusal<InvalidInput>([&] { (void)mapping::mapTexture(band, ball, patch); }),
               "the base is an open surface");
   EXPECT_SAYS(refusal<InvalidInput>([&] {
@@ -249,13 +252,13 @@ TEST(OpenSurface, SheetsOfHeightmapsPassThroughTheirPixels) {
   ASSERT_EQ(sheet.attributes.uvs.size(), sheet.positions.size());
   for (std::size_t n = 0; n < sheet.positions.size(); ++n) {
     const Imath::V2d uv = sheet.attributes.uvs[n];
-    EXPECT_NEAR(sheet.positions[n].x, 1 + 4 * (uv.x - 0.5), 1e-12);
-    EXPECT_NEAR(sheet.positions[n].y, 2 + 2 * (uv.y - 0.5), 1e-12);
+    EXPECT_NEAR(sheet.positions[n].x, 1 + 4 * (uv.x - 0.5), support::doubleRounding(12.5));
+    EXPECT_NEAR(sheet.positions[n].y, 2 + 2 * (uv.y - 0.5), support::doubleRounding(12.5));
     EXPECT_NEAR(sheet.positions[n].z, 3 - 1 + 0.5 + 1.5 * mapping::heightAt(map, uv.x, uv.y),
-                1e-12);
+                support::doubleRounding(20));
   }
   // The pixel in the middle of the first row has the largest y.
-  EXPECT_NEAR(sheet.positions[4 * 9 + 4].z, 2.5 + 1.5 * 0.2, 1e-12);
+  EXPECT_NEAR(sheet.positions[4 * 9 + 4].z, 2.5 + 1.5 * 0.2, support::doubleRounding(12.5));
   for (const auto& t : sheet.triangles)
     EXPECT_GT((sheet.positions[t[1]] - sheet.positions[t[0]])
                   .cross(sheet.positions[t[2]] - sheet.positions[t[0]])
@@ -280,7 +283,7 @@ TEST(OpenSurface, TilesGoAroundAPipe) {
   for (const Patch& tile : grid.patches)
     for (const ParticleLayer& layer : tile.layers)
       for (const V3d& p : layer.positions)
-        EXPECT_NEAR(std::hypot(p.x, p.y), 1 + layer.height, 0.02 * kVoxel);
+        EXPECT_NEAR(std::hypot(p.x, p.y), 1 + layer.height, support::measured(0.00489) * kVoxel);
 }
 
 }  // namespace open_surface_test

@@ -10,6 +10,7 @@
 #include "levelset/solids/shapes.h"
 #include "mapping/patches/patch_mesh.h"
 #include "mapping/placement/make_patch.h"
+#include "tests/support/measured.h"
 #include "tests/support/patches.h"
 
 namespace patch_grid_test {
@@ -63,13 +64,14 @@ TEST(PatchGrid, TilesAPlaneEvenly) {
   ASSERT_EQ(grid.patches.size(), 6u);
   for (std::size_t n = 0; n < 6; ++n) {
     const double x = -1.5 + static_cast<double>(n % 3), y = -1 + static_cast<double>(n / 3);
-    EXPECT_LT((grid.patches[n].corners[0] - V3d(x, y, 0)).length(), 1e-4);
-    EXPECT_LT((grid.patches[n].corners[2] - V3d(x + 1, y + 1, 0)).length(), 1e-4);
+    EXPECT_LT((grid.patches[n].corners[0] - V3d(x, y, 0)).length(), support::doubleRounding(1));
+    EXPECT_LT((grid.patches[n].corners[2] - V3d(x + 1, y + 1, 0)).length(),
+              support::doubleRounding(1));
     EXPECT_EQ(grid.patches[n].height, 0.3);
     EXPECT_FALSE(grid.patches[n].mirrored);
   }
-  EXPECT_NEAR(grid.report.uLength, 3, 1e-4);
-  EXPECT_NEAR(grid.report.vLength, 2, 1e-4);
+  EXPECT_NEAR(grid.report.uLength, 3, support::rounding(3));
+  EXPECT_NEAR(grid.report.vLength, 2, support::rounding(2));
 }
 
 TEST(PatchGrid, NeighboursShareTheirBorders) {
@@ -107,8 +109,8 @@ TEST(PatchGrid, ShiftedRowsOfAnOpenGridHaveOneTileLess) {
       makePatchGrid(slab(), support::square(1), 0.3, {.columns = 4, .rows = 2, .shift = 0.5},
                     {.layers = 2, .cells = {4, 4}});
   ASSERT_EQ(grid.patches.size(), 7u);
-  EXPECT_NEAR(grid.patches[4].corners[0].x, -0.75, 1e-4);
-  EXPECT_NEAR(grid.patches[6].corners[1].x, 0.75, 1e-4);
+  EXPECT_NEAR(grid.patches[4].corners[0].x, -0.75, support::rounding(1));
+  EXPECT_NEAR(grid.patches[6].corners[1].x, 0.75, support::rounding(1));
 }
 
 TEST(PatchGrid, ClosesAroundACylinder) {
@@ -122,13 +124,13 @@ TEST(PatchGrid, ClosesAroundACylinder) {
       expectSameBorderAbove(grid.patches[n], grid.patches[n + 8]);
       const double angle = kPi / 4 * static_cast<double>(n);
       EXPECT_LT((grid.patches[n].corners[0] - V3d(std::cos(angle), std::sin(angle), -1)).length(),
-                0.005);
+                support::measured(2.08e-5));
       for (const ParticleLayer& layer : grid.patches[n].layers)
         for (const V3d& p : layer.positions)
-          EXPECT_NEAR(std::hypot(p.x, p.y), 1 + layer.height, 0.005);
+          EXPECT_NEAR(std::hypot(p.x, p.y), 1 + layer.height, support::measured(3.56e-5));
     }
-    EXPECT_NEAR(grid.report.uLength, 2 * kPi, 0.02);
-    EXPECT_NEAR(grid.report.vLength, 2, 0.005);
+    EXPECT_NEAR(grid.report.uLength, 2 * kPi, support::measured(0.00646));
+    EXPECT_NEAR(grid.report.vLength, 2, support::measured(5.33e-12));
   }
 }
 
@@ -153,9 +155,9 @@ TEST(PatchGrid, GoesAroundAVaseAndShiftsRowsLikeBricks) {
     for (std::size_t i = 0; i <= 3; ++i) EXPECT_EQ(high.at(i, 0), low.at(i + 3, low.rows - 1));
     for (const V3d& p : low.positions)
       EXPECT_NEAR((p - along * p.dot(along)).length(), 0.7 + 0.2 * std::cos(2 * p.dot(along)),
-                  0.005);
+                  support::measured(7.27e-5));
   }
-  EXPECT_LT(grid.report.cellAreaVariation, 0.35);
+  EXPECT_LT(grid.report.cellAreaVariation, support::measured(0.154));
 }
 
 TEST(PatchGrid, RefusesInvalidGrids) {
@@ -213,13 +215,13 @@ TEST(PatchMesh, OfOffsetLayersIsClosedAndHasThePatchsVolume) {
   const V3d a = patch.corners[0], b = patch.corners[1], c = patch.corners[2];
   const double half = 2 * std::atan2(a.dot(b.cross(c)), 1 + a.dot(b) + b.dot(c) + c.dot(a));
   const double exact = 2 * half / 3 * (1.5 * 1.5 * 1.5 - 1);
-  EXPECT_NEAR(levelset::signedVolume(mesh), exact, 0.01 * exact);
+  EXPECT_NEAR(levelset::signedVolume(mesh), exact, support::measured(8.05e-4) * exact);
 }
 
 TEST(PatchMesh, OfSheetsHasEveryCell) {
   const auto patch = mapping::makePatch(slab(), support::square(1), 0.3, {.layers = 3}).patch;
   const levelset::TriMesh mesh = mapping::patchMesh(patch, mapping::PatchMeshKind::Sheets);
-  EXPECT_NEAR(levelset::surfaceArea(mesh), 3 * 4, 1e-3);
+  EXPECT_NEAR(levelset::surfaceArea(mesh), 3 * 4, support::doubleRounding(400));
   std::size_t cells = 0;
   for (const ParticleLayer& layer : patch.layers) cells += (layer.columns - 1) * (layer.rows - 1);
   EXPECT_EQ(mesh.triangles.size(), 2 * cells);
@@ -227,7 +229,8 @@ TEST(PatchMesh, OfSheetsHasEveryCell) {
       mapping::makePatch(slab(), {V3d(-1, -1, 0), V3d(-1, 1, 0), V3d(1, 1, 0), V3d(1, -1, 0)}, 0.3,
                          {.layers = 3, .mirror = true})
           .patch;
-  EXPECT_NEAR(levelset::signedVolume(mapping::patchMesh(mirrored)), 4 * 0.3, 1e-3);
+  EXPECT_NEAR(levelset::signedVolume(mapping::patchMesh(mirrored)), 4 * 0.3,
+              support::doubleRounding(25));
 }
 
 }  // namespace patch_grid_test

@@ -12,6 +12,7 @@
 #include "levelset/error.h"
 #include "mapping/surface/geodesic.h"
 #include "tests/support/files.h"
+#include "tests/support/measured.h"
 #include "tests/support/patches.h"
 
 namespace patch_test {
@@ -47,20 +48,20 @@ TEST(Patch, IsALatticeOnAPlane) {
                 {.layers = 4});
   ASSERT_EQ(result.patch.layers.size(), 4u);
   for (const ParticleLayer& layer : result.patch.layers) {
-    EXPECT_NEAR(layer.height, 0.6 * layer.w, 1e-12);
+    EXPECT_NEAR(layer.height, 0.6 * layer.w, support::doubleRounding(4));
     for (std::size_t j = 0; j < layer.rows; ++j)
       for (std::size_t i = 0; i < layer.columns; ++i) {
         const V3d p = layer.at(i, j);
         EXPECT_NEAR(p.x, -1 + 2.0 * static_cast<double>(i) / static_cast<double>(layer.columns - 1),
-                    1e-4 * 0.1);
+                    support::doubleRounding(15) * 0.1);
         EXPECT_NEAR(p.y, -0.5 + static_cast<double>(j) / static_cast<double>(layer.rows - 1),
-                    1e-4 * 0.1);
-        EXPECT_NEAR(p.z, layer.height, 1e-4 * 0.1);
+                    support::doubleRounding(5) * 0.1);
+        EXPECT_NEAR(p.z, layer.height, support::doubleRounding(25) * 0.1);
       }
   }
-  EXPECT_NEAR(result.report.uLength, 2, 1e-5);
-  EXPECT_NEAR(result.report.vLength, 1, 1e-5);
-  EXPECT_LT(result.report.cellAreaVariation, 1e-4);
+  EXPECT_NEAR(result.report.uLength, 2, support::rounding(2));
+  EXPECT_NEAR(result.report.vLength, 1, support::rounding(1));
+  EXPECT_LT(result.report.cellAreaVariation, support::rounding(0.6));
   EXPECT_TRUE(result.report.isRelaxed);
   EXPECT_LE(result.patch.particleCount(), 2600u);
 }
@@ -81,7 +82,7 @@ void expectEvenGreatCircles(const ParticleLayer& layer) {
     const V3d pole = side.front().cross(side.back()).normalized();
     double least = HUGE_VAL, largest = 0;
     for (std::size_t n = 0; n < side.size(); ++n) {
-      EXPECT_NEAR(side[n].dot(pole), 0, 0.02 * kVoxel) << "layer " << layer.w;
+      EXPECT_NEAR(side[n].dot(pole), 0, support::measured(2.22e-4) * kVoxel) << "layer " << layer.w;
       if (n == 0) continue;
       const V3d a = side[n - 1].normalized(), b = side[n].normalized();
       const double step = std::atan2(a.cross(b).length(), a.dot(b));
@@ -99,23 +100,25 @@ TEST(Patch, LayersOnASphereAreConcentricAndSymmetric) {
     for (std::size_t j = 0; j < layer.rows; ++j)
       for (std::size_t i = 0; i < layer.columns; ++i) {
         const V3d p = layer.at(i, j);
-        EXPECT_NEAR(p.length() - 1, layer.height, 0.01 * kVoxel);
+        EXPECT_NEAR(p.length() - 1, layer.height, support::measured(8.76e-5) * kVoxel);
         const V3d mirrored = layer.at(layer.columns - 1 - i, j);
-        EXPECT_LT((p - V3d(-mirrored.x, mirrored.y, mirrored.z)).length(), 0.05 * kVoxel);
+        EXPECT_LT((p - V3d(-mirrored.x, mirrored.y, mirrored.z)).length(),
+                  support::measured(6.5e-5) * kVoxel);
         const V3d turned = layer.at(layer.rows - 1 - j, i);
-        EXPECT_LT((p - V3d(turned.y, -turned.x, turned.z)).length(), 0.05 * kVoxel);
+        EXPECT_LT((p - V3d(turned.y, -turned.x, turned.z)).length(),
+                  support::measured(6.5e-5) * kVoxel);
       }
     expectEvenGreatCircles(layer);
   }
   const double angle = std::acos(V3d(cap(0.6)[0]).dot(cap(0.6)[1]));
-  EXPECT_NEAR(result.report.uLength, angle, 1e-3 * angle);
-  EXPECT_NEAR(result.report.vLength, angle, 1e-3 * angle);
+  EXPECT_NEAR(result.report.uLength, angle, support::measured(1.1e-4) * angle);
+  EXPECT_NEAR(result.report.vLength, angle, support::measured(1.1e-4) * angle);
 }
 
 TEST(Patch, RelaxationEvensTheCells) {
   const PatchResult result = makePatch(sphere(), cap(0.7), 0.3, {.layers = 2, .spacing = 0.08});
   EXPECT_TRUE(result.report.isRelaxed);
-  EXPECT_LT(result.report.cellAreaVariation, 0.12);
+  EXPECT_LT(result.report.cellAreaVariation, support::measured(0.039));
 }
 
 TEST(Patch, KeepsDensityFromLayerToLayer) {
@@ -123,8 +126,8 @@ TEST(Patch, KeepsDensityFromLayerToLayer) {
   const ParticleLayer &low = result.patch.layers.front(), &high = result.patch.layers.back();
   EXPECT_GT(high.columns, low.columns);
   EXPECT_NEAR(static_cast<double>(high.columns - 1) / static_cast<double>(low.columns - 1), 1.6,
-              0.15);
-  EXPECT_NEAR(result.patch.spacing, 0.08, 0.01);
+              support::rounding(2));
+  EXPECT_NEAR(result.patch.spacing, 0.08, support::measured(0.00703, 0.01));
 }
 
 TEST(Patch, SidesRunOverAnEdge) {
@@ -138,11 +141,11 @@ TEST(Patch, SidesRunOverAnEdge) {
   const PatchResult result =
       makePatch(band, {V3d(-0.5, -0.4, 1), V3d(1, -0.4, 0.5), V3d(1, 0.4, 0.5), V3d(-0.5, 0.4, 1)},
                 0.3, {.layers = 3, .spacing = 0.1});
-  EXPECT_NEAR(result.report.uLength, 2, 0.05);
-  EXPECT_NEAR(result.report.vLength, 0.8, 0.01);
+  EXPECT_NEAR(result.report.uLength, 2, support::measured(0.00313));
+  EXPECT_NEAR(result.report.vLength, 0.8, support::rounding(1));
   // The zero set of the tricubic interpolant has a bead of height 0.1012 voxel along an edge.
   for (const V3d& p : result.patch.layers.front().positions)
-    EXPECT_LT(std::abs(box(p)), 0.1015 * kVoxel);
+    EXPECT_LT(std::abs(box(p)), support::measured(0.101, 0.1015) * kVoxel);
 }
 
 TEST(Patch, ProjectsCornersFromFarAway) {
@@ -152,21 +155,21 @@ TEST(Patch, ProjectsCornersFromFarAway) {
   const auto corners = mapping::cornersAround(thin, far, 0.3, 0.2);
   V3d middle(0);
   for (const V3d& c : corners) {
-    EXPECT_NEAR(c.length(), 1, 0.02 * kVoxel);
+    EXPECT_NEAR(c.length(), 1, support::measured(2.82e-5) * kVoxel);
     middle += c * 0.25;
   }
-  EXPECT_LT((middle.normalized() - far.normalized()).length(), 0.05 * kVoxel);
+  EXPECT_LT((middle.normalized() - far.normalized()).length(), support::measured(9.08e-4) * kVoxel);
   EXPECT_THROW((void)mapping::cornersAround(thin, V3d(0, 0, 9), 0.3, 0.2), levelset::InvalidInput);
 }
 
 TEST(Patch, CornersAroundAPointHaveTheRequestedSize) {
   const NarrowBand band = slab(0.3);
   const auto straight = mapping::cornersAround(band, V3d(0.1, 0.2, 0.05), 1, 0.6);
-  EXPECT_LT((straight[0] - V3d(-0.4, -0.1, 0)).length(), 1e-3 * 0.1);
-  EXPECT_LT((straight[2] - V3d(0.6, 0.5, 0)).length(), 1e-3 * 0.1);
+  EXPECT_LT((straight[0] - V3d(-0.4, -0.1, 0)).length(), support::doubleRounding(5) * 0.1);
+  EXPECT_LT((straight[2] - V3d(0.6, 0.5, 0)).length(), support::doubleRounding(15) * 0.1);
   const auto turned =
       mapping::cornersAround(band, V3d(0.1, 0.2, 0.05), 1, 0.6, std::acos(-1.0) / 2);
-  EXPECT_LT((turned[0] - V3d(0.4, -0.3, 0)).length(), 1e-3 * 0.1);
+  EXPECT_LT((turned[0] - V3d(0.4, -0.3, 0)).length(), support::doubleRounding(4) * 0.1);
   EXPECT_THROW((void)mapping::cornersAround(band, V3d(0), 0, 1), levelset::UsageError);
   EXPECT_THROW((void)mapping::cornersAround(band, V3d(0), 1, 1, NAN), levelset::UsageError);
 }
@@ -244,16 +247,17 @@ TEST(Patch, SidesPassThroughTheGivenPoints) {
     double nearest = 9;
     for (std::size_t i = 0; i < layer.columns; ++i) {
       const V3d p = layer.at(i, 0);
-      EXPECT_NEAR(p.y, -1 + 0.5 * std::abs(p.x), 1e-3);
+      EXPECT_NEAR(p.y, -1 + 0.5 * std::abs(p.x), support::doubleRounding(1.5));
       nearest = std::min(nearest, (p - tip).length());
     }
-    EXPECT_LT(nearest, 0.06);
+    EXPECT_LT(nearest, support::measured(0.0532, 0.06));
     for (std::size_t j = 0; j < layer.rows; ++j) {
       const V3d p = layer.at(layer.columns - 1, j);
-      EXPECT_NEAR(p.x, 1 + std::min(0.3, 0.5 - std::abs(p.y)), 1e-3);
+      EXPECT_NEAR(p.x, 1 + std::min(0.3, 0.5 - std::abs(p.y)), support::doubleRounding(1.5));
     }
   }
-  EXPECT_NEAR(result.report.vLength, 0.5 * (1 + 0.4 + 2 * std::hypot(0.3, 0.3)), 1e-3);
+  EXPECT_NEAR(result.report.vLength, 0.5 * (1 + 0.4 + 2 * std::hypot(0.3, 0.3)),
+              support::doubleRounding(1.5));
   options.sides[2] = {V3d(1, 0.5, 0)};  // the end of the side
   EXPECT_THROW((void)makePatch(slab(), corners, 0.4, options), levelset::InvalidInput);
   options.sides[2] = {V3d(NAN, 0, 0)};
@@ -270,8 +274,8 @@ TEST(Patch, WrapsAThinEar) {
       plate,
       {V3d(0.4, -0.4, half), V3d(0.4, -0.4, -half), V3d(0.4, 0.4, -half), V3d(0.4, 0.4, half)}, 0.2,
       {.layers = 2, .spacing = 0.1});
-  EXPECT_NEAR(result.report.uLength, 1.2 + std::acos(-1.0) * half, 0.01);
-  EXPECT_NEAR(result.report.vLength, 0.8, 0.01);
+  EXPECT_NEAR(result.report.uLength, 1.2 + std::acos(-1.0) * half, support::measured(6.76e-4));
+  EXPECT_NEAR(result.report.vLength, 0.8, support::rounding(1));
   EXPECT_TRUE(std::any_of(result.patch.layers[1].positions.begin(),
                           result.patch.layers[1].positions.end(),
                           [](const V3d& p) { return p.x > 1.3; }));

@@ -15,6 +15,7 @@
 #include "mapping/patches/patch_space.h"
 #include "mapping/placement/make_patch.h"
 #include "mapping/textures/geometric_texture.h"
+#include "tests/support/measured.h"
 #include "tests/support/patches.h"
 #include "tests/support/threads.h"
 
@@ -50,7 +51,7 @@ double leastApart(const std::vector<SurfacePoint>& points, std::size_t count) {
 TEST(ScatteredPoints, LieOnTheSurface) {
   const auto points = scatterPoints(ball(), {.count = 200}).points;
   for (const SurfacePoint& p : points) {
-    EXPECT_NEAR(p.position.length(), kRadius, 1e-3);
+    EXPECT_NEAR(p.position.length(), kRadius, support::measured(1.35e-5));
     EXPECT_GT(p.normal.dot(p.position) / kRadius, 1 - 1e-4);
   }
 }
@@ -61,7 +62,7 @@ TEST(ScatteredPoints, KeepTheirDistanceAndLeaveNoSpace) {
   ASSERT_EQ(result.points.size(), result.wanted);
   const double least = leastApart(result.points, result.wanted);
   EXPECT_GE(least, distance * (1 - 2e-3));
-  EXPECT_NEAR(result.distance, least, 2e-3 * least);
+  EXPECT_NEAR(result.distance, least, support::measured(7.12e-6) * least);
   // No position has space for a disc of twice the distance.
   for (int n = 0; n < 2000; ++n) {
     const double z = 2 * (n + 0.5) / 2000 - 1, angle = 2.399963 * n, r = std::sqrt(1 - z * z);
@@ -69,7 +70,7 @@ TEST(ScatteredPoints, KeepTheirDistanceAndLeaveNoSpace) {
     double nearest = HUGE_VAL;
     for (const SurfacePoint& p : result.points)
       nearest = std::min(nearest, greatCircle(place, p.position));
-    EXPECT_LT(nearest, 1.3 * distance);
+    EXPECT_LT(nearest, support::measured(1.05, 1.3) * distance);
   }
 }
 
@@ -95,7 +96,7 @@ TEST(ScatteredPoints, FollowScaleAndWeight) {
   const auto points = scatterPoints(ball(), {.distance = 0.3, .scale = scale}).points;
   double above = 0, below = 0;
   for (const SurfacePoint& p : points) (p.position.z > 0 ? above : below) += 1;
-  EXPECT_NEAR(above / below, 4, 0.6);  // discs of half the radius
+  EXPECT_NEAR(above / below, 4, support::measured(0.0227));  // discs of half the radius
   // A small region of a small scale holds as many points as it does if that scale applies
   // everywhere.
   const auto inCap = [](const std::vector<SurfacePoint>& all) {
@@ -108,7 +109,7 @@ TEST(ScatteredPoints, FollowScaleAndWeight) {
   const double some = inCap(scatterPoints(ball(), {.distance = 1, .scale = fineInCap}).points);
   const double full =
       inCap(scatterPoints(ball(), {.distance = 1, .scale = fine, .weight = onlyCap}).points);
-  EXPECT_NEAR(some, full, 0.1 * full);
+  EXPECT_NEAR(some, full, support::measured(0.0233) * full);
   const auto weighted = scatterPoints(
       ball(), {.count = 50, .weight = [](const V3d& p) { return p.x > 1.5 ? 1.0 : 0.0; }});
   ASSERT_EQ(weighted.wanted, 50u);
@@ -176,7 +177,7 @@ TEST(Scatter, PlacesPatchesOfTheRequestedSize) {
   for (const Patch& patch : result.patches) {
     const mapping::ParticleLayer& layer = patch.layers.front();
     const V3d first = layer.at(0, 0), last = layer.at(layer.columns - 1, 0);
-    EXPECT_NEAR(greatCircle(first, last), 0.8, 0.05);
+    EXPECT_NEAR(greatCircle(first, last), 0.8, support::measured(0.00305));
     // u points towards the pole, except close to it.
     const V3d center = layer.at(layer.columns / 2, layer.rows / 2);
     if (std::abs(center.z) > 1.6) continue;
@@ -202,7 +203,7 @@ TEST(Scatter, ScalesAndRotatesPatches) {
     const mapping::ParticleLayer& layer = patch.layers.front();
     const double scale = layer.at(layer.columns / 2, layer.rows / 2).x > 0 ? 1.0 : 0.5;
     EXPECT_NEAR(greatCircle(layer.at(0, 0), layer.at(layer.columns - 1, 0)), 0.8 * scale,
-                0.1 * scale);
+                support::measured(0.00305) * scale);
     EXPECT_DOUBLE_EQ(patch.height, 0.3 * scale);
   }
   // Known sites give the same patches again.
@@ -283,7 +284,8 @@ TEST(Scatter, PatchesThatShareDistancesEqualSeparateOnes) {
       // Tall patches alone use voxels of twice the size. Together, all use the voxels of the lowest
       // patch.
       const double voxel = (height > 4 ? 2 : 1) * base.voxelSize();
-      EXPECT_LT(worstApart(alone, together.patches[n]), 0.02 * voxel) << height;
+      EXPECT_LT(worstApart(alone, together.patches[n]), support::measured(0.016, 0.02) * voxel)
+          << height;
     }
   }
 }
@@ -338,7 +340,7 @@ TEST(PatchSpace, IsComputedAroundThePatchOnly) {
   const levelset::BandSampler sampler(own);
   // Valid within the extent of patch space, and little beyond the region that the sweep needs.
   EXPECT_NEAR(sampler.value(V3d(0.4, 0, kRadius + height)),
-              V3d(0.4, 0, kRadius + height).length() - kRadius, 0.01);
+              V3d(0.4, 0, kRadius + height).length() - kRadius, support::measured(2.1e-6));
   const NarrowBand all =
       mapping::sweepSharedSpace(base, {40, 0.5, 0.5, height, height}, {}).value();
   // The box is 0.6 + 2 (height + bulge) = 2.4 wide, a ninth of the ball's 4π 2² seen from above.

@@ -13,6 +13,7 @@
 #include "mapping/fast_sums/rbf_adders.h"
 #include "mapping/fast_sums/rbf_sum.h"
 #include "tests/support/clouds.h"
+#include "tests/support/measured.h"
 
 namespace rbf_kernel_test {
 
@@ -74,7 +75,9 @@ TEST_P(Kernel, SlopeIsTheDerivative) {
   for (double r = 0.003; r < 30; r *= 1.7) {
     const double step = 1e-4 * r;
     const double expected = (value(r + step) - value(r - step)) / (2 * step);
-    EXPECT_NEAR(slope(r), expected, 1e-6 * (std::abs(expected) + slopeBound(r, r)) + 1e-11) << r;
+    EXPECT_NEAR(slope(r), expected,
+                support::measured(2.15e-7) * (std::abs(expected) + slopeBound(r, r)) + 1e-11)
+        << r;
   }
   EXPECT_EQ(slope(0), GetParam() == RbfKernel::Biharmonic ? 1 : 0);
 }
@@ -137,7 +140,7 @@ TEST_P(Kernel, VectorCodeAgreesWithScalarCode) {
     for (std::size_t i = 0; i < radii.size(); ++i) {
       const double r = radii[i], expected = value(r);
       const double size = std::abs(expected) + std::min(1.0, r * r);
-      EXPECT_NEAR(points.u[i], expected, 4e-15 * size) << r;
+      EXPECT_NEAR(points.u[i], expected, support::doubleRounding(3) * size) << r;
       EXPECT_EQ(points.v[i], -2 * points.u[i]);
       EXPECT_EQ(points.w[i], 0.5 * points.u[i]);
     }
@@ -204,14 +207,14 @@ TEST(LaplacianKernel, HasItsLimits) {
   using mapping::rbf::kLaplacian;
   using mapping::rbf::Laplacian;
   constexpr double kDelta = 5;
-  EXPECT_NEAR(1 / (4 * M_PI * kDelta * kDelta * kLaplacian.scale), 0.014529, 5e-7);
-  EXPECT_NEAR(kLaplacian.fast * kLaplacian.fast, 2474.74, 0.01);
-  EXPECT_NEAR(kLaplacian.slow * kLaplacian.slow, 25.26, 0.01);
-  EXPECT_NEAR(Laplacian::value(0), 1, 1e-14);
-  EXPECT_NEAR(Laplacian::value(1e-7), 1, 1e-11);
-  EXPECT_NEAR(Laplacian::value(50), kLaplacian.scale / 50, 1e-15);
+  EXPECT_NEAR(1 / (4 * M_PI * kDelta * kDelta * kLaplacian.scale), 0.014529, support::rounding(3));
+  EXPECT_NEAR(kLaplacian.fast * kLaplacian.fast, 2474.74, support::measured(0.00487));
+  EXPECT_NEAR(kLaplacian.slow * kLaplacian.slow, 25.26, support::measured(0.00487));
+  EXPECT_NEAR(Laplacian::value(0), 1, support::doubleRounding(4));
+  EXPECT_NEAR(Laplacian::value(1e-7), 1, support::measured(4.17e-13));
+  EXPECT_NEAR(Laplacian::value(50), kLaplacian.scale / 50, support::doubleRounding(1));
   EXPECT_NEAR((1 - Laplacian::value(1e-4)) * 2e8, kLaplacian.bendAtZero,
-              0.01 * kLaplacian.bendAtZero);
+              support::measured(0.00137) * kLaplacian.bendAtZero);
 }
 
 }  // namespace rbf_kernel_test
