@@ -10,7 +10,7 @@ configure() {  # configure NAME OPTIONS…: lists the files to build in NAME.pla
   shift
   rm -rf "${work:?}/$name"
   cmake -S "$source" -B "$work/$name" -G Ninja --no-warn-unused-cli -DCMAKE_BUILD_TYPE=Release "$@" >/dev/null
-  ninja -C "$work/$name" -n >"$work/$name.plan"
+  ninja -C "$work/$name" -t commands >"$work/$name.plan"
   grep -q levelset_tests "$work/$name.plan"
 }
 

@@ -146,7 +146,7 @@ def test_refusals_name_the_parameters(ls, folder):
     with pytest.raises(ls.UsageError, match=r"--radius: '-1'.*line 3.*\(parameters\[1\], radius = -1\)"):
         ls.map(PARTS, [{"radius": 1}, {"radius": -1}])
     assert contents(folder) == {}  # all sets are checked before the first run
-    with pytest.raises(ls.UsageError, match="^map: raduis=1: no variable .* did you mean 'radius'"):
+    with pytest.raises(ls.UsageError, match="^map: raduis=1: .* no variable raduis; did you mean 'radius'"):
         ls.map(PARTS, [{"raduis": 1}])
     with pytest.raises(ls.InputError, match=r"parameters\[1\], box = "):
         ls.map(lambda box: ls.sphere(radius=1, voxel=0.1).array(box=box).sum(),
