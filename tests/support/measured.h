@@ -11,8 +11,8 @@ namespace support {
 /// Limit on an error.
 /// @param figure  the largest error measured
 /// @param promise  limit that the documentation gives, where it is tighter than the margin
-[[nodiscard]] constexpr double measured(
-    double figure, double promise = std::numeric_limits<double>::infinity()) {
+[[nodiscard]] constexpr double measured(double figure,
+                                        double promise = std::numeric_limits<double>::infinity()) {
   constexpr double kMargin = 1.5;
   return std::min(kMargin * figure, promise);
 }

@@ -90,7 +90,8 @@ TEST_F(FormerWords, StayOutOfHelp) {
   }
   for (const char* shell : {"bash", "zsh"}) {
     const std::string script = pipeline::help({"--completion", shell});
-    for (const char* word : {"widen", "'march:", " march ", "--sink", "--unfold", "--sign-anyway", "--whole"})
+    for (const char* word :
+         {"widen", "'march:", " march ", "--sink", "--unfold", "--sign-anyway", "--whole"})
       EXPECT_EQ(script.find(word), std::string::npos) << word;
   }
 }

@@ -477,8 +477,8 @@ TEST_F(Demands, PlansReportTheMemoryOfActions) {
   const std::string solid = "torus --radius 2 --tube 0.6 --voxel 0.02 ! ",
                     end = "clip --box \"1.5,-1,-1 3,1,1\" ! write o.vdb";
   for (const char* action : {"smooth --sigma 2vx", "offset 0.1", "open 0.1", "shell --thickness .2",
-                             "resample --voxel .02", "rebuild-band --half-width 9", "curvature-flow 0.01",
-                             "keep --largest 1"}) {
+                             "resample --voxel .02", "rebuild-band --half-width 9",
+                             "curvature-flow 0.01", "keep --largest 1"}) {
     const std::string name = std::string(action).substr(0, std::string(action).find(' '));
     const std::string whole = plan("--whole " + solid + action + " ! " + end),
                       part = plan(solid + action + " ! " + end);
