@@ -140,7 +140,7 @@ TEST_F(Refusal, DetectableErrorsPrecedeTheRun) {
   const std::string target = "sphere --radius 1.2 --voxel 0.1 ! morph ";
   soon(target + "--steps 4294967297", 2, "too many");
   soon(target + "--until 1.5", 2, "up to 1");
-  soon(target + "--steps 3 --keep-steps step.vdb", 2, "put # where the number goes");
+  soon(target + "--steps 3 --keep-steps step.vdb", 2, "write # for the number");
   soon(target + "--steps 3 --keep-steps nowhere/step_#.vdb", 6, "no folder");
   soon("write nowhere/a.vdb", 6, "no folder");
   soon("render nowhere/a.png", 6, "render: ");
@@ -396,10 +396,11 @@ TEST_F(Refusal, FileErrorsExitWithSix) {
 /// @param isListening  true: the delay begins when the command handles the signal
 std::string interrupted(const std::string& command, const std::string& delay, bool isListening) {
   // SIGINT is bit 1 of the caught signals.
-  const std::string listen = isListening
-                                 ? "n=0; until [ $n -eq 6000 ] || grep -q '^SigCgt:.*[2367abef]$' "
-                                   "/proc/$pid/status; do n=$((n + 1)); sleep 0.01; done; "
-                                 : "";
+  const std::string listen =
+      isListening
+          ? "n=0; until [ $n -eq 1000 ] || ! kill -0 $pid || grep -q '^SigCgt:.*[2367abef]$' "
+            "/proc/$pid/status; do n=$((n + 1)); sleep 0.01; done; "
+          : "";
   return "set -m; " + command + " & pid=$!; " + listen + "sleep " + delay +
          "; before=$(awk '{ print $14 + $15 }' /proc/$pid/stat 2>/dev/null); kill -INT $pid; "
          "wait $pid; code=$?; after=$(awk '{ print $16 + $17 }' /proc/$$/stat); "
