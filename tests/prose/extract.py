@@ -74,8 +74,8 @@ def messages(names):
     for name in names or tracked(MODULES):
         with open(name, errors="replace") as file:
             source = file.read()
-        source = re.sub(r'R"\w*\((?:.|\n)*?\)\w*"', '""', source)
-        source = re.sub(r"^\s*//.*$|^#include.*$", "", source, flags=re.M)
+        source = re.sub(r'R"\w*\((?:.|\n)*?\)\w*"', lambda m: '""' + "\n" * m.group(0).count("\n"), source)
+        source = re.sub(r"^[ \t]*//.*$|^#include.*$", "", source, flags=re.M)
         for match in re.finditer(LITERAL + r"(?:\s*" + LITERAL + ")*", source):
             text = "".join(re.findall(LITERAL, match.group(0)))
             text = re.sub(r"\\n", ". ", text).replace('\\"', '"')

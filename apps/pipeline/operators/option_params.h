@@ -199,7 +199,7 @@ class OptionReader {
     } else if constexpr (std::is_same_v<T, double>) {
       return isLength ? length(name) : in_.number(name);
     } else if constexpr (std::is_integral_v<T>) {
-      return static_cast<T>(in_.integer(name));
+      return in_.integerAs<T>(name);
     } else if constexpr (std::is_same_v<T, Imath::V3d>) {
       if (!isLength) return in_.point(name);
       if (stage_ == OptionStage::Syntax || stage_ == OptionStage::Partial) return Imath::V3d(0);

@@ -6,9 +6,12 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "apps/pipeline/registry/operator.h"
@@ -68,6 +71,13 @@ class Invocation {
   [[nodiscard]] std::string text(const std::string& name) const;
   [[nodiscard]] double number(const std::string& name) const;
   [[nodiscard]] long integer(const std::string& name) const;
+  /// @throws UsageError when the value does not fit into `T`
+  template <class T>
+  [[nodiscard]] T integerAs(const std::string& name) const {
+    const long value = integer(name);
+    if (!std::in_range<T>(value)) refuseInteger(name, value, std::numeric_limits<T>::max());
+    return static_cast<T>(value);
+  }
   [[nodiscard]] double radians(const std::string& name) const;
   [[nodiscard]] std::vector<double> numbers(const std::string& name) const;
   [[nodiscard]] Imath::V3d point(const std::string& name) const;
@@ -122,6 +132,7 @@ class Invocation {
   [[nodiscard]] double toWorld(const std::string& name, const std::string& text,
                                const std::string& label);
   void note(const Resolved& length);
+  [[noreturn]] void refuseInteger(const std::string& name, long value, std::uint64_t most) const;
   [[nodiscard]] double countIn(double voxel);
 
   const Operator* op_;

@@ -202,7 +202,7 @@ Value draw(Invocation& in) {
   const std::string renderer =
       scene.isBlended() && !in.given("renderer") ? "cpu" : in.text("renderer");
   const bool isBoth = renderer == "both";
-  render::RenderOptions options{.samples = static_cast<int>(in.integer("samples")),
+  render::RenderOptions options{.samples = in.integerAs<int>("samples"),
                                 .filter = filterOf(in),
                                 .fromNanoVdb = in.text("tables") == "nanovdb",
                                 .style = styleOf(in),

@@ -33,8 +33,8 @@ struct Generator {
 using Generate = Generator (*)(Invocation&);
 
 mapping::Tiling tilingOf(Invocation& in) {
-  return {.columns = static_cast<int>(in.integer("columns")),
-          .rows = static_cast<int>(in.integer("rows")),
+  return {.columns = in.integerAs<int>("columns"),
+          .rows = in.integerAs<int>("rows"),
           .overlap = in.length("overlap")};
 }
 
@@ -124,8 +124,8 @@ Generator ring(Invocation& in) {
     ring.section = Imath::V2d(section[0], section[1]);
   }
   if (in.given("lean")) ring.lean = in.radians("lean");
-  ring.columns = static_cast<int>(in.integer("columns"));
-  ring.rows = static_cast<int>(in.integer("rows"));
+  ring.columns = in.integerAs<int>("columns");
+  ring.rows = in.integerAs<int>("rows");
   if (in.given("spacing")) {
     const std::vector<double> spacing = in.lengths("spacing");
     ring.spacing = Imath::V2d(spacing[0], spacing[1]);
@@ -145,8 +145,8 @@ Generator gyroid(Invocation& in) {
   if (in.text("kind") == "network") gyroid.kind = mapping::GyroidKind::Network;
   gyroid.cell = in.length("cell");
   gyroid.thickness = lengthUnlessAuto(in, "thickness").value_or(gyroid.cell * 0.1);
-  gyroid.cells = {static_cast<int>(in.integer("columns")), static_cast<int>(in.integer("rows")),
-                  static_cast<int>(in.integer("layers"))};
+  gyroid.cells = {in.integerAs<int>("columns"), in.integerAs<int>("rows"),
+                  in.integerAs<int>("layers")};
   const V3d center = in.point("center");
   return {mapping::gyroidExtent(gyroid, center), mapping::gyroidBox(gyroid, center),
           [=](double voxel, const auto& options) {

@@ -138,7 +138,8 @@ TEST_F(Refusal, DetectableErrorsPrecedeTheRun) {
   soon("advect --field vortex --time 1 --factor \"x*t\"", 2, "use t, numbers");
   soon("advect --field vortex --time 1 --factor \"1,2\"", 2, "'1,2' holds 2 formulas; give one");
   const std::string target = "sphere --radius 1.2 --voxel 0.1 ! morph ";
-  soon(target + "--steps 4294967297", 2, "too many");
+  soon(target + "--steps 4294967297", 2, "give at most 2147483647");
+  soon(target + "--steps 2147483647", 2, "too many");
   soon(target + "--until 1.5", 2, "up to 1");
   soon(target + "--steps 3 --keep-steps step.vdb", 2, "write # for the number");
   soon(target + "--steps 3 --keep-steps nowhere/step_#.vdb", 6, "no folder");
@@ -393,12 +394,13 @@ TEST_F(Refusal, FileErrorsExitWithSix) {
 /// Shell commands that run a chain and interrupt it `delay` seconds later. The exit code is 99
 /// where the chain then takes more than half a CPU second on each core. Job control is on, since a
 /// shell without it starts background jobs that ignore the signal.
-/// @param isListening  true: the delay begins when the command handles the signal
+/// @param isListening  true: the delay begins when the command handles the signal, which it does by
+///                     blocking it for all threads but one
 std::string interrupted(const std::string& command, const std::string& delay, bool isListening) {
-  // SIGINT is bit 1 of the caught signals.
+  // SIGINT is bit 1 of the blocked signals.
   const std::string listen =
       isListening
-          ? "n=0; until [ $n -eq 1000 ] || ! kill -0 $pid || grep -q '^SigCgt:.*[2367abef]$' "
+          ? "n=0; until [ $n -eq 1000 ] || ! kill -0 $pid || grep -q '^SigBlk:.*[2367abef]$' "
             "/proc/$pid/status; do n=$((n + 1)); sleep 0.01; done; "
           : "";
   return "set -m; " + command + " & pid=$!; " + listen + "sleep " + delay +
