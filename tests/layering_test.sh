@@ -31,7 +31,7 @@ plant render/kernel/paint.h '#include "render/embree/embree_renderer.h"'
 refuses 'render/kernel/paint.h includes render/embree/embree_renderer.h'
 restore render/kernel/paint.h
 plant mapping/rbf/offset.h '#pragma once'
-refuses 'files named offset in several folders: levelset/solids mapping/rbf'
+refuses 'files named offset in several folders: levelset/offset mapping/rbf'
 restore mapping/rbf/offset.h
 for i in $(seq 21); do plant "levelset/fields/extra_$i.cpp" ''; done
 refuses 'levelset/fields has [0-9]* files, 20 are allowed'

@@ -12,7 +12,7 @@
 #include "levelset/inspect/compare.h"
 #include "levelset/inspect/measure.h"
 #include "levelset/meshing/band_to_mesh.h"
-#include "levelset/placement/resample.h"
+#include "levelset/transform/resample.h"
 #include "levelset/vdb.h"
 
 namespace regress {

@@ -15,7 +15,7 @@
 #include "levelset/csg/csg_vdb.h"
 #include "levelset/distance/distance_transform.h"
 #include "levelset/error.h"
-#include "levelset/placement/resample.h"
+#include "levelset/transform/resample.h"
 #include "levelset/vdb.h"
 
 namespace levelset {

@@ -6,7 +6,7 @@
 #include <set>
 
 #include "levelset/csg/csg_vdb.h"
-#include "levelset/placement/resample.h"
+#include "levelset/transform/resample.h"
 
 namespace levelset::solids {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/eikonal and levelset/solids only.
+// For the .cpp files of levelset only.
 
 #include <cstdint>
 #include <span>

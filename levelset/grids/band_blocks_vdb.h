@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/flow only.
+// For the .cpp files of levelset/advection only.
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>

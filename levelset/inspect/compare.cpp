@@ -16,8 +16,8 @@
 #include "levelset/inspect/curved_surface.h"
 #include "levelset/inspect/symmetric_difference.h"
 #include "levelset/meshing/cell_surface.h"
-#include "levelset/placement/resample.h"
 #include "levelset/progress_gate.h"
+#include "levelset/transform/resample.h"
 #include "levelset/vdb.h"
 
 namespace levelset {

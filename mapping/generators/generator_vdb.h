@@ -10,7 +10,7 @@
 
 #include "levelset/distance/redistance.h"
 #include "levelset/error.h"
-#include "levelset/solids/shape_band_vdb.h"
+#include "levelset/shapes/shape_band_vdb.h"
 #include "mapping/generators/tiling.h"
 
 namespace mapping {

@@ -5,7 +5,7 @@
 #include <array>
 
 #include "levelset/narrow_band.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "mapping/generators/tiling.h"
 
 namespace mapping {

@@ -4,7 +4,7 @@
 
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "mapping/generators/tiling.h"
 
 namespace mapping {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "levelset/narrow_band.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "mapping/generators/tiling.h"
 
 namespace mapping {

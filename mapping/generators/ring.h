@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "levelset/narrow_band.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "mapping/generators/tiling.h"
 
 namespace mapping {

@@ -9,7 +9,7 @@
 #include "levelset/error.h"
 #include "levelset/grids/sample.h"
 #include "levelset/memory_limit.h"
-#include "levelset/placement/resample.h"
+#include "levelset/transform/resample.h"
 
 namespace mapping {
 namespace {

@@ -8,14 +8,14 @@
 #include <map>
 #include <span>
 
+#include "levelset/components/components.h"
 #include "levelset/csg/blend.h"
 #include "levelset/csg/clip.h"
 #include "levelset/csg/csg.h"
 #include "levelset/distance/redistance.h"
 #include "levelset/error.h"
 #include "levelset/grids/sample.h"
-#include "levelset/placement/resample.h"
-#include "levelset/solids/components.h"
+#include "levelset/transform/resample.h"
 #include "mapping/textures/shared_sides.h"
 #include "mapping/textures/texture_maps.h"
 #include "mapping/textures/texture_warp.h"

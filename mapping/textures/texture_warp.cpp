@@ -14,8 +14,8 @@
 
 #include "levelset/error.h"
 #include "levelset/grids/sample.h"
-#include "levelset/placement/resample_vdb.h"
 #include "levelset/progress_gate.h"
+#include "levelset/transform/resample_vdb.h"
 #include "levelset/vdb.h"
 #include "mapping/maps/layer_map.h"
 

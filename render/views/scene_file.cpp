@@ -17,7 +17,7 @@
 #include "levelset/files/band_file.h"
 #include "levelset/files/json_depth.h"
 #include "levelset/mesh_files/mesh_file.h"
-#include "levelset/placement/transform.h"
+#include "levelset/transform/transform.h"
 #include "render/scene/field_expression.h"
 #include "render/views/picture.h"
 

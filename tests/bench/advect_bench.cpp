@@ -14,10 +14,10 @@
 #include <vector>
 
 #include "apps/regress/peers/peer.h"
-#include "levelset/flow/advect.h"
-#include "levelset/flow/velocity.h"
+#include "levelset/advection/advect.h"
+#include "levelset/advection/velocity.h"
 #include "levelset/inspect/measure.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "levelset/vdb.h"
 
 namespace {

@@ -3,9 +3,9 @@
 #include <benchmark/benchmark.h>
 #include <openvdb/tools/LevelSetFilter.h>
 
-#include "levelset/curvature/curvature_flow.h"
-#include "levelset/curvature/smooth.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/curvature_flow/curvature_flow.h"
+#include "levelset/curvature_flow/smooth.h"
+#include "levelset/shapes/shapes.h"
 #include "levelset/vdb.h"
 
 namespace {

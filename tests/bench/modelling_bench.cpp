@@ -10,18 +10,18 @@
 
 #include <cmath>
 
+#include "levelset/components/components.h"
 #include "levelset/csg/blend.h"
-#include "levelset/curvature/smooth.h"
+#include "levelset/curvature_flow/smooth.h"
 #include "levelset/distance/closest_points.h"
 #include "levelset/inspect/check.h"
 #include "levelset/inspect/compare.h"
 #include "levelset/inspect/measure.h"
-#include "levelset/placement/resample.h"
-#include "levelset/solids/components.h"
-#include "levelset/solids/morph.h"
-#include "levelset/solids/morphology.h"
-#include "levelset/solids/offset.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/morph/morph.h"
+#include "levelset/offset/morphology.h"
+#include "levelset/offset/offset.h"
+#include "levelset/shapes/shapes.h"
+#include "levelset/transform/resample.h"
 #include "levelset/vdb.h"
 
 namespace {

@@ -14,8 +14,8 @@
 #include "levelset/distance/redistance.h"
 #include "levelset/eikonal/arrival.h"
 #include "levelset/meshing/band_to_mesh.h"
-#include "levelset/solids/offset.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/offset/offset.h"
+#include "levelset/shapes/shapes.h"
 #include "levelset/vdb.h"
 
 namespace {

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "levelset/csg/csg.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "render/cpu/cpu_tracer.h"
 #include "render/kernel/kernel_scene.h"
 

@@ -12,7 +12,7 @@
 #include <algorithm>
 #include <ctime>
 
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "mapping/placement/scatter.h"
 #include "mapping/textures/geometric_texture.h"
 

@@ -1,6 +1,6 @@
 #include <cstdio>
 
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "mapping/patches/patch.h"
 #include "render/embree/embree_renderer.h"
 

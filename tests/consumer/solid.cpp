@@ -1,7 +1,7 @@
 #include <cstdio>
 
 #include "levelset/inspect/measure.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 
 int main() {
   const levelset::NarrowBand ball = levelset::makeSphere(1, Imath::V3d(0), 0.1);

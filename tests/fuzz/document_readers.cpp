@@ -5,7 +5,7 @@
 #include "apps/pipeline/values/mesh_bytes.h"
 #include "levelset/files/band_file.h"
 #include "levelset/mesh_files/mesh_file.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "mapping/patches/patch_file.h"
 #include "render/views/scene_file.h"
 #include "tests/fuzz/readers.h"

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "mapping/animation/animation.h"
 #include "mapping/placement/make_patch.h"
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "levelset/csg/csg.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "render/camera.h"
 #include "render/scene/scene.h"
 

@@ -11,9 +11,9 @@
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/fields.h"
 #include "apps/pipeline/registry/invocation.h"
+#include "levelset/advection/velocity.h"
 #include "levelset/error.h"
 #include "levelset/fields/mask.h"
-#include "levelset/flow/velocity.h"
 #include "levelset/operator/options.h"
 
 /// Derives parameters of the command line from the description of an options struct, and reads

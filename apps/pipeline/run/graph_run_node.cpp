@@ -6,7 +6,7 @@
 #include "apps/pipeline/run/planner.h"
 #include "apps/pipeline/values/refusal.h"
 #include "levelset/error.h"
-#include "levelset/placement/crop.h"
+#include "levelset/transform/crop.h"
 
 namespace pipeline {
 namespace {

@@ -7,8 +7,8 @@
 #include "apps/regress/recorder.h"
 #include "apps/regress/truth/carried.h"
 #include "apps/regress/truth/exact_band.h"
-#include "levelset/flow/advect.h"
-#include "levelset/flow/velocity.h"
+#include "levelset/advection/advect.h"
+#include "levelset/advection/velocity.h"
 #include "levelset/inspect/compare.h"
 
 namespace regress {

@@ -10,9 +10,9 @@
 #include "levelset/distance/redistance.h"
 #include "levelset/inspect/check.h"
 #include "levelset/inspect/measure.h"
-#include "levelset/placement/resample.h"
-#include "levelset/placement/transform.h"
-#include "levelset/solids/offset.h"
+#include "levelset/offset/offset.h"
+#include "levelset/transform/resample.h"
+#include "levelset/transform/transform.h"
 #include "levelset/vdb.h"
 
 namespace regress {

@@ -6,7 +6,7 @@
 #include "apps/regress/recorder.h"
 #include "apps/regress/truth/exact_band.h"
 #include "levelset/csg/csg.h"
-#include "levelset/curvature/curvature_flow.h"
+#include "levelset/curvature_flow/curvature_flow.h"
 #include "levelset/inspect/check.h"
 #include "levelset/inspect/measure.h"
 

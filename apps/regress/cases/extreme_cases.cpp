@@ -4,8 +4,8 @@
 #include "apps/regress/truth/exact_band.h"
 #include "levelset/csg/csg.h"
 #include "levelset/distance/redistance.h"
-#include "levelset/solids/offset.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/offset/offset.h"
+#include "levelset/shapes/shapes.h"
 
 namespace regress {
 

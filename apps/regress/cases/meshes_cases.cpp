@@ -9,7 +9,7 @@
 #include "levelset/convert/mesh_to_band.h"
 #include "levelset/mesh_sign/triangle_distance.h"
 #include "levelset/meshing/band_to_mesh.h"
-#include "levelset/placement/transform.h"
+#include "levelset/transform/transform.h"
 
 namespace regress {
 

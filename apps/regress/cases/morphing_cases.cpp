@@ -6,7 +6,7 @@
 #include "apps/regress/recorder.h"
 #include "apps/regress/truth/exact_band.h"
 #include "levelset/inspect/compare.h"
-#include "levelset/solids/morph.h"
+#include "levelset/morph/morph.h"
 
 namespace regress {
 

@@ -1,4 +1,4 @@
-#include "levelset/solids/morphology.h"
+#include "levelset/offset/morphology.h"
 
 #include <fmt/core.h>
 

@@ -1,4 +1,4 @@
-#include "levelset/solids/offset.h"
+#include "levelset/offset/offset.h"
 
 #include "apps/regress/peers/peer.h"
 #include "apps/regress/recorder.h"

@@ -1,4 +1,4 @@
-#include "levelset/placement/resample.h"
+#include "levelset/transform/resample.h"
 
 #include "apps/regress/peers/peer.h"
 #include "apps/regress/recorder.h"

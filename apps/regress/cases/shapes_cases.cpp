@@ -1,4 +1,4 @@
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 
 #include "apps/regress/peers/peer.h"
 #include "apps/regress/recorder.h"

@@ -1,4 +1,4 @@
-#include "levelset/curvature/smooth.h"
+#include "levelset/curvature_flow/smooth.h"
 
 #include <cmath>
 #include <numbers>

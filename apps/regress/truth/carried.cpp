@@ -4,7 +4,7 @@
 
 #include "levelset/convert/mesh_to_band.h"
 #include "levelset/meshing/band_to_mesh.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 
 namespace regress {
 

@@ -13,8 +13,8 @@
 #include "apps/viewer/model/layer_colours.h"
 #include "levelset/error.h"
 #include "levelset/grids/sample.h"
-#include "levelset/placement/transform.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
+#include "levelset/transform/transform.h"
 
 namespace viewer {
 namespace {

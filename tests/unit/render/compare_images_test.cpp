@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "levelset/error.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "render/embree/embree_renderer.h"
 #include "render/scene/scene.h"
 

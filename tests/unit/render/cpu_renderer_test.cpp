@@ -9,8 +9,8 @@
 #include <string>
 
 #include "levelset/error.h"
-#include "levelset/placement/transform.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
+#include "levelset/transform/transform.h"
 #include "render/embree/embree_renderer.h"
 #include "render/images/compare_images.h"
 #include "tests/support/render_scenes.h"

@@ -8,7 +8,7 @@
 #include <memory>
 #include <string>
 
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/embree/embree_renderer.h"
 #include "render/gpu/gpu_renderer.h"

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "levelset/error.h"
-#include "levelset/placement/transform.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
+#include "levelset/transform/transform.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/embree/embree_renderer.h"
 #include "render/gpu/gpu_renderer.h"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/embree/embree_renderer.h"
 #include "tests/support/field_scenes.h"

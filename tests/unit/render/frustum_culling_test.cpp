@@ -7,8 +7,8 @@
 #include <string>
 
 #include "levelset/csg/csg.h"
-#include "levelset/placement/transform.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
+#include "levelset/transform/transform.h"
 #include "render/cpu/cpu_tracer.h"
 #include "render/images/compare_images.h"
 #include "render/kernel/kernel_scene.h"

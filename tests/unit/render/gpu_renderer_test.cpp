@@ -11,8 +11,8 @@
 
 #include "levelset/csg/csg.h"
 #include "levelset/error.h"
-#include "levelset/placement/transform.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
+#include "levelset/transform/transform.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/cpu/cpu_trace.h"
 #include "render/gpu/gl_context.h"

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "levelset/csg/csg.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "levelset/vdb.h"
 #include "render/bricks/brick_pool.h"
 #include "render/cpu/cpu_trace.h"

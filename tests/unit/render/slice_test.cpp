@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "levelset/error.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 
 namespace slice_test {
 

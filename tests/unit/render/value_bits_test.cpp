@@ -8,7 +8,7 @@
 #include <string>
 
 #include "levelset/error.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "levelset/vdb.h"
 #include "render/bricks/brick_pool.h"
 #include "render/cpu/cpu_renderer.h"

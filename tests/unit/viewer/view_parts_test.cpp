@@ -19,7 +19,7 @@
 #include "apps/viewer/viewer_arguments.h"
 #include "levelset/error.h"
 #include "levelset/files/band_file.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "tests/support/files.h"
 
 namespace view_parts_test {

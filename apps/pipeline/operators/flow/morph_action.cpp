@@ -6,7 +6,7 @@
 #include "apps/pipeline/operators/level_set_operator.h"
 #include "levelset/error.h"
 #include "levelset/files/band_file.h"
-#include "levelset/solids/morph.h"
+#include "levelset/morph/morph.h"
 
 namespace pipeline {
 namespace {

@@ -4,13 +4,13 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "levelset/components/components.h"
 #include "levelset/csg/clip.h"
 #include "levelset/error.h"
 #include "levelset/files/band_file.h"
 #include "levelset/inspect/check.h"
 #include "levelset/inspect/measure.h"
-#include "levelset/solids/components.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "render/images/image.h"
 #include "tests/support/command_line.h"
 

@@ -9,7 +9,7 @@
 #include "levelset/error.h"
 #include "levelset/fields/grid_vdb.h"
 #include "levelset/files/band_file.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "tests/support/command_line.h"
 
 namespace fields_test {

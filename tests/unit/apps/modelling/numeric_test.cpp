@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "levelset/files/band_file.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "levelset/vdb.h"
 #include "tests/support/command_line.h"
 

@@ -15,7 +15,7 @@
 #include "apps/regress/truth/gaps.h"
 #include "apps/regress/truth/rays.h"
 #include "apps/regress/truth/truth.h"
-#include "levelset/flow/velocity.h"
+#include "levelset/advection/velocity.h"
 #include "levelset/vdb.h"
 #include "tests/support/command_line.h"
 

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "apps/pipeline/values/mesh_bytes.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "tests/support/command_line.h"
 
 namespace cache_test {

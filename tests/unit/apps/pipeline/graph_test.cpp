@@ -14,7 +14,7 @@
 #include "apps/pipeline/graph/graph_file.h"
 #include "apps/pipeline/run/runner.h"
 #include "levelset/error.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "tests/support/command_line.h"
 
 namespace graph_test {

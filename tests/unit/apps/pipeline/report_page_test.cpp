@@ -11,7 +11,7 @@
 #include "apps/html_text.h"
 #include "apps/pipeline/report/report.h"
 #include "apps/pipeline/report/versions.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "render/shading/style.h"
 #include "tests/support/command_line.h"
 #include "tests/support/files.h"

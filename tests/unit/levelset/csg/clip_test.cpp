@@ -7,8 +7,8 @@
 
 #include "levelset/error.h"
 #include "levelset/inspect/measure.h"
-#include "levelset/placement/transform.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
+#include "levelset/transform/transform.h"
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
 #include "tests/support/measured.h"

@@ -10,7 +10,7 @@
 #include "levelset/geometry/point_tree.h"
 #include "levelset/grids/sample.h"
 #include "levelset/inspect/measure.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
 #include "tests/support/measured.h"

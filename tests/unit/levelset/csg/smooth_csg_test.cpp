@@ -10,8 +10,8 @@
 #include "levelset/grids/sample.h"
 #include "levelset/inspect/check.h"
 #include "levelset/inspect/measure.h"
-#include "levelset/placement/resample.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
+#include "levelset/transform/resample.h"
 #include "levelset/vdb.h"
 #include "tests/support/bands.h"
 

@@ -6,7 +6,7 @@
 #include "levelset/error.h"
 #include "levelset/inspect/measure.h"
 #include "levelset/mesh_files/mesh_file.h"
-#include "levelset/placement/transform.h"
+#include "levelset/transform/transform.h"
 #include "tests/support/files.h"
 #include "tests/support/measured.h"
 #include "tests/support/mesh_files.h"

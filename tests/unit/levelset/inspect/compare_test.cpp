@@ -6,9 +6,9 @@
 #include <numbers>
 
 #include "levelset/error.h"
-#include "levelset/placement/resample.h"
-#include "levelset/placement/transform.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
+#include "levelset/transform/resample.h"
+#include "levelset/transform/transform.h"
 #include "tests/support/bands.h"
 #include "tests/support/measured.h"
 

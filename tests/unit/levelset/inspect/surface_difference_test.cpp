@@ -10,7 +10,7 @@
 #include "levelset/error.h"
 #include "levelset/geometry/closest_on_triangle.h"
 #include "levelset/meshing/band_to_mesh.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "tests/support/files.h"
 #include "tests/support/measured.h"
 #include "tests/support/threads.h"

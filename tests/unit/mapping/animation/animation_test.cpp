@@ -11,7 +11,7 @@
 
 #include "levelset/csg/csg.h"
 #include "levelset/error.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "mapping/animation/patch_path.h"
 #include "mapping/placement/make_patch.h"
 #include "mapping/surface/geodesic.h"

@@ -11,7 +11,7 @@
 #include "levelset/csg/csg.h"
 #include "levelset/error.h"
 #include "levelset/fields/grid.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "mapping/distortion/distortion.h"
 #include "mapping/distortion/jacobian_field.h"
 #include "mapping/layers/trilinear_volume.h"

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "levelset/error.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "mapping/maps/prism_map.h"
 #include "mapping/placement/make_patch.h"
 #include "mapping/surface/surface_walk.h"

@@ -4,7 +4,7 @@
 
 #include "levelset/convert/surface_band.h"
 #include "levelset/error.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "mapping/generators/heightmap.h"
 #include "mapping/placement/decal.h"
 #include "mapping/placement/make_patch.h"

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "levelset/error.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "mapping/patches/patch_mesh.h"
 #include "mapping/placement/make_patch.h"
 #include "tests/support/measured.h"

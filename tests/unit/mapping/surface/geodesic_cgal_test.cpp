@@ -14,7 +14,7 @@
 #include "levelset/convert/mesh_to_band.h"
 #include "levelset/mesh_files/mesh_file.h"
 #include "levelset/meshing/band_to_mesh.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "mapping/surface/geodesic.h"
 #include "mapping/surface/surface_projection.h"
 #include "tests/support/meshes.h"

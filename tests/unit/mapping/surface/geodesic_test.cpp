@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "mapping/surface/surface_projection.h"
 #include "mapping/surface/surface_walk.h"
 #include "tests/support/measured.h"

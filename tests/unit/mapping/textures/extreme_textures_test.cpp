@@ -14,7 +14,7 @@
 #include "levelset/grids/sample.h"
 #include "levelset/inspect/measure.h"
 #include "levelset/meshing/band_to_mesh.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "mapping/placement/make_patch.h"
 #include "mapping/textures/geometric_texture.h"
 #include "tests/support/files.h"

@@ -12,7 +12,7 @@
 #include "levelset/error.h"
 #include "levelset/grids/sample.h"
 #include "levelset/inspect/measure.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "mapping/maps/prism_map.h"
 #include "mapping/placement/make_patch.h"
 #include "tests/support/files.h"

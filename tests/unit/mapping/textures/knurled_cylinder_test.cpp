@@ -12,7 +12,7 @@
 
 #include "levelset/grids/sample.h"
 #include "levelset/inspect/measure.h"
-#include "levelset/solids/shapes.h"
+#include "levelset/shapes/shapes.h"
 #include "mapping/generators/knurl.h"
 #include "mapping/placement/patch_grid.h"
 #include "mapping/placement/shared_particles.h"

@@ -1,0 +1,126 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "levelset/advection/velocity.h"
+#include "levelset/fields/field.h"
+#include "levelset/fields/mask.h"
+#include "levelset/narrow_band.h"
+#include "levelset/operator/description.h"
+#include "levelset/progress.h"
+
+namespace levelset {
+
+enum class AdvectScheme {
+  /// Triangle surface whose vertices follow the flow; converted to a band at the end. Preserves
+  /// volume and thin sheets, since nothing is interpolated on a grid during the motion.
+  Front,
+  /// φ at the feet of backward characteristics, interpolated tricubically. Steps of several voxels;
+  /// redistanced after each [Strain99].
+  SemiLagrangian,
+  /// Upwind differences: fifth-order HJ-WENO and third-order TVD Runge-Kutta. Steps below one voxel
+  /// [Jiang00, Shu88]; redistanced every voxel and a half.
+  Upwind
+};
+
+struct AdvectOptions {
+  double start = 0;  ///< time of the velocity at the start of the motion
+  AdvectScheme scheme = AdvectScheme::Front;
+  bool fixVolume = false;         ///< offset the result to the volume of the solid
+  std::optional<Mask> mask = {};  ///< scales the velocity
+  std::size_t maxMemory = kNoMemoryLimit;
+  Progress progress = {};
+};
+
+struct AdvectResult {
+  NarrowBand band;
+  std::size_t steps = 0;
+  double volumeBefore = 0, volumeAfter = 0;  ///< world units³; after: before fixVolume
+};
+
+/// Moves a solid with a velocity field: φ_t + u·∇φ = 0.
+///
+/// A grid cannot hold sheets thinner than its voxels. Enright's deformation there and back on 64³
+/// costs the upwind scheme 30 % of the volume (OpenVDB's: 44 %), and the front 0.1 %. A reference
+/// map on the same grid was tried and failed for the same reason: it stretches fortyfold between
+/// two grid points. Triangles that are split where they stretch keep both sides of a sheet, however
+/// near they come to each other.
+///
+/// @param velocity  world units per unit of time; evaluated only near the surface, and only at
+///                  times within the current step
+/// @param time      duration; negative runs backwards
+/// @return a band with the transform and half width of `solid`. It lacks parts thinner than about a
+///         voxel; Advection keeps them until the band is requested
+/// @throws InvalidInput if `solid` is empty, if the velocity is not finite on the path of the
+///         surface, or if no part thick enough for the grid is left
+/// @throws UsageError for times that are not finite
+/// @throws ResourceLimit for too many steps, triangles or voxels
+/// @throws Cancelled
+[[nodiscard]] AdvectResult advect(NarrowBand solid, const VectorField& velocity, double time,
+                                  const AdvectOptions& options = {});
+
+/// Advection step by step, for a velocity that becomes known only as time advances (a simulation).
+/// Parts thinner than a voxel survive between the calls, unlike through a band.
+class Advection {
+ public:
+  explicit Advection(NarrowBand solid, const AdvectOptions& options = {});
+  ~Advection();
+  Advection(Advection&&) noexcept;
+  Advection& operator=(Advection&&) noexcept;
+
+  /// Advances by `time`. The velocity is evaluated only at times within that interval.
+  void advance(const VectorField& velocity, double time);
+  [[nodiscard]] AdvectResult result() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// The operator `advect`.
+struct AdvectOperator {
+  static const OperatorText text;
+  static constexpr ErrorModel errorModel{2, 1.1, 0, "rigid-rotation"};
+
+  struct Options {
+    NamedVelocity field;
+    double time = 0, start = 0;
+    AdvectScheme scheme = AdvectScheme::Front;
+    std::optional<double> period;  ///< of a velocity known by its name
+    Imath::V3d center = Imath::V3d(0), axis = Imath::V3d(0, 0, 1);
+    std::string factor;  ///< formula in t; empty: 1
+    bool fixVolume = false;
+    std::optional<Mask> mask;
+
+    template <class Visitor>
+    static void describe(Visitor& visit) {
+      visit("field", &Options::field,
+            {.help = "the velocity, world units per unit of time", .required = true});
+      visit("time", &Options::time,
+            {.help = "length of time; negative: backwards", .required = true});
+      visit("start", &Options::start, {.help = "time of the velocity at which it begins"});
+      visit("scheme", &Options::scheme,
+            {{"front", AdvectScheme::Front},
+             {"semi-lagrangian", AdvectScheme::SemiLagrangian},
+             {"upwind", AdvectScheme::Upwind}},
+            {.help = "numerical scheme"});
+      visit("period", &Options::period,
+            {.help = "period of a velocity known by its name; default: enright 3, vortex 8, "
+                     "rotation 1",
+             .range = OptionRange::Positive});
+      visit("center", &Options::center, {.help = "centre of the rotation"});
+      visit("axis", &Options::axis, {.help = "axis of the rotation"});
+      visit("factor", &Options::factor,
+            {.help = "formula in t that the velocity is multiplied by"});
+      visit("fix-volume", &Options::fixVolume,
+            {.help = "offset the result to the volume of the solid"});
+      visit("mask", &Options::mask, {});
+    }
+  };
+
+  static void check(const Options& options, const GivenOptions& given);
+  static NarrowBand run(std::vector<NarrowBand> operands, const Options& options, OperatorRun& run);
+};
+
+}  // namespace levelset

@@ -1,0 +1,69 @@
+#include <fmt/core.h>
+
+#include "levelset/advection/advect.h"
+#include "levelset/error.h"
+#include "levelset/fields/expression.h"
+
+namespace levelset {
+namespace {
+
+VectorField velocityOf(const AdvectOperator::Options& options) {
+  const std::string& name = options.field.name;
+  const auto period = [&](double usual) { return options.period.value_or(usual); };
+  VectorField velocity = name == "enright"  ? enrightVelocity(period(3))
+                         : name == "vortex" ? vortexVelocity(period(8))
+                         : name == "rotation"
+                             ? rotationVelocity(options.center, options.axis, period(1))
+                             : options.field.field;
+  if (options.factor.empty()) return velocity;
+  return [velocity, factor = timeExpression(options.factor, "advect: --factor")](
+             const Imath::V3d& p, double time) { return velocity(p, time) * factor(time); };
+}
+
+}  // namespace
+
+const OperatorText AdvectOperator::text{
+    .name = "advect",
+    .group = "Flow",
+    .summary = "carry a solid along with a velocity",
+    .details =
+        "The velocity is a named one, three formulas in x, y, z, r and t, or a field of vectors "
+        "(read FILE.vdb --grid NAME --as v, then --field @v), staggered or not. A negative time "
+        "runs backwards. The scheme 'front' moves the surface as triangles and keeps volume and "
+        "thin sheets; the two others work on the grid.",
+    .example =
+        "levelsmith sphere --radius 0.15 --center 0.35,0.35,0.35 --voxel 0.03 ! advect "
+        "--field enright --time 0.3 ! measure"};
+
+void AdvectOperator::check(const Options& options, const GivenOptions& given) {
+  if (given("factor")) (void)timeExpression(options.factor, "advect: --factor");
+  if (given("period") && options.field.name.empty())
+    throw UsageError(
+        "advect: --period is that of a velocity known by its name; write the time into the formula "
+        "or use --factor");
+  for (const char* option : {"center", "axis"}) {
+    if (given(option) && options.field.name != "rotation")
+      throw UsageError(fmt::format(
+          "advect: --{} is that of the rotation; leave it out, or use --field rotation", option));
+  }
+}
+
+NarrowBand AdvectOperator::run(std::vector<NarrowBand> operands, const Options& options,
+                               OperatorRun& run) {
+  const AdvectOptions settings{.start = options.start,
+                               .scheme = options.scheme,
+                               .fixVolume = options.fixVolume,
+                               .mask = options.mask,
+                               .maxMemory = run.maxMemory,
+                               .progress = run.progress};
+  AdvectResult result = advect(operands[0], velocityOf(options), options.time, settings);
+  const double change = result.volumeAfter / result.volumeBefore - 1;
+  run.figures = {{"steps", result.steps},
+                 {"volume_before", result.volumeBefore},
+                 {"volume_after", result.volumeAfter}};
+  run.notes.push_back(fmt::format("{} steps, the volume changed by {:+.3g} %{}", result.steps,
+                                  100 * change, options.fixVolume ? " before it was fixed" : ""));
+  return std::move(result.band);
+}
+
+}  // namespace levelset

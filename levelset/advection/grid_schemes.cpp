@@ -1,0 +1,229 @@
+#include "levelset/advection/grid_schemes.h"
+
+#include <openvdb/tools/Morphology.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "levelset/advection/characteristic.h"
+#include "levelset/distance/distance_transform.h"
+#include "levelset/distance/interpolant.h"
+#include "levelset/vdb.h"
+
+namespace levelset::flow {
+namespace {
+
+using Imath::V3d;
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+using openvdb::Index;
+using LeafNode = FloatTree::LeafNodeType;
+
+// Semi-Lagrangian: limits of a step, the move in voxels and the strain.
+constexpr double kFarthestFoot = 4, kFootStrain = 0.5;
+// Half width of the working band, voxels. All values interpolated beside the zero set, and those
+// for the distances computed from them, are then distances and not the background.
+constexpr double kFootWidth = 5;
+// Upwind: share of the CFL limit, travel of the surface before redistancing, and half width of the
+// working band, both in voxels. The band must hold the travel and the stencils beyond it.
+constexpr double kCfl = 0.5, kUpwindTravel = 1.5, kUpwindWidth = 6;
+
+std::vector<LeafNode*> leavesOf(FloatTree& tree) {
+  std::vector<LeafNode*> leaves;
+  tree.getNodes(leaves);
+  return leaves;
+}
+
+V3d positionOf(const LeafNode& leaf, Index n) {
+  return toImath(leaf.offsetToGlobalCoord(n).asVec3d());
+}
+
+/// Returns the longest step at a time: the minimum of `limit` over the active grid points.
+template <typename Limit>
+double longestStep(FloatGrid& grid, const Limit& limit) {
+  const std::vector<LeafNode*> leaves = leavesOf(grid.tree());
+  std::vector<double> least(leaves.size(), HUGE_VAL);
+  tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
+    for (auto it = leaves[i]->cbeginValueOn(); it; ++it)
+      least[i] = std::min(least[i], limit(positionOf(*leaves[i], it.pos())));
+  });
+  double result = HUGE_VAL;
+  for (const double value : least) result = std::min(result, value);
+  return result;
+}
+
+FloatGrid::Ptr distanceOf(const FloatGrid& field, double halfWidth, const TimeInterval& interval) {
+  eikonal::DistanceRequest request;
+  request.action = interval.action;
+  request.halfWidth = halfWidth;
+  request.maxMemory = interval.maxMemory;
+  return eikonal::distanceTransform(field, request);
+}
+
+// === Semi-Lagrangian
+
+// Largest error of a foot point per step, voxels. A path with a larger error is halved, at most
+// kMostHalvings times.
+constexpr double kFootError = 1e-3;
+constexpr int kMostHalvings = 6;
+
+V3d footOf(const TimeInterval& interval, const V3d& position, double from, double to,
+           int halvings = 0) {
+  const Characteristic path(interval.velocity, position, from, to);
+  if (!path.isFinite()) requireFinitePath(interval, position, from, to);
+  if (!(path.error.length() > kFootError) || halvings == kMostHalvings) return position + path.move;
+  const double middle = from + (to - from) / 2;
+  return footOf(interval, footOf(interval, position, from, middle, halvings + 1), middle, to,
+                halvings + 1);
+}
+
+FloatGrid::Ptr semiLagrangianStep(const FloatGrid& before, const TimeInterval& interval,
+                                  double from, double to) {
+  const FloatGrid::Ptr after = before.deepCopy();
+  openvdb::tools::dilateActiveValues(after->tree(), static_cast<int>(kFarthestFoot) + 1,
+                                     openvdb::tools::NN_FACE_EDGE, openvdb::tools::IGNORE_TILES);
+  const std::vector<LeafNode*> leaves = leavesOf(after->tree());
+  tbb::enumerable_thread_specific<eikonal::DenseBlockCache> caches(
+      [&] { return eikonal::DenseBlockCache(before.tree()); });
+  tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
+    eikonal::DenseBlockCache& cache = caches.local();
+    for (auto it = leaves[i]->beginValueOn(); it; ++it) {
+      const openvdb::Vec3d foot =
+          toVdb(footOf(interval, positionOf(*leaves[i], it.pos()), to, from));
+      const eikonal::DenseBlock& block = cache.around(foot);
+      it.setValue(static_cast<float>(block.jet(foot - block.origin().asVec3d()).value));
+    }
+  });
+  return after;
+}
+
+// === Upwind
+
+/// Fifth-order weighted, essentially non-oscillatory derivative from five differences in the
+/// direction of the flow [Jiang00].
+double weno5(double a, double b, double c, double d, double e) {
+  const double s1 = 13.0 / 12 * (a - 2 * b + c) * (a - 2 * b + c) +
+                    0.25 * (a - 4 * b + 3 * c) * (a - 4 * b + 3 * c);
+  const double s2 = 13.0 / 12 * (b - 2 * c + d) * (b - 2 * c + d) + 0.25 * (b - d) * (b - d);
+  const double s3 = 13.0 / 12 * (c - 2 * d + e) * (c - 2 * d + e) +
+                    0.25 * (3 * c - 4 * d + e) * (3 * c - 4 * d + e);
+  // Differences are about one voxel per voxel.
+  constexpr double kSmall = 1e-6;
+  const double w1 = 0.1 / ((s1 + kSmall) * (s1 + kSmall)),
+               w2 = 0.6 / ((s2 + kSmall) * (s2 + kSmall)),
+               w3 = 0.3 / ((s3 + kSmall) * (s3 + kSmall));
+  return (w1 * (2 * a - 7 * b + 11 * c) + w2 * (-b + 5 * c + 2 * d) + w3 * (2 * c + 5 * d - e)) /
+         (6 * (w1 + w2 + w3));
+}
+
+/// Returns the derivative along an axis from the upwind side; voxels per voxel.
+double upwindDerivative(const eikonal::DenseBlock& block, const Coord& c, int axis, double speed,
+                        double voxelSize) {
+  const int side = speed > 0 ? -1 : 1;
+  std::array<double, 6> values;
+  for (int k = 0; k < 6; ++k) {
+    Coord at = c;
+    at[axis] += side * (3 - k);
+    values[static_cast<std::size_t>(k)] =
+        static_cast<double>(block.at(at[0], at[1], at[2])) / voxelSize;
+  }
+  std::array<double, 5> d;
+  for (std::size_t k = 0; k < 5; ++k) d[k] = -side * (values[k + 1] - values[k]);
+  return weno5(d[0], d[1], d[2], d[3], d[4]);
+}
+
+/// result = share · start + (1 − share) · (field − dt u·∇field) on the active grid points.
+void eulerStage(const FloatGrid& start, const FloatGrid& field, double share, double time,
+                double dt, const TimeInterval& interval, FloatGrid& result) {
+  const std::vector<LeafNode*> leaves = leavesOf(result.tree());
+  const double h = result.voxelSize()[0], background = static_cast<double>(result.background());
+  tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
+    const FloatGrid::ConstAccessor accessor(field.tree());
+    const LeafNode* first = start.tree().probeConstLeaf(leaves[i]->origin());
+    eikonal::DenseBlock block;
+    block.load(accessor, leaves[i]->origin());
+    for (auto it = leaves[i]->beginValueOn(); it; ++it) {
+      const Coord c = LeafNode::offsetToLocalCoord(it.pos());
+      const V3d speed = interval.velocity(positionOf(*leaves[i], it.pos()), time);
+      requireFinite(interval, speed, positionOf(*leaves[i], it.pos()), time);
+      double slope = 0;
+      for (int axis = 0; axis < 3; ++axis)
+        if (speed[axis] != 0)
+          slope += speed[axis] * upwindDerivative(block, c, axis, speed[axis] * dt, h);
+      const double moved = static_cast<double>(block.at(c[0], c[1], c[2])) - dt * slope * h;
+      const double value =
+          share * static_cast<double>(first->getValue(it.pos())) + (1 - share) * moved;
+      it.setValue(
+          static_cast<float>(std::clamp(value, -background + 1e-6 * h, background - 1e-6 * h)));
+    }
+  });
+}
+
+/// Third-order TVD Runge-Kutta step [Shu88].
+FloatGrid::Ptr upwindStep(const FloatGrid& start, const TimeInterval& interval, double from,
+                          double to) {
+  const double dt = to - from;
+  const FloatGrid::Ptr one = start.deepCopy(), two = start.deepCopy(), three = start.deepCopy();
+  eulerStage(start, start, 0, from, dt, interval, *one);
+  eulerStage(start, *one, 0.75, to, dt, interval, *two);
+  eulerStage(start, *two, 1.0 / 3, from + dt / 2, dt, interval, *three);
+  return three;
+}
+
+}  // namespace
+
+std::size_t advectSemiLagrangian(NarrowBand& band, const TimeInterval& interval) {
+  const double halfWidth = band.halfWidth(), width = std::max(halfWidth, kFootWidth);
+  FloatGrid::Ptr grid =
+      width > halfWidth ? distanceOf(vdb(band), width, interval) : vdb(band).deepCopy();
+  const auto longest = [&](double time) {
+    return longestStep(*grid, [&](const V3d& p) {
+      const V3d speed = interval.velocity(p, time);
+      requireFinite(interval, speed, p, time);
+      double strain = 0;
+      for (int axis = 0; axis < 3; ++axis) {
+        V3d q = p;
+        q[axis] += 1;
+        strain += (interval.velocity(q, time) - speed).length2();
+      }
+      return std::min(kFarthestFoot / speed.length(), kFootStrain / std::sqrt(strain));
+    });
+  };
+  const std::size_t steps = integrate(interval, longest, [&](double from, double to) {
+    grid = distanceOf(*semiLagrangianStep(*grid, interval, from, to), width, interval);
+  });
+  if (steps > 0) band = makeBand(width > halfWidth ? distanceOf(*grid, halfWidth, interval) : grid);
+  return steps;
+}
+
+std::size_t advectUpwind(NarrowBand& band, const TimeInterval& interval) {
+  const double halfWidth = band.halfWidth();
+  FloatGrid::Ptr grid = distanceOf(vdb(band), std::max(halfWidth, kUpwindWidth), interval);
+  double travelled = 0, fastest = 0;
+  const auto longest = [&](double time) {
+    const double step = longestStep(*grid, [&](const V3d& p) {
+      const V3d speed = interval.velocity(p, time);
+      requireFinite(interval, speed, p, time);
+      return kCfl / (std::abs(speed.x) + std::abs(speed.y) + std::abs(speed.z));
+    });
+    fastest = std::max(fastest, kCfl / step);
+    return step;
+  };
+  const std::size_t steps = integrate(interval, longest, [&](double from, double to) {
+    grid = upwindStep(*grid, interval, from, to);
+    travelled += std::abs(to - from) * fastest;
+    fastest = 0;
+    if (travelled < kUpwindTravel) return;
+    grid = distanceOf(*grid, std::max(halfWidth, kUpwindWidth), interval);
+    travelled = 0;
+  });
+  if (steps > 0) band = makeBand(distanceOf(*grid, halfWidth, interval));
+  return steps;
+}
+
+}  // namespace levelset::flow

@@ -1,0 +1,92 @@
+#include "levelset/advection/time_interval.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "levelset/error.h"
+
+namespace levelset::flow {
+
+using Imath::V3d;
+
+void requireFinite(const TimeInterval& interval, const V3d& velocity, const V3d& position,
+                   double time) {
+  if (std::isfinite(velocity.x) && std::isfinite(velocity.y) && std::isfinite(velocity.z)) return;
+  V3d world;
+  interval.toWorld.multVecMatrix(position, world);
+  throw InvalidInput(
+      fmt::format("{}: the velocity is not finite at {:.6g},{:.6g},{:.6g} and time {:.6g}; give a "
+                  "velocity that is finite along the path of the surface",
+                  interval.action, world.x, world.y, world.z, time));
+}
+
+std::size_t integrate(const TimeInterval& interval,
+                      const std::function<StepResult(double, double)>& step) {
+  const double to = interval.to, total = std::abs(to - interval.from);
+  double time = interval.from, dt = kFirstShare * total;
+  std::size_t done = 0;
+  while (time != to) {
+    report(interval.progress, (time - interval.from) / (to - interval.from), interval.action);
+    const double left = std::abs(to - time);
+    // At a late time, a share of a short interval may round to zero.
+    dt = std::max(dt, 4 * std::abs(std::nextafter(time, to) - time));
+    // The last two steps share the remaining time.
+    const double longest = dt >= left ? left : left < 2 * dt ? left / 2 : dt;
+    const StepResult made = step(time, longest);
+    const double needed = static_cast<double>(done) + std::abs(to - made.time) / made.next;
+    if (!(needed <= kMostSteps) || made.time == time) {
+      throw ResourceLimit(fmt::format(
+          "{}: at time {:.6g} the velocity limits steps to {:.3g}, which requires "
+          "about {:.3g} steps, more than the limit of {}; use a shorter time or a smoother "
+          "velocity",
+          interval.action, time, made.next, needed, kMostSteps));
+    }
+    time = made.time;
+    dt = made.next;
+    ++done;
+  }
+  report(interval.progress, 1, interval.action);
+  return done;
+}
+
+std::size_t integrate(const TimeInterval& interval, const std::function<double(double)>& longest,
+                      const std::function<void(double, double)>& step) {
+  const double to = interval.to, sign = to < interval.from ? -1 : 1;
+  // Sample times within a step. They are uneven so as not to match the period of an oscillating
+  // velocity.
+  constexpr double kSamples[] = {0.146, 0.382, 0.618, 1};
+  constexpr double kGrowth = 1.5;
+  constexpr int kTries = 40;
+  const double total = std::abs(to - interval.from);
+  double last = total;
+  return integrate(interval, [&](double from, double) {
+    const double left = std::abs(to - from);
+    const double atStart = longest(from);
+    double dt = std::min({left, kGrowth * last, atStart}), least = atStart;
+    for (int i = 0; i < kTries; ++i) {
+      double allowed = std::numeric_limits<double>::infinity();
+      for (const double sample : kSamples)
+        allowed = std::min(allowed, longest(from + sign * sample * dt));
+      least = std::min(atStart, allowed);
+      // While nothing moves, steps stay short, so that a motion that sets in is not skipped.
+      if (std::isinf(least) && dt > kFirstShare * total) {
+        dt = kFirstShare * total;
+        continue;
+      }
+      if (dt <= 1.05 * allowed) break;
+      dt = std::max(allowed, dt / 4);
+    }
+    if (dt < left && left < 2 * dt) dt = left / 2;
+    const bool isStill = std::isinf(least);
+    last = dt;
+    const double next = dt >= left ? to : from + sign * dt;
+    if (!(left / dt <= kMostSteps)) return StepResult{from, dt};
+    if (!isStill) step(from, next);
+    return StepResult{next, kGrowth * dt};
+  });
+}
+
+}  // namespace levelset::flow

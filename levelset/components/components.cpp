@@ -1,0 +1,311 @@
+#include "levelset/components/components.h"
+
+#include <fmt/core.h>
+#include <openvdb/tools/Prune.h>
+#include <openvdb/tree/LeafManager.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <set>
+#include <vector>
+
+#include "levelset/components/regions.h"
+#include "levelset/distance/redistance.h"
+#include "levelset/error.h"
+#include "levelset/grids/sample.h"
+#include "levelset/inspect/measure.h"
+
+namespace levelset {
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+using openvdb::Int32Tree;
+using FloatLeaf = FloatTree::LeafNodeType;
+using LabelLeaf = Int32Tree::LeafNodeType;
+using BlockSet = std::set<Coord>;
+
+/// Largest difference, in voxels, between an old and a recomputed distance that count as equal.
+constexpr float kSameDistance = 0.02f;
+/// Smallest magnitude, in voxels, of a value whose sign must be kept.
+constexpr float kLeastDistance = 1e-3f;
+
+/// Flips regions from inside to outside or from outside to inside. The surfaces between them and
+/// their neighbours vanish. Grid points that are nearer to a remaining surface keep their bits.
+class RegionFlip {
+ public:
+  RegionFlip(const NarrowBand& solid, const RegionMap& map, std::vector<bool> flipped,
+             const Progress& progress)
+      : solid_(solid), map_(map), flipped_(std::move(flipped)), progress_(progress) {
+    bandBlocks_ = static_cast<int>(std::ceil((solid.halfWidth() + 1) / 8));
+  }
+
+  [[nodiscard]] NarrowBand run() {
+    collectBlocks();
+    NarrowBand result = solid_;
+    FloatGrid& grid = editVdb(result);
+    flipTiles(grid);
+    openvdb::tree::LeafManager<FloatTree> leaves(grid.tree());
+    leaves.foreach ([this](FloatLeaf& leaf, std::size_t) { flipLeaf(leaf); });
+    if (!both_.empty()) renew(result);
+    openvdb::tools::prune(editVdb(result).tree());
+    return result;
+  }
+
+ private:
+  [[nodiscard]] bool isFlipped(std::int32_t region) const {
+    return flipped_[static_cast<std::size_t>(region)];
+  }
+
+  /// Collects the blocks within the band of a vanishing surface, and those also within the band of
+  /// a remaining one.
+  void collectBlocks() {
+    BlockSet vanishing, remaining;
+    map_.forEachSurfaceBlock([&](const Coord& origin, std::uint32_t component) {
+      const RegionSurface& s = map_.surfaces()[component];
+      const bool stays = isFlipped(static_cast<std::int32_t>(s.inside)) ==
+                         isFlipped(static_cast<std::int32_t>(s.outside));
+      (stays ? remaining : vanishing).insert(origin);
+    });
+    vanishing_ = dilated(vanishing);
+    for (const Coord& origin : dilated(remaining)) {
+      if (vanishing_.count(origin)) both_.insert(origin);
+    }
+  }
+
+  [[nodiscard]] BlockSet dilated(const BlockSet& blocks) const {
+    BlockSet result;
+    for (const Coord& origin : blocks)
+      for (int x = -bandBlocks_; x <= bandBlocks_; ++x)
+        for (int y = -bandBlocks_; y <= bandBlocks_; ++y)
+          for (int z = -bandBlocks_; z <= bandBlocks_; ++z)
+            result.insert(origin.offsetBy(8 * x, 8 * y, 8 * z));
+    return result;
+  }
+
+  void flipTiles(FloatGrid& grid) const {
+    openvdb::tree::ValueAccessor<const Int32Tree> labels(map_.labels());
+    auto tile = grid.tree().beginValueAll();
+    tile.setMaxDepth(FloatTree::DEPTH - 2);
+    for (; tile; ++tile) {
+      if (isFlipped(labels.getValue(tile.getBoundingBox().min()))) tile.setValue(-*tile);
+    }
+  }
+
+  /// Corrects all signs. Also corrects the values, except near a remaining surface.
+  void flipLeaf(FloatLeaf& leaf) const {
+    const LabelLeaf& labels = *map_.labels().probeConstLeaf(leaf.origin());
+    const bool nearVanishing = vanishing_.count(leaf.origin()) > 0;
+    const bool nearBoth = both_.count(leaf.origin()) > 0;
+    const float background = vdb(solid_).background();
+    const float least = kLeastDistance * static_cast<float>(solid_.voxelSize());
+    float* values = leaf.buffer().data();
+    for (openvdb::Index i = 0; i < FloatLeaf::SIZE; ++i) {
+      const bool flips = isFlipped(labels.getValue(i));
+      if (!flips && !nearVanishing) continue;
+      const float sign = (values[i] < 0) != flips ? -1.f : 1.f;
+      if (nearBoth) {
+        if (flips) values[i] = sign * std::max(std::abs(values[i]), least);
+      } else {
+        values[i] = sign * background;
+        leaf.setValueOff(i);
+      }
+    }
+  }
+
+  /// Copies the field with larger distances next to vanished surfaces. With small distances on both
+  /// sides, an interpolant could cross zero there.
+  [[nodiscard]] NarrowBand smoothed(const NarrowBand& flippedSolid) const {
+    NarrowBand result = flippedSolid;
+    FloatGrid& grid = editVdb(result);
+    auto before = vdb(solid_).getConstAccessor(), after = vdb(flippedSolid).getConstAccessor();
+    const float voxel = static_cast<float>(solid_.voxelSize());
+    for (const Coord& origin : both_) {
+      FloatLeaf* leaf = grid.tree().probeLeaf(origin);
+      if (!leaf) continue;
+      for (openvdb::Index i = 0; i < FloatLeaf::SIZE; ++i) {
+        const Coord c = leaf->offsetToGlobalCoord(i);
+        const float own = leaf->getValue(i);
+        if (std::abs(own) < voxel && isBesideSurface(before, c, before.getValue(c)) &&
+            !isBesideSurface(after, c, own)) {
+          leaf->setValueOnly(i, std::copysign(voxel, own));
+        }
+      }
+    }
+    return result;
+  }
+
+  /// World box that contains the blocks of `both_` and the surfaces near them.
+  [[nodiscard]] Imath::Box3d worldBoxOfBoth() const {
+    openvdb::BBoxd box;
+    for (const Coord& origin : both_) {
+      box.expand(openvdb::BBoxd(origin.asVec3d(), (origin + Coord(7)).asVec3d()));
+    }
+    box.expand(8.0 * (bandBlocks_ + 1));
+    const openvdb::BBoxd world = vdb(solid_).transform().indexToWorld(box);
+    return {toImath(world.min()), toImath(world.max())};
+  }
+
+  /// Recomputes distances near both kinds of surfaces. Grid points that were nearest to a vanished
+  /// surface get their distance from the re-distanced field.
+  void renew(NarrowBand& result) const {
+    // Wider than the result, to distinguish a distance just below the background from a clamped
+    // one.
+    const NarrowBand fresh =
+        redistance(smoothed(result), {.halfWidth = solid_.halfWidth() + 1,
+                                      .region = worldBoxOfBoth(),
+                                      .progress = subProgress(progress_, 0.2, 0.9)});
+    const NarrowBand before = result;
+    FloatGrid& grid = editVdb(result);
+    auto old = vdb(before).getConstAccessor();
+    auto out = grid.getAccessor();
+    auto in = vdb(fresh).getConstAccessor();
+    openvdb::tree::ValueAccessor<const Int32Tree> labels(map_.labels());
+    for (const Coord& origin : both_) {
+      if (!old.probeConstLeaf(origin) && !in.probeConstLeaf(origin)) continue;
+      FloatLeaf& leaf = *out.touchLeaf(origin);
+      for (openvdb::Index i = 0; i < FloatLeaf::SIZE; ++i) {
+        const Coord c = leaf.offsetToGlobalCoord(i);
+        const float distance = std::abs(in.getValue(c));
+        if (!isFlipped(labels.getValue(c)) && isRight(leaf, i, distance, old)) continue;
+        const bool inBand = distance < grid.background();
+        leaf.setValueOnly(i,
+                          std::copysign(inBand ? distance : grid.background(), leaf.getValue(i)));
+        leaf.setActiveState(i, inBand);
+      }
+    }
+  }
+
+  /// Decides if a value is still correct. Outside the band no surface was near. Inside it, the
+  /// value is correct if the remaining surfaces are not farther away.
+  [[nodiscard]] bool isRight(const FloatLeaf& leaf, openvdb::Index i, float distance,
+                             FloatGrid::ConstAccessor& signs) const {
+    if (!leaf.isValueOn(i)) return true;
+    const float own = leaf.getValue(i);
+    return distance <= std::abs(own) + kSameDistance * static_cast<float>(solid_.voxelSize()) ||
+           isBesideSurface(signs, leaf.offsetToGlobalCoord(i), own);
+  }
+
+  /// Decides if a grid point has a neighbour of the other sign. Its value defines the zero set and
+  /// must stay.
+  static bool isBesideSurface(FloatGrid::ConstAccessor& values, const Coord& c, float own) {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int step = -1; step <= 1; step += 2) {
+        Coord beside = c;
+        beside[axis] += step;
+        if ((values.getValue(beside) < 0) != (own < 0)) return true;
+      }
+    }
+    return false;
+  }
+
+  const NarrowBand& solid_;
+  const RegionMap& map_;
+  std::vector<bool> flipped_;
+  const Progress& progress_;
+  int bandBlocks_ = 1;
+  BlockSet vanishing_, both_;
+};
+
+NarrowBand flip(const NarrowBand& solid, const RegionMap& map, std::vector<bool> flipped,
+                const Progress& progress) {
+  if (std::find(flipped.begin(), flipped.end(), true) == flipped.end()) return solid;
+  return RegionFlip(solid, map, std::move(flipped), progress).run();
+}
+
+}  // namespace
+
+Topology topology(const NarrowBand& solid) {
+  const Measurement m = measure(solid);
+  return {m.components, m.surfaces, m.cavities};
+}
+
+NarrowBand keepLargest(const NarrowBand& solid, std::size_t count, const Progress& progress) {
+  if (!count) throw UsageError("keep: --largest is 0; keep at least one solid");
+  requireSolid(solid, "keep");
+  if (solid.isEmpty()) {
+    throw InvalidInput(
+        "keep: the level set is empty, so there is no solid to keep; check the actions "
+        "before it");
+  }
+  const RegionMap map(vdb(solid), subProgress(progress, 0, 0.5), "keep");
+  const std::vector<Region>& regions = map.regions();
+  std::vector<std::size_t> solids;
+  for (std::size_t i = 0; i < regions.size(); ++i) {
+    if (regions[i].inside) solids.push_back(i);
+  }
+  // Volumes of equal solids may differ in the last bits, so compare them in single precision.
+  const auto volume = [&](std::size_t i) { return static_cast<float>(regions[i].volume); };
+  std::stable_sort(solids.begin(), solids.end(),
+                   [&](std::size_t a, std::size_t b) { return volume(a) > volume(b); });
+  std::vector<bool> flipped(regions.size(), false);
+  for (std::size_t i = count; i < solids.size(); ++i) flipped[solids[i]] = true;
+  NarrowBand result = flip(solid, map, std::move(flipped), subProgress(progress, 0.5, 1));
+  report(progress, 1, "keep");
+  return result;
+}
+
+SliversDropped dropSlivers(const NarrowBand& solid, const NarrowBand& cutter,
+                           const Progress& progress) {
+  constexpr float kDepth = 0.5, kNear = 1;  // voxels
+  const RegionMap map(vdb(solid), subProgress(progress, 0, 0.5), "slivers");
+  const std::vector<Region>& regions = map.regions();
+  const auto voxel = static_cast<float>(solid.voxelSize());
+  std::vector<bool> isSliver(regions.size());
+  for (std::size_t i = 0; i < regions.size(); ++i) isSliver[i] = regions[i].inside;
+  const FloatTree& tree = vdb(solid).tree();
+  openvdb::tree::ValueAccessor<const Int32Tree> labels(map.labels());
+  auto tile = tree.cbeginValueAll();
+  tile.setMaxDepth(FloatTree::DEPTH - 2);
+  for (; tile; ++tile)
+    if (*tile < 0)
+      isSliver[static_cast<std::size_t>(labels.getValue(tile.getBoundingBox().min()))] = false;
+  std::vector<Coord> shallow;
+  for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
+    const LabelLeaf& own = *map.labels().probeConstLeaf(leaf->origin());
+    for (openvdb::Index i = 0; i < FloatLeaf::SIZE; ++i) {
+      const float value = leaf->getValue(i);
+      if (!(value < 0)) continue;
+      if (value < -kDepth * voxel)
+        isSliver[static_cast<std::size_t>(own.getValue(i))] = false;
+      else
+        shallow.push_back(leaf->offsetToGlobalCoord(i));
+    }
+  }
+  const BandSampler sampler(cutter);
+  for (const Coord& c : shallow) {
+    const auto region = static_cast<std::size_t>(labels.getValue(c));
+    if (!isSliver[region]) continue;
+    const double distance = sampler.value(toImath(vdb(solid).indexToWorld(c)));
+    isSliver[region] = std::abs(distance) < kNear * voxel;
+  }
+  const auto count = static_cast<std::size_t>(std::count(isSliver.begin(), isSliver.end(), true));
+  const auto solids = std::count_if(regions.begin(), regions.end(),
+                                    [](const Region& region) { return region.inside; });
+  if (count == 0 || count == static_cast<std::size_t>(solids)) return {solid, 0};
+  return {flip(solid, map, std::move(isSliver), subProgress(progress, 0.5, 1)), count};
+}
+
+NarrowBand fillCavities(const NarrowBand& solid, double maxVolume, const Progress& progress) {
+  if (!(maxVolume >= 0)) {
+    throw UsageError(fmt::format(
+        "fill-cavities: the largest volume to fill is {}; give a number that is not negative",
+        maxVolume));
+  }
+  requireSolid(solid, "fill-cavities");
+  if (solid.isEmpty()) return solid;
+  const RegionMap map(vdb(solid), subProgress(progress, 0, 0.5), "fill-cavities");
+  const std::vector<Region>& regions = map.regions();
+  const double limit = maxVolume / std::pow(solid.voxelSize(), 3);
+  std::vector<bool> flipped(regions.size(), false);
+  for (std::size_t i = 0; i < regions.size(); ++i) {
+    flipped[i] = i != RegionMap::kInfinite && !regions[i].inside && regions[i].volume <= limit;
+  }
+  NarrowBand result = flip(solid, map, std::move(flipped), subProgress(progress, 0.5, 1));
+  report(progress, 1, "fill-cavities");
+  return result;
+}
+
+}  // namespace levelset

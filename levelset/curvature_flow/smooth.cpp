@@ -1,0 +1,419 @@
+#include "levelset/curvature_flow/smooth.h"
+
+#include <fmt/core.h>
+#include <openvdb/tools/Prune.h>
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <optional>
+
+#include "levelset/distance/distance_transform.h"
+#include "levelset/distance/redistance.h"
+#include "levelset/error.h"
+#include "levelset/grids/band_blocks_vdb.h"
+
+namespace levelset {
+namespace {
+
+using flow::BandBlocks;
+using flow::Field;
+using flow::Values;
+using openvdb::Coord;
+using openvdb::CoordBBox;
+
+constexpr const char* kSmooth = "smooth";
+// Cut-off of the Gaussian, in σ.
+constexpr double kGaussianReach = 4;
+// Distance from the zero set at which the interpolant reads values, voxels.
+constexpr double kStencil = 3;
+// Half width that the filter needs, in σ. Beyond it the tails of both sides of the surface balance.
+constexpr double kKnownReach = 3;
+// Relative tolerance for a band to count as wide enough.
+constexpr double kWideEnough = 1.0001;
+constexpr double kFieldsAlive = 5;
+// Largest number of values that a median may read in all: some thousand CPU seconds.
+constexpr double kMostReadings = 1e12;
+constexpr double kWidened = 0.3, kFiltered = 0.7;  // shares of the work
+
+/// Weights of a symmetric filter along a line, the middle one first.
+std::vector<float> gaussianWeights(double sigma) {
+  const int reach = std::max(1, static_cast<int>(std::ceil(kGaussianReach * sigma)));
+  // The weights integrate the Gaussian over each voxel, so that a σ below a voxel keeps its
+  // variance. The variance of the voxel's own width is subtracted.
+  std::vector<double> weights;
+  const double narrowed = std::sqrt(std::max(sigma * sigma - 1.0 / 12, 1e-4));
+  double sum = 0;
+  for (int i = 0; i <= reach; ++i) {
+    weights.push_back(std::erf((i + 0.5) / (narrowed * M_SQRT2)) -
+                      std::erf((i - 0.5) / (narrowed * M_SQRT2)));
+    sum += i == 0 ? weights.back() : 2 * weights.back();
+  }
+  std::vector<float> result;
+  for (const double w : weights) result.push_back(static_cast<float>(w / sum));
+  return result;
+}
+
+std::vector<float> boxWeights(double sigma) {
+  // A box of variance σ²: full weight on inner voxels, and an equal part of it at both ends.
+  int whole = 0;
+  const auto squares = [](int n) { return n * (n + 1.0) * (2.0 * n + 1) / 3; };
+  while (squares(whole + 1) / (2.0 * (whole + 1) + 1) <= sigma * sigma) ++whole;
+  const double end = whole + 1, variance = sigma * sigma;
+  // (squares + 2 p end²) / (2 whole + 1 + 2 p) = σ²
+  const double part =
+      (variance * (2.0 * whole + 1) - squares(whole)) / (2 * (end * end - variance));
+  const double sum = 2.0 * whole + 1 + 2 * part;
+  std::vector<float> result(static_cast<std::size_t>(whole) + 1, static_cast<float>(1 / sum));
+  result.push_back(static_cast<float>(part / sum));
+  return result;
+}
+
+/// Returns index steps within a dense cube of `side` grid points to those within `radius` of its
+/// centre.
+std::vector<std::ptrdiff_t> stepsWithin(double radius, int pad, std::ptrdiff_t side) {
+  const double squared = std::max(1.0, radius * radius);
+  std::vector<std::ptrdiff_t> steps;
+  for (int x = -pad; x <= pad; ++x)
+    for (int y = -pad; y <= pad; ++y)
+      for (int z = -pad; z <= pad; ++z)
+        if (static_cast<double>(x) * x + static_cast<double>(y) * y + static_cast<double>(z) * z <=
+            squared)
+          steps.push_back((x * side + y) * side + z);
+  return steps;
+}
+
+int medianPad(double radius) {
+  return std::max(1, static_cast<int>(std::floor(radius)));
+}
+
+/// Refuses a median that takes too long.
+void requireMedian(const openvdb::FloatGrid& grid, double radius) {
+  const double around = 4.0 / 3 * M_PI * std::pow(std::max(1.0, radius), 3);
+  const double readings = static_cast<double>(grid.activeVoxelCount()) * around;
+  if (readings <= kMostReadings) return;
+  throw ResourceLimit(fmt::format(
+      "{}: a median within {:.4g} voxels reads {:.3g} values, more than the limit of {:.3g}; use "
+      "a smaller sigma, larger voxels or --kind gaussian",
+      kSmooth, radius, readings, kMostReadings));
+}
+
+/// Filter for fields on the blocks of a band.
+class BlockFilter {
+ public:
+  /// @param passes  number of passes over all blocks, for the progress
+  BlockFilter(const openvdb::FloatGrid& grid, double passes, Progress progress)
+      : tree_(grid.tree()),
+        blocks_(grid.tree()),
+        far_(static_cast<float>(static_cast<double>(grid.background()) / grid.voxelSize()[0])),
+        work_(passes * static_cast<double>(blocks_.size())),
+        progress_(std::move(progress)) {}
+
+  [[nodiscard]] const BandBlocks& blocks() const { return blocks_; }
+
+  [[nodiscard]] Field convolve(const Field& field, const std::vector<float>& weights) const {
+    Field a = field, b(blocks_.size());
+    for (int axis = 0; axis < 3; ++axis) {
+      alongAxis(a, axis, weights, b);
+      std::swap(a, b);
+    }
+    return a;
+  }
+
+  [[nodiscard]] Field median(const Field& field, double radius) const {
+    struct Scratch {
+      std::vector<float> dense, values;
+    };
+    const int pad = medianPad(radius);
+    const std::ptrdiff_t side = 8 + 2 * pad;
+    const std::vector<std::ptrdiff_t> steps = stepsWithin(radius, pad, side);
+    Field result(blocks_.size());
+    forEachBlock<Scratch>([&](std::size_t i, Scratch& scratch) {
+      gatherWide(field, i, pad, scratch.dense);
+      scratch.values.resize(steps.size());
+      result[i] = field[i];
+      for (auto it = blocks_.active(i).beginOn(); it; ++it) {
+        const Coord c = BandBlocks::LeafNode::offsetToLocalCoord(it.pos()).offsetBy(pad);
+        const float* centre = scratch.dense.data() + (c.x() * side + c.y()) * side + c.z();
+        std::transform(steps.begin(), steps.end(), scratch.values.begin(),
+                       [centre](std::ptrdiff_t step) { return centre[step]; });
+        const auto middle =
+            scratch.values.begin() + static_cast<std::ptrdiff_t>(scratch.values.size() / 2);
+        std::nth_element(scratch.values.begin(), middle, scratch.values.end());
+        result[i][it.pos()] = *middle;
+      }
+    });
+    return result;
+  }
+
+ private:
+  [[nodiscard]] float farValue(const Coord& c) const {
+    return tree_.getValue(c) < 0 ? -far_ : far_;
+  }
+
+  /// Calls work(i, scratch) for each block in parallel, and reports progress.
+  template <typename Scratch, typename Work>
+  void forEachBlock(const Work& work) const {
+    blocks_.forEach<Scratch>([&](std::size_t i, Scratch& scratch) {
+      work(i, scratch);
+      const std::lock_guard lock(mutex_);
+      report(progress_, std::min(1.0, ++done_ / work_), kSmooth);
+    });
+  }
+
+  /// Copies the values of a block and of `pad` grid points on each side of it, rows along z.
+  void gatherWide(const Field& field, std::size_t i, int pad, std::vector<float>& dense) const {
+    const int side = 8 + 2 * pad;
+    dense.resize(static_cast<std::size_t>(side) * static_cast<std::size_t>(side) *
+                 static_cast<std::size_t>(side));
+    copyPadded(pad, pad, side, dense.data(), [&](const Coord& step) -> BlockValues {
+      const Coord origin = blocks_.origin(i).offsetBy(8 * step.x(), 8 * step.y(), 8 * step.z());
+      const std::uint32_t n = blocks_.find(origin);
+      if (n != BandBlocks::kNone) return {field[n / 512].data(), 0};
+      return {nullptr, farValue(origin)};
+    });
+  }
+
+  /// Convolves along an axis: copies the chain of blocks around each block, then filters its 64
+  /// lines. Not a padded leaf: the copy extends along one axis only, and its lines are transposed.
+  void alongAxis(const Field& in, int axis, const std::vector<float>& weights, Field& out) const {
+    const int reach = static_cast<int>(weights.size()) - 1, chain = (reach + 7) / 8;
+    const std::size_t stride = axis == 0 ? 64 : axis == 1 ? 8 : 1;
+    forEachBlock<std::vector<float>>([&](std::size_t i, std::vector<float>& lines) {
+      lines.resize(static_cast<std::size_t>(8 * (2 * chain + 1)) * 64);
+      for (int k = -chain; k <= chain; ++k) {
+        Coord origin = blocks_.origin(i);
+        origin[axis] += 8 * k;
+        const std::uint32_t n = blocks_.find(origin);
+        const float* source = n == BandBlocks::kNone ? nullptr : in[n / 512].data();
+        const float constant = source ? 0 : farValue(origin);
+        float* target = lines.data() + static_cast<std::size_t>(8 * (k + chain)) * 64;
+        for (std::size_t along = 0; along < 8; ++along)
+          for (std::size_t line = 0; line < 64; ++line)
+            target[along * 64 + line] =
+                source ? source[along * stride + startOfLine(line, axis)] : constant;
+      }
+      std::array<float, 64> sums;
+      for (std::size_t along = 0; along < 8; ++along) {
+        const float* centre = lines.data() + (static_cast<std::size_t>(8 * chain) + along) * 64;
+        for (std::size_t line = 0; line < 64; ++line) sums[line] = weights[0] * centre[line];
+        for (int k = 1; k <= reach; ++k) {
+          const float w = weights[static_cast<std::size_t>(k)];
+          const float *before = centre - 64 * k, *after = centre + 64 * k;
+          for (std::size_t line = 0; line < 64; ++line)
+            sums[line] += w * (before[line] + after[line]);
+        }
+        for (std::size_t line = 0; line < 64; ++line)
+          out[i][along * stride + startOfLine(line, axis)] = sums[line];
+      }
+    });
+  }
+
+  static std::size_t startOfLine(std::size_t line, int axis) {
+    return axis == 0 ? line : axis == 1 ? (line >> 3) * 64 + (line & 7) : line * 8;
+  }
+
+  const openvdb::FloatTree& tree_;
+  BandBlocks blocks_;
+  float far_;
+  double work_;  ///< total work: blocks times the passes over each
+  mutable double done_ = 0;
+  mutable std::mutex mutex_;
+  Progress progress_;
+};
+
+Field filtered(const BlockFilter& filter, const Field& field, SmoothKind kind, double sigma) {
+  switch (kind) {
+    case SmoothKind::Mean:
+      return filter.convolve(field, boxWeights(sigma));
+    case SmoothKind::Median:
+      return filter.median(field, sigma);
+    case SmoothKind::Taubin: {
+      const std::vector<float> weights = gaussianWeights(sigma);
+      Field once = filter.convolve(field, weights);
+      const Field twice = filter.convolve(once, weights);
+      for (std::size_t i = 0; i < once.size(); ++i)
+        for (std::size_t n = 0; n < 512; ++n) once[i][n] += once[i][n] - twice[i][n];
+      return once;
+    }
+    default:
+      return filter.convolve(field, gaussianWeights(sigma));
+  }
+}
+
+void applyMask(const Mask& mask, const openvdb::FloatGrid& grid, const BandBlocks& blocks,
+               const Field& before, Field& after) {
+  struct Nothing {};
+  blocks.forEach<Nothing>([&](std::size_t i, Nothing&) {
+    for (auto it = blocks.active(i).beginOn(); it; ++it) {
+      const openvdb::Index n = it.pos();
+      const Coord c = blocks.origin(i) + BandBlocks::LeafNode::offsetToLocalCoord(n);
+      const double weight = mask.weight(toImath(grid.transform().indexToWorld(c)));
+      after[i][n] = before[i][n] + static_cast<float>(weight) * (after[i][n] - before[i][n]);
+    }
+  });
+}
+
+/// Returns the bounds of the band's grid points with a positive mask weight; empty when there are
+/// none.
+CoordBBox changingBox(const openvdb::FloatGrid& grid, const Mask& mask) {
+  CoordBBox box;
+  for (auto it = grid.cbeginValueOn(); it; ++it)
+    if (mask.weight(toImath(grid.transform().indexToWorld(it.getCoord()))) > 0)
+      box.expand(it.getCoord());
+  return box;
+}
+
+/// Returns the bounds of the grid points whose values differ.
+CoordBBox differing(const BandBlocks& blocks, const Field& a, const Field& b) {
+  CoordBBox box;
+  for (std::size_t i = 0; i < blocks.size(); ++i)
+    for (openvdb::Index n = 0; n < BandBlocks::LeafNode::SIZE; ++n)
+      if (a[i][n] != b[i][n])
+        box.expand(blocks.origin(i) + BandBlocks::LeafNode::offsetToLocalCoord(n));
+  return box;
+}
+
+/// Replaces the content of a box in `target` by that of `source`.
+void paste(const openvdb::FloatTree& source, const CoordBBox& box, openvdb::FloatTree& target) {
+  target.fill(box, target.background(), false);
+  for (auto it = source.cbeginValueAll(); it; ++it) {
+    if (it.isVoxelValue() || *it >= 0) continue;
+    CoordBBox tile;
+    it.getBoundingBox(tile);
+    tile.intersect(box);
+    if (!tile.empty()) target.fill(tile, *it, false);
+  }
+  for (auto leaf = source.cbeginLeaf(); leaf; ++leaf) {
+    if (!leaf->getNodeBoundingBox().hasOverlap(box)) continue;
+    auto* out = target.touchLeaf(leaf->origin());
+    for (auto it = leaf->cbeginValueAll(); it; ++it)
+      if (box.isInside(it.getCoord())) {
+        if (it.isValueOn())
+          out->setValueOn(it.pos(), *it);
+        else
+          out->setValueOff(it.pos(), *it);
+      }
+  }
+  openvdb::tools::pruneTiles(target);
+}
+
+struct Filtering {
+  SmoothKind kind;
+  double width;  ///< voxels
+
+  [[nodiscard]] double passes() const { return kind == SmoothKind::Taubin ? 2 : 1; }
+  /// Returns the distance from the surface to which distances must be known, voxels.
+  [[nodiscard]] double known() const {
+    return kind == SmoothKind::Median ? width + 1 : passes() * kKnownReach * width;
+  }
+  /// Returns the distance from a grid point to which values are read, voxels.
+  [[nodiscard]] double reach() const {
+    return kind == SmoothKind::Median ? width + 1 : passes() * kGaussianReach * width;
+  }
+};
+
+/// Smooths the solid in a box of grid points, or everywhere. Returns none when the box holds no
+/// usable surface.
+std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const NarrowBand& solid,
+                                     const Filtering& filtering, const SmoothOptions& options) {
+  const double voxel = solid.voxelSize();
+  eikonal::DistanceRequest request;
+  request.action = kSmooth;
+  request.maxMemory = options.maxMemory;
+  const auto around = [&](double voxels) {
+    CoordBBox wider = *box;
+    wider.expand(static_cast<int>(std::ceil(std::min(1e8, voxels))));
+    return wider;
+  };
+
+  // === Distances for the filter
+  // The distances computed at the end depend on surfaces up to twice the half width away.
+  const double trusted = filtering.known(), own = 2 * solid.halfWidth() + 2;
+  const double needed = trusted + std::max(filtering.reach(), own) + 2 * kStencil;
+  openvdb::FloatGrid::Ptr field;
+  if (filtering.known() > solid.halfWidth() * kWideEnough) {
+    request.halfWidth = filtering.known() + kStencil;
+    if (box) request.region = around(needed);
+    request.progress = subProgress(options.progress, 0, kWidened);
+    field = eikonal::distanceTransform(vdb(solid), request);
+  } else {
+    field = vdb(solid).deepCopy();
+    if (box) field->tree().clip(around(needed));
+  }
+
+  // === Filter
+  requireMemory(static_cast<double>(field->tree().leafCount()) * sizeof(Values) * kFieldsAlive,
+                options.maxMemory, kSmooth);
+  if (filtering.kind == SmoothKind::Median) requireMedian(*field, filtering.width);
+  const BlockFilter filter(*field,
+                           filtering.kind == SmoothKind::Median ? 1 : 3 * filtering.passes(),
+                           subProgress(options.progress, kWidened, kFiltered));
+  const Field before = filter.blocks().read(field->tree(), voxel);
+  Field after = filtered(filter, before, filtering.kind, filtering.width);
+  if (options.mask) applyMask(*options.mask, *field, filter.blocks(), before, after);
+  const CoordBBox moved = box ? differing(filter.blocks(), before, after) : CoordBBox();
+  if (box && moved.empty()) return solid;
+  // A wide filter may change grid points outside the part of the field that was computed.
+  if (box && !around(trusted).isInside(moved)) return std::nullopt;
+  filter.blocks().write(after, voxel, field->tree());
+  if (!eikonal::hasZeroCrossing(field->tree())) return std::nullopt;
+
+  // === Redistancing
+  request.halfWidth = solid.halfWidth();
+  request.progress = subProgress(options.progress, kFiltered, 1);
+  request.region.reset();
+  if (!box) return makeBand(eikonal::distanceTransform(*field, request));
+  request.region = moved;
+  request.region->expand(static_cast<int>(std::ceil(solid.halfWidth() + 1)));
+  openvdb::FloatGrid::Ptr changed;
+  try {
+    changed = eikonal::distanceTransform(*field, request);
+  } catch (const InvalidInput&) {
+    return std::nullopt;  // the only crossings are at the borders of the part
+  }
+  const openvdb::FloatGrid::Ptr result = vdb(solid).deepCopy();
+  paste(changed->tree(), *request.region, result->tree());
+  return makeBand(result);
+}
+
+}  // namespace
+
+double smoothingWidth(SmoothKind kind, double sigma) {
+  return Filtering{kind, sigma}.known();
+}
+
+double smoothingReach(SmoothKind kind, double sigma, double halfWidth) {
+  const Filtering filtering{kind, sigma};
+  const double known = filtering.known(),
+               widened = known > halfWidth * kWideEnough ? distanceReach(known + kStencil) : 0;
+  return widened + filtering.reach() + distanceReach(halfWidth);
+}
+
+NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma, const SmoothOptions& options) {
+  if (!(sigma > 0) || !std::isfinite(sigma))
+    throw UsageError(
+        fmt::format("{}: sigma is {}; give a positive, finite length", kSmooth, sigma));
+  if (options.mask) checkMask(*options.mask, kSmooth);
+  requireSolid(solid, kSmooth);
+  if (solid.isEmpty())
+    throw InvalidInput(fmt::format(
+        "{}: the solid is empty, so there is no surface to smooth; give a solid with a surface",
+        kSmooth));
+  const Filtering filtering{kind, sigma / solid.voxelSize()};
+  if (options.mask) {
+    const CoordBBox box = changingBox(vdb(solid), *options.mask);
+    if (box.empty()) return solid;
+    // When the box holds no usable surface, the surface elsewhere determines the distances: smooth
+    // all.
+    if (!box.isInside(vdb(solid).evalActiveVoxelBoundingBox()))
+      if (auto part = smoothedIn(box, solid, filtering, options)) return std::move(*part);
+  }
+  if (auto whole = smoothedIn(std::nullopt, solid, filtering, options)) return std::move(*whole);
+  throw InvalidInput(
+      fmt::format("{}: a sigma of {} world units removes the entire solid; give a smaller "
+                  "sigma",
+                  kSmooth, sigma));
+}
+
+}  // namespace levelset

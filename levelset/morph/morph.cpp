@@ -1,0 +1,175 @@
+#include "levelset/morph/morph.h"
+
+#include <fmt/core.h>
+#include <openvdb/tree/LeafManager.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "levelset/distance/distance_transform.h"
+#include "levelset/error.h"
+#include "levelset/inspect/compare.h"
+#include "levelset/transform/resample.h"
+#include "levelset/vdb.h"
+
+namespace levelset {
+namespace {
+
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+using TreeManager = openvdb::tree::LeafManager<FloatTree>;
+using LeafNode = FloatTree::LeafNodeType;
+
+// First guess of the distance between the surfaces, voxels; doubled until it suffices.
+constexpr double kFirstReach = 8;
+// Progress when the target is on the grid of the solid, and when the distances are known.
+constexpr double kUntilResampled = 0.05, kUntilDistances = 0.4;
+// Distances extend this much beyond the surfaces, voxels, so that interpolation reads no
+// background.
+constexpr double kBesideSurface = 4;
+
+void checkMorph(const NarrowBand& solid, const NarrowBand& target, const MorphOptions& options) {
+  const char* action = options.action;
+  if (options.mask) checkMask(*options.mask, action);
+  if (options.farthest && !(*options.farthest >= kFirstReach && std::isfinite(*options.farthest)))
+    throw UsageError(fmt::format("{}: a distance limit of {} voxels is too small; give at least {}",
+                                 action, *options.farthest, kFirstReach));
+  if (options.steps < 1)
+    throw UsageError(
+        fmt::format("{}: the number of steps is {}; give at least 1", action, options.steps));
+  if (!(options.until > 0 && options.until <= 1))
+    throw UsageError(fmt::format("{}: the last fraction is {}; give a number above 0, up to 1",
+                                 action, options.until));
+  if (options.tolerance && !(*options.tolerance > 0 && std::isfinite(*options.tolerance)))
+    throw UsageError(
+        fmt::format("{}: the tolerance is {}; give a positive length", action, *options.tolerance));
+  requireSolid(solid, options.action);
+  requireSolid(target, options.action);
+  if (solid.isEmpty() || target.isEmpty())
+    throw InvalidInput(fmt::format("{}: the {} is empty; give two solids", action,
+                                   solid.isEmpty() ? "solid" : "target"));
+}
+
+/// Distances to two solids on common blocks.
+struct DistancePair {
+  FloatGrid::Ptr from, to;
+
+  void shareBlocks() {
+    from->tree().topologyUnion(to->tree());
+    to->tree().topologyUnion(from->tree());
+  }
+
+  /// Returns true when a grid point inside only one solid has a distance near or beyond the extent.
+  [[nodiscard]] bool fallsShort(double reach) const {
+    const auto limit = static_cast<float>((reach - kBesideSurface) * from->voxelSize()[0]);
+    std::atomic<bool> found = false;
+    TreeManager manager(from->tree());
+    manager.foreach ([&](LeafNode& a, std::size_t) {
+      if (found) return;
+      const LeafNode& b = *to->tree().probeConstLeaf(a.origin());
+      for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n) {
+        const float x = a.getValue(n), y = b.getValue(n);
+        if ((x < 0) != (y < 0) && (std::abs(x) > limit || std::abs(y) > limit)) found = true;
+      }
+    });
+    return found;
+  }
+
+  /// Computes the field whose zero set is the surface at a fraction, scaled by `mask` where given.
+  [[nodiscard]] FloatGrid::Ptr at(double part, const std::optional<Mask>& mask) const {
+    FloatGrid::Ptr result = from->deepCopy();
+    const auto everywhere = static_cast<float>(part);
+    const float farInside = from->background(),
+                onSide = 1e-3f * static_cast<float>(from->voxelSize()[0]);
+    TreeManager manager(result->tree());
+    manager.foreach ([&](LeafNode& leaf, std::size_t) {
+      const float* b = to->tree().probeConstLeaf(leaf.origin())->buffer().data();
+      float* values = leaf.buffer().data();
+      for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n) {
+        float s = everywhere;
+        if (mask) {
+          const openvdb::Vec3d p = from->indexToWorld(leaf.offsetToGlobalCoord(n));
+          s *= static_cast<float>(mask->weight({p.x(), p.y(), p.z()}));
+        }
+        const float mixed = (1 - s) * values[n] + s * b[n];
+        // A point far inside one solid and far outside the other mixes to zero at one half: solid
+        // stays.
+        values[n] = mixed == 0 && values[n] <= -farInside ? -onSide : mixed;
+      }
+    });
+    return result;
+  }
+};
+
+/// @param distances  computes distances from a field
+NarrowBand intermediate(const DistancePair& pair, double part, const MorphOptions& options,
+                        const std::function<FloatGrid::Ptr(const FloatGrid&)>& distances) {
+  const FloatGrid::Ptr field = pair.at(part, options.mask);
+  if (!eikonal::hasZeroCrossing(field->tree()))
+    throw InvalidInput(
+        fmt::format("{}: the solid vanishes at fraction {:.3g} of the morph, since it does not "
+                    "overlap the target; move the target until the two overlap, or use 1 step",
+                    options.action, part));
+  return makeBand(distances(*field));
+}
+
+}  // namespace
+
+NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphOptions& options) {
+  checkMorph(solid, target, options);
+  const NarrowBand goal =
+      resampleLike(target, solid,
+                   {.maxMemory = options.maxMemory,
+                    .progress = subProgress(options.progress, 0, kUntilResampled)});
+  // The surface stays within the active voxels of both solids.
+  openvdb::CoordBBox region = vdb(solid).evalActiveVoxelBoundingBox();
+  region.expand(vdb(goal).evalActiveVoxelBoundingBox());
+  region.expand(static_cast<int>(kBesideSurface));
+  const auto distances = [&](const FloatGrid& field, double halfWidth, double from, double to,
+                             const std::optional<openvdb::CoordBBox>& within = {}) {
+    eikonal::DistanceRequest request;
+    request.action = options.action;
+    request.halfWidth = halfWidth;
+    request.region = within;
+    request.maxMemory = options.maxMemory;
+    request.progress = subProgress(options.progress, from, to);
+    return eikonal::distanceTransform(field, request);
+  };
+
+  // === Distances wherever the surface will pass
+  DistancePair pair;
+  const bool isOnTarget = options.until == 1 && !options.mask;
+  const bool isDirect = isOnTarget && options.steps == 1;  // only the end is requested
+  double done = kUntilResampled;
+  for (double reach = options.farthest.value_or(kFirstReach); !isDirect; reach *= 2) {
+    // Each attempt takes about as long as all before it, so it gets half of the remaining progress.
+    const double half = (done + kUntilDistances) / 2, quarter = (done + half) / 2;
+    pair.from = distances(vdb(solid), reach, done, quarter, region);
+    pair.to = distances(vdb(goal), reach, quarter, half, region);
+    done = half;
+    pair.shareBlocks();
+    if (options.farthest || !pair.fallsShort(reach)) break;
+  }
+
+  // === Steps
+  NarrowBand result;
+  const auto fractionOf = [&](int step) {
+    return kUntilDistances + (1 - kUntilDistances) * step / options.steps;
+  };
+  for (int i = 1; i <= options.steps; ++i) {
+    const double part = options.until * i / options.steps;
+    result = part == 1 && isOnTarget
+                 ? goal
+                 : intermediate(pair, part, options, [&](const FloatGrid& field) {
+                     return distances(field, solid.halfWidth(), fractionOf(i - 1), fractionOf(i));
+                   });
+    if (options.keep) options.keep(result, i);
+    report(options.progress, fractionOf(i), options.action);
+    if (options.tolerance && part < 1 && compare(result, goal).hausdorff() <= *options.tolerance)
+      break;
+  }
+  return result;
+}
+
+}  // namespace levelset

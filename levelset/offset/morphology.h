@@ -1,0 +1,122 @@
+#pragma once
+
+#include "levelset/offset/offset.h"
+
+/// Opening, closing and hollowing of solids, by offsets with exact distances.
+namespace levelset {
+
+/// Computes the union of all balls of that radius that fit into the solid. Parts thinner than twice
+/// the radius disappear. Convex edges become round; concave edges and thicker parts stay. Offsets
+/// the solid inwards, then outwards.
+/// @param radius  world units, ≥ 0
+/// @throws UsageError unless `radius` is finite and ≥ 0
+/// @throws InvalidInput if `solid` or the result is empty
+/// @throws ResourceLimit if the memory estimate exceeds the limit
+/// @throws Cancelled
+[[nodiscard]] NarrowBand opening(const NarrowBand& solid, double radius,
+                                 const OffsetOptions& options = {});
+
+/// Computes the complement of all balls of that radius that fit outside the solid. Fills gaps
+/// narrower than twice the radius and rounds concave edges. Offsets the solid outwards, then
+/// inwards.
+/// @throws as opening()
+[[nodiscard]] NarrowBand closing(const NarrowBand& solid, double radius,
+                                 const OffsetOptions& options = {});
+
+enum class ShellSide {
+  In,   ///< wall inside the surface of the solid
+  Out,  ///< wall outside the surface of the solid
+  Both  ///< half of the thickness on each side
+};
+
+/// Hollows a solid: keeps a wall of that thickness along its surface.
+/// @param thickness  world units, at least one voxel
+/// @throws UsageError unless `thickness` is finite and positive
+/// @throws InvalidInput if `solid` is empty, the wall is thinner than a voxel, or the solid is too
+///         thin for a cavity
+/// @throws ResourceLimit if the memory estimate exceeds the limit
+/// @throws Cancelled
+[[nodiscard]] NarrowBand shell(const NarrowBand& solid, double thickness,
+                               ShellSide side = ShellSide::In, const OffsetOptions& options = {});
+
+/// Options of the operators `open` and `close`.
+struct MorphologyOptions {
+  double radius = 0;  ///< world units
+  std::optional<double> halfWidth;
+  std::optional<Mask> mask;
+
+  template <class Visitor>
+  static void describe(Visitor& visit) {
+    visit("radius", &MorphologyOptions::radius,
+          {.help = "radius of the ball",
+           .unit = OptionUnit::Length,
+           .range = OptionRange::NonNegative,
+           .required = true,
+           .position = 0});
+    visit("half-width", &MorphologyOptions::halfWidth, kResultHalfWidth);
+    visit("mask", &MorphologyOptions::mask, {});
+  }
+};
+
+/// Estimates that `open` and `close` share.
+struct MorphologyOperator {
+  using Options = MorphologyOptions;
+  static constexpr Slope slope = Slope::OfOperands;
+  static constexpr double partTolerance = kDistanceTolerance;
+
+  static ValuePlan plan(const Options& options, Plans operands, const OperatorRun& run);
+  static RegionOfInterest regionOfInterest(const Options& options, const OperatorPlans& plans,
+                                           std::size_t operand, const RegionOfInterest& ofResult);
+  static std::optional<Cost> cost(const Options& options, const OperatorPlans& plans);
+};
+
+/// The operator `open`.
+struct OpenOperator : MorphologyOperator {
+  static const OperatorText text;
+  static constexpr ErrorModel errorModel{2, 0.6, 0, "opening-closing"};
+  static NarrowBand run(std::vector<NarrowBand> operands, const Options& options, OperatorRun& run);
+};
+
+/// The operator `close`.
+struct CloseOperator : MorphologyOperator {
+  static const OperatorText text;
+  static constexpr ErrorModel errorModel{2, 0.6, kCreaseError, "opening-closing"};
+  static NarrowBand run(std::vector<NarrowBand> operands, const Options& options, OperatorRun& run);
+};
+
+/// The operator `shell`.
+struct ShellOperator {
+  static const OperatorText text;
+  static constexpr Slope slope = Slope::OfOperands;
+  static constexpr double partTolerance = kDistanceTolerance;
+  static constexpr ErrorModel errorModel{2, kTriangleError, kCreaseError, "shell"};
+
+  struct Options {
+    double thickness = 0;  ///< world units
+    ShellSide side = ShellSide::In;
+    std::optional<double> halfWidth;
+    std::optional<Mask> mask;
+
+    template <class Visitor>
+    static void describe(Visitor& visit) {
+      visit("thickness", &Options::thickness,
+            {.help = "thickness of the wall, a voxel or more",
+             .unit = OptionUnit::Length,
+             .range = OptionRange::Positive,
+             .required = true});
+      visit("side", &Options::side,
+            {{"in", ShellSide::In}, {"out", ShellSide::Out}, {"both", ShellSide::Both}},
+            {.help = "position of the wall: inside the surface, outside, or half and half"});
+      visit("half-width", &Options::halfWidth, kResultHalfWidth);
+      visit("mask", &Options::mask, {});
+    }
+  };
+
+  static NarrowBand run(std::vector<NarrowBand> operands, const Options& options, OperatorRun& run);
+  static ValuePlan plan(const Options& options, Plans operands, const OperatorRun& run);
+  static RegionOfInterest regionOfInterest(const Options& options, const OperatorPlans& plans,
+                                           std::size_t operand, const RegionOfInterest& ofResult);
+  static std::optional<Cost> cost(const Options& options, const OperatorPlans& plans);
+};
+
+}  // namespace levelset

@@ -1,0 +1,172 @@
+#include "levelset/offset/offset.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+
+#include "levelset/distance/distance_transform.h"
+#include "levelset/error.h"
+#include "levelset/vdb.h"
+
+namespace levelset {
+namespace {
+
+using LeafNode = openvdb::FloatTree::LeafNodeType;
+
+// Voxels around the moved surface that the interpolant reads before re-distancing.
+constexpr double kPadding = 3;
+// Voxels by which lengths between the sampled closest points may exceed the sampled range.
+constexpr double kRangeMargin = 0.5;
+
+double checkedHalfWidth(const NarrowBand& solid, const OffsetOptions& options) {
+  const double halfWidth = options.halfWidth.value_or(solid.halfWidth());
+  if (!std::isfinite(halfWidth) || halfWidth < 1)
+    throw UsageError(
+        fmt::format("{}: the half width is {} voxels; give at least 1", options.action, halfWidth));
+  return halfWidth;
+}
+
+void requireSurface(const NarrowBand& solid, const OffsetOptions& options) {
+  requireSolid(solid, options.action);
+  if (solid.isEmpty())
+    throw InvalidInput(fmt::format(
+        "{}: the solid is empty, so there is no surface to move; give a solid", options.action));
+}
+
+/// Requests distances near the possible positions of the new surface.
+eikonal::DistanceRequest nearSurfaceRequest(const OffsetOptions& options, double shift,
+                                            double reach) {
+  eikonal::DistanceRequest request;
+  request.action = options.action;
+  request.halfWidth = reach + kPadding;
+  request.shift = shift;
+  request.maxMemory = options.maxMemory;
+  return request;
+}
+
+/// Re-distances a shifted field. Where fronts met, it is only a bound of the distance.
+NarrowBand redistanced(const openvdb::FloatGrid& field, double halfWidth,
+                       const OffsetOptions& options, double done) {
+  eikonal::DistanceRequest request;
+  request.action = options.action;
+  request.halfWidth = halfWidth;
+  request.maxMemory = options.maxMemory;
+  request.progress = subProgress(options.progress, done, 1);
+  return makeBand(eikonal::distanceTransform(field, request));
+}
+
+bool hasSurface(const openvdb::FloatGrid& field) {
+  return field.activeVoxelCount() > 0 && eikonal::hasZeroCrossing(field.tree());
+}
+
+/// Offset length at each closest point of the surface, in voxels.
+class Lengths {
+ public:
+  Lengths(const openvdb::FloatGrid& field, const ScalarField& distance, const char* action)
+      : field_(field), distance_(distance), action_(action) {}
+
+  [[nodiscard]] double at(const openvdb::Vec3d& point) const {
+    const Imath::V3d world = toImath(field_.indexToWorld(point));
+    const double length = distance_(world);
+    if (!std::isfinite(length)) {
+      throw InvalidInput(
+          fmt::format("{}: the length is {} at {:.6g},{:.6g},{:.6g} on the surface; give a field "
+                      "that is finite there",
+                      action_, length, world.x, world.y, world.z));
+    }
+    return length / field_.voxelSize()[0];
+  }
+
+  struct Range {
+    double low = INFINITY, high = -INFINITY;
+  };
+  /// Range of lengths over the closest points of the grid points next to the surface.
+  [[nodiscard]] Range range(const OffsetOptions& options) const {
+    Range all;
+    std::mutex mutex;
+    eikonal::DistanceRequest request = nearSurfaceRequest(options, 0, 0);
+    request.progress = subProgress(options.progress, 0, 0.3);
+    request.visitPoints = [&](const LeafNode& leaf, const eikonal::ClosestPointLeaf& points) {
+      Range own;
+      for (auto it = leaf.cbeginValueOn(); it; ++it) {
+        const double length = at(points[it.pos()]);
+        own = {std::min(own.low, length), std::max(own.high, length)};
+      }
+      const std::lock_guard lock(mutex);
+      all = {std::min(all.low, own.low), std::max(all.high, own.high)};
+    };
+    (void)eikonal::distanceTransform(field_, request);
+    return all;
+  }
+
+ private:
+  const openvdb::FloatGrid& field_;
+  const ScalarField& distance_;
+  const char* action_;
+};
+
+}  // namespace
+
+NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& options) {
+  if (!std::isfinite(distance))
+    throw UsageError(
+        fmt::format("{}: the distance is {}; give a finite length", options.action, distance));
+  requireSurface(solid, options);
+  const double halfWidth = checkedHalfWidth(solid, options);
+  if (distance == 0 && halfWidth == solid.halfWidth()) return solid;
+  if (distance == 0) return redistanced(vdb(solid), halfWidth, options, 0);
+
+  eikonal::DistanceRequest request = nearSurfaceRequest(options, distance / solid.voxelSize(), 0);
+  request.progress = subProgress(options.progress, 0, 0.6);
+  const openvdb::FloatGrid::Ptr moved = eikonal::distanceTransform(vdb(solid), request);
+  if (!hasSurface(*moved))
+    throw InvalidInput(
+        fmt::format("{}: the result is empty after an offset of {} world units, because no part of "
+                    "the solid is "
+                    "thicker than twice that; use a smaller length",
+                    options.action, distance));
+  return redistanced(*moved, halfWidth, options, 0.6);
+}
+
+NarrowBand offsetBy(NarrowBand solid, const ScalarField& distance, const OffsetOptions& options) {
+  if (!distance)
+    throw UsageError(fmt::format("{}: the length is missing; give a formula or a grid of numbers",
+                                 options.action));
+  requireSurface(solid, options);
+  const double halfWidth = checkedHalfWidth(solid, options);
+  const double voxel = solid.voxelSize();
+  const Lengths lengths(vdb(solid), distance, options.action);
+  const Lengths::Range range = lengths.range(options);
+
+  // === Compute φ(x) − length(closest point) near the possible positions of the new surface
+  const double middle = (range.low + range.high) / 2;
+  eikonal::DistanceRequest request =
+      nearSurfaceRequest(options, middle, (range.high - range.low) / 2 + kRangeMargin);
+  request.progress = subProgress(options.progress, 0.3, 0.7);
+  const auto limit = static_cast<float>(request.halfWidth * voxel);
+  openvdb::FloatTree displaced;
+  std::mutex mutex;
+  request.visitPoints = [&](const LeafNode& leaf, const eikonal::ClosestPointLeaf& points) {
+    auto part = std::make_unique<LeafNode>(leaf);
+    for (auto it = part->beginValueOn(); it; ++it) {
+      const double length = lengths.at(points[it.pos()]);
+      const double value = static_cast<double>(*it) - (length - middle) * voxel;
+      it.setValue(std::clamp(static_cast<float>(value), -limit, limit));
+    }
+    const std::lock_guard lock(mutex);
+    displaced.addLeaf(part.release());
+  };
+  const openvdb::FloatGrid::Ptr moved = eikonal::distanceTransform(vdb(solid), request);
+  for (auto leaf = displaced.beginLeaf(); leaf; ++leaf)
+    *moved->tree().touchLeaf(leaf->origin()) = *leaf;
+  if (!hasSurface(*moved))
+    throw InvalidInput(
+        fmt::format("{}: the result is empty after offsets of {:.6g} to {:.6g} world units; use "
+                    "smaller lengths",
+                    options.action, range.low * voxel, range.high * voxel));
+  return redistanced(*moved, halfWidth, options, 0.7);
+}
+
+}  // namespace levelset

@@ -1,0 +1,87 @@
+#include <cmath>
+
+#include "levelset/distance/redistance.h"
+#include "levelset/error.h"
+#include "levelset/offset/offset.h"
+
+namespace levelset {
+
+Cost costOfOffset(double before, double after, double distance, double halfWidth) {
+  constexpr double kShell = 3;  // voxels of distances beside the moved surface, computed again
+  Cost cost = costOfDistances(std::max(before, after), kShell);
+  cost.seconds += 1e-9 * before * 700 * std::abs(distance);
+  cost.bytes += 15 * before * std::abs(distance);
+  return cost += costOfDistances(after, halfWidth);
+}
+
+const OperatorText OffsetOperator::text{
+    .name = "offset",
+    .group = "Solids",
+    .summary = "move the surface along its normal; positive grows the solid",
+    .details =
+        "Outwards, convex edges become round and concave ones stay sharp; inwards the reverse. "
+        "--by displaces each point of the surface by a length of its own, --mask limits the offset "
+        "to a part of the surface.",
+    .example = "levelsmith sphere --radius 1 --voxel 0.05 ! offset 2vx ! measure"};
+
+void OffsetOperator::check(const Options&, const GivenOptions& given) {
+  if (given("distance") == given("by"))
+    throw UsageError(given("by")
+                         ? "offset: a distance and --by exclude each other; leave one out"
+                         : "offset: how far is missing; give a length, or --by and a field");
+}
+
+NarrowBand OffsetOperator::run(std::vector<NarrowBand> operands, const Options& options,
+                               OperatorRun& run) {
+  OffsetOptions settings{
+      .halfWidth = options.halfWidth, .maxMemory = run.maxMemory, .progress = run.progress};
+  // A narrower part is made as wide as the complete band: the distance that points travel shows in
+  // the last bits.
+  if (run.isPartial) settings.halfWidth = run.planned->halfWidth;
+  NarrowBand solid = std::move(operands[0]);
+  operands.clear();
+  if (!options.mask && !options.by) return offset(std::move(solid), *options.distance, settings);
+  ScalarField distance = options.by;
+  if (!distance)
+    distance = [everywhere = *options.distance](const Imath::V3d&) { return everywhere; };
+  if (options.mask)
+    distance = [distance, mask = *options.mask](const Imath::V3d& p) {
+      return mask.weight(p) * distance(p);
+    };
+  return offsetBy(std::move(solid), distance, settings);
+}
+
+ValuePlan OffsetOperator::plan(const Options& options, Plans operands, const OperatorRun&) {
+  ValuePlan plan = operands[0];
+  if (options.halfWidth) plan.halfWidth = *options.halfWidth;
+  if (!options.distance) return plan;  // a field may have any value
+  const double before = plan.bounds.size().length();
+  plan.bounds = grown(plan.bounds, *options.distance);
+  const double after = plan.bounds.isEmpty() ? 0 : plan.bounds.size().length();
+  if (before > 0) plan.area *= (after / before) * (after / before);
+  return plan;
+}
+
+RegionOfInterest OffsetOperator::regionOfInterest(const Options& options,
+                                                  const OperatorPlans& plans, std::size_t,
+                                                  const RegionOfInterest& ofResult) {
+  if (!options.distance || options.mask || *options.distance == 0) return {};
+  const double reach = std::abs(*options.distance) +
+                       distanceReach(plans.result.halfWidth) * plans.operands[0].voxelSize;
+  return {.halfWidth = kReadBySurface, .region = grown(ofResult.region, reach)};
+}
+
+std::optional<Cost> OffsetOperator::cost(const Options& options, const OperatorPlans& plans) {
+  const ValuePlan& solid = plans.operands[0];
+  const double distance = options.distance ? *options.distance / solid.voxelSize : 0;
+  const double before = solid.layer();
+  Cost cost = costOfOffset(before, plans.result.layer(), distance, plans.result.halfWidth);
+  // The lengths are looked up first, at the surface points.
+  if (options.by || options.mask) {
+    cost += costOfDistances(before, 12);
+    cost.bytes += 60 * solid.activeVoxels();
+  }
+  return cost;
+}
+
+}  // namespace levelset

@@ -1,0 +1,53 @@
+#pragma once
+
+// Bands of solids with a formula for the distance. Includes OpenVDB: for .cpp files only.
+
+#include <fmt/core.h>
+
+#include <cmath>
+
+#include "levelset/error.h"
+#include "levelset/grids/fill_blocks_vdb.h"
+#include "levelset/shapes/shapes.h"
+#include "levelset/vdb.h"
+
+namespace levelset {
+
+/// Builds the band of a solid from a distance function.
+/// @param distance  double(const V3d&): signed distance at a world position. Outside the band, any
+///                  lower bound of the magnitude with the correct sign suffices.
+/// @throws as checkShape()
+/// @throws InvalidInput if no grid point lies inside
+template <typename Distance>
+NarrowBand makeShape(const ShapeExtent& extent, double voxelSize, const ShapeOptions& options,
+                     const char* action, const Distance& distance) {
+  checkShape(extent, voxelSize, options, action);
+  report(options.progress, 0, action);
+
+  const auto grid = emptyLevelSet(uniformTransform(voxelSize), options.halfWidth);
+  openvdb::CoordBBox domain;
+  for (int axis = 0; axis < 3; ++axis) {
+    domain.min()[axis] =
+        static_cast<int>(std::floor(extent.bounds.min[axis] / voxelSize - options.halfWidth)) - 1;
+    domain.max()[axis] =
+        static_cast<int>(std::ceil(extent.bounds.max[axis] / voxelSize + options.halfWidth)) + 1;
+  }
+  const auto phi = [&](double i, double j, double k) {
+    return distance(Imath::V3d(i * voxelSize, j * voxelSize, k * voxelSize));
+  };
+  BlockFiller filler(*grid, phi);
+  if (!isEverywhere(options.region)) {
+    const openvdb::CoordBBox blocks = blocksOf(options.region, grid->transform());
+    filler.limitTo(blocks);
+    domain.intersect(blocks);
+  }
+  if (!filler.fill(domain, options.progress, action)) {
+    throw InvalidInput(
+        fmt::format("{}: no grid point lies inside, because the shape is too thin for voxels "
+                    "of {}; use smaller voxels",
+                    action, voxelSize));
+  }
+  return makeBand(grid);
+}
+
+}  // namespace levelset

@@ -1,0 +1,161 @@
+#include "levelset/transform/transform.h"
+
+#include <fmt/core.h>
+#include <openvdb/tree/LeafManager.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "levelset/error.h"
+#include "levelset/transform/resample_vdb.h"
+#include "levelset/vdb.h"
+
+namespace levelset {
+namespace {
+
+using openvdb::FloatTree;
+
+/// Checks that a matrix is finite, affine and invertible.
+void requireAffine(const Imath::M44d& matrix, const char* action) {
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; j < 4; ++j) {
+      if (std::isfinite(matrix[i][j])) continue;
+      throw UsageError(
+          fmt::format("{}: the matrix has {} in row {}, column {}; its elements must be "
+                      "finite",
+                      action, matrix[i][j], i + 1, j + 1));
+    }
+  if (matrix[0][3] != 0 || matrix[1][3] != 0 || matrix[2][3] != 0 || matrix[3][3] != 1) {
+    throw UsageError(
+        fmt::format("{}: the last column of the matrix is {},{},{},{}; it must be 0,0,0,1 "
+                    "(points are row vectors: a translation is the last row)",
+                    action, matrix[0][3], matrix[1][3], matrix[2][3], matrix[3][3]));
+  }
+  const Stretch stretch = stretchOf(matrix);
+  if (!(stretch.least > 1e-12 * stretch.greatest)) {
+    throw UsageError(
+        fmt::format("{}: the matrix is singular (it stretches by {} and by {}); use an "
+                    "invertible matrix",
+                    action, stretch.least, stretch.greatest));
+  }
+}
+
+/// Largest coordinate of grids and meshes, in double precision: volumes must not overflow.
+constexpr double kFarthest = 1e100;
+/// Largest rounding error of world positions, voxels.
+constexpr double kPositionTolerance = 1e-6;
+
+/// Checks that the origin of a grid is accurate. With large rounding errors, the voxel size is
+/// lost.
+void requirePrecision(const Imath::M44d& indexToWorld, double voxelSize, const char* action) {
+  double farthest = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    farthest = std::max(farthest, std::abs(indexToWorld[3][axis]));
+  const double spacing = spacingAt(farthest, CoordinatePrecision::Double);
+  if (spacing <= kPositionTolerance * voxelSize) return;
+  throw InvalidInput(fmt::format(
+      "{}: at {:.3g} from the origin, double precision resolves only {:.2g}, too coarse for "
+      "voxels of {:.3g}; move the solid less far, or use larger voxels",
+      action, farthest, spacing, voxelSize));
+}
+
+void requireStretch(const Stretch& stretch, const char* action) {
+  if (stretch.greatest < kFarthest && stretch.least > 1 / kFarthest) return;
+  throw InvalidInput(fmt::format(
+      "{}: the matrix stretches by {:.3g} to {:.3g}, and coordinates or volumes would overflow; "
+      "change the unit of length",
+      action, stretch.least, stretch.greatest));
+}
+
+void scaleDistances(openvdb::FloatGrid& grid, double scale, float background) {
+  const auto scaled = [=](float value, bool isOn) {
+    if (!isOn) return std::copysign(background, value);
+    return std::clamp(static_cast<float>(static_cast<double>(value) * scale), -background,
+                      background);
+  };
+  openvdb::tree::LeafManager<FloatTree> leaves(grid.tree());
+  leaves.foreach ([&](FloatTree::LeafNodeType& leaf, std::size_t) {
+    float* values = leaf.buffer().data();
+    for (openvdb::Index i = 0; i < FloatTree::LeafNodeType::SIZE; ++i)
+      values[i] = scaled(values[i], leaf.isValueOn(i));
+  });
+  for (auto it = grid.tree().beginValueOff(); it; ++it)
+    if (it.getDepth() < FloatTree::DEPTH - 1) it.setValue(scaled(*it, false));
+  grid.tree().root().setBackground(background, /*updateChildNodes=*/false);
+}
+
+}  // namespace
+
+NarrowBand transform(NarrowBand solid, const Imath::M44d& matrix) {
+  const char* action = "transform";
+  requireAffine(matrix, action);
+  const Stretch stretch = stretchOf(matrix);
+  requireStretch(stretch, action);
+  if (stretch.greatest > stretch.least * (1 + 1e-7) || !(Imath::M44d(matrix).determinant() > 0)) {
+    throw InvalidInput(
+        fmt::format("{}: the matrix shears, mirrors or scales unevenly, which a grid "
+                    "transform cannot represent; resample the solid with --bake",
+                    action));
+  }
+  if (!solid.shared())
+    throw InvalidInput(fmt::format("{}: the solid is empty; give a solid with a surface", action));
+  const Imath::M44d moved = solid.indexToWorld() * matrix;
+  const double voxelSize = solid.voxelSize() * stretch.greatest, halfWidth = solid.halfWidth();
+  const float background = backgroundOf(halfWidth, voxelSize);
+  requireBackground(background, voxelSize, action);
+  requirePrecision(moved, voxelSize, action);
+  const openvdb::math::Transform::Ptr transform = transformOf(moved, action);
+  openvdb::FloatGrid& grid = editVdb(solid);
+  grid.setTransform(transform);
+  const double scale = std::cbrt(Imath::M44d(matrix).determinant());
+  // The determinant of a rotation is one up to rounding; keep the bits of the distances then.
+  if (std::abs(scale - 1) > 1e-9) scaleDistances(grid, scale, background);
+  return solid;
+}
+
+NarrowBand bake(const NarrowBand& solid, const Imath::M44d& matrix, double voxelSize,
+                const BakeOptions& options) {
+  const char* action = "transform";
+  requireAffine(matrix, action);
+  requireVoxelSize(voxelSize, action);
+  return resampleField(solid, solid.indexToWorld() * matrix, axisAligned(voxelSize),
+                       solid.shared() ? solid.halfWidth() : 3, options.maxMemory, options.progress,
+                       action);
+}
+
+TriMesh transform(TriMesh mesh, const Imath::M44d& matrix) {
+  const char* action = "transform";
+  requireAffine(matrix, action);
+  requireAttributes(mesh, action);
+  const Stretch stretch = stretchOf(matrix);
+  requireStretch(stretch, action);
+  mesh.spacing = coordinateSpacing(mesh) * stretch.greatest;
+  mesh.precision = CoordinatePrecision::Double;  // transformed coordinates need more digits
+  for (Imath::V3d& position : mesh.positions) {
+    Imath::V3d moved;
+    matrix.multVecMatrix(position, moved);
+    for (int axis = 0; axis < 3; ++axis)
+      if (!(std::abs(moved[axis]) < kFarthest))
+        throw InvalidInput(
+            fmt::format("{}: a vertex moves to ({:.3g}, {:.3g}, {:.3g}), where volumes "
+                        "would overflow; change the unit of length",
+                        action, moved.x, moved.y, moved.z));
+    position = moved;
+  }
+  const bool mirrors = Imath::M44d(matrix).determinant() < 0;
+  const std::array<Imath::V3d, 3> slopes = {Imath::V3d(matrix[0][0], matrix[0][1], matrix[0][2]),
+                                            Imath::V3d(matrix[1][0], matrix[1][1], matrix[1][2]),
+                                            Imath::V3d(matrix[2][0], matrix[2][1], matrix[2][2])};
+  const bool turns =
+      slopes != std::array{Imath::V3d(1, 0, 0), Imath::V3d(0, 1, 0), Imath::V3d(0, 0, 1)};
+  if (turns)  // otherwise keep the bits
+    for (Imath::V3d& normal : mesh.attributes.normals)
+      normal = transformedNormal(normal, slopes, mirrors ? -1 : 1);
+  if (mirrors)
+    for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
+  return mesh;
+}
+
+}  // namespace levelset
