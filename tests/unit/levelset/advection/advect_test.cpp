@@ -39,8 +39,7 @@ struct SurfaceError {
   double mean = 0, largest = 0;  ///< errors of the surface, voxels
 };
 
-/// exact distance
-///  at the zeros that linear interpolation finds on grid edges.
+/// Measures the exact distance at the zeros that linear interpolation finds on grid edges.
 SurfaceError surfaceError(const NarrowBand& band, const Distance& exact) {
   const openvdb::FloatGrid& grid = levelset::vdb(band);
   const auto accessor = grid.getConstAccessor();
@@ -362,6 +361,22 @@ TEST(SlowAdvect, GridSchemesTransportASphere) {
         << static_cast<int>(scheme);
     EXPECT_TRUE(levelset::check(result.band).passed());
   }
+}
+
+TEST(Advect, UpwindDifferencesConverge) {
+  std::vector<double> errors;  // voxels
+  const V3d from(0.02, 0.03, -0.01), by(0.21, 0.34, 0.13);
+  for (const double resolution : {4.0, 8.0, 16.0}) {
+    const NarrowBand ball = levelset::makeSphere(1, from, 1 / resolution);
+    const AdvectResult result =
+        levelset::advect(ball, constantVelocity(by), 1, {.scheme = AdvectScheme::Upwind});
+    errors.push_back(surfaceError(result.band, ballDistance(from + by, 1)).mean);
+  }
+  EXPECT_LT(errors[0], support::measured(0.00965));
+  EXPECT_LT(errors[2], support::measured(0.00261));
+  // One order more in world units.
+  EXPECT_GT(std::log2(errors[0] / errors[1]), support::measuredOrder(0.903));
+  EXPECT_GT(std::log2(errors[1] / errors[2]), support::measuredOrder(0.982));
 }
 
 TEST(Advect, SemiLagrangianStepsKeepTheVolumeOfNarrowBands) {
