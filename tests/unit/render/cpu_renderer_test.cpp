@@ -13,6 +13,7 @@
 #include "levelset/transform/transform.h"
 #include "render/embree/embree_renderer.h"
 #include "render/images/compare_images.h"
+#include "tests/support/measured.h"
 #include "tests/support/render_scenes.h"
 
 namespace cpu_renderer_test {
@@ -72,7 +73,7 @@ TEST(CpuRenderer, HasNoHoleInAFaceOfTheBoxAcrossTheView) {
   const Image image = renderCpu(scene, kDataOnly);
   for (const float z : image.channels.at("Z"))
     if (std::isfinite(z)) {
-      ASSERT_NEAR(z, 84, 0.1);
+      ASSERT_NEAR(z, 84, support::rounding(100));
     }
 }
 
@@ -114,7 +115,7 @@ TEST(CpuRenderer, HasTheColoursOfTheJudge) {
       unlike += std::abs(a[i] - b[i]) > 0.1f;
     }
   }
-  EXPECT_LT(std::abs(sum), 2e-3 * covered);
+  EXPECT_LT(std::abs(sum), support::measured(1.17e-4) * covered);
   EXPECT_LT(unlike, 20u);
 }
 

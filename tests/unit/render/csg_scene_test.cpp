@@ -22,6 +22,7 @@
 #include "render/kernel/kernel_scene.h"
 #include "render/scene/csg_expression.h"
 #include "tests/support/bands.h"
+#include "tests/support/measured.h"
 #include "tests/support/render_scenes.h"
 
 namespace csg_scene_test {
@@ -101,9 +102,11 @@ void expectBitten(const Image& image, const char* what) {
   const std::size_t middle =
       static_cast<std::size_t>(image.height / 2) * static_cast<std::size_t>(image.width) +
       static_cast<std::size_t>(image.width / 2);
-  EXPECT_NEAR(image.channels.at("Z")[middle], 88, 0.05) << what;
-  EXPECT_NEAR(image.channels.at("N.Z")[middle], 1, 0.01) << what;  // normal of the concave cut
-  EXPECT_NEAR(image.channels.at("curvature.mean")[middle], -1.0 / 8, 0.004) << what;
+  EXPECT_NEAR(image.channels.at("Z")[middle], 88, support::measured(0.0393, 0.05)) << what;
+  EXPECT_NEAR(image.channels.at("N.Z")[middle], 1, support::measured(0.00441))
+      << what;  // normal of the concave cut
+  EXPECT_NEAR(image.channels.at("curvature.mean")[middle], -1.0 / 8, support::measured(3.57e-5))
+      << what;
   EXPECT_EQ(image.ids.at("id")[middle], 2u) << what;
 }
 
@@ -194,7 +197,7 @@ TEST(CsgScene, SubtractedPartsCastNoShadowAndHideNothing) {
     return sum;
   };
   for (const bool isJudge : {false, true}) {
-    EXPECT_NEAR(brightness("a - b", isJudge) / brightness("a", isJudge), 1, 1e-6);
+    EXPECT_NEAR(brightness("a - b", isJudge) / brightness("a", isJudge), 1, support::rounding(1));
     EXPECT_LT(brightness("a | b", isJudge), 0.9 * brightness("a", isJudge));
   }
 }
@@ -247,7 +250,7 @@ TEST(Thickness, MatchesTheExactSolids) {
                                                              : chord(8);
           const auto i = static_cast<std::size_t>(y) * static_cast<std::size_t>(image->width) +
                          static_cast<std::size_t>(x);
-          ASSERT_NEAR(image->channels.at("thickness")[i], exact, 0.1) << csg;
+          ASSERT_NEAR(image->channels.at("thickness")[i], exact, support::measured(0.0229)) << csg;
         }
     }
   }

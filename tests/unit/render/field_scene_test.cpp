@@ -19,6 +19,7 @@
 #include "render/images/value_bits.h"
 #include "render/kernel/kernel_scene.h"
 #include "tests/support/field_scenes.h"
+#include "tests/support/measured.h"
 #include "tests/support/render_scenes.h"
 
 namespace field_scene_test {
@@ -172,15 +173,16 @@ TEST(FieldDepths, CutABallAtTheirPlanes) {
         const bool seesFront = half > 0 && in > near && in<end, seesBack = half> 0 && in < near &&
                                out > near && out < end;
         ASSERT_NEAR(image.channels.at("thickness")[i],
-                    std::max(0.0, std::min(out, end) - std::max(in, near)), 0.05)
+                    std::max(0.0, std::min(out, end) - std::max(in, near)),
+                    support::measured(0.0171))
             << near << ' ' << r2;
         const auto pixel = pixelOf(image, i);
         ASSERT_EQ(pixel.has_value(), seesFront || seesBack) << near << ' ' << r2;
         if (!pixel) continue;
-        ASSERT_NEAR(image.channels.at("Z")[i], seesFront ? in : out, 0.02);
+        ASSERT_NEAR(image.channels.at("Z")[i], seesFront ? in : out, support::measured(0.00853));
         // The normal points outwards and the surface is convex, as from outside.
-        ASSERT_NEAR(pixel->normal.z, (seesFront ? half : -half) / 20, 1e-3);
-        ASSERT_NEAR(image.channels.at("curvature.mean")[i], 0.05, 1e-3);
+        ASSERT_NEAR(pixel->normal.z, (seesFront ? half : -half) / 20, support::measured(4.04e-4));
+        ASSERT_NEAR(image.channels.at("curvature.mean")[i], 0.05, support::measured(7.09e-6));
       }
   }
 }
@@ -255,7 +257,7 @@ TEST(FieldScene, IsSeenThroughMeshesAndHidesThem) {
         EXPECT_NEAR(image.channels.at(name)[middle],
                     share * ofMesh.channels.at(name)[middle] +
                         (1 - share) * ofBall.channels.at(name)[middle],
-                    1e-5);
+                    support::rounding(1));
       }
     }
   }
@@ -269,7 +271,7 @@ TEST(FieldScene, IsSeenThroughMeshesAndHidesThem) {
   for (const RenderOptions& options : {kDataOnly, lit}) {
     const Image cpu = renderCpu(scene, options), judge = renderEmbree(scene, options);
     EXPECT_EQ(cpu.ids.at("id")[middle], 4u);
-    EXPECT_NEAR(cpu.channels.at("A")[middle], 1, 1e-6);
+    EXPECT_NEAR(cpu.channels.at("A")[middle], 1, support::rounding(1));
     for (const char* name : colours) {
       std::size_t unlike = 0;
       double ours = 0, theirs = 0;
@@ -279,7 +281,7 @@ TEST(FieldScene, IsSeenThroughMeshesAndHidesThem) {
         ours += static_cast<double>(a);
         theirs += static_cast<double>(b);
       }
-      EXPECT_NEAR(ours, theirs, 1e-3 * theirs) << name;
+      EXPECT_NEAR(ours, theirs, support::measured(7.64e-10) * theirs) << name;
       EXPECT_TRUE(options.shadowSamples > 0 || unlike <= cpu.pixelCount() / 1000)
           << name << ": " << unlike;
     }
@@ -299,7 +301,7 @@ TEST(FieldScene, IsLitThroughMeshes) {
     };
     const double open = brightness(0), dark = brightness(1);
     EXPECT_LT(dark, 0.95 * open);
-    EXPECT_NEAR(brightness(0.3), dark + (open - dark) * 0.7, 1e-4 * open);
+    EXPECT_NEAR(brightness(0.3), dark + (open - dark) * 0.7, support::measured(1.65e-9) * open);
   }
 }
 

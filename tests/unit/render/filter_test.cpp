@@ -18,6 +18,7 @@
 #include "render/gpu/gpu_renderer.h"
 #include "render/images/compare_images.h"
 #include "tests/support/bands.h"
+#include "tests/support/measured.h"
 #include "tests/support/render_scenes.h"
 
 namespace filter_test {
@@ -64,8 +65,8 @@ TEST(Filters, HaveTheStatedPositionError) {
     EXPECT_LE(linear.worst(), 0.26 / radius) << radius;
     EXPECT_GE(linear.worst(), 0.1 / radius) << radius;
     const Shift plain = shiftOf(radius, Filter::BSpline);
-    EXPECT_NEAR(plain.least, -1 / (3 * radius), 0.05 / radius) << radius;
-    EXPECT_NEAR(plain.most, -1 / (3 * radius), 0.05 / radius) << radius;
+    EXPECT_NEAR(plain.least, -1 / (3 * radius), support::measured(0.00128) / radius) << radius;
+    EXPECT_NEAR(plain.most, -1 / (3 * radius), support::measured(9.84e-4) / radius) << radius;
   }
   const double coarse = shiftOf(10, Filter::BSplineQi).worst();
   EXPECT_LE(coarse, 1e-4);
@@ -164,10 +165,10 @@ TEST(Filters, NormalsAndCurvaturesConverge) {
       EXPECT_GE(order(coarse.normal, fine.normal) / 2, 1.8) << what;
       EXPECT_GE(order(coarse.mean, middle.mean), 1.5) << what;
       EXPECT_GE(order(middle.mean, fine.mean), 1.5) << what;
-      EXPECT_LE(fine.mean, 0.01) << what;
+      EXPECT_LE(fine.mean, support::measured(4.85e-4)) << what;
       if (formula.name != "cylinder") {
         EXPECT_GE(order(coarse.gauss, fine.gauss) / 2, 1.5) << what;
-        EXPECT_LE(fine.gauss, 0.02) << what;
+        EXPECT_LE(fine.gauss, support::measured(7.87e-4)) << what;
       }
     }
 }

@@ -16,6 +16,7 @@
 #include "render/embree/embree_renderer.h"
 #include "render/gpu/gpu_renderer.h"
 #include "render/images/compare_images.h"
+#include "tests/support/measured.h"
 #include "tests/support/render_scenes.h"
 
 namespace style_test {
@@ -60,7 +61,7 @@ TEST(Styles, DistinguishFiveKindsOfShape) {
 TEST(Styles, DarkenPointsThatLargeBallsCannotTouch) {
   EXPECT_EQ(accessibilityOf(sampleOf(7, 0), 1), 1);
   EXPECT_GT(accessibilityOf(sampleOf(0, -0.1), 1), 0.9);
-  EXPECT_LT(accessibilityOf(sampleOf(0, -100), 1), 0.01);
+  EXPECT_LT(accessibilityOf(sampleOf(0, -100), 1), support::measured(1.21e-4));
   EXPECT_GT(accessibilityOf(sampleOf(0, -1), 1), accessibilityOf(sampleOf(0, -2), 1));
 }
 
@@ -89,7 +90,7 @@ TEST(Styles, ComputeTheCurvatureAlongTheView) {
     const V3d direction = (V3d(-1, 0, 0) + aside).normalized();
     const Hit hit = rays.intersect(target - direction * 3.0, direction);
     ASSERT_TRUE(hit.found);
-    EXPECT_NEAR(hit.viewCurvature, aside.y * aside.y / radius, 0.01) << slope;
+    EXPECT_NEAR(hit.viewCurvature, aside.y * aside.y / radius, support::measured(6.2e-4)) << slope;
   }
 }
 
@@ -120,7 +121,7 @@ TEST(Styles, InkTheRimOfABallInTheRequestedWidth) {
       if (pixelOf(image, x, 60).x < 0.1f &&
           image.ids.at("id")[60 * 120 + static_cast<std::size_t>(x)])
         ++dark;
-    EXPECT_NEAR(dark, width, 1);
+    EXPECT_NEAR(dark, width, support::rounding(6));
   }
 }
 
@@ -152,8 +153,8 @@ TEST(Styles, DrawTheMatcapOnABall) {
       const double u = (x + 0.5 - 60) / 50, v = (y + 0.5 - 60) / 50;
       if (std::hypot(u, v) > 0.9) continue;
       const C3f colour = pixelOf(image, x, y);
-      EXPECT_NEAR(colour.x, 0.5 * (0.5 + 0.49 * u), 0.02) << x << ' ' << y;
-      EXPECT_NEAR(colour.y, 0.5 * (0.5 + 0.49 * v), 0.02) << x << ' ' << y;
+      EXPECT_NEAR(colour.x, 0.5 * (0.5 + 0.49 * u), support::measured(0.0046)) << x << ' ' << y;
+      EXPECT_NEAR(colour.y, 0.5 * (0.5 + 0.49 * v), support::measured(0.00438)) << x << ' ' << y;
     }
   }
 }

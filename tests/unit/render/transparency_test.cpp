@@ -14,6 +14,7 @@
 #include "render/embree/embree_renderer.h"
 #include "render/gpu/gpu_renderer.h"
 #include "render/images/compare_images.h"
+#include "tests/support/measured.h"
 #include "tests/support/render_scenes.h"
 
 namespace transparency_test {
@@ -81,10 +82,10 @@ void expectSeen(const Scene& scene, const Seen& wanted) {
   const Image cpu = renderCpu(scene, kNoRays);
   for (const Image& image : {cpu, renderEmbree(scene, kNoRays)}) {
     const Seen seen = middleOf(image);
-    EXPECT_NEAR(seen.r, wanted.r, 1e-5);
-    EXPECT_NEAR(seen.g, wanted.g, 1e-5);
-    EXPECT_NEAR(seen.b, wanted.b, 1e-5);
-    EXPECT_NEAR(seen.a, wanted.a, 1e-6);
+    EXPECT_NEAR(seen.r, wanted.r, support::rounding(0.8));
+    EXPECT_NEAR(seen.g, wanted.g, support::rounding(0.5));
+    EXPECT_NEAR(seen.b, wanted.b, support::measured(1.16e-8));
+    EXPECT_NEAR(seen.a, wanted.a, support::rounding(0.4));
   }
   EXPECT_EQ(compareImages(cpu, renderGpu(scene, kNoRays), {.exact = true}).differentBits, 0u);
 }
@@ -95,7 +96,7 @@ TEST(Transparency, OfSlabsAddsUpFrontToBack) {
   for (std::size_t i = 3; i-- > 0;)
     for (int side = 0; side < 2; ++side)  // each slab has a front and a back
       wanted = over(aloneOf(scene, i), scene.solids[i].opacity, wanted);
-  EXPECT_NEAR(wanted.a, 1 - std::pow(0.7 * 0.4 * 0.55, 2), 1e-12);
+  EXPECT_NEAR(wanted.a, 1 - std::pow(0.7 * 0.4 * 0.55, 2), support::doubleRounding(1));
   expectSeen(scene, wanted);
 }
 
@@ -106,7 +107,7 @@ TEST(Transparency, EndsAtOpaqueAndNearlyOpaqueSurfaces) {
   const Scene dense = slabs({0.9, 0.9});  // a third surface would contribute less than 1/512
   const Seen first = aloneOf(dense, 0), second = aloneOf(dense, 1);
   Seen wanted = over(first, 1 - 0.1 * 0.1, over(second, 0.9, {0, 0, 0, 0}));
-  EXPECT_NEAR(wanted.a, 1 - 1e-3, 1e-12);
+  EXPECT_NEAR(wanted.a, 1 - 1e-3, support::doubleRounding(4));
   expectSeen(dense, wanted);
 }
 
@@ -201,7 +202,7 @@ void expectSameLight(const Image& ours, const Image& judge, const char* what) {
       a += static_cast<double>(ours.channels.at(name)[i]);
       b += static_cast<double>(judge.channels.at(name)[i]);
     }
-    EXPECT_NEAR(a / b, 1, 2e-3) << what << ' ' << name;
+    EXPECT_NEAR(a / b, 1, support::measured(2.17e-5)) << what << ' ' << name;
   }
 }
 
@@ -256,11 +257,12 @@ TEST(Transparency, DimsShadowsByTheTransmittedLight) {
       const double dark = brightnessUnder(withRoof(1, csg), isJudge);
       EXPECT_LT(dark, 0.95 * open);
       EXPECT_NEAR(brightnessUnder(withRoof(0.3, csg), isJudge), dark + (open - dark) * 0.7 * 0.7,
-                  1e-4 * open);
+                  support::measured(7.73e-9) * open);
     }
     const double dark = brightnessUnder(withSheet(1), isJudge);
     EXPECT_LT(dark, 0.95 * open);
-    EXPECT_NEAR(brightnessUnder(withSheet(0.3), isJudge), dark + (open - dark) * 0.7, 1e-4 * open);
+    EXPECT_NEAR(brightnessUnder(withSheet(0.3), isJudge), dark + (open - dark) * 0.7,
+                support::measured(1.07e-8) * open);
   }
 }
 
