@@ -4,7 +4,8 @@
 #include <string>
 #include <string_view>
 
-/// Text and data for HTML pages: the regression suite and reports.
+/// Escapes text and encodes data for HTML pages. The regression suite and the run reports use these
+/// functions.
 namespace apps {
 
 /// Length in bytes of the well-formed UTF-8 sequence at the start of a text; 0 if there is none

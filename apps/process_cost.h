@@ -14,15 +14,15 @@
 /// suite.
 namespace apps {
 
-/// CPU seconds of all threads so far.
+/// CPU time of all threads of the process so far, seconds.
 [[nodiscard]] inline double processCpuSeconds() {
   timespec time{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-/// Value in bytes of a line of /proc/self/status that is given in kilobytes; NaN if the line is
-/// missing.
+/// Reads a line of /proc/self/status whose value is given in kilobytes, such as "VmRSS:". Returns
+/// bytes; NaN if the line is missing.
 [[nodiscard]] inline double processStatusBytes(const std::string& key) {
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);)
@@ -30,7 +30,7 @@ namespace apps {
   return std::numeric_limits<double>::quiet_NaN();
 }
 
-/// Peak of the resident set since the last reset, bytes.
+/// Peak of the resident set since the last resetPeakResident(), bytes.
 [[nodiscard]] inline double peakResidentBytes() {
   return processStatusBytes("VmHWM:");
 }
@@ -40,11 +40,12 @@ inline void resetPeakResident() {
 
 struct Cost {
   double cpuSeconds = 0;
-  double peakBytes = 0;  ///< largest growth of the resident set, bytes
+  double peakBytes = 0;  ///< largest growth of the resident set during the measured work, bytes
 };
 
-/// Runs `work` and measures its cost. Freed memory is first returned to the system, so that memory
-/// allocated again counts.
+/// Runs `work` and measures its cost. Freed memory is first returned to the system. Memory that
+/// `work` allocates then counts as growth of the resident set, even if the process had used it
+/// before.
 [[nodiscard]] inline Cost costOf(const std::function<void()>& work) {
   malloc_trim(0);
   resetPeakResident();

@@ -49,7 +49,7 @@ Json notesJson(const StepNotes& notes) {
   return json;
 }
 
-/// Reads a number. JSON has no infinity and stores it as null.
+/// Reads a number. JSON cannot express infinity, so null stands for it.
 double numberOf(const Json& json) {
   return json.is_number() ? json.get<double>() : HUGE_VAL;
 }
@@ -90,10 +90,11 @@ Json readEntry(const fs::path& file) {
   const std::size_t end = std::min(bytes.find('\n'), bytes.size());
   const std::string text = bytes.substr(std::min(end + 1, bytes.size()));
   if (bytes.substr(0, end) != digestOf(text))
-    throw levelset::InvalidInput("cache: the entry is damaged");
+    throw levelset::InvalidInput(
+        "cache: the entry file is damaged: its digest does not match its text");
   Json entry = Json::parse(text);
   if (entry.at("version") != kCacheVersion)
-    throw levelset::InvalidInput("cache: the entry has another version");
+    throw levelset::InvalidInput("cache: the entry file has another version of the format");
   return entry;
 }
 
@@ -109,7 +110,7 @@ void touch(const fs::path& file) {
 std::uint64_t hashOf(const Value& value) {
   if (value.kind() == Kind::Band) return value.band().contentHash();
   if (value.kind() == Kind::Field) return value.field().contentHash();
-  return 0;  // the bytes of a mesh contain their own digest
+  return 0;  // mesh: the stored bytes contain a digest
 }
 
 }  // namespace
@@ -171,7 +172,7 @@ std::optional<CachedStep> Cache::step(const std::string& key) const {
                             f.at("changed").get<std::int64_t>()});
     touch(entryPath(key, kEntry));
     return step;
-  } catch (const std::exception&) {  // damaged
+  } catch (const std::exception&) {  // the entry is damaged and counts as absent
     return {};
   }
 }
@@ -196,7 +197,7 @@ std::optional<Value> Cache::value(const std::string& key, std::size_t maxMemory)
     throw;
   } catch (const levelset::Cancelled&) {
     throw;
-  } catch (const std::exception&) {  // damaged
+  } catch (const std::exception&) {  // the entry is damaged and counts as absent
     return {};
   }
 }
@@ -224,7 +225,7 @@ std::string Cache::put(const std::string& key, const CachedStep& step, const Val
         std::ofstream out(whole, std::ios::binary);
         const std::string bytes = bytesOf(value->mesh());
         out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-        if (!out.flush()) throw levelset::IoError("the disk is full");
+        if (!out.flush()) throw levelset::IoError("a write failed; check the free disk space");
       } else if (value->kind() == Kind::Field) {
         json["grid"] = value->field().name();
         levelset::writeField(whole, value->field(),
@@ -239,7 +240,7 @@ std::string Cache::put(const std::string& key, const CachedStep& step, const Val
     std::ofstream out(entry, std::ios::binary);
     out << textOf(json);
     out.close();
-    if (!out) throw levelset::IoError("the disk is full");
+    if (!out) throw levelset::IoError("a write failed; check the free disk space");
     fs::rename(entry, entryPath(key, kEntry));
     return {};
   } catch (const levelset::Cancelled&) {
@@ -259,7 +260,8 @@ std::optional<std::string> Cache::memo(const std::string& name) const {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) return {};
   std::string text = contentsOf(file);
-  if (text.size() < 2 || text.back() != '\n') return {};  // truncated
+  // Damaged: a complete file ends with a newline.
+  if (text.size() < 2 || text.back() != '\n') return {};
   text.pop_back();
   return text;
 }
@@ -282,7 +284,7 @@ std::vector<Cache::Entry> Cache::list() const {
     Entry entry;
     entry.key = item.path().stem().string();
     struct stat about;
-    if (::stat(item.path().c_str(), &about) != 0) continue;  // another process removed it
+    if (::stat(item.path().c_str(), &about) != 0) continue;  // another process removed the entry
     entry.used = nanoseconds(about.st_mtim);
     entry.bytes = static_cast<std::uint64_t>(about.st_size);
     for (const char* extension : {kGrid, kMesh})
@@ -317,8 +319,9 @@ std::size_t Cache::shrink(std::uint64_t mostBytes) const {
       fs::remove(entryPath(entry.key, extension), ignored);
     ++gone;
   }
-  // Remove values without an entry, and temporary files of dead processes. A live process may be
-  // about to write the entry of a value, so only values older than one hour are removed.
+  // Remove value files without an entry file, and temporary files of dead processes. A live process
+  // may be about to write the entry file of a value, so only value files older than one hour are
+  // removed.
   constexpr auto kLongEnough = std::chrono::hours(1);
   const auto isOld = [&](const fs::path& file) {
     const auto written = fs::last_write_time(file, ignored);

@@ -12,21 +12,22 @@
 
 namespace pipeline {
 
-/// State of a file after a node wrote it. A later comparison shows if the file changed.
+/// Path and state of a regular file at one moment. A comparison with a later stamp shows if the
+/// file changed in between.
 struct FileStamp {
-  std::string path;
+  std::string path;  ///< absolute path
   std::uint64_t size = 0, inode = 0, device = 0;
   std::int64_t changed = 0;  ///< modification time, ns
   [[nodiscard]] bool operator==(const FileStamp&) const = default;
 };
-/// @return the current state of a regular file; empty for anything else
+/// @return the current stamp of a regular file; empty if the path names anything else
 [[nodiscard]] std::optional<FileStamp> stampOf(const std::filesystem::path& file);
 
-/// Everything a node produced beside its value.
+/// Everything that a run of a node produced, except its value.
 struct CachedStep {
   std::string action;
   StepNotes notes;
-  std::string output;            ///< printed text
+  std::string output;            ///< text that the action printed for the user
   std::vector<FileStamp> files;  ///< files that the node wrote
 };
 
@@ -48,8 +49,10 @@ class Cache {
   /// Decides if values of a kind can be stored: meshes, level sets and fields can.
   [[nodiscard]] static bool canHold(Kind kind);
   [[nodiscard]] bool has(const std::string& key) const;
+  /// Reads everything that was stored with a result, except its value.
   /// @return empty if there is no entry or the entry is damaged
   [[nodiscard]] std::optional<CachedStep> step(const std::string& key) const;
+  /// Reads the value of a result.
   /// @param maxMemory  limit for the value, bytes
   /// @return empty if there is no value or the entry is damaged
   /// @throws levelset::ResourceLimit if the value exceeds the limit
@@ -60,9 +63,10 @@ class Cache {
   [[nodiscard]] std::string put(const std::string& key, const CachedStep& step,
                                 const Value* value) const;
 
-  /// Reads a short text stored by remember(). It saves an expensive look at a file, such as a
-  /// digest.
+  /// Reads a short text that remember() stored under a name; empty if there is none. Such a text is
+  /// the digest of an input file, which saves reading the file again.
   [[nodiscard]] std::optional<std::string> memo(const std::string& name) const;
+  /// Stores a short text under a name. Ignores write failures.
   void remember(const std::string& name, const std::string& text) const;
 
   /// Lists the entries, most recently used first.

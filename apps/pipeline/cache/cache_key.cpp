@@ -40,8 +40,8 @@ std::string stampText(const FileStamp& stamp) {
   return fmt::format("{} {} {} {}", stamp.size, stamp.inode, stamp.device, stamp.changed);
 }
 
-/// File that contains this code. Its digest is part of each key, because another version of the
-/// program may compute other results.
+/// Executable, or shared library of the Python module, that contains this code. Its digest is part
+/// of each key, because another version of the program may compute other results.
 std::filesystem::path programFile() {
   Dl_info about;
   const bool isKnown =
@@ -69,7 +69,8 @@ std::optional<std::string> CacheKeys::contentOf(const std::filesystem::path& fil
                                                 const Node& node) const {
   const std::optional<FileStamp> stamp = stampOf(file);
   const std::string extension = lowerExtension(file);
-  if (!stamp || extension == ".json") return {};  // the file refers to other files
+  // Not cached: the file is no regular file, or is a .json, which refers to further files.
+  if (!stamp || extension == ".json") return {};
   std::string about = stampText(*stamp);
   const bool isGrid = extension == ".vdb";
   const auto grid = node.options.find("grid");
@@ -78,7 +79,8 @@ std::optional<std::string> CacheKeys::contentOf(const std::filesystem::path& fil
   if (auto known = cache_.memo(name)) return known;
   std::optional<std::string> content;
   if (isGrid) {
-    // OpenVDB files of one tree can differ in their bytes, so hash the content.
+    // Two OpenVDB files of the same grid can differ in their bytes, so the content of the grid is
+    // hashed.
     try {
       const levelset::BandOrField read = levelset::readGrid(
           file, {.grid = grid == node.options.end() ? "" : grid->second, .maxMemory = maxMemory_});
@@ -87,7 +89,7 @@ std::optional<std::string> CacheKeys::contentOf(const std::filesystem::path& fil
     } catch (const levelset::Cancelled&) {
       throw;
     } catch (const levelset::Error&) {
-      return {};  // the action will report the error
+      return {};  // not cached: the action that reads the file will report the error
     }
   } else {
     content = digestOfFile(file);
