@@ -63,7 +63,7 @@ struct Reader {
   const Script* script = nullptr;  // script that contains the tokens; null: command line
   bool isStandardInput = false;    // the script came from standard input
   std::size_t next = 0;
-  Graph graph = {};  // what has been read so far, without the nodes
+  Graph graph = {};  // graph built so far
 
   [[nodiscard]] bool atEnd() const { return next >= tokens.size(); }
   [[nodiscard]] bool atBang() const { return !atEnd() && tokens[next] == "!"; }
@@ -83,9 +83,9 @@ struct Reader {
     const Param& param = matchParam(params, name, who);
     if (param.formerName == name) graph.addRenamed("--" + name, "--" + param.name);
     const std::string where = who + ": --" + param.name;
-    if (options.contains(param.name)) throw UsageError(where + ": is given twice");
+    if (options.contains(param.name)) throw UsageError(where + " is given twice; leave one out");
     if (param.type == ParamType::Flag) {
-      if (equals != std::string::npos) throw UsageError(where + ": is a flag and takes no value");
+      if (equals != std::string::npos) throw UsageError(where + " is a flag and takes no value");
       options[param.name] = "true";
       return;
     }
@@ -95,7 +95,7 @@ struct Reader {
     } else {
       if (atEnd() || atBang() || tokens[next].starts_with("--")) {
         throw UsageError(
-            fmt::format("{}: needs a value: --{} {}", where, param.name, valueForm(param)));
+            fmt::format("{} needs a value; write --{} {}", where, param.name, valueForm(param)));
       }
       value = tokens[next++];
     }
@@ -113,7 +113,8 @@ const Operator& matchOperator(const std::string& name) {
         "levelsmith: help must be the only action: `levelsmith help` or `levelsmith help ACTION`");
   }
   if (name == runOperator().name)
-    throw UsageError("run: must be the only action, after global options: `levelsmith run FILE`");
+    throw UsageError(
+        "run: must be the only action; only global options may precede it: `levelsmith run FILE`");
   const std::string guess = didYouMean(name, names);
   throw UsageError(fmt::format("levelsmith: there is no action '{}'{}", name,
                                guess.empty() ? "; `levelsmith help` lists them"
@@ -125,13 +126,14 @@ std::string operandName(const std::string& token, const std::string& who) {
   return token.substr(1);
 }
 
-/// An action as written.
+/// An action and its arguments, as the user wrote them.
 struct Action {
   const Operator* op = nullptr;
-  std::map<std::string, std::string> options;  // by full name; a flag is "true"
-  std::vector<std::string> operandNames;       // `@NAME`, without the @
-  std::string resultName;                      // --as
-  std::string location;                        // position in a script
+  // Values by full option name; a flag has the value "true".
+  std::map<std::string, std::string> options;
+  std::vector<std::string> operandNames;  // operands `@NAME`, without the @
+  std::string resultName;                 // name that --as gives; empty: none
+  std::string location;  // line of the script, for messages; empty: not from a script
 };
 
 Action readAction(Reader& reader) {
@@ -167,7 +169,8 @@ Action readAction(Reader& reader) {
           op.name, positional[i]));
     }
     const std::string where = op.name + ": " + param->name;
-    if (action.options.contains(param->name)) throw UsageError(where + ": is given twice");
+    if (action.options.contains(param->name))
+      throw UsageError(where + " is given twice; leave one out");
     checkText(*param, positional[i], where);
     action.options[param->name] = positional[i];
   }
@@ -184,7 +187,8 @@ Action readAction(Reader& reader) {
   return action;
 }
 
-/// Builds the nodes of a chain. Unnamed values are on a stack; named values stay available.
+/// Builds the nodes of a chain. Each result is pushed on a stack, from which actions take their
+/// operands. A named result can also be taken by its name, any number of times.
 class ChainBuilder {
  public:
   /// @param voxelsFollow  --tolerance chooses the voxel sizes that are not given
@@ -225,8 +229,9 @@ class ChainBuilder {
                                                : fmt::format("; did you mean '@{}'?", guess)));
   }
 
-  /// Collects the operands. Named operands come last; missing ones before them are taken off the
-  /// stack. An action that passes its operand through leaves it on the stack.
+  /// Collects the operands of an action. Operands given as @NAME are the last ones; those before
+  /// them are taken off the stack. An action that passes its operand through leaves it on the
+  /// stack.
   std::vector<std::size_t> takeOperands(const Action& action) {
     std::vector<std::size_t> named;
     for (const std::string& name : action.operandNames) named.push_back(nodeOf(name, *action.op));
@@ -308,7 +313,7 @@ ScriptCall readCall(Reader& reader) {
       ++reader.next;
     } else {
       throw UsageError(
-          "run: only --set NAME=VALUE may follow the file; write further actions into it");
+          "run: only --set NAME=VALUE may follow the file; write further actions into the file");
     }
   }
   if (call.file.empty())
@@ -321,7 +326,7 @@ Graph parseLines(const Script& script, const std::map<std::string, std::string>&
   try {
     return parse(reader, false, outer);
   } catch (const UsageError& error) {
-    // The reader is just after the action that failed.
+    // The reader is at the word after the action that failed.
     const std::size_t word = std::min(reader.next, script.words.size());
     throw UsageError(
         fmt::format("{} ({})", error.what(), script.location(word > 0 ? word - 1 : 0)));
@@ -361,7 +366,8 @@ Graph parse(Reader& reader, bool mayRun, const std::map<std::string, std::string
   while (!reader.atEnd()) {
     if (reader.atBang()) {
       throw UsageError(fmt::format(
-          "levelsmith: there is no action {} the '!' at word {}",
+          "levelsmith: there is no action {} the '!' at word {}; write one there, or leave out the "
+          "'!'",
           reader.next == 0 || graph.nodes.empty() ? "before" : "between an earlier '!' and",
           reader.next + 1));
     }
@@ -390,7 +396,7 @@ std::optional<std::string> helpRequest(const std::vector<std::string>& tokens) {
     if (token == "!") {
       isAtAction = true;
       action.clear();
-    } else if (isAtAction && isOption(token)) {  // a global option, perhaps with a value
+    } else if (isAtAction && isOption(token)) {  // a global option; its value is skipped
       const Param* param =
           token.starts_with("--") ? findParam(globalParams(), token.substr(2)) : nullptr;
       if (param && param->type != ParamType::Flag) ++i;

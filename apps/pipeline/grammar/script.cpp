@@ -21,7 +21,8 @@ using levelset::UsageError;
 /// held in memory.
 constexpr std::size_t kMostActions = 100'000;
 constexpr std::size_t kMostScriptBytes = 1 << 24;
-/// Limit for the expanded text: a variable can double its length in each iteration.
+/// Limit for the text after the expansion of variables and loops, bytes. In a loop, `set` can
+/// double the length of a variable in each iteration.
 constexpr std::size_t kMostExpandedBytes = 1 << 26;
 constexpr std::size_t kMostNested = 64;
 
@@ -32,7 +33,8 @@ bool isName(const std::string& text) {
          text.find_first_not_of(std::string(kLetters) + kDigits) == std::string::npos;
 }
 
-/// A reference such as "file:stem": variable name, and part of a file name.
+/// Text inside ${…}, such as "file:stem": name of a variable, and the part of a file name to take
+/// from its value. Empty part: the complete value.
 struct Reference {
   std::string name, part;
 };
@@ -42,7 +44,7 @@ Reference referenceOf(const std::string& text) {
   return {text.substr(0, colon), text.substr(std::min(colon + 1, text.size()))};
 }
 
-/// Text of a word without quotes and variables; empty for other words.
+/// Text of a word that has no quotes and no variables; empty for other words.
 std::string plainText(const ScriptWord& word) {
   return word.size() == 1 && !word[0].isVariable && !word[0].isQuoted ? word[0].text : "";
 }
@@ -52,7 +54,8 @@ bool beginsLoop(const ScriptLine& line) {
   return word == "repeat" || word == "for";
 }
 
-/// Variable of a loop: `repeat COUNT` (i), `repeat COUNT as NAME`, `for NAME in …`.
+/// Name of the variable of a loop: NAME in `for NAME in …` and `repeat COUNT as NAME`, i in `repeat
+/// COUNT`.
 std::string loopVariable(const ScriptLine& line) {
   const bool isFor = plainText(line.words[0]) == "for";
   if (!isFor && line.words.size() < 4) return "i";
@@ -83,7 +86,8 @@ class Expander {
  private:
   // === Checks before any variable is replaced
 
-  /// Finds the end of each loop and checks its syntax.
+  /// Finds the `end` line of each loop. Checks the syntax of the lines `repeat`, `for`, `end` and
+  /// `set`.
   void matchEnds() {
     ends_.resize(lines_.size());
     std::vector<std::size_t> open;
@@ -119,11 +123,13 @@ class Expander {
     const std::size_t count = line.words.size();
     if (plainText(line.words[0]) == "for") {
       if (count < 4 || plainText(line.words[2]) != "in")
-        fail(line, "for: write it as `for NAME in LIST`, the list as words, 0..10 or *.ply");
+        fail(line, "for: the line is not `for NAME in LIST`; the list is words, 0..10 or *.ply");
       checkName(line, "for", loopVariable(line));
     } else {
       if (count != 2 && (count != 4 || plainText(line.words[2]) != "as"))
-        fail(line, "repeat: write it as `repeat COUNT` or `repeat COUNT as NAME`");
+        fail(line,
+             "repeat: the line is neither `repeat COUNT` nor `repeat COUNT as NAME`; write one of "
+             "these");
       checkName(line, "repeat", loopVariable(line));
     }
   }
@@ -137,10 +143,12 @@ class Expander {
     }
   }
 
-  /// Checks that the script uses each setting: an unused one is probably misspelt.
+  /// Checks that the script uses each variable that --set gives: the name of an unused one is
+  /// probably misspelt.
   void checkSettings() const {
     std::set<std::string> taken = set_;
-    std::vector<std::pair<std::string, std::size_t>> loops;  // variable, and the line of its `end`
+    // Open loops: variable, and index of the `end` line.
+    std::vector<std::pair<std::string, std::size_t>> loops;
     for (std::size_t i = 0; i < lines_.size(); ++i) {
       std::erase_if(loops, [&](const auto& loop) { return loop.second == i; });
       for (const ScriptWord& word : lines_[i].words) {
@@ -214,7 +222,8 @@ class Expander {
     return loopValues(words, {kMostActions, &budget_}, placed(line, "for"));
   }
 
-  /// Appends the words of a list. Splits unquoted variables at blanks, as a shell does.
+  /// Appends the list entries that one word of a `for` line expands to. Splits unquoted variables
+  /// at blanks, as a shell does.
   void addListWords(const ScriptLine& line, const ScriptWord& word,
                     std::vector<ListWord>& words) const {
     bool inWord = false, isPattern = false;
@@ -266,7 +275,8 @@ class Expander {
     return text;
   }
 
-  /// Counts expanded text before it is stored.
+  /// Adds `bytes` to the size of the expanded text. Called before the text is stored, so that the
+  /// limit also bounds the memory.
   void spend(const ScriptLine& line, std::size_t bytes) const {
     expandedBytes_ += bytes;
     if (expandedBytes_ > kMostExpandedBytes)
@@ -343,9 +353,9 @@ class Expander {
   const std::vector<ScriptLine> lines_;
   const std::string file_;
   const std::map<std::string, std::string>& settings_;
-  std::vector<std::size_t> ends_;  // for each line that begins a loop: the line of its `end`
-  std::set<std::string> set_;      // names that any `set` line sets
-  std::map<std::string, std::string> values_;  // values set so far
+  std::vector<std::size_t> ends_;  // for each line that begins a loop: index of its `end` line
+  std::set<std::string> set_;      // names in all `set` lines of the script
+  std::map<std::string, std::string> values_;  // values from the `set` lines expanded so far
   std::vector<Round> rounds_;                  // open loops, outermost first
   std::size_t roundCount_ = 0;
   FolderBudget budget_;

@@ -11,10 +11,10 @@ namespace pipeline {
 struct Script {
   std::vector<std::string> words;  ///< as on the command line, with `!` between actions
   // One entry per expanded line; a line in a loop has one entry per iteration.
-  std::vector<std::size_t> begins;     ///< index of its first word
-  std::vector<std::string> locations;  ///< position, "FILE, line 4, i = 2"
+  std::vector<std::size_t> begins;     ///< index in `words` of the first word of the line
+  std::vector<std::string> locations;  ///< position of the line, "FILE, line 4, i = 2"
 
-  /// Position of a word in the script.
+  /// Returns the position in the script of a word, given by its index in `words`.
   [[nodiscard]] const std::string& location(std::size_t word) const;
 };
 
@@ -22,10 +22,11 @@ struct Script {
 /// The statements are `set NAME VALUE`, `repeat COUNT [as NAME]` and `for NAME in LIST`; `end` ends
 /// a loop. Lines of options before the first action are global options.
 /// @param file      path, or "-" for standard input
-/// @param settings  values of variables; they override those of `set`
+/// @param settings  values of variables by name; they override those of `set`
 /// @throws levelset::IoError if the file cannot be read, or no file matches a pattern
-/// @throws levelset::UsageError for a syntax error, a variable without a value, a setting of an
-///         unknown variable, a script without an action, or one that exceeds a limit
+/// @throws levelset::UsageError for a syntax error, a variable without a value, a value in
+///         `settings` for an unknown variable, a script without an action, or one that exceeds a
+///         limit
 [[nodiscard]] Script readScript(const std::filesystem::path& file,
                                 const std::map<std::string, std::string>& settings = {});
 /// Expands the text of a script, as readScript() does.

@@ -24,8 +24,8 @@ constexpr std::size_t kMostDigits = 18;
 struct Decimal {
   long long digits = 0;
   std::size_t decimals = 0;
-  std::size_t whole = 0;  ///< digits before the point
-  bool isPadded = false;  ///< has leading zeros
+  std::size_t whole = 0;  ///< number of digits before the point
+  bool isPadded = false;  ///< the text has leading zeros
 };
 
 std::optional<Decimal> parseDecimal(const std::string& text) {
@@ -57,7 +57,8 @@ std::string decimalText(long long digits, std::size_t decimals, std::size_t widt
   return (digits < 0 ? "-" : "") + whole + (fraction.empty() ? "" : "." + fraction);
 }
 
-/// Decides if a word is a range. A file name may contain two points too: "../a.ply".
+/// Decides if a word is a range such as 0..10. A number must precede the two points, because a file
+/// name may contain two points too: "../a.ply".
 bool looksLikeRange(const ListWord& word) {
   const std::size_t points = word.isBare ? word.text.find("..") : std::string::npos;
   return points != std::string::npos && parseDecimal(word.text.substr(0, points));
@@ -111,7 +112,7 @@ std::vector<std::string> rangeValues(const std::string& range, const std::string
 thread_local FolderBudget* globBudget = nullptr;
 
 void* openFolder(const char* name) {
-  errno = ENFILE;  // this value reaches refuseFolder()
+  errno = ENFILE;  // glob() passes this value to refuseFolder()
   if (globBudget->folders == 0 || globBudget->entries == 0) return nullptr;
   --globBudget->folders;
   return ::opendir(name);
@@ -129,7 +130,8 @@ bool mayLookUp() {
   return true;
 }
 
-/// Ends the search when the budget is used up. Ignores folders that cannot be read.
+/// Error callback of glob(). Ends the search when the budget is used up, which openFolder() reports
+/// as ENFILE. Ignores folders that cannot be read.
 int refuseFolder(const char*, int error) {
   return error == ENFILE ? 1 : 0;
 }
@@ -152,7 +154,7 @@ std::vector<std::string> matchingFiles(const std::string& pattern, FolderBudget*
   globfree(&found);
   if (status == GLOB_ABORTED || budget->entries == 0 || budget->names == 0)
     throw UsageError(fmt::format(
-        "{}: '{}' visits too many folders and files; name the folder, and use fewer patterns",
+        "{}: '{}' visits too many folders and files; name the folder, and use fewer wildcards",
         where, pattern));
   if (status == 0) {
     std::sort(files.begin(), files.end());  // by bytes, independent of the locale

@@ -13,7 +13,7 @@ class Splitter {
  public:
   Splitter(const std::string& text, const std::string& name) : text_(text), name_(name) {}
 
-  /// Reads the next line that has words; returns a line without words at the end.
+  /// Reads the next line that has words; returns a line without words at the end of the text.
   ScriptLine nextLine() {
     ScriptLine line;
     while (at_ < text_.size()) {
@@ -63,7 +63,7 @@ class Splitter {
 
   void readQuoted(char quote) {
     const std::size_t begin = line_;
-    word_.push_back({.isQuoted = true});  // '' is an empty word
+    word_.push_back({.isQuoted = true});  // so that '' is an empty word
     for (++at_; at_ < text_.size() && text_[at_] != quote;) {
       if (quote == '"' && text_[at_] == '\\' && at_ + 1 < text_.size())
         ++at_;
@@ -79,7 +79,7 @@ class Splitter {
     ++at_;
   }
 
-  /// Reads a variable or one unquoted character.
+  /// Reads a variable ${NAME}, a literal $${, or one character.
   void readCharacter(bool quoted) {
     if (isAt("$${")) {
       ++at_;

@@ -7,10 +7,12 @@
 /// Splits the text of a script into lines of words. Variables are not replaced yet.
 namespace pipeline {
 
+/// Part of a word: literal text or one variable.
 struct WordPart {
   std::string text = {};  ///< literal text, or the text between ${ and }
   bool isVariable = false;
-  bool isQuoted = false;  ///< never split, and not a pattern or a range
+  /// The part is in quotes: it is not split at blanks, and is no pattern or range.
+  bool isQuoted = false;
 };
 
 using ScriptWord = std::vector<WordPart>;
