@@ -74,7 +74,8 @@ std::vector<std::string> targetsOf(const Node& node) {
 
 struct FileRead {
   std::string name;
-  bool standsForOthers = false;  ///< refers to further files: a scene, or a sequence with '#'
+  /// The name stands for further files: a scene, or a sequence with '#'.
+  bool standsForOthers = false;
 };
 
 std::vector<FileRead> filesRead(const Node& node) {
@@ -94,12 +95,13 @@ std::vector<FileRead> filesRead(const Node& node) {
   return files;
 }
 
-/// Files that nodes write, with their writers, and the writer added last.
+/// Files that nodes write, each with the node that was last added as its writer.
 class Written {
  public:
   void add(const Graph& graph, std::size_t writer) {
     const Node& node = graph.nodes[writer];
-    // A scene writes files of its solids into the same folder.
+    // Writing a scene also writes a file for each of its solids into the folder of the scene file.
+    // So the complete folder counts as written.
     const bool isScene =
         std::any_of(node.inputs.begin(), node.inputs.end(),
                     [&](std::size_t input) { return graph.nodes[input].kind == Kind::Scene; });
@@ -111,7 +113,8 @@ class Written {
     }
   }
 
-  /// Finds the last writer of a file or of a folder that contains it.
+  /// Finds the last writer of a file or of a folder that contains it. For a name that stands for
+  /// further files, finds the last writer of any file.
   [[nodiscard]] std::optional<std::size_t> find(const FileRead& file) const {
     if (!last_ || file.standsForOthers) return last_;
     std::optional<std::size_t> found;
@@ -169,7 +172,7 @@ Kind checkNode(const Node& node, const std::vector<Node>& before) {
 
 std::vector<char> neededNodes(const Graph& graph) {
   const std::vector<Node>& nodes = graph.nodes;
-  // An operator that computes a value and also writes files is needed for its files.
+  // A node that computes a value and also writes files is needed because of its files.
   const auto actsOutside = [](const Node& node) {
     return !node.makes() || !targetsOf(node).empty();
   };

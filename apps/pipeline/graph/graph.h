@@ -13,14 +13,15 @@ namespace pipeline {
 /// One action with checked options and its operands.
 struct Node {
   const Operator* op = nullptr;
-  std::map<std::string, std::string> options;  ///< by full option name; a flag is "true"
-  std::vector<std::size_t> inputs;             ///< operands: indices of earlier nodes
+  /// Values as text, by full option name; a flag is "true".
+  std::map<std::string, std::string> options;
+  std::vector<std::size_t> inputs;  ///< operands: indices of earlier nodes
   std::map<std::string, std::size_t>
-      named;                  ///< by option: index of the node that `@NAME` refers to
+      named;                  ///< by option name: index of the node that `@NAME` refers to
   std::string name;           ///< name from --as; empty: none
   Kind kind = Kind::Band;     ///< kind of the result, if there is one
-  std::string location;       ///< position in a script; empty: not from a script
-  bool voxelFollows = false;  ///< voxel size is not given, and --tolerance will choose it
+  std::string location;       ///< position in a script, "FILE, line 4"; empty: not from a script
+  bool voxelFollows = false;  ///< true: no voxel size is given, and --tolerance will choose it
 
   [[nodiscard]] bool makes() const { return op->flow == Flow::Makes; }
 };
@@ -28,28 +29,33 @@ struct Node {
 /// The requested computation: nodes that compute values from values. A command line, a script and a
 /// JSON file with the same actions give the same graph.
 struct Graph {
-  std::map<std::string, std::string> globals;  ///< options of the run
-  std::vector<Node> nodes;                     ///< each node follows its operands
+  /// Global options of the run, by name without dashes.
+  std::map<std::string, std::string> globals;
+  std::vector<Node> nodes;  ///< each node follows its operands
   std::map<std::size_t, Value>
-      given;  ///< by node: values from outside the graph, see givenOperator()
-  std::vector<std::size_t> results;  ///< nodes whose values are requested
-  std::vector<std::string> renamed;  ///< one sentence for each former word that was used
+      given;  ///< by index of the node: values from outside the graph, see givenOperator()
+  std::vector<std::size_t> results;  ///< indices of nodes whose values the caller requests
+  /// For each former name of an action or option in the input, a sentence with its new name.
+  std::vector<std::string> renamed;
 
-  /// Adds the sentence for a former word, once.
+  /// Adds a sentence to `renamed` if the input has `written`, the former name of `name`. Adds each
+  /// sentence once.
   void addRenamed(const std::string& written, const std::string& name);
 };
 
-/// Operator of nodes whose values are in Graph::given. It never runs, and files cannot refer to it.
+/// Operator of nodes whose values are in Graph::given. It never runs, and graph files cannot
+/// contain it.
 [[nodiscard]] const Operator& givenOperator();
 
 /// Checks the operands and options of a node.
-/// @return kind of its result
-/// @throws levelset::UsageError if the number or the kinds of operands do not fit, or as
-///         Operator::validate
+/// @param before  all earlier nodes
+/// @return kind of the result of the node
+/// @throws levelset::UsageError if the number or the kinds of operands do not fit, or if
+///         Operator::validate rejects the options
 [[nodiscard]] Kind checkNode(const Node& node, const std::vector<Node>& before);
 
-/// Leaves the voxel size to --tolerance, if the node takes one and none is given. Call this before
-/// checkNode().
+/// Marks the voxel size of a node as chosen by --tolerance, if its action has the options --voxel
+/// and --resolution and neither is given. Call this before checkNode().
 void leaveVoxelOpen(Node& node);
 
 /// Finds the needed nodes: the requested results, the nodes that write, draw, print or check, and
@@ -64,8 +70,8 @@ void leaveVoxelOpen(Node& node);
 [[nodiscard]] std::vector<std::optional<std::size_t>> findWritersRead(
     const Graph& graph, const std::vector<char>& needed);
 
-/// Finds the nodes that read a file which a later node writes. After that writer, the input is
-/// lost.
+/// Finds the nodes that read a file which a later node writes. After the later node has run, the
+/// original content of the file is lost.
 /// @return one flag per node
 [[nodiscard]] std::vector<char> findOverwritten(const Graph& graph,
                                                 const std::vector<char>& needed);

@@ -38,7 +38,7 @@ Json toJson(const Node& node) {
   return json;
 }
 
-/// Reads nodes one by one. Each error message names the node.
+/// Reads the nodes of a JSON graph one by one. Each error message names the node by its index.
 class GraphReader {
  public:
   GraphReader(const Json& nodes, std::string file, std::map<std::string, std::string> globals)
@@ -63,11 +63,11 @@ class GraphReader {
   }
 
   void readNode(const Json& json) {
-    if (!json.is_object()) refuse("is not an object; write {\"op\": ...}");
+    if (!json.is_object()) refuse("the node is not an object; write {\"op\": ...}");
     for (const auto& [key, value] : json.items())
       if (key != "op" && key != "options" && key != "inputs" && key != "named" && key != "as")
-        refuse(
-            fmt::format("has an unknown member '{}'; use op, options, inputs, named and as", key));
+        refuse(fmt::format(
+            "the node has an unknown member '{}'; use op, options, inputs, named and as", key));
     Node node;
     const std::string op = textOf(json, "op");
     node.op = findOperator(op);
@@ -131,7 +131,8 @@ class GraphReader {
             fmt::format("{}: --{} takes no value of another action; give it under \"options\"",
                         node.op->name, name));
       if (node.options.contains(param.name))
-        throw UsageError(fmt::format("{}: --{}: is given twice", node.op->name, name));
+        throw UsageError(
+            fmt::format("{}: --{} is given twice; leave one out", node.op->name, name));
       node.options[param.name] = text;
       node.named[param.name] = number;
     }
@@ -139,7 +140,8 @@ class GraphReader {
 
   void setName(const std::string& name, Node& node) {
     if (!node.makes())
-      throw UsageError(fmt::format("{}: has no result to name; leave out \"as\"", node.op->name));
+      throw UsageError(
+          fmt::format("{}: the action has no result to name; leave out \"as\"", node.op->name));
     if (name.empty() || !names_.emplace(name, at_).second)
       throw UsageError(
           fmt::format("{}: the name '{}' is taken or empty; choose another", node.op->name, name));
@@ -156,18 +158,20 @@ class GraphReader {
   }
   [[nodiscard]] std::string textOf(const Json& json, const char* key) const {
     if (!json.contains(key) || !json[key].is_string())
-      refuse(fmt::format("has no text member '{}'", key));
+      refuse(fmt::format("the node has no member '{}' that is a text; add it", key));
     return json[key].get<std::string>();
   }
-  /// Index of an earlier node that has a value.
+  /// Reads the index of an operand. Checks that it is an earlier node with a result.
   [[nodiscard]] std::size_t numberOf(const Json& json) const {
     if (!json.is_number_unsigned() || json.get<std::uint64_t>() >= at_)
-      refuse(fmt::format("refers to {}; give the number of an earlier node, the first is 0",
-                         json.dump(-1, ' ', false, Json::error_handler_t::replace)));
+      refuse(
+          fmt::format("the node refers to {}; give the number of an earlier node, the first is 0",
+                      json.dump(-1, ' ', false, Json::error_handler_t::replace)));
     const auto number = json.get<std::size_t>();
     if (!graph_.nodes[number].makes())
-      refuse(fmt::format("takes node {}, but '{}' has no result", number,
-                         graph_.nodes[number].op->name));
+      refuse(fmt::format(
+          "the node takes node {} as operand, but '{}' has no result; take another node", number,
+          graph_.nodes[number].op->name));
     return number;
   }
 
@@ -180,8 +184,8 @@ class GraphReader {
 
 std::string toleranceText(const Json& json, const std::string& file) {
   if (!json.is_string() && !json.is_number())
-    throw InvalidInput(
-        fmt::format("run: '{}': \"tolerance\" is neither a text nor a number", file));
+    throw InvalidInput(fmt::format(
+        "run: '{}': \"tolerance\" is neither a text nor a number; write \"1%\" or 0.01", file));
   const std::string text = json.is_string() ? json.get<std::string>() : json.dump();
   const std::vector<Param>& all = globalParams();
   const auto param = std::find_if(all.begin(), all.end(),
@@ -209,12 +213,14 @@ Graph graphFromJson(const std::string& text, const std::string& name,
         name));
   if (json.value("version", Json()) != kVersion)
     throw InvalidInput(fmt::format(
-        "run: '{}' has version {}, but this program reads version {}", name,
-        json.value("version", Json()).dump(-1, ' ', false, Json::error_handler_t::replace),
+        "run: '{}' has version {}, but this program reads version {}; write the file again with "
+        "--save-graph",
+        name, json.value("version", Json()).dump(-1, ' ', false, Json::error_handler_t::replace),
         kVersion));
   const auto nodes = json.find("nodes");
   if (nodes == json.end() || !nodes->is_array() || nodes->empty())
-    throw InvalidInput(fmt::format("run: '{}' contains no nodes", name));
+    throw InvalidInput(
+        fmt::format("run: '{}' contains no nodes; add them as a list under \"nodes\"", name));
   std::map<std::string, std::string> all = globals;
   if (json.contains(kTolerance) && !all.contains(kTolerance))
     all[kTolerance] = toleranceText(json[kTolerance], name);

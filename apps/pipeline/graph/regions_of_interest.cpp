@@ -10,7 +10,8 @@ namespace {
 using Imath::Box3d;
 using Imath::V3d;
 
-/// A share of the operand's size would be one of the part's.
+/// Decides if an option of a node is a percentage of the diagonal of its first operand. A cropped
+/// operand would have another diagonal, so the node needs operands with their complete box.
 bool asksForSize(const Node& node) {
   return std::any_of(node.op->params.begin(), node.op->params.end(), [&](const Param& param) {
     if (param.type != ParamType::Length && param.type != ParamType::Lengths) return false;
@@ -20,8 +21,8 @@ bool asksForSize(const Node& node) {
   });
 }
 
-/// Is the value a distance, with a slope of 1? Only then a narrower band holds what is beside the
-/// surface. By node.
+/// Finds, for each node, if its value is a distance, with a slope of 1. Only then does a narrower
+/// band contain all voxels within its half width of the surface.
 std::vector<char> findDistances(const Graph& graph) {
   std::vector<char> is(graph.nodes.size(), 0);
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
@@ -34,7 +35,10 @@ std::vector<char> findDistances(const Graph& graph) {
   return is;
 }
 
-/// What a node reads of an operand, whose plan is known.
+/// Returns the region of interest of one operand of a node. It is the complete value if the
+/// operator gives none, or if the plan of an operand or of the result is unknown.
+/// @param of   region of interest of the result of the node
+/// @param own  plan of the result
 RegionOfInterest readOf(const Node& node, std::size_t operand, const RegionOfInterest& of,
                         const std::vector<std::optional<Plan>>& plans,
                         const std::optional<Plan>& own) {
@@ -53,7 +57,10 @@ RegionOfInterest readOf(const Node& node, std::size_t operand, const RegionOfInt
   return read;
 }
 
-/// Without what is no less than all.
+/// Removes a restriction that saves nothing: a half width as large as that of the band, and a box
+/// that is empty or contains the complete band. Keeps the complete half width of a value that is no
+/// distance.
+/// @param leastHalfWidth  voxels; a smaller half width is raised to it
 RegionOfInterest simplified(RegionOfInterest roi, const Plan& plan, bool isDistance,
                             double leastHalfWidth) {
   double& width = roi.halfWidth;
@@ -102,7 +109,7 @@ std::vector<RegionOfInterest> regionsOfInterest(const Graph& graph, const std::v
 Plan restricted(Plan plan, const RegionOfInterest& roi) {
   plan.halfWidth = std::min(plan.halfWidth, roi.halfWidth);
   if (plan.bounds.isEmpty()) return plan;
-  // As if the surface were spread evenly over its box.
+  // The estimate assumes that the surface is distributed evenly over its bounding box.
   double share = 1;
   for (int axis = 0; axis < 3; ++axis) {
     const double low = std::max(plan.bounds.min[axis], roi.region.min[axis]),

@@ -11,16 +11,18 @@ namespace pipeline {
 
 using levelset::RegionOfInterest;
 
-/// Finds the region of interest of each node's value, going backwards through the nodes that run.
-/// @param runs   one flag per node
-/// @param plans  of whole values; an empty one means that all of the value is read
-/// @param leastHalfWidth  voxels, at least 1: read of each band in any case
-/// @return       one per node; the whole for nodes that do not run and for values that are no bands
+/// Finds the region of interest of each node's value, from the last node that runs to the first.
+/// @param runs   one flag per node: true if the node runs
+/// @param plans  one plan of the complete value per node; empty: unknown, so the complete value is
+///        needed
+/// @param leastHalfWidth  smallest half width that is computed of any band, voxels; at least 1
+/// @return       one region of interest per node; the complete value for nodes that do not run and
+///               for values that are no bands
 [[nodiscard]] std::vector<RegionOfInterest> regionsOfInterest(
     const Graph& graph, const std::vector<char>& runs,
     const std::vector<std::optional<Plan>>& plans, double leastHalfWidth = 1);
 
-/// The plan of a band that is restricted to a region of interest.
+/// Restricts the plan of a band to a region of interest: reduces its half width and its area.
 [[nodiscard]] Plan restricted(Plan plan, const RegionOfInterest& roi);
 
 }  // namespace pipeline
