@@ -29,7 +29,7 @@ def test_usage_errors_are_raised_when_the_node_is_created(ls, ball):
     assert text == "sphere: there is no option raduis; did you mean radius?"
     text, _ = refusal(ls.UsageError, lambda: ls.sphere(voxel=0.1))
     assert text == "sphere: needs --radius L"
-    assert "how fine?" in refusal(ls.UsageError, lambda: ls.sphere(radius=1))[0]
+    assert "needs a voxel size" in refusal(ls.UsageError, lambda: ls.sphere(radius=1))[0]
     assert "operand 1 is a mesh" in refusal(ls.UsageError, lambda: ls.offset(ball.mesh(), 1))[0]
     assert "needs 2 operands" in refusal(ls.UsageError, lambda: ls.union(ball))[0]
     assert "given twice" in refusal(ls.UsageError, lambda: ball.offset(1, distance=1))[0]

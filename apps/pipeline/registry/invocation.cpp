@@ -17,7 +17,7 @@ using levelset::UsageError;
 std::string Invocation::text(const std::string& name) const {
   if (const auto it = options_.find(name); it != options_.end()) return it->second;
   const Param* param = op_->find(name);
-  assert(param && "an operator asks for a parameter that it does not declare");
+  assert(param && "an operator reads a parameter that it does not declare");
   return param->fallback;
 }
 
@@ -28,7 +28,8 @@ long Invocation::integer(const std::string& name) const {
   return parseInteger(text(name), where(name));
 }
 void Invocation::refuseInteger(const std::string& name, long value, std::uint64_t most) const {
-  if (value < 0) throw UsageError(fmt::format("{}: {} is too small", where(name), value));
+  if (value < 0)
+    throw UsageError(fmt::format("{}: {} is too small; give a larger number", where(name), value));
   throw UsageError(fmt::format("{}: {} is too large; give at most {}", where(name), value, most));
 }
 double Invocation::radians(const std::string& name) const {
@@ -67,7 +68,7 @@ double Invocation::toWorld(const std::string& name, const std::string& text,
   if (length.unit == Unit::Voxels) {
     if (!referenceVoxel_) {
       throw UsageError(
-          fmt::format("{}: '{}' counts in voxels, but there is no grid yet to count on; write "
+          fmt::format("{}: '{}' is a length in voxels, but no voxel size is known yet; write "
                       "it in world units",
                       where(name), text));
     }
@@ -87,7 +88,7 @@ double Invocation::toWorld(const std::string& name, const std::string& text,
   return world;
 }
 
-/// A length that is resolved again replaces its earlier entry.
+/// Adds a resolved length to the notes. An earlier entry of the same parameter is replaced.
 void Invocation::note(const Resolved& length) {
   const auto known =
       std::find_if(notes.lengths.begin(), notes.lengths.end(),
@@ -138,17 +139,18 @@ std::vector<double> Invocation::lengths(const std::string& name) {
 
 bool Invocation::asksVoxelSize() const {
   if (given("voxel") && given("resolution")) {
-    throw UsageError(
-        fmt::format("{}: --voxel and --resolution say the same thing twice; give one", op_->name));
+    throw UsageError(fmt::format(
+        "{}: --voxel and --resolution both set the voxel size; give only one", op_->name));
   }
   return given("voxel") || given("resolution");
 }
 
 void Invocation::requireVoxelSize() const {
   if (!asksVoxelSize() && !voxelFollows)
-    throw UsageError(fmt::format(
-        "{}: how fine? give --voxel L or --resolution N, or --tolerance L before the first action",
-        op_->name));
+    throw UsageError(
+        fmt::format("{}: needs a voxel size; give --voxel L or --resolution N, or --tolerance L "
+                    "before the first action",
+                    op_->name));
 }
 
 double Invocation::voxelSize(double longestSide) {
@@ -156,9 +158,9 @@ double Invocation::voxelSize(double longestSide) {
   if (given("voxel")) return countIn(length("voxel"));
   const long resolution = integer("resolution");
   if (!(longestSide > 0)) {
-    throw InvalidInput(
-        fmt::format("{}: --resolution {} divides the object's longest side, which is {}", op_->name,
-                    resolution, longestSide));
+    throw InvalidInput(fmt::format(
+        "{}: --resolution {} divides the object's longest side, which is {}; give --voxel",
+        op_->name, resolution, longestSide));
   }
   const double voxel = longestSide / static_cast<double>(resolution);
   note({.param = "voxel",
@@ -168,7 +170,8 @@ double Invocation::voxelSize(double longestSide) {
   return countIn(voxel);
 }
 
-/// Adds the number of voxels to lengths that were resolved before the voxel size was known.
+/// Adds the value in voxels to lengths that were resolved before the voxel size was known.
+/// @return the voxel size
 double Invocation::countIn(double voxel) {
   for (Resolved& length : notes.lengths)
     if (!length.voxels) length.voxels = length.world / voxel;

@@ -22,26 +22,28 @@
 
 namespace pipeline {
 
-/// A resolved length, for the report.
+/// A length option whose unit has been resolved, for the report.
 struct Resolved {
-  std::string param;
-  std::string written;
-  double world = 0;
-  std::optional<double> voxels = {};
+  std::string param;                  ///< name of the option, without dashes
+  std::string written;                ///< text as the user wrote it
+  double world = 0;                   ///< world units
+  std::optional<double> voxels = {};  ///< the same length in voxels; empty: voxel size unknown
 };
 
 using levelset::ErrorEstimate;
 
-/// Notes and figures that an operator leaves beside its result.
+/// Messages and figures that an operator reports beside its result.
 struct StepNotes {
   std::vector<Resolved> lengths;
   std::vector<std::string> warnings;
   std::vector<std::string> notes;
   std::vector<ErrorEstimate> errors;
-  /// A numeric check that the result fails. The chain continues, and ends with exit code 5.
+  /// Message of a numeric check that the result fails; empty: none. The chain continues, and ends
+  /// with exit code 5.
   std::string failure;
-  std::string certificateJson;  ///< sign certificate of level-set
-  std::string detailsJson;      ///< figures of the operator, a JSON object
+  /// Sign certificate of the action level-set, a JSON object; empty: none.
+  std::string certificateJson;
+  std::string detailsJson;  ///< figures of the operator, a JSON object; empty: none
 };
 
 /// One action of a chain as its operator sees it: typed parameters, operands and notes.
@@ -50,9 +52,10 @@ class Invocation {
   Invocation(const Operator& op, std::map<std::string, std::string> options)
       : op_(&op), options_(std::move(options)) {}
 
-  // Operands; the oldest is first.
+  // Operands in the order in which they were pushed on the stack.
   std::vector<Value> operands;
-  /// Names of the operands by --as; empty: none. Set when the action runs, one for each operand.
+  /// Names that --as gave to the operands; empty: none. Set when the action runs, one for each
+  /// operand.
   std::vector<std::string> operandNames;
   [[nodiscard]] const levelset::NarrowBand& band(std::size_t index = 0) const {
     return operands.at(index).band();
@@ -61,16 +64,17 @@ class Invocation {
     return operands.at(index).mesh();
   }
 
-  /// Values that parameters name ("--mask @NAME"), by parameter.
+  /// Values that parameters refer to ("--mask @NAME"), by name of the parameter.
   std::map<std::string, Value> named;
 
-  // Parameters. A parameter that was not given has its default. To read a parameter that has
+  // Parameters. A parameter that was not given has its default. Reading a parameter that has
   // neither a value nor a default is a programming error.
   [[nodiscard]] bool given(const std::string& name) const { return options_.contains(name); }
   [[nodiscard]] bool flag(const std::string& name) const { return given(name); }
   [[nodiscard]] std::string text(const std::string& name) const;
   [[nodiscard]] double number(const std::string& name) const;
   [[nodiscard]] long integer(const std::string& name) const;
+  /// Returns an integer parameter as type `T`.
   /// @throws UsageError when the value does not fit into `T`
   template <class T>
   [[nodiscard]] T integerAs(const std::string& name) const {
@@ -85,20 +89,22 @@ class Invocation {
   [[nodiscard]] Imath::Box3d box(const std::string& name) const;
   [[nodiscard]] Imath::M44d matrix(const std::string& name) const;
   [[nodiscard]] std::pair<int, int> imageSize(const std::string& name) const;
-  /// Returns a length in world units. `vx` and `%` refer to the first operand, or to
-  /// setReference().
+  /// Returns a length in world units. `vx` and `%` refer to the voxel size and the diagonal of the
+  /// first operand, or to those of setReference().
   [[nodiscard]] double length(const std::string& name);
-  /// Returns the number of a length as written, whatever its unit.
+  /// Returns the number in the text of a length, without conversion of its unit.
   [[nodiscard]] double writtenLength(const std::string& name) const;
-  /// Returns as many lengths as Param::count.
+  /// Returns Param::count lengths in world units.
   [[nodiscard]] std::vector<double> lengths(const std::string& name);
-  /// Returns the voxel size of --voxel, or of --resolution and the object's longest side.
+  /// Returns the voxel size in world units: --voxel, or `longestSide` of the object divided by
+  /// --resolution.
   [[nodiscard]] double voxelSize(double longestSide);
   /// Throws UsageError unless exactly one of --voxel and --resolution is given, or the voxel size
   /// follows from --tolerance.
   void requireVoxelSize() const;
   /// Returns whether --voxel or --resolution is given. Throws UsageError for both.
   [[nodiscard]] bool asksVoxelSize() const;
+  /// Sets the voxel size and the diagonal, world units, to which `vx` and `%` refer; 0: unknown.
   void setReference(double voxelSize, double diagonal);
   /// Resolves every length that is given or has a default, for the report of a dry run.
   void resolveLengths();
@@ -108,12 +114,14 @@ class Invocation {
     return op_->name + ": --" + param;
   }
 
-  // Part of the result that is needed; run() may make no more than that.
+  // Region of interest of the result. Operator::run may compute only this part of it.
   levelset::RegionOfInterest roi = {};
-  /// Plan of the complete result, where it is known.
+  /// Plan of the complete result; empty: unknown. For Operator::cost it is the plan of the part
+  /// that is computed.
   std::optional<Plan> planned = {};
-  bool isPartial = false;  ///< the first operand is narrower than the complete band
-  /// Half width to make, voxels.
+  /// True if the half width of the first operand is smaller than that of its complete value.
+  bool isPartial = false;
+  /// Half width to compute, voxels.
   /// @param whole  half width of the complete result
   [[nodiscard]] double neededHalfWidth(double whole) const {
     return std::min(whole, roi.halfWidth);
@@ -125,7 +133,7 @@ class Invocation {
   bool dryRun = false;
   bool voxelFollows = false;  ///< the voxel size follows from --tolerance (Node::voxelFollows)
   StepNotes notes;
-  std::string output;  ///< text for people, printed when the operator is done
+  std::string output;  ///< text for the user, printed when the operator has finished
 
  private:
   /// @param label  name of the length in the report

@@ -9,8 +9,8 @@
 #include "levelset/operator/description.h"
 #include "levelset/region_of_interest.h"
 
-/// The registry: one declaration per operator. Command line, help, checks, completion and Python
-/// functions follow from it.
+/// The registry: one declaration per operator. The command line, help, checks, completion and
+/// Python functions are derived from it.
 namespace pipeline {
 
 class Invocation;
@@ -32,39 +32,40 @@ enum class ParamType {
   Path,
   ImageSize,
   Bytes,
-  Scalar,   ///< a number in space: a number, a formula in x, y, z, r, or the @NAME of a value
-  Velocity  ///< a vector in space and time: one of `choices`, three formulas, or the @NAME of a
-            ///< field
+  Scalar,   ///< a scalar field: a number, a formula in x, y, z, r, or the @NAME of a value
+  Velocity  ///< a vector field that may depend on time: one of `choices`, three formulas, or the
+            ///< @NAME of a field
 };
 
 using Range = levelset::OptionRange;
 
 struct Param {
-  std::string name;  ///< without the dashes
+  std::string name;  ///< name without the dashes
   ParamType type = ParamType::Number;
-  std::string doc;                        ///< one line; the type gives the unit
+  std::string doc;                        ///< one line for the help; the unit follows from `type`
   std::string fallback = {};              ///< default as text; empty: none
-  std::vector<std::string> choices = {};  ///< values of a Choice
+  std::vector<std::string> choices = {};  ///< accepted words of a Choice or a Velocity
   Range range = Range::Any;
   bool required = false;
-  std::size_t count = 1;        ///< Lengths: their number
-  int position = -1;            ///< ≥ 0: place at which it may stand without its name
+  std::size_t count = 1;  ///< Lengths: number of lengths
+  /// ≥ 0: index among the arguments that are given without a name; -1: needs its name.
+  int position = -1;
   bool allowsVoxels = true;     ///< Length: may be given in vx
-  bool allowsAuto = false;      ///< Length: `auto` is a value, too
-  std::string formerName = {};  ///< a name that scripts used before; it keeps working
+  bool allowsAuto = false;      ///< Length: the word `auto` is accepted too
+  std::string formerName = {};  ///< former name of the option, still accepted; empty: none
 };
 
 /// Returns the type in words, such as "image size".
 [[nodiscard]] const char* typeName(ParamType type);
 
-/// Returns the form of a value in the help, such as "L" for a length.
+/// Returns the placeholder for a value in the help, such as "L" for a length.
 [[nodiscard]] std::string valueForm(const Param& param);
 
 /// Returns whether the text of the parameter names a value of the chain, "@NAME".
 [[nodiscard]] bool namesValue(const Param& param, const std::string& text);
 
 /// Throws UsageError when `text` is not a value of `param`.
-/// @param where  "action: --name"
+/// @param where  begins the message: "action: --name"
 void checkText(const Param& param, const std::string& text, const std::string& where);
 
 enum class Flow {
@@ -77,43 +78,48 @@ using levelset::Slope;
 struct Operator {
   std::string name;
   std::string group;            ///< heading in `help`
-  std::string summary;          ///< one line
-  std::string details = {};     ///< facts beyond the parameters
+  std::string summary;          ///< one line for the help
+  std::string details = {};     ///< further sentences of the help page
   std::string example = {};     ///< a complete command line
-  std::string formerName = {};  ///< a name that scripts used before; it keeps working
+  std::string formerName = {};  ///< former name of the action, still accepted; empty: none
   std::vector<Param> params = {};
-  std::vector<std::vector<Kind>> operands = {};  ///< kinds allowed at each place
-  bool takesMore = false;         ///< further operands of the last place's kinds may follow
+  std::vector<std::vector<Kind>> operands = {};  ///< for each operand, the kinds that it may have
+  bool takesMore = false;         ///< more operands may follow, of the kinds of the last one
   bool operandsOptional = false;  ///< may run without any operand (`info FILE`)
-  bool readsNames = false;        ///< the result depends on what --as called the operands
-  bool isRepeatable = true;       ///< the same operands, options and files give the same result
+  bool readsNames = false;   ///< the result depends on the names that --as gave to the operands
+  bool isRepeatable = true;  ///< the same operands, options and files give the same result
   Flow flow = Flow::Makes;
-  /// Kind of the result, known before anything runs.
+  /// Returns the kind of the result before anything runs.
   std::function<Kind(const Invocation&)> resultKind = {};
   std::function<Value(Invocation&)> run = {};
-  /// Plan of the result, for --dry-run; by default that of the first operand.
+  /// Plans the result before it is computed. Empty: the plan of the first operand is used.
   std::function<Plan(Invocation&)> plan = {};
-  /// Cost of `run`, beside operands and result; empty: not known.
+  /// Estimates the time of `run`, and its memory beside operands and result. Empty: unknown.
   CostOf cost = {};
+  /// Bound of the surface error of the result; empty: not measured.
   std::optional<levelset::ErrorModel> errorModel = {};
-  /// Least radius of curvature of the result, world units; not positive: not known.
+  /// Returns the least radius of curvature of the result, world units; 0 or less: unknown.
   std::function<double(Invocation&)> leastRadius = {};
-  Slope slope = Slope::Any;
-  /// Region of interest of an operand, given that of the result. Empty: complete operands are
-  /// needed. The operands are plans, and Invocation::planned is the plan of the complete result.
-  /// Inside its region of interest the result equals that of complete operands, to the bit or to
-  /// `partTolerance`.
+  Slope slope = Slope::Any;  ///< states if the values of the result are distances
+  /// Returns the region of interest of an operand, given that of the result. Empty function:
+  /// complete operands are needed. The operands are plans, and Invocation::planned is the plan of
+  /// the complete result. Inside its region of interest the result equals that of complete
+  /// operands, to the bit or to `partTolerance`.
   std::function<levelset::RegionOfInterest(Invocation&, std::size_t operand,
                                            const levelset::RegionOfInterest& of)>
       regionOfInterest = {};
-  double partTolerance = 0;  ///< voxels
-  bool makesParts = false;   ///< `run` makes only the part in Invocation::roi
-  /// Checks, before anything runs, the options and the kinds of the operands: options that exclude
+  /// Largest difference, in voxels, between a value computed on the region of interest and the
+  /// complete value.
+  double partTolerance = 0;
+  bool makesParts = false;  ///< `run` computes only the region of interest, Invocation::roi
+  /// Checks the options and the kinds of the operands before anything runs: options that exclude
   /// each other, formats, missing options.
   std::function<void(const Invocation&)> validate = {};
-  /// Files that `run` writes. The pipeline checks before anything runs that it can create them.
+  /// Returns the files that `run` writes. The pipeline checks before anything runs that it can
+  /// create them.
   std::function<std::vector<std::string>(const Invocation&)> targets = {};
-  /// Whether `run` uses standard output, or input, for data. Messages then go to standard error.
+  /// Return true if `run` uses standard output, or standard input, for data. With data on standard
+  /// output, messages go to standard error.
   std::function<bool(const Invocation&)> usesStandardOutput = {};
   std::function<bool(const Invocation&)> usesStandardInput = {};
 
@@ -125,7 +131,7 @@ struct Operator {
 [[nodiscard]] const Operator* findOperator(const std::string& name);
 /// Finds a parameter by its name, or by its former name; null: there is none.
 [[nodiscard]] const Param* findParam(const std::vector<Param>& params, const std::string& name);
-/// Sentence that names the new word for a former one.
+/// Returns the message for a former name of an action or option; it gives the new name.
 [[nodiscard]] std::string renamedSentence(const std::string& former, const std::string& name);
 [[nodiscard]] const std::vector<Param>& globalParams();
 /// The action `run FILE`, for help only: parseChain() replaces it by the actions of the file.

@@ -12,13 +12,14 @@ class Invocation;
 
 using levelset::Cost;
 
-/// Estimates the cost of an action. Operands are plans of the parts that are read, and
-/// Invocation::planned is the plan of the part that is made. Empty where the cost is not known.
+/// Estimates the cost of an action. The operands are plans of the parts that are read, and
+/// Invocation::planned is the plan of the part that is computed. Returns nothing if the cost is
+/// unknown.
 using CostOf = std::function<std::optional<Cost>(Invocation&)>;
 
-/// Cost in proportion to the active voxels of the operands together or of the result, whichever are
-/// more.
-/// @param nanoseconds,bytes  for each active voxel
+/// Returns an estimate in proportion to a number of active voxels: those of all operands together
+/// or those of the result, whichever is larger.
+/// @param nanoseconds,bytes  CPU time, and memory beside operands and result, for each active voxel
 /// @param perTriangle  nanoseconds for each triangle of a mesh; 0: the cost of meshes is not known
 [[nodiscard]] CostOf costPerVoxel(double nanoseconds, double bytes = 0, double perTriangle = 0);
 

@@ -10,7 +10,8 @@ namespace {
 
 constexpr ErrorModel kUnmeasured{1, 0.7, levelset::kCreaseError, ""};
 
-/// Least radius of curvature of a shape, world units; not positive where its options do not tell.
+/// Least radius of curvature of a node's result, world units; 0 or less: its options do not
+/// determine it.
 double leastRadius(const Node& node) {
   if (!node.op->leastRadius) return 0;
   Invocation probe(*node.op, node.options);

@@ -9,23 +9,25 @@ namespace pipeline {
 
 using levelset::ErrorModel;
 
-/// The error model of an action. An action that the suite does not measure gets the least that a
-/// level set promises: first order, with creases.
+/// Returns the error model of an action. An action that the regression suite does not measure gets
+/// a cautious model: first order, with creases.
 [[nodiscard]] const ErrorModel& errorModel(const Operator& op);
 
 /// Error model of a graph, known before anything runs.
 struct GraphModel {
-  double order = 2;                ///< lowest order of the actions
-  bool makesCreases = false;       ///< true if one of the actions makes creases
-  std::vector<const char*> cases;  ///< cases of the suite that measured the models
+  double order = 2;                ///< lowest convergence order of the actions
+  bool makesCreases = false;       ///< true if one of the actions creates creases
+  std::vector<const char*> cases;  ///< regression cases that measured the models
 };
-/// @param nodes  the nodes to consider
+/// Combines the error models of some nodes of a graph.
+/// @param nodes  indices of these nodes
 [[nodiscard]] GraphModel graphModel(const Graph& graph, const std::vector<std::size_t>& nodes);
 
-/// The voxel size at which a node's result has the error `error`, by the model of its action.
+/// Returns the voxel size at which a node's result has the error `error`, by the error model of its
+/// action.
 /// @param error  world units
-/// @return       world units; 0 where the model gives none: the surface is flat, or its curvature
-///               is not known before the result is computed
+/// @return       world units; 0 if the model gives none: the result is exact away from creases, or
+///               its curvature is unknown before it is computed
 [[nodiscard]] double modelVoxelSize(const Node& node, double error);
 
 }  // namespace pipeline

@@ -27,12 +27,12 @@ namespace {
 /// different grids. Without the factor, estimates are 1.0 to 2.1 times the true error over the
 /// cases of tests/bench/tolerance_bench.cpp.
 constexpr double kSafety = 1.25;
-/// Fraction of the tolerance that the next voxel size aims at.
+/// Fraction of the tolerance that the next voxel size aims at if the error is estimated.
 constexpr double kAim = 0.65;
-/// The same fraction where the error is measured, not estimated.
+/// Fraction of the tolerance that the next voxel size aims at if the error is measured.
 constexpr double kMeasuredAim = 0.8;
 /// Safety factor for measured errors, because samples miss the points between them. On the bunny,
-/// samples at half the spacing find up to 1.06 times the error.
+/// samples at half the spacing find an error up to 1.06 times as large.
 constexpr double kMeasuredSafety = 1.1;
 /// An estimate below this fraction of the tolerance justifies a run with larger voxels. It saves
 /// memory, and time in all later actions.
@@ -40,18 +40,20 @@ constexpr double kWasteful = 0.25;
 /// Smallest and largest factor from one voxel size to the next. Short extrapolations are more
 /// accurate.
 constexpr double kFinest = 1 / 3.0, kCoarsest = 4;
-/// Smallest number of voxels along an object. The coarsest run has a quarter of them, and
-/// comparisons with fewer voxels are meaningless.
+/// Smallest number of voxels along the longest side of the smallest object. The coarsest run for
+/// comparison has a quarter of them, and a comparison with fewer is meaningless.
 constexpr double kLeastVoxels = 8;
 /// Largest number of voxels along the longest side in the first run, independent of the models.
 constexpr double kMostFirst = 64;
-/// Largest voxel size, in tolerances, if there are creases. The error near creases is about half a
-/// voxel. It does not count, but should stay within a few tolerances where memory allows.
+/// Largest voxel size, as a multiple of the tolerance, if there are creases. The error near creases
+/// is about half a voxel. It is not compared with the tolerance, but should stay within a few times
+/// the tolerance where memory allows.
 constexpr double kCreaseVoxels = 4;
-constexpr int kMostRounds = 12;
-/// Lowest convergence order in use. At a lower observed order, the difference of two runs counts as
-/// the error.
+constexpr int kMostRounds = 12;  ///< voxel sizes that are tried
+/// Lowest convergence order in extrapolations. At a lower observed order, the difference of two
+/// runs counts as the error.
 constexpr double kLeastOrder = 1;
+/// Voxels along the longest side of an object when sizes of objects are planned.
 constexpr int kPlanResolution = 16;
 
 class ToleranceRun {
@@ -81,7 +83,7 @@ class ToleranceRun {
     }
   }
 
-  /// Fills the report, also after a failed run.
+  /// Fills the parts of the report that concern the complete graph, also after a failed run.
   void fillReport() {
     const std::vector<char> needed = neededNodes(graph_);
     report_.leftOut.clear();
@@ -94,8 +96,8 @@ class ToleranceRun {
   }
 
  private:
-  /// With a cache, moves the values of `once` to `again`: the cache stores them, and it could not
-  /// store results that depend on given values.
+  /// With a cache, moves the nodes of `once` to `again`. Every run then contains them and reads
+  /// their values from the cache, in place of values given from outside its graph.
   static ToleranceParts withoutCacheUse(ToleranceParts parts, const RunSettings& settings) {
     if (settings.cache.empty() || settings.dryRun) return parts;
     parts.again.insert(parts.again.end(), parts.once.begin(), parts.once.end());
@@ -123,7 +125,8 @@ class ToleranceRun {
   }
 
   // === The first voxel size
-  /// Chooses it from the error models and from the sizes of the objects.
+  /// Chooses the voxel size of the first run from the error models and from the sizes of the
+  /// objects.
   void plan() {
     RunReport planned;
     const std::map<std::size_t, Value> plans = levels_.planAll(kPlanResolution, planned);
@@ -150,7 +153,7 @@ class ToleranceRun {
 
   [[nodiscard]] double coarsest() const { return shortestSide_ / kLeastVoxels; }
 
-  /// Rounds down to three digits, for readability.
+  /// Rounds a voxel size down to three digits, for readability.
   static double rounded(double voxel) {
     const double unit = std::pow(10, std::floor(std::log10(voxel)) - 2);
     const double steps = std::floor(voxel / unit * (1 + 1e-12));
@@ -166,14 +169,15 @@ class ToleranceRun {
     double order = 1;  ///< convergence order of the output with that ratio
     double aim = 1;    ///< fraction of the tolerance that the next run aims at
     bool hasCreases = false;
-    double finest = 0;  ///< tolerance of the strictest output
+    double finest = 0;  ///< smallest tolerance of an output, world units
   };
 
   Trial tryVoxel(double voxel) {
     coarsePeak_ = base_;
     Trial trial{.level = levels_.runAt(voxel, 1)};
     trial.outputs.resize(parts_.outputs.size());
-    std::vector<std::size_t> open;  // outputs whose error needs runs with larger voxels
+    // Outputs whose error must be estimated from runs with larger voxels.
+    std::vector<std::size_t> open;
     for (std::size_t i = 0; i < parts_.outputs.size(); ++i) {
       ToleranceOutput& output = trial.outputs[i];
       output.name = nameOf(graph_.nodes[parts_.outputs[i]]);
@@ -200,13 +204,13 @@ class ToleranceRun {
       trial.finest = std::min(trial.finest, output.requested);
     }
     trial.level.peakBytes = std::max(trial.level.peakBytes, apps::peakResidentBytes());
-    trial.level.surfaces.clear();  // only the result is needed from here on
+    trial.level.surfaces.clear();  // the surfaces are needed only for the error
     return trial;
   }
 
-  /// Decides if the measured error falls with the voxel size. It does not fall if the mesh has
-  /// parts inside the solid, or creases finer than the tolerance. The error is then estimated
-  /// instead.
+  /// Decides if the measured error of an output falls with the voxel size. It does not fall if the
+  /// mesh has parts inside the solid, or creases finer than the tolerance. The error is then
+  /// estimated instead.
   bool measuredFalls(double voxel, double error, std::size_t output) {
     const auto last = measured_.find(output);
     if (last != measured_.end() && voxel < last->second.voxel) {
@@ -218,7 +222,7 @@ class ToleranceRun {
   }
 
   /// Switches from measured to estimated errors if a measured one is too large. Sets `voxel` to the
-  /// best voxel size, to try it again.
+  /// best voxel size so far, which is then tried again.
   /// @return false if no measured error is too large, or estimates are already in use
   bool turnToEstimates(double& voxel) {
     const auto& outputs = best_->outputs;
@@ -236,8 +240,8 @@ class ToleranceRun {
     try {
       coarser = levels_.runAt(voxel, 4);
       coarser->values.clear();
-    } catch (const levelset::InvalidInput&) {  // no object is left at that voxel size: use the
-                                               // model's order
+    } catch (const levelset::InvalidInput&) {
+      // An object vanishes at that voxel size: the order stays kLeastOrder.
     }
     Level coarse = levels_.runAt(voxel, 2);
     coarse.values.clear();
@@ -251,7 +255,8 @@ class ToleranceRun {
       const double order =
           std::clamp(isObserved ? std::log2(far.smooth / near.smooth) : kLeastOrder, kLeastOrder,
                      std::max(kLeastOrder, model_.order));
-      // The difference may be small by chance, so also use the expected one of the coarser pair.
+      // The difference between this voxel size and twice as large voxels may be small by chance. So
+      // the difference that the order predicts from the two coarser runs is used if it is larger.
       const double expected = far.smooth / std::exp2(order);
       const double error = kSafety * std::max(near.smooth, expected) / (std::exp2(order) - 1);
       output.creaseShare = near.creaseShare;
@@ -315,7 +320,7 @@ class ToleranceRun {
       std::optional<Trial> trial = tryVoxelSize(voxel);
       if (!trial) {
         if (!best_) {
-          // The voxels may be too large for an object. Try smaller ones twice, then report the
+          // The voxels may be too large for an object. Try smaller voxels twice, then report the
           // error.
           if (++failures > 2) std::rethrow_exception(failure_);
           voxel = rounded(voxel / 4);
@@ -338,7 +343,8 @@ class ToleranceRun {
       const double order = trial->order, ratio = trial->ratio;
       keepBest(std::move(*trial));
       if (!next || failures > 2) return;
-      // A single stall may be chance, unless fixed voxel sizes explain it.
+      // One voxel size at which the error does not fall may be chance. The search ends at the
+      // second one, or at once if nodes have fixed voxel sizes.
       if (stalls && (++stalled_ > 1 || !parts_.fixed.empty())) {
         outcome_.limit = stallSentence();
         return;
@@ -346,7 +352,8 @@ class ToleranceRun {
       double wanted = *next;
       if (wanted < least) {
         if (ratio <= 1) return;
-        // Use the finest voxels that memory allows, if they are clearly finer.
+        // Use the smallest voxels that memory allows, if they are clearly smaller than the current
+        // ones.
         if (least > 0.85 * voxel) {
           if (turnToEstimates(voxel)) continue;
           outcome_.limit = memorySentence(voxel * std::pow(kAim / ratio, 1 / order));
@@ -357,7 +364,7 @@ class ToleranceRun {
       voxel = wanted;
     }
     if (best_->ratio > 1 && outcome_.limit.empty())
-      outcome_.limit = fmt::format("the limit of {} voxel sizes was reached", kMostRounds);
+      outcome_.limit = fmt::format("the limit of {} tried voxel sizes was reached", kMostRounds);
   }
 
   [[nodiscard]] std::string memorySentence(double voxel) const {
@@ -374,7 +381,7 @@ class ToleranceRun {
     return "the error no longer falls with the voxel size";
   }
 
-  /// Tries a voxel size and records the round.
+  /// Runs the graph at a voxel size and records the outcome in the report.
   /// @return empty if the run failed
   std::optional<Trial> tryVoxelSize(double voxel) {
     malloc_trim(0);
@@ -397,7 +404,8 @@ class ToleranceRun {
   }
 
   /// Keeps the better of two trials. Among trials within the tolerance, the coarser one is better,
-  /// or with creases the later one. Among the others, the one with the smaller error is better.
+  /// or with creases the later one. Among the others, the one with the smaller ratio of error to
+  /// tolerance is better.
   void keepBest(Trial trial) {
     const bool isBetter =
         !best_ || (trial.ratio <= 1 ? best_->ratio > 1 || trial.hasCreases ||
@@ -465,18 +473,21 @@ class ToleranceRun {
   GraphModel model_;
   LevelRunner levels_;
   ToleranceReport outcome_;
+  /// Longest side of the largest and of the smallest object, world units.
   double longestSide_ = 0, shortestSide_ = std::numeric_limits<double>::max();
+  /// Resident memory before the search, and peak memory of the run with twice as large voxels,
+  /// bytes.
   double base_ = 0, coarsePeak_ = 0;
   std::optional<Trial> best_;
   std::optional<double> reaching_;  ///< coarsest voxel size within the tolerance
   std::optional<double> failing_;   ///< finest voxel size beyond the tolerance
   std::exception_ptr failure_;
-  int stalled_ = 0;
+  int stalled_ = 0;  ///< number of voxel sizes at which the error did not fall
   struct Measured {
     double voxel = 0, error = 0;
   };
-  std::map<std::size_t, Measured> measured_;  ///< last measured error by output
-  bool believesMeasured_ = true;
+  std::map<std::size_t, Measured> measured_;  ///< last measured error, by index of the output
+  bool believesMeasured_ = true;  ///< false: all errors are estimated from runs with larger voxels
 };
 
 }  // namespace

@@ -44,7 +44,7 @@ std::string scaledVoxel(const std::string& text, double factor) {
   return fmt::format("{}{}", length.number * factor, length.unit == Unit::Percent ? "%" : "");
 }
 
-/// Assigns each node to its role.
+/// Assigns the needed nodes of a graph to the lists of ToleranceParts.
 class PartFinder {
  public:
   explicit PartFinder(const Graph& graph)
@@ -107,7 +107,7 @@ class PartFinder {
     for (const auto& [option, text] : node.options)
       if (isLength(node, option) && text.find("vx") != std::string::npos)
         throw UsageError(withLocation(
-            fmt::format("{}: --{}: '{}' counts in voxels, and --tolerance chooses their "
+            fmt::format("{}: --{}: '{}' is a length in voxels, and --tolerance chooses their "
                         "size; write it in world units",
                         node.op->name, option, text),
             node.location));
@@ -159,9 +159,10 @@ std::vector<std::string> voxelLengths(const Graph& graph, const ToleranceParts& 
     for (const auto& [option, text] : node.options)
       if (isLength(node, option) && text.find("vx") != std::string::npos)
         sentences.push_back(withLocation(
-            fmt::format("{}: --{}: '{}' counts in voxels, whose size --tolerance chooses; write it "
-                        "in world units if the surface depends on it",
-                        node.op->name, option, text),
+            fmt::format(
+                "{}: --{}: '{}' is a length in voxels, whose size --tolerance chooses; write it "
+                "in world units if the surface depends on it",
+                node.op->name, option, text),
             node.location));
   }
   return sentences;

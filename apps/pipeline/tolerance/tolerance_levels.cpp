@@ -150,7 +150,8 @@ Level LevelRunner::runAt(double voxel, double coarsening) {
   try {
     pipeline::run(part.graph, settings, level.report);
   } catch (const levelset::NumericalError& error) {
-    // A failed check of a step ends the run only after all steps, so the values may exist.
+    // A numeric check that fails in a step ends the run only after all steps, so the values may
+    // exist.
     for (const std::size_t i : parts_.outputs)
       if (!made.contains(i)) throw;
     level.failure = error.what();
@@ -223,9 +224,11 @@ std::optional<double> LevelRunner::knownError(const Level& level, std::size_t ou
 
 LevelDifference LevelRunner::difference(const Level& fine, const Level& coarse,
                                         std::size_t output) const {
-  // Faces must be flat over the distance at which crease detection reads normals, on both sides.
+  // Voxels. Crease detection reads normals up to this distance on both sides of an edge, so the
+  // faces must be flat over it.
   constexpr double kFlatVoxels = 4;
-  // Extent, in coarse voxels, of triangles that cut off an edge or that its rounding affects.
+  // Coarse voxels. Within this distance of an edge, triangles cut off the edge or are affected by
+  // its rounding.
   constexpr double kCreaseReach = 2.5;
   const LevelSurface &near = fine.surfaces[output], &far = coarse.surfaces[output];
   levelset::SurfaceDifferenceOptions options{.spacing = near.voxelSize,

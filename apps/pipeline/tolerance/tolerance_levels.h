@@ -15,11 +15,11 @@ namespace pipeline {
 struct LevelSurface {
   levelset::TriangleSurface surface = {};
   levelset::TriangleSurface uniform =
-      {};                ///< surface of the level set that the mesh comes from, if any
+      {};                ///< uniform mesh of the level set that `surface` comes from; invalid: none
   double voxelSize = 0;  ///< voxel size of that level set or of the result, world units
   double diagonal = 0;   ///< diagonal of the bounding box, world units
   double heldEdge =
-      0;  ///< distance from an edge within which the source meshes are flat, world units
+      0;  ///< width of the flat faces beside sharp edges of the source meshes, world units
 };
 
 /// A message of a run, held back until the run is known to be the best one.
@@ -31,17 +31,18 @@ struct Message {
 /// Results of one run at one voxel size.
 struct Level {
   double voxelSize = 0;
-  std::vector<LevelSurface> surfaces;   ///< one per output
+  std::vector<LevelSurface> surfaces;   ///< one per node of ToleranceParts::outputs
   std::map<std::size_t, Value> values;  ///< values of ToleranceParts::lasting, by node index
   RunReport report;
   std::vector<Message> messages;
-  std::string failure;   ///< message of a failed check after which the run continued
-  double peakBytes = 0;  ///< peak resident memory, bytes
-  double voxels = 0;     ///< active voxels of all steps together
-  std::size_t triangles = 0;
+  /// Message of a numeric check that failed, after which the run continued; empty: none.
+  std::string failure;
+  double peakBytes = 0;       ///< peak resident memory, bytes
+  double voxels = 0;          ///< active voxels of all steps together
+  std::size_t triangles = 0;  ///< triangles of all surfaces together
 };
 
-/// Difference of a result between a fine and a coarse run.
+/// Difference between the surfaces of one result in a fine and in a coarse run.
 struct LevelDifference {
   double smooth = 0, crease = 0, creaseShare = 0;  ///< as in levelset::SurfaceDifference
 };
@@ -51,15 +52,16 @@ class LevelRunner {
  public:
   LevelRunner(const Graph& graph, const ToleranceParts& parts, const RunSettings& settings);
 
-  /// Computes the values that are independent of voxel sizes. Appends the steps to `report`.
+  /// Computes the nodes of ToleranceParts::once. Appends the steps to `report`.
   void computeOnce(RunReport& report);
   /// Plans the complete graph with `resolution` voxels along the longest side of each object. Also
   /// checks the files that it will write.
   /// @return plans by node index
   [[nodiscard]] std::map<std::size_t, Value> planAll(int resolution, RunReport& report) const;
-  /// Runs the graph without `ends`, at `voxel` times `coarsening`.
-  /// @param voxel       voxel size of the chosen nodes, world units
-  /// @param coarsening  factor for the given voxel sizes too
+  /// Runs the graph without the nodes of ToleranceParts::ends, at the voxel size `voxel` times
+  /// `coarsening`.
+  /// @param voxel       voxel size of the nodes of ToleranceParts::chosen, world units
+  /// @param coarsening  factor for all voxel sizes, including those that the user gave
   /// @throws levelset::Error as run()
   [[nodiscard]] Level runAt(double voxel, double coarsening);
   /// Plans the complete graph at a voxel size. Appends the steps to `report`.
@@ -86,11 +88,12 @@ class LevelRunner {
   const Graph& graph_;
   const ToleranceParts& parts_;
   const RunSettings& settings_;
-  std::vector<std::size_t> watched_;  ///< values to keep: outputs, their sources, `lasting`
-  std::map<std::size_t, Value> once_;
-  std::vector<std::size_t> meshes_;  ///< source meshes of level sets
+  /// Nodes whose values are kept: outputs, their source meshes and level sets, `lasting`.
+  std::vector<std::size_t> watched_;
+  std::map<std::size_t, Value> once_;  ///< values of ToleranceParts::once, by node
+  std::vector<std::size_t> meshes_;    ///< nodes of the meshes that are converted to level sets
   std::map<std::size_t, levelset::TriangleSurface>
-      exact_;                ///< source meshes that are independent of voxel sizes
+      exact_;  ///< surfaces of those `meshes_` that do not depend on voxel sizes, by node
   bool hasCreases_ = false;  ///< an action other than `level-set` creates creases
 };
 

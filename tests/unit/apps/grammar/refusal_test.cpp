@@ -114,7 +114,7 @@ TEST_F(Refusal, DetectableErrorsPrecedeTheRun) {
   soon("write /dev/stdout --format vdb ! measure --json", 2, "already used");
   soon("render a.exr --png ./a.exr", 2, "named twice");
   soon("clip --box \"0,0,0 1,1,1\" --plane \"0,0,0 0,0,1\"", 2, "give one of");
-  soon("resample", 2, "how fine");
+  soon("resample", 2, "needs a voxel size");
   soon("transform --mirror x", 2, "add --bake");
   soon("patch --at 0,0,1 --height 0.1", 2, "needs --size");
   soon("patch --corners \"0,0,1 0,1,1\" --height 0.1", 2, "four points");

@@ -249,8 +249,8 @@ TEST(Tolerance, Refuses) {
   EXPECT_SAYS(refusalOf("--tolerance 2vx" + rest), "in voxels");
   EXPECT_SAYS(refusalOf("--tolerance 0.1 sphere --radius 1 --voxel 0.1 ! measure"),
               "every action has a voxel size already");
-  EXPECT_SAYS(refusalOf("--tolerance 0.1 sphere --radius 10vx ! measure"), "counts in voxels");
-  EXPECT_SAYS(refusalOf("sphere --radius 1 ! measure"), "how fine?");
+  EXPECT_SAYS(refusalOf("--tolerance 0.1 sphere --radius 10vx ! measure"), "is a length in voxels");
+  EXPECT_SAYS(refusalOf("sphere --radius 1 ! measure"), "needs a voxel size");
   EXPECT_SAYS(refusalOf("--tolerance 0.1 sphere --radius 1 --voxel 0.1 --resolution 3 ! measure"),
               "twice");
   EXPECT_SAYS(refusalOf("--tolerance 0.1 sphere --radius 1 ! box --size 1,1,1 ! morph "
