@@ -4,7 +4,7 @@
 
 namespace pipeline {
 
-/// Writes a script for bash or zsh that completes actions, options, choices, files, names of --as,
+/// Returns a script for bash or zsh that completes actions, options, choices, files, names of --as,
 /// and variables of scripts. The shell evaluates it.
 /// @throws levelset::UsageError for another shell
 [[nodiscard]] std::string completionScript(const std::string& shell);

@@ -13,7 +13,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kNumber = R"(\+?-?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?)";
 
-/// Returns a pattern of the texts that are values of the parameter; empty: there is no pattern.
+/// Returns a regular expression that matches the accepted texts of a parameter; empty: none.
 std::string patternOf(const Param& param) {
   const std::string number = kNumber;
   const std::string length = number + (param.allowsVoxels ? "(vx|%)?" : "%?");
@@ -40,7 +40,7 @@ std::string patternOf(const Param& param) {
   }
 }
 
-/// Returns whether a JSON number may stand for the value.
+/// Returns true if a JSON number may be given in place of a text.
 bool takesNumber(ParamType type) {
   return type == ParamType::Number || type == ParamType::Degrees || type == ParamType::Length ||
          type == ParamType::Scalar || type == ParamType::Numbers || type == ParamType::Bytes;
@@ -60,7 +60,7 @@ Json valueSchema(const Param& param) {
   const bool isInteger = param.type == ParamType::Integer;
   if (isInteger || takesNumber(param.type)) {
     json["type"] = {"string", isInteger ? "integer" : "number"};
-    // The limits hold for numbers; a pattern checks only the form of a text.
+    // The limits apply to JSON numbers. A text is checked by a pattern, which covers only its form.
     if (param.range == Range::Positive) json["exclusiveMinimum"] = 0;
     if (param.range == Range::NonNegative) json["minimum"] = 0;
   } else {
@@ -74,12 +74,12 @@ Json valueSchema(const Param& param) {
   return json;
 }
 
-/// Schema of the number of a node.
+/// Schema of a reference to a node: its index in the list of nodes.
 Json nodeNumber() {
   return {{"type", "integer"}, {"minimum", 0}};
 }
 
-/// Schema of the members of an action's node beside `op`.
+/// Schema of the nodes with a given action.
 Json actionSchema(const Operator& op) {
   Json options = Json::object(), named = Json::object(), required = Json::array();
   for (const Param& param : op.params) {
@@ -112,7 +112,7 @@ Json actionSchema(const Operator& op) {
           {"additionalProperties", false}};
 }
 
-/// Schema of --tolerance, the only global option that a graph holds.
+/// Schema of --tolerance, the only global option that a graph file contains.
 Json toleranceSchema() {
   for (const Param& param : globalParams())
     if (param.name == "tolerance") return valueSchema(param);
@@ -129,7 +129,7 @@ std::string graphSchema() {
     cases.push_back({{"if", {{"properties", {{"op", {{"const", op.name}}}}}}},
                      {"then", {{"$ref", "#/$defs/" + op.name}}}});
   }
-  // Selected by `op`, so that errors name only that action.
+  // The member `op` of a node selects its schema, so that validation errors name only that action.
   const Json node = {{"type", "object"},
                      {"properties", {{"op", {{"enum", names}}}}},
                      {"required", {"op"}},
@@ -138,8 +138,9 @@ std::string graphSchema() {
       {"$schema", "https://json-schema.org/draft/2020-12/schema"},
       {"title", "levelsmith graph"},
       {"description",
-       "Actions and what they take: numbers of nodes before them, the first 0. Values are texts as "
-       "on the command line; numbers may be numbers."},
+       "Actions with their options and operands. An operand is the index of an earlier node; the "
+       "first node has index 0. Option values are texts as on the command line; numeric ones may "
+       "be JSON numbers."},
       {"type", "object"},
       {"properties",
        {{"format", {{"const", "levelsmith graph"}}},

@@ -76,10 +76,10 @@ std::string helpOverview() {
   std::string text =
       "levelsmith: level-set modelling on sparse grids\n\n"
       "  levelsmith [global options] ACTION [args] ! ACTION [args] ! …\n\n"
-      "Values live on a stack: an action takes its operands from the top and leaves its result. "
+      "Values are on a stack: an action takes its operands from the top and pushes its result. "
       "--as NAME names a\n"
-      "result, @NAME takes it. Lengths are world units (0.5), voxels (2vx) or a share of the "
-      "diagonal (1%).\n";
+      "result, @NAME uses it as an operand. Lengths are world units (0.5), voxels (2vx) or a share "
+      "of the diagonal (1%).\n";
   for (const HelpGroup& group : helpGroups()) {
     text += "\n" + group.name + "\n";
     for (const Operator* op : group.actions)
@@ -91,7 +91,7 @@ std::string helpOverview() {
       "`help --completion bash|zsh`\n\nGlobal options\n";
   for (const Param& param : globalParams()) text += optionLine(param);
   text +=
-      "  --version                      which levelsmith this is\n\n"
+      "  --version                      print the version\n\n"
       "Exit codes: 0 done, 2 usage, 3 input, 4 resource, 5 numeric check failed, 6 file, 130 "
       "interrupted.\n";
   return text;
@@ -164,7 +164,7 @@ std::string helpSearch(const std::string& word) {
 
 namespace {
 
-/// Returns a page that takes no further words; empty for other words.
+/// Returns the page for --markdown, --schema or --completion SHELL alone; empty for other words.
 std::string wholePage(const std::vector<std::string>& words) {
   if (words[0] == "--markdown" && words.size() == 1) return referencePage();
   if (words[0] == "--schema" && words.size() == 1) return graphSchema();
@@ -195,7 +195,7 @@ std::string help(const std::vector<std::string>& words) {
       name = words[i];
     } else {
       throw UsageError(fmt::format(
-          "help: what is '{}' for? use `help ACTION [--json]`, `help --search WORD`, or one of "
+          "help: unexpected word '{}'; use `help ACTION [--json]`, `help --search WORD`, or one of "
           "--markdown, --schema and --completion SHELL alone",
           words[i]));
     }

@@ -12,7 +12,7 @@ struct HelpGroup {
   std::vector<const Operator*> actions;
 };
 
-/// Groups of the help: every action, and `run`.
+/// Returns the groups of the help, which contain every action and `run`.
 [[nodiscard]] std::vector<HelpGroup> helpGroups();
 /// Returns the kinds of an action's operands, "mesh or level set, patch", or "none".
 [[nodiscard]] std::string operandText(const Operator& op);
@@ -21,12 +21,12 @@ struct HelpGroup {
 [[nodiscard]] std::string helpOverview();
 /// Page of `help ACTION`.
 [[nodiscard]] std::string helpPage(const Operator& op);
-/// Page of `help ACTION --json`: the declaration as an object.
+/// Page of `help ACTION --json`: the declaration of the action as a JSON object.
 [[nodiscard]] std::string helpJson(const Operator& op);
 /// Page of `help --search WORD`: actions and options that mention the word.
 [[nodiscard]] std::string helpSearch(const std::string& word);
 
-/// Returns the page for the words behind `help`.
+/// Returns the page that `help` prints for the words after it.
 /// @throws levelset::UsageError for an unknown action
 [[nodiscard]] std::string help(const std::vector<std::string>& words);
 

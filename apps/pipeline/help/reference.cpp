@@ -10,7 +10,7 @@
 namespace pipeline {
 namespace {
 
-/// Escapes marks of Markdown, and the end of a cell.
+/// Escapes the characters that Markdown would interpret, and `|`, which ends a cell of a table.
 std::string inMarkdown(const std::string& text) {
   std::string result;
   bool isCode = false;
@@ -93,7 +93,7 @@ std::string actionText(const Operator& op) {
   if (!op.operands.empty()) {
     text += fmt::format("Operands: {}{}.{}\n\n", operandText(op),
                         op.flow == Flow::PassesThrough ? " (stays on the stack)" : "",
-                        op.operandsOptional ? " It may run without." : "");
+                        op.operandsOptional ? " The operands may be left out." : "");
   }
   text += paramTable(op.params);
   if (!op.example.empty()) text += "```sh\n" + op.example + "\n```\n\n";
@@ -104,11 +104,12 @@ std::string actionText(const Operator& op) {
 
 std::string referencePage() {
   std::string text =
-      "# Reference\n\nEvery action with its parameters, as the program declares them; made by "
-      "`levelsmith help --markdown`. What all\nshare, types and units among it, is told by "
-      "[command-line.md](command-line.md), how actions work by [operators.md](operators.md).\n"
-      "Parameters without dashes may be given without their name; actions that make a value take "
-      "`--as NAME` too.\n\n";
+      "# Reference\n\nEvery action with its parameters. `levelsmith help --markdown` writes this "
+      "page from the declarations in the program.\n[command-line.md](command-line.md) describes "
+      "what all actions share, such as types and units. [operators.md](operators.md)\ndescribes "
+      "how actions "
+      "work. Parameters shown without dashes may be given without their name. Actions that compute "
+      "a\nvalue also take `--as NAME`.\n\n";
   for (const HelpGroup& group : helpGroups()) {
     std::vector<std::string> links;
     for (const Operator* op : group.actions) links.push_back(fmt::format("[{0}](#{0})", op->name));
@@ -120,7 +121,7 @@ std::string referencePage() {
     text += "## " + group.name + "\n\n";
     for (const Operator* op : group.actions) text += actionText(*op);
   }
-  text += "## Global options\n\nThey stand before the first action.\n\n";
+  text += "## Global options\n\nGlobal options are given before the first action.\n\n";
   text += paramTable(globalParams());
   text.pop_back();
   return text;

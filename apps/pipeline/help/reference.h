@@ -4,7 +4,8 @@
 
 namespace pipeline {
 
-/// Writes docs/reference.md: every action by group, with operands, parameters and example.
+/// Returns the text of docs/reference.md: every action by group, with operands, parameters and
+/// example.
 [[nodiscard]] std::string referencePage();
 
 }  // namespace pipeline

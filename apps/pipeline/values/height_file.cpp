@@ -30,7 +30,8 @@ std::ifstream openHeights(const std::filesystem::path& path) {
                                       isFolder ? "is a folder" : std::strerror(errno)));
 }
 
-/// Recognizes a PNG by its first byte, with which no text begins. A pipe cannot be rewound.
+/// Recognizes a PNG by its first byte, with which no text begins. Only this byte is inspected,
+/// because a pipe cannot be rewound.
 bool isPng(std::istream& in) {
   return in.peek() == 0x89;
 }

@@ -13,7 +13,9 @@ namespace pipeline {
 /// @param invert  white, or the largest number, becomes 0
 /// @param maxMemory  limit for the heights, bytes
 /// @throws IoError if the file cannot be read
-/// @throws InvalidInput if a line is not usable; names the line
+/// @throws InvalidInput if a line has a word that is no number, or another count of numbers than
+///         the lines before (the message names the line), or if there are fewer than two rows or
+///         columns
 /// @throws ResourceLimit if the heights exceed the limit
 [[nodiscard]] mapping::HeightGrid readHeights(const std::filesystem::path& path, bool invert,
                                               std::size_t maxMemory);

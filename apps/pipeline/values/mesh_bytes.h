@@ -6,10 +6,10 @@
 
 namespace pipeline {
 
-/// Writes a mesh bit for bit, with a checksum. Only the same program on the same machine type can
+/// Encodes a mesh bit for bit, with a checksum. Only the same program on the same machine type can
 /// read it.
 [[nodiscard]] std::string bytesOf(const levelset::TriMesh& mesh);
-/// Reads the bytes of bytesOf().
+/// Decodes the bytes of bytesOf().
 /// @return false if the bytes are damaged or have another format; `mesh` is then incomplete
 [[nodiscard]] bool readMeshBytes(const std::string& bytes, levelset::TriMesh& mesh);
 

@@ -54,7 +54,9 @@ void writeText(const std::filesystem::path& file, const std::string& text, const
   try {
     levelset::FileTarget target(file);
     std::FILE* out = std::fopen(target.path().c_str(), "wb");
-    if (!out) throw levelset::IoError(fmt::format("cannot write '{}'", file.string()));
+    if (!out)
+      throw levelset::IoError(
+          fmt::format("cannot write '{}'; check the path and the permissions", file.string()));
     const bool whole = std::fwrite(text.data(), 1, text.size(), out) == text.size();
     if (std::fclose(out) != 0 || !whole)
       throw levelset::IoError(fmt::format(

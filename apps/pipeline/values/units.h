@@ -17,7 +17,8 @@ namespace pipeline {
 
 enum class Unit { World, Voxels, Percent };
 
-/// A length as written: `0.5` (world units), `2vx`, `1%`. `0.5mm` means the same as `0.5`.
+/// A length as the user wrote it: `0.5` (world units), `2vx` (voxels), `1%` (of the diagonal of the
+/// first operand). `0.5mm` means the same as `0.5`.
 struct Length {
   double number = 0;
   Unit unit = Unit::World;

@@ -156,7 +156,7 @@ render::ViewedScene sceneOf(const Value& drawn) {
   render::ViewedScene viewed;
   if (drawn.kind() == Kind::Scene)
     viewed = drawn.scene();
-  else if (drawn.kind() == Kind::Mesh)  // refers to the mesh of the value
+  else if (drawn.kind() == Kind::Mesh)  // the scene shares the mesh with the value
     viewed.scene.meshes.push_back(
         {std::shared_ptr<const TriMesh>(std::shared_ptr<const void>(), &drawn.mesh())});
   else

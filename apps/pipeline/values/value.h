@@ -36,16 +36,16 @@ struct Plan {
   Kind kind = Kind::Band;
   Imath::Box3d bounds = {};  ///< bounds of the zero set or of the vertices, world units
   double area = 0;           ///< surface area, world units²
-  double voxelSize = 0;      ///< bands of solids and surfaces only, world units
-  double halfWidth = 0;      ///< voxels, bands only
-  double fieldBytes = 0;     ///< fields only
-  double triangles = 0;      ///< meshes only; 0: unknown
-  /// Patches only: size along u, size along v and height, world units. Height 0: the texture will
-  /// determine it.
+  double voxelSize = 0;      ///< voxel size, world units; 0: the value has no voxels
+  double halfWidth = 0;      ///< half width, voxels; bands and scenes only
+  double fieldBytes = 0;     ///< memory of a field, bytes; fields only
+  double triangles = 0;      ///< number of triangles; meshes only; 0: unknown
+  /// Patches only: size along u, size along v and height, world units. Height 0: the texture that
+  /// is mapped will determine it.
   Imath::V3d patchSize = Imath::V3d(0);
-  double patchCount = 1;
+  double patchCount = 1;  ///< patches only: number of patches
 
-  /// The estimates that operators of levelset read.
+  /// Returns the plan in the form that the operators of the library levelset read.
   [[nodiscard]] levelset::ValuePlan estimate() const;
   void set(const levelset::ValuePlan& estimate);
   /// Estimated number of active voxels of a band with this area.
@@ -56,18 +56,18 @@ struct Plan {
 
 /// Description of how patches were built, to rebuild them on another base or at another position.
 struct PatchRecipe {
-  /// Extracts the outlines that are carried to another base.
+  /// Extracts the outlines that are transferred to another base.
   std::function<std::vector<mapping::PatchOutline>(const std::vector<mapping::Patch>&)> outlines =
       {};
-  /// Builds patches from carried outlines.
+  /// Builds patches from transferred outlines.
   mapping::PatchMaker make = {};
   /// Replaces `outlines` and `make` for patches around a fixed axis.
   std::function<std::vector<mapping::Patch>(const levelset::NarrowBand& base, double height,
                                             const levelset::Progress& progress)>
       around = {};
-  bool isRigid = false;    ///< centre and direction determine the patch, as for a decal
-  std::string fixed = {};  ///< reason why the patch cannot be moved; empty: it can
-  std::string action = {};
+  bool isRigid = false;     ///< centre and direction determine the patch, as for a decal
+  std::string fixed = {};   ///< reason why the patch cannot be moved; empty: it can
+  std::string action = {};  ///< action that built the patches
   /// Options without position and height: `shape` determines the geometry, `fineness` only its
   /// resolution.
   std::map<std::string, std::string> shape = {}, fineness = {};
@@ -94,7 +94,7 @@ class Value {
   explicit Value(Plan plan);
 
   [[nodiscard]] Kind kind() const;
-  // These return the value as the given kind. A file may contain another kind than its name
+  // These return the value as the kind in their name. A file may contain another kind than its name
   // suggests.
   // @throws levelset::UsageError if the value is of another kind
   [[nodiscard]] const levelset::TriMesh& mesh() const;
