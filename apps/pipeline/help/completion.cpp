@@ -21,7 +21,8 @@ std::string paramWord(const Param& param) {
                              : fmt::format("--{}={}", param.name, kind);
 }
 
-/// Shell function that sets the parameters of an action; '' stands for the global options.
+/// Shell function `_levelsmith_params ACTION`. It sets the shell variable `params` to the words of
+/// paramWord() for an action; '' stands for the global options.
 std::string completionTable() {
   std::string text = "_levelsmith_params() {\n  case $1 in\n";
   const auto add = [&](const std::string& action, const std::vector<Param>& params,
@@ -38,16 +39,17 @@ std::string completionTable() {
   return text + "  *) params='' ;;\n  esac\n}\n";
 }
 
-/// Shell function for both shells.
+/// Shell function that is part of both scripts.
 constexpr const char* kVariables = R"sh(
-# Prints `NAME=` for what a script sets.
+# Prints `NAME=` for each variable that a `set` line of a script sets.
 _levelsmith_variables() {
   sed -n 's/^[[:blank:]]*set[[:blank:]]\{1,\}\([A-Za-z_][A-Za-z0-9_-]*\)[[:blank:]].*/\1=/p' "$1"
 }
 )sh";
 
 constexpr const char* kBash = R"sh(
-# Sets `kind` to what an option takes, or a place: nothing for a flag.
+# Sets `kind` to the kind of value that an option, or a positional argument given by its index,
+# takes; empty for a flag.
 _levelsmith_kind() {
   local each begun=''
   kind=''
@@ -59,7 +61,7 @@ _levelsmith_kind() {
   kind=$begun
 }
 
-# Completes `$1` as a kind of value.
+# Completes `$1` as a value of the kind in `kind`.
 _levelsmith_value() {
   local list=''
   case $kind in
@@ -76,7 +78,7 @@ _levelsmith_value() {
 
 _levelsmith() {
   COMPREPLY=()
-  # Bash makes words of their own of =, @ and =@.
+  # Bash splits words at =, @ and =@. Join the pieces again.
   local -a words=()
   local word joins='' i
   for ((i = 1; i <= COMP_CWORD; ++i)); do
@@ -142,7 +144,7 @@ _levelsmith() {
       mapfile -t COMPREPLY < <(compgen -W "$list" -- "$full")
     fi
   fi
-  # What stands before the value is a part of the word, where bash does not split it.
+  # If bash does not split words at =, a completion must repeat the text before the value.
   if [[ $full == --*=* && $COMP_WORDBREAKS != *=* ]]; then
     COMPREPLY=("${COMPREPLY[@]/#/${full%%=*}=}")
   fi
@@ -153,7 +155,8 @@ complete -F _levelsmith levelsmith
 )sh";
 
 constexpr const char* kZsh = R"sh(
-# Sets `kind` to what an option takes, or a place: nothing for a flag.
+# Sets `kind` to the kind of value that an option, or a positional argument given by its index,
+# takes; empty for a flag.
 _levelsmith_kind() {
   local each begun=''
   kind=''
@@ -229,7 +232,8 @@ _levelsmith() {
   fi
 }
 
-# As a file _levelsmith of $fpath it is the function; evaluated, it announces it.
+# If zsh loads this text as the file _levelsmith in $fpath, the text is the body of the completion
+# function. If the text is evaluated, it registers that function.
 if [[ $funcstack[1] == _levelsmith ]]; then
   _levelsmith
 else
@@ -237,7 +241,7 @@ else
 fi
 )sh";
 
-/// Returns an entry of zsh's _describe, in single quotes.
+/// Returns an action and its summary as an entry for zsh's _describe, in single quotes.
 std::string summaryWord(const Operator& op) {
   std::string text;
   for (char c : op.name + ":" + op.summary) {
