@@ -107,9 +107,8 @@ std::string referencePage() {
       "# Reference\n\nEvery action with its parameters. `levelsmith help --markdown` writes this "
       "page from the declarations in the program.\n[command-line.md](command-line.md) describes "
       "what all actions share, such as types and units. [operators.md](operators.md)\ndescribes "
-      "how actions "
-      "work. Parameters shown without dashes may be given without their name. Actions that compute "
-      "a\nvalue also take `--as NAME`.\n\n";
+      "how actions work. Parameters shown without dashes may be given without their name. Actions "
+      "that compute a\nvalue also take `--as NAME`.\n\n";
   for (const HelpGroup& group : helpGroups()) {
     std::vector<std::string> links;
     for (const Operator* op : group.actions) links.push_back(fmt::format("[{0}](#{0})", op->name));

@@ -188,9 +188,9 @@ std::vector<std::string> toleranceLines(const ToleranceReport& tolerance) {
   }
   for (const ToleranceOutput& output : tolerance.outputs) {
     std::string line =
-        fmt::format("tolerance: {}: {:.4g} requested, {:.3g} {}, with voxels of {:.4g}",
-                    output.name, output.requested, output.achieved,
-                    output.isReached() ? "reached" : "reached only", tolerance.voxelSize);
+        fmt::format("tolerance: {}: {:.4g} requested, {:.3g} {} with voxels of {:.4g}", output.name,
+                    output.requested, output.achieved,
+                    output.isReached() ? "achieved" : "achieved (not enough)", tolerance.voxelSize);
     if (output.crease > 0)
       line +=
           fmt::format("; near creases, which the field cannot represent, {:.3g}", output.crease);

@@ -12,7 +12,7 @@ namespace pipeline {
 /// `steps`, `tolerance` (only with --tolerance), `left_out`, `warnings`, `exit_code` and `error`.
 /// `graph`, saved to a file, is a valid input of the action `run`.
 [[nodiscard]] std::string reportJson(const RunReport& report);
-/// Formats one line for each voxel size that was tried, and one for each result.
+/// Formats one line for each voxel size that --tolerance tried, and one for each result.
 [[nodiscard]] std::vector<std::string> toleranceLines(const ToleranceReport& tolerance);
 /// Checks the files of --report and --save-graph before the run.
 /// @throws levelset::IoError if a file cannot be written
@@ -22,7 +22,7 @@ void checkRunTargets(const Graph& graph);
 [[nodiscard]] bool isPage(const std::filesystem::path& path);
 /// Writes a report as .json or .html, by extension; "-" writes JSON to standard output. Writes a
 /// temporary file and renames it.
-/// @throws levelset::IoError
+/// @throws levelset::IoError if the file cannot be written
 void writeReport(const std::filesystem::path& path, const RunReport& report);
 
 /// Formats one line about a step: its result, time, memory and estimated error.

@@ -70,7 +70,7 @@ summary { cursor: pointer; color: var(--faint); }
 <body>
 )HTML";
 
-/// Meaning of an exit code.
+/// Returns the meaning of an exit code.
 const char* meaningOf(int exitCode) {
   switch (static_cast<levelset::ExitCode>(exitCode)) {
     case levelset::ExitCode::Done:
@@ -140,8 +140,8 @@ std::string quotedWord(const std::string& text) {
   return quoted + "'";
 }
 
-/// Command line of a step. Positional options go without their names, if all positional options
-/// before them are given.
+/// Formats a step as on the command line. A positional option is written without its name if all
+/// positional options before it are given.
 std::string actionText(const StepReport& step) {
   const Operator* op = findOperator(step.action);
   std::map<int, std::string> places;
@@ -169,7 +169,7 @@ std::string actionText(const StepReport& step) {
   return text;
 }
 
-/// Indents a JSON text.
+/// Formats a JSON text with indentation; other texts stay unchanged.
 std::string prettyJson(const std::string& text) {
   const auto json = nlohmann::ordered_json::parse(text, nullptr, false);
   return json.is_discarded()
@@ -216,7 +216,7 @@ class StepTable {
       text += fmt::format("<td class=\"picture\"{}>{}</td>", more.empty() ? "" : " rowspan=\"2\"",
                           pictureOf(step, index));
     text += "<th scope=\"rowgroup\">" + headOf(step) + "</th>";
-    // The bar behind the time shows the share of the total time.
+    // The bar behind the wall time shows the share of this step in the wall time of all steps.
     const double share = wall_ > 0 && step.wallSeconds > 0 ? 100 * step.wallSeconds / wall_ : 0;
     if (step.isCached || report_.dryRun)
       text += "<td class=\"n\">–</td><td class=\"n\">–</td><td class=\"n\">–</td>";
@@ -388,7 +388,8 @@ std::string toleranceOutputs(const ToleranceReport& tolerance) {
         "style=\"margin:0\">{}</span></td><td>{}</td><td>{}</td><td class=\"n\">{}</td></tr>\n",
         escapedHtml(output.name), figure(output.requested), figure(output.achieved, 3),
         output.isReached() ? "good" : "bad", output.isReached() ? "yes" : "no",
-        output.isMeasured ? "measuring" : "estimate", creaseText(output), figure(output.order, 3));
+        output.isMeasured ? "measurement" : "estimate", creaseText(output),
+        figure(output.order, 3));
   return text + "</tbody>\n</table></div>\n";
 }
 
@@ -447,10 +448,11 @@ std::string versionTable() {
 std::string graphSection(const RunReport& report) {
   if (report.graphJson.empty()) return "";
   return fmt::format(
-      "<h2>The graph</h2>\n<p>It computes the same results again: <a download=\"graph.json\" "
+      "<h2>The graph</h2>\n<p>The graph computes the same results again: <a "
+      "download=\"graph.json\" "
       "href=\"data:application/json;base64,{}\">save it</a> as <code>graph.json</code>, then "
-      "<code>levelsmith run graph.json</code>. Paths are as written. Options of the run, such as "
-      "<code>--max-memory</code>, are not part of it.</p>\n"
+      "<code>levelsmith run graph.json</code>. File names are as the user wrote them. Options of "
+      "the run, such as <code>--max-memory</code>, are not part of the graph.</p>\n"
       "<details><summary>graph.json</summary><pre>{}</pre></details>\n",
       apps::base64(report.graphJson), escapedHtml(report.graphJson));
 }

@@ -27,7 +27,7 @@ void GraphRun::run() {
     try {
       reportInOrder();
     } catch (const std::exception&) {
-      // The first failure is the one to report.
+      // Ignored: the failure of the run is the one to report.
     }
     collectSteps();
     throw;

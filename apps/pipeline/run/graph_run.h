@@ -59,15 +59,15 @@ class GraphRun {
   enum class NodeState {
     Unneeded,  // no requested result depends on it
     Compute,   // its operator must run
-    Load,      // the cache has its value, which a node that runs or the caller takes
-    UpToDate   // its results exist and no node that runs takes its value
+    Load,      // its value is read from the cache, for a node that runs or for the caller
+    UpToDate   // nothing to do: its files are unchanged, and no node that runs takes its value
   };
   /// Failure of a node on a region of interest. The node may succeed on complete values.
   struct RegionFailure {};
   using ContinueCheck = std::function<bool()>;
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
-  // Order of the run and report: graph_run.cpp.
+  // Order of execution and of the report, defined in graph_run.cpp.
   std::vector<std::size_t> decideStates();
   void runNodes();
   void runInOrder(const std::vector<char>& isDone, std::size_t end);
@@ -79,14 +79,14 @@ class GraphRun {
   [[nodiscard]] bool isGiven(std::size_t i) const { return graph_.given.contains(i); }
   [[nodiscard]] bool isLimited() const { return settings_.maxMemory != levelset::kNoMemoryLimit; }
 
-  // Results of earlier runs: graph_run_cache.cpp.
+  // Cached results of earlier runs, defined in graph_run_cache.cpp.
   void useCache(const std::vector<char>& needed);
   [[nodiscard]] bool isUpToDate(const std::string& key) const;
   void loadFromCache(std::size_t i);
   bool tryLoad(std::size_t i);
   void storeInCache(std::size_t i, const Invocation& invocation, const Value& value);
 
-  // Sizes and regions of interest before the run: graph_run_plan.cpp.
+  // Sizes and regions of interest, computed before the run; defined in graph_run_plan.cpp.
   void planNodes();
   std::optional<Plan> planFromMesh(std::size_t i);
   [[nodiscard]] bool isRestricted(std::size_t i) const;
@@ -94,13 +94,13 @@ class GraphRun {
   [[nodiscard]] bool fitsInMemory(std::size_t i, const std::vector<std::size_t>& running) const;
   [[nodiscard]] std::optional<double> workingBytes(std::size_t i) const;
 
-  // Concurrent branches: graph_run_tasks.cpp.
+  // Concurrent branches, defined in graph_run_tasks.cpp.
   [[nodiscard]] bool hasBranches() const;
   [[nodiscard]] std::vector<Task> tasks() const;
   ScheduleResult scheduleTasks();
   bool runTask(std::size_t i, const ContinueCheck& shouldContinue);
 
-  // One node: graph_run_node.cpp.
+  // Execution of one node, defined in graph_run_node.cpp.
   void compute(std::size_t i);
   void runChecked(std::size_t i, const ContinueCheck& shouldContinue, const ArenaCpu* arena);
   void runNode(std::size_t i, StepReport& step, StepClock& clock,
@@ -115,14 +115,20 @@ class GraphRun {
   std::optional<Cache> cache_;
   std::vector<std::optional<std::string>> keys_;
   std::vector<RegionOfInterest> regions_;
-  std::vector<std::optional<Plan>> plans_;  // of complete values; empty: unknown
-  std::vector<char> isComputedForPlan_;     // ran already, because planning needs its mesh
+  // Plan of the complete value of each node; empty: unknown.
+  std::vector<std::optional<Plan>> plans_;
+  // Per node: it ran already, because its plan requires its mesh.
+  std::vector<char> isComputedForPlan_;
+  // Per node: error while it ran for its plan; null: none.
   std::vector<std::exception_ptr> planningFailures_;
-  double planningBytes_ = 0;
-  std::vector<char> needsFullValues_;  // failed on a region of interest; retried on complete values
+  double planningBytes_ = 0;  // memory of the meshes computed for planning
+  // Per node: it failed on a region of interest, and must run again on complete values.
+  std::vector<char> needsFullValues_;
   RunningSteps running_;
-  std::vector<std::optional<StepReport>> steps_;           // one per node; empty: did not run
-  std::vector<std::optional<std::string>> pendingOutput_;  // printed text of finished nodes
+  std::vector<std::optional<StepReport>> steps_;  // one per node; empty: did not run
+  // Printed text of finished nodes; empty: not finished.
+  std::vector<std::optional<std::string>> pendingOutput_;
+  // First node that is not yet reported, and end of the nodes to report.
   std::size_t nextReported_ = 0, reportEnd_ = kNone;
   std::mutex mutex_;  // guards values, states, steps, output and the callbacks of the settings
   Values values_;     // last member: decideStates() initializes the others

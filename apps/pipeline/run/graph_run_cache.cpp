@@ -18,7 +18,7 @@ void GraphRun::useCache(const std::vector<char>& needed) {
     const bool isKnown = keys_[i] && cache_->has(*keys_[i]);
     if (!node.makes()) {
       if (isKnown && isUpToDate(*keys_[i])) states_[i] = NodeState::UpToDate;
-    } else if (!taken[i] && uses[i] > 0) {  // a value without consumers is a result of its own
+    } else if (!taken[i] && uses[i] > 0) {  // without uses, the value is itself a result
       states_[i] = NodeState::UpToDate;
     } else if (isKnown && Cache::canHold(node.kind)) {
       states_[i] = NodeState::Load;
@@ -36,11 +36,13 @@ bool GraphRun::isUpToDate(const std::string& key) const {
                              [](const FileStamp& file) { return stampOf(file.path) == file; });
 }
 
-/// Repeats the cached output of a node and loads its value if a node takes it.
+/// Repeats the printed text of a cached node, and loads its value if a node takes it. Computes a
+/// node whose cache entry is damaged.
 void GraphRun::loadFromCache(std::size_t i) {
   if (!tryLoad(i)) compute(i);
 }
 
+/// Repeats the printed text of a cached node, and loads its value if a node takes it.
 /// @return false: the cache entry is damaged
 bool GraphRun::tryLoad(std::size_t i) {
   std::optional<Value> value;
@@ -69,8 +71,8 @@ bool GraphRun::tryLoad(std::size_t i) {
   return true;
 }
 
-/// Stores a result for later runs. Does not store a failed one, so that the failure is reported
-/// again.
+/// Stores a result for later runs. A result that failed a numeric check is not stored, so that a
+/// later run reports the failure again.
 void GraphRun::storeInCache(std::size_t i, const Invocation& invocation, const Value& value) {
   if (!cache_ || !keys_[i] || !invocation.notes.failure.empty()) return;
   const Node& node = graph_.nodes[i];

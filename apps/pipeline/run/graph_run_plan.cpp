@@ -39,7 +39,8 @@ void GraphRun::planNodes() {
     const std::vector<char> isOverwritten = findOverwritten(graph_, runs);
     for (std::size_t i = 0; i < runs.size(); ++i) {
       if (!runs[i] || !(isOverwritten[i] || readsOnce(graph_.nodes[i]))) continue;
-      // The node cannot be read again: keep its complete value for a retry on complete values.
+      // The node cannot read its input again. Keep its complete value, in case a consumer is
+      // retried on complete values.
       regions_[i] = {};
       values_.addUse(i);
     }
@@ -48,7 +49,7 @@ void GraphRun::planNodes() {
 }
 
 /// Computes a mesh during planning if a band is computed from it. The plan of a mesh requires the
-/// mesh itself. Does nothing when the meshes held already exceed the limit.
+/// mesh itself. Does nothing if the meshes computed for planning already exceed the limit.
 std::optional<Plan> GraphRun::planFromMesh(std::size_t i) {
   const double most = std::min(kMaxPlanningBytes, static_cast<double>(settings_.maxMemory) / 8);
   const bool feedsBand = std::any_of(graph_.nodes.begin() + static_cast<std::ptrdiff_t>(i),

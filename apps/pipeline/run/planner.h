@@ -19,14 +19,16 @@ namespace pipeline {
 
 /// Predicted sizes of values, known before the values are computed.
 struct ValuePlans {
-  std::vector<std::optional<Plan>> plans;    ///< one per node; empty: unknown size
-  std::vector<std::exception_ptr> failures;  ///< one per node: error that prevented the plan
+  std::vector<std::optional<Plan>> plans;  ///< one per node; empty: unknown size
+  /// One per node: error that prevented the plan; null: none.
+  std::vector<std::exception_ptr> failures;
 };
 
 /// Plans the values of all nodes that run.
 /// @param runs       one flag per node
 /// @param maxMemory  limit for files that planning must read, bytes
-/// @param mesh       plans a node without operands whose result is a mesh; may take a while
+/// @param mesh       plans a node, given by index, without operands whose result is a mesh; may
+///        take a while
 [[nodiscard]] ValuePlans planValues(const Graph& graph, const std::vector<char>& runs,
                                     std::size_t maxMemory,
                                     const std::function<std::optional<Plan>(std::size_t)>& mesh);

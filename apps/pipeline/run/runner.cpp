@@ -43,7 +43,7 @@ void throwFailures(const RunReport& report) {
 class Targets {
  public:
   /// Adds a file.
-  /// @return true if an earlier name denotes the same file; one hash look-up per call
+  /// @return true if an earlier name denotes the same file
   bool add(const std::string& target) {
     const bool isDash = target == "-", isOutput = levelset::isStandardOutput(target);
     const std::filesystem::path file = levelset::canonicalFile(target);
@@ -59,7 +59,7 @@ class Targets {
 };
 
 /// Rejects output files that cannot be written, before any action runs.
-/// @param earlier  files of the actions before; receives the files of this action
+/// @param earlier  files of the earlier actions; receives the files of this action
 void checkTargets(const Node& action, const RunSettings& settings, Targets& earlier,
                   RunReport& report) {
   if (!action.op->targets) return;
@@ -69,15 +69,14 @@ void checkTargets(const Node& action, const RunSettings& settings, Targets& earl
       if (!earlier.add(target)) continue;
       if (!levelset::clobberDefault())
         throw levelset::IoError(fmt::format(
-            "{}: an earlier action writes '{}' too, and --no-clobber forbids to overwrite it; use "
+            "{}: an earlier action writes '{}' too, and --no-clobber forbids overwriting it; use "
             "another file",
             action.op->name, target));
-      report.warnings.push_back(withLocation(
-          fmt::format(
-              "{}: an earlier action writes '{}' too, and only the last content stays; use another "
-              "file",
-              action.op->name, target),
-          action.location));
+      report.warnings.push_back(
+          withLocation(fmt::format("{}: an earlier action writes '{}' too, and only the later "
+                                   "content remains; use another file",
+                                   action.op->name, target),
+                       action.location));
       settings.warn(report.warnings.back());
     }
   } catch (const levelset::Error& error) {

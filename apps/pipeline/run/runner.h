@@ -35,7 +35,7 @@ struct RunSettings {
   std::function<void(std::size_t, const Value&)> onValue = {};
   /// Receives the text that an action prints for the user.
   std::function<void(const std::string&)> print = {};
-  /// Receive one sentence about a result.
+  /// Receive one sentence about a result: a warning, or a note.
   std::function<void(const std::string&)> warn = {}, note = {};
 };
 
@@ -43,15 +43,17 @@ struct RunSettings {
 struct StepReport {
   std::string action;
   bool isCached = false;                          ///< the result comes from an earlier run
-  std::map<std::string, std::string> parameters;  ///< options as written
-  std::map<std::string, std::string> defaults;    ///< defaults of the other options
+  std::map<std::string, std::string> parameters;  ///< options as the user wrote them, by name
+  std::map<std::string, std::string> defaults;    ///< default values of the other options, by name
   StepNotes notes;
   double wallSeconds = 0, cpuSeconds = 0;
-  double peakBytes = 0;  ///< peak resident memory
+  double peakBytes = 0;  ///< peak resident memory of the process, bytes
   std::string resultName, resultKind;
   std::string location;  ///< position in the script, "FILE, line 4"; empty: none
+  /// Number of active voxels, voxel size in world units, and half width in voxels, of a band.
   double activeVoxels = 0, voxelSize = 0, halfWidth = 0;
-  levelset::RegionOfInterest roi = {};  ///< part of the result that other nodes read
+  /// Region of interest: part of the result that other nodes read.
+  levelset::RegionOfInterest roi = {};
   std::size_t triangles = 0;
   Thumbnail thumbnail = {};  ///< picture of the result, if requested
 };
@@ -60,7 +62,7 @@ struct StepReport {
 struct RunReport {
   std::string graphJson;  ///< the complete graph as JSON
   std::vector<StepReport> steps;
-  std::vector<std::string> warnings;  ///< about the graph, not about one step
+  std::vector<std::string> warnings;  ///< warnings about the graph, not about one step
   std::vector<std::string> leftOut;   ///< actions that no requested result depends on
   std::string error;                  ///< message of the error that ended the run; empty: none
   int exitCode = 0;

@@ -35,17 +35,18 @@ class ArenaCpu : public tbb::task_scheduler_observer {
  private:
   mutable std::mutex mutex_;
   std::map<pthread_t, double> since_;  // CPU seconds at entry, of threads inside the arena
-  double past_ = 0;
+  double past_ = 0;                    // CPU seconds of threads that have left the arena
 };
 
 class StepClock;
 
-/// The steps that run at the same time.
+/// The clocks of the steps that run at the same time.
 class RunningSteps {
  public:
   void add(StepClock& clock);
   void remove(StepClock& clock);
-  /// Resets the peak of the process if no step runs, so that earlier memory counts for no step.
+  /// Resets the peak resident memory of the process if no step runs. Memory that was used before
+  /// then counts for no step.
   void resetPeak();
 
  private:
@@ -60,7 +61,7 @@ class RunningSteps {
 /// complete process.
 class StepClock {
  public:
-  /// @param arena  arena of the step, if other steps may run concurrently
+  /// @param arena  arena of the step; null: no other step runs concurrently
   StepClock(StepReport& step, RunningSteps& running, const ArenaCpu* arena = nullptr);
   ~StepClock() { stop(); }
   StepClock(const StepClock&) = delete;

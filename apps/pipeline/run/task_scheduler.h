@@ -11,7 +11,8 @@ namespace pipeline {
 /// A task of an ordered list. Running the tasks one after another in list order is always valid.
 struct Task {
   std::vector<std::size_t> dependencies;  ///< indices of earlier tasks that must be done first
-  bool isBarrier = false;  ///< waits for all earlier tasks, because it has outside effects
+  /// Waits for all earlier tasks, because it has effects beside its value, such as written files.
+  bool isBarrier = false;
 };
 
 struct SchedulerSettings {

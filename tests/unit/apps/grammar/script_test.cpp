@@ -238,7 +238,7 @@ TEST_F(Script, ReportsTheIterationOfAnError) {
   writeFile("over.txt", "sphere --radius 1 --voxel 0.5\nrepeat 2\nwrite a.vdb\nend\n");
   const auto over = levelsmith("run over.txt");
   EXPECT_NE(
-      over.err.find("only the last content stays; use another file (over.txt, line 3, i = 1)"),
+      over.err.find("only the later content remains; use another file (over.txt, line 3, i = 1)"),
       std::string::npos)
       << over.err;
 }
