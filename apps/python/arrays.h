@@ -11,7 +11,7 @@
 /// Conversions between values and numpy arrays.
 namespace python {
 
-/// Builds a mesh.
+/// Builds a mesh from numpy arrays.
 /// @param vertices  n × 3 floats
 /// @param faces  m × 3 integers
 /// @throws levelset::InvalidInput for other shapes and types, numbers that are not finite, and
@@ -19,8 +19,10 @@ namespace python {
 [[nodiscard]] levelset::TriMesh meshFromArrays(const pybind11::array& vertices,
                                                const pybind11::array& faces);
 
-/// One of the lists of a mesh, as a read-only array that shares its memory. None for attributes
-/// that the mesh does not have.
+/// Returns a list of a mesh as a read-only numpy array that shares its memory; None for an
+/// attribute that the mesh does not have.
+/// @param owner  Python object that keeps the mesh alive
+/// @param list   vertices, faces, normals, uvs or colors
 [[nodiscard]] pybind11::object meshArray(const pybind11::object& owner,
                                          const levelset::TriMesh& mesh, const std::string& list);
 
@@ -29,18 +31,20 @@ struct DenseBand {
   pybind11::array_t<float> values;
   Imath::V3d origin;  ///< world position of the first grid point
 };
-/// Reads the values of a band.
-/// @param box  world units; default: the box of the band
+/// Reads the values of a band at the grid points of a box.
+/// @param box  world units; default: the box of the active voxels
 /// @throws levelset::InvalidInput for a band whose grid is rotated against the axes
 /// @throws levelset::ResourceLimit for too many grid points
 [[nodiscard]] DenseBand bandArray(const levelset::NarrowBand& band,
                                   const std::optional<Imath::Box3d>& box, std::size_t maxMemory);
 
-/// Builds a grid from samples. Its zero set is correct, but its values are not yet distances:
-/// `reinitialize` computes these.
-/// @param blocks  n × 3 block coordinates; blocks have 8³ grid points
+/// Builds a band from samples of a function. Its zero set is correct, but its values need not be
+/// distances: the action `reinitialize` computes distances.
+/// @param origin  world position of the grid point with index (0, 0, 0)
+/// @param voxel  voxel size, world units
+/// @param blocks  n × 3 block coordinates: grid indices divided by 8; blocks have 8³ grid points
 /// @param values  n × 8 × 8 × 8 samples of these blocks
-/// @param inside  m × 3 coordinates of blocks without samples that lie inside
+/// @param inside  m × 3 coordinates of blocks that lie inside the solid and have no samples
 [[nodiscard]] levelset::NarrowBand bandOfSamples(const Imath::V3d& origin, double voxel,
                                                  const pybind11::array_t<std::int32_t>& blocks,
                                                  const pybind11::array_t<float>& values,

@@ -25,9 +25,9 @@ namespace py = pybind11;
 namespace python {
 namespace {
 
-std::size_t maxMemory = 0;  // limit of all runs; 0: from the free memory
+std::size_t maxMemory = 0;  // memory limit of all runs, bytes; 0: a share of the free memory
 
-/// Removes temporary files that killed processes left beside an output file.
+/// Removes temporary files that killed processes left in the folder of an output file.
 void removeLeftovers(const std::filesystem::path& target) {
   std::error_code ignored;
   const std::filesystem::path file = levelset::canonicalFile(target);
@@ -44,7 +44,7 @@ void removeLeftovers(const std::filesystem::path& target) {
 
 using OnValue = std::function<void(std::size_t, const pipeline::Value&)>;
 
-/// A run in a thread of its own, which does not use Python.
+/// A run of a graph in a separate thread, which does not use Python.
 class Run {
  public:
   Run(const pipeline::Graph& graph, const RunOptions& options, OnValue onValue)
@@ -95,7 +95,7 @@ class Run {
     changed_.notify_all();
   }
 
-  /// A failure to write the report does not replace an earlier error.
+  /// Writes the report file. A failure to write it does not replace an earlier error.
   void writeReport(const pipeline::RunReport& report) {
     if (options_.report.empty()) return;
     try {
@@ -142,10 +142,12 @@ class Run {
   bool isDone_ = false, isWhole_ = false;
   std::string action_;
   double fraction_ = 0;
-  std::thread thread_;  // declared last, because it starts at once
+  // Declared last, because the thread starts at once and uses the other members.
+  std::thread thread_;
 };
 
-/// Handles signals and progress. @throws py::error_already_set as raised by the handlers
+/// Runs the Python signal handlers, and calls the progress function if there is one.
+/// @throws py::error_already_set if one of these functions raises an exception
 void attend(Run& run, const py::object& progress) {
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();
   if (progress.is_none()) return;
@@ -155,7 +157,8 @@ void attend(Run& run, const py::object& progress) {
   if (answer.ptr() == Py_False) run.end();
 }
 
-/// Waits for a run. @return its outcome, with an exception that Python raised meanwhile
+/// Waits for a run, and handles signals and progress meanwhile.
+/// @return outcome of the run; an exception raised by a signal handler or `progress` is its failure
 Outcome wait(Run& run, const py::object& progress) {
   constexpr std::chrono::milliseconds kInterval(50);
   std::exception_ptr raised;

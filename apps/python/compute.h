@@ -9,16 +9,15 @@
 
 namespace python {
 
-/// Results of a run apart from the values.
+/// Results of a run, except the values.
 struct Outcome {
-  std::string report;  ///< JSON
-  std::string printed;
+  std::string report;   ///< report of the run, JSON
+  std::string printed;  ///< text that the actions printed for the user
   std::vector<std::string> warnings, notes;
-  std::exception_ptr
-      failure;  ///< a levelset::Error, or an exception raised by `progress` or a signal handler
+  /// A levelset::Error, or an exception raised by `progress` or a signal handler; null: none.
+  std::exception_ptr failure;
 };
 /// Options of a run.
-
 struct RunOptions {
   /// None, or a function of the name of an action and the completed fraction. It is called in this
   /// thread, at most 20 times per second and once at the end. Returning False ends the run.
@@ -27,22 +26,23 @@ struct RunOptions {
   /// The job may have been started before by a process that was killed. Temporary files that it
   /// left beside the output files are removed.
   bool isAgain = false;
-  // For pipelines only.
+  // Used only by jobs that run a pipeline.
   std::filesystem::path report = {};  ///< report file; empty: none
-  bool measureErrors = false;
-  std::size_t maxMemory = 0;  ///< bytes; 0: the limit of setMaxMemory()
+  bool measureErrors = false;         ///< estimate the error of each result
+  std::size_t maxMemory = 0;          ///< memory limit, bytes; 0: the limit of setMaxMemory()
 };
 
-/// Computes values and keeps them, in a thread of its own. The calling thread waits for signals
-/// without holding the interpreter's lock.
+/// Computes lazy values in a separate thread, and stores the results in them. The calling thread
+/// waits without the interpreter's lock, and handles signals.
 [[nodiscard]] Outcome compute(const std::vector<LazyPtr>& values, const RunOptions& options);
-/// Runs a graph as written, for its output files and printed text.
+/// Runs a complete graph for its output files and printed text.
 [[nodiscard]] Outcome compute(const pipeline::Graph& graph, const RunOptions& options);
 
-/// Settings of all later runs: number of threads, 0 for the number of cores; bytes, 0 for 80 % of
-/// the free memory.
+/// Sets the number of threads of all later runs; 0: the number of cores.
 void setThreads(std::size_t count);
+/// Sets the memory limit of all later runs, bytes; 0: 80 % of the free memory.
 void setMaxMemory(std::size_t bytes);
+/// Memory limit of a run, bytes.
 [[nodiscard]] std::size_t memoryLimit();
 
 }  // namespace python

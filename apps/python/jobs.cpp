@@ -35,7 +35,8 @@ void refuseStandardStreams(const Node& node) {
     const auto& uses = node.op->*use;
     if (uses && !node.options.contains("json") && uses(probe))
       throw UsageError(pipeline::sentenceOf(
-          node.op->name, "'-' is a standard stream, which jobs do not have; give a file"));
+          node.op->name,
+          "'-' is a standard stream, which the jobs of map() do not have; give a file"));
   }
 }
 
@@ -43,7 +44,7 @@ std::string absolute(const std::string& file, const fs::path& folder) {
   return (folder / file).lexically_normal().string();
 }
 
-/// A folder that is removed at the end, with its contents.
+/// A temporary folder. The destructor removes it with its contents.
 class TemporaryFolder {
  public:
   TemporaryFolder() {

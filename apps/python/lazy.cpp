@@ -20,7 +20,7 @@ Lazy::Lazy(Value value) : value_(std::move(value)), isSettled_(true) {
 
 Lazy::~Lazy() {
   leaveInputs();
-  // Not recursive, because a chain may be longer than the stack allows.
+  // The inputs are released without recursion, because a chain may be longer than the stack allows.
   std::vector<LazyPtr> open;
   moveInputs(open);
   while (!open.empty()) {
@@ -43,7 +43,7 @@ void Lazy::letGo() {
   if (holders_ == 0 && waiting_ == 0) value_.reset();
 }
 
-/// Releases the inputs, which are not requested again.
+/// Marks the node as settled, and releases its inputs, which it does not need again.
 void Lazy::leaveInputs() {
   if (isSettled_) return;
   isSettled_ = true;
@@ -63,7 +63,8 @@ void Lazy::settle(std::optional<Value> value) {
 }
 
 Request::Request(const std::vector<LazyPtr>& results, Depth depth) {
-  // Lists each node after its inputs. Not recursive, because chains may be long.
+  // Lists each node after its inputs, without recursion, because a chain may be longer than the
+  // stack allows.
   std::vector<std::pair<LazyPtr, bool>> open;
   for (auto it = results.rbegin(); it != results.rend(); ++it) open.emplace_back(*it, false);
   while (!open.empty()) {
@@ -108,7 +109,7 @@ void Request::add(Lazy& lazy, Depth depth) {
       node.options[option] = "@" + (name.empty() ? fmt::format("{}", of) : name);
       node.named[option] = of;
     }
-    // Names must be unique within a file.
+    // Names must be unique within a graph file.
     for (const Node& other : graph_.nodes)
       if (depth == Depth::Whole && other.name == node.name) node.name.clear();
   }
@@ -121,7 +122,8 @@ void Request::keep(std::size_t node, const Value& value) {
 
 void Request::settle(bool isDone) {
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
-    // With a cache, derived values may be known without the value itself.
+    // With a cache, a run may complete without this value, if the values derived from it are in the
+    // cache.
     const bool isMissing = isKept_[i] && !values_[i] && graph_.nodes[i].makes();
     if (isDone ? !isMissing : values_[i].has_value()) nodes_[i]->settle(std::move(values_[i]));
   }

@@ -19,7 +19,7 @@ using LazyPtr = std::shared_ptr<Lazy>;
 /// object or a node that is not yet computed may request it.
 class Lazy {
  public:
-  /// @param node  its `inputs` and `named` are not read
+  /// @param node  action and options; its members `inputs` and `named` are ignored
   Lazy(pipeline::Node node, std::vector<LazyPtr> inputs, std::map<std::string, LazyPtr> named);
   /// Wraps a value that was computed elsewhere.
   explicit Lazy(pipeline::Value value);
@@ -34,7 +34,9 @@ class Lazy {
   [[nodiscard]] bool isSettled() const { return isSettled_; }
   void setName(std::string name) { node_.name = std::move(name); }
 
+  /// Stores the computed value, and releases the inputs.
   void settle(std::optional<pipeline::Value> value);
+  /// Counts the Python objects that refer to this node, with release().
   void hold() { ++holders_; }
   void release() {
     --holders_;
@@ -44,6 +46,7 @@ class Lazy {
  private:
   friend class Request;
 
+  /// Releases the value if no Python object and no unsettled node can request it.
   void letGo();
   void leaveInputs();
   /// Moves all inputs into `all`.
@@ -54,32 +57,33 @@ class Lazy {
   std::map<std::string, LazyPtr> named_;
   std::optional<pipeline::Value> value_;
   bool isSettled_ = false;
-  std::size_t holders_ = 0;  ///< number of Python objects
+  std::size_t holders_ = 0;  ///< number of Python objects that refer to this node
   std::size_t waiting_ = 0;  ///< number of uses as input of unsettled nodes
 };
 
-/// The graph to compute some values, down to known values.
+/// The graph that computes some lazy values. It begins at values that are already computed.
 class Request {
  public:
   enum class Depth {
-    Unknown,  ///< stops at known values
-    Whole     ///< complete graph, for files
+    Unknown,  ///< begins at computed values
+    Whole     ///< complete graph, for graph files
   };
   explicit Request(const std::vector<LazyPtr>& results, Depth depth = Depth::Unknown);
 
   [[nodiscard]] const pipeline::Graph& graph() const { return graph_; }
-  /// Values for the runner. Needs no lock.
+  /// Receives the value of a node from the runner. Needs no interpreter lock.
   void keep(std::size_t node, const pipeline::Value& value);
-  /// Stores the computed values in the nodes. @param isDone  the run was complete
+  /// Stores the received values in the lazy values.
+  /// @param isDone  the run was complete
   void settle(bool isDone);
 
  private:
   void add(Lazy& lazy, Depth depth);
 
   pipeline::Graph graph_;
-  std::vector<LazyPtr> nodes_;
-  std::map<const Lazy*, std::size_t> numbers_;
-  std::vector<char> isKept_;  ///< by node: its value may be requested after the run
+  std::vector<LazyPtr> nodes_;                  ///< lazy values of the nodes of `graph_`
+  std::map<const Lazy*, std::size_t> numbers_;  ///< indices of the nodes of `graph_`
+  std::vector<char> isKept_;  ///< for each node: its value may be requested after the run
   std::vector<std::optional<pipeline::Value>> values_;
 };
 

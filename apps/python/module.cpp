@@ -89,8 +89,8 @@ const char* hintOf(ParamType type) {
   return "";
 }
 
-/// Kinds of results of an operator for one kind of first operand, found by trying each option
-/// alone.
+/// Finds the kinds of results that an operator can have, by trying each option alone.
+/// @param first  kind of the first operand; null: the first kind that the operator accepts
 std::set<Kind> resultKinds(const Operator& op, const Kind* first) {
   if (!op.resultKind) return {Kind::Band};
   std::set<Kind> kinds;
@@ -101,7 +101,7 @@ std::set<Kind> resultKinds(const Operator& op, const Kind* first) {
           pipeline::Plan{.kind = i == 0 && first ? *first : op.operands[i][0]});
     try {
       kinds.insert(op.resultKind(invocation));
-    } catch (const levelset::Error&) {  // requires several options
+    } catch (const levelset::Error&) {  // the option is not valid alone
     }
   };
   probe({});
@@ -112,8 +112,8 @@ std::set<Kind> resultKinds(const Operator& op, const Kind* first) {
   return kinds;
 }
 
-/// Classes of results by class of the first operand ("" without operands); None if the operator has
-/// no result.
+/// Lists the Python classes of results for each class of the first operand ("" without operands).
+/// Returns None if the operator has no result.
 py::object resultClasses(const Operator& op) {
   if (op.flow != pipeline::Flow::Makes) return py::none();
   py::dict result;
@@ -168,7 +168,7 @@ py::list describeOperators() {
   return all;
 }
 
-/// The exception classes, by exit code.
+/// The Python exception classes, one for each exit code.
 class Exceptions {
  public:
   explicit Exceptions(py::module_& module) {
@@ -230,7 +230,7 @@ std::vector<LazyPtr> lazies(const py::iterable& nodes) {
   return list;
 }
 
-/// Value of a computed node.
+/// Returns the value of a computed node.
 const pipeline::Value& valueOf(const Handle& node) {
   if (node.lazy()->value()) return *node.lazy()->value();
   throw levelset::UsageError("levelsmith: the value is not yet computed; call compute()");
@@ -267,7 +267,7 @@ py::tuple makeJob(const std::string& text, const std::string& name, const Texts&
   return py::make_tuple(job.graph, job.places, job.globals);
 }
 
-/// Runs a job. Returns as compute().
+/// Runs a job. Returns the same tuple as compute().
 py::tuple runJob(const std::string& graph, const std::vector<std::string>& places,
                  const Texts& globals, const std::string& cache) {
   const pipeline::Graph whole = python::graphOf({graph, places, globals});
@@ -300,8 +300,8 @@ std::string graphText(const py::iterable& nodes) {
   for (const pipeline::Node& node : request.graph().nodes)
     if (node.op == &pipeline::givenOperator())
       throw levelset::UsageError(
-          "graph: its first value comes from an array, which a graph cannot store; save that value "
-          "to a file and read it");
+          "graph: a value was built from arrays, which a graph cannot store; save that value to a "
+          "file and read the file");
   return graphJson(request.graph());
 }
 

@@ -34,7 +34,7 @@ LazyPtr lazyOf(py::handle object) {
   return py::isinstance<Handle>(held) ? held.cast<const Handle&>().lazy() : nullptr;
 }
 
-/// Text of a number as in a chain; empty if the object is not a number.
+/// Text of a number as on the command line; empty if the object is not a number.
 std::optional<std::string> numberText(py::handle value) {
   PyObject* object = value.ptr();
   if (PyBool_Check(object)) return std::nullopt;
@@ -57,8 +57,8 @@ std::optional<std::string> numberText(py::handle value) {
 
 [[noreturn]] void refuse(py::handle value, const std::string& where) {
   const std::string type = py::str(py::type::of(value).attr("__name__"));
-  throw UsageError(
-      fmt::format("{}: a value of type {} is not supported here; see the help", where, type));
+  throw UsageError(fmt::format(
+      "{}: a value of type {} is not supported here; see the help of the function", where, type));
 }
 
 /// Text of rows of numbers or lengths, with `inner` between columns and `outer` between rows.
@@ -87,7 +87,7 @@ bool ofWords(py::handle sequence) {
   return false;
 }
 
-/// Text of a parameter's value as in a chain.
+/// Text of a parameter's value as on the command line.
 std::string textOf(const Param& param, py::handle value, const std::string& where) {
   if (PyUnicode_Check(value.ptr())) return value.cast<std::string>();
   if (param.type == ParamType::Path) {
@@ -140,12 +140,12 @@ const Param& paramNamed(const Operator& op, const ParamsByName& params, const st
   std::vector<std::string> names;
   for (const Param& param : op.params) names.push_back(pythonName(param.name));
   const std::string guess = pipeline::didYouMean(name, names);
-  throw UsageError(fmt::format(
-      "{}: there is no option {}{}", op.name, name,
-      guess.empty() ? "; its help lists the options" : fmt::format("; did you mean {}?", guess)));
+  throw UsageError(fmt::format("{}: there is no option {}{}", op.name, name,
+                               guess.empty() ? "; the help of the function lists the options"
+                                             : fmt::format("; did you mean {}?", guess)));
 }
 
-/// Collects the arguments of a call.
+/// Collects the arguments of a call of an operator.
 class Call {
  public:
   explicit Call(std::size_t action)
@@ -202,13 +202,14 @@ class Call {
     }
     std::string text = textOf(param, value, where);
     if (pipeline::namesValue(param, text))
-      throw UsageError(
-          fmt::format("{}: '{}' is a reference of a chain; give the value itself", where, text));
+      throw UsageError(fmt::format(
+          "{}: '{}' refers to a value by name, as on the command line; pass the value itself",
+          where, text));
     pipeline::checkText(param, text, where);
     node_.options[param.name] = std::move(text);
   }
 
-  /// Checks this node and its inputs by the rules of a graph.
+  /// Checks this node and its inputs with checkNode().
   void check() {
     std::vector<Node> before;
     const auto addBefore = [&](const Lazy& lazy, std::string name) {

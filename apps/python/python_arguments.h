@@ -22,12 +22,12 @@ class Handle {
   LazyPtr lazy_;
 };
 
-/// Name of a parameter in Python: half_width, from_.
+/// Name of a parameter in Python: half_width for half-width, from_ for from.
 [[nodiscard]] std::string pythonName(const std::string& param);
 
 /// Builds the node of an operator call. Arguments are checked like those of a chain: first
-/// operands, then parameters with a position, then parameters by name. Nothing runs.
-/// @param action  number in the registry
+/// operands, then parameters with a position, then parameters by name. No operator runs.
+/// @param action  index in pipeline::operators()
 /// @throws levelset::UsageError for invalid arguments
 [[nodiscard]] LazyPtr makeNode(std::size_t action, const pybind11::args& args,
                                const pybind11::kwargs& kwargs);

@@ -138,7 +138,7 @@ def test_functions_return_transferable_results(ls):
     assert balls[1].measure()["volume"] == pytest.approx(8 * balls[0].measure()["volume"], rel=1e-2)
     (result,) = ls.map(make, [{"radius": 1, "deep": True}])
     assert result["more"][0].is_computed and result["more"][1] > 4
-    with pytest.raises(ls.UsageError, match="returns a Scene, which cannot leave"):
+    with pytest.raises(ls.UsageError, match="returns a Scene, which cannot be sent"):
         ls.map(lambda: ls.scene(ls.sphere(radius=1, voxel=0.1)), [{}])
 
 

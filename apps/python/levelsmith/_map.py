@@ -12,7 +12,8 @@ import numpy
 
 from . import _core, _values
 
-# Global options of a pipeline that jobs use, and those that only concern output for the user.
+# Global options of a pipeline that apply to its jobs, and those that jobs ignore because they do not
+# change results. All other global options are refused.
 FOLLOWED = {"cache", "report", "max-memory", "verbose"}
 IGNORED = {"quiet", "progress", "threads"}
 
@@ -21,12 +22,13 @@ def map(graph, parameters, client=None, *, cache=None):
     """Run a graph once for each set of parameters. Returns the results, in their order.
 
     graph: a pipeline with ${variables}, as a text of several lines or as a file (.pipeline, or a
-        graph as .json with variables in its options). Or a function of the parameters that returns
-        values, or other objects that can be pickled, also in lists, tuples and dictionaries.
+        graph as .json with variables in its options). Or a function that is called with the
+        parameters and returns values, or other objects that can be pickled, also in lists, tuples
+        and dictionaries.
     parameters: dictionaries; keys are variables of the pipeline, or arguments of the function.
-    client: a dask.distributed.Client whose workers run the jobs; None: this process, one by one.
+    client: a dask.distributed.Client whose workers run the jobs; None: this process runs them one by one.
         If a worker dies, another one runs its job again.
-    cache: cache folder of all jobs; None: that of set_cache().
+    cache: cache folder of all jobs; None: the folder of set_cache().
 
     The result of a pipeline is its report, with the printed text under "printed". File names are
     relative to the caller's folder. All pipelines are checked before the first one runs. Errors are
@@ -80,7 +82,7 @@ def _named(error, about):
 
 
 class _Function:
-    """A function call with its parameters."""
+    """A job that calls a function with its parameters."""
 
     def __init__(self, function, parameters):
         self.function, self.parameters = function, parameters
@@ -92,7 +94,7 @@ class _Function:
             kind = type(value).__name__
             if kind not in ("Solid", "Mesh", "Field"):
                 raise _core.UsageError(
-                    f"map: the function returns a {kind}, which cannot leave its process; return values computed from it"
+                    f"map: the function returns a {kind}, which cannot be sent to another process; return values computed from it"
                 )
         if values:
             _values.run([value._node for value in values])
@@ -117,7 +119,7 @@ def _functions(function, sets):
 
 
 class _Pipeline:
-    """A pipeline with values for its variables: a checked graph with absolute file names."""
+    """A job that runs a pipeline: a checked graph with absolute file names and values of its variables."""
 
     def __init__(self, text, name, settings, folder):
         if name.lower().endswith(".json"):
@@ -167,7 +169,7 @@ def _pipelines(graph, sets):
 
 
 def _text(value, where):
-    """Text of a value in a pipeline."""
+    """Text that replaces a variable of a pipeline, for a Python value."""
     if isinstance(value, (str, os.PathLike)):
         return os.fspath(value)
     if isinstance(value, numpy.ndarray) and value.ndim == 0:
@@ -186,12 +188,12 @@ def _text(value, where):
 
 
 def _filled(text, name, settings):
-    """Replaces the variables in the options of a graph."""
+    """Replaces the variables in the options of a graph. text: the graph as JSON."""
     try:
         graph = json.loads(text)
         options = [node["options"] for node in graph["nodes"] if "options" in node]
     except (ValueError, TypeError, KeyError):
-        return text  # the reader of graphs reports the error
+        return text  # not a graph: _core.job() reports the error
     found = set()
 
     def value_of(match):
@@ -213,7 +215,7 @@ def _filled(text, name, settings):
 
 
 def _run(job, folder):
-    """Returns (result, warnings, exception or None)."""
+    """Runs a job in this process. Returns (result, warnings, exception or None)."""
     with _values.Job(folder) as context:
         try:
             return job.run(context), context.messages, None
@@ -237,13 +239,13 @@ def _on_worker(job, folder, processes):
         _values.share_machine(processes[host], _memory_of(worker))
     result, messages, error = _run(job, folder)
     if error is not None:
-        error._messages = messages  # sent with the exception
+        error._messages = messages  # Dask sends the warnings with the exception
         raise error
     return result, messages
 
 
 def _memory_of(worker):
-    """Memory use, in bytes, at which Dask pauses the worker."""
+    """Memory use, in bytes, at which Dask pauses the worker; 0: no limit is known."""
     limit = getattr(getattr(worker, "memory_manager", None), "memory_limit", None)
     return int(0.8 * limit) if limit else 0
 

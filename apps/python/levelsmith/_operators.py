@@ -31,12 +31,12 @@ def default_of(param):
 
 
 def hidden(param):
-    """True for --json: measured values are always returned as a dictionary."""
+    """Returns True for the option --json, because functions always return measured values as a dictionary."""
     return param["name"] == "json"
 
 
 def operand_names(operator):
-    """Names of the operands: solid, mesh, patch, …; numbered where a kind occurs twice."""
+    """Names of the operands: solid, mesh, patch, …; with a number if a kind occurs more than once."""
     kinds = [kinds[0].lower() for kinds in operator["operands"]]
     count = {kind: kinds.count(kind) for kind in kinds}
     return [
@@ -77,7 +77,7 @@ FORMS = {
     "Text": "text",
     "Length": "length",
     "Lengths": "lengths",
-    "Numbers": "number, or three",
+    "Numbers": "number, or three numbers",
     "Point": "three numbers",
     "Points": "points",
     "Box": "two points",
@@ -149,7 +149,7 @@ def make(number, operator):
 
 
 def install(package):
-    """Adds the functions to the package, and methods to the classes of first operands."""
+    """Adds the functions to the package, and as methods to the classes of their first operands."""
     for number, operator in enumerate(registry):
         name, call = python_name(operator), make(number, operator)
         package[name] = _values.operators[name] = call

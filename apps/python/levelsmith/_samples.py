@@ -4,7 +4,7 @@ import numpy
 
 from . import _core, _operators, _values
 
-SIDE = 8  # grid points of a block along an axis, as in the tree
+SIDE = 8  # grid points of a block along an axis, as in a leaf of OpenVDB
 HALF = SIDE // 2
 
 
@@ -43,7 +43,8 @@ def _solid(origin, voxel, blocks, values, inside, half_width, action):
 
 
 def _mixed(signs, axes):
-    """Blocks in which the sign changes, or between which and a neighbour it changes."""
+    """Flags the blocks in which the sign changes, and both blocks of a pair of neighbours between which
+    it changes. axes: axes of `signs` that run over the grid points of a block."""
     low, high = signs.min(axis=axes), signs.max(axis=axes)
     mixed = low != high
     for axis in range(3):
@@ -55,7 +56,7 @@ def _mixed(signs, axes):
 
 
 def _dilated(mask):
-    """Adds the neighbours of blocks, over faces, edges and corners."""
+    """Adds to a mask of blocks their neighbours across faces, edges and corners."""
     for axis in range(3):
         near = mask.copy()
         a, b = _sides(axis)
@@ -100,10 +101,10 @@ def from_array(phi, voxel, origin=(0, 0, 0), half_width=3):
 
 
 def _padded(phi):
-    """Pads to complete blocks, and further where the surface is near the border.
+    """Pads an array to complete blocks, and by half a block where the solid is that close to the border.
 
-    Returns the padded array and the number of points added in front, by axis. The padding
-    continues the slope at the border, but does not decrease.
+    Returns the padded array and the number of points added at the start of each axis. The padded
+    values continue the slope at the border, but are not below the value at the border.
     """
     def room(axis, layers):
         return HALF if (phi.take(layers, axis, mode="clip") < 0).any() else 0
@@ -117,13 +118,13 @@ def _padded(phi):
 class _Sampler:
     """Evaluates a function at grid points, in calls of bounded size."""
 
-    CALL = 1 << 18
+    CALL = 1 << 18  # largest number of points in one call
 
     def __init__(self, function, origin, voxel):
         self.function, self.origin, self.voxel = function, origin, voxel
 
     def at(self, index):
-        """Values at grid points. index: (n, 3) integers."""
+        """Values of the function at grid points. index: (n, 3) grid indices."""
         values = numpy.empty(len(index), numpy.float64)
         for start in range(0, len(index), self.CALL):
             part = index[start : start + self.CALL]
@@ -153,7 +154,7 @@ def from_function(f, bounds, voxel, half_width=3):
     f takes an (n, 3) array of world points and returns (n,) numbers. bounds are two points; the box
     between them contains the entire solid. f is evaluated at every fourth grid point. It is evaluated
     at all grid points of a block where its sign changes, or where its slope suggests a sign change,
-    and then along the surface. A part of the solid is missed only if it lies between the coarse
+    and of the neighbouring blocks into which the surface continues. A part of the solid is missed only if it lies between the coarse
     points and the values and slopes there do not indicate it.
     """
     action = "from_function"
@@ -182,12 +183,16 @@ def from_function(f, bounds, voxel, half_width=3):
     return _solid(low, voxel, index, samples / scale, inside, half_width, action)
 
 
+# Index offsets of the grid points of a block from its first one.
 OFFSETS = numpy.indices((SIDE, SIDE, SIDE)).reshape(3, -1).T
-MOST_COARSE = 2**27
+MOST_COARSE = 2**27  # largest number of grid points in the coarse evaluation
 
 
 def _coarse(sampler, count):
-    """Blocks that may contain a surface, and blocks that lie inside, by every fourth grid point."""
+    """Flags the blocks that may contain a surface, and the blocks that lie inside the solid.
+
+    Evaluates the function at every fourth grid point. count: number of blocks along each axis.
+    """
     shape = 2 * count + 1
     values = sampler.at(HALF * numpy.indices(shape).reshape(3, -1).T).reshape(shape)
     slopes = numpy.zeros_like(values)
@@ -205,22 +210,23 @@ def _coarse(sampler, count):
         numpy.minimum(nearest, numpy.abs(values[part]), out=nearest)
         numpy.maximum(slope, slopes[part], out=slope)
         inside += values[part] < 0
-    # The distance to the nearest coarse point is at most 0.87 times their spacing.
+    # `slope` is the change of the function over one spacing of the coarse points. Any position is
+    # at most 0.87 spacings from the nearest coarse point; 1.2 adds a margin.
     requested = (nearest <= 1.2 * slope) | ((inside > 0) & (inside < 27))
     return requested, inside == 27
 
 
 def _sides(axis):
-    """Slices of the items before and after each step along an axis."""
+    """Indices of all items but the last along an axis, and of all items but the first."""
     before, behind = [slice(None)] * 3, [slice(None)] * 3
     before[axis], behind[axis] = slice(None, -1), slice(1, None)
     return tuple(before), tuple(behind)
 
 
 class _Blocks:
-    """Blocks with samples. Finds the neighbours that need samples, too."""
+    """Blocks with samples. Finds the neighbouring blocks that need samples too."""
 
-    REACH = 3  # grid points that an interpolant reads beyond the surface
+    REACH = 3  # number of grid points beyond the surface that interpolation reads
 
     def __init__(self, count, is_inside):
         self.count, self.is_inside = count, is_inside
@@ -229,7 +235,7 @@ class _Blocks:
         self.signs = numpy.zeros((0, SIDE, SIDE, SIDE), bool)
 
     def add(self, index, samples):
-        """Adds samples. Returns the blocks that need samples next."""
+        """Adds the samples of some blocks. Returns a mask of the blocks that need samples next."""
         self.number[tuple(index.T)] = len(self.signs) + numpy.arange(len(index))
         self.index.append(index)
         self.samples.append(samples)
@@ -253,7 +259,7 @@ class _Blocks:
         requested[tuple(index.T)] = True
 
     def _request_across(self, index, signs, axis, step, requested):
-        """Requests all blocks around a face of blocks across which the sign changes."""
+        """Requests the blocks around each block that has a sign change across its face in direction `step`."""
         other = index + step
         known = ((other >= 0) & (other < self.count)).all(axis=1)
         index, signs, other = index[known], signs[known], other[known]

@@ -13,24 +13,24 @@ import numpy
 from . import _core
 
 _log = logging.getLogger("levelsmith")
-_local = threading.local()  # per thread: the report of its last run, and its job
-_limits = {"cache": "", "threads": None, "memory": None}  # as set by the user
-_share = None  # as set by share_machine
-operators = {}  # functions by name, see _operators.install
+_local = threading.local()  # per thread: report of its last run, and its job of map()
+_limits = {"cache": "", "threads": None, "memory": None}  # as the user set them
+_share = None  # arguments of the last call of share_machine()
+operators = {}  # functions of the operators, by name; filled by _operators.install()
 
 
 class Warning(UserWarning):
-    """A warning about a result."""
+    """A warning of a run about a result."""
 
 
 def run(nodes, progress=None, level=3):
-    """Compute nodes. Returns the printed text. Warnings are attributed to the caller `level` frames up."""
+    """Compute nodes. Returns the text that the actions print. Warnings name the caller `level` frames up."""
     job = getattr(_local, "job", None)
     return settle(_core.compute(nodes, progress, cache_folder(), job is not None), level + 1)
 
 
 def settle(outcome, level=3):
-    """Emits the notes and warnings of a run. Returns the printed text, or raises the error of the run."""
+    """Emits the notes and warnings of a run. Returns the text that its actions printed, or raises its error."""
     report, printed, messages, notes, failure = outcome
     _local.report = report
     for text in notes:
@@ -70,7 +70,9 @@ def compute(*values, progress=None):
     """
     for value in values:
         if not isinstance(value, Value):
-            raise _core.UsageError(f"compute: {type(value).__name__} is not a value of levelsmith")
+            raise _core.UsageError(
+                f"compute: {type(value).__name__} is not a value of levelsmith; give a Solid, a Mesh or another Value"
+            )
     run([value._node for value in values], progress)
     return last_report()
 
@@ -81,7 +83,7 @@ def last_report():
 
 
 def graph(*values):
-    """Graph of values, as text. `levelsmith run g.json` computes it again."""
+    """Graph of values, as JSON text. Saved as g.json, `levelsmith run g.json` computes it again."""
     return _core.graph([value._node for value in values])
 
 
@@ -92,15 +94,16 @@ def set_threads(count=0):
 
 
 def set_max_memory(size=""):
-    """Set the memory limit, for example "4G"; "": 80 % of the free memory. Larger runs are refused."""
+    """Set the memory limit, for example "4G"; "": 80 % of the free memory. Runs that need more fail."""
     _core.set_max_memory(str(size))
     _limits["memory"] = size
 
 
 def set_cache(folder=""):
-    """Set the folder in which results are kept and from which known results are read; "": no cache.
+    """Set the folder in which results are stored and from which they are read again; "": no cache.
 
-    The same as `--cache` of the command line, and compatible with it. `cache` lists the contents.
+    The option `--cache` of the command line can use the same folder. The function `cache` lists its
+    contents.
     """
     _limits["cache"] = os.path.abspath(folder) if folder else ""
 
@@ -112,7 +115,10 @@ def cache_folder():
 
 
 def share_machine(processes, memory):
-    """Set limits for one of several processes, unless the user has set them. memory: bytes, or 0."""
+    """Set limits for one of several processes on a machine, unless the user has set them.
+
+    processes: number of these processes. memory: limit of this process, bytes; 0: none.
+    """
     global _share
     if _share == (processes, memory):
         return
@@ -137,7 +143,7 @@ def unwrap(kind, content, name):
 
 
 class Value:
-    """An immutable lazy value. It is computed when needed, and then kept."""
+    """An immutable lazy value. It is computed when a result needs it, and then kept."""
 
     __slots__ = ("_node", "__weakref__")
     _node: _core.Node
