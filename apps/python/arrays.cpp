@@ -30,11 +30,11 @@ void requireRows(const py::array& array, const char* name, const char* kinds,
                  const char* expected) {
   const bool isKind = std::strchr(kinds, array.dtype().kind()) != nullptr;
   if (isKind && array.ndim() == 2 && array.shape(1) == 3) return;
-  throw InvalidInput(fmt::format("Mesh: {} is an array {}; give one of shape (n, 3) of {}", name,
+  throw InvalidInput(fmt::format("Mesh: the array {} has shape {}; give shape (n, 3) of {}", name,
                                  shapeText(array), expected));
 }
 
-/// Read-only view of rows of numbers.
+/// Read-only numpy view of rows of numbers. The view keeps `owner` alive, which holds the rows.
 template <typename Row, typename T, std::size_t columns>
 py::object rowsView(const py::object& owner, const std::vector<Row>& rows) {
   static_assert(sizeof(Row) == columns * sizeof(T));
@@ -67,8 +67,9 @@ TriMesh meshFromArrays(const py::array& vertices, const py::array& faces) {
   for (py::ssize_t i = 0; i < corners.shape(0); ++i, c += 3) {
     for (int k = 0; k < 3; ++k)
       if (c[k] < 0 || c[k] >= count || c[k] > std::int64_t{0xffffffff})
-        throw InvalidInput(fmt::format(
-            "Mesh: face {} uses vertex {}, but there are only {} vertices", i, c[k], count));
+        throw InvalidInput(
+            fmt::format("Mesh: face {} uses vertex {}, but there are {} vertices, numbered from 0",
+                        i, c[k], count));
     mesh.triangles.push_back({static_cast<std::uint32_t>(c[0]), static_cast<std::uint32_t>(c[1]),
                               static_cast<std::uint32_t>(c[2])});
   }
@@ -97,8 +98,8 @@ DenseBand bandArray(const levelset::NarrowBand& band, const std::optional<Imath:
   for (int i = 0; i < 3; ++i)
     if (std::abs(matrix[i][i] - voxel) > 1e-6 * voxel)
       throw InvalidInput(
-          "array: the grid is rotated against the axes; use 'resample' or 'transform' with bake "
-          "first");
+          "array: the grid is rotated against the axes; call resample(), or transform() with "
+          "bake=True, first");
   openvdb::CoordBBox range = grid.evalActiveVoxelBoundingBox();
   if (box) {
     const openvdb::Vec3d low = grid.worldToIndex(levelset::toVdb(box->min)),
@@ -128,7 +129,7 @@ levelset::NarrowBand bandOfSamples(const V3d& origin, double voxel,
   using Leaf = openvdb::FloatTree::LeafNodeType;
   auto transform = levelset::uniformTransform(voxel);
   transform->postTranslate(levelset::toVdb(origin));
-  // Larger than all samples, so that the background adds no surface.
+  // The background is larger than all samples, so that it adds no surface beside the blocks.
   auto largest = static_cast<float>(voxel);
   for (py::ssize_t i = 0; i < values.size(); ++i)
     largest = std::max(largest, std::abs(values.data()[i]));

@@ -108,7 +108,7 @@ void checkRange(const Param& param, double number, const std::string& text,
 }
 
 void checkField(const Param& param, const std::string& text, const std::string& where) {
-  if (text == "@") throw UsageError(fmt::format("{}: '@' needs a name behind it", where));
+  if (text == "@") throw UsageError(fmt::format("{}: a name must follow '@'", where));
   if (namesValue(param, text)) return;
   const auto& known = param.choices;
   if (std::find(known.begin(), known.end(), text) != known.end()) return;
@@ -139,10 +139,10 @@ void checkText(const Param& param, const std::string& text, const std::string& w
       if (param.allowsAuto && text == "auto") return;
       const Length length = parseLength(text, where);
       if (length.unit == Unit::Voxels && !param.allowsVoxels && param.name != "voxel") {
-        throw UsageError(
-            fmt::format("{}: cannot be given in voxels, whose size follows from it; write it in "
-                        "world units, or as a share of the diagonal, 0.2%",
-                        where));
+        throw UsageError(fmt::format(
+            "{}: the length determines the voxel size, so it cannot be given in voxels; "
+            "write it in world units, or as a share of the diagonal, 0.2%",
+            where));
       }
       if (length.unit == Unit::Voxels && !param.allowsVoxels) {
         throw UsageError(
@@ -177,7 +177,7 @@ void checkText(const Param& param, const std::string& text, const std::string& w
       return;
     case ParamType::Text:
     case ParamType::Path:
-      if (text.empty()) throw UsageError(fmt::format("{}: is empty", where));
+      if (text.empty()) throw UsageError(fmt::format("{}: the value is empty; give one", where));
       return;
     case ParamType::ImageSize:
       return void(parseImageSize(text, where));
@@ -232,13 +232,14 @@ const Operator& runOperator() {
       .group = "Chains in files",
       .summary = "run a file: a chain, one action a line, or a graph (.json)",
       .details =
-          "No '!' between actions; # begins a comment; quotes and backslashes as in a "
-          "shell. Lines of options before the first action are global options; those of the "
-          "command line win. ${NAME} is a variable: a line `set NAME VALUE` gives its default, "
-          "--set another value; ${NAME:stem}, :name and :dir are parts of a file's name. Actions "
-          "between `repeat COUNT` (it counts ${i} from 0) or `for NAME in LIST` and `end` are "
-          "repeated; a LIST is words, 0..10, 0..1 step 0.25, or *.ply. A .json is a graph that "
-          "--save-graph wrote. No action stands behind the file.",
+          "The file has one action on each line, without '!'. # begins a comment; quotes and "
+          "backslashes work as in a shell. Lines of options before the first action are global "
+          "options; options of the command line override them. ${NAME} is a variable: a line `set "
+          "NAME VALUE` gives its default, --set gives another value; ${NAME:stem}, ${NAME:name} "
+          "and ${NAME:dir} are parts of a file name. Actions between `repeat COUNT` (which counts "
+          "${i} from 0) or `for NAME in LIST` and `end` are repeated; a LIST is words, 0..10, 0..1 "
+          "step 0.25, or *.ply. A .json file is a graph that --save-graph wrote. No action may "
+          "follow the file.",
       .example = "levelsmith --threads 2 run holes.pipeline --set voxel=0.3",
       .params = {{.name = "file",
                   .type = ParamType::Path,
@@ -247,7 +248,7 @@ const Operator& runOperator() {
                   .position = 0},
                  {.name = "set",
                   .type = ParamType::Text,
-                  .doc = "NAME=VALUE of a variable of the file; may be repeated"}},
+                  .doc = "value of a variable of the file, as NAME=VALUE; may be repeated"}},
       .flow = Flow::PassesThrough};
   return op;
 }
@@ -256,45 +257,46 @@ const std::vector<Param>& globalParams() {
   static const std::vector<Param> params = {
       {.name = "threads",
        .type = ParamType::Integer,
-       .doc = "threads to use; results do not depend on it",
+       .doc = "number of threads; results do not depend on it",
        .range = Range::Positive},
       {.name = "max-memory",
        .type = ParamType::Bytes,
-       .doc = "memory limit, e.g. 4G: an action that needs more is an error; default: 80 % of the "
-              "free memory"},
+       .doc = "memory limit, e.g. 4G; an action that needs more fails; default: 80 % of the free "
+              "memory"},
       {.name = "tolerance",
        .type = ParamType::Length,
-       .doc = "largest error of the result; voxel sizes that are not given follow from it",
+       .doc =
+           "largest accepted error of the results; determines the voxel sizes that are not given",
        .range = Range::Positive,
        .allowsVoxels = false},
-      {.name = "quiet", .type = ParamType::Flag, .doc = "errors only"},
+      {.name = "quiet", .type = ParamType::Flag, .doc = "print errors only"},
       {.name = "verbose",
        .type = ParamType::Flag,
-       .doc = "time, memory and voxels of each step (also -v)"},
+       .doc = "print time, memory and voxels of each step (also -v)"},
       {.name = "report",
        .type = ParamType::Path,
-       .doc = "write the result and the cost of each step: as .json, or as a page with pictures "
-              "(.html)"},
+       .doc = "file for the result and the cost of each step: .json, or .html for a page with "
+              "pictures"},
       {.name = "save-graph",
        .type = ParamType::Path,
-       .doc = "write the graph as a .json for `run`; with --dry-run nothing else is done"},
+       .doc = "file for the graph, a .json that `run` reads; with --dry-run nothing else is done"},
       {.name = "no-roi",
        .type = ParamType::Flag,
        .doc = "compute every value completely, also where a part of it suffices",
        .formerName = "whole"},
       {.name = "cache",
        .type = ParamType::Path,
-       .doc = "folder that keeps results; known results are not computed again"},
+       .doc = "folder that stores results; a stored result is not computed again"},
       {.name = "progress",
        .type = ParamType::Choice,
-       .doc = "bars on a terminal, lines of JSON, or nothing",
+       .doc = "progress display: auto (bars on a terminal), json (lines of JSON) or off",
        .fallback = "auto",
        .choices = {"auto", "json", "off"}},
       {.name = "no-clobber", .type = ParamType::Flag, .doc = "never overwrite a file"},
       {.name = "explain",
        .type = ParamType::Flag,
-       .doc = "list the actions that would run or be left out, with the reason, the needed part of "
-              "each value, and its cost; computes and writes nothing"},
+       .doc = "list the actions that would run or be left out, with the reason, the region of "
+              "interest of each value, and the estimated cost; computes and writes nothing"},
       {.name = "dry-run",
        .type = ParamType::Flag,
        .doc = "resolve every parameter and estimate the cost; computes and writes nothing"},

@@ -11,7 +11,8 @@
 namespace pipeline {
 namespace {
 
-/// Decides if the input causes a failure, as opposed to memory or a cancellation.
+/// Decides if a failure is caused by the input, as opposed to a memory limit, a cancellation or an
+/// unknown exception.
 bool isInputError(const std::exception_ptr& failure) {
   try {
     std::rethrow_exception(failure);
@@ -46,7 +47,9 @@ void GraphRun::compute(std::size_t i) {
   const Node& node = graph_.nodes[i];
   const bool isPlanned =
       states_[i] == NodeState::Compute;  // the uses of its operands are already counted
-  states_[i] = NodeState::UpToDate;      // a later request for a released value loads it
+  // If the value is requested again after its release, it is loaded from the cache or computed
+  // again.
+  states_[i] = NodeState::UpToDate;
   if (!isPlanned) {
     for (const std::size_t input : node.inputs) values_.addUse(input);
     for (const auto& [option, input] : node.named) values_.addUse(input);

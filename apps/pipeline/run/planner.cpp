@@ -36,14 +36,14 @@ std::string reasonFor(const Graph& graph, std::size_t index, const std::vector<c
     return text;
   };
   if (!files.empty()) return "writes " + joined(files);
-  if (!takers.empty()) return "for " + joined(takers);
+  if (!takers.empty()) return "needed by " + joined(takers);
   return node.makes() ? "ends the chain" : "requested";
 }
 
 std::string roiText(const RegionOfInterest& roi, const Plan& plan) {
   std::string text;
   if (roi.halfWidth < plan.halfWidth)
-    text += fmt::format("; {:.3g} of {:.3g} voxels of its band", roi.halfWidth, plan.halfWidth);
+    text += fmt::format("; half width {:.3g} of {:.3g} voxels", roi.halfWidth, plan.halfWidth);
   if (!levelset::isEverywhere(roi.region)) {
     const Imath::Box3d& box = roi.region;
     text += fmt::format("; only {:.4g},{:.4g},{:.4g} to {:.4g},{:.4g},{:.4g}", box.min.x, box.min.y,
@@ -153,7 +153,8 @@ ValuePlans planValues(const Graph& graph, const std::vector<char>& runs, std::si
       continue;
     }
     Invocation invocation(*node.op, node.options);
-    // To plan a scene or a patch from a file means to read it, which costs as much as to run.
+    // Planning a scene or a patch from a file means reading the file, which costs as much as
+    // running the node.
     const bool isHeavy =
         node.inputs.empty() && (node.kind == Kind::Patch || node.kind == Kind::Scene);
     bool isKnown = (node.op->plan || !node.inputs.empty()) && !isHeavy && !readsOnce(node);
@@ -167,8 +168,8 @@ ValuePlans planValues(const Graph& graph, const std::vector<char>& runs, std::si
     }
     for (const auto& [option, input] : node.named) invocation.named.emplace(option, know(input));
     if (!isKnown) continue;
-    // This plans complete values, which need not fit into memory: checkMemoryFor() checks the
-    // regions of interest.
+    // These plans are of complete values, which need not fit into memory. checkMemoryFor() checks
+    // the regions of interest.
     const bool isRead =
         std::any_of(node.op->params.begin(), node.op->params.end(), [&](const Param& param) {
           return param.type == ParamType::Path && node.options.contains(param.name);
@@ -220,7 +221,7 @@ void explain(const Graph& graph, std::size_t maxMemory, bool fullValues,
   if (!fullValues) regions = regionsOfInterest(graph, runs, plans);
   std::string text;
   double seconds = 0;
-  std::vector<double> worked(graph.nodes.size(), 0);  // bytes, by node
+  std::vector<double> worked(graph.nodes.size(), 0);  // working memory of each node, bytes
   std::vector<std::string> untimed;
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     const Node& node = graph.nodes[i];

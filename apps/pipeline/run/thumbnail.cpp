@@ -24,7 +24,7 @@ std::size_t memoryLeft(std::size_t maxMemory) {
   return limit - std::min(limit, static_cast<std::size_t>(held));
 }
 
-/// Memory of Embree's tree over a mesh, with its copies of vertices and faces, for each triangle.
+/// Memory of Embree's tree over a mesh, with its copies of vertices and faces, bytes per triangle.
 constexpr double kBytesOfTriangle = 250;
 
 std::string drawn(const Value& value, std::size_t maxBytes) {
