@@ -22,7 +22,7 @@ struct LevelSurface {
       0;  ///< width of the flat faces beside sharp edges of the source meshes, world units
 };
 
-/// A message of a run, held back until the run is known to be the best one.
+/// A message of a run, kept until the search has chosen the best run.
 struct Message {
   enum class Kind { Print, Warn, Note } kind = Kind::Note;
   std::string text;

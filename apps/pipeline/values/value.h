@@ -94,8 +94,8 @@ class Value {
   explicit Value(Plan plan);
 
   [[nodiscard]] Kind kind() const;
-  // These return the value as the kind in their name. A file may contain another kind than its name
-  // suggests.
+  // mesh(), band(), patch(), field() and scene() return the value as that kind. A file may contain
+  // another kind than its name suggests.
   // @throws levelset::UsageError if the value is of another kind
   [[nodiscard]] const levelset::TriMesh& mesh() const;
   [[nodiscard]] const levelset::NarrowBand& band() const;
