@@ -4,7 +4,8 @@
 #include <string>
 
 /// Exception classes, one for each exit code of the command line. A message is one sentence. It
-/// names the attempted action, the cause, the location and a remedy.
+/// names the cause, the location and a remedy. It does not name the operator that throws it: the
+/// caller knows that. The command line puts the action before the message.
 namespace levelset {
 
 enum class ExitCode : int {
@@ -44,5 +45,19 @@ struct IoError : Error {
 struct Cancelled : Error {
   explicit Cancelled(const std::string& sentence) : Error(ExitCode::Interrupted, sentence) {}
 };
+
+/// Throws an error of the same class with another message.
+[[noreturn]] void rethrow(const Error& error, const std::string& message);
+
+/// Returns the result of `work`. Puts "context: " before the message of an Error that `work`
+/// throws.
+template <class Work>
+auto withContext(const std::string& context, const Work& work) -> decltype(work()) {
+  try {
+    return work();
+  } catch (const Error& error) {
+    rethrow(error, context + ": " + error.what());
+  }
+}
 
 }  // namespace levelset

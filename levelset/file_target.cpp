@@ -42,7 +42,7 @@ Registry& registry() {
 }
 
 [[noreturn]] void throwIo(const fs::path& target, const std::string& what) {
-  throw IoError(fmt::format("write: '{}' {}", target.string(), what));
+  throw IoError(fmt::format("'{}' {}", target.string(), what));
 }
 
 [[noreturn]] void throwErrno(const fs::path& target, const char* what, int error) {
@@ -55,8 +55,7 @@ Registry& registry() {
 }
 
 [[noreturn]] void throwCancelled(const fs::path& target) {
-  throw Cancelled(
-      fmt::format("write: '{}' is left as it was, the job was interrupted", target.string()));
+  throw Cancelled(fmt::format("'{}' is left as it was, the job was interrupted", target.string()));
 }
 
 class Descriptor {
@@ -156,7 +155,7 @@ bool isClosed() {
 
 FileTarget::FileTarget(const fs::path& target, bool clobber)
     : target_(target), clobber_(clobber && mayClobber) {
-  if (target.empty()) throw IoError("write: the file name is empty; name a file");
+  if (target.empty()) throw IoError("the file name is empty; name a file");
   if (target == "-") {
     target_ = "standard output";
     descriptor_ = STDOUT_FILENO;

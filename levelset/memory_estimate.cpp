@@ -11,7 +11,7 @@
 
 namespace levelset::eikonal {
 
-void checkMemory(const MemoryEstimate& estimate, std::size_t maxMemory, const char* action) {
+void checkMemory(const MemoryEstimate& estimate, std::size_t maxMemory) {
   // Inwards there are never more points than in the solid's own box.
   const double out = estimate.outside + 1;
   double reached = 1, longest = 0;
@@ -19,9 +19,9 @@ void checkMemory(const MemoryEstimate& estimate, std::size_t maxMemory, const ch
     double from = estimate.surface.min()[i] - out, to = estimate.surface.max()[i] + out;
     if (from < -kIndexLimit || to > kIndexLimit)
       throw ResourceLimit(
-          fmt::format("{}: distances up to {:.4g} voxels exceed the range of 32-bit indices; use a "
+          fmt::format("distances up to {:.4g} voxels exceed the range of 32-bit indices; use a "
                       "smaller distance or larger voxels",
-                      action, out));
+                      out));
     if (estimate.region) {
       from = std::max<double>(from, estimate.region->min()[i]);
       to = std::min<double>(to, estimate.region->max()[i]);
@@ -33,7 +33,7 @@ void checkMemory(const MemoryEstimate& estimate, std::size_t maxMemory, const ch
   const double steiner = estimate.area * (std::min(estimate.inside, longest / 2) + out) +
                          2 * M_PI * longest * out * out + 4.0 / 3 * M_PI * out * out * out;
   const double bytes = std::min(reached, steiner) * estimate.bytesPerGridPoint;
-  requireMemory(bytes, memoryLimit(maxMemory), action);
+  requireMemory(bytes, memoryLimit(maxMemory));
 }
 
 }  // namespace levelset::eikonal

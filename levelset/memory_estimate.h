@@ -20,6 +20,6 @@ struct MemoryEstimate {
 /// Refuses a computation that does not fit into memory, before it allocates.
 /// @throws ResourceLimit when the grid points take more than `maxMemory` or the machine's memory,
 ///         or exceed the index range
-void checkMemory(const MemoryEstimate& estimate, std::size_t maxMemory, const char* action);
+void checkMemory(const MemoryEstimate& estimate, std::size_t maxMemory);
 
 }  // namespace levelset::eikonal

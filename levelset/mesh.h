@@ -54,8 +54,8 @@ struct TriMesh {
 
 /// Checks the attributes of a mesh.
 /// @throws InvalidInput when the length of a list differs from the number of vertices, or a value
-///         is not finite: "texture: the mesh has 3 normals for 4 vertices; …"
-void requireAttributes(const TriMesh& mesh, const char* action);
+///         is not finite: "the mesh has 3 normals for 4 vertices; …"
+void requireAttributes(const TriMesh& mesh);
 
 /// Transforms a normal by a map with the derivatives `slopes` along x, y and z. Uses the inverse
 /// transpose, so that the normal stays perpendicular to the surface. Returns unit length.
@@ -71,10 +71,9 @@ void append(TriMesh& mesh, const TriMesh& other);
 /// Returns the mesh without attributes and with closed seams. Attributes double the vertices along
 /// a seam. The function joins two edges at equal positions when each has one triangle and they run
 /// in opposite directions. Parts that only touch keep their own vertices.
-/// @param action  name of the action in the message when memory does not suffice
 /// @return nullopt when there is no seam to close: the triangles of `mesh` are the result
 /// @throws ResourceLimit
-[[nodiscard]] std::optional<TriMesh> withoutSeams(const TriMesh& mesh, const char* action,
+[[nodiscard]] std::optional<TriMesh> withoutSeams(const TriMesh& mesh,
                                                   std::size_t maxMemory = kNoMemoryLimit);
 
 /// Distance from a coordinate of that magnitude to the next one that the precision can represent.

@@ -13,22 +13,21 @@ using Imath::V3d;
 
 /// Checks that one list has an entry for each vertex and that all its values are finite.
 template <typename Vector>
-void requireList(const std::vector<Vector>& list, std::size_t vertices, const char* name,
-                 const char* action) {
+void requireList(const std::vector<Vector>& list, std::size_t vertices, const char* name) {
   if (list.empty()) return;
   if (list.size() != vertices) {
     throw InvalidInput(
-        fmt::format("{}: the mesh has {} {}s for {} vertices; give one for each vertex, or "
+        fmt::format("the mesh has {} {}s for {} vertices; give one for each vertex, or "
                     "none",
-                    action, list.size(), name, vertices));
+                    list.size(), name, vertices));
   }
   for (std::size_t v = 0; v < vertices; ++v)
     for (unsigned axis = 0; axis < Vector::dimensions(); ++axis)
       if (!std::isfinite(list[v][static_cast<int>(axis)])) {
         throw InvalidInput(
-            fmt::format("{}: the {} of vertex {} holds {}, which is not a finite number; "
+            fmt::format("the {} of vertex {} holds {}, which is not a finite number; "
                         "repair the mesh, or remove its {}s",
-                        action, name, v, list[v][static_cast<int>(axis)], name));
+                        name, v, list[v][static_cast<int>(axis)], name));
       }
 }
 
@@ -58,11 +57,11 @@ std::string describe(const MeshAttributes& attributes) {
   return text;
 }
 
-void requireAttributes(const TriMesh& mesh, const char* action) {
+void requireAttributes(const TriMesh& mesh) {
   const std::size_t count = mesh.positions.size();
-  requireList(mesh.attributes.normals, count, "normal", action);
-  requireList(mesh.attributes.uvs, count, "texture coordinate", action);
-  requireList(mesh.attributes.colors, count, "colour", action);
+  requireList(mesh.attributes.normals, count, "normal");
+  requireList(mesh.attributes.uvs, count, "texture coordinate");
+  requireList(mesh.attributes.colors, count, "colour");
 }
 
 V3d transformedNormal(const V3d& normal, const std::array<V3d, 3>& slopes, double hand) {

@@ -124,12 +124,11 @@ NarrowBand makeOpenBand(FloatGrid::Ptr grid, std::shared_ptr<const openvdb::Floa
   return band;
 }
 
-void requireSolid(const NarrowBand& band, const char* action) {
+void requireSolid(const NarrowBand& band) {
   if (!band.isOpenSurface()) return;
   throw InvalidInput(
-      fmt::format("{}: the operand is an open surface, which has two sides and no "
-                  "inside; give a solid",
-                  action));
+      "the operand is an open surface, which has two sides and no "
+      "inside; give a solid");
 }
 
 std::string NarrowBand::name() const {
@@ -153,27 +152,26 @@ NarrowBand makeBand(FloatGrid::Ptr grid) {
   return NarrowBand(std::make_shared<VdbGrid>(VdbGrid{std::move(grid), {}}));
 }
 
-NarrowBand importBand(FloatGrid::Ptr grid, const char* action, BandRepairs* repairs) {
-  if (!grid) throw InvalidInput(fmt::format("{}: there is no float grid", action));
+NarrowBand importBand(FloatGrid::Ptr grid, BandRepairs* repairs) {
+  if (!grid) throw InvalidInput("there is no float grid");
   const std::string name = grid->getName().empty() ? "(unnamed)" : grid->getName();
   if (grid->getGridClass() != openvdb::GRID_LEVEL_SET) {
-    throw InvalidInput(
-        fmt::format("{}: grid '{}' is of class '{}', not a level set; convert it first", action,
-                    name, FloatGrid::gridClassToString(grid->getGridClass())));
+    throw InvalidInput(fmt::format("grid '{}' is of class '{}', not a level set; convert it first",
+                                   name, FloatGrid::gridClassToString(grid->getGridClass())));
   }
   if (!isSimilarity(grid->transform())) {
     throw InvalidInput(
-        fmt::format("{}: the transform of grid '{}' shears, mirrors or scales its axes "
+        fmt::format("the transform of grid '{}' shears, mirrors or scales its axes "
                     "differently; resample it to "
                     "uniform voxels first",
-                    action, name));
+                    name));
   }
   const float background = grid->background();
   if (!(background > 0) || !std::isfinite(background)) {
     throw InvalidInput(
-        fmt::format("{}: the background of grid '{}' is {}; a level set needs a "
+        fmt::format("the background of grid '{}' is {}; a level set needs a "
                     "positive, finite one",
-                    action, name, background));
+                    name, background));
   }
   BandRepairs made;
   made.activeTiles = grid->tree().activeTileCount();
@@ -189,9 +187,9 @@ NarrowBand importBand(FloatGrid::Ptr grid, const char* action, BandRepairs* repa
     for (openvdb::Index i = 0; i < LeafNode::SIZE; ++i) {
       if (!std::isfinite(values[i])) {
         throw InvalidInput(
-            fmt::format("{}: grid '{}' holds {} at index {}; repair the file or write it "
+            fmt::format("grid '{}' holds {} at index {}; repair the file or write it "
                         "again",
-                        action, name, values[i], coordText(leaf->offsetToGlobalCoord(i))));
+                        name, values[i], coordText(leaf->offsetToGlobalCoord(i))));
       }
       if (!leaf->isValueOn(i)) takes(values[i]);
     }
@@ -199,8 +197,7 @@ NarrowBand importBand(FloatGrid::Ptr grid, const char* action, BandRepairs* repa
   for (auto it = grid->tree().beginValueOff(); it; ++it) {
     if (it.getDepth() == FloatGrid::TreeType::DEPTH - 1) continue;
     if (!std::isfinite(*it)) {
-      throw InvalidInput(
-          fmt::format("{}: grid '{}' holds {} in a tile; repair the file", action, name, *it));
+      throw InvalidInput(fmt::format("grid '{}' holds {} in a tile; repair the file", name, *it));
     }
     float value = *it;
     takes(value);
@@ -252,19 +249,19 @@ openvdb::CoordBBox blocksOf(const Imath::Box3d& world, const openvdb::math::Tran
   return blocks;
 }
 
-void requireBackground(float background, double voxelSize, const char* action) {
+void requireBackground(float background, double voxelSize) {
   // A thousandth of the background must still be a normal number, so that small distances keep full
   // precision.
   if (background > 1000 * std::numeric_limits<float>::min() && std::isfinite(background)) return;
   throw InvalidInput(
-      fmt::format("{}: voxels of {:.6g} are too {} for distances in single precision; change the "
+      fmt::format("voxels of {:.6g} are too {} for distances in single precision; change the "
                   "unit of length",
-                  action, voxelSize, background < 1 ? "small" : "large"));
+                  voxelSize, background < 1 ? "small" : "large"));
 }
 
 FloatGrid::Ptr emptyLevelSet(openvdb::math::Transform::Ptr transform, double halfWidth) {
   const float background = backgroundOf(halfWidth, transform->voxelSize()[0]);
-  requireBackground(background, transform->voxelSize()[0], "level-set");
+  requireBackground(background, transform->voxelSize()[0]);
   FloatGrid::Ptr grid = FloatGrid::create(background);
   grid->setTransform(std::move(transform));
   grid->setGridClass(openvdb::GRID_LEVEL_SET);

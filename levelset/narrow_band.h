@@ -77,7 +77,7 @@ inline const Imath::Box3d kEverywhere{Imath::V3d{Imath::V3d::baseTypeLowest()},
 }
 
 /// Refuses a band that is no solid. Every operator on solids calls it first.
-/// @throws InvalidInput for an open surface: "measure: the operand is an open surface, …"
-void requireSolid(const NarrowBand& band, const char* action);
+/// @throws InvalidInput for an open surface: "the operand is an open surface, …"
+void requireSolid(const NarrowBand& band);
 
 }  // namespace levelset

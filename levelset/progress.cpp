@@ -6,8 +6,8 @@
 
 namespace levelset {
 
-void report(const Progress& progress, double fraction, const char* action) {
-  if (progress && !progress(fraction)) throw Cancelled(fmt::format("{}: cancelled", action));
+void report(const Progress& progress, double fraction) {
+  if (progress && !progress(fraction)) throw Cancelled("cancelled");
 }
 
 Progress subProgress(const Progress& whole, double from, double to) {
@@ -15,12 +15,12 @@ Progress subProgress(const Progress& whole, double from, double to) {
   return [=](double fraction) { return whole(from + (to - from) * fraction); };
 }
 
-void requireMemory(double estimatedBytes, std::size_t maxBytes, const char* action) {
+void requireMemory(double estimatedBytes, std::size_t maxBytes) {
   if (estimatedBytes <= static_cast<double>(maxBytes)) return;
-  throw ResourceLimit(fmt::format(
-      "{}: needs about {:.3g} GB, which exceeds the limit of {:.3g} GB; use larger voxels "
-      "or raise --max-memory",
-      action, estimatedBytes * 1e-9, static_cast<double>(maxBytes) * 1e-9));
+  throw ResourceLimit(
+      fmt::format("needs about {:.3g} GB, which exceeds the limit of {:.3g} GB; use larger voxels "
+                  "or raise --max-memory",
+                  estimatedBytes * 1e-9, static_cast<double>(maxBytes) * 1e-9));
 }
 
 }  // namespace levelset

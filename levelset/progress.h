@@ -14,7 +14,7 @@ using Progress = std::function<bool(double)>;
 
 /// Reports the fraction.
 /// @throws Cancelled when `progress` is set and returns false
-void report(const Progress& progress, double fraction, const char* action);
+void report(const Progress& progress, double fraction);
 
 /// Maps the progress of a subtask, 0 to 1, to the interval [from, to] of the complete task.
 [[nodiscard]] Progress subProgress(const Progress& whole, double from, double to);
@@ -25,6 +25,6 @@ inline constexpr std::size_t kNoMemoryLimit = std::numeric_limits<std::size_t>::
 
 /// Compares a memory estimate with its limit.
 /// @throws ResourceLimit, with both figures, when `estimatedBytes` exceeds `maxBytes`
-void requireMemory(double estimatedBytes, std::size_t maxBytes, const char* action);
+void requireMemory(double estimatedBytes, std::size_t maxBytes);
 
 }  // namespace levelset

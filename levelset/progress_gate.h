@@ -12,8 +12,8 @@ namespace levelset {
 /// decreases, and no task waits for another (internal).
 class ProgressGate {
  public:
-  ProgressGate(const Progress& progress, std::size_t total, const char* action)
-      : progress_(progress), total_(static_cast<double>(total ? total : 1)), action_(action) {}
+  ProgressGate(const Progress& progress, std::size_t total)
+      : progress_(progress), total_(static_cast<double>(total ? total : 1)), action_() {}
 
   /// @throws Cancelled
   void advance(std::size_t count) {
@@ -22,7 +22,7 @@ class ProgressGate {
     const std::unique_lock lock(mutex_, std::try_to_lock);
     if (!lock) return;
     const double fraction = static_cast<double>(done_.load(std::memory_order_relaxed)) / total_;
-    report(progress_, fraction < 1 ? fraction : 1.0, action_);
+    report(progress_, fraction < 1 ? fraction : 1.0);
   }
 
  private:

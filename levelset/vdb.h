@@ -43,8 +43,7 @@ struct VdbAccess {
 /// given.
 /// @throws InvalidInput for NaN or infinite values, a background ≤ 0, a class other than level set,
 ///         or a transform that is not a rotation, uniform scale and translation
-[[nodiscard]] NarrowBand importBand(openvdb::FloatGrid::Ptr grid, const char* action,
-                                    BandRepairs* repairs = nullptr);
+[[nodiscard]] NarrowBand importBand(openvdb::FloatGrid::Ptr grid, BandRepairs* repairs = nullptr);
 
 [[nodiscard]] inline Imath::V3d toImath(const openvdb::Vec3d& v) {
   return {v.x(), v.y(), v.z()};
@@ -64,7 +63,7 @@ struct VdbAccess {
 
 /// Checks that distances up to `background` fit into single precision.
 /// @throws InvalidInput when they leave the range of `float`
-void requireBackground(float background, double voxelSize, const char* action);
+void requireBackground(float background, double voxelSize);
 
 /// Index box of the 8³ blocks of grid points that meet a world box, clamped to the index range. It
 /// runs from the lowest point of the first block to the highest point of the last.

@@ -111,7 +111,9 @@ DenseBand bandArray(const levelset::NarrowBand& band, const std::optional<Imath:
     throw InvalidInput(box ? "array: the box contains no grid point; give a larger box"
                            : "array: the level set is empty; give a box");
   const openvdb::Vec3d size = range.extents().asVec3d();
-  levelset::requireMemory(size[0] * size[1] * size[2] * sizeof(float), maxMemory, "array");
+  levelset::withContext("array", [&] {
+    levelset::requireMemory(size[0] * size[1] * size[2] * sizeof(float), maxMemory);
+  });
   const Coord dim = range.dim();
   py::array_t<float> values({dim.x(), dim.y(), dim.z()});
   openvdb::tools::Dense<float> dense(range, values.mutable_data());  // z varies fastest

@@ -44,7 +44,7 @@ bool Recorder::wantsRepeats(const Sample& at) const {
 }
 
 void Recorder::tick() {
-  levelset::report(progress_, 0, "regress");
+  levelset::report(progress_, 0);
 }
 
 std::optional<NarrowBand> Recorder::measure(

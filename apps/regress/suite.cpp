@@ -86,7 +86,7 @@ SuiteResult runSuite(const SuiteOptions& options) {
     result.cases.back().cpuSeconds = apps::processCpuSeconds() - caseStart;
     if (options.finished) options.finished(result.cases.back());
   }
-  levelset::report(options.progress, 1, "regress");
+  levelset::report(options.progress, 1);
   result.cpuSeconds = apps::processCpuSeconds() - start;
   return result;
 }

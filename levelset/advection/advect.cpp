@@ -20,14 +20,12 @@ namespace {
 
 using Imath::V3d;
 
-constexpr const char* kAdvectAction = "advect";
 // Shares of the work, as measured: mesh, motion, band.
 constexpr double kMeshed = 0.05, kMoved = 0.9;
 
 void requireTime(double time, const char* what) {
   if (!std::isfinite(time))
-    throw UsageError(
-        fmt::format("{}: the {} is {}; give a finite time", kAdvectAction, what, time));
+    throw UsageError(fmt::format("the {} is {}; give a finite time", what, time));
 }
 
 /// Projects vertices onto the zero set of the tricubic interpolant, a fraction of a voxel away.
@@ -73,9 +71,9 @@ NarrowBand bandOf(const TriMesh& mesh, const NarrowBand& model, const AdvectOpti
     unit = meshToBand(mesh, 1, conversion).band;
   } catch (const InvalidInput& error) {
     throw InvalidInput(
-        fmt::format("{}: the moved surface encloses no solid on this grid ({}); use smaller "
+        fmt::format("the moved surface encloses no solid on this grid ({}); use smaller "
                     "voxels or a shorter time",
-                    kAdvectAction, error.what()));
+                    error.what()));
   }
   return transform(unit, model.indexToWorld());
 }
@@ -104,16 +102,13 @@ struct Advection::Impl {
 
   Impl(NarrowBand solid, const AdvectOptions& given)
       : options(given), band(std::move(solid)), time(given.start) {
-    requireSolid(band, kAdvectAction);
-    if (band.isEmpty())
-      throw InvalidInput(
-          fmt::format("{}: the solid is empty; give a solid with a surface", kAdvectAction));
+    requireSolid(band);
+    if (band.isEmpty()) throw InvalidInput("the solid is empty; give a solid with a surface");
     requireTime(time, "start time");
-    if (options.mask) checkMask(*options.mask, kAdvectAction);
+    if (options.mask) checkMask(*options.mask);
     volumeBefore = measure(band).volume;
-    if (options.scheme == AdvectScheme::Front)
-      front.emplace(surfaceOf(band), options.maxMemory, "advect");
-    report(options.progress, kMeshed, kAdvectAction);
+    if (options.scheme == AdvectScheme::Front) front.emplace(surfaceOf(band), options.maxMemory);
+    report(options.progress, kMeshed);
   }
 
   /// Converts a world velocity to masked voxels of the band's grid.
@@ -139,7 +134,6 @@ struct Advection::Impl {
     const flow::TimeInterval interval{.velocity = speed,
                                       .from = time,
                                       .to = end,
-                                      .action = kAdvectAction,
                                       .toWorld = band.indexToWorld(),
                                       .maxMemory = options.maxMemory,
                                       .progress = subProgress(options.progress, kMeshed, kMoved)};
@@ -160,7 +154,7 @@ struct Advection::Impl {
     result.band = front && steps > 0 ? bandOf(front->mesh(), band, options) : band;
     result.volumeAfter = measure(result.band).volume;
     if (options.fixVolume) result.band = withVolume(result.band, volumeBefore, options);
-    report(options.progress, 1, kAdvectAction);
+    report(options.progress, 1);
     return result;
   }
 };

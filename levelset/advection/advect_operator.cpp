@@ -7,6 +7,10 @@
 namespace levelset {
 namespace {
 
+std::function<double(double)> factorOf(const AdvectOperator::Options& options) {
+  return withContext("--factor", [&] { return timeExpression(options.factor); });
+}
+
 VectorField velocityOf(const AdvectOperator::Options& options) {
   const std::string& name = options.field.name;
   const auto period = [&](double usual) { return options.period.value_or(usual); };
@@ -16,8 +20,9 @@ VectorField velocityOf(const AdvectOperator::Options& options) {
                              ? rotationVelocity(options.center, options.axis, period(1))
                              : options.field.field;
   if (options.factor.empty()) return velocity;
-  return [velocity, factor = timeExpression(options.factor, "advect: --factor")](
-             const Imath::V3d& p, double time) { return velocity(p, time) * factor(time); };
+  return [velocity, factor = factorOf(options)](const Imath::V3d& p, double time) {
+    return velocity(p, time) * factor(time);
+  };
 }
 
 }  // namespace
@@ -36,15 +41,15 @@ const OperatorText AdvectOperator::text{
         "--field enright --time 0.3 ! measure"};
 
 void AdvectOperator::check(const Options& options, const GivenOptions& given) {
-  if (given("factor")) (void)timeExpression(options.factor, "advect: --factor");
+  if (given("factor")) (void)factorOf(options);
   if (given("period") && options.field.name.empty())
     throw UsageError(
-        "advect: --period is that of a velocity known by its name; write the time into the formula "
+        "--period is that of a velocity known by its name; write the time into the formula "
         "or use --factor");
   for (const char* option : {"center", "axis"}) {
     if (given(option) && options.field.name != "rotation")
       throw UsageError(fmt::format(
-          "advect: --{} is that of the rotation; leave it out, or use --field rotation", option));
+          "--{} is that of the rotation; leave it out, or use --field rotation", option));
   }
 }
 

@@ -158,18 +158,18 @@ class Splitter {
 
 }  // namespace
 
-Front::Front(TriMesh mesh, std::size_t maxMemory, const char* action) : mesh_(std::move(mesh)) {
-  splitLongEdges(maxMemory, action);
+Front::Front(TriMesh mesh, std::size_t maxMemory) : mesh_(std::move(mesh)) {
+  splitLongEdges(maxMemory);
   largestArea_ = surfaceArea(mesh_);
 }
 
-void Front::splitLongEdges(std::size_t maxMemory, const char* action) {
+void Front::splitLongEdges(std::size_t maxMemory) {
   // A step stretches little; remaining long edges wait for the next step.
   constexpr int kPasses = 4;
   for (int pass = 0; pass < kPasses; ++pass) {
     Splitter splitter(mesh_);
     const double count = static_cast<double>(mesh_.triangles.size() + 2 * splitter.longEdges());
-    requireMemory(kBytesPerTriangle * count, memoryLimit(maxMemory), action);
+    requireMemory(kBytesPerTriangle * count, memoryLimit(maxMemory));
     if (splitter.longEdges() == 0) return;
     splitter.run();
   }
@@ -228,8 +228,7 @@ double Front::tryStep(const TimeInterval& interval, double from, double to) {
     if (largest.nonFiniteDistance > kShortMove) return 0.25;
     for (const V3d& p : mesh_.positions) requireFinitePath(interval, p, from, to);
     throw InvalidInput(
-        fmt::format("{}: the velocity overflows at time {:.6g}; use smaller velocities",
-                    interval.action, from));
+        fmt::format("the velocity overflows at time {:.6g}; use smaller velocities", from));
   }
   double allowed = std::min(kFarthestMove / std::max(largest.move, largest.fastest / 4),
                             kMostStrain / mostStrain());
@@ -276,8 +275,7 @@ StepResult Front::step(const TimeInterval& interval, double from, double longest
       const double total = std::abs(interval.to - interval.from);
       return {to, isStill_ ? std::min(next, kFirstShare * total) : next};
     }
-    report(interval.progress, (from - interval.from) / (interval.to - interval.from),
-           interval.action);
+    report(interval.progress, (from - interval.from) / (interval.to - interval.from));
     dt *= kMargin * allowed;
   }
 }
@@ -285,14 +283,14 @@ StepResult Front::step(const TimeInterval& interval, double from, double longest
 std::size_t Front::advance(const TimeInterval& interval) {
   return integrate(interval, [&](double from, double longest) {
     const StepResult made = step(interval, from, longest);
-    splitLongEdges(interval.maxMemory, interval.action);
+    splitLongEdges(interval.maxMemory);
     largestArea_ = std::max(largestArea_, surfaceArea(mesh_));
     if (static_cast<double>(mesh_.triangles.size()) >
         kSpareTriangles + kMostTrianglesPerVoxel * largestArea_) {
-      throw ResourceLimit(fmt::format(
-          "{}: at time {:.6g} the velocity has folded the surface too finely to follow; "
-          "use a smoother velocity, a shorter time or --scheme semi-lagrangian",
-          interval.action, made.time));
+      throw ResourceLimit(
+          fmt::format("at time {:.6g} the velocity has folded the surface too finely to follow; "
+                      "use a smoother velocity, a shorter time or --scheme semi-lagrangian",
+                      made.time));
     }
     return made;
   });

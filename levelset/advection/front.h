@@ -19,7 +19,7 @@ class Front {
  public:
   /// @param mesh  closed and two-manifold, in voxels
   /// @throws ResourceLimit when the split triangles do not fit into memory
-  Front(TriMesh mesh, std::size_t maxMemory, const char* action);
+  Front(TriMesh mesh, std::size_t maxMemory);
 
   /// Moves the surface over the time interval, forwards or backwards.
   /// @throws InvalidInput for a velocity that is not finite
@@ -40,7 +40,7 @@ class Front {
   /// Returns the longest first step, from the speeds at the start.
   [[nodiscard]] double firstStep(const TimeInterval& interval) const;
   StepResult step(const TimeInterval& interval, double from, double longest);
-  void splitLongEdges(std::size_t maxMemory, const char* action);
+  void splitLongEdges(std::size_t maxMemory);
 
   TriMesh mesh_;
   std::vector<Imath::V3d> moved_;  ///< vertices after the step that was tried last

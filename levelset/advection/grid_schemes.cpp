@@ -59,7 +59,6 @@ double longestStep(FloatGrid& grid, const Limit& limit) {
 
 FloatGrid::Ptr distanceOf(const FloatGrid& field, double halfWidth, const TimeInterval& interval) {
   eikonal::DistanceRequest request;
-  request.action = interval.action;
   request.halfWidth = halfWidth;
   request.maxMemory = interval.maxMemory;
   return eikonal::distanceTransform(field, request);

@@ -18,9 +18,9 @@ void requireFinite(const TimeInterval& interval, const V3d& velocity, const V3d&
   V3d world;
   interval.toWorld.multVecMatrix(position, world);
   throw InvalidInput(
-      fmt::format("{}: the velocity is not finite at {:.6g},{:.6g},{:.6g} and time {:.6g}; give a "
+      fmt::format("the velocity is not finite at {:.6g},{:.6g},{:.6g} and time {:.6g}; give a "
                   "velocity that is finite along the path of the surface",
-                  interval.action, world.x, world.y, world.z, time));
+                  world.x, world.y, world.z, time));
 }
 
 std::size_t integrate(const TimeInterval& interval,
@@ -29,7 +29,7 @@ std::size_t integrate(const TimeInterval& interval,
   double time = interval.from, dt = kFirstShare * total;
   std::size_t done = 0;
   while (time != to) {
-    report(interval.progress, (time - interval.from) / (to - interval.from), interval.action);
+    report(interval.progress, (time - interval.from) / (to - interval.from));
     const double left = std::abs(to - time);
     // At a late time, a share of a short interval may round to zero.
     dt = std::max(dt, 4 * std::abs(std::nextafter(time, to) - time));
@@ -39,16 +39,16 @@ std::size_t integrate(const TimeInterval& interval,
     const double needed = static_cast<double>(done) + std::abs(to - made.time) / made.next;
     if (!(needed <= kMostSteps) || made.time == time) {
       throw ResourceLimit(fmt::format(
-          "{}: at time {:.6g} the velocity limits steps to {:.3g}, which requires "
+          "at time {:.6g} the velocity limits steps to {:.3g}, which requires "
           "about {:.3g} steps, more than the limit of {}; use a shorter time or a smoother "
           "velocity",
-          interval.action, time, made.next, needed, kMostSteps));
+          time, made.next, needed, kMostSteps));
     }
     time = made.time;
     dt = made.next;
     ++done;
   }
-  report(interval.progress, 1, interval.action);
+  report(interval.progress, 1);
   return done;
 }
 

@@ -19,7 +19,6 @@ using Velocity = std::function<Imath::V3d(const Imath::V3d& position, double tim
 struct TimeInterval {
   const Velocity& velocity;
   double from, to;
-  const char* action;   ///< prefix of messages
   Imath::M44d toWorld;  ///< from voxels, for messages
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};

@@ -13,8 +13,8 @@ using Imath::V3d;
 
 void requirePeriod(double period) {
   if (!(period > 0) || !std::isfinite(period))
-    throw UsageError(fmt::format(
-        "advect: the period of the velocity is {}; give a positive, finite time", period));
+    throw UsageError(
+        fmt::format("the period of the velocity is {}; give a positive, finite time", period));
 }
 
 /// sin² of πx, and sin of 2πx.
@@ -53,7 +53,7 @@ VectorField rotationVelocity(const V3d& center, const V3d& axis, double period) 
   for (int i = 0; i < 3; ++i) {
     if (!std::isfinite(center[i]) || !std::isfinite(axis[i]) || !(spin.length2() > 0))
       throw UsageError(fmt::format(
-          "advect: the rotation's axis is {},{},{} through {},{},{}; give a direction and a finite "
+          "the rotation's axis is {},{},{} through {},{},{}; give a direction and a finite "
           "point",
           axis.x, axis.y, axis.z, center.x, center.y, center.z));
   }

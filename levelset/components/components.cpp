@@ -223,14 +223,14 @@ Topology topology(const NarrowBand& solid) {
 }
 
 NarrowBand keepLargest(const NarrowBand& solid, std::size_t count, const Progress& progress) {
-  if (!count) throw UsageError("keep: --largest is 0; keep at least one solid");
-  requireSolid(solid, "keep");
+  if (!count) throw UsageError("--largest is 0; keep at least one solid");
+  requireSolid(solid);
   if (solid.isEmpty()) {
     throw InvalidInput(
-        "keep: the level set is empty, so there is no solid to keep; check the actions "
+        "the level set is empty, so there is no solid to keep; check the actions "
         "before it");
   }
-  const RegionMap map(vdb(solid), subProgress(progress, 0, 0.5), "keep");
+  const RegionMap map(vdb(solid), subProgress(progress, 0, 0.5));
   const std::vector<Region>& regions = map.regions();
   std::vector<std::size_t> solids;
   for (std::size_t i = 0; i < regions.size(); ++i) {
@@ -243,14 +243,14 @@ NarrowBand keepLargest(const NarrowBand& solid, std::size_t count, const Progres
   std::vector<bool> flipped(regions.size(), false);
   for (std::size_t i = count; i < solids.size(); ++i) flipped[solids[i]] = true;
   NarrowBand result = flip(solid, map, std::move(flipped), subProgress(progress, 0.5, 1));
-  report(progress, 1, "keep");
+  report(progress, 1);
   return result;
 }
 
 SliversDropped dropSlivers(const NarrowBand& solid, const NarrowBand& cutter,
                            const Progress& progress) {
   constexpr float kDepth = 0.5, kNear = 1;  // voxels
-  const RegionMap map(vdb(solid), subProgress(progress, 0, 0.5), "slivers");
+  const RegionMap map(vdb(solid), subProgress(progress, 0, 0.5));
   const std::vector<Region>& regions = map.regions();
   const auto voxel = static_cast<float>(solid.voxelSize());
   std::vector<bool> isSliver(regions.size());
@@ -291,12 +291,11 @@ SliversDropped dropSlivers(const NarrowBand& solid, const NarrowBand& cutter,
 NarrowBand fillCavities(const NarrowBand& solid, double maxVolume, const Progress& progress) {
   if (!(maxVolume >= 0)) {
     throw UsageError(fmt::format(
-        "fill-cavities: the largest volume to fill is {}; give a number that is not negative",
-        maxVolume));
+        "the largest volume to fill is {}; give a number that is not negative", maxVolume));
   }
-  requireSolid(solid, "fill-cavities");
+  requireSolid(solid);
   if (solid.isEmpty()) return solid;
-  const RegionMap map(vdb(solid), subProgress(progress, 0, 0.5), "fill-cavities");
+  const RegionMap map(vdb(solid), subProgress(progress, 0, 0.5));
   const std::vector<Region>& regions = map.regions();
   const double limit = maxVolume / std::pow(solid.voxelSize(), 3);
   std::vector<bool> flipped(regions.size(), false);
@@ -304,7 +303,7 @@ NarrowBand fillCavities(const NarrowBand& solid, double maxVolume, const Progres
     flipped[i] = i != RegionMap::kInfinite && !regions[i].inside && regions[i].volume <= limit;
   }
   NarrowBand result = flip(solid, map, std::move(flipped), subProgress(progress, 0.5, 1));
-  report(progress, 1, "fill-cavities");
+  report(progress, 1);
   return result;
 }
 

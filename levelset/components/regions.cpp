@@ -107,24 +107,24 @@ class RegionMap::Linker {
   std::int32_t lastA_ = 0, lastB_ = 0;
 };
 
-RegionMap::RegionMap(const FloatGrid& grid, const Progress& progress, const char* action)
+RegionMap::RegionMap(const FloatGrid& grid, const Progress& progress)
     : labels_(grid.tree(), 0, openvdb::TopologyCopy()) {
-  report(progress, 0, action);
+  report(progress, 0);
   const CellSurface surface(grid);
   Linker linker;
-  report(progress, 0.1, action);
+  report(progress, 0.1);
   labelLeaves(grid, linker);
   labelTiles(grid, linker);
-  report(progress, 0.3, action);
+  report(progress, 0.3);
   joinLeaves(grid, linker);
   joinTiles(grid, linker);
-  report(progress, 0.5, action);
+  report(progress, 0.5);
   joinDiagonals(surface, linker);
-  report(progress, 0.6, action);
+  report(progress, 0.6);
   numberRegions(grid, linker);
-  report(progress, 0.7, action);
+  report(progress, 0.7);
   findSurfaceComponents(surface);
-  report(progress, 1, action);
+  report(progress, 1);
 }
 
 void RegionMap::labelLeaves(const FloatGrid& grid, Linker& linker) {

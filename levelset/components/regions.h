@@ -28,9 +28,7 @@ struct RegionSurface {
 class RegionMap {
  public:
   /// Labels the complete space: each voxel of a leaf and each tile. Does not expand tiles.
-  /// @param action  name in messages
-  explicit RegionMap(const openvdb::FloatGrid& grid, const Progress& progress = {},
-                     const char* action = "regions");
+  explicit RegionMap(const openvdb::FloatGrid& grid, const Progress& progress = {});
 
   static constexpr std::uint32_t kInfinite = 0;  ///< index of the unbounded outside region
 

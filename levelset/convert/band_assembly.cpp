@@ -69,7 +69,7 @@ class LeafCollector {
     if (count % kStep == 0)
       requireMemory(static_cast<double>(count) * sizeof(LeafNode) +
                         static_cast<double>(count) * LeafNode::SIZE * sizeof(float),
-                    maxMemory_, "level-set");
+                    maxMemory_);
   }
 
   openvdb::FloatGrid::Ptr finish(double halfWidth) {

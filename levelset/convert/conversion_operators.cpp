@@ -81,7 +81,7 @@ ValuePlan LevelSetOperator::plan(const Options& options, Plans operands, const O
     reach = std::max({reach, std::abs(plan.bounds.min[axis]), std::abs(plan.bounds.max[axis])});
   if (!(reach / plan.voxelSize < std::numeric_limits<std::int32_t>::max()))
     throw ResourceLimit(
-        fmt::format("level-set: the mesh reaches {:.3g} voxels from the origin, more than can be "
+        fmt::format("the mesh reaches {:.3g} voxels from the origin, more than can be "
                     "counted; use larger voxels or move it",
                     reach / plan.voxelSize));
   return plan;
@@ -114,8 +114,8 @@ double SurfaceBandOperator::longestSide(const Options&, Plans operands) {
 
 void SurfaceBandOperator::check(const Options& options, const GivenOptions&) {
   if (options.halfWidth < kMinSurfaceHalfWidth) {
-    throw UsageError(fmt::format("surface-band: --half-width is {} voxels; give at least {}",
-                                 options.halfWidth, kMinSurfaceHalfWidth));
+    throw UsageError(fmt::format("--half-width is {} voxels; give at least {}", options.halfWidth,
+                                 kMinSurfaceHalfWidth));
   }
 }
 
@@ -138,7 +138,7 @@ ValuePlan SurfaceBandOperator::plan(const Options& options, Plans operands, cons
   plan.triangles = 0;
   plan.voxelSize = options.voxel.edge;
   plan.halfWidth = options.halfWidth;
-  checkVoxelSize(plan.voxelSize, plan.longestSide(), "surface-band");
+  checkVoxelSize(plan.voxelSize, plan.longestSide());
   return plan;
 }
 

@@ -64,13 +64,13 @@ SignMode chooseMethod(const MeshToBandOptions& options, const MeshTopology& topo
 
 void checkClosed(const MeshTopology& topology, Nesting nesting) {
   if (topology.oddEdges > 0)
-    throw InvalidInput(fmt::format(
-        "level-set: the mesh is not closed: {} edges have one face and {} have three or "
-        "more; use --sign winding, or close it first",
-        topology.boundaryEdges, topology.nonManifoldEdges));
+    throw InvalidInput(
+        fmt::format("the mesh is not closed: {} edges have one face and {} have three or "
+                    "more; use --sign winding, or close it first",
+                    topology.boundaryEdges, topology.nonManifoldEdges));
   if (nesting == Nesting::Orientation && !topology.boundary.empty())
     throw InvalidInput(
-        fmt::format("level-set: at {} edges neighbouring faces are oriented differently, so nested "
+        fmt::format("at {} edges neighbouring faces are oriented differently, so nested "
                     "components cannot follow their orientation; use --nested parity",
                     topology.boundary.size()));
 }
@@ -108,17 +108,17 @@ void checkResult(const openvdb::FloatGrid& grid, const SignCertificate& certific
     for (auto it = leaf->cbeginValueAll(); it && !anyInside; ++it) anyInside = *it < 0;
   if (!anyInside && certificate.closed)
     throw InvalidInput(
-        "level-set: no grid point lies inside the object, which is everywhere thinner than a "
+        "no grid point lies inside the object, which is everywhere thinner than a "
         "voxel; use smaller voxels");
   if (!anyInside && !options.acceptSign)
     throw InvalidInput(fmt::format(
-        "level-set: the mesh encloses no volume: its winding number exceeds 1/2 at no grid point "
+        "the mesh encloses no volume: its winding number exceeds 1/2 at no grid point "
         "({} boundary edges); close it first, use smaller voxels, or accept distances without an "
         "inside with --accept-sign",
         certificate.boundaryEdges));
   if (certificate.ambiguousShare > kAmbiguousLimit && !options.acceptSign)
     throw InvalidInput(fmt::format(
-        "level-set: inside and outside are a guess at {:.2g} % of the voxels next to the "
+        "inside and outside are a guess at {:.2g} % of the voxels next to the "
         "surface ({} boundary edges, {} non-manifold); close the holes, or accept the guess "
         "with --accept-sign",
         100 * certificate.ambiguousShare, certificate.boundaryEdges, certificate.nonManifoldEdges));
@@ -142,22 +142,21 @@ std::string describe(const SignCertificate& c) {
 
 MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
                             const MeshToBandOptions& options) {
-  constexpr const char* kAction = "level-set";
   convert::checkMeshInput(mesh, voxelSize, options);
   const Progress progress = monotonic(options.progress);
   const std::size_t maxMemory = memoryLimit(options.maxMemory);
-  report(progress, 0, kAction);
+  report(progress, 0);
 
   // === Topology and method
   const MeshTopology topology = convert::findTopology(mesh);
-  report(progress, 0.05, kAction);
+  report(progress, 0.05);
   SignCertificate certificate;
   certificate.closed = topology.isClosed();
   certificate.boundaryEdges = topology.boundaryEdges;
   certificate.nonManifoldEdges = topology.nonManifoldEdges;
   certificate.droppedTriangles = topology.dropped;
   if (topology.triangles.empty())
-    throw InvalidInput("level-set: every triangle is degenerate; there is no surface to convert");
+    throw InvalidInput("every triangle is degenerate; there is no surface to convert");
   SelfIntersections selfIntersections(mesh, topology, subProgress(progress, 0.05, 0.4));
   certificate.method = chooseMethod(options, topology, selfIntersections);
   if (certificate.method == SignMode::Closed) checkClosed(topology, options.nesting);
@@ -191,7 +190,7 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
     }
     if (reached.isEmpty())
       throw InvalidInput(
-          "level-set: the requested region does not meet the mesh; choose a region that meets "
+          "the requested region does not meet the mesh; choose a region that meets "
           "it");
     region = blocksOf(reached, *uniformTransform(voxelSize));
   }
@@ -200,7 +199,7 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
   certificate.ambiguousShare = convert::ambiguousShare(*grid, field, origin);
   if (options.onCertificate) options.onCertificate(certificate);
   checkResult(*grid, certificate, options);
-  report(progress, 1, kAction);
+  report(progress, 1);
   return {makeBand(grid), certificate};
 }
 

@@ -76,9 +76,8 @@ struct MeshToBandResult {
                                           const MeshToBandOptions& options = {});
 
 /// Checks the voxel size against the size of the object. This check of meshToBand needs no mesh.
-/// @param action  start of the message
 /// @throws InvalidInput for a voxel larger than the object
-void checkVoxelSize(double voxelSize, double longestSide, const char* action = "level-set");
+void checkVoxelSize(double voxelSize, double longestSide);
 
 /// The operator `level-set`.
 struct LevelSetOperator {

@@ -27,30 +27,29 @@ double largest(const V3d& p) {
   return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
 }
 
-void checkCall(double voxelSize, const MeshToBandOptions& options, const char* action) {
+void checkCall(double voxelSize, const MeshToBandOptions& options) {
   if (!(voxelSize > 0) || !std::isfinite(voxelSize))
-    throw UsageError(fmt::format("{}: the voxel size is {}; give a positive length in world units",
-                                 action, voxelSize));
+    throw UsageError(
+        fmt::format("the voxel size is {}; give a positive length in world units", voxelSize));
   if (!(options.halfWidth >= 1) || !std::isfinite(options.halfWidth))
     throw UsageError(
-        fmt::format("{}: the half width is {} voxels; give at least 1", action, options.halfWidth));
+        fmt::format("the half width is {} voxels; give at least 1", options.halfWidth));
 }
 
-void checkElements(const TriMesh& mesh, const char* action) {
+void checkElements(const TriMesh& mesh) {
   if (mesh.isEmpty())
-    throw InvalidInput(
-        fmt::format("{}: the mesh has no triangles; there is no surface to convert", action));
+    throw InvalidInput("the mesh has no triangles; there is no surface to convert");
   for (std::size_t v = 0; v < mesh.positions.size(); ++v)
     if (!isFinite(mesh.positions[v]))
       throw InvalidInput(
-          fmt::format("{}: vertex {} has the coordinates {}, which are not finite; repair the mesh",
-                      action, v, text(mesh.positions[v])));
+          fmt::format("vertex {} has the coordinates {}, which are not finite; repair the mesh", v,
+                      text(mesh.positions[v])));
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     for (const std::uint32_t v : mesh.triangles[t])
       if (v >= mesh.positions.size())
         throw InvalidInput(fmt::format(
-            "{}: triangle {} refers to vertex {}, but there are only {} vertices; repair the mesh",
-            action, t, v, mesh.positions.size()));
+            "triangle {} refers to vertex {}, but there are only {} vertices; repair the mesh", t,
+            v, mesh.positions.size()));
 }
 
 std::uint32_t outermostVertex(const TriMesh& mesh) {
@@ -92,44 +91,42 @@ double estimateMemory(const TriMesh& mesh, double voxelSize, const MeshToBandOpt
   return 24 * halfWidth * area + 250.0 * static_cast<double>(mesh.triangles.size());
 }
 
-void checkPrecision(const TriMesh& mesh, double voxelSize, std::uint32_t outermost,
-                    const char* action) {
+void checkPrecision(const TriMesh& mesh, double voxelSize, std::uint32_t outermost) {
   const bool isFloat = mesh.precision == CoordinatePrecision::Float;
   const double here = spacingAt(largest(mesh.positions[outermost]), mesh.precision);
   if (mesh.spacing > voxelSize / 8 && mesh.spacing > here)
     throw InvalidInput(fmt::format(
-        "{}: before the mesh was moved, its coordinates were {:.3g} apart "
+        "before the mesh was moved, its coordinates were {:.3g} apart "
         "(measured at its present position), coarser than an eighth of the voxel size {:.6g}; "
         "move the object to the origin before writing it, or use larger voxels",
-        action, mesh.spacing, voxelSize));
+        mesh.spacing, voxelSize));
   const double spacing = here;
   if (spacing > voxelSize / 8)
     throw InvalidInput(
-        fmt::format("{}: {} coordinates at vertex {}, {}, are {:.3g} apart, coarser than an "
+        fmt::format("{} coordinates at vertex {}, {}, are {:.3g} apart, coarser than an "
                     "eighth of the "
                     "voxel size {:.6g}; move the object to the origin before writing it, or use "
                     "larger voxels",
-                    action, isFloat ? "single-precision" : "double-precision", outermost,
+                    isFloat ? "single-precision" : "double-precision", outermost,
                     text(mesh.positions[outermost]), spacing, voxelSize));
 }
 
 }  // namespace
 
-void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options,
-                    const char* action) {
-  checkCall(voxelSize, options, action);
-  checkElements(mesh, action);
+void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options) {
+  checkCall(voxelSize, options);
+  checkElements(mesh);
   const V3d size = bounds(mesh).size();
-  checkVoxelSize(voxelSize, std::max({size.x, size.y, size.z}), action);
+  checkVoxelSize(voxelSize, std::max({size.x, size.y, size.z}));
   const std::uint32_t outermost = outermostVertex(mesh);
   if (largest(mesh.positions[outermost]) / voxelSize + options.halfWidth >= kIndexLimit)
-    throw ResourceLimit(fmt::format(
-        "{}: vertex {} at {} is {:.3g} voxels from the origin, beyond the range of 32-bit "
-        "indices; use larger voxels, or remove the vertex if it is an outlier",
-        action, outermost, text(mesh.positions[outermost]),
-        largest(mesh.positions[outermost]) / voxelSize));
-  requireMemory(estimateMemory(mesh, voxelSize, options), memoryLimit(options.maxMemory), action);
-  checkPrecision(mesh, voxelSize, outermost, action);
+    throw ResourceLimit(
+        fmt::format("vertex {} at {} is {:.3g} voxels from the origin, beyond the range of 32-bit "
+                    "indices; use larger voxels, or remove the vertex if it is an outlier",
+                    outermost, text(mesh.positions[outermost]),
+                    largest(mesh.positions[outermost]) / voxelSize));
+  requireMemory(estimateMemory(mesh, voxelSize, options), memoryLimit(options.maxMemory));
+  checkPrecision(mesh, voxelSize, outermost);
 }
 
 V3i localOrigin(const TriMesh& mesh, double voxelSize) {
@@ -151,12 +148,12 @@ LocalMesh toLocal(const TriMesh& mesh, const MeshTopology& topology, double voxe
 
 namespace levelset {
 
-void checkVoxelSize(double voxelSize, double longestSide, const char* action) {
+void checkVoxelSize(double voxelSize, double longestSide) {
   if (voxelSize > longestSide)
     throw InvalidInput(
-        fmt::format("{}: the voxel size {:.6g} is larger than the object, whose longest side is "
+        fmt::format("the voxel size {:.6g} is larger than the object, whose longest side is "
                     "{:.6g}; use smaller voxels",
-                    action, voxelSize, longestSide));
+                    voxelSize, longestSide));
 }
 
 }  // namespace levelset

@@ -9,10 +9,8 @@ namespace levelset::convert {
 
 /// Checks the input of meshToBand, in this order: the arguments, the mesh, the index range, the
 /// memory, the precision of the coordinates.
-/// @param action  start of the message
 /// @throws UsageError, InvalidInput, ResourceLimit
-void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options,
-                    const char* action = "level-set");
+void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options);
 
 /// Grid point just below the centre of the mesh. Its coordinates are multiples of 8.
 [[nodiscard]] Imath::V3i localOrigin(const TriMesh& mesh, double voxelSize);

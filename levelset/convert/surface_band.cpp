@@ -27,7 +27,6 @@ using Imath::V3d;
 using Imath::V3i;
 using SurfaceLeaf = openvdb::FloatTree::LeafNodeType;
 
-constexpr const char* kSurfaceBand = "surface-band";
 // Voxels by which the band extends the surface beyond its border. Tricubic interpolation reads two
 // voxels along each axis, about 3.5 along the diagonal.
 constexpr double kBeyond = 3.5;
@@ -149,7 +148,7 @@ SurfaceGrids measureBlocks(const LocalMesh& mesh, const SideOfSurface& side, con
     if (count % kStep < added)
       requireMemory(
           static_cast<double>(count) * (sizeof(SurfaceLeaf) + SurfaceLeaf::SIZE * sizeof(float)),
-          maxMemory, kSurfaceBand);
+          maxMemory);
   };
   convert::forEachBlock(mesh, side.search(), visit, progress);
   const auto addAll = [](tbb::enumerable_thread_specific<Leaves>& from, openvdb::FloatTree& tree) {
@@ -219,16 +218,15 @@ void checkSurface(const Pseudonormals& normals, const V3i& origin, double voxelS
     };
     throw InvalidInput(
         edge->faces > 2
-            ? fmt::format("{}: at the edge from {} to {}, {} faces meet, so the surface does not "
+            ? fmt::format("at the edge from {} to {}, {} faces meet, so the surface does not "
                           "have two sides; split the surface there",
-                          kSurfaceBand, text(edge->from), text(edge->to), edge->faces)
-            : fmt::format("{}: at the edge from {} to {}, two faces have opposite orientations; "
+                          text(edge->from), text(edge->to), edge->faces)
+            : fmt::format("at the edge from {} to {}, two faces have opposite orientations; "
                           "orient all faces alike (a Moebius strip has only one side: cut it)",
-                          kSurfaceBand, text(edge->from), text(edge->to)));
+                          text(edge->from), text(edge->to)));
   }
   if (normals.borderEdges() == 0)
-    throw InvalidInput(fmt::format(
-        "{}: the mesh has no border; 'level-set' converts a closed mesh to a solid", kSurfaceBand));
+    throw InvalidInput("the mesh has no border; 'level-set' converts a closed mesh to a solid");
 }
 
 }  // namespace
@@ -236,16 +234,14 @@ void checkSurface(const Pseudonormals& normals, const V3i& origin, double voxelS
 SurfaceBandResult surfaceBand(const TriMesh& mesh, double voxelSize,
                               const SurfaceBandOptions& options) {
   if (!(options.halfWidth >= kMinSurfaceHalfWidth) || !std::isfinite(options.halfWidth))
-    throw UsageError(fmt::format("{}: the half width is {} voxels; give at least {}", kSurfaceBand,
-                                 options.halfWidth, kMinSurfaceHalfWidth));
+    throw UsageError(fmt::format("the half width is {} voxels; give at least {}", options.halfWidth,
+                                 kMinSurfaceHalfWidth));
   convert::checkMeshInput(mesh, voxelSize,
-                          {.halfWidth = options.halfWidth, .maxMemory = options.maxMemory},
-                          kSurfaceBand);
-  report(options.progress, 0, kSurfaceBand);
+                          {.halfWidth = options.halfWidth, .maxMemory = options.maxMemory});
+  report(options.progress, 0);
   const convert::MeshTopology topology = convert::findTopology(mesh);
   if (topology.triangles.empty())
-    throw InvalidInput(
-        fmt::format("{}: every triangle is degenerate; there is no surface", kSurfaceBand));
+    throw InvalidInput("every triangle is degenerate; there is no surface");
   const V3i origin = convert::localOrigin(mesh, voxelSize);
   const LocalMesh local = convert::toLocal(mesh, topology, voxelSize, origin);
   const Pseudonormals normals(local);
@@ -259,7 +255,7 @@ SurfaceBandResult surfaceBand(const TriMesh& mesh, double voxelSize,
   result.band = makeOpenBand(grids.grid, grids.beyond);
   result.borderEdges = normals.borderEdges();
   result.droppedTriangles = topology.dropped;
-  report(options.progress, 1, kSurfaceBand);
+  report(options.progress, 1);
   return result;
 }
 

@@ -26,11 +26,7 @@ class BlockTraversal {
  public:
   BlockTraversal(const LocalMesh& mesh, double reach, const BlockVisitor& visit,
                  const Progress& progress, const std::optional<Imath::Box3i>& region)
-      : mesh_(mesh),
-        reach_(reach),
-        visit_(visit),
-        gate_(progress, kShare, "level-set"),
-        region_(region) {
+      : mesh_(mesh), reach_(reach), visit_(visit), gate_(progress, kShare), region_(region) {
     boxes_.resize(mesh.triangles.size());
     for (std::size_t t = 0; t < boxes_.size(); ++t) boxes_[t] = boxOf(t);
   }

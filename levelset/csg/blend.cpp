@@ -39,7 +39,6 @@ FloatGrid::Ptr runFlow(FloatGrid::Ptr field, solids::SeamWeights& weights,
                        const solids::SeamFlow& flow, double halfWidth,
                        const BlendOptions& options) {
   eikonal::DistanceRequest request;
-  request.action = "blend";
   request.halfWidth = kHalfWidth;
   request.maxMemory = options.maxMemory;
   field = eikonal::distanceTransform(*field, request);
@@ -55,7 +54,7 @@ FloatGrid::Ptr runFlow(FloatGrid::Ptr field, solids::SeamWeights& weights,
       field = eikonal::distanceTransform(*field, request);
       moved = 0;
     }
-    report(options.progress, 0.4 + 0.5 * std::min(1.0, time / duration), "blend");
+    report(options.progress, 0.4 + 0.5 * std::min(1.0, time / duration));
   }
   request.halfWidth = halfWidth;
   return eikonal::distanceTransform(*field, request);
@@ -91,13 +90,12 @@ void putBack(const FloatGrid& part, solids::SeamWeights& weights, FloatGrid& sol
 
 void checkRadius(double radius, const BlendOptions& options) {
   if (!std::isfinite(radius) || radius < 0)
-    throw UsageError(fmt::format("blend: the radius is {}; give a length of zero or more", radius));
+    throw UsageError(fmt::format("the radius is {}; give a length of zero or more", radius));
   if (!options.reach) return;
   if (!std::isfinite(*options.reach) || *options.reach <= 0)
-    throw UsageError(
-        fmt::format("blend: the reach is {}; give a length above zero", *options.reach));
+    throw UsageError(fmt::format("the reach is {}; give a length above zero", *options.reach));
   if (options.method != BlendMethod::Fillet)
-    throw UsageError("blend: --reach applies only to --method fillet; leave it out");
+    throw UsageError("--reach applies only to --method fillet; leave it out");
 }
 
 /// Checks the radius against the size of the solid: a larger flow would remove the solid.
@@ -105,7 +103,7 @@ void checkAgainstSize(double radius, const NarrowBand& solid) {
   const Imath::Box3d box = solid.zeroSetBounds();
   if (!box.isEmpty() && radius > box.size().length())
     throw InvalidInput(
-        fmt::format("blend: the radius {:.4g} is larger than the solids, whose "
+        fmt::format("the radius {:.4g} is larger than the solids, whose "
                     "diagonal is {:.4g}; use a smaller radius",
                     radius, box.size().length()));
 }
@@ -115,14 +113,14 @@ void checkAgainstSize(double radius, const NarrowBand& solid) {
 CsgResult blend(CsgOperation operation, const NarrowBand& a, const NarrowBand& b, double radius,
                 const BlendOptions& options) {
   checkRadius(radius, options);
-  requireSolid(a, "blend");
-  requireSolid(b, "blend");
+  requireSolid(a);
+  requireSolid(b);
   if (a.isEmpty() || b.isEmpty())
-    throw InvalidInput("blend: a solid is empty, so there is nothing to blend; give two solids");
+    throw InvalidInput("a solid is empty, so there is nothing to blend; give two solids");
 
   // === Plain CSG
   const solids::SeamOperands operands =
-      solids::onOneGrid(a, b, {"blend", options.maxMemory, subProgress(options.progress, 0, 0.2)});
+      solids::onOneGrid(a, b, {options.maxMemory, subProgress(options.progress, 0, 0.2)});
   CsgOptions csg;
   csg.maxMemory = options.maxMemory;
   csg.progress = subProgress(options.progress, 0.2, 0.4);
@@ -140,13 +138,11 @@ CsgResult blend(CsgOperation operation, const NarrowBand& a, const NarrowBand& b
   checkAgainstSize(radius, result.band);
   if (radiusVoxels < kCoarsest)
     result.notes.push_back(fmt::format(
-        "blend: the grid cannot represent a radius of {:.3g} voxels; use smaller voxels",
-        radiusVoxels));
+        "the grid cannot represent a radius of {:.3g} voxels; use smaller voxels", radiusVoxels));
   const std::vector<Vec3d> curve =
       solids::seamCurve(vdb(operands.a).tree(), vdb(operands.b).tree());
   if (curve.empty()) {
-    result.notes.emplace_back(
-        "blend: the surfaces do not intersect, so there is no crease to round");
+    result.notes.emplace_back("the surfaces do not intersect, so there is no crease to round");
     return result;
   }
 
@@ -157,7 +153,7 @@ CsgResult blend(CsgOperation operation, const NarrowBand& a, const NarrowBand& b
   part = runFlow(std::move(part), weights, {radiusVoxels, options.side}, result.band.halfWidth(),
                  options);
   putBack(*part, weights, solid);
-  report(options.progress, 1, "blend");
+  report(options.progress, 1);
   return result;
 }
 

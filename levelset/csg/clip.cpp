@@ -17,7 +17,7 @@ using Imath::V3d;
 
 InvalidInput nothingLeft() {
   return InvalidInput(
-      "clip: the result is empty, because the solid lies outside; check the box or the plane");
+      "the result is empty, because the solid lies outside; check the box or the plane");
 }
 
 Imath::Box3d worldBounds(const openvdb::FloatGrid& grid, const openvdb::CoordBBox& box) {
@@ -40,24 +40,24 @@ openvdb::CoordBBox solidBounds(const openvdb::FloatGrid& grid) {
 /// function only within the bounds of the solid.
 template <typename Distance>
 NarrowBand clipBy(const NarrowBand& solid, const Progress& progress, const Distance& distance) {
-  report(progress, 0, "clip");
+  report(progress, 0);
   const openvdb::FloatGrid& grid = vdb(solid);
   const auto region = emptyLevelSet(grid.transform().copy(), 1);
   region->tree().root().setBackground(grid.background(), /*updateChildNodes=*/false);
   const auto phi = [&](double i, double j, double k) {
     return distance(toImath(grid.indexToWorld(openvdb::Vec3d(i, j, k))));
   };
-  if (!BlockFiller(*region, phi).fill(solidBounds(grid), subProgress(progress, 0, 0.5), "clip"))
+  if (!BlockFiller(*region, phi).fill(solidBounds(grid), subProgress(progress, 0, 0.5)))
     throw nothingLeft();
   openvdb::FloatGrid::Ptr merged = mergePair(CsgOperation::Intersection, grid, *region);
   if (!hasInside(*merged)) throw nothingLeft();
-  report(progress, 1, "clip");
+  report(progress, 1);
   return makeBand(std::move(merged));
 }
 
 void requireSurface(const NarrowBand& solid) {
-  requireSolid(solid, "clip");
-  if (solid.isEmpty()) throw InvalidInput("clip: the solid is empty; give a solid with a surface");
+  requireSolid(solid);
+  if (solid.isEmpty()) throw InvalidInput("the solid is empty; give a solid with a surface");
 }
 
 }  // namespace
@@ -67,7 +67,7 @@ NarrowBand clip(const NarrowBand& solid, const Imath::Box3d& box, const Progress
   for (int axis = 0; axis < 3; ++axis) {
     if (box.min[axis] < box.max[axis]) continue;  // false for NaN
     throw UsageError(
-        fmt::format("clip: the box extends from {} to {} along axis {}; its lower corner "
+        fmt::format("the box extends from {} to {} along axis {}; its lower corner "
                     "must be below its upper one",
                     box.min[axis], box.max[axis], "xyz"[axis]));
   }
@@ -91,7 +91,7 @@ NarrowBand clip(const NarrowBand& solid, const Imath::Plane3d& plane, const Prog
   const double length = plane.normal.length();
   if (!(length > 0) || !std::isfinite(length) || !std::isfinite(plane.distance)) {
     throw UsageError(
-        fmt::format("clip: the plane has normal {},{},{} and distance {}; it needs a "
+        fmt::format("the plane has normal {},{},{} and distance {}; it needs a "
                     "finite direction and distance",
                     plane.normal.x, plane.normal.y, plane.normal.z, plane.distance));
   }

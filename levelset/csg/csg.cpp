@@ -24,18 +24,6 @@ namespace {
 using openvdb::FloatGrid;
 using openvdb::FloatTree;
 
-const char* nameOf(CsgOperation operation) {
-  switch (operation) {
-    case CsgOperation::Union:
-      return "union";
-    case CsgOperation::Intersection:
-      return "intersection";
-    case CsgOperation::Difference:
-      return "difference";
-  }
-  return "";
-}
-
 /// Replaces negative zeros by zeros, so that equal results have equal bits.
 void clearSignOfZeros(FloatTree& tree) {
   openvdb::tree::LeafManager<FloatTree> leaves(tree);
@@ -62,26 +50,25 @@ FloatGrid::Ptr minimumOf(CsgOperation operation, const FloatGrid& a, const Float
   return result;
 }
 
-void requireSolids(std::span<const NarrowBand> solids, const CsgOptions& options,
-                   const char* action) {
+void requireSolids(std::span<const NarrowBand> solids, const CsgOptions& options) {
   if (solids.size() < 2) {
-    throw UsageError(fmt::format("{}: needs at least two solids, but there {}; name more operands",
-                                 action, solids.empty() ? "are none" : "is one"));
+    throw UsageError(fmt::format("needs at least two solids, but there {}; name more operands",
+                                 solids.empty() ? "are none" : "is one"));
   }
   double bytes = 0;
   for (std::size_t i = 0; i < solids.size(); ++i) {
-    requireSolid(solids[i], action);
+    requireSolid(solids[i]);
     if (solids[i].isEmpty()) {
-      throw InvalidInput(fmt::format("{}: operand {} has no surface; leave it out", action, i + 1));
+      throw InvalidInput(fmt::format("operand {} has no surface; leave it out", i + 1));
     }
     bytes += static_cast<double>(solids[i].memoryUse());
   }
-  requireMemory(2 * bytes, options.maxMemory, action);
+  requireMemory(2 * bytes, options.maxMemory);
 }
 
 /// Resamples all solids to the grid of the finest one, with the smallest half width.
 std::vector<NarrowBand> onOneGrid(std::span<const NarrowBand> solids, const CsgOptions& options,
-                                  const char* action, std::vector<std::string>& notes) {
+                                  std::vector<std::string>& notes) {
   const auto finest = std::min_element(
       solids.begin(), solids.end(),
       [](const auto& a, const auto& b) { return a.voxelSize() < b.voxelSize() * (1 - 1e-9); });
@@ -93,16 +80,16 @@ std::vector<NarrowBand> onOneGrid(std::span<const NarrowBand> solids, const CsgO
       result.push_back(narrowed(solids[i], halfWidth));
       // Half widths that differ only by rounding need no note.
       if (halfWidth < solids[i].halfWidth() * (1 - 1e-5))
-        notes.push_back(fmt::format("{}: operand {} was narrowed to a half width of {:.6g} voxels",
-                                    action, i + 1, halfWidth));
+        notes.push_back(fmt::format("operand {} was narrowed to a half width of {:.6g} voxels",
+                                    i + 1, halfWidth));
       continue;
     }
     result.push_back(resampleTo(solids[i], finest->indexToWorld(),
                                 {.halfWidth = halfWidth, .maxMemory = options.maxMemory}));
     notes.push_back(fmt::format(
-        "{}: operand {} was resampled from voxels of {} to the grid of operand {} "
+        "operand {} was resampled from voxels of {} to the grid of operand {} "
         "with voxels of {}",
-        action, i + 1, solids[i].voxelSize(), finest - solids.begin() + 1, finest->voxelSize()));
+        i + 1, solids[i].voxelSize(), finest - solids.begin() + 1, finest->voxelSize()));
   }
   // Voxel sizes may differ in the last bits, and then equal half widths give different backgrounds.
   float background = vdb(result.front()).background();
@@ -146,12 +133,10 @@ std::set<openvdb::Coord> blocksAbout(const std::vector<openvdb::Coord>& blocks, 
 
 /// Re-distances the field near coincident faces that bound no solid. Works only near these faces,
 /// so the cost and the result do not depend on the rest of the solid.
-void redistanceAbout(const std::vector<openvdb::Coord>& faces, FloatGrid& grid,
-                     const char* action) {
+void redistanceAbout(const std::vector<openvdb::Coord>& faces, FloatGrid& grid) {
   const double voxelSize = grid.voxelSize()[0];
   const float background = grid.background();
   eikonal::DistanceRequest request;
-  request.action = action;
   request.halfWidth = static_cast<double>(background) / voxelSize;
   const int reach = static_cast<int>(std::ceil((request.halfWidth + 1) / Leaf::DIM));
   const std::set<openvdb::Coord> blocks = blocksAbout(faces, reach);
@@ -202,8 +187,7 @@ FloatGrid::Ptr mergePair(CsgOperation operation, const FloatGrid& first, const F
   pruneOneSided(result->tree());
   // Where such a face ends at an edge of the result, the plane model of correctSeam() is wrong.
   const std::vector<openvdb::Coord> faces = coincidentFaces(first, second, signs);
-  if (!faces.empty() && eikonal::hasZeroCrossing(result->tree()))
-    redistanceAbout(faces, *result, nameOf(operation));
+  if (!faces.empty() && eikonal::hasZeroCrossing(result->tree())) redistanceAbout(faces, *result);
   return result;
 }
 
@@ -218,7 +202,7 @@ NarrowBand uniteAll(std::vector<NarrowBand> solids, const CsgOptions& options) {
     const std::size_t half = (solids.size() + 1) / 2;
     for (std::size_t i = 0; i < half; ++i) {
       const bool isPair = 2 * i + 1 < solids.size();
-      if (isPair) report(options.progress, done++ / pairs, nameOf(CsgOperation::Union));
+      if (isPair) report(options.progress, done++ / pairs);
       solids[i] =
           isPair
               ? makeBand(mergePair(CsgOperation::Union, vdb(solids[2 * i]), vdb(solids[2 * i + 1])))
@@ -233,34 +217,32 @@ NarrowBand uniteAll(std::vector<NarrowBand> solids, const CsgOptions& options) {
 
 CsgResult combine(CsgOperation operation, std::span<const NarrowBand> solids,
                   const CsgOptions& options) {
-  const char* action = nameOf(operation);
-  requireSolids(solids, options, action);
+  requireSolids(solids, options);
   CsgResult result;
-  std::vector<NarrowBand> operands = onOneGrid(solids, options, action, result.notes);
+  std::vector<NarrowBand> operands = onOneGrid(solids, options, result.notes);
   if (operation == CsgOperation::Union) {
     result.band = uniteAll(std::move(operands), options);
-    report(options.progress, 1, action);
+    report(options.progress, 1);
     return result;
   }
   result.band = operands.front();
   for (std::size_t i = 1; i < operands.size(); ++i) {
-    report(options.progress, static_cast<double>(i - 1) / static_cast<double>(operands.size() - 1),
-           action);
+    report(options.progress, static_cast<double>(i - 1) / static_cast<double>(operands.size() - 1));
     FloatGrid::Ptr merged = mergePair(operation, vdb(result.band), vdb(operands[i]));
     if (!hasInside(*merged)) {
       throw InvalidInput(operation == CsgOperation::Intersection
-                             ? fmt::format("{}: the result is empty, because operand {} does not "
+                             ? fmt::format("the result is empty, because operand {} does not "
                                            "overlap the intersection of the "
                                            "operands before it; check their positions",
-                                           action, i + 1)
-                             : fmt::format("{}: the result is empty after operand {} is "
+                                           i + 1)
+                             : fmt::format("the result is empty after operand {} is "
                                            "subtracted; check the order of the "
                                            "operands",
-                                           action, i + 1));
+                                           i + 1));
     }
     result.band = makeBand(std::move(merged));
   }
-  report(options.progress, 1, action);
+  report(options.progress, 1);
   return result;
 }
 

@@ -148,11 +148,11 @@ const OperatorText ClipOperator::text{
     .example = "levelsmith sphere --radius 2 --voxel 0.1 ! clip --plane \"0,0,0 0,0,1\" ! measure"};
 
 void ClipOperator::check(const Options& options, const GivenOptions& given) {
-  if (given("box") == given("plane")) throw UsageError("clip: give one of --box and --plane");
+  if (given("box") == given("plane")) throw UsageError("give one of --box and --plane");
   if (given("box")) return;
   if (options.plane.size() != 2 || !(options.plane[1].length() > 0)) {
     throw UsageError(
-        "clip: --plane needs a point and a normal, \"x,y,z x,y,z\"; what lies behind the plane "
+        "--plane needs a point and a normal, \"x,y,z x,y,z\"; what lies behind the plane "
         "stays");
   }
 }

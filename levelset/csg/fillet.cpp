@@ -77,7 +77,6 @@ FloatGrid::Ptr widened(const NarrowBand& solid, float sign, const eikonal::Point
                        const FilletSize& size, double halfWidth, const BlendOptions& options) {
   FloatGrid::Ptr part = cutOut(vdb(solid), curve, 2 * (size.extent() + halfWidth));
   eikonal::DistanceRequest request;
-  request.action = "blend";
   request.halfWidth = 2 * size.radius + halfWidth + kStencil + 1;
   request.maxMemory = options.maxMemory;
   request.progress = options.progress;
@@ -219,8 +218,8 @@ void addFillet(CsgOperation operation, const SeamOperands& operands, double radi
   const bool adds = operation == CsgOperation::Union;
   if (options.side == (adds ? BlendSide::Remove : BlendSide::Add)) {
     result.notes.emplace_back(
-        adds ? "blend: the fillet of a union only adds material, so --side remove changes nothing"
-             : "blend: this fillet only removes material, so --side add changes nothing");
+        adds ? "the fillet of a union only adds material, so --side remove changes nothing"
+             : "this fillet only removes material, so --side add changes nothing");
     return;
   }
   const double voxelSize = result.band.voxelSize(), halfWidth = result.band.halfWidth();
@@ -228,14 +227,12 @@ void addFillet(CsgOperation operation, const SeamOperands& operands, double radi
   size.bound = boundOf(vdb(operands.a), vdb(operands.b), size, halfWidth);
   const std::vector<Vec3d> curve = seamCurve(vdb(operands.a).tree(), vdb(operands.b).tree());
   if (curve.empty()) {
-    result.notes.emplace_back(
-        "blend: the surfaces do not intersect, so there is no crease to round");
+    result.notes.emplace_back("the surfaces do not intersect, so there is no crease to round");
     return;
   }
   if (size.radius < 1.5)
     result.notes.push_back(fmt::format(
-        "blend: the grid cannot represent a radius of {:.3g} voxels; use smaller voxels",
-        size.radius));
+        "the grid cannot represent a radius of {:.3g} voxels; use smaller voxels", size.radius));
 
   // === Distances over the diameter of the ball
   const eikonal::PointTree tree(curve);
@@ -254,7 +251,7 @@ void addFillet(CsgOperation operation, const SeamOperands& operands, double radi
   const std::vector<Coord> origins =
       blocksBeside(a->tree(), b->tree(), tree, size.extent() + halfWidth + 1);
   requireMemory(static_cast<double>(origins.size()) * kBytesPerBlock,
-                memoryLimit(options.maxMemory), "blend");
+                memoryLimit(options.maxMemory));
   std::vector<FilletBlock> blocks(origins.size());
   constexpr std::size_t kBatch = 512;
   for (std::size_t begin = 0; begin < origins.size(); begin += kBatch) {
@@ -271,7 +268,7 @@ void addFillet(CsgOperation operation, const SeamOperands& operands, double radi
       }
     });
     report(options.progress,
-           0.8 + 0.2 * static_cast<double>(end) / static_cast<double>(origins.size()), "blend");
+           0.8 + 0.2 * static_cast<double>(end) / static_cast<double>(origins.size()));
   }
   putFillet(blocks, editVdb(result.band));
 }

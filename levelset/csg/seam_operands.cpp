@@ -56,8 +56,8 @@ SeamOperands onOneGrid(const NarrowBand& a, const NarrowBand& b, const SeamReque
   resampling.progress = request.progress;
   const NarrowBand moved = resampleTo(coarse, fine.indexToWorld(), resampling);
   std::string note = fmt::format(
-      "{}: the {} operand was resampled from voxels of {:.4g} to the other's grid of {:.4g}",
-      request.action, firstIsFiner ? "second" : "first", coarse.voxelSize(), fine.voxelSize());
+      "the {} operand was resampled from voxels of {:.4g} to the other's grid of {:.4g}",
+      firstIsFiner ? "second" : "first", coarse.voxelSize(), fine.voxelSize());
   return {firstIsFiner ? fine : moved, firstIsFiner ? moved : fine, {std::move(note)}};
 }
 

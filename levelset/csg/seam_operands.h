@@ -9,7 +9,6 @@
 namespace levelset::solids {
 
 struct SeamRequest {
-  const char* action;  ///< prefix of notes
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };

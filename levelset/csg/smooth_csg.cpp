@@ -26,18 +26,6 @@ using SmoothLeaf = openvdb::FloatTree::LeafNodeType;
 // On the smooth surface the smaller distance is at most K/4, and the other at most K more.
 constexpr double kReadRadii = 1.25;
 
-const char* smoothName(CsgOperation operation) {
-  switch (operation) {
-    case CsgOperation::Union:
-      return "smooth-union";
-    case CsgOperation::Intersection:
-      return "smooth-intersection";
-    case CsgOperation::Difference:
-      return "smooth-difference";
-  }
-  return "";
-}
-
 /// Index box of the grid points where the zero set of a solid is at most `extent` voxels away.
 CoordBBox boxAround(const FloatGrid& grid, double extent) {
   CoordBBox box = grid.evalActiveVoxelBoundingBox();
@@ -47,11 +35,9 @@ CoordBBox boxAround(const FloatGrid& grid, double extent) {
 
 /// Distances of a solid up to `width` voxels inside a box of grid points.
 FloatGrid::Ptr widenedIn(const CoordBBox& box, const NarrowBand& solid, double width,
-                         const char* action, const SmoothCsgOptions& options,
-                         const Progress& progress) {
+                         const SmoothCsgOptions& options, const Progress& progress) {
   if (solid.halfWidth() >= width) return vdb(solid).deepCopy();
   eikonal::DistanceRequest request;
-  request.action = action;
   request.halfWidth = width;
   request.region = box;
   request.maxMemory = options.maxMemory;
@@ -95,27 +81,24 @@ std::size_t applySmoothMinimum(FloatGrid& field, const FloatGrid& a, const Float
   return changed;
 }
 
-void checkOperands(const NarrowBand& a, const NarrowBand& b, const SmoothCsgOptions& options,
-                   const char* action) {
+void checkOperands(const NarrowBand& a, const NarrowBand& b, const SmoothCsgOptions& options) {
   if (!std::isfinite(options.radius) || options.radius < 0)
     throw UsageError(
-        fmt::format("{}: the radius is {}; give a length of zero or more", action, options.radius));
-  requireSolid(a, action);
-  requireSolid(b, action);
-  if (a.isEmpty() || b.isEmpty())
-    throw InvalidInput(fmt::format("{}: a solid is empty; give two solids", action));
+        fmt::format("the radius is {}; give a length of zero or more", options.radius));
+  requireSolid(a);
+  requireSolid(b);
+  if (a.isEmpty() || b.isEmpty()) throw InvalidInput("a solid is empty; give two solids");
 }
 
 }  // namespace
 
 CsgResult smoothCombine(CsgOperation operation, const NarrowBand& first, const NarrowBand& second,
                         const SmoothCsgOptions& options) {
-  const char* action = smoothName(operation);
-  checkOperands(first, second, options, action);
+  checkOperands(first, second, options);
 
   // === The hard result, which is right where the distances differ by K or more
-  const solids::SeamOperands operands = solids::onOneGrid(
-      first, second, {action, options.maxMemory, subProgress(options.progress, 0, 0.2)});
+  const solids::SeamOperands operands =
+      solids::onOneGrid(first, second, {options.maxMemory, subProgress(options.progress, 0, 0.2)});
   const std::array<NarrowBand, 2> pair = {operands.a, operands.b};
   CsgResult result = combine(
       operation, pair,
@@ -131,10 +114,8 @@ CsgResult smoothCombine(CsgOperation operation, const NarrowBand& first, const N
   if (box.empty()) return result;
   FloatGrid::Ptr a, b;
   try {
-    a = widenedIn(box, operands.a, width, action, options,
-                  subProgress(options.progress, 0.4, 0.55));
-    b = widenedIn(box, operands.b, width, action, options,
-                  subProgress(options.progress, 0.55, 0.7));
+    a = widenedIn(box, operands.a, width, options, subProgress(options.progress, 0.4, 0.55));
+    b = widenedIn(box, operands.b, width, options, subProgress(options.progress, 0.55, 0.7));
   } catch (const InvalidInput&) {
     return result;  // a surface does not reach the box, as that of a ball deep inside another
   }
@@ -145,11 +126,9 @@ CsgResult smoothCombine(CsgOperation operation, const NarrowBand& first, const N
   if (applySmoothMinimum(*field, *a, *b, csgSigns(operation), options.radius, known) == 0)
     return result;
   if (!eikonal::hasZeroCrossing(field->tree()))
-    throw InvalidInput(
-        fmt::format("{}: nothing is left of the solids with a radius of {}; give a smaller one",
-                    action, options.radius));
+    throw InvalidInput(fmt::format(
+        "nothing is left of the solids with a radius of {}; give a smaller one", options.radius));
   eikonal::DistanceRequest request;
-  request.action = action;
   request.halfWidth = result.band.halfWidth();
   request.maxMemory = options.maxMemory;
   request.progress = subProgress(options.progress, 0.7, 1);

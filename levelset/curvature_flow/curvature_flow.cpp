@@ -18,7 +18,6 @@ using flow::CurvatureState;
 using flow::CurvatureSteps;
 using flow::NearSurface;
 
-constexpr const char* kAction = "curvature-flow";
 // Default tolerance in voxels, over the entire time.
 constexpr double kDefaultTolerance = 0.02;
 // Limits of the growth and shrinkage of steps, and safety factor on the error estimate.
@@ -37,28 +36,25 @@ constexpr double kRestMove = 0.05;
 
 void checkPositive(double value, const char* what, const char* unit) {
   if (!(value > 0) || !std::isfinite(value))
-    throw UsageError(
-        fmt::format("{}: the {} is {}; give a positive number of {}", kAction, what, value, unit));
+    throw UsageError(fmt::format("the {} is {}; give a positive number of {}", what, value, unit));
 }
 
 void checkArguments(const NarrowBand& solid, double time, const CurvatureFlowOptions& options) {
   if (!(time >= 0) || !std::isfinite(time))
-    throw UsageError(
-        fmt::format("{}: the time is {}; give a finite time of 0 or more, in world units squared",
-                    kAction, time));
+    throw UsageError(fmt::format(
+        "the time is {}; give a finite time of 0 or more, in world units squared", time));
   if (options.tolerance) checkPositive(*options.tolerance, "tolerance", "world units");
   if (options.step) checkPositive(*options.step, "step", "world units squared");
-  if (options.mask) checkMask(*options.mask, kAction);
-  requireSolid(solid, kAction);
+  if (options.mask) checkMask(*options.mask);
+  requireSolid(solid);
   if (solid.isEmpty())
-    throw InvalidInput(fmt::format(
-        "{}: the solid is empty, so there is no surface to move; give a solid with a surface",
-        kAction));
+    throw InvalidInput(
+        "the solid is empty, so there is no surface to move; give a solid with a surface");
   if (options.step && time / *options.step > static_cast<double>(kMostFlowSteps))
     throw ResourceLimit(fmt::format(
-        "{}: a time of {} in steps of {} requires {:.3g} steps, more than the limit of {}; use "
+        "a time of {} in steps of {} requires {:.3g} steps, more than the limit of {}; use "
         "longer steps or a shorter time",
-        kAction, time, *options.step, time / *options.step, kMostFlowSteps));
+        time, *options.step, time / *options.step, kMostFlowSteps));
 }
 
 /// Time in voxels² after which the corners of a cube have moved by a voxel.
@@ -90,7 +86,7 @@ class CurvatureFlow {
       return spent_[index(a)] < spent_[index(b)];
     });
     if (result_.steps == 0) result_.scheme = FlowScheme::Auto;
-    report(options_.progress, 1, kAction);
+    report(options_.progress, 1);
     return std::move(result_);
   }
 
@@ -99,11 +95,10 @@ class CurvatureFlow {
       FlowScheme::Explicit, FlowScheme::Stabilized, FlowScheme::Implicit};
   static std::size_t index(FlowScheme scheme) { return static_cast<std::size_t>(scheme); }
 
-  void reportProgress() const { report(options_.progress, 0.99 * now_ / time_, kAction); }
+  void reportProgress() const { report(options_.progress, 0.99 * now_ / time_); }
 
   openvdb::FloatGrid::Ptr distances(const openvdb::FloatGrid& field, double halfWidth) {
     eikonal::DistanceRequest request;
-    request.action = kAction;
     request.halfWidth = halfWidth;
     request.mayHaveEdges = now_ < kEdgesGone || options_.mask;
     request.maxMemory = options_.maxMemory;
@@ -115,15 +110,15 @@ class CurvatureFlow {
 
   void checkMemory(const openvdb::FloatGrid& grid) const {
     const double blocks = static_cast<double>(grid.tree().leafCount());
-    requireMemory(blocks * sizeof(flow::Values) * kFields, options_.maxMemory, kAction);
+    requireMemory(blocks * sizeof(flow::Values) * kFields, options_.maxMemory);
   }
 
   void requireSurface(const openvdb::FloatGrid& grid) const {
     if (eikonal::hasZeroCrossing(grid.tree())) return;
     throw InvalidInput(
-        fmt::format("{}: the solid vanishes after a time of {:.4g} world units squared, before the "
+        fmt::format("the solid vanishes after a time of {:.4g} world units squared, before the "
                     "requested {:.4g}; give a shorter time",
-                    kAction, now_ * voxel_ * voxel_, time_ * voxel_ * voxel_));
+                    now_ * voxel_ * voxel_, time_ * voxel_ * voxel_));
   }
 
   /// Integrates until redistancing is due, the surface is gone or the time is over.
@@ -182,11 +177,10 @@ class CurvatureFlow {
   void requireEnd(double dt) const {
     if (result_.steps < kMostFlowSteps && now_ + dt > now_) return;
     throw ResourceLimit(fmt::format(
-        "{}: {} steps reached a time of {:.4g} world units squared, and the next "
+        "{} steps reached a time of {:.4g} world units squared, and the next "
         "step is {:.3g}, so the requested {:.4g} takes too many steps; use a shorter time "
         "or larger voxels",
-        kAction, result_.steps, now_ * voxel_ * voxel_, dt * voxel_ * voxel_,
-        time_ * voxel_ * voxel_));
+        result_.steps, now_ * voxel_ * voxel_, dt * voxel_ * voxel_, time_ * voxel_ * voxel_));
   }
 
   FlowScheme cheapest(double dt, double left) const {

@@ -22,7 +22,6 @@ using flow::Values;
 using openvdb::Coord;
 using openvdb::CoordBBox;
 
-constexpr const char* kSmooth = "smooth";
 // Cut-off of the Gaussian, in σ.
 constexpr double kGaussianReach = 4;
 // Distance from the zero set at which the interpolant reads values, voxels.
@@ -93,9 +92,9 @@ void requireMedian(const openvdb::FloatGrid& grid, double radius) {
   const double readings = static_cast<double>(grid.activeVoxelCount()) * around;
   if (readings <= kMostReadings) return;
   throw ResourceLimit(fmt::format(
-      "{}: a median within {:.4g} voxels reads {:.3g} values, more than the limit of {:.3g}; use "
+      "a median within {:.4g} voxels reads {:.3g} values, more than the limit of {:.3g}; use "
       "a smaller sigma, larger voxels or --kind gaussian",
-      kSmooth, radius, readings, kMostReadings));
+      radius, readings, kMostReadings));
 }
 
 /// Filter for fields on the blocks of a band.
@@ -157,7 +156,7 @@ class BlockFilter {
     blocks_.forEach<Scratch>([&](std::size_t i, Scratch& scratch) {
       work(i, scratch);
       const std::lock_guard lock(mutex_);
-      report(progress_, std::min(1.0, ++done_ / work_), kSmooth);
+      report(progress_, std::min(1.0, ++done_ / work_));
     });
   }
 
@@ -319,7 +318,6 @@ std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const 
                                      const Filtering& filtering, const SmoothOptions& options) {
   const double voxel = solid.voxelSize();
   eikonal::DistanceRequest request;
-  request.action = kSmooth;
   request.maxMemory = options.maxMemory;
   const auto around = [&](double voxels) {
     CoordBBox wider = *box;
@@ -344,7 +342,7 @@ std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const 
 
   // === Filter
   requireMemory(static_cast<double>(field->tree().leafCount()) * sizeof(Values) * kFieldsAlive,
-                options.maxMemory, kSmooth);
+                options.maxMemory);
   if (filtering.kind == SmoothKind::Median) requireMedian(*field, filtering.width);
   const BlockFilter filter(*field,
                            filtering.kind == SmoothKind::Median ? 1 : 3 * filtering.passes(),
@@ -392,14 +390,12 @@ double smoothingReach(SmoothKind kind, double sigma, double halfWidth) {
 
 NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma, const SmoothOptions& options) {
   if (!(sigma > 0) || !std::isfinite(sigma))
-    throw UsageError(
-        fmt::format("{}: sigma is {}; give a positive, finite length", kSmooth, sigma));
-  if (options.mask) checkMask(*options.mask, kSmooth);
-  requireSolid(solid, kSmooth);
+    throw UsageError(fmt::format("sigma is {}; give a positive, finite length", sigma));
+  if (options.mask) checkMask(*options.mask);
+  requireSolid(solid);
   if (solid.isEmpty())
-    throw InvalidInput(fmt::format(
-        "{}: the solid is empty, so there is no surface to smooth; give a solid with a surface",
-        kSmooth));
+    throw InvalidInput(
+        "the solid is empty, so there is no surface to smooth; give a solid with a surface");
   const Filtering filtering{kind, sigma / solid.voxelSize()};
   if (options.mask) {
     const CoordBBox box = changingBox(vdb(solid), *options.mask);
@@ -411,9 +407,9 @@ NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma, const SmoothO
   }
   if (auto whole = smoothedIn(std::nullopt, solid, filtering, options)) return std::move(*whole);
   throw InvalidInput(
-      fmt::format("{}: a sigma of {} world units removes the entire solid; give a smaller "
+      fmt::format("a sigma of {} world units removes the entire solid; give a smaller "
                   "sigma",
-                  kSmooth, sigma));
+                  sigma));
 }
 
 }  // namespace levelset

@@ -15,18 +15,16 @@ namespace {
 /// Builds a grid with one value for each closest point: make(world position of the point).
 template <typename Grid, typename Make>
 typename Grid::Ptr gridOfClosestPoints(const NarrowBand& solid, const ClosestPointOptions& options,
-                                       const char* action, const Make& make) {
+                                       const Make& make) {
   using GridLeaf = typename Grid::TreeType::LeafNodeType;
-  requireSolid(solid, action);
+  requireSolid(solid);
   if (solid.isEmpty())
-    throw InvalidInput(fmt::format(
-        "{}: the solid is empty, so it has no surface; give a solid with a surface", action));
+    throw InvalidInput("the solid is empty, so it has no surface; give a solid with a surface");
   eikonal::DistanceRequest request;
-  request.action = action;
   request.halfWidth = options.halfWidth.value_or(solid.halfWidth());
   if (!std::isfinite(request.halfWidth) || request.halfWidth < 1)
     throw UsageError(
-        fmt::format("{}: the half width is {} voxels; give at least 1", action, request.halfWidth));
+        fmt::format("the half width is {} voxels; give at least 1", request.halfWidth));
   request.maxMemory = options.maxMemory;
   request.progress = options.progress;
 
@@ -50,10 +48,10 @@ typename Grid::Ptr gridOfClosestPoints(const NarrowBand& solid, const ClosestPoi
 
 FieldGrid closestPoints(const NarrowBand& solid, const ClosestPointOptions& options) {
   const auto grid = gridOfClosestPoints<openvdb::Vec3SGrid>(
-      solid, options, "closest-point", [](const openvdb::Vec3d& p) { return openvdb::Vec3s(p); });
+      solid, options, [](const openvdb::Vec3d& p) { return openvdb::Vec3s(p); });
   grid->setName("closest_point");
   grid->setVectorType(openvdb::VEC_CONTRAVARIANT_ABSOLUTE);
-  return importField(grid, "closest-point");
+  return importField(grid);
 }
 
 FieldGrid extendOffSurface(const NarrowBand& solid, const ScalarField& attribute,
@@ -61,20 +59,20 @@ FieldGrid extendOffSurface(const NarrowBand& solid, const ScalarField& attribute
   if (!attribute)
     throw UsageError("extend: there is no attribute; give a formula or a grid of numbers");
   const auto grid = gridOfClosestPoints<openvdb::FloatGrid>(
-      solid, options, "extend",
+      solid, options,
       [&](const openvdb::Vec3d& p) { return static_cast<float>(attribute(toImath(p))); });
   grid->setName("attribute");
-  return importField(grid, "extend");
+  return importField(grid);
 }
 
 FieldGrid extendOffSurface(const NarrowBand& solid, const VectorField& attribute,
                            const ClosestPointOptions& options) {
   if (!attribute) throw UsageError("extend: there is no attribute; give a grid of vectors");
   const auto grid = gridOfClosestPoints<openvdb::Vec3SGrid>(
-      solid, options, "extend",
+      solid, options,
       [&](const openvdb::Vec3d& p) { return openvdb::Vec3s(toVdb(attribute(toImath(p), 0))); });
   grid->setName("attribute");
-  return importField(grid, "extend");
+  return importField(grid);
 }
 
 }  // namespace levelset

@@ -210,8 +210,7 @@ FloatTree::Ptr makeTree(const FloatTree& field, const FloatTree& interpolated,
                              voxelSize, background);
     });
     report(request.progress,
-           0.6 + 0.4 * static_cast<double>(end) / static_cast<double>(blocks.size()),
-           request.action);
+           0.6 + 0.4 * static_cast<double>(end) / static_cast<double>(blocks.size()));
   }
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     if (leaves[i].leaf)
@@ -237,7 +236,7 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
   // === Surface points
   FloatTree::ConstPtr interpolated = field.constTreePtr();
   const auto reportProgress = [&](double done) {
-    report(request.progress, 0.2 * done, request.action);
+    report(request.progress, 0.2 * done);
     return true;
   };
   const SharpPatches patches =
@@ -249,14 +248,13 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
   }
   if (points.size() == 0)
     throw InvalidInput(
-        fmt::format("{}: the field has no zero crossing{}, so there is no surface to "
+        fmt::format("the field has no zero crossing{}, so there is no surface to "
                     "measure from; give a solid with a surface",
-                    request.action, within ? " near the region" : ""));
+                    within ? " near the region" : ""));
   if (points.size() >= NearestPoints::kNone)
     throw ResourceLimit(
-        fmt::format("{}: more than 2^32 grid points lie beside the surface; use larger "
-                    "voxels",
-                    request.action));
+        "more than 2^32 grid points lie beside the surface; use larger "
+        "voxels");
   MemoryEstimate estimate;
   for (const Coord& c : points.gridPoints) estimate.surface.expand(c);
   // There are at least 1.15 points per unit of area.
@@ -265,12 +263,12 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
   estimate.outside = reach.outside;
   estimate.region = request.region;
   estimate.bytesPerGridPoint = 25;  // state and result, including the unused part of blocks
-  checkMemory(estimate, request.maxMemory, request.action);
-  report(request.progress, 0.3, request.action);
+  checkMemory(estimate, request.maxMemory);
+  report(request.progress, 0.3);
 
   // === Nearest surface point of each grid point
   NearestPoints nearest(field.tree(), points, reach);
-  nearest.run(subProgress(request.progress, 0.3, 0.6), request.action);
+  nearest.run(subProgress(request.progress, 0.3, 0.6));
 
   // === Distances
   FloatGrid::Ptr result = FloatGrid::create(makeTree(field.tree(), *interpolated, points, patches,
@@ -278,7 +276,7 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
   result->setTransform(field.transform().copy());
   result->setName(field.getName());
   result->setGridClass(openvdb::GRID_LEVEL_SET);
-  report(request.progress, 1, request.action);
+  report(request.progress, 1);
   return result;
 }
 

@@ -17,7 +17,6 @@ using ClosestPointLeaf = std::array<openvdb::Vec3d, 512>;
 /// Options of distanceTransform(), in voxels. The result is d − shift where |d − shift| <
 /// halfWidth.
 struct DistanceRequest {
-  const char* action = "redistance";  ///< prefix of messages
   double halfWidth = 3;
   double shift = 0;  ///< offset of the surface, outwards (> 0) or inwards (< 0)
   std::optional<openvdb::CoordBBox> region = {};

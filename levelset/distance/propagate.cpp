@@ -278,7 +278,7 @@ void NearestPoints::process(Block& block, std::vector<Coord>& missing) const {
   }
 }
 
-void NearestPoints::run(const Progress& progress, const char* action) {
+void NearestPoints::run(const Progress& progress) {
   std::array<std::vector<Block*>, 8> byParity;
   std::size_t sorted = 0;
   const auto sortNew = [&] {
@@ -313,7 +313,7 @@ void NearestPoints::run(const Progress& progress, const char* action) {
       sortNew();
     }
     fraction += (1 - fraction) / 8;
-    report(progress, fraction, action);
+    report(progress, fraction);
   }
 }
 

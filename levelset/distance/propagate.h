@@ -43,7 +43,7 @@ class NearestPoints {
   };
 
   NearestPoints(const openvdb::FloatTree& field, const SurfacePoints& points, const Reach& reach);
-  void run(const Progress& progress, const char* action);
+  void run(const Progress& progress);
 
   [[nodiscard]] const std::deque<Block>& blocks() const { return blocks_; }
   [[nodiscard]] bool holds(const openvdb::Coord& origin) const { return index_.count(origin) > 0; }

@@ -32,7 +32,7 @@ bool isFinite(const Imath::Box3d& box) {
 }  // namespace
 
 NarrowBand redistance(NarrowBand field, const RedistanceOptions& options) {
-  requireSolid(field, "redistance");
+  requireSolid(field);
   if (field.isEmpty())
     throw InvalidInput(
         "redistance: the field is empty and has no zero crossing; give a solid with a surface");

@@ -61,7 +61,6 @@ class Solver {
         side_(side),
         voxelTime_(unit * transform.voxelSize()[0]) {
     ArrivalBlocks::Settings settings;
-    settings.action = request.action;
     settings.until = request.until / voxelTime_;
     if (slowness) settings.slowness = [=](const Coord& c) { return slowness(c.asVec3d()); };
     settings.side = side;
@@ -162,12 +161,11 @@ void checkMemoryFor(const std::vector<StartTime>& start, const FloatGrid& field,
   estimate.area = static_cast<double>(start.size()) / (2 * kStartWidth);
   estimate.inside = estimate.outside = request.until / field.voxelSize()[0];
   estimate.bytesPerGridPoint = kBytesPerGridPoint;
-  checkMemory(estimate, request.options.maxMemory, request.action);
+  checkMemory(estimate, request.options.maxMemory);
 }
 
 ArrivalStart startOf(const ArrivalRequest& request, const Slowness& slowness) {
-  return {.action = request.action,
-          .slowness = slowness,
+  return {.slowness = slowness,
           .maxMemory = request.options.maxMemory,
           .progress = subProgress(request.options.progress, 0, kStarted)};
 }
@@ -175,16 +173,16 @@ ArrivalStart startOf(const ArrivalRequest& request, const Slowness& slowness) {
 /// Converts source points to index positions.
 /// @throws ResourceLimit beyond the range of indices
 std::vector<Vec3d> positionsOf(std::span<const Imath::V3d> sources,
-                               const openvdb::math::Transform& transform, const char* action) {
+                               const openvdb::math::Transform& transform) {
   std::vector<Vec3d> positions;
   for (const Imath::V3d& source : sources) {
     positions.push_back(transform.worldToIndex(toVdb(source)));
     for (int i = 0; i < 3; ++i)
       if (!(std::abs(positions.back()[i]) < kIndexLimit))
-        throw ResourceLimit(fmt::format(
-            "{}: a source point lies {:.4g} voxels from the origin, beyond the range of "
-            "32-bit indices; use larger voxels",
-            action, std::abs(positions.back()[i])));
+        throw ResourceLimit(
+            fmt::format("a source point lies {:.4g} voxels from the origin, beyond the range of "
+                        "32-bit indices; use larger voxels",
+                        std::abs(positions.back()[i])));
   }
   return positions;
 }
@@ -203,7 +201,7 @@ ArrivalGrid arrivalFromSurface(const FloatGrid& field, const ArrivalRequest& req
 ArrivalGrid arrivalFromPoints(std::span<const Imath::V3d> sources,
                               const openvdb::math::Transform& transform,
                               const ArrivalRequest& request) {
-  const std::vector<Vec3d> positions = positionsOf(sources, transform, request.action);
+  const std::vector<Vec3d> positions = positionsOf(sources, transform);
   const Slowness world = slownessOf(request.options.speed, transform);
   const double unit = world ? typicalSlowness(positions, world) : 1;
   const Slowness slowness = scaled(world, unit);
@@ -217,71 +215,61 @@ namespace {
 
 eikonal::ArrivalRequest checkedRequest(double until, const ArrivalOptions& options) {
   eikonal::ArrivalRequest request;
-  request.action = options.method == FrontMethod::Marching ? "fast-marching" : "fast-sweeping";
   request.until = until;
   request.options = options;
   if (!std::isfinite(until) || until <= 0)
-    throw UsageError(fmt::format("{}: the latest time is {}; give a positive, finite time",
-                                 request.action, until));
+    throw UsageError(fmt::format("the latest time is {}; give a positive, finite time", until));
   if (options.order != 1 && options.order != 2)
-    throw UsageError(
-        fmt::format("{}: the order is {}; give 1 or 2", request.action, options.order));
+    throw UsageError(fmt::format("the order is {}; give 1 or 2", options.order));
   return request;
 }
 
-void requireStart(const NarrowBand& solid, const char* action) {
-  requireSolid(solid, action);
+void requireStart(const NarrowBand& solid) {
+  requireSolid(solid);
   if (solid.isEmpty())
-    throw InvalidInput(
-        fmt::format("{}: the solid is empty, so no front can start on it; give a solid", action));
+    throw InvalidInput("the solid is empty, so no front can start on it; give a solid");
 }
 
-ArrivalTimes asField(eikonal::ArrivalGrid result, const char* action) {
+ArrivalTimes asField(eikonal::ArrivalGrid result) {
   result.times->setName("time");
-  return {importField(result.times, action), result.figures};
+  return {importField(result.times), result.figures};
 }
 
 }  // namespace
 
 ArrivalTimes arrivalTimes(const NarrowBand& solid, double until, const ArrivalOptions& options) {
   const eikonal::ArrivalRequest request = checkedRequest(until, options);
-  requireStart(solid, request.action);
+  requireStart(solid);
   eikonal::ArrivalGrid result = eikonal::arrivalFromSurface(vdb(solid), request);
   result.times->setGridClass(openvdb::GRID_UNKNOWN);
-  return asField(std::move(result), request.action);
+  return asField(std::move(result));
 }
 
 ArrivalTimes arrivalTimesFromPoints(const NarrowBand& lattice, std::span<const Imath::V3d> sources,
                                     double until, const ArrivalOptions& options) {
   const eikonal::ArrivalRequest request = checkedRequest(until, options);
-  if (!lattice.shared())
-    throw UsageError(
-        fmt::format("{}: there is no grid for the times; give a solid", request.action));
-  if (sources.empty())
-    throw UsageError(
-        fmt::format("{}: there is no source point; give at least one", request.action));
+  if (!lattice.shared()) throw UsageError("there is no grid for the times; give a solid");
+  if (sources.empty()) throw UsageError("there is no source point; give at least one");
   for (const Imath::V3d& p : sources)
     for (int i = 0; i < 3; ++i)
       if (!std::isfinite(p[i]))
         throw UsageError(
-            fmt::format("{}: a source point has the coordinate {}; give finite "
+            fmt::format("a source point has the coordinate {}; give finite "
                         "points",
-                        request.action, p[i]));
-  return asField(eikonal::arrivalFromPoints(sources, vdb(lattice).transform(), request),
-                 request.action);
+                        p[i]));
+  return asField(eikonal::arrivalFromPoints(sources, vdb(lattice).transform(), request));
 }
 
 FrontDistance frontDistance(const NarrowBand& solid, double reach, const ArrivalOptions& options) {
   const eikonal::ArrivalRequest request = checkedRequest(reach, options);
-  requireStart(solid, request.action);
+  requireStart(solid);
   if (options.speed)
     throw UsageError(
-        fmt::format("{}: with a speed other than 1, arrival times are not distances; request "
-                    "arrival times",
-                    request.action));
+        "with a speed other than 1, arrival times are not distances; request "
+        "arrival times");
   if (reach < solid.voxelSize())
-    throw UsageError(fmt::format("{}: the largest distance is {} voxels; give at least 1",
-                                 request.action, reach / solid.voxelSize()));
+    throw UsageError(fmt::format("the largest distance is {} voxels; give at least 1",
+                                 reach / solid.voxelSize()));
   eikonal::ArrivalGrid result = eikonal::arrivalFromSurface(vdb(solid), request);
   return {makeBand(std::move(result.times)), result.figures};
 }

@@ -34,16 +34,15 @@ void ArrivalBlocks::checkMemoryFor(const Coord& origin) const {
   const double bytes = static_cast<double>(blocks_.size() + 1) * kBytesPerBlock;
   if (bytes > limit_)
     throw ResourceLimit(
-        fmt::format("{}: the front has reached {} blocks of 512 grid points, which take {:.4g} MB, "
+        fmt::format("the front has reached {} blocks of 512 grid points, which take {:.4g} MB, "
                     "more than the limit of {:.4g} MB; use a smaller distance or time, larger "
                     "voxels or more memory",
-                    settings_.action, blocks_.size(), bytes / 1e6, limit_ / 1e6));
+                    blocks_.size(), bytes / 1e6, limit_ / 1e6));
   for (int i = 0; i < 3; ++i)
     if (std::abs(static_cast<double>(origin[i])) > kIndexLimit - 16)
       throw ResourceLimit(
-          fmt::format("{}: the front leaves the range of 32-bit indices; use a smaller distance "
-                      "or time, or larger voxels",
-                      settings_.action));
+          "the front leaves the range of 32-bit indices; use a smaller distance "
+          "or time, or larger voxels");
 }
 
 ArrivalBlock& ArrivalBlocks::touch(const Coord& origin) {
@@ -100,9 +99,8 @@ void ArrivalBlocks::start(const std::vector<StartTime>& times) {
   }
   if (!any)
     throw InvalidInput(
-        fmt::format("{}: the speed is nowhere positive where the front starts, so it cannot move; "
-                    "give a speed that is positive there",
-                    settings_.action));
+        "the speed is nowhere positive where the front starts, so it cannot move; "
+        "give a speed that is positive there");
 }
 
 }  // namespace levelset::eikonal

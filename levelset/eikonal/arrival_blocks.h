@@ -63,7 +63,6 @@ struct StartTime {
 class ArrivalBlocks {
  public:
   struct Settings {
-    const char* action = "fast-sweeping";
     double until = 0;                                            ///< latest time to keep
     std::function<double(const openvdb::Coord&)> slowness = {};  ///< empty: 1
     /// Negative values mark the inside; null: no grid point is inside.

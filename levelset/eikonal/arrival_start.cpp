@@ -141,7 +141,6 @@ double medianSlowness(const std::vector<Vec3d>& positions, const Slowness& slown
 
 std::vector<StartTime> startAtSurface(const FloatGrid& field, const ArrivalStart& start) {
   DistanceRequest near;
-  near.action = start.action;
   near.halfWidth = kStartWidth;
   near.maxMemory = start.maxMemory;
   near.progress = start.progress;
@@ -182,9 +181,8 @@ std::vector<StartTime> startAtPoints(std::span<const Vec3d> points, const Arriva
         if (s.time < accessor.getValue(s.gridPoint)) accessor.setValue(s.gridPoint, s.time);
     requireMemory(times.leafCount() * kBytesPerLeaf +
                       static_cast<double>(times.activeVoxelCount() * sizeof(StartTime)),
-                  memoryLimit(start.maxMemory), start.action);
-    report(start.progress, static_cast<double>(begin + count) / static_cast<double>(points.size()),
-           start.action);
+                  memoryLimit(start.maxMemory));
+    report(start.progress, static_cast<double>(begin + count) / static_cast<double>(points.size()));
   }
   return activeTimes(times);
 }

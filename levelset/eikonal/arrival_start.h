@@ -17,7 +17,6 @@ inline constexpr double kStartWidth = 2;
 
 /// Options for computing the times at which a front starts.
 struct ArrivalStart {
-  const char* action = "fast-sweeping";
   Slowness slowness = {};  ///< empty: 1 everywhere
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};

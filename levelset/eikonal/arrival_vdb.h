@@ -10,7 +10,6 @@
 namespace levelset::eikonal {
 
 struct ArrivalRequest {
-  const char* action = "fast-sweeping";
   double until = 0;  ///< world units of time
   ArrivalOptions options = {};
 };

@@ -41,8 +41,7 @@ class Marcher {
       block.known.setOn(trial.offset);
       updateAround(block, trial.offset);
       if (count % kReportInterval == 0)
-        report(blocks_.settings().progress, static_cast<double>(trial.time / until),
-               blocks_.settings().action);
+        report(blocks_.settings().progress, static_cast<double>(trial.time / until));
     }
     clearTrials();
   }

@@ -77,8 +77,7 @@ class Rounds {
       if (earliest == kFar) return;
       window = std::max({window, earliest + kWindow, (1 + kWindowShare) * earliest});
       report(subProgress(blocks_.settings().progress, from, to),
-             std::min(1.0, static_cast<double>(earliest) / blocks_.settings().until),
-             blocks_.settings().action);
+             std::min(1.0, static_cast<double>(earliest) / blocks_.settings().until));
       for (auto& candidates : byParity_) {
         std::vector<std::uint32_t> due;
         for (const std::uint32_t i : candidates)

@@ -15,10 +15,6 @@ constexpr const char* kFrontDetails =
     "again; `rebuild-band` computes the same by closest points, which is more exact. Otherwise the "
     "result is a field. Where the speed is zero, negative or no number, nothing passes.";
 
-constexpr const char* frontName(FrontMethod method) {
-  return method == FrontMethod::Marching ? "fast-marching" : "fast-sweeping";
-}
-
 void noteFigures(const FrontOptions& options, const ArrivalFigures& figures, OperatorRun& run) {
   run.notes.push_back(fmt::format("{} grid points reached", figures.reached));
   if (options.order == 2)
@@ -46,9 +42,9 @@ void FrontOperator<method>::check(const Options&, const GivenOptions& given) {
   for (const char* other : {"speed", "from", "order"})
     if (given("extend") && given(other))
       throw UsageError(
-          fmt::format("{}: --extend carries an attribute along the normals, so --{} has no meaning "
+          fmt::format("--extend carries an attribute along the normals, so --{} has no meaning "
                       "beside it; leave one out",
-                      frontName(method), other));
+                      other));
 }
 
 template <FrontMethod method>

@@ -58,16 +58,16 @@ class Formula {
 
 class Formulas {
  public:
-  Formulas(const std::string& text, const Variables& variables, int count, const char* action)
-      : perThread_(read(text, variables, action)) {
+  Formulas(const std::string& text, const Variables& variables, int count)
+      : perThread_(read(text, variables)) {
     int found = 0;
     try {
       perThread_.local().evaluate(V3d(0.5), 0.5, found);
     } catch (const mu::Parser::exception_type& error) {
-      refuse(text, variables, action, error.GetMsg());
+      refuse(text, variables, error.GetMsg());
     }
     if (found != count) {
-      throw UsageError(fmt::format("{}: '{}' holds {} formula{}; give {}", action, text, found,
+      throw UsageError(fmt::format("'{}' holds {} formula{}; give {}", text, found,
                                    found == 1 ? "" : "s",
                                    count == 1 ? "one" : "three with commas between them"));
     }
@@ -79,20 +79,20 @@ class Formulas {
 
  private:
   /// Parses the text. The parser's constructor refuses a text that is too long.
-  static Formula read(const std::string& text, const Variables& variables, const char* action) {
+  static Formula read(const std::string& text, const Variables& variables) {
     try {
       return {text, variables};
     } catch (const mu::Parser::exception_type& error) {
-      refuse(text, variables, action, error.GetMsg());
+      refuse(text, variables, error.GetMsg());
     }
   }
   [[noreturn]] static void refuse(const std::string& text, const Variables& variables,
-                                  const char* action, const std::string& why) {
+                                  const std::string& why) {
     constexpr std::size_t kMaxShown = 200;
     throw UsageError(
-        fmt::format("{}: the formula '{}' cannot be read: {}; use {}, numbers and functions such "
+        fmt::format("the formula '{}' cannot be read: {}; use {}, numbers and functions such "
                     "as sin({})",
-                    action, text.size() > kMaxShown ? text.substr(0, kMaxShown) + "…" : text, why,
+                    text.size() > kMaxShown ? text.substr(0, kMaxShown) + "…" : text, why,
                     variables.names, variables.names[0]));
   }
 
@@ -101,21 +101,21 @@ class Formulas {
 
 }  // namespace
 
-ScalarField scalarExpression(const std::string& text, const char* action) {
-  const auto formulas = std::make_shared<Formulas>(text, kSpace, 1, action);
+ScalarField scalarExpression(const std::string& text) {
+  const auto formulas = std::make_shared<Formulas>(text, kSpace, 1);
   return [formulas](const V3d& world) { return (*formulas)(world, 0)[0]; };
 }
 
-VectorField vectorExpression(const std::string& text, const char* action) {
-  const auto formulas = std::make_shared<Formulas>(text, kSpaceAndTime, 3, action);
+VectorField vectorExpression(const std::string& text) {
+  const auto formulas = std::make_shared<Formulas>(text, kSpaceAndTime, 3);
   return [formulas](const V3d& world, double time) {
     const double* values = (*formulas)(world, time);
     return V3d(values[0], values[1], values[2]);
   };
 }
 
-std::function<double(double)> timeExpression(const std::string& text, const char* action) {
-  const auto formulas = std::make_shared<Formulas>(text, kTime, 1, action);
+std::function<double(double)> timeExpression(const std::string& text) {
+  const auto formulas = std::make_shared<Formulas>(text, kTime, 1);
   return [formulas](double time) { return (*formulas)(V3d(0), time)[0]; };
 }
 

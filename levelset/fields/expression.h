@@ -12,16 +12,14 @@
 namespace levelset {
 
 /// Parses one formula in x, y, z, r.
-/// @param action  name of the action in messages
 /// @throws UsageError, with the position, for an invalid formula
-[[nodiscard]] ScalarField scalarExpression(const std::string& text, const char* action);
+[[nodiscard]] ScalarField scalarExpression(const std::string& text);
 
 /// Parses three formulas in x, y, z, r, t, separated by commas: "-y, x, 0.1*sin(t)".
 /// @throws UsageError when there are not three, or one is invalid
-[[nodiscard]] VectorField vectorExpression(const std::string& text, const char* action);
+[[nodiscard]] VectorField vectorExpression(const std::string& text);
 
 /// Parses one formula in t. @throws UsageError for an invalid formula
-[[nodiscard]] std::function<double(double time)> timeExpression(const std::string& text,
-                                                                const char* action);
+[[nodiscard]] std::function<double(double time)> timeExpression(const std::string& text);
 
 }  // namespace levelset

@@ -142,17 +142,16 @@ V3d staggeredVector(VectorSampler& sampler, const V3d& world) {
 }
 
 template <typename GridT>
-void checkField(const GridT& grid, const char* action) {
+void checkField(const GridT& grid) {
   if (!grid.transform().isLinear()) {
-    throw InvalidInput(
-        fmt::format("{}: grid '{}' has a frustum transform; resample it to uniform voxels first",
-                    action, grid.getName()));
+    throw InvalidInput(fmt::format(
+        "grid '{}' has a frustum transform; resample it to uniform voxels first", grid.getName()));
   }
   const auto refuse = [&](const Coord& at) {
     throw InvalidInput(
-        fmt::format("{}: grid '{}' holds NaN or infinity at index [{}, {}, {}]; repair the "
+        fmt::format("grid '{}' holds NaN or infinity at index [{}, {}, {}]; repair the "
                     "file or write it again",
-                    action, grid.getName(), at.x(), at.y(), at.z()));
+                    grid.getName(), at.x(), at.y(), at.z()));
   };
   if (!openvdb::math::isFinite(grid.background())) refuse(Coord(0));
   for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) {
@@ -209,12 +208,12 @@ std::uint64_t FieldGrid::contentHash() const {
   return mixHash(hash, static_cast<std::uint64_t>(field_->base().getGridClass()));
 }
 
-ScalarField asScalarField(const FieldGrid& grid, const char* action) {
+ScalarField asScalarField(const FieldGrid& grid) {
   if (grid.isVector()) {
     throw InvalidInput(
-        fmt::format("{}: grid '{}' holds vectors, but a number is needed at each "
+        fmt::format("grid '{}' holds vectors, but a number is needed at each "
                     "point; give a scalar grid",
-                    action, grid.name()));
+                    grid.name()));
   }
   return sampled(grid.shared(), *grid.shared()->scalar);
 }
@@ -223,12 +222,12 @@ ScalarField asScalarField(const NarrowBand& band) {
   return sampled(band.shared(), vdb(band));
 }
 
-VectorField asVectorField(const FieldGrid& grid, const char* action) {
+VectorField asVectorField(const FieldGrid& grid) {
   if (!grid.isVector()) {
     throw InvalidInput(
-        fmt::format("{}: grid '{}' holds numbers, but a vector is needed at each "
+        fmt::format("grid '{}' holds numbers, but a vector is needed at each "
                     "point; give a vector grid",
-                    action, grid.name()));
+                    grid.name()));
   }
   const auto sampler =
       std::make_shared<FieldSampler<Vec3SGrid>>(grid.shared(), *grid.shared()->vector);
@@ -237,12 +236,12 @@ VectorField asVectorField(const FieldGrid& grid, const char* action) {
   return [sampler](const V3d& world, double) { return centredVector(*sampler, world); };
 }
 
-FieldGrid importField(const FloatGrid::Ptr& grid, const char* action) {
-  checkField(*grid, action);
+FieldGrid importField(const FloatGrid::Ptr& grid) {
+  checkField(*grid);
   return FieldGrid(std::make_shared<const VdbField>(VdbField{.scalar = grid}));
 }
-FieldGrid importField(const Vec3SGrid::Ptr& grid, const char* action) {
-  checkField(*grid, action);
+FieldGrid importField(const Vec3SGrid::Ptr& grid) {
+  checkField(*grid);
   return FieldGrid(std::make_shared<const VdbField>(VdbField{.vector = grid}));
 }
 

@@ -48,17 +48,15 @@ class FieldGrid {
 };
 
 /// Interpolates the grid trilinearly, with the background outside.
-/// @param action  name of the action in the message
 /// @throws InvalidInput for a vector grid
-[[nodiscard]] ScalarField asScalarField(const FieldGrid& grid, const char* action);
+[[nodiscard]] ScalarField asScalarField(const FieldGrid& grid);
 
 /// The signed distance of a band, world units; ± background outside it.
 [[nodiscard]] ScalarField asScalarField(const NarrowBand& band);
 
 /// Interpolates a vector grid trilinearly, constant in time. Staggered components have grid points
 /// of their own.
-/// @param action  name of the action in the message
 /// @throws InvalidInput for a scalar grid
-[[nodiscard]] VectorField asVectorField(const FieldGrid& grid, const char* action);
+[[nodiscard]] VectorField asVectorField(const FieldGrid& grid);
 
 }  // namespace levelset

@@ -19,7 +19,7 @@ struct VdbField {
 
 /// Makes a field of an external grid and checks that its values are finite.
 /// @throws InvalidInput for NaN or infinite values, or a transform that is not linear
-[[nodiscard]] FieldGrid importField(const openvdb::FloatGrid::Ptr& grid, const char* action);
-[[nodiscard]] FieldGrid importField(const openvdb::Vec3SGrid::Ptr& grid, const char* action);
+[[nodiscard]] FieldGrid importField(const openvdb::FloatGrid::Ptr& grid);
+[[nodiscard]] FieldGrid importField(const openvdb::Vec3SGrid::Ptr& grid);
 
 }  // namespace levelset

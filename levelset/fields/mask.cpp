@@ -21,13 +21,13 @@ double Mask::weight(const Imath::V3d& world) const {
   return invert ? 1 - weight : weight;
 }
 
-void checkMask(const Mask& mask, const char* action) {
-  if (!mask.field) throw UsageError(fmt::format("{}: the mask has no field; give one", action));
+void checkMask(const Mask& mask) {
+  if (!mask.field) throw UsageError("the mask has no field; give one");
   if (!(mask.min <= mask.max) || !std::isfinite(mask.min) || !std::isfinite(mask.max)) {
     throw UsageError(
-        fmt::format("{}: the mask ranges from {} to {}; give finite values, the "
+        fmt::format("the mask ranges from {} to {}; give finite values, the "
                     "smaller first",
-                    action, mask.min, mask.max));
+                    mask.min, mask.max));
   }
 }
 

@@ -17,8 +17,7 @@ struct Mask {
 };
 
 /// Checks a mask.
-/// @param action  name of the action in the message
 /// @throws UsageError unless the field is set, min and max are finite and min ≤ max
-void checkMask(const Mask& mask, const char* action);
+void checkMask(const Mask& mask);
 
 }  // namespace levelset

@@ -41,7 +41,7 @@ std::string bandFormat(const fs::path& path, const std::string& given) {
   const std::string format = bandFormat(given.empty() ? path : fs::path(given));
   if (!format.empty()) return format;
   throw UsageError(
-      fmt::format("write: '{}' names no format of a band; end the name in .vdb or .nvdb, or "
+      fmt::format("'{}' names no format of a band; end the name in .vdb or .nvdb, or "
                   "give --format",
                   given.empty() ? path.string() : given));
 }
@@ -83,7 +83,7 @@ const VdbEntry& chooseGrid(const std::vector<VdbEntry>& entries, const std::stri
     if (wanted.empty() ? !isLevelSet(entry) : entry.name != wanted) continue;
     if (chosen) {
       throw InvalidInput(
-          fmt::format("read: {} holds more than one {}: {}; {}", file,
+          fmt::format("{} holds more than one {}: {}; {}", file,
                       wanted.empty() ? "level set" : "grid of that name", listOf(entries),
                       wanted.empty() ? "choose with --grid" : "write them to separate files"));
     }
@@ -91,7 +91,7 @@ const VdbEntry& chooseGrid(const std::vector<VdbEntry>& entries, const std::stri
   }
   if (!chosen) {
     throw InvalidInput(fmt::format(
-        "read: {} holds {}, but no {}; {}", file, listOf(entries),
+        "{} holds {}, but no {}; {}", file, listOf(entries),
         wanted.empty() ? "level set of float values" : fmt::format("grid '{}'", wanted),
         wanted.empty()
             ? "convert it to a level set first, or name a grid with --grid to read it as "
@@ -110,7 +110,7 @@ const VdbEntry& treeOwner(const std::vector<VdbEntry>& entries, const VdbEntry& 
         other.type == entry.type)
       return other;
   throw InvalidInput(
-      fmt::format("read: {} is damaged: the tree of grid '{}' is missing; download or create "
+      fmt::format("{} is damaged: the tree of grid '{}' is missing; download or create "
                   "the file again",
                   file, entry.name));
 }
@@ -123,25 +123,23 @@ struct ChosenGrid {
   std::vector<VdbEntry> entries = readVdbEntries(file, name);
   const VdbEntry& entry = chooseGrid(entries, options.grid, name);
 
-  [[nodiscard]] std::string action() const { return fmt::format("read: {}", name); }
-
   [[noreturn]] void refuseType(const char* readable) const {
-    throw InvalidInput(fmt::format(
-        "read: grid '{}' of {} holds values of type {}; supported types are {}; convert it "
-        "first",
-        entry.name, name, valueType(entry), readable));
+    throw InvalidInput(
+        fmt::format("grid '{}' of {} holds values of type {}; supported types are {}; convert it "
+                    "first",
+                    entry.name, name, valueType(entry), readable));
   }
 
   template <typename GridT, typename Read>
   [[nodiscard]] typename GridT::Ptr load(const Read& read, bool keepsTiles) const {
     if (!entry.transform) {
       throw InvalidInput(
-          fmt::format("read: grid '{}' of {} has a frustum transform; resample it to "
+          fmt::format("grid '{}' of {} has a frustum transform; resample it to "
                       "uniform voxels first",
                       entry.name, name));
     }
     const std::size_t limit = memoryLimit(options.maxMemory);
-    requireMemory(static_cast<double>(file.size()), limit, "read");
+    requireMemory(static_cast<double>(file.size()), limit);
     const auto grid = GridT::create(read(
         file, name, treeOwner(entries, entry, name),
         VdbTreeLimits{limit - file.size(), keepsTiles, subProgress(options.progress, 0.3, 0.9)}));
@@ -153,15 +151,19 @@ struct ChosenGrid {
 
   [[nodiscard]] NarrowBand band() const {
     if (!hasNumbers(entry)) refuseType("float, half and double");
-    return importBand(load<openvdb::FloatGrid>(readVdbTree, false), action().c_str(),
-                      options.repairs);
+    const auto grid = load<openvdb::FloatGrid>(readVdbTree, false);
+    return withContext(name, [&] { return importBand(grid, options.repairs); });
   }
 
   [[nodiscard]] FieldGrid field() const {
-    if (hasNumbers(entry))
-      return importField(load<openvdb::FloatGrid>(readVdbTree, true), action().c_str());
-    if (hasVectorTree(entry))
-      return importField(load<openvdb::Vec3SGrid>(readVdbVectorTree, true), action().c_str());
+    if (hasNumbers(entry)) {
+      const auto grid = load<openvdb::FloatGrid>(readVdbTree, true);
+      return withContext(name, [&] { return importField(grid); });
+    }
+    if (hasVectorTree(entry)) {
+      const auto grid = load<openvdb::Vec3SGrid>(readVdbVectorTree, true);
+      return withContext(name, [&] { return importField(grid); });
+    }
     refuseType("numbers and vectors of float, half and double");
   }
 };
@@ -171,23 +173,23 @@ auto readFrom(const fs::path& path, const ReadBandOptions& options, const Take& 
   const std::string name = inputName(path);
   if (bandFormat(path) == "nvdb") {
     throw UsageError(
-        fmt::format("read: {} is a file for renderers, which cannot be read back; read the .vdb "
+        fmt::format("{} is a file for renderers, which cannot be read back; read the .vdb "
                     "file that it was written from",
                     name));
   }
   try {
-    report(options.progress, 0, "read");
+    report(options.progress, 0);
     const Bytes bytes = readBytes(path, options.maxMemory);
-    report(options.progress, 0.3, "read");
+    report(options.progress, 0.3);
     auto result = take(ChosenGrid{bytes.view(), name, options});
-    report(options.progress, 1, "read");
+    report(options.progress, 1);
     return result;
   } catch (const std::bad_alloc&) {
     throw ResourceLimit(
-        fmt::format("read: {} does not fit into memory; free memory or use larger voxels", name));
+        fmt::format("{} does not fit into memory; free memory or use larger voxels", name));
   } catch (const openvdb::Exception& error) {
-    throw InvalidInput(fmt::format("read: {} is damaged: {}; download or create the file again",
-                                   name, error.what()));
+    throw InvalidInput(
+        fmt::format("{} is damaged: {}; download or create the file again", name, error.what()));
   }
 }
 
@@ -206,7 +208,7 @@ class ReportingFile : public std::filebuf {
     if (written_ > told_ + kStep) {
       told_ = written_;
       // Compression leaves fewer bytes than expected. Closing the file reports the end.
-      report(progress_, std::min(0.9, written_ / expected_), "write");
+      report(progress_, std::min(0.9, written_ / expected_));
     }
     return std::filebuf::xsputn(data, size);
   }
@@ -244,7 +246,7 @@ std::string identifierText(std::uint64_t hash) {
 void writeVdb(const fs::path& path, const openvdb::GridBase::ConstPtr& grid, std::uint64_t hash,
               const Progress& progress) {
   openvdb::initialize();
-  report(progress, 0, "write");
+  report(progress, 0);
   std::vector<char> buffer(1 << 20);
   ReportingFile file(progress, static_cast<double>(grid->memUsage()));
   file.pubsetbuf(buffer.data(), static_cast<std::streamsize>(buffer.size()));
@@ -256,7 +258,7 @@ void writeVdb(const fs::path& path, const openvdb::GridBase::ConstPtr& grid, std
   const std::string identifier = identifierText(hash);
   out.write(identifier.data(), static_cast<std::streamsize>(identifier.size()));
   if (!file.close()) out.setstate(std::ios::failbit);
-  report(progress, 1, "write");
+  report(progress, 1);
 }
 
 /// @param write  fills the file at the given path
@@ -268,12 +270,12 @@ void writeTarget(const fs::path& path, const Write& write) {
     write(target.path());
   } catch (const std::ios_base::failure&) {
     throw IoError(
-        fmt::format("write: '{}' could not be written: {}; make room on the disk or write "
+        fmt::format("'{}' could not be written: {}; make room on the disk or write "
                     "elsewhere",
                     path.string(), std::generic_category().message(errno != 0 ? errno : EIO)));
   } catch (const openvdb::Exception& error) {
-    throw IoError(fmt::format("write: '{}' could not be written: {}; write elsewhere",
-                              path.string(), error.what()));
+    throw IoError(
+        fmt::format("'{}' could not be written: {}; write elsewhere", path.string(), error.what()));
   }
   target.commit();
 }
@@ -350,27 +352,27 @@ void writeBand(const fs::path& path, const NarrowBand& band, const WriteBandOpti
   const std::string format = bandFormat(path, options.format);
   if (!band.shared())
     throw InvalidInput(
-        fmt::format("write: there is no band to write to '{}'; create one first", path.string()));
-  requireSolid(band, "write");  // a file would not record that the surface is open
+        fmt::format("there is no band to write to '{}'; create one first", path.string()));
+  requireSolid(band);  // a file would not record that the surface is open
   if (format == "nvdb" && band.voxelSize() < kMinNanoVoxel)
-    throw InvalidInput(fmt::format(
-        "write: '{}' cannot hold voxels of {:.6g}, NanoVDB accepts none below {}; write "
-        "a .vdb file, or change the unit of length",
-        path.string(), band.voxelSize(), kMinNanoVoxel));
+    throw InvalidInput(
+        fmt::format("'{}' cannot hold voxels of {:.6g}, NanoVDB accepts none below {}; write "
+                    "a .vdb file, or change the unit of length",
+                    path.string(), band.voxelSize(), kMinNanoVoxel));
   const auto grid = namedGrid(vdb(band), options.name);
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   writeTarget(path, [&](const fs::path& target) {
     if (format == "vdb") return writeVdb(target, grid, band.contentHash(), options.progress);
-    report(options.progress, 0, "write");
+    report(options.progress, 0);
     writeNanoGrid(target, *grid);
-    report(options.progress, 1, "write");
+    report(options.progress, 1);
   });
 }
 
 void writeField(const fs::path& path, const FieldGrid& field, const WriteBandOptions& options) {
   if (bandFormat(path, options.format) != "vdb") {
     throw UsageError(
-        fmt::format("write: '{}' would hold a field, which is written as .vdb only; name such a "
+        fmt::format("'{}' would hold a field, which is written as .vdb only; name such a "
                     "file",
                     path.string()));
   }

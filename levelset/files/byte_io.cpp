@@ -32,7 +32,7 @@ std::string systemMessage(int error) {
 class InputFile {
  public:
   explicit InputFile(const fs::path& path) : name_(inputName(path)) {
-    if (path.empty()) throw IoError("read: the file name is empty; name a file");
+    if (path.empty()) throw IoError("the file name is empty; name a file");
     if (path == "-") {
       fd_ = STDIN_FILENO;
       return;
@@ -40,16 +40,15 @@ class InputFile {
     fd_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
     if (fd_ < 0) {
       const int error = errno;
-      if (error == ENOENT)
-        throw IoError(fmt::format("read: there is no file {}; check the name", name_));
-      throw IoError(fmt::format("read: {} cannot be opened: {}; check its permissions", name_,
+      if (error == ENOENT) throw IoError(fmt::format("there is no file {}; check the name", name_));
+      throw IoError(fmt::format("{} cannot be opened: {}; check its permissions", name_,
                                 systemMessage(error)));
     }
     struct stat status {};
     if (::fstat(fd_, &status) != 0) return;
     if (S_ISDIR(status.st_mode)) {
       ::close(fd_);
-      throw IoError(fmt::format("read: {} is a directory; name a file in it", name_));
+      throw IoError(fmt::format("{} is a directory; name a file in it", name_));
     }
     if (S_ISREG(status.st_mode)) expected_ = static_cast<std::size_t>(status.st_size);
   }
@@ -77,7 +76,7 @@ class InputFile {
       if (count >= 0) return static_cast<std::size_t>(count);
       if (errno == EINTR) continue;
       throw IoError(
-          fmt::format("read: {} cannot be read: {}; check the disk", name_, systemMessage(errno)));
+          fmt::format("{} cannot be read: {}; check the disk", name_, systemMessage(errno)));
     }
   }
 
@@ -89,8 +88,8 @@ class InputFile {
 
 [[noreturn]] void throwTooLarge(const std::string& name, std::size_t limit, bool inflated) {
   throw ResourceLimit(fmt::format(
-      "read: {} {}exceeds the memory limit of {:.3g} GB; raise --max-memory or use a smaller file",
-      name, inflated ? "when decompressed " : "", static_cast<double>(limit) * 1e-9));
+      "{} {}exceeds the memory limit of {:.3g} GB; raise --max-memory or use a smaller file", name,
+      inflated ? "when decompressed " : "", static_cast<double>(limit) * 1e-9));
 }
 
 /// Appends the data from `next` until it returns nothing or `stopAt` bytes are present.
@@ -125,7 +124,7 @@ class Inflater {
  public:
   Inflater(std::string_view input, std::string name) : rest_(input), name_(std::move(name)) {
     if (inflateInit2(&stream_, kGzipWindow) != Z_OK)
-      throw ResourceLimit("read: not enough memory to decompress; close other programs");
+      throw ResourceLimit("not enough memory to decompress; close other programs");
   }
   ~Inflater() { inflateEnd(&stream_); }
   Inflater(const Inflater&) = delete;
@@ -156,8 +155,8 @@ class Inflater {
 
  private:
   [[noreturn]] void throwDamaged(const char* how) const {
-    throw InvalidInput(fmt::format(
-        "read: the compressed data of {} {}; download or create the file again", name_, how));
+    throw InvalidInput(
+        fmt::format("the compressed data of {} {}; download or create the file again", name_, how));
   }
   z_stream stream_{};
   std::string_view rest_;
@@ -171,7 +170,7 @@ void Bytes::resize(std::size_t size) {
   char* grown = static_cast<char*>(std::realloc(data_.get(), std::max<std::size_t>(size, 1)));
   if (!grown) {
     throw ResourceLimit(
-        fmt::format("read: not enough memory for {:.3g} GB; use a smaller file or free memory",
+        fmt::format("not enough memory for {:.3g} GB; use a smaller file or free memory",
                     static_cast<double>(size) * 1e-9));
   }
   static_cast<void>(data_.release());
@@ -192,15 +191,14 @@ Bytes readAll(InputFile& file, std::size_t maxMemory) {
   fill(raw, file.expectedSize(), limit, kNoMemoryLimit, file.name(), false,
        [&](char* to, std::size_t size) { return file.read(to, size); });
   if (raw.size() == 0)
-    throw InvalidInput(
-        fmt::format("read: {} is empty; download or create the file again", file.name()));
+    throw InvalidInput(fmt::format("{} is empty; download or create the file again", file.name()));
   if (!isGzip(raw.view())) return raw;
   Bytes inflated;
   fill(inflated, 4 * raw.size(), limit, kNoMemoryLimit, file.name(), true,
        Inflater(raw.view(), file.name()));
   if (inflated.size() == 0) {
     throw InvalidInput(
-        fmt::format("read: {} is empty when decompressed; create the file again", file.name()));
+        fmt::format("{} is empty when decompressed; create the file again", file.name()));
   }
   return inflated;
 }
@@ -260,7 +258,7 @@ struct ByteWriter::Deflater {
   Deflater() {
     if (deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, kGzipWindow, 8,
                      Z_DEFAULT_STRATEGY) != Z_OK)
-      throw ResourceLimit("write: not enough memory to compress; close other programs");
+      throw ResourceLimit("not enough memory to compress; close other programs");
   }
   ~Deflater() { deflateEnd(&stream); }
 };
@@ -272,8 +270,8 @@ ByteWriter::ByteWriter(const fs::path& target, bool compressed)
       deflater_(compressed ? std::make_unique<Deflater>() : nullptr) {
   fd_ = ::open(target_.path().c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC);
   if (fd_ < 0)
-    throw IoError(fmt::format("write: {} cannot be opened: {}; check its permissions", name_,
-                              systemMessage(errno)));
+    throw IoError(
+        fmt::format("{} cannot be opened: {}; check its permissions", name_, systemMessage(errno)));
 }
 
 ByteWriter::~ByteWriter() {
@@ -300,9 +298,8 @@ void ByteWriter::commit() {
   if (deflater_) deflateBuffer(true);
   const int fd = std::exchange(fd_, -1);
   if (::close(fd) != 0)
-    throw IoError(
-        fmt::format("write: {} could not be written: {}; free disk space or write elsewhere", name_,
-                    systemMessage(errno)));
+    throw IoError(fmt::format("{} could not be written: {}; free disk space or write elsewhere",
+                              name_, systemMessage(errno)));
   target_.commit();
 }
 
@@ -342,9 +339,8 @@ void ByteWriter::put(const char* data, std::size_t size) {
     const ssize_t written = ::write(fd_, data, size);
     if (written < 0) {
       if (errno == EINTR) continue;
-      throw IoError(
-          fmt::format("write: {} could not be written: {}; free disk space or write elsewhere",
-                      name_, systemMessage(errno)));
+      throw IoError(fmt::format("{} could not be written: {}; free disk space or write elsewhere",
+                                name_, systemMessage(errno)));
     }
     data += written;
     size -= static_cast<std::size_t>(written);

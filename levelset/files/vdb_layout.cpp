@@ -45,14 +45,14 @@ std::vector<VdbMetadata> readMetadata(VdbBytes& bytes) {
 bool readFileHeader(VdbBytes& bytes) {
   if (bytes.remaining() < sizeof kMagic || bytes.value<std::int64_t>() != kMagic) {
     throw InvalidInput(
-        fmt::format("read: {} is not an OpenVDB file; give its true format", bytes.name()));
+        fmt::format("{} is not an OpenVDB file; give its true format", bytes.name()));
   }
   const auto version = bytes.value<std::uint32_t>();
   if (version < kOldestVersion || version > kNewestVersion) {
-    throw InvalidInput(fmt::format(
-        "read: {} has version {} of OpenVDB's file format; versions {} to {} are supported; "
-        "write it again with a current program",
-        bytes.name(), version, kOldestVersion, kNewestVersion));
+    throw InvalidInput(
+        fmt::format("{} has version {} of OpenVDB's file format; versions {} to {} are supported; "
+                    "write it again with a current program",
+                    bytes.name(), version, kOldestVersion, kNewestVersion));
   }
   static_cast<void>(bytes.take(2 * sizeof(std::uint32_t)));  // version of the library
   const bool hasOffsets = bytes.value<char>() != 0;
@@ -104,7 +104,7 @@ void skipTree(VdbBytes& bytes, const VdbEntry& entry, std::int64_t end) {
   if (!entry.transform ||
       (!hasFloatTree(entry) && !hasDoubleTree(entry) && !hasVectorTree(entry))) {
     throw InvalidInput(
-        fmt::format("read: {} was written as a stream, and grid '{}' of type '{}' in it "
+        fmt::format("{} was written as a stream, and grid '{}' of type '{}' in it "
                     "cannot be skipped; write the level set to a separate file",
                     bytes.name(), entry.name, entry.type));
   }
@@ -132,9 +132,8 @@ std::string_view VdbBytes::text() {
 }
 
 void VdbBytes::fail(const std::string& what) const {
-  throw InvalidInput(
-      fmt::format("read: {} is damaged at byte {}: {}; download or create the file again", *name_,
-                  position_, what));
+  throw InvalidInput(fmt::format("{} is damaged at byte {}: {}; download or create the file again",
+                                 *name_, position_, what));
 }
 
 const VdbMetadata* VdbEntry::find(std::string_view key) const {

@@ -37,7 +37,7 @@ class VdbBytes {
   /// Reads a length and then that many characters.
   [[nodiscard]] std::string_view text();
   [[nodiscard]] std::string_view rest() const { return file_.substr(position_); }
-  /// @throws InvalidInput: "read: 'x.vdb' is damaged at byte 123: <what>; …"
+  /// @throws InvalidInput: "'x.vdb' is damaged at byte 123: <what>; …"
   [[noreturn]] void fail(const std::string& what) const;
   [[nodiscard]] const std::string& name() const { return *name_; }
 

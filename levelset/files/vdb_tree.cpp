@@ -192,7 +192,7 @@ class TreeReader {
     auto tree = std::make_shared<TreeT>();
     readRoot(tree->root());
     const std::vector<std::size_t> offsets = skipLeafValues();
-    ProgressGate gate(limits_.progress, leaves_.size(), "read");
+    ProgressGate gate(limits_.progress, leaves_.size());
     tbb::parallel_for(std::size_t{0}, leaves_.size(), [&](std::size_t i) {
       VdbBytes at = bytes_;
       at.seek(offsets[i]);
@@ -216,8 +216,7 @@ class TreeReader {
   /// file.
   void countMemory(std::size_t size) {
     memory_ += static_cast<double>(size);
-    if (memory_ > static_cast<double>(limits_.maxMemory))
-      requireMemory(memory_, limits_.maxMemory, "read");
+    if (memory_ > static_cast<double>(limits_.maxMemory)) requireMemory(memory_, limits_.maxMemory);
   }
 
   void readRoot(Root& root) {

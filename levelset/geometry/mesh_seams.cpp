@@ -133,20 +133,19 @@ TriMesh withJoined(const TriMesh& mesh, DisjointSets& vertices) {
 
 }  // namespace
 
-std::optional<TriMesh> withoutSeams(const TriMesh& mesh, const char* action,
-                                    std::size_t maxMemory) {
+std::optional<TriMesh> withoutSeams(const TriMesh& mesh, std::size_t maxMemory) {
   const auto triangles = static_cast<double>(mesh.triangles.size()),
              vertices = static_cast<double>(mesh.positions.size());
   constexpr double kTableBytes = 16, kSideBytes = 16 + 8;
-  requireMemory(vertices * kTableBytes, maxMemory, action);
+  requireMemory(vertices * kTableBytes, maxMemory);
   if (!anyCoincide(mesh.positions)) return std::nullopt;
-  requireMemory(triangles * 3 * kSideBytes, maxMemory, action);
+  requireMemory(triangles * 3 * kSideBytes, maxMemory);
   std::vector<BorderSide> border = findBorder(mesh);
   if (border.empty()) return std::nullopt;
   // Memory of the border with its order and position table, then of the result.
   constexpr double kBorderBytes = sizeof(BorderSide) + 2 * 8 + kTableBytes;
   requireMemory(static_cast<double>(border.size()) * kBorderBytes + triangles * 12 + vertices * 32,
-                maxMemory, action);
+                maxMemory);
   findEndVertices(mesh.positions, border);
   DisjointSets joined(mesh.positions.size());
   joinSides(border, joined);

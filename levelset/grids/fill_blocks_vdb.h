@@ -39,7 +39,7 @@ class BlockFiller {
 
   /// Fills the 128³ blocks that meet `domain`; the rest stays unchanged.
   /// @return true when a grid point lies inside
-  bool fill(const openvdb::CoordBBox& domain, const Progress& progress, const char* action) {
+  bool fill(const openvdb::CoordBBox& domain, const Progress& progress) {
     const openvdb::Coord first = domain.min() & ~(kRoot - 1);
     for (int x = first[0]; x <= domain.max()[0]; x += kRoot)
       for (int y = first[1]; y <= domain.max()[1]; y += kRoot)
@@ -56,8 +56,7 @@ class BlockFiller {
       });
       for (std::size_t i = 0; i < count; ++i) insert(slice[i]);
       report(progress,
-             static_cast<double>(from + count) / static_cast<double>(surfaceBlocks_.size()),
-             action);
+             static_cast<double>(from + count) / static_cast<double>(surfaceBlocks_.size()));
     }
     return anyInside_;
   }

@@ -201,7 +201,7 @@ LeafFindings checkLeaves(const FloatGrid& grid, const Progress& progress) {
   leaves.reserve(grid.tree().leafCount());
   for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) leaves.push_back(leaf.getLeaf());
   std::vector<LeafFindings> found(leaves.size());
-  ProgressGate gate(progress, leaves.size(), "check");
+  ProgressGate gate(progress, leaves.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 16),
                     [&](const tbb::blocked_range<std::size_t>& range) {
                       SlopeStencil stencil(grid);
@@ -269,7 +269,7 @@ bool CheckReport::passed() const {
 }
 
 CheckReport check(const NarrowBand& solid, const Progress& progress) {
-  levelset::report(progress, 0, "check");
+  levelset::report(progress, 0);
   CheckReport report;
   if (!solid.shared()) {
     report.items.push_back({"floating-point values", false, "there is no grid"});

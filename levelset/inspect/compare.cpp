@@ -34,7 +34,7 @@ constexpr std::size_t kSampleChunk = 2048;
 template <typename Work>
 void forEachChunk(std::size_t count, const Progress& progress, const Work& work) {
   const std::size_t chunks = (count + kSampleChunk - 1) / kSampleChunk;
-  ProgressGate gate(progress, chunks, "compare");
+  ProgressGate gate(progress, chunks);
   tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
     work(chunk, chunk * kSampleChunk, std::min(count, (chunk + 1) * kSampleChunk));
     gate.advance(1);
@@ -158,19 +158,19 @@ double volumeOfDifference(const NarrowBand& a, const NarrowBand& b) {
 }  // namespace
 
 Comparison compare(const NarrowBand& a, const NarrowBand& b, const CompareOptions& options) {
-  report(options.progress, 0, "compare");
-  requireSolid(a, "compare");
-  requireSolid(b, "compare");
+  report(options.progress, 0);
+  requireSolid(a);
+  requireSolid(b);
   for (const NarrowBand* solid : {&a, &b})
     if (solid->isEmpty())
-      throw InvalidInput(fmt::format(
-          "compare: the {} solid is empty, so there is no surface to compare; give two solids",
-          solid == &a ? "first" : "second"));
+      throw InvalidInput(
+          fmt::format("the {} solid is empty, so there is no surface to compare; give two solids",
+                      solid == &a ? "first" : "second"));
   const ZeroSet surfaceA(a, subProgress(options.progress, 0, 0.15)),
       surfaceB(b, subProgress(options.progress, 0.15, 0.3));
   if (surfaceA.isEmpty() || surfaceB.isEmpty())
     throw InvalidInput(fmt::format(
-        "compare: the {} solid has no zero crossing, so there is no surface to compare; give two "
+        "the {} solid has no zero crossing, so there is no surface to compare; give two "
         "solids",
         surfaceA.isEmpty() ? "first" : "second"));
   const DistanceSums fromA =
@@ -183,7 +183,7 @@ Comparison compare(const NarrowBand& a, const NarrowBand& b, const CompareOption
   result.meanAtoB = fromA.weighted / fromA.area;
   result.meanBtoA = fromB.weighted / fromB.area;
   result.symmetricDifference = volumeOfDifference(a, b);
-  report(options.progress, 1, "compare");
+  report(options.progress, 1);
   return result;
 }
 

@@ -19,8 +19,6 @@ namespace {
 
 using openvdb::Vec3d;
 
-constexpr const char* kMeasure = "measure";
-
 /// Sums moments over the triangles of each surface component, chunk by chunk, and adds the chunks
 /// in order.
 /// @param piece  (triangle, anchor, worker): moments of one triangle
@@ -37,7 +35,7 @@ std::vector<SurfaceMoments> sumComponents(const std::vector<std::uint32_t>& comp
   };
   const std::size_t count = componentOfTriangle.size();
   std::vector<std::vector<Part>> parts((count + kChunk - 1) / kChunk);
-  ProgressGate gate(progress, parts.size(), kMeasure);
+  ProgressGate gate(progress, parts.size());
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t chunk) {
     auto worker = makeWorker();
     const std::size_t end = std::min(count, (chunk + 1) * kChunk);
@@ -157,7 +155,7 @@ double edgeCurvature(const TriMesh& mesh) {
 /// The mesh with closed seams, if attributes may have doubled vertices and did so.
 std::optional<TriMesh> withoutItsSeams(const TriMesh& mesh) {
   if (mesh.attributes.isEmpty()) return std::nullopt;
-  return withoutSeams(mesh, kMeasure, memoryLimit(kNoMemoryLimit));
+  return withoutSeams(mesh, memoryLimit(kNoMemoryLimit));
 }
 
 }  // namespace
@@ -165,18 +163,18 @@ std::optional<TriMesh> withoutItsSeams(const TriMesh& mesh) {
 // Computed in index space, near the origin, so that a part far from the world origin has the same
 // measurements.
 Measurement measure(const NarrowBand& solid, const Progress& progress) {
-  requireSolid(solid, kMeasure);
-  report(progress, 0, kMeasure);
+  requireSolid(solid);
+  report(progress, 0);
   Measurement result;
   result.voxelSize = solid.voxelSize();
   result.halfWidth = solid.halfWidth();
   result.activeVoxels = solid.activeVoxelCount();
   if (solid.isEmpty()) return result;
   const IndexMesh mesh = marchCells(CellSurface(vdb(solid)));
-  report(progress, 0.2, kMeasure);
+  report(progress, 0.2);
   const SurfaceComponents components = findSurfaceComponents(mesh.positions, mesh.triangles);
   const std::vector<Vec3d> anchors = componentAnchors(components, mesh.positions);
-  report(progress, 0.3, kMeasure);
+  report(progress, 0.3);
   const CurvedSurface surface(mesh, vdb(solid));
   const Progress last = subProgress(progress, 0.4, 1);
   const std::vector<SurfaceMoments> sums = sumComponents(
@@ -192,7 +190,7 @@ Measurement measure(const NarrowBand& solid, const Progress& progress) {
 }
 
 Measurement measure(const TriMesh& mesh, const Progress& progress) {
-  report(progress, 0, kMeasure);
+  report(progress, 0);
   if (const auto closed = withoutItsSeams(mesh)) return measure(*closed, progress);
   Measurement result;
   const SurfaceComponents components = findSurfaceComponents(mesh.positions, mesh.triangles);
@@ -209,7 +207,7 @@ Measurement measure(const TriMesh& mesh, const Progress& progress) {
   describeComponents(components, sums, anchors, Imath::M44d(), 1, result);
   result.meanCurvature = edgeCurvature(mesh);
   result.bounds = bounds(mesh);
-  report(progress, 1, kMeasure);
+  report(progress, 1);
   return result;
 }
 

@@ -108,7 +108,7 @@ DifferenceSums scanAll(std::size_t count, const SampleScan& fresh, const Progres
                        const Work& work) {
   const std::size_t chunks = (count + kDifferenceChunk - 1) / kDifferenceChunk;
   std::vector<DifferenceSums> parts(chunks);
-  ProgressGate gate(progress, std::max<std::size_t>(1, chunks), "tolerance");
+  ProgressGate gate(progress, std::max<std::size_t>(1, chunks));
   tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
     SampleScan scan = fresh;
     const std::size_t end = std::min(count, (chunk + 1) * kDifferenceChunk);

@@ -45,64 +45,65 @@ std::optional<FormatChoice> findFormat(const fs::path& nameOrFormat) {
   return std::nullopt;
 }
 
-FormatChoice meshFormat(const fs::path& path, const std::string& given, const char* action) {
+/// @param isInput  true for a file to be read
+FormatChoice meshFormat(const fs::path& path, const std::string& given, bool isInput) {
   if (!given.empty()) {
     if (const auto choice = findFormat(given)) return *choice;
     throw UsageError(
-        fmt::format("{}: the mesh format '{}' is unknown; use ply, obj, stl or off, "
+        fmt::format("the mesh format '{}' is unknown; use ply, obj, stl or off, "
                     "with .gz appended if compressed",
-                    action, given));
+                    given));
   }
   if (const auto choice = findFormat(path)) return *choice;
   if (path == "-") {
     throw UsageError(
-        fmt::format("{}: standard {} has no name that determines its format; give --format ply, "
+        fmt::format("standard {} has no name that determines its format; give --format ply, "
                     "obj, stl or off",
-                    action, action[0] == 'r' ? "input" : "output"));
+                    isInput ? "input" : "output"));
   }
   throw UsageError(
-      fmt::format("{}: the name '{}' names no mesh format; end it in .ply, .obj, .stl or "
+      fmt::format("the name '{}' names no mesh format; end it in .ply, .obj, .stl or "
                   ".off, or give --format",
-                  action, path.string()));
+                  path.string()));
 }
 
 }  // namespace
 
 TriMesh readMesh(const fs::path& path, const ReadMeshOptions& options) {
-  const FormatChoice choice = meshFormat(path, options.format, "read");
-  report(options.progress, 0, "read");
+  const FormatChoice choice = meshFormat(path, options.format, true);
+  report(options.progress, 0);
   try {
     const Bytes bytes = readBytes(path, options.maxMemory);
     MeshBuilder builder(inputName(path), options, bytes.view());
     choice.format->read(bytes.view(), builder);
     TriMesh mesh = builder.finish();
     if (builder.droppedAttributes())
-      if (auto closed = withoutSeams(mesh, "read", options.maxMemory)) mesh = std::move(*closed);
+      if (auto closed = withoutSeams(mesh, options.maxMemory)) mesh = std::move(*closed);
     if (mesh.isEmpty())
       failFile(
           inputName(path),
           "holds only triangles without area, of which none remains when its seams are closed; "
           "export the mesh again");
-    report(options.progress, 1, "read");
+    report(options.progress, 1);
     return mesh;
   } catch (const std::bad_alloc&) {
     throw ResourceLimit(fmt::format(
-        "read: {} does not fit into memory; use a smaller mesh or free memory", inputName(path)));
+        "{} does not fit into memory; use a smaller mesh or free memory", inputName(path)));
   }
 }
 
 void writeMesh(const fs::path& path, const TriMesh& mesh, const WriteMeshOptions& options) {
-  const FormatChoice choice = meshFormat(path, options.format, "write");
-  requireAttributes(mesh, "write");
-  report(options.progress, 0, "write");
+  const FormatChoice choice = meshFormat(path, options.format, false);
+  requireAttributes(mesh);
+  report(options.progress, 0);
   // Without the attributes, seams would remain as slits.
   std::optional<TriMesh> closed;
   if (!choice.format->attributes && !mesh.attributes.isEmpty())
-    closed = withoutSeams(mesh, "write", options.maxMemory);
+    closed = withoutSeams(mesh, options.maxMemory);
   ByteWriter out(path, choice.compressed);
   choice.format->write(out, closed ? *closed : mesh, options.progress);
   out.commit();
-  report(options.progress, 1, "write");
+  report(options.progress, 1);
 }
 
 bool holdsAttributes(const fs::path& nameOrFormat) {
@@ -115,7 +116,7 @@ bool isMeshFormat(const fs::path& nameOrFormat) {
 }
 
 MeshFileInfo meshFileInfo(const fs::path& path, const std::string& format) {
-  const FormatChoice choice = meshFormat(path, format, "info");
+  const FormatChoice choice = meshFormat(path, format, true);
   const std::string name = inputName(path);
   const FirstBytes first = readFirstBytes(path, kInfoBytes);
   const std::string_view head = first.bytes.view();

@@ -43,11 +43,11 @@ double extremeNumber(const char* first, const char* last) {
 }  // namespace
 
 void failAt(const std::string& name, FilePosition place, const std::string& what) {
-  throw InvalidInput(fmt::format("read: {}, {} {}: {}", name, place.unit, place.number, what));
+  throw InvalidInput(fmt::format("{}, {} {}: {}", name, place.unit, place.number, what));
 }
 
 void failFile(const std::string& name, const std::string& what) {
-  throw InvalidInput(fmt::format("read: {} {}", name, what));
+  throw InvalidInput(fmt::format("{} {}", name, what));
 }
 
 void requireText(std::string_view input, const std::string& name, const char* format) {
@@ -77,7 +77,7 @@ void MeshBuilder::reserve(std::size_t vertices, std::size_t triangles, std::size
   const double bytes = static_cast<double>(input_.size() + attributeBytes) +
                        static_cast<double>(vertices) * sizeof(Imath::V3d) +
                        static_cast<double>(triangles) * sizeof(mesh_.triangles[0]);
-  requireMemory(bytes, options_.maxMemory, "read");
+  requireMemory(bytes, options_.maxMemory);
   mesh_.positions.reserve(vertices);
   mesh_.triangles.reserve(triangles);
 }
@@ -90,7 +90,7 @@ void MeshBuilder::declarePrecision(CoordinatePrecision precision) {
 void MeshBuilder::tick(const char* at) {
   if ((++added_ & kTickMask) != 0) return;
   report(options_.progress,
-         static_cast<double>(at - input_.data()) / static_cast<double>(input_.size()), "read");
+         static_cast<double>(at - input_.data()) / static_cast<double>(input_.size()));
   requireMore(0);
   if (mesh_.positions.size() > kMaxIndex)
     failFile(name_, "holds more than 4294967295 vertices; split the mesh");
@@ -104,7 +104,7 @@ void MeshBuilder::requireMore(double bytes) const {
       polygons_.capacity() * sizeof(Polygon) + splitVertices_.capacity() * sizeof(std::uint32_t) +
       held.normals.capacity() * sizeof(held.normals[0]) +
       held.uvs.capacity() * sizeof(held.uvs[0]) + held.colors.capacity() * sizeof(held.colors[0]);
-  requireMemory(static_cast<double>(now) + bytes, options_.maxMemory, "read");
+  requireMemory(static_cast<double>(now) + bytes, options_.maxMemory);
 }
 
 void MeshBuilder::noteUnsupported(std::string what) {

@@ -21,9 +21,9 @@ struct FilePosition {
   std::size_t number;
 };
 
-/// @throws InvalidInput: "read: 'x.ply', line 12: <what>"
+/// @throws InvalidInput: "'x.ply', line 12: <what>"
 [[noreturn]] void failAt(const std::string& name, FilePosition place, const std::string& what);
-/// @throws InvalidInput: "read: 'x.ply' <what>"
+/// @throws InvalidInput: "'x.ply' <what>"
 [[noreturn]] void failFile(const std::string& name, const std::string& what);
 
 /// Collects vertices and faces, checks them, and splits polygons once all vertices are known. A
@@ -202,7 +202,7 @@ class WriteProgress {
   WriteProgress(const Progress& progress, std::size_t total) : progress_(progress), total_(total) {}
   void step() {
     if ((++done_ & 0xFFFF) == 0)
-      report(progress_, static_cast<double>(done_) / static_cast<double>(total_), "write");
+      report(progress_, static_cast<double>(done_) / static_cast<double>(total_));
   }
 
  private:

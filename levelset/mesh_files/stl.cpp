@@ -189,7 +189,7 @@ void requireSinglePrecision(const TriMesh& mesh) {
       spacingAt(farthest, CoordinatePrecision::Float) <= kStlPrecision * longest)
     return;
   throw InvalidInput(fmt::format(
-      "write: STL stores positions in single precision, too coarse for an object of {:.3g} at "
+      "STL stores positions in single precision, too coarse for an object of {:.3g} at "
       "a distance of {:.3g} from the origin; write PLY, OBJ or OFF, or move it to the origin first",
       longest, farthest));
 }
@@ -212,7 +212,7 @@ MeshFileInfo stlInfo(std::string_view head, std::size_t fileSize, const std::str
 void writeStl(ByteWriter& out, const TriMesh& mesh, const Progress& progress) {
   requireSinglePrecision(mesh);
   if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max())
-    throw UsageError("write: STL cannot count more than 4294967295 triangles; write PLY");
+    throw UsageError("STL cannot count more than 4294967295 triangles; write PLY");
   char header[80] = "binary STL, triangles counter-clockwise seen from outside";
   out.write(header, sizeof header);
   out.writeValue(static_cast<std::uint32_t>(mesh.triangles.size()));

@@ -107,7 +107,7 @@ LineCrossings::LineCrossings(const LocalMesh& mesh, std::span<const int> weights
                              const Progress& progress) {
   const std::size_t chunks = (mesh.triangles.size() + kChunk - 1) / kChunk;
   std::vector<std::vector<Crossing>> found(chunks);
-  ProgressGate gate(progress, chunks, "level-set");
+  ProgressGate gate(progress, chunks);
   tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
     const std::size_t end = std::min(mesh.triangles.size(), (chunk + 1) * kChunk);
     for (std::size_t t = chunk * kChunk; t < end; ++t)

@@ -51,7 +51,7 @@ class OpenSurfaceWalk {
       wave.erase(std::unique(wave.begin(), wave.end()), wave.end());
       requireMemory(
           static_cast<double>(known_.size() + wave.size()) * sizeof(SignField::BlockWinding),
-          maxMemory_, "level-set");
+          maxMemory_);
       evaluate(wave);
       wave = unknownNeighbours(wave);
     }
@@ -100,7 +100,7 @@ class OpenSurfaceWalk {
 
   void evaluate(const std::vector<V3i>& wave) {
     std::vector<std::unique_ptr<SignField::BlockWinding>> values(wave.size());
-    ProgressGate gate(progress_, wave.size(), "level-set");
+    ProgressGate gate(progress_, wave.size());
     tbb::parallel_for(std::size_t{0}, wave.size(), [&](std::size_t i) {
       values[i] = std::make_unique<SignField::BlockWinding>();
       field_.winding(wave[i], *values[i]);
@@ -144,7 +144,7 @@ class OpenSurfaceWalk {
   /// Unknown blocks that the cells of the crossed edges extend into.
   std::vector<V3i> unknownNeighbours(const std::vector<V3i>& wave) const {
     std::vector<std::vector<V3i>> found(wave.size());
-    ProgressGate gate(progress_, wave.size(), "level-set");
+    ProgressGate gate(progress_, wave.size());
     tbb::parallel_for(std::size_t{0}, wave.size(), [&](std::size_t i) {
       std::vector<CrossedEdge> edges;
       crossedEdgesIn(wave[i], true, edges);

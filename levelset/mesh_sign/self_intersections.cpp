@@ -171,7 +171,7 @@ class PairSearch {
     split(std::move(all), region, 0);
     std::vector<std::vector<Pair>> found(parts_.size());
     const Progress second = subProgress(progress_, 0.5, 1);
-    ProgressGate gate(second, parts_.size(), kAction);
+    ProgressGate gate(second, parts_.size());
     tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t i) {
       found[i] = findIn(parts_[i], gate);
       gate.advance(1);
@@ -188,12 +188,11 @@ class PairSearch {
     List triangles;
     Imath::Box3d region;  // open above, except at the upper end of space
   };
-  static constexpr const char* kAction = "self-intersections";
   static constexpr std::size_t kFew = 24;
   static constexpr int kDeepest = 60;
 
   void split(List all, const Imath::Box3d& region, int depth) {
-    if (all.size() > 1000) report(progress_, 0, kAction);
+    if (all.size() > 1000) report(progress_, 0);
     const V3d size = region.size();
     const int axis = size.x >= size.y && size.x >= size.z ? 0 : (size.y >= size.z ? 1 : 2);
     const double middle = region.min[axis] + size[axis] / 2;

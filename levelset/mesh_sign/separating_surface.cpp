@@ -23,7 +23,6 @@ using Polygon = std::vector<V3d>;
 /// Polygons that are kept or dropped together.
 using Sheet = std::vector<Polygon>;
 
-constexpr const char* kAction = "level-set";
 /// Number of points above which the winding number is summed over a tree.
 constexpr std::size_t kFewPoints = 16;
 /// Relative to the polygon's size: corners nearer to a plane count as on it.
@@ -100,13 +99,13 @@ class SeparatingSurface {
   LocalMesh find() {
     findPartners();
     findPatches();
-    report(progress_, 0.3, kAction);
+    report(progress_, 0.3);
     std::vector<std::uint32_t> patches;  // by their largest triangle
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
       if (largest_[t] != kNone) patches.push_back(t);
     if (pairs_.empty() && patches.size() <= 1) return mesh_;
     if (!pairs_.empty() || patches.size() > kFewPoints) buildField();
-    report(progress_, 0.6, kAction);
+    report(progress_, 0.6);
     std::vector<char> kept(mesh_.triangles.size(), 0);  // by patch
     tbb::parallel_for(std::size_t{0}, patches.size(), [&](std::size_t i) {
       const std::uint32_t t = largest_[patches[i]];
@@ -287,7 +286,7 @@ class SeparatingSurface {
     };
     std::vector<Found> found(crossed.size());
     const Progress last = subProgress(progress_, 0.6, 1);
-    ProgressGate gate(last, crossed.size(), kAction);
+    ProgressGate gate(last, crossed.size());
     tbb::parallel_for(std::size_t{0}, crossed.size(), [&](std::size_t i) {
       for (Polygon& piece : pieces(crossed[i]))
         (separates(crossed[i], piece) ? found[i].kept : found[i].dropped)

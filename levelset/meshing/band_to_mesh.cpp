@@ -11,20 +11,17 @@
 namespace levelset {
 namespace {
 
-constexpr const char* kAction = "mesh";
-
 void validate(const NarrowBand& band, const BandToMeshOptions& options) {
   if (!(options.adaptivity >= 0 && options.adaptivity <= 1)) {
-    throw UsageError(fmt::format(
-        "mesh: adaptivity {} is outside [0, 1]; give a number in that range", options.adaptivity));
+    throw UsageError(fmt::format("adaptivity {} is outside [0, 1]; give a number in that range",
+                                 options.adaptivity));
   }
   if (options.sharp && options.adaptivity > 0) {
-    throw UsageError("mesh: sharp and adaptivity exclude each other; omit one of them");
+    throw UsageError("sharp and adaptivity exclude each other; omit one of them");
   }
-  if (!options.openSurface) requireSolid(band, kAction);
+  if (!options.openSurface) requireSolid(band);
   if (band.isEmpty()) {
-    throw InvalidInput(
-        "mesh: the band is empty, so there is no surface; check the steps before it");
+    throw InvalidInput("the band is empty, so there is no surface; check the steps before it");
   }
 }
 
@@ -45,26 +42,26 @@ TriMesh toWorld(const IndexMesh& mesh, const NarrowBand& band) {
 
 TriMesh bandToMesh(const NarrowBand& band, const BandToMeshOptions& options) {
   validate(band, options);
-  report(options.progress, 0, kAction);
+  report(options.progress, 0);
   const CellSurface surface(vdb(band));
   if (!surface.triangleCount()) {
     throw InvalidInput(
-        "mesh: the band has no zero crossing, so there is no surface; check the steps "
+        "the band has no zero crossing, so there is no surface; check the steps "
         "before it");
   }
-  report(options.progress, 0.3, kAction);
+  report(options.progress, 0.3);
   IndexMesh mesh =
       options.sharp
           ? IndexMesh(sharpSurface(surface, vdb(band), subProgress(options.progress, 0.3, 0.9)))
           : marchCells(surface);
   if (options.adaptivity > 0) {
-    report(options.progress, 0.4, kAction);
+    report(options.progress, 0.4);
     mesh = decimate(mesh, options.adaptivity);
   }
-  report(options.progress, 0.9, kAction);
+  report(options.progress, 0.9);
   TriMesh result = toWorld(mesh, band);
   result.triangles = std::move(mesh.triangles);
-  report(options.progress, 1, kAction);
+  report(options.progress, 1);
   return result;
 }
 

@@ -160,7 +160,7 @@ void CellSurface::collectBlocks() {
 
 void CellSurface::linkBlocks() {
   if (blocks_.size() >= kNoBlock)
-    throw ResourceLimit("mesh: the band has more than 4294967294 leaves; use larger voxels");
+    throw ResourceLimit("the band has more than 4294967294 leaves; use larger voxels");
   std::unordered_map<Coord, std::uint32_t, OriginHash> indexOf;
   indexOf.reserve(blocks_.size());
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
@@ -232,7 +232,7 @@ void CellSurface::numberAll() {
     cycleCount_ += block.cycleCount;
   }
   if (vertexCount_ > std::numeric_limits<std::uint32_t>::max()) {
-    throw ResourceLimit("mesh: the surface needs more than 4294967296 vertices; use larger voxels");
+    throw ResourceLimit("the surface needs more than 4294967296 vertices; use larger voxels");
   }
 }
 

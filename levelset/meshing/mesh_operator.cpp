@@ -13,9 +13,9 @@ const OperatorText MeshOperator::text{
     .example = "levelsmith box --size 2,2,2 --voxel 0.1 ! mesh --sharp ! write box.ply"};
 
 void MeshOperator::check(const Options& options, const GivenOptions&) {
-  if (options.adaptivity > 1) throw UsageError("mesh: --adaptivity must lie between 0 and 1");
+  if (options.adaptivity > 1) throw UsageError("--adaptivity must lie between 0 and 1");
   if (options.sharp && options.adaptivity > 0)
-    throw UsageError("mesh: --sharp and --adaptivity exclude each other; give one");
+    throw UsageError("--sharp and --adaptivity exclude each other; give one");
 }
 
 TriMesh MeshOperator::run(std::vector<NarrowBand> operands, const Options& options,

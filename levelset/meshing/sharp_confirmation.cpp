@@ -298,11 +298,11 @@ std::vector<bool> confirmFeatures(IndexMesh& mesh, const openvdb::FloatGrid& fie
   for (std::uint32_t v = 0; v < sheets.size(); ++v)
     if (sheets[v].count > 1 && quality[v].misfit <= kMisfit) features.push_back(v);
   if (features.empty()) return isBeside;
-  report(progress, 0, "mesh");
+  report(progress, 0);
   const Fans fans(mesh);
-  report(progress, 0.2, "mesh");
+  report(progress, 0.2);
   const Progress asked = subProgress(progress, 0.2, 1);
-  ProgressGate gate(asked, 2 * features.size(), "mesh");
+  ProgressGate gate(asked, 2 * features.size());
   std::vector<EdgeEvidence> evidence(mesh.positions.size());
   const double voxelSize = field.voxelSize()[0];
   const double halfWidth = static_cast<double>(field.background()) / voxelSize;

@@ -85,9 +85,7 @@ class FeatureInserter {
   void run() {
     collectCorners();
     for (int pass = 0; pass < kPasses; ++pass) {
-      const auto reportProgress = [&](double done) {
-        report(progress_, (pass + done) / kPasses, "mesh");
-      };
+      const auto reportProgress = [&](double done) { report(progress_, (pass + done) / kPasses); };
       reportProgress(0);
       collect();
       if (edges_.empty() && faces_.empty()) return;

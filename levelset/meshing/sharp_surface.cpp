@@ -78,15 +78,15 @@ class DualMesher {
     twice_.resize(surface_.cycleCount());
     cells_.resize(surface_.vertexCount());
     const Progress placed = subProgress(progress_, 0, 0.4);
-    ProgressGate gate(placed, surface_.blocks().size(), "mesh");
+    ProgressGate gate(placed, surface_.blocks().size());
     forEachBlock([&](const SurfaceBlock& block) {
       placeBlock(block);
       gate.advance(1);
     });
     collectSegments();
-    report(progress_, 0.4, "mesh");
+    report(progress_, 0.4);
     adoptSheets();
-    report(progress_, 0.45, "mesh");
+    report(progress_, 0.45);
     SharpMesh mesh = assemble();
     std::vector<SheetQuality> quality(mesh.positions.size());
     for (std::size_t i = 0; i < vertices_.size(); ++i)
@@ -98,7 +98,7 @@ class DualMesher {
       vertices_[i].position = isBeside[i] ? Vector3d(p[0], p[1], p[2]) : vertices_[i].smooth;
       vertices_[i].sheets = isBeside[i] ? mesh.sheets[i] : VertexSheets();
     }
-    report(progress_, 0.7, "mesh");
+    report(progress_, 0.7);
     mesh = assemble();
     insertFeatures(mesh, mesh.sheets, subProgress(progress_, 0.75, 1));
     return mesh;

@@ -33,7 +33,7 @@ class SheetUnfolder {
     for (int pass = 0; pass < kUnfoldPasses; ++pass) {
       const double done = static_cast<double>(pass) / kUnfoldPasses;
       flip(done);
-      report(progress_, done, "mesh");
+      report(progress_, done);
       if (!collapse()) return;
     }
   }
@@ -84,7 +84,7 @@ class SheetUnfolder {
   /// form a triangle without area.
   void flip(double done) {
     for (int pass = 0; pass < kUnfoldPasses; ++pass) {
-      report(progress_, done, "mesh");
+      report(progress_, done);
       faces_ = foldedTriangles();
       if (faces_.empty()) return;
       std::vector<TriangleSide> sides;

@@ -16,11 +16,12 @@ NarrowBand masked(const NarrowBand& solid, const Mask& mask, double farthest,
                   const MaskedOptions& options) {
   const NarrowBand changed = change(subProgress(options.progress, 0, 0.5));
   NarrowBand result = morph(solid, changed,
-                            {.mask = mask,
-                             .farthest = farthest / solid.voxelSize() + kBeyondMoved,
-                             .maxMemory = options.maxMemory,
-                             .progress = subProgress(options.progress, 0.5, 0.9),
-                             .action = options.action});
+                            {
+                                .mask = mask,
+                                .farthest = farthest / solid.voxelSize() + kBeyondMoved,
+                                .maxMemory = options.maxMemory,
+                                .progress = subProgress(options.progress, 0.5, 0.9),
+                            });
   if (!options.halfWidth) return result;
   return redistance(std::move(result), {.halfWidth = options.halfWidth,
                                         .maxMemory = options.maxMemory,

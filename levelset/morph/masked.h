@@ -13,7 +13,6 @@ struct MaskedOptions {
   std::optional<double> halfWidth = {};  ///< of the result, voxels; empty: as the operand
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
-  const char* action = "mask";  ///< in messages
 };
 
 /// Applies a change of a solid where a mask allows it: morphs from the solid to the changed solid,

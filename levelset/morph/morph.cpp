@@ -30,25 +30,23 @@ constexpr double kUntilResampled = 0.05, kUntilDistances = 0.4;
 constexpr double kBesideSurface = 4;
 
 void checkMorph(const NarrowBand& solid, const NarrowBand& target, const MorphOptions& options) {
-  const char* action = options.action;
-  if (options.mask) checkMask(*options.mask, action);
+  if (options.mask) checkMask(*options.mask);
   if (options.farthest && !(*options.farthest >= kFirstReach && std::isfinite(*options.farthest)))
-    throw UsageError(fmt::format("{}: a distance limit of {} voxels is too small; give at least {}",
-                                 action, *options.farthest, kFirstReach));
+    throw UsageError(fmt::format("a distance limit of {} voxels is too small; give at least {}",
+                                 *options.farthest, kFirstReach));
   if (options.steps < 1)
-    throw UsageError(
-        fmt::format("{}: the number of steps is {}; give at least 1", action, options.steps));
+    throw UsageError(fmt::format("the number of steps is {}; give at least 1", options.steps));
   if (!(options.until > 0 && options.until <= 1))
-    throw UsageError(fmt::format("{}: the last fraction is {}; give a number above 0, up to 1",
-                                 action, options.until));
+    throw UsageError(
+        fmt::format("the last fraction is {}; give a number above 0, up to 1", options.until));
   if (options.tolerance && !(*options.tolerance > 0 && std::isfinite(*options.tolerance)))
     throw UsageError(
-        fmt::format("{}: the tolerance is {}; give a positive length", action, *options.tolerance));
-  requireSolid(solid, options.action);
-  requireSolid(target, options.action);
+        fmt::format("the tolerance is {}; give a positive length", *options.tolerance));
+  requireSolid(solid);
+  requireSolid(target);
   if (solid.isEmpty() || target.isEmpty())
-    throw InvalidInput(fmt::format("{}: the {} is empty; give two solids", action,
-                                   solid.isEmpty() ? "solid" : "target"));
+    throw InvalidInput(
+        fmt::format("the {} is empty; give two solids", solid.isEmpty() ? "solid" : "target"));
 }
 
 /// Distances to two solids on common blocks.
@@ -108,9 +106,9 @@ NarrowBand intermediate(const DistancePair& pair, double part, const MorphOption
   const FloatGrid::Ptr field = pair.at(part, options.mask);
   if (!eikonal::hasZeroCrossing(field->tree()))
     throw InvalidInput(
-        fmt::format("{}: the solid vanishes at fraction {:.3g} of the morph, since it does not "
+        fmt::format("the solid vanishes at fraction {:.3g} of the morph, since it does not "
                     "overlap the target; move the target until the two overlap, or use 1 step",
-                    options.action, part));
+                    part));
   return makeBand(distances(*field));
 }
 
@@ -129,7 +127,6 @@ NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphO
   const auto distances = [&](const FloatGrid& field, double halfWidth, double from, double to,
                              const std::optional<openvdb::CoordBBox>& within = {}) {
     eikonal::DistanceRequest request;
-    request.action = options.action;
     request.halfWidth = halfWidth;
     request.region = within;
     request.maxMemory = options.maxMemory;
@@ -165,7 +162,7 @@ NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphO
                      return distances(field, solid.halfWidth(), fractionOf(i - 1), fractionOf(i));
                    });
     if (options.keep) options.keep(result, i);
-    report(options.progress, fractionOf(i), options.action);
+    report(options.progress, fractionOf(i));
     if (options.tolerance && part < 1 && compare(result, goal).hausdorff() <= *options.tolerance)
       break;
   }

@@ -25,7 +25,6 @@ struct MorphOptions {
   std::function<void(const NarrowBand& step, int number)> keep = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
-  const char* action = "morph";  ///< prefix of messages
 };
 
 /// Moves the surface of `solid` towards that of `target`, on the grid of `solid`.

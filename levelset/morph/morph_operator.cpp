@@ -20,7 +20,7 @@ double partOfTheWay(const std::string& until) {
   const auto [next, error] = std::from_chars(begin, end, part);
   if (error == std::errc() && next == end && part > 0 && part <= 1) return part;
   throw UsageError(
-      fmt::format("morph: --until: '{}' is no part of the way; write converged, or a number above "
+      fmt::format("--until: '{}' is no part of the way; write converged, or a number above "
                   "0 and up to 1",
                   until));
 }
@@ -43,15 +43,15 @@ const OperatorText MorphOperator::text{
 void MorphOperator::check(const Options& options, const GivenOptions& given) {
   if (partOfTheWay(options.until) < 1 && given("tolerance"))
     throw UsageError(
-        "morph: --tolerance tells when the target is reached, and --until ends before; "
+        "--tolerance tells when the target is reached, and --until ends before; "
         "leave one of them out");
   if (given("mask") && given("tolerance"))
     throw UsageError(
-        "morph: --tolerance tells when the target is reached, and with --mask it is not; leave one "
+        "--tolerance tells when the target is reached, and with --mask it is not; leave one "
         "of them out");
   if (options.steps > kMostMorphSteps) {
-    throw UsageError(fmt::format("morph: --steps: {} are too many; give at most {}", options.steps,
-                                 kMostMorphSteps));
+    throw UsageError(
+        fmt::format("--steps: {} are too many; give at most {}", options.steps, kMostMorphSteps));
   }
 }
 

@@ -29,23 +29,20 @@ NarrowBand offsetAndBack(const NarrowBand& solid, double distance, const OffsetO
                              vdb(start), vdb(back)));
 }
 
-void checkRadius(double radius, const char* action) {
+void checkRadius(double radius) {
   if (!std::isfinite(radius) || radius < 0)
-    throw UsageError(
-        fmt::format("{}: the radius is {}; give a length of zero or more", action, radius));
+    throw UsageError(fmt::format("the radius is {}; give a length of zero or more", radius));
 }
 
 void checkShell(const NarrowBand& solid, double thickness) {
   if (!std::isfinite(thickness) || thickness <= 0)
-    throw UsageError(
-        fmt::format("shell: the thickness is {}; give a length above zero", thickness));
-  requireSolid(solid, "shell");
+    throw UsageError(fmt::format("the thickness is {}; give a length above zero", thickness));
+  requireSolid(solid);
   if (solid.isEmpty())
-    throw InvalidInput(
-        "shell: the solid is empty, so there is no surface to thicken; give a solid");
+    throw InvalidInput("the solid is empty, so there is no surface to thicken; give a solid");
   if (thickness < solid.voxelSize() * (1 - 1e-9))
     throw InvalidInput(
-        fmt::format("shell: a wall of {:.4g} is thinner than a voxel of {:.4g}; use a "
+        fmt::format("a wall of {:.4g} is thinner than a voxel of {:.4g}; use a "
                     "thicker wall or smaller voxels",
                     thickness, solid.voxelSize()));
 }
@@ -56,7 +53,7 @@ NarrowBand cavityOf(const NarrowBand& solid, double depth, const OffsetOptions& 
     return offset(solid, -depth, options);
   } catch (const InvalidInput&) {
     throw InvalidInput(fmt::format(
-        "shell: no part of the solid is thicker than twice {:.4g}, so there is no cavity; use a "
+        "no part of the solid is thicker than twice {:.4g}, so there is no cavity; use a "
         "thinner wall",
         depth));
   }
@@ -65,12 +62,12 @@ NarrowBand cavityOf(const NarrowBand& solid, double depth, const OffsetOptions& 
 }  // namespace
 
 NarrowBand opening(const NarrowBand& solid, double radius, const OffsetOptions& options) {
-  checkRadius(radius, "open");
+  checkRadius(radius);
   return offsetAndBack(solid, -radius, options);
 }
 
 NarrowBand closing(const NarrowBand& solid, double radius, const OffsetOptions& options) {
-  checkRadius(radius, "close");
+  checkRadius(radius);
   return offsetAndBack(solid, radius, options);
 }
 

@@ -9,20 +9,22 @@ namespace {
 /// Applies a change to the operand, where the mask allows it.
 /// @param farthest  largest distance by which the surface moves, world units
 template <class Options, class Change>
-NarrowBand changed(const char* action, const NarrowBand& solid, const Options& options,
-                   double farthest, OperatorRun& run, const Change& change) {
+NarrowBand changed(const NarrowBand& solid, const Options& options, double farthest,
+                   OperatorRun& run, const Change& change) {
   const auto apply = [&](const Progress& progress) {
-    return change(solid, OffsetOptions{.halfWidth = options.halfWidth,
-                                       .maxMemory = run.maxMemory,
-                                       .progress = progress,
-                                       .action = action});
+    return change(solid, OffsetOptions{
+                             .halfWidth = options.halfWidth,
+                             .maxMemory = run.maxMemory,
+                             .progress = progress,
+                         });
   };
   if (!options.mask) return apply(run.progress);
   return masked(solid, *options.mask, farthest, apply,
-                {.halfWidth = options.halfWidth,
-                 .maxMemory = run.maxMemory,
-                 .progress = run.progress,
-                 .action = action});
+                {
+                    .halfWidth = options.halfWidth,
+                    .maxMemory = run.maxMemory,
+                    .progress = run.progress,
+                });
 }
 
 }  // namespace
@@ -65,7 +67,7 @@ const OperatorText OpenOperator::text{
 
 NarrowBand OpenOperator::run(std::vector<NarrowBand> operands, const Options& options,
                              OperatorRun& run) {
-  return changed(text.name, operands[0], options, options.radius, run,
+  return changed(operands[0], options, options.radius, run,
                  [&](const NarrowBand& solid, const OffsetOptions& settings) {
                    return opening(solid, options.radius, settings);
                  });
@@ -84,7 +86,7 @@ const OperatorText CloseOperator::text{
 
 NarrowBand CloseOperator::run(std::vector<NarrowBand> operands, const Options& options,
                               OperatorRun& run) {
-  return changed(text.name, operands[0], options, options.radius, run,
+  return changed(operands[0], options, options.radius, run,
                  [&](const NarrowBand& solid, const OffsetOptions& settings) {
                    return closing(solid, options.radius, settings);
                  });
@@ -98,7 +100,7 @@ const OperatorText ShellOperator::text{
 
 NarrowBand ShellOperator::run(std::vector<NarrowBand> operands, const Options& options,
                               OperatorRun& run) {
-  return changed(text.name, operands[0], options, options.thickness, run,
+  return changed(operands[0], options, options.thickness, run,
                  [&](const NarrowBand& solid, const OffsetOptions& settings) {
                    return shell(solid, options.thickness, options.side, settings);
                  });

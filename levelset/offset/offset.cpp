@@ -23,23 +23,20 @@ constexpr double kRangeMargin = 0.5;
 double checkedHalfWidth(const NarrowBand& solid, const OffsetOptions& options) {
   const double halfWidth = options.halfWidth.value_or(solid.halfWidth());
   if (!std::isfinite(halfWidth) || halfWidth < 1)
-    throw UsageError(
-        fmt::format("{}: the half width is {} voxels; give at least 1", options.action, halfWidth));
+    throw UsageError(fmt::format("the half width is {} voxels; give at least 1", halfWidth));
   return halfWidth;
 }
 
-void requireSurface(const NarrowBand& solid, const OffsetOptions& options) {
-  requireSolid(solid, options.action);
+void requireSurface(const NarrowBand& solid) {
+  requireSolid(solid);
   if (solid.isEmpty())
-    throw InvalidInput(fmt::format(
-        "{}: the solid is empty, so there is no surface to move; give a solid", options.action));
+    throw InvalidInput("the solid is empty, so there is no surface to move; give a solid");
 }
 
 /// Requests distances near the possible positions of the new surface.
 eikonal::DistanceRequest nearSurfaceRequest(const OffsetOptions& options, double shift,
                                             double reach) {
   eikonal::DistanceRequest request;
-  request.action = options.action;
   request.halfWidth = reach + kPadding;
   request.shift = shift;
   request.maxMemory = options.maxMemory;
@@ -50,7 +47,6 @@ eikonal::DistanceRequest nearSurfaceRequest(const OffsetOptions& options, double
 NarrowBand redistanced(const openvdb::FloatGrid& field, double halfWidth,
                        const OffsetOptions& options, double done) {
   eikonal::DistanceRequest request;
-  request.action = options.action;
   request.halfWidth = halfWidth;
   request.maxMemory = options.maxMemory;
   request.progress = subProgress(options.progress, done, 1);
@@ -64,17 +60,17 @@ bool hasSurface(const openvdb::FloatGrid& field) {
 /// Offset length at each closest point of the surface, in voxels.
 class Lengths {
  public:
-  Lengths(const openvdb::FloatGrid& field, const ScalarField& distance, const char* action)
-      : field_(field), distance_(distance), action_(action) {}
+  Lengths(const openvdb::FloatGrid& field, const ScalarField& distance)
+      : field_(field), distance_(distance), action_() {}
 
   [[nodiscard]] double at(const openvdb::Vec3d& point) const {
     const Imath::V3d world = toImath(field_.indexToWorld(point));
     const double length = distance_(world);
     if (!std::isfinite(length)) {
       throw InvalidInput(
-          fmt::format("{}: the length is {} at {:.6g},{:.6g},{:.6g} on the surface; give a field "
+          fmt::format("the length is {} at {:.6g},{:.6g},{:.6g} on the surface; give a field "
                       "that is finite there",
-                      action_, length, world.x, world.y, world.z));
+                      length, world.x, world.y, world.z));
     }
     return length / field_.voxelSize()[0];
   }
@@ -111,9 +107,8 @@ class Lengths {
 
 NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& options) {
   if (!std::isfinite(distance))
-    throw UsageError(
-        fmt::format("{}: the distance is {}; give a finite length", options.action, distance));
-  requireSurface(solid, options);
+    throw UsageError(fmt::format("the distance is {}; give a finite length", distance));
+  requireSurface(solid);
   const double halfWidth = checkedHalfWidth(solid, options);
   if (distance == 0 && halfWidth == solid.halfWidth()) return solid;
   if (distance == 0) return redistanced(vdb(solid), halfWidth, options, 0);
@@ -123,21 +118,19 @@ NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& option
   const openvdb::FloatGrid::Ptr moved = eikonal::distanceTransform(vdb(solid), request);
   if (!hasSurface(*moved))
     throw InvalidInput(
-        fmt::format("{}: the result is empty after an offset of {} world units, because no part of "
+        fmt::format("the result is empty after an offset of {} world units, because no part of "
                     "the solid is "
                     "thicker than twice that; use a smaller length",
-                    options.action, distance));
+                    distance));
   return redistanced(*moved, halfWidth, options, 0.6);
 }
 
 NarrowBand offsetBy(NarrowBand solid, const ScalarField& distance, const OffsetOptions& options) {
-  if (!distance)
-    throw UsageError(fmt::format("{}: the length is missing; give a formula or a grid of numbers",
-                                 options.action));
-  requireSurface(solid, options);
+  if (!distance) throw UsageError("the length is missing; give a formula or a grid of numbers");
+  requireSurface(solid);
   const double halfWidth = checkedHalfWidth(solid, options);
   const double voxel = solid.voxelSize();
-  const Lengths lengths(vdb(solid), distance, options.action);
+  const Lengths lengths(vdb(solid), distance);
   const Lengths::Range range = lengths.range(options);
 
   // === Compute φ(x) − length(closest point) near the possible positions of the new surface
@@ -163,9 +156,9 @@ NarrowBand offsetBy(NarrowBand solid, const ScalarField& distance, const OffsetO
     *moved->tree().touchLeaf(leaf->origin()) = *leaf;
   if (!hasSurface(*moved))
     throw InvalidInput(
-        fmt::format("{}: the result is empty after offsets of {:.6g} to {:.6g} world units; use "
+        fmt::format("the result is empty after offsets of {:.6g} to {:.6g} world units; use "
                     "smaller lengths",
-                    options.action, range.low * voxel, range.high * voxel));
+                    range.low * voxel, range.high * voxel));
   return redistanced(*moved, halfWidth, options, 0.7);
 }
 

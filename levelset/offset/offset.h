@@ -16,7 +16,6 @@ struct OffsetOptions {
       {};  ///< half width of the result, voxels; empty: that of the operand
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
-  const char* action = "offset";  ///< name in messages
 };
 
 /// Offsets the surface along its normal by `distance`; a positive distance grows the solid. Extends

@@ -26,9 +26,8 @@ const OperatorText OffsetOperator::text{
 
 void OffsetOperator::check(const Options&, const GivenOptions& given) {
   if (given("distance") == given("by"))
-    throw UsageError(given("by")
-                         ? "offset: a distance and --by exclude each other; leave one out"
-                         : "offset: how far is missing; give a length, or --by and a field");
+    throw UsageError(given("by") ? "a distance and --by exclude each other; leave one out"
+                                 : "how far is missing; give a length, or --by and a field");
 }
 
 NarrowBand OffsetOperator::run(std::vector<NarrowBand> operands, const Options& options,

@@ -20,9 +20,9 @@ namespace levelset {
 /// @throws InvalidInput if no grid point lies inside
 template <typename Distance>
 NarrowBand makeShape(const ShapeExtent& extent, double voxelSize, const ShapeOptions& options,
-                     const char* action, const Distance& distance) {
-  checkShape(extent, voxelSize, options, action);
-  report(options.progress, 0, action);
+                     const Distance& distance) {
+  checkShape(extent, voxelSize, options);
+  report(options.progress, 0);
 
   const auto grid = emptyLevelSet(uniformTransform(voxelSize), options.halfWidth);
   openvdb::CoordBBox domain;
@@ -41,11 +41,11 @@ NarrowBand makeShape(const ShapeExtent& extent, double voxelSize, const ShapeOpt
     filler.limitTo(blocks);
     domain.intersect(blocks);
   }
-  if (!filler.fill(domain, options.progress, action)) {
+  if (!filler.fill(domain, options.progress)) {
     throw InvalidInput(
-        fmt::format("{}: no grid point lies inside, because the shape is too thin for voxels "
+        fmt::format("no grid point lies inside, because the shape is too thin for voxels "
                     "of {}; use smaller voxels",
-                    action, voxelSize));
+                    voxelSize));
   }
   return makeBand(grid);
 }

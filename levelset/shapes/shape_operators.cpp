@@ -14,9 +14,8 @@ constexpr const char* kShapeGroup = "Shapes";
 constexpr const char* kShapeDetails =
     "Exact signed distances on both sides. Sizes are full extents.";
 
-V3d axisDirection(const V3d& axis, const char* action) {
-  if (!(axis.length() > 0))
-    throw UsageError(fmt::format("{}: --axis has no direction; give for example 0,0,1", action));
+V3d axisDirection(const V3d& axis) {
+  if (!(axis.length() > 0)) throw UsageError("--axis has no direction; give for example 0,0,1");
   return axis.normalized();
 }
 
@@ -44,7 +43,7 @@ template <class Shape>
 ValuePlan ShapeOperator<Shape>::plan(const Shape& shape, Plans, const OperatorRun& run) {
   const double voxel = shape.voxel.of(longestSide(shape, {}));
   const ShapeExtent extent = shape.extent();
-  checkShape(extent, voxel, shapeOptions(shape, run), Shape::kName);
+  checkShape(extent, voxel, shapeOptions(shape, run));
   return {.bounds = extent.bounds,
           .area = extent.area,
           .voxelSize = voxel,
@@ -77,17 +76,17 @@ NarrowBand BoxShape::make(double voxelSize, const ShapeOptions& options) const {
 }
 
 ShapeExtent TorusShape::extent() const {
-  return torusExtent(radius, tube, center, axisDirection(axis, kName));
+  return torusExtent(radius, tube, center, axisDirection(axis));
 }
 NarrowBand TorusShape::make(double voxelSize, const ShapeOptions& options) const {
-  return makeTorus(radius, tube, center, axisDirection(axis, kName), voxelSize, options);
+  return makeTorus(radius, tube, center, axisDirection(axis), voxelSize, options);
 }
 
 ShapeExtent CylinderShape::extent() const {
-  return cylinderExtent(radius, height, center, axisDirection(axis, kName));
+  return cylinderExtent(radius, height, center, axisDirection(axis));
 }
 NarrowBand CylinderShape::make(double voxelSize, const ShapeOptions& options) const {
-  return makeCylinder(radius, height, center, axisDirection(axis, kName), voxelSize, options);
+  return makeCylinder(radius, height, center, axisDirection(axis), voxelSize, options);
 }
 
 ShapeExtent CapsuleShape::extent() const {

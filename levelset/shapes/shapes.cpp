@@ -16,38 +16,35 @@ namespace {
 
 using Imath::V3d;
 
-void requireLength(double length, const char* action, const char* name) {
+void requireLength(double length, const char* name) {
   if (length > 0 && std::isfinite(length)) return;
-  throw UsageError(
-      fmt::format("{}: {} is {}; give a positive, finite length", action, name, length));
+  throw UsageError(fmt::format("{} is {}; give a positive, finite length", name, length));
 }
 
-void requirePoint(const V3d& point, const char* action, const char* name) {
+void requirePoint(const V3d& point, const char* name) {
   if (std::isfinite(point.x) && std::isfinite(point.y) && std::isfinite(point.z)) return;
-  throw UsageError(fmt::format("{}: {} is {},{},{}; give finite coordinates", action, name, point.x,
-                               point.y, point.z));
+  throw UsageError(
+      fmt::format("{} is {},{},{}; give finite coordinates", name, point.x, point.y, point.z));
 }
 
-V3d requireAxis(const V3d& axis, const char* action) {
-  requirePoint(axis, action, "the axis");
+V3d requireAxis(const V3d& axis) {
+  requirePoint(axis, "the axis");
   const V3d unit = axis.normalized();
   if (unit.length2() > 0.5) return unit;
-  throw UsageError(fmt::format("{}: the axis is 0,0,0; give it a direction", action));
+  throw UsageError("the axis is 0,0,0; give it a direction");
 }
 
-void requireFits(const ShapeExtent& extent, double voxelSize, const ShapeOptions& options,
-                 const char* action) {
+void requireFits(const ShapeExtent& extent, double voxelSize, const ShapeOptions& options) {
   if (!std::isfinite(extent.area)) {
-    throw InvalidInput(fmt::format(
-        "{}: the surface area overflows double precision; change the unit of length", action));
+    throw InvalidInput("the surface area overflows double precision; change the unit of length");
   }
   const V3d size = extent.bounds.size();
   const double longest = std::max({size.x, size.y, size.z});
   if (voxelSize > longest) {
     throw InvalidInput(
-        fmt::format("{}: the voxel size {} is larger than the longest side of the shape, {}; "
+        fmt::format("the voxel size {} is larger than the longest side of the shape, {}; "
                     "use smaller voxels",
-                    action, voxelSize, longest));
+                    voxelSize, longest));
   }
   double farthest = 0;
   for (int axis = 0; axis < 3; ++axis)
@@ -56,10 +53,10 @@ void requireFits(const ShapeExtent& extent, double voxelSize, const ShapeOptions
   const double index = farthest / voxelSize + options.halfWidth;
   if (!(index < kIndexLimit)) {
     throw ResourceLimit(
-        fmt::format("{}: at voxel size {} the grid index {:.3g} of the shape exceeds 32 bits; use "
+        fmt::format("at voxel size {} the grid index {:.3g} of the shape exceeds 32 bits; use "
                     "larger voxels "
                     "or move it towards the origin",
-                    action, voxelSize, index));
+                    voxelSize, index));
   }
   // A surface piece of the size of a leaf face overlaps the leaves within the band, and about one
   // leaf more.
@@ -68,7 +65,7 @@ void requireFits(const ShapeExtent& extent, double voxelSize, const ShapeOptions
     const V3d blocks = options.region.size() / (8 * voxelSize) + V3d(2);
     leaves = std::min(leaves, blocks.x * blocks.y * blocks.z);
   }
-  requireMemory(leaves * 2300 + 1e5, options.maxMemory, action);
+  requireMemory(leaves * 2300 + 1e5, options.maxMemory);
 }
 
 Imath::Box3d around(const V3d& center, const V3d& half) {
@@ -108,14 +105,13 @@ double ringDistance(double r, double z, double radius, double tube) {
 
 }  // namespace
 
-void checkShape(const ShapeExtent& extent, double voxelSize, const ShapeOptions& options,
-                const char* action) {
-  requireLength(voxelSize, action, "the voxel size");
+void checkShape(const ShapeExtent& extent, double voxelSize, const ShapeOptions& options) {
+  requireLength(voxelSize, "the voxel size");
   if (!(options.halfWidth >= 1) || !std::isfinite(options.halfWidth)) {
     throw UsageError(
-        fmt::format("{}: the half width is {} voxels; give at least 1", action, options.halfWidth));
+        fmt::format("the half width is {} voxels; give at least 1", options.halfWidth));
   }
-  requireFits(extent, voxelSize, options, action);
+  requireFits(extent, voxelSize, options);
 }
 
 ShapeExtent sphereExtent(double radius, const V3d& center) {
@@ -147,20 +143,18 @@ ShapeExtent capsuleExtent(const V3d& from, const V3d& to, double radius) {
 
 NarrowBand makeSphere(double radius, const V3d& center, double voxelSize,
                       const ShapeOptions& options) {
-  const char* action = "sphere";
-  requireLength(radius, action, "the radius");
-  requirePoint(center, action, "the centre");
-  return makeShape(sphereExtent(radius, center), voxelSize, options, action,
+  requireLength(radius, "the radius");
+  requirePoint(center, "the centre");
+  return makeShape(sphereExtent(radius, center), voxelSize, options,
                    [=](const V3d& p) { return (p - center).length() - radius; });
 }
 
 NarrowBand makeBox(const V3d& size, const V3d& center, double voxelSize,
                    const ShapeOptions& options) {
-  const char* action = "box";
-  for (int axis = 0; axis < 3; ++axis) requireLength(size[axis], action, "a side");
-  requirePoint(center, action, "the centre");
+  for (int axis = 0; axis < 3; ++axis) requireLength(size[axis], "a side");
+  requirePoint(center, "the centre");
   const V3d half = size / 2;
-  return makeShape(boxExtent(size, center), voxelSize, options, action, [=](const V3d& p) {
+  return makeShape(boxExtent(size, center), voxelSize, options, [=](const V3d& p) {
     const V3d q(std::abs(p.x - center.x) - half.x, std::abs(p.y - center.y) - half.y,
                 std::abs(p.z - center.z) - half.z);
     const V3d outside(std::max(q.x, 0.0), std::max(q.y, 0.0), std::max(q.z, 0.0));
@@ -170,27 +164,24 @@ NarrowBand makeBox(const V3d& size, const V3d& center, double voxelSize,
 
 NarrowBand makeTorus(double radius, double tube, const V3d& center, const V3d& axis,
                      double voxelSize, const ShapeOptions& options) {
-  const char* action = "torus";
-  requireLength(radius, action, "the radius");
-  requireLength(tube, action, "the tube radius");
-  requirePoint(center, action, "the centre");
-  const V3d n = requireAxis(axis, action);
-  return makeShape(torusExtent(radius, tube, center, n), voxelSize, options, action,
-                   [=](const V3d& p) {
-                     const double z = (p - center) ^ n;
-                     const double r = (p - center - n * z).length();
-                     return ringDistance(r, z, radius, tube);
-                   });
+  requireLength(radius, "the radius");
+  requireLength(tube, "the tube radius");
+  requirePoint(center, "the centre");
+  const V3d n = requireAxis(axis);
+  return makeShape(torusExtent(radius, tube, center, n), voxelSize, options, [=](const V3d& p) {
+    const double z = (p - center) ^ n;
+    const double r = (p - center - n * z).length();
+    return ringDistance(r, z, radius, tube);
+  });
 }
 
 NarrowBand makeCylinder(double radius, double height, const V3d& center, const V3d& axis,
                         double voxelSize, const ShapeOptions& options) {
-  const char* action = "cylinder";
-  requireLength(radius, action, "the radius");
-  requireLength(height, action, "the height");
-  requirePoint(center, action, "the centre");
-  const V3d n = requireAxis(axis, action);
-  return makeShape(cylinderExtent(radius, height, center, n), voxelSize, options, action,
+  requireLength(radius, "the radius");
+  requireLength(height, "the height");
+  requirePoint(center, "the centre");
+  const V3d n = requireAxis(axis);
+  return makeShape(cylinderExtent(radius, height, center, n), voxelSize, options,
                    [=](const V3d& p) {
                      const double z = (p - center) ^ n;
                      const double r = (p - center - n * z).length();
@@ -200,13 +191,12 @@ NarrowBand makeCylinder(double radius, double height, const V3d& center, const V
 
 NarrowBand makeCapsule(const V3d& from, const V3d& to, double radius, double voxelSize,
                        const ShapeOptions& options) {
-  const char* action = "capsule";
-  requireLength(radius, action, "the radius");
-  requirePoint(from, action, "the first end");
-  requirePoint(to, action, "the second end");
+  requireLength(radius, "the radius");
+  requirePoint(from, "the first end");
+  requirePoint(to, "the second end");
   const V3d along = to - from;
   const double squaredLength = along.length2();
-  return makeShape(capsuleExtent(from, to, radius), voxelSize, options, action, [=](const V3d& p) {
+  return makeShape(capsuleExtent(from, to, radius), voxelSize, options, [=](const V3d& p) {
     // If both ends coincide, the capsule is a sphere.
     const double t =
         squaredLength > 0 ? std::clamp(((p - from) ^ along) / squaredLength, 0.0, 1.0) : 0.0;

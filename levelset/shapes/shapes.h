@@ -60,9 +60,7 @@ struct ShapeExtent {
 
 /// Checks the voxel size, half width and memory of a shape from its extent. Throws the same errors
 /// as building the shape.
-/// @param action  name of the shape, for messages
-void checkShape(const ShapeExtent& extent, double voxelSize, const ShapeOptions& options,
-                const char* action);
+void checkShape(const ShapeExtent& extent, double voxelSize, const ShapeOptions& options);
 
 /// Grid of a new shape, part of the options of every shape.
 struct ShapeGrid {
@@ -85,7 +83,6 @@ inline constexpr OptionInfo kShapeCenter{.help = "position of the centre"};
 inline constexpr OptionInfo kShapeAxis{.help = "direction of the axis"};
 
 struct SphereShape : ShapeGrid {
-  static constexpr const char* kName = "sphere";
   double radius = 0;
   Imath::V3d center = Imath::V3d(0);
 
@@ -100,7 +97,6 @@ struct SphereShape : ShapeGrid {
 };
 
 struct BoxShape : ShapeGrid {
-  static constexpr const char* kName = "box";
   Imath::V3d size = Imath::V3d(0);
   Imath::V3d center = Imath::V3d(0);
 
@@ -115,7 +111,6 @@ struct BoxShape : ShapeGrid {
 };
 
 struct TorusShape : ShapeGrid {
-  static constexpr const char* kName = "torus";
   double radius = 0, tube = 0;
   Imath::V3d center = Imath::V3d(0), axis = Imath::V3d(0, 0, 1);
 
@@ -132,7 +127,6 @@ struct TorusShape : ShapeGrid {
 };
 
 struct CylinderShape : ShapeGrid {
-  static constexpr const char* kName = "cylinder";
   double radius = 0, height = 0;
   Imath::V3d center = Imath::V3d(0), axis = Imath::V3d(0, 0, 1);
 
@@ -149,7 +143,6 @@ struct CylinderShape : ShapeGrid {
 };
 
 struct CapsuleShape : ShapeGrid {
-  static constexpr const char* kName = "capsule";
   Imath::V3d from = Imath::V3d(0), to = Imath::V3d(0);
   double radius = 0;
 

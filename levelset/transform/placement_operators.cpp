@@ -17,7 +17,7 @@ M44d rotationOf(const TransformOperator::Options& options) {
   M44d matrix;
   if (options.rotate.size() == 1) {
     if (!(options.axis.length() > 0))
-      throw UsageError("transform: --axis has no direction; give for example 0,0,1");
+      throw UsageError("--axis has no direction; give for example 0,0,1");
     matrix.setAxisAngle(options.axis.normalized(), options.rotate[0] * kDegree);
     return matrix;
   }
@@ -57,7 +57,7 @@ M44d placementOf(const TransformOperator::Options& options) {
     matrix = matrix * move;
   }
   if (!(std::abs(matrix.determinant()) > 0))
-    throw UsageError("transform: the matrix flattens space; it must be invertible");
+    throw UsageError("the matrix flattens space; it must be invertible");
   return matrix;
 }
 
@@ -151,18 +151,18 @@ const OperatorText TransformOperator::text{
 
 void TransformOperator::check(const Options& options, const GivenOptions& given) {
   if (options.rotate.size() > 1 && given("axis"))
-    throw UsageError("transform: --axis goes with one angle, not with three");
+    throw UsageError("--axis goes with one angle, not with three");
   const M44d matrix = placementOf(options);
   if (given.isMesh) {
     if (options.bake || options.voxel)
-      throw UsageError("transform: --bake and --voxel are for level sets, and this is a mesh");
+      throw UsageError("--bake and --voxel are for level sets, and this is a mesh");
     return;
   }
   if (options.bake) return;
-  if (options.voxel) throw UsageError("transform: --voxel goes with --bake");
+  if (options.voxel) throw UsageError("--voxel goes with --bake");
   if (!isSimilarityMatrix(matrix)) {
     throw UsageError(
-        "transform: a level set that is mirrored, sheared or scaled unevenly must be resampled; "
+        "a level set that is mirrored, sheared or scaled unevenly must be resampled; "
         "add --bake");
   }
 }

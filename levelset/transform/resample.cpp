@@ -67,7 +67,7 @@ class ResampleKernel {
         creaseBend_(static_cast<float>(kCreaseBend * placement.sourceVoxel / placement.scale)) {}
 
   /// Adds the leaves of the target that can contain voxels of the source's band.
-  void addLeaves(const char* action) {
+  void addLeaves() {
     std::vector<const Leaf*> leaves;
     source_.tree().getNodes(leaves);
     std::vector<std::vector<Coord>> found(leaves.size());
@@ -75,7 +75,7 @@ class ResampleKernel {
                       [&](const auto& range) {
                         const auto accessor = source_.getConstAccessor();
                         for (std::size_t i = range.begin(); i != range.end(); ++i)
-                          found[i] = blocksNear(*leaves[i], accessor, action);
+                          found[i] = blocksNear(*leaves[i], accessor);
                       });
     std::size_t count = 0;
     for (const auto& part : found) count += part.size();
@@ -106,8 +106,7 @@ class ResampleKernel {
  private:
   using Accessor = FloatGrid::ConstAccessor;
 
-  [[nodiscard]] std::vector<Coord> blocksNear(const Leaf& leaf, const Accessor& accessor,
-                                              const char* action) const {
+  [[nodiscard]] std::vector<Coord> blocksNear(const Leaf& leaf, const Accessor& accessor) const {
     Vec3d low(std::numeric_limits<double>::max()), high(-std::numeric_limits<double>::max());
     const openvdb::CoordBBox box = leaf.getNodeBoundingBox();
     for (int i = 0; i < 8; ++i) {
@@ -122,9 +121,9 @@ class ResampleKernel {
     Coord first, last;
     for (int axis = 0; axis < 3; ++axis) {
       if (!(std::max(std::abs(low[axis]), std::abs(high[axis])) < kIndexLimit)) {
-        throw ResourceLimit(fmt::format(
-            "{}: the grid index {:.3g} of the result exceeds 32 bits; use larger voxels", action,
-            std::max(std::abs(low[axis]), std::abs(high[axis]))));
+        throw ResourceLimit(
+            fmt::format("the grid index {:.3g} of the result exceeds 32 bits; use larger voxels",
+                        std::max(std::abs(low[axis]), std::abs(high[axis]))));
       }
       first[axis] = static_cast<int>(std::floor(low[axis])) & ~7;
       last[axis] = static_cast<int>(std::ceil(high[axis])) & ~7;
@@ -239,25 +238,25 @@ FloatGrid::Ptr supported(const NarrowBand& solid, const Placement& place, std::s
 /// Checks the memory estimate before any block is built.
 /// @param refinement  number of target voxels along a source voxel
 void checkMemory(const NarrowBand& solid, double refinement, double halfWidth,
-                 std::size_t maxMemory, const char* action) {
+                 std::size_t maxMemory) {
   // Estimate the source voxels at the surface, then the leaves of the target. The target exists
   // twice, sampled and re-distanced.
   const double surface = static_cast<double>(solid.activeVoxelCount()) / (2 * solid.halfWidth());
   const double leaves = surface * refinement * refinement / 64 * (2 * halfWidth + 15) / 8;
-  requireMemory(leaves * 2 * 2300, maxMemory, action);
+  requireMemory(leaves * 2 * 2300, maxMemory);
 }
 
 /// Checks that the target's voxels are smaller than the solid, before the band is widened.
 void requireSmallerVoxels(const NarrowBand& solid, const Imath::M44d& sourceToWorld,
-                          const Placement& place, const char* action) {
+                          const Placement& place) {
   const Imath::V3d size = solid.zeroSetBounds().size();
   const double longest =
       std::max({size.x, size.y, size.z}) / solid.voxelSize() * stretchOf(sourceToWorld).greatest;
   if (place.targetVoxel <= longest) return;
   throw InvalidInput(
-      fmt::format("{}: voxels of {} are larger than the longest side of the solid, "
+      fmt::format("voxels of {} are larger than the longest side of the solid, "
                   "about {:.3g}; use smaller voxels",
-                  action, place.targetVoxel, longest));
+                  place.targetVoxel, longest));
 }
 
 }  // namespace
@@ -270,15 +269,15 @@ Stretch stretchOf(const Imath::M44d& matrix) {
   return {values[2], values[0]};
 }
 
-openvdb::math::Transform::Ptr transformOf(const Imath::M44d& indexToWorld, const char* action) {
+openvdb::math::Transform::Ptr transformOf(const Imath::M44d& indexToWorld) {
   const double scale = indexToWorld[0][0];
   if (scale > 0 && indexToWorld == axisAligned(scale)) return uniformTransform(scale);
   // OpenVDB rejects a matrix with a determinant of 3e-15 or less.
   if (!(Imath::M44d(indexToWorld).determinant() > 1e-14)) {
     throw ResourceLimit(
-        fmt::format("{}: voxels of {:.3g} are too small for a rotated or "
+        fmt::format("voxels of {:.3g} are too small for a rotated or "
                     "translated grid; use a smaller unit of length, so that the numbers are larger",
-                    action, stretchOf(indexToWorld).least));
+                    stretchOf(indexToWorld).least));
   }
   return openvdb::math::Transform::createLinearTransform(openvdb::math::Mat4d(&indexToWorld[0][0]));
 }
@@ -287,40 +286,36 @@ Imath::M44d axisAligned(double voxelSize) {
   return Imath::M44d().setScale(voxelSize);
 }
 
-void requireVoxelSize(double voxelSize, const char* action) {
+void requireVoxelSize(double voxelSize) {
   if (voxelSize > 0 && std::isfinite(voxelSize)) return;
-  throw UsageError(
-      fmt::format("{}: the voxel size is {}; give a positive, finite length", action, voxelSize));
+  throw UsageError(fmt::format("the voxel size is {}; give a positive, finite length", voxelSize));
 }
 
 NarrowBand resampleField(const NarrowBand& solid, const Imath::M44d& sourceToWorld,
                          const Imath::M44d& targetToWorld, double halfWidth, std::size_t maxMemory,
-                         const Progress& progress, const char* action) {
-  requireSolid(solid, action);
-  if (solid.isEmpty())
-    throw InvalidInput(fmt::format("{}: the solid is empty; give a solid with a surface", action));
+                         const Progress& progress) {
+  requireSolid(solid);
+  if (solid.isEmpty()) throw InvalidInput("the solid is empty; give a solid with a surface");
   if (!(halfWidth >= 1) || !std::isfinite(halfWidth)) {
-    throw UsageError(
-        fmt::format("{}: the half width is {} voxels; give at least 1", action, halfWidth));
+    throw UsageError(fmt::format("the half width is {} voxels; give at least 1", halfWidth));
   }
   const Placement place = placementOf(solid, sourceToWorld, targetToWorld);
-  requireSmallerVoxels(solid, sourceToWorld, place, action);
-  checkMemory(solid, stretchOf(sourceToWorld).greatest / place.targetVoxel, halfWidth, maxMemory,
-              action);
-  report(progress, 0, action);
-  const auto target = emptyLevelSet(transformOf(targetToWorld, action), halfWidth);
+  requireSmallerVoxels(solid, sourceToWorld, place);
+  checkMemory(solid, stretchOf(sourceToWorld).greatest / place.targetVoxel, halfWidth, maxMemory);
+  report(progress, 0);
+  const auto target = emptyLevelSet(transformOf(targetToWorld), halfWidth);
   const FloatGrid::Ptr source = supported(solid, place, maxMemory, subProgress(progress, 0, 0.4));
   ResampleKernel kernel(*source, *target, place);
-  kernel.addLeaves(action);
-  report(progress, 0.45, action);
+  kernel.addLeaves();
+  report(progress, 0.45);
   kernel.fillLeaves();
   kernel.fillTiles();
-  report(progress, 0.6, action);
+  report(progress, 0.6);
   if (!hasInside(*target)) {
     throw InvalidInput(
-        fmt::format("{}: no grid point lies inside, because voxels of {} are too large for this "
+        fmt::format("no grid point lies inside, because voxels of {} are too large for this "
                     "solid; use smaller voxels",
-                    action, place.targetVoxel));
+                    place.targetVoxel));
   }
   return redistance(
       makeBand(target),
@@ -329,18 +324,16 @@ NarrowBand resampleField(const NarrowBand& solid, const Imath::M44d& sourceToWor
 
 NarrowBand resampleTo(const NarrowBand& solid, const Imath::M44d& indexToWorld,
                       const ResampleOptions& options) {
-  const char* action = "resample";
   const double halfWidth = options.halfWidth.value_or(solid.halfWidth());
   const Stretch stretch = stretchOf(indexToWorld);
   if (!(stretch.least > 0) || !(stretch.greatest < stretch.least * (1 + 1e-6)) ||
       !(Imath::M44d(indexToWorld).determinant() > 0)) {
     throw InvalidInput(
-        fmt::format("{}: the transform of the new grid shears, mirrors or scales unevenly; "
-                    "use a rotation, a uniform scale and a translation",
-                    action));
+        "the transform of the new grid shears, mirrors or scales unevenly; "
+        "use a rotation, a uniform scale and a translation");
   }
   return resampleField(solid, solid.indexToWorld(), indexToWorld, halfWidth, options.maxMemory,
-                       options.progress, action);
+                       options.progress);
 }
 
 double sampledWidth(double ratio) {
@@ -348,7 +341,7 @@ double sampledWidth(double ratio) {
 }
 
 NarrowBand resample(const NarrowBand& solid, double voxelSize, const ResampleOptions& options) {
-  requireVoxelSize(voxelSize, "resample");
+  requireVoxelSize(voxelSize);
   return resampleTo(solid, axisAligned(voxelSize), options);
 }
 

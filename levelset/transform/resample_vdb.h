@@ -15,17 +15,15 @@ namespace levelset {
 /// @throws as resample()
 [[nodiscard]] NarrowBand resampleField(const NarrowBand& solid, const Imath::M44d& sourceToWorld,
                                        const Imath::M44d& targetToWorld, double halfWidth,
-                                       std::size_t maxMemory, const Progress& progress,
-                                       const char* action);
+                                       std::size_t maxMemory, const Progress& progress);
 
 /// Checks a voxel size.
 /// @throws UsageError unless it is positive and finite
-void requireVoxelSize(double voxelSize, const char* action);
+void requireVoxelSize(double voxelSize);
 
 /// Converts a matrix to an OpenVDB transform.
 /// @throws ResourceLimit if the voxels are so small that OpenVDB rejects the matrix as singular
-[[nodiscard]] openvdb::math::Transform::Ptr transformOf(const Imath::M44d& indexToWorld,
-                                                        const char* action);
+[[nodiscard]] openvdb::math::Transform::Ptr transformOf(const Imath::M44d& indexToWorld);
 
 /// Index-to-world matrix of the axis-aligned grid through the origin.
 [[nodiscard]] Imath::M44d axisAligned(double voxelSize);

@@ -18,27 +18,27 @@ namespace {
 using openvdb::FloatTree;
 
 /// Checks that a matrix is finite, affine and invertible.
-void requireAffine(const Imath::M44d& matrix, const char* action) {
+void requireAffine(const Imath::M44d& matrix) {
   for (int i = 0; i < 4; ++i)
     for (int j = 0; j < 4; ++j) {
       if (std::isfinite(matrix[i][j])) continue;
       throw UsageError(
-          fmt::format("{}: the matrix has {} in row {}, column {}; its elements must be "
+          fmt::format("the matrix has {} in row {}, column {}; its elements must be "
                       "finite",
-                      action, matrix[i][j], i + 1, j + 1));
+                      matrix[i][j], i + 1, j + 1));
     }
   if (matrix[0][3] != 0 || matrix[1][3] != 0 || matrix[2][3] != 0 || matrix[3][3] != 1) {
     throw UsageError(
-        fmt::format("{}: the last column of the matrix is {},{},{},{}; it must be 0,0,0,1 "
+        fmt::format("the last column of the matrix is {},{},{},{}; it must be 0,0,0,1 "
                     "(points are row vectors: a translation is the last row)",
-                    action, matrix[0][3], matrix[1][3], matrix[2][3], matrix[3][3]));
+                    matrix[0][3], matrix[1][3], matrix[2][3], matrix[3][3]));
   }
   const Stretch stretch = stretchOf(matrix);
   if (!(stretch.least > 1e-12 * stretch.greatest)) {
     throw UsageError(
-        fmt::format("{}: the matrix is singular (it stretches by {} and by {}); use an "
+        fmt::format("the matrix is singular (it stretches by {} and by {}); use an "
                     "invertible matrix",
-                    action, stretch.least, stretch.greatest));
+                    stretch.least, stretch.greatest));
   }
 }
 
@@ -49,24 +49,24 @@ constexpr double kPositionTolerance = 1e-6;
 
 /// Checks that the origin of a grid is accurate. With large rounding errors, the voxel size is
 /// lost.
-void requirePrecision(const Imath::M44d& indexToWorld, double voxelSize, const char* action) {
+void requirePrecision(const Imath::M44d& indexToWorld, double voxelSize) {
   double farthest = 0;
   for (int axis = 0; axis < 3; ++axis)
     farthest = std::max(farthest, std::abs(indexToWorld[3][axis]));
   const double spacing = spacingAt(farthest, CoordinatePrecision::Double);
   if (spacing <= kPositionTolerance * voxelSize) return;
   throw InvalidInput(fmt::format(
-      "{}: at {:.3g} from the origin, double precision resolves only {:.2g}, too coarse for "
+      "at {:.3g} from the origin, double precision resolves only {:.2g}, too coarse for "
       "voxels of {:.3g}; move the solid less far, or use larger voxels",
-      action, farthest, spacing, voxelSize));
+      farthest, spacing, voxelSize));
 }
 
-void requireStretch(const Stretch& stretch, const char* action) {
+void requireStretch(const Stretch& stretch) {
   if (stretch.greatest < kFarthest && stretch.least > 1 / kFarthest) return;
   throw InvalidInput(fmt::format(
-      "{}: the matrix stretches by {:.3g} to {:.3g}, and coordinates or volumes would overflow; "
+      "the matrix stretches by {:.3g} to {:.3g}, and coordinates or volumes would overflow; "
       "change the unit of length",
-      action, stretch.least, stretch.greatest));
+      stretch.least, stretch.greatest));
 }
 
 void scaleDistances(openvdb::FloatGrid& grid, double scale, float background) {
@@ -89,24 +89,21 @@ void scaleDistances(openvdb::FloatGrid& grid, double scale, float background) {
 }  // namespace
 
 NarrowBand transform(NarrowBand solid, const Imath::M44d& matrix) {
-  const char* action = "transform";
-  requireAffine(matrix, action);
+  requireAffine(matrix);
   const Stretch stretch = stretchOf(matrix);
-  requireStretch(stretch, action);
+  requireStretch(stretch);
   if (stretch.greatest > stretch.least * (1 + 1e-7) || !(Imath::M44d(matrix).determinant() > 0)) {
     throw InvalidInput(
-        fmt::format("{}: the matrix shears, mirrors or scales unevenly, which a grid "
-                    "transform cannot represent; resample the solid with --bake",
-                    action));
+        "the matrix shears, mirrors or scales unevenly, which a grid "
+        "transform cannot represent; resample the solid with --bake");
   }
-  if (!solid.shared())
-    throw InvalidInput(fmt::format("{}: the solid is empty; give a solid with a surface", action));
+  if (!solid.shared()) throw InvalidInput("the solid is empty; give a solid with a surface");
   const Imath::M44d moved = solid.indexToWorld() * matrix;
   const double voxelSize = solid.voxelSize() * stretch.greatest, halfWidth = solid.halfWidth();
   const float background = backgroundOf(halfWidth, voxelSize);
-  requireBackground(background, voxelSize, action);
-  requirePrecision(moved, voxelSize, action);
-  const openvdb::math::Transform::Ptr transform = transformOf(moved, action);
+  requireBackground(background, voxelSize);
+  requirePrecision(moved, voxelSize);
+  const openvdb::math::Transform::Ptr transform = transformOf(moved);
   openvdb::FloatGrid& grid = editVdb(solid);
   grid.setTransform(transform);
   const double scale = std::cbrt(Imath::M44d(matrix).determinant());
@@ -117,20 +114,17 @@ NarrowBand transform(NarrowBand solid, const Imath::M44d& matrix) {
 
 NarrowBand bake(const NarrowBand& solid, const Imath::M44d& matrix, double voxelSize,
                 const BakeOptions& options) {
-  const char* action = "transform";
-  requireAffine(matrix, action);
-  requireVoxelSize(voxelSize, action);
+  requireAffine(matrix);
+  requireVoxelSize(voxelSize);
   return resampleField(solid, solid.indexToWorld() * matrix, axisAligned(voxelSize),
-                       solid.shared() ? solid.halfWidth() : 3, options.maxMemory, options.progress,
-                       action);
+                       solid.shared() ? solid.halfWidth() : 3, options.maxMemory, options.progress);
 }
 
 TriMesh transform(TriMesh mesh, const Imath::M44d& matrix) {
-  const char* action = "transform";
-  requireAffine(matrix, action);
-  requireAttributes(mesh, action);
+  requireAffine(matrix);
+  requireAttributes(mesh);
   const Stretch stretch = stretchOf(matrix);
-  requireStretch(stretch, action);
+  requireStretch(stretch);
   mesh.spacing = coordinateSpacing(mesh) * stretch.greatest;
   mesh.precision = CoordinatePrecision::Double;  // transformed coordinates need more digits
   for (Imath::V3d& position : mesh.positions) {
@@ -139,9 +133,9 @@ TriMesh transform(TriMesh mesh, const Imath::M44d& matrix) {
     for (int axis = 0; axis < 3; ++axis)
       if (!(std::abs(moved[axis]) < kFarthest))
         throw InvalidInput(
-            fmt::format("{}: a vertex moves to ({:.3g}, {:.3g}, {:.3g}), where volumes "
+            fmt::format("a vertex moves to ({:.3g}, {:.3g}, {:.3g}), where volumes "
                         "would overflow; change the unit of length",
-                        action, moved.x, moved.y, moved.z));
+                        moved.x, moved.y, moved.z));
     position = moved;
   }
   const bool mirrors = Imath::M44d(matrix).determinant() < 0;

@@ -23,33 +23,22 @@ using levelset::InvalidInput;
 using levelset::NarrowBand;
 using levelset::UsageError;
 
-constexpr const char* kAnimation = "animate";
 using Footprints = std::vector<Footprint>;
 
-/// Adds the frame to a message that has none, and removes the prefix of the action that failed.
-std::string sentenceAt(std::size_t frame, std::string sentence) {
-  if (sentence.starts_with(std::string(kAnimation) + ": frame ")) return sentence;
-  for (const std::string who : {"animate: ", "texture: ", "read: ", "write: "}) {
-    if (!sentence.starts_with(who)) continue;
-    sentence.erase(0, who.size());
-    break;
-  }
-  return fmt::format("{}: frame {}: {}", kAnimation, frame, sentence);
-}
-
-/// Runs `call` and adds the frame to its errors, except to usage errors, which concern all frames.
+/// Runs `call` and adds the frame to its errors, except to usage errors, which concern all frames,
+/// and to errors that name a frame already.
 template <typename Call>
 auto atFrame(std::size_t frame, const Call& call) {
   try {
     return call();
-  } catch (const InvalidInput& error) {
-    throw InvalidInput(sentenceAt(frame, error.what()));
-  } catch (const levelset::NumericalError& error) {
-    throw levelset::NumericalError(sentenceAt(frame, error.what()));
-  } catch (const levelset::ResourceLimit& error) {
-    throw levelset::ResourceLimit(sentenceAt(frame, error.what()));
-  } catch (const levelset::IoError& error) {
-    throw levelset::IoError(sentenceAt(frame, error.what()));
+  } catch (const UsageError&) {
+    throw;
+  } catch (const levelset::Cancelled&) {
+    throw;
+  } catch (const levelset::Error& error) {
+    const std::string sentence = error.what();
+    if (sentence.starts_with("frame ")) throw;
+    levelset::rethrow(error, fmt::format("frame {}: {}", frame, sentence));
   }
 }
 
@@ -65,44 +54,43 @@ bool isSamePatch(const Patch& a, const Patch& b) {
 }
 
 void checkKeys(const std::vector<AnimationKey>& keys, const AnimationOptions& options) {
-  if (options.frames < 1) throw UsageError(fmt::format("{}: there are no frames", kAnimation));
+  if (options.frames < 1) throw UsageError("there are no frames");
   if (keys.empty() || keys.front().frame != 0)
-    throw UsageError(fmt::format("{}: the first patch must be at frame 0", kAnimation));
+    throw UsageError("the first patch must be at frame 0");
   for (std::size_t k = 0; k < keys.size(); ++k) {
-    if (keys[k].patches.empty())
-      throw UsageError(fmt::format("{}: patch {} holds no patches", kAnimation, k + 1));
+    if (keys[k].patches.empty()) throw UsageError(fmt::format("patch {} holds no patches", k + 1));
     if (keys[k].frame >= options.frames || (k > 0 && keys[k].frame <= keys[k - 1].frame)) {
       throw UsageError(fmt::format(
-          "{}: patch {} is at frame {}, which is not between the frame of the previous patch and "
+          "patch {} is at frame {}, which is not between the frame of the previous patch and "
           "the last frame, {}; give increasing frames, or more frames",
-          kAnimation, k + 1, keys[k].frame, options.frames - 1));
+          k + 1, keys[k].frame, options.frames - 1));
     }
     if (keys.size() == 1) continue;
     if (keys[k].outlines.empty()) {
       throw UsageError(fmt::format(
-          "{}: patch {} goes all around its axis and cannot be moved to another position; leave "
+          "patch {} goes all around its axis and cannot be moved to another position; leave "
           "out the other patches",
-          kAnimation, k + 1));
+          k + 1));
     }
     if (keys[k].outlines.size() != keys.front().outlines.size()) {
       throw UsageError(
-          fmt::format("{}: patch {} is a set of {}, the first patch a set of {}; give sets of the "
+          fmt::format("patch {} is a set of {}, the first patch a set of {}; give sets of the "
                       "same size",
-                      kAnimation, k + 1, keys[k].outlines.size(), keys.front().outlines.size()));
+                      k + 1, keys[k].outlines.size(), keys.front().outlines.size()));
     }
     const std::vector<Patch>&first = keys.front().patches, &patches = keys[k].patches;
     if (patches.size() != first.size()) {
       throw UsageError(fmt::format(
-          "{}: patch {} is a set of {} tiles, the first patch a set of {}; the frames between them "
+          "patch {} is a set of {} tiles, the first patch a set of {}; the frames between them "
           "follow the first patch, so give the same number of tiles for all",
-          kAnimation, k + 1, patches.size(), first.size()));
+          k + 1, patches.size(), first.size()));
     }
     for (std::size_t i = 0; i < patches.size(); ++i) {
       if (patches[i].mirrored == first[i].mirrored) continue;
       throw UsageError(
-          fmt::format("{}: one of patch {} and the first patch is mirrored and the other is "
+          fmt::format("one of patch {} and the first patch is mirrored and the other is "
                       "not{}; mirror both or neither",
-                      kAnimation, k + 1, i > 0 ? fmt::format(", in member {}", i + 1) : ""));
+                      k + 1, i > 0 ? fmt::format(", in member {}", i + 1) : ""));
     }
   }
 }
@@ -168,9 +156,9 @@ class Animation {
                       first = keys_.front().patches.front().layers.size();
     if (layers == first) return;
     report_.warnings.push_back(
-        fmt::format("{}: patch {} has {} layers and the first patch {}; the frames between them "
+        fmt::format("patch {} has {} layers and the first patch {}; the frames between them "
                     "follow the first patch, so give the same --layers for all",
-                    kAnimation, k + 1, layers, first));
+                    k + 1, layers, first));
   }
 
   void requireOn(const NarrowBand& base, std::size_t key) const {
@@ -188,15 +176,15 @@ class Animation {
     requireOn(base, key);
     Footprints all;
     for (const PatchOutline& outline : keys_[key].outlines) {
-      levelset::report(options_.progress, done_, kAnimation);
+      levelset::report(options_.progress, done_);
       Footprint one = footprintOf(base, outline);
       if (options_.carry == CarryRule::Rigid || keys_.size() > 1)
         one = withReach(base, std::move(one), outline.direction.has_value());
       if (options_.carry == CarryRule::Rigid && !one.reach) {
         throw InvalidInput(fmt::format(
-            "{}: no geodesic leads from the centre {} of the patch to each of its corners; use "
+            "no geodesic leads from the centre {} of the patch to each of its corners; use "
             "--carry corners, or a smaller patch",
-            kAnimation, pointAsOption(one.centre)));
+            pointAsOption(one.centre)));
       }
       all.push_back(std::move(one));
     }
@@ -206,7 +194,7 @@ class Animation {
   [[nodiscard]] Footprints carryAll(const NarrowBand& base, const Footprints& from) const {
     Footprints moved;
     for (const Footprint& one : from) {
-      levelset::report(options_.progress, done_, kAnimation);
+      levelset::report(options_.progress, done_);
       moved.push_back(carryFootprint(base, one, options_.carry));
       // A footprint that stops moving must keep the same bits.
       if (farthestMove(one, moved.back()) <= 1e-6 * base.voxelSize()) moved.back() = one;
@@ -222,7 +210,7 @@ class Animation {
     Footprints now = goal_;
     std::uint64_t hash = bases_.hash();
     for (std::size_t f = end - 1; f > begin; --f) {
-      levelset::report(options_.progress, done_, kAnimation);
+      levelset::report(options_.progress, done_);
       const Footprints before = now;
       atFrame(f, [&] {
         const NarrowBand& base = bases_.at(f);
@@ -237,7 +225,7 @@ class Animation {
   void playFrame(std::size_t f, std::size_t begin, std::size_t end) {
     done_ = static_cast<double>(f) / static_cast<double>(options_.frames);
     const double next = static_cast<double>(f + 1) / static_cast<double>(options_.frames);
-    levelset::report(options_.progress, done_, kAnimation);
+    levelset::report(options_.progress, done_);
     const bool isFirst = report_.frames.empty();
     const NarrowBand& base = baseAt(f);
     const bool isSameBase = !isFirst && bases_.hash() == baseHash_;
@@ -305,7 +293,7 @@ class Animation {
     if (areNew || pathHash_ != bases_.hash()) {
       std::vector<PatchPath> paths;
       for (std::size_t i = 0; i < own_.size(); ++i) {
-        levelset::report(options_.progress, done_, kAnimation);
+        levelset::report(options_.progress, done_);
         Footprint from = own_[i], to = later_[f - begin][i];
         if (!from.reach) from = withReach(base, std::move(from));
         if (!to.reach) to = withReach(base, std::move(to));
@@ -329,27 +317,27 @@ class Animation {
     if (!path.isAlike()) {
       warnOnce(warnedOfPaths_,
                fmt::format(
-                   "{}: frame {}: the paths of the corners cannot follow that of the patch's "
+                   "frame {}: the paths of the corners cannot follow that of the patch's "
                    "centre; each corner takes its own shortest path, and where these lead around "
                    "different sides the patch is stretched; use --carry rigid, or add a patch "
                    "between the two",
-                   kAnimation, f));
+                   f));
     }
     constexpr double kMostTurn = 1;  // radians; sides shrink by the cosine of half the angle
     if (isNew && options_.carry == CarryRule::Corners && std::abs(path.turn()) > kMostTurn) {
       warnOnce(
           warnedOfTurn_,
-          fmt::format("{}: frame {}: the patch turns by {:.0f} degrees on its path, and shrinks "
+          fmt::format("frame {}: the patch turns by {:.0f} degrees on its path, and shrinks "
                       "in between because its corners move along geodesics; --carry rigid turns "
                       "it without shrinking",
-                      kAnimation, f, std::abs(path.turn()) * 180 / std::acos(-1.0)));
+                      f, std::abs(path.turn()) * 180 / std::acos(-1.0)));
     }
     if (path.hasJumped()) {
-      warnOnce(warnedOfJump_,
-               fmt::format(
-                   "{}: frame {}: the path from patch to patch differs from that of the previous "
-                   "frame, and may lead around another side",
-                   kAnimation, f));
+      warnOnce(
+          warnedOfJump_,
+          fmt::format("frame {}: the path from patch to patch differs from that of the previous "
+                      "frame, and may lead around another side",
+                      f));
     }
   }
 
@@ -363,8 +351,7 @@ class Animation {
 
   [[nodiscard]] std::vector<Patch> remade(const NarrowBand& base,
                                           const levelset::Progress& progress) const {
-    if (!options_.make)
-      throw UsageError(fmt::format("{}: it is unknown how to rebuild its patches", kAnimation));
+    if (!options_.make) throw UsageError("it is unknown how to rebuild its patches");
     std::vector<Patch> patches;
     try {
       patches = options_.make(base, shown_, origins_, progress);
@@ -376,9 +363,9 @@ class Animation {
       const Patch& patch = patches[i];
       if (patch.mirrored == first[std::min(i, first.size() - 1)].mirrored) continue;
       throw InvalidInput(fmt::format(
-          "{}: the patch is inverted: its corners {}, {}, {} and {} are now in the opposite order; "
+          "the patch is inverted: its corners {}, {}, {} and {} are now in the opposite order; "
           "use --carry rigid, or end the animation before this frame",
-          kAnimation, pointAsOption(patch.corners[0]), pointAsOption(patch.corners[1]),
+          pointAsOption(patch.corners[0]), pointAsOption(patch.corners[1]),
           pointAsOption(patch.corners[2]), pointAsOption(patch.corners[3])));
     }
     return patches;
@@ -399,9 +386,9 @@ class Animation {
     const Drift drift = worstDrift(first, now);
     if (drift.factor() > options_.driftWarning) {
       warnOnce(warnedOfDrift_,
-               fmt::format("{}: frame {}: sides or diagonals of the patch are {:.3g} to {:.3g} "
+               fmt::format("frame {}: sides or diagonals of the patch are {:.3g} to {:.3g} "
                            "times as long as at its key; {}",
-                           kAnimation, f, drift.least, drift.most,
+                           f, drift.least, drift.most,
                            options_.carry == CarryRule::Corners ? "--carry rigid keeps its shape"
                                                                 : "the surface under it bends"));
     }
@@ -412,10 +399,10 @@ class Animation {
       warnOnce(
           warnedOfMove_,
           fmt::format(
-              "{}: frame {}: a corner moved {:.4g} to the nearest surface, over half of the "
+              "frame {}: a corner moved {:.4g} to the nearest surface, over half of the "
               "patch's "
               "diagonal; give frames in between, or check that it is the same surface component",
-              kAnimation, f, move));
+              f, move));
     }
   }
 

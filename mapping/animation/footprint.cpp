@@ -20,8 +20,6 @@ using Imath::V2d;
 using Imath::V3d;
 using levelset::NarrowBand;
 
-constexpr const char* kAnimate = "animate";
-
 /// Finds the tangent vector at the centre whose geodesic ends at `goal`. It starts with that of the
 /// geodesic between the two points and corrects it by the miss of a traced geodesic. The correction
 /// treats the surface as flat, which is inexact by the spreading of geodesics, so each step reduces
@@ -93,8 +91,8 @@ Footprint footprintOf(const NarrowBand& base, const PatchOutline& outline) {
   Footprint footprint;
   footprint.height = outline.height;
   for (std::size_t i = 0; i < 4; ++i)
-    footprint.corners[i] = closestSurfacePoint(base, outline.corners[i], kAnimate);
-  footprint.centre = closestSurfacePoint(base, outline.middle, kAnimate);
+    footprint.corners[i] = closestSurfacePoint(base, outline.corners[i]);
+  footprint.centre = closestSurfacePoint(base, outline.middle);
   SurfaceFrame frame{footprint.centre, V3d(0), SurfaceField(base).normal(footprint.centre)};
   const std::array<V3d, 4>& c = footprint.corners;
   const V3d u = outline.direction ? *outline.direction : c[1] + c[2] - c[0] - c[3];
@@ -127,22 +125,22 @@ Footprint withReach(const NarrowBand& base, Footprint footprint, bool keepsDirec
 
 Footprint carryFootprint(const NarrowBand& base, const Footprint& footprint, CarryRule rule) {
   Footprint moved = footprint;
-  moved.centre = closestSurfacePoint(base, footprint.centre, kAnimate);
+  moved.centre = closestSurfacePoint(base, footprint.centre);
   const SurfaceField field(base);
   moved.normal = field.normal(moved.centre);
   moved.direction = carried(footprint.direction, footprint.normal, moved.normal);
   if (moved.direction == V3d(0)) moved.direction = eastOf(moved.normal);
   if (rule == CarryRule::Corners) {
     moved.reach.reset();
-    for (V3d& corner : moved.corners) corner = closestSurfacePoint(base, corner, kAnimate);
+    for (V3d& corner : moved.corners) corner = closestSurfacePoint(base, corner);
     return moved;
   }
   const auto corners = cornersFrom(field, frameOf(moved), footprint.reach.value());
   if (!corners) {
     throw levelset::InvalidInput(fmt::format(
-        "{}: the surface breaks off between the centre {} of the patch and its corners; use "
+        "the surface breaks off between the centre {} of the patch and its corners; use "
         "--carry corners, or end the animation before this frame",
-        kAnimate, pointAsOption(moved.centre)));
+        pointAsOption(moved.centre)));
   }
   moved.corners = *corners;
   return moved;

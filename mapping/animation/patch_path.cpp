@@ -20,7 +20,6 @@ using Imath::V2d;
 using Imath::V3d;
 using levelset::InvalidInput;
 
-constexpr const char* kPath = "animate";
 constexpr double kNoDistance = 1e-6;  // voxels; shorter paths count as no path
 
 /// Finds the segment of a path at a share of the path's length, and the share of that segment.
@@ -50,10 +49,10 @@ std::array<V2d, 4> between(const std::array<V2d, 4>& a, const std::array<V2d, 4>
 }
 
 [[noreturn]] void refuseApart(const V3d& a, const V3d& b) {
-  throw InvalidInput(fmt::format(
-      "{}: the surface does not connect {} and {}; put both patches on the same surface "
-      "component of the base",
-      kPath, pointAsOption(a), pointAsOption(b)));
+  throw InvalidInput(
+      fmt::format("the surface does not connect {} and {}; put both patches on the same surface "
+                  "component of the base",
+                  pointAsOption(a), pointAsOption(b)));
 }
 
 }  // namespace
@@ -66,9 +65,9 @@ PatchPath::PatchPath(const levelset::NarrowBand& base, Footprint from, Footprint
   if (isConstant_) return;
   if (rule_ == CarryRule::Rigid && !(from_.reach && to_.reach)) {
     throw InvalidInput(fmt::format(
-        "{}: no geodesic leads from the centre {} of the patch to each of its corners; use --carry "
+        "no geodesic leads from the centre {} of the patch to each of its corners; use --carry "
         "corners, or a smaller patch",
-        kPath, pointAsOption(from_.reach ? to_.centre : from_.centre)));
+        pointAsOption(from_.reach ? to_.centre : from_.centre)));
   }
   findCentrePath(guide);
   carryDirections();
@@ -183,9 +182,9 @@ Footprint PatchPath::at(double part) const {
   const auto corners = cornersFrom(field, frame, *result.reach);
   if (!corners) {
     throw InvalidInput(
-        fmt::format("{}: the surface breaks off between the centre {} of the patch and its "
+        fmt::format("the surface breaks off between the centre {} of the patch and its "
                     "corners; use --carry corners, or choose other positions",
-                    kPath, pointAsOption(frame.centre)));
+                    pointAsOption(frame.centre)));
   }
   result.corners = *corners;
   return result;

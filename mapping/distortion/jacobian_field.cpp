@@ -22,8 +22,6 @@ using Imath::Box3d;
 using Imath::V3d;
 using levelset::FieldGrid;
 
-constexpr const char* kFolds = "folds";
-
 /// Grid that keeps the least of several values at a point.
 class LeastGrid {
  public:
@@ -68,7 +66,7 @@ class LeastGrid {
 
   [[nodiscard]] FieldGrid finish(const FoldCertificate& certificate) {
     for (const FoldPoint& fold : certificate.worst) add(nearest(fold.position), fold.jacobian);
-    return levelset::importField(grid_, kFolds);
+    return levelset::importField(grid_);
   }
 
  private:
@@ -82,7 +80,7 @@ class LeastGrid {
 void checkField(const Patch& patch, const JacobianFieldOptions& options) {
   if (!(options.voxelSize > 0) || !std::isfinite(options.voxelSize)) {
     throw levelset::UsageError(
-        fmt::format("{}: the voxel size is {}; give a positive number", kFolds, options.voxelSize));
+        fmt::format("the voxel size is {}; give a positive number", options.voxelSize));
   }
   const std::vector<V3d> positions = particlePositions(patch);
   const PrismCells cells(patch, options.embedDepth);
@@ -97,15 +95,15 @@ void checkField(const Patch& patch, const JacobianFieldOptions& options) {
       constexpr double kMostIndex = 1e9;
       if (!(std::max(std::abs(box.min[axis]), std::abs(box.max[axis])) <
             kMostIndex * options.voxelSize)) {
-        throw levelset::ResourceLimit(fmt::format(
-            "{}: with a voxel size of {:.3g} the grid exceeds the range of 32-bit indices; "
-            "use larger voxels",
-            kFolds, options.voxelSize));
+        throw levelset::ResourceLimit(
+            fmt::format("with a voxel size of {:.3g} the grid exceeds the range of 32-bit indices; "
+                        "use larger voxels",
+                        options.voxelSize));
       }
     }
   }
   constexpr double kBytesPerPoint = 160;  // including the samples of a smooth map
-  levelset::requireMemory(points * kBytesPerPoint, options.maxMemory, kFolds);
+  levelset::requireMemory(points * kBytesPerPoint, options.maxMemory);
 }
 
 /// Corners of one of a cell's six tetrahedra, as bits of the corner index.

@@ -17,61 +17,58 @@ namespace mapping {
 
 /// Checks that a length is positive and finite.
 /// @throws UsageError otherwise
-inline void requirePositive(double length, const char* action, const char* name) {
+inline void requirePositive(double length, const char* name) {
   if (length > 0 && std::isfinite(length)) return;
-  throw levelset::UsageError(
-      fmt::format("{}: {} is {}; give a positive, finite length", action, name, length));
+  throw levelset::UsageError(fmt::format("{} is {}; give a positive, finite length", name, length));
 }
 
-inline void requireNonNegative(double length, const char* action, const char* name) {
+inline void requireNonNegative(double length, const char* name) {
   if (length >= 0 && std::isfinite(length)) return;
   throw levelset::UsageError(
-      fmt::format("{}: {} is {}; give a finite length of at least 0", action, name, length));
+      fmt::format("{} is {}; give a finite length of at least 0", name, length));
 }
 
-inline void requireFinite(const Imath::V3d& point, const char* action, const char* name) {
+inline void requireFinite(const Imath::V3d& point, const char* name) {
   if (std::isfinite(point.x) && std::isfinite(point.y) && std::isfinite(point.z)) return;
-  throw levelset::UsageError(fmt::format("{}: {} is {},{},{}; its coordinates must be finite",
-                                         action, name, point.x, point.y, point.z));
+  throw levelset::UsageError(fmt::format("{} is {},{},{}; its coordinates must be finite", name,
+                                         point.x, point.y, point.z));
 }
 
 /// Checks that an angle lies in an open range; radians in the arguments, degrees in the message.
 /// @throws UsageError otherwise
-inline void requireAngle(double angle, double above, double below, const char* action,
-                         const char* name) {
+inline void requireAngle(double angle, double above, double below, const char* name) {
   if (angle > above && angle < below) return;
   constexpr double kDegrees = 180 / 3.14159265358979323846;
   throw levelset::UsageError(
-      fmt::format("{}: {} is {:.6g} degrees; give more than {:.6g} and less than {:.6g}", action,
-                  name, angle * kDegrees, above * kDegrees, below * kDegrees));
+      fmt::format("{} is {:.6g} degrees; give more than {:.6g} and less than {:.6g}", name,
+                  angle * kDegrees, above * kDegrees, below * kDegrees));
 }
 
-inline void requireTiling(const Tiling& tiling, const char* action) {
+inline void requireTiling(const Tiling& tiling) {
   constexpr int kMost = 1'000'000;
   if (tiling.columns < 1 || tiling.rows < 1 || tiling.columns > kMost || tiling.rows > kMost) {
-    throw levelset::UsageError(fmt::format("{}: {} columns and {} rows; give 1 to {} of each",
-                                           action, tiling.columns, tiling.rows, kMost));
+    throw levelset::UsageError(fmt::format("{} columns and {} rows; give 1 to {} of each",
+                                           tiling.columns, tiling.rows, kMost));
   }
-  requireNonNegative(tiling.overlap, action, "the overlap");
+  requireNonNegative(tiling.overlap, "the overlap");
 }
 
 /// Checks that a length is at least two voxels.
 /// @throws InvalidInput otherwise
-inline void requireResolved(double length, double voxelSize, const char* action, const char* name) {
+inline void requireResolved(double length, double voxelSize, const char* name) {
   constexpr double kFewestVoxels = 2;
   if (length >= kFewestVoxels * voxelSize * (1 - 1e-9)) return;
-  throw levelset::InvalidInput(
-      fmt::format("{}: {} is {:.6g}, under two voxels of {:.6g}; use smaller voxels", action, name,
-                  length, voxelSize));
+  throw levelset::InvalidInput(fmt::format(
+      "{} is {:.6g}, under two voxels of {:.6g}; use smaller voxels", name, length, voxelSize));
 }
 
-/// Distance to the quadrant u < 0, v < 0, negative inside.
+/// Signed distance to the quadrant u < 0, v < 0; negative inside it.
 inline double convexEdge(double u, double v) {
   const double a = std::max(u, 0.0), b = std::max(v, 0.0);
   return std::min(std::max(u, v), 0.0) + std::sqrt(a * a + b * b);
 }
 
-/// Distance to the plane without the quadrant u > 0, v > 0.
+/// Signed distance to the plane without the quadrant u > 0, v > 0; positive inside that quadrant.
 inline double concaveEdge(double u, double v) {
   return -convexEdge(-u, -v);
 }
@@ -87,7 +84,7 @@ inline double boxDistance(const Imath::V3d& p, const Imath::Box3d& box) {
   return squared > 0 ? std::sqrt(squared) : depth;
 }
 
-/// Gradient of a distance by central differences.
+/// Gradient of a distance by central differences over ±`step`, world units.
 template <typename Distance>
 Imath::V3d slopeOf(const Distance& distance, const Imath::V3d& p, double step) {
   Imath::V3d slope;
@@ -100,9 +97,9 @@ Imath::V3d slopeOf(const Distance& distance, const Imath::V3d& p, double step) {
   return slope;
 }
 
-/// Finds the point of a solid's surface nearest to p within faces of a box, by Newton steps.
-/// Coordinates along `fixed` axes are those of `corner`; the others follow from tangent planes of
-/// the solid. For a plane one step suffices.
+/// Finds the point nearest to p on the part of a solid's surface that lies in a face or edge of a
+/// box, by Newton steps. Along the axes that are `fixed`, the point has the coordinates of
+/// `corner`; the others follow from tangent planes of the solid. For a plane one step suffices.
 template <typename Distance>
 Imath::V3d footWithin(const Distance& distance, const Imath::V3d& p, const Imath::V3d& corner,
                       const std::array<bool, 3>& fixed, double step) {
@@ -138,8 +135,9 @@ double clippedDistance(const Distance& distance, const Imath::V3d& p, const Imat
                        double exact, double voxelSize) {
   const double outside = boxDistance(p, box);
   const double toSolid = distance(p), least = std::max(outside, toSolid);
-  // In these cases p is inside, or further away than `exact`, or its nearest point of the solid
-  // does not involve the faces of the box.
+  // `least` is the result in three cases: p is inside; p is further away than `exact`; or p lies
+  // deeper in the solid than its distance to the box, so that the nearest point of the box is
+  // inside the solid.
   if (least <= 0 || least > exact || outside < -toSolid) return least;
   const double step = 1e-3 * voxelSize;
   std::array<bool, 3> fixed = {};
@@ -163,22 +161,21 @@ double clippedDistance(const Distance& distance, const Imath::V3d& p, const Imat
   return std::max(least, std::min((corner - p).length(), 2 * least + step));
 }
 
-/// Builds a band from a function with the right sign and zero set, unit slope beside the zero set,
-/// and values that nowhere exceed the distance. The function is sampled, and distances are restored
-/// by closest points.
+/// Builds a band from a field with the right sign and zero set, unit slope beside the zero set, and
+/// values that nowhere exceed the distance. The field is sampled at the grid points, and the
+/// distances are then computed by closest points.
 template <typename Field>
 levelset::NarrowBand makeFromField(const levelset::ShapeExtent& extent, double voxelSize,
-                                   const levelset::ShapeOptions& options, const char* action,
-                                   const Field& field) {
-  levelset::checkShape(extent, voxelSize, options, action);
-  // The tricubic interpolant at the zero set reads values up to this distance.
+                                   const levelset::ShapeOptions& options, const Field& field) {
+  levelset::checkShape(extent, voxelSize, options);
+  // Voxels: the tricubic interpolant at the zero set reads values up to this distance.
   constexpr double kSampledHalfWidth = 4;
   levelset::NarrowBand sampled =
       levelset::makeShape(extent, voxelSize,
                           {.halfWidth = kSampledHalfWidth,
                            .maxMemory = options.maxMemory,
                            .progress = levelset::subProgress(options.progress, 0, 0.5)},
-                          action, field);
+                          field);
   return levelset::redistance(std::move(sampled),
                               {.halfWidth = options.halfWidth,
                                .maxMemory = options.maxMemory,

@@ -15,16 +15,16 @@ using Imath::V3d;
 using levelset::ShapeExtent;
 using levelset::ShapeOptions;
 
-constexpr const char* kGyroid = "gyroid";
 constexpr double kTurn = 2 * std::numbers::pi;
-// Largest slope of the formula, per radian.
+// Largest gradient of sin x cos y + sin y cos z + sin z cos x, per radian.
 constexpr double kSteepest = 1.7320508075688773;
-// Area of the surface in one cell, in squares of its edge.
+// Area of the gyroid surface in one cell, in units of the squared cell edge.
 constexpr double kCellArea = 3.0968;
-// Distance from the middle of a strut at its thinnest to the surface, in cells.
+// Distance from the axis of a strut to the gyroid surface where the strut is thinnest, in cell
+// edges.
 constexpr double kNeck = kThickestGyroidWall / 2;
 
-/// Value and derivatives of the formula at a point, in radians.
+/// Value and derivatives of sin x cos y + sin y cos z + sin z cos x at a point, in radians.
 struct GyroidJet {
   double value;
   V3d slope;
@@ -53,16 +53,17 @@ double gyroidValue(const V3d& p) {
          std::sin(p.z) * std::cos(p.x);
 }
 
-/// Distance from p to a foot point on the surface, radians. Newton's method solves x − p + λ ∇g =
-/// 0, g = 0 for the foot x and the multiplier λ [Saye14]. It starts where the given x projects onto
-/// the surface along ∇g. Returns HUGE_VAL if it does not converge.
+/// Distance from p to a foot point on the gyroid surface, radians. With g the formula of the
+/// gyroid, Newton's method solves x − p + λ ∇g = 0, g = 0 for the foot x and the multiplier λ
+/// [Saye14]. It starts where the given x projects onto the surface along ∇g. Returns HUGE_VAL if it
+/// does not converge.
 double distanceToFoot(const V3d& p, V3d x) {
   for (int i = 0; i < 2; ++i) {
     const GyroidJet g(x);
     x -= g.slope * (g.value / std::max(g.slope.length2(), 0.25));
   }
-  // Moves along the surface towards the foot, which selects the side on which Newton's method
-  // converges.
+  // Projects p onto the tangent plane of the surface at x, a few times. This moves x towards the
+  // foot, to the side on which Newton's method converges.
   for (int i = 0; i < 4; ++i) {
     const GyroidJet g(x);
     const double squared = std::max(g.slope.length2(), 0.25);
@@ -79,7 +80,7 @@ double distanceToFoot(const V3d& p, V3d x) {
     const GyroidJet g(x);
     M33d system = g.curvature * multiplier;
     for (int axis = 0; axis < 3; ++axis) system[axis][axis] += 1;
-    // Symmetric; Imath returns the identity for a singular matrix.
+    // The matrix is symmetric. Imath returns the identity for a singular matrix.
     const M33d inverse = system.inverse();
     const V3d u = g.slope * inverse, v = (p - x - g.slope * multiplier) * inverse;
     const double pivot = g.slope ^ u;
@@ -93,12 +94,14 @@ double distanceToFoot(const V3d& p, V3d x) {
   return std::abs(gyroidValue(x)) < 1e-9 ? (x - p).length() : HUGE_VAL;
 }
 
-/// Distance from a point to the surface, radians. If the foot is further away than points near the
-/// surface allow, several feet may compete, so further starts around p decide which is nearest.
+/// Distance from p to the gyroid surface, radians. A foot much further away than the lower bound
+/// `least` may not be the nearest one. Newton's method then also starts from eight positions around
+/// p.
 double distanceToSurface(const V3d& p) {
   const double least = std::abs(gyroidValue(p)) / kSteepest;
   double best = distanceToFoot(p, p);
-  // Ratio reached at the necks, and offset of the starts in radians.
+  // kPlain: ratio of distance to lower bound at the necks, up to which the first foot is accepted.
+  // kAround: offset of the further starts along each axis, radians.
   constexpr double kPlain = 1.34, kAround = 0.4;
   if (best <= kPlain * least) return best;
   for (int corner = 0; corner < 8; ++corner) {
@@ -109,30 +112,29 @@ double distanceToSurface(const V3d& p) {
 }
 
 void requireGyroid(const Gyroid& gyroid, const V3d& center) {
-  requirePositive(gyroid.cell, kGyroid, "the cell");
-  requirePositive(gyroid.thickness, kGyroid, "the thickness");
+  requirePositive(gyroid.cell, "the cell");
+  requirePositive(gyroid.thickness, "the thickness");
   const bool isSheet = gyroid.kind == GyroidKind::Sheet;
   const double most = (isSheet ? kThickestGyroidWall : kThickestGyroidStrut) * gyroid.cell;
   if (gyroid.thickness >= most) {
-    throw levelset::UsageError(fmt::format(
-        "{}: a thickness of {:.6g} closes all openings between the {} in a cell of {:.6g}; "
-        "give less than {:.6g}",
-        kGyroid, gyroid.thickness, isSheet ? "walls" : "struts", gyroid.cell, most));
+    throw levelset::UsageError(
+        fmt::format("a thickness of {:.6g} closes all openings between the {} in a cell of {:.6g}; "
+                    "give less than {:.6g}",
+                    gyroid.thickness, isSheet ? "walls" : "struts", gyroid.cell, most));
   }
   for (const int count : gyroid.cells) {
     if (count >= 1 && count <= 1'000'000) continue;
-    throw levelset::UsageError(
-        fmt::format("{}: {} cells; give 1 to 1000000 along each axis", kGyroid, count));
+    throw levelset::UsageError(fmt::format("{} cells; give 1 to 1000000 along each axis", count));
   }
-  requireFinite(center, kGyroid, "the centre");
+  requireFinite(center, "the centre");
 }
 
 class GyroidField {
  public:
   GyroidField(const Gyroid& gyroid, const V3d& corner, double reach)
       : isSheet_(gyroid.kind == GyroidKind::Sheet),
-        // Offset: the solid is where the distance (unsigned for a sheet, signed for a network) is
-        // less.
+        // World units. The solid consists of the points whose distance (unsigned for a sheet,
+        // signed for a network) is below this offset.
         offset_(isSheet_ ? gyroid.thickness / 2 : gyroid.thickness / 2 - kNeck * gyroid.cell),
         cell_(gyroid.cell),
         corner_(corner),
@@ -141,7 +143,7 @@ class GyroidField {
   double operator()(const V3d& world) const {
     const V3d p = world - corner_;
     const double value = gyroidValue(p * (kTurn / cell_));
-    // Lower bound of the distance, from the largest slope.
+    // Lower bound of the distance, from the largest gradient of the formula.
     double least = value / kSteepest * cell_ / kTurn;
     if (isSheet_) least = std::abs(least);
     if (least - offset_ > reach_ || (!isSheet_ && least - offset_ < -reach_ && least < 0))
@@ -182,11 +184,10 @@ ShapeExtent gyroidExtent(const Gyroid& gyroid, const V3d& center) {
 void checkGyroid(const Gyroid& gyroid, const V3d& center, double voxelSize,
                  const ShapeOptions& options) {
   const ShapeExtent extent = gyroidExtent(gyroid, center);
-  levelset::checkShape(extent, voxelSize, options, kGyroid);
-  requireResolved(gyroid.thickness, voxelSize, kGyroid, "the thickness");
+  levelset::checkShape(extent, voxelSize, options);
+  requireResolved(gyroid.thickness, voxelSize, "the thickness");
   const double most = gyroid.kind == GyroidKind::Sheet ? kThickestGyroidWall : kThickestGyroidStrut;
-  requireResolved(most * gyroid.cell - gyroid.thickness, voxelSize, kGyroid,
-                  "the opening at the necks");
+  requireResolved(most * gyroid.cell - gyroid.thickness, voxelSize, "the opening at the necks");
 }
 
 levelset::NarrowBand makeGyroid(const Gyroid& gyroid, const V3d& center, double voxelSize,
@@ -195,7 +196,7 @@ levelset::NarrowBand makeGyroid(const Gyroid& gyroid, const V3d& center, double 
   const ShapeExtent extent = gyroidExtent(gyroid, center);
   const double exact = (options.halfWidth + 0.5) * voxelSize;
   const GyroidField solid(gyroid, extent.bounds.min, exact);
-  return levelset::makeShape(extent, voxelSize, options, kGyroid, [&](const V3d& p) {
+  return levelset::makeShape(extent, voxelSize, options, [&](const V3d& p) {
     return clippedDistance(solid, p, extent.bounds, exact, voxelSize);
   });
 }

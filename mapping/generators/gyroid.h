@@ -24,12 +24,14 @@ struct Gyroid {
   std::array<int, 3> cells = {1, 1, 1};  ///< number of cells along x, y and z
 };
 
-/// Largest thickness of walls and struts, in cells. Thicker ones close the necks of a labyrinth.
+/// Thickness at which walls and struts close the necks of a labyrinth, in cell edges. Thinner ones
+/// are valid.
 inline constexpr double kThickestGyroidWall = 0.2449, kThickestGyroidStrut = 0.4898;
 
-/// Signed distance to the surface, world units, positive where the formula is positive. It is exact
-/// within rounding errors up to an eighth of a cell.
-/// @param position  relative to a corner of a cell
+/// Signed distance to the gyroid surface, world units, positive where the formula is positive. It
+/// is exact within rounding errors up to an eighth of a cell.
+/// @param position  relative to a corner of a cell, world units
+/// @param cell      edge of a cell, world units
 [[nodiscard]] double gyroidDistance(const Imath::V3d& position, double cell);
 
 [[nodiscard]] TileBox gyroidBox(const Gyroid& gyroid, const Imath::V3d& center);

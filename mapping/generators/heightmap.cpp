@@ -13,34 +13,31 @@ using Imath::V3d;
 using levelset::ShapeExtent;
 using levelset::ShapeOptions;
 
-constexpr const char* kHeightmap = "heightmap";
 // Upper bound of the sum of the magnitudes of the weights of cubic convolution, in one dimension.
 constexpr double kCubicWeights = 1.25;
 // Upper bound of its slope, relative to the largest difference of neighbours.
 constexpr double kCubicSlope = 1.5;
 
 void requireHeightmap(const Heightmap& heightmap, const V3d& center) {
-  requirePositive(heightmap.size.x, kHeightmap, "the size along x");
-  requirePositive(heightmap.size.y, kHeightmap, "the size along y");
-  requirePositive(heightmap.height, kHeightmap, "the height");
-  requireNonNegative(heightmap.base, kHeightmap, "the base");
-  requireFinite(center, kHeightmap, "the centre");
+  requirePositive(heightmap.size.x, "the size along x");
+  requirePositive(heightmap.size.y, "the size along y");
+  requirePositive(heightmap.height, "the height");
+  requireNonNegative(heightmap.base, "the base");
+  requireFinite(center, "the centre");
   const HeightGrid& grid = heightmap.grid;
   if (grid.columns < 2 || grid.rows < 2) {
-    throw levelset::UsageError(
-        fmt::format("{}: the grid has {} columns and {} rows; give at least two of each",
-                    kHeightmap, grid.columns, grid.rows));
+    throw levelset::UsageError(fmt::format(
+        "the grid has {} columns and {} rows; give at least two of each", grid.columns, grid.rows));
   }
   const auto count = static_cast<std::size_t>(grid.columns) * static_cast<std::size_t>(grid.rows);
   if (grid.heights.size() != count) {
-    throw levelset::UsageError(fmt::format("{}: the grid of {} x {} nodes has {} heights",
-                                           kHeightmap, grid.columns, grid.rows,
-                                           grid.heights.size()));
+    throw levelset::UsageError(fmt::format("the grid of {} x {} nodes has {} heights", grid.columns,
+                                           grid.rows, grid.heights.size()));
   }
   for (std::size_t i = 0; i < count; ++i) {
     if (std::isfinite(grid.heights[i])) continue;
     throw levelset::UsageError(
-        fmt::format("{}: the height in row {}, column {} is {}; give finite numbers", kHeightmap,
+        fmt::format("the height in row {}, column {} is {}; give finite numbers",
                     i / static_cast<std::size_t>(grid.columns) + 1,
                     i % static_cast<std::size_t>(grid.columns) + 1, grid.heights[i]));
   }
@@ -251,30 +248,29 @@ ShapeExtent heightmapExtent(const Heightmap& heightmap, const V3d& center) {
 
 void checkHeightmap(const Heightmap& heightmap, const V3d& center, double voxelSize,
                     const ShapeOptions& options) {
-  levelset::checkShape(heightmapExtent(heightmap, center), voxelSize, options, kHeightmap);
+  levelset::checkShape(heightmapExtent(heightmap, center), voxelSize, options);
 }
 
 levelset::NarrowBand makeHeightmap(const Heightmap& heightmap, const V3d& center, double voxelSize,
                                    const ShapeOptions& options) {
   const ShapeExtent extent = heightmapExtent(heightmap, center);
   return makeFromField(
-      extent, voxelSize, options, kHeightmap,
+      extent, voxelSize, options,
       HeightField(heightmap, heightmapBox(heightmap, center).tile, extent.bounds, voxelSize));
 }
 
 levelset::TriMesh heightmapSheet(const Heightmap& heightmap, const V3d& center, double spacing,
                                  const ShapeOptions& options) {
   const Imath::Box3d tile = heightmapBox(heightmap, center).tile;
-  requirePositive(spacing, kHeightmap, "the vertex spacing");
+  requirePositive(spacing, "the vertex spacing");
   const double columns = std::ceil(heightmap.size.x / spacing * (1 - 1e-9)),
                rows = std::ceil(heightmap.size.y / spacing * (1 - 1e-9));
   constexpr double kBytesPerVertex = 24 + 16 + 2 * 12, kMostVertices = 4294967295.0;
   const double vertices = (columns + 1) * (rows + 1);
-  levelset::requireMemory(kBytesPerVertex * vertices, options.maxMemory, kHeightmap);
+  levelset::requireMemory(kBytesPerVertex * vertices, options.maxMemory);
   if (vertices > kMostVertices) {
-    throw levelset::ResourceLimit(
-        fmt::format("{}: {:.3g} vertices exceed the limit of a mesh; use a larger vertex spacing",
-                    kHeightmap, vertices));
+    throw levelset::ResourceLimit(fmt::format(
+        "{:.3g} vertices exceed the limit of a mesh; use a larger vertex spacing", vertices));
   }
   const HeightSurface surface(heightmap);
   levelset::TriMesh mesh;
@@ -284,7 +280,7 @@ levelset::TriMesh heightmapSheet(const Heightmap& heightmap, const V3d& center, 
   mesh.attributes.uvs.reserve(count);
   mesh.triangles.reserve(2 * std::size_t{across} * up);
   for (std::uint32_t j = 0; j <= up; ++j) {
-    levelset::report(options.progress, static_cast<double>(j) / (rows + 1), kHeightmap);
+    levelset::report(options.progress, static_cast<double>(j) / (rows + 1));
     for (std::uint32_t i = 0; i <= across; ++i) {
       const double u = i / columns, v = j / rows;
       mesh.positions.emplace_back(

@@ -13,7 +13,6 @@ using Imath::V3d;
 using levelset::ShapeExtent;
 using levelset::ShapeOptions;
 
-constexpr const char* kHexagons = "hexagons";
 constexpr double kRoot3 = std::numbers::sqrt3;
 
 V2d hexagonPeriod(const Hexagons& hexagons) {
@@ -22,19 +21,19 @@ V2d hexagonPeriod(const Hexagons& hexagons) {
 }
 
 void requireHexagons(const Hexagons& hexagons, const V3d& center) {
-  requirePositive(hexagons.size, kHexagons, "the size");
-  requirePositive(hexagons.gap, kHexagons, "the gap");
-  requirePositive(hexagons.height, kHexagons, "the height");
-  requireNonNegative(hexagons.base, kHexagons, "the base");
-  requireNonNegative(hexagons.rounding, kHexagons, "the rounding");
-  requireTiling(hexagons.tiling, kHexagons);
-  requireFinite(center, kHexagons, "the centre");
+  requirePositive(hexagons.size, "the size");
+  requirePositive(hexagons.gap, "the gap");
+  requirePositive(hexagons.height, "the height");
+  requireNonNegative(hexagons.base, "the base");
+  requireNonNegative(hexagons.rounding, "the rounding");
+  requireTiling(hexagons.tiling);
+  requireFinite(center, "the centre");
   const double widest = hexagons.kind == HexagonKind::Raised ? hexagons.size : hexagons.gap;
   const double most = std::min(widest / 2, hexagons.height);
   if (hexagons.rounding > most) {
     throw levelset::UsageError(
-        fmt::format("{}: a rounding of {:.6g} is too large for the edges; give at most {:.6g}",
-                    kHexagons, hexagons.rounding, most));
+        fmt::format("a rounding of {:.6g} is too large for the edges; give at most {:.6g}",
+                    hexagons.rounding, most));
   }
 }
 
@@ -109,9 +108,9 @@ ShapeExtent hexagonsExtent(const Hexagons& hexagons, const V3d& center) {
 void checkHexagons(const Hexagons& hexagons, const V3d& center, double voxelSize,
                    const ShapeOptions& options) {
   const ShapeExtent extent = hexagonsExtent(hexagons, center);
-  levelset::checkShape(extent, voxelSize, options, kHexagons);
-  requireResolved(hexagons.size, voxelSize, kHexagons, "the size");
-  requireResolved(hexagons.gap, voxelSize, kHexagons, "the gap");
+  levelset::checkShape(extent, voxelSize, options);
+  requireResolved(hexagons.size, voxelSize, "the size");
+  requireResolved(hexagons.gap, voxelSize, "the gap");
 }
 
 levelset::NarrowBand makeHexagons(const Hexagons& hexagons, const V3d& center, double voxelSize,
@@ -125,7 +124,7 @@ levelset::NarrowBand makeHexagons(const Hexagons& hexagons, const V3d& center, d
   const HexagonField pattern(hexagons, origin);
   const double exact = (options.halfWidth + 0.5) * voxelSize;
   return levelset::makeShape(
-      hexagonsExtent(hexagons, center), voxelSize, options, kHexagons,
+      hexagonsExtent(hexagons, center), voxelSize, options,
       [&](const V3d& p) { return clippedDistance(pattern, p, box.whole, exact, voxelSize); });
 }
 

@@ -15,8 +15,6 @@ using Imath::V3d;
 using levelset::ShapeExtent;
 using levelset::ShapeOptions;
 
-constexpr const char* kKnurl = "knurl";
-
 double depthOf(const Knurl& knurl) {
   return knurl.depth > 0 ? knurl.depth : sharpDepth(knurl);
 }
@@ -27,19 +25,19 @@ V2d knurlPeriod(const Knurl& knurl) {
 }
 
 void requireKnurl(const Knurl& knurl, const V3d& center) {
-  requirePositive(knurl.pitch, kKnurl, "the pitch");
-  requireNonNegative(knurl.depth, kKnurl, "the depth");
-  requireNonNegative(knurl.base, kKnurl, "the base");
-  requireAngle(knurl.flankAngle, 0, std::numbers::pi, kKnurl, "the angle between the flanks");
+  requirePositive(knurl.pitch, "the pitch");
+  requireNonNegative(knurl.depth, "the depth");
+  requireNonNegative(knurl.base, "the base");
+  requireAngle(knurl.flankAngle, 0, std::numbers::pi, "the angle between the flanks");
   if (knurl.pattern != KnurlPattern::Straight)
-    requireAngle(knurl.grooveAngle, 0, std::numbers::pi / 2, kKnurl, "the angle of the grooves");
-  requireTiling(knurl.tiling, kKnurl);
-  requireFinite(center, kKnurl, "the centre");
+    requireAngle(knurl.grooveAngle, 0, std::numbers::pi / 2, "the angle of the grooves");
+  requireTiling(knurl.tiling);
+  requireFinite(center, "the centre");
   if (knurl.depth > sharpDepth(knurl) * (1 + 1e-9)) {
     throw levelset::UsageError(
-        fmt::format("{}: the depth is {:.6g}, but at this pitch and flank angle the crests are "
+        fmt::format("the depth is {:.6g}, but at this pitch and flank angle the crests are "
                     "sharp at {:.6g}; give a smaller depth or a smaller flank angle",
-                    kKnurl, knurl.depth, sharpDepth(knurl)));
+                    knurl.depth, sharpDepth(knurl)));
   }
 }
 
@@ -134,7 +132,7 @@ double crossingCount(const Knurl& knurl, const TileBox& box) {
 levelset::TriMesh knurlMesh(const Knurl& knurl, const V3d& center, const ShapeOptions& options) {
   const TileBox box = knurlBox(knurl, center);
   constexpr double kBytesPerCrossing = 6000;  // 24 triangles with their vertices, edges and maps
-  levelset::requireMemory(crossingCount(knurl, box) * kBytesPerCrossing, options.maxMemory, kKnurl);
+  levelset::requireMemory(crossingCount(knurl, box) * kBytesPerCrossing, options.maxMemory);
   // Coordinates in the pattern's own frame, where the tile begins at a crossing of two grooves.
   const V3d corner = box.tile.min;
   const Imath::Box2d rectangle(V2d(box.whole.min.x - corner.x, box.whole.min.y - corner.y),
@@ -148,7 +146,7 @@ levelset::TriMesh knurlMesh(const Knurl& knurl, const V3d& center, const ShapeOp
       groovesOver(rectangle, V2d(std::cos(angle), std::sin(angle)), knurl.pitch);
   const double length = rectangle.min.length() + rectangle.max.length();
   for (long i = firsts.first; i <= firsts.last; ++i) {
-    levelset::report(options.progress, 0, kKnurl);
+    levelset::report(options.progress, 0);
     if (knurl.pattern != KnurlPattern::Diamond) {
       addGroove(knurl, stations, i, length, relief);
       continue;
@@ -182,14 +180,14 @@ ShapeExtent knurlExtent(const Knurl& knurl, const V3d& center) {
 void checkKnurl(const Knurl& knurl, const V3d& center, double voxelSize,
                 const ShapeOptions& options) {
   const ShapeExtent extent = knurlExtent(knurl, center);
-  levelset::checkShape(extent, voxelSize, options, kKnurl);
-  requireResolved(knurl.pitch, voxelSize, kKnurl, "the pitch");
+  levelset::checkShape(extent, voxelSize, options);
+  requireResolved(knurl.pitch, voxelSize, "the pitch");
 }
 
 levelset::NarrowBand makeKnurl(const Knurl& knurl, const V3d& center, double voxelSize,
                                const ShapeOptions& options) {
   checkKnurl(knurl, center, voxelSize, options);
-  levelset::report(options.progress, 0, kKnurl);
+  levelset::report(options.progress, 0);
   return levelset::meshToBand(knurlMesh(knurl, center, options), voxelSize,
                               {.halfWidth = options.halfWidth,
                                .sign = levelset::SignMode::Closed,

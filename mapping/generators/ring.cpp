@@ -13,7 +13,6 @@ using Imath::V3d;
 using levelset::ShapeExtent;
 using levelset::ShapeOptions;
 
-constexpr const char* kRing = "ring";
 constexpr int kMostRings = 1'000'000;
 
 // In radii. At this spacing and lean the least distance between the circles of a sheet is largest,
@@ -33,38 +32,38 @@ double wireReach(const Ring& ring) {
 }
 
 void requireRing(const Ring& ring, const V3d& center) {
-  requirePositive(ring.radius, kRing, "the radius");
+  requirePositive(ring.radius, "the radius");
   if (ring.section) {
-    requirePositive(ring.section->x, kRing, "the width of the section");
-    requirePositive(ring.section->y, kRing, "the height of the section");
+    requirePositive(ring.section->x, "the width of the section");
+    requirePositive(ring.section->y, "the height of the section");
     if (ring.section->x >= 2 * ring.radius) {
       throw levelset::UsageError(fmt::format(
-          "{}: the section is {:.6g} wide, which closes a ring of radius {:.6g}; make it narrower",
-          kRing, ring.section->x, ring.radius));
+          "the section is {:.6g} wide, which closes a ring of radius {:.6g}; make it narrower",
+          ring.section->x, ring.radius));
     }
   } else {
-    requirePositive(ring.tube, kRing, "the tube");
+    requirePositive(ring.tube, "the tube");
     if (ring.tube >= ring.radius) {
       throw levelset::UsageError(fmt::format(
-          "{}: a tube of radius {:.6g} closes a ring of radius {:.6g}; make it thinner, or use "
+          "a tube of radius {:.6g} closes a ring of radius {:.6g}; make it thinner, or use "
           "`torus` for a solid without a hole",
-          kRing, ring.tube, ring.radius));
+          ring.tube, ring.radius));
     }
   }
-  if (ring.lean) requireAngle(*ring.lean, -std::numbers::pi, std::numbers::pi, kRing, "the lean");
+  if (ring.lean) requireAngle(*ring.lean, -std::numbers::pi, std::numbers::pi, "the lean");
   if (ring.columns < 1 || ring.rows < 1 || ring.columns > kMostRings ||
       ring.rows > kMostRings / ring.columns) {
     throw levelset::UsageError(
-        fmt::format("{}: {} columns and {} rows; give at least 1 of each "
+        fmt::format("{} columns and {} rows; give at least 1 of each "
                     "and at most a million rings",
-                    kRing, ring.columns, ring.rows));
+                    ring.columns, ring.rows));
   }
   if (ring.spacing) {
-    requirePositive(ring.spacing->x, kRing, "the spacing along a row");
-    requirePositive(ring.spacing->y, kRing, "the spacing of rows");
+    requirePositive(ring.spacing->x, "the spacing along a row");
+    requirePositive(ring.spacing->y, "the spacing of rows");
   }
-  requireNonNegative(ring.clearance, kRing, "the clearance");
-  requireFinite(center, kRing, "the centre");
+  requireNonNegative(ring.clearance, "the clearance");
+  requireFinite(center, "the centre");
 }
 
 /// Circle of a ring: its centre, and the two directions that span it.
@@ -125,15 +124,14 @@ void requireMail(const Ring& ring) {
   const double clearance = ringClearance(ring);
   if (!(clearance > ring.clearance) && !(clearance == ring.clearance && clearance > 0)) {
     throw levelset::UsageError(fmt::format(
-        "{}: the clearance between wires is {:.6g}, but --clearance requires {:.6g}; make the wire "
+        "the clearance between wires is {:.6g}, but --clearance requires {:.6g}; make the wire "
         "thinner (a tube under {:.6g} radii, at the best spacing) or change --spacing and --lean",
-        kRing, clearance, ring.clearance, 0.25));
+        clearance, ring.clearance, 0.25));
   }
   if (ring.rows > 1 && !holdsRing(Circle(ring, 0, 0), Circle(ring, 0, 1))) {
     throw levelset::UsageError(
-        fmt::format("{}: the rings do not hold each other; move the rows closer, or leave "
-                    "--spacing and --lean out",
-                    kRing));
+        "the rings do not hold each other; move the rows closer, or leave "
+        "--spacing and --lean out");
   }
 }
 
@@ -255,16 +253,16 @@ ShapeExtent ringExtent(const Ring& ring, const V3d& center) {
 
 void checkRing(const Ring& ring, const V3d& center, double voxelSize, const ShapeOptions& options) {
   const ShapeExtent extent = ringExtent(ring, center);
-  levelset::checkShape(extent, voxelSize, options, kRing);
+  levelset::checkShape(extent, voxelSize, options);
   requireMail(ring);
   if (ring.section) {
-    requireResolved(ring.section->x, voxelSize, kRing, "the width of the section");
-    requireResolved(ring.section->y, voxelSize, kRing, "the height of the section");
+    requireResolved(ring.section->x, voxelSize, "the width of the section");
+    requireResolved(ring.section->y, voxelSize, "the height of the section");
   } else {
-    requireResolved(2 * ring.tube, voxelSize, kRing, "the wire");
+    requireResolved(2 * ring.tube, voxelSize, "the wire");
   }
   if (ring.isSheet())
-    requireResolved(ringClearance(ring), voxelSize, kRing, "the clearance between wires");
+    requireResolved(ringClearance(ring), voxelSize, "the clearance between wires");
 }
 
 levelset::NarrowBand makeRing(const Ring& ring, const V3d& center, double voxelSize,
@@ -273,7 +271,7 @@ levelset::NarrowBand makeRing(const Ring& ring, const V3d& center, double voxelS
   const ShapeExtent extent = ringExtent(ring, center);
   // Beyond the size of a leaf, blocks only need to know that they are far from the surface.
   const double reach = (options.halfWidth + 8) * voxelSize;
-  return levelset::makeShape(extent, voxelSize, options, kRing,
+  return levelset::makeShape(extent, voxelSize, options,
                              RingField(ring, center - sheetMiddle(ring), extent.bounds, reach));
 }
 

@@ -13,8 +13,6 @@ using Imath::V3d;
 using levelset::ShapeExtent;
 using levelset::ShapeOptions;
 
-constexpr const char* kScales = "scales";
-
 double stepOf(const Scales& scales) {
   return scales.step > 0 ? scales.step : scales.length / 2;
 }
@@ -35,37 +33,36 @@ double tipOf(const Scales& scales) {
 }
 
 void requireScales(const Scales& scales, const V3d& center) {
-  requirePositive(scales.length, kScales, "the length");
-  requirePositive(scales.width, kScales, "the width");
-  requireNonNegative(scales.thickness, kScales, "the thickness");
-  requireAngle(scales.tilt, 0, std::numbers::pi / 3, kScales, "the tilt");
-  requireNonNegative(scales.step, kScales, "the step");
-  requireNonNegative(scales.tip, kScales, "the tip");
-  requireNonNegative(scales.rounding, kScales, "the rounding");
-  requireNonNegative(scales.base, kScales, "the base");
-  requireTiling(scales.tiling, kScales);
-  requireFinite(center, kScales, "the centre");
+  requirePositive(scales.length, "the length");
+  requirePositive(scales.width, "the width");
+  requireNonNegative(scales.thickness, "the thickness");
+  requireAngle(scales.tilt, 0, std::numbers::pi / 3, "the tilt");
+  requireNonNegative(scales.step, "the step");
+  requireNonNegative(scales.tip, "the tip");
+  requireNonNegative(scales.rounding, "the rounding");
+  requireNonNegative(scales.base, "the base");
+  requireTiling(scales.tiling);
+  requireFinite(center, "the centre");
   const auto refuse = [](const char* what, double is, double most) {
-    throw levelset::UsageError(
-        fmt::format("{}: {} is {:.6g}; give at most {:.6g}", kScales, what, is, most));
+    throw levelset::UsageError(fmt::format("{} is {:.6g}; give at most {:.6g}", what, is, most));
   };
   if (tipOf(scales) > scales.length)
     refuse("the tip (part of the length)", tipOf(scales), scales.length);
   if (tipOf(scales) < scales.width / 2) {
     throw levelset::UsageError(
-        fmt::format("{}: a tip of {:.6g} is blunter than a half circle; give at least half the "
+        fmt::format("a tip of {:.6g} is blunter than a half circle; give at least half the "
                     "width, {:.6g}",
-                    kScales, tipOf(scales), scales.width / 2));
+                    tipOf(scales), scales.width / 2));
   }
   if (stepOf(scales) > scales.length)
     refuse("the step (rows must overlap)", stepOf(scales), scales.length);
   const double roundest = std::min(thicknessOf(scales), scales.width) / 2;
   if (scales.rounding > roundest) refuse("the rounding", scales.rounding, roundest);
   if (scales.thickness > 0 && rowGap(scales) <= 0) {
-    throw levelset::UsageError(fmt::format(
-        "{}: with a thickness of {:.6g} the rows touch; give less than {:.6g}, or give 0 "
-        "for scales that are solid down to the plate",
-        kScales, scales.thickness, stepOf(scales) * std::sin(scales.tilt)));
+    throw levelset::UsageError(
+        fmt::format("with a thickness of {:.6g} the rows touch; give less than {:.6g}, or give 0 "
+                    "for scales that are solid down to the plate",
+                    scales.thickness, stepOf(scales) * std::sin(scales.tilt)));
   }
 }
 
@@ -177,11 +174,11 @@ ShapeExtent scalesExtent(const Scales& scales, const V3d& center) {
 void checkScales(const Scales& scales, const V3d& center, double voxelSize,
                  const ShapeOptions& options) {
   const ShapeExtent extent = scalesExtent(scales, center);
-  levelset::checkShape(extent, voxelSize, options, kScales);
-  requireResolved(scales.width, voxelSize, kScales, "the width");
+  levelset::checkShape(extent, voxelSize, options);
+  requireResolved(scales.width, voxelSize, "the width");
   if (scales.thickness == 0) return;
-  requireResolved(scales.thickness, voxelSize, kScales, "the thickness");
-  requireResolved(rowGap(scales), voxelSize, kScales, "the gap under the tips");
+  requireResolved(scales.thickness, voxelSize, "the thickness");
+  requireResolved(rowGap(scales), voxelSize, "the gap under the tips");
 }
 
 levelset::NarrowBand makeScales(const Scales& scales, const V3d& center, double voxelSize,
@@ -195,9 +192,9 @@ levelset::NarrowBand makeScales(const Scales& scales, const V3d& center, double 
   // Tips are not clipped at the top.
   Imath::Box3d cut = box.whole;
   cut.max.z = HUGE_VAL;
-  return levelset::makeShape(
-      scalesExtent(scales, center), voxelSize, options, kScales,
-      [&](const V3d& p) { return clippedDistance(pattern, p, cut, exact, voxelSize); });
+  return levelset::makeShape(scalesExtent(scales, center), voxelSize, options, [&](const V3d& p) {
+    return clippedDistance(pattern, p, cut, exact, voxelSize);
+  });
 }
 
 }  // namespace mapping

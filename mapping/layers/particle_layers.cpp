@@ -68,7 +68,7 @@ void sweepGeodesics(const SurfaceField& field, const std::vector<V3d>& firstRow,
     if (path.empty()) path = geodesic(field, layer.height, a, b);
     if (path.empty()) {
       throw InvalidInput(
-          fmt::format("patch: the surface does not connect {} and {}; move the corners "
+          fmt::format("the surface does not connect {} and {}; move the corners "
                       "closer together",
                       text(a), text(b)));
     }
@@ -126,12 +126,12 @@ PatchSides makeSides(const levelset::NarrowBand& band, double height,
                     text(knots[gap]), text(knots[gap + 1]), kEnds[side][0], kEnds[side][1], height);
     if (ground) {
       throw InvalidInput(
-          fmt::format("patch: no path shorter than {:.6g} {}: the surface separates them at that "
+          fmt::format("no path shorter than {:.6g} {}: the surface separates them at that "
                       "height; use a lower height, or move the corners closer together",
                       longest, ends));
     }
     throw InvalidInput(fmt::format(
-        "patch: no path on the surface {}; put all points on the same surface component", ends));
+        "no path on the surface {}; put all points on the same surface component", ends));
   }
   return sides;
 }
@@ -209,7 +209,7 @@ void advectPoints(const levelset::NarrowBand& band, double from, double to, std:
       p += field.normal(p + field.normal(p) * (0.5 * step)) * step;
     if (!field.project(p, to)) {
       throw InvalidInput(
-          fmt::format("patch: above the point {} the distance to the base does not reach {:.6g}, "
+          fmt::format("above the point {} the distance to the base does not reach {:.6g}, "
                       "because another part of the base is too near at {}; use a lower height or "
                       "move the patch",
                       text(point), to, text(p)));
@@ -234,7 +234,7 @@ void raisePoints(const levelset::NarrowBand& band, double height, std::span<cons
       above += step;
       if (above > kFarthest * rise + step) {
         throw InvalidInput(
-            fmt::format("patch: from {} along {} the distance to the base does not reach {:.6g}; "
+            fmt::format("from {} along {} the distance to the base does not reach {:.6g}; "
                         "use a direction that leans less, or a lower height",
                         text(points[i]), text(directions[i]), height));
       }
@@ -247,7 +247,7 @@ void raisePoints(const levelset::NarrowBand& band, double height, std::span<cons
     // Values jump at the end of the swept region.
     if (field.value(points[i] + directions[i] * above) - height > 0.1 * field.voxelSize()) {
       throw InvalidInput(
-          fmt::format("patch: the ray from {} along {} leaves the region above the patch before "
+          fmt::format("the ray from {} along {} leaves the region above the patch before "
                       "the distance to "
                       "the base reaches {:.6g}; use a direction that leans less, or a lower height",
                       text(points[i]), text(directions[i]), height));

@@ -19,7 +19,6 @@ using Imath::V3d;
 using levelset::NarrowBand;
 using levelset::UsageError;
 
-constexpr const char* kPatchLayers = "patch";
 // The system of the map is dense: n³ / 3 operations and n² numbers. This many particles cost about
 // a second or two, and are five to ten voxels apart on a patch of 100 to 200 voxels.
 constexpr double kParticleBudget = 2000;
@@ -100,62 +99,59 @@ std::string pointAsOption(const V3d& p) {
   return fmt::format("{},{},{}", p.x, p.y, p.z);
 }
 
-void checkPatchOptions(const char* action, double height, const PatchOptions& options) {
+void checkPatchOptions(double height, const PatchOptions& options) {
   if (!(height > 0) || !std::isfinite(height)) {
-    throw UsageError(fmt::format("{}: the height is {}; give a positive length", action, height));
+    throw UsageError(fmt::format("the height is {}; give a positive length", height));
   }
   if (options.layers < 2) {
-    throw UsageError(fmt::format("{}: {} layers of particles; give --layers of at least 2", action,
-                                 options.layers));
+    throw UsageError(
+        fmt::format("{} layers of particles; give --layers of at least 2", options.layers));
   }
   if (!(options.spacing >= 0) || !std::isfinite(options.spacing)) {
-    throw UsageError(fmt::format("{}: the spacing of particles is {}; give a positive length",
-                                 action, options.spacing));
+    throw UsageError(
+        fmt::format("the spacing of particles is {}; give a positive length", options.spacing));
   }
   const auto [across, up] = options.cells;
   if ((across == 0) != (up == 0) || (across > 0 && std::min(across, up) < 3)) {
     throw UsageError(
-        fmt::format("{}: {} by {} cells; give at least 3 along u and along v", action, across, up));
+        fmt::format("{} by {} cells; give at least 3 along u and along v", across, up));
   }
   const LayerTransform& t = options.transform;
   if (!std::isfinite(t.twist) || !std::isfinite(t.bend) || !(t.taper > 0) ||
       !std::isfinite(t.taper)) {
     throw UsageError(
-        fmt::format("{}: twist {}, taper {} and bend {}; give two angles and a positive scale",
-                    action, t.twist, t.taper, t.bend));
+        fmt::format("twist {}, taper {} and bend {}; give two angles and a positive scale", t.twist,
+                    t.taper, t.bend));
   }
   if (options.scheme != LayerScheme::Spline && (!options.spline.empty() || options.fade)) {
-    throw UsageError(fmt::format("{}: --spline and --fade require --particles spline", action));
+    throw UsageError("--spline and --fade require --particles spline");
   }
   if (options.scheme != LayerScheme::Reduced && (options.parallel || !options.directions.empty())) {
-    throw UsageError(
-        fmt::format("{}: directions of the corners require --particles reduced", action));
+    throw UsageError("directions of the corners require --particles reduced");
   }
   if (options.parallel && !options.directions.empty()) {
-    throw UsageError(fmt::format(
-        "{}: --directions and --parallel exclude each other; give one of them", action));
+    throw UsageError("--directions and --parallel exclude each other; give one of them");
   }
   if (options.directions.size() > 1 && options.directions.size() != 4) {
-    throw UsageError(fmt::format("{}: {} directions; give one for all corners, or four", action,
-                                 options.directions.size()));
+    throw UsageError(
+        fmt::format("{} directions; give one for all corners, or four", options.directions.size()));
   }
   for (const V3d& d : options.directions) {
     if (!std::isfinite(d.x) || !std::isfinite(d.y) || !std::isfinite(d.z) || !(d.length() > 0)) {
-      throw UsageError(fmt::format("{}: the direction {} is not a vector of finite, nonzero length",
-                                   action, pointAsOption(d)));
+      throw UsageError(fmt::format("the direction {} is not a vector of finite, nonzero length",
+                                   pointAsOption(d)));
     }
   }
   for (const V3d& p : options.spline) {
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
-      throw UsageError(
-          fmt::format("{}: the spline's point {} is not finite", action, pointAsOption(p)));
+      throw UsageError(fmt::format("the spline's point {} is not finite", pointAsOption(p)));
     }
   }
   for (std::size_t side = 0; side < 4; ++side)
     for (const V3d& p : options.sides[side]) {
       if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
-        throw UsageError(fmt::format("{}: the point {} of side {} is not finite", action,
-                                     pointAsOption(p), side));
+        throw UsageError(
+            fmt::format("the point {} of side {} is not finite", pointAsOption(p), side));
       }
     }
 }
@@ -196,20 +192,20 @@ std::size_t countAlong(double length, double spacing) {
   const double cells = std::round(length / spacing);
   if (!(cells < kMostParticles)) {
     throw levelset::ResourceLimit(
-        fmt::format("{}: {:.3g} particles along a side exceed the limit of {:.0g}; give a larger "
+        fmt::format("{:.3g} particles along a side exceed the limit of {:.0g}; give a larger "
                     "--spacing or less taper",
-                    kPatchLayers, cells, kMostParticles));
+                    cells, kMostParticles));
   }
   return std::max(kFewest, static_cast<std::size_t>(cells) + 1);
 }
 
 void checkParticleCount(double count, double spacing, const PatchOptions& options) {
-  levelset::requireMemory(count * 3 * sizeof(V3d), options.maxMemory, kPatchLayers);
+  levelset::requireMemory(count * 3 * sizeof(V3d), options.maxMemory);
   if (!(count <= kMostParticles)) {
     throw levelset::ResourceLimit(
-        fmt::format("{}: a spacing of {:.6g} gives {:.3g} particles, more than the limit of "
+        fmt::format("a spacing of {:.6g} gives {:.3g} particles, more than the limit of "
                     "{:.0g}; give a larger --spacing",
-                    kPatchLayers, spacing, count, kMostParticles));
+                    spacing, count, kMostParticles));
   }
 }
 
@@ -250,17 +246,17 @@ std::vector<ParticleLayer> layersFromSurface(const NarrowBand& base, const Parti
   if (options.spline.empty()) points.push_back(axis.origin + axis.normal * height);
   for (std::size_t i = 1; i < points.size(); ++i) {
     if ((points[i] - points[i - 1]).length() < 1e-6 * base.voxelSize()) {
-      throw UsageError(fmt::format("{}: the spline has two equal points at {}; leave one out{}",
-                                   kPatchLayers, pointAsOption(points[i]),
+      throw UsageError(fmt::format("the spline has two equal points at {}; leave one out{}",
+                                   pointAsOption(points[i]),
                                    i == 1 ? ", because it starts at the patch's centre" : ""));
     }
   }
   const SweepCurve curve(points);
   if (height > curve.length() * (1 + 1e-9)) {
     throw UsageError(fmt::format(
-        "{}: the height is {:.6g} but the spline is only {:.6g} long; use a lower height or "
+        "the height is {:.6g} but the spline is only {:.6g} long; use a lower height or "
         "a longer spline",
-        kPatchLayers, height, curve.length()));
+        height, curve.length()));
   }
   SplineSweep sweep = splineLayers(surface, curve, height, options.layers, options.fade);
   report.slowed = sweep.slowed;
@@ -279,9 +275,9 @@ void requireCovered(const NarrowBand& base, const ParticleLayer& layer) {
     V3d p = place;
     if (field.project(p, 0) && !field.isBeyondBorder(p)) return;
     throw levelset::InvalidInput(fmt::format(
-        "{}: the surface breaks off at ({:.6g}, {:.6g}, {:.6g}), within the patch; move the patch "
+        "the surface breaks off at ({:.6g}, {:.6g}, {:.6g}), within the patch; move the patch "
         "away from the border and holes of the surface",
-        kPatchLayers, place.x, place.y, place.z));
+        place.x, place.y, place.z));
   };
   for (const V3d& p : layer.positions) require(p);
   constexpr double kStepVoxels = 1;  // a slit of four voxels contains two of these samples

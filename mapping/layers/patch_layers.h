@@ -17,9 +17,8 @@ namespace mapping {
 [[nodiscard]] std::string pointAsOption(const Imath::V3d& p);
 
 /// Checks the height and options of a patch.
-/// @param action  prefix of the message
 /// @throws UsageError for a height that is not positive and options out of range
-void checkPatchOptions(const char* action, double height, const PatchOptions& options);
+void checkPatchOptions(double height, const PatchOptions& options);
 
 /// Mean lengths of a layer's rows and columns, world units.
 struct LayerSize {

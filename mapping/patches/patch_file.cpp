@@ -31,9 +31,9 @@ constexpr double kBytesPerLetter = 20;
 
 Json toJson(const V3d& p) {
   if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
-    throw InvalidInput(fmt::format(
-        "write: a particle of the patch at ({}, {}, {}) is not finite; build the patch again", p.x,
-        p.y, p.z));
+    throw InvalidInput(
+        fmt::format("a particle of the patch at ({}, {}, {}) is not finite; build the patch again",
+                    p.x, p.y, p.z));
   }
   return {p.x, p.y, p.z};
 }
@@ -47,7 +47,7 @@ Json toJson(std::span<const V3d> points) {
 void requireFinite(double value, const char* what) {
   if (!std::isfinite(value)) {
     throw InvalidInput(
-        fmt::format("write: the {} of the patch is {}; build the patch again", what, value));
+        fmt::format("the {} of the patch is {}; build the patch again", what, value));
   }
 }
 
@@ -82,7 +82,7 @@ class Reader {
   explicit Reader(std::string file) : file_(std::move(file)) {}
 
   [[noreturn]] void refuse(const std::string& where, const std::string& what) const {
-    throw InvalidInput(fmt::format("read: {}: {} {}; write the patch again", file_, where, what));
+    throw InvalidInput(fmt::format("{}: {} {}; write the patch again", file_, where, what));
   }
 
   [[nodiscard]] const Json& member(const Json& json, const char* name,
@@ -192,26 +192,23 @@ std::string textOf(const std::filesystem::path& file, std::size_t maxMemory) {
     while (std::cin.read(part.data(), static_cast<std::streamsize>(part.size())) ||
            std::cin.gcount() > 0) {
       text.append(part, 0, static_cast<std::size_t>(std::cin.gcount()));
-      levelset::requireMemory(kBytesPerLetter * static_cast<double>(text.size()), maxMemory,
-                              "read");
+      levelset::requireMemory(kBytesPerLetter * static_cast<double>(text.size()), maxMemory);
     }
   } else {
     std::error_code failed;
     if (std::filesystem::is_directory(file, failed)) {
-      throw levelset::IoError(
-          fmt::format("read: {} is a folder; give a patch file", file.string()));
+      throw levelset::IoError(fmt::format("{} is a folder; give a patch file", file.string()));
     }
     const auto size = std::filesystem::file_size(file, failed);
-    if (!failed)
-      levelset::requireMemory(kBytesPerLetter * static_cast<double>(size), maxMemory, "read");
+    if (!failed) levelset::requireMemory(kBytesPerLetter * static_cast<double>(size), maxMemory);
     std::ifstream stream(file, std::ios::binary);
     text.assign(std::istreambuf_iterator<char>(stream), {});
     if (!stream) {
       throw levelset::IoError(
-          fmt::format("read: {} cannot be read; check its name and permissions", file.string()));
+          fmt::format("{} cannot be read; check its name and permissions", file.string()));
     }
   }
-  levelset::requireMemory(kBytesPerLetter * static_cast<double>(text.size()), maxMemory, "read");
+  levelset::requireMemory(kBytesPerLetter * static_cast<double>(text.size()), maxMemory);
   return text;
 }
 
@@ -230,7 +227,7 @@ void writePatches(const std::filesystem::path& file, std::span<const Patch> patc
     stream.flush();
     if (!stream) {
       throw levelset::IoError(
-          fmt::format("write: {} cannot be written; check the free disk space", file.string()));
+          fmt::format("{} cannot be written; check the free disk space", file.string()));
     }
   }
   target.commit();

@@ -90,10 +90,10 @@ NarrowBand sweepPatchSpace(const NarrowBand& base, std::span<const V3d> border, 
   if (base.isOpenSurface()) {
     constexpr double kRounding = 1e-6;
     if (base.halfWidth() >= needed - kRounding) return base;
-    throw levelset::InvalidInput(fmt::format(
-        "patch: the band of the open surface extends to {:.6g} voxels, and the height {:.6g} "
-        "needs more; build it with surface-band --half-width {}, or use a lower patch",
-        base.halfWidth(), height, std::ceil(needed - kRounding)));
+    throw levelset::InvalidInput(
+        fmt::format("the band of the open surface extends to {:.6g} voxels, and the height {:.6g} "
+                    "needs more; build it with surface-band --half-width {}, or use a lower patch",
+                    base.halfWidth(), height, std::ceil(needed - kRounding)));
   }
   if (options.shared && serves(*options.shared, base, border, height)) return *options.shared;
   const NarrowBand coarse = coarsen(base, border, height, options);

@@ -28,7 +28,6 @@ using levelset::InvalidInput;
 using levelset::NarrowBand;
 using levelset::UsageError;
 
-constexpr const char* kDecal = "decal";
 // Sine of 1.1 degrees, the least angle between the direction and the normal.
 constexpr double kLeastTangent = 0.02;
 
@@ -43,10 +42,10 @@ DecalFrame frameAt(const SurfaceField& field, const V3d& center, const V3d& dire
   const double length = direction.length();
   const V3d tangent = direction - normal * normal.dot(direction);
   if (!(tangent.length() > kLeastTangent * length)) {
-    throw UsageError(fmt::format(
-        "{}: the direction {} is normal to the surface at {}, whose normal is "
-        "{:.3g},{:.3g},{:.3g}; give a direction along the surface",
-        kDecal, pointAsOption(direction), pointAsOption(center), normal.x, normal.y, normal.z));
+    throw UsageError(
+        fmt::format("the direction {} is normal to the surface at {}, whose normal is "
+                    "{:.3g},{:.3g},{:.3g}; give a direction along the surface",
+                    pointAsOption(direction), pointAsOption(center), normal.x, normal.y, normal.z));
   }
   const V3d u = tangent.normalized(), v = normal.cross(u);
   return {center, u, isMirrored ? -v : v};
@@ -100,9 +99,9 @@ void walkToParticles(const NarrowBand& band, const DecalFrame& frame, double rad
   }
   if (!std::isfinite(most)) return;
   throw InvalidInput(fmt::format(
-      "{}: the surface breaks off or is too sharp to be followed at {}, {:.4g} from the centre {}; "
+      "the surface breaks off or is too sharp to be followed at {}, {:.4g} from the centre {}; "
       "{}",
-      kDecal, pointAsOption(layer.positions[first]),
+      pointAsOption(layer.positions[first]),
       radius * std::hypot(signedShare(first % layer.columns, layer.columns),
                           signedShare(first / layer.columns, layer.rows)) -
           missing[first],
@@ -209,10 +208,9 @@ void requireSound(const NarrowBand& band, const ParticleLayer& layer, double rad
   findFolds(layer, normals, radius, isMirrored, trouble);
   findOverlaps(layer, normals, radius, trouble);
   if (!std::isfinite(trouble.radius)) return;
-  throw InvalidInput(
-      fmt::format("{}: it {}{}", kDecal,
-                  fmt::format(fmt::runtime(trouble.sentence), pointAsOption(trouble.place)),
-                  smallerRadius(0.95 * trouble.radius)));
+  throw InvalidInput(fmt::format(
+      "it {}{}", fmt::format(fmt::runtime(trouble.sentence), pointAsOption(trouble.place)),
+      smallerRadius(0.95 * trouble.radius)));
 }
 
 /// Builds the layer of one exponential map on φ = height.
@@ -261,9 +259,9 @@ double raiseFrame(const NarrowBand& space, double from, double to, DecalFrame& f
     if (path.empty()) path = geodesic(field, to, frame.center, points[i + 1]);
     if (path.empty()) {
       throw InvalidInput(fmt::format(
-          "{}: at height {:.4g} the surface no longer connects its centre and sides; use a lower "
+          "at height {:.4g} the surface no longer connects its centre and sides; use a lower "
           "height or --particles conforming",
-          kDecal, to));
+          to));
     }
     growth += pathLength(path) / length / static_cast<double>(paths.size());
     paths[i] = std::move(path);
@@ -283,39 +281,38 @@ std::vector<ParticleLayer> reducedDecal(const NarrowBand& base, DecalFrame frame
     radius *= raiseFrame(space, layers.back().height, w * height, frame, paths);
     layers.push_back(
         decalLayer(space, frame, radius, w * height, w, surface.columns, options.mirror));
-    levelset::report(options.progress, 0.5 + 0.5 * w, kDecal);
+    levelset::report(options.progress, 0.5 + 0.5 * w);
   }
   return layers;
 }
 
 void checkDecalArguments(const NarrowBand& base, const V3d& direction, double radius, double height,
                          const PatchOptions& options) {
-  checkPatchOptions(kDecal, height, options);
+  checkPatchOptions(height, options);
   if (!(radius > 0) || !std::isfinite(radius))
-    throw UsageError(fmt::format("{}: the radius is {}; give a positive length", kDecal, radius));
+    throw UsageError(fmt::format("the radius is {}; give a positive length", radius));
   if (!std::isfinite(direction.x) || !std::isfinite(direction.y) || !std::isfinite(direction.z) ||
       direction.length() == 0) {
     throw UsageError(
-        fmt::format("{}: the direction {} is not a vector of finite, nonzero length; give a "
+        fmt::format("the direction {} is not a vector of finite, nonzero length; give a "
                     "direction along the surface",
-                    kDecal, pointAsOption(direction)));
+                    pointAsOption(direction)));
   }
   for (const std::vector<V3d>& side : options.sides)
     if (!side.empty())
-      throw UsageError(
-          fmt::format("{}: points along sides require a patch with corners; use `patch`", kDecal));
+      throw UsageError("points along sides require a patch with corners; use `patch`");
   if (radius < 2 * base.voxelSize()) {
     throw InvalidInput(
-        fmt::format("{}: the radius {:.4g} is under two voxels of {:.4g}; use a "
+        fmt::format("the radius {:.4g} is under two voxels of {:.4g}; use a "
                     "larger radius, or resample the base",
-                    kDecal, radius, base.voxelSize()));
+                    radius, base.voxelSize()));
   }
   const double diagonal = base.zeroSetBounds().size().length();
   if (radius > 10 * diagonal) {
     throw InvalidInput(
-        fmt::format("{}: the radius {:.4g} is over ten times the base's diagonal of {:.4g}; use a "
+        fmt::format("the radius {:.4g} is over ten times the base's diagonal of {:.4g}; use a "
                     "smaller radius",
-                    kDecal, radius, diagonal));
+                    radius, diagonal));
   }
 }
 
@@ -324,12 +321,11 @@ void checkDecalArguments(const NarrowBand& base, const V3d& direction, double ra
 PatchResult makeDecal(const NarrowBand& base, const V3d& at, const V3d& direction, double radius,
                       double height, const PatchOptions& options) {
   if (base.isEmpty()) {
-    throw InvalidInput(
-        fmt::format("{}: the base has no surface; give a solid with at least one voxel", kDecal));
+    throw InvalidInput("the base has no surface; give a solid with at least one voxel");
   }
   checkDecalArguments(base, direction, radius, height, options);
   PatchResult result;
-  const V3d center = closestSurfacePoint(base, at, kDecal);
+  const V3d center = closestSurfacePoint(base, at);
   result.report.projectionDistance = (center - at).length();
   const DecalFrame frame =
       frameAt(SurfaceField(base), center, direction.normalized(), options.mirror);
@@ -342,7 +338,7 @@ PatchResult makeDecal(const NarrowBand& base, const V3d& at, const V3d& directio
                      options);
   const ParticleLayer surface =
       decalLayer(base, frame, radius, 0, 0, countAlong(2 * radius, spacing), options.mirror);
-  levelset::report(options.progress, 0.1, kDecal);
+  levelset::report(options.progress, 0.1);
 
   Patch& patch = result.patch;
   patch.height = height;

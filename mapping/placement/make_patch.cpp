@@ -20,13 +20,12 @@ using levelset::InvalidInput;
 using levelset::NarrowBand;
 using levelset::UsageError;
 
-constexpr const char* kPatch = "patch";
 void checkPatchArguments(const std::array<V3d, 4>& corners, double height,
                          const PatchOptions& options) {
-  checkPatchOptions(kPatch, height, options);
+  checkPatchOptions(height, options);
   for (const V3d& c : corners) {
     if (!std::isfinite(c.x) || !std::isfinite(c.y) || !std::isfinite(c.z))
-      throw UsageError(fmt::format("{}: the corner {} is not finite", kPatch, pointAsOption(c)));
+      throw UsageError(fmt::format("the corner {} is not finite", pointAsOption(c)));
   }
 }
 
@@ -42,9 +41,9 @@ void checkApart(const NarrowBand& base, const Outline& outline) {
       const double distance = (corners[i] - corners[j]).length();
       if (distance < 2 * base.voxelSize()) {
         throw InvalidInput(
-            fmt::format("{}: corners {} and {} both project to {}, {:.3g} voxels apart; sides must "
+            fmt::format("corners {} and {} both project to {}, {:.3g} voxels apart; sides must "
                         "be at least two voxels long",
-                        kPatch, i, j, pointAsOption(corners[i]), distance / base.voxelSize()));
+                        i, j, pointAsOption(corners[i]), distance / base.voxelSize()));
       }
     }
   constexpr std::array<std::array<std::size_t, 2>, 4> kEnds = {{{0, 1}, {1, 2}, {3, 2}, {0, 3}}};
@@ -55,9 +54,9 @@ void checkApart(const NarrowBand& base, const Outline& outline) {
     for (std::size_t i = 1; i < knots.size(); ++i) {
       if ((knots[i] - knots[i - 1]).length() >= 2 * base.voxelSize()) continue;
       throw InvalidInput(
-          fmt::format("{}: two points of side {} both project to {}; leave one out (the corners "
+          fmt::format("two points of side {} both project to {}; leave one out (the corners "
                       "are already part of the side)",
-                      kPatch, side, pointAsOption(knots[i])));
+                      side, pointAsOption(knots[i])));
     }
   }
 }
@@ -108,17 +107,16 @@ bool checkOrientation(const NarrowBand& base, const std::array<V3d, 4>& given,
   for (std::size_t i = 0; i < 4; ++i) scale += (corners[(i + 1) % 4] - corners[i]).length2();
   if (std::abs(area) < kFlat * scale) area = handednessOfSides(base, sides) * scale / 4;
   if (std::abs(area) < kFlat * scale) {
-    throw InvalidInput(
-        fmt::format("{}: the corners {}, {}, {} and {} span no area; move one of them", kPatch,
-                    pointAsOption(corners[0]), pointAsOption(corners[1]), pointAsOption(corners[2]),
-                    pointAsOption(corners[3])));
+    throw InvalidInput(fmt::format("the corners {}, {}, {} and {} span no area; move one of them",
+                                   pointAsOption(corners[0]), pointAsOption(corners[1]),
+                                   pointAsOption(corners[2]), pointAsOption(corners[3])));
   }
   if (area < 0 && !mirror) {
     throw UsageError(
-        fmt::format("{}: the corners are in clockwise order seen from outside, which mirrors the "
+        fmt::format("the corners are in clockwise order seen from outside, which mirrors the "
                     "texture; give them as \"{} {} {} {}\", or give --mirror",
-                    kPatch, pointAsOption(given[0]), pointAsOption(given[3]),
-                    pointAsOption(given[2]), pointAsOption(given[1])));
+                    pointAsOption(given[0]), pointAsOption(given[3]), pointAsOption(given[2]),
+                    pointAsOption(given[1])));
   }
   return area < 0;
 }
@@ -147,7 +145,7 @@ Outline projectOutline(const NarrowBand& base, const std::array<V3d, 4>& corners
                        const PatchOptions& options, PatchReport& report) {
   Outline outline;
   const auto projected = [&](const V3d& p) {
-    const V3d foot = closestSurfacePoint(base, p, kPatch);
+    const V3d foot = closestSurfacePoint(base, p);
     report.projectionDistance = std::max(report.projectionDistance, (foot - p).length());
     return foot;
   };
@@ -190,7 +188,7 @@ std::vector<V3d> cornerDirections(const NarrowBand& base, const Outline& outline
   if (options.parallel) {
     const V3d middle =
         (outline.corners[0] + outline.corners[1] + outline.corners[2] + outline.corners[3]) / 4.0;
-    directions = {field.normal(closestSurfacePoint(base, middle, kPatch))};
+    directions = {field.normal(closestSurfacePoint(base, middle))};
   }
   if (directions.size() == 1) directions.resize(4, directions.front());
   for (std::size_t i = 0; i < directions.size(); ++i) {
@@ -198,9 +196,9 @@ std::vector<V3d> cornerDirections(const NarrowBand& base, const Outline& outline
     constexpr double kLeastCosine = 0.2;  // 78 degrees
     if (directions[i].dot(field.normal(outline.corners[i])) >= kLeastCosine) continue;
     throw UsageError(
-        fmt::format("{}: the direction {} hardly leads away from the surface at corner {}, {}; "
+        fmt::format("the direction {} hardly leads away from the surface at corner {}, {}; "
                     "give a direction less than 78 degrees from the normal",
-                    kPatch, pointAsOption(directions[i]), i, pointAsOption(outline.corners[i])));
+                    pointAsOption(directions[i]), i, pointAsOption(outline.corners[i])));
   }
   return directions;
 }
@@ -267,7 +265,7 @@ std::vector<ParticleLayer> reducedLayers(const NarrowBand& base, Outline outline
     layers.push_back(filledLayer(layers.empty() ? base : space, space, border, height,
                                  spacing / scaleOf(border), options, report));
     const double done = static_cast<double>(layers.size()) / static_cast<double>(sides.size());
-    levelset::report(options.progress, 0.5 + 0.5 * done, kPatch);
+    levelset::report(options.progress, 0.5 + 0.5 * done);
   }
   return layers;
 }
@@ -280,7 +278,7 @@ std::vector<ParticleLayer> travellingLayers(const NarrowBand& base, const LayerS
                              ? options.spacing
                              : chooseSpacing(base.voxelSize(), {{sides.size}}, options.layers);
   const ParticleLayer surface = filledLayer(base, base, sides, height, spacing, options, report);
-  levelset::report(options.progress, 0.2, kPatch);
+  levelset::report(options.progress, 0.2);
   return layersFromSurface(base, surface, sides.outline(), sides.size, height, options, report);
 }
 
@@ -304,7 +302,7 @@ PatchResult makePatch(const NarrowBand& base, const std::array<V3d, 4>& corners,
   if (options.spacing > 0)
     checkParticleCount(particlesAt(options.spacing, {{size}}) * static_cast<double>(options.layers),
                        options.spacing, options);
-  levelset::report(options.progress, 0.1, kPatch);
+  levelset::report(options.progress, 0.1);
 
   // === The layers above it
   patch.layers = options.scheme == LayerScheme::Reduced
@@ -325,13 +323,13 @@ std::array<V3d, 4> cornersAround(const NarrowBand& base, const V3d& point, doubl
                                  double rotation) {
   for (const double size : {a, b}) {
     if (!(size > 0) || !std::isfinite(size)) {
-      throw UsageError(fmt::format("{}: the size is {}; give two positive lengths", kPatch, size));
+      throw UsageError(fmt::format("the size is {}; give two positive lengths", size));
     }
   }
   if (!std::isfinite(rotation)) {
-    throw UsageError(fmt::format("{}: the rotation is {}; give an angle", kPatch, rotation));
+    throw UsageError(fmt::format("the rotation is {}; give an angle", rotation));
   }
-  const V3d center = closestSurfacePoint(base, point, kPatch);
+  const V3d center = closestSurfacePoint(base, point);
   const SurfaceField field(base);
   const V3d normal = field.normal(center);
   const V3d east = eastOf(normal);
@@ -344,9 +342,9 @@ std::array<V3d, 4> cornersAround(const NarrowBand& base, const V3d& point, doubl
     const std::optional<V3d> corner = walkStraight(field, 0, center, offset, offset.length());
     if (!corner) {
       throw InvalidInput(fmt::format(
-          "{}: the surface breaks off between {} and corner {}; use a smaller size, or give the "
+          "the surface breaks off between {} and corner {}; use a smaller size, or give the "
           "corners",
-          kPatch, pointAsOption(center), i));
+          pointAsOption(center), i));
     }
     corners[i] = *corner;
   }

@@ -25,7 +25,6 @@ using levelset::InvalidInput;
 using levelset::NarrowBand;
 using levelset::UsageError;
 
-constexpr const char* kGrid = "patch-grid";
 constexpr double kMostPerTile = 2000;    // particles, the same as for a single patch
 constexpr double kMostPerGrid = 20000;   // over all layers; relaxation slows down with their number
 constexpr std::size_t kFewestCells = 4;  // along each side of a tile
@@ -34,12 +33,12 @@ void checkGrid(const PatchGridOptions& grid) {
   constexpr std::size_t kMostTiles = 100'000;
   if (grid.columns == 0 || grid.rows == 0 || grid.columns > kMostTiles || grid.rows > kMostTiles ||
       grid.columns * grid.rows > kMostTiles) {
-    throw UsageError(fmt::format("{}: {} by {} tiles; give 1 to {} in all", kGrid, grid.columns,
-                                 grid.rows, kMostTiles));
+    throw UsageError(
+        fmt::format("{} by {} tiles; give 1 to {} in all", grid.columns, grid.rows, kMostTiles));
   }
   if (!(grid.shift >= 0 && grid.shift < 1)) {
-    throw UsageError(fmt::format("{}: the shift is {}; give a share of a tile, 0 to below 1", kGrid,
-                                 grid.shift));
+    throw UsageError(
+        fmt::format("the shift is {}; give a share of a tile, 0 to below 1", grid.shift));
   }
 }
 
@@ -151,12 +150,12 @@ RoundFrame roundFrame(const NarrowBand& base, const V3d& from, const V3d& to, do
   const V3d offset = to - from;
   if (!(offset.length() >= 2 * base.voxelSize()) || !std::isfinite(offset.length())) {
     throw UsageError(
-        fmt::format("{}: the axis from {} to {} is under two voxels long; give two "
+        fmt::format("the axis from {} to {} is under two voxels long; give two "
                     "points that are further apart",
-                    kGrid, pointAsOption(from), pointAsOption(to)));
+                    pointAsOption(from), pointAsOption(to)));
   }
   if (!std::isfinite(rotation))
-    throw UsageError(fmt::format("{}: the rotation is {}; give an angle", kGrid, rotation));
+    throw UsageError(fmt::format("the rotation is {}; give an angle", rotation));
   const V3d along = offset.normalized();
   const V3d reference = std::abs(along.x) < 0.9 ? V3d(1, 0, 0) : V3d(0, 1, 0);
   const V3d east = (reference - along * along.dot(reference)).normalized();
@@ -178,9 +177,9 @@ V3d seenFromOutside(const SurfaceField& field, const V3d& axis, const V3d& direc
   }
   if (inner <= 0 || inner == far) {
     throw InvalidInput(
-        fmt::format("{}: the line from the axis at {} along {:.3g},{:.3g},{:.3g} meets no surface; "
+        fmt::format("the line from the axis at {} along {:.3g},{:.3g},{:.3g} meets no surface; "
                     "the axis must be inside the base, and end before the base does",
-                    kGrid, pointAsOption(axis), direction.x, direction.y, direction.z));
+                    pointAsOption(axis), direction.x, direction.y, direction.z));
   }
   for (int i = 0; i < 50; ++i) {
     const double middle = 0.5 * (inner + outer);
@@ -236,9 +235,9 @@ void requireOneSheet(const ParticleLayer& layer) {
     for (const auto& [length, place] : steps) {
       if (length <= kFarthest * sum / static_cast<double>(steps.size())) continue;
       throw InvalidInput(fmt::format(
-          "{}: seen from the axis the surface jumps at {}; move the axis or its ends so that each "
+          "seen from the axis the surface jumps at {}; move the axis or its ends so that each "
           "line from the axis meets only one sheet",
-          kGrid, pointAsOption(place)));
+          pointAsOption(place)));
     }
   }
 }
@@ -275,7 +274,7 @@ std::vector<ParticleLayer> roundLayers(const NarrowBand& base, ParticleLayer sur
     advectPoints(space, layers.back().height, layer.height, layer.positions);
     settleRound(space, layer, report);
     layers.push_back(std::move(layer));
-    levelset::report(options.progress, 0.5 + 0.5 * layer.w, kGrid);
+    levelset::report(options.progress, 0.5 + 0.5 * layer.w);
   }
   return layers;
 }
@@ -286,9 +285,9 @@ PatchGridResult makePatchGrid(const NarrowBand& base, const std::array<V3d, 4>& 
                               double height, const PatchGridOptions& grid,
                               const PatchOptions& options) {
   checkGrid(grid);
-  checkPatchOptions(kGrid, height, options);
+  checkPatchOptions(height, options);
   std::array<V3d, 4> feet;
-  for (std::size_t i = 0; i < 4; ++i) feet[i] = closestSurfacePoint(base, corners[i], kGrid);
+  for (std::size_t i = 0; i < 4; ++i) feet[i] = closestSurfacePoint(base, corners[i]);
   const LayerSize straight = {0.5 * ((feet[1] - feet[0]).length() + (feet[2] - feet[3]).length()),
                               0.5 * ((feet[3] - feet[0]).length() + (feet[2] - feet[1]).length())};
   PatchOptions whole = options;
@@ -304,24 +303,22 @@ PatchGridResult makePatchGridAround(const NarrowBand& base, const V3d& from, con
                                     double rotation, double height, const PatchGridOptions& grid,
                                     const PatchOptions& options) {
   if (base.isEmpty()) {
-    throw InvalidInput(
-        fmt::format("{}: the base has no surface; give a solid with at least one voxel", kGrid));
+    throw InvalidInput("the base has no surface; give a solid with at least one voxel");
   }
   checkGrid(grid);
-  checkPatchOptions(kGrid, height, options);
+  checkPatchOptions(height, options);
   if (grid.columns < 3)
-    throw UsageError(fmt::format("{}: {} tiles around; give at least 3", kGrid, grid.columns));
+    throw UsageError(fmt::format("{} tiles around; give at least 3", grid.columns));
   if (grid.mirrorU && grid.columns % 2 == 1) {
     throw UsageError(
-        fmt::format("{}: with --mirror u or both the number of tiles around must be even, so that "
+        fmt::format("with --mirror u or both the number of tiles around must be even, so that "
                     "the last matches the first; {} is odd",
-                    kGrid, grid.columns));
+                    grid.columns));
   }
   if (options.scheme == LayerScheme::Spline || !options.transform.isIdentity() || options.mirror) {
     throw UsageError(
-        fmt::format("{}: --particles spline, twist, taper, bend and --mirrored cannot be combined "
-                    "with tiles around an axis",
-                    kGrid));
+        "--particles spline, twist, taper, bend and --mirrored cannot be combined "
+        "with tiles around an axis");
   }
   const RoundFrame frame = roundFrame(base, from, to, rotation);
   PatchGridResult result;
@@ -335,7 +332,7 @@ PatchGridResult makePatchGridAround(const NarrowBand& base, const V3d& from, con
   result.report.uLength = size.u;
   result.report.vLength = size.v;
   result.report.cellAreaVariation = cellAreaVariation(surface);
-  levelset::report(options.progress, 0.1, kGrid);
+  levelset::report(options.progress, 0.1);
   const Sheet sheet{roundLayers(base, std::move(surface), size, height, options, result.report),
                     true, height, false, options.scheme};
   result.patches = cutTiles(sheet, grid);

@@ -25,7 +25,6 @@ using Imath::V3d;
 using levelset::InvalidInput;
 using levelset::NarrowBand;
 
-constexpr const char* kScatter = "scatter";
 // Positions tried for each requested patch.
 constexpr std::size_t kTriesPerPatch = 3;
 // A patch that fills a gap may be nearer to others by this factor than they are to each other.
@@ -55,8 +54,8 @@ PatchSite siteAt(const NarrowBand& base, const SurfacePoint& point, std::size_t 
     const V3d direction = options.direction(point.position, 0);
     if (!std::isfinite(direction.length())) {
       throw levelset::UsageError(
-          fmt::format("{}: the direction at ({:.6g}, {:.6g}, {:.6g}) is not finite", kScatter,
-                      point.position.x, point.position.y, point.position.z));
+          fmt::format("the direction at ({:.6g}, {:.6g}, {:.6g}) is not finite", point.position.x,
+                      point.position.y, point.position.z));
     }
     rotation += angleTowards(point, direction);
   }
@@ -155,7 +154,7 @@ bool isFarFrom(const SurfacePoint& point, std::span<const SurfacePoint> others, 
 }  // namespace
 
 ScatterResult scatter(const NarrowBand& base, double height, const ScatterOptions& options) {
-  checkPatchOptions(kScatter, height, options.patch);
+  checkPatchOptions(height, options.patch);
   ScatterOptions parts = options;
   parts.density.progress = levelset::subProgress(options.density.progress, 0, 0.2);
   parts.patch.progress = {};
@@ -171,7 +170,7 @@ ScatterResult scatter(const NarrowBand& base, double height, const ScatterOption
   // === The chosen positions
   std::vector<Attempt> attempts(points.wanted);
   const levelset::Progress progress = levelset::subProgress(options.density.progress, 0.4, 0.9);
-  levelset::ProgressGate gate(progress, points.wanted, kScatter);
+  levelset::ProgressGate gate(progress, points.wanted);
   tbb::parallel_for(std::size_t{0}, points.wanted, [&](std::size_t n) {
     attempts[n] = tryAt(base, points.points[n], n, height, parts);
     gate.advance(1);
@@ -196,21 +195,21 @@ ScatterResult scatter(const NarrowBand& base, double height, const ScatterOption
     if (!isFarFrom(point, taken, kGapShare * kept)) continue;
     Attempt attempt = tryAt(base, point, n, height, parts);
     take(attempt, point);
-    levelset::report(options.density.progress, 0.9, kScatter);
+    levelset::report(options.density.progress, 0.9);
   }
   if (result.patches.empty()) {
-    throw InvalidInput(fmt::format(
-        "{}: no patch could be built at any of {} positions; the first failed because: {}",
-        kScatter, result.leftOut, result.cause));
+    throw InvalidInput(
+        fmt::format("no patch could be built at any of {} positions; the first failed because: {}",
+                    result.leftOut, result.cause));
   }
   result.distance = leastDistance(taken, base.zeroSetBounds().size().length(), kept);
-  levelset::report(options.density.progress, 1, kScatter);
+  levelset::report(options.density.progress, 1);
   return result;
 }
 
 std::vector<Patch> makePatches(const NarrowBand& base, const std::vector<PatchSite>& sites,
                                double height, const PatchOptions& options) {
-  checkPatchOptions(kScatter, height, options);
+  checkPatchOptions(height, options);
   constexpr double kSweep = 0.3;
   PatchOptions sweeping = options;
   sweeping.progress = levelset::subProgress(options.progress, 0, kSweep);

@@ -20,7 +20,6 @@ namespace {
 using Imath::V3d;
 using levelset::InvalidInput;
 
-constexpr const char* kRbfCloud = "rbf map";
 // Two particles closer than this share of the cloud's size give matrix rows that are equal within
 // rounding errors.
 constexpr double kSmallestGap = 1e-9;
@@ -42,22 +41,21 @@ void checkArguments(std::span<const V3d> points, std::span<const V3d> targets,
                     std::span<const char> near, const RbfMapOptions& options) {
   for (const double lambda : {options.lambdaNear, options.lambdaFar}) {
     if (!(lambda >= 0) || !std::isfinite(lambda)) {
-      throw levelset::UsageError(
-          fmt::format("{}: λ is {}; give a relaxation of at least 0", kRbfCloud, lambda));
+      throw levelset::UsageError(fmt::format("λ is {}; give a relaxation of at least 0", lambda));
     }
   }
   if (points.size() != targets.size() || points.size() != near.size()) {
-    throw InvalidInput(fmt::format("{}: {} points, {} targets and {} flags; give equal numbers",
-                                   kRbfCloud, points.size(), targets.size(), near.size()));
+    throw InvalidInput(fmt::format("{} points, {} targets and {} flags; give equal numbers",
+                                   points.size(), targets.size(), near.size()));
   }
   if (points.empty()) {
-    throw InvalidInput(fmt::format("{}: there are no particles; give at least one", kRbfCloud));
+    throw InvalidInput("there are no particles; give at least one");
   }
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!isFinite(points[i]) || !isFinite(targets[i])) {
       throw InvalidInput(
-          fmt::format("{}: particle {} at ({}, {}, {}) is not finite; build the patch again",
-                      kRbfCloud, i, points[i].x, points[i].y, points[i].z));
+          fmt::format("particle {} at ({}, {}, {}) is not finite; build the patch again", i,
+                      points[i].x, points[i].y, points[i].z));
     }
   }
 }
@@ -167,12 +165,11 @@ void checkMerged(const Merged& merged, std::span<const V3d> points, std::span<co
     worst = std::max(worst, off);
     if (off > same) differs[merged.place[i]] = 1;
     if (off > std::max(targetSpacing, same)) {
-      throw InvalidInput(
-          fmt::format("{}: particles at ({:.6g}, {:.6g}, {:.6g}) coincide, but the texture "
-                      "coordinates ({:.6g}, {:.6g}, {:.6g}) of one differ from those of the others "
-                      "by more than neighbours do; remove one of them",
-                      kRbfCloud, points[i].x, points[i].y, points[i].z, targets[i].x, targets[i].y,
-                      targets[i].z));
+      throw InvalidInput(fmt::format(
+          "particles at ({:.6g}, {:.6g}, {:.6g}) coincide, but the texture "
+          "coordinates ({:.6g}, {:.6g}, {:.6g}) of one differ from those of the others "
+          "by more than neighbours do; remove one of them",
+          points[i].x, points[i].y, points[i].z, targets[i].x, targets[i].y, targets[i].z));
     }
   }
   std::vector<char> isTaken(merged.points.size(), 0);
@@ -236,9 +233,8 @@ RbfCloud makeRbfCloud(std::span<const V3d> points, std::span<const V3d> targets,
   const auto [targetOrigin, targetExtent] = centreOf(targets);
   if (!std::isfinite(extent) || !std::isfinite(targetExtent)) {
     throw InvalidInput(
-        fmt::format("{}: the distance between particles overflows double precision; use a larger "
-                    "unit of length",
-                    kRbfCloud));
+        "the distance between particles overflows double precision; use a larger "
+        "unit of length");
   }
   cloud.origin = origin;
   // Scaled to size 1, so that no square overflows.

@@ -21,7 +21,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Imath::V3d;
 
-constexpr const char* kKrylov = "rbf map";
 constexpr std::size_t kSolveLeaf = 128;
 constexpr Index kMostSteps = 40;  // steps between restarts
 constexpr int kMostRestarts = 30;
@@ -148,10 +147,10 @@ class KrylovSolver {
  private:
   [[noreturn]] void refuse(double worst, double tolerance) const {
     throw levelset::NumericalError(fmt::format(
-        "{}: after {} iterations for {} particles the residual stagnates at {:.3g} in texture "
+        "after {} iterations for {} particles the residual stagnates at {:.3g} in texture "
         "coordinates, but {:.3g} is required; use a larger λ, more evenly spaced particles, the "
         "biharmonic kernel or a larger tolerance",
-        kKrylov, report_.iterations, cloud_.points.size(), worst, tolerance));
+        report_.iterations, cloud_.points.size(), worst, tolerance));
   }
 
   [[nodiscard]] RbfColumns project(const RbfColumns& values) const {
@@ -199,7 +198,7 @@ class KrylovSolver {
         problems[static_cast<std::size_t>(k)].push(orthogonalize(basis, k));
       ++report_.iterations;
       const double done = static_cast<double>(report_.iterations);
-      levelset::report(options_.progress, 0.1 + 0.8 * done / (done + 20), kKrylov);
+      levelset::report(options_.progress, 0.1 + 0.8 * done / (done + 20));
     }
     return combine(searched, problems);
   }
@@ -253,7 +252,7 @@ RbfFit solveIteratively(const RbfCloud& cloud, const RbfMapOptions& options, con
   const double basis = 2.0 * kMostSteps * sizeof(double) * 3;
   constexpr double kSumBytes = 500;  // per particle, for the nodes of the fast sum
   levelset::requireMemory(n * (basis + kSumBytes) + RbfPreconditioner::estimateBytes(n),
-                          options.maxMemory, kKrylov);
+                          options.maxMemory);
   const PointTree first(cloud.points, kSolveLeaf);
   const std::vector<std::uint32_t> order(first.order().begin(), first.order().end());
   const RbfCloud ordered = inOrder(cloud, order);

@@ -16,14 +16,12 @@ namespace {
 
 using Imath::V3d;
 
-constexpr const char* kRbfMap = "rbf map";
 constexpr std::size_t kResidualChunk = 512;
 
 void checkTolerance(double tolerance) {
   if (!(tolerance > 0) || !std::isfinite(tolerance)) {
-    throw levelset::UsageError(
-        fmt::format("{}: the solver tolerance is {}; give a positive share of the texture's size",
-                    kRbfMap, tolerance));
+    throw levelset::UsageError(fmt::format(
+        "the solver tolerance is {}; give a positive share of the texture's size", tolerance));
   }
 }
 
@@ -36,7 +34,7 @@ RbfMap::RbfMap(std::span<const V3d> points, std::span<const V3d> targets,
   const RbfCloud cloud = makeRbfCloud(points, targets, near, options, solveReport_);
   origin_ = cloud.origin;
   spacing_ = cloud.spacing;
-  levelset::report(options.progress, 0.05, kRbfMap);
+  levelset::report(options.progress, 0.05);
   const RbfSolution solution = solveRbf(cloud, options, solveReport_);
   constant_ = solution.constant;
   linear_ = solution.linear;
@@ -44,9 +42,9 @@ RbfMap::RbfMap(std::span<const V3d> points, std::span<const V3d> targets,
     particles_.push_back({cloud.points[i], solution.weights[i]});
     weightNorm_.push_back(solution.weights[i].length());
   }
-  levelset::report(options.progress, 0.9, kRbfMap);
+  levelset::report(options.progress, 0.9);
   measureResidual(points, targets);
-  levelset::report(options.progress, 1, kRbfMap);
+  levelset::report(options.progress, 1);
 }
 
 V3d RbfMap::affine(const V3d& local) const {

@@ -21,7 +21,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Imath::V3d;
 
-constexpr const char* kRbfSolve = "rbf map";
 // Beyond this condition number a solution has no correct digits. Then this share of the system's
 // norm, or powers of ten of it, is added to its diagonal.
 constexpr double kWorstCondition = 1e15;
@@ -132,7 +131,7 @@ RbfColumns solveDirectly(const RbfCloud& cloud, RbfKernel kernel,
   std::vector<std::uint32_t> all(cloud.points.size());
   std::iota(all.begin(), all.end(), 0u);
   MatrixXd system = rbfMatrix(cloud, kernel, all);
-  levelset::report(progress, 0.1, kRbfSolve);
+  levelset::report(progress, 0.1);
   const auto q = polynomial.householderQ();
   system.applyOnTheLeft(q.transpose());
   system.applyOnTheRight(q);
@@ -210,7 +209,7 @@ RbfSolution solveRbf(const RbfCloud& cloud, const RbfMapOptions& options, RbfSol
     const MatrixXd q = polynomial.householderQ() * MatrixXd::Identity(n, 1 + cloud.directions);
     fit = solveIteratively(cloud, options, q, values, report);
   } else {
-    levelset::requireMemory(denseBytes, options.maxMemory, kRbfSolve);
+    levelset::requireMemory(denseBytes, options.maxMemory);
     fit.weights =
         solveDirectly(cloud, options.kernel, polynomial, values, options.progress, report);
     fit.image = multiplyDirectly(cloud, options.kernel, fit.weights);
@@ -223,9 +222,9 @@ RbfSolution solveRbf(const RbfCloud& cloud, const RbfMapOptions& options, RbfSol
   const RbfColumns& weights = fit.weights;
   if (!weights.allFinite() || !coefficients.allFinite()) {
     throw levelset::NumericalError(
-        fmt::format("{}: solving for {} particles overflowed; check the patch for particles that "
+        fmt::format("solving for {} particles overflowed; check the patch for particles that "
                     "are much closer than others",
-                    kRbfSolve, cloud.points.size()));
+                    cloud.points.size()));
   }
 
   RbfSolution solution;

@@ -25,7 +25,6 @@ using Imath::V3d;
 using levelset::InvalidInput;
 using levelset::UsageError;
 
-constexpr const char* kSpread = "scatter";
 constexpr double kCandidatesPerPoint = 20;  // [Yuksel15] uses at least five
 constexpr double kMostPoints = 1e6;
 constexpr double kOtherSide = -0.5;  // cosine between normals
@@ -79,21 +78,19 @@ class PointGrid {
 
 void checkDensity(const ScatterDensity& density) {
   if (!(density.distance >= 0) || !std::isfinite(density.distance)) {
-    throw UsageError(fmt::format("{}: the distance between points is {}; give a positive length",
-                                 kSpread, density.distance));
+    throw UsageError(
+        fmt::format("the distance between points is {}; give a positive length", density.distance));
   }
   if ((density.count > 0) == (density.distance > 0)) {
-    throw UsageError(
-        fmt::format("{}: give either the number of points or their distance", kSpread));
+    throw UsageError("give either the number of points or their distance");
   }
 }
 
 double scaleAt(const ScatterDensity& density, const V3d& place) {
   const double scale = density.scale ? density.scale(place) : 1;
   if (!(scale > 0) || !std::isfinite(scale)) {
-    throw UsageError(
-        fmt::format("{}: the scale at ({:.6g}, {:.6g}, {:.6g}) is {}; it must be positive", kSpread,
-                    place.x, place.y, place.z, scale));
+    throw UsageError(fmt::format("the scale at ({:.6g}, {:.6g}, {:.6g}) is {}; it must be positive",
+                                 place.x, place.y, place.z, scale));
   }
   return scale;
 }
@@ -169,7 +166,7 @@ Candidates makeCandidates(const AreaSampler& sampler, const ScatterDensity& dens
   Candidates result;
   std::size_t tried = 0, misses = 0;
   for (; misses < kMostMisses && result.points.size() < count; ++tried) {
-    if (tried % kReported == 0) levelset::report(density.progress, 0.5, kSpread);
+    if (tried % kReported == 0) levelset::report(density.progress, 0.5);
     SurfacePoint point = sampler(random);
     const double luck = random();
     ++misses;
@@ -179,8 +176,7 @@ Candidates makeCandidates(const AreaSampler& sampler, const ScatterDensity& dens
     result.points.push_back(point);
   }
   if (result.points.empty()) {
-    throw InvalidInput(
-        fmt::format("{}: the mask leaves no position on the surface; enlarge it", kSpread));
+    throw InvalidInput("the mask leaves no position on the surface; enlarge it");
   }
   result.area =
       sampler.area() * static_cast<double>(result.points.size()) / static_cast<double>(tried);
@@ -300,16 +296,14 @@ double leastDistance(std::span<const SurfacePoint> points, double reach, double 
 ScatteredPoints scatterPoints(const levelset::NarrowBand& base, const ScatterDensity& density) {
   checkDensity(density);
   if (base.isEmpty()) {
-    throw InvalidInput(
-        fmt::format("{}: the base has no surface; give a solid with at least one voxel", kSpread));
+    throw InvalidInput("the base has no surface; give a solid with at least one voxel");
   }
-  levelset::report(density.progress, 0, kSpread);
+  levelset::report(density.progress, 0);
   const AreaSampler sampler(base, density);
   if (!(sampler.area() > 0)) {
-    throw InvalidInput(
-        fmt::format("{}: the base has no surface; give a solid with at least one voxel", kSpread));
+    throw InvalidInput("the base has no surface; give a solid with at least one voxel");
   }
-  levelset::report(density.progress, 0.5, kSpread);
+  levelset::report(density.progress, 0.5);
   Random random(density.seed);
   double wanted = static_cast<double>(density.count);
   if (density.count == 0) {
@@ -319,18 +313,18 @@ ScatteredPoints scatterPoints(const levelset::NarrowBand& base, const ScatterDen
     wanted = std::max(1.0, makeCandidates(sampler, density, kSurvey, random).area / disc);
   }
   if (!(wanted <= kMostPoints)) {
-    throw levelset::ResourceLimit(fmt::format(
-        "{}: {:.3g} points exceed the limit of {:.0g}; {}", kSpread, wanted, kMostPoints,
-        density.count > 0 ? "give a smaller count" : "give a larger distance"));
+    throw levelset::ResourceLimit(
+        fmt::format("{:.3g} points exceed the limit of {:.0g}; {}", wanted, kMostPoints,
+                    density.count > 0 ? "give a smaller count" : "give a larger distance"));
   }
   constexpr double kNeighbours = 70,  // of a candidate
       kBytesPerNeighbour = 16;
   levelset::requireMemory(
       wanted * kCandidatesPerPoint * (sizeof(SurfacePoint) + kNeighbours * kBytesPerNeighbour),
-      density.maxMemory, kSpread);
+      density.maxMemory);
   const Candidates candidates = makeCandidates(
       sampler, density, static_cast<std::size_t>(wanted * kCandidatesPerPoint) + 50, random);
-  levelset::report(density.progress, 0.7, kSpread);
+  levelset::report(density.progress, 0.7);
   ScatteredPoints result;
   double reach = 2 * density.distance;
   if (density.count == 0) {
@@ -343,7 +337,7 @@ ScatteredPoints scatterPoints(const levelset::NarrowBand& base, const ScatterDen
   }
   result.distance =
       leastDistance(std::span(result.points).first(result.wanted), reach, 0.5 * reach);
-  levelset::report(density.progress, 1, kSpread);
+  levelset::report(density.progress, 1);
   return result;
 }
 

@@ -36,40 +36,38 @@ V3d nearestFoot(const levelset::NarrowBand& base, const V3d& point) {
   return levelset::toImath(grid.indexToWorld(nearest));
 }
 
-[[noreturn]] void failBrokenOff(const V3d& foot, const V3d& point, const char* action) {
+[[noreturn]] void failBrokenOff(const V3d& foot, const V3d& point) {
   throw levelset::InvalidInput(fmt::format(
-      "{}: the surface breaks off at about ({:.6g}, {:.6g}, {:.6g}), before the point ({:.6g}, "
+      "the surface breaks off at about ({:.6g}, {:.6g}, {:.6g}), before the point ({:.6g}, "
       "{:.6g}, {:.6g}); choose a point further inside its border",
-      action, foot.x, foot.y, foot.z, point.x, point.y, point.z));
+      foot.x, foot.y, foot.z, point.x, point.y, point.z));
 }
 
 }  // namespace
 
-V3d closestSurfacePoint(const levelset::NarrowBand& base, const V3d& point, const char* action) {
+V3d closestSurfacePoint(const levelset::NarrowBand& base, const V3d& point) {
   const auto at = [&] {
     return fmt::format("({:.6g}, {:.6g}, {:.6g})", point.x, point.y, point.z);
   };
   if (!std::isfinite(point.x) || !std::isfinite(point.y) || !std::isfinite(point.z)) {
-    throw levelset::UsageError(fmt::format("{}: the point {} is not finite", action, at()));
+    throw levelset::UsageError(fmt::format("the point {} is not finite", at()));
   }
   if (base.isEmpty()) {
-    throw levelset::InvalidInput(
-        fmt::format("{}: the base has no surface; give a solid with at least one voxel", action));
+    throw levelset::InvalidInput("the base has no surface; give a solid with at least one voxel");
   }
   const SurfaceField field(base);
   V3d foot = point;
   if (!field.project(foot, 0)) {
     if (base.zeroSetBounds().isEmpty()) {
-      throw levelset::InvalidInput(
-          fmt::format("{}: the base has no surface; give a solid with at least one voxel", action));
+      throw levelset::InvalidInput("the base has no surface; give a solid with at least one voxel");
     }
     foot = nearestFoot(base, point);
     if (!field.project(foot, 0)) {
-      if (base.isOpenSurface()) failBrokenOff(foot, point, action);
-      throw levelset::InvalidInput(fmt::format(
-          "{}: the field near ({:.6g}, {:.6g}, {:.6g}), nearest to the point {}, is not a "
-          "distance field; re-distance the base first",
-          action, foot.x, foot.y, foot.z, at()));
+      if (base.isOpenSurface()) failBrokenOff(foot, point);
+      throw levelset::InvalidInput(
+          fmt::format("the field near ({:.6g}, {:.6g}, {:.6g}), nearest to the point {}, is not a "
+                      "distance field; re-distance the base first",
+                      foot.x, foot.y, foot.z, at()));
     }
   }
   // Gradient descent of the distance to `point` along the surface; steps are halved when one fails.
@@ -92,17 +90,17 @@ V3d closestSurfacePoint(const levelset::NarrowBand& base, const V3d& point, cons
     constexpr double kBeyondVoxels = 1, kSlant = 0.02;
     const double along = (offset - normal * offset.dot(normal)).length();
     if (along > kBeyondVoxels * base.voxelSize() && along > kSlant * offset.length())
-      failBrokenOff(foot, point, action);
+      failBrokenOff(foot, point);
   }
   const double distance = (point - foot).length();
   // Within the band the result is certain; the bounding box would visit every voxel.
   if (distance <= base.halfWidth() * base.voxelSize()) return foot;
   const double diagonal = base.zeroSetBounds().size().length();
   if (distance > diagonal) {
-    throw levelset::InvalidInput(fmt::format(
-        "{}: the point {} is {:.6g} away from the surface, more than the diagonal {:.6g} "
-        "of its bounding box; give a point near the base",
-        action, at(), distance, diagonal));
+    throw levelset::InvalidInput(
+        fmt::format("the point {} is {:.6g} away from the surface, more than the diagonal {:.6g} "
+                    "of its bounding box; give a point near the base",
+                    at(), distance, diagonal));
   }
   return foot;
 }

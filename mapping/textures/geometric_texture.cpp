@@ -40,52 +40,46 @@ void checkArguments(const NarrowBand& base, const NarrowBand& texture,
                     std::span<const Patch> patches, const TextureOptions& options) {
   const auto requirePositive = [](double value, const char* name) {
     if (!(value > 0) || !std::isfinite(value)) {
-      throw UsageError(
-          fmt::format("{}: the {} is {}; give a positive number", kTextureAction, name, value));
+      throw UsageError(fmt::format("the {} is {}; give a positive number", name, value));
     }
   };
   if (options.voxelSize) requirePositive(*options.voxelSize, "voxel size");
   if (!(options.halfWidth >= 1) || !std::isfinite(options.halfWidth)) {
-    throw UsageError(fmt::format("{}: the half width is {}; give at least 1 voxel", kTextureAction,
-                                 options.halfWidth));
+    throw UsageError(fmt::format("the half width is {}; give at least 1 voxel", options.halfWidth));
   }
   if (!(options.mapTolerance >= 0) || !std::isfinite(options.mapTolerance)) {
-    throw UsageError(fmt::format("{}: the map's tolerance is {}; give texture voxels, at least 0",
-                                 kTextureAction, options.mapTolerance));
+    throw UsageError(fmt::format("the map's tolerance is {}; give texture voxels, at least 0",
+                                 options.mapTolerance));
   }
   if (options.embedDepth && !std::isfinite(*options.embedDepth)) {
-    throw UsageError(fmt::format("{}: the embedding depth is {}; give a length with --embed",
-                                 kTextureAction, *options.embedDepth));
+    throw UsageError(
+        fmt::format("the embedding depth is {}; give a length with --embed", *options.embedDepth));
   }
   const double diagonal = base.zeroSetBounds().size().length();
   if (options.embedDepth && std::abs(*options.embedDepth) > diagonal) {
     throw InvalidInput(
-        fmt::format("{}: the embedding depth of {:.6g} exceeds the diagonal of the base, {:.6g}; "
+        fmt::format("the embedding depth of {:.6g} exceeds the diagonal of the base, {:.6g}; "
                     "give a smaller --embed",
-                    kTextureAction, *options.embedDepth, diagonal));
+                    *options.embedDepth, diagonal));
   }
   if (!(options.blend >= 0) || !std::isfinite(options.blend)) {
-    throw UsageError(fmt::format("{}: the blend radius is {}; give a length of at least 0",
-                                 kTextureAction, options.blend));
+    throw UsageError(
+        fmt::format("the blend radius is {}; give a length of at least 0", options.blend));
   }
   if (options.merge != TextureMerge::Alone && base.isOpenSurface()) {
     throw levelset::InvalidInput(
-        fmt::format("{}: the base is an open surface, which has no inside; give --alone for the "
-                    "texture alone, or map a mesh with --map mesh",
-                    kTextureAction));
+        "the base is an open surface, which has no inside; give --alone for the "
+        "texture alone, or map a mesh with --map mesh");
   }
-  requireSolid(texture, kTextureAction);
+  requireSolid(texture);
   if (base.isEmpty() || texture.isEmpty()) {
-    throw InvalidInput(
-        fmt::format("{}: the {} has no surface; give a solid with at least one voxel",
-                    kTextureAction, base.isEmpty() ? "base" : "texture"));
+    throw InvalidInput(fmt::format("the {} has no surface; give a solid with at least one voxel",
+                                   base.isEmpty() ? "base" : "texture"));
   }
-  if (patches.empty())
-    throw UsageError(fmt::format("{}: there is no patch; build one with `patch`", kTextureAction));
+  if (patches.empty()) throw UsageError("there is no patch; build one with `patch`");
   for (const Patch& patch : patches) {
     if (patch.layers.size() < 2 || !(patch.height > 0)) {
-      throw InvalidInput(fmt::format(
-          "{}: the patch has no layers of particles; build it with `patch`", kTextureAction));
+      throw InvalidInput("the patch has no layers of particles; build it with `patch`");
     }
     requirePatchOn(base, patch);
   }
@@ -118,9 +112,9 @@ NarrowBand fitTexture(const NarrowBand& texture, double voxelSize, double least,
     fitted = levelset::resample(texture, coarsest, {.maxMemory = options.maxMemory});
     if (fitted.isEmpty()) {
       throw InvalidInput(
-          fmt::format("{}: on the patch the texture is smaller than a voxel of {:.6g}; use "
+          fmt::format("on the patch the texture is smaller than a voxel of {:.6g}; use "
                       "smaller voxels",
-                      kTextureAction, voxelSize));
+                      voxelSize));
     }
   }
   const double needed = kTextureBandNeeded * voxelSize / (least * fitted.voxelSize());
@@ -194,13 +188,13 @@ void requireResult(const NarrowBand& texture, const TextureReport& report,
   if (bytes > static_cast<double>(options.maxMemory) && !options.voxelSize &&
       worst.stretch.least < kSqueezed * worst.stretch.median) {
     const V3d& p = worst.foldPoint;
-    throw levelset::ResourceLimit(fmt::format(
-        "{}: the map compresses the texture to {:.2g} of its size near ({:.6g}, "
-        "{:.6g}, {:.6g}); voxels fine enough for that, {:.3g}, need about {:.3g} GB; "
-        "give --voxel, a lower height or a flatter position",
-        kTextureAction, worst.stretch.least, p.x, p.y, p.z, report.voxelSize, bytes / 1e9));
+    throw levelset::ResourceLimit(
+        fmt::format("the map compresses the texture to {:.2g} of its size near ({:.6g}, "
+                    "{:.6g}, {:.6g}); voxels fine enough for that, {:.3g}, need about {:.3g} GB; "
+                    "give --voxel, a lower height or a flatter position",
+                    worst.stretch.least, p.x, p.y, p.z, report.voxelSize, bytes / 1e9));
   }
-  levelset::requireMemory(bytes, options.maxMemory, kTextureAction);
+  levelset::requireMemory(bytes, options.maxMemory);
 }
 
 /// Range of the maps' stretch, for the choice of voxels and of the texture's band.
@@ -351,9 +345,9 @@ void requirePatchOn(const NarrowBand& base, const Patch& patch) {
     const double distance = std::abs(sampler.value(p)) / base.voxelSize();
     if (distance > 1) {
       throw InvalidInput(fmt::format(
-          "{}: the patch does not lie on the base: at ({:.6g}, {:.6g}, {:.6g}) the surface is "
+          "the patch does not lie on the base: at ({:.6g}, {:.6g}, {:.6g}) the surface is "
           "at least {:.3g} voxels away; build the patch on this base",
-          kTextureAction, p.x, p.y, p.z, distance));
+          p.x, p.y, p.z, distance));
     }
   }
 }
@@ -395,7 +389,7 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
   result.band = timed(report.cost.merging, [&] {
     return merge(base, join(std::move(pieces), options), options, report);
   });
-  levelset::report(options.progress, 1, kTextureAction);
+  levelset::report(options.progress, 1);
   return result;
 }
 

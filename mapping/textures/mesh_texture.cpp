@@ -20,8 +20,6 @@ using Imath::V3d;
 
 namespace {
 
-constexpr const char* kMapMesh = "texture";
-
 /// Memory per vertex of a mesh with the given attributes, bytes.
 double bytesPerVertex(const levelset::TriMesh& mesh) {
   const levelset::MeshAttributes& held = mesh.attributes;
@@ -41,7 +39,7 @@ void moveVertices(const levelset::TriMesh& texture, const Patch& patch,
                   levelset::TriMesh& mesh) {
   const V3d perSize = V3d(1) / placement.box.size();
   const double hand = patch.mirrored ? -1 : 1;
-  levelset::ProgressGate gate(progress, mesh.positions.size(), kMapMesh);
+  levelset::ProgressGate gate(progress, mesh.positions.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.positions.size(), 4096),
                     [&](const auto& range) {
                       for (std::size_t i = range.begin(); i != range.end(); ++i) {
@@ -73,17 +71,15 @@ void noteLostNormals(MeshTextureResult& result) {
 MeshTextureResult mapOnto(const levelset::TriMesh& texture, const Patch& patch,
                           const MeshTextureOptions& options) {
   if (!std::isfinite(options.embedDepth)) {
-    throw levelset::UsageError(fmt::format(
-        "{}: the embedding depth is {}; give a length with --embed", kMapMesh, options.embedDepth));
+    throw levelset::UsageError(
+        fmt::format("the embedding depth is {}; give a length with --embed", options.embedDepth));
   }
   if (texture.isEmpty()) {
-    throw levelset::InvalidInput(
-        fmt::format("{}: the mesh has no triangles; give a mesh with triangles", kMapMesh));
+    throw levelset::InvalidInput("the mesh has no triangles; give a mesh with triangles");
   }
-  requireAttributes(texture, kMapMesh);
+  requireAttributes(texture);
   if (patch.layers.size() < 2 || !(patch.height > 0)) {
-    throw levelset::InvalidInput(
-        fmt::format("{}: the patch has no layers of particles; build it with `patch`", kMapMesh));
+    throw levelset::InvalidInput("the patch has no layers of particles; build it with `patch`");
   }
   const double embedDepth = options.embedDepth / patch.height;
   const TexturePlacement placement{chooseTextureBox(levelset::bounds(texture), options.textureBox),
@@ -94,8 +90,8 @@ MeshTextureResult mapOnto(const levelset::TriMesh& texture, const Patch& patch,
       kSampleBytes * static_cast<double>(patch.particleCount()) +
           (16 + bytesPerVertex(texture)) * static_cast<double>(texture.positions.size()) +
           12 * static_cast<double>(texture.triangles.size()),
-      options.maxMemory, kMapMesh);
-  levelset::report(options.progress, 0, kMapMesh);
+      options.maxMemory);
+  levelset::report(options.progress, 0);
   result.distortion =
       surveyDistortion(sampleLayerMap(patch, embedDepth), placement.box.size(), patch.mirrored);
   result.certificate = certifyLayers(patch, embedDepth);
@@ -127,18 +123,17 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, const Patch& patch,
 
 MeshTextureResult mapMesh(const levelset::TriMesh& texture, std::span<const Patch> patches,
                           const MeshTextureOptions& options) {
-  if (patches.empty())
-    throw levelset::UsageError("texture: there is no patch; build one with `patch`");
+  if (patches.empty()) throw levelset::UsageError("there is no patch; build one with `patch`");
   if (patches.size() * texture.positions.size() > std::numeric_limits<std::uint32_t>::max()) {
     throw levelset::ResourceLimit(fmt::format(
-        "texture: {} patches of {} vertices exceed the vertex limit of a mesh; give fewer patches",
+        "{} patches of {} vertices exceed the vertex limit of a mesh; give fewer patches",
         patches.size(), texture.positions.size()));
   }
   levelset::requireMemory(
       static_cast<double>(patches.size()) *
           (bytesPerVertex(texture) * static_cast<double>(texture.positions.size()) +
            12 * static_cast<double>(texture.triangles.size())),
-      options.maxMemory, kMapMesh);
+      options.maxMemory);
   MeshTextureResult result;
   std::vector<Distortion> distortions;
   std::vector<FoldCertificate> certificates;
@@ -161,7 +156,7 @@ MeshTextureResult mapMesh(const levelset::TriMesh& texture, std::span<const Patc
   }
   if (distortions.empty()) {
     throw levelset::InvalidInput(fmt::format(
-        "texture: all of {} patches fold; use a lower height or smaller patches", patches.size()));
+        "all of {} patches fold; use a lower height or smaller patches", patches.size()));
   }
   result.skipped = patches.size() - distortions.size();
   if (result.skipped > 0) {

@@ -30,8 +30,8 @@ double solveTolerance(const NarrowBand& texture, const V3d& boxSize, double mapT
 
 std::unique_ptr<PrismMap> buildPrismMap(const NarrowBand& base, const Patch& patch,
                                         double embedDepth, const TextureOptions& options) {
-  levelset::requireMemory(PrismMap::estimateBytes(patch), options.maxMemory, kTextureAction);
-  levelset::report(options.progress, 0, kTextureAction);
+  levelset::requireMemory(PrismMap::estimateBytes(patch), options.maxMemory);
+  levelset::report(options.progress, 0);
   // Margin for the texture's band, which extends beyond the texture.
   const double rim =
       (kTextureBandNeeded + 1) * std::max(base.voxelSize(), options.voxelSize.value_or(0));
@@ -93,10 +93,10 @@ void addSolve(const RbfSolveReport& one, TextureReport& report) {
 std::string overlapMessage(const ChosenMap& map) {
   const V3d &p = map.overlap.position, &uvw = map.overlap.uvw;
   return fmt::format(
-      "{}: the patch passes through itself at {} of {} sample points, one at ({:.6g}, {:.6g}, "
+      "the patch passes through itself at {} of {} sample points, one at ({:.6g}, {:.6g}, "
       "{:.6g}), u, v, w = {:.3g}, {:.3g}, {:.3g}, where the texture would have two values; keep "
       "its spline clear of itself, use a lower height, or map its halves one after the other",
-      kTextureAction, map.overlaps, map.distortion.samples, p.x, p.y, p.z, uvw.x, uvw.y, uvw.z);
+      map.overlaps, map.distortion.samples, p.x, p.y, p.z, uvw.x, uvw.y, uvw.z);
 }
 
 /// Figures of the maps built so far.
@@ -140,8 +140,7 @@ void reportMaps(const MapFigures& figures, std::size_t patches, TextureReport& r
   report.patches = figures.distortions.size();
   if (figures.distortions.empty()) {
     throw InvalidInput(
-        fmt::format("{}: all of {} patches fold; use a lower height or smaller patches",
-                    kTextureAction, patches));
+        fmt::format("all of {} patches fold; use a lower height or smaller patches", patches));
   }
   if (figures.extrapolated > 0) {
     report.notes.push_back(

@@ -12,7 +12,6 @@
 
 namespace mapping {
 
-inline constexpr const char* kTextureAction = "texture";
 /// Result voxels that the texture's band must extend on each side, so that the high-order
 /// interpolant at the zero set reads only distances.
 inline constexpr double kTextureBandNeeded = 3;

@@ -12,23 +12,18 @@ using Imath::Box3d;
 using Imath::V3d;
 using levelset::InvalidInput;
 
-namespace {
-constexpr const char* kAction = "texture";
-}
-
 Box3d chooseTextureBox(const Box3d& own, const std::optional<Box3d>& given) {
   const Box3d box = given ? *given : own;
   const V3d size = box.isEmpty() ? V3d(0) : box.size();
   if (!(size.x > 0 && size.y > 0 && size.z > 0) || !std::isfinite(size.x * size.y * size.z)) {
     throw InvalidInput(
-        fmt::format("{}: the texture box has no volume: its size is {:.6g} × {:.6g} × "
+        fmt::format("the texture box has no volume: its size is {:.6g} × {:.6g} × "
                     "{:.6g}; give a low and a high corner",
-                    kAction, size.x, size.y, size.z));
+                    size.x, size.y, size.z));
   }
   if (given && !box.intersects(own)) {
-    throw InvalidInput(fmt::format(
-        "{}: the texture box contains nothing of the texture; give a box that meets its surface",
-        kAction));
+    throw InvalidInput(
+        "the texture box contains nothing of the texture; give a box that meets its surface");
   }
   return box;
 }
@@ -67,8 +62,8 @@ std::vector<std::string> checkFolds(const Distortion& distortion,
                         certificate.undecidedShare)};
   std::string sentence = foldSentence(distortion, certificate);
   if (!areAllowed) {
-    throw InvalidInput(fmt::format("{}: {}; give --untangle, a lower height or a flatter position",
-                                   kAction, sentence));
+    throw InvalidInput(
+        fmt::format("{}; give --untangle, a lower height or a flatter position", sentence));
   }
   return {std::move(sentence)};
 }

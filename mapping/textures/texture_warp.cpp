@@ -29,7 +29,6 @@ using openvdb::Coord;
 using openvdb::CoordBBox;
 using LeafNode = openvdb::FloatTree::LeafNodeType;
 
-constexpr const char* kWarp = "texture";
 constexpr int kRootEdge = 64;  // grid points along a block at the top of the hierarchy
 constexpr double kLeafBytes = sizeof(LeafNode) + LeafNode::SIZE * sizeof(float);
 
@@ -153,7 +152,7 @@ class TextureWarp {
         occupancy_(levelset::vdb(texture)),
         textureBackground_(texture.halfWidth() * texture.voxelSize()),
         ghostDistance_(1.5 * longestCellEdge(patch)) {
-    transform_ = levelset::transformOf(options.indexToWorld, "texture");
+    transform_ = levelset::transformOf(options.indexToWorld);
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) step_[i][j] = options.indexToWorld[i][j];
     const V3d size = placement.box.size();
@@ -167,7 +166,7 @@ class TextureWarp {
 
     const std::vector<Block> roots = rootBlocks();
     std::vector<Piece> pieces(roots.size());
-    levelset::ProgressGate gate(options_.progress, 8 * roots.size(), kWarp);
+    levelset::ProgressGate gate(options_.progress, 8 * roots.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, roots.size(), 1), [&](const auto& range) {
       for (std::size_t n = range.begin(); n != range.end(); ++n)
         pieces[n] = descendRoot(roots[n], gate);
@@ -186,9 +185,8 @@ class TextureWarp {
       warp.mapError = std::max(warp.mapError, piece.mapError);
     }
     if (warp.blocksEvaluated == 0) {
-      throw levelset::InvalidInput(fmt::format(
-          "{}: no part of the texture falls into the patch; check --texture-box and --embed",
-          kWarp));
+      throw levelset::InvalidInput(
+          "no part of the texture falls into the patch; check --texture-box and --embed");
     }
     warp.crumbs = dropCrumbs(*grid);
     warp.field = levelset::makeBand(grid);
@@ -257,12 +255,12 @@ class TextureWarp {
       count *= box.extents()[axis] / kRootEdge + 2;
       if (!(std::abs(box.min()[axis]) < kMostIndex) || !(std::abs(box.max()[axis]) < kMostIndex)) {
         throw levelset::ResourceLimit(
-            fmt::format("{}: with a voxel size of {:.3g} the grid exceeds the range of 32-bit "
+            fmt::format("with a voxel size of {:.3g} the grid exceeds the range of 32-bit "
                         "indices; use larger voxels",
-                        kWarp, transform_->voxelSize()[0]));
+                        transform_->voxelSize()[0]));
       }
     }
-    levelset::requireMemory(count * (sizeof(Block) + sizeof(Piece)), options_.maxMemory, kWarp);
+    levelset::requireMemory(count * (sizeof(Block) + sizeof(Piece)), options_.maxMemory);
     std::vector<Block> blocks;
     const Coord low = Coord::floor(box.min()) & ~(kRootEdge - 1), high = Coord::ceil(box.max());
     for (int x = low.x(); x <= high.x(); x += kRootEdge)
@@ -328,7 +326,7 @@ class TextureWarp {
 
   void requireLeaves(std::size_t count) const {
     // The field, its copy while distances are restored, and the result.
-    levelset::requireMemory(static_cast<double>(count) * 3 * kLeafBytes, options_.maxMemory, kWarp);
+    levelset::requireMemory(static_cast<double>(count) * 3 * kLeafBytes, options_.maxMemory);
   }
 
   Meets testBlock(const Block& block, const BlockMap& map, const Samplers& samplers) const {

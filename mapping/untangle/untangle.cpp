@@ -23,43 +23,39 @@ using Imath::V3d;
 using levelset::InvalidInput;
 using levelset::NarrowBand;
 
-void checkInput(const NarrowBand& base, const Patch& patch, const UntangleOptions& options,
-                const char* action) {
+void checkInput(const NarrowBand& base, const Patch& patch, const UntangleOptions& options) {
   if (patch.layers.size() < 2 || !(patch.height > 0)) {
-    throw InvalidInput(
-        fmt::format("{}: the patch has no layers of particles; build it with `patch`", action));
+    throw InvalidInput("the patch has no layers of particles; build it with `patch`");
   }
   if (!std::isfinite(options.embedDepth)) {
-    throw levelset::UsageError(fmt::format(
-        "{}: the embedding depth is {}; give a length with --embed", action, options.embedDepth));
+    throw levelset::UsageError(
+        fmt::format("the embedding depth is {}; give a length with --embed", options.embedDepth));
   }
   if (options.proportions) {
     const V3d& p = *options.proportions;
     const double volume = p.x * p.y * p.z;
     if (!(p.x > 0 && p.y > 0 && p.z > 0 && volume > 0) || !std::isfinite(volume)) {
-      throw levelset::UsageError(
-          fmt::format("{}: the proportions are {} × {} × {}; give three positive lengths", action,
-                      p.x, p.y, p.z));
+      throw levelset::UsageError(fmt::format(
+          "the proportions are {} × {} × {}; give three positive lengths", p.x, p.y, p.z));
     }
   }
   for (const ParticleLayer& layer : patch.layers)
     for (const V3d& p : layer.positions)
       if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
-        throw InvalidInput(
-            fmt::format("{}: the particle at ({}, {}, {}) is not finite; build the patch again",
-                        action, p.x, p.y, p.z));
+        throw InvalidInput(fmt::format(
+            "the particle at ({}, {}, {}) is not finite; build the patch again", p.x, p.y, p.z));
       }
   const SurfaceField field(base);
   for (const V3d& p : patch.layers.front().positions) {
     const double distance = std::abs(field.value(p)) / base.voxelSize();
     if (!(distance <= 1)) {
       throw InvalidInput(
-          fmt::format("{}: the patch does not lie on the base: at ({:.6g}, {:.6g}, {:.6g}) the "
+          fmt::format("the patch does not lie on the base: at ({:.6g}, {:.6g}, {:.6g}) the "
                       "surface is at least {:.3g} voxels away; build the patch on this base",
-                      action, p.x, p.y, p.z, distance));
+                      p.x, p.y, p.z, distance));
     }
   }
-  levelset::requireMemory(PrismElements::estimateBytes(patch), options.maxMemory, action);
+  levelset::requireMemory(PrismElements::estimateBytes(patch), options.maxMemory);
 }
 
 /// Constraints of all particles: those above the surface are free; those on it slide, except on
@@ -171,8 +167,7 @@ std::size_t removeFolds(PrismSolver& solver, const UntangleOptions& options,
   int stuck = 0;
   while (iterations < options.mostIterations && stuck < kMostStuck) {
     levelset::report(options.progress,
-                     static_cast<double>(iterations) / static_cast<double>(options.mostIterations),
-                     "untangle");
+                     static_cast<double>(iterations) / static_cast<double>(options.mostIterations));
     const auto density = [epsilon](const ElementSlopes& f) { return foldoverEnergy(f, epsilon); };
     const double energy = solver.energy(density);
     const std::size_t taken = solver.minimise(density, kRound);
@@ -251,7 +246,7 @@ FoldCount countFolds(const Patch& patch, double embedDepth) {
 }
 
 Untangling untangle(const NarrowBand& base, const Patch& patch, const UntangleOptions& options) {
-  checkInput(base, patch, options, "untangle");
+  checkInput(base, patch, options);
   const PrismElements elements(patch, options.proportions.value_or(meanExtents(patch)),
                                options.embedDepth);
   const std::vector<V3d> start = particlePositions(patch);
@@ -281,16 +276,15 @@ Untangling untangle(const NarrowBand& base, const Patch& patch, const UntangleOp
 
 DistortionGain minimiseDistortion(const NarrowBand& base, const Patch& patch,
                                   const UntangleOptions& options) {
-  constexpr const char* kRelax = "relax";
-  checkInput(base, patch, options, kRelax);
+  checkInput(base, patch, options);
   const PrismElements elements(patch, options.proportions.value_or(sideLengths(patch)),
                                options.embedDepth);
   const std::vector<V3d> start = particlePositions(patch);
   const FoldCount folds = foldsAt(patch, elements, options.embedDepth, start);
   if (folds.folded > 0) {
     throw InvalidInput(
-        fmt::format("{}: the patch folds in {} of {} cells of its particles; untangle it first",
-                    kRelax, folds.folded, folds.cells));
+        fmt::format("the patch folds in {} of {} cells of its particles; untangle it first",
+                    folds.folded, folds.cells));
   }
   DistortionGain result;
   result.before = distortionAt(elements, start);
@@ -298,10 +292,8 @@ DistortionGain minimiseDistortion(const NarrowBand& base, const Patch& patch,
   std::vector<V3d> found = start;
   constexpr std::size_t kRound = 20;
   while (result.iterations < options.mostIterations) {
-    levelset::report(
-        options.progress,
-        static_cast<double>(result.iterations) / static_cast<double>(options.mostIterations),
-        kRelax);
+    levelset::report(options.progress, static_cast<double>(result.iterations) /
+                                           static_cast<double>(options.mostIterations));
     const std::size_t wanted = std::min(kRound, options.mostIterations - result.iterations);
     const double scale = bestRestScale(elements, found);
     const auto density = [scale](const ElementSlopes& f) { return scaledDirichlet(f, scale); };

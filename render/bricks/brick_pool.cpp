@@ -87,7 +87,7 @@ class Table {
     if (first < 0) {
       if (pool_.entry.size() > kMostValues - kEntriesOfPage)
         throw levelset::ResourceLimit(
-            "render: the surface is spread over more table pages than an index can address; use "
+            "the surface is spread over more table pages than an index can address; use "
             "larger voxels, or draw its parts separately");
       first = static_cast<std::int32_t>(pool_.entry.size());
       pool_.entry.resize(pool_.entry.size() + BrickPool::kBlocksOfPage, -BrickPool::kBlock);
@@ -142,9 +142,9 @@ void fillPool(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks
       hold(table.slotOf(block.origin), held + (block.isInside ? BrickPool::kBlock : 0), 0, 0);
   held += 2 * BrickPool::kBlock;
   if (held > kMostValues) {
-    throw levelset::ResourceLimit(fmt::format(
-        "render: the surface needs {} values, but at most {} are supported; use larger voxels",
-        held, kMostValues));
+    throw levelset::ResourceLimit(
+        fmt::format("the surface needs {} values, but at most {} are supported; use larger voxels",
+                    held, kMostValues));
   }
   markEmptyCubes(pool);
   pool.value.resize(bricks.size() * BrickPool::kValues);
@@ -183,7 +183,7 @@ void requireNarrow(const openvdb::CoordBBox& crossed) {
         static_cast<double>(crossed.max()[a]) - crossed.min()[a] + BrickPool::kBlock;
   if (*std::max_element(spans.begin(), spans.end()) <= kWidest) return;
   throw levelset::ResourceLimit(
-      fmt::format("render: the surface spans {:.6g} x {:.6g} x {:.6g} voxels, but at most {:.0f} "
+      fmt::format("the surface spans {:.6g} x {:.6g} x {:.6g} voxels, but at most {:.0f} "
                   "are supported in "
                   "single precision; draw with --renderer embree, use larger voxels, or draw its "
                   "parts separately",

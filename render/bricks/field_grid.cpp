@@ -143,7 +143,7 @@ FieldGrid::FieldGrid(const levelset::NarrowBand& band) {
     const double span = static_cast<double>(box.max()[a]) - box.min()[a];
     if (span > kWidestField)
       throw levelset::ResourceLimit(
-          fmt::format("render: a band spans {:.0f} voxels along an axis, but at most {:.0f} are "
+          fmt::format("a band spans {:.0f} voxels along an axis, but at most {:.0f} are "
                       "supported; use larger voxels",
                       span, kWidestField));
     const auto i = static_cast<std::size_t>(a);

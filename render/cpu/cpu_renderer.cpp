@@ -8,7 +8,7 @@
 namespace render {
 Image renderCpu(const Scene& scene, const RenderOptions& options) {
   requirePicture(scene, options);
-  levelset::report(options.progress, 0, "render");
+  levelset::report(options.progress, 0);
   const KernelScene surfaces(scene, options);
   if (surfaces.bounds().isEmpty()) refuseEmptyScene();
   constexpr int kCpuTile = 16;  // pixels

@@ -82,7 +82,7 @@ struct PixelPainter {
 
 Image renderEmbree(const Scene& scene, const RenderOptions& options) {
   requirePicture(scene, options);
-  levelset::report(options.progress, 0, "render");
+  levelset::report(options.progress, 0);
   const EmbreeScene rays(scene, options.filter);
   if (rays.bounds().isEmpty()) refuseEmptyScene();
   const Camera& camera = scene.camera;
@@ -97,7 +97,7 @@ Image renderEmbree(const Scene& scene, const RenderOptions& options) {
     for (int y = top; y < std::min(top + kTile, camera.height); ++y)
       for (int x = left; x < std::min(left + kTile, camera.width); ++x) painter.paint(x, y);
     const std::scoped_lock lock(reporting);
-    levelset::report(options.progress, static_cast<double>(++done) / (across * down), "render");
+    levelset::report(options.progress, static_cast<double>(++done) / (across * down));
   });
   image.attributes = sceneAttributes(scene, options);
   image.attributes["ls:renderer"] = fmt::format("embree {}", RTC_VERSION_STRING);

@@ -163,7 +163,7 @@ void requireRay(const V3d& origin, const V3d& direction) {
   const double sum = origin.x + origin.y + origin.z + direction.x + direction.y + direction.z;
   if (std::isfinite(sum) && direction != V3d(0)) return;
   throw levelset::UsageError(
-      fmt::format("render: a ray from {},{},{} along {},{},{} has no direction or is not finite; "
+      fmt::format("a ray from {},{},{} along {},{},{} has no direction or is not finite; "
                   "give finite numbers and "
                   "a nonzero direction",
                   origin.x, origin.y, origin.z, direction.x, direction.y, direction.z));

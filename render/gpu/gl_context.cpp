@@ -44,13 +44,12 @@ struct GlContext::Egl {
   Egl() {
     library = dlopen("libEGL.so.1", RTLD_NOW | RTLD_LOCAL);
     if (!library) {
-      throw NoOpenGl(fmt::format("render: EGL is not available ({}); {}", dlerror(), kRemedy));
+      throw NoOpenGl(fmt::format("EGL is not available ({}); {}", dlerror(), kRemedy));
     }
     const auto load = [&](auto& function, const char* name) {
       function =
           reinterpret_cast<std::remove_reference_t<decltype(function)>>(dlsym(library, name));
-      if (!function)
-        throw NoOpenGl(fmt::format("render: EGL has no function {}; {}", name, kRemedy));
+      if (!function) throw NoOpenGl(fmt::format("EGL has no function {}; {}", name, kRemedy));
     };
     load(getProcAddress, "eglGetProcAddress");
     load(queryString, "eglQueryString");
@@ -66,8 +65,7 @@ struct GlContext::Egl {
     getPlatformDisplay = reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(
         getProcAddress("eglGetPlatformDisplayEXT"));
     if (!getPlatformDisplay)
-      throw NoOpenGl(
-          fmt::format("render: EGL does not support contexts without a window; {}", kRemedy));
+      throw NoOpenGl(fmt::format("EGL does not support contexts without a window; {}", kRemedy));
   }
   // The library is not unloaded: drivers leave threads and handlers that outlive the context.
   ~Egl() { close(); }
@@ -90,7 +88,7 @@ struct GlContext::Egl {
     if (openOn(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, "no surface")) return;
     for (EGLDeviceEXT device : software)
       if (openOn(EGL_PLATFORM_DEVICE_EXT, device, "a software device")) return;
-    throw NoOpenGl(fmt::format("render: OpenGL 4.5 is not available ({}); {}", tried, kRemedy));
+    throw NoOpenGl(fmt::format("OpenGL 4.5 is not available ({}); {}", tried, kRemedy));
   }
 
   void listDevices(std::vector<EGLDeviceEXT>& hardware, std::vector<EGLDeviceEXT>& software) {
@@ -149,8 +147,7 @@ GlContext::GlContext() : egl_(std::make_unique<Egl>()) {
   const auto load = [&](auto& function, const char* name) {
     function =
         reinterpret_cast<std::remove_reference_t<decltype(function)>>(egl_->getProcAddress(name));
-    if (!function)
-      throw NoOpenGl(fmt::format("render: OpenGL has no function {}; {}", name, kRemedy));
+    if (!function) throw NoOpenGl(fmt::format("OpenGL has no function {}; {}", name, kRemedy));
   };
 #define LEVELSMITH_GL_LOAD(Type, name) load(gl_.name, "gl" #name);
   LEVELSMITH_GL_FUNCTIONS(LEVELSMITH_GL_LOAD)
@@ -179,7 +176,7 @@ GlContext::Current::Current(const GlContext& context) : context_(context), lock_
   if (!egl.bindApi(EGL_OPENGL_API) ||
       !egl.makeCurrent(egl.display, EGL_NO_SURFACE, EGL_NO_SURFACE, egl.context)) {
     throw levelset::ResourceLimit(
-        "render: the OpenGL context cannot be made current; try again, or draw with --renderer "
+        "the OpenGL context cannot be made current; try again, or draw with --renderer "
         "cpu");
   }
 }
@@ -199,16 +196,16 @@ GlContext::Current::~Current() {
 void GlContext::check(const char* what) const {
   if (gl_.GetGraphicsResetStatus() != GL_NO_ERROR) {
     throw levelset::ResourceLimit(
-        fmt::format("render: the OpenGL context was lost while {}; draw a smaller "
+        fmt::format("the OpenGL context was lost while {}; draw a smaller "
                     "picture, or with --renderer cpu",
                     what));
   }
   const GLenum error = gl_.GetError();
   if (error == GL_NO_ERROR) return;
-  throw levelset::ResourceLimit(fmt::format(
-      "render: {} failed with OpenGL error {:#x}{}; use larger voxels, or draw with --renderer "
-      "cpu",
-      what, error, error == GL_OUT_OF_MEMORY ? " (out of memory)" : ""));
+  throw levelset::ResourceLimit(
+      fmt::format("{} failed with OpenGL error {:#x}{}; use larger voxels, or draw with --renderer "
+                  "cpu",
+                  what, error, error == GL_OUT_OF_MEMORY ? " (out of memory)" : ""));
 }
 
 }  // namespace render

@@ -11,15 +11,15 @@ Image renderGpu(const Scene& scene, const RenderOptions& options) {
   requirePicture(scene, options);
   if (scene.isBlended())
     throw levelset::UsageError(
-        "render: --renderer gpu supports neither soft expressions nor morphs; use --renderer cpu");
-  levelset::report(options.progress, 0, "render");
+        "--renderer gpu supports neither soft expressions nor morphs; use --renderer cpu");
+  levelset::report(options.progress, 0);
   const KernelScene surfaces(scene, options);
   if (surfaces.bounds().isEmpty()) refuseEmptyScene();
   if (options.fromNanoVdb) {  // memory of the grids and of their copies as words
     double bytes = 0;
     for (const Solid& solid : scene.solids)
       bytes += 2 * static_cast<double>(solid.band.memoryUse());
-    levelset::requireMemory(bytes, options.maxBytes, "render");
+    levelset::requireMemory(bytes, options.maxBytes);
   }
   const GlContext context;
   const GpuTracer tracer(context, surfaces, 0, options.fromNanoVdb ? &scene : nullptr);

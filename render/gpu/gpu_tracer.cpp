@@ -199,7 +199,7 @@ GLuint compileCompute(const GlContext& context, const std::string& text) {
     gl.DeleteShader(shader);
     gl.DeleteProgram(program);
     throw levelset::ResourceLimit(fmt::format(
-        "render: the graphics driver ({}) does not {} the ray caster: {}; draw with --renderer cpu",
+        "the graphics driver ({}) does not {} the ray caster: {}; draw with --renderer cpu",
         context.description(), what, log));
   };
   const char* lines = text.c_str();
@@ -265,7 +265,7 @@ struct GpuTracer::Impl {
   Texels texelsOf(const void* data, std::size_t bytes, GLenum format) {
     if (bytes > largestTable) {
       throw levelset::ResourceLimit(fmt::format(
-          "render: a table of {} MB does not fit into a buffer texture of {} MB, the limit of {}; "
+          "a table of {} MB does not fit into a buffer texture of {} MB, the limit of {}; "
           "use larger voxels, or draw with --renderer cpu",
           bytes >> 20, largestTable >> 20, context.description()));
     }
@@ -285,7 +285,7 @@ struct GpuTracer::Impl {
     const std::size_t blocks = (bytes + perBlock - 1) / perBlock;
     if (blocks + kFirstValues > static_cast<std::size_t>(context.tableCount())) {
       throw levelset::ResourceLimit(
-          fmt::format("render: {} MB of values need {} buffer textures, but {} offers {}; use "
+          fmt::format("{} MB of values need {} buffer textures, but {} offers {}; use "
                       "larger voxels, or "
                       "draw with --renderer cpu",
                       bytes >> 20, blocks, context.description(),

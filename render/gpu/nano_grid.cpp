@@ -39,10 +39,10 @@ NanoGrid makeNanoGrid(const levelset::NarrowBand& band) {
   const auto handle = nanovdb::openToNanoVDB(levelset::vdb(band));
   const std::size_t count = handle.size() / kNanoWord;
   if (count + 2 * kRow > static_cast<std::size_t>(std::numeric_limits<int>::max()))
-    throw levelset::ResourceLimit(fmt::format(
-        "render: a NanoVDB grid of {} MB is too large for the shader's index; draw from "
-        "bricks (the default)",
-        handle.size() >> 20));
+    throw levelset::ResourceLimit(
+        fmt::format("a NanoVDB grid of {} MB is too large for the shader's index; draw from "
+                    "bricks (the default)",
+                    handle.size() >> 20));
   NanoGrid grid;
   grid.words.resize(count);
   std::memcpy(grid.words.data(), handle.data(), count * kNanoWord);

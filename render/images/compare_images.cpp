@@ -48,13 +48,13 @@ class Comparer {
       : a_(first), b_(second), options_(options) {
     if (a_.width != b_.width || a_.height != b_.height)
       throw levelset::InvalidInput(
-          fmt::format("compare-images: the pictures have {} × {} and {} × {} pixels; draw both "
+          fmt::format("the pictures have {} × {} and {} × {} pixels; draw both "
                       "with the same size",
                       a_.width, a_.height, b_.width, b_.height));
     for (const auto& [name, tolerance] : options_.tolerances)
       if (!(tolerance.usual >= 0) || !(tolerance.worst >= 0))
         throw levelset::UsageError(
-            fmt::format("compare-images: the tolerance of {} is {}, {}; give two finite numbers "
+            fmt::format("the tolerance of {} is {}, {}; give two finite numbers "
                         "that are 0 or more",
                         name, tolerance.usual, tolerance.worst));
   }
@@ -68,9 +68,9 @@ class Comparer {
     const std::vector<Layer> all = layers();
     for (const auto& [name, tolerance] : options_.tolerances)
       if (std::none_of(all.begin(), all.end(), [&](const Layer& l) { return l.name == name; }))
-        throw levelset::UsageError(fmt::format(
-            "compare-images: the pictures have no common layer '{}'; their common layers are {}",
-            name, namesOf(all)));
+        throw levelset::UsageError(
+            fmt::format("the pictures have no common layer '{}'; their common layers are {}", name,
+                        namesOf(all)));
     for (const Layer& layer : all) compare(layer);
     compareBits();
     return std::move(result_);
@@ -93,7 +93,7 @@ class Comparer {
     const bool byDepth = has("Z");
     if (!byDepth && !has("A"))
       throw levelset::InvalidInput(
-          "compare-images: the pictures have neither Z nor A in common, so their hits cannot be "
+          "the pictures have neither Z nor A in common, so their hits cannot be "
           "found; draw them with 'render FILE.exr'");
     const auto hits = [&](const Image& image) {
       const std::vector<float>& channel = image.channels.at(byDepth ? "Z" : "A");

@@ -19,8 +19,6 @@ namespace {
 using levelset::InvalidInput;
 using levelset::IoError;
 
-constexpr const char* kReadGrey = "read image";
-
 /// libpng returns from errors by longjmp, which skips destructors. So its state is held here,
 /// outside the functions that call it.
 struct PngReader {
@@ -71,7 +69,7 @@ struct PngReader {
 };
 
 [[noreturn]] void refuseDamaged(const std::string& name, const std::string& why) {
-  throw InvalidInput(fmt::format("{}: {} is not a complete PNG image: {}", kReadGrey, name, why));
+  throw InvalidInput(fmt::format("{} is not a complete PNG image: {}", name, why));
 }
 
 /// Sample of 8 or 16 bits; the high byte is first.
@@ -109,8 +107,8 @@ void requirePngPixels(const std::filesystem::path& path, double width, double he
   const auto bytes = static_cast<double>(std::filesystem::file_size(path, failed));
   if (failed || width * height <= bytes * kMostPerByte) return;
   throw InvalidInput(
-      fmt::format("{}: {} announces {}x{} pixels, more than its {} bytes can hold; copy it again",
-                  kReadGrey, path.string(), width, height, bytes));
+      fmt::format("{} announces {}x{} pixels, more than its {} bytes can hold; copy it again",
+                  path.string(), width, height, bytes));
 }
 
 GreyImage readGreyPng(const std::filesystem::path& path, std::size_t maxMemory) {
@@ -120,20 +118,19 @@ GreyImage readGreyPng(const std::filesystem::path& path, std::size_t maxMemory) 
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"),
                                                              &std::fclose);
   if (!file || std::filesystem::is_directory(path, ignored)) {
-    throw IoError(fmt::format("{}: {}: {}; check the path", kReadGrey, name,
-                              file ? "is a folder" : std::strerror(errno)));
+    throw IoError(
+        fmt::format("{}: {}; check the path", name, file ? "is a folder" : std::strerror(errno)));
   }
   PngReader reader;
   if (!reader.png || !reader.info)
-    throw levelset::ResourceLimit(fmt::format("{}: no memory left to read {}", kReadGrey, name));
+    throw levelset::ResourceLimit(fmt::format("no memory left to read {}", name));
   requirePngChunks(path);
   if (!reader.readHeader(file.get())) refuseDamaged(name, reader.error);
   const auto width = static_cast<std::size_t>(png_get_image_width(reader.png, reader.info)),
              height = static_cast<std::size_t>(png_get_image_height(reader.png, reader.info));
   if (png_get_color_type(reader.png, reader.info) & PNG_COLOR_MASK_COLOR) {
-    throw InvalidInput(
-        fmt::format("{}: {} is a colour picture, but heights need grey values; convert it to grey",
-                    kReadGrey, name));
+    throw InvalidInput(fmt::format(
+        "{} is a colour picture, but heights need grey values; convert it to grey", name));
   }
   requirePngPixels(path, static_cast<double>(width), static_cast<double>(height));
   if (!reader.prepare()) refuseDamaged(name, reader.error);
@@ -141,7 +138,7 @@ GreyImage readGreyPng(const std::filesystem::path& path, std::size_t maxMemory) 
   levelset::requireMemory(
       static_cast<double>(height) *
           (static_cast<double>(rowBytes) + 2.0 * sizeof(double) * static_cast<double>(width)),
-      maxMemory, kReadGrey);
+      maxMemory);
   std::vector<png_byte> bytes(rowBytes * height);
   std::vector<png_bytep> rows(height);
   for (std::size_t j = 0; j < height; ++j) rows[j] = bytes.data() + j * rowBytes;

@@ -167,14 +167,14 @@ Image readOpenExr(Imf::InputFile& file, const std::string& name, std::size_t max
   double channelCount = 0;
   for (auto it = header.channels().begin(); it != header.channels().end(); ++it) ++channelCount;
   levelset::requireMemory(static_cast<double>(width) * height * channelCount * sizeof(float),
-                          maxMemory, "read image");
+                          maxMemory);
   Image image(width, height);
   Imf::FrameBuffer frame;
   for (auto it = header.channels().begin(); it != header.channels().end(); ++it) {
     const Imf::Channel& channel = it.channel();
     if (channel.xSampling != 1 || channel.ySampling != 1) {
       throw InvalidInput(
-          fmt::format("read image: channel {} of {} is subsampled; write it at full "
+          fmt::format("channel {} of {} is subsampled; write it at full "
                       "resolution",
                       it.name(), name));
     }
@@ -279,8 +279,8 @@ Image readExr(const std::filesystem::path& path, std::size_t maxMemory) {
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> probe(std::fopen(path.c_str(), "rb"),
                                                         &std::fclose);
   if (!probe || std::filesystem::is_directory(path, ignored)) {
-    throw IoError(fmt::format("read image: {}: {}; check the path", name,
-                              probe ? "is a folder" : std::strerror(errno)));
+    throw IoError(
+        fmt::format("{}: {}; check the path", name, probe ? "is a folder" : std::strerror(errno)));
   }
   try {
     checkExrHeader(path, maxMemory);
@@ -289,10 +289,9 @@ Image readExr(const std::filesystem::path& path, std::size_t maxMemory) {
   } catch (const levelset::Error&) {
     throw;
   } catch (const std::bad_alloc&) {
-    throw levelset::ResourceLimit(fmt::format("read image: {} does not fit in memory", name));
+    throw levelset::ResourceLimit(fmt::format("{} does not fit in memory", name));
   } catch (const std::exception& error) {
-    throw InvalidInput(
-        fmt::format("read image: {} is not a readable EXR image: {}", name, error.what()));
+    throw InvalidInput(fmt::format("{} is not a readable EXR image: {}", name, error.what()));
   }
 }
 

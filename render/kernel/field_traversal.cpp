@@ -382,7 +382,7 @@ FieldTraversal::FieldTraversal(const Scene& scene, std::size_t maxBytes)
   double bytes = 0;
   for (const FieldExpression::Operand& operand : expression_.operands)
     bytes += FieldGrid::bytesOf(scene.solids[operand.solid].band);
-  levelset::requireMemory(bytes, maxBytes, "render");
+  levelset::requireMemory(bytes, maxBytes);
   for (const FieldExpression::Operand& operand : expression_.operands)
     grids_.emplace_back(scene.solids[operand.solid].band);
   updateTransforms(scene);

@@ -126,7 +126,7 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
   // With BSplineQi the leaves are copied for the spline's coefficients.
   const double kCopies = options.filter == Filter::BSplineQi ? 4 * 512 : 0;
   const double kBytesOfBlock = 2 * 4 * (BrickPool::kValues + BrickPool::kMaskWords) + kCopies;
-  levelset::requireMemory(leaves * kBytesOfBlock, options.maxBytes, "render");
+  levelset::requireMemory(leaves * kBytesOfBlock, options.maxBytes);
   const FrustumCulling culling =
       isPicture && !box.isEmpty() ? FrustumCulling(scene, options, box) : FrustumCulling();
   for (std::size_t i = 0; i < scene.solids.size(); ++i) {

@@ -200,7 +200,7 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
     painter.paint(tracer, {left, top, std::min(left + tile, camera.width),
                            std::min(top + tile, camera.height)});
     const std::scoped_lock lock(reporting);
-    levelset::report(options.progress, static_cast<double>(++done) / (across * down), "render");
+    levelset::report(options.progress, static_cast<double>(++done) / (across * down));
   });
   image.attributes = sceneAttributes(scene, options);
   image.attributes["ls:renderer"] = renderer;

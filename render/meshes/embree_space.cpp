@@ -52,7 +52,7 @@ void requireEmbree(RTCDevice device) {
   const RTCError error = rtcGetDeviceError(device);
   if (error == RTC_ERROR_NONE) return;
   throw levelset::ResourceLimit(fmt::format(
-      "render: Embree failed with error code {} ({}); use larger voxels, a coarser mesh, or free "
+      "Embree failed with error code {} ({}); use larger voxels, a coarser mesh, or free "
       "memory",
       static_cast<int>(error), error == RTC_ERROR_OUT_OF_MEMORY ? "out of memory" : "other"));
 }

@@ -127,11 +127,10 @@ C3f ColourImage::at(double x, double y) const {
 ColourImage readColourPng(const std::filesystem::path& path, std::size_t maxMemory) {
   std::error_code failed;
   if (!std::filesystem::is_regular_file(path, failed))
-    throw levelset::IoError(
-        fmt::format("read image: '{}' does not exist; check the name", path.string()));
+    throw levelset::IoError(fmt::format("'{}' does not exist; check the name", path.string()));
   if (!std::ifstream(path, std::ios::binary))
     throw levelset::IoError(
-        fmt::format("read image: {} cannot be opened; check its permissions", path.string()));
+        fmt::format("{} cannot be opened; check its permissions", path.string()));
   requirePngChunks(path);
   struct Png {
     png_image image = {};
@@ -140,20 +139,17 @@ ColourImage readColourPng(const std::filesystem::path& path, std::size_t maxMemo
   png_image& png = owner.image;
   png.version = PNG_IMAGE_VERSION;
   if (!png_image_begin_read_from_file(&png, path.c_str()))
-    throw levelset::InvalidInput(
-        fmt::format("read image: {} is not a PNG: {}", path.string(), png.message));
+    throw levelset::InvalidInput(fmt::format("{} is not a PNG: {}", path.string(), png.message));
   constexpr double kMostPixels = 1 << 26;
   if (static_cast<double>(png.width) * png.height > kMostPixels)
-    throw levelset::ResourceLimit(
-        fmt::format("read image: {} has {}x{} pixels, but at most 2^26 are supported",
-                    path.string(), png.width, png.height));
+    throw levelset::ResourceLimit(fmt::format("{} has {}x{} pixels, but at most 2^26 are supported",
+                                              path.string(), png.width, png.height));
   requirePngPixels(path, png.width, png.height);
-  levelset::requireMemory((4.0 + sizeof(C3f)) * png.width * png.height, maxMemory, "read image");
+  levelset::requireMemory((4.0 + sizeof(C3f)) * png.width * png.height, maxMemory);
   png.format = PNG_FORMAT_RGBA;
   std::vector<std::uint8_t> bytes(PNG_IMAGE_SIZE(png));
   if (!png_image_finish_read(&png, nullptr, bytes.data(), 0, nullptr))
-    throw levelset::InvalidInput(
-        fmt::format("read image: {} is damaged: {}", path.string(), png.message));
+    throw levelset::InvalidInput(fmt::format("{} is damaged: {}", path.string(), png.message));
   ColourImage image{static_cast<int>(png.width), static_cast<int>(png.height), {}};
   image.pixels.reserve(bytes.size() / 4);
   const auto linear = [](std::uint8_t byte) { return linearFromSrgb(byte / 255.0f); };

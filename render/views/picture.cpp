@@ -77,7 +77,7 @@ void requireOpacity(const Scene& scene) {
     for (const auto& part : parts)
       if (!(part.opacity > 0 && part.opacity <= 1))
         throw levelset::UsageError(fmt::format(
-            "render: an opacity of {} is out of range; give more than 0 and at most 1, or leave "
+            "an opacity of {} is out of range; give more than 0 and at most 1, or leave "
             "the part out",
             part.opacity));
   };
@@ -92,7 +92,7 @@ void requireLight(const Scene& scene) {
       !(scene.key.softness >= 0 && scene.key.softness < 1.5) || scene.key.strength < 0 ||
       scene.ambient < 0) {
     throw levelset::UsageError(fmt::format(
-        "render: a light towards {},{},{} of strength {}, softness {} and ambient {} is not valid; "
+        "a light towards {},{},{} of strength {}, softness {} and ambient {} is not valid; "
         "give finite numbers, none negative, and a softness below 1.5 radians",
         d.x, d.y, d.z, scene.key.strength, scene.key.softness, scene.ambient));
   }
@@ -104,7 +104,7 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
   if (!inRange(options.samples, 1) || !inRange(options.ambientSamples, 0) ||
       !inRange(options.shadowSamples, 0)) {
     throw levelset::UsageError(fmt::format(
-        "render: {} samples, {} ambient and {} shadow samples are out of range; give 1 to {} "
+        "{} samples, {} ambient and {} shadow samples are out of range; give 1 to {} "
         "samples and 0 to {} of "
         "the others",
         options.samples, options.ambientSamples, options.shadowSamples, kMaxSamples, kMaxSamples));
@@ -115,48 +115,46 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
   if (!(style.curvatureRange >= 0 && std::isfinite(style.curvatureRange)) ||
       !(style.lineWidth >= 0 && style.lineWidth <= 1000)) {
     throw levelset::UsageError(
-        fmt::format("render: curvatures up to {} and lines of {} pixels are out of range; give a "
+        fmt::format("curvatures up to {} and lines of {} pixels are out of range; give a "
                     "positive range, and lines up to 1000 pixels",
                     style.curvatureRange, style.lineWidth));
   }
   if (style.style == Style::Matcap && !style.matcap)
-    throw levelset::UsageError(
-        "render: the style matcap needs a picture of a shaded ball; give a PNG");
+    throw levelset::UsageError("the style matcap needs a picture of a shaded ball; give a PNG");
   if (options.fromNanoVdb && options.filter != Filter::Trilinear)
     throw levelset::UsageError(
-        "render: NanoVDB grids support only the trilinear filter; use it, or draw from bricks");
+        "NanoVDB grids support only the trilinear filter; use it, or draw from bricks");
   requireFields(scene);
   if (scene.isBlended() && options.filter != Filter::Trilinear)
     throw levelset::UsageError(
-        fmt::format("render: soft expressions and morphs support only the trilinear filter, not "
+        fmt::format("soft expressions and morphs support only the trilinear filter, not "
                     "{}; omit the filter",
                     filterName(options.filter)));
   if (scene.isBlended() && options.fromNanoVdb)
     throw levelset::UsageError(
-        "render: soft expressions and morphs cannot be drawn from NanoVDB grids; draw from "
+        "soft expressions and morphs cannot be drawn from NanoVDB grids; draw from "
         "bricks");
   constexpr double kReach = 2.99;  // voxels
   for (const Solid& solid : scene.solids) {
     if (options.filter == Filter::Trilinear || solid.band.isEmpty()) continue;
     if (options.filter == Filter::BSplineQi && solid.quantization.bits != 32)
       throw levelset::UsageError(
-          fmt::format("render: the filter bspline-qi does not support values of {} bits; use 32 "
+          fmt::format("the filter bspline-qi does not support values of {} bits; use 32 "
                       "bits, or another filter",
                       solid.quantization.bits));
     if (solid.band.halfWidth() >= kReach) continue;
     throw levelset::InvalidInput(fmt::format(
-        "render: the filter {} reads values up to 3 voxels from the surface, but the band has a "
+        "the filter {} reads values up to 3 voxels from the surface, but the band has a "
         "half width of {:.3g}; widen it with rebuild-band, or use the trilinear filter",
         filterName(options.filter), solid.band.halfWidth()));
   }
   const double pixels = static_cast<double>(scene.camera.width) * scene.camera.height;
   const double channels = 12 + (options.curvature ? 4 : 0) + (options.thickness ? 1 : 0);
-  levelset::requireMemory(pixels * 4 * channels, options.maxBytes, "render");
+  levelset::requireMemory(pixels * 4 * channels, options.maxBytes);
 }
 
 void refuseEmptyScene() {
-  throw levelset::InvalidInput(
-      "render: the scene has no surface; add at least one solid with a zero set");
+  throw levelset::InvalidInput("the scene has no surface; add at least one solid with a zero set");
 }
 
 std::map<std::string, std::string> sceneAttributes(const Scene& scene,

@@ -72,7 +72,7 @@ void requireColour(const Imath::C3f& colour) {
   for (int c = 0; c < 3; ++c)
     if (!(colour[c] >= 0 && colour[c] <= 1))
       throw InvalidInput(
-          fmt::format("write: the colour {}, {}, {} is not between 0 and 1; give one in this range",
+          fmt::format("the colour {}, {}, {} is not between 0 and 1; give one in this range",
                       colour.x, colour.y, colour.z));
 }
 
@@ -88,8 +88,8 @@ class Reader {
   explicit Reader(const std::filesystem::path& file) : file_(file.string()) {}
 
   [[noreturn]] void refuse(const std::string& where, const std::string& what) const {
-    throw InvalidInput(fmt::format(
-        "read: {}: {} {}; docs/rendering.md describes the format of scenes", file_, where, what));
+    throw InvalidInput(fmt::format("{}: {} {}; docs/rendering.md describes the format of scenes",
+                                   file_, where, what));
   }
 
   [[nodiscard]] const Json& member(const Json& json, const char* name,
@@ -232,16 +232,15 @@ class Reader {
 Json documentOf(const std::filesystem::path& file) {
   std::error_code failed;
   if (std::filesystem::is_directory(file, failed))
-    throw levelset::IoError(
-        fmt::format("read: {} is a folder; give the file of a scene", file.string()));
+    throw levelset::IoError(fmt::format("{} is a folder; give the file of a scene", file.string()));
   const auto size = std::filesystem::file_size(file, failed);
   if (!failed && static_cast<double>(size) > kMostBytes)
-    throw InvalidInput(fmt::format("read: {} is too large for a scene", file.string()));
+    throw InvalidInput(fmt::format("{} is too large for a scene", file.string()));
   std::ifstream stream(file, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(stream), {}};
   if (!stream)
     throw levelset::IoError(
-        fmt::format("read: {} cannot be read; check its name and permissions", file.string()));
+        fmt::format("{} cannot be read; check its name and permissions", file.string()));
   if (levelset::isJsonTooDeep(text)) return Json(Json::value_t::discarded);
   return Json::parse(text, nullptr, /*allow_exceptions=*/false);
 }
@@ -252,7 +251,7 @@ std::string textOf(const Json& json, const std::filesystem::path& file) {
     return json.dump(2);
   } catch (const Json::exception&) {
     throw levelset::IoError(fmt::format(
-        "write: {} cannot be stored in a scene, because its name is not UTF-8; use another name",
+        "{} cannot be stored in a scene, because its name is not UTF-8; use another name",
         file.string()));
   }
 }
@@ -391,7 +390,7 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
     stream.flush();
     if (!stream)
       throw levelset::IoError(
-          fmt::format("write: {} cannot be written; is the disk full?", file.string()));
+          fmt::format("{} cannot be written; is the disk full?", file.string()));
   }
   target.commit();
 }

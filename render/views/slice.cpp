@@ -91,21 +91,20 @@ void requireSlice(const levelset::NarrowBand& band, const SliceOptions& options)
   const V3d sum = options.point + options.normal;
   if (!std::isfinite(sum.x + sum.y + sum.z) || !(options.normal.length() > 0))
     throw levelset::UsageError(
-        "slice: the plane's point or normal is not finite, or the normal is zero; give a finite "
+        "the plane's point or normal is not finite, or the normal is zero; give a finite "
         "point and a nonzero normal");
   if (options.width < 1 || options.height < 1 || !(options.step >= 0) ||
       !std::isfinite(options.step))
-    throw levelset::UsageError(fmt::format(
-        "slice: {}x{} pixels with a contour every {} are out of range; give positive numbers",
-        options.width, options.height, options.step));
+    throw levelset::UsageError(
+        fmt::format("{}x{} pixels with a contour every {} are out of range; give positive numbers",
+                    options.width, options.height, options.step));
   if (static_cast<double>(options.width) * options.height > kMaxPixels)
-    throw levelset::ResourceLimit(fmt::format("slice: {}x{} pixels exceed the limit of {:.0f}",
+    throw levelset::ResourceLimit(fmt::format("{}x{} pixels exceed the limit of {:.0f}",
                                               options.width, options.height, kMaxPixels));
   constexpr double kBytesOfPixel = 8 * 4;
-  levelset::requireMemory(kBytesOfPixel * options.width * options.height, options.maxBytes,
-                          "slice");
+  levelset::requireMemory(kBytesOfPixel * options.width * options.height, options.maxBytes);
   if (band.isEmpty() || band.zeroSetBounds().isEmpty())
-    throw levelset::InvalidInput("slice: the solid has no surface; give one with a zero set");
+    throw levelset::InvalidInput("the solid has no surface; give one with a zero set");
 }
 
 }  // namespace
@@ -140,7 +139,7 @@ Image drawSlice(const levelset::NarrowBand& band, const SliceOptions& options) {
       phi[i] = static_cast<float>(painter.phi(middle));
     }
     const std::scoped_lock lock(reporting);
-    levelset::report(options.progress, static_cast<double>(++done) / options.height, "slice");
+    levelset::report(options.progress, static_cast<double>(++done) / options.height);
   });
   return image;
 }

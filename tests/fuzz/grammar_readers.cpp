@@ -54,9 +54,9 @@ void readChain(std::string_view bytes) {
 void readFormula(std::string_view bytes) {
   const std::string text(bytes);
   const Imath::V3d place(0.25, -1, 3);
-  accepts([&] { static_cast<void>(levelset::scalarExpression(text, "fuzz")(place)); });
-  accepts([&] { static_cast<void>(levelset::vectorExpression(text, "fuzz")(place, 0.5)); });
-  accepts([&] { static_cast<void>(levelset::timeExpression(text, "fuzz")(0.5)); });
+  accepts([&] { static_cast<void>(levelset::scalarExpression(text)(place)); });
+  accepts([&] { static_cast<void>(levelset::vectorExpression(text)(place, 0.5)); });
+  accepts([&] { static_cast<void>(levelset::timeExpression(text)(0.5)); });
   accepts([&] {
     const render::CsgExpression solid(text, {"a", "b", "c"});
     const double phi[3] = {-1, 0.5, 2};

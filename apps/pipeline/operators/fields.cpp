@@ -11,18 +11,20 @@
 namespace pipeline {
 
 levelset::ScalarField scalarField(const Invocation& in, const std::string& param) {
-  const std::string where = in.where(param);
   const auto named = in.named.find(param);
-  if (named == in.named.end()) return levelset::scalarExpression(in.text(param), where.c_str());
-  if (named->second.kind() == Kind::Band) return levelset::asScalarField(named->second.band());
-  return levelset::asScalarField(named->second.field(), where.c_str());
+  return levelset::withContext(in.where(param), [&] {
+    if (named == in.named.end()) return levelset::scalarExpression(in.text(param));
+    if (named->second.kind() == Kind::Band) return levelset::asScalarField(named->second.band());
+    return levelset::asScalarField(named->second.field());
+  });
 }
 
 levelset::VectorField vectorField(const Invocation& in, const std::string& param) {
-  const std::string where = in.where(param);
   const auto named = in.named.find(param);
-  if (named == in.named.end()) return levelset::vectorExpression(in.text(param), where.c_str());
-  return levelset::asVectorField(named->second.field(), where.c_str());
+  return levelset::withContext(in.where(param), [&] {
+    if (named == in.named.end()) return levelset::vectorExpression(in.text(param));
+    return levelset::asVectorField(named->second.field());
+  });
 }
 
 levelset::Attribute attribute(const Invocation& in, const std::string& param) {
@@ -77,7 +79,7 @@ std::optional<levelset::Mask> maskOf(const Invocation& in) {
                       .min = in.number("mask-min"),
                       .max = in.number("mask-max"),
                       .invert = in.flag("mask-invert")};
-  levelset::checkMask(mask, in.op().name.c_str());
+  levelset::checkMask(mask);
   return mask;
 }
 

@@ -112,10 +112,12 @@ void checkField(const Param& param, const std::string& text, const std::string& 
   if (namesValue(param, text)) return;
   const auto& known = param.choices;
   if (std::find(known.begin(), known.end(), text) != known.end()) return;
-  if (param.type == ParamType::Scalar)
-    (void)levelset::scalarExpression(text, where.c_str());
-  else
-    (void)levelset::vectorExpression(text, where.c_str());
+  levelset::withContext(where, [&] {
+    if (param.type == ParamType::Scalar)
+      (void)levelset::scalarExpression(text);
+    else
+      (void)levelset::vectorExpression(text);
+  });
 }
 
 }  // namespace

@@ -141,7 +141,7 @@ void GraphRun::runNode(std::size_t i, StepReport& step, StepClock& clock,
     if (settings_.dryRun) {
       const Plan plan = planOf(invocation);
       invocation.resolveLengths();
-      levelset::requireMemory(plan.bytes(), settings_.maxMemory, op.name.c_str());
+      levelset::requireMemory(plan.bytes(), settings_.maxMemory);
       const Value value(plan);
       if (node.makes()) describeResult(value, true, step);
       clock.stop();

@@ -192,13 +192,13 @@ void checkMemoryFor(const Graph& graph, const std::vector<char>& runs,
                     const std::vector<RegionOfInterest>& regions, std::size_t maxMemory) {
   for (std::size_t i = 0; i < plans.size(); ++i)
     if (plans[i])
-      levelset::requireMemory(restricted(*plans[i], regions[i]).bytes(), maxMemory,
-                              graph.nodes[i].op->name.c_str());
+      levelset::withContext(graph.nodes[i].op->name, [&] {
+        levelset::requireMemory(restricted(*plans[i], regions[i]).bytes(), maxMemory);
+      });
   const Peak peak = findPeak(graph, runs, plans, regions);
   if (peak.bytes > static_cast<double>(maxMemory))
-    levelset::requireMemory(
-        peak.bytes, maxMemory,
-        (graph.nodes[peak.node].op->name + " and the values held beside it").c_str());
+    levelset::withContext(graph.nodes[peak.node].op->name + " and the values held beside it",
+                          [&] { levelset::requireMemory(peak.bytes, maxMemory); });
 }
 
 void explain(const Graph& graph, std::size_t maxMemory, bool fullValues,

@@ -32,7 +32,7 @@ std::string drawn(const Value& value, std::size_t maxBytes) {
   double triangles = 0;
   for (const render::MeshPart& part : viewed.scene.meshes)
     triangles += static_cast<double>(part.mesh->triangles.size());
-  levelset::requireMemory(triangles * kBytesOfTriangle, maxBytes, "render");
+  levelset::requireMemory(triangles * kBytesOfTriangle, maxBytes);
   render::Camera& camera = viewed.scene.camera;
   if (!viewed.hasCamera)
     camera = render::framingCamera(value.plan().bounds, kThumbnailWidth, kThumbnailHeight);

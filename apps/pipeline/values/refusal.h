@@ -13,8 +13,7 @@ namespace pipeline {
 inline constexpr const char* kThreadLimitMessage =
     ": the system gives no more threads; raise its limits (ulimit -u, -v), or use fewer --threads";
 
-/// Adds the prefix "who: " to a message. Keeps a message that already does. Replaces the prefix of
-/// an internal reader or writer: "read: 'x.ply' is empty" becomes "info: 'x.ply' is empty".
+/// Adds the prefix "who: " to a message that does not have it.
 [[nodiscard]] std::string sentenceOf(const std::string& who, std::string sentence);
 
 /// Appends a position in a script to a message; appends nothing if the position is empty.

@@ -116,17 +116,16 @@ void damagedGrids(Recorder& out) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float inf = std::numeric_limits<float>::infinity();
   out.expectRefusal("NaN inside a band", ExitCode::Input,
-                    [&] { (void)levelset::importBand(spoiled(nan), "regress"); });
+                    [&] { (void)levelset::importBand(spoiled(nan)); });
   out.expectRefusal("infinity inside a band", ExitCode::Input,
-                    [&] { (void)levelset::importBand(spoiled(inf), "regress"); });
+                    [&] { (void)levelset::importBand(spoiled(inf)); });
   out.expectRefusal("offset by NaN", ExitCode::Usage, [&] {
     (void)levelset::offset(solid(), std::numeric_limits<double>::quiet_NaN());
   });
   out.expect("background of 10 voxels around a band of 3", "a sound band after redistance", [] {
     const auto grid = levelset::vdb(solid()).deepCopy();
     openvdb::tools::changeBackground(grid->tree(), static_cast<float>(10 * kVoxel));
-    const NarrowBand made =
-        levelset::redistance(levelset::importBand(grid, "regress"), {.halfWidth = 3});
+    const NarrowBand made = levelset::redistance(levelset::importBand(grid), {.halfWidth = 3});
     Figures figures;
     addErrors(made, ball(V3d(0.01, 0.02, 0.03), 1), Mesher::Ours, figures);
     const double error = std::max(figures["band_in_linf_vx"], figures["band_out_linf_vx"]);
@@ -144,11 +143,11 @@ openvdb::math::Mat4d axes(double x, double y, double z, double shear) {
 void skewedAxes(Recorder& out) {
   const double h = kVoxel;
   out.expectRefusal("grid with voxels of 1 × 1 × 2", ExitCode::Input,
-                    [&] { (void)levelset::importBand(onAxes(axes(h, h, 2 * h, 0)), "regress"); });
+                    [&] { (void)levelset::importBand(onAxes(axes(h, h, 2 * h, 0))); });
   out.expectRefusal("grid with sheared axes", ExitCode::Input,
-                    [&] { (void)levelset::importBand(onAxes(axes(h, h, h, 0.3 * h)), "regress"); });
+                    [&] { (void)levelset::importBand(onAxes(axes(h, h, h, 0.3 * h))); });
   out.expectRefusal("grid with left-handed axes", ExitCode::Input,
-                    [&] { (void)levelset::importBand(onAxes(axes(-h, h, h, 0)), "regress"); });
+                    [&] { (void)levelset::importBand(onAxes(axes(-h, h, h, 0))); });
   const auto bakes = [&](const char* name, const M44d& matrix, double volume, const auto& isError) {
     out.expect(name, "the measured error of the volume, a sound band", [=] {
       const NarrowBand made = levelset::bake(solid(), matrix, kVoxel);

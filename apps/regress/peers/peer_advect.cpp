@@ -67,7 +67,7 @@ VectorField staggered(const VectorField& velocity, double voxelSize) {
         }
         accessor.setValue(c, openvdb::Vec3f(value));
       }
-  return levelset::asVectorField(levelset::importField(grid, "regress"), "regress");
+  return levelset::asVectorField(levelset::importField(grid));
 }
 
 }  // namespace regress::peer

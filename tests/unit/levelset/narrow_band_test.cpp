@@ -45,22 +45,22 @@ TEST(NarrowBand, RefusesGridsThatAreNoLevelSets) {
     NarrowBand band = unitSphere(0.2);
     return editVdb(band).deepCopy();
   };
-  EXPECT_NO_THROW((void)importBand(sound(), "read"));
+  EXPECT_NO_THROW((void)importBand(sound()));
   auto fog = sound();
   fog->setGridClass(openvdb::GRID_FOG_VOLUME);
-  EXPECT_THROW((void)importBand(fog, "read"), InvalidInput);
+  EXPECT_THROW((void)importBand(fog), InvalidInput);
   auto nan = sound();
   nan->tree().setValueOn(openvdb::Coord(5, 0, 0), std::numeric_limits<float>::quiet_NaN());
-  EXPECT_THROW((void)importBand(nan, "read"), InvalidInput);
+  EXPECT_THROW((void)importBand(nan), InvalidInput);
   auto sheared = sound();
   sheared->setTransform(openvdb::math::Transform::createLinearTransform(
       openvdb::math::Mat4d(1., 0., 0., 0., .5, 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.)));
-  EXPECT_THROW((void)importBand(sheared, "read"), InvalidInput);
+  EXPECT_THROW((void)importBand(sheared), InvalidInput);
   auto mirrored = sound();
   mirrored->setTransform(openvdb::math::Transform::createLinearTransform(
       openvdb::math::Mat4d(-1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.)));
-  EXPECT_THROW((void)importBand(mirrored, "read"), InvalidInput);
-  EXPECT_THROW((void)importBand(nullptr, "read"), InvalidInput);
+  EXPECT_THROW((void)importBand(mirrored), InvalidInput);
+  EXPECT_THROW((void)importBand(nullptr), InvalidInput);
 }
 
 }  // namespace narrow_band_test

@@ -235,8 +235,7 @@ mapping::PatchMaker makerLike(const std::vector<Patch>& patches) {
                    std::span<const mapping::Footprint>, const levelset::Progress& progress) {
     std::vector<Patch> made;
     for (std::size_t i = 0; i < footprints.size(); ++i) {
-      levelset::report(progress, static_cast<double>(i) / static_cast<double>(footprints.size()),
-                       "animate");
+      levelset::report(progress, static_cast<double>(i) / static_cast<double>(footprints.size()));
       made.push_back(
           mapping::makePatch(base, footprints[i].corners, footprints[i].height, options[i]).patch);
     }

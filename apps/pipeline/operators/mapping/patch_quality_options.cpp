@@ -153,7 +153,7 @@ JudgedMap judgeMap(Invocation& in, const mapping::Patch& patch, double embedDept
             std::move(field)};
   }
   if (in.text("map") == "shell") {
-    levelset::requireMemory(mapping::PrismMap::estimateBytes(patch), in.maxMemory, "folds");
+    levelset::requireMemory(mapping::PrismMap::estimateBytes(patch), in.maxMemory);
     const mapping::PrismMap map(patch, {.embedDepth = options.embedDepth});
     mapping::FoldCertificate certificate = mapping::certifyPrisms(map, patch.mirrored);
     levelset::FieldGrid field = mapping::jacobianField(patch, map, certificate, options);

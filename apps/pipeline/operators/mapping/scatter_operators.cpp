@@ -69,8 +69,7 @@ std::shared_ptr<const PatchRecipe> recipeOf(const Invocation& in,
       mapping::PatchOptions now = options;
       now.spacing *= sites[i].scale;
       now.mirror = true;
-      levelset::report(progress, static_cast<double>(i) / static_cast<double>(footprints.size()),
-                       "scatter");
+      levelset::report(progress, static_cast<double>(i) / static_cast<double>(footprints.size()));
       patches.push_back(
           mapping::makePatch(base, footprints[i].corners, footprints[i].height, now).patch);
     }

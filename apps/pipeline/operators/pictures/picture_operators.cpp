@@ -179,7 +179,7 @@ void coarsen(Invocation& in, render::Scene& scene) {
   double bytes = 0;
   for (const render::Solid& solid : scene.solids)
     bytes += static_cast<double>(solid.band.memoryUse());
-  levelset::requireMemory(bytes, in.maxMemory, "render");
+  levelset::requireMemory(bytes, in.maxMemory);
   render::SurfaceShift most;
   for (render::Solid& solid : scene.solids) {
     if (solid.band.isEmpty()) continue;

@@ -37,10 +37,10 @@ levelset::FieldGrid constantField(bool vector) {
     grid->setName("wind");
     grid->setGridClass(openvdb::GRID_STAGGERED);
     grid->tree().setValue(openvdb::Coord(0), openvdb::Vec3s(1, 2, 3));
-    return levelset::importField(grid, "test");
+    return levelset::importField(grid);
   }
   const auto grid = openvdb::FloatGrid::create(5);
-  return levelset::importField(grid, "test");
+  return levelset::importField(grid);
 }
 
 TEST(Fields, AreNumbersFormulasOrValues) {

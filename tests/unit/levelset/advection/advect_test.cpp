@@ -123,11 +123,11 @@ levelset::FieldGrid staggeredEnright(int resolution) {
         }
         accessor.setValue(openvdb::Coord(x, y, z), value);
       }
-  return levelset::importField(grid, "test");
+  return levelset::importField(grid);
 }
 
 TEST(SlowAdvect, ReversesTheDeformationWithAVelocityGrid) {
-  const VectorField steady = levelset::asVectorField(staggeredEnright(64), "test");
+  const VectorField steady = levelset::asVectorField(staggeredEnright(64));
   const AdvectResult result = enright(64, AdvectScheme::Front, [steady](const V3d& p, double time) {
     return steady(p, time) * std::cos(kPi * time / 3);
   });
@@ -243,8 +243,7 @@ TEST(Advect, KeepsSheetsBetweenItsCalls) {
 
 TEST(Advect, RunsBackwards) {
   const NarrowBand ball = levelset::makeSphere(0.2, V3d(0.5, 0.7, 0.5), 0.02);
-  const VectorField shear =
-      levelset::vectorExpression("sin(pi*y)*(1 + t), 0.3*x, 0.2*cos(t)", "test");
+  const VectorField shear = levelset::vectorExpression("sin(pi*y)*(1 + t), 0.3*x, 0.2*cos(t)");
   levelset::Advection advection(ball, {.start = 0.5});
   advection.advance(shear, 0.8);
   advection.advance(shear, -0.8);
@@ -414,9 +413,8 @@ TEST(Advect, EndsForDiscontinuousVelocities) {
        {"x > 0 ? 1 : -1, 0, 0", "y > 0 ? 1 : -1, 0, 0", "x > 0 ? -1 : 1, 0, 0"}) {
     for (const AdvectScheme scheme : {AdvectScheme::Front, AdvectScheme::SemiLagrangian}) {
       try {
-        const NarrowBand band = levelset::advect(ball, levelset::vectorExpression(text, "test"),
-                                                 0.5, {.scheme = scheme})
-                                    .band;
+        const NarrowBand band =
+            levelset::advect(ball, levelset::vectorExpression(text), 0.5, {.scheme = scheme}).band;
         EXPECT_NEAR(band.zeroSetBounds().max.z, 1, support::measured(0.28) * h) << text;
         EXPECT_LE(band.zeroSetBounds().max.x, 1.5 + h) << text;
       } catch (const levelset::Error& error) {
@@ -435,9 +433,8 @@ TEST(Front, HasFewTrianglesWhereItIsStretched) {
     const levelset::flow::Velocity inVoxels = [&](const V3d& p, double t) {
       return enrights(p / n, t) * n;
     };
-    levelset::flow::Front front(levelset::bandToMesh(ball), levelset::kNoMemoryLimit, "test");
-    (void)front.advance(
-        {.velocity = inVoxels, .from = 0, .to = 1.5, .action = "test", .toWorld = {}});
+    levelset::flow::Front front(levelset::bandToMesh(ball), levelset::kNoMemoryLimit);
+    (void)front.advance({.velocity = inVoxels, .from = 0, .to = 1.5, .toWorld = {}});
     const double count = static_cast<double>(front.mesh().triangles.size());
     EXPECT_LT(count / levelset::surfaceArea(front.mesh()), 36) << n;
   }
@@ -445,9 +442,9 @@ TEST(Front, HasFewTrianglesWhereItIsStretched) {
 
 TEST(Advect, RefusesCrumplingByAJump) {
   const NarrowBand ball = levelset::makeSphere(1, V3d(0.01, 0.02, 0.03), 1.0 / 16);
-  EXPECT_THROW((void)levelset::advect(
-                   ball, levelset::vectorExpression("0, x < 0.01 ? -1 : 1, 0", "test"), 0.25),
-               levelset::ResourceLimit);
+  EXPECT_THROW(
+      (void)levelset::advect(ball, levelset::vectorExpression("0, x < 0.01 ? -1 : 1, 0"), 0.25),
+      levelset::ResourceLimit);
 }
 
 TEST(Advect, GivesTheSameBitsForAnyNumberOfThreads) {
@@ -497,9 +494,8 @@ TEST(Advect, RefusesUndefinedVelocities) {
   EXPECT_NO_THROW(
       (void)levelset::advect(ball, constantVelocity(V3d(1, 0, 0)), 2e-6, {.start = 1.7e9}));
   // NaN that begins during the motion.
-  EXPECT_THROW(
-      (void)levelset::advect(ball, levelset::vectorExpression("1/sqrt(0.5 - t), 0, 0", "test"), 1),
-      levelset::Error);
+  EXPECT_THROW((void)levelset::advect(ball, levelset::vectorExpression("1/sqrt(0.5 - t), 0, 0"), 1),
+               levelset::Error);
   EXPECT_THROW((void)levelset::advect(ball, constantVelocity(V3d(1)), nan), levelset::UsageError);
   EXPECT_THROW((void)levelset::advect(ball, constantVelocity(V3d(1)), INFINITY),
                levelset::UsageError);

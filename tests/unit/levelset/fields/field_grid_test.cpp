@@ -77,10 +77,10 @@ void writeForeign(const std::filesystem::path& path, const openvdb::GridPtrVec& 
 }
 
 TEST(FieldGrid, InterpolatesNumbersThroughItsTransform) {
-  const FieldGrid grid = levelset::importField(linearGrid(), "test");
+  const FieldGrid grid = levelset::importField(linearGrid());
   EXPECT_FALSE(grid.isVector());
   EXPECT_EQ(grid.voxelSize(), 0.5);
-  const levelset::ScalarField field = levelset::asScalarField(grid, "test");
+  const levelset::ScalarField field = levelset::asScalarField(grid);
   std::mt19937 random(1);
   std::uniform_real_distribution<double> inside(-5, 5);
   for (int i = 0; i < 1000; ++i) {
@@ -95,9 +95,9 @@ TEST(FieldGrid, InterpolatesNumbersThroughItsTransform) {
 
 TEST(FieldGrid, ReadsStaggeredComponentsAtFaces) {
   for (const bool staggered : {false, true}) {
-    const FieldGrid grid = levelset::importField(velocityGrid(staggered), "test");
+    const FieldGrid grid = levelset::importField(velocityGrid(staggered));
     EXPECT_EQ(grid.isStaggered(), staggered);
-    const levelset::VectorField field = levelset::asVectorField(grid, "test");
+    const levelset::VectorField field = levelset::asVectorField(grid);
     std::mt19937 random(2);
     std::uniform_real_distribution<double> inside(-2.5, 2.5);
     for (int i = 0; i < 1000; ++i) {
@@ -109,8 +109,7 @@ TEST(FieldGrid, ReadsStaggeredComponentsAtFaces) {
 }
 
 TEST(FieldGrid, IsSampledByManyThreads) {
-  const levelset::ScalarField field =
-      levelset::asScalarField(levelset::importField(linearGrid(), "test"), "test");
+  const levelset::ScalarField field = levelset::asScalarField(levelset::importField(linearGrid()));
   std::atomic<int> wrong = 0;
   tbb::parallel_for(0, 200000, [&](int i) {
     const double x = 1 + (i % 997) * 0.004;
@@ -129,25 +128,24 @@ TEST(FieldGrid, OfABandIsItsDistance) {
 }
 
 TEST(FieldGrid, RefusesTheWrongKindAndNan) {
-  const FieldGrid numbers = levelset::importField(linearGrid(), "test");
-  const FieldGrid vectors = levelset::importField(velocityGrid(true), "test");
-  EXPECT_THROW((void)levelset::asVectorField(numbers, "test"), InvalidInput);
-  EXPECT_THROW((void)levelset::asScalarField(vectors, "test"), InvalidInput);
+  const FieldGrid numbers = levelset::importField(linearGrid());
+  const FieldGrid vectors = levelset::importField(velocityGrid(true));
+  EXPECT_THROW((void)levelset::asVectorField(numbers), InvalidInput);
+  EXPECT_THROW((void)levelset::asScalarField(vectors), InvalidInput);
   const auto broken = linearGrid();
   broken->tree().setValue(Coord(1, 2, 3), std::numeric_limits<float>::quiet_NaN());
-  EXPECT_NE(
-      refusal<InvalidInput>([&] { (void)levelset::importField(broken, "test"); }).find("[1, 2, 3]"),
-      std::string::npos);
+  EXPECT_NE(refusal<InvalidInput>([&] { (void)levelset::importField(broken); }).find("[1, 2, 3]"),
+            std::string::npos);
   const auto tile = velocityGrid(false);
   tile->tree().addTile(1, Coord(800, 0, 0),
                        openvdb::Vec3s(0, std::numeric_limits<float>::infinity(), 0), true);
-  EXPECT_THROW((void)levelset::importField(tile, "test"), InvalidInput);
+  EXPECT_THROW((void)levelset::importField(tile), InvalidInput);
 }
 
 TEST(FieldGrid, KeepsEveryBitInFiles) {
   const TemporaryFolder folder;
-  const FieldGrid numbers = levelset::importField(linearGrid(), "test");
-  const FieldGrid vectors = levelset::importField(velocityGrid(true), "test");
+  const FieldGrid numbers = levelset::importField(linearGrid());
+  const FieldGrid vectors = levelset::importField(velocityGrid(true));
   for (const FieldGrid& field : {numbers, vectors}) {
     levelset::writeField(folder / "a.vdb", field, {.name = "it"});
     const FieldGrid again = levelset::readField(folder / "a.vdb", {.grid = "it"});
@@ -162,7 +160,7 @@ TEST(FieldGrid, KeepsEveryBitInFiles) {
 
 TEST(FieldGrid, ReadsEveryStorageOfOpenVdb) {
   const TemporaryFolder folder;
-  const FieldGrid vectors = levelset::importField(velocityGrid(true), "test");
+  const FieldGrid vectors = levelset::importField(velocityGrid(true));
   const auto half = velocityGrid(true);
   half->setName("half");
   half->setSaveFloatAsHalf(true);
@@ -181,7 +179,7 @@ TEST(FieldGrid, ReadsEveryStorageOfOpenVdb) {
     EXPECT_EQ(read("velocity").contentHash(), vectors.contentHash()) << compression;
     EXPECT_EQ(read("wide").contentHash(), vectors.contentHash()) << compression;
     const V3d place(0.3, -0.4, 0.9);
-    const V3d coarse = levelset::asVectorField(read("half"), "test")(place, 0);
+    const V3d coarse = levelset::asVectorField(read("half"))(place, 0);
     // Half floats hold the components here exactly.
     EXPECT_LT((coarse - linearVelocity(place)).length(), support::doubleRounding(1));
   }
@@ -197,7 +195,7 @@ TEST(FieldGrid, KeepsActiveTilesAsTiles) {
   const FieldGrid field =
       levelset::readField(folder / "a.vdb", {.grid = "fog", .maxMemory = 100 << 20});
   EXPECT_EQ(field.gridClass(), "fog volume");
-  EXPECT_EQ(levelset::asScalarField(field, "test")(V3d(1000.5, 7, 7)), 2);
+  EXPECT_EQ(levelset::asScalarField(field)(V3d(1000.5, 7, 7)), 2);
 }
 
 TEST(FieldGrid, DistinguishesBandsFromFields) {

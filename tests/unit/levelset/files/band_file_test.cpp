@@ -68,7 +68,7 @@ TEST(BandFile, IsReadByOpenVdbWithTheSameValues) {
   file.open(false);
   const auto grid = openvdb::gridPtrCast<FloatGrid>(file.readGrid("ball"));
   ASSERT_TRUE(grid);
-  EXPECT_EQ(levelset::importBand(grid, "test").contentHash(), band.contentHash());
+  EXPECT_EQ(levelset::importBand(grid).contentHash(), band.contentHash());
   EXPECT_EQ(file.getGrids()->size(), 1u);
 }
 

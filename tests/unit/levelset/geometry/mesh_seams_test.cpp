@@ -79,7 +79,7 @@ TEST(MeshSeams, OfTouchingClosedMeshesAreKept) {
   mesh.attributes.normals.assign(mesh.positions.size(), V3d(0, 0, 1));
   other.attributes.normals.assign(other.positions.size(), V3d(0, 0, 1));
   append(mesh, other);
-  EXPECT_FALSE(withoutSeams(mesh, "test"));
+  EXPECT_FALSE(withoutSeams(mesh));
   EXPECT_EQ(measure(mesh).components, 2u);
 }
 
@@ -101,7 +101,7 @@ TEST(MeshSeams, FinsAndFlippedFacesAreReported) {
   EXPECT_EQ(manifoldness(soup({{a, b, c}, {b, a, d}})).boundaryEdges, 4u);
   EXPECT_EQ(manifoldness(soup({{a, b, c}, {b, a, d}, {a, b, e}})).nonManifoldEdges, 1u);
   EXPECT_EQ(manifoldness(soup({{a, b, c}, {a, b, d}})).misorientedEdges, 1u);
-  EXPECT_THROW((void)withoutSeams(cube(), "test", 100), levelset::ResourceLimit);
+  EXPECT_THROW((void)withoutSeams(cube(), 100), levelset::ResourceLimit);
 }
 
 TEST(MeshSeams, ObjSplitsByValue) {

@@ -430,15 +430,13 @@ TEST(JacobianField, HasTheJacobianOfEachMap) {
   const Patch patch = patchAt(wedge, 17, 5, 3);
   const mapping::JacobianFieldOptions options{.voxelSize = 0.05};
   const FoldCertificate layers = certifyLayers(patch, 0);
-  const auto field =
-      levelset::asScalarField(mapping::jacobianField(patch, layers, options), "test");
+  const auto field = levelset::asScalarField(mapping::jacobianField(patch, layers, options));
   const PrismMap shell(patch, {});
   const auto straight = levelset::asScalarField(
-      mapping::jacobianField(patch, shell, certifyPrisms(shell, false), options), "test");
+      mapping::jacobianField(patch, shell, certifyPrisms(shell, false), options));
   const mapping::RbfMap map = mapping::patchToTexture(patch);
   const FoldCertificate proof = certifyRbf(map, patch, 0);
-  const auto smooth =
-      levelset::asScalarField(mapping::jacobianField(patch, map, proof, options), "test");
+  const auto smooth = levelset::asScalarField(mapping::jacobianField(patch, map, proof, options));
   // For patch → texture, half of the volume is below x = √2.5 − 1.
   EXPECT_NEAR(proof.unit, 1 / std::sqrt(2.5), support::measured(0.00866));
   for (const double x : {0.25, 0.5, 0.75}) {
@@ -477,7 +475,7 @@ TEST(JacobianField, ShowsFoldsBetweenGridPoints) {
   const FoldCertificate certificate = certifyLayers(patch, 0);
   ASSERT_EQ(certificate.verdict(), FoldVerdict::Folds);
   const levelset::FieldGrid field = mapping::jacobianField(patch, certificate, {.voxelSize = 0.5});
-  const auto value = levelset::asScalarField(field, "test");
+  const auto value = levelset::asScalarField(field);
   const V3d place = certificate.worst[0].position;
   const V3d point(std::round(place.x / 0.5) * 0.5, std::round(place.y / 0.5) * 0.5,
                   std::round(place.z / 0.5) * 0.5);

@@ -183,14 +183,12 @@ TEST(OpenSurface, PatchesMayEndAtTheCornersOfTiltedSheets) {
 
 TEST(OpenSurface, ClosestPointsLieOnTheSurface) {
   const NarrowBand band = plane();
-  EXPECT_LT(
-      (mapping::closestSurfacePoint(band, V3d(0.3, 1.9, 5), "test") - V3d(0.3, 1.9, 0)).length(),
-      support::doubleRounding(20) * kVoxel);
-  EXPECT_LT(
-      (mapping::closestSurfacePoint(band, V3d(0.3, 1.9, -4), "test") - V3d(0.3, 1.9, 0)).length(),
-      support::doubleRounding(20) * kVoxel);
-  EXPECT_THROW((void)mapping::closestSurfacePoint(band, V3d(0, 2.4, 0), "test"), InvalidInput);
-  EXPECT_THROW((void)mapping::closestSurfacePoint(band, V3d(0, 2.4, 2), "test"), InvalidInput);
+  EXPECT_LT((mapping::closestSurfacePoint(band, V3d(0.3, 1.9, 5)) - V3d(0.3, 1.9, 0)).length(),
+            support::doubleRounding(20) * kVoxel);
+  EXPECT_LT((mapping::closestSurfacePoint(band, V3d(0.3, 1.9, -4)) - V3d(0.3, 1.9, 0)).length(),
+            support::doubleRounding(20) * kVoxel);
+  EXPECT_THROW((void)mapping::closestSurfacePoint(band, V3d(0, 2.4, 0)), InvalidInput);
+  EXPECT_THROW((void)mapping::closestSurfacePoint(band, V3d(0, 2.4, 2)), InvalidInput);
 }
 
 TEST(OpenSurface, CarriesTextures) {

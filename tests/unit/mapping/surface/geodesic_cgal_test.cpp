@@ -63,7 +63,7 @@ double worstDifference(const NarrowBand& band, const levelset::TriMesh& mesh,
                        std::vector<V3d> places) {
   Judge judge(mesh);
   const mapping::SurfaceField field(band);
-  for (V3d& p : places) p = mapping::closestSurfacePoint(band, p, "test");
+  for (V3d& p : places) p = mapping::closestSurfacePoint(band, p);
   double worst = 0;
   for (std::size_t i = 0; i + 1 < places.size(); ++i) {
     judge.startAt(places[i]);

@@ -186,8 +186,8 @@ TEST(Geodesic, IsTheSameFromEitherEnd) {
   const NarrowBand torus =
       levelset::makeTorus(2, 0.7, V3d(0.3, 0, 0), V3d(1, 2, 3).normalized(), 0.1);
   const SurfaceField field(torus);
-  const V3d a = mapping::closestSurfacePoint(torus, V3d(2, 1, -1), "test"),
-            b = mapping::closestSurfacePoint(torus, V3d(-2, 0.5, 1), "test");
+  const V3d a = mapping::closestSurfacePoint(torus, V3d(2, 1, -1)),
+            b = mapping::closestSurfacePoint(torus, V3d(-2, 0.5, 1));
   const double there = pathLength(geodesic(field, 0, a, b)),
                back = pathLength(geodesic(field, 0, b, a));
   EXPECT_NEAR(there, back, support::rounding(0.25) * there);
