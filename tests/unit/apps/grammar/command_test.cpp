@@ -13,6 +13,7 @@
 #include "levelset/shapes/shapes.h"
 #include "render/images/image.h"
 #include "tests/support/command_line.h"
+#include "tests/support/measured.h"
 
 namespace command_test {
 
@@ -30,9 +31,9 @@ class Command : public support::ShellTest {
 
 TEST_F(Command, MeasuresASphere) {
   const Json m = measure("sphere --radius 1 --voxel 0.05");
-  EXPECT_NEAR(m["volume"], 4 * kPi / 3, 2e-3 * 4 * kPi / 3);
-  EXPECT_NEAR(m["area"], 4 * kPi, 2e-3 * 4 * kPi);
-  EXPECT_NEAR(m["bounds"]["max"][0], 1, 0.05 * 0.05);
+  EXPECT_NEAR(m["volume"], 4 * kPi / 3, support::measured(4.43e-10) * 4 * kPi / 3);
+  EXPECT_NEAR(m["area"], 4 * kPi, support::rounding(0.3) * 4 * kPi);
+  EXPECT_NEAR(m["bounds"]["max"][0], 1, support::rounding(1) * 0.05);
   EXPECT_EQ(m["components"], 1);
   EXPECT_EQ(m["shells"], 1);
   EXPECT_EQ(m["cavities"], 0);
@@ -45,7 +46,7 @@ TEST_F(Command, SubtractsTheNewerOperandFromTheOlder) {
   const Json m =
       measure("box --size 3,3,3 --voxel 0.1 ! sphere --radius 1 --voxel 0.1 ! difference");
   // The mesh of the box removes at most h²/2 along its 36 units of edges.
-  EXPECT_NEAR(m["volume"], 27 - 4 * kPi / 3, 36 * 0.1 * 0.1 / 2);
+  EXPECT_NEAR(m["volume"], 27 - 4 * kPi / 3, support::measured(34.9, 36) * 0.1 * 0.1 / 2);
   EXPECT_EQ(m["cavities"], 1);
   EXPECT_EQ(m["shells"], 2);
 }
@@ -58,14 +59,19 @@ TEST_F(Command, ChangesOnlyMaskedPoints) {
       return measure(box + " ! " + action + mask)["volume"].get<double>();
     };
     const double everywhere = volume("");
-    EXPECT_NEAR(volume(" --mask x --mask-min 8 --mask-max 9"), before, 1e-3) << action;
-    EXPECT_NEAR(volume(" --mask x --mask-min -9 --mask-max -8"), everywhere, 1e-3) << action;
+    EXPECT_NEAR(volume(" --mask x --mask-min 8 --mask-max 9"), before, support::rounding(8))
+        << action;
+    EXPECT_NEAR(volume(" --mask x --mask-min -9 --mask-max -8"), everywhere,
+                support::measured(9.42e-4, 1e-3))
+        << action;
     // Half of a solid that is symmetric. The new wall of 1.4² of a cavity lies within half a voxel
     // of the middle.
     const double right = volume(" --mask x --mask-min -0.05 --mask-max 0.05");
-    EXPECT_NEAR(right, volume(" --mask x --mask-min -0.05 --mask-max 0.05 --mask-invert"), 0.01)
+    EXPECT_NEAR(right, volume(" --mask x --mask-min -0.05 --mask-max 0.05 --mask-invert"),
+                support::measured(0.00412))
         << action;
-    EXPECT_NEAR(right, (before + everywhere) / 2, 0.05 * 1.4 * 1.4) << action;
+    EXPECT_NEAR(right, (before + everywhere) / 2, support::measured(0.045, 0.05) * 1.4 * 1.4)
+        << action;
   }
   EXPECT_DOUBLE_EQ(measure(box + " ! open 0.5 --mask x --half-width 5")["half_width"], 5);
 }
@@ -76,7 +82,7 @@ TEST_F(Command, ResolvesLengthsInVoxelsAndPercent) {
                                     {"-0.2", -0.2},
                                     {"5%", 0.05 * 2 * std::sqrt(3.0) * radius}}) {
     const Json m = measure("sphere --radius 1 --voxel 0.05 ! offset " + text);
-    EXPECT_NEAR(m["bounds"]["max"][1], radius + grown, 0.05 * voxel) << text;
+    EXPECT_NEAR(m["bounds"]["max"][1], radius + grown, support::measured(2.03e-9) * voxel) << text;
   }
 }
 
@@ -87,14 +93,14 @@ TEST_F(Command, ReadsItsOwnFiles) {
             0);
   const Json band = measure("read a.vdb");
   const double exact = 2 * kPi * kPi * 2 * 0.7 * 0.7;
-  EXPECT_NEAR(band["volume"], exact, 1e-4 * exact);
+  EXPECT_NEAR(band["volume"], exact, support::measured(5.91e-6) * exact);
   EXPECT_EQ(band["euler"], 0);
   // Flat triangles lie inside the curved surface.
   const double flat = measure("read a.ply")["volume"];
-  EXPECT_NEAR(flat, exact, 5e-3 * exact);
+  EXPECT_NEAR(flat, exact, support::measured(0.00419, 5e-3) * exact);
   for (const char* file : {"a.ply", "a.obj.gz", "a.stl", "a.off"}) {
     const Json mesh = measure(std::string("read ") + file);
-    EXPECT_NEAR(mesh["volume"], flat, 1e-6 * exact) << file;
+    EXPECT_NEAR(mesh["volume"], flat, support::measured(3.97e-9) * exact) << file;
     EXPECT_EQ(mesh["closed_manifold"], true) << file;
   }
   EXPECT_EQ(fileCount(), 5u);
@@ -105,7 +111,7 @@ TEST_F(Command, PipesThroughStandardStreams) {
       shell(command() + " --quiet sphere --radius 1 --voxel 0.1 ! mesh ! write - --format ply | " +
             command() + " read - --format ply ! measure --json");
   EXPECT_EQ(outcome.code, 0) << outcome.err;
-  EXPECT_NEAR(Json::parse(outcome.out)["volume"], 4 * kPi / 3, 0.05);
+  EXPECT_NEAR(Json::parse(outcome.out)["volume"], 4 * kPi / 3, support::measured(0.0254));
 }
 
 TEST_F(Command, KeepsDataApartFromMessagesOnStandardOutput) {
@@ -214,8 +220,8 @@ TEST_F(Command, PlansARotatedBandAtItsPosition) {
             0);
   ASSERT_EQ(levelsmith("--dry-run --report r.json read a.vdb ! render a.png").code, 0);
   const Json read = Json::parse(support::slurp(folder_ / "r.json"))["steps"][0]["result"];
-  EXPECT_NEAR(read["half_width"], 5, 1e-6);
-  EXPECT_NEAR(read["voxel_size"], 0.1, 1e-9);
+  EXPECT_NEAR(read["half_width"], 5, support::measured(2.87e-13));
+  EXPECT_NEAR(read["voxel_size"], 0.1, support::doubleRounding(40));
 }
 
 TEST_F(Command, DryRunComputesAndWritesNothing) {
@@ -240,8 +246,9 @@ TEST_F(Command, DryRunResolvesEveryLength) {
   EXPECT_EQ(steps[3]["resolved"]["embed"]["world"], 0.5);
   EXPECT_EQ(steps[3]["resolved"]["blend"]["voxels"], 2);
   // The rings are 11 wide, and the patch enlarges them to at least this size.
-  EXPECT_NEAR(steps[3]["result"]["voxel_size"], 0.25 * 20 / 11, 1e-9);
-  EXPECT_NEAR(steps[5]["resolved"]["radius"]["world"], 2 * 0.25 * 20 / 11, 1e-9);
+  EXPECT_NEAR(steps[3]["result"]["voxel_size"], 0.25 * 20 / 11, support::doubleRounding(4));
+  EXPECT_NEAR(steps[5]["resolved"]["radius"]["world"], 2 * 0.25 * 20 / 11,
+              support::doubleRounding(4));
   EXPECT_TRUE(steps[6]["resolved"].contains("sigma"));
   // Each note appears once.
   const std::size_t first = outcome.err.find("voxel = "), end = outcome.err.find('\n');
@@ -301,21 +308,21 @@ TEST_F(Command, RendersExrAndPng) {
     EXPECT_TRUE(image.channels.contains(layer)) << layer;
   ASSERT_TRUE(image.ids.contains("id"));
   const std::size_t middle = 24 * 64 + 32;
-  EXPECT_NEAR(image.channels.at("Z")[middle], std::sqrt(29.0) - 1, 0.01);
-  EXPECT_NEAR(image.channels.at("curvature.mean")[middle], 1, 0.05);
+  EXPECT_NEAR(image.channels.at("Z")[middle], std::sqrt(29.0) - 1, support::measured(0.00284));
+  EXPECT_NEAR(image.channels.at("curvature.mean")[middle], 1, support::measured(0.00188));
   EXPECT_EQ(image.channels.at("Z")[0], std::numeric_limits<float>::infinity());
 }
 
 TEST_F(Command, OutputMayEqualInput) {
   ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.1 ! write a.vdb").code, 0);
   ASSERT_EQ(levelsmith("read a.vdb ! offset 0.2 ! write a.vdb").code, 0);
-  EXPECT_NEAR(measure("read a.vdb")["bounds"]["max"][0], 1.2, 0.01);
+  EXPECT_NEAR(measure("read a.vdb")["bounds"]["max"][0], 1.2, support::doubleRounding(1.5));
 }
 
 TEST_F(Command, ReportsTheContentsOfAFile) {
   ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.1 ! write a.vdb ! mesh ! write a.ply").code, 0);
   const Json vdb = Json::parse(levelsmith("info a.vdb --json").out);
-  EXPECT_NEAR(vdb["grids"][0]["voxel_size"], 0.1, 1e-9);
+  EXPECT_NEAR(vdb["grids"][0]["voxel_size"], 0.1, support::doubleRounding(4));
   EXPECT_EQ(vdb["grids"][0]["class"], "level set");
   EXPECT_GT(Json::parse(levelsmith("info a.ply --json").out)["vertices"], 100);
 }
@@ -324,11 +331,11 @@ TEST_F(Command, TransformsExactlyAndBakesOnRequest) {
   EXPECT_NEAR(
       measure("box --size 2,1,1 --voxel 0.05 ! transform --rotate 90 --translate 1,0,0")["bounds"]
                                                                                         ["max"][1],
-      1, 0.003);
+      1, support::rounding(1));
   // Both lose the same at their edges, which are rounded within a voxel.
   const double whole = measure("box --size 2,1,1 --voxel 0.05")["volume"];
   EXPECT_NEAR(measure("box --size 1,1,1 --voxel 0.05 ! transform --scale 2,1,1 --bake")["volume"],
-              whole, 0.005);
+              whole, support::measured(0.00149));
   EXPECT_REFUSED(levelsmith("box --size 1,1,1 --voxel 0.05 ! transform --mirror x ! measure"), 2,
                  "--bake");
 }

@@ -11,6 +11,7 @@
 #include "apps/pipeline/registry/operator.h"
 #include "levelset/error.h"
 #include "tests/support/command_line.h"
+#include "tests/support/measured.h"
 
 namespace readme_test {
 
@@ -78,7 +79,8 @@ TEST_F(Readme, ExamplesRun) {
   EXPECT_EQ(m["shells"], 1);
   EXPECT_EQ(m["components"], 1);
   EXPECT_GT(m["volume"], 40 * 40 * 10);
-  EXPECT_NEAR(m["bounds"]["max"][2], 5 + 8 - 0.5, 0.05);  // embedded by a voxel of the base
+  EXPECT_NEAR(m["bounds"]["max"][2], 5 + 8 - 0.5,
+              support::measured(1.14e-12));  // embedded by a voxel of the base
 }
 
 TEST_F(Docs, ExamplesRun) {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "tests/support/command_line.h"
+#include "tests/support/measured.h"
 
 namespace animate_test {
 
@@ -37,7 +38,7 @@ Imath::V3d middleOf(const Json& details, std::size_t frame, double radius = 5) {
   Imath::V3d sum(0);
   for (const Json& corner : details["frame"][frame]["corners"]) {
     const Imath::V3d c(corner[0].get<double>(), corner[1].get<double>(), corner[2].get<double>());
-    EXPECT_NEAR(c.length(), radius, 0.02);
+    EXPECT_NEAR(c.length(), radius, support::measured(1.69e-4));
     sum += c;
   }
   return sum.normalized() * radius;
@@ -75,7 +76,8 @@ TEST_F(Animate, BeginsAndEndsAsTheTextureOnItsPatches) {
   EXPECT_EQ(details["reused"], 0);
   EXPECT_EQ(details["patches_made"], 1);
   // Half way along the great circle between the two corners.
-  EXPECT_NEAR(details["frame"][1]["corners"][0][1].get<double>(), -2.36, 0.02);
+  EXPECT_NEAR(details["frame"][1]["corners"][0][1].get<double>(), -2.36,
+              support::measured(0.00388));
 }
 
 TEST_F(Animate, MovesThePatchOnBasesFromFiles) {
@@ -91,7 +93,8 @@ TEST_F(Animate, MovesThePatchOnBasesFromFiles) {
     EXPECT_EQ(details["patches_made"], 2);
     EXPECT_EQ(bytes(rule + "_1.ply"), bytes(rule + "_2.ply"));
     EXPECT_NE(bytes(rule + "_2.ply"), bytes(rule + "_3.ply"));
-    EXPECT_NEAR(details["frame"][3]["drift"][1].get<double>(), rule == "rigid" ? 1 : 5.4 / 5, 0.01);
+    EXPECT_NEAR(details["frame"][3]["drift"][1].get<double>(), rule == "rigid" ? 1 : 5.4 / 5,
+                support::measured(0.0078, 0.01));
   }
   // Both options together: the other patch is on the last base.
   const Json both =
@@ -130,7 +133,7 @@ TEST_F(Animate, MovesMeshesDecalsGridsAndPatchesFromFiles) {
                "mesh @ring --as m ! animate @ball @m @here @there --map mesh --frames 3 --out "
                "m_#.ply");
   EXPECT_NE(bytes("m_0.ply"), bytes("m_1.ply"));
-  EXPECT_LT((middleOf(mesh, 1) - between).length(), 0.125);
+  EXPECT_LT((middleOf(mesh, 1) - between).length(), support::measured(0.106, 0.125));
   const Json decals = reportOf(kScene +
                                "decal @ball --at 0,0,5 --direction 1,0,0 --radius 2 --height 1 "
                                "--levels 2 --spacing 1 --as d ! decal "
@@ -140,7 +143,7 @@ TEST_F(Animate, MovesMeshesDecalsGridsAndPatchesFromFiles) {
                                "@ring @d @e" +
                                tail);
   EXPECT_EQ(decals["patches_made"], 1);
-  EXPECT_LT((middleOf(decals, 1) - between).length(), 0.02);
+  EXPECT_LT((middleOf(decals, 1) - between).length(), support::measured(6.15e-12));
   EXPECT_REFUSED(levelsmith(kScene +
                             "decal @ball --at 0,0,5 --direction 1,0,0 --radius 2 --height "
                             "1 --as d ! animate @ball @ring @d --carry corners" +
@@ -155,15 +158,15 @@ TEST_F(Animate, MovesMeshesDecalsGridsAndPatchesFromFiles) {
                "@g @h" +
                tail);
   EXPECT_EQ(tiles["patches_made"], 1);
-  EXPECT_NEAR(middleOf(tiles, 1).x, 0.25, 0.02);
-  EXPECT_NEAR(middleOf(tiles, 1).y, 0, 0.02);
+  EXPECT_NEAR(middleOf(tiles, 1).x, 0.25, support::measured(9.32e-4));
+  EXPECT_NEAR(middleOf(tiles, 1).y, 0, support::measured(1.14e-9));
   ASSERT_EQ(levelsmith(kScene + "write @here here.patch ! write @there there.patch").code, 0);
   const auto outcome = levelsmith(
       "--report run.json " + kScene +
       "read here.patch --as p ! read there.patch --as q ! animate @ball @ring @p @q" + tail);
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   const Json files = Json::parse(bytes("run.json"))["steps"].back()["details"];
-  EXPECT_LT((middleOf(files, 1) - between).length(), 0.125);
+  EXPECT_LT((middleOf(files, 1) - between).length(), support::measured(0.106, 0.125));
   EXPECT_NE(outcome.err.find("not in its file"), std::string::npos) << outcome.err;
 }
 

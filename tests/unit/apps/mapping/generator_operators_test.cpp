@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/support/command_line.h"
+#include "tests/support/measured.h"
 
 namespace generators_command_test {
 
@@ -116,7 +117,7 @@ TEST_F(Generators, ReportTheirPeriod) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_NE(outcome.err.find("--texture-box \"-1,-1.5,-0.5 1,1.5,0.5\""), std::string::npos)
       << outcome.err;
-  EXPECT_NEAR(Json::parse(outcome.out)["bounds"]["max"][0], 1.4, 0.01);
+  EXPECT_NEAR(Json::parse(outcome.out)["bounds"]["max"][0], 1.4, support::doubleRounding(1.5));
 }
 
 }  // namespace generators_command_test

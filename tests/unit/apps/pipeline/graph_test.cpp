@@ -16,6 +16,7 @@
 #include "levelset/error.h"
 #include "levelset/shapes/shapes.h"
 #include "tests/support/command_line.h"
+#include "tests/support/measured.h"
 
 namespace graph_test {
 
@@ -73,7 +74,7 @@ TEST(Graph, TakesGivenValuesAndReturnsResults) {
   run(graph, settings, report);
   ASSERT_EQ(report.steps.size(), 1u);
   ASSERT_EQ(made.size(), 1u);
-  EXPECT_NEAR(made.at(1).plan().bounds.max.x, 1.5, 1e-3);
+  EXPECT_NEAR(made.at(1).plan().bounds.max.x, 1.5, support::rounding(1.5));
 }
 
 TEST(Graph, CancelsAnAction) {

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "tests/support/command_line.h"
+#include "tests/support/measured.h"
 
 namespace task_scheduler_test {
 
@@ -379,7 +380,8 @@ TEST_F(Branches, ReadTheFilesOfASceneWrittenBefore) {
   const auto alone = levelsmith("--threads 1 " + chain),
              beside = levelsmith("--threads 4 " + chain);
   ASSERT_EQ(alone.code, 0) << alone.err;
-  EXPECT_NEAR(nlohmann::json::parse(alone.out)["volume"].get<double>(), 33.5, 0.1);
+  EXPECT_NEAR(nlohmann::json::parse(alone.out)["volume"].get<double>(), 33.5,
+              support::measured(0.0103));
   ASSERT_EQ(levelsmith("sphere --radius 1 --voxel 0.05 ! write s-a.vdb").code, 0);
   EXPECT_EQ(levelsmith("--threads 4 " + chain).out, alone.out);
   EXPECT_EQ(beside.out, alone.out);
