@@ -73,7 +73,7 @@ inline double concaveEdge(double u, double v) {
   return -convexEdge(-u, -v);
 }
 
-/// Distance to a box; exact outside, a lower bound of the depth inside.
+/// Signed distance to a box, exact inside and outside.
 inline double boxDistance(const Imath::V3d& p, const Imath::Box3d& box) {
   double depth = -HUGE_VAL, squared = 0;
   for (int axis = 0; axis < 3; ++axis) {

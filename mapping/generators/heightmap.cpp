@@ -15,7 +15,8 @@ using levelset::ShapeOptions;
 
 // Upper bound of the sum of the magnitudes of the weights of cubic convolution, in one dimension.
 constexpr double kCubicWeights = 1.25;
-// Upper bound of its slope, relative to the largest difference of neighbours.
+// Upper bound of the slope of cubic convolution in one dimension, per node spacing, relative to the
+// largest difference of neighbouring nodes.
 constexpr double kCubicSlope = 1.5;
 
 void requireHeightmap(const Heightmap& heightmap, const V3d& center) {
@@ -31,8 +32,9 @@ void requireHeightmap(const Heightmap& heightmap, const V3d& center) {
   }
   const auto count = static_cast<std::size_t>(grid.columns) * static_cast<std::size_t>(grid.rows);
   if (grid.heights.size() != count) {
-    throw levelset::UsageError(fmt::format("the grid of {} x {} nodes has {} heights", grid.columns,
-                                           grid.rows, grid.heights.size()));
+    throw levelset::UsageError(
+        fmt::format("the grid of {} x {} nodes has {} heights; give one for each node",
+                    grid.columns, grid.rows, grid.heights.size()));
   }
   for (std::size_t i = 0; i < count; ++i) {
     if (std::isfinite(grid.heights[i])) continue;
@@ -43,15 +45,15 @@ void requireHeightmap(const Heightmap& heightmap, const V3d& center) {
   }
 }
 
-/// A height and its derivatives with respect to u and v.
+/// Interpolated grid value, and its derivatives with respect to u and v.
 struct HeightJet {
   double value = 0;
   V2d slope{0, 0};
 };
 
-/// The surface over the unit square. Beyond the border, cubic convolution uses values of the
-/// parabola through the last three nodes, so that it reproduces parabolas up to the border
-/// [Keys81].
+/// Interpolates the grid values over the unit square of u and v. Beyond the border, cubic
+/// convolution uses values of the parabola through the last three nodes, so that it reproduces
+/// parabolas up to the border [Keys81].
 class HeightSurface {
  public:
   explicit HeightSurface(const Heightmap& heightmap)
@@ -65,7 +67,7 @@ class HeightSurface {
   struct Range {
     double low = HUGE_VAL, high = -HUGE_VAL;
   };
-  /// Bounds of all heights.
+  /// Bounds of all interpolated values. Cubic interpolation may exceed the values of the nodes.
   [[nodiscard]] Range range() const {
     const bool isLinear = heightmap_.interpolation == HeightInterpolation::Linear;
     const double beyond = isLinear ? 0 : (kCubicWeights * kCubicWeights - 1) / 2;
@@ -86,7 +88,7 @@ class HeightSurface {
     return all;
   }
 
-  /// Bounds of the slopes along u and v.
+  /// Upper bounds of |∂/∂u| and |∂/∂v| of the interpolated values.
   [[nodiscard]] V2d steepest() const {
     V2d difference(0, 0);
     const bool isLinear = heightmap_.interpolation == HeightInterpolation::Linear;
@@ -103,7 +105,8 @@ class HeightSurface {
   }
 
  private:
-  /// A position between two nodes.
+  /// Position along one axis: the node before it, the fraction `t` of the way to the next node, and
+  /// the number of intervals.
   struct Station {
     int node;
     double t, count;
@@ -114,7 +117,8 @@ class HeightSurface {
     }
   };
 
-  /// Height of a node, counted from the smallest x and y; also for one node beyond each border.
+  /// Value of node (i, j), where (0, 0) has the smallest x and y; also for one node beyond each
+  /// border.
   [[nodiscard]] double node(int i, int j) const {
     if (i < 0 || i >= columns_) {
       return beyond(columns_, i, [&](int inner) { return node(inner, j); });
@@ -169,7 +173,8 @@ class HeightSurface {
   int columns_, rows_;
 };
 
-/// Range of heights that the surface may have above the base, world units; at least 0 … height.
+/// Bounds of the height above the base that the surface may have, world units. Cubic interpolation
+/// may exceed 0 and `height`.
 HeightSurface::Range worldRange(const Heightmap& heightmap) {
   HeightSurface::Range range = HeightSurface(heightmap).range();
   return {range.low * heightmap.height, range.high * heightmap.height};
@@ -195,8 +200,8 @@ class HeightField {
     const HeightJet jet = surface_.at((p.x - tile_.min.x) / heightmap_.size.x,
                                       (p.y - tile_.min.y) / heightmap_.size.y);
     const double above = p.z - zero_ - jet.value * heightmap_.height;
-    // Lower bound of the distance. Near the surface its own slope gives a better value, which
-    // elsewhere could miss a cliff.
+    // The steepest slope of the entire surface gives a lower bound of the distance. Near the
+    // surface the local slope gives a better value; further away it could miss a cliff.
     double value = above / steepest_;
     if (std::abs(value) < trusted_) {
       const V2d slope(jet.slope.x / heightmap_.size.x, jet.slope.y / heightmap_.size.y);
@@ -230,7 +235,7 @@ ShapeExtent heightmapExtent(const Heightmap& heightmap, const V3d& center) {
   Imath::Box3d bounds = heightmapBox(heightmap, center).whole;
   const HeightSurface::Range range = worldRange(heightmap);
   bounds.max.z = bounds.min.z + heightmap.base + std::max(range.high, 0.0);
-  // Area of the top, from the steps along both axes.
+  // Area of the top, from the differences of neighbouring nodes along both axes.
   const HeightGrid& grid = heightmap.grid;
   const double dx = heightmap.size.x / (grid.columns - 1), dy = heightmap.size.y / (grid.rows - 1);
   double top = 0;

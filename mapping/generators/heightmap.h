@@ -12,12 +12,12 @@ namespace mapping {
 /// Heights at the nodes of a rectangular grid, like the pixels of a picture.
 struct HeightGrid {
   int columns = 0, rows = 0;    ///< at least 2 of each
-  std::vector<double> heights;  ///< rows × columns, 0 … 1; the first row has the largest y
+  std::vector<double> heights;  ///< rows × columns, values 0 … 1; the first row has the largest y
 };
 
 enum class HeightInterpolation {
   Linear,  ///< linear along each axis, with creases along the grid lines
-  Cubic    ///< cubic convolution [Keys81]: smooth; may overshoot by a quarter of a step
+  Cubic  ///< cubic convolution [Keys81]: smooth; may exceed the nodes by up to 0.29 of their range
 };
 
 struct Heightmap {
@@ -31,7 +31,7 @@ struct Heightmap {
 /// Interpolated grid value at u, v in 0 … 1 along x and y.
 [[nodiscard]] double heightAt(const Heightmap& heightmap, double u, double v);
 
-/// Box of base and heights.
+/// Boxes of the solid. Along z, they contain the base and grid values from 0 to 1.
 [[nodiscard]] TileBox heightmapBox(const Heightmap& heightmap, const Imath::V3d& center);
 [[nodiscard]] levelset::ShapeExtent heightmapExtent(const Heightmap& heightmap,
                                                     const Imath::V3d& center);
@@ -50,8 +50,9 @@ void checkHeightmap(const Heightmap& heightmap, const Imath::V3d& center, double
 
 /// Builds only the top, as an open mesh that faces up: a terrain that surfaceBand can turn into a
 /// base. Vertices are at most `spacing` apart, evenly along x and along y, with u and v as texture
-/// coordinates. Heights are those of the picture, even where a solid would be clipped below.
-/// @throws UsageError as makeHeightmap, and for a spacing that is not positive
+/// coordinates. Parts that lie below the bottom of the base, where makeHeightmap clips the solid,
+/// are kept.
+/// @throws UsageError for the errors of makeHeightmap, and for a spacing that is not positive
 /// @throws ResourceLimit if the memory estimate exceeds the limit
 /// @throws Cancelled if the progress callback cancels
 [[nodiscard]] levelset::TriMesh heightmapSheet(const Heightmap& heightmap, const Imath::V3d& center,

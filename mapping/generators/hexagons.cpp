@@ -37,7 +37,7 @@ void requireHexagons(const Hexagons& hexagons, const V3d& center) {
   }
 }
 
-/// Distance to a hexagon around the origin.
+/// Signed distance to a hexagon around the origin.
 /// @param apothem  distance from its centre to its flats
 double hexagonDistance(double x, double y, double apothem) {
   x = std::abs(x);
@@ -52,8 +52,8 @@ double hexagonDistance(double x, double y, double apothem) {
   return beyond > 0 ? std::sqrt(beyond * beyond + beside * beside) : beyond;
 }
 
-/// Exact distance to the infinite pattern, whose plate extends infinitely downwards. `origin` is
-/// the centre of a hexagon, at the top of the plate.
+/// Exact signed distance to an infinite pattern of hexagons, whose plate extends infinitely
+/// downwards. `origin` is the centre of a hexagon, at the top of the plate.
 class HexagonField {
  public:
   HexagonField(const Hexagons& hexagons, const V3d& origin)
@@ -100,7 +100,7 @@ ShapeExtent hexagonsExtent(const Hexagons& hexagons, const V3d& center) {
   const Imath::Box3d bounds = hexagonsBox(hexagons, center).whole;
   const V3d size = bounds.size();
   const V2d period = hexagonPeriod(hexagons);
-  // The six flats of each hexagon; horizontal faces are added below.
+  // Area of the six flats of each hexagon, per area of the plate; horizontal faces are added below.
   const double walls = 2 * kRoot3 * hexagons.size * hexagons.height / (period.x * period.y);
   return {bounds, size.x * size.y * (2 + walls) + 2 * (size.x + size.y) * size.z};
 }
@@ -118,8 +118,8 @@ levelset::NarrowBand makeHexagons(const Hexagons& hexagons, const V3d& center, d
   checkHexagons(hexagons, center, voxelSize, options);
   const TileBox box = hexagonsBox(hexagons, center);
   const V2d period = hexagonPeriod(hexagons);
-  // The tile's lower side halves the hexagons of the first row. A side beside the row would cut
-  // slivers off the corners of the next row.
+  // The side of the tile at its smallest y passes through the centres of the hexagons in the first
+  // row. A side between two rows would cut slivers off the corners of the next row.
   const V3d origin(box.tile.min.x + period.x / 2, box.tile.min.y, box.tile.max.z - hexagons.height);
   const HexagonField pattern(hexagons, origin);
   const double exact = (options.halfWidth + 0.5) * voxelSize;

@@ -20,7 +20,8 @@ struct Hexagons {
   double gap = 0.2;     ///< gap between hexagons, or thickness of a honeycomb's walls
   double height = 0.5;  ///< height above the plate
   double base = 0.2;    ///< thickness of the plate; 0: separate pillars, or cells open at both ends
-  double rounding = 0;  ///< radius of the upper edges; also of the corners of raised hexagons
+  /// Rounding radius of the upper edges, and of the upright edges of raised hexagons.
+  double rounding = 0;
   Tiling tiling = {};
 };
 
@@ -31,7 +32,8 @@ void checkHexagons(const Hexagons& hexagons, const Imath::V3d& center, double vo
                    const levelset::ShapeOptions& options = {});
 
 /// Builds hexagons.
-/// @throws UsageError for lengths out of range, and a rounding wider than half of the rounded part
+/// @throws UsageError for lengths out of range, and a rounding larger than the height or half the
+///         width of pillars or walls
 /// @throws InvalidInput for a size or gap under two voxels
 /// @throws ResourceLimit if the memory estimate exceeds the limit
 /// @throws Cancelled if the progress callback cancels

@@ -42,15 +42,15 @@ void requireKnurl(const Knurl& knurl, const V3d& center) {
 }
 
 /// Profile of the relief across the grooves, as heights at four stations per pitch. The stations
-/// are the bottom, the edge of the crest, the middle between two grooves, and the edge of the crest
-/// before the next groove. They are numbered continuously, so that neighbouring grooves compute the
-/// same bits.
+/// are the bottom of a groove, the edge of the crest, the middle between two grooves, and the edge
+/// of the crest before the next groove. They are numbered continuously, so that neighbouring
+/// grooves compute the same bits.
 class GrooveStations {
  public:
   explicit GrooveStations(const Knurl& knurl)
       : pitch_(knurl.pitch),
         depth_(depthOf(knurl)),
-        // Half width of a groove's mouth. Sharp crests have no land between them.
+        // Half width of a groove's mouth. Sharp crests have no flat land between the grooves.
         mouth_(std::min(depth_ * std::tan(knurl.flankAngle / 2), knurl.pitch / 2)),
         isSharp_(mouth_ > knurl.pitch / 2 * (1 - 1e-9)) {}
 
@@ -69,7 +69,8 @@ class GrooveStations {
   bool isSharp_;
 };
 
-/// Range of the grooves of one family that may meet a box, along the family's normal (cos, ±sin).
+/// Indices of the first and last groove of one family that may meet a box. Grooves are counted
+/// along the family's normal, (cos, −sin) or (cos, sin) of the groove angle.
 struct GrooveRange {
   long first, last;
 };
@@ -84,7 +85,8 @@ GrooveRange groovesOver(const Imath::Box2d& box, const V2d& normal, double pitch
   return {static_cast<long>(std::floor(low)) - 1, static_cast<long>(std::ceil(high)) + 1};
 }
 
-/// Adds the flat faces of a groove's two flanks and of the lands beside it, along the entire box.
+/// Adds the flat faces of a groove: its two flanks and half of the flat crest on each side, along
+/// the entire box.
 void addGroove(const Knurl& knurl, const GrooveStations& stations, long groove, double length,
                ReliefMesh& relief) {
   const double angle = knurl.pattern == KnurlPattern::Straight ? 0 : knurl.grooveAngle;
@@ -98,8 +100,8 @@ void addGroove(const Knurl& knurl, const GrooveStations& stations, long groove, 
                 corner(station, length)});
 }
 
-/// Adds the flat faces around the crossing of two grooves: in each quadrant a flank of each groove,
-/// and the land.
+/// Adds the flat faces around the crossing of two grooves. Each quadrant has a flank of each
+/// groove, and the flat crest between them.
 void addCrossing(const Knurl& knurl, const GrooveStations& stations, long first, long second,
                  ReliefMesh& relief) {
   const double c = 2 * std::cos(knurl.grooveAngle), s = 2 * std::sin(knurl.grooveAngle);
@@ -131,9 +133,11 @@ double crossingCount(const Knurl& knurl, const TileBox& box) {
 
 levelset::TriMesh knurlMesh(const Knurl& knurl, const V3d& center, const ShapeOptions& options) {
   const TileBox box = knurlBox(knurl, center);
-  constexpr double kBytesPerCrossing = 6000;  // 24 triangles with their vertices, edges and maps
+  // Bytes: 24 triangles with their vertices, edges and maps.
+  constexpr double kBytesPerCrossing = 6000;
   levelset::requireMemory(crossingCount(knurl, box) * kBytesPerCrossing, options.maxMemory);
-  // Coordinates in the pattern's own frame, where the tile begins at a crossing of two grooves.
+  // The relief is built in a frame whose x and y start at a corner of the tile, where the first
+  // grooves meet, and whose z starts at the crests.
   const V3d corner = box.tile.min;
   const Imath::Box2d rectangle(V2d(box.whole.min.x - corner.x, box.whole.min.y - corner.y),
                                V2d(box.whole.max.x - corner.x, box.whole.max.y - corner.y));

@@ -20,8 +20,9 @@ struct Knurl {
   double pitch = 1;  ///< distance of neighbouring grooves, across them, world units
   double depth = 0;  ///< depth of the grooves; 0: the depth at which the crests become sharp
   double flankAngle = 1.570796326795;  ///< radians between the two flanks of a groove
-  double grooveAngle = 0.5235987756;   ///< radians from y; ignored for straight grooves
-  double base = 0;                     ///< thickness of solid below the grooves
+  /// Angle of the grooves from y, radians; ignored for straight grooves.
+  double grooveAngle = 0.5235987756;
+  double base = 0;  ///< thickness of solid below the grooves, world units
   Tiling tiling = {};
 };
 
@@ -38,7 +39,7 @@ void checkKnurl(const Knurl& knurl, const Imath::V3d& center, double voxelSize,
 /// Builds a knurled plate with exact distances to all flanks, crests and sides.
 /// @throws UsageError for lengths and angles out of range, and grooves deeper than sharp crests
 ///         allow
-/// @throws InvalidInput for a pitch or depth under two voxels
+/// @throws InvalidInput for a pitch under two voxels
 /// @throws ResourceLimit if the memory estimate exceeds the limit
 /// @throws Cancelled if the progress callback cancels
 [[nodiscard]] levelset::NarrowBand makeKnurl(const Knurl& knurl, const Imath::V3d& center,

@@ -9,8 +9,8 @@ namespace {
 
 using Imath::V3d;
 
-/// Intersection of an edge with the plane axis = side; the order of the ends does not change the
-/// bits.
+/// Intersection of the edge from a to b with the plane where coordinate `axis` equals `side`.
+/// Exchanging a and b does not change the bits.
 V3d crossSide(V3d a, V3d b, int axis, double side) {
   if (std::array{b.x, b.y, b.z} < std::array{a.x, a.y, a.z}) std::swap(a, b);
   const double t = (side - a[axis]) / (b[axis] - a[axis]);

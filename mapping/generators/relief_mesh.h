@@ -14,12 +14,13 @@ namespace mapping {
 /// give its ends with the same bits; clipping at the sides of a rectangle preserves this.
 class ReliefMesh {
  public:
-  /// @param rectangle  x and y; facets are clipped there
-  /// @param snap       corners of facets within this distance of a side are moved onto it
+  /// @param rectangle  range of x and y, to which facets are clipped
+  /// @param snap       corners of facets within this distance of a side of the rectangle are moved
+  ///         onto it
   ReliefMesh(const Imath::Box2d& rectangle, double snap) : rectangle_(rectangle), snap_(snap) {}
 
   /// Adds a facet.
-  /// @param corners  of a convex polygon, anticlockwise seen from above
+  /// @param corners  corners of a convex polygon, anticlockwise seen from above
   void add(std::vector<Imath::V3d> corners);
 
   /// Returns the solid between the relief and z = bottom: walls below the relief's border and a

@@ -15,9 +15,10 @@ using levelset::ShapeOptions;
 
 constexpr int kMostRings = 1'000'000;
 
-// In radii. At this spacing and lean the least distance between the circles of a sheet is largest,
-// 0.5022. There the next ring of the row, the rings held, and the ring three rows away are equally
-// near.
+// Default spacing and lean of the rings of a sheet; spacings in ring radii, lean in radians. They
+// give the largest least distance between the circles of the rings, 0.5022 radii. Three distances
+// are then equal: to the next ring of the row, to the linked rings, and to the ring three rows
+// away.
 constexpr double kBestColumn = 2.50219, kBestRow = 0.62,
                  kBestLean = 34.7207 * 3.14159265358979323846 / 180;
 
@@ -26,7 +27,7 @@ V2d ringSpacing(const Ring& ring) {
   return {kBestColumn * ring.radius, kBestRow * ring.radius};
 }
 
-/// Radius of the round wire that contains the section.
+/// Radius of a round wire that contains the section of the wire.
 double wireReach(const Ring& ring) {
   return ring.section ? ring.section->length() / 2 : ring.tube;
 }
@@ -66,7 +67,8 @@ void requireRing(const Ring& ring, const V3d& center) {
   requireFinite(center, "the centre");
 }
 
-/// Circle of a ring: its centre, and the two directions that span it.
+/// Centre line of a ring's wire: its centre, the two directions that span its plane, its axis and
+/// its radius.
 struct Circle {
   V3d center, along{1, 0, 0}, across, axis;
   double radius;
@@ -80,8 +82,8 @@ struct Circle {
   [[nodiscard]] V3d at(double angle) const {
     return center + (along * std::cos(angle) + across * std::sin(angle)) * radius;
   }
-  /// Coordinates of a point in the half plane of the profile: outwards from the circle, and along
-  /// the axis.
+  /// Coordinates of a point in the half plane through the axis: distance outwards from the circle,
+  /// and distance along the axis.
   [[nodiscard]] V2d profile(const V3d& p) const {
     const V3d d = p - center;
     const double u = d ^ along, v = d ^ across;
@@ -89,8 +91,8 @@ struct Circle {
   }
 };
 
-/// Least distance of two circles: the nearest of many sample points of one circle, refined between
-/// its neighbours by golden-section search.
+/// Least distance of two circles. The nearest of many sample points of one circle is refined
+/// between its neighbours by golden-section search.
 double distanceOfCircles(const Circle& a, const Circle& b) {
   const auto distance = [&](double angle) { return b.profile(a.at(angle)).length(); };
   constexpr int kSamples = 360;
@@ -130,8 +132,8 @@ void requireMail(const Ring& ring) {
   }
   if (ring.rows > 1 && !holdsRing(Circle(ring, 0, 0), Circle(ring, 0, 1))) {
     throw levelset::UsageError(
-        "the rings do not hold each other; move the rows closer, or leave "
-        "--spacing and --lean out");
+        "the rings do not hold each other: no ring passes through its neighbours in the next "
+        "row; move the rows closer, or leave --spacing and --lean out");
   }
 }
 
@@ -143,14 +145,14 @@ V3d ringHalfSize(const Ring& ring) {
   return {outer, outer * c + half * s, outer * s + half * c};
 }
 
-/// Centre of the box of all rings, in the frame of ring (0, 0).
+/// Centre of the bounding box of all rings, relative to the centre of ring (0, 0).
 V3d sheetMiddle(const Ring& ring) {
   const V2d spacing = ringSpacing(ring);
   const double aside = ring.rows > 1 ? 0.5 : 0;
   return {(ring.columns - 1 + aside) * spacing.x / 2, (ring.rows - 1) * spacing.y / 2, 0};
 }
 
-/// Signed distance to all rings, exact up to `reach`.
+/// Signed distance to the union of all rings; exact up to `reach`, and cut off there.
 class RingField {
  public:
   RingField(const Ring& ring, const V3d& origin, const Imath::Box3d& bounds, double reach)
@@ -178,7 +180,8 @@ class RingField {
   }
 
  private:
-  /// The first (or last) integer of 0 … count − 1 that is not below (above) `place`.
+  /// Returns the first (or last) integer of 0 … count − 1 that is not below (above) `place`;
+  /// `count` (or −1) if there is none.
   static int nth(double place, int count, bool isFirst) {
     return static_cast<int>(isFirst ? std::clamp(std::ceil(place), 0.0, double(count))
                                     : std::clamp(std::floor(place), -1.0, double(count - 1)));
@@ -214,8 +217,8 @@ double ringClearance(const Ring& ring) {
   const V2d spacing = ringSpacing(ring);
   const double reach = 2 * (ring.radius + wireReach(ring));
   double least = HUGE_VAL;
-  // Rows and columns are periodic, so the pairs of the first two rows with their neighbourhood
-  // suffice.
+  // The arrangement repeats after two rows. So it suffices to pair the rings of the first two rows
+  // with the rings around them.
   const double ranges = std::min<double>(ring.rows, reach / spacing.y + 1) *
                         std::min<double>(ring.columns, 2 * reach / spacing.x + 3);
   if (ranges > kMostRings) return -2 * wireReach(ring);
@@ -269,7 +272,8 @@ levelset::NarrowBand makeRing(const Ring& ring, const V3d& center, double voxelS
                               const ShapeOptions& options) {
   checkRing(ring, center, voxelSize, options);
   const ShapeExtent extent = ringExtent(ring, center);
-  // Beyond the size of a leaf, blocks only need to know that they are far from the surface.
+  // Distances may be cut off here: a block of 8³ voxels has no voxel in the band if its centre is
+  // further away than the half width plus 6.1 voxels.
   const double reach = (options.halfWidth + 8) * voxelSize;
   return levelset::makeShape(extent, voxelSize, options,
                              RingField(ring, center - sheetMiddle(ring), extent.bounds, reach));

@@ -9,21 +9,23 @@
 namespace mapping {
 
 /// A single ring, flat or leaning, or a sheet of rings as European 4-in-1 chain mail. Rows along x
-/// lean alternately to either side, and every second row is shifted by half a spacing. Each ring
-/// holds two rings of the previous row and two of the next row.
+/// lean alternately to either side, and every second row is shifted by half a spacing. Each ring is
+/// linked with two rings of the previous row and two of the next row.
 struct Ring {
   double radius = 1;  ///< from the ring's centre to the middle of its wire, world units
-  double tube = 0.2;  ///< radius of round wire
-  /// Flat wire instead of `tube`: width across the ring, and along its axis.
+  double tube = 0.2;  ///< radius of round wire, world units
+  /// Section of flat wire, which replaces `tube`: width across the ring, and height along its axis,
+  /// world units.
   std::optional<Imath::V2d> section = {};
   /// Angle about x by which the axis leans from z towards −y, and towards +y in every second row;
   /// radians. Empty: 0 for a single ring; in sheets the angle with the largest clearance.
   std::optional<double> lean = {};
   int columns = 1, rows = 1;
-  /// Distance between the rings of a row, and between rows. Empty: the spacing with the largest
-  /// clearance.
+  /// Distance between the rings of a row, and between rows, world units. Empty: the spacing with
+  /// the largest clearance.
   std::optional<Imath::V2d> spacing = {};
-  double clearance = 0;  ///< required clearance between wires; at least two voxels in any case
+  /// Required clearance between wires, world units; at least two voxels in any case.
+  double clearance = 0;
 
   [[nodiscard]] bool isSheet() const { return columns > 1 || rows > 1; }
 };
@@ -37,16 +39,16 @@ struct Ring {
 /// wire counts as round wire through its corners. Negative if wires overlap.
 [[nodiscard]] double ringClearance(const Ring& ring);
 
-/// The tile is one period: whole spacings, two rows at a time.
+/// Boxes of the rings. The tile of a sheet is `columns` by `rows` spacings; with an even number of
+/// rows the sheet repeats after it. The tile of a single ring is its bounding box.
 [[nodiscard]] TileBox ringBox(const Ring& ring, const Imath::V3d& center);
 [[nodiscard]] levelset::ShapeExtent ringExtent(const Ring& ring, const Imath::V3d& center);
 void checkRing(const Ring& ring, const Imath::V3d& center, double voxelSize,
                const levelset::ShapeOptions& options = {});
 
 /// Builds a ring or sheet with exact distances.
-/// @param center  centre of the box of all rings
-/// @throws UsageError for lengths and angles out of range, and rings that touch or do not hold each
-///         other
+/// @param center  centre of the bounding box of all rings
+/// @throws UsageError for lengths and angles out of range, and rings that touch or are not linked
 /// @throws InvalidInput for wire under two voxels, or less than two voxels between wires
 /// @throws ResourceLimit if the memory estimate exceeds the limit
 /// @throws Cancelled if the progress callback cancels

@@ -81,20 +81,20 @@ class ScaleOutline {
     radius_ = (tip * tip + side * side) / (2 * side);
     aside_ = radius_ - side;
     notch_ = middle_ + std::sqrt(radius_ * radius_ - (half_ + aside_) * (half_ + aside_));
-    // Point where the arcs of the scale without its rounding meet.
+    // Point where the two arcs of a scale meet after they are moved inwards by the rounding.
     const double inner = radius_ - rounding_;
     length_ = middle_ + std::sqrt(std::max(0.0, inner * inner - aside_ * aside_));
   }
 
-  /// Distance to the outline reduced by the rounding.
+  /// Signed distance to the outline moved inwards by the rounding.
   /// @param u  coordinate from the root to the tip
   /// @param v  coordinate across, from the middle of the nearest scale
   [[nodiscard]] double distance(double u, double v) const {
     v = std::abs(v);
     const double along = u - middle_, across = v + aside_;
     const double fromCenter = std::sqrt(along * along + across * across);
-    // Beyond both arcs the tip is nearest. Inside, where the arc belongs to a neighbour, the notch
-    // is nearest.
+    // Outside both arcs the tip is nearest. Inside, where the nearest arc belongs to a neighbour,
+    // the notch is nearest.
     if (fromCenter > radius_ - rounding_ && across * (radius_ - rounding_) < aside_ * fromCenter) {
       const double beyond = u - length_;
       return std::sqrt(beyond * beyond + v * v);
@@ -110,8 +110,8 @@ class ScaleOutline {
   double half_, rounding_, length_, middle_ = 0, radius_ = 0, aside_ = 0, notch_ = 0;
 };
 
-/// Distance to the pattern in its own frame. The origin is the root of the first scale, in the
-/// middle of the first column. The top of the plate is z = 0.
+/// Signed distance to the infinite pattern of scales. `origin` is the root of the first scale in
+/// the middle of the first column, at the top of the plate.
 class ScalesField {
  public:
   ScalesField(const Scales& scales, const V3d& origin, double reach)
@@ -186,10 +186,11 @@ levelset::NarrowBand makeScales(const Scales& scales, const V3d& center, double 
   checkScales(scales, center, voxelSize, options);
   const TileBox box = scalesBox(scales, center);
   const V3d origin(box.tile.min.x + scales.width / 2, box.tile.min.y, box.tile.min.z + scales.base);
-  // Beyond the size of a leaf, blocks only need to know that they are far from the surface.
+  // Distances may be cut off here: a block of 8³ voxels has no voxel in the band if its centre is
+  // further away than the half width plus 6.1 voxels.
   const double exact = (options.halfWidth + 0.5) * voxelSize;
   const ScalesField pattern(scales, origin, exact + 8 * voxelSize);
-  // Tips are not clipped at the top.
+  // The box is open at the top, so that it does not clip the tips.
   Imath::Box3d cut = box.whole;
   cut.max.z = HUGE_VAL;
   return levelset::makeShape(scalesExtent(scales, center), voxelSize, options, [&](const V3d& p) {

@@ -15,9 +15,9 @@ struct Scales {
   double thickness = 0;       ///< thickness of a scale; 0: solid down to the plate
   double tilt = 0.349065850;  ///< angle to the plate, radians
   double step = 0;            ///< distance between rows; 0: half a length
-  double tip = 0;             ///< length of the pointed part; 0: half a width, which makes it round
-  double rounding = 0;        ///< radius of the edges
-  double base = 0.3;          ///< thickness of the plate
+  double tip = 0;       ///< length of the pointed part; 0: half a width, which makes a half circle
+  double rounding = 0;  ///< rounding radius of the edges, world units
+  double base = 0.3;    ///< thickness of the plate, world units
   Tiling tiling = {};
 };
 

@@ -14,8 +14,8 @@ struct Tiling {
 
 /// Boxes of a pattern. The centre of a generator is the centre of the `whole` box.
 struct TileBox {
-  Imath::Box3d tile;   ///< the period along x and y; maps onto a patch
-  Imath::Box3d whole;  ///< the tile with the overlap and all that stands on it
+  Imath::Box3d tile;  ///< period of the pattern along x and y; a patch gets the texture of one tile
+  Imath::Box3d whole;  ///< box of the solid: the tile, its overlap, and parts that project from it
 };
 
 /// Computes the boxes of a pattern.
