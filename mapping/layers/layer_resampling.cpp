@@ -8,7 +8,8 @@ namespace {
 
 using Imath::V3d;
 
-/// Interpolates a row of positions at x = 0 … count − 1; extrapolates linearly beyond.
+/// Interpolates a row of positions at x = 0 … count − 1 (Catmull-Rom); extrapolates linearly beyond
+/// its ends.
 template <typename At>
 V3d along(const At& at, std::size_t count, double x) {
   const double last = static_cast<double>(count - 1);
@@ -35,7 +36,7 @@ V3d positionAt(const ParticleLayer& layer, double x, double y) {
   return along(row, layer.rows, y);
 }
 
-/// Adds the rim as ordinary rows and columns, which shifts each position by one along both axes.
+/// Turns the rim into ordinary rows and columns, which shifts each position by one along both axes.
 ParticleLayer withRimInside(const ParticleLayer& layer) {
   ParticleLayer wide;
   wide.columns = layer.columns + 2;
@@ -83,9 +84,10 @@ ParticleLayer withCounts(const ParticleLayer& layer, std::size_t columns, std::s
 }
 
 std::vector<EmbeddedParticle> embeddedParticles(const Patch& patch, double embedDepth) {
-  // Least distance to a neighbour that must remain, as a share of the distance on the last layer.
+  // Least distance between neighbouring columns, as a share of their distance on the outermost
+  // layer. Columns that come closer get no embedded particle.
   constexpr double kLeastShare = 0.25;
-  // Spacing of the embedded layers, in spacings of the patch's layers.
+  // Largest distance of embedded layers, in layer spacings of the patch.
   constexpr double kWidest = 1.1;
   std::vector<EmbeddedParticle> particles;
   if (embedDepth == 0 || patch.layers.size() < 2) return particles;
@@ -101,8 +103,8 @@ std::vector<EmbeddedParticle> embeddedParticles(const Patch& patch, double embed
   const double step = std::abs(last.w - before.w);
   // A smooth map has its largest errors beside its last particles. So particles continue deeper
   // than the texture, by the same depth again or by one layer spacing, whichever is less. Columns
-  // are straight there, so the embedded layers may be wider apart than the patch's, the more so the
-  // deeper they are.
+  // are straight there, so embedded layers may be kWidest spacings apart, or further where `most`
+  // limits their number.
   const double reach = std::abs(embedDepth) + std::min(std::abs(embedDepth), step);
   const double most = 2.0 * static_cast<double>(patch.layers.size());
   const auto layers = static_cast<int>(std::min(most, std::ceil(reach / (kWidest * step))));

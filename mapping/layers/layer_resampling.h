@@ -9,8 +9,8 @@
 namespace mapping {
 
 /// Resamples a layer on the smooth surface (Catmull-Rom) through its particles and rim. The new rim
-/// lies one new spacing outside, continued linearly where that is beyond the given rim. Returns the
-/// given layer if the counts are equal.
+/// lies one new spacing outside. Where that is beyond the given rim, the surface continues
+/// linearly. Returns the given layer if the counts are equal.
 /// @param columns, rows  each at least 2
 [[nodiscard]] ParticleLayer withCounts(const ParticleLayer& layer, std::size_t columns,
                                        std::size_t rows);
@@ -20,10 +20,11 @@ struct EmbeddedParticle {
   Imath::V3d position, uvw;
 };
 
-/// Particles down to w = −embedDepth, or up to w = 1 − embedDepth if embedDepth is negative. The
-/// columns of the patch continue linearly, in layers no further apart than the patch's own layers
-/// there. Particles are left out where columns converge, as below a crease.
-/// @param embedDepth  as a share of the patch's height
+/// Particles down to w = −embedDepth and somewhat deeper, or above w = 1 − embedDepth if embedDepth
+/// is negative. The columns of the patch continue linearly. The new layers are at most 1.1 layer
+/// spacings apart, or more if there would be over twice as many as the patch has. Particles are
+/// left out where columns converge, as below a crease.
+/// @param embedDepth  depth below the surface, as a share of the patch's height
 [[nodiscard]] std::vector<EmbeddedParticle> embeddedParticles(const Patch& patch,
                                                               double embedDepth);
 

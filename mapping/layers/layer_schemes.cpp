@@ -32,7 +32,7 @@ ParticleLayer layerLike(const ParticleLayer& surface, double w, double height) {
 V3d turned(const V3d& v, const V3d& from, const V3d& to) {
   const V3d axis = from.cross(to);
   const double cosine = from.dot(to);
-  // Half a turn within one step cannot occur on a dense curve.
+  // Consecutive tangents of a dense curve never differ by half a turn.
   if (cosine < -0.999) return v;
   return v + axis.cross(v) + axis.cross(axis.cross(v)) / (1 + cosine);
 }
@@ -82,7 +82,8 @@ ParticleLayer advected(const levelset::NarrowBand& space, const ParticleLayer& s
   return top;
 }
 
-/// Interpolates linearly along the straight paths from the surface to the top layer.
+/// Interpolates linearly between the surface and the top layer, along the straight path of each
+/// particle.
 ParticleLayer between(const ParticleLayer& surface, const ParticleLayer& top, double height,
                       double w) {
   ParticleLayer layer = layerLike(surface, w, w * height);
@@ -93,7 +94,8 @@ ParticleLayer between(const ParticleLayer& surface, const ParticleLayer& top, do
   return layer;
 }
 
-/// Guard whose spheres have a diameter of a twentieth of the least distance between neighbours.
+/// Returns a guard whose spheres have a diameter of a twentieth of the least distance between
+/// neighbours.
 TravelGuard guardOf(const ParticleLayer& surface) {
   constexpr double kShare = 0.05;
   double least = HUGE_VAL;
@@ -128,7 +130,8 @@ ParticleLayer conformingLayer(const levelset::NarrowBand& space, const ParticleL
 
 SweepCurve::SweepCurve(std::span<const V3d> points) {
   const std::size_t last = points.size() - 1;
-  // Tangents by the parabola through three points, at unit speed.
+  // The tangent at a point is that of the parabola through the point and its two neighbours, at
+  // unit speed.
   std::vector<V3d> tangents(points.size());
   std::vector<double> chords(last);
   for (std::size_t i = 0; i < last; ++i) chords[i] = (points[i + 1] - points[i]).length();
@@ -166,7 +169,7 @@ V3d SweepCurve::position(double length) const {
 }
 
 V3d SweepCurve::tangent(double length) const {
-  // Interpolates between the directions of two segments, from middle to middle.
+  // Interpolates between the directions of two segments; t = 0 and 1 are their middles.
   const std::size_t i = segment(length);
   const double middle = 0.5 * (lengths_[i] + lengths_[i + 1]);
   const std::size_t j =
@@ -181,15 +184,16 @@ V3d SweepCurve::tangent(double length) const {
 
 SplineSweep splineLayers(const ParticleLayer& surface, const SweepCurve& curve, double height,
                          std::size_t count, bool isFaded) {
-  constexpr std::size_t kSteps = 32;  // steps from layer to layer
-  constexpr double kCrawl = 0.02;     // least progress, as a share of the curve's
+  constexpr std::size_t kSteps = 32;  // integration steps between two layers
+  constexpr double kCrawl = 0.02;  // least forward motion in a step, as a share of the curve's own
   SplineSweep sweep;
   sweep.layers.push_back(layerLike(surface, 0, 0));
   ParticleLayer layer = surface;
   std::vector<V3d> places = particlesOf(surface), moves(places.size());
   TravelGuard guard = guardOf(surface);
   std::vector<char> isSlowed(places.size(), 0);
-  // Heights of the particles above the plane across the start of the curve.
+  // Heights of the particles above the plane through the start of the curve and perpendicular to
+  // it.
   std::vector<double> above;
   const V3d start = curve.position(0), along = curve.tangent(0);
   for (const V3d& p : places) above.push_back((p - start).dot(along));

@@ -9,25 +9,26 @@
 #include "levelset/narrow_band.h"
 #include "mapping/patches/patch.h"
 
-/// Builds particle layers from the particles on the surface, see also particle_layers.h.
+/// Builds particle layers from the particles on the surface; particle_layers.h has further
+/// functions.
 namespace mapping {
 
 /// Scheme A: each particle follows ∇φ up to the height, and the inner layers lie on its straight
 /// path [Brodersen07 §8.2]. Particles spread over convex and crowd over concave parts; they slow
 /// down towards the medial axis. Paths along a gradient do not cross.
-/// @param space    distances throughout patch space
-/// @param surface  the layer w = 0
+/// @param space    distances to the base throughout the space above the patch
+/// @param surface  the layer at w = 0
 /// @return `count` layers, the surface first
 [[nodiscard]] std::vector<ParticleLayer> conformingLayers(const levelset::NarrowBand& space,
                                                           const ParticleLayer& surface,
                                                           double height, std::size_t count);
 
-/// Computes only the layer at w of conformingLayers.
+/// Computes only the layer at w that conformingLayers would build.
 [[nodiscard]] ParticleLayer conformingLayer(const levelset::NarrowBand& space,
                                             const ParticleLayer& surface, double height, double w);
 
-/// A smooth curve with tangents through points (Catmull-Rom by chord lengths), stored as a polyline
-/// that is dense enough to measure lengths.
+/// A smooth curve with tangents through points (Catmull-Rom by chord lengths). It is stored as a
+/// polyline with so many points that lengths are accurate.
 class SweepCurve {
  public:
   /// @param points  at least two; successive points differ
@@ -45,8 +46,8 @@ class SweepCurve {
 
 struct SplineSweep {
   std::vector<ParticleLayer> layers;
-  /// Particles slowed because they would have met their neighbours, see TravelGuard, or gone
-  /// backwards.
+  /// Number of particles that were slowed because they would have met neighbours (see TravelGuard)
+  /// or moved backwards.
   std::size_t slowed = 0;
 };
 
@@ -54,13 +55,14 @@ struct SplineSweep {
 /// rotation; w is the distance travelled [Brodersen07 §8.2]. In a bend narrower than the patch,
 /// inner particles would go backwards. They are slowed almost to a stop instead, and none collides
 /// with another.
-/// @param height  distance along the curve, at most its length
-/// @param isFaded  the relief above or below the plane across the curve fades to zero at the end
+/// @param height   distance along the curve, at most its length
+/// @param isFaded  true: the distances of the particles from the plane perpendicular to the start
+///         of the curve shrink linearly to zero at its end
 [[nodiscard]] SplineSweep splineLayers(const ParticleLayer& surface, const SweepCurve& curve,
                                        double height, std::size_t count, bool isFaded);
 
 /// Twists, tapers and bends the layers about an axis, more with growing w.
-/// @param origin, axis  centre and unit normal of the patch
+/// @param origin, axis  centre of the patch, and its unit normal there
 /// @param side  unit direction towards which the axis bends
 void transformLayers(std::vector<ParticleLayer>& layers, const LayerTransform& transform,
                      const Imath::V3d& origin, const Imath::V3d& axis, const Imath::V3d& side,

@@ -32,8 +32,9 @@ V3d coons(const PatchSides& border, const ParticleLayer& layer, std::size_t colu
          (c0 * ((1 - u) * (1 - v)) + c1 * (u * (1 - v)) + c2 * (u * v) + c3 * ((1 - u) * v));
 }
 
-/// True if neighbours in rows and columns are as close as the sides suggest. Otherwise the blended
-/// start has slipped to another part of the surface.
+/// True if no distance between neighbours exceeds the limit, which is longestU along rows and
+/// longestV along columns. A larger distance means that a blended position was projected onto
+/// another part of the surface.
 bool isUnbroken(const ParticleLayer& layer, double longestU, double longestV) {
   for (std::size_t j = 0; j < layer.rows; ++j)
     for (std::size_t i = 0; i < layer.columns; ++i) {
@@ -83,8 +84,8 @@ void sweepGeodesics(const SurfaceField& field, const std::vector<V3d>& firstRow,
 
 /// Joins shortest paths through all knots.
 /// @param longest  largest length of a path between two knots
-/// @return empty if two knots are not connected, or only by a longer path; `gap` is the index of
-///         the first of them
+/// @return empty if two knots are not connected, or only by a longer path; `gap` is then the index
+///         of the first knot of that pair
 std::vector<V3d> sideThrough(const SurfaceField& field, double height,
                              const std::vector<V3d>& knots, const std::vector<V3d>* below,
                              double longest, std::size_t& gap) {
@@ -108,7 +109,8 @@ PatchSides makeSides(const levelset::NarrowBand& band, double height,
                      const std::array<V3d, 4>& corners, const PatchSides& between,
                      const PatchSides* below, const PatchSides* ground) {
   const SurfaceField field(band);
-  // Half a turn along a side adds π times the height.
+  // Largest length of a side, as a multiple of its length on the surface plus the height. Half a
+  // turn along a side adds π times the height.
   constexpr double kMostGrowth = 4;
   constexpr std::array<std::array<std::size_t, 2>, 4> kEnds = {{{0, 1}, {1, 2}, {3, 2}, {0, 3}}};
   PatchSides sides;
@@ -175,7 +177,7 @@ void addRim(const levelset::NarrowBand& band, ParticleLayer& layer) {
   layer.rim.assign(2 * (layer.columns + layer.rows) + 4, V3d(0));
   const auto onwards = [&](const V3d& last, const V3d& before) {
     const V3d offset = last - before;
-    constexpr double kMostTurn = 0.5;  // cosine
+    constexpr double kMostTurn = 0.5;  // cosine of the largest turn of the normal
     const std::optional<V3d> end = walkStraight(field, layer.height, last, offset, offset.length());
     const bool isAhead = end && field.normal(last).dot(field.normal(*end)) > kMostTurn;
     return isAhead ? *end : last + offset;
@@ -220,7 +222,8 @@ void advectPoints(const levelset::NarrowBand& band, double from, double to, std:
 
 void raisePoints(const levelset::NarrowBand& band, double height, std::span<const V3d> directions,
                  std::span<V3d> points) {
-  // Multiple of the height difference: a direction that leans by 84 degrees.
+  // Longest path, as a multiple of the height difference: a direction that leans by 84 degrees
+  // needs this length.
   constexpr double kFarthest = 10;
   constexpr int kHalvings = 40;
   const SurfaceField field(band);
@@ -244,7 +247,7 @@ void raisePoints(const levelset::NarrowBand& band, double height, std::span<cons
       const double middle = 0.5 * (below + above);
       (isAbove(middle) ? above : below) = middle;
     }
-    // Values jump at the end of the swept region.
+    // The band holds distances only in the swept region. Values jump at its end.
     if (field.value(points[i] + directions[i] * above) - height > 0.1 * field.voxelSize()) {
       throw InvalidInput(
           fmt::format("the ray from {} along {} leaves the region above the patch before "

@@ -17,7 +17,8 @@ namespace mapping {
 /// same direction.
 using PatchSides = std::array<std::vector<Imath::V3d>, 4>;
 
-/// Computes the geodesics between the corners on φ = height, through the points between them.
+/// Computes the geodesic sides between the corners on φ = height, through the given points between
+/// them.
 /// @param between  points on φ = height on each side; often none
 /// @param below    sides on the layer below, whose course the new sides follow if possible; or
 ///         nullptr
@@ -36,9 +37,9 @@ using PatchSides = std::array<std::vector<Imath::V3d>, 4>;
 
 /// Fills a layer with a grid of particles blended between the sides, projected onto φ =
 /// layer.height and relaxed. Adds the rim around it.
-/// @param layer  with counts, w and height set; its positions are computed
-/// @param guide  distances, possibly coarser, that cover the blend of the sides
-/// @throws InvalidInput where the surface cannot be followed
+/// @param layer  input with counts, w and height; its positions and rim are computed
+/// @param guide  distances, possibly coarser, that cover all positions blended between the sides
+/// @throws InvalidInput if no path on φ = layer.height joins opposite side points
 Relaxation fillLayer(const levelset::NarrowBand& band, const levelset::NarrowBand& guide,
                      const PatchSides& sides, ParticleLayer& layer);
 
@@ -47,12 +48,12 @@ Relaxation fillLayer(const levelset::NarrowBand& band, const levelset::NarrowBan
 void addRim(const levelset::NarrowBand& band, ParticleLayer& layer);
 
 /// Moves points along ∇φ from one height to another, in steps of at most half a voxel (RK2).
-/// @throws InvalidInput where a point meets the medial axis of the base before that height
+/// @throws InvalidInput where a point meets the medial axis of the base before height `to`
 void advectPoints(const levelset::NarrowBand& band, double from, double to,
                   std::span<Imath::V3d> points);
 
 /// Moves points straight along unit directions from below φ = height up to it.
-/// @throws InvalidInput where a path does not arrive within ten times the height difference
+/// @throws InvalidInput where φ = height is further away than ten times the height difference
 void raisePoints(const levelset::NarrowBand& band, double height,
                  std::span<const Imath::V3d> directions, std::span<Imath::V3d> points);
 

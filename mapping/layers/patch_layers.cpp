@@ -19,14 +19,15 @@ using Imath::V3d;
 using levelset::NarrowBand;
 using levelset::UsageError;
 
-// The system of the map is dense: n³ / 3 operations and n² numbers. This many particles cost about
-// a second or two, and are five to ten voxels apart on a patch of 100 to 200 voxels.
+// The linear system of an RBF map is dense: n³ / 3 operations and n² numbers for n particles. This
+// many particles cost a second or two, and are five to ten voxels apart on a patch of 100 to 200
+// voxels.
 constexpr double kParticleBudget = 2000;
 constexpr double kSmallestSpacing = 1.5;  // voxels; closer particles carry no more information
 constexpr std::size_t kFewest = 4;        // particles along a side
 constexpr double kMostParticles = 1e6;
 
-/// Middle of a layer, with the normal and the direction of u there.
+/// Middle of a layer, and the normal and the direction of u at that point.
 struct Axis {
   V3d origin, normal, u;
 };
@@ -60,7 +61,8 @@ struct Counts {
 
 /// Calls refit(layer, counts) for each layer above the surface whose particle spacing along u or v
 /// differs by over a quarter from that on the surface. If no spacing is requested and the automatic
-/// spacing for all layers together is wider, that one is the reference.
+/// spacing for all layers together is wider than that on the surface, the automatic spacing is the
+/// reference.
 /// @throws ResourceLimit as checkParticleCount
 template <typename Refit>
 void keepDensity(const NarrowBand& base, std::vector<ParticleLayer>& layers, double height,
@@ -120,14 +122,16 @@ void checkPatchOptions(double height, const PatchOptions& options) {
   if (!std::isfinite(t.twist) || !std::isfinite(t.bend) || !(t.taper > 0) ||
       !std::isfinite(t.taper)) {
     throw UsageError(
-        fmt::format("twist {}, taper {} and bend {}; give two angles and a positive scale", t.twist,
-                    t.taper, t.bend));
+        fmt::format("twist {}, taper {} and bend {} are out of range; give finite angles and a "
+                    "positive scale as the taper",
+                    t.twist, t.taper, t.bend));
   }
   if (options.scheme != LayerScheme::Spline && (!options.spline.empty() || options.fade)) {
     throw UsageError("--spline and --fade require --particles spline");
   }
   if (options.scheme != LayerScheme::Reduced && (options.parallel || !options.directions.empty())) {
-    throw UsageError("directions of the corners require --particles reduced");
+    throw UsageError(
+        "directions of the corners (--directions, --parallel) require --particles reduced");
   }
   if (options.parallel && !options.directions.empty()) {
     throw UsageError("--directions and --parallel exclude each other; give one of them");
@@ -144,14 +148,16 @@ void checkPatchOptions(double height, const PatchOptions& options) {
   }
   for (const V3d& p : options.spline) {
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
-      throw UsageError(fmt::format("the spline's point {} is not finite", pointAsOption(p)));
+      throw UsageError(fmt::format("the spline's point {} is not finite; give finite coordinates",
+                                   pointAsOption(p)));
     }
   }
   for (std::size_t side = 0; side < 4; ++side)
     for (const V3d& p : options.sides[side]) {
       if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
         throw UsageError(
-            fmt::format("the point {} of side {} is not finite", pointAsOption(p), side));
+            fmt::format("the point {} of side {} is not finite; give finite coordinates",
+                        pointAsOption(p), side));
       }
     }
 }
@@ -211,8 +217,8 @@ void checkParticleCount(double count, double spacing, const PatchOptions& option
 
 NarrowBand sweepAbove(const NarrowBand& base, std::span<const V3d> outline, const LayerSize& size,
                       double height, const PatchOptions& options, double lean) {
-  // Inner particles may lie outside the box of the sides, because a patch may bulge by a quarter of
-  // its width.
+  // The inner surface of a patch may leave the box of its sides, because it may bulge by a quarter
+  // of its width.
   const double bulge = 0.25 * std::min(size.u, size.v) + lean;
   return sweepPatchSpace(base, outline, bulge, height,
                          {.shared = options.space,
@@ -229,8 +235,8 @@ std::vector<ParticleLayer> layersFromSurface(const NarrowBand& base, const Parti
     std::vector<ParticleLayer> layers = conformingLayers(space, surface, height, options.layers);
     if (options.cells[0] == 0) {
       keepDensity(base, layers, height, options, [&](ParticleLayer& layer, const Counts& n) {
-        // New particles start on the surface like the others, even where it has relief between
-        // them.
+        // Resampled particles start on the surface like the original ones, even where the surface
+        // has relief between the original ones.
         ParticleLayer start = withCounts(surface, n.columns, n.rows);
         const SurfaceField field(base);
         for (V3d& p : start.positions) (void)field.project(p, 0);
@@ -280,7 +286,8 @@ void requireCovered(const NarrowBand& base, const ParticleLayer& layer) {
         place.x, place.y, place.z));
   };
   for (const V3d& p : layer.positions) require(p);
-  constexpr double kStepVoxels = 1;  // a slit of four voxels contains two of these samples
+  // Voxels between samples: at least two lie beyond the border in a slit of four voxels.
+  constexpr double kStepVoxels = 1;
   const auto steps = [&](const V3d& along) {
     return std::ceil(along.length() / (kStepVoxels * base.voxelSize()));
   };

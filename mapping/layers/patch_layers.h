@@ -27,32 +27,36 @@ struct LayerSize {
 
 [[nodiscard]] LayerSize sizeOf(const ParticleLayer& layer);
 
-/// Particle count at a spacing s: (u/s + 3)(v/s + 3), including rims, summed over the layers.
+/// Number of particles at a spacing s: (u/s + 3)(v/s + 3), including rims, summed over the layers
+/// of size u × v.
 [[nodiscard]] double particlesAt(double spacing, std::span<const LayerSize> layers);
 
-/// Spacing that gives about two thousand particles over all layers; at least 1.5 voxels.
+/// Chooses the spacing that gives about two thousand particles over all layers, world units; at
+/// least 1.5 voxels.
 /// @param times  number of copies of each layer
 [[nodiscard]] double chooseSpacing(double voxelSize, std::span<const LayerSize> layers,
                                    std::size_t times = 1);
 
 /// Number of particles along a length, at least four.
-/// @throws ResourceLimit for over a million
+/// @throws ResourceLimit for more than a million
 [[nodiscard]] std::size_t countAlong(double length, double spacing);
 
-/// Checks the total particle count.
+/// Checks the total number of particles of a patch.
 /// @throws ResourceLimit for more than a million, or more than the memory limit allows
 void checkParticleCount(double count, double spacing, const PatchOptions& options);
 
-/// Computes distances throughout patch space, from points along the outline.
-/// @param lean  how far layers may extend sideways beyond the space above the outline, world units
+/// Computes distances to the base in the space above a patch, given points along the outline of the
+/// patch.
+/// @param lean  distance by which layers may extend sideways beyond the space above the outline,
+///         world units
 [[nodiscard]] levelset::NarrowBand sweepAbove(const levelset::NarrowBand& base,
                                               std::span<const Imath::V3d> outline,
                                               const LayerSize& size, double height,
                                               const PatchOptions& options, double lean = 0);
 
-/// Schemes A and C: builds the layers by moving the particles of the surface. Unless the options
-/// give counts, a layer whose spacing travel and taper change by over a quarter is resampled at the
-/// surface's spacing.
+/// Schemes A and C: builds the layers by moving the particles of the surface. A layer whose
+/// particle spacing comes to differ by over a quarter from that on the surface is resampled, unless
+/// the options give counts.
 [[nodiscard]] std::vector<ParticleLayer> layersFromSurface(const levelset::NarrowBand& base,
                                                            const ParticleLayer& surface,
                                                            std::span<const Imath::V3d> outline,
@@ -60,12 +64,13 @@ void checkParticleCount(double count, double spacing, const PatchOptions& option
                                                            const PatchOptions& options,
                                                            PatchReport& report);
 
-/// Checks that an open surface lies under the entire layer, sampled every two voxels. A closed
+/// Checks that an open surface lies under the entire layer, at samples one voxel apart. A closed
 /// solid always passes.
 /// @throws InvalidInput with the position where the surface breaks off
 void requireCovered(const levelset::NarrowBand& base, const ParticleLayer& layer);
 
-/// Twists, tapers and bends the layers as the options request, and measures them.
+/// Twists, tapers and bends the layers as the options request. Adds the mean spacing to the patch,
+/// and the variation of the cell areas to the report.
 void finishPatch(const levelset::NarrowBand& base, const PatchOptions& options, Patch& patch,
                  PatchReport& report);
 

@@ -16,7 +16,8 @@ namespace {
 using Imath::V3d;
 
 constexpr std::size_t kMaxIterations = 1000;
-constexpr double kAtRest = 1e-3;  // voxels per iteration
+// Largest displacement of a particle at rest, voxels per iteration.
+constexpr double kAtRest = 1e-3;
 // Twelve springs of unit stiffness act on a particle. 1/12 is the longest step whose overshoot the
 // momentum can compensate.
 constexpr double kStep = 1.0 / 12;
@@ -26,7 +27,7 @@ double fractionOf(std::size_t k, std::size_t count) {
   return static_cast<double>(k) / static_cast<double>(count - 1);
 }
 
-/// A position between four particles of a layer, at fractions of its columns and rows.
+/// Bilinear interpolation at fractions u, v of a layer's columns and rows, between four particles.
 struct Between {
   std::size_t corner, columns;
   double s, t;
@@ -64,11 +65,11 @@ constexpr std::array<Spring, 12> kSprings = {{{1, 0},
                                               {0, 2},
                                               {0, -2}}};  // flexion
 
-/// Rest lengths of springs. Between the borders they are interpolated from one border's mean to the
-/// other's.
+/// Rest lengths of the springs. They are interpolated linearly between the mean spacings of two
+/// opposite borders.
 struct RestLengths {
-  /// Lengths for neighbours, and for particles two apart: on a bent surface these are less than
-  /// twice as long.
+  /// Element 0: springs between neighbours. Element 1: springs between particles two apart; on a
+  /// bent surface these are less than twice as long.
   std::array<std::vector<double>, 2> along;   // along u, for each row
   std::array<std::vector<double>, 2> across;  // along v, for each column
 
@@ -146,7 +147,7 @@ ParticleLayer coarsened(const SurfaceField& field, const ParticleLayer& fine) {
   return coarse;
 }
 
-/// Copies the first column to the last one.
+/// Copies the first column to the last one, which is the same column of a closed ring.
 void closeRing(std::vector<V3d>& positions, std::size_t columns) {
   for (std::size_t n = 0; n < positions.size(); n += columns)
     positions[n + columns - 1] = positions[n];

@@ -10,16 +10,17 @@ namespace mapping {
 struct Relaxation {
   std::size_t iterations = 0;
   double lastMove = 0;       ///< largest displacement of a particle in the last iteration, voxels
-  bool isConverged = false;  ///< lastMove ≤ 1e-3
+  bool isConverged = false;  ///< true: lastMove is at most 1e-3 voxel
 };
 
-/// Relaxes the inner particles of a layer as masses of a spring net on φ = layer.height. The net
-/// has structural, shear and flexion springs [Provot95], fixed borders, and is projected after each
-/// step. The rest length of a spring is the mean spacing of the borders parallel to it.
+/// Relaxes the inner particles of a layer as masses of a spring net. The net has structural, shear
+/// and flexion springs [Provot95] and fixed borders. After each step, its particles are projected
+/// onto φ = layer.height. The rest length of a spring is the mean spacing of the borders parallel
+/// to it.
 /// @param isRing  the last column equals the first one, and moves with it
 Relaxation relax(const levelset::NarrowBand& band, ParticleLayer& layer, bool isRing = false);
 
-/// Standard deviation / mean of the areas of a layer's cells.
+/// Ratio of the standard deviation to the mean of the areas of a layer's cells.
 [[nodiscard]] double cellAreaVariation(const ParticleLayer& layer);
 
 }  // namespace mapping

@@ -11,10 +11,12 @@ namespace {
 
 using Imath::V3d;
 
-using Bernstein = std::array<double, 27>;  // index 9 i + 3 j + k for the degrees along u, v, w
+// The coefficient of degrees i, j, k in u, v, w is at 9 i + 3 j + k.
+using Bernstein = std::array<double, 27>;
 constexpr std::array<std::size_t, 3> kBernsteinStep = {9, 3, 1};
 
-/// Edges of the image along `axis`, at the ends (a, b) of the two following axes.
+/// Edge vectors of the image of the unit cube. In along[axis][n], bits 0 and 1 of n select the ends
+/// along the two axes that follow `axis`. longest[axis] is the largest length along an axis.
 struct CornerEdges {
   std::array<std::array<V3d, 4>, 3> along;
   std::array<double, 3> longest{};
@@ -36,9 +38,9 @@ struct CornerEdges {
 /// The middle coefficient of a product of two linear functions is the mean of the mixed products.
 Bernstein coefficientsOf(const CornerEdges& edges, double hand) {
   Bernstein sums{};
-  for (std::size_t u = 0; u < 4; ++u)      // bits: v, w
-    for (std::size_t v = 0; v < 4; ++v)    // bits: w, u
-      for (std::size_t w = 0; w < 4; ++w)  // bits: u, v
+  for (std::size_t u = 0; u < 4; ++u)      // edge along u; bits 0 and 1: ends along v, w
+    for (std::size_t v = 0; v < 4; ++v)    // edge along v; bits 0 and 1: ends along w, u
+      for (std::size_t w = 0; w < 4; ++w)  // edge along w; bits 0 and 1: ends along u, v
       {
         const std::size_t i = (v >> 1) + (w & 1), j = (u & 1) + (w >> 1), k = (u >> 1) + (v & 1);
         sums[9 * i + 3 * j + k] +=
@@ -50,7 +52,8 @@ Bernstein coefficientsOf(const CornerEdges& edges, double hand) {
   return sums;
 }
 
-/// Splits the polynomial at the middle of an axis by de Casteljau's algorithm.
+/// Splits the polynomial at the middle of an axis by de Casteljau's algorithm, into a lower and an
+/// upper half.
 void halve(const Bernstein& whole, std::size_t axis, Bernstein& low, Bernstein& high) {
   const std::size_t step = kBernsteinStep[axis];
   for (std::size_t n = 0; n < 27; ++n) {
@@ -84,7 +87,8 @@ VolumeSign signOfTrilinear(const std::array<V3d, 8>& corners, double rounding, d
                            std::size_t mostPieces) {
   const CornerEdges edges(corners);
   const auto& longest = edges.longest;
-  // Error bound: sums of eight triple products and their halvings, and the errors of the corners.
+  // Rounding error bound of a coefficient: sums of eight triple products and their halvings, and
+  // the errors of the corners.
   const double slack =
       64 * std::numeric_limits<double>::epsilon() * longest[0] * longest[1] * longest[2] +
       8 * rounding * (longest[0] * longest[1] + longest[1] * longest[2] + longest[2] * longest[0]);

@@ -9,11 +9,13 @@ namespace mapping {
 
 /// Sign of the Jacobian determinant of a trilinear map, as shares of the unit cube.
 struct VolumeSign {
-  double negative = 0;   ///< share where the determinant is proven not to be positive
-  double undecided = 0;  ///< share of the pieces that contain the change of sign, or touch zero
-  double least = 0;      ///< least value found, world units³ per unit cube
-  Imath::V3d at{0};      ///< position of the least value in the unit cube
-  bool folds = false;    ///< a value found is negative, or is zero within rounding errors
+  double negative = 0;  ///< share where the determinant is proven not to be positive
+  /// Share left undecided at `mostPieces`: pieces where the determinant changes sign or touches
+  /// zero.
+  double undecided = 0;
+  double least = 0;    ///< least determinant found at a corner of a piece, world units³
+  Imath::V3d at{0};    ///< position of the least value in the unit cube
+  bool folds = false;  ///< true: a determinant found is negative, or zero within rounding errors
   std::size_t pieces = 0;
 };
 
