@@ -23,7 +23,7 @@ class CellTree {
     return std::max({sides.x, sides.y, sides.z});
   }
 
-  /// Visits the cells whose world boxes touch a box, in a fixed order, until `visit` returns true.
+  /// Visits the cells whose world boxes touch `box`, in a fixed order, until `visit` returns true.
   /// @return true if a visit returned true
   bool visit(const Imath::Box3d& box, const std::function<bool(const Cell&)>& visit) const;
 

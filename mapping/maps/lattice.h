@@ -13,8 +13,8 @@ namespace mapping {
 
 /// One of the six tetrahedra of a cell [Brodersen07 §9]. The cell is two prisms, one over each half
 /// of its bottom, each split by its lowest and highest corner. Every tetrahedron is a path from the
-/// cell's first corner to its last, along the three axes in one of six orders. So neighbours need
-/// not be stored.
+/// cell's first corner to its last, along the three axes in one of six orders. So the neighbours of
+/// a tetrahedron follow from its order and need not be stored.
 struct Tetrahedron {
   std::array<int, 3> cell{};
   int order = 0;  ///< 0 … 5, see Lattice::kOrders
@@ -29,10 +29,10 @@ class Lattice {
       {{0, 1, 2}, {0, 2, 1}, {2, 0, 1}, {1, 0, 2}, {1, 2, 0}, {2, 1, 0}}};
   using Corners = std::array<Imath::V3d, 4>;
 
-  /// Builds the grid. Layers with fewer particles are refined on a smooth surface through their
-  /// particles.
-  /// @param border  extent beyond the layers and sides, continued linearly; a rim is at least one
-  ///         cell wide
+  /// Builds the grid. Layers with fewer particles than the largest layer are refined on a smooth
+  /// surface through their particles.
+  /// @param border  extent of the lattice beyond the layers and sides, continued linearly; a rim is
+  ///         at least one cell wide
   Lattice(const Patch& patch, const LatticeBorder& border) : nodes_(latticeNodes(patch, border)) {}
 
   [[nodiscard]] const std::array<int, 3>& cells() const { return nodes_.cells; }
@@ -43,14 +43,14 @@ class Lattice {
   [[nodiscard]] Corners corners(const Tetrahedron& t) const;
   /// Texture coordinates of a tetrahedron's corners, along its path.
   [[nodiscard]] Corners textureCorners(const Tetrahedron& t) const;
-  /// Texture coordinates of a cell's box.
+  /// Box of a cell in texture coordinates.
   [[nodiscard]] Imath::Box3d textureBox(const std::array<int, 3>& cell) const;
   /// World box of a cell.
   [[nodiscard]] Imath::Box3d worldBox(const std::array<int, 3>& cell) const;
   /// True if a face of the cell lies on the border of the lattice.
   [[nodiscard]] bool isOutermost(const std::array<int, 3>& cell) const;
 
-  /// Steps to the neighbour across the face opposite `corner`. Returns false at the border.
+  /// Moves `t` to its neighbour across the face opposite `corner`. Returns false at the border.
   [[nodiscard]] bool cross(Tetrahedron& t, int corner) const;
 
   /// Finds the tetrahedron that contains a point of texture space. Returns false outside the

@@ -54,7 +54,7 @@ class LatticeBuilder {
   }
 
  private:
-  /// Sets the coordinates along u and v, with those of the outer cells.
+  /// Sets the coordinates along u and v, including those of the outer cells.
   void setCoordinatesAlongSides() {
     for (const ParticleLayer& layer : patch_.layers) {
       columns_ = std::max(columns_, layer.columns);
@@ -74,7 +74,8 @@ class LatticeBuilder {
     }
   }
 
-  /// Sets the coordinates along w: those of the layers and of the outer layers of nodes.
+  /// Sets the coordinates along w: those of the layers, and those of the outer nodes below and
+  /// above them.
   void setCoordinatesAcrossLayers() {
     std::vector<double>& w = nodes_.coordinates[2];
     const double rim = border_.rim / patch_.height, lift = std::max(0.0, -border_.embedDepth),
@@ -88,7 +89,7 @@ class LatticeBuilder {
     if (rim > 0) w.push_back(1 + lift + rim);
   }
 
-  /// Adds the particles of the layer that has the nodes (·, ·, k), and its rim.
+  /// Adds the particles of one layer as the nodes (·, ·, k), and the outer nodes around them.
   void addLayer(int k) {
     const ParticleLayer layer =
         withCounts(patch_.layers[static_cast<std::size_t>(k - below_)], columns_, rows_);
@@ -99,7 +100,7 @@ class LatticeBuilder {
     if (around_) addRim(layer, k);
   }
 
-  /// Adds the outer nodes at the sides and corners of a layer.
+  /// Adds the outer nodes along the sides and at the corners of a layer.
   void addRim(const ParticleLayer& layer, int k) {
     const std::array<int, 3>& cells = nodes_.cells;
     // The rim particles, if there are any, give the direction.
@@ -124,7 +125,8 @@ class LatticeBuilder {
       }
   }
 
-  /// Continues the columns linearly to the nodes (·, ·, to).
+  /// Continues the columns linearly to the nodes (·, ·, to), from the nodes at w-indices `near` and
+  /// `far`.
   void continueLayers(int to, int near, int far) {
     const std::vector<double>& w = nodes_.coordinates[2];
     const double share = (w[static_cast<std::size_t>(to)] - w[static_cast<std::size_t>(near)]) /
@@ -142,9 +144,9 @@ class LatticeBuilder {
   const Patch& patch_;
   const LatticeBorder& border_;
   int around_;                           ///< outer cells on each side, 0 or 1
-  std::size_t columns_ = 2, rows_ = 2;   ///< of the layers
-  std::array<double, 2> wide_ = {1, 1};  ///< width of the outer cells along u and v, cells
-  int below_ = 0, lastLayer_ = 0;        ///< w-indices of the first and the last layer
+  std::size_t columns_ = 2, rows_ = 2;   ///< largest counts of all layers
+  std::array<double, 2> wide_ = {1, 1};  ///< width of the outer cells along u and v, in inner cells
+  int below_ = 0, lastLayer_ = 0;        ///< w-indices of the nodes of the first and the last layer
   LatticeNodes nodes_;
 };
 

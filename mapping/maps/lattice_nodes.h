@@ -23,7 +23,7 @@ struct LatticeBorder {
 struct LatticeNodes {
   using Node = std::array<int, 3>;
 
-  std::array<int, 3> cells{};  ///< along u, v, w
+  std::array<int, 3> cells{};  ///< number of cells along u, v, w
   /// Texture coordinates of the nodes, along u, v, w.
   std::array<std::vector<double>, 3> coordinates;
   std::vector<Imath::V3d> positions;  ///< world positions, by index()
@@ -42,10 +42,10 @@ struct LatticeNodes {
   }
 };
 
-/// Builds the nodes from the particles of a patch. Layers with fewer particles are refined on a
-/// smooth surface through their particles.
-/// @param border  extent beyond the layers and sides, continued linearly; a rim is at least one
-///         cell wide
+/// Builds the nodes from the particles of a patch. Layers with fewer particles than the largest
+/// layer are refined on a smooth surface through their particles.
+/// @param border  extent of the lattice beyond the layers and sides, continued linearly; a rim is
+///         at least one cell wide
 [[nodiscard]] LatticeNodes latticeNodes(const Patch& patch, const LatticeBorder& border);
 
 }  // namespace mapping

@@ -35,7 +35,8 @@ LayerCell cellOf(const ParticleLayer& layer, double u, double v) {
   return {locate(u, layer.columns), locate(v, layer.rows)};
 }
 
-/// Cell of the upper layer. Most layers have equal counts, so one search serves both.
+/// Cell of the upper layer at (u, v). Most layers have equal counts, so that one search serves both
+/// layers.
 LayerCell cellAbove(const ParticleLayer& low, const LayerCell& cell, const ParticleLayer& high,
                     double u, double v) {
   return low.columns == high.columns && low.rows == high.rows ? cell : cellOf(high, u, v);
@@ -58,8 +59,8 @@ LayerFrame frameOnLayer(const ParticleLayer& layer, const LayerCell& cell) {
            (high - low) * static_cast<double>(layer.rows - 1), V3d(0)}};
 }
 
-/// Computes slopes by central differences whose steps stay in one cell. They are exact up to
-/// rounding, because the map is trilinear there.
+/// Computes slopes by central differences within one cell. They are exact up to rounding, because
+/// the map is trilinear in a cell.
 MapSample sampleAt(const Patch& patch, const V3d& uvw, const V3d& step) {
   std::array<V3d, 3> along;  // derivatives of the position along u, v and w
   for (int axis = 0; axis < 3; ++axis) {
@@ -100,7 +101,7 @@ LayerFrame layerFrame(const Patch& patch, const V3d& uvw) {
 }
 
 std::vector<MapSample> sampleLayerMap(const Patch& patch, double embedDepth) {
-  constexpr double kInside = 1e-3;  // distance of samples from the corners, in cells
+  constexpr double kInside = 1e-3;  // distance of samples from the corners of their cell, in cells
   std::vector<MapSample> samples;
   const double layers = static_cast<double>(patch.layers.size() - 1);
   for (std::size_t k = 0; k < patch.layers.size(); ++k) {

@@ -10,9 +10,9 @@
 
 namespace mapping {
 
-/// Maps texture → patch space, piecewise linear through the particles: bilinear in u and v within
-/// the two layers next to w, then linear between them [Brodersen07 §8.4]. Beyond the unit cube the
-/// outermost cells continue linearly.
+/// Maps texture coordinates to a position above the patch. The map is piecewise linear through the
+/// particles: bilinear in u and v on the two layers next to w, then linear between them
+/// [Brodersen07 §8.4]. Beyond the unit cube the outermost cells continue linearly.
 [[nodiscard]] Imath::V3d layerPosition(const Patch& patch, const Imath::V3d& uvw);
 
 /// Value and derivatives of the layer map; derivatives in world units per unit of u, v and w.
@@ -26,12 +26,12 @@ struct LayerFrame {
 [[nodiscard]] LayerFrame layerFrame(const Patch& patch, const Imath::V3d& uvw);
 
 /// Samples the layer map and the slopes of its inverse in the middle and near the corners of every
-/// cell, where a bilinear cell inverts first. For layers of different counts the cells of both
-/// layers are sampled.
+/// cell, because a bilinear cell inverts first at a corner. Between layers of different counts, the
+/// cells of both layers are sampled.
 /// @param embedDepth  also sample this far below w = 0, or above w = 1 if negative; in w
 [[nodiscard]] std::vector<MapSample> sampleLayerMap(const Patch& patch, double embedDepth);
 
-/// Longest edge of any cell of particles, including edges between layers.
+/// Longest edge of any cell of particles, including edges between layers, world units.
 [[nodiscard]] double longestCellEdge(const Patch& patch);
 
 }  // namespace mapping

@@ -21,7 +21,7 @@ struct GridBlock {
   [[nodiscard]] Imath::V3d center() const {
     return origin + (row(0) + row(1) + row(2)) * (0.5 * (edge - 1));
   }
-  /// The octant that is the upper half along i, j, k where bit 4, 2, 1 is set.
+  /// Octant of the block. Bits 4, 2 and 1 of `bits` select the upper half along i, j and k.
   /// @pre edge > kLeafEdge
   [[nodiscard]] GridBlock octant(int bits) const {
     const double half = 0.5 * edge;
@@ -34,21 +34,22 @@ struct GridBlock {
   using V3d = Imath::V3d;
 };
 
-/// A map restricted to the grid points of one block: particles far from the block are summed into
-/// an expansion, particles without influence are left out.
+/// A map restricted to the grid points of one block. Particles far from the block are summed into
+/// an expansion, and particles without influence are left out.
 class BlockMap {
  public:
   virtual ~BlockMap() = default;
-  /// Box that contains the image of the block's hull; empty if the map is not defined there.
+  /// Box of texture coordinates that contains the image of the block's hull; empty if the map is
+  /// not defined there.
   [[nodiscard]] virtual Imath::Box3d imageBounds() const = 0;
   /// True if the map is defined in all of the block's hull.
   [[nodiscard]] virtual bool isTotal() const { return true; }
-  /// The same map restricted to an octant, see GridBlock::octant.
+  /// This map restricted to an octant, see GridBlock::octant.
   [[nodiscard]] virtual std::unique_ptr<BlockMap> octant(int bits) const = 0;
   /// Computes the texture coordinates of the 512 grid points, at index 64 i + 8 j + k; NaN where
   /// the map is not defined.
   /// @pre edge == kLeafEdge
-  /// @return number of particles summed or tetrahedra tested, over all grid points
+  /// @return number of particles summed or tetrahedra tested, total of all grid points
   virtual std::size_t evaluate(std::span<Imath::V3d, 512> uvw) const = 0;
 };
 
@@ -59,18 +60,19 @@ struct MapSample {
   Imath::M33d jacobian;
 };
 
-/// A map from patch space to the texture's unit cube.
+/// A map from world positions above a patch to texture coordinates, the texture's unit cube.
 class PatchMap {
  public:
   virtual ~PatchMap() = default;
   /// Texture coordinates; NaN where the map is not defined.
   [[nodiscard]] virtual Imath::V3d operator()(const Imath::V3d& x) const = 0;
-  /// True if the map is defined only near its particles and reaches each point of texture space
+  /// True if the map is defined only near its particles, and takes each value of u, v, w at most
   /// once.
   [[nodiscard]] virtual bool isLocal() const { return false; }
   /// Jacobian with the gradients of u, v and w as rows; NaN where the map is not defined.
   [[nodiscard]] virtual Imath::M33d jacobian(const Imath::V3d& x) const = 0;
-  /// The map restricted to a block, accurate to `tolerance` in u, v and w. It refers to this map.
+  /// The map restricted to a block, accurate to `tolerance` in u, v and w. The result keeps a
+  /// reference to this map.
   [[nodiscard]] virtual std::unique_ptr<BlockMap> restrictTo(const GridBlock& block,
                                                              double tolerance) const = 0;
 };

@@ -17,8 +17,8 @@ using Imath::V3d;
 using Cell = std::array<int, 3>;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-// Tolerance for barycentric coordinates: a point on a face may have a share this far below 0 from
-// rounding.
+// Least barycentric coordinate that counts as inside. A point on a face may get one this far below
+// 0 from rounding.
 constexpr double kOnFace = -1e-9;
 
 bool isInside(const std::array<double, 4>& shares) {
@@ -49,7 +49,7 @@ Box3d around(const GridBlock& block) {
   for (int i = 0; i < 3; ++i)
     for (int axis = 0; axis < 3; ++axis)
       half[axis] += std::abs(block.row(i)[axis]) * 0.5 * (block.edge - 1);
-  // The box grows a little so that rounding does not lose cells at its border.
+  // Enlarged a little, so that rounding does not lose cells that touch the border of the box.
   half *= 1 + 1e-9;
   return {center - half, center + half};
 }
@@ -67,8 +67,8 @@ class PrismBlock final : public BlockMap {
   }
 
   [[nodiscard]] Box3d imageBounds() const override {
-    // Tetrahedra much smaller than the block fill most of their boxes, so the boxes are tight
-    // enough.
+    // With more cells than this, the tetrahedra are much smaller than the block, and their boxes
+    // bound the image tightly enough.
     constexpr std::size_t kFew = 32;
     Box3d bounds;
     for (const Cell& cell : cells_) {
@@ -139,7 +139,8 @@ class PrismBlock final : public BlockMap {
     return image;
   }
 
-  /// Walks from point to point across faces; searches the block's cells when the walk fails.
+  /// Finds the tetrahedra of successive points by walking across faces. Searches all cells of the
+  /// block when a walk fails.
   class Walk {
    public:
     explicit Walk(const PrismBlock& block)
@@ -219,7 +220,8 @@ double PrismMap::estimateBytes(const Patch& patch) {
     columns = std::max(columns, static_cast<double>(layer.columns));
     rows = std::max(rows, static_cast<double>(layer.rows));
   }
-  // Nodes, boxes, samples and the statistics computed from the samples, for each cell.
+  // Bytes for each cell: its nodes, boxes and samples, and the statistics computed from the
+  // samples.
   constexpr double kBytesPerCell = 1200;
   return kBytesPerCell * (columns + 1) * (rows + 1) *
          (static_cast<double>(patch.layers.size()) + 3);
@@ -280,7 +282,7 @@ std::vector<MapSample> PrismMap::samples() const {
 }
 
 std::size_t PrismMap::countOverlaps(std::span<const MapSample> samples, MapSample& first) const {
-  constexpr double kElsewhere = 1e-6;  // of u, v, w; rounding is far less
+  constexpr double kElsewhere = 1e-6;  // distance in u, v, w that rounding cannot explain
   std::size_t count = 0;
   for (const MapSample& sample : samples) {
     const V3d found = (*this)(sample.position);

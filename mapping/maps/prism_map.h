@@ -23,17 +23,17 @@ class PrismMap final : public PatchMap {
   [[nodiscard]] Imath::M33d jacobian(const Imath::V3d& x) const override;
   [[nodiscard]] std::unique_ptr<BlockMap> restrictTo(const GridBlock& block,
                                                      double tolerance) const override;
-  /// Samples one point in every tetrahedron that holds the texture: in the unit cube of the patch,
-  /// extended below or above it by the embedding depth.
+  /// Samples one point in every tetrahedron that contains a part of the texture. The texture fills
+  /// the unit cube of the patch, extended below or above it by the embedding depth.
   [[nodiscard]] std::vector<MapSample> samples() const;
   [[nodiscard]] bool isLocal() const override { return true; }
   /// Memory for building the map and for sampling all its tetrahedra, bytes.
   [[nodiscard]] static double estimateBytes(const Patch& patch);
-  /// Maps texture coordinates to patch space; NaN outside the lattice.
+  /// Maps texture coordinates to a world position above the patch; NaN outside the lattice.
   [[nodiscard]] Imath::V3d toPatch(const Imath::V3d& uvw) const;
   [[nodiscard]] const Lattice& lattice() const { return lattice_; }
-  /// Counts the samples whose position maps to other texture coordinates inside the texture, which
-  /// means that the offset layer passes through itself.
+  /// Counts the samples whose position maps to other texture coordinates inside the texture. Such a
+  /// sample means that the offset layer passes through itself.
   /// @param first  one such sample; unchanged if there is none
   [[nodiscard]] std::size_t countOverlaps(std::span<const MapSample> samples,
                                           MapSample& first) const;
@@ -43,14 +43,15 @@ class PrismMap final : public PatchMap {
 
  private:
   friend class PrismBlock;
-  /// Box around a point, large enough to meet the cell that contains the point despite rounding.
+  /// Box around a point. It meets the box of the cell that contains the point, despite rounding.
   [[nodiscard]] Imath::Box3d aroundPoint(const Imath::V3d& x) const;
   /// Finds the tetrahedron that contains x.
   /// @return false if there is none
   [[nodiscard]] bool find(const Imath::V3d& x, Tetrahedron& t) const;
 
   Lattice lattice_;
-  double embedDepth_;  ///< in w
+  /// Depth of the texture below w = 0; if negative, its lift above w = 1; in w.
+  double embedDepth_;
   CellTree tree_;
 };
 
