@@ -56,6 +56,7 @@ enum class LayerScheme {
 struct Patch {
   std::array<Imath::V3d, 4> corners;  ///< on the base surface, anticlockwise seen from outside
   double height = 0;                  ///< world units
+  /// True: the corners are in clockwise order seen from outside, so that the texture is mirrored.
   bool mirrored = false;
   std::vector<ParticleLayer> layers;  ///< from the surface (w = 0) outwards (w = 1)
   double spacing = 0;                 ///< mean distance of neighbouring particles, world units
@@ -69,10 +70,10 @@ struct Patch {
 
 /// Measurements of a new patch.
 struct PatchReport {
-  double uLength = 0, vLength = 0;  ///< mean length of the rows and columns at w = 0
+  double uLength = 0, vLength = 0;  ///< mean lengths of the rows and columns at w = 0, world units
   double cellAreaVariation = 0;     ///< standard deviation / mean of the cell areas at w = 0
   std::size_t relaxIterations = 0;  ///< sum over all layers
-  bool isRelaxed = true;            ///< the last step moved no particle by more than 1e-3 voxel
+  bool isRelaxed = true;  ///< true: the last iteration moved no particle by more than 1e-3 voxel
   /// Largest distance from a given corner to the surface, world units.
   double projectionDistance = 0;
   /// Spline only: number of particles that were slowed to avoid their neighbours.
@@ -90,26 +91,29 @@ struct LayerTransform {
 struct PatchOptions {
   std::size_t layers = 6;  ///< at least 2
   LayerScheme scheme = LayerScheme::Reduced;
-  /// Spline only: points of the curve after the patch's centre; none: straight along the normal
-  /// there. The height is measured along the curve.
+  /// Spline only: points of the curve after the patch's centre. Empty: the curve is straight along
+  /// the normal at the centre. The height is measured along the curve.
   std::vector<Imath::V3d> spline = {};
   bool fade = false;  ///< Spline only: the relief of the surface fades to zero along the curve
   LayerTransform transform = {};
   /// Points near the surface through which the sides 0 → 1, 1 → 2, 3 → 2 and 0 → 3 pass, in this
-  /// order. A side is the shortest path between successive points and has a corner at each.
+  /// order. A side consists of the shortest paths between successive points, and may have a corner
+  /// at each point.
   std::array<std::vector<Imath::V3d>, 4> sides = {};
-  /// Reduced only: straight directions in which the corners rise, instead of along ∇φ: one for all
-  /// corners, or one for each. Directions at points on the sides are interpolated. Where a surface
-  /// bends strongly, parallel directions keep the upper layers from spreading [Brodersen07 fig.
-  /// 8.4].
+  /// Reduced only: straight directions in which the corners rise, instead of along ∇φ. Give one for
+  /// all corners, or one for each. Directions at points on the sides are interpolated. Where a
+  /// surface bends strongly, parallel directions keep the upper layers from spreading [Brodersen07
+  /// fig. 8.4].
   std::vector<Imath::V3d> directions = {};
   bool parallel = false;  ///< Reduced only: all corners rise along the normal at the patch's centre
-  double spacing = 0;     ///< particle spacing, world units; 0: chosen from patch and voxel size
+  /// Particle spacing, world units; 0: chosen from the sizes of the patch and the voxels.
+  double spacing = 0;
   /// Cells along u and v, the same on all layers, each at least 3; 0, 0: chosen from the spacing.
   std::array<std::size_t, 2> cells = {0, 0};
   bool mirror = false;  ///< accept corners in clockwise order seen from outside
-  /// Result of sweepSharedSpace, when many patches share distances to the base; it must outlive the
-  /// call. Without it, or where it does not reach, distances are computed around the patch.
+  /// Result of sweepSharedSpace: distances to the base that many patches share; it must outlive the
+  /// call. Without it, or where it does not extend to the height, distances are computed around the
+  /// patch.
   const levelset::NarrowBand* space = nullptr;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};

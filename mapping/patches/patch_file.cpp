@@ -25,8 +25,8 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kFormat = "levelsmith patches";
 constexpr int kVersion = 1;
 constexpr std::array<const char*, 3> kSchemeNames = {"reduced", "conforming", "spline"};
-// Memory per character: the text, and the document nodes that two characters may become, with their
-// list entries.
+// Bytes of memory per character of a file: the character itself, and its share of a JSON node with
+// its list entry, which takes at least two characters.
 constexpr double kBytesPerLetter = 20;
 
 Json toJson(const V3d& p) {
@@ -76,7 +76,8 @@ Json toJson(const Patch& patch) {
   return json;
 }
 
-/// Reads a document. Messages name the position in the document.
+/// Reads the values of a document. Messages name the part of the document, such as "patch 0, layer
+/// 1".
 class Reader {
  public:
   explicit Reader(std::string file) : file_(std::move(file)) {}

@@ -11,7 +11,7 @@ namespace {
 using levelset::TriMesh;
 using VertexIndex = std::uint32_t;
 
-/// Vertices of a layer's particles in a mesh: index of particle 0, and the layer's counts.
+/// Maps the particles of a layer to vertices of a mesh, which are consecutive from `first`.
 struct SheetIndex {
   VertexIndex first;
   const ParticleLayer* layer;
@@ -38,7 +38,7 @@ SheetIndex addSheet(const ParticleLayer& layer, TriMesh& mesh) {
   return sheet;
 }
 
-/// Adds the triangles of the cells, facing along +w or −w.
+/// Adds two triangles for each cell of a layer, facing along +w (`isUp`) or −w.
 void addCells(const SheetIndex& sheet, bool isUp, TriMesh& mesh) {
   const auto add = [&](VertexIndex a, VertexIndex b, VertexIndex c) {
     if (isUp)

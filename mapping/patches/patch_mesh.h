@@ -10,8 +10,8 @@ enum class PatchMeshKind {
   Sheets  ///< each layer as an open mesh
 };
 
-/// Builds a mesh of patch space for display. Particles are its vertices, and each cell of four
-/// particles is two triangles. The sides of a Solid connect the borders of all layers.
+/// Builds a mesh of the space above a patch, for display. Particles are its vertices, and each cell
+/// of four particles is two triangles. The sides of a Solid connect the borders of all layers.
 /// @pre two layers or more
 [[nodiscard]] levelset::TriMesh patchMesh(const Patch& patch,
                                           PatchMeshKind kind = PatchMeshKind::Solid);

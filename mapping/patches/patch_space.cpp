@@ -17,13 +17,16 @@ namespace {
 using Imath::V3d;
 using levelset::NarrowBand;
 
-// Distances beyond the highest layer, for the interpolation filters.
+// Voxels of distances beyond the highest layer, which the interpolation stencils read.
 constexpr double kMarginVoxels = 6;
-// Least number of coarse voxels per height; fewer make the layers inexact.
+// Least number of coarse voxels in the height of a patch; fewer make the layers inexact.
 constexpr double kCoarseVoxels = 20;
-constexpr double kCoarsest = 4;     // multiple of the base's voxel size
-constexpr double kThinnest = 12;    // coarse voxels across the base's bounding box
-constexpr double kFaithful = 0.25;  // largest error of the coarse surface, coarse voxels
+// Largest coarse voxel size, as a multiple of the base's voxel size.
+constexpr double kCoarsest = 4;
+// Least number of coarse voxels across the shortest side of the base's bounding box.
+constexpr double kThinnest = 12;
+// Largest |φ| of the coarse grid at the border of the patch, coarse voxels.
+constexpr double kFaithful = 0.25;
 
 bool isFaithful(const NarrowBand& coarse, std::span<const V3d> border) {
   const levelset::BandSampler sampler(coarse, levelset::Interpolation::Tricubic);
@@ -32,7 +35,7 @@ bool isFaithful(const NarrowBand& coarse, std::span<const V3d> border) {
   });
 }
 
-/// Coarsening factor of the grid for layers up to a height.
+/// Factor by which the voxels may be larger than the base's, for layers up to a height.
 double coarsestFactor(const NarrowBand& base, double height) {
   if (height < 2 * kCoarseVoxels * base.voxelSize()) return 1;
   const V3d extent = base.zeroSetBounds().size();
@@ -41,7 +44,7 @@ double coarsestFactor(const NarrowBand& base, double height) {
                                             thickness / kThinnest})));
 }
 
-/// Resamples the base to a coarser grid; empty if no grid point of it lies inside.
+/// Resamples the base to a coarser grid; empty if no point of the coarser grid lies inside.
 std::optional<NarrowBand> coarsened(const NarrowBand& base, double factor,
                                     const PatchSpaceOptions& options) {
   try {
@@ -51,7 +54,7 @@ std::optional<NarrowBand> coarsened(const NarrowBand& base, double factor,
   }
 }
 
-/// The base on a coarser grid, or the base itself if the coarser grid would lose its surface.
+/// Returns the base on a coarser grid, or the base itself if a coarser grid would lose its surface.
 NarrowBand coarsen(const NarrowBand& base, std::span<const V3d> border, double height,
                    const PatchSpaceOptions& options) {
   for (double factor = coarsestFactor(base, height); factor >= 2; --factor) {
@@ -61,12 +64,13 @@ NarrowBand coarsen(const NarrowBand& base, std::span<const V3d> border, double h
   return base;
 }
 
-/// True if the band already extends to the height.
+/// True if the band of the base already extends to the height.
 bool reaches(const NarrowBand& base, double height) {
   return base.halfWidth() * base.voxelSize() >= height + kMarginVoxels * base.voxelSize();
 }
 
-/// True if the shared distances are as good as the patch's own.
+/// True if the shared distances extend to the height and are as accurate as distances computed for
+/// this patch alone.
 bool serves(const NarrowBand& shared, const NarrowBand& base, std::span<const V3d> border,
             double height) {
   constexpr double kRounding = 1 + 1e-9;
@@ -112,9 +116,10 @@ std::optional<NarrowBand> sweepSharedSpace(const NarrowBand& base, const PatchCr
                                            const PatchSpaceOptions& options) {
   if (base.isEmpty() || base.isOpenSurface() || reaches(base, crowd.highest)) return {};
   const double factor = coarsestFactor(base, crowd.lowest);
-  // Both variants extend equally far from the surface, so their costs are compared by surface area.
-  // In a box a grid point costs at least three times as much, because of the search along the box
-  // faces. A coarser grid resamples the entire base for each patch that has its own box.
+  // One region around the entire base and one box per patch both extend equally far from the
+  // surface, so their costs are compared by surface area. In a box a grid point costs at least
+  // three times as much, because of the search along the box faces. With a coarser grid, one region
+  // is always chosen, because each box would resample the entire base.
   constexpr double kBoxCost = 3;
   const double around = 2 * (crowd.highest + kMarginVoxels * base.voxelSize());
   const double boxes =

@@ -12,8 +12,8 @@
 namespace mapping {
 
 struct PatchSpaceOptions {
-  /// Result of sweepSharedSpace; used if it extends to the height and is as accurate there as the
-  /// patch's own distances.
+  /// Result of sweepSharedSpace. It is used if it extends to the height and is as accurate there as
+  /// distances computed for the patch alone.
   const levelset::NarrowBand* shared = nullptr;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};
@@ -23,10 +23,10 @@ struct PatchSpaceOptions {
 /// band in a box around the patch [Brodersen07 §8.2]. If the height is many voxels, the grid is up
 /// to four times coarser. Iso-surfaces of φ become smoother with height, and the base's own band
 /// represents the surface itself.
-/// @throws InvalidInput for an open surface whose band does not reach the height, because it cannot
-///         be swept
+/// @throws InvalidInput for an open surface whose band does not extend to the height, because such
+///         a band cannot be extended
 /// @param border  points on the surface along the sides of the patch
-/// @param bulge   how far the inner surface may leave the box of the border, world units
+/// @param bulge   distance by which the inner surface may leave the box of the border, world units
 [[nodiscard]] levelset::NarrowBand sweepPatchSpace(const levelset::NarrowBand& base,
                                                    std::span<const Imath::V3d> border, double bulge,
                                                    double height,
@@ -35,13 +35,13 @@ struct PatchSpaceOptions {
 /// Size of a group of patches on one base.
 struct PatchCrowd {
   std::size_t count;
-  double uSize, vSize;     ///< of the largest patch, world units
+  double uSize, vSize;     ///< lengths of the largest patch along u and v, world units
   double lowest, highest;  ///< range of the patch heights, world units, positive
 };
 
 /// Computes distances for many patches at once around the entire base, if that costs less than a
 /// box around each patch. Returns nothing if it costs more, or needs more than a quarter of the
-/// memory.
+/// memory limit.
 [[nodiscard]] std::optional<levelset::NarrowBand> sweepSharedSpace(
     const levelset::NarrowBand& base, const PatchCrowd& crowd,
     const PatchSpaceOptions& options = {});

@@ -19,12 +19,13 @@ struct Entry {
   bool operator<(const Entry& other) const { return cell < other.cell; }
 };
 
-/// Share of a step after which two particles come as close as the diameter; 1 if they do not.
+/// Share of a step after which the centres of two particles are `diameter` apart; 1 if they stay
+/// further apart.
 double contact(const V3d& apart, const V3d& relative, double diameter) {
   const double approach = apart.dot(relative);
   if (approach >= 0) return 1;
-  // Particles that start this close are one particle stored twice, as where a grid closes on
-  // itself.
+  // Particles that start this close are one particle stored twice, for example where the first and
+  // last column of a grid coincide.
   if (apart.length2() < 0.25 * diameter * diameter) return 1;
   const double over = apart.length2() - diameter * diameter;
   if (over <= 0) return 0;
@@ -34,11 +35,11 @@ double contact(const V3d& apart, const V3d& relative, double diameter) {
   return std::min(1.0, over / (std::sqrt(root) - approach));
 }
 
-/// Calls meet(i, j) for all pairs that may touch, in a fixed order.
+/// Calls meet(i, j) for all pairs of particles that may touch within the step, in a fixed order.
 template <typename Meet>
 void forEachNear(std::span<const V3d> positions, std::span<const V3d> moves, double diameter,
                  const Meet& meet) {
-  // The common motion does not change distances.
+  // Motion that all particles share does not change their distances.
   V3d mean(0);
   for (const V3d& move : moves) mean += move / static_cast<double>(moves.size());
   double farthest = 0;
@@ -57,7 +58,8 @@ void forEachNear(std::span<const V3d> positions, std::span<const V3d> moves, dou
   for (auto a = entries.begin(); a != entries.end(); ++a) {
     for (auto b = a + 1; b != entries.end() && b->cell == a->cell; ++b)
       meet(a->particle, b->particle);
-    // The 13 neighbour cells that come later in the order, and the cell itself.
+    // The 13 of the 26 neighbouring cells that follow this cell in the order, so that each pair of
+    // cells is visited once.
     for (int n = 14; n < 27; ++n) {
       const GuardCell cell = {a->cell[0] + n / 9 - 1, a->cell[1] + n / 3 % 3 - 1,
                               a->cell[2] + n % 3 - 1};

@@ -13,8 +13,8 @@ namespace mapping {
 /// through another, however long the step is [Brodersen07 §8.2].
 class TravelGuard {
  public:
-  /// @param diameter  of the spheres, world units; particles that start closer than half of it
-  ///         count as one particle
+  /// @param diameter  diameter of the spheres, world units; particles that start closer than half
+  ///         of it count as one particle
   TravelGuard(double diameter, std::size_t particles) : diameter_(diameter), isSlowed_(particles) {}
 
   /// Limits the moves of one step. For particles that would touch, the components that bring them
