@@ -31,7 +31,7 @@ using levelset::UsageError;
 // Sine of 1.1 degrees, the least angle between the direction and the normal.
 constexpr double kLeastTangent = 0.02;
 
-/// Centre of a layer's map, and the unit directions of u and v there.
+/// Centre of the exponential map of one layer, and the unit directions of u and v at the centre.
 struct DecalFrame {
   V3d center, u, v;
 };
@@ -51,12 +51,13 @@ DecalFrame frameAt(const SurfaceField& field, const V3d& center, const V3d& dire
   return {center, u, isMirrored ? -v : v};
 }
 
-/// Position from −1 to 1 along a row or column.
+/// Coordinate of a particle along its row or column, from −1 to 1.
 double signedShare(std::size_t i, std::size_t count) {
   return 2 * static_cast<double>(i) / static_cast<double>(count - 1) - 1;
 }
 
-/// Half side of the largest square around the centre that does not contain the particle.
+/// Half side of the largest square around the centre that does not contain the particle, in the (u,
+/// v) plane, world units.
 double squareRadius(const ParticleLayer& layer, std::size_t index, double radius) {
   return radius * std::max(std::abs(signedShare(index % layer.columns, layer.columns)),
                            std::abs(signedShare(index / layer.columns, layer.rows)));
@@ -71,7 +72,8 @@ std::string smallerRadius(double radius) {
 void walkToParticles(const NarrowBand& band, const DecalFrame& frame, double radius,
                      ParticleLayer& layer) {
   layer.positions.assign(layer.columns * layer.rows, frame.center);
-  std::vector<double> missing(layer.positions.size(), 0);  // length that was not traced
+  // Length of each geodesic that could not be traced, world units.
+  std::vector<double> missing(layer.positions.size(), 0);
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, layer.positions.size(), 16), [&](const auto& range) {
         const SurfaceField field(band);
@@ -125,11 +127,13 @@ double facing(const ParticleLayer& layer, const std::vector<V3d>& normals, std::
   return area.dot(normals[a] + normals[b] + normals[c] + normals[d]);
 }
 
-/// First defect of a layer, and half the side of the square that excludes it.
+/// Defect of a layer that is nearest to its centre, and half the side of the largest square without
+/// it, world units.
 struct Trouble {
   double radius = std::numeric_limits<double>::infinity();
   V3d place{0};
-  const char* sentence = "";  ///< with a placeholder for the position
+  /// Message after "the decal", with a placeholder for `place`; the advice on the radius follows.
+  const char* sentence = "";
   void note(double at, const V3d& where, const char* what) {
     if (at < radius) *this = {at, where, what};
   }
@@ -161,10 +165,10 @@ void findFolds(const ParticleLayer& layer, const std::vector<V3d>& normals, doub
     }
 }
 
-/// Finds particles that are not neighbours but nearly coincide.
+/// Finds particles that nearly coincide but are not neighbours in the grid of the layer.
 void findOverlaps(const ParticleLayer& layer, const std::vector<V3d>& normals, double radius,
                   Trouble& trouble) {
-  constexpr double kNear = 0.75;  // spacings
+  constexpr double kNear = 0.75;  // largest distance of coinciding particles, particle spacings
   constexpr long kNeighbours = 3;
   const double spacing = 2 * radius / static_cast<double>(layer.columns - 1);
   using Bucket = std::tuple<long, long, long>;
@@ -199,7 +203,7 @@ void findOverlaps(const ParticleLayer& layer, const std::vector<V3d>& normals, d
   }
 }
 
-/// Checks a layer.
+/// Checks that a layer is a valid part of a decal.
 /// @throws InvalidInput if the layer folds, overlaps itself or passes through the solid
 void requireSound(const NarrowBand& band, const ParticleLayer& layer, double radius,
                   bool isMirrored) {
@@ -209,11 +213,11 @@ void requireSound(const NarrowBand& band, const ParticleLayer& layer, double rad
   findOverlaps(layer, normals, radius, trouble);
   if (!std::isfinite(trouble.radius)) return;
   throw InvalidInput(fmt::format(
-      "it {}{}", fmt::format(fmt::runtime(trouble.sentence), pointAsOption(trouble.place)),
+      "the decal {}{}", fmt::format(fmt::runtime(trouble.sentence), pointAsOption(trouble.place)),
       smallerRadius(0.95 * trouble.radius)));
 }
 
-/// Builds the layer of one exponential map on φ = height.
+/// Builds one layer: the exponential map on φ = height around the centre of the frame.
 ParticleLayer decalLayer(const NarrowBand& band, const DecalFrame& frame, double radius,
                          double height, double w, std::size_t count, bool isMirrored) {
   ParticleLayer layer;
@@ -242,8 +246,8 @@ std::vector<std::vector<V3d>> spokes(const NarrowBand& band, const DecalFrame& f
   return result;
 }
 
-/// Moves the frame one layer up: its centre and spokes are carried along ∇φ.
-/// @return mean growth factor of the spokes
+/// Moves the frame up by one layer. The centre and the ends of the spokes, the geodesics from it to
+/// the middles of the sides, move along ∇φ.
 double raiseFrame(const NarrowBand& space, double from, double to, DecalFrame& frame,
                   std::vector<std::vector<V3d>>& paths) {
   std::vector<V3d> points = {frame.center};
@@ -259,7 +263,7 @@ double raiseFrame(const NarrowBand& space, double from, double to, DecalFrame& f
     if (path.empty()) path = geodesic(field, to, frame.center, points[i + 1]);
     if (path.empty()) {
       throw InvalidInput(fmt::format(
-          "at height {:.4g} the surface no longer connects its centre and sides; use a lower "
+          "at height {:.4g} no path connects the centre of the decal with its sides; use a lower "
           "height or --particles conforming",
           to));
     }

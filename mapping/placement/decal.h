@@ -13,12 +13,13 @@ namespace mapping {
 /// the centre are preserved, and developable surfaces are mapped without distortion. Each geodesic
 /// is traced separately (see SurfaceWalk), because passing coordinates from neighbour to neighbour
 /// [Schmidt06] accumulates errors. With LayerScheme::Reduced each layer has its own exponential
-/// map, around the centre carried along ∇φ. Its size grows with the distances from the centre to
-/// the middles of the sides.
+/// map, whose centre moves along ∇φ from layer to layer. Its size grows with the distances from the
+/// centre to the middles of the sides.
 /// @param at         centre, projected along φ to the zero set
 /// @param direction  direction of u; its tangential part is used
 /// @param radius     half of the square's side, along the surface, world units
-/// @param height     height of the patch space above the surface, world units, positive
+/// @param height     height of the space above the surface that the patch covers, world units,
+///         positive
 /// @param options    with mirror, v runs in the opposite direction; sides must be empty
 /// @throws UsageError for a direction along the normal, and lengths that are not positive
 /// @throws InvalidInput if the surface breaks off within the radius, if the decal folds or overlaps

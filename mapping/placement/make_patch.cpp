@@ -25,13 +25,15 @@ void checkPatchArguments(const std::array<V3d, 4>& corners, double height,
   checkPatchOptions(height, options);
   for (const V3d& c : corners) {
     if (!std::isfinite(c.x) || !std::isfinite(c.y) || !std::isfinite(c.z))
-      throw UsageError(fmt::format("the corner {} is not finite", pointAsOption(c)));
+      throw UsageError(
+          fmt::format("the corner {} is not finite; give finite coordinates", pointAsOption(c)));
   }
 }
 
 struct Outline {
   std::array<V3d, 4> corners;
-  PatchSides between;  ///< points on the sides between the corners
+  /// Points on the sides between the corners, in the order of PatchOptions::sides.
+  PatchSides between;
 };
 
 void checkApart(const NarrowBand& base, const Outline& outline) {
@@ -61,8 +63,8 @@ void checkApart(const NarrowBand& base, const Outline& outline) {
   }
 }
 
-/// Positive if the corners are in anticlockwise order seen from outside: twice the area spanned at
-/// each corner with its neighbours, projected on the normal there.
+/// Twice the area spanned at each corner with its neighbours, projected on the normal at the
+/// corner, and summed. Positive if the corners are in anticlockwise order seen from outside.
 double handedness(const NarrowBand& base, const std::array<V3d, 4>& corners) {
   const SurfaceField field(base);
   double sum = 0;
@@ -73,11 +75,12 @@ double handedness(const NarrowBand& base, const std::array<V3d, 4>& corners) {
   return sum;
 }
 
-/// The same from the directions in which sides leave the corners. It also works for a patch wrapped
+/// Positive if the corners are in anticlockwise order seen from outside. Unlike handedness(), it
+/// uses the directions in which the sides leave the corners. So it also works for a patch wrapped
 /// around an edge, whose corners lie above each other.
 double handednessOfSides(const NarrowBand& base, const PatchSides& sides) {
   const SurfaceField field(base);
-  // Direction over the first tenth of the side.
+  // Direction in which a side leaves its first or last point, over the nearest tenth of its length.
   const auto leaving = [](const std::vector<V3d>& side, bool isReversed) {
     const std::vector<V3d> tenths = sampleByArcLength(side, 11);
     return isReversed ? (tenths[9] - tenths[10]).normalized()
@@ -96,7 +99,7 @@ double handednessOfSides(const NarrowBand& base, const PatchSides& sides) {
   return sum;
 }
 
-/// Checks the orientation of the corners.
+/// Checks the orientation of the corners, seen from outside.
 /// @return true if the patch is mirrored
 bool checkOrientation(const NarrowBand& base, const std::array<V3d, 4>& given,
                       const PatchSides& sides, bool mirror) {
@@ -140,7 +143,7 @@ LayerSides makeLayerSides(const NarrowBand& band, double height, const std::arra
   return layer;
 }
 
-/// Projects the corners and the points between them to the surface.
+/// Projects the corners and the given points on the sides to the surface.
 Outline projectOutline(const NarrowBand& base, const std::array<V3d, 4>& corners,
                        const PatchOptions& options, PatchReport& report) {
   Outline outline;
@@ -156,7 +159,8 @@ Outline projectOutline(const NarrowBand& base, const std::array<V3d, 4>& corners
   return outline;
 }
 
-/// Builds a layer: counts from the spacing, positions between the sides.
+/// Builds a layer of particles between its sides. The counts follow from the spacing, unless the
+/// options give them.
 ParticleLayer filledLayer(const NarrowBand& band, const NarrowBand& guide, const LayerSides& border,
                           double height, double spacing, const PatchOptions& options,
                           PatchReport& report) {
@@ -171,16 +175,15 @@ ParticleLayer filledLayer(const NarrowBand& band, const NarrowBand& guide, const
   return layer;
 }
 
-/// Directions in which the corners and the points between them rise; empty: along ∇φ.
+/// Directions in which the corners and the given points on the sides rise; empty: along ∇φ.
 struct Rise {
   std::vector<V3d> corners;
   std::array<std::vector<V3d>, 4> between;
-  double lean = 0;  ///< sideways displacement per unit of height
+  double lean = 0;  ///< largest sideways displacement per unit of height
 };
 
-/// Unit direction of each corner.
+/// Returns the unit direction in which each corner rises; empty if the corners rise along ∇φ.
 /// @throws UsageError for a direction that hardly leads away from the surface
-/// @throws UsageError for one that hardly leads away from the surface
 std::vector<V3d> cornerDirections(const NarrowBand& base, const Outline& outline,
                                   const PatchOptions& options) {
   const SurfaceField field(base);
@@ -223,7 +226,8 @@ Rise riseOf(const NarrowBand& base, const Outline& outline, const PatchOptions& 
   return rise;
 }
 
-/// Moves the corners and the points between them from one layer to the next.
+/// Moves the corners and the given points on the sides from the layer at height `from` to height
+/// `to`.
 void raiseOutline(const NarrowBand& space, const Rise& rise, double from, double to,
                   Outline& outline) {
   if (rise.corners.empty()) {
@@ -250,7 +254,7 @@ std::vector<ParticleLayer> reducedLayers(const NarrowBand& base, Outline outline
     sides.push_back(makeLayerSides(space, layer, outline.corners, outline.between,
                                    &sides.back().sides, &sides.front().sides));
   }
-  // Sizes of the layers after tapering.
+  // Sizes that the layers will have after tapering.
   const auto scaleOf = [&](const LayerSides& border) {
     return std::lerp(1.0, options.transform.taper, border.height / height);
   };
@@ -304,7 +308,7 @@ PatchResult makePatch(const NarrowBand& base, const std::array<V3d, 4>& corners,
                        options.spacing, options);
   levelset::report(options.progress, 0.1);
 
-  // === The layers above it
+  // === The layers above the surface
   patch.layers = options.scheme == LayerScheme::Reduced
                      ? reducedLayers(base, outline, std::move(sides), height, options, report)
                      : travellingLayers(base, sides.front(), height, options, report);

@@ -18,7 +18,8 @@ struct PatchResult {
 /// Builds a patch between four corners.
 /// @param corners  u runs from corner 0 to 1, v from corner 0 to 3; projected along φ to the zero
 ///         set
-/// @param height   height of the patch space above the surface, world units, positive
+/// @param height   height of the space above the surface that the patch covers, world units,
+///         positive
 /// @throws UsageError for corners in clockwise order seen from outside (the message gives the right
 ///         order) or a height that is not positive
 /// @throws InvalidInput if a corner is further from the surface than the diagonal of its bounding

@@ -25,9 +25,11 @@ using levelset::InvalidInput;
 using levelset::NarrowBand;
 using levelset::UsageError;
 
-constexpr double kMostPerTile = 2000;    // particles, the same as for a single patch
-constexpr double kMostPerGrid = 20000;   // over all layers; relaxation slows down with their number
-constexpr std::size_t kFewestCells = 4;  // along each side of a tile
+// Particles of one tile on all layers, the same as for a single patch.
+constexpr double kMostPerTile = 2000;
+// Particles of all tiles on all layers; relaxation slows down with their number.
+constexpr double kMostPerGrid = 20000;
+constexpr std::size_t kFewestCells = 4;  // cells along each side of a tile
 
 void checkGrid(const PatchGridOptions& grid) {
   constexpr std::size_t kMostTiles = 100'000;
@@ -68,18 +70,20 @@ std::array<std::size_t, 2> cellsPerTile(const NarrowBand& base, const LayerSize&
 struct Sheet {
   std::vector<ParticleLayer> layers;  ///< all with equal counts
   bool isRing = false;                ///< true: the last column equals the first
+  /// Height of the top layer above the surface, world units.
   double height = 0;
   bool isMirrored = false;
   LayerScheme scheme = LayerScheme::Reduced;
 };
 
 struct Tile {
-  std::size_t column, row;    ///< of the first particle
-  std::size_t columns, rows;  ///< number of cells
+  std::size_t column, row;    ///< column and row of the tile's first particle in the sheet
+  std::size_t columns, rows;  ///< number of cells along u and v
   bool isTurnedU, isTurnedV;
 };
 
-/// Part of a layer under a tile; its rim consists of the neighbours' particles.
+/// Cuts the part of a layer that belongs to a tile. Its rim consists of particles of the
+/// neighbouring tiles.
 ParticleLayer cut(const ParticleLayer& whole, const Tile& tile, bool isRing) {
   ParticleLayer part;
   part.columns = tile.columns + 1;
@@ -135,8 +139,8 @@ std::vector<Patch> cutTiles(const Sheet& sheet, const PatchGridOptions& grid) {
   return patches;
 }
 
-/// An axis and two directions across it: `out` at the first seam, and `side` a quarter turn
-/// further.
+/// An axis and two unit directions perpendicular to it. `out` points to the border between the last
+/// and the first column of tiles, `side` a quarter turn further.
 struct RoundFrame {
   V3d from, along, out, side;
   double length;
@@ -164,7 +168,8 @@ RoundFrame roundFrame(const NarrowBand& base, const V3d& from, const V3d& to, do
   return {from, along, out, along.cross(out), offset.length()};
 }
 
-/// First intersection of a line from outside to the axis with the surface.
+/// Finds the first intersection of the surface with a line that comes from outside, perpendicular
+/// to the axis.
 /// @throws InvalidInput if there is none
 V3d seenFromOutside(const SurfaceField& field, const V3d& axis, const V3d& direction, double far,
                     double background) {
@@ -188,8 +193,8 @@ V3d seenFromOutside(const SurfaceField& field, const V3d& axis, const V3d& direc
   return axis + direction * (0.5 * (inner + outer));
 }
 
-/// Builds the surface layer. Particles of the first and last row are evenly spaced along their
-/// rings, those of the other rows at equal angles.
+/// Builds the surface layer. Particles of the first and last row are evenly spaced along the row,
+/// those of the other rows lie at equal angles about the axis.
 ParticleLayer roundLayer(const NarrowBand& base, const RoundFrame& frame, std::size_t columns,
                          std::size_t rows) {
   const SurfaceField field(base);
@@ -219,10 +224,11 @@ ParticleLayer roundLayer(const NarrowBand& base, const RoundFrame& frame, std::s
   return layer;
 }
 
-/// Checks that the surface around the axis is a single sheet.
+/// Checks that the surface around the axis is a single sheet, without jumps.
 /// @throws InvalidInput where neighbours are too far apart
 void requireOneSheet(const ParticleLayer& layer) {
-  constexpr double kFarthest = 4;  // multiple of the mean distance along u, or along v
+  // Largest distance of neighbours, as a multiple of their mean distance along u or v.
+  constexpr double kFarthest = 4;
   for (const auto& [across, up] : {std::pair<std::size_t, std::size_t>{1, 0}, {0, 1}}) {
     std::vector<std::pair<double, V3d>> steps;
     double sum = 0;
@@ -242,7 +248,8 @@ void requireOneSheet(const ParticleLayer& layer) {
   }
 }
 
-/// Adds the rim: periodic around the axis, and straight at the two ends.
+/// Adds the rim: it repeats the particles around the axis, and continues the columns straight at
+/// the two ends.
 void addRoundRim(const NarrowBand& band, ParticleLayer& layer) {
   addRim(band, layer);
   const auto last = static_cast<int>(layer.columns) - 1, rows = static_cast<int>(layer.rows);
@@ -317,7 +324,7 @@ PatchGridResult makePatchGridAround(const NarrowBand& base, const V3d& from, con
   }
   if (options.scheme == LayerScheme::Spline || !options.transform.isIdentity() || options.mirror) {
     throw UsageError(
-        "--particles spline, twist, taper, bend and --mirrored cannot be combined "
+        "--particles spline, --twist, --taper, --bend and --mirrored cannot be combined "
         "with tiles around an axis");
   }
   const RoundFrame frame = roundFrame(base, from, to, rotation);

@@ -23,7 +23,7 @@ struct PatchGridOptions {
 
 struct PatchGridResult {
   std::vector<Patch> patches;  ///< row by row, along u first
-  PatchReport report;          ///< over all tiles
+  PatchReport report;          ///< measurements over all tiles
 };
 
 /// Builds the tiles of one patch between four corners, see makePatch. Neighbours share the
@@ -37,13 +37,13 @@ struct PatchGridResult {
                                             const PatchGridOptions& grid,
                                             const PatchOptions& options = {});
 
-/// Builds tiles all around an axis, between the two planes across it through its ends. The
-/// direction of u is around the axis, anticlockwise seen from `to`. That of v is from `from` to
-/// `to`. The last column joins the first. The surface used is the part visible from outside along
-/// lines perpendicular to the axis.
+/// Builds tiles all around an axis, between the two planes through its ends that are perpendicular
+/// to it. The direction of u is around the axis, anticlockwise seen from `to`. That of v is from
+/// `from` to `to`. The last column of tiles joins the first. The tiles lie on the part of the
+/// surface that is visible from outside along lines perpendicular to the axis.
 /// @param from, to  different points on the axis; a solid of revolution has its own axis
-/// @param rotation  angle of the first seam about the axis, radians, from the perpendicular
-///         direction nearest to +x (or to +y for an axis along x)
+/// @param rotation  angle about the axis at which the first column of tiles begins, radians, from
+///         the perpendicular direction nearest to +x (or to +y for an axis along x)
 /// @throws UsageError as makePatchGrid, for fewer than 3 columns, and for mirrorU with an odd
 ///         number of columns
 /// @throws InvalidInput where no surface lies around the axis, or where it is not a single sheet

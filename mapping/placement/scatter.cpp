@@ -25,12 +25,13 @@ using Imath::V3d;
 using levelset::InvalidInput;
 using levelset::NarrowBand;
 
-// Positions tried for each requested patch.
+// Number of positions tried for each requested patch.
 constexpr std::size_t kTriesPerPatch = 3;
-// A patch that fills a gap may be nearer to others by this factor than they are to each other.
+// A patch that fills a gap may be closer to other patches than their least distance, by this
+// factor.
 constexpr double kGapShare = 0.75;
 
-/// A random number in [−1, 1) for one position, independent of the other positions.
+/// A random number in [−1, 1) for the position with this index, independent of the other positions.
 double luckAt(std::uint64_t seed, std::size_t index) {
   std::uint64_t z = seed + (index + 1) * 0x9e3779b97f4a7c15;  // splitmix64
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
@@ -54,8 +55,9 @@ PatchSite siteAt(const NarrowBand& base, const SurfacePoint& point, std::size_t 
     const V3d direction = options.direction(point.position, 0);
     if (!std::isfinite(direction.length())) {
       throw levelset::UsageError(
-          fmt::format("the direction at ({:.6g}, {:.6g}, {:.6g}) is not finite", point.position.x,
-                      point.position.y, point.position.z));
+          fmt::format("the direction at ({:.6g}, {:.6g}, {:.6g}) is not finite; give a field that "
+                      "is finite on the surface",
+                      point.position.x, point.position.y, point.position.z));
     }
     rotation += angleTowards(point, direction);
   }
@@ -74,7 +76,7 @@ bool doesFold(const Patch& patch) {
   return surveyDistortion(sampleLayerMap(patch, 0), V3d(1), patch.mirrored).folded > 0;
 }
 
-/// A patch, or the reason why there is none.
+/// A patch at one position, or the reason why none could be built.
 struct Attempt {
   std::optional<Patch> patch;
   PatchSite site = {};
@@ -87,7 +89,8 @@ Attempt tryAt(const NarrowBand& base, const SurfacePoint& point, std::size_t ind
   try {
     attempt.site = siteAt(base, point, index, options);
     PatchOptions part = atScale(options.patch, point.scale);
-    part.mirror = true;  // clockwise corners are not an error of the caller here
+    // The caller gave no corners, so clockwise ones are a failed attempt and no error.
+    part.mirror = true;
     PatchResult made = makePatch(base, attempt.site.corners, height * point.scale, part);
     Patch& patch = made.patch;
     const auto isHalf = [&](double length, double asked) {
@@ -95,11 +98,11 @@ Attempt tryAt(const NarrowBand& base, const SurfacePoint& point, std::size_t ind
     };
     if (patch.mirrored || isHalf(made.report.uLength, options.uSize) ||
         isHalf(made.report.vLength, options.vSize)) {
-      attempt.cause = "the surface bends too much for a patch of this size";
+      attempt.cause = "the surface bends too much for a patch of this size; use smaller patches";
       return attempt;
     }
     if (!options.allowFolds && doesFold(patch)) {
-      attempt.cause = "the patch would fold";
+      attempt.cause = "the patch would fold; use a lower height or smaller patches";
     } else {
       attempt.patch = std::move(patch);
     }
@@ -109,7 +112,7 @@ Attempt tryAt(const NarrowBand& base, const SurfacePoint& point, std::size_t ind
   return attempt;
 }
 
-/// Sweeps shared distances, which spline patches do not need.
+/// Computes the distances that all patches share. Spline patches do not need any.
 std::optional<NarrowBand> sweepFor(const NarrowBand& base, const PatchCrowd& crowd,
                                    const PatchOptions& options) {
   if (options.scheme == LayerScheme::Spline) return {};
@@ -117,7 +120,7 @@ std::optional<NarrowBand> sweepFor(const NarrowBand& base, const PatchCrowd& cro
                           {.maxMemory = options.maxMemory, .progress = options.progress});
 }
 
-/// Number of positions that are tried, the best first.
+/// Number of positions to try, in order of priority.
 std::size_t triesOf(const ScatteredPoints& points) {
   return std::min(points.points.size(), kTriesPerPatch * points.wanted);
 }
@@ -187,7 +190,7 @@ ScatterResult scatter(const NarrowBand& base, double height, const ScatterOption
   };
   for (std::size_t n = 0; n < points.wanted; ++n) take(attempts[n], points.points[n]);
 
-  // === The next best positions, in the gaps of those where no patch could be built
+  // === The next positions in order of priority, in the gaps where no patch could be built
   const std::size_t tries = triesOf(points);
   const double kept = std::isfinite(points.distance) ? points.distance : 0;
   for (std::size_t n = points.wanted; n < tries && taken.size() < points.wanted; ++n) {

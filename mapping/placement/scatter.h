@@ -16,13 +16,14 @@
 namespace mapping {
 
 struct ScatterOptions {
-  ScatterDensity density = {};  ///< its scale also scales the patches, heights included
+  /// Density of positions; its scale also scales the patches, heights included.
+  ScatterDensity density = {};
   double uSize = 0, vSize = 0;  ///< size of a patch at scale 1, world units
   /// Direction of u, projected onto the surface; empty or zero: the direction of `cornersAround`.
   levelset::VectorField direction = {};
   double rotation = 0;      ///< rotation of u about the normal, radians
   double jitter = 0;        ///< amplitude of a random rotation to either side, radians
-  PatchOptions patch = {};  ///< its spacing is the one at scale 1
+  PatchOptions patch = {};  ///< options of each patch; its particle spacing is the one at scale 1
   bool allowFolds = false;
 };
 
@@ -35,7 +36,8 @@ struct PatchSite {
 struct ScatterResult {
   std::vector<Patch> patches;
   std::vector<PatchSite> sites;  ///< one for each patch
-  double distance = 0;      ///< least distance between two patch centres, in units of their scales
+  /// Least distance between two patch centres, divided by their mean scale, world units.
+  double distance = 0;
   std::size_t leftOut = 0;  ///< number of positions where no patch could be built
   std::string cause;        ///< reason for the first position left out
 };
@@ -49,7 +51,7 @@ struct ScatterResult {
 [[nodiscard]] ScatterResult scatter(const levelset::NarrowBand& base, double height,
                                     const ScatterOptions& options);
 
-/// Builds patches at known sites with another height.
+/// Builds patches at the sites of an earlier scatter() with another height.
 [[nodiscard]] std::vector<Patch> makePatches(const levelset::NarrowBand& base,
                                              const std::vector<PatchSite>& sites, double height,
                                              const PatchOptions& options = {});

@@ -33,7 +33,7 @@ void addSides(std::size_t number, const ParticleLayer& before, ParticleLayer& af
 }  // namespace
 
 void joinSharedParticles(std::span<const Patch> before, std::span<Patch> after) {
-  constexpr double kTolerance = 1e-3;  // spacings
+  constexpr double kTolerance = 1e-3;  // largest distance of shared particles, particle spacings
   std::vector<SideParticle> particles;
   for (std::size_t p = 0; p < before.size(); ++p)
     for (std::size_t k = 0; k < before[p].layers.size(); ++k)
