@@ -41,7 +41,8 @@ NodeWeights<kNodes, kLeaf> makeToGridPoints() {
 }
 const NodeWeights<kNodes, kLeaf> kToGridPoints = makeToGridPoints();
 
-/// Weights from a block's nodes to the nodes of its lower or upper half along an axis.
+/// Interpolation weights from the nodes of a block to the nodes of its lower or upper half along an
+/// axis.
 ToNodes toHalf(int edge, bool isUpper) {
   const double half = (0.5 * edge - 1) / (edge - 1), middle = isUpper ? 1 - half : half - 1;
   std::array<double, kNodes> at;
@@ -60,8 +61,9 @@ double radiusOf(const GridBlock& block) {
 // Lebesgue constant for six Chebyshev nodes.
 constexpr double kLebesgue = 2.11;
 
-/// Error bound of the polynomial for a particle of weight 1 at distance `gap` from the hull. It
-/// uses the sixth derivatives, or the value bound of a decaying kernel.
+/// Error bound of the polynomial for a particle of weight 1 at distance `gap` from the block's
+/// hull: the smaller of a bound from the kernel's sixth derivatives, and one from the values of a
+/// decaying kernel.
 template <typename Kernel>
 double farError(double halfEdge, double gap) {
   const double a = halfEdge / 2, squared = a * a;
@@ -70,7 +72,8 @@ double farError(double halfEdge, double gap) {
   return std::min(cube, Kernel::farBound(gap) * (1 + kLebesgue * kLebesgue * kLebesgue));
 }
 
-/// Bound of the remainder beyond the tangent at the middle of a ball.
+/// Bounds the difference between the kernel of a particle and its linear expansion around the
+/// centre of a ball. The particle is at `distance` from the centre and has weight 1.
 template <typename Kernel>
 double beyondTangent(double distance, double radius) {
   const double lo = std::max(distance - radius, 0.0), hi = distance + radius;
@@ -78,7 +81,7 @@ double beyondTangent(double distance, double radius) {
                   0.5 * radius * radius * Kernel::bendBound(lo, hi));
 }
 
-/// Block in the map's own coordinates: mean particle spacings relative to its origin.
+/// Block in the map's own coordinates: in mean particle spacings, relative to the map's origin.
 GridBlock scaled(const GridBlock& block, const V3d& origin, double spacing) {
   GridBlock result = block;
   result.origin = (block.origin - origin) / spacing;
@@ -136,8 +139,8 @@ std::vector<std::uint32_t> RbfBlock::split(Kernel, std::span<const std::uint32_t
   double halfEdge = 0;
   for (int i = 0; i < 3; ++i) halfEdge = std::max(halfEdge, half * block_.row(i).length());
 
-  // Particles with the smallest errors go first, as many as the tolerance allows; a share of the
-  // tolerance is reserved for the octants. Errors are sorted only by their power of two.
+  // The far particles are those with the smallest errors, as many as the tolerance allows. A share
+  // of the tolerance is reserved for the octants. Errors are sorted only by their power of two.
   constexpr int kPowers = 128;
   std::array<double, kPowers> errors{};
   std::vector<std::int8_t> power(candidates.size());

@@ -28,9 +28,9 @@ class RbfBlock final : public BlockMap {
   [[nodiscard]] std::size_t nearCount() const { return near_.size(); }
 
  private:
-  static constexpr std::size_t kNodes = 6;  ///< along each axis
+  static constexpr std::size_t kNodes = 6;  ///< Chebyshev nodes along each axis
   static constexpr std::size_t kCubeNodes = kNodes * kNodes * kNodes;
-  /// Values of u, v and w at the nodes.
+  /// Values of u, v and w at the nodes, summed over the particles in the polynomial.
   using Values = std::array<std::array<double, kCubeNodes>, 3>;
 
   RbfBlock(const RbfBlock& parent, int bits);
@@ -47,7 +47,7 @@ class RbfBlock final : public BlockMap {
   const RbfMap& map_;
   GridBlock block_;  ///< in mean particle spacings, relative to the map's origin
   double tolerance_;
-  double error_ = 0;  ///< error bound of the polynomial so far
+  double error_ = 0;  ///< error bound of the polynomial, in u, v and w
   Values far_{};
   std::vector<std::uint32_t> near_;
 };

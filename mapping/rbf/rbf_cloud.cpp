@@ -25,7 +25,8 @@ using levelset::InvalidInput;
 constexpr double kSmallestGap = 1e-9;
 // A cloud flatter than this share of its size leaves the gradient across it undetermined.
 constexpr double kFlattest = 1e-6;
-// Targets of coincident particles that differ by less than this share of their size count as equal.
+// Targets of coincident particles that differ by less than this share of the extent of all targets
+// count as equal.
 constexpr double kSameTarget = 1e-9;
 constexpr std::size_t kNeighbourLeaf = 16;
 
@@ -99,7 +100,8 @@ std::vector<std::uint32_t> findLeaders(std::span<const V3d> points, double gap) 
   return leader;
 }
 
-/// Mean distance of a point to its nearest neighbour, and of their targets.
+/// Mean distance of a point to its nearest neighbour, and mean distance of the targets of these
+/// pairs.
 std::pair<double, double> meanSpacings(std::span<const V3d> points, std::span<const V3d> targets) {
   const PointTree tree(points, kNeighbourLeaf);
   std::vector<std::uint32_t> nearest(points.size());
@@ -146,7 +148,7 @@ Merged mergeCoincident(std::span<const V3d> points, std::span<const V3d> targets
   }
   for (std::size_t i = 0; i < points.size(); ++i)
     merged.targets[merged.place[i]] += targets[i] / count[merged.place[i]];
-  // A single target keeps its bits.
+  // Targets that need no averaging keep their bits.
   for (std::size_t i = 0; i < points.size(); ++i)
     if (count[merged.place[i]] == 1) merged.targets[merged.place[i]] = targets[i];
   return merged;
@@ -191,7 +193,8 @@ void checkMerged(const Merged& merged, std::span<const V3d> points, std::span<co
   }
 }
 
-/// Computes the principal axes of the points, the widest first, and counts the wide ones.
+/// Computes the principal axes of the points, the widest first, and counts the axes along which the
+/// points have a width.
 void findAxes(RbfCloud& cloud, RbfSolveReport& report) {
   if (cloud.points.size() > 1) {
     Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
@@ -237,7 +240,7 @@ RbfCloud makeRbfCloud(std::span<const V3d> points, std::span<const V3d> targets,
         "unit of length");
   }
   cloud.origin = origin;
-  // Scaled to size 1, so that no square overflows.
+  // Points scaled to size 1, so that no square overflows.
   std::vector<V3d> local;
   for (const V3d& p : points) local.push_back(extent > 0 ? (p - origin) / extent : V3d(0));
   Merged merged = mergeCoincident(local, targets, near, kSmallestGap);
@@ -246,7 +249,7 @@ RbfCloud makeRbfCloud(std::span<const V3d> points, std::span<const V3d> targets,
   cloud.spacing = merged.points.size() > 1 ? spacing * extent : 1;
   cloud.targets = std::move(merged.targets);
   for (const std::uint32_t i : merged.leader) {
-    // Computed as RbfMap does, so that the particles match to the last bit.
+    // The same expression as in RbfMap, so that the positions match to the last bit.
     cloud.points.push_back((points[i] - origin) / cloud.spacing);
     cloud.extent = std::max(cloud.extent, largest(cloud.points.back()));
   }

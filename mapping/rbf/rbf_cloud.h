@@ -37,15 +37,15 @@ struct RbfCloud {
   Imath::V3d origin{0};
   /// Mean distance to the nearest neighbour, world units; 1 for a single particle.
   double spacing = 1;
-  double extent = 0;  ///< largest |coordinate| of the points
+  double extent = 0;  ///< largest |coordinate| of the points, mean particle spacings
   /// Orthonormal axes; the points span the first `directions` of them.
   std::array<Imath::V3d, 3> axes{Imath::V3d(1, 0, 0), Imath::V3d(0, 1, 0), Imath::V3d(0, 0, 1)};
   int directions = 0;
 };
 
-/// Merges and normalises the particles. Particles closer than 1e-9 of the cloud's size are merged,
-/// with the mean of their targets. A direction in which the cloud is thinner than 1e-6 of its size
-/// is not counted in `directions`.
+/// Merges and normalises the particles. Particles closer than 1e-9 of the cloud's size are merged
+/// into one, which gets the mean of their targets. A direction in which the cloud is thinner than
+/// 1e-6 of its size is not counted in `directions`.
 /// @throws UsageError for λ that is negative or not finite
 /// @throws InvalidInput for no points, numbers that are not finite, and coincident points whose
 ///         targets are further apart than those of neighbours

@@ -22,20 +22,23 @@ using Eigen::MatrixXd;
 using Imath::V3d;
 
 constexpr std::size_t kSolveLeaf = 128;
-constexpr Index kMostSteps = 40;  // steps between restarts
+constexpr Index kMostSteps = 40;  // largest number of steps between restarts
 constexpr int kMostRestarts = 30;
-// Stagnation: a restart that reduces the residual by less than this factor.
+// The iteration stagnates if a restart does not reduce the residual below this share of its
+// previous value.
 constexpr double kStill = 0.7;
-// The accuracy of the fast sum limits the reduction of one restart.
+// Largest reduction of the residual that one restart aims at. The fast sum is not accurate enough
+// for more.
 constexpr double kLeastReduction = 1e-3;
 
-/// True if far particles outweigh near ones so much that the fast sum is too inaccurate.
+/// True if the kernel grows so fast that the fast sum is too inaccurate, because far particles
+/// outweigh near ones.
 bool growsFast(RbfKernel kernel) {
   return kernel == RbfKernel::Triharmonic || kernel == RbfKernel::ThinPlate ||
          kernel == RbfKernel::Sum;
 }
 
-/// Reorders the particles by a tree, so that those of a box are contiguous.
+/// Reorders the particles by a tree, so that the particles of each tree node are contiguous.
 RbfCloud inOrder(const RbfCloud& cloud, std::span<const std::uint32_t> order) {
   RbfCloud result = cloud;
   for (std::size_t n = 0; n < order.size(); ++n) {
@@ -54,14 +57,16 @@ Matrix rowsInOrder(const Matrix& matrix, std::span<const std::uint32_t> order) {
   return result;
 }
 
-/// Least-squares problem of one right-hand side; columns are added one by one.
+/// Least-squares problem of GMRES for one right-hand side. Columns of the Hessenberg matrix are
+/// added one by one.
 class Hessenberg {
  public:
   explicit Hessenberg(double residual) : right_(Eigen::VectorXd::Zero(kMostSteps + 1)) {
     right_[0] = residual;
   }
   /// Adds a column.
-  /// @param column  products with the basis, and the norm of the rest; steps + 2 values
+  /// @param column  dot products of the new vector with the basis, then the norm of its remainder;
+  ///         steps + 2 values
   void push(Eigen::VectorXd column) {
     plain_.topRows(column.size()).col(steps_) = column;
     for (Index i = 0; i < steps_; ++i) rotate(i, column[i], column[i + 1]);
@@ -103,7 +108,7 @@ class Hessenberg {
   std::array<double, kMostSteps> cosine_{}, sine_{};
 };
 
-/// Flexible GMRES for u, v and w in lockstep.
+/// Flexible GMRES for the three right-hand sides u, v and w in lockstep.
 ///
 /// Eigen has GMRES only in unsupported/, without a flexible variant. It preconditions from the
 /// left, so its tolerance bounds the preconditioned residual. It assumes a linear preconditioner,
@@ -124,7 +129,7 @@ class KrylovSolver {
         report_(report) {}
 
   /// Solves for the weights.
-  /// @param tolerance  largest magnitude of the residual's entries
+  /// @param tolerance  largest accepted magnitude of the residual's entries
   RbfFit solve(const RbfColumns& values, double tolerance) {
     const RbfColumns right = project(values), zero = RbfColumns::Zero(values.rows(), 3);
     RbfFit fit{zero, zero};
@@ -139,7 +144,8 @@ class KrylovSolver {
       if (worst <= tolerance) break;
       const bool isStill = !(worst < kStill * before);
       if ((isStill && isDirect_) || restart >= kMostRestarts) refuse(worst, tolerance);
-      if (isStill) isDirect_ = true;  // the errors of the fast sum may be the cause
+      // The residual may stagnate because of the errors of the fast sum.
+      if (isStill) isDirect_ = true;
     }
     return fit;
   }
@@ -240,7 +246,7 @@ class KrylovSolver {
   double sign_;
   RbfClusterSum sum_;
   RbfPreconditioner inverse_;
-  bool isDirect_;  ///< true: products are direct sums
+  bool isDirect_;  ///< true: matrix products use direct sums instead of the fast sum
   RbfSolveReport& report_;
 };
 

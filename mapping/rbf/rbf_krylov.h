@@ -10,7 +10,7 @@ namespace mapping {
 /// errors of the fast sum do not affect the result. The preconditioner solves separately for the
 /// particles of each leaf of a tree with their neighbours, and then for a coarse subset of all
 /// particles [Beatson00].
-/// @param q  n × (1 + directions), orthonormal: the polynomials at the particles
+/// @param q  orthonormal basis of the polynomials at the particles, n × (1 + directions)
 /// @return weights and their image under the matrix. Orthogonal to the polynomials, the residual is
 ///         at most options.solveTolerance times the extent of the targets in u, v and w.
 /// @throws ResourceLimit if the memory estimate exceeds the limit

@@ -14,19 +14,19 @@
 #include "mapping/maps/patch_map.h"
 #include "mapping/rbf/rbf_cloud.h"
 
-/// Smooth maps from patch space to texture space through scattered particles.
+/// Smooth maps from world positions to texture coordinates, through scattered particles.
 namespace mapping {
 
 struct RbfMapOptions {
   RbfKernel kernel = RbfKernel::Biharmonic;
-  /// Relaxation λ at the surface, and everywhere else: added to ±φ on the diagonal, ≥ 0. φ takes r
-  /// in mean particle spacings. For φ(r) = r, λ is a length in mean particle spacings; decaying
-  /// kernels have φ(0) = 1.
+  /// Relaxation λ ≥ 0 of the particles at the surface (lambdaNear) and of all others (lambdaFar).
+  /// It is added to ±φ on the diagonal. φ takes r in mean particle spacings. For φ(r) = r, λ is a
+  /// length in mean particle spacings; decaying kernels have φ(0) = 1.
   double lambdaNear = 0.005, lambdaFar = 0.25;
   /// Largest number of particles for a direct solution. Above it, or if the factors exceed
   /// maxMemory, the system is solved iteratively.
   std::size_t denseLimit = 10000;
-  /// Tolerance of the iterative solver: largest residual in u, v and w, divided by the targets'
+  /// Tolerance of the iterative solver: largest residual in u, v and w, as a share of the targets'
   /// extent.
   double solveTolerance = 1e-6;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
@@ -53,19 +53,19 @@ struct RbfMapOptions {
 class RbfMap final : public PatchMap {
  public:
   /// Builds the map.
-  /// @param points, targets  n each
-  /// @param near  n values, true where lambdaNear applies
+  /// @param points, targets  n positions in world units, and their n texture coordinates
+  /// @param near  n values; true for particles with lambdaNear
   /// @throws UsageError for λ or a tolerance that is negative or not finite
   /// @throws InvalidInput for no points, numbers that are not finite, and coincident points whose
   ///         targets are further apart than those of neighbours
-  /// @throws ResourceLimit before the matrix is allocated
+  /// @throws ResourceLimit if the matrix would exceed options.maxMemory, before it is allocated
   /// @throws NumericalError if the iteration stagnates
   RbfMap(std::span<const Imath::V3d> points, std::span<const Imath::V3d> targets,
          std::span<const char> near, const RbfMapOptions& options = {});
 
   [[nodiscard]] Imath::V3d operator()(const Imath::V3d& x) const override;
-  /// Jacobian of the map. At a particle its own term with φ(r) = r, which has a kink there, adds
-  /// nothing.
+  /// Jacobian of the map. At a particle the particle's own term adds nothing; for φ(r) = r it has
+  /// no derivative there.
   [[nodiscard]] Imath::M33d jacobian(const Imath::V3d& x) const override;
   [[nodiscard]] std::unique_ptr<BlockMap> restrictTo(const GridBlock& block,
                                                      double tolerance) const override;
@@ -82,7 +82,8 @@ class RbfMap final : public PatchMap {
   /// Particles with their weights; positions in mean particle spacings relative to origin().
   [[nodiscard]] std::span<const RbfParticle> particles() const { return particles_; }
   [[nodiscard]] const Imath::V3d& origin() const { return origin_; }
-  /// Affine part: gradients as rows, per mean particle spacing; and the value at origin().
+  /// Affine part of the map: gradients of u, v and w as rows, per mean particle spacing; and its
+  /// value at origin().
   [[nodiscard]] const Imath::M33d& linearPart() const { return linear_; }
   [[nodiscard]] const Imath::V3d& constantPart() const { return constant_; }
 
@@ -96,9 +97,9 @@ class RbfMap final : public PatchMap {
   RbfKernel kernel_;
   std::vector<RbfParticle> particles_;
   std::vector<double> weightNorm_;  ///< |ω_i| of each particle
-  Imath::V3d origin_{0};            ///< world units
-  double spacing_ = 1;              ///< world units
-  Imath::M33d linear_;              ///< gradients of the affine part as rows
+  Imath::V3d origin_{0};            ///< mean of the particle positions, world units
+  double spacing_ = 1;  ///< mean distance of a particle to its nearest neighbour, world units
+  Imath::M33d linear_;  ///< gradients of the affine part as rows, per mean particle spacing
   Imath::V3d constant_{0};
   double maxResidual_ = 0;
   Imath::V3d axisResidual_{0};

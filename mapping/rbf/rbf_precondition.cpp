@@ -16,14 +16,18 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Imath::V3d;
 
-constexpr std::size_t kAround = 150;  // neighbouring particles that are solved together with a leaf
-constexpr std::size_t kCoarseShare = 40;  // particles per coarse particle, below kMostCoarse
+// Neighbouring particles that are solved together with those of a leaf.
+constexpr std::size_t kAround = 150;
+// Particles for each coarse one, until there are kMostCoarse coarse ones.
+constexpr std::size_t kCoarseShare = 40;
 constexpr std::size_t kMostCoarse = 2500;
 constexpr std::size_t kCoarseTile = 64;
-// Share of the diagonal; keeps the factors of close particles positive definite.
+// Smallest shift of the diagonal, as a share of its mean. It keeps the matrix of close particles
+// positive definite.
 constexpr double kRidge = 1e-12;
 
-/// Cholesky factors of a symmetric matrix. If needed, a small share of its diagonal is added.
+/// Cholesky factors of a symmetric matrix. If it is not positive definite within rounding errors,
+/// its diagonal is increased.
 Eigen::LLT<MatrixXd> factor(MatrixXd system) {
   const double mean = system.rows() > 0 ? system.diagonal().cwiseAbs().mean() : 0;
   for (double ridge = kRidge;; ridge *= 100) {
@@ -33,8 +37,8 @@ Eigen::LLT<MatrixXd> factor(MatrixXd system) {
   }
 }
 
-/// An orthonormal basis whose first columns span the polynomials at the chosen particles, and their
-/// number.
+/// An orthonormal basis whose first columns span the polynomials at the chosen particles, and the
+/// number of these columns.
 std::pair<MatrixXd, Index> basisOf(const MatrixXd& q, std::span<const std::uint32_t> chosen) {
   MatrixXd polynomial(static_cast<Index>(chosen.size()), q.cols());
   for (std::size_t i = 0; i < chosen.size(); ++i)
@@ -77,7 +81,7 @@ void RbfPreconditioner::makeLeaf(const PointTree& tree, Leaf& leaf) const {
   const auto [basis, rank] = basisOf(q_, leaf.members);
   const Index rest = system.rows() - rank;
   system = basis.rightCols(rest).transpose() * system * basis.rightCols(rest);
-  // The inverse is symmetric, so its own rows equal its own columns.
+  // The inverse is symmetric, so the rows of the leaf's own particles equal their columns.
   const MatrixXd right = basis.rightCols(rest).topRows(own).transpose();
   leaf.inverse =
       (basis.rightCols(rest) * factor(std::move(system)).solve(right)).transpose().cast<float>();
@@ -86,7 +90,8 @@ void RbfPreconditioner::makeLeaf(const PointTree& tree, Leaf& leaf) const {
 void RbfPreconditioner::chooseCoarse() {
   const std::size_t n = cloud_.points.size();
   const std::size_t step = std::max(kCoarseShare, (n + kMostCoarse - 1) / kMostCoarse);
-  // Neighbours in the tree's order are neighbours in space.
+  // Neighbours in the tree's order are neighbours in space, so every step-th particle gives an even
+  // subset.
   for (std::size_t i = step / 2; i < n; i += step) coarse_.push_back(static_cast<std::uint32_t>(i));
 }
 

@@ -10,18 +10,18 @@
 
 namespace mapping {
 
-/// A two-level approximate inverse of s φ + λ [Beatson00]. First, each leaf of a tree is solved
-/// separately together with neighbouring particles, and only the leaf's own weights are kept. Then
-/// the remaining residual at a coarse subset of particles is solved. It refers to the cloud and the
-/// tree.
+/// A two-level approximate inverse of the RBF matrix s φ + λ, with s the sign of the kernel
+/// [Beatson00]. First, each leaf of a tree is solved separately together with neighbouring
+/// particles, and only the leaf's own weights are kept. Then the remaining residual at a coarse
+/// subset of particles is solved. The object keeps references to the cloud and the tree.
 class RbfPreconditioner {
  public:
-  /// @param cloud  in the order of the tree
-  /// @param q      polynomials at the particles, orthonormal
+  /// @param cloud  particles in the order of the tree
+  /// @param q      orthonormal basis of the polynomials at the particles
   RbfPreconditioner(const RbfCloud& cloud, RbfKernel kernel, const PointTree& tree,
                     const Eigen::MatrixXd& q);
 
-  /// Returns weights orthogonal to the polynomials.
+  /// Applies the approximate inverse. The resulting weights are orthogonal to the polynomials.
   [[nodiscard]] RbfColumns operator()(const RbfColumns& residual) const;
 
   /// Memory for a number of particles, bytes.
@@ -31,13 +31,13 @@ class RbfPreconditioner {
   struct Leaf {
     std::uint32_t begin, end;
     std::vector<std::uint32_t> members;
-    Eigen::MatrixXf inverse;  ///< own particles × members
+    Eigen::MatrixXf inverse;  ///< rows: the leaf's own particles; columns: all members
   };
   void chooseCoarse();
   void makeLeaf(const PointTree& tree, Leaf& leaf) const;
   void factorCoarse();
   [[nodiscard]] RbfColumns solveLeaves(const RbfColumns& residual) const;
-  /// (s φ + λ) times the weights, at the coarse particles.
+  /// Computes (s φ + λ) times the weights, only at the coarse particles.
   [[nodiscard]] RbfColumns atCoarse(const RbfColumns& weights) const;
 
   const RbfCloud& cloud_;
@@ -45,7 +45,8 @@ class RbfPreconditioner {
   const Eigen::MatrixXd& q_;
   std::vector<Leaf> leaves_;
   std::vector<std::uint32_t> coarse_;
-  Eigen::MatrixXd coarseQ_;  ///< complete orthogonal basis, polynomials first
+  /// Orthonormal basis of the coarse weights that are orthogonal to the polynomials.
+  Eigen::MatrixXd coarseQ_;
   Eigen::LLT<Eigen::MatrixXd> coarseFactors_;
 };
 

@@ -21,11 +21,11 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Imath::V3d;
 
-// Beyond this condition number a solution has no correct digits. Then this share of the system's
-// norm, or powers of ten of it, is added to its diagonal.
+// Beyond this condition number a solution has no correct digits. Then kFirstRidge times the
+// system's norm, or 10, 100, … times as much, is added to its diagonal.
 constexpr double kWorstCondition = 1e15;
 constexpr double kFirstRidge = 1e-14;
-// Smaller systems are always solved directly.
+// Systems of at most this many particles are always solved directly.
 constexpr std::size_t kAlwaysDense = 500;
 constexpr std::size_t kChunk = 512;
 
@@ -33,8 +33,8 @@ double signOf(RbfKernel kernel) {
   return withKernel(kernel, [](auto k) { return decltype(k)::kSign; });
 }
 
-/// Polynomials that the particles distinguish, at the particles: 1 and the coordinates along
-/// spread-out axes.
+/// Values at the particles of the polynomials that the particles can distinguish: 1, and the
+/// coordinates along the axes in which the cloud has a width.
 MatrixXd polynomialOf(const RbfCloud& cloud) {
   const auto n = static_cast<Index>(cloud.points.size());
   MatrixXd result(n, 1 + cloud.directions);
@@ -52,14 +52,15 @@ MatrixXd polynomialOf(const RbfCloud& cloud) {
 /// @pre u ⟂ a
 V3d turned(const V3d& u, const V3d& a, const V3d& b, bool isFirst) {
   const double cosine = a.dot(b);
-  // Half a turn about the first perpendicular axis.
+  // The least rotation is not unique. Takes half a turn about the first axis that is perpendicular
+  // to a.
   if (cosine < -1 + 1e-12) return isFirst ? u : -u;
   return u - (a + b) * (u.dot(b) / (1 + cosine));
 }
 
 /// Gradient in the directions that the particles do not span. Normal to a plane, it is the normal
 /// of the plane's image times the mean scale in the plane, with the same handedness. Around a line,
-/// it is the similarity of the line.
+/// it continues the rotation and scale of the line.
 Imath::M33d missingGradient(const RbfCloud& cloud, const MatrixXd& coefficients) {
   Imath::M33d result(0, 0, 0, 0, 0, 0, 0, 0, 0);
   const auto along = [&](int d) {
@@ -121,7 +122,7 @@ MatrixXd solveDefinite(Eigen::Ref<MatrixXd> system, const MatrixXd& right, RbfSo
   }
 }
 
-/// Weights orthogonal to the polynomials, by Cholesky factorisation.
+/// Computes weights orthogonal to the polynomials by Cholesky factorisation.
 RbfColumns solveDirectly(const RbfCloud& cloud, RbfKernel kernel,
                          const Eigen::HouseholderQR<MatrixXd>& polynomial, const RbfColumns& values,
                          const levelset::Progress& progress, RbfSolveReport& report) {
@@ -214,7 +215,8 @@ RbfSolution solveRbf(const RbfCloud& cloud, const RbfMapOptions& options, RbfSol
         solveDirectly(cloud, options.kernel, polynomial, values, options.progress, report);
     fit.image = multiplyDirectly(cloud, options.kernel, fit.weights);
   }
-  // The polynomial fits what the kernels leave; the remainder is the error of the solution.
+  // The polynomial fits the values that the kernels leave. The remainder is the error of the
+  // solution.
   RbfColumns rest = values - fit.image;
   const MatrixXd coefficients = polynomial.solve(rest);
   rest -= polynomialOf(cloud) * coefficients;

@@ -16,12 +16,14 @@ struct RbfMapOptions;
 /// Columns u, v and w; one row per particle.
 using RbfColumns = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
-/// Weights orthogonal to the polynomials, and their product with s φ + λ.
+/// Weights orthogonal to the polynomials, and their product with the RBF matrix s φ + λ, with s the
+/// sign of the kernel.
 struct RbfFit {
   RbfColumns weights, image;
 };
 
-/// Φ(x) = constant + linear x + Σ weights_i φ(|x − p_i|), in the coordinates of the cloud.
+/// Coefficients of Φ(x) = constant + linear x + Σ weights_i φ(|x − p_i|), in the coordinates of the
+/// cloud.
 struct RbfSolution {
   std::vector<Imath::V3d> weights;
   Imath::V3d constant{0};
@@ -33,16 +35,16 @@ struct RbfSolution {
 /// Cholesky factorisation, or iteratively above options.denseLimit and if the factors exceed
 /// options.maxMemory. If the particles span fewer than three directions, a similarity completes the
 /// affine part, see RbfMap.
-/// @throws ResourceLimit before too much memory is allocated
+/// @throws ResourceLimit if the memory estimate exceeds options.maxMemory
 /// @throws NumericalError if the iteration stagnates
 [[nodiscard]] RbfSolution solveRbf(const RbfCloud& cloud, const RbfMapOptions& options,
                                    RbfSolveReport& report);
 
-/// Computes (s φ + λ) times the weights by direct summation.
+/// Computes (s φ + λ) times the weights by direct summation, with s the sign of the kernel.
 [[nodiscard]] RbfColumns multiplyDirectly(const RbfCloud& cloud, RbfKernel kernel,
                                           const RbfColumns& weights);
 
-/// Matrix s φ + λ between chosen particles.
+/// Matrix s φ + λ between chosen particles, with s the sign of the kernel.
 [[nodiscard]] Eigen::MatrixXd rbfMatrix(const RbfCloud& cloud, RbfKernel kernel,
                                         std::span<const std::uint32_t> chosen);
 

@@ -46,8 +46,8 @@ std::size_t termOf(int x, int y, int z) {
 
 constexpr std::size_t kNoTerm = kTerms;
 
-/// Recurrence of a coefficient of |x|: the terms with one and with two powers less of x, y and z,
-/// and their factors.
+/// Recurrence of a coefficient of |x|: the terms with one power less and with two powers less of x,
+/// y and z, and the factors of their sums.
 struct TermParents {
   std::array<std::size_t, 3> one, two;
   double firstShare = 0, secondShare = 0;
@@ -72,10 +72,10 @@ std::array<TermParents, kTerms> makeParents() {
 }
 const std::array<TermParents, kTerms> kParents = makeParents();
 
-/// Bounds the remainder of the gradient of |x + s|, a series in |s| / |x|. The magnitude of its
-/// n-th term is at most the square root of (n + 1) / n. With t the cosine between x and s, the term
-/// is P_n(t) x̂ − P_{n−1}(t) ŝ. Its square is (1 − t²) (P_n² + (1 − t²) P_n′² / n²), and P_n² + (1
-/// − t²) P_n′² / (n (n + 1)) ≤ 1.
+/// Bounds the remainder of the gradient of |x + s|, a series in |s| / |x|. The factor of (|s| /
+/// |x|)ⁿ is at most √((n + 1) / n). With t the cosine between x and s, this factor is P_n(t) x̂ −
+/// P_{n−1}(t) ŝ. Its square is (1 − t²) (P_n² + (1 − t²) P_n′² / n²), and P_n² + (1 − t²) P_n′² /
+/// (n (n + 1)) ≤ 1.
 double gradientRest(double ratio) {
   const double squared = ratio * ratio;
   return std::sqrt((kDegree + 1.0) / kDegree) * squared * squared * ratio / (1 - ratio);
@@ -169,8 +169,8 @@ RbfCubes::RbfCubes(const RbfMap& map, const V3d& sizes, double tolerance)
     : particles_(map.particles().begin(), map.particles().end()),
       linear_(map.linearPart()),
       constant_(map.constantPart() * sizes) {
-  // The map uses particle spacings as its unit, so the weights of the kernel r are divided by the
-  // spacing.
+  // The map uses mean particle spacings as its unit, so the weights of the kernel r are divided by
+  // the spacing to get world units.
   const double spacing = map.meanSpacing();
   double sum = 0;
   for (RbfParticle& particle : particles_) {

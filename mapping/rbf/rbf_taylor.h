@@ -32,7 +32,7 @@ class TaylorPolynomial {
   /// Adds weight × |offset + s|, expanded in s, by the recurrence of [Duan01].
   /// @pre offset is not zero
   void addDistance(const Imath::V3d& offset, const Imath::V3d& weight);
-  /// Re-expands the polynomial around a point at distance vector `by` from the old one.
+  /// Re-expands the polynomial around a point that is displaced by `by` from the old centre.
   void shift(const Imath::V3d& by);
   /// Jacobian at s: gradients of the three components as rows.
   [[nodiscard]] Imath::M33d slopes(const Imath::V3d& s) const;
@@ -42,14 +42,15 @@ class TaylorPolynomial {
   std::array<Imath::V3d, kTerms> terms_;
 };
 
-/// A smooth map around the centre of a cube, in scaled units: u, v and w are multiplied by the
-/// extents of the patch, so that slopes are about 1.
+/// Expansion of a smooth map around the centre of a cube. The map is scaled: u, v and w are
+/// multiplied by the extents of the patch, so that slopes are about 1.
 struct RbfCube {
-  Imath::V3d center{0};  ///< relative to the map's origin
+  Imath::V3d center{0};  ///< centre of the cube, relative to the map's origin, world units
   double half = 0;       ///< half edge length, world units
   TaylorPolynomial far;
-  double slopeError = 0, valueError = 0;  ///< error bounds of the polynomial in the cube's ball
-  std::vector<std::uint32_t> near;        ///< particles that the polynomial does not contain
+  /// Error bounds of the polynomial in the ball around the cube, in scaled units.
+  double slopeError = 0, valueError = 0;
+  std::vector<std::uint32_t> near;  ///< particles that the polynomial does not contain
 
   [[nodiscard]] double radius() const { return half * 1.7320508075688774; }
 };
@@ -58,19 +59,19 @@ struct RbfCube {
 /// which its octants inherit.
 class RbfCubes {
  public:
-  /// @param map        with the kernel r
-  /// @param sizes      factors of u, v and w
+  /// @param map        a map with the kernel r
+  /// @param sizes      factors by which u, v and w are scaled
   /// @param tolerance  error bound for the slopes of all far particles together, in scaled units
   RbfCubes(const RbfMap& map, const Imath::V3d& sizes, double tolerance);
 
   [[nodiscard]] RbfCube root(const Imath::V3d& center, double half) const;
-  /// The octant that is the upper half along x, y, z where bit 1, 2, 4 is set.
+  /// Octant of the cube. Bits 1, 2 and 4 of `bits` select the upper half along x, y and z.
   [[nodiscard]] RbfCube octant(const RbfCube& cube, int bits) const;
-  /// Particles with scaled weights; positions relative to the map's origin.
+  /// Particles with scaled weights; positions in world units, relative to the map's origin.
   [[nodiscard]] std::span<const RbfParticle> particles() const { return particles_; }
   [[nodiscard]] double weightNorm(std::uint32_t particle) const { return norms_[particle]; }
-  /// Scaled Jacobian at a point of the cube, gradients as rows. At a particle its own term, which
-  /// has a kink there, adds nothing.
+  /// Scaled Jacobian at a point of the cube, gradients as rows. At a particle the particle's own
+  /// term, which has no derivative there, adds nothing.
   [[nodiscard]] Imath::M33d slopes(const RbfCube& cube, const Imath::V3d& point) const;
   /// Scaled u, v and w at a point of the cube.
   [[nodiscard]] Imath::V3d value(const RbfCube& cube, const Imath::V3d& point) const;
@@ -83,7 +84,7 @@ class RbfCubes {
   std::vector<double> norms_;
   Imath::M33d linear_;
   Imath::V3d constant_{0};
-  double farRatio_ = 0;  ///< ratio of a cube's radius to the distance from which a particle is far
+  double farRatio_ = 0;  ///< largest ratio of a cube's radius to the distance of a far particle
 };
 
 }  // namespace mapping
