@@ -11,18 +11,22 @@ namespace {
 
 using Imath::V3d;
 
-// A path is never shorter than the chord. Below this ratio no other paths are searched.
+// No path is shorter than its chord. A path whose length is below this multiple of its chord is
+// accepted without a search for other paths.
 constexpr double kNearlyStraight = 1.01;
-// Multiple of the shortest length, for a roughly straightened path.
+// A roughly straightened path is straightened fully only if its length is below this multiple of
+// the shortest length.
 constexpr double kWorthTrying = 1.02;
-// Between the normals at the ends of a segment, also over an edge.
+// Least cosine between the normals at the ends of a segment that stays on the surface, even over an
+// edge.
 constexpr double kLeastTurnCosine = -0.7;
-constexpr double kFlatCosine = 0.98;  // of 0.2 radians, for which a chord is 0.2 % short
+// Cosine of 0.2 radians: an arc with this turn is 0.2 % longer than its chord.
+constexpr double kFlatCosine = 0.98;
 constexpr std::size_t kCoarsestSegments = 8;
 constexpr int kMaxSweeps = 600;
 constexpr int kSweepsBetweenLooks = 16;
 constexpr double kCalm = 1e-5;      // relative change of the length between two checks
-constexpr double kStraight = 1e-3;  // voxels; largest move of a point in the last sweep
+constexpr double kStraight = 1e-3;  // largest move of a point in the last sweep, voxels
 
 V3d tangential(const V3d& offset, const V3d& normal) {
   return offset - normal * offset.dot(normal);
@@ -48,8 +52,8 @@ std::vector<V3d> walkTowards(const SurfaceField& field, double height, const V3d
   return path;
 }
 
-/// True if a straight step along the surface can turn the normal this much. Through a thin sheet
-/// the normals are opposite.
+/// True if a straight step along the surface can turn the normal from `normal` to `next`. Nearly
+/// opposite normals mean that the step passes through a thin sheet.
 bool isSoundTurn(const V3d& normal, const V3d& next) {
   return normal.dot(next) > kLeastTurnCosine;
 }
@@ -87,7 +91,8 @@ void relaxPath(const SurfaceField& field, double height, std::vector<V3d>& path)
       V3d next = path[i] + move;
       if (!field.project(next, height) || (next - path[i]).length() > 2 * longest) continue;
       const V3d normal = field.normal(next);
-      // A sound segment must stay sound; otherwise the path would slip off a thin ear.
+      // A segment that stays on the surface must still do so after the move; otherwise the path
+      // would jump to the other side of a thin part.
       const auto spoils = [&](std::size_t other) {
         return !isSoundTurn(normal, normals[other]) && isSoundTurn(normals[i], normals[other]);
       };
@@ -98,7 +103,8 @@ void relaxPath(const SurfaceField& field, double height, std::vector<V3d>& path)
     }
     if (moved < kStraight * field.voxelSize()) return;
     if (sweep % kSweepsBetweenLooks != 0) continue;
-    // Near edges the points may oscillate for ever.
+    // Near edges the points may oscillate for ever. So over-relaxation ends when the length no
+    // longer decreases, and the sweeps end when this happens again.
     const double length = pathLength(path);
     const bool isCalm = lengthBefore - length < kCalm * length;
     if (isCalm && factor == 1) return;
@@ -124,7 +130,7 @@ void followBend(const SurfaceField& field, double height, const V3d& p, const V3
   const bool isFlat = field.normal(p).dot(field.normal(q)) > kFlatCosine;
   V3d middle = (p + q) * 0.5;
   if (!isFlat && depth > 0 && field.project(middle, height)) {
-    // A midpoint that a ridge of φ throws aside would lengthen the path.
+    // Near a ridge of φ, a midpoint may be projected far aside, which would lengthen the path.
     const double chord = (q - p).length();
     if ((middle - p).length() < chord && (middle - q).length() < chord) {
       followBend(field, height, p, middle, depth - 1, result);
@@ -143,7 +149,7 @@ std::vector<V3d> withBends(const SurfaceField& field, double height, const std::
   return result;
 }
 
-/// True if the path lies within `distance` of the chords of another path.
+/// True if every point of the path lies within `distance` of the chords of another path.
 bool isBeside(const std::vector<V3d>& path, const std::vector<V3d>& other, double distance) {
   return std::all_of(path.begin(), path.end(), [&](const V3d& p) {
     for (std::size_t i = 1; i < other.size(); ++i) {
@@ -238,7 +244,8 @@ std::vector<V3d> geodesic(const SurfaceField& field, double height, const V3d& a
 
 std::vector<V3d> geodesicLike(const SurfaceField& field, double height, const V3d& a, const V3d& b,
                               const std::vector<V3d>& path) {
-  constexpr double kLongest = 3;  // multiple of the mean segment
+  // Longest segment of an unbroken path, as a multiple of the mean segment.
+  constexpr double kLongest = 3;
   const double voxels = pathLength(path) / field.voxelSize();
   const std::size_t segments = std::max(kCoarsestSegments, static_cast<std::size_t>(voxels / 2));
   std::vector<V3d> moved = sampleByArcLength(path, segments + 1);

@@ -19,10 +19,10 @@ namespace mapping {
 /// nearly straight in space, other paths that may be shorter are found and straightened too, and
 /// the shortest one is returned. No path jumps through the solid to another side if the solid is
 /// two voxels thick there. Lengths are within 1 % where radii of curvature exceed 2 voxels and over
-/// edges (`Geodesic.*`).
-/// @param a, b  on φ = height
-/// @param longest  upper bound for the length before straightening, which may shorten a path by an
-///         eighth
+/// edges (tests `Geodesic.*`).
+/// @param a, b  ends of the path, on φ = height
+/// @param longest  upper bound for the length of the path before it is straightened, which may
+///         shorten a path by an eighth
 /// @return empty if the surface does not connect a and b by a path within `longest`
 [[nodiscard]] std::vector<Imath::V3d> geodesic(const SurfaceField& field, double height,
                                                const Imath::V3d& a, const Imath::V3d& b,
@@ -30,7 +30,7 @@ namespace mapping {
 
 /// Computes the geodesic from a to b that follows a nearby path, possibly one on another layer. The
 /// points of that path are projected and straightened.
-/// @return empty if the path cannot be projected without breaking
+/// @return empty if the path cannot be projected onto φ = height without breaking
 [[nodiscard]] std::vector<Imath::V3d> geodesicLike(const SurfaceField& field, double height,
                                                    const Imath::V3d& a, const Imath::V3d& b,
                                                    const std::vector<Imath::V3d>& path);

@@ -15,8 +15,8 @@ using Imath::V3d;
 using Path = std::vector<V3d>;
 
 constexpr std::size_t kMaxSearchNodes = 4'000'000;
-// Grid points closer to the surface than this are connected to their 26 neighbours, on planes of
-// any slope.
+// Grid points within this distance of the surface belong to the graph. On a plane of any slope,
+// they are connected through their 26 neighbours.
 constexpr double kBesideVoxels = 0.75;
 // A step that turns the normal by more than a right angle passes through a thin sheet, not around
 // it.
@@ -47,7 +47,8 @@ GridCell unpackCell(Key key) {
 class PathGraph {
  public:
   struct Node {
-    std::array<double, 2> cost = {HUGE_VAL, HUGE_VAL};  // from a, from b
+    // Length of the path from a, and from b; world units.
+    std::array<double, 2> cost = {HUGE_VAL, HUGE_VAL};
     std::array<Key, 2> from = {};
     std::array<bool, 2> isClosed = {};
     bool isBeside = false;
@@ -67,8 +68,8 @@ class PathGraph {
   Node& node(Key key) { return nodes_.at(key); }
 
   /// Runs Dijkstra's algorithm from an end, or A* if `estimate` is not zero.
-  /// @param mayLie  true for a position and its cost if the search may visit it
-  /// @param isGoal  true for the node that ends the search
+  /// @param mayLie  true if the search may visit a position at a path length
+  /// @param isGoal  true for a node at which the search ends
   /// @return key of the goal, or nothing
   template <typename MayLie, typename Estimate, typename IsGoal>
   std::optional<Key> search(std::size_t end, const MayLie& mayLie, const Estimate& estimate,
@@ -92,7 +93,8 @@ class PathGraph {
            normal.dot(field_.normal(ends_[end])) > kLeastNormalCosine;
   }
 
-  /// Path from a node back to the start of the search from `end`, projected onto the surface.
+  /// Returns the path from a node back to the start of the search from `end`, projected onto the
+  /// surface.
   [[nodiscard]] Path trace(std::size_t end, Key key) {
     Path path;
     for (;; key = nodes_.at(key).from[end]) {
@@ -117,7 +119,7 @@ class PathGraph {
     return it->second;
   }
 
-  /// Opens the nodes around an end. The path from them to the end is straight.
+  /// Opens the nodes around an end, at their straight distance from the end.
   template <typename Estimate>
   void start(std::size_t end, const Estimate& estimate) {
     const V3d offset = (ends_[end] - ends_[0]) / step_;
@@ -139,7 +141,7 @@ class PathGraph {
   template <typename MayLie, typename Estimate>
   void expand(std::size_t end, Key key, const MayLie& mayLie, const Estimate& estimate) {
     const GridCell c = unpackCell(key);
-    const Node current = nodes_.at(key);  // a copy, because the map may move it
+    const Node current = nodes_.at(key);  // a copy, because visit() may move the nodes in memory
     for (int n = 0; n < 27; ++n) {
       const GridCell d = {n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1};
       if (n == 13) continue;
@@ -171,7 +173,7 @@ struct Meeting {
   Key key;
 };
 
-/// Nodes with about equal distance to both ends, shortest total first.
+/// Nodes with about equal path lengths to both ends, sorted by their sum.
 std::vector<Meeting> meetings(const PathGraph& graph) {
   std::vector<Meeting> result;
   for (const auto& [key, node] : graph.nodes()) {
@@ -218,7 +220,8 @@ std::vector<Path> GeodesicSearch::alternatives(double longest) const {
   // Meeting points close to each other belong to the same path.
   const double apart = std::max(3 * graph.step(), 0.025 * longest);
   std::vector<Path> paths;
-  std::vector<std::pair<V3d, V3d>> taken;  // positions and normals
+  // Positions and normals of the middles of the paths found.
+  std::vector<std::pair<V3d, V3d>> taken;
   const std::vector<Meeting> all = meetings(graph);
   for (const Meeting& meeting : all) {
     if (paths.size() == kMostPaths || meeting.cost > kGridExcess * all.front().cost) break;

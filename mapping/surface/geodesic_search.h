@@ -9,10 +9,10 @@
 namespace mapping {
 
 /// Finds paths from a to b over grid points beside φ = height, so that no path jumps through the
-/// solid to another side. It finds the shortest path, and others whose middle lies elsewhere. Paths
+/// solid to another side. It finds the shortest path, and others whose middle is elsewhere. Paths
 /// over a grid are up to 13 % too long; the true shortest path results from straightening one of
 /// them.
-/// @param a, b  on φ = height
+/// @param a, b  ends of the paths, on φ = height
 class GeodesicSearch {
  public:
   GeodesicSearch(const SurfaceField& field, double height, const Imath::V3d& a, const Imath::V3d& b)
@@ -23,7 +23,7 @@ class GeodesicSearch {
 
   /// Paths that may become no longer than `longest` when they are straightened, the shortest grid
   /// path first. Runs Dijkstra's algorithm from both ends and joins the halves where they meet.
-  /// @param longest  length of a known path, world units
+  /// @param longest  length of the shortest path found so far, world units
   [[nodiscard]] std::vector<std::vector<Imath::V3d>> alternatives(double longest) const;
 
  private:

@@ -27,8 +27,10 @@ using levelset::UsageError;
 
 constexpr double kCandidatesPerPoint = 20;  // [Yuksel15] uses at least five
 constexpr double kMostPoints = 1e6;
-constexpr double kOtherSide = -0.5;  // cosine between normals
-constexpr double kThin = 0.25;       // share of the least distance
+// Cosine between the normals of points on opposite sides of a thin part.
+constexpr double kOtherSide = -0.5;
+// Thickness of a thin part, as a share of the least distance of points.
+constexpr double kThin = 0.25;
 
 /// Random numbers that are equal on all platforms, unlike the standard library's distributions.
 class Random {
@@ -41,13 +43,13 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-/// Grid of points for neighbour searches. Its cells are as wide as the largest distance that
-/// matters.
+/// Grid of points for neighbour searches. Its cells are as wide as the largest distance that is
+/// searched.
 class PointGrid {
  public:
   explicit PointGrid(double width) : width_(width) {}
   void add(const V3d& p, std::size_t index) { cells_[cellOf(p)].push_back(index); }
-  /// Visits every point that may lie within the grid's width of p.
+  /// Visits at least all points within one cell width of p.
   template <typename Visit>
   void visitNear(const V3d& p, const Visit& visit) const {
     const CellKey c = cellOf(p);
@@ -95,7 +97,7 @@ double scaleAt(const ScatterDensity& density, const V3d& place) {
   return scale;
 }
 
-/// The zero set as triangles, sampled by area in units of the local scale. So parts with a small
+/// The zero set as triangles, sampled by area in units of the local scale. So regions with a small
 /// scale get as many points per scaled area as others.
 class AreaSampler {
  public:
@@ -137,7 +139,7 @@ class AreaSampler {
   }
 
  private:
-  /// Removes the triangles of an open surface that close off the end of the band.
+  /// Removes the triangles that close the band of an open surface at the border of the surface.
   void dropWalls() {
     std::erase_if(mesh_.triangles, [&](const auto& t) {
       V3d p = (mesh_.positions[t[0]] + mesh_.positions[t[1]] + mesh_.positions[t[2]]) / 3.0;
@@ -158,10 +160,10 @@ struct Candidates {
   double area = 0;  ///< area accepted by the weight, in units of scale²
 };
 
-/// Samples candidates by area and accepts them with the probability of the weight.
+/// Samples candidates by area and accepts each with the probability that `density.weight` gives.
 Candidates makeCandidates(const AreaSampler& sampler, const ScatterDensity& density,
                           std::size_t count, Random& random) {
-  // A weight that accepts fewer points counts as zero everywhere.
+  // Sampling ends after this many rejections in a row.
   constexpr std::size_t kMostMisses = 200000, kReported = 4096;
   Candidates result;
   std::size_t tried = 0, misses = 0;
@@ -183,8 +185,9 @@ Candidates makeCandidates(const AreaSampler& sampler, const ScatterDensity& dens
   return result;
 }
 
-/// Distance in units of the mean scale.
-/// @param reach  relevant distance, in scales
+/// Distance of two points along the surface, divided by their mean scale.
+/// @param reach  largest distance of interest, in scales; a part thinner than a quarter of it
+///         counts as thin
 double scaledDistance(const SurfacePoint& a, const SurfacePoint& b, double reach) {
   const double scale = 0.5 * (a.scale + b.scale);
   return surfaceDistance(a, b, kThin * reach * scale) / scale;
@@ -196,7 +199,7 @@ double largestScale(std::span<const SurfacePoint> points) {
   return largest;
 }
 
-/// Accepts candidates in their order, unless an accepted one is too near.
+/// Accepts candidates in their order, unless an accepted candidate is nearer than `distance`.
 std::vector<SurfacePoint> throwDarts(std::span<const SurfacePoint> candidates, double distance) {
   std::vector<SurfacePoint> taken;
   PointGrid grid(distance * largestScale(candidates));
@@ -212,8 +215,8 @@ std::vector<SurfacePoint> throwDarts(std::span<const SurfacePoint> candidates, d
   return taken;
 }
 
-/// Removes the most crowded candidates one by one. In reverse order of removal, any first n points
-/// are well spread.
+/// Removes the most crowded candidates one by one. Returns the remaining ones, then the removed
+/// ones in reverse order, so that any first n points are evenly distributed.
 std::vector<SurfacePoint> orderBySpread(std::span<const SurfacePoint> candidates, double reach,
                                         std::size_t kept) {
   PointGrid grid(reach * largestScale(candidates));
@@ -222,7 +225,7 @@ std::vector<SurfacePoint> orderBySpread(std::span<const SurfacePoint> candidates
     std::size_t index;
     double crowding;
   };
-  // Pairs that are much too near count equally, because one of the two is removed anyway
+  // Pairs nearer than `limit` have the same weight, because one of the two is removed anyway
   // [Yuksel15].
   const double share = static_cast<double>(kept) / static_cast<double>(candidates.size());
   const double limit = 0.65 * (1 - std::pow(share, 1.5));
@@ -317,7 +320,7 @@ ScatteredPoints scatterPoints(const levelset::NarrowBand& base, const ScatterDen
         fmt::format("{:.3g} points exceed the limit of {:.0g}; {}", wanted, kMostPoints,
                     density.count > 0 ? "give a smaller count" : "give a larger distance"));
   }
-  constexpr double kNeighbours = 70,  // of a candidate
+  constexpr double kNeighbours = 70,  // assumed number of neighbours of a candidate
       kBytesPerNeighbour = 16;
   levelset::requireMemory(
       wanted * kCandidatesPerPoint * (sizeof(SurfacePoint) + kNeighbours * kBytesPerNeighbour),

@@ -25,17 +25,17 @@ struct ScatterDensity {
 };
 
 struct SurfacePoint {
-  Imath::V3d position, normal;  ///< on the zero set; unit, outwards
+  Imath::V3d position, normal;  ///< position on the zero set; unit normal, outwards
   double scale = 1;
 };
 
 struct ScatteredPoints {
-  /// Points in order of priority. If more than `count` points were requested, the later ones fill
-  /// gaps that appear when earlier ones are rejected.
+  /// Points in order of priority: the points of the result, then spare points. Spare points fill
+  /// the gaps that appear when points of the result are rejected.
   std::vector<SurfacePoint> points;
-  /// Number of points at the front that are the result; the others are spares.
+  /// Number of points at the front that are the result; the others are spare points.
   std::size_t wanted = 0;
-  /// Least distance between two points, in units of their scales; world units.
+  /// Least distance between two points of the result, divided by their mean scale, world units.
   double distance = 0;
 };
 
@@ -57,7 +57,7 @@ struct ScatteredPoints {
 /// points then lie on opposite sides.
 [[nodiscard]] double surfaceDistance(const SurfacePoint& a, const SurfacePoint& b, double thin);
 
-/// Least distance of any two points in units of their mean scale; infinite if no two points are
+/// Least distance of any two points, divided by their mean scale; infinite if no two points are
 /// within `reach`.
 /// @param reach  largest distance that counts, in scales, positive
 /// @param kept   points on opposite sides of a part thinner than a quarter of this length ignore

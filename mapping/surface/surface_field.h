@@ -19,8 +19,8 @@ class SurfaceField {
   /// ∇φ / |∇φ|; zero outside the band.
   [[nodiscard]] Imath::V3d normal(const Imath::V3d& p) const;
   /// Moves p along ∇φ until φ = height within a hundred-thousandth of a voxel: p ← p − (φ − height)
-  /// ∇φ. Returns false, with the last p, if the path leaves the band or meets a ridge of φ, or
-  /// where an open surface breaks off.
+  /// ∇φ. Returns false, with the last p, if p leaves the band or meets a ridge of φ, or where an
+  /// open surface breaks off.
   [[nodiscard]] bool project(Imath::V3d& p, double height) const;
   /// True if p lies more than a voxel beyond the border of an open surface, where the band
   /// continues.
@@ -31,7 +31,8 @@ class SurfaceField {
  private:
   levelset::BandSampler sampler_;
   double voxelSize_, background_;
-  bool isOpen_;  ///< true: the part of the band beyond the border is not a surface
+  /// True: the band belongs to an open surface, and also covers space beyond its border.
+  bool isOpen_;
 };
 
 }  // namespace mapping

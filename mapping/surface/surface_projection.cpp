@@ -14,7 +14,7 @@ namespace {
 
 using Imath::V3d;
 
-/// Grid point beside the surface that is nearest to `point`.
+/// Grid point within a voxel of the surface that is nearest to `point`.
 V3d nearestFoot(const levelset::NarrowBand& base, const V3d& point) {
   const openvdb::FloatGrid& grid = levelset::vdb(base);
   const double voxel = base.voxelSize();
@@ -50,7 +50,8 @@ V3d closestSurfacePoint(const levelset::NarrowBand& base, const V3d& point) {
     return fmt::format("({:.6g}, {:.6g}, {:.6g})", point.x, point.y, point.z);
   };
   if (!std::isfinite(point.x) || !std::isfinite(point.y) || !std::isfinite(point.z)) {
-    throw levelset::UsageError(fmt::format("the point {} is not finite", at()));
+    throw levelset::UsageError(
+        fmt::format("the point {} is not finite; give finite coordinates", at()));
   }
   if (base.isEmpty()) {
     throw levelset::InvalidInput("the base has no surface; give a solid with at least one voxel");
@@ -93,7 +94,8 @@ V3d closestSurfacePoint(const levelset::NarrowBand& base, const V3d& point) {
       failBrokenOff(foot, point);
   }
   const double distance = (point - foot).length();
-  // Within the band the result is certain; the bounding box would visit every voxel.
+  // A point within the band is never too far from the surface, and computing the bounding box would
+  // visit every voxel.
   if (distance <= base.halfWidth() * base.voxelSize()) return foot;
   const double diagonal = base.zeroSetBounds().size().length();
   if (distance > diagonal) {

@@ -9,11 +9,13 @@ namespace {
 using Imath::V3d;
 
 constexpr double kStepVoxels = 0.5;
-constexpr double kShortestVoxels = 1.0 / 64;  // a step where the surface bends sharply
-constexpr double kMostTurn = 0.15;            // radians within a step longer than the shortest
-constexpr double kSharpest = 1.2;             // radians within the shortest step
-// Distances have slope 1, and up to 1.1 beside edges where they are interpolated. At the end of a
-// band the values jump; that wall is not part of the surface.
+// Length of the shortest step, voxels; taken where the surface bends sharply.
+constexpr double kShortestVoxels = 1.0 / 64;
+constexpr double kMostTurn = 0.15;  // largest turn of the normal within a longer step, radians
+constexpr double kSharpest = 1.2;   // largest turn of the normal within the shortest step, radians
+// Largest |∇φ| on a surface. Distances have slope 1, and up to 1.1 where they are interpolated
+// beside edges. At the end of a band the values jump, which looks like a steep wall but is not part
+// of the surface.
 constexpr double kSteepestWalk = 2.5;
 
 V3d withoutNormal(const V3d& v, const V3d& normal) {

@@ -13,8 +13,8 @@ namespace mapping {
                                  const Imath::V3d& to);
 
 /// Traces a geodesic on φ = height from a start point and a direction. Across an edge it continues
-/// as if the faces were unfolded into a plane. Steps are half a voxel long, shorter where the
-/// surface bends; the method is second order in the step.
+/// as if the faces were unfolded into a plane. Steps are half a voxel long, and shorter where the
+/// surface bends. The method is of second order in the step.
 class SurfaceWalk {
  public:
   /// @param from       start point on φ = height
