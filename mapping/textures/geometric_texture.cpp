@@ -29,12 +29,13 @@ using levelset::InvalidInput;
 using levelset::NarrowBand;
 using levelset::UsageError;
 
-// Accuracy of the sampled stretch; within it, a flat patch keeps the base's own grid.
+// Relative error of the sampled stretch. If stretched texture voxels are smaller than the base's by
+// less than this share, the base's voxel size is kept.
 constexpr double kStretchError = 0.01;
-// Ratio of result to texture voxel size above which the texture is resampled first. Then the cost
-// of its band follows the result and not the cube of the ratio.
+// Ratio of result to texture voxel size above which the texture is resampled first. The cost of the
+// texture's band then depends on the result's voxels, and not on the cube of the ratio.
 constexpr double kCoarser = 6;
-// A map whose least stretch is below this share of the median counts as compressing.
+// A map whose least stretch is below this share of the median stretch counts as compressing.
 constexpr double kSqueezed = 0.2;
 void checkArguments(const NarrowBand& base, const NarrowBand& texture,
                     std::span<const Patch> patches, const TextureOptions& options) {
@@ -48,7 +49,7 @@ void checkArguments(const NarrowBand& base, const NarrowBand& texture,
     throw UsageError(fmt::format("the half width is {}; give at least 1 voxel", options.halfWidth));
   }
   if (!(options.mapTolerance >= 0) || !std::isfinite(options.mapTolerance)) {
-    throw UsageError(fmt::format("the map's tolerance is {}; give texture voxels, at least 0",
+    throw UsageError(fmt::format("the map's tolerance is {} texture voxels; give at least 0",
                                  options.mapTolerance));
   }
   if (options.embedDepth && !std::isfinite(*options.embedDepth)) {
@@ -91,8 +92,8 @@ double chooseVoxelSize(const NarrowBand& base, const NarrowBand& texture, double
   return resultVoxelSize(base.voxelSize(), texture.voxelSize(), minStretch);
 }
 
-/// Transform of the result: the base's own grid if the voxel sizes agree, so that merging needs no
-/// resampling.
+/// Index-to-world transform of the result: that of the base if the voxel sizes agree, so that
+/// merging needs no resampling.
 Imath::M44d chooseGrid(const NarrowBand& base, double voxelSize, TextureMerge merge) {
   const bool agrees = std::abs(voxelSize - base.voxelSize()) <= 1e-9 * voxelSize;
   if (agrees && merge != TextureMerge::Alone) return base.indexToWorld();
@@ -101,9 +102,9 @@ Imath::M44d chooseGrid(const NarrowBand& base, double voxelSize, TextureMerge me
   return result;
 }
 
-/// Adapts a texture to the voxels of the result. Resamples it if they are much coarser, and widens
-/// its band so that it covers enough of them after warping.
-/// @param least, most  stretch of texture → patch
+/// Adapts a texture to the voxels of the result. Resamples the texture if they are much coarser.
+/// Widens its band so that after warping it still covers kTextureBandNeeded voxels of the result.
+/// @param least, most  smallest and largest stretch of the map from the texture to the patches
 NarrowBand fitTexture(const NarrowBand& texture, double voxelSize, double least, double most,
                       const TextureOptions& options) {
   NarrowBand fitted = texture;
@@ -125,9 +126,9 @@ NarrowBand fitTexture(const NarrowBand& texture, double voxelSize, double least,
 
 /// Parts of the texture that are mapped onto each patch. A prism map ends a little outside the unit
 /// cube. So a texture that extends beyond the given box is clipped at the box, not at the end of
-/// the map. At sides that patches share it is clipped two voxels further out, so that tiles
-/// overlap. If they met face to face, the grid would show a gap. A texture that only touches the
-/// box is not clipped.
+/// the map. At sides that two patches share it is clipped two voxels further out, so that
+/// neighbouring tiles overlap. If they met face to face, the grid would show a gap. A texture that
+/// only touches the box is not clipped.
 class TextureParts {
  public:
   template <typename Fit>
@@ -139,7 +140,8 @@ class TextureParts {
       return;
     }
     ofPatch_ = sharedSides(patches);
-    constexpr double kBeyond = 2;  // voxels
+    // Voxels of the result by which clipped parts overlap their neighbours.
+    constexpr double kBeyond = 2;
     double u = HUGE_VAL, v = HUGE_VAL;
     for (const Patch& patch : patches) {
       const ParticleLayer& layer = patch.layers.front();
@@ -181,8 +183,10 @@ void requireResult(const NarrowBand& texture, const TextureReport& report,
     // The entire band of the texture is warped, even if it is wider than the result's band.
     warped = std::max(warped, static_cast<double>(texture.activeVoxelCount()) * std::pow(finer, 3));
   }
-  constexpr double kBytesPerVoxel = 40;  // active share of a block, for three fields
-  constexpr double kBytesWarped = 8;  // a value, and its share of the inactive values of the block
+  // Bytes of an active voxel in three fields, with its share of the inactive values of the block.
+  constexpr double kBytesPerVoxel = 40;
+  // Bytes of a warped value, with its share of the inactive values of the block.
+  constexpr double kBytesWarped = 8;
   const double bytes = voxels * kBytesPerVoxel + warped * kBytesWarped;
   const Distortion& worst = report.distortion;
   if (bytes > static_cast<double>(options.maxMemory) && !options.voxelSize &&
@@ -197,11 +201,12 @@ void requireResult(const NarrowBand& texture, const TextureReport& report,
   levelset::requireMemory(bytes, options.maxMemory);
 }
 
-/// Range of the maps' stretch, for the choice of voxels and of the texture's band.
+/// Range of the stretch of all maps, from which the voxel size and the half width of the texture's
+/// band are chosen.
 struct StretchRange {
   double least = HUGE_VAL, most = 0;
-  /// Least stretch that the texture's band must bear. Parts compressed more than this are under a
-  /// voxel, unless the voxel size follows them.
+  /// Least stretch for which the texture's band is widened. Regions that are compressed more are
+  /// thinner than a voxel of the result, unless the voxel size is chosen for them.
   double ofBand = HUGE_VAL;
 };
 
@@ -217,7 +222,7 @@ StretchRange stretchRange(std::span<const ChosenMap> maps, TextureMerge merge) {
   return range;
 }
 
-/// Warps the texture into patches, one after the other.
+/// Warps the texture into the patches, one after the other, and sums their figures.
 class TextureWarper {
  public:
   /// Keeps references to the arguments.
@@ -252,7 +257,7 @@ class TextureWarper {
     });
   }
 
-  /// Adds the figures of all patches to the report.
+  /// Adds the figures of all patches, and notes about omitted grid points, to the report.
   void finish() {
     report_.operationsPerPoint =
         static_cast<double>(operations_) / (512 * static_cast<double>(report_.blocksEvaluated));
@@ -298,7 +303,7 @@ class TextureWarper {
   std::size_t operations_ = 0, ghosts_ = 0, crumbs_ = 0;
 };
 
-/// Unites all mapped pieces.
+/// Unites the mapped pieces of all patches.
 NarrowBand join(std::vector<NarrowBand> pieces, const TextureOptions& options) {
   if (pieces.size() == 1) return std::move(pieces.front());
   return levelset::combine(levelset::CsgOperation::Union, pieces, {.maxMemory = options.maxMemory})

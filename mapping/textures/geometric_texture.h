@@ -36,13 +36,13 @@ struct TextureOptions {
   std::optional<double> embedDepth = {};
   double blend = 0;  ///< radius of the blend along the seam, world units; 0: no blend
   /// Box that is mapped to the unit cube of u, v, w; empty: the box of the texture's zero set. An
-  /// RBF map continues the texture outside the box beyond the patch; a prism map cuts it off there,
-  /// unless the box contains the entire texture.
+  /// RBF map also maps parts of the texture outside the box, to positions beyond the patch. A prism
+  /// map cuts off these parts.
   std::optional<Imath::Box3d> textureBox = {};
-  /// Voxel size of the result, world units; empty: the smaller of the base's and of the texture's
-  /// times the smallest stretch.
+  /// Voxel size of the result, world units. Empty: the smaller of the base's voxel size and the
+  /// texture's voxel size times the smallest stretch.
   std::optional<double> voxelSize = {};
-  double halfWidth = 3;        ///< voxels
+  double halfWidth = 3;        ///< half width of the result's band, voxels
   RbfMapOptions rbf = {};      ///< solveTolerance is ignored: a tenth of mapTolerance is used
   double mapTolerance = 0.05;  ///< error bound of the map's fast evaluation, texture voxels
   bool allowFolds = false;
@@ -60,7 +60,7 @@ struct TextureCost {
   double merging = 0;      ///< merging with the other pieces and the base
 };
 
-/// Measurements over all patches; the distortion is that of the worst patch.
+/// Measurements over all patches. Distortion and certificate are those of the worst patch.
 struct TextureReport {
   double voxelSize = 0;
   std::size_t patches = 0, skipped = 0;  ///< mapped patches, and patches left out because they fold
@@ -73,7 +73,7 @@ struct TextureReport {
   /// Largest error of the map's fast evaluation at random grid points, texture voxels.
   double mapError = 0;
   std::size_t mapErrorPoints = 0;
-  RbfSolveReport solve = {};  ///< of an RBF map only
+  RbfSolveReport solve = {};  ///< report of the solver; RBF maps only
   TextureCost cost = {};
   std::vector<std::string> notes;
 };
@@ -83,15 +83,17 @@ struct TextureResult {
   TextureReport report;
 };
 
-/// Default voxel size of a result: the texture's times the stretch if that is smaller than the
-/// base's, else the base's.
+/// Default voxel size of a result, world units: the texture's voxel size times the stretch if that
+/// is smaller than the base's voxel size, otherwise the base's voxel size.
+/// @param base, texture  voxel sizes of the base and the texture, world units
 /// @param minStretch  smallest stretch of texture → patch
 [[nodiscard]] double resultVoxelSize(double base, double texture, double minStretch);
 
-/// Builds the RBF map of a patch from its particles and rims to their texture coordinates, with λ
-/// near for w = 0. The rims reduce the error beside the patch's sides. For an embedded texture the
-/// columns continue linearly beyond the first or last layer.
-/// @param embedDepth  as a share of the patch's height; negative: beyond the last layer
+/// Builds the RBF map of a patch from its particles and rims to their texture coordinates. λ is
+/// lambdaNear for the particles at w = 0. The rims reduce the error beside the patch's sides. For
+/// an embedded texture the columns continue linearly beyond the first or last layer.
+/// @param embedDepth  depth of the texture below the surface, in w; negative: its lift above the
+///         last layer
 [[nodiscard]] RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options = {},
                                     double embedDepth = 0);
 
@@ -103,10 +105,10 @@ struct CertifiedRbf {
   bool isExtrapolated = false;
 };
 
-/// Builds and certifies the RBF map of a patch for an embedded texture. Columns continued below the
-/// surface may make the map fold, as below a crease. If the map without them does not fold, that
-/// map is returned.
-/// @param cost  setup and certificate times are added to it
+/// Builds and certifies the RBF map of a patch for an embedded texture. Particles that continue the
+/// columns below the surface may make the map fold, as below a crease. If the map without these
+/// particles does not fold, that map is returned, and isExtrapolated is true.
+/// @param cost  the times for setup and certificate are added to it
 [[nodiscard]] CertifiedRbf certifiedRbf(const Patch& patch, double embedDepth,
                                         const RbfMapOptions& options, TextureCost& cost);
 
@@ -115,8 +117,8 @@ struct CertifiedRbf {
 void requirePatchOn(const levelset::NarrowBand& base, const Patch& patch);
 
 /// Warps `texture` into the patch, restores distances [Brodersen07 §8.3], and merges the result
-/// with `base`. If the warped texture needs no finer voxels than the base has, the result has the
-/// grid of the base.
+/// with `base`. If the warped texture needs no finer voxels than those of the base, the result has
+/// the grid of the base.
 /// @param base     the solid on which the patch was built
 /// @param texture  any solid; x, y, z of its box become u, v, w
 /// @throws UsageError for lengths that are negative or not finite
@@ -128,9 +130,9 @@ void requirePatchOn(const levelset::NarrowBand& base, const Patch& patch);
                                        const levelset::NarrowBand& texture, const Patch& patch,
                                        const TextureOptions& options = {});
 
-/// Maps the same texture onto each of many patches of one base. All have one voxel size, overlaps
-/// are united, and the base is merged once, so that the cost per patch does not grow with their
-/// number.
+/// Maps the same texture onto each of many patches of one base. All mapped textures have one voxel
+/// size. Their overlaps are united, and the base is merged once, so that the cost per patch does
+/// not grow with the number of patches.
 /// @throws UsageError as above, and if there is no patch
 /// @throws InvalidInput as above, and if all patches were skipped
 /// @throws NumericalError, ResourceLimit as above

@@ -20,7 +20,7 @@ using Imath::V3d;
 
 namespace {
 
-/// Memory per vertex of a mesh with the given attributes, bytes.
+/// Memory per vertex of a mesh with its attributes, bytes.
 double bytesPerVertex(const levelset::TriMesh& mesh) {
   const levelset::MeshAttributes& held = mesh.attributes;
   return 24 + (held.normals.empty() ? 0 : 24) + (held.uvs.empty() ? 0 : 16) +
@@ -32,7 +32,7 @@ std::size_t countLost(const std::vector<V3d>& normals) {
   return static_cast<std::size_t>(std::count(normals.begin(), normals.end(), V3d(0)));
 }
 
-/// Moves the vertices, and the normals if there are any.
+/// Moves the vertices, and with kNormals also the normals.
 template <bool kNormals>
 void moveVertices(const levelset::TriMesh& texture, const Patch& patch,
                   const TexturePlacement& placement, const levelset::Progress& progress,
@@ -85,6 +85,7 @@ MeshTextureResult mapOnto(const levelset::TriMesh& texture, const Patch& patch,
   const TexturePlacement placement{chooseTextureBox(levelset::bounds(texture), options.textureBox),
                                    embedDepth};
   MeshTextureResult result;
+  // Bytes per particle: up to ten samples of the layer map in its cell, with their statistics.
   constexpr double kSampleBytes = 5 * 2 * 160;
   levelset::requireMemory(
       kSampleBytes * static_cast<double>(patch.particleCount()) +

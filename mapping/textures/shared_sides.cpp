@@ -40,7 +40,7 @@ std::array<Side, 4> sidesOf(const Patch& patch, std::size_t number) {
 }  // namespace
 
 std::vector<SharedSides> sharedSides(std::span<const Patch> patches) {
-  constexpr double kTolerance = 1e-3;  // spacings
+  constexpr double kTolerance = 1e-3;  // largest distance of coinciding points, particle spacings
   std::vector<Side> sides;
   for (std::size_t n = 0; n < patches.size(); ++n)
     for (const Side& side : sidesOf(patches[n], n)) sides.push_back(side);

@@ -12,8 +12,8 @@ namespace mapping {
 /// of another patch or of the same one.
 using SharedSides = std::array<bool, 4>;
 
-/// Finds sides on the surface whose ends and middles coincide to a thousandth of the spacing, as
-/// those of tiles do.
+/// Finds the sides, at w = 0, whose ends and middles coincide with those of another side to a
+/// thousandth of the particle spacing, as neighbouring tiles have them.
 [[nodiscard]] std::vector<SharedSides> sharedSides(std::span<const Patch> patches);
 
 }  // namespace mapping

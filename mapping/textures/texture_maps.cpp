@@ -19,7 +19,8 @@ using Imath::V3d;
 using levelset::InvalidInput;
 using levelset::NarrowBand;
 
-// Share of the map's tolerance that the solver may use, and the finest useful tolerance.
+// Share of the map's tolerance that the solver may use, and the smallest solver tolerance in u, v
+// and w.
 constexpr double kSolveShare = 0.1, kFinestSolve = 1e-10;
 
 /// Solver tolerance in u, v and w for a map tolerance in texture voxels.
@@ -72,7 +73,8 @@ ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double embedDepth,
   return result;
 }
 
-/// Combines solver reports: figures of the worst, sums of the counts, and each note once.
+/// Adds one solver report to the report of all maps: the worst figures, the sums of merged
+/// particles, and each note once.
 void addSolve(const RbfSolveReport& one, TextureReport& report) {
   RbfSolveReport& all = report.solve;
   all.merged += one.merged;
@@ -99,7 +101,7 @@ std::string overlapMessage(const ChosenMap& map) {
       map.overlaps, map.distortion.samples, p.x, p.y, p.z, uvw.x, uvw.y, uvw.z);
 }
 
-/// Figures of the maps built so far.
+/// Figures of the maps built so far, which become the figures of the report.
 struct MapFigures {
   std::vector<Distortion> distortions;
   std::vector<FoldCertificate> certificates;

@@ -12,8 +12,8 @@
 
 namespace mapping {
 
-/// Result voxels that the texture's band must extend on each side, so that the high-order
-/// interpolant at the zero set reads only distances.
+/// Number of result voxels by which the texture's band must extend on each side of its surface. The
+/// high-order interpolant at the zero set then reads only distances.
 inline constexpr double kTextureBandNeeded = 3;
 
 /// Calls `work` and adds its CPU time to `seconds`.
@@ -26,16 +26,16 @@ auto timed(double& seconds, const Work& work) {
   return result;
 }
 
-/// A map of the chosen kind, with its measurements.
+/// A map of the requested kind, with its measurements; `map` is empty for a skipped patch.
 struct ChosenMap {
   std::unique_ptr<PatchMap> map;
   Distortion distortion = {};
   FoldCertificate certificate = {};
   std::size_t particles = 0;
-  Imath::V3d residual{0};  ///< at the particles, in u, v and w
-  /// Sample points where the patch passes through itself without folding.
+  Imath::V3d residual{0};  ///< largest residuals at the particles, in u, v and w
+  /// Number of sample points where the patch passes through itself without folding.
   std::size_t overlaps = 0;
-  MapSample overlap = {};  ///< one of these points
+  MapSample overlap = {};  ///< one sample point where the patch passes through itself
   RbfSolveReport solve = {};
   bool isExtrapolated = false;  ///< true: no particles support the map below the surface
 

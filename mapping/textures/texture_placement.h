@@ -11,10 +11,11 @@
 
 namespace mapping {
 
-/// Position of a texture in texture space: the unit cube is `box`, moved inwards by `embedDepth`.
+/// Placement of a texture: `box` is mapped to the unit cube of u, v, w, then lowered by
+/// `embedDepth`.
 struct TexturePlacement {
   Imath::Box3d box;
-  double embedDepth = 0;  ///< in w
+  double embedDepth = 0;  ///< depth of the texture below the surface, in w
   [[nodiscard]] Imath::V3d toTexture(const Imath::V3d& uvw) const {
     return box.min + Imath::V3d(uvw.x, uvw.y, uvw.z + embedDepth) * box.size();
   }
@@ -28,12 +29,13 @@ struct TexturePlacement {
 [[nodiscard]] Imath::Box3d chooseTextureBox(const Imath::Box3d& own,
                                             const std::optional<Imath::Box3d>& given);
 
-/// True if a texture with box `own` extends beyond `box` by more than a small fraction of a voxel.
+/// True if a texture with box `own` extends beyond `box` by more than a twentieth of a voxel.
 [[nodiscard]] bool isBeyond(const Imath::Box3d& own, const Imath::Box3d& box, double voxelSize);
 
 /// Checks a map for folds.
-/// @return notes about folds that are allowed, and about parts that are not certified; often empty
-/// @throws InvalidInput for folds that are not allowed, with the position of the worst
+/// @return notes about folds that are allowed, and about an uncertified share of the volume; often
+///         empty
+/// @throws InvalidInput for folds that are not allowed, with the position of the worst fold
 [[nodiscard]] std::vector<std::string> checkFolds(const Distortion& distortion,
                                                   const FoldCertificate& certificate,
                                                   bool areAllowed);

@@ -51,7 +51,7 @@ class Occupancy {
     for (int axis = 0; axis < 3; ++axis) accumulate(axis);
   }
 
-  /// True if a leaf node lies within a box of world coordinates, widened by `pad` voxels.
+  /// True if a leaf node meets a box of world coordinates, widened by `pad` voxels.
   [[nodiscard]] bool touches(const Box3d& world, double pad) const {
     openvdb::Vec3d low(std::numeric_limits<double>::max()), high(-low);
     for (int corner = 0; corner < 8; ++corner) {
@@ -98,7 +98,8 @@ class Occupancy {
   const openvdb::FloatGrid& grid_;
   int shift_ = 3;
   Coord origin_, size_;
-  // Sums over all cells below; one more than cells along each axis.
+  // Number of leaves in all cells with smaller indices along every axis; one entry more than cells
+  // along each axis.
   std::vector<std::uint32_t> sums_;
 };
 
@@ -121,7 +122,7 @@ std::uint64_t hashOf(const Coord& c) {
 
 enum class Meets { Nothing, Inside, Band };
 
-/// Results for a block of patch space.
+/// Results for one root block or a part of it.
 struct Piece {
   std::vector<std::unique_ptr<LeafNode>> leaves;
   std::vector<Block> inside;  ///< blocks that are completely inside
@@ -139,7 +140,7 @@ struct Piece {
   }
 };
 
-/// Warps a texture over patch space.
+/// Evaluates a warped texture on the grid of the result.
 class TextureWarp {
  public:
   TextureWarp(const levelset::NarrowBand& texture, const TexturePlacement& placement,
@@ -228,8 +229,8 @@ class TextureWarp {
     return levelset::toImath(transform_->indexToWorld(index));
   }
 
-  /// Aligned blocks over the image of the texture's band under the layer map, with a margin for the
-  /// difference between the two maps.
+  /// Aligned blocks over the image of the texture's band under the layer map. The margin allows for
+  /// the difference between the layer map and the map that is evaluated.
   std::vector<Block> rootBlocks() const {
     const openvdb::FloatGrid& grid = levelset::vdb(texture_);
     const CoordBBox active = grid.evalActiveVoxelBoundingBox();
@@ -341,8 +342,8 @@ class TextureWarp {
     return isGhost(center, middle) ? Meets::Nothing : Meets::Inside;
   }
 
-  /// True if the map, far from the particles, sends a point back into the texture. The layer map of
-  /// the result then gives a position far from the point.
+  /// True if the map sends a point far from the particles back into the texture. The layer map then
+  /// maps the resulting u, v, w to a position far from the point.
   bool isGhost(const V3d& place, const V3d& uvw) const {
     return !map_.isLocal() && (layerPosition(patch_, uvw) - place).length() > ghostDistance_;
   }
@@ -372,8 +373,9 @@ class TextureWarp {
     }
   }
 
-  /// Evaluates the map directly at a point of some leaves, chosen by a hash of their coordinates.
-  /// The choice does not depend on the threads, and the cost is about a twentieth of the rest.
+  /// Evaluates the map directly at one point of some leaves, chosen by a hash of their coordinates.
+  /// So the choice does not depend on the threads. The cost is about a twentieth of the other
+  /// evaluations.
   void checkAgainstDirect(const LeafNode& leaf, const std::array<V3d, LeafNode::SIZE>& uvw,
                           Piece& piece) const {
     if (map_.isLocal()) return;  // a local map has no other evaluation

@@ -13,9 +13,10 @@
 namespace mapping {
 
 struct WarpOptions {
-  /// Index to world transform of the result: rotation, uniform scale, translation.
+  /// Index-to-world transform of the result: rotation, uniform scale and translation.
   Imath::M44d indexToWorld;
-  double scale = 1;  ///< typical stretch, the factor of the texture's distances
+  /// Typical stretch of the map, by which the texture's distances are multiplied.
+  double scale = 1;
   /// Error bound of the map's fast evaluation, texture voxels.
   double mapTolerance = 0.05;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
@@ -26,20 +27,21 @@ struct Warp {
   levelset::NarrowBand field;  ///< zero set and signs are correct; distances are approximate
   std::size_t blocksTested = 0, blocksEvaluated = 0;
   std::size_t operations = 0;  ///< particles summed or tetrahedra tested, see BlockMap::evaluate
-  /// Grid points far from the particles that the map sends back into the texture.
+  /// Number of grid points far from the particles that the map sends back into the texture; they
+  /// are left out.
   std::size_t ghosts = 0;
-  /// Isolated inside grid points less than a tenth of a voxel deep, which were left out so that
-  /// they do not become separate solids.
+  /// Number of isolated inside grid points less than a tenth of a voxel deep. They are left out so
+  /// that they do not become separate solids.
   std::size_t crumbs = 0;
-  /// Random grid points where the map was also evaluated directly, and the largest error of the
-  /// fast evaluation at these points, texture voxels.
+  /// Number of random grid points where the map was also evaluated directly, and the largest error
+  /// of the fast evaluation at these points, texture voxels.
   std::size_t checked = 0;
   double mapError = 0;
 };
 
-/// Pulls a texture back into patch space. Blocks of 64³ grid points are split down to 8³ as long as
-/// the image of a block, bounded through the map's slopes, may touch the texture's band. Only such
-/// 8³ blocks are evaluated; the others lie completely inside or outside.
+/// Evaluates a texture through a map on the grid of the result. Blocks of 64³ grid points are split
+/// down to 8³ as long as the image of a block, bounded through the map's slopes, may touch the
+/// texture's band. Only such 8³ blocks are evaluated; the others lie completely inside or outside.
 /// @throws InvalidInput if no block meets the texture
 /// @throws ResourceLimit before memory exceeds `maxMemory`
 [[nodiscard]] Warp warpTexture(const levelset::NarrowBand& texture,
