@@ -8,8 +8,8 @@ namespace {
 
 using Imath::V3d;
 
-// Tolerance for equal cell borders of two layers. Different borders are further apart than this for
-// up to a million particles, and rounding errors are much smaller.
+// Largest difference of cell borders in u or v that count as equal. For up to a million particles,
+// different borders are further apart, and rounding errors are much smaller.
 constexpr double kSameEnd = 1e-9;
 
 void addEnds(std::vector<double>& ends, std::size_t count) {

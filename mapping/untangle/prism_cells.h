@@ -48,19 +48,20 @@ class PrismCells {
   struct Slab {
     std::size_t lower = 0;     ///< index of the lower layer; the upper layer is the next
     std::size_t first = 0;     ///< index of its first cell
-    double from = 0, to = 0;   ///< range of w
+    double from = 0, to = 0;   ///< range of w, with the embedding depth
     std::vector<double> u, v;  ///< cell borders along u and v
     [[nodiscard]] std::size_t count() const { return (u.size() - 1) * (v.size() - 1); }
   };
   void addLayer(ParticleSum& sum, std::size_t layer, double u, double v, double share) const;
 
   std::vector<Slab> slabs_;
-  std::vector<std::array<std::size_t, 3>> layers_;  ///< columns, rows, first particle
+  /// Columns, rows, and index of the first particle.
+  std::vector<std::array<std::size_t, 3>> layers_;
   std::vector<double> w_;
 };
 
-/// Mean lengths of the rows and columns on the surface, and the height. With u, v and w multiplied
-/// by these lengths, slopes are about 1.
+/// Mean lengths of the rows and columns on the surface, and the height of the patch, world units.
+/// With u, v and w multiplied by these lengths, slopes are about 1.
 [[nodiscard]] Imath::V3d meanExtents(const Patch& patch);
 
 /// Positions of all particles except those of the rims, layer by layer.

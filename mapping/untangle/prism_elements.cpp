@@ -54,7 +54,7 @@ ElementEnergy symmetricDirichlet(const ElementSlopes& f) {
 ElementEnergy foldoverEnergy(const ElementSlopes& f, double epsilon) {
   const ElementSlopes c = cofactors(f);
   const double det = f[0].dot(c[0]), root = std::hypot(epsilon, det);
-  // For negative determinants the sum would suffer cancellation.
+  // For negative determinants the sum would suffer cancellation, so this equal quotient is used.
   const double chi = det >= 0 ? 0.5 * (det + root) : 0.5 * epsilon * epsilon / (root - det);
   ElementEnergy result;
   if (!(chi > 0)) {
@@ -79,7 +79,8 @@ PrismElements::PrismElements(const Patch& patch, const V3d& rest, double embedDe
     V3d sides = cell.box.size() * rest;
     const double size = sides.x * sides.y * sides.z;
     volume += size;
-    // A patch that is mirrored on purpose is mirrored back.
+    // A mirrored patch without folds has negative determinants. Reversing one side at rest makes
+    // them positive.
     if (patch.mirrored) sides.x = -sides.x;
     for (std::size_t corner = 0; corner < 8; ++corner)
       addElement(
@@ -163,7 +164,8 @@ std::vector<V3d> PrismElements::gather(const std::vector<ElementSlopes>& stress)
 }
 
 double PrismElements::estimateBytes(const Patch& patch) {
-  // 14 elements of at least four particles each, stored twice, and a factorised matrix.
+  // Memory for 14 elements of at least four particles each, stored twice, and for a factorised
+  // matrix.
   constexpr double kBytesPerParticle = 8000;
   return kBytesPerParticle * static_cast<double>(patch.particleCount());
 }

@@ -11,11 +11,12 @@
 
 namespace mapping {
 
-/// Slopes of the map texture → patch as columns: ∂x/∂u, ∂x/∂v, ∂x/∂w in units of the rest shape.
+/// Slopes of the map from texture coordinates to positions, as columns: ∂x/∂u, ∂x/∂v, ∂x/∂w, where
+/// u, v and w are lengths in the undeformed (rest) shape.
 using ElementSlopes = std::array<Imath::V3d, 3>;
 
-/// Energy density of one element per unit of rest volume, and its derivative with respect to the
-/// slopes.
+/// Energy density of one element, per unit of its rest volume, and its derivative with respect to
+/// the slopes.
 struct ElementEnergy {
   double value = 0;  ///< infinite for slopes that the energy forbids
   ElementSlopes stress{Imath::V3d(0), Imath::V3d(0), Imath::V3d(0)};
@@ -25,8 +26,8 @@ struct ElementEnergy {
 /// inverted [Smith15].
 [[nodiscard]] ElementEnergy symmetricDirichlet(const ElementSlopes& slopes);
 
-/// Returns |F|² / χ^⅔ + (1 + det²) / χ, where χ = (det + √(ε² + det²)) / 2 replaces det. The energy
-/// is finite for every F, and forbids folds in the limit ε → 0 [Garanzha21].
+/// Returns |F|² / χ^⅔ + (1 + det²) / χ, where χ = (det + √(ε² + det²)) / 2 replaces the determinant
+/// det of F. The energy is finite for every F, and forbids folds in the limit ε → 0 [Garanzha21].
 [[nodiscard]] ElementEnergy foldoverEnergy(const ElementSlopes& slopes, double epsilon);
 
 [[nodiscard]] double determinantOf(const ElementSlopes& slopes);
@@ -36,8 +37,8 @@ struct ElementEnergy {
 /// and its six tetrahedra.
 class PrismElements {
  public:
-  /// @param rest  size of the unit cube at rest, world units
-  /// @param embedDepth  in w, see PrismCells
+  /// @param rest  size of the unit cube of u, v, w in the undeformed shape, world units
+  /// @param embedDepth  depth of the texture below the surface, in w, see PrismCells
   PrismElements(const Patch& patch, const Imath::V3d& rest, double embedDepth);
 
   [[nodiscard]] std::size_t size() const { return weights_.size(); }
@@ -46,8 +47,8 @@ class PrismElements {
   [[nodiscard]] double weight(std::size_t element) const { return weights_[element]; }
   [[nodiscard]] ElementSlopes slopes(std::size_t element,
                                      const std::vector<Imath::V3d>& positions) const;
-  /// Collects the derivatives with respect to particle positions from those with respect to element
-  /// slopes.
+  /// Computes the derivatives of a sum over elements with respect to particle positions, from those
+  /// with respect to element slopes.
   [[nodiscard]] std::vector<Imath::V3d> gather(const std::vector<ElementSlopes>& stress) const;
 
   /// Contribution of one particle to an element: slopes += position × slope, column by column.
@@ -60,7 +61,7 @@ class PrismElements {
   void forEachEntry(std::size_t element, const Visit& visit) const {
     for (std::size_t n = first_[element]; n < first_[element + 1]; ++n) visit(entries_[n]);
   }
-  /// Memory for the elements and for minimising over them, bytes.
+  /// Memory for the elements and for minimising an energy over them, bytes.
   [[nodiscard]] static double estimateBytes(const Patch& patch);
 
  private:
@@ -74,7 +75,8 @@ class PrismElements {
   std::vector<Entry> entries_;
   std::vector<double> weights_;
   std::vector<std::size_t> firstUse_;
-  /// Element and entry of each use, particle by particle.
+  /// For each particle, the index of each element that uses it and of its entry there; see
+  /// firstUse_.
   std::vector<std::array<std::uint32_t, 2>> uses_;
 };
 

@@ -18,15 +18,17 @@ namespace {
 
 using Imath::V3d;
 
-constexpr std::size_t kRemembered = 8;  // pairs of step and gradient change
-constexpr double kSufficient = 1e-4;    // share of the decrease that the slope predicts (Armijo)
+constexpr std::size_t kRemembered = 8;  // pairs of step and gradient change that L-BFGS keeps
+// Least decrease of the energy, as a share of what the slope predicts (Armijo).
+constexpr double kSufficient = 1e-4;
 constexpr int kMostHalvings = 30;
-constexpr double kLongestStep = 0.5;  // particle spacings
+constexpr double kLongestStep = 0.5;  // longest step of a particle, particle spacings
 constexpr double kStandsStill = 1e-7;
-// Relative decrease of the energy; kNoGainSteps such steps in a row end the search.
+// A step gains nothing if it decreases the energy by less than this share; kNoGainSteps such steps
+// in a row end the search.
 constexpr double kNoGain = 1e-11;
 constexpr int kNoGainSteps = 5;
-// Second derivative of the symmetric Dirichlet energy at rest, with respect to the slopes.
+// Second derivative of the symmetric Dirichlet energy with respect to the slopes, at rest.
 constexpr double kStiffness = 8;
 
 double innerProduct(const std::vector<V3d>& a, const std::vector<V3d>& b) {
@@ -41,7 +43,7 @@ void addScaled(std::vector<V3d>& a, const std::vector<V3d>& b, double factor) {
 
 }  // namespace
 
-/// Factorised Laplacian of the elements over the particles that are not fixed.
+/// Factorised Laplacian matrix of the elements, over the particles that are not fixed.
 struct PrismSolver::Preconditioner {
   std::vector<int> unknown;  ///< index of each particle's unknown; −1: fixed
   int count = 0;
@@ -63,7 +65,7 @@ struct PrismSolver::Preconditioner {
           if (column == row) trace += value;
         });
       });
-    // The shift keeps the matrix regular when no particle is fixed.
+    // The shift of the diagonal keeps the matrix regular when no particle is fixed.
     constexpr double kShift = 1e-6;
     for (int n = 0; n < count; ++n) triplets.emplace_back(n, n, kShift * trace / count);
     Eigen::SparseMatrix<double> matrix(count, count);
@@ -89,7 +91,8 @@ struct PrismSolver::Memory {
     pairs.push_back({std::move(step), std::move(change), product});
   }
 
-  /// Applies the approximate inverse Hessian to `vectors`.
+  /// Applies the approximate inverse Hessian to `vectors`; `start` is the inverse from which the
+  /// updates begin.
   template <typename Start>
   Vectors apply(Vectors vectors, const Start& start) const {
     std::vector<double> alpha(pairs.size());
@@ -120,7 +123,8 @@ PrismSolver::PrismSolver(const levelset::NarrowBand& base, const PrismElements& 
       positions_(std::move(positions)),
       normals_(positions_.size(), V3d(0)),
       preconditioner_(std::make_unique<Preconditioner>(elements, holds_)) {
-  // An element's slopes are differences along its edges at rest, so their mean is 1 / spacing.
+  // An element's slopes are differences divided by its edge lengths at rest, so the mean of the
+  // steepest is 1 / spacing.
   double steepness = 0;
   for (std::size_t e = 0; e < elements_.size(); ++e) {
     double steepest = 0;

@@ -27,11 +27,13 @@ class PrismSolver {
  public:
   using Density = std::function<ElementEnergy(const ElementSlopes&)>;
 
-  /// @param positions  of all particles; particles with ParticleHold::Slides lie on the surface
+  /// @param positions  positions of all particles; particles with ParticleHold::Slides lie on the
+  ///         surface
   PrismSolver(const levelset::NarrowBand& base, const PrismElements& elements,
               std::vector<ParticleHold> holds, std::vector<Imath::V3d> positions);
   ~PrismSolver();
 
+  /// Minimises the energy, starting from the current positions.
   /// @return number of iterations; fewer than `mostIterations` when the energy no longer decreases
   std::size_t minimise(const Density& density, std::size_t mostIterations);
 
@@ -59,7 +61,7 @@ class PrismSolver {
   const PrismElements& elements_;
   std::vector<ParticleHold> holds_;
   Vectors positions_, normals_;
-  double spacing_ = 0;  ///< particle spacing, the unit for step lengths
+  double spacing_ = 0;  ///< particle spacing at rest, the unit for step lengths
   std::unique_ptr<Preconditioner> preconditioner_;
 };
 

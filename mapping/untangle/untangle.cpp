@@ -58,8 +58,8 @@ void checkInput(const NarrowBand& base, const Patch& patch, const UntangleOption
   levelset::requireMemory(PrismElements::estimateBytes(patch), options.maxMemory);
 }
 
-/// Constraints of all particles: those above the surface are free; those on it slide, except on
-/// sides that must stay.
+/// Constraints of all particles. Those above the surface are free; those on it slide, except that
+/// the particles on the sides are fixed unless `freeSides`.
 std::vector<ParticleHold> holdsOf(const Patch& patch, bool freeSides) {
   std::vector<ParticleHold> holds;
   for (std::size_t k = 0; k < patch.layers.size(); ++k) {
@@ -127,7 +127,7 @@ std::array<V3d, 8> cornersOfCell(const PrismCell& cell, const std::vector<V3d>& 
   return corners;
 }
 
-/// Elements are stored cell by cell.
+/// Number of elements of a cell; the elements are stored cell by cell.
 constexpr std::size_t kElementsPerCell = 14;
 
 FoldCount foldsAt(const Patch& patch, const PrismElements& elements, double embedDepth,
@@ -152,14 +152,15 @@ FoldCount foldsAt(const Patch& patch, const PrismElements& elements, double embe
   return result;
 }
 
-constexpr std::size_t kSettling = 100;  // iterations
+// Iterations of the symmetric Dirichlet energy after all folds are removed.
+constexpr std::size_t kSettling = 100;
 
-/// Reduces ε until no element is inverted [Garanzha21, §3]. Then continues with a small ε until no
-/// cell folds between its elements either.
+/// Minimises the foldover energy with smaller and smaller ε until no element is inverted
+/// [Garanzha21, §3]. Then continues with a small ε until no cell folds between its elements either.
 /// @return number of iterations
 std::size_t removeFolds(PrismSolver& solver, const UntangleOptions& options,
                         const std::function<bool()>& isDone) {
-  constexpr std::size_t kRound = 20;  // iterations at one ε
+  constexpr std::size_t kRound = 20;  // iterations for each value of ε
   constexpr double kSlowest = 0.2;  // least relative progress per round assumed in the update of ε
   constexpr int kMostStuck = 10;    // rounds without progress before the search ends
   double epsilon = 1, last = -std::numeric_limits<double>::infinity();
@@ -186,7 +187,7 @@ std::size_t removeFolds(PrismSolver& solver, const UntangleOptions& options,
   return iterations;
 }
 
-/// Mean lengths of opposite sides on the surface, and the height.
+/// Mean lengths of opposite sides on the surface, and the height of the patch, world units.
 V3d sideLengths(const Patch& patch) {
   const ParticleLayer& layer = patch.layers.front();
   double u = 0, v = 0;
@@ -199,7 +200,7 @@ V3d sideLengths(const Patch& patch) {
   return {u, v, patch.height};
 }
 
-/// Energy of an element whose rest shape is `scale` times as large.
+/// Symmetric Dirichlet energy of an element whose rest shape is `scale` times as large.
 ElementEnergy scaledDirichlet(ElementSlopes slopes, double scale) {
   for (V3d& column : slopes) column /= scale;
   ElementEnergy energy = symmetricDirichlet(slopes);
@@ -207,8 +208,8 @@ ElementEnergy scaledDirichlet(ElementSlopes slopes, double scale) {
   return energy;
 }
 
-/// Scale of the rest shape with the least energy: |F|² scales with its inverse square and |F⁻¹|²
-/// with its square.
+/// Scale of the rest shape for which the energy is least. |F|² is proportional to the inverse
+/// square of the scale, |F⁻¹|² to its square.
 double bestRestScale(const PrismElements& elements, const std::vector<V3d>& positions) {
   double stretch = 0, squeeze = 0;
   for (std::size_t e = 0; e < elements.size(); ++e) {
@@ -262,7 +263,8 @@ Untangling untangle(const NarrowBand& base, const Patch& patch, const UntangleOp
   std::vector<V3d> found = solver.positions();
   FoldCount after = foldsAt(patch, elements, options.embedDepth, found);
   if (after.folded == 0) {
-    // Cells that barely avoid folding are too flat for the smoothed map.
+    // Cells that barely avoid folding are too flat for an RBF map, which smooths by λ. So the
+    // distortion is minimised too.
     result.iterations += solver.minimise(symmetricDirichlet, kSettling);
     const FoldCount settled = foldsAt(patch, elements, options.embedDepth, solver.positions());
     if (settled.folded == 0) after = settled, found = solver.positions();
@@ -282,9 +284,9 @@ DistortionGain minimiseDistortion(const NarrowBand& base, const Patch& patch,
   const std::vector<V3d> start = particlePositions(patch);
   const FoldCount folds = foldsAt(patch, elements, options.embedDepth, start);
   if (folds.folded > 0) {
-    throw InvalidInput(
-        fmt::format("the patch folds in {} of {} cells of its particles; untangle it first",
-                    folds.folded, folds.cells));
+    throw InvalidInput(fmt::format(
+        "the patch folds in {} of {} cells of its particles; untangle it first (--untangle)",
+        folds.folded, folds.cells));
   }
   DistortionGain result;
   result.before = distortionAt(elements, start);

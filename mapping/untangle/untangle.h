@@ -15,12 +15,13 @@
 namespace mapping {
 
 struct UntangleOptions {
-  double embedDepth = 0;  ///< depth of the texture below the surface, in w
+  /// Depth of the texture below the surface, in w; negative: its lift above w = 1.
+  double embedDepth = 0;
   /// True: particles on the sides slide on the surface too; false: they stay.
   bool freeSides = false;
-  /// Size of the unit cube at rest; empty: the size of the patch, so that the proportions of the
-  /// patch do not count as distortion. Only the proportions affect the distortion, not the unit of
-  /// length.
+  /// Size of the unit cube of u, v, w in the undeformed shape; empty: the size of the patch, so
+  /// that the proportions of the patch do not count as distortion. Only the ratios of the sizes
+  /// matter, not their unit.
   std::optional<Imath::V3d> proportions = {};
   std::size_t mostIterations = 1000;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
@@ -28,10 +29,11 @@ struct UntangleOptions {
 };
 
 /// Number of cells in which the piecewise linear map through the particles, or one of the cell's
-/// six tetrahedra, is inverted or has no volume.
+/// six tetrahedra, is inverted or has no volume, or where this cannot be excluded.
 struct FoldCount {
   std::size_t folded = 0, cells = 0;
-  double leastJacobian = 0;  ///< least determinant at the corners and in the tetrahedra; 1 at rest
+  /// Least determinant at the corners of cells and in the tetrahedra; 1 at rest.
+  double leastJacobian = 0;
 };
 [[nodiscard]] FoldCount countFolds(const Patch& patch, double embedDepth = 0);
 
@@ -58,11 +60,11 @@ struct Untangling {
 [[nodiscard]] Untangling untangle(const levelset::NarrowBand& base, const Patch& patch,
                                   const UntangleOptions& options = {});
 
-/// Symmetric Dirichlet energy of the elements, relative to a rest box of the given proportions. The
-/// size of the rest box is the one with the least energy. A map that keeps the proportions has
-/// energy 6.
+/// Symmetric Dirichlet energy of the elements, relative to an undeformed (rest) box of the given
+/// proportions. The size of the box is the one with the least energy. A map that keeps the
+/// proportions has energy 6.
 struct ElementDistortion {
-  double mean = 0;  ///< weighted by rest volume; the minimised quantity
+  double mean = 0;  ///< mean weighted by rest volume, which is minimised
   double median = 0, percent99 = 0, most = 0;
 };
 
