@@ -47,8 +47,9 @@ inline void requireAngle(double angle, double above, double below, const char* n
 inline void requireTiling(const Tiling& tiling) {
   constexpr int kMost = 1'000'000;
   if (tiling.columns < 1 || tiling.rows < 1 || tiling.columns > kMost || tiling.rows > kMost) {
-    throw levelset::UsageError(fmt::format("{} columns and {} rows; give 1 to {} of each",
-                                           tiling.columns, tiling.rows, kMost));
+    throw levelset::UsageError(
+        fmt::format("the tiling has {} columns and {} rows; give 1 to {} of each", tiling.columns,
+                    tiling.rows, kMost));
   }
   requireNonNegative(tiling.overlap, "the overlap");
 }

@@ -124,7 +124,8 @@ void requireGyroid(const Gyroid& gyroid, const V3d& center) {
   }
   for (const int count : gyroid.cells) {
     if (count >= 1 && count <= 1'000'000) continue;
-    throw levelset::UsageError(fmt::format("{} cells; give 1 to 1000000 along each axis", count));
+    throw levelset::UsageError(
+        fmt::format("the gyroid has {} cells along an axis; give 1 to 1000000", count));
   }
   requireFinite(center, "the centre");
 }

@@ -55,7 +55,7 @@ void requireRing(const Ring& ring, const V3d& center) {
   if (ring.columns < 1 || ring.rows < 1 || ring.columns > kMostRings ||
       ring.rows > kMostRings / ring.columns) {
     throw levelset::UsageError(
-        fmt::format("{} columns and {} rows; give at least 1 of each "
+        fmt::format("the sheet has {} columns and {} rows of rings; give at least 1 of each "
                     "and at most a million rings",
                     ring.columns, ring.rows));
   }

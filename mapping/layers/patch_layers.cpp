@@ -106,8 +106,8 @@ void checkPatchOptions(double height, const PatchOptions& options) {
     throw UsageError(fmt::format("the height is {}; give a positive length", height));
   }
   if (options.layers < 2) {
-    throw UsageError(
-        fmt::format("{} layers of particles; give --layers of at least 2", options.layers));
+    throw UsageError(fmt::format(
+        "the patch has {} layers of particles; give --layers of at least 2", options.layers));
   }
   if (!(options.spacing >= 0) || !std::isfinite(options.spacing)) {
     throw UsageError(
@@ -115,8 +115,8 @@ void checkPatchOptions(double height, const PatchOptions& options) {
   }
   const auto [across, up] = options.cells;
   if ((across == 0) != (up == 0) || (across > 0 && std::min(across, up) < 3)) {
-    throw UsageError(
-        fmt::format("{} by {} cells; give at least 3 along u and along v", across, up));
+    throw UsageError(fmt::format(
+        "the patch has {} by {} cells; give at least 3 along u and along v", across, up));
   }
   const LayerTransform& t = options.transform;
   if (!std::isfinite(t.twist) || !std::isfinite(t.bend) || !(t.taper > 0) ||
@@ -137,8 +137,8 @@ void checkPatchOptions(double height, const PatchOptions& options) {
     throw UsageError("--directions and --parallel exclude each other; give one of them");
   }
   if (options.directions.size() > 1 && options.directions.size() != 4) {
-    throw UsageError(
-        fmt::format("{} directions; give one for all corners, or four", options.directions.size()));
+    throw UsageError(fmt::format("{} directions are given; give one for all corners, or four",
+                                 options.directions.size()));
   }
   for (const V3d& d : options.directions) {
     if (!std::isfinite(d.x) || !std::isfinite(d.y) || !std::isfinite(d.z) || !(d.length() > 0)) {

@@ -35,8 +35,8 @@ void checkGrid(const PatchGridOptions& grid) {
   constexpr std::size_t kMostTiles = 100'000;
   if (grid.columns == 0 || grid.rows == 0 || grid.columns > kMostTiles || grid.rows > kMostTiles ||
       grid.columns * grid.rows > kMostTiles) {
-    throw UsageError(
-        fmt::format("{} by {} tiles; give 1 to {} in all", grid.columns, grid.rows, kMostTiles));
+    throw UsageError(fmt::format("the grid has {} by {} tiles; give 1 to {} in all", grid.columns,
+                                 grid.rows, kMostTiles));
   }
   if (!(grid.shift >= 0 && grid.shift < 1)) {
     throw UsageError(
@@ -315,7 +315,8 @@ PatchGridResult makePatchGridAround(const NarrowBand& base, const V3d& from, con
   checkGrid(grid);
   checkPatchOptions(height, options);
   if (grid.columns < 3)
-    throw UsageError(fmt::format("{} tiles around; give at least 3", grid.columns));
+    throw UsageError(
+        fmt::format("there are {} tiles around the axis; give at least 3", grid.columns));
   if (grid.mirrorU && grid.columns % 2 == 1) {
     throw UsageError(
         fmt::format("with --mirror u or both the number of tiles around must be even, so that "

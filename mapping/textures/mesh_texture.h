@@ -31,7 +31,7 @@ struct MeshTextureResult {
   Distortion distortion;  ///< sampled in the middle and near the corners of the particles' cells
   FoldCertificate certificate;
   std::size_t skipped = 0;      ///< patches left out because they fold
-  std::size_t lostNormals = 0;  ///< normals of length zero, given or after the map
+  std::size_t lostNormals = 0;  ///< number of normals of length zero, in the input or after mapping
   std::vector<std::string> notes;
 };
 
