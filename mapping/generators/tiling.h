@@ -8,7 +8,7 @@
 namespace mapping {
 
 struct Tiling {
-  int columns = 1, rows = 1;  ///< number of tiles along x and y, each at least 1
+  int columns = 1, rows = 1;  ///< columns along x and rows along y of a tile, each at least 1
   double overlap = 0;         ///< extent of the pattern beyond each side of its tile, world units
 };
 
