@@ -20,7 +20,8 @@ namespace {
 
 using Imath::V3d;
 
-// Shares of the work, as measured: mesh, motion, band.
+// Progress at which the triangle surface is extracted, and at which the motion is done. The rest is
+// the conversion to a band. From measured times.
 constexpr double kMeshed = 0.05, kMoved = 0.9;
 
 void requireTime(double time, const char* what) {
@@ -28,8 +29,8 @@ void requireTime(double time, const char* what) {
     throw UsageError(fmt::format("the {} is {}; give a finite time", what, time));
 }
 
-/// Projects vertices onto the zero set of the tricubic interpolant, a fraction of a voxel away.
-/// Vertices on a crease of the field stay.
+/// Moves vertices by at most 0.3 voxels onto the zero set of the tricubic interpolant. Vertices for
+/// which Newton's method does not converge, such as those on a crease, stay.
 void projectVertices(TriMesh& mesh, const NarrowBand& band) {
   constexpr int kNewtonSteps = 4;
   constexpr double kMostProjection = 0.3;  // voxels
@@ -58,7 +59,7 @@ TriMesh surfaceOf(const NarrowBand& band) {
   return mesh;
 }
 
-/// Returns the band that triangles in index space enclose, on the grid of `model`.
+/// Converts a closed mesh in index space to a band with the transform and half width of `model`.
 NarrowBand bandOf(const TriMesh& mesh, const NarrowBand& model, const AdvectOptions& options) {
   MeshToBandOptions conversion;
   conversion.halfWidth = model.halfWidth();
@@ -95,7 +96,8 @@ NarrowBand withVolume(NarrowBand band, double volume, const AdvectOptions& optio
 
 struct Advection::Impl {
   AdvectOptions options;
-  NarrowBand band;  ///< start of the motion; the grid schemes update it
+  /// Solid at the start of the motion. The grid schemes replace it by the moved solid.
+  NarrowBand band;
   std::optional<flow::Front> front;
   double time, volumeBefore;
   std::size_t steps = 0;
@@ -111,7 +113,7 @@ struct Advection::Impl {
     report(options.progress, kMeshed);
   }
 
-  /// Converts a world velocity to masked voxels of the band's grid.
+  /// Returns the velocity in index space, in voxels per unit of time, multiplied by the mask.
   [[nodiscard]] flow::Velocity inVoxels(const VectorField& velocity) const {
     const Imath::M44d toWorld = band.indexToWorld(), toIndex = toWorld.inverse();
     const V3d origin = toWorld.translation();
@@ -150,7 +152,7 @@ struct Advection::Impl {
     AdvectResult result;
     result.steps = steps;
     result.volumeBefore = volumeBefore;
-    // Without a step the result is the given solid, to the bit.
+    // Without a step the result is the given solid, to the bit, and not its converted mesh.
     result.band = front && steps > 0 ? bandOf(front->mesh(), band, options) : band;
     result.volumeAfter = measure(result.band).volume;
     if (options.fixVolume) result.band = withVolume(result.band, volumeBefore, options);

@@ -16,19 +16,19 @@ enum class AdvectScheme {
   /// Triangle surface whose vertices follow the flow; converted to a band at the end. Preserves
   /// volume and thin sheets, since nothing is interpolated on a grid during the motion.
   Front,
-  /// φ at the feet of backward characteristics, interpolated tricubically. Steps of several voxels;
-  /// redistanced after each [Strain99].
+  /// Interpolates φ tricubically at the feet of backward characteristics. Steps of several voxels;
+  /// redistances after each step [Strain99].
   SemiLagrangian,
   /// Upwind differences: fifth-order HJ-WENO and third-order TVD Runge-Kutta. Steps below one voxel
-  /// [Jiang00, Shu88]; redistanced every voxel and a half.
+  /// [Jiang00, Shu88]; redistances whenever the surface has moved 1.5 voxels.
   Upwind
 };
 
 struct AdvectOptions {
-  double start = 0;  ///< time of the velocity at the start of the motion
+  double start = 0;  ///< time at which the motion starts, passed to the velocity
   AdvectScheme scheme = AdvectScheme::Front;
   bool fixVolume = false;         ///< offset the result to the volume of the solid
-  std::optional<Mask> mask = {};  ///< scales the velocity
+  std::optional<Mask> mask = {};  ///< weight that multiplies the velocity
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
@@ -36,22 +36,24 @@ struct AdvectOptions {
 struct AdvectResult {
   NarrowBand band;
   std::size_t steps = 0;
-  double volumeBefore = 0, volumeAfter = 0;  ///< world units³; after: before fixVolume
+  /// Volumes of the given solid and of the moved solid, world units³. The latter is measured before
+  /// fixVolume corrects the result.
+  double volumeBefore = 0, volumeAfter = 0;
 };
 
 /// Moves a solid with a velocity field: φ_t + u·∇φ = 0.
 ///
-/// A grid cannot hold sheets thinner than its voxels. Enright's deformation there and back on 64³
-/// costs the upwind scheme 30 % of the volume (OpenVDB's: 44 %), and the front 0.1 %. A reference
-/// map on the same grid was tried and failed for the same reason: it stretches fortyfold between
-/// two grid points. Triangles that are split where they stretch keep both sides of a sheet, however
-/// near they come to each other.
+/// A grid cannot represent sheets thinner than its voxels. In Enright's test, a deformation and its
+/// reversal on a 64³ grid, the upwind scheme loses 30 % of the volume (OpenVDB's: 44 %), and the
+/// front 0.1 %. A reference map (start positions stored on the same grid) was tried and failed for
+/// the same reason: it stretches fortyfold between two grid points. Triangles that are split where
+/// they stretch keep both sides of a sheet, however close the two sides come.
 ///
 /// @param velocity  world units per unit of time; evaluated only near the surface, and only at
 ///                  times within the current step
 /// @param time      duration; negative runs backwards
 /// @return a band with the transform and half width of `solid`. It lacks parts thinner than about a
-///         voxel; Advection keeps them until the band is requested
+///         voxel; the class Advection keeps such parts between steps
 /// @throws InvalidInput if `solid` is empty, if the velocity is not finite on the path of the
 ///         surface, or if no part thick enough for the grid is left
 /// @throws UsageError for times that are not finite
@@ -60,8 +62,9 @@ struct AdvectResult {
 [[nodiscard]] AdvectResult advect(NarrowBand solid, const VectorField& velocity, double time,
                                   const AdvectOptions& options = {});
 
-/// Advection step by step, for a velocity that becomes known only as time advances (a simulation).
-/// Parts thinner than a voxel survive between the calls, unlike through a band.
+/// Advects a solid step by step, for a velocity that becomes known only as time advances (a
+/// simulation). With AdvectScheme::Front the surface stays a mesh between the calls of advance(),
+/// so parts thinner than a voxel survive. They would be lost by calling advect() for each step.
 class Advection {
  public:
   explicit Advection(NarrowBand solid, const AdvectOptions& options = {});
@@ -69,7 +72,8 @@ class Advection {
   Advection(Advection&&) noexcept;
   Advection& operator=(Advection&&) noexcept;
 
-  /// Advances by `time`. The velocity is evaluated only at times within that interval.
+  /// Moves the solid for the duration `time`, negative: backwards. Evaluates the velocity only at
+  /// times within that interval.
   void advance(const VectorField& velocity, double time);
   [[nodiscard]] AdvectResult result() const;
 
@@ -87,9 +91,9 @@ struct AdvectOperator {
     NamedVelocity field;
     double time = 0, start = 0;
     AdvectScheme scheme = AdvectScheme::Front;
-    std::optional<double> period;  ///< of a velocity known by its name
+    std::optional<double> period;  ///< period of a built-in velocity; empty: its default
     Imath::V3d center = Imath::V3d(0), axis = Imath::V3d(0, 0, 1);
-    std::string factor;  ///< formula in t; empty: 1
+    std::string factor;  ///< formula in t that multiplies the velocity; empty: 1
     bool fixVolume = false;
     std::optional<Mask> mask;
 
@@ -98,21 +102,19 @@ struct AdvectOperator {
       visit("field", &Options::field,
             {.help = "the velocity, world units per unit of time", .required = true});
       visit("time", &Options::time,
-            {.help = "length of time; negative: backwards", .required = true});
-      visit("start", &Options::start, {.help = "time of the velocity at which it begins"});
+            {.help = "duration of the motion; negative: backwards in time", .required = true});
+      visit("start", &Options::start, {.help = "time at which the motion starts"});
       visit("scheme", &Options::scheme,
             {{"front", AdvectScheme::Front},
              {"semi-lagrangian", AdvectScheme::SemiLagrangian},
              {"upwind", AdvectScheme::Upwind}},
             {.help = "numerical scheme"});
       visit("period", &Options::period,
-            {.help = "period of a velocity known by its name; default: enright 3, vortex 8, "
-                     "rotation 1",
+            {.help = "period of a built-in velocity; default: enright 3, vortex 8, rotation 1",
              .range = OptionRange::Positive});
       visit("center", &Options::center, {.help = "centre of the rotation"});
       visit("axis", &Options::axis, {.help = "axis of the rotation"});
-      visit("factor", &Options::factor,
-            {.help = "formula in t that the velocity is multiplied by"});
+      visit("factor", &Options::factor, {.help = "formula in t that multiplies the velocity"});
       visit("fix-volume", &Options::fixVolume,
             {.help = "offset the result to the volume of the solid"});
       visit("mask", &Options::mask, {});

@@ -30,12 +30,13 @@ VectorField velocityOf(const AdvectOperator::Options& options) {
 const OperatorText AdvectOperator::text{
     .name = "advect",
     .group = "Flow",
-    .summary = "carry a solid along with a velocity",
+    .summary = "move a solid with a velocity field",
     .details =
-        "The velocity is a named one, three formulas in x, y, z, r and t, or a field of vectors "
-        "(read FILE.vdb --grid NAME --as v, then --field @v), staggered or not. A negative time "
+        "The velocity is a built-in one (enright, vortex or rotation), three formulas in x, y, z, "
+        "r and t, or a grid of vectors (read FILE.vdb --grid NAME --as v, then --field @v), "
+        "staggered or not. A negative time "
         "runs backwards. The scheme 'front' moves the surface as triangles and keeps volume and "
-        "thin sheets; the two others work on the grid.",
+        "thin sheets; 'semi-lagrangian' and 'upwind' work on the grid.",
     .example =
         "levelsmith sphere --radius 0.15 --center 0.35,0.35,0.35 --voxel 0.03 ! advect "
         "--field enright --time 0.3 ! measure"};
@@ -44,12 +45,12 @@ void AdvectOperator::check(const Options& options, const GivenOptions& given) {
   if (given("factor")) (void)factorOf(options);
   if (given("period") && options.field.name.empty())
     throw UsageError(
-        "--period is that of a velocity known by its name; write the time into the formula "
-        "or use --factor");
+        "--period applies only to the built-in velocities enright, vortex and rotation; write the "
+        "time into the formula or use --factor");
   for (const char* option : {"center", "axis"}) {
     if (given(option) && options.field.name != "rotation")
       throw UsageError(fmt::format(
-          "--{} is that of the rotation; leave it out, or use --field rotation", option));
+          "--{} applies only to the rotation; leave it out, or use --field rotation", option));
   }
 }
 
@@ -67,7 +68,8 @@ NarrowBand AdvectOperator::run(std::vector<NarrowBand> operands, const Options& 
                  {"volume_before", result.volumeBefore},
                  {"volume_after", result.volumeAfter}};
   run.notes.push_back(fmt::format("{} steps, the volume changed by {:+.3g} %{}", result.steps,
-                                  100 * change, options.fixVolume ? " before it was fixed" : ""));
+                                  100 * change,
+                                  options.fixVolume ? " before --fix-volume corrected it" : ""));
   return std::move(result.band);
 }
 

@@ -23,7 +23,7 @@ constexpr std::array<double, kStages> kMove = {37.0 / 378,  0, 250.0 / 621,
 constexpr std::array<double, kStages> kFourth = {
     2825.0 / 27648, 0, 18575.0 / 48384, 13525.0 / 55296, 277.0 / 14336, 1.0 / 4};
 
-/// Samples the velocity at the stages of a step.
+/// Returns the velocities at the six stages of a step.
 /// @param seen  called with each velocity, its position and time
 template <typename Seen>
 std::array<V3d, kStages> velocitiesOn(const Velocity& velocity, const V3d& from, double time,
@@ -33,7 +33,7 @@ std::array<V3d, kStages> velocitiesOn(const Velocity& velocity, const V3d& from,
   for (std::size_t stage = 0; stage < kStages; ++stage) {
     V3d position = from;
     for (std::size_t i = 0; i < stage; ++i) position += k[i] * (dt * kStagePosition[stage][i]);
-    // Rounding must not evaluate the velocity beyond the end of the interval.
+    // With rounding, time + dt could lie beyond the end of the time interval.
     const double at = kTime[stage] == 1 ? to : time + dt * kTime[stage];
     k[stage] = velocity(position, at);
     seen(k[stage], position, at);

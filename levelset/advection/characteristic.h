@@ -8,17 +8,20 @@
 
 namespace levelset::flow {
 
-/// One step along a characteristic with the fifth-order method of Cash and Karp [Cash90]. The error
-/// is the difference to its embedded fourth-order method.
+/// One Runge-Kutta step along a characteristic (the path of a point in the velocity field) with the
+/// fifth-order method of Cash and Karp [Cash90].
 struct Characteristic {
-  Imath::V3d move{0}, error{0};  ///< voxels
-  /// Largest displacement over the step by any sampled velocity, voxels; infinite if one is not
-  /// finite.
+  /// Displacement over the step, and its difference to the embedded fourth-order method, voxels.
+  Imath::V3d move{0}, error{0};
+  /// Largest sampled speed times the length of the step, voxels; infinite if a sampled velocity is
+  /// not finite.
   double fastest = 0;
-  /// Deviation of the second velocity sample from the line through the first and the third, voxels.
-  /// The move gives the second sample no weight.
+  /// Difference between the second velocity sample and the line through the first and the third,
+  /// times the length of the step, voxels. It shows a jump of the velocity at the second sample,
+  /// which has no weight in `move` and `error`.
   double stageDeviation = 0;
-  /// Distance from the start to the nearest sample that is not finite, voxels.
+  /// Distance from the start to the nearest position where a sampled velocity is not finite,
+  /// voxels. HUGE_VAL: all are finite.
   double nonFiniteDistance = HUGE_VAL;
 
   Characteristic(const Velocity& velocity, const Imath::V3d& from, double time, double to);
@@ -26,7 +29,7 @@ struct Characteristic {
   [[nodiscard]] bool isFinite() const { return std::isfinite(fastest); }
 };
 
-/// Checks every velocity that the step samples.
+/// Checks every velocity that a step from `from`, between two times, samples.
 /// @throws InvalidInput with position and time, if one is not finite
 void requireFinitePath(const TimeInterval& interval, const Imath::V3d& from, double time,
                        double to);

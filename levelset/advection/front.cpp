@@ -19,24 +19,28 @@ using Imath::V3d;
 using Triangle = std::array<std::uint32_t, 3>;
 
 constexpr double kLongestEdge = 1;  // voxels
-// Limits of a step: move of a vertex in voxels, strain of an edge, error of a vertex in voxels.
-// Strain is the change of an edge as a share of its length, or of kLongestEdge for shorter edges.
-// It is limited because a new vertex goes onto a curve over the entire edge. Shorter edges need no
-// new vertex: the error limit alone covers their ends.
+// Limits of a step: displacement of a vertex in voxels, strain of an edge, error of a vertex in
+// voxels. Strain is the change of an edge vector divided by its length, or by kLongestEdge for
+// shorter edges. It is limited because a split edge gets its new vertex on a curve through its end
+// points only. Edges shorter than kLongestEdge are not split, so the error limit suffices for them.
 constexpr double kFarthestMove = 16, kMostStrain = 0.7, kMostError = 2e-3;
-// The error limit does not apply when no velocity moves a vertex further than this in a step, in
-// voxels: at a jump of the velocity no step would be short enough.
+// The error limit does not apply when the largest sampled speed moves a vertex less than this
+// distance in a step, voxels. Otherwise no step would be short enough at a jump of the velocity.
 constexpr double kShortMove = 0.25;
-// Largest deviation of the method's second sample from the others, voxels.
+// Limit of Characteristic::stageDeviation, voxels: the second velocity sample of a step against the
+// line through the first and the third.
 constexpr double kMostStageDeviation = 1;
-// Positions and triangles, with the temporary arrays for splitting and moving.
+// Memory of a triangle and its share of the vertices, with temporary arrays for splitting and
+// moving.
 constexpr double kBytesPerTriangle = 100;
-// Limit of triangles per voxel of the largest area so far. A surface with more is crumpled, not
-// stretched, and takes long to resolve where it crosses itself. The largest area counts because a
-// surface keeps the triangles of a stretch on its way back. The test
-// Front.HasFewTrianglesWhereItIsStretched shows the margin for smooth velocities.
+// Limit of the number of triangles for each voxel² of the largest area so far, and an allowance for
+// small surfaces. A surface with more triangles is crumpled, not stretched, and its
+// self-intersections take long to resolve. The largest area counts because a surface that shrinks
+// again keeps its triangles. The test Front.HasFewTrianglesWhereItIsStretched shows the margin for
+// smooth velocities.
 constexpr double kMostTrianglesPerVoxel = 50, kSpareTriangles = 20000;
-// A face whose normal deviates more than this from a vertex normal lies beyond a crease.
+// An end of an edge lies on a crease when its vertex normal times the mean of the two face normals
+// beside the edge is less than this cosine.
 constexpr double kCreaseCosine = 0.8;
 
 std::uint64_t edgeKey(std::uint32_t a, std::uint32_t b) {
@@ -48,7 +52,7 @@ V3d areaNormal(const TriMesh& mesh, const Triangle& t) {
   return (mesh.positions[t[1]] - a).cross(mesh.positions[t[2]] - a);
 }
 
-/// Splits the edges that are too long, once.
+/// Splits each edge longer than kLongestEdge once, and divides the triangles beside it.
 class Splitter {
  public:
   explicit Splitter(TriMesh& mesh) : mesh_(mesh) {
@@ -70,18 +74,19 @@ class Splitter {
     return (mesh_.positions[a] - mesh_.positions[b]).length2() > kLongestEdge * kLongestEdge;
   }
 
-  /// Marks a long edge in the one triangle that passes it from the lower to the higher vertex.
+  /// Stores a long edge once: only one of its two triangles runs from the lower to the higher
+  /// vertex index.
   void mark(std::uint32_t a, std::uint32_t b) {
     if (a < b && isLong(a, b)) edges_.push_back(edgeKey(a, b));
   }
 
-  /// Returns the number of a long edge.
+  /// Returns the index of a long edge in `edges_`.
   [[nodiscard]] std::uint32_t find(std::uint32_t a, std::uint32_t b) const {
     return index_.at(edgeKey(a, b));
   }
 
-  /// Adds the midpoints of cubic curves with the normals of the vertices. Where a crease passes at
-  /// a vertex, its side of the curve is straight.
+  /// Adds a vertex for each long edge: the midpoint of the cubic curve that the vertex normals
+  /// define [Vlachos01]. A vertex on a crease does not bend the curve.
   void addMidpoints() {
     std::vector<V3d> normals(mesh_.positions.size(), V3d(0));
     for (const Triangle& t : mesh_.triangles) {
@@ -153,7 +158,7 @@ class Splitter {
   TriMesh& mesh_;
   std::vector<std::uint64_t> edges_;
   std::unordered_map<std::uint64_t, std::uint32_t> index_;
-  std::uint32_t first_ = 0;  ///< number of the first midpoint
+  std::uint32_t first_ = 0;  ///< vertex index of the first midpoint
 };
 
 }  // namespace
@@ -164,7 +169,8 @@ Front::Front(TriMesh mesh, std::size_t maxMemory) : mesh_(std::move(mesh)) {
 }
 
 void Front::splitLongEdges(std::size_t maxMemory) {
-  // A step stretches little; remaining long edges wait for the next step.
+  // A step stretches edges little, so few passes suffice. Edges that are still too long are split
+  // after the next step.
   constexpr int kPasses = 4;
   for (int pass = 0; pass < kPasses; ++pass) {
     Splitter splitter(mesh_);
@@ -177,9 +183,9 @@ void Front::splitLongEdges(std::size_t maxMemory) {
 
 namespace {
 
-/// Maxima over all vertices.
+/// Maxima of the members of Characteristic over all vertices.
 struct Largest {
-  double fastest = 0, move = 0, error = 0, stageDeviation = 0;  ///< voxels, see Characteristic
+  double fastest = 0, move = 0, error = 0, stageDeviation = 0;  ///< voxels
   double nonFiniteDistance = HUGE_VAL;                          ///< minimum over all vertices
 
   static Largest of(const Largest& a, const Largest& b) {
@@ -224,7 +230,8 @@ double Front::tryStep(const TimeInterval& interval, double from, double to) {
       Largest::of);
   isStill_ = largest.fastest == 0;
   if (!std::isfinite(largest.fastest)) {
-    // The step may have sampled beyond the path of the surface: a shorter one may be finite.
+    // The step may have sampled the velocity away from the path of the surface. The samples of a
+    // shorter step may be finite.
     if (largest.nonFiniteDistance > kShortMove) return 0.25;
     for (const V3d& p : mesh_.positions) requireFinitePath(interval, p, from, to);
     throw InvalidInput(
@@ -271,7 +278,8 @@ StepResult Front::step(const TimeInterval& interval, double from, double longest
     if (allowed * kSlack >= 1) {
       mesh_.positions.swap(moved_);
       const double next = dt * std::clamp(kMargin * allowed, kMargin / kSlack, kGrowth);
-      // While nothing moves, steps stay short, so that a motion that sets in is not skipped.
+      // While the velocity is zero, steps stay short, so that they do not skip the start of a
+      // motion.
       const double total = std::abs(interval.to - interval.from);
       return {to, isStill_ ? std::min(next, kFirstShare * total) : next};
     }

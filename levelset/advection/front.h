@@ -9,12 +9,12 @@
 
 namespace levelset::flow {
 
-/// Closed triangle surface that moves with a velocity.
-/// Vertices follow their characteristics with a fifth-order Runge-Kutta method with error estimate
-/// [Cash90]. A step is repeated with a shorter length when a vertex exceeds the limits of error or
-/// move, or when an edge exceeds the limit of strain. An edge longer than a voxel is split; the new
-/// vertex goes onto the cubic curve defined by the normals at the ends [Vlachos01]. Nothing is
-/// interpolated on a grid, so the surface does not erode and keeps parts thinner than a voxel.
+/// Closed triangle surface in index space that moves with a velocity. Its vertices follow
+/// characteristics, by a fifth-order Runge-Kutta method with error estimate [Cash90]. A step is
+/// repeated with a shorter length when the error or the displacement of a vertex, or the strain of
+/// an edge, exceeds its limit. An edge longer than a voxel is split; the new vertex lies on the
+/// cubic curve that the end points and their normals define [Vlachos01]. Nothing is interpolated on
+/// a grid, so the surface does not erode and keeps parts thinner than a voxel.
 class Front {
  public:
   /// @param mesh  closed and two-manifold, in voxels
@@ -32,20 +32,22 @@ class Front {
 
  private:
   /// Computes the vertices after a step into `moved_`.
-  /// @return allowed share of the step; 1 or more accepts the step
+  /// @return ratio of the allowed step length to the tried one; clearly below 1: retry with a
+  ///         shorter step
   double tryStep(const TimeInterval& interval, double from, double to);
-  /// Returns the largest change of an edge from the mesh to `moved_`, as a share of its length or
-  /// of kLongestEdge.
+  /// Returns the largest strain: change of an edge vector from `mesh_` to `moved_`, divided by the
+  /// length of the edge or by kLongestEdge, whichever is longer.
   [[nodiscard]] double mostStrain() const;
-  /// Returns the longest first step, from the speeds at the start.
+  /// Returns the longest allowed first step, units of time, from the speeds of the vertices at the
+  /// start.
   [[nodiscard]] double firstStep(const TimeInterval& interval) const;
   StepResult step(const TimeInterval& interval, double from, double longest);
   void splitLongEdges(std::size_t maxMemory);
 
   TriMesh mesh_;
-  std::vector<Imath::V3d> moved_;  ///< vertices after the step that was tried last
-  double largestArea_ = 0;         ///< largest area so far, voxels²
-  bool isStill_ = false;           ///< nothing moved in the step that was tried last
+  std::vector<Imath::V3d> moved_;  ///< positions of the vertices after the last tried step
+  double largestArea_ = 0;         ///< largest area of the surface so far, voxels²
+  bool isStill_ = false;           ///< all velocities in the last tried step were zero
 };
 
 }  // namespace levelset::flow

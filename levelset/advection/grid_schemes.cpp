@@ -24,13 +24,15 @@ using openvdb::FloatTree;
 using openvdb::Index;
 using LeafNode = FloatTree::LeafNodeType;
 
-// Semi-Lagrangian: limits of a step, the move in voxels and the strain.
+// Semi-Lagrangian: limits of a step. Length of a characteristic in voxels, and strain: the norm of
+// the velocity gradient times the step.
 constexpr double kFarthestFoot = 4, kFootStrain = 0.5;
-// Half width of the working band, voxels. All values interpolated beside the zero set, and those
-// for the distances computed from them, are then distances and not the background.
+// Half width of the working band of the semi-Lagrangian scheme, voxels. The interpolation stencils
+// of all grid points beside the zero set, and those of the distance transform that follows, then
+// contain no background values.
 constexpr double kFootWidth = 5;
-// Upwind: share of the CFL limit, travel of the surface before redistancing, and half width of the
-// working band, both in voxels. The band must hold the travel and the stencils beyond it.
+// Upwind: Courant number, travel of the surface before the band is redistanced, and half width of
+// the working band, both in voxels. The band must contain the stencils after the travel.
 constexpr double kCfl = 0.5, kUpwindTravel = 1.5, kUpwindWidth = 6;
 
 std::vector<LeafNode*> leavesOf(FloatTree& tree) {
@@ -43,7 +45,8 @@ V3d positionOf(const LeafNode& leaf, Index n) {
   return toImath(leaf.offsetToGlobalCoord(n).asVec3d());
 }
 
-/// Returns the longest step at a time: the minimum of `limit` over the active grid points.
+/// Returns the longest allowed step, units of time: the minimum of `limit`, a function of an index
+/// position, over the active grid points.
 template <typename Limit>
 double longestStep(FloatGrid& grid, const Limit& limit) {
   const std::vector<LeafNode*> leaves = leavesOf(grid.tree());
@@ -66,8 +69,8 @@ FloatGrid::Ptr distanceOf(const FloatGrid& field, double halfWidth, const TimeIn
 
 // === Semi-Lagrangian
 
-// Largest error of a foot point per step, voxels. A path with a larger error is halved, at most
-// kMostHalvings times.
+// Largest error of a foot point, voxels. A characteristic with a larger error is integrated in two
+// halves, recursively to a depth of kMostHalvings.
 constexpr double kFootError = 1e-3;
 constexpr int kMostHalvings = 6;
 
@@ -111,7 +114,7 @@ double weno5(double a, double b, double c, double d, double e) {
   const double s2 = 13.0 / 12 * (b - 2 * c + d) * (b - 2 * c + d) + 0.25 * (b - d) * (b - d);
   const double s3 = 13.0 / 12 * (c - 2 * d + e) * (c - 2 * d + e) +
                     0.25 * (3 * c - 4 * d + e) * (3 * c - 4 * d + e);
-  // Differences are about one voxel per voxel.
+  // The differences are about 1, since |∇φ| ≈ 1, so the regularisation can be absolute.
   constexpr double kSmall = 1e-6;
   const double w1 = 0.1 / ((s1 + kSmall) * (s1 + kSmall)),
                w2 = 0.6 / ((s2 + kSmall) * (s2 + kSmall)),
@@ -120,7 +123,8 @@ double weno5(double a, double b, double c, double d, double e) {
          (6 * (w1 + w2 + w3));
 }
 
-/// Returns the derivative along an axis from the upwind side; voxels per voxel.
+/// Returns the upwind derivative of φ along an axis, voxels per voxel. The sign of `speed` selects
+/// the side.
 double upwindDerivative(const eikonal::DenseBlock& block, const Coord& c, int axis, double speed,
                         double voxelSize) {
   const int side = speed > 0 ? -1 : 1;
@@ -136,7 +140,8 @@ double upwindDerivative(const eikonal::DenseBlock& block, const Coord& c, int ax
   return weno5(d[0], d[1], d[2], d[3], d[4]);
 }
 
-/// result = share · start + (1 − share) · (field − dt u·∇field) on the active grid points.
+/// Computes result = share · start + (1 − share) · (field − dt u·∇field) on the active grid points,
+/// with the velocity u at `time`.
 void eulerStage(const FloatGrid& start, const FloatGrid& field, double share, double time,
                 double dt, const TimeInterval& interval, FloatGrid& result) {
   const std::vector<LeafNode*> leaves = leavesOf(result.tree());

@@ -31,9 +31,10 @@ std::size_t integrate(const TimeInterval& interval,
   while (time != to) {
     report(interval.progress, (time - interval.from) / (to - interval.from));
     const double left = std::abs(to - time);
-    // At a late time, a share of a short interval may round to zero.
+    // When the time is large, adding a very short step may not change it. A step of four units in
+    // the last place does.
     dt = std::max(dt, 4 * std::abs(std::nextafter(time, to) - time));
-    // The last two steps share the remaining time.
+    // The last two steps each take half of the remaining time.
     const double longest = dt >= left ? left : left < 2 * dt ? left / 2 : dt;
     const StepResult made = step(time, longest);
     const double needed = static_cast<double>(done) + std::abs(to - made.time) / made.next;
@@ -55,8 +56,8 @@ std::size_t integrate(const TimeInterval& interval,
 std::size_t integrate(const TimeInterval& interval, const std::function<double(double)>& longest,
                       const std::function<void(double, double)>& step) {
   const double to = interval.to, sign = to < interval.from ? -1 : 1;
-  // Sample times within a step. They are uneven so as not to match the period of an oscillating
-  // velocity.
+  // Sample times as fractions of a step. Their spacing is uneven, so that they do not match the
+  // period of an oscillating velocity.
   constexpr double kSamples[] = {0.146, 0.382, 0.618, 1};
   constexpr double kGrowth = 1.5;
   constexpr int kTries = 40;
@@ -71,7 +72,8 @@ std::size_t integrate(const TimeInterval& interval, const std::function<double(d
       for (const double sample : kSamples)
         allowed = std::min(allowed, longest(from + sign * sample * dt));
       least = std::min(atStart, allowed);
-      // While nothing moves, steps stay short, so that a motion that sets in is not skipped.
+      // While the velocity is zero, steps stay short, so that they do not skip the start of a
+      // motion.
       if (std::isinf(least) && dt > kFirstShare * total) {
         dt = kFirstShare * total;
         continue;

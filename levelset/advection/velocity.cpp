@@ -17,7 +17,7 @@ void requirePeriod(double period) {
         fmt::format("the period of the velocity is {}; give a positive, finite time", period));
 }
 
-/// sin² of πx, and sin of 2πx.
+/// Values sin²(πx) and sin(2πx).
 struct Waves {
   double squared, twice;
   explicit Waves(double x) {
@@ -52,10 +52,10 @@ VectorField rotationVelocity(const V3d& center, const V3d& axis, double period) 
   const V3d spin = axis.normalized() * (2 * M_PI / period);
   for (int i = 0; i < 3; ++i) {
     if (!std::isfinite(center[i]) || !std::isfinite(axis[i]) || !(spin.length2() > 0))
-      throw UsageError(fmt::format(
-          "the rotation's axis is {},{},{} through {},{},{}; give a direction and a finite "
-          "point",
-          axis.x, axis.y, axis.z, center.x, center.y, center.z));
+      throw UsageError(
+          fmt::format("the rotation axis has direction {},{},{} and center {},{},{}; give a finite "
+                      "direction other than zero and a finite center",
+                      axis.x, axis.y, axis.z, center.x, center.y, center.z));
   }
   return [center, spin](const V3d& p, double) { return spin.cross(p - center); };
 }
