@@ -136,8 +136,8 @@ double clippedDistance(const Distance& distance, const Imath::V3d& p, const Imat
                        double exact, double voxelSize) {
   const double outside = boxDistance(p, box);
   const double toSolid = distance(p), least = std::max(outside, toSolid);
-  // `least` is the result in three cases: p is inside; p is further away than `exact`; or p lies
-  // deeper in the solid than its distance to the box, so that the nearest point of the box is
+  // `least` is the result if p is inside, or further away than `exact`. It is also the result if p
+  // lies deeper in the solid than its distance to the box. Then the nearest point of the box is
   // inside the solid.
   if (least <= 0 || least > exact || outside < -toSolid) return least;
   const double step = 1e-3 * voxelSize;

@@ -15,8 +15,8 @@ enum class GyroidKind {
   Network  ///< the struts of one labyrinth
 };
 
-/// The level surface sin x cos y + sin y cos z + sin z cos x = 0, which approximates Schoen's
-/// minimal surface [Schoen70, Wohlgemuth01], clipped by the box of its cells.
+/// The surface sin x cos y + sin y cos z + sin z cos x = 0, clipped by the box of its cells. It
+/// approximates Schoen's minimal surface [Schoen70, Wohlgemuth01].
 struct Gyroid {
   GyroidKind kind = GyroidKind::Sheet;
   double cell = 1;         ///< edge of a cubic cell, world units

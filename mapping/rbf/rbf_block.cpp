@@ -62,8 +62,8 @@ double radiusOf(const GridBlock& block) {
 constexpr double kLebesgue = 2.11;
 
 /// Error bound of the polynomial for a particle of weight 1 at distance `gap` from the block's
-/// hull: the smaller of a bound from the kernel's sixth derivatives, and one from the values of a
-/// decaying kernel.
+/// hull. It is the smaller of a bound from the kernel's sixth derivatives, and a bound from the
+/// values of a decaying kernel.
 template <typename Kernel>
 double farError(double halfEdge, double gap) {
   const double a = halfEdge / 2, squared = a * a;

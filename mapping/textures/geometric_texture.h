@@ -86,7 +86,7 @@ struct TextureResult {
 /// Default voxel size of a result, world units: the texture's voxel size times the stretch if that
 /// is smaller than the base's voxel size, otherwise the base's voxel size.
 /// @param base, texture  voxel sizes of the base and the texture, world units
-/// @param minStretch  smallest stretch of texture → patch
+/// @param minStretch  smallest stretch of the map from the texture to the patches
 [[nodiscard]] double resultVoxelSize(double base, double texture, double minStretch);
 
 /// Builds the RBF map of a patch from its particles and rims to their texture coordinates. λ is

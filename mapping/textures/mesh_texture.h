@@ -40,7 +40,7 @@ struct MeshTextureResult {
 /// may be open or closed. Its triangles are kept; they are reversed if the patch is mirrored, so
 /// that they face the same side. Beyond the unit cube the outermost cells continue linearly.
 /// Normals are transformed by the inverse transpose of the map's Jacobian in the cell of their
-/// vertex; for a vertex on the border of two cells, in the cell that begins there. They get unit
+/// vertex. On the border of two cells, that is the cell that begins there. They get unit
 /// length and stay on the same side of the triangles. Normals of length zero stay zero, with a
 /// note. Texture coordinates and colours are copied.
 /// @throws UsageError for an embedding depth that is not finite

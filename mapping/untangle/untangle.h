@@ -19,9 +19,9 @@ struct UntangleOptions {
   double embedDepth = 0;
   /// True: particles on the sides slide on the surface too; false: they stay.
   bool freeSides = false;
-  /// Size of the unit cube of u, v, w in the undeformed shape; empty: the size of the patch, so
-  /// that the proportions of the patch do not count as distortion. Only the ratios of the sizes
-  /// matter, not their unit.
+  /// Size of the unit cube of u, v, w in the undeformed shape. Empty: the size of the patch, so
+  /// that its proportions do not count as distortion. Only the ratios of the sizes matter, not
+  /// their unit.
   std::optional<Imath::V3d> proportions = {};
   std::size_t mostIterations = 1000;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
@@ -29,7 +29,7 @@ struct UntangleOptions {
 };
 
 /// Number of cells in which the piecewise linear map through the particles, or one of the cell's
-/// six tetrahedra, is inverted or has no volume, or where this cannot be excluded.
+/// six tetrahedra, is inverted or has no volume. Cells where this cannot be excluded count too.
 struct FoldCount {
   std::size_t folded = 0, cells = 0;
   /// Least determinant at the corners of cells and in the tetrahedra; 1 at rest.
