@@ -5,13 +5,13 @@
 
 /// Exception classes, one for each exit code of the command line. A message is one sentence. It
 /// names the cause, the location and a remedy. It does not name the operator that throws it: the
-/// caller knows that. The command line puts the action before the message.
+/// caller knows the operator, and the command line puts the name of the action before the message.
 namespace levelset {
 
 enum class ExitCode : int {
   Done = 0,
-  Usage = 2,     ///< wrong call: a negative length, a missing operand
-  Input = 3,     ///< unusable data: a truncated file, an open mesh under `closed`
+  Usage = 2,     ///< wrong command line or argument: a negative length, a missing operand
+  Input = 3,     ///< unusable data: a truncated file, an open mesh with `--sign closed`
   Resource = 4,  ///< memory, index range or image size exceeds its limit
   Numeric = 5,   ///< a numeric check failed
   File = 6,      ///< missing, unreadable, not writable, disk full

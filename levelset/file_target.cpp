@@ -23,13 +23,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMaxLinks = 40;          // the kernel's own limit
-constexpr std::size_t kMaxStem = 180;  // keeps the name of the temporary file below NAME_MAX
+constexpr int kMaxLinks = 40;          // limit of the Linux kernel for nested symbolic links
+constexpr std::size_t kMaxStem = 180;  // bytes; keeps the name of the temporary file below NAME_MAX
 constexpr std::size_t kCopyChunk = 1 << 20;
 
 std::atomic<bool> mayClobber{true};
 
-/// Names of the temporary files of this process. The lock is held for single system calls only.
+/// Paths of the temporary files of this process. The mutex is locked for single system calls only.
 struct Registry {
   std::mutex mutex;
   std::set<std::string> names;
@@ -37,7 +37,8 @@ struct Registry {
 };
 
 Registry& registry() {
-  static Registry* instance = new Registry;  // outlives every static object that may write
+  // Never deleted, so that destructors of static objects may still write files.
+  static Registry* instance = new Registry;
   return *instance;
 }
 
@@ -55,7 +56,7 @@ Registry& registry() {
 }
 
 [[noreturn]] void throwCancelled(const fs::path& target) {
-  throw Cancelled(fmt::format("'{}' is left as it was, the job was interrupted", target.string()));
+  throw Cancelled(fmt::format("the job was interrupted and '{}' is unchanged", target.string()));
 }
 
 class Descriptor {
@@ -99,7 +100,7 @@ class SigpipeGuard {
   bool wasPending_ = false;
 };
 
-/// Returns N for /proc/<process>/fd/N, else -1.
+/// Returns the descriptor N when the path is /proc/PID/fd/N of this process, else -1.
 int ownDescriptor(const fs::path& path) {
   const fs::path folder = path.parent_path();
   if (folder != fmt::format("/proc/{}/fd", ::getpid()) && folder != "/proc/self/fd") return -1;
@@ -180,7 +181,7 @@ FileTarget::FileTarget(const fs::path& target, bool clobber)
   }
   if (exists && !clobber_)
     throwIo(target_,
-            "exists already and --no-clobber forbids to overwrite it; choose another name");
+            "exists already, and --no-clobber forbids overwriting it; choose another name");
   if (exists && ::access(finalPath_.c_str(), W_OK) != 0)
     throwErrno(target_, "cannot be overwritten", errno);
   createTemporary(finalPath_.parent_path(), finalPath_.filename().string());
@@ -189,7 +190,8 @@ FileTarget::FileTarget(const fs::path& target, bool clobber)
 void FileTarget::createTemporary(const fs::path& folder, std::string name) {
   static std::atomic<unsigned> counter{0};
   if (name.size() > kMaxStem) {
-    std::size_t cut = kMaxStem;  // not inside a UTF-8 character: some file systems refuse that
+    // Does not cut inside a UTF-8 character: some file systems refuse incomplete characters.
+    std::size_t cut = kMaxStem;
     while (cut > 0 && (static_cast<unsigned char>(name[cut]) & 0xC0) == 0x80) --cut;
     name.resize(cut);
   }

@@ -6,12 +6,13 @@
 namespace levelset {
 
 /// Writes an output file atomically. The data goes to a temporary file beside the target. commit()
-/// renames the temporary file over the target; the destructor removes it otherwise. An existing
-/// target keeps its permissions. A symbolic link stays, and the file that it points to is replaced.
+/// renames the temporary file over the target. Without commit(), the destructor removes the
+/// temporary file. An existing target keeps its permissions. A symbolic link stays, and the file
+/// that it points to is replaced.
 ///
-/// Pipes and devices, including standard output ("-"), cannot be renamed over. commit() copies the
-/// temporary file into them. Writers may therefore seek on any target, and a reader receives no
-/// data from a job that failed.
+/// A file cannot be renamed over a pipe or device, including standard output ("-"). commit() copies
+/// the temporary file into such a target. Writers may therefore seek on any target, and a reader
+/// receives no data from a job that failed.
 class FileTarget {
  public:
   /// @throws IoError when the folder is missing or not writable, or when the target is a directory,
@@ -22,12 +23,13 @@ class FileTarget {
   FileTarget(const FileTarget&) = delete;
   FileTarget& operator=(const FileTarget&) = delete;
 
-  /// Path of the file to open and write. The file exists already and is empty. Its extension
-  /// differs from that of the target, so choose the format by the target.
+  /// Path of the temporary file, which the caller opens and writes. It exists already and is empty.
+  /// Its extension differs from that of the target, so choose the file format by the name of the
+  /// target.
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
-  /// Flushes the data to disk and renames the file, or copies it into a pipe or device. The caller
-  /// closes its own streams on path() first.
+  /// Flushes the temporary file to disk and renames it to the target, or copies it into a pipe or
+  /// device. The caller closes its own streams on path() first.
   /// @throws IoError when the disk is full, the pipe has no reader or the rename fails
   /// @throws Cancelled after removeTemporaryFiles()
   void commit();
@@ -36,7 +38,7 @@ class FileTarget {
   void createTemporary(const std::filesystem::path& folder, std::string name);
   void copyToTarget();
 
-  std::filesystem::path target_;     ///< the caller's name of the target, for messages
+  std::filesystem::path target_;     ///< target as the caller named it, for messages
   std::filesystem::path finalPath_;  ///< target with all links resolved
   std::filesystem::path path_;
   int descriptor_ = -1;  ///< descriptor of this process that the target names (/dev/stdout), or -1
@@ -58,11 +60,12 @@ class FileTarget {
 [[nodiscard]] bool isSameFile(const std::filesystem::path& a, const std::filesystem::path& b);
 
 /// Removes all temporary files of this process. A thread that handles a signal may call it while
-/// other threads write. Afterwards no file is renamed or created.
+/// other threads write. Afterwards constructor and commit() of every FileTarget throw Cancelled.
 void removeTemporaryFiles() noexcept;
 
-/// Sets the default of `clobber`. With false, every FileTarget refuses to overwrite an existing
-/// file (`--no-clobber`).
+/// Allows or forbids to overwrite existing files in the entire process. With false
+/// (`--no-clobber`), every FileTarget refuses an existing target, whatever its own `clobber`
+/// argument.
 void setClobberDefault(bool clobber);
 [[nodiscard]] bool clobberDefault();
 

@@ -10,8 +10,8 @@ struct LibraryVersion {
   std::string name, version;
 };
 
-/// Versions of the libraries that levelset/ uses: the run-time version where the library reports
-/// one, else the version in its headers.
+/// Returns the versions of the libraries that levelset/ uses: the version of the loaded library
+/// where the library reports one, else the version in its headers.
 [[nodiscard]] std::vector<LibraryVersion> libraryVersions();
 
 }  // namespace levelset

@@ -12,7 +12,7 @@
 namespace levelset::eikonal {
 
 void checkMemory(const MemoryEstimate& estimate, std::size_t maxMemory) {
-  // Inwards there are never more points than in the solid's own box.
+  // Grid points inside the surface never lie outside its box, so only `outside` extends the box.
   const double out = estimate.outside + 1;
   double reached = 1, longest = 0;
   for (int i = 0; i < 3; ++i) {
@@ -29,7 +29,8 @@ void checkMemory(const MemoryEstimate& estimate, std::size_t maxMemory) {
     reached *= std::max(0.0, to - from + 1);
     longest = std::max(longest, static_cast<double>(estimate.surface.dim()[i]));
   }
-  // The smaller of Steiner's formula for a convex body and the complete box.
+  // Number of grid points: the smaller of Steiner's formula for a convex body and the volume of the
+  // box.
   const double steiner = estimate.area * (std::min(estimate.inside, longest / 2) + out) +
                          2 * M_PI * longest * out * out + 4.0 / 3 * M_PI * out * out * out;
   const double bytes = std::min(reached, steiner) * estimate.bytesPerGridPoint;

@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/eikonal only.
+// Includes OpenVDB, so include it from .cpp files only.
 
 #include <optional>
 
@@ -8,12 +8,12 @@
 
 namespace levelset::eikonal {
 
-/// Extent of the grid points that an operator computes around a surface, in voxels.
+/// Number and memory of the grid points that an operator computes around a surface.
 struct MemoryEstimate {
-  openvdb::CoordBBox surface;
-  double area = 0;
-  double inside = 0, outside = 0;  ///< distances from the surface, voxels
-  std::optional<openvdb::CoordBBox> region = {};
+  openvdb::CoordBBox surface;      ///< bounds of the surface, index space
+  double area = 0;                 ///< area of the surface, voxels²
+  double inside = 0, outside = 0;  ///< largest computed distances on the two sides, voxels
+  std::optional<openvdb::CoordBBox> region = {};  ///< limits the grid points; empty: no limit
   double bytesPerGridPoint = 20;
 };
 

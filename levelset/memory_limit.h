@@ -4,7 +4,8 @@
 
 namespace levelset {
 
-/// Bytes that an operator may plan to use: the smaller of `maxMemory` and the machine's memory.
+/// Returns the number of bytes that an operator may use: the smaller of `maxMemory` and the
+/// physical memory of the machine.
 [[nodiscard]] std::size_t memoryLimit(std::size_t maxMemory);
 
 }  // namespace levelset

@@ -65,7 +65,7 @@ void requireAttributes(const TriMesh& mesh) {
 }
 
 V3d transformedNormal(const V3d& normal, const std::array<V3d, 3>& slopes, double hand) {
-  // Scaled by the largest component first, so that no product overflows.
+  // Divides the Jacobian and the normal by their largest components, so that no product overflows.
   double inA = largestPart(slopes[0]), inB = largestPart(slopes[1]), inC = largestPart(slopes[2]);
   const double size = std::max(std::max(inA, inB), inC);
   const double length = largestPart(normal);
@@ -74,10 +74,10 @@ V3d transformedNormal(const V3d& normal, const std::array<V3d, 3>& slopes, doubl
   const double bySize = 1 / size, byLength = 1 / length;
   const V3d a = slopes[0] * bySize, b = slopes[1] * bySize, c = slopes[2] * bySize,
             n = normal * byLength;
-  // Columns of the cofactor matrix, which is the inverse transpose times the determinant. The scale
-  // does not matter here.
+  // The cross products are the columns of the cofactor matrix: the inverse transpose times the
+  // determinant. The factor does not matter, since the result is normalised.
   const V3d moved = hand * (n.x * b.cross(c) + n.y * c.cross(a) + n.z * a.cross(b));
-  // For a flat map, the remaining vector consists of rounding errors.
+  // If the Jacobian is singular, `moved` consists of rounding errors only. `sum` bounds its terms.
   inA *= bySize, inB *= bySize, inC *= bySize;
   const double sum =
       std::abs(n.x) * inB * inC + std::abs(n.y) * inC * inA + std::abs(n.z) * inA * inB;
@@ -94,7 +94,7 @@ void append(TriMesh& mesh, const TriMesh& other) {
     mesh.precision = other.precision;
     mesh.spacing = other.spacing;
   } else if (more > 0) {
-    // The coarser of the two: it holds for all coordinates of the joined mesh.
+    // Takes the coarser precision of the two meshes, since the result has coordinates of both.
     if (other.precision == CoordinatePrecision::Float) mesh.precision = other.precision;
     mesh.spacing = std::max(mesh.spacing, other.spacing);
   }

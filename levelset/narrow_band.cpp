@@ -20,18 +20,19 @@ using openvdb::Coord;
 using openvdb::FloatGrid;
 using LeafNode = openvdb::FloatTree::LeafNodeType;
 
+// Name of the grid metadata that marks the band of an open surface.
 constexpr const char* kOpenSurface = "levelsmith_open_surface";
 
-/// The linear part of a transform: one image of an axis per row. It avoids OpenVDB's AffineMap,
-/// which refuses voxels below 1.4e-5 as singular.
+/// Returns the linear part of a transform: row i is the image of the unit vector along index axis
+/// i. Avoids OpenVDB's AffineMap, which refuses voxels smaller than 1.4e-5 as singular.
 std::array<openvdb::Vec3d, 3> linearPart(const openvdb::math::Transform& transform) {
   const openvdb::math::MapBase& map = *transform.baseMap();
   return {map.applyJacobian(openvdb::Vec3d(1, 0, 0)), map.applyJacobian(openvdb::Vec3d(0, 1, 0)),
           map.applyJacobian(openvdb::Vec3d(0, 0, 1))};
 }
 
-/// Returns true for a rotation, uniform scale and translation, within the rounding of the stored
-/// matrix.
+/// Returns true if the transform is a rotation, uniform scale and translation, within a relative
+/// tolerance of 1e-6.
 bool isSimilarity(const openvdb::math::Transform& transform) {
   if (!transform.isLinear()) return false;
   const std::array<openvdb::Vec3d, 3> rows = linearPart(transform);
@@ -61,8 +62,8 @@ double NarrowBand::voxelSize() const {
 
 double NarrowBand::halfWidth() const {
   if (!grid_) return 0;
-  // The background is a float, so the ratio may be 3.0000001. Returns the short number, 3, if it
-  // gives the same background; else the ratio itself.
+  // The background is a float, so background / voxel may be 3.0000001 for a half width of 3.
+  // Returns the rounded number, 3, if it gives the same background, else the ratio itself.
   const double voxel = voxelSize(), ratio = static_cast<double>(grid_->grid->background()) / voxel;
   const double rounded = std::round(ratio * 1e6) / 1e6;
   return backgroundOf(rounded, voxel) == grid_->grid->background() ? rounded : ratio;
@@ -153,7 +154,7 @@ NarrowBand makeBand(FloatGrid::Ptr grid) {
 }
 
 NarrowBand importBand(FloatGrid::Ptr grid, BandRepairs* repairs) {
-  if (!grid) throw InvalidInput("there is no float grid");
+  if (!grid) throw InvalidInput("the grid pointer is null; give a float grid");
   const std::string name = grid->getName().empty() ? "(unnamed)" : grid->getName();
   if (grid->getGridClass() != openvdb::GRID_LEVEL_SET) {
     throw InvalidInput(fmt::format("grid '{}' is of class '{}', not a level set; convert it first",
@@ -162,21 +163,20 @@ NarrowBand importBand(FloatGrid::Ptr grid, BandRepairs* repairs) {
   if (!isSimilarity(grid->transform())) {
     throw InvalidInput(
         fmt::format("the transform of grid '{}' shears, mirrors or scales its axes "
-                    "differently; resample it to "
-                    "uniform voxels first",
+                    "differently; resample it to uniform voxels first",
                     name));
   }
   const float background = grid->background();
   if (!(background > 0) || !std::isfinite(background)) {
-    throw InvalidInput(
-        fmt::format("the background of grid '{}' is {}; a level set needs a "
-                    "positive, finite one",
-                    name, background));
+    throw InvalidInput(fmt::format(
+        "the background of grid '{}' is {}; write it with a positive, finite background", name,
+        background));
   }
   BandRepairs made;
   made.activeTiles = grid->tree().activeTileCount();
   grid->tree().voxelizeActiveTiles();
-  // Files with half floats round the background.
+  // Sets an inactive value to ± background. Differences below 0.1 % are not counted as repairs:
+  // files with half floats round the background.
   const auto takes = [&](float& value) {
     const float right = std::signbit(value) ? -background : background;
     made.inactiveValues += std::abs(value - right) > 1e-3f * background;
@@ -197,7 +197,8 @@ NarrowBand importBand(FloatGrid::Ptr grid, BandRepairs* repairs) {
   for (auto it = grid->tree().beginValueOff(); it; ++it) {
     if (it.getDepth() == FloatGrid::TreeType::DEPTH - 1) continue;
     if (!std::isfinite(*it)) {
-      throw InvalidInput(fmt::format("grid '{}' holds {} in a tile; repair the file", name, *it));
+      throw InvalidInput(fmt::format(
+          "grid '{}' holds {} in a tile; repair the file or write it again", name, *it));
     }
     float value = *it;
     takes(value);
@@ -209,8 +210,8 @@ NarrowBand importBand(FloatGrid::Ptr grid, BandRepairs* repairs) {
 
 openvdb::math::Transform::Ptr uniformTransform(double voxelSize) {
   using openvdb::math::UniformScaleMap;
-  // The map's constructor refuses a determinant below 3e-15. Its fields may hold any scale when
-  // they are read from a stream.
+  // The constructor of UniformScaleMap refuses a determinant below 3e-15, that is voxels below
+  // 1.4e-5. Reading its members from a stream accepts any scale.
   const double fields[] = {voxelSize, voxelSize, 1 / voxelSize, 1 / voxelSize / voxelSize,
                            1 / voxelSize / 2};
   std::stringstream stream;
@@ -225,8 +226,8 @@ openvdb::math::Transform::Ptr uniformTransform(double voxelSize) {
 float backgroundOf(double halfWidth, double voxelSize) {
   const double width = halfWidth * voxelSize;
   const auto background = static_cast<float>(width);
-  // When `width` stems from a float background, the product differs from that float only in the
-  // last bits of a double.
+  // If halfWidth was computed from a float background, `width` differs from that float only in the
+  // last bits of a double. The tolerance avoids rounding it up to the next float.
   return background < width * (1 - 1e-12) ? std::nextafter(background, INFINITY) : background;
 }
 
@@ -250,11 +251,11 @@ openvdb::CoordBBox blocksOf(const Imath::Box3d& world, const openvdb::math::Tran
 }
 
 void requireBackground(float background, double voxelSize) {
-  // A thousandth of the background must still be a normal number, so that small distances keep full
-  // precision.
+  // A thousandth of the background must still be a normal (not denormal) float, so that small
+  // distances keep full precision.
   if (background > 1000 * std::numeric_limits<float>::min() && std::isfinite(background)) return;
   throw InvalidInput(
-      fmt::format("voxels of {:.6g} are too {} for distances in single precision; change the "
+      fmt::format("the voxel size {:.6g} is too {} for distances in single precision; change the "
                   "unit of length",
                   voxelSize, background < 1 ? "small" : "large"));
 }

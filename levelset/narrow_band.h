@@ -11,26 +11,26 @@
 
 namespace levelset {
 
-struct VdbGrid;  // levelset/vdb.h, for .cpp files only
+struct VdbGrid;  // defined in levelset/vdb.h, which only .cpp files include
 
-/// Limit of the magnitude of index coordinates. The margin keeps the coordinates of the surrounding
-/// tree nodes within 32 bits.
+/// Limit of the magnitude of index coordinates. It leaves a margin to 2³¹, so that the corners of
+/// the surrounding tree nodes fit into 32 bits.
 inline constexpr double kIndexLimit = 2147483648.0 - 8192;
 
-/// Repairs that importBand made to turn an external grid into a band.
+/// Number of values that importBand changed to turn an external grid into a band.
 struct BandRepairs {
-  std::uint64_t activeTiles = 0;     ///< active tiles that were split into voxels
-  std::uint64_t inactiveValues = 0;  ///< inactive values other than ± background, set to it by
-                                     ///< their sign
+  std::uint64_t activeTiles = 0;  ///< active tiles that were split into voxels
+  /// Inactive values that were not ± background and were set to it by their sign.
+  std::uint64_t inactiveValues = 0;
 };
 
 /// A solid as a signed distance field in a narrow band on a sparse grid. Values are `float` in
 /// world units, negative inside, with |∇φ| ≈ 1 in the band and ± background elsewhere.
 ///
-/// The class has value semantics. Copies are cheap: they share one const grid, and an edit of one
-/// copy does not affect the others. Grid points lie at integer index coordinates. The transform to
-/// world space is a rotation, a uniform scale and a translation. The bits of the tree do not depend
-/// on the number of threads.
+/// The class has value semantics. Copies are cheap: they share one grid, which is copied before one
+/// of them changes it. Grid points lie at integer index coordinates. The transform to world space
+/// is a rotation, a uniform scale and a translation. Operators compute the same bits with any
+/// number of threads.
 class NarrowBand {
  public:
   NarrowBand() = default;
@@ -47,16 +47,16 @@ class NarrowBand {
   [[nodiscard]] std::size_t memoryUse() const;
   /// Transform from index to world space. Imath multiplies row vectors: `world = index * matrix`.
   [[nodiscard]] Imath::M44d indexToWorld() const;
-  /// World-space box of the sign changes between neighbouring grid points, located by linear
-  /// interpolation. Empty when there are none.
+  /// Bounds of the zero set, world units: box of all sign changes between neighbouring grid points,
+  /// located by linear interpolation. Empty when there are none.
   [[nodiscard]] Imath::Box3d zeroSetBounds() const;
-  /// Returns true for the band of a surface with a border (surfaceBand). The band ends at the
+  /// Returns true for the band of an open surface, as surfaceBand() computes it from a mesh with a
   /// border. Such a surface has two sides and no inside: it can be the base of patches but is no
   /// solid.
   [[nodiscard]] bool isOpenSurface() const;
-  /// Name of the grid, where the band comes from a file that gives one.
+  /// Name of the grid in the file that the band was read from. Empty if it has none.
   [[nodiscard]] std::string name() const;
-  /// Hash of transform, topology and values. Equal trees have equal hashes, whichever operator
+  /// Hash of transform, topology and values. Equal grids have equal hashes, whichever operator
   /// computed them.
   [[nodiscard]] std::uint64_t contentHash() const;
 
@@ -69,7 +69,7 @@ class NarrowBand {
   std::shared_ptr<VdbGrid> grid_;
 };
 
-/// Unbounded region.
+/// Unbounded region in world space.
 inline const Imath::Box3d kEverywhere{Imath::V3d{Imath::V3d::baseTypeLowest()},
                                       Imath::V3d{Imath::V3d::baseTypeMax()}};
 [[nodiscard]] inline bool isEverywhere(const Imath::Box3d& region) {

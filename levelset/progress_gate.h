@@ -8,13 +8,15 @@
 
 namespace levelset {
 
-/// Lets parallel tasks report progress. Calls come one at a time with a fraction that never
-/// decreases, and no task waits for another (internal).
+/// Lets parallel tasks report progress to one callback. Only one thread at a time calls it, with a
+/// fraction that never decreases. A task skips its report while another one reports, so no task
+/// waits. Internal.
 class ProgressGate {
  public:
   ProgressGate(const Progress& progress, std::size_t total)
       : progress_(progress), total_(static_cast<double>(total ? total : 1)), action_() {}
 
+  /// Adds finished items to the count and reports the fraction of `total`.
   /// @throws Cancelled
   void advance(std::size_t count) {
     done_.fetch_add(count, std::memory_order_relaxed);

@@ -10,10 +10,12 @@
 
 namespace levelset {
 
-/// Part of a band that its consumers read: a half width and a box.
+/// Part of a band that the following operators read: a half width and a box. Only this part is
+/// computed.
 struct RegionOfInterest {
-  double halfWidth = std::numeric_limits<double>::infinity();  ///< voxels
-  Imath::Box3d region = kEverywhere;                           ///< world units
+  /// Half width, voxels. Infinite: the complete band.
+  double halfWidth = std::numeric_limits<double>::infinity();
+  Imath::Box3d region = kEverywhere;  ///< box, world units
 
   [[nodiscard]] bool isWhole() const { return std::isinf(halfWidth) && isEverywhere(region); }
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// Content hashes of trees. Includes OpenVDB, so include it from .cpp files only.
+// Hashes of the contents of grids. Includes OpenVDB, so include it from .cpp files only.
 
 #include <algorithm>
 #include <cstdint>
@@ -28,13 +28,13 @@ template <typename T>
   return hash;
 }
 
-/// Hash of transform, background, topology and values.
+/// Returns a hash of the transform, background, topology and values of a grid.
 template <typename GridT>
 [[nodiscard]] std::uint64_t gridHash(const GridT& grid) {
   using Leaf = typename GridT::TreeType::LeafNodeType;
   std::uint64_t hash = 0x4c4556454c534d54ull;
-  // The transform enters through the images of four points, because OpenVDB computes no matrix for
-  // small voxels.
+  // Hashes the transform as the images of four points, because OpenVDB refuses to compute the
+  // matrix for small voxels.
   for (int corner = 0; corner < 4; ++corner) {
     openvdb::Vec3d point(0);
     if (corner > 0) point[corner - 1] = 1;
@@ -49,7 +49,7 @@ template <typename GridT>
     hash = mixBytes(hash, &leaf->valueMask(), 1);
     hash = mixBytes(hash, leaf->buffer().data(), Leaf::SIZE);
   }
-  // Tiles carry the sign outside the band.
+  // Tile values: outside the band they give the sign.
   auto it = grid.tree().cbeginValueAll();
   it.setMaxDepth(decltype(it)::LEAF_DEPTH - 1);
   for (; it; ++it) {

@@ -1,7 +1,7 @@
 #pragma once
 
-// The only header that includes OpenVDB. Include it from .cpp files only: it takes three seconds to
-// compile.
+// Access to the OpenVDB grid behind a band. Include it from .cpp files only: OpenVDB's headers take
+// three seconds to compile.
 
 #include <openvdb/openvdb.h>
 
@@ -11,8 +11,9 @@ namespace levelset {
 
 struct VdbGrid {
   openvdb::FloatGrid::Ptr grid;
-  /// For an open surface: distance beyond the border, in voxels, of the closest point on the
-  /// surface's straight extension. Active where the band belongs to the extension.
+  /// Null for a solid. An open surface is extended straight beyond its border, so that the band
+  /// does not end at the border. The tree is active at grid points whose closest point lies on that
+  /// extension. Its value is the distance of that point from the border, in voxels.
   std::shared_ptr<const openvdb::FloatTree> beyond = {};
 };
 
@@ -20,27 +21,28 @@ struct VdbAccess {
   static std::shared_ptr<VdbGrid>& slot(NarrowBand& band) { return band.grid_; }
 };
 
-/// The grid behind a band, read-only. @pre the band is not default constructed
+/// Returns the grid of a band, read-only.
+/// @pre the band is not default constructed
 [[nodiscard]] inline const openvdb::FloatGrid& vdb(const NarrowBand& band) {
   return *band.shared()->grid;
 }
 
-/// The grid behind a band, for editing. Copies it first when another band shares it.
+/// Returns the grid of a band, for editing. Copies the grid first when another band shares it.
 [[nodiscard]] openvdb::FloatGrid& editVdb(NarrowBand& band);
 
-/// Makes a band of a grid that fulfils the invariants of a band: class level set, background > 0,
-/// no active tiles, inactive values ± background. Debug builds assert them; nothing else checks
-/// them.
+/// Makes a band of a grid and sets its class to level set. The grid must fulfil the invariants of a
+/// band: background > 0, a transform of rotation, uniform scale and translation, no active tiles,
+/// inactive values ± background. Debug builds assert the first two; the others are not checked.
 [[nodiscard]] NarrowBand makeBand(openvdb::FloatGrid::Ptr grid);
 
 /// Makes the band of an open surface, as makeBand does.
-/// @param beyond  as in VdbGrid, with background 0
+/// @param beyond  see VdbGrid; its background is 0
 [[nodiscard]] NarrowBand makeOpenBand(openvdb::FloatGrid::Ptr grid,
                                       std::shared_ptr<const openvdb::FloatTree> beyond);
 
 /// Checks the invariants of an external grid and makes a band of it. Splits active tiles into
-/// voxels and sets inactive values to ± background by their sign. Counts both in `repairs` if
-/// given.
+/// voxels and sets inactive values to ± background by their sign. Writes the numbers of both to
+/// `repairs` unless it is null.
 /// @throws InvalidInput for NaN or infinite values, a background ≤ 0, a class other than level set,
 ///         or a transform that is not a rotation, uniform scale and translation
 [[nodiscard]] NarrowBand importBand(openvdb::FloatGrid::Ptr grid, BandRepairs* repairs = nullptr);
@@ -52,25 +54,28 @@ struct VdbAccess {
   return {v.x, v.y, v.z};
 }
 
-/// Axis-aligned transform: world = voxelSize × index.
+/// Returns the axis-aligned transform world = voxelSize × index.
 [[nodiscard]] openvdb::math::Transform::Ptr uniformTransform(double voxelSize);
 
-/// halfWidth × voxelSize, rounded up. Rounding down would turn a band of 3 voxels into one of
-/// 2.9999999, which OpenVDB's own check refuses. All bands take their background from here, because
-/// their widths must agree to the bit. `NarrowBand::halfWidth` returns a number that gives the same
-/// background again.
+/// Returns the background of a band: halfWidth × voxelSize, rounded up to a float. Rounding down
+/// would turn a half width of 3 voxels into 2.9999999, which OpenVDB's own check refuses. All bands
+/// get their background from this function, because equal half widths must give equal bits.
+/// NarrowBand::halfWidth() returns a number that gives the same background again.
 [[nodiscard]] float backgroundOf(double halfWidth, double voxelSize);
 
 /// Checks that distances up to `background` fit into single precision.
-/// @throws InvalidInput when they leave the range of `float`
+/// @throws InvalidInput when the background overflows `float`, or a thousandth of it underflows
 void requireBackground(float background, double voxelSize);
 
-/// Index box of the 8³ blocks of grid points that meet a world box, clamped to the index range. It
-/// runs from the lowest point of the first block to the highest point of the last.
+/// Returns the index box of all blocks (8³ grid points) that intersect a world box, clamped to the
+/// index range. Its corners are the lowest grid point of the first block and the highest of the
+/// last.
 [[nodiscard]] openvdb::CoordBBox blocksOf(const Imath::Box3d& world,
                                           const openvdb::math::Transform& transform);
 
-/// Empty level-set grid with that transform and the background halfWidth × voxelSize.
+/// Returns an empty level-set grid with the given transform and the background halfWidth ×
+/// voxelSize.
+/// @throws InvalidInput when the background does not fit into `float`, see requireBackground()
 [[nodiscard]] openvdb::FloatGrid::Ptr emptyLevelSet(openvdb::math::Transform::Ptr transform,
                                                     double halfWidth);
 
