@@ -55,7 +55,7 @@ Camera::Ray Camera::ray(double x, double y) const {
       axes.right * ((2 * x / width - 1) * half.x) + axes.up * ((1 - 2 * y / height) * half.y);
   const double end = farthest();
   if (orthoHeight) return {from + shift, axes.forward, near, end};
-  const V3d along = axes.forward + shift;  // a step of 1 in depth
+  const V3d along = axes.forward + shift;  // its depth increases by 1
   return {from, along.normalized(), near * along.length(), far ? end * along.length() : end};
 }
 
@@ -142,7 +142,8 @@ void validate(const Camera& camera) {
 
 namespace {
 
-/// Rotates the default view, whose up vector is y, to another up vector.
+/// Direction from the target to the camera in the default view, rotated from the up vector y to
+/// `up`.
 V3d viewFrom(const V3d& up) {
   const V3d view(0.45, 0.35, 1);
   const double length = up.length();
@@ -151,7 +152,8 @@ V3d viewFrom(const V3d& up) {
         "camera: the vector up is zero or not finite; give for example 0,1,0");
   const V3d y = up / length;
   if (y == V3d(0, 1, 0)) return view;
-  // The front is z, made perpendicular to `up`; where up is z, -y is the front.
+  // The front direction is z, made perpendicular to `up`. If `up` is close to z, the front is -y;
+  // close to -z, it is y.
   const V3d front = std::abs(y.z) < 0.9 ? V3d(0, 0, 1) : V3d(0, y.z > 0 ? -1 : 1, 0);
   const V3d x = y.cross(front).normalized();
   return x * view.x + y * view.y + x.cross(y) * view.z;
@@ -175,8 +177,8 @@ Camera framingCamera(const Imath::Box3d& bounds, int width, int height, double v
   validate(camera);
 
   // Consider a camera at distance `back` from the target, shifted by s along an image axis. It sees
-  // a corner at (x, y, depth) when |x - s| <= k (back + depth). This is linear in s and back, so
-  // each axis has a closed form.
+  // a box corner with coordinate x on that axis, `depth` behind the target, when |x - s| <= k (back
+  // + depth). This is linear in s and back, so each axis has a closed form.
   const CameraAxes axes = axesOf(camera);
   const double half[2] = {halfExtentOf(camera).x, halfExtentOf(camera).y};
   constexpr double kMargin = 0.94;  // share of the picture that the box fills

@@ -10,11 +10,12 @@ namespace render {
 
 /// A camera that looks from one point at another, in perspective or orthographic projection.
 struct Camera {
-  static constexpr double kNoDepth = 1e300;  ///< larger than every depth
+  static constexpr double kNoDepth =
+      1e300;  ///< stands for an unlimited depth; larger than every depth of a surface
   Imath::V3d from{0, 0, 5}, to{0, 0, 0}, up{0, 1, 0};
   double verticalFov = 0.6108652381980153;  ///< radians, (0, π)
   std::optional<double> orthoHeight = {};   ///< world units; set: orthographic projection
-  /// Depth range that the camera sees, world units along the view axis. `near` is at least 0, `far`
+  /// Visible depth range, world units along the view axis. `near` is at least 0, `far`
   /// is above `near` or unset (no end). Surfaces outside the range are invisible but still cast
   /// shadows.
   double near = 0;
@@ -31,8 +32,8 @@ struct Camera {
   [[nodiscard]] double farthest() const { return far.value_or(kNoDepth); }
   /// Unit view axis, towards `to`.
   [[nodiscard]] Imath::V3d axis() const;
-  /// World-space vectors from one pixel to the next one to the right and to the next one below. In
-  /// perspective they are measured on the plane at unit depth, otherwise in world units.
+  /// World-space vectors from one pixel to the next pixel to the right and to the next pixel below.
+  /// In perspective they are measured on the plane at unit depth, otherwise in world units.
   struct PixelSteps {
     Imath::V3d right, down;
   };
@@ -55,8 +56,8 @@ inline constexpr double kMaxPixels = 268435456;  // 2^28
 /// @throws levelset::ResourceLimit for more than kMaxPixels pixels
 void validate(const Camera& camera);
 
-/// Camera that just frames the box, at any aspect ratio. It looks from the upper right front, where
-/// `up` points upwards.
+/// Camera that frames the box, for any ratio of width to height. It looks from the upper right
+/// front; `up` is the upward direction.
 /// @throws levelset::UsageError when the box is empty, and as validate()
 [[nodiscard]] Camera framingCamera(const Imath::Box3d& bounds, int width, int height,
                                    double verticalFov = 0.6108652381980153,

@@ -16,15 +16,15 @@ namespace {
 using openvdb::Coord;
 
 constexpr std::size_t kEntriesOfPage = 3 * BrickPool::kBlocksOfPage;
-constexpr int kMostEmptyPages = 1 << 10;  // limit of the edge of an empty cube, pages
+constexpr int kMostEmptyPages = 1 << 10;  // largest edge of an empty cube, pages
 // At this distance from the table's corner, single precision resolves positions to 5e-4 voxels.
-constexpr double kWidest = 8192;  // voxels
+constexpr double kWidest = 8192;  // largest extent of a surface along an axis, voxels
 constexpr std::size_t kMostValues = std::numeric_limits<std::int32_t>::max();
 
 /// Writes the edges of the largest aligned empty cubes into the empty items of a cubic table.
 /// @param size  number of items along each axis
-/// @param isEmpty  tests the item with a number
-/// @param set  stores the edge of the cube for an item
+/// @param isEmpty  returns true when the item with a given number is empty
+/// @param set  stores the edge of the cube, in items, for the item with a given number
 template <typename IsEmpty, typename Set>
 void markEmpty(const std::array<int, 3>& size, int most, const IsEmpty& isEmpty, const Set& set) {
   const auto number = [&](const std::array<int, 3>& size_, int x, int y, int z) {
@@ -33,7 +33,8 @@ void markEmpty(const std::array<int, 3>& size, int most, const IsEmpty& isEmpty,
                static_cast<std::size_t>(size_[2]) +
            static_cast<std::size_t>(z);
   };
-  // Build a pyramid of flags, finest level first: true where everything below is empty.
+  // Build a pyramid of flags, finest level first. A flag is true when all items that it covers are
+  // empty.
   std::vector<std::array<int, 3>> sizes{size};
   std::vector<std::vector<char>> levels(1);
   levels[0].resize(number(size, size[0] - 1, size[1] - 1, size[2] - 1) + 1);
@@ -73,7 +74,8 @@ class Table {
     for (const int n : pool.pages) count *= static_cast<std::size_t>(n);
     pool.page.assign(count, -BrickPool::kPage);
   }
-  /// Position of the block's entry. Adds the page if it is missing.
+  /// Position in `entry` of the block's item of list 1. Adds the lists of the page if they are
+  /// missing.
   std::size_t slotOf(const Coord& origin) {
     std::size_t page = 0, block = 0;
     for (int a = 0; a < 3; ++a) {
@@ -87,8 +89,8 @@ class Table {
     if (first < 0) {
       if (pool_.entry.size() > kMostValues - kEntriesOfPage)
         throw levelset::ResourceLimit(
-            "the surface is spread over more table pages than an index can address; use "
-            "larger voxels, or draw its parts separately");
+            "the surface occupies more table pages than a 32-bit index can address; use larger "
+            "voxels, or draw its parts separately");
       first = static_cast<std::int32_t>(pool_.entry.size());
       pool_.entry.resize(pool_.entry.size() + BrickPool::kBlocksOfPage, -BrickPool::kBlock);
       pool_.entry.resize(pool_.entry.size() + kEntriesOfPage - BrickPool::kBlocksOfPage, 0);
@@ -162,7 +164,7 @@ void fillPool(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks
   pool.value.insert(pool.value.end(), BrickPool::kBlock, -background);
 }
 
-/// Converts the values to codes.
+/// Replaces the values of the pool by codes of the quantization `held`.
 void encode(BrickPool& pool, const ValueBits& held) {
   pool.quantization = held;
   const auto size = static_cast<std::size_t>(held.bits / 8);
@@ -175,7 +177,8 @@ void encode(BrickPool& pool, const ValueBits& held) {
   pool.value = {};
 }
 
-/// Checks the extent of the surface. @param crossed  box of the origins of the bricks
+/// Checks that the surface spans at most kWidest voxels. @param crossed  box of the origins of the
+/// crossed blocks
 void requireNarrow(const openvdb::CoordBBox& crossed) {
   std::array<double, 3> spans{};
   for (int a = 0; a < 3; ++a)

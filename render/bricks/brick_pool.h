@@ -14,56 +14,62 @@
 
 namespace render {
 
-/// The values of a band that rays read, and a table that finds them. It holds the blocks of 8³
-/// cells that the surface crosses. Of neighbouring blocks it holds the points that stencils for the
-/// curvature read. The members are plain arrays, as they are uploaded to the GPU.
+/// Values of a band that the kernel's rays read, and a two-level table that finds them by position.
+/// The pool holds all values of the blocks of 8³ cells that the surface crosses (bricks). Of their
+/// neighbours (halo blocks) it holds only the points that curvature stencils read. The members are
+/// plain arrays, so that they can be uploaded to the GPU.
 ///
 /// Positions are in table space: the band's index space minus `origin`. Blocks, pages of 8³ blocks
-/// and empty cubes are aligned in it.
+/// and empty cubes start at multiples of their edge there.
 struct BrickPool {
   static constexpr int kBlock = 8;  ///< cells of a block along an axis
   static constexpr int kEdge =
-      kBlock + 1;  ///< points of a brick along an axis, with those of the last face
+      kBlock + 1;  ///< grid points of a brick along an axis, with those of its last face
   static constexpr int kValues = kEdge * kEdge * kEdge;
-  static constexpr int kMaskWords = 16;  ///< words of 32 bits
-  static constexpr int kPage = 64;       ///< cells of a page along an axis
+  static constexpr int kMaskWords =
+      16;  ///< 32-bit words of a brick's mask, which has a bit for each cell
+  static constexpr int kPage = 64;  ///< cells along an axis of a page, which has 8³ blocks
   static constexpr int kBlocksOfPage = 512;
-  /// Offsets from a block's entry to the position of its values, and to their strides.
+  /// Offsets in `entry` from a block's item of list 1 to its items of list 2 and of list 3.
   static constexpr int kFirstOfEntry = kBlocksOfPage, kStridesOfEntry = 2 * kBlocksOfPage;
-  static constexpr std::size_t kCodePadding = 4;  ///< bytes after the last code
-  static constexpr int kStrideShift = 8;          ///< the stride along x stands above that along y
+  static constexpr std::size_t kCodePadding = 4;  ///< padding after the last value in `code`, bytes
+  static constexpr int kStrideShift =
+      8;  ///< list 3 packs (stride along x) << kStrideShift | (stride along y)
 
   Filter filter = Filter::Trilinear;
   ValueBits quantization = {};
-  std::array<int, 3> origin{};  ///< index of the point at (0, 0, 0)
-  std::array<int, 3> pages{};   ///< number along each axis
-  /// By x, y, z of the page: position of its entries. Negative: minus the edge of an empty cube of
-  /// cells that contains the page.
+  std::array<int, 3> origin{};  ///< position (0, 0, 0) of table space, in the band's index space
+  std::array<int, 3> pages{};   ///< number of pages along each axis
+  /// An item for each page, ordered by x, y, z: position of the page's lists in `entry`. An empty
+  /// page has a negative item: minus the edge, in cells, of an aligned empty cube that contains the
+  /// page.
   std::vector<std::int32_t> page;
-  /// Three lists of kBlocksOfPage for each page, by x, y, z of the block.
+  /// Three lists of kBlocksOfPage items for each page that is not empty, ordered by x, y, z of the
+  /// block.
   /// 1. Number of the brick for a block that the surface crosses; otherwise negative, as in `page`.
   /// 2. Position of the value of the block's first point, for each block that a stencil reads. For
   /// blocks other than bricks only a box of points is stored, so that first point may lie outside
   /// it.
   /// 3. Strides of the block's values along x and y. They are 0 where all values are equal.
   std::vector<std::int32_t> entry;
-  /// kMaskWords for each brick. Bit 64x + 8y + z is set where the corners of the cell differ in
-  /// sign, or where the bounds of the spline do.
+  /// kMaskWords words for each brick. Bit 64x + 8y + z is set when the surface may cross cell (x,
+  /// y, z): its corners differ in sign, or, for a spline filter, bounds on the spline do.
   std::vector<std::uint32_t> mask;
-  /// φ in the band's unit, or the spline's coefficients, by x, y, z. First kValues for each brick,
-  /// then the boxes of the halo blocks. Two rows follow, of values far outside and far inside.
+  /// φ or the spline's coefficients, world units, ordered by x, y, z. First kValues values for each
+  /// brick, then the stored box of each halo block. The last kBlock + kBlock values are the
+  /// background far outside and far inside.
   std::vector<float> value;
   /// Replaces `value` when values are quantized: little-endian codes, followed by padding so that a
   /// 32-bit load of the last code stays in bounds.
   std::vector<std::uint8_t> code;
-  /// Range of points of the blocks that the surface crosses, in table space.
+  /// Range of the grid points of the blocks that the surface crosses, in table space.
   std::array<int, 3> low{}, high{};
-  /// Range of the cells that the surface crosses.
+  /// Range of the cells that the surface crosses, in table space; the upper end is exclusive.
   std::array<int, 3> cellsLow{}, cellsHigh{};
 
-  std::size_t haloCount = 0;      ///< neighbouring blocks with some stored points
-  std::size_t blocksOmitted = 0;  ///< leaves of the band without stored points
-  std::size_t blocksCulled = 0;   ///< crossed blocks that the picture does not need
+  std::size_t haloCount = 0;      ///< halo blocks with stored points
+  std::size_t blocksOmitted = 0;  ///< leaf nodes of the band of which no point is stored
+  std::size_t blocksCulled = 0;   ///< blocks that the surface crosses but the picture does not need
   [[nodiscard]] std::size_t brickCount() const { return mask.size() / kMaskWords; }
   [[nodiscard]] std::size_t valueBytes() const {
     return code.empty() ? value.size() * sizeof value[0] : code.size() - kCodePadding;
@@ -74,9 +80,10 @@ struct BrickPool {
 /// Options of makeBricks().
 struct TableOptions {
   Filter filter = Filter::Trilinear;
-  ValueBits quantization =
-      {};  ///< @pre the values are multiples of its step, as are the coefficients of a spline
-  /// Returns false for balls in index space that may be culled. Empty: nothing is culled.
+  ValueBits quantization = {};  ///< storage of the values; @pre all values, or coefficients of a
+                                ///< spline, are quantized values of it
+  /// Returns false for a ball in index space that the picture does not need. Blocks in such balls
+  /// are culled. Empty: no block is culled.
   std::function<bool(const Imath::V3d& centre, double radius)> keeps = {};
 };
 

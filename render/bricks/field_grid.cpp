@@ -18,11 +18,12 @@ using Imath::M44d;
 using Imath::V3d;
 using openvdb::Coord;
 
-constexpr double kWidestField = 1 << 14;  // voxels; gives 2^24 pages in the table
+constexpr double kWidestField =
+    1 << 14;  // largest extent along an axis, voxels; then the table has 2^24 pages
 constexpr int kPageCells = 64;
 
-/// Origins of the blocks with cells that are not constant. A leaf also has cells in the seven
-/// blocks below it.
+/// Origins of the blocks with cells in which the field may vary. A cell belongs to the block of its
+/// lowest corner, so values of a leaf also affect the seven blocks before it along the axes.
 std::vector<Coord> blockOrigins(const openvdb::FloatTree& tree) {
   std::vector<Coord> origins;
   for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
@@ -33,17 +34,17 @@ std::vector<Coord> blockOrigins(const openvdb::FloatTree& tree) {
   return origins;
 }
 
-/// Reads the values of the block's points, from up to eight leaves.
+/// Copies the values of the 9³ points of a block, which lie in up to eight leaves, to `to`.
 void readBlock(const openvdb::FloatTree& tree, const Coord& origin, float* to) {
   static_assert(FieldGrid::kPoints == 8 + 1);
   openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> accessor(tree);
   levelset::copyPaddedLeaf(accessor, origin, 0, 1, to);
 }
 
-/// Weights of six points around a cell, starting two points before its lowest corner, for a
-/// function along one axis at a in [0, 1] of the cell. `own` gives the uniform cubic B-spline with
-/// the function values as coefficients, `bent` the one with their second differences. Each has the
-/// first and second derivatives.
+/// Weights along one axis of the six points around a cell, starting two points before its lowest
+/// corner. They evaluate a spline at the fraction a in [0, 1] of the cell. `own` gives the uniform
+/// cubic B-spline with the function values as coefficients, `bent` the one with their second
+/// differences as coefficients. Row d holds the weights of the derivative of order d.
 struct SplineTaps {
   double own[3][6] = {}, bent[3][6] = {};
 
@@ -71,9 +72,9 @@ double applied(const double (&taps)[6], const double* to, int stride) {
 
 using FieldWindow = FieldGrid::FieldWindow;
 
-/// Computes the derivatives of order p, q, r of Σ (f − ∇²f/6) B, one axis at a time. `own` holds
-/// the spline over the axes done so far, `bent` the sum in which one of these axes uses second
-/// differences.
+/// Computes the derivatives sum[p][q][r] of order p, q, r along x, y, z of the spline Σ (f − ∇²f/6)
+/// B, one axis at a time. `own` holds the spline over the axes done so far, `bent` the sum in which
+/// one of these axes uses second differences.
 void splineDerivatives(const FieldWindow& f, const V3d& a, double (&sum)[3][3][3]) {
   const SplineTaps tx(a.x), ty(a.y), tz(a.z);
   double own[6][6][3], bent[6][6][3];  // indexed by x, y and order along z
@@ -96,7 +97,8 @@ void splineDerivatives(const FieldWindow& f, const V3d& a, double (&sum)[3][3][3
     }
 }
 
-/// Bound on |trilinear − smooth|, from the second differences at the cell's corners.
+/// Bound on the difference between the trilinear interpolant and a smooth function in the cell,
+/// from the second differences at its corners.
 double interpolationErrorOf(const FieldWindow& f) {
   double error = 0;
   for (int x = 2; x < 4; ++x)
@@ -110,7 +112,8 @@ double interpolationErrorOf(const FieldWindow& f) {
   return error / 8;
 }
 
-/// Value and gradient of the trilinear interpolant.
+/// Value and gradient, per voxel, of the trilinear interpolant. @param a  position in the cell,
+/// each in [0, 1]
 double interpolate(const FieldWindow& f, const V3d& a, V3d& gradient) {
   const auto mix = [](double u, double v, double share) { return u + (v - u) * share; };
   double face[2], alongZ[2], alongY[2];
@@ -215,7 +218,7 @@ Imath::Box3d FieldGrid::worldBox() const {
 
 void FieldGrid::read(const std::array<int, 3>& low, FieldWindow& window) const {
   constexpr int kWindow = 6;
-  // Read block by block: a window overlaps at most two blocks along an axis.
+  // Read block by block: the window of six points overlaps at most two blocks along an axis.
   for (int n = 0; n < 8; ++n) {
     int at[3], from[3], end[3];
     bool isEmpty = false, isBeyond = false;

@@ -20,11 +20,11 @@ class FieldGrid {
  public:
   static constexpr int kEdge = 8;  ///< cells of a block along an axis
   static constexpr int kPoints =
-      9;  ///< points of a block along an axis, with those of the last face
+      9;  ///< grid points of a block along an axis, with those of its last face
   struct Range {
     double low, high;
   };
-  /// Values around a cell, starting two points before its lowest corner.
+  /// Values at the 6³ grid points around a cell, starting two points before its lowest corner.
   using FieldWindow = double[6][6][6];
 
   /// Upper bound on the memory of a band's blocks, bytes.
@@ -33,7 +33,7 @@ class FieldGrid {
   /// @throws levelset::ResourceLimit for a band that spans more than the table can hold
   explicit FieldGrid(const levelset::NarrowBand& band);
 
-  /// Reads the band's transform again. Returns true when it has changed.
+  /// Takes over the transform of the band. Returns true when it differs from the previous one.
   /// @pre the band has the values that this grid was built from
   bool updateTransform(const levelset::NarrowBand& band);
 
@@ -46,24 +46,27 @@ class FieldGrid {
   [[nodiscard]] std::size_t bytes() const;
   [[nodiscard]] Imath::Box3d worldBox() const;
 
-  /// Number of a block within size(); negative where the field is constant.
+  /// Number of the block at (x, y, z), counted in blocks and within size(); negative when the field
+  /// is constant in the block.
   [[nodiscard]] int block(int x, int y, int z) const {
     const int entries =
         page_[static_cast<std::size_t>(((x >> 3) * pages_[1] + (y >> 3)) * pages_[2] + (z >> 3))];
     if (entries < 0) return entries;
     return entry_[static_cast<std::size_t>(entries + ((x & 7) << 6 | (y & 7) << 3 | (z & 7)))];
   }
-  /// Range of the values in such a block.
+  /// Range of the values in a block, world units. @param block  number from block(), which may be
+  /// negative
   [[nodiscard]] Range range(int block) const {
     if (block < 0) return {constant(block), constant(block)};
     return ranges_[static_cast<std::size_t>(block)];
   }
-  /// Values of a block, by x, y, z, kPoints along each axis.
+  /// Values of a block ordered by x, y, z, kPoints along each axis, world units. @pre `block` is
+  /// not negative
   [[nodiscard]] const float* values(int block) const {
     return values_.data() + static_cast<std::size_t>(block) * kValues;
   }
-  /// Value and derivatives at a world position: those of the trilinear interpolant and those of the
-  /// quasi-interpolating tricubic B-spline.
+  /// Value and gradient of the trilinear interpolant at a world position, and first and second
+  /// derivatives of the quasi-interpolating tricubic B-spline there.
   [[nodiscard]] FieldShape shapeAt(const Imath::V3d& world) const;
 
  private:
@@ -74,11 +77,11 @@ class FieldGrid {
   }
   void read(const std::array<int, 3>& low, FieldWindow& window) const;
 
-  double background_ = 0;  // world units, as the values
+  double background_ = 0;  // |φ| outside the band, world units
   Imath::V3d corner_;      // corner of the table, in the band's index space
   std::array<int, 3> size_{}, pages_{};
-  // Same layout as in BrickPool: position of a page's entries, or the constant of the entire page;
-  // and numbers of blocks.
+  // Two-level table with pages of 8³ blocks. page_: position of the page's items in entry_; entry_:
+  // number of the block. kOutside or kInside marks a page or block with a constant field.
   std::vector<std::int32_t> page_, entry_;
   std::vector<Range> ranges_;
   std::vector<float> values_;

@@ -21,8 +21,8 @@ using Leaf = openvdb::FloatTree::LeafNodeType;
 
 constexpr int kBlock = BrickPool::kBlock;
 
-/// Origins of the blocks that may hold a crossed cell: leaves, and the blocks before them, whose
-/// last cells have corners in the leaves. Each origin appears once, in no particular order.
+/// Origins of the blocks that may hold a crossed cell: the leaves, and the blocks before them along
+/// the axes, whose last cells have corners in the leaves. Sorted, without duplicates.
 std::vector<Coord> blocksOf(const openvdb::FloatTree& tree) {
   std::vector<Coord> blocks;
   blocks.reserve(tree.leafCount() * 2);
@@ -35,8 +35,8 @@ std::vector<Coord> blocksOf(const openvdb::FloatTree& tree) {
   return blocks;
 }
 
-/// Fills in the values of the 9³ points from a block's origin on, from up to eight leaves. Returns
-/// true when they differ in sign.
+/// Copies the values of the 9³ points from a block's origin on, which lie in up to eight leaves.
+/// Returns true when they differ in sign.
 template <typename Accessor>
 bool fill(const Accessor& accessor, Brick& brick) {
   static_assert(BrickPool::kEdge == kBlock + 1);
@@ -46,14 +46,14 @@ bool fill(const Accessor& accessor, Brick& brick) {
   return anyInside && anyOutside;
 }
 
-/// Marks the cells whose corners differ in sign.
+/// Sets the mask bits of the cells whose corners differ in sign.
 void findCrossings(Brick& brick) {
   constexpr int kEdge = BrickPool::kEdge;
   brick.mask = {};
   for (int x = 0; x < kBlock; ++x)
     for (int y = 0; y < kBlock; ++y) {
-      // Bit z of `all` and `any`: all or any of the four points at z of this column of cells are
-      // inside.
+      // Bit z of `all` and of `any`: all, or any, of the four points at height z of the column of
+      // cells (x, y) are inside.
       unsigned all = 0, any = 0;
       for (int z = 0; z < kEdge; ++z) {
         const auto isInside = [&](int i, int j) {
@@ -69,7 +69,7 @@ void findCrossings(Brick& brick) {
     }
 }
 
-/// Coefficients that the cells of a block read, starting one point before its origin.
+/// Spline coefficients that the cells of a block read, starting one point before its origin.
 struct SplineBlock {
   static constexpr int kAround = kBlock + 3;
   float c[kAround][kAround][kAround];
@@ -80,7 +80,7 @@ struct SplineBlock {
   }
 
   using SignRows = std::array<std::array<unsigned, kAround>, kAround>;
-  /// Sign rows: bit z of row (x, y) is set where the coefficient is negative.
+  /// Signs of the coefficients: bit z of rows[x][y] is set when c[x][y][z] is negative.
   [[nodiscard]] SignRows signRows() const {
     SignRows rows;
     for (std::size_t x = 0; x < kAround; ++x)
@@ -92,8 +92,8 @@ struct SplineBlock {
     return rows;
   }
 
-  /// Bit z is set where the coefficients of cell (x, y, z) differ in sign. In other cells the
-  /// spline has no zero, because its values lie between the coefficients.
+  /// Row of cells (x, y) as bits: bit z is set when the coefficients of cell (x, y, z) differ in
+  /// sign. In other cells the spline has no zero, because its values lie between the coefficients.
   [[nodiscard]] static unsigned mixedCells(const SignRows& rows, std::size_t x, std::size_t y) {
     unsigned any = 0, all = ~0u;
     for (std::size_t i = x; i < x + 4; ++i)
@@ -106,12 +106,13 @@ struct SplineBlock {
     return (any | any >> 2) & ~(all & all >> 2) & 0xff;
   }
 
-  /// Bit z is set where the value of the spline in the middle of cell (x, y, z) does not exceed its
-  /// slope bound, so a zero is possible. Processes a row along z at once.
+  /// Row of cells (x, y) as bits: bit z is set when a zero of the spline in cell (x, y, z) is
+  /// possible. That is when the value in the cell's middle does not exceed the bound on its change
+  /// within the cell.
   [[nodiscard]] unsigned openCells(int x, int y) const {
     constexpr float kMiddle[4] = {1.0f / 48, 23.0f / 48, 23.0f / 48, 1.0f / 48};
     constexpr float kRoom =
-        1e-5f;  // relative to the largest coefficient: margin for single-precision rounding
+        1e-5f;  // margin for single-precision rounding, relative to the largest coefficient
     Row middle{}, most{}, slopeX{}, slopeY{}, slopeZ{};  // one entry for each z
     const auto widen = [](float& to, float v) { to = std::max(to, v); };
     for (int i = 0; i < 4; ++i)
@@ -149,7 +150,7 @@ struct SplineBlock {
   }
 };
 
-/// Marks the cells in which the spline may cross zero.
+/// Sets the mask bits of the cells in which the spline may cross zero.
 template <typename Accessor>
 void findSplineCrossings(const Accessor& accessor, Brick& brick) {
   const SplineBlock block(accessor, brick.origin);
@@ -165,7 +166,8 @@ void findSplineCrossings(const Accessor& accessor, Brick& brick) {
     }
 }
 
-/// Calls work(first, last) for each row of cells along z, with its first and its last crossed cell.
+/// Calls work(first, last) with the first and the last crossed cell of each row of cells along z
+/// that has any. Cells are relative to the brick's origin.
 template <typename Work>
 void overCrossedRows(const Brick& brick, const Work& work) {
   for (int x = 0; x < kBlock; ++x)
@@ -177,15 +179,15 @@ void overCrossedRows(const Brick& brick, const Work& work) {
     }
 }
 
-/// A block, and the box of its points that a stencil reads.
+/// A block, and the box of its points that the stencils of one brick read.
 struct Part {
   Coord origin;
   CoordBBox points;  ///< relative to the origin
 };
 
-/// Adds the points of neighbouring blocks that determine the surface's shape in the cells of a
-/// brick. The stencil of a cell covers one point before it and two points after it on each axis.
-/// Along one axis at a time it covers one more point in both directions.
+/// Adds the points of neighbouring blocks that the stencils of a brick's crossed cells read. The
+/// stencil of a cell starts one point before its lowest corner and ends two points after it, on
+/// each axis. Along one axis at a time it covers one more point in both directions.
 void addPartsBeside(const Brick& brick, std::vector<Part>& parts) {
   std::array<CoordBBox, 27> beside;
   const auto add = [&](const CoordBBox& points) {
@@ -215,7 +217,6 @@ void addPartsBeside(const Brick& brick, std::vector<Part>& parts) {
 
 }  // namespace
 
-/// Builds a tree with the spline's coefficients f − ∇²f/6 in place of the values, in leaves.
 openvdb::FloatTree::Ptr quasiInterpolated(const openvdb::FloatTree& tree) {
   openvdb::FloatTree::Ptr result(new openvdb::FloatTree(tree));
   openvdb::tree::LeafManager<openvdb::FloatTree> leaves(*result);
@@ -239,7 +240,7 @@ openvdb::FloatTree::Ptr quasiInterpolated(const openvdb::FloatTree& tree) {
 }
 
 Bricks bricksOf(const openvdb::FloatTree& tree, const TableOptions& options) {
-  // Radius of a ball around a block and the stencils of its cells.
+  // Radius, in voxels, of a ball that contains a block and the stencils of its cells.
   constexpr double kRadius = 0.5 * kBlock * std::numbers::sqrt3 + 3;
   const std::vector<Coord> blocks = blocksOf(tree);
   std::vector<std::unique_ptr<Brick>> bricks(blocks.size());

@@ -13,37 +13,40 @@
 
 namespace render {
 
-/// A block of 8³ cells that the surface crosses, as BrickPool stores it.
+/// A block of 8³ cells that the surface crosses, with values and mask in the layout of BrickPool.
 struct Brick {
   openvdb::Coord origin;
   std::array<float, BrickPool::kValues> value;
   std::array<std::uint32_t, BrickPool::kMaskWords> mask;
 };
 
-/// A block that the surface does not cross, but whose points stencils of crossed cells read.
+/// A block that the surface does not cross, but with points that the stencils of crossed cells
+/// read.
 struct HaloBlock {
   openvdb::Coord origin;
-  openvdb::CoordBBox points = {};  ///< box of the points that are read, relative to the origin
+  openvdb::CoordBBox points = {};  ///< box of the points that stencils read, relative to the origin
   std::vector<float> value =
       {};  ///< values of these points by x, y, z; empty where all equal the background
   bool isInside = false;  ///< sign of the background value, if `value` is empty
 };
 
-/// Builds a tree with the spline's coefficients f − ∇²f/6 in place of the values, in leaves.
+/// Builds a copy of the tree in which each leaf value f is replaced by the spline's coefficient f −
+/// ∇²f/6.
 [[nodiscard]] openvdb::FloatTree::Ptr quasiInterpolated(const openvdb::FloatTree& tree);
 
-/// The blocks that the surface of a band crosses.
+/// Blocks that the surface of a band crosses.
 struct Bricks {
   std::vector<std::unique_ptr<Brick>> kept;  ///< sorted by origin
   openvdb::CoordBBox crossed;  ///< box of the origins of all crossed blocks, kept or culled
   openvdb::CoordBBox cells;    ///< box of all crossed cells
-  std::size_t culled = 0;
+  std::size_t culled = 0;      ///< number of crossed blocks that `keeps` rejected
 };
 
-/// Finds the crossed blocks. @param tree  values, or the spline's coefficients
+/// Finds the blocks that the surface crosses. @param tree  values, or the spline's coefficients
 [[nodiscard]] Bricks bricksOf(const openvdb::FloatTree& tree, const TableOptions& options);
 
-/// Finds the halo blocks, sorted by origin. @param bricks  crossed blocks of the same tree
+/// Finds the halo blocks of the bricks, sorted by origin. @param bricks  crossed blocks of `tree`,
+/// sorted by origin
 [[nodiscard]] std::vector<HaloBlock> haloBlocks(const openvdb::FloatTree& tree,
                                                 const std::vector<std::unique_ptr<Brick>>& bricks);
 

@@ -13,16 +13,16 @@ enum class InstructionSet { Sse2, Avx2, Avx512 };
 /// Instruction sets that this processor supports, the fastest last.
 [[nodiscard]] std::vector<InstructionSet> instructionSets();
 
-/// Finds the first crossings of rays with a band's zero set. All instruction sets return the same
-/// bits.
-/// @param hits  as long as the rays
+/// Finds the first crossing of each ray with a band's zero set. All instruction sets return the
+/// same bits.
+/// @param hits  must have as many entries as `rays`
 /// @pre the processor supports the set
 void traceRays(const BrickPool& pool, const RayBlock& rays, HitBlock& hits,
                InstructionSet set = instructionSets().back());
 
-/// Finds the first crossings of the rays through pixels, and the shape of the surface there.
-/// Fastest when neighbouring pixels follow each other.
-/// @param hits, shapes  as long as the pixels
+/// Finds the first crossing of the ray through each pixel, and the shape of the surface at the
+/// crossing. It is fastest when neighbouring pixels follow each other.
+/// @param hits, shapes  must have as many entries as `pixels`
 /// @pre the processor supports the set
 void tracePixels(const BrickPool& pool, const RayFan& fan, const PixelBlock& pixels, HitBlock& hits,
                  ShapeBlock& shapes, InstructionSet set = instructionSets().back());
