@@ -33,7 +33,7 @@ using levelset::ExitCode;
 void printAll(const std::string& text) {
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
     throw levelset::IoError(
-        fmt::format("levelsmith: standard output cannot be written: {}", std::strerror(errno)));
+        fmt::format("standard output cannot be written: {}", std::strerror(errno)));
 }
 
 /// More threads do not help, and some systems do not allow more.

@@ -33,9 +33,9 @@ class CsgParser {
   /// Parses operands joined by operators of one precedence level; level 0 binds loosest.
   void chain(std::size_t level) {
     static constexpr std::pair<char, CsgExpression::Step> kOperators[] = {
-        {'|', CsgExpression::kUnion},
-        {'&', CsgExpression::kIntersection},
-        {'-', CsgExpression::kDifference}};
+        {'|', CsgExpression::Union},
+        {'&', CsgExpression::Intersection},
+        {'-', CsgExpression::Difference}};
     if (level == std::size(kOperators)) return operand();
     chain(level + 1);
     while (take(kOperators[level].first)) {
@@ -105,12 +105,12 @@ bool CsgExpression::holds(const char* inside) const {
       stack = stack << 1 | (inside[step] != 0);
       continue;
     }
-    if (step == kNothing) {
+    if (step == Nothing) {
       stack <<= 1;
       continue;
     }
     const bool b = stack & 1, a = stack >> 1 & 1;
-    const bool both = step == kUnion ? a || b : step == kIntersection ? a && b : a && !b;
+    const bool both = step == Union ? a || b : step == Intersection ? a && b : a && !b;
     stack = stack >> 2 << 1 | both;
   }
   return stack & 1;
@@ -119,14 +119,14 @@ bool CsgExpression::holds(const char* inside) const {
 double CsgExpression::phi(const double* phi) const {
   std::vector<double> stack;
   for (const int step : steps_) {
-    if (step >= 0 || step == kNothing) {
+    if (step >= 0 || step == Nothing) {
       stack.push_back(step >= 0 ? phi[step] : std::numeric_limits<double>::infinity());
       continue;
     }
     const double b = stack.back();
     stack.pop_back();
     double& a = stack.back();
-    a = step == kUnion ? std::min(a, b) : std::max(a, step == kIntersection ? b : -b);
+    a = step == Union ? std::min(a, b) : std::max(a, step == Intersection ? b : -b);
   }
   return stack.empty() ? std::numeric_limits<double>::infinity() : stack.back();
 }
@@ -136,7 +136,7 @@ CsgExpression CsgExpression::renumbered(const std::vector<int>& numbers) const {
   for (int& step : result.steps_) {
     if (step < 0) continue;
     step = numbers[static_cast<std::size_t>(step)];
-    if (step < 0) step = kNothing;
+    if (step < 0) step = Nothing;
   }
   return result;
 }
@@ -144,18 +144,18 @@ CsgExpression CsgExpression::renumbered(const std::vector<int>& numbers) const {
 Imath::Box3d CsgExpression::bounds(const std::vector<Imath::Box3d>& boxes, double growth) const {
   std::vector<Imath::Box3d> stack;
   for (const int step : steps_) {
-    if (step >= 0 || step == kNothing) {
+    if (step >= 0 || step == Nothing) {
       stack.push_back(step >= 0 ? boxes[static_cast<std::size_t>(step)] : Imath::Box3d());
       continue;
     }
     const Imath::Box3d b = stack.back();
     stack.pop_back();
     Imath::Box3d& a = stack.back();
-    if (step == kUnion) {
+    if (step == Union) {
       a.extendBy(b);
       if (!a.isEmpty()) a = {a.min - Imath::V3d(growth), a.max + Imath::V3d(growth)};
     }
-    if (step != kIntersection) continue;
+    if (step != Intersection) continue;
     for (int axis = 0; axis < 3; ++axis) {
       a.min[axis] = std::max(a.min[axis], b.min[axis]);
       a.max[axis] = std::min(a.max[axis], b.max[axis]);

@@ -35,7 +35,7 @@ class CsgExpression {
   /// @param numbers  new number of each solid; negative: the solid is empty
   [[nodiscard]] CsgExpression renumbered(const std::vector<int>& numbers) const;
 
-  enum Step : int { kUnion = -1, kIntersection = -2, kDifference = -3, kNothing = -4 };
+  enum Step : int { Union = -1, Intersection = -2, Difference = -3, Nothing = -4 };
   /// The expression in postfix notation. Entries are numbers of solids, or a Step.
   [[nodiscard]] const std::vector<int>& postfix() const { return steps_; }
 

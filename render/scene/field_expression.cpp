@@ -25,9 +25,9 @@ bool isOperand(const Scene& scene, std::size_t solid) {
 
 Join joinOf(int step) {
   switch (step) {
-    case CsgExpression::kUnion:
+    case CsgExpression::Union:
       return Join::Union;
-    case CsgExpression::kIntersection:
+    case CsgExpression::Intersection:
       return Join::Intersection;
     default:
       return Join::Difference;
@@ -129,7 +129,7 @@ FieldExpression fieldExpression(const Scene& scene) {
   }
   StepWriter writer(result);
   for (const int step : scene.csg.postfix()) {
-    if (step == CsgExpression::kNothing)
+    if (step == CsgExpression::Nothing)
       writer.push(std::nullopt);
     else if (step >= 0)
       writer.push(number[static_cast<std::size_t>(step)]);

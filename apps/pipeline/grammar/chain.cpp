@@ -26,6 +26,7 @@ bool isOption(const std::string& token) {
 
 std::vector<std::string> namesOf(const std::vector<Param>& params) {
   std::vector<std::string> names;
+  names.reserve(params.size());
   for (const Param& param : params) names.push_back(param.name);
   return names;
 }

@@ -186,7 +186,7 @@ std::string toleranceText(const Json& json, const std::string& file) {
   if (!json.is_string() && !json.is_number())
     throw InvalidInput(fmt::format(
         "run: '{}': \"tolerance\" is neither a text nor a number; write \"1%\" or 0.01", file));
-  const std::string text = json.is_string() ? json.get<std::string>() : json.dump();
+  std::string text = json.is_string() ? json.get<std::string>() : json.dump();
   const std::vector<Param>& all = globalParams();
   const auto param = std::find_if(all.begin(), all.end(),
                                   [](const Param& known) { return known.name == kTolerance; });

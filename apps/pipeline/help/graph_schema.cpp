@@ -15,7 +15,7 @@ constexpr const char* kNumber = R"(\+?-?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9
 
 /// Returns a regular expression that matches the accepted texts of a parameter; empty: none.
 std::string patternOf(const Param& param) {
-  const std::string number = kNumber;
+  std::string number = kNumber;
   const std::string length = number + (param.allowsVoxels ? "(vx|%)?" : "%?");
   switch (param.type) {
     case ParamType::Number:

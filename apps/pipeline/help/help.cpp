@@ -180,7 +180,7 @@ std::string wholePage(const std::vector<std::string>& words) {
 
 std::string help(const std::vector<std::string>& words) {
   if (!words.empty())
-    if (const std::string page = wholePage(words); !page.empty()) return page;
+    if (std::string page = wholePage(words); !page.empty()) return page;
   std::string name, search;
   bool json = false;
   for (std::size_t i = 0; i < words.size(); ++i) {
@@ -209,6 +209,7 @@ std::string help(const std::vector<std::string>& words) {
   });
   if (op == topics.end()) {
     std::vector<std::string> names;
+    names.reserve(topics.size());
     for (const Operator* each : topics) names.push_back(each->name);
     const std::string guess = didYouMean(name, names);
     throw UsageError(fmt::format("help: there is no action '{}'{}", name,

@@ -73,7 +73,7 @@ Value read(Invocation& in) {
                                           .maxMemory = in.maxMemory,
                                           .repairs = &repairs,
                                           .progress = in.progress};
-  Value value = in.given("grid") ? std::visit([](auto&& grid) { return Value(std::move(grid)); },
+  Value value = in.given("grid") ? std::visit([](auto grid) { return Value(std::move(grid)); },
                                               levelset::readGrid(file, options))
                                  : Value(levelset::readBand(file, options));
   const std::vector<std::string> told = sentencesOf(repairs, file);

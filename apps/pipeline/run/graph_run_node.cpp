@@ -27,6 +27,13 @@ bool isInputError(const std::exception_ptr& failure) {
   }
 }
 
+/// Puts the name of the action before the notes and warnings that do not have it.
+void putActionBefore(const std::string& action, StepNotes& notes) {
+  for (std::vector<std::string>* sentences : {&notes.notes, &notes.warnings})
+    for (std::string& sentence : *sentences) sentence = sentenceOf(action, sentence);
+  if (!notes.failure.empty()) notes.failure = sentenceOf(action, notes.failure);
+}
+
 /// Crops a band to a region of interest.
 /// @throws levelset::InvalidInput if the region contains no surface
 Value cropTo(const Value& value, const RegionOfInterest& roi) {
@@ -134,6 +141,7 @@ void GraphRun::runNode(std::size_t i, StepReport& step, StepClock& clock,
     if (isRefused) reportEnd_ = std::min(reportEnd_, i + 1);
     if (value && settings_.onValue) settings_.onValue(i, *value);
     if (value) values_.put(i, *value);
+    putActionBefore(op.name, invocation.notes);
     step.notes = invocation.notes;
     queueOutput(i, invocation.output);
   };
@@ -148,6 +156,7 @@ void GraphRun::runNode(std::size_t i, StepReport& step, StepClock& clock,
       finish(node.makes() ? &value : nullptr);
     } else {
       Value value = op.run(invocation);
+      putActionBefore(op.name, invocation.notes);  // as the cache stores them
       if (!regions_[i].isWhole()) value = cropTo(value, regions_[i]);
       if (node.makes()) describeResult(value, false, step);
       clock.stop();

@@ -254,7 +254,7 @@ TEST(Tolerance, Refuses) {
   EXPECT_SAYS(refusalOf("--tolerance 0.1 sphere --radius 10vx ! measure"), "is a length in voxels");
   EXPECT_SAYS(refusalOf("sphere --radius 1 ! measure"), "needs a voxel size");
   EXPECT_SAYS(refusalOf("--tolerance 0.1 sphere --radius 1 --voxel 0.1 --resolution 3 ! measure"),
-              "twice");
+              "give only one");
   EXPECT_SAYS(refusalOf("--tolerance 0.1 sphere --radius 1 ! box --size 1,1,1 ! morph "
                         "--keep-steps a_##.vdb ! measure"),
               "writes files while it computes its result");
