@@ -47,7 +47,24 @@ struct Cancelled : Error {
 };
 
 /// Throws an error of the same class with another message.
-[[noreturn]] void rethrow(const Error& error, const std::string& message);
+[[noreturn]] inline void rethrow(const Error& error, const std::string& message) {
+  switch (error.exitCode()) {
+    case ExitCode::Usage:
+      throw UsageError(message);
+    case ExitCode::Resource:
+      throw ResourceLimit(message);
+    case ExitCode::Numeric:
+      throw NumericalError(message);
+    case ExitCode::File:
+      throw IoError(message);
+    case ExitCode::Interrupted:
+      throw Cancelled(message);
+    case ExitCode::Input:
+    case ExitCode::Done:
+      break;
+  }
+  throw InvalidInput(message);
+}
 
 /// Returns the result of `work`. Puts "context: " before the message of an Error that `work`
 /// throws.

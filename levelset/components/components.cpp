@@ -29,11 +29,13 @@ using BlockSet = std::set<Coord>;
 
 /// Largest difference, in voxels, between an old and a recomputed distance that count as equal.
 constexpr float kSameDistance = 0.02f;
-/// Smallest magnitude, in voxels, of a value whose sign must be kept.
+/// Smallest magnitude, in voxels, of a value whose sign was flipped. It keeps the sign of a value
+/// that was zero.
 constexpr float kLeastDistance = 1e-3f;
 
-/// Flips regions from inside to outside or from outside to inside. The surfaces between them and
-/// their neighbours vanish. Grid points that are nearer to a remaining surface keep their bits.
+/// Flips connected regions of grid points from inside to outside or from outside to inside. The
+/// surfaces between a flipped region and its neighbours vanish. Grid points whose nearest surface
+/// remains keep their bits.
 class RegionFlip {
  public:
   RegionFlip(const NarrowBand& solid, const RegionMap& map, std::vector<bool> flipped,
@@ -59,8 +61,9 @@ class RegionFlip {
     return flipped_[static_cast<std::size_t>(region)];
   }
 
-  /// Collects the blocks within the band of a vanishing surface, and those also within the band of
-  /// a remaining one.
+  /// Collects in `vanishing_` the origins of the blocks within the half width of a vanishing
+  /// surface, and in `both_` those of them that are also within the half width of a remaining
+  /// surface.
   void collectBlocks() {
     BlockSet vanishing, remaining;
     map_.forEachSurfaceBlock([&](const Coord& origin, std::uint32_t component) {
@@ -94,7 +97,8 @@ class RegionFlip {
     }
   }
 
-  /// Corrects all signs. Also corrects the values, except near a remaining surface.
+  /// Corrects the signs of a leaf. Near vanishing surfaces only, also sets the values to ±
+  /// background and deactivates them. In blocks of `both_`, renew() corrects the distances.
   void flipLeaf(FloatLeaf& leaf) const {
     const LabelLeaf& labels = *map_.labels().probeConstLeaf(leaf.origin());
     const bool nearVanishing = vanishing_.count(leaf.origin()) > 0;
@@ -115,8 +119,9 @@ class RegionFlip {
     }
   }
 
-  /// Copies the field with larger distances next to vanished surfaces. With small distances on both
-  /// sides, an interpolant could cross zero there.
+  /// Returns a copy of the band in which grid points beside a vanished surface have a distance of
+  /// at least one voxel. With smaller distances on both sides, an interpolant could cross zero
+  /// there.
   [[nodiscard]] NarrowBand smoothed(const NarrowBand& flippedSolid) const {
     NarrowBand result = flippedSolid;
     FloatGrid& grid = editVdb(result);
@@ -137,7 +142,8 @@ class RegionFlip {
     return result;
   }
 
-  /// World box that contains the blocks of `both_` and the surfaces near them.
+  /// Returns the world box that contains the blocks of `both_` and all surfaces within the half
+  /// width of them.
   [[nodiscard]] Imath::Box3d worldBoxOfBoth() const {
     openvdb::BBoxd box;
     for (const Coord& origin : both_) {
@@ -148,11 +154,11 @@ class RegionFlip {
     return {toImath(world.min()), toImath(world.max())};
   }
 
-  /// Recomputes distances near both kinds of surfaces. Grid points that were nearest to a vanished
-  /// surface get their distance from the re-distanced field.
+  /// Recomputes the distances in the blocks of `both_`. Grid points whose nearest surface has
+  /// vanished get their distance from a redistanced copy.
   void renew(NarrowBand& result) const {
-    // Wider than the result, to distinguish a distance just below the background from a clamped
-    // one.
+    // The copy is one voxel wider than the result, so that a distance just below the background of
+    // the result is not clamped.
     const NarrowBand fresh =
         redistance(smoothed(result), {.halfWidth = solid_.halfWidth() + 1,
                                       .region = worldBoxOfBoth(),
@@ -178,8 +184,9 @@ class RegionFlip {
     }
   }
 
-  /// Decides if a value is still correct. Outside the band no surface was near. Inside it, the
-  /// value is correct if the remaining surfaces are not farther away.
+  /// Returns true if a value is still correct after surfaces have vanished. An inactive value had
+  /// no surface within the half width. An active value is correct if `distance`, recomputed from
+  /// the remaining surfaces, is not larger.
   [[nodiscard]] bool isRight(const FloatLeaf& leaf, openvdb::Index i, float distance,
                              FloatGrid::ConstAccessor& signs) const {
     if (!leaf.isValueOn(i)) return true;
@@ -188,8 +195,8 @@ class RegionFlip {
            isBesideSurface(signs, leaf.offsetToGlobalCoord(i), own);
   }
 
-  /// Decides if a grid point has a neighbour of the other sign. Its value defines the zero set and
-  /// must stay.
+  /// Returns true if a grid point has a neighbour of the opposite sign. The value of such a grid
+  /// point defines the zero set and must not change.
   static bool isBesideSurface(FloatGrid::ConstAccessor& values, const Coord& c, float own) {
     for (int axis = 0; axis < 3; ++axis) {
       for (int step = -1; step <= 1; step += 2) {

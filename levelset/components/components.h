@@ -10,8 +10,8 @@
 
 /// Connected components of a solid and of the space around it. Inside grid points connect along the
 /// grid axes (6 neighbours). Outside grid points also connect across face diagonals (18
-/// neighbours). The mesh of bandToMesh() separates them in the same way, so inside and outside
-/// never cross.
+/// neighbours). The mesh of bandToMesh() connects grid points by the same rule, so an inside and an
+/// outside connection never cross.
 namespace levelset {
 
 struct Topology {
@@ -19,22 +19,22 @@ struct Topology {
   std::size_t surfaces = 0;    ///< surface components
   std::size_t cavities = 0;    ///< enclosed voids
 };
-/// Counts the connected components of a solid, of its surface and of its cavities.
+/// Counts the connected solids, the surface components and the cavities of a band.
 [[nodiscard]] Topology topology(const NarrowBand& solid);
 
 /// Keeps the `count` components of largest volume with their cavities and removes the others. Among
-/// components of equal volume, the first in tree order stays. Grid points that are not nearest to a
-/// removed surface keep their bits.
+/// components of equal volume, the first in tree order stays. Grid points whose nearest surface
+/// remains keep their bits.
 /// @throws UsageError if `count` is 0
 /// @throws InvalidInput if the band is empty
 [[nodiscard]] NarrowBand keepLargest(const NarrowBand& solid, std::size_t count,
                                      const Progress& progress = {});
 
-/// Volume that exceeds every cavity.
+/// Value of `maxVolume` that fills every cavity.
 inline constexpr double kAnyVolume = std::numeric_limits<double>::infinity();
 
-/// Fills enclosed cavities. A solid inside a cavity does not count for its volume and disappears
-/// when the cavity is filled. An empty band stays empty.
+/// Fills enclosed cavities. The volume of a cavity excludes a solid inside it. Filling the cavity
+/// merges such a solid with it. An empty band stays empty.
 /// @param maxVolume  largest volume to fill, world units³; default: all cavities
 /// @throws UsageError if `maxVolume` is negative or not a number
 [[nodiscard]] NarrowBand fillCavities(const NarrowBand& solid, double maxVolume = kAnyVolume,
@@ -45,11 +45,12 @@ struct SliversDropped {
   std::size_t count = 0;  ///< number of removed slivers
 };
 
-/// Removes the thin slivers that rounding leaves where the surface of the cutter coincides with
-/// that of the cut solid. A sliver is a component that is nowhere half a voxel deep and lies within
-/// a voxel of the cutter's surface. Other components keep their bits, as with keepLargest(). If all
-/// components are slivers, they stay.
-/// @pre both are solids, and the band of `cutter` is at least two voxels of `solid` wide
+/// Removes the thin slivers that rounding leaves in a difference or split where the surface of the
+/// cutter coincides with that of the cut solid. A sliver is a component that is nowhere half a
+/// voxel deep and lies within a voxel of the cutter's surface. Grid points whose nearest surface
+/// remains keep their bits. If all components are slivers, they stay.
+/// @pre both bands are solids; the half width of `cutter` is at least twice the voxel size of
+///      `solid`
 [[nodiscard]] SliversDropped dropSlivers(const NarrowBand& solid, const NarrowBand& cutter,
                                          const Progress& progress = {});
 
@@ -80,12 +81,12 @@ struct FillCavitiesOperator {
   static constexpr ErrorModel errorModel{2, 0, 0, "shapes"};
 
   struct Options {
-    std::optional<double> upTo;  ///< world units³
+    std::optional<double> upTo;  ///< largest volume of a filled cavity, world units³; empty: all
 
     template <class Visitor>
     static void describe(Visitor& visit) {
       visit("up-to", &Options::upTo,
-            {.help = "only voids up to this volume, world units cubed",
+            {.help = "fill only voids up to this volume, world units cubed",
              .range = OptionRange::Positive});
     }
   };

@@ -18,7 +18,8 @@ using openvdb::FloatTree;
 using openvdb::Int32Tree;
 using FloatLeaf = FloatTree::LeafNodeType;
 using LabelLeaf = Int32Tree::LeafNodeType;
-using LeafBits = std::array<std::uint64_t, 8>;  ///< word x, bit y·8 + z
+using LeafBits =
+    std::array<std::uint64_t, 8>;  ///< a bit for each voxel (x, y, z): bit 8y + z of word x
 
 constexpr int kLeafDepth = FloatTree::DEPTH - 1;
 
@@ -35,7 +36,7 @@ bool isEmpty(const LeafBits& mask) {
   return std::all_of(mask.begin(), mask.end(), [](std::uint64_t word) { return word == 0; });
 }
 
-/// Connected component of `within` that contains its first voxel.
+/// Returns the 6-connected component that contains the first voxel of `within`.
 LeafBits firstComponent(const LeafBits& within) {
   constexpr std::uint64_t kLowZ = 0x0101010101010101ull, kHighZ = kLowZ << 7;
   LeafBits grown = {};
@@ -56,7 +57,8 @@ LeafBits firstComponent(const LeafBits& within) {
   return grown;
 }
 
-/// Splits a leaf into components of both signs, in a fixed order.
+/// Splits the voxels of a leaf into 6-connected components: first the inside ones, then the outside
+/// ones, each in the order of their first voxels.
 std::vector<LeafBits> splitLeaf(const FloatLeaf& leaf) {
   std::vector<LeafBits> parts;
   LeafBits left = insideMask(leaf);
@@ -73,7 +75,8 @@ std::vector<LeafBits> splitLeaf(const FloatLeaf& leaf) {
   return parts;
 }
 
-/// Leaf offsets of the 64 voxels on one of its faces.
+/// Returns the buffer offsets of the 64 voxels of a leaf whose local coordinate along `axis` is
+/// `position`.
 std::array<openvdb::Index, 64> faceOffsets(int axis, int position) {
   std::array<openvdb::Index, 64> offsets;
   std::size_t count = 0;
@@ -87,8 +90,8 @@ std::array<openvdb::Index, 64> faceOffsets(int axis, int position) {
 
 }  // namespace
 
-/// Joins labels into sets; the lowest label represents its set. Label 0 is the space outside the
-/// tree.
+/// Joins labels of connected voxels and tiles into disjoint sets. The lowest label represents its
+/// set. Label 0 is the space outside the tree.
 class RegionMap::Linker {
  public:
   std::int32_t add() { return static_cast<std::int32_t>(sets_.add()); }
@@ -176,7 +179,7 @@ void RegionMap::joinLeaves(const FloatGrid& grid, Linker& linker) const {
         const auto& here = (side ? high : low)[static_cast<std::size_t>(axis)];
         const auto& there = (side ? low : high)[static_cast<std::size_t>(axis)];
         const FloatLeaf* other = values.probeConstLeaf(beside);
-        if (other && !side) continue;  // the other leaf joins this pair
+        if (other && !side) continue;  // the loop over the other leaf joins this pair
         const LabelLeaf* otherLabels = other ? labels.probeConstLeaf(beside) : nullptr;
         const bool tileInside = !other && values.getValue(beside) < 0;
         const std::int32_t tileLabel = other ? 0 : labels.getValue(beside);
@@ -190,7 +193,8 @@ void RegionMap::joinLeaves(const FloatGrid& grid, Linker& linker) const {
   }
 }
 
-/// Joins each tile with neighbours of equal or larger size. Smaller neighbours join with it.
+/// Joins each tile with neighbouring tiles of equal or larger size and of the same sign. Its
+/// smaller neighbours are joined in their own iteration, leaves by joinLeaves().
 void RegionMap::joinTiles(const FloatGrid& grid, Linker& linker) const {
   openvdb::tree::ValueAccessor<const FloatTree> values(grid.tree());
   openvdb::tree::ValueAccessor<const Int32Tree> labels(labels_);
@@ -210,7 +214,7 @@ void RegionMap::joinTiles(const FloatGrid& grid, Linker& linker) const {
   }
 }
 
-/// Joins outside corners that share only the diagonal of a cell face.
+/// Joins two outside grid points on the diagonal of a cell face whose other two corners are inside.
 void RegionMap::joinDiagonals(const CellSurface& surface, Linker& linker) const {
   constexpr int kAxes[3] = {4, 2, 1};  // corner bits
   openvdb::tree::ValueAccessor<const Int32Tree> labels(labels_);

@@ -11,12 +11,13 @@
 
 namespace levelset {
 
-/// A connected component of the inside (6 neighbours) or of the outside (18 neighbours). The
-/// surface of CellSurface separates them.
+/// A connected component of the inside (6 neighbours) or of the outside (18 neighbours).
+/// CellSurface builds the surface between two such components.
 struct Region {
   bool inside = false;
-  double volume =
-      0;  ///< voxels³, without regions enclosed in it; invalid for region 0, which is unbounded
+  /// Volume without the regions enclosed in it, voxels³. Invalid for the unbounded outside
+  /// region.
+  double volume = 0;
 };
 
 /// A surface component, which separates two regions.
@@ -27,7 +28,7 @@ struct RegionSurface {
 /// Connected regions of a grid, and the surfaces between them.
 class RegionMap {
  public:
-  /// Labels the complete space: each voxel of a leaf and each tile. Does not expand tiles.
+  /// Computes the region of each voxel in a leaf and of each tile. Does not expand tiles.
   explicit RegionMap(const openvdb::FloatGrid& grid, const Progress& progress = {});
 
   static constexpr std::uint32_t kInfinite = 0;  ///< index of the unbounded outside region
@@ -36,11 +37,11 @@ class RegionMap {
   [[nodiscard]] const std::vector<Region>& regions() const { return regions_; }
   /// Surface components between the regions.
   [[nodiscard]] const std::vector<RegionSurface>& surfaces() const { return surfaces_; }
-  /// Region index of each voxel and tile, with the topology of the grid.
+  /// Tree with the topology of the grid. Its values are the region indices of voxels and tiles.
   [[nodiscard]] const openvdb::Int32Tree& labels() const { return labels_; }
 
-  /// Calls visit(block origin, surface index) for each block and each surface component that
-  /// crosses one of its edges.
+  /// Calls visit(block origin, index into surfaces()) for each surface component that crosses a
+  /// grid edge in a block. May visit a pair more than once.
   template <typename Visit>
   void forEachSurfaceBlock(Visit&& visit) const {
     for (const auto& [origin, surface] : surfaceBlocks_) visit(origin, surface);

@@ -26,7 +26,8 @@ using Root = FloatTree::RootNodeType;
 using Upper = Root::ChildNodeType;
 using Lower = Upper::ChildNodeType;
 
-/// Voxels. Far below the accuracy of the distances, far above the rounding error at zero.
+/// Distance below which a grid point counts as on the surface, voxels. It is far below the accuracy
+/// of the distances and far above their rounding error.
 constexpr double kOnSurface = 1e-6;
 
 Coord toCoord(const V3i& p) {
@@ -36,7 +37,7 @@ V3i toV3i(const Coord& p) {
   return {p.x(), p.y(), p.z()};
 }
 
-/// Collects leaves from several threads, each with a list of its own.
+/// Computes leaves in several threads, each with its own list, and assembles them into a grid.
 class LeafCollector {
  public:
   LeafCollector(double reach, double voxelSize, std::size_t maxMemory)
@@ -54,8 +55,8 @@ class LeafCollector {
     auto leaf = std::make_unique<LeafNode>(toCoord(block + origin), background_, false);
     float* values = leaf->buffer().data();
     for (openvdb::Index i = 0; i < LeafNode::SIZE; ++i) {
-      // A point on the surface counts as outside, so that rounding leaves no isolated inside
-      // points.
+      // A grid point on the surface gets distance 0 and so counts as outside. Otherwise rounding
+      // could leave isolated inside points.
       const double d = distance.distances()[i] < kOnSurface ? 0 : distance.distances()[i];
       const bool isActive = d < reach;
       const float value =
@@ -94,14 +95,16 @@ class LeafCollector {
 
 using Region = std::optional<openvdb::CoordBBox>;
 
-/// Computes the signs of tiles. The points of a tile lie at least a voxel from the surface, so
-/// adjacent tiles agree. Only the first tile of a row is looked up. Where the region covers a part
-/// of a tile, the sign is that of this part; the parts of two neighbours are adjacent too.
+/// Computes the signs of the tiles of a node. The grid points of a tile lie at least a voxel from
+/// the surface, so adjacent tiles have the same sign. Only a tile without an adjacent tile before
+/// it evaluates the winding number. Where the region covers a part of a tile, the sign is that of
+/// this part; the parts of two adjacent tiles are adjacent too.
 template <typename Node>
 void signTiles(Node& node, const SignField& field, const V3i& origin, float background,
                const Region& region) {
   constexpr openvdb::Index kZ = 1, kY = 1u << Node::LOG2DIM, kX = 1u << (2 * Node::LOG2DIM);
-  std::vector<signed char> side(Node::NUM_VALUES, 0);  // 0: a child node
+  std::vector<signed char> side(Node::NUM_VALUES,
+                                0);  // −1 inside, 1 outside, 0: child node or outside the region
   for (auto it = node.beginValueAll(); it; ++it) {
     const openvdb::Index n = it.pos();
     signed char& s = side[n];
@@ -132,7 +135,8 @@ void signTilesOfAll(FloatTree& tree, const SignField& field, const V3i& origin, 
   });
 }
 
-/// Adds the interior tiles of the root: rows of tiles between two nodes that contain the surface.
+/// Adds the root tiles inside the solid. They form rows along x between two child nodes, since only
+/// child nodes contain the surface.
 void signRootTiles(FloatTree& tree, const SignField& field, const V3i& origin, float background) {
   std::vector<Coord> keys;
   for (auto it = tree.root().cbeginChildOn(); it; ++it) keys.push_back(it->origin());
@@ -150,8 +154,8 @@ void signRootTiles(FloatTree& tree, const SignField& field, const V3i& origin, f
   }
 }
 
-/// Adds the interior root tiles that the region meets. With a region, a row need not end at a node
-/// that contains the surface.
+/// Adds the root tiles inside the solid that intersect the region. Evaluates the sign of each,
+/// because with a region a row of tiles need not end at a child node.
 void signRootTilesIn(const openvdb::CoordBBox& region, FloatTree& tree, const SignField& field,
                      const V3i& origin, float background) {
   constexpr int kDim = static_cast<int>(Upper::DIM);
@@ -197,8 +201,8 @@ double ambiguousShare(const openvdb::FloatGrid& grid, const SignField& field, co
   if (!field.isOpen()) return 0;
   std::vector<const LeafNode*> leaves;
   grid.tree().getNodes(leaves);
-  std::vector<std::array<std::size_t, 2>> counts(leaves.size());  // voxels next to the zero set;
-                                                                  // ambiguous ones
+  std::vector<std::array<std::size_t, 2>> counts(
+      leaves.size());  // numbers of voxels next to the zero set, and of ambiguous ones among them
   tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t n) {
     const LeafNode& leaf = *leaves[n];
     const V3i block = toV3i(leaf.origin()) - origin;

@@ -8,13 +8,14 @@
 
 namespace levelset::convert {
 
-/// Computes distances and signs of all blocks within `halfWidth` of the mesh and assembles the
-/// tree.
-/// @param region  index box of the blocks to compute; empty: all blocks. Tiles that do not meet the
-///         region are outside
-/// @param surface  the mesh and the other surfaces that bound the solid, in voxels relative to
-///         `origin`
-/// @return a level set with leaves where there are active voxels, and tiles of the correct sign
+/// Computes distances and signs in all blocks within `halfWidth` voxels of the surface and
+/// assembles them into a tree.
+/// @param region   index box of the blocks to compute; empty: all blocks. Tiles that do not
+///                 intersect it are set to outside
+/// @param surface  mesh, with the surfaces that span its holes, in voxels relative to `origin`
+/// @param field    winding numbers that give the signs, in the same frame
+/// @param origin   index coordinates of the origin of `surface`
+/// @return level set with a leaf for each block with active voxels, and tiles of the correct sign
 ///         elsewhere
 [[nodiscard]] openvdb::FloatGrid::Ptr assembleBand(const LocalMesh& surface, const SignField& field,
                                                    const Imath::V3i& origin, double voxelSize,
@@ -22,8 +23,9 @@ namespace levelset::convert {
                                                    const std::optional<openvdb::CoordBBox>& region,
                                                    std::size_t maxMemory, const Progress& progress);
 
-/// Share of ambiguous grid points, |w − 1/2| < 1/4, among those with a neighbour of opposite sign.
-/// 0 for a closed surface, 1 where there are no such points.
+/// Returns the fraction of grid points with an ambiguous winding number w, |w − 1/2| < 1/4, among
+/// the active points with a neighbour of the opposite sign. Returns 0 for a closed surface, and 1
+/// if no active point has such a neighbour.
 [[nodiscard]] double ambiguousShare(const openvdb::FloatGrid& grid, const SignField& field,
                                     const Imath::V3i& origin);
 

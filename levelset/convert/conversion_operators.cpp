@@ -34,9 +34,10 @@ const OperatorText LevelSetOperator::text{
     .group = "Conversion",
     .summary = "turn a mesh into a level set with exact distances",
     .details =
-        "auto takes 'closed' when every edge has two faces and no self-intersection is found, "
-        "otherwise 'winding' (inside where the generalised winding number passes one half). The "
-        "sign certificate lists the findings. A mesh whose sign would be a guess is an error "
+        "--sign auto selects 'closed' when every edge has two faces and no self-intersection is "
+        "found, otherwise 'winding' (inside where the generalised winding number exceeds one "
+        "half). The sign certificate in the report lists the properties of the mesh. A mesh whose "
+        "sign would be a guess is an error "
         "without --accept-sign.",
     .example = "levelsmith read dragon.ply ! level-set --resolution 512 ! write dragon.vdb"};
 
@@ -60,11 +61,12 @@ NarrowBand LevelSetOperator::run(const TriMesh& mesh, const Options& options, Op
   MeshToBandResult result = meshToBand(mesh, options.voxel.edge, settings);
   if (options.acceptsSign && result.band.zeroSetBounds().isEmpty()) {
     run.warnings.push_back(
-        "no grid point lies inside: the band holds distances to the mesh and no surface; close the "
-        "mesh to get a solid");
+        "no grid point lies inside: the band contains distances to the mesh but no zero set; close "
+        "the mesh to get a solid");
   } else if (options.acceptsSign && result.certificate.ambiguousShare > kAmbiguousLimit) {
     run.warnings.push_back(
-        fmt::format("the sign is a guess at a share of {:.2g} of the voxels beside the surface",
+        fmt::format("inside and outside are a guess at a fraction of {:.2g} of the voxels next to "
+                    "the surface; close the holes to get a reliable sign",
                     result.certificate.ambiguousShare));
   }
   return std::move(result.band);
@@ -81,8 +83,8 @@ ValuePlan LevelSetOperator::plan(const Options& options, Plans operands, const O
     reach = std::max({reach, std::abs(plan.bounds.min[axis]), std::abs(plan.bounds.max[axis])});
   if (!(reach / plan.voxelSize < std::numeric_limits<std::int32_t>::max()))
     throw ResourceLimit(
-        fmt::format("the mesh reaches {:.3g} voxels from the origin, more than can be "
-                    "counted; use larger voxels or move it",
+        fmt::format("the mesh extends to {:.3g} voxels from the origin, beyond the range of 32-bit "
+                    "indices; use larger voxels or move the mesh to the origin",
                     reach / plan.voxelSize));
   return plan;
 }
@@ -98,10 +100,11 @@ const OperatorText SurfaceBandOperator::text{
     .group = "Conversion",
     .summary = "turn an open mesh (terrain, a sheet) into a base for patches",
     .details =
-        "Signed distances to an open, consistently oriented mesh, up to its border. The band has "
-        "no inside: 'patch', 'decal', 'patch-grid', 'scatter' and 'folds' take it as base, "
-        "'texture' with --alone or --map mesh. Patches end at the border. The half width must be "
-        "the height of the patches and six voxels more, unless their layers follow a spline. Use "
+        "Computes signed distances to an open, consistently oriented mesh, up to its border. The "
+        "band has no inside: 'patch', 'decal', 'patch-grid', 'scatter' and 'folds' accept it as "
+        "base, and 'texture' accepts it with --alone or --map mesh. Patches end at the border. The "
+        "half width must be at least the height of the patches plus six voxels, unless their "
+        "layers follow a spline. Use "
         "'level-set' for a closed mesh.",
     .example =
         "levelsmith heightmap --image <(printf '0 1 0\\n1 2 1\\n0 1 0\\n') --size 8,8 --height 2 "
@@ -123,12 +126,12 @@ NarrowBand SurfaceBandOperator::run(const TriMesh& mesh, const Options& options,
   SurfaceBandResult result = surfaceBand(
       mesh, options.voxel.edge,
       {.halfWidth = options.halfWidth, .maxMemory = run.maxMemory, .progress = run.progress});
-  run.notes.push_back(fmt::format("{} border edges, {} triangles dropped", result.borderEdges,
-                                  result.droppedTriangles));
+  run.notes.push_back(fmt::format("{} border edges, {} degenerate or duplicate triangles dropped",
+                                  result.borderEdges, result.droppedTriangles));
   if (result.removedVoxels > 0)
     run.notes.push_back(
-        fmt::format("{} voxels lie half way between the front of one part of the surface and the "
-                    "back of another, and are cut out: patches cannot pass there",
+        fmt::format("removed {} voxels half way between the front of one part of the surface and "
+                    "the back of another; patches cannot extend there",
                     result.removedVoxels));
   return std::move(result.band);
 }

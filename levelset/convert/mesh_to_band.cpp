@@ -23,7 +23,8 @@ using convert::SignField;
 using Imath::V3d;
 using Imath::V3i;
 
-/// Wraps the caller's progress so that it never decreases while stages repeat.
+/// Wraps a progress callback so that the fraction never decreases. Two stages of meshToBand report
+/// overlapping intervals.
 Progress monotonic(const Progress& progress) {
   if (!progress) return {};
   return [&progress, high = 0.0](double fraction) mutable {
@@ -32,7 +33,7 @@ Progress monotonic(const Progress& progress) {
   };
 }
 
-/// Finds the self-intersections once, at the first request.
+/// Finds the self-intersections of a mesh at the first call of get() and keeps them.
 class SelfIntersections {
  public:
   SelfIntersections(const TriMesh& mesh, const MeshTopology& topology, Progress progress)
@@ -43,7 +44,7 @@ class SelfIntersections {
     searched_ = true;
     return pairs_;
   }
-  /// Number of pairs; −1 when no search was made.
+  /// Number of pairs of intersecting triangles; −1 before the first call of get().
   [[nodiscard]] std::ptrdiff_t count() const { return searched_ ? std::ssize(pairs_) : -1; }
 
  private:
@@ -70,8 +71,8 @@ void checkClosed(const MeshTopology& topology, Nesting nesting) {
                     topology.boundaryEdges, topology.nonManifoldEdges));
   if (nesting == Nesting::Orientation && !topology.boundary.empty())
     throw InvalidInput(
-        fmt::format("at {} edges neighbouring faces are oriented differently, so nested "
-                    "components cannot follow their orientation; use --nested parity",
+        fmt::format("at {} edges neighbouring faces have opposite orientations, so --nested "
+                    "orientation cannot decide which components are solid; use --nested parity",
                     topology.boundary.size()));
 }
 
@@ -80,7 +81,8 @@ SignField::Rule ruleFor(SignMode method, Nesting nesting) {
   return nesting == Nesting::Parity ? SignField::Rule::Parity : SignField::Rule::Orientation;
 }
 
-/// Adds the surface that spans the holes of the mesh.
+/// Adds to the mesh the surface that spans its holes: the part of the boundary between inside and
+/// outside that is not on the mesh.
 void addOpenSurface(LocalMesh& mesh, const SignField& field, double halfWidth,
                     std::size_t maxMemory, const Progress& progress) {
   std::vector<V3i> seeds;
@@ -156,7 +158,9 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
   certificate.nonManifoldEdges = topology.nonManifoldEdges;
   certificate.droppedTriangles = topology.dropped;
   if (topology.triangles.empty())
-    throw InvalidInput("every triangle is degenerate; there is no surface to convert");
+    throw InvalidInput(
+        "every triangle of the mesh is degenerate, so there is no surface to convert; repair the "
+        "mesh");
   SelfIntersections selfIntersections(mesh, topology, subProgress(progress, 0.05, 0.4));
   certificate.method = chooseMethod(options, topology, selfIntersections);
   if (certificate.method == SignMode::Closed) checkClosed(topology, options.nesting);
@@ -190,8 +194,8 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
     }
     if (reached.isEmpty())
       throw InvalidInput(
-          "the requested region does not meet the mesh; choose a region that meets "
-          "it");
+          "the requested region does not intersect the band of the mesh; choose a region that "
+          "does");
     region = blocksOf(reached, *uniformTransform(voxelSize));
   }
   const auto grid = convert::assembleBand(local, field, origin, voxelSize, halfWidth, region,

@@ -16,8 +16,8 @@
 namespace levelset {
 
 enum class SignMode {
-  Auto,    ///< Closed when every edge has two faces and no self-intersection is found, else Winding
-  Closed,  ///< closed input; inside by parity or orientation of the crossings along grid lines
+  Auto,    ///< selects Closed if every edge has two faces and no triangles intersect, else Winding
+  Closed,  ///< requires a closed mesh; inside by parity or orientation of crossings with grid lines
   Winding  ///< inside where the generalised winding number exceeds 1/2 [Jacobson13, Barill18]
 };
 enum class Nesting {
@@ -25,38 +25,41 @@ enum class Nesting {
   Orientation  ///< nested components are solid or cavity by their orientation
 };
 
-/// Evidence for the sign of the distances: properties of the mesh and the method used.
+/// Sign certificate: properties of the mesh and the method that decided inside and outside.
 struct SignCertificate {
   bool closed = false;                    ///< every edge has exactly two faces
   std::size_t boundaryEdges = 0;          ///< edges with one face
   std::size_t nonManifoldEdges = 0;       ///< edges with three or more faces
-  std::ptrdiff_t selfIntersections = -1;  ///< pairs of triangles; -1: not searched
+  std::ptrdiff_t selfIntersections = -1;  ///< pairs of intersecting triangles; -1: not searched
   SignMode method = SignMode::Auto;       ///< method used: Closed or Winding
-  bool flipped = false;                   ///< true when a mesh that faced inwards was reversed
-  double ambiguousShare = 0;  ///< share of voxels next to the zero set with |w − 0.5| < 0.25; 1 if
-                              ///< there is no such voxel
+  bool flipped =
+      false;  ///< true when a mesh that faced inwards was reversed
+              /// Fraction of the voxels next to the zero set with an ambiguous winding number w,
+  /// |w − 0.5| < 0.25. 1 if no voxel is next to the zero set.
+  double ambiguousShare = 0;
   std::size_t droppedTriangles = 0;  ///< triangles without area and exact duplicates
 };
 
 struct MeshToBandOptions {
-  double halfWidth = 3;  ///< voxels, at least 1
+  double halfWidth = 3;  ///< half width of the band, voxels, at least 1
   SignMode sign = SignMode::Auto;
   Nesting nesting = Nesting::Parity;    ///< used with SignMode::Closed only
   bool acceptSign = false;              ///< accept an ambiguous sign, or a mesh without an inside
   bool searchSelfIntersections = true;  ///< false: Auto assumes that the mesh has none
-  /// Region of interest. Distances outside it are omitted, as cropped() does, unless the mesh has
-  /// holes. The certificate covers the complete mesh, except for the ambiguous share.
+  /// Region of interest. Distances outside it are not computed, unless the mesh has holes: then it
+  /// is ignored. The certificate describes the complete mesh, except for ambiguousShare.
   RegionOfInterest roi = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
-  /// Receives the complete certificate, also when the mesh is then refused.
+  /// Called with the complete certificate, even if meshToBand then throws because of it.
   std::function<void(const SignCertificate&)> onCertificate = {};
 };
 
-/// Limit of SignCertificate::ambiguousShare. Above it the sign is considered a guess.
+/// Limit of SignCertificate::ambiguousShare. Above it meshToBand refuses the mesh, unless the
+/// option acceptSign is set.
 inline constexpr double kAmbiguousLimit = 1e-3;
 
-/// Summary of the certificate in one line of text.
+/// Returns a summary of the certificate in one line of text.
 [[nodiscard]] std::string describe(const SignCertificate& certificate);
 
 struct MeshToBandResult {
@@ -65,17 +68,20 @@ struct MeshToBandResult {
 };
 
 /// Computes the signed distance of a triangle mesh on the voxels of a narrow band.
-/// @param mesh  finite coordinates; any set of triangles under Winding
+/// @param mesh  finite coordinates; with SignMode::Winding any set of triangles
 /// @param voxelSize  world units, positive and finite; grid points lie at its integer multiples
-/// @return all voxels whose centres lie within halfWidth of the mesh, with exact distances
+/// @return band in which the active voxels are all grid points within halfWidth of the mesh, with
+///         exact distances
 /// @throws UsageError for a voxel size or half width out of range
-/// @throws InvalidInput when the mesh is open under Closed or its sign is ambiguous; when the voxel
-///         is larger than the object, or the coordinates are coarser than voxel/8
+/// @throws InvalidInput when the mesh is open with SignMode::Closed or its sign is ambiguous; when
+///         the voxel is larger than the object, or the spacing of representable coordinates exceeds
+///         voxel/8
 /// @throws ResourceLimit when the memory does not suffice or an index exceeds 32 bits
 [[nodiscard]] MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
                                           const MeshToBandOptions& options = {});
 
-/// Checks the voxel size against the size of the object. This check of meshToBand needs no mesh.
+/// Checks the voxel size against the longest side of the bounding box of the object, both in world
+/// units. meshToBand() performs this check too.
 /// @throws InvalidInput for a voxel larger than the object
 void checkVoxelSize(double voxelSize, double longestSide);
 
@@ -88,7 +94,7 @@ struct LevelSetOperator {
 
   struct Options {
     VoxelSize voxel;
-    double halfWidth = 3;  ///< voxels
+    double halfWidth = 3;  ///< half width of the band, voxels
     SignMode sign = SignMode::Auto;
     Nesting nesting = Nesting::Parity;
     bool acceptsSign = false;
@@ -104,12 +110,14 @@ struct LevelSetOperator {
           {.help = "how inside is distinguished from outside"});
       visit("nested", &Options::nesting,
             {{"parity", Nesting::Parity}, {"orientation", Nesting::Orientation}},
-            {.help = "under 'closed': nested surfaces alternate, or follow their orientation"});
+            {.help = "with --sign closed: nested surfaces alternate between solid and void, or "
+                     "follow their orientation"});
       visit("accept-sign", &Options::acceptsSign,
-            {.help = "accept a sign that is a guess, or distances without an inside",
+            {.help = "accept a mesh whose inside is ambiguous, or that has no inside",
              .formerName = "sign-anyway"});
       visit("skip-intersection-test", &Options::skipsIntersectionTest,
-            {.help = "under 'auto': do not search self-intersections", .formerName = "trust-mesh"});
+            {.help = "with --sign auto: assume that the mesh has no self-intersections",
+             .formerName = "trust-mesh"});
     }
   };
 

@@ -60,8 +60,9 @@ std::uint32_t outermostVertex(const TriMesh& mesh) {
   return result;
 }
 
-/// Area of the surface within the box, world units². A triangle that extends beyond the box counts
-/// by the share of its own bounding box, along the axis with the smallest share.
+/// Estimates the area of the surface within a box, world units². The area of a triangle that
+/// extends beyond the box is multiplied by a fraction: the part of its bounding box within the box,
+/// along the axis where this part is smallest.
 double areaWithin(const Imath::Box3d& box, const TriMesh& mesh) {
   if (isEverywhere(box)) return surfaceArea(mesh);
   double area = 0;
@@ -80,8 +81,8 @@ double areaWithin(const Imath::Box3d& box, const TriMesh& mesh) {
   return area;
 }
 
-/// Estimate in bytes: about 12 per voxel of the band; per triangle, the local copy, its box and its
-/// index lists.
+/// Estimates the memory in bytes: 12 for each voxel of the band, and 250 for each triangle (its
+/// local copy, bounding box and index lists).
 double estimateMemory(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options) {
   const double halfWidth = std::min(options.halfWidth, options.roi.halfWidth);
   Imath::Box3d box = options.roi.region;
@@ -95,11 +96,11 @@ void checkPrecision(const TriMesh& mesh, double voxelSize, std::uint32_t outermo
   const bool isFloat = mesh.precision == CoordinatePrecision::Float;
   const double here = spacingAt(largest(mesh.positions[outermost]), mesh.precision);
   if (mesh.spacing > voxelSize / 8 && mesh.spacing > here)
-    throw InvalidInput(fmt::format(
-        "before the mesh was moved, its coordinates were {:.3g} apart "
-        "(measured at its present position), coarser than an eighth of the voxel size {:.6g}; "
-        "move the object to the origin before writing it, or use larger voxels",
-        mesh.spacing, voxelSize));
+    throw InvalidInput(
+        fmt::format("before the mesh was moved, its representable coordinates were {:.3g} apart "
+                    "(in its present scale), coarser than an eighth of the voxel size {:.6g}; move "
+                    "the object to the origin before writing it, or use larger voxels",
+                    mesh.spacing, voxelSize));
   const double spacing = here;
   if (spacing > voxelSize / 8)
     throw InvalidInput(

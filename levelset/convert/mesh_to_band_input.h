@@ -7,15 +7,17 @@
 
 namespace levelset::convert {
 
-/// Checks the input of meshToBand, in this order: the arguments, the mesh, the index range, the
-/// memory, the precision of the coordinates.
+/// Checks the input of meshToBand, in this order: the voxel size and half width, the vertices and
+/// triangles, the index range, the memory, the precision of the coordinates.
 /// @throws UsageError, InvalidInput, ResourceLimit
 void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options);
 
-/// Grid point just below the centre of the mesh. Its coordinates are multiples of 8.
+/// Returns the origin of the local frame of a mesh, in index coordinates: the centre of the mesh,
+/// rounded down to multiples of 8.
 [[nodiscard]] Imath::V3i localOrigin(const TriMesh& mesh, double voxelSize);
 
-/// The welded faces, in voxels relative to `origin`.
+/// Returns the mesh in voxels relative to `origin`, with the triangles of `topology`: vertices at
+/// equal positions are merged, degenerate and duplicate triangles are dropped.
 [[nodiscard]] LocalMesh toLocal(const TriMesh& mesh, const MeshTopology& topology, double voxelSize,
                                 const Imath::V3i& origin);
 

@@ -11,29 +11,33 @@
 
 namespace levelset::convert {
 
-/// An edge at which the faces do not form one oriented surface.
+/// An edge at which the faces do not form a consistently oriented surface.
 struct UnorientedEdge {
-  Imath::V3d from, to;  ///< end points, in the units of the mesh
-  std::size_t faces = 0;
+  Imath::V3d from, to;    ///< end points, in the frame of the LocalMesh
+  std::size_t faces = 0;  ///< number of faces that share the edge
 };
 
-/// Normals at the faces, edges and vertices of a mesh. A point lies in front of the surface exactly
-/// if it lies in front of the plane through its closest point with that normal [Baerentzen05].
+/// Normals at the faces, edges and vertices of a mesh. A point lies in front of the surface if and
+/// only if it lies in front of the plane through its closest point with the pseudonormal of that
+/// point [Baerentzen05].
 class Pseudonormals {
  public:
   explicit Pseudonormals(const LocalMesh& mesh);
 
-  /// The first edge with three or more faces, or with two faces that run along it in the same
-  /// direction.
+  /// Returns the first edge with three or more faces, or with two faces that traverse it in the
+  /// same direction. Empty: the mesh is consistently oriented.
   [[nodiscard]] const std::optional<UnorientedEdge>& unorientedEdge() const {
     return unorientedEdge_;
   }
   [[nodiscard]] std::size_t borderEdges() const { return borderEdges_; }
 
   struct Direction {
-    Imath::V3d normal{0};  ///< unit length; zero where all faces are degenerate
+    Imath::V3d normal{0};  ///< unit length; zero if all adjacent faces are degenerate
     bool onBorder = false;
   };
+  /// Returns the pseudonormal of a part of a triangle: corner 0 to 2, edge from corner part − 3
+  /// to the
+  /// next for 3 to 5, face for 6.
   [[nodiscard]] Direction at(std::uint32_t triangle, int part) const;
 
  private:

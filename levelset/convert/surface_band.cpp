@@ -30,9 +30,11 @@ using SurfaceLeaf = openvdb::FloatTree::LeafNodeType;
 // Voxels by which the band extends the surface beyond its border. Tricubic interpolation reads two
 // voxels along each axis, about 3.5 along the diagonal.
 constexpr double kBeyond = 3.5;
-constexpr double kTouching = 1e-6;  // voxels, as in meshToBand
+constexpr double kTouching =
+    1e-6;  // distance at which a grid point counts as on the surface, voxels
 
-/// Bounding sphere of a triangle, for quick rejection.
+/// Bounding sphere of a triangle, in voxels. It excludes far triangles from the search for the
+/// closest one.
 struct Sphere {
   V3d center;
   double radius;
@@ -49,11 +51,11 @@ std::vector<Sphere> spheresOf(const LocalMesh& mesh) {
   return spheres;
 }
 
-/// Relation of a grid point to the surface, in voxels.
+/// Signed distance of a grid point from the surface.
 struct SignedPoint {
-  double value = 0;
-  bool isActive = false;
-  double beyond = 0;  ///< distance beyond the border, voxels
+  double value = 0;       ///< signed distance, voxels
+  bool isActive = false;  ///< the grid point belongs to the band
+  double beyond = 0;  ///< distance of the closest point on the extension from the border, voxels
 };
 
 class SideOfSurface {
@@ -61,10 +63,14 @@ class SideOfSurface {
   SideOfSurface(const LocalMesh& mesh, const Pseudonormals& normals, double reach)
       : mesh_(mesh), normals_(normals), spheres_(spheresOf(mesh)), reach_(reach) {}
 
-  /// Search radius of a block, voxels. It covers the extension beyond the border.
+  /// Radius of the search for triangles, voxels. It covers the extension of the surface beyond its
+  /// border.
   [[nodiscard]] double search() const { return std::sqrt(reach_ * reach_ + kBeyond * kBeyond); }
 
-  /// @param distance  distance of the point to the nearest triangle
+  /// Computes the signed distance of a grid point.
+  /// @param p           in the frame of the mesh, voxels
+  /// @param distance    distance of the grid point from the nearest triangle, voxels
+  /// @param candidates  triangles that may be nearest
   [[nodiscard]] SignedPoint at(const V3d& p, double distance,
                                std::span<const std::uint32_t> candidates) const {
     double best = HUGE_VAL;
@@ -89,8 +95,8 @@ class SideOfSurface {
       const double length = distance < kTouching ? 0 : distance;
       return {ahead < 0 ? -length : length, length < reach_};
     }
-    // Beyond the border the value is the distance to the plane of the border's normal. It continues
-    // the distance smoothly across the border.
+    // If the closest point is on the border, the value is the distance from the plane through it
+    // with the pseudonormal of the border. It continues the distance smoothly beyond the border.
     const double beyond = (offset - direction.normal * ahead).length();
     const bool isOn = direction.normal != V3d(0) && beyond <= kBeyond && std::abs(ahead) < reach_;
     return {std::abs(ahead) < kTouching ? 0 : ahead, isOn, beyond};
@@ -166,10 +172,12 @@ SurfaceGrids measureBlocks(const LocalMesh& mesh, const SideOfSurface& side, con
   return grids;
 }
 
-/// Returns true when the sign change from `here` to `next` is no surface, but the midpoint between
-/// the front of one part and the back of another. At a real surface, distances differ by at most
-/// the step. Close parts are recognised by slopes on both sides that run against the change.
-/// @param last, after  values of the points before and behind, where active; else null
+/// Returns true when the sign change between two neighbouring grid points is not at the surface,
+/// but half way between the front of one part of the surface and the back of another. At the
+/// surface, the two distances differ by at most a voxel. If the parts are close together, the
+/// difference may be small too; then the distances on both sides slope against the change.
+/// @param here, next values of the two grid points
+/// @param last, after values of the grid points before `here` and behind `next`; null: inactive
 bool isContradiction(float here, float next, const float* last, const float* after, float voxel) {
   if ((here < 0) == (next < 0)) return false;
   const float change = next - here;
@@ -177,7 +185,8 @@ bool isContradiction(float here, float next, const float* last, const float* aft
   return last && after && (here - *last) * change < 0 && (*after - next) * change < 0;
 }
 
-/// Deactivates the voxels beside a contradiction.
+/// Deactivates the voxels next to a sign change that is not at the surface.
+/// @return their number
 std::size_t removeContradictions(openvdb::FloatGrid& grid) {
   const float voxel = static_cast<float>(grid.voxelSize()[0]), background = grid.background();
   openvdb::tree::LeafManager<openvdb::FloatTree> leaves(grid.tree());
@@ -218,8 +227,8 @@ void checkSurface(const Pseudonormals& normals, const V3i& origin, double voxelS
     };
     throw InvalidInput(
         edge->faces > 2
-            ? fmt::format("at the edge from {} to {}, {} faces meet, so the surface does not "
-                          "have two sides; split the surface there",
+            ? fmt::format("at the edge from {} to {}, {} faces meet, so the surface has no front "
+                          "and back there; split the surface at this edge",
                           text(edge->from), text(edge->to), edge->faces)
             : fmt::format("at the edge from {} to {}, two faces have opposite orientations; "
                           "orient all faces alike (a Moebius strip has only one side: cut it)",
@@ -241,7 +250,9 @@ SurfaceBandResult surfaceBand(const TriMesh& mesh, double voxelSize,
   report(options.progress, 0);
   const convert::MeshTopology topology = convert::findTopology(mesh);
   if (topology.triangles.empty())
-    throw InvalidInput("every triangle is degenerate; there is no surface");
+    throw InvalidInput(
+        "every triangle of the mesh is degenerate, so there is no surface to convert; repair the "
+        "mesh");
   const V3i origin = convert::localOrigin(mesh, voxelSize);
   const LocalMesh local = convert::toLocal(mesh, topology, voxelSize, origin);
   const Pseudonormals normals(local);

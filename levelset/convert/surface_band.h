@@ -10,7 +10,8 @@
 /// Band of a surface that has a border: a base for patches, not a solid.
 namespace levelset {
 
-/// Minimum half width, voxels: tricubic interpolation at the surface reads up to 3.5 voxels away.
+/// Minimum half width, voxels: tricubic interpolation at the surface reads grid points up to 3.5
+/// voxels from it.
 inline constexpr double kMinSurfaceHalfWidth = 4;
 
 struct SurfaceBandOptions {
@@ -20,23 +21,24 @@ struct SurfaceBandOptions {
 };
 
 struct SurfaceBandResult {
-  NarrowBand band;  ///< isOpenSurface()
-  std::size_t borderEdges = 0;
+  NarrowBand band;                   ///< band with isOpenSurface() true
+  std::size_t borderEdges = 0;       ///< edges with one face
   std::size_t droppedTriangles = 0;  ///< triangles without area and exact duplicates
-  /// Voxels removed where the front of one part of the surface meets the back of another.
+  /// Number of voxels removed half way between the front of one part of the surface and the back of
+  /// another, where the sign would change without a surface.
   std::size_t removedVoxels = 0;
 };
 
-/// Computes distances to an open, consistently oriented mesh, positive on the side that the
+/// Computes signed distances to an open, consistently oriented mesh, positive on the side that the
 /// triangles face. The sign is that of the closest face; at edges and vertices, that of the
 /// angle-weighted pseudonormal [Baerentzen05].
 ///
 /// Beyond the border the band extends the surface straight for 3.5 voxels. Interpolation is thus
-/// valid up to the border in any orientation. The band ends there and nothing is active further
-/// out. The extensions of both sides of a slit overlap, so the band stores the distance of each
-/// point beyond the border (BandSampler::beyondBorder). The band also ends halfway between two
-/// parts where the front of one faces the back of the other.
-/// @param mesh  vertices at equal positions count as one
+/// valid up to the border in any orientation. The band ends at the end of this extension. The
+/// extensions of both sides of a slit overlap, so the band also stores how far the closest point of
+/// each voxel lies beyond the border (BandSampler::beyondBorder). Where the front of one part of
+/// the surface faces the back of another part, the band ends half way between the two.
+/// @param mesh  vertices at equal positions are merged
 /// @param voxelSize  world units, positive and finite; grid points lie at its integer multiples
 /// @throws UsageError for a voxel size or half width out of range
 /// @throws InvalidInput for a mesh that meshToBand refuses or a mesh without a border. Also throws
@@ -53,7 +55,7 @@ struct SurfaceBandOperator {
 
   struct Options {
     VoxelSize voxel;
-    double halfWidth = 16;  ///< voxels
+    double halfWidth = 16;  ///< half width of the band, voxels
 
     template <class Visitor>
     static void describe(Visitor& visit) {

@@ -15,11 +15,11 @@ using Imath::V3d;
 using Imath::V3i;
 using List = std::vector<std::uint32_t>;
 
-constexpr std::size_t kTaskSize = 2048;  // triangles; smaller cells stay within their task
-constexpr std::size_t kShare = std::size_t{1} << 50;  // progress units of the complete search
+constexpr std::size_t kTaskSize = 2048;  // triangles of a cell that becomes a task of its own
+constexpr std::size_t kShare = std::size_t{1} << 50;  // progress units of the complete traversal
 
 struct Cell {
-  std::int64_t x, y, z, size;  // lowest grid point; edge length
+  std::int64_t x, y, z, size;  // lowest grid point; grid points along an edge
 };
 
 class BlockTraversal {
@@ -39,7 +39,7 @@ class BlockTraversal {
 
  private:
   struct Box {
-    V3d low, high;  // bounding box enlarged by reach
+    V3d low, high;  // bounding box of a triangle, enlarged by reach_
     double extent;  // longest side of the triangle's bounding box
   };
 
@@ -55,7 +55,8 @@ class BlockTraversal {
     return box;
   }
 
-  /// Cell of 8 · 2ⁿ points, centred at the origin, that contains all points within reach.
+  /// Returns the root cell: a cube of 8 · 2ⁿ grid points along an edge, centred at the origin, that
+  /// contains all points within reach_ of the mesh.
   Cell rootCell() const {
     double half = kBlockDim;
     for (const Box& box : boxes_)

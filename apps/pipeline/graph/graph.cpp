@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "apps/pipeline/registry/invocation.h"
+#include "apps/pipeline/values/refusal.h"
 #include "levelset/error.h"
 
 namespace pipeline {
@@ -166,7 +167,13 @@ Kind checkNode(const Node& node, const std::vector<Node>& before) {
   probe.voxelFollows = node.voxelFollows;
   for (const std::size_t input : node.inputs)
     probe.operands.emplace_back(Plan{.kind = before[input].kind});
-  if (op.validate) op.validate(probe);
+  if (op.validate) {
+    try {
+      op.validate(probe);
+    } catch (const levelset::Error& error) {
+      rethrowAs(op.name, error);
+    }
+  }
   return node.makes() && op.resultKind ? op.resultKind(probe) : Kind::Band;
 }
 

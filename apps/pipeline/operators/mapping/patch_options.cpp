@@ -110,6 +110,7 @@ std::array<double, 2> patchSizeOf(Invocation& in) {
 
 std::vector<mapping::PatchOutline> outlinesOf(const std::vector<mapping::Patch>& patches) {
   std::vector<mapping::PatchOutline> outlines;
+  outlines.reserve(patches.size());
   for (const mapping::Patch& one : patches) outlines.push_back(mapping::outlineOf(one));
   return outlines;
 }
