@@ -33,7 +33,7 @@ CubicPiece splitCubic(CubicPiece& piece) {
 /// Processes the pieces from left to right. A piece without sign variation has no root (convex
 /// hull). A piece whose ends differ in sign has one. With `stopAtProof` the search ends as soon as
 /// a root is certain.
-/// @param all  if given, receives all roots, and the function returns none
+/// @param all  if not null, receives all roots; then the function returns -1
 double searchCubic(const BernsteinCubic& cubic, bool stopAtProof,
                    std::vector<double>* all = nullptr) {
   CubicPiece stack[kMaxDepth + 1];

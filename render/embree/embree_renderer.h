@@ -16,9 +16,10 @@
 namespace render {
 
 /// Draws the scene. Pixels depend on the scene alone, not on the number of threads.
-/// @return layers R G B A (linear, premultiplied, mean of the samples); and from the pixel centre Z
-///         (distance along the view axis, +inf for a miss), N.X N.Y N.Z, P.X P.Y P.Z, curvature.*
-///         and id (0: none). Lengths are world units. Header attributes record scene and options.
+/// @return layers R G B A (linear, premultiplied, mean of the samples), and data layers from the
+/// ray through the pixel's centre: Z (distance along the view axis, +inf for a miss), N.X N.Y N.Z,
+/// P.X P.Y P.Z, curvature.* and id (0: none). Lengths are world units. Header attributes record
+/// scene and options.
 /// @throws levelset::UsageError for an invalid camera, or sample counts out of range
 /// @throws levelset::InvalidInput when there is no surface in the scene
 /// @throws levelset::ResourceLimit for an image that is too large
@@ -34,7 +35,7 @@ class EmbreeScene {
   explicit EmbreeScene(const Scene& scene, Filter filter = Filter::Trilinear);
   ~EmbreeScene();
   EmbreeScene(EmbreeScene&&) noexcept;
-  /// First hit beyond `near`. A ray that starts inside hits where it leaves.
+  /// First hit in [near, far]. A ray that starts inside a solid hits where it leaves the solid.
   /// @throws levelset::UsageError when origin or direction is not finite or the direction is zero
   [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction,
                               double near = 0, double far = Camera::kNoDepth) const;
@@ -44,7 +45,8 @@ class EmbreeScene {
   [[nodiscard]] std::vector<Hit> intersectVisible(const Imath::V3d& origin,
                                                   const Imath::V3d& direction, double near,
                                                   double far) const;
-  /// Share of light that passes all surfaces in [0, far]; may stop below kLeastTransmittance.
+  /// Share of light that passes all surfaces in [0, far]. Surfaces are ignored once the share is
+  /// below kLeastTransmittance.
   /// @throws as intersect()
   [[nodiscard]] double transmittance(const Imath::V3d& origin, const Imath::V3d& direction,
                                      double far) const;

@@ -28,7 +28,7 @@ struct RaySolid {
   std::uint32_t id;
   std::size_t index;        // index in Scene::solids
   std::size_t number;       // index among the solids with a surface
-  const EmbreeSpace* view;  // space of the entire scene
+  const EmbreeSpace* view;  // scaled space of Embree's rays, the same for all solids
   Filter filter;
   Imath::C3f colour;
   double opacity;
@@ -43,13 +43,15 @@ struct RaySolid {
 /// precision and the best hit so far.
 struct RayQuery {
   RTCIntersectContext embree;  // first member: Embree returns its address
-  V3d origin, direction;       // world; the origin is at the scene's box
-  double limit;  // end of the search: the same for all blocks, so that a hit has the same bits in
-                 // any order of the blocks
+  V3d origin,
+      direction;  // world space; the origin is moved to the ray's entry into the box of the scene
+  double limit;   // end of the search, distance from `origin`. It is the same for all blocks, so
+                  // that a hit has the same bits in any order of the blocks
   double nearest;
   double scale;
   const RaySolid* solid = nullptr;
-  std::vector<std::vector<SideChange>>* changes = nullptr;  // set: collects all changes, by solid
+  std::vector<std::vector<SideChange>>* changes =
+      nullptr;  // if not null, receives all crossings of the ray, by solid
 };
 
 IndexRay indexRayOf(const RayQuery& query, const RaySolid& solid) {
@@ -93,7 +95,7 @@ void intersectBlock(const RTCIntersectFunctionNArguments* args) {
   if (query.solid && *t == query.nearest && solid.number >= query.solid->number) return;
   query.nearest = *t;
   query.solid = &solid;
-  // Keep blocks that may hold a hit at the same distance within Embree's range.
+  // The padding keeps blocks that may hold a hit at the same distance within Embree's range.
   RTCRayN* ray = RTCRayHitN_RayN(args->rayhit, args->N);
   RTCRayN_tfar(ray, args->N, 0) = std::min(
       RTCRayN_tfar(ray, args->N, 0), static_cast<float>(*t * query.scale + EmbreeSpace::kPad));
@@ -110,7 +112,8 @@ void occludeBlock(const RTCOccludedFunctionNArguments* args) {
     RTCRayN_tfar(args->ray, args->N, 0) = -std::numeric_limits<float>::infinity();
 }
 
-/// Sorts the changes and removes pairs that cancel at equal distance.
+/// Sorts the crossings of a ray with one solid by distance. Removes an entry and an exit at equal
+/// distance, because they cancel.
 void putInOrder(std::vector<SideChange>& changes) {
   std::stable_sort(changes.begin(), changes.end(),
                    [](const SideChange& a, const SideChange& b) { return a.t < b.t; });
@@ -124,15 +127,16 @@ void putInOrder(std::vector<SideChange>& changes) {
   changes = std::move(kept);
 }
 
-/// A point where a ray enters or leaves the result of the expression.
+/// A point where a ray enters or leaves the result of the CSG expression.
 struct CsgChange {
   double t;
   std::size_t solid;
   bool isFlipped;
 };
 
-/// Calls visit(change) for each such point along the ray until it returns false. Without an
-/// expression, visits the crossings of all solids.
+/// Calls visit(change) for each point where the ray enters or leaves the result of `csg`, in order,
+/// until visit() returns false. Without an expression, visits the crossings of all solids.
+/// @param changes  crossings of the ray, by solid
 template <typename Visit>
 void walkChanges(const CsgExpression& csg, std::vector<std::vector<SideChange>>& changes,
                  const Visit& visit) {
@@ -173,12 +177,12 @@ void requireRay(const V3d& origin, const V3d& direction) {
 
 struct EmbreeScene::Impl {
   std::vector<RaySolid> solids;
-  CsgExpression csg;  // over these solids
+  CsgExpression csg;  // uses indices of `solids`
   MeshRays meshes;
-  std::optional<FieldMarch> fields;  // set when the scene is blended
+  std::optional<FieldMarch> fields;  // set for a blended scene; then `solids` is empty
   bool isOpaque;
-  Box3d allBounds;  // with meshes
-  Box3d bounds;     // box of the crossed cells
+  Box3d allBounds;  // world-space box of the solids and meshes
+  Box3d bounds;     // world-space box of the cells that the solids' surfaces cross
   EmbreeSpace view;
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
@@ -193,13 +197,13 @@ struct EmbreeScene::Impl {
 
   void gather(const Scene& source, Filter filter);
   void build();
-  /// Builds a query and Embree's ray for it; empty when the ray misses the scene's box. `moved`
-  /// returns the distance from the ray's origin to the query's origin.
+  /// Builds a query and Embree's ray for it. Returns nothing when the ray misses the box of the
+  /// scene. `moved` receives the distance from `origin` to the query's origin.
   std::optional<RayQuery> prepare(const V3d& origin, const V3d& direction, double near, double far,
                                   double& moved, RTCRay& ray) const;
-  /// All crossings of the ray, by solid, up to the end of the scene.
+  /// All crossings of the ray, by solid, up to the far side of the scene.
   [[nodiscard]] std::vector<std::vector<SideChange>> allChanges(RayQuery& query, RTCRay ray) const;
-  /// First crossing with the result of the expression, up to `limit` of the query.
+  /// First point, up to `limit` of the query, where the ray enters or leaves the result of `csg`.
   std::optional<CsgChange> findCsg(RayQuery& query, RTCRay ray) const;
   /// @pre the direction is finite and not zero
   [[nodiscard]] Hit intersectSolids(const V3d& origin, const V3d& direction, double near,
@@ -308,7 +312,8 @@ std::vector<std::vector<SideChange>> EmbreeScene::Impl::allChanges(RayQuery& que
   query.changes = &changes;
   RTCRayHit all;
   all.ray = ray;
-  all.ray.tfar = 2;  // end of the scene: later crossings determine the side at the start
+  all.ray.tfar = 2;  // beyond the scaled scene: the crossings after `limit` are also needed to know
+                     // if the ray starts inside
   all.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   all.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(scene, &query.embree, &all);
@@ -385,7 +390,8 @@ std::vector<Hit> EmbreeScene::intersectVisible(const V3d& origin, const V3d& dir
     return hits;
   }
   double share = 1;
-  // Adds mesh hits up to a distance. Returns true when a later surface is still visible.
+  // Adds the mesh hits up to the distance `end`. Returns true when a surface behind them is
+  // visible.
   const auto addMeshes = [&](double end) {
     while (share >= kLeastTransmittance) {
       const Hit hit = impl_->meshes.intersect(origin, direction, near, end);
@@ -453,7 +459,7 @@ double EmbreeScene::thickness(const V3d& origin, const V3d& direction, double ne
   auto query = impl_->prepare(origin, direction, near, far, moved, ray);
   if (!query) return 0;
   auto changes = impl_->allChanges(*query, ray);
-  // Without an expression, a point is inside when any solid contains it.
+  // Without a CSG expression, a point is inside when any solid contains it.
   const auto isWithin = [&](const std::vector<char>& inside) {
     if (!impl_->csg.isEmpty()) return impl_->csg.holds(inside.data());
     return std::find(inside.begin(), inside.end(), 1) != inside.end();

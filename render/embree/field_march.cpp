@@ -20,12 +20,13 @@ using CornerAccessor = openvdb::tree::ValueAccessor<const FloatTree, false>;
 using Join = FieldExpression::Join;
 
 constexpr double kEndless = std::numeric_limits<double>::infinity();
-constexpr double kLeastStep = 1e-7;  // relative to the finest voxel
-constexpr double kMostStepUp = 1e5;  // limit on the growth of repeated least steps
+constexpr double kLeastStep = 1e-7;  // smallest step, relative to the finest voxel size
+constexpr double kMostStepUp = 1e5;  // limit on the growth of repeated smallest steps
 constexpr double kSlopeRounding = 1 + 1e-6;
 
-/// Bound on the gradient of the interpolant in the cells from the leaf's origin − 1 on, per voxel.
-/// Along each axis it is the largest slope of the four cell edges.
+/// Bound on the length of the trilinear interpolant's gradient in the 9³ cells from the leaf's
+/// origin − 1 on, per voxel. In a cell, each component is at most the largest slope of the four
+/// edges along its axis.
 double steepestNear(const FloatTree& tree, const Coord& origin) {
   CornerAccessor accessor(tree);
   constexpr int kPoints = 10;
@@ -50,7 +51,7 @@ double steepestNear(const FloatTree& tree, const Coord& origin) {
   return steepest;
 }
 
-/// Bound on the gradient of the entire interpolant, per voxel.
+/// Bound on the length of the trilinear interpolant's gradient in the entire grid, per voxel.
 double steepestOf(const FloatTree& tree) {
   std::vector<Coord> origins;
   for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) origins.push_back(leaf->origin());
@@ -77,7 +78,8 @@ double interpolantAt(const CornerAccessor& accessor, const V3d& place) {
   return sum;
 }
 
-/// The smooth minimum, written as a convex combination.
+/// The smooth minimum of FieldExpression, written as a convex combination of a and b less a
+/// quadratic term.
 double mixedMin(double a, double b, double softness) {
   const double h = std::clamp(0.5 + 0.5 * (b - a) / softness, 0.0, 1.0);
   return a * h + b * (1 - h) - softness * h * (1 - h);
@@ -98,12 +100,12 @@ double marchedJoin(const FieldExpression& e, Join how, double a, double b) {
 
 }  // namespace
 
-/// The expression along one ray, as a function of the distance from the point where the ray enters
-/// the fields.
+/// The expression along one ray, as a function of the distance t from the point where the ray first
+/// enters the box of a field.
 class FieldMarch::RaySegment {
  public:
   double begin = kEndless,
-         end = 0;  // from the ray's origin: range in which the fields are not constant
+         end = 0;  // range in which the fields are not constant, distances from the ray's origin
 
   RaySegment(const FieldMarch& march, const V3d& origin, const V3d& direction, double near,
              double far)
@@ -129,15 +131,16 @@ class FieldMarch::RaySegment {
   [[nodiscard]] bool isEmpty() const { return begin >= end; }
   [[nodiscard]] bool isInside(double t) { return valueAt(t) < 0; }
 
-  /// Finds the next crossing after t, given the side at t. Returns nothing when the ray stays on
-  /// that side.
+  /// Finds the next crossing after t. Returns nothing when the ray stays on its side. @param inside
+  /// true when the ray is inside the solid at t
   std::optional<double> nextCrossing(double t, bool inside) {
     double least = march_.leastStep_;
     while (t < end - begin) {
       const double value = valueAt(t);
       if ((value < 0) != inside) return t;
       const double safe = std::abs(value) / march_.steepest_, step = std::max(safe, least);
-      // The growing least step ends the search on a ray that runs within a face of the solid.
+      // The growth of the smallest step bounds the time for a ray that runs within a face of the
+      // solid.
       least =
           safe < least ? std::min(2 * least, kMostStepUp * march_.leastStep_) : march_.leastStep_;
       const double next = std::min(std::max(t + step, nextEntry(t)), end - begin);
@@ -148,10 +151,10 @@ class FieldMarch::RaySegment {
   }
 
  private:
-  struct Part {  // segment of the ray, in a field's index space
+  struct Part {  // the ray in the index space of a field
     CornerAccessor accessor;
     V3d start, step;
-    double enter, leave;  // range in which the field is not constant
+    double enter, leave;  // range of t in which the field is not constant
   };
 
   static std::pair<double, double> partIn(const MarchedField& field, const V3d& origin,
@@ -180,7 +183,8 @@ class FieldMarch::RaySegment {
     return values_[march_.expression_.drawn];
   }
 
-  /// Parameter at which the next field begins to vary, when all fields are constant at t; else 0.
+  /// If all fields are constant at t: the parameter at which the next field begins to vary.
+  /// Otherwise 0.
   [[nodiscard]] double nextEntry(double t) const {
     double entry = kEndless;
     for (const Part& part : parts_) {

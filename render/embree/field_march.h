@@ -13,16 +13,17 @@
 namespace render {
 
 /// The judge of blended scenes: sphere tracing of a FieldExpression in double precision [Hart96]. A
-/// step is the value divided by a bound on the slope. The bound is proven for every cell of every
-/// grid, so no step passes a crossing. The smallest step is 1e-7 of the finest voxel. It grows to
-/// 1e-2 of that voxel where the ray runs along a surface that is nearer than that. Thread-safe. Ray
-/// directions have unit length.
+/// step is the value divided by a bound on the slope. The bound holds in every cell of every grid,
+/// so no such step passes a crossing. The smallest step is 1e-7 times the finest voxel size. While
+/// a ray stays so close to the surface that it takes only smallest steps, their length doubles up
+/// to 1e-2 voxel sizes. Thread-safe. Ray directions have unit length.
 class FieldMarch {
  public:
   /// @pre the scene is blended and passes requireFields()
   explicit FieldMarch(const Scene& scene);
 
-  /// First hit in [near, far]. A ray that is inside at `near` hits where it leaves.
+  /// First hit in [near, far]. A ray that is inside the solid at `near` hits where it leaves the
+  /// solid.
   [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction, double near,
                               double far) const;
   [[nodiscard]] bool isOccluded(const Imath::V3d& origin, const Imath::V3d& direction, double near,
@@ -35,14 +36,14 @@ class FieldMarch {
   struct MarchedField {
     levelset::NarrowBand band;
     Imath::M44d indexToWorld, worldToIndex;
-    Imath::Box3d box;  // cells whose values are not constant, index space
+    Imath::Box3d box;  // box of the cells whose values are not constant, index space
   };
   class RaySegment;
 
   FieldExpression expression_;
   std::vector<MarchedField> fields_;  // one for each operand
-  double steepest_ = 1;               // bound on the slopes of all fields
-  double leastStep_ = 0;              // world units
+  double steepest_ = 1;   // bound on the slopes of all fields, change of φ per world unit
+  double leastStep_ = 0;  // smallest step, world units
 };
 
 }  // namespace render

@@ -18,7 +18,8 @@ using openvdb::FloatTree;
 
 // === Cells that the surface crosses
 
-/// Bit z of rows[x][y] is set where the value at (x, y, z) is negative, each 0 … 8.
+/// Bit z of rows[x][y] is set when the value at the grid point (x, y, z) of a block is negative.
+/// Each index runs from 0 to 8.
 using SignRows = std::array<std::array<unsigned, 9>, 9>;
 
 SignRows signRowsOf(const SurfaceBlock& block) {
@@ -33,7 +34,8 @@ SignRows signRowsOf(const SurfaceBlock& block) {
   return rows;
 }
 
-/// Adds the cells with set bits z to `crossing` and `extent`.
+/// Adds the cells (x, y, z) for which bit z of `cells` is set to `crossing` and `extent` of the
+/// block.
 void markCells(SurfaceBlock& block, unsigned x, unsigned y, unsigned cells) {
   block.crossing[x] |= std::uint64_t{cells} << (8 * y);
   for (unsigned z = 0; z < 8; ++z) {
@@ -47,8 +49,8 @@ void markCells(SurfaceBlock& block, unsigned x, unsigned y, unsigned cells) {
   }
 }
 
-/// Fills `crossing` and `extent` with the cells in which the spline may cross zero; false when
-/// there are none.
+/// Fills `crossing` and `extent` with the cells in which the spline may cross zero. Returns false
+/// when there are none.
 bool markSplineCells(SurfaceBlock& block, const DrawnField& field) {
   const SplineCoefficients<8> coefficients(field.tree, block.origin, field.filter);
   block.crossing.fill(0);
@@ -63,8 +65,8 @@ bool markSplineCells(SurfaceBlock& block, const DrawnField& field) {
   return block.extent[3] != 0;
 }
 
-/// Fills `crossing` and `extent` with the cells whose corners differ in sign; false when there are
-/// none.
+/// Fills `crossing` and `extent` with the cells whose corners differ in sign. Returns false when
+/// there are none.
 bool markCrossingCells(SurfaceBlock& block) {
   const SignRows rows = signRowsOf(block);
   block.crossing.fill(0);
@@ -87,7 +89,8 @@ bool markCrossingCells(SurfaceBlock& block) {
 struct BlockTraversal {
   const SurfaceBlock& block;
   const IndexRay& ray;
-  double enter, leave;  ///< ray interval within the block, clipped to the range of the ray
+  double enter, leave;  ///< interval of the ray's parameter within the block and within the range
+                        ///< of the search
   int axis = -1;        ///< axis of the entry plane of the cell; -1: the ray starts inside
   int cell[3] = {};     ///< index coordinates of the cell
   double t = 0;         ///< parameter at the entry into the cell
@@ -103,7 +106,8 @@ struct BlockTraversal {
   bool clip();
   void findFirstCell();
   int exitAxis(double& exit) const;
-  /// Positions in the cell at `t` and at `exit`; on a face the coordinate is exactly 0 or 1.
+  /// Computes the positions p[0] at `t` and p[1] at `exit` in the cell, from 0 to 1. On a face the
+  /// coordinate is exactly 0 or 1.
   void placesInCell(double exit, int outAxis, double (&p)[2][3]) const;
   [[nodiscard]] BernsteinCubic restrictToRay(double exit, int exitAxis) const;
   [[nodiscard]] std::optional<double> splineRoot(const DrawnField& field, double exit,
@@ -114,8 +118,9 @@ struct BlockTraversal {
                       std::vector<double>& shares) const;
 };
 
-/// Clips the ray to the block; false when it misses. Of planes met at the same parameter the last
-/// one is the entry plane. findFirstCell() and exitAxis() use the same order.
+/// Clips the ray to the block. Returns false when the ray misses the block. When the ray meets
+/// several planes at the same parameter, the plane of the last axis is the entry plane.
+/// findFirstCell() and exitAxis() use the same order.
 bool BlockTraversal::clip() {
   for (int a = 0; a < 3; ++a) {
     const int low = block.origin[a], high = low + 8;
@@ -134,8 +139,9 @@ bool BlockTraversal::clip() {
   return enter <= leave;
 }
 
-/// Finds the cell in which a traversal of the entire grid would enter this block. The guess by
-/// floor() is corrected by the planes themselves.
+/// Finds the cell in which a traversal of the entire grid would enter this block. The estimate by
+/// floor() may be off by rounding. It is corrected by comparing `t` with the parameters of the
+/// cell's planes.
 void BlockTraversal::findFirstCell() {
   t = enter;
   for (int a = 0; a < 3; ++a) {
@@ -210,8 +216,9 @@ bool BlockTraversal::addSplineRoots(const DrawnField& field, double exit, int ou
   return spline.value(start) < 0;
 }
 
-/// The interpolant between `t` and `exit`: the blossom of the cubic at both ends, because the
-/// interpolant is affine in each coordinate. On a face the coordinate is exactly 0 or 1.
+/// Bernstein coefficients of the trilinear interpolant along the ray between `t` and `exit`. They
+/// are values of its blossom at the two ends, because the interpolant is affine in each coordinate.
+/// On a face the coordinate is exactly 0 or 1.
 /// @param outAxis  axis of the face at `exit`; -1 when the ray ends within the cell
 BernsteinCubic BlockTraversal::restrictToRay(double exit, int outAxis) const {
   double p[2][3];
@@ -255,8 +262,8 @@ Imath::Box3d SurfaceBlock::bounds() const {
 std::vector<SurfaceBlock> surfaceBlocks(const DrawnField& field) {
   const FloatTree& tree = field.tree;
   using Leaf = FloatTree::LeafNodeType;
-  // A cell belongs to the block of its lowest corner. So a leaf has cells in the seven blocks below
-  // it, which may have no leaves of their own.
+  // A cell belongs to the block of its lowest corner. So points of a leaf are also corners of cells
+  // in the seven blocks before it along the axes, which may have no leaves of their own.
   std::vector<Coord> origins;
   for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
     for (int n = 0; n < 8; ++n)
@@ -291,10 +298,10 @@ std::vector<SurfaceBlock> surfaceBlocks(const DrawnField& field) {
 
 namespace {
 
-/// Traverses the marked cells of a block, in their order along the ray.
+/// Visits the cells of a block that are marked in `crossing`, in their order along the ray.
 /// @param far  end of the ray
-/// @param visit  called with the parameter and axis of the exit from the cell; returns true to
-///        continue
+/// @param visit  called with the parameter and the axis of the ray's exit from the cell (axis -1:
+/// the ray ends in the cell); returns true to continue
 template <typename Visit>
 void traverseCells(BlockTraversal& walk, double far, const Visit& visit) {
   if (!walk.clip()) return;

@@ -18,7 +18,8 @@ namespace render {
 /// length.
 struct IndexRay {
   Imath::V3d origin, direction, inverse;
-  bool isParallel[3];  ///< no motion along that axis: planes across it are never met
+  bool isParallel[3];  ///< true for an axis along which the ray does not move, so it meets no plane
+                       ///< across the axis
 
   IndexRay(const Imath::V3d& origin_, const Imath::V3d& direction_);
   [[nodiscard]] double at(int axis, double t) const { return origin[axis] + t * direction[axis]; }
@@ -29,18 +30,18 @@ struct IndexRay {
   }
 };
 
-/// The 8³ cells from `origin` on, with the values in OpenVDB's tree. Cell (i, j, k) spans the grid
-/// points i … i+1, j … j+1, k … k+1. Shares no code with the kernel's bricks, so that the judge is
-/// an independent check of them.
+/// The 8³ cells from `origin` on, and pointers to their values in OpenVDB's tree. Cell (i, j, k)
+/// spans the grid points i … i+1, j … j+1, k … k+1. Shares no code with the kernel's bricks, so
+/// that the judge is an independent check of them.
 struct SurfaceBlock {
   openvdb::Coord origin;
-  std::array<const float*, 8>
-      leaves;                  ///< values of the 2³ leaves that hold the corners; null: a tile
-  std::array<float, 8> tiles;  ///< value where there is no leaf
+  std::array<const float*, 8> leaves;  ///< values of the 2³ leaves that hold the corners of the
+                                       ///< cells; null where the tree has a tile
+  std::array<float, 8> tiles;          ///< values of the tiles where `leaves` is null
   std::array<std::uint64_t, 8>
-      crossing;  ///< bit y·8 + z of word x: the corners of that cell differ in sign
-  std::array<std::uint8_t, 6>
-      extent;  ///< range of grid points of the crossed cells: low x y z, high x y z
+      crossing;  ///< bit y·8 + z of word x: the surface may cross cell (x, y, z)
+  std::array<std::uint8_t, 6> extent;  ///< range of the grid points of the marked cells, relative
+                                       ///< to `origin`: low x y z, high x y z
 
   /// Grid value at `origin` + (x, y, z), each in [0, 8].
   [[nodiscard]] double value(unsigned x, unsigned y, unsigned z) const {
@@ -48,6 +49,7 @@ struct SurfaceBlock {
     const float* leaf = leaves[n];
     return static_cast<double>(leaf ? leaf[(x & 7) << 6 | (y & 7) << 3 | (z & 7)] : tiles[n]);
   }
+  /// Box of the marked cells, index space.
   [[nodiscard]] Imath::Box3d bounds() const;
 };
 
@@ -57,8 +59,9 @@ struct DrawnField {
   Filter filter = Filter::Trilinear;
 };
 
-/// All blocks with a cell whose corners differ in sign, or in which the spline may cross zero, in
-/// tree order. The tree must outlive the blocks.
+/// All blocks with a cell that the surface may cross, sorted by origin. For the trilinear filter,
+/// these are the cells whose corners differ in sign; for a spline, those in which its bounds allow
+/// a zero. The tree must outlive the blocks.
 [[nodiscard]] std::vector<SurfaceBlock> surfaceBlocks(const DrawnField& field);
 
 /// A point of a ray at which it enters or leaves the solid.
@@ -69,8 +72,8 @@ struct SideChange {
 
 enum class Search { FirstCrossing, AnyCrossing };
 
-/// Finds the first sign change of the field on [near, far] inside the block. For AnyCrossing the
-/// returned parameter is an arbitrary one in the cell that contains the crossing.
+/// Finds the first sign change of the field on [near, far] inside the block. With AnyCrossing, the
+/// returned parameter may lie anywhere in the cell that contains the crossing.
 [[nodiscard]] std::optional<double> findCrossing(const DrawnField& field, const SurfaceBlock& block,
                                                  const IndexRay& ray, double near, double far,
                                                  Search search);

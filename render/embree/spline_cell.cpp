@@ -9,9 +9,9 @@ namespace {
 using Imath::V3d;
 using openvdb::Coord;
 
-constexpr int kDepth = 40;  // largest number of halvings
+constexpr int kDepth = 40;  // largest number of halvings of a segment
 
-/// Values of the B-spline basis at a, or of its derivative.
+/// Values w of the four cubic B-spline basis functions at a in [0, 1], or of their derivatives.
 void basis(double a, bool isSlope, double (&w)[4]) {
   const double b = 1 - a;
   if (isSlope) {
@@ -36,13 +36,14 @@ double weighed(const double (&c)[4][4][4], const double (&x)[4], const double (&
   return sum;
 }
 
-/// The spline along a line: value and slope at the parameter s, and bounds on their changes.
+/// The spline along the line p + s · direction in the cell: its value and slope at s, and bounds on
+/// their changes per unit of s.
 class LineSearch {
  public:
   LineSearch(const double (&c)[4][4][4], const V3d& p, const V3d& direction)
       : c_(c), p_(p), direction_(direction) {
-    // A derivative of a spline is a convex combination of differences of its coefficients, so these
-    // bound it.
+    // A derivative of a spline is a convex combination of differences of its coefficients, so the
+    // largest difference bounds the derivative.
     for (int a = 0; a < 3; ++a) {
       const double first = mostDifference(a, -1);
       slope_ += std::abs(direction[a]) * first;
@@ -58,13 +59,13 @@ class LineSearch {
     return weighed(c_, w[0], w[1], w[2]);
   }
 
-  /// False when the value at the line's start excludes a zero. Holds for all directions with the
-  /// same absolute components.
+  /// Returns false when the value at s = 0 is so large that the spline has no zero for s in [0, 1].
+  /// The result also holds for all directions with the same absolute components.
   [[nodiscard]] bool mayCross() const { return std::abs(value(0)) <= slope_ * (1 + 1e-9); }
 
-  /// Reports the sign changes between low and high, in order. The signs at both ends are given:
-  /// they are shared by the two cells at a face and are independent of rounding within the cell.
-  /// @param take  called for each change; returns true to stop
+  /// Reports the sign changes between low and high, in order. The caller passes the signs at both
+  /// ends, so that the two cells at a face use the same sign, whatever the rounding within a cell.
+  /// @param take  called with the parameter of each change; returns false to stop
   /// @return true when the search was stopped
   template <typename Take>
   bool search(double low, bool lowInside, double high, bool highInside, int depth,
@@ -72,7 +73,7 @@ class LineSearch {
     const auto stops = [&](bool isChange, double at) { return isChange && !take(at); };
     const double middle = 0.5 * (low + high), half = 0.5 * (high - low);
     const bool differ = lowInside != highInside;
-    // For a line within the zero set, or one that touches it, the signs of the ends decide.
+    // If the line lies within the zero set or touches it, the signs of the ends decide.
     if (depth == 0 || slope_ == 0 || evaluations_ > kMostEvaluations) return stops(differ, middle);
     const double v = value(middle);
     ++evaluations_;
@@ -107,8 +108,8 @@ class LineSearch {
     }
     return 0.5 * (low + high);
   }
-  /// Largest difference of coefficients along axis a, or second difference along a and b (b = −1:
-  /// first difference).
+  /// Largest magnitude of a second difference of the coefficients along the axes a and b; for b =
+  /// −1, of a first difference along a.
   [[nodiscard]] double mostDifference(int a, int b) const {
     double most = 0;
     int n[3];
@@ -146,7 +147,8 @@ bool SplineCell::mayCross() const {
     for (const auto& row : plane)
       for (const double c : row) (c < 0 ? anyInside : anyOutside) = true;
   if (!anyInside || !anyOutside) return false;
-  // No corner is farther from the middle.
+  // The slope bound for the line from the centre to a corner covers all points of the cell, because
+  // none is farther from the centre on any axis.
   const LineSearch toCorner(c_, V3d(0.5), V3d(0.5));
   return toCorner.mayCross();
 }

@@ -1,7 +1,7 @@
 #pragma once
 
-// Private to the judge: the tricubic B-spline of a cell in double precision. Finds the crossings of
-// a line with its zero set by bounds on the slope.
+// Private to the judge: the tricubic B-spline of a cell in double precision. Crossings of a line
+// with its zero set are found by bounds on the slope.
 
 #include <optional>
 #include <vector>
@@ -11,9 +11,9 @@
 
 namespace render {
 
-/// Spline coefficients that the cells from (0, 0, 0) to (size − 1)³ of a block read. Reads every
-/// value from the tree and not from a padded copy, so that the judge shares no code with the
-/// kernel.
+/// Spline coefficients that the size³ cells of a block read, from one point before its lowest
+/// corner on. Reads every value from the tree and not from a padded copy, so that the judge shares
+/// no code with the kernel.
 template <int size>
 struct SplineCoefficients {
   double c[size + 3][size + 3][size + 3];
@@ -41,7 +41,7 @@ struct SplineCoefficients {
 /// The tricubic B-spline on one cell.
 class SplineCell {
  public:
-  /// Takes cell (x, y, z) of a block.
+  /// Copies the coefficients of cell (x, y, z) of a block.
   template <int size>
   explicit SplineCell(const SplineCoefficients<size>& block, int x = 0, int y = 0, int z = 0) {
     for (int i = 0; i < 4; ++i)
@@ -49,19 +49,21 @@ class SplineCell {
         for (int k = 0; k < 4; ++k) c_[i][j][k] = block.c[x + i][y + j][z + k];
   }
 
-  /// False when the spline certainly has no zero: all coefficients have one sign, or the value at
-  /// the centre is larger than the slope bound allows.
+  /// Returns false when the spline has no zero in the cell: all coefficients have one sign, or the
+  /// magnitude at the centre exceeds the largest possible change within the cell.
   [[nodiscard]] bool mayCross() const;
   /// Value at p. Both cells at a common face return the same bits for p on that face, because there
   /// the farthest coefficients have weight zero.
   /// @param p  in [0, 1]³
   [[nodiscard]] double value(const Imath::V3d& p) const;
-  /// Finds the first fraction of the segment from p to q at which the spline changes sign. A half
-  /// is skipped when the value at its middle is larger than the slope bound allows. A half is not
-  /// divided further when the slope cannot change its sign.
+  /// Finds the first fraction of the segment from p to q at which the spline changes sign. The
+  /// segment is halved repeatedly. A part is skipped when the magnitude at its middle exceeds the
+  /// largest possible change within the part. A part is not halved further when the slope cannot
+  /// change its sign.
   [[nodiscard]] std::optional<double> firstSignChange(const Imath::V3d& p,
                                                       const Imath::V3d& q) const;
-  /// Appends all of these fractions, in ascending order. The directions of the changes alternate.
+  /// Appends all fractions of the segment at which the spline changes sign, in ascending order. The
+  /// directions of the changes alternate.
   void addSignChanges(const Imath::V3d& p, const Imath::V3d& q, std::vector<double>& found) const;
 
  private:

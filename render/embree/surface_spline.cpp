@@ -9,7 +9,8 @@ namespace {
 using Imath::V3d;
 using openvdb::Coord;
 
-/// 6³ grid values from cell − 2 on. The corners of the cell have the indices 2 and 3.
+/// Values of the 6³ grid points from cell − 2 on. The corners of the cell have the indices 2 and 3
+/// on each axis.
 struct ShapeWindow {
   double f[6][6][6];
 
@@ -27,7 +28,8 @@ struct ShapeWindow {
   }
 };
 
-/// Weights of the uniform cubic B-spline and its first and second derivatives, at a in [0, 1].
+/// Weights w[d] of the four coefficients for the derivative of order d of a uniform cubic B-spline,
+/// at a in [0, 1].
 struct SplineWeights {
   double w[3][4];
 

@@ -10,28 +10,31 @@
 
 namespace render {
 
-/// A uniform scaling that maps a box to a diagonal of 1 about the origin. Rays start at that box,
-/// so origin, direction and boxes have errors of about 2^-24 each.
+/// A translation and uniform scaling that map a box of the scene to a box around the origin with
+/// diagonal 1. Rays start at the box, so their origins and directions, and the boxes of primitives,
+/// have rounding errors of about 2^-24 each.
 struct EmbreeSpace {
-  /// Padding that covers these errors, in the scaled space.
+  /// Padding of boxes and ray ends that covers these rounding errors, in the scaled space.
   static constexpr double kPad = 2e-6;
 
-  Imath::Box3d box;  ///< slightly larger than the given bounds; rays may start on it
-  Imath::V3d centre;
-  double scale = 1;
+  Imath::Box3d box;   ///< slightly larger than the given bounds, world space; rays may start on it
+  Imath::V3d centre;  ///< point that is mapped to the origin, world space
+  double scale = 1;   ///< scaled length of one world unit
 
   EmbreeSpace() = default;
   explicit EmbreeSpace(const Imath::Box3d& bounds);
-  /// Distance at which the ray enters the box, at least `near`; empty when the ray misses the box
-  /// or ends before it.
+  /// Distance from `origin` at which the ray enters the box, at least `near`, world units. Empty
+  /// when the ray misses the box or ends before it.
   [[nodiscard]] std::optional<double> entryOf(const Imath::V3d& origin, const Imath::V3d& direction,
                                               double near, double far) const;
-  /// @param start  world position, at the box; `maxDistance` is measured from it
+  /// Builds Embree's ray in the scaled space.
+  /// @param start  start of the ray, world space, on or in the box
+  /// @param maxDistance  length of the ray, world units
   [[nodiscard]] RTCRay rayFrom(const Imath::V3d& start, const Imath::V3d& direction,
                                double maxDistance) const;
 };
 
-/// Checks the device. @throws levelset::ResourceLimit when Embree reports an error
+/// Checks for an error of Embree. @throws levelset::ResourceLimit when the device reports one
 void requireEmbree(RTCDevice device);
 
 }  // namespace render

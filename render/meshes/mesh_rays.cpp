@@ -33,8 +33,8 @@ struct MeshRays::Impl {
 
   void build();
   void add(const MeshPart& part, unsigned number);
-  /// Computes Embree's ray and the distance to its start, where the ray enters the box, at least
-  /// `near`. Returns nothing when the ray misses the box.
+  /// Computes Embree's ray, which starts where the ray enters the box of the meshes. Returns the
+  /// distance from `origin` to that start, at least `near`; nothing when the ray misses the box.
   std::optional<double> prepare(const V3d& origin, const V3d& direction, double near, double far,
                                 RTCRay& ray) const;
   void complete(const RTCRayHit& found, const V3d& start, const V3d& direction, double moved,

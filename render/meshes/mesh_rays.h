@@ -9,8 +9,9 @@
 
 namespace render {
 
-/// Intersects rays with the meshes of a scene, for all renderers. Embree finds the triangle; double
-/// precision computes the position on its plane. Thread-safe. Ray directions have unit length.
+/// Intersects rays with the meshes of a scene, for all renderers. Embree finds the triangle in
+/// single precision. The position on its plane is computed in double precision. Thread-safe. Ray
+/// directions have unit length.
 class MeshRays {
  public:
   /// @throws levelset::ResourceLimit when Embree cannot allocate memory
@@ -21,13 +22,14 @@ class MeshRays {
 
   [[nodiscard]] bool isEmpty() const;
   [[nodiscard]] const Imath::Box3d& bounds() const;
-  /// First triangle in [near, far], hit from either side. `solid` of the hit is the index in
+  /// First hit with a triangle in [near, far], from either side. `solid` of the hit is the index in
   /// Scene::meshes. Normals are interpolated from the vertices where the mesh has vertex normals.
   [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction, double near,
                               double far) const;
   [[nodiscard]] bool isOccluded(const Imath::V3d& origin, const Imath::V3d& direction,
                                 double far) const;
-  /// Share of light that passes all triangles in [0, far]; may stop below kLeastTransmittance.
+  /// Share of light that passes all triangles in [0, far]. Triangles are ignored once the share is
+  /// below kLeastTransmittance.
   [[nodiscard]] double transmittance(const Imath::V3d& origin, const Imath::V3d& direction,
                                      double far) const;
 
