@@ -18,8 +18,8 @@ using openvdb::FloatTree;
 using openvdb::Int32Tree;
 using FloatLeaf = FloatTree::LeafNodeType;
 using LabelLeaf = Int32Tree::LeafNodeType;
-using LeafBits =
-    std::array<std::uint64_t, 8>;  ///< a bit for each voxel (x, y, z): bit 8y + z of word x
+/// One bit for each voxel (x, y, z) of a leaf: bit 8y + z of word x.
+using LeafBits = std::array<std::uint64_t, 8>;
 
 constexpr int kLeafDepth = FloatTree::DEPTH - 1;
 

@@ -103,8 +103,8 @@ template <typename Node>
 void signTiles(Node& node, const SignField& field, const V3i& origin, float background,
                const Region& region) {
   constexpr openvdb::Index kZ = 1, kY = 1u << Node::LOG2DIM, kX = 1u << (2 * Node::LOG2DIM);
-  std::vector<signed char> side(Node::NUM_VALUES,
-                                0);  // −1 inside, 1 outside, 0: child node or outside the region
+  // −1: inside, 1: outside, 0: a child node, or a tile outside the region.
+  std::vector<signed char> side(Node::NUM_VALUES, 0);
   for (auto it = node.beginValueAll(); it; ++it) {
     const openvdb::Index n = it.pos();
     signed char& s = side[n];
@@ -201,8 +201,8 @@ double ambiguousShare(const openvdb::FloatGrid& grid, const SignField& field, co
   if (!field.isOpen()) return 0;
   std::vector<const LeafNode*> leaves;
   grid.tree().getNodes(leaves);
-  std::vector<std::array<std::size_t, 2>> counts(
-      leaves.size());  // numbers of voxels next to the zero set, and of ambiguous ones among them
+  // For each leaf, the numbers of voxels next to the zero set and of ambiguous ones among them.
+  std::vector<std::array<std::size_t, 2>> counts(leaves.size());
   tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t n) {
     const LeafNode& leaf = *leaves[n];
     const V3i block = toV3i(leaf.origin()) - origin;

@@ -32,9 +32,9 @@ struct SignCertificate {
   std::size_t nonManifoldEdges = 0;       ///< edges with three or more faces
   std::ptrdiff_t selfIntersections = -1;  ///< pairs of intersecting triangles; -1: not searched
   SignMode method = SignMode::Auto;       ///< method used: Closed or Winding
-  bool flipped =
-      false;  ///< true when a mesh that faced inwards was reversed
-              /// Fraction of the voxels next to the zero set with an ambiguous winding number w,
+  bool flipped = false;                   ///< true when a mesh that faced inwards was reversed
+
+  /// Fraction of the voxels next to the zero set with an ambiguous winding number w,
   /// |w − 0.5| < 0.25. 1 if no voxel is next to the zero set.
   double ambiguousShare = 0;
   std::size_t droppedTriangles = 0;  ///< triangles without area and exact duplicates

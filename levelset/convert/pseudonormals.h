@@ -35,9 +35,8 @@ class Pseudonormals {
     Imath::V3d normal{0};  ///< unit length; zero if all adjacent faces are degenerate
     bool onBorder = false;
   };
-  /// Returns the pseudonormal of a part of a triangle: corner 0 to 2, edge from corner part − 3
-  /// to the
-  /// next for 3 to 5, face for 6.
+  /// Returns the pseudonormal of a part of a triangle. 0 to 2: corner; 3 to 5: edge from corner
+  /// part − 3 to the next; 6: face.
   [[nodiscard]] Direction at(std::uint32_t triangle, int part) const;
 
  private:

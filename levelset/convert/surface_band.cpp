@@ -30,8 +30,8 @@ using SurfaceLeaf = openvdb::FloatTree::LeafNodeType;
 // Voxels by which the band extends the surface beyond its border. Tricubic interpolation reads two
 // voxels along each axis, about 3.5 along the diagonal.
 constexpr double kBeyond = 3.5;
-constexpr double kTouching =
-    1e-6;  // distance at which a grid point counts as on the surface, voxels
+// Distance below which a grid point counts as on the surface, voxels.
+constexpr double kTouching = 1e-6;
 
 /// Bounding sphere of a triangle, in voxels. It excludes far triangles from the search for the
 /// closest one.

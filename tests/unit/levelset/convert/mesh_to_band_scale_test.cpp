@@ -104,7 +104,7 @@ TEST(MeshToBandScale, KeepsTheSpacingOfCoordinates) {
   const TriMesh home = transform(floatBoxFarAway(), Imath::M44d().setTranslation(V3d(-1e7)));
   EXPECT_EQ(home.spacing, 1);  // spacing of floats from 2²³ to 2²⁴
   const std::string sentence = refusal<InvalidInput>([&] { (void)meshToBand(home, 0.02); });
-  EXPECT_NE(sentence.find("before the mesh was moved, its coordinates were 1 apart"),
+  EXPECT_NE(sentence.find("before the mesh was moved, its representable coordinates were 1 apart"),
             std::string::npos);
   // Scaling down also scales the uncertainty.
   const TriMesh small = transform(home, Imath::M44d().setScale(0.01));
