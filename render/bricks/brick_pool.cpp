@@ -23,6 +23,7 @@ constexpr std::size_t kMostValues = std::numeric_limits<std::int32_t>::max();
 
 /// Writes the edges of the largest aligned empty cubes into the empty items of a cubic table.
 /// @param size  number of items along each axis
+/// @param most  largest edge of a cube, items
 /// @param isEmpty  returns true when the item with a given number is empty
 /// @param set  stores the edge of the cube, in items, for the item with a given number
 template <typename IsEmpty, typename Set>

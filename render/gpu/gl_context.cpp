@@ -39,7 +39,7 @@ struct GlContext::Egl {
   PFNEGLGETPLATFORMDISPLAYEXTPROC getPlatformDisplay = nullptr;
   EGLDisplay display = EGL_NO_DISPLAY;
   EGLContext context = EGL_NO_CONTEXT;
-  std::string tried;  // failed attempts, with reasons
+  std::string tried;  // failed attempts with reasons, for the error message
 
   Egl() {
     library = dlopen("libEGL.so.1", RTLD_NOW | RTLD_LOCAL);
@@ -72,22 +72,23 @@ struct GlContext::Egl {
   Egl(const Egl&) = delete;
   Egl& operator=(const Egl&) = delete;
 
-  /// Does not terminate the display, which is shared by the entire process.
+  /// Destroys the context. It does not terminate the display, because the entire process shares it.
   void close() {
     if (context != EGL_NO_CONTEXT) destroyContext(display, context);
     display = EGL_NO_DISPLAY;
     context = EGL_NO_CONTEXT;
   }
 
-  /// Tries hardware devices first, then the surfaceless platform, then software devices.
+  /// Opens a context: tries hardware devices first, then the surfaceless platform, then software
+  /// devices.
   void open() {
     std::vector<EGLDeviceEXT> hardware, software;
     listDevices(hardware, software);
     for (EGLDeviceEXT device : hardware)
-      if (openOn(EGL_PLATFORM_DEVICE_EXT, device, "a device")) return;
-    if (openOn(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, "no surface")) return;
+      if (openOn(EGL_PLATFORM_DEVICE_EXT, device, "hardware device")) return;
+    if (openOn(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, "surfaceless platform")) return;
     for (EGLDeviceEXT device : software)
-      if (openOn(EGL_PLATFORM_DEVICE_EXT, device, "a software device")) return;
+      if (openOn(EGL_PLATFORM_DEVICE_EXT, device, "software device")) return;
     throw NoOpenGl(fmt::format("OpenGL 4.5 is not available ({}); {}", tried, kRemedy));
   }
 
@@ -114,14 +115,14 @@ struct GlContext::Egl {
       return false;
     };
     display = getPlatformDisplay(platform, native, nullptr);
-    if (display == EGL_NO_DISPLAY) return fail("no display");
+    if (display == EGL_NO_DISPLAY) return fail("EGL offers no display");
     if (!initialize(display, nullptr, nullptr)) {
       display = EGL_NO_DISPLAY;
-      return fail("not initialised");
+      return fail("EGL cannot initialise the display");
     }
     if (!hasWord(queryString(display, EGL_EXTENSIONS), "EGL_KHR_surfaceless_context"))
-      return fail("requires a window");
-    if (!bindApi(EGL_OPENGL_API)) return fail("no OpenGL");
+      return fail("EGL_KHR_surfaceless_context is missing");
+    if (!bindApi(EGL_OPENGL_API)) return fail("EGL offers no OpenGL");
     // Request notification of a lost context, if the driver supports it.
     for (const bool tellsLoss : {true, false}) {
       const EGLint version[] = {
@@ -137,7 +138,7 @@ struct GlContext::Egl {
       context = createContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, version);
       if (context != EGL_NO_CONTEXT) return true;
     }
-    return fail("no OpenGL 4.5 context without a framebuffer configuration");
+    return fail("EGL cannot create an OpenGL 4.5 context");
   }
 };
 
@@ -172,12 +173,12 @@ GlContext::Current::Current(const GlContext& context) : context_(context), lock_
   draw_ = egl.currentSurface(EGL_DRAW);
   read_ = egl.currentSurface(EGL_READ);
   before_ = egl.currentContext();
-  // The bound API is a property of each thread.
+  // Bind the API again: the bound API is a property of each thread.
   if (!egl.bindApi(EGL_OPENGL_API) ||
       !egl.makeCurrent(egl.display, EGL_NO_SURFACE, EGL_NO_SURFACE, egl.context)) {
     throw levelset::ResourceLimit(
-        "the OpenGL context cannot be made current; try again, or draw with --renderer "
-        "cpu");
+        "the OpenGL context cannot be made current on this thread; try again, or draw with "
+        "--renderer cpu");
   }
 }
 

@@ -1,7 +1,7 @@
 #pragma once
 
-// Private to the GPU renderer. OpenGL 4.5 without a display or a window. EGL is loaded at run time,
-// so programs also start on machines without it.
+// Private to the GPU renderer: OpenGL 4.5 without a display or a window. EGL is loaded at run time,
+// so that programs also start on machines without EGL.
 
 #include <GL/glcorearb.h>
 
@@ -49,24 +49,25 @@ namespace render {
   X(PFNGLUNIFORM1IPROC, Uniform1i)                           \
   X(PFNGLUSEPROGRAMPROC, UseProgram)
 
-/// OpenGL functions in use, without the prefix "gl".
+/// Pointers to the OpenGL functions of LEVELSMITH_GL_FUNCTIONS, named without the prefix "gl".
 struct GlFunctions {
 #define LEVELSMITH_GL_MEMBER(Type, name) Type name = nullptr;
   LEVELSMITH_GL_FUNCTIONS(LEVELSMITH_GL_MEMBER)
 #undef LEVELSMITH_GL_MEMBER
 };
 
-/// An OpenGL 4.5 context without a window. Hardware is preferred to software.
+/// An OpenGL 4.5 context without a window. Hardware devices are preferred to software rendering.
 class GlContext {
  public:
-  /// @throws NoOpenGl when EGL or OpenGL 4.5 is missing; the message lists the attempts
+  /// @throws NoOpenGl when EGL or OpenGL 4.5 is missing; the message lists the devices that were
+  /// tried
   GlContext();
   ~GlContext();
   GlContext(const GlContext&) = delete;
   GlContext& operator=(const GlContext&) = delete;
 
-  /// Makes the context current on the calling thread, exclusively, and restores the previous
-  /// context at the end of its lifetime.
+  /// Makes the context current on the calling thread and locks it against other threads. The
+  /// destructor restores the previous context.
   class Current {
    public:
     explicit Current(const GlContext& context);
@@ -83,12 +84,12 @@ class GlContext {
   const GlFunctions& gl() const { return gl_; }
   /// Renderer and version as reported by the driver.
   [[nodiscard]] const std::string& description() const { return description_; }
-  /// Size of the largest buffer of 32-bit texels, bytes.
+  /// Largest size of a buffer texture with 32-bit texels, bytes.
   [[nodiscard]] std::size_t largestTable() const { return largestTable_; }
-  /// Number of texel buffers that a compute shader can access.
+  /// Number of buffer textures that a compute shader can access.
   [[nodiscard]] int tableCount() const { return tableCount_; }
   /// Checks for OpenGL errors. @pre the context is current
-  /// @param what  current operation, for the message
+  /// @param what  operation that has just run, such as "tracing the rays"; part of the message
   /// @throws levelset::ResourceLimit when the context was lost or OpenGL reports an error
   void check(const char* what) const;
 

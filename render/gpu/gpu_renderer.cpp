@@ -15,7 +15,7 @@ Image renderGpu(const Scene& scene, const RenderOptions& options) {
   levelset::report(options.progress, 0);
   const KernelScene surfaces(scene, options);
   if (surfaces.bounds().isEmpty()) refuseEmptyScene();
-  if (options.fromNanoVdb) {  // memory of the grids and of their copies as words
+  if (options.fromNanoVdb) {  // memory of the NanoVDB grids and of their copies for the upload
     double bytes = 0;
     for (const Solid& solid : scene.solids)
       bytes += 2 * static_cast<double>(solid.band.memoryUse());
@@ -23,7 +23,7 @@ Image renderGpu(const Scene& scene, const RenderOptions& options) {
   }
   const GlContext context;
   const GpuTracer tracer(context, surfaces, 0, options.fromNanoVdb ? &scene : nullptr);
-  constexpr int kGpuTile = 64;  // pixels; large enough for an efficient dispatch
+  constexpr int kGpuTile = 64;  // pixels; edge of a tile; enough rays for an efficient dispatch
   return paintPicture(scene, surfaces, tracer, kGpuTile, "gpu " + context.description(), options);
 }
 

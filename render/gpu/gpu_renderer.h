@@ -7,14 +7,14 @@
 
 namespace render {
 
-/// OpenGL 4.5 without a display is not available.
+/// Error: OpenGL 4.5 without a display is not available.
 struct NoOpenGl : levelset::ResourceLimit {
   using ResourceLimit::ResourceLimit;
 };
 
-/// Draws the scene with the kernel as an OpenGL 4.5 compute shader, without a display. Pixels have
-/// the same bits as those of renderCpu() when the driver rounds as IEEE 754 requires (Mesa's
-/// llvmpipe does).
+/// Draws the scene with the kernel as an OpenGL 4.5 compute shader, without a display. If the
+/// driver rounds as IEEE 754 requires, as Mesa's llvmpipe does, pixels have the same bits as those
+/// of renderCpu().
 /// @throws as renderCpu()
 /// @throws levelset::UsageError for blended scenes
 /// @throws NoOpenGl when OpenGL 4.5 is missing

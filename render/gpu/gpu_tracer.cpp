@@ -16,15 +16,16 @@
 namespace render {
 namespace {
 
-constexpr int kGroup = 64;                 // invocations of a work group
-constexpr std::size_t kOneRun = 1u << 18;  // rays of a dispatch: short enough for any watchdog
+constexpr int kGroup = 64;  // invocations of a work group
+constexpr std::size_t kOneRun =
+    1u << 18;  // rays of a dispatch, few enough to finish within the time limits of drivers
 constexpr int kRayParts = 12, kHitParts = 5;
 
-/// Bindings of storage blocks, and texture units.
+/// Bindings of storage blocks (Binding) and of texture units (Unit) in the shader.
 enum Binding : GLuint { kRays, kHits };
 enum Unit : GLuint { kPages, kEntries, kMasks, kFirstValues };
 
-/// GLSL definitions of the kernel's types and macros.
+/// GLSL definitions of the types, macros and table look-ups that render/shaders/*.glsl use.
 constexpr const char* kDialect = R"GLSL(
 #define Real float
 #define Int int
@@ -132,15 +133,16 @@ constexpr const char* kNanoText = R"GLSL(
 uniform int nanoRoot, nanoTiles, nanoFar, nanoOriginX, nanoOriginY, nanoOriginZ;
 )GLSL";
 
-/// Properties that select a shader.
+/// Properties of rays and grid that select a shader.
 struct Variant {
   bool isPixels, isSpline, isNano;
   int valueBits;
-  int blocks;  // number of texel buffers for the values
+  int blocks;  // number of buffer textures that hold the values
   auto operator<=>(const Variant&) const = default;
 };
 
-/// Declares the values in one texel buffer, or in several of 2^shift values each.
+/// GLSL declarations of the values in one buffer texture, or in several of 2^shift values each, and
+/// of the look-up function loadValue().
 std::string valueText(const Variant& variant, int shift) {
   const bool isCode = variant.valueBits != 32;
   const char* prefix = isCode ? "u" : variant.isNano ? "i" : "";
@@ -157,8 +159,8 @@ std::string valueText(const Variant& variant, int shift) {
   text += variant.blocks == 1 ? "  return texelFetch(values0, i).x;\n}\n"
                               : fmt::format("  return texelFetch(values{}, i & {}).x;\n}}\n",
                                             variant.blocks - 1, (1 << shift) - 1);
-  // Words of the NanoVDB grid that are integers never pass through a float, because that may change
-  // bits.
+  // Integer words of a NanoVDB grid are never loaded as floats, because a float load may change
+  // their bits.
   if (variant.isNano)
     return text + "Real loadValue(Int i) { return intBitsToFloat(loadHeld(i)); }\n";
   if (!isCode) return text + "Real loadValue(Int i) { return loadHeld(i); }\n";
@@ -225,13 +227,13 @@ struct GpuTracer::Impl {
   struct Tables {
     Texels pages, entries, masks;
     std::vector<Texels> values;
-    std::optional<NanoGrid> nano;  // without its words, which are uploaded as values
+    std::optional<NanoGrid> nano;  // header data of the NanoVDB grid; its words are in `values`
   };
 
   const GlContext& context;
   const GlFunctions& gl;
   const std::size_t largestTable;
-  int shift = 0;  // log2 of the number of values in a texel buffer
+  int shift = 0;  // log2 of the number of values in a buffer texture
   std::map<const KernelSolid*, Tables> tables;
   GLuint rays = 0, hits = 0;
   std::map<Variant, GLuint> programs;
@@ -277,8 +279,8 @@ struct GpuTracer::Impl {
     return texels;
   }
 
-  /// @param size  of a value, bytes
-  /// @param format  internal format of a value
+  /// @param size  size of a value, bytes
+  /// @param format  OpenGL's internal format of a value
   void uploadValues(Tables& t, const void* values, std::size_t bytes, std::size_t size,
                     GLenum format) {
     const std::size_t perBlock = size << shift;
@@ -379,7 +381,9 @@ struct GpuTracer::Impl {
       gl.BindTextureUnit(kFirstValues + static_cast<GLuint>(b), t.values[b].texture);
   }
 
-  /// @param shapes  for pixels only; else null
+  /// Traces `count` rays and reads the hits back.
+  /// @param input  components of the rays, one array after the other
+  /// @param shapes  receives the surface's shape at the hits of pixel rays; null for listed rays
   void run(const KernelSolid& solid, const std::vector<float>& input, std::size_t count,
            HitBlock& found, ShapeBlock* shapes) {
     if (count == 0) return;
@@ -438,7 +442,7 @@ GpuTracer::~GpuTracer() {
   try {
     const GlContext::Current current(impl_->context);
     impl_->release();
-  } catch (const levelset::Error&) {  // a lost context has released its objects
+  } catch (const levelset::Error&) {  // the context was lost, and its objects with it
   }
 }
 
@@ -446,7 +450,8 @@ void GpuTracer::trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlo
                       ShapeBlock& shapes) const {
   std::vector<float> input(pixels.x);
   input.insert(input.end(), pixels.y.begin(), pixels.y.end());
-  input.insert(input.end(), pixels.passing.begin(), pixels.passing.end());  // exact up to 2^24
+  input.insert(input.end(), pixels.passing.begin(),
+               pixels.passing.end());  // integers up to 2^24 are exact as floats
   impl_->run(solid, input, pixels.size(), hits, &shapes);
 }
 

@@ -10,14 +10,14 @@
 
 namespace render {
 
-/// Runs the kernel on the graphics processor. The tables of each solid are uploaded once.
+/// Runs the kernel on the graphics processor. The brick tables of each solid are uploaded once.
 /// Thread-safe; calls are serialised.
 class GpuTracer : public KernelTracer {
  public:
   /// @param context  must outlive the tracer
-  /// @param largestTable  largest texel buffer, bytes; 0: the limit of the driver
-  /// @param grids  scene that KernelScene was built from. Its NanoVDB grids are uploaded in place
-  ///        of the tables, as a reference for them. Null: the tables are uploaded.
+  /// @param largestTable  limit on the size of a buffer texture, bytes; 0: the limit of the driver
+  /// @param grids  source of `scene`. Its solids are uploaded as NanoVDB grids in place of brick
+  /// tables, as a reference for those tables. Null: the brick tables are uploaded.
   /// @pre with `grids` the filter is trilinear
   /// @throws levelset::ResourceLimit when the tables do not fit, or the shader does not compile
   GpuTracer(const GlContext& context, const KernelScene& scene, std::size_t largestTable = 0,
@@ -34,7 +34,8 @@ class GpuTracer : public KernelTracer {
 };
 
 /// Compiles and links a compute shader. @pre the context is current
-/// @throws levelset::ResourceLimit with the start of the driver's log when it does not compile
+/// @throws levelset::ResourceLimit when it does not compile or link; the message has the start of
+/// the driver's log
 [[nodiscard]] GLuint compileCompute(const GlContext& context, const std::string& text);
 
 }  // namespace render

@@ -40,8 +40,8 @@ NanoGrid makeNanoGrid(const levelset::NarrowBand& band) {
   const std::size_t count = handle.size() / kNanoWord;
   if (count + 2 * kRow > static_cast<std::size_t>(std::numeric_limits<int>::max()))
     throw levelset::ResourceLimit(
-        fmt::format("a NanoVDB grid of {} MB is too large for the shader's index; draw from "
-                    "bricks (the default)",
+        fmt::format("a NanoVDB grid of {} MB is too large for the shader's 32-bit index; draw with "
+                    "--tables bricks (the default)",
                     handle.size() >> 20));
   NanoGrid grid;
   grid.words.resize(count);

@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to the GPU renderer: a NanoVDB grid as the shader reads it.
+// Private to the GPU renderer: a NanoVDB grid as an array of words for the shader.
 
 #include <string>
 #include <vector>
@@ -9,19 +9,20 @@
 
 namespace render {
 
-/// The words of a NanoVDB grid, followed by eight values far outside and eight far inside.
+/// The 32-bit words of a NanoVDB grid, followed by eight background values for outside and eight
+/// for inside.
 struct NanoGrid {
   std::vector<float> words;
   int root = 0;   ///< word index of the root node
-  int tiles = 0;  ///< number of its tiles
-  int far = 0;    ///< word index of the values after the grid
+  int tiles = 0;  ///< number of tiles in the root node's table
+  int far = 0;    ///< word index of the first of the background values
 
-  /// GLSL constants with the offsets of members within nodes.
+  /// GLSL constants with the word offsets of members within NanoVDB's nodes.
   [[nodiscard]] static std::string layout();
 };
 
-/// Converts a band. @pre the band is not empty
-/// @throws levelset::ResourceLimit for more words than an index can address
+/// Converts a band to NanoVDB. @pre the band is not empty
+/// @throws levelset::ResourceLimit for more words than a 32-bit index can address
 [[nodiscard]] NanoGrid makeNanoGrid(const levelset::NarrowBand& band);
 
 }  // namespace render

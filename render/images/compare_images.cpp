@@ -19,8 +19,8 @@ namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr std::size_t kShown = 5;
-// Allowed share of the pixels at outlines. Where a ray passes an outline within the rounding error,
-// both answers are right.
+// Largest accepted share of all pixels that differ at outlines. Where a ray passes an outline
+// within the rounding error, a hit and a miss are both right.
 constexpr double kOutlineShare = 1e-5;
 // Largest relative difference of Z between samples of one surface.
 constexpr double kOneSurface = 1e-3;
@@ -28,8 +28,9 @@ enum : char { kMissed, kHit, kBroken };
 
 using Difference = std::function<double(std::size_t)>;
 
-/// Comparison of one layer, with the tolerance between two correct renderers, one in single and one
-/// in double precision. docs/rendering.md derives the tolerances.
+/// A layer, its measure and a function that returns the difference in a pixel. `allowed` is the
+/// tolerance between two correct renderers, one in single and one in double precision.
+/// docs/rendering.md derives the tolerances.
 struct Layer {
   std::string name, measure;
   LayerTolerance allowed;
@@ -47,16 +48,14 @@ class Comparer {
   Comparer(const Image& first, const Image& second, const ImageComparisonOptions& options)
       : a_(first), b_(second), options_(options) {
     if (a_.width != b_.width || a_.height != b_.height)
-      throw levelset::InvalidInput(
-          fmt::format("the pictures have {} × {} and {} × {} pixels; draw both "
-                      "with the same size",
-                      a_.width, a_.height, b_.width, b_.height));
+      throw levelset::InvalidInput(fmt::format(
+          "the pictures differ in size ({} × {} and {} × {} pixels); draw both with the same size",
+          a_.width, a_.height, b_.width, b_.height));
     for (const auto& [name, tolerance] : options_.tolerances)
       if (!(tolerance.usual >= 0) || !(tolerance.worst >= 0))
-        throw levelset::UsageError(
-            fmt::format("the tolerance of {} is {}, {}; give two finite numbers "
-                        "that are 0 or more",
-                        name, tolerance.usual, tolerance.worst));
+        throw levelset::UsageError(fmt::format(
+            "the tolerances of layer {} are {} and {}; give two numbers that are 0 or more", name,
+            tolerance.usual, tolerance.worst));
   }
 
   ImageComparison run() {
@@ -112,14 +111,14 @@ class Comparer {
     isCompared_.assign(result_.pixels, 0);
   }
 
-  /// Calls visit(index) for a pixel and its neighbours.
+  /// Calls visit(index) for a pixel and its up to eight neighbours.
   template <typename Visit>
   void forEachWithinOne(int x, int y, const Visit& visit) const {
     for (int v = std::max(0, y - 1); v <= std::min(a_.height - 1, y + 1); ++v)
       for (int u = std::max(0, x - 1); u <= std::min(a_.width - 1, x + 1); ++u) visit(index(u, v));
   }
 
-  /// True when there are a hit and a miss within one pixel.
+  /// True when the pixel and its neighbours include both a hit and a miss.
   [[nodiscard]] bool isOutline(const std::vector<char>& hit, int x, int y) const {
     bool any = false, all = true;
     forEachWithinOne(x, y, [&](std::size_t i) {
@@ -129,9 +128,9 @@ class Comparer {
     return any && !all;
   }
 
-  /// True when one picture shows the front of two surfaces and the other one the back. Then Z
-  /// differs by more than one surface allows, and each Z lies in the range that the other picture
-  /// has within one pixel.
+  /// True when one picture shows the front and the other the back of two surfaces behind each
+  /// other. Then Z differs by more than kOneSurface, and each Z lies in the range of the other
+  /// picture's Z in the pixel and its neighbours.
   [[nodiscard]] bool isInnerOutline(int x, int y) const {
     if (!has("Z")) return false;
     const std::size_t i = index(x, y);
@@ -173,7 +172,8 @@ class Comparer {
         isCompared_[i] = areHit && !isInner;
         if (hitA_[i] == hitB_[i] && !isBroken && !isInner) continue;
         shown[i] = hitB_[i] == kHit && !isInner ? -1 : 1;
-        // Require the outline in both pictures: a leak has an outline only in its own picture.
+        // Require the outline in both pictures: a hole that only one picture has is surrounded by
+        // an outline in that picture alone.
         const bool excused =
             isInner || (!isBroken && isOutline(hitA_, x, y) && isOutline(hitB_, x, y));
         ++(excused ? result_.unlikeAtOutline : result_.unlikeElsewhere);
@@ -194,9 +194,9 @@ class Comparer {
   /// Voxel size of the first solid.
   [[nodiscard]] double voxelSize() const { return lengthNamed(a_, "ls:voxelSize", 1); }
 
-  /// Tolerance of curvatures of quantized values, per voxel: their change over 1e-3 voxels, the
-  /// allowed distance of positions. In a band of three voxels, third differences of the values are
-  /// up to eight quantization steps.
+  /// Tolerance that quantized values add to the curvatures, per voxel. It is the change of the
+  /// curvature over 1e-3 voxels, the tolerance of positions. In a band of three voxels, third
+  /// differences of the values are up to eight quantization steps.
   [[nodiscard]] double curvatureStep() const {
     const double bits = lengthNamed(a_, "ls:valueBits", 32);
     return bits < 32 ? 1e-3 * 8 * 6 * std::exp2(-bits) : 0;
@@ -210,11 +210,11 @@ class Comparer {
     }
     return std::sqrt(squares);
   }
-  /// Angle in radians by which the surface turns between the positions of both pictures; 0 where
-  /// the layers for it are missing.
+  /// Angle in radians by which the surface turns between the positions P of both pictures; 0
+  /// without the layers P and curvature.
   [[nodiscard]] double turnBetweenPlaces(std::size_t i) const {
     if (!has("P.X") || !has("P.Y") || !has("P.Z")) return 0;
-    constexpr double kMostTurn = 1.7e-3;  // the tolerance of pictures without these layers
+    constexpr double kMostTurn = 1.7e-3;  // limit of the angle: the tolerance `worst` of N
     double curvature[2] = {};
     for (const char* name : {"curvature.k1", "curvature.k2"}) {
       if (!has(name)) continue;
@@ -262,7 +262,8 @@ class Comparer {
         {"curvature.gauss", "per voxel²", {1e-4 + rough, kInfinite}, [this, h](std::size_t i) {
            return h * h * apart(value(a_, "curvature.gauss", i), value(b_, "curvature.gauss", i));
          }});
-    // For a near camera, the precision of positions is relative to the size of the solid.
+    // If the camera is close to the solid, the error of positions is relative to the size of the
+    // solid.
     const double extent =
         std::max(lengthNamed(a_, kExtentAttribute, 0), lengthNamed(b_, kExtentAttribute, 0));
     add({"Z"}, {"Z", "relative", {2e-6, kOneSurface}, [this, extent](std::size_t i) {
@@ -344,7 +345,8 @@ class Comparer {
       };
       found.median = share(0.5);
       found.p99 = share(0.99);
-      // With fewer than a thousand pixels the percentile is the maximum; exclude one pixel from it.
+      // With fewer than a thousand pixels the 99.9 % percentile is the maximum. Exclude the worst
+      // pixel from it, if there are at least 100.
       const std::size_t beyond = std::min<std::size_t>(1, sorted.size() / 100);
       found.p999 = std::min(share(0.999), sorted[sorted.size() - 1 - beyond]);
       found.largest = sorted.back();
@@ -352,7 +354,8 @@ class Comparer {
     result_.layers.push_back(std::move(found));
   }
 
-  /// Compares the bits of all channels that both pictures have, hit or not, and lists the others.
+  /// Compares the bits of all channels that both pictures have, in all pixels. Lists the channels
+  /// that only one picture has.
   void compareBits() {
     std::vector<char> differs(result_.pixels, 0);
     const auto pass = [&](const auto& mine, const auto& others, const auto& differ) {
@@ -382,7 +385,7 @@ class Comparer {
   const Image &a_, &b_;
   const ImageComparisonOptions& options_;
   std::vector<char> hitA_, hitB_;
-  std::vector<char> isCompared_;  // both hit, and the same surface
+  std::vector<char> isCompared_;  // 1: both pictures hit the same surface in the pixel
   ImageComparison result_;
 };
 
@@ -399,17 +402,15 @@ std::string ImageComparison::reason() const {
   }
   if (!coverageAgrees()) {
     return fmt::format(
-        "only one of them hits in {} pixels away from outlines (0 allowed) and in {} along "
-        "outlines "
-        "({} allowed), the first at {},{}",
+        "hits differ in {} pixels away from outlines (0 allowed) and in {} pixels at outlines ({} "
+        "allowed), the first at pixel {},{}",
         unlikeElsewhere, unlikeAtOutline, outlineAllowed, unlike[0].x, unlike[0].y);
   }
   for (const LayerComparison& layer : layers) {
     if (layer.agrees()) continue;
     return fmt::format(
-        "{} differs by {:.3g} ({}) at the 99.9 % percentile ({:.3g} allowed) and by at most {:.3g} "
-        "({:.3g} "
-        "allowed), the worst at {},{}",
+        "layer {} differs by {:.3g} ({}) at the 99.9 % percentile ({:.3g} allowed) and by up to "
+        "{:.3g} ({:.3g} allowed), the worst at pixel {},{}",
         layer.layer, layer.p999, layer.measure, layer.allowed.usual, layer.largest,
         layer.allowed.worst, layer.worst[0].x, layer.worst[0].y);
   }

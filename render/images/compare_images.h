@@ -12,28 +12,28 @@
 /// over all pixels is not used, because it hides a leak of one pixel.
 namespace render {
 
-/// Largest difference allowed between two correct renderers.
+/// Largest difference of a layer between pictures of two correct renderers, in the layer's measure.
 struct LayerTolerance {
-  double usual;  ///< for 99.9 % of the pixels
-  double worst;  ///< for all pixels
+  double usual;  ///< limit for 99.9 % of the pixels
+  double worst;  ///< limit for all pixels
 };
 
 struct PixelDifference {
-  int x = 0, y = 0;  ///< from the upper left corner
+  int x = 0, y = 0;  ///< pixel, counted from the upper left corner
   double value = 0;
 };
 
 struct LayerComparison {
   std::string layer;           ///< "Z", "N", "P", "curvature.mean", "id", "colour" …
-  std::string measure;         ///< unit of the difference: "relative", "radians" …
-  std::size_t compared = 0;    ///< pixels that both pictures hit
-  double median = 0, p99 = 0;  ///< statistics of the differences of these pixels
+  std::string measure;         ///< measure of the difference: "relative", "radians" …
+  std::size_t compared = 0;    ///< number of pixels that show the same surface in both pictures
+  double median = 0, p99 = 0;  ///< percentiles of the differences in these pixels, in `measure`
   double p999 = 0, largest = 0;
   LayerTolerance allowed{};
   std::vector<PixelDifference>
-      worst;  ///< at most five, the largest first; zero differences are left out
-  /// True when the differences are within the tolerance. False for an infinite difference, which
-  /// means that one picture is broken there.
+      worst;  ///< pixels with the largest differences above 0, at most five, the largest first
+  /// True when the differences are within the tolerance. False for an infinite difference: then one
+  /// picture has an invalid value.
   [[nodiscard]] bool agrees() const {
     return std::isfinite(largest) && p999 <= allowed.usual && largest <= allowed.worst;
   }
@@ -41,18 +41,18 @@ struct LayerComparison {
 
 struct ImageComparison {
   std::size_t pixels = 0, bothHit = 0;
-  /// Pixels that are hit in one picture only. AtOutline: beside an outline of both pictures, where
-  /// rounding decides. Elsewhere: all others, including pixels with a NaN Z, and pixels of
-  /// different surfaces along inner outlines.
+  /// Numbers of pixels whose hits differ. AtOutline: pixels beside an outline of both pictures,
+  /// where rounding decides which surface is hit, or if any is. Elsewhere: all other pixels that
+  /// only one picture hits, and pixels with an invalid Z.
   std::size_t unlikeAtOutline = 0, unlikeElsewhere = 0;
   std::size_t outlineAllowed = 0;  ///< limit of unlikeAtOutline; unlikeElsewhere must be 0
   std::vector<PixelDifference>
-      unlike;  ///< the first five; pixels elsewhere precede those at outlines
+      unlike;  ///< at most five pixels whose hits differ, those away from outlines first
   std::vector<LayerComparison> layers;  ///< sorted by name
-  std::vector<std::string> onlyOne;     ///< layers of one picture only; not compared
+  std::vector<std::string> onlyOne;     ///< channels of one picture only; not compared
   std::size_t differentBits = 0;        ///< pixels with different bits in any channel
   bool isExact = false;                 ///< agreement requires equal bits
-  Image difference;                     ///< a channel for each layer, and "coverage"
+  Image difference;  ///< differences as a picture: a channel for each layer, and "coverage"
 
   [[nodiscard]] bool coverageAgrees() const {
     return unlikeElsewhere == 0 && unlikeAtOutline <= outlineAllowed;
@@ -63,7 +63,7 @@ struct ImageComparison {
 };
 
 struct ImageComparisonOptions {
-  bool exact = false;  ///< requires equal bits in all channels, and the same channels
+  bool exact = false;  ///< requires that both pictures have the same channels with equal bits
   /// Overrides the tolerances of layers, by name.
   std::map<std::string, LayerTolerance> tolerances = {};
 };
@@ -71,16 +71,19 @@ struct ImageComparisonOptions {
 /// Compares two pictures.
 ///
 /// A pixel is hit where Z is finite, and missed where Z is +inf; without Z, it is hit where A is
-/// positive. Inner outline: each Z lies between those of the other picture within one pixel. Then
-/// the pixels show two surfaces in front of each other, and no layer is compared.
+/// positive. At an inner outline one picture shows the front and the other the back of two surfaces
+/// behind each other. There Z differs, but each Z lies in the range of the other picture's Z within
+/// one pixel. Layers are not compared in such pixels.
 ///
 /// Measures of difference by layer. NaN counts as an infinite difference.
-/// - Z: relative to the larger of Z and the size of the scene (ls:extent of the first header).
-/// - P: relative to the larger of these and the length of P.
-/// - N: angle, minus the angle by which the surface turns between both positions (P times
-///   curvature, if these layers exist).
-/// - curvature: times the voxel size in the first header (ls:voxelSize; 1 if missing).
-/// - id: 0 or 1.
+/// - Z: difference relative to the larger of Z and the scene's diagonal (the larger ls:extent of
+/// both headers).
+/// - P: difference relative to the largest of Z, that diagonal and the length of P.
+/// - N: angle, minus the angle by which the surface turns between the positions P of both pictures
+/// (their distance times the curvature, if these layers exist).
+/// - curvature: difference times the voxel size in the first header (ls:voxelSize; 1 if missing).
+/// For curvature.gauss, times its square.
+/// - id: 0 for equal numbers, 1 for different ones.
 /// @throws levelset::InvalidInput for pictures of different sizes, or without Z and A
 /// @throws levelset::UsageError for a tolerance of a missing layer, or an invalid tolerance
 [[nodiscard]] ImageComparison compareImages(const Image& first, const Image& second,

@@ -27,14 +27,15 @@ constexpr std::uint32_t kManyParts = 0x1000;
 constexpr std::size_t kLongestName = 255;
 constexpr std::size_t kMostAttributeBytes =
     1 << 24;  // largest attribute, bytes; the largest one in use is a preview picture
-/// ZIP compresses by a factor of at most about 1000. A header that announces far more than that is
-/// damaged.
+/// ZIP compresses by a factor of at most about 1000. A header that announces many more pixels than
+/// the file can hold at this factor is damaged.
 constexpr double kMaxCompression = 5000;
-/// Lines in a chunk by compression: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB.
+/// Number of lines in a chunk for each compression: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A,
+/// DWAA, DWAB.
 constexpr std::array<double, 10> kChunkLines = {1, 1, 1, 16, 32, 16, 32, 32, 32, 256};
 constexpr std::size_t kZip = 3;
-/// Largest number of lines in a chunk for any compression. The file stores a number of 8 bytes for
-/// each chunk.
+/// Largest number of lines in a chunk for any compression. The file stores an offset of kChunkBytes
+/// bytes for each chunk.
 constexpr double kMostLines = 256;
 constexpr double kChunkBytes = 8;
 
@@ -48,7 +49,7 @@ const std::map<std::string, std::size_t> kSizes = {
     {"v2f", 8},         {"v2i", 8},      {"v3d", 24},
     {"v3f", 12},        {"v3i", 12},     {"deepImageState", 1}};
 
-/// Reads the headers of a file without the pixels.
+/// Reads and checks the headers of an EXR file, without its pixels.
 class ExrHeaderReader {
  public:
   ExrHeaderReader(const std::filesystem::path& path, std::size_t maxMemory)
@@ -69,11 +70,12 @@ class ExrHeaderReader {
   /// Pixel layout from one header.
   struct Part {
     double width = 0, height = 0, channels = 0;
-    double tileWidth = 0, tileHeight = 0;  // 0: scan lines
+    double tileWidth = 0, tileHeight = 0;  // pixels; 0: the part is stored in scan lines
     std::size_t compression = kZip;        // OpenEXR's default
   };
 
-  /// Returns false at the empty header that ends the list of headers in a multi-part file.
+  /// Checks one header. Returns false for the empty header that ends the list of headers in a
+  /// multi-part file.
   bool checkPart() {
     Part part;
     bool isEmpty = true;
@@ -81,9 +83,12 @@ class ExrHeaderReader {
       isEmpty = false;
       const std::string type = text();
       const std::uint32_t size = number();
-      if (size > left_) refuse(fmt::format("its attribute '{}' has {} bytes", name, size));
+      if (size > left_)
+        refuse(fmt::format("its attribute '{}' of {} bytes extends beyond the end of the file",
+                           name, size));
       if (size > kMostAttributeBytes)
-        refuse(fmt::format("its attribute '{}' of {} bytes is too large", name, size));
+        refuse(fmt::format("its attribute '{}' has {} bytes, more than the limit of 16 MB", name,
+                           size));
       const std::string value = bytes(size);
       checkSize(name, type, value);
       if (name == "dataWindow" && type == "box2i") readWindow(value, part);
@@ -106,19 +111,22 @@ class ExrHeaderReader {
     };
     part.width = corner(2) - corner(0) + 1;
     part.height = corner(3) - corner(1) + 1;
-    constexpr double kFarthest = 1 << 30;  // sums of two such numbers fit into 32 bits
+    constexpr double kFarthest =
+        1 << 30;  // limit of coordinates, pixels; the difference of two corners fits into 32 bits
     for (std::size_t i = 0; i < 4; ++i)
       if (std::abs(corner(i)) > kFarthest)
-        refuse(fmt::format("its data window extends to {:.0f}", corner(i)));
+        refuse(fmt::format("its data window has a corner at {:.0f}, beyond the limit of 2^30",
+                           corner(i)));
   }
 
   void readTiles(const std::string& value, Part& part) const {
     part.tileWidth = numberAt(value, 0);
     part.tileHeight = numberAt(value, 1);
-    if (part.tileWidth < 1 || part.tileHeight < 1) refuse("its tiles are empty");
+    if (part.tileWidth < 1 || part.tileHeight < 1) refuse("its tiles have a width or height of 0");
   }
 
-  /// Counts the channels: a name and 16 bytes each; an empty name ends the list.
+  /// Counts the channels in a list. Each consists of a name and 16 bytes; an empty name ends the
+  /// list.
   [[nodiscard]] double channelCount(const std::string& value) const {
     double count = 0;
     std::size_t at = 0;
@@ -131,8 +139,9 @@ class ExrHeaderReader {
     return count;
   }
 
-  /// Checks the size of an attribute. OpenEXR reads as many bytes as the type requires, whatever
-  /// the stated size, and then takes the rest for the next attribute.
+  /// Checks that the stated size of an attribute fits its type. OpenEXR reads as many bytes as the
+  /// type requires, whatever the stated size. It then mistakes the remaining bytes for the next
+  /// attribute.
   void checkSize(const std::string& name, const std::string& type, const std::string& value) const {
     const auto known = kSizes.find(type);
     bool isRight = known == kSizes.end() || known->second == value.size();
@@ -170,10 +179,11 @@ class ExrHeaderReader {
                       name_, part.width, part.height, part.channels, fileBytes_));
     }
     if (part.tileWidth > 0) {
-      // OpenEXR stores entire tiles, also where only a part lies in the picture.
+      // OpenEXR stores complete tiles, even if only a part of a tile lies in the picture.
       if (part.tileWidth > 2 * part.width + 64 || part.tileHeight > 2 * part.height + 64)
-        refuse(fmt::format("it has tiles of {:.0f}x{:.0f} for {:.0f}x{:.0f} pixels", part.tileWidth,
-                           part.tileHeight, part.width, part.height));
+        refuse(fmt::format(
+            "its tiles of {:.0f}x{:.0f} pixels are larger than the image of {:.0f}x{:.0f} pixels",
+            part.tileWidth, part.tileHeight, part.width, part.height));
       requireChunks(pixels / (part.tileWidth * part.tileHeight));
       requireChunkMemory(part, part.tileWidth * part.tileHeight);
     } else {
@@ -183,8 +193,8 @@ class ExrHeaderReader {
     }
   }
 
-  /// Checks the memory of a chunk. OpenEXR holds a chunk both packed and unpacked, at full size
-  /// even when it has few lines.
+  /// Checks the memory of a chunk of `pixels` pixels. OpenEXR holds a chunk both packed and
+  /// unpacked, at full size even if the chunk has fewer lines.
   void requireChunkMemory(const Part& part, double pixels) const {
     const double bytes = 2 * 4 * pixels * part.channels;
     if (bytes <= maxMemory_) return;
@@ -195,10 +205,11 @@ class ExrHeaderReader {
   }
 
   void requireChunks(double count) const {
-    if (count * kChunkBytes > fileBytes_) refuse(fmt::format("it announces {:.0f} chunks", count));
+    if (count * kChunkBytes > fileBytes_)
+      refuse(fmt::format("it announces {:.0f} chunks, more than the file can hold", count));
   }
 
-  // === Bytes
+  // === Reading of bytes, numbers and texts
 
   std::string bytes(std::size_t count) {
     if (count > left_) refuse("the file ends within the header");
@@ -219,7 +230,7 @@ class ExrHeaderReader {
   }
   [[nodiscard]] std::uint32_t numberAt(const std::string& value, std::size_t index) const {
     std::uint32_t result = 0;
-    if (value.size() < 4 * index + 4) refuse("an attribute is too short");
+    if (value.size() < 4 * index + 4) refuse("an attribute has fewer bytes than its type requires");
     for (std::size_t i = 4; i-- > 0;)
       result = result << 8 | static_cast<unsigned char>(value[4 * index + i]);
     return result;

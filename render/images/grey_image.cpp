@@ -19,8 +19,8 @@ namespace {
 using levelset::InvalidInput;
 using levelset::IoError;
 
-/// libpng returns from errors by longjmp, which skips destructors. So its state is held here,
-/// outside the functions that call it.
+/// State of libpng. libpng returns from errors by longjmp, which skips destructors, so the state
+/// must not belong to the functions that call libpng.
 struct PngReader {
   png_structp png = nullptr;
   png_infop info = nullptr;
@@ -34,7 +34,7 @@ struct PngReader {
   PngReader(const PngReader&) = delete;
   PngReader& operator=(const PngReader&) = delete;
 
-  /// Reads everything before the rows. Returns false and sets `error` when the file is damaged.
+  /// Reads the chunks before the pixels. Returns false and sets `error` when the file is damaged.
   bool readHeader(std::FILE* file) {
     if (setjmp(png_jmpbuf(png))) return false;
     png_init_io(png, file);
@@ -42,8 +42,8 @@ struct PngReader {
     return true;
   }
 
-  /// Prepares rows of 16 bits, or of 8 bits for a file with at most 8, with alpha if the file has
-  /// it.
+  /// Sets up the conversion of the rows: samples of 16 bits, or of 8 bits for a file with at most 8
+  /// bits; with alpha if the file has transparency.
   bool prepare() {
     if (setjmp(png_jmpbuf(png))) return false;
     if (png_get_bit_depth(png, info) < 8) png_set_expand_gray_1_2_4_to_8(png);
@@ -69,10 +69,10 @@ struct PngReader {
 };
 
 [[noreturn]] void refuseDamaged(const std::string& name, const std::string& why) {
-  throw InvalidInput(fmt::format("{} is not a complete PNG image: {}", name, why));
+  throw InvalidInput(fmt::format("{} is not a complete PNG image: {}; copy it again", name, why));
 }
 
-/// Sample of 8 or 16 bits; the high byte is first.
+/// Sample number `index` of a row, scaled to [0, 1]. It has 8 bits, or 16 with the high byte first.
 double sampleAt(const png_byte* row, std::size_t index, bool isDeep) {
   if (!isDeep) return row[index] / 255.0;
   return (row[2 * index] * 256 + row[2 * index + 1]) / 65535.0;
@@ -95,14 +95,16 @@ void requirePngChunks(const std::filesystem::path& path) {
                                  static_cast<std::uintmax_t>(length[1]) << 16 |
                                  static_cast<std::uintmax_t>(length[2]) << 8 | length[3];
     if (!in || bytes > size - at - kAround)
-      refuseDamaged(path.string(), fmt::format("it ends after byte {}", at));
+      refuseDamaged(path.string(),
+                    fmt::format("the chunk at byte {} extends beyond the end of the file", at));
     at += kAround + bytes;
   }
 }
 
 void requirePngPixels(const std::filesystem::path& path, double width, double height) {
   constexpr double kMostPerByte =
-      8 * 1040;  // deflate packs at most 1032 to 1, and a byte holds 8 pixels of one bit
+      8 * 1040;  // largest number of pixels for a byte of the file: deflate packs at most 1032 to
+                 // 1, and a byte holds 8 pixels of one bit
   std::error_code failed;
   const auto bytes = static_cast<double>(std::filesystem::file_size(path, failed));
   if (failed || width * height <= bytes * kMostPerByte) return;
@@ -123,7 +125,8 @@ GreyImage readGreyPng(const std::filesystem::path& path, std::size_t maxMemory) 
   }
   PngReader reader;
   if (!reader.png || !reader.info)
-    throw levelset::ResourceLimit(fmt::format("no memory left to read {}", name));
+    throw levelset::ResourceLimit(
+        fmt::format("libpng cannot allocate memory to read {}; free memory", name));
   requirePngChunks(path);
   if (!reader.readHeader(file.get())) refuseDamaged(name, reader.error);
   const auto width = static_cast<std::size_t>(png_get_image_width(reader.png, reader.info)),

@@ -8,14 +8,14 @@
 
 namespace render {
 
-/// A grey picture as numbers, without a tone curve.
+/// A grey picture as numbers; the stored values are used without a tone curve.
 struct GreyImage {
-  int width = 0, height = 0;
+  int width = 0, height = 0;   ///< pixels
   std::vector<double> values;  ///< height × width, 0 (black) … 1 (white), top row first
   std::vector<double> alpha;   ///< same size, 0 … 1; empty: opaque
 };
 
-/// Reads a PNG of 1 to 16 bits, with or without alpha or a transparent grey.
+/// Reads a grey PNG of 1 to 16 bits, with or without an alpha channel or a transparent grey value.
 /// @throws IoError when the file cannot be read
 /// @throws InvalidInput when it is not a PNG, is damaged, announces more pixels than its bytes can
 ///         hold, or has colours
@@ -24,12 +24,13 @@ struct GreyImage {
                                     std::size_t maxMemory = levelset::kNoMemoryLimit);
 
 /// Checks that the chunks of a PNG lie within the file, because libpng allocates memory for any
-/// chunk size that a file claims.
+/// chunk size that a file claims. Does nothing for a pipe.
 /// @throws InvalidInput for a chunk beyond the end of the file
 void requirePngChunks(const std::filesystem::path& path);
 
-/// Checks the size of a PNG before memory is allocated for its pixels.
-/// @throws InvalidInput for more pixels than a file of its size can hold
+/// Checks that a PNG file can hold the size that it announces, before memory is allocated for its
+/// pixels.
+/// @throws InvalidInput for more pixels than the bytes of the file can hold
 void requirePngPixels(const std::filesystem::path& path, double width, double height);
 
 }  // namespace render

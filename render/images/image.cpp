@@ -31,8 +31,8 @@ namespace {
 using levelset::InvalidInput;
 using levelset::IoError;
 
-// === Bytes in memory. EXR files are written with seeks, which pipes do not support. Besides, all
-// disk errors then occur in one place.
+// === Images are encoded in memory first. OpenEXR seeks in its output, which pipes do not support.
+// Besides, all disk errors then occur in writeBytes().
 
 class MemoryStream : public Imf::OStream {
  public:
@@ -78,15 +78,16 @@ void requireWhole(const Image& image) {
   }
   const auto check = [&](const std::string& name, std::size_t size) {
     if (size == image.pixelCount()) return;
-    throw InvalidInput(fmt::format("write image: channel {} has {} values for {}x{} pixels", name,
-                                   size, image.width, image.height));
+    throw InvalidInput(fmt::format(
+        "write image: channel {} has {} values for {}x{} pixels; give one value for each pixel",
+        name, size, image.width, image.height));
   };
   for (const auto& [name, values] : image.channels) check(name, values.size());
   for (const auto& [name, values] : image.ids) check(name, values.size());
   for (const auto& [name, matrix] : image.matrices) {
     if (matrix.size() == 16) continue;
     throw InvalidInput(
-        fmt::format("write image: matrix {} has {} numbers, not 16", name, matrix.size()));
+        fmt::format("write image: matrix {} has {} numbers; give 16", name, matrix.size()));
   }
 }
 
@@ -128,8 +129,8 @@ std::vector<char> encodeExr(const Image& image) {
 
 // === PNG
 
-/// Tone curve: linear up to the knee, then a smooth approach to 1, so that highlights do not clip;
-/// then sRGB.
+/// Display value in [0, 1] of a linear colour component: linear up to kKnee, then a smooth approach
+/// to 1, so that highlights do not clip. The sRGB curve is applied last.
 double toneCurve(double linear) {
   constexpr double kKnee = 0.6;
   if (!(linear > 0)) return 0;
@@ -162,7 +163,7 @@ std::vector<char> encodePng(int width, int height, const std::vector<std::uint8_
 Image readOpenExr(Imf::InputFile& file, const std::string& name, std::size_t maxMemory) {
   const Imf::Header& header = file.header();
   const Imath::Box2i window = header.dataWindow();
-  // checkExrHeader() has checked that these are small enough.
+  // checkExrHeader() has limited the corners of the window, so these differences do not overflow.
   const int width = window.max.x - window.min.x + 1, height = window.max.y - window.min.y + 1;
   double channelCount = 0;
   for (auto it = header.channels().begin(); it != header.channels().end(); ++it) ++channelCount;
@@ -266,7 +267,7 @@ void writeImage(const std::filesystem::path& path, const Image& image, const std
     throw;
   } catch (const std::bad_alloc&) {
     throw;
-  } catch (const std::exception& error) {  // an exception of OpenEXR
+  } catch (const std::exception& error) {  // thrown by OpenEXR
     throw IoError(fmt::format("write image: {}: {}", path.string(), error.what()));
   }
   writeBytes(path, bytes);
@@ -289,9 +290,11 @@ Image readExr(const std::filesystem::path& path, std::size_t maxMemory) {
   } catch (const levelset::Error&) {
     throw;
   } catch (const std::bad_alloc&) {
-    throw levelset::ResourceLimit(fmt::format("{} does not fit in memory", name));
+    throw levelset::ResourceLimit(
+        fmt::format("{} does not fit in memory; free memory, or use a smaller image", name));
   } catch (const std::exception& error) {
-    throw InvalidInput(fmt::format("{} is not a readable EXR image: {}", name, error.what()));
+    throw InvalidInput(fmt::format("{} is not a readable EXR image: {}; copy or draw it again",
+                                   name, error.what()));
   }
 }
 

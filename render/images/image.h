@@ -13,8 +13,8 @@
 /// tone curve). As in OpenEXR, colour is linear with premultiplied alpha.
 namespace render {
 
-/// Name of the header attribute with the diagonal of the scene's bounding box, world units. The
-/// error of single-precision positions is relative to it.
+/// Name of the header attribute that stores the diagonal of the scene's bounding box, world units.
+/// The error of single-precision positions is relative to that diagonal.
 inline constexpr const char* kExtentAttribute = "ls:extent";
 
 /// An image with named channels.
@@ -22,8 +22,9 @@ struct Image {
   int width = 0, height = 0;  ///< pixels
   /// Width × height values each, row by row, top row first.
   std::map<std::string, std::vector<float>> channels;
-  std::map<std::string, std::vector<std::uint32_t>> ids;  ///< UINT channels
-  std::map<std::string, std::string> attributes;          ///< written to the EXR header as strings
+  std::map<std::string, std::vector<std::uint32_t>>
+      ids;  ///< channels of unsigned integers, with the same layout
+  std::map<std::string, std::string> attributes;       ///< written to the EXR header as strings
   std::map<std::string, std::vector<float>> matrices;  ///< 16 floats each, by rows: M44f attributes
 
   Image() = default;
@@ -34,8 +35,8 @@ struct Image {
   std::vector<float>& addChannel(const std::string& name, float fill = 0);
 };
 
-/// Returns "exr" or "png", from `format` or else from the extension of `path`, in upper or lower
-/// case. Empty for other formats.
+/// Returns "exr" or "png". Uses `format` if given, else the extension of `path`; both in upper or
+/// lower case. Returns an empty text for other formats.
 [[nodiscard]] std::string imageFormat(const std::filesystem::path& path,
                                       const std::string& format = {});
 

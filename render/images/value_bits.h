@@ -4,28 +4,29 @@
 
 namespace render {
 
-/// Quantization of values to few bits: evenly spaced between minus and plus the largest magnitude.
-/// Zero is not among the quantized values and no value changes its sign, so the surface crosses the
-/// same cells.
+/// Quantization of values to few bits. The quantized values are evenly spaced between minus and
+/// plus the largest magnitude. Zero is not among them, and no value changes its sign, so the
+/// surface crosses the same cells.
 struct ValueBits {
   int bits = 32;   ///< 8 or 16; 32: single precision, not quantized
-  float step = 0;  ///< difference of consecutive values, in the band's unit
+  float step = 0;  ///< difference of neighbouring quantized values, world units
 
-  /// Code of the nearest quantized value. The magnitude of `value` is at most the largest one.
+  /// Code of the quantized value that is nearest to `value`. Values beyond the largest quantized
+  /// value are clamped.
   [[nodiscard]] int codeOf(float value) const;
-  /// Value of a code, as the kernel computes it.
+  /// Quantized value of a code, with the same bits as in the kernel.
   [[nodiscard]] float valueOf(int code) const;
   [[nodiscard]] bool operator==(const ValueBits&) const = default;
 };
 
-/// Displacement of a surface, voxels, measured at its crossings with grid edges.
+/// Displacement of a surface by quantization, voxels, measured at its crossings with grid edges.
 struct SurfaceShift {
   double largest = 0, rms = 0;
 };
 
 /// A band with quantized values.
 struct QuantizedBand {
-  levelset::NarrowBand band;  ///< values are multiples of the quantization
+  levelset::NarrowBand band;  ///< all its values are quantized values
   ValueBits quantization;
   SurfaceShift shift;
 };
