@@ -158,7 +158,7 @@ TEST(SurfaceBand, RefusesSurfacesWithoutTwoSides) {
   TriMesh flipped = square(V3d(0), V3d(1, 0, 0), V3d(0, 1, 0));
   std::swap(flipped.triangles[12][0], flipped.triangles[12][1]);
   const std::string sentence = refusal<InvalidInput>([&] { (void)surfaceBand(flipped, 0.1); });
-  EXPECT_SAYS(sentence, "surface-band: at the edge from (");
+  EXPECT_SAYS(sentence, "at the edge from (");
   EXPECT_SAYS(sentence, "orient all faces alike");
   TriMesh fin = square(V3d(0), V3d(1, 0, 0), V3d(0, 1, 0), 2);
   fin.positions.emplace_back(0, 0.5, 1);
@@ -174,9 +174,8 @@ TEST(SurfaceBand, RefusesInvalidArguments) {
   EXPECT_THROW((void)surfaceBand(sheet, 0.1, {.halfWidth = 3}), levelset::UsageError);
   EXPECT_THROW((void)surfaceBand(sheet, 0), levelset::UsageError);
   EXPECT_SAYS(refusal<InvalidInput>([&] { (void)surfaceBand({}, 0.1); }),
-              "surface-band: the mesh has no triangles");
-  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)surfaceBand(sheet, 3); }),
-              "surface-band: the voxel");
+              "the mesh has no triangles");
+  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)surfaceBand(sheet, 3); }), "the voxel");
   EXPECT_THROW((void)surfaceBand(sheet, 0.1, {.progress = [](double) { return false; }}),
                levelset::Cancelled);
   EXPECT_THROW((void)surfaceBand(sheet, 0.01, {.maxMemory = 1000}), levelset::ResourceLimit);

@@ -300,18 +300,17 @@ TEST(Csg, ResamplesOperandsToTheFinestGrid) {
   EXPECT_NEAR(result.band.voxelSize(), 0.05, support::doubleRounding(4));
   EXPECT_NEAR(result.band.halfWidth(), 3, support::rounding(3));
   ASSERT_EQ(result.notes.size(), 2u);
-  EXPECT_EQ(
-      result.notes[0],
-      "union: operand 1 was resampled from voxels of 0.1 to the grid of operand 2 with voxels of "
-      "0.05");
-  EXPECT_EQ(result.notes[1], "union: operand 2 was narrowed to a half width of 3 voxels");
+  EXPECT_EQ(result.notes[0],
+            "operand 1 was resampled from voxels of 0.1 to the grid of operand 2 with voxels of "
+            "0.05");
+  EXPECT_EQ(result.notes[1], "operand 2 was narrowed to a half width of 3 voxels");
   const double direct = measure(unite(makeSphere(1, V3d(0.5, 0, 0), 0.05), fine)).volume;
   EXPECT_NEAR(measure(result.band).volume, direct, support::rounding(3) * direct);
   // Different half widths alone do not cause resampling.
   const NarrowBand wide = makeSphere(1, V3d(0), 0.1, {.halfWidth = 5});
   const CsgResult cut = combine(CsgOperation::Union, std::array{wide, coarse});
   EXPECT_EQ(cut.notes,
-            std::vector<std::string>{"union: operand 1 was narrowed to a half width of 3 voxels"});
+            std::vector<std::string>{"operand 1 was narrowed to a half width of 3 voxels"});
   EXPECT_TRUE(combine(CsgOperation::Union, std::array{coarse, coarse}).notes.empty());
   EXPECT_EQ(cut.band.contentHash(), unite(makeSphere(1, V3d(0), 0.1), coarse).contentHash());
 }

@@ -186,12 +186,12 @@ TEST(MeshAttributes, ListsOfWrongLengthAreRefused) {
   TriMesh bad = mesh;
   bad.attributes.normals.pop_back();
   EXPECT_SAYS(refusal<InvalidInput>([&] { levelset::writeMesh(folder / "a.ply", bad); }),
-              "write: the mesh has 3 normals for 4 vertices");
+              "the mesh has 3 normals for 4 vertices");
   EXPECT_THROW((void)transform(bad, M44d()), InvalidInput);
   bad = mesh;
   bad.attributes.uvs[2].y = std::numeric_limits<double>::infinity();
   EXPECT_SAYS(refusal<InvalidInput>([&] { (void)transform(bad, M44d()); }),
-              "transform: the texture coordinate of vertex 2 holds inf");
+              "the texture coordinate of vertex 2 holds inf");
   bad = mesh;
   bad.attributes.colors[1].w = std::numeric_limits<float>::quiet_NaN();
   EXPECT_SAYS(refusal<InvalidInput>([&] { levelset::writeMesh(folder / "a.obj", bad); }),

@@ -338,7 +338,7 @@ TEST(AnimatePatches, NamesTheFrameOfAnError) {
   const auto bases = [&](std::size_t f) { return base(f < 2 ? 0.7 : 1.3); };
   const std::string torn = support::refusal<levelset::Error>(
       [&] { (void)play(first, {keyOf(a)}, {.frames = 4, .bases = bases}); });
-  EXPECT_NE(torn.find("animate: frame 2: "), std::string::npos) << torn;
+  EXPECT_NE(torn.find("frame 2: "), std::string::npos) << torn;
   EXPECT_NE(torn.find("the same surface component"), std::string::npos) << torn;
   EXPECT_EQ(torn.find("frame"), torn.rfind("frame")) << torn;
   // No solid is left.
@@ -347,7 +347,7 @@ TEST(AnimatePatches, NamesTheFrameOfAnError) {
     (void)play(ball, {keyOf(patchAt(ball, V3d(0, 0, 1)))},
                {.frames = 3, .bases = [&](std::size_t f) { return f < 2 ? ball : NarrowBand(); }});
   });
-  EXPECT_NE(gone.find("animate: frame 2: the base has no surface"), std::string::npos) << gone;
+  EXPECT_NE(gone.find("frame 2: the base has no surface"), std::string::npos) << gone;
   // The keys are on different components.
   const NarrowBand two = base(1.3);
   std::size_t made = 0;
@@ -357,8 +357,7 @@ TEST(AnimatePatches, NamesTheFrameOfAnError) {
         {.frames = 4, .make = support::remakePatches}, [&](const PatchFrame&) { ++made; });
   });
   EXPECT_EQ(made, 0u);
-  EXPECT_NE(apart.find("animate: frame 1: the surface does not connect"), std::string::npos)
-      << apart;
+  EXPECT_NE(apart.find("frame 1: the surface does not connect"), std::string::npos) << apart;
 }
 
 TEST(AnimatePatches, WarnsOfDriftingPatches) {
@@ -445,9 +444,9 @@ TEST(AnimatePatches, RefusesKeysOfAnotherBaseBeforeTheFirstFrame) {
     return ballAt(V3d(0), 1 + 0.02 * static_cast<double>(f));
   };
   const std::string moving = refusal({keyOf(a), keyOf(b, 3)}, bases);
-  EXPECT_TRUE(moving.starts_with("animate: frame 3: the patch does not lie on the base")) << moving;
+  EXPECT_TRUE(moving.starts_with("frame 3: the patch does not lie on the base")) << moving;
   const std::string still = refusal({keyOf(a), keyOf(a, 1), keyOf(b, 3)}, {});
-  EXPECT_TRUE(still.starts_with("animate: frame 3: the patch does not lie on the base")) << still;
+  EXPECT_TRUE(still.starts_with("frame 3: the patch does not lie on the base")) << still;
   EXPECT_EQ(made, 0u);
 }
 
@@ -464,13 +463,13 @@ TEST(AnimatePatches, NamesTheFrameOnceForAnyError) {
     EXPECT_THROW((void)throwing(error), Thrown);
     EXPECT_EQ(support::refusal<levelset::Error>([&] { (void)throwing(error); }), sentence);
   };
-  expect(levelset::InvalidInput("texture: a"), "animate: frame 1: a");
-  expect(levelset::ResourceLimit("map: b"), "animate: frame 1: map: b");
-  expect(levelset::IoError("write: c"), "animate: frame 1: c");
-  expect(levelset::NumericalError("animate: d"), "animate: frame 1: d");
-  expect(levelset::InvalidInput("animate: frame 2: e"), "animate: frame 2: e");
-  expect(levelset::UsageError("animate: f"), "animate: f");
-  expect(levelset::Cancelled("animate: g"), "animate: g");
+  expect(levelset::InvalidInput("a"), "frame 1: a");
+  expect(levelset::ResourceLimit("map: b"), "frame 1: map: b");
+  expect(levelset::IoError("c"), "frame 1: c");
+  expect(levelset::NumericalError("d"), "frame 1: d");
+  expect(levelset::InvalidInput("frame 2: e"), "frame 2: e");
+  expect(levelset::UsageError("f"), "f");
+  expect(levelset::Cancelled("g"), "g");
 }
 
 TEST(AnimatePatches, HoldsOneBaseBesideTheFirst) {
