@@ -21,14 +21,14 @@ double squaredGap(const Box3d& a, const Box3d& b) {
   return sum;
 }
 
-PointTree::PointTree(std::span<const V3d> points, std::size_t leafSize)
+ClusterTree::ClusterTree(std::span<const V3d> points, std::size_t leafSize)
     : points_(points), order_(points.size()) {
   std::iota(order_.begin(), order_.end(), 0u);
   nodes_.push_back({.begin = 0, .end = static_cast<std::uint32_t>(points.size())});
   for (std::size_t node = 0; node < nodes_.size(); ++node) split(node, leafSize);
 }
 
-void PointTree::split(std::size_t at, std::size_t leafSize) {
+void ClusterTree::split(std::size_t at, std::size_t leafSize) {
   const std::uint32_t begin = nodes_[at].begin, end = nodes_[at].end;
   Box3d box;
   for (std::uint32_t n = begin; n < end; ++n) box.extendBy(points_[order_[n]]);
@@ -45,14 +45,14 @@ void PointTree::split(std::size_t at, std::size_t leafSize) {
   nodes_.push_back({.begin = middle, .end = end});
 }
 
-PointTree PointTree::inOrder(std::span<const V3d> orderedPoints) const {
-  PointTree result = *this;
+ClusterTree ClusterTree::inOrder(std::span<const V3d> orderedPoints) const {
+  ClusterTree result = *this;
   result.points_ = orderedPoints;
   std::iota(result.order_.begin(), result.order_.end(), 0u);
   return result;
 }
 
-std::uint32_t PointTree::nearest(std::uint32_t point) const {
+std::uint32_t ClusterTree::nearest(std::uint32_t point) const {
   const V3d p = points_[point];
   const Box3d place(p, p);
   std::pair best(std::numeric_limits<double>::infinity(), point);
@@ -77,7 +77,7 @@ std::uint32_t PointTree::nearest(std::uint32_t point) const {
   return best.second;
 }
 
-std::vector<std::uint32_t> PointTree::within(const V3d& center, double radius) const {
+std::vector<std::uint32_t> ClusterTree::within(const V3d& center, double radius) const {
   const Box3d place(center, center);
   const double squared = radius * radius;
   std::vector<std::uint32_t> found;
@@ -97,7 +97,7 @@ std::vector<std::uint32_t> PointTree::within(const V3d& center, double radius) c
   return found;
 }
 
-std::vector<std::uint32_t> PointTree::around(const Box3d& box, std::size_t count) const {
+std::vector<std::uint32_t> ClusterTree::around(const Box3d& box, std::size_t count) const {
   using Far = std::pair<double, std::uint32_t>;
   std::vector<Far> found;
   std::priority_queue<Far, std::vector<Far>, std::greater<>> open;  // nodes, ordered by distance

@@ -15,7 +15,7 @@ namespace mapping {
 
 /// A balanced binary tree of points with tight boxes. Each node is split across its longest side at
 /// the median point. It refers to the points.
-class PointTree {
+class ClusterTree {
  public:
   struct Node {
     std::uint32_t begin = 0, end = 0;  ///< range of order()
@@ -28,10 +28,10 @@ class PointTree {
   /// Builds the tree.
   /// @param leafSize  maximum number of points in a leaf, ≥ 1
   /// @pre there is at least one point, and fewer than 2³¹
-  PointTree(std::span<const Imath::V3d> points, std::size_t leafSize);
+  ClusterTree(std::span<const Imath::V3d> points, std::size_t leafSize);
 
   /// The same tree for the points reordered into its order; it refers to the reordered points.
-  [[nodiscard]] PointTree inOrder(std::span<const Imath::V3d> orderedPoints) const;
+  [[nodiscard]] ClusterTree inOrder(std::span<const Imath::V3d> orderedPoints) const;
   /// Nodes, parents before children, the root first.
   [[nodiscard]] std::span<const Node> nodes() const { return nodes_; }
   /// Indices of the points, leaf by leaf.

@@ -24,9 +24,9 @@ struct RbfClusterSum::Pass {
 };
 
 RbfClusterSum::RbfClusterSum(RbfKernel kernel, std::span<const V3d> points,
-                             std::span<const PointTree::Node> nodes)
+                             std::span<const ClusterTree::Node> nodes)
     : kernel_(kernel), points_(points), nodes_(nodes) {
-  for (const PointTree::Node& node : nodes) {
+  for (const ClusterTree::Node& node : nodes) {
     Frame frame{node.box.center(), node.box.size() / 2};
     frame.radius = frame.half.length();
     for (int axis = 0; axis < 3; ++axis)
@@ -116,7 +116,7 @@ void RbfClusterSum::chooseSources(std::size_t at, std::span<const std::uint32_t>
   while (!open.empty()) {
     const std::uint32_t other = open.back();
     open.pop_back();
-    const PointTree::Node& from = nodes_[other];
+    const ClusterTree::Node& from = nodes_[other];
     if (isFar(at, other)) {
       addSources(other, sources);
     } else if (!isBottom(other) && (isLast || frames_[other].radius >= frames_[at].radius)) {
@@ -132,7 +132,7 @@ void RbfClusterSum::chooseSources(std::size_t at, std::span<const std::uint32_t>
 
 void RbfClusterSum::sumLeaf(std::size_t at, std::span<const std::uint32_t> sources,
                             const Cubes& inherited, Pass& pass) const {
-  const PointTree::Node& node = nodes_[at];
+  const ClusterTree::Node& node = nodes_[at];
   const Frame& frame = frames_[at];
   RbfPoints points(node.count());
   for (std::size_t n = 0; n < points.size(); ++n) {
@@ -156,7 +156,7 @@ void RbfClusterSum::descend(std::size_t at, std::span<const std::uint32_t> candi
                             const Cubes& inherited, Pass& pass) const {
   std::vector<std::uint32_t> sources, rest;
   chooseSources(at, candidates, sources, rest);
-  const PointTree::Node& node = nodes_[at];
+  const ClusterTree::Node& node = nodes_[at];
   if (isBottom(at)) {
     sumLeaf(at, sources, inherited, pass);
     return;

@@ -22,7 +22,7 @@ class RbfClusterSum {
   /// @param points  in the order of their tree, so that its order() is 0, 1, 2, …; referred to
   /// @param nodes   nodes of that tree; referred to
   RbfClusterSum(RbfKernel kernel, std::span<const Imath::V3d> points,
-                std::span<const PointTree::Node> nodes);
+                std::span<const ClusterTree::Node> nodes);
 
   /// Computes Σ ω_i φ(|p_j − p_i|) for each particle j.
   [[nodiscard]] std::vector<Imath::V3d> operator()(std::span<const Imath::V3d> weights) const;
@@ -61,7 +61,7 @@ class RbfClusterSum {
 
   RbfKernel kernel_;
   std::span<const Imath::V3d> points_;
-  std::span<const PointTree::Node> nodes_;
+  std::span<const ClusterTree::Node> nodes_;
   std::vector<Frame> frames_;
 };
 

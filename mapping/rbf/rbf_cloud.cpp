@@ -87,7 +87,7 @@ std::vector<std::uint32_t> findLeaders(std::span<const V3d> points, double gap) 
   std::sort(distinct.begin(), distinct.end());
   std::vector<V3d> places;
   for (const std::uint32_t i : distinct) places.push_back(points[i]);
-  const PointTree tree(places, kNeighbourLeaf);
+  const ClusterTree tree(places, kNeighbourLeaf);
   std::vector<std::uint32_t> first(points.size(), static_cast<std::uint32_t>(points.size()));
   for (std::uint32_t n = 0; n < places.size(); ++n) {
     if (first[distinct[n]] < points.size()) continue;
@@ -103,7 +103,7 @@ std::vector<std::uint32_t> findLeaders(std::span<const V3d> points, double gap) 
 /// Mean distance of a point to its nearest neighbour, and mean distance of the targets of these
 /// pairs.
 std::pair<double, double> meanSpacings(std::span<const V3d> points, std::span<const V3d> targets) {
-  const PointTree tree(points, kNeighbourLeaf);
+  const ClusterTree tree(points, kNeighbourLeaf);
   std::vector<std::uint32_t> nearest(points.size());
   tbb::parallel_for(std::size_t{0}, points.size(), [&](std::size_t i) {
     nearest[i] = tree.nearest(static_cast<std::uint32_t>(i));

@@ -118,7 +118,7 @@ class Hessenberg {
 class KrylovSolver {
  public:
   KrylovSolver(const RbfCloud& cloud, const RbfMapOptions& options, const MatrixXd& q,
-               const PointTree& tree, RbfSolveReport& report)
+               const ClusterTree& tree, RbfSolveReport& report)
       : cloud_(cloud),
         options_(options),
         q_(q),
@@ -259,11 +259,11 @@ RbfFit solveIteratively(const RbfCloud& cloud, const RbfMapOptions& options, con
   constexpr double kSumBytes = 500;  // per particle, for the nodes of the fast sum
   levelset::requireMemory(n * (basis + kSumBytes) + RbfPreconditioner::estimateBytes(n),
                           options.maxMemory);
-  const PointTree first(cloud.points, kSolveLeaf);
+  const ClusterTree first(cloud.points, kSolveLeaf);
   const std::vector<std::uint32_t> order(first.order().begin(), first.order().end());
   const RbfCloud ordered = inOrder(cloud, order);
   const MatrixXd orderedQ = rowsInOrder(q, order);
-  const PointTree tree = first.inOrder(ordered.points);
+  const ClusterTree tree = first.inOrder(ordered.points);
   const Eigen::RowVector3d mean = values.colwise().mean();
   const double extent = (values.rowwise() - mean).cwiseAbs().maxCoeff();
   KrylovSolver solver(ordered, options, orderedQ, tree, report);

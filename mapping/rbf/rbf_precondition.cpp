@@ -50,10 +50,10 @@ std::pair<MatrixXd, Index> basisOf(const MatrixXd& q, std::span<const std::uint3
 
 }  // namespace
 
-RbfPreconditioner::RbfPreconditioner(const RbfCloud& cloud, RbfKernel kernel, const PointTree& tree,
-                                     const MatrixXd& q)
+RbfPreconditioner::RbfPreconditioner(const RbfCloud& cloud, RbfKernel kernel,
+                                     const ClusterTree& tree, const MatrixXd& q)
     : cloud_(cloud), kernel_(kernel), q_(q) {
-  for (const PointTree::Node& node : tree.nodes())
+  for (const ClusterTree::Node& node : tree.nodes())
     if (node.isLeaf()) leaves_.push_back({node.begin, node.end, {}, {}});
   tbb::parallel_for(std::size_t{0}, leaves_.size(),
                     [&](std::size_t n) { makeLeaf(tree, leaves_[n]); });
@@ -68,7 +68,7 @@ double RbfPreconditioner::estimateBytes(double particles) {
          kMatrices * coarse * coarse * sizeof(double);
 }
 
-void RbfPreconditioner::makeLeaf(const PointTree& tree, Leaf& leaf) const {
+void RbfPreconditioner::makeLeaf(const ClusterTree& tree, Leaf& leaf) const {
   const Index own = leaf.end - leaf.begin;
   leaf.members.resize(static_cast<std::size_t>(own));
   std::iota(leaf.members.begin(), leaf.members.end(), leaf.begin);

@@ -18,7 +18,7 @@ class RbfPreconditioner {
  public:
   /// @param cloud  particles in the order of the tree
   /// @param q      orthonormal basis of the polynomials at the particles
-  RbfPreconditioner(const RbfCloud& cloud, RbfKernel kernel, const PointTree& tree,
+  RbfPreconditioner(const RbfCloud& cloud, RbfKernel kernel, const ClusterTree& tree,
                     const Eigen::MatrixXd& q);
 
   /// Applies the approximate inverse. The resulting weights are orthogonal to the polynomials.
@@ -34,7 +34,7 @@ class RbfPreconditioner {
     Eigen::MatrixXf inverse;  ///< rows: the leaf's own particles; columns: all members
   };
   void chooseCoarse();
-  void makeLeaf(const PointTree& tree, Leaf& leaf) const;
+  void makeLeaf(const ClusterTree& tree, Leaf& leaf) const;
   void factorCoarse();
   [[nodiscard]] RbfColumns solveLeaves(const RbfColumns& residual) const;
   /// Computes (s φ + λ) times the weights, only at the coarse particles.

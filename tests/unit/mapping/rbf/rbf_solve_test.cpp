@@ -243,7 +243,7 @@ TEST(ClusterSum, ApproximatesTheDirectSum) {
   const Cloud cloud = slab(30);
   std::mt19937 random(4);
   std::normal_distribution<double> normal;
-  const mapping::PointTree tree(cloud.points, 128);
+  const mapping::ClusterTree tree(cloud.points, 128);
   std::vector<V3d> points, weights;
   for (const std::uint32_t i : tree.order()) {
     points.push_back(cloud.points[i]);
@@ -262,13 +262,13 @@ TEST(ClusterSum, ApproximatesTheDirectSum) {
   EXPECT_LT(worst, support::rounding(4) * largest);
 }
 
-TEST(PointTree, FindsNeighbours) {
+TEST(ClusterTree, FindsNeighbours) {
   std::mt19937 random(2);
   std::uniform_real_distribution<double> unit(0, 1);
   std::vector<V3d> points;
   for (int i = 0; i < 700; ++i) points.emplace_back(unit(random), unit(random) / 9, i % 3);
   for (int i = 0; i < 40; ++i) points.push_back(points[5]);
-  const mapping::PointTree tree(points, 7);
+  const mapping::ClusterTree tree(points, 7);
   const Imath::Box3d box(V3d(0.2, 0, 0), V3d(0.5, 0.1, 0.2));
   for (std::uint32_t i = 0; i < points.size(); i += 11) {
     std::pair best(HUGE_VAL, i);
