@@ -185,14 +185,23 @@ void roundBalls(Recorder& out) {
 Bounds filletPlanesBounds() {
   return Bounds()
       .measured("45 degrees", "value_error",
-                {{2, 0.00687}, {3, 0.00393}, {4, 0.00158, Budget::Quick}})
-      .unmeasured("45 degrees", "value_error", 0.02, {4, 8})
+                {{2, 0.00687},
+                 {3, 0.00393},
+                 {4, 0.00158, Budget::Quick},
+                 {4, 0.00187, Budget::Full},
+                 {8, 0.00012}})
       .measured("90 degrees", "value_error",
-                {{2, 0.00688}, {3, 0.000967}, {4, 0.000806, Budget::Quick}})
-      .unmeasured("90 degrees", "value_error", 0.02, {4, 8})
+                {{2, 0.00688},
+                 {3, 0.000967},
+                 {4, 0.000806, Budget::Quick},
+                 {4, 0.00168, Budget::Full},
+                 {8, 0.00026}})
       .measured("135 degrees", "value_error",
-                {{2, 0.00932}, {3, 0.00281}, {4, 0.00215, Budget::Quick}})
-      .unmeasured("135 degrees", "value_error", 0.02, {4, 8})
+                {{2, 0.00932},
+                 {3, 0.00281},
+                 {4, 0.00215, Budget::Quick},
+                 {4, 0.00215, Budget::Full},
+                 {8, 0.000371}})
       .rounding("45 degrees", "deviation_vx", 0.5)
       .rounding("90 degrees", "deviation_vx", 0.5)
       .rounding("135 degrees", "deviation_vx", 0.5);

@@ -153,42 +153,61 @@ Bounds offsetCubeBounds() {
 
 Bounds offsetLawsBounds() {
   return Bounds()
-      .measured("sphere, +3 then +4", "surface_l1_vx",
-                {{6, 0.000347}, {8, 0.000179}, {12, 8.25e-5}})
-      .unmeasured("sphere, +3 then +4", "surface_l1_vx", 0.002, {16, 32, 64})
-      .measured("sphere, +3 then +4", "deviation_vx", {{6, 0.00178}, {8, 0.00116}, {12, 0.000566}})
+      .measured("sphere, +5 then -5", "missed_hits", {{16, 0}, {32, 0}, {64, 0}})
+      .measured(
+          "sphere, +3 then +4", "surface_l1_vx",
+          {{6, 0.000347}, {8, 0.000179}, {12, 8.25e-5}, {16, 5.14e-5}, {32, 1.36e-5}, {64, 3.8e-6}})
+      .measured("sphere, +3 then +4", "deviation_vx",
+                {{6, 0.00178},
+                 {8, 0.00116},
+                 {12, 0.000566},
+                 {16, 0.00035},
+                 {32, 0.000103},
+                 {64, 2.87e-5}})
       .ceiling(0.002)
-      .unmeasured("sphere, +3 then +4", "deviation_vx", 0.002, {16, 32, 64})
       .measured("sphere, +5 then -5", "surface_l1_vx",
-                {{6, 0.000558}, {8, 0.000288}, {12, 0.000118}})
-      .unmeasured("sphere, +5 then -5", "surface_l1_vx", 0.002, {16, 32, 64})
-      .measured("sphere, +3 then +4", "band_in_linf_vx",
-                {{6, 0.00179}, {8, 0.00101}, {12, 0.00046}})
-      .unmeasured("sphere, +3 then +4", "band_in_linf_vx", 0.005, {16, 32, 64})
+                {{6, 0.000558},
+                 {8, 0.000288},
+                 {12, 0.000118},
+                 {16, 6.7e-5},
+                 {32, 1.56e-5},
+                 {64, 3.76e-6}})
+      .measured(
+          "sphere, +3 then +4", "band_in_linf_vx",
+          {{6, 0.00179}, {8, 0.00101}, {12, 0.00046}, {16, 0.000312}, {32, 9.14e-5}, {64, 2.51e-5}})
       .measured("sphere, +3 then +4", "band_out_linf_vx",
-                {{6, 0.00175}, {8, 0.000993}, {12, 0.000484}})
-      .unmeasured("sphere, +3 then +4", "band_out_linf_vx", 0.005, {16, 32, 64})
-      .measured("sphere, +5 then -5", "band_in_linf_vx",
-                {{6, 0.00294}, {8, 0.00102}, {12, 0.000469}})
-      .unmeasured("sphere, +5 then -5", "band_in_linf_vx", 0.005, {16, 32, 64})
+                {{6, 0.00175},
+                 {8, 0.000993},
+                 {12, 0.000484},
+                 {16, 0.000314},
+                 {32, 8.92e-5},
+                 {64, 2.5e-5}})
+      .measured(
+          "sphere, +5 then -5", "band_in_linf_vx",
+          {{6, 0.00294}, {8, 0.00102}, {12, 0.000469}, {16, 0.00031}, {32, 9.46e-5}, {64, 2.96e-5}})
       .measured("sphere, +5 then -5", "band_out_linf_vx",
-                {{6, 0.00291}, {8, 0.00112}, {12, 0.000495}})
-      .unmeasured("sphere, +5 then -5", "band_out_linf_vx", 0.005, {16, 32, 64})
-      .measured("box, +3 then +4", "band_in_linf_vx", {{6, 0.0276}, {8, 0.0223}, {12, 0.0207}})
-      .unmeasured("box, +3 then +4", "band_in_linf_vx", 0.05, {16, 32, 64})
-      .measured("box, +3 then +4", "band_out_linf_vx", {{6, 0.0275}, {8, 0.0217}, {12, 0.0212}})
-      .unmeasured("box, +3 then +4", "band_out_linf_vx", 0.05, {16, 32, 64})
-      .measured("box, +3 then +4", "surface_l1_vx", {{6, 0.00515}, {8, 0.00355}, {12, 0.00322}})
-      .unmeasured("box, +3 then +4", "surface_l1_vx", 0.01, {16, 32, 64})
-      .measured("box, +5 then -5", "band_in_linf_vx", {{6, 0.00338}, {8, 0.00119}, {12, 0.00103}})
-      .unmeasured("box, +5 then -5", "band_in_linf_vx", 0.05, {16, 32, 64})
-      .measured("box, +5 then -5", "band_out_linf_vx", {{6, 0.0132}, {8, 0.00223}, {12, 0.00345}})
-      .unmeasured("box, +5 then -5", "band_out_linf_vx", 0.05, {16, 32, 64})
-      .measured("sphere, +3 then +4", "missed_hits", {{6, 0.00068}})
-      .unmeasured("sphere, +3 then +4", "missed_hits", 0.025, {16, 32, 64})
-      .unmeasured("sphere, +5 then -5", "missed_hits", 0.025, {16, 32, 64})
-      .measured("box, +3 then +4", "missed_hits", {{6, 0.000822}, {12, 0.000778}})
-      .unmeasured("box, +3 then +4", "missed_hits", 0.025, {16, 32, 64});
+                {{6, 0.00291},
+                 {8, 0.00112},
+                 {12, 0.000495},
+                 {16, 0.000294},
+                 {32, 9.21e-5},
+                 {64, 2.85e-5}})
+      .measured("box, +3 then +4", "band_in_linf_vx",
+                {{6, 0.0276}, {8, 0.0223}, {12, 0.0207}, {16, 0.0276}, {32, 0.0274}, {64, 0.0268}})
+      .measured("box, +3 then +4", "band_out_linf_vx",
+                {{6, 0.0275}, {8, 0.0217}, {12, 0.0212}, {16, 0.0275}, {32, 0.0269}, {64, 0.0273}})
+      .measured(
+          "box, +3 then +4", "surface_l1_vx",
+          {{6, 0.00515}, {8, 0.00355}, {12, 0.00322}, {16, 0.00353}, {32, 0.00202}, {64, 0.00138}})
+      .measured(
+          "box, +5 then -5", "band_in_linf_vx",
+          {{6, 0.00338}, {8, 0.00119}, {12, 0.00103}, {16, 0.00338}, {32, 0.00158}, {64, 0.00474}})
+      .measured(
+          "box, +5 then -5", "band_out_linf_vx",
+          {{6, 0.0132}, {8, 0.00223}, {12, 0.00345}, {16, 0.0132}, {32, 0.00419}, {64, 0.0144}})
+      .measured("sphere, +3 then +4", "missed_hits", {{6, 0.00068}, {16, 0}, {32, 0}, {64, 0}})
+      .measured("box, +3 then +4", "missed_hits",
+                {{6, 0.000822}, {12, 0.000778}, {16, 0.00057}, {32, 0.000551}, {64, 0.000179}});
 }
 
 }  // namespace
