@@ -54,7 +54,7 @@ bool CsgTraversal::advance() {
   return asks;
 }
 
-// Returns true when the ray has open queries.
+// Moves one ray. Returns true when it has open queries.
 bool CsgTraversal::advance(std::size_t ray) {
   if (met_[ray] >= 0) return false;
   const auto row = [&](auto& all) {
@@ -68,7 +68,7 @@ bool CsgTraversal::advance(std::size_t ray) {
   return met_[ray] < 0;
 }
 
-// Crosses all surfaces at that distance, which is the ray's next.
+// Crosses all surfaces at the distance `place`, which is the nearest one ahead of the ray.
 void CsgTraversal::cross(std::size_t ray, double place) {
   char* inside = inside_.data() + ray * solids_;
   const bool before = csg_.holds(inside);

@@ -16,7 +16,8 @@ namespace render {
 /// together; the hit is attributed to the solid with the lowest number.
 class CsgTraversal {
  public:
-  /// Requested crossing of a ray with a solid: the one after `passing` earlier crossings.
+  /// Request for the next crossing of a ray with a solid. The first `passing` crossings of the ray
+  /// with that solid are skipped.
   struct Query {
     std::size_t ray;
     std::int32_t passing;
@@ -26,20 +27,22 @@ class CsgTraversal {
   /// @param maxDistances  largest distance along each ray; crossings beyond it do not count
   CsgTraversal(const CsgExpression& csg, std::size_t solids, std::vector<double> maxDistances);
 
-  /// Open queries about a solid. All of them must be answered before the next advance().
+  /// Open queries about a solid. Each must be answered by answer() or answerNone() before the next
+  /// advance().
   [[nodiscard]] std::vector<Query> queriesFor(std::size_t solid) const;
   void answer(std::size_t solid, const Query& query, double place, bool enters);
   void answerNone(std::size_t solid, const Query& query);
-  /// Advances all rays as far as the answers allow.
+  /// Moves each ray to its next hit, or up to the point where it needs another crossing.
   /// @return true when there are open queries
   bool advance();
 
-  /// Lets a ray continue from its present hit to the next one.
+  /// Lets a ray continue from its present hit to its next hit.
   void resume(std::size_t ray) { met_[ray] = -1; }
 
-  /// Number of the solid that the ray hits, or −1.
+  /// Number of the solid at the present hit of the ray; −1 without a hit.
   [[nodiscard]] std::int32_t solidMet(std::size_t ray) const { return met_[ray]; }
-  /// True when the outside of that solid is inside the result of the expression.
+  /// True when the result of the expression is on the outside of the hit solid, as for a subtracted
+  /// solid.
   [[nodiscard]] bool isFlipped(std::size_t ray) const { return flipped_[ray] != 0; }
 
  private:
@@ -50,11 +53,11 @@ class CsgTraversal {
   std::size_t solids_;
   std::vector<double> maxDistances_;
   // Indexed by ray and solid.
-  std::vector<double> place_;  // distance of the next crossing
-  std::vector<std::int32_t> passed_;
-  std::vector<char> inside_, asked_;
+  std::vector<double> place_;         // distance of the next crossing; infinite: there is none
+  std::vector<std::int32_t> passed_;  // number of crossings behind the ray's present position
+  std::vector<char> inside_, asked_;  // the ray is inside the solid; its query is open
   // Indexed by ray.
-  std::vector<std::int32_t> met_;
+  std::vector<std::int32_t> met_;  // number of the hit solid; −1: no hit
   std::vector<char> flipped_;
 };
 

@@ -17,12 +17,13 @@ using Range = FieldGrid::Range;
 constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr int kMostHalvings =
     44;  // halvings of a ray segment, down to the spacing of representable positions
-constexpr double kNoise = 1e-13;  // relative to the backgrounds: smaller values are rounding noise
+constexpr double kNoise =
+    1e-13;  // relative to the largest background; values of smaller magnitude are rounding noise
 
-/// A cubic on a ray segment, by its Bernstein coefficients.
+/// Bernstein coefficients of a field's cubic on a ray segment.
 using FieldCubic = std::array<double, 4>;
 
-/// Bounds on the value along a ray segment and on its derivative.
+/// Bounds on a field's values and on its derivative along a ray segment.
 struct FieldBounds {
   Range value, slope;
 };
@@ -37,7 +38,7 @@ Range negated(const Range& r) {
   return {-r.high, -r.low};
 }
 
-/// Bounds on the mixed slope share · a + (1 − share) · b.
+/// Bounds on share · a + (1 − share) · b, given ranges of the share and of the slopes a and b.
 Range mixedSlope(const Range& share, const Range& a, const Range& b) {
   const auto at = [](double s, double u, double v) { return s * u + (1 - s) * v; };
   return {std::min(at(share.low, a.low, b.low), at(share.high, a.low, b.low)),
@@ -77,7 +78,7 @@ double valueAt(const FieldCubic& c, double s) {
   return r * r * (r * c[0] + 3 * s * c[1]) + s * s * (3 * r * c[2] + s * c[3]);
 }
 
-/// Traversal of one grid by a ray: the present block, and the present cell in it.
+/// Traversal of one grid by a ray: the present block, and the present cell in that block.
 struct GridTraversal {
   const FieldGrid* grid;
   V3d origin, direction;  // index space; the parameter is the world distance along the ray
@@ -85,8 +86,8 @@ struct GridTraversal {
   int block[3] = {}, cell[3] = {};
   int number = -1;  // number of the block; negative where the field is constant
   double blockExit = 0, cellExit = kNever;
-  int blockAxis = -1, cellAxis = -1;  // axis of the exit; −1: before the table
-  Range range{0, 0};                  // range of the values in the block, then in the cell
+  int blockAxis = -1, cellAxis = -1;  // axis of the plane at the exit; −1: outside the table
+  Range range{0, 0};                  // range of the values in the present block or cell
   double corner[2][2][2];
 
   GridTraversal(const FieldGrid& of, const V3d& start, const V3d& along) : grid(&of) {
@@ -100,8 +101,8 @@ struct GridTraversal {
     beAway(entry());
   }
 
-  /// Parameter at the plane k of axis a. All cells and blocks use this function. It is monotone in
-  /// k, so they agree on their common faces.
+  /// Parameter at which the ray meets the plane k across axis a. All cells and blocks use this
+  /// function. It is monotone in k, so neighbours agree on their common face.
   [[nodiscard]] double plane(int a, int k) const {
     return (static_cast<double>(k) - origin[a]) * inverse[a];
   }
@@ -169,7 +170,7 @@ struct GridTraversal {
     if (cell[cellAxis] / FieldGrid::kEdge == block[cellAxis] && cell[cellAxis] >= 0)
       readCell();
     else
-      cellExit = kNever;  // the block ends here, too
+      cellExit = kNever;  // the ray leaves the block, too
   }
   void readCell() {
     constexpr int kPoints = FieldGrid::kPoints;
@@ -185,7 +186,8 @@ struct GridTraversal {
     cellExit = exitOf(cell, 1, cellAxis);
   }
 
-  /// The field between t0 and t1 within one cell, from the blossom of its cubic.
+  /// Bernstein coefficients of the field along the ray between t0 and t1 within the present cell.
+  /// They are values of the blossom of its cubic.
   [[nodiscard]] FieldCubic cubic(double t0, double t1) const {
     if (number < 0) return {range.low, range.low, range.low, range.low};
     double p[2][3];
@@ -193,7 +195,7 @@ struct GridTraversal {
       p[0][a] = std::clamp(origin[a] + t0 * direction[a] - cell[a], 0.0, 1.0);
       p[1][a] = std::clamp(origin[a] + t1 * direction[a] - cell[a], 0.0, 1.0);
     }
-    double blossom[2][2][2];  // indexed by the end taken along x, y, z
+    double blossom[2][2][2];  // index 0: position at t0; 1: at t1; one index for each of x, y, z
     for (int i = 0; i < 2; ++i)
       for (int j = 0; j < 2; ++j) {
         double line[2];
@@ -212,10 +214,11 @@ struct GridTraversal {
 /// Finds the points where one ray crosses the zero set of the expression.
 class FieldSearch {
  public:
-  std::vector<double> crossings;  // distances from the start
+  std::vector<double> crossings;  // distances from `start` along the ray, world units
   bool startsInside = false;
 
-  /// @param wantsAll  finds all crossings; false: only the first one
+  /// @param end  length of the searched segment, world units
+  /// @param wantsAll  true: finds all crossings; false: only the first one
   FieldSearch(const FieldExpression& expression, const std::vector<FieldGrid>& grids,
               const V3d& start, const V3d& direction, double end, bool wantsAll)
       : e_(expression),
@@ -243,7 +246,8 @@ class FieldSearch {
     return values[e_.drawn];
   }
 
-  /// Records the side on which the ray is from t on. Returns true when the search continues.
+  /// Records if the ray is inside the solid from t on, and a crossing at t when the side changes.
+  /// Returns true when the search continues.
   bool settle(bool isInside, double t) {
     if (!inside_) startsInside = isInside;
     const bool hasChanged = inside_ && *inside_ != isInside;
@@ -252,7 +256,8 @@ class FieldSearch {
     return wantsAll_ || !hasChanged;
   }
 
-  /// Side of the surface, if the value ranges of the grids determine it; else nothing.
+  /// Decides from the value ranges in the present blocks or cells if the ray is inside the solid.
+  /// Returns nothing when the ranges allow both signs.
   std::optional<bool> sideByRanges() {
     for (std::size_t i = 0; i < traversals_.size(); ++i) ranges_[i] = traversals_[i].range;
     const Range all = joined(ranges_, joinRanges);
@@ -325,8 +330,8 @@ class FieldSearch {
     });
   }
 
-  /// Finds the sign change of the value between 0 and 1. Uses the Illinois variant of regula falsi,
-  /// and bisection where that converges slowly.
+  /// Finds the parameter in [0, 1] at which the expression changes sign. Uses the Illinois variant
+  /// of regula falsi, with a bisection at every fourth step.
   [[nodiscard]] double rootOf(const FieldCubic* cubics) {
     constexpr int kMostSteps = 100;
     constexpr double kExact = 0x1p-50;
@@ -355,10 +360,10 @@ class FieldSearch {
   std::vector<double> values_;
   std::vector<FieldBounds> bounds_;
   std::vector<Range> ranges_;
-  std::vector<FieldCubic> cubics_;  // cubics of the grids, by depth of halving
+  std::vector<FieldCubic> cubics_;  // cubics of all grids for each depth of halving
 };
 
-/// Clips a ray to a box.
+/// Clips the range [near, far] of a ray to a box. Returns nothing when the ray misses the box.
 std::optional<Range> partWithin(const Imath::Box3d& box, const V3d& origin, const V3d& direction,
                                 double near, double far) {
   if (box.isEmpty()) return std::nullopt;

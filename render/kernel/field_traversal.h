@@ -17,20 +17,22 @@ namespace render {
 ///
 /// A ray traverses the cells of all grids at once. Between two cell faces all fields are cubic in
 /// the ray parameter. Interval arithmetic bounds the expression and its slope there [Mitchell90].
-/// The interval is halved until the sign is certain or the expression is monotone. The side of the
-/// surface is carried from interval to interval, so rounding at faces loses no crossing.
+/// Each interval is halved until the sign is certain or the expression is monotone. The search
+/// remembers on which side of the surface the previous interval ended, so rounding at faces loses
+/// no crossing.
 class FieldTraversal {
  public:
   /// @pre the scene is blended and passes requireFields()
   /// @throws levelset::ResourceLimit when the fields need more than maxBytes or span too many
   ///         blocks
   FieldTraversal(const Scene& scene, std::size_t maxBytes);
-  /// Reads the transforms of the solids again. Returns true when one has moved.
+  /// Takes over the transforms of the solids. Returns true when a transform has changed.
   bool updateTransforms(const Scene& scene);
 
   [[nodiscard]] std::size_t bytes() const;
   [[nodiscard]] std::size_t blockCount() const;
-  /// First hit in [near, far]. A ray that is inside at `near` hits where it leaves.
+  /// First hit in [near, far]. A ray that is inside the solid at `near` hits where it leaves the
+  /// solid.
   [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction, double near,
                               double far) const;
   [[nodiscard]] bool isOccluded(const Imath::V3d& origin, const Imath::V3d& direction,
@@ -42,7 +44,7 @@ class FieldTraversal {
  private:
   FieldExpression expression_;
   std::vector<FieldGrid> grids_;  // one for each operand
-  Imath::Box3d box_;              // outside it the expression is positive
+  Imath::Box3d box_;  // box of all fields, world space; outside it the expression is positive
 };
 
 }  // namespace render

@@ -15,7 +15,8 @@ FrustumCulling::FrustumCulling(const Scene& scene, const RenderOptions& options,
                                const Imath::Box3d& bounds) {
   const Camera& camera = scene.camera;
   const bool isLit = usesLights(options.style.style);
-  // With an expression, occlusion rays continue to the exit from the last solid, in all directions.
+  // With a CSG expression, the kernel traces occlusion rays in all directions up to the last solid,
+  // so nothing can be culled.
   if (isLit && options.ambientSamples > 0 && !scene.csg.isEmpty()) return;
 
   const V3d axis = camera.axis();
@@ -35,18 +36,18 @@ FrustumCulling::FrustumCulling(const Scene& scene, const RenderOptions& options,
     for (const double side : {-1.0, 1.0}) {
       if (camera.orthoHeight)
         add(camera.from + edge * side, edge * -side);
-      else  // `edge` is the edge of the frame at distance 1
+      else  // `edge` leads from the centre of the picture to its edge, at unit depth
         add(camera.from, axis * edge.length() - edge * (side / edge.length()));
     }
   if (!isLit) return;
-  // Shader starts light rays at twice the surface error of the hit. That error is at most three
-  // second differences over 8. Second differences of values up to the half width sum to at most 12
-  // half widths.
+  // The Shader starts light rays at a distance of twice the surface error from the hit. The error
+  // is at most an eighth of the sum of three second differences. Each of these is at most 4 half
+  // widths, so the distance is at most 3 half widths.
   for (const Solid& solid : scene.solids)
     if (!solid.band.isEmpty())
       margin_ = std::max(margin_, (3.1 * solid.band.halfWidth() + 0.1) * solid.band.voxelSize());
-  // The rest covers the surface error of meshes, which is single-precision rounding relative to
-  // their size, and the rounding of this test itself.
+  // This term covers the surface error of meshes, which is single-precision rounding relative to
+  // their size, and the rounding of keeps().
   margin_ += 1e-5 * bounds.size().length();
   if (options.ambientSamples > 0) occlusionDistance_ = occlusionDistance(bounds.size().length());
   hasShadows_ = options.shadowSamples > 0;
@@ -63,14 +64,13 @@ bool FrustumCulling::keeps(const V3d& centre, double radius) const {
   };
   if (isSeen(radius + margin_ + occlusionDistance_)) return true;
   if (!hasShadows_) return false;
-  // A cone that widens opens from the ball, away from the light. Test if it intersects the frustum:
-  // the part of its axis in front of each plane is an interval.
+  // The shadow of the ball is a cone that opens away from the key light. Test if it intersects the
+  // frustum: on its axis, the points that are in front of a plane form an interval.
   double from = 0, to = std::numeric_limits<double>::infinity();
   for (const Plane& plane : planes_) {
     const double room = plane.normal.dot(centre) - plane.offset + radius + margin_;
     const double slope =
-        spread_ -
-        plane.normal.dot(towardsKey_);  // change of `room` per unit of length along the axis
+        spread_ - plane.normal.dot(towardsKey_);  // change of `room` per world unit along the axis
     if (slope > 0)
       from = std::max(from, -room / slope);
     else if (slope < 0)

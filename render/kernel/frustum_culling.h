@@ -10,16 +10,17 @@
 
 namespace render {
 
-/// Culls space that cannot affect a picture. Kept are the view frustum and the points that can cast
-/// shadow or ambient occlusion onto visible surfaces.
+/// Culls space that cannot affect a picture. It keeps the view frustum, and the points that can
+/// cast a shadow or ambient occlusion onto visible surfaces.
 class FrustumCulling {
  public:
-  FrustumCulling() = default;  ///< keeps all of space
-  /// @param bounds  a box that holds the surfaces, world units, not empty
+  FrustumCulling() = default;  ///< culls nothing
+  /// @param bounds  box of all surfaces, world units, not empty
   /// @pre the camera is valid
   FrustumCulling(const Scene& scene, const RenderOptions& options, const Imath::Box3d& bounds);
 
-  /// True when a ball may affect the picture. May return true for a ball that does not.
+  /// Returns true when a ball may affect the picture. The test is conservative: it may also keep
+  /// other balls.
   /// @param centre, radius  world units
   [[nodiscard]] bool keeps(const Imath::V3d& centre, double radius) const;
 
@@ -28,12 +29,14 @@ class FrustumCulling {
     Imath::V3d normal;
     double offset;
   };
-  double margin_ = 0;  // distance from the surface at which rays to lights start, world units
-  std::vector<Plane> planes_;  // planes of the frustum and of the bounds; none: keep all of space
+  double margin_ =
+      0;  // largest distance between a surface and the start of its light rays, world units
+  std::vector<Plane> planes_;     // planes of the frustum and of the bounds; empty: cull nothing
   double occlusionDistance_ = 0;  // length of ambient occlusion rays, world units
   bool hasShadows_ = false;
-  Imath::V3d towardsKey_;
-  double spread_ = 0;  // widening of the key light's cone per unit of length
+  Imath::V3d towardsKey_;  // unit vector towards the key light
+  double spread_ =
+      0;  // growth of a shadow cone's radius per unit of length; tangent of the light's half angle
 };
 
 }  // namespace render

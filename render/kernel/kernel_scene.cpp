@@ -17,12 +17,12 @@ namespace {
 using Imath::M44d;
 using Imath::V3d;
 
-constexpr double kBesideBox =
-    0.0625;  // padding, so that rounding does not lose a crossing on a face of the box
+constexpr double kBesideBox = 0.0625;  // padding of a box, voxels, so that rounding does not lose a
+                                       // crossing on a face of the box
 constexpr double kParallel = 1e30;
 constexpr std::size_t kRaysAtOnce = 1u << 18;
 
-/// A box that contains all cells that the surface may cross, world units.
+/// A world-space box that contains all cells that the surface may cross.
 Imath::Box3d leafBox(const levelset::NarrowBand& band) {
   openvdb::CoordBBox leaves;
   if (band.isEmpty() || !levelset::vdb(band).tree().evalLeafBoundingBox(leaves)) return {};
@@ -32,7 +32,7 @@ Imath::Box3d leafBox(const levelset::NarrowBand& band) {
                           band.indexToWorld());
 }
 
-/// An interval of a ray's parameter.
+/// An interval of a ray's parameter, voxels.
 struct Span {
   double enter, leave;
 };
@@ -50,14 +50,14 @@ Span clipped(const BrickPool& pool, const V3d& origin, const V3d& direction, dou
   return span;
 }
 
-/// Rays of a list that pass near a solid, as input of its kernel.
+/// The rays of a list that meet the box of a solid's blocks, as input of the kernel.
 struct PackedRays {
-  std::vector<std::size_t> number;  // number in the list
-  std::vector<double> enter;        // start, voxels along the ray
+  std::vector<std::size_t> number;  // index of each packed ray in the list
+  std::vector<double> enter;  // distance from each ray's origin to its start at the box, voxels
   RayBlock block{0};
 
-  /// @param asked  numbers of the rays
-  /// @param hasEnd  rays end at their maxDistance; false: they continue to the last surface
+  /// @param asked  indices of the rays that are considered
+  /// @param hasEnd  true: rays end at their maxDistance; false: they continue to the last surface
   PackedRays(const KernelSolid& solid, const std::vector<LightRay>& rays,
              const std::vector<std::size_t>& asked, bool hasEnd) {
     struct Ready {
@@ -66,7 +66,7 @@ struct PackedRays {
     };
     std::vector<Ready> ready;
     for (const std::size_t i : asked) {
-      // A unit of t is one voxel, so that single precision suffices for any length unit.
+      // Choose a voxel as the unit of t, so that single precision suffices for any world unit.
       V3d origin, direction;
       solid.worldToTable.multVecMatrix(rays[i].origin, origin);
       solid.worldToTable.multDirMatrix(rays[i].direction * solid.voxelSize, direction);
@@ -114,8 +114,8 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
     bounds_ = tableBounds_ = scene.bounds();
     return;
   }
-  // The estimate counts a block for each leaf. Blocks that the surface does not cross are built and
-  // then dropped.
+  // The memory estimate counts one block for each leaf, because blocks that the surface does not
+  // cross are also built before they are dropped.
   double leaves = 0;
   Imath::Box3d box = meshes_.bounds();
   for (const Solid& solid : scene.solids) {
@@ -123,7 +123,7 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
     leaves += static_cast<double>(levelset::vdb(solid.band).tree().leafCount());
     box.extendBy(leafBox(solid.band));
   }
-  // With BSplineQi the leaves are copied for the spline's coefficients.
+  // For BSplineQi the leaves are copied, to store the spline's coefficients.
   const double kCopies = options.filter == Filter::BSplineQi ? 4 * 512 : 0;
   const double kBytesOfBlock = 2 * 4 * (BrickPool::kValues + BrickPool::kMaskWords) + kCopies;
   levelset::requireMemory(leaves * kBytesOfBlock, options.maxBytes);
@@ -313,7 +313,7 @@ std::vector<double> KernelScene::thickness(const KernelTracer& tracer,
     std::fill(inside.begin(), inside.end(), 0);
     std::fill(known.begin(), known.end(), 0);
     for (const Crossing& crossing :
-         all)  // the first crossing of each solid determines the side at the ray's start
+         all)  // the first crossing with each solid tells if the ray starts inside it
       if (!std::exchange(known[crossing.solid], 1))
         inside[crossing.solid] = crossing.enters ? 0 : 1;
     double from = near_;
@@ -385,8 +385,8 @@ void KernelScene::dimByCsg(const KernelTracer& tracer, const std::vector<LightRa
       const std::vector<CsgTraversal::Query> queries = walk.queriesFor(s);
       std::vector<std::size_t> asked;
       for (const CsgTraversal::Query& query : queries) asked.push_back(first + query.ray);
-      // Trace the rays beyond their ends: when a ray ends inside a solid, only later crossings show
-      // it.
+      // Trace the rays beyond their maxDistance: if a ray ends inside a solid, only a later
+      // crossing shows that.
       PackedRays packed(solid, rays, asked, false);
       std::size_t n = 0;
       for (const CsgTraversal::Query& query : queries) {
@@ -408,8 +408,8 @@ void KernelScene::dimByCsg(const KernelTracer& tracer, const std::vector<LightRa
       }
     }
     asks = walk.advance();
-    // Continue rays that met a surface only when no ray has open queries, so that they continue
-    // together.
+    // Rays with a hit continue only when no ray has open queries, so that all continue in one
+    // batch.
     if (asks) continue;
     for (std::size_t i = first; i < last; ++i) {
       const std::int32_t met = walk.solidMet(i - first);

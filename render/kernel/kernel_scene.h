@@ -22,9 +22,9 @@
 
 namespace render {
 
-/// A solid of a scene with its tables for the kernel.
+/// A solid of a scene with its brick tables for the kernel.
 struct KernelSolid {
-  std::size_t index = 0;  ///< in Scene::solids
+  std::size_t index = 0;  ///< index in Scene::solids
   std::uint32_t id = 0;
   double voxelSize = 1, opacity = 1;
   BrickPool pool;
@@ -32,29 +32,29 @@ struct KernelSolid {
   Imath::M44d tableToWorld, worldToTable;
 };
 
-/// Interface of the kernel's back ends (processor, GPU). All of them return the same bits.
+/// Interface of the kernel's back ends, on the processor and on the GPU. All of them return the
+/// same bits.
 class KernelTracer {
  public:
   virtual ~KernelTracer() = default;
-  /// @param hits, shapes  arrays as long as the pixels; `shapes` is written only where there is a
-  ///        hit
+  /// @param hits, shapes  must have as many entries as `pixels`; `shapes` is written only for hits
   virtual void trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits,
                      ShapeBlock& shapes) const = 0;
   virtual void trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits) const = 0;
 };
 
-/// Hits of the rays through a block of pixels.
+/// First hits with solids of the rays through a block of pixels.
 struct PixelHits {
   std::vector<double> depth;        ///< along the view axis, world units
   std::vector<std::int32_t> solid;  ///< index in KernelScene::solids(), or −1
-  std::vector<char> flipped;        ///< the outside of that solid is inside the drawn shape
+  std::vector<char> flipped;        ///< 1: the drawn shape is on the outside of the hit solid
   ShapeBlock shapes;
 
   explicit PixelHits(std::size_t size)
       : depth(size), solid(size, -1), flipped(size, 0), shapes(size) {}
 };
 
-/// Rays through pixels that continue from surface to surface.
+/// State of rays through pixels that continue from one surface to the next.
 struct PixelTraversal {
   PixelBlock pixels;
   CsgTraversal solids;
@@ -66,50 +66,54 @@ struct PixelTraversal {
 };
 
 /// A scene prepared for the kernel, independent of the back end. When two solids are hit at the
-/// same depth, the one with the smaller voxels counts; for equal voxels, the one with the lower id.
+/// same depth, the solid with the smaller voxels counts; for equal voxels, the solid with the lower
+/// id.
 class KernelScene {
  public:
   /// Prepares the scene for any camera.
-  /// @param maxBytes  memory limit of the kernel's data
+  /// @param maxBytes  memory limit of the kernel's data, bytes
   /// @param filter  interpolation of the grids
   /// @pre the camera is valid
-  /// @throws levelset::ResourceLimit before anything is allocated; and as makeBricks()
+  /// @throws levelset::ResourceLimit when the estimated memory exceeds `maxBytes`, before anything
+  /// is allocated; also as makeBricks()
   explicit KernelScene(const Scene& scene, std::size_t maxBytes = levelset::kNoMemoryLimit,
                        Filter filter = Filter::Trilinear);
   /// Prepares the scene for one picture; data that cannot affect it is culled. @pre the camera is
   /// valid
   KernelScene(const Scene& scene, const RenderOptions& options);
 
-  /// Reads the camera and the transforms and opacities of the solids again; tables and meshes stay.
-  /// @pre built for any camera, not for one picture; the camera is valid; solids and expression of
-  ///      the scene are those that it was built from
+  /// Takes over the camera, and the transforms and opacities of the solids. Tables and meshes are
+  /// not changed.
+  /// @pre this object was built for any camera, not for one picture; the camera is valid; the scene
+  /// has the solids and the expression that this object was built from
   void updateView(const Scene& scene);
 
   [[nodiscard]] const std::vector<KernelSolid>& solids() const { return solids_; }
   /// World-space box of the cells that the surfaces cross, and of the meshes; empty when there are
   /// none.
   [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }
-  /// World-space box of the blocks. Its size determines the absolute precision of single-precision
-  /// positions.
+  /// World-space box of the blocks that the surfaces cross, and of the meshes. Its size determines
+  /// the absolute error of single-precision positions.
   [[nodiscard]] const Imath::Box3d& tableBounds() const { return tableBounds_; }
   [[nodiscard]] const MeshRays& meshes() const { return meshes_; }
   /// Traversal of a blended scene, else null. For a blended scene solids() is empty, and
   /// castPixels() and thickness() find nothing.
   [[nodiscard]] const FieldTraversal* fields() const { return fields_ ? &*fields_ : nullptr; }
   [[nodiscard]] std::size_t bytes() const;
-  /// Numbers of blocks of the solids, by their treatment.
+  /// Numbers of blocks of all solids, by what the tables store of them.
   struct Counts {
-    std::size_t crossed = 0, halo = 0;  // stored
+    std::size_t crossed = 0, halo = 0;  // stored: blocks that the surface crosses, and halo blocks
     std::size_t omitted = 0;            // not stored: neither crossed nor read by a stencil
     std::size_t culled = 0;             // crossed by the surface, but irrelevant to the picture
   };
   [[nodiscard]] const Counts& counts() const { return counts_; }
 
-  /// First hits with the solids. The caller intersects meshes().
+  /// First hits of the rays through pixels with the solids. Meshes are not included: the caller
+  /// intersects meshes().
   [[nodiscard]] PixelHits castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const;
   [[nodiscard]] PixelTraversal startTraversal(const PixelBlock& pixels) const;
-  /// Next hits of the rays that CsgTraversal::resume() released; the other rays keep their present
-  /// hit.
+  /// Next hits of the rays that CsgTraversal::resume() has released; all other rays keep their
+  /// present hit.
   [[nodiscard]] PixelHits castNext(const KernelTracer& tracer, PixelTraversal& traversal) const;
   /// @return for each pixel the length of the visible ray inside the drawn solids, along the view
   ///         axis, world units
@@ -121,30 +125,32 @@ class KernelScene {
 
  private:
   [[nodiscard]] PixelHits castFirst(const KernelTracer& tracer, const PixelBlock& pixels) const;
-  /// True when a point that lies in those solids is inside the drawn shape. @param inside  by solid
+  /// True when a point is inside the drawn shape. @param inside  for each solid: nonzero when the
+  /// point is inside the solid
   [[nodiscard]] bool isInside(const std::vector<char>& inside) const;
-  /// Dims the light of the rays in [first, last).
+  /// Multiplies `light` of the rays first … last − 1 by the transmittance of the solids.
   void dimBySolids(const KernelTracer& tracer, const std::vector<LightRay>& rays, std::size_t first,
                    std::size_t last, std::vector<double>& light) const;
   void dimByCsg(const KernelTracer& tracer, const std::vector<LightRay>& rays, std::size_t first,
                 std::size_t last, std::vector<double>& light) const;
 
-  /// @param isPicture  cull data that the picture does not need
+  /// @param isPicture  true: cull data that the picture does not need
   void makeTables(const Scene& scene, const RenderOptions& options, bool isPicture);
 
-  /// Extent of a solid's surface. The tables may hold only a part of it.
+  /// Extent of a solid's surface. After culling, the tables may hold only a part of the surface.
   struct Extent {
-    std::size_t index;           // in Scene::solids
-    Imath::Box3d cells, blocks;  // crossed by the surface, index space
+    std::size_t index;  // index in Scene::solids
+    Imath::Box3d cells,
+        blocks;  // boxes of the cells and of the blocks that the surface crosses, index space
   };
   std::vector<Extent> extents_;
   Counts counts_;
   std::vector<KernelSolid> solids_;  // sorted by voxel size and id
-  CsgExpression csg_;                // over those solids
+  CsgExpression csg_;                // uses indices of solids_
   MeshRays meshes_;
   std::optional<FieldTraversal> fields_;
   Imath::Box3d bounds_, tableBounds_;
-  double near_ = 0, far_ = Camera::kNoDepth;  // visible depth range of the camera
+  double near_ = 0, far_ = Camera::kNoDepth;  // visible depth range of the camera, world units
 };
 
 }  // namespace render

@@ -14,10 +14,11 @@ namespace {
 using Imath::V2d;
 using Imath::V3d;
 
-constexpr int kSquare = 4;                        // pixels along the edge of a packet
-constexpr std::size_t kMostLightRays = 1u << 18;  // limit of light rays in one batch
+constexpr int kSquare = 4;  // pixels along the edge of a packet
+constexpr std::size_t kMostLightRays = 1u
+                                       << 18;  // number of light rays after which a batch is traced
 constexpr double kCastError =
-    2e-3;  // error of the kernel's depths, voxels; light rays start beyond it
+    2e-3;  // bound on the error of the kernel's depths, voxels; light rays start beyond it
 
 }  // namespace
 
@@ -79,7 +80,7 @@ Hit KernelPainter::hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std
   return hit;
 }
 
-// Uses the rays through the pixels' centres.
+// Paints the data layers from the rays through the pixels' centres.
 void KernelPainter::paintData(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const {
   const double middleX = 0.5 * scene_.camera.width, middleY = 0.5 * scene_.camera.height;
   PixelBlock at(pixels.size());
@@ -108,7 +109,7 @@ void KernelPainter::paintData(const KernelTracer& tracer, const std::vector<Pixe
   }
 }
 
-// Computes the means over the pixels' areas.
+// Paints the mean colours of samples spread over the pixels' areas.
 void KernelPainter::paintColours(const KernelTracer& tracer,
                                  const std::vector<Pixel>& pixels) const {
   const double middleX = 0.5 * scene_.camera.width, middleY = 0.5 * scene_.camera.height;
@@ -118,7 +119,8 @@ void KernelPainter::paintColours(const KernelTracer& tracer,
     std::vector<SampleRay> sampleRays;
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       const V2d shift = PixelSequence::overArea(pixels[i].x, pixels[i].y).at(s);
-      // The ray passes through the pixel position as rounded to single precision.
+      // Build the ray from the rounded position: the kernel reads pixel positions in single
+      // precision.
       at.x[i] = static_cast<float>(pixels[i].x + shift.x - middleX);
       at.y[i] = static_cast<float>(pixels[i].y + shift.y - middleY);
       const Camera::Ray ray = scene_.camera.ray(static_cast<double>(at.x[i]) + middleX,

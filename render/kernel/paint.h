@@ -17,7 +17,8 @@ struct PixelBox {
   int left, top, right, bottom;  ///< right and bottom are exclusive
 };
 
-/// Paints rectangles of a picture from the kernel's hits, one kind of ray after another.
+/// Paints rectangles of a picture from the kernel's hits. It traces all rays of one kind (pixel
+/// centres, colour samples, lights) together.
 class KernelPainter {
  public:
   KernelPainter(const Scene& scene, const KernelScene& surfaces, const RenderOptions& options,
@@ -30,11 +31,11 @@ class KernelPainter {
   struct Pixel {
     int x, y;
   };
-  /// Pixels of the box in an order that keeps neighbours together, in squares of four.
+  /// Pixels of the box, ordered by squares of 4 × 4 pixels, so that neighbours follow each other.
   [[nodiscard]] static std::vector<Pixel> pixelsOf(const PixelBox& box);
   [[nodiscard]] std::size_t numberOf(const Pixel& pixel) const;
-  /// First hit of ray number i, on a solid or a mesh. @param meshNear  distance at which meshes
-  /// begin to count
+  /// First hit of ray number i, on a solid or a mesh. @param meshNear  mesh hits nearer than this
+  /// distance are ignored, world units
   [[nodiscard]] Hit hitOf(const Camera::Ray& ray, double meshNear, const PixelHits& hits,
                           std::size_t i) const;
   [[nodiscard]] Hit hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const;
@@ -43,10 +44,10 @@ class KernelPainter {
   /// The ray of one sample of a pixel.
   struct SampleRay {
     Camera::Ray ray;
-    double meshNear;  ///< distance behind the last mesh surface that it hit
-    double left = 1;  ///< transmittance of the surfaces that it hit; 0: the ray ends
+    double meshNear;  ///< distance just behind the last mesh surface that the ray hit
+    double left = 1;  ///< transmittance of all surfaces that the ray hit so far; 0: the ray ends
   };
-  /// Adds the colours of the hits of all rays that are not yet absorbed.
+  /// Adds to `sums` the colours at the hits of all rays whose transmittance is not yet negligible.
   /// @return numbers of the rays that continue through a transparent solid
   std::vector<std::size_t> addSeen(const KernelTracer& tracer, const std::vector<Pixel>& pixels,
                                    int sample, const PixelHits& hits,

@@ -9,8 +9,8 @@
 
 namespace render {
 
-/// The kernel's value of 1 / d. For d = 0 it is so large that the ray meets no plane across that
-/// axis.
+/// The kernel's value of 1 / d for a direction component d. For d = 0 it is so large that the ray
+/// meets no plane across the component's axis.
 inline float rayInverse(float d) {
   return d == 0 ? 1e30f : 1 / d;
 }
@@ -25,7 +25,7 @@ struct RayBlock {
   std::vector<float> dx, dy, dz;      ///< derivative by t
   std::vector<float> ix, iy, iz;      ///< rayInverse(d)
   std::vector<float> start, end;      ///< interval of t
-  std::vector<std::int32_t> passing;  ///< number of crossings to skip
+  std::vector<std::int32_t> passing;  ///< for each ray: number of crossings to skip before the hit
 
   explicit RayBlock(std::size_t count) : size((count + kLanes - 1) / kLanes * kLanes) {
     for (auto* a : {&ox, &oy, &oz}) a->assign(size, 0);
@@ -36,11 +36,11 @@ struct RayBlock {
   }
 };
 
-/// A batch of pixels of a RayFan: offsets from the centre of the picture to the right and down, in
-/// pixels. The length is a multiple of RayBlock::kLanes.
+/// A batch of pixel positions of a RayFan: offsets from the centre of the picture to the right (x)
+/// and down (y), in pixels. The length is a multiple of RayBlock::kLanes.
 struct PixelBlock {
   std::vector<float> x, y;
-  std::vector<std::int32_t> passing;  ///< number of crossings to skip
+  std::vector<std::int32_t> passing;  ///< for each ray: number of crossings to skip before the hit
 
   explicit PixelBlock(std::size_t count)
       : x((count + RayBlock::kLanes - 1) / RayBlock::kLanes * RayBlock::kLanes),
@@ -53,15 +53,15 @@ struct PixelBlock {
 struct HitBlock {
   static constexpr std::int32_t kEnters = -1, kLeaves = -2;
   std::vector<std::int32_t>
-      found;  ///< direction of the crossing: kEnters, kLeaves, or 0 for no hit
-  std::vector<float> t;
-  std::vector<std::int32_t> x, y, z;  ///< cell, in table space
+      found;             ///< direction of the crossing: kEnters, kLeaves, or 0 for no hit
+  std::vector<float> t;  ///< parameter of the ray at the hit
+  std::vector<std::int32_t> x, y, z;  ///< cell of the hit, table space
 
   explicit HitBlock(std::size_t size) : found(size), t(size), x(size), y(size), z(size) {}
 };
 
-/// Shape of the surface at the hits: the members of the kernel's Shape in their order, per grid
-/// point and along the axes of the table.
+/// Shape of the surface at the hits: the members of struct Shape in render/shaders/shape.glsl, in
+/// their order. Derivatives are per voxel, along the axes of table space.
 struct ShapeBlock {
   static constexpr std::size_t kParts = 13;
   std::array<std::vector<float>, kParts> part;

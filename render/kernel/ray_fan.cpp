@@ -27,14 +27,15 @@ RayFan makeRayFan(const Camera& camera, const M44d& tableToWorld, double voxelSi
   const V3d axis = camera.axis();
   const Camera::PixelSteps step = camera.pixelSteps();
 
-  // Depth of the nearest corner of the box, but at least the camera's `near`.
+  // Depth of the box's nearest corner.
   double depth = std::numeric_limits<double>::infinity();
   for (int i = 0; i < 8; ++i) {
     const V3d p(i & 4 ? pool.high[0] : pool.low[0], i & 2 ? pool.high[1] : pool.low[1],
                 i & 1 ? pool.high[2] : pool.low[2]);
     depth = std::min(depth, (p * tableToWorld - camera.from).dot(axis));
   }
-  // Start a little in front of the box, because the surface may lie on its faces.
+  // Start two voxels in front of the box, because the surface may lie on its faces, but not before
+  // the camera's `near`.
   depth = std::max(depth - 2 * voxelSize, camera.near);
 
   RayFan fan;

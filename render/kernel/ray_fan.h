@@ -8,15 +8,15 @@
 namespace render {
 
 /// Camera rays in the table space of a BrickPool, as linear functions of the pixel position. The
-/// parameter t counts from a plane across the view just in front of the surface, in units of depth.
-/// So single precision suffices at any distance of the camera.
+/// parameter t counts from a plane across the view just in front of the surface, in voxels of
+/// depth. So single precision suffices for any distance of the camera.
 ///
 /// For the pixel with centre (x, y), measured in pixels to the right of and below the picture's
 /// centre, the ray is origin + x originX + y originY, direction + x directionX + y directionY.
 struct RayFan {
   float origin[3], originX[3], originY[3];
   float direction[3], directionX[3], directionY[3];
-  float low[3], high[3];  ///< box of the crossed cells
+  float low[3], high[3];  ///< box of the blocks that the surface crosses, table space
 
   double depth = 0;         ///< depth of the plane t = 0, world units along the view axis
   double depthPerStep = 0;  ///< depth per unit of t, world units

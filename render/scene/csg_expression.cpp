@@ -13,11 +13,12 @@
 namespace render {
 namespace {
 
-constexpr std::size_t kMostPending = 64;  // bits of the stack in holds()
+constexpr std::size_t kMostPending =
+    64;  // largest number of operands on the stack, a bit each in holds()
 
 }  // namespace
 
-/// Parses by recursive descent and writes the steps in postfix order.
+/// Parses an expression by recursive descent and writes its steps in postfix order.
 class CsgParser {
  public:
   CsgParser(const std::string& text, const std::vector<std::string>& names, std::vector<int>& steps)
@@ -47,7 +48,7 @@ class CsgParser {
 
   void operand() {
     if (take('(')) {
-      if (++depth_ > kMostPending) refuse("parentheses are nested too deeply");
+      if (++depth_ > kMostPending) refuse("parentheses are nested more than 64 deep");
       chain(0);
       --depth_;
       if (!take(')')) refuse("a ')' is missing");
@@ -65,7 +66,7 @@ class CsgParser {
       at_ = first;
       refuse(fmt::format("there is no solid '{}'", name));
     }
-    if (++pending_ > kMostPending) refuse("the expression is nested too deeply");
+    if (++pending_ > kMostPending) refuse("the expression is nested more than 64 deep");
     steps_.push_back(static_cast<int>(found - names_.begin()));
   }
 
@@ -83,7 +84,7 @@ class CsgParser {
     for (const std::string& name : names_) all += (all.empty() ? "" : ", ") + name;
     throw levelset::UsageError(fmt::format(
         "scene: the expression '{}' has an error at character {}: {}; {}", text_, at_ + 1, why,
-        all.empty() ? "add level sets, because it cannot use meshes"
+        all.empty() ? "add level sets, because expressions cannot use meshes"
                     : "write for example '(a | b) - c'; the names are " + all));
   }
 
@@ -99,7 +100,7 @@ CsgExpression::CsgExpression(const std::string& text, const std::vector<std::str
 }
 
 bool CsgExpression::holds(const char* inside) const {
-  std::uint64_t stack = 0;  // the newest entry is the lowest bit
+  std::uint64_t stack = 0;  // one bit for each operand; the top of the stack is the lowest bit
   for (const int step : steps_) {
     if (step >= 0) {
       stack = stack << 1 | (inside[step] != 0);

@@ -18,7 +18,7 @@ double backgroundOf(const Solid& solid) {
   return solid.band.halfWidth() * solid.band.voxelSize();
 }
 
-/// True when the expression reads the field of that solid.
+/// True when the expression or the morph reads the field of a solid.
 bool isOperand(const Scene& scene, std::size_t solid) {
   return !scene.solids[solid].band.isEmpty() && (scene.morph || scene.csg.uses(solid));
 }
@@ -34,7 +34,8 @@ Join joinOf(int step) {
   }
 }
 
-/// Converts the postfix order into steps. Empty solids drop out.
+/// Converts the postfix notation of a CsgExpression into steps. Operations with an empty solid are
+/// simplified away.
 class StepWriter {
  public:
   explicit StepWriter(FieldExpression& to) : to_(to) {}
@@ -71,15 +72,15 @@ int depthOf(const FieldExpression& expression) {
 void requireMorph(const Scene& scene) {
   if (!scene.csg.isEmpty() || scene.softness > 0)
     throw levelset::UsageError(
-        "scene: a morph goes from one solid to another and cannot be combined with an expression; "
-        "leave one of them "
-        "out");
+        "scene: a morph blends two solids and cannot be combined with an expression or a softness; "
+        "leave one of them out");
   if (!(*scene.morph >= 0 && *scene.morph <= 1))
-    throw levelset::UsageError(
-        fmt::format("scene: a morph of {} is not between 0 and 1", *scene.morph));
+    throw levelset::UsageError(fmt::format(
+        "scene: a morph of {} is out of range; give a number from 0 to 1", *scene.morph));
   if (scene.solids.size() != 2)
-    throw levelset::UsageError(
-        fmt::format("scene: a morph needs two solids, but the scene has {}", scene.solids.size()));
+    throw levelset::UsageError(fmt::format(
+        "scene: a morph needs exactly two solids, but the scene has {}; add or remove solids",
+        scene.solids.size()));
   for (const Solid& solid : scene.solids)
     if (solid.band.isEmpty())
       throw levelset::InvalidInput(
@@ -89,8 +90,8 @@ void requireMorph(const Scene& scene) {
 
 void requireSoftness(const Scene& scene) {
   if (!(scene.softness >= 0 && std::isfinite(scene.softness)))
-    throw levelset::UsageError(
-        fmt::format("scene: a softness of {} must be a length of 0 or more", scene.softness));
+    throw levelset::UsageError(fmt::format(
+        "scene: a softness of {} is out of range; give a length of 0 or more", scene.softness));
   if (!(scene.softness > 0)) return;
   if (scene.csg.isEmpty())
     throw levelset::UsageError("scene: softness needs an expression; give one, such as 'a | b'");
@@ -98,15 +99,16 @@ void requireSoftness(const Scene& scene) {
   double narrowest = std::numeric_limits<double>::infinity();
   for (const FieldExpression::Operand& operand : expression.operands)
     narrowest = std::min(narrowest, operand.background);
-  // Each step lowers the value by up to K/4. Far from all solids the value must stay positive.
+  // Each step of the smooth minimum changes the value by up to K/4. Far from all solids the value
+  // is the background, and after all steps it must still be positive.
   const int depth = depthOf(expression);
   const double most = narrowest * std::min(1.0, 3.999 / std::max(depth, 1));
   if (scene.softness <= most) return;
-  throw levelset::InvalidInput(fmt::format(
-      "scene: a softness of {:.6g} exceeds the bands, which store distances up to {:.6g}{}; "
-      "widen them with rebuild-band, or give at most {:.6g}",
-      scene.softness, narrowest,
-      depth > 4 ? fmt::format(" and are joined in {} nested steps", depth) : "", most));
+  throw levelset::InvalidInput(
+      fmt::format("scene: a softness of {:.6g} is too large for the bands, which store distances "
+                  "up to {:.6g}{}; widen them with rebuild-band, or give at most {:.6g}",
+                  scene.softness, narrowest,
+                  depth > 4 ? fmt::format(" and are joined in {} nested steps", depth) : "", most));
 }
 
 }  // namespace

@@ -15,11 +15,12 @@ namespace render {
 /// A function of the distances to solids; renderers draw its zero set. It is soft CSG by the smooth
 /// minimum of degree two [Quilez13],
 ///   smin(a, b) = min(a, b) − max(K − |a − b|, 0)² / 4K,  smax(a, b) = −smin(−a, −b),
-/// or the morph (1 − s) a + s b between two solids. Distances are the trilinear interpolants of the
-/// grids, each on its own grid, and ± the background outside a band.
+/// or the morph (1 − s) a + s b between two solids. The distance to a solid is the trilinear
+/// interpolant on the solid's own grid, and ± the background outside its band.
 struct FieldExpression {
   enum class Join { Union, Intersection, Difference, Morph };
-  /// One operation. Operand numbers count the solids first, then the results of earlier steps.
+  /// One operation on the values numbered a and b. The numbers first count the operands, then the
+  /// results of earlier steps.
   struct Step {
     Join join;
     std::size_t a, b;
@@ -28,18 +29,18 @@ struct FieldExpression {
     std::size_t solid = 0;  ///< index in Scene::solids
     std::uint32_t id = 0;
     Imath::C3f colour{0};
-    double background = 0;  ///< world units
+    double background = 0;  ///< |φ| outside the band, world units
   };
-  std::vector<Operand> operands;  ///< solids with a band
+  std::vector<Operand> operands;  ///< solids that the expression reads; empty solids are left out
   std::vector<Step> steps;
   std::size_t drawn = 0;  ///< number of the value whose zero set is drawn
   double softness = 0;    ///< K, world units
-  double share = 0;       ///< s
+  double share = 0;       ///< s, fraction of the morph, [0, 1]
 
-  /// True when nothing is drawn.
+  /// True when the expression reads no solid, so that nothing is drawn.
   [[nodiscard]] bool isEmpty() const { return operands.empty(); }
-  /// Joins two values. The result is monotone: nondecreasing in a and b, but nonincreasing in b for
-  /// a difference.
+  /// Joins the values a and b of two operands. The result is monotone: nondecreasing in a and b,
+  /// but nonincreasing in b for a difference.
   [[nodiscard]] double join(Join how, double a, double b) const {
     switch (how) {
       case Join::Union:
@@ -64,12 +65,12 @@ struct FieldExpression {
 /// Builds the expression of a blended scene. @pre the scene passes requireFields()
 [[nodiscard]] FieldExpression fieldExpression(const Scene& scene);
 
-/// Checks the blending options of any scene.
+/// Checks the softness and the morph of a scene, which may also have neither.
 /// @throws levelset::UsageError for a softness below 0 or without an expression, and for
 ///         transparent solids that are blended. Also for a morph outside [0, 1], beside an
 ///         expression, or of other than two solids.
-/// @throws levelset::InvalidInput for a softness larger than the bands' width, and a morph of empty
-///         solids
+/// @throws levelset::InvalidInput for a softness that is too large for the half widths of the
+/// bands, and for a morph of an empty solid
 void requireFields(const Scene& scene);
 
 }  // namespace render

@@ -20,9 +20,10 @@ namespace render {
 /// The key light of a scene.
 struct Light {
   Imath::V3d direction{
-      -0.4, 0.7, 0.6};  ///< towards the light, in camera space (x right, y up, z towards the eye)
-  double strength = 0.8;
-  double softness = 0.15;  ///< half angle of the light, radians: width of penumbrae
+      -0.4, 0.7, 0.6};    ///< towards the light, in camera space (x right, y up, z towards the eye)
+  double strength = 0.8;  ///< factor of the key light's term; 0: no key light
+  double softness = 0.15;  ///< half angle of the cone of light directions, radians; it sets the
+                           ///< width of penumbrae
 };
 
 /// A level set of a scene.
@@ -30,21 +31,21 @@ struct Solid {
   levelset::NarrowBand band;
   Imath::C3f colour{0.66f, 0.62f, 0.56f};
   std::uint32_t id = 1;
-  std::string name = {};  ///< name in the expression
-  double opacity = 1;     ///< opacity of each surface crossing, (0, 1]
-  ValueBits quantization =
-      {};  ///< quantization of the kernel's tables; the band has these values (see quantized())
+  std::string name = {};        ///< name of the solid in the expression
+  double opacity = 1;           ///< opacity of the surface, for each crossing of a ray, (0, 1]
+  ValueBits quantization = {};  ///< storage of the values in the kernel's tables; below 32 bits,
+                                ///< the band must come from quantized()
 };
 
-/// Triangles beside the solids. They are drawn, lit and cast shadows like solids, but cannot be
-/// used in the expression. Shading is flat unless the vertices have normals. Vertex colours (sRGB)
-/// replace `colour`.
+/// Triangles that are drawn together with the solids. They are lit and cast shadows like solids,
+/// but cannot be used in the expression. Shading is flat unless the vertices have normals. Vertex
+/// colours (sRGB) replace `colour`.
 struct MeshPart {
   std::shared_ptr<const levelset::TriMesh> mesh;
   Imath::C3f colour{0.66f, 0.62f, 0.56f};
   std::uint32_t id = 1;
   std::string name = {};
-  double opacity = 1;  ///< same meaning as in Solid
+  double opacity = 1;  ///< opacity of the surface, for each crossing of a ray, (0, 1]
 };
 
 /// Transmittance below which a ray ends as if the last surface were opaque.
@@ -54,19 +55,20 @@ inline constexpr double kLeastTransmittance = 1.0 / 512;
 struct Scene {
   Camera camera;
   Light key;
-  double ambient = 0.32;  ///< weight of the ambient term, dimmed by occlusion
+  double ambient = 0.32;  ///< weight of the sky light, the fill light and the rim light, all dimmed
+                          ///< by ambient occlusion
   std::vector<Solid> solids;
   std::vector<MeshPart> meshes = {};
   CsgExpression csg = {};  ///< expression over the solids; empty: each solid is drawn
   double softness = 0;     ///< K of the smooth minimum in the expression, world units; 0: sharp
   std::optional<double> morph =
-      {};  ///< set: fraction of the morph from the first solid to the second, [0, 1]
-  /// True when the scene is drawn as the zero set of one function of all fields
-  /// (render/scene/field_expression.h).
+      {};  ///< fraction of the morph from the first solid to the second, [0, 1]; unset: no morph
+  /// True when the scene is drawn as the zero set of one function of all solids' fields: a soft
+  /// expression or a morph (render/scene/field_expression.h).
   [[nodiscard]] bool isBlended() const { return softness > 0 || morph; }
   /// True when no surface is transparent.
   [[nodiscard]] bool isOpaque() const;
-  /// A box that contains all surfaces; empty when there can be none.
+  /// A world-space box that contains all drawn surfaces; empty when the scene has none.
   [[nodiscard]] Imath::Box3d bounds() const;
 };
 
