@@ -1,10 +1,11 @@
-// Look-up of cells and values in the tables of a BrickPool. Types and space are those of
-// roots.glsl.
+// Look-up of cells and values in the tables of a BrickPool (render/bricks/brick_pool.h). Types and
+// coordinates are those of roots.glsl. Parameters named `walking` or `asked` select the active
+// lanes.
 
 struct Spot {
   Bool crosses;  // the surface may cross the cell
-  Int size;    // edge of an aligned cube around the cell without any other crossed cell
-  Int brick;   // number of the brick with the cell's values
+  Int size;    // edge, in cells, of an aligned cube around the cell in which the surface crosses no other cell
+  Int brick;   // number of the brick that stores the cell's values; valid if `crosses`
 };
 
 Spot spotAt(Bool walking, Int x, Int y, Int z) {
@@ -24,7 +25,7 @@ Spot spotAt(Bool walking, Int x, Int y, Int z) {
   return spot;
 }
 
-// Values at the corners of a cell. Corner (x, y, z) has the number 4x + 2y + z.
+// Values at the corners of a cell. Corner (x, y, z), each 0 or 1, has the number 4x + 2y + z.
 struct CellValues {
   Real f0, f1, f2, f3, f4, f5, f6, f7;
 };
@@ -44,7 +45,8 @@ CellValues cellValues(Bool asked, Int brick, Int x, Int y, Int z) {
   return f;
 }
 
-// Position and strides of the values of the block that contains a point.
+// Returns the position of the first value of the block that contains the grid point (x, y, z).
+// `strides` receives the packed strides of the block's values.
 Int blockOf(Bool asked, Int x, Int y, Int z, INOUT(Int) strides) {
   Int page = loadPage(select(asked, ((x >> kPageShift) * pagesY + (y >> kPageShift)) * pagesZ + (z >> kPageShift), integer(0)));
   Bool full = AND(asked, page >= 0);

@@ -1,20 +1,21 @@
-// Look-up of cells and values in a NanoVDB grid, in place of bricks.glsl. It is the reference for
-// the bricks. GLSL only. Space is that of roots.glsl; positions are indices of 32-bit words.
+// Look-up of cells and values in a NanoVDB grid. It replaces bricks.glsl and is the reference for
+// it. GLSL only, not C++. Coordinates are those of roots.glsl. Positions in the grid's memory are
+// indices of 32-bit words.
 //
-// The grid is followed by a row of eight values far outside and a row of eight far inside, which
-// serve blocks without a leaf.
+// The grid is followed by eight background values for outside and eight for inside. They stand for
+// the values of blocks without a leaf.
 
 struct Spot {
   bool crosses;  // the surface crosses the cell
-  int size;      // edge of an aligned cube around the cell without any other crossed cell
-  int brick;     // not used here
+  int size;      // edge, in cells, of an aligned cube around the cell that has no crossed cell; 1 if unknown
+  int brick;     // not used with NanoVDB
 };
 
 struct CellValues {
   float f0, f1, f2, f3, f4, f5, f6, f7;
 };
 
-// Position of a node's child. The word at `place` holds its distance in bytes.
+// Position of a node's child. The two words at `place` hold its distance from `node`, in bytes.
 int childAt(int node, int place) {
   return node + (((loadHeld(place) >> 2) & 0x3fffffff) | loadHeld(place + 1) << 30);
 }
@@ -23,8 +24,8 @@ bool isOnAt(int mask, int n) { return ((loadHeld(mask + (n >> 5)) >> (n & 31)) &
 
 int farRow(float value) { return value < 0.0 ? nanoFar + 8 : nanoFar; }
 
-// Position and strides of the values of the block that contains a point. Strides are 0 where there
-// is no leaf.
+// Returns the position of the first value of the block that contains the grid point (x, y, z).
+// `strides` receives the packed strides of the block's values; 0 for a block without a leaf.
 int blockOf(bool asked, int x, int y, int z, inout int strides) {
   strides = 0;
   int i = x + nanoOriginX, j = y + nanoOriginY, k = z + nanoOriginZ;
@@ -61,7 +62,7 @@ float nanoValue(int x, int y, int z) {
 // @param first, strides  position and strides of the block that contains the cell's lowest corner
 CellValues cellValuesIn(int first, int strides, int x, int y, int z) {
   CellValues f;
-  if (strides != 0 && (x & 7) < 7 && (y & 7) < 7 && (z & 7) < 7) {  // all corners in that block
+  if (strides != 0 && (x & 7) < 7 && (y & 7) < 7 && (z & 7) < 7) {  // all corners lie in that block
     int at = first + ((x & 7) << 6 | (y & 7) << 3 | (z & 7));
     f.f0 = loadValue(at);
     f.f1 = loadValue(at + 1);
@@ -98,7 +99,7 @@ Spot spotAt(bool walking, int x, int y, int z) {
   int strides;
   int first = blockOf(true, x, y, z, strides);
   bool anyLeaf = strides != 0;
-  for (int n = 1; n < 8; ++n) {  // blocks into which the block's last cells extend
+  for (int n = 1; n < 8; ++n) {  // neighbouring blocks with corners of this block's last cells
     if (anyLeaf) break;
     int beside;
     blockOf(true, x + 8 * (n >> 2), y + 8 * ((n >> 1) & 1), z + 8 * (n & 1), beside);

@@ -6,17 +6,18 @@
 // depend on sums, products and comparisons of floats alone, so that all processors return the same
 // bits. Inactive lanes load from index 0.
 //
-// Space is table space: grid points have integer coordinates, starting at 0. Cell (i, j, k) spans
-// the points i … i+1, j … j+1, k … k+1. Negative values are inside, zero is outside.
+// Coordinates are those of table space: grid points have integer coordinates, starting at 0. Cell
+// (i, j, k) spans the points i … i+1, j … j+1, k … k+1. Negative values are inside, zero is
+// outside.
 
-CONST_INT kNone = 3;             // no axis
-CONST_INT kMostHalvings = 12;    // halvings of a cell that may hold several crossings
-CONST_INT kBisections = 20;      // halvings of an interval with one crossing
+CONST_INT kNone = 3;             // number that stands for no axis
+CONST_INT kMostHalvings = 12;    // largest number of halvings of a ray segment in a cell with several crossings
+CONST_INT kBisections = 20;      // halvings of an interval that holds one crossing
 CONST_FLOAT kThird = 0.33333333333f;
 CONST_FLOAT kBarelyInside = -1e-30f;
 CONST_FLOAT kLeastDirection = 1e-20f;
 CONST_FLOAT kParallel = 1e30f;
-CONST_FLOAT kBesideBox = 0.0625f;  // padding, so that rounding does not lose a crossing on a face of the box
+CONST_FLOAT kBesideBox = 0.0625f;  // padding of a box, voxels, so that rounding does not lose a crossing on a face of the box
 
 // Parameter at which a ray meets the plane of points k. All cells use this function. It is monotone
 // in k, and both cells at a plane get the same number, so no ray slips between them.
@@ -60,17 +61,19 @@ Int signChanges(Real b0, Real b1, Real b2, Real b3) {
          bit(differ(b2 < 0.0f, b3 < 0.0f), 1);
 }
 
-// Moves on from interval number `part` of length `size`: to its first half when it is divided,
-// otherwise to the next interval. Larger intervals are skipped where the sign rule proves them
-// empty.
-// @return true while there is an interval
+// Moves on from interval number `part` of [0, 1], which has the length `size` after `halvings`
+// halvings. If `divides`, the next interval is its first half, otherwise the interval that follows
+// it, with the largest length that fits. The test of that larger interval may prove it empty at
+// once.
+// @return true while an interval is left
 Bool nextPart(Bool open, Bool divides, INOUT(Int) part, INOUT(Int) halvings, INOUT(Real) size) {
   Bool divide = AND(open, divides);
   Bool next = AND(open, NOT(divide));
   part = select(divide, part + part, select(next, part + 1, part));
   halvings = select(divide, halvings + 1, halvings);
   size = select(divide, size * 0.5f, size);
-  for (int i = 0; i < kMostHalvings; ++i) {  // an even number starts an interval of twice the length
+  // An interval with an even number is the first half of an interval of twice the length.
+  for (int i = 0; i < kMostHalvings; ++i) {
     Bool up = AND(next, AND((part & 1) == 0, halvings > 0));
     part = select(up, part >> 1, part);
     halvings = select(up, halvings - 1, halvings);
@@ -79,9 +82,9 @@ Bool nextPart(Bool open, Bool divides, INOUT(Int) part, INOUT(Int) halvings, INO
   return AND(open, OR(divide, halvings > 0));
 }
 
-// Finds the first interval in [0, 1] with a single sign change of the cubic, after skipping
-// `passing` of them. Skipped changes are subtracted from `passing`.
-// @return true when there is one
+// Finds the first interval [low, high] in [0, 1] with a single sign change of the cubic, after
+// skipping `passing` sign changes. Skipped changes are subtracted from `passing`.
+// @return true when such an interval exists
 Bool isolate(Bool asked, Real b0, Real b1, Real b2, Real b3, INOUT(Int) passing, INOUT(Real) low,
              INOUT(Real) high) {
   Int changes = signChanges(b0, b1, b2, b3);
@@ -116,7 +119,7 @@ Bool isolate(Bool asked, Real b0, Real b1, Real b2, Real b3, INOUT(Int) passing,
 }
 
 // Finds the parameter in [low, high] at which the cubic changes sign once, by bisection.
-// @param inside  the cubic is negative at low
+// @param inside  true when the cubic is negative at low
 Real bisect(Real b0, Real b1, Real b2, Real b3, Bool inside, Real low, Real high) {
   for (int i = 0; i < kBisections; ++i) {
     VAR middle = (low + high) * 0.5f;
@@ -127,15 +130,16 @@ Real bisect(Real b0, Real b1, Real b2, Real b3, Bool inside, Real low, Real high
   return (low + high) * 0.5f;
 }
 
-// Bits of the corners of a cell's face. Corner (x, y, z) has the bit 4x + 2y + z.
+// Mask of the four corners on a face of a cell. The corner (x, y, z), each 0 or 1, has the bit 4x +
+// 2y + z.
 Int faceCorners(Int axis, Bool upper) {
   return select(axis == 0, select(upper, integer(0xf0), integer(0x0f)),
                 select(axis == 1, select(upper, integer(0xcc), integer(0x33)),
                        select(upper, integer(0xaa), integer(0x55))));
 }
 
-// Corrects a value whose side is known. A value of the wrong side becomes a tiny value of the right
-// one.
+// Corrects the sign of a value at a point that is known to be inside or outside. A value with the
+// wrong sign becomes a tiny value inside, or 0 outside.
 Real onSide(Real value, Bool inside) {
   return select(differ(value < 0.0f, inside), select(inside, real(kBarelyInside), real(0.0f)),
                 value);
@@ -143,7 +147,7 @@ Real onSide(Real value, Bool inside) {
 
 struct Crossing {
   Bool found;
-  Real share;  // fraction of the ray's segment in the cell
-  Bool enters;
-  Bool endsInside;
+  Real share;  // position of the crossing as a fraction of the ray's segment in the cell
+  Bool enters;      // the ray enters the solid there
+  Bool endsInside;  // the ray's segment ends inside the solid
 };

@@ -1,17 +1,19 @@
 // Shape of the surface at a hit: gradient and Hessian of the tricubic B-spline with coefficients f
 // − ∇²f/6 [Sigg05], and gradient of the trilinear interpolant. If the grid stores spline
-// coefficients, all of these are derivatives of that spline. Types and space are those of
-// roots.glsl.
+// coefficients (isSpline), all of these are derivatives of that spline. Types and coordinates are
+// those of roots.glsl.
 //
-// The coefficients are not computed. Instead the weight of each value is the weight of its
-// coefficient minus a sixth of the weights' second differences. So each value is loaded once and
-// kept in no array, because Mesa 22.3 gathers from arrays.
+// The coefficients are not computed. Instead, each value has the weight of its coefficient minus a
+// sixth of the second differences of the weights. So each value is loaded once, and none is kept in
+// an array, because Mesa 22.3 reads arrays by slow gathers.
 
 CONST_FLOAT kSixth = 0.16666666667f;
 CONST_FLOAT kEighth = 0.125f;
 
-// Weights along one axis of the six points from cell − 2 on: those of the uniform cubic B-spline
-// and its derivatives, which are 0 at both ends, and a sixth of their second differences.
+// Weights along one axis of the six points from cell − 2 on. `value`, `slope` and `bend` are the
+// weights of the uniform cubic B-spline and of its first and second derivative; they are 0 for the
+// first and last point. `valueBend`, `slopeBend` and `bendBend` are a sixth of their second
+// differences.
 struct Stencil {
   Real value[6], slope[6], bend[6];
   Real valueBend[6], slopeBend[6], bendBend[6];
@@ -61,7 +63,7 @@ Stencil stencilAt(Real a) {
   return w;
 }
 
-// Six values along z.
+// Values of the six points of a Window along z.
 struct Column {
   Real f0, f1, f2, f3, f4, f5;
 };
@@ -79,7 +81,7 @@ Column columnAt(IN(Window) w, int i, int j) {
   return c;
 }
 
-// A column without its two ends, which are not stored where i or j is an end.
+// A column without its first and last value. They are not stored if i or j is 0 or 5.
 Column shortColumnAt(IN(Window) w, int i, int j) {
   Int nearBlocks = firstAt(w, i, j, 0);
   Int farBlocks = firstAt(w, i, j, 1);
@@ -104,8 +106,9 @@ Real whole6(IN(Column) c, IN_ARRAY(Real, weight, 6)) {
   return sum;
 }
 
-// Derivatives along y and z in one slab across x, named by their orders. r: of the values. p: of
-// the coefficients, without the second differences along x.
+// Derivatives in one slab of points across x; the two digits are their orders along y and z. r…: of
+// the spline with the values as coefficients. p…: of the spline with corrected coefficients, except
+// for second differences along x.
 struct Slab {
   Real r00, r10, r20, r01, r11, r02;
   Real p00, p10, p20, p01, p11, p02;
@@ -160,13 +163,14 @@ void addColumn(INOUT(Slab) s, IN(Column) c, IN(Stencil) y, IN(Stencil) z, int j)
 }
 
 struct Shape {
-  Real gx, gy, gz;                    // gradient of the B-spline, φ per grid spacing
-  Real tx, ty, tz;                    // gradient of the trilinear interpolant
-  Real hxx, hyy, hzz, hxy, hxz, hyz;  // Hessian of the B-spline
-  Real error;                         // bound on |trilinear − smooth|, from second differences
+  Real gx, gy, gz;                    // gradient of the B-spline, φ per voxel
+  Real tx, ty, tz;                    // gradient of the trilinear interpolant, φ per voxel
+  Real hxx, hyy, hzz, hxy, hxz, hyz;  // Hessian of the B-spline, φ per voxel²
+  Real error;                         // bound on |trilinear interpolant − smooth function|, from second differences
 };
 
-// Subtracts the part of a slab's values in the second differences along x of neighbouring slabs.
+// Subtracts from the derivatives what the values of a slab contribute to the second differences
+// along x.
 void takeBeside(INOUT(Shape) shape, IN(Slab) s, Real value, Real slope, Real bend) {
   shape.gx = minus(shape.gx, slope, s.r00);
   shape.gy = minus(shape.gy, value, s.r10);
@@ -198,7 +202,8 @@ Real bendOf(Real before, Real at, Real after) {
   return magnitude(bend);
 }
 
-// Values at four corners of the cell, and their second differences along y and z.
+// Values at the four points (2 and 3 along y and z) of a slab that are corners of the cell, and the
+// sums of the magnitudes of their second differences along y and z.
 struct Corners {
   Real f00, f01, f10, f11;
   Real b00, b01, b10, b11;
@@ -221,7 +226,8 @@ Corners cornersOf(IN(Column) c1, IN(Column) c2, IN(Column) c3, IN(Column) c4) {
   return c;
 }
 
-// Bound on the interpolation error from the corners of a slab and its two neighbours.
+// Bound on the error of trilinear interpolation, from the corners in a slab and in its two
+// neighbouring slabs.
 Real errorOf(IN(Corners) before, IN(Corners) at, IN(Corners) after) {
   VAR e00 = bendOf(before.f00, at.f00, after.f00) + at.b00;
   VAR e01 = bendOf(before.f01, at.f01, after.f01) + at.b01;
@@ -231,7 +237,8 @@ Real errorOf(IN(Corners) before, IN(Corners) at, IN(Corners) after) {
   return most;
 }
 
-// Adds the gradient of the trilinear interpolant between two slabs.
+// Sets the gradient of the trilinear interpolant in the cell between two slabs. (a, b, c) is the
+// position in the cell, each from 0 to 1.
 void addTrilinear(INOUT(Shape) shape, IN(Corners) low, IN(Corners) high, Real a, Real b, Real c) {
   VAR ra = 1.0f - a;
   VAR rb = 1.0f - b;
@@ -249,7 +256,9 @@ void addTrilinear(INOUT(Shape) shape, IN(Corners) low, IN(Corners) high, Real a,
   shape.tz = between(z0, z1, a, ra);
 }
 
-// @param cell  cell that contains the position
+// Computes the shape of the surface at a position.
+// @param asked  active lanes
+// @param cellX, cellY, cellZ  cell that contains the position
 // @param a, b, c  position in the cell, from 0 to 1
 Shape shapeAt(Bool asked, Int cellX, Int cellY, Int cellZ, Real a, Real b, Real c) {
   Window w = windowAt(asked, cellX, cellY, cellZ);
@@ -295,7 +304,7 @@ Shape shapeAt(Bool asked, Int cellX, Int cellY, Int cellZ, Real a, Real b, Real 
     addValues(s, shortColumnAt(w, i, 4), y, z, 4);
     takeBeside(shape, s, x.valueBend[i], x.slopeBend[i], x.bendBend[i]);
   }
-  if (isSpline) {  // rays meet the spline itself
+  if (isSpline) {  // the drawn surface is the zero set of the spline
     shape.tx = shape.gx;
     shape.ty = shape.gy;
     shape.tz = shape.gz;
@@ -304,7 +313,7 @@ Shape shapeAt(Bool asked, Int cellX, Int cellY, Int cellZ, Real a, Real b, Real 
   return shape;
 }
 
-// Shape at the hit of a ray.
+// Shape of the surface at the hit of a ray.
 Shape shapeOf(IN(Ray) ray, IN(Hit) hit) {
   VAR x = (ray.ox - toReal(hit.x)) + hit.t * ray.dx;
   VAR y = (ray.oy - toReal(hit.y)) + hit.t * ray.dy;

@@ -1,13 +1,15 @@
 // Crossings of a ray with the zero set of a tricubic B-spline whose coefficients the grid stores.
-// Types and space are those of roots.glsl.
+// Types and coordinates are those of roots.glsl.
 //
 // Along a line the spline has degree 9 within a cell. Its Bernstein coefficients follow from the
-// Bézier net of the box that the ray's segment spans. They are sums of nonnegative multiples of the
-// net's values. So a net of one sign gives coefficients of that sign, in spite of rounding.
+// Bézier net of the box that the ray's segment spans. Each coefficient is a sum of nonnegative
+// multiples of the net's values. So if all values of the net have one sign, the coefficients have
+// it too, in spite of rounding.
 
 CONST_INT kDegree = 9;
 
-// Weights of the four coefficients from cell − 1 on, for the blossom of the cubic B-spline.
+// Weights of the four spline coefficients along an axis, from cell − 1 on, in the blossom of the
+// cubic B-spline.
 struct Blend {
   Real w0, w1, w2, w3;
 };
@@ -34,8 +36,8 @@ Real blended(IN(Blend) b, Real c0, Real c1, Real c2, Real c3) {
   return sum;
 }
 
-// Replaces four coefficients along the axis with that stride by four values of the Bézier net
-// between two positions.
+// Along the axis with the given stride, replaces each four spline coefficients by the four values
+// of the Bézier net between two positions in the cell, `from` and `to`.
 void bendAxis(INOUT_ARRAY(Real, net, 64), int stride, Real from, Real to) {
   Blend b0 = blendOf(from, from, from);
   Blend b1 = blendOf(from, from, to);
@@ -64,8 +66,9 @@ Int countChanges(IN_ARRAY(Real, b, 10)) {
   return count;
 }
 
-// Halves the interval of a polynomial and keeps the left or right part. The loops have fixed
-// bounds, because Mesa 22.3 loses writes of nested loops with variable bounds.
+// Replaces the Bernstein coefficients of a polynomial by those of the left or right half of its
+// interval. The loops have fixed bounds, because Mesa 22.3 loses writes of nested loops with
+// variable bounds.
 void halve(INOUT_ARRAY(Real, b, 10), Bool asked, Bool right) {
   VAR l[10];
   VAR r[10];
@@ -93,7 +96,8 @@ Real valueAt(IN_ARRAY(Real, b, 10), Real u) {
   return c[0];
 }
 
-// Isolates the first sign change; see isolate().
+// Finds the first interval [low, high] in [0, 1] with a single sign change of the polynomial, after
+// skipping `passing` sign changes. Works as isolate() in roots.glsl.
 Bool isolateSpline(Bool asked, IN_ARRAY(Real, b, 10), INOUT(Int) passing, INOUT(Real) low,
                    INOUT(Real) high) {
   Int changes = countChanges(b);
@@ -129,9 +133,11 @@ Bool isolateSpline(Bool asked, IN_ARRAY(Real, b, 10), INOUT(Int) passing, INOUT(
   return found;
 }
 
-// Crossing of a ray between two points of a cell, given from 0 to 1 on each axis.
-// @param carried, inside  the side at the end of the previous cell is known, and it is the inside
-// @param passing  number of crossings to skip; reduced by those of the cell
+// Finds a crossing of a ray with the spline's zero set between two points of a cell. Their
+// coordinates run from 0 to 1 within the cell.
+// @param carried  true when the ray's side of the surface at the end of the previous cell is known
+// @param inside  that side: true for inside
+// @param passing  number of crossings to skip; crossings skipped in this cell are subtracted
 Crossing splineCrossingIn(Bool asked, Int cellX, Int cellY, Int cellZ, Real x0, Real y0,
                           Real z0, Real x1, Real y1, Real z1, Bool carried, Bool inside,
                           INOUT(Int) passing) {

@@ -1,11 +1,14 @@
-// Crossings of a ray with the zero set of the trilinear interpolant. Types and space are those of
-// roots.glsl.
+// Crossings of a ray with the zero set of the trilinear interpolant, and the traversal of cells for
+// all filters. Types and coordinates are those of roots.glsl.
 
-// Crossing of a ray between two points of a cell, given from 0 to 1 on each axis.
-// @param brick, cellX …  the cell, as returned by spotAt()
-// @param entered, left  axes of the entry and exit faces, or kNone
-// @param carried, inside  the side at the end of the previous cell is known, and it is the inside
-// @param passing  number of crossings to skip; reduced by those of the cell
+// Finds a crossing of a ray with the zero set between two points of a cell. Their coordinates run
+// from 0 to 1 within the cell.
+// @param brick, cellX …  the cell and the number of its brick, from spotAt()
+// @param entered, left  axes of the faces through which the ray enters and leaves the cell, or
+// kNone
+// @param carried  true when the ray's side of the surface at the end of the previous cell is known
+// @param inside  that side: true for inside
+// @param passing  number of crossings to skip; crossings skipped in this cell are subtracted
 Crossing crossingIn(Bool asked, Int brick, Int cellX, Int cellY, Int cellZ, Real x0, Real y0,
                     Real z0, Real x1, Real y1, Real z1, Int entered, Int left, Bool aheadX,
                     Bool aheadY, Bool aheadZ, Bool carried, Bool inside, INOUT(Int) passing) {
@@ -14,8 +17,8 @@ Crossing crossingIn(Bool asked, Int brick, Int cellX, Int cellY, Int cellZ, Real
                 bit(f.f4 < 0.0f, 16) | bit(f.f5 < 0.0f, 32) | bit(f.f6 < 0.0f, 64) |
                 bit(f.f7 < 0.0f, 128);
 
-  // Along the segment the trilinear interpolant is a cubic. Its Bernstein coefficients are values
-  // of its blossom.
+  // Along the ray's segment the trilinear interpolant is a cubic. Its Bernstein coefficients b0 …
+  // b3 are values of its blossom.
   VAR rx0 = 1.0f - x0;
   VAR ry0 = 1.0f - y0;
   VAR rz0 = 1.0f - z0;
@@ -49,8 +52,8 @@ Crossing crossingIn(Bool asked, Int brick, Int cellX, Int cellY, Int cellZ, Real
   VAR b1 = ((e1 + e2) + e3) * kThird;
   VAR b2 = ((e4 + e5) + e6) * kThird;
 
-  // Both cells at a face must agree on the side. It is the sign of the face's corners if they are
-  // equal, otherwise the side at the end of the previous cell.
+  // Both cells at a face must agree if the ray is inside there. If all corners of the face have one
+  // sign, that sign decides; otherwise the side at the end of the previous cell.
   Bool upperIn = select(entered == 0, NOT(aheadX), select(entered == 1, NOT(aheadY), NOT(aheadZ)));
   Bool upperOut = select(left == 0, aheadX, select(left == 1, aheadY, aheadZ));
   Int maskIn = faceCorners(entered, upperIn);
@@ -80,17 +83,17 @@ Crossing crossingIn(Bool asked, Int brick, Int cellX, Int cellY, Int cellZ, Real
 struct Ray {
   Real ox, oy, oz;  // position at t = 0
   Real dx, dy, dz;  // derivative by t
-  Real ix, iy, iz;  // inverses of the direction; kParallel for 0
+  Real ix, iy, iz;  // 1 / direction; kParallel for a component 0
   Real start, end;  // interval of t
 };
 
-// One component of a pixel's ray in a RayFan.
+// One component of the origin or direction of the ray through pixel (x, y) of a RayFan.
 Real onFan(float middle, float right, float down, Real x, Real y) {
   VAR across = x * right + y * down;
   return across + middle;
 }
 
-// Flushes tiny direction components to 0. A ray without motion along an axis counts as ascending
+// Replaces a tiny direction component by 0. A ray without motion along an axis counts as ascending
 // and meets no plane across it: its inverse is kParallel, and its position on the axis does not
 // change.
 Real onlyFar(Real d) {
@@ -99,7 +102,7 @@ Real onlyFar(Real d) {
 
 Real inverseOf(Real d) { return select(d == 0.0f, real(kParallel), 1.0f / d); }
 
-// The ray of pixel (x, y), clipped to the box of the crossed cells.
+// The ray through pixel (x, y), clipped to the box of the blocks that the surface crosses.
 Ray viewRay(Real x, Real y) {
   Ray ray;
   ray.ox = onFan(fan.origin[0], fan.originX[0], fan.originY[0], x, y);
@@ -126,10 +129,10 @@ struct Hit {
   Bool found;
   Bool enters;
   Real t;
-  Int x, y, z;  // cell
+  Int x, y, z;  // cell of the hit
 };
 
-// Finds the crossing after `passing` earlier ones.
+// Finds the first crossing of a ray with the surface after skipping `passing` crossings.
 Hit trace(Ray ray, Int passing) {
   Bool aheadX = ray.dx >= 0.0f;
   Bool aheadY = ray.dy >= 0.0f;
@@ -143,17 +146,17 @@ Hit trace(Ray ray, Int passing) {
   Int x = cellAt(t, ray.ox, ray.dx, ray.ix, integer(0), integer(tableSizeX - 1));
   Int y = cellAt(t, ray.oy, ray.dy, ray.iy, integer(0), integer(tableSizeY - 1));
   Int z = cellAt(t, ray.oz, ray.dz, ray.iz, integer(0), integer(tableSizeZ - 1));
-  // A ray that starts in front of the table's first cells begins on their faces.
+  // A ray that starts outside the table begins on the entry face of its first cell in the table.
   t = larger(t, planeAt(select(aheadX, x, x + 1), ray.ox, ray.ix));
   t = larger(t, planeAt(select(aheadY, y, y + 1), ray.oy, ray.iy));
   t = larger(t, planeAt(select(aheadZ, z, z + 1), ray.oz, ray.iz));
   alive = AND(alive, t <= ray.end);
   Int entered = integer(kNone);
-  Bool solved = no();    // the surface crosses this cell, but the ray does not cross the surface in it
-  Bool carried = no();   // the previous cell was such a cell
-  Bool inside = no();    // the ray was inside at its end
+  Bool solved = no();    // the present cell was searched: the surface crosses it, but the ray has no further crossing in it
+  Bool carried = no();   // the previous cell was searched, so `inside` is the side at its end
+  Bool inside = no();    // side at the end of the last searched cell: true for inside
   while (any(alive)) {
-    // Advance to the next crossed cell.
+    // Step to the next cell that the surface may cross.
     Bool walking = alive;
     Int brick = integer(0);
     Int axis = integer(kNone);
@@ -201,7 +204,8 @@ Hit trace(Ray ray, Int passing) {
       alive = AND(alive, NOT(AND(moving, gone)));
       walking = AND(moving, NOT(gone));
     }
-    // Rays still in the loop have not found a crossed cell.
+    // Rays that were still stepping when the loop ended have not yet reached a crossed cell. They
+    // continue in the next round.
     Bool asked = AND(alive, NOT(walking));
     if (any(asked)) {
       VAR fromX = ray.ox - toReal(x);

@@ -1,11 +1,13 @@
-// The grid points around a cell, in one or several blocks. Types and space are those of roots.glsl.
+// Access to the grid points around a cell, which lie in one or several blocks. Types and
+// coordinates are those of roots.glsl.
 
-// Six grid points on each axis, from cell − 2 on. They lie in one block or two along an axis.
+// Six grid points on each axis, from cell − 2 on. Along an axis they lie in one block, or in a near
+// block and a far block.
 struct Window {
-  Int base[8];     // position of the first value of each block, by bits x, y, z
-  Int strides[8];  // strides of its values
-  Bool farX[6], farY[6], farZ[6];
-  Int stepX[6], stepY[6], stepZ[6];  // offset within the block
+  Int base[8];     // position of the first value of each block; bits 4, 2, 1 of the index: far along x, y, z
+  Int strides[8];  // packed strides of the block's values
+  Bool farX[6], farY[6], farZ[6];    // the point lies in the far block of the axis
+  Int stepX[6], stepY[6], stepZ[6];  // coordinate of the point within its block, 0 … 7
 };
 
 Window windowAt(Bool asked, Int cellX, Int cellY, Int cellZ) {
@@ -26,7 +28,8 @@ Window windowAt(Bool asked, Int cellX, Int cellY, Int cellZ) {
   return w;
 }
 
-// Indices of the values at (i, j, 0) and following, in the near blocks or in the far ones.
+// Position of the first value of column (i, j) along z in its block: in the far block along z if
+// `far` is 1, else in the near block. Adding stepZ[k] gives the position of value (i, j, k).
 Int firstAt(IN(Window) w, int i, int j, int far) {
   Int base = select(w.farY[j], select(w.farX[i], w.base[6 + far], w.base[2 + far]),
                       select(w.farX[i], w.base[4 + far], w.base[far]));

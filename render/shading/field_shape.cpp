@@ -11,16 +11,17 @@ using Imath::V3d;
 using Join = FieldExpression::Join;
 
 constexpr double kAtEnd =
-    1 - 1e-6;  // relative to the background: at larger values the band has no distance
-constexpr double kEqualParts =
-    1e-6;  // contributions of two solids that count as equal; the first solid counts
+    1 -
+    1e-6;  // relative to the background: at values of larger magnitude the band stores no distance
+constexpr double kEqualParts = 1e-6;  // difference below which the contributions of two solids
+                                      // count as equal; then the first solid counts
 
-/// Value of a step and its derivatives by its operands: a, and b with the sign with which it is
-/// joined.
+/// Result of a step of the expression: its value, its first derivatives by the operands a and b,
+/// the sign with which b is joined (−1 for a difference), and a second derivative.
 struct JoinShape {
   double value, a, b;
   double signOfB;
-  double bend;  ///< second derivative along a − b
+  double bend;  ///< second derivative of the value along a − signOfB · b
 };
 
 JoinShape joined(const FieldExpression& e, Join join, double a, double b) {

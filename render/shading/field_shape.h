@@ -8,21 +8,22 @@
 
 namespace render {
 
-/// Value of a field at a point, and its derivatives in world axes and per world unit.
+/// Value of a field at a point, world units, and its derivatives along world axes, per world unit.
 struct FieldShape {
   double value = 0;
   SurfaceShape shape;
 };
 
-/// Converts value and derivatives of a grid from index space to world axes.
+/// Converts the derivatives of a grid at a point from index space to world space.
 /// @param indexToWorld  a rotation with uniform scale, and a translation
 [[nodiscard]] FieldShape fieldShape(double value, const SurfaceShape& shape,
                                     const Imath::M44d& indexToWorld);
 
-/// Completes a hit on an expression's zero set. The shape follows from the chain rule. Colours are
-/// mixed by the contributions of the solids, and the id is that of the solid with the largest
-/// contribution. `position` and `distance` of the hit must be set.
-/// @param operands  shapes of the fields at the hit, in the expression's order
+/// Completes a hit on the zero set of an expression. Its derivatives follow from those of the
+/// fields by the chain rule. Colours are mixed by the contributions of the solids, and the id is
+/// that of the solid with the largest contribution. `position` and `distance` of the hit must be
+/// set.
+/// @param operands  shapes of the fields at the hit, in the order of FieldExpression::operands
 /// @param direction  direction of the ray
 void addFieldShape(Hit& hit, const FieldExpression& expression,
                    const std::vector<FieldShape>& operands, const Imath::V3d& direction);

@@ -11,9 +11,9 @@ using Imath::C3f;
 using Imath::V2d;
 using Imath::V3d;
 
-constexpr double kOcclusionShare =
-    0.25;  // fraction of the scene's diagonal: hollows darken, open surfaces do not
-constexpr double kDefaultRange = 40;  // range of curvatures, times the scene's diagonal
+constexpr double kOcclusionShare = 0.25;  // length of occlusion rays relative to the scene's
+                                          // diagonal: hollows darken, open surfaces do not
+constexpr double kDefaultRange = 40;      // default curvature range, times the scene's diagonal
 constexpr std::uint64_t kAmbient = 1, kShadow = 2;
 
 std::uint64_t scramble(std::uint64_t x) {  // the finaliser of SplitMix64
@@ -35,7 +35,8 @@ void tangentFrame(const V3d& n, V3d& s, V3d& t) {
   t = {b, sign + n.y * n.y * a, -n.y};
 }
 
-/// Direction in the hemisphere around `axis`, cosine-weighted.
+/// Cosine-weighted random direction in the hemisphere around `axis`. @param u  random point in [0,
+/// 1)²
 V3d cosineDirection(const V3d& axis, const V2d& u) {
   V3d s, t;
   tangentFrame(axis, s, t);
@@ -43,7 +44,8 @@ V3d cosineDirection(const V3d& axis, const V2d& u) {
   return s * (r * std::cos(angle)) + t * (r * std::sin(angle)) + axis * std::sqrt(1 - u.x);
 }
 
-/// Direction in a cone around `axis`, uniformly distributed.
+/// Uniformly distributed random direction in a cone around `axis`. @param u  random point in [0,
+/// 1)²
 V3d coneDirection(const V3d& axis, double halfAngle, const V2d& u) {
   V3d s, t;
   tangentFrame(axis, s, t);
@@ -98,7 +100,8 @@ Shader::Frame Shader::frameOf(const Hit& hit, const V3d& direction) const {
   Frame frame{hit.position, hit.normal, hit.facetNormal};
   if (frame.facet.dot(direction) > 0) frame.facet = -frame.facet;
   if (frame.normal.dot(frame.facet) < 0) frame.normal = -frame.normal;
-  // Move the start off the ripples of the interpolant and the rounding error of the hit.
+  // Move the start of light rays away from the surface, beyond the ripples of the interpolant and
+  // the rounding error of the hit.
   frame.start += frame.facet * (2 * hit.surfaceError + 1e-9 * diagonal_);
   return frame;
 }
@@ -109,8 +112,8 @@ void Shader::addSkyRays(const Frame& frame, int x, int y, int sample,
   const PixelSequence sequence(x, y, kAmbient);
   for (int i = 0; i < count; ++i) {
     V3d d = cosineDirection(frame.normal, sequence.at(sample * count + i));
-    // The hemisphere around the smooth normal extends below the plane of the facet. Mirror such
-    // directions.
+    // The hemisphere around the smooth normal extends below the plane of the facet. Mirror
+    // directions that point below that plane.
     const double below = d.dot(frame.facet);
     if (below < 0) d = (d - frame.facet * (2 * below)).normalized();
     rays.push_back({frame.start, d, occlusionDistance(diagonal_), 1});
@@ -201,7 +204,8 @@ C3f Shader::litColour(const Hit& hit, const Frame& frame, const V3d& direction, 
                   C3f(0.50f, 0.45f, 0.41f) * static_cast<float>(1 - upward);
   C3f result = scaled(C3f(1.06f, 1.0f, 0.90f), key);
   for (int c = 0; c < 3; ++c) {
-    // Interreflection in a hollow of this colour; 1 where the sky is open.
+    // Factor of the sky light with interreflection in a hollow of the surface's colour; 1 for an
+    // open sky.
     const double bounced = open / (1 - static_cast<double>(albedo[c]) * (1 - open));
     result[c] += static_cast<float>(bounced) * static_cast<float>(scene_.ambient) * sky[c];
   }
@@ -235,8 +239,7 @@ C3f Shader::inkColour(const Hit& hit, const Frame& frame, const V3d& direction) 
   const auto mark = [&](const C3f& with, double amount) {
     colour += scaled(with - colour, std::clamp(amount, 0.0, 1.0));
   };
-  // The larger curvature decides: a ridge bends most outwards, a valley most inwards. A convex
-  // corner counts as a ridge.
+  // A point is a ridge if k1 exceeds −k2, otherwise a valley. A convex corner counts as a ridge.
   const double ridge = hit.curvature.k1 / curvatureRange_,
                valley = -hit.curvature.k2 / curvatureRange_;
   mark(sepia, ridge > valley ? 1.5 * (ridge - 1) : 0);

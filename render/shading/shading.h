@@ -13,12 +13,12 @@
 
 namespace render {
 
-/// A low-discrepancy sequence in [0, 1)² for each pixel, the same in every run: the additive R2
-/// sequence, with a start derived from the pixel's coordinates.
+/// A low-discrepancy sequence of points in [0, 1)² for a pixel, the same in every run: the additive
+/// R2 sequence, with a start derived from the pixel's coordinates and a number for its purpose.
 class PixelSequence {
  public:
   PixelSequence(int x, int y, std::uint64_t purpose);
-  /// Sequence of sample positions within the pixel.
+  /// Sequence of sample positions within pixel (x, y).
   [[nodiscard]] static PixelSequence overArea(int x, int y) { return {x, y, 0}; }
   [[nodiscard]] Imath::V2d at(int index) const;
 
@@ -29,30 +29,31 @@ class PixelSequence {
 /// Unit vector towards the key light, in world space.
 [[nodiscard]] Imath::V3d keyDirection(const Scene& scene);
 /// Length of ambient occlusion rays, world units.
-/// @param diagonal  of the bounding box of the surfaces, world units
+/// @param diagonal  diagonal of the bounding box of the surfaces, world units
 [[nodiscard]] double occlusionDistance(double diagonal);
 
 /// A ray from a surface point towards a light.
 struct LightRay {
   Imath::V3d origin, direction;  ///< direction of unit length
-  double maxDistance = 0;        ///< world units
-  double light = 0;              ///< light that arrives if the ray is not blocked
+  double maxDistance = 0;        ///< length of the ray, world units
+  double light = 0;  ///< weight of the light that arrives if the ray is not blocked, [0, 1]
 };
 
-/// Light rays of one surface point, as a range of a shared list: `sky` rays from index `first`,
-/// then `key` rays.
+/// Light rays of one surface point, as a range of a list: `sky` rays towards the sky from index
+/// `first` on, then `key` rays towards the key light.
 struct LightRays {
   std::size_t first = 0, sky = 0, key = 0;
 };
 
 /// Shades a surface: key light with soft shadows, sky light with ambient occlusion, a cool fill
-/// light and a thin rim light. Other styles need no light.
+/// light and a thin rim light. The styles tone, ink and matcap cast no light rays.
 class Shader {
  public:
-  /// @param diagonal  of the bounding box of the surfaces, world units
+  /// @param diagonal  diagonal of the bounding box of the surfaces, world units
   Shader(const Scene& scene, double diagonal, const RenderOptions& options);
 
-  /// Appends the rays that determine how much light arrives at a hit seen along `direction`.
+  /// Appends to `rays` the light rays of a hit on a view ray with the given direction. Pixel (x, y)
+  /// and sample select their random directions.
   /// @param sample  number of the sample within the pixel
   [[nodiscard]] LightRays addRays(const Hit& hit, const Imath::V3d& direction, int x, int y,
                                   int sample, std::vector<LightRay>& rays) const;
@@ -64,7 +65,8 @@ class Shader {
 
  private:
   struct Frame {
-    Imath::V3d start, normal, facet;  ///< shading frame, with normals that face the eye
+    Imath::V3d start, normal, facet;  ///< start of light rays, and unit normals that face the eye:
+                                      ///< of the smooth surface and of the drawn facet
   };
   [[nodiscard]] Frame frameOf(const Hit& hit, const Imath::V3d& direction) const;
   void addSkyRays(const Frame& frame, int x, int y, int sample, std::vector<LightRay>& rays) const;

@@ -21,7 +21,7 @@ C3f mixed(const C3f& a, const C3f& b, double share) {
   return a + (b - a) * static_cast<float>(share);
 }
 
-/// Maps curvatures to (−1, 1), with ±range at half way. Large values are compressed, not clipped.
+/// Maps a curvature to (−1, 1); ±range becomes ±1/2. Large values are compressed, not clipped.
 double squeezed(double curvature, double range) {
   return 2 / std::numbers::pi * std::atan(curvature / range);
 }
@@ -33,8 +33,8 @@ double ramp(double from, double to, double x) {
 
 const C3f kNeutral(0.62f, 0.60f, 0.57f);
 
-/// Colour between two hues, through neutral at 0. The lightness carries little of the difference,
-/// so that shading stays readable.
+/// Colour for a value in [−1, 1] between two hues, neutral at 0. The colours differ little in
+/// lightness, so that shading stays readable.
 C3f diverging(double value, const C3f& negative, const C3f& positive) {
   return mixed(kNeutral, value < 0 ? negative : positive, std::abs(value));
 }
@@ -72,13 +72,14 @@ C3f meanColour(const CurvatureSample& sample, double range) {
 }
 
 C3f gaussColour(const CurvatureSample& sample, double range) {
-  // The square root has the dimension of a curvature, so that one range serves both.
+  // The square root has the dimension of a curvature, so the range is in the same unit as for mean
+  // curvature.
   const double k = std::copysign(std::sqrt(std::abs(sample.gauss)), sample.gauss);
   return diverging(squeezed(k, range), C3f(0.02f, 0.30f, 0.10f), C3f(0.62f, 0.24f, 0.0f));
 }
 
 C3f principalColour(const CurvatureSample& sample, double range) {
-  // Corners and edges of the table of pairs k1 ≥ k2: bowl, groove, saddle, ridge, dome.
+  // Colours of the five basic shapes of a surface with k1 ≥ k2: bowl, groove, saddle, ridge, dome.
   const double a = squeezed(sample.k1, range), b = squeezed(sample.k2, range);
   const C3f dome(0.65f, 0.05f, 0.03f), ridge(0.75f, 0.48f, 0.04f), saddle(0.06f, 0.42f, 0.10f),
       groove(0.03f, 0.40f, 0.52f), bowl(0.04f, 0.08f, 0.55f);
@@ -97,8 +98,8 @@ double accessibilityOf(const CurvatureSample& sample, double range) {
 }
 
 double silhouetteOf(double cosine, double viewCurvature, double width) {
-  // The line ends where the surface has turned away from the outline by the line's width. A surface
-  // that curves towards the eye has no outline nearby.
+  // The line covers the points that appear within `width` of the outline. A surface that is concave
+  // along the view has no outline nearby.
   const double bend = std::clamp(width * viewCurvature, 0.0, 1.0);
   const double limit = std::sqrt(bend * (2 - bend));
   return limit > 0 && cosine <= limit ? 1 : 0;
@@ -127,7 +128,8 @@ C3f ColourImage::at(double x, double y) const {
 ColourImage readColourPng(const std::filesystem::path& path, std::size_t maxMemory) {
   std::error_code failed;
   if (!std::filesystem::is_regular_file(path, failed))
-    throw levelset::IoError(fmt::format("'{}' does not exist; check the name", path.string()));
+    throw levelset::IoError(
+        fmt::format("'{}' does not exist or is not a regular file; check the name", path.string()));
   if (!std::ifstream(path, std::ios::binary))
     throw levelset::IoError(
         fmt::format("{} cannot be opened; check its permissions", path.string()));
@@ -139,17 +141,20 @@ ColourImage readColourPng(const std::filesystem::path& path, std::size_t maxMemo
   png_image& png = owner.image;
   png.version = PNG_IMAGE_VERSION;
   if (!png_image_begin_read_from_file(&png, path.c_str()))
-    throw levelset::InvalidInput(fmt::format("{} is not a PNG: {}", path.string(), png.message));
+    throw levelset::InvalidInput(
+        fmt::format("{} is not a PNG: {}; give a PNG file", path.string(), png.message));
   constexpr double kMostPixels = 1 << 26;
   if (static_cast<double>(png.width) * png.height > kMostPixels)
-    throw levelset::ResourceLimit(fmt::format("{} has {}x{} pixels, but at most 2^26 are supported",
-                                              path.string(), png.width, png.height));
+    throw levelset::ResourceLimit(
+        fmt::format("{} has {}x{} pixels, but at most 2^26 are supported; use a smaller picture",
+                    path.string(), png.width, png.height));
   requirePngPixels(path, png.width, png.height);
   levelset::requireMemory((4.0 + sizeof(C3f)) * png.width * png.height, maxMemory);
   png.format = PNG_FORMAT_RGBA;
   std::vector<std::uint8_t> bytes(PNG_IMAGE_SIZE(png));
   if (!png_image_finish_read(&png, nullptr, bytes.data(), 0, nullptr))
-    throw levelset::InvalidInput(fmt::format("{} is damaged: {}", path.string(), png.message));
+    throw levelset::InvalidInput(
+        fmt::format("{} is damaged: {}; copy it again", path.string(), png.message));
   ColourImage image{static_cast<int>(png.width), static_cast<int>(png.height), {}};
   image.pixels.reserve(bytes.size() / 4);
   const auto linear = [](std::uint8_t byte) { return linearFromSrgb(byte / 255.0f); };

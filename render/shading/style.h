@@ -16,12 +16,13 @@
 namespace render {
 
 enum class Style {
-  Lit,            ///< the solid's colour under the lights, with shadows
-  Tone,           ///< from cool to warm, as in technical drawings [Gooch98]
-  Mean,           ///< mean curvature by colour, lit
-  Gauss,          ///< Gauss curvature by colour, lit
-  Principal,      ///< both principal curvatures by a two-dimensional colour table, lit
-  Accessibility,  ///< the solid's colour, dark where a ball of a certain size does not fit
+  Lit,        ///< the solid's colour under the lights, with shadows
+  Tone,       ///< from a cool to a warm tone, by the angle to the light, as in technical drawings
+              ///< [Gooch98]
+  Mean,       ///< mean curvature by colour, lit
+  Gauss,      ///< Gauss curvature by colour, lit
+  Principal,  ///< both principal curvatures by a two-dimensional colour table, lit
+  Accessibility,  ///< the solid's colour, darker in concave regions that large balls cannot touch
                   ///< [Miller94]
   Ink,            ///< silhouettes, ridges and valleys on paper [Kindlmann03]
   Matcap          ///< a picture of a shaded ball, looked up by the normal
@@ -38,8 +39,8 @@ struct ColourImage {
   int width = 0, height = 0;
   std::vector<Imath::C3f> pixels;  ///< top row first
 
-  /// Interpolates bilinearly between pixels. @param x, y  from 0 to 1, (0, 0) is the upper left
-  /// corner
+  /// Interpolates bilinearly between pixels. @param x, y  position, from 0 to 1; (0, 0) is the
+  /// upper left corner
   [[nodiscard]] Imath::C3f at(double x, double y) const;
 };
 
@@ -57,28 +58,30 @@ struct ColourImage {
 /// Options of a style.
 struct StyleOptions {
   Style style = Style::Lit;
-  /// Curvature scale, per world unit. This curvature is half way to the end of a colour map, and it
-  /// is the threshold of ridges and valleys. 0: 40 divided by the diagonal of the bounding box of
-  /// the surfaces.
+  /// Curvature scale, per world unit. This curvature has the colour half way from the middle to the
+  /// end of a colour map. Ridges and valleys in Style::Ink begin at it. 0 stands for 40 divided by
+  /// the diagonal of the bounding box of the surfaces.
   double curvatureRange = 0;
   double lineWidth = 2;                            ///< width of silhouette lines, pixels
   std::shared_ptr<const ColourImage> matcap = {};  ///< picture of a shaded ball, for Style::Matcap
 };
 
-/// True when the style uses lights and shadows.
+/// True when the style uses shadow rays and ambient occlusion rays.
 [[nodiscard]] bool usesLights(Style style);
 
-/// Linear colours of curvatures. @param range  as StyleOptions::curvatureRange, positive
+/// Linear colours for mean, Gauss and principal curvatures. @param range  as
+/// StyleOptions::curvatureRange, positive
 [[nodiscard]] Imath::C3f meanColour(const CurvatureSample& sample, double range);
 [[nodiscard]] Imath::C3f gaussColour(const CurvatureSample& sample, double range);
 [[nodiscard]] Imath::C3f principalColour(const CurvatureSample& sample, double range);
-/// Accessibility: 1 where all balls of radius up to 1 / range touch the point, towards 0 where only
-/// small ones do.
+/// Accessibility of a surface point, from 0 to 1: 1 where the surface is not concave, 1/2 where the
+/// largest ball that can touch the point from outside has the radius 1 / range, and less
+/// where only smaller balls can touch it.
 [[nodiscard]] double accessibilityOf(const CurvatureSample& sample, double range);
 
 /// Weight of a silhouette line at a point, from 0 to 1. The line width does not depend on the
 /// curvature along the view [Kindlmann03].
-/// @param cosine  of the angle between normal and view, from 0 to 1
+/// @param cosine  cosine of the angle between normal and direction to the eye, from 0 to 1
 /// @param width  width of the line on the surface, world units
 [[nodiscard]] double silhouetteOf(double cosine, double viewCurvature, double width);
 

@@ -17,8 +17,8 @@ V3d row(const Imath::M44d& m, int i) {
   return {m[i][0], m[i][1], m[i][2]};
 }
 
-/// Normal curvature in a direction (index axes, any length), projected onto the tangent plane, per
-/// voxel. Zero where the direction is that of the normal.
+/// Normal curvature, per voxel, in the projection of a direction onto the tangent plane. It is 0
+/// for a direction parallel to the normal. @param direction  in index space, of any length
 double curvatureAlong(const SurfaceShape& shape, const V3d& direction) {
   const double length = shape.gradient.length();
   if (!(length > 0)) return 0;
@@ -53,7 +53,7 @@ CurvatureSample curvaturesOf(const SurfaceShape& shape, double voxelSize) {
   return {mean, gauss, mean + spread, mean - spread};
 }
 
-/// Curvatures of the same surface seen from its other side.
+/// Curvatures of the same surface with inside and outside exchanged.
 CurvatureSample flipped(const CurvatureSample& sample) {
   return {-sample.mean, sample.gauss, -sample.k2, -sample.k1};
 }

@@ -7,18 +7,21 @@
 
 namespace render {
 
-/// Derivatives of a level set at a surface point. Positions are in index space, φ has its own
-/// (world) unit.
+/// Derivatives of a level set at a surface point. Positions are in index space; φ is in world
+/// units.
 struct SurfaceShape {
-  Imath::V3d gradient{0};  ///< gradient of the quasi-interpolating tricubic B-spline, per voxel
-  Imath::V3d trilinearGradient{0};  ///< gradient of the interpolant that the rays meet
-  Imath::M33d hessian{0.0};         ///< second derivatives of the B-spline
-  double interpolationError = 0;    ///< bound on |trilinear − smooth|, from second differences
+  Imath::V3d gradient{0};  ///< gradient of the quasi-interpolating tricubic B-spline, φ per voxel
+  Imath::V3d trilinearGradient{
+      0};                    ///< gradient of the interpolant whose zero set is drawn, φ per voxel
+  Imath::M33d hessian{0.0};  ///< second derivatives of the B-spline, φ per voxel²
+  double interpolationError = 0;  ///< bound on the difference between the drawn interpolant and a
+                                  ///< smooth function, world units
 };
 
-/// Sets normals, curvatures and surface error of a hit. `isFlipped` of the hit must be set.
+/// Sets normals, curvatures and surface error of a hit. @pre `isFlipped` of the hit is set
 /// @param indexToWorld  a rotation with uniform scale, and a translation
-/// @param direction  direction of the ray; where φ has no gradient, the normal faces it
+/// @param direction  direction of the ray; where the gradient of φ vanishes, the normal is its
+/// opposite
 void addShape(Hit& hit, const SurfaceShape& shape, const Imath::M44d& indexToWorld,
               const Imath::V3d& direction);
 
