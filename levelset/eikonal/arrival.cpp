@@ -28,12 +28,15 @@ using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
 constexpr double kBytesPerGridPoint = 24;
-// Least depth of a grid point that was inside, voxels: it stays inside when its time rounds to
+// Smallest depth of an inside grid point, voxels. The negative time of an inside grid point is at
+// least the time for this depth in magnitude, so the point stays inside when its time rounds to
 // zero.
 constexpr double kLeastDepth = 1e-7;
-constexpr double kStarted = 0.1;  // share of the work
+// Fraction of the total progress that the start times take.
+constexpr double kStarted = 0.1;
 
-/// Returns the slowness at index positions; kFar where the front cannot pass. Empty at speed 1.
+/// Returns the slowness, 1 / speed, as a function of index positions; kFar where the front cannot
+/// pass. Returns an empty function when no speed is set: the speed is 1 everywhere.
 Slowness slownessOf(const ScalarField& speed, const openvdb::math::Transform& transform) {
   if (!speed) return {};
   return [&](const Vec3d& index) {
@@ -52,8 +55,10 @@ Slowness scaled(const Slowness& slowness, double unit) {
 
 class Solver {
  public:
-  /// @param slowness  slowness divided by `unit`, the typical one, so that times are about voxels
-  /// @param sources  empty: the front starts at the surface of `side`
+  /// @param slowness  slowness divided by `unit`; empty: 1 everywhere
+  /// @param sources  source points, index space; empty: the front starts at the surface of `side`
+  /// @param unit  typical slowness, by which times are scaled. At typical speed, scaled times are
+  /// distances in voxels.
   Solver(const ArrivalRequest& request, const openvdb::math::Transform& transform,
          const FloatTree* side, std::vector<Vec3d> sources, const Slowness& slowness, double unit)
       : request_(request),
@@ -96,8 +101,8 @@ class Solver {
     return static_cast<float>(static_cast<double>(block.time[n]) * voxelTime_);
   }
 
-  /// Returns the grid points to which makeLeaf() gives a time. A start time may exceed the latest
-  /// time.
+  /// Returns the grid points of a block whose times makeLeaf() stores. Leaves out times of `until`
+  /// or later, which a start time may have.
   [[nodiscard]] ArrivalBlock::Mask reachedOf(const ArrivalBlock& block) const {
     ArrivalBlock::Mask reached = block.known;
     for (auto it = block.known.beginOn(); it; ++it)
@@ -154,7 +159,8 @@ class Solver {
 
 void checkMemoryFor(const std::vector<StartTime>& start, const FloatGrid& field,
                     const ArrivalRequest& request) {
-  // At another speed the extent is not known in advance: touch() checks memory block by block.
+  // With a user-defined speed, the extent of the front is not known in advance.
+  // ArrivalBlocks::touch() then checks the memory block by block.
   if (request.options.speed) return;
   MemoryEstimate estimate;
   for (const StartTime& s : start) estimate.surface.expand(s.gridPoint);
@@ -171,7 +177,7 @@ ArrivalStart startOf(const ArrivalRequest& request, const Slowness& slowness) {
 }
 
 /// Converts source points to index positions.
-/// @throws ResourceLimit beyond the range of indices
+/// @throws ResourceLimit when an index does not fit into 32 bits
 std::vector<Vec3d> positionsOf(std::span<const Imath::V3d> sources,
                                const openvdb::math::Transform& transform) {
   std::vector<Vec3d> positions;
@@ -220,7 +226,7 @@ eikonal::ArrivalRequest checkedRequest(double until, const ArrivalOptions& optio
   if (!std::isfinite(until) || until <= 0)
     throw UsageError(fmt::format("the latest time is {}; give a positive, finite time", until));
   if (options.order != 1 && options.order != 2)
-    throw UsageError(fmt::format("the order is {}; give 1 or 2", options.order));
+    throw UsageError(fmt::format("the order of the differences is {}; give 1 or 2", options.order));
   return request;
 }
 
@@ -248,7 +254,8 @@ ArrivalTimes arrivalTimes(const NarrowBand& solid, double until, const ArrivalOp
 ArrivalTimes arrivalTimesFromPoints(const NarrowBand& lattice, std::span<const Imath::V3d> sources,
                                     double until, const ArrivalOptions& options) {
   const eikonal::ArrivalRequest request = checkedRequest(until, options);
-  if (!lattice.shared()) throw UsageError("there is no grid for the times; give a solid");
+  if (!lattice.shared())
+    throw UsageError("there is no grid on which to compute arrival times; give a solid");
   if (sources.empty()) throw UsageError("there is no source point; give at least one");
   for (const Imath::V3d& p : sources)
     for (int i = 0; i < 3; ++i)

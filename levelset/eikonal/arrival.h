@@ -34,13 +34,14 @@ struct ArrivalOptions {
 
 struct ArrivalFigures {
   std::size_t reached = 0;  ///< grid points with a time
-  std::size_t started = 0;  ///< grid points whose time the start gives
+  std::size_t started = 0;  ///< grid points with a start time
   /// Grid points that fell back from second to first order on one axis or more.
   std::size_t firstOrder = 0;
 };
 
 struct ArrivalTimes {
-  FieldGrid times;  ///< active where the front arrived; elsewhere ± the latest time
+  FieldGrid times;  ///< active where the front arrived; elsewhere the latest time, negated inside
+                    ///< the solid
   ArrivalFigures figures;
 };
 
@@ -51,8 +52,8 @@ struct FrontDistance {
 
 /// Computes when a front arrives at the grid points around the surface of `solid`. It starts on the
 /// surface at time 0 and moves to both sides; times are negative inside.
-/// Within two voxels of the surface the time is that along the straight segment to the closest
-/// point, where the speed on the segment varies little.
+/// Within two voxels of the surface, the time is integrated along the straight segment to the
+/// closest point, if the speed varies little on the segment.
 /// @param until  the latest time; at speed 1 a distance, world units
 /// @throws UsageError for an order other than 1 or 2, or `until` not positive and finite
 /// @throws InvalidInput for an empty solid, or when the speed is nowhere positive on its surface
@@ -61,12 +62,11 @@ struct FrontDistance {
 [[nodiscard]] ArrivalTimes arrivalTimes(const NarrowBand& solid, double until,
                                         const ArrivalOptions& options = {});
 
-/// Computes arrival times of a front that starts at points, on the grid of `lattice` (the solid
-/// itself does not count).
-/// Within eight voxels of each point the start is exact, as far as the speed is about linear in all
-/// directions. Elsewhere the front starts as a ball of about two voxels. With order 2 the
-/// singularity at the nearest point is factored out: at constant speed, times from one point are
-/// exact to float [Treister16].
+/// Computes arrival times of a front that starts at points. The grid points are those of `lattice`,
+/// whose surface is ignored. Times up to eight voxels from each point are integrated along straight
+/// segments, as far as the speed is nearly linear in the position. Where it is not, this start ball
+/// has a radius of two voxels. With order 2 the singularity at the nearest point is factored out:
+/// at constant speed, times from one point are exact to single precision [Treister16].
 /// @throws UsageError also when there is no point, or one that is not finite
 [[nodiscard]] ArrivalTimes arrivalTimesFromPoints(const NarrowBand& lattice,
                                                   std::span<const Imath::V3d> sources, double until,
@@ -93,13 +93,15 @@ struct FrontOptions {
            .unit = OptionUnit::Length,
            .range = OptionRange::Positive});
     visit("speed", &FrontOptions::speed,
-          {.help = "F, in world units per unit of time; default: 1"});
+          {.help = "speed F of the front, in world units per unit of time; default: 1"});
     visit("from", &FrontOptions::from,
           {.help = "start at these points, on the grid of the operand, in place of its surface"});
     visit("order", &FrontOptions::order, {{"1", 1}, {"2", 2}},
-          {.help = "order of the differences; 2 falls back to 1 where it must"});
+          {.help = "order of the upwind differences; with 2, grid points use first order where no "
+                   "second-order difference is upwind"});
     visit("extend", &FrontOptions::extend,
-          {.help = "in place of times: this attribute, carried off the surface along its normals"});
+          {.help = "instead of times, compute this attribute of the surface, extended along the "
+                   "normals to both sides"});
   }
 };
 

@@ -19,9 +19,9 @@ namespace levelset::eikonal {
 
 /// Arrival times at the 8³ grid points of a leaf block.
 /// Times are divided by the time that the front takes for a voxel at a typical speed. At that speed
-/// they are distances in voxels. They count from the front's start and are positive on both sides.
-/// Not a padded copy: accepted times must be visible in neighbouring blocks at once, so a block has
-/// links to its neighbours.
+/// they are distances in voxels. They are 0 where the front starts and positive on both sides of
+/// it. A block has no copies of the times in its neighbours, but pointers to these blocks. The
+/// solver reads a newly accepted time from the neighbouring blocks at once.
 struct ArrivalBlock {
   using Mask = openvdb::util::NodeMask<3>;
   static constexpr openvdb::Index kSize = 512;
@@ -29,18 +29,21 @@ struct ArrivalBlock {
   openvdb::Coord origin;
   std::uint32_t number = 0;
   std::array<float, kSize> time;
-  /// Slowness relative to the typical one; kFar where the front cannot pass; empty: 1 everywhere.
+  /// Slowness divided by the typical slowness; kFar where the front cannot pass; null: 1
+  /// everywhere.
   std::unique_ptr<std::array<float, kSize>> slowness;
-  std::array<ArrivalBlock*, 6> neighbours{};  ///< −x, +x, −y, +y, −z, +z; null where there is none
-  Mask inside;                                ///< on the negative side of the front's start
-  Mask known;                                 ///< start times and accepted times
-  Mask firstOrder;  ///< fell back from second to first order on one axis or more
+  /// Blocks at −x, +x, −y, +y, −z, +z; null where there is no block.
+  std::array<ArrivalBlock*, 6> neighbours{};
+  Mask inside;      ///< grid points on the negative side of the start surface
+  Mask known;       ///< grid points with a start time or an accepted time
+  Mask firstOrder;  ///< grid points that fell back to first order on one axis or more
 
   [[nodiscard]] double slownessAt(openvdb::Index n) const {
     return slowness ? static_cast<double>((*slowness)[n]) : 1.0;
   }
-  /// Returns the block of a grid point's neighbour in direction d = axis · 2 + (step > 0), null if
-  /// there is none. `to` is the neighbour's offset in that block.
+  /// Returns the block that holds the neighbour of grid point `n` in direction d; null if that
+  /// block does not exist. d = 2 · axis for the previous grid point along the axis, 2 · axis + 1
+  /// for the next one. `to` receives the neighbour's offset in its block.
   [[nodiscard]] const ArrivalBlock* step(openvdb::Index n, int d, openvdb::Index& to) const {
     const int shift = 6 - 3 * (d >> 1);
     const openvdb::Index at = n >> shift & 7u;
@@ -53,7 +56,7 @@ struct ArrivalBlock {
   }
 };
 
-/// Grid point with a known time at the start.
+/// Grid point where the front starts, with its time, scaled as in ArrivalBlock.
 struct StartTime {
   openvdb::Coord gridPoint;
   float time = 0;
@@ -63,21 +66,21 @@ struct StartTime {
 class ArrivalBlocks {
  public:
   struct Settings {
-    double until = 0;                                            ///< latest time to keep
-    std::function<double(const openvdb::Coord&)> slowness = {};  ///< empty: 1
-    /// Negative values mark the inside; null: no grid point is inside.
+    double until = 0;  ///< latest time to compute, scaled as in ArrivalBlock
+    std::function<double(const openvdb::Coord&)> slowness = {};  ///< relative slowness; empty: 1
+    /// Level set whose negative values mark the inside; null: no grid point is inside.
     const openvdb::FloatTree* side = nullptr;
-    std::shared_ptr<const PointSources> sources = {};  ///< set where the front starts at points
+    std::shared_ptr<const PointSources> sources = {};  ///< null: starts at a surface
     std::size_t maxMemory = kNoMemoryLimit;
     Progress progress = {};
   };
   explicit ArrivalBlocks(Settings settings);
 
-  /// Creates the blocks of the start and sets their times.
-  /// @throws InvalidInput when the front cannot pass at any of the grid points
+  /// Creates the blocks that hold the given grid points and stores their start times.
+  /// @throws InvalidInput when the speed is positive at none of the grid points
   void start(const std::vector<StartTime>& times);
-  /// Returns the block at `origin` and creates it if needed; loadSlowness() must then fill its
-  /// slowness.
+  /// Returns the block at `origin` and creates it if needed. A new block has no slowness before the
+  /// next call of loadSlowness().
   ArrivalBlock& touch(const openvdb::Coord& origin);
   /// Evaluates the slowness of the blocks created since the last call, in parallel.
   void loadSlowness();
@@ -101,8 +104,8 @@ class ArrivalBlocks {
   std::unique_ptr<openvdb::FloatGrid::ConstAccessor> side_;
   std::deque<ArrivalBlock> blocks_;
   std::unordered_map<openvdb::Coord, ArrivalBlock*, std::hash<openvdb::Coord>> index_;
-  std::size_t loaded_ = 0;  ///< blocks whose slowness is known
-  double limit_ = 0;        ///< bytes
+  std::size_t loaded_ = 0;  ///< number of blocks with loaded slowness
+  double limit_ = 0;        ///< memory limit of the blocks, bytes
 };
 
 }  // namespace levelset::eikonal

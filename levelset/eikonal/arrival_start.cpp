@@ -18,21 +18,23 @@ using openvdb::FloatTree;
 using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
-// Largest radius around a point source, voxels, in which start times are given: there the front is
-// too curved for differences.
+// Largest radius around a point source, voxels, in which start times are computed directly. So
+// close to the source, the front is too curved for upwind differences.
 constexpr double kStartBall = 8;
-// Largest difference of the speed from a linear one, and from the speed at the point, in that
-// radius; both are parts of the speed at the point. Within these bounds straight segments are the
-// fastest paths, to within 0.03 voxels.
+// Limits of the speed within the start ball of a point source, as fractions of the speed at the
+// source: deviation from a linear function (kLeastLinear), and change of that linear function
+// (kMostChange). Within these limits, straight segments are the fastest paths to within 0.03
+// voxels.
 constexpr double kLeastLinear = 0.02, kMostChange = 0.35;
 // Distance between samples of the slowness on a segment, voxels.
 constexpr double kSpacing = 0.5;
-// Another path may be faster if the slowness varies by more than this factor on a segment. Segments
-// below one voxel are exempt: no grid point beside them offers the solver another path.
+// A straight segment on which the slowness varies by more than the factor kMostRatio is rejected:
+// another path may be faster. Segments shorter than kShortRay voxels are exempt, because the solver
+// has no grid point beside them for another path.
 constexpr double kMostRatio = 2, kShortRay = 1;
 constexpr std::size_t kPointsPerBatch = 64;
 constexpr double kBytesPerLeaf = 2300;
-// Number of samples for the typical slowness.
+// Maximum number of samples for the typical slowness.
 constexpr std::size_t kProbes = 1000;
 
 /// Integrates the slowness along a straight segment with Simpson's rule. Returns kFar when the
@@ -52,8 +54,9 @@ float straightTime(const Vec3d& from, const Vec3d& to, const Slowness& slowness,
   return static_cast<float>(length * sum / (3 * pieces));
 }
 
-/// Returns offsets on a half-voxel lattice, shortest first. It covers the ball and half a cell
-/// around it, and includes the grid points.
+/// Returns the offsets, in voxels, of points with half-voxel spacing, shortest first. They cover
+/// the start ball of a point source and half a voxel diagonal around it, and include the grid
+/// points.
 const std::vector<Vec3d>& halfVoxelOffsets() {
   static const std::vector<Vec3d> offsets = [] {
     std::vector<Vec3d> made;
@@ -70,8 +73,9 @@ const std::vector<Vec3d>& halfVoxelOffsets() {
   return offsets;
 }
 
-/// Returns the radius of the ball around a point in which the speed is about linear, voxels. No
-/// path that leaves the ball is faster than a straight one within it.
+/// Returns the radius, voxels, of the ball around a source point in which the speed is nearly
+/// linear. No path that leaves the ball is faster than a straight one within it. 0 where the front
+/// cannot pass at the point.
 double linearRadius(const Vec3d& point, const Slowness& slowness) {
   const auto speed = [&](const Vec3d& p) {
     const double here = slowness(p);
@@ -167,7 +171,8 @@ std::vector<StartTime> startAtSurface(const FloatGrid& field, const ArrivalStart
 }
 
 std::vector<StartTime> startAtPoints(std::span<const Vec3d> points, const ArrivalStart& start) {
-  // Balls overlap: the kept times grow with the volume they cover, not with the number of points.
+  // The start balls of neighbouring points overlap. The tree keeps one time for each grid point, so
+  // its memory grows with the covered volume, not with the number of points.
   FloatTree times(kFar);
   std::vector<std::vector<StartTime>> parts(kPointsPerBatch);
   for (std::size_t begin = 0; begin < points.size(); begin += kPointsPerBatch) {

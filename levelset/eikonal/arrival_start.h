@@ -11,8 +11,8 @@ namespace levelset::eikonal {
 /// Slowness at an index position; kFar where the front cannot pass. Safe to call from many threads.
 using Slowness = std::function<double(const openvdb::Vec3d&)>;
 
-/// Distance from the start, in voxels, to which start times are given: second-order differences
-/// read two grid points back.
+/// Distance from the surface or source point, in voxels, up to which start times are computed
+/// directly. Second-order differences read two grid points towards the start.
 inline constexpr double kStartWidth = 2;
 
 /// Options for computing the times at which a front starts.
@@ -22,9 +22,9 @@ struct ArrivalStart {
   Progress progress = {};
 };
 
-/// Computes the times along straight segments to the closest points of the zero set, up to two
+/// Computes start times along straight segments to the closest points of the zero set, up to two
 /// voxels from it. Leaves out grid points whose segment may not be the fastest path: the solver
-/// reaches them.
+/// computes their times.
 [[nodiscard]] std::vector<StartTime> startAtSurface(const openvdb::FloatGrid& field,
                                                     const ArrivalStart& start);
 
@@ -33,8 +33,8 @@ struct ArrivalStart {
 [[nodiscard]] std::vector<StartTime> startAtPoints(std::span<const openvdb::Vec3d> points,
                                                    const ArrivalStart& start);
 
-/// Returns the median slowness over a sample of active grid points beside the zero set. Times are
-/// scaled by it. Returns 1 where the front cannot pass.
+/// Returns the median slowness over a sample of active grid points beside the zero set. The solver
+/// scales times by it. Returns 1 when the front can pass at none of the samples.
 [[nodiscard]] double typicalSlowness(const openvdb::FloatGrid& field, const Slowness& slowness);
 [[nodiscard]] double typicalSlowness(std::span<const openvdb::Vec3d> points,
                                      const Slowness& slowness);

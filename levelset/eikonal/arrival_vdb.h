@@ -10,12 +10,14 @@
 namespace levelset::eikonal {
 
 struct ArrivalRequest {
-  double until = 0;  ///< world units of time
+  /// Latest time, in the unit of time of the speed; at speed 1 a distance in world units.
+  double until = 0;
   ArrivalOptions options = {};
 };
 
 struct ArrivalGrid {
-  /// World units; active where reached; elsewhere ± the latest time.
+  /// Arrival times in the unit of ArrivalRequest::until. Active where the front arrived; elsewhere
+  /// the latest time, negated inside the solid.
   openvdb::FloatGrid::Ptr times;
   ArrivalFigures figures;
 };
@@ -25,7 +27,7 @@ struct ArrivalGrid {
 [[nodiscard]] ArrivalGrid arrivalFromSurface(const openvdb::FloatGrid& field,
                                              const ArrivalRequest& request);
 
-/// Computes arrival times from points (world), on the grid points of `transform`.
+/// Computes arrival times from source points (world units), on the grid points of `transform`.
 [[nodiscard]] ArrivalGrid arrivalFromPoints(std::span<const Imath::V3d> sources,
                                             const openvdb::math::Transform& transform,
                                             const ArrivalRequest& request);

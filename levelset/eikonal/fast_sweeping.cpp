@@ -18,17 +18,19 @@ using openvdb::Coord;
 using openvdb::Index;
 using Mask = ArrivalBlock::Mask;
 
-// An improvement below this part of the time for one voxel at the grid point does not count.
+// Smallest improvement of a time that counts, as a fraction of the time for one voxel at the speed
+// of the grid point.
 constexpr float kImprovement = 1e-5f;
-// Window after the earliest change, in voxels and as a part of the time. Blocks with later changes
-// wait, since their times would not be final yet. The relative part serves slow media, where a
-// voxel takes long.
+// Length of the time window after the earliest pending change: the larger of kWindow, the time for
+// half a voxel at typical speed, and the fraction kWindowShare of that earliest time. Blocks with
+// later changes wait, since their times would change again. The fraction serves slow media, where
+// the front needs long for a voxel.
 constexpr float kWindow = 0.5f, kWindowShare = 0.05f;
 constexpr std::size_t kBlocksPerTask = 8;
 
-/// Latest time to which the first solution is computed. With `lookahead` it exceeds `until` by as
-/// much as the second solution reads beyond it: a voxel at the local speed, or a twentieth of the
-/// time.
+/// Latest time of the first-order solution. With `lookahead` it lies beyond `until`, because the
+/// second-order solution reads later times: by the time for one voxel at the local speed or a
+/// twentieth of `until`, whichever is larger.
 struct SweepLimit {
   float until = 0;
   bool lookahead = false;
@@ -44,24 +46,27 @@ int parityOf(const Coord& origin) {
 /// State of a block during sweeping, beside its times.
 struct BlockState {
   float earliest = kFar;  ///< time of the earliest change not yet processed; kFar: block is clean
-  bool seen = false;      ///< the block was processed before
+  bool seen = false;      ///< the first-order solver processed the block before
   std::uint8_t dirtyNeighbours = 0;  ///< dirty flags, bit d: times of neighbour d changed
-  /// Bit d: neighbour d must be flagged; written only by the block's own work.
+  /// Bit d: times that neighbour d reads have changed, so that neighbour must get a dirty flag.
+  /// Written only by the task that processes this block.
   std::uint8_t dirtiedNeighbours = 0;
-  std::array<float, 6> earliestAtFace{};            ///< earliest change at each face
-  std::optional<std::vector<std::uint16_t>> order;  ///< grid points to solve, by first-order time
+  std::array<float, 6> earliestAtFace{};  ///< earliest changed time that neighbour d reads
+  /// Offsets of the grid points to solve, sorted by first-order time; empty before the first visit.
+  std::optional<std::vector<std::uint16_t>> order;
   std::unique_ptr<std::array<float, ArrivalBlock::kSize>> second;  ///< second-order times
 };
 
 /// Scheduler of dirty blocks: calls work(block, state) until no block is dirty.
-/// Takes the eight parities of block positions in turn, the earliest blocks first. Blocks of one
-/// parity do not touch and run in parallel. The order is fixed, and so is the result.
+/// Each round takes the eight parities of block positions in turn. It skips blocks whose changes
+/// lie beyond a time window. Blocks of one parity do not touch and run in parallel. The order is
+/// fixed, so the result does not depend on the number of threads.
 class Rounds {
  public:
   explicit Rounds(ArrivalBlocks& blocks) : blocks_(blocks) {}
   std::vector<BlockState> blockStates;
 
-  /// Passes the flags set before the first round to the neighbours.
+  /// Passes the dirty flags that were set before the first round on to the neighbouring blocks.
   void passInitialFlags() {
     blockStates.resize(blocks_.blocks().size());
     for (std::size_t i = 0, end = blockStates.size(); i < end; ++i)
@@ -134,7 +139,8 @@ class Rounds {
   std::size_t sorted_ = 0;
 };
 
-/// Records a change of the time at a grid point for the neighbours that read it.
+/// Records that the time at grid point `n` changed, for the neighbouring blocks that read it.
+/// @param depth  number of layers of grid points that a neighbouring block reads: 1 or 2
 void markDirty(BlockState& state, Index n, float time, Index depth) {
   const std::array<Index, 3> at = {n >> 6, n >> 3 & 7u, n & 7u};
   for (std::size_t axis = 0; axis < 3; ++axis)
@@ -203,7 +209,8 @@ class FirstOrderWorker {
       }
   }
 
-  /// Marks all grid points at the first call, later only those beside dirty neighbours.
+  /// Marks the grid points to solve: all on the first visit of the block, later those beside dirty
+  /// neighbours.
   void markPending() {
     if (!state_.seen) {
       pending_.fill(~std::uint64_t{0});
@@ -244,7 +251,8 @@ class FirstOrderWorker {
     }
   }
 
-  /// Marks the later neighbours: only they can depend on this time.
+  /// Marks the neighbours of a changed grid point that have later times: only they depend on its
+  /// time.
   void markReaders(int x, int y, int z) {
     const std::size_t here = slot(x, y, z);
     const auto mark = [&](int i, int j, int k) {
@@ -275,7 +283,7 @@ class FirstOrderWorker {
     if (block_.known.isOn(n)) return false;
     const auto slowness = static_cast<float>(block_.slownessAt(n));
     if (!(slowness < kFar) || a > limit_.at(block_.slownessAt(n))) return false;
-    // [Zhao05, section 2], relative to the earliest neighbour.
+    // Update by [Zhao05, section 2], with times relative to the earliest neighbour.
     float u = slowness;
     const float p = b - a, q = c - a;
     if (u > p) {
@@ -296,13 +304,15 @@ class FirstOrderWorker {
   ArrivalBlock& block_;
   BlockState& state_;
   SweepLimit limit_;
-  Times times_;  ///< only the faces of the border are filled, from six neighbours
-  std::array<std::uint64_t, 8> pending_{};  ///< grid points to solve: slices of x, bits 8 y + z
+  Times times_;  ///< times of the block and, in the border, of its six neighbours
+  /// Grid points to solve: one word for each x, bit 8 y + z.
+  std::array<std::uint64_t, 8> pending_{};
   Mask changed_;
 };
 
-/// Solver with second-order differences. It takes the upwind neighbours from the first solution. So
-/// each grid point depends on earlier ones only, and the equations have one solution.
+/// Solver with second-order differences. The first-order solution decides which neighbours are
+/// upwind. Each grid point thus depends only on points with earlier first-order times, and the
+/// equations have one solution.
 class SecondOrderWorker {
  public:
   SecondOrderWorker(const ArrivalBlocks& blocks, ArrivalBlock& block, BlockState& state,
@@ -343,7 +353,7 @@ class SecondOrderWorker {
   }
 
  private:
-  /// Marks the two layers beside each dirty neighbour.
+  /// Marks the two layers of the block beside each dirty neighbour.
   void markPending() {
     for (std::size_t d = 0; d < 6; ++d)
       if (state_.dirtyNeighbours >> d & 1) pending_ |= facingLayers()[d];
@@ -362,8 +372,8 @@ class SecondOrderWorker {
     return layers;
   }
 
-  /// Marks the grid points of the block up to two away. Marks on earlier ones have no effect: none
-  /// of these reads this one.
+  /// Marks the grid points of the block up to two steps from `n` along the axes. Marks on points
+  /// with earlier times have no effect: run() has passed these points, and none of them reads `n`.
   void markReaders(Index n) {
     for (const Index shift : {0u, 3u, 6u}) {
       const Index at = n >> shift & 7u, step = 1u << shift;
@@ -375,7 +385,7 @@ class SecondOrderWorker {
   }
 
   void sortByTime() {
-    // Times are not negative, so their bits sort in the same order.
+    // Times are not negative, so their bit patterns as integers sort in the same order.
     std::array<std::uint64_t, ArrivalBlock::kSize> keys;
     std::size_t count = 0;
     for (Index n = 0; n < ArrivalBlock::kSize; ++n)
@@ -388,8 +398,8 @@ class SecondOrderWorker {
   }
 
   struct Neighbour {
-    float first = kFar;  ///< time of the first solution, negative on the other side
-    double time = 0;     ///< time of the second solution, negative on the other side
+    float first = kFar;  ///< first-order time, negative on the other side of the start surface
+    double time = 0;     ///< second-order time, negative on the other side of the start surface
   };
 
   static std::size_t slot(const Coord& c) {
@@ -399,7 +409,8 @@ class SecondOrderWorker {
     return slot(openvdb::FloatTree::LeafNodeType::offsetToLocalCoord(n));
   }
 
-  /// Calls each(first grid point) for the rows along z between two corners.
+  /// Calls each(c) for all rows along z of the box [from, to), where c is the first grid point of
+  /// the row.
   template <typename Each>
   static void forEachRow(const Coord& from, const Coord& to, const Each& each) {
     for (int x = from.x(); x < to.x(); ++x)
@@ -438,7 +449,8 @@ class SecondOrderWorker {
     const std::size_t here = slot(n);
     const StraightTime straight = blocks_.straightTime(block_, n);
     UpwindTerms terms;
-    std::array<double, 3> near{}, missed{};  // first-order values and errors
+    std::array<double, 3> near{}, missed{};  // for each term: nearest upwind time, and error of a
+                                             // first-order difference of the straight time
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const std::size_t step = kStep[axis];
       const Neighbour a = look(here - step, side), b = look(here + step, side);
@@ -468,8 +480,9 @@ class SecondOrderWorker {
         plain.addFirst(near[i], share * missed[i]);
       return solveUpwind(plain, slowness);
     };
-    // Each fallback is less accurate than the one before it and closer to causal; the last one is
-    // causal.
+    // A time must not precede the times that it is computed from (causality). If it does, two
+    // fallbacks follow: first-order differences, then first order without the correction by the
+    // straight time. The last one is always causal but the least accurate.
     if (terms.hasSecond && time < terms.latest - straight.slack()) {
       time = inFirstOrder(1);
       first = true;
@@ -483,7 +496,8 @@ class SecondOrderWorker {
   ArrivalBlock& block_;
   BlockState& state_;
   SweepLimit limit_;
-  /// Both solutions in the block and in two layers of its neighbours, negative inside.
+  /// First- and second-order times of the block and of two layers of its neighbours, negative
+  /// inside.
   std::array<float, 12 * 12 * 12> first_, second_;
   Mask pending_;  ///< grid points to solve in this round
 };

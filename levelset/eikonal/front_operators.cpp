@@ -9,17 +9,17 @@ namespace levelset {
 namespace {
 
 constexpr const char* kFrontDetails =
-    "Solves |grad T| F = 1 from the surface to both sides (negative inside) or from "
-    "points. "
-    "Without --speed, --from and --extend the times are distances and the result is a band "
-    "again; `rebuild-band` computes the same by closest points, which is more exact. Otherwise the "
-    "result is a field. Where the speed is zero, negative or no number, nothing passes.";
+    "Solves |grad T| F = 1 for the times T at which a front of speed F arrives. The front starts "
+    "at the surface and moves to both sides (times are negative inside), or it starts at points. "
+    "Without --speed, --from and --extend, the times are distances and the result is a band; "
+    "`rebuild-band` computes these distances from closest points, more accurately. Otherwise the "
+    "result is a field. The front does not pass where the speed is zero, negative or NaN.";
 
 void noteFigures(const FrontOptions& options, const ArrivalFigures& figures, OperatorRun& run) {
   run.notes.push_back(fmt::format("{} grid points reached", figures.reached));
   if (options.order == 2)
     run.notes.push_back(
-        fmt::format("{} of them fell back to first order on some axis", figures.firstOrder));
+        fmt::format("{} grid points fell back to first order on some axis", figures.firstOrder));
   run.figures = {{"reached", figures.reached},
                  {"started", figures.started},
                  {"first_order", figures.firstOrder}};
@@ -30,7 +30,7 @@ FieldGrid extendAttribute(const NarrowBand& solid, const FrontOptions& options, 
       .halfWidth = options.to.in(solid.voxelSize()) / solid.voxelSize(),
       .maxMemory = run.maxMemory,
       .progress = run.progress};
-  run.notes.push_back("the attribute is that of the closest point of the surface");
+  run.notes.push_back("each grid point has the attribute of its closest point on the surface");
   return options.extend.vector ? extendOffSurface(solid, options.extend.vector, settings)
                                : extendOffSurface(solid, options.extend.scalar, settings);
 }
@@ -42,8 +42,8 @@ void FrontOperator<method>::check(const Options&, const GivenOptions& given) {
   for (const char* other : {"speed", "from", "order"})
     if (given("extend") && given(other))
       throw UsageError(
-          fmt::format("--extend carries an attribute along the normals, so --{} has no meaning "
-                      "beside it; leave one out",
+          fmt::format("--extend computes an attribute instead of arrival times, so it cannot be "
+                      "combined with --{}; leave out one of the two",
                       other));
 }
 
@@ -73,7 +73,7 @@ std::variant<NarrowBand, FieldGrid> FrontOperator<method>::run(std::vector<Narro
 
 template <FrontMethod method>
 ValuePlan FrontOperator<method>::plan(const Options& options, Plans operands, const OperatorRun&) {
-  constexpr double kBytes = 8;  // for each active voxel of a field
+  constexpr double kBytes = 8;  // bytes for each active voxel of a field
   ValuePlan plan = operands[0];
   plan.halfWidth = options.to.in(plan.voxelSize) / plan.voxelSize;
   if (makesField(options)) plan.fieldBytes = plan.activeVoxels() * kBytes;
@@ -86,7 +86,7 @@ std::optional<Cost> FrontOperator<method>::cost(const Options& options,
   const ValuePlan& solid = plans.operands[0];
   const double reach = options.to.in(solid.voxelSize) / solid.voxelSize,
                voxels = solid.layer() * 2 * reach;
-  if (!options.from.empty()) return {};  // depends on the volume around the points
+  if (!options.from.empty()) return {};  // the cost depends on the unknown volume around the points
   if (options.extend) return costOfDistances(solid.layer(), reach);
   return Cost{1e-9 * (method == FrontMethod::Marching ? 1400 : 550) * voxels, 12 * voxels};
 }

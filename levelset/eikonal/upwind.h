@@ -8,11 +8,12 @@
 
 namespace levelset::eikonal {
 
-/// Time of a grid point that no front has reached.
+/// Time of a grid point that no front has reached. Also the slowness where the front cannot pass.
 inline constexpr float kFar = 1e30f;
 
-/// Contribution of the upwind grid points on one axis: weight · (u − value)² is the square of the
-/// derivative. First order: the neighbour's time and 1. Second order: (4 T₁ − T₂) / 3 and 9/4.
+/// Contribution of one axis to |∇T|² at a grid point with the unknown time u: weight · (u − value)²
+/// is the squared derivative. T₁ and T₂ are the times of the next two grid points on the upwind
+/// side. First order: value T₁, weight 1. Second order: value (4 T₁ − T₂) / 3, weight 9/4.
 struct UpwindTerm {
   double value = 0;
   double weight = 1;
@@ -22,11 +23,13 @@ struct UpwindTerm {
 struct UpwindTerms {
   UpwindTerm term[3];
   int count = 0;
-  double latest = -std::numeric_limits<double>::max();  ///< latest time of the nearest neighbours
-  bool hasFirst = false, hasSecond = false;             ///< presence of terms of that order
-  double known = 0;  ///< squares of derivatives along axes without a term
+  double latest = -std::numeric_limits<double>::max();  ///< latest T₁ of all axes
+  bool hasFirst = false, hasSecond = false;  ///< terms of first or second order are present
+  double known = 0;  ///< sum of the known squared derivatives along axes without a term
 
-  /// @param missed  error of the difference against the derivative, where known
+  /// Adds a first-order term.
+  /// @param near  time T₁ of the upwind neighbour
+  /// @param missed  known error of the difference, see StraightTime::missed(); 0: no correction
   void addFirst(double near, double missed = 0) {
     add(near - missed, 1, near);
     hasFirst = true;
@@ -46,9 +49,9 @@ struct UpwindTerms {
   }
 };
 
-/// Solves Σ weight (u − value)² = slowness² − known for the arrival time u, with the slowness per
-/// voxel. Leaves out axes whose values are later than the time from the earlier axes [Sethian99,
-/// Zhao05].
+/// Solves Σ weight (u − value)² = slowness² − known for the arrival time u, with the slowness in
+/// time per voxel. Leaves out axes whose values are later than the time from the earlier axes
+/// [Sethian99, Zhao05].
 [[nodiscard]] inline double solveUpwind(const UpwindTerms& terms, double slowness) {
   const double base = terms.term[0].value,
                square = std::max(0.0, slowness * slowness - terms.known);
