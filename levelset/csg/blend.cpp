@@ -26,15 +26,16 @@ using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
 constexpr double kHalfWidth = 4;     // voxels, half width of the band for the flow
-constexpr double kStepLength = 0.4;  // voxels: largest movement in one step …
-constexpr double kDrift = 1;         // … and between two distance transforms
-// Time in which the flow rounds a right-angled crease to its radius, as a multiple of radius².
+constexpr double kStepLength = 0.4;  // voxels: largest motion of the surface in one step
+constexpr double kDrift = 1;         // voxels: motion after which the band is redistanced
+// Time in which the flow rounds a right-angled crease to an arc of the radius, divided by radius².
 constexpr double kDuration = 1;
 // The flow has converged when its speed is below this fraction of 1 / radius.
 constexpr double kRest = 0.03;
 constexpr double kCoarsest = 1.5;  // voxels: smallest radius that a grid can represent
 
-/// Runs the flow until no curvature exceeds 1 / radius.
+/// Runs the flow until no curvature exceeds 1 / radius, but at most for kDuration × radius².
+/// @param halfWidth  half width of the result, voxels
 FloatGrid::Ptr runFlow(FloatGrid::Ptr field, solids::SeamWeights& weights,
                        const solids::SeamFlow& flow, double halfWidth,
                        const BlendOptions& options) {
@@ -60,7 +61,9 @@ FloatGrid::Ptr runFlow(FloatGrid::Ptr field, solids::SeamWeights& weights,
   return eikonal::distanceTransform(*field, request);
 }
 
-/// Copies the field of the flow into the solid where the weight is not zero.
+/// Copies the distances of `part`, the result of the flow, into the solid where the weight is not
+/// zero.
+/// @param part  distances in voxels
 void putBack(const FloatGrid& part, solids::SeamWeights& weights, FloatGrid& solid) {
   FloatTree& tree = solid.tree();
   const float background = solid.background();
@@ -98,7 +101,8 @@ void checkRadius(double radius, const BlendOptions& options) {
     throw UsageError("--reach applies only to --method fillet; leave it out");
 }
 
-/// Checks the radius against the size of the solid: a larger flow would remove the solid.
+/// Checks the radius against the size of the solid. A flow with a larger radius would remove the
+/// solid.
 void checkAgainstSize(double radius, const NarrowBand& solid) {
   const Imath::Box3d box = solid.zeroSetBounds();
   if (!box.isEmpty() && radius > box.size().length())
@@ -116,7 +120,8 @@ CsgResult blend(CsgOperation operation, const NarrowBand& a, const NarrowBand& b
   requireSolid(a);
   requireSolid(b);
   if (a.isEmpty() || b.isEmpty())
-    throw InvalidInput("a solid is empty, so there is nothing to blend; give two solids");
+    throw InvalidInput(
+        "one of the solids is empty, so there is nothing to blend; give two solids with a surface");
 
   // === Plain CSG
   const solids::SeamOperands operands =
@@ -146,7 +151,7 @@ CsgResult blend(CsgOperation operation, const NarrowBand& a, const NarrowBand& b
     return result;
   }
 
-  // === Flow near the curve, on a copy of the blocks there
+  // === Flow near the curve, on a copy of the blocks near it
   FloatGrid& solid = editVdb(result.band);
   solids::SeamWeights weights(curve, radiusVoxels);
   FloatGrid::Ptr part = solids::cutOut(solid, eikonal::PointTree(curve), radiusVoxels);

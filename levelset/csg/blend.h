@@ -15,7 +15,7 @@ enum class BlendSide {
 };
 
 enum class BlendMethod {
-  Curvature,  ///< curvature flow near the seam
+  Curvature,  ///< curvature flow near the seam, the curve in which the surfaces intersect
   Fillet      ///< ball rolled along the seam
 };
 
@@ -45,9 +45,8 @@ struct BlendOptions {
 /// seam than `reach`, the ball is smaller, so surfaces that nearly touch get no bulge. The fillet
 /// of a union adds material; those of the other operations remove it.
 /// @param radius  world units, ≥ 0; 0 is plain CSG
-/// @return        notes report resampled operands, surfaces that do not intersect (plain CSG), and
-/// a
-///                radius below 1.5 voxels
+/// @return        combined solid; its notes report resampled operands, surfaces that do not
+///                intersect (the result is then plain CSG), and a radius below 1.5 voxels
 /// @throws UsageError if `radius` is negative or not finite
 /// @throws InvalidInput if a solid is empty or the radius is larger than the solids
 /// @throws ResourceLimit if the memory estimate exceeds the limit
@@ -63,10 +62,10 @@ struct BlendOperator {
   static constexpr ErrorModel errorModel{2, 0.5, 0, "fillet-balls"};
 
   struct Options {
-    double radius = 0;  ///< world units
+    double radius = 0;  ///< radius of the rounding, world units
     CsgOperation operation = CsgOperation::Union;
     BlendMethod method = BlendMethod::Curvature;
-    std::optional<double> reach;  ///< world units
+    std::optional<double> reach;  ///< BlendOptions::reach, world units
     BlendSide side = BlendSide::Both;
 
     template <class Visitor>
@@ -85,8 +84,9 @@ struct BlendOperator {
             {{"curvature", BlendMethod::Curvature}, {"fillet", BlendMethod::Fillet}},
             {.help = "method that rounds the seam"});
       visit("reach", &Options::reach,
-            {.help = "fillet: largest distance of the middle of its arc from the seam, beyond "
-                     "which the ball gets smaller; default: twice the radius",
+            {.help = "with --method fillet: largest distance from the seam to the middle of the "
+                     "arc; where the arc would be farther away, the ball is smaller; default: "
+                     "twice the radius",
              .unit = OptionUnit::Length,
              .range = OptionRange::Positive});
       visit("side", &Options::side,

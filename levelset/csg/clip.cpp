@@ -17,7 +17,8 @@ using Imath::V3d;
 
 InvalidInput nothingLeft() {
   return InvalidInput(
-      "the result is empty, because the solid lies outside; check the box or the plane");
+      "the result is empty, because the solid lies outside the box or in front of the plane; check "
+      "the position of the box or plane");
 }
 
 Imath::Box3d worldBounds(const openvdb::FloatGrid& grid, const openvdb::CoordBBox& box) {
@@ -25,7 +26,8 @@ Imath::Box3d worldBounds(const openvdb::FloatGrid& grid, const openvdb::CoordBBo
   return {toImath(world.min()), toImath(world.max())};
 }
 
-/// Bounds of all grid points in the band or inside. A cropped solid may have no band on some sides.
+/// Returns the index bounds of all grid points in the band or inside the solid. The bounds of the
+/// band do not suffice, since a cropped solid has no band where it was cropped.
 openvdb::CoordBBox solidBounds(const openvdb::FloatGrid& grid) {
   openvdb::CoordBBox bounds = grid.evalActiveVoxelBoundingBox();
   openvdb::CoordBBox tile;
@@ -71,12 +73,13 @@ NarrowBand clip(const NarrowBand& solid, const Imath::Box3d& box, const Progress
                     "must be below its upper one",
                     box.min[axis], box.max[axis], "xyz"[axis]));
   }
-  // Reject a box outside the band early, before any work.
+  // Refuse a box outside the solid before any work.
   const openvdb::FloatGrid& grid = vdb(solid);
   const Imath::Box3d reach = worldBounds(grid, solidBounds(grid));
   for (int axis = 0; axis < 3; ++axis)
     if (box.min[axis] > reach.max[axis] || box.max[axis] < reach.min[axis]) throw nothingLeft();
-  // Measure each face separately, so that a value does not depend on the positions of other faces.
+  // Compute the distance to each face separately, so that the bits of a value do not depend on the
+  // positions of other faces.
   return clipBy(solid, progress, [=](const V3d& p) {
     const V3d q(std::max(box.min.x - p.x, p.x - box.max.x),
                 std::max(box.min.y - p.y, p.y - box.max.y),
@@ -91,8 +94,8 @@ NarrowBand clip(const NarrowBand& solid, const Imath::Plane3d& plane, const Prog
   const double length = plane.normal.length();
   if (!(length > 0) || !std::isfinite(length) || !std::isfinite(plane.distance)) {
     throw UsageError(
-        fmt::format("the plane has normal {},{},{} and distance {}; it needs a "
-                    "finite direction and distance",
+        fmt::format("the plane has normal {},{},{} and distance {}; give a finite normal other "
+                    "than zero and a finite distance",
                     plane.normal.x, plane.normal.y, plane.normal.z, plane.distance));
   }
   const V3d normal = plane.normal / length;

@@ -31,12 +31,12 @@ struct ClipOperator {
   static constexpr ErrorModel errorModel{2, kTriangleError, kCreaseError, "csg-balls"};
 
   struct Options {
-    std::optional<Imath::Box3d> box;  ///< either this or `plane`
-    std::vector<Imath::V3d> plane;    ///< point and normal
+    std::optional<Imath::Box3d> box;  ///< clip box, world units; empty: `plane` is given
+    std::vector<Imath::V3d> plane;    ///< point and normal, world units; empty: `box` is given
 
     template <class Visitor>
     static void describe(Visitor& visit) {
-      visit("box", &Options::box, {.help = "keep the part inside"});
+      visit("box", &Options::box, {.help = "keep the part inside this box"});
       visit("plane", &Options::plane, {.help = "point and normal: keep the part behind the plane"});
     }
   };

@@ -33,7 +33,7 @@ void clearSignOfZeros(FloatTree& tree) {
   });
 }
 
-/// Computes the combined field without pruning.
+/// Combines two grids by OpenVDB's CSG node operations, without pruning.
 FloatGrid::Ptr minimumOf(CsgOperation operation, const FloatGrid& a, const FloatGrid& b) {
   FloatGrid::Ptr result = a.deepCopy();
   {
@@ -52,8 +52,9 @@ FloatGrid::Ptr minimumOf(CsgOperation operation, const FloatGrid& a, const Float
 
 void requireSolids(std::span<const NarrowBand> solids, const CsgOptions& options) {
   if (solids.size() < 2) {
-    throw UsageError(fmt::format("needs at least two solids, but there {}; name more operands",
-                                 solids.empty() ? "are none" : "is one"));
+    throw UsageError(
+        fmt::format("the operation needs at least two solids, but there {}; name more operands",
+                    solids.empty() ? "are none" : "is one"));
   }
   double bytes = 0;
   for (std::size_t i = 0; i < solids.size(); ++i) {
@@ -66,7 +67,8 @@ void requireSolids(std::span<const NarrowBand> solids, const CsgOptions& options
   requireMemory(2 * bytes, options.maxMemory);
 }
 
-/// Resamples all solids to the grid of the finest one, with the smallest half width.
+/// Resamples all solids to the grid of the finest one, and narrows all bands to the smallest half
+/// width.
 std::vector<NarrowBand> onOneGrid(std::span<const NarrowBand> solids, const CsgOptions& options,
                                   std::vector<std::string>& notes) {
   const auto finest = std::min_element(
@@ -91,7 +93,8 @@ std::vector<NarrowBand> onOneGrid(std::span<const NarrowBand> solids, const CsgO
         "with voxels of {}",
         i + 1, solids[i].voxelSize(), finest - solids.begin() + 1, finest->voxelSize()));
   }
-  // Voxel sizes may differ in the last bits, and then equal half widths give different backgrounds.
+  // Voxel sizes may differ in the last bits. Equal half widths then give different backgrounds, so
+  // all bands are ended at the smallest background.
   float background = vdb(result.front()).background();
   for (const NarrowBand& solid : result) background = std::min(background, vdb(solid).background());
   for (NarrowBand& solid : result)
@@ -101,11 +104,12 @@ std::vector<NarrowBand> onOneGrid(std::span<const NarrowBand> solids, const CsgO
 
 using Leaf = FloatTree::LeafNodeType;
 
-/// Restores the values of before a re-distancing where they were correct. Also restores the end of
-/// the band where faces lie on grid points.
-/// @param old  leaf before the re-distancing; null: there was none
+/// Restores the old values of a redistanced leaf where both differ by at most 0.05 voxels. Also
+/// deactivates voxels that have become active within 0.05 voxels of the half width: where faces lie
+/// on grid points, rounding decides if voxels at exactly the half width are active.
+/// @param old  leaf before redistancing; null: there was none
 void keepGoodValues(Leaf& leaf, const Leaf* old, float background, double voxelSize) {
-  constexpr double kSame = 0.05;  // voxels: error of re-distancing along ridges
+  constexpr double kSame = 0.05;  // voxels: error of redistancing along ridges of the distance
   const auto same = static_cast<float>(kSame * voxelSize);
   for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
     if (!leaf.isValueOn(n)) continue;
@@ -118,7 +122,7 @@ void keepGoodValues(Leaf& leaf, const Leaf* old, float background, double voxelS
   }
 }
 
-/// Dilates a set of blocks by `reach` blocks along each axis.
+/// Dilates a set of blocks, given by their origins, by `reach` blocks along each axis.
 std::set<openvdb::Coord> blocksAbout(const std::vector<openvdb::Coord>& blocks, int reach) {
   std::set<openvdb::Coord> all(blocks.begin(), blocks.end());
   for (int axis = 0; axis < 3; ++axis) {
@@ -131,8 +135,9 @@ std::set<openvdb::Coord> blocksAbout(const std::vector<openvdb::Coord>& blocks, 
   return all;
 }
 
-/// Re-distances the field near coincident faces that bound no solid. Works only near these faces,
-/// so the cost and the result do not depend on the rest of the solid.
+/// Redistances the field within the half width of coincident faces that bound no solid. Works only
+/// near these faces, so the cost and the result do not depend on the rest of the solid.
+/// @param faces  origins of the blocks that contain such faces
 void redistanceAbout(const std::vector<openvdb::Coord>& faces, FloatGrid& grid) {
   const double voxelSize = grid.voxelSize()[0];
   const float background = grid.background();
@@ -185,7 +190,8 @@ FloatGrid::Ptr mergePair(CsgOperation operation, const FloatGrid& first, const F
   const FloatGrid::Ptr result = minimumOf(operation, a, b);
   correctSeam(*result, a, b, signs);
   pruneOneSided(result->tree());
-  // Where such a face ends at an edge of the result, the plane model of correctSeam() is wrong.
+  // Coincident faces that bound no solid may end at an edge of the result. The plane model of
+  // correctSeam() is wrong there, so the band is redistanced.
   const std::vector<openvdb::Coord> faces = coincidentFaces(first, second, signs);
   if (!faces.empty() && eikonal::hasZeroCrossing(result->tree())) redistanceAbout(faces, *result);
   return result;
@@ -193,8 +199,8 @@ FloatGrid::Ptr mergePair(CsgOperation operation, const FloatGrid& first, const F
 
 namespace {
 
-/// Unites neighbours pairwise, then their results. With many small solids, no large band is copied
-/// for each of them.
+/// Unites the solids in pairs, then the results in pairs, and so on. Adding many small solids one
+/// by one would copy the large intermediate band for each of them.
 NarrowBand uniteAll(std::vector<NarrowBand> solids, const CsgOptions& options) {
   const auto pairs = static_cast<double>(solids.size() - 1);
   double done = 0;

@@ -27,8 +27,8 @@ struct CsgResult {
 
 /// Combines solids from left to right; Difference subtracts all others from the first. The result
 /// has the finest voxel size and, in voxels, the smallest half width of the operands. The minimum
-/// or maximum of distances is exact at the surface, but only a bound away from it. The band is
-/// re-distanced where the two differ.
+/// or maximum of the operands' distances is exact at the surface, but only a bound away from it.
+/// Where the bound differs from the distance, the distance is computed again.
 /// @throws UsageError for fewer than two solids
 /// @throws InvalidInput if a solid or the result is empty
 /// @throws ResourceLimit if the memory estimate exceeds the limit
@@ -39,18 +39,20 @@ struct CsgResult {
 [[nodiscard]] NarrowBand intersect(const NarrowBand& a, const NarrowBand& b);
 [[nodiscard]] NarrowBand subtract(const NarrowBand& a, const NarrowBand& b);
 
-/// Extent, in voxels, around a part of a cut or joined solid that decides the part. A seam is
-/// corrected up to the half width, from all surfaces within the half width. Faces that touch the
-/// blocks of 8³ beside the seam are computed again from as many voxels beyond those blocks.
+/// Returns the distance, in voxels, around a region of the result within which the operands
+/// determine the result in that region. Distances are corrected up to the half width from the seam,
+/// from surfaces up to the half width away. Near coincident faces complete blocks of 8³ are
+/// redistanced, which adds three blocks.
 [[nodiscard]] constexpr double seamReach(double halfWidth) {
   constexpr double kBlocks = 3 * 8;
   return 2 * halfWidth + kBlocks;
 }
 
-/// Plan of a union, intersection or difference, as if surfaces were spread evenly over their boxes.
+/// Estimates the plan of a union, intersection or difference. Assumes that the surface of each
+/// operand is spread evenly over its bounding box.
 [[nodiscard]] ValuePlan planCombined(CsgOperation operation, Plans operands);
 
-/// Estimates that the three operators share.
+/// Members that the operators union, intersection and difference share.
 template <CsgOperation operation>
 struct CsgOperator {
   using Options = NoOptions;

@@ -16,12 +16,14 @@ using openvdb::FloatGrid;
 using openvdb::Vec3d;
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
-/// Largest gap that counts as closed, voxels. Rounding leaves such gaps between touching faces.
+/// Largest gap between two faces that counts as closed, voxels. Rounding leaves such gaps between
+/// touching faces.
 constexpr double kGap = 1e-3;
 
+/// Grid point between two touching faces.
 struct Contact {
   Coord at;
-  double depth;  ///< smallest depth of the inside neighbours, voxels, negative
+  double depth;  ///< distance of the least deep inside neighbour, voxels, negative
 };
 
 /// Reads both operands with their signs, in voxels.
@@ -42,7 +44,7 @@ struct SignedPair {
     return second * static_cast<double>(b.getValue(c));
   }
   [[nodiscard]] double least(const Coord& c) const { return std::min(u(c), v(c)); }
-  /// Decides if a grid point is on both surfaces and inside neither solid.
+  /// Returns true if a grid point is on both surfaces and inside neither solid.
   [[nodiscard]] bool isOnBoth(const Coord& c) const {
     return least(c) >= 0 && std::max(u(c), v(c)) <= kGap;
   }
@@ -53,8 +55,8 @@ Coord stepped(Coord c, int axis, int step) {
   return c;
 }
 
-/// Decides if a grid point is between two touching faces. The gradients are opposite there, and
-/// along one axis both neighbours are inside. Along every other axis the face continues, so two
+/// Returns true if a grid point is between two touching faces. The gradients are opposite there,
+/// and along one axis both neighbours are inside. Along every other axis the face continues, so two
 /// spheres that touch in a point stay separate.
 bool isContact(const SignedPair& pair, const Coord& c, double& depth) {
   if (!pair.isOnBoth(c)) return false;
@@ -106,9 +108,9 @@ FloatGrid::Ptr withContacts(const FloatGrid& grid, const std::vector<Contact>& c
   return result;
 }
 
-/// Decides if a grid point is next to a common face with opposite gradients that continues around
-/// the point. Round solids that touch have opposite gradients only along the line through the
-/// contact.
+/// Returns true if a grid point is next to a face that both operands share with opposite
+/// orientation, and if that face continues around the point. Round solids that touch in a point
+/// have opposite gradients too, but only on the line through the contact.
 bool isBesideBoth(const SignedPair& pair, const Coord& c) {
   const auto isOpposite = [&](const Coord& at) {
     return std::abs(pair.u(at) + pair.v(at)) <= kGap;
@@ -124,7 +126,7 @@ bool isBesideBoth(const SignedPair& pair, const Coord& c) {
     slopeU[axis] = pair.u(up) - pair.u(down);
     slopeV[axis] = pair.v(up) - pair.v(down);
   }
-  // The central difference spans two voxels: twice a unit gradient, less at edges.
+  // slopeU and slopeV are differences over two voxels: of length 2 on a face, and shorter at edges.
   return slopeU.length() > 1.8 && slopeV.length() > 1.8 &&
          slopeU.dot(slopeV) < -0.999 * slopeU.length() * slopeV.length();
 }

@@ -11,9 +11,9 @@ namespace {
 
 constexpr const char* kCsgDetails =
     "Operands on different grids are resampled to the finest grid, and the report says so. Without "
-    "names the operands are the two newest values, older first.";
+    "named operands the action takes the two newest values of the stack, the older one first.";
 
-/// Share of the box that also lies in the other; 1 where the box has no volume.
+/// Returns the fraction of the volume of `box` that also lies in `other`; 1 if `box` has no volume.
 double shareWithin(const Imath::Box3d& box, const Imath::Box3d& other) {
   double share = 1;
   for (int axis = 0; axis < 3; ++axis) {
@@ -73,7 +73,8 @@ RegionOfInterest CsgOperator<operation>::regionOfInterest(const Options&,
                                                           const RegionOfInterest& ofResult) {
   const double voxel = plans.result.voxelSize;
   for (const ValuePlan& operand : plans.operands)
-    if (std::abs(operand.voxelSize / voxel - 1) > 1e-9) return {};  // one is resampled
+    if (std::abs(operand.voxelSize / voxel - 1) > 1e-9)
+      return {};  // an operand is resampled, which needs the complete operand
   return {.region = grown(ofResult.region, seamReach(plans.result.halfWidth) * voxel)};
 }
 
@@ -118,10 +119,11 @@ const OperatorText BlendOperator::text{
     .group = "Solids",
     .summary = "union, intersection or difference with a rounded seam",
     .details =
-        "'curvature' smooths along the curve in which the two surfaces meet; nothing changes "
-        "further than the radius from it. 'fillet' is the surface of a ball of that radius that "
-        "rolls along the seam: an arc of the radius, tangent to both surfaces, with nothing "
-        "changed beyond radius / tan(angle / 2). Solids that are near but do not meet stay apart.",
+        "'curvature' smooths along the seam, the curve in which the two surfaces intersect; "
+        "nothing changes further than the radius from the seam. 'fillet' is the surface of a ball "
+        "of that radius that rolls along the seam: an arc of the radius, tangent to both surfaces. "
+        "It changes nothing beyond radius / tan(angle / 2) from the seam, with the angle between "
+        "the surfaces. Solids that are close but do not intersect stay apart.",
     .example =
         "levelsmith box --size 8,8,2 --voxel 0.1 ! cylinder --radius 1.5 --height 6 "
         "--voxel 0.1 ! blend --radius 0.8 ! measure"};
@@ -144,16 +146,16 @@ ValuePlan BlendOperator::plan(const Options&, Plans operands, const OperatorRun&
 const OperatorText ClipOperator::text{
     .name = "clip",
     .group = "Placement",
-    .summary = "cut a solid by a box or a plane, and close it there",
+    .summary = "cut a solid by a box or a plane, and close the cut",
     .example = "levelsmith sphere --radius 2 --voxel 0.1 ! clip --plane \"0,0,0 0,0,1\" ! measure"};
 
 void ClipOperator::check(const Options& options, const GivenOptions& given) {
-  if (given("box") == given("plane")) throw UsageError("give one of --box and --plane");
+  if (given("box") == given("plane")) throw UsageError("give either --box or --plane");
   if (given("box")) return;
   if (options.plane.size() != 2 || !(options.plane[1].length() > 0)) {
     throw UsageError(
-        "--plane needs a point and a normal, \"x,y,z x,y,z\"; what lies behind the plane "
-        "stays");
+        "--plane needs a point and a normal other than zero, \"x,y,z x,y,z\"; the part behind the "
+        "plane is kept");
   }
 }
 
@@ -178,12 +180,14 @@ ValuePlan ClipOperator::plan(const Options& options, Plans operands, const Opera
   if (left.isEmpty()) return plan;
   const Imath::V3d size = left.size();
   plan.bounds = left;
-  // The operand's surface as if spread evenly, and the faces that close it.
+  // Area of the operand within the box, as if it were spread evenly over its bounds, plus the faces
+  // that close the cut.
   plan.area = share * plan.area + 2 * (size.x * size.y + size.y * size.z + size.z * size.x);
   return plan;
 }
 
-/// The region of an intersection, which ends where the box is further away than the band reaches.
+/// Returns the region of the operand that determines the result in `ofResult`, as for an
+/// intersection. The region ends at the half width plus two voxels outside the clip box.
 RegionOfInterest ClipOperator::regionOfInterest(const Options& options, const OperatorPlans& plans,
                                                 std::size_t, const RegionOfInterest& ofResult) {
   const double voxel = plans.result.voxelSize, width = plans.result.halfWidth;

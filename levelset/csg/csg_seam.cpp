@@ -17,18 +17,20 @@ using openvdb::FloatGrid;
 using openvdb::Vec3d;
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
-/// Largest error of a foot point, voxels, before its voxel counts as doubtful. Doubtful voxels are
-/// measured again, so a smaller figure costs time, not accuracy.
+/// Largest error of a foot point, the estimated closest surface point of a voxel, in voxels. A
+/// voxel with a larger error counts as doubtful. The distances of doubtful voxels are computed
+/// again, so a smaller value costs time, not accuracy.
 constexpr double kFootMiss = 0.02;
-/// Half the edge of a cell, with an overlap. The planes deviate from a curved surface by a quarter
-/// of its curvature, and neighbouring patches must leave no gap where they meet.
+/// Half the edge of a cell plus an overlap, voxels: the part of a plane, or of the intersection
+/// line of two planes, that belongs to the cell. The planes deviate from a curved surface by a
+/// quarter of its curvature, and the parts of neighbouring cells must leave no gap.
 constexpr double kPatchReach = 0.5 + 0.05;
 constexpr double kLineReach = 0.5 + 0.1;
 /// Largest deviation of the corner values from their plane, voxels. A cell with a larger one
 /// contains an edge. A sphere with a radius of five voxels stays below.
 constexpr double kBend = 0.05;
 
-/// Reads one operand with its sign, in voxels.
+/// Reads the distances of one operand in voxels, multiplied by its sign of CsgSigns.
 struct SignedField {
   FloatGrid::ConstAccessor accessor;
   double perVoxel;  ///< sign / voxel size
@@ -68,17 +70,19 @@ struct Patch {
   double above(const Vec3d& y) const { return n.dot(y) + d; }
 };
 
-/// The surface of the minimum in one cell of eight grid points.
+/// Surface of the minimum of both operands in one cell of eight grid points, as one or two planes.
 struct SurfaceCell {
   Vec3d center;
   Patch first, second;
-  bool isSeam = false;  ///< both surfaces cross the cell; each counts outside the other solid
+  /// Both surfaces cross the cell. Of each plane, only the part outside the other solid counts.
+  bool isSeam = false;
 };
 
+/// Values at the eight corners of a cell, in voxels.
 struct CellCorners {
   std::array<double, 8> values;
 
-  /// Corner values of the minimum of both solids.
+  /// Computes the corner values of the minimum of both operands.
   CellCorners(const CellCorners& first, const CellCorners& second) {
     for (std::size_t i = 0; i < 8; ++i) values[i] = std::min(first.values[i], second.values[i]);
   }
@@ -87,7 +91,8 @@ struct CellCorners {
     for (int i = 0; i < 8; ++i)
       values[static_cast<std::size_t>(i)] = field(c.offsetBy((i >> 2) & 1, (i >> 1) & 1, i & 1));
   }
-  /// Decides if each corner is inside one of the solids, so that the result has no surface here.
+  /// Returns true if each corner is inside one of the operands, so that no surface of the result
+  /// crosses the cell.
   bool allInsideWith(const CellCorners& other) const {
     for (std::size_t i = 0; i < 8; ++i)
       if (!(values[i] < 0) && !(other.values[i] < 0)) return false;
@@ -96,7 +101,8 @@ struct CellCorners {
   bool allOutside() const {
     return std::none_of(values.begin(), values.end(), [](double v) { return v < 0; });
   }
-  /// Decides if the values deviate from their plane, because an edge of the solid crosses the cell.
+  /// Returns true if the corner values deviate from a plane, because an edge of the solid crosses
+  /// the cell.
   bool isBent() const {
     const Patch plane = patch();
     if (!plane.isValid) return true;
@@ -133,7 +139,8 @@ Vec3d clamped(const Vec3d& y, double reach) {
           std::clamp(y[2], -reach, reach)};
 }
 
-/// Distance from r to the part of a patch in the cell that is outside the other solid.
+/// Returns the distance from r to the part of a plane in the cell that is outside the other solid,
+/// or `best` if that is smaller. The position r is relative to the centre of the cell, voxels.
 double patchDistance(const Patch& patch, const Patch& other, bool isSeam, const Vec3d& r,
                      double best) {
   if (!patch.isValid || std::abs(patch.above(r)) >= best) return best;
@@ -144,7 +151,8 @@ double patchDistance(const Patch& patch, const Patch& other, bool isSeam, const 
   return std::min(best, (r - y).length());
 }
 
-/// Distance from r to the intersection line of both patches, within the cell.
+/// Returns the distance from r to the intersection line of both planes within the cell, or `best`
+/// if that is smaller.
 double lineDistance(const SurfaceCell& cell, const Vec3d& r, double best) {
   const Patch &p = cell.first, &q = cell.second;
   if (!p.isValid || !q.isValid) return best;
@@ -220,8 +228,9 @@ class SeamCorrector {
     const SignedField& winner = atU < atV ? u : v;
     const SignedField& loser = atU < atV ? v : u;
     const double depth = -std::min(atU, atV);
-    // All points within `depth` are inside the winner. A loser farther away than `depth` cannot
-    // change the distance.
+    // c lies at `depth` inside the winner, and so do all points closer than that. If the loser is
+    // farther from c than `depth`, it does not contain the closest surface point and cannot change
+    // the distance.
     if (std::max(atU, atV) > depth + kFootMiss) return false;
     if (isBesideSurface(u, v, c)) return false;
     const Vec3d direction = winner.towardsSurface(c);
@@ -231,8 +240,8 @@ class SeamCorrector {
     return std::abs(winner(foot)) > kFootMiss || loser(foot) < kFootMiss;
   }
 
-  /// Decides if both operands have the same surface here. Equal values at one point alone also
-  /// occur midway between two surfaces.
+  /// Returns true if both operands have equal values at all six neighbours, so that their surfaces
+  /// coincide. Equal values at one grid point alone also occur midway between two surfaces.
   static bool isOneSurface(const SignedField& u, const SignedField& v, const Coord& c) {
     for (int axis = 0; axis < 3; ++axis)
       for (const int step : {-1, 1}) {
@@ -243,8 +252,8 @@ class SeamCorrector {
     return true;
   }
 
-  /// Decides if a grid point shares a cell face with an outside grid point. Its value then affects
-  /// the position of the surface.
+  /// Returns true if a grid point shares a cell face with a grid point outside both operands. The
+  /// value of such a grid point affects the position of the surface and must not change.
   static bool isBesideSurface(const SignedField& u, const SignedField& v, const Coord& c) {
     for (int x = -1; x <= 1; ++x)
       for (int y = -1; y <= 1; ++y)
@@ -256,7 +265,7 @@ class SeamCorrector {
     return false;
   }
 
-  /// Collects the surface cells of all leaves near doubtful voxels.
+  /// Collects the surface cells of all leaves within the half width of doubtful voxels.
   void collectCells() {
     const int leaves = static_cast<int>(std::ceil((reach_ + 2) / 8)) * 8;
     for (const DoubtfulLeaf& leaf : doubtful_)
@@ -286,7 +295,7 @@ class SeamCorrector {
     cell.center = c.asVec3d() + Vec3d(0.5);
     cell.isSeam = crossesFirst && crossesSecond;
     if (cell.isSeam && (first.isBent() || second.isBent())) {
-      // More than two faces meet here: fit one plane to the minimum.
+      // More than two faces meet in the cell: fit one plane to the minimum.
       cell.isSeam = false;
       cell.first = CellCorners(first, second).patch();
     } else {
@@ -312,8 +321,8 @@ class SeamCorrector {
     }
   }
 
-  /// Distance to the surface cells, voxels. Returns slightly more than the half width if they are
-  /// farther away.
+  /// Returns the distance of a grid point from the surface cells, voxels. Returns slightly more
+  /// than the half width if they are farther away.
   double surfaceDistance(const Coord& c) const {
     const int steps = static_cast<int>(std::ceil((reach_ + 2) / 8));
     const Coord home = c & ~7;

@@ -11,8 +11,8 @@
 
 namespace levelset {
 
-/// Signs that reduce every operation to a minimum: result × min(first × a, second × b), each ±1. A
-/// rule for the inside of a union then applies to the outside of an intersection.
+/// Signs, each ±1, that reduce every operation to a minimum: result × min(first × a, second × b).
+/// An algorithm for the inside of a union then serves for the outside of an intersection.
 struct CsgSigns {
   float first, second, result;
 };
@@ -23,26 +23,28 @@ struct CsgSigns {
 [[nodiscard]] openvdb::FloatGrid::Ptr mergePair(CsgOperation operation, const openvdb::FloatGrid& a,
                                                 const openvdb::FloatGrid& b);
 
-/// Combines two grids by minimum or maximum only, without correction. Takes signs from the operands
-/// even where a band is cropped, unlike OpenVDB's own operation, which floods them within a node.
+/// Combines two grids by minimum or maximum only, without correction. Takes the signs outside the
+/// band from the operands, also where a band is cropped. OpenVDB's own CSG functions flood-fill
+/// signs within a node instead.
 [[nodiscard]] openvdb::FloatGrid::Ptr mergePlain(CsgOperation operation,
                                                  const openvdb::FloatGrid& a,
                                                  const openvdb::FloatGrid& b);
 
+/// Copies of two operands, changed by closeContacts().
 struct ClosedPair {
   openvdb::FloatGrid::Ptr a, b;
 };
-/// Closes cracks between faces that touch on grid points. Both distances are zero there, so their
-/// minimum would leave a crack of zero width. Gives both operands the depth of their neighbours at
-/// these points.
+/// Closes cracks between faces of the two operands that touch on grid points. Both distances are
+/// zero at these grid points, so the minimum would leave a crack of zero width. Gives both operands
+/// the depth of the inside neighbours at these grid points.
 /// @return empty if there are no such points
 [[nodiscard]] std::optional<ClosedPair> closeContacts(const openvdb::FloatGrid& a,
                                                       const openvdb::FloatGrid& b,
                                                       const CsgSigns& signs);
 
-/// Finds the leaf blocks in which the surfaces coincide with opposite orientation. The minimum is
-/// then zero, or nearly zero, along faces that bound no solid, and nearby distances refer to these
-/// faces.
+/// Returns the origins of the leaf blocks in which the surfaces of both operands coincide with
+/// opposite orientation. Such faces bound no solid in the result. But the minimum of the distances
+/// is zero, or nearly zero, along them, and refers to them nearby.
 [[nodiscard]] std::vector<openvdb::Coord> coincidentFaces(const openvdb::FloatGrid& a,
                                                           const openvdb::FloatGrid& b,
                                                           const CsgSigns& signs);
@@ -52,7 +54,8 @@ struct ClosedPair {
 /// distance. The correction measures the distance to the planes that fit both surfaces in nearby
 /// cells, and to their intersection lines. Voxels next to the zero set keep their values, so the
 /// surface stays.
-/// @param result  result × min(first × a, second × b), same transform and background as both
+/// @param result  uncorrected combination signs.result × min(signs.first × a, signs.second × b),
+///                with the transform and background of `a` and `b`
 void correctSeam(openvdb::FloatGrid& result, const openvdb::FloatGrid& a,
                  const openvdb::FloatGrid& b, const CsgSigns& signs);
 

@@ -25,46 +25,54 @@ using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
 constexpr double kLeastRadius = 0.5;  // voxels: the grid cannot represent a smaller ball
-// Cosine of the smallest angle between the normals at an edge; closer normals form no edge.
+// Largest cosine between the normals of two surfaces at an edge. Surfaces with more similar normals
+// form no edge.
 constexpr double kSameCosine = 0.9995;
 constexpr int kSpineSteps = 16;
 constexpr double kSpineTolerance = 1e-3;  // voxels
 constexpr double kLongestSpineStep = 4;   // voxels
-// Smallest ratio between the decrease of the remaining distance along the spine and the step taken,
-// where the spine has a unique nearest point.
+// Lower bound of the decrease of the remaining distance along the spine divided by the length of
+// the step. The quotient is larger where the spine has a unique nearest point.
 constexpr double kLeastShrinkage = 0.05;
-constexpr double kStencil = 4;  // voxels around a point that its jet reads
-// Largest distance from the seam to the edge of the two tangent planes at the contacts, in ball
-// radii plus voxels. Beyond it, the surfaces face each other without meeting there.
+constexpr double kStencil =
+    4;  // voxels around a point that the tricubic interpolation of its jet reads
+// Largest distance of the seam from the line in which the tangent planes at the two contact points
+// of the ball intersect: kSeamShare × radius of the ball + kSeamSlack voxels. Farther from the
+// seam, the surfaces face each other without intersecting.
 constexpr double kSeamShare = 0.75, kSeamSlack = 2;
 
-/// A position of the ball.
+/// A position of the ball, in index space.
 struct Ball {
-  Vec3d centre, normalA, normalB;  ///< normals: gradients of both distances at the centre
+  /// Centre, and unit gradients of the distances to both solids there.
+  Vec3d centre, normalA, normalB;
+  /// Cosine of the angle between the normals, and radius in voxels.
   double cosine = 0, radius = 0;
 };
 
-/// Lengths in voxels.
+/// Radius of the ball and limits of the fillet, in voxels.
 struct FilletSize {
   double radius, reach;
-  double bound = HUGE_VAL;  ///< upper bound of the distance from the seam to a contact point
+  /// Upper bound of the distance from the seam to a contact point of the ball.
+  double bound = HUGE_VAL;
 
-  /// Radius of the ball that fits between surfaces whose normals have this cosine. The middle of
-  /// its arc is r (1 / sin(θ/2) − 1) from the seam, and at most `reach`.
+  /// Returns the radius r of the ball between surfaces whose normals have this cosine and which
+  /// meet at the angle θ. The middle of its arc is r (1 / sin(θ/2) − 1) from the seam, and at most
+  /// `reach`.
   [[nodiscard]] double radiusAt(double cosine) const {
     const double sine = std::sqrt(std::max(0.0, (1 + cosine) / 2));
     return std::min(radius, reach * sine / (1 - sine));
   }
-  /// Largest distance from the seam at which the surface changes: r / tan(θ/2), at the angle where
-  /// `reach` starts to limit the radius.
+  /// Returns the largest distance from the seam at which the surface changes: r / tan(θ/2), at the
+  /// angle θ where `reach` starts to limit the radius r.
   [[nodiscard]] double extent() const {
     const double sine = radius / (reach + radius);
     return std::min(bound, radius * std::sqrt(1 - sine * sine) / sine);
   }
 };
 
-/// Upper bound of the distance from the seam within which one ball can touch both solids, voxels.
-/// The seam lies in the bounding boxes of both solids, and so do the contact points, up to a ball.
+/// Returns an upper bound of the distance between the seam and the contact points of a ball that
+/// touches both solids, voxels. The seam lies in the bounding boxes of both solids. The contact
+/// points lie in them too, within a margin of the diameter of the ball.
 double boundOf(const FloatGrid& a, const FloatGrid& b, const FilletSize& size, double halfWidth) {
   openvdb::CoordBBox common = a.evalActiveVoxelBoundingBox();
   common.intersect(b.evalActiveVoxelBoundingBox());
@@ -72,7 +80,8 @@ double boundOf(const FloatGrid& a, const FloatGrid& b, const FilletSize& size, d
   return (common.extents().asVec3d() + Vec3d(2 * margin)).length();
 }
 
-/// Computes distances in a wide band around the seam, in voxels, positive on the side of the ball.
+/// Computes the distances to one solid in a wide band around the seam, in voxels, positive on the
+/// side of the ball.
 FloatGrid::Ptr widened(const NarrowBand& solid, float sign, const eikonal::PointTree& curve,
                        const FilletSize& size, double halfWidth, const BlendOptions& options) {
   FloatGrid::Ptr part = cutOut(vdb(solid), curve, 2 * (size.extent() + halfWidth));
@@ -98,7 +107,8 @@ class BallRoller {
         size_(size),
         curve_(curve) {}
 
-  /// Distance from a grid point to the fillet; empty if the fillet is not its nearest surface.
+  /// Returns the distance from a grid point to the fillet, voxels; empty if the fillet is not the
+  /// nearest surface.
   std::optional<double> distance(const Coord& point, double halfWidth) {
     const double a = static_cast<double>(readA_.getValue(point)),
                  b = static_cast<double>(readB_.getValue(point));
@@ -109,7 +119,7 @@ class BallRoller {
     if (!findBall(x, ball)) return {};
     const Vec3d toCentre = ball.centre - x;
     const double p = toCentre.dot(ball.normalA), q = toCentre.dot(ball.normalB);
-    if (p < ball.cosine * q || q < ball.cosine * p) return {};  // not between the radii
+    if (p < ball.cosine * q || q < ball.cosine * p) return {};  // x is not between the radii
     const Vec3d edge =
         ball.centre - (ball.normalA + ball.normalB) * (ball.radius / (1 + ball.cosine));
     if (curve_.nearest(edge, kSeamShare * ball.radius + kSeamSlack) == eikonal::PointTree::kNone)
@@ -123,9 +133,9 @@ class BallRoller {
     return block.jet(p - block.origin().asVec3d());
   }
 
-  /// Finds the ball whose centre is nearest to x. Uses Newton's method for a(s) = b(s) = r. Along
-  /// the curve, uses the secant method: where the curve bends around x, the remaining distance
-  /// decreases by less than the step.
+  /// Finds the ball whose centre is nearest to x. Across the spine, uses Newton's method for a(s) =
+  /// b(s) = r. Along the spine, uses the secant method: where the spine bends around x, the
+  /// remaining distance decreases by less than the step.
   bool findBall(const Vec3d& x, Ball& ball) {
     ball.centre = x;
     double before = 0, moved = 0, shrinkage = 1;
@@ -161,13 +171,13 @@ class BallRoller {
 
   FloatGrid::ConstAccessor readA_, readB_;
   eikonal::DenseBlockCache a_, b_;
-  double known_;  ///< largest magnitude at which the interpolant is valid
+  double known_;  ///< largest distance at which the interpolant of the distances is valid, voxels
   FilletSize size_;
   const eikonal::PointTree& curve_;
 };
 
-/// Finds the leaf blocks within `extent` of the curve that contain both distances, sorted.
-/// Elsewhere no ball touches both solids.
+/// Returns the origins of the leaf blocks within `extent` voxels of the curve that both grids
+/// contain, sorted. Elsewhere no ball touches both solids.
 std::vector<Coord> blocksBeside(const FloatTree& a, const FloatTree& b,
                                 const eikonal::PointTree& curve, double extent) {
   std::vector<Coord> both;
@@ -189,9 +199,11 @@ std::vector<Coord> blocksBeside(const FloatTree& a, const FloatTree& b,
 
 struct FilletBlock {
   Coord origin;
-  std::vector<std::pair<openvdb::Index, float>> values;  ///< voxels, with the result's sign
+  /// Buffer offsets and distances, voxels, negative inside the result.
+  std::vector<std::pair<openvdb::Index, float>> values;
 };
-// A block with all its values, with spare capacity of the vector, and the leaf of the result.
+// Memory of a FilletBlock with all its values, the spare capacity of its vector, and the leaf of
+// the result.
 constexpr double kBytesPerBlock = sizeof(FilletBlock) + 2 * 512 * 8 + 2300;
 
 void putFillet(const std::vector<FilletBlock>& blocks, FloatGrid& solid) {
@@ -219,7 +231,8 @@ void addFillet(CsgOperation operation, const SeamOperands& operands, double radi
   if (options.side == (adds ? BlendSide::Remove : BlendSide::Add)) {
     result.notes.emplace_back(
         adds ? "the fillet of a union only adds material, so --side remove changes nothing"
-             : "this fillet only removes material, so --side add changes nothing");
+             : "the fillet of an intersection or difference only removes material, so --side add "
+               "changes nothing");
     return;
   }
   const double voxelSize = result.band.voxelSize(), halfWidth = result.band.halfWidth();
@@ -234,7 +247,7 @@ void addFillet(CsgOperation operation, const SeamOperands& operands, double radi
     result.notes.push_back(fmt::format(
         "the grid cannot represent a radius of {:.3g} voxels; use smaller voxels", size.radius));
 
-  // === Distances over the diameter of the ball
+  // === Distances up to the diameter of the ball from both solids
   const eikonal::PointTree tree(curve);
   const CsgSigns signs = csgSigns(operation);
   const auto within = [&](double from, double to) {

@@ -18,14 +18,14 @@ using Accessor = openvdb::tree::ValueAccessor<const FloatTree>;
 
 // Sine of the smallest angle between the surfaces that counts as a crease.
 constexpr double kLeastSine = 0.1;
-// Largest distance of a curve point from the centre of its cell, voxels along each axis.
+// Largest distance of a curve point from the centre of its cell along each axis, voxels.
 constexpr double kCellReach = 0.75;
 
-/// The linear model of a field in a cell that its zero set crosses.
+/// Linear model of a field in a cell of eight grid points.
 struct CellModel {
-  double value = 0;  ///< at the centre
+  double value = 0;  ///< value at the centre of the cell
   Vec3d gradient;
-  bool crossed = false;
+  bool crossed = false;  ///< the zero set of the field crosses the cell
 
   CellModel(const Accessor& accessor, const Coord& cell) {
     int inside = 0;
@@ -41,7 +41,8 @@ struct CellModel {
   }
 };
 
-/// Finds the point nearest to the cell's centre at which both models are zero.
+/// Returns the point nearest to the centre of the cell at which both models are zero, in index
+/// space. Empty if the surfaces are nearly parallel, or the point is not in or near the cell.
 std::optional<Vec3d> meetingPoint(const CellModel& a, const CellModel& b, const Coord& cell) {
   const double aa = a.gradient.lengthSqr(), bb = b.gradient.lengthSqr(),
                ab = a.gradient.dot(b.gradient);

@@ -9,9 +9,10 @@
 namespace levelset::solids {
 
 /// Finds points on the curve in which the zero sets of two fields intersect, about one per voxel.
-/// Both fields share their grid points. Each cell that both zero sets cross gives the point where
-/// both linear models are zero, if it lies in or near the cell [Brodersen07 §6.3]. Nearly parallel
-/// surfaces give no points.
+/// Both fields have the same transform. In each cell of eight grid points that both zero sets
+/// cross, fits a linear model to each field. The point where both models are zero is a point of the
+/// curve, if it lies in or near the cell [Brodersen07 §6.3]. Nearly parallel surfaces give no
+/// points.
 /// @return index coordinates, in tree order
 [[nodiscard]] std::vector<openvdb::Vec3d> seamCurve(const openvdb::FloatTree& a,
                                                     const openvdb::FloatTree& b);

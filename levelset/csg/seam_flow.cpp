@@ -18,13 +18,14 @@ using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 using Manager = openvdb::tree::LeafManager<FloatTree>;
 
-// The weight is 1 up to this fraction of the radius.
+// The weight is 1 up to this distance from the seam curve, as a fraction of the radius.
 constexpr double kFullWeight = 0.7;
 // Largest stable explicit step for κ = k1 + k2 in three dimensions, voxels², with a margin.
 constexpr double kExplicitStep = 0.15;
 // Largest curvature that the grid can represent, voxels⁻¹.
 constexpr double kSharpest = 2;
-constexpr float kNearSurface = 1;  // voxels
+// Distance from the zero set within which speed and motion are measured, voxels.
+constexpr float kNearSurface = 1;
 
 /// Falls from 1 at x ≤ 0 to 0 at x ≥ 1, twice differentiable.
 double fade(double x) {
@@ -61,7 +62,7 @@ double speed(const eikonal::DenseBlock& b, int x, int y, int z, const SeamFlow& 
   return excess * slope;
 }
 
-/// Leaves with nonzero weights, and these weights, in tree order.
+/// Leaves that have nonzero weights, and their weights, in tree order.
 struct MovingLeaves {
   std::vector<std::size_t> number;  ///< indices in the leaf manager
   std::vector<const SeamWeights::Block*> weights;
@@ -79,7 +80,8 @@ struct MovingLeaves {
   }
 };
 
-/// Calls visit(leaf index, index in `moving`, offset, φ_t) at each active grid point with a weight.
+/// Calls visit(leaf index, index in `moving`, buffer offset, φ_t) at each active grid point with a
+/// nonzero weight.
 template <typename Visit>
 void forEachMoving(const Manager& manager, const MovingLeaves& moving, const SeamFlow& flow,
                    const Visit& visit) {
@@ -142,7 +144,7 @@ const SeamWeights::Block* SeamWeights::at(const Coord& origin) {
 }
 
 double seamStep(FloatTree& field, SeamWeights& weights, const SeamFlow& flow, double dt) {
-  Manager manager(field, 1);  // the tree contains stage j - 1, the auxiliary buffer stage j - 2
+  Manager manager(field, 1);  // the tree holds Runge-Kutta stage j - 1, buffer 1 holds stage j - 2
   const MovingLeaves moving(manager, weights);
   std::vector<SeamWeights::Block> before(moving.number.size());
   for (std::size_t i = 0; i < before.size(); ++i)

@@ -17,7 +17,8 @@ using openvdb::FloatTree;
 using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
-// Voxels around the changing part that contain the surface next to it.
+// Margin around the part of the band that changes, voxels. It contains the surface next to that
+// part.
 constexpr double kSurfaceMargin = 8;
 
 /// Adds a block that contains signs only, no distances.
@@ -56,7 +57,8 @@ SeamOperands onOneGrid(const NarrowBand& a, const NarrowBand& b, const SeamReque
   resampling.progress = request.progress;
   const NarrowBand moved = resampleTo(coarse, fine.indexToWorld(), resampling);
   std::string note = fmt::format(
-      "the {} operand was resampled from voxels of {:.4g} to the other's grid of {:.4g}",
+      "the {} operand was resampled from voxels of {:.4g} to the grid of the other operand with "
+      "voxels of {:.4g}",
       firstIsFiner ? "second" : "first", coarse.voxelSize(), fine.voxelSize());
   return {firstIsFiner ? fine : moved, firstIsFiner ? moved : fine, {std::move(note)}};
 }

@@ -13,17 +13,20 @@ struct SeamRequest {
   Progress progress = {};
 };
 
+/// Two operands on one grid.
 struct SeamOperands {
   NarrowBand a, b;
-  std::vector<std::string> notes;
+  std::vector<std::string> notes;  ///< a note if one operand was resampled
 };
 
-/// Resamples both solids to the finer grid of the two.
+/// Resamples the solid with the larger voxels to the grid of the other one, unless both have the
+/// same transform.
 [[nodiscard]] SeamOperands onOneGrid(const NarrowBand& a, const NarrowBand& b,
                                      const SeamRequest& request);
 
-/// Copies the blocks of a solid within `radius` plus a margin of the curve, with values in voxels.
-/// Neighbour blocks and tiles deep inside contain only signs.
+/// Returns a copy of the blocks of a solid within `radius` plus a margin of the seam curve, with
+/// values in voxels. The blocks next to them, and inside tiles, have correct signs but no
+/// distances.
 /// @param radius  voxels
 [[nodiscard]] openvdb::FloatGrid::Ptr cutOut(const openvdb::FloatGrid& solid,
                                              const eikonal::PointTree& curve, double radius);

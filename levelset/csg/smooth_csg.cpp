@@ -23,17 +23,19 @@ using openvdb::CoordBBox;
 using openvdb::FloatGrid;
 using SmoothLeaf = openvdb::FloatTree::LeafNodeType;
 
-// On the smooth surface the smaller distance is at most K/4, and the other at most K more.
+// Distance up to which the operands are read, as a multiple of the radius K. On the smooth surface
+// the smaller distance is at most K/4, and the other one at most K larger.
 constexpr double kReadRadii = 1.25;
 
-/// Index box of the grid points where the zero set of a solid is at most `extent` voxels away.
+/// Returns the index box of the grid points from which the zero set of a solid is at most `extent`
+/// voxels away.
 CoordBBox boxAround(const FloatGrid& grid, double extent) {
   CoordBBox box = grid.evalActiveVoxelBoundingBox();
   if (!box.empty()) box.expand(static_cast<int>(std::ceil(std::min(extent, 1e8))));
   return box;
 }
 
-/// Distances of a solid up to `width` voxels inside a box of grid points.
+/// Returns the distances to a solid, up to `width` voxels, inside a box of grid points.
 FloatGrid::Ptr widenedIn(const CoordBBox& box, const NarrowBand& solid, double width,
                          const SmoothCsgOptions& options, const Progress& progress) {
   if (solid.halfWidth() >= width) return vdb(solid).deepCopy();
@@ -45,9 +47,9 @@ FloatGrid::Ptr widenedIn(const CoordBBox& box, const NarrowBand& solid, double w
   return eikonal::distanceTransform(vdb(solid), request);
 }
 
-/// Replaces the hard minimum by the smooth one where both distances are known and differ by less
-/// than K.
-/// @param width   world units up to which `a` and `b` hold distances
+/// Replaces the plain minimum in `field` by the smooth one where both operands have distances that
+/// differ by less than the radius K.
+/// @param width   distance up to which `a` and `b` contain distances, world units
 /// @return        the number of changed values
 std::size_t applySmoothMinimum(FloatGrid& field, const FloatGrid& a, const FloatGrid& b,
                                const CsgSigns& signs, double radius, double width) {
@@ -66,7 +68,7 @@ std::size_t applySmoothMinimum(FloatGrid& field, const FloatGrid& a, const Float
       if (!(gap > 0) || std::abs(u) >= width || std::abs(v) >= width) continue;
       const double smooth = signs.result * (std::min(u, v) - gap * gap / (4 * radius));
       if (std::abs(smooth) >= background) {
-        // Beyond the band only the sign counts.
+        // Outside the band of the result only the sign matters.
         const float hard = field.tree().getValue(origin + SmoothLeaf::offsetToLocalCoord(n));
         if (std::abs(hard) >= background && (hard < 0) == (smooth < 0)) continue;
       }
@@ -87,7 +89,8 @@ void checkOperands(const NarrowBand& a, const NarrowBand& b, const SmoothCsgOpti
         fmt::format("the radius is {}; give a length of zero or more", options.radius));
   requireSolid(a);
   requireSolid(b);
-  if (a.isEmpty() || b.isEmpty()) throw InvalidInput("a solid is empty; give two solids");
+  if (a.isEmpty() || b.isEmpty())
+    throw InvalidInput("one of the solids is empty; give two solids with a surface");
 }
 
 }  // namespace
@@ -96,7 +99,7 @@ CsgResult smoothCombine(CsgOperation operation, const NarrowBand& first, const N
                         const SmoothCsgOptions& options) {
   checkOperands(first, second, options);
 
-  // === The hard result, which is right where the distances differ by K or more
+  // === Plain CSG, which is the result where the distances differ by K or more
   const solids::SeamOperands operands =
       solids::onOneGrid(first, second, {options.maxMemory, subProgress(options.progress, 0, 0.2)});
   const std::array<NarrowBand, 2> pair = {operands.a, operands.b};
@@ -106,7 +109,7 @@ CsgResult smoothCombine(CsgOperation operation, const NarrowBand& first, const N
   result.notes.insert(result.notes.begin(), operands.notes.begin(), operands.notes.end());
   if (options.radius == 0) return result;
 
-  // === Distances up to where the smooth surface and its stencils read them
+  // === Distances of both operands, as far as the smooth surface and its stencils need them
   const double voxel = result.band.voxelSize();
   const double width = kReadRadii * options.radius / voxel + kReadBySurface + 2;
   CoordBBox box = boxAround(vdb(operands.a), width);
@@ -117,7 +120,7 @@ CsgResult smoothCombine(CsgOperation operation, const NarrowBand& first, const N
     a = widenedIn(box, operands.a, width, options, subProgress(options.progress, 0.4, 0.55));
     b = widenedIn(box, operands.b, width, options, subProgress(options.progress, 0.55, 0.7));
   } catch (const InvalidInput&) {
-    return result;  // a surface does not reach the box, as that of a ball deep inside another
+    return result;  // an operand has no surface in the box
   }
 
   // === The smooth minimum, and distances to its zero set
@@ -126,8 +129,8 @@ CsgResult smoothCombine(CsgOperation operation, const NarrowBand& first, const N
   if (applySmoothMinimum(*field, *a, *b, csgSigns(operation), options.radius, known) == 0)
     return result;
   if (!eikonal::hasZeroCrossing(field->tree()))
-    throw InvalidInput(fmt::format(
-        "nothing is left of the solids with a radius of {}; give a smaller one", options.radius));
+    throw InvalidInput(fmt::format("the result is empty with a radius of {}; give a smaller radius",
+                                   options.radius));
   eikonal::DistanceRequest request;
   request.halfWidth = result.band.halfWidth();
   request.maxMemory = options.maxMemory;
@@ -159,8 +162,9 @@ namespace {
 
 constexpr const char* kSmoothDetails =
     "The surface is the zero set of a smooth minimum (or maximum) of both exact distances. It "
-    "changes only where the distances differ by less than the radius, by a quarter of the radius "
-    "at most. Unlike 'blend', it joins solids that do not touch where the gap is below half the "
+    "differs from the plain result only where the distances to both solids differ by less than the "
+    "radius, and by a quarter of the radius at most. Unlike 'blend', it joins solids that do not "
+    "touch where the gap is below half the "
     "radius.";
 
 }  // namespace
@@ -168,7 +172,7 @@ constexpr const char* kSmoothDetails =
 const OperatorText SmoothUnionOperator::text{
     .name = "smooth-union",
     .group = "Solids",
-    .summary = "union of two solids that flow into each other",
+    .summary = "union of two solids with a smooth seam",
     .details = kSmoothDetails,
     .example =
         "levelsmith sphere --radius 1 --voxel 0.05 ! sphere --radius 0.7 --center 1.3,0,0 --voxel "

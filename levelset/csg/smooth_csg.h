@@ -18,23 +18,22 @@ struct SmoothCsgOptions {
 
 /// Joins two solids by a smooth minimum of their exact distances a and b [Dekkers04, Quilez13]:
 /// smin(a, b) = min(a, b) − max(K − |a − b|, 0)² / 4K. A union is the zero set of smin(a, b), an
-/// intersection that of −smin(−a, −b), a difference that of −smin(−a, b). The union adds at most
-/// K/4 beyond the hard one, at the points where a = b, and changes nothing where |a − b| ≥ K.
-/// Solids that do not touch flow together where the gap is smaller than K/2. blend() does not do
-/// that.
-/// @return  distances to the smooth surface, on the finer grid of the two, in the smaller half
-///          width; notes for operands that were resampled or cut
+/// intersection that of −smin(−a, −b), a difference that of −smin(−a, b). The smooth union extends
+/// at most K/4 beyond the plain union, at the points where a = b, and equals it where |a − b| ≥ K.
+/// Solids that do not touch are joined where the gap between them is smaller than K/2; blend()
+/// leaves them apart.
+/// @return  distances to the smooth surface, on the finer of the two grids, with the smaller half
+///          width; notes on operands that were resampled or narrowed
 /// @throws UsageError if the radius is negative or not finite
 /// @throws InvalidInput if a solid is empty, or nothing is left of an intersection or difference
 /// @throws ResourceLimit, Cancelled
-/// @note The operands' distances are extended to 1.25 K where both solids are near. The surface is
-/// of
-///       second order in the voxel size, with its largest errors where |a − b| = K and the
-///       curvature jumps.
+/// @note The operands' distances are extended to 1.25 K where both solids are near. The error of
+///       the surface is of second order in the voxel size. It is largest where |a − b| = K, since
+///       the curvature jumps there.
 [[nodiscard]] CsgResult smoothCombine(CsgOperation operation, const NarrowBand& a,
                                       const NarrowBand& b, const SmoothCsgOptions& options);
 
-/// Members that the three operators share.
+/// Members that the operators smooth-union, smooth-intersection and smooth-difference share.
 template <CsgOperation operation>
 struct SmoothCsgOperator {
   static constexpr std::size_t operandCount = 2;
@@ -42,12 +41,13 @@ struct SmoothCsgOperator {
   static constexpr ErrorModel errorModel{2, 0.5, kCreaseError, "smooth-csg-balls"};
 
   struct Options {
-    double radius = 0;  ///< world units
+    double radius = 0;  ///< blending distance K, world units
 
     template <class Visitor>
     static void describe(Visitor& visit) {
       visit("radius", &Options::radius,
-            {.help = "distance within which the surfaces flow together",
+            {.help = "blending distance: the result is smooth where the distances to both solids "
+                     "differ by less",
              .unit = OptionUnit::Length,
              .range = OptionRange::NonNegative,
              .required = true});
