@@ -53,8 +53,7 @@ void PictureLayers::addWarnings(Image& image, const Scene& scene) const {
   if (count == 0) return;
   image.attributes["ls:warning"] = fmt::format(
       "{} pixel{} show{} the {} outside a band, where the distance is unknown and the shape is "
-      "wrong; "
-      "widen the bands with rebuild-band",
+      "wrong; widen the bands with rebuild-band",
       count, count == 1 ? "" : "s", count == 1 ? "s" : "",
       scene.morph ? "morph" : "soft expression");
 }
@@ -76,10 +75,10 @@ void requireOpacity(const Scene& scene) {
   const auto require = [](const auto& parts) {
     for (const auto& part : parts)
       if (!(part.opacity > 0 && part.opacity <= 1))
-        throw levelset::UsageError(fmt::format(
-            "an opacity of {} is out of range; give more than 0 and at most 1, or leave "
-            "the part out",
-            part.opacity));
+        throw levelset::UsageError(
+            fmt::format("an opacity of {} is out of range; give more than 0 and at most 1, or "
+                        "leave the solid or mesh out",
+                        part.opacity));
   };
   require(scene.solids);
   require(scene.meshes);
@@ -115,15 +114,15 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
   if (!(style.curvatureRange >= 0 && std::isfinite(style.curvatureRange)) ||
       !(style.lineWidth >= 0 && style.lineWidth <= 1000)) {
     throw levelset::UsageError(
-        fmt::format("curvatures up to {} and lines of {} pixels are out of range; give a "
-                    "positive range, and lines up to 1000 pixels",
+        fmt::format("a curvature range of {} or a line width of {} pixels is out of range; give a "
+                    "range of 0 or more, and a width from 0 to 1000 pixels",
                     style.curvatureRange, style.lineWidth));
   }
   if (style.style == Style::Matcap && !style.matcap)
     throw levelset::UsageError("the style matcap needs a picture of a shaded ball; give a PNG");
   if (options.fromNanoVdb && options.filter != Filter::Trilinear)
     throw levelset::UsageError(
-        "NanoVDB grids support only the trilinear filter; use it, or draw from bricks");
+        "NanoVDB grids support only the trilinear filter; use that filter, or draw from bricks");
   requireFields(scene);
   if (scene.isBlended() && options.filter != Filter::Trilinear)
     throw levelset::UsageError(
@@ -134,7 +133,8 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
     throw levelset::UsageError(
         "soft expressions and morphs cannot be drawn from NanoVDB grids; draw from "
         "bricks");
-  constexpr double kReach = 2.99;  // voxels
+  constexpr double kReach =
+      2.99;  // half width that the spline filters need: 3 voxels, less a margin for rounding
   for (const Solid& solid : scene.solids) {
     if (options.filter == Filter::Trilinear || solid.band.isEmpty()) continue;
     if (options.filter == Filter::BSplineQi && solid.quantization.bits != 32)

@@ -11,22 +11,23 @@
 #include "render/scene/scene.h"
 #include "render/shading/render_options.h"
 
-// Common parts of the pictures of all renderers.
+// Code that all renderers share: layers, checks and header attributes of a picture.
 namespace render {
 
-/// Accumulated colour of the rays of a pixel.
+/// Sum of the colours that the sample rays of a pixel see.
 struct ColourSum {
   Imath::C3f colour{0};
-  double coverage = 0;
-  /// Adds a surface. @param share  part of the ray that ends there: opacity times remaining
-  /// transmittance
+  double coverage = 0;  ///< sum of the shares
+  /// Adds the colour of a surface on a ray. @param share  its weight: the surface's opacity times
+  /// the transmittance of the surfaces in front of it
   void add(const Imath::C3f& seen, double share) {
     colour += seen * static_cast<float>(share);
     coverage += share;
   }
 };
 
-/// The layers of a picture, as plain pointers for the tiles.
+/// Pointers to the pixels of a picture's layers, so that tiles can be written in parallel. Null:
+/// the picture has no such layer.
 struct PictureLayers {
   float *r, *g, *b, *a, *z;
   float *n[3], *p[3];
@@ -36,10 +37,10 @@ struct PictureLayers {
   mutable std::atomic<std::size_t> beyondBand = 0;  ///< number of hits with Hit::isBeyondBand
 
   PictureLayers(Image& image, const RenderOptions& options);
-  /// Writes the data layers of pixel `i` from a hit with known normals.
+  /// Writes depth, normal, position and id of pixel `i`. @pre the normals of the hit are set
   void setHit(std::size_t i, const Camera& camera, const Hit& hit) const;
   void setCurvature(std::size_t i, const CurvatureSample& sample) const;
-  /// Adds the header attribute ls:warning when the user should know of a limitation.
+  /// Adds the header attribute ls:warning if pixels show a blended surface outside the bands.
   void addWarnings(Image& image, const Scene& scene) const;
   /// Writes the colour of pixel `i` from the sum over `samples` rays.
   void setColour(std::size_t i, const ColourSum& sum, int samples) const;
@@ -47,24 +48,25 @@ struct PictureLayers {
 
 /// Checks a scene and its options before a picture is drawn.
 /// @throws levelset::UsageError for an invalid camera or light, opacities outside (0, 1], or sample
-///         counts out of range; for blended scenes also for a filter that is not trilinear, and for
+///         counts out of range; for blended scenes also for a filter other than trilinear, and for
 ///         NanoVDB grids
 /// @throws levelset::InvalidInput for bands that are narrower than the filter's stencil
 /// @throws levelset::ResourceLimit for an image that is too large
 /// @throws as requireFields() for blended scenes
 void requirePicture(const Scene& scene, const RenderOptions& options);
 
-/// Checks all opacities. @throws levelset::UsageError for an opacity outside (0, 1]
+/// Checks the opacities of all solids and meshes. @throws levelset::UsageError for an opacity
+/// outside (0, 1]
 void requireOpacity(const Scene& scene);
 
 /// Checks the key light. @throws levelset::UsageError for an invalid light
 void requireLight(const Scene& scene);
 
-/// Reports that a scene has no surface. @throws levelset::InvalidInput always
+/// Throws the error for a scene without a surface. @throws levelset::InvalidInput always
 [[noreturn]] void refuseEmptyScene();
 
 /// Header attributes of a scene: ls:grid (name and content hash of each solid), ls:voxelSize, and
-/// the parameters of the layers.
+/// the options that determine the layers.
 [[nodiscard]] std::map<std::string, std::string> sceneAttributes(const Scene& scene,
                                                                  const RenderOptions& options);
 

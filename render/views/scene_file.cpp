@@ -31,14 +31,14 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kFormat = "levelsmith scene";
 constexpr int kVersion = 1;
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kMostBytes =
-    1 << 24;  // limit of a scene file, which contains only names of other files
+constexpr double kMostBytes = 1 << 24;  // largest size of a scene file, bytes; the file contains
+                                        // only names of other files, not their data
 
 Json toJson(const V3d& v) {
   return {v.x, v.y, v.z};
 }
 
-/// Writes the shortest numbers that are read back as the same floats.
+/// Converts a colour to the shortest decimal numbers that are read back as the same floats.
 Json colourJson(const Imath::C3f& colour) {
   const auto shortest = [](float c) { return std::stod(fmt::format("{}", c)); };
   return {shortest(colour.x), shortest(colour.y), shortest(colour.z)};
@@ -72,17 +72,17 @@ void requireColour(const Imath::C3f& colour) {
   for (int c = 0; c < 3; ++c)
     if (!(colour[c] >= 0 && colour[c] <= 1))
       throw InvalidInput(
-          fmt::format("the colour {}, {}, {} is not between 0 and 1; give one in this range",
+          fmt::format("the colour {}, {}, {} is out of range; give three numbers from 0 to 1",
                       colour.x, colour.y, colour.z));
 }
 
-/// File of a part of a scene, beside the scene's file.
+/// File of a solid or mesh with the given name, in the folder of the scene file `file`.
 std::filesystem::path fileBeside(const std::filesystem::path& file, const std::string& name,
                                  const char* extension) {
   return file.parent_path() / (file.stem().string() + "-" + name + extension);
 }
 
-/// Reads the document. Error messages name the file and the part.
+/// Reads members of the JSON document. Error messages name the file and the location `where` in it.
 class Reader {
  public:
   explicit Reader(const std::filesystem::path& file) : file_(file.string()) {}
@@ -102,11 +102,11 @@ class Reader {
   [[nodiscard]] std::string text(const Json& json, const char* name,
                                  const std::string& where) const {
     const Json& value = member(json, name, where);
-    if (!value.is_string()) refuse(where, fmt::format("has a \"{}\" that is not a text", name));
+    if (!value.is_string()) refuse(where, fmt::format("has a \"{}\" that is not a string", name));
     return value.get<std::string>();
   }
 
-  /// Reads exactly `count` finite numbers.
+  /// Reads a member that must be a list of exactly `count` finite numbers, or a single number.
   [[nodiscard]] std::vector<double> numbers(const Json& json, const char* name, std::size_t count,
                                             const std::string& where) const {
     const Json& list = member(json, name, where);
@@ -156,7 +156,10 @@ class Reader {
       const std::vector<double> size = numbers(json, "size", 2, where);
       for (const double pixels : size)
         if (!(pixels >= 1 && pixels <= 1e6) || pixels != std::floor(pixels))
-          refuse(where, fmt::format("has a size of {} pixels", pixels));
+          refuse(
+              where,
+              fmt::format("has a \"size\" of {} pixels, which is not an integer from 1 to 1000000",
+                          pixels));
       camera.width = static_cast<int>(size[0]);
       camera.height = static_cast<int>(size[1]);
     }
@@ -173,7 +176,7 @@ class Reader {
     return light;
   }
 
-  /// Reads the members common to solids and meshes. @param number_  of the part, from 1 on
+  /// Reads the members common to solids and meshes. @param number_  default id of the solid or mesh
   template <typename Part>
   void readPart(const Json& json, std::size_t number_, const std::string& where,
                 Part& solid) const {
@@ -189,7 +192,7 @@ class Reader {
       const V3d colour = point(json, "colour", where);
       for (int c = 0; c < 3; ++c)
         if (!(colour[c] >= 0 && colour[c] <= 1))
-          refuse(where, "has a \"colour\" that is not between 0 and 1");
+          refuse(where, "has a \"colour\" with numbers outside the range from 0 to 1");
       solid.colour = Imath::C3f(colour);
     }
     if (json.contains("opacity")) solid.opacity = number(json, "opacity", where);
@@ -197,16 +200,18 @@ class Reader {
       refuse(where, "has an \"opacity\" that is not above 0 and at most 1");
   }
 
-  /// Path of a part's file, relative to the scene's folder unless absolute.
+  /// Path of the file of a solid or mesh. A relative name starts at the folder of the scene file
+  /// `file`.
   [[nodiscard]] std::filesystem::path partFile(const Json& json, const std::filesystem::path& file,
                                                const std::string& where) const {
     const std::string name = text(json, "file", where);
-    if (name == "-") refuse(where, "names standard input, which a scene cannot use");
+    if (name == "-")
+      refuse(where, "has the \"file\" \"-\" (standard input), which a scene cannot use");
     return file.parent_path() / name;
   }
 
-  /// Returns the result of a job. If the job rejects the values, adds the file and the location to
-  /// the message.
+  /// Calls job() and returns its result. If it rejects the input, adds the file and the location
+  /// `where` to the error message.
   template <typename Job>
   auto withContext(const std::string& where, const Job& job) const {
     try {
@@ -235,7 +240,8 @@ Json documentOf(const std::filesystem::path& file) {
     throw levelset::IoError(fmt::format("{} is a folder; give the file of a scene", file.string()));
   const auto size = std::filesystem::file_size(file, failed);
   if (!failed && static_cast<double>(size) > kMostBytes)
-    throw InvalidInput(fmt::format("{} is too large for a scene", file.string()));
+    throw InvalidInput(fmt::format(
+        "{} is larger than 16 MB, the limit for a scene file; give a scene file", file.string()));
   std::ifstream stream(file, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(stream), {}};
   if (!stream)
@@ -245,7 +251,8 @@ Json documentOf(const std::filesystem::path& file) {
   return Json::parse(text, nullptr, /*allow_exceptions=*/false);
 }
 
-/// Called before anything is written, because JSON supports only UTF-8.
+/// Converts the document to text. It is called before any file is written, because it fails for
+/// names that are not UTF-8.
 std::string textOf(const Json& json, const std::filesystem::path& file) {
   try {
     return json.dump(2);
@@ -256,7 +263,7 @@ std::string textOf(const Json& json, const std::filesystem::path& file) {
   }
 }
 
-/// Divides progress among parts that run one after the other.
+/// Divides the progress range evenly among files that are read or written one after the other.
 class Parts {
  public:
   Parts(const levelset::Progress& progress, std::size_t count)
@@ -286,7 +293,7 @@ void readSolid(const Reader& reader, const Json& json, const std::filesystem::pa
                .repairs = &repairs,
                .progress = progress});
   if (solid.band.isOpenSurface())
-    reader.refuse(where, "is the band of an open surface, which is not a solid");
+    reader.refuse(where, "is a band of an open surface, not of a solid");
   if (options.repairs) options.repairs(repairs, source);
   if (json.contains("transform"))
     solid.band = reader.withContext(
@@ -331,12 +338,12 @@ void requireSceneNames(const std::vector<std::string>& names) {
     if (name.empty() || std::isdigit(static_cast<unsigned char>(name[0])) ||
         !std::all_of(name.begin(), name.end(), isWord))
       throw levelset::UsageError(
-          fmt::format("scene: '{}' is not a valid name of a part; use letters, digits and _, and "
-                      "no digit first",
+          fmt::format("scene: '{}' is not a valid name of a solid or mesh; use letters, digits and "
+                      "_, and no digit first",
                       name));
     if (!seen.insert(name).second)
       throw levelset::UsageError(fmt::format(
-          "scene: two parts have the name '{}'; give each part a different name", name));
+          "scene: '{}' is the name of two solids or meshes; give each a different name", name));
   }
 }
 
@@ -389,8 +396,8 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
     stream << text << '\n';
     stream.flush();
     if (!stream)
-      throw levelset::IoError(
-          fmt::format("{} cannot be written; is the disk full?", file.string()));
+      throw levelset::IoError(fmt::format(
+          "{} cannot be written; free some space or choose another folder", file.string()));
   }
   target.commit();
 }
@@ -423,7 +430,7 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
   if (!solids.is_array() || !meshes.is_array() || (solids.empty() && meshes.empty()))
     reader.refuse(whole, "has no solids and no meshes");
   Parts parts(options.progress, solids.size() + meshes.size());
-  ReadSceneOptions rest = options;  // the memory limit applies to all parts together
+  ReadSceneOptions rest = options;  // the memory limit applies to all solids and meshes together
   rest.maxMemory = levelset::memoryLimit(options.maxMemory);
   const auto spend = [&rest](std::size_t bytes) {
     rest.maxMemory -= std::min(rest.maxMemory, bytes);
@@ -441,7 +448,7 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
   const auto isNew = [&](const auto& part) { return ids.insert(part.id).second; };
   if (!std::all_of(scene.solids.begin(), scene.solids.end(), isNew) ||
       !std::all_of(scene.meshes.begin(), scene.meshes.end(), isNew))
-    reader.refuse(whole, "gives two parts the same \"id\"");
+    reader.refuse(whole, "gives the same \"id\" to two solids or meshes");
   if (json.contains("csg"))
     scene.csg = CsgExpression(reader.text(json, "csg", whole), solidNames(scene));
   if (json.contains("soft")) scene.softness = reader.number(json, "soft", whole);

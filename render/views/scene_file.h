@@ -11,20 +11,22 @@
 #include "levelset/progress.h"
 #include "render/scene/scene.h"
 
-/// Scene files: JSON that names files of level sets and meshes, by paths relative to its folder.
+/// Scene files: JSON documents that name files of level sets and meshes, by paths relative to the
+/// folder of the document.
 namespace render {
 
-/// A scene. `hasCamera` is true when its file sets the camera.
+/// A scene, and whether its file sets the camera. If not, `scene.camera` has default values.
 struct ViewedScene {
   Scene scene;
   bool hasCamera = false;
 };
 
-/// True for a file name or format that readScene() reads: .json.
+/// True for the format "json" and for file names with the extension .json, which readScene() reads.
 [[nodiscard]] bool isSceneFormat(const std::string& name);
 
-/// Writes the solids and meshes beside the scene file, as FILE-NAME.vdb and FILE-NAME.ply, then the
-/// scene. Existing files of these names are replaced.
+/// Writes each solid and mesh into the folder of the scene file, as STEM-NAME.vdb and
+/// STEM-NAME.ply. STEM is the scene file's name without extension. Then it writes the scene file.
+/// Existing files are replaced.
 /// @throws levelset::IoError when a file cannot be written
 /// @throws levelset::InvalidInput for invalid colours
 /// @throws levelset::UsageError for an invalid opacity
@@ -33,8 +35,9 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& scene,
 
 /// Options of readScene().
 struct ReadSceneOptions {
-  std::size_t maxMemory = levelset::kNoMemoryLimit;
-  /// Called for each solid with the repairs that turned its grid into a band, and its file.
+  std::size_t maxMemory = levelset::kNoMemoryLimit;  ///< limit for all solids and meshes, bytes
+  /// Called for each solid with its file and the repairs that turned the grid of that file into a
+  /// band.
   std::function<void(const levelset::BandRepairs&, const std::filesystem::path&)> repairs = {};
   levelset::Progress progress = {};
 };
@@ -48,7 +51,7 @@ struct ReadSceneOptions {
 [[nodiscard]] ViewedScene readScene(const std::filesystem::path& file,
                                     const ReadSceneOptions& options = {});
 
-/// Checks the names of solids and meshes.
+/// Checks the names of all solids and meshes of a scene.
 /// @throws levelset::UsageError unless names are unique and consist of letters, digits and _, with
 ///         no digit first
 void requireSceneNames(const std::vector<std::string>& names);

@@ -18,15 +18,16 @@ namespace {
 using Imath::C3f;
 using Imath::V3d;
 
-constexpr double kMargin = 1.08;     // size of the frame relative to the solid
+constexpr double kMargin = 1.08;     // size of the picture relative to the solid
 constexpr double kLine = 1.2;        // width of a contour line, pixels
 constexpr double kZeroLine = 2.4;    // width of the zero contour, pixels
-constexpr double kFaintLine = 0.45;  // darkness of the contours
+constexpr double kFaintLine = 0.45;  // opacity of the black contour lines other than zero
 constexpr int kAcross = 4;           // samples along a pixel's side
 
-/// Positions of the pixels.
+/// World positions of the pixels.
 struct Frame {
-  V3d centre, right, down;  ///< right and down: the step from pixel to pixel
+  V3d centre, right, down;  ///< centre of the picture, and the steps to the next pixel to the right
+                            ///< and down, world units
   [[nodiscard]] V3d at(double x, double y) const { return centre + right * x + down * y; }
 };
 
@@ -70,11 +71,13 @@ class SlicePainter {
     C3f result = phi < 0 ? mixedColour(C3f(0.55f, 0.72f, 0.88f), C3f(0.10f, 0.25f, 0.52f), depth)
                          : mixedColour(C3f(0.94f, 0.82f, 0.62f), C3f(0.62f, 0.40f, 0.18f), depth);
     if (isFar) return phi < 0 ? C3f(0.16f, 0.20f, 0.28f) : C3f(0.80f, 0.80f, 0.80f);
-    // The line width in pixels follows from the gradient of φ within the plane.
+    // Change of φ per pixel: it converts the line width in pixels to a range of φ.
     const V3d gradient = phi_.gradient(p);
     const double perPixel = std::hypot(gradient.dot(frame_.right), gradient.dot(frame_.down));
     const double toLine = std::abs(phi - std::round(phi / step_) * step_);
-    const bool isEnd = std::abs(phi) > background_ - 0.25 * step_;  // near the end of the band
+    const bool isEnd =
+        std::abs(phi) >
+        background_ - 0.25 * step_;  // close to the end of the band, where no contour is drawn
     if (!isEnd && toLine < 0.5 * kLine * perPixel && 4 * kLine * perPixel < step_)
       result = mixedColour(result, C3f(0), kFaintLine);
     if (std::abs(phi) < 0.5 * kZeroLine * perPixel) result = C3f(0.01f);
@@ -96,15 +99,17 @@ void requireSlice(const levelset::NarrowBand& band, const SliceOptions& options)
   if (options.width < 1 || options.height < 1 || !(options.step >= 0) ||
       !std::isfinite(options.step))
     throw levelset::UsageError(
-        fmt::format("{}x{} pixels with a contour every {} are out of range; give positive numbers",
+        fmt::format("a picture of {}x{} pixels with contours every {} world units is out of range; "
+                    "give a positive size, and a step of 0 or more",
                     options.width, options.height, options.step));
   if (static_cast<double>(options.width) * options.height > kMaxPixels)
-    throw levelset::ResourceLimit(fmt::format("{}x{} pixels exceed the limit of {:.0f}",
-                                              options.width, options.height, kMaxPixels));
+    throw levelset::ResourceLimit(fmt::format(
+        "a picture of {}x{} pixels exceeds the limit of {:.0f} pixels; choose a smaller size",
+        options.width, options.height, kMaxPixels));
   constexpr double kBytesOfPixel = 8 * 4;
   levelset::requireMemory(kBytesOfPixel * options.width * options.height, options.maxBytes);
   if (band.isEmpty() || band.zeroSetBounds().isEmpty())
-    throw levelset::InvalidInput("the solid has no surface; give one with a zero set");
+    throw levelset::InvalidInput("the solid has no surface; give a solid with a zero set");
 }
 
 }  // namespace

@@ -9,18 +9,19 @@
 
 namespace render {
 
-/// A plane through a solid, and the size of its picture.
+/// A plane through a solid, and the size of the picture of that plane.
 struct SliceOptions {
-  Imath::V3d point{0}, normal{0, 0, 1};  ///< the normal, of any length, points towards the viewer
-  int width = 1024, height = 768;        ///< pixels
-  double step = 0;                       ///< distance of contour lines, world units; 0: one voxel
-  std::size_t maxBytes = levelset::kNoMemoryLimit;  ///< memory limit of the image
+  Imath::V3d point{0},
+      normal{0, 0, 1};  ///< world units; the normal has any length and points towards the viewer
+  int width = 1024, height = 768;  ///< pixels
+  double step = 0;  ///< difference of φ between contour lines, world units; 0: one voxel
+  std::size_t maxBytes = levelset::kNoMemoryLimit;  ///< memory limit of the image, bytes
   levelset::Progress progress = {};
 };
 
 /// Draws the distance φ in a plane: blue inside and brown outside, with contour lines; the zero
-/// contour is black. Areas outside the band have even tones. Up is z, or y where the normal is
-/// along z. The picture frames the solid's bounds.
+/// contour is black. Areas outside the band have a uniform colour. The up direction is z, or y for
+/// a normal along z. The picture frames the bounds of the zero set.
 /// @return layers R G B A; phi (trilinear, ± the background outside the band) and P.X P.Y P.Z at
 ///         the pixel centres, world units
 /// @throws levelset::UsageError for a plane with a zero normal, or a size or step that is not
