@@ -13,7 +13,7 @@ namespace {
 
 using Imath::V3d;
 
-/// Variables that a formula may use.
+/// Variables that a formula may use: coordinates, time or both, and their names for messages.
 struct Variables {
   bool space = false, time = false;
   const char* names = "";
@@ -21,8 +21,8 @@ struct Variables {
 constexpr Variables kSpace = {true, false, "x, y, z, r"}, kTime = {false, true, "t"},
                     kSpaceAndTime = {true, true, "x, y, z, r, t"};
 
-/// A parser with its variables. It binds the variables by address, so each thread has its own
-/// parser.
+/// A muParser object and its variables. The parser binds the variables by address, so each thread
+/// needs a copy.
 class Formula {
  public:
   Formula(const std::string& text, const Variables& variables)
@@ -40,7 +40,8 @@ class Formula {
   Formula(const Formula& other) : Formula(other.text_, other.variables_) {}
   Formula& operator=(const Formula&) = delete;
 
-  /// Evaluates all formulas of the text and returns their values; `count` receives their number.
+  /// Evaluates the formulas of the text, which commas separate, and returns their values. `count`
+  /// receives the number of formulas.
   const double* evaluate(const V3d& place, double time, int& count) {
     place_ = place;
     radius_ = place.length();

@@ -11,7 +11,8 @@ namespace levelset {
 using ScalarField = std::function<double(const Imath::V3d& world)>;
 using VectorField = std::function<Imath::V3d(const Imath::V3d& world, double time)>;
 
-/// An attribute of a surface: numbers, or vectors at time 0. One of the two is set.
+/// An attribute of a surface: a scalar field, or a vector field taken at time 0. One of the two is
+/// set.
 struct Attribute {
   ScalarField scalar = {};
   VectorField vector = {};

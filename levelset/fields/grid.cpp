@@ -19,16 +19,17 @@ using openvdb::Coord;
 using openvdb::FloatGrid;
 using openvdb::Vec3SGrid;
 
-// Clamps positions far outside any tree, and NaN, to a valid coordinate.
+// Positions beyond this index coordinate, and NaN, are clamped to it, so that they fit into int.
 constexpr double kFarthestIndex = 2147483000.0;
 
-/// Grid cell below a position on an axis, and the fraction of the position in it.
+/// Grid cell that holds a position on one axis: index of its lower grid point, and the position as
+/// a fraction of the cell.
 struct Cell {
   int low;
   double share;
 
   explicit Cell(double index) {
-    // NaN fails these comparisons and so goes to the far end.
+    // NaN fails the first comparison, so it becomes kFarthestIndex.
     const double near = index < kFarthestIndex ? index : kFarthestIndex;
     const double inside = near > -kFarthestIndex ? near : -kFarthestIndex;
     const int towardsZero = static_cast<int>(inside);
@@ -37,9 +38,9 @@ struct Cell {
   }
 };
 
-/// The N³ grid points from a lowest one upwards: a view of their leaf, or a copy gathered from
-/// several. Separate from SampleBlock, which always copies: most cells lie in one leaf, and the
-/// values may be vectors.
+/// Values of the N³ grid points from the corner `low` upwards. A view of the leaf when one leaf
+/// holds them all, otherwise a copy gathered from several leaves. SampleBlock (interpolate_vdb.h)
+/// does not serve here: it always copies, and it holds no vectors.
 template <typename Value, int N>
 class PointBlock {
  public:
@@ -58,8 +59,10 @@ class PointBlock {
   PointBlock(const PointBlock&) = delete;
   PointBlock& operator=(const PointBlock&) = delete;
 
-  /// Trilinear interpolation between eight of the points; `pick` selects one component of a value.
-  /// @param first  lowest of the eight points, relative to the block
+  /// Interpolates trilinearly between eight of the grid points.
+  /// @param first  lowest of the eight grid points, relative to `low`
+  /// @param t  fractions of the position between the grid points, along x, y and z
+  /// @param pick  selects one component of a value
   template <typename Pick>
   [[nodiscard]] double trilinear(const Coord& first, const double (&t)[3], const Pick& pick) const {
     const Value* values = first_ + first[0] * strideX_ + first[1] * strideY_ + first[2];
@@ -79,8 +82,8 @@ class PointBlock {
   Value gathered_[N * N * N];
 };
 
-/// Grid access for several threads, each with an accessor of its own. The tree never changes, so it
-/// need not register the accessors.
+/// Read access to a grid for several threads. Each thread has its own accessor. The tree never
+/// changes, so the accessors need not be registered with it.
 template <typename GridT>
 class FieldSampler {
  public:
@@ -112,7 +115,7 @@ ScalarField sampled(std::shared_ptr<const void> owner, const FloatGrid& grid) {
 
 using VectorSampler = FieldSampler<Vec3SGrid>;
 
-/// Interpolates a vector whose three components belong to the grid points.
+/// Interpolates a vector grid that stores all three components at the grid points.
 V3d centredVector(VectorSampler& sampler, const V3d& world) {
   const openvdb::Vec3d index = sampler.toIndex(world);
   const Cell x(index[0]), y(index[1]), z(index[2]);
@@ -124,8 +127,8 @@ V3d centredVector(VectorSampler& sampler, const V3d& world) {
   return result;
 }
 
-/// Interpolates a vector whose components belong to points half a voxel before the grid points,
-/// each along its own axis.
+/// Interpolates a staggered vector grid. It stores component i half a voxel below the grid point
+/// along axis i.
 V3d staggeredVector(VectorSampler& sampler, const V3d& world) {
   const openvdb::Vec3d index = sampler.toIndex(world);
   const Cell x(index[0]), y(index[1]), z(index[2]);

@@ -51,11 +51,12 @@ class FieldGrid {
 /// @throws InvalidInput for a vector grid
 [[nodiscard]] ScalarField asScalarField(const FieldGrid& grid);
 
-/// The signed distance of a band, world units; ± background outside it.
+/// Interpolates the signed distance of a band trilinearly, world units; ± background outside the
+/// band.
 [[nodiscard]] ScalarField asScalarField(const NarrowBand& band);
 
-/// Interpolates a vector grid trilinearly, constant in time. Staggered components have grid points
-/// of their own.
+/// Interpolates a vector grid trilinearly; the result is constant in time. On a staggered grid,
+/// each component is interpolated between the points where it is stored.
 /// @throws InvalidInput for a scalar grid
 [[nodiscard]] VectorField asVectorField(const FieldGrid& grid);
 

@@ -23,7 +23,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Offset of the random identifier: after the magic number, three versions and a flag.
+/// Byte offset of the random identifier (UUID) in a .vdb file. It follows the magic number, three
+/// version numbers and a flag.
 constexpr std::streamoff kIdentifierOffset = 8 + 3 * 4 + 1;
 /// Smallest voxel size of a NanoVDB file. NanoVDB's writer inverts the matrix with OpenVDB's
 /// AffineMap, which treats smaller voxels as singular.
@@ -40,10 +41,9 @@ std::string bandFormat(const fs::path& nameOrFormat) {
 std::string bandFormat(const fs::path& path, const std::string& given) {
   const std::string format = bandFormat(given.empty() ? path : fs::path(given));
   if (!format.empty()) return format;
-  throw UsageError(
-      fmt::format("'{}' names no format of a band; end the name in .vdb or .nvdb, or "
-                  "give --format",
-                  given.empty() ? path.string() : given));
+  throw UsageError(fmt::format(
+      "'{}' names no file format for bands; end the name in .vdb or .nvdb, or give --format",
+      given.empty() ? path.string() : given));
 }
 
 // === Choice of a grid
@@ -75,7 +75,8 @@ std::string listOf(const std::vector<VdbEntry>& entries) {
   return list.empty() ? "nothing" : list;
 }
 
-/// Chooses the grid by name, or the only level set.
+/// Returns the grid with the name `wanted`. If `wanted` is empty, returns the only level set of the
+/// file.
 const VdbEntry& chooseGrid(const std::vector<VdbEntry>& entries, const std::string& wanted,
                            const std::string& file) {
   const VdbEntry* chosen = nullptr;
@@ -85,7 +86,7 @@ const VdbEntry& chooseGrid(const std::vector<VdbEntry>& entries, const std::stri
       throw InvalidInput(
           fmt::format("{} holds more than one {}: {}; {}", file,
                       wanted.empty() ? "level set" : "grid of that name", listOf(entries),
-                      wanted.empty() ? "choose with --grid" : "write them to separate files"));
+                      wanted.empty() ? "choose one with --grid" : "write them to separate files"));
     }
     chosen = &entry;
   }
@@ -101,7 +102,7 @@ const VdbEntry& chooseGrid(const std::vector<VdbEntry>& entries, const std::stri
   return *chosen;
 }
 
-/// The entry that owns the tree; a different entry where grids share a tree.
+/// Returns the entry that owns the tree of `entry`: another entry when grids share a tree.
 const VdbEntry& treeOwner(const std::vector<VdbEntry>& entries, const VdbEntry& entry,
                           const std::string& file) {
   if (entry.instanceOf.empty()) return entry;
@@ -173,8 +174,8 @@ auto readFrom(const fs::path& path, const ReadBandOptions& options, const Take& 
   const std::string name = inputName(path);
   if (bandFormat(path) == "nvdb") {
     throw UsageError(
-        fmt::format("{} is a file for renderers, which cannot be read back; read the .vdb "
-                    "file that it was written from",
+        fmt::format("{} is a NanoVDB file, which can only be written; read the .vdb file with the "
+                    "same grid instead",
                     name));
   }
   try {
@@ -207,7 +208,8 @@ class ReportingFile : public std::filebuf {
     written_ += static_cast<double>(size);
     if (written_ > told_ + kStep) {
       told_ = written_;
-      // Compression leaves fewer bytes than expected. Closing the file reports the end.
+      // Compressed data takes fewer bytes than expected. writeVdb() reports the end after it closes
+      // the file.
       report(progress_, std::min(0.9, written_ / expected_));
     }
     return std::filebuf::xsputn(data, size);
@@ -218,7 +220,7 @@ class ReportingFile : public std::filebuf {
   double expected_, written_ = 0, told_ = 0;
 };
 
-/// OpenVDB's writer, with grid offsets, on any seekable stream.
+/// OpenVDB's writer for any seekable stream. It stores the byte offsets of the grids.
 struct StreamArchive : openvdb::io::Archive {
   void writeGrids(std::ostream& out, const openvdb::GridBase::ConstPtr& grid) const {
     Archive::write(out, openvdb::GridCPtrVec{grid}, true, openvdb::MetaMap());
@@ -261,7 +263,8 @@ void writeVdb(const fs::path& path, const openvdb::GridBase::ConstPtr& grid, std
   report(progress, 1);
 }
 
-/// @param write  fills the file at the given path
+/// Writes a file by way of a temporary file, which replaces the target when it is complete.
+/// @param write  (path): writes the temporary file
 template <typename Write>
 void writeTarget(const fs::path& path, const Write& write) {
   FileTarget target(path);
@@ -270,12 +273,11 @@ void writeTarget(const fs::path& path, const Write& write) {
     write(target.path());
   } catch (const std::ios_base::failure&) {
     throw IoError(
-        fmt::format("'{}' could not be written: {}; make room on the disk or write "
-                    "elsewhere",
+        fmt::format("'{}' could not be written: {}; free disk space or write to another disk",
                     path.string(), std::generic_category().message(errno != 0 ? errno : EIO)));
   } catch (const openvdb::Exception& error) {
-    throw IoError(
-        fmt::format("'{}' could not be written: {}; write elsewhere", path.string(), error.what()));
+    throw IoError(fmt::format("'{}' could not be written: {}; write to another file", path.string(),
+                              error.what()));
   }
   target.commit();
 }
@@ -303,7 +305,8 @@ Imath::Box3d worldBox(const Imath::Box3d& box, const openvdb::math::Transform& t
   return result;
 }
 
-/// @param owner  the entry that owns the tree
+/// Returns the properties of a grid from its header.
+/// @param owner  the entry that owns the tree of `entry`
 GridInfo describe(const VdbEntry& entry, const VdbEntry& owner, std::string_view file,
                   const std::string& name) {
   using openvdb::GridBase;
@@ -356,8 +359,8 @@ void writeBand(const fs::path& path, const NarrowBand& band, const WriteBandOpti
   requireSolid(band);  // a file would not record that the surface is open
   if (format == "nvdb" && band.voxelSize() < kMinNanoVoxel)
     throw InvalidInput(
-        fmt::format("'{}' cannot hold voxels of {:.6g}, NanoVDB accepts none below {}; write "
-                    "a .vdb file, or change the unit of length",
+        fmt::format("'{}' cannot hold voxels of size {:.6g}, since NanoVDB accepts none below {}; "
+                    "write a .vdb file, or use a smaller unit of length",
                     path.string(), band.voxelSize(), kMinNanoVoxel));
   const auto grid = namedGrid(vdb(band), options.name);
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
@@ -371,10 +374,9 @@ void writeBand(const fs::path& path, const NarrowBand& band, const WriteBandOpti
 
 void writeField(const fs::path& path, const FieldGrid& field, const WriteBandOptions& options) {
   if (bandFormat(path, options.format) != "vdb") {
-    throw UsageError(
-        fmt::format("'{}' would hold a field, which is written as .vdb only; name such a "
-                    "file",
-                    path.string()));
+    throw UsageError(fmt::format(
+        "'{}' cannot hold a field, since fields are written as .vdb only; end the name in .vdb",
+        path.string()));
   }
   const VdbField& source = *field.shared();
   openvdb::GridBase::Ptr grid;

@@ -19,7 +19,7 @@ namespace levelset {
 struct ReadBandOptions {
   std::string grid = {};  ///< name of the grid; empty: the only float level set of the file
   std::size_t maxMemory = kNoMemoryLimit;
-  BandRepairs* repairs = nullptr;  ///< receives the repairs that the grid needed to become a band
+  BandRepairs* repairs = nullptr;  ///< receives the numbers of repaired values; may be null
   Progress progress = {};
 };
 
@@ -27,7 +27,8 @@ struct ReadBandOptions {
 /// file causes an error, never a hang.
 /// @param path  a .vdb file, or "-" for standard input
 /// @throws IoError when the file cannot be opened
-/// @throws InvalidInput when the file is damaged or holds no such grid, or the grid breaks the
+/// @throws InvalidInput when the file is damaged or does not hold the requested grid, or the grid
+/// breaks the
 ///         invariants of a band
 /// @throws ResourceLimit before the grid exceeds options.maxMemory or the machine's memory
 [[nodiscard]] NarrowBand readBand(const std::filesystem::path& path,
@@ -68,13 +69,14 @@ struct GridInfo {
   std::string type;  ///< value type: "float", "half", "double", "vec3s", …; else OpenVDB's name
   std::string gridClass;           ///< "level set", "fog volume", …
   bool isLevelSet = false;         ///< level set of numbers, which readBand accepts
-  std::uint64_t activeVoxels = 0;  ///< 0 when unknown from the file
+  std::uint64_t activeVoxels = 0;  ///< 0 when the file does not state it
   double voxelSize = 0;            ///< world units; 0 when the voxels are not cubes of equal size
   double halfWidth = 0;            ///< voxels; 0 for other classes than level set
-  Imath::Box3d indexBounds;        ///< empty when unknown from the file
+  Imath::Box3d indexBounds;  ///< box of the active voxels, index space; empty when the file does
+                             ///< not state it
   Imath::Box3d worldBounds;  ///< box of the centres of the active voxels, world units; empty when
-                             ///< unknown
-  std::uint64_t bytes = 0;   ///< memory of the tree in bytes; 0 when unknown from the file
+                             ///< the file does not state it
+  std::uint64_t bytes = 0;   ///< memory of the tree in bytes; 0 when the file does not state it
 };
 [[nodiscard]] std::vector<GridInfo> bandFileInfo(const std::filesystem::path& path);
 

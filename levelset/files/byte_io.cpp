@@ -22,7 +22,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kReadChunk = 1 << 22;
-constexpr int kGzipWindow = 15 + 16;  // zlib's code for a gzip wrapper
+constexpr int kGzipWindow =
+    15 + 16;  // zlib's windowBits: window of 2¹⁵ bytes; + 16 selects the gzip format
 
 std::string systemMessage(int error) {
   return std::generic_category().message(error);
@@ -58,11 +59,11 @@ class InputFile {
   InputFile(const InputFile&) = delete;
   InputFile& operator=(const InputFile&) = delete;
 
-  /// Size of the file; 0 when unknown before reading.
+  /// Size of the file in bytes; 0 for pipes and standard input, whose size is unknown.
   [[nodiscard]] std::size_t expectedSize() const { return expected_; }
   [[nodiscard]] const std::string& name() const { return name_; }
 
-  /// Maps the file into memory; null where that is impossible.
+  /// Maps the file into memory and returns its address; null when the file cannot be mapped.
   [[nodiscard]] void* mapped() const {
     if (expected_ == 0) return nullptr;
     void* begin = ::mmap(nullptr, expected_, PROT_READ, MAP_PRIVATE, fd_, 0);
@@ -92,7 +93,11 @@ class InputFile {
       inflated ? "when decompressed " : "", static_cast<double>(limit) * 1e-9));
 }
 
-/// Appends the data from `next` until it returns nothing or `stopAt` bytes are present.
+/// Fills `bytes` with data from next(address, size), which returns the number of bytes it delivers.
+/// Stops when it returns 0 or `stopAt` bytes are present.
+/// @param expected  expected number of bytes; 0 when unknown
+/// @param limit  memory limit in bytes
+/// @param inflated  true for decompressed data, for messages
 template <typename Next>
 void fill(Bytes& bytes, std::size_t expected, std::size_t limit, std::size_t stopAt,
           const std::string& name, bool inflated, Next next) {
@@ -246,7 +251,8 @@ FirstBytes readFirstBytes(const fs::path& path, std::size_t count) {
       produced += more;
     }
   } catch (const InvalidInput&) {
-    // The raw bytes end at `count`. The data decompressed so far is the result.
+    // Only the first `count` bytes of the file were read, so its compressed data may end early. The
+    // data decompressed so far is the result.
   }
   inflated.resize(produced);
   return {std::move(inflated), fileSize > 0 && produced < count ? produced : 0};

@@ -59,11 +59,10 @@ class MappedFile {
   std::size_t size_ = 0;
 };
 
-/// The first bytes of a file, decompressed if necessary. Damage further on goes unnoticed.
+/// The first bytes of a file, decompressed if necessary. Damage behind these bytes is not detected.
 struct FirstBytes {
   Bytes bytes;
-  std::size_t fileSize =
-      0;  ///< size of the complete file in bytes; 0 when unknown without reading it
+  std::size_t fileSize = 0;  ///< size of the complete data, decompressed, in bytes; 0 when unknown
 };
 /// Reads the first bytes of a file.
 /// @param count  maximum number of bytes

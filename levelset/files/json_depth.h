@@ -5,11 +5,11 @@
 
 namespace levelset {
 
-/// Maximum nesting depth of JSON documents. The program's own documents are less deep.
+/// Maximum nesting depth of JSON documents. The documents that Levelsmith writes are less deep.
 inline constexpr std::size_t kMaxJsonDepth = 64;
 
-/// Returns true when lists and objects are nested deeper than kMaxJsonDepth. Check a text before
-/// parsing it: copying or writing such a document would overflow the stack.
+/// Returns true when lists and objects are nested deeper than kMaxJsonDepth. Call it before parsing
+/// a text: copying or writing a document nested too deeply would overflow the stack.
 [[nodiscard]] inline bool isJsonTooDeep(std::string_view text) {
   std::size_t depth = 0;
   bool isQuoted = false;

@@ -26,10 +26,11 @@ void initializeOnce() {
 }
 
 std::vector<VdbMetadata> readMetadata(VdbBytes& bytes) {
-  constexpr std::size_t kMinSize = 12;  // three lengths
+  constexpr std::size_t kMinSize = 12;  // bytes: the lengths of name, type and value
   const auto count = bytes.value<std::uint32_t>();
   if (count > bytes.remaining() / kMinSize)
-    bytes.fail(fmt::format("its header promises {} entries of metadata", count));
+    bytes.fail(
+        fmt::format("its header promises {} metadata entries, which the file cannot hold", count));
   std::vector<VdbMetadata> result;
   for (std::uint32_t i = 0; i < count; ++i) {
     VdbMetadata entry;
@@ -41,11 +42,12 @@ std::vector<VdbMetadata> readMetadata(VdbBytes& bytes) {
   return result;
 }
 
-/// @return true when the file stores the ends of its grids
+/// Reads the header of the file.
+/// @return true when the file stores where each grid begins and ends
 bool readFileHeader(VdbBytes& bytes) {
   if (bytes.remaining() < sizeof kMagic || bytes.value<std::int64_t>() != kMagic) {
     throw InvalidInput(
-        fmt::format("{} is not an OpenVDB file; give its true format", bytes.name()));
+        fmt::format("{} is not an OpenVDB file; give its actual format", bytes.name()));
   }
   const auto version = bytes.value<std::uint32_t>();
   if (version < kOldestVersion || version > kNewestVersion) {
@@ -54,14 +56,14 @@ bool readFileHeader(VdbBytes& bytes) {
                     "write it again with a current program",
                     bytes.name(), version, kOldestVersion, kNewestVersion));
   }
-  static_cast<void>(bytes.take(2 * sizeof(std::uint32_t)));  // version of the library
+  static_cast<void>(bytes.take(2 * sizeof(std::uint32_t)));  // skips the version of the library
   const bool hasOffsets = bytes.value<char>() != 0;
   static_cast<void>(bytes.take(kIdentifierSize));
   static_cast<void>(readMetadata(bytes));
   return hasOffsets;
 }
 
-/// Reads a transform; null for a kind of map that a band cannot have.
+/// Reads a transform. Returns null for a frustum map, which bands and fields do not support.
 openvdb::math::Transform::Ptr readTransform(VdbBytes& bytes, std::uint32_t version) {
   VdbBytes probe = bytes;
   const std::string_view kind = probe.text();
@@ -93,7 +95,8 @@ VdbEntry readDescriptor(VdbBytes& bytes) {
   return entry;
 }
 
-/// Moves to the start of the next grid.
+/// Skips the tree of a grid and moves to the start of the next grid.
+/// @param end  byte offset of the end of the grid; 0 when the file does not store it
 void skipTree(VdbBytes& bytes, const VdbEntry& entry, std::int64_t end) {
   if (end > 0) {
     if (static_cast<std::size_t>(end) < bytes.position())
@@ -104,8 +107,8 @@ void skipTree(VdbBytes& bytes, const VdbEntry& entry, std::int64_t end) {
   if (!entry.transform ||
       (!hasFloatTree(entry) && !hasDoubleTree(entry) && !hasVectorTree(entry))) {
     throw InvalidInput(
-        fmt::format("{} was written as a stream, and grid '{}' of type '{}' in it "
-                    "cannot be skipped; write the level set to a separate file",
+        fmt::format("{} was written as a stream, without the offsets of its grids, so grid '{}' of "
+                    "type '{}' cannot be skipped; write the level set to a separate file",
                     bytes.name(), entry.name, entry.type));
   }
   skipVdbTree(bytes, entry);
@@ -163,24 +166,26 @@ std::vector<VdbEntry> readVdbEntries(std::string_view file, const std::string& n
   VdbBytes bytes(file, name);
   const bool hasOffsets = readFileHeader(bytes);
   const auto version = VdbBytes(file.substr(sizeof kMagic), name).value<std::uint32_t>();
-  constexpr std::size_t kMinSize = 40;  // names and offsets
+  constexpr std::size_t kMinSize =
+      40;  // bytes of the descriptor of a grid: lengths of its names, and offsets
   const auto count = bytes.value<std::int32_t>();
   if (count < 0 || static_cast<std::size_t>(count) > bytes.remaining() / kMinSize)
-    bytes.fail(fmt::format("its header promises {} grids", count));
+    bytes.fail(fmt::format("its header promises {} grids, which the file cannot hold", count));
   std::vector<VdbEntry> entries;
   for (std::int32_t i = 0; i < count; ++i) {
     VdbEntry entry = readDescriptor(bytes);
-    static_cast<void>(bytes.take(2 * sizeof(std::int64_t)));  // offsets of grid and blocks
+    static_cast<void>(bytes.take(
+        2 * sizeof(std::int64_t)));  // skips the offsets of the grid and of its leaf values
     const auto end = bytes.value<std::int64_t>();
     if (hasOffsets && end <= 0)
-      bytes.fail(fmt::format("the end of grid '{}' is missing", entry.name));
+      bytes.fail(fmt::format("the header does not state where grid '{}' ends", entry.name));
     entry.compression = bytes.value<std::uint32_t>();
     entry.metadata = readMetadata(bytes);
     entry.transform = readTransform(bytes, version);
     entry.treePosition = bytes.position();
     const VdbMetadata* given = entry.find(openvdb::GridBase::META_GRID_NAME);
     if (given) entry.name = given->value;
-    // The end of the last grid is not needed, but it reveals a truncated file.
+    // Skips the tree of the last grid too, although nothing follows: a truncated file fails here.
     skipTree(bytes, entry, hasOffsets ? end : 0);
     entries.push_back(std::move(entry));
   }

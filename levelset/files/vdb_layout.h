@@ -69,8 +69,8 @@ struct VdbEntry {
   bool half = false;
   std::uint32_t compression = 0;
   std::vector<VdbMetadata> metadata;
-  openvdb::math::Transform::Ptr transform;  ///< null for an unsupported kind
-  std::size_t treePosition = 0;             ///< byte offset in the file
+  openvdb::math::Transform::Ptr transform;  ///< null for a frustum, which is not supported
+  std::size_t treePosition = 0;             ///< byte offset of the tree in the file
 
   [[nodiscard]] const VdbMetadata* find(std::string_view key) const;
   [[nodiscard]] std::string gridClass() const;
@@ -82,12 +82,14 @@ struct VdbEntry {
 
 struct VdbTreeLimits {
   std::size_t maxMemory = kNoMemoryLimit;
-  bool keepsTiles = false;  ///< active tiles stay tiles; they need not fit in memory as voxels
+  bool keepsTiles =
+      false;  ///< true: active tiles stay tiles, so the memory limit does not count their voxels
   Progress progress = {};
 };
 
 /// Reads the tree of an entry with float or double values, as a float tree.
-/// @throws InvalidInput when the file is damaged; ResourceLimit before the tree passes its limit
+/// @throws InvalidInput when the file is damaged
+/// @throws ResourceLimit before the tree exceeds limits.maxMemory
 [[nodiscard]] openvdb::FloatTree::Ptr readVdbTree(std::string_view file, const std::string& name,
                                                   const VdbEntry& entry,
                                                   const VdbTreeLimits& limits);
@@ -98,7 +100,7 @@ struct VdbTreeLimits {
                                                         const VdbEntry& entry,
                                                         const VdbTreeLimits& limits);
 
-/// Background of a float or double tree, from the start of the tree only.
+/// Reads the background of a float or double tree, without its nodes.
 [[nodiscard]] double readVdbBackground(std::string_view file, const std::string& name,
                                        const VdbEntry& entry);
 

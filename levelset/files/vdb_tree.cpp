@@ -54,7 +54,7 @@ struct Storage {
 template <typename T, typename Mask>
 struct ValueBlock {
   T inactive[2];   // replacements for inactive values that are not stored
-  Mask selection;  // which of the two replacements
+  Mask selection;  // for each inactive value: on for inactive[1], off for inactive[0]
   Index count;     // number of stored values
   bool activeOnly;
   const char* data;  // starts with the length if compressed
@@ -80,7 +80,7 @@ void checkBloscHeader(const VdbBytes& bytes, const char* block, std::size_t stor
     std::memcpy(&packed, block + 12, 4);
   }
   if (stored < kHeaderSize || plain != expected || packed != stored)
-    bytes.fail("a compressed block disagrees about its size");
+    bytes.fail("the header of a compressed block states a wrong size");
 }
 
 /// Skips stored data that unpack to `expected` bytes. Returns the stored size.
@@ -111,7 +111,7 @@ ValueBlock<T, Mask> takeValues(VdbBytes& bytes, const Storage<T>& storage, const
   ValueBlock<T, Mask> block;
   const auto kind = bytes.value<std::int8_t>();
   if (kind < io::NO_MASK_OR_INACTIVE_VALS || kind > io::NO_MASK_AND_ALL_VALS)
-    bytes.fail(fmt::format("a node has values of the unknown kind {}", kind));
+    bytes.fail(fmt::format("a node stores its values in the unknown layout {}", kind));
   block.inactive[1] = storage.background;
   block.inactive[0] =
       kind == io::NO_MASK_OR_INACTIVE_VALS ? storage.background : T(-storage.background);
@@ -127,7 +127,7 @@ ValueBlock<T, Mask> takeValues(VdbBytes& bytes, const Storage<T>& storage, const
   block.count = block.activeOnly ? active.countOn() : Mask::SIZE;
   block.data = bytes.rest().data();
   block.size = storage.half && block.count == 0
-                   ? 0  // half floats: zero values take no bytes
+                   ? 0  // with half floats, an empty list of values takes no bytes
                    : takeData(bytes, storage.compression,
                               block.count * (storage.half ? 2 * kComponents<T> : sizeof(T)));
   return block;
@@ -151,7 +151,7 @@ void unpack(const VdbBytes& bytes, const char* data, std::size_t size, std::uint
   }
 }
 
-/// Fills in all values of a node, stored or implied.
+/// Fills in all values of a node: those stored in the file, and replacements for the others.
 template <typename T, typename Mask>
 void expand(const VdbBytes& bytes, const ValueBlock<T, Mask>& block, const Storage<T>& storage,
             const Mask& active, T* values) {
@@ -212,21 +212,23 @@ class TreeReader {
   }
 
  private:
-  /// Counts the memory of the tree. It grows node by node, and each node also takes bytes of the
-  /// file.
+  /// Adds the bytes of a node to the memory of the tree and checks the limit. A damaged file cannot
+  /// claim nodes without end, because each node also takes bytes of the file.
   void countMemory(std::size_t size) {
     memory_ += static_cast<double>(size);
     if (memory_ > static_cast<double>(limits_.maxMemory)) requireMemory(memory_, limits_.maxMemory);
   }
 
   void readRoot(Root& root) {
-    if (bytes_.value<std::int32_t>() != 1) bytes_.fail("a tree has more than one buffer");
+    if (bytes_.value<std::int32_t>() != 1)
+      bytes_.fail("a tree has an unsupported number of buffers");
     storage_.background = bytes_.value<T>();
     root.setBackground(storage_.background, false);
     const auto tiles = bytes_.value<std::uint32_t>(), children = bytes_.value<std::uint32_t>();
     constexpr std::size_t kTileSize = 3 * sizeof(std::int32_t) + sizeof(T) + 1;
     if (tiles > bytes_.remaining() / kTileSize)
-      bytes_.fail(fmt::format("its root promises {} tiles", tiles));
+      bytes_.fail(
+          fmt::format("the root of a tree promises {} tiles, which the file cannot hold", tiles));
     std::set<Coord> seen;
     for (std::uint32_t i = 0; i < tiles; ++i) {
       const Coord origin = takeOrigin<typename Root::ChildNodeType>(seen);
@@ -252,7 +254,8 @@ class TreeReader {
     return origin;
   }
 
-  /// Counts the leaves of an active tile, which may later be split into voxels.
+  /// Adds the memory that an active tile takes after importBand() has split it into voxels. Fields
+  /// keep their tiles, so nothing is added for them.
   void countTile(Index log2VoxelCount) {
     if (limits_.keepsTiles) return;
     const double leaves = std::ldexp(1.0, static_cast<int>(log2VoxelCount)) / Leaf::SIZE;
@@ -294,7 +297,7 @@ class TreeReader {
     return node;
   }
 
-  /// Offsets of the values of each leaf in the file.
+  /// Skips the values of all leaves. Returns the byte offset of the values of each leaf.
   std::vector<std::size_t> skipLeafValues() {
     std::vector<std::size_t> offsets;
     offsets.reserve(leaves_.size());

@@ -217,7 +217,7 @@ TEST(BandFile, PicksTheOnlyLevelSet) {
   EXPECT_SAYS(sentence("vectors"), "vec3s");
   EXPECT_SAYS(sentence("none"), "'fog' (float, fog volume)");
   writeForeign(folder / "a.vdb", {gridOf(sphere(2), "a"), gridOf(sphere(2), "b")});
-  EXPECT_SAYS(sentence(""), "choose with --grid");
+  EXPECT_SAYS(sentence(""), "choose one with --grid");
   writeForeign(folder / "a.vdb", {gridOf(sphere(2), "a"), gridOf(sphere(2), "a")});
   EXPECT_SAYS(sentence("a"), "more than one grid of that name");
   writeForeign(folder / "a.vdb", {fog});
