@@ -22,8 +22,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kReadChunk = 1 << 22;
-constexpr int kGzipWindow =
-    15 + 16;  // zlib's windowBits: window of 2¹⁵ bytes; + 16 selects the gzip format
+// zlib's windowBits: a window of 2¹⁵ bytes; adding 16 selects the gzip format.
+constexpr int kGzipWindow = 15 + 16;
 
 std::string systemMessage(int error) {
   return std::generic_category().message(error);

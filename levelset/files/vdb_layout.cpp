@@ -166,16 +166,15 @@ std::vector<VdbEntry> readVdbEntries(std::string_view file, const std::string& n
   VdbBytes bytes(file, name);
   const bool hasOffsets = readFileHeader(bytes);
   const auto version = VdbBytes(file.substr(sizeof kMagic), name).value<std::uint32_t>();
-  constexpr std::size_t kMinSize =
-      40;  // bytes of the descriptor of a grid: lengths of its names, and offsets
+  constexpr std::size_t kMinSize = 40;  // bytes of a grid's descriptor: names and offsets
   const auto count = bytes.value<std::int32_t>();
   if (count < 0 || static_cast<std::size_t>(count) > bytes.remaining() / kMinSize)
     bytes.fail(fmt::format("its header promises {} grids, which the file cannot hold", count));
   std::vector<VdbEntry> entries;
   for (std::int32_t i = 0; i < count; ++i) {
     VdbEntry entry = readDescriptor(bytes);
-    static_cast<void>(bytes.take(
-        2 * sizeof(std::int64_t)));  // skips the offsets of the grid and of its leaf values
+    // Skips the offsets of the grid and of its leaf values.
+    static_cast<void>(bytes.take(2 * sizeof(std::int64_t)));
     const auto end = bytes.value<std::int64_t>();
     if (hasOffsets && end <= 0)
       bytes.fail(fmt::format("the header does not state where grid '{}' ends", entry.name));

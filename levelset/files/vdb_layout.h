@@ -82,8 +82,8 @@ struct VdbEntry {
 
 struct VdbTreeLimits {
   std::size_t maxMemory = kNoMemoryLimit;
-  bool keepsTiles =
-      false;  ///< true: active tiles stay tiles, so the memory limit does not count their voxels
+  /// True: active tiles stay tiles, so the memory limit does not count their voxels.
+  bool keepsTiles = false;
   Progress progress = {};
 };
 
