@@ -18,20 +18,23 @@ using flow::CurvatureState;
 using flow::CurvatureSteps;
 using flow::NearSurface;
 
-// Default tolerance in voxels, over the entire time.
+// Default tolerance of the time steps together, voxels.
 constexpr double kDefaultTolerance = 0.02;
-// Limits of the growth and shrinkage of steps, and safety factor on the error estimate.
+// Largest and smallest ratio of successive steps, and safety factor on the step length that the
+// error estimate allows.
 constexpr double kMostGrowth = 3, kMostShrinkage = 0.2, kSafety = 0.8;
 // Length of the first step, before an estimate exists, voxels².
 constexpr double kFirstStep = 10 * flow::kExplicitStep;
-// Redistancing is due when the band leaves less than this share of the wanted step.
+// The band is redistanced when it limits the next step to less than this fraction of the wanted
+// step, or of the time in which the surface moves by kFlowTravel.
 constexpr double kLeastShare = 0.4;
-// Number of fields alive during a step, and the active share of a band's blocks.
+// Number of fields in memory during a step, and the fraction of active grid points in the blocks of
+// a band.
 constexpr double kFields = 9, kFilled = 0.45;
-constexpr double kVolumeTolerance = 1e-6;  // share of the volume
+constexpr double kVolumeTolerance = 1e-6;  // relative error of the preserved volume
 constexpr std::size_t kMostFlowSteps = 100000;
-// A surface with preserved volume is at rest when its rate would move it less than this, in voxels,
-// over the time in which it rounds itself.
+// A surface with preserved volume is at rest when its rate would move it less than this distance,
+// in voxels, over the time 1 / κ² in which it becomes round (κ: mean curvature).
 constexpr double kRestMove = 0.05;
 
 void checkPositive(double value, const char* what, const char* unit) {
@@ -57,10 +60,11 @@ void checkArguments(const NarrowBand& solid, double time, const CurvatureFlowOpt
         time, *options.step, time / *options.step, kMostFlowSteps));
 }
 
-/// Time in voxels² after which the corners of a cube have moved by a voxel.
+/// Time in voxels² after which the corners of a cube have moved by a voxel. Later the surface has
+/// no edges that the distance transform must search for.
 constexpr double kEdgesGone = 0.5;
 
-/// Curvature flow of one solid, in voxels.
+/// Curvature flow of one solid. Lengths are in voxels, times in voxels².
 class CurvatureFlow {
  public:
   CurvatureFlow(const NarrowBand& solid, double time, const CurvatureFlowOptions& options)
@@ -121,7 +125,8 @@ class CurvatureFlow {
                     now_ * voxel_ * voxel_, time_ * voxel_ * voxel_));
   }
 
-  /// Integrates until redistancing is due, the surface is gone or the time is over.
+  /// Integrates until the band must be redistanced, the surface has vanished or the time is over.
+  /// @return the field after the last step, not redistanced
   openvdb::FloatGrid::Ptr runOn(const openvdb::FloatGrid& grid) {
     CurvatureState state(grid, options_.mask);
     CurvatureSteps steps(state, [&] { reportProgress(); });
@@ -143,7 +148,7 @@ class CurvatureFlow {
       const double whole = onSurface + (near.fastest > 0 ? near.displaced / near.fastest : 0);
       const double available = std::min(onSurface, near.clear);
       if (!first && available < kLeastShare * std::min(wanted, whole)) break;
-      // The explicit step is always possible, so the flow always advances.
+      // A step of kExplicitStep is stable with any scheme, so the flow always advances.
       double dt = std::min(wanted, std::max(available, flow::kExplicitStep));
       if (dt > 0.999 * left) dt = left;
       step(state, steps, first ? std::min(dt, kFirstStep) : dt, first);
@@ -153,8 +158,8 @@ class CurvatureFlow {
   }
 
   /// Returns true when the surface is at rest, by its current rate. Long steps and redistancing
-  /// leave roughness that may exceed that rate. So the displacement since redistancing, `elapsed`
-  /// ago, is tested too.
+  /// leave a roughness whose rate may exceed the limit. So the displacement of the surface since
+  /// redistancing, over the time `elapsed`, is tested too.
   static bool isAtRest(const CurvatureState& state, const NearSurface& near, double meanCurvature,
                        double elapsed) {
     const double rounding = meanCurvature * meanCurvature;
@@ -166,9 +171,9 @@ class CurvatureFlow {
     return flow::measureNearSurface(state, moved).unevenness() < kRestMove * rounding * elapsed;
   }
 
-  /// Returns the time over which the tolerance is spread. A surface with preserved volume forgets
-  /// its errors while it rounds itself: the slowest wave on a ball decays with the square of the
-  /// mean curvature.
+  /// Returns the time over which the errors of the steps may add up to the tolerance. With
+  /// preserved volume, earlier errors decay while the surface becomes round: the slowest wave on a
+  /// ball decays at a rate equal to the square of the mean curvature.
   double errorSpan(double meanCurvature) const {
     if (!options_.preservesVolume || meanCurvature == 0) return time_;
     return std::min(time_, 1 / (meanCurvature * meanCurvature));
@@ -185,7 +190,7 @@ class CurvatureFlow {
 
   FlowScheme cheapest(double dt, double left) const {
     if (options_.scheme != FlowScheme::Auto) return options_.scheme;
-    // Cost of the remaining time with steps of this length.
+    // Cost of the remaining time `left` with steps of length dt.
     const auto cost = [&](FlowScheme scheme) {
       return scheme == FlowScheme::Explicit ? flow::predictedCost(scheme, left)
                                             : left / dt * flow::predictedCost(scheme, dt);
@@ -194,8 +199,8 @@ class CurvatureFlow {
                              [&](auto a, auto b) { return cost(a) < cost(b); });
   }
 
-  /// Takes one step of at most dt. The first step after redistancing smooths away the rounding of
-  /// the distances; an error estimate would measure only that rounding.
+  /// Takes one step of at most dt. The first step after redistancing has no error control: it
+  /// smooths the rounding errors of the distances, and an error estimate would measure only those.
   void step(CurvatureState& state, CurvatureSteps& steps, double dt, bool first) {
     const FlowScheme scheme = cheapest(dt, time_ - now_);
     if (scheme == FlowScheme::Explicit) dt = std::min(dt, flow::kExplicitStep);
@@ -216,7 +221,8 @@ class CurvatureFlow {
         wanted_ = dt;
         continue;
       }
-      // A shortened step says little about the longest possible one.
+      // If the band has shortened dt, dt * factor is no limit of the next step, so keep the former
+      // wanted_.
       wanted_ = std::max({flow::kExplicitStep, dt * factor, factor > 1 ? wanted_ : 0.0});
       if (span < time_) error_ *= std::exp(-dt / span);
       error_ += error;
@@ -239,8 +245,8 @@ class CurvatureFlow {
     keepVolume(state, steps);
   }
 
-  /// Offsets the surface until its volume is restored. From then on the mean curvature is
-  /// subtracted from the rate.
+  /// Offsets the surface until it has the volume of the given solid again. Then updates the mean
+  /// curvature, which is subtracted from the curvature in the next steps.
   void keepVolume(CurvatureState& state, CurvatureSteps& steps) {
     constexpr int kMostCorrections = 4;
     for (int i = 0; i < kMostCorrections; ++i) {

@@ -10,6 +10,7 @@
 
 namespace levelset {
 
+/// Schemes of the time steps.
 enum class FlowScheme {
   Auto,      ///< scheme with the least predicted cost
   Explicit,  ///< Euler steps
@@ -21,11 +22,11 @@ enum class FlowScheme {
 
 struct CurvatureFlowOptions {
   FlowScheme scheme = FlowScheme::Auto;
-  bool preservesVolume = false;   ///< V_n = mean of κ over the surface − κ
-  std::optional<Mask> mask = {};  ///< scales V_n
-  /// Error of the time steps, rms over the surface, world units.
+  bool preservesVolume = false;   ///< normal velocity V_n = mean of κ over the surface − κ
+  std::optional<Mask> mask = {};  ///< weight that multiplies V_n
+  /// Largest error of the time steps, rms over the surface, world units. Empty: 0.02 voxels.
   std::optional<double> tolerance = {};
-  /// Longest step, world units²; shortened where the surface would leave the band.
+  /// Longest step, world units²; shortened where the surface would leave the band. Empty: no limit.
   std::optional<double> step = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
@@ -36,22 +37,23 @@ struct CurvatureFlowResult {
   /// Scheme used for most of the time; Auto: no step was taken.
   FlowScheme scheme = FlowScheme::Auto;
   std::size_t steps = 0;
-  std::size_t evaluations = 0;  ///< evaluations of the rate over the band, or work of the same cost
-  std::size_t redistances = 0;
+  /// Evaluations of φ_t over the band, with other work in units of their cost.
+  std::size_t evaluations = 0;
+  std::size_t redistances = 0;  ///< number of distance transforms
   /// Estimated error of the time steps, rms over the surface, world units.
   double errorEstimate = 0;
-  double shortestStep = 0;  ///< world units²; the tolerance makes no step shorter than this
+  double shortestStep = 0;  ///< lower limit of steps shortened for the tolerance, world units²
   double longestStep = 0;   ///< longest step taken, world units²
-  /// Time after which the surface was at rest; set only with preservesVolume.
+  /// Time after which the surface was at rest, world units². Set only with preservesVolume.
   std::optional<double> restedAfter = {};
 };
 
 /// Moves the surface inwards with the speed κ = k1 + k2 for a `time` in world units²: a ball obeys
-/// R² = R0² − 4 time. The topology may change, and parts may vanish.
-/// κ|∇φ| is of fourth order where the surface is smooth at the scale of the voxels. Redistancing
-/// happens only when the surface has moved a voxel and a half. Without a tolerance the error of the
-/// time steps is two hundredths of a voxel. [Meyer14, Smereka03, Sommeijer98]
-/// With preservesVolume the flow ends when the surface is at rest.
+/// R² = R0² − 4 time. The topology may change, and parts may vanish. The differences for κ|∇φ| are
+/// of fourth order where the surface is smooth at the scale of the voxels. The band is redistanced
+/// only when the surface has moved 1.5 voxels. The default tolerance of the time steps is 0.02
+/// voxels. [Meyer14, Smereka03, Sommeijer98] With preservesVolume the flow ends when the surface is
+/// at rest.
 /// @throws UsageError for a time, step or tolerance that is not positive and finite (time may be 0)
 /// @throws InvalidInput if `solid` is empty, or vanishes during the flow; the message gives the
 ///         time
@@ -66,30 +68,30 @@ struct CurvatureFlowOperator {
   static constexpr ErrorModel errorModel{2, 0.9, 0, "curvature-sphere"};
 
   struct Options {
-    double time = 0;  ///< world units²
+    double time = 0;  ///< duration of the flow, world units²
     bool preservesVolume = false;
     FlowScheme scheme = FlowScheme::Auto;
-    std::optional<double> tolerance;  ///< world units
-    std::optional<double> step;       ///< world units²
+    std::optional<double> tolerance;  ///< CurvatureFlowOptions::tolerance, world units
+    std::optional<double> step;       ///< longest step, world units²
     std::optional<Mask> mask;
 
     template <class Visitor>
     static void describe(Visitor& visit) {
       visit("time", &Options::time,
-            {.help = "length of time, world units squared",
+            {.help = "duration of the flow, world units squared",
              .range = OptionRange::NonNegative,
              .required = true,
              .position = 0});
       visit("volume-preserving", &Options::preservesVolume,
-            {.help = "take the mean curvature off, so that the volume stays"});
+            {.help = "subtract the mean curvature from the speed, so that the volume is constant"});
       visit("scheme", &Options::scheme,
             {{"auto", FlowScheme::Auto},
              {"explicit", FlowScheme::Explicit},
              {"stabilized", FlowScheme::Stabilized},
              {"implicit", FlowScheme::Implicit}},
-            {.help = "scheme of the steps in time; auto: the one predicted to cost least"});
+            {.help = "scheme of the time steps; auto: the scheme with the least predicted cost"});
       visit("tolerance", &Options::tolerance,
-            {.help = "error of the steps in time, rms; default: 0.02vx",
+            {.help = "largest error of the time steps, rms over the surface; default: 0.02vx",
              .unit = OptionUnit::Length,
              .range = OptionRange::Positive});
       visit("step", &Options::step,

@@ -15,9 +15,9 @@ const OperatorText CurvatureFlowOperator::text{
     .summary = "move the surface inwards with its curvature k1 + k2",
     .details =
         "A ball obeys R² = R0² - 4 time. Topology may change; a solid that vanishes is an error, "
-        "which gives the time. Steps are as long as the tolerance allows, and always stable. Where "
-        "the tolerance is not reached the result is still written, and the exit code is 5. A flow "
-        "that keeps its volume comes to rest.",
+        "and the message gives the time. Steps are as long as the tolerance allows, and always "
+        "stable. If the error exceeds the tolerance, the result is still written, and the exit "
+        "code is 5. A flow with --volume-preserving comes to rest.",
     .example = "levelsmith box --size 2,2,2 --voxel 0.1 ! curvature-flow --time 0.05 ! measure"};
 
 NarrowBand CurvatureFlowOperator::run(std::vector<NarrowBand> operands, const Options& options,
@@ -32,23 +32,22 @@ NarrowBand CurvatureFlowOperator::run(std::vector<NarrowBand> operands, const Op
   NarrowBand band = std::move(operands[0]);
   operands.clear();
   CurvatureFlowResult result = curvatureFlow(std::move(band), options.time, settings);
-  run.notes.push_back(fmt::format("{} steps, {} evaluations, {} re-distancings", result.steps,
-                                  result.evaluations, result.redistances));
-  run.errors.push_back(
-      {"steps in time, rms over the surface", result.errorEstimate, "world units"});
+  run.notes.push_back(fmt::format("{} steps, {} evaluations of the curvature, redistanced {} times",
+                                  result.steps, result.evaluations, result.redistances));
+  run.errors.push_back({"time steps, rms over the surface", result.errorEstimate, "world units"});
   if (result.restedAfter)
-    run.notes.push_back(
-        fmt::format("at rest after a time of {:.4g} world units squared", *result.restedAfter));
+    run.notes.push_back(fmt::format(
+        "the surface is at rest after a time of {:.4g} world units squared", *result.restedAfter));
   if (options.tolerance && result.errorEstimate > *options.tolerance)
     run.failure = fmt::format(
-        "the steps in time leave about {:.3g} world units, more than the tolerance of {:.3g}, "
-        "since for its sake none is made shorter than {:.3g}; ask for a shorter --step or a larger "
+        "the error of the time steps is about {:.3g} world units, more than the tolerance of "
+        "{:.3g}: the tolerance shortens no step below {:.3g}; give a shorter --step or a larger "
         "--tolerance",
         result.errorEstimate, *options.tolerance, result.shortestStep);
   return std::move(result.band);
 }
 
-/// The number of stages of stabilized steps grows with the root of the time.
+/// Assumes stabilized steps, whose number of stages grows with the square root of the time.
 std::optional<Cost> CurvatureFlowOperator::cost(const Options& options,
                                                 const OperatorPlans& plans) {
   const ValuePlan& solid = plans.operands[0];
@@ -62,9 +61,9 @@ const OperatorText SmoothOperator::text{
     .group = "Flow",
     .summary = "smooth the surface by a filter of its distances",
     .details =
-        "gaussian: a Gaussian of that sigma; mean: a box of the same variance; median: over the "
-        "grid points within sigma, which takes long when sigma is large; taubin: a Gaussian, then "
-        "sharpened so that long waves keep their amplitude.",
+        "--kind gaussian: a Gaussian with the standard deviation --sigma; mean: a box of the same "
+        "variance; median: the median over the grid points within sigma, which is slow for a large "
+        "sigma; taubin: a Gaussian, then a sharpening that restores the amplitude of long waves.",
     .example = "levelsmith box --size 2,2,2 --voxel 0.1 ! smooth --sigma 1vx ! measure"};
 
 NarrowBand SmoothOperator::run(std::vector<NarrowBand> operands, const Options& options,
@@ -85,7 +84,8 @@ RegionOfInterest SmoothOperator::regionOfInterest(const Options& options,
   return {.region = grown(ofResult.region, reach * voxel)};
 }
 
-/// The band is made as wide as the filter reads, filtered, and its distances are computed again.
+/// Adds the costs of three stages: the band is widened to the width that the filter reads,
+/// filtered, and redistanced.
 std::optional<Cost> SmoothOperator::cost(const Options& options, const OperatorPlans& plans) {
   const ValuePlan& solid = plans.operands[0];
   const double layer = solid.layer(), sigma = options.sigma / solid.voxelSize;

@@ -10,9 +10,10 @@ namespace {
 using Float4 = float __attribute__((vector_size(16)));
 using Int4 = std::int32_t __attribute__((vector_size(16)));
 
-// Below this squared slope the gradient has no reliable direction.
+// Below this squared slope |∇φ|² the direction of the gradient is not reliable.
 constexpr float kFlat = 0.01f;
-// Bound of the fourth-order correction: share of the second-order rate, and floor in voxels⁻¹.
+// Bound of the difference between the fourth-order and the second-order rate: a fraction of the
+// second-order rate plus a constant in voxels⁻¹.
 constexpr float kCorrectionShare = 0.3f, kCorrectionFloor = 0.02f;
 
 Float4 load(const float* p) {
@@ -33,7 +34,7 @@ struct Derivatives {
   Float4 x, y, z, xx, yy, zz, xy, xz, yz;
 
   [[nodiscard]] Float4 squaredSlope() const { return x * x + y * y + z * z; }
-  /// Δφ − n·Hn
+  /// Returns κ|∇φ| = Δφ − n·Hn, with the unit normal n and the Hessian H.
   [[nodiscard]] Float4 rate() const {
     const Float4 along =
         x * x * xx + y * y * yy + z * z * zz + 2.0f * (x * y * xy + x * z * xz + y * z * yz);
@@ -42,7 +43,7 @@ struct Derivatives {
   }
 };
 
-/// Central differences over `k` voxels to each side.
+/// Computes central differences over `k` voxels to each side, second order.
 template <int k>
 Derivatives differences(const float* centre) {
   constexpr int sx = k * PaddedBlock::kStepX, sy = k * PaddedBlock::kStepY, sz = k;
@@ -64,7 +65,7 @@ Derivatives differences(const float* centre) {
   return d;
 }
 
-/// Richardson extrapolation of differences over one and two voxels: fourth order.
+/// Extrapolates differences over one and two voxels to fourth order (Richardson).
 Derivatives combine(const Derivatives& one, const Derivatives& two) {
   const auto mix = [](Float4 a, Float4 b) { return (4.0f * a - b) * (1.0f / 3); };
   return {mix(one.x, two.x),   mix(one.y, two.y),   mix(one.z, two.z),
@@ -72,7 +73,8 @@ Derivatives combine(const Derivatives& one, const Derivatives& two) {
           mix(one.xy, two.xy), mix(one.xz, two.xz), mix(one.yz, two.yz)};
 }
 
-/// Returns the sum of the two second derivatives across the strongest one.
+/// Returns κ|∇φ| where the gradient has no direction: the sum of the eigenvalues of the Hessian
+/// without the one of largest magnitude, which stands for the normal.
 float rateWithoutNormal(const Derivatives& d, int lane) {
   Eigen::Matrix3f h;
   h << d.xx[lane], d.xy[lane], d.xz[lane], d.xy[lane], d.yy[lane], d.yz[lane], d.xz[lane],

@@ -14,19 +14,23 @@ using openvdb::FloatGrid;
 using openvdb::Vec3d;
 using LeafNode = openvdb::FloatTree::LeafNodeType;
 
-constexpr float kNear = 1;  // voxels
-// Least sum of the weights of valid corners; below it there is no leader.
+constexpr float kNear = 1;  // distance from the zero set in measureNearSurface(), voxels
+// Least sum of the trilinear weights of the corners of a leader's cell that lie in the core. With a
+// smaller sum the grid point does not follow a leader.
 constexpr float kLeastSum = 0.1f;
 
-// Bound of principal curvatures: close to a focus or a crease, level sets are not parallel.
+// Bound of the magnitude of principal curvatures, voxels⁻¹. Close to a focus or a crease, level
+// sets are not parallel and their curvature difference is unbounded.
 constexpr double kMostBent = 0.12;
 
-constexpr double kDifferencesReach = 2.8284271247461903;  // (2, 2, 0)
+constexpr double kDifferencesReach = 2.8284271247461903;  // length of (2, 2, 0), voxels
 static_assert(kFlowWidth >= kFlowCore + kDifferencesReach);
 
 struct Nothing {};
 
-/// Returns k1 + k2 of the parallel surface `away` voxels further out, less k1 + k2 here.
+/// Returns k1 + k2 of the parallel surface `away` voxels further out, minus `sum`.
+/// @param sum      k1 + k2 of a surface
+/// @param squares  k1² + k2² of that surface
 double differenceOfParallel(double away, double sum, double squares) {
   const double half = std::sqrt(std::max(0.0, squares / 2 - sum * sum / 4));
   double difference = 0;
@@ -52,7 +56,7 @@ std::pair<float, float> bendingAt(const float* p) {
   return {sum, squares};
 }
 
-/// Returns central differences at a grid point of a padded block.
+/// Returns the gradient at a grid point of a padded block by central differences.
 Vec3d gradientAt(const PaddedBlock& block, const Coord& c) {
   const float* p = block.at(c.x(), c.y(), c.z());
   const auto difference = [&](int step) { return static_cast<double>(p[step] - p[-step]) / 2; };
@@ -89,8 +93,8 @@ void CurvatureState::findCore(std::size_t i, PaddedBlock& block, Bending& bendin
     const double phi = static_cast<double>(std::abs(start_[i][it.pos()]));
     if (!(phi < kFlowCore)) continue;
     core_[i].setOn(it.pos());
-    // Curvature is needed at the corners of leaders' cells; these are within a diagonal of
-    // kFlowLeader.
+    // Curvatures are needed only at the corners of cells that contain leaders. These lie within a
+    // cell diagonal of |φ| = kFlowLeader.
     if (phi < kFlowLeader - 1.8) continue;
     const Coord c = LeafNode::offsetToLocalCoord(it.pos());
     std::tie(bending.sums[i][it.pos()], bending.squares[i][it.pos()]) =

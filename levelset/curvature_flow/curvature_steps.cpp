@@ -9,13 +9,14 @@ namespace {
 
 struct NoScratch {};
 
-// An iteration reads 7 values and a rate 37; both stream some fields.
+// Cost of an iteration of the HelmholtzSolver in evaluations of φ_t. An iteration reads 7 values
+// for each grid point and an evaluation 37, but both also read and write complete fields.
 constexpr double kIterationCost = 0.5;
 
 }  // namespace
 
 int legendreStages(double dt) {
-  // dt = kExplicitStep (s² + s − 2) / 4
+  // Solves the stability limit dt = kExplicitStep (s² + s − 2) / 4 for the number of stages s.
   const double s = (std::sqrt(9 + 16 * dt / kExplicitStep) - 1) / 2;
   return std::max(3, static_cast<int>(std::ceil(s - 1e-9)) | 1);
 }
@@ -75,8 +76,9 @@ double CurvatureSteps::rmsNearSurface(const Error& error) const {
     }
   };
   const Sum sum = state_.blocks().sum<Sum>([&](std::size_t i) {
-    // The error is averaged over a block. An error that alternates between grid points is rounding
-    // of the distances: any step damps it, and no shorter step avoids it.
+    // Averages the signed error over a block before squaring it. An error that alternates between
+    // grid points is rounding of the distances: any step damps it, and shorter steps do not avoid
+    // it.
     double total = 0, count = 0;
     for (auto it = state_.blocks().active(i).beginOn(); it; ++it) {
       if (!(std::abs(before_[i][it.pos()]) < 1)) continue;
@@ -120,8 +122,8 @@ void CurvatureSteps::eulerStep(double dt) {
   });
 }
 
-// [Meyer14, 16-18], in changes since the beginning of the step: the recursion multiplies rounding
-// errors by about s².
+// Equations 16 to 18 of [Meyer14], for the change since the beginning of the step instead of the
+// value: the recursion multiplies rounding errors by about s², and the change is small.
 void CurvatureSteps::legendreStep(double dt) {
   const int stages = legendreStages(dt);
   const auto b = [](int j) { return j < 2 ? 1.0 / 3 : (j * j + j - 2.0) / (2.0 * j * (j + 1)); };
@@ -149,8 +151,9 @@ void CurvatureSteps::legendreStep(double dt) {
   }
 }
 
-// Linearly implicit Euler steps with the Laplacian in place of the rate's derivative [Smereka03].
-// Twice the result of two half steps less that of one full step is of second order.
+// Linearly implicit Euler steps with the Laplacian in place of the derivative of the rate
+// [Smereka03]. Twice the result of two half steps minus the result of one full step is of second
+// order.
 double CurvatureSteps::implicitStep(double dt) {
   if (!solver_) solver_ = std::make_unique<HelmholtzSolver>(state_.blocks(), state_.weights());
   work_ += kIterationCost * solver_->solve(dt, rateBefore_, last_, pulse_);
@@ -162,7 +165,7 @@ double CurvatureSteps::implicitStep(double dt) {
   work_ += kIterationCost * solver_->solve(dt / 2, stageRate_, stageRate_, pulse_);
   state_.blocks().forEach<NoScratch>([&](std::size_t i, NoScratch&) {
     for (std::size_t n = 0; n < 512; ++n) {
-      older_[i][n] += stageRate_[i][n];  // change by two half steps
+      older_[i][n] += stageRate_[i][n];  // change by the two half steps
       last_[i][n] = older_[i][n] - last_[i][n];
       state_.value[i][n] = before_[i][n] + older_[i][n] + last_[i][n];
     }

@@ -11,11 +11,12 @@
 
 namespace levelset::flow {
 
-/// Returns the number of stages of a Runge-Kutta-Legendre step of length `dt`; always odd.
+/// Returns the number of stages of a Runge-Kutta-Legendre step of length `dt`, voxels². It is
+/// always odd.
 [[nodiscard]] int legendreStages(double dt);
 
-/// Returns the cost of a step in evaluations of the rate. The figure counts operations and is not
-/// measured.
+/// Returns the predicted cost of a step of length `dt`, voxels², in units of one evaluation of φ_t
+/// over the band. It is derived from the number of values read, not measured.
 [[nodiscard]] double predictedCost(FlowScheme scheme, double dt);
 
 /// Time stepping of a curvature flow; lengths in voxels, times in voxels². Keeps its fields between
@@ -25,20 +26,20 @@ class CurvatureSteps {
   /// @param pulse  called repeatedly during a step; may throw to stop it
   CurvatureSteps(CurvatureState& state, std::function<void()> pulse);
 
-  /// Takes one step. rate() must be that of the state; the step updates it.
-  /// @return estimated error of the step, rms over the surface
+  /// Takes one step. rate() must be the rate of the state's current value; the step updates both.
+  /// @return estimated error of the step, rms over the surface, voxels
   double take(FlowScheme scheme, double dt);
   /// Reverts the last step.
   void undo();
-  /// Adds `by` times the weights to all values.
+  /// Adds `by` voxels times the mask weights to all values. Does not update rate().
   void raise(double by);
   /// Recomputes rate(), after raise() or a change of the shift.
   void refreshRate();
 
   [[nodiscard]] const Field& rate() const { return rate_; }
-  double shift = 0;  ///< constant subtracted from the curvature
+  double shift = 0;  ///< constant subtracted from the curvature, voxels⁻¹
   [[nodiscard]] std::size_t evaluations() const { return static_cast<std::size_t>(work_); }
-  /// Returns the power of the step length with which the error grows.
+  /// Returns the power of the step length with which the error of one step grows.
   [[nodiscard]] static int errorOrder(FlowScheme scheme) {
     return scheme == FlowScheme::Stabilized ? 3 : 2;
   }

@@ -7,11 +7,11 @@ namespace {
 
 struct NoBuffer {};
 
-// Tolerance of the residual, relative to the right-hand side.
+// Tolerance of the preconditioned residual, relative to its initial value.
 constexpr double kSolved = 1e-5;
 // Largest eigenvalue of the negative Laplacian, voxels⁻².
 constexpr double kLargestEigenvalue = 12;
-// A smaller weight counts as zero: the system would be nearly singular.
+// A smaller weight counts as zero, since it would make the system nearly singular.
 constexpr float kLeastWeight = 1e-3f;
 
 }  // namespace

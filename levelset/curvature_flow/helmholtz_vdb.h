@@ -8,21 +8,22 @@
 
 namespace levelset::flow {
 
-/// Solver of (1/w − dt Δ) change = dt rate / w on the grid points of a band, with no flow through
-/// its rim. Uses conjugate gradients with sums in a fixed order. The change vanishes where the
-/// weight w does.
+/// Solver of (1/w − dt Δ) change = dt rate / w on the grid points of a band, with homogeneous
+/// Neumann conditions at the ends of the band. Uses conjugate gradients with sums in a fixed order.
+/// The change is zero where the weight w is zero.
 ///
-/// Eigen's ConjugateGradient is not used: it needs contiguous vectors, while the fields here are
-/// blocks that are read with a border. It adds the products of single-precision vectors in single
-/// precision. Here they are added in double precision, in parallel and in tree order, so that any
-/// number of threads gives the same bits. Its loop also has no callback that could report progress
-/// or cancel.
+/// Eigen's ConjugateGradient is not used: it needs contiguous vectors, while the fields of this
+/// solver are blocks that are read with an apron. It adds the products of single-precision vectors
+/// in single precision. This solver adds them in double precision, in parallel and in tree order,
+/// so that any number of threads gives the same bits. The loop of Eigen's solver also has no
+/// callback that could report progress or cancel.
 class HelmholtzSolver {
  public:
   /// Keeps a reference to both arguments.
-  /// @param weights  empty: all one
+  /// @param weights  weights w of the grid points; empty: all are 1
   HelmholtzSolver(const BandBlocks& blocks, const Field& weights);
-  /// Solves for `change`, which may be the same field as `rate`.
+  /// Solves for `change`, which may be the same field as `rate`. Calls `pulse` in each iteration;
+  /// it may throw to stop the solver.
   /// @return the number of iterations
   int solve(double dt, const Field& rate, Field& change, const std::function<void()>& pulse);
   [[nodiscard]] static double predictedIterations(double dt);
@@ -37,7 +38,7 @@ class HelmholtzSolver {
   const BandBlocks& blocks_;
   const Field& weights_;
   std::vector<BandBlocks::Mask> unknown_;
-  Field neighbours_;  ///< number of the six neighbours in the band
+  Field neighbours_;  ///< how many of the six neighbours are in the band
   Field residual_, scaled_, direction_, product_;
 };
 

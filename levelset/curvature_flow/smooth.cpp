@@ -26,20 +26,24 @@ using openvdb::CoordBBox;
 constexpr double kGaussianReach = 4;
 // Distance from the zero set at which the interpolant reads values, voxels.
 constexpr double kStencil = 3;
-// Half width that the filter needs, in σ. Beyond it the tails of both sides of the surface balance.
+// Half width that the filter needs, in σ. Values farther from the surface change the result little,
+// since those on its two sides cancel.
 constexpr double kKnownReach = 3;
 // Relative tolerance for a band to count as wide enough.
 constexpr double kWideEnough = 1.0001;
+// Number of fields in memory at the same time.
 constexpr double kFieldsAlive = 5;
-// Largest number of values that a median may read in all: some thousand CPU seconds.
+// Largest number of values that a median may read, for all grid points together. Reading as many
+// takes some thousand CPU seconds.
 constexpr double kMostReadings = 1e12;
-constexpr double kWidened = 0.3, kFiltered = 0.7;  // shares of the work
+constexpr double kWidened = 0.3, kFiltered = 0.7;  // progress after widening and after filtering
 
-/// Weights of a symmetric filter along a line, the middle one first.
+/// Returns the weights of a Gaussian filter along a line, from the middle to one end. The filter is
+/// symmetric.
 std::vector<float> gaussianWeights(double sigma) {
   const int reach = std::max(1, static_cast<int>(std::ceil(kGaussianReach * sigma)));
   // The weights integrate the Gaussian over each voxel, so that a σ below a voxel keeps its
-  // variance. The variance of the voxel's own width is subtracted.
+  // variance. That adds the variance 1/12 of a voxel, which is therefore subtracted from σ² first.
   std::vector<double> weights;
   const double narrowed = std::sqrt(std::max(sigma * sigma - 1.0 / 12, 1e-4));
   double sum = 0;
@@ -54,12 +58,13 @@ std::vector<float> gaussianWeights(double sigma) {
 }
 
 std::vector<float> boxWeights(double sigma) {
-  // A box of variance σ²: full weight on inner voxels, and an equal part of it at both ends.
+  // A box of variance σ²: equal weights on the inner voxels, and the fraction `part` of that weight
+  // on the voxel at each end.
   int whole = 0;
   const auto squares = [](int n) { return n * (n + 1.0) * (2.0 * n + 1) / 3; };
   while (squares(whole + 1) / (2.0 * (whole + 1) + 1) <= sigma * sigma) ++whole;
   const double end = whole + 1, variance = sigma * sigma;
-  // (squares + 2 p end²) / (2 whole + 1 + 2 p) = σ²
+  // Solves (squares(whole) + 2 part end²) / (2 whole + 1 + 2 part) = σ² for `part`.
   const double part =
       (variance * (2.0 * whole + 1) - squares(whole)) / (2 * (end * end - variance));
   const double sum = 2.0 * whole + 1 + 2 * part;
@@ -68,8 +73,8 @@ std::vector<float> boxWeights(double sigma) {
   return result;
 }
 
-/// Returns index steps within a dense cube of `side` grid points to those within `radius` of its
-/// centre.
+/// Returns the array offsets, in a dense cube with `side` grid points along an edge, from a grid
+/// point to all grid points within `radius` voxels of it.
 std::vector<std::ptrdiff_t> stepsWithin(double radius, int pad, std::ptrdiff_t side) {
   const double squared = std::max(1.0, radius * radius);
   std::vector<std::ptrdiff_t> steps;
@@ -86,7 +91,7 @@ int medianPad(double radius) {
   return std::max(1, static_cast<int>(std::floor(radius)));
 }
 
-/// Refuses a median that takes too long.
+/// Refuses a median that would read more than kMostReadings values.
 void requireMedian(const openvdb::FloatGrid& grid, double radius) {
   const double around = 4.0 / 3 * M_PI * std::pow(std::max(1.0, radius), 3);
   const double readings = static_cast<double>(grid.activeVoxelCount()) * around;
@@ -100,7 +105,7 @@ void requireMedian(const openvdb::FloatGrid& grid, double radius) {
 /// Filter for fields on the blocks of a band.
 class BlockFilter {
  public:
-  /// @param passes  number of passes over all blocks, for the progress
+  /// @param passes  number of passes over all blocks that report progress
   BlockFilter(const openvdb::FloatGrid& grid, double passes, Progress progress)
       : tree_(grid.tree()),
         blocks_(grid.tree()),
@@ -173,8 +178,9 @@ class BlockFilter {
     });
   }
 
-  /// Convolves along an axis: copies the chain of blocks around each block, then filters its 64
-  /// lines. Not a padded leaf: the copy extends along one axis only, and its lines are transposed.
+  /// Convolves along an axis: copies each block and its neighbour blocks along the axis, then
+  /// filters the 64 lines of the block. Does not use PaddedLeaf, because the copy extends along one
+  /// axis only, and is transposed so that the 64 lines are contiguous.
   void alongAxis(const Field& in, int axis, const std::vector<float>& weights, Field& out) const {
     const int reach = static_cast<int>(weights.size()) - 1, chain = (reach + 7) / 8;
     const std::size_t stride = axis == 0 ? 64 : axis == 1 ? 8 : 1;
@@ -215,7 +221,7 @@ class BlockFilter {
   const openvdb::FloatTree& tree_;
   BandBlocks blocks_;
   float far_;
-  double work_;  ///< total work: blocks times the passes over each
+  double work_;  ///< total work: number of blocks times number of passes
   mutable double done_ = 0;
   mutable std::mutex mutex_;
   Progress progress_;
@@ -253,8 +259,8 @@ void applyMask(const Mask& mask, const openvdb::FloatGrid& grid, const BandBlock
   });
 }
 
-/// Returns the bounds of the band's grid points with a positive mask weight; empty when there are
-/// none.
+/// Returns the index bounds of the band's grid points with a positive mask weight; empty when there
+/// are none.
 CoordBBox changingBox(const openvdb::FloatGrid& grid, const Mask& mask) {
   CoordBBox box;
   for (auto it = grid.cbeginValueOn(); it; ++it)
@@ -263,7 +269,7 @@ CoordBBox changingBox(const openvdb::FloatGrid& grid, const Mask& mask) {
   return box;
 }
 
-/// Returns the bounds of the grid points whose values differ.
+/// Returns the index bounds of the grid points at which two fields differ.
 CoordBBox differing(const BandBlocks& blocks, const Field& a, const Field& b) {
   CoordBBox box;
   for (std::size_t i = 0; i < blocks.size(); ++i)
@@ -273,7 +279,7 @@ CoordBBox differing(const BandBlocks& blocks, const Field& a, const Field& b) {
   return box;
 }
 
-/// Replaces the content of a box in `target` by that of `source`.
+/// Replaces the values and active states of `target` in a box by those of `source`.
 void paste(const openvdb::FloatTree& source, const CoordBBox& box, openvdb::FloatTree& target) {
   target.fill(box, target.background(), false);
   for (auto it = source.cbeginValueAll(); it; ++it) {
@@ -297,12 +303,13 @@ void paste(const openvdb::FloatTree& source, const CoordBBox& box, openvdb::Floa
   openvdb::tools::pruneTiles(target);
 }
 
+/// A filter and its size.
 struct Filtering {
   SmoothKind kind;
-  double width;  ///< voxels
+  double width;  ///< σ, or the radius of the median, voxels
 
   [[nodiscard]] double passes() const { return kind == SmoothKind::Taubin ? 2 : 1; }
-  /// Returns the distance from the surface to which distances must be known, voxels.
+  /// Returns the half width of the band that the filter needs, voxels.
   [[nodiscard]] double known() const {
     return kind == SmoothKind::Median ? width + 1 : passes() * kKnownReach * width;
   }
@@ -312,8 +319,8 @@ struct Filtering {
   }
 };
 
-/// Smooths the solid in a box of grid points, or everywhere. Returns none when the box holds no
-/// usable surface.
+/// Smooths the solid in a box of grid points, or everywhere if `box` is empty. Returns no band when
+/// the box contains too little of the surface to compute the distances from.
 std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const NarrowBand& solid,
                                      const Filtering& filtering, const SmoothOptions& options) {
   const double voxel = solid.voxelSize();
@@ -326,7 +333,7 @@ std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const 
   };
 
   // === Distances for the filter
-  // The distances computed at the end depend on surfaces up to twice the half width away.
+  // The final redistancing depends on surfaces up to twice the half width away.
   const double trusted = filtering.known(), own = 2 * solid.halfWidth() + 2;
   const double needed = trusted + std::max(filtering.reach(), own) + 2 * kStencil;
   openvdb::FloatGrid::Ptr field;
@@ -352,7 +359,7 @@ std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const 
   if (options.mask) applyMask(*options.mask, *field, filter.blocks(), before, after);
   const CoordBBox moved = box ? differing(filter.blocks(), before, after) : CoordBBox();
   if (box && moved.empty()) return solid;
-  // A wide filter may change grid points outside the part of the field that was computed.
+  // A wide filter may change grid points outside the region in which `field` was computed.
   if (box && !around(trusted).isInside(moved)) return std::nullopt;
   filter.blocks().write(after, voxel, field->tree());
   if (!eikonal::hasZeroCrossing(field->tree())) return std::nullopt;
@@ -368,7 +375,7 @@ std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const 
   try {
     changed = eikonal::distanceTransform(*field, request);
   } catch (const InvalidInput&) {
-    return std::nullopt;  // the only crossings are at the borders of the part
+    return std::nullopt;  // all zero crossings are at the border of the region
   }
   const openvdb::FloatGrid::Ptr result = vdb(solid).deepCopy();
   paste(changed->tree(), *request.region, result->tree());
@@ -400,8 +407,8 @@ NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma, const SmoothO
   if (options.mask) {
     const CoordBBox box = changingBox(vdb(solid), *options.mask);
     if (box.empty()) return solid;
-    // When the box holds no usable surface, the surface elsewhere determines the distances: smooth
-    // all.
+    // When the box contains too little of the surface, distances in it depend on the surface
+    // elsewhere: smooth the complete band.
     if (!box.isInside(vdb(solid).evalActiveVoxelBoundingBox()))
       if (auto part = smoothedIn(box, solid, filtering, options)) return std::move(*part);
   }

@@ -12,14 +12,14 @@ namespace levelset {
 
 enum class SmoothKind {
   Gaussian,  ///< convolution of φ with a Gaussian of standard deviation σ, cut at 4 σ
-  Mean,      ///< convolution with a box of the same variance
-  Median,    ///< median over the grid points within σ, at least one voxel
-  /// Gaussian, then sharpening that restores long waves; preserves the volume.
+  Mean,      ///< convolution of φ with a box of variance σ²
+  Median,    ///< median of φ over the grid points within σ, or within one voxel if σ is smaller
+  /// Gaussian, then a sharpening that restores the amplitude of long waves; preserves the volume.
   Taubin
 };
 
 struct SmoothOptions {
-  std::optional<Mask> mask = {};
+  std::optional<Mask> mask = {};  ///< weight of the filtered values against the given ones
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
@@ -30,7 +30,7 @@ struct SmoothOptions {
 /// @return voxels
 [[nodiscard]] double smoothingReach(SmoothKind kind, double sigma, double halfWidth);
 
-/// Returns the half width that the filter needs. A narrower band is rebuilt to this width first.
+/// Returns the half width that the filter needs. smooth() widens a narrower band to it first.
 /// @param sigma  standard deviation of the filter, voxels
 /// @return voxels
 [[nodiscard]] double smoothingWidth(SmoothKind kind, double sigma);
@@ -54,7 +54,7 @@ struct SmoothOperator {
 
   struct Options {
     SmoothKind kind = SmoothKind::Gaussian;
-    double sigma = 0;  ///< world units
+    double sigma = 0;  ///< standard deviation of the filter, world units
     std::optional<Mask> mask;
 
     template <class Visitor>

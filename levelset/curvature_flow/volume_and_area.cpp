@@ -8,25 +8,27 @@ namespace {
 
 using LeafNode = openvdb::FloatTree::LeafNodeType;
 
-// Beyond this distance, in voxels, a plane does not cut the cube around a grid point.
+// A plane at a larger distance from a grid point, in voxels, does not cut the unit cube about it.
+// Half the diagonal of the cube is 0.866.
 constexpr float kReach = 0.87f;
-// Least component of a normal: keeps the formula regular near the axes.
+// Lower bound of the components of a normal in partBelow(), which divides by them.
 constexpr double kLeastComponent = 1e-3;
-// Support of the kernel that spreads the surface over grid points, voxels.
+// Half width of the triangular kernel that approximates the delta function of the surface, voxels.
 constexpr double kSpread = 1.5;
 
 double cubed(double x) {
   return x > 0 ? x * x * x : 0;
 }
 
-/// Returns the part of the unit cube about the origin in which n·x + d < 0, for a unit normal.
+/// Returns the volume of the part of the unit cube about the origin in which n·x + d < 0, for a
+/// unit normal n.
 double partBelow(openvdb::Vec3d n, double d) {
   double sum = 0;
   for (int i = 0; i < 3; ++i) {
     n[i] = std::max(std::abs(n[i]), kLeastComponent);
     sum += n[i];
   }
-  const double a = sum / 2 - d;  // height of the plane above the lowest corner
+  const double a = sum / 2 - d;  // distance of the plane from the lowest corner of the cube
   if (a <= 0) return 0;
   if (a >= sum) return 1;
   double volume = cubed(a) - cubed(a - sum);
@@ -58,7 +60,8 @@ VolumeAndArea volumeAndAreaOfBlock(const CurvatureState& state, const Field& rat
     const double weight =
         state.weights().empty() ? 1 : static_cast<double>(state.weights()[i][it.pos()]);
     volumeAndArea.area += delta * weight / std::max(slope, 0.1);
-    // A plane through the foot differs from a surface of curvature κ by κ/24 on average.
+    // The volume behind the tangent plane at the foot point exceeds that behind a surface of
+    // curvature κ by κ/24 on average.
     volumeAndArea.volume -= delta * (static_cast<double>(rate[i][it.pos()]) + weight * shift) / 24;
   }
   return volumeAndArea;
