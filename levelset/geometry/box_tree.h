@@ -14,9 +14,9 @@
 
 namespace levelset {
 
-/// Binary tree of the bounding boxes of items, for nearest-item searches. The boxes are tight.
-/// Splitting planes alone would give poor distance bounds for a flat surface that lies aside of
-/// them.
+/// Binary tree of the bounding boxes of items, for nearest-item searches. Each node stores the
+/// tight box of its items, not only a splitting plane: planes give poor lower bounds of the
+/// distance to a flat surface.
 class BoxTree {
  public:
   BoxTree() = default;
@@ -31,8 +31,9 @@ class BoxTree {
   /// Item numbers in the order of the leaves.
   [[nodiscard]] const std::vector<std::uint32_t>& order() const { return order_; }
 
-  /// Calls look(begin, end), a range of positions in order(), for each leaf whose box lies within
-  /// the root of `squared`. `look` lowers `squared`. Near leaves come first.
+  /// Calls look(begin, end) for each leaf whose box is at most √`squared` away from `from`, near
+  /// leaves first. The items of the leaf are order()[begin] to order()[end − 1]. `look` lowers
+  /// `squared` when it finds a nearer item.
   template <typename Look>
   void search(const openvdb::Vec3d& from, const double& squared, const Look& look) const {
     if (!nodes_.empty()) visit(0, from, squared, look);
@@ -44,7 +45,8 @@ class BoxTree {
   struct Node {
     openvdb::Vec3f low, high;
     std::uint32_t begin = 0, end = 0;  ///< range in order_
-    std::uint32_t right = 0;  ///< second child; the first child follows its parent; 0: a leaf
+    /// Index of the second child, 0 for a leaf; the first child follows its parent.
+    std::uint32_t right = 0;
   };
 
   template <typename Bound, typename Coordinate>
@@ -54,7 +56,7 @@ class BoxTree {
     nodes_.emplace_back();
     openvdb::Vec3d low(std::numeric_limits<double>::max()), high = -low;
     for (std::uint32_t i = begin; i < end; ++i) bound(order_[i], low, high);
-    // Rounded outwards, so that the box contains its items.
+    // Rounds the box outwards to float, so that it contains its items.
     for (int i = 0; i < 3; ++i) {
       nodes_[index].low[i] = std::nextafter(static_cast<float>(low[i]), -INFINITY);
       nodes_[index].high[i] = std::nextafter(static_cast<float>(high[i]), INFINITY);

@@ -7,8 +7,8 @@
 
 namespace levelset {
 
-/// Disjoint sets of numbers that support joining (union-find). The lowest number represents its set
-/// (internal).
+/// Union-find structure: disjoint sets of numbers that can be joined. The lowest number of a set
+/// represents it. Internal.
 class DisjointSets {
  public:
   /// The numbers 0 … count − 1, each in a set of its own.

@@ -19,11 +19,11 @@ bool anyCoincide(const std::vector<Imath::V3d>& positions) {
   return false;
 }
 
-/// An edge with a single triangle.
+/// Border edge: an edge with only one triangle.
 struct BorderSide {
-  std::uint32_t low, high;  ///< vertices that represent the positions of its ends
-  std::uint32_t atLow, atHigh;
-  bool rises;  ///< the triangle runs along the edge from low to high
+  std::uint32_t low, high;  ///< representatives of all border vertices at its two ends; low ≤ high
+  std::uint32_t atLow, atHigh;  ///< vertices of the triangle itself at these ends
+  bool rises;                   ///< the triangle runs along the edge from low to high
 };
 
 /// Finds the edges with a single triangle, in triangle order.
@@ -59,8 +59,9 @@ std::vector<BorderSide> findBorder(const TriMesh& mesh) {
   return border;
 }
 
-/// Finds the representatives of the edge ends. Enters vertices on the border only, so that parts
-/// that only touch keep their own vertices.
+/// Sets the representatives of the ends of border edges: border vertices at equal positions get the
+/// same one. Other vertices do not take part, so surface components that merely touch keep their
+/// own vertices.
 void findEndVertices(const std::vector<Imath::V3d>& positions, std::vector<BorderSide>& border) {
   convert::PositionTable table(positions, border.size());
   for (BorderSide& side : border) {
@@ -78,10 +79,11 @@ void join(DisjointSets& vertices, const BorderSide& a, const BorderSide& b) {
   vertices.join(a.atHigh, b.atHigh);
 }
 
-/// Joins edges at equal positions. Edges that run in opposite directions are paired like brackets.
-/// The triangles of one part are consecutive in a mesh, so parts that share an edge stay separate.
-/// Unpaired edges are joined too: an edge with three faces, or with two faces of opposite
-/// orientation, is one edge with or without seams.
+/// Joins border edges at equal positions. In triangle order, edges that run in opposite directions
+/// are paired like brackets. The triangles of one surface component are consecutive in a mesh, so
+/// two components that share an edge stay separate. The remaining edges are joined to the first
+/// edge at their position. Three faces at an edge, or two of opposite orientation, thus share one
+/// edge, as in a mesh without seams.
 void joinSides(const std::vector<BorderSide>& border, DisjointSets& vertices) {
   std::vector<std::size_t> order(border.size()), open;
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
@@ -142,7 +144,7 @@ std::optional<TriMesh> withoutSeams(const TriMesh& mesh, std::size_t maxMemory) 
   requireMemory(triangles * 3 * kSideBytes, maxMemory);
   std::vector<BorderSide> border = findBorder(mesh);
   if (border.empty()) return std::nullopt;
-  // Memory of the border with its order and position table, then of the result.
+  // Bytes of the border edges, their order and their position table; then those of the result.
   constexpr double kBorderBytes = sizeof(BorderSide) + 2 * 8 + kTableBytes;
   requireMemory(static_cast<double>(border.size()) * kBorderBytes + triangles * 12 + vertices * 32,
                 maxMemory);

@@ -8,8 +8,8 @@
 
 namespace levelset::convert {
 
-/// Hash table that finds equal points of two or three coordinates. −0 and +0 are equal. Open
-/// addressing.
+/// Hash table with open addressing that finds equal points of two or three coordinates. −0 and +0
+/// are equal.
 template <typename Vector>
 class ValueTable {
  public:

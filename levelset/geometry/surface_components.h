@@ -8,19 +8,18 @@
 
 #include "levelset/geometry/disjoint_sets.h"
 
-/// Surface components (connected surfaces) of a triangle mesh, for any vector type with []
-/// (internal).
+/// Surface components (connected pieces) of a triangle mesh, for any vector type with []. Internal.
 namespace levelset {
 
 struct ComponentFigures {
   double volume = 0;  ///< signed: negative for the wall of a cavity
   double area = 0;
-  long euler = 0;  ///< V − E + F, if each edge has two triangles
+  long euler = 0;  ///< Euler characteristic V − E + F, valid if each edge has two triangles
 };
 
 struct SurfaceComponents {
-  std::vector<ComponentFigures> figures;         ///< in the order of their first vertices
-  std::vector<std::uint32_t> componentOfVertex;  ///< kNoComponent: vertex without a triangle
+  std::vector<ComponentFigures> figures;  ///< one entry for each component, ordered by first vertex
+  std::vector<std::uint32_t> componentOfVertex;  ///< component number; kNoComponent: no triangle
   static constexpr std::uint32_t kNoComponent = 0xffffffffu;
 };
 
@@ -61,7 +60,8 @@ SurfaceComponents findSurfaceComponents(
   std::vector<std::uint32_t> anchors;
   for (std::uint32_t v = 0; v < positions.size(); ++v) {
     if (components.componentOfVertex[v] == SurfaceComponents::kNoComponent) continue;
-    const std::uint32_t top = sets.find(v);  // lowest vertex of its set, numbered before
+    // Lowest vertex of the component: it comes first, so the component has its number already.
+    const std::uint32_t top = sets.find(v);
     if (top == v) {
       components.componentOfVertex[v] = static_cast<std::uint32_t>(anchors.size());
       anchors.push_back(v);

@@ -24,7 +24,8 @@ class TriangleTree {
     double distance = 0;
     bool found = false;
   };
-  /// Nearest point on the triangles within `limit`.
+  /// Finds the nearest point on the triangles that is nearer than `limit`. If there is none,
+  /// `found` is false and `distance` is `limit`.
   [[nodiscard]] Hit nearest(const openvdb::Vec3d& from, double limit) const;
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
 
-// For the .cpp files of levelset/advection only.
+// For the .cpp files of levelset/curvature_flow only.
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -18,11 +18,11 @@ namespace levelset::flow {
 
 /// One float for each grid point of a leaf block.
 using Values = std::array<float, 512>;
-/// One block for each leaf, in tree order.
+/// Values of all leaf blocks of a tree, in tree order.
 using Field = std::vector<Values>;
 
-/// A leaf block with a border of two grid points on each side. The rows of 16 keep vector reads
-/// inside the array.
+/// A leaf block with a border of two grid points on each side. Rows have 16 entries instead of 12,
+/// so that vector instructions may read beyond the end of a row.
 struct PaddedBlock : PaddedLeaf<2, 16> {
   /// Sum of the values at the six neighbours of a grid point, given by its offset in the leaf.
   [[nodiscard]] float neighbourSum(openvdb::Index offset) const {
@@ -53,9 +53,9 @@ class BandBlocks {
   /// Writes the active values to the tree, multiplied by `unit`.
   void write(const Field& field, double unit, openvdb::FloatTree& tree) const;
 
-  /// Copies a block and its border.
-  /// @param outside  value at border points beyond all blocks, outside the solid; −outside inside
-  ///         it
+  /// Copies block `i` of a field and a border of two grid points from its neighbours.
+  /// @param outside  value at border points that no leaf block holds: positive outside the solid;
+  /// inside it, the value is −outside
   void gather(const Field& field, std::size_t i, float outside, PaddedBlock& block) const;
 
   /// Calls work(i, scratch) for each block, in parallel. Each task has one `Scratch`.
@@ -80,8 +80,8 @@ class BandBlocks {
   }
 
  private:
-  static constexpr std::int32_t kOutside = -1, kInside = -2;  // replace the number of a missing
-                                                              // neighbour
+  // Entries of neighbours_ for a missing block, outside and inside the solid.
+  static constexpr std::int32_t kOutside = -1, kInside = -2;
 
   std::vector<openvdb::Coord> origins_;
   std::vector<Mask> active_;

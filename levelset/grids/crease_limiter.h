@@ -1,7 +1,8 @@
 #pragma once
 
-// For the .cpp files of this library: limits creases in tricubic interpolation of distances, whose
-// slope jumps in the middle of a thin wall and inside an edge.
+// Crease limiter for tricubic interpolation of distances, for the .cpp files of this library. The
+// slope of a distance jumps in the middle of a thin wall and on the bisector inside an edge of the
+// solid. Samples beyond such a crease would falsify the interpolant.
 
 #include <array>
 #include <cmath>
@@ -10,12 +11,12 @@ namespace levelset {
 
 /// Second difference, in voxels, above which a sample may lie beyond a crease.
 inline constexpr double kCreaseBend = 0.3;
-/// Factor by which the second difference on the other side must be smaller. A curved surface never
-/// reaches it.
+/// A sample counts as beyond a crease only if the second difference at its end of the line exceeds
+/// that at the other end by this factor. On a smooth curved surface the factor is never reached.
 inline constexpr float kCreaseOneSided = 3;
 
-/// If one of the two outer samples lies beyond a crease, replaces it by extrapolation of the
-/// other three.
+/// Limits four consecutive samples on a line. If an outer one (v0 or v3) lies beyond a crease,
+/// replaces it by parabolic extrapolation of the other three.
 inline void limitAtCrease(float& v0, float v1, float v2, float& v3, float bendLimit) {
   const float before = v0 - 2 * v1 + v2, after = v1 - 2 * v2 + v3;
   if (std::abs(before) > bendLimit && std::abs(before) > kCreaseOneSided * std::abs(after))
@@ -25,8 +26,8 @@ inline void limitAtCrease(float& v0, float v1, float v2, float& v3, float bendLi
 }
 
 /// Returns true when a second difference along the lines of a cell's 4³ samples (x slowest) exceeds
-/// the limit. Without branches, so that the compiler vectorises it: almost all cells have no
-/// crease.
+/// the limit. The loops have no branches, so that the compiler vectorises them: almost all cells
+/// have no crease and need only this test.
 inline bool bendsMoreThan(const std::array<float, 64>& s, float bendLimit) {
   int bent = 0;
   const auto look = [&](std::size_t i, std::size_t step) {

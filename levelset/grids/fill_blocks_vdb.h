@@ -16,12 +16,12 @@
 
 namespace levelset {
 
-/// Fills a tree with a function that changes by at most one world unit per world unit.
+/// Fills the tree of a band with the values of a distance function, whose slope is at most 1.
 ///
 /// A block holds no voxel of the band if its centre lies far enough from the zero set: further than
-/// the half width plus the distance from centre to corner. It becomes a tile; only blocks near the
-/// surface are evaluated point by point. Blocks are independent, so the bits do not depend on the
-/// number of threads.
+/// the half width plus the distance from centre to corner. Such a block becomes a tile; only blocks
+/// near the surface are evaluated point by point. Blocks are independent, so the result does not
+/// depend on the number of threads.
 /// @tparam Phi  double(double i, double j, double k): world distance at an index position
 template <typename Phi>
 class BlockFiller {
@@ -34,18 +34,20 @@ class BlockFiller {
         voxelSize_(grid.voxelSize()[0]),
         background_(grid.background()) {}
 
-  /// Limits the creation of leaves to these blocks.
+  /// Limits the creation of leaves to blocks that meet this index box.
   void limitTo(const openvdb::CoordBBox& blocks) { limit_ = blocks; }
 
-  /// Fills the 128³ blocks that meet `domain`; the rest stays unchanged.
-  /// @return true when a grid point lies inside
+  /// Fills all nodes of 128³ grid points that meet the index box `domain`; the rest of the tree
+  /// stays unchanged.
+  /// @return true when a grid point lies inside the solid
   bool fill(const openvdb::CoordBBox& domain, const Progress& progress) {
     const openvdb::Coord first = domain.min() & ~(kRoot - 1);
     for (int x = first[0]; x <= domain.max()[0]; x += kRoot)
       for (int y = first[1]; y <= domain.max()[1]; y += kRoot)
         for (int z = first[2]; z <= domain.max()[2]; z += kRoot)
           descend(openvdb::Coord(x, y, z), kRoot, domain);
-    // In slices, so that cancelling takes effect quickly and the reports come from one thread.
+    // Refines the nodes in slices, so that cancelling takes effect quickly and the reports come
+    // from one thread.
     constexpr std::size_t kSlice = 64;
     std::vector<Filled> slice(std::min(kSlice, surfaceBlocks_.size()));
     for (std::size_t from = 0; from < surfaceBlocks_.size(); from += kSlice) {
@@ -62,12 +64,13 @@ class BlockFiller {
   }
 
  private:
-  static constexpr int kRoot = 4096, kLower = 128, kLeaf = 8;  // edge lengths of the tree's nodes
+  // Edge lengths of the tree's nodes, voxels.
+  static constexpr int kRoot = 4096, kLower = 128, kLeaf = 8;
   enum class Side { Inside, Outside, Near };
 
   struct Filled {
     std::vector<std::unique_ptr<Leaf>> leaves;
-    std::vector<openvdb::Coord> inside;  ///< tiles of leaf size
+    std::vector<openvdb::Coord> inside;  ///< origins of 8³ tiles inside the solid
     bool anyInside = false;
   };
 
@@ -79,7 +82,8 @@ class BlockFiller {
     return value < 0 ? Side::Inside : Side::Outside;
   }
 
-  /// Descends from root blocks to blocks of kLower, serially, because there are few.
+  /// Descends from blocks of kRoot³ to blocks of kLower³ grid points, serially, because there are
+  /// few.
   void descend(const openvdb::Coord& origin, int edge, const openvdb::CoordBBox& domain) {
     if (!domain.hasOverlap(openvdb::CoordBBox::createCube(origin, edge))) return;
     const Side side = sideOf(origin, edge);

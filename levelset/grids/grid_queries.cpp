@@ -15,8 +15,8 @@ using openvdb::FloatTree;
 namespace {
 
 /// Replaces nodes by tiles where they lie beyond the band and on one side of the surface. OpenVDB's
-/// pruneLevelSet() uses a node's first value, which is valid for closed bands only. A cropped band
-/// (crop.h) may end between the two sides.
+/// pruneLevelSet() uses a node's first value, which is valid for closed bands only. At the cut of a
+/// cropped band (crop.h), a node may hold inactive values of both signs.
 class PruneOneSided {
  public:
   explicit PruneOneSided(float background) : background_(background) {}

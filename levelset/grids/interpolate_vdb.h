@@ -1,6 +1,6 @@
 #pragma once
 
-// Interpolation between the samples of a tree, for the .cpp files of this library. The sampler, the
+// Interpolation between the samples of a tree, for the .cpp files of this library. BandSampler, the
 // resampling kernels and the fields from grids share it.
 
 #include <algorithm>
@@ -49,9 +49,9 @@ void gatherSamples(const Accessor& accessor, const openvdb::Coord& first, Value*
 }
 
 /// Weights of N = 2 (linear) or N = 4 (Catmull-Rom) samples, and their derivatives by t. The
-/// position lies at fraction t in [0, 1) after the preceding sample. The weights sum to 1, the
-/// derivatives to 0. DenseBlock has weights of its own: it needs second derivatives, in single
-/// precision.
+/// position lies at fraction t in [0, 1) between the two middle samples. The weights sum to 1, the
+/// derivatives to 0. DenseBlock (distance/interpolant.h) has its own weights: it needs second
+/// derivatives, in single precision.
 template <int N>
 struct AxisWeights {
   std::array<double, N> weight, slope;
@@ -70,12 +70,12 @@ struct AxisWeights {
   }
 };
 
-/// The N³ samples around an index position, x slowest, and the fraction of the position among them.
+/// The N³ samples around an index position, x slowest, and the position as a fraction of its cell.
 template <int N>
 struct SampleBlock {
-  static constexpr int kBefore = N / 2 - 1;  ///< samples before the one at or just below the
-                                             ///< position
-  openvdb::Coord origin;                     ///< index coordinates of the first sample
+  /// Number of samples on each axis below the cell that holds the position.
+  static constexpr int kBefore = N / 2 - 1;
+  openvdb::Coord origin;  ///< index coordinates of the first sample
   openvdb::Vec3d fraction;
   std::array<float, N * N * N> values;
 
@@ -84,7 +84,7 @@ struct SampleBlock {
     gatherSamples<N>(accessor, origin, values.data());
   }
 
-  /// Without values: only for allActive().
+  /// Leaves `values` unset: only allActive() may be called.
   explicit SampleBlock(const openvdb::Vec3d& index) {
     for (int axis = 0; axis < 3; ++axis) {
       const double cell = std::fmax(-kFarthest, std::fmin(kFarthest, std::floor(index[axis])));
@@ -93,6 +93,7 @@ struct SampleBlock {
     }
   }
 
+  /// Returns true when all N³ samples are active.
   template <typename Accessor>
   [[nodiscard]] bool allActive(const Accessor& accessor) const {
     if (isInOneLeaf()) {
@@ -145,14 +146,15 @@ struct SampleBlock {
   }
 
  private:
-  // Clamps positions far outside any tree, and NaN, to a valid coordinate.
+  // Positions beyond this index coordinate, and NaN, are clamped to it, so that they fit into int.
   static constexpr double kFarthest = 2147483000.0;
 
   [[nodiscard]] bool isInOneLeaf() const {
     return (origin[0] & 7) <= 8 - N && (origin[1] & 7) <= 8 - N && (origin[2] & 7) <= 8 - N;
   }
 
-  /// Bits of N × N voxels in one x-slice of a leaf's mask (8 rows along y, each of 8 bits along z).
+  /// Returns the bits of the N × N samples in one x-slice of a leaf's mask. The slice has 8 rows
+  /// along y, each of 8 bits along z.
   [[nodiscard]] std::uint64_t rowPattern() const {
     const std::uint64_t bits = ((std::uint64_t{1} << N) - 1) << (origin[2] & 7);
     std::uint64_t pattern = 0;

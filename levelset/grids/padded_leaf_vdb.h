@@ -27,12 +27,13 @@ template <typename Accessor>
 
 /// Copies a block and the grid points around it to a dense cube, x slowest and rows along z.
 /// @param before, after  number of grid points before and after the block, the same on all axes
-/// @param row  distance of two rows in `target`, at least 8 + before + after
-/// @param valuesAt  returns the BlockValues of the block (dx, dy, dz) blocks away, given as a Coord
+/// @param row  number of floats from one row to the next in `target`, at least 8 + before + after
+/// @param valuesAt  (Coord step): returns the BlockValues of the block that lies `step` blocks away
 template <typename ValuesAt>
 void copyPadded(int before, int after, int row, float* target, const ValuesAt& valuesAt) {
   const int first = -((before + 7) / 8), last = (after + 7) / 8, side = 8 + before + after;
-  // Range [from, to) of the block `k` blocks away, in coordinates of the block itself.
+  // Range [from, to) of the grid points to copy from the block `k` blocks away, counted from the
+  // first grid point of the central block.
   const auto from = [&](int k) { return std::max(8 * k, -before); };
   const auto to = [&](int k) { return std::min(8 * k + 8, 8 + after); };
   for (int bx = first; bx <= last; ++bx)
@@ -64,12 +65,13 @@ void copyPaddedLeaf(const Accessor& accessor, const openvdb::Coord& origin, int 
   });
 }
 
-/// A leaf block with a border of `Pad` grid points on each side; rows run along z. A `Row` longer
-/// than the side lets vector instructions read beyond the end of a row.
+/// A leaf block with a border of `Pad` grid points on each side; rows run along z. If `Row` is
+/// longer than the side, vector instructions may read beyond the end of a row.
 template <int Pad, int Row = 8 + 2 * Pad>
 struct PaddedLeaf {
   static constexpr int kPad = Pad, kSide = 8 + 2 * Pad, kRow = Row;
-  static constexpr int kStepX = kSide * kRow, kStepY = kRow;  ///< distance of two neighbours
+  /// Distance in `values` between neighbours along x and y.
+  static constexpr int kStepX = kSide * kRow, kStepY = kRow;
   alignas(64) std::array<float, static_cast<std::size_t>(kSide* kSide* kRow)> values;
 
   /// Returns the index of the grid point (x, y, z) of the leaf; the border has coordinates below 0

@@ -34,8 +34,8 @@ struct BandSampler::Impl {
                                                      : SampleBlock<4>(accessor, index).value();
   }
 
-  /// Transforms a derivative by index coordinates, a covector, to world space: by the transposed
-  /// inverse.
+  /// Transforms a gradient with respect to index coordinates to world space. As a covector, it is
+  /// multiplied by the transposed inverse of indexToWorld.
   [[nodiscard]] Imath::V3d covectorToWorld(const openvdb::Vec3d& g) const {
     const Imath::M44d& m = worldToIndex;
     Imath::V3d world;

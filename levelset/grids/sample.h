@@ -31,9 +31,10 @@ class BandSampler {
   [[nodiscard]] Imath::V3d normal(const Imath::V3d& world) const;
   /// Returns true when all grid points that value() reads are active.
   [[nodiscard]] bool isInBand(const Imath::V3d& world) const;
-  /// Distance of a point beyond the border of an open surface, where the band extends the surface
-  /// straight. World units, interpolated trilinearly. 0 within the surface, for solids, and outside
-  /// the band.
+  /// The band extends an open surface straight beyond its border. Returns the distance from the
+  /// border to the point of this extension that is closest to `world`. World units, interpolated
+  /// trilinearly. 0 where the closest point lies on the surface itself, for solids, and outside the
+  /// band.
   [[nodiscard]] double beyondBorder(const Imath::V3d& world) const;
 
  private:
