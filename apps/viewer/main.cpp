@@ -19,21 +19,22 @@ namespace {
 
 using levelset::ExitCode;
 
-/// Prints a sentence with the name of the program in front, unless it starts with it.
+/// Prints a sentence on standard error. Puts the name of the program in front of it, unless the
+/// sentence starts with that name.
 void printMessage(const std::string& sentence) {
   constexpr const char* kName = "levelsmith-view: ";
   fmt::print(stderr, "{}{}\n", sentence.starts_with(kName) ? "" : kName, sentence);
 }
 
 void runWindow(const viewer::Arguments& arguments) {
-  // Report files that cannot be opened on the command line, before the window opens.
+  // Check the files before the window opens, so that an error ends the program.
   viewer::requireReadable(arguments.files);
   viewer::Window window("Levelsmith", arguments.width, arguments.height, true);
   viewer::Viewer viewer(arguments, window);
   if (!arguments.files.empty()) viewer.open(arguments.files);
   constexpr double kIdle = 0.25;  // seconds between checks of the files
   constexpr double kAfterEvent = 0.02;
-  constexpr int kFramesAfterEvent = 3;  // frames that ImGui needs to settle
+  constexpr int kFramesAfterEvent = 3;  // frames that ImGui needs until its layout is final
   int frames = kFramesAfterEvent;
   while (!window.isToClose()) {
     const int width = window.width(), height = window.height();
@@ -62,7 +63,7 @@ int levelsmithView(const std::vector<std::string>& words) {
   return static_cast<int>(ExitCode::Done);
 }
 
-/// Prints the error. @return the exit code
+/// Prints the message of an error. @return the exit code of the program
 int printFailure(const std::exception_ptr& failure) {
   try {
     std::rethrow_exception(failure);

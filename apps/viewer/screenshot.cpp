@@ -13,7 +13,7 @@ void requireScreenshotName(const std::filesystem::path& file, bool isInterface) 
   if (format == "png" || (format == "exr" && !isInterface)) return;
   throw levelset::UsageError(fmt::format("screenshot: '{}' has no supported extension; use .png{}",
                                          file.string(),
-                                         isInterface ? "" : ", or in .exr for all layers"));
+                                         isInterface ? "" : ", or .exr for all layers"));
 }
 
 void writeScreenshot(const std::filesystem::path& file, const Frame& frame) {

@@ -6,14 +6,16 @@
 
 namespace viewer {
 
-/// Writes the picture of a frame as a .png, or all of its layers as an .exr.
+/// Writes the displayed colours of a frame to a .png file, or all layers of its picture to an .exr
+/// file.
 /// @throws levelset::UsageError for another file name extension
 /// @throws levelset::IoError when the file cannot be written
 void writeScreenshot(const std::filesystem::path& file, const Frame& frame);
 
-/// Checks the extension of a screenshot's file name.
-/// @param isInterface  the screenshot is of the entire window, which has no layers: .png only
-/// @throws levelset::UsageError for an extension that writeScreenshot() does not support
+/// Checks the file name extension of a screenshot.
+/// @param isInterface  true: the screenshot shows the entire window, which has no layers, so only
+/// .png is allowed
+/// @throws levelset::UsageError for an extension that is not allowed
 void requireScreenshotName(const std::filesystem::path& file, bool isInterface);
 
 }  // namespace viewer

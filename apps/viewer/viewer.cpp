@@ -21,8 +21,9 @@ using Imath::V3d;
 constexpr double kWatchSeconds = 0.4;
 constexpr double kTurnPerPixel = 0.006;  // radians
 constexpr double kTurnPerKey = 0.1;      // radians
-constexpr double kClickPixels = 3;       // larger movements with a pressed button are drags
-constexpr double kZoomPerStep = 0.88;    // per step of the wheel
+constexpr double kClickPixels =
+    3;  // movement with a pressed button from which on it is a drag, pixels
+constexpr double kZoomPerStep = 0.88;  // factor of the distance for each step of the wheel
 
 std::string namesOf(const std::vector<std::filesystem::path>& files) {
   std::string names;
@@ -112,7 +113,7 @@ void Viewer::takeModel() {
     showFailure(result->failure, model_ ? "(The previous model stays open.)" : "");
     return;
   }
-  // A patch that is added to the present solid keeps the view.
+  // Keep the view if only a patch was added.
   const bool isSameSolid =
       model_ && !model_->files.empty() && result->files.front() == model_->files.front();
   try {
@@ -245,7 +246,7 @@ void Viewer::pressSpecial(const KeyPress& key) {
 
 void Viewer::useMouse(int width, int height) {
   const ImGuiIO& io = ImGui::GetIO();
-  // Conversion to pixels of the picture.
+  // Convert ImGui's units to pixels of the picture.
   const auto perUnit = [](int pixels, float units) {
     return pixels / std::max(static_cast<double>(units), 1.0);
   };
@@ -298,7 +299,7 @@ void Viewer::pickAt(const V2d& place, bool isForTarget) {
 }
 
 void Viewer::finishPick() {
-  // Coarser pixels show other positions.
+  // Wait for a picture at full resolution: coarser pixels show other points of the surface.
   if (!pendingPick_ || !frame_ || frame_->pixelSize > 1) return;
   const std::optional<Picked> picked = pick(*frame_, (*pendingPick_)[0], (*pendingPick_)[1]);
   pendingPick_.reset();
@@ -346,7 +347,8 @@ void Viewer::saveScreenshot() {
   try {
     requireScreenshotName(name, isInterfaceShot_);
     if (isInterfaceShot_) {
-      wantsInterfaceShot_ = true;  // taken in the next frame, without the dialog
+      wantsInterfaceShot_ =
+          true;  // written by writeInterfaceShot() after the next frame, when the dialog is closed
       return;
     }
     if (!frame_)

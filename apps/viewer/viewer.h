@@ -20,30 +20,30 @@
 
 namespace viewer {
 
-/// State of the window and reactions to the user's input.
+/// State of the viewer and reactions to the user's input.
 class Viewer {
  public:
   Viewer(const Arguments& arguments, Window& window);
 
   /// Reads files in the background; the present model is shown until they are read.
   void open(const std::vector<std::filesystem::path>& files, bool isReload = false);
-  /// Shows a model. @param keepView  keeps the present camera
+  /// Shows a model. @param keepView  true: keeps the present camera and picked points
   void show(std::shared_ptr<const Model> model, bool keepView);
 
   /// Handles external events: loaded models, finished pictures, dropped files, changed files.
   void update();
-  /// Draws the interface and handles the user's input to it.
+  /// Draws the panels and dialogs, and handles mouse and keyboard input.
   /// @param width, height  size of the picture, pixels
   void drawInterface(int width, int height);
 
-  /// Writes the picture of the entire window if the user requested one.
+  /// Writes a screenshot of the entire window if the user has requested one.
   void writeInterfaceShot();
 
   /// Requests the picture of the present view. @param width, height  pixels
   void requestPicture(int width, int height);
   [[nodiscard]] const ProgressivePicture& picture() const { return picture_; }
   [[nodiscard]] bool isBusy() const;
-  /// Adds a picked point, as a click does.
+  /// Adds a picked point to the list, as a click does.
   void addPick(const Picked& picked);
 
  private:
@@ -87,7 +87,7 @@ class Viewer {
   ProgressivePicture picture_;
   FileList fileList_;
   FileWatch watch_;
-  double nextWatch_ = 0;  // seconds
+  double nextWatch_ = 0;  // time of the next check of the files, seconds
   bool wasMissing_ = false;
 
   std::shared_ptr<const Model> model_;
@@ -108,7 +108,8 @@ class Viewer {
   bool isPickForTarget_ = false;
   std::vector<Picked> picks_;
 
-  // Keys for the open dialog: ImGui misses keys that are released within one frame.
+  // Enter or Escape was pressed since the last frame. ImGui misses keys that are released within
+  // one frame.
   bool isEntered_ = false, isEscaped_ = false;
   std::string message_;
   bool asksScreenshot_ = false, asksKeys_ = false;

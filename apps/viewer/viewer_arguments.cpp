@@ -17,7 +17,8 @@ namespace {
 
 using levelset::UsageError;
 
-constexpr long kMostResolution = 4096;  // voxels; rays resolve no more
+constexpr long kMostResolution =
+    4096;  // voxels along the longest side of a mesh; more are not visible
 
 constexpr const char* kHelp = R"(levelsmith-view [FILE…] [options]
 Shows a level set (.vdb), a mesh (.ply .obj .stl .off, also .gz) or a scene (.json), and patches (.patch) with it.
@@ -29,9 +30,9 @@ Shows a level set (.vdb), a mesh (.ply .obj .stl .off, also .gz) or a scene (.js
   --ortho L           orthographic projection; height of the view, world units
   --layer NAME        displayed layer: colour, normal, depth, position, mean, gauss, k1, k2 or id
   --style NAME        shading style: lit, tone, mean, gauss, principal, accessibility or ink
-  --range N           range of curvatures, times the model's extent     [40]
+  --range N           curvature at the ends of the colours, times the model's diagonal [40]
   --clip PLANE        clip plane that shows phi: x=0.1, y=0.1, z=0.1, or view=0.1 (in front of the centre)
-  --patches LINES     none, outline, base or all layers of particles    [all]
+  --patches LINES     lines of the patches: none, outline, base or all  [all]
   --resolution N      voxels along the longest side of a mesh           [256]
   --renderer NAME     auto, cpu or gpu                                  [auto]
   --help, --version
@@ -66,7 +67,9 @@ std::array<int, 2> parsePixel(const std::string& text) {
 
 double parsePositive(const std::string& text, const std::string& option) {
   const double number = pipeline::parseNumber(text, whereOf(option));
-  if (!(number > 0)) throw UsageError(fmt::format("{} {} must be positive", whereOf(option), text));
+  if (!(number > 0))
+    throw UsageError(
+        fmt::format("{} {} is out of range; give a positive number", whereOf(option), text));
   return number;
 }
 
@@ -130,8 +133,10 @@ const std::map<std::string, Setter>& setters() {
        [](Arguments& to, const std::string& text) {
          to.resolution = pipeline::parseInteger(text, whereOf("--resolution"));
          if (to.resolution < 4 || to.resolution > kMostResolution)
-           throw UsageError(fmt::format("levelsmith-view: --resolution {} is not between 4 and {}",
-                                        text, kMostResolution));
+           throw UsageError(
+               fmt::format("levelsmith-view: --resolution {} is out of range; give a number of "
+                           "voxels from 4 to {}",
+                           text, kMostResolution));
        }},
       {"--renderer",
        [](Arguments& to, const std::string& text) { to.renderer = rendererNamed(text); }},
@@ -172,12 +177,13 @@ void requireSense(const Arguments& arguments) {
   if (arguments.to && !arguments.from)
     throw UsageError("levelsmith-view: --to requires --from; add --from");
   if (arguments.verticalFov && !(*arguments.verticalFov < std::numbers::pi))
-    throw UsageError("levelsmith-view: --fov is too wide; it must be below 180 degrees");
+    throw UsageError("levelsmith-view: --fov is too wide; give an angle below 180 degrees");
   if (arguments.pick &&
       ((*arguments.pick)[0] >= arguments.width || (*arguments.pick)[1] >= arguments.height) &&
       arguments.hasSize)
     throw UsageError(
-        fmt::format("levelsmith-view: --pick {},{} lies outside the picture of {}x{} pixels",
+        fmt::format("levelsmith-view: --pick {},{} lies outside the picture of {}x{} pixels; 0,0 "
+                    "is its upper left corner",
                     (*arguments.pick)[0], (*arguments.pick)[1], arguments.width, arguments.height));
 }
 
@@ -208,7 +214,8 @@ Arguments parseArguments(const std::vector<std::string>& words) {
     const auto setter = setters().find(name);
     if (setter == setters().end()) refuseOption(name);
     if (equals == std::string::npos && i + 1 == words.size())
-      throw UsageError(fmt::format("levelsmith-view: {} needs a value after it", name));
+      throw UsageError(
+          fmt::format("levelsmith-view: {} has no value; give one after the option", name));
     setter->second(arguments, equals == std::string::npos ? words[++i] : word.substr(equals + 1));
   }
   requireSense(arguments);

@@ -18,10 +18,11 @@ namespace viewer {
 struct Arguments {
   std::vector<std::filesystem::path> files;
   int width = 1280, height = 800;  ///< size of the picture, pixels
-  bool hasSize = false;            ///< the size is given; false: a scene's size has priority
+  bool hasSize = false;  ///< --size is given; false: the size in a scene file has priority
+  /// Position of the eye, target and up direction, world units.
   std::optional<Imath::V3d> from = {}, to = {}, up = {};
   std::optional<double> verticalFov = {};  ///< radians
-  std::optional<double> orthoHeight = {};  ///< world units
+  std::optional<double> orthoHeight = {};  ///< height of an orthographic view, world units
   std::optional<ClipPlane> clip = {};
   Display display = {};
   render::Style style = render::Style::Lit;
@@ -29,20 +30,21 @@ struct Arguments {
   Renderer renderer = Renderer::Auto;
   std::optional<std::filesystem::path> screenshot = {};
   bool isInterface = false;                     ///< the screenshot shows the entire window
-  std::optional<std::array<int, 2>> pick = {};  ///< pixel to pick
+  std::optional<std::array<int, 2>> pick = {};  ///< x and y of the pixel to pick
   bool asksHelp = false, asksVersion = false;
 
-  /// True when the viewer runs without user interaction.
+  /// True when the viewer runs without an open window.
   [[nodiscard]] bool isScript() const { return screenshot || pick; }
 };
 
 /// Parses the command line.
-/// @throws levelset::UsageError
+/// @throws levelset::UsageError for an unknown option or an invalid value
 [[nodiscard]] Arguments parseArguments(const std::vector<std::string>& words);
 /// Text of levelsmith-view --help.
 [[nodiscard]] std::string viewerHelp();
 
-/// First camera of a model: from the options, else from its scene, else one that frames it.
+/// Initial camera for a model: from the options, else from the scene file, else a camera that
+/// frames the model.
 /// @throws levelset::UsageError for an invalid camera
 [[nodiscard]] render::Camera firstCamera(const Arguments& arguments, const Model& model, int width,
                                          int height);

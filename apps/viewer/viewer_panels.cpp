@@ -7,7 +7,7 @@
 
 #include "apps/viewer/viewer.h"
 
-// Panels, dialogs and status line of the window.
+// Members of Viewer that draw the panel, the dialogs and the status line of the window.
 namespace viewer {
 namespace {
 
@@ -147,7 +147,7 @@ void Viewer::drawPatchPart() {
 
 void Viewer::drawPointPart() {
   if (picks_.empty() || !beginPart("Points")) return;
-  constexpr std::size_t kShown = 6;  // newest points shown
+  constexpr std::size_t kShown = 6;  // number of points shown, the newest
   const std::size_t first = picks_.size() > kShown ? picks_.size() - kShown : 0;
   for (std::size_t i = first; i < picks_.size(); ++i) {
     const Picked& picked = picks_[i];
@@ -233,7 +233,7 @@ void Viewer::drawKeysDialog() {
       {"x y z, X Y Z", "look along the negative or positive axis"},
       {"o", "orthographic, perspective"},
       {"t", "turn about the point under the pointer"},
-      {"l, L", "the next layer, the one before"},
+      {"l, L", "next layer, previous layer"},
       {"c", "clip plane"},
       {"p", "write a picture"},
       {"r", "read the files again"},

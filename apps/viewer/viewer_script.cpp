@@ -22,7 +22,7 @@ void printLine(const std::string& line) {
                                         std::strerror(errno)));
 }
 
-/// Waits until the picture is complete. @param isForPick  light and shadow are not needed
+/// Waits until the picture is complete. @param isForPick  true: light and shadow are not needed
 std::shared_ptr<const Frame> finishedFrame(Window& window, Viewer& viewer, int width, int height,
                                            bool isForPick) {
   for (;;) {
@@ -35,7 +35,8 @@ std::shared_ptr<const Frame> finishedFrame(Window& window, Viewer& viewer, int w
   }
 }
 
-/// Returns a picture of the window. ImGui computes layout in one frame and draws it in the next.
+/// Returns a picture of the window. It draws several frames, because ImGui computes the layout in
+/// one frame and uses it in the next.
 Canvas windowShot(Window& window, Viewer& viewer, int width, int height) {
   constexpr int kFrames = 3;
   Canvas shot;
@@ -49,20 +50,21 @@ Canvas windowShot(Window& window, Viewer& viewer, int width, int height) {
 
 void runScript(const Arguments& arguments) {
   if (arguments.screenshot)
-    levelset::FileTarget(*arguments.screenshot);  // fails early if the file cannot be written
+    levelset::FileTarget(
+        *arguments.screenshot);  // throws before any work if the file cannot be written
   const auto model = std::make_shared<const Model>(
       openModel(arguments.files, {.resolution = arguments.resolution}));
   if (arguments.clip && !model->canCut())
     throw levelset::InvalidInput(
         "levelsmith-view: --clip needs solids that can be cut, and the model has none; omit "
         "--clip");
-  // Same rule as in 'levelsmith render'.
+  // The size in a scene file is used if --size is not given, as in 'levelsmith render'.
   const bool isSceneSize = model->camera && !arguments.hasSize;
   const int width = isSceneSize ? model->camera->width : arguments.width,
             height = isSceneSize ? model->camera->height : arguments.height;
   const render::Camera camera = firstCamera(arguments, *model, width, height);
-  constexpr int kAnyEdge =
-      64;  // pixels; pictures are drawn in memory, so the size of the window does not matter
+  constexpr int kAnyEdge = 64;  // edge of the invisible window, pixels; pictures are drawn in
+                                // memory, so any size will do
   Window window("levelsmith-view", kAnyEdge, kAnyEdge, false);
   Viewer viewer(arguments, window);
   viewer.requestPicture(camera.width, camera.height);
@@ -73,8 +75,9 @@ void runScript(const Arguments& arguments) {
     const auto [x, y] = *arguments.pick;
     if (x >= width || y >= height)
       throw levelset::UsageError(
-          fmt::format("levelsmith-view: --pick {},{} lies outside the picture of {}x{} pixels", x,
-                      y, width, height));
+          fmt::format("levelsmith-view: --pick {},{} lies outside the picture of {}x{} pixels; 0,0 "
+                      "is its upper left corner",
+                      x, y, width, height));
     const std::optional<Picked> picked = pick(*frame, x, y);
     if (picked) viewer.addPick(*picked);
     printLine(pickedJson(picked));

@@ -4,9 +4,9 @@
 
 namespace viewer {
 
-/// Draws the requested picture in an invisible window until it is complete. Prints the picked point
-/// on standard output and writes the screenshot.
-/// @throws levelset::Error as reading, drawing and writing do
+/// Runs the viewer without an open window: draws the picture until it is complete, prints the point
+/// of --pick on standard output, and writes the file of --screenshot.
+/// @throws levelset::Error when reading, drawing or writing fails
 void runScript(const Arguments& arguments);
 
 }  // namespace viewer

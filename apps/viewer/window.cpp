@@ -35,7 +35,7 @@ Window& windowOf(GLFWwindow* window) {
   return *static_cast<Window*>(glfwGetWindowUserPointer(window));
 }
 
-/// Loads a font with all characters of the interface, if the system has one.
+/// Loads a font with all characters of the interface, if it is installed; else ImGui's own font.
 void loadFont() {
   constexpr std::array<const char*, 3> kPlaces = {
       "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf",
@@ -64,7 +64,7 @@ void drawBackground(ImDrawList& list, float width, float height) {
   list.AddRectFilledMultiColor({0, 0}, {width, height}, top, top, bottom, bottom);
 }
 
-/// A framebuffer in memory that is the render target during its lifetime.
+/// A framebuffer in memory. OpenGL draws into it during its lifetime.
 class MemoryTarget {
  public:
   MemoryTarget(int width, int height) {
@@ -111,7 +111,7 @@ Window::Window(const std::string& title, int width, int height, bool isVisible) 
   glfwMakeContextCurrent(window_);
   glfwSwapInterval(1);
   glfwSetWindowUserPointer(window_, this);
-  // Must be set before ImGui's callbacks, which call these.
+  // Set these callbacks before ImGui installs its own, which then call these.
   glfwSetCharCallback(window_, [](GLFWwindow* window, unsigned character) {
     windowOf(window).keys_.push_back({.character = character});
   });
@@ -179,7 +179,7 @@ void Window::setPicture(const Canvas& canvas) {
   if (!texture_) glGenTextures(1, &texture_);
   glBindTexture(GL_TEXTURE_2D, texture_);
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-  // Linear filtering keeps pixels sharp where a picture pixel is a window pixel.
+  // With linear filtering, pictures with the size of the window stay sharp.
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
@@ -228,9 +228,8 @@ Canvas Window::drawInMemory(int width, int height, const std::function<void()>& 
   glGetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &most);
   const auto refuse = [&] {
     throw levelset::ResourceLimit(
-        fmt::format("levelsmith-view: a window of {}x{} pixels is too large, because OpenGL "
-                    "supports at most {} "
-                    "along a side; give a smaller --size",
+        fmt::format("levelsmith-view: a window of {}x{} pixels is too large; OpenGL supports at "
+                    "most {} pixels along a side here; give a smaller --size",
                     width, height, most));
   };
   if (width > most || height > most) refuse();
@@ -241,7 +240,8 @@ Canvas Window::drawInMemory(int width, int height, const std::function<void()>& 
   canvas.colours.resize(4 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
   glReadPixels(0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, canvas.colours.data());
-  // OpenGL counts rows from below, and blending leaves a meaningless alpha.
+  // Reverse the rows, which OpenGL counts from below. Set alpha to 255, because blending leaves a
+  // meaningless value.
   const std::size_t row = 4 * static_cast<std::size_t>(width);
   for (int y = 0; y < height / 2; ++y)
     std::swap_ranges(canvas.colours.begin() + static_cast<std::ptrdiff_t>(row) * y,

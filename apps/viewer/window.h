@@ -12,26 +12,26 @@ struct GLFWwindow;
 
 namespace viewer {
 
-/// A pressed key: its character, or GLFW's key number for keys without a character.
+/// A pressed key. Keys with a character have `character`, all others have `key`.
 struct KeyPress {
-  unsigned character = 0;
-  int key = 0;
-  bool withControl = false;
+  unsigned character = 0;    ///< Unicode code point; 0: none
+  int key = 0;               ///< GLFW's key number
+  bool withControl = false;  ///< the control key was held
 };
 
-/// A window with OpenGL and Dear ImGui. Only one may exist at a time, on the main thread.
+/// A window with OpenGL 3.3 and Dear ImGui. Only one may exist at a time, on the main thread.
 class Window {
  public:
-  /// @param isVisible  false: for pictures of the window only
-  /// @throws levelset::ResourceLimit when there is no display, or OpenGL 3.3 is missing
+  /// @param isVisible  false: the window only serves drawInMemory()
+  /// @throws levelset::ResourceLimit when no display is available, or OpenGL 3.3 is missing
   Window(const std::string& title, int width, int height, bool isVisible);
   ~Window();
   Window(const Window&) = delete;
   Window& operator=(const Window&) = delete;
 
-  /// Requests a redraw. May be called from any thread.
+  /// Ends wait() early, so that the window is redrawn. May be called from any thread.
   static void wake();
-  /// Waits for an event, at most the given time. Returns true when an event arrived.
+  /// Waits for an event, at most `seconds`. Returns true when an event arrived.
   bool wait(double seconds);
   [[nodiscard]] bool isToClose() const;
   void close();
@@ -42,15 +42,16 @@ class Window {
 
   /// Draws the picture, if there is one, and on top of it the ImGui widgets of `interface`.
   void draw(const std::function<void()>& interface);
-  /// Draws the same into memory, at any size. @return red, green, blue, alpha
+  /// Draws the same contents as draw() into memory, at any size in pixels.
   /// @throws levelset::ResourceLimit for a size that OpenGL does not support
   [[nodiscard]] Canvas drawInMemory(int width, int height, const std::function<void()>& interface);
 
-  /// Picture behind the interface, stretched to the window.
+  /// Sets the picture behind the interface. It is stretched to the window.
   void setPicture(const Canvas& canvas);
   void clearPicture();
 
-  /// Input since the last call.
+  /// Returns and removes the key presses, or the files dropped into the window, since the last
+  /// call.
   [[nodiscard]] std::vector<KeyPress> takeKeys();
   [[nodiscard]] std::vector<std::filesystem::path> takeDrops();
 

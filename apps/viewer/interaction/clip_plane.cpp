@@ -24,10 +24,12 @@ using Imath::V3d;
 constexpr const char* kCutName = "clip_plane";
 constexpr double kBoxVoxels = 48;
 constexpr double kBeforeEnd =
-    1 - 1e-6;  // fraction of the half width; larger values may be rounded background
-constexpr double kBesideSolids = 8;  // voxels; normals read values three voxels away
+    1 - 1e-6;  // fraction of the half width; values of larger magnitude may be rounded background
+constexpr double kBesideSolids =
+    8;  // margin of the box beside the solids, voxels; normals read values three voxels away
 
-// Same tones as in 'slice': near the surface, at the end of the band, and outside it.
+// The tones of the action 'slice': next to the surface, at the end of the band, and inside beyond
+// the band.
 constexpr DisplayColour kNearInside = {0.77, 0.86, 0.91}, kFarInside = {0.35, 0.54, 0.75},
                         kNearOutside = {0.92, 0.89, 0.81}, kFarOutside = {0.81, 0.67, 0.46},
                         kDeepInside = {0.44, 0.49, 0.57};
@@ -38,7 +40,7 @@ DisplayColour mixedTones(const DisplayColour& a, const DisplayColour& b, double 
   return colour;
 }
 
-/// Completes n to a right-handed orthonormal frame.
+/// Completes the unit vector n to a right-handed orthonormal frame (s, t, n).
 void frameWith(const V3d& n, V3d& s, V3d& t) {
   s = (std::abs(n.x) < 0.9 ? V3d(1, 0, 0) : V3d(0, 1, 0)).cross(n).normalized();
   t = n.cross(s);
@@ -50,7 +52,8 @@ std::string unusedName(const render::Scene& scene, std::string name) {
   return name;
 }
 
-/// Coverage of a pixel by a line of that half width at `distance` from its centre; pixels.
+/// Share of a pixel that a line covers. @param distance  distance of the line from the pixel's
+/// centre, pixels; `halfWidth` is in pixels too
 double lineShare(double distance, double halfWidth) {
   return std::clamp(halfWidth + 0.5 - distance, 0.0, 1.0);
 }
@@ -61,7 +64,9 @@ struct PhiPainter {
   const PlacedPlane& plane;
   const render::Scene& scene;
   std::vector<std::uint8_t>& colours;
-  double voxel = 0, reach = 0;  // voxel of the finest band and widest half width, world units
+  double voxel = 0,
+         reach =
+             0;  // voxel size of the finest band and largest half width of all bands, world units
 
   PhiPainter(const render::Image& image_, const render::Camera& camera_, const PlacedPlane& plane_,
              const render::Scene& scene_, std::vector<std::uint8_t>& colours_)
@@ -89,7 +94,8 @@ struct PhiPainter {
     const double depth = distance * ray.direction.dot(camera.axis());
     const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) +
                           static_cast<std::size_t>(x);
-    // Solids are visible only behind or in the plane. Meshes are not clipped.
+    // Skip pixels in which a surface hides the plane. Solids are clipped in front of the plane, but
+    // meshes are not.
     const auto seen = static_cast<double>(image.channels.at("Z")[i]);
     if (!(depth > 0 && depth < seen + 0.5 * voxel)) return;
     const V3d place = ray.origin + ray.direction * distance;
@@ -101,16 +107,17 @@ struct PhiPainter {
     blend(i, colourOf(phi, pixel), phi < 0 ? 1 : 0.85 * (1 - phi / reach));
   }
 
-  /// @param pixel  edge of the pixel at that point, world units
+  /// Colour of a point of the plane.
+  /// @param pixel  edge of a pixel at the point's depth, world units
   [[nodiscard]] DisplayColour colourOf(double phi, double pixel) const {
     DisplayColour colour = phi <= -reach * kBeforeEnd ? kDeepInside
                            : phi < 0 ? mixedTones(kNearInside, kFarInside, -phi / reach)
                                      : mixedTones(kNearOutside, kFarOutside, phi / reach);
-    // Fade out contours that are closer than a few pixels.
+    // Fade out the contours if they are fewer than six pixels apart.
     const double room = std::clamp((voxel / pixel - 3) / 3, 0.0, 1.0);
     const double whole = std::round(phi / voxel);
     double dark = 0;
-    if (std::abs(phi) < reach - 0.3 * voxel && whole != 0)  // the end of the band is not a contour
+    if (std::abs(phi) < reach - 0.3 * voxel && whole != 0)  // no contour at the end of the band
       dark = 0.45 * room * lineShare(std::abs(phi - whole * voxel) / pixel, 0.4);
     dark = std::max(dark, lineShare(std::abs(phi) / pixel, 0.9));
     for (double& c : colour) c *= 1 - dark;

@@ -12,12 +12,13 @@ namespace {
 using Imath::V2d;
 using Imath::V3d;
 
-constexpr double kNearestPole =
-    1e-9;  // radians; nearer to a pole, the picture's up direction determines the azimuth
+constexpr double kNearestPole = 1e-9;  // angle, radians; if the view direction is closer to a pole,
+                                       // the picture's up direction determines the azimuth
 
 constexpr double kFramed = 0.94;  // share of the picture that a framed box fills
 
-/// World position of a picture position at that depth.
+/// World position of the point at a picture position, at a depth along the view axis in world
+/// units.
 V3d worldAt(const render::Camera& camera, const V2d& place, double depth) {
   const render::Camera::Ray ray = camera.ray(place.x, place.y);
   return ray.origin + ray.direction * (depth / ray.direction.dot(camera.axis()));
@@ -39,7 +40,7 @@ void OrbitCamera::take(const render::Camera& changed) {
   try {
     render::validate(changed);
   } catch (const levelset::Error&) {
-    return;  // overflow: keep the present camera
+    return;  // the change overflowed: keep the present camera
   }
   camera_ = changed;
 }
@@ -85,7 +86,7 @@ void OrbitCamera::zoom(double factor, const V2d& place, double depth, int width,
     changed.from = fixed + (changed.from - fixed) * factor;
     changed.to = fixed + (changed.to - fixed) * factor;
   } else {
-    // The eye keeps its distance, so that it does not enter the surface.
+    // In orthographic projection the eye keeps its depth, so that it does not enter the surface.
     const V3d axis = changed.axis();
     V3d shift = (fixed - changed.to) * (1 - factor);
     shift -= axis * shift.dot(axis);
@@ -109,8 +110,8 @@ void OrbitCamera::frame(const Imath::Box3d& bounds, int width, int height) {
             up = right.cross(axis), half = 0.5 * bounds.size();
   const double aspect = static_cast<double>(std::max(width, 1)) / std::max(height, 1);
   const double slopeY = kFramed * std::tan(0.5 * camera_.verticalFov), slopeX = slopeY * aspect;
-  // Distance of the eye from the centre, and half extent of the view, as required by the outermost
-  // corner.
+  // Smallest distance of the eye from the centre, and smallest half height of an orthographic view,
+  // for which all corners of the box are visible.
   double distance = 1e-9, extent = 1e-9;
   for (int corner = 0; corner < 8; ++corner) {
     const V3d p(corner & 1 ? half.x : -half.x, corner & 2 ? half.y : -half.y,
@@ -133,7 +134,8 @@ void OrbitCamera::lookAgainst(const V3d& direction) {
   const V3d toEye = direction.normalized();
   V3d up = vertical_;
   if (std::abs(toEye.dot(vertical_)) > 1 - 1e-9) {
-    // View from above: up is the direction that is ahead in a front view.
+    // View from above or below: the direction that leads away from the eye in a front view becomes
+    // the up direction.
     const V3d front = std::abs(vertical_.z) < 0.9 ? V3d(0, 0, -1) : V3d(0, 1, 0);
     up = front - toEye * front.dot(toEye);
   }

@@ -8,33 +8,37 @@
 namespace viewer {
 
 /// A camera that the user moves: around its target, parallel to the picture, and forwards or
-/// backwards. Picture positions are pixels, (0, 0) is the upper left corner, +y points down. Moves
-/// that would overflow are ignored.
+/// backwards. Positions in the picture are in pixels; (0, 0) is the upper left corner, +y points
+/// down. Moves with overflow are ignored.
 class OrbitCamera {
  public:
   OrbitCamera() = default;
-  /// @param camera  initial camera; unchanged to the last bit until it is moved
+  /// @param camera  initial camera; camera() returns its bits unchanged until the first move
   explicit OrbitCamera(const render::Camera& camera);
 
-  /// Camera for a picture of that size, pixels; sizes below 1 count as 1.
+  /// Present camera for a picture of the given size in pixels. Sizes below 1 count as 1.
   [[nodiscard]] render::Camera camera(int width, int height) const;
 
-  /// Turns around the target: to the right, and up at most to the poles; radians.
+  /// Turns the camera around its target by angles in radians, to the right and up. It stops at the
+  /// poles.
   void orbit(double right, double up);
-  /// Moves so that the point seen at `from`, at that depth along the view axis (world units),
-  /// appears at `to`.
+  /// Moves the camera so that the point seen at picture position `from` appears at `to`.
+  /// @param depth  depth of the point along the view axis, world units
   void pan(const Imath::V2d& from, const Imath::V2d& to, double depth, int width, int height);
-  /// Approaches for a factor below 1, recedes for a factor above 1. The point seen at `place`, at
-  /// that depth, stays at its position in the picture.
+  /// Approaches for a factor below 1, recedes for a factor above 1. The point seen at picture
+  /// position `place` stays there. @param depth  depth of the point along the view axis, world
+  /// units
   void zoom(double factor, const Imath::V2d& place, double depth, int width, int height);
-  /// Makes this point the target, which moves to the centre of the picture.
+  /// Makes `point` (world space) the target, so that it moves to the centre of the picture.
   void centreOn(const Imath::V3d& point);
 
-  /// Frames the entire box from the present direction.
+  /// Moves the camera so that the entire box is visible, without a change of the view direction.
   void frame(const Imath::Box3d& bounds, int width, int height);
-  /// Looks along the negative direction (± x, y or z) at the same target, from the same distance.
+  /// Turns the camera to look against `direction` at the same target, from the same distance. So
+  /// {1, 0, 0} shows the side of the target that faces +x.
   void lookAgainst(const Imath::V3d& direction);
-  /// Toggles between perspective and orthographic projection; the size of the target stays.
+  /// Toggles between perspective and orthographic projection. The target keeps its size in the
+  /// picture.
   void toggleOrtho();
   [[nodiscard]] bool isOrtho() const { return camera_.orthoHeight.has_value(); }
 
@@ -47,7 +51,7 @@ class OrbitCamera {
   void take(const render::Camera& changed);
 
   render::Camera camera_;
-  Imath::V3d vertical_{0, 1, 0};  // unit axis of orbit()
+  Imath::V3d vertical_{0, 1, 0};  // unit vector towards the upper pole of orbit()
 };
 
 }  // namespace viewer

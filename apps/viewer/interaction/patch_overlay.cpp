@@ -16,7 +16,8 @@ namespace {
 using Imath::V3d;
 
 constexpr std::array<const char*, 4> kLinesNames = {"none", "outline", "base", "all"};
-constexpr double kBehind = 0.12;  // opacity of a line behind a surface
+constexpr double kBehind =
+    0.12;  // opacity of a line or dot behind a surface, relative to one in front
 
 DisplayColour layerColour(double w) {
   constexpr DisplayColour kLow = {0.05, 0.62, 0.60}, kHigh = {0.95, 0.52, 0.10};
@@ -26,7 +27,7 @@ DisplayColour layerColour(double w) {
   return colour;
 }
 
-/// A position in the picture, pixels, and its depth.
+/// A position in the picture, pixels, and a depth along the view axis, world units.
 struct Seen {
   double x, y, depth;
 };
@@ -77,8 +78,8 @@ class Pen {
             0.5 * canvas_.height - p.y * shrink * scaleY_, p.z};
   }
 
-  /// Draws an antialiased line: one step per pixel along its longer axis, shared by two pixels
-  /// across it.
+  /// Draws an antialiased line. It takes one step per pixel along the longer axis of the picture.
+  /// At each step it shares the colour between the two nearest pixels along the other axis.
   void lineSeen(const Seen& a, const Seen& b, const DisplayColour& colour) const {
     const bool isSteep = std::abs(b.y - a.y) > std::abs(b.x - a.x);
     const double from = isSteep ? a.y : a.x, to = isSteep ? b.y : b.x;

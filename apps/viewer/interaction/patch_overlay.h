@@ -10,15 +10,16 @@
 
 namespace viewer {
 
-/// Parts of patches that are drawn.
+/// Lines of the patches that are drawn.
 enum class PatchLines {
   None,
-  Outline,  ///< edges of the space above each patch
-  Base,     ///< particles on the surface and the lines between them
+  Outline,  ///< borders of the lowest and the highest layer, and the lines between their corners
+  Base,     ///< particles of the lowest layer, on the surface, and the lines between them
   All       ///< particles and lines of all layers
 };
 
-/// Value for a name. @throws levelset::UsageError for a name other than none, outline, base and all
+/// Finds the value for its name. @throws levelset::UsageError for a name other than none, outline,
+/// base and all
 [[nodiscard]] PatchLines patchLinesNamed(const std::string& name);
 [[nodiscard]] const char* patchLinesName(PatchLines lines);
 
@@ -28,14 +29,16 @@ struct Canvas {
   std::vector<std::uint8_t> colours;
 };
 
-/// Resamples the canvas smoothly to another size. @pre both sizes are positive
+/// Resamples the canvas to another size by bilinear interpolation. @pre the sizes are positive
 [[nodiscard]] Canvas stretched(const Canvas& canvas, int width, int height);
 
 /// Draws patches in colours from teal at the surface to orange at the top. Lines behind a surface
 /// are faint.
-/// @param camera  camera with the size of the canvas
-/// @param picture  picture, of any size, with the depths of the surfaces
-/// @param tolerance  depth difference up to which a line counts as in front, world units
+/// @param camera  camera whose width and height are those of the canvas
+/// @param picture  picture of the same view, of any size; its layer Z decides if a line is behind a
+/// surface
+/// @param tolerance  depth behind a surface up to which a line still counts as in front, world
+/// units
 void drawPatches(const std::vector<mapping::Patch>& patches, PatchLines lines,
                  const render::Camera& camera, const render::Image& picture, double tolerance,
                  Canvas& canvas);

@@ -26,8 +26,9 @@ V3d vectorAt(const render::Image& image, const char* name, std::size_t i) {
   return {part("X"), part("Y"), part("Z")};
 }
 
-/// Name of the solid with that id whose surface is nearest. A clip plane's id belongs to no solid;
-/// then the solid that is deepest at the point.
+/// Name of the solid or mesh that a pixel with the given id shows. If several solids have the id,
+/// the one with the nearest surface. The id of the clip plane belongs to none of them; then the
+/// solid in which the point lies deepest. @param phi  φ of each solid at the point, world units
 std::string nameAt(const render::Scene& scene, std::uint32_t id, const std::vector<double>& phi) {
   std::string name;
   double least = INFINITY;
@@ -74,14 +75,14 @@ std::optional<double> depthSeen(const Frame& frame, double x, double y) {
 }
 
 std::string pointText(const V3d& point) {
-  // Significant digits of single precision; negative zero becomes zero.
+  // Eight significant digits, as single precision has. Negative zero becomes zero.
   const auto digits = [](double x) { return fmt::format("{:.8g}", x == 0 ? 0 : x); };
   return fmt::format("{},{},{}", digits(point.x), digits(point.y), digits(point.z));
 }
 
 std::string pickedJson(const std::optional<Picked>& picked) {
   if (!picked) return "null";
-  const auto list = [](const V3d& v) {  // no negative zeros
+  const auto list = [](const V3d& v) {  // the sum turns negative zeros to zeros
     return nlohmann::ordered_json{v.x + 0.0, v.y + 0.0, v.z + 0.0};
   };
   const nlohmann::ordered_json json = {{"position", list(picked->position)},

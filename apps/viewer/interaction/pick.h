@@ -9,24 +9,26 @@
 
 namespace viewer {
 
-/// A point on a visible surface.
+/// A point of a visible surface that the user picked.
 struct Picked {
-  Imath::V3d position, normal;  ///< world units; outward unit normal
+  Imath::V3d position, normal;  ///< position in world units; outward unit normal
   double phi = 0;               ///< φ of the drawn shape, world units
-  std::string solid = {};       ///< name of the solid
+  std::string solid = {};       ///< name of the solid or mesh at the point
 };
 
-/// Surface point at the centre of a pixel; none for a miss. @pre the frame has pixel size 1
+/// Surface point at the centre of the pixel (x, y); nothing if the pixel shows no surface.
+/// @pre `pixelSize` of the frame is 1
 [[nodiscard]] std::optional<Picked> pick(const Frame& frame, int x, int y);
 
-/// Depth along the view axis of the surface at a picture position, in a frame of any pixel size;
-/// none for a miss.
+/// Depth of the surface at the picture position (x, y) in window pixels, along the view axis, world
+/// units. Nothing if there is no surface. The frame may have any pixel size.
 [[nodiscard]] std::optional<double> depthSeen(const Frame& frame, double x, double y);
 
 /// Formats a point as "x,y,z", the form of the command line.
 [[nodiscard]] std::string pointText(const Imath::V3d& point);
 
-/// JSON object {"position": […], "normal": […], "phi": …, "solid": "…"}; null for none.
+/// Formats a picked point as a JSON object {"position": […], "normal": […], "phi": …, "solid":
+/// "…"}; returns "null" without a point.
 [[nodiscard]] std::string pickedJson(const std::optional<Picked>& picked);
 
 }  // namespace viewer

@@ -16,16 +16,17 @@
 namespace viewer {
 namespace {
 
-/// One pass of refinement.
+/// A pass of refinement: edge of a picture pixel in window pixels, and numbers of samples.
 struct Pass {
   int pixelSize, samples, ambientSamples, shadowSamples;
 };
 constexpr std::array<Pass, 6> kPasses = {Pass{8, 1, 0, 0}, {4, 1, 0, 0},  {2, 1, 0, 0},
                                          {1, 1, 0, 0},     {1, 1, 16, 4}, {1, 4, 16, 4}};
 
-constexpr int kCpuTileEdge = 16, kGpuTileEdge = 64;  // pixels; enough rays for efficient tracing
-constexpr double kOnSurface =
-    4e-3;  // relative to the extent: particles at most that far below the surface count as on it
+constexpr int kCpuTileEdge = 16,
+              kGpuTileEdge = 64;     // edges of a tile, pixels; enough rays for efficient tracing
+constexpr double kOnSurface = 4e-3;  // relative to the model's diagonal; particles that are less
+                                     // deep below the surface count as on it
 
 render::Camera shrunk(render::Camera camera, int pixelSize) {
   camera.width = std::max(1, (camera.width + pixelSize / 2) / pixelSize);
@@ -35,16 +36,19 @@ render::Camera shrunk(render::Camera camera, int pixelSize) {
 
 }  // namespace
 
-/// State of the thread, kept from picture to picture.
+/// State of the drawing thread, which it keeps from picture to picture.
 struct ProgressivePicture::Worker {
   const ProgressivePicture& owner;
   View view;
   Display display;
-  std::size_t pass = kPasses.size();  // next pass; kPasses.size(): none
+  std::size_t pass =
+      kPasses.size();  // index of the next pass; kPasses.size(): the picture is finished
   int pixelSize = kPasses[0].pixelSize;
-  std::shared_ptr<const render::Image> image;  // last complete picture of this view
+  std::shared_ptr<const render::Image>
+      image;  // picture of the last finished pass for `view`; null: none
 
-  std::shared_ptr<const Model> preparedModel;  // model of the prepared tables
+  std::shared_ptr<const Model>
+      preparedModel;  // model that the tables in `surfaces` were built from
   std::optional<ClipPlane::Across> preparedCut;
   std::unique_ptr<ClippedScene> cut;
   std::unique_ptr<render::KernelScene> surfaces;
@@ -59,7 +63,8 @@ struct ProgressivePicture::Worker {
   [[nodiscard]] PlacedPlane plane() const {
     return placed(*view.clip, view.camera, view.model->solidBounds);
   }
-  /// Scene of the view, with a camera for fewer pixels.
+  /// Scene of the view, with a camera for a coarser picture. @param edge  edge of a picture pixel,
+  /// window pixels
   [[nodiscard]] render::Scene sceneFor(int edge) {
     render::Scene scene = isCut() ? cut->at(plane()) : view.model->scene;
     scene.camera = shrunk(view.camera, edge);
@@ -81,7 +86,7 @@ struct ProgressivePicture::Worker {
       hasTriedGpu = true;
       try {
         context = std::make_unique<render::GlContext>();
-        // Software OpenGL is slower than the processor back end.
+        // OpenGL in software is slower than the kernel on the processor.
         const bool isSoftware = context->description().find("llvmpipe") != std::string::npos;
         if (owner.renderer_ == Renderer::Auto && isSoftware) context = nullptr;
       } catch (const levelset::ResourceLimit&) {
@@ -92,7 +97,7 @@ struct ProgressivePicture::Worker {
       try {
         tracer = std::make_unique<render::GpuTracer>(*context, *surfaces);
         name = context->description();
-      } catch (const levelset::ResourceLimit&) {  // GPU memory is smaller
+      } catch (const levelset::ResourceLimit&) {  // the tables do not fit into the GPU's memory
         if (owner.renderer_ == Renderer::Gpu) throw;
       }
     }
@@ -102,12 +107,12 @@ struct ProgressivePicture::Worker {
     }
   }
 
-  /// Builds the tables unless they match the view.
+  /// Builds the kernel's tables, unless those of the previous picture fit the view.
   void prepare() {
     const std::optional<ClipPlane::Across> newCut =
         isCut() ? std::optional(view.clip->across) : std::nullopt;
     if (surfaces && preparedModel == view.model && preparedCut == newCut) return;
-    tracer = nullptr;  // it references the tables
+    tracer = nullptr;  // the tracer references the tables
     surfaces = nullptr;
     cut = nullptr;
     if (newCut)

@@ -20,9 +20,9 @@
 
 namespace viewer {
 
-/// Choice of the back end.
+/// Back end that draws the picture.
 enum class Renderer {
-  Auto,  ///< the GPU if it is hardware, else the processor
+  Auto,  ///< the GPU if OpenGL runs on hardware, else the processor
   Cpu,
   Gpu
 };
@@ -32,13 +32,14 @@ struct View {
   std::shared_ptr<const Model> model;
   render::Camera camera;
   std::optional<ClipPlane> clip = {};
-  render::Style style = render::Style::Lit;  ///< shading style; not matcap
+  render::Style style = render::Style::Lit;  ///< shading style; Matcap is not supported
 };
 
-/// Display options, which change without a new picture.
+/// Display options. A change of them recolours the present picture, without new rays.
 struct Display {
   Layer layer = Layer::Colour;
-  double curvatureRange = 40;  ///< relative to the extent, see layerColours()
+  double curvatureRange =
+      40;  ///< curvature at the end of the colour scale, times the model's diagonal
   PatchLines patches = PatchLines::All;
   bool contours = true;  ///< draws contours of φ on the clip plane
   bool operator==(const Display&) const = default;
@@ -47,30 +48,32 @@ struct Display {
 /// A picture of a view at one level of refinement.
 struct Frame {
   View view;
-  int pixelSize = 8;                           ///< edge of a picture pixel, window pixels
-  bool isComplete = false;                     ///< all samples are done, with light and shadow
-  std::shared_ptr<const render::Image> image;  ///< the layers of the picture
-  Canvas canvas;                               ///< displayed pixels, any size
+  int pixelSize = 8;        ///< edge of a pixel of `image`, window pixels
+  bool isComplete = false;  ///< the last pass is done, with all samples, light and shadow
+  std::shared_ptr<const render::Image> image;  ///< the picture with all layers
+  Canvas
+      canvas;  ///< colours to display; its size may differ from that of `image` and of the window
 };
 
 /// Draws views in a background thread, in passes of increasing quality.
 class ProgressivePicture {
  public:
-  /// @param wake  called from that thread when a new frame is available
+  /// @param wake  called from the drawing thread when a new frame is available
   explicit ProgressivePicture(Renderer renderer = Renderer::Auto, std::function<void()> wake = {});
   ~ProgressivePicture();
   ProgressivePicture(const ProgressivePicture&) = delete;
   ProgressivePicture& operator=(const ProgressivePicture&) = delete;
 
-  /// Requests a view and returns at once. For the present view only the display options change.
+  /// Requests a picture of a view and returns at once. If the view has not changed, only the
+  /// display options are applied.
   void request(const View& view, const Display& display);
   /// Newest frame; null before the first one.
   [[nodiscard]] std::shared_ptr<const Frame> frame() const;
-  /// Error that prevents drawing of the requested view; null: none.
+  /// Error that prevented the drawing of the requested view; null without an error.
   [[nodiscard]] std::exception_ptr failure() const;
   /// Progress of the present pass, from 0 to 1; 1 when idle.
   [[nodiscard]] double progress() const { return progress_; }
-  /// Description of the back end for the user.
+  /// Name of the back end in use: "processor", or the description of the OpenGL device.
   [[nodiscard]] std::string rendererName() const;
 
  private:
@@ -85,18 +88,18 @@ class ProgressivePicture {
   Renderer renderer_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::optional<Request> pending_;      // not yet taken by the thread
-  std::optional<Request> lastRequest_;  // newest request, taken or not
+  std::optional<Request> pending_;      // request that the drawing thread has not yet taken
+  std::optional<Request> lastRequest_;  // newest request, even if taken
   std::shared_ptr<const Frame> frame_;
   std::exception_ptr failure_;
   std::string rendererName_;
   bool isEnding_ = false;
-  std::atomic<bool> isStale_ = false;  // the present drawing is out of date
+  std::atomic<bool> isStale_ = false;  // a newer request makes the picture being drawn obsolete
   std::atomic<double> progress_ = 1;
   std::thread thread_;
 };
 
-/// True when both are equal to the last bit.
+/// True when the numbers of both cameras, or views, are equal.
 [[nodiscard]] bool isSame(const render::Camera& a, const render::Camera& b);
 [[nodiscard]] bool isSame(const View& a, const View& b);
 

@@ -41,7 +41,7 @@ void FileList::enter(const fs::path& folder) {
       files.push_back(path);
   }
   error_ = wrong ? "open: " + whole.string() + ": " + wrong.message() : "";
-  if (wrong) return;  // keeps the previous list
+  if (wrong) return;  // keep the list of the previous folder
   std::sort(folders.begin(), folders.end());
   std::sort(files.begin(), files.end());
   folder_ = whole;

@@ -7,13 +7,14 @@
 
 namespace viewer {
 
-/// Dialog that lists folders and readable files.
+/// Dialog that lists the folders, and the files that the viewer can open, of a folder.
 class FileList {
  public:
-  /// Opens the dialog in a folder, or in the folder of a file; in the current folder if that does
-  /// not exist.
+  /// Opens the dialog in the folder `place`, or in the folder of the file `place`. If that folder
+  /// does not exist, it opens in the working directory.
   void show(const std::filesystem::path& place);
-  /// Draws the dialog while it is open. @return the chosen file
+  /// Draws the dialog if it is open. @param isEscaped  the user pressed Escape, which closes it
+  /// @return the file that the user has just chosen, or nothing
   std::optional<std::filesystem::path> draw(bool isEscaped);
 
  private:

@@ -6,17 +6,18 @@
 
 namespace viewer {
 
-/// Detects changes of files.
+/// Detects changes of files on disk by their time and size.
 class FileWatch {
  public:
   FileWatch() = default;
-  /// Starts to watch these files from their present state on.
+  /// Starts to watch files. Changes are relative to their present state.
   explicit FileWatch(std::vector<std::filesystem::path> files);
 
-  /// Returns true once after a file has been written or replaced and has not changed since the
-  /// previous call. Otherwise it may still be in the middle of being written. A removed file counts
-  /// as changed when it is back.
+  /// Returns true once after a file has been written or replaced. It waits until no file has
+  /// changed since the previous call, because a program may still be writing. A removed file counts
+  /// as changed when it exists again.
   [[nodiscard]] bool hasChanged();
+  /// True when a file did not exist in the last call of hasChanged().
   [[nodiscard]] bool isAnyMissing() const;
 
  private:

@@ -20,14 +20,14 @@ std::uint8_t displayByte(double unit) {
   return static_cast<std::uint8_t>(std::lround(255 * std::clamp(unit, 0.0, 1.0)));
 }
 
-/// Range of values over the hit pixels.
+/// Smallest and largest value of a layer over the pixels that show a surface.
 struct ValueRange {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   void extendBy(double value) {
     low = std::min(low, value);
     high = std::max(high, value);
   }
-  /// Position in the range, 0 to 1; 0.5 for an empty range.
+  /// Position of a value in the range, from 0 to 1; 0.5 if all values are equal.
   [[nodiscard]] double share(double value) const {
     return high > low ? (value - low) / (high - low) : 0.5;
   }
@@ -75,7 +75,9 @@ std::vector<std::uint8_t> depthColours(const render::Image& image) {
   for (std::size_t i = 0; i < image.pixelCount(); ++i)
     if (isHit(image, i)) range.extendBy(valueAt(z, i));
   return painted(image, [&](std::size_t i) {
-    const double grey = 1 - 0.85 * range.share(valueAt(z, i));  // brighter than the background
+    const double grey =
+        1 - 0.85 * range.share(
+                       valueAt(z, i));  // the darkest grey, 0.15, is brighter than the background
     return DisplayColour{grey, grey, grey};
   });
 }
@@ -119,7 +121,8 @@ DisplayColour divergingColour(double value) {
                           kRed = {0.75, 0.16, 0.18};
   const double v = std::isnan(value) ? 0 : std::clamp(value, -1.0, 1.0);
   const DisplayColour& end = v < 0 ? kBlue : kRed;
-  const double share = std::sqrt(std::abs(v));  // the square root separates the many small values
+  const double share =
+      std::sqrt(std::abs(v));  // the square root makes small values distinguishable
   DisplayColour colour;
   for (std::size_t c = 0; c < 3; ++c) colour[c] = kWhite[c] + (end[c] - kWhite[c]) * share;
   return colour;
@@ -127,7 +130,7 @@ DisplayColour divergingColour(double value) {
 
 DisplayColour idColour(std::uint32_t id) {
   if (id == 0) return {0.5, 0.5, 0.5};
-  // Hues at golden-section steps stay far from all earlier ones.
+  // Hues that advance by the golden section stay far from all earlier hues.
   const double hue = 6 * std::fmod(0.58 + 0.61803398874989485 * (id - 1), 1.0);
   DisplayColour colour;
   constexpr std::array<double, 3> kMiddle = {0, 2, 4};

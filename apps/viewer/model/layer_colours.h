@@ -9,36 +9,39 @@
 
 namespace viewer {
 
-/// Layer of a picture that is displayed.
+/// Layer of the picture that the viewer displays.
 enum class Layer { Colour, Normal, Depth, Position, MeanCurvature, GaussCurvature, K1, K2, Id };
 
 inline constexpr std::array<Layer, 9> kLayers = {
     Layer::Colour,         Layer::Normal, Layer::Depth, Layer::Position, Layer::MeanCurvature,
     Layer::GaussCurvature, Layer::K1,     Layer::K2,    Layer::Id};
 
-/// Name in options and menus: "colour", "normal", …
+/// Name of a layer in options and menus: "colour", "normal", …
 [[nodiscard]] const char* layerName(Layer layer);
-/// Layer with a name. @throws levelset::UsageError for an unknown name; the message lists the names
+/// Finds the layer with a name. @throws levelset::UsageError for an unknown name; the message lists
+/// the names
 [[nodiscard]] Layer layerNamed(const std::string& name);
 
 /// Displayed red, green and blue, from 0 to 1.
 using DisplayColour = std::array<double, 3>;
 
-/// Colour for a value from −1 to 1: blue, white, red. Values outside are clamped.
+/// Colour for a value: blue at −1, white at 0, red at 1. Values outside this range are clamped.
 [[nodiscard]] DisplayColour divergingColour(double value);
-/// A different colour for each number; 0 is grey.
+/// Colour for a solid's or mesh's id, different for each id; grey for 0.
 [[nodiscard]] DisplayColour idColour(std::uint32_t id);
 
 /// Converts a layer to four bytes for each pixel: red, green, blue, alpha. Pixels without a hit are
 /// transparent.
-/// - Colour: as in the PNG of the picture.
+/// - Colour: the pixels of a PNG of the picture.
 /// - Normals: x, y, z from −1 to 1 as red, green, blue.
 /// - Depth: white for the nearest point of the picture, dark for the farthest.
-/// - Positions: x, y, z as red, green, blue, within the bounding box of the picture's points.
-/// - Curvatures: times the extent (Gauss: times its square), from −range to range.
-/// @param extent  diagonal of the surfaces' box, world units
-/// @param range  largest displayed curvature times extent; a ball that just fits has k = 2 / extent
-/// @pre the image has the layers of a picture
+/// - Positions: x, y, z as red, green, blue, scaled to the bounding box of the points in the
+/// picture.
+/// - Curvatures: curvature × extent (Gauss curvature × extent²) on a scale from −range to range
+/// (−range² to range²).
+/// @param extent  diagonal of the bounding box of the surfaces, world units
+/// @param range  product of curvature and extent at the ends of the colour scale
+/// @pre the image has the layers that renderEmbree() returns
 [[nodiscard]] std::vector<std::uint8_t> layerColours(const render::Image& image, Layer layer,
                                                      double extent, double range = 40);
 

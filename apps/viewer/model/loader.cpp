@@ -20,7 +20,8 @@ Loader::~Loader() {
 void Loader::open(const std::vector<std::filesystem::path>& files, long resolution, bool isReload) {
   if (job_) job_->isCancelled = true;
   const auto job = job_ = std::make_shared<Job>();
-  // The thread is detached: a cancelled job ends at its next progress report and owns its state.
+  // The thread is detached, so that nobody waits for a cancelled job. The thread shares ownership
+  // of the job and ends at the next progress report.
   std::thread([job, files, resolution, isReload, wake = wake_] {
     Result result{.files = files, .model = nullptr, .failure = nullptr, .isReload = isReload};
     try {

@@ -11,10 +11,10 @@
 
 namespace viewer {
 
-/// Reads models in the background. Only the newest request counts.
+/// Reads models in a background thread. A new request cancels the previous one.
 class Loader {
  public:
-  /// @param wake  called from another thread when there is a result
+  /// @param wake  called from the background thread when a result is available
   explicit Loader(std::function<void()> wake) : wake_(std::move(wake)) {}
   ~Loader();
   Loader(const Loader&) = delete;
@@ -22,15 +22,16 @@ class Loader {
 
   struct Result {
     std::vector<std::filesystem::path> files;
-    std::shared_ptr<const Model> model;  ///< null: see failure
-    std::exception_ptr failure;
-    bool isReload = false;
+    std::shared_ptr<const Model> model;  ///< null when reading failed
+    std::exception_ptr failure;          ///< error; null when reading succeeded
+    bool isReload = false;               ///< value passed to open()
   };
-  /// Starts to read files and cancels a read in progress.
+  /// Starts to read files. Cancels a request in progress.
+  /// @param resolution  voxels along the longest side of a mesh
   void open(const std::vector<std::filesystem::path>& files, long resolution, bool isReload);
   [[nodiscard]] bool isLoading() const { return job_ != nullptr; }
   [[nodiscard]] double progress() const;
-  /// Result of the read, once it is complete.
+  /// Returns the result of the newest request once, when it is complete; otherwise nothing.
   [[nodiscard]] std::optional<Result> take();
 
  private:

@@ -33,7 +33,8 @@ FileKind kindOf(const fs::path& file) {
   return FileKind::Unknown;
 }
 
-/// Converts a file name to a solid's name of letters, digits and _, as expressions require.
+/// Name of a solid from the name of its file. It has only letters, digits and _, as CSG expressions
+/// require.
 std::string solidNameOf(const fs::path& file) {
   const std::string stem = file.stem().string();
   std::string name;
@@ -47,7 +48,7 @@ levelset::NarrowBand bandOfMesh(const fs::path& file, const OpenOptions& options
       file, {.attributes = false, .progress = levelset::subProgress(options.progress, 0, 0.2)});
   const Imath::V3d size = levelset::bounds(mesh).size();
   const double longest = std::max({size.x, size.y, size.z});
-  // Meshes with holes are accepted for viewing.
+  // Meshes with holes or wrong orientation are accepted, because they are only viewed.
   return levelset::meshToBand(mesh, longest / static_cast<double>(options.resolution),
                               {.acceptSign = true,
                                .searchSelfIntersections = false,
@@ -55,7 +56,7 @@ levelset::NarrowBand bandOfMesh(const fs::path& file, const OpenOptions& options
       .band;
 }
 
-/// Files of the level sets and meshes of a scene that readScene() has read.
+/// Files of the level sets and meshes that a scene file names. @pre readScene() accepts the file
 std::vector<fs::path> solidFilesOf(const fs::path& scene) {
   std::vector<fs::path> files;
   std::ifstream stream(scene);
@@ -113,7 +114,8 @@ void measureModel(Model& model) {
 }  // namespace
 
 bool Model::canCut() const {
-  // Clipping uses an expression, which does not show transparent solids.
+  // Clipping subtracts a box by a CSG expression. Without an expression of its own, the scene's
+  // solids would be joined to a union, which hides surfaces inside transparent solids.
   const bool hidesNothing = scene.isOpaque() || !scene.csg.isEmpty();
   return !solidBounds.isEmpty() && !scene.solids.empty() && !scene.isBlended() && hidesNothing &&
          std::none_of(scene.solids.begin(), scene.solids.end(),
@@ -137,10 +139,10 @@ void requireReadable(const std::vector<fs::path>& files) {
           fmt::format("open: '{}' does not exist; check its name", file.string()));
     if (kind == FileKind::Patch) continue;
     if (solid)
-      throw UsageError(fmt::format(
-          "open: '{}' is a second solid after '{}'; open one of them, or combine both in a scene "
-          "(levelsmith help scene)",
-          file.string(), solid->string()));
+      throw UsageError(
+          fmt::format("open: '{}' is a second level set, mesh or scene after '{}'; open one of "
+                      "them, or combine both in a scene (see levelsmith help scene)",
+                      file.string(), solid->string()));
     solid = &file;
   }
 }

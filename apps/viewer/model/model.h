@@ -13,21 +13,23 @@
 
 namespace viewer {
 
-/// The contents of the opened files. Constant after reading.
+/// The contents of the opened files. A model is not changed after it has been read.
 struct Model {
-  render::Scene scene;                        ///< without a camera
-  std::optional<render::Camera> camera = {};  ///< camera of a scene file
+  render::Scene scene;                        ///< solids and meshes; its camera is not used
+  std::optional<render::Camera> camera = {};  ///< camera of the scene file, if one is set there
   std::vector<mapping::Patch> patches;
   Imath::Box3d solidBounds;  ///< box of the drawn surfaces, world units; empty when there are none
-  Imath::Box3d bounds;       ///< box that also contains the particles
-  std::string description = {};  ///< one line for the user
+  Imath::Box3d bounds;       ///< box of the surfaces and of the patches' particles, world units
+  std::string description = {};  ///< number of solids, voxels and patches, as a line for the user
   std::vector<std::filesystem::path>
-      files;  ///< files that were read: first the solid's, then the patches'
-  std::vector<std::filesystem::path> watched = {};  ///< `files` and the files that they name
+      files;  ///< files that were read: first the level set, mesh or scene, then the patches
+  std::vector<std::filesystem::path> watched = {};  ///< `files`, and the files that a scene names
 
+  /// Diagonal of solidBounds, world units.
   [[nodiscard]] double extent() const { return solidBounds.size().length(); }
-  /// True when there are solids that a clip plane can cut. Blended scenes cannot be cut, because
-  /// the plane would be blended with the fields.
+  /// True when a clip plane can cut the solids. Blended scenes cannot be cut, because the clip
+  /// plane would be blended with the solids. Scenes with transparent solids and without an
+  /// expression cannot be cut either.
   [[nodiscard]] bool canCut() const;
 };
 
@@ -37,25 +39,25 @@ struct OpenOptions {
   levelset::Progress progress = {};
 };
 
-/// True for file names that can be opened.
+/// True for file names with an extension that the viewer can open.
 [[nodiscard]] bool canOpen(const std::filesystem::path& file);
 
-/// Reads a level set, a mesh (which is converted to a level set) or a scene, and patches to show
-/// with it.
+/// Reads a level set, a mesh (which is converted to a level set) or a scene, and the patches that
+/// are shown together with it.
 /// @param files  at most one level set, mesh or scene, and any number of patches, in any order
-/// @throws levelset::UsageError for unknown file names, or two solids
+/// @throws levelset::UsageError for an unknown extension, or more than one level set, mesh or scene
 /// @throws as readBand(), readMesh(), meshToBand(), readScene() and readPatches()
 [[nodiscard]] Model openModel(const std::vector<std::filesystem::path>& files,
                               const OpenOptions& options = {});
 
-/// Checks files before they are read: each must exist and have a known format, and at most one may
-/// be a solid.
-/// @throws levelset::UsageError for an unknown format or a second solid
+/// Checks files before they are read: each must exist and have a known extension, and at most one
+/// may be a level set, mesh or scene.
+/// @throws levelset::UsageError for an unknown extension, or a second level set, mesh or scene
 /// @throws levelset::IoError for a missing file
 void requireReadable(const std::vector<std::filesystem::path>& files);
 
-/// Files to open when a file is added to those shown. A patch is added, or read again; any other
-/// file replaces them.
+/// Files to open when the user opens `file` while the files `shown` are open. A patch is added to
+/// them, or read again. Any other file replaces them.
 [[nodiscard]] std::vector<std::filesystem::path> filesWith(
     const std::vector<std::filesystem::path>& shown, const std::filesystem::path& file);
 
