@@ -36,17 +36,17 @@ void printAll(const std::string& text) {
         fmt::format("standard output cannot be written: {}", std::strerror(errno)));
 }
 
-/// More threads do not help, and some systems do not allow more.
+/// Largest value of --threads. More threads bring no gain, and some systems do not allow more.
 constexpr long kMostThreads = 1024;
 
-/// Prints a sentence on standard error, with the name of the program in front unless it starts with
-/// it.
+/// Prints a sentence on standard error. Puts the name of the program in front of it, unless the
+/// sentence starts with that name.
 void printMessage(const std::string& sentence) {
   fmt::print(stderr, "{}{}\n",
              sentence.starts_with("levelsmith: ") ? "" : "levelsmith: ", sentence);
 }
 
-/// Prints the error. @return the exit code
+/// Prints the message of an error. @return the exit code of the program
 int printFailure(const std::exception_ptr& failure) {
   try {
     if (failure) std::rethrow_exception(failure);
@@ -73,8 +73,8 @@ int printFailure(const std::exception_ptr& failure) {
   return static_cast<int>(ExitCode::Input);
 }
 
-/// Handles exceptions that nobody can catch, such as a thread that the system refuses to TBB.
-/// Temporary files are removed.
+/// Terminate handler, for exceptions that cannot be caught. An example is TBB's failure to start a
+/// thread that the system refuses. Removes temporary files and ends the process.
 [[noreturn]] void endUnexpectedly() {
   levelset::removeTemporaryFiles();
   _exit(printFailure(std::current_exception()));
@@ -123,7 +123,7 @@ int runGraph(const pipeline::Graph& graph) {
                       threads, kMostThreads));
     limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
                                                   static_cast<std::size_t>(threads));
-    arena.initialize(static_cast<int>(threads));  // may exceed the number of cores
+    arena.initialize(static_cast<int>(threads));  // the number may exceed that of the cores
   }
   if (globals.contains("no-clobber")) levelset::setClobberDefault(false);
   pipeline::checkRunTargets(graph);
@@ -157,7 +157,8 @@ int runGraph(const pipeline::Graph& graph) {
   };
   settings.print = [&](const std::string& text) {
     line.clear();
-    // Data for programs and messages for people go to different streams.
+    // Keep standard output clean for data: texts for people go to standard error when an action
+    // writes data or JSON to standard output.
     if (dataOnly || (json && !text.starts_with("{")))
       fmt::print(stderr, "{}", text);
     else
@@ -190,7 +191,7 @@ int runGraph(const pipeline::Graph& graph) {
         pipeline::run(graph, settings, report);
     });
   } catch (const std::exception&) {
-    // The first error takes precedence.
+    // The error of the run takes precedence over an error in finish(), which is only printed.
     try {
       finish();
     } catch (const levelset::Error& error) {
@@ -239,7 +240,7 @@ int main(int argc, char** argv) {
   }
   std::fflush(stderr);
   levelset::removeTemporaryFiles();
-  // The watching thread still runs, so destructors are skipped.
+  // Skip destructors, because the thread of startWatch() still runs.
   if (std::fflush(stdout) != 0 && code == 0) code = static_cast<int>(ExitCode::File);
   _exit(code);
 }

@@ -60,8 +60,8 @@ void watch(sigset_t signals, std::size_t maxBytes) {
 
 void startWatch(std::size_t maxBytes) {
   std::signal(SIGPIPE, SIG_IGN);
-  // A shell starts background jobs with SIGINT ignored, and an ignored signal never arrives at the
-  // watching thread.
+  // Restore the default: a shell starts background jobs with SIGINT ignored, and an ignored signal
+  // never reaches the thread of watch().
   std::signal(SIGINT, SIG_DFL);
   sigset_t signals;
   sigemptyset(&signals);

@@ -131,8 +131,8 @@ class FieldMarch::RaySegment {
   [[nodiscard]] bool isEmpty() const { return begin >= end; }
   [[nodiscard]] bool isInside(double t) { return valueAt(t) < 0; }
 
-  /// Finds the next crossing after t. Returns nothing when the ray stays on its side. @param inside
-  /// true when the ray is inside the solid at t
+  /// Finds the next crossing after t. Returns nothing when the ray stays on its side.
+  /// @param inside  true when the ray is inside the solid at t
   std::optional<double> nextCrossing(double t, bool inside) {
     double least = march_.leastStep_;
     while (t < end - begin) {
