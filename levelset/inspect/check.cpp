@@ -21,7 +21,8 @@ using LeafNode = FloatTree::LeafNodeType;
 constexpr double kMeanResidualLimit = 0.1;
 /// Bounds of |∇φ|² at a zero crossing, from openvdb::tools::checkLevelSet.
 constexpr double kMinSquaredSlope = 0.5, kMaxSquaredSlope = 1.5;
-/// In a narrower band, only voxels at edges of the solid have all their neighbours in the band.
+/// Smallest half width, voxels, at which the eikonal residual is measured. In a narrower band, only
+/// voxels at edges of the solid have all their neighbours in the band.
 constexpr double kMinHalfWidthForResidual = 2 - 1e-5;
 
 /// Number of values that fail a check, and the first one in tree order.
@@ -47,8 +48,9 @@ CheckItem item(const char* name, const Finding& finding, const char* fault) {
       finding.isBackground
           ? "the background"
           : fmt::format("[{}, {}, {}]", finding.where.x(), finding.where.y(), finding.where.z());
-  return {name, false,
-          fmt::format("{} {}: first at {} with {}", finding.count, fault, place, finding.value)};
+  return {
+      name, false,
+      fmt::format("{} {}: first at {} with value {}", finding.count, fault, place, finding.value)};
 }
 
 struct EikonalSum {
@@ -104,9 +106,9 @@ class SlopeStencil {
     return sum;
   }
 
-  /// Returns true when a slope between the one-sided differences of each axis can have a square in
-  /// [low, high]. Beside an edge of the solid these differences vary widely, and any slope between
-  /// them may be correct.
+  /// Returns true when the squared length of some gradient lies in [low, high], with each component
+  /// between the two one-sided differences of its axis. Beside an edge of the solid these two
+  /// differ widely, and any slope between them may be correct.
   [[nodiscard]] bool canHaveSquaredSlope(double low, double high) const {
     double least = 0, most = 0;
     for (const auto& pair : around_) {
@@ -117,8 +119,9 @@ class SlopeStencil {
     return least <= high && most >= low;
   }
 
-  /// Deviation of |∇φ| from 1 beside a sheet thinner than two voxels; nullopt where there is none.
-  /// Uses the differences away from the sheet: a difference towards it spans both of its sides.
+  /// Returns the deviation of |∇φ| from 1 beside a sheet thinner than two voxels; nullopt where
+  /// there is no such sheet. Uses the differences away from the sheet, because a difference towards
+  /// it spans both of its sides.
   [[nodiscard]] std::optional<double> residualBesideSheet() const {
     const bool isInside = centre_ < 0;
     double sum = 0;
@@ -243,16 +246,16 @@ CheckItem checkBackground(const FloatGrid& grid) {
   // Rounded to float, a half width of one voxel may be slightly too small.
   if (std::isfinite(voxels) && voxels >= 1 - 1e-5) return {"positive background", true, ""};
   return {"positive background", false,
-          fmt::format("the background is {}, which is {} voxels; it needs at least one",
+          fmt::format("the background is {}, which is {} voxels; it must be at least one voxel",
                       grid.background(), voxels)};
 }
 
 CheckItem checkClass(const FloatGrid& grid) {
   const bool passed = grid.getGridClass() == openvdb::GRID_LEVEL_SET;
-  return {
-      "level-set class", passed,
-      passed ? ""
-             : fmt::format("the class is '{}'", FloatGrid::gridClassToString(grid.getGridClass()))};
+  return {"level-set class", passed,
+          passed ? ""
+                 : fmt::format("the class of the grid is '{}', not 'level set'",
+                               FloatGrid::gridClassToString(grid.getGridClass()))};
 }
 
 CheckItem checkVoxels(const FloatGrid& grid) {
@@ -294,8 +297,8 @@ CheckReport check(const NarrowBand& solid, const Progress& progress) {
   report.items.push_back(checkBackground(grid));
   report.items.push_back(item("no active tiles", activeTiles, "active tiles"));
   report.items.push_back(item("finite values", notFinite, "values are not finite"));
-  report.items.push_back(
-      item("values within the background", leaves.outOfRange, "active values lie beyond it"));
+  report.items.push_back(item("values within the background", leaves.outOfRange,
+                              "active values exceed the background in magnitude"));
   report.items.push_back(item("symmetric background", found.badInactive,
                               "inactive values differ from plus or minus the background"));
   report.items.push_back(item("unit slope at the zero set", leaves.badSlope,

@@ -9,9 +9,10 @@
 namespace levelset {
 
 struct CheckItem {
-  std::string name;  ///< "positive background"
+  std::string name;  ///< for example "positive background"
   bool passed = false;
-  std::string detail;  ///< fault and position, if the check failed
+  std::string detail;  ///< fault and position if the check failed, else empty; the residual check
+                       ///< always fills it
 };
 
 struct CheckReport {

@@ -41,7 +41,7 @@ void forEachChunk(std::size_t count, const Progress& progress, const Work& work)
   });
 }
 
-/// The zero set of one solid: its samples, and the data for distance queries.
+/// The zero set of one solid: points sampled on it, and the data for distance queries to it.
 class ZeroSet {
  public:
   ZeroSet(const NarrowBand& solid, const Progress& progress)
@@ -70,8 +70,8 @@ class ZeroSet {
   [[nodiscard]] Vec3d toWorld(const Vec3d& index) const { return transform_->indexToWorld(index); }
 
   /// Distance of a point to the zero set, world units. Newton's method starts from the nearest
-  /// known point and, close to the surface, also from the query point. It may fail at edges, so the
-  /// flat triangles there are tested as well.
+  /// stored surface point and, close to the surface, also from the query point. Newton's method may
+  /// fail at edges, so the flat triangles there are tested as well.
   [[nodiscard]] double distance(const Vec3d& world, Cache& cache) const {
     const Vec3d query = transform_->worldToIndex(world);
     const Vec3d start = points_.positions[tree_.nearest(query, std::numeric_limits<double>::max())];
@@ -89,7 +89,8 @@ class ZeroSet {
   }
 
  private:
-  /// Voxels: distance below which Newton's method also starts from the query point.
+  /// Distance from the surface, voxels, below which Newton's method also starts from the query
+  /// point.
   static constexpr double kOwnStart = 1.5;
 
   struct Points {

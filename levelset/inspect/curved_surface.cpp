@@ -15,14 +15,14 @@ using openvdb::Vec3d;
 
 /// Minimum half width, voxels, at which the tricubic stencil beside the surface lies in the band.
 constexpr double kTricubicHalfWidth = 3;
-/// Maximum distance of the surface from the triangle, in voxels.
+/// Maximum distance of the zero set from a triangle, voxels. Beyond it, the triangle stays flat.
 constexpr double kLargestLift = 0.4;
 /// Minimum cosine between the normals at the corners of a triangle and its own normal. A lower
 /// value indicates an edge of the solid.
 constexpr double kSmoothCosine = 0.85;
 constexpr int kLiftSteps = 4;
-constexpr double kLiftTolerance = 1e-3;  // voxels: limit of Newton's last step; the remaining error
-                                         // is its square
+// Largest last step of Newton's method, voxels. The remaining error is about its square.
+constexpr double kLiftTolerance = 1e-3;
 
 struct QuadratureNode {
   double u, v, weight;
@@ -41,7 +41,7 @@ Vec3d toDouble(const openvdb::Vec3f& v) {
   return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
 }
 
-/// Adds the contribution of a surface element at p with the area vector `a`.
+/// Adds the moments of a surface element at position `p` with the area vector `a`.
 void addPiece(SurfaceMoments& sum, const Vec3d& p, const Vec3d& a) {
   sum.volume += p.dot(a) / 3;
   sum.area += a.length();
@@ -148,8 +148,8 @@ CurvedSurface::Node CurvedSurface::node(std::size_t triangle, bool bends, double
       break;
     }
   }
-  // (k1 + k2) dA = n · (n_u × S_v + S_u × n_v), with the interpolated normals: across an edge of
-  // the solid they turn by its angle.
+  // (k1 + k2) dA = n · (n_u × S_v + S_u × n_v), with the interpolated normals. Across an edge of
+  // the solid, these normals turn by the angle of the edge.
   const double length = normal.length();
   if (length > 0.1) {
     const Vec3d unit = normal / length;

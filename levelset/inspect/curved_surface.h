@@ -15,16 +15,17 @@ namespace levelset {
 struct SurfaceMoments {
   double volume = 0;
   double area = 0;
-  double meanCurvature = 0;  ///< ∫ (k1 + k2) / 2 dA
-  openvdb::Vec3d first = openvdb::Vec3d(0);
-  std::array<double, 6> second = {};  ///< xx, yy, zz, xy, xz, yz
+  double meanCurvature = 0;                  ///< ∫ (k1 + k2) / 2 dA
+  openvdb::Vec3d first = openvdb::Vec3d(0);  ///< ∫ x dV, x relative to the anchor
+  std::array<double, 6> second = {};         ///< ∫ of xx, yy, zz, xy, xz and yz over the volume
 
   void add(const SurfaceMoments& other);
-  /// Moments about the point at `shift` from the old anchor.
+  /// Returns the moments about a new anchor, `shift` away from the old one.
   [[nodiscard]] SurfaceMoments about(const openvdb::Vec3d& shift) const;
 };
 
-/// Exact moments of a flat triangle. The curvature is zero: that of a mesh lies in its edges.
+/// Exact moments of a flat triangle. Its mean curvature is zero: the curvature of a mesh lies in
+/// its edges.
 [[nodiscard]] SurfaceMoments flatTriangleMoments(const openvdb::Vec3d& a, const openvdb::Vec3d& b,
                                                  const openvdb::Vec3d& c);
 
@@ -34,23 +35,24 @@ struct SurfaceMoments {
 /// field is no smooth distance, mainly at edges. Index space.
 class CurvedSurface {
  public:
-  /// Keeps a view of the mesh. @param grid  the field that the mesh was extracted from
+  /// Keeps a reference to the mesh, which must outlive this object.
+  /// @param grid  level set from which the mesh was extracted
   CurvedSurface(const IndexMesh& mesh, const openvdb::FloatGrid& grid);
 
   /// Scratch memory, one per thread.
   using Cache = eikonal::DenseBlockCache;
   [[nodiscard]] Cache makeCache() const { return Cache(*field_); }
 
-  /// Integrates over a triangle by a quadrature rule of degree four. @param anchor  reference point
-  /// of the moments
+  /// Integrates over a triangle by a quadrature rule of degree four.
+  /// @param anchor  reference point of the moments
   [[nodiscard]] SurfaceMoments moments(std::size_t triangle, const openvdb::Vec3d& anchor,
                                        Cache& cache) const;
 
   struct Sample {
     openvdb::Vec3d position;
     double area = 0;
-    bool isFlat = true;  ///< true: a point of the flat triangle, which replaces an edge that the
-                         ///< interpolant rounds
+    bool isFlat = true;  ///< true: lies on a triangle that stays flat, mainly at an edge, which the
+                         ///< interpolant would round
   };
   /// Midpoint of a triangle and the triangle's area.
   [[nodiscard]] Sample middle(std::size_t triangle, Cache& cache) const;
@@ -58,7 +60,7 @@ class CurvedSurface {
  private:
   struct Node {
     openvdb::Vec3d position, areaVector;
-    double meanCurvature = 0;  ///< mean curvature times area
+    double meanCurvature = 0;  ///< mean curvature times triangle area
     bool isFlat = true;
   };
   [[nodiscard]] Node node(std::size_t triangle, bool bends, double u, double v, Cache& cache) const;
@@ -67,7 +69,8 @@ class CurvedSurface {
 
   const IndexMesh& mesh_;
   openvdb::FloatTree::ConstPtr field_;
-  std::vector<openvdb::Vec3f> normals_;  ///< unit normals at the vertices; zero where unknown
+  /// Unit normals at the vertices, index space; zero where the gradient vanishes.
+  std::vector<openvdb::Vec3f> normals_;
 };
 
 }  // namespace levelset

@@ -53,8 +53,8 @@ std::vector<SurfaceMoments> sumComponents(const std::vector<std::uint32_t>& comp
   return sums;
 }
 
-/// Anchors for the moments: a vertex of each surface component. It is close to its component even
-/// if the components are far apart.
+/// Returns the reference point of the moments of each surface component: its first vertex, which is
+/// close to the component even if the components are far apart.
 template <typename Vector>
 std::vector<Vec3d> componentAnchors(const SurfaceComponents& components,
                                     const std::vector<Vector>& positions) {
@@ -76,8 +76,10 @@ std::vector<std::uint32_t> componentsOfTriangles(
   return result;
 }
 
+/// Converts moments in index space to volume, area, curvature, centroid and inertia in world space.
+/// @param whole  moments of all surface components together
 /// @param anchor  reference point of the moments
-/// @param scale  length of an index unit in the world
+/// @param scale  voxel size, world units
 void describeMoments(const SurfaceMoments& whole, const Vec3d& anchor, const Imath::M44d& toWorld,
                      double scale, Measurement& result) {
   result.volume = whole.volume * scale * scale * scale;
@@ -106,8 +108,9 @@ void describeComponents(const SurfaceComponents& components,
   for (std::size_t i = 0; i < sums.size(); ++i) {
     result.euler += components.figures[i].euler;
     ++result.surfaces;
-    // The volume of the flat triangles decides: where the surface bends by more than a voxel, the
-    // curved volume may have the wrong sign.
+    // The sign of the volume tells a component that faces outwards from a cavity. The volume under
+    // the flat triangles decides: where the surface bends strongly within a voxel, the volume under
+    // the curved triangles may have the wrong sign.
     const double volume = components.figures[i].volume;
     if (volume > 0) ++result.components;
     if (volume < 0) ++result.cavities;
@@ -116,7 +119,8 @@ void describeComponents(const SurfaceComponents& components,
   describeMoments(whole, anchors[0], toWorld, scale, result);
 }
 
-/// Half the sum of length times angle over the edges, positive where convex [Steiner40].
+/// Returns the integral of the mean curvature of a mesh: half the sum over all edges of length
+/// times angle between the normals, positive at convex edges [Steiner40].
 double edgeCurvature(const TriMesh& mesh) {
   struct Side {
     std::uint32_t low, high;
@@ -152,7 +156,8 @@ double edgeCurvature(const TriMesh& mesh) {
   return sum;
 }
 
-/// The mesh with closed seams, if attributes may have doubled vertices and did so.
+/// Returns the mesh with closed seams if it has attributes whose seams double vertices; else
+/// nullopt.
 std::optional<TriMesh> withoutItsSeams(const TriMesh& mesh) {
   if (mesh.attributes.isEmpty()) return std::nullopt;
   return withoutSeams(mesh, memoryLimit(kNoMemoryLimit));
@@ -160,8 +165,8 @@ std::optional<TriMesh> withoutItsSeams(const TriMesh& mesh) {
 
 }  // namespace
 
-// Computed in index space, near the origin, so that a part far from the world origin has the same
-// measurements.
+// Integrates in index space, relative to a vertex, so that the distance of the solid from the world
+// origin does not affect the result.
 Measurement measure(const NarrowBand& solid, const Progress& progress) {
   requireSolid(solid);
   report(progress, 0);
@@ -213,7 +218,8 @@ Measurement measure(const TriMesh& mesh, const Progress& progress) {
 
 namespace {
 
-/// The triangle corners at each vertex: for each corner, the vertices after and before it.
+/// Triangle corners grouped by vertex. The corners at vertex v are spokes[first[v]] to
+/// spokes[first[v + 1] − 1]. Each holds the next and the previous vertex of its triangle.
 struct VertexFans {
   std::vector<std::size_t> first;
   std::vector<std::array<std::uint32_t, 2>> spokes;

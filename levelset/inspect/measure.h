@@ -12,7 +12,7 @@
 namespace levelset {
 
 struct Measurement {
-  double volume = 0;    ///< volume of the solid without its cavities, world units³
+  double volume = 0;    ///< volume of the solid, cavities subtracted, world units³
   double area = 0;      ///< area of all its surfaces, world units²
   Imath::Box3d bounds;  ///< bounds of the zero set, world units
   std::size_t activeVoxels = 0;
@@ -35,8 +35,8 @@ struct Measurement {
 
 /// Measures a triangle mesh, exactly for its flat triangles. `components` counts the connected
 /// surfaces that face outwards. Volume, centroid and inertia are meaningful for a closed mesh only.
-/// The curvature is that of the edges: half the length times the angle [Steiner40]. Seams of
-/// attributes count as closed (withoutSeams).
+/// `meanCurvature` is the sum over the edges of half the length times the angle [Steiner40]. Seams
+/// of attributes count as closed (withoutSeams).
 [[nodiscard]] Measurement measure(const TriMesh& mesh, const Progress& progress = {});
 
 /// Defects of a mesh. In a closed manifold, exactly two triangles share each edge and traverse it

@@ -34,9 +34,11 @@ TriangleTree treeOf(const TriMesh& mesh) {
   return TriangleTree(std::move(triangles));
 }
 
-/// Samples per task. Consecutive samples are usually close in space.
+/// Number of samples per task. Consecutive samples are usually close in space, which makes the
+/// searches of SampleScan fast.
 constexpr std::size_t kDifferenceChunk = 1024;
-/// Maximum number of parts of a triangle's side: triangles of decimated meshes may be long.
+/// Maximum number of parts into which the side of a triangle is divided. It limits the samples on
+/// the long triangles of decimated meshes.
 constexpr double kMaxParts = 256;
 
 struct DifferenceSums {
@@ -51,15 +53,15 @@ struct DifferenceSums {
   }
 };
 
-/// Measures samples one after another. The distance changes by at most the distance between two
-/// samples, which bounds the search.
+/// Measures the distances of samples to `target`, one after another. From one sample to the next,
+/// the distance grows by at most the distance between the two samples. This bounds the search.
 class SampleScan {
  public:
   SampleScan(const TriangleSurface& target, const eikonal::PointTree* creases, double reach)
       : target_(target), creases_(creases), reach_(reach) {}
 
   /// Measures one sample.
-  /// @return the distance; 0 near a crease
+  /// @return the distance to `target`, world units; 0 near a crease
   double visit(const V3d& point) {
     const double limit =
         sums_.samples == 0 ? std::numeric_limits<double>::max() : last_ + (point - at_).length();
@@ -85,8 +87,9 @@ class SampleScan {
   DifferenceSums sums_;
 };
 
-/// Measures the midpoints of the parts of a triangle.
-/// @return the largest distance
+/// Divides a triangle into parts with sides of at most `spacing` and measures the distances of
+/// their midpoints.
+/// @return the largest of these distances, those near creases excepted
 double visitMiddles(const V3d& a, const V3d& b, const V3d& c, double spacing, SampleScan& scan) {
   const double longest =
       std::sqrt(std::max({(b - a).length2(), (c - b).length2(), (a - c).length2()}));
@@ -102,7 +105,8 @@ double visitMiddles(const V3d& a, const V3d& b, const V3d& c, double spacing, Sa
   return largest;
 }
 
-/// Calls work(i, scan) for each i below `count`, in parallel, and sums the results.
+/// Calls work(i, scan) for each i below `count`, in parallel, and combines the results.
+/// @param fresh  scan without samples, copied for each task
 template <typename Work>
 DifferenceSums scanAll(std::size_t count, const SampleScan& fresh, const Progress& progress,
                        const Work& work) {
@@ -121,8 +125,8 @@ DifferenceSums scanAll(std::size_t count, const SampleScan& fresh, const Progres
   return sums;
 }
 
-/// Numbers of the triangles whose distances come close to the largest of all; the 4,096 largest at
-/// most.
+/// Returns the indices of the triangles with at least 0.75 times the largest distance. If these are
+/// more than 4,096, returns the 4,096 with the largest distances.
 std::vector<std::uint32_t> farthest(const std::vector<float>& distances, double largest) {
   constexpr double kLargePart = 0.75;
   constexpr std::size_t kMaxCount = 4096;
@@ -142,8 +146,9 @@ std::vector<std::uint32_t> farthest(const std::vector<float>& distances, double 
   return numbers;
 }
 
-/// Measures everywhere at the requested spacing, and four times as densely where distances are
-/// largest. The error of the largest distance is then about one percent.
+/// Measures the distances from `surface` to `target`: everywhere at the requested spacing, and with
+/// a quarter of it where distances are largest. The error of the largest distance is then about one
+/// percent.
 DifferenceSums differenceTo(const TriangleSurface& target, const TriangleSurface& surface,
                             const eikonal::PointTree* creases,
                             const SurfaceDifferenceOptions& options, const Progress& progress) {
@@ -174,8 +179,9 @@ DifferenceSums differenceTo(const TriangleSurface& target, const TriangleSurface
   return sums;
 }
 
-/// For each vertex, the angle between two planes whose normals would scatter as the normals in two
-/// rings of triangles around it do.
+/// Returns the turn of the surface at each vertex, radians. It is the angle between two planes of
+/// equal area whose normals scatter as much as the normals of the triangles in two rings around the
+/// vertex.
 std::vector<float> turnsOf(const TriMesh& mesh) {
   std::vector<V3d> normals(mesh.positions.size(), V3d(0));
   std::vector<double> areas(mesh.positions.size(), 0);
@@ -206,7 +212,8 @@ std::vector<float> turnsOf(const TriMesh& mesh) {
   return turns;
 }
 
-/// The largest turn in each cell of a coarse grid and its neighbours.
+/// Largest turn, radians, in each cell of a coarse grid; around() also reads the 26 neighbouring
+/// cells.
 class TurnGrid {
  public:
   explicit TurnGrid(double cell) : cell_(cell) {}
@@ -254,7 +261,7 @@ const TriMesh& TriangleSurface::mesh() const {
 }
 
 double TriangleSurface::distance(const V3d& point, double limit) const {
-  // Slightly enlarged to allow for rounding of the limit.
+  // Enlarges the limit slightly, in case rounding made it too small.
   const double wide = limit < 1e300 ? limit * (1 + 1e-9) + 1e-300 : limit;
   const TriangleTree::Hit near = data_->tree.nearest(toVdb(point), wide);
   if (near.found) return near.distance;
@@ -277,10 +284,11 @@ SurfaceDifference surfaceDifference(const TriangleSurface& a, const TriangleSurf
 
 std::vector<V3d> findCreases(const TriMesh& fine, double fineVoxel, const TriMesh& coarse,
                              double coarseVoxel) {
-  // The turn that two planes at 45 degrees leave beside the triangles that cut their edge.
+  // Smallest turn of a crease. Two planes that meet at 45 degrees reach it at the vertices beside
+  // the triangles that cut off their edge.
   constexpr double kMinTurn = 30 * std::numbers::pi / 180;
-  // A resolved bend turns twice as much in the coarse mesh. An edge turns 0.7 to 1.2 times as much,
-  // depending on its position in the grid.
+  // Bounds of the turn in the coarse mesh divided by that in the fine mesh. For a resolved bend the
+  // ratio is 2. For an edge it is 0.7 to 1.2, depending on the position of the edge in the grid.
   constexpr float kMinTurnRatio = 0.5f, kMaxTurnRatio = 1.35f;
   const std::vector<float> fineTurns = turnsOf(fine), coarseTurns = turnsOf(coarse);
   const double cell = 2 * std::max(fineVoxel, coarseVoxel);

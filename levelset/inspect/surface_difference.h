@@ -42,7 +42,7 @@ struct SurfaceDifferenceOptions {
 struct SurfaceDifference {
   double smooth = 0;       ///< two-sided Hausdorff distance of the samples away from creases
   double crease = 0;       ///< the same distance of the samples near creases
-  double creaseShare = 0;  ///< share of the samples near creases
+  double creaseShare = 0;  ///< fraction of the samples that lie near creases
 };
 
 /// Measures the largest distance of two surfaces, from samples of each to the other. The samples
@@ -57,13 +57,15 @@ struct SurfaceDifference {
 /// coarser mesh of the same surface must turn as much within two of its own voxels. A resolved bend
 /// turns half as much over half the distance. A sharp edge or a seam of two solids turns by the
 /// same angle at every scale.
-/// @param fine  result of bandToMesh() for a band with voxels of that size; likewise `coarse`
+/// @param fine  result of bandToMesh() for a band with voxels of size `fineVoxel`, world units
+/// @param coarse  result of bandToMesh() for a band with voxels of size `coarseVoxel`
 /// @return positions, world units
 [[nodiscard]] std::vector<Imath::V3d> findCreases(const TriMesh& fine, double fineVoxel,
                                                   const TriMesh& coarse, double coarseVoxel);
 
-/// Width of the flat faces beside the sharp edges, world units: the largest value over all edges of
-/// at least 45 degrees. With smaller voxels, a field resolves a crease there. 0 without such edges.
+/// Returns the width of the flat faces beside sharp edges, world units: the largest value over all
+/// edges of at least 45 degrees. At one edge, it is the smaller height of the two triangles over
+/// the edge. A field with voxels below this width resolves the crease. 0 without such edges.
 [[nodiscard]] double flatBesideEdges(const TriMesh& mesh);
 
 }  // namespace levelset

@@ -70,8 +70,8 @@ double negativeVolume(const Tet& tet, std::size_t field) {
   return sum;
 }
 
-/// Symmetric difference in a unit cell, split into six tetrahedra around its diagonal. Corners have
-/// the numbers dx·4 + dy·2 + dz.
+/// Returns the volume of the symmetric difference of two fields in a unit cell, split into six
+/// tetrahedra around its diagonal. Corners have the numbers dx·4 + dy·2 + dz.
 double cellDifference(const std::array<std::array<double, 2>, 8>& corners) {
   constexpr std::array<std::array<int, 2>, 6> kPaths = {
       {{4, 6}, {4, 5}, {2, 6}, {2, 3}, {1, 5}, {1, 3}}};
@@ -89,7 +89,8 @@ double cellDifference(const std::array<std::array<double, 2>, 8>& corners) {
   return sum;
 }
 
-/// Sum over the cells whose lowest corners lie in the leaf block at `origin`.
+/// Returns the volume of the symmetric difference, in voxels, in the cells whose lowest corners lie
+/// in the leaf block at `origin`.
 double blockDifference(const FloatTree& a, const FloatTree& b, const Coord& origin) {
   std::vector<std::array<double, 2>> values;
   values.reserve(729);
@@ -121,7 +122,8 @@ double blockDifference(const FloatTree& a, const FloatTree& b, const Coord& orig
   return sum;
 }
 
-/// Leaf blocks of both trees, and the blocks below them whose cells extend into one.
+/// Returns the origins of the leaf blocks of both trees, and of the blocks before them on each
+/// axis, whose last cells extend into a leaf block.
 std::vector<Coord> blocksOfBoth(const FloatTree& a, const FloatTree& b) {
   std::vector<Coord> blocks;
   for (const FloatTree* tree : {&a, &b})
@@ -144,7 +146,8 @@ openvdb::MaskTree insideTiles(const FloatTree& tree) {
   return mask;
 }
 
-/// Number of voxels in tiles that are inside in one tree only.
+/// Returns the number of voxels in tiles that are inside in one tree only. Leaves out the voxels of
+/// `blocks`.
 double tileDifference(const FloatTree& a, const FloatTree& b, const std::vector<Coord>& blocks) {
   const openvdb::MaskTree inA = insideTiles(a), inB = insideTiles(b);
   double sum = 0;
