@@ -27,7 +27,8 @@ CameraAxes axesOf(const Camera& camera) {
   return axes;
 }
 
-/// Half extents of the picture: at unit distance (perspective), or in world units (orthographic).
+/// Half extents of the picture: on the plane at unit depth (perspective), or in world units
+/// (orthographic).
 struct HalfExtent {
   double x, y;
 };
@@ -83,7 +84,8 @@ Imath::M44d Camera::worldToCamera() const {
 Imath::M44d Camera::worldToNdc() const {
   const HalfExtent half = halfExtentOf(*this);
   const double sx = 0.5 / half.x, sy = -0.5 / half.y;
-  // Readers discard the third coordinate; it keeps the matrix invertible.
+  // Programs that read the matrix discard the third coordinate; the third row and column only keep
+  // the matrix invertible.
   const Imath::M44d perspective(sx, 0, 0, 0, 0, sy, 0, 0, 0.5, 0.5, 1, 1, 0, 0, -1, 0);
   const Imath::M44d orthographic(sx, 0, 0, 0, 0, sy, 0, 0, 0, 0, 1, 0, 0.5, 0.5, 0, 1);
   return worldToCamera() * (orthoHeight ? orthographic : perspective);

@@ -13,14 +13,15 @@ struct Camera {
   static constexpr double kNoDepth =
       1e300;  ///< stands for an unlimited depth; larger than every depth of a surface
   Imath::V3d from{0, 0, 5}, to{0, 0, 0}, up{0, 1, 0};
-  double verticalFov = 0.6108652381980153;  ///< radians, (0, π)
-  std::optional<double> orthoHeight = {};   ///< world units; set: orthographic projection
+  double verticalFov = 0.6108652381980153;  ///< vertical field of view, radians, in (0, π)
+  std::optional<double> orthoHeight =
+      {};  ///< height of an orthographic view, world units; unset: perspective
   /// Visible depth range, world units along the view axis. `near` is at least 0, `far`
   /// is above `near` or unset (no end). Surfaces outside the range are invisible but still cast
   /// shadows.
   double near = 0;
   std::optional<double> far = {};
-  int width = 1024, height = 1024;  ///< pixels
+  int width = 1024, height = 1024;  ///< size of the picture, pixels
 
   struct Ray {
     Imath::V3d origin, direction;     ///< direction of unit length
@@ -58,7 +59,7 @@ void validate(const Camera& camera);
 
 /// Camera that frames the box, for any ratio of width to height. It looks from the upper right
 /// front; `up` is the upward direction.
-/// @throws levelset::UsageError when the box is empty, and as validate()
+/// @throws levelset::UsageError when the box is empty, and for the reasons of validate()
 [[nodiscard]] Camera framingCamera(const Imath::Box3d& bounds, int width, int height,
                                    double verticalFov = 0.6108652381980153,
                                    const Imath::V3d& up = {0, 1, 0});

@@ -6,11 +6,11 @@ namespace render {
 enum class Filter {
   /// Trilinear interpolation.
   Trilinear,
-  /// Tricubic B-spline whose coefficients are the grid values: smooth, but off by a sixth of the
-  /// Laplacian.
+  /// Tricubic B-spline whose coefficients are the grid values. It is smooth, but differs from the
+  /// grid values by a sixth of their Laplacian.
   BSpline,
-  /// Quasi-interpolating tricubic B-spline with coefficients f − ∇²f/6: it meets the values to
-  /// fourth order [Sigg05].
+  /// Quasi-interpolating tricubic B-spline with coefficients f − ∇²f/6: its error is of fourth
+  /// order in the voxel size [Sigg05].
   BSplineQi
 };
 

@@ -6,8 +6,8 @@
 
 namespace render {
 
-/// Versions of the libraries that render/ uses in addition to levelset::libraryVersions(), in the
-/// same form.
+/// Names and versions of the libraries that render/ uses in addition to those of
+/// levelset::libraryVersions().
 [[nodiscard]] std::vector<levelset::LibraryVersion> libraryVersions();
 
 }  // namespace render

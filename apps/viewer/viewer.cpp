@@ -19,8 +19,8 @@ using Imath::V2d;
 using Imath::V3d;
 
 constexpr double kWatchSeconds = 0.4;
-constexpr double kTurnPerPixel = 0.006;  // radians
-constexpr double kTurnPerKey = 0.1;      // radians
+constexpr double kTurnPerPixel = 0.006;  // rotation for a pixel of a drag, radians
+constexpr double kTurnPerKey = 0.1;      // rotation for an arrow key, radians
 constexpr double kClickPixels =
     3;  // movement with a pressed button from which on it is a drag, pixels
 constexpr double kZoomPerStep = 0.88;  // factor of the distance for each step of the wheel

@@ -47,7 +47,7 @@ class Viewer {
   void addPick(const Picked& picked);
 
  private:
-  static constexpr float kPanelWidth = 250;  // pixels
+  static constexpr float kPanelWidth = 250;  // width of the panel at the left, pixels
 
   [[nodiscard]] bool isPanelShown() const;
   void frameBesidePanel();

@@ -76,7 +76,8 @@ double parsePositive(const std::string& text, const std::string& option) {
 render::Style styleNamed(const std::string& name) {
   std::string all;
   for (const render::Style style : render::kStyles) {
-    if (style == render::Style::Matcap) continue;  // it needs a picture of a ball
+    if (style == render::Style::Matcap)
+      continue;  // the style needs a picture of a ball, which has no option
     if (render::styleName(style) == name) return style;
     all += (all.empty() ? "" : ", ") + std::string(render::styleName(style));
   }

@@ -21,7 +21,7 @@ struct Arguments {
   bool hasSize = false;  ///< --size is given; false: the size in a scene file has priority
   /// Position of the eye, target and up direction, world units.
   std::optional<Imath::V3d> from = {}, to = {}, up = {};
-  std::optional<double> verticalFov = {};  ///< radians
+  std::optional<double> verticalFov = {};  ///< vertical field of view, radians
   std::optional<double> orthoHeight = {};  ///< height of an orthographic view, world units
   std::optional<ClipPlane> clip = {};
   Display display = {};

@@ -21,7 +21,7 @@ bool beginPart(const char* title) {
   return ImGui::CollapsingHeader(title, ImGuiTreeNodeFlags_DefaultOpen);
 }
 
-/// A slider for a double.
+/// Draws a slider for a double. Returns true when the user has moved it.
 bool slideDouble(const char* label, double& value, double low, double high, const char* format) {
   return ImGui::SliderScalar(label, ImGuiDataType_Double, &value, &low, &high, format);
 }

@@ -40,7 +40,7 @@ void loadFont() {
   constexpr std::array<const char*, 3> kPlaces = {
       "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf",
       "/usr/share/fonts/dejavu-sans-fonts/DejaVuSans.ttf", "/usr/share/fonts/TTF/DejaVuSans.ttf"};
-  constexpr float kHeight = 15;  // pixels
+  constexpr float kHeight = 15;  // height of the font, pixels
   ImFontAtlas& fonts = *ImGui::GetIO().Fonts;
   for (const char* place : kPlaces) {
     std::error_code wrong;

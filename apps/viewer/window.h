@@ -37,8 +37,8 @@ class Window {
   void close();
   void setTitle(const std::string& title);
 
-  [[nodiscard]] int width() const;   ///< pixels, at least 1
-  [[nodiscard]] int height() const;  ///< pixels, at least 1
+  [[nodiscard]] int width() const;   ///< width of the framebuffer, pixels, at least 1
+  [[nodiscard]] int height() const;  ///< height of the framebuffer, pixels, at least 1
 
   /// Draws the picture, if there is one, and on top of it the ImGui widgets of `interface`.
   void draw(const std::function<void()>& interface);

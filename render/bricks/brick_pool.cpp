@@ -21,7 +21,8 @@ constexpr int kMostEmptyPages = 1 << 10;  // largest edge of an empty cube, page
 constexpr double kWidest = 8192;  // largest extent of a surface along an axis, voxels
 constexpr std::size_t kMostValues = std::numeric_limits<std::int32_t>::max();
 
-/// Writes the edges of the largest aligned empty cubes into the empty items of a cubic table.
+/// For each empty item of a three-dimensional table, stores the edge of the largest aligned cube of
+/// empty items that contains it.
 /// @param size  number of items along each axis
 /// @param most  largest edge of a cube, items
 /// @param isEmpty  returns true when the item with a given number is empty
@@ -67,7 +68,8 @@ void markEmpty(const std::array<int, 3>& size, int most, const IsEmpty& isEmpty,
       }
 }
 
-/// Finds the table entry of a block by its origin.
+/// Fills the two-level table of a pool: finds the items of a block by the block's origin, and adds
+/// pages.
 class Table {
  public:
   explicit Table(BrickPool& pool) : pool_(pool) {
@@ -115,8 +117,8 @@ void markEmptyCubes(BrickPool& pool) {
       [&](std::size_t i, int edge) { pool.page[i] = -BrickPool::kPage * edge; });
 }
 
-/// Fills the pool with the bricks, then the halo blocks, then one row of values far outside and one
-/// far inside.
+/// Fills the pool with the values of the bricks, then of the halo blocks, then with eight
+/// background values for outside and eight for inside.
 void fillPool(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks,
               const std::vector<HaloBlock>& beside, float background) {
   constexpr int kEdge = BrickPool::kEdge;

@@ -87,9 +87,9 @@ struct TableOptions {
   std::function<bool(const Imath::V3d& centre, double radius)> keeps = {};
 };
 
-/// Builds the bricks of a band.
+/// Builds the brick pool of a band.
 /// @throws levelset::ResourceLimit for a surface that spans more than the table can hold, or for
-///         more values than an index can address
+/// more values than a 32-bit index can address
 [[nodiscard]] BrickPool makeBricks(const levelset::NarrowBand& band,
                                    const TableOptions& options = {});
 

@@ -30,7 +30,7 @@ class FieldGrid {
   /// Upper bound on the memory of a band's blocks, bytes.
   [[nodiscard]] static double bytesOf(const levelset::NarrowBand& band);
   /// @pre the band is not empty
-  /// @throws levelset::ResourceLimit for a band that spans more than the table can hold
+  /// @throws levelset::ResourceLimit for a band that spans more voxels than the table supports
   explicit FieldGrid(const levelset::NarrowBand& band);
 
   /// Takes over the transform of the band. Returns true when it differs from the previous one.
@@ -39,7 +39,8 @@ class FieldGrid {
 
   [[nodiscard]] const Imath::M44d& indexToWorld() const { return indexToWorld_; }
   [[nodiscard]] const Imath::M44d& worldToIndex() const { return worldToIndex_; }
-  /// Number of blocks along an axis. Outside them the field equals the background.
+  /// Number of blocks of the grid along an axis. Outside these blocks the field equals the
+  /// background.
   [[nodiscard]] int size(int axis) const { return size_[static_cast<std::size_t>(axis)]; }
   [[nodiscard]] double background() const { return background_; }
   [[nodiscard]] std::size_t blockCount() const { return ranges_.size(); }

@@ -25,9 +25,10 @@ struct Brick {
 struct HaloBlock {
   openvdb::Coord origin;
   openvdb::CoordBBox points = {};  ///< box of the points that stencils read, relative to the origin
-  std::vector<float> value =
-      {};  ///< values of these points by x, y, z; empty where all equal the background
-  bool isInside = false;  ///< sign of the background value, if `value` is empty
+  std::vector<float> value = {};  ///< values of the points in the box `points`, ordered by x, y, z;
+                                  ///< empty when all equal ± the background
+  bool isInside =
+      false;  ///< if `value` is empty: true when the block is far inside, false when far outside
 };
 
 /// Builds a copy of the tree in which each leaf value f is replaced by the spline's coefficient f −
@@ -38,7 +39,7 @@ struct HaloBlock {
 struct Bricks {
   std::vector<std::unique_ptr<Brick>> kept;  ///< sorted by origin
   openvdb::CoordBBox crossed;  ///< box of the origins of all crossed blocks, kept or culled
-  openvdb::CoordBBox cells;    ///< box of all crossed cells
+  openvdb::CoordBBox cells;    ///< box of all cells that the surface crosses
   std::size_t culled = 0;      ///< number of crossed blocks that `keeps` rejected
 };
 

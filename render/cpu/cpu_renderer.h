@@ -10,7 +10,8 @@ namespace render {
 /// in single precision. Pixels depend on the scene alone, not on the number of threads or the
 /// instruction set.
 /// @throws as renderEmbree()
-/// @throws levelset::ResourceLimit also for surfaces that span more than the tables can hold
+/// @throws levelset::ResourceLimit also for surfaces that span more voxels than the brick tables
+/// support
 [[nodiscard]] Image renderCpu(const Scene& scene, const RenderOptions& options = {});
 
 }  // namespace render

@@ -3,7 +3,8 @@
 namespace render {
 namespace {
 
-/// Number of halvings after which an interval is as narrow as the spacing of doubles below 1.
+/// Number of halvings after which a part of [0, 1] is about as narrow as the spacing of doubles
+/// below 1.
 constexpr int kMaxDepth = 52;
 
 int signChanges(const BernsteinCubic& b) {
@@ -30,9 +31,9 @@ CubicPiece splitCubic(CubicPiece& piece) {
   return {{middle, b123, b23, b[3]}, piece.low + piece.width, piece.width, piece.depth};
 }
 
-/// Processes the pieces from left to right. A piece without sign variation has no root (convex
-/// hull). A piece whose ends differ in sign has one. With `stopAtProof` the search ends as soon as
-/// a root is certain.
+/// Searches for roots by halving [0, 1], from left to right. A piece whose coefficients have one
+/// sign has no root (convex hull). A piece whose ends differ in sign has a root.
+/// @param stopAtProof  true: returns as soon as a root is certain, at a coarse position
 /// @param all  if not null, receives all roots; then the function returns -1
 double searchCubic(const BernsteinCubic& cubic, bool stopAtProof,
                    std::vector<double>* all = nullptr) {

@@ -15,7 +15,7 @@ namespace {
 
 using Imath::V2d;
 
-constexpr int kTile = 16;  // pixels
+constexpr int kTile = 16;  // edge of a tile, pixels
 
 struct PixelPainter {
   const Scene& scene;

@@ -10,9 +10,9 @@
 #include "render/scene/scene.h"
 #include "render/shading/render_options.h"
 
-/// The judge: finds the first zero of the filter's function along each ray, in double precision on
-/// OpenVDB's own tree. Embree finds only leaf blocks and mesh triangles. Correctness has priority
-/// over speed.
+/// The judge: finds the first zero of the interpolating function along each ray, in double
+/// precision on OpenVDB's own tree. Embree only finds the leaf blocks and mesh triangles that a ray
+/// meets. Correctness has priority over speed.
 namespace render {
 
 /// Draws the scene. Pixels depend on the scene alone, not on the number of threads.
@@ -27,8 +27,8 @@ namespace render {
 [[nodiscard]] Image renderEmbree(const Scene& scene, const RenderOptions& options = {});
 
 /// A scene prepared for the judge. Thread-safe; results do not depend on the order of calls. Ray
-/// directions have unit length. When two solids are hit at the same distance, the one with the
-/// smaller voxels counts; for equal voxels, the one with the lower id.
+/// directions have unit length. When two solids are hit at the same distance, the solid with the
+/// smaller voxels counts; for equal voxels, the solid with the lower id.
 class EmbreeScene {
  public:
   /// @throws levelset::ResourceLimit when Embree cannot allocate memory
@@ -39,8 +39,8 @@ class EmbreeScene {
   /// @throws levelset::UsageError when origin or direction is not finite or the direction is zero
   [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction,
                               double near = 0, double far = Camera::kNoDepth) const;
-  /// Visible hits in [near, far], in order along the ray. Ends at an opaque hit or when the
-  /// transmittance falls below kLeastTransmittance.
+  /// Visible hits in [near, far], in order along the ray. The list ends at an opaque hit, or when
+  /// the transmittance falls below kLeastTransmittance.
   /// @throws as intersect()
   [[nodiscard]] std::vector<Hit> intersectVisible(const Imath::V3d& origin,
                                                   const Imath::V3d& direction, double near,

@@ -93,7 +93,7 @@ struct BlockTraversal {
                         ///< of the search
   int axis = -1;        ///< axis of the entry plane of the cell; -1: the ray starts inside
   int cell[3] = {};     ///< index coordinates of the cell
-  double t = 0;         ///< parameter at the entry into the cell
+  double t = 0;         ///< ray parameter at the entry into the present cell
 
   [[nodiscard]] bool isForward(int a) const { return ray.direction[a] > 0; }
   [[nodiscard]] double exitPlane(int a, int k) const {
@@ -154,7 +154,7 @@ void BlockTraversal::findFirstCell() {
     cell[a] = static_cast<int>(
         std::clamp(std::floor(ray.at(a, t)), static_cast<double>(low), static_cast<double>(high)));
     if (ray.isParallel[a]) continue;
-    // Planes met at the same parameter are crossed in the order x, y, z.
+    // The ray crosses planes that it meets at the same parameter in the order x, y, z.
     const bool isEarlier = axis >= 0 && a < axis, isLater = axis >= 0 && a > axis;
     const int last = forward > 0 ? high : low, first = forward > 0 ? low : high;
     while (cell[a] != last &&

@@ -189,8 +189,8 @@ GlContext::Current::~Current() {
     return;
   }
   egl.makeCurrent(egl.display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
-  // Mesa frees the state of a thread when the thread ends, and again when the process ends. If both
-  // happen at once, it crashes.
+  // Release the thread's state here: Mesa frees it when the thread ends, and again when the process
+  // ends, and crashes if both happen at once.
   egl.releaseThread();
 }
 

@@ -82,7 +82,7 @@ class GlContext {
   };
 
   const GlFunctions& gl() const { return gl_; }
-  /// Renderer and version as reported by the driver.
+  /// Name of the renderer and OpenGL version, from the driver.
   [[nodiscard]] const std::string& description() const { return description_; }
   /// Largest size of a buffer texture with 32-bit texels, bytes.
   [[nodiscard]] std::size_t largestTable() const { return largestTable_; }

@@ -18,7 +18,8 @@ struct NoOpenGl : levelset::ResourceLimit {
 /// @throws as renderCpu()
 /// @throws levelset::UsageError for blended scenes
 /// @throws NoOpenGl when OpenGL 4.5 is missing
-/// @throws levelset::ResourceLimit also when the driver rejects the shader or the grids
+/// @throws levelset::ResourceLimit also when the driver rejects the shader, or the tables are too
+/// large for it
 [[nodiscard]] Image renderGpu(const Scene& scene, const RenderOptions& options = {});
 
 }  // namespace render

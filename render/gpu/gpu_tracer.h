@@ -11,7 +11,7 @@
 namespace render {
 
 /// Runs the kernel on the graphics processor. The brick tables of each solid are uploaded once.
-/// Thread-safe; calls are serialised.
+/// Thread-safe: concurrent calls run one after the other.
 class GpuTracer : public KernelTracer {
  public:
   /// @param context  must outlive the tracer

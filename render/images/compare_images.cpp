@@ -22,7 +22,7 @@ constexpr std::size_t kShown = 5;
 // Largest accepted share of all pixels that differ at outlines. Where a ray passes an outline
 // within the rounding error, a hit and a miss are both right.
 constexpr double kOutlineShare = 1e-5;
-// Largest relative difference of Z between samples of one surface.
+// Largest relative difference of Z between two pictures of the same surface point.
 constexpr double kOneSurface = 1e-3;
 enum : char { kMissed, kHit, kBroken };
 
@@ -184,14 +184,14 @@ class Comparer {
     if (result_.unlike.size() > kShown) result_.unlike.resize(kShown);
   }
 
-  /// A positive length from a picture's header.
+  /// Value of a header attribute that is a length, or `fallback` if it is missing or not positive.
   [[nodiscard]] static double lengthNamed(const Image& image, const char* name, double fallback) {
     const auto found = image.attributes.find(name);
     if (found == image.attributes.end()) return fallback;
     const double size = std::atof(found->second.c_str());
     return size > 0 && std::isfinite(size * size) ? size : fallback;
   }
-  /// Voxel size of the first solid.
+  /// Voxel size of the first solid of the first picture; 1 if unknown.
   [[nodiscard]] double voxelSize() const { return lengthNamed(a_, "ls:voxelSize", 1); }
 
   /// Tolerance that quantized values add to the curvatures, per voxel. It is the change of the

@@ -9,7 +9,7 @@
 #include "render/images/image.h"
 
 /// Compares two pictures of one scene, layer by layer, by percentiles and the worst pixels. A mean
-/// over all pixels is not used, because it hides a leak of one pixel.
+/// over all pixels is not used, because it hides an error in a single pixel.
 namespace render {
 
 /// Largest difference of a layer between pictures of two correct renderers, in the layer's measure.
@@ -48,17 +48,18 @@ struct ImageComparison {
   std::size_t outlineAllowed = 0;  ///< limit of unlikeAtOutline; unlikeElsewhere must be 0
   std::vector<PixelDifference>
       unlike;  ///< at most five pixels whose hits differ, those away from outlines first
-  std::vector<LayerComparison> layers;  ///< sorted by name
+  std::vector<LayerComparison> layers;  ///< compared layers, sorted by name
   std::vector<std::string> onlyOne;     ///< channels of one picture only; not compared
-  std::size_t differentBits = 0;        ///< pixels with different bits in any channel
-  bool isExact = false;                 ///< agreement requires equal bits
-  Image difference;  ///< differences as a picture: a channel for each layer, and "coverage"
+  std::size_t differentBits = 0;        ///< number of pixels with different bits in any channel
+  bool isExact = false;  ///< value of ImageComparisonOptions::exact: agreement requires equal bits
+  Image difference;      ///< differences as a picture: a channel for each layer, and "coverage"
 
   [[nodiscard]] bool coverageAgrees() const {
     return unlikeElsewhere == 0 && unlikeAtOutline <= outlineAllowed;
   }
   [[nodiscard]] bool agrees() const;
-  /// First reason of a disagreement, as the end of a sentence; empty when the pictures agree.
+  /// First reason why the pictures disagree, as a clause after "the pictures differ:". Empty when
+  /// they agree.
   [[nodiscard]] std::string reason() const;
 };
 

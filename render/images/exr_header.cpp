@@ -67,11 +67,11 @@ class ExrHeaderReader {
   }
 
  private:
-  /// Pixel layout from one header.
+  /// Pixel layout that one header describes.
   struct Part {
     double width = 0, height = 0, channels = 0;
     double tileWidth = 0, tileHeight = 0;  // pixels; 0: the part is stored in scan lines
-    std::size_t compression = kZip;        // OpenEXR's default
+    std::size_t compression = kZip;        // index in kChunkLines; ZIP is OpenEXR's default
   };
 
   /// Checks one header. Returns false for the empty header that ends the list of headers in a

@@ -83,10 +83,11 @@ double sampleAt(const png_byte* row, std::size_t index, bool isDeep) {
 void requirePngChunks(const std::filesystem::path& path) {
   std::error_code failed;
   const std::uintmax_t size = std::filesystem::file_size(path, failed);
-  if (failed) return;  // a pipe, which can be read only once
+  if (failed) return;  // not a regular file, but a pipe, which can be read only once
   std::ifstream in(path, std::ios::binary);
   constexpr std::uintmax_t kSignature = 8,
-                           kAround = 12;  // bytes of a chunk's length, type and checksum
+                           kAround =
+                               12;  // bytes of a chunk beside its data: length, type and checksum
   for (std::uintmax_t at = kSignature; at + kAround <= size;) {
     unsigned char length[4] = {};
     in.seekg(static_cast<std::streamoff>(at));

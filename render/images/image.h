@@ -20,12 +20,13 @@ inline constexpr const char* kExtentAttribute = "ls:extent";
 /// An image with named channels.
 struct Image {
   int width = 0, height = 0;  ///< pixels
-  /// Width × height values each, row by row, top row first.
+  /// Channels of floats by name. Each has width × height values, row by row, top row first.
   std::map<std::string, std::vector<float>> channels;
   std::map<std::string, std::vector<std::uint32_t>>
       ids;  ///< channels of unsigned integers, with the same layout
-  std::map<std::string, std::string> attributes;       ///< written to the EXR header as strings
-  std::map<std::string, std::vector<float>> matrices;  ///< 16 floats each, by rows: M44f attributes
+  std::map<std::string, std::string> attributes;  ///< written to the EXR header as strings
+  std::map<std::string, std::vector<float>>
+      matrices;  ///< M44f attributes of the EXR header; 16 floats each, row by row
 
   Image() = default;
   Image(int width_, int height_) : width(width_), height(height_) {}
@@ -71,8 +72,9 @@ void writePng(const std::filesystem::path& path, int width, int height,
 
 /// Reads the first part of an EXR file: channels of 16 or 32 bits, string and M44f attributes.
 /// @throws levelset::IoError when the file cannot be opened
-/// @throws levelset::InvalidInput when it is not an EXR, is damaged, or is subsampled
-/// @throws levelset::ResourceLimit for more than 2^28 pixels, or above `maxMemory`
+/// @throws levelset::InvalidInput when the file is not an EXR, is damaged, or has subsampled
+/// channels
+/// @throws levelset::ResourceLimit for more than 2^28 pixels, or for memory above `maxMemory` bytes
 [[nodiscard]] Image readExr(const std::filesystem::path& path,
                             std::size_t maxMemory = levelset::kNoMemoryLimit);
 

@@ -9,7 +9,7 @@
 namespace render {
 
 /// Follows rays through solids, from one surface of the result of a CSG expression to the next.
-/// Without an expression, each surface of each solid counts.
+/// Without an expression, it stops at each surface of each solid.
 ///
 /// The caller computes the intersections. The traversal requests the first crossing of a ray with
 /// each solid, and later crossings when it needs them. Surfaces at equal distance are crossed

@@ -24,7 +24,7 @@ class FieldTraversal {
  public:
   /// @pre the scene is blended and passes requireFields()
   /// @throws levelset::ResourceLimit when the fields need more than maxBytes or span too many
-  ///         blocks
+  /// voxels
   FieldTraversal(const Scene& scene, std::size_t maxBytes);
   /// Takes over the transforms of the solids. Returns true when a transform has changed.
   bool updateTransforms(const Scene& scene);

@@ -63,7 +63,7 @@ class KernelPainter {
 
 /// Paints the entire picture in parallel tiles and writes its header attributes.
 /// @param tile  edge of a tile, pixels
-/// @param renderer  name for the header
+/// @param renderer  name of the renderer for the header attribute ls:renderer
 [[nodiscard]] Image paintPicture(const Scene& scene, const KernelScene& surfaces,
                                  const KernelTracer& tracer, int tile, const std::string& renderer,
                                  const RenderOptions& options);

@@ -15,16 +15,16 @@ inline float rayInverse(float d) {
   return d == 0 ? 1e30f : 1 / d;
 }
 
-/// A batch of rays in the table space of a BrickPool. Array lengths are multiples of kLanes. A ray
-/// with start > end hits nothing.
+/// A batch of rays in the table space of a BrickPool. The lengths of the arrays are multiples of
+/// kLanes. A ray with start > end hits nothing.
 struct RayBlock {
   static constexpr std::size_t kLanes = 16;
 
   std::size_t size = 0;               ///< length of the arrays
   std::vector<float> ox, oy, oz;      ///< origin: position at t = 0
-  std::vector<float> dx, dy, dz;      ///< derivative by t
-  std::vector<float> ix, iy, iz;      ///< rayInverse(d)
-  std::vector<float> start, end;      ///< interval of t
+  std::vector<float> dx, dy, dz;      ///< direction: derivative of the position by t
+  std::vector<float> ix, iy, iz;      ///< rayInverse() of the direction's components
+  std::vector<float> start, end;      ///< interval of t that is searched
   std::vector<std::int32_t> passing;  ///< for each ray: number of crossings to skip before the hit
 
   explicit RayBlock(std::size_t count) : size((count + kLanes - 1) / kLanes * kLanes) {

@@ -19,14 +19,14 @@ struct RayFan {
   float low[3], high[3];  ///< box of the blocks that the surface crosses, table space
 
   double depth = 0;         ///< depth of the plane t = 0, world units along the view axis
-  double depthPerStep = 0;  ///< depth per unit of t, world units
+  double depthPerStep = 0;  ///< increase of depth per unit of t, world units
   [[nodiscard]] double depthAt(float t) const {
     return depth + static_cast<double>(t) * depthPerStep;
   }
 };
 
 /// Builds the rays of a camera for a pool.
-/// @param voxelSize  world units
+/// @param voxelSize  voxel size of the band, world units
 /// @pre the camera is valid and the pool has bricks
 [[nodiscard]] RayFan makeRayFan(const Camera& camera, const Imath::M44d& tableToWorld,
                                 double voxelSize, const BrickPool& pool);

@@ -31,7 +31,8 @@ class CsgParser {
   }
 
  private:
-  /// Parses operands joined by operators of one precedence level; level 0 binds loosest.
+  /// Parses operands that operators of one precedence level join. Level 0 is |, level 1 is &, level
+  /// 2 is -.
   void chain(std::size_t level) {
     static constexpr std::pair<char, CsgExpression::Step> kOperators[] = {
         {'|', CsgExpression::Union},

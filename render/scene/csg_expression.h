@@ -28,7 +28,7 @@ class CsgExpression {
   /// most that of the distance.
   [[nodiscard]] double phi(const double* phi) const;
   [[nodiscard]] bool uses(std::size_t solid) const;
-  /// A box that contains the result, given boxes that contain the solids.
+  /// Box of the result, given boxes of the solids, all in world units.
   /// @param growth  distance by which a union may extend beyond its operands, world units
   [[nodiscard]] Imath::Box3d bounds(const std::vector<Imath::Box3d>& boxes,
                                     double growth = 0) const;

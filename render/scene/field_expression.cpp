@@ -61,7 +61,7 @@ class StepWriter {
   std::vector<std::optional<std::size_t>> stack_;
 };
 
-/// Nesting depth of the steps.
+/// Largest number of nested steps that lead to the drawn value.
 int depthOf(const FieldExpression& expression) {
   std::vector<int> depth(expression.operands.size(), 0);
   for (const FieldExpression::Step& step : expression.steps)

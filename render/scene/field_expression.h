@@ -33,8 +33,8 @@ struct FieldExpression {
   };
   std::vector<Operand> operands;  ///< solids that the expression reads; empty solids are left out
   std::vector<Step> steps;
-  std::size_t drawn = 0;  ///< number of the value whose zero set is drawn
-  double softness = 0;    ///< K, world units
+  std::size_t drawn = 0;  ///< number, as in Step, of the value whose zero set is drawn
+  double softness = 0;    ///< K of the smooth minimum, world units
   double share = 0;       ///< s, fraction of the morph, [0, 1]
 
   /// True when the expression reads no solid, so that nothing is drawn.
@@ -67,8 +67,8 @@ struct FieldExpression {
 
 /// Checks the softness and the morph of a scene, which may also have neither.
 /// @throws levelset::UsageError for a softness below 0 or without an expression, and for
-///         transparent solids that are blended. Also for a morph outside [0, 1], beside an
-///         expression, or of other than two solids.
+///         transparent solids that are blended. Also for a morph outside [0, 1], combined with an
+///         expression, or of a number of solids other than two.
 /// @throws levelset::InvalidInput for a softness that is too large for the half widths of the
 /// bands, and for a morph of an empty solid
 void requireFields(const Scene& scene);

@@ -26,7 +26,7 @@ struct Light {
                            ///< width of penumbrae
 };
 
-/// A level set of a scene.
+/// A level set in a scene, with its appearance.
 struct Solid {
   levelset::NarrowBand band;
   Imath::C3f colour{0.66f, 0.62f, 0.56f};
@@ -48,7 +48,8 @@ struct MeshPart {
   double opacity = 1;  ///< opacity of the surface, for each crossing of a ray, (0, 1]
 };
 
-/// Transmittance below which a ray ends as if the last surface were opaque.
+/// Renderers end a ray when its transmittance falls below this value, as if the last surface were
+/// opaque.
 inline constexpr double kLeastTransmittance = 1.0 / 512;
 
 /// Everything that a renderer draws.

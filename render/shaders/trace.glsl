@@ -82,9 +82,9 @@ Crossing crossingIn(Bool asked, Int brick, Int cellX, Int cellY, Int cellZ, Real
 
 struct Ray {
   Real ox, oy, oz;  // position at t = 0
-  Real dx, dy, dz;  // derivative by t
+  Real dx, dy, dz;  // direction: derivative of the position by t
   Real ix, iy, iz;  // 1 / direction; kParallel for a component 0
-  Real start, end;  // interval of t
+  Real start, end;  // interval of t that is searched
 };
 
 // One component of the origin or direction of the ray through pixel (x, y) of a RayFan.

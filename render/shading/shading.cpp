@@ -27,7 +27,7 @@ double unitInterval(std::uint64_t bits) {
   return static_cast<double>(bits >> 11) * 0x1p-53;
 }
 
-/// Completes n to an orthonormal frame [Duff17].
+/// Completes the unit vector n to an orthonormal frame (s, t, n) [Duff17].
 void tangentFrame(const V3d& n, V3d& s, V3d& t) {
   const double sign = std::copysign(1.0, n.z);
   const double a = -1 / (sign + n.z), b = n.x * n.y * a;

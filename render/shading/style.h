@@ -24,8 +24,8 @@ enum class Style {
   Principal,  ///< both principal curvatures by a two-dimensional colour table, lit
   Accessibility,  ///< the solid's colour, darker in concave regions that large balls cannot touch
                   ///< [Miller94]
-  Ink,            ///< silhouettes, ridges and valleys on paper [Kindlmann03]
-  Matcap          ///< a picture of a shaded ball, looked up by the normal
+  Ink,            ///< silhouettes, ridges and valleys as lines on the colour of paper [Kindlmann03]
+  Matcap  ///< colours from a picture of a shaded ball, looked up by the normal in camera space
 };
 
 /// Name of a style: "lit", "tone", "mean", "gauss", "principal", "accessibility", "ink", "matcap".
@@ -47,8 +47,8 @@ struct ColourImage {
 /// Reads a PNG with sRGB colours; alpha is ignored.
 /// @throws levelset::IoError when the file cannot be opened
 /// @throws levelset::InvalidInput when it is not a PNG or is damaged
-/// @throws levelset::ResourceLimit, before memory is allocated, for more than 2^26 pixels, or above
-///         `maxMemory`
+/// @throws levelset::ResourceLimit, before memory is allocated, for more than 2^26 pixels, or for
+/// memory above `maxMemory` bytes
 [[nodiscard]] ColourImage readColourPng(const std::filesystem::path& path,
                                         std::size_t maxMemory = levelset::kNoMemoryLimit);
 
@@ -79,8 +79,8 @@ struct StyleOptions {
 /// where only smaller balls can touch it.
 [[nodiscard]] double accessibilityOf(const CurvatureSample& sample, double range);
 
-/// Weight of a silhouette line at a point, from 0 to 1. The line width does not depend on the
-/// curvature along the view [Kindlmann03].
+/// Weight of a silhouette line at a point, from 0 to 1. The curvature along the view is used to
+/// keep the line width constant [Kindlmann03].
 /// @param cosine  cosine of the angle between normal and direction to the eye, from 0 to 1
 /// @param width  width of the line on the surface, world units
 [[nodiscard]] double silhouetteOf(double cosine, double viewCurvature, double width);

@@ -35,7 +35,7 @@ CurvatureSample curvaturesOf(const SurfaceShape& shape, double voxelSize) {
   const Imath::M33d& h = shape.hessian;
   const double squared = g.length2(), length = std::sqrt(squared);
   if (!(length > 0)) return {0, 0, 0, 0};
-  const auto minor = [&](int i, int j) {  // cofactor of h
+  const auto minor = [&](int i, int j) {  // cofactor (i, j) of h
     const int a = (i + 1) % 3, b = (i + 2) % 3, c = (j + 1) % 3, d = (j + 2) % 3;
     return h[a][c] * h[b][d] - h[a][d] * h[b][c];
   };

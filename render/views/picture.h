@@ -34,7 +34,8 @@ struct PictureLayers {
   float* curvature[4] = {};
   float* thickness = nullptr;
   std::uint32_t* id;
-  mutable std::atomic<std::size_t> beyondBand = 0;  ///< number of hits with Hit::isBeyondBand
+  mutable std::atomic<std::size_t> beyondBand =
+      0;  ///< number of pixels whose hit has Hit::isBeyondBand
 
   PictureLayers(Image& image, const RenderOptions& options);
   /// Writes depth, normal, position and id of pixel `i`. @pre the normals of the hit are set

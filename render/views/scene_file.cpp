@@ -133,7 +133,7 @@ class Reader {
     return numbers(json, name, 1, where)[0];
   }
 
-  /// Rejects unknown members, so that a misspelt word is not ignored.
+  /// Rejects members that are not in `known`, so that a misspelt name is not ignored.
   void requireKnown(const Json& json, const std::set<std::string>& known,
                     const std::string& where) const {
     if (!json.is_object()) refuse(where, "is not an object");

@@ -22,7 +22,7 @@ constexpr double kMargin = 1.08;     // size of the picture relative to the soli
 constexpr double kLine = 1.2;        // width of a contour line, pixels
 constexpr double kZeroLine = 2.4;    // width of the zero contour, pixels
 constexpr double kFaintLine = 0.45;  // opacity of the black contour lines other than zero
-constexpr int kAcross = 4;           // samples along a pixel's side
+constexpr int kAcross = 4;           // colour samples along a pixel's side
 
 /// World positions of the pixels.
 struct Frame {

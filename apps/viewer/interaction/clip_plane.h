@@ -32,7 +32,8 @@ struct ClipPlane {
 struct PlacedPlane {
   Imath::V3d point, normal;  ///< a point of the plane, world units; unit normal, towards the eye
 };
-/// Places the plane for a camera. @param bounds  box of the solids, not empty
+/// Converts a clip plane to world space for a camera. @param bounds  box of the solids, world
+/// units, not empty
 [[nodiscard]] PlacedPlane placed(const ClipPlane& clip, const render::Camera& camera,
                                  const Imath::Box3d& bounds);
 

@@ -47,7 +47,7 @@ class OrbitCamera {
 
  private:
   void setDirection(const Imath::V3d& toEye, const Imath::V3d& up);
-  /// Accepts the change if the camera is valid.
+  /// Replaces the present camera by `changed` if that is valid.
   void take(const render::Camera& changed);
 
   render::Camera camera_;

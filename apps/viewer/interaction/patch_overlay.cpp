@@ -32,7 +32,8 @@ struct Seen {
   double x, y, depth;
 };
 
-/// Draws lines and dots over a picture, with a depth test.
+/// Draws lines and dots over a picture. They are faint where the picture shows a surface in front
+/// of them.
 class Pen {
  public:
   Pen(const render::Camera& camera, const render::Image& picture, double tolerance, Canvas& canvas)

@@ -32,8 +32,8 @@ struct Canvas {
 /// Resamples the canvas to another size by bilinear interpolation. @pre the sizes are positive
 [[nodiscard]] Canvas stretched(const Canvas& canvas, int width, int height);
 
-/// Draws patches in colours from teal at the surface to orange at the top. Lines behind a surface
-/// are faint.
+/// Draws patches, in colours from teal for the lowest layer, on the surface, to orange for the
+/// highest layer. Lines behind a surface are faint.
 /// @param camera  camera whose width and height are those of the canvas
 /// @param picture  picture of the same view, of any size; its layer Z decides if a line is behind a
 /// surface

@@ -12,7 +12,7 @@ namespace viewer {
 /// A point of a visible surface that the user picked.
 struct Picked {
   Imath::V3d position, normal;  ///< position in world units; outward unit normal
-  double phi = 0;               ///< φ of the drawn shape, world units
+  double phi = 0;               ///< φ of the drawn shape at `position`, world units
   std::string solid = {};       ///< name of the solid or mesh at the point
 };
 

@@ -126,7 +126,7 @@ struct ProgressivePicture::Worker {
     findTracer();
   }
 
-  /// @return the picture, or null when a newer request is pending
+  /// Draws the picture of one pass. @return the picture, or null when a newer request is pending
   std::shared_ptr<const render::Image> draw(const Pass& how, std::atomic<double>& progress,
                                             const std::atomic<bool>& isStale) {
     const render::Scene scene = sceneFor(how.pixelSize);

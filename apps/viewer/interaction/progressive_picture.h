@@ -27,7 +27,7 @@ enum class Renderer {
   Gpu
 };
 
-/// Everything that determines a picture.
+/// Everything that determines the rays of a picture.
 struct View {
   std::shared_ptr<const Model> model;
   render::Camera camera;
@@ -71,7 +71,7 @@ class ProgressivePicture {
   [[nodiscard]] std::shared_ptr<const Frame> frame() const;
   /// Error that prevented the drawing of the requested view; null without an error.
   [[nodiscard]] std::exception_ptr failure() const;
-  /// Progress of the present pass, from 0 to 1; 1 when idle.
+  /// Progress of the pass that is being drawn, from 0 to 1; 1 when nothing is drawn.
   [[nodiscard]] double progress() const { return progress_; }
   /// Name of the back end in use: "processor", or the description of the OpenGL device.
   [[nodiscard]] std::string rendererName() const;

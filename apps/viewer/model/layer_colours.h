@@ -22,7 +22,7 @@ inline constexpr std::array<Layer, 9> kLayers = {
 /// the names
 [[nodiscard]] Layer layerNamed(const std::string& name);
 
-/// Displayed red, green and blue, from 0 to 1.
+/// Red, green and blue as displayed (sRGB), from 0 to 1.
 using DisplayColour = std::array<double, 3>;
 
 /// Colour for a value: blue at −1, white at 0, red at 1. Values outside this range are clamped.
