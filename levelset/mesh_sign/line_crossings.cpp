@@ -19,20 +19,22 @@ using Imath::V3d;
 constexpr std::size_t kChunk = 4096;  // triangles per chunk; fixed, so that the number of threads
                                       // does not change the result
 
-/// Side of the edge a → b on which the line through q, shifted by (ε, ε²), lies. 0 only when a = b.
+/// Side of the edge a → b on which the point q, shifted by (ε, ε²), lies: +1 left, −1 right. 0 only
+/// when a = b.
 int sideOf(const V2d& a, const V2d& b, const V2d& q) {
   if (const int side = orient2d(a, b, q)) return side;
   if (a.y != b.y) return a.y > b.y ? 1 : -1;
   return (b.x > a.x) - (b.x < a.x);
 }
 
-/// Projects a point along the line onto the plane (y, z).
+/// Projects a point along x onto the plane (y, z).
 V2d project(const V3d& p) {
   return {p.y, p.z};
 }
 
-/// First integer x for which the point (x, y, z) lies behind the face, as seen from −x.
-/// @param front  +1 when the front of the face points to +x
+/// Lowest integer x for which the point (x, q) lies on the +x side of the triangle's plane.
+/// @param q      y and z of the grid line
+/// @param front  +1 when the front of the triangle faces +x, −1 when it faces −x
 int firstBehind(const V3d& a, const V3d& b, const V3d& c, const V2d& q, int front) {
   const V2d pa = project(a) - q, pb = project(b) - q, pc = project(c) - q;
   const double bc = pb.x * pc.y, cb = pb.y * pc.x;
@@ -44,8 +46,8 @@ int firstBehind(const V3d& a, const V3d& b, const V3d& c, const V2d& q, int fron
   const double size =
       std::abs(bc) + std::abs(cb) + std::abs(ca) + std::abs(ac) + std::abs(ab) + std::abs(ba);
   const double magnitude = std::max(std::abs(low), std::abs(high));
-  // The error of each weight is at most 4 ulp of its terms. A weighted mean of a.x, b.x, c.x
-  // changes by that fraction of their range.
+  // Rounding changes each weight by at most 4 ulp of its terms. The weighted mean of a.x, b.x and
+  // c.x then changes by at most the relative error of the weights times high − low.
   constexpr double kUlp = 2.3e-16;
   double x = (low + high) / 2, error = (high - low) / 2;
   if (sum > 0 && 32 * kUlp * size < sum) {
@@ -55,7 +57,8 @@ int firstBehind(const V3d& a, const V3d& b, const V3d& c, const V2d& q, int fron
   error += 8 * kUlp * magnitude;
   int before = static_cast<int>(std::floor(x - error));
   int behind = static_cast<int>(std::floor(x + error)) + 1;
-  // Bisection. `before` is not behind the face and `behind` is; only rounding decides in between.
+  // Bisection by the exact predicate. `before` lies on the −x side or in the plane, `behind` on the
+  // +x side. Integers between the two lie within the rounding error of x.
   while (behind - before > 1) {
     const int middle = before + (behind - before) / 2;
     if (orient3d(a, b, c, V3d(middle, q.x, q.y)) == front)
@@ -66,7 +69,8 @@ int firstBehind(const V3d& a, const V3d& b, const V3d& c, const V2d& q, int fron
   return behind;
 }
 
-/// Range of z that the triangle covers at this y, slightly enlarged. The exact test then decides.
+/// Range of z that the projected triangle covers at this y, slightly enlarged. The caller tests
+/// each z in it exactly.
 std::pair<double, double> rangeAt(double y, const V2d& a, const V2d& b, const V2d& c) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   const auto visit = [&](const V2d& p, const V2d& q) {

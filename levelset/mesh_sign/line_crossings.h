@@ -9,16 +9,17 @@
 
 namespace levelset::convert {
 
-/// Sums over the crossings of a grid line between x = −∞ and a grid point.
+/// Sums over the triangles that a grid line along x crosses between x = −∞ and a grid point.
 struct CrossingSum {
-  std::int32_t winding = 0;  ///< faces entered − faces left: the winding number of a closed set of
-                             ///< faces
-  std::uint32_t crossings = 0;
+  /// Crossings where the line enters the solid minus crossings where it leaves, times the weights
+  /// of the triangles. This is the winding number if the triangles have no boundary.
+  std::int32_t winding = 0;
+  std::uint32_t crossings = 0;  ///< number of crossings, without weights
 };
 
 /// Crossings of a mesh with the grid lines along x (y and z integer), decided exactly. If an edge
 /// or a vertex lies on a line, the line counts as shifted by (ε, ε²) in y and z. Every closed set
-/// of faces is thus crossed consistently. A grid point on a face counts as before the face.
+/// of faces is thus crossed consistently. A grid point on a face counts as lying on its −x side.
 class LineCrossings {
  public:
   /// @param weights  multiplicity of each triangle; empty: 1 each
@@ -26,17 +27,18 @@ class LineCrossings {
 
   [[nodiscard]] CrossingSum at(int x, int y, int z) const;
 
-  /// Writes the sums at x0, x0 + 1, …, x0 + 7 on the lines (y, z0) … (y, z0 + 7): sums[8 * dx +
-  /// dz].
+  /// Writes the sums of the 64 grid points (x0 + dx, y, z0 + dz), dx and dz from 0 to 7, to
+  /// sums[8 * dx + dz].
   void slab(int x0, int y, int z0, CrossingSum* sums) const;
 
   [[nodiscard]] std::size_t size() const { return crossings_.size(); }
 
  private:
   struct Crossing {
-    std::int32_t y, z, x;  ///< x: first grid point behind the face
-    std::int32_t step;     ///< +weight where the line enters
-    CrossingSum sum;       ///< sum up to and including this crossing
+    /// Grid line (y, z), and the lowest x of a grid point on the +x side of the face.
+    std::int32_t y, z, x;
+    std::int32_t step;  ///< +weight where the line enters the solid, −weight where it leaves
+    CrossingSum sum;    ///< sum over the crossings of this line, up to and including this one
     bool operator<(const Crossing& other) const {
       if (y != other.y) return y < other.y;
       if (z != other.z) return z < other.z;

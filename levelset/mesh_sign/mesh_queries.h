@@ -14,7 +14,8 @@ namespace levelset {
 [[nodiscard]] std::size_t countSelfIntersections(const TriMesh& mesh,
                                                  const Progress& progress = {});
 
-/// Generalised winding number of the mesh at `point`, by direct summation. Serves as the reference.
+/// Generalised winding number of the mesh at `point`, by direct summation over all triangles. Tests
+/// use it as the reference for the sign of bands.
 [[nodiscard]] double windingNumber(const TriMesh& mesh, const Imath::V3d& point);
 
 }  // namespace levelset

@@ -39,7 +39,7 @@ Triangle canonical(const Triangle& t) {
   return {t[low], t[(low + 1) % 3], t[(low + 2) % 3]};
 }
 
-/// Removes all but the first of equal faces.
+/// Removes each face that has the same vertices and orientation as an earlier face.
 std::vector<Triangle> withoutRepeated(const std::vector<Triangle>& triangles,
                                       std::size_t vertices) {
   const Buckets byVertex(vertices, triangles.size(),
@@ -67,7 +67,9 @@ void countEdges(MeshTopology& topology, std::size_t vertices) {
   const auto to = [&](std::size_t e) { return triangles[e / 3][(e % 3 + 1) % 3]; };
   const Buckets byLow(vertices, triangles.size() * 3,
                       [&](std::size_t e) { return std::min(from(e), to(e)); });
-  std::vector<std::pair<std::uint32_t, int>> row;  // the other vertex, direction
+  // Edges with the lower vertex v: the higher vertex, and +1 if the face runs from v to it, else
+  // −1.
+  std::vector<std::pair<std::uint32_t, int>> row;
   for (std::uint32_t v = 0; v < vertices; ++v) {
     row.clear();
     for (std::size_t i = byLow.begin[v]; i < byLow.begin[v + 1]; ++i) {
@@ -106,7 +108,7 @@ MeshTopology findTopology(const TriMesh& mesh) {
     other.triangles = std::move(single);
     countEdges(other, mesh.positions.size());
     // Decimated meshes may contain coincident faces that each close a sheet of their own. Removing
-    // one of them would open the mesh.
+    // one of these faces would open the mesh, so then all repeated faces stay.
     if (other.boundary.size() <= topology.boundary.size() && other.oddEdges <= topology.oddEdges)
       topology = std::move(other);
   }

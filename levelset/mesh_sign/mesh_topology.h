@@ -11,10 +11,10 @@ namespace levelset::convert {
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-/// A directed edge of the boundary, with the number of unmatched faces.
+/// A directed edge that more faces traverse from `from` to `to` than in the opposite direction.
 struct BoundaryEdge {
   std::uint32_t from = 0, to = 0;
-  int multiplicity = 1;  ///< positive
+  int multiplicity = 1;  ///< faces in this direction minus faces in the other, positive
 };
 
 struct MeshTopology {
@@ -22,7 +22,7 @@ struct MeshTopology {
   /// represents the others. Faces with a repeated vertex are removed. Exact duplicates of a face
   /// are removed unless that opens the mesh. A face and its reverse both stay.
   std::vector<Triangle> triangles;
-  std::size_t dropped = 0;
+  std::size_t dropped = 0;           ///< number of faces that were removed
   std::size_t boundaryEdges = 0;     ///< edges with one face
   std::size_t nonManifoldEdges = 0;  ///< edges with three or more faces
   std::size_t oddEdges = 0;  ///< edges with an odd number of faces, where crossing parity fails

@@ -16,7 +16,7 @@ namespace {
 using Imath::V3d;
 using SampleCell = std::array<std::int64_t, 3>;
 
-constexpr double kCellSize = 4;
+constexpr double kCellSize = 4;  // voxels
 
 SampleCell cellOf(const V3d& p) {
   SampleCell cell;
@@ -25,7 +25,8 @@ SampleCell cellOf(const V3d& p) {
   return cell;
 }
 
-/// Grid cells that contain points, each with the triangles near it.
+/// Cubes of edge kCellSize that contain sample points, each with the triangles whose enlarged boxes
+/// overlap it.
 class SampleCells {
  public:
   explicit SampleCells(std::span<const V3d> points) {

@@ -24,8 +24,8 @@ struct CoordLess {
   }
 };
 
-/// A grid edge from `point` to the next one along `axis`, crossed by the open surface at fraction
-/// `t`.
+/// A grid edge from `point` to the next grid point along `axis`. The open surface crosses it at the
+/// fraction `t` of its length.
 struct CrossedEdge {
   V3i point;
   int axis;
@@ -91,7 +91,8 @@ class OpenSurfaceWalk {
     return V3d(edge.point) + V3d(step(edge.axis)) * edge.t;
   }
 
-  /// The four cells around an edge, in cyclic order, by their lowest corners.
+  /// Lowest grid point of one of the four cells around an edge. `corner` counts them in cyclic
+  /// order from 0 to 3.
   static V3i cellAt(const CrossedEdge& edge, int corner) {
     const V3i first = step((edge.axis + 1) % 3), second = step((edge.axis + 2) % 3);
     return edge.point - (corner == 1 || corner == 2 ? first : V3i(0)) -
@@ -116,14 +117,16 @@ class OpenSurfaceWalk {
     return (*found->second)[static_cast<std::size_t>(64 * d.x + 8 * d.y + d.z)];
   }
 
-  /// The winding number jumps by one across a face. A smaller change means that no face lies in
-  /// between. If a hole is so small that the change is larger, its rim lies within a voxel.
+  /// Returns true when the open surface crosses a grid edge whose ends have the winding numbers w
+  /// and `next`. A triangle on the edge would change the winding number by one, so a change below
+  /// 1/2 excludes a triangle. The change exceeds 1/2 also across a very small hole. The rim of the
+  /// hole then lies within a voxel, so the edge needs no open surface.
   static bool isCrossed(double w, double next) {
     return (w > 0.5) != (next > 0.5) && std::abs(w - next) < 0.5;
   }
 
-  /// Crossed edges that start at the block's points in positive direction; with `both`, also those
-  /// that enter the block from below.
+  /// Adds the crossed edges from the block's grid points in the positive directions. With `both`,
+  /// also adds the crossed edges that end at them and start in the neighbours on the negative side.
   void crossedEdgesIn(const V3i& origin, bool both, std::vector<CrossedEdge>& out) const {
     for (int x = 0; x < kBlockDim; ++x)
       for (int y = 0; y < kBlockDim; ++y)
@@ -141,7 +144,8 @@ class OpenSurfaceWalk {
         }
   }
 
-  /// Unknown blocks that the cells of the crossed edges extend into.
+  /// Blocks without computed winding numbers that contain corners of the cells around the crossed
+  /// edges.
   std::vector<V3i> unknownNeighbours(const std::vector<V3i>& wave) const {
     std::vector<std::vector<V3i>> found(wave.size());
     ProgressGate gate(progress_, wave.size());

@@ -8,12 +8,14 @@
 
 namespace levelset::convert {
 
-/// Finds the surface w = 1/2 where it leaves the triangles to span the holes of a mesh.
+/// Finds the surface where the winding number is 1/2, as far as it spans holes of the mesh instead
+/// of following its triangles.
 ///
-/// Starts at the blocks `seeds`, the blocks near the mesh with an ambiguous sign. Follows the grid
-/// edges that change sign without a face in between. Returns a dual surface as triangles: each
-/// vertex is the mean of the crossings of its cell [Gibson98]. Also returns each crossing as a
-/// degenerate triangle, so that every sign change has the surface within a voxel.
+/// Starts at the blocks with origins `seeds`: the blocks near the mesh with an ambiguous sign.
+/// Follows the grid edges whose ends differ in sign although no triangle lies between them. Returns
+/// a dual surface as triangles: each vertex is the mean of the crossings of its cell [Gibson98].
+/// Also returns each crossing as a degenerate triangle, so that every sign change has the surface
+/// within a voxel.
 [[nodiscard]] std::vector<std::array<Imath::V3d, 3>> findOpenSurface(const SignField& field,
                                                                      std::vector<Imath::V3i> seeds,
                                                                      std::size_t maxMemory,

@@ -26,8 +26,8 @@ V2d dropAxis(const V3d& p, int axis) {
   return {p[(axis + 1) % 3], p[(axis + 2) % 3]};
 }
 
-/// Axis along which the triangle does not project to a segment; the best-conditioned such axis. −1
-/// for a triangle with exactly zero area.
+/// Axis (0 to 2) along which the triangle projects to a triangle with area, preferably the one with
+/// the largest area. −1 for a triangle with exactly zero area.
 int projectionAxis(const TriangleCorners& t) {
   const V3d normal = (t[1] - t[0]).cross(t[2] - t[0]);
   std::array<int, 3> axes = {0, 1, 2};
@@ -72,11 +72,11 @@ bool meetsInPlane(const V3d& p, const V3d& q, const TriangleCorners& t) {
 }
 
 /// Returns true when the closed segment pq and the closed triangle have a point in common.
-/// @param sideP, sideQ  sides of the triangle's plane, from orient3d
+/// @param sideP, sideQ  sides of the triangle's plane on which p and q lie, as orient3d gives them
 bool segmentMeets(const V3d& p, const V3d& q, int sideP, int sideQ, const TriangleCorners& t) {
   if (sideP * sideQ > 0) return false;
   if (sideP == 0 && sideQ == 0) return meetsInPlane(p, q, t);
-  // As seen along pq, the three edges must not turn in different directions.
+  // As seen along pq, the three edges of the triangle must turn about the line pq in one direction.
   const int s0 = convert::orient3d(p, q, t[0], t[1]), s1 = convert::orient3d(p, q, t[1], t[2]),
             s2 = convert::orient3d(p, q, t[2], t[0]);
   return (s0 >= 0 && s1 >= 0 && s2 >= 0) || (s0 <= 0 && s1 <= 0 && s2 <= 0);
@@ -129,7 +129,8 @@ bool trianglesMeet(const Triangle& first, const Triangle& second,
            convert::orient2d(p, q, dropAxis(b[2], axis));
   }
   if (shared == 1 && separateAtCorner(a, b)) return false;
-  std::array<int, 3> sideA{}, sideB{};  // sides of the other triangle's plane
+  // Sides on which the corners of each triangle lie, relative to the plane of the other one.
+  std::array<int, 3> sideA{}, sideB{};
   for (std::size_t i = shared; i < 3; ++i) sideA[i] = convert::orient3d(b[0], b[1], b[2], a[i]);
   if (shared == 0 && sideA[0] == sideA[1] && sideA[1] == sideA[2] && sideA[0] != 0) return false;
   if (shared == 1 && sideA[1] == sideA[2] && sideA[1] != 0) return false;
@@ -145,9 +146,9 @@ bool trianglesMeet(const Triangle& first, const Triangle& second,
   return false;
 }
 
-/// Searches by halving space along its longest side until a part holds few triangles. Several parts
-/// may contain the same pair. It belongs to the part that contains the lowest corner of the
-/// intersection of both boxes.
+/// Finds intersecting triangles by halving space across its longest side until each part contains
+/// few triangles. If several parts contain the same pair, one part reports it: the part with the
+/// lowest corner of the intersection of both bounding boxes.
 class PairSearch {
  public:
   PairSearch(const std::vector<Triangle>& triangles, const std::vector<V3d>& positions,
@@ -186,7 +187,7 @@ class PairSearch {
   using List = std::vector<std::uint32_t>;
   struct Part {
     List triangles;
-    Imath::Box3d region;  // open above, except at the upper end of space
+    Imath::Box3d region;  // excludes its upper faces, except at the upper end of space
   };
   static constexpr std::size_t kFew = 24;
   static constexpr int kDeepest = 60;
