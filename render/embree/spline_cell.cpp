@@ -147,8 +147,8 @@ bool SplineCell::mayCross() const {
     for (const auto& row : plane)
       for (const double c : row) (c < 0 ? anyInside : anyOutside) = true;
   if (!anyInside || !anyOutside) return false;
-  // The slope bound for the line from the centre to a corner covers all points of the cell, because
-  // none is farther from the centre on any axis.
+  // The slope bound for the line from the centre to a corner covers all points of the cell: on each
+  // axis, none is farther from the centre.
   const LineSearch toCorner(c_, V3d(0.5), V3d(0.5));
   return toCorner.mayCross();
 }

@@ -6,9 +6,9 @@
 // Private to render: checks of an EXR file that OpenEXR does not make. OpenEXR allocates memory for
 // any size that a file claims. Header::setMaxImageSize and setMaxTileSize of OpenEXR 3.1 do not
 // replace these checks: they limit width and height separately, and for the entire process, which
-// may use OpenEXR for other files too. They check neither the number of pixels and the memory of a
-// chunk nor the sizes of attributes and tables, and OpenEXR has already read the header when it
-// applies them.
+// may use OpenEXR for other files too. They do not check the number of pixels, the memory of a
+// chunk, or the sizes of attributes and tables. Besides, OpenEXR has already read the header when
+// it applies them.
 
 namespace render {
 

@@ -202,8 +202,8 @@ Real bendOf(Real before, Real at, Real after) {
   return magnitude(bend);
 }
 
-// Values at the four points (2 and 3 along y and z) of a slab that are corners of the cell, and the
-// sums of the magnitudes of their second differences along y and z.
+// f…: values at the four points of a slab that are corners of the cell (points 2 and 3 along y and
+// z). b…: sums of the magnitudes of the second differences along y and z at these points.
 struct Corners {
   Real f00, f01, f10, f11;
   Real b00, b01, b10, b11;

@@ -36,8 +36,8 @@ Real blended(IN(Blend) b, Real c0, Real c1, Real c2, Real c3) {
   return sum;
 }
 
-// Along the axis with the given stride, replaces each four spline coefficients by the four values
-// of the Bézier net between two positions in the cell, `from` and `to`.
+// Works on each row of four along the axis with the given stride. Replaces its spline coefficients
+// by the values of the Bézier net between the positions `from` and `to` in the cell.
 void bendAxis(INOUT_ARRAY(Real, net, 64), int stride, Real from, Real to) {
   Blend b0 = blendOf(from, from, from);
   Blend b1 = blendOf(from, from, to);

@@ -74,9 +74,9 @@ struct StyleOptions {
 [[nodiscard]] Imath::C3f meanColour(const CurvatureSample& sample, double range);
 [[nodiscard]] Imath::C3f gaussColour(const CurvatureSample& sample, double range);
 [[nodiscard]] Imath::C3f principalColour(const CurvatureSample& sample, double range);
-/// Accessibility of a surface point, from 0 to 1: 1 where the surface is not concave, 1/2 where the
-/// largest ball that can touch the point from outside has the radius 1 / range, and less
-/// where only smaller balls can touch it.
+/// Accessibility of a surface point, from 0 to 1. It is 1 where the surface is not concave. It is
+/// 1/2 where the largest ball that can touch the point from outside has the radius 1 / range, and
+/// less where only smaller balls can touch it.
 [[nodiscard]] double accessibilityOf(const CurvatureSample& sample, double range);
 
 /// Weight of a silhouette line at a point, from 0 to 1. The curvature along the view is used to
