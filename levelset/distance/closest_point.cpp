@@ -9,13 +9,14 @@ namespace {
 using openvdb::Vec3d;
 
 constexpr int kMaxIterations = 8;
-constexpr double kFootReach = 2;    // voxels from the start
+constexpr double kFootReach = 2;    // largest distance of the search from its start, voxels
 constexpr double kLongestStep = 1;  // voxels
 // The iteration stops when the estimated error after a step falls below this, in voxels. The
 // estimate is the cube of the step's length times the square of the curvature.
 constexpr double kTolerance = 2e-5;
 constexpr double kLongestLastStep = 0.6;
-// Least second derivative of half the squared distance along the surface; it is 1 on a plane.
+// Least second derivative, along the surface, of half the squared distance from the query point. It
+// is 1 on a plane.
 constexpr double kLeastCurvature = 0.1;
 
 /// Computes two unit vectors perpendicular to a unit vector and to each other.
@@ -28,14 +29,15 @@ void tangents(const Vec3d& n, Vec3d& t1, Vec3d& t2) {
 }
 
 struct NewtonStep {
-  Vec3d along;  ///< step vector
-  double length = 0;
+  Vec3d along;         ///< step vector, voxels
+  double length = 0;   ///< length of the step, voxels
   double remains = 0;  ///< estimated distance to the solution after the step, voxels
 };
 
-/// Takes one Newton step of the constrained problem: along the normal to φ = 0, along the tangents
-/// to the point where the distance to `from` is stationary. The normal part includes the second
-/// order.
+/// Computes one Newton step of the constrained problem. Along the normal, the step leads to φ = 0;
+/// along the tangents, to the point whose distance from the query point is stationary. The normal
+/// part includes the second-order term.
+/// @param toFrom  vector to the query point
 NewtonStep newtonStep(const Jet& jet, double slope, const Vec3d& toFrom) {
   const Vec3d n = jet.gradient / slope;
   const double along = -jet.value / slope;
@@ -46,7 +48,8 @@ NewtonStep newtonStep(const Jet& jet, double slope, const Vec3d& toFrom) {
   double a11 = 1 + lambda * h1.dot(t1), a12 = lambda * h1.dot(t2), a22 = 1 + lambda * h2.dot(t2);
   const double b1 = toFrom.dot(t1) - lambda * along * h1.dot(n);
   const double b2 = toFrom.dot(t2) - lambda * along * h2.dot(n);
-  // Past the centre of curvature the stationary point is a maximum: shift the eigenvalues up.
+  // If the query point lies beyond the centre of curvature, the stationary point is a maximum of
+  // the distance. Increases the eigenvalues so that the step leads to a minimum.
   const double mean = (a11 + a22) / 2, half = (a11 - a22) / 2;
   const double least = mean - std::sqrt(half * half + a12 * a12);
   if (least < kLeastCurvature) {

@@ -12,7 +12,8 @@
 namespace levelset {
 namespace {
 
-/// Builds a grid with one value for each closest point: make(world position of the point).
+/// Builds a grid with the value make(p) at each grid point within the half width, where p is the
+/// closest point of the surface in world units.
 template <typename Grid, typename Make>
 typename Grid::Ptr gridOfClosestPoints(const NarrowBand& solid, const ClosestPointOptions& options,
                                        const Make& make) {
@@ -57,7 +58,7 @@ FieldGrid closestPoints(const NarrowBand& solid, const ClosestPointOptions& opti
 FieldGrid extendOffSurface(const NarrowBand& solid, const ScalarField& attribute,
                            const ClosestPointOptions& options) {
   if (!attribute)
-    throw UsageError("extend: there is no attribute; give a formula or a grid of numbers");
+    throw UsageError("there is no attribute to extend; give a formula or a grid of numbers");
   const auto grid = gridOfClosestPoints<openvdb::FloatGrid>(
       solid, options,
       [&](const openvdb::Vec3d& p) { return static_cast<float>(attribute(toImath(p))); });
@@ -67,7 +68,7 @@ FieldGrid extendOffSurface(const NarrowBand& solid, const ScalarField& attribute
 
 FieldGrid extendOffSurface(const NarrowBand& solid, const VectorField& attribute,
                            const ClosestPointOptions& options) {
-  if (!attribute) throw UsageError("extend: there is no attribute; give a grid of vectors");
+  if (!attribute) throw UsageError("there is no attribute to extend; give a grid of vectors");
   const auto grid = gridOfClosestPoints<openvdb::Vec3SGrid>(
       solid, options,
       [&](const openvdb::Vec3d& p) { return openvdb::Vec3s(toVdb(attribute(toImath(p), 0))); });

@@ -17,11 +17,10 @@ struct ClosestPointOptions {
   Progress progress = {};
 };
 
-/// Closest-point transform: for each grid point nearer to the surface than the half width, the
-/// closest point of the surface, in world units.
-/// Uses the same search as redistance(), so φ at that point is zero to the order of the tricubic
-/// interpolant. Stored as float: at coordinates of 10⁶ voxels the resolution is a sixteenth of a
-/// voxel.
+/// Computes the closest-point transform: for each grid point nearer to the surface than the half
+/// width, the closest point of the surface, in world units. Uses the same search as redistance(),
+/// so φ at that point is zero to the order of the tricubic interpolant. Coordinates are stored as
+/// float: at 10⁶ voxels from the origin their resolution is a sixteenth of a voxel.
 /// @throws InvalidInput for an empty solid
 /// @throws UsageError for a half width below 1
 /// @throws ResourceLimit when the result does not fit into memory
@@ -32,12 +31,14 @@ struct ClosestPointOptions {
 /// Extends a scalar attribute off the surface along its normals: each grid point within the half
 /// width gets the value of the attribute at its closest point, so ∇φ · ∇q = 0. Other grid points
 /// get 0.
-/// @throws UsageError also when the attribute is not set
+/// @throws as closestPoints()
+/// @throws UsageError also when `attribute` is an empty function
 /// @throws InvalidInput also when the attribute is not finite
 [[nodiscard]] FieldGrid extendOffSurface(const NarrowBand& solid, const ScalarField& attribute,
                                          const ClosestPointOptions& options = {});
 
-/// Extends a vector attribute, taken at time 0, off the surface in the same way.
+/// Extends a vector attribute, evaluated at time 0, off the surface like a scalar attribute.
+/// @throws as for a scalar attribute
 [[nodiscard]] FieldGrid extendOffSurface(const NarrowBand& solid, const VectorField& attribute,
                                          const ClosestPointOptions& options = {});
 
@@ -46,7 +47,8 @@ struct ClosestPointOperator {
   static const OperatorText text;
 
   struct Options {
-    std::optional<double> halfWidth;  ///< of the result, voxels
+    /// Half width of the result, voxels; empty: that of the operand.
+    std::optional<double> halfWidth;
 
     template <class Visitor>
     static void describe(Visitor& visit) {

@@ -24,7 +24,8 @@ ValuePlan RedistanceOperator<isRequired>::plan(const Options& options, Plans ope
   return plan;
 }
 
-/// A value that is a distance already is kept, so the operand is read as wide as the result.
+/// Redistancing keeps values that are distances already. So it reads the operand up to the half
+/// width of the result, not only beside the surface.
 template <bool isRequired>
 RegionOfInterest RedistanceOperator<isRequired>::regionOfInterest(
     const Options&, const OperatorPlans& plans, std::size_t, const RegionOfInterest& ofResult) {
@@ -46,14 +47,17 @@ const OperatorText ReinitializeOperator::text{
     .name = "reinitialize",
     .group = "Distances",
     .summary = "compute distances again without moving the surface",
-    .details = "Only signs and the values beside the surface are read; they may have any slope.",
+    .details =
+        "Reads only the signs and the values beside the surface; these values may have any slope.",
     .example = "levelsmith sphere --radius 1 --voxel 0.05 ! reinitialize --half-width 4 ! check"};
 
 const OperatorText RebuildBandOperator::text{
     .name = "rebuild-band",
     .group = "Distances",
     .summary = "make the band wider or narrower; the surface stays",
-    .details = "Distances by closest points: exact to interpolation at any width.",
+    .details =
+        "Computes distances to closest points of the surface. The half width does not affect their "
+        "accuracy.",
     .example = "levelsmith sphere --radius 1 --voxel 0.05 ! rebuild-band --half-width 8 ! check",
     .formerName = "widen"};
 
@@ -61,7 +65,7 @@ const OperatorText ClosestPointOperator::text{
     .name = "closest-point",
     .group = "Distances",
     .summary = "compute the closest point of the surface for each grid point of the band",
-    .details = "A field of vectors, in world units.",
+    .details = "The result is a field of vectors, in world units.",
     .example = "levelsmith sphere --radius 1 --voxel 0.05 ! closest-point --half-width 4 ! info"};
 
 FieldGrid ClosestPointOperator::run(std::vector<NarrowBand> operands, const Options& options,

@@ -27,18 +27,20 @@ using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 using Block = NearestPoints::Block;
 
-// A neighbour's surface point farther than this from our own belongs to another part of the
-// surface.
+// If the surface points of two neighbouring grid points are farther apart than this, in voxels,
+// they belong to different parts of the surface.
 constexpr double kOtherPart = 2;
-// Another part of the surface can gain at most this much, in voxels, when both points are refined.
+// Refinement of a surface point decreases its distance from the grid point by at most this, in
+// voxels.
 constexpr double kPolishGain = 0.5;
 
-// A grid point keeps its value when the value is its distance within the tricubic's own error. So
-// repeated redistancing does not shift a distance field. The error is about kTricubicError times
-// the square of the curvature. It is capped at kMostError, its value at a radius of 8 voxels, and
-// never below rounding. Voxels.
+// A grid point keeps its old value if that equals the computed distance within the error of
+// tricubic interpolation. So repeated redistancing does not shift a distance field. The error, in
+// voxels, is about kTricubicError times the square of the curvature. Its upper limit is kMostError,
+// reached at a radius of curvature of about 8 voxels, and its lower limit is kRounding.
 constexpr double kTricubicError = 0.03, kMostError = 1e-3, kRounding = 1e-6;
 
+// Number of searches for a foot point, each of which starts where the one before left its block.
 constexpr int kAttempts = 4;
 
 /// Point of the zero set and its distance, in voxels.
@@ -50,8 +52,8 @@ struct Closest {
   }
 };
 
-/// Finds the point of the zero set closest to a grid point. Candidates are the surface points of
-/// the grid point and of its neighbours.
+/// Finds the closest point of the zero set for a grid point. Refines the nearest surface points
+/// that NearestPoints found for the grid point and for its six neighbours.
 class Polisher {
  public:
   Polisher(const FloatTree& field, const SurfacePoints& points, const SharpPatches& patches)
@@ -86,9 +88,9 @@ class Polisher {
   }
 
  private:
-  /// Finds the closest point of the surface near a surface point. The search starts on the patches
-  /// or on the interpolant, where the surface point lies. It changes over when the point it finds
-  /// belongs to the other one.
+  /// Finds the closest point of the zero set to x near a surface point. The search starts on the
+  /// sharp patches if the surface point lies on them, else on the interpolant. If the point that it
+  /// finds lies in the domain of the other representation, the search continues on that one.
   Closest polish(const Vec3d& x, std::uint32_t point) {
     const Vec3d start = points_.positions[point];
     if (!points_.sharp[point]) {
@@ -104,8 +106,8 @@ class Polisher {
   }
 
   /// Finds the foot point with Newton's method from `start`; returns `start` if that fails. Far
-  /// inside, much of the surface is almost equally near. The foot may then be far along the
-  /// surface, so the search restarts from where it left the block.
+  /// inside a solid, a large part of the surface is almost equally near. The foot point may then be
+  /// far from `start`, so a search that leaves the block restarts at that position.
   Closest polishOnInterpolant(const Vec3d& x, Vec3d start) {
     const Closest first{start, (x - start).length()};
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
@@ -139,12 +141,14 @@ class Polisher {
   const SharpPatches& patches_;
 };
 
-/// Result for one block: a leaf, or a tile when no value lies in the band and all have one sign.
+/// Result for one block: a leaf, or the value of a tile if no grid point is in the band and all
+/// have the same sign.
 struct LeafOrTile {
   std::unique_ptr<LeafNode> leaf;
   float tile = 0;
 };
 
+/// Computes the distances of one block.
 /// @param before  leaf of the input field; null where the field has none
 LeafOrTile makeLeaf(const Block& block, const LeafNode* before, Polisher& polisher,
                     const DistanceRequest& request, double voxelSize, float background) {
@@ -257,12 +261,12 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
         "voxels");
   MemoryEstimate estimate;
   for (const Coord& c : points.gridPoints) estimate.surface.expand(c);
-  // There are at least 1.15 points per unit of area.
+  // There are at least 1.15 surface points for each voxel² of the surface.
   estimate.area = static_cast<double>(points.size()) / 1.15;
   estimate.inside = reach.inside;
   estimate.outside = reach.outside;
   estimate.region = request.region;
-  estimate.bytesPerGridPoint = 25;  // state and result, including the unused part of blocks
+  estimate.bytesPerGridPoint = 25;  // state and result, with the unused grid points of blocks
   checkMemory(estimate, request.maxMemory);
   report(request.progress, 0.3);
 

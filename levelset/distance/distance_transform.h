@@ -11,35 +11,39 @@
 
 namespace levelset::eikonal {
 
-/// Closest point of each grid point of a leaf, index space; valid where the leaf is active.
+/// Closest point of the surface for each grid point of a leaf, in index space. Valid at active grid
+/// points.
 using ClosestPointLeaf = std::array<openvdb::Vec3d, 512>;
 
-/// Options of distanceTransform(), in voxels. The result is d − shift where |d − shift| <
-/// halfWidth.
+/// Options of distanceTransform(), in voxels. With the signed distance d, the values of the result
+/// are d − shift where |d − shift| < halfWidth.
 struct DistanceRequest {
   double halfWidth = 3;
   double shift = 0;  ///< offset of the surface, outwards (> 0) or inwards (< 0)
-  std::optional<openvdb::CoordBBox> region = {};
-  /// Searches for edges and corners. Pass false for a surface that was smoothed for long: it has
-  /// none.
+  std::optional<openvdb::CoordBBox> region = {};  ///< grid points to compute; empty: all
+  /// Searches for edges and corners of the surface. Pass false for a surface without any, such as
+  /// after a long smoothing.
   bool mayHaveEdges = true;
-  /// Called for each leaf with active values, from many threads at once and in no fixed order.
+  /// Called with each leaf of the result that has active values and with its closest points, from
+  /// many threads at once and in no fixed order.
   std::function<void(const openvdb::FloatTree::LeafNodeType&, const ClosestPointLeaf&)>
       visitPoints = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
 
-/// Computes the signed distance to the zero set of `field`, on the same grid.
-/// Works in three steps. Surface points are located beside the zero set (surface_points.h). The
-/// nearest surface point propagates outwards (propagate.h). Each grid point refines its surface
-/// point on the interpolant.
-/// @throws InvalidInput without a zero crossing
+/// Computes the signed distance to the zero set of `field`, on the same grid. Works in three steps.
+/// First, finds the closest points of the zero set for the grid points beside it
+/// (surface_points.h). Second, propagates these surface points outwards, so that each grid point
+/// gets the nearest one (propagate.h). Third, refines the surface point of each grid point on the
+/// interpolant.
+/// @throws InvalidInput if the field has no zero crossing
 /// @throws ResourceLimit before it allocates more memory than allowed
 [[nodiscard]] openvdb::FloatGrid::Ptr distanceTransform(const openvdb::FloatGrid& field,
                                                         const DistanceRequest& request);
 
-/// Returns true when two neighbouring grid points differ in sign and one of them holds a distance.
+/// Returns true when two neighbouring grid points differ in sign and one of them has a distance,
+/// which means a magnitude below the background.
 [[nodiscard]] bool hasZeroCrossing(const openvdb::FloatTree& field);
 
 }  // namespace levelset::eikonal

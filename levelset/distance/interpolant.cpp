@@ -16,9 +16,10 @@ Float4 load4(const float* values) {
   return result;
 }
 
-/// Catmull-Rom weights of four samples at -1, 0, 1, 2, with first and second derivatives.
-/// Separate from AxisWeights of interpolate_vdb.h: these are single-precision numbers for vector
-/// instructions, and two of the polynomials round differently there.
+/// Catmull-Rom weights of four samples at -1, 0, 1 and 2 for a position t in [0, 1), with their
+/// first and second derivatives. Does not use AxisWeights of interpolate_vdb.h, because these
+/// weights are in single precision for vector instructions, and two of the polynomials of
+/// AxisWeights round differently.
 struct Weights {
   float w[4], d[4], dd[4];
   explicit Weights(double t) {

@@ -10,7 +10,8 @@
 
 namespace levelset::eikonal {
 
-/// Value, gradient and second derivatives of an interpolated field, per voxel.
+/// Value, gradient and second derivatives of an interpolated field. The unit of length of the
+/// derivatives is the voxel.
 struct Jet {
   double value = 0;
   openvdb::Vec3d gradient;
@@ -22,7 +23,7 @@ struct Jet {
   }
 };
 
-/// Jet in single precision, for arrays of millions.
+/// Jet in single precision, for arrays with millions of entries.
 struct CompactJet {
   std::array<float, 10> numbers{};
   CompactJet() = default;
@@ -74,7 +75,8 @@ class DenseBlock {
 class DenseBlockCache {
  public:
   explicit DenseBlockCache(const openvdb::FloatTree& tree) : accessor_(tree) {}
-  /// Returns the block whose leaf holds the cell of `position` (index space).
+  /// Returns the block of the leaf that contains `position` (index space). Valid until the next
+  /// call.
   const DenseBlock& around(const openvdb::Vec3d& position);
 
  private:
@@ -87,7 +89,7 @@ class DenseBlockCache {
   std::vector<Slot> slots_ = std::vector<Slot>(kSlots);
 };
 
-/// Returns the first grid point of the leaf block that holds a position.
+/// Returns the first grid point of the leaf block that contains a position in index space.
 [[nodiscard]] inline openvdb::Coord leafOrigin(const openvdb::Vec3d& position) {
   return openvdb::Coord::floor(position) & ~7;
 }

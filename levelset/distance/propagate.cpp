@@ -18,7 +18,8 @@ using openvdb::FloatTree;
 using openvdb::Vec3d;
 using Block = NearestPoints::Block;
 
-// A neighbour's surface point may differ from our own by half a voxel along the surface.
+// Margin added to the largest distances, voxels: the nearest surface points of two neighbouring
+// grid points may lie half a voxel apart along the surface.
 constexpr double kBlockMargin = 0.5;
 
 int directionIndex(const Coord& d) {
@@ -48,7 +49,8 @@ float squareOf(double x) {
 using Float4 = float __attribute__((vector_size(16)));
 using Int4 = std::int32_t __attribute__((vector_size(16)));
 
-/// Relaxes one block until it is stable, given its neighbours.
+/// Propagates surface points inside one block, and from its neighbours into it, until no distance
+/// in the block decreases.
 class BlockWorker {
  public:
   BlockWorker(Block& block, const SurfacePoints& points) : block_(block), points_(points) {
@@ -72,14 +74,14 @@ class BlockWorker {
     }
   }
 
-  /// Returns the neighbours that the changes of this block can improve: bit i for neighbour i.
-  /// Squared distances of `limit` and more do not count.
+  /// Returns the neighbour blocks that the new surface points of this block may bring nearer
+  /// points: bit i for neighbour i. Ignores squared distances of `limit`, voxels², and more.
   [[nodiscard]] std::uint32_t outbox(float limit) const;
 
  private:
-  // Squared distances of the block and of two grid points around it. The padding holds -1 and
-  // accepts nothing, so rows of four need no bounds check.
-  // Only the layout is that of a padded leaf: neighbours offer points and are not copied.
+  // Squared distances of the block, with a padding of two grid points. Values in the padding are
+  // -1, so no offer is nearer there and rows of four need no bounds check. The padding holds no
+  // values of neighbour blocks: readNeighbour() reads them from their blocks.
   using Held = PaddedLeaf<2, 16>;
 
   [[nodiscard]] openvdb::Vec3f local(std::uint32_t point) const {
@@ -98,8 +100,8 @@ class BlockWorker {
     queue_.push_back(n);
   }
 
-  /// Offers a surface point to the grid points of the block around a position. The position may lie
-  /// one grid point outside the block.
+  /// Offers a surface point to the 27 grid points around `c`, in coordinates of the block. `c` may
+  /// lie one grid point outside the block.
   void offerAround(const Coord& c, std::uint32_t point) {
     const openvdb::Vec3f at = local(point);
     const float dz = at[2] - static_cast<float>(c.z() - 1);
@@ -224,7 +226,8 @@ void NearestPoints::seedBesideSurface() {
   for (std::uint32_t i = 0; i < points_.gridPoints.size(); ++i)
     if (!reach_.region || reach_.region->isInside(points_.gridPoints[i]))
       seed(points_.gridPoints[i], i, true);
-  // An edge may be nearer to a grid point than the points that its neighbours found on the faces.
+  // Points on edges and corners may be nearer to a grid point than all points on faces, so they are
+  // offered to the corners of their cells.
   for (std::size_t i = points_.gridPoints.size(); i < points_.size(); ++i) {
     const Coord cell = Coord::floor(points_.positions[i]);
     for (int corner = 0; corner < 8; ++corner) {
@@ -236,8 +239,9 @@ void NearestPoints::seedBesideSurface() {
 }
 
 void NearestPoints::seedRegionBoundary() {
-  // The straight segment from a grid point to its closest point leaves the region through the
-  // boundary. With correct values on the boundary, no block outside needs a visit.
+  // If the closest point of a grid point lies outside the region, the segment between both crosses
+  // the boundary of the region. With correct surface points on the boundary, no block outside the
+  // region is needed.
   const PointTree tree(points_.positions);
   const openvdb::CoordBBox& box = *reach_.region;
   const double limit = std::max(reach_.inside, reach_.outside) + kBlockMargin;

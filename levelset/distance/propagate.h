@@ -12,11 +12,11 @@
 
 namespace levelset::eikonal {
 
-/// Nearest surface point of each grid point near the zero set.
-/// Each grid point offers its surface point to its 26 neighbours until nothing improves. A queue
-/// drives this inside a leaf block. Between blocks it runs in rounds over the eight parities of the
-/// block positions. Blocks of one parity never touch, so they run in parallel; the order, and so
-/// the result, is fixed.
+/// Finds the nearest of the SurfacePoints for each grid point near the zero set. Each grid point
+/// offers its nearest surface point to its 26 neighbours, until no grid point gets a nearer one.
+/// Inside a leaf block, a queue holds the grid points that must make offers. Between blocks, the
+/// algorithm runs in rounds over the eight parities of the block positions. Blocks of one parity
+/// never touch, so they run in parallel; the order, and so the result, is fixed.
 class NearestPoints {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
@@ -24,22 +24,24 @@ class NearestPoints {
 
   struct Block {
     openvdb::Coord origin;
-    std::array<std::uint32_t, 512> nearest;  ///< index of the nearest surface point
-    /// Squared distance to the nearest surface point, voxels². Without one: the square of the
-    /// largest distance that counts.
+    std::array<std::uint32_t, 512> nearest;  ///< index of the nearest surface point, or kNone
+    /// Squared distance to the nearest surface point, voxels². If there is none yet: the square of
+    /// the largest distance to compute.
     std::array<float, 512> squared;
-    Mask inside;  ///< φ < 0
-    Mask own;     ///< grid points whose surface point was found for that very grid point
-    std::array<Block*, 27> neighbours{};  ///< null where there is no block
+    Mask inside;  ///< grid points with φ < 0
+    Mask own;     ///< grid points beside the zero set that still have their own surface point
+    std::array<Block*, 27> neighbours{};  ///< 26 neighbours; null: no block
     openvdb::Coord low, high;  ///< bounds of the block's grid points in the region, inclusive
-    /// Bit i: neighbour i changed at the shared border.
+    /// Bit i is set when neighbour i has changed at the shared border and this block has not read
+    /// it.
     std::atomic<std::uint32_t> dirtyNeighbours = 0;
     Mask queued;  ///< grid points that must offer their surface point to their neighbours
   };
 
+  /// Grid points for which a nearest surface point is searched.
   struct Reach {
-    double inside = 3, outside = 3;  ///< voxels
-    std::optional<openvdb::CoordBBox> region = {};
+    double inside = 3, outside = 3;                 ///< largest distances from the zero set, voxels
+    std::optional<openvdb::CoordBBox> region = {};  ///< box of the grid points; empty: no limit
   };
 
   NearestPoints(const openvdb::FloatTree& field, const SurfacePoints& points, const Reach& reach);

@@ -10,7 +10,7 @@
 namespace levelset {
 namespace {
 
-/// Returns the smallest box of grid points that holds a world box.
+/// Returns the smallest index box of grid points that contains a world box.
 openvdb::CoordBBox gridBox(const openvdb::math::Transform& transform, const Imath::Box3d& box) {
   openvdb::BBoxd index;
   for (int corner = 0; corner < 8; ++corner) {
@@ -34,18 +34,16 @@ bool isFinite(const Imath::Box3d& box) {
 NarrowBand redistance(NarrowBand field, const RedistanceOptions& options) {
   requireSolid(field);
   if (field.isEmpty())
-    throw InvalidInput(
-        "redistance: the field is empty and has no zero crossing; give a solid with a surface");
+    throw InvalidInput("the field is empty and has no zero crossing; give a solid with a surface");
   eikonal::DistanceRequest request;
   request.halfWidth = options.halfWidth.value_or(field.halfWidth());
   if (!std::isfinite(request.halfWidth) || request.halfWidth < 1)
     throw UsageError(
-        fmt::format("redistance: the half width is {} voxels; give at least 1", request.halfWidth));
+        fmt::format("the half width is {} voxels; give at least 1", request.halfWidth));
   if (options.region) {
     if (options.region->isEmpty() || !isFinite(*options.region))
       throw UsageError(
-          "redistance: the region is empty or has a coordinate that is not finite; give a finite "
-          "box");
+          "the region is empty or has a coordinate that is not finite; give a finite box");
     request.region = gridBox(vdb(field).transform(), *options.region);
   }
   request.maxMemory = options.maxMemory;
@@ -54,8 +52,8 @@ NarrowBand redistance(NarrowBand field, const RedistanceOptions& options) {
 }
 
 Cost costOfDistances(double layer, double halfWidth) {
-  // The first term finds the surface, the second the closest point of each grid point. Smooth
-  // surfaces take less, meshes of facets with edges everywhere more.
+  // The first term is for the surface points, the second for the closest point of each grid point.
+  // Smooth surfaces take less time, faceted surfaces with edges everywhere take more.
   return {1e-9 * layer * (1250 + 1060 * 2 * halfWidth), layer * (540 + 6 * 2 * halfWidth)};
 }
 

@@ -20,8 +20,8 @@ struct RedistanceOptions {
   Progress progress = {};
 };
 
-/// Distance from the surface, in voxels, within which field values affect the surface points.
-/// Includes edges and the faces that meet there.
+/// Distance from the surface, in voxels, within which field values affect the position of the
+/// surface. Includes the reconstruction of edges from the faces that meet there.
 inline constexpr double kReadBySurface = 6;
 
 /// Radius around a point, in voxels, within which the field determines the distance computed there.
@@ -30,35 +30,36 @@ inline constexpr double kReadBySurface = 6;
   return halfWidth + 2 * kReadBySurface;
 }
 
-/// Recomputes a signed distance from a field with the right zero set, without moving the zero set.
-/// Beside the surface each grid point finds its closest point on a tricubic interpolant with
-/// Newton's method [Chopp01, Saye14]. From there closest points propagate outwards block by block.
-/// Each grid point keeps the nearest one and refines it on the interpolant.
-/// The error is of second order in the voxel size, and smaller on smooth surfaces. Edges and
-/// corners between faces that are flat beside them are those of `mesh --sharp`. Other edges are
-/// rounded by up to 0.75 voxel. The result does not depend on the order of blocks or on the number
-/// of threads.
-/// A value within the tricubic's own error is kept (1e-3 voxel at a radius of curvature of 8, less
-/// on flatter parts). So a distance field keeps its bits where radii of curvature exceed 10 voxels.
-/// @param field  right sign everywhere, Lipschitz, any slope; only values beside the zero set are
-///               read
-/// @return with `region`, distances on the smallest box of grid points that holds it; signs
-///         everywhere
+/// Recomputes the signed distance from a field, without moving the zero set. Beside the surface
+/// each grid point finds its closest point on a tricubic interpolant with Newton's method [Chopp01,
+/// Saye14]. From there closest points propagate outwards block by block. Each grid point keeps the
+/// nearest one and refines it on the interpolant. The error is of second order in the voxel size,
+/// and smaller on smooth surfaces. Edges and corners between faces that are flat near them are as
+/// sharp as those of `mesh --sharp`. Other edges are rounded by up to 0.75 voxel. The result does
+/// not depend on the order of blocks or on the number of threads. A value of the field is kept if
+/// it equals the computed distance within the error of tricubic interpolation: 1e-3 voxel at a
+/// radius of curvature of 8 voxels, less on flatter parts. So a distance field keeps its bits where
+/// radii of curvature exceed 10 voxels.
+/// @param field  correct sign everywhere, Lipschitz continuous, any slope; only values beside the
+///               zero set are read
+/// @return band of the requested half width; with `region`, distances only on the smallest box of
+///         grid points that contains the region, and signs everywhere
 /// @throws InvalidInput if the field has no zero crossing
 /// @throws UsageError for a half width below 1 or an empty region
 /// @throws ResourceLimit when the result does not fit into memory
 /// @throws Cancelled
 [[nodiscard]] NarrowBand redistance(NarrowBand field, const RedistanceOptions& options = {});
 
-/// Estimates the cost of distances that are computed again.
+/// Estimates the cost of redistancing.
 /// @param layer      ValuePlan::layer() of the surface
-/// @param halfWidth  of the result, voxels
+/// @param halfWidth  half width of the result, voxels
 [[nodiscard]] Cost costOfDistances(double layer, double halfWidth);
 
 /// Options of the operators `reinitialize` and `rebuild-band`.
 template <bool isRequired>
 struct HalfWidthOptions {
-  std::optional<double> halfWidth;  ///< of the result, voxels
+  /// Half width of the result, voxels; empty: that of the operand.
+  std::optional<double> halfWidth;
 
   template <class Visitor>
   static void describe(Visitor& visit) {
@@ -69,7 +70,7 @@ struct HalfWidthOptions {
   }
 };
 
-/// Estimates that the two operators share.
+/// Members that the operators reinitialize and rebuild-band share.
 template <bool isRequired>
 struct RedistanceOperator {
   using Options = HalfWidthOptions<isRequired>;

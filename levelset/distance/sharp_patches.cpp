@@ -22,19 +22,22 @@ using openvdb::FloatTree;
 using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
-// Second difference, voxels per unit slope, above which a grid point may lie beside an edge.
+// Second difference of the distance, voxels, above which a grid point may lie beside an edge.
 constexpr double kSharpBend = 0.15;
-// An edge affects the interpolant of cells up to this many cells away, and so do the bisector
-// planes of its faces.
+// Number of cells from an edge in which the edge, or the bisector planes of its faces, affect the
+// interpolant.
 constexpr int kZone = 3;
-// An edge is rejected when another sheet that faces away lies nearer than this, in voxels. The
-// values between both mix the two, and planes fitted to them lie on neither.
+// An edge is rejected when a part of the surface with the opposite orientation lies nearer than
+// this, in voxels. Values between both parts depend on both, and planes fitted to them lie on
+// neither part.
 constexpr double kThin = 2;
-// Two normals face away from each other when their dot product is below this. The faces of a knife
-// edge below 26° count too: it looks like the rim of a plate, and both stay on the interpolant.
+// Two normals count as opposite when their dot product is below this value. So do the normals of an
+// edge with an angle below 26°. Such an edge cannot be distinguished from the rim of a thin plate,
+// so both are left to the interpolant.
 constexpr double kFacesAway = -0.9;
 
-/// Returns true when the field bends sharply at a grid point beside the surface.
+/// Returns true when a second difference of the field exceeds `limit`, world units, at a grid point
+/// beside the surface.
 bool bends(const DenseBlock& block, double limit) {
   constexpr int kSteps[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   for (int x = 0; x < 8; ++x)
@@ -54,7 +57,7 @@ bool bends(const DenseBlock& block, double limit) {
   return false;
 }
 
-/// Returns the leaves where the field bends beside the surface, with all leaves around them.
+/// Returns a grid of the leaves that may contain an edge, with the 26 leaves or tiles around each.
 FloatGrid::Ptr bentPart(const FloatGrid& field, const std::optional<CoordBBox>& within) {
   std::vector<const LeafNode*> leaves;
   for (auto it = field.tree().cbeginLeaf(); it; ++it)
@@ -88,11 +91,12 @@ FloatGrid::Ptr bentPart(const FloatGrid& field, const std::optional<CoordBBox>& 
   return part;
 }
 
-/// Triangles of a mesh, sorted by the cells of their centroids, to find thin parts.
+/// Triangles of a mesh near edges and corners, sorted by the cells of their centroids. Finds the
+/// parts of a solid that are thinner than kThin.
 class SheetTable {
  public:
   explicit SheetTable(const SharpMesh& mesh) {
-    openvdb::MaskTree near;  // leaves near a feature
+    openvdb::MaskTree near;  // leaves within kThin of an edge or corner
     for (std::size_t v = 0; v < mesh.sheets.size(); ++v)
       for (int corner = 0; corner < 8 && mesh.sheets[v].count > 1; ++corner)
         near.touchLeaf(Coord::floor(mesh.positions[v] + Vec3d(corner & 4 ? kThin : -kThin,
@@ -162,12 +166,12 @@ SharpPatches::SharpPatches(const FloatGrid& field, const std::optional<CoordBBox
   openvdb::tools::dilateActiveValues(zone_, kZone, openvdb::tools::NN_FACE_EDGE_VERTEX,
                                      openvdb::tools::IGNORE_TILES);
 
-  // === Patches around them
+  // === Patches around the confirmed edges
   border_.topologyUnion(zone_);
   openvdb::tools::dilateActiveValues(border_, 1, openvdb::tools::NN_FACE_EDGE_VERTEX,
                                      openvdb::tools::IGNORE_TILES);
-  // Patches extend beyond the zone. A point at its border must find the continuing surface nearer
-  // than the last triangle that touches the zone.
+  // The patches extend by a cell beyond the zone. Otherwise a query at the border of the zone could
+  // find the last triangle in the zone, although the surface beyond it is nearer.
   openvdb::MaskTree around(border_);
   openvdb::tools::dilateActiveValues(around, 1, openvdb::tools::NN_FACE_EDGE_VERTEX,
                                      openvdb::tools::IGNORE_TILES);

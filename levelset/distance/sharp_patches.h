@@ -10,16 +10,16 @@
 
 namespace levelset::eikonal {
 
-/// Zero set beside the edges and corners of a solid, as triangles in index space.
-/// A tricubic rounds edges by up to 0.75 voxel; planes fitted on either side do not [Ju02]. Smooth
-/// surfaces get no patches, whatever their curvature: beside an edge the faces must be flat in
-/// proportion to the sharpness of the edge.
+/// Zero set near the edges and corners of a solid, as triangles in index space. Tricubic
+/// interpolation rounds edges by up to 0.75 voxel; the intersection of planes fitted to both faces
+/// does not [Ju02]. Smooth surfaces get no patches, whatever their curvature: the less the
+/// surface turns at an edge, the flatter the faces beside it must be.
 class SharpPatches {
  public:
   /// Builds an empty set.
   SharpPatches() = default;
-  /// Searches for edges and corners where the field bends, in the leaf blocks that touch `within`
-  /// (empty: all). Only fields of unit slope yield any.
+  /// Searches for edges and corners in the leaf blocks that intersect the index box `within`
+  /// (empty: all). Finds them only in fields of unit slope.
   SharpPatches(const openvdb::FloatGrid& field, const std::optional<openvdb::CoordBBox>& within,
                const Progress& progress);
 
@@ -29,14 +29,15 @@ class SharpPatches {
   [[nodiscard]] bool covers(const openvdb::Coord& cell) const {
     return !isEmpty() && zone_.isValueOn(cell);
   }
-  /// Returns true when the grid point is a corner of such a cell.
+  /// Returns true when the grid point may be a corner of a cell for which covers() is true.
   [[nodiscard]] bool touches(const openvdb::Coord& gridPoint) const {
     return !isEmpty() && border_.isValueOn(gridPoint);
   }
-  /// Vertices on edges and corners, in an order that depends on the field alone.
+  /// Returns the vertices of the patches that lie on edges and corners, in index space. Their order
+  /// depends on the field only.
   [[nodiscard]] const std::vector<openvdb::Vec3d>& features() const { return features_; }
 
-  /// Finds the nearest point of the patches within `limit`.
+  /// Finds the nearest point of the patches within `limit` voxels.
   [[nodiscard]] TriangleTree::Hit nearest(const openvdb::Vec3d& from, double limit) const {
     return surface_.nearest(from, limit);
   }

@@ -9,7 +9,7 @@
 namespace levelset::eikonal {
 
 /// Writes ± background into `result` with the signs of `field`. Skips the leaf blocks for which
-/// `holds` returns true: the caller fills those.
+/// holds(origin) returns true: the caller writes their values.
 void copySigns(const openvdb::FloatTree& field,
                const std::function<bool(const openvdb::Coord& origin)>& holds,
                openvdb::FloatTree& result);

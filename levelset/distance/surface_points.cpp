@@ -23,16 +23,18 @@ using LeafNode = FloatTree::LeafNodeType;
 constexpr std::array<std::array<int, 3>, 6> kDirections = {
     {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}}};
 
-// Linear crossings differ from those of the interpolant by up to about this much, voxels.
+// Largest difference, about, between zero crossings by linear interpolation on grid edges and those
+// of the tricubic interpolant, voxels.
 constexpr double kCrossingTolerance = 0.05;
-// A sharp surface differs from the linear crossings by up to about this much, voxels.
+// Largest difference, about, between the linear zero crossings and the sharp patches, voxels.
 constexpr double kSharpTolerance = 0.5;
 
 Vec3d vectorOf(const std::array<int, 3>& d) {
   return Vec3d(d[0], d[1], d[2]);
 }
 
-/// Linear crossings on the six edges at a grid point, as distances in voxels; 2: no crossing.
+/// Zero crossings by linear interpolation on the six grid edges at a grid point, as distances from
+/// it in voxels; 2: no crossing.
 struct Crossings {
   std::array<double, 6> at;
   int nearest = 0;
@@ -54,8 +56,8 @@ struct Crossings {
   }
 };
 
-/// Returns the gradient's estimate of the foot point where it is plausible, else the nearest
-/// crossing.
+/// Returns the start of Newton's method, relative to the grid point: the foot point by value and
+/// gradient if it is not farther than the nearest crossing, else that crossing.
 Vec3d firstGuess(const DenseBlock& block, int x, int y, int z, const Crossings& crossings) {
   const auto difference = [&](int dx, int dy, int dz) {
     const double forward = block.at(x + dx, y + dy, z + dz),
@@ -71,9 +73,9 @@ Vec3d firstGuess(const DenseBlock& block, int x, int y, int z, const Crossings& 
   return crossings.offset(crossings.nearest);
 }
 
-/// Finds the closest point of the zero set to a grid point beside it. A crossing nearer than the
-/// point that Newton's method found is used as another start, so both walls of a narrow gap are
-/// found.
+/// Finds the closest point of the zero set to a grid point beside it, in the frame of the block. A
+/// crossing nearer than the point that Newton's method found is used as another start. So the
+/// nearer wall of a narrow gap is found.
 Vec3d findFoot(const DenseBlock& block, int x, int y, int z, const Crossings& crossings) {
   const Vec3d from(x, y, z);
   Foot best = closestPoint(block, from, from + firstGuess(block, x, y, z, crossings));
@@ -83,7 +85,7 @@ Vec3d findFoot(const DenseBlock& block, int x, int y, int z, const Crossings& cr
     const Foot other = closestPoint(block, from, from + crossings.offset(i));
     if (other.converged && (!best.converged || other.distance < best.distance)) best = other;
   }
-  // On creases Newton's method may not converge; a crossing always lies on the surface.
+  // On creases Newton's method may not converge. A linear crossing always lies on the surface.
   const bool plausible = best.converged && changesSignAround(block, best.point) &&
                          best.distance <= crossings.nearestDistance() + 4 * kCrossingTolerance;
   return plausible ? best.point : from + crossings.offset(crossings.nearest);
@@ -113,7 +115,7 @@ std::vector<const LeafNode*> leavesOf(const FloatTree& tree,
   return leaves;
 }
 
-/// Calls work(leaf number, dense block around it) for all leaves, in parallel.
+/// Calls work(index of a leaf, dense block of the leaf) for all leaves, in parallel.
 template <typename Work>
 void forEachBlock(const FloatTree& tree, const std::vector<const LeafNode*>& leaves,
                   const Work& work) {
@@ -127,10 +129,10 @@ void forEachBlock(const FloatTree& tree, const std::vector<const LeafNode*>& lea
   });
 }
 
-/// Extrapolates to a grid point that holds the bare background. Takes the mean over the axes, at
-/// least the background; returns 0 when no axis has two distances to extrapolate from. The
-/// extrapolation is quadratic where the second difference is small, so that smooth fields keep
-/// their order.
+/// Extrapolates the field to a grid point whose value is the background. Takes the mean over the
+/// axes, at least the background; returns 0 when no axis has two distances to extrapolate from. The
+/// extrapolation is quadratic where the second difference is small, so that the interpolation of
+/// smooth fields keeps its order.
 float extrapolate(const DenseBlock& block, int x, int y, int z, float background) {
   constexpr float kGentle = 0.25f;
   const float sign = block.at(x, y, z) < 0 ? -1.0f : 1.0f;
@@ -170,13 +172,15 @@ void addLayer(FloatTree& tree) {
     for (const auto& [n, value] : additions[i]) leaf->setValueOnly(n, value);
 }
 
-/// Returns true when the interpolant beside this grid point reads values clipped to the background.
+/// Returns true when the interpolant beside this grid point reads values that are clipped to the
+/// background.
 bool isThinAt(const DenseBlock& block, int x, int y, int z, float background) {
   const float here = std::abs(block.at(x, y, z));
   for (const auto& d : kDirections) {
     const float one = std::abs(block.at(x + d[0], y + d[1], z + d[2]));
     const float two = std::abs(block.at(x + 2 * d[0], y + 2 * d[1], z + 2 * d[2]));
-    // A value beyond the linear continuation was not clipped.
+    // The value two voxels away counts as clipped if the linear continuation exceeds the
+    // background.
     if (one >= background || (two >= background && 2 * one - here > 1.02f * background))
       return true;
   }

@@ -12,28 +12,33 @@
 
 namespace levelset::eikonal {
 
-/// Closest points of the zero set, one for each grid point with a neighbour of the other sign. They
-/// are sorted by leaf block in tree order, then by grid point. Points on edges and corners follow.
+/// Closest points of the zero set, one for each grid point with a neighbour of the opposite sign.
+/// They are sorted by leaf block in tree order, then by grid point. Points on edges and corners
+/// follow.
 struct SurfacePoints {
   std::vector<openvdb::Vec3d> positions;  ///< index space
-  std::vector<openvdb::Coord>
-      gridPoints;                ///< grid point of each closest point; none for edges and corners
-  std::vector<CompactJet> jets;  ///< derivatives of the interpolant at the point; zero on patches
-  std::vector<char> sharp;       ///< point lies on the patches, not on the interpolant
-  /// The interpolant read grid points without a distance: call thicken() on the field.
+  /// Grid point of each closest point. Shorter than `positions`: points on edges and corners have
+  /// none.
+  std::vector<openvdb::Coord> gridPoints;
+  /// Derivatives of the interpolant at each point; zero on sharp patches.
+  std::vector<CompactJet> jets;
+  /// Nonzero: the point lies on the sharp patches, not on the interpolant.
+  std::vector<char> sharp;
+  /// The interpolant beside the zero set reads grid points without a distance. Call thicken() on
+  /// the field and search again.
   bool thin = false;
   [[nodiscard]] std::size_t size() const { return positions.size(); }
 };
 
-/// Finds the surface points in the leaf blocks that touch `within` (empty: all). A pair of
-/// neighbours counts when at least one holds a distance: two opposite backgrounds do not locate a
-/// surface.
+/// Finds the surface points in the leaf blocks that intersect the index box `within` (empty: all).
+/// At least one of two neighbours of opposite sign must have a distance: two opposite backgrounds
+/// do not locate a surface.
 [[nodiscard]] SurfacePoints findSurfacePoints(const openvdb::FloatTree& field,
                                               const std::optional<openvdb::CoordBBox>& within,
                                               const SharpPatches& patches);
 
-/// Returns the field with two more layers on each side, extrapolated along the axes. The
-/// extrapolation is parabolic where the field is smooth, else linear.
+/// Returns the field with its band extended by two grid points on each side, by extrapolation along
+/// the axes. The extrapolation is parabolic where the field is smooth, else linear.
 [[nodiscard]] openvdb::FloatTree::Ptr thicken(const openvdb::FloatTree& field);
 
 }  // namespace levelset::eikonal
