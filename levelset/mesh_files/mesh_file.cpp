@@ -96,7 +96,8 @@ void writeMesh(const fs::path& path, const TriMesh& mesh, const WriteMeshOptions
   const FormatChoice choice = meshFormat(path, options.format, false);
   requireAttributes(mesh);
   report(options.progress, 0);
-  // Without the attributes, seams would remain as slits.
+  // A format without attributes needs no seams: their doubled vertices would be open slits in the
+  // surface, so they are merged.
   std::optional<TriMesh> closed;
   if (!choice.format->attributes && !mesh.attributes.isEmpty())
     closed = withoutSeams(mesh, options.maxMemory);
@@ -126,7 +127,7 @@ MeshFileInfo meshFileInfo(const fs::path& path, const std::string& format) {
     info = plyInfo(head, first.fileSize, name);
     const bool isMesh = info.vertices > 0 && info.faces > 0, isKnown = first.fileSize > 0;
     if (isMesh && isKnown && path != "-" && !plyHoldsTriangles(head, first.fileSize, name))
-      (void)readMesh(path, {.format = format});  // its message says where the file ends
+      (void)readMesh(path, {.format = format});  // throws with the position at which the data ends
   } else if (choice.format->read == readStl) {
     info = stlInfo(head, first.fileSize, name);
   } else if (choice.format->read == readOff) {

@@ -33,8 +33,8 @@ void requireNumbers(const std::string& name, const Vector& numbers, const char* 
                          what, number));
 }
 
-/// Value of a number that std::from_chars reports as out of range: strtod decides whether it is too
-/// large or too small.
+/// Returns the value of a number that std::from_chars reports as out of range: strtod gives ±
+/// infinity for a number that is too large, and about 0 for one that is too small.
 double extremeNumber(const char* first, const char* last) {
   static const locale_t plain = ::newlocale(LC_ALL_MASK, "C", nullptr);
   return ::strtod_l(std::string(first, last).c_str(), nullptr, plain);
@@ -150,8 +150,8 @@ void MeshBuilder::noteIndex(std::uint64_t index, FilePosition place) {
 std::uint64_t MeshBuilder::splitVertex(std::uint64_t vertex, FilePosition place) {
   noteIndex(vertex, place);
   splitVertices_.push_back(static_cast<std::uint32_t>(vertex));
-  // The placeholder counts down from the maximum until all vertices are known: kMaxIndex - n fits a
-  // triangle's corner.
+  // The final number of the duplicate is unknown until all vertices are read. Until then, kMaxIndex
+  // − n stands for the n-th duplicate in the corners of triangles.
   return kSplit | (kMaxIndex - (splitVertices_.size() - 1));
 }
 
@@ -160,8 +160,8 @@ void MeshBuilder::placeSplitVertices() {
   if (splits == 0) return;
   if (before + splits > kMaxIndex) {
     failFile(name_,
-             "has more than 4294967295 vertices, once those with "
-             "several normals or texture coordinates are split; split the mesh");
+             "has more than 4294967295 vertices after duplicating those with several normals or "
+             "texture coordinates; split the mesh");
   }
   const std::uint64_t first = kMaxIndex - (splits - 1);
   for (auto& triangle : mesh_.triangles)
@@ -179,7 +179,8 @@ void MeshBuilder::addFace(std::span<const std::uint64_t> corners, FilePosition p
     if ((corner & kSplit) == 0) noteIndex(corner, place);
   if (corners.size() > 3)
     polygons_.push_back({mesh_.triangles.size(), corners.size(), place.number});
-  // A fan stores the corners until all vertices are known.
+  // Stores the corners as a fan of triangles. splitPolygons() replaces it when all vertices are
+  // known.
   for (std::size_t i = 2; i < corners.size(); ++i) {
     mesh_.triangles.push_back({static_cast<std::uint32_t>(corners[0]),
                                static_cast<std::uint32_t>(corners[i - 1]),
@@ -211,10 +212,9 @@ TriMesh MeshBuilder::finish() {
         fmt::format("holds {} vertices and no triangles; export the mesh with its faces", count));
   if (highestIndex_ >= count) {
     failAt(name_, {highestUnit_.c_str(), highestNumber_},
-           fmt::format(
-               "a face refers to vertex {} (counted from 0) of {}; repair the mesh or export it "
-               "again",
-               highestIndex_, count));
+           fmt::format("a face refers to vertex {} (counted from 0), but the mesh has {} vertices; "
+                       "repair the mesh or export it again",
+                       highestIndex_, count));
   }
   placeSplitVertices();
   splitPolygons();
@@ -259,7 +259,8 @@ void TextCursor::skipLine() {
 
 std::string_view TextCursor::token() {
   const char* begin = p_;
-  if (p_ != end_ && *p_ == '\\') ++p_;  // a backslash that continues no line is part of a name
+  if (p_ != end_ && *p_ == '\\')
+    ++p_;  // a backslash that does not continue the line is part of the token
   while (!atBlank()) ++p_;
   return {begin, static_cast<std::size_t>(p_ - begin)};
 }

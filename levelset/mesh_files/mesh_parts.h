@@ -42,23 +42,25 @@ class MeshBuilder {
   /// coordinate fits a float.
   void declarePrecision(CoordinatePrecision precision);
 
-  /// Adds a vertex. `at` is the current reading position, for the progress.
+  /// Adds a vertex. `place` is its position for messages, `at` the reading position for the
+  /// progress.
   void addVertex(double x, double y, double z, FilePosition place, const char* at);
-  /// Adds an attribute of the last vertex. @throws InvalidInput for numbers that are not finite
+  /// Adds an attribute of the last vertex: normal, texture coordinate or colour.
+  /// @throws InvalidInput for numbers that are not finite
   void addNormal(const Imath::V3d& normal, FilePosition place);
   void addUv(const Imath::V2d& uv, FilePosition place);
   void addColor(const Imath::V4f& color, FilePosition place);
   [[nodiscard]] bool wantsAttributes() const { return options_.attributes; }
   [[nodiscard]] MeshAttributes& attributes() { return mesh_.attributes; }
-  /// Records that the file has attributes that the caller does not want.
+  /// Records that the file has attributes, which are skipped because the options exclude them.
   void dropAttributes() { droppedAttributes_ = true; }
   [[nodiscard]] bool droppedAttributes() const { return droppedAttributes_; }
   /// Reports an attribute that a TriMesh cannot hold.
   void noteUnsupported(std::string what);
-  /// Sets the memory that the reader uses besides the mesh.
+  /// Sets the memory that the reader uses besides the mesh, bytes.
   void noteBytes(std::size_t bytes) { readerBytes_ = bytes; }
   [[nodiscard]] std::size_t splitCount() const { return splitVertices_.size(); }
-  /// @throws ResourceLimit when that many further bytes do not fit
+  /// @throws ResourceLimit when `bytes` more bytes would exceed the memory limit
   void requireMore(double bytes) const;
   /// Adds a duplicate of a vertex, which may not have been read yet.
   /// @return a placeholder for the corners of faces; the final number of the n-th duplicate is
@@ -88,8 +90,8 @@ class MeshBuilder {
   std::vector<std::uint32_t> splitVertices_;  // original vertex of each duplicate
   std::size_t readerBytes_ = 0;
   std::uint64_t highestIndex_ = 0;
-  std::string highestUnit_ = "line";  // owned copy: the text of the element's name may be freed
-                                      // before the message is built
+  std::string highestUnit_ = "line";  // unit of the position of the face with highestIndex_; a
+                                      // copy, because the reader frees the name of the element
   std::size_t highestNumber_ = 0;
   std::size_t added_ = 0;
   bool precisionDeclared_ = false, droppedAttributes_ = false;
@@ -97,7 +99,8 @@ class MeshBuilder {
 };
 
 /// Splits a polygon into corners.size() − 2 triangles. Uses a fan for few corners if the fan stays
-/// inside the polygon; otherwise clips ears in the best-fitting plane.
+/// inside the polygon; otherwise clips ears, projected along the axis nearest to the polygon's
+/// normal.
 /// @return false when the polygon is too complex to split in reasonable time
 [[nodiscard]] bool splitPolygon(std::span<const std::uint32_t> corners,
                                 const std::vector<Imath::V3d>& positions,
@@ -139,9 +142,10 @@ class TextCursor {
   /// Takes the token at the cursor, at least one character, so that a reader always advances.
   [[nodiscard]] std::string_view token();
   /// Takes the number at the cursor; ± infinity beyond the range of a double. Fails if there is no
-  /// number.
+  /// number. `what` names the expected number in the message: "a coordinate".
   [[nodiscard]] double number(const char* what);
-  /// Takes the integer at the cursor, without the characters after it (as in 1/2/3).
+  /// Takes the integer at the cursor and stops at the first character that is no digit, as in
+  /// 1/2/3.
   [[nodiscard]] std::int64_t integer(const char* what);
   /// Takes `c` if it is the character at the cursor.
   bool take(char c) {

@@ -18,14 +18,15 @@ namespace levelset {
 namespace {
 
 /// Assigns a separate vertex to each pair of texture coordinate and normal at a vertex. The vertex
-/// itself takes the first pair. Corners without a pair share it.
+/// itself takes the first pair; each further pair gets a duplicate of the vertex. Corners without
+/// texture coordinate and normal use the vertex itself.
 class Seams {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
   using Pair = std::array<std::uint32_t, 2>;  // indices of texture coordinate and normal
 
-  /// @param maxVertices  maximum number of vertices in a file of that size; larger indices are
-  ///         invalid
+  /// @param maxVertices  maximum number of vertices that a file of this size can hold; faces with
+  /// larger indices are invalid
   Seams(MeshBuilder& builder, std::size_t maxVertices)
       : builder_(builder), maxVertices_(maxVertices) {}
 
@@ -42,7 +43,7 @@ class Seams {
     return found->second;
   }
 
-  /// The pair of every vertex; those of the duplicates follow.
+  /// Returns the pairs of all vertices, followed by the pairs of the duplicates.
   [[nodiscard]] std::vector<Pair> pairs(std::size_t vertices) const {
     std::vector<Pair> result;
     result.reserve(vertices + splits_.size());
@@ -105,11 +106,12 @@ class ObjReader {
                              kUv = {"texture coordinate", "the index of a texture coordinate"},
                              kNormal = {"normal", "the index of a normal"};
 
-  /// References of faces to one list, and the position of the greatest index.
+  /// References of faces to the texture coordinates or to the normals: greatest index + 1 and the
+  /// face that uses it.
   struct References {
     std::uint64_t count = 0;
     FilePosition place{"line", 0};
-    std::vector<bool> seen;  ///< flags of the entries that preceded their faces
+    std::vector<bool> seen;  ///< true for entries that a later face refers to
     void note(std::uint64_t index, std::size_t soFar, FilePosition at) {
       if (index < soFar) {
         if (seen.size() < soFar) seen.resize(soFar);
@@ -123,13 +125,13 @@ class ObjReader {
     }
     bool isAhead = false;  ///< true when a face preceded an entry that it refers to
     [[nodiscard]] std::size_t unreferenced(std::size_t all) const {
-      if (isAhead) return 0;  // unknown
+      if (isAhead) return 0;  // number unknown: `seen` is incomplete
       return all - static_cast<std::size_t>(std::count(seen.begin(), seen.end(), true));
     }
   };
 
-  /// Values of a list, and for each the index of the first equal value. Seams lie where values
-  /// differ, not where a file repeats a value.
+  /// All texture coordinates or normals of a file, and for each the index of the first equal value.
+  /// Seams lie where values differ, not where a file repeats a value.
   template <typename Vector>
   struct Values {
     std::vector<Vector> all;
@@ -160,7 +162,8 @@ class ObjReader {
       if (keyword == "vt") return readUv();
       if (keyword == "vn") return readNormal();
     }
-    while (cursor_.skipBlanks('#', true)) skipToken();  // a continued line belongs to its statement
+    while (cursor_.skipBlanks('#', true))
+      skipToken();  // skips the statement with its continuation lines
   }
 
   void skipToken() { static_cast<void>(cursor_.token()); }
@@ -283,8 +286,8 @@ class ObjReader {
   void checkReferences(const References& named, std::size_t count, const char* what) const {
     if (named.count <= count) return;
     failAt(builder_.name(), named.place,
-           fmt::format("a face refers to {} {} of {}; repair the mesh, or read it without "
-                       "attributes (--no-attributes)",
+           fmt::format("a face refers to {} {}, but the file has only {}; repair the mesh, or read "
+                       "it without attributes (--no-attributes)",
                        what, named.count, count));
   }
 
@@ -339,8 +342,8 @@ class ObjReader {
     attributes.colors = std::move(colors_);
   }
 
-  /// Returns true when every component equals n / 255 rounded to double, as written by a program
-  /// that stores bytes.
+  /// Returns true when every component equals n / 255 rounded to float, as written by a program
+  /// that stores colours as bytes.
   static bool isOfBytes(const Imath::V4f& color) {
     for (int i = 0; i < 4; ++i)
       if (!(color[i] >= 0 && color[i] <= 1) || std::round(color[i] * 255) / 255 != color[i])
@@ -387,7 +390,8 @@ void writeObj(ByteWriter& out, const TriMesh& mesh, const Progress& progress) {
     for (int i = 0; i < (held.colors.empty() ? 0 : held.hasAlpha ? 4 : 3); ++i) {
       const float part = held.colors[v][i];
       out.write(" ");
-      // Writes all digits of a float, or the few digits that identify a byte.
+      // A byte n is written as n / 255 with the few digits that identify it as a float, a float
+      // with the digits that identify it as a double.
       if (held.colorPrecision == ColorPrecision::Byte)
         out.writeNumber(std::round(std::clamp(part, 0.0f, 1.0f) * 255) / 255);
       else

@@ -23,8 +23,9 @@ Counts readHeader(TextCursor& cursor) {
     cursor.fail("the file does not begin with 'OFF'; give its actual format");
   for (const char c : keyword.substr(0, keyword.size() - 3)) {
     if (c == '4' || c == 'n')
-      cursor.fail(fmt::format("'{}' is a mesh of another dimension; export it in three dimensions",
-                              keyword));
+      cursor.fail(fmt::format(
+          "'{}' marks a mesh of another dimension than three; export it in three dimensions",
+          keyword));
     if (c != 'C' && c != 'N' && c != 'S' && c != 'T')
       cursor.fail("the file does not begin with 'OFF'; give its actual format");
   }
@@ -35,15 +36,18 @@ Counts readHeader(TextCursor& cursor) {
     cursor.skipToToken('#');
     count = cursor.integer("the number of vertices and faces");
     if (count < 0)
-      cursor.fail(fmt::format("the number {} is negative; export the mesh again", count));
+      cursor.fail(fmt::format(
+          "the number of vertices or faces is {}, which is negative; export the mesh again",
+          count));
   }
-  cursor.skipLine();  // the number of edges, which is unreliable
+  cursor.skipLine();  // skips the number of edges, which is unreliable
   return {static_cast<std::size_t>(counts[0]), static_cast<std::size_t>(counts[1])};
 }
 
-constexpr std::size_t kMinVertexSize = 6, kMinFaceSize = 2;  // "0 0 0\n", "0\n"
+constexpr std::size_t kMinVertexSize = 6, kMinFaceSize = 2;  // bytes of "0 0 0\n" and "0\n"
 
-/// @param remaining  bytes after the header
+/// Refuses a header that promises more vertices and faces than the file can hold.
+/// @param remaining  number of bytes after the header
 void checkCounts(const Counts& counts, std::size_t remaining, const std::string& name) {
   const std::size_t left = remaining + 1;  // the last line may lack its line end
   if (counts.vertices <= left / kMinVertexSize &&
@@ -93,7 +97,7 @@ class OffReader {
       corners_.push_back(static_cast<std::uint64_t>(readWhole("the index of a vertex")));
     }
     builder_.addFace(corners_, place, cursor_.at());
-    cursor_.skipLine();  // colours
+    cursor_.skipLine();  // skips colours
   }
 
   std::int64_t readWhole(const char* what) {

@@ -83,7 +83,7 @@ class BinarySource {
   }
   [[noreturn]] void failShort() const {
     failAt(name_, place(),
-           "the file ends within it; it is truncated or damaged: download or export it "
+           "the file ends within this element; it is truncated or damaged: download or export it "
            "again");
   }
 
@@ -94,7 +94,8 @@ class BinarySource {
   std::size_t index_ = 0;
 };
 
-/// Reads one element per line. A line with too many values would shift all that follow.
+/// Reads one element per line. Refuses a line with too many values, which would shift the values of
+/// all later elements.
 class AsciiSource {
  public:
   AsciiSource(std::string_view data, std::size_t headerLines, const std::string& name)
@@ -103,9 +104,11 @@ class AsciiSource {
   void begin(const Element& element, std::size_t) { element_ = &element; }
   void end() {
     if (cursor_.skipBlanks(0))
-      failAt(name_, place(),
-             fmt::format("there are more values than an element '{}' has; export the mesh again",
-                         element_->name));
+      failAt(
+          name_, place(),
+          fmt::format(
+              "there are more values on the line than an element '{}' has; export the mesh again",
+              element_->name));
   }
   [[nodiscard]] FilePosition place() const { return cursor_.place(); }
   [[nodiscard]] const char* at() const { return cursor_.at(); }
@@ -113,8 +116,8 @@ class AsciiSource {
   double value(Type type) {
     if (!cursor_.skipToToken(0)) failEnd();
     const double number = cursor_.number("a number");
-    // A value declared float is rounded to float. Beyond the range of float, the caller receives
-    // the written number.
+    // A value declared float is rounded to float. A number beyond the range of float is returned as
+    // written, so that the caller can refuse it.
     const bool isFloat =
         type == Type::Float && std::abs(number) <= std::numeric_limits<float>::max();
     return isFloat ? static_cast<double>(static_cast<float>(number)) : number;
@@ -213,8 +216,8 @@ class ElementReader {
       corner = wholeNumber(source_.value(property.type), "the index of a vertex");
   }
 
-  /// Refuses a number beyond the range of its type, which text can contain. Another check refuses
-  /// numbers that are not finite.
+  /// Refuses an attribute beyond the range of its type float, which an ASCII file can contain.
+  /// MeshBuilder refuses numbers that are not finite.
   void requireFloat(double value) const {
     if (!std::isfinite(value) || std::abs(value) <= std::numeric_limits<float>::max()) return;
     failAt(builder_.name(), source_.place(),
@@ -223,7 +226,8 @@ class ElementReader {
                        value));
   }
 
-  /// Fraction of the type's maximum, rounded to float.
+  /// Returns an integer colour as a fraction of the maximum of its type (255 or 65535), rounded to
+  /// float.
   double share(double value, Type type) const {
     const double full = type == Type::Uint8 ? 255 : 65535;
     if (!(value >= 0 && value <= full) || std::floor(value) != value) {
@@ -241,8 +245,11 @@ class ElementReader {
       const auto whole = static_cast<std::uint64_t>(value);
       if (static_cast<double>(whole) == value) return whole;
     }
-    failAt(builder_.name(), source_.place(),
-           fmt::format("{} is {}; repair the mesh or export it again", what, value));
+    failAt(
+        builder_.name(), source_.place(),
+        fmt::format(
+            "{} is {}, which is not an integer from 0 to 1e15; repair the mesh or export it again",
+            what, value));
   }
 
   Source& source_;
@@ -261,7 +268,7 @@ void readElements(const Header& header, std::string_view data, MeshBuilder& buil
                         "the elements that its header promises");
 }
 
-/// Marks all attributes as skipped.
+/// Marks the properties of all attributes as skipped.
 /// @return true when there were any
 bool skipAttributes(Header& header) {
   bool any = false;
@@ -342,7 +349,7 @@ MeshFileInfo plyInfo(std::string_view head, std::size_t fileSize, const std::str
   for (const Element& element : header.elements) {
     if (element.holdsVertices()) {
       info.vertices = element.count;
-      MeshAttributes held;  // one entry of each attribute present
+      MeshAttributes held;  // one entry for each attribute in the file, so that describe() names it
       if (element.holdsNormals()) held.normals.resize(1);
       if (element.holdsUvs()) held.uvs.resize(1);
       if (element.holdsColors()) held.colors.resize(1);

@@ -96,7 +96,8 @@ class HeaderReader {
     header_.elements.push_back(std::move(element));
   }
 
-  /// Chooses the first complete pair of names for the texture coordinates.
+  /// Chooses the first complete pair of texture coordinates (u and v, s and t, or texture_u and
+  /// texture_v) and skips the others.
   static void chooseUvs(Element& element) {
     const auto holds = [&](Role role, int family) {
       return std::any_of(element.properties.begin(), element.properties.end(),
@@ -139,7 +140,7 @@ class HeaderReader {
     if (property.role != Role::Skip &&
         std::any_of(element.properties.begin(), element.properties.end(), isSame)) {
       if (isAttribute(property.role))
-        property.role = Role::Skip;  // the first one counts
+        property.role = Role::Skip;  // skips a repeated attribute: the first one counts
       else
         fail(fmt::format("the property '{}' occurs twice", name));
     }
@@ -173,7 +174,8 @@ class HeaderReader {
     return Role::Skip;
   }
 
-  /// Returns true for types whose value of full colour is known.
+  /// Returns true for types with a known value of full intensity: 255 for uchar, 65535 for ushort,
+  /// 1 for float and double.
   static bool isColorType(Type type) {
     return type == Type::Uint8 || type == Type::Uint16 || type >= Type::Float;
   }

@@ -28,9 +28,10 @@ constexpr std::size_t sizeOf(Type type) {
 /// Property of an element, in the order of the data.
 struct Property {
   Type type;
-  std::optional<Type> listCount;  ///< set for a list
+  std::optional<Type> listCount;  ///< type of the length of a list; empty: no list
   Role role = Role::Skip;
-  int family = 0;  ///< which pair of names of texture coordinates
+  int family = 0;  ///< texture coordinate: 1 for u and v, 2 for s and t, 3 for texture_u and
+                   ///< texture_v; else 0
 };
 
 struct Element {
@@ -51,7 +52,7 @@ struct Element {
   [[nodiscard]] bool holdsColors() const {
     return has(Role::Red) && has(Role::Green) && has(Role::Blue);
   }
-  /// The widest type among the properties in a range of roles.
+  /// Returns the widest type among the properties with roles from `from` to `to`.
   [[nodiscard]] Type widest(Role from, Role to) const {
     Type widest = Type::Int8;
     for (const Property& p : properties)
@@ -70,8 +71,8 @@ struct Element {
 struct Header {
   Encoding encoding = Encoding::Ascii;
   std::vector<Element> elements;
-  std::size_t size = 0;                    ///< bytes before the data
-  std::size_t lines = 0;                   ///< lines of the header
+  std::size_t size = 0;                    ///< size of the header in bytes; the data follows
+  std::size_t lines = 0;                   ///< number of lines of the header
   std::set<std::string> unsupported = {};  ///< names of attributes that a TriMesh cannot hold
 };
 

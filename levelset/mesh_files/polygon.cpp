@@ -10,18 +10,18 @@ namespace {
 using Imath::V2d;
 using Imath::V3d;
 
-/// Maximum number of corners of a fan. All triangles of a larger fan would share a corner, and so
-/// would their bounding boxes.
+/// Maximum number of corners of a polygon that becomes a fan. All triangles of a fan share one
+/// corner, so their bounding boxes overlap there, which slows down searches in a large fan.
 constexpr std::size_t kLargestFan = 16;
-/// Limit of the corner × reflex-corner tests (about two seconds). A polygon that needs more is
-/// refused.
+/// Maximum number of tests for ear clipping, corners × reflex corners (about two seconds). A
+/// polygon that needs more becomes a fan if a fan fits, else it is refused.
 constexpr double kMaxTests = 5e8;
 
 double cross(const V2d& a, const V2d& b, const V2d& c) {
   return (b - a).cross(c - a);
 }
 
-/// Projects the corners onto the plane of the two axes across the polygon's normal,
+/// Projects the corners along the coordinate axis nearest to the polygon's normal. The result runs
 /// counter-clockwise.
 std::vector<V2d> flatten(std::span<const std::uint32_t> corners,
                          const std::vector<V3d>& positions) {
@@ -43,7 +43,8 @@ std::vector<V2d> flatten(std::span<const std::uint32_t> corners,
   return points;
 }
 
-/// Returns true when every triangle of the fan from the first corner has the correct orientation.
+/// Returns true when no triangle of the fan from the first corner is clockwise, so that the fan
+/// covers the counter-clockwise polygon without overlap.
 bool fanFits(const std::vector<V2d>& points) {
   for (std::size_t i = 1; i + 1 < points.size(); ++i)
     if (cross(points[0], points[i], points[i + 1]) < 0) return false;
@@ -129,8 +130,8 @@ class EarClipper {
   const std::vector<V2d>& points_;
   std::vector<std::size_t> previous_, next_, reflex_;
   std::vector<State> state_;
-  std::vector<std::uint32_t> turns_;  // number of times queued; earlier entries in the queue are
-                                      // void
+  std::vector<std::uint32_t> turns_;  // for each corner, how often it was queued as an ear; older
+                                      // queue entries of a corner are void
   std::deque<std::pair<std::size_t, std::uint32_t>> ears_;
 };
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kStlHeaderSize = 84, kFacetSize = 50;
 
-/// Assigns one vertex number to equal positions.
+/// Merges corners at equal positions into one vertex.
 class VertexMerger {
  public:
   explicit VertexMerger(MeshBuilder& builder) : builder_(builder), table_(points_, 1 << 11) {}
@@ -71,9 +71,10 @@ std::size_t facetCapacity(std::string_view head, std::size_t fileSize, const std
   const std::size_t count = facetCount(head), held = (fileSize - kStlHeaderSize) / kFacetSize;
   if (count > held) {
     failFile(name,
-             fmt::format("promises {} triangles and holds {}; it is truncated or not an STL file: "
-                         "download or export it again",
-                         count, held));
+             fmt::format(
+                 "promises {} triangles but can hold only {}; it is truncated or not an STL file: "
+                 "download or export it again",
+                 count, held));
   }
   return held;
 }
@@ -83,7 +84,7 @@ void readBinary(std::string_view input, MeshBuilder& builder) {
   const std::size_t count = facetCount(input);
   requireNoTrailingData(
       input, kStlHeaderSize + count * kFacetSize, builder.name(),
-      fmt::format("the {} triangles that its header promises (it can hold {})", count, held));
+      fmt::format("the {} triangles that its header promises (the file can hold {})", count, held));
   builder.declarePrecision(CoordinatePrecision::Float);
   builder.reserve(count / 2, count);
   VertexMerger merger(builder);
@@ -133,7 +134,7 @@ class TextReader {
         cursor_.fail(
             fmt::format("'{}' is not a keyword of an STL file; export the mesh again", keyword));
       open = keyword == "solid";
-      cursor_.skipLine();  // the name
+      cursor_.skipLine();  // skips the name of the solid
     }
     if (open)
       cursor_.fail("the file ends before 'endsolid'; it is truncated: download or export it again");
@@ -149,7 +150,8 @@ class TextReader {
     return word;
   }
 
-  /// Skips the normal: it follows from the corners and is neither needed nor checked.
+  /// Skips the word `normal` and its three numbers. The normal follows from the corners and is
+  /// neither needed nor checked.
   void readNormal() {
     for (int i = 0; i < 4; ++i) {
       cursor_.skipToToken(0);
@@ -177,7 +179,8 @@ class TextReader {
 constexpr double kStlPrecision = 1e-3;
 
 void requireSinglePrecision(const TriMesh& mesh) {
-  if (mesh.precision == CoordinatePrecision::Float) return;  // no loss of precision
+  if (mesh.precision == CoordinatePrecision::Float)
+    return;  // the coordinates are single precision already
   const Imath::Box3d box = bounds(mesh);
   if (box.isEmpty()) return;
   double farthest = 0;
@@ -188,10 +191,11 @@ void requireSinglePrecision(const TriMesh& mesh) {
   if (farthest < static_cast<double>(std::numeric_limits<float>::max()) &&
       spacingAt(farthest, CoordinatePrecision::Float) <= kStlPrecision * longest)
     return;
-  throw InvalidInput(fmt::format(
-      "STL stores positions in single precision, too coarse for an object of {:.3g} at "
-      "a distance of {:.3g} from the origin; write PLY, OBJ or OFF, or move it to the origin first",
-      longest, farthest));
+  throw InvalidInput(
+      fmt::format("STL stores positions in single precision, too coarse for an object of size "
+                  "{:.3g} at a distance of {:.3g} from the origin; write PLY, OBJ or OFF, or move "
+                  "the object to the origin first",
+                  longest, farthest));
 }
 
 }  // namespace

@@ -170,11 +170,12 @@ TEST(MeshAttributes, InvalidValuesAreRefusedWithTheirPosition) {
   EXPECT_SAYS(refused("vn 0 0\nf 1//1 2//1 3//1\n"), "a coordinate of a normal is missing");
   EXPECT_SAYS(refused("vt 0 inf\nf 1/1 2/1 3/1\n"), "a texture coordinate is inf");
   EXPECT_SAYS(refused("vt 0 0\nvt 1 0\nf 1/1 2/2 3/3\n"),
-              "line 6: a face refers to texture coordinate 3 of 2");
+              "line 6: a face refers to texture coordinate 3, but the file has only 2");
   EXPECT_SAYS(refused("vn 0 0 1\nf 1//1 2//-2 3//1\n"), "refers to normal -2, but only 1 precede");
   EXPECT_SAYS(refused("vn 0 0 1\nf 1//0 2//1 3//1\n"), "refers to normal 0, but OBJ counts from 1");
   EXPECT_SAYS(refused("v 1 1 1 0.5 oops 0\nf 1 2 3\n"), "found 'oops' where a weight or colour");
-  EXPECT_SAYS(refused("vn 0 0 1\nf 1//1 2//1 9//1\n"), "vertex 8 (counted from 0) of 3");
+  EXPECT_SAYS(refused("vn 0 0 1\nf 1//1 2//1 9//1\n"),
+              "vertex 8 (counted from 0), but the mesh has 3");
   EXPECT_EQ(parse("a.obj", obj + "vn 0 0 nan\nf 1//1 2//7 3//1\n", {.attributes = false})
                 .triangles.size(),
             1u);

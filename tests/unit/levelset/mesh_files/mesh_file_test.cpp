@@ -405,13 +405,14 @@ TEST(MeshFile, ReadsBinaryStlWithAnyHeader) {
     EXPECT_SAYS(refused("a.stl", binaryStl(header, {triangle, triangle}, 2) + "tail"),
                 "has data after the 2 triangles");
     EXPECT_SAYS(refused("a.stl", binaryStl(header, {triangle, triangle}, 1)),
-                "has data after the 1 triangles that its header promises (it can hold 2)");
+                "has data after the 1 triangles that its header promises (the file can hold 2)");
   }
 }
 
 TEST(MeshFile, RefusesBrokenStl) {
   const std::array<float, 9> triangle = {0, 0, 0, 1, 0, 0, 0, 1, 0};
-  EXPECT_SAYS(refused("a.stl", binaryStl("x", {triangle}, 2)), "promises 2 triangles and holds 1");
+  EXPECT_SAYS(refused("a.stl", binaryStl("x", {triangle}, 2)),
+              "promises 2 triangles but can hold only 1");
   EXPECT_SAYS(refused("a.stl", binaryStl("solid", {triangle}, 4000000000u)), "promises 4000000000");
   EXPECT_SAYS(refused("a.stl", binaryStl("x", {}, 0)), "no triangle");
   EXPECT_SAYS(refused("a.stl", "short"), "neither text");
