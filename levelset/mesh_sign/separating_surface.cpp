@@ -20,18 +20,19 @@ namespace {
 
 using Imath::V3d;
 using Polygon = std::vector<V3d>;
-/// Polygons that are kept or dropped together.
+/// Connected polygons that are kept or dropped together.
 using Sheet = std::vector<Polygon>;
 
 /// Number of points above which the winding number is summed over a tree.
 constexpr std::size_t kFewPoints = 16;
-/// Relative to the polygon's size: corners nearer to a plane count as on it.
+/// Distance relative to the polygon's size: corners nearer to a cutting plane count as on it.
 constexpr double kOnPlane = 1e-12;
-/// Voxels. Folds no deeper than this stay in the mesh. No grid resolves their interior, and the
-/// distances then still refer to the given mesh.
+/// Voxels. Sheets inside the solid that lie within this distance of the separating surface stay in
+/// the mesh. The grid cannot resolve the gap, and the distances then still refer to the given mesh.
 constexpr double kShallow = 0.25;
 
-/// Directed edges of triangles, used to find the edges that exactly two triangles share.
+/// Directed edge of a triangle, used to find the edges that exactly two triangles share. `rising`:
+/// the triangle runs from `low` to `high`.
 struct HalfEdge {
   std::uint32_t low, high, triangle;
   bool rising;
@@ -55,8 +56,8 @@ V3d centroid(std::span<const V3d> polygon) {
   return sum / static_cast<double>(polygon.size());
 }
 
-/// Cuts a convex polygon by the plane through `point`. A polygon without corners on both sides
-/// stays in one piece.
+/// Cuts a convex polygon by the plane through `point` and adds the one or two pieces to `out`. A
+/// polygon without corners on both sides stays in one piece.
 void cut(const Polygon& polygon, const V3d& point, const V3d& normal, std::vector<Polygon>& out) {
   double size = 0;
   for (const V3d& p : polygon) size = std::max(size, (p - polygon[0]).length());
@@ -100,19 +101,19 @@ class SeparatingSurface {
     findPartners();
     findPatches();
     report(progress_, 0.3);
-    std::vector<std::uint32_t> patches;  // by their largest triangle
+    std::vector<std::uint32_t> patches;  // each as its triangle with the lowest index
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
       if (largest_[t] != kNone) patches.push_back(t);
     if (pairs_.empty() && patches.size() <= 1) return mesh_;
     if (!pairs_.empty() || patches.size() > kFewPoints) buildField();
     report(progress_, 0.6);
-    std::vector<char> kept(mesh_.triangles.size(), 0);  // by patch
+    std::vector<char> kept(mesh_.triangles.size(), 0);  // indexed as largest_
     tbb::parallel_for(std::size_t{0}, patches.size(), [&](std::size_t i) {
       const std::uint32_t t = largest_[patches[i]];
       kept[patches[i]] = separates(t, corners(t));
     });
     LocalMesh result{mesh_.points, {}};
-    std::map<std::uint32_t, Sheet> dropped;  // by patch
+    std::map<std::uint32_t, Sheet> dropped;  // by the lowest triangle of each patch
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
       if (isCrossed(t)) continue;
       const std::uint32_t patch = groups_.find(t);
@@ -150,8 +151,8 @@ class SeparatingSurface {
     for (const auto& [i, j] : pairs_) partners_[next[i]++] = j, partners_[next[j]++] = i;
   }
 
-  /// Joins uncrossed triangles over edges that exactly two of them share. The winding numbers on
-  /// both sides are constant on such a patch.
+  /// Joins triangles that no other triangle crosses into patches, over edges that exactly two of
+  /// them share. The winding number on each side of such a patch is constant.
   void findPatches() {
     std::vector<HalfEdge> edges;
     edges.reserve(3 * mesh_.triangles.size());
@@ -188,8 +189,8 @@ class SeparatingSurface {
     field_ = WindingField(std::move(all));
   }
 
-  /// Winding number without the given triangles. The point lies in their planes, where their own
-  /// winding number is undefined.
+  /// Winding number of the mesh without the triangles `without`. The point lies in the planes of
+  /// these triangles, where their solid angles are undefined.
   [[nodiscard]] double windingAt(const V3d& point, std::span<const std::uint32_t> without) const {
     double w = 0;
     if (field_.isEmpty()) {
@@ -220,11 +221,12 @@ class SeparatingSurface {
     return true;
   }
 
-  /// Returns true when an uncrossed polygon of triangle t has the solid on exactly one side.
+  /// Returns true when a polygon of triangle t has the solid on exactly one side. No triangle may
+  /// cross the polygon.
   [[nodiscard]] bool separates(std::uint32_t t, std::span<const V3d> polygon) const {
     const V3d point = centroid(polygon), normal = areaVector(corners(t));
     std::vector<std::uint32_t> inPlane = {t};
-    double jump = 1;  // jump of the winding number from the front to the back
+    double jump = 1;  // increase of the winding number from the front of t to its back
     for (const std::uint32_t other : partners(t)) {
       if (!isCoplanar(t, other)) continue;
       inPlane.push_back(other);
@@ -235,7 +237,8 @@ class SeparatingSurface {
     return (back > 0.5) != (front > 0.5);
   }
 
-  /// Cuts a triangle along all triangles that cross it. Each part is cut only by triangles near it.
+  /// Cuts a triangle along all triangles that cross it. A triangle cuts only the parts whose
+  /// bounding boxes overlap its own.
   [[nodiscard]] std::vector<Polygon> pieces(std::uint32_t t) const {
     const std::array<V3d, 3> own = corners(t);
     std::vector<Polygon> parts = {Polygon(own.begin(), own.end())};
@@ -276,7 +279,8 @@ class SeparatingSurface {
       result.triangles.push_back({first, first + k - 1, first + k});
   }
 
-  /// Adds the separating pieces to the result and the others to the sheets.
+  /// Cuts all crossed triangles. Adds the pieces that separate inside from outside to `result`, and
+  /// each other piece as a sheet to `sheets`.
   void addPieces(LocalMesh& result, std::vector<Sheet>& sheets) const {
     std::vector<std::uint32_t> crossed;
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
@@ -299,9 +303,10 @@ class SeparatingSurface {
     }
   }
 
-  /// Restores the sheets that lie within kShallow of the result at all their sample points.
+  /// Adds those of the dropped sheets to `result` whose sample points all lie within kShallow of
+  /// it.
   static void addShallow(const std::vector<Sheet>& sheets, LocalMesh& result) {
-    // One point of each sheet suffices to exclude the deep ones.
+    // First test one point of each sheet. This excludes most sheets that lie deep in the solid.
     std::vector<V3d> points;
     for (const Sheet& sheet : sheets) {
       const auto largest =
@@ -341,10 +346,10 @@ class SeparatingSurface {
   double flip_;
   const Progress& progress_;
   std::vector<std::size_t> first_;       // start of each triangle's partners in partners_
-  std::vector<std::uint32_t> partners_;  // triangles that meet it
+  std::vector<std::uint32_t> partners_;  // for each triangle, the triangles that intersect it
   DisjointSets groups_;
-  std::vector<std::uint32_t> largest_;  // largest triangle of each patch, indexed by the patch's
-                                        // lowest
+  /// Largest triangle of each patch, at the index of the patch's lowest triangle; kNone elsewhere.
+  std::vector<std::uint32_t> largest_;
   WindingField field_;
 };
 

@@ -11,9 +11,9 @@ namespace levelset::convert {
 /// Finds the part of a mesh without boundary that separates the solid from the outside. Where
 /// surface components overlap, or one lies inside another of the same orientation, the inner sheets
 /// separate nothing and are removed. Triangles that cross others are cut along the intersections.
-/// Folds shallower than a quarter voxel stay.
+/// Inner sheets within a quarter voxel of the separating surface stay.
 /// @param pairs  intersecting triangles, from findSelfIntersections
-/// @param flip  −1 when the mesh faces inwards and counts as reversed
+/// @param flip   −1 when the mesh faces inwards and counts as reversed, else 1
 [[nodiscard]] LocalMesh separatingSurface(const LocalMesh& mesh,
                                           std::span<const TrianglePair> pairs, double flip,
                                           const Progress& progress);

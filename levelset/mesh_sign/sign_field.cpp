@@ -10,16 +10,17 @@ namespace {
 using Imath::V3d;
 using Imath::V3i;
 
-/// Mesh and fans for the line crossings, and the correction to the integer winding number that they
-/// give.
+/// Mesh and fans, whose crossings with grid lines give an integer winding number, and the
+/// correction of this integer.
 struct ClosedMesh {
   LocalMesh mesh;
-  std::vector<int> weights;  ///< multiplicities; empty: 1 each
-  std::vector<WeightedTriangle> rest;
+  std::vector<int> weights;            ///< multiplicity of each triangle; empty: 1 each
+  std::vector<WeightedTriangle> rest;  ///< triangles whose winding number is added to the integer
 };
 
-/// Closes each loop of the boundary by a fan from the mean of its edges' end points. The edges of a
-/// loop form a cycle, so mesh and fans together have no boundary, whatever the shape of the loop.
+/// Closes each loop of the boundary by a fan of triangles around the mean of its vertices. The
+/// edges of a loop form a cycle, so mesh and fans together have no boundary, whatever the loop's
+/// shape.
 ClosedMesh closeByFans(const LocalMesh& mesh, const std::vector<BoundaryEdge>& boundary) {
   ClosedMesh closed{mesh, std::vector<int>(mesh.triangles.size(), 1), {}};
   DisjointSets loops(mesh.points.size());
@@ -57,7 +58,8 @@ ClosedMesh soupOf(const LocalMesh& mesh) {
   return closed;
 }
 
-/// Six times the signed volume of the cone over the mesh from the mean of its corners.
+/// Six times the signed volume of the tetrahedra from the mean of all corners to the triangles;
+/// positive for a mesh that faces outwards.
 double orientedVolume(const LocalMesh& mesh, const std::vector<int>& weights) {
   V3d mean(0);
   for (const Triangle& t : mesh.triangles)

@@ -19,8 +19,9 @@ namespace levelset::convert {
 ///
 /// For a mesh without boundary the crossings with grid lines suffice. Otherwise a fan of triangles
 /// closes each loop of the boundary. Mesh and fans together have an integer winding number, which
-/// the crossings give. The winding number of the mesh is this integer minus that of the fans, a sum
-/// over few triangles. If most of the mesh is boundary, the sum is taken over the mesh itself.
+/// the crossings give. The winding number of the mesh is this integer minus the winding number of
+/// the fans, a sum over few triangles. If the boundary has more edges than the mesh has triangles,
+/// the winding number is summed over the mesh itself.
 class SignField {
  public:
   enum class Rule { Parity, Orientation, Winding };
@@ -30,7 +31,8 @@ class SignField {
 
   /// Returns true when the complete mesh faces inwards and counts as reversed.
   [[nodiscard]] bool isFlipped() const { return flip_ < 0; }
-  /// Returns true when the surface between inside and outside may leave the triangles.
+  /// Returns true when the surface between inside and outside may leave the triangles, to span
+  /// holes of the mesh.
   [[nodiscard]] bool isOpen() const { return !field_.isEmpty(); }
 
   /// Winding number at a grid point, for the reversed mesh if isFlipped(). Accurate enough that
@@ -52,7 +54,9 @@ class SignField {
 
   Rule rule_;
   double flip_ = 1;
-  WindingField field_;  ///< part of the winding number beyond the integer
+  /// Triangles whose winding number is added to the integer: the fans with negative weights, or all
+  /// triangles of the mesh. Empty for a mesh without boundary.
+  WindingField field_;
   LineCrossings lines_;
 };
 

@@ -10,7 +10,8 @@ namespace {
 using Imath::V3d;
 using Imath::V3f;
 
-/// Generous bounds of the rounding error of `float` centres and distances near a block.
+/// Generous bounds of the rounding error of `float` sphere centres and distances near a block: a
+/// factor, and a length in voxels.
 constexpr float kRelativeSlack = 1e-5f, kSlack = 2e-5f;
 
 double clampUnit(double t) {
@@ -57,7 +58,7 @@ double TriangleFrame::squaredDistance(const V3d& point) const {
   const V3d d = point - a_;
   const double x = d.dot(u_), y = d.dot(v_), height = d.dot(n_);
   double plane = 0;
-  if (y <= 0) {  // the angles at A and B are not obtuse, so AB is nearest
+  if (y <= 0) {  // AB is the longest edge, so the angles at A and B are acute and AB is nearest
     const double dx = x < 0 ? -x : (x > length_ ? x - length_ : 0);
     plane = dx * dx + y * y;
   } else {
@@ -126,9 +127,10 @@ float BlockDistance::squaredToCentres(const Spheres& spheres, const V3f& point) 
   return low;
 }
 
-/// The centre of a sphere lies on its triangle, so the nearest centre bounds the distance from
-/// above. At a point of the cell, this bound and all other distances change by at most the cell's
-/// radius.
+/// Copies to `to` the spheres whose triangles can be nearest to a point of the cell around
+/// `centre`. The centre of a sphere lies on its triangle, so the nearest centre bounds the distance
+/// from above. Between `centre` and a point of the cell, this bound and the distance to a triangle
+/// each change by at most the cell's radius.
 void BlockDistance::pass(const Spheres& from, const V3f& centre, float cellRadius, Spheres& to) {
   const float low = std::sqrt(squaredToCentres(from, centre)) * (1 + kRelativeSlack) + kSlack;
   const float bound =
@@ -173,7 +175,8 @@ double BlockDistance::nearest(const Spheres& spheres, const V3f& point) {
   return std::sqrt(best);
 }
 
-/// @param level  1 for cells of 4³ points, 2 for cells of 2³, 3 for single points
+/// Measures the eight children of the cell around `centre`.
+/// @param level  size of the children: 1 for 4³ points, 2 for 2³ points, 3 for single points
 void BlockDistance::splitCell(int level, const V3f& centre) {
   const float offset = static_cast<float>(kBlockDim >> level) / 2;
   const float cellRadius = (static_cast<float>(kBlockDim >> level) - 1) * 0.8660255f;

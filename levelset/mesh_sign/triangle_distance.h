@@ -11,9 +11,10 @@
 
 namespace levelset::convert {
 
-/// A triangle in a frame of its own: A at the origin, its longest edge AB along u, C above it at
-/// (cx, cy). The distance of a point then reduces to a problem in the plane plus a height
-/// [Jones95]. A triangle without area reduces to its longest edge or to a point.
+/// A triangle in its own orthonormal frame (u, v, n): corner A at the origin, the longest edge AB
+/// along u, corner C at (cx, cy) with cy ≥ 0. The squared distance of a point is the squared
+/// distance in the plane plus the squared height above it [Jones95]. A triangle without area counts
+/// as its longest edge or as a point.
 class TriangleFrame {
  public:
   TriangleFrame() = default;
@@ -24,23 +25,25 @@ class TriangleFrame {
  private:
   Imath::V3d a_, u_, v_, n_;
   double length_ = 0, cx_ = 0, cy_ = 0;
-  double inverseAc_ = 0, inverseBc_ = 0;  // 1 / squared length; 0 for a point
+  double inverseAc_ = 0, inverseBc_ = 0;  // 1 / squared length of AC and BC; 0 if the length is 0
 };
 
-/// Edge length of a block in grid points: a leaf node of the tree.
+/// Edge length, in grid points, of a block: a leaf node of the OpenVDB tree.
 inline constexpr int kBlockDim = 8;
 inline constexpr int kBlockVoxels = kBlockDim * kBlockDim * kBlockDim;
 
-/// Distances of the 8³ grid points of a block to the nearest of given triangles. Distances are
-/// exact up to `reach`. Cells of 4³ and 2³ points pass on only the triangles that can be nearest to
-/// one of their points, by bounding spheres. Reuses its scratch memory between blocks.
+/// Distances, in voxels, from the 8³ grid points of a block to the nearest of given triangles. They
+/// are exact up to `reach`. The block is divided into cells of 4³, then of 2³ points. Bounding
+/// spheres exclude the triangles that cannot be nearest to any point of a cell. Reuses its scratch
+/// memory between blocks.
 class BlockDistance {
  public:
   explicit BlockDistance(double reach) : reach_(reach) {}
 
   /// @param candidates  triangles, including all within reach of the block
   /// @param origin  lowest grid point of the block
-  /// @return true when a point lies within reach; distances() then holds all distances
+  /// @return true when a grid point lies within `reach` of a triangle; else all distances are
+  ///         `reach`
   bool measure(const LocalMesh& mesh, std::span<const std::uint32_t> candidates,
                const Imath::V3d& origin);
 
@@ -48,7 +51,9 @@ class BlockDistance {
   [[nodiscard]] const std::array<double, kBlockVoxels>& distances() const { return distances_; }
 
  private:
-  struct Spheres {  // structure of arrays, so that loops over it vectorise
+  // Bounding spheres of triangles, as a structure of arrays, so that loops over it vectorise.
+  // `slot` is the index of the triangle in corners_.
+  struct Spheres {
     std::vector<float> x, y, z, radius;
     std::vector<std::uint32_t> slot;
     std::size_t size = 0;
@@ -65,8 +70,8 @@ class BlockDistance {
   Imath::V3d centre_;
   std::array<double, kBlockVoxels> distances_{};
   bool anyWithin_ = false;
-  std::array<Spheres, 3> lists_;  // lists of the block, of a 4³ cell, of a 2³ cell
-  std::vector<float> squared_;
+  std::array<Spheres, 3> lists_;  // candidates of the block, of its current 4³ cell and 2³ cell
+  std::vector<float> squared_;    // squared distances to the sphere centres
   std::vector<std::array<Imath::V3d, 3>> corners_;  // relative to the centre of the block
   std::vector<TriangleFrame> frames_;
   std::vector<char> hasFrame_;

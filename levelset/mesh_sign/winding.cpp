@@ -33,7 +33,8 @@ V3d centroid(const WeightedTriangle& t) {
   return (t.corners[0] + t.corners[1] + t.corners[2]) / 3;
 }
 
-/// Area of the triangle divided by the smallest possible squared distance to a point of the ball.
+/// Bound on the triangle's winding number at all points of the ball: its area, divided by 4π times
+/// the smallest possible squared distance.
 double boundOf(const WeightedTriangle& t, const V3d& centre, double radius) {
   const V3d middle = centroid(t);
   double reach = 0;
@@ -54,7 +55,8 @@ double solidAngle(const V3d& a, const V3d& b, const V3d& c, const V3d& point) {
   const double lu = u.length(), lv = v.length(), lw = w.length();
   const double numerator = u.dot(v.cross(w));
   const double denominator = lu * lv * lw + u.dot(v) * lw + v.dot(w) * lu + w.dot(u) * lv;
-  if (numerator == 0 && denominator <= 0) return 0;  // on the triangle: between its two sides
+  // On the triangle, return the mean of the values on its two sides, ±1/2.
+  if (numerator == 0 && denominator <= 0) return 0;
   return std::atan2(numerator, denominator) * 2 * kQuarterPi;
 }
 
@@ -112,7 +114,8 @@ void WindingField::build(std::size_t begin, std::size_t end) {
   build(middle, end);
 }
 
-/// First-order expansion of ∫ n · (y − x) / |y − x|³ about the node's centre.
+/// Winding number of a far node at x = `point`: 1/4π times the first-order expansion of the
+/// integral ∫ n · (y − x) / |y − x|³ over the triangles, about the node's centre.
 double WindingField::far(const Node& node, const V3d& point) const {
   const V3d r = node.centre - point;
   const double inverse2 = 1 / r.length2(), inverse3 = inverse2 * std::sqrt(inverse2);

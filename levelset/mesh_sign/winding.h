@@ -14,23 +14,24 @@ namespace levelset::convert {
 [[nodiscard]] double solidAngle(const Imath::V3d& a, const Imath::V3d& b, const Imath::V3d& c,
                                 const Imath::V3d& point);
 
-/// A triangle with a multiplicity.
+/// A triangle whose solid angle counts `weight` times.
 struct WeightedTriangle {
   std::array<Imath::V3d, 3> corners;
   double weight = 1;
 };
 
-/// Winding number of a set of triangles. Far clusters enter by their dipole and its first moment
-/// [Barill18]. Each cluster has an error bound, so that a value meets the requested tolerance.
+/// Winding number of a set of triangles. A tree groups the triangles into clusters. Far clusters
+/// enter by their dipole and its first moment [Barill18]. Each cluster has an error bound, so that
+/// a value meets the requested tolerance.
 class WindingField {
  public:
   WindingField() = default;
   explicit WindingField(std::vector<WeightedTriangle> triangles);
 
   [[nodiscard]] bool isEmpty() const { return triangles_.empty(); }
-  /// Exact value, by direct summation in tree order.
+  /// Winding number at `point`, by direct summation over all triangles.
   [[nodiscard]] double exact(const Imath::V3d& point) const;
-  /// Value within `tolerance` of the exact one.
+  /// Winding number at `point`, with an error of at most `tolerance`.
   [[nodiscard]] double within(double tolerance, const Imath::V3d& point) const;
   /// Bound on the magnitude of the winding number at all points of the ball. Infinite near the
   /// triangles.
@@ -38,13 +39,14 @@ class WindingField {
 
  private:
   struct Node {
-    Imath::V3d centre;                 // area-weighted mean
+    Imath::V3d centre;                 // area-weighted mean of the triangles' centroids
     Imath::V3d dipole;                 // Σ area · normal
-    std::array<Imath::V3d, 3> moment;  // row k: Σ area · normal · (y − centre)ₖ
-    double area = 0, spread = 0;       // Σ |area|, Σ |area| · max |y − centre|²
-    double radius = 0;
-    std::size_t begin = 0, end = 0;
-    std::size_t right = 0;  // the left child follows its parent; 0 for a leaf
+    std::array<Imath::V3d, 3> moment;  // row k: Σ area · normal · (centroid − centre)ₖ
+    // Σ |area|, and Σ |area| · max |corner − centre|²
+    double area = 0, spread = 0;
+    double radius = 0;               // distance from the centre to the farthest corner
+    std::size_t begin = 0, end = 0;  // range of triangles_
+    std::size_t right = 0;           // right child, 0 for a leaf; the left child follows its parent
   };
   void build(std::size_t begin, std::size_t end);
   [[nodiscard]] Node summarise(std::size_t begin, std::size_t end) const;
