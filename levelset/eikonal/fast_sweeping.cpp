@@ -43,7 +43,7 @@ int parityOf(const Coord& origin) {
   return ((origin.x() >> 3) & 1) * 4 + ((origin.y() >> 3) & 1) * 2 + ((origin.z() >> 3) & 1);
 }
 
-/// State of a block during sweeping, beside its times.
+/// State of a block during sweeping; ArrivalBlock holds its times.
 struct BlockState {
   float earliest = kFar;  ///< time of the earliest change not yet processed; kFar: block is clean
   bool seen = false;      ///< the first-order solver processed the block before

@@ -49,8 +49,8 @@ struct UpwindTerms {
   }
 };
 
-/// Solves Σ weight (u − value)² = slowness² − known for the arrival time u, with the slowness in
-/// time per voxel. Leaves out axes whose values are later than the time from the earlier axes
+/// Solves Σ weight (u − value)² = slowness² − terms.known for the arrival time u, with the slowness
+/// in time per voxel. Leaves out axes whose values are later than the time from the earlier axes
 /// [Sethian99, Zhao05].
 [[nodiscard]] inline double solveUpwind(const UpwindTerms& terms, double slowness) {
   const double base = terms.term[0].value,

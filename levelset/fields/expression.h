@@ -5,9 +5,10 @@
 
 #include "levelset/fields/field.h"
 
-/// Fields given by formulas in x, y, z (world units) and r = |(x, y, z)|, in t (time), or in all of
-/// them. The grammar is muParser's: + − * / ^, comparison, ?:, &&, ||, sin … atan2, exp, ln, sqrt,
-/// min, max, abs, sign, rint, sum, avg; and `pi`. A formula with any other variable is refused.
+/// Fields given by formulas. Their variables are x, y, z (world units) and r = |(x, y, z)|, or t
+/// (time), or all five. The grammar is muParser's: + − * / ^, comparison, ?:, &&, ||, sin … atan2,
+/// exp, ln, sqrt, min, max, abs, sign, rint, sum, avg; and `pi`. A formula with any other variable
+/// is refused.
 namespace levelset {
 
 /// Parses one formula in x, y, z, r.

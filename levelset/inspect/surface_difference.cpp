@@ -89,7 +89,7 @@ class SampleScan {
 
 /// Divides a triangle into parts with sides of at most `spacing` and measures the distances of
 /// their midpoints.
-/// @return the largest of these distances, those near creases excepted
+/// @return the largest of these distances, without those near creases
 double visitMiddles(const V3d& a, const V3d& b, const V3d& c, double spacing, SampleScan& scan) {
   const double longest =
       std::sqrt(std::max({(b - a).length2(), (c - b).length2(), (a - c).length2()}));

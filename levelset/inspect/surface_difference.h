@@ -41,7 +41,7 @@ struct SurfaceDifferenceOptions {
 /// Differences of two surfaces, world units.
 struct SurfaceDifference {
   double smooth = 0;       ///< two-sided Hausdorff distance of the samples away from creases
-  double crease = 0;       ///< the same distance of the samples near creases
+  double crease = 0;       ///< two-sided Hausdorff distance of the samples near creases
   double creaseShare = 0;  ///< fraction of the samples that lie near creases
 };
 
