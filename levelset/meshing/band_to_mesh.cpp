@@ -21,7 +21,7 @@ void validate(const NarrowBand& band, const BandToMeshOptions& options) {
   }
   if (!options.openSurface) requireSolid(band);
   if (band.isEmpty()) {
-    throw InvalidInput("the band is empty, so there is no surface; check the steps before it");
+    throw InvalidInput("the band is empty and has no surface; check the action that computed it");
   }
 }
 
@@ -46,8 +46,8 @@ TriMesh bandToMesh(const NarrowBand& band, const BandToMeshOptions& options) {
   const CellSurface surface(vdb(band));
   if (!surface.triangleCount()) {
     throw InvalidInput(
-        "the band has no zero crossing, so there is no surface; check the steps "
-        "before it");
+        "the band has no zero crossing and so no surface; check the action that "
+        "computed it");
   }
   report(options.progress, 0.3);
   IndexMesh mesh =

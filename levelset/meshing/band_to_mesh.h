@@ -9,21 +9,24 @@
 namespace levelset {
 
 struct BandToMeshOptions {
-  double adaptivity = 0;  ///< [0, 1]: tolerance of coarsening, voxels; 0 keeps the uniform mesh
-  /// Keeps the edges and corners that the field implies [Ju02]; excludes adaptivity.
+  /// Tolerance of the coarsening of flat parts, voxels, in [0, 1]; 0 keeps the uniform mesh.
+  double adaptivity = 0;
+  /// Reconstructs the edges and corners that the field implies [Ju02]. Not possible together with
+  /// an adaptivity above 0.
   bool sharp = false;
-  bool openSurface = false;  ///< accepts open surfaces, closed with walls at their cut
+  /// Accepts the band of an open surface. Its mesh is closed by walls where the band was cut off.
+  bool openSurface = false;
   Progress progress = {};
 };
 
 /// Converts the zero set to a triangle mesh that faces outwards. The mesh is closed and 2-manifold
 /// when the zero set is closed.
 /// @return vertices on the zero set of the trilinear interpolant to second order in the voxel size
-/// @throws InvalidInput if the band is empty, or an open surface
+/// @throws InvalidInput if the band is empty, or an open surface without `openSurface`
 /// @throws UsageError for options out of range
 [[nodiscard]] TriMesh bandToMesh(const NarrowBand& band, const BandToMeshOptions& options = {});
 
-/// The operator `mesh` of a band.
+/// The operator `mesh` for bands.
 struct MeshOperator {
   static const OperatorText text;
   static constexpr ErrorModel errorModel{2, kTriangleError, 0, "shapes"};
@@ -34,11 +37,11 @@ struct MeshOperator {
 
     template <class Visitor>
     static void describe(Visitor& visit) {
-      visit(
-          "adaptivity", &Options::adaptivity,
-          {.help = "0 to 1: how far flat parts are coarsened", .range = OptionRange::NonNegative});
+      visit("adaptivity", &Options::adaptivity,
+            {.help = "tolerance of the coarsening of flat parts, 0 to 1 voxel; 0: none",
+             .range = OptionRange::NonNegative});
       visit("sharp", &Options::sharp,
-            {.help = "keep the edges and corners that the field implies"});
+            {.help = "reconstruct the sharp edges and corners that the field implies"});
     }
   };
 

@@ -18,7 +18,7 @@ using openvdb::FloatTree;
 using LeafNode = FloatTree::LeafNodeType;
 
 constexpr int kSide = 8;
-constexpr std::uint64_t kLowZ = 0x0101010101010101ull;  ///< z = 0 of a slab
+constexpr std::uint64_t kLowZ = 0x0101010101010101ull;  ///< bits of a slab's points with z = 0
 
 Coord shifted(const Coord& origin, unsigned side) {
   return origin.offsetBy(side & 4 ? kSide : 0, side & 2 ? kSide : 0, side & 1 ? kSide : 0);
@@ -28,7 +28,8 @@ Coord lowered(const Coord& origin, unsigned side) {
   return origin.offsetBy(side & 4 ? -kSide : 0, side & 2 ? -kSide : 0, side & 1 ? -kSide : 0);
 }
 
-/// Shifts a slab: bit (y, z) of the result is bit (y, z + 1) of the slab, or of the slab beyond it.
+/// Shifts a slab: bit (y, z) of the result is bit (y, z + 1) of the slab, and for z = 7 bit (y, 0)
+/// of `beyond`, the slab of the next block along z.
 std::uint64_t shiftZ(std::uint64_t slab, std::uint64_t beyond) {
   return ((slab >> 1) & ~(kLowZ << 7)) | ((beyond & kLowZ) << 7);
 }
@@ -65,7 +66,7 @@ void sortUnique(std::vector<Coord>& coords) {
   coords.erase(std::unique(coords.begin(), coords.end()), coords.end());
 }
 
-/// Returns the blocks without a leaf on both sides of every face where tiles of opposite sign meet.
+/// Returns the origins of the blocks without a leaf that meet at a face with opposite signs.
 std::vector<Coord> blocksBetweenTiles(const FloatGrid& grid) {
   std::vector<Coord> found;
   FloatGrid::ConstAccessor accessor = grid.getConstAccessor();
@@ -101,8 +102,8 @@ CellSurface::CellSurface(const FloatGrid& grid) : grid_(grid) {
   numberAll();
 }
 
-/// Collects the leaves, and the tiles beside them that hold a cell with corners of both signs. A
-/// cell belongs to the block of its lowest corner, which may be a tile.
+/// Collects the leaves, and the blocks in tiles that contain a cell with corners of both signs. A
+/// cell belongs to the block of its lowest corner, which may lie in a tile.
 void CellSurface::collectBlocks() {
   const FloatTree& tree = grid_.tree();
   blocks_.reserve(tree.leafCount());
@@ -123,7 +124,8 @@ void CellSurface::collectBlocks() {
   for (const SurfaceBlock& block : blocks_) addBelow(block.origin, 1);
   for (const Coord& origin : blocksBetweenTiles(grid_)) addBelow(origin, 0);
   sortUnique(candidates);
-  // A tile can hold such cells only if some value beside it has another sign.
+  // A block in a tile contains such a cell only if a neighbour in positive direction has a value of
+  // the other sign at their common border.
   for (const Coord& origin : candidates) {
     const float fill = accessor.getValue(origin);
     bool mixed = false;
@@ -147,8 +149,8 @@ void CellSurface::collectBlocks() {
     block.fill = fill;
     blocks_.push_back(block);
   }
-  // Order the blocks as a tree orders its leaves. A block may be a leaf or not, depending on the
-  // width of the band. The triangles must not depend on that.
+  // Order the blocks as a tree orders its leaves. Whether a block is a leaf depends on the width of
+  // the band, and the order of the triangles must not depend on that width.
   std::sort(blocks_.begin(), blocks_.end(), [](const SurfaceBlock& a, const SurfaceBlock& b) {
     for (const int nodeSide : {4096, 128, kSide}) {
       const Coord first = a.origin & -nodeSide, second = b.origin & -nodeSide;
@@ -160,7 +162,7 @@ void CellSurface::collectBlocks() {
 
 void CellSurface::linkBlocks() {
   if (blocks_.size() >= kNoBlock)
-    throw ResourceLimit("the band has more than 4294967294 leaves; use larger voxels");
+    throw ResourceLimit("the surface passes more than 4294967294 blocks; use larger voxels");
   std::unordered_map<Coord, std::uint32_t, OriginHash> indexOf;
   indexOf.reserve(blocks_.size());
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
@@ -185,8 +187,8 @@ std::uint64_t CellSurface::insideWord(const SurfaceBlock& block, unsigned side, 
   return block.neighbourFill[side] < 0 ? ~0ull : 0;
 }
 
-/// Returns the signs of slab x in [0, 8], by dy·2 + dz: unshifted, shifted by one along z, along y,
-/// and along both.
+/// Returns the inside masks of slab x in [0, 8], by dy·2 + dz: unshifted, shifted by one along z,
+/// along y, and along both.
 CellSurface::Slab CellSurface::slabWords(const SurfaceBlock& block, int x) const {
   const unsigned far = x == kSide ? 4 : 0;
   const int slab = x & (kSide - 1);
@@ -232,7 +234,7 @@ void CellSurface::numberAll() {
     cycleCount_ += block.cycleCount;
   }
   if (vertexCount_ > std::numeric_limits<std::uint32_t>::max()) {
-    throw ResourceLimit("the surface needs more than 4294967296 vertices; use larger voxels");
+    throw ResourceLimit("the surface needs more than 4294967295 vertices; use larger voxels");
   }
 }
 
@@ -262,8 +264,9 @@ std::uint32_t CellSurface::vertexOf(const SurfaceBlock& block, int x, int y, int
 
 namespace {
 
-/// Least distance, in voxels, between a crossing and a grid point with other crossings. It is far
-/// above the spacing of floats in a file, and far below any accuracy of the field.
+/// Least distance, in voxels, of a vertex from a grid point at which other crossed edges meet. It
+/// is far above the rounding of single-precision coordinates in a mesh file, and far below the
+/// accuracy of any field.
 constexpr double kCornerGuard = 1e-4;
 
 bool hasOtherCrossing(const CellSurface& surface, const Coord& point, const Coord& along) {
@@ -286,7 +289,7 @@ openvdb::Vec3d crossingPoint(const CellSurface& surface, const SurfaceBlock& blo
   const double high = static_cast<double>(
       surface.valueAt(block, x + (axis == 0), y + (axis == 1), z + (axis == 2)));
   double t = low / (low - high);
-  if (!(t >= 0 && t <= 1)) t = 0.5;  // the values are NaN
+  if (!(t >= 0 && t <= 1)) t = 0.5;  // a value is NaN or infinite
   const Coord point = block.origin.offsetBy(x, y, z);
   if (t < kCornerGuard || t > 1 - kCornerGuard) {
     Coord beyond = point;

@@ -1,7 +1,7 @@
 #pragma once
 
-// Cells that the zero set passes, block by block. Internal header of levelset: public headers must
-// not include it.
+// Grid cells that the zero set passes through, block by block. Internal header of levelset: public
+// headers must not include it.
 
 #include <array>
 #include <cstdint>
@@ -12,32 +12,36 @@
 
 namespace levelset {
 
-/// Block of 8³ grid points, with the cells and edges whose lowest corner is one of them. Bit y·8 +
-/// z of word x stands for a grid point, as in OpenVDB's masks. Not a padded copy: all blocks exist
-/// at once, so each refers to its leaf and its neighbours.
+/// Block of 8³ grid points, with the cells and edges whose lowest corner is one of them. In the bit
+/// masks, bit y·8 + z of word x stands for a grid point, as in OpenVDB. The values are not copied:
+/// all blocks exist at once, so each refers to its leaf and to its neighbours.
 struct SurfaceBlock {
   openvdb::Coord origin;
-  const float* values = nullptr;  ///< values of the leaf; null: `fill` everywhere
+  const float* values = nullptr;  ///< values of the leaf; null: a tile with the value `fill`
   float fill = 0;
-  std::array<std::uint32_t, 8> neighbour = {};  ///< by dx·4 + dy·2 + dz; [0] is the block itself
-  std::array<float, 8> neighbourFill = {};      ///< value of a neighbour that has no block
+  /// Indices of the blocks at the offset (dx, dy, dz) of 0 or 1 blocks, by dx·4 + dy·2 + dz;
+  /// CellSurface::kNoBlock if there is none. [0] is the block itself.
+  std::array<std::uint32_t, 8> neighbour = {};
+  std::array<float, 8> neighbourFill = {};  ///< value of a neighbour that has no block
   std::array<std::uint64_t, 8> inside = {};
   std::array<std::uint64_t, 24> crossed = {};  ///< [x·3 + axis]: edges with a change of sign
-  std::array<std::uint16_t, 24> rank = {};     ///< number of crossed edges before that word
+  std::array<std::uint16_t, 24> rank =
+      {};  ///< number of crossed edges in the words before this one
   std::size_t firstVertex = 0, vertexCount = 0;
   std::size_t firstTriangle = 0, triangleCount = 0;
-  std::size_t firstCycle = 0, cycleCount = 0;  ///< polygons of the table, for dual meshes
+  /// Polygons of the cell table in this block's cells. A dual mesh has one vertex for each.
+  std::size_t firstCycle = 0, cycleCount = 0;
   [[nodiscard]] float value(int offset) const { return values ? values[offset] : fill; }
 };
 
-/// All cells and edges with corners of both signs.
-/// Their order depends on the grid alone: leaves in tree order, then further blocks by position. A
-/// grid point with φ < 0 is inside. Outside the leaves the tiles give the values, so a band that
-/// was cut open still yields a closed surface.
+/// All cells and edges of a grid whose corners have both signs, in blocks.
+/// The blocks are ordered by position, as OpenVDB orders leaves, whether they are leaves or tiles.
+/// A grid point with φ < 0 is inside. Outside the leaves the tiles give the values, so a band that
+/// was cut off at a box still yields a closed surface.
 class CellSurface {
  public:
-  /// Collects, links and numbers the blocks.
-  /// @throws ResourceLimit when a triangle mesh of the surface needs more than 2³² vertices
+  /// Collects the blocks, links them to their neighbours, and numbers vertices and triangles.
+  /// @throws ResourceLimit when the blocks or the vertices of the surface exceed 32-bit indices
   explicit CellSurface(const openvdb::FloatGrid& grid);
 
   static constexpr std::uint32_t kNoBlock = 0xffffffffu;
@@ -47,18 +51,19 @@ class CellSurface {
   [[nodiscard]] std::size_t triangleCount() const { return triangleCount_; }
   [[nodiscard]] std::size_t cycleCount() const { return cycleCount_; }
 
-  /// Returns the sign words of the corners of all cells with lowest corner in slab x, by corner
-  /// number.
+  /// Returns, for each of the eight corners of a cell, the bit mask of the cells in slab x for
+  /// which this corner is inside.
   [[nodiscard]] std::array<std::uint64_t, 8> cornerWords(const SurfaceBlock& block, int x) const;
   /// Returns the value at a grid point relative to the block, each coordinate in [0, 8].
   [[nodiscard]] float valueAt(const SurfaceBlock& block, int x, int y, int z) const;
   /// Returns true when the grid point is inside. Accepts any point; slow.
   [[nodiscard]] bool isInside(const openvdb::Coord& point) const;
-  /// Returns the number of the crossed edge `edge` of the cell (x, y, z).
+  /// Returns the number of the vertex on the crossed edge `edge` of the cell (x, y, z).
   [[nodiscard]] std::uint32_t vertexOf(const SurfaceBlock& block, int x, int y, int z,
                                        int edge) const;
 
-  /// Calls visit(x, y, z, pattern) for each cell of the block with corners of both signs.
+  /// Calls visit(x, y, z, pattern) for each cell of the block with corners of both signs. Bit c of
+  /// `pattern` is set when corner c is inside.
   template <typename Visit>
   void forEachCell(const SurfaceBlock& block, Visit&& visit) const {
     for (int x = 0; x < 8; ++x) {
@@ -76,7 +81,8 @@ class CellSurface {
     }
   }
 
-  /// Calls visit(x, y, z, axis) for each crossed edge that the block owns, in the order of numbers.
+  /// Calls visit(x, y, z, axis) for each crossed edge that starts at a grid point of the block, in
+  /// the order of vertex numbers.
   template <typename Visit>
   static void forEachVertex(const SurfaceBlock& block, Visit&& visit) {
     for (int word = 0; word < 24; ++word) {
@@ -102,16 +108,18 @@ class CellSurface {
   std::size_t vertexCount_ = 0, triangleCount_ = 0, cycleCount_ = 0;
 };
 
-/// Returns the zero of linear interpolation on a crossed edge, in index space. It keeps a small
-/// distance from a grid point where other edges cross too, so that no two vertices coincide.
+/// Returns the zero of the linear interpolation on a crossed edge, in index space. The zero keeps a
+/// small distance from an end of the edge at which further crossed edges meet, so that no two
+/// vertices coincide.
 [[nodiscard]] openvdb::Vec3d crossingPoint(const CellSurface& surface, const SurfaceBlock& block,
                                            int x, int y, int z, int axis);
 
-/// Uniform mesh in index space: marching cubes with the polygons of the table [Lor87].
+/// Triangle mesh in index space.
 struct IndexMesh {
   std::vector<openvdb::Vec3d> positions;
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
+/// Builds the uniform mesh by marching cubes [Lor87], with the polygons of cell_table.h.
 [[nodiscard]] IndexMesh marchCells(const CellSurface& surface);
 
 }  // namespace levelset

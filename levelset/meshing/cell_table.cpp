@@ -73,8 +73,9 @@ double squaredDistance(int a, int b) {
   return sum;
 }
 
-/// Splits polygon[first … last] with the shortest diagonals. No diagonal may lie in a face of the
-/// cell. The cell beyond the face could use the same one, and four triangles would meet there.
+/// Splits a polygon into triangles with the shortest diagonals. No diagonal may lie in a face of
+/// the cell: the cell beyond the face could use the same diagonal, and four triangles would meet at
+/// it. cost() and emit() treat the part of the polygon from vertex `first` to vertex `last`.
 class PolygonSplit {
  public:
   explicit PolygonSplit(const std::vector<int>& polygon) : polygon_(polygon) {}

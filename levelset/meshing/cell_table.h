@@ -7,11 +7,11 @@
 ///
 /// Corner = dx·4 + dy·2 + dz. Edge = axis·4 + k, where k's two bits are the offsets along the axes
 /// axis+1 (high) and axis+2 (low), modulo 3.
-/// The table is computed, not copied. On each face, one segment cuts off every run of inside
-/// corners, so inside corners that share only a diagonal stay apart. Both cells at a face have the
-/// same segments. Hence the surface is closed, and each of its vertices lies in one ring of
-/// polygons. The inside is connected along grid edges, the outside also across the diagonals of
-/// faces.
+/// The table is computed when it is first used. On each face of a cell, one segment cuts off every
+/// run of adjacent inside corners, so inside corners that share only a diagonal stay apart. Both
+/// cells at a face have the same segments. Hence the surface is closed, and the polygons around
+/// each of its vertices form one ring. The inside is connected along grid edges, the outside also
+/// across the diagonals of faces.
 namespace levelset {
 
 struct CellCase {
@@ -19,14 +19,15 @@ struct CellCase {
   std::array<std::uint8_t, 4> cycleLength = {};
   /// Edges of all polygons, one after the other, counter-clockwise seen from outside.
   std::array<std::uint8_t, 12> cycleEdges = {};
-  /// Polygon through the edge; −1: the edge is not crossed.
+  /// Index of the polygon with a vertex on the edge; −1: the edge is not crossed.
   std::array<std::int8_t, 12> cycleOfEdge = {};
   std::uint8_t triangleCount = 0;
-  /// Triangles of the polygons, as edges.
+  /// Triangles of the polygons; each corner is the number of the edge on which it lies.
   std::array<std::array<std::uint8_t, 3>, 8> triangles = {};
 };
 
-/// Returns the cases by pattern: bit c is set when corner c is inside.
+/// Returns the surface of a cell by its pattern. Bit c of the pattern is set when corner c is
+/// inside.
 [[nodiscard]] const std::array<CellCase, 256>& cellTable();
 
 [[nodiscard]] constexpr int cornerOf(int dx, int dy, int dz) {

@@ -19,8 +19,8 @@ using HalfedgeMesh = OpenMesh::TriMesh_ArrayKernelT<DoubleTraits>;
 /// parts become fans of thousands of triangles, and each further collapse visits all of them.
 constexpr unsigned kMaxValences = 24;
 
-/// Quadric module that accepts rounding. The quadric of a flat part is zero except for rounding,
-/// and a negative priority would forbid the collapse.
+/// Quadric module that accepts rounding errors. The quadric of a flat part is zero up to rounding.
+/// If it is slightly negative, OpenMesh would forbid the collapse.
 template <typename AnyMesh>
 class FlatQuadric : public OpenMesh::Decimater::ModQuadricT<AnyMesh> {
  public:
@@ -37,7 +37,7 @@ class FlatQuadric : public OpenMesh::Decimater::ModQuadricT<AnyMesh> {
   }
 };
 
-/// Largest turn of a triangle by a collapse.
+/// Largest rotation of a triangle's normal in one collapse.
 constexpr float kMaxTurnDegrees = 45;
 
 HalfedgeMesh toHalfedges(const IndexMesh& mesh) {
@@ -84,7 +84,7 @@ IndexMesh decimate(const IndexMesh& mesh, double tolerance) {
   OpenMesh::Decimater::ModNormalFlippingT<HalfedgeMesh>::Handle turning;
   decimater.add(quadric);
   decimater.add(turning);
-  // The quadric sums squared distances, so each of them is within the bound.
+  // The quadric is the sum of the squared distances, so each distance is at most `tolerance`.
   decimater.module(quadric).set_max_err(tolerance * tolerance, false);
   decimater.module(turning).set_max_normal_deviation(kMaxTurnDegrees);
   decimater.initialize();

@@ -8,8 +8,8 @@ const OperatorText MeshOperator::text{
     .group = "Conversion",
     .summary = "turn a level set, or the space of a patch, into a closed triangle mesh",
     .details =
-        "The mesh of a patch is one closed surface of its lowest and highest particles and its "
-        "sides, or with --sheets each layer.",
+        "The mesh of a patch is one closed surface: its lowest layer, its highest layer and its "
+        "sides. With --sheets it is the separate surfaces of all layers.",
     .example = "levelsmith box --size 2,2,2 --voxel 0.1 ! mesh --sharp ! write box.ply"};
 
 void MeshOperator::check(const Options& options, const GivenOptions&) {
@@ -26,14 +26,14 @@ TriMesh MeshOperator::run(std::vector<NarrowBand> operands, const Options& optio
 }
 
 ValuePlan MeshOperator::plan(const Options&, Plans operands, const OperatorRun&) {
-  // Triangles for each square of a voxel's side; --sharp and --adaptivity make no more.
+  // Number of triangles per voxel² of surface area. --sharp and --adaptivity yield no more.
   constexpr double kTriangles = 3.35;
   const ValuePlan& solid = operands[0];
   return {.bounds = solid.bounds, .area = solid.area, .triangles = kTriangles * solid.layer()};
 }
 
-/// The ends of edges that the zero set crosses are less than a voxel from it; half a voxel more is
-/// for distances that are not exact.
+/// Requests a half width of 1.5 voxels. The ends of a grid edge that the zero set crosses are less
+/// than a voxel from it; half a voxel is added for distances that are not exact.
 RegionOfInterest MeshOperator::regionOfInterest(const Options& options, const OperatorPlans&,
                                                 std::size_t, const RegionOfInterest&) {
   if (options.sharp || options.adaptivity > 0) return {};

@@ -72,7 +72,7 @@ std::unordered_set<std::uint64_t> edgesBeside(const std::vector<PairedEdge>& edg
 EdgeFlip flipOf(const PairedEdge& edge, const std::vector<MeshTriangle>& triangles,
                 const std::unordered_set<std::uint64_t>& present) {
   const MeshTriangle &t = triangles[edge.triangle[0]], &u = triangles[edge.triangle[1]];
-  // The first triangle runs from a to b, the second from b to a.
+  // Name the ends so that the first triangle runs from a to b and the second from b to a.
   std::uint32_t a = edge.low, b = edge.high;
   for (std::size_t k = 0; k < 3; ++k)
     if (t[k] == b && t[(k + 1) % 3] == a) std::swap(a, b);

@@ -11,45 +11,48 @@ namespace levelset {
 
 using MeshTriangle = std::array<std::uint32_t, 3>;
 
-/// Mesh edge and the triangles on both sides of it.
+/// Mesh edge between the vertices `low` < `high`, and the triangles on both sides of it.
 struct PairedEdge {
   std::uint32_t low, high;
   std::array<std::size_t, 2> triangle;
-  double weight = 0;
-  bool done = false;
+  double weight = 0;  ///< order in which edges are processed: the largest weight first
+  bool done = false;  ///< true after the edge was flipped
 };
 
-/// One side of a triangle.
+/// One side of a triangle: an edge between the vertices `low` < `high`.
 struct TriangleSide {
   std::uint32_t low, high;
   std::size_t triangle;
 };
 
-/// Both triangles beside an edge after it is flipped to join the two opposite vertices.
+/// The two triangles that a flip of an edge yields. The new edge joins the vertices opposite to the
+/// old one.
 struct EdgeFlip {
   MeshTriangle left, right;
   std::uint64_t removed = 0, added = 0;  ///< edgeKey of the removed and of the added edge
   bool isPossible = false;
 };
 
+/// Number that identifies the edge between two vertices, in either order.
 [[nodiscard]] std::uint64_t edgeKey(std::uint32_t a, std::uint32_t b);
-/// Marks the vertices of the chosen triangles. Scans of an entire mesh test this first, since few
-/// vertices are marked.
+/// Marks the vertices of the chosen triangles. Loops over an entire mesh test these marks first,
+/// since few vertices have one.
 [[nodiscard]] std::vector<bool> markVertices(const std::vector<MeshTriangle>& triangles,
                                              const std::vector<std::size_t>& chosen,
                                              std::size_t vertexCount);
-/// Adds the sides of the chosen triangles, once for each of the two triangles beside them.
+/// Adds each edge of the chosen triangles to `sides`, once for each of the two triangles beside it.
 void addSides(const std::vector<MeshTriangle>& triangles, const std::vector<std::size_t>& chosen,
               std::size_t vertexCount, std::vector<TriangleSide>& sides);
-/// Pairs the sides of a closed mesh into edges, in rising order. Both sides of each edge must be in
-/// `sides`.
+/// Pairs the triangle sides of a closed mesh into edges, ordered by vertex indices. `sides` must
+/// contain each edge once for each of the two triangles beside it; repeats are ignored.
 [[nodiscard]] std::vector<PairedEdge> pairSides(std::vector<TriangleSide> sides);
-/// Returns all mesh edges between vertices that a flip of one of the edges could join.
+/// Returns the keys of all mesh edges between vertices that a flip of one of `edges` could join.
 [[nodiscard]] std::unordered_set<std::uint64_t> edgesBeside(
     const std::vector<PairedEdge>& edges, const std::vector<MeshTriangle>& triangles,
     std::size_t vertexCount);
 /// Computes the flip of an edge.
-/// @param present  edges of the mesh beside it; a flip must not create one of them again
+/// @param present  keys from edgesBeside. The flip is impossible if the mesh already has the new
+/// edge.
 [[nodiscard]] EdgeFlip flipOf(const PairedEdge& edge, const std::vector<MeshTriangle>& triangles,
                               const std::unordered_set<std::uint64_t>& present);
 void applyFlip(const EdgeFlip& flip, const PairedEdge& edge, std::vector<MeshTriangle>& triangles,
