@@ -14,7 +14,7 @@ namespace levelset {
 class ProgressGate {
  public:
   ProgressGate(const Progress& progress, std::size_t total)
-      : progress_(progress), total_(static_cast<double>(total ? total : 1)), action_() {}
+      : progress_(progress), total_(static_cast<double>(total ? total : 1)) {}
 
   /// Adds finished items to the count and reports the fraction of `total`.
   /// @throws Cancelled
@@ -30,7 +30,6 @@ class ProgressGate {
  private:
   const Progress& progress_;
   double total_;
-  const char* action_;
   std::atomic<std::size_t> done_{0};
   std::mutex mutex_;
 };

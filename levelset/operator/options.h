@@ -72,7 +72,7 @@ struct NoOptions {
 
 /// Half width of an operator's result, which is that of its operand by default.
 inline constexpr OptionInfo kResultHalfWidth{
-    .help = "half width of the result, in voxels; default: as before",
+    .help = "half width of the result, in voxels; default: that of the operand",
     .range = OptionRange::Positive};
 
 /// Half width of a new band.

@@ -117,7 +117,8 @@ bool checkOrientation(const NarrowBand& base, const std::array<V3d, 4>& given,
   if (area < 0 && !mirror) {
     throw UsageError(
         fmt::format("the corners are in clockwise order seen from outside, which mirrors the "
-                    "texture; give them as \"{} {} {} {}\", or give --mirror",
+                    "texture; give them as \"{} {} {} {}\", or accept it with --mirror "
+                    "(patch-grid: --mirrored)",
                     pointAsOption(given[0]), pointAsOption(given[3]), pointAsOption(given[2]),
                     pointAsOption(given[1])));
   }
