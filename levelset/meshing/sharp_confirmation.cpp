@@ -14,14 +14,18 @@ namespace {
 
 using openvdb::Vec3d;
 
-/// Largest distance of a feature vertex from the planes of its faces, voxels.
+/// Largest distance of a feature (a vertex with several sheets) from the planes of its sheets,
+/// voxels.
 constexpr double kMisfit = 0.1;
-/// Ring around a feature in which the surface must be as flat as its faces: distances in voxels.
+/// Inner and outer radius, voxels, of the ring around a feature in which the surface must lie in
+/// the planes of the feature's sheets.
 constexpr double kRingBegin = 0.8, kRingEnd = 2.3;
-/// Largest part of the ring that may turn away from the faces, and the turn that counts, as a share
-/// of the angle between them. On a round surface the normal continues to turn.
+/// Largest share of the ring's area that may deviate from the sheets. A triangle deviates if its
+/// normal differs from those of the sheets by more than the share kTurn of the angle between the
+/// sheets. On a round surface most of the ring deviates, since the normal continues to turn.
 constexpr double kOddPart = 0.15, kTurn = 0.35;
-/// Largest distance of the rest of the ring from the planes of the faces, voxels.
+/// A triangle of the ring also deviates if it is further than this from the plane of its sheet,
+/// voxels.
 constexpr double kOffFace = 0.35;
 /// A vertex further than this, in voxels, from a plane to which it was fitted is torn: two surfaces
 /// run through its cell, and it lies on neither.
@@ -29,21 +33,21 @@ constexpr double kTorn = 0.3;
 /// A sheet is flat where second differences, in voxels, are below this share of the feature's angle
 /// in radians.
 constexpr double kFlatBend = 0.06;
-/// Planes with larger second differences than kBent, voxels, are replaced by planes nearby whose
-/// second differences are smaller by the factor kFlatter.
+/// A plane from a part of the field with second differences above kBent, voxels, is replaced by a
+/// plane nearby. The second differences there must be smaller by the factor kFlatter.
 constexpr double kBent = 0.005, kFlatter = 4;
-/// Both planes must belong to the same face: largest distance of the new plane from the vertex,
-/// voxels. It also limits the resulting move of the vertex.
+/// Largest distance of the replacing plane from the vertex, voxels, so that both planes belong to
+/// the same face. It also limits the resulting displacement of the vertex.
 constexpr double kSameFace = 0.3;
-/// Distance from an edge, voxels, up to which values are compared with those of a sharp edge.
+/// Distance from an edge, voxels, up to which field values are compared with those of a sharp edge.
 /// Inside a convex edge, or outside a concave one, these are distances to the nearer sheet. Beyond
 /// the edge they are distances to the edge.
 constexpr double kEdgeReach = 1.5;
-/// Tolerance of that comparison, voxels, and the part of the values that may exceed it. At a
-/// rounded right angle, values differ by up to 2/5 of the radius. Vertices within kCornerReach of a
-/// corner do not count, since a third sheet is nearer there.
+/// kRounded: tolerance of that comparison, voxels; at a rounded right angle, values differ by up to
+/// 2/5 of the radius. kRoundedPart: share of the values that may exceed the tolerance. Vertices
+/// within kCornerReach voxels of a corner do not count, since a third sheet may be nearer there.
 constexpr double kRounded = 0.06, kRoundedPart = 0.15, kCornerReach = 2;
-/// Distance along the surface, voxels, within which vertices are beside a feature.
+/// Distance, voxels, within which connected vertices count as beside a feature.
 constexpr double kBeside = 3;
 
 /// Triangles at each vertex of a mesh.
@@ -67,7 +71,7 @@ class Fans {
   std::vector<std::uint32_t> triangles_;
 };
 
-/// Returns the triangles connected to a vertex and nearer than `radius`.
+/// Returns the triangles that are connected to a vertex through vertices within `radius` of it.
 std::vector<std::uint32_t> trianglesNear(const IndexMesh& mesh, const Fans& fans,
                                          std::uint32_t vertex, double radius) {
   const Vec3d centre = mesh.positions[vertex];
@@ -84,7 +88,7 @@ std::vector<std::uint32_t> trianglesNear(const IndexMesh& mesh, const Fans& fans
   return found;
 }
 
-/// Returns the widest angle between two of the sheets.
+/// Returns the widest angle between the normals of two of the sheets, radians.
 double widestAngle(const VertexSheets& sheets) {
   double least = 1;
   for (std::size_t i = 0; i < sheets.count; ++i)
@@ -93,9 +97,9 @@ double widestAngle(const VertexSheets& sheets) {
   return std::acos(std::clamp(least, -1.0, 1.0));
 }
 
-/// Returns true when each sheet of a feature is flat somewhere near it. A round surface that turns
-/// by the same angle within one cell's planes is bent everywhere, by at least twice kFlatBend of
-/// the angle.
+/// Returns true when each sheet of a feature is flat at some vertex of the given triangles. A round
+/// surface that turns by the same angle within one cell has second differences of at least twice
+/// kFlatBend of the angle everywhere.
 bool hasFlatSheets(const IndexMesh& mesh, std::span<const std::uint32_t> triangles,
                    std::uint32_t feature, const std::vector<VertexSheets>& sheets,
                    const std::vector<SheetQuality>& quality) {
@@ -112,7 +116,7 @@ bool hasFlatSheets(const IndexMesh& mesh, std::span<const std::uint32_t> triangl
   return flat + 1 == 1u << own.count;
 }
 
-/// Returns true when the surface around a feature lies in the planes of its faces.
+/// Returns true when the surface in a ring around a feature lies in the planes of its sheets.
 bool isConfirmed(const IndexMesh& mesh, const Fans& fans, std::uint32_t vertex,
                  const VertexSheets& sheets, const std::vector<SheetQuality>& quality) {
   const double turn = std::cos(kTurn * widestAngle(sheets));
@@ -134,7 +138,7 @@ bool isConfirmed(const IndexMesh& mesh, const Fans& fans, std::uint32_t vertex,
       isIn |= cosine >= turn * size && std::abs(n.dot(middle - mesh.positions[vertex])) < kOffFace;
       isFar |= cosine < -turn * size;
     }
-    // The far side of a thin plate neither confirms nor refutes the faces.
+    // The opposite side of a thin plate neither confirms nor refutes the sheets.
     if (isFar && !isIn && !isTorn) continue;
     area += size;
     if (!isIn || isTorn) odd += size;
@@ -162,9 +166,9 @@ struct EdgeEvidence {
   }
 };
 
-/// Collects the evidence at a vertex with two sheets. Inside a convex edge, a distance field holds
-/// the distance to the nearer plane; beyond the edge, at most the distance to the edge. A concave
-/// edge is the same with the signs changed.
+/// Compares the field around a vertex with two sheets to that of a sharp edge. Inside a convex
+/// edge, the values must equal the distance to the nearer plane; beyond the edge, they must not
+/// exceed the distance to the edge. For a concave edge the same holds with the opposite signs.
 EdgeEvidence evidenceAt(const Vec3d& vertex, const VertexSheets& sheets,
                         const openvdb::FloatGrid::ConstAccessor& field, double voxelSize,
                         double halfWidth) {
@@ -178,7 +182,7 @@ EdgeEvidence evidenceAt(const Vec3d& vertex, const VertexSheets& sheets,
     const Vec3d to = c.asVec3d() - vertex;
     const double alongEdge = to.dot(along), across = (to - along * alongEdge).length();
     const double value = static_cast<double>(field.getValue(c)) / voxelSize;
-    // A value clipped at the rim of the band is no evidence.
+    // A value at the end of the band is clipped to the background and proves nothing.
     if (std::abs(alongEdge) > kEdgeReach || std::abs(value) > halfWidth * (1 - 1e-5)) continue;
     for (const int sign : {1, -1}) {
       const double d0 = sign * to.dot(n0), d1 = sign * to.dot(n1), d = sign * value;
@@ -193,7 +197,7 @@ EdgeEvidence evidenceAt(const Vec3d& vertex, const VertexSheets& sheets,
   return found;
 }
 
-/// Returns true when two edges have the same sheets.
+/// Returns true when two vertices have two sheets each, and these are the same.
 bool areSameSheets(const VertexSheets& a, const VertexSheets& b) {
   if (a.count != 2 || b.count != 2) return false;
   const auto match = [&](std::size_t i, std::size_t j) {
@@ -202,8 +206,9 @@ bool areSameSheets(const VertexSheets& a, const VertexSheets& b) {
   return (match(0, 0) && match(1, 1)) || (match(0, 1) && match(1, 0));
 }
 
-/// Returns true when the values around an edge show that it is not rounded. Vertices near a corner
-/// do not count where others exist, since a third sheet affects them.
+/// Returns true when the field values around an edge show that it is not rounded. Considers the
+/// vertices of the given triangles on the same edge as `feature`. Those near a corner count only if
+/// there are no others, since a third sheet affects the values there.
 bool isSharp(const IndexMesh& mesh, std::span<const std::uint32_t> triangles, std::uint32_t feature,
              const std::vector<VertexSheets>& sheets, const std::vector<EdgeEvidence>& evidence) {
   std::vector<std::uint32_t> edge, corners;
@@ -233,7 +238,8 @@ struct SheetEstimate {
   Vec3d normal;
 };
 
-/// Returns a better estimate of a sheet: the nearest one that is much flatter.
+/// Returns the estimate of the same sheet at the nearest vertex where the field is much flatter, or
+/// `own` if there is none.
 SheetEstimate flatterSheet(const IndexMesh& mesh, std::span<const std::uint32_t> triangles,
                            const SheetEstimate& own, const std::vector<VertexSheets>& sheets,
                            const std::vector<SheetQuality>& quality) {
@@ -327,7 +333,8 @@ std::vector<bool> confirmFeatures(IndexMesh& mesh, const openvdb::FloatGrid& fie
     if (!isEdge[v] && !(isSure[i] && sheets[v].count > 2)) near[i] = {};
     gate.advance(1);
   });
-  // Values at a corner depend on three sheets: a corner is as sharp as the edges that end there.
+  // The values at a corner depend on three sheets, so the corner is not compared itself. It is
+  // accepted if an accepted edge ends there.
   const auto touchesEdge = [&](std::uint32_t t) {
     const auto& [a, b, c] = mesh.triangles[t];
     return isEdge[a] || isEdge[b] || isEdge[c];

@@ -18,18 +18,20 @@ namespace {
 using openvdb::Vec3d;
 using Triangle = MeshTriangle;
 
-/// A mesh edge or triangle nearer than this to an edge or corner of the solid stays, voxels.
+/// A mesh edge or triangle within this distance, voxels, of the edge or corner of the solid stays
+/// as it is.
 constexpr double kFeatureTolerance = 0.01;
 /// Largest distance of a new vertex from the edge or triangle that it splits, voxels.
 constexpr double kFeatureReach = 1.5;
 /// Sheets whose normals have a larger dot product form no edge.
 constexpr double kCreaseCosine = 0.88;
-/// Number of passes. What a pass inserts can require more: a corner follows after its three edges.
+/// Largest number of passes. Vertices that a pass inserts may require others in the next pass: a
+/// corner follows after its three edges.
 constexpr int kPasses = 8;
 /// Least distance between two corners, voxels.
 constexpr double kCornerApart = 0.1;
-/// Least determinant of three normals at a corner: below it, one sheet is nearly parallel to the
-/// line of the others.
+/// Least determinant of the three unit normals at a corner. Below it, one sheet is nearly parallel
+/// to the intersection line of the other two.
 constexpr double kLeastDeterminant = 0.05;
 constexpr std::uint32_t kNoVertex = 0xffffffffu;
 
@@ -43,7 +45,7 @@ struct SheetPlane {
 struct NewVertex {
   Vec3d position;
   VertexSheets sheets;
-  double gap = 0;  ///< distance of the surface from the mesh there, voxels
+  double gap = 0;  ///< distance of the vertex from the mesh edge or triangle it splits, voxels
 };
 
 void addSheet(VertexSheets& sheets, const Vec3d& n) {
@@ -54,8 +56,8 @@ void addSheet(VertexSheets& sheets, const Vec3d& n) {
 }
 
 /// Returns the point on the intersection line of two sheets that is nearest to the middle of the
-/// segment from `a` to `b`. Each end lies on one sheet. Returns none where the sheets form no edge
-/// between both points.
+/// segment from `a` to `b`. Point `a` lies on the sheet with normal `na`, point `b` on the sheet
+/// with normal `nb`. Returns none where the sheets form no edge between both points.
 std::optional<Vec3d> creasePoint(const Vec3d& a, const Vec3d& na, const Vec3d& b, const Vec3d& nb) {
   const double cosine = na.dot(nb);
   if (cosine > kCreaseCosine || cosine < -kCreaseCosine) return std::nullopt;
@@ -104,7 +106,8 @@ class FeatureInserter {
     return sheetGap(positions_[a], sheets_[a], positions_[b], sheets_[b]);
   }
 
-  /// Returns the vertex that a mesh edge needs on an edge of the solid, or none.
+  /// Returns the vertex on an edge or corner of the solid that must split the mesh edge ab; none if
+  /// the mesh edge already follows the surface.
   [[nodiscard]] std::optional<NewVertex> edgeVertex(std::uint32_t a, std::uint32_t b) const {
     if (gapBetween(a, b) < kFeatureTolerance) return std::nullopt;
     const Vec3d &pa = positions_[a], &pb = positions_[b];
@@ -157,8 +160,8 @@ class FeatureInserter {
     return hasFeature && isKnown && !fitsSheet(t);
   }
 
-  /// Returns the corner where the sheets of some vertices meet; none unless they are three and it
-  /// is near.
+  /// Returns the corner where the sheets of the given vertices meet. Returns none unless there are
+  /// three sheets, the corner is within kFeatureReach of `near`, and no vertex lies there yet.
   [[nodiscard]] std::optional<NewVertex> cornerOf(std::span<const std::uint32_t> vertices,
                                                   const Vec3d& near) const {
     NewVertex corner;
@@ -183,7 +186,8 @@ class FeatureInserter {
     return corner;
   }
 
-  /// Returns the vertex that a triangle with valid sides needs at a corner of the solid, or none.
+  /// Returns the vertex at a corner of the solid that must split a triangle whose sides need no
+  /// vertex, or none.
   [[nodiscard]] std::optional<NewVertex> faceVertex(const Triangle& t) const {
     if (!isOffSheets(t)) return std::nullopt;
     const Vec3d &a = positions_[t[0]], &b = positions_[t[1]], &c = positions_[t[2]];
@@ -248,7 +252,7 @@ class FeatureInserter {
       all.insert(all.end(), sides[i].begin(), sides[i].end());
       faces_.insert(faces_.end(), faces[i].begin(), faces[i].end());
     }
-    // A flip may join a triangle to a corner on the other side of one of its sides.
+    // A flip of a side of such a triangle may join it to a corner vertex beyond that side.
     addSides(triangles_, faces_, positions_.size(), all);
     edges_ = pairSides(std::move(all));
     for (PairedEdge& edge : edges_) {
@@ -283,8 +287,8 @@ class FeatureInserter {
     return index;
   }
 
-  /// Inserts a vertex on each edge that still cuts across, then splits the triangles beside it.
-  /// Triangles changed by a flip wait for the next pass.
+  /// Inserts a vertex into each mesh edge that still cuts across an edge of the solid, and splits
+  /// the triangles beside it. Triangles that a flip has changed are left to the next pass.
   void splitEdges() {
     struct Cut {
       std::size_t triangle;
@@ -295,7 +299,7 @@ class FeatureInserter {
       const auto [first, second] = edge.triangle;
       if (edge.done || edge.weight == 0 || touched_[first] || touched_[second]) continue;
       const std::optional<NewVertex> found = edgeVertex(edge.low, edge.high);
-      if (!found) continue;  // another edge has taken the corner
+      if (!found) continue;  // another mesh edge has got the vertex at this corner
       const std::uint32_t vertex = add(*found);
       cuts.push_back({first, edge.low, edge.high, vertex});
       cuts.push_back({second, edge.low, edge.high, vertex});
@@ -305,7 +309,7 @@ class FeatureInserter {
     });
     for (std::size_t i = 0, end = 0; i < cuts.size(); i = end) {
       const Triangle t = triangles_[cuts[i].triangle];
-      std::array<std::uint32_t, 3> middle;  // on the side from t[k] to the next vertex
+      std::array<std::uint32_t, 3> middle;  // [k]: new vertex on the side from t[k] to t[k + 1]
       middle.fill(kNoVertex);
       for (end = i; end < cuts.size() && cuts[end].triangle == cuts[i].triangle; ++end)
         for (std::size_t k = 0; k < 3; ++k)
@@ -363,9 +367,10 @@ class FeatureInserter {
   /// Mesh edges that cut across an edge of the solid, with the distance as weight, and the sides of
   /// faces_ with weight 0.
   std::vector<PairedEdge> edges_;
-  std::vector<std::size_t> faces_;  ///< triangles in no sheet that have no cut side
-  std::map<std::array<int, 3>, std::vector<std::uint32_t>> corners_;  ///< by cell
-  bool hasChanged_ = false;                                           ///< in this pass
+  /// Triangles that lie in no sheet and of which no side cuts across an edge of the solid.
+  std::vector<std::size_t> faces_;
+  std::map<std::array<int, 3>, std::vector<std::uint32_t>> corners_;  ///< corner vertices by cell
+  bool hasChanged_ = false;    ///< true: this pass has changed the mesh
   std::vector<bool> touched_;  ///< triangles that a flip has changed in this pass
 };
 
@@ -430,7 +435,8 @@ void insertFeatures(IndexMesh& mesh, std::vector<VertexSheets>& sheets, const Pr
     mesh.triangles = std::move(rest);
     return;
   }
-  // After the repair, a triangle may lack a corner that a folded triangle had: run twice.
+  // Run twice: the repair may leave a triangle without a corner vertex, because a folded triangle
+  // had that vertex.
   for (const double begin : {0.0, 0.5}) {
     FeatureInserter(mesh, sheets, subProgress(progress, begin, begin + 0.3)).run();
     unfoldSheets(mesh, sheets, subProgress(progress, begin + 0.3, begin + 0.5));

@@ -12,8 +12,8 @@
 
 namespace levelset {
 
-/// Unit normals of the sheets that meet at a vertex; a sheet is a smooth part of the surface. One
-/// sheet on a smooth part, two on an edge, three at a corner. None: unknown.
+/// Unit normals of the sheets that meet at a vertex; a sheet is a smooth part of the surface. A
+/// vertex on a smooth part has one sheet, on an edge two, at a corner three. `count` 0: unknown.
 struct VertexSheets {
   static constexpr std::size_t kMost = 4;
   std::uint8_t count = 0;
@@ -24,12 +24,13 @@ struct VertexSheets {
   return openvdb::Vec3d(sheets.normal[i]);
 }
 
-/// Sheets whose normals have a larger dot product are the same sheet.
+/// Two sheets whose unit normals have a larger dot product count as one sheet.
 inline constexpr double kOneSheetCosine = 0.9;
 
-/// Returns true when the segment `to` runs in one sheet, from a vertex with sheet normal `n` to one
-/// with `sheets`. The chord of a round face is perpendicular to the mean of the normals at its
-/// ends.
+/// Returns true when a segment runs in one sheet. It starts at a vertex with a sheet of normal `n`
+/// and ends at a vertex with the sheets `sheets`. The chord of a round face is perpendicular to the
+/// mean of the normals at its ends.
+/// @param to  vector from start to end, voxels
 [[nodiscard]] inline bool isInSheet(const openvdb::Vec3d& n, const openvdb::Vec3d& to,
                                     const VertexSheets& sheets) {
   constexpr double kOff = 0.03;  // voxels
@@ -41,19 +42,20 @@ inline constexpr double kOneSheetCosine = 0.9;
   return false;
 }
 
-/// Accuracy of the planes to which a vertex was fitted.
+/// Accuracy of the tangent planes to which a vertex was fitted.
 struct SheetQuality {
   double misfit = 0;  ///< largest distance of the vertex from a plane, voxels
-  double bend = 1;    ///< largest second difference of the values that define the planes, voxels
+  double bend = 1;    ///< largest second difference of the field where the planes come from, voxels
 };
 
 /// Finds the vertices near confirmed edges of the solid and moves them onto the edges.
 /// An edge is confirmed when three conditions hold. A vertex has several sheets, the surface around
 /// it lies in these, and each sheet is somewhere much flatter than a round surface that turns as
-/// far. Smooth surfaces have no such edges, whatever their curvature. Edges rounded by a voxel or
-/// more have none either: the values beside them are not those of the planes.
-/// A vertex moves to the point where the planes of its sheets meet. The planes come from the
-/// flattest parts nearby, since an edge bends the values at the grid points next to it.
+/// far. On a smooth surface no edge is confirmed, whatever its curvature. Edges that are rounded by
+/// a voxel or more are not confirmed either: the values beside them differ from the distances to
+/// the planes. A vertex moves to the point where the planes of its sheets meet. The planes come
+/// from the flattest parts nearby, since the field is not linear at the grid points next to an
+/// edge.
 /// @param field    field whose zero set the mesh is
 /// @param sheets   one for each vertex
 /// @param quality  one for each vertex

@@ -16,19 +16,20 @@ using Eigen::Vector3d;
 using openvdb::Coord;
 using openvdb::FloatGrid;
 
-/// Largest distance of a vertex without sheets from those of its neighbours, and from their
-/// intersection, voxels.
+/// Largest distance of a vertex without sheets from a neighbour's sheet that it adopts, and from
+/// the intersection of the adopted sheets, voxels.
 constexpr double kAdoptReach = 1.25;
-/// Least distance between vertices, voxels.
+/// A vertex is not moved to a point within this distance of another vertex, voxels.
 constexpr double kApart = 0.05;
-/// Diagonals whose gaps differ by less, voxels, are equally good.
+/// Diagonals of a quadrilateral whose sheetGap differs by less, voxels, are equally good.
 constexpr double kSameGap = 0.02;
 
 openvdb::Vec3d toIndex(const Vector3d& p) {
   return {p.x(), p.y(), p.z()};
 }
 
-/// Returns the faces of a cell that one polygon passes twice: bit axis·2 + side, by polygon.
+/// Returns, for each polygon of a cell, the faces of the cell that it passes twice: bit axis·2 +
+/// side.
 std::array<std::uint8_t, 4> facesPassedTwice(const CellCase& cell) {
   std::array<std::uint8_t, 4> result = {};
   for (int axis = 0; axis < 3; ++axis) {
@@ -49,8 +50,9 @@ std::array<std::uint8_t, 4> facesPassedTwice(const CellCase& cell) {
   return result;
 }
 
-/// Segment on a face that the polygons of both cells pass twice. Both cells would be joined by two
-/// equal mesh edges, so each segment gets its own vertex.
+/// Segment of a polygon on a cell face that the polygons of both adjacent cells pass twice. The two
+/// segments on the face would yield the same mesh edge between both cells, so each gets a vertex of
+/// its own.
 struct FaceSegment {
   Coord insideCorner;    ///< corner that the segment cuts off
   Coord oppositeCorner;  ///< opposite corner of the face
@@ -62,9 +64,10 @@ struct FaceSegment {
   }
 };
 
-/// Slots of the cells around an edge, counter-clockwise about its axis, by the two offsets of the
-/// edge in the cell. kRingStep is the axis in which each cell differs from the next one (0: axis +
-/// 1, 1: axis + 2).
+/// Slots of the four cells around an edge, counter-clockwise about its axis. The two bits of a slot
+/// are the offsets of the edge in the cell along axis + 1 (high) and axis + 2 (low), as in
+/// cell_table.h. kRingStep is the axis along which a cell differs from the next one (0: axis + 1,
+/// 1: axis + 2).
 constexpr std::array<unsigned, 4> kRing = {0, 2, 3, 1};
 constexpr std::array<int, 4> kRingStep = {0, 1, 0, 1};
 
@@ -152,8 +155,9 @@ class DualMesher {
     return (twice_[lower] >> (step * 2 + 1)) & (twice_[upper] >> (step * 2)) & 1;
   }
 
-  /// Returns the segment on the face between the cells of slots i and i + 1. Both cells have the
-  /// same other offset of the edge; it gives the side of the edge on which the face lies.
+  /// Returns the segment on the face between the cells in the slots kRing[i] and kRing[i + 1]. The
+  /// edge has the same offset along the second axis of the face in both cells. This offset gives
+  /// the side of the edge on which the face lies.
   [[nodiscard]] static FaceSegment segmentAt(const Coord& low, int axis, bool lowInside,
                                              std::size_t i) {
     const int other = (axis + 2 - kRingStep[i]) % 3;  // axis along which the face extends
@@ -167,9 +171,9 @@ class DualMesher {
     return segment;
   }
 
-  /// Gives vertices without sheets those of their neighbours. A cell beside a corner may have no
-  /// grid point whose values belong to one face. Its vertex then moves to the intersection of the
-  /// neighbours' sheets.
+  /// Gives vertices without sheets the sheets of their neighbours. A cell beside a corner may have
+  /// no grid point whose values belong to one face of the solid. Its vertex then moves to the
+  /// intersection of the neighbours' sheets.
   void adoptSheets() {
     std::vector<bool> isWithout(vertices_.size());
     std::vector<std::uint32_t> without;
@@ -256,7 +260,8 @@ class DualMesher {
     segments_.erase(std::unique(segments_.begin(), segments_.end()), segments_.end());
   }
 
-  /// Returns the midpoint between the crossings on both edges of the face at the segment's corner.
+  /// Returns the midpoint between the zero crossings on the two edges of the face that meet at the
+  /// segment's inside corner.
   [[nodiscard]] openvdb::Vec3d middle(const FaceSegment& segment) const {
     const openvdb::FloatTree& tree = grid_.tree();
     const double own = static_cast<double>(tree.getValue(segment.insideCorner));
@@ -301,8 +306,9 @@ class DualMesher {
     });
   }
 
-  /// Returns the start of the diagonal that does not cut across an edge of the solid; else that of
-  /// the shorter diagonal.
+  /// Returns the index (0 or 1) of the vertex at which the better diagonal of a quadrilateral
+  /// starts. The better diagonal does not cut across an edge of the solid; if this does not decide,
+  /// it is the shorter one.
   [[nodiscard]] std::size_t firstOfDiagonal(const std::vector<std::uint32_t>& quad) const {
     const auto gap = [&](std::size_t i) {
       const DualVertex &a = vertices_[quad[i]], &b = vertices_[quad[i + 2]];
@@ -319,8 +325,8 @@ class DualMesher {
   const CellSurface& surface_;
   const FloatGrid& grid_;
   const Progress& progress_;
-  std::vector<DualVertex> vertices_;                 ///< by polygon
-  std::vector<std::uint8_t> twice_;                  ///< facesPassedTwice, by polygon
+  std::vector<DualVertex> vertices_;                 ///< one for each polygon of a cell
+  std::vector<std::uint8_t> twice_;                  ///< facesPassedTwice() of each polygon
   std::vector<std::array<std::uint32_t, 4>> cells_;  ///< polygons around each crossed edge, by slot
   std::vector<FaceSegment> segments_;
   std::vector<std::size_t> firstTriangle_;

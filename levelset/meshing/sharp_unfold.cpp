@@ -13,12 +13,13 @@ namespace {
 using openvdb::Vec3d;
 using Triangle = MeshTriangle;
 
-/// Least height of a triangle, voxels; a lower one is folded or has no area. Least gain of a flip,
-/// voxels.
+/// Least height of a triangle in its sheet, voxels; a lower triangle counts as folded. Least
+/// decrease of the sum of deficits by a flip, voxels.
 constexpr double kLeastHeight = 0.02, kLeastGain = 1e-3;
-/// Height of a triangle that lies in no sheet: less than any other.
+/// Height assigned to a triangle that lies in no sheet: less than that of any other.
 constexpr double kOffSheets = -10;
-/// Number of passes. A flip can require another flip, and a removed vertex can require flips.
+/// Largest number of passes. A flip can require another flip, and a removed vertex can require
+/// flips.
 constexpr int kUnfoldPasses = 8;
 
 class SheetUnfolder {
@@ -40,8 +41,8 @@ class SheetUnfolder {
 
  private:
   /// Returns the height of a triangle over its longest side, in the sheet that fits it best,
-  /// voxels. The height is negative when the triangle is turned over there, and kOffSheets if it
-  /// lies in none.
+  /// voxels. The height is negative when the triangle is turned over in that sheet, and kOffSheets
+  /// when it lies in no sheet.
   [[nodiscard]] double heightInSheet(const Triangle& t) const {
     const Vec3d &a = positions_[t[0]], &b = positions_[t[1]], &c = positions_[t[2]];
     const Vec3d area = (b - a).cross(c - a);
@@ -79,9 +80,9 @@ class SheetUnfolder {
     return all;
   }
 
-  /// Flips mesh edges where both triangles beside the edge improve in sum. Vertices out of order
-  /// along an edge of the solid turn triangles over in their sheet. Three vertices on that edge
-  /// form a triangle without area.
+  /// Flips mesh edges where this decreases the sum of the deficits of both triangles beside the
+  /// edge. Triangles are turned over in their sheet if vertices along an edge of the solid are out
+  /// of order. A triangle has no area if its three vertices lie on such an edge.
   void flip(double done) {
     for (int pass = 0; pass < kUnfoldPasses; ++pass) {
       report(progress_, done);
@@ -109,7 +110,8 @@ class SheetUnfolder {
     }
   }
 
-  /// Returns what a triangle lacks to the least height, voxels.
+  /// Returns the amount by which the height of a triangle is below kLeastHeight, voxels; at least
+  /// 0.
   [[nodiscard]] double deficit(const Triangle& t) const {
     return std::max(0.0, kLeastHeight - heightInSheet(t));
   }

@@ -13,7 +13,7 @@ using Eigen::Vector3d;
 using openvdb::Coord;
 using openvdb::FloatGrid;
 
-/// Second difference, in voxels, up to which a grid point counts as smooth.
+/// Second difference, in voxels, up to which the field counts as smooth at a grid point.
 constexpr double kSmooth = 0.15;
 /// Largest deviation of the values around a grid point from a plane of unit slope, voxels.
 constexpr double kPlanar = 0.1;
@@ -24,9 +24,10 @@ constexpr double kSurelySmooth = 0.02;
 constexpr double kFlat = 1e-4;
 /// A plane is dropped when another plane of its sheet has an error smaller by this factor.
 constexpr double kWorse = 4;
-/// Eigenvalues of the planes' matrix below this share of the largest are noise.
+/// Eigenvalues of the matrix Σ n nᵀ over the planes' normals below this share of the largest are
+/// noise.
 constexpr double kRank = 0.05;
-/// Largest distance from its cell, in voxels, at which a plane may touch the surface.
+/// Largest distance from the cell, in voxels, at which a plane may touch the surface.
 constexpr double kTouchMargin = 0.75;
 /// Largest field value at the point where a plane touches the surface, voxels. Beside an edge, a
 /// plane may extend beyond its face.
@@ -36,10 +37,11 @@ constexpr double kVertexReach = 1;
 /// Largest distance of a vertex from the planes of its sheets, voxels.
 constexpr double kOffSheet = 0.05;
 
-/// Number of Newton steps along a normal.
+/// Largest number of Newton steps of a vertex along its normal.
 constexpr int kSettleSteps = 4;
-/// Largest distance from its cell, voxels, to which the steps may lead: the linear crossings are
-/// off by no more. kLeastSlope is the least slope along the normal for the steps.
+/// kSettleReach: largest distance from its cell, voxels, to which these steps may move a vertex,
+/// since the error of the linear zero crossings is not larger. kLeastSlope: least slope of the
+/// field along the normal for which the steps are made.
 constexpr double kSettleReach = 0.15;
 constexpr double kLeastSlope = 0.5;
 
@@ -48,7 +50,7 @@ openvdb::Vec3f toSheet(const Vector3d& normal) {
           static_cast<float>(normal.z())};
 }
 
-/// Removes planes for which their sheet has a much better one.
+/// Removes each plane for which another plane of the same sheet has a much smaller error.
 void dropWorse(std::vector<FacePlane>& planes) {
   const std::vector<FacePlane> all = planes;
   std::erase_if(planes, [&](const FacePlane& plane) {
@@ -71,16 +73,16 @@ struct VertexPlacer::Plane {
   Vector3d normal = Vector3d::Zero();
   Vector3d gradient = Vector3d::Zero();  ///< central differences
   double distance = 0;                   ///< distance of the grid point from the plane, voxels
-  double error = 0;                      ///< distance of the values around from the plane, voxels
-  /// Bend of the values behind the plane, voxels: the largest second difference, or the sum of all
-  /// three, which is invariant under rotation.
+  double error = 0;  ///< deviation of the surrounding values from the plane, voxels
+  /// Bend of the field at the grid point, voxels: the largest second difference along an axis, or
+  /// the sum of all three if it is larger. The sum is invariant under rotation.
   double bend = 0;
   bool isSmooth = false;
-  bool isKnown = false;
+  bool isKnown = false;  ///< false: no plane could be estimated
 };
 
-/// Values of a block, of one layer below it and of two above, in voxels, with the planes estimated
-/// from them.
+/// Field values, in voxels, of a block and its surroundings: one grid point on the low side of each
+/// axis, two on the high side. Also estimates the tangent planes from them.
 class VertexPlacer::BlockField {
  public:
   BlockField(const FloatGrid& grid, const Coord& origin) {
@@ -114,8 +116,8 @@ class VertexPlacer::BlockField {
     return sum;
   }
 
-  /// Interpolates with second differences too: third order on a smooth field. Coordinates in [0,
-  /// 8].
+  /// Interpolates trilinearly, corrected by second differences: third order on a smooth field.
+  /// Coordinates in [0, 8].
   [[nodiscard]] double curved(const Vector3d& p) const {
     std::array<int, 3> low;
     Vector3d t;
@@ -175,9 +177,10 @@ class VertexPlacer::BlockField {
     return plane;
   }
 
-  /// Takes the plane from one of the eight cells at the grid point. Beside an edge of the solid,
-  /// central differences mix two faces. The cell whose corners lie nearest to a plane of unit slope
-  /// belongs to one face.
+  /// Estimates the plane from one of the eight cells at the grid point. Beside an edge of the
+  /// solid, central differences mix two faces. The cell whose values lie nearest to a plane of unit
+  /// slope belongs to one face.
+  /// @param limit  largest deviation of these values from such a plane, voxels
   void chooseOctant(int x, int y, int z, double limit, Plane& plane) const {
     double best = limit;
     for (int octant = 0; octant < 8; ++octant) {
@@ -196,8 +199,8 @@ class VertexPlacer::BlockField {
       plane.isKnown = true;
       plane.isSmooth = false;
     }
-    // One cell's values are as flat at the pole of a small ball as on a face, but never exactly
-    // flat.
+    // Reduce `bend` only if the cell's values are flat up to rounding. At the pole of a small ball
+    // they are nearly as flat as on a face, but the field around is bent.
     if (best < kFlat) plane.bend = best;
   }
 
@@ -280,8 +283,8 @@ class VertexPlacer::Impl {
     return {result, sheets, result};
   }
 
-  /// Moves a smooth vertex to the zero of the field along its normal. Where the radius of curvature
-  /// is close to a voxel, the midpoint is not accurate enough.
+  /// Moves the smooth position of a vertex to the zero of the field along its normal. Where the
+  /// radius of curvature is close to a voxel, the midpoint of placeSmooth() is not accurate enough.
   void settle(DualVertex& vertex) const {
     if (!vertex.sheets.count) return;
     const openvdb::Vec3d n = sheetNormal(vertex.sheets, 0);
@@ -349,7 +352,7 @@ class VertexPlacer::Impl {
 
   BlockField field_;
   int x_ = 0, y_ = 0, z_ = 0;                             // current cell
-  std::vector<std::pair<Vector3d, Vector3d>> crossings_;  ///< with gradients
+  std::vector<std::pair<Vector3d, Vector3d>> crossings_;  ///< zero crossings and gradients there
   std::vector<FacePlane> planes_;
 };
 

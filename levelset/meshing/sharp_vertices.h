@@ -15,24 +15,25 @@ namespace levelset {
 struct FacePlane {
   Eigen::Vector3d normal;
   double offset = 0;
-  double error = 0;  ///< distance of the values that define the plane from it, voxels
-  double bend = 0;   ///< second difference of these values, voxels
+  double error = 0;  ///< deviation of the field values that define the plane from it, voxels
+  double bend = 0;   ///< largest second difference of these values, voxels
   [[nodiscard]] double above(const Eigen::Vector3d& p) const { return normal.dot(p) - offset; }
 };
 
 /// Returns the point nearest to `centre` among those that fit the planes best [Ju02].
 [[nodiscard]] Eigen::Vector3d fitPlanes(const std::vector<FacePlane>& planes,
                                         const Eigen::Vector3d& centre);
-/// Returns the planes that pass through a point, one of each sheet.
+/// Returns the normals of the planes that pass through a point, one for each sheet.
 [[nodiscard]] VertexSheets sheetsAt(const Eigen::Vector3d& point,
                                     const std::vector<FacePlane>& planes);
 
 struct DualVertex {
-  Eigen::Vector3d position;  ///< intersection of the planes of the grid points around, voxels
-  VertexSheets sheets = {};  ///< those planes
+  /// Point where the tangent planes estimated at the cell's grid points meet, voxels.
+  Eigen::Vector3d position;
+  VertexSheets sheets = {};  ///< normals of these planes
   Eigen::Vector3d smooth;    ///< position of the vertex if no edge is near, voxels
-  double misfit = 0;         ///< largest distance of the position from a plane, voxels
-  double bend = 1;           ///< largest second difference of the values behind the planes, voxels
+  double misfit = 0;         ///< largest distance of `position` from one of the planes, voxels
+  double bend = 1;  ///< largest second difference of the values that define the planes, voxels
 };
 
 /// Computes the vertices of the cells of one block, with positions relative to its origin.
