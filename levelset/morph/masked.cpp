@@ -6,7 +6,7 @@
 namespace levelset {
 namespace {
 
-/// Voxels beyond the moved surface: larger distances count as this one.
+/// Voxels added to the largest displacement. Distances are clipped at the sum.
 constexpr double kBeyondMoved = 8;
 
 }  // namespace

@@ -23,10 +23,10 @@ using LeafNode = FloatTree::LeafNodeType;
 
 // First guess of the distance between the surfaces, voxels; doubled until it suffices.
 constexpr double kFirstReach = 8;
-// Progress when the target is on the grid of the solid, and when the distances are known.
+// Progress (0 to 1) after the target is resampled, and after the distances are computed.
 constexpr double kUntilResampled = 0.05, kUntilDistances = 0.4;
-// Distances extend this much beyond the surfaces, voxels, so that interpolation reads no
-// background.
+// Distances must extend this many voxels beyond the points that the surface passes, so that
+// interpolation reads no background values.
 constexpr double kBesideSurface = 4;
 
 void checkMorph(const NarrowBand& solid, const NarrowBand& target, const MorphOptions& options) {
@@ -37,8 +37,8 @@ void checkMorph(const NarrowBand& solid, const NarrowBand& target, const MorphOp
   if (options.steps < 1)
     throw UsageError(fmt::format("the number of steps is {}; give at least 1", options.steps));
   if (!(options.until > 0 && options.until <= 1))
-    throw UsageError(
-        fmt::format("the last fraction is {}; give a number above 0, up to 1", options.until));
+    throw UsageError(fmt::format(
+        "the last fraction of the morph is {}; give a number above 0 and up to 1", options.until));
   if (options.tolerance && !(*options.tolerance > 0 && std::isfinite(*options.tolerance)))
     throw UsageError(
         fmt::format("the tolerance is {}; give a positive length", *options.tolerance));
@@ -49,7 +49,7 @@ void checkMorph(const NarrowBand& solid, const NarrowBand& target, const MorphOp
         fmt::format("the {} is empty; give two solids", solid.isEmpty() ? "solid" : "target"));
 }
 
-/// Distances to two solids on common blocks.
+/// Signed distances to the solid (`from`) and to the target (`to`), on the same blocks of one grid.
 struct DistancePair {
   FloatGrid::Ptr from, to;
 
@@ -58,7 +58,8 @@ struct DistancePair {
     to->tree().topologyUnion(from->tree());
   }
 
-  /// Returns true when a grid point inside only one solid has a distance near or beyond the extent.
+  /// Returns true when a grid point inside exactly one solid has a distance above `reach` −
+  /// kBesideSurface voxels: distances computed up to `reach` do not suffice.
   [[nodiscard]] bool fallsShort(double reach) const {
     const auto limit = static_cast<float>((reach - kBesideSurface) * from->voxelSize()[0]);
     std::atomic<bool> found = false;
@@ -74,7 +75,8 @@ struct DistancePair {
     return found;
   }
 
-  /// Computes the field whose zero set is the surface at a fraction, scaled by `mask` where given.
+  /// Computes the field whose zero set is the surface at the fraction `part` of the morph. A mask
+  /// scales the fraction at each point.
   [[nodiscard]] FloatGrid::Ptr at(double part, const std::optional<Mask>& mask) const {
     FloatGrid::Ptr result = from->deepCopy();
     const auto everywhere = static_cast<float>(part);
@@ -91,8 +93,8 @@ struct DistancePair {
           s *= static_cast<float>(mask->weight({p.x(), p.y(), p.z()}));
         }
         const float mixed = (1 - s) * values[n] + s * b[n];
-        // A point far inside one solid and far outside the other mixes to zero at one half: solid
-        // stays.
+        // A point beyond the computed distances both inside the solid and outside the target has
+        // the values −background and +background. At one half their mean is 0; count it as inside.
         values[n] = mixed == 0 && values[n] <= -farInside ? -onSide : mixed;
       }
     });
@@ -100,7 +102,8 @@ struct DistancePair {
   }
 };
 
-/// @param distances  computes distances from a field
+/// Computes the band at the fraction `part` of the morph.
+/// @param distances  redistances a field
 NarrowBand intermediate(const DistancePair& pair, double part, const MorphOptions& options,
                         const std::function<FloatGrid::Ptr(const FloatGrid&)>& distances) {
   const FloatGrid::Ptr field = pair.at(part, options.mask);
@@ -120,7 +123,7 @@ NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphO
       resampleLike(target, solid,
                    {.maxMemory = options.maxMemory,
                     .progress = subProgress(options.progress, 0, kUntilResampled)});
-  // The surface stays within the active voxels of both solids.
+  // The surface stays in the box around the active voxels of both solids.
   openvdb::CoordBBox region = vdb(solid).evalActiveVoxelBoundingBox();
   region.expand(vdb(goal).evalActiveVoxelBoundingBox());
   region.expand(static_cast<int>(kBesideSurface));
@@ -137,10 +140,11 @@ NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphO
   // === Distances wherever the surface will pass
   DistancePair pair;
   const bool isOnTarget = options.until == 1 && !options.mask;
-  const bool isDirect = isOnTarget && options.steps == 1;  // only the end is requested
+  const bool isDirect = isOnTarget && options.steps == 1;  // the result is the target itself
   double done = kUntilResampled;
   for (double reach = options.farthest.value_or(kFirstReach); !isDirect; reach *= 2) {
-    // Each attempt takes about as long as all before it, so it gets half of the remaining progress.
+    // Each attempt takes about as long as all earlier ones together, so it gets half of the
+    // remaining progress.
     const double half = (done + kUntilDistances) / 2, quarter = (done + half) / 2;
     pair.from = distances(vdb(solid), reach, done, quarter, region);
     pair.to = distances(vdb(goal), reach, quarter, half, region);

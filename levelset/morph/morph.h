@@ -16,10 +16,11 @@ struct MorphOptions {
   /// Hausdorff distance to the target, world units, at which the morph stops: the first step within
   /// it is the last. Empty: all steps are computed.
   std::optional<double> tolerance = {};
-  /// Scales the fraction at each point; the end is then no longer the target.
+  /// Scales the fraction at each point by its weight. The last step is then no longer the target.
   std::optional<Mask> mask = {};
-  /// Largest distance that counts, voxels. Saves computing distances far from the surfaces when a
-  /// mask joins solids that differ only near them. Empty: wherever the surface passes.
+  /// Distance from both surfaces, voxels, up to which distances are computed; larger ones are
+  /// clipped. A limit saves time when the solids are known to differ only near their surfaces.
+  /// Empty: distances are computed wherever the surface passes.
   std::optional<double> farthest = {};
   /// Receives every step, 1 to `steps`, including the last.
   std::function<void(const NarrowBand& step, int number)> keep = {};
@@ -31,11 +32,12 @@ struct MorphOptions {
 /// At fraction s the surface is the zero set of (1 − s) · distance to the solid + s · distance to
 /// the target, redistanced. Both distances are exact and known wherever the surface passes. A point
 /// inside only one of the solids changes sides once, at a fraction of its own. So every step is
-/// nearer to the target than the one before, whatever the topology.
+/// nearer to the target than the previous step, whatever the topology.
 /// @throws UsageError for fewer than one step, `until` outside (0, 1], a tolerance that is not
 ///         positive, or an invalid mask
-/// @throws InvalidInput if a solid is empty, or if nothing is left at some fraction (the solids lie
-///         apart)
+/// @throws InvalidInput if a solid is empty, or if the surface vanishes at some fraction because
+/// the
+///         solids do not overlap
 /// @throws ResourceLimit when the distances do not fit into memory
 /// @throws Cancelled
 [[nodiscard]] NarrowBand morph(const NarrowBand& solid, const NarrowBand& target,
@@ -60,9 +62,9 @@ struct MorphOperator {
           "steps", &Options::steps,
           {.help = "number of steps from the solid to the target", .range = OptionRange::Positive});
       visit("until", &Options::until,
-            {.help = "converged: on the target; or a part of the way, above 0 and up to 1"});
+            {.help = "converged: morph to the target; or the last fraction, above 0 and up to 1"});
       visit("tolerance", &Options::tolerance,
-            {.help = "a step as near as this to the target is the last",
+            {.help = "stop at the first step within this Hausdorff distance of the target",
              .unit = OptionUnit::Length,
              .range = OptionRange::Positive});
       visit("mask", &Options::mask, {});

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kMostMorphSteps = 100000;
 
-/// The part of the way that `until` stands for, in (0, 1].
+/// Last fraction of the morph, in (0, 1], from the text of --until.
 double partOfTheWay(const std::string& until) {
   if (until == "converged") return 1;
   double part = 0;
@@ -20,7 +20,7 @@ double partOfTheWay(const std::string& until) {
   const auto [next, error] = std::from_chars(begin, end, part);
   if (error == std::errc() && next == end && part > 0 && part <= 1) return part;
   throw UsageError(
-      fmt::format("--until: '{}' is no part of the way; write converged, or a number above "
+      fmt::format("--until: '{}' is no fraction of the morph; give converged, or a number above "
                   "0 and up to 1",
                   until));
 }
@@ -32,10 +32,10 @@ const OperatorText MorphOperator::text{
     .group = "Flow",
     .summary = "turn the first solid into the second, step by step",
     .details =
-        "Every step is nearer to the target than the one before; topology may change. The result "
-        "is on the grid of the first solid. With --mask each point moves only a part of the way, "
-        "so the last step is not the target. Without names the operands are the two newest values, "
-        "the target last.",
+        "Every step is nearer to the target than the previous step; topology may change. The "
+        "result is on the grid of the first solid. --mask scales the fraction of the morph at each "
+        "point, so the last step is not the target. Without names the operands are the two newest "
+        "values, the target last.",
     .example =
         "levelsmith sphere --radius 1 --voxel 0.1 ! box --size 1.6,1.6,1.6 --voxel 0.1 ! "
         "morph --steps 3 ! measure"};
@@ -43,15 +43,15 @@ const OperatorText MorphOperator::text{
 void MorphOperator::check(const Options& options, const GivenOptions& given) {
   if (partOfTheWay(options.until) < 1 && given("tolerance"))
     throw UsageError(
-        "--tolerance tells when the target is reached, and --until ends before; "
+        "--tolerance stops the morph near the target, and --until stops it before; "
         "leave one of them out");
   if (given("mask") && given("tolerance"))
     throw UsageError(
-        "--tolerance tells when the target is reached, and with --mask it is not; leave one "
-        "of them out");
+        "--tolerance stops the morph near the target, which it does not reach with --mask; leave "
+        "one of them out");
   if (options.steps > kMostMorphSteps) {
-    throw UsageError(
-        fmt::format("--steps: {} are too many; give at most {}", options.steps, kMostMorphSteps));
+    throw UsageError(fmt::format("--steps: {} steps are too many; give at most {}", options.steps,
+                                 kMostMorphSteps));
   }
 }
 

@@ -13,8 +13,9 @@
 namespace levelset {
 namespace {
 
-/// Offsets a solid by `distance` and back. Limits the result by the start solid, because edges that
-/// return to grid points could otherwise pass it by rounding.
+/// Offsets a solid by `distance` and back. Unites the result of a closing with the given solid, and
+/// intersects that of an opening with it. Otherwise rounding could move edges at grid points past
+/// their original position.
 NarrowBand offsetAndBack(const NarrowBand& solid, double distance, const OffsetOptions& options) {
   OffsetOptions first = options, second = options;
   // The second offset recomputes its band anyway, so the first half width is the default.
@@ -71,7 +72,8 @@ NarrowBand closing(const NarrowBand& solid, double radius, const OffsetOptions& 
   return offsetAndBack(solid, radius, options);
 }
 
-// Both surfaces have exact distances and do not intersect, so their difference has too.
+// The outer and the inner solid have exact distances and their surfaces do not intersect, so their
+// difference has exact distances too.
 NarrowBand shell(const NarrowBand& solid, double thickness, ShellSide side,
                  const OffsetOptions& options) {
   checkShell(solid, thickness);

@@ -5,9 +5,9 @@
 /// Opening, closing and hollowing of solids, by offsets with exact distances.
 namespace levelset {
 
-/// Computes the union of all balls of that radius that fit into the solid. Parts thinner than twice
-/// the radius disappear. Convex edges become round; concave edges and thicker parts stay. Offsets
-/// the solid inwards, then outwards.
+/// Computes the union of all balls of radius `radius` that fit into the solid. Parts thinner than
+/// twice the radius disappear. Convex edges become round; concave edges and thicker parts stay.
+/// Offsets the solid inwards, then outwards.
 /// @param radius  world units, ≥ 0
 /// @throws UsageError unless `radius` is finite and ≥ 0
 /// @throws InvalidInput if `solid` or the result is empty
@@ -16,9 +16,10 @@ namespace levelset {
 [[nodiscard]] NarrowBand opening(const NarrowBand& solid, double radius,
                                  const OffsetOptions& options = {});
 
-/// Computes the complement of all balls of that radius that fit outside the solid. Fills gaps
+/// Computes the complement of all balls of radius `radius` that fit outside the solid. Fills gaps
 /// narrower than twice the radius and rounds concave edges. Offsets the solid outwards, then
 /// inwards.
+/// @param radius  world units, ≥ 0
 /// @throws as opening()
 [[nodiscard]] NarrowBand closing(const NarrowBand& solid, double radius,
                                  const OffsetOptions& options = {});
@@ -29,7 +30,7 @@ enum class ShellSide {
   Both  ///< half of the thickness on each side
 };
 
-/// Hollows a solid: keeps a wall of that thickness along its surface.
+/// Hollows a solid: keeps a wall along its surface.
 /// @param thickness  world units, at least one voxel
 /// @throws UsageError unless `thickness` is finite and positive
 /// @throws InvalidInput if `solid` is empty, the wall is thinner than a voxel, or the solid is too
@@ -58,7 +59,7 @@ struct MorphologyOptions {
   }
 };
 
-/// Estimates that `open` and `close` share.
+/// Plan, region of interest and cost of the operators `open` and `close`.
 struct MorphologyOperator {
   using Options = MorphologyOptions;
   static constexpr Slope slope = Slope::OfOperands;
@@ -106,7 +107,7 @@ struct ShellOperator {
              .required = true});
       visit("side", &Options::side,
             {{"in", ShellSide::In}, {"out", ShellSide::Out}, {"both", ShellSide::Both}},
-            {.help = "position of the wall: inside the surface, outside, or half and half"});
+            {.help = "position of the wall: inside the surface, outside, or half on each side"});
       visit("half-width", &Options::halfWidth, kResultHalfWidth);
       visit("mask", &Options::mask, {});
     }

@@ -6,8 +6,8 @@
 namespace levelset {
 namespace {
 
-/// Applies a change to the operand, where the mask allows it.
-/// @param farthest  largest distance by which the surface moves, world units
+/// Applies a change to the solid; with a mask, only where the mask allows it.
+/// @param farthest  largest distance by which the change moves the surface, world units
 template <class Options, class Change>
 NarrowBand changed(const NarrowBand& solid, const Options& options, double farthest,
                    OperatorRun& run, const Change& change) {
@@ -35,7 +35,8 @@ ValuePlan MorphologyOperator::plan(const Options& options, Plans operands, const
   return plan;
 }
 
-/// The surface moves away and back, and each way reads what lies beside it.
+/// The surface moves by the radius and back. Each of the two offsets also reads the field around
+/// the surface.
 RegionOfInterest MorphologyOperator::regionOfInterest(const Options& options,
                                                       const OperatorPlans& plans, std::size_t,
                                                       const RegionOfInterest& ofResult) {
@@ -52,17 +53,17 @@ std::optional<Cost> MorphologyOperator::cost(const Options& options, const Opera
   const double layer = solid.layer(), distance = options.radius / solid.voxelSize;
   Cost cost = costOfOffset(layer, layer, distance, solid.halfWidth);
   cost += costOfOffset(layer, layer, distance, plans.result.halfWidth);
-  cost.bytes += kBytesPerVoxel * solid.activeVoxels();  // the moved solid
+  cost.bytes += kBytesPerVoxel * solid.activeVoxels();  // the solid after the first offset
   return cost;
 }
 
 const OperatorText OpenOperator::text{
     .name = "open",
     .group = "Solids",
-    .summary = "keep all balls of a radius that fit into the solid: drops thin parts",
+    .summary = "keep all balls of a given radius that fit into the solid; removes thin parts",
     .details =
-        "Moves the surface inwards and back: parts thinner than twice the radius go, convex "
-        "edges are rounded to it, the rest stays.",
+        "Moves the surface inwards and back. Parts thinner than twice the radius disappear, convex "
+        "edges are rounded to the radius, and the rest stays.",
     .example = "levelsmith box --size 2,2,2 --voxel 0.05 ! open 0.3 ! measure"};
 
 NarrowBand OpenOperator::run(std::vector<NarrowBand> operands, const Options& options,
@@ -76,10 +77,10 @@ NarrowBand OpenOperator::run(std::vector<NarrowBand> operands, const Options& op
 const OperatorText CloseOperator::text{
     .name = "close",
     .group = "Solids",
-    .summary = "fill the space that no ball of a radius outside the solid enters",
+    .summary = "fill the space that no ball of a given radius outside the solid can enter",
     .details =
-        "Moves the surface outwards and back: gaps narrower than twice the radius are "
-        "filled, concave edges are rounded to it, the rest stays.",
+        "Moves the surface outwards and back. Gaps narrower than twice the radius are "
+        "filled, concave edges are rounded to the radius, and the rest stays.",
     .example =
         "levelsmith box --size 2,2,0.6 --voxel 0.05 ! cylinder --radius 0.4 --height 2 "
         "--voxel 0.05 ! union ! close 0.3 ! measure"};
@@ -95,7 +96,7 @@ NarrowBand CloseOperator::run(std::vector<NarrowBand> operands, const Options& o
 const OperatorText ShellOperator::text{
     .name = "shell",
     .group = "Solids",
-    .summary = "hollow a solid: the wall along its surface",
+    .summary = "hollow a solid: keep a wall along its surface",
     .example = "levelsmith sphere --radius 1 --voxel 0.05 ! shell --thickness 0.2 ! measure"};
 
 NarrowBand ShellOperator::run(std::vector<NarrowBand> operands, const Options& options,

@@ -15,9 +15,11 @@ namespace {
 
 using LeafNode = openvdb::FloatTree::LeafNodeType;
 
-// Voxels around the moved surface that the interpolant reads before re-distancing.
+// Distance from the moved surface, voxels, within which the interpolant reads the field before
+// re-distancing.
 constexpr double kPadding = 3;
-// Voxels by which lengths between the sampled closest points may exceed the sampled range.
+// Voxels by which offset lengths between the sampled closest points may exceed the range of the
+// sampled lengths.
 constexpr double kRangeMargin = 0.5;
 
 double checkedHalfWidth(const NarrowBand& solid, const OffsetOptions& options) {
@@ -34,6 +36,8 @@ void requireSurface(const NarrowBand& solid) {
 }
 
 /// Requests distances near the possible positions of the new surface.
+/// @param shift  mean offset of the surface, voxels
+/// @param reach  largest deviation of the offset from `shift`, voxels
 eikonal::DistanceRequest nearSurfaceRequest(const OffsetOptions& options, double shift,
                                             double reach) {
   eikonal::DistanceRequest request;
@@ -43,7 +47,9 @@ eikonal::DistanceRequest nearSurfaceRequest(const OffsetOptions& options, double
   return request;
 }
 
-/// Re-distances a shifted field. Where fronts met, it is only a bound of the distance.
+/// Re-distances a shifted field, as distances to the old surface minus the offset are only a bound
+/// where parts of the moved surface meet.
+/// @param done  progress so far, 0 to 1
 NarrowBand redistanced(const openvdb::FloatGrid& field, double halfWidth,
                        const OffsetOptions& options, double done) {
   eikonal::DistanceRequest request;
@@ -57,7 +63,7 @@ bool hasSurface(const openvdb::FloatGrid& field) {
   return field.activeVoxelCount() > 0 && eikonal::hasZeroCrossing(field.tree());
 }
 
-/// Offset length at each closest point of the surface, in voxels.
+/// Offset lengths, in voxels, at points of the surface.
 class Lengths {
  public:
   Lengths(const openvdb::FloatGrid& field, const ScalarField& distance)
@@ -68,7 +74,7 @@ class Lengths {
     const double length = distance_(world);
     if (!std::isfinite(length)) {
       throw InvalidInput(
-          fmt::format("the length is {} at {:.6g},{:.6g},{:.6g} on the surface; give a field "
+          fmt::format("the distance is {} at {:.6g},{:.6g},{:.6g} on the surface; give a field "
                       "that is finite there",
                       length, world.x, world.y, world.z));
     }
@@ -78,7 +84,8 @@ class Lengths {
   struct Range {
     double low = INFINITY, high = -INFINITY;
   };
-  /// Range of lengths over the closest points of the grid points next to the surface.
+  /// Range of the lengths over the points of the surface that are closest to the grid points near
+  /// it.
   [[nodiscard]] Range range(const OffsetOptions& options) const {
     Range all;
     std::mutex mutex;
@@ -126,7 +133,7 @@ NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& option
 }
 
 NarrowBand offsetBy(NarrowBand solid, const ScalarField& distance, const OffsetOptions& options) {
-  if (!distance) throw UsageError("the length is missing; give a formula or a grid of numbers");
+  if (!distance) throw UsageError("the distance is missing; give a formula or a grid of numbers");
   requireSurface(solid);
   const double halfWidth = checkedHalfWidth(solid, options);
   const double voxel = solid.voxelSize();

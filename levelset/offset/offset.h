@@ -18,8 +18,8 @@ struct OffsetOptions {
   Progress progress = {};
 };
 
-/// Offsets the surface along its normal by `distance`; a positive distance grows the solid. Extends
-/// the distances to the new zero set and re-distances once, for any `distance`.
+/// Offsets the surface along its normal by `distance`; a positive distance grows the solid.
+/// Computes distances as far as the new zero set and re-distances once, for any `distance`.
 /// @param distance  world units, any sign
 /// @throws UsageError if `distance` is not finite
 /// @throws InvalidInput if `solid` or the result is empty
@@ -31,8 +31,8 @@ struct OffsetOptions {
 /// Offsets each point of the surface along its normal by the local value of `distance`. Implements
 /// displacement maps and masked offsets. The new surface is the zero set of
 /// φ(x) − distance(closest point of x), re-distanced once. Parts with zero distance stay. Overhangs
-/// cannot occur: where the distance varies too fast along the surface, the farthest point along
-/// each normal counts.
+/// cannot occur: where the distance varies too fast along the surface, the new surface passes
+/// through the farthest point along each normal.
 /// @param distance  world units, any sign
 /// @throws as offset()
 /// @throws InvalidInput if `distance` is not finite at a point; names the point
@@ -40,9 +40,9 @@ struct OffsetOptions {
                                   const OffsetOptions& options = {});
 
 /// Estimates the cost of moving a surface.
-/// @param before,after  layers of the two surfaces (ValuePlan::layer)
-/// @param distance      voxels, any sign
-/// @param halfWidth     of the result, voxels
+/// @param before,after  ValuePlan::layer() of the surface before and after the offset
+/// @param distance      offset, voxels, any sign
+/// @param halfWidth     half width of the result, voxels
 [[nodiscard]] Cost costOfOffset(double before, double after, double distance, double halfWidth);
 
 /// The operator `offset`.
@@ -53,8 +53,8 @@ struct OffsetOperator {
   static constexpr ErrorModel errorModel{2, kTriangleError, kCreaseError, "offset-sphere"};
 
   struct Options {
-    std::optional<double> distance;  ///< world units; either this or `by`
-    ScalarField by;                  ///< world units
+    std::optional<double> distance;  ///< world units; empty if `by` is given
+    ScalarField by;                  ///< distance at each point of the surface, world units
     std::optional<double> halfWidth;
     std::optional<Mask> mask;
 

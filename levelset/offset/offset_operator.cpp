@@ -7,7 +7,7 @@
 namespace levelset {
 
 Cost costOfOffset(double before, double after, double distance, double halfWidth) {
-  constexpr double kShell = 3;  // voxels of distances beside the moved surface, computed again
+  constexpr double kShell = 3;  // half width of the first distances at the moved surface, voxels
   Cost cost = costOfDistances(std::max(before, after), kShell);
   cost.seconds += 1e-9 * before * 700 * std::abs(distance);
   cost.bytes += 15 * before * std::abs(distance);
@@ -20,22 +20,22 @@ const OperatorText OffsetOperator::text{
     .summary = "move the surface along its normal; positive grows the solid",
     .details =
         "Outwards, convex edges become round and concave ones stay sharp; inwards the reverse. "
-        "--by displaces each point of the surface by a length of its own, --mask limits the offset "
+        "--by moves each point of the surface by a distance of its own, --mask limits the offset "
         "to a part of the surface.",
     .example = "levelsmith sphere --radius 1 --voxel 0.05 ! offset 2vx ! measure"};
 
 void OffsetOperator::check(const Options&, const GivenOptions& given) {
   if (given("distance") == given("by"))
     throw UsageError(given("by") ? "a distance and --by exclude each other; leave one out"
-                                 : "how far is missing; give a length, or --by and a field");
+                                 : "the distance is missing; give a length, or --by and a field");
 }
 
 NarrowBand OffsetOperator::run(std::vector<NarrowBand> operands, const Options& options,
                                OperatorRun& run) {
   OffsetOptions settings{
       .halfWidth = options.halfWidth, .maxMemory = run.maxMemory, .progress = run.progress};
-  // A narrower part is made as wide as the complete band: the distance that points travel shows in
-  // the last bits.
+  // If the operand is narrowed to a region of interest, give the result the half width of the
+  // complete result. The distance over which closest points propagate affects the last bits.
   if (run.isPartial) settings.halfWidth = run.planned->halfWidth;
   NarrowBand solid = std::move(operands[0]);
   operands.clear();
@@ -75,7 +75,7 @@ std::optional<Cost> OffsetOperator::cost(const Options& options, const OperatorP
   const double distance = options.distance ? *options.distance / solid.voxelSize : 0;
   const double before = solid.layer();
   Cost cost = costOfOffset(before, plans.result.layer(), distance, plans.result.halfWidth);
-  // The lengths are looked up first, at the surface points.
+  // A variable distance is first evaluated at the points of the surface.
   if (options.by || options.mask) {
     cost += costOfDistances(before, 12);
     cost.bytes += 60 * solid.activeVoxels();

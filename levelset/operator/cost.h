@@ -2,13 +2,13 @@
 
 #include "levelset/operator/description.h"
 
-/// Estimates of what an operator takes, measured on solids of some million voxels.
-/// tests/bench/step_costs.py repeats the measurement and compares.
+/// Estimates of the time and memory of an operator, fitted to measurements on solids of some
+/// million voxels. tests/bench/step_costs.py repeats the measurements and compares.
 namespace levelset {
 
 struct Cost {
   double seconds = 0;  ///< CPU time
-  double bytes = 0;    ///< memory in use at once, beside operands and result
+  double bytes = 0;    ///< peak memory in addition to operands and result
 
   /// Adds the cost of a later stage: times add up, the larger memory counts.
   Cost& operator+=(const Cost& next);
@@ -16,7 +16,8 @@ struct Cost {
 
 /// Cost in proportion to the active voxels of the operands together or of the result, whichever are
 /// more.
-/// @param nanoseconds,bytes  for each active voxel
+/// @param nanoseconds  CPU time for each active voxel
+/// @param bytes        memory for each active voxel
 [[nodiscard]] Cost costPerVoxel(const OperatorPlans& plans, double nanoseconds, double bytes = 0);
 
 }  // namespace levelset

@@ -23,67 +23,69 @@
 ///   struct Options;                         // options.h
 ///   static NarrowBand run(std::vector<NarrowBand> operands, const Options&, OperatorRun&);
 ///
-///   // All that follows may be left out.
+///   // All further members may be left out.
 ///   static constexpr std::size_t operandCount = 1;
 ///   static constexpr bool takesMore = false;          // further operands may follow
 ///   static constexpr Slope slope = Slope::Any;
 ///   static constexpr double partTolerance = 0;        // voxels, see regionOfInterest
-///   static constexpr bool makesPart = false;          // run() keeps to OperatorRun::roi
+///   static constexpr bool makesPart = false;          // run() computes only OperatorRun::roi
 ///   static constexpr bool makesSurface = false;       // the result is the band of an open surface
 ///   static constexpr ErrorModel errorModel = {};
 ///   static void check(const Options&, const GivenOptions&);      // throws UsageError
-///   static double longestSide(const Options&, Plans operands);   // object that VoxelSize divides
+///   static double longestSide(const Options&, Plans operands);   // world units, for --resolution
 ///   static ValuePlan plan(const Options&, Plans operands, const OperatorRun&);
 ///   static RegionOfInterest regionOfInterest(const Options&, const OperatorPlans&, std::size_t
 ///                                            operand, const RegionOfInterest& ofResult);
 ///   static std::optional<Cost> cost(const Options&, const OperatorPlans&);
-///   static double leastRadius(const Options&);        // of curvature, world units
-///   static bool makesField(const Options&);           // run() returns a variant with FieldGrid
+///   static double leastRadius(const Options&);        // least radius of curvature, world units
+///   static bool makesField(const Options&);           // true: the result is a FieldGrid
 /// };
 ///
-/// run() takes a mesh where it is declared with `const TriMesh&` in place of the bands (an operator
-/// may have both), no operand where it is declared without. It returns a band, a mesh, a field, or
-/// a variant of band and field. plan() is that of the first operand by default.
+/// run() may take `const TriMesh&` in place of the bands, or no operand; an operator may have one
+/// run() for bands and one for a mesh. run() returns a band, a mesh, a field, or a variant of band
+/// and field. By default, plan() returns the plan of the first operand.
 ///
-/// regionOfInterest() gives the part of a band operand that decides the result inside `ofResult`,
-/// to the bit or to `partTolerance`. An operator without it needs complete operands.
+/// regionOfInterest() returns the part of a band operand that decides the result inside `ofResult`,
+/// to the bit or to `partTolerance`. An operator without this function reads complete operands.
 namespace levelset {
 
 struct OperatorText {
-  const char* name = "";             ///< the word of the command line
+  const char* name = "";             ///< name of the action on the command line
   const char* group = "";            ///< heading in the help
-  const char* summary = "";          ///< one line
-  const char* details = "";          ///< facts beyond the options
+  const char* summary = "";          ///< effect of the operator, one line
+  const char* details = "";          ///< facts that the option descriptions do not give
   const char* example = "";          ///< a complete command line
   const char* formerName = nullptr;  ///< a name that scripts used before; it keeps working
 };
 
-/// Slope of the band that an operator makes.
+/// Slope |∇φ| of the band that an operator computes.
 enum class Slope {
-  Any,        ///< values may be no distances
-  One,        ///< values are distances
-  OfOperands  ///< values are distances if those of all operands are
+  Any,        ///< the values need not be distances
+  One,        ///< the values are distances
+  OfOperands  ///< the values are distances if the values of all operands are
 };
 
-/// Bound of the distance between the triangles of a zero set and the surface that an action stands
-/// for, as the regression suite measures it: `constant` × voxel × (voxel / radius)^(order − 1),
-/// with the least radius of curvature; beside creases `creaseConstant` × voxel.
+/// Bound of the distance between the triangulated zero set of a result and the exact surface that
+/// the action describes. Away from creases it is `constant` × voxel × (voxel / radius)^(order − 1)
+/// with the least radius of curvature; beside creases it is `creaseConstant` × voxel. The
+/// regression suite measures the constants.
 struct ErrorModel {
-  double order = 1;
+  double order = 1;           ///< order of convergence in the voxel size
   double constant = 0;        ///< 0: exact away from creases
-  double creaseConstant = 0;  ///< 0: makes no creases
+  double creaseConstant = 0;  ///< 0: the operator creates no creases
   const char* source = "";    ///< case of the regression suite that measured it, docs/regression.md
 };
 
-// Largest errors of meshes (`mesh_linf_vx` of results.csv) times radius over voxel, the worst of
-// all resolutions and placements of the quick budget, rounded up. An operator that resamples or
-// moves a surface adds as much again as its triangles do.
+// Error constants of the triangles alone, on smooth surfaces and beside creases. They are the
+// column `mesh_linf_vx` of results.csv, on smooth surfaces times radius / voxel: the largest value
+// over all resolutions and placements of the quick budget, rounded up. An operator that resamples
+// or moves a surface adds an error of about the same size.
 inline constexpr double kTriangleError = 0.35;
 inline constexpr double kCreaseError = 0.55;
 
-/// Largest difference, in voxels, between a part of a band and the same part of the complete band,
-/// where distances are computed again: values that are right already may be kept in one and not in
-/// the other.
+/// Largest difference, in voxels, between a redistanced region of interest and the same region of
+/// the redistanced complete band. Redistancing keeps values that are accurate already, and it may
+/// keep a value in one of the two and replace it in the other.
 inline constexpr double kDistanceTolerance = 1e-4;
 
 using Plans = std::span<const ValuePlan>;
@@ -94,39 +96,40 @@ struct OperatorPlans {
   ValuePlan result;
 };
 
-/// The options and operands that a check of the options may ask about.
+/// Information for check(): the options that the user gave, and the kind of the first operand.
 struct GivenOptions {
-  std::function<bool(std::string_view)> isGiven;  ///< by the option's name on the command line
-  bool isMesh = false;                            ///< the first operand is a mesh
+  /// Returns true when the option with this name, without dashes, was given.
+  std::function<bool(std::string_view)> isGiven;
+  bool isMesh = false;  ///< true: the first operand is a mesh
 
   [[nodiscard]] bool operator()(std::string_view option) const { return isGiven(option); }
 };
 
-/// A figure of a report, by key.
+/// Figures of a report, as pairs of key and value.
 using Figures =
     std::vector<std::pair<std::string, std::variant<double, std::size_t, bool, std::string>>>;
 
 /// An estimate of the error of a result.
 struct ErrorEstimate {
-  std::string measure;  ///< "eikonal residual, mean"
+  std::string measure;  ///< name of the quantity, for example "eikonal residual, mean"
   double value = 0;
-  std::string unit;  ///< "", "voxels" or a world unit
+  std::string unit;  ///< unit of `value`: "" for a pure number, "voxels" or "world units"
 };
 
-/// Circumstances of a run, and what it leaves behind beside its result.
+/// Inputs of a run beside operands and options, and its outputs beside the result.
 struct OperatorRun {
-  RegionOfInterest roi = {};              ///< part of the result that is needed
-  std::optional<ValuePlan> planned = {};  ///< plan of the complete result, where it is known
-  bool isPartial = false;                 ///< the first operand is narrower than its whole
+  RegionOfInterest roi = {};              ///< part of the result that later operators read
+  std::optional<ValuePlan> planned = {};  ///< plan of the complete result; empty: not known
+  bool isPartial = false;  ///< true: the first operand was computed with a reduced half width
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 
   std::vector<std::string> notes = {}, warnings = {};
   std::vector<ErrorEstimate> errors = {};
-  /// Reason why the result misses a tolerance that was requested; empty: it does not.
+  /// Reason why the result misses a requested tolerance; empty: it meets the tolerance.
   std::string failure = {};
   Figures figures = {};      ///< details for the report
-  Figures certificate = {};  ///< of the sign of a band that was made from a mesh
+  Figures certificate = {};  ///< sign certificate of a band that was built from a mesh; else empty
 };
 
 }  // namespace levelset

@@ -36,19 +36,20 @@ struct OptionInfo {
   OptionUnit unit = OptionUnit::None;
   OptionRange range = OptionRange::Any;
   bool required = false;
-  int position = -1;                 ///< ≥ 0: place at which the value may stand without its name
-  bool allowsVoxels = true;          ///< Length: may be given in voxels
+  /// ≥ 0: index of the argument that gives the value without the option's name; −1: named only.
+  int position = -1;
+  bool allowsVoxels = true;          ///< for OptionUnit::Length: may be given in voxels
   const char* formerName = nullptr;  ///< a name that scripts used before; it keeps working
 };
 
 /// Length whose default is a number of voxels. The command line resolves it to world units.
 struct Length {
   double number = 0;
-  bool isVoxels = false;
+  bool isVoxels = false;  ///< true: `number` is in voxels; false: in world units
 
   [[nodiscard]] static Length voxels(double number) { return {number, true}; }
   [[nodiscard]] static Length world(double number) { return {number, false}; }
-  /// World units on a grid of that voxel size.
+  /// Length in world units on a grid of the given voxel size.
   [[nodiscard]] double in(double voxelSize) const { return isVoxels ? number * voxelSize : number; }
 };
 
@@ -56,26 +57,27 @@ struct Length {
 /// object. The command line resolves a resolution to an edge length.
 struct VoxelSize {
   double edge = 0;                     ///< world units; 0: follows from `resolution`
-  std::optional<int> resolution = {};  ///< > 0
+  std::optional<int> resolution = {};  ///< number of voxels along the longest side, > 0
 
-  /// @param longestSide  of the object, world units
+  /// Edge length of a voxel, world units.
+  /// @param longestSide  longest side of the object, world units
   [[nodiscard]] double of(double longestSide) const {
     return edge > 0 || !resolution ? edge : longestSide / *resolution;
   }
 };
 
-/// The options struct of an operator without options.
+/// Options of an operator without options.
 struct NoOptions {
   template <class Visitor>
   static void describe(Visitor&) {}
 };
 
-/// Half width of an operator's result, which is that of its operand by default.
+/// Description of the option `half-width` of an operator on a band.
 inline constexpr OptionInfo kResultHalfWidth{
     .help = "half width of the result, in voxels; default: that of the operand",
     .range = OptionRange::Positive};
 
-/// Half width of a new band.
+/// Description of the option `half-width` of an operator that creates a band.
 inline constexpr OptionInfo kNewHalfWidth{.help = "extent of the band on each side, in voxels",
                                           .range = OptionRange::Positive};
 

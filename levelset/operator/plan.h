@@ -4,14 +4,15 @@
 
 namespace levelset {
 
-/// Estimate of a value before it is computed: enough to resolve lengths and to estimate cost.
+/// Estimate of a value before it is computed. It suffices to resolve lengths in voxels or percent
+/// and to estimate cost.
 struct ValuePlan {
   Imath::Box3d bounds = {};  ///< bounds of the zero set or of the vertices, world units
   double area = 0;           ///< area of the surface, world units²
-  double voxelSize = 0;      ///< bands: world units; 0 for meshes
-  double halfWidth = 0;      ///< bands: voxels
-  double triangles = 0;      ///< meshes: number of triangles; 0: not known
-  double fieldBytes = 0;     ///< fields: memory of the grid
+  double voxelSize = 0;      ///< of a band, world units; 0: the value is no band
+  double halfWidth = 0;      ///< half width of a band, voxels
+  double triangles = 0;      ///< number of triangles of a mesh; 0: not known
+  double fieldBytes = 0;     ///< memory of the grid of a field, bytes
 
   [[nodiscard]] bool isBand() const { return voxelSize > 0; }
   [[nodiscard]] double longestSide() const;
@@ -21,11 +22,11 @@ struct ValuePlan {
   [[nodiscard]] double layer() const;
 };
 
-/// Memory of a band for each active voxel. A band fills about a third of its leaf blocks, so this
-/// figure is measured, not computed.
+/// Memory of a band for each active voxel, bytes. Measured, because only about a third of the
+/// voxels in the leaf blocks of a band are active.
 inline constexpr double kBytesPerVoxel = 12;
 
-/// The box with all its faces moved outwards. An infinite box stays infinite.
+/// The box with all its faces moved outwards by `by`. An infinite box stays infinite.
 [[nodiscard]] Imath::Box3d grown(Imath::Box3d box, double by);
 
 }  // namespace levelset

@@ -32,7 +32,7 @@ def test_help_of_offset(ls):
         "mask_max=1, mask_invert=False)" in text
     )
     assert "Move the surface along its normal; positive grows the solid." in text
-    assert "half_width: half width of the result, in voxels; default: as before (number)" in text
+    assert "half_width: half width of the result, in voxels; default: that of the operand (number)" in text
     assert "mask_min" in text and "--mask" not in text.split("On the command line")[0]
 
 
