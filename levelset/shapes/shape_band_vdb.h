@@ -1,6 +1,6 @@
 #pragma once
 
-// Bands of solids with a formula for the distance. Includes OpenVDB: for .cpp files only.
+// Bands of solids whose distance is given by a formula. Includes OpenVDB: for .cpp files only.
 
 #include <fmt/core.h>
 
@@ -14,8 +14,9 @@
 namespace levelset {
 
 /// Builds the band of a solid from a distance function.
-/// @param distance  double(const V3d&): signed distance at a world position. Outside the band, any
-///                  lower bound of the magnitude with the correct sign suffices.
+/// @param distance  double(const V3d&): signed distance at a world position, negative inside.
+/// Outside
+///                  the band, any lower bound of its magnitude with the correct sign suffices.
 /// @throws as checkShape()
 /// @throws InvalidInput if no grid point lies inside
 template <typename Distance>
@@ -43,7 +44,7 @@ NarrowBand makeShape(const ShapeExtent& extent, double voxelSize, const ShapeOpt
   }
   if (!filler.fill(domain, options.progress)) {
     throw InvalidInput(
-        fmt::format("no grid point lies inside, because the shape is too thin for voxels "
+        fmt::format("no grid point lies inside the shape, because it is too thin for voxels "
                     "of {}; use smaller voxels",
                     voxelSize));
   }

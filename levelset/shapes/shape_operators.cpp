@@ -12,7 +12,8 @@ using Imath::V3d;
 
 constexpr const char* kShapeGroup = "Shapes";
 constexpr const char* kShapeDetails =
-    "Exact signed distances on both sides. Sizes are full extents.";
+    "The signed distances are exact on both sides of the surface. Sizes are full extents, not "
+    "halves.";
 
 V3d axisDirection(const V3d& axis) {
   if (!(axis.length() > 0)) throw UsageError("--axis has no direction; give for example 0,0,1");

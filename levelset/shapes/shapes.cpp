@@ -58,8 +58,8 @@ void requireFits(const ShapeExtent& extent, double voxelSize, const ShapeOptions
                     "or move it towards the origin",
                     voxelSize, index));
   }
-  // A surface piece of the size of a leaf face overlaps the leaves within the band, and about one
-  // leaf more.
+  // A piece of the surface of the size of a leaf face (8² voxels) overlaps the leaves across the
+  // width of the band, and about one leaf more.
   double leaves = extent.area / (64 * voxelSize * voxelSize) * (2 * options.halfWidth + 15) / 8;
   if (!isEverywhere(options.region)) {
     const V3d blocks = options.region.size() / (8 * voxelSize) + V3d(2);
@@ -151,7 +151,7 @@ NarrowBand makeSphere(double radius, const V3d& center, double voxelSize,
 
 NarrowBand makeBox(const V3d& size, const V3d& center, double voxelSize,
                    const ShapeOptions& options) {
-  for (int axis = 0; axis < 3; ++axis) requireLength(size[axis], "a side");
+  for (int axis = 0; axis < 3; ++axis) requireLength(size[axis], "a side of the box");
   requirePoint(center, "the centre");
   const V3d half = size / 2;
   return makeShape(boxExtent(size, center), voxelSize, options, [=](const V3d& p) {

@@ -74,7 +74,7 @@ struct ShapeGrid {
   }
 };
 
-/// Options that describe a position, a direction and a positive length of a shape.
+/// Description of a required option that gives a positive length of a shape.
 [[nodiscard]] constexpr OptionInfo shapeLength(const char* help) {
   return {
       .help = help, .unit = OptionUnit::Length, .range = OptionRange::Positive, .required = true};
@@ -104,7 +104,7 @@ struct BoxShape : ShapeGrid {
   [[nodiscard]] NarrowBand make(double voxelSize, const ShapeOptions& options) const;
   template <class Visitor>
   static void describe(Visitor& visit) {
-    visit("size", &BoxShape::size, shapeLength("full extents"));
+    visit("size", &BoxShape::size, shapeLength("full edge lengths along x, y and z"));
     visit("center", &BoxShape::center, kShapeCenter);
     ShapeGrid::describe(visit);
   }
@@ -118,7 +118,8 @@ struct TorusShape : ShapeGrid {
   [[nodiscard]] NarrowBand make(double voxelSize, const ShapeOptions& options) const;
   template <class Visitor>
   static void describe(Visitor& visit) {
-    visit("radius", &TorusShape::radius, shapeLength("from the centre to the middle of the tube"));
+    visit("radius", &TorusShape::radius,
+          shapeLength("distance from the centre to the middle of the tube"));
     visit("tube", &TorusShape::tube, shapeLength("radius of the tube"));
     visit("center", &TorusShape::center, kShapeCenter);
     visit("axis", &TorusShape::axis, kShapeAxis);
@@ -134,7 +135,7 @@ struct CylinderShape : ShapeGrid {
   [[nodiscard]] NarrowBand make(double voxelSize, const ShapeOptions& options) const;
   template <class Visitor>
   static void describe(Visitor& visit) {
-    visit("radius", &CylinderShape::radius, shapeLength("radius of the round side"));
+    visit("radius", &CylinderShape::radius, shapeLength("radius of the cylinder"));
     visit("height", &CylinderShape::height, shapeLength("length from end to end"));
     visit("center", &CylinderShape::center, kShapeCenter);
     visit("axis", &CylinderShape::axis, kShapeAxis);
@@ -150,14 +151,16 @@ struct CapsuleShape : ShapeGrid {
   [[nodiscard]] NarrowBand make(double voxelSize, const ShapeOptions& options) const;
   template <class Visitor>
   static void describe(Visitor& visit) {
-    visit("from", &CapsuleShape::from, {.help = "centre of one end's ball", .required = true});
-    visit("to", &CapsuleShape::to, {.help = "centre of the other end's ball", .required = true});
+    visit("from", &CapsuleShape::from,
+          {.help = "centre of the ball at the first end", .required = true});
+    visit("to", &CapsuleShape::to,
+          {.help = "centre of the ball at the second end", .required = true});
     visit("radius", &CapsuleShape::radius, shapeLength("radius of the rod"));
     ShapeGrid::describe(visit);
   }
 };
 
-/// Operator that makes a shape.
+/// Operator that creates the band of a shape.
 template <class Shape>
 struct ShapeOperator {
   using Options = Shape;

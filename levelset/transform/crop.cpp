@@ -13,9 +13,10 @@ namespace levelset {
 NarrowBand cropped(NarrowBand band, const RegionOfInterest& part) {
   using Leaf = openvdb::FloatTree::LeafNodeType;
   if (!(part.halfWidth >= 1))
-    throw UsageError(
-        fmt::format("crop: the half width is {} voxels; give at least 1", part.halfWidth));
-  if (part.region.isEmpty()) throw UsageError("crop: the region is empty; give a box");
+    throw UsageError(fmt::format(
+        "the half width of the region of interest is {} voxels; give at least 1", part.halfWidth));
+  if (part.region.isEmpty())
+    throw UsageError("the box of the region of interest is empty; give a box with a volume");
   if (!isEverywhere(part.region)) {
     const openvdb::CoordBBox blocks = blocksOf(part.region, vdb(band).transform());
     std::vector<openvdb::Coord> beyond;

@@ -5,9 +5,10 @@
 
 namespace levelset {
 
-/// Crops a band to a region of interest. Values in the region keep their bits; a few blocks around
-/// it may stay. Outside the region, the band may end anywhere and its signs are undefined.
-/// @param part  a half width of at least that of the band does not narrow the band
+/// Crops a band to a region of interest. Values in the region keep their bits. Some blocks around
+/// the region may stay, since only complete blocks are removed. Outside the region, the band may
+/// end anywhere and its signs are undefined.
+/// @param part  box, and half width; the band is narrowed if its half width is larger
 /// @throws UsageError if the half width is below 1 or the region is empty
 [[nodiscard]] NarrowBand cropped(NarrowBand band, const RegionOfInterest& part);
 

@@ -31,7 +31,7 @@ M44d rotationOf(const TransformOperator::Options& options) {
   return matrix;
 }
 
-/// The matrix, then mirror, scale, rotate, translate.
+/// Combines the options into one matrix. Their order is matrix, mirror, scale, rotate, translate.
 M44d placementOf(const TransformOperator::Options& options) {
   M44d matrix = options.matrix.value_or(M44d());
   M44d there, back;
@@ -57,7 +57,7 @@ M44d placementOf(const TransformOperator::Options& options) {
     matrix = matrix * move;
   }
   if (!(std::abs(matrix.determinant()) > 0))
-    throw UsageError("the matrix flattens space; it must be invertible");
+    throw UsageError("the matrix is singular; give an invertible matrix");
   return matrix;
 }
 
@@ -92,7 +92,9 @@ Cost costOfSamples(const ValuePlan& source, const ValuePlan& target) {
 RegionOfInterest sampledRegion(const OperatorPlans& plans, const RegionOfInterest& ofResult,
                                const M44d& toSource) {
   const ValuePlan &source = plans.operands[0], &target = plans.result;
-  double squares = 0;  // of the stretches along three axes; their root bounds every stretch
+  // Sum of the squared stretches along the three axes. Its root bounds the stretch in any
+  // direction.
+  double squares = 0;
   for (int i = 0; i < 3; ++i)
     for (int k = 0; k < 3; ++k) squares += toSource[i][k] * toSource[i][k];
   const double sampled = sampledWidth(std::sqrt(squares) * target.voxelSize / source.voxelSize);
@@ -151,18 +153,19 @@ const OperatorText TransformOperator::text{
 
 void TransformOperator::check(const Options& options, const GivenOptions& given) {
   if (options.rotate.size() > 1 && given("axis"))
-    throw UsageError("--axis goes with one angle, not with three");
+    throw UsageError("--axis needs a single angle, but --rotate has three; leave out --axis");
   const M44d matrix = placementOf(options);
   if (given.isMesh) {
     if (options.bake || options.voxel)
-      throw UsageError("--bake and --voxel are for level sets, and this is a mesh");
+      throw UsageError(
+          "--bake and --voxel are for level sets, but the operand is a mesh; leave them out");
     return;
   }
   if (options.bake) return;
-  if (options.voxel) throw UsageError("--voxel goes with --bake");
+  if (options.voxel) throw UsageError("--voxel needs --bake; add --bake, or leave out --voxel");
   if (!isSimilarityMatrix(matrix)) {
     throw UsageError(
-        "a level set that is mirrored, sheared or scaled unevenly must be resampled; "
+        "the matrix mirrors, shears or scales unevenly, so the level set must be resampled; "
         "add --bake");
   }
 }
@@ -200,7 +203,7 @@ RegionOfInterest TransformOperator::regionOfInterest(const Options& options,
   const M44d toSource = placementOf(options).inverse();
   if (options.bake) return sampledRegion(plans, ofResult, toSource);
   RegionOfInterest read = ofResult;
-  read.halfWidth *= 1 + 1e-6;  // the band's end is rounded before it is scaled
+  read.halfWidth *= 1 + 1e-6;  // the background value is rounded before it is scaled
   if (!isEverywhere(ofResult.region))
     read.region = grown(movedBox(ofResult.region, toSource), plans.operands[0].voxelSize);
   return read;

@@ -31,19 +31,22 @@ using openvdb::Vec3d;
 using Leaf = FloatTree::LeafNodeType;
 
 const double kCubeDiagonal = std::sqrt(3.0);
-/// Distance from a position to the farthest of its 64 samples, voxels.
+/// Largest distance from a position to a sample of its tricubic interpolation, voxels of the
+/// source.
 const double kTricubicReach = 2 * kCubeDiagonal;
-/// Distance from the surface within which re-distancing reads, voxels: two grid points on each
-/// side, and their samples.
+/// Distance from the surface within which re-distancing reads values, voxels of the target: two
+/// grid points on each side, and the samples around them.
 constexpr double kReadReach = 3.5;
-/// Voxels that thickening a band twice adds on each side.
+/// Voxels that supported() adds to the source band on each side, by thickening it twice.
 constexpr double kThickened = 4;
 
 /// Maps between target and source indices, and the factor from source values to distances in the
 /// target.
 struct Placement {
   Imath::M44d targetToSource, sourceToTarget;
-  double scale;        ///< smallest stretch, so the scaled value is at most the distance
+  /// Factor from source values to target distances: the smallest stretch of the transform, so that
+  /// a scaled value is at most the distance.
+  double scale;
   double targetVoxel;  ///< voxel size of the target, world units
   double sourceVoxel;  ///< smallest voxel size of the source, world units
 
@@ -157,7 +160,8 @@ class ResampleKernel {
       else
         leaf.setValueOff(n, std::copysign(background, value));
     };
-    // The nearest sample alone shows that most of a leaf is outside the band.
+    // For most grid points of a leaf, the nearest sample alone shows that they are outside the
+    // band.
     const Coord nearest = Coord::round(p);
     const double offset = (p - nearest.asVec3d()).length() * placement_.sourceVoxel;
     const float sample = accessor.getValue(nearest);
@@ -313,8 +317,8 @@ NarrowBand resampleField(const NarrowBand& solid, const Imath::M44d& sourceToWor
   report(progress, 0.6);
   if (!hasInside(*target)) {
     throw InvalidInput(
-        fmt::format("no grid point lies inside, because voxels of {} are too large for this "
-                    "solid; use smaller voxels",
+        fmt::format("no grid point lies inside the solid, because voxels of {} are too large; "
+                    "use smaller voxels",
                     place.targetVoxel));
   }
   return redistance(

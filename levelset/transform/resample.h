@@ -18,7 +18,8 @@ struct ResampleOptions {
   Progress progress = {};
 };
 
-/// Half width, in voxels of the solid, that resampling reads. A narrower band is widened first.
+/// Half width of the band that resampling reads, in voxels of the solid. A narrower band is widened
+/// first.
 /// @param ratio  voxel size of the result divided by that of the solid
 [[nodiscard]] double sampledWidth(double ratio);
 
@@ -42,7 +43,7 @@ struct ResampleOptions {
 [[nodiscard]] NarrowBand resampleLike(const NarrowBand& solid, const NarrowBand& like,
                                       const ResampleOptions& options = {});
 
-/// Decides if both bands have the same grid points and the same half width.
+/// Returns true when both bands have the same grid points and the same half width.
 [[nodiscard]] bool shareGrid(const NarrowBand& a, const NarrowBand& b);
 
 /// The operator `resample`.
@@ -54,7 +55,7 @@ struct ResampleOperator {
 
   struct Options {
     VoxelSize voxel;
-    std::optional<double> halfWidth;  ///< of the result, voxels
+    std::optional<double> halfWidth;  ///< half width of the result, voxels
 
     template <class Visitor>
     static void describe(Visitor& visit) {
@@ -71,11 +72,12 @@ struct ResampleOperator {
   static std::optional<Cost> cost(const Options& options, const OperatorPlans& plans);
 };
 
-/// Cost of laying a solid on another grid, and of the distances there.
+/// Estimates the cost of resampling a solid on another grid and of re-distancing the result.
 [[nodiscard]] Cost costOfSamples(const ValuePlan& source, const ValuePlan& target);
 
-/// Region of interest of a solid that is laid on another grid.
-/// @param toSource  from the world of the result to that of the solid
+/// Region of a solid that is read when only `ofResult` of a resampled result is computed.
+/// @param plans     the solid as the first operand, and the result
+/// @param toSource  matrix from world positions in the result to world positions in the solid
 [[nodiscard]] RegionOfInterest sampledRegion(const OperatorPlans& plans,
                                              const RegionOfInterest& ofResult,
                                              const Imath::M44d& toSource);

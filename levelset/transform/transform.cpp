@@ -36,19 +36,19 @@ void requireAffine(const Imath::M44d& matrix) {
   const Stretch stretch = stretchOf(matrix);
   if (!(stretch.least > 1e-12 * stretch.greatest)) {
     throw UsageError(
-        fmt::format("the matrix is singular (it stretches by {} and by {}); use an "
-                    "invertible matrix",
+        fmt::format("the matrix is singular (its smallest and largest stretch are {} and {}); "
+                    "use an invertible matrix",
                     stretch.least, stretch.greatest));
   }
 }
 
-/// Largest coordinate of grids and meshes, in double precision: volumes must not overflow.
+/// Limit of coordinates and stretches, so that volumes do not overflow double precision.
 constexpr double kFarthest = 1e100;
-/// Largest rounding error of world positions, voxels.
+/// Largest accepted rounding error of the world position of a grid's origin, voxels.
 constexpr double kPositionTolerance = 1e-6;
 
-/// Checks that the origin of a grid is accurate. With large rounding errors, the voxel size is
-/// lost.
+/// Checks that double precision resolves the world position of a grid's origin to a small fraction
+/// of a voxel.
 void requirePrecision(const Imath::M44d& indexToWorld, double voxelSize) {
   double farthest = 0;
   for (int axis = 0; axis < 3; ++axis)
@@ -144,7 +144,7 @@ TriMesh transform(TriMesh mesh, const Imath::M44d& matrix) {
                                             Imath::V3d(matrix[2][0], matrix[2][1], matrix[2][2])};
   const bool turns =
       slopes != std::array{Imath::V3d(1, 0, 0), Imath::V3d(0, 1, 0), Imath::V3d(0, 0, 1)};
-  if (turns)  // otherwise keep the bits
+  if (turns)  // a pure translation keeps the bits of the normals
     for (Imath::V3d& normal : mesh.attributes.normals)
       normal = transformedNormal(normal, slopes, mirrors ? -1 : 1);
   if (mirrors)

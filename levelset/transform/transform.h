@@ -14,9 +14,8 @@ namespace levelset {
 /// @param matrix  rotation, uniform scale, translation; world' = world * matrix, with Imath's row
 ///                vectors
 /// @throws UsageError if the matrix is not affine and invertible
-/// @throws InvalidInput if the matrix shears, mirrors or scales unevenly (use bake()), or the solid
-/// is
-///         empty or too far from the origin for its voxels
+/// @throws InvalidInput if the matrix shears, mirrors or scales unevenly (use bake()), or if the
+///         solid is empty or too far from the origin for its voxels
 [[nodiscard]] NarrowBand transform(NarrowBand solid, const Imath::M44d& matrix);
 
 struct BakeOptions {
@@ -26,13 +25,16 @@ struct BakeOptions {
 
 /// Transforms a solid by any invertible affine matrix. Resamples it on the axis-aligned grid of
 /// `voxelSize` and re-distances it.
-/// @throws UsageError if the matrix is not affine and invertible; further errors as resample()
+/// @param voxelSize  voxel size of the result, world units
+/// @throws UsageError if the matrix is not affine and invertible
+/// @throws further errors as resample()
 [[nodiscard]] NarrowBand bake(const NarrowBand& solid, const Imath::M44d& matrix, double voxelSize,
                               const BakeOptions& options = {});
 
 /// Transforms the vertices of a mesh. A mirroring matrix also reverses the triangles. Normals
-/// transform by the inverse transpose and stay unit vectors. The mesh remembers the precision of
-/// its original coordinates, and is written in double precision from then on.
+/// transform by the inverse transpose and stay unit vectors. The mesh keeps the scaled rounding
+/// error of its original coordinates (`spacing`), and files store its coordinates in double
+/// precision.
 /// @throws UsageError if the matrix is not affine and invertible
 /// @throws InvalidInput if attributes do not fit the vertices, or a coordinate exceeds 1e100
 [[nodiscard]] TriMesh transform(TriMesh mesh, const Imath::M44d& matrix);
@@ -41,7 +43,7 @@ struct BakeOptions {
 struct TransformOperator {
   static const OperatorText text;
   static constexpr Slope slope = Slope::OfOperands;
-  static constexpr double partTolerance = kDistanceTolerance;  // of `bake`; otherwise to the bit
+  static constexpr double partTolerance = kDistanceTolerance;  // with `bake`; else to the bit
   static constexpr ErrorModel errorModel{2, 0.65, 0, "resample-chain"};
 
   struct Options {
@@ -49,28 +51,28 @@ struct TransformOperator {
     std::optional<Imath::V3d> translate;  ///< world units
     std::vector<double> rotate;           ///< degrees: one angle about `axis`, or three
     Imath::V3d axis = Imath::V3d(0, 0, 1);
-    std::vector<double> scale;  ///< one factor, or three
-    std::optional<int> mirror;  ///< 0 to 2: x, y, z
-    Imath::V3d about = Imath::V3d(0);
+    std::vector<double> scale;         ///< one factor, or three for x, y and z
+    std::optional<int> mirror;         ///< axis normal to the mirror plane, 0 to 2: x, y, z
+    Imath::V3d about = Imath::V3d(0);  ///< fixed point of mirror, scale and rotate, world units
     bool bake = false;
-    std::optional<double> voxel;  ///< world units
+    std::optional<double> voxel;  ///< voxel size of the baked grid, world units
 
     template <class Visitor>
     static void describe(Visitor& visit) {
       visit("matrix", &Options::matrix,
-            {.help = "acts on row vectors, translation in the last row"});
-      visit("translate", &Options::translate, {.help = "world units"});
+            {.help = "matrix for row vectors, with the translation in the last row"});
+      visit("translate", &Options::translate, {.help = "displacement, world units"});
       visit("rotate", &Options::rotate,
-            {.help = "degrees about --axis, or about x, then y, then z"});
+            {.help = "degrees about --axis, or three angles about x, then y, then z"});
       visit("axis", &Options::axis, {.help = "axis of a single --rotate"});
       visit("scale", &Options::scale,
             {.help = "one factor, or one for each axis", .range = OptionRange::Positive});
       visit("mirror", &Options::mirror, {{"x", 0}, {"y", 1}, {"z", 2}},
-            {.help = "across the plane through --about"});
+            {.help = "axis normal to the mirror plane, which passes through --about"});
       visit("about", &Options::about, {.help = "centre of mirror, scale and rotate"});
       visit("bake", &Options::bake, {.help = "resample on an axis-aligned uniform grid"});
       visit("voxel", &Options::voxel,
-            {.help = "voxel size of the baked grid; default: as before",
+            {.help = "voxel size of the baked grid; default: that of the operand",
              .unit = OptionUnit::Length,
              .range = OptionRange::Positive,
              .allowsVoxels = false});
