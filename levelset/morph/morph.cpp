@@ -110,7 +110,7 @@ NarrowBand intermediate(const DistancePair& pair, double part, const MorphOption
   if (!eikonal::hasZeroCrossing(field->tree()))
     throw InvalidInput(
         fmt::format("the solid vanishes at fraction {:.3g} of the morph, since it does not "
-                    "overlap the target; move the target until the two overlap, or use 1 step",
+                    "overlap the target; move it until they overlap, or give --steps 1",
                     part));
   return makeBand(distances(*field));
 }

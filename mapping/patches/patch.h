@@ -100,12 +100,13 @@ struct PatchOptions {
   /// order. A side consists of the shortest paths between successive points, and may have a corner
   /// at each point.
   std::array<std::vector<Imath::V3d>, 4> sides = {};
-  /// Reduced only: straight directions in which the corners rise, instead of along ∇φ. Give one for
-  /// all corners, or one for each. Directions at points on the sides are interpolated. Where a
-  /// surface bends strongly, parallel directions keep the upper layers from spreading [Brodersen07
-  /// fig. 8.4].
+  /// For LayerScheme::Reduced only: straight directions in which the corners rise, instead of along
+  /// ∇φ. Give one for all corners, or one for each. Directions at points on the sides are
+  /// interpolated. Where a surface bends strongly, parallel directions keep the upper layers from
+  /// spreading [Brodersen07 fig. 8.4].
   std::vector<Imath::V3d> directions = {};
-  bool parallel = false;  ///< Reduced only: all corners rise along the normal at the patch's centre
+  bool parallel =
+      false;  ///< all corners rise along the normal at the centre; LayerScheme::Reduced only
   /// Particle spacing, world units; 0: chosen from the sizes of the patch and the voxels.
   double spacing = 0;
   /// Cells along u and v, the same on all layers, each at least 3; 0, 0: chosen from the spacing.
