@@ -32,9 +32,8 @@ struct BakeOptions {
                               const BakeOptions& options = {});
 
 /// Transforms the vertices of a mesh. A mirroring matrix also reverses the triangles. Normals
-/// transform by the inverse transpose and stay unit vectors. The mesh keeps the scaled rounding
-/// error of its original coordinates (`spacing`), and files store its coordinates in double
-/// precision.
+/// transform by the inverse transpose and stay unit vectors. `spacing` of the result is that of the
+/// original coordinates, scaled. Files store the new coordinates in double precision.
 /// @throws UsageError if the matrix is not affine and invertible
 /// @throws InvalidInput if attributes do not fit the vertices, or a coordinate exceeds 1e100
 [[nodiscard]] TriMesh transform(TriMesh mesh, const Imath::M44d& matrix);

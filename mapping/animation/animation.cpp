@@ -54,11 +54,12 @@ bool isSamePatch(const Patch& a, const Patch& b) {
 }
 
 void checkKeys(const std::vector<AnimationKey>& keys, const AnimationOptions& options) {
-  if (options.frames < 1) throw UsageError("there are no frames");
+  if (options.frames < 1) throw UsageError("the number of frames is 0; give at least 1");
   if (keys.empty() || keys.front().frame != 0)
-    throw UsageError("the first patch must be at frame 0");
+    throw UsageError("no patch is at frame 0; give the first patch the frame 0");
   for (std::size_t k = 0; k < keys.size(); ++k) {
-    if (keys[k].patches.empty()) throw UsageError(fmt::format("patch {} holds no patches", k + 1));
+    if (keys[k].patches.empty())
+      throw UsageError(fmt::format("patch {} is an empty set; leave it out", k + 1));
     if (keys[k].frame >= options.frames || (k > 0 && keys[k].frame <= keys[k - 1].frame)) {
       throw UsageError(fmt::format(
           "patch {} is at frame {}, which is not between the frame of the previous patch and "
@@ -74,8 +75,8 @@ void checkKeys(const std::vector<AnimationKey>& keys, const AnimationOptions& op
     }
     if (keys[k].outlines.size() != keys.front().outlines.size()) {
       throw UsageError(
-          fmt::format("patch {} is a set of {}, the first patch a set of {}; give sets of the "
-                      "same size",
+          fmt::format("patch {} has {} outlines and the first patch {}; give sets of patches of "
+                      "the same size",
                       k + 1, keys[k].outlines.size(), keys.front().outlines.size()));
     }
     const std::vector<Patch>&first = keys.front().patches, &patches = keys[k].patches;
@@ -88,14 +89,14 @@ void checkKeys(const std::vector<AnimationKey>& keys, const AnimationOptions& op
     for (std::size_t i = 0; i < patches.size(); ++i) {
       if (patches[i].mirrored == first[i].mirrored) continue;
       throw UsageError(
-          fmt::format("one of patch {} and the first patch is mirrored and the other is "
-                      "not{}; mirror both or neither",
+          fmt::format("either patch {} or the first patch is mirrored, but not both{}; mirror "
+                      "both or neither",
                       k + 1, i > 0 ? fmt::format(", in member {}", i + 1) : ""));
     }
   }
 }
 
-/// Bases of all frames. Only one is in memory besides the first.
+/// Bases of all frames. Only one base is in memory besides that of frame 0.
 class Bases {
  public:
   Bases(const NarrowBand& first, const BandFrames& frames)
@@ -136,7 +137,7 @@ class Animation {
   AnimationReport run() {
     for (std::size_t k = 1; k < keys_.size(); ++k) {
       warnOfLayers(k);
-      // On moving bases, this is checked when the path to the key is computed.
+      // If the base moves, footprintsOf() checks this on the base of the key's frame.
       if (!bases_.areMoving()) atFrame(keys_[k].frame, [&] { requireOn(bases_.at(0), k); });
     }
     for (std::size_t k = 0; k < keys_.size(); ++k) {
@@ -202,7 +203,8 @@ class Animation {
     return moved;
   }
 
-  /// Carries the footprints of the next key backwards over the previous bases.
+  /// Carries the footprints of the next key backwards, from base to base, to the frames after
+  /// `begin`.
   void carryBackwards(std::size_t begin, std::size_t end) {
     done_ = static_cast<double>(begin) / static_cast<double>(options_.frames);
     later_.assign(end - begin, {});
@@ -247,7 +249,7 @@ class Animation {
           std::equal(given.begin(), given.end(), patches_.begin(), patches_.end(), isSamePatch);
       isUnchanged = isUnchanged && isSame;
       if (!isSame) patches_ = given;
-      // If there is no path, fail before any frame is computed.
+      // If no path leads to the next key, fail before any frame is computed.
       if (!bases_.areMoving() && isBetween && begin + 1 < end)
         (void)atFrame(f + 1, [&] { return footprintsBetween(f + 1, begin, end); });
     } else {
@@ -323,7 +325,8 @@ class Animation {
                    "between the two",
                    f));
     }
-    constexpr double kMostTurn = 1;  // radians; sides shrink by the cosine of half the angle
+    // Radians. Halfway, sides have shrunk by the cosine of half the angle.
+    constexpr double kMostTurn = 1;
     if (isNew && options_.carry == CarryRule::Corners && std::abs(path.turn()) > kMostTurn) {
       warnOnce(
           warnedOfTurn_,
@@ -336,7 +339,8 @@ class Animation {
       warnOnce(
           warnedOfJump_,
           fmt::format("frame {}: the path from patch to patch differs from that of the previous "
-                      "frame, and may lead around another side",
+                      "frame, and may lead around another side of the object; add a patch between "
+                      "the two to fix the side",
                       f));
     }
   }
@@ -351,7 +355,9 @@ class Animation {
 
   [[nodiscard]] std::vector<Patch> remade(const NarrowBand& base,
                                           const levelset::Progress& progress) const {
-    if (!options_.make) throw UsageError("it is unknown how to rebuild its patches");
+    if (!options_.make)
+      throw UsageError(
+          "the patches move, but no function rebuilds them; set AnimationOptions::make");
     std::vector<Patch> patches;
     try {
       patches = options_.make(base, shown_, origins_, progress);
@@ -389,8 +395,9 @@ class Animation {
                fmt::format("frame {}: sides or diagonals of the patch are {:.3g} to {:.3g} "
                            "times as long as at its key; {}",
                            f, drift.least, drift.most,
-                           options_.carry == CarryRule::Corners ? "--carry rigid keeps its shape"
-                                                                : "the surface under it bends"));
+                           options_.carry == CarryRule::Corners
+                               ? "use --carry rigid to keep its shape"
+                               : "the cause is the bending of the surface under it"));
     }
     for (std::size_t i = 0; i < now.size(); ++i) {
       const double move = farthestMove(before[i], now[i]);
@@ -399,9 +406,9 @@ class Animation {
       warnOnce(
           warnedOfMove_,
           fmt::format(
-              "frame {}: a corner moved {:.4g} to the nearest surface, over half of the "
-              "patch's "
-              "diagonal; give frames in between, or check that it is the same surface component",
+              "frame {}: a corner moved by {:.4g} to the nearest point of the surface, over half "
+              "of the patch's diagonal; give frames in between, or check that it is still on the "
+              "same surface component",
               f, move));
     }
   }
@@ -413,14 +420,16 @@ class Animation {
   AnimationReport report_;
   std::size_t key_ = 0;
   std::size_t warnedOfDrift_ = 0, warnedOfMove_ = 0, warnedOfPaths_ = 0, warnedOfTurn_ = 0,
-              warnedOfJump_ = 0;  ///< last keys with each warning, from 1
+              warnedOfJump_ = 0;  ///< last key for which each warning was issued, from 1; 0: none
   double done_ = 0;
   std::uint64_t baseHash_ = 0, pathHash_ = 0;
-  Footprints origins_;
-  Footprints own_, first_,
-      shown_;                      ///< of the last key: carried, original, and current
-  Footprints goal_;                ///< footprints of the next key
-  std::vector<Footprints> later_;  ///< footprints of the next key on the bases before it
+  Footprints origins_;  ///< footprints at frame 0
+  /// Footprints of the last key, carried to the base of the current frame; the same on the key's
+  /// own base; footprints of the current frame, interpolated towards the next key.
+  Footprints own_, first_, shown_;
+  Footprints goal_;  ///< footprints of the next key
+  std::vector<Footprints>
+      later_;  ///< footprints of the next key on the base of each frame before it
   std::vector<PatchPath> paths_;
   std::vector<Patch> patches_;
 };
@@ -454,7 +463,7 @@ AnimationReport animatePatches(const NarrowBand& base, const std::vector<Animati
 AnimationReport animateTexture(const NarrowBand& base, const NarrowBand& texture,
                                const std::vector<AnimationKey>& keys,
                                const TextureAnimationOptions& options, const FrameWriter& write) {
-  constexpr double kImproving = 0.3;  // share of the progress
+  constexpr double kImproving = 0.3;  // share of a frame's progress for options.improve
   std::optional<TextureResult> result;
   std::vector<Patch> improved;
   std::vector<std::size_t> skipped;

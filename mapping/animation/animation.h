@@ -24,29 +24,33 @@ using PatchMaker = std::function<std::vector<Patch>(
     const levelset::NarrowBand& base, std::span<const Footprint> footprints,
     std::span<const Footprint> origins, const levelset::Progress& progress)>;
 
-/// Options that rebuild a patch of unknown origin with as many particles as it has. If all layers
-/// have equal counts, particles follow ∇φ. Otherwise each layer is a separate relaxed net.
+/// Patch options that rebuild a patch with about as many particles as it has, for a patch whose own
+/// options are unknown. Layers of the scheme Reduced stay separate relaxed nets. With any other
+/// scheme particles follow ∇φ. If the patch does not name its scheme, it counts as Reduced if its
+/// layers have different counts.
 [[nodiscard]] PatchOptions optionsLike(const Patch& patch);
 
-/// Patches at one frame, on the base of that frame.
+/// Key frame: patches at one frame, on the base of that frame.
 struct AnimationKey {
   std::vector<Patch> patches;
-  /// Outlines that are carried and moved; usually one for each patch, or one for a grid of patches.
+  /// Outlines that follow the base between the keys; one for each patch, or one for a grid of
+  /// patches.
   std::vector<PatchOutline> outlines;
   std::size_t frame = 0;
 };
 
-/// Returns a level set for each frame except the first, which the caller holds. It may read files.
-/// The same frame may be requested more than once, and one frame is held at a time.
+/// Returns the level set of a frame, for example from a file. Frame 0 is passed separately and
+/// never requested. A frame may be requested more than once. Only one returned level set is kept at
+/// a time.
 using BandFrames = std::function<levelset::NarrowBand(std::size_t frame)>;
 
 struct AnimationOptions {
   std::size_t frames = 2;  ///< number of frames
   CarryRule carry = CarryRule::Corners;
   BandFrames bases = {};  ///< empty: the base does not change
-  PatchMaker make = {};   ///< builds patches like those of the first key
-  /// Factor for the drift warning. It is issued when the sides or diagonals of a carried patch have
-  /// changed by more than this factor since its key.
+  PatchMaker make = {};   ///< rebuilds patches like those of the first key at new positions
+  /// Factor for the drift warning. It is issued when a side or diagonal of a carried patch has
+  /// become longer or shorter than at its key by more than this factor.
   double driftWarning = 1.5;
   levelset::Progress progress = {};
 };
@@ -57,12 +61,12 @@ struct FrameReport {
   std::vector<std::array<Imath::V3d, 4>> corners;  ///< corners of each outline
   /// Largest displacement of a corner since the previous frame, world units.
   double farthestMove = 0;
-  Drift drift = {};         ///< of the worst outline, relative to the previous or next key
-  bool isRemade = false;    ///< true: the patches had to be rebuilt
+  Drift drift = {};       ///< largest drift of an outline, relative to the previous or the next key
+  bool isRemade = false;  ///< true: the patches were rebuilt
   std::size_t skipped = 0;  ///< patches left out because they fold, see TextureOptions::skipFolds
 };
 
-/// Data of one frame for the caller's visitor. References are valid during the call.
+/// Data of one frame, passed to `visit` of animatePatches(). References are valid during the call.
 struct PatchFrame {
   std::size_t index = 0;
   const levelset::NarrowBand& base;
@@ -74,18 +78,19 @@ struct PatchFrame {
 
 struct AnimationReport {
   std::vector<FrameReport> frames;
-  std::size_t patchesMade = 0;  ///< number of frames whose patches had to be rebuilt
-  std::size_t reused = 0;       ///< number of frames equal to the previous one, texture included
+  std::size_t patchesMade = 0;  ///< number of frames whose patches were rebuilt
+  std::size_t reused = 0;       ///< number of frames whose base, patches and texture did not change
   /// Messages of all frames ("frame 3: …"), each reported for its first frame.
   std::vector<std::string> warnings, notes;
 };
 
 /// Carries and moves patches from frame to frame, and calls `visit` for each frame.
 ///
-/// Between two keys the patches of the first are carried forwards along the bases, and those of the
-/// second backwards. At frame f the patches are interpolated between the two by (f − f₀) / (f₁ −
-/// f₀) on the base of f, see PatchPath. At the frame of a key its patches are used unchanged. After
-/// the last key its patches are carried on. If nothing changes, nothing is rebuilt.
+/// Between two keys at the frames f₀ and f₁, the outlines of the first key are carried forwards
+/// along the bases, and the outlines of the second key backwards. At frame f the outlines are
+/// interpolated between both by (f − f₀) / (f₁ − f₀) on the base of f, see PatchPath, and the
+/// patches are rebuilt there. At the frame of a key its patches are used unchanged. After the last
+/// key its outlines are carried forwards. If nothing changes, nothing is rebuilt.
 /// @param base  base of frame 0
 /// @param keys  at least one, the first at frame 0, ordered by frame; all with the same number of
 ///         patches, mirrored alike
@@ -101,13 +106,13 @@ struct AnimationReport {
 
 struct TextureAnimationOptions {
   AnimationOptions animation = {};
-  /// Options of the texture; its progress is ignored. If textures change and no box is given, the
-  /// box of frame 0 is used for all. An RBF map continues the texture outside that box; a prism map
-  /// cuts it off, with a warning.
+  /// Options of the texture; the member `progress` is ignored. If the texture changes and no box is
+  /// given, all frames use the texture's box at frame 0. An RBF map continues the texture outside
+  /// that box; a prism map cuts it off, with a warning.
   TextureOptions texture = {};
   BandFrames textures = {};  ///< empty: the texture does not change
-  /// Changes the patches before the texture is mapped, once if they do not change; empty: no
-  /// change.
+  /// Changes the patches of a frame before the texture is mapped. It is called only for frames
+  /// whose base or patches differ from those of the previous frame. Empty: no change.
   std::function<std::vector<Patch>(const PatchFrame& frame)> improve = {};
 };
 

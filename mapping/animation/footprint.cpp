@@ -20,14 +20,14 @@ using Imath::V2d;
 using Imath::V3d;
 using levelset::NarrowBand;
 
-/// Finds the tangent vector at the centre whose geodesic ends at `goal`. It starts with that of the
-/// geodesic between the two points and corrects it by the miss of a traced geodesic. The correction
-/// treats the surface as flat, which is inexact by the spreading of geodesics, so each step reduces
-/// the miss.
+/// Finds the tangent vector at the centre whose geodesic, traced over the vector's length, ends at
+/// `goal`. Starts with direction and length of the shortest path. Each step traces the geodesic and
+/// corrects the vector by the gap to `goal`, as if the surface were flat. Since geodesics spread on
+/// a curved surface, a step reduces the gap but does not close it. Returns none if a gap remains.
 std::optional<V3d> geodesicTo(const SurfaceField& field, const SurfaceFrame& frame,
                               const V3d& goal) {
   constexpr int kMostShots = 24;
-  constexpr double kHit = 1e-4, kNear = 0.05;  // voxels
+  constexpr double kHit = 1e-4, kNear = 0.05;  // gaps at which to stop and to accept, voxels
   const std::vector<V3d> path = geodesic(field, 0, frame.centre, goal);
   if (path.size() < 2) return {};
   V3d best = frame.inPlane(path[1] - path[0]).normalized() * pathLength(path);
@@ -97,7 +97,7 @@ Footprint footprintOf(const NarrowBand& base, const PatchOutline& outline) {
   const std::array<V3d, 4>& c = footprint.corners;
   const V3d u = outline.direction ? *outline.direction : c[1] + c[2] - c[0] - c[3];
   V3d direction = frame.inPlane(u);
-  // For a patch that goes all around something, any direction is suitable.
+  // The corners of a patch that goes all around an object give no direction; any one is suitable.
   if (!(direction.length() > 1e-3 * u.length())) direction = eastOf(frame.normal);
   footprint.direction = direction.normalized();
   footprint.normal = frame.normal;

@@ -11,17 +11,17 @@
 /// Footprint of a patch on a surface, and how a moving surface carries it [Brodersen07 §10.2].
 namespace mapping {
 
-/// Data from which a patch can be rebuilt elsewhere.
+/// Data from which a patch can be rebuilt at another position.
 struct PatchOutline {
   std::array<Imath::V3d, 4> corners;
-  Imath::V3d middle;  ///< about where the middles of opposite sides connect
-  /// Direction of u at `middle`, which is then the centre, as for a decal; empty: derived from the
-  /// corners.
+  Imath::V3d middle;  ///< middle of the patch on the surface, approximate
+  /// Direction of u at `middle`, for a patch that was placed around this point as a decal; empty:
+  /// it is derived from the corners.
   std::optional<Imath::V3d> direction = {};
   double height = 0;  ///< world units, positive
 };
 
-/// Outline of a patch: its corners, and the middle of its particles on the surface.
+/// Outline of a patch: its corners, its height, and the middle of its particles on the surface.
 [[nodiscard]] PatchOutline outlineOf(const Patch& patch);
 
 /// Footprint of a patch on one base: its corners, absolute and relative to its centre.
@@ -29,45 +29,51 @@ struct Footprint {
   std::array<Imath::V3d, 4> corners;  ///< on the zero set
   /// Point on the zero set; unit direction of u; unit normal.
   Imath::V3d centre, direction, normal;
-  std::optional<std::array<Imath::V2d, 4>> reach = {};  ///< see withReach
-  double height = 0;
+  /// Geodesic coordinates of the corners relative to the centre, see withReach(); empty: unknown.
+  std::optional<std::array<Imath::V2d, 4>> reach = {};
+  double height = 0;  ///< height of the patch, world units
   [[nodiscard]] bool operator==(const Footprint&) const = default;
 };
 
-/// Projects the corners and the middle of an outline along φ.
-/// @throws InvalidInput if there is no surface, or it is further away than its diagonal
+/// Moves the corners and the middle of an outline to the closest points of the zero set.
+/// @throws InvalidInput if there is no surface, or if a point is further from it than the diagonal
+/// of
+///         the zero set's box
 [[nodiscard]] Footprint footprintOf(const levelset::NarrowBand& base, const PatchOutline& outline);
 
 /// Adds the geodesic coordinates of the corners relative to the centre: world units along u and
-/// along v, which is anticlockwise from u seen from outside. If the outline has no direction, the
-/// direction becomes the mean one from corners 0 and 3 to corners 1 and 2. `reach` stays empty if
-/// no geodesic from the centre ends at a corner.
+/// along v, which is anticlockwise from u seen from outside. `reach` stays empty if no geodesic
+/// from the centre ends at a corner.
+/// @param keepsDirection  false: the direction becomes the mean direction from corners 0 and 3 to
+///         corners 1 and 2
 [[nodiscard]] Footprint withReach(const levelset::NarrowBand& base, Footprint footprint,
                                   bool keepsDirection = false);
 
 enum class CarryRule {
   Corners,  ///< each corner goes to the nearest point of the new surface [Brodersen07 §10.2]
-  /// Moves the centre, rotates u by the least rotation, and keeps the geodesic coordinates of the
-  /// corners, so that the patch keeps its shape.
+  /// Moves the centre to the nearest point, rotates u by the least rotation between the normals,
+  /// and keeps the geodesic coordinates of the corners, so that the patch keeps its shape.
   Rigid
 };
 
 /// Carries a footprint to a base that moved a little. Only the shape of the base is known, so
 /// motion of the surface along itself, as of a rotating ball, has no effect.
-/// @param footprint  with a reach under CarryRule::Rigid
-/// @throws InvalidInput if there is no surface, or it breaks off before a corner
+/// @param footprint  footprint on the previous base; CarryRule::Rigid needs its `reach`
+/// @throws InvalidInput if there is no surface, or if it breaks off between the centre and a corner
 [[nodiscard]] Footprint carryFootprint(const levelset::NarrowBand& base, const Footprint& footprint,
                                        CarryRule rule);
 
-/// Largest displacement of a corner.
+/// Largest displacement of a corner, world units.
 [[nodiscard]] double farthestMove(const Footprint& from, const Footprint& to);
 
-/// Ratios of the straight lengths of the sides and diagonals to those of another footprint.
+/// Least and largest ratio of the straight length of a side or diagonal to its length in an earlier
+/// footprint.
 struct Drift {
   double least = 1, most = 1;
   /// Largest factor of growth or shrinkage, at least 1.
   [[nodiscard]] double factor() const;
 };
+/// Computes the ratios of the lengths in `now` to those in `first`.
 [[nodiscard]] Drift driftBetween(const Footprint& first, const Footprint& now);
 
 /// Moves a point rigidly with a footprint: u, v and the normal are rotated into those of the other

@@ -20,9 +20,10 @@ using Imath::V2d;
 using Imath::V3d;
 using levelset::InvalidInput;
 
-constexpr double kNoDistance = 1e-6;  // voxels; shorter paths count as no path
+constexpr double kNoDistance = 1e-6;  // voxels; points closer than this count as equal
 
-/// Finds the segment of a path at a share of the path's length, and the share of that segment.
+/// Finds the point at the share `part` of a path's length: the index of its segment, and the share
+/// of the segment's length up to the point.
 std::pair<std::size_t, double> segmentAt(const std::vector<V3d>& path, double part) {
   double left = part * pathLength(path);
   for (std::size_t i = 1; i < path.size(); ++i) {
@@ -34,7 +35,7 @@ std::pair<std::size_t, double> segmentAt(const std::vector<V3d>& path, double pa
   return {0, 0};
 }
 
-/// Interpolates along a path, and projects the result onto the surface.
+/// Point at the share `part` of a path's length, projected onto the surface.
 V3d pointOn(const SurfaceField& field, const std::vector<V3d>& path, double part) {
   const auto [i, share] = segmentAt(path, part);
   V3d p = path[i] + (path[i + 1] - path[i]) * share;
@@ -125,7 +126,7 @@ SurfaceFrame PatchPath::frameAt(double part) const {
 }
 
 void PatchPath::findCornerPaths() {
-  constexpr double kJump = 4;  // multiple of a corner's mean step
+  constexpr double kJump = 4;  // largest step of a corner, as a multiple of its mean step
   const SurfaceField field(base_);
   const double voxel = base_.voxelSize();
   double farthest = pathLength(path_);
@@ -165,7 +166,7 @@ Footprint PatchPath::at(double part) const {
   if (part <= 0) return from_;
   if (part >= 1) return to_;
   Footprint result = from_;
-  // Equal bits if the heights are equal.
+  // If both heights are equal, this form yields the same bits.
   result.height = from_.height + (to_.height - from_.height) * part;
   if (isConstant_) return result;
   const SurfaceField field(base_);

@@ -16,9 +16,9 @@ struct SurfaceFrame;
 ///
 /// The centre moves along a geodesic. u is transported along it, and the angle that remains at the
 /// end is distributed evenly, so that patches may rotate. Under CarryRule::Corners each corner has
-/// its own geodesic, as in the thesis. It is straightened from a path beside the centre's path, so
-/// that around a pipe all corners go around the same side. Under CarryRule::Rigid the shape is
-/// interpolated evenly.
+/// its own geodesic, as in the thesis. The geodesic is obtained by straightening a path beside the
+/// centre's path, so that around a pipe all corners go around the same side. Under CarryRule::Rigid
+/// the geodesic coordinates of the corners are interpolated linearly.
 class PatchPath {
  public:
   /// Computes the path.
@@ -39,12 +39,12 @@ class PatchPath {
   void setBase(const levelset::NarrowBand& base) { base_ = base; }
 
   [[nodiscard]] const std::vector<Imath::V3d>& centrePath() const { return path_; }
-  /// True if the corners move beside the centre. Otherwise each corner takes its own shortest path,
-  /// which may lead around the other side.
+  /// True if the paths of the corners follow the centre's path. Otherwise each corner takes its own
+  /// shortest path, which may lead around the other side of the object.
   [[nodiscard]] bool isAlike() const { return isAlike_; }
   /// Rotation of u on the path relative to parallel transport, radians, between −π and π.
   [[nodiscard]] double turn() const { return turn_; }
-  /// True if there was a guide that could not be followed.
+  /// True if the path could not follow the guide.
   [[nodiscard]] bool hasJumped() const { return hasJumped_; }
 
  private:

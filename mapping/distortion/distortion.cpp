@@ -16,8 +16,9 @@ namespace {
 
 using Imath::V3d;
 
-/// Least and largest singular value of texture → patch: the reciprocals of those of the scaled
-/// gradient.
+/// Least and largest singular value of the derivative of texture → patch, world units per world
+/// unit. They are the reciprocals of the singular values of the Jacobian, scaled by the texture's
+/// size.
 struct Stretch {
   double least, most;
 };
@@ -45,7 +46,7 @@ Spread spreadOf(std::vector<double> values) {
 
 std::vector<V3d> samplePoints(const Patch& patch, double embedDepth) {
   std::vector<V3d> points;
-  if (embedDepth != 0) {  // below the surface, or above the last layer
+  if (embedDepth != 0) {  // add points below the surface, or above the last layer
     const ParticleLayer& end = embedDepth > 0 ? patch.layers.front() : patch.layers.back();
     for (std::size_t j = 0; j < end.rows; ++j)
       for (std::size_t i = 0; i < end.columns; ++i)
@@ -93,7 +94,7 @@ Distortion surveyDistortion(std::span<const MapSample> samples, const V3d& textu
     stretches[2 * n] = stretch.least;
     stretches[2 * n + 1] = stretch.most;
   });
-  // The median is insensitive to slivers and folds.
+  // The median volume ratio is insensitive to slivers and folds.
   std::vector<double> volumes;
   for (const double jacobian : jacobians)
     if (jacobian > 0) volumes.push_back(1 / jacobian);

@@ -20,27 +20,30 @@ struct Spread {
 struct Distortion {
   /// Number of samples, and of samples where the map is inverted.
   std::size_t samples = 0, folded = 0;
-  Spread jacobian;  ///< det ∇Φ × median of its reciprocals; 1 for a box, ≤ 0 at folds
+  /// Jacobian determinant of patch → texture, times the median of its positive reciprocals; 1
+  /// everywhere for a box, ≤ 0 at folds.
+  Spread jacobian;
   /// Sample with the least Jacobian, in world and texture coordinates.
   Imath::V3d foldPoint{0}, foldUvw{0};
-  /// Singular values of texture → patch, world per world: least, largest, and quantiles over all.
+  /// Stretch: least and largest singular value of texture → patch at each sample, both lengths in
+  /// world units.
   Spread stretch;
-  /// Least stretch at and above the surface, where a union shows the texture.
+  /// Least stretch at and above the surface, where the texture is visible after a union.
   double leastAbove = 0;
-  double meanStretch = 0;  ///< third root of the median volume ratio
+  double meanStretch = 0;  ///< cube root of the median volume ratio, patch to texture
 };
 
 /// Texture coordinates of sample points: the particles, the middles of their cells, points between
 /// the layers, and points below the surface.
-/// @param embedDepth  depth of the points below the surface, in w
+/// @param embedDepth  depth of the points below the surface, in w; negative: height above w = 1
 [[nodiscard]] std::vector<Imath::V3d> samplePoints(const Patch& patch, double embedDepth);
 
 /// Evaluates a map at samplePoints.
 [[nodiscard]] std::vector<MapSample> sampleMap(const PatchMap& map, const Patch& patch,
                                                double embedDepth);
 
-/// Computes the distortion over samples.
-/// @param textureSize  size of the box that is mapped to the unit cube, world units
+/// Computes the distortion of a map from its samples.
+/// @param textureSize  size of the texture's box, which corresponds to the unit cube, world units
 /// @param isMirrored   true if the patch mirrors the texture on purpose
 /// @pre samples is not empty
 [[nodiscard]] Distortion surveyDistortion(std::span<const MapSample> samples,

@@ -19,7 +19,8 @@ namespace {
 
 using Imath::V3d;
 
-/// True for orders of the axes (even permutations) that give tetrahedra of positive volume.
+/// True if the tetrahedra with this order of the axes have a positive volume in texture space: even
+/// permutations.
 bool isEvenOrder(int order) {
   const auto& axes = Lattice::kOrders[static_cast<std::size_t>(order)];
   return (axes[0] + 1) % 3 == axes[1];
@@ -35,10 +36,10 @@ V3d middleOf(const Lattice::Corners& c) {
 
 /// Results for one cell.
 struct CellVolume {
-  double size = 0, folded = 0, undecided = 0;  ///< volumes of texture space
-  double typical = 0;                          ///< determinant of texture → patch
+  double size = 0, folded = 0, undecided = 0;  ///< volumes in texture space
+  double typical = 0;                          ///< typical determinant of texture → patch
   bool folds = false;
-  FoldPoint least;  ///< its Jacobian is not yet divided by the median
+  FoldPoint least;  ///< point with the least determinant, not yet divided by the median
   std::size_t pieces = 0;
 };
 

@@ -25,8 +25,8 @@ enum class FoldVerdict {
 
 /// A point where a map is inverted.
 struct FoldPoint {
-  Imath::V3d position{0}, uvw{0};
-  double jacobian = 0;  ///< in the unit of FoldCertificate::leastJacobian
+  Imath::V3d position{0}, uvw{0};  ///< world position; texture coordinates
+  double jacobian = 0;             ///< in the unit of FoldCertificate::leastJacobian
 };
 
 struct FoldCertificate {
@@ -54,15 +54,16 @@ struct FoldCertificate {
 /// Certifies the piecewise linear map of the particle layers (see layer_map.h) by the Bernstein
 /// coefficients of the determinant of each trilinear cell. A determinant that is zero within
 /// rounding errors counts as a fold.
-/// @param embedDepth  in w, see PrismCells
+/// @param embedDepth  depth of the texture below the surface, in w; negative: its lift above w = 1
 [[nodiscard]] FoldCertificate certifyLayers(const Patch& patch, double embedDepth);
 
-/// Certifies a smooth map. In a box around c the Jacobian is J(c) (I + E). The bound on |E| comes
-/// from the Taylor polynomials of the far particles and the kinks of the near ones. If |E| < 1, the
-/// determinant has the sign of det J(c) in the entire box. Boxes are halved until they are decided,
-/// or until their number exceeds a limit. The boxes cover the cells of the particles, where the map
-/// sends them into the unit cube or down to `embedDepth` below it. The bounds hold for φ(r) = r.
-/// For other kernels nothing is decided, and the least Jacobian is not searched.
+/// Certifies a smooth map (an RBF map). In a cube around c the Jacobian is J(c) (I + E). The bound
+/// on |E| comes from the Taylor polynomials of the far particles and from the near particles, at
+/// which the map is not smooth. If |E| < 1, the determinant has the sign of det J(c) in the entire
+/// cube. Cubes are halved until they are decided, or until their number exceeds a limit. The cubes
+/// cover the cells of the particles, as far as the map sends them into the unit cube or down to
+/// `embedDepth` below it. The bounds hold for the kernel φ(r) = r. With other kernels the map stays
+/// undecided, and `leastJacobian` is NaN.
 [[nodiscard]] FoldCertificate certifyRbf(const RbfMap& map, const Patch& patch, double embedDepth);
 
 /// Combines several certificates. Pieces are summed; shares and the least Jacobian are those of the
@@ -70,8 +71,8 @@ struct FoldCertificate {
 /// @pre certificates is not empty
 [[nodiscard]] FoldCertificate worstOf(std::span<const FoldCertificate> certificates);
 
-/// Computes texture coordinates and Jacobians of the smooth map at the positions of the samples.
-/// Far particles are summed by polynomials, accurate to 1e-5 of the mean slope.
+/// Computes texture coordinates and Jacobians of a smooth map at the positions of the samples. Far
+/// particles are summed by polynomials; the error of the slopes is at most 1e-5 of the mean slope.
 void evaluateRbf(const RbfMap& map, const Patch& patch, std::vector<MapSample>& samples);
 
 /// Samples a smooth map like sampleMap in distortion.h, by evaluateRbf if there are many particles.

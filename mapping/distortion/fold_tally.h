@@ -9,22 +9,22 @@
 
 namespace mapping {
 
-/// Sorts folds, the worst first, and keeps the number that is reported.
+/// Sorts folds, the worst first, and keeps the first kMostPoints.
 inline void keepWorst(std::vector<FoldPoint>& places) {
   std::stable_sort(places.begin(), places.end(),
                    [](const FoldPoint& a, const FoldPoint& b) { return a.jacobian < b.jacobian; });
   places.resize(std::min(places.size(), FoldCertificate::kMostPoints));
 }
 
-/// Accumulates the results of the parts of a map, in their order.
+/// Accumulates the results of the cells or cubes of a map, in order, into a certificate.
 struct FoldTally {
   FoldCertificate certificate = {};
 
   void addVolume(double size, double folded, double undecided) {
     size_ += size, folded_ += folded, undecided_ += undecided;
   }
-  /// Adds the determinants of one part.
-  /// @param typical  typical determinant, for the median
+  /// Adds two determinants of a cell or cube.
+  /// @param typical  typical determinant, for the median; ignored unless positive
   /// @param least    least determinant
   void addDeterminant(double typical, double least) {
     if (typical > 0) typical_.push_back(typical);

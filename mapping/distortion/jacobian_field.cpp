@@ -22,7 +22,7 @@ using Imath::Box3d;
 using Imath::V3d;
 using levelset::FieldGrid;
 
-/// Grid that keeps the least of several values at a point.
+/// Grid in which each grid point keeps the least of the values that are added to it.
 class LeastGrid {
  public:
   explicit LeastGrid(double voxelSize)
@@ -75,8 +75,8 @@ class LeastGrid {
   openvdb::FloatGrid::Accessor accessor_;
 };
 
-/// Checks the options and the memory estimate. It bounds the grid points of all cells before the
-/// grid is built.
+/// Checks the options and the memory estimate before the grid is built. The estimate counts the
+/// grid points in the bounding boxes of all cells.
 void checkField(const Patch& patch, const JacobianFieldOptions& options) {
   if (!(options.voxelSize > 0) || !std::isfinite(options.voxelSize)) {
     throw levelset::UsageError(
@@ -106,7 +106,8 @@ void checkField(const Patch& patch, const JacobianFieldOptions& options) {
   levelset::requireMemory(points * kBytesPerPoint, options.maxMemory);
 }
 
-/// Corners of one of a cell's six tetrahedra, as bits of the corner index.
+/// Corners of one of a cell's six tetrahedra, as corner indices of the cell. Bits 0, 1 and 2 of an
+/// index select the upper end of u, v and w.
 std::array<std::size_t, 4> tetrahedronOf(int order) {
   const auto& axes = Lattice::kOrders[static_cast<std::size_t>(order)];
   std::array<std::size_t, 4> corners = {0, 0, 0, 7};

@@ -23,7 +23,8 @@ using Imath::Box3d;
 using Imath::M33d;
 using Imath::V3d;
 
-// Tolerances of the far particles' slopes; a map that preserves lengths has slopes of 1.
+// Largest errors of the sum of the far particles' slopes, for a certificate and for samples. A map
+// that preserves lengths has slopes of 1.
 constexpr double kProofTolerance = 1e-2;
 constexpr double kSlopeTolerance = 1e-5;
 // Margin of the bounds for rounding errors.
@@ -31,16 +32,16 @@ constexpr double kProofRounding = 1e-9;
 // Largest number of cubes tested within one cube of the size of a particle's cell. The second limit
 // applies if the first leaves cubes undecided and no fold was found.
 constexpr std::size_t kFewCubes = 80, kMostCubes = 800;
-constexpr double kSmallestCube = 1.0 / 32;  // mean particle spacings
+constexpr double kSmallestCube = 1.0 / 32;  // half edge length, mean particle spacings
 
 V3d rowOf(const M33d& m, int k) {
   return {m[k][0], m[k][1], m[k][2]};
 }
 
-/// Second derivatives xx, yy, zz, xy, xz, yz of three functions, each as a vector.
+/// Second derivatives xx, yy, zz, xy, xz, yz of u, v and w, each a vector of three.
 using Curvature = std::array<V3d, 6>;
 
-/// Change of the slopes from the middle of a cube to `s`, as columns.
+/// Change of the slopes from the middle of a cube to the point at offset `s`, as columns.
 std::array<V3d, 3> changeAt(const Curvature& h, const V3d& s) {
   return {h[0] * s.x + h[3] * s.y + h[4] * s.z, h[3] * s.x + h[1] * s.y + h[5] * s.z,
           h[4] * s.x + h[5] * s.y + h[2] * s.z};
@@ -57,15 +58,18 @@ struct CubeSlopes {
   double determinant = 0;
 };
 
-/// Bound on the change of the direction to a particle in a ball, and the approximation at its
-/// middle.
+/// Approximation of the unit vector from a near particle to the points of a ball, and the bound on
+/// its error.
 struct KinkBound {
+  /// Curved: value and derivative in the middle. Straight: value in the middle. Any: zero.
   enum class Kind { Curved, Straight, Any } kind = Kind::Any;
   double error = 1;
 };
 
+/// @param ratio  radius of the ball divided by the distance of its middle from the particle
 KinkBound kinkBound(double ratio) {
-  // Beyond the second derivative, the series bounded in RbfCubes begins with |s|² / |x|².
+  // The factor of ratioⁿ in the Taylor series of the unit vector is at most √((n + 1) / n). Without
+  // value and derivative, the series begins with n = 2.
   constexpr double kCurved = 0.45, kStraight = 0.86, kSecond = 1.2247448713915890;
   if (ratio < kCurved) return {KinkBound::Kind::Curved, kSecond * ratio * ratio / (1 - ratio)};
   if (ratio < kStraight) return {KinkBound::Kind::Straight, 2 * std::sin(0.5 * std::asin(ratio))};
@@ -109,8 +113,9 @@ CubeSlopes slopesIn(const RbfCubes& cubes, const RbfCube& cube) {
   return result;
 }
 
-/// Computes the bounds. Multiplying by the inverse of the slopes in the middle removes their common
-/// part.
+/// Bounds the change of the slopes in the cube: for each row, and relative to the slopes in the
+/// middle. For the relative bound, each change is multiplied by the inverse of these slopes before
+/// its norm is taken.
 void boundSlopes(const RbfCubes& cubes, const RbfCube& cube, CubeSlopes& at) {
   at.determinant = at.slopes.determinant();
   const std::array<V3d, 3> inverse =
@@ -127,7 +132,7 @@ void boundSlopes(const RbfCubes& cubes, const RbfCube& cube, CubeSlopes& at) {
     stray += applyColumns(inverse, particle.weight).length() * bound.error;
     for (int k = 0; k < 3; ++k) at.rowStray[k] += std::abs(particle.weight[k]) * bound.error;
   }
-  // Beyond the curvature, the polynomial's slopes are bounded by the sum of their terms.
+  // Terms of degree 3 and more change the slopes by at most the sum of their largest slopes.
   for (std::size_t n = 10; n < TaylorPolynomial::kTerms; ++n) {
     const auto& p = TaylorPolynomial::powers()[n];
     const double power = std::pow(cube.half, p.total() - 1);
@@ -135,7 +140,8 @@ void boundSlopes(const RbfCubes& cubes, const RbfCube& cube, CubeSlopes& at) {
     stray += applyColumns(inverse, cube.far[n]).length() * slope;
     for (int k = 0; k < 3; ++k) at.rowStray[k] += std::abs(cube.far[n][k]) * slope;
   }
-  // The norm of a linear function is largest at a corner, and equal at opposite corners.
+  // The curvature changes the slopes linearly. The norm of a linear function is largest at a corner
+  // of the cube, and equal at opposite corners.
   double bend = 0;
   V3d rowBend(0);
   for (int corner = 0; corner < 4; ++corner) {
@@ -162,9 +168,10 @@ struct ProofScene {
   const CellTree& tree;
   V3d origin, sizes;
   Box3d wanted;  ///< range of u, v and w that the texture covers
+  /// Sign of the determinant without folds; least half edge of a cube that is halved, world units.
   double hand, smallest;
 
-  /// True if cells of the particles extend into the cube.
+  /// True if cells of the particles extend into the cube of half edge `half` around the centre.
   [[nodiscard]] bool isInPatch(const RbfCube& cube, double half) const {
     const V3d middle = cube.center + origin;
     return tree.visit({middle - V3d(half), middle + V3d(half)},
@@ -197,7 +204,7 @@ bool isCenterWanted(const ProofScene& scene, const RbfCube& cube, const CubeSlop
   return scene.wanted.intersects(at.value / scene.sizes) && scene.isInPatch(cube, 0);
 }
 
-/// Evaluates the determinant in the middle of a cube.
+/// Evaluates the determinant in the middle of a cube and adds it to `proof`.
 /// @pre isCenterWanted
 void lookAtCenter(const ProofScene& scene, const RbfCube& cube, const CubeSlopes& at,
                   CubeProof& proof) {
@@ -285,7 +292,8 @@ Box3d worldBoxOf(const Lattice& lattice) {
   return box;
 }
 
-/// Distributes the samples to octants until each holds few, and evaluates them there.
+/// Distributes the samples to octants until each has few, and evaluates them there.
+/// @param chosen  indices of the samples in the cube
 void fillWithin(const RbfCubes& cubes, const V3d& origin, const V3d& sizes, const RbfCube& cube,
                 std::vector<std::uint32_t> chosen, std::vector<MapSample>& samples) {
   constexpr std::size_t kFewSamples = 16;

@@ -45,7 +45,8 @@ NodeWeights<Nodes, Out> interpolation(const std::array<double, Out>& at) {
   return weights;
 }
 
-/// Applies weights along each axis of a cube of node values.
+/// Applies the weights `a`, `b` and `c` along the three axes of a cube of In³ node values. Writes
+/// Out³ values to `result`, the last axis fastest.
 template <std::size_t In, std::size_t Out>
 void transformCube(const NodeWeights<In, Out>& a, const NodeWeights<In, Out>& b,
                    const NodeWeights<In, Out>& c, const double* nodes, double* result) {

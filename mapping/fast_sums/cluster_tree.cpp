@@ -102,7 +102,8 @@ std::vector<std::uint32_t> ClusterTree::around(const Box3d& box, std::size_t cou
   std::vector<Far> found;
   std::priority_queue<Far, std::vector<Far>, std::greater<>> open;  // nodes, ordered by distance
   open.emplace(squaredGap(nodes_[0].box, box), 0);
-  // Points found are final up to the distance of the nearest node that is still open.
+  // Squared distance of the farthest of the `count` nearest points found so far; infinite until
+  // there are `count` points. Nodes beyond it cannot contain a nearer point.
   double reach = std::numeric_limits<double>::infinity();
   while (!open.empty() && open.top().first <= reach) {
     const Node& node = nodes_[open.top().second];

@@ -10,11 +10,11 @@
 
 namespace mapping {
 
-/// Squared distance of two boxes; 0 where they touch.
+/// Squared distance between two boxes; 0 if they touch or overlap.
 [[nodiscard]] double squaredGap(const Imath::Box3d& a, const Imath::Box3d& b);
 
 /// A balanced binary tree of points with tight boxes. Each node is split across its longest side at
-/// the median point. It refers to the points.
+/// the median point. The tree does not copy the points; they must outlive it.
 class ClusterTree {
  public:
   struct Node {
@@ -30,14 +30,15 @@ class ClusterTree {
   /// @pre there is at least one point, and fewer than 2³¹
   ClusterTree(std::span<const Imath::V3d> points, std::size_t leafSize);
 
-  /// The same tree for the points reordered into its order; it refers to the reordered points.
+  /// Copy of the tree for the same points sorted by order(). The sorted points must outlive the
+  /// copy.
   [[nodiscard]] ClusterTree inOrder(std::span<const Imath::V3d> orderedPoints) const;
   /// Nodes, parents before children, the root first.
   [[nodiscard]] std::span<const Node> nodes() const { return nodes_; }
   /// Indices of the points, leaf by leaf.
   [[nodiscard]] std::span<const std::uint32_t> order() const { return order_; }
-  /// Index of the nearest other point, the lower index in a tie; `point` itself if there is no
-  /// other.
+  /// Index of the point nearest to the point with index `point`, the lower index in a tie; `point`
+  /// itself if there is no other.
   [[nodiscard]] std::uint32_t nearest(std::uint32_t point) const;
   /// All points within `radius` of `center`, in the order of the tree.
   [[nodiscard]] std::vector<std::uint32_t> within(const Imath::V3d& center, double radius) const;

@@ -9,7 +9,8 @@
 /// Variants of the vector code behind addRbfSums, for tests that compare them.
 namespace mapping {
 
-/// Adds the sums of `count` chosen particles, of six numbers each, at `points` points.
+/// Adds the contributions of `count` particles to u, v and w at `points` points. `particles` has
+/// six numbers for each particle: position and weights. `chosen` has the indices of the particles.
 using RbfAdder = void (*)(const double* particles, const std::uint32_t* chosen, std::size_t count,
                           const double* x, const double* y, const double* z, double* u, double* v,
                           double* w, std::size_t points);
@@ -17,7 +18,7 @@ using RbfAdder = void (*)(const double* particles, const std::uint32_t* chosen, 
 /// The loops for all kernels, compiled for one instruction set.
 struct RbfAdders {
   const char* name;      ///< plain, avx2, avx512
-  const RbfAdder* each;  ///< one for each RbfKernel, in its order
+  const RbfAdder* each;  ///< array with one function for each RbfKernel, in the order of the enum
 };
 
 /// Variants that the processor supports, ordered from scalar to the widest.

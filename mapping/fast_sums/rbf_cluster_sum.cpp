@@ -11,9 +11,9 @@ using Imath::V3d;
 
 namespace {
 
-// Boxes are far from each other if their gap exceeds this multiple of the larger radius.
+// Two boxes are far from each other if their gap exceeds this multiple of the larger radius.
 constexpr double kFarGap = 1;
-constexpr std::size_t kSequential = 2000;  // nodes with fewer points are not worth two tasks
+constexpr std::size_t kSequential = 2000;  // children of nodes with fewer points run in one task
 
 }  // namespace
 
@@ -107,7 +107,8 @@ void RbfClusterSum::addSources(std::size_t at, std::vector<std::uint32_t>& sourc
     sources.push_back(static_cast<std::uint32_t>(first + n));
 }
 
-/// Divides the candidates into sources that are summed at the node, and the rest for its children.
+/// Divides the candidate nodes: `sources` gets the particles and Chebyshev nodes that are summed at
+/// this node, `rest` the nodes that are too near and are left to its children.
 void RbfClusterSum::chooseSources(std::size_t at, std::span<const std::uint32_t> candidates,
                                   std::vector<std::uint32_t>& sources,
                                   std::vector<std::uint32_t>& rest) const {

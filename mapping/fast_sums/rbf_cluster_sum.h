@@ -13,14 +13,16 @@
 
 namespace mapping {
 
-/// Sums over all particles at all particles in about n log n operations, for any kernel [Fong09].
-/// The particles of a box are replaced by weights at its Chebyshev nodes, and their sums at a
-/// distant box are evaluated at the nodes of that box. The error has no bound; addRbfSums gives the
-/// exact value.
+/// Computes the RBF sum of n particles at each of these particles in about n log n operations, for
+/// any kernel [Fong09]. The particles of a box are replaced by weights at its Chebyshev nodes.
+/// Their sum in a distant box is evaluated at the nodes of that box and interpolated. The error has
+/// no proven bound; addRbfSums() gives the exact value.
 class RbfClusterSum {
  public:
-  /// @param points  in the order of their tree, so that its order() is 0, 1, 2, …; referred to
-  /// @param nodes   nodes of that tree; referred to
+  /// @param points  particles in the order of a ClusterTree, so that its order() is 0, 1, 2, …;
+  /// must
+  ///                outlive this object
+  /// @param nodes   nodes of that tree; must outlive this object
   RbfClusterSum(RbfKernel kernel, std::span<const Imath::V3d> points,
                 std::span<const ClusterTree::Node> nodes);
 
@@ -28,10 +30,10 @@ class RbfClusterSum {
   [[nodiscard]] std::vector<Imath::V3d> operator()(std::span<const Imath::V3d> weights) const;
 
  private:
-  static constexpr std::size_t kNodes = 7;  ///< along each axis
+  static constexpr std::size_t kNodes = 7;  ///< number of Chebyshev nodes along each axis
   static constexpr std::size_t kCubeNodes = kNodes * kNodes * kNodes;
   using Cube = std::array<double, kCubeNodes>;
-  using Cubes = std::array<Cube, 3>;  ///< values for u, v and w
+  using Cubes = std::array<Cube, 3>;  ///< values at the nodes for u, v and w
   using Shift = std::array<NodeWeights<kNodes, kNodes>, 3>;
 
   /// Position and size of a box's node cube.
@@ -48,7 +50,7 @@ class RbfClusterSum {
   void gatherLeaf(std::size_t node, Pass& pass) const;
   void descend(std::size_t node, std::span<const std::uint32_t> candidates, const Cubes& inherited,
                Pass& pass) const;
-  /// True if a box has no more particles than nodes, so that dividing it saves nothing.
+  /// True if a box has no more particles than Chebyshev nodes, so that dividing it saves nothing.
   [[nodiscard]] bool isBottom(std::size_t node) const {
     return nodes_[node].isLeaf() || nodes_[node].count() <= kCubeNodes;
   }

@@ -9,8 +9,8 @@ namespace mapping {
 
 /// φ takes r in mean particle spacings, so that a map does not depend on the unit of length. For
 /// homogeneous kernels (r, r³) the map does not depend on the spacing either, apart from the
-/// meaning of λ. The same holds for r² log r, which is homogeneous up to a polynomial that the side
-/// conditions cancel.
+/// scale of the relaxation λ. The same holds for r² log r, which is homogeneous up to a
+/// polynomial that the side conditions cancel.
 enum class RbfKernel : std::uint8_t {
   Biharmonic,   ///< r: conditionally negative definite of order 1, least bending
   Triharmonic,  ///< r³: conditionally positive definite of order 2
@@ -35,8 +35,9 @@ enum class RbfKernel : std::uint8_t {
 /// ch. 8]. So linear polynomials, order 2, suffice for all six kernels.
 namespace rbf {
 
-/// Bound from Gegenbauer polynomials: on a line at distance r, |x − p| = r √(1 − 2ct + t²) is their
-/// generating function. Its coefficient at t⁶ is (P₄ − P₆)(c)/11, which is largest at c = 0.
+/// sixth() follows from Gegenbauer polynomials. Along a line, |x − p| = r √(1 − 2ct + t²) is their
+/// generating function, with the step t in units of r and the cosine c. Its coefficient at t⁶ is
+/// (P₄ − P₆)(c)/11, which is largest at c = 0.
 struct Biharmonic {
   static constexpr double kSign = -1;
   static double value(double r) { return r; }
@@ -50,8 +51,8 @@ struct Biharmonic {
   static double farBound(double) { return HUGE_VAL; }
 };
 
-/// The coefficient of (1 − 2ct + t²)^(3/2) at t⁶ is (1 − c²)²(7c² − 1)/16, which is largest at c =
-/// 0.
+/// sixth(): the coefficient of (1 − 2ct + t²)^(3/2) at t⁶ is (1 − c²)²(7c² − 1)/16, of largest
+/// magnitude at c = 0.
 struct Triharmonic {
   static constexpr double kSign = 1;
   static double value(double r) { return r * r * r; }
@@ -62,8 +63,9 @@ struct Triharmonic {
   static double farBound(double) { return HUGE_VAL; }
 };
 
-/// With log(1 − 2ct + t²) = −Σ 2 T_n(c) tⁿ/n and q = 1 − 2ct + t², the coefficient of q log(q)/2 at
-/// t⁶ is T₆/30 − T₄/20. The Hessian has the eigenvalues 2 log r + 1 (twice) and 2 log r + 3.
+/// sixth(): with log(1 − 2ct + t²) = −Σ 2 T_n(c) tⁿ/n and q = 1 − 2ct + t², the coefficient of
+/// q log(q)/2 at t⁶ is T₆/30 − T₄/20, with Chebyshev polynomials T_n. bendBound(): the Hessian has
+/// the eigenvalues 2 log r + 1 (twice) and 2 log r + 3.
 struct ThinPlate {
   static constexpr double kSign = 1;
   static double value(double r) { return r > 0 ? r * r * std::log(r) : 0; }
@@ -116,7 +118,8 @@ struct LaplacianShape {
 };
 inline const LaplacianShape kLaplacian;
 
-/// Since the Fourier transform is positive, no second derivative exceeds the one at 0 in magnitude.
+/// Multi-order Laplacian. Since its Fourier transform is positive, no second derivative exceeds the
+/// one at 0 in magnitude.
 struct Laplacian {
   static constexpr double kSign = 1;
   static double value(double r) {
@@ -161,7 +164,7 @@ struct Laplacian {
   static double yukawa(double rate) { return std::min(17.66, 128 * std::exp(-0.433 * rate)); }
 };
 
-/// Uses Cramér's inequality: |H₆(t)| exp(−t²/2) ≤ 1.0865 · 2³ √6!.
+/// sixth() uses Cramér's inequality: |H₆(t)| exp(−t²/2) ≤ 1.0865 · 2³ √6!.
 struct Gaussian {
   static constexpr double kSign = 1;
   static double value(double r) { return std::exp(-r * r); }

@@ -1,5 +1,6 @@
-// Compiled with -O3 -fno-math-errno -fno-trapping-math, so that plain loops are vectorised. The
-// flags do not change the results: each point's sum runs over the particles in a fixed order.
+// This file is compiled with -O3 -fno-math-errno -fno-trapping-math, so that plain loops are
+// vectorised. The flags do not change the results: each point's sum runs over the particles in a
+// fixed order.
 
 #include "mapping/fast_sums/rbf_sum.h"
 
@@ -13,7 +14,7 @@
 namespace mapping {
 namespace {
 
-constexpr std::size_t kTile = 64;  // points; few enough for the first-level cache
+constexpr std::size_t kTile = 64;  // points per call of an adder; they fit the first-level cache
 
 const double kScale = rbf::kLaplacian.scale, kA = rbf::kLaplacian.a, kB = rbf::kLaplacian.b,
              kFast = rbf::kLaplacian.fast, kSlow = rbf::kLaplacian.slow;

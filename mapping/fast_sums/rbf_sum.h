@@ -16,8 +16,9 @@ struct RbfParticle {
   Imath::V3d position, weight;
 };
 
-/// Positions and sums of a set of points, one array for each component. Plain loops over the arrays
-/// are vectorised, with the instruction set chosen at run time; all variants give the same bits.
+/// Positions (x, y, z) and sums (u, v, w) of a set of points, one array for each component, so that
+/// plain loops over them are vectorised. The instruction set is chosen at run time; all give the
+/// same bits.
 struct RbfPoints {
   std::vector<double> x, y, z, u, v, w;
   explicit RbfPoints(std::size_t count)
