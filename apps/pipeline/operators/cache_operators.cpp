@@ -20,12 +20,16 @@ bool isShrink(const Invocation& in) {
 
 void validateCache(const Invocation& in) {
   if (isShrink(in) != in.given("max-size"))
-    throw UsageError(isShrink(in) ? "cache: gc needs --max-size, of what may stay, like 2G"
-                                  : "cache: --max-size is for gc; leave it out");
+    throw UsageError(isShrink(in)
+                         ? "cache: gc needs --max-size, the total size of the results to keep, as "
+                           "in --max-size 2G"
+                         : "cache: --max-size applies only to gc; leave it out, or write gc");
   std::error_code ignored;
   if (!std::filesystem::is_directory(std::filesystem::path(in.text("folder")) / "results", ignored))
-    throw levelset::IoError(fmt::format(
-        "cache: '{}' holds no results; name the folder that --cache was given", in.text("folder")));
+    throw levelset::IoError(
+        fmt::format("cache: '{}' contains no results of earlier runs; name the folder of the "
+                    "global option --cache",
+                    in.text("folder")));
 }
 
 std::string ageOf(std::int64_t used) {
@@ -75,26 +79,28 @@ Operator cacheOperator() {
       .name = "cache",
       .group = "Results of earlier runs",
       .summary =
-          "list the results that --cache keeps in a folder, or remove the least recently used (gc)",
+          "list the results that the global option --cache stored in a folder, or remove the least "
+          "recently used ones (gc)",
       .details =
-          "The key of a result is made of the program, the action, its options and the content of "
-          "its operands and files. So no entry is ever wrong, though some may not be needed again. "
-          "Several programs may use the folder at the same time.",
+          "Each result is stored under a key, a hash of the program, the action, its options and "
+          "the content of its operands and files. So a stored result never becomes wrong, but it "
+          "may not be needed again. Several programs may use the folder at the same time.",
       .example = "levelsmith --cache kept sphere --radius 1 --voxel 0.1 ! offset 0.2 ! measure",
       .params = {{.name = "verb",
                   .type = ParamType::Choice,
-                  .doc = "list the results, or remove some",
+                  .doc = "list: list the results; gc: remove the least recently used results",
                   .choices = {"list", "gc"},
                   .required = true,
                   .position = 0},
                  {.name = "folder",
                   .type = ParamType::Path,
-                  .doc = "folder that --cache was given",
+                  .doc = "folder of the global option --cache",
                   .required = true,
                   .position = 1},
                  {.name = "max-size",
                   .type = ParamType::Bytes,
-                  .doc = "gc: memory to keep; the most recently used results stay"},
+                  .doc = "with gc: total size of the results to keep, as 2G; the least recently "
+                         "used results are removed"},
                  jsonParam()},
       .isRepeatable = false,
       .flow = Flow::PassesThrough,

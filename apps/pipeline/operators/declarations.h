@@ -2,8 +2,8 @@
 
 #include "apps/pipeline/registry/operator.h"
 
-/// Operators of files, textures, pictures and inspection, each of which describes itself in the
-/// pipeline. Those of level sets are described in levelset (level_set_operator.h).
+/// Operators for files, textures, pictures and inspection, which the pipeline itself describes. The
+/// operators on level sets are described in the library levelset, see level_set_operator.h.
 namespace pipeline {
 
 [[nodiscard]] Operator readOperator();

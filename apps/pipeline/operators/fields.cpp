@@ -32,14 +32,15 @@ levelset::Attribute attribute(const Invocation& in, const std::string& param) {
   if (named != in.named.end() && named->second.kind() == Kind::Field &&
       named->second.field().isVector())
     return {.vector = vectorField(in, param)};
-  // Checked here, where the parameter's text is known for the message.
+  // Check for finite values here, since only here the text of the parameter is known for the
+  // message.
   return {.scalar = [scalar = scalarField(in, param), where = in.where(param),
                      text = in.text(param)](const Imath::V3d& p) {
     const double value = scalar(p);
     if (std::isfinite(static_cast<float>(value))) return value;
     throw levelset::InvalidInput(
         fmt::format("{}: '{}' is {} on the surface at {:.6g},{:.6g},{:.6g}; give an attribute that "
-                    "is finite on all of it",
+                    "is finite on the entire surface",
                     where, text, value, p.x, p.y, p.z));
   }};
 }
@@ -47,18 +48,19 @@ levelset::Attribute attribute(const Invocation& in, const std::string& param) {
 std::vector<Param> maskParams() {
   return {{.name = "mask",
            .type = ParamType::Scalar,
-           .doc = "field that limits the effect: none up to --mask-min, full from --mask-max on"},
+           .doc = "scalar field that limits the effect of the action: no effect where the field is "
+                  "at most --mask-min, full effect where it is at least --mask-max"},
           {.name = "mask-min",
            .type = ParamType::Number,
-           .doc = "value of the mask up to which nothing changes",
+           .doc = "value of the field --mask up to which the action has no effect",
            .fallback = "0"},
           {.name = "mask-max",
            .type = ParamType::Number,
-           .doc = "value of the mask from which the effect is full",
+           .doc = "value of the field --mask from which the action has full effect",
            .fallback = "1"},
           {.name = "mask-invert",
            .type = ParamType::Flag,
-           .doc = "exchange the parts that change and that stay"}};
+           .doc = "invert the mask: full effect up to --mask-min, no effect from --mask-max on"}};
 }
 
 std::vector<Param> withMask(std::vector<Param> params) {
@@ -71,7 +73,8 @@ std::optional<levelset::Mask> maskOf(const Invocation& in) {
     for (const char* param : {"mask-min", "mask-max", "mask-invert"}) {
       if (in.given(param))
         throw levelset::UsageError(fmt::format(
-            "{}: --{} shapes a mask, and there is none; give --mask", in.op().name, param));
+            "{}: --{} sets a limit or inversion of a mask, but --mask is missing; give --mask",
+            in.op().name, param));
     }
     return std::nullopt;
   }

@@ -7,14 +7,16 @@
 #include "levelset/fields/field.h"
 #include "levelset/fields/mask.h"
 
-/// Parameters that are fields: a formula, or a value of the chain.
+/// Reads parameters whose value is a field: a formula in x, y and z, or a value of the chain
+/// (@NAME).
 namespace pipeline {
 
 /// Returns the field of a parameter of type Scalar. A level set stands for its signed distance.
 /// @throws levelset::UsageError, InvalidInput for a field of vectors
 [[nodiscard]] levelset::ScalarField scalarField(const Invocation& in, const std::string& param);
 
-/// Returns the field of a parameter of type Velocity whose text is none of its choices.
+/// Returns the field of a parameter of type Velocity that is given by formulas or as @NAME, not by
+/// the name of a built-in velocity.
 /// @throws levelset::UsageError, InvalidInput for a field of numbers
 [[nodiscard]] levelset::VectorField vectorField(const Invocation& in, const std::string& param);
 
@@ -26,7 +28,7 @@ namespace pipeline {
 [[nodiscard]] std::vector<Param> maskParams();
 /// Appends the parameters of a mask to `params`.
 [[nodiscard]] std::vector<Param> withMask(std::vector<Param> params);
-/// Returns the mask that these options describe; empty without --mask.
+/// Returns the mask that the options of maskParams() describe; empty without --mask.
 /// @throws levelset::UsageError for limits in the wrong order, or limits without a mask
 [[nodiscard]] std::optional<levelset::Mask> maskOf(const Invocation& in);
 

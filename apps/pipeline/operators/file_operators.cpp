@@ -31,14 +31,15 @@ Kind fileKind(const Invocation& in) {
       in.op().name, name, in.op().name == "write" ? ", nvdb" : ""));
 }
 
-/// A named grid may be a field. Its file decides, if the file exists already.
+/// Returns the kind of the value that `read` makes. The grid that --grid names may be a field; the
+/// header of the file shows its class, if the file exists already.
 Kind readKind(const Invocation& in) {
   const Kind kind = fileKind(in);
   if (kind != Kind::Band || !in.given("grid") || isStandardStream(in)) return kind;
   try {
     for (const levelset::GridInfo& grid : levelset::bandFileInfo(in.text("file")))
       if (grid.name == in.text("grid")) return grid.isLevelSet ? Kind::Band : Kind::Field;
-  } catch (const levelset::Error&) {  // reported by the run
+  } catch (const levelset::Error&) {  // the run itself reports this error
   }
   return kind;
 }
@@ -63,8 +64,9 @@ Value read(Invocation& in) {
                                                        .unsupported = &unsupported,
                                                        .progress = in.progress});
     if (!unsupported.empty()) {
-      in.notes.warnings.push_back(fmt::format("{}: left aside what no vertex can carry: {}",
-                                              file.string(), fmt::join(unsupported, "; ")));
+      in.notes.warnings.push_back(
+          fmt::format("{}: ignored attributes that belong to no vertex of the mesh: {}",
+                      file.string(), fmt::join(unsupported, "; ")));
     }
     return Value(std::move(mesh));
   }
@@ -81,7 +83,8 @@ Value read(Invocation& in) {
   return value;
 }
 
-/// A mesh is read completely, since lengths refer to its size. The header of a band suffices.
+/// Plans the value. A mesh is read completely, since lengths in % refer to its size. For a band,
+/// the header of the file suffices.
 Plan planRead(Invocation& in) {
   if (fileKind(in) != Kind::Band) return read(in).plan();
   for (const levelset::GridInfo& grid : levelset::bandFileInfo(in.text("file"))) {
@@ -93,7 +96,7 @@ Plan planRead(Invocation& in) {
     }
     Plan plan{.kind = Kind::Band, .voxelSize = grid.voxelSize, .halfWidth = grid.halfWidth};
     if (!grid.worldBounds.isEmpty()) {
-      // The zero set lies half the band's width inside the box of its voxels.
+      // The zero set lies one half width inside the box of the active voxels.
       plan.bounds = grid.worldBounds;
       const Imath::V3d rim(plan.halfWidth * plan.voxelSize);
       if (Imath::Box3d inner(plan.bounds.min + rim, plan.bounds.max - rim); !inner.isEmpty())
@@ -116,7 +119,8 @@ void validateRead(const Invocation& in) {
         "read: --grid picks a grid of a .vdb, and this is a {}; leave it out", kindName(kind)));
   if (kind == Kind::Scene && isStandardStream(in))
     throw UsageError(
-        "read: a scene names other files by their place beside its own; give a file, not -");
+        "read: a scene refers to other files relative to the folder of its own file, so it cannot "
+        "be read from standard input; give a file, not -");
 }
 
 void validateWrite(const Invocation& in) {
@@ -131,10 +135,13 @@ void validateWrite(const Invocation& in) {
                                           : "put 'level-set' before it, or write .ply"));
   }
   if ((kind == Kind::Mesh || kind == Kind::Patch || kind == Kind::Scene) && in.given("name"))
-    throw UsageError(fmt::format("write: --name is that of a grid, and this is a {}; leave it out",
-                                 kindName(kind)));
+    throw UsageError(fmt::format(
+        "write: --name is the name of a grid in a .vdb, and this file is a {}; leave it out",
+        kindName(kind)));
   if (kind == Kind::Scene && levelset::isStandardOutput(in.text("file")))
-    throw UsageError("write: a scene has its level sets in files beside its own; give a file");
+    throw UsageError(
+        "write: a scene stores its level sets in files beside its own file, so it cannot go to "
+        "standard output; give a file");
 }
 
 Value write(Invocation& in) {
@@ -142,7 +149,9 @@ Value write(Invocation& in) {
   const Value& value = in.operands[0];
   if (value.kind() == Kind::Patch) {
     if (value.patch().atHeight)
-      throw UsageError("write: the texture is to tell this patch's height; give --height a length");
+      throw UsageError(
+          "write: this patch has --height auto, and its height is unknown without a texture; give "
+          "--height a length");
     mapping::writePatches(file, value.patch().patches);
   } else if (value.kind() == Kind::Scene) {
     render::writeScene(file, value.scene(), in.progress);
@@ -156,10 +165,10 @@ Value write(Invocation& in) {
         file, value.mesh(),
         {.format = in.text("format"), .maxMemory = in.maxMemory, .progress = in.progress});
     if (!value.mesh().attributes.isEmpty() && !levelset::holdsAttributes(formatName(in)))
-      in.notes.warnings.push_back(fmt::format(
-          "{} holds positions and triangles only: the {} were left out; write .ply or .obj to keep "
-          "them",
-          file.string(), describe(value.mesh().attributes)));
+      in.notes.warnings.push_back(
+          fmt::format("{} stores positions and triangles only: the {} were left out; write .ply or "
+                      ".obj to keep them",
+                      file.string(), describe(value.mesh().attributes)));
   } else {
     levelset::writeBand(
         file, value.band(),
@@ -178,23 +187,26 @@ Operator readOperator() {
           "read a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb), patches "
           "(patch), a scene (json)",
       .details =
-          "A .vdb with more than one level set needs --grid. A grid of another class must be "
-          "named, too. It becomes a field of numbers or of vectors, which may be staggered. Meshes "
-          "keep the normals, texture coordinates and colours of their vertices in PLY and OBJ. '-' "
-          "is standard input and needs --format.",
+          "A .vdb with more than one level set needs --grid. A grid that is not a level set needs "
+          "--grid, too; it becomes a field of numbers or of vectors, which may be staggered. "
+          "Meshes keep the normals, texture coordinates and colours of their vertices in PLY and "
+          "OBJ. '-' is standard input and needs --format.",
       .example = "levelsmith read dragon.ply.gz ! info",
       .params = {{.name = "file",
                   .type = ParamType::Path,
-                  .doc = "file to read, or -",
+                  .doc = "file to read, or - for standard input",
                   .required = true,
                   .position = 0},
                  {.name = "format",
                   .type = ParamType::Text,
-                  .doc = "ply, obj, stl, off, vdb, patch, json; default: by extension"},
-                 {.name = "grid", .type = ParamType::Text, .doc = "name of the grid in a .vdb"},
+                  .doc = "format of the file: ply, obj, stl, off, vdb, patch or json; default: by "
+                         "its extension"},
+                 {.name = "grid",
+                  .type = ParamType::Text,
+                  .doc = "name of the grid to read from a .vdb"},
                  {.name = "no-attributes",
                   .type = ParamType::Flag,
-                  .doc = "meshes: read positions and triangles only, no normals, texture "
+                  .doc = "for meshes: read positions and triangles only, without normals, texture "
                          "coordinates and colours",
                   .formerName = "bare"}},
       .resultKind = readKind,
@@ -214,22 +226,24 @@ Operator writeOperator() {
           "write a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb, nvdb), "
           "patches (patch), a scene (json)",
       .details =
-          "The file is written beside its target and renamed when it is complete; an existing file "
-          "stays until then. The level sets and meshes of a scene go to .vdb and .ply files beside "
-          "it, FILE-NAME.vdb for the level set NAME, and replace files of those names. The value "
-          "stays on the stack.",
+          "Data is written to a temporary file in the same folder, which replaces an existing file "
+          "only when it is complete. The level sets and meshes of a scene go to .vdb and .ply "
+          "files in the same folder: the level set NAME of FILE.json goes to FILE-NAME.vdb. "
+          "Existing files of these names are replaced. The value stays on the stack.",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! mesh ! write sphere.ply",
       .params = {{.name = "file",
                   .type = ParamType::Path,
-                  .doc = "file to write, or -",
+                  .doc = "file to write, or - for standard output",
                   .required = true,
                   .position = 0},
                  {.name = "format",
                   .type = ParamType::Text,
-                  .doc = "ply, obj, stl, off, vdb, nvdb, patch, json; default: by extension"},
+                  .doc = "format of the file: ply, obj, stl, off, vdb, nvdb, patch or json; "
+                         "default: by its extension"},
                  {.name = "name",
                   .type = ParamType::Text,
-                  .doc = "name of the grid in a .vdb or .nvdb; default for a field: its own name",
+                  .doc =
+                      "name of the grid in a .vdb or .nvdb; a field keeps its own name by default",
                   .fallback = "surface"}},
       .operands = {{Kind::Mesh, Kind::Band, Kind::Field, Kind::Patch, Kind::Scene}},
       .flow = Flow::PassesThrough,

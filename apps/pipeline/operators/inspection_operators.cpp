@@ -98,10 +98,10 @@ Value compare(Invocation& in) {
   if (in.given("tolerance")) {
     const double tolerance = in.length("tolerance");
     if (c.hausdorff() > tolerance)
-      throw levelset::NumericalError(fmt::format(
-          "compare: the surfaces are up to {:.6g} apart, more than the tolerance of {:.6g}; look "
-          "at the figures, or allow more",
-          c.hausdorff(), tolerance));
+      throw levelset::NumericalError(
+          fmt::format("compare: the Hausdorff distance of the surfaces is {:.6g}, more than the "
+                      "tolerance of {:.6g}; see the figures above, or raise --tolerance",
+                      c.hausdorff(), tolerance));
   }
   return in.operands[1];
 }
@@ -133,12 +133,13 @@ Value check(Invocation& in) {
                              report.eikonalMax);
   if (!report.passed()) {
     throw levelset::NumericalError(fmt::format(
-        "check: the level set fails: {}; make it again with 'resample', or from its mesh", failed));
+        "check: the level set fails this check: {}; rebuild it with 'resample', or from its mesh",
+        failed));
   }
   return in.operands[0];
 }
 
-/// Counts that the header lacks are 0.
+/// Returns null for 0, which stands for a count that is missing in the header of the file.
 Json countOrNull(std::uint64_t count) {
   return count > 0 ? Json(count) : Json(nullptr);
 }
@@ -149,8 +150,7 @@ void validateInfo(const Invocation& in) {
   if (levelset::isMeshFormat(name)) return;
   if (levelset::isBandFormat(name) && !name.ends_with("nvdb")) return;
   throw levelset::UsageError(fmt::format(
-      "info: '{}' is of no known format; it can tell of ply, obj, stl, off (also .gz) and vdb",
-      name));
+      "info: '{}' is of no known format; info reads ply, obj, stl, off (also .gz) and vdb", name));
 }
 
 Json fileInfo(const std::string& file, const std::string& format) {
@@ -250,7 +250,8 @@ Value info(Invocation& in) {
     json = valueInfo(in.operands[0]);
   } else {
     throw levelset::UsageError(
-        "info: of what? name a file, or put it behind an action that makes something");
+        "info: there is nothing to describe; name a file, or put info after an action that makes a "
+        "value");
   }
   if (asksJson(in))
     in.output = printed(json);
@@ -265,7 +266,8 @@ Operator measureOperator() {
   return {
       .name = "measure",
       .group = "Inspection",
-      .summary = "volume, area, bounds, topology, centroid, inertia, mean curvature",
+      .summary =
+          "measure volume, area, bounds, topology, centroid, inertia and mean curvature of a solid",
       .details =
           "Inertia is about the centroid for density 1; mean_curvature is the integral of "
           "(k1 + k2) / 2 over the surface; euler is V - E + F of the surface.",
@@ -283,7 +285,8 @@ Operator compareOperator() {
   return {
       .name = "compare",
       .group = "Inspection",
-      .summary = "difference of two solids: Hausdorff, mean and Chamfer distance, volume",
+      .summary =
+          "measure the difference of two solids: Hausdorff, mean and Chamfer distance, volume",
       .details =
           "Both solids stay on the stack. hausdorff is the larger of the two directed distances, "
           "chamfer the sum of the two means, symmetric_difference the volume inside exactly one of "
@@ -293,7 +296,8 @@ Operator compareOperator() {
           "--voxel 0.05 ! compare --tolerance 0.11",
       .params = {{.name = "tolerance",
                   .type = ParamType::Length,
-                  .doc = "exit code 5 if the Hausdorff distance is larger",
+                  .doc =
+                      "largest accepted Hausdorff distance; if it is exceeded, the exit code is 5",
                   .range = Range::NonNegative},
                  jsonParam()},
       .operands = {{Kind::Band}, {Kind::Band}},
@@ -308,7 +312,8 @@ Operator checkOperator() {
   return {
       .name = "check",
       .group = "Inspection",
-      .summary = "check that a level set is sound; exit code 5 if it is not",
+      .summary =
+          "check the values, signs and gradients of a level set; exit code 5 if a check fails",
       .example = "levelsmith box --size 1,1,1 --voxel 0.05 ! check",
       .params = {jsonParam()},
       .operands = {{Kind::Band}},
@@ -323,15 +328,15 @@ Operator infoOperator() {
   return {
       .name = "info",
       .group = "Inspection",
-      .summary = "describe a file, without loading its voxels, or the newest value",
+      .summary = "describe the newest value, or a file without loading its voxels",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! info",
       .params = {{.name = "file",
                   .type = ParamType::Path,
-                  .doc = "a mesh or .vdb file; default: the newest value",
+                  .doc = "mesh or .vdb file to describe; default: the newest value",
                   .position = 0},
                  {.name = "format",
                   .type = ParamType::Text,
-                  .doc = "format of the file; default: by extension"},
+                  .doc = "format of the file; default: by its extension"},
                  jsonParam()},
       .operands = {{Kind::Band, Kind::Mesh, Kind::Patch, Kind::Field, Kind::Surface, Kind::Scene}},
       .operandsOptional = true,

@@ -12,7 +12,8 @@ namespace pipeline {
 
 using Json = nlohmann::ordered_json;
 
-/// Names of files and grids may hold any bytes, so invalid UTF-8 is replaced.
+/// Formats JSON for output. Names of files and grids may contain any bytes, so invalid UTF-8 is
+/// replaced.
 inline std::string printed(const Json& json) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -22,7 +23,9 @@ inline bool asksJson(const Invocation& in) {
 }
 
 inline Param jsonParam() {
-  return {.name = "json", .type = ParamType::Flag, .doc = "one JSON object on standard output"};
+  return {.name = "json",
+          .type = ParamType::Flag,
+          .doc = "print the results as one JSON object on standard output"};
 }
 
 }  // namespace pipeline

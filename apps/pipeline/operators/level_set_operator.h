@@ -12,14 +12,15 @@
 #include "levelset/operator/cost.h"
 #include "levelset/operator/description.h"
 
-/// Makes an action of the pipeline from the description of an operator of levelset
+/// Builds an action of the pipeline from the description of an operator of the library levelset
 /// (levelset/operator/description.h).
 namespace pipeline {
 
-/// Additions of the pipeline to an operator: what needs files, pictures or JSON.
+/// Parameters and functions that the pipeline adds to an operator of the library, for example an
+/// option that names files to write.
 template <class Op>
 struct OperatorExtension {
-  std::vector<Param> params = {};  ///< further parameters, behind those of the options
+  std::vector<Param> params = {};  ///< further parameters, listed after those of Op::Options
   std::function<void(const Invocation&)> validate = {};
   std::function<std::vector<std::string>(const Invocation&)> targets = {};
   /// Changes the options before the operator runs.
@@ -57,16 +58,16 @@ constexpr std::size_t operandCount() {
 [[nodiscard]] levelset::GivenOptions givenIn(const Invocation& in);
 [[nodiscard]] std::vector<ValuePlan> operandPlans(const Invocation& in);
 [[nodiscard]] OperatorRun runOf(const Invocation& in);
-/// Moves what an operator left behind into the notes of the step.
+/// Moves the messages and figures of an operator's run into the notes of its step in the report.
 void fileNotes(OperatorRun& run, StepNotes& notes);
 
-/// Options in full, with the voxel size.
+/// Reads all options, including the voxel size.
 template <class Op>
 typename Op::Options resolvedOptions(Invocation& in, OptionStage stage) {
   using Options = typename Op::Options;
   if (!hasVoxelSize<Options>()) return readOptions<Options>(in, stage);
   const std::vector<ValuePlan> operands = operandPlans(in);
-  // Sizes in voxels need --voxel: with --resolution the voxel itself follows from the size.
+  // Lengths in vx need --voxel: with --resolution, the voxel size depends on those lengths.
   if (operands.empty() && in.asksVoxelSize() && in.given("voxel"))
     in.setReference(in.length("voxel"), 0);
   Options options = readOptions<Options>(in, stage);
@@ -94,7 +95,8 @@ Value runOn(Invocation& in, const typename Op::Options& options, OperatorRun& ru
     std::vector<NarrowBand> bands;
     for (const Value& operand : in.operands) bands.push_back(operand.band());
     using Result = decltype(Op::run(std::move(bands), options, run));
-    // An operator may work on a band in place, unless others hold it too.
+    // Drop the references in `in.operands`: an operator changes a band in place if it holds the
+    // only reference.
     if constexpr (std::is_same_v<Result, NarrowBand>) in.operands.clear();
     return valueOf(Op::run(std::move(bands), options, run));
   } else if constexpr (!TakesMesh<Op>) {
@@ -104,7 +106,8 @@ Value runOn(Invocation& in, const typename Op::Options& options, OperatorRun& ru
   }
 }
 
-/// @param extension  kept by the action
+/// Runs the operator on the operands and options of an action. The messages of the run go to
+/// `in.notes`, also if it throws.
 template <class Op>
 Value runOperator(Invocation& in, const OperatorExtension<Op>& extension) {
   typename Op::Options options = resolvedOptions<Op>(in, OptionStage::Run);
@@ -170,7 +173,8 @@ template <class Op>
 RegionOfInterest regionOfInterest(Invocation& in, std::size_t operand,
                                   const RegionOfInterest& ofResult) {
   if (in.operands[0].kind() != Kind::Band) return {};
-  // A number of voxels along the longest side refers to the complete operand.
+  // --resolution counts voxels along the longest side of the complete operand, so a region of
+  // interest would change the voxel size.
   if (hasVoxelSize<typename Op::Options>() && in.given("resolution")) return {};
   const std::vector<ValuePlan> operands = operandPlans(in);
   const auto options = resolvedOptions<Op>(in, OptionStage::Plan);

@@ -16,11 +16,12 @@
 #include "levelset/fields/mask.h"
 #include "levelset/operator/options.h"
 
-/// Derives parameters of the command line from the description of an options struct, and reads
-/// their values into such a struct (levelset/operator/options.h).
+/// Derives the parameters of the command line from the members that an options struct of the
+/// library levelset describes (levelset/operator/options.h), and reads their values into such a
+/// struct.
 namespace pipeline {
 
-/// The value type of a member that may be optional.
+/// Type of the value of a member: T for a member of type T or std::optional<T>.
 template <class T>
 struct OptionValue {
   using Type = T;
@@ -37,8 +38,8 @@ using OptionValueType = typename OptionValue<T>::Type;
 template <class T>
 using OptionTable = std::initializer_list<std::pair<const char*, OptionValueType<T>>>;
 
-/// Returns the parameter type of a member, or an empty value for a member that stands for several
-/// parameters.
+/// Returns the parameter type for a member of type T. Empty if the member stands for several
+/// parameters, as a mask does, or needs a table of words.
 template <class T>
 constexpr std::optional<ParamType> paramTypeOf(levelset::OptionUnit unit) {
   const bool isLength = unit == levelset::OptionUnit::Length;
@@ -59,7 +60,7 @@ constexpr std::optional<ParamType> paramTypeOf(levelset::OptionUnit unit) {
   return {};
 }
 
-/// Collects the parameters of an options struct.
+/// Visitor for `describe` of an options struct: builds one command-line parameter for each member.
 template <class Options>
 class ParamCollector {
  public:
@@ -72,7 +73,8 @@ class ParamCollector {
       params.push_back(voxelParam());
       params.push_back(resolutionParam());
     } else {
-      static_assert(paramTypeOf<Bare>({}).has_value(), "a member of this type needs a table");
+      static_assert(paramTypeOf<Bare>({}).has_value(),
+                    "a member of this type needs a table of words");
       Param param = makeParam(name, *paramTypeOf<Bare>(info.unit), info);
       if (param.type == ParamType::Lengths) param.count = 3;
       if constexpr (std::is_same_v<Bare, levelset::NamedVelocity>)
@@ -132,12 +134,14 @@ std::vector<Param> paramsOf() {
   return std::move(collector.params);
 }
 
-/// Extent to which the values of options are known.
+/// Stage of a run in which options are read. It decides which values are known.
 enum class OptionStage {
-  Syntax,   ///< before anything runs: lengths are plain numbers, fields stand for any field
-  Partial,  ///< as Syntax, with lengths resolved where that is possible, else NaN
-  Plan,     ///< operands are plans: lengths are resolved, fields stand for any field
-  Run       ///< everything is known
+  Syntax,   ///< before anything runs: a length is the number as written, without its unit; a field
+            ///< is a placeholder
+  Partial,  ///< like Syntax, but a length is in world units, or NaN if `vx` or `%` has no operand
+            ///< to refer to
+  Plan,     ///< operands are plans: lengths are in world units; a field is a placeholder
+  Run       ///< all values are known
 };
 
 /// Reads the values of an invocation into an options struct. Members whose option is not given keep
@@ -157,7 +161,8 @@ class OptionReader {
       else if (in_.given("mask"))
         options_.*member = levelset::Mask{.field = anyField()};
     } else if constexpr (std::is_same_v<Bare, levelset::VoxelSize>) {
-      // Resolved by the caller, since it depends on the object.
+      // Left to the caller, since with --resolution the voxel size depends on the size of the
+      // object.
     } else if constexpr (std::is_same_v<T, levelset::Length>) {
       options_.*member = levelset::Length::world(length(name));
     } else {
@@ -186,7 +191,8 @@ class OptionReader {
     if (stage_ != OptionStage::Partial) return in_.length(name);
     try {
       return in_.length(name);
-    } catch (const levelset::UsageError&) {  // `%` or `vx`, and no operand to refer to
+    } catch (const levelset::UsageError&) {  // the length is in `%` or `vx`, and there is no
+                                             // operand to which they refer
       return std::numeric_limits<double>::quiet_NaN();
     }
   }
@@ -235,7 +241,8 @@ class OptionReader {
   Options& options_;
 };
 
-/// Tells whether an options struct has a member of type VoxelSize, and sets it.
+/// Visitor that finds a member of type VoxelSize in an options struct, and sets it to `edge` unless
+/// `options` is null.
 template <class Options>
 struct VoxelSizeSetter {
   Options* options = nullptr;
@@ -260,7 +267,7 @@ bool hasVoxelSize() {
   return visit.hasOne;
 }
 
-/// Reads all options but a VoxelSize.
+/// Reads all options except a member of type VoxelSize.
 template <class Options>
 Options readOptions(Invocation& in, OptionStage stage) {
   Options options;

@@ -66,17 +66,19 @@ Operator regressOperator() {
       .group = "Inspection",
       .summary = "run problems with exact solutions and report errors and run times",
       .details =
-          "Each case runs at several resolutions and at five placements between the grid points, "
-          "beside OpenVDB's own tool where it has one. The folder receives results.json, "
-          "results.csv, plots and index.html. The exit code is 5 when an accuracy bound is missed, "
-          "after everything is written. Times are shown but have no bound.",
+          "Each case runs at several resolutions and at five positions of the object relative to "
+          "the grid points. OpenVDB's own tool runs on the same problem where it has one. The "
+          "folder receives results.json, results.csv, plots and index.html. The exit code is 5 "
+          "when an accuracy bound is missed, after everything is written. Times are shown but have "
+          "no bound.",
       .example = "levelsmith regress --case empty-and-full --out regression",
       .params = {{.name = "case",
                   .type = ParamType::Text,
-                  .doc = "names of cases, between commas; default: all"},
+                  .doc = "names of the cases to run, separated by commas; default: all"},
                  {.name = "budget",
                   .type = ParamType::Choice,
-                  .doc = "quick: under three minutes on two cores; full: everything",
+                  .doc = "quick: coarse resolutions, under three minutes on two cores; full: all "
+                         "resolutions",
                   .fallback = "quick",
                   .choices = {"quick", "full"}},
                  {.name = "out",
@@ -84,8 +86,7 @@ Operator regressOperator() {
                   .doc = "folder for the results; created if it is missing"},
                  {.name = "no-plots",
                   .type = ParamType::Flag,
-                  .doc =
-                      "leave the plots out; plots.py in the folder draws them from an earlier run"},
+                  .doc = "draw no plots; plots.py in the folder of --out can draw them later"},
                  {.name = "list",
                   .type = ParamType::Flag,
                   .doc = "print the names of all cases and run none"}},

@@ -22,7 +22,7 @@ FileSequence stepSequence(const Invocation& in) {
   return sequence;
 }
 
-/// Names of all files that --keep-steps may write.
+/// Returns the names of all files that --keep-steps may write; empty without the option.
 std::vector<std::string> stepFiles(const Invocation& in) {
   std::vector<std::string> files;
   if (!in.given("keep-steps")) return files;
@@ -45,7 +45,8 @@ Operator morphOperator() {
   return levelSetOperator<levelset::MorphOperator>(
       {.params = {{.name = "keep-steps",
                    .type = ParamType::Path,
-                   .doc = "write every step; # in the name stands for its number (step_###.vdb)"}},
+                   .doc = "write the band after each step to a .vdb file; # in the name stands for "
+                          "the number of the step, as in step_###.vdb"}},
        .validate =
            [](const Invocation& in) {
              if (in.given("keep-steps")) (void)stepSequence(in);

@@ -4,7 +4,7 @@
 
 namespace pipeline {
 
-/// The action `morph`, with --keep-steps, which writes a file for each step.
+/// The action `morph`, with the additional option --keep-steps, which writes a file for each step.
 [[nodiscard]] Operator morphOperator();
 
 }  // namespace pipeline

@@ -23,7 +23,8 @@ using Imath::V3d;
 using levelset::NarrowBand;
 using levelset::ShapeOptions;
 
-/// A texture whose lengths are resolved to world units.
+/// A texture generator with its parameters, lengths in world units: its extent, its boxes, and the
+/// functions that check the parameters and build the solid.
 struct Generator {
   levelset::ShapeExtent extent;
   mapping::TileBox box;
@@ -46,9 +47,10 @@ std::optional<double> lengthUnlessAuto(Invocation& in, const char* name) {
 
 void noteOddRows(Invocation& in, const mapping::Tiling& tiling) {
   if (tiling.rows % 2 == 0) return;
-  in.notes.notes.push_back(fmt::format(
-      "{} rows: every second one stands aside, so that only an even number repeats along y",
-      tiling.rows));
+  in.notes.notes.push_back(
+      fmt::format("{} rows: every second row is shifted, so the pattern repeats along y only with "
+                  "an even number of rows",
+                  tiling.rows));
 }
 
 Generator knurl(Invocation& in) {
@@ -184,7 +186,8 @@ Generator heightmap(Invocation& in) {
           }};
 }
 
-/// The texture and its voxel size. Adds notes on both.
+/// Returns the texture generator and the voxel size. Adds a note if the tile is smaller than the
+/// solid.
 std::pair<Generator, double> describeTexture(Invocation& in, Generate generate) {
   if (in.asksVoxelSize() && in.given("voxel")) in.setReference(in.length("voxel"), 0);
   Generator generator = generate(in);
@@ -192,9 +195,9 @@ std::pair<Generator, double> describeTexture(Invocation& in, Generate generate) 
   const double voxel = in.voxelSize(std::max({size.x, size.y, size.z}));
   const Imath::Box3d& tile = generator.box.tile;
   if (tile.min != generator.box.whole.min) {
-    in.notes.notes.push_back(fmt::format("what repeats is --texture-box \"{},{},{} {},{},{}\"",
-                                         tile.min.x, tile.min.y, tile.min.z, tile.max.x, tile.max.y,
-                                         tile.max.z));
+    in.notes.notes.push_back(
+        fmt::format("the pattern repeats with the tile --texture-box \"{},{},{} {},{},{}\"",
+                    tile.min.x, tile.min.y, tile.min.z, tile.max.x, tile.max.y, tile.max.z));
   }
   return {std::move(generator), voxel};
 }
@@ -271,9 +274,10 @@ Param pair(const char* name, const char* doc, bool isRequired = false) {
 }
 
 std::vector<Param> tiled(std::vector<Param> params) {
-  params.push_back(count("columns", "of the tile, along x"));
-  params.push_back(count("rows", "of the tile, along y"));
-  params.push_back(size("overlap", "how far the pattern goes on beyond each side of its tile", "0",
+  params.push_back(count("columns", "number of columns of the pattern in a tile, along x"));
+  params.push_back(count("rows", "number of rows of the pattern in a tile, along y"));
+  params.push_back(size("overlap",
+                        "length by which the pattern continues beyond each side of the tile", "0",
                         Range::NonNegative));
   return params;
 }
@@ -283,7 +287,7 @@ Operator generator(const char* name, const char* summary, const char* details, c
                    std::vector<Param> params) {
   params.push_back({.name = "center",
                     .type = ParamType::Point,
-                    .doc = "centre of its box",
+                    .doc = "centre of the bounding box of the solid",
                     .fallback = "0,0,0"});
   params.push_back(voxelParam());
   params.push_back(resolutionParam());
@@ -309,13 +313,18 @@ Operator knurlOperator() {
       "one of straight grooves is a pitch wide and long.",
       "levelsmith knurl --pitch 2 --columns 3 --rows 2 --voxel 0.1 ! measure",
       tiled({choice("pattern", "arrangement of the grooves", {"diamond", "diagonal", "straight"}),
-             size("pitch", "distance of neighbouring grooves, across them"),
-             size("depth", "depth of the grooves; 'auto': until the crests are sharp", "auto",
-                  Range::Positive),
+             size("pitch", "distance between neighbouring grooves, perpendicular to them"),
+             size("depth",
+                  "depth of the grooves; 'auto': the depth at which the crests between them become "
+                  "sharp",
+                  "auto", Range::Positive),
              degrees("flanks", "angle between the two flanks of a groove", "90"),
-             degrees("angle", "angle of the grooves from y", "30"),
-             size("base", "thickness below the grooves; 'auto': as much as their depth", "auto",
-                  Range::NonNegative)}));
+             degrees("angle",
+                     "angle between the grooves and the y axis; without effect on straight grooves",
+                     "30"),
+             size("base",
+                  "thickness of the plate below the grooves; 'auto': the depth of the grooves",
+                  "auto", Range::NonNegative)}));
 }
 
 Operator scalesOperator() {
@@ -328,14 +337,18 @@ Operator scalesOperator() {
           {size("length", "length of a scale"),
            size("width", "width of a scale; 'auto': 0.7 of its length", "auto", Range::Positive),
            size("thickness",
-                "thickness of a scale, with a gap under its tip; 0: solid down to the plate", "0",
-                Range::NonNegative),
-           degrees("tilt", "angle of a scale against the plate", "20"),
-           size("step", "distance from row to row; 'auto': half a length", "auto", Range::Positive),
-           size("tip", "length of the pointed part; 'auto': half a width, which is round", "auto",
+                "thickness of a scale that has a gap under its tip; 0: scales are solid down to "
+                "the plate",
+                "0", Range::NonNegative),
+           degrees("tilt", "angle between a scale and the plate", "20"),
+           size("step", "distance between rows; 'auto': half the length of a scale", "auto",
                 Range::Positive),
-           size("rounding", "radius of the edges", "0", Range::NonNegative),
-           size("base", "thickness of the plate; 'auto': 0.2 of the length", "auto",
+           size("tip",
+                "length of the pointed tip of a scale; 'auto': half the width, which makes a half "
+                "circle",
+                "auto", Range::Positive),
+           size("rounding", "rounding radius of the edges of the scales", "0", Range::NonNegative),
+           size("base", "thickness of the plate; 'auto': 0.2 of the length of a scale", "auto",
                 Range::NonNegative)}));
 }
 
@@ -345,7 +358,10 @@ Operator hexagonsOperator() {
       "Rows of hexagons along x with flats across x. Every second row is shifted by half a "
       "spacing, so an even number of rows continues across the tile's sides.",
       "levelsmith hexagons --size 2 --kind honeycomb --columns 3 --rows 2 --voxel 0.1 ! measure",
-      tiled({choice("kind", "pillars with gaps, or walls between cells", {"raised", "honeycomb"}),
+      tiled({choice(
+                 "kind",
+                 "raised: pillars with gaps between them; honeycomb: walls between hexagonal cells",
+                 {"raised", "honeycomb"}),
              size("size", "width of a hexagon across its flats"),
              size("gap",
                   "gap between hexagons, or thickness of the honeycomb's walls; 'auto': 0.2 of the "
@@ -355,7 +371,9 @@ Operator hexagonsOperator() {
                   Range::Positive),
              size("base", "thickness of the plate, 0: none; 'auto': 0.2 of the size", "auto",
                   Range::NonNegative),
-             size("rounding", "radius of the upper edges", "0", Range::NonNegative)}));
+             size("rounding",
+                  "rounding radius of the upper edges, and of the upright edges of raised hexagons",
+                  "0", Range::NonNegative)}));
 }
 
 Operator ringOperator() {
@@ -365,18 +383,23 @@ Operator ringOperator() {
       "row before and two of the row behind, and no rings touch. The defaults of spacing and lean "
       "leave the largest distance between wires.",
       "levelsmith ring --radius 3 --columns 2 --rows 3 --voxel 0.15 ! measure",
-      {size("radius", "from the centre to the middle of the wire"),
-       size("tube", "radius of round wire; 'auto': 0.16 of the ring's", "auto", Range::Positive),
+      {size("radius", "radius of a ring, from its centre to the middle of the wire"),
+       size("tube", "radius of round wire; 'auto': 0.16 of the radius of the ring", "auto",
+            Range::Positive),
        pair("section",
-            "section of flat wire, in place of --tube: across the ring, and along its axis"),
+            "cross-section of flat wire, in place of --tube: width across the ring, and height "
+            "along its axis"),
        {.name = "lean",
         .type = ParamType::Degrees,
-        .doc = "angle of rings about x, to the other side in every second row; default: 0 for one "
-               "ring"},
+        .doc = "angle of the rings about x, with the opposite sign in every second row; default: 0 "
+               "for one ring, for chain mail the angle with the largest distance between wires"},
        count("columns", "number of rings along x", "1"),
        count("rows", "number of rings along y", "1"),
-       pair("spacing", "distance of rings along a row, and of rows"),
-       size("clearance", "least distance between wires", "0", Range::NonNegative)});
+       pair("spacing",
+            "distance between the rings of a row, and distance between rows; default: the spacing "
+            "with the largest distance between wires"),
+       size("clearance", "required distance between wires; at least two voxels in any case", "0",
+            Range::NonNegative)});
 }
 
 Operator gyroidOperator() {
@@ -385,7 +408,8 @@ Operator gyroidOperator() {
       "The surface sin x cos y + sin y cos z + sin z cos x = 0, thickened by its true distance and "
       "cut off by the box of its cells, where small parts may come loose (`keep` drops them).",
       "levelsmith gyroid --cell 5 --columns 1 --rows 1 --layers 1 --voxel 0.2 ! measure",
-      {choice("kind", "walls between two labyrinths, or the struts of one", {"sheet", "network"}),
+      {choice("kind", "sheet: a wall between two labyrinths; network: the struts of one labyrinth",
+              {"sheet", "network"}),
        size("cell", "edge of a cubic cell"),
        size("thickness", "thickness of walls, or of struts at their thinnest; 'auto': 0.1 cell",
             "auto", Range::Positive),
@@ -403,11 +427,15 @@ Operator heightmapOperator() {
       "--voxel 0.1 ! measure",
       {{.name = "image",
         .type = ParamType::Path,
-        .doc = "a grey .png, or a text file of numbers",
+        .doc = "grey .png, or text file of numbers, with the heights",
         .required = true},
-       pair("size", "distance from the first to the last column and row", true),
-       size("height", "height of white above black"),
-       size("base", "thickness below black; 'auto': half the height", "auto", Range::NonNegative),
+       pair("size",
+            "size along x and y: distance from the first to the last column, and from the first to "
+            "the last row, of pixels",
+            true),
+       size("height", "height of white pixels above black ones"),
+       size("base", "thickness of the plate below black pixels; 'auto': half the height", "auto",
+            Range::NonNegative),
        choice("interpolation", "interpolation between pixels", {"cubic", "linear"}),
        {.name = "invert", .type = ParamType::Flag, .doc = "black is high, white is low"},
        {.name = "sheet",
@@ -426,7 +454,8 @@ Operator heightmapOperator() {
   op.validate = [](const Invocation& in) {
     in.requireVoxelSize();
     if (in.flag("sheet") && in.given("half-width"))
-      throw levelset::UsageError("heightmap: a --sheet is a mesh and has no --half-width");
+      throw levelset::UsageError(
+          "heightmap: --sheet makes a mesh, which has no half width; leave --half-width out");
   };
   return op;
 }

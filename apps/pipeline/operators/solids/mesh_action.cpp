@@ -23,9 +23,9 @@ levelset::TriMesh meshOfPatches(const std::vector<mapping::Patch>& patches,
 void validateMesh(const Invocation& in) {
   if (isPatch(in) && (in.given("adaptivity") || in.flag("sharp")))
     throw levelset::UsageError(
-        "mesh: --adaptivity and --sharp are for level sets, not for a patch");
+        "mesh: --adaptivity and --sharp apply to level sets, not to a patch; leave them out");
   if (!isPatch(in) && in.flag("sheets"))
-    throw levelset::UsageError("mesh: --sheets is for a patch, not for a level set");
+    throw levelset::UsageError("mesh: --sheets is for a patch, not for a level set; leave it out");
 }
 
 }  // namespace
@@ -34,7 +34,8 @@ Operator meshOperator() {
   Operator op = levelSetOperator<levelset::MeshOperator>(
       {.params = {{.name = "sheets",
                    .type = ParamType::Flag,
-                   .doc = "patches: each layer of particles by itself"}},
+                   .doc = "for patches: make an open mesh of each layer of particles, in place of "
+                          "one closed surface"}},
        .validate = validateMesh});
   op.operands = {{Kind::Band, Kind::Patch}};
   op.run = [ofBand = op.run](Invocation& in) {
