@@ -19,7 +19,8 @@ void setDepths(Invocation& in, render::Camera& camera) {
   if (in.given("far")) camera.far = in.length("far");
 }
 
-/// Names of the given camera options, or of all.
+/// Changes `camera` by the options that are given, and with `isAll` also by the defaults of the
+/// others.
 void setOptions(Invocation& in, bool isAll, render::Camera& camera) {
   const auto asks = [&](const char* name) { return isAll || in.given(name); };
   if (asks("size")) std::tie(camera.width, camera.height) = in.imageSize("size");
@@ -38,30 +39,37 @@ void addCameraParams(std::vector<Param>& params) {
   const std::vector<Param> camera = {
       {.name = "size",
        .type = ParamType::ImageSize,
-       .doc = "size in pixels",
+       .doc = "width and height of the picture, in pixels",
        .fallback = "1024x768"},
-      {.name = "from", .type = ParamType::Point, .doc = "position of the eye"},
+      {.name = "from",
+       .type = ParamType::Point,
+       .doc = "position of the eye; default: a three-quarter view of the solid, or the view of the "
+              "scene"},
       {.name = "to",
        .type = ParamType::Point,
        .doc = "point that the camera looks at; default: the middle of the solid"},
-      {.name = "up", .type = ParamType::Point, .doc = "upward direction", .fallback = "0,1,0"},
+      {.name = "up",
+       .type = ParamType::Point,
+       .doc = "direction in space that points upwards in the picture",
+       .fallback = "0,1,0"},
       {.name = "fov",
        .type = ParamType::Degrees,
-       .doc = "vertical field of view",
+       .doc = "vertical angle of view",
        .fallback = "35",
        .range = Range::Positive},
       {.name = "ortho",
        .type = ParamType::Length,
-       .doc = "height of an orthographic view",
+       .doc = "draw an orthographic view of this height, in place of a perspective view",
        .range = Range::Positive},
       {.name = "near",
        .type = ParamType::Length,
-       .doc = "distance along the view axis up to which surfaces are cut off; they still cast "
-              "shadows; default: 0",
+       .doc = "distance from the eye along the view axis; surfaces nearer than this are not drawn, "
+              "but cast shadows; default: 0",
        .range = Range::NonNegative},
       {.name = "far",
        .type = ParamType::Length,
-       .doc = "distance beyond which surfaces are cut off; default: none",
+       .doc = "distance from the eye along the view axis; surfaces farther than this are not "
+              "drawn; default: no limit",
        .range = Range::Positive}};
   params.insert(params.end(), camera.begin(), camera.end());
 }
@@ -91,9 +99,10 @@ render::Camera cameraOf(Invocation& in, const Imath::Box3d& bounds, const render
 
 void validateCamera(const Invocation& in) {
   if (in.given("to") && !in.given("from"))
-    throw UsageError(fmt::format("{}: --to needs --from beside it", in.op().name));
+    throw UsageError(
+        fmt::format("{}: --to needs the position of the eye, too; give --from", in.op().name));
   if (!(in.radians("fov") < 3.1))
-    throw UsageError(fmt::format("{}: --fov {} degrees is too wide; it must be below 177",
+    throw UsageError(fmt::format("{}: --fov {} degrees is too wide; give less than 177",
                                  in.op().name, in.text("fov")));
 }
 

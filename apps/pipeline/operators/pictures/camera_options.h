@@ -1,6 +1,6 @@
 #pragma once
 
-// The camera of pictures and scenes.
+// Options of the camera, which the actions `render` and `scene` share.
 
 #include <Imath/ImathBox.h>
 
@@ -16,12 +16,15 @@ void addCameraParams(std::vector<Param>& params);
 
 [[nodiscard]] bool givesCamera(const Invocation& in);
 
-/// @param known  view that given options change; null: a three-quarter view that frames `bounds`,
-///               unless --from is given
+/// Returns the camera that the options describe.
+/// @param bounds  box of the drawn surfaces, world units
+/// @param known  camera that the given options change. If null, the camera is at --from; without
+///         --from it is a three-quarter view that frames `bounds`.
 [[nodiscard]] render::Camera cameraOf(Invocation& in, const Imath::Box3d& bounds,
                                       const render::Camera* known = nullptr);
 
-/// Checks the options that need no operand.
+/// Checks the camera options as far as this needs no operand.
+/// @throws levelset::UsageError for --to without --from, and for too wide a --fov
 void validateCamera(const Invocation& in);
 
 }  // namespace pipeline

@@ -28,7 +28,8 @@ namespace {
 
 using levelset::UsageError;
 
-/// Makes a scene of the operand, with the view that the options request.
+/// Builds the scene to draw from the operand. The camera options override the camera of the
+/// operand, if it has one.
 render::Scene sceneOf(Invocation& in) {
   const Value& drawn = in.operands[0];
   render::ViewedScene viewed = sceneOf(drawn);
@@ -42,35 +43,38 @@ constexpr long kMostSamples = 4096;
 void validateDraw(const Invocation& in) {
   validateCamera(in);
   if (in.integer("samples") > kMostSamples)
-    throw UsageError(fmt::format("render: --samples {} is too many; {} are the most",
+    throw UsageError(fmt::format("render: --samples {} is too many; give at most {}",
                                  in.text("samples"), kMostSamples));
   const std::string style = in.text("style");
   if ((style == "matcap") != in.given("matcap"))
     throw UsageError(in.given("matcap")
-                         ? "render: --matcap is for --style matcap; leave it out, or give that"
+                         ? "render: --matcap applies only to --style matcap; leave it out, or give "
+                           "--style matcap"
                          : "render: --style matcap needs --matcap with a PNG of a shaded ball");
   if (in.flag("thickness") && render::imageFormat(in.text("file"), in.text("format")) != "exr")
     throw UsageError("render: a PNG has no layers, so --thickness is lost; name an .exr");
   if (in.given("line") && style != "tone" && style != "ink")
-    throw UsageError(fmt::format("render: the style {} draws no lines; leave --line out", style));
+    throw UsageError(
+        fmt::format("render: --style {} draws no silhouette lines; leave --line out", style));
   if (in.text("tables") == "nanovdb") {
     const std::string renderer = in.text("renderer");
     if (renderer != "gpu" && renderer != "both")
-      throw UsageError(fmt::format(
-          "render: --renderer {} reads no NanoVDB grid; leave --tables out, or take gpu",
-          renderer));
+      throw UsageError(
+          fmt::format("render: --renderer {} cannot read a NanoVDB grid; leave --tables out, or "
+                      "give --renderer gpu",
+                      renderer));
     if (in.text("filter") != "trilinear" || in.text("value-bits") != "32")
       throw UsageError(
-          "render: a NanoVDB grid is drawn as it is, by the trilinear filter; leave --filter and "
-          "--value-bits out, or take --tables bricks");
+          "render: --tables nanovdb supports only the trilinear filter and values of 32 bits; "
+          "leave --filter and --value-bits out, or give --tables bricks");
   }
   if (in.text("value-bits") != "32" && in.text("filter") == "bspline-qi")
     throw UsageError(
-        "render: the filter bspline-qi draws from coefficients, which --value-bits does not hold; "
-        "leave it out, or take another filter");
+        "render: --filter bspline-qi computes spline coefficients, which cannot be stored in fewer "
+        "bits; leave --value-bits out, or give another filter");
   if (in.given("curvature-range") && (style == "lit" || style == "tone" || style == "matcap"))
-    throw UsageError(fmt::format(
-        "render: the style {} shows no curvatures; leave --curvature-range out", style));
+    throw UsageError(
+        fmt::format("render: --style {} shows no curvatures; leave --curvature-range out", style));
   if (render::imageFormat(in.text("file"), in.text("format")).empty()) {
     throw UsageError(
         fmt::format("render: '{}' is of no known format; use .exr or .png, or --format",
@@ -82,7 +86,7 @@ void validateDraw(const Invocation& in) {
     throw UsageError("render: two images cannot share standard output; use a file for one");
   if (levelset::isSameFile(file, png))
     throw UsageError(fmt::format(
-        "render: '{}' is named twice, for the image and for --png; name two files", file));
+        "render: '{}' is named twice, as the image and by --png; give two different files", file));
 }
 
 std::vector<std::string> targetsOf(const Invocation& in) {
@@ -91,7 +95,7 @@ std::vector<std::string> targetsOf(const Invocation& in) {
   return targets;
 }
 
-/// JSON has no number for infinity, so a text stands for it.
+/// Returns a JSON number, or the text "infinite", since JSON has no number for infinity.
 Json numberOrText(double value) {
   return std::isfinite(value) ? Json(value) : Json("infinite");
 }
@@ -138,7 +142,8 @@ render::Image drawByKernel(Invocation& in, const render::Scene& scene,
   try {
     return render::renderGpu(scene, options);
   } catch (const render::NoOpenGl& error) {
-    in.notes.warnings.push_back(fmt::format("{}; 'both' takes the processor now", error.what()));
+    in.notes.warnings.push_back(
+        fmt::format("{}; --renderer both uses the processor instead", error.what()));
     return render::renderCpu(scene, options);
   }
 }
@@ -172,7 +177,8 @@ render::StyleOptions styleOf(const Invocation& in) {
   return options;
 }
 
-/// Quantizes values to the requested bits, and adds a note with the displacement of the surfaces.
+/// Quantizes the values of all solids to --value-bits, and adds a note with the displacement of the
+/// surfaces.
 void coarsen(Invocation& in, render::Scene& scene) {
   const int bits = std::stoi(in.text("value-bits"));
   if (bits == 32) return;
@@ -189,16 +195,16 @@ void coarsen(Invocation& in, render::Scene& scene) {
     most.largest = std::max(most.largest, coarse.shift.largest);
     most.rms = std::max(most.rms, coarse.shift.rms);
   }
-  in.notes.notes.push_back(
-      fmt::format("render: values of {} bits moved the surface by {:.2g} voxel at most, {:.2g} in "
-                  "the mean (rms)",
-                  bits, most.largest, most.rms));
+  in.notes.notes.push_back(fmt::format(
+      "render: values of {} bits displace the surface by at most {:.2g} voxels, {:.2g} voxels rms",
+      bits, most.largest, most.rms));
 }
 
 Value draw(Invocation& in) {
   render::Scene scene = sceneOf(in);
   coarsen(in, scene);
-  // The judge is slow on fields.
+  // Soft expressions and morphs are drawn by cpu unless a renderer is given, since the judge is
+  // slow on them.
   const std::string renderer =
       scene.isBlended() && !in.given("renderer") ? "cpu" : in.text("renderer");
   const bool isBoth = renderer == "both";
@@ -221,7 +227,8 @@ Value draw(Invocation& in) {
   render::writeImage(in.text("file"), image, in.text("format"));
   if (in.given("png")) render::writeImage(in.text("png"), image, "png");
   if (isBoth) {
-    // Only layers are compared, which are sampled at the centres of pixels.
+    // One sample without lights suffices for the comparison: geometric layers are sampled at the
+    // centres of pixels, and colours have no tolerance.
     options.samples = 1;
     options.ambientSamples = options.shadowSamples = 0;
     options.progress = levelset::subProgress(in.progress, 0.5, 1);
@@ -230,19 +237,21 @@ Value draw(Invocation& in) {
     in.notes.detailsJson = toJson(found).dump();
     if (found.bothHit == 0)
       in.notes.warnings.push_back(
-          "render: no pixel shows a surface in both pictures, so no layer was compared");
+          "render: no pixel shows a surface in both pictures (kernel and embree), so no layer was "
+          "compared");
     if (!found.agrees())
       throw levelset::NumericalError(
-          fmt::format("render: the kernel's picture and the judge's differ: {}; draw both and look "
-                      "at them with compare-images",
+          fmt::format("render: the pictures of the kernel and of embree differ: {}; draw one with "
+                      "each renderer and compare them with compare-images",
                       found.reason()));
   }
   return in.operands[0];
 }
 
-/// The region inside the frame, where it alone determines the picture. Shadows also depend on
-/// solids beside the frame; the default view, the range of curvatures and coarse values depend on
-/// the size of the complete solid.
+/// Returns the box of the solid that is inside the frame of the picture, if this part alone
+/// determines the picture; otherwise the complete solid. Shadows depend on parts outside the frame.
+/// The default view, the default range of curvatures and quantized values depend on the size of the
+/// complete solid.
 RegionOfInterest roiOfDraw(Invocation& in, std::size_t, const RegionOfInterest&) {
   const render::Style style = styleNamed(in.text("style"));
   const bool isFramed = in.operands[0].kind() == Kind::Band && in.given("from") && in.given("to") &&
@@ -264,9 +273,10 @@ RegionOfInterest roiOfDraw(Invocation& in, std::size_t, const RegionOfInterest&)
     if (culling.keeps(low + side / 2, side.length() / 2))
       seen.extendBy(Imath::Box3d(low, low + side));
   }
-  if (seen.isEmpty()) return {};  // the picture is empty, which only the complete solid shows
-  constexpr double kRead =
-      8;  // voxels beside the visible part that normals, curvatures and splines read
+  if (seen.isEmpty())
+    return {};  // no part is in the frame: request the complete solid, not an empty region
+  constexpr double kRead = 8;  // margin around the visible part, voxels: normals, curvatures and
+                               // splines read values there
   return {.region = grown(seen, kRead * plan.voxelSize)};
 }
 
@@ -275,7 +285,7 @@ Plan planDraw(Invocation& in) {
   return in.operands[0].plan();
 }
 
-/// Reads "LAYER=USUAL,WORST …".
+/// Reads --tolerance: "LAYER=USUAL,WORST", several separated by blanks.
 std::map<std::string, render::LayerTolerance> tolerancesOf(const Invocation& in) {
   std::map<std::string, render::LayerTolerance> all;
   if (!in.given("tolerance")) return all;
@@ -288,8 +298,8 @@ std::map<std::string, render::LayerTolerance> tolerancesOf(const Invocation& in)
     if (!(numbers >> tolerance.usual >> comma >> tolerance.worst) || comma != ',' ||
         !numbers.eof() || !(tolerance.usual >= 0) || !(tolerance.worst >= 0))
       throw UsageError(
-          fmt::format("compare-images: --tolerance '{}' is not understood; write "
-                      "LAYER=USUAL,WORST, as Z=1e-6,1e-3, and blanks between several",
+          fmt::format("compare-images: --tolerance '{}' is invalid; write LAYER=USUAL,WORST, as "
+                      "Z=1e-6,1e-3, and separate several by blanks",
                       word));
     all[word.substr(0, equals)] = tolerance;
   }
@@ -300,21 +310,24 @@ void validateComparison(const Invocation& in) {
   (void)tolerancesOf(in);
   if (in.flag("exact") && in.given("tolerance"))
     throw UsageError(
-        "compare-images: --exact allows nothing, so --tolerance has no place; give one");
+        "compare-images: --exact accepts no difference, so --tolerance has no effect; leave one of "
+        "them out");
   if (in.given("difference") &&
       render::imageFormat(in.text("difference"), in.text("format")) != "exr")
-    throw UsageError("compare-images: --difference holds layers; name a file .exr");
+    throw UsageError(
+        "compare-images: --difference writes layers, which need the format EXR; name an .exr file");
   for (const char* input : {"first", "second"})
     if (in.given("difference") && levelset::isSameFile(in.text("difference"), in.text(input)))
-      throw UsageError(fmt::format(
-          "compare-images: '{}' is compared and named for --difference; name another file",
-          in.text(input)));
+      throw UsageError(
+          fmt::format("compare-images: --difference would overwrite '{}', one of the compared "
+                      "pictures; name another file",
+                      in.text(input)));
 }
 
 std::string asTable(const render::ImageComparison& found) {
   std::string text = fmt::format(
-      "{} pixels, {} hit by both, {} by one along the outline and {} elsewhere, {} with other "
-      "bits\n",
+      "{} pixels: {} show a surface in both pictures, {} in only one along the outline and {} "
+      "elsewhere; {} differ in some bit\n",
       found.pixels, found.bothHit, found.unlikeAtOutline, found.unlikeElsewhere,
       found.differentBits);
   text += fmt::format("{:<18}{:>10}{:>10}{:>10}{:>10}  {}\n", "layer", "median", "99 %", "99.9 %",
@@ -325,7 +338,7 @@ std::string asTable(const render::ImageComparison& found) {
         l.largest, l.worst.empty() ? "none" : fmt::format("{},{}", l.worst[0].x, l.worst[0].y));
   }
   for (const std::string& name : found.onlyOne)
-    text += fmt::format("{} is in one picture only\n", name);
+    text += fmt::format("channel {} is in one picture only\n", name);
   return text;
 }
 
@@ -371,61 +384,67 @@ Operator renderOperator() {
       .params =
           {{.name = "file",
             .type = ParamType::Path,
-            .doc = ".exr or .png, or -",
+            .doc = "picture to write, .exr or .png, or - for standard output",
             .required = true,
             .position = 0},
-           {.name = "png", .type = ParamType::Path, .doc = "write the colours to this .png too"},
+           {.name = "png", .type = ParamType::Path, .doc = "also write the colours to this .png"},
            {.name = "renderer",
             .type = ParamType::Choice,
-            .doc = "renderer; both: gpu and embree, compared; soft expressions and morphs use cpu "
-                   "unless embree is given",
+            .doc = "renderer; both: draws with gpu and embree, and compares the two; soft "
+                   "expressions and morphs of a scene use cpu by default",
             .fallback = "embree",
             .choices = {"gpu", "cpu", "embree", "both"}},
            {.name = "filter",
             .type = ParamType::Choice,
-            .doc = "interpolation between grid points: trilinear, a tricubic B-spline, which "
-                   "shrinks the solid, or one with corrected coefficients",
+            .doc =
+                "interpolation between grid points: trilinear; bspline, a tricubic B-spline, which "
+                "shrinks the solid; bspline-qi, the same spline with corrected coefficients",
             .fallback = "trilinear",
             .choices = {"trilinear", "bspline", "bspline-qi"}},
            {.name = "tables",
             .type = ParamType::Choice,
-            .doc = "grid that the shader of gpu and both reads: bricks, or a NanoVDB grid, which "
-                   "is slower and gives the same bits",
+            .doc = "with --renderer gpu or both: data that the shader reads; bricks, or a NanoVDB "
+                   "grid, which is slower and gives the same bits",
             .fallback = "bricks",
             .choices = {"bricks", "nanovdb"}},
            {.name = "value-bits",
             .type = ParamType::Choice,
-            .doc = "bits of a value in the ray caster; 16 and 8 save memory, and the report gives "
-                   "the displacement of the surface",
+            .doc = "bits of each distance value in the memory of the ray caster; 16 and 8 save "
+                   "memory and displace the surface, by a length that the report gives",
             .fallback = "32",
             .choices = {"32", "16", "8"}},
            {.name = "style",
             .type = ParamType::Choice,
-            .doc = "style of the colours; mean, gauss and principal are curvatures",
+            .doc = "style of the colours; mean, gauss and principal show curvatures",
             .fallback = "lit",
             .choices = styleNames()},
            {.name = "matcap",
             .type = ParamType::Path,
-            .doc = "a PNG of a shaded ball, for --style matcap"},
+            .doc = "with --style matcap: a PNG of a shaded ball, which gives the colour for each "
+                   "normal"},
            {.name = "curvature-range",
             .type = ParamType::Number,
-            .doc = "curvature, per world unit, half way along the colours and at which ridges and "
-                   "valleys begin; default: 40 / diagonal",
+            .doc = "curvature, per world unit, that has the colour half way to the end of the "
+                   "colour scale, and at which --style ink begins to draw ridges and valleys; "
+                   "default: 40 / diagonal of the bounding box",
             .range = Range::Positive},
            {.name = "line",
             .type = ParamType::Number,
-            .doc = "width of the silhouettes of tone and ink, pixels",
+            .doc = "with --style tone or ink: width of the silhouette lines, in pixels",
             .fallback = "2",
             .range = Range::NonNegative},
            {.name = "thickness",
             .type = ParamType::Flag,
-            .doc = "add a layer with the length of the ray inside the solids"},
+            .doc = "add a layer to the EXR with the length of each pixel's ray inside the solids, "
+                   "world units"},
            {.name = "samples",
             .type = ParamType::Integer,
-            .doc = "colour samples per pixel",
+            .doc = "number of colour samples per pixel",
             .fallback = "4",
             .range = Range::Positive},
-           {.name = "format", .type = ParamType::Text, .doc = "exr or png; default: by extension"}},
+           {.name = "format",
+            .type = ParamType::Text,
+            .doc = "format of the picture: exr or png; default: by its extension"}},
       .operands = {{Kind::Band, Kind::Mesh, Kind::Scene}},
       .flow = Flow::PassesThrough,
       .run = draw,
@@ -449,34 +468,37 @@ Operator compareImagesOperator() {
       .group = "Pictures",
       .summary = "compare two EXR pictures of one scene layer by layer",
       .details =
-          "Shares of the differences and the worst pixels for each layer: Z and P relative to Z, "
-          "angles of N, curvatures by the voxel, id, colour. Exit code 5, after everything is "
-          "written, when they differ by more than two correct renderers may: pixels that only one "
-          "hits off the outline, or a layer that passes its tolerance.",
+          "Reports percentiles of the differences and the worst pixels for each layer: Z and P "
+          "relative to Z, the angle between the normals N, curvatures times the voxel size, id and "
+          "colour. The exit code is 5, after everything is written, when the pictures differ by "
+          "more than those of two correct renderers may: a pixel away from outlines shows a "
+          "surface in only one picture, or a layer exceeds its tolerance.",
       .example =
           "levelsmith sphere --radius 1 --voxel 0.1 ! render a.exr --size 64x64 --samples 1 "
           "! render b.exr --size 64x64 --samples 2 ! compare-images a.exr b.exr",
       .params = {{.name = "first",
                   .type = ParamType::Path,
-                  .doc = "an EXR with the layers of 'render'",
+                  .doc = "EXR with the layers that 'render' writes",
                   .required = true,
                   .position = 0},
                  {.name = "second",
                   .type = ParamType::Path,
-                  .doc = "another EXR of the same size",
+                  .doc = "EXR of the same size, to compare with the first",
                   .required = true,
                   .position = 1},
-                 {.name = "exact", .type = ParamType::Flag, .doc = "require the same bits"},
+                 {.name = "exact",
+                  .type = ParamType::Flag,
+                  .doc = "require that both pictures have the same channels with the same bits"},
                  {.name = "tolerance",
                   .type = ParamType::Text,
-                  .doc = "LAYER=USUAL,WORST: largest difference of 999 in 1000 pixels, and of all; "
-                         "blanks between several"},
+                  .doc = "LAYER=USUAL,WORST: largest accepted difference of a layer in 99.9 % of "
+                         "the pixels, and in all pixels; separate several by blanks"},
                  {.name = "difference",
                   .type = ParamType::Path,
-                  .doc = "write the differences to this .exr, a channel for each layer"},
+                  .doc = "write the differences to this .exr, with one channel for each layer"},
                  {.name = "format",
                   .type = ParamType::Text,
-                  .doc = "format of the differences: exr"},
+                  .doc = "format of the file of --difference: exr"},
                  jsonParam()},
       .flow = Flow::PassesThrough,
       .run = compareImages,

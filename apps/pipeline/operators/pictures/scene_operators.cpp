@@ -27,14 +27,16 @@ std::vector<std::string> wordsOf(const std::string& text) {
   return words;
 }
 
-/// Names of the parts: --names, else those of --as, else part1, part2, …
+/// Returns the names of the parts, the operands of the scene: --names, otherwise those of --as,
+/// otherwise part1, part2, …
 std::vector<std::string> partNames(const Invocation& in) {
   std::vector<std::string> names;
   if (in.given("names")) {
     names = wordsOf(in.text("names"));
     if (names.size() != in.operands.size())
-      throw UsageError(fmt::format("scene: {} names for {} parts; give as many", names.size(),
-                                   in.operands.size()));
+      throw UsageError(
+          fmt::format("scene: --names gives {} names for {} parts; give one name for each part",
+                      names.size(), in.operands.size()));
   } else {
     names = in.operandNames;
     names.resize(in.operands.size());
@@ -45,17 +47,17 @@ std::vector<std::string> partNames(const Invocation& in) {
   return names;
 }
 
-/// Colours of the parts; fewer colours than parts repeat.
+/// Returns the colours of --colours, or six default colours. The caller repeats the default colours
+/// for further parts.
 std::vector<Imath::C3f> partColours(const Invocation& in) {
   std::vector<Imath::C3f> colours;
   if (in.given("colours")) {
     for (const Imath::V3d& colour : in.points("colours")) {
       for (int c = 0; c < 3; ++c)
         if (!(colour[c] >= 0 && colour[c] <= 1))
-          throw UsageError(
-              fmt::format("scene: --colours {},{},{} is no colour; give red, green and blue from "
-                          "0 to 1",
-                          colour.x, colour.y, colour.z));
+          throw UsageError(fmt::format(
+              "scene: --colours {},{},{} is not a colour; give red, green and blue from 0 to 1",
+              colour.x, colour.y, colour.z));
       colours.emplace_back(colour);
     }
   } else {
@@ -65,14 +67,15 @@ std::vector<Imath::C3f> partColours(const Invocation& in) {
   return colours;
 }
 
-/// Opacities, one for each part.
+/// Returns the opacity of each part; 1 without --opacities.
 std::vector<double> partOpacities(const Invocation& in) {
   std::vector<double> opacities(in.operands.size(), 1);
   if (!in.given("opacities")) return opacities;
   const std::vector<std::string> words = wordsOf(in.text("opacities"));
   if (words.size() != opacities.size())
-    throw UsageError(fmt::format("scene: {} opacities for {} parts; give as many", words.size(),
-                                 opacities.size()));
+    throw UsageError(
+        fmt::format("scene: --opacities gives {} values for {} parts; give one value for each part",
+                    words.size(), opacities.size()));
   for (std::size_t i = 0; i < words.size(); ++i) {
     opacities[i] = parseNumber(words[i], "scene: --opacities");
     if (!(opacities[i] > 0 && opacities[i] <= 1))
@@ -92,7 +95,8 @@ Plan planScene(Invocation& in) {
     if (one.voxelSize == 0) continue;  // a mesh
     plan.voxelSize = plan.voxelSize > 0 ? std::min(plan.voxelSize, one.voxelSize) : one.voxelSize;
   }
-  // Lengths refer to all parts, whatever their order.
+  // `vx` is the smallest voxel size of the parts, and `%` refers to the diagonal of all parts, so
+  // lengths do not depend on the order of the parts.
   in.setReference(plan.voxelSize, plan.bounds.isEmpty() ? 0 : plan.bounds.size().length());
   return plan;
 }
@@ -103,8 +107,9 @@ Value makeScene(Invocation& in) {
   const std::vector<Imath::C3f> colours = partColours(in);
   const std::vector<double> opacities = partOpacities(in);
   if (in.given("colours") && colours.size() != in.operands.size())
-    throw UsageError(fmt::format("scene: {} colours for {} parts; give as many", colours.size(),
-                                 in.operands.size()));
+    throw UsageError(
+        fmt::format("scene: --colours gives {} colours for {} parts; give one colour for each part",
+                    colours.size(), in.operands.size()));
   render::ViewedScene viewed;
   render::Scene& scene = viewed.scene;
   std::vector<std::string> solids;
@@ -139,12 +144,16 @@ Value makeScene(Invocation& in) {
 void validateScene(const Invocation& in) {
   validateCamera(in);
   if (in.given("soft") && !in.given("csg"))
-    throw UsageError("scene: --soft needs --csg with what is joined, as 'a | b'; give both");
+    throw UsageError(
+        "scene: --soft blends the solids of a CSG expression; give --csg, too, as --csg 'a | b'");
   if (!in.given("morph")) return;
   if (in.given("csg"))
-    throw UsageError("scene: --morph goes from one solid to another, without --csg; give one");
+    throw UsageError(
+        "scene: --morph blends two solids and cannot be combined with --csg; leave one of them "
+        "out");
   if (in.number("morph") < 0 || in.number("morph") > 1)
-    throw UsageError(fmt::format("scene: --morph {} is not from 0 to 1", in.text("morph")));
+    throw UsageError(fmt::format("scene: --morph {} is out of range; give a number from 0 to 1",
+                                 in.text("morph")));
 }
 
 }  // namespace
@@ -157,37 +166,39 @@ Operator sceneOperator() {
       .details =
           "With --csg the rays of 'render' combine the solids: a | b is the union, a & b the "
           "intersection, a - b the difference. Solids are not resampled; each keeps its voxels. "
-          "The names are those of --as. Meshes are drawn beside them, with the normals and colours "
-          "of their vertices if they have some. Coincident surfaces on different grids are "
-          "separated by rounding only, so let the subtracted solid protrude. --soft blends the "
-          "distances: surfaces closer than that merge. --morph interpolates between the distances "
-          "of two solids. Both need the renderers cpu or embree. 'write scene.json' saves the "
-          "scene, with the parts in files beside it.",
+          "The expression uses the names that --as gave to the solids. Meshes are drawn beside "
+          "them, with the normals and colours of their vertices if they have any. Coincident "
+          "surfaces on different grids are separated by rounding only, so let the subtracted solid "
+          "protrude. --soft blends the distances to the solids: surfaces closer than this length "
+          "merge. --morph interpolates between the distances of two solids. Both need the "
+          "renderers cpu or embree. 'write scene.json' saves the scene, with the parts in files "
+          "beside it.",
       .example =
           "levelsmith box --size 2,2,2 --voxel 0.05 --as b ! sphere --radius 1.3 --voxel "
           "0.03 --as s ! scene @b @s --csg 'b - s' ! render cut.png --size 320x240",
-      .params = {{.name = "csg",
-                  .type = ParamType::Text,
-                  .doc = "expression to draw, as '(a | b) - c'; default: all parts"},
-                 {.name = "soft",
-                  .type = ParamType::Length,
-                  .doc = "--csg: distance at which surfaces begin to blend, at most the half width "
-                         "of the narrowest band",
-                  .range = Range::NonNegative},
-                 {.name = "morph",
-                  .type = ParamType::Number,
-                  .doc = "two solids: 0 draws the first, 1 the second, values between them a blend "
-                         "of their distances"},
-                 {.name = "names",
-                  .type = ParamType::Text,
-                  .doc = "names of the parts, blanks between them; default: those of --as"},
-                 {.name = "colours",
-                  .type = ParamType::Points,
-                  .doc = "colours of the parts: red,green,blue from 0 to 1, blanks between them"},
-                 {.name = "opacities",
-                  .type = ParamType::Text,
-                  .doc = "opacities of the surfaces: above 0, up to 1, blanks between them; below "
-                         "1 a surface is transparent in R G B A and casts a weaker shadow"}},
+      .params =
+          {{.name = "csg",
+            .type = ParamType::Text,
+            .doc = "CSG expression of the solids to draw, as '(a | b) - c'; default: all parts"},
+           {.name = "soft",
+            .type = ParamType::Length,
+            .doc = "with --csg: solids blend where their distances differ by less than this; at "
+                   "most the half width of the narrowest band",
+            .range = Range::NonNegative},
+           {.name = "morph",
+            .type = ParamType::Number,
+            .doc = "for two solids: fraction of the blend of their distances; 0 draws the first "
+                   "solid, 1 the second"},
+           {.name = "names",
+            .type = ParamType::Text,
+            .doc = "names of the parts, separated by blanks; default: those of --as"},
+           {.name = "colours",
+            .type = ParamType::Points,
+            .doc = "colours of the parts, red,green,blue from 0 to 1 each, separated by blanks"},
+           {.name = "opacities",
+            .type = ParamType::Text,
+            .doc = "opacities of the parts, above 0 and up to 1, separated by blanks; below 1 a "
+                   "surface is transparent in the layers R G B A and casts a weaker shadow"}},
       .operands = {{Kind::Band, Kind::Mesh}},
       .takesMore = true,
       .readsNames = true,

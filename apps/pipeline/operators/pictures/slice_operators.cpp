@@ -29,9 +29,12 @@ void validateSlice(const Invocation& in) {
   if (plane.size() != 2 || !(plane[1].length() > 0))
     throw UsageError("slice: --plane needs a point and a normal, \"x,y,z x,y,z\"");
   const std::vector<std::string> targets = slicesOf(in);
-  if (targets.empty()) throw UsageError("slice: name a picture with --png, or layers with --exr");
+  if (targets.empty())
+    throw UsageError(
+        "slice: no output file is named; give --png for a picture, --exr for layers, or both");
   if (targets.size() == 2 && levelset::isSameFile(targets[0], targets[1]))
-    throw UsageError(fmt::format("slice: '{}' is named twice; give two files", targets[0]));
+    throw UsageError(fmt::format(
+        "slice: '{}' is named by both --png and --exr; give two different files", targets[0]));
 }
 
 Value slice(Invocation& in) {
@@ -56,25 +59,29 @@ Operator sliceOperator() {
       .details =
           "The inside is blue, the outside brown. There is a contour line for each voxel of "
           "distance, or for each --step; the zero line is black. Grey tones mark points outside "
-          "the band. The view is against the normal, z upwards (y for a normal along z). The "
-          "layers are R G B A, phi and P.X P.Y P.Z.",
+          "the band. The view direction is against the normal, with z upwards (y for a normal "
+          "along z). The layers are R G B A, phi and P.X P.Y P.Z.",
       .example =
           "levelsmith torus --radius 2 --tube 0.8 --voxel 0.1 ! slice --plane \"0,0,0 "
           "1,0,0\" --png slice.png --size 320x240",
       .params = {{.name = "plane",
                   .type = ParamType::Points,
-                  .doc = "point and normal of the plane",
+                  .doc = "a point of the plane and its normal, \"x,y,z x,y,z\"",
                   .required = true},
-                 {.name = "png", .type = ParamType::Path, .doc = "PNG to write"},
-                 {.name = "exr", .type = ParamType::Path, .doc = "EXR with layers to write"},
+                 {.name = "png",
+                  .type = ParamType::Path,
+                  .doc = "write the coloured picture to this .png"},
+                 {.name = "exr",
+                  .type = ParamType::Path,
+                  .doc = "write colours, distances and positions as layers to this .exr"},
                  {.name = "step",
                   .type = ParamType::Length,
-                  .doc = "distance between contour lines",
+                  .doc = "difference of the distance between neighbouring contour lines",
                   .fallback = "1vx",
                   .range = Range::Positive},
                  {.name = "size",
                   .type = ParamType::ImageSize,
-                  .doc = "size in pixels",
+                  .doc = "width and height of the picture, in pixels",
                   .fallback = "1024x768"}},
       .operands = {{Kind::Band, Kind::Surface}},
       .flow = Flow::PassesThrough,

@@ -66,7 +66,7 @@ TEST_F(Pictures, OfValuesInFewBitsReportTheShiftOfTheSurface) {
   for (const char* bits : {"16", "8"}) {
     const Outcome drawn = levelsmith("-v " + chain + "--renderer both --value-bits " + bits);
     EXPECT_EQ(drawn.code, 0) << drawn.err;
-    EXPECT_NE(drawn.err.find(std::string("values of ") + bits + " bits moved the surface by "),
+    EXPECT_NE(drawn.err.find(std::string("values of ") + bits + " bits displace the surface by "),
               std::string::npos)
         << drawn.err;
   }
@@ -83,7 +83,7 @@ TEST_F(Pictures, WithoutOpenGlAreRefusedOrDrawnByTheProcessor) {
   EXPECT_EQ(refused.code, 4) << refused.err;
   EXPECT_NE(refused.err.find("--renderer cpu"), std::string::npos) << refused.err;
   EXPECT_EQ(both.code, 0) << both.err;
-  EXPECT_NE(both.err.find("takes the processor"), std::string::npos) << both.err;
+  EXPECT_NE(both.err.find("uses the processor"), std::string::npos) << both.err;
   EXPECT_TRUE(exists("o.exr"));
 }
 
