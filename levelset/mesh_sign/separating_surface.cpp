@@ -101,19 +101,19 @@ class SeparatingSurface {
     findPartners();
     findPatches();
     report(progress_, 0.3);
-    std::vector<std::uint32_t> patches;  // each as its triangle with the lowest index
+    std::vector<std::uint32_t> patches;  // lowest triangle index of each patch
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
       if (largest_[t] != kNone) patches.push_back(t);
     if (pairs_.empty() && patches.size() <= 1) return mesh_;
     if (!pairs_.empty() || patches.size() > kFewPoints) buildField();
     report(progress_, 0.6);
-    std::vector<char> kept(mesh_.triangles.size(), 0);  // indexed as largest_
+    std::vector<char> kept(mesh_.triangles.size(), 0);  // 1 at the index of a patch that stays
     tbb::parallel_for(std::size_t{0}, patches.size(), [&](std::size_t i) {
       const std::uint32_t t = largest_[patches[i]];
       kept[patches[i]] = separates(t, corners(t));
     });
     LocalMesh result{mesh_.points, {}};
-    std::map<std::uint32_t, Sheet> dropped;  // by the lowest triangle of each patch
+    std::map<std::uint32_t, Sheet> dropped;  // other patches, by their lowest triangle index
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
       if (isCrossed(t)) continue;
       const std::uint32_t patch = groups_.find(t);

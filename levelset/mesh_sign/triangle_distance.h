@@ -72,7 +72,8 @@ class BlockDistance {
   bool anyWithin_ = false;
   std::array<Spheres, 3> lists_;  // candidates of the block, of its current 4³ cell and 2³ cell
   std::vector<float> squared_;    // squared distances to the sphere centres
-  std::vector<std::array<Imath::V3d, 3>> corners_;  // relative to the centre of the block
+  // Corners of the candidates, relative to the centre of the block.
+  std::vector<std::array<Imath::V3d, 3>> corners_;
   std::vector<TriangleFrame> frames_;
   std::vector<char> hasFrame_;
 };

@@ -22,11 +22,11 @@ struct SurfaceBlock {
   /// Indices of the blocks at the offset (dx, dy, dz) of 0 or 1 blocks, by dx·4 + dy·2 + dz;
   /// CellSurface::kNoBlock if there is none. [0] is the block itself.
   std::array<std::uint32_t, 8> neighbour = {};
-  std::array<float, 8> neighbourFill = {};  ///< value of a neighbour that has no block
-  std::array<std::uint64_t, 8> inside = {};
+  std::array<float, 8> neighbourFill = {};     ///< value of a neighbour that has no block
+  std::array<std::uint64_t, 8> inside = {};    ///< [x]: grid points with φ < 0
   std::array<std::uint64_t, 24> crossed = {};  ///< [x·3 + axis]: edges with a change of sign
-  std::array<std::uint16_t, 24> rank =
-      {};  ///< number of crossed edges in the words before this one
+  /// Number of crossed edges in the words of `crossed` before each word.
+  std::array<std::uint16_t, 24> rank = {};
   std::size_t firstVertex = 0, vertexCount = 0;
   std::size_t firstTriangle = 0, triangleCount = 0;
   /// Polygons of the cell table in this block's cells. A dual mesh has one vertex for each.

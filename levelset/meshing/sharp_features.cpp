@@ -327,7 +327,7 @@ class FeatureInserter {
         triangles_.push_back({t[k], middle[k], middle[(k + 2) % 3]});
       return;
     }
-    std::size_t k = 0;  // rotate: side k is cut, and of two cut sides the other is k + 1
+    std::size_t k = 0;  // side k is cut; if two sides are cut, these are k and k + 1
     while (middle[k] == kNoVertex || (count == 2 && middle[(k + 1) % 3] == kNoVertex)) ++k;
     const std::uint32_t a = t[k], b = t[(k + 1) % 3], c = t[(k + 2) % 3], ab = middle[k];
     if (count == 1) {

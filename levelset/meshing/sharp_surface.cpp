@@ -160,7 +160,7 @@ class DualMesher {
   /// the side of the edge on which the face lies.
   [[nodiscard]] static FaceSegment segmentAt(const Coord& low, int axis, bool lowInside,
                                              std::size_t i) {
-    const int other = (axis + 2 - kRingStep[i]) % 3;  // axis along which the face extends
+    const int other = (axis + 2 - kRingStep[i]) % 3;  // second axis of the face, beside `axis`
     const unsigned bit = kRingStep[i] == 0 ? 1 : 2;
     Coord high = low;
     high[axis] += 1;

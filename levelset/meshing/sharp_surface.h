@@ -8,7 +8,7 @@ namespace levelset {
 
 /// Mesh in index space, with the sheets of the surface that meet at each of its vertices.
 struct SharpMesh : IndexMesh {
-  std::vector<VertexSheets> sheets;  ///< by vertex
+  std::vector<VertexSheets> sheets;  ///< one for each vertex
 };
 
 /// Meshes the zero set in index space with the edges and corners that the field implies. The mesh

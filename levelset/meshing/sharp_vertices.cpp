@@ -71,7 +71,7 @@ bool isInCell(const Vector3d& p, double margin) {
 /// Tangent plane of the surface, estimated at one grid point.
 struct VertexPlacer::Plane {
   Vector3d normal = Vector3d::Zero();
-  Vector3d gradient = Vector3d::Zero();  ///< central differences
+  Vector3d gradient = Vector3d::Zero();  ///< gradient of the field, by central differences
   double distance = 0;                   ///< distance of the grid point from the plane, voxels
   double error = 0;  ///< deviation of the surrounding values from the plane, voxels
   /// Bend of the field at the grid point, voxels: the largest second difference along an axis, or
@@ -351,7 +351,7 @@ class VertexPlacer::Impl {
   }
 
   BlockField field_;
-  int x_ = 0, y_ = 0, z_ = 0;                             // current cell
+  int x_ = 0, y_ = 0, z_ = 0;  ///< lowest grid point of the current cell, relative to the block
   std::vector<std::pair<Vector3d, Vector3d>> crossings_;  ///< zero crossings and gradients there
   std::vector<FacePlane> planes_;
 };

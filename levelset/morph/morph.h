@@ -52,9 +52,10 @@ struct MorphOperator {
   struct Options {
     int steps = 1;
     std::string until = "converged";
-    std::optional<double> tolerance;  ///< world units
+    std::optional<double> tolerance;  ///< Hausdorff distance to the target, world units
     std::optional<Mask> mask;
-    std::function<void(const NarrowBand& step, int number)> keep;  ///< as MorphOptions::keep
+    /// Receives every step, see MorphOptions::keep.
+    std::function<void(const NarrowBand& step, int number)> keep;
 
     template <class Visitor>
     static void describe(Visitor& visit) {

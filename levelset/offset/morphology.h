@@ -42,7 +42,7 @@ enum class ShellSide {
 
 /// Options of the operators `open` and `close`.
 struct MorphologyOptions {
-  double radius = 0;  ///< world units
+  double radius = 0;  ///< radius of the ball, world units
   std::optional<double> halfWidth;
   std::optional<Mask> mask;
 
@@ -93,7 +93,7 @@ struct ShellOperator {
   static constexpr ErrorModel errorModel{2, kTriangleError, kCreaseError, "shell"};
 
   struct Options {
-    double thickness = 0;  ///< world units
+    double thickness = 0;  ///< thickness of the wall, world units
     ShellSide side = ShellSide::In;
     std::optional<double> halfWidth;
     std::optional<Mask> mask;

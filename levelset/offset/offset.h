@@ -12,8 +12,8 @@
 namespace levelset {
 
 struct OffsetOptions {
-  std::optional<double> halfWidth =
-      {};  ///< half width of the result, voxels; empty: that of the operand
+  /// Half width of the result, voxels; empty: that of the operand.
+  std::optional<double> halfWidth = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };

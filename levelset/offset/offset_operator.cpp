@@ -53,7 +53,7 @@ NarrowBand OffsetOperator::run(std::vector<NarrowBand> operands, const Options& 
 ValuePlan OffsetOperator::plan(const Options& options, Plans operands, const OperatorRun&) {
   ValuePlan plan = operands[0];
   if (options.halfWidth) plan.halfWidth = *options.halfWidth;
-  if (!options.distance) return plan;  // a field may have any value
+  if (!options.distance) return plan;  // the values of --by are not known before the run
   const double before = plan.bounds.size().length();
   plan.bounds = grown(plan.bounds, *options.distance);
   const double after = plan.bounds.isEmpty() ? 0 : plan.bounds.size().length();

@@ -56,7 +56,7 @@ struct Length {
 /// Voxel size of a new band: an edge length, or a number of voxels along the longest side of the
 /// object. The command line resolves a resolution to an edge length.
 struct VoxelSize {
-  double edge = 0;                     ///< world units; 0: follows from `resolution`
+  double edge = 0;  ///< edge length of a voxel, world units; 0: follows from `resolution`
   std::optional<int> resolution = {};  ///< number of voxels along the longest side, > 0
 
   /// Edge length of a voxel, world units.

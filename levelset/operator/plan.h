@@ -9,7 +9,7 @@ namespace levelset {
 struct ValuePlan {
   Imath::Box3d bounds = {};  ///< bounds of the zero set or of the vertices, world units
   double area = 0;           ///< area of the surface, world units²
-  double voxelSize = 0;      ///< of a band, world units; 0: the value is no band
+  double voxelSize = 0;      ///< voxel size of a band, world units; 0: the value is no band
   double halfWidth = 0;      ///< half width of a band, voxels
   double triangles = 0;      ///< number of triangles of a mesh; 0: not known
   double fieldBytes = 0;     ///< memory of the grid of a field, bytes

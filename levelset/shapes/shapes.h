@@ -65,7 +65,7 @@ void checkShape(const ShapeExtent& extent, double voxelSize, const ShapeOptions&
 /// Grid of a new shape, part of the options of every shape.
 struct ShapeGrid {
   VoxelSize voxel;
-  double halfWidth = 3;  ///< voxels
+  double halfWidth = 3;  ///< half width of the band, voxels
 
   template <class Visitor>
   static void describe(Visitor& visit) {

@@ -47,8 +47,8 @@ struct TransformOperator {
 
   struct Options {
     std::optional<Imath::M44d> matrix;    ///< row vectors, translation in the last row
-    std::optional<Imath::V3d> translate;  ///< world units
-    std::vector<double> rotate;           ///< degrees: one angle about `axis`, or three
+    std::optional<Imath::V3d> translate;  ///< displacement, world units
+    std::vector<double> rotate;  ///< degrees: one angle about `axis`, or about x, then y, then z
     Imath::V3d axis = Imath::V3d(0, 0, 1);
     std::vector<double> scale;         ///< one factor, or three for x, y and z
     std::optional<int> mirror;         ///< axis normal to the mirror plane, 0 to 2: x, y, z

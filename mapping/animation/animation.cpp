@@ -428,8 +428,8 @@ class Animation {
   /// own base; footprints of the current frame, interpolated towards the next key.
   Footprints own_, first_, shown_;
   Footprints goal_;  ///< footprints of the next key
-  std::vector<Footprints>
-      later_;  ///< footprints of the next key on the base of each frame before it
+  /// Footprints of the next key, carried to the base of each frame since the last key.
+  std::vector<Footprints> later_;
   std::vector<PatchPath> paths_;
   std::vector<Patch> patches_;
 };

@@ -47,7 +47,7 @@ using BandFrames = std::function<levelset::NarrowBand(std::size_t frame)>;
 struct AnimationOptions {
   std::size_t frames = 2;  ///< number of frames
   CarryRule carry = CarryRule::Corners;
-  BandFrames bases = {};  ///< empty: the base does not change
+  BandFrames bases = {};  ///< bases of the frames from 1 on; empty: the base does not change
   PatchMaker make = {};   ///< rebuilds patches like those of the first key at new positions
   /// Factor for the drift warning. It is issued when a side or diagonal of a carried patch has
   /// become longer or shorter than at its key by more than this factor.
@@ -110,7 +110,7 @@ struct TextureAnimationOptions {
   /// given, all frames use the texture's box at frame 0. An RBF map continues the texture outside
   /// that box; a prism map cuts it off, with a warning.
   TextureOptions texture = {};
-  BandFrames textures = {};  ///< empty: the texture does not change
+  BandFrames textures = {};  ///< textures from frame 1 on; empty: the texture does not change
   /// Changes the patches of a frame before the texture is mapped. It is called only for frames
   /// whose base or patches differ from those of the previous frame. Empty: no change.
   std::function<std::vector<Patch>(const PatchFrame& frame)> improve = {};

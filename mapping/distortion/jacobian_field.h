@@ -10,8 +10,9 @@
 namespace mapping {
 
 struct JacobianFieldOptions {
-  double voxelSize = 0;   ///< world units, positive
-  double embedDepth = 0;  ///< depth of the texture below the surface, in w
+  double voxelSize = 0;  ///< voxel size of the field, world units, positive
+  /// Depth of the texture below the surface, in w; negative: its lift above w = 1.
+  double embedDepth = 0;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
 };
 

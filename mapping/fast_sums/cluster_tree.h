@@ -18,8 +18,8 @@ namespace mapping {
 class ClusterTree {
  public:
   struct Node {
-    std::uint32_t begin = 0, end = 0;  ///< range of order()
-    std::int32_t child = -1;           ///< the first of two adjacent children; −1: a leaf
+    std::uint32_t begin = 0, end = 0;  ///< range of the node's points in order()
+    std::int32_t child = -1;           ///< index of the first of two adjacent children; −1: leaf
     Imath::Box3d box = {};
     [[nodiscard]] std::size_t count() const { return end - begin; }
     [[nodiscard]] bool isLeaf() const { return child < 0; }

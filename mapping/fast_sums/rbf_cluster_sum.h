@@ -38,7 +38,7 @@ class RbfClusterSum {
 
   /// Position and size of a box's node cube.
   struct Frame {
-    Imath::V3d center, half;  ///< half sizes; 1 for edges of length zero
+    Imath::V3d center, half;  ///< centre, and half edge lengths of the box; 1 in place of 0
     double radius = 0;
   };
   struct Pass;  ///< working data of one sum

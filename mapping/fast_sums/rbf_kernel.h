@@ -105,7 +105,7 @@ struct LaplacianShape {
   static constexpr double kTau = 0.02, kDelta = 5;
   double fast, slow;  ///< f and s
   double a, b;        ///< b − a = 1
-  double scale;       ///< makes φ(0) = 1
+  double scale;       ///< factor that makes φ(0) = 1
   double bendAtZero;  ///< |φ″(0)|
   LaplacianShape() {
     const double root = std::sqrt(1 - 4 * kTau * kTau * kDelta * kDelta);
@@ -171,7 +171,7 @@ struct Gaussian {
   static double slope(double r) { return -2 * r * std::exp(-r * r); }
   static double sixth(double d) { return 0.324 * std::exp(-0.5 * d * d); }
   static double slopeBound(double lo, double) {
-    const double at = std::max(lo, M_SQRT1_2);  // position of the maximum
+    const double at = std::max(lo, M_SQRT1_2);  // position of the maximum of |φ′| for r ≥ lo
     return 2 * at * std::exp(-at * at);
   }
   static double bendBound(double lo, double) {
