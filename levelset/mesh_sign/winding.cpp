@@ -114,8 +114,8 @@ void WindingField::build(std::size_t begin, std::size_t end) {
   build(middle, end);
 }
 
-/// Winding number of a far node at x = `point`: 1/4π times the first-order expansion of the
-/// integral ∫ n · (y − x) / |y − x|³ over the triangles, about the node's centre.
+/// Winding number of a far node at x = `point`: 1/4π times ∫ n · (y − x) / |y − x|³ over its
+/// triangles. The integrand is expanded to first order about the node's centre.
 double WindingField::far(const Node& node, const V3d& point) const {
   const V3d r = node.centre - point;
   const double inverse2 = 1 / r.length2(), inverse3 = inverse2 * std::sqrt(inverse2);

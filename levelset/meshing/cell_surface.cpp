@@ -28,8 +28,8 @@ Coord lowered(const Coord& origin, unsigned side) {
   return origin.offsetBy(side & 4 ? -kSide : 0, side & 2 ? -kSide : 0, side & 1 ? -kSide : 0);
 }
 
-/// Shifts a slab: bit (y, z) of the result is bit (y, z + 1) of the slab, and for z = 7 bit (y, 0)
-/// of `beyond`, the slab of the next block along z.
+/// Shifts a slab by one along z: bit (y, z) of the result is bit (y, z + 1) of the slab. Bits with
+/// z = 7 come from `beyond`, the slab of the next block along z.
 std::uint64_t shiftZ(std::uint64_t slab, std::uint64_t beyond) {
   return ((slab >> 1) & ~(kLowZ << 7)) | ((beyond & kLowZ) << 7);
 }

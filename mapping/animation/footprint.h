@@ -51,8 +51,8 @@ struct Footprint {
 
 enum class CarryRule {
   Corners,  ///< each corner goes to the nearest point of the new surface [Brodersen07 §10.2]
-  /// Moves the centre to the nearest point, rotates u by the least rotation between the normals,
-  /// and keeps the geodesic coordinates of the corners, so that the patch keeps its shape.
+  /// Moves the centre to the nearest point and rotates u by the least rotation between the normals.
+  /// The corners keep their geodesic coordinates, so that the patch keeps its shape.
   Rigid
 };
 
