@@ -45,15 +45,16 @@ std::size_t keyCount(const Invocation& in) {
 
 // === Files
 
-/// @param what  name of the content, for the message
-/// @param isKnown  returns whether the format can hold the content
+/// Returns the file sequence that an option names.
+/// @param example  pattern of a valid sequence, for the error message
+/// @param isKnown  true if the format of the files can store the frames
 FileSequence sequenceOf(const Invocation& in, const char* option, const char* example,
                         bool isKnown) {
   FileSequence sequence(in.text(option));
   if (sequence.hasNumber() && isKnown) return sequence;
-  throw UsageError(
-      fmt::format("{}: '{}' is not a sequence of such files; write # for the number, as in {}",
-                  in.where(option), sequence.pattern(), example));
+  throw UsageError(fmt::format(
+      "{}: '{}' is not a sequence of files of a suitable format; write # for the number, as in {}",
+      in.where(option), sequence.pattern(), example));
 }
 
 FileSequence outSequence(const Invocation& in) {
@@ -75,7 +76,9 @@ FileSequence textureSequence(const Invocation& in) {
       mapsMesh(in) ? levelset::isMeshFormat(pattern) : levelset::isBandFormat(pattern));
 }
 
-/// Returns the file of a frame, whose number is 1 or more.
+/// Returns the file that is read for a frame.
+/// @param first  option with the number of the file of frame 1
+/// @param frame  number of the frame, 1 or more
 std::filesystem::path frameFile(const Invocation& in, const FileSequence& sequence,
                                 const char* first, std::size_t frame) {
   return sequence.file(static_cast<std::size_t>(in.integer(first)) + frame - 1);
@@ -88,7 +91,7 @@ std::vector<std::string> outFiles(const Invocation& in) {
   return files;
 }
 
-/// Checks that all files exist before anything is computed.
+/// Checks that the files of all frames exist before anything is computed.
 void requireFrames(const Invocation& in, const FileSequence& sequence, const char* first) {
   for (std::size_t f = 1; f < framesOf(in); ++f) {
     const std::filesystem::path file = frameFile(in, sequence, first, f);
@@ -116,7 +119,7 @@ void requireApart(const Invocation& in, const char* sequence, const char* first)
 
 // === Keys
 
-/// Frames of the key patches: --key-frames, or evenly spread.
+/// Returns the frame of each key patch: --key-frames, or evenly distributed frames.
 std::vector<std::size_t> keyFrames(const Invocation& in) {
   const std::size_t count = keyCount(in), frames = framesOf(in);
   std::vector<std::size_t> keys;
@@ -126,23 +129,26 @@ std::vector<std::size_t> keyFrames(const Invocation& in) {
       const std::size_t end = std::min(text.find(',', begin), text.size());
       const long frame = parseInteger(text.substr(begin, end - begin), in.where("key-frames"));
       if (frame < 0)
-        throw UsageError(fmt::format("{}: there is no frame {}", in.where("key-frames"), frame));
+        throw UsageError(fmt::format("{}: frame {} is negative; frames count from 0",
+                                     in.where("key-frames"), frame));
       keys.push_back(static_cast<std::size_t>(frame));
       begin = end + 1;
     }
     if (keys.size() != count)
-      throw UsageError(fmt::format("{}: {} frames for {} patches; give one for each, 0 first",
-                                   in.where("key-frames"), keys.size(), count));
+      throw UsageError(fmt::format(
+          "{}: {} frames are given for {} patches; give one frame for each patch, 0 first",
+          in.where("key-frames"), keys.size(), count));
   } else {
     for (std::size_t k = 0; k < count; ++k)
       keys.push_back(count > 1 ? (2 * k * (frames - 1) + count - 1) / (2 * (count - 1)) : 0);
   }
   for (std::size_t k = 0; k < keys.size(); ++k) {
     if (keys[k] < frames && (k == 0 ? keys[k] == 0 : keys[k] > keys[k - 1])) continue;
-    throw UsageError(fmt::format(
-        "animate: {} patches do not fit {} frames: patch {} would stand at frame {}; the first "
-        "stands at frame 0, each later than the one before, the last at {} at most",
-        count, frames, k + 1, keys[k], frames - 1));
+    throw UsageError(
+        fmt::format("animate: {} patches do not fit {} frames: patch {} would be at frame {}; the "
+                    "first patch must be at frame 0, each further patch at a later frame than its "
+                    "predecessor, and the last at frame {} at most",
+                    count, frames, k + 1, keys[k], frames - 1));
   }
   return keys;
 }
@@ -150,7 +156,7 @@ std::vector<std::size_t> keyFrames(const Invocation& in) {
 void validateAnimate(const Invocation& in) {
   validateTextureOptions(in);
   if (in.integer("frames") > kMostFrames)
-    throw UsageError(fmt::format("animate: --frames {} are too many; give at most {}",
+    throw UsageError(fmt::format("animate: --frames {} is too large; give at most {}",
                                  in.integer("frames"), kMostFrames));
   (void)outSequence(in);
   if (in.given("base-frames")) (void)baseSequence(in);
@@ -158,47 +164,52 @@ void validateAnimate(const Invocation& in) {
   for (const auto& [first, sequence] :
        {std::pair{"base-first", "base-frames"}, std::pair{"texture-first", "texture-frames"}}) {
     if (in.given(first) && !in.given(sequence))
-      throw UsageError(fmt::format("animate: --{} goes with --{}", first, sequence));
+      throw UsageError(fmt::format("animate: --{} needs --{}; give both", first, sequence));
     if (in.integer(first) < 0)
-      throw UsageError(
-          fmt::format("{}: no file has the number {}", in.where(first), in.integer(first)));
+      throw UsageError(fmt::format("{}: the file number {} is negative; give 0 or more",
+                                   in.where(first), in.integer(first)));
     requireApart(in, sequence, first);
   }
   if (in.number("drift") < 1)
     throw UsageError(fmt::format(
-        "animate: --drift {} is below 1, a factor of nothing; give 1 or more", in.number("drift")));
+        "animate: --drift {} is below 1, but it is a factor of growth or shrinkage; give 1 or more",
+        in.number("drift")));
   (void)keyFrames(in);
 }
 
-/// Frames between the keys follow the first patch. Rejects a key patch that another action or other
-/// options made, and warns where its fineness differs or is unknown.
+/// Checks that a key patch was built like the first one, whose recipe builds the patches between
+/// the keys. Rejects a key patch of another action or with other options of its shape. Warns if its
+/// resolution differs, or if its recipe is unknown.
+/// @param patch  number of the key patch; the first has number 1
 void requireLikeFirst(Invocation& in, std::size_t patch) {
   const PatchRecipe* first = in.operands[2].patch().recipe.get();
   const PatchRecipe* other = in.operands[1 + patch].patch().recipe.get();
   if (!first) return;  // reported when the patch is built again
   if (!other) {
-    in.notes.warnings.push_back(fmt::format(
-        "how patch {} was made is not in its file; the frames between are made as the first",
-        patch));
+    in.notes.warnings.push_back(
+        fmt::format("the file of patch {} does not record how the patch was built; the patches "
+                    "between key frames are built like the first patch",
+                    patch));
     return;
   }
   if (first->action != other->action) {
-    throw UsageError(fmt::format(
-        "animate: patch {} was made by '{}' and the first by '{}'; the frames between follow the "
-        "first, so make both by one action",
-        patch, other->action, first->action));
+    throw UsageError(
+        fmt::format("animate: patch {} was built by '{}' and the first patch by '{}'; the patches "
+                    "between key frames are built like the first, so build both by the same action",
+                    patch, other->action, first->action));
   }
   for (const auto& [option, value] : first->shape) {
     if (other->shape.at(option) == value) continue;
-    throw UsageError(fmt::format(
-        "animate: patch {} has another --{} than the first; the frames between follow the first, "
-        "so give both the same",
-        patch, option));
+    throw UsageError(
+        fmt::format("animate: patch {} and the first patch differ in --{}; the patches between key "
+                    "frames are built like the first, so give both the same value",
+                    patch, option));
   }
   for (const auto& [option, value] : first->fineness) {
     if (other->fineness.at(option) == value) continue;
     in.notes.warnings.push_back(
-        fmt::format("patch {} has another --{} than the first, which the frames between follow",
+        fmt::format("patch {} and the first patch differ in --{}; the patches between key frames "
+                    "are built like the first",
                     patch, option));
   }
 }
@@ -211,8 +222,9 @@ std::vector<mapping::AnimationKey> keysOf(Invocation& in, const Imath::Box3d& te
     const PatchValue& value = in.operands[2 + k].patch();
     const bool isMoved = in.given("base-frames") || frames.size() > 1;
     if (isMoved && value.recipe && !value.recipe->fixed.empty()) {
-      throw UsageError(fmt::format("animate: patch {} cannot be moved, since {}; leave them out",
-                                   k + 1, value.recipe->fixed));
+      throw UsageError(
+          fmt::format("animate: patch {} cannot be moved, since {}; leave this option out", k + 1,
+                      value.recipe->fixed));
     }
     mapping::AnimationKey key;
     key.frame = frames[k];
@@ -227,7 +239,7 @@ std::vector<mapping::AnimationKey> keysOf(Invocation& in, const Imath::Box3d& te
   return keys;
 }
 
-/// Recipe of patches that were read from a file.
+/// Returns a function that rebuilds patches from a file, whose recipe is unknown.
 mapping::PatchMaker makerLike(const std::vector<Patch>& patches) {
   std::vector<mapping::PatchOptions> options;
   for (const Patch& patch : patches) options.push_back(mapping::optionsLike(patch));
@@ -243,8 +255,9 @@ mapping::PatchMaker makerLike(const std::vector<Patch>& patches) {
   };
 }
 
-/// Reads a level set, and warns once about repairs.
-/// @param told  frames with such a warning
+/// Reads the level set of a frame. Warns about repairs once for each frame, although a frame may be
+/// read several times.
+/// @param told  frames whose warnings were already given
 NarrowBand readFrame(Invocation& in, std::size_t frame, const std::filesystem::path& file,
                      std::set<std::size_t>& told) {
   levelset::BandRepairs repairs;
@@ -272,8 +285,8 @@ mapping::AnimationOptions animationOptions(Invocation& in,
         mapping::optionsLike(patch).scheme == mapping::LayerScheme::Conforming;
     if (isMoved)
       in.notes.notes.push_back(fmt::format(
-          "how the first patch was made is not in its file; where it moves it is made again with "
-          "{} layers, {:.4g} between {} particles",
+          "the file of the first patch does not record how the patch was built; in frames where it "
+          "moves it is rebuilt with {} layers and a spacing of {:.4g} between {} particles",
           patch.layers.size(), patch.spacing, isConforming ? "conforming" : "reduced"));
   } else if (first.recipe->around) {
     options.make = [around = first.recipe->around, height = keys.front().patches.front().height](
@@ -287,8 +300,8 @@ mapping::AnimationOptions animationOptions(Invocation& in,
   if (first.recipe && first.recipe->isRigid) {
     if (in.given("carry") && options.carry == mapping::CarryRule::Corners)
       throw UsageError(
-          "animate: a decal is told by its centre and direction, so its corners cannot be carried "
-          "by themselves; leave --carry out");
+          "animate: a decal is defined by its centre and direction, so its corners cannot move "
+          "separately; leave --carry out");
     options.carry = mapping::CarryRule::Rigid;
   }
   if (in.given("base-frames")) {
@@ -326,17 +339,17 @@ void tellAnimation(Invocation& in, const mapping::AnimationReport& report) {
   in.notes.warnings.insert(in.notes.warnings.end(), report.warnings.begin(), report.warnings.end());
   in.notes.notes.insert(in.notes.notes.end(), report.notes.begin(), report.notes.end());
   in.notes.notes.push_back(fmt::format(
-      "{} frames, {} of them as the one before and not computed again; patches made {} times, no "
-      "corner went further than {:.4g} from frame to frame",
+      "{} frames, of which {} equal the previous frame and were not computed again; patches were "
+      "built in {} frames; a corner moves by at most {:.4g} from frame to frame",
       report.frames.size(), report.reused, report.patchesMade, farthest));
   if (worst.factor() > 1.001)
-    in.notes.notes.push_back(fmt::format(
-        "sides and diagonals of what was carried are {:.4g} to {:.4g} times as long as at first, "
-        "where they changed most",
-        worst.least, worst.most));
+    in.notes.notes.push_back(
+        fmt::format("the sides and diagonals of the patch that changes most are {:.4g} to {:.4g} "
+                    "times as long as at its key frame",
+                    worst.least, worst.most));
 }
 
-/// Untangles and relaxes patches. Warnings name their frame; only the first frame adds notes.
+/// Untangles and relaxes the patches of a frame. Warnings name the frame; only frame 0 adds notes.
 std::vector<Patch> improvedAt(Invocation& in, const mapping::PatchFrame& frame,
                               const Imath::V3d& textureSize) {
   std::vector<std::string>&notes = in.notes.notes, &warnings = in.notes.warnings;
@@ -363,10 +376,10 @@ class MeshWriter {
     levelset::writeMesh(file, mesh);
     if (isTold_ || mesh.attributes.isEmpty() || levelset::holdsAttributes(file)) return;
     isTold_ = true;
-    in_.notes.warnings.push_back(fmt::format(
-        "{} and the frames after hold positions and triangles only: the {} were left out; write "
-        ".ply or .obj to keep them",
-        file.string(), describe(mesh.attributes)));
+    in_.notes.warnings.push_back(
+        fmt::format("{} and the files of later frames store positions and triangles only: the {} "
+                    "were left out; write .ply or .obj to keep them",
+                    file.string(), describe(mesh.attributes)));
   }
 
  private:
@@ -386,7 +399,7 @@ bool isSame(const levelset::TriMesh& a, const levelset::TriMesh& b) {
 // === The action
 
 Value animateMesh(Invocation& in, const std::vector<mapping::AnimationKey>& keys) {
-  constexpr double kImproving = 0.3;  // share of the progress
+  constexpr double kImproving = 0.3;  // share of untangling and relaxing in the progress of a frame
   MeshWriter writer(in);
   mapping::MeshTextureOptions options = meshTextureOptions(in);
   options.textureBox = textureBoxOf(
@@ -453,7 +466,8 @@ Value animate(Invocation& in) {
   }
   const FileSequence out = outSequence(in);
   MeshWriter writer(in);
-  levelset::TriMesh mesh;  // mesh of the previous frame, where meshes are written
+  levelset::TriMesh
+      mesh;  // mesh of the previous frame; empty when the frames are written as level sets
   NarrowBand last;
   tellAnimation(in,
                 mapping::animateTexture(
@@ -480,35 +494,39 @@ std::vector<Param> animateParams() {
        .required = true},
       {.name = "out",
        .type = ParamType::Path,
-       .doc = "files of the frames, .vdb or meshes; # in the name stands for the number "
-              "(frame_###.vdb)",
+       .doc = "files of the frames to write, .vdb or meshes; # in the name stands for the number "
+              "of the frame, as in frame_###.vdb",
        .required = true},
       {.name = "base-frames",
        .type = ParamType::Path,
-       .doc = "bases of the frames after the first; # in the name stands for the number"},
+       .doc = "files with the bases of frames 1, 2, …; # in the name stands for the number of the "
+              "file, as in base_###.vdb"},
       {.name = "base-first",
        .type = ParamType::Integer,
-       .doc = "number of the file that is the base of frame 1",
+       .doc = "number in the name of the --base-frames file for frame 1",
        .fallback = "1"},
       {.name = "texture-frames",
        .type = ParamType::Path,
-       .doc = "textures of the frames after the first, likewise; without --texture-box, the box of "
-              "the first frame's texture holds for all"},
+       .doc = "files with the textures of frames 1, 2, …; # in the name stands for the number of "
+              "the file; without --texture-box, all frames use the box of the texture of frame 0"},
       {.name = "texture-first",
        .type = ParamType::Integer,
-       .doc = "number of the file that is the texture of frame 1",
+       .doc = "number in the name of the --texture-frames file for frame 1",
        .fallback = "1"},
       {.name = "key-frames",
        .type = ParamType::Text,
-       .doc = "frames at which the patches are reached, as 0,12,30; default: evenly spread"},
+       .doc =
+           "frame of each patch operand, as 0,12,30; default: evenly distributed over all frames"},
       {.name = "carry",
        .type = ParamType::Choice,
-       .doc = "move each corner by itself, or turn the patch as a rigid shape",
+       .doc = "motion of a patch with the base: corners, each corner goes to the nearest point of "
+              "the new surface; rigid, the patch moves and turns without a change of its shape",
        .fallback = "corners",
        .choices = {"corners", "rigid"}},
       {.name = "drift",
        .type = ParamType::Number,
-       .doc = "warn about carried patches that grow or shrink by more than this factor",
+       .doc = "warn when sides or diagonals of a moved patch have grown or shrunk by more than "
+              "this factor since its key frame",
        .fallback = "1.5",
        .range = Range::Positive}};
   const std::vector<Param> texture = textureParams();

@@ -24,21 +24,22 @@ using levelset::UsageError;
 
 constexpr std::array<const char*, 4> kSides = {"side0", "side1", "side2", "side3"};
 
-/// Reads --corners, or --at and --size.
+/// Checks --corners, or --at and --size, and the options that belong to one of them.
+/// @throws levelset::UsageError for a wrong combination
 void validateOutline(const Invocation& in) {
   const std::string& name = in.op().name;
-  if (in.given("at") && !in.given("size"))
-    throw UsageError(name + ": --at needs --size a,b beside it");
+  if (in.given("at") && !in.given("size")) throw UsageError(name + ": --at needs --size a,b, too");
   if (in.given("corners")) {
     if (in.given("size") || in.given("rotate"))
-      throw UsageError(name + ": --size and --rotate go with --at, not with --corners");
+      throw UsageError(name +
+                       ": --size and --rotate need --at and cannot be combined with --corners");
     const std::size_t count = in.points("corners").size();
     if (count != 4)
       throw UsageError(fmt::format("{}: --corners needs four points, not {}", name, count));
   }
   for (const char* side : kSides) {
     if (in.given(side) && !in.given("corners"))
-      throw UsageError(fmt::format("{}: --{} goes with --corners", name, side));
+      throw UsageError(fmt::format("{}: --{} needs --corners", name, side));
   }
 }
 
@@ -49,7 +50,7 @@ void validatePatch(const Invocation& in) {
   validateLayers(in);
 }
 
-/// Reads "n,m", two positive integers.
+/// Reads --count "n,m", two positive integers: tiles along u and along v.
 std::array<std::size_t, 2> countOf(const Invocation& in) {
   const std::string text = in.text("count");
   std::array<std::size_t, 2> count = {0, 0};
@@ -59,7 +60,8 @@ std::array<std::size_t, 2> countOf(const Invocation& in) {
   const auto second = hasComma ? std::from_chars(first.ptr + 1, end, count[1]) : first;
   if (!hasComma || second.ec != std::errc() || second.ptr != end || count[0] == 0 || count[1] == 0)
     throw UsageError(
-        fmt::format("{}: '{}' is no pair of counts; write 12,3", in.where("count"), text));
+        fmt::format("{}: '{}' is not a pair of positive integers; write numbers of tiles, as 12,3",
+                    in.where("count"), text));
   return count;
 }
 
@@ -73,15 +75,16 @@ void validateGrid(const Invocation& in) {
   if (in.given("around")) {
     const std::size_t count = in.points("around").size();
     if (count != 2)
-      throw UsageError(
-          fmt::format("patch-grid: --around needs two points, where the tiles begin and end on the "
-                      "axis, not {}",
-                      count));
+      throw UsageError(fmt::format(
+          "patch-grid: --around needs two points, the ends of the axis, not {}", count));
     for (const char* other : {"size", "twist", "taper", "bend", "mirrored"})
       if (in.given(other))
-        throw UsageError(fmt::format("patch-grid: --{} does not go with --around", other));
+        throw UsageError(
+            fmt::format("patch-grid: --{} cannot be combined with --around; leave it out", other));
     if (in.text("particles") == "spline")
-      throw UsageError("patch-grid: --particles spline does not go with --around");
+      throw UsageError(
+          "patch-grid: --particles spline cannot be combined with --around; give conforming or "
+          "reduced");
   }
   validateOutline(in);
   validateLayers(in);
@@ -89,7 +92,8 @@ void validateGrid(const Invocation& in) {
   const double shift = in.number("shift");
   if (shift >= 1)
     throw UsageError(fmt::format(
-        "patch-grid: --shift {} is out of range; give a share of a tile, 0 to below 1", shift));
+        "patch-grid: --shift {} is out of range; give a fraction of a tile, at least 0 and below 1",
+        shift));
 }
 
 std::array<V3d, 4> cornersOf(Invocation& in) {
@@ -101,13 +105,14 @@ std::array<V3d, 4> cornersOf(Invocation& in) {
   return mapping::cornersAround(in.band(), in.point("at"), size[0], size[1], in.radians("rotate"));
 }
 
-/// Checks the orientation of corners around a point, which a strongly curved surface may reverse.
-/// @return a warning; empty where the user gave the corners, or allowed the reversal
+/// Returns the error message for a patch around a point whose corners turn out clockwise, as they
+/// may on a strongly curved surface. Empty if the user gave the corners, or allows a mirrored
+/// patch.
 std::string whyMirrored(const Invocation& in, const mapping::PatchOptions& options) {
   if (in.given("corners") || options.mirror) return "";
   return fmt::format(
-      "{}: the surface bends too much about {} for a patch of size {}, it would be laid the wrong "
-      "way round; make it smaller, or lay it elsewhere",
+      "{}: the surface around {} bends too much for a patch of size {}: its corners would run "
+      "clockwise; make it smaller, or place it elsewhere",
       in.op().name, in.text("at"), in.text("size"));
 }
 
@@ -115,7 +120,9 @@ void requireUpright(const std::vector<mapping::Patch>& patches, const std::strin
   if (!whyMirrored.empty() && patches.front().mirrored) throw levelset::InvalidInput(whyMirrored);
 }
 
-/// On a curved surface, a patch with the requested diagonals has different sides.
+/// Compares the sides of a patch around a point with --size, from which they differ on a curved
+/// surface. Warns beyond 10 %.
+/// @throws levelset::InvalidInput beyond a factor of 2
 void requireSize(Invocation& in, const mapping::PatchReport& report) {
   if (in.op().name != "patch" || !in.given("at")) return;
   const std::array<double, 2> asked = patchSizeOf(in);
@@ -123,19 +130,20 @@ void requireSize(Invocation& in, const mapping::PatchReport& report) {
   const double least = std::min(u, v), most = std::max(u, v);
   if (least < 0.5 || most > 2) {
     throw levelset::InvalidInput(
-        fmt::format("patch: about {} the surface bends too much for a patch of size {}, its sides "
-                    "would be {:.4g} by {:.4g} long; make it smaller, or give its corners",
+        fmt::format("patch: the surface around {} bends too much for a patch of size {}: its sides "
+                    "would be {:.4g} by {:.4g} long; make it smaller, or give its --corners",
                     in.text("at"), in.text("size"), report.uLength, report.vLength));
   }
   if (least < 0.9 || most > 1.1) {
     in.notes.warnings.push_back(
-        fmt::format("patch: where the surface bends like this, a patch of size {} has sides of "
-                    "{:.4g} by {:.4g}; give its corners if these are not as wanted",
+        fmt::format("patch: because of the curvature of the surface, a patch of size {} gets sides "
+                    "of {:.4g} by {:.4g}; give its --corners for other sides",
                     in.text("size"), report.uLength, report.vLength));
   }
 }
 
-/// Reports distortion and counts, and warns about particles that were slowed.
+/// Reports the sizes and counts of new patches. Warns about slowed particles, and about a
+/// relaxation that did not converge.
 void tellPatches(Invocation& in, const mapping::PatchReport& report,
                  const std::vector<mapping::Patch>& patches) {
   std::size_t particles = 0;
@@ -155,15 +163,16 @@ void tellPatches(Invocation& in, const mapping::PatchReport& report,
   in.notes.detailsJson = json.dump();
   if (report.slowed > 0) {
     in.notes.warnings.push_back(
-        fmt::format("{}: {} of its particles would meet their neighbours on the way, where the "
-                    "spline bends more narrowly than the patch is wide; they were slowed",
+        fmt::format("{}: {} particles were slowed, since they would collide with their neighbours "
+                    "where the spline bends too tightly for the width of the patch",
                     in.op().name, report.slowed));
   }
   if (!report.isRelaxed) {
-    in.notes.warnings.push_back(fmt::format(
-        "{}: particles still moved after {} steps of relaxation, so the texture may be stretched "
-        "unevenly; make the patch smaller, its spacing wider or its place flatter",
-        in.op().name, report.relaxIterations));
+    in.notes.warnings.push_back(
+        fmt::format("{}: particles still moved after {} steps of relaxation, so the texture may be "
+                    "stretched unevenly; make the patch smaller, raise --spacing, or place the "
+                    "patch where the surface is flatter",
+                    in.op().name, report.relaxIterations));
   }
   in.notes.notes.push_back(fmt::format(
       "{:.4g} by {:.4g} along the surface, {}{} particles in {} layers", report.uLength,
@@ -171,12 +180,13 @@ void tellPatches(Invocation& in, const mapping::PatchReport& report,
       particles, layers));
 }
 
-/// Builds patches at the requested height, or again once the texture determines the height.
-/// @param make  builds the patches and their report for a height
+/// Builds patches at the requested height. With --height auto, also stores how to rebuild them at
+/// the height that the texture determines.
+/// @param make builds the patches and their report for a height in world units
 template <typename Make>
 Value patchesOf(Invocation& in, PatchRecipe recipe, const Make& make) {
   const bool isAuto = in.text("height") == "auto";
-  // The texture determines the height. Until then one voxel suffices to find the patch's size.
+  // With --height auto, a height of one voxel suffices to measure the patch on the surface.
   auto [patches, report] = make(isAuto ? in.band().voxelSize() : in.length("height"), in.progress);
   requireSize(in, report);
   tellPatches(in, report, patches);
@@ -202,8 +212,8 @@ PatchGridResult asSet(mapping::PatchResult result) {
   return set;
 }
 
-/// Options of a patch that moves to another position. A spline and directions move with it. The
-/// caller checks whether its corners have reversed their orientation.
+/// Returns the options of a patch that moves from the footprint `origin` to `now`. Its spline and
+/// directions move with it. The caller checks if its corners have become clockwise.
 mapping::PatchOptions optionsElsewhere(mapping::PatchOptions options,
                                        const mapping::Footprint& origin,
                                        const mapping::Footprint& now, const Progress& progress) {
@@ -218,7 +228,8 @@ mapping::PatchOptions optionsElsewhere(mapping::PatchOptions options,
 std::string whyFixed(const Invocation& in) {
   for (const char* side : kSides)
     if (in.given(side))
-      return fmt::format("--{} of '{}' names points that stay where they are", side, in.op().name);
+      return fmt::format("--{} of '{}' names points that do not move with the surface", side,
+                         in.op().name);
   return "";
 }
 
@@ -247,7 +258,8 @@ Value patch(Invocation& in) {
                    });
 }
 
-/// Mean distance along u and along v from the centre to the corners.
+/// Mean of |u| and |v| over the four corners, relative to the centre; world units along the
+/// surface.
 double meanReach(const mapping::Footprint& footprint) {
   double sum = 0;
   for (const Imath::V2d& way : footprint.reach.value()) sum += std::abs(way.x) + std::abs(way.y);
@@ -344,7 +356,8 @@ Value patchGrid(Invocation& in) {
                    });
 }
 
-/// Plan whose box is grown by the patch's height on all sides.
+/// Returns `plan` for a patch whose particles on the surface lie in `box`: the box is extended on
+/// all sides by the height, with --height auto by half the diagonal of the box.
 Plan raisedPlan(Invocation& in, Plan plan, Imath::Box3d box) {
   const bool isAuto = in.text("height") == "auto";
   const double height = isAuto ? box.size().length() / 2 : in.length("height");
@@ -396,35 +409,49 @@ Plan planGrid(Invocation& in) {
   return raisedPlan(in, plan, plan.bounds);
 }
 
-/// Parameters of the part above the surface, which all patches share.
+/// Returns the parameters of the layers above the surface.
+/// @param particles  default of --particles
 std::vector<Param> layerParams(const char* particles) {
   std::vector<Param> params = withLayers({});
   for (Param& param : params)
     if (param.name == "particles") param.fallback = particles;
   params.push_back({.name = "spline",
                     .type = ParamType::Points,
-                    .doc = "--particles spline: points that the curve passes, from the patch's "
-                           "centre on; default: straight along the normal"});
-  params.push_back({.name = "fade",
-                    .type = ParamType::Flag,
-                    .doc = "--particles spline: the relief of the surface fades along the curve"});
+                    .doc = "with --particles spline: points of the curve after the centre of the "
+                           "patch; default: a straight line along the normal"});
+  params.push_back(
+      {.name = "fade",
+       .type = ParamType::Flag,
+       .doc = "with --particles spline: the relief of the base surface fades out along the curve"});
   return params;
 }
 
 std::vector<Param> outlineParams() {
-  return {{.name = "corners", .type = ParamType::Points, .doc = "four points, \"p0 p1 p2 p3\""},
-          {.name = "at", .type = ParamType::Point, .doc = "centre of a patch of --size"},
-          {.name = "size",
-           .type = ParamType::Lengths,
-           .doc = "lengths along u and v, on the surface",
-           .range = Range::Positive,
-           .count = 2},
-          {.name = "side0",
-           .type = ParamType::Points,
-           .doc = "points that the side from corner 0 to 1 passes, on shortest paths"},
-          {.name = "side1", .type = ParamType::Points, .doc = "the same from corner 1 to 2"},
-          {.name = "side2", .type = ParamType::Points, .doc = "the same from corner 3 to 2"},
-          {.name = "side3", .type = ParamType::Points, .doc = "the same from corner 0 to 3"}};
+  return {
+      {.name = "corners",
+       .type = ParamType::Points,
+       .doc = "corners of the patch, anticlockwise seen from outside: four points \"p0 p1 p2 p3\""},
+      {.name = "at",
+       .type = ParamType::Point,
+       .doc = "centre of a patch whose lengths --size gives"},
+      {.name = "size",
+       .type = ParamType::Lengths,
+       .doc = "lengths of the patch along u and along v, measured on the surface",
+       .range = Range::Positive,
+       .count = 2},
+      {.name = "side0",
+       .type = ParamType::Points,
+       .doc = "points through which the side from corner 0 to 1 passes, on shortest paths between "
+              "them"},
+      {.name = "side1",
+       .type = ParamType::Points,
+       .doc = "points through which the side from corner 1 to 2 passes"},
+      {.name = "side2",
+       .type = ParamType::Points,
+       .doc = "points through which the side from corner 3 to 2 passes"},
+      {.name = "side3",
+       .type = ParamType::Points,
+       .doc = "points through which the side from corner 0 to 3 passes"}};
 }
 
 std::vector<Param> joinParams(std::vector<Param> a, const std::vector<Param>& b) {
@@ -442,30 +469,33 @@ Operator patchOperator() {
       .details =
           "Points are projected to the surface along the gradient of the distance. u runs from "
           "corner 0 to 1, v from corner 0 to 3, w outwards; corners run anticlockwise seen from "
-          "outside. Sides are shortest paths on the surface, through the points of --side0 to "
-          "--side3 with a corner at each.",
+          "outside. Sides are shortest paths on the surface. Points of --side0 to --side3 divide a "
+          "side into several shortest paths, which may meet at an angle.",
       .example =
           "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! patch @ball --at 0,0,10 "
           "--size 8,8 --height 3 --as p "
           "! torus --radius 4 --tube 1.5 --voxel 0.5 --as ring ! texture @ball @ring @p "
           "--blend 1 ! mesh ! write ring.ply",
       .params = joinParams(
-          joinParams(outlineParams(), {{.name = "rotate",
-                                        .type = ParamType::Degrees,
-                                        .doc = "--at: angle of u about the normal",
-                                        .fallback = "0"}}),
-          joinParams(
-              layerParams("reduced"),
-              {{.name = "directions",
-                .type = ParamType::Points,
-                .doc = "--particles reduced: directions in which the corners rise, one for all or "
-                       "\"d0 d1 d2 d3\"; default: along the gradient of the distance"},
-               {.name = "parallel",
-                .type = ParamType::Flag,
-                .doc = "the same, all along the normal at the patch's centre"},
-               {.name = "mirror",
-                .type = ParamType::Flag,
-                .doc = "accept corners that run clockwise: the texture is mirrored"}})),
+          joinParams(outlineParams(),
+                     {{.name = "rotate",
+                       .type = ParamType::Degrees,
+                       .doc = "with --at: rotation of the direction u about the surface normal",
+                       .fallback = "0"}}),
+          joinParams(layerParams("reduced"),
+                     {{.name = "directions",
+                       .type = ParamType::Points,
+                       .doc = "with --particles reduced: directions in which the corners rise from "
+                              "the surface, one for all or \"d0 d1 d2 d3\"; default: along the "
+                              "gradient of the distance"},
+                      {.name = "parallel",
+                       .type = ParamType::Flag,
+                       .doc = "with --particles reduced: all corners rise along the normal at the "
+                              "centre of the patch"},
+                      {.name = "mirror",
+                       .type = ParamType::Flag,
+                       .doc = "accept corners that run clockwise seen from outside, which mirrors "
+                              "the texture"}})),
       .operands = {{Kind::Band, Kind::Surface}},
       .resultKind = [](const Invocation&) { return Kind::Patch; },
       .run = patch,
@@ -491,20 +521,21 @@ Operator decalOperator() {
       .params = joinParams(
           {{.name = "at",
             .type = ParamType::Point,
-            .doc = "the centre, projected to the surface",
+            .doc = "centre of the decal, which is projected to the surface",
             .required = true},
            {.name = "direction",
             .type = ParamType::Point,
-            .doc = "direction of u; its tangential part counts",
+            .doc = "direction of u at the centre; only its tangential part is used",
             .required = true},
            {.name = "radius",
             .type = ParamType::Length,
-            .doc = "half the side of the square, along the surface",
+            .doc = "half the side of the square, measured along the surface",
             .range = Range::Positive,
             .required = true}},
-          joinParams(layerParams("reduced"), {{.name = "mirror",
-                                               .type = ParamType::Flag,
-                                               .doc = "reverse v, which mirrors the texture"}})),
+          joinParams(layerParams("reduced"),
+                     {{.name = "mirror",
+                       .type = ParamType::Flag,
+                       .doc = "reverse the direction of v, which mirrors the texture"}})),
       .operands = {{Kind::Band, Kind::Surface}},
       .resultKind = [](const Invocation&) { return Kind::Patch; },
       .run = decal,
@@ -531,31 +562,34 @@ Operator patchGridOperator() {
       .params = joinParams(
           joinParams({{.name = "count",
                        .type = ParamType::Text,
-                       .doc = "n,m: tiles along u and along v",
+                       .doc = "numbers of tiles along u and along v, as 12,3",
                        .required = true}},
                      outlineParams()),
-          joinParams({{.name = "around",
-                       .type = ParamType::Points,
-                       .doc = "two points, \"from to\": tile all around the axis between them"},
-                      {.name = "rotate",
-                       .type = ParamType::Degrees,
-                       .doc = "angle of u about the normal (--at), or of the first seam (--around)",
-                       .fallback = "0"},
-                      {.name = "mirror",
-                       .type = ParamType::Choice,
-                       .doc = "mirror every other tile along u, along v, or along both",
-                       .fallback = "none",
-                       .choices = {"none", "u", "v", "both"}},
-                      {.name = "shift",
-                       .type = ParamType::Number,
-                       .doc = "shift of every other row along u, in tiles; such a row has one tile "
-                              "less, unless the tiles close",
-                       .fallback = "0",
-                       .range = Range::NonNegative},
-                      {.name = "mirrored",
-                       .type = ParamType::Flag,
-                       .doc = "accept corners that run clockwise: textures are mirrored"}},
-                     layerParams("conforming"))),
+          joinParams(
+              {{.name = "around",
+                .type = ParamType::Points,
+                .doc = "tile the surface all around the axis between two points, \"from to\""},
+               {.name = "rotate",
+                .type = ParamType::Degrees,
+                .doc = "with --at: rotation of the direction u about the surface normal; with "
+                       "--around: angle about the axis at which the first tile begins",
+                .fallback = "0"},
+               {.name = "mirror",
+                .type = ParamType::Choice,
+                .doc = "mirror every other tile along u, along v, or along both",
+                .fallback = "none",
+                .choices = {"none", "u", "v", "both"}},
+               {.name = "shift",
+                .type = ParamType::Number,
+                .doc = "shift of every other row along u, as a fraction of a tile, below 1; "
+                       "without --around such a row has one tile less",
+                .fallback = "0",
+                .range = Range::NonNegative},
+               {.name = "mirrored",
+                .type = ParamType::Flag,
+                .doc = "accept corners that run clockwise seen from outside, which mirrors the "
+                       "textures"}},
+              layerParams("conforming"))),
       .operands = {{Kind::Band, Kind::Surface}},
       .resultKind = [](const Invocation&) { return Kind::Patch; },
       .run = patchGrid,

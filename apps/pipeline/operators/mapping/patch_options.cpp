@@ -23,37 +23,42 @@ std::vector<Param> withLayers(std::vector<Param> params) {
   const std::vector<Param> layers = {
       {.name = "height",
        .type = ParamType::Length,
-       .doc = "height of the texture; 'auto' keeps its proportions",
+       .doc = "height of the top layer above the surface; 'auto': the height that keeps the "
+              "proportions of the texture",
        .range = Range::Positive,
        .required = true,
        .allowsAuto = true},
       {.name = "layers",
        .type = ParamType::Integer,
-       .doc = "number of layers of particles, 2 or more",
+       .doc = "number of layers of particles, from the surface to the height; at least 2",
        .fallback = "6",
        .range = Range::Positive,
        .formerName = "levels"},
       {.name = "particles",
        .type = ParamType::Choice,
-       .doc = "arrangement of the particles above the surface",
+       .doc =
+           "arrangement of the particles: reduced, each layer is relaxed separately; conforming, "
+           "particles follow the gradient of the distance; spline, they follow a curve",
        .fallback = "reduced",
        .choices = {"reduced", "conforming", "spline"}},
       {.name = "twist",
        .type = ParamType::Degrees,
-       .doc = "rotation of the top about the patch's axis, anticlockwise seen from outside",
+       .doc =
+           "rotation of the top layer about the axis of the patch, anticlockwise seen from outside",
        .fallback = "0"},
       {.name = "taper",
        .type = ParamType::Number,
-       .doc = "ratio of the width of the top to that at the surface",
+       .doc = "ratio of the width of the top layer to the width at the surface",
        .fallback = "1",
        .range = Range::Positive},
       {.name = "bend",
        .type = ParamType::Degrees,
-       .doc = "angle by which the axis leans towards u at the top",
+       .doc = "angle by which the axis of the patch leans towards u at the top layer",
        .fallback = "0"},
       {.name = "spacing",
        .type = ParamType::Length,
-       .doc = "distance of particles; default: by patch and voxel size",
+       .doc = "distance between neighbouring particles; default: chosen from the sizes of the "
+              "patch and the voxels",
        .range = Range::Positive}};
   params.insert(params.end(), layers.begin(), layers.end());
   return params;
@@ -62,16 +67,18 @@ std::vector<Param> withLayers(std::vector<Param> params) {
 void validateLayers(const Invocation& in) {
   const std::string& name = in.op().name;
   if (in.text("particles") != "spline" && (in.given("spline") || in.given("fade")))
-    throw UsageError(fmt::format("{}: --spline and --fade go with --particles spline", name));
+    throw UsageError(fmt::format("{}: --spline and --fade need --particles spline", name));
   for (const char* option : {"directions", "parallel"})
     if (in.given(option) && in.text("particles") != "reduced")
-      throw UsageError(fmt::format("{}: --{} goes with --particles reduced", name, option));
+      throw UsageError(fmt::format("{}: --{} needs --particles reduced", name, option));
   if (in.given("directions") && in.given("parallel"))
-    throw UsageError(fmt::format("{}: give one of --directions and --parallel", name));
+    throw UsageError(
+        fmt::format("{}: --directions and --parallel exclude each other; give one of them", name));
   if (in.text("particles") == "spline" && in.text("height") == "auto") {
-    throw UsageError(fmt::format(
-        "{}: --height auto does not go with --particles spline; give the length along the spline",
-        name));
+    throw UsageError(
+        fmt::format("{}: --height auto does not work with --particles spline; give the length "
+                    "along the spline as --height",
+                    name));
   }
   const long layers = in.integer("layers");
   if (layers < 2 || layers > kMostLayers) {
@@ -101,7 +108,7 @@ std::array<double, 2> patchSizeOf(Invocation& in) {
   for (const double side : size) {
     if (side > 10 * in.operands[0].diagonal()) {
       throw levelset::InvalidInput(fmt::format(
-          "{}: --size {} is over ten times the solid's diagonal of {:.6g}; make it smaller",
+          "{}: --size {} is over ten times the diagonal of the solid, {:.6g}; give a smaller size",
           in.op().name, in.text("size"), in.operands[0].diagonal()));
     }
   }
@@ -119,7 +126,8 @@ void tellOrigin(const Invocation& in, PatchRecipe& recipe) {
   recipe.action = in.op().name;
   const auto written = [&](const Param& param) -> std::string {
     if (param.type == ParamType::Flag || param.type == ParamType::Points)
-      return in.given(param.name) ? "given" : "none";  // a spline moves with its patch
+      return in.given(param.name) ? "given" : "none";  // points of a spline move with the patch, so
+                                                       // their values are not compared
     if (param.type == ParamType::Number) return fmt::format("{}", in.number(param.name));
     if (param.type == ParamType::Degrees) return fmt::format("{}", in.radians(param.name));
     return in.given(param.name) || !param.fallback.empty() ? in.text(param.name) : "none";

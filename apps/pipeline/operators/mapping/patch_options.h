@@ -7,7 +7,7 @@
 #include "mapping/animation/footprint.h"
 #include "mapping/patches/patch.h"
 
-/// Parameters that all actions share that make patches: height and layers of particles.
+/// Parameters of the layers above the surface, which all actions that build patches share.
 namespace pipeline {
 
 /// Appends --height, --layers, --particles, --twist, --taper, --bend and --spacing to
@@ -17,11 +17,11 @@ namespace pipeline {
 void validateLayers(const Invocation& in);
 [[nodiscard]] mapping::PatchOptions patchOptionsOf(Invocation& in);
 /// Reads --size: lengths along u and along v, world units.
-/// @throws levelset::InvalidInput for lengths far beyond the size of the base
+/// @throws levelset::InvalidInput for a length over ten times the diagonal of the base
 [[nodiscard]] std::array<double, 2> patchSizeOf(Invocation& in);
 [[nodiscard]] std::vector<mapping::PatchOutline> outlinesOf(
     const std::vector<mapping::Patch>& patches);
-/// Stores the action and the options that decide whether patches can be compared.
+/// Stores in the recipe the action and the options that the key patches of `animate` must share.
 void tellOrigin(const Invocation& in, PatchRecipe& recipe);
 
 }  // namespace pipeline

@@ -55,7 +55,7 @@ bool isRelaxed(const Invocation& in) {
   return in.text("relax") != "none";
 }
 
-/// @param part, parts  index and number of the patches, for the progress
+/// @param part, parts  index of this pass over a patch and number of all passes, for the progress
 mapping::UntangleOptions shellOptions(const Invocation& in, const mapping::Patch& patch,
                                       double embedDepth, std::size_t part, std::size_t parts) {
   const auto share = [&](std::size_t n) {
@@ -88,17 +88,18 @@ void unfoldPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPat
     patch = std::move(result.patch);
   }
   if (before.folded == 0) {
-    in.notes.notes.push_back("--untangle: no cell of the patch folds, it stays as it is");
+    in.notes.notes.push_back("--untangle: no cell of the patch folds, so the patch is unchanged");
   } else if (after.folded == 0) {
-    in.notes.notes.push_back(fmt::format(
-        "--untangle: {} of {} cells folded, none does now; the least Jacobian went from {:.3g} to "
-        "{:.3g}",
-        before.folded, before.cells, before.leastJacobian, after.leastJacobian));
+    in.notes.notes.push_back(
+        fmt::format("--untangle: {} of {} cells folded before, none afterwards; the least Jacobian "
+                    "changed from {:.3g} to {:.3g}",
+                    before.folded, before.cells, before.leastJacobian, after.leastJacobian));
   } else {
-    in.notes.warnings.push_back(fmt::format(
-        "{}: --untangle cannot mend the patch, {} of {} cells fold where {} did; lower its height, "
-        "let its sides move with --sides free, or choose a flatter place",
-        in.op().name, after.folded, before.cells, before.folded));
+    in.notes.warnings.push_back(
+        fmt::format("{}: --untangle cannot remove all folds: {} of {} cells fold, {} folded "
+                    "before; lower the height of the patch, let its sides move with --sides free, "
+                    "or place it where the surface is flatter",
+                    in.op().name, after.folded, before.cells, before.folded));
   }
 }
 
@@ -110,7 +111,7 @@ void relaxPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPatc
   for (mapping::Patch& patch : improved.patches) {
     const auto part = first + static_cast<std::size_t>(&patch - improved.patches.data());
     mapping::UntangleOptions options = shellOptions(in, patch, embedDepth, part, parts);
-    // Patches that are left out afterwards need no untangling.
+    // --skip-folds leaves a folded patch out later, so it is not relaxed.
     if (in.flag("skip-folds") && mapping::countFolds(patch, options.embedDepth).folded > 0) {
       improved.figures["relax"].push_back(nullptr);
       continue;
@@ -126,12 +127,12 @@ void relaxPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPatc
     after += share * result.after.mean;
     patch = std::move(result.patch);
   }
-  in.notes.notes.push_back(
-      fmt::format("--relax: the energy of distortion went from {:.6g} to {:.6g}, where 6 is none",
-                  before, after));
+  in.notes.notes.push_back(fmt::format(
+      "--relax: the energy of distortion changed from {:.6g} to {:.6g}; 6 means no distortion",
+      before, after));
 }
 
-/// Certificate, distortion and Jacobian field of the map that --map names.
+/// Fold certificate, distortion and Jacobian field of the map that --map names.
 struct JudgedMap {
   mapping::FoldCertificate certificate;
   mapping::Distortion distortion;
@@ -141,7 +142,7 @@ struct JudgedMap {
 JudgedMap judgeMap(Invocation& in, const mapping::Patch& patch, double embedDepth, double voxel) {
   mapping::JacobianFieldOptions options{
       .voxelSize = voxel, .embedDepth = embedDepth / patch.height, .maxMemory = in.maxMemory};
-  const auto [u, v] = sidesOf(patch);  // used in place of a texture's box
+  const auto [u, v] = sidesOf(patch);  // lengths of the patch, used as the size of the texture
   const V3d size(u, v, patch.height);
   const auto survey = [&](const std::vector<mapping::MapSample>& samples) {
     return mapping::surveyDistortion(samples, size, patch.mirrored);
@@ -169,9 +170,8 @@ JudgedMap judgeMap(Invocation& in, const mapping::Patch& patch, double embedDept
                                                        cost);
   if (judged.isExtrapolated)
     in.notes.notes.push_back(
-        "folds: where the texture is sunk no particles hold the map, since columns that go "
-        "straight "
-        "on would fold it");
+        "folds: below the surface of the base, the map is extrapolated without particles, since "
+        "particles that continue the columns straight would fold it");
   levelset::FieldGrid field =
       mapping::jacobianField(patch, *judged.map, judged.certificate, options);
   return {std::move(judged.certificate), survey(judged.samples), std::move(field)};
@@ -182,11 +182,11 @@ std::string verdictSentence(const mapping::FoldCertificate& certificate) {
     return fmt::format("certified: the map folds nowhere, its least Jacobian is {:.3g}",
                        certificate.leastJacobian);
   if (certificate.verdict() == mapping::FoldVerdict::Undecided)
-    return fmt::format("no fold was met, but {:.2g} of the volume is not certified",
+    return fmt::format("no fold was found, but a share of {:.2g} of the volume is not certified",
                        certificate.undecidedShare);
   const mapping::FoldPoint& worst = certificate.worst.front();
   return fmt::format(
-      "the map folds, most at ({:.6g}, {:.6g}, {:.6g}), u, v, w = {:.3g}, {:.3g}, {:.3g}",
+      "the map folds, worst at ({:.6g}, {:.6g}, {:.6g}), where u, v, w = {:.3g}, {:.3g}, {:.3g}",
       worst.position.x, worst.position.y, worst.position.z, worst.uvw.x, worst.uvw.y, worst.uvw.z);
 }
 
@@ -194,9 +194,11 @@ Value folds(Invocation& in) {
   const PatchValue& onto = in.operands[1].patch();
   if (onto.atHeight)
     throw UsageError(
-        "folds: the patch has --height auto, which only its texture tells; give it a height");
+        "folds: the patch has --height auto, and its height is unknown without a texture; give "
+        "--height a length");
   if (onto.patches.size() != 1)
-    throw UsageError(fmt::format("folds: there are {} patches; give one", onto.patches.size()));
+    throw UsageError(
+        fmt::format("folds: the operand has {} patches; give a single patch", onto.patches.size()));
   const double embedDepth = in.length("embed");
   const double voxel = in.given("voxel") ? in.length("voxel") : in.band(0).voxelSize();
   // Without a texture, the patch is relaxed towards its own proportions.
@@ -230,7 +232,7 @@ void validateFolds(const Invocation& in) {
     throw UsageError("folds: --relax texture needs a texture; give --relax patch");
   for (const char* option : {"kernel", "lambda-near", "lambda-far"})
     if (in.text("map") != "rbf" && in.given(option))
-      throw UsageError(fmt::format("folds: --{} says nothing to --map {}; leave it out", option,
+      throw UsageError(fmt::format("folds: --{} has no effect with --map {}; leave it out", option,
                                    in.text("map")));
 }
 
@@ -261,7 +263,9 @@ void addDistortion(const mapping::Distortion& distortion, nlohmann::ordered_json
 Param kernelParam() {
   return {.name = "kernel",
           .type = ParamType::Choice,
-          .doc = "--map rbf: kernel, the influence of a particle by distance",
+          .doc =
+              "with --map rbf: radial basis function, the influence of a particle as a function of "
+              "distance",
           .fallback = "biharmonic",
           .choices = kKernelNames};
 }
@@ -274,17 +278,18 @@ mapping::RbfKernel kernelOf(const Invocation& in) {
 std::vector<Param> withShell(std::vector<Param> params) {
   params.push_back({.name = "untangle",
                     .type = ParamType::Flag,
-                    .doc = "move particles of the patch until none of its cells folds",
+                    .doc = "move particles of the patch until none of the cells between them folds",
                     .formerName = "unfold"});
   params.push_back({.name = "relax",
                     .type = ParamType::Choice,
-                    .doc = "move particles so that the patch is distorted least, relative to its "
-                           "own proportions or the texture's",
+                    .doc = "move particles so that the map has the least distortion, relative to "
+                           "the proportions of the patch or of the texture",
                     .fallback = "none",
                     .choices = {"none", "patch", "texture"}});
   params.push_back({.name = "sides",
                     .type = ParamType::Choice,
-                    .doc = "--untangle and --relax: the sides on the surface stay, or slide",
+                    .doc = "with --untangle or --relax: particles on the sides of the patch stay "
+                           "fixed, or slide on the surface",
                     .fallback = "fixed",
                     .choices = {"fixed", "free"}});
   return params;
@@ -297,7 +302,8 @@ bool improvesPatches(const Invocation& in) {
 void validateShell(const Invocation& in) {
   if (in.given("sides") && !improvesPatches(in))
     throw UsageError(
-        fmt::format("{}: --sides goes with --untangle or --relax; leave it out", in.op().name));
+        fmt::format("{}: --sides needs --untangle or --relax; leave it out, or give one of them",
+                    in.op().name));
 }
 
 ImprovedPatches improvedPatches(Invocation& in, const levelset::NarrowBand& base,
@@ -337,34 +343,40 @@ Operator foldsOperator() {
       .summary = "certify that a patch's map does not fold, and compute its Jacobian as a field",
       .details =
           "The operands are base and patch. The field holds the map's Jacobian on the grid points "
-          "of the patch: 1 at the median, 0 or less where the map folds. The report holds the "
-          "certificate, and the spread of lengths and volumes relative to the patch's own size.",
+          "of the patch: 1 at the median, 0 or less where the map folds. The report gives the fold "
+          "certificate, and percentiles of the stretch and the Jacobian relative to the patch's "
+          "own size.",
       .example =
           "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! patch @ball --at 0,0,10 "
           "--size 8,8 --height 3 --as p ! folds @ball @p ! write jacobian.vdb",
-      .params = withShell({{.name = "map",
-                            .type = ParamType::Choice,
-                            .doc = "as of `texture`",
-                            .fallback = "rbf",
-                            .choices = {"rbf", "shell", "mesh"}},
-                           {.name = "embed",
-                            .type = ParamType::Length,
-                            .doc = "depth of the texture below the surface of the base",
-                            .fallback = "1vx",
-                            .range = Range::NonNegative,
-                            .formerName = "sink"},
-                           voxelParam("of the field; default: the base's"),
-                           kernelParam(),
-                           {.name = "lambda-near",
-                            .type = ParamType::Number,
-                            .doc = "as of `texture`",
-                            .fallback = "0.005",
-                            .range = Range::NonNegative},
-                           {.name = "lambda-far",
-                            .type = ParamType::Number,
-                            .doc = "as of `texture`",
-                            .fallback = "0.25",
-                            .range = Range::NonNegative}}),
+      .params = withShell(
+          {{.name = "map",
+            .type = ParamType::Choice,
+            .doc = "map to certify: rbf, smooth, by radial basis functions; shell, piecewise "
+                   "linear between the particles; mesh, the map that moves vertices of a mesh",
+            .fallback = "rbf",
+            .choices = {"rbf", "shell", "mesh"}},
+           {.name = "embed",
+            .type = ParamType::Length,
+            .doc = "depth below the surface of the base to which the map is tested",
+            .fallback = "1vx",
+            .range = Range::NonNegative,
+            .formerName = "sink"},
+           voxelParam("voxel size of the field; default: that of the base"),
+           kernelParam(),
+           {.name = "lambda-near",
+            .type = ParamType::Number,
+            .doc = "with --map rbf: smoothing of the map at particles on the surface, in mean "
+                   "particle spacings (for kernels other than biharmonic, in units of the kernel); "
+                   "0: none",
+            .fallback = "0.005",
+            .range = Range::NonNegative},
+           {.name = "lambda-far",
+            .type = ParamType::Number,
+            .doc = "with --map rbf: smoothing of the map at particles above the surface, in the "
+                   "unit of --lambda-near; 0: none",
+            .fallback = "0.25",
+            .range = Range::NonNegative}}),
       .operands = {{Kind::Band, Kind::Surface}, {Kind::Patch}},
       .resultKind = [](const Invocation&) { return Kind::Field; },
       .run = folds,

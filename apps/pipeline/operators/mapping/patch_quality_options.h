@@ -12,7 +12,7 @@
 #include "mapping/fast_sums/rbf_kernel.h"
 #include "mapping/patches/patch.h"
 
-// Certifying, untangling and relaxing of patches, for operators that map onto patches.
+// Options that untangle, relax and certify patches, for actions that map onto patches.
 namespace pipeline {
 
 /// Appends --untangle, --relax and --sides to `params`.
@@ -21,21 +21,23 @@ void validateShell(const Invocation& in);
 
 struct ImprovedPatches {
   std::vector<mapping::Patch> patches;
-  /// Figures before and after: under "unfold" and "relax" an array with an object for each patch.
+  /// Figures before and after the improvement: "unfold" (of --untangle) and "relax" are arrays with
+  /// an object for each patch. Null stands for a patch that was not relaxed.
   nlohmann::ordered_json figures = nlohmann::ordered_json::object();
 };
 
-/// Returns whether --untangle or --relax move particles.
+/// Returns true if --untangle or --relax is given, so that particles move.
 [[nodiscard]] bool improvesPatches(const Invocation& in);
 
-/// Untangles and relaxes patches of a base as the options request, and adds notes.
-/// @param embedDepth  embedding depth, world units
-/// @param textureSize  size of the texture's box
+/// Untangles and relaxes the patches of a base as the options request, and adds notes.
+/// @param embedDepth  depth of the texture below the surface of the base, world units
+/// @param textureSize  size of the texture's box, whose proportions --relax texture uses
 [[nodiscard]] ImprovedPatches improvedPatches(Invocation& in, const levelset::NarrowBand& base,
                                               std::vector<mapping::Patch> patches,
                                               double embedDepth, const Imath::V3d& textureSize);
 
-/// Mean lengths of the rows and of the columns of particles on the surface, world units.
+/// Returns the mean length of the rows of particles on the surface, and that of the columns, world
+/// units.
 [[nodiscard]] std::array<double, 2> sidesOf(const mapping::Patch& patch);
 
 [[nodiscard]] Param kernelParam();

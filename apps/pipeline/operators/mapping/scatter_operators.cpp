@@ -24,7 +24,8 @@ void validateScatter(const Invocation& in) {
   if (in.given("count") == in.given("distance"))
     throw UsageError("scatter: give either --count or --distance");
   if (in.integer("seed") < 0)
-    throw UsageError(fmt::format("scatter: --seed {} is below 0", in.integer("seed")));
+    throw UsageError(
+        fmt::format("scatter: --seed {} is negative; give 0 or more", in.integer("seed")));
   validateLayers(in);
 }
 
@@ -53,7 +54,7 @@ mapping::ScatterOptions scatterOptions(Invocation& in) {
   return options;
 }
 
-/// Each patch moves by itself and keeps its scale.
+/// Returns the recipe of scattered patches: each patch is rebuilt separately, at its scale.
 std::shared_ptr<const PatchRecipe> recipeOf(const Invocation& in,
                                             const std::vector<mapping::PatchSite>& sites,
                                             const mapping::PatchOptions& options) {
@@ -94,13 +95,14 @@ Value scatter(Invocation& in) {
                                                    in.given("scale") ? " at scale 1" : "")
                                      : ""));
   if (options.density.count > result.patches.size()) {
-    in.notes.warnings.push_back(
-        fmt::format("scatter: {} of {} patches found no place, the first because: {}",
-                    options.density.count - result.patches.size(), options.density.count,
-                    result.leftOut > 0 ? result.cause : "the mask leaves too little room"));
+    in.notes.warnings.push_back(fmt::format(
+        "scatter: {} of {} patches could not be placed; the first reason: {}",
+        options.density.count - result.patches.size(), options.density.count,
+        result.leftOut > 0 ? result.cause : "the mask leaves too small a part of the surface"));
   } else if (result.leftOut > 0) {
-    in.notes.notes.push_back(fmt::format("{} places bear no patch, the first because: {}",
-                                         result.leftOut, result.cause));
+    in.notes.notes.push_back(
+        fmt::format("no patch could be built at {} positions; the first reason: {}", result.leftOut,
+                    result.cause));
   }
   PatchValue value;
   value.patches = std::move(result.patches);
@@ -122,8 +124,8 @@ Plan planScatter(Invocation& in) {
   const std::vector<double> size = in.lengths("size");
   const bool isAuto = in.text("height") == "auto";
   plan.patchSize = {size[0], size[1], isAuto ? 0 : in.length("height")};
-  // Discs thrown at random into a plane until no more fit reach seven tenths of the densest
-  // packing.
+  // Discs placed at random in a plane until no more fit cover about seven tenths of the area that
+  // the densest packing covers.
   constexpr double kPacked = 0.7 / 0.866;
   const double distance = in.given("distance") ? in.length("distance") : 0;
   plan.patchCount = in.given("count") ? static_cast<double>(in.integer("count"))
@@ -151,40 +153,46 @@ Operator scatterOperator() {
           "levelsmith sphere --radius 10 --voxel 0.5 --as ball ! scatter @ball --count 12 "
           "--size 4,4 --height 1.5 --layers 2 --as many ! torus --radius 2 --tube 0.6 "
           "--voxel 0.3 --as ring ! texture @ball @ring @many --voxel 0.5 ! write studded.vdb",
-      .params = withMask(withLayers(
-          {{.name = "count",
-            .type = ParamType::Integer,
-            .doc = "number of patches",
-            .range = Range::Positive},
-           {.name = "distance",
-            .type = ParamType::Length,
-            .doc = "least distance of their centres along the surface; as many patches as fit",
-            .range = Range::Positive},
-           {.name = "size",
-            .type = ParamType::Lengths,
-            .doc = "lengths along u and v, on the surface",
-            .range = Range::Positive,
-            .required = true,
-            .count = 2},
-           {.name = "scale",
-            .type = ParamType::Scalar,
-            .doc = "factor of size, height and distance at each point; default: 1"},
-           {.name = "along",
-            .type = ParamType::Velocity,
-            .doc = "direction of u; its tangential part counts"},
-           {.name = "rotate",
-            .type = ParamType::Degrees,
-            .doc = "angle of u about the normal",
-            .fallback = "0"},
-           {.name = "jitter",
-            .type = ParamType::Degrees,
-            .doc = "largest random rotation to either side; 180 allows all",
-            .fallback = "0"},
-           {.name = "seed",
-            .type = ParamType::Integer,
-            .doc = "seed of the random positions",
-            .fallback = "1"},
-           {.name = "allow-folds", .type = ParamType::Flag, .doc = "keep patches that fold"}})),
+      .params = withMask(
+          withLayers({{.name = "count",
+                       .type = ParamType::Integer,
+                       .doc = "number of patches",
+                       .range = Range::Positive},
+                      {.name = "distance",
+                       .type = ParamType::Length,
+                       .doc = "least distance between the centres of patches, along the surface; "
+                              "places as many patches as fit",
+                       .range = Range::Positive},
+                      {.name = "size",
+                       .type = ParamType::Lengths,
+                       .doc = "lengths of a patch along u and along v, measured on the surface",
+                       .range = Range::Positive,
+                       .required = true,
+                       .count = 2},
+                      {.name = "scale",
+                       .type = ParamType::Scalar,
+                       .doc = "field that scales the size, height and distance of the patches at "
+                              "each point; default: 1"},
+                      {.name = "along",
+                       .type = ParamType::Velocity,
+                       .doc = "vector field for the direction of u of each patch; only its "
+                              "tangential part is used"},
+                      {.name = "rotate",
+                       .type = ParamType::Degrees,
+                       .doc = "rotation of the direction u about the surface normal",
+                       .fallback = "0"},
+                      {.name = "jitter",
+                       .type = ParamType::Degrees,
+                       .doc = "largest random rotation of a patch about the normal, to either "
+                              "side; 180 allows all directions",
+                       .fallback = "0"},
+                      {.name = "seed",
+                       .type = ParamType::Integer,
+                       .doc = "seed of the random positions",
+                       .fallback = "1"},
+                      {.name = "allow-folds",
+                       .type = ParamType::Flag,
+                       .doc = "keep patches that fold, in place of leaving them out"}})),
       .operands = {{Kind::Band, Kind::Surface}},
       .resultKind = [](const Invocation&) { return Kind::Patch; },
       .run = scatter,

@@ -65,7 +65,7 @@ std::size_t particlesOf(std::span<const mapping::Patch> patches) {
   return particles;
 }
 
-/// Patches after --untangle and --relax.
+/// Returns the patches of the operand after --untangle and --relax.
 ImprovedPatches patchesFor(Invocation& in, const Imath::Box3d& textureBox) {
   return improvedPatches(in, in.band(0), patchesAtHeight(in, in.operands[2].patch(), textureBox),
                          in.length("embed"), textureBox.size());
@@ -94,18 +94,21 @@ Value textureMesh(Invocation& in) {
   return Value(std::move(result.mesh));
 }
 
-/// Error of the fast evaluation, where the map was also evaluated directly.
+/// Reports the error of the map's fast evaluation at the points where the map was also evaluated
+/// directly. Warns if it exceeds the tolerance.
+/// @param tolerance  --map-tolerance, texture voxels
 void tellMapError(Invocation& in, const mapping::TextureReport& report, double tolerance) {
   if (report.mapErrorPoints == 0) return;
   in.notes.errors.push_back(
-      {fmt::format("map's fast evaluation at {} random points, largest", report.mapErrorPoints),
+      {fmt::format("largest error of the map's fast evaluation at {} random points",
+                   report.mapErrorPoints),
        report.mapError, "texture voxels"});
   constexpr double kRounding = 1e-6;
   if (report.mapError > tolerance + kRounding) {
-    in.notes.warnings.push_back(fmt::format(
-        "{}: the map's fast evaluation is off by {:.3g} texture voxels, and {} was asked; this is "
-        "a defect, please report it",
-        in.op().name, report.mapError, tolerance));
+    in.notes.warnings.push_back(
+        fmt::format("{}: the map's fast evaluation has an error of {:.3g} texture voxels, more "
+                    "than the requested {}; this is a defect, please report it",
+                    in.op().name, report.mapError, tolerance));
   }
 }
 
@@ -118,15 +121,16 @@ Value texture(Invocation& in) {
   mapping::TextureResult result = mapping::mapTexture(in.band(0), in.band(1), patches, options);
   in.notes.detailsJson = detailsOf(result.report, patches.front().height,
                                    options.map == mapping::TextureMap::Rbf, improved.figures);
-  in.notes.errors.push_back({"map residual at particles, largest",
+  in.notes.errors.push_back({"largest residual of the map at particles",
                              result.report.mapResidual / result.report.voxelSize, "voxels"});
   tellMapError(in, result.report, options.mapTolerance);
   in.notes.notes.insert(in.notes.notes.end(), result.report.notes.begin(),
                         result.report.notes.end());
   if (result.report.solve.isIterative) {
-    in.notes.notes.push_back(fmt::format(
-        "{} particles solved for in {} iterations, residual {:.2g}", result.report.particles,
-        result.report.solve.iterations, result.report.solve.solveResidual));
+    in.notes.notes.push_back(
+        fmt::format("the map through {} particles was solved in {} iterations, residual {:.2g}",
+                    result.report.particles, result.report.solve.iterations,
+                    result.report.solve.solveResidual));
   }
   in.notes.notes.push_back(
       fmt::format("smallest Jacobian {:.3g}, stretch {:.3g} to {:.3g}, {} of {} blocks evaluated",
@@ -145,7 +149,8 @@ Operator textureOperator() {
       .summary = "map a solid onto a patch of a surface, and join the two",
       .details =
           "The operands are base, texture and patch. The box of the texture's zero set is the unit "
-          "cube of u, v, w. A map that folds is an error, which names the position.",
+          "cube of u, v, w. A map that folds is an error, whose message gives the position of the "
+          "fold.",
       .example =
           "levelsmith box --size 40,40,10 --voxel 0.5 --as base ! torus --radius 4 --tube "
           "1.5 --voxel 0.25 --as rings "

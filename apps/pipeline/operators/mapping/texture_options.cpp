@@ -16,7 +16,8 @@ namespace {
 using Imath::V3d;
 using levelset::UsageError;
 
-/// Returns the height that keeps the texture's proportions on patches of this size.
+/// Returns the height, world units, that keeps the texture's proportions on patches of this size;
+/// the mean over all patches.
 double aspectHeight(std::span<const mapping::Patch> patches, const Imath::Box3d& textureBox) {
   const V3d size = textureBox.size();
   double sum = 0;
@@ -27,8 +28,8 @@ double aspectHeight(std::span<const mapping::Patch> patches, const Imath::Box3d&
   return sum / static_cast<double>(patches.size());
 }
 
-/// Estimates the smallest stretch by the flattest map of the texture's box onto the patch. The run
-/// measures the actual map.
+/// Estimates the smallest stretch of the map before the map exists: the smallest ratio of the
+/// patch's size to the texture's box along u, v and w; 1 if no size is known.
 double plannedStretch(const Invocation& in, const Plan& texture, const Plan& patch) {
   const V3d box = in.given("texture-box") ? in.box("texture-box").size() : texture.bounds.size();
   double stretch = HUGE_VAL;
@@ -115,14 +116,14 @@ void validateTextureOptions(const Invocation& in) {
     throw UsageError(in.op().name + ": --allow-folds and --skip-folds exclude each other");
   if (in.operands[0].kind() == Kind::Surface && !mapsMesh(in) && !in.flag("alone"))
     throw UsageError(in.op().name +
-                     ": the base is a surface band, which has no inside to join; take the texture "
-                     "--alone, or move a mesh with --map mesh");
+                     ": the base is a surface band, which has no inside to join the texture to; "
+                     "give --alone for the texture only, or move a mesh with --map mesh");
   if (in.flag("alone") && in.given("blend"))
     throw UsageError(in.op().name + ": --alone has no seam to blend; leave --blend out");
   const Kind kind = in.operands[1].kind();
   if (mapsMesh(in) && kind != Kind::Mesh)
     throw UsageError(in.op().name +
-                     ": --map mesh moves the vertices of a mesh; give one, or `mesh` first");
+                     ": --map mesh needs a mesh as texture; put `mesh` after the level set");
   if (!mapsMesh(in) && kind == Kind::Mesh) {
     throw UsageError(in.op().name +
                      ": the texture is a mesh; turn it into a solid with `level-set`, or move its "
@@ -133,58 +134,68 @@ void validateTextureOptions(const Invocation& in) {
   if (mapsMesh(in)) unused.insert(unused.end(), {"carve", "alone", "blend", "voxel", "half-width"});
   for (const char* option : unused)
     if (in.given(option))
-      throw UsageError(fmt::format("{}: --{} says nothing to --map {}; leave it out", in.op().name,
-                                   option, in.text("map")));
+      throw UsageError(fmt::format("{}: --{} has no effect with --map {}; leave it out",
+                                   in.op().name, option, in.text("map")));
 }
 
 std::vector<Param> textureParams() {
   return withShell(
       {{.name = "map",
         .type = ParamType::Choice,
-        .doc = "method that maps patch space to texture space",
+        .doc = "map from the space above the patch to the texture: rbf, smooth, by radial basis "
+               "functions; shell, piecewise linear between the particles; mesh, moves the vertices "
+               "of a mesh",
         .fallback = "rbf",
         .choices = {"rbf", "shell", "mesh"}},
        kernelParam(),
        {.name = "map-tolerance",
         .type = ParamType::Number,
-        .doc = "largest error of the fast evaluation of the map, texture voxels",
+        .doc = "with --map rbf: largest error of the fast evaluation of the map, in texture voxels",
         .fallback = "0.05",
         .range = Range::NonNegative},
        {.name = "embed",
         .type = ParamType::Length,
-        .doc = "depth of the texture below the surface of the base",
+        .doc = "depth by which the texture reaches below the surface of the base, so that the two "
+               "connect",
         .fallback = "1vx",
         .range = Range::NonNegative,
         .formerName = "sink"},
        {.name = "blend",
         .type = ParamType::Length,
-        .doc = "radius of the rounding along the seam",
+        .doc = "radius of the rounding along the seam of texture and base; 0: none",
         .fallback = "0",
         .range = Range::NonNegative},
-       {.name = "carve", .type = ParamType::Flag, .doc = "subtract the texture from the base"},
+       {.name = "carve",
+        .type = ParamType::Flag,
+        .doc = "subtract the texture from the base, in place of adding it"},
        {.name = "alone",
         .type = ParamType::Flag,
         .doc = "return the mapped texture without the base"},
        {.name = "texture-box",
         .type = ParamType::Box,
-        .doc = "box of texture space that is mapped onto the patch"},
-       voxelParam("of the result; default: the finest of base and texture x smallest stretch"),
+        .doc = "box of the texture that is mapped onto the patch; default: the bounding box of the "
+               "texture"},
+       voxelParam("voxel size of the result; default: that of the base, or that of the texture "
+                  "times the smallest stretch if this is smaller"),
        halfWidthParam(),
        {.name = "lambda-near",
         .type = ParamType::Number,
-        .doc = "relaxation of the map at the surface, in mean particle spacings; for other kernels "
-               "in the kernel's units",
+        .doc = "with --map rbf: smoothing of the map at particles on the surface, in mean particle "
+               "spacings (for kernels other than biharmonic, in units of the kernel); 0: none",
         .fallback = "0.005",
         .range = Range::NonNegative},
        {.name = "lambda-far",
         .type = ParamType::Number,
-        .doc = "the same above the surface",
+        .doc = "with --map rbf: smoothing of the map at particles above the surface, in the unit "
+               "of --lambda-near; 0: none",
         .fallback = "0.25",
         .range = Range::NonNegative},
-       {.name = "allow-folds", .type = ParamType::Flag, .doc = "map even where the map folds"},
+       {.name = "allow-folds",
+        .type = ParamType::Flag,
+        .doc = "accept a map that folds, in place of an error"},
        {.name = "skip-folds",
         .type = ParamType::Flag,
-        .doc = "leave out patches whose map folds"}});
+        .doc = "leave out patches whose map folds, in place of an error"}});
 }
 
 }  // namespace pipeline

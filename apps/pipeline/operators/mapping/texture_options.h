@@ -8,14 +8,14 @@
 #include "mapping/textures/geometric_texture.h"
 #include "mapping/textures/mesh_texture.h"
 
-/// Parameters that all actions share that map a texture. Their first operands are base, texture and
-/// patch.
+/// Parameters that `texture` and `animate` share. The first operands of these actions are base,
+/// texture and patch.
 namespace pipeline {
 
 [[nodiscard]] std::vector<Param> textureParams();
 /// @throws levelset::UsageError for options that exclude each other or do not fit the texture
 void validateTextureOptions(const Invocation& in);
-/// Returns whether --map is mesh, so that texture and result are meshes.
+/// Returns true for --map mesh, where texture and result are meshes.
 [[nodiscard]] bool mapsMesh(const Invocation& in);
 /// Returns --texture-box, or the bounds of the texture.
 [[nodiscard]] Imath::Box3d textureBoxOf(const Invocation& in);
@@ -23,7 +23,7 @@ void validateTextureOptions(const Invocation& in);
 /// note with that height.
 [[nodiscard]] std::vector<mapping::Patch> patchesAtHeight(Invocation& in, const PatchValue& onto,
                                                           const Imath::Box3d& textureBox);
-// The options without the progress.
+// Read the options of the mapping; the caller sets the progress callback.
 [[nodiscard]] mapping::TextureOptions textureOptions(Invocation& in);
 [[nodiscard]] mapping::MeshTextureOptions meshTextureOptions(Invocation& in);
 [[nodiscard]] Plan planTexture(Invocation& in);

@@ -108,20 +108,20 @@ TEST(Chain, ChecksOperandsAndTheirKinds) {
       "sphere --radius 3 --voxel 0.2 --as b ! patch @b --at 0,0,3 --size 2,2 --height 1 --as p ! ";
   EXPECT_REFUSAL(onto + "read a.ply --as t ! texture @b @t @p", "with `level-set`, or move its");
   EXPECT_REFUSAL(onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --map mesh",
-                 "moves the vertices of a mesh");
+                 "needs a mesh as texture");
   EXPECT_REFUSAL(onto + "read a.ply --as t ! texture @b @t @p --map mesh --blend 1",
-                 "says nothing to --map mesh");
+                 "has no effect with --map mesh");
   EXPECT_REFUSAL(onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --map-tolerance -1",
                  "map-tolerance");
   EXPECT_REFUSAL(onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --kernel cubic",
                  "thin-plate");
   EXPECT_REFUSAL(
       onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --map shell --kernel sum",
-      "--kernel says nothing to --map shell");
+      "--kernel has no effect with --map shell");
   EXPECT_REFUSAL(onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --sides free",
-                 "goes with --untangle or --relax");
+                 "needs --untangle or --relax");
   EXPECT_REFUSAL(onto + "folds @b @p --relax texture", "needs a texture");
-  EXPECT_REFUSAL(onto + "folds @b @p --map mesh --lambda-near 1", "says nothing to --map mesh");
+  EXPECT_REFUSAL(onto + "folds @b @p --map mesh --lambda-near 1", "has no effect with --map mesh");
   EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 --as a ! sphere --radius 1 --voxel 0.1 --as a",
                  "is taken");
 }

@@ -76,7 +76,7 @@ TEST_F(Refusal, PatchesLargerThanTheirSolidReportItsCurvature) {
   for (const char* rest :
        {"patch @ball --at 1,0,0 --size 4,4 --height 0.2 ! mesh ! write a.ply",
         "patch-grid @ball --at 1,0,0 --size 4,4 --count 2,2 --height 0.2 ! mesh ! write a.ply"})
-    EXPECT_REFUSED(levelsmith(ball + rest), 3, "bends too much about 1,0,0");
+    EXPECT_REFUSED(levelsmith(ball + rest), 3, "around 1,0,0 bends too much");
   // Its diagonals go around the ball more than once and end in the right orientation again.
   EXPECT_REFUSED(levelsmith(ball + "patch @ball --at 0,0,1 --size 10,10 --height 0.1 ! mesh ! "
                                    "write a.ply"),
@@ -119,7 +119,7 @@ TEST_F(Refusal, DetectableErrorsPrecedeTheRun) {
   soon("patch --at 0,0,1 --height 0.1", 2, "needs --size");
   soon("patch --corners \"0,0,1 0,1,1\" --height 0.1", 2, "four points");
   soon("patch --at 0,0,1 --size 0.1,0.1 --height 0.1 --levels 1000000", 2, "out of range");
-  soon("patch --at 0,0,1 --size 1,1 --side0 \"0,0,1\" --height 0.1", 2, "goes with --corners");
+  soon("patch --at 0,0,1 --size 1,1 --side0 \"0,0,1\" --height 0.1", 2, "needs --corners");
   soon("decal --at 0,0,1 --direction 1,0,0 --height 0.1", 2, "--radius");
   soon("decal --at 0,0,1 --direction 1,0,0 --radius -1 --height 0.1", 2, "--radius");
   soon("patch-grid --count 3,2 --height 0.1", 2, "give one of --corners");

@@ -167,7 +167,8 @@ TEST_F(Animate, MovesMeshesDecalsGridsAndPatchesFromFiles) {
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   const Json files = Json::parse(bytes("run.json"))["steps"].back()["details"];
   EXPECT_LT((middleOf(files, 1) - between).length(), support::measured(0.106, 0.125));
-  EXPECT_NE(outcome.err.find("not in its file"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("does not record how the patch was built"), std::string::npos)
+      << outcome.err;
 }
 
 TEST_F(Animate, ComparesAndKeepsMeshAttributes) {
@@ -184,7 +185,8 @@ TEST_F(Animate, ComparesAndKeepsMeshAttributes) {
   const auto outcome = levelsmith(chain + "f_#.stl");
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_EQ(countOf("the normals and colours were left out", outcome.err), 1u) << outcome.err;
-  EXPECT_NE(outcome.err.find("f_0.stl and the frames after"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("f_0.stl and the files of later frames"), std::string::npos)
+      << outcome.err;
 }
 
 TEST_F(Animate, HoldsTheLastPatchAndPlaysOneFrame) {
@@ -212,10 +214,10 @@ TEST_F(Animate, RefusesPatchesBuiltDifferently) {
   };
   const std::string patch = "patch @ball --at 5,0,0 --size 3,3 --height 1 --levels 2 --spacing 1 ";
   EXPECT_REFUSED(refusal(patch + "--particles conforming --twist 90"), 2,
-                 "patch 2 has another --twist than the first");
+                 "patch 2 and the first patch differ in --twist");
   EXPECT_REFUSED(refusal("decal @ball --at 5,0,0 --direction 0,1,0 --radius 1 --height 1 --levels "
                          "2 --spacing 1"),
-                 2, "patch 2 was made by 'decal' and the first by 'patch'");
+                 2, "patch 2 was built by 'decal' and the first patch by 'patch'");
   EXPECT_REFUSED(
       refusal(
           "patch @ball --corners \"5,-1,-1 5,-1,1 5,1,1 5,1,-1\" --mirror --height 1 --levels 2 "
@@ -225,7 +227,8 @@ TEST_F(Animate, RefusesPatchesBuiltDifferently) {
   // A patch that is only finer is reported.
   const auto outcome = refusal(patch + "--particles reduced");
   EXPECT_EQ(outcome.code, 0) << outcome.err;
-  EXPECT_NE(outcome.err.find("patch 2 has another --particles than the first"), std::string::npos)
+  EXPECT_NE(outcome.err.find("patch 2 and the first patch differ in --particles"),
+            std::string::npos)
       << outcome.err;
 }
 
@@ -258,14 +261,13 @@ TEST_F(Animate, TakesNumbersFromTheFileNameOnly) {
 TEST_F(Animate, RefusesBeforeTheComputation) {
   const std::string head = kScene + "animate @ball @ring @here ";
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --out frame.vdb"), 2, "write # for the number");
-  EXPECT_REFUSED(levelsmith(head + "--frames 3 --out f_#.txt"), 2,
-                 "is not a sequence of such files");
+  EXPECT_REFUSED(levelsmith(head + "--frames 3 --out f_#.txt"), 2, "is not a sequence of files");
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --out no/where_#.vdb"), 6, "where_0.vdb");
   EXPECT_REFUSED(levelsmith(head + "--frames 0 --out f_#.vdb"), 2, "--frames");
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --base-frames b.vdb --out f_#.vdb"), 2,
                  "--base-frames");
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --base-first 2 --out f_#.vdb"), 2,
-                 "goes with --base-frames");
+                 "needs --base-frames");
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --base-frames f_#.vdb --out f_#.vdb"), 2,
                  "would write over 'f_1.vdb'");
   std::filesystem::create_directory_symlink(".", folder_ / "link");
@@ -276,9 +278,9 @@ TEST_F(Animate, RefusesBeforeTheComputation) {
   EXPECT_REFUSED(levelsmith(head + "@there --frames 5 --key-frames 0,x --out f_#.vdb"), 2,
                  "--key-frames");
   EXPECT_REFUSED(levelsmith(head + "@there --frames 5 --key-frames 0 --out f_#.vdb"), 2,
-                 "1 frames for 2 patches");
+                 "1 frames are given for 2 patches");
   EXPECT_REFUSED(levelsmith(head + "@there --frames 5 --key-frames 0,5 --out f_#.vdb"), 2,
-                 "would stand at frame 5");
+                 "would be at frame 5");
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --drift 0.5 --out f_#.vdb"), 2, "--drift");
   EXPECT_REFUSED(levelsmith(head + "--frames 3 --carve --alone --out f_#.vdb"), 2,
                  "animate: --carve and --alone");
