@@ -327,7 +327,7 @@ std::unique_ptr<Handle> given(pipeline::Value value) {
 }  // namespace
 
 PYBIND11_MODULE(_core, module) {
-  exceptions = new Exceptions(module);
+  exceptions = new Exceptions(module);  // NOLINT(bugprone-throw-keyword-missing)
   py::register_exception_translator([](std::exception_ptr failure) {
     try {
       if (failure) std::rethrow_exception(failure);

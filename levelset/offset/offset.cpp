@@ -67,7 +67,7 @@ bool hasSurface(const openvdb::FloatGrid& field) {
 class Lengths {
  public:
   Lengths(const openvdb::FloatGrid& field, const ScalarField& distance)
-      : field_(field), distance_(distance), action_() {}
+      : field_(field), distance_(distance) {}
 
   [[nodiscard]] double at(const openvdb::Vec3d& point) const {
     const Imath::V3d world = toImath(field_.indexToWorld(point));
@@ -107,7 +107,6 @@ class Lengths {
  private:
   const openvdb::FloatGrid& field_;
   const ScalarField& distance_;
-  const char* action_;
 };
 
 }  // namespace

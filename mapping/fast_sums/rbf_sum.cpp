@@ -20,19 +20,19 @@ const double kScale = rbf::kLaplacian.scale, kA = rbf::kLaplacian.a, kB = rbf::k
              kFast = rbf::kLaplacian.fast, kSlow = rbf::kLaplacian.slow;
 
 namespace plain {
-#include "mapping/maps/rbf_sum_tile.inc"
+#include "mapping/fast_sums/rbf_sum_tile.inc"
 }
 #if defined(__x86_64__)
 #pragma GCC push_options
 #pragma GCC target("avx2")
 namespace avx2 {
-#include "mapping/maps/rbf_sum_tile.inc"
+#include "mapping/fast_sums/rbf_sum_tile.inc"
 }
 #pragma GCC pop_options
 #pragma GCC push_options
 #pragma GCC target("avx512f,avx512vl,avx512dq,prefer-vector-width=512")
 namespace avx512 {
-#include "mapping/maps/rbf_sum_tile.inc"
+#include "mapping/fast_sums/rbf_sum_tile.inc"
 }
 #pragma GCC pop_options
 #endif

@@ -132,7 +132,6 @@ void checkText(const Param& param, const std::string& text, const std::string& w
     case ParamType::Flag:
       return;
     case ParamType::Number:
-      return checkRange(param, parseNumber(text, where), text, where);
     case ParamType::Degrees:
       return checkRange(param, parseNumber(text, where), text, where);
     case ParamType::Integer:

@@ -268,8 +268,8 @@ RegionOfInterest roiOfDraw(Invocation& in, std::size_t, const RegionOfInterest&)
   const Imath::V3d side = all.size() / kCells;
   Imath::Box3d seen;
   for (int i = 0; i < kCells * kCells * kCells; ++i) {
-    const Imath::V3d low =
-        all.min + side * Imath::V3d(i % kCells, i / kCells % kCells, i / (kCells * kCells));
+    const int x = i % kCells, y = i / kCells % kCells, z = i / (kCells * kCells);
+    const Imath::V3d low = all.min + side * Imath::V3d(x, y, z);
     if (culling.keeps(low + side / 2, side.length() / 2))
       seen.extendBy(Imath::Box3d(low, low + side));
   }
