@@ -108,10 +108,12 @@ NarrowBand intermediate(const DistancePair& pair, double part, const MorphOption
                         const std::function<FloatGrid::Ptr(const FloatGrid&)>& distances) {
   const FloatGrid::Ptr field = pair.at(part, options.mask);
   if (!eikonal::hasZeroCrossing(field->tree()))
-    throw InvalidInput(
-        fmt::format("the solid vanishes at fraction {:.3g} of the morph, since it does not "
-                    "overlap the target; move it until they overlap, or give --steps 1",
-                    part));
+    throw InvalidInput(fmt::format(
+        "the solid vanishes at fraction {:.3g} of the morph, because it does not overlap "
+        "the target; move one of them until they overlap{}",
+        part,
+        options.until == 1 && !options.mask ? ", or give --steps 1, which returns the target"
+                                            : ""));
   return makeBand(distances(*field));
 }
 

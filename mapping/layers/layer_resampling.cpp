@@ -19,7 +19,8 @@ V3d along(const At& at, std::size_t count, double x) {
   const auto i = static_cast<std::size_t>(cell);
   const double f = x - cell;
   const V3d b = at(i), c = at(i + 1);
-  // Continues the row by the parabola through the last three positions.
+  // Continues the row at either end by the parabola through its three outermost positions, or
+  // linearly if it has only two.
   const auto beyond = [&](const V3d& end, const V3d& next, std::size_t third) {
     return count > 2 ? (end - next) * 3.0 + at(third) : end * 2.0 - next;
   };

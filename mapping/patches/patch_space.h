@@ -41,7 +41,8 @@ struct PatchCrowd {
 
 /// Computes distances for many patches at once around the entire base, if that costs less than a
 /// box around each patch. Returns nothing if it costs more, or needs more than a quarter of the
-/// memory limit.
+/// memory limit. Also returns nothing for fewer than two patches, an empty base or an open surface,
+/// and where the band of the base extends to the height.
 [[nodiscard]] std::optional<levelset::NarrowBand> sweepSharedSpace(
     const levelset::NarrowBand& base, const PatchCrowd& crowd,
     const PatchSpaceOptions& options = {});

@@ -109,9 +109,9 @@ struct BlockTraversal {
   /// Computes the positions p[0] at `t` and p[1] at `exit` in the cell, from 0 to 1. On a face the
   /// coordinate is exactly 0 or 1.
   void placesInCell(double exit, int outAxis, double (&p)[2][3]) const;
-  [[nodiscard]] BernsteinCubic restrictToRay(double exit, int exitAxis) const;
+  [[nodiscard]] BernsteinCubic restrictToRay(double exit, int outAxis) const;
   [[nodiscard]] std::optional<double> splineRoot(const DrawnField& field, double exit,
-                                                 int exitAxis) const;
+                                                 int outAxis) const;
   /// Appends the roots of the spline in the cell. Returns true when the ray is inside at the entry
   /// into the cell.
   bool addSplineRoots(const DrawnField& field, double exit, int outAxis,

@@ -132,7 +132,7 @@ class ExrHeaderReader {
     std::size_t at = 0;
     for (; at < value.size() && value[at] != '\0'; ++count) {
       const std::size_t end = value.find('\0', at);
-      if (end == std::string::npos || end - at >= kLongestName) break;
+      if (end == std::string::npos || end - at > kLongestName) break;
       at = end + 1 + 16;
     }
     if (at + 1 != value.size() || value[at] != '\0') refuse("its list of channels has no end");
@@ -224,7 +224,7 @@ class ExrHeaderReader {
     std::string result;
     for (char c = bytes(1)[0]; c != '\0'; c = bytes(1)[0]) {
       result += c;
-      if (result.size() >= kLongestName) refuse("a name in its header has no end");
+      if (result.size() > kLongestName) refuse("a name in its header has no end");
     }
     return result;
   }

@@ -172,7 +172,7 @@ std::optional<CachedStep> Cache::step(const std::string& key) const {
                             f.at("changed").get<std::int64_t>()});
     touch(entryPath(key, kEntry));
     return step;
-  } catch (const std::exception&) {  // the entry is damaged and counts as absent
+  } catch (const std::exception&) {  // missing, damaged or of another version: no entry
     return {};
   }
 }
@@ -197,7 +197,7 @@ std::optional<Value> Cache::value(const std::string& key, std::size_t maxMemory)
     throw;
   } catch (const levelset::Cancelled&) {
     throw;
-  } catch (const std::exception&) {  // the entry is damaged and counts as absent
+  } catch (const std::exception&) {  // missing, damaged or of another version: no entry
     return {};
   }
 }

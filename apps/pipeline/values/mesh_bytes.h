@@ -10,7 +10,8 @@ namespace pipeline {
 /// read it.
 [[nodiscard]] std::string bytesOf(const levelset::TriMesh& mesh);
 /// Decodes the bytes of bytesOf().
-/// @return false if the bytes are damaged or have another format; `mesh` is then incomplete
+/// @return false if the bytes are damaged or have another format; `mesh` is then unchanged or
+/// incomplete
 [[nodiscard]] bool readMeshBytes(const std::string& bytes, levelset::TriMesh& mesh);
 
 }  // namespace pipeline

@@ -22,8 +22,8 @@ using levelset::NarrowBand;
 
 namespace {
 
-/// Two slabs whose faces meet along z. The free space between them has the angle θ and is symmetric
-/// to the plane y = 0: x > |y| / tan(θ/2).
+/// Two slabs whose faces meet along z, at a corner. In coordinates relative to the corner, the free
+/// space between them has the angle θ and is symmetric to y = 0: x > |y| / tan(θ/2).
 struct Wedge {
   double half;  ///< θ / 2
   Truth first, second;

@@ -25,8 +25,9 @@ constexpr const char* kCutName = "clip_plane";
 constexpr double kBoxVoxels = 48;
 constexpr double kBeforeEnd =
     1 - 1e-6;  // fraction of the half width; values of larger magnitude may be rounded background
-constexpr double kBesideSolids =
-    8;  // margin of the box beside the solids, voxels; normals read values three voxels away
+// Length added to each edge of the cutting box, in voxels of that box. It leaves four of them on
+// each side of the solids, because normals read values three voxels away.
+constexpr double kBesideSolids = 8;
 
 // The tones of the action 'slice': next to the surface, at the end of the band, and inside beyond
 // the band.

@@ -105,7 +105,7 @@ void unfoldPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPat
 
 void relaxPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPatches& improved,
                   double embedDepth, const V3d& textureSize) {
-  double before = 0, after = 0;
+  double before = 0, after = 0, relaxed = 0;
   const std::size_t first = in.flag("untangle") ? improved.patches.size() : 0;
   const std::size_t parts = first + improved.patches.size();
   for (mapping::Patch& patch : improved.patches) {
@@ -122,14 +122,15 @@ void relaxPatches(Invocation& in, const levelset::NarrowBand& base, ImprovedPatc
                                          {"after", energyJson(result.after)},
                                          {"iterations", result.iterations},
                                          {"farthest_move", result.farthestMove}});
-    const double share = 1 / static_cast<double>(improved.patches.size());
-    before += share * result.before.mean;
-    after += share * result.after.mean;
+    before += result.before.mean;
+    after += result.after.mean;
+    ++relaxed;
     patch = std::move(result.patch);
   }
+  if (relaxed == 0) return;
   in.notes.notes.push_back(fmt::format(
       "--relax: the energy of distortion changed from {:.6g} to {:.6g}; 6 means no distortion",
-      before, after));
+      before / relaxed, after / relaxed));
 }
 
 /// Fold certificate, distortion and Jacobian field of the map that --map names.
