@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Figures of README.md and docs/*.md that come from result files of the regression suite.
 
-figures.py                    checks the text against docs/figures/regress.csv
+figures.py                    checks the text against docs/figures/*.csv
 figures.py --write            rewrites the figures in the text
 figures.py --take RESULTS     replaces docs/figures/regress.csv by the columns needed of RESULTS, a results.csv of
                               `levelsmith regress --budget quick`
@@ -21,6 +21,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 TABLE = ROOT / "docs/figures/regress.csv"
+OTHERS = [ROOT / "docs/figures/advect.csv"]  # advect_bench csv=docs/figures/advect.csv 64
 COLUMNS = ["case", "variant", "tool", "resolution", "phase", "band_in_l1_vx", "band_in_linf_vx", "band_out_l1_vx",
            "band_out_linf_vx", "surface_l1_vx", "surface_linf_vx", "volume_error", "area_error", "value_error", "cpu_s"]
 FIGURE = re.compile(r"<!--fig (.+?)-->(.*?)<!--/fig-->")
@@ -97,8 +98,10 @@ def main():
             writer = csv.DictWriter(file, COLUMNS, extrasaction="ignore", lineterminator="\n")
             writer.writeheader()
             writer.writerows(read_rows(arguments.take))
-    rows = read_rows(TABLE)
-    fresh = read_rows(arguments.against) if arguments.against and arguments.against.exists() else None
+    rows = read_rows(TABLE) + [row for other in OTHERS for row in read_rows(other)]
+    fresh = None
+    if arguments.against and arguments.against.exists():
+        fresh = read_rows(arguments.against) + [row for other in OTHERS for row in read_rows(other)]
     count, problems = 0, []
     for path in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]:
         text = path.read_text(encoding="utf-8")

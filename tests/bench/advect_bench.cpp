@@ -2,13 +2,15 @@
 // on the same grid in one run. The velocity is first a function, then a staggered grid of the same
 // voxels. Both programs read it with the same sampler. Exits 1 when the ratio of the front's CPU
 // seconds to OpenVDB's exceeds a bound or cannot be computed.
-// Usage: advect_bench [function=BOUND] [staggered=BOUND] [RESOLUTION …]
+// Usage: advect_bench [function=BOUND] [staggered=BOUND] [csv=FILE] [RESOLUTION …]
+// csv=FILE writes the rows as docs/figures/advect.csv has them, for tests/figures.py.
 
 #include <fmt/core.h>
 #include <sys/resource.h>
 
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
 #include <map>
 #include <string>
 #include <vector>
@@ -58,16 +60,21 @@ double surfaceError(const NarrowBand& band) {
   return sum / count / band.voxelSize();
 }
 
+/// Rows of the result file; empty without one.
+std::string rows;
+
 /// @return CPU seconds
 template <typename Run>
 double show(const char* name, int resolution, const NarrowBand& ball, const Run& run) {
   const double start = cpuSeconds();
   const NarrowBand result = run();
   const double seconds = cpuSeconds() - start;
+  const double volume = levelset::measure(result).volume / levelset::measure(ball).volume - 1;
+  const double surface = surfaceError(result);
   fmt::print("{:>4}  {:<18} volume {:+8.3f} %  surface L1 {:7.4f} voxels  {:7.1f} s CPU\n",
-             resolution, name,
-             100 * (levelset::measure(result).volume / levelset::measure(ball).volume - 1),
-             surfaceError(result), seconds);
+             resolution, name, 100 * volume, surface, seconds);
+  rows += fmt::format("advect_bench,\"{}\",levelsmith,{},{:.9g},{:.9g},{:.9g}\n", name, resolution,
+                      surface, volume, seconds);
   return seconds;
 }
 
@@ -100,11 +107,14 @@ int main(int count, char** arguments) {
   using Scheme = levelset::AdvectScheme;
   Bounds bounds;
   std::vector<int> resolutions;
+  std::string file;
   for (int i = 1; i < count; ++i) {
     const std::string argument = arguments[i];
     const std::size_t equals = argument.find('=');
     if (equals == std::string::npos)
       resolutions.push_back(std::atoi(argument.c_str()));
+    else if (argument.starts_with("csv="))
+      file = argument.substr(4);
     else
       bounds[argument.substr(0, equals)] = std::atof(argument.c_str() + equals + 1);
   }
@@ -138,6 +148,14 @@ int main(int count, char** arguments) {
     show("semi-lagrangian", resolution, ball,
          [&] { return ours(Scheme::SemiLagrangian, function); });
     show("upwind", resolution, ball, [&] { return ours(Scheme::Upwind, function); });
+  }
+  if (!file.empty()) {
+    std::ofstream out(file);
+    out << "case,variant,tool,resolution,surface_l1_vx,volume_error,cpu_s\n" << rows;
+    if (!out.flush()) {
+      fmt::print(stderr, "advect_bench: '{}' cannot be written\n", file);
+      return 1;
+    }
   }
   return isMissed ? 1 : 0;
 }
