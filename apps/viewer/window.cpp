@@ -208,6 +208,7 @@ void Window::drawFrame(int width, int height, bool isInMemory,
   ImDrawList& behind = *ImGui::GetBackgroundDrawList();
   drawBackground(behind, io.DisplaySize.x, io.DisplaySize.y);
   if (hasPicture_)
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): ImGui stores texture numbers as pointers
     behind.AddImage(reinterpret_cast<ImTextureID>(static_cast<std::uintptr_t>(texture_)), {0, 0},
                     io.DisplaySize);
   interface();

@@ -72,7 +72,7 @@ class FieldGrid {
 
  private:
   static constexpr int kOutside = -1, kInside = -2;
-  static constexpr std::size_t kValues = kPoints * kPoints * kPoints;
+  static constexpr std::size_t kValues = std::size_t{kPoints} * kPoints * kPoints;
   [[nodiscard]] double constant(int block) const {
     return block == kInside ? -background_ : background_;
   }
