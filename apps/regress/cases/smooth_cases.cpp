@@ -54,26 +54,52 @@ void smoothSphere(Recorder& out) {
 
 Bounds smoothBounds() {
   return Bounds()
-      .measured("σ = 1 voxel", "surface_linf_vx", {{6, 0.00236}, {12, 0.000759}, {24, 0.000431}})
-      .unmeasured("σ = 1 voxel", "surface_linf_vx", 0.02, {16, 64, 256})
-      .measured("σ = 1 voxel", "band_in_linf_vx", {{6, 0.00167}, {12, 0.000664}, {24, 0.000473}})
-      .unmeasured("σ = 1 voxel", "band_in_linf_vx", 0.05, {16, 64, 256})
-      .measured("σ = 1 voxel", "band_out_linf_vx", {{6, 0.0018}, {12, 0.0007}, {24, 0.000477}})
-      .unmeasured("σ = 1 voxel", "band_out_linf_vx", 0.05, {16, 64, 256})
+      .measured("σ = 1.63 voxels", "missed_hits", {{16, 0.000314}, {64, 0}, {256, 0}})
+      .measured("σ = 1 voxel", "surface_linf_vx",
+                {{6, 0.00236},
+                 {12, 0.000759},
+                 {24, 0.000431},
+                 {16, 0.000597},
+                 {64, 0.000387},
+                 {256, 0.000378}})
+      .measured("σ = 1 voxel", "band_in_linf_vx",
+                {{6, 0.00167},
+                 {12, 0.000664},
+                 {24, 0.000473},
+                 {16, 0.000556},
+                 {64, 0.00101},
+                 {256, 0.00155}})
+      .measured("σ = 1 voxel", "band_out_linf_vx",
+                {{6, 0.0018},
+                 {12, 0.0007},
+                 {24, 0.000477},
+                 {16, 0.000558},
+                 {64, 0.000964},
+                 {256, 0.00185}})
       .zero("σ = 1 voxel", "checks_failed")
       .measured("σ = 1.63 voxels", "surface_linf_vx",
-                {{6, 0.00277}, {12, 0.000558}, {24, 0.000142}})
-      .unmeasured("σ = 1.63 voxels", "surface_linf_vx", 0.02, {16, 64, 256})
+                {{6, 0.00277},
+                 {12, 0.000558},
+                 {24, 0.000142},
+                 {16, 0.00032},
+                 {64, 2.25e-5},
+                 {256, 2.22e-6}})
       .measured("σ = 1.63 voxels", "band_in_linf_vx",
-                {{6, 0.00187}, {12, 0.000434}, {24, 0.000109}})
-      .unmeasured("σ = 1.63 voxels", "band_in_linf_vx", 0.05, {16, 64, 256})
+                {{6, 0.00187},
+                 {12, 0.000434},
+                 {24, 0.000109},
+                 {16, 0.000242},
+                 {64, 1.75e-5},
+                 {256, 4.39e-6}})
       .measured("σ = 1.63 voxels", "band_out_linf_vx",
-                {{6, 0.00186}, {12, 0.00043}, {24, 0.000109}})
-      .unmeasured("σ = 1.63 voxels", "band_out_linf_vx", 0.05, {16, 64, 256})
+                {{6, 0.00186},
+                 {12, 0.00043},
+                 {24, 0.000109},
+                 {16, 0.000242},
+                 {64, 1.86e-5},
+                 {256, 5.62e-6}})
       .zero("σ = 1.63 voxels", "checks_failed")
-      .measured("σ = 1 voxel", "missed_hits", {{6, 0.00114}})
-      .unmeasured("σ = 1 voxel", "missed_hits", 0.025, {16, 64, 256})
-      .unmeasured("σ = 1.63 voxels", "missed_hits", 0.025, {16, 64, 256});
+      .measured("σ = 1 voxel", "missed_hits", {{6, 0.00114}, {16, 0.000157}, {64, 0}, {256, 0}});
 }
 
 }  // namespace
