@@ -7,43 +7,50 @@
 #include <string>
 #include <vector>
 
-/// Bounds on the figures of the suite. A bound states what was measured, and its limit follows from
-/// that, so that every limit is at most three times the figure that it guards.
+/// Bounds on the figures of the suite. A bound states the measured figure, and its limit follows
+/// from that figure, so that every limit is at most three times the figure that it guards.
 namespace regress {
 
 enum class Budget { Quick, Full };
 
 enum class Sense { AtMost, AtLeast };
 
-/// A limit on one of our figures in the worst placement.
+/// A limit on a figure of Levelsmith in the worst placement of the object relative to the grid
+/// points.
 struct Bound {
   enum class Kind {
-    Measured,  ///< `stated`: the magnitude measured; limit: kMargin times that, or `ceiling`
-    Order,     ///< `stated`: the order of convergence measured; limit: kOrderMargin below that, or
-               ///< `least`
-    Rounding,  ///< `stated`: a multiple of the machine epsilon of float, which is the limit
-    Required,  ///< `stated`: the limit itself, which follows from a requirement
-    Unmeasured,  ///< `stated`: the limit itself, of a run too long to measure; never stale
+    Measured,  ///< `stated` is the measured magnitude; the limit is kMargin times it, or `ceiling`
+               ///< if that is smaller
+    Order,     ///< `stated` is the measured order of convergence; the limit is kOrderMargin below
+               ///< it, or `least` if that is larger
+    Rounding,  ///< `stated` times the machine epsilon of float is the limit
+    Required,  ///< `stated` is the limit itself, which follows from a requirement
+    Unmeasured,  ///< `stated` is the limit itself, for a run that is too long to measure; never
+                 ///< stale
   };
-  /// Limit over measured figure.
+  /// Ratio of the limit to the measured figure.
   static constexpr double kMargin = 1.5;
   /// Measured order minus limit.
   static constexpr double kOrderMargin = 0.3;
-  /// Largest limit over the figure found in a run. A limit above that guards nothing: the bound is
-  /// stale, and fails.
+  /// Largest accepted ratio of the limit to the figure found in a run. A looser limit guards
+  /// nothing: the bound is stale, and fails.
   static constexpr double kLoosest = 3;
-  /// Largest order found minus limit.
+  /// Largest accepted difference of the order found in a run and its limit. Beyond it the bound is
+  /// stale, and fails.
   static constexpr double kLoosestOrder = 1;
 
   std::string variant = {};
-  std::string figure = {};  ///< a column, see columns.h
+  std::string figure = {};  ///< name of a column, see columns.h
   Kind kind = Kind::Measured;
   double stated = 0;
-  int resolution = 0;                 ///< voxels per unit of length; 0: every one
-  Sense sense = Sense::AtMost;        ///< of Required; follows from the kind for the others
-  std::optional<Budget> budget = {};  ///< the budget that the bound is for; empty: both
-  double ceiling = std::numeric_limits<double>::infinity();  ///< largest limit of Measured
-  double least = -std::numeric_limits<double>::infinity();   ///< smallest limit of Order
+  int resolution = 0;  ///< resolution at which the bound holds, voxels per unit of length; 0: all
+  Sense sense = Sense::AtMost;  ///< direction of a Required limit; for the other kinds it follows
+                                ///< from the kind
+  std::optional<Budget> budget = {};  ///< budget in which the bound is tested; empty: both
+  double ceiling =
+      std::numeric_limits<double>::infinity();  ///< upper limit of limit() for Kind::Measured
+  double least =
+      -std::numeric_limits<double>::infinity();  ///< lower limit of limit() for Kind::Order
 
   [[nodiscard]] double limit() const;
   [[nodiscard]] bool isMet(double found) const;
@@ -60,34 +67,36 @@ struct MeasuredAt {
   std::optional<Budget> budget = {};
 };
 
-/// The bounds of a case, built row by row. Resolutions of the full budget have figures of five
-/// placements; those of the quick budget may have figures of one, so a resolution of both budgets
-/// has two entries where these differ by more than the margin.
+/// The bounds of a case, added figure by figure. The full budget runs five placements at each
+/// resolution, the quick budget often only one. So a resolution of both budgets has two entries
+/// where the worst figures differ by more than the margin.
 class Bounds {
  public:
-  /// Magnitudes at most Bound::kMargin times the measured ones. A resolution whose figure is not
-  /// stated fails.
+  /// Adds bounds on a magnitude, which must be at most Bound::kMargin times the measured one. A
+  /// resolution that runs without an entry in `figures` fails.
   Bounds& measured(const std::string& variant, const std::string& figure,
                    std::initializer_list<MeasuredAt> figures);
-  /// Lowers the limits of the measured figures added last to a promise that is tighter than the
-  /// margin.
-  /// @param resolution  0: every one
+  /// Lowers the limits that the last call of measured() added to `limit`, a promised accuracy that
+  /// is tighter than the margin.
+  /// @param resolution  resolution whose limit is lowered; 0: all
   Bounds& ceiling(double limit, int resolution = 0);
-  /// Orders of convergence at least Bound::kOrderMargin below the measured ones.
+  /// Adds bounds on an order of convergence, which must be at most Bound::kOrderMargin below the
+  /// measured one.
   /// @param least  promised order; the limits are not below it
   Bounds& order(const std::string& variant, const std::string& figure,
                 std::initializer_list<MeasuredAt> figures,
                 double least = -std::numeric_limits<double>::infinity());
-  /// A magnitude at rounding level: at most `multiple` times the machine epsilon of float.
-  /// @param resolution  0: every one
+  /// Adds a bound on a magnitude at rounding level: at most `multiple` times the machine epsilon of
+  /// float.
+  /// @param resolution  resolution at which the bound holds; 0: all
   Bounds& rounding(const std::string& variant, const std::string& figure, double multiple,
                    int resolution = 0);
-  /// A figure that is exactly zero at every resolution.
+  /// Adds a bound on a figure that must be exactly zero at every resolution.
   Bounds& zero(const std::string& variant, const std::string& figure);
-  /// A limit that follows from a requirement, not from a measurement.
+  /// Adds a limit that follows from a requirement, not from a measurement.
   Bounds& required(const std::string& variant, const std::string& figure, double limit,
                    int resolution = 0, Sense sense = Sense::AtMost);
-  /// A limit of a run of the full budget that is too long to measure.
+  /// Adds a limit for runs of the full budget that are too long to measure.
   Bounds& unmeasured(const std::string& variant, const std::string& figure, double limit,
                      std::initializer_list<int> resolutions);
 
@@ -99,11 +108,13 @@ class Bounds {
   std::size_t last_ = 0;  ///< index of the first bound of the last call of measured()
 };
 
-/// A figure of a stated outcome, judged as a bound is.
-/// @return true where `found` is within the limit of `measured` and the limit is not stale
+/// Compares a figure of an outcome with the measured figure, by the rules of Bound::Kind::Measured.
+/// @return true if `found` is within the limit that follows from `measured`, and the limit is not
+///         stale
 [[nodiscard]] bool isAsMeasured(double found, double measured);
 
-/// @return true where `found` is at most `multiple` times the machine epsilon of float
+/// @return true if the magnitude of `found` is at most `multiple` times the machine epsilon of
+///         float
 [[nodiscard]] bool isRounding(double found, double multiple);
 
 }  // namespace regress

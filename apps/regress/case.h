@@ -10,35 +10,37 @@
 
 #include "apps/regress/bounds.h"
 
-/// Regression suite: problems with exact answers, run at several resolutions and placements on the
-/// grid.
+/// Regression suite: problems with exact answers, run at several resolutions and at several
+/// positions of the object relative to the grid points (placements).
 namespace regress {
 
 class Recorder;
 
-/// One run of a problem. The object has a size near one. The voxel size is 1 / resolution.
+/// Resolution and placement of one run of a problem. Objects have a size near one, so the voxel
+/// size is 1 / resolution unless the case chooses another.
 struct Sample {
   int resolution = 0;     ///< voxels per unit of length
   int phase = 0;          ///< index of the placement
   double voxelSize = 0;   ///< world units
-  Imath::V3d shift = {};  ///< offset of the object from the grid points, world units
+  Imath::V3d shift = {};  ///< offset of the object from its position at placement 0, world units
 };
 
-/// Placements of an object between the grid points, in voxels.
+/// Returns the placements: offsets of an object from the grid points, in voxels.
 [[nodiscard]] const std::vector<Imath::V3d>& subVoxelPhases();
 
 struct Case {
-  std::string name = {};                   ///< argument of --case
-  std::string group = {};                  ///< operator; each group has one plot
-  std::string title = {};                  ///< one line
-  std::string definition = {};             ///< computation and exact answer
-  std::string citation = {};               ///< keys of REFERENCES.md
+  std::string name = {};  ///< argument of --case
+  std::string group =
+      {};  ///< name of the operator, for the plots: each group of cases has one plot
+  std::string title = {};       ///< description in one line
+  std::string definition = {};  ///< computation, exact answer and meaning of the column value_error
+  std::string citation = {};    ///< keys of REFERENCES.md, or the kind of the exact answer
   std::vector<int> quick = {}, full = {};  ///< resolutions; empty for cases with outcomes only
   std::vector<Bound> bounds = {};
   std::function<void(Recorder&)> run = {};
 };
 
-/// Builds a case without rows of figures, which states outcomes only.
+/// Builds a case that states outcomes only and has no rows of figures.
 [[nodiscard]] inline Case statedCase(const char* name, const char* title, const char* definition,
                                      const char* citation, void (*run)(Recorder&)) {
   return {.name = name,
@@ -71,16 +73,16 @@ void addBadInputCases(std::vector<Case>& all);
 
 using Figures = std::map<std::string, double>;
 
-/// One run of one tool.
+/// Figures of one run of one tool, or the summary of its runs at all placements.
 struct Row {
   std::string variant, tool;
   int resolution = 0;
   int phase = 0;             ///< index of the placement; -1 in a summary
-  Figures figures = {};      ///< by column, measured ones only
+  Figures figures = {};      ///< figures by the name of their column; only those that were measured
   std::string failure = {};  ///< reason why the row has no figures
 };
 
-/// Statement of a case and its verification.
+/// Statement about the result of a run, and its verification.
 struct Outcome {
   std::string variant;
   std::string expected;
@@ -88,7 +90,7 @@ struct Outcome {
   bool passed = false;
 };
 
-/// Bound and the figure found.
+/// Bound of a case, the figure found, and the result of the comparison.
 struct Judgement {
   Bound bound;
   int resolution = 0;
@@ -100,10 +102,11 @@ struct Judgement {
 struct CaseResult {
   const Case* of = nullptr;
   std::vector<Row> rows;
-  std::vector<Row> summary;  ///< worst placement, by variant, tool and resolution
+  std::vector<Row>
+      summary;  ///< worst figures of all placements, for each variant, tool and resolution
   std::vector<Outcome> outcomes;
   std::vector<Judgement> judgements;
-  double cpuSeconds = 0;  ///< measurements included
+  double cpuSeconds = 0;  ///< CPU time of the case including the measurement of the errors, seconds
 };
 
 }  // namespace regress

@@ -22,7 +22,7 @@ using levelset::NarrowBand;
 
 namespace {
 
-/// Sum, largest and number of absolute errors.
+/// Sum, maximum and number of absolute errors, world units.
 struct Tally {
   double sum = 0, largest = 0, count = 0;
   void add(double error) {
@@ -44,8 +44,8 @@ struct Sides {
 
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
-/// Errors of the active voxels of a leaf, and of inactive voxels that the band should reach.
-/// missingShare() counts grid points without a leaf.
+/// Collects the errors of the active voxels of a leaf, and of inactive voxels whose exact distance
+/// lies within the band. Grid points without a leaf are counted by missingShare().
 Sides leafErrors(const Leaf& leaf, const openvdb::FloatGrid& grid, const Truth& truth) {
   Sides sides;
   const double background = static_cast<double>(grid.background());

@@ -4,23 +4,26 @@
 #include "apps/regress/truth/rays.h"
 #include "levelset/narrow_band.h"
 
-/// Errors of a band against the truth.
+/// Measures the errors of a band against the exact solid.
 namespace regress {
 
-/// Surface extraction that builds the mesh of the mesh columns.
+/// Mesher that builds the mesh for the columns mesh_l1_vx and mesh_linf_vx.
 enum class Mesher { Ours, OpenVdb };
 
-/// Adds all columns that compare `result` with `truth`. Both sides of the surface have columns of
-/// their own.
+/// Adds the columns with the errors of the band, of its surface and of its mesh. The band has
+/// separate columns for the inside and the outside of the solid.
+/// @param rays  number of rays along which the surface is measured
 void addErrors(const levelset::NarrowBand& result, const Truth& truth, Mesher mesher,
                Figures& figures, int rays = kRayCount);
 
-/// Adds the surface columns, the volume and, as the value, the volume of the symmetric difference.
-/// The reference band stands for the truth. Distances are the larger of both directions.
+/// Adds the surface columns and the volume error against a reference band. value_error is the
+/// volume of the symmetric difference over that of the reference. Surface distances are the larger
+/// of those from `result` to `reference` and back.
 void addDifferences(const levelset::NarrowBand& result, const levelset::NarrowBand& reference,
                     Figures& figures);
 
-/// Adds volume, area, eikonal residual and checks.
+/// Adds the errors of volume and area, the eikonal residual and the number of failed level-set
+/// checks.
 void addInvariants(const levelset::NarrowBand& result, const Truth& truth, Figures& figures);
 
 /// Largest difference of φ over the grid points at which either band is active, in voxels;

@@ -1,4 +1,4 @@
-"""Error against run time, one plot for each operator, from results.json in this folder."""
+"""Plots error against run time from results.json in this folder, one plot per group of cases."""
 import json
 import math
 import os
@@ -26,7 +26,7 @@ def error(row, columns):
 
 
 def series(cases, columns):
-    """Points (CPU seconds, error) by (variant, tool), coarse to fine."""
+    """Returns lists of (CPU seconds, error, resolution) by (variant, tool), from coarse to fine."""
     lines = {}
     for case in cases:
         for row in case["summary"]:

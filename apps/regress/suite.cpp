@@ -48,8 +48,8 @@ std::vector<const Case*> chosen(const std::vector<std::string>& names) {
   return list;
 }
 
-/// Runs a case. An exception that the case does not catch is a missed outcome, and the other cases
-/// go on.
+/// Runs a case. An exception that the case does not catch becomes a failed outcome, so that the
+/// other cases still run.
 void runWhole(const Case& of, Recorder& recorder) {
   std::exception_ptr failure;
   try {
@@ -96,7 +96,7 @@ std::vector<std::string> failures(const CaseResult& result) {
   for (const Judgement& j : result.judgements) {
     if (j.passed) continue;
     const std::string what =
-        fmt::format("{}: {} at {}: ", result.of->name, j.bound.variant, j.resolution);
+        fmt::format("{}: {} at resolution {}: ", result.of->name, j.bound.variant, j.resolution);
     sentences.push_back(
         j.remark.empty()
             ? fmt::format("{}{} is {:.4g}, the bound is {} {:.4g}", what, j.bound.figure, j.found,

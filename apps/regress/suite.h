@@ -29,18 +29,18 @@ void checkNames(const std::vector<std::string>& names);
 /// @throws UsageError as checkNames(); Cancelled
 [[nodiscard]] SuiteResult runSuite(const SuiteOptions& options);
 
-/// Lists a sentence for each missed bound and each statement that does not hold.
+/// Returns a sentence for each missed bound and for each outcome that does not hold.
 [[nodiscard]] std::vector<std::string> failures(const CaseResult& result);
 [[nodiscard]] std::vector<std::string> failures(const SuiteResult& result);
 
 /// Creates the folder for results if it is missing.
-/// @throws IoError
+/// @throws IoError if it cannot be created
 void makeFolder(const std::filesystem::path& folder);
 
-/// Writes results.json, results.csv, index.html and, where Python has matplotlib, the plots (PNG
-/// and SVG, only `withPlots`) with the script that draws them.
-/// @return notes on missing plots, with the reason
-/// @throws IoError
+/// Writes results.json, results.csv and index.html. With `withPlots` it also writes plots.py and,
+/// if Python has matplotlib, the plots as PNG and SVG.
+/// @return reasons why plots are missing; empty: none is missing
+/// @throws IoError if a file cannot be written
 std::vector<std::string> writeResults(const SuiteResult& result,
                                       const std::filesystem::path& folder, bool withPlots);
 

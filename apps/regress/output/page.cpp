@@ -32,7 +32,7 @@ std::string number(double value) {
   return std::abs(value) >= 1e6 ? fmt::format("{:.3e}", value) : fmt::format("{:.4g}", value);
 }
 
-/// Columns that at least one row has.
+/// Returns the columns in which at least one row has a figure.
 std::vector<const Column*> used(const std::vector<Row>& rows) {
   std::vector<const Column*> list;
   for (const Column& column : columns())
@@ -68,7 +68,7 @@ void appendSummary(const CaseResult& result, std::string& html) {
   html += "</table></div>\n";
 }
 
-/// Formats the figure that a bound states.
+/// Formats the measured figure of a bound, or the kind of a bound without one.
 std::string stated(const Bound& bound) {
   switch (bound.kind) {
     case Bound::Kind::Measured:
@@ -87,8 +87,8 @@ std::string stated(const Bound& bound) {
 void appendBounds(const CaseResult& result, std::string& html) {
   if (result.judgements.empty()) return;
   html +=
-      "<table><tr><th>bound on</th><th>figure</th><th>resolution</th><th>stated</th><th>bound</th>"
-      "<th>found</th></tr>\n";
+      "<table><tr><th>variant</th><th>figure</th><th>resolution</th><th>stated "
+      "figure</th><th>limit</th><th>found</th></tr>\n";
   for (const Judgement& j : result.judgements)
     html += fmt::format(
         "<tr class=\"{}\"><td class=\"t\">{}</td><td "
@@ -119,10 +119,11 @@ std::string pageText(const SuiteResult& result, const std::vector<std::string>& 
   const std::vector<std::string> failed = failures(result);
   html += fmt::format(
       "<h1>Level-set regression suite</h1>\n<p>levelsmith {}, {} budget, {:.0f} CPU seconds. "
-      "Figures are the worst of the placements between the grid points; CPU seconds are their "
-      "mean. Lengths are voxels unless said; resolution is voxels per unit of length. Times are "
-      "shown, never judged. <a href=\"results.json\">results.json</a> and <a "
-      "href=\"results.csv\">results.csv</a> hold every run.</p>\n",
+      "Figures are the worst over all positions of the object relative to the grid points; CPU "
+      "seconds are the mean. Lengths are in voxels unless a heading says otherwise; the resolution "
+      "is in voxels per unit of length. Times have no bounds. <a "
+      "href=\"results.json\">results.json</a> and <a href=\"results.csv\">results.csv</a> contain "
+      "every run.</p>\n",
       LEVELSMITH_VERSION, result.budget == Budget::Quick ? "quick" : "full", result.cpuSeconds);
   html += failed.empty()
               ? "<p class=\"good\">Every bound is met.</p>\n"
@@ -133,12 +134,13 @@ std::string pageText(const SuiteResult& result, const std::vector<std::string>& 
   html += "<h2>Error against run time</h2>\n<div class=\"plots\">\n";
   for (const std::string& name : plots)
     html += fmt::format("<a href=\"{0}.svg\"><img src=\"{0}.png\" alt=\"{0}\"></a>\n", name);
-  html += plots.empty() ? "<p>The page has no plots, since matplotlib is missing.</p></div>\n"
+  html += plots.empty() ? "<p>There are no plots: --no-plots was given, or plots.py could not draw "
+                          "them.</p></div>\n"
                         : "</div>\n";
   for (const CaseResult& c : result.cases) {
     html += fmt::format(
-        "<h2 id=\"{0}\">{0}: {1}</h2>\n<p>{2}</p>\n<p>Source: {3}. {4:.1f} CPU seconds with all "
-        "measuring.</p>\n",
+        "<h2 id=\"{0}\">{0}: {1}</h2>\n<p>{2}</p>\n<p>Source: {3}. {4:.1f} CPU seconds, including "
+        "the measurement of errors.</p>\n",
         escapedHtml(c.of->name), escapedHtml(c.of->title), escapedHtml(c.of->definition),
         escapedHtml(c.of->citation), c.cpuSeconds);
     appendBounds(c, html);

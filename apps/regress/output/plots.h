@@ -11,7 +11,7 @@ struct Plots {
   std::vector<std::string> notes;  ///< reasons why plots are missing
 };
 
-/// Writes plots.py beside results.json and runs it. Users can run it again by hand.
+/// Writes plots.py into the folder of results.json and runs it. Users can run it again by hand.
 [[nodiscard]] Plots makePlots(const std::filesystem::path& folder);
 
 }  // namespace regress

@@ -11,11 +11,11 @@
 namespace regress {
 namespace {
 
-/// Share of missing values. A missing value has no error, so this share must be zero wherever
-/// errors are bounded, unless the case states another figure.
+/// Column with the share of missing values. A missing value has no error, so this share must be
+/// zero wherever errors are bounded, unless the case bounds the share itself.
 struct Presence {
   const char* figure;
-  const char* errors[2];  ///< prefixes of the error columns that do not see missing values
+  const char* errors[2];  ///< prefixes of the error columns in which missing values do not count
 };
 constexpr Presence kPresences[] = {{"missing_band", {"band_", "order_band"}},
                                    {"missed_hits", {"surface_l", "order_surface"}}};
@@ -24,7 +24,8 @@ bool isCost(const std::string& column) {
   return column == "cpu_s";
 }
 
-/// Largest magnitude with its sign; mean of the costs.
+/// Combines the rows of all placements: the value of largest magnitude, with its sign, in each
+/// column; the mean of the CPU seconds.
 Row worstOf(const std::vector<const Row*>& placements) {
   Row worst = *placements.front();
   worst.phase = -1;
@@ -89,7 +90,7 @@ std::vector<Row> summarize(const std::vector<Row>& rows) {
   }
   std::vector<Row> summary;
   for (const auto& group : groups) {
-    // A refused placement has no figures, so accepted placements come first.
+    // A placement that ended with an exception has no figures, so the other placements come first.
     std::vector<const Row*> placements = group;
     std::stable_partition(placements.begin(), placements.end(),
                           [](const Row* row) { return row->failure.empty(); });
@@ -111,7 +112,7 @@ bool fits(const Bound& bound, const Row& row, Budget budget) {
          (bound.resolution == 0 || bound.resolution == row.resolution);
 }
 
-/// Adds a judgement where the case bounds errors, but does not state the share of missing values.
+/// Adds the bound 0 on the share of missing values if the case bounds errors, but not this share.
 void judgePresence(const Case& of, const Row& row, const Presence& presence, Budget budget,
                    std::vector<Judgement>& judgements) {
   const auto found = row.figures.find(presence.figure);
@@ -147,16 +148,17 @@ void judgeCompleteness(const Case& of, const Row& row, Budget budget,
   }
   for (const std::string& figure : bounded) {
     const auto found = row.figures.find(figure);
-    // A share of missing values that is not stated must be zero: judgePresence().
+    // judgePresence() bounds a share of missing values that the case does not bound.
     const bool isShare =
         std::any_of(std::begin(kPresences), std::end(kPresences),
                     [&](const Presence& presence) { return figure == presence.figure; });
     if (isShare || stated.contains(figure) || found == row.figures.end()) continue;
-    judgements.push_back({{.variant = row.variant, .figure = figure, .resolution = row.resolution},
-                          row.resolution,
-                          found->second,
-                          false,
-                          "the case states no measured figure at this resolution"});
+    judgements.push_back(
+        {{.variant = row.variant, .figure = figure, .resolution = row.resolution},
+         row.resolution,
+         found->second,
+         false,
+         "the case states no measured figure at this resolution; add one to its bounds"});
   }
 }
 
@@ -194,7 +196,8 @@ std::vector<Judgement> judge(const Case& of, const std::vector<Row>& summary, Bu
     };
     // The other budget judges the bounds at its own resolutions.
     if (!met && (bound.resolution == 0 || has(resolutions) || !(has(of.full) || has(of.quick))))
-      judgements.push_back({bound, bound.resolution, 0, false, "there is no such row"});
+      judgements.push_back(
+          {bound, bound.resolution, 0, false, "no row has this variant and resolution"});
   }
   for (const Row& row : summary) {
     if (row.tool != kOurs) continue;
@@ -202,7 +205,7 @@ std::vector<Judgement> judge(const Case& of, const std::vector<Row>& summary, Bu
       judgePresence(of, row, presence, budget, judgements);
     judgeCompleteness(of, row, budget, judgements);
   }
-  // A refused run fails even where no bound looks at it.
+  // A run that ended with an exception fails, even without a bound on its figures.
   for (const Row& row : summary)
     if (row.tool == kOurs && !row.failure.empty() &&
         std::none_of(judgements.begin(), judgements.end(), [&](const Judgement& j) {

@@ -18,7 +18,7 @@ NarrowBand dilate(const NarrowBand& band, int voxels) {
 NarrowBand curvatureFlow(const NarrowBand& band, double time) {
   const auto grid = levelset::vdb(band).deepCopy();
   openvdb::tools::LevelSetFilter<openvdb::FloatGrid> filter(*grid);
-  // A step of OpenVDB covers h²/3 at the mean curvature, which is half of k1 + k2.
+  // OpenVDB's speed is (k1 + k2) / 2, half of ours. Its step of h²/3 is a step of h²/6 of our time.
   const double h = band.voxelSize(), step = h * h / 6;
   for (long left = std::lround(time / step); left > 0; --left) filter.meanCurvature();
   return adopt(grid);

@@ -5,10 +5,10 @@
 
 namespace regress {
 
-/// Figure that a row can have. The names are the columns of results.csv.
+/// Figure that a row can have. It is a column of results.csv and of the tables in index.html.
 struct Column {
   const char* name;
-  const char* heading;  ///< heading of the page
+  const char* heading;  ///< heading in the tables of index.html
   const char* meaning;
 };
 [[nodiscard]] const std::vector<Column>& columns();

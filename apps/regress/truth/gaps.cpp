@@ -13,13 +13,13 @@ using openvdb::Coord;
 
 namespace {
 
-constexpr int kEdge = 8;  // edge of a leaf, grid points
+constexpr int kEdge = 8;  // edge of a leaf, in grid points
 
 struct Count {
   double wanted = 0, missing = 0;
 };
 
-/// Origins of the leaf blocks that can hold grid points of a region.
+/// Returns the origins of the leaf blocks that can contain grid points of a region.
 std::vector<Coord> blocksOf(const Region& region, const openvdb::math::Transform& transform) {
   const double h = transform.voxelSize()[0];
   const double toCorner = (kEdge - 1) / 2.0 * std::numbers::sqrt3 * h * region.steepest;
@@ -70,7 +70,7 @@ double shareOf(const Region& region, const Grid& grid) {
     all.wanted += count.wanted;
     all.missing += count.missing;
   }
-  // A region without grid points would pass with any gaps.
+  // NaN misses every bound. With 0, a region without grid points would hide all gaps.
   return all.wanted > 0 ? all.missing / all.wanted : std::nan("");
 }
 

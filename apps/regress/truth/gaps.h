@@ -6,24 +6,26 @@
 
 namespace regress {
 
-/// Grid points at which an answer must have values: those where a known function lies between two
-/// values.
+/// Grid points at which a result must have values: the points at which the function `value` is
+/// between `low` and `high`.
 struct Region {
   Distance value;
   double low = 0, high = 0;
-  double steepest = 1;                                   ///< slope of `value`
-  Imath::V3d centre = {};                                ///< centre of a ball that holds the region
-  double extent = 0;                                     ///< radius of that ball
-  std::function<bool(const Imath::V3d&)> compared = {};  ///< as in Truth
+  double steepest = 1;     ///< largest slope of `value`
+  Imath::V3d centre = {};  ///< centre of a ball that holds the region
+  double extent = 0;       ///< radius of that ball
+  std::function<bool(const Imath::V3d&)> compared =
+      {};  ///< true at points that count; empty: all points count
 };
 
-/// Share of the region's grid points that are not active in the grid. Missing grid points have no
-/// error, so this share is judged apart. 0 where the region has no grid point.
+/// Returns the share of the region's grid points that are not active in the grid. Missing grid
+/// points have no error, so this share has its own bound. NaN if the region contains no grid point.
 [[nodiscard]] double missingShare(const Region& region, const openvdb::FloatGrid& grid);
 [[nodiscard]] double missingShare(const Region& region, const openvdb::Vec3SGrid& grid);
 
-/// Region of the exact band, up to a voxel below its half width, or to half of it below two voxels.
-/// At the end of the band, rounding and the error of φ decide which grid points it holds.
+/// Returns the region of the exact band without its ends: distances up to the half width minus a
+/// voxel, or up to half of a half width below two voxels. At the ends of a band, rounding and the
+/// error of φ decide which grid points are active.
 [[nodiscard]] Region bandRegion(const Truth& truth, double halfWidth, double voxelSize);
 
 }  // namespace regress

@@ -34,8 +34,8 @@ struct Chord {
   double length = 0;
 };
 
-/// Builds a chord between two independent points of a sphere. Such chords spread evenly over all
-/// lines.
+/// Builds chord number i, between two independent points of a sphere. Such chords are evenly
+/// distributed over the lines that cross the sphere.
 Chord chord(int i, const V3d& centre, double radius) {
   const V3d from = onSphere(radicalInverse(i + 1, 2), radicalInverse(i + 1, 3));
   const V3d to = onSphere(radicalInverse(i + 1, 5), radicalInverse(i + 1, 7));
@@ -44,12 +44,13 @@ Chord chord(int i, const V3d& centre, double radius) {
   return {centre + from * radius, length > 0 ? way / length : V3d(1, 0, 0), length};
 }
 
-/// Finds a zero by regula falsi with the Illinois rule: an end that stays twice counts half.
+/// Finds a zero by regula falsi with the Illinois rule: the value at an end that stays twice in a
+/// row is halved.
 template <typename Function>
 double root(const Function& f, double low, double high, double atLow, double atHigh,
             double tolerance) {
   const bool rises = atLow < 0;
-  int stayed = 0;  // end that stayed last; -1: the lower one, 1: the upper one
+  int stayed = 0;  // end that stayed in the last step: -1: `low`, 1: `high`, 0: none yet
   for (int i = 0; i < 60 && high - low > tolerance; ++i) {
     const double t = std::clamp((low * atHigh - high * atLow) / (atHigh - atLow), low, high);
     const double value = f(t);
@@ -69,8 +70,8 @@ double root(const Function& f, double low, double high, double atLow, double atH
   return 0.5 * (low + high);
 }
 
-/// Finds zeros along a chord. The steps are so short that they skip no zero where the band is a
-/// distance.
+/// Finds the zeros of a band's interpolant along chords, by steps that are so short that they skip
+/// no zero if the band is a distance.
 class Walk {
  public:
   explicit Walk(const NarrowBand& band)
@@ -95,15 +96,16 @@ class Walk {
   }
 
  private:
-  /// Shortest step, voxels. Zeros nearer to each other count as none or as one.
+  /// Shortest step, voxels. Two zeros that are closer together may be counted as none or as one.
   static constexpr double kShortest = 0.25;
 
   struct Sample {
     bool isInside = false;
-    double clear = 0;  ///< distance without a surface, world units
+    double clear = 0;  ///< length of the next step, on which there is no zero, world units
   };
 
-  /// Away from the surface the value at the nearest grid point, at most 0.87 voxels off, suffices.
+  /// Evaluates the sign of φ and the next step at position t. Far from the surface, the value at
+  /// the nearest grid point, at most 0.87 voxels away, is used in place of the interpolant.
   Sample sample(const Chord& line, double t) {
     const V3d p = line.from + t * line.direction;
     const openvdb::Vec3d index = grid_->worldToIndex(levelset::toVdb(p));
@@ -116,7 +118,8 @@ class Walk {
     return {value < 0, 0.7 * std::abs(value)};
   }
 
-  /// A block without a leaf has no surface. The values of its neighbours extend two voxels into it.
+  /// Returns the length of the chord up to the end of a block without a leaf. Such a block has no
+  /// surface: values of its neighbours affect the interpolant only within two voxels of its faces.
   [[nodiscard]] double leaveBlock(const Chord& line, const openvdb::Vec3d& index,
                                   const openvdb::Coord& c) const {
     const openvdb::Vec3d way =
@@ -136,7 +139,7 @@ class Walk {
   double voxel_;
 };
 
-/// Finds zeros by sphere tracing, which skips no zero of an exact distance.
+/// Counts zeros by sphere tracing, which skips no zero of an exact distance.
 int exactZeros(const Chord& line, const Distance& exact, double voxel) {
   int count = 0;
   double value = exact(line.from);

@@ -109,7 +109,7 @@ Truth twoBalls(CsgOperation operation, const V3d& centreA, double radiusA, const
                double radiusB) {
   const V3d axis = (centreB - centreA).normalized();
   const double gap = (centreB - centreA).length();
-  // Position of the plane in which the surfaces meet, and radius of the circle there.
+  // Position along the axis of the plane in which the spheres meet, and radius of the circle there.
   const double plane = (gap * gap + radiusA * radiusA - radiusB * radiusB) / (2 * gap);
   const double ring = std::sqrt(radiusA * radiusA - plane * plane);
   const double heightA = radiusA - plane, heightB = radiusB - (gap - plane);
@@ -172,7 +172,8 @@ Truth filletedBalls(const V3d& centreA, double radiusA, const V3d& centreB, doub
   const Distance distance = [=](const V3d& p) {
     const V3d a = p - centreA;
     const double along = a.dot(axis), off = (a - along * axis).length();
-    // In the triangle of the three centres the fillet is nearest.
+    // Inside the triangle of the centres of both balls and of the fillet, the fillet is the nearest
+    // surface.
     const bool isBetween = along * y >= off * x && (gap - along) * y >= off * (gap - x);
     if (isBetween) return fillet - std::hypot(along - x, off - y);
     return std::min(a.length() - radiusA, (p - centreB).length() - radiusB);

@@ -8,7 +8,7 @@
 
 #include "levelset/csg/csg.h"
 
-/// Exact answers by independent formulas.
+/// Exact answers of the problems, by formulas that are independent of the operators.
 namespace regress {
 
 /// Signed distance, negative inside, world units.
@@ -20,7 +20,8 @@ struct Truth {
   std::optional<double> volume = {}, area = {};
   Imath::V3d centre = {};  ///< centre of a ball that holds the solid
   double reach = 1;        ///< radius of that ball; the rays cross it
-  /// True at points where the band is compared. Empty: all points.
+  /// Returns true at points where the band is compared with the exact distance. Empty: at all
+  /// points.
   std::function<bool(const Imath::V3d&)> compared = {};
 };
 
