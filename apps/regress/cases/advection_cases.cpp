@@ -27,20 +27,23 @@ struct Scheme {
 constexpr Scheme kSchemes[] = {{"front", AdvectScheme::Front},
                                {"semi-Lagrangian", AdvectScheme::SemiLagrangian}};
 
-/// Volume of the symmetric difference of two solids over the volume of the truth. `a` may be empty.
+/// Returns the volume of the symmetric difference of two solids, over the volume of the exact
+/// solid; 1 if `a` is empty.
 double symmetricDifference(const NarrowBand& a, const NarrowBand& b, const Truth& truth) {
   if (a.isEmpty()) return 1;
   return levelset::compare(a, b).symmetricDifference / *truth.volume;
 }
 
-/// Velocity that returns a solid to its start after `time`.
+/// Velocity that returns a solid to its initial shape and position after `time`.
 struct TimeInterval {
   VectorField velocity;
   double time;
-  bool turnsBack;  ///< true: the velocity turns back at half the time
+  bool turnsBack;  ///< true: the velocity reverses its direction at half of `time`
 };
 
-/// @param finestPeer  finest resolution at which OpenVDB runs, too
+/// Measures the advection of an exact band by all schemes, and by OpenVDB. value_error is the
+/// symmetric difference of start and end.
+/// @param finestPeer  finest resolution at which OpenVDB runs in the quick budget
 void carry(Recorder& out, const std::string& variant, const Sample& at, const Truth& truth,
            const TimeInterval& journey, int finestPeer) {
   const NarrowBand solid = exactBand(truth, at.voxelSize);
@@ -58,7 +61,8 @@ void carry(Recorder& out, const std::string& variant, const Sample& at, const Tr
   if (theirs) out.set("value_error", symmetricDifference(*theirs, solid, truth));
 }
 
-/// Measures the solid at half the time against a reference that was moved without a level set.
+/// Measures the solid at half the time, T/2 = 1.5, against a reference whose points were moved one
+/// by one, without a level set.
 void halfWay(Recorder& out, const std::string& variant, const Sample& at, const NarrowBand& solid,
              const VectorField& velocity, const NarrowBand& reference) {
   for (const Scheme& s : kSchemes)
@@ -78,7 +82,7 @@ void enright(Recorder& out) {
       return gridded(p, 0) * std::cos(std::numbers::pi * t / 3);
     };
     carry(out, "staggered grid", at, truth, {swinging, 3, true}, 0);
-    // The run stops and restarts from the band.
+    // Four advections of a quarter of T each; each starts from the band of the previous one.
     const auto halting = out.measure({"stopped at quarters", at, truth}, kOurs, [&] {
       NarrowBand band = solid;
       for (int quarter = 0; quarter < 4; ++quarter)
@@ -105,8 +109,8 @@ void vortex(Recorder& out) {
   }
 }
 
-/// Ball of radius 15 with a slot 5 wide from below up to y = 85, all lengths in hundredths. The
-/// distance is exact inside. Beyond the edges of the slot, where sphere and slot meet almost at
+/// Ball of radius 15 with a slot of width 5 from below up to y = 85, all lengths in hundredths of a
+/// unit. The distance is exact inside. Outside, near the edges where sphere and slot meet almost at
 /// right angles, its error is a few per cent.
 Truth zalesakSphere(const V3d& centre) {
   Truth truth;
@@ -158,32 +162,34 @@ void badVelocities(Recorder& out) {
     (void)levelset::advect(
         solid, [](const V3d&, double) { return V3d(std::nan("")); }, 1);
   });
-  out.expect("velocity of 1e9 for 1e-9", "the sphere moved by 1, with the error measured", [&] {
-    const NarrowBand made = levelset::advect(
-                                solid, [](const V3d&, double) { return V3d(1e9, 0, 0); }, 1e-9)
-                                .band;
-    Figures figures;
-    addErrors(made, ball(V3d(1.01, 0.02, 0.03), 1), Mesher::Ours, figures);
-    const double error = figures["surface_linf_vx"];
-    const double missed = figures["missed_hits"];
-    return std::pair{
-        isAsMeasured(error, 0.0107) && isAsMeasured(missed, 3.13e-4),
-        fmt::format("surface L∞ {:.3g} voxels, {:.3g} of the hits missed", error, missed)};
-  });
-  // No method can follow this velocity for long: a step has thousands of turns, or the sheet needs
-  // too much memory.
+  out.expect(
+      "velocity of 1e9 for 1e-9", "the sphere moved by 1, with the error as measured before", [&] {
+        const NarrowBand made = levelset::advect(
+                                    solid, [](const V3d&, double) { return V3d(1e9, 0, 0); }, 1e-9)
+                                    .band;
+        Figures figures;
+        addErrors(made, ball(V3d(1.01, 0.02, 0.03), 1), Mesher::Ours, figures);
+        const double error = figures["surface_linf_vx"];
+        const double missed = figures["missed_hits"];
+        return std::pair{
+            isAsMeasured(error, 0.0107) && isAsMeasured(missed, 3.13e-4),
+            fmt::format("surface L∞ {:.3g} voxels, {:.3g} of the hits missed", error, missed)};
+      });
+  // No scheme can follow this velocity for long: a step has thousands of turns, or the sheets that
+  // wind up need too much memory.
   out.expectRefusal("velocity of 1e9 that winds up", levelset::ExitCode::Resource, [&] {
     (void)levelset::advect(
         solid, [](const V3d& p, double) { return V3d(-p.y, p.x, 0) * (1e9 * p.length2()); }, 1,
         {.maxMemory = std::size_t{256} << 20});
   });
-  // Along the jump the front stretches without limit. A grid does not resolve the stretching.
+  // The velocity jumps across x = 0.01, where the triangles of a front are stretched without limit.
+  // The grid of the semi-Lagrangian scheme does not resolve this stretching.
   const VectorField jump = [](const V3d& p, double) { return V3d(0, p.x < 0.01 ? -1 : 1, 0); };
   out.expectRefusal("velocity with a jump, front", levelset::ExitCode::Resource,
                     [&] { (void)levelset::advect(solid, jump, 0.25); });
   out.expect(
       "velocity with a jump, semi-Lagrangian",
-      "halves moved apart by 0.5, the volume error measured, sound", [&] {
+      "halves moved apart by 0.5, the volume error as measured before, a sound band", [&] {
         const NarrowBand made =
             levelset::advect(solid, jump, 0.25, {.scheme = AdvectScheme::SemiLagrangian}).band;
         Figures figures;
@@ -242,7 +248,7 @@ Bounds vortexBounds() {
       .ceiling(0.025);
 }
 
-/// Rays that pass the edges of the slot within a fraction of a voxel can miss it or not.
+/// Rays that pass within a fraction of a voxel of an edge of the slot may hit or miss the slot.
 Bounds zalesakBounds() {
   return Bounds()
       .measured("slotted sphere, front", "surface_linf_vx",
@@ -296,54 +302,61 @@ void addAdvectionCases(std::vector<Case>& all) {
        .title = "a sphere is stretched to a sheet and returns",
        .definition =
            "Sphere of radius 0.15 at (0.35, 0.35, 0.35) in LeVeque's deformation with T = 3, the "
-           "velocity given as a function and on a staggered grid of the same voxels. At T the "
+           "velocity given as a function and on a staggered grid of the same voxels. At time T the "
            "solid is the sphere again. value: volume of the symmetric difference of start and end, "
            "over the volume of the start. A run that stops and restarts from the band at every "
            "quarter of T has no bound. At T/2 the sheet is thinnest. The reference there is a band "
-           "of 512 voxels per unit (64 in the quick budget) from points of the sphere that are "
-           "moved one by one. surface: mean and largest distance in both directions.",
+           "of 512 voxels per unit (64 in the quick budget), made from points of the sphere that "
+           "are moved one by one. surface at T/2: mean and largest distance between result and "
+           "reference, the larger of both directions.",
        .citation = "LeVeque96, Enright02",
        .quick = {20, 24, 28},
        .full = {32, 64, 128},
        .bounds = enrightBounds(),
        .run = enright});
-  all.push_back({.name = "vortex",
-                 .group = "advection, vortex",
-                 .title = "a sphere in the single vortex returns",
-                 .definition =
-                     "Sphere of radius 0.15 at (0.5, 0.75, 0.5) in the vortex of the unit square, "
-                     "T = 8, 2 in the quick budget. value as for enright.",
-                 .citation = "Bell89, LeVeque96",
-                 .quick = {16, 20, 32},
-                 .full = {32, 64, 128},
-                 .bounds = vortexBounds(),
-                 .run = vortex});
-  all.push_back({.name = "zalesak",
-                 .group = "advection, Zalesak",
-                 .title = "a slotted sphere turns once",
-                 .definition =
-                     "Sphere of radius 15 at (50, 75, 50) with a slot 5 wide up to y = 85, one "
-                     "turn about (50, 50) in 628, all lengths in hundredths. value as for enright.",
-                 .citation = "Zalesak79, Enright02",
-                 .quick = {24, 32, 50},
-                 .full = {50, 100, 200},
-                 .bounds = zalesakBounds(),
-                 .run = zalesak});
-  all.push_back({.name = "rigid-rotation",
-                 .group = "advection, rotation",
-                 .title = "cube, torus and thin plate turn once",
-                 .definition =
-                     "A cube of edge 0.6, a torus 0.35 / 0.12 and a plate two voxels thick, half a "
-                     "unit from the axis (1, 2, 3). value as for enright.",
-                 .citation = "closed form",
-                 .quick = {8, 12, 16},
-                 .full = {16, 32, 64},
-                 .bounds = rigidRotationBounds(),
-                 .run = rotate});
+  all.push_back(
+      {.name = "vortex",
+       .group = "advection, vortex",
+       .title = "a sphere in a single vortex returns to its start",
+       .definition =
+           "Sphere of radius 0.15 at (0.5, 0.75, 0.5) in the vortex of the unit square; the period "
+           "T is 8, in the quick budget 2. At time T the solid is the sphere again. value: volume "
+           "of the symmetric difference of start and end, over the volume of the start.",
+       .citation = "Bell89, LeVeque96",
+       .quick = {16, 20, 32},
+       .full = {32, 64, 128},
+       .bounds = vortexBounds(),
+       .run = vortex});
+  all.push_back(
+      {.name = "zalesak",
+       .group = "advection, Zalesak",
+       .title = "a slotted sphere turns once",
+       .definition =
+           "Sphere of radius 15 at (50, 75, 50) with a slot of width 5 up to y = 85, all lengths "
+           "in hundredths of a unit. It turns once about (50, 50) in the time 628. value: volume "
+           "of the symmetric difference of start and end, over the volume of the start.",
+       .citation = "Zalesak79, Enright02",
+       .quick = {24, 32, 50},
+       .full = {50, 100, 200},
+       .bounds = zalesakBounds(),
+       .run = zalesak});
+  all.push_back(
+      {.name = "rigid-rotation",
+       .group = "advection, rotation",
+       .title = "cube, torus and thin plate turn once",
+       .definition = "A cube of edge 0.6, a torus (ring radius 0.35, tube radius 0.12) and a plate "
+                     "two voxels thick are half a unit from the origin and turn once about the "
+                     "axis (1, 2, 3) through it. value: volume of the symmetric difference of "
+                     "start and end, over the volume of the start.",
+       .citation = "closed form",
+       .quick = {8, 12, 16},
+       .full = {16, 32, 64},
+       .bounds = rigidRotationBounds(),
+       .run = rotate});
   all.push_back({.name = "bad-velocities",
                  .group = "bad-velocities",
                  .title = "velocities of 1e9, of NaN, with a jump",
-                 .definition = "Velocities that input files or programs can give.",
+                 .definition = "Velocities that input files or programs can contain.",
                  .citation = "stated outcomes",
                  .run = badVelocities});
 }

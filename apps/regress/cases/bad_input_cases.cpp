@@ -30,14 +30,14 @@ NarrowBand solid() {
   return exactBand(ball(V3d(0.01, 0.02, 0.03), 1), kVoxel);
 }
 
-/// Builds a band with one bad value, as a program or a damaged file can contain.
+/// Builds a grid with one bad value, as a program can create it or a damaged file can contain it.
 openvdb::FloatGrid::Ptr spoiled(float value) {
   const auto grid = levelset::vdb(solid()).deepCopy();
   grid->tree().setValueOn(grid->cbeginValueOn().getCoord(), value);
   return grid;
 }
 
-/// Builds the sphere on a grid with the given, non-uniform axes.
+/// Builds the sphere on a grid whose transform has the given axes, which a band cannot have.
 openvdb::FloatGrid::Ptr onAxes(const openvdb::math::Mat4d& matrix) {
   const auto grid = levelset::vdb(solid()).deepCopy();
   grid->setTransform(openvdb::math::Transform::createLinearTransform(matrix));
@@ -47,18 +47,20 @@ openvdb::FloatGrid::Ptr onAxes(const openvdb::math::Mat4d& matrix) {
 void hugeOffsets(Recorder& out) {
   out.expectRefusal("offset to nothing", ExitCode::Input,
                     [] { (void)levelset::offset(solid(), -1.2); });
-  out.expectRefusal("offset to nothing, far", ExitCode::Input,
+  out.expectRefusal("offset by −100 to nothing", ExitCode::Input,
                     [] { (void)levelset::offset(solid(), -100); });
   // A ball of 101 radii needs about 6 × 4π (16 × 101)² voxels, or a gigabyte.
   out.expectRefusal("offset by 100 times the object under 256 MB", ExitCode::Resource, [] {
     (void)levelset::offset(solid(), 100, {.maxMemory = std::size_t{256} << 20});
   });
   if (out.isQuick()) return;
-  out.expect("the same on voxels of half the radius", "a ball of 101 radii, volume within 1 %", [] {
-    const NarrowBand grown = levelset::offset(levelset::resample(solid(), 0.5), 100);
-    const double error = levelset::measure(grown).volume / *ball(V3d(0), 101).volume - 1;
-    return std::pair{std::abs(error) <= 0.01, fmt::format("volume {:+.3g} %", 100 * error)};
-  });
+  out.expect(
+      "offset by 100 times the object on voxels of half its radius",
+      "a ball of 101 radii, volume within 1 %", [] {
+        const NarrowBand grown = levelset::offset(levelset::resample(solid(), 0.5), 100);
+        const double error = levelset::measure(grown).volume / *ball(V3d(0), 101).volume - 1;
+        return std::pair{std::abs(error) <= 0.01, fmt::format("volume {:+.3g} %", 100 * error)};
+      });
 }
 
 void emptyAndFull(Recorder& out) {
@@ -87,7 +89,7 @@ void emptyAndFull(Recorder& out) {
     grid->tree().setValueOn(openvdb::Coord(0), grid->background());
     (void)levelset::redistance(levelset::makeBand(grid));
   });
-  // No value gives the distance to the surface.
+  // All values are minus the background, so none gives the distance to a surface.
   out.expectRefusal("redistance of a block of equal values", ExitCode::Input,
                     [&] { (void)levelset::redistance(full()); });
   out.expect("redistance of a single voxel", "a sound band of one small solid", [&] {
@@ -149,7 +151,7 @@ void skewedAxes(Recorder& out) {
   out.expectRefusal("grid with left-handed axes", ExitCode::Input,
                     [&] { (void)levelset::importBand(onAxes(axes(-h, h, h, 0))); });
   const auto bakes = [&](const char* name, const M44d& matrix, double volume, const auto& isError) {
-    out.expect(name, "the measured error of the volume, a sound band", [=] {
+    out.expect(name, "the volume error as measured before, and a sound band", [=] {
       const NarrowBand made = levelset::bake(solid(), matrix, kVoxel);
       const double error = levelset::measure(made).volume / (volume * *ball(V3d(0), 1).volume) - 1;
       const bool sound = levelset::check(made).passed();
@@ -176,16 +178,18 @@ void addBadInputCases(std::vector<Case>& all) {
     all.push_back(statedCase(name, title, definition, "stated outcomes", run));
   };
   add("huge-offsets", "offsets to nothing and to a hundred times the object",
-      "A sphere of 16 voxels' radius. Impossible offsets are refused before memory is allocated. "
-      "The same offset on coarser voxels succeeds.",
+      "A sphere with a radius of 16 voxels. Impossible offsets are refused before memory is "
+      "allocated. The offset by 100 that needs too much memory succeeds on coarser voxels.",
       hugeOffsets);
   add("empty-and-full", "bands without a surface",
       "Empty bands, bands without a change of sign, a block of equal values and a single voxel.",
       emptyAndFull);
   add("damaged-grids", "NaN, infinity and a background other than the half width",
-      "Grids that a program or a damaged file can contain.", damagedGrids);
+      "Grids as programs can create them and damaged files can contain them.", damagedGrids);
   add("skewed-axes", "anisotropic, sheared and left-handed transforms",
-      "Grids with such axes are refused; solids moved by such matrices are baked.", skewedAxes);
+      "Grids with such axes are refused. A solid that is moved by such a matrix is baked: "
+      "resampled on a uniform grid.",
+      skewedAxes);
 }
 
 }  // namespace regress

@@ -30,8 +30,8 @@ constexpr std::array<Named, 3> kOperations = {{{CsgOperation::Union, "union"},
 
 const V3d kApart(0.9, 0.3, 0.2);
 
-/// Leaves out grid points within 1.5 voxels of the crease, since the crease lies between grid
-/// points.
+/// Excludes grid points within 1.5 voxels of the crease from the comparison, since the grid does
+/// not resolve the position of the crease between grid points.
 Truth awayFromCrease(Truth truth, const V3d& a, const V3d& b, double radius, double voxelSize) {
   const V3d middle = (a + b) / 2.0, axis = (b - a).normalized();
   const double ring = std::sqrt(radius * radius - (b - a).length2() / 4);
@@ -59,18 +59,21 @@ void combineBalls(Recorder& out) {
   }
 }
 
-/// Zero set of smin(a, b) in a plane that both surfaces cross at right angles [Quilez13]. Between
-/// the parts where one distance alone counts it is an arc. Along the arc a − b runs from −K to K.
+/// Zero set of smin(a, b) in a plane that both surfaces cross at right angles [Quilez13]. Where |a
+/// − b| ≥ K it is the surface of one solid alone. Between these parts it is an arc, along which a −
+/// b runs from −K to K.
 struct SmoothArc {
-  double radius = 0;                                     ///< K
-  std::function<V3d(double a, double b)> position = {};  ///< in the plane, from both distances
+  double radius = 0;  ///< K
+  std::function<V3d(double a, double b)> position =
+      {};  ///< point of the plane at the distances a and b from the two surfaces
 
   [[nodiscard]] V3d at(double difference) const {
     const double gap = radius - std::abs(difference), less = gap * gap / (4 * radius);
     return difference > 0 ? position(less + difference, less) : position(less, less - difference);
   }
 
-  /// Distance of a point in the plane: the best of 64 intervals, refined by golden sections.
+  /// Returns the distance from a point of the plane to the arc: the best of 64 intervals, refined
+  /// by golden-section search.
   [[nodiscard]] double distance(const V3d& p) const {
     constexpr int kIntervals = 64;
     const auto squared = [&](double d) { return (at(d) - p).length2(); };
@@ -108,7 +111,8 @@ Truth smoothBalls(const V3d& centreA, double radiusA, const V3d& centreB, double
     const V3d in(x, y, 0), b(apart, 0, 0);
     const double toA = in.length() - radiusA, toB = (in - b).length() - radiusB;
     double least = arc.distance(in);
-    // The nearest point of a ball counts where the other ball is K or more away.
+    // The nearest point of a ball is on the surface of the union only if the other ball is K or
+    // more away from it.
     const V3d footA = in.normalized() * radiusA, footB = b + (in - b).normalized() * radiusB;
     if ((footA - b).length() - radiusB >= radius) least = std::min(least, std::abs(toA));
     if (footB.length() - radiusA >= radius) least = std::min(least, std::abs(toB));
@@ -117,8 +121,8 @@ Truth smoothBalls(const V3d& centreA, double radiusA, const V3d& centreB, double
   return {.distance = distance, .centre = (centreA + centreB) / 2.0, .reach = apart + 1.5};
 }
 
-/// Smooth union of two half spaces with the angle θ of the free space between them, compared near
-/// the edge, which runs along z.
+/// Smooth union of two half spaces that leave the angle `degrees` of free space between them. It is
+/// compared near the edge, which runs along z.
 Truth smoothPlanes(const V3d& corner, double degrees, double radius) {
   const double half = degrees / 2 * std::numbers::pi / 180;
   const V3d normalA(std::sin(half), -std::cos(half), 0), normalB(std::sin(half), std::cos(half), 0);
@@ -139,7 +143,8 @@ Truth smoothPlanes(const V3d& corner, double degrees, double radius) {
   return truth;
 }
 
-/// A slab whose upper face goes through the corner, much larger than the blend.
+/// Slab whose upper face goes through the corner. It is much larger than the blend, so that it
+/// stands for a half space.
 Truth slabBelow(const V3d& corner, double degrees, double side) {
   Imath::M44d turn, shift;
   turn.setAxisAngle(V3d(0, 0, 1), side * (90 - degrees / 2) * std::numbers::pi / 180);
@@ -198,8 +203,8 @@ void laws(Recorder& out) {
   }
 }
 
-/// The position of the crease between grid points is known to a third of a voxel, which limits the
-/// band where the crease is nearest.
+/// The grid values determine the position of the crease only to a third of a voxel. This limits the
+/// accuracy of the band where the crease is the nearest part of the surface.
 Bounds csgBallsBounds() {
   return Bounds()
       .measured("union", "band_in_linf_vx",
@@ -294,43 +299,42 @@ void addCsgCases(std::vector<Case>& all) {
                  .full = {32, 64, 128, 256},
                  .bounds = csgBallsBounds(),
                  .run = combineBalls});
-  all.push_back(
-      {.name = "csg-laws",
-       .group = "CSG laws",
-       .title = "idempotence, commutativity, De Morgan",
-       .definition =
-           "The same balls, and a box of edge 4 around them. deviation: largest difference between "
-           "the bands of both sides, in voxels. It is zero to the bit.",
-       .citation = "set algebra",
-       .quick = {8, 12, 16},
-       .full = {16, 32, 64},
-       .bounds = csgLawsBounds(),
-       .run = laws});
-  all.push_back({.name = "smooth-csg-balls",
-                 .group = "smooth CSG",
-                 .title = "two balls flow into each other",
-                 .definition =
-                     "Balls of radius 1 and 0.8, (0.9, 0.3, 0.2) apart, and the smooth "
-                     "union with K = 0.4: the zero set of min(a, b) − max(K − |a − b|, 0)² "
-                     "/ 4K of their distances a and b. The exact distance to it is a "
-                     "minimum along its meridian.",
-                 .citation = "Dekkers04, Quilez13",
-                 .quick = {8, 16, 32},
-                 .full = {16, 32, 64},
-                 .bounds = smoothBallsBounds(),
-                 .run = smoothlyUniteBalls});
-  all.push_back({.name = "smooth-csg-planes",
-                 .group = "smooth CSG",
-                 .title = "two planes flow into each other",
-                 .definition =
-                     "Two half spaces at 60°, 90° and 120° of free space, K = 0.4: the "
-                     "smooth union is a parabola between the planes. Compared within 1 of "
-                     "the edge's middle.",
-                 .citation = "Dekkers04, Quilez13",
+  all.push_back({.name = "csg-laws",
+                 .group = "CSG laws",
+                 .title = "idempotence, commutativity, De Morgan",
+                 .definition = "A and B are the balls of csg-balls, X is a box of edge 4 around "
+                               "them. deviation: largest difference between the bands of the two "
+                               "sides of a law, in voxels. It must be exactly zero.",
+                 .citation = "set algebra",
                  .quick = {8, 12, 16},
-                 .full = {16, 24, 32},
-                 .bounds = smoothPlanesBounds(),
-                 .run = smoothlyUnitePlanes});
+                 .full = {16, 32, 64},
+                 .bounds = csgLawsBounds(),
+                 .run = laws});
+  all.push_back(
+      {.name = "smooth-csg-balls",
+       .group = "smooth CSG",
+       .title = "smooth union of two balls",
+       .definition = "The centres of balls of radius 1 and 0.8 are (0.9, 0.3, 0.2) apart. Their "
+                     "smooth union with K = 0.4 is the zero set of min(a, b) − max(K − |a − b|, "
+                     "0)² / 4K of their distances a and b, a surface of revolution. The exact "
+                     "distance is the distance to its profile curve.",
+       .citation = "Dekkers04, Quilez13",
+       .quick = {8, 16, 32},
+       .full = {16, 32, 64},
+       .bounds = smoothBallsBounds(),
+       .run = smoothlyUniteBalls});
+  all.push_back(
+      {.name = "smooth-csg-planes",
+       .group = "smooth CSG",
+       .title = "smooth union of two half spaces",
+       .definition = "Two half spaces leave 60°, 90° or 120° of free space between them; K = 0.4. "
+                     "The section of the smooth union has a parabola between the two planes. "
+                     "Points within 1 of the middle of the edge are compared.",
+       .citation = "Dekkers04, Quilez13",
+       .quick = {8, 12, 16},
+       .full = {16, 24, 32},
+       .bounds = smoothPlanesBounds(),
+       .run = smoothlyUnitePlanes});
 }
 
 }  // namespace regress

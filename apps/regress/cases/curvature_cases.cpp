@@ -27,7 +27,7 @@ constexpr Integrator kIntegrators[] = {{"auto", FlowScheme::Auto},
                                        {"explicit", FlowScheme::Explicit},
                                        {"stabilized", FlowScheme::Stabilized},
                                        {"implicit", FlowScheme::Implicit}};
-/// Integrators that are stable at any step length. Explicit steps are shortened.
+/// Integrators that are stable at any step length. The explicit integrator would shorten its steps.
 constexpr Integrator kUnlimited[] = {kIntegrators[2], kIntegrators[3]};
 
 std::string asLongAsTheBand(const Integrator& i) {
@@ -37,15 +37,16 @@ std::string asLongAsTheBand(const Integrator& i) {
 /// Longest stable step of explicit Euler, voxels².
 constexpr double kExplicitStep = 0.16;
 
-/// Options for steps of 1000 explicit ones, with a tolerance that allows any error.
+/// Returns options for steps that are 1000 times as long as the longest stable explicit step, with
+/// a tolerance that accepts any error.
 CurvatureFlowOptions longSteps(FlowScheme scheme, double voxelSize) {
   return {.scheme = scheme,
           .tolerance = 1000 * voxelSize,
           .step = 1000 * kExplicitStep * voxelSize * voxelSize};
 }
 
-/// Measures the flow of a sphere. The value is the mean distance between surface and exact surface,
-/// over the radius.
+/// Measures the flow of a sphere. value_error is the mean distance between surface and exact
+/// surface, over the exact radius.
 void shrinkSphere(Recorder& out) {
   constexpr double kTime = (1 - 0.25) / 4;  // R² = R0² − 4 t, to half the radius
   for (const Sample& at : out.samples()) {
@@ -60,8 +61,8 @@ void shrinkSphere(Recorder& out) {
       measure(i.name, kOurs,
               [&] { return levelset::curvatureFlow(solid, kTime, {.scheme = i.scheme}).band; });
     }
-    // One full step would remove the ball. Each step therefore ends where the surface leaves the
-    // band.
+    // One step of the requested length would remove the ball. Each step therefore ends when the
+    // surface would leave the band.
     for (const Integrator& i : kUnlimited) {
       if (out.isQuick() && at.phase != kQuickPhase) continue;
       measure(asLongAsTheBand(i), kOurs, [&] {
@@ -76,18 +77,19 @@ void shrinkSphere(Recorder& out) {
 /// Measured errors at the end of a flow, or limits on them.
 struct FlowErrors {
   double mean, largest;   ///< distance of the surface, voxels
-  double volume;          ///< relative
-  double missedHits = 0;  ///< share of the zeros along rays
+  double volume;          ///< relative error of the volume
+  double missedHits = 0;  ///< missing and surplus zeros along rays, over the exact zeros
   bool isLimit = false;   ///< true: limits of a run that is too long to measure
 };
 
-/// Expects a flow to take steps of 1000 explicit ones and to end with the measured errors.
+/// Expects that a flow takes steps 1000 times as long as explicit ones, and that it ends with the
+/// measured errors.
 void expectLongSteps(Recorder& out, const std::string& variant, const NarrowBand& solid,
                      double time, const CurvatureFlowOptions& options, const Truth& truth,
                      const FlowErrors& measured) {
   const std::string expected = fmt::format(
-      "steps of 1000 explicit ones; {}: surface L1 {} voxel, L∞ {}, volume {}, missed "
-      "hits {}",
+      "steps 1000 times as long as explicit ones; {}: surface L1 {} voxels, L∞ {}, volume {}, "
+      "missed hits {}",
       measured.isLimit ? "at most" : "as measured", measured.mean, measured.largest,
       measured.volume, measured.missedHits);
   out.expect(variant, expected, [&] {
@@ -106,16 +108,17 @@ void expectLongSteps(Recorder& out, const std::string& variant, const NarrowBand
     const bool isWhole = found["missing_band"] == 0 && found["checks_failed"] == 0;
     return std::pair{
         longest > 999.9 && isNear && isWhole,
-        fmt::format("{} steps, the longest of {:.1f} explicit ones; surface L1 {:.3g} voxel, L∞ "
-                    "{:.3g}, volume {:+.2e}, missed hits {:.3g}, {}",
+        fmt::format("{} steps, the longest {:.1f} times as long as an explicit one; surface L1 "
+                    "{:.3g} voxels, L∞ {:.3g}, volume {:+.2e}, missed hits {:.3g}, {}",
                     flowed.steps, longest, found["surface_l1_vx"], found["surface_linf_vx"],
                     found["volume_error"], found["missed_hits"],
-                    isWhole ? "complete" : "incomplete")};
+                    isWhole ? "no gaps, all checks passed" : "gaps or failed checks")};
   });
 }
 
-/// Solid r = a (1 + ε P2(cos θ)), θ the angle to z, ε the elongation. Its volume is that of the
-/// solid with a = 1 and ε = `kept`: a ball's volume times 1 + 3 `kept`² / 5.
+/// Solid r = a (1 + ε P2(cos θ)), θ the angle to z, ε the elongation. The radius a is such that the
+/// volume equals that of the solid with a = 1 and ε = `kept`: a ball's volume times 1 + 3 `kept`² /
+/// 5.
 Truth oval(const V3d& centre, double elongation, double kept) {
   const auto share = [](double e) { return 1 + 0.6 * e * e; };
   const double mean = std::cbrt(share(kept) / share(elongation));
@@ -138,8 +141,9 @@ void stiff(Recorder& out) {
     constexpr double kVoxelSize = 1.0 / 40, kTime = 370 * kVoxelSize * kVoxelSize;
     CurvatureFlowOptions options = longSteps(i.scheme, kVoxelSize);
     options.preservesVolume = true;
-    // To first order in ε the wave decays as exp(−4 t). The second-order term is 0.06 voxel. Steps
-    // of implicit Euler, 800 and 1000 explicit ones long, have an error of 0.1 voxel.
+    // To first order, the elongation ε decays as exp(−4 t); the neglected second-order term is 0.06
+    // voxel. Implicit Euler, with steps 800 and 1000 times as long as an explicit one, would have
+    // an error of 0.1 voxel.
     expectLongSteps(out, std::string("an oval becomes rounder, ") + i.name,
                     exactBand(oval(centre, kElongation, kElongation), kVoxelSize), kTime, options,
                     oval(centre, kElongation * std::exp(-4 * kTime), kElongation), measured);
@@ -153,8 +157,8 @@ void stiff(Recorder& out) {
   const auto expectSmaller = [&](const Integrator& i, const FlowErrors& measured) {
     constexpr double kVoxelSize = 1.0 / 256, kTime = 540 * kVoxelSize * kVoxelSize;
     const NarrowBand solid = exactBand(ball(centre, 1), kVoxelSize);
-    // Steps of Euler of that length have an error of 0.011 voxel. Each of the five redistancing
-    // passes adds a thousandth.
+    // Euler steps of that length have an error of 0.011 voxel. Each of the five redistancing passes
+    // adds 0.001 voxel.
     expectLongSteps(out, std::string("a ball of 256 voxels shrinks, ") + i.name, solid, kTime,
                     longSteps(i.scheme, kVoxelSize), ball(centre, std::sqrt(1 - 4 * kTime)),
                     measured);
@@ -165,8 +169,8 @@ void stiff(Recorder& out) {
   expectSmaller(implicit, kLimits);
 }
 
-/// Shrinks a long capsule. Its middle is a cylinder, R² = R0² − 2 t, until the effect of the ends
-/// arrives.
+/// Shrinks a long capsule. Its middle shrinks as a cylinder, R² = R0² − 2 t, until the effect of
+/// the ends arrives there.
 void shrinkCylinder(Recorder& out) {
   constexpr double kTime = (1 - 0.49) / 2 * 0.16;
   const V3d axis = V3d(1, 2, 3).normalized();
@@ -204,7 +208,7 @@ void pinch(Recorder& out) {
     // The bar of radius 0.15 vanishes by t = 0.15² / 2, the balls by t = 0.5² / 4.
     out.expect("dumb-bell at t = 0.004" + where, "one solid",
                [=] { return topology(levelset::curvatureFlow(dumbBell(h), 0.004).band, 1, 2); });
-    out.expect("dumb-bell at t = 0.02" + where, "two solids, as spheres",
+    out.expect("dumb-bell at t = 0.02" + where, "two solids with the topology of spheres",
                [=] { return topology(levelset::curvatureFlow(dumbBell(h), 0.02).band, 2, 4); });
     // The curvature of the thin tube is 1 / 0.2. The hole of the fat torus closes before its tube
     // vanishes.
@@ -242,14 +246,14 @@ void thinThings(Recorder& out) {
   };
   shrinks("plate of one voxel", box(centre, V3d(1, 1, kVoxelSize)));
   shrinks("needle of one voxel", capsule(centre - V3d(0.5), centre + V3d(0.5), kVoxelSize / 2));
-  out.expectRefusal("sphere past its end", levelset::ExitCode::Input, [=] {
+  out.expectRefusal("sphere beyond the time at which it vanishes", levelset::ExitCode::Input, [=] {
     (void)levelset::curvatureFlow(exactBand(ball(centre, 0.5), kVoxelSize), 1);
   });
 }
 
-/// The error of the steps is up to 0.02 voxel; explicit steps have 0.22 voxel over the radius in
-/// voxels. Each redistancing pass adds a thousandth. Steps as long as the band are of second order:
-/// steps of Euler that cross a voxel and a half have an error of 0.75 voxel.
+/// The time steps have an error of up to 0.02 voxel, explicit steps one of 0.22 voxel divided by
+/// the radius in voxels. Each redistancing pass adds 0.001 voxel. Steps as long as the band must be
+/// of second order: Euler steps in which the surface moves 1.5 voxels have an error of 0.75 voxel.
 Bounds curvatureSphereBounds() {
   return Bounds()
       .measured("auto", "value_error", {{6, 0.00534}, {8, 0.00194}, {12, 0.00184}})
@@ -307,26 +311,27 @@ Bounds curvatureCylinderBounds() {
 }  // namespace
 
 void addCurvatureCases(std::vector<Case>& all) {
-  all.push_back({.name = "curvature-sphere",
-                 .group = "curvature flow",
-                 .title = "a sphere shrinks to half its radius",
-                 .definition =
-                     "φ_t = κ|∇φ|, κ = k1 + k2: a sphere of radius 1 obeys R² = 1 − 4t. Each "
-                     "integrator shrinks it to R = 1/2. Steps of 1000 explicit ones do so as well; "
-                     "they end where the surface leaves the band, after a voxel and a half. value: "
-                     "mean distance between surface and exact surface, over the radius.",
-                 .citation = "Meyer14, Smereka03",
-                 .quick = {6, 8, 12},
-                 .full = {16, 32, 64},
-                 .bounds = curvatureSphereBounds(),
-                 .run = shrinkSphere});
+  all.push_back(
+      {.name = "curvature-sphere",
+       .group = "curvature flow",
+       .title = "a sphere shrinks to half its radius",
+       .definition =
+           "φ_t = κ|∇φ|, κ = k1 + k2: a sphere of radius 1 obeys R² = 1 − 4t. Each integrator "
+           "shrinks it to R = 1/2. Further variants request steps 1000 times as long as explicit "
+           "ones; these end when the surface would leave the band, after 1.5 voxels. value: mean "
+           "distance between surface and exact surface, over the radius.",
+       .citation = "Meyer14, Smereka03",
+       .quick = {6, 8, 12},
+       .full = {16, 32, 64},
+       .bounds = curvatureSphereBounds(),
+       .run = shrinkSphere});
   all.push_back(
       {.name = "curvature-cylinder",
        .group = "curvature flow of a cylinder",
        .title = "the middle of a long capsule shrinks as a cylinder",
        .definition =
-           "Capsule of radius 0.4 and length 3 about (1, 2, 3): in its middle R² = 0.16 − "
-           "2t, to R = 0.28. value: largest error of the band inside, over the radius.",
+           "A capsule of radius 0.4 and length 3 along (1, 2, 3) shrinks: in its middle R² = 0.16 "
+           "− 2t, until R = 0.28. value: largest error of the band inside, over the radius.",
        .citation = "Meyer14, Smereka03",
        .quick = {8, 10, 16},
        .full = {16, 32, 64},
@@ -337,14 +342,16 @@ void addCurvatureCases(std::vector<Case>& all) {
     all.push_back(statedCase(name, title, definition, "stated outcomes; Smereka03", run));
   };
   add("curvature-topology", "a dumb-bell pinches, tori shrink and close",
-      "Balls of radius 0.5 joined by a bar of radius 0.15; tori 0.8 / 0.2 and 0.6 / 0.5.", pinch);
-  add("curvature-stiff", "steps of 1000 explicit ones",
-      "A solid r = 1 + 0.04 P2(cos θ), 40 voxels per unit, keeps its volume until t = 0.23 (370 "
-      "voxels²). The wave has then decayed to exp(−4 t). A ball of 256 voxels shrinks for 540 "
-      "voxels² (full budget).",
+      "Two balls of radius 0.5 joined by a bar of radius 0.15, and tori with ring / tube radii 0.8 "
+      "/ 0.2 and 0.6 / 0.5. The topology after the flow is stated.",
+      pinch);
+  add("curvature-stiff", "time steps 1000 times as long as explicit ones",
+      "A solid r = 1 + ε P2(cos θ) with ε = 0.04, 40 voxels per unit, flows until t = 0.23 (370 "
+      "voxels²) and keeps its volume. By then ε has decayed by the factor exp(−4 t). In the full "
+      "budget, a ball of radius 256 voxels also shrinks for 540 voxels².",
       stiff);
-  add("curvature-thin", "a plate and a needle of one voxel, a sphere past its end",
-      "Solids that curvature flow removes at once.", thinThings);
+  add("curvature-thin", "a plate and a needle one voxel thick, and a sphere that vanishes",
+      "Solids so thin that curvature flow shrinks or removes them at once.", thinThings);
 }
 
 }  // namespace regress

@@ -30,8 +30,9 @@ constexpr std::array<Front, 4> kFronts = {{{"marching, order 1", FrontMethod::Ma
                                            {"sweeping, order 1", FrontMethod::Sweeping, 1},
                                            {"sweeping, order 2", FrontMethod::Sweeping, 2}}};
 
-/// Region that a front from a point must have reached. Times within `margin` voxels, at speed 1, of
-/// the latest are left out.
+/// Returns the region that a front from a point must have reached at the time `until`. The last
+/// `margin` voxels, as times at speed 1, are left out.
+/// @param fastest, slowest  largest and smallest speed in the region
 Region reachedRegion(const Distance& exact, double until, const Sample& at, double margin,
                      double fastest, double slowest) {
   return {.value = exact,
@@ -42,8 +43,8 @@ Region reachedRegion(const Distance& exact, double until, const Sample& at, doub
           .extent = until * fastest};
 }
 
-/// Errors of arrival times at active grid points, in voxels at speed 1, and the share of the
-/// region's grid points without a time.
+/// Returns the errors of arrival times at active grid points, as distances at speed 1, and the
+/// share of the region's grid points without a time.
 Figures timeErrors(const levelset::FieldGrid& times, const Region& region, double voxelSize) {
   double sum = 0, largest = 0, count = 0;
   const openvdb::FloatGrid& grid = *times.shared()->scalar;
@@ -99,8 +100,9 @@ void fromPointWithGradient(Recorder& out) {
       return std::acosh(1 + slope.length2() * (p - at.shift).length2() / (2 * speed(p))) /
              slope.length();
     };
-    // Along g the front reaches (exp(0.8 |g|) − 1) / |g| = 1.03. Against g it reaches points where
-    // the speed is 0.61, and the blocks around those extend to a speed of 0.35.
+    // In the direction of g the front advances by (exp(0.8 |g|) − 1) / |g| = 1.03. Against g it
+    // reaches points where the speed is 0.61; the blocks around these points extend to a speed of
+    // 0.35.
     const Region reached = reachedRegion(exact, 0.8, at, 1, 1.3, 0.35);
     for (const Front& front : kFronts) {
       const ArrivalOptions options{.method = front.method, .order = front.order, .speed = speed};
@@ -163,7 +165,7 @@ void throughMedia(Recorder& out) {
 
 void fromSurface(Recorder& out) {
   for (const Sample& at : out.samples()) {
-    // The same distance as in OpenVDB: eight voxels beyond a band of three.
+    // The fronts extend a band of three voxels by eight, as OpenVDB's dilateSdf does below.
     const double reach = 11 * at.voxelSize;
     const auto measure = [&](const std::string& name, const Truth& truth) {
       const NarrowBand solid = exactBand(truth, at.voxelSize);
@@ -177,7 +179,7 @@ void fromSurface(Recorder& out) {
         out.measure({name, at, truth}, peer::kDilate, [&] { return peer::dilate(solid, 8); });
     };
     measure("sphere", ball(at.shift, 1));
-    // Fronts that meet halfway leave a crease.
+    // The fronts of the two spheres meet halfway, where the distance has a crease.
     measure("two spheres", apart(ball(at.shift, 0.6), ball(at.shift + V3d(1.3, 0.2, 0.1), 0.6)));
   }
 }
@@ -313,59 +315,61 @@ Bounds closestPointBounds() {
 }  // namespace
 
 void addEikonalCases(std::vector<Case>& all) {
-  all.push_back({.name = "eikonal-point",
-                 .group = "eikonal, point source",
-                 .title = "arrival times from a point",
-                 .definition = "|∇T| = 1 from one point between the grid points, out to T = 1. The "
-                               "singularity at the source costs first-order schemes O(h log h). "
-                               "The second-order schemes factor it out and lose nothing.",
-                 .citation = "Sethian99, Zhao05, Treister16",
-                 .quick = {6, 8, 12},
-                 .full = {16, 32, 64},
-                 .bounds = eikonalPointBounds(),
-                 .run = fromPoint});
-  all.push_back({.name = "eikonal-gradient",
-                 .group = "eikonal, gradient",
-                 .title = "arrival times from a point where the speed is linear",
-                 .definition =
-                     "F = 1 + (0.5, 0.3, 0.2)·(x − s) from one point s between the grid "
-                     "points, out to T = 0.8: T = acosh(1 + |g|² |x − s|² / (2 F)) / |g|.",
-                 .citation = "Treister16",
-                 .quick = {8, 12, 16},
-                 .full = {16, 32, 64},
-                 .bounds = eikonalGradientBounds(),
-                 .run = fromPointWithGradient});
-  all.push_back({.name = "eikonal-media",
-                 .group = "eikonal, two media",
-                 .title = "slow and fast inclusions",
-                 .definition =
-                     "A point source 0.25 below a plane beyond which the speed is 0.5 or 2, 1 "
-                     "before, out to T = 0.6. The exact times follow from Fermat's principle: rays "
-                     "refracted by Snell's law, and the head wave that a faster medium sends back.",
-                 .citation = "Sethian99, Zhao05",
-                 .quick = {12, 16, 24},
-                 .full = {32, 64, 128},
-                 .bounds = eikonalMediaBounds(),
-                 .run = throughMedia});
-  all.push_back({.name = "eikonal-surface",
-                 .group = "eikonal, from a surface",
-                 .title = "a sphere and two spheres, widened by fronts by eight voxels",
-                 .definition =
-                     "The exact band of a sphere of radius 1, and of two of radius 0.6 whose "
-                     "fronts meet, half width 3, is continued by eight voxels to eleven on both "
-                     "sides.",
-                 .citation = "Sethian99, Zhao05",
-                 .quick = {8, 12, 24},
-                 .full = {16, 32, 64},
-                 .bounds = eikonalSurfaceBounds(),
-                 .run = fromSurface});
+  all.push_back(
+      {.name = "eikonal-point",
+       .group = "eikonal, point source",
+       .title = "arrival times from a point",
+       .definition = "|∇T| = 1 from one point between the grid points, out to T = 1. The "
+                     "singularity at the source gives first-order schemes an error of O(h log h). "
+                     "The second-order schemes factor the singularity out and keep their order.",
+       .citation = "Sethian99, Zhao05, Treister16",
+       .quick = {6, 8, 12},
+       .full = {16, 32, 64},
+       .bounds = eikonalPointBounds(),
+       .run = fromPoint});
+  all.push_back(
+      {.name = "eikonal-gradient",
+       .group = "eikonal, gradient",
+       .title = "arrival times from a point where the speed is linear",
+       .definition = "F = 1 + (0.5, 0.3, 0.2)·(x − s) from one point s between the grid points, up "
+                     "to T = 0.8. The exact time is T = acosh(1 + |g|² |x − s|² / (2 F)) / |g|.",
+       .citation = "Treister16",
+       .quick = {8, 12, 16},
+       .full = {16, 32, 64},
+       .bounds = eikonalGradientBounds(),
+       .run = fromPointWithGradient});
+  all.push_back(
+      {.name = "eikonal-media",
+       .group = "eikonal, two media",
+       .title = "slower and faster media beyond a plane",
+       .definition =
+           "A point source lies 0.25 below a plane. The speed is 1 below the plane and 0.5 or 2 "
+           "above it; times go up to T = 0.6. The exact times follow from Fermat's principle: rays "
+           "refracted by Snell's law, and the head wave that a faster medium sends back.",
+       .citation = "Sethian99, Zhao05",
+       .quick = {12, 16, 24},
+       .full = {32, 64, 128},
+       .bounds = eikonalMediaBounds(),
+       .run = throughMedia});
+  all.push_back(
+      {.name = "eikonal-surface",
+       .group = "eikonal, from a surface",
+       .title = "bands of one and of two spheres, extended by fronts by eight voxels",
+       .definition =
+           "The exact band, half width 3, of a sphere of radius 1, and of two spheres of radius "
+           "0.6 whose fronts meet, is extended by eight voxels to a half width of eleven.",
+       .citation = "Sethian99, Zhao05",
+       .quick = {8, 12, 24},
+       .full = {16, 32, 64},
+       .bounds = eikonalSurfaceBounds(),
+       .run = fromSurface});
   all.push_back(
       {.name = "closest-point",
        .group = "closest point",
        .title = "closest points of a sphere and a torus",
-       .definition =
-           "Closest points at the grid points of a band. surface: exact distance of the closest "
-           "points to the surface. value: largest distance to the exact closest point, voxels.",
+       .definition = "Closest points at the grid points of a band. surface: exact distance of the "
+                     "computed closest points to the surface. value: largest distance of a "
+                     "computed closest point to the exact one, voxels.",
        .citation = "Chopp01, Saye14",
        .quick = {8, 12, 24},
        .full = {16, 32, 64},

@@ -44,11 +44,13 @@ void halfWidths(Recorder& out) {
       const Truth truth = ball(at.shift, 1);
       const NarrowBand field = exactBand(truth, at.voxelSize, width);
       std::string name = "half width " + std::to_string(width).substr(0, width > 9 ? 2 : 3);
-      // At the centre every point of the sphere is equally near.
+      // With a half width of 50, the band contains the centre of the sphere, where the closest
+      // point is not unique.
       out.measure({name, at, truth}, kOurs,
                   [&] { return levelset::redistance(field, {.halfWidth = width}); });
     }
-    // Redistancing widens a band of three voxels to ten and narrows it again.
+    // Redistancing widens a band with a half width of three voxels to ten voxels and narrows it
+    // again.
     Truth truth = ball(at.shift, 1);
     const NarrowBand narrow = exactBand(truth, at.voxelSize, 3);
     out.measure({"background 10 voxels, band 3", at, truth}, kOurs, [&] {
@@ -70,8 +72,8 @@ Truth spindle(const V3d& centre, double radius, double tube) {
     const double away = std::hypot(q.x, q.y), up = std::abs(q.z);
     const double toRing = std::hypot(away - radius, up);
     if (toRing >= tube) return toRing - tube;
-    // Inside, the closest point lies on the outer arc where its foot is on this side of the axis,
-    // else at the tip.
+    // Inside, the closest point is the foot on the tube's circle if this foot lies on the same side
+    // of the axis, otherwise the tip on the axis.
     const double foot = toRing > 0 ? radius + (away - radius) / toRing * tube : radius + tube;
     const double toTip = std::hypot(away, up - tip);
     return -(foot >= 0 ? std::min(tube - toRing, toTip) : toTip);
@@ -97,14 +99,15 @@ void pastTheAxis(Recorder& out) {
       const std::string name = touching ? "balls that touch" : "balls 0.3 voxels apart";
       const V3d middle = (a + b) / 2.0;
       Truth judged = pair;
-      // Between the poles no grid point separates the two surfaces.
+      // Near the contact, no grid point lies between the two surfaces.
       judged.compared = [=](const V3d& p) { return (p - middle).length() > 4 * at.voxelSize; };
       out.measure({"union of " + name, at, judged}, kOurs, [&] {
         return levelset::unite(exactBand(ball(a, 0.5), at.voxelSize),
                                exactBand(ball(b, 0.5), at.voxelSize));
       });
     }
-    // Faces in one plane, on and between grid points.
+    // Boxes with faces in one plane, which lies on or between grid points, depending on the
+    // placement.
     const V3d half(0.5, 1, 1), at0 = at.shift;
     out.measure({"boxes that share a face, united", at, box(at0 + V3d(0.25, 0, 0), V3d(1, 1, 1))},
                 kOurs, [&] {
@@ -122,7 +125,7 @@ void pastTheAxis(Recorder& out) {
 }
 
 void tenMillion(Recorder& out) {
-  // A band has 4 π R² 2w voxels: ten million at R = 365, w = 3.
+  // A band with the half width w has 4 π R² 2w voxels: ten million at R = 365, w = 3, in voxels.
   if (out.isQuick()) return;
   const Sample at{365, 3, 1.0 / 365, subVoxelPhases()[3] / 365};
   const Truth truth = ball(at.shift, 1);
@@ -290,7 +293,7 @@ Bounds tenMillionBounds() {
 void addExtremeCases(std::vector<Case>& all) {
   all.push_back({.name = "scales",
                  .group = "scales",
-                 .title = "tiny voxels, huge ones, and far from the origin",
+                 .title = "tiny and huge voxels, and a sphere far from the origin",
                  .definition =
                      "A sphere is sampled, re-distanced and grown by three voxels: with voxels of "
                      "1, 1e-6 and 1e6, and with its centre 1e6 voxels from the origin along each "
@@ -300,26 +303,27 @@ void addExtremeCases(std::vector<Case>& all) {
                  .full = {16, 32, 64},
                  .bounds = scalesBounds(),
                  .run = scales});
-  all.push_back({.name = "half-widths",
-                 .group = "half widths",
-                 .title = "bands of 1 to 50 voxels",
-                 .definition =
-                     "A sphere of radius 1 with half widths of 1, 1.5, 3 and 50 voxels is "
-                     "re-distanced; a band of 3 is widened to 10 and narrowed again.",
-                 .citation = "closed form",
-                 .quick = {6, 8, 12},
-                 .full = {16, 32, 64},
-                 .bounds = halfWidthsBounds(),
-                 .run = halfWidths});
+  all.push_back(
+      {.name = "half-widths",
+       .group = "half widths",
+       .title = "bands with half widths of 1 to 50 voxels",
+       .definition =
+           "A sphere of radius 1 with half widths of 1, 1.5, 3 and 50 voxels is re-distanced; a "
+           "band of half width 3 is widened to 10 voxels and narrowed again.",
+       .citation = "closed form",
+       .quick = {6, 8, 12},
+       .full = {16, 32, 64},
+       .bounds = halfWidthsBounds(),
+       .run = halfWidths});
   all.push_back(
       {.name = "contact",
        .group = "contact",
        .title = "surfaces that meet, touch and coincide",
        .definition =
-           "A torus 0.6 / 0.2 offset by 0.6, past the axis, so that its hole closes. Balls of "
-           "radius 0.5 that touch in a point or are 0.3 voxels apart, united and compared beyond 4 "
-           "voxels from the contact. Boxes with one or three faces in one plane, united and "
-           "subtracted.",
+           "A torus (ring radius 0.6, tube radius 0.2) is offset by 0.6 beyond its axis, so that "
+           "its hole closes. Balls of radius 0.5 that touch in a point or are 0.3 voxels apart, "
+           "are united and compared where the contact is more than 4 voxels away. Boxes with one "
+           "or three pairs of coplanar faces are united and subtracted.",
        .citation = "closed form",
        .quick = {12, 16, 24},
        .full = {16, 32, 64},

@@ -41,8 +41,8 @@ Wedge wedge(double degrees, const V3d& corner, double size) {
   return {half, slab(1), slab(-1)};
 }
 
-/// Distance from the circle's centre to the surface along a line. NaN where no surface is within
-/// `reach` of the expected distance.
+/// Finds the distance from the centre `from` of the fillet's circle to the surface along a
+/// direction. NaN if the surface is not within `reach` of the expected distance.
 double crossing(const levelset::BandSampler& phi, const V3d& from, const V3d& direction,
                 double expected, double reach) {
   double low = expected - reach, high = expected + reach;
@@ -55,7 +55,8 @@ double crossing(const levelset::BandSampler& phi, const V3d& from, const V3d& di
   return 0.5 * (low + high);
 }
 
-/// Largest relative error of the fillet's radius over its arc, on several sections.
+/// Returns the largest relative error of the fillet's radius over its arc, on several sections
+/// across the edge. NaN if the surface is not found.
 double radiusError(const NarrowBand& band, const Wedge& w, const V3d& corner, double radius) {
   const levelset::BandSampler phi(band, levelset::Interpolation::Tricubic);
   const V3d centre = corner + V3d(radius / std::sin(w.half), 0, 0);
@@ -73,8 +74,8 @@ double radiusError(const NarrowBand& band, const Wedge& w, const V3d& corner, do
   return worst;
 }
 
-/// Largest change of φ beyond r / tan(θ/2) from the edge, in voxels. A grid point counts at its
-/// closest point on the surface.
+/// Returns the largest change of φ by the blend, in voxels, at grid points whose closest point on
+/// the surface is further than `reach` from the edge.
 double changeBeyond(const NarrowBand& blended, const NarrowBand& plain, const V3d& corner,
                     double reach) {
   constexpr double kMargin = 0.1;  // voxels
@@ -121,18 +122,19 @@ void roundWedges(Recorder& out) {
   }
 }
 
-/// Largest relative error of the radius between crossed cylinders of radius R along x and y through
-/// one point. A ball that touches both from outside rolls along the ellipses |x| = |y|, x² + z² =
-/// (R + r)².
+/// Returns the largest relative error of the fillet's radius r between crossed cylinders of radius
+/// R, with axes along x and y through one point. NaN if the surface is not found. A ball that
+/// touches both from outside rolls along the ellipses |x| = |y|, x² + z² = (R + r)².
 double crossedError(const NarrowBand& band, const V3d& centre, double cylinderRadius,
                     double radius) {
   const levelset::BandSampler phi(band, levelset::Interpolation::Tricubic);
   const double sum = cylinderRadius + radius;
   double worst = 0;
   for (int i = -6; i <= 6; ++i) {
-    const double angle = 0.12 * i;  // from the middle between top and bottom
+    const double angle = 0.12 * i;  // parameter of the ellipse; 0 in the plane z = 0
     const V3d s(sum * std::cos(angle), sum * std::cos(angle), sum * std::sin(angle));
-    // The ball touches the cylinders in the directions of their axes.
+    // Directions from the centre of the ball to the axes of the cylinders, in which it touches
+    // them.
     const V3d toFirst = V3d(0, -s.y, -s.z).normalized(), toSecond = V3d(-s.x, 0, -s.z).normalized();
     for (const double t : {0.25, 0.5, 0.75}) {
       const V3d direction = (toFirst * (1 - t) + toSecond * t).normalized();
@@ -262,37 +264,35 @@ void addFilletCases(std::vector<Case>& all) {
        .group = "fillets",
        .title = "the fillet between planes at 45°, 90° and 135°",
        .definition =
-           "Two slabs meet at the angle θ of the free space between them; their union is rounded "
-           "with radius r = 1, resolution is voxels per radius. value: largest relative error of "
-           "the radius over the arc. deviation: change of φ beyond r / tan(θ/2) "
-           "from the edge, voxels.",
+           "Two slabs enclose the angle θ of free space; their union is rounded with radius r = 1, "
+           "so the resolution is in voxels per radius. value: largest relative error of the radius "
+           "over the arc. deviation: change of φ beyond r / tan(θ/2) from the edge, voxels.",
        .citation = "closed form; Rossignac84",
        .quick = {2, 3, 4},
        .full = {4, 8, 16},
        .bounds = filletPlanesBounds(),
        .run = roundWedges});
-  all.push_back(
-      {.name = "fillet-cylinders",
-       .group = "fillets of cylinders",
-       .title = "the fillet between crossed cylinders",
-       .definition =
-           "Cylinders of radius 1.5 along x and y, their union rounded with radius 1. The "
-           "ball rolls along two ellipses. value: largest relative error of the radius "
-           "about the middle of one of them; cavities: no void may remain between the fillet and "
-           "the seam.",
-       .citation = "closed form; Rossignac84",
-       .quick = {3, 4, 5},
-       .full = {4, 8, 16},
-       .bounds = filletCylindersBounds(),
-       .run = roundCylinders});
+  all.push_back({.name = "fillet-cylinders",
+                 .group = "fillets of cylinders",
+                 .title = "the fillet between crossed cylinders",
+                 .definition =
+                     "Cylinders of radius 1.5 along x and y, their union rounded with radius 1. "
+                     "The ball of the fillet rolls along two ellipses. value: largest relative "
+                     "error of the radius along the middle part of one ellipse; cavities: no void "
+                     "may remain between the fillet and the seam.",
+                 .citation = "closed form; Rossignac84",
+                 .quick = {3, 4, 5},
+                 .full = {4, 8, 16},
+                 .bounds = filletCylindersBounds(),
+                 .run = roundCylinders});
   all.push_back(
       {.name = "fillet-balls",
        .group = "fillets of balls",
-       .title = "the fillet between two balls, and all distances",
+       .title = "the fillet between two balls, and the distances of its band",
        .definition =
-           "Balls of radius 1 and 0.7 whose centres are 1.16 apart, their union rounded "
-           "with radius 0.5: a solid of revolution with an arc between two. Resolution is "
-           "voxels per radius of the larger ball.",
+           "Balls of radius 1 and 0.7 whose centres are 1.16 apart, their union rounded with "
+           "radius 0.5: a solid of revolution, in whose profile the arc of the fillet joins the "
+           "arcs of the balls. The resolution is in voxels per radius of the larger ball.",
        .citation = "closed form; Rossignac84",
        .quick = {10, 14, 20},
        .full = {16, 24, 32},

@@ -50,7 +50,7 @@ void convertMeshes(Recorder& out) {
       if (out.wantsPeer(at, 16))
         out.measure(subject, peer::kMesh, [&] { return peer::fromMesh(mesh, at.voxelSize); });
     }
-    // The error of a round trip is the error of the mesh between.
+    // Distances to a mesh are exact, so the error of a round trip is the error of the mesh.
     const Truth ring = torus(at.shift, V3d(1, 2, 3), 0.35, 0.15);
     const levelset::NarrowBand exact = exactBand(ring, at.voxelSize);
     const Subject subject{"torus and back", at, ring};
@@ -63,7 +63,7 @@ void convertMeshes(Recorder& out) {
   }
 }
 
-/// Distance of a point to a mesh, at most `reach`.
+/// Returns the distance of a point to a mesh, at most `reach`; world units.
 double distanceTo(const TriMesh& mesh, const V3d& point, double reach) {
   double nearest = reach * reach;
   for (const auto& t : mesh.triangles) {
@@ -158,21 +158,23 @@ Bounds sharpMeshBounds() {
 }  // namespace
 
 void addMeshCases(std::vector<Case>& all) {
-  all.push_back({.name = "mesh-round-trip",
-                 .group = "mesh conversion",
-                 .title = "meshes to distances, and distances to meshes and back",
-                 .definition = "A cube of edge 1 made of twelve triangles, aligned with the grid "
-                               "and rotated, becomes a band, whose distances are known exactly. An "
-                               "exact band of a torus 0.35 / 0.15 becomes a mesh and a band again.",
-                 .citation = "closed forms; Jones95",
-                 .quick = {12, 16, 24},
-                 .full = {32, 64, 128},
-                 .bounds = meshRoundTripBounds(),
-                 .run = convertMeshes});
+  all.push_back(
+      {.name = "mesh-round-trip",
+       .group = "mesh conversion",
+       .title = "conversion of meshes to bands, and of a band to a mesh and back",
+       .definition =
+           "A cube of edge 1 made of twelve triangles, aligned with the grid and rotated, becomes "
+           "a band, whose distances are known exactly. An exact band of a torus (ring radius 0.35, "
+           "tube radius 0.15) becomes a mesh and a band again.",
+       .citation = "closed forms; Jones95",
+       .quick = {12, 16, 24},
+       .full = {32, 64, 128},
+       .bounds = meshRoundTripBounds(),
+       .run = convertMeshes});
   all.push_back(
       {.name = "sharp-mesh",
        .group = "meshing",
-       .title = "edges and corners of a rotated cube",
+       .title = "edges and corners of the mesh of a rotated cube",
        .definition =
            "The exact band of a rotated cube of edge 1 becomes a mesh, uniform and sharp. "
            "value: largest distance of the cube's corners, and of 17 points on each "

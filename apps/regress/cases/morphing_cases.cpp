@@ -15,8 +15,8 @@ using levelset::NarrowBand;
 
 namespace {
 
-/// Largest ratio of a difference to the one before it. A ratio below 1 means that the differences
-/// fall strictly.
+/// Returns the largest ratio of a difference to its predecessor. A ratio below 1 means that the
+/// differences fall strictly.
 double mostLeft(const std::vector<double>& differences) {
   double most = 0;
   for (std::size_t i = 1; i < differences.size(); ++i)
@@ -24,8 +24,8 @@ double mostLeft(const std::vector<double>& differences) {
   return most;
 }
 
-/// Largest allowed ratio. The first of twenty even steps leaves 0.95 of the difference, each later
-/// step less.
+/// Largest accepted result of mostLeft(). The first of twenty even steps leaves 0.95 of the
+/// difference, and each later step leaves a smaller ratio.
 constexpr double kMostLeft = 0.99;
 
 void morphShapes(Recorder& out) {
@@ -55,7 +55,7 @@ void morphShapes(Recorder& out) {
       std::vector<double> differences{levelset::compare(from, to).symmetricDifference};
       for (const NarrowBand& step : kept)
         differences.push_back(levelset::compare(step, to).symmetricDifference);
-      // A step that was not kept counts as one that does not fall.
+      // If a step is missing, the value is 1, which misses the bound.
       const bool isWhole = static_cast<int>(kept.size()) == steps;
       out.set("value_error", isWhole ? mostLeft(differences) : 1);
     }
@@ -109,12 +109,13 @@ void addMorphCases(std::vector<Case>& all) {
   all.push_back(
       {.name = "morph",
        .group = "morphing",
-       .title = "sphere, cube and torus into each other",
+       .title = "morphs between a sphere, a cube and a torus",
        .definition =
-           "Sphere of radius 0.8, cube of edge 1.3 and torus 0.7 / 0.3 about one point, "
-           "and a sphere shifted by (0.5, 0.3, 0.2), in 20 kept steps, 5 in the quick "
-           "budget. value: largest ratio of the volume by which a step differs from the target to "
-           "that of the step before. A disjoint target is refused, except in one step.",
+           "Morphs between a sphere of radius 0.8, a cube of edge 1.3 and a torus (ring radius "
+           "0.7, tube radius 0.3) about one point, and to a sphere shifted by (0.5, 0.3, 0.2), in "
+           "20 steps, 5 in the quick budget. The symmetric difference of a step and the target "
+           "must fall from step to step. value: largest ratio of its volume to that of the "
+           "previous step. A disjoint target is refused, except in one step.",
        .citation = "closed forms; Museth02",
        .quick = {5, 6, 8},
        .full = {16, 32, 64},

@@ -34,7 +34,8 @@ void openAndClose(Recorder& out) {
       out.measure({"closing of a box", at, cuboid}, peer::kFilter,
                   [&] { return peer::offset(peer::offset(solid, kRadius), -kRadius); });
     }
-    // Opening removes a bar thinner than the ball. The balls at its ends stay unchanged.
+    // Opening removes a bar that is thinner than the ball of the opening. The balls at the ends of
+    // the bar stay unchanged.
     const Truth one = ball(at.shift, 0.5), other = ball(at.shift + V3d(1.5, 0, 0), 0.5);
     const NarrowBand joined =
         levelset::unite(exactBand(apart(one, other), h),
@@ -55,7 +56,7 @@ void openAndClose(Recorder& out) {
                        fmt::format("{} solids, {} cavities, {}", m.components, m.cavities,
                                    sound ? "sound" : "not sound")};
     });
-    out.expectRefusal("opening by more than fits" + where, levelset::ExitCode::Input,
+    out.expectRefusal("opening by a ball that does not fit" + where, levelset::ExitCode::Input,
                       [&] { (void)levelset::opening(pair, 0.4); });
   }
 }
@@ -146,15 +147,17 @@ void addMorphologyCases(std::vector<Case>& all) {
                  .full = {32, 64, 128},
                  .bounds = openingClosingBounds(),
                  .run = openAndClose});
-  all.push_back({.name = "shell",
-                 .group = "shell",
-                 .title = "the wall of a sphere",
-                 .definition = "A sphere of radius 1 hollowed to a wall of 0.25.",
-                 .citation = "closed form",
-                 .quick = {12, 16, 24},
-                 .full = {16, 32, 64},
-                 .bounds = shellBounds(),
-                 .run = hollow});
+  all.push_back(
+      {.name = "shell",
+       .group = "shell",
+       .title = "hollowing a sphere to a wall",
+       .definition =
+           "A sphere of radius 1 is hollowed to a wall of thickness 0.25 inside its surface.",
+       .citation = "closed form",
+       .quick = {12, 16, 24},
+       .full = {16, 32, 64},
+       .bounds = shellBounds(),
+       .run = hollow});
 }
 
 }  // namespace regress

@@ -225,7 +225,7 @@ void addOffsetCases(std::vector<Case>& all) {
        .run = offsetSphere});
   all.push_back({.name = "offset-cube",
                  .group = "offset of a cube",
-                 .title = "a cube shrinks to a cube and grows to a rounded one",
+                 .title = "a cube shrinks to a cube and grows to a rounded cube",
                  .definition =
                      "The exact band of a cube of edge 1, aligned with the grid and rotated. The "
                      "inward offset by 5 voxels is the smaller cube with sharp edges and corners. "
@@ -238,9 +238,10 @@ void addOffsetCases(std::vector<Case>& all) {
   all.push_back({.name = "offset-laws",
                  .group = "offset laws",
                  .title = "two offsets equal one offset by their sum; out and back gives the solid",
-                 .definition =
-                     "Sphere of radius 1 and box 1.6 × 1.2 × 0.8: +3 then +4 voxels must equal +7 "
-                     "(deviation). +5 then −5 must give the solid, since both solids are convex.",
+                 .definition = "Sphere of radius 1 and box 1.6 × 1.2 × 0.8: offsets by +3 and then "
+                               "+4 voxels must equal one offset by +7; deviation: largest "
+                               "difference between the two bands, voxels. Offsets by +5 and then "
+                               "−5 voxels must give the solid again, since both solids are convex.",
                  .citation = "closed form",
                  .quick = {6, 8, 12},
                  .full = {16, 32, 64},

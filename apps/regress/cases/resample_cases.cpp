@@ -11,7 +11,7 @@ using levelset::NarrowBand;
 
 namespace {
 
-/// Resamples `times` times to voxels of 0.8 times the size and back.
+/// Resamples a band to voxels of 0.8 times the size and back, `times` times.
 template <typename Resample>
 NarrowBand chain(NarrowBand band, double voxelSize, int times, const Resample& resample) {
   for (int i = 0; i < times; ++i) {
@@ -76,10 +76,9 @@ void addResampleCases(std::vector<Case>& all) {
   all.push_back({.name = "resample-chain",
                  .group = "resampling",
                  .title = "resampling to finer voxels and back, once and ten times",
-                 .definition =
-                     "The exact band of a torus 0.7 / 0.3 about (1, 2, 3) and of a rotated cube of "
-                     "edge 1 is resampled to voxels of 0.8 times the size and back, once and ten "
-                     "times.",
+                 .definition = "The exact band of a torus (ring radius 0.7, tube radius 0.3, axis "
+                               "(1, 2, 3)) and of a rotated cube of edge 1 is resampled to voxels "
+                               "of 0.8 times the size and back, once and ten times.",
                  .citation = "closed form",
                  .quick = {6, 8, 12},
                  .full = {16, 32, 64},

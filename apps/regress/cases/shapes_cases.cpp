@@ -35,7 +35,8 @@ void sampleShapes(Recorder& out) {
   }
 }
 
-/// Voxels hold floats. The volume of the sphere is at their rounding level and shows no order.
+/// Voxels are floats. The volume error of the sphere is at their rounding level, so it has no order
+/// of convergence.
 Bounds shapesBounds() {
   return Bounds()
       .rounding("sphere", "band_in_linf_vx", 1.5)
@@ -58,12 +59,11 @@ void addShapeCases(std::vector<Case>& all) {
   all.push_back(
       {.name = "shapes",
        .group = "shapes",
-       .title = "sampled shapes hold exact distances",
-       .definition =
-           "Sphere of radius 1, box 1.6 × 1.2 × 0.8, and about the axis (1, 2, 3) a torus "
-           "0.7 / 0.3, a cylinder of radius 0.5 and height 1.2 and a capsule of radius "
-           "0.4, against their closed forms on both sides. The remaining error of the surface is "
-           "that of tricubic interpolation.",
+       .title = "sampled shapes have exact distances",
+       .definition = "Sphere of radius 1, box 1.6 × 1.2 × 0.8, and about the axis (1, 2, 3) a "
+                     "torus of ring radius 0.7 and tube radius 0.3, a cylinder of radius 0.5 and "
+                     "height 1.2 and a capsule of radius 0.4, against their closed forms on both "
+                     "sides. The remaining error of the surface is that of tricubic interpolation.",
        .citation = "closed forms",
        .quick = {8, 16, 24},
        .full = {16, 32, 64},

@@ -44,7 +44,7 @@ void smoothSphere(Recorder& out) {
       return [&, sigma] { return levelset::smooth(solid, SmoothKind::Gaussian, sigma); };
     };
     out.measure(subject("σ = 1 voxel", h), kOurs, ours(h));
-    // Four boxes of three voxels have a variance of 8/3.
+    // The four box filters of OpenVDB, three voxels wide each, have a variance of 8/3 voxels².
     const Subject same = subject("σ = 1.63 voxels", theirs);
     out.measure(same, kOurs, ours(theirs));
     if (out.wantsPeer(at, 16, 1))
@@ -108,7 +108,7 @@ void addSmoothCases(std::vector<Case>& all) {
   all.push_back(
       {.name = "smooth",
        .group = "smoothing",
-       .title = "a sphere's distance under a Gaussian",
+       .title = "the distance of a sphere, smoothed by a Gaussian",
        .definition =
            "|x| − R of a sphere of radius R = 1, convolved with a Gaussian of σ and re-distanced, "
            "gives a sphere of the radius r at which the mean of |x + σξ|, ξ standard normal, is "
