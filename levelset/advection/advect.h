@@ -100,7 +100,8 @@ struct AdvectOperator {
     template <class Visitor>
     static void describe(Visitor& visit) {
       visit("field", &Options::field,
-            {.help = "the velocity, world units per unit of time", .required = true});
+            {.help = "velocity that moves the surface, world units per unit of time",
+             .required = true});
       visit("time", &Options::time,
             {.help = "duration of the motion; negative: backwards in time", .required = true});
       visit("start", &Options::start, {.help = "time at which the motion starts"});
@@ -108,15 +109,18 @@ struct AdvectOperator {
             {{"front", AdvectScheme::Front},
              {"semi-lagrangian", AdvectScheme::SemiLagrangian},
              {"upwind", AdvectScheme::Upwind}},
-            {.help = "numerical scheme"});
+            {.help = "scheme: front moves triangles of the surface; semi-lagrangian and upwind "
+                     "move the values on the grid"});
       visit("period", &Options::period,
             {.help = "period of a built-in velocity; default: enright 3, vortex 8, rotation 1",
              .range = OptionRange::Positive});
-      visit("center", &Options::center, {.help = "centre of the rotation"});
-      visit("axis", &Options::axis, {.help = "axis of the rotation"});
+      visit("center", &Options::center, {.help = "with --field rotation: a point on the axis"});
+      visit("axis", &Options::axis, {.help = "with --field rotation: direction of the axis"});
       visit("factor", &Options::factor, {.help = "formula in t that multiplies the velocity"});
-      visit("fix-volume", &Options::fixVolume,
-            {.help = "offset the result to the volume of the solid"});
+      visit(
+          "fix-volume", &Options::fixVolume,
+          {.help =
+               "offset the result so that it has the volume that the solid had before the motion"});
       visit("mask", &Options::mask, {});
     }
   };

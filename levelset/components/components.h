@@ -65,7 +65,7 @@ struct KeepOperator {
     template <class Visitor>
     static void describe(Visitor& visit) {
       visit("largest", &Options::largest,
-            {.help = "number of solids to keep, by volume",
+            {.help = "number of connected solids to keep, those of largest volume",
              .range = OptionRange::Positive,
              .required = true});
     }
@@ -86,7 +86,7 @@ struct FillCavitiesOperator {
     template <class Visitor>
     static void describe(Visitor& visit) {
       visit("up-to", &Options::upTo,
-            {.help = "fill only voids up to this volume, world units cubed",
+            {.help = "fill only cavities up to this volume, world units cubed; default: all",
              .range = OptionRange::Positive});
     }
   };

@@ -107,7 +107,8 @@ struct LevelSetOperator {
       visit(
           "sign", &Options::sign,
           {{"auto", SignMode::Auto}, {"closed", SignMode::Closed}, {"winding", SignMode::Winding}},
-          {.help = "how inside is distinguished from outside"});
+          {.help = "method that distinguishes inside from outside: closed, for closed meshes; "
+                   "winding, by the generalised winding number; auto chooses one of the two"});
       visit("nested", &Options::nesting,
             {{"parity", Nesting::Parity}, {"orientation", Nesting::Orientation}},
             {.help = "with --sign closed: nested surfaces alternate between solid and void, or "

@@ -61,8 +61,8 @@ struct SurfaceBandOperator {
     static void describe(Visitor& visit) {
       visit("voxel", &Options::voxel, {});
       visit("half-width", &Options::halfWidth,
-            {.help = "half width of the band, voxels, at least 4; 16 are enough for patches of up "
-                     "to ten voxels",
+            {.help = "half width of the band, in voxels, at least 4; 16 suffices for patches up to "
+                     "ten voxels high",
              .range = OptionRange::Positive});
     }
   };

@@ -71,7 +71,7 @@ struct BlendOperator {
     template <class Visitor>
     static void describe(Visitor& visit) {
       visit("radius", &Options::radius,
-            {.help = "radius of the rounding",
+            {.help = "radius of the rounding along the seam",
              .unit = OptionUnit::Length,
              .range = OptionRange::NonNegative,
              .required = true});
@@ -91,7 +91,7 @@ struct BlendOperator {
              .range = OptionRange::Positive});
       visit("side", &Options::side,
             {{"both", BlendSide::Both}, {"add", BlendSide::Add}, {"remove", BlendSide::Remove}},
-            {.help = "add material, remove it, or both"});
+            {.help = "effect of the rounding: add material, remove it, or both"});
     }
   };
 

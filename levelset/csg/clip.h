@@ -36,8 +36,10 @@ struct ClipOperator {
 
     template <class Visitor>
     static void describe(Visitor& visit) {
-      visit("box", &Options::box, {.help = "keep the part inside this box"});
-      visit("plane", &Options::plane, {.help = "point and normal: keep the part behind the plane"});
+      visit("box", &Options::box, {.help = "keep the part of the solid inside this box"});
+      visit("plane", &Options::plane,
+            {.help = "point and normal of a plane, \"x,y,z x,y,z\": keep the part of the solid on "
+                     "the side opposite to the normal"});
     }
   };
 

@@ -83,19 +83,24 @@ struct CurvatureFlowOperator {
              .required = true,
              .position = 0});
       visit("volume-preserving", &Options::preservesVolume,
-            {.help = "subtract the mean curvature from the speed, so that the volume is constant"});
-      visit("scheme", &Options::scheme,
-            {{"auto", FlowScheme::Auto},
-             {"explicit", FlowScheme::Explicit},
-             {"stabilized", FlowScheme::Stabilized},
-             {"implicit", FlowScheme::Implicit}},
-            {.help = "scheme of the time steps; auto: the scheme with the least predicted cost"});
+            {.help = "subtract the mean of the speed over the surface from the speed, so that the "
+                     "volume stays constant"});
+      visit(
+          "scheme", &Options::scheme,
+          {{"auto", FlowScheme::Auto},
+           {"explicit", FlowScheme::Explicit},
+           {"stabilized", FlowScheme::Stabilized},
+           {"implicit", FlowScheme::Implicit}},
+          {.help =
+               "scheme of the time steps; auto chooses the scheme with the least predicted cost"});
       visit("tolerance", &Options::tolerance,
-            {.help = "largest error of the time steps, rms over the surface; default: 0.02vx",
+            {.help = "largest accepted displacement of the surface by the error of the time steps, "
+                     "rms over the surface; default: 0.02vx",
              .unit = OptionUnit::Length,
              .range = OptionRange::Positive});
       visit("step", &Options::step,
-            {.help = "longest step, world units squared", .range = OptionRange::Positive});
+            {.help = "longest time step, world units squared; default: no limit",
+             .range = OptionRange::Positive});
       visit("mask", &Options::mask, {});
     }
   };

@@ -64,9 +64,9 @@ struct SmoothOperator {
              {"mean", SmoothKind::Mean},
              {"median", SmoothKind::Median},
              {"taubin", SmoothKind::Taubin}},
-            {.help = "kind of the filter"});
+            {.help = "filter: gaussian; mean, a box; median; taubin, which preserves the volume"});
       visit("sigma", &Options::sigma,
-            {.help = "standard deviation of the filter",
+            {.help = "standard deviation of the filter; for median its radius",
              .unit = OptionUnit::Length,
              .range = OptionRange::Positive,
              .required = true});

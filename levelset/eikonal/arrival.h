@@ -89,19 +89,20 @@ struct FrontOptions {
   template <class Visitor>
   static void describe(Visitor& visit) {
     visit("to", &FrontOptions::to,
-          {.help = "latest time, which at speed 1 is a distance",
+          {.help = "latest arrival time to compute; at speed 1 the times are distances",
            .unit = OptionUnit::Length,
            .range = OptionRange::Positive});
     visit("speed", &FrontOptions::speed,
           {.help = "speed F of the front, in world units per unit of time; default: 1"});
     visit("from", &FrontOptions::from,
-          {.help = "start at these points, on the grid of the operand, in place of its surface"});
+          {.help = "start the front at these points, in place of the surface of the operand, which "
+                   "only gives the grid"});
     visit("order", &FrontOptions::order, {{"1", 1}, {"2", 2}},
-          {.help = "order of the upwind differences; with 2, grid points use first order where no "
-                   "second-order difference is upwind"});
+          {.help = "order of the upwind differences; with 2, a grid point uses first order where "
+                   "no second-order difference is upwind"});
     visit("extend", &FrontOptions::extend,
-          {.help = "instead of times, compute this attribute of the surface, extended along the "
-                   "normals to both sides"});
+          {.help = "in place of arrival times, compute this attribute of the surface, extended "
+                   "along the normals to both sides"});
   }
 };
 

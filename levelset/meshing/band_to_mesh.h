@@ -41,7 +41,7 @@ struct MeshOperator {
             {.help = "tolerance of the coarsening of flat parts, 0 to 1 voxel; 0: none",
              .range = OptionRange::NonNegative});
       visit("sharp", &Options::sharp,
-            {.help = "reconstruct the sharp edges and corners that the field implies"});
+            {.help = "reconstruct the sharp edges and corners that the distances imply"});
     }
   };
 

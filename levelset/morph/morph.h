@@ -63,7 +63,8 @@ struct MorphOperator {
           "steps", &Options::steps,
           {.help = "number of steps from the solid to the target", .range = OptionRange::Positive});
       visit("until", &Options::until,
-            {.help = "converged: morph to the target; or the last fraction, above 0 and up to 1"});
+            {.help = "fraction of the morph at which it ends, above 0 and up to 1; converged: 1, "
+                     "the target"});
       visit("tolerance", &Options::tolerance,
             {.help = "stop at the first step within this Hausdorff distance of the target",
              .unit = OptionUnit::Length,

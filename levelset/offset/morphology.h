@@ -49,7 +49,7 @@ struct MorphologyOptions {
   template <class Visitor>
   static void describe(Visitor& visit) {
     visit("radius", &MorphologyOptions::radius,
-          {.help = "radius of the ball",
+          {.help = "radius of the ball that opens or closes the solid",
            .unit = OptionUnit::Length,
            .range = OptionRange::NonNegative,
            .required = true,
@@ -101,7 +101,7 @@ struct ShellOperator {
     template <class Visitor>
     static void describe(Visitor& visit) {
       visit("thickness", &Options::thickness,
-            {.help = "thickness of the wall, a voxel or more",
+            {.help = "thickness of the wall, at least one voxel",
              .unit = OptionUnit::Length,
              .range = OptionRange::Positive,
              .required = true});

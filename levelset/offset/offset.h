@@ -61,10 +61,12 @@ struct OffsetOperator {
     template <class Visitor>
     static void describe(Visitor& visit) {
       visit("distance", &Options::distance,
-            {.help = "distance to move; negative shrinks",
+            {.help = "distance by which the surface moves outwards; negative shrinks the solid",
              .unit = OptionUnit::Length,
              .position = 0});
-      visit("by", &Options::by, {.help = "distance at each point of the surface, world units"});
+      visit("by", &Options::by,
+            {.help = "field with the distance at each point of the surface, world units; in place "
+                     "of one distance for all"});
       visit("half-width", &Options::halfWidth, kResultHalfWidth);
       visit("mask", &Options::mask, {});
     }

@@ -78,7 +78,9 @@ inline constexpr OptionInfo kResultHalfWidth{
     .range = OptionRange::Positive};
 
 /// Description of the option `half-width` of an operator that creates a band.
-inline constexpr OptionInfo kNewHalfWidth{.help = "extent of the band on each side, in voxels",
+inline constexpr OptionInfo kNewHalfWidth{.help =
+                                              "half width of the band: distance from the surface "
+                                              "to the end of the band on each side, in voxels",
                                           .range = OptionRange::Positive};
 
 }  // namespace levelset

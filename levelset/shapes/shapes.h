@@ -136,7 +136,7 @@ struct CylinderShape : ShapeGrid {
   template <class Visitor>
   static void describe(Visitor& visit) {
     visit("radius", &CylinderShape::radius, shapeLength("radius of the cylinder"));
-    visit("height", &CylinderShape::height, shapeLength("length from end to end"));
+    visit("height", &CylinderShape::height, shapeLength("height of the cylinder, along its axis"));
     visit("center", &CylinderShape::center, kShapeCenter);
     visit("axis", &CylinderShape::axis, kShapeAxis);
     ShapeGrid::describe(visit);

@@ -62,14 +62,19 @@ struct TransformOperator {
             {.help = "matrix for row vectors, with the translation in the last row"});
       visit("translate", &Options::translate, {.help = "displacement, world units"});
       visit("rotate", &Options::rotate,
-            {.help = "degrees about --axis, or three angles about x, then y, then z"});
-      visit("axis", &Options::axis, {.help = "axis of a single --rotate"});
+            {.help = "angle about --axis, or three angles about x, then y, then z; degrees"});
+      visit(
+          "axis", &Options::axis,
+          {.help = "direction of the axis of a single --rotate angle; it passes through --about"});
       visit("scale", &Options::scale,
-            {.help = "one factor, or one for each axis", .range = OptionRange::Positive});
+            {.help = "scale factor, or three factors for x, y and z",
+             .range = OptionRange::Positive});
       visit("mirror", &Options::mirror, {{"x", 0}, {"y", 1}, {"z", 2}},
             {.help = "axis normal to the mirror plane, which passes through --about"});
-      visit("about", &Options::about, {.help = "centre of mirror, scale and rotate"});
-      visit("bake", &Options::bake, {.help = "resample on an axis-aligned uniform grid"});
+      visit("about", &Options::about,
+            {.help = "fixed point of --mirror, --scale and --rotate, world units"});
+      visit("bake", &Options::bake,
+            {.help = "resample the result on an axis-aligned uniform grid"});
       visit("voxel", &Options::voxel,
             {.help = "voxel size of the baked grid; default: that of the operand",
              .unit = OptionUnit::Length,
