@@ -53,7 +53,7 @@ Value runRegression(Invocation& in) {
   for (const std::string& sentence : failed) in.output += "missed: " + sentence + "\n";
   if (!failed.empty())
     throw levelset::NumericalError(
-        fmt::format("regress: {} of the bounds are missed, the first by {}; see index.html in '{}'",
+        fmt::format("regress: {} bounds are missed, the first is: {}; see index.html in '{}'",
                     failed.size(), failed[0], in.text("out")));
   return Value(Plan{});
 }

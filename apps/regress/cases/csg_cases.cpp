@@ -59,9 +59,9 @@ void combineBalls(Recorder& out) {
   }
 }
 
-/// Zero set of smin(a, b) in a plane that both surfaces cross at right angles [Quilez13]. Where |a
-/// − b| ≥ K it is the surface of one solid alone. Between these parts it is an arc, along which a −
-/// b runs from −K to K.
+/// Zero set of smin(a, b) in a plane that both surfaces cross at right angles [Quilez13]. Where the
+/// distances differ by K or more, it is the surface of one solid alone. In between it is an arc,
+/// along which a − b runs from −K to K.
 struct SmoothArc {
   double radius = 0;  ///< K
   std::function<V3d(double a, double b)> position =
@@ -310,31 +310,31 @@ void addCsgCases(std::vector<Case>& all) {
                  .full = {16, 32, 64},
                  .bounds = csgLawsBounds(),
                  .run = laws});
-  all.push_back(
-      {.name = "smooth-csg-balls",
-       .group = "smooth CSG",
-       .title = "smooth union of two balls",
-       .definition = "The centres of balls of radius 1 and 0.8 are (0.9, 0.3, 0.2) apart. Their "
+  all.push_back({.name = "smooth-csg-balls",
+                 .group = "smooth CSG",
+                 .title = "smooth union of two balls",
+                 .definition =
+                     "The centres of balls of radius 1 and 0.8 are (0.9, 0.3, 0.2) apart. Their "
                      "smooth union with K = 0.4 is the zero set of min(a, b) − max(K − |a − b|, "
                      "0)² / 4K of their distances a and b, a surface of revolution. The exact "
                      "distance is the distance to its profile curve.",
-       .citation = "Dekkers04, Quilez13",
-       .quick = {8, 16, 32},
-       .full = {16, 32, 64},
-       .bounds = smoothBallsBounds(),
-       .run = smoothlyUniteBalls});
-  all.push_back(
-      {.name = "smooth-csg-planes",
-       .group = "smooth CSG",
-       .title = "smooth union of two half spaces",
-       .definition = "Two half spaces leave 60°, 90° or 120° of free space between them; K = 0.4. "
+                 .citation = "Dekkers04, Quilez13",
+                 .quick = {8, 16, 32},
+                 .full = {16, 32, 64},
+                 .bounds = smoothBallsBounds(),
+                 .run = smoothlyUniteBalls});
+  all.push_back({.name = "smooth-csg-planes",
+                 .group = "smooth CSG",
+                 .title = "smooth union of two half spaces",
+                 .definition =
+                     "Two half spaces leave 60°, 90° or 120° of free space between them; K = 0.4. "
                      "The section of the smooth union has a parabola between the two planes. "
                      "Points within 1 of the middle of the edge are compared.",
-       .citation = "Dekkers04, Quilez13",
-       .quick = {8, 12, 16},
-       .full = {16, 24, 32},
-       .bounds = smoothPlanesBounds(),
-       .run = smoothlyUnitePlanes});
+                 .citation = "Dekkers04, Quilez13",
+                 .quick = {8, 12, 16},
+                 .full = {16, 24, 32},
+                 .bounds = smoothPlanesBounds(),
+                 .run = smoothlyUnitePlanes});
 }
 
 }  // namespace regress

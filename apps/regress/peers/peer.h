@@ -38,7 +38,7 @@ inline constexpr const char* kResample = "OpenVDB resampleToMatch";
 /// Smooths by four passes of a box filter of three voxels: σ = √(8/3).
 [[nodiscard]] levelset::NarrowBand gaussian(const levelset::NarrowBand& band);
 /// Advects a band with HJ-WENO5 and TVD-RK3.
-/// @param turnsBack true: the velocity vanishes at half of `time`. OpenVDB would stop there, so a
+/// @param turnsBack  true: the velocity vanishes at half of `time`. OpenVDB would stop there, so a
 ///         small time interval around it is skipped.
 [[nodiscard]] levelset::NarrowBand advect(const levelset::NarrowBand& band,
                                           const levelset::VectorField& velocity, double time,

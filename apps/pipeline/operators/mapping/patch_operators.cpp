@@ -182,7 +182,7 @@ void tellPatches(Invocation& in, const mapping::PatchReport& report,
 
 /// Builds patches at the requested height. With --height auto, also stores how to rebuild them at
 /// the height that the texture determines.
-/// @param make builds the patches and their report for a height in world units
+/// @param make  builds the patches and their report for a height in world units
 template <typename Make>
 Value patchesOf(Invocation& in, PatchRecipe recipe, const Make& make) {
   const bool isAuto = in.text("height") == "auto";

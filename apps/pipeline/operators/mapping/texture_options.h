@@ -23,7 +23,7 @@ void validateTextureOptions(const Invocation& in);
 /// note with that height.
 [[nodiscard]] std::vector<mapping::Patch> patchesAtHeight(Invocation& in, const PatchValue& onto,
                                                           const Imath::Box3d& textureBox);
-// Read the options of the mapping; the caller sets the progress callback.
+// These functions read the options of the mapping. The caller sets the progress callback.
 [[nodiscard]] mapping::TextureOptions textureOptions(Invocation& in);
 [[nodiscard]] mapping::MeshTextureOptions meshTextureOptions(Invocation& in);
 [[nodiscard]] Plan planTexture(Invocation& in);
