@@ -91,7 +91,7 @@ struct AdvectOperator {
     NamedVelocity field;
     double time = 0, start = 0;
     AdvectScheme scheme = AdvectScheme::Front;
-    std::optional<double> period;  ///< period of a built-in velocity; empty: its default
+    std::optional<double> period;  ///< of a built-in velocity, see describe(); empty: its default
     Imath::V3d center = Imath::V3d(0), axis = Imath::V3d(0, 0, 1);
     std::string factor;  ///< formula in t that multiplies the velocity; empty: 1
     bool fixVolume = false;
@@ -111,9 +111,12 @@ struct AdvectOperator {
              {"upwind", AdvectScheme::Upwind}},
             {.help = "scheme: front moves triangles of the surface; semi-lagrangian and upwind "
                      "move the values on the grid"});
-      visit("period", &Options::period,
-            {.help = "period of a built-in velocity; default: enright 3, vortex 8, rotation 1",
-             .range = OptionRange::Positive});
+      visit(
+          "period", &Options::period,
+          {.help =
+               "time after which a solid that a built-in velocity moves from time 0 is back at its "
+               "start; default: enright 3, vortex 8, rotation 1",
+           .range = OptionRange::Positive});
       visit("center", &Options::center, {.help = "with --field rotation: a point on the axis"});
       visit("axis", &Options::axis, {.help = "with --field rotation: direction of the axis"});
       visit("factor", &Options::factor, {.help = "formula in t that multiplies the velocity"});

@@ -72,11 +72,13 @@ struct GridInfo {
   std::uint64_t activeVoxels = 0;  ///< 0 when the file does not state it
   double voxelSize = 0;            ///< world units; 0 when the voxels are not cubes of equal size
   double halfWidth = 0;            ///< voxels; 0 for other classes than level set
-  Imath::Box3d indexBounds;  ///< box of the active voxels, index space; empty when the file does
-                             ///< not state it
-  Imath::Box3d worldBounds;  ///< box of the centres of the active voxels, world units; empty when
-                             ///< the file does not state it
-  std::uint64_t bytes = 0;   ///< memory of the tree in bytes; 0 when the file does not state it
+  /// Box of the active voxels, index space. Empty when the file does not state it or the grid has
+  /// no active voxel.
+  Imath::Box3d indexBounds;
+  /// Box of the centres of the active voxels, world units. Empty when `indexBounds` is empty, or
+  /// when the grid has a frustum transform.
+  Imath::Box3d worldBounds;
+  std::uint64_t bytes = 0;  ///< memory of the tree in bytes; 0 when the file does not state it
 };
 [[nodiscard]] std::vector<GridInfo> bandFileInfo(const std::filesystem::path& path);
 

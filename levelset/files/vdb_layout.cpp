@@ -53,7 +53,7 @@ bool readFileHeader(VdbBytes& bytes) {
   if (version < kOldestVersion || version > kNewestVersion) {
     throw InvalidInput(
         fmt::format("{} has version {} of OpenVDB's file format; versions {} to {} are supported; "
-                    "write it again with a current program",
+                    "write it again with a program that uses one of these versions",
                     bytes.name(), version, kOldestVersion, kNewestVersion));
   }
   static_cast<void>(bytes.take(2 * sizeof(std::uint32_t)));  // skips the version of the library

@@ -17,9 +17,10 @@
 ///
 /// The type of the member gives the type of the option: double, int, bool (a flag), V3d (a point,
 /// or three lengths), Box3d, M44d, std::string, std::vector<double> (one or three numbers),
-/// std::vector<V3d> (points), ScalarField, NamedVelocity, Length, VoxelSize (--voxel and
+/// std::vector<V3d> (points), ScalarField, Attribute, NamedVelocity, Length, VoxelSize (--voxel and
 /// --resolution), Mask (--mask, --mask-min, --mask-max and --mask-invert), and std::optional of
-/// these. A member of any other type takes a table of its values as the third argument:
+/// these. Any member may take a table of its values as the third argument; a member of another type
+/// must:
 /// visit("side", &Options::side, {{"in", ShellSide::In}, {"out", ShellSide::Out}}, {...}).
 /// The default is the initial value of the member; an empty std::optional has none.
 namespace levelset {

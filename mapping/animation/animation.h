@@ -17,9 +17,9 @@
 namespace mapping {
 
 /// Rebuilds patches on a base.
-/// @param footprints  positions of the new patches
+/// @param footprints  new positions: one for each patch, or one for a grid of patches
 /// @param origins     the footprints at frame 0, on the base of frame 0
-/// @return the same number of patches in the same order
+/// @return as many patches as the first key frame has, in the same order
 using PatchMaker = std::function<std::vector<Patch>(
     const levelset::NarrowBand& base, std::span<const Footprint> footprints,
     std::span<const Footprint> origins, const levelset::Progress& progress)>;

@@ -39,8 +39,8 @@ void checkGrid(const PatchGridOptions& grid) {
                                  grid.rows, kMostTiles));
   }
   if (!(grid.shift >= 0 && grid.shift < 1)) {
-    throw UsageError(
-        fmt::format("the shift is {}; give a share of a tile, 0 to below 1", grid.shift));
+    throw UsageError(fmt::format(
+        "the shift of every second row is {}; give a share of a tile, 0 to below 1", grid.shift));
   }
 }
 

@@ -114,8 +114,8 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
     bounds_ = tableBounds_ = scene.bounds();
     return;
   }
-  // The memory estimate counts one block for each leaf, because blocks that the surface does not
-  // cross are also built before they are dropped.
+  // The memory estimate counts one block for each leaf, because the number of blocks that the
+  // surface crosses is not known yet.
   double leaves = 0;
   Imath::Box3d box = meshes_.bounds();
   for (const Solid& solid : scene.solids) {

@@ -60,7 +60,7 @@ Json valueSchema(const Param& param) {
   const bool isInteger = param.type == ParamType::Integer;
   if (isInteger || takesNumber(param.type)) {
     json["type"] = {"string", isInteger ? "integer" : "number"};
-    // The limits apply to JSON numbers. A text is checked by a pattern, which covers only its form.
+    // The limits apply to JSON numbers. A pattern checks the form of a text, except for a field.
     if (param.range == Range::Positive) json["exclusiveMinimum"] = 0;
     if (param.range == Range::NonNegative) json["minimum"] = 0;
   } else {

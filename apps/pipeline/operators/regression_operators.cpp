@@ -89,7 +89,7 @@ Operator regressOperator() {
                   .doc = "draw no plots; plots.py in the folder of --out can draw them later"},
                  {.name = "list",
                   .type = ParamType::Flag,
-                  .doc = "print the names of all cases and run none"}},
+                  .doc = "print the names and titles of all cases and run none"}},
       .isRepeatable = false,
       .flow = Flow::PassesThrough,
       .run = runRegression,

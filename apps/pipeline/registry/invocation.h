@@ -41,7 +41,8 @@ struct StepNotes {
   /// Message of a numeric check that the result fails; empty: none. The chain continues, and ends
   /// with exit code 5.
   std::string failure;
-  /// Sign certificate of the action level-set, a JSON object; empty: none.
+  /// levelset::SignCertificate as a JSON object, from the action level-set: the properties of the
+  /// mesh and the method that decided inside and outside. Empty: none.
   std::string certificateJson;
   std::string detailsJson;  ///< figures of the operator, a JSON object; empty: none
 };

@@ -33,8 +33,8 @@ struct ValuePlans {
                                     std::size_t maxMemory,
                                     const std::function<std::optional<Plan>(std::size_t)>& mesh);
 
-/// Checks the memory estimate before anything is computed. Counts each value alone, and the values
-/// that a run in graph order holds at once.
+/// Checks the memory estimates of all planned values: each value alone, and the values that a run
+/// in graph order holds at once.
 /// @throws levelset::ResourceLimit if the estimate exceeds the limit; names the action
 void checkMemoryFor(const Graph& graph, const std::vector<char>& runs,
                     const std::vector<std::optional<Plan>>& plans,

@@ -58,8 +58,8 @@ class LevelRunner {
   /// checks the files that it will write.
   /// @return plans by node index
   [[nodiscard]] std::map<std::size_t, Value> planAll(int resolution, RunReport& report) const;
-  /// Runs the graph without the nodes of ToleranceParts::ends, at the voxel size `voxel` times
-  /// `coarsening`.
+  /// Runs the nodes of ToleranceParts::again, with the values of computeOnce(), at the voxel size
+  /// `voxel` times `coarsening`.
   /// @param voxel       voxel size of the nodes of ToleranceParts::chosen, world units
   /// @param coarsening  factor for all voxel sizes, including those that the user gave
   /// @throws levelset::Error as run()
@@ -68,11 +68,12 @@ class LevelRunner {
   void planAt(double voxel, RunReport& report) const;
   /// Runs the nodes that write, draw, print and check, on the values of one run.
   void runEnds(const Level& level, RunReport& report) const;
-  /// Measures the largest two-sided distance between a result and its source mesh, creases
-  /// included. Faces of the mesh inside the solid count too, so the figure may be too large, never
-  /// too small.
+  /// Measures the largest two-sided distance between a result and its source mesh at sample points,
+  /// creases included. Faces of the mesh inside the solid count too, so the figure may be too
+  /// large.
   /// @param output  index in ToleranceParts::outputs
-  /// @return empty unless the result is a level set of a mesh, or a mesh of such a level set
+  /// @return empty unless the result is a level set of a mesh, or a mesh of such a level set. Also
+  ///         empty when the source mesh itself depends on voxel sizes
   [[nodiscard]] std::optional<double> knownError(const Level& level, std::size_t output);
   /// Compares one output of two runs.
   /// @param output  index in ToleranceParts::outputs

@@ -29,7 +29,8 @@ const std::vector<Column>& columns() {
        "largest exact distance of the zeros along the rays, world units"},
       {"surface_hits", "hits", "number of zeros found along the rays"},
       {"missed_hits", "missed",
-       "number of missing and surplus zeros along the rays, over the number of zeros of the exact "
+       "differences in the number of zeros of each ray, summed, over the number of zeros of the "
+       "exact "
        "solid"},
       {"mesh_l1_vx", "mesh L1",
        "mean exact distance of vertices and face centres of the mesh of the result, voxels"},

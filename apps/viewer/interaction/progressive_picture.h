@@ -99,7 +99,8 @@ class ProgressivePicture {
   std::thread thread_;
 };
 
-/// True when the numbers of both cameras, or views, are equal.
+/// True when all members of both cameras, or of both views, are equal. Models are equal if they are
+/// the same object.
 [[nodiscard]] bool isSame(const render::Camera& a, const render::Camera& b);
 [[nodiscard]] bool isSame(const View& a, const View& b);
 
