@@ -113,7 +113,7 @@ TEST_F(Refusal, DetectableErrorsPrecedeTheRun) {
   soon("render a.exr --png - ! write - --format vdb", 2, "already used");
   soon("write /dev/stdout --format vdb ! measure --json", 2, "already used");
   soon("render a.exr --png ./a.exr", 2, "named twice");
-  soon("clip --box \"0,0,0 1,1,1\" --plane \"0,0,0 0,0,1\"", 2, "give one of");
+  soon("clip --box \"0,0,0 1,1,1\" --plane \"0,0,0 0,0,1\"", 2, "give either");
   soon("resample", 2, "needs a voxel size");
   soon("transform --mirror x", 2, "add --bake");
   soon("patch --at 0,0,1 --height 0.1", 2, "needs --size");
@@ -130,8 +130,8 @@ TEST_F(Refusal, DetectableErrorsPrecedeTheRun) {
   soon("patch-grid --count 3,2 --at 0,0,1 --size 1,1 --shift 1 --height 0.1", 2, "--shift");
   soon("mesh --sheets", 2, "for a patch");
   soon("march --order 3", 2, "--order");
-  soon("sweep --extend x --speed 2", 2, "--speed has no meaning");
-  soon("march --extend x --order 1", 2, "--order has no meaning");
+  soon("sweep --extend x --speed 2", 2, "cannot be combined with --speed");
+  soon("march --extend x --order 1", 2, "cannot be combined with --order");
   soon("march --speed \"1 + t\"", 2, "fast-marching: --speed: the formula '1 + t'");
   soon("offset --by \"0.3*t\"", 2, "use x, y, z, r, numbers");
   soon("advect --field vortex --time 1 --factor \"1 +\"", 2, "advect: --factor");
