@@ -111,7 +111,7 @@ Json toJson(const render::ImageComparison& found) {
   Json json;
   json["agrees"] = found.agrees();
   json["exact"] = found.isExact;
-  json["size in pixels"] = found.pixels;
+  json["pixels"] = found.pixels;
   json["both_hit"] = found.bothHit;
   json["unlike_at_outline"] = found.unlikeAtOutline;
   json["unlike_elsewhere"] = found.unlikeElsewhere;
