@@ -208,42 +208,60 @@ void laws(Recorder& out) {
 Bounds csgBallsBounds() {
   return Bounds()
       .measured("union", "band_in_linf_vx",
-                {{12, 0.0412}, {16, 0.0539}, {32, 0.0557, Budget::Quick}})
-      .unmeasured("union", "band_in_linf_vx", 0.1, {32, 64, 128, 256})
+                {{12, 0.0412},
+                 {16, 0.0539},
+                 {32, 0.0557, Budget::Quick},
+                 {32, 0.0601, Budget::Full},
+                 {64, 0.0731},
+                 {128, 0.0793},
+                 {256, 0.0615}})
       .rounding("union", "band_out_linf_vx", 1.5)
       .measured("union", "band_in_l1_vx",
-                {{12, 0.000443}, {16, 0.000239}, {32, 6.5e-5, Budget::Quick}})
-      .unmeasured("union", "band_in_l1_vx", 0.01, {32})
+                {{12, 0.000443},
+                 {16, 0.000239},
+                 {32, 6.5e-5, Budget::Quick},
+                 {32, 6.74e-5, Budget::Full}})
       .rounding("union", "band_out_l1_vx", 0.5)
       .zero("union", "checks_failed")
       .rounding("intersection", "band_in_linf_vx", 1.5)
       .measured("intersection", "band_out_linf_vx",
-                {{12, 0.0527}, {16, 0.0507}, {32, 0.0287, Budget::Quick}})
-      .unmeasured("intersection", "band_out_linf_vx", 0.4, {32, 64, 128, 256})
+                {{12, 0.0527},
+                 {16, 0.0507},
+                 {32, 0.0287, Budget::Quick},
+                 {32, 0.0434, Budget::Full},
+                 {64, 0.0528},
+                 {128, 0.0618},
+                 {256, 0.074}})
       .rounding("intersection", "band_in_l1_vx", 0.5)
       .measured("intersection", "band_out_l1_vx",
-                {{12, 0.00153}, {16, 0.000493}, {32, 0.000135, Budget::Quick}})
-      .unmeasured("intersection", "band_out_l1_vx", 0.01, {32})
+                {{12, 0.00153},
+                 {16, 0.000493},
+                 {32, 0.000135, Budget::Quick},
+                 {32, 0.000142, Budget::Full}})
       .zero("intersection", "checks_failed")
       .rounding("difference", "band_in_linf_vx", 1.5)
       .measured("difference", "band_out_linf_vx",
-                {{12, 0.277}, {16, 0.128}, {32, 0.322, Budget::Quick}})
+                {{12, 0.277},
+                 {16, 0.128},
+                 {32, 0.322, Budget::Quick},
+                 {32, 0.322, Budget::Full},
+                 {64, 0.239},
+                 {128, 0.257},
+                 {256, 0.322}})
       .ceiling(0.4)
-      .unmeasured("difference", "band_out_linf_vx", 0.4, {32, 64, 128, 256})
       .rounding("difference", "band_in_l1_vx", 0.5)
       .measured("difference", "band_out_l1_vx",
-                {{12, 0.00122}, {16, 0.00072}, {32, 0.000367, Budget::Quick}})
-      .unmeasured("difference", "band_out_l1_vx", 0.01, {32})
+                {{12, 0.00122},
+                 {16, 0.00072},
+                 {32, 0.000367, Budget::Quick},
+                 {32, 0.000367, Budget::Full}})
       .zero("difference", "checks_failed")
       .measured("union", "volume_error",
-                {{12, 0.000131}, {16, 6.93e-6}, {32, 1.92e-5, Budget::Quick}})
-      .unmeasured("union", "volume_error", 0.002, {64})
+                {{12, 0.000131}, {16, 6.93e-6}, {32, 1.92e-5, Budget::Quick}, {64, 1.85e-5}})
       .measured("intersection", "volume_error",
-                {{12, 0.00118}, {16, 0.000522}, {32, 0.000101, Budget::Quick}})
-      .unmeasured("intersection", "volume_error", 0.002, {64})
+                {{12, 0.00118}, {16, 0.000522}, {32, 0.000101, Budget::Quick}, {64, 4.61e-5}})
       .measured("difference", "volume_error",
-                {{12, 0.0094}, {16, 0.00447}, {32, 0.00236, Budget::Quick}})
-      .unmeasured("difference", "volume_error", 0.002, {64});
+                {{12, 0.0094}, {16, 0.00447}, {32, 0.00236, Budget::Quick}, {64, 0.00124}});
 }
 
 Bounds smoothBallsBounds() {
