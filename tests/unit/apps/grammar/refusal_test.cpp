@@ -123,8 +123,8 @@ TEST_F(Refusal, DetectableErrorsPrecedeTheRun) {
   soon("decal --at 0,0,1 --direction 1,0,0 --height 0.1", 2, "--radius");
   soon("decal --at 0,0,1 --direction 1,0,0 --radius -1 --height 0.1", 2, "--radius");
   soon("patch-grid --count 3,2 --height 0.1", 2, "give one of --corners");
-  soon("patch-grid --count 3 --around \"0,0,0 0,0,1\" --height 0.1", 2, "write 12,3");
-  soon("patch-grid --count 3,0 --around \"0,0,0 0,0,1\" --height 0.1", 2, "write 12,3");
+  soon("patch-grid --count 3 --around \"0,0,0 0,0,1\" --height 0.1", 2, "as 12,3");
+  soon("patch-grid --count 3,0 --around \"0,0,0 0,0,1\" --height 0.1", 2, "as 12,3");
   soon("patch-grid --count 3,2 --around \"0,0,0\" --height 0.1", 2, "needs two points");
   soon("patch-grid --count 3,2 --around \"0,0,0 0,0,1\" --twist 5 --height 0.1", 2, "--twist");
   soon("patch-grid --count 3,2 --at 0,0,1 --size 1,1 --shift 1 --height 0.1", 2, "--shift");
