@@ -30,8 +30,8 @@ struct Hit {
   std::uint32_t id = 0;       ///< Solid::id or MeshPart::id
   std::size_t solid = 0;      ///< index in Scene::solids, or Scene::meshes
   bool isOnMesh = false;
-  bool isFlipped = false;  ///< the drawn shape is on the outside of the hit solid, as for a
-                           ///< subtracted solid; normals and curvatures describe the drawn shape
+  bool isFlipped = false;     ///< the drawn shape is on the outside of the hit solid, as for a
+                              ///< subtracted solid; normals and curvatures describe the drawn shape
   bool isBeyondBand = false;  ///< a blended field contributes to this hit, but its band does not
                               ///< extend to this point
   /// Distance at which the ray continues behind a mesh surface, clear of the hit's rounding error.

@@ -250,8 +250,7 @@ class TurnGrid {
 
 TriangleSurface::TriangleSurface(TriMesh mesh) {
   if (mesh.isEmpty())
-    throw InvalidInput(
-        "a result has no surface to measure; choose a result with a surface");
+    throw InvalidInput("a result has no surface to measure; choose a result with a surface");
   TriangleTree tree = treeOf(mesh);
   data_ = std::make_shared<const Data>(Data{std::move(mesh), std::move(tree)});
 }

@@ -340,19 +340,19 @@ void addAdvectionCases(std::vector<Case>& all) {
        .full = {50, 100, 200},
        .bounds = zalesakBounds(),
        .run = zalesak});
-  all.push_back(
-      {.name = "rigid-rotation",
-       .group = "advection, rotation",
-       .title = "cube, torus and thin plate turn once",
-       .definition = "A cube of edge 0.6, a torus (ring radius 0.35, tube radius 0.12) and a plate "
+  all.push_back({.name = "rigid-rotation",
+                 .group = "advection, rotation",
+                 .title = "cube, torus and thin plate turn once",
+                 .definition =
+                     "A cube of edge 0.6, a torus (ring radius 0.35, tube radius 0.12) and a plate "
                      "two voxels thick are half a unit from the origin and turn once about the "
                      "axis (1, 2, 3) through it. value: volume of the symmetric difference of "
                      "start and end, over the volume of the start.",
-       .citation = "closed form",
-       .quick = {8, 12, 16},
-       .full = {16, 32, 64},
-       .bounds = rigidRotationBounds(),
-       .run = rotate});
+                 .citation = "closed form",
+                 .quick = {8, 12, 16},
+                 .full = {16, 32, 64},
+                 .bounds = rigidRotationBounds(),
+                 .run = rotate});
   all.push_back({.name = "bad-velocities",
                  .group = "bad-velocities",
                  .title = "velocities of 1e9, of NaN, with a jump",

@@ -84,30 +84,30 @@ Bounds redistanceAgainBounds() {
 }  // namespace
 
 void addRedistanceCases(std::vector<Case>& all) {
-  all.push_back(
-      {.name = "redistance",
-       .group = "redistancing",
-       .title = "redistancing restores the distance and keeps the surface",
-       .definition = "φ (1.5 + 0.8 sin(x/4w) sin(y/4w) sin(z/4w)) of a sphere of radius 1, half "
+  all.push_back({.name = "redistance",
+                 .group = "redistancing",
+                 .title = "redistancing restores the distance and keeps the surface",
+                 .definition =
+                     "φ (1.5 + 0.8 sin(x/4w) sin(y/4w) sin(z/4w)) of a sphere of radius 1, half "
                      "width 3, values clipped at the background, is re-distanced once. With w = h "
                      "the waves shorten with the voxels, so that the error in voxels stays "
                      "constant at best. The other variant has w = 1/16.",
-       .citation = "Russo00, Min10",
-       .quick = {12, 24, 64},
-       .full = {32, 64, 128},
-       .bounds = redistanceBounds(),
-       .run = mendSlopes});
-  all.push_back(
-      {.name = "redistance-again",
-       .group = "redistancing again and again",
-       .title = "redistancing once, ten and a hundred times",
-       .definition = "φ (1.5 + 0.8 sin(x/4h) sin(y/4h) sin(z/4h)) of a sphere of radius 1, h the "
+                 .citation = "Russo00, Min10",
+                 .quick = {12, 24, 64},
+                 .full = {32, 64, 128},
+                 .bounds = redistanceBounds(),
+                 .run = mendSlopes});
+  all.push_back({.name = "redistance-again",
+                 .group = "redistancing again and again",
+                 .title = "redistancing once, ten and a hundred times",
+                 .definition =
+                     "φ (1.5 + 0.8 sin(x/4h) sin(y/4h) sin(z/4h)) of a sphere of radius 1, h the "
                      "voxel size, is re-distanced repeatedly. The surface must not drift.",
-       .citation = "Russo00, Min10",
-       .quick = {8, 10, 12},
-       .full = {16, 32, 64},
-       .bounds = redistanceAgainBounds(),
-       .run = repeat});
+                 .citation = "Russo00, Min10",
+                 .quick = {8, 10, 12},
+                 .full = {16, 32, 64},
+                 .bounds = redistanceAgainBounds(),
+                 .run = repeat});
 }
 
 }  // namespace regress

@@ -56,19 +56,19 @@ Bounds shapesBounds() {
 }  // namespace
 
 void addShapeCases(std::vector<Case>& all) {
-  all.push_back(
-      {.name = "shapes",
-       .group = "shapes",
-       .title = "sampled shapes have exact distances",
-       .definition = "Sphere of radius 1, box 1.6 × 1.2 × 0.8, and about the axis (1, 2, 3) a "
+  all.push_back({.name = "shapes",
+                 .group = "shapes",
+                 .title = "sampled shapes have exact distances",
+                 .definition =
+                     "Sphere of radius 1, box 1.6 × 1.2 × 0.8, and about the axis (1, 2, 3) a "
                      "torus of ring radius 0.7 and tube radius 0.3, a cylinder of radius 0.5 and "
                      "height 1.2 and a capsule of radius 0.4, against their closed forms on both "
                      "sides. The remaining error of the surface is that of tricubic interpolation.",
-       .citation = "closed forms",
-       .quick = {8, 16, 24},
-       .full = {16, 32, 64},
-       .bounds = shapesBounds(),
-       .run = sampleShapes});
+                 .citation = "closed forms",
+                 .quick = {8, 16, 24},
+                 .full = {16, 32, 64},
+                 .bounds = shapesBounds(),
+                 .run = sampleShapes});
 }
 
 }  // namespace regress
