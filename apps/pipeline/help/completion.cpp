@@ -10,7 +10,8 @@ namespace pipeline {
 namespace {
 
 /// Returns `--name` for a flag, `--name=KIND` for an option with a value, and `0=KIND` for a
-/// positional value. KIND is FILE, ACTION, VALUE, or the choices with commas between them.
+/// positional value. KIND is FILE, ACTION, VALUE, or the accepted words with commas between them,
+/// such as `auto`.
 std::string paramWord(const Param& param) {
   std::string kind = "VALUE";
   if (param.type == ParamType::Path) kind = "FILE";

@@ -22,7 +22,7 @@
 
 namespace pipeline {
 
-/// A length option whose unit has been resolved, for the report.
+/// A length option converted to world units, for the report.
 struct Resolved {
   std::string param;                  ///< name of the option, without dashes
   std::string written;                ///< text as the user wrote it

@@ -48,7 +48,8 @@ struct Param {
   Range range = Range::Any;
   bool required = false;
   std::size_t count = 1;  ///< Lengths: number of lengths
-  /// ≥ 0: index among the arguments that are given without a name; -1: needs its name.
+  /// Position among the arguments that may be given without a name, from 0; -1: always given as
+  /// --NAME.
   int position = -1;
   bool allowsVoxels = true;     ///< Length: may be given in vx
   bool allowsAuto = false;      ///< Length: the word `auto` is accepted too
@@ -69,7 +70,7 @@ struct Param {
 void checkText(const Param& param, const std::string& text, const std::string& where);
 
 enum class Flow {
-  Makes,         ///< takes its operands off the stack and leaves its result
+  Makes,         ///< takes its operands off the stack of the chain and pushes its result
   PassesThrough  ///< leaves its operand on the stack: write, measure, check, info, render
 };
 
@@ -96,7 +97,8 @@ struct Operator {
   std::function<Plan(Invocation&)> plan = {};
   /// Estimates the time of `run`, and its memory beside operands and result. Empty: unknown.
   CostOf cost = {};
-  /// Bound of the surface error of the result; empty: not measured.
+  /// Bound of the surface error of the result as a function of the voxel size; empty: the
+  /// regression suite does not measure it.
   std::optional<levelset::ErrorModel> errorModel = {};
   /// Returns the least radius of curvature of the result, world units; 0 or less: unknown.
   std::function<double(Invocation&)> leastRadius = {};

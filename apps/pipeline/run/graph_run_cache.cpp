@@ -18,7 +18,8 @@ void GraphRun::useCache(const std::vector<char>& needed) {
     const bool isKnown = keys_[i] && cache_->has(*keys_[i]);
     if (!node.makes()) {
       if (isKnown && isUpToDate(*keys_[i])) states_[i] = NodeState::UpToDate;
-    } else if (!taken[i] && uses[i] > 0) {  // without uses, the value is itself a result
+    } else if (!taken[i] && uses[i] > 0) {  // nodes take the value, but none of them runs; a value
+                                            // that no node takes is a result of the run
       states_[i] = NodeState::UpToDate;
     } else if (isKnown && Cache::canHold(node.kind)) {
       states_[i] = NodeState::Load;

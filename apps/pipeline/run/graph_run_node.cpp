@@ -156,7 +156,7 @@ void GraphRun::runNode(std::size_t i, StepReport& step, StepClock& clock,
       finish(node.makes() ? &value : nullptr);
     } else {
       Value value = op.run(invocation);
-      putActionBefore(op.name, invocation.notes);  // as the cache stores them
+      putActionBefore(op.name, invocation.notes);  // the cache stores the notes in this form
       if (!regions_[i].isWhole()) value = cropTo(value, regions_[i]);
       if (node.makes()) describeResult(value, false, step);
       clock.stop();

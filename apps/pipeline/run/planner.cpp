@@ -92,7 +92,8 @@ Peak findPeak(const Graph& graph, const std::vector<char>& runs,
     for (const std::size_t input : graph.nodes[i].inputs) release(input);
     for (const auto& [option, input] : graph.nodes[i].named) release(input);
     const double made = ignoresRoi(graph.nodes[i]) ? bytesOf(plans[i], {}) : bytes(i);
-    // The last consumer of a value may modify it in place.
+    // The last consumer of a value may modify it in place, so its result reuses the memory of the
+    // largest value that is released.
     double during = held + std::max(0.0, made - largest);
     if (!worked.empty()) during = held + made + worked[i];
     if (during > peak.bytes) peak = {during, i};

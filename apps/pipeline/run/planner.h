@@ -27,8 +27,8 @@ struct ValuePlans {
 /// Plans the values of all nodes that run.
 /// @param runs       one flag per node
 /// @param maxMemory  limit for files that planning must read, bytes
-/// @param mesh       plans a node, given by index, without operands whose result is a mesh; may
-///        take a while
+/// @param mesh       plans a node, given by its index, that makes a mesh and has no operands; may
+///        take long, because it may compute the mesh
 [[nodiscard]] ValuePlans planValues(const Graph& graph, const std::vector<char>& runs,
                                     std::size_t maxMemory,
                                     const std::function<std::optional<Plan>(std::size_t)>& mesh);

@@ -23,37 +23,40 @@ namespace pipeline {
 namespace {
 
 // === Constants of the search
-/// Safety factor for errors estimated from runs: the largest distance is at different points on
-/// different grids. Without the factor, estimates are 1.0 to 2.1 times the true error over the
-/// cases of tests/bench/tolerance_bench.cpp.
+/// Safety factor for errors estimated from runs at several voxel sizes. On different grids, the
+/// largest distance of the surfaces lies at different points. Without the factor, estimates are 1.0
+/// to 2.1 times the true error over the cases of tests/bench/tolerance_bench.cpp.
 constexpr double kSafety = 1.25;
 /// Fraction of the tolerance that the next voxel size aims at if the error is estimated.
 constexpr double kAim = 0.65;
 /// Fraction of the tolerance that the next voxel size aims at if the error is measured.
 constexpr double kMeasuredAim = 0.8;
-/// Safety factor for measured errors, because samples miss the points between them. On the bunny,
-/// samples at half the spacing find an error up to 1.06 times as large.
+/// Safety factor for errors measured against the source mesh at sample points, which miss the
+/// largest distance. On the bunny, samples at half the spacing find an error up to 1.06 times as
+/// large.
 constexpr double kMeasuredSafety = 1.1;
-/// An estimate below this fraction of the tolerance justifies a run with larger voxels. It saves
-/// memory, and time in all later actions.
+/// An estimate below this fraction of the tolerance justifies a run with larger voxels. Larger
+/// voxels save memory, and time in all later actions.
 constexpr double kWasteful = 0.25;
-/// Smallest and largest factor from one voxel size to the next. Short extrapolations are more
-/// accurate.
+/// Smallest and largest factor from one voxel size to the next. The error is predicted more
+/// accurately for a nearby voxel size.
 constexpr double kFinest = 1 / 3.0, kCoarsest = 4;
 /// Smallest number of voxels along the longest side of the smallest object. The coarsest run for
 /// comparison has a quarter of them, and a comparison with fewer is meaningless.
 constexpr double kLeastVoxels = 8;
-/// Largest number of voxels along the longest side in the first run, independent of the models.
+/// Largest number of voxels along the longest side of the largest object in the first run, whatever
+/// the error models say. A small object may need up to kCoarsest times as many.
 constexpr double kMostFirst = 64;
 /// Largest voxel size, as a multiple of the tolerance, if there are creases. The error near creases
 /// is about half a voxel. It is not compared with the tolerance, but should stay within a few times
 /// the tolerance where memory allows.
 constexpr double kCreaseVoxels = 4;
-constexpr int kMostRounds = 12;  ///< voxel sizes that are tried
+constexpr int kMostRounds = 12;  ///< largest number of voxel sizes that are tried
 /// Lowest convergence order in extrapolations. At a lower observed order, the difference of two
 /// runs counts as the error.
 constexpr double kLeastOrder = 1;
-/// Voxels along the longest side of an object when sizes of objects are planned.
+/// --resolution of the dry run that finds the sizes of the objects: voxels along the longest side
+/// of each.
 constexpr int kPlanResolution = 16;
 
 class ToleranceRun {
@@ -97,7 +100,7 @@ class ToleranceRun {
 
  private:
   /// With a cache, moves the nodes of `once` to `again`. Every run then contains them and reads
-  /// their values from the cache, in place of values given from outside its graph.
+  /// their values from the cache, in place of values that computeOnce() passes to it.
   static ToleranceParts withoutCacheUse(ToleranceParts parts, const RunSettings& settings) {
     if (settings.cache.empty() || settings.dryRun) return parts;
     parts.again.insert(parts.again.end(), parts.once.begin(), parts.once.end());
@@ -241,7 +244,7 @@ class ToleranceRun {
       coarser = levels_.runAt(voxel, 4);
       coarser->values.clear();
     } catch (const levelset::InvalidInput&) {
-      // An object vanishes at that voxel size: the order stays kLeastOrder.
+      // An object vanishes at four times the voxel size: the convergence order stays kLeastOrder.
     }
     Level coarse = levels_.runAt(voxel, 2);
     coarse.values.clear();
@@ -255,8 +258,8 @@ class ToleranceRun {
       const double order =
           std::clamp(isObserved ? std::log2(far.smooth / near.smooth) : kLeastOrder, kLeastOrder,
                      std::max(kLeastOrder, model_.order));
-      // The difference between this voxel size and twice as large voxels may be small by chance. So
-      // the difference that the order predicts from the two coarser runs is used if it is larger.
+      // The surfaces at this voxel size and at twice the size may agree by chance. So the
+      // difference that the order predicts from the two coarser runs is used if it is larger.
       const double expected = far.smooth / std::exp2(order);
       const double error = kSafety * std::max(near.smooth, expected) / (std::exp2(order) - 1);
       output.creaseShare = near.creaseShare;
@@ -268,7 +271,8 @@ class ToleranceRun {
     }
   }
 
-  /// Smallest voxel size that memory allows, predicted from a trial.
+  /// Smallest voxel size, world units, that the memory limit allows, predicted from a trial. 0: no
+  /// limit; the largest double: no size fits.
   [[nodiscard]] double leastVoxel(const Trial& trial) const {
     if (settings_.maxMemory == levelset::kNoMemoryLimit) return 0;
     // The working memory of operators and of comparisons is proportional to the surface area.
@@ -404,8 +408,8 @@ class ToleranceRun {
   }
 
   /// Keeps the better of two trials. Among trials within the tolerance, the coarser one is better,
-  /// or with creases the later one. Among the others, the one with the smaller ratio of error to
-  /// tolerance is better.
+  /// or with creases the later one. Among trials beyond the tolerance, the one with the smaller
+  /// ratio of error to tolerance is better.
   void keepBest(Trial trial) {
     const bool isBetter =
         !best_ || (trial.ratio <= 1 ? best_->ratio > 1 || trial.hasCreases ||
@@ -479,8 +483,10 @@ class ToleranceRun {
   /// bytes.
   double base_ = 0, coarsePeak_ = 0;
   std::optional<Trial> best_;
-  std::optional<double> reaching_;  ///< coarsest voxel size within the tolerance
-  std::optional<double> failing_;   ///< finest voxel size beyond the tolerance
+  std::optional<double>
+      reaching_;  ///< largest voxel size at which the error was within the tolerance
+  std::optional<double>
+      failing_;  ///< smallest voxel size at which the error exceeded the tolerance
   std::exception_ptr failure_;
   int stalled_ = 0;  ///< number of voxel sizes at which the error did not fall
   struct Measured {

@@ -27,9 +27,10 @@ struct ToleranceParts {
 };
 
 /// Assigns the needed nodes of a graph to their roles.
-/// @throws levelset::UsageError if no voxel size is open, or no result has an error estimate
-/// @throws levelset::UsageError if a length is given in voxels whose size is open, or an action
-///         writes files beside its result
+/// @throws levelset::UsageError if every node has a given voxel size, or no result has an error
+///         estimate
+/// @throws levelset::UsageError if a node without a given voxel size has a length in voxels, or an
+///         action writes files beside its result
 [[nodiscard]] ToleranceParts toleranceParts(const Graph& graph);
 
 /// Returns a warning for each length in voxels: the exact surface then depends on the voxel size.
@@ -48,13 +49,13 @@ struct PartGraph {
 [[nodiscard]] PartGraph partGraph(const Graph& graph, const std::vector<std::size_t>& keep,
                                   const std::map<std::size_t, Value>& given);
 
-/// Sets the voxel size of the chosen nodes to `voxel` times `coarsening`. Multiplies the voxel
-/// sizes that the user gave by `coarsening`.
+/// Sets the voxel size of the nodes in ToleranceParts::chosen to `voxel` times `coarsening`.
+/// Multiplies the voxel sizes that the user gave by `coarsening`.
 void setVoxels(Graph& graph, const ToleranceParts& parts, double voxel, double coarsening);
-/// Sets --resolution of the chosen nodes.
+/// Sets --resolution of the nodes in ToleranceParts::chosen.
 void setResolution(Graph& graph, const ToleranceParts& parts, int resolution);
 
-/// Name of a result: "@NAME", or the action.
+/// Name of a node's result in messages: "@NAME" if --as names it, otherwise the name of the action.
 [[nodiscard]] std::string nameOf(const Node& node);
 
 }  // namespace pipeline

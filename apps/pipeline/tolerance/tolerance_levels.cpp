@@ -224,11 +224,11 @@ std::optional<double> LevelRunner::knownError(const Level& level, std::size_t ou
 
 LevelDifference LevelRunner::difference(const Level& fine, const Level& coarse,
                                         std::size_t output) const {
-  // Voxels. Crease detection reads normals up to this distance on both sides of an edge, so the
-  // faces must be flat over it.
+  // In voxels of the coarse run. Crease detection reads normals up to this distance on both sides
+  // of an edge, so the faces must be flat over it.
   constexpr double kFlatVoxels = 4;
-  // Coarse voxels. Within this distance of an edge, triangles cut off the edge or are affected by
-  // its rounding.
+  // In voxels of the coarse run. Within this distance of an edge, triangles cut off the edge or are
+  // affected by its rounding.
   constexpr double kCreaseReach = 2.5;
   const LevelSurface &near = fine.surfaces[output], &far = coarse.surfaces[output];
   levelset::SurfaceDifferenceOptions options{.spacing = near.voxelSize,

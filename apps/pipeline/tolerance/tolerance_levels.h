@@ -11,18 +11,20 @@
 
 namespace pipeline {
 
-/// Surface of a result at one voxel size, for comparison.
+/// Surface of one output of a run with --tolerance, at one voxel size. The search compares it with
+/// the surface at other voxel sizes.
 struct LevelSurface {
   levelset::TriangleSurface surface = {};
   levelset::TriangleSurface uniform =
-      {};                ///< uniform mesh of the level set that `surface` comes from; invalid: none
-  double voxelSize = 0;  ///< voxel size of that level set or of the result, world units
+      {};  ///< mesh with uniform triangles of the level set behind `surface`; isValid() is false if
+           ///< there is no such level set
+  double voxelSize = 0;  ///< voxel size of that level set; without one, of the run; world units
   double diagonal = 0;   ///< diagonal of the bounding box, world units
-  double heldEdge =
-      0;  ///< width of the flat faces beside sharp edges of the source meshes, world units
+  double heldEdge = 0;   ///< width of flat faces beside sharp edges, largest over the meshes that
+                         ///< become level sets; world units
 };
 
-/// A message of a run, kept until the search has chosen the best run.
+/// A message of a run, kept until the search for the voxel size has chosen the best run.
 struct Message {
   enum class Kind { Print, Warn, Note } kind = Kind::Note;
   std::string text;
@@ -32,7 +34,8 @@ struct Message {
 struct Level {
   double voxelSize = 0;
   std::vector<LevelSurface> surfaces;   ///< one per node of ToleranceParts::outputs
-  std::map<std::size_t, Value> values;  ///< values of ToleranceParts::lasting, by node index
+  std::map<std::size_t, Value> values;  ///< values that nodes which write, draw or print will read,
+                                        ///< or that no node reads; by node index
   RunReport report;
   std::vector<Message> messages;
   /// Message of a numeric check that failed, after which the run continued; empty: none.
@@ -44,27 +47,32 @@ struct Level {
 
 /// Difference between the surfaces of one result in a fine and in a coarse run.
 struct LevelDifference {
-  double smooth = 0, crease = 0, creaseShare = 0;  ///< as in levelset::SurfaceDifference
+  double smooth = 0, crease = 0,
+         creaseShare = 0;  ///< largest distances away from and near creases, world units; share of
+                           ///< the samples near creases
 };
 
-/// Runs the parts of a graph at several voxel sizes and compares their results.
+/// Runs a graph at several voxel sizes and compares the surfaces of its outputs. ToleranceParts
+/// lists the nodes that each run contains.
 class LevelRunner {
  public:
   LevelRunner(const Graph& graph, const ToleranceParts& parts, const RunSettings& settings);
 
-  /// Computes the nodes of ToleranceParts::once. Appends the steps to `report`.
+  /// Computes the nodes whose values do not depend on voxel sizes (ToleranceParts::once). Appends
+  /// their steps to `report`.
   void computeOnce(RunReport& report);
   /// Plans the complete graph with `resolution` voxels along the longest side of each object. Also
-  /// checks the files that it will write.
+  /// checks that the files which the graph writes can be created.
   /// @return plans by node index
   [[nodiscard]] std::map<std::size_t, Value> planAll(int resolution, RunReport& report) const;
-  /// Runs the nodes of ToleranceParts::again, with the values of computeOnce(), at the voxel size
-  /// `voxel` times `coarsening`.
-  /// @param voxel       voxel size of the nodes of ToleranceParts::chosen, world units
+  /// Runs the nodes that depend on voxel sizes (ToleranceParts::again) on the values of
+  /// computeOnce(), at the voxel size `voxel` times `coarsening`.
+  /// @param voxel       voxel size of the nodes whose voxel size the user left open, world units
   /// @param coarsening  factor for all voxel sizes, including those that the user gave
   /// @throws levelset::Error as run()
   [[nodiscard]] Level runAt(double voxel, double coarsening);
-  /// Plans the complete graph at a voxel size. Appends the steps to `report`.
+  /// Runs the complete graph at a voxel size in a dry run, which only plans. Appends the steps to
+  /// `report`.
   void planAt(double voxel, RunReport& report) const;
   /// Runs the nodes that write, draw, print and check, on the values of one run.
   void runEnds(const Level& level, RunReport& report) const;
@@ -91,7 +99,7 @@ class LevelRunner {
   const RunSettings& settings_;
   /// Nodes whose values are kept: outputs, their source meshes and level sets, `lasting`.
   std::vector<std::size_t> watched_;
-  std::map<std::size_t, Value> once_;  ///< values of ToleranceParts::once, by node
+  std::map<std::size_t, Value> once_;  ///< values that computeOnce() computed, by node index
   std::vector<std::size_t> meshes_;    ///< nodes of the meshes that are converted to level sets
   std::map<std::size_t, levelset::TriangleSurface>
       exact_;  ///< surfaces of those `meshes_` that do not depend on voxel sizes, by node

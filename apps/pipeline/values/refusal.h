@@ -9,7 +9,7 @@ namespace pipeline {
 
 /// Decides if std::thread or TBB threw `error` because the system gives no more threads.
 [[nodiscard]] bool isThreadLimitError(const std::exception& error);
-/// Error message for that case, appended to the name of the action or program.
+/// Error message for a failure to start a thread, appended to the name of the action or program.
 inline constexpr const char* kThreadLimitMessage =
     ": the system gives no more threads; raise its limits (ulimit -u, -v), or use fewer --threads";
 

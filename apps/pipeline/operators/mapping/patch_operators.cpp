@@ -405,7 +405,8 @@ Plan planGrid(Invocation& in) {
   }
   Plan plan = in.operands[0].plan();
   plan.kind = Kind::Patch;
-  plan.patchSize = V3d(0);  // depends on the surface
+  plan.patchSize =
+      V3d(0);  // unknown: the lengths of the sides depend on the surface between the corners
   return raisedPlan(in, plan, plan.bounds);
 }
 

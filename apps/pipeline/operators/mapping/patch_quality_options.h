@@ -36,8 +36,7 @@ struct ImprovedPatches {
                                               std::vector<mapping::Patch> patches,
                                               double embedDepth, const Imath::V3d& textureSize);
 
-/// Returns the mean length of the rows of particles on the surface, and that of the columns, world
-/// units.
+/// Returns the mean lengths of a patch on the surface along u and along v, world units.
 [[nodiscard]] std::array<double, 2> sidesOf(const mapping::Patch& patch);
 
 [[nodiscard]] Param kernelParam();

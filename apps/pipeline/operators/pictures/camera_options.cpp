@@ -19,8 +19,8 @@ void setDepths(Invocation& in, render::Camera& camera) {
   if (in.given("far")) camera.far = in.length("far");
 }
 
-/// Changes `camera` by the options that are given, and with `isAll` also by the defaults of the
-/// others.
+/// Changes `camera` by the camera options that are given. With `isAll`, options that are not given
+/// set their defaults.
 void setOptions(Invocation& in, bool isAll, render::Camera& camera) {
   const auto asks = [&](const char* name) { return isAll || in.given(name); };
   if (asks("size")) std::tie(camera.width, camera.height) = in.imageSize("size");
