@@ -19,8 +19,9 @@ struct Outcome {
 };
 /// Options of a run.
 struct RunOptions {
-  /// None, or a function of the name of an action and the completed fraction. It is called in this
-  /// thread, at most 20 times per second and once at the end. Returning False ends the run.
+  /// None, or a function of the name of an action and the completed fraction. It is called in the
+  /// thread that calls compute(), at most 20 times per second and once at the end. Returning False
+  /// ends the run.
   pybind11::object progress = pybind11::none();
   std::filesystem::path cache = {};  ///< cache folder; empty: no cache
   /// The job may have been started before by a process that was killed. Temporary files that it

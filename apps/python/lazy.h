@@ -58,7 +58,7 @@ class Lazy {
   std::optional<pipeline::Value> value_;
   bool isSettled_ = false;
   std::size_t holders_ = 0;  ///< number of Python objects that refer to this node
-  std::size_t waiting_ = 0;  ///< number of uses as input of unsettled nodes
+  std::size_t waiting_ = 0;  ///< number of uses as input of nodes that are not yet computed
 };
 
 /// The graph that computes some lazy values. It begins at values that are already computed.

@@ -76,8 +76,8 @@ class Bounds {
   /// resolution that runs without an entry in `figures` fails.
   Bounds& measured(const std::string& variant, const std::string& figure,
                    std::initializer_list<MeasuredAt> figures);
-  /// Lowers the limits that the last call of measured() added to `limit`, a promised accuracy that
-  /// is tighter than the margin.
+  /// Caps the limits of the last call of measured(): none of them exceeds `limit`, a promised
+  /// accuracy that is tighter than the margin.
   /// @param resolution  resolution whose limit is lowered; 0: all
   Bounds& ceiling(double limit, int resolution = 0);
   /// Adds bounds on an order of convergence, which must be at most Bound::kOrderMargin below the

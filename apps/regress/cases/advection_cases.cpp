@@ -82,7 +82,8 @@ void enright(Recorder& out) {
       return gridded(p, 0) * std::cos(std::numbers::pi * t / 3);
     };
     carry(out, "staggered grid", at, truth, {swinging, 3, true}, 0);
-    // Four advections of a quarter of T each; each starts from the band of the previous one.
+    // Four advections of a quarter of the period T = 3 each; each starts from the band of the
+    // previous one.
     const auto halting = out.measure({"stopped at quarters", at, truth}, kOurs, [&] {
       NarrowBand band = solid;
       for (int quarter = 0; quarter < 4; ++quarter)
@@ -126,7 +127,7 @@ Truth zalesakSphere(const V3d& centre) {
     return a > 0 && slot < 0 ? std::hypot(a, slot) : std::max(a, -slot);
   };
   // Volume of the slot in the ball by the midpoint rule: the integral of the chord along z over |x|
-  // < 2.5, y < 10.
+  // < 2.5 and y < 10 hundredths.
   constexpr int kSteps = 2000;
   double volume = 0;
   const double dx = 0.05 / kSteps * 20, dy = 0.25 / kSteps;

@@ -121,8 +121,8 @@ Truth smoothBalls(const V3d& centreA, double radiusA, const V3d& centreB, double
   return {.distance = distance, .centre = (centreA + centreB) / 2.0, .reach = apart + 1.5};
 }
 
-/// Smooth union of two half spaces that leave the angle `degrees` of free space between them. It is
-/// compared near the edge, which runs along z.
+/// Smooth union of two half spaces that leave the angle `degrees` of free space between them.
+/// Points within a distance of 1 from the corner, a point of the edge along z, are compared.
 Truth smoothPlanes(const V3d& corner, double degrees, double radius) {
   const double half = degrees / 2 * std::numbers::pi / 180;
   const V3d normalA(std::sin(half), -std::cos(half), 0), normalB(std::sin(half), std::cos(half), 0);
@@ -143,8 +143,8 @@ Truth smoothPlanes(const V3d& corner, double degrees, double radius) {
   return truth;
 }
 
-/// Slab whose upper face goes through the corner. It is much larger than the blend, so that it
-/// stands for a half space.
+/// Slab that stands for one half space of smoothPlanes(): `side` −1 has the normal A, 1 has B. The
+/// face through the corner is much larger than the blend.
 Truth slabBelow(const V3d& corner, double degrees, double side) {
   Imath::M44d turn, shift;
   turn.setAxisAngle(V3d(0, 0, 1), side * (90 - degrees / 2) * std::numbers::pi / 180);

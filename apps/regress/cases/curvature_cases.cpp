@@ -157,8 +157,8 @@ void stiff(Recorder& out) {
   const auto expectSmaller = [&](const Integrator& i, const FlowErrors& measured) {
     constexpr double kVoxelSize = 1.0 / 256, kTime = 540 * kVoxelSize * kVoxelSize;
     const NarrowBand solid = exactBand(ball(centre, 1), kVoxelSize);
-    // Euler steps of that length have an error of 0.011 voxel. Each of the five redistancing passes
-    // adds 0.001 voxel.
+    // Euler steps of the length of longSteps() have an error of 0.011 voxel. Each of the five
+    // redistancing passes adds 0.001 voxel.
     expectLongSteps(out, std::string("a ball of 256 voxels shrinks, ") + i.name, solid, kTime,
                     longSteps(i.scheme, kVoxelSize), ball(centre, std::sqrt(1 - 4 * kTime)),
                     measured);

@@ -100,9 +100,9 @@ void fromPointWithGradient(Recorder& out) {
       return std::acosh(1 + slope.length2() * (p - at.shift).length2() / (2 * speed(p))) /
              slope.length();
     };
-    // In the direction of g the front advances by (exp(0.8 |g|) − 1) / |g| = 1.03. Against g it
-    // reaches points where the speed is 0.61; the blocks around these points extend to a speed of
-    // 0.35.
+    // In the direction of g the front advances by (exp(0.8 |g|) − 1) / |g| = 1.03 until the time
+    // 0.8. Against g it reaches points where the speed is 0.61; the blocks around these points
+    // extend to a speed of 0.35.
     const Region reached = reachedRegion(exact, 0.8, at, 1, 1.3, 0.35);
     for (const Front& front : kFronts) {
       const ArrivalOptions options{.method = front.method, .order = front.order, .speed = speed};
@@ -148,7 +148,7 @@ void throughMedia(Recorder& out) {
         const V3d q = p - at.shift;
         return quickest(std::hypot(q.x, q.y), q.z, kDepth, speed);
       };
-      // A margin of two voxels exceeds the error of the times.
+      // A margin of two voxels exceeds the error of the arrival times.
       Region reached =
           reachedRegion(exact, kUntil, at, 2, std::max(1.0, speed), std::min(1.0, speed));
       reached.centre = source[0];

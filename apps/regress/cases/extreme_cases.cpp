@@ -14,8 +14,8 @@ using levelset::NarrowBand;
 
 namespace {
 
-/// Samples a sphere of `at.resolution` voxels, re-distances it and offsets it by three voxels. The
-/// errors in voxels must not depend on the position or on the voxel size.
+/// Samples a sphere with a radius of `at.resolution` voxels, re-distances it and offsets it by
+/// three voxels. The errors in voxels must not depend on the position or on the voxel size.
 void chainOfThree(Recorder& out, const std::string& variant, const Sample& at, double voxelSize,
                   const V3d& centre) {
   Sample here = at;
@@ -29,7 +29,7 @@ void chainOfThree(Recorder& out, const std::string& variant, const Sample& at, d
 
 void scales(Recorder& out) {
   for (const Sample& at : out.samples()) {
-    const V3d off = at.shift / at.voxelSize;  // voxels
+    const V3d off = at.shift / at.voxelSize;  // offset of the centre from a grid point, voxels
     chainOfThree(out, "voxel 1", at, 1, off);
     chainOfThree(out, "voxel 1e-6", at, 1e-6, off * 1e-6);
     chainOfThree(out, "voxel 1e6", at, 1e6, off * 1e6);

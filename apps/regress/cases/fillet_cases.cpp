@@ -32,7 +32,8 @@ struct Wedge {
 Wedge wedge(double degrees, const V3d& corner, double size) {
   const double half = degrees / 2 * std::numbers::pi / 180;
   const auto slab = [&](double side) {
-    // Box below the plane through the corner with this normal, far larger than the fillet.
+    // Box whose face y = 0 is turned about z by ±θ/2 and moved to the corner; far larger than the
+    // fillet.
     M44d turn, shift;
     turn.setAxisAngle(V3d(0, 0, 1), side * half);
     shift.setTranslation(corner);
@@ -88,7 +89,8 @@ double changeBeyond(const NarrowBand& blended, const NarrowBand& plain, const V3
     if (std::abs(value) >= plain.halfWidth() * plain.voxelSize() || !before.isInBand(p)) continue;
     const V3d foot = p - before.normal(p) * value - corner;
     const double away = std::hypot(foot.x, foot.y);
-    // The other edges of the slabs are left out.
+    // Points within `reach` of the edge at the corner are skipped, and points near the other edges
+    // of the slabs.
     if (away < reach + kMargin * blended.voxelSize() || away > 3.5 || std::abs(foot.z) > 2)
       continue;
     largest = std::max(largest, std::abs(static_cast<double>(*it) - value));
@@ -133,8 +135,8 @@ double crossedError(const NarrowBand& band, const V3d& centre, double cylinderRa
   for (int i = -6; i <= 6; ++i) {
     const double angle = 0.12 * i;  // parameter of the ellipse; 0 in the plane z = 0
     const V3d s(sum * std::cos(angle), sum * std::cos(angle), sum * std::sin(angle));
-    // Directions from the centre of the ball to the axes of the cylinders, in which it touches
-    // them.
+    // Directions from the centre of the rolling ball to the axes of the cylinders; the ball touches
+    // the cylinders in these directions.
     const V3d toFirst = V3d(0, -s.y, -s.z).normalized(), toSecond = V3d(-s.x, 0, -s.z).normalized();
     for (const double t : {0.25, 0.5, 0.75}) {
       const V3d direction = (toFirst * (1 - t) + toSecond * t).normalized();

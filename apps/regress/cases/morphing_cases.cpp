@@ -15,8 +15,8 @@ using levelset::NarrowBand;
 
 namespace {
 
-/// Returns the largest ratio of a difference to its predecessor. A ratio below 1 means that the
-/// differences fall strictly.
+/// Returns the largest ratio of an element to its predecessor. `differences` are the volumes of the
+/// symmetric differences of target and morph, step by step. A result below 1 means a strict fall.
 double mostLeft(const std::vector<double>& differences) {
   double most = 0;
   for (std::size_t i = 1; i < differences.size(); ++i)

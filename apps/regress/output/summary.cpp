@@ -11,8 +11,9 @@
 namespace regress {
 namespace {
 
-/// Column with the share of missing values. A missing value has no error, so this share must be
-/// zero wherever errors are bounded, unless the case bounds the share itself.
+/// Column with the share of missing values: grid points without a value, or zeros of φ that a ray
+/// misses. They have no error, so the share must be 0 where errors are bounded, unless the case
+/// bounds the share itself.
 struct Presence {
   const char* figure;
   const char* errors[2];  ///< prefixes of the error columns in which missing values do not count

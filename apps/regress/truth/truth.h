@@ -37,7 +37,7 @@ struct Truth {
 /// Moves a solid by a rotation and a translation (row vectors).
 [[nodiscard]] Truth moved(const Truth& solid, const Imath::M44d& matrix);
 
-/// Two balls whose surfaces meet in a circle.
+/// Union, intersection or difference of two balls whose surfaces meet in a circle.
 [[nodiscard]] Truth twoBalls(levelset::CsgOperation operation, const Imath::V3d& centreA,
                              double radiusA, const Imath::V3d& centreB, double radiusB);
 
