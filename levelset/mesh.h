@@ -70,12 +70,14 @@ void requireAttributes(const TriMesh& mesh);
                                            const std::array<Imath::V3d, 3>& slopes, double hand);
 
 /// Appends the vertices and triangles of another mesh. Drops attributes that only one of the meshes
-/// has. The result has the coarser `precision` and the larger `spacing` of the two meshes.
+/// has. The result has the coarser `precision` and the larger `spacing` of the two meshes. A mesh
+/// without vertices takes both, and the attributes, from `other`.
 void append(TriMesh& mesh, const TriMesh& other);
 
-/// Returns the mesh without attributes, with the doubled vertices along attribute seams merged.
-/// Merges two edges at equal positions when each has only one triangle and they run in opposite
-/// directions. Surface components that only touch keep their own vertices.
+/// Returns the mesh without attributes, with the doubled vertices along seams (edges where normals,
+/// texture coordinates or colours jump) merged. Merges two edges at equal positions when each has
+/// only one triangle and they run in opposite directions. Surface components that only touch keep
+/// their own vertices.
 /// @return nullopt when no vertices are merged: use `mesh` itself
 /// @throws ResourceLimit
 [[nodiscard]] std::optional<TriMesh> withoutSeams(const TriMesh& mesh,

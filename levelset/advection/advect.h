@@ -27,8 +27,8 @@ enum class AdvectScheme {
 struct AdvectOptions {
   double start = 0;  ///< time at which the motion starts, passed to the velocity
   AdvectScheme scheme = AdvectScheme::Front;
-  bool fixVolume = false;         ///< offset the result to the volume of the solid
-  std::optional<Mask> mask = {};  ///< weight that multiplies the velocity
+  bool fixVolume = false;  ///< offset the result so that it has the volume of the given solid
+  std::optional<Mask> mask = {};  ///< weight that multiplies the velocity; empty: 1
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
@@ -91,7 +91,8 @@ struct AdvectOperator {
     NamedVelocity field;
     double time = 0, start = 0;
     AdvectScheme scheme = AdvectScheme::Front;
-    std::optional<double> period;  ///< of a built-in velocity, see describe(); empty: its default
+    std::optional<double> period;  ///< time after which a solid moved by a built-in velocity is
+                                   ///< back at its start; empty: default of that velocity
     Imath::V3d center = Imath::V3d(0), axis = Imath::V3d(0, 0, 1);
     std::string factor;  ///< formula in t that multiplies the velocity; empty: 1
     bool fixVolume = false;

@@ -39,8 +39,8 @@ constexpr double kBytesPerTriangle = 100;
 // again keeps its triangles. The test Front.HasFewTrianglesWhereItIsStretched shows the margin for
 // smooth velocities.
 constexpr double kMostTrianglesPerVoxel = 50, kSpareTriangles = 20000;
-// An end of an edge lies on a crease when its vertex normal times the mean of the two face normals
-// beside the edge is less than this cosine.
+// An end of an edge lies on a crease when the dot product of its vertex normal and the mean of the
+// two face normals beside the edge is less than this cosine.
 constexpr double kCreaseCosine = 0.8;
 
 std::uint64_t edgeKey(std::uint32_t a, std::uint32_t b) {
@@ -127,7 +127,8 @@ class Splitter {
       int marked = 0;
       for (std::size_t k = 0; k < 3; ++k) marked += (m[k] = midpoint(t[k], t[(k + 1) % 3])) != 0;
       if (marked == 0) continue;
-      // Rotate so that the first edge is split, and the last one is not unless all are.
+      // Rotate the corners of the triangle so that its first edge is split, and its last edge is
+      // not unless all three are.
       while (m[0] == 0 || (marked == 2 && m[2] != 0)) {
         std::rotate(t.begin(), t.begin() + 1, t.end());
         std::rotate(m.begin(), m.begin() + 1, m.end());

@@ -47,7 +47,7 @@ class Front {
   TriMesh mesh_;
   std::vector<Imath::V3d> moved_;  ///< positions of the vertices after the last tried step
   double largestArea_ = 0;         ///< largest area of the surface so far, voxels²
-  bool isStill_ = false;           ///< all velocities in the last tried step were zero
+  bool isStill_ = false;           ///< all velocities sampled in the last tried step were zero
 };
 
 }  // namespace levelset::flow

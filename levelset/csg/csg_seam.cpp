@@ -26,11 +26,12 @@ constexpr double kFootMiss = 0.02;
 /// quarter of its curvature, and the parts of neighbouring cells must leave no gap.
 constexpr double kPatchReach = 0.5 + 0.05;
 constexpr double kLineReach = 0.5 + 0.1;
-/// Largest deviation of the corner values from their plane, voxels. A cell with a larger one
-/// contains an edge. A sphere with a radius of five voxels stays below.
+/// Largest deviation of the values at the corners of a cell from the linear function fitted to
+/// them, voxels. A cell with a larger deviation contains an edge. A sphere with a radius of five
+/// voxels stays below.
 constexpr double kBend = 0.05;
 
-/// Reads the distances of one operand in voxels, multiplied by its sign of CsgSigns.
+/// Reads the distances of one operand in voxels, multiplied by its sign ±1 of CsgSigns.
 struct SignedField {
   FloatGrid::ConstAccessor accessor;
   double perVoxel;  ///< sign / voxel size
@@ -45,8 +46,8 @@ struct SignedField {
   double operator()(const Vec3d& index) const {
     return perVoxel * SampleBlock<2>(accessor, index).value();
   }
-  /// Direction from an inside point to the surface. Along each axis, uses the neighbour that is
-  /// closer to the surface.
+  /// Returns the direction from an inside grid point to the surface, of length about 1 where the
+  /// values are distances. Along each axis, uses the neighbour that is closer to the surface.
   Vec3d towardsSurface(const Coord& c) const {
     const double here = (*this)(c);
     Vec3d direction(0, 0, 0);
@@ -61,7 +62,8 @@ struct SignedField {
   }
 };
 
-/// Plane n·y + d = 0 that fits a surface in a cell, with y relative to the cell's centre.
+/// Plane n·y + d = 0 that fits a surface in a cell, in voxels, with unit normal n and y relative to
+/// the cell's centre.
 struct Patch {
   bool isValid = false;
   Vec3d n;
@@ -91,8 +93,8 @@ struct CellCorners {
     for (int i = 0; i < 8; ++i)
       values[static_cast<std::size_t>(i)] = field(c.offsetBy((i >> 2) & 1, (i >> 1) & 1, i & 1));
   }
-  /// Returns true if each corner is inside one of the operands, so that no surface of the result
-  /// crosses the cell.
+  /// Returns true if each corner is inside this operand or the one of `other`, so that no surface
+  /// of their union crosses the cell.
   bool allInsideWith(const CellCorners& other) const {
     for (std::size_t i = 0; i < 8; ++i)
       if (!(values[i] < 0) && !(other.values[i] < 0)) return false;
@@ -139,8 +141,9 @@ Vec3d clamped(const Vec3d& y, double reach) {
           std::clamp(y[2], -reach, reach)};
 }
 
-/// Returns the distance from r to the part of a plane in the cell that is outside the other solid,
-/// or `best` if that is smaller. The position r is relative to the centre of the cell, voxels.
+/// Returns the distance from r to the part of a plane in the cell, or `best` if that is smaller. If
+/// `isSeam`, only the part outside the other solid counts. The position r is relative to the centre
+/// of the cell, voxels.
 double patchDistance(const Patch& patch, const Patch& other, bool isSeam, const Vec3d& r,
                      double best) {
   if (!patch.isValid || std::abs(patch.above(r)) >= best) return best;
@@ -152,7 +155,7 @@ double patchDistance(const Patch& patch, const Patch& other, bool isSeam, const 
 }
 
 /// Returns the distance from r to the intersection line of both planes within the cell, or `best`
-/// if that is smaller.
+/// if that is smaller. The position r is relative to the centre of the cell, voxels.
 double lineDistance(const SurfaceCell& cell, const Vec3d& r, double best) {
   const Patch &p = cell.first, &q = cell.second;
   if (!p.isValid || !q.isValid) return best;
@@ -228,9 +231,9 @@ class SeamCorrector {
     const SignedField& winner = atU < atV ? u : v;
     const SignedField& loser = atU < atV ? v : u;
     const double depth = -std::min(atU, atV);
-    // c lies at `depth` inside the winner, and so do all points closer than that. If the loser is
-    // farther from c than `depth`, it does not contain the closest surface point and cannot change
-    // the distance.
+    // The winner is the operand with the smaller value. The ball about c with radius `depth` lies
+    // inside it. If the loser is farther from c than `depth`, it does not contain the closest
+    // surface point and cannot change the distance.
     if (std::max(atU, atV) > depth + kFootMiss) return false;
     if (isBesideSurface(u, v, c)) return false;
     const Vec3d direction = winner.towardsSurface(c);
@@ -321,8 +324,8 @@ class SeamCorrector {
     }
   }
 
-  /// Returns the distance of a grid point from the surface cells, voxels. Returns slightly more
-  /// than the half width if they are farther away.
+  /// Returns the distance of a grid point from the planes and lines in `cells_`, voxels. Returns
+  /// slightly more than the half width if all are farther away.
   double surfaceDistance(const Coord& c) const {
     const int steps = static_cast<int>(std::ceil((reach_ + 2) / 8));
     const Coord home = c & ~7;

@@ -25,23 +25,26 @@ using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
 constexpr double kLeastRadius = 0.5;  // voxels: the grid cannot represent a smaller ball
-// Largest cosine between the normals of two surfaces at an edge. Surfaces with more similar normals
-// form no edge.
+// Largest cosine between the normals of the two surfaces at the seam. Surfaces with more similar
+// normals form no edge there.
 constexpr double kSameCosine = 0.9995;
+// Search for the centre of the ball on its spine, the curve of all centres: number of steps,
+// length below which a step is the last, and longest step.
 constexpr int kSpineSteps = 16;
 constexpr double kSpineTolerance = 1e-3;  // voxels
 constexpr double kLongestSpineStep = 4;   // voxels
-// Lower bound of the decrease of the remaining distance along the spine divided by the length of
-// the step. The quotient is larger where the spine has a unique nearest point.
+// Lower bound of a quotient in findBall(): decrease of the distance to the grid point along the
+// spine, divided by the length of the step. It is larger where the spine has a unique nearest
+// point.
 constexpr double kLeastShrinkage = 0.05;
-constexpr double kStencil =
-    4;  // voxels around a point that the tricubic interpolation of its jet reads
+// The tricubic interpolation at a point reads values up to this distance, voxels.
+constexpr double kStencil = 4;
 // Largest distance of the seam from the line in which the tangent planes at the two contact points
 // of the ball intersect: kSeamShare × radius of the ball + kSeamSlack voxels. Farther from the
 // seam, the surfaces face each other without intersecting.
 constexpr double kSeamShare = 0.75, kSeamSlack = 2;
 
-/// A position of the ball, in index space.
+/// A position of the rolling ball, in index space.
 struct Ball {
   /// Centre, and unit gradients of the distances to both solids there.
   Vec3d centre, normalA, normalB;
@@ -49,10 +52,11 @@ struct Ball {
   double cosine = 0, radius = 0;
 };
 
-/// Radius of the ball and limits of the fillet, in voxels.
+/// Radius of the ball, `reach` (largest distance from the seam to the middle of the arc) and limits
+/// of the fillet, in voxels.
 struct FilletSize {
   double radius, reach;
-  /// Upper bound of the distance from the seam to a contact point of the ball.
+  /// Upper bound of the distance from the seam to a contact point of the ball; infinite: not set.
   double bound = HUGE_VAL;
 
   /// Returns the radius r of the ball between surfaces whose normals have this cosine and which
@@ -71,8 +75,9 @@ struct FilletSize {
 };
 
 /// Returns an upper bound of the distance between the seam and the contact points of a ball that
-/// touches both solids, voxels. The seam lies in the bounding boxes of both solids. The contact
-/// points lie in them too, within a margin of the diameter of the ball.
+/// touches both solids, voxels. The seam lies in the bounding boxes of both solids, and the contact
+/// points within `margin` of these boxes. So the diagonal of their common box with the margin is a
+/// bound.
 double boundOf(const FloatGrid& a, const FloatGrid& b, const FilletSize& size, double halfWidth) {
   openvdb::CoordBBox common = a.evalActiveVoxelBoundingBox();
   common.intersect(b.evalActiveVoxelBoundingBox());
@@ -107,8 +112,8 @@ class BallRoller {
         size_(size),
         curve_(curve) {}
 
-  /// Returns the distance from a grid point to the fillet, voxels; empty if the fillet is not the
-  /// nearest surface.
+  /// Returns the signed distance from a grid point to the fillet, voxels, negative outside the
+  /// ball. Empty where the fillet is not the nearest surface.
   std::optional<double> distance(const Coord& point, double halfWidth) {
     const double a = static_cast<double>(readA_.getValue(point)),
                  b = static_cast<double>(readB_.getValue(point));
@@ -119,7 +124,8 @@ class BallRoller {
     if (!findBall(x, ball)) return {};
     const Vec3d toCentre = ball.centre - x;
     const double p = toCentre.dot(ball.normalA), q = toCentre.dot(ball.normalB);
-    if (p < ball.cosine * q || q < ball.cosine * p) return {};  // x is not between the radii
+    if (p < ball.cosine * q || q < ball.cosine * p)
+      return {};  // x is not between the radii to the contact points
     const Vec3d edge =
         ball.centre - (ball.normalA + ball.normalB) * (ball.radius / (1 + ball.cosine));
     if (curve_.nearest(edge, kSeamShare * ball.radius + kSeamSlack) == eikonal::PointTree::kNone)
@@ -133,9 +139,10 @@ class BallRoller {
     return block.jet(p - block.origin().asVec3d());
   }
 
-  /// Finds the ball whose centre is nearest to x. Across the spine, uses Newton's method for a(s) =
-  /// b(s) = r. Along the spine, uses the secant method: where the spine bends around x, the
-  /// remaining distance decreases by less than the step.
+  /// Finds the ball whose centre is nearest to x. The centres s lie on the spine: a(s) = b(s) = r,
+  /// with the distances a and b to both solids. Newton's method leads to the spine. Along it, the
+  /// secant method is used: where the spine bends around x, the distance to x along the spine
+  /// decreases by less than the step.
   bool findBall(const Vec3d& x, Ball& ball) {
     ball.centre = x;
     double before = 0, moved = 0, shrinkage = 1;
@@ -176,8 +183,8 @@ class BallRoller {
   const eikonal::PointTree& curve_;
 };
 
-/// Returns the origins of the leaf blocks within `extent` voxels of the curve that both grids
-/// contain, sorted. Elsewhere no ball touches both solids.
+/// Returns the sorted origins of the leaf blocks that both distance grids contain and that lie
+/// within `extent` voxels of the seam curve. Elsewhere no ball touches both solids.
 std::vector<Coord> blocksBeside(const FloatTree& a, const FloatTree& b,
                                 const eikonal::PointTree& curve, double extent) {
   std::vector<Coord> both;
@@ -199,7 +206,8 @@ std::vector<Coord> blocksBeside(const FloatTree& a, const FloatTree& b,
 
 struct FilletBlock {
   Coord origin;
-  /// Buffer offsets and distances, voxels, negative inside the result.
+  /// Changed grid points: buffer offset, and distance to the fillet in voxels, negative inside the
+  /// result.
   std::vector<std::pair<openvdb::Index, float>> values;
 };
 // Memory of a FilletBlock with all its values, the spare capacity of its vector, and the leaf of

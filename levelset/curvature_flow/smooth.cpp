@@ -22,28 +22,31 @@ using flow::Values;
 using openvdb::Coord;
 using openvdb::CoordBBox;
 
-// Cut-off of the Gaussian, in σ.
+// Distance at which the Gaussian filter is cut off, in σ.
 constexpr double kGaussianReach = 4;
-// Distance from the zero set at which the interpolant reads values, voxels.
+// Largest distance from the zero set at which the interpolant of the distance transform reads
+// values, voxels.
 constexpr double kStencil = 3;
 // Half width that the filter needs, in σ. Values farther from the surface change the result little,
-// since those on its two sides cancel.
+// since the changes on the two sides of the surface cancel.
 constexpr double kKnownReach = 3;
-// Relative tolerance for a band to count as wide enough.
+// A band is widened when the filter needs more than this multiple of its half width.
 constexpr double kWideEnough = 1.0001;
-// Number of fields in memory at the same time.
+// Number of fields, each with one float for each grid point of the leaf blocks, in memory at once.
 constexpr double kFieldsAlive = 5;
 // Largest number of values that a median may read, for all grid points together. Reading as many
 // takes some thousand CPU seconds.
 constexpr double kMostReadings = 1e12;
-constexpr double kWidened = 0.3, kFiltered = 0.7;  // progress after widening and after filtering
+// Progress, 0 to 1, when the band is wide enough and when it is filtered.
+constexpr double kWidened = 0.3, kFiltered = 0.7;
 
-/// Returns the weights of a Gaussian filter along a line, from the middle to one end. The filter is
-/// symmetric.
+/// Returns the weights of a Gaussian filter along a line, from the middle to one end; `sigma` is in
+/// voxels. The filter is symmetric.
 std::vector<float> gaussianWeights(double sigma) {
   const int reach = std::max(1, static_cast<int>(std::ceil(kGaussianReach * sigma)));
   // The weights integrate the Gaussian over each voxel, so that a σ below a voxel keeps its
-  // variance. That adds the variance 1/12 of a voxel, which is therefore subtracted from σ² first.
+  // variance. The integration adds 1/12 voxel², the variance of a box one voxel wide, so this is
+  // subtracted from σ² first.
   std::vector<double> weights;
   const double narrowed = std::sqrt(std::max(sigma * sigma - 1.0 / 12, 1e-4));
   double sum = 0;
@@ -74,7 +77,7 @@ std::vector<float> boxWeights(double sigma) {
 }
 
 /// Returns the array offsets, in a dense cube with `side` grid points along an edge, from a grid
-/// point to all grid points within `radius` voxels of it.
+/// point to all grid points within `radius` voxels of it; a radius below 1 counts as 1.
 std::vector<std::ptrdiff_t> stepsWithin(double radius, int pad, std::ptrdiff_t side) {
   const double squared = std::max(1.0, radius * radius);
   std::vector<std::ptrdiff_t> steps;
@@ -102,10 +105,11 @@ void requireMedian(const openvdb::FloatGrid& grid, double radius) {
       radius, readings, kMostReadings));
 }
 
-/// Filter for fields on the blocks of a band.
+/// Linear and median filters for a field on the leaf blocks of a band.
 class BlockFilter {
  public:
-  /// @param passes  number of passes over all blocks that report progress
+  /// @param passes  number of passes over all blocks that the caller makes, for the fraction in
+  ///                progress reports
   BlockFilter(const openvdb::FloatGrid& grid, double passes, Progress progress)
       : tree_(grid.tree()),
         blocks_(grid.tree()),
@@ -166,6 +170,7 @@ class BlockFilter {
   }
 
   /// Copies the values of a block and of `pad` grid points on each side of it, rows along z.
+  /// Positions outside all leaf blocks get the background with their sign.
   void gatherWide(const Field& field, std::size_t i, int pad, std::vector<float>& dense) const {
     const int side = 8 + 2 * pad;
     dense.resize(static_cast<std::size_t>(side) * static_cast<std::size_t>(side) *
@@ -179,8 +184,9 @@ class BlockFilter {
   }
 
   /// Convolves along an axis: copies each block and its neighbour blocks along the axis, then
-  /// filters the 64 lines of the block. Does not use PaddedLeaf, because the copy extends along one
-  /// axis only, and is transposed so that the 64 lines are contiguous.
+  /// filters the 64 lines of the block. Does not use PaddedLeaf, which copies a border on all
+  /// sides: this copy extends along one axis only, and is transposed so that the 64 lines are
+  /// contiguous.
   void alongAxis(const Field& in, int axis, const std::vector<float>& weights, Field& out) const {
     const int reach = static_cast<int>(weights.size()) - 1, chain = (reach + 7) / 8;
     const std::size_t stride = axis == 0 ? 64 : axis == 1 ? 8 : 1;
@@ -269,7 +275,8 @@ CoordBBox changingBox(const openvdb::FloatGrid& grid, const Mask& mask) {
   return box;
 }
 
-/// Returns the index bounds of the grid points at which two fields differ.
+/// Returns the index bounds of the grid points at which two fields differ; empty when there are
+/// none.
 CoordBBox differing(const BandBlocks& blocks, const Field& a, const Field& b) {
   CoordBBox box;
   for (std::size_t i = 0; i < blocks.size(); ++i)
@@ -313,14 +320,15 @@ struct Filtering {
   [[nodiscard]] double known() const {
     return kind == SmoothKind::Median ? width + 1 : passes() * kKnownReach * width;
   }
-  /// Returns the distance from a grid point to which values are read, voxels.
+  /// Returns the largest distance from a grid point at which the filter reads values, voxels.
   [[nodiscard]] double reach() const {
     return kind == SmoothKind::Median ? width + 1 : passes() * kGaussianReach * width;
   }
 };
 
-/// Smooths the solid in a box of grid points, or everywhere if `box` is empty. Returns no band when
-/// the box contains too little of the surface to compute the distances from.
+/// Smooths the solid in an index box of grid points, or everywhere if `box` is empty. Returns
+/// nullopt if the filtered field has no zero crossing. With a box, also returns nullopt if too
+/// little of the surface lies near it to compute the distances in it.
 std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const NarrowBand& solid,
                                      const Filtering& filtering, const SmoothOptions& options) {
   const double voxel = solid.voxelSize();
@@ -333,7 +341,7 @@ std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const 
   };
 
   // === Distances for the filter
-  // The final redistancing depends on surfaces up to twice the half width away.
+  // The final redistancing reads the surface up to twice the half width of the solid away.
   const double trusted = filtering.known(), own = 2 * solid.halfWidth() + 2;
   const double needed = trusted + std::max(filtering.reach(), own) + 2 * kStencil;
   openvdb::FloatGrid::Ptr field;
@@ -359,7 +367,7 @@ std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const 
   if (options.mask) applyMask(*options.mask, *field, filter.blocks(), before, after);
   const CoordBBox moved = box ? differing(filter.blocks(), before, after) : CoordBBox();
   if (box && moved.empty()) return solid;
-  // A wide filter may change grid points outside the region in which `field` was computed.
+  // Values that change farther than `trusted` voxels from the box would need a larger `field`.
   if (box && !around(trusted).isInside(moved)) return std::nullopt;
   filter.blocks().write(after, voxel, field->tree());
   if (!eikonal::hasZeroCrossing(field->tree())) return std::nullopt;
