@@ -22,8 +22,9 @@ struct BandToMeshOptions {
 /// Converts the zero set to a triangle mesh that faces outwards. The mesh is closed and 2-manifold
 /// when the zero set is closed.
 /// @return vertices on the zero set of the trilinear interpolant to second order in the voxel size
-/// @throws InvalidInput if the band is empty, or an open surface without `openSurface`
-/// @throws UsageError for options out of range
+/// @throws InvalidInput if the band is empty or has no zero crossing, or is an open surface without
+///         `openSurface`
+/// @throws UsageError if `adaptivity` is outside [0, 1], or above 0 together with `sharp`
 [[nodiscard]] TriMesh bandToMesh(const NarrowBand& band, const BandToMeshOptions& options = {});
 
 /// The operator `mesh` for bands.

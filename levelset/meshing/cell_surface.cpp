@@ -124,8 +124,8 @@ void CellSurface::collectBlocks() {
   for (const SurfaceBlock& block : blocks_) addBelow(block.origin, 1);
   for (const Coord& origin : blocksBetweenTiles(grid_)) addBelow(origin, 0);
   sortUnique(candidates);
-  // A block in a tile contains such a cell only if a neighbour in positive direction has a value of
-  // the other sign at their common border.
+  // A block in a tile contains a cell with both signs only if a neighbour in positive direction has
+  // a value of the other sign at their common border.
   for (const Coord& origin : candidates) {
     const float fill = accessor.getValue(origin);
     bool mixed = false;
@@ -187,8 +187,8 @@ std::uint64_t CellSurface::insideWord(const SurfaceBlock& block, unsigned side, 
   return block.neighbourFill[side] < 0 ? ~0ull : 0;
 }
 
-/// Returns the inside masks of slab x in [0, 8], by dy·2 + dz: unshifted, shifted by one along z,
-/// along y, and along both.
+/// Returns four bit masks of slab x in [0, 8], indexed by dy·2 + dz. Bit y·8 + z of a mask is set
+/// when the grid point (x, y + dy, z + dz) is inside.
 CellSurface::Slab CellSurface::slabWords(const SurfaceBlock& block, int x) const {
   const unsigned far = x == kSide ? 4 : 0;
   const int slab = x & (kSide - 1);

@@ -12,9 +12,10 @@
 
 namespace levelset {
 
-/// Block of 8³ grid points, with the cells and edges whose lowest corner is one of them. In the bit
-/// masks, bit y·8 + z of word x stands for a grid point, as in OpenVDB. The values are not copied:
-/// all blocks exist at once, so each refers to its leaf and to its neighbours.
+/// Block of 8³ grid points, with the grid cells and grid edges whose lowest corner is one of these
+/// points. In the bit masks, bit y·8 + z of word x stands for a grid point, as in OpenVDB. The
+/// values are not copied: all blocks exist at once, so each refers to its leaf and, by index, to
+/// its neighbours.
 struct SurfaceBlock {
   openvdb::Coord origin;
   const float* values = nullptr;  ///< values of the leaf; null: a tile with the value `fill`
@@ -34,7 +35,7 @@ struct SurfaceBlock {
   [[nodiscard]] float value(int offset) const { return values ? values[offset] : fill; }
 };
 
-/// All cells and edges of a grid whose corners have both signs, in blocks.
+/// All cells and edges of a grid whose corners or ends have both signs, in blocks.
 /// The blocks are ordered by position, as OpenVDB orders leaves, whether they are leaves or tiles.
 /// A grid point with φ < 0 is inside. Outside the leaves the tiles give the values, so a band that
 /// was cut off at a box still yields a closed surface.
@@ -51,14 +52,15 @@ class CellSurface {
   [[nodiscard]] std::size_t triangleCount() const { return triangleCount_; }
   [[nodiscard]] std::size_t cycleCount() const { return cycleCount_; }
 
-  /// Returns, for each of the eight corners of a cell, the bit mask of the cells in slab x for
-  /// which this corner is inside.
+  /// Returns, for each of the eight corners of a cell, the bit mask of the cells in slab x of the
+  /// block (64 cells of equal x) for which this corner is inside.
   [[nodiscard]] std::array<std::uint64_t, 8> cornerWords(const SurfaceBlock& block, int x) const;
   /// Returns the value at a grid point relative to the block, each coordinate in [0, 8].
   [[nodiscard]] float valueAt(const SurfaceBlock& block, int x, int y, int z) const;
   /// Returns true when the grid point is inside. Accepts any point; slow.
   [[nodiscard]] bool isInside(const openvdb::Coord& point) const;
-  /// Returns the number of the vertex on the crossed edge `edge` of the cell (x, y, z).
+  /// Returns the number of the vertex on the crossed edge `edge` of the cell (x, y, z), with edges
+  /// numbered as in cell_table.h.
   [[nodiscard]] std::uint32_t vertexOf(const SurfaceBlock& block, int x, int y, int z,
                                        int edge) const;
 

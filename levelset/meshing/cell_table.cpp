@@ -32,7 +32,7 @@ std::array<Offset, 4> faceLoop(std::size_t axis, int side) {
   return loop;
 }
 
-/// Returns next[e]: the edge that follows e on its polygon, or −1.
+/// Returns next[e]: the edge that follows e on its polygon; −1: e is not crossed.
 std::array<int, 12> linkEdges(int pattern) {
   std::array<int, 12> next;
   next.fill(-1);

@@ -84,7 +84,8 @@ IndexMesh decimate(const IndexMesh& mesh, double tolerance) {
   OpenMesh::Decimater::ModNormalFlippingT<HalfedgeMesh>::Handle turning;
   decimater.add(quadric);
   decimater.add(turning);
-  // The quadric is the sum of the squared distances, so each distance is at most `tolerance`.
+  // The quadric is the sum of the squared distances to the planes of the merged triangles, so each
+  // distance is at most `tolerance`.
   decimater.module(quadric).set_max_err(tolerance * tolerance, false);
   decimater.module(turning).set_max_normal_deviation(kMaxTurnDegrees);
   decimater.initialize();

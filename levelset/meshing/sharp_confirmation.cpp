@@ -40,12 +40,13 @@ constexpr double kBent = 0.005, kFlatter = 4;
 /// the same face. It also limits the resulting displacement of the vertex.
 constexpr double kSameFace = 0.3;
 /// Distance from an edge, voxels, up to which field values are compared with those of a sharp edge.
-/// Inside a convex edge, or outside a concave one, these are distances to the nearer sheet. Beyond
-/// the edge they are distances to the edge.
+/// Inside a convex edge, or outside a concave one, the values of a sharp edge are distances to the
+/// nearer sheet. Beyond the edge they are distances to the edge.
 constexpr double kEdgeReach = 1.5;
 /// kRounded: tolerance of that comparison, voxels; at a rounded right angle, values differ by up to
-/// 2/5 of the radius. kRoundedPart: share of the values that may exceed the tolerance. Vertices
-/// within kCornerReach voxels of a corner do not count, since a third sheet may be nearer there.
+/// 2/5 of the radius of the rounding. kRoundedPart: share of the values that may exceed the
+/// tolerance. Vertices within kCornerReach voxels of a corner do not count, since a third sheet may
+/// be nearer there.
 constexpr double kRounded = 0.06, kRoundedPart = 0.15, kCornerReach = 2;
 /// Distance, voxels, within which connected vertices count as beside a feature.
 constexpr double kBeside = 3;
@@ -98,8 +99,8 @@ double widestAngle(const VertexSheets& sheets) {
 }
 
 /// Returns true when each sheet of a feature is flat at some vertex of the given triangles. A round
-/// surface that turns by the same angle within one cell has second differences of at least twice
-/// kFlatBend of the angle everywhere.
+/// surface that turns by the same angle within one cell has second differences of at least 2 ·
+/// kFlatBend · angle (voxels, radians) everywhere.
 bool hasFlatSheets(const IndexMesh& mesh, std::span<const std::uint32_t> triangles,
                    std::uint32_t feature, const std::vector<VertexSheets>& sheets,
                    const std::vector<SheetQuality>& quality) {
@@ -197,7 +198,8 @@ EdgeEvidence evidenceAt(const Vec3d& vertex, const VertexSheets& sheets,
   return found;
 }
 
-/// Returns true when two vertices have two sheets each, and these are the same.
+/// Returns true when two vertices have two sheets each, and each sheet of one vertex is also a
+/// sheet of the other.
 bool areSameSheets(const VertexSheets& a, const VertexSheets& b) {
   if (a.count != 2 || b.count != 2) return false;
   const auto match = [&](std::size_t i, std::size_t j) {
@@ -207,8 +209,8 @@ bool areSameSheets(const VertexSheets& a, const VertexSheets& b) {
 }
 
 /// Returns true when the field values around an edge show that it is not rounded. Considers the
-/// vertices of the given triangles on the same edge as `feature`. Those near a corner count only if
-/// there are no others, since a third sheet affects the values there.
+/// vertices of the given triangles on the same edge as `feature`. Vertices near a corner count only
+/// if no other vertex has evidence, since a third sheet affects the values near a corner.
 bool isSharp(const IndexMesh& mesh, std::span<const std::uint32_t> triangles, std::uint32_t feature,
              const std::vector<VertexSheets>& sheets, const std::vector<EdgeEvidence>& evidence) {
   std::vector<std::uint32_t> edge, corners;
@@ -238,8 +240,8 @@ struct SheetEstimate {
   Vec3d normal;
 };
 
-/// Returns the estimate of the same sheet at the nearest vertex where the field is much flatter, or
-/// `own` if there is none.
+/// Returns another vertex's estimate of the sheet of `own`, from the nearest of the given
+/// triangles' vertices where the field is much flatter; `own` if there is none.
 SheetEstimate flatterSheet(const IndexMesh& mesh, std::span<const std::uint32_t> triangles,
                            const SheetEstimate& own, const std::vector<VertexSheets>& sheets,
                            const std::vector<SheetQuality>& quality) {
@@ -333,8 +335,8 @@ std::vector<bool> confirmFeatures(IndexMesh& mesh, const openvdb::FloatGrid& fie
     if (!isEdge[v] && !(isSure[i] && sheets[v].count > 2)) near[i] = {};
     gate.advance(1);
   });
-  // The values at a corner depend on three sheets, so the corner is not compared itself. It is
-  // accepted if an accepted edge ends there.
+  // The values at a corner depend on three sheets, so they are not compared with those of a sharp
+  // edge. A corner is accepted if an accepted edge ends there.
   const auto touchesEdge = [&](std::uint32_t t) {
     const auto& [a, b, c] = mesh.triangles[t];
     return isEdge[a] || isEdge[b] || isEdge[c];

@@ -11,11 +11,11 @@ namespace levelset {
 
 using MeshTriangle = std::array<std::uint32_t, 3>;
 
-/// Mesh edge between the vertices `low` < `high`, and the triangles on both sides of it.
+/// Mesh edge between the vertices `low` < `high`, and the indices of the triangles on both sides.
 struct PairedEdge {
   std::uint32_t low, high;
   std::array<std::size_t, 2> triangle;
-  double weight = 0;  ///< order in which edges are processed: the largest weight first
+  double weight = 0;  ///< priority: edges of larger weight are processed first
   bool done = false;  ///< true after the edge was flipped
 };
 
@@ -35,8 +35,8 @@ struct EdgeFlip {
 
 /// Number that identifies the edge between two vertices, in either order.
 [[nodiscard]] std::uint64_t edgeKey(std::uint32_t a, std::uint32_t b);
-/// Marks the vertices of the chosen triangles. Loops over an entire mesh test these marks first,
-/// since few vertices have one.
+/// Returns a flag for each vertex: true for the vertices of the triangles with the indices
+/// `chosen`. Loops over an entire mesh test these flags first, since few of them are true.
 [[nodiscard]] std::vector<bool> markVertices(const std::vector<MeshTriangle>& triangles,
                                              const std::vector<std::size_t>& chosen,
                                              std::size_t vertexCount);

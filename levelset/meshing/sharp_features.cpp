@@ -21,14 +21,15 @@ using Triangle = MeshTriangle;
 /// A mesh edge or triangle within this distance, voxels, of the edge or corner of the solid stays
 /// as it is.
 constexpr double kFeatureTolerance = 0.01;
-/// Largest distance of a new vertex from the edge or triangle that it splits, voxels.
+/// Largest distance of a new vertex from the middle of the mesh edge or triangle that it splits,
+/// voxels.
 constexpr double kFeatureReach = 1.5;
 /// Sheets whose normals have a larger dot product form no edge.
 constexpr double kCreaseCosine = 0.88;
-/// Largest number of passes. Vertices that a pass inserts may require others in the next pass: a
-/// corner follows after its three edges.
+/// Largest number of passes of FeatureInserter::run(). Vertices that a pass inserts may require
+/// others in the next pass: a corner follows after its three edges.
 constexpr int kPasses = 8;
-/// Least distance between two corners, voxels.
+/// Least distance between two vertices at corners of the solid, voxels.
 constexpr double kCornerApart = 0.1;
 /// Least determinant of the three unit normals at a corner. Below it, one sheet is nearly parallel
 /// to the intersection line of the other two.
@@ -200,7 +201,7 @@ class FeatureInserter {
     return vertex;
   }
 
-  // === Corners, so that no two vertices share one
+  // === Vertices at corners of the solid, by position, so that no corner gets two vertices
 
   static std::array<int, 3> cornerCell(const Vec3d& p) {
     return {static_cast<int>(std::floor(p[0])), static_cast<int>(std::floor(p[1])),
@@ -252,7 +253,8 @@ class FeatureInserter {
       all.insert(all.end(), sides[i].begin(), sides[i].end());
       faces_.insert(faces_.end(), faces[i].begin(), faces[i].end());
     }
-    // A flip of a side of such a triangle may join it to a corner vertex beyond that side.
+    // The sides of the triangles in faces_ are added too: a flip of a side may join its triangle to
+    // a corner vertex beyond that side.
     addSides(triangles_, faces_, positions_.size(), all);
     edges_ = pairSides(std::move(all));
     for (PairedEdge& edge : edges_) {
@@ -364,8 +366,8 @@ class FeatureInserter {
   std::vector<Triangle>& triangles_;
   std::vector<VertexSheets>& sheets_;
   const Progress& progress_;
-  /// Mesh edges that cut across an edge of the solid, with the distance as weight, and the sides of
-  /// faces_ with weight 0.
+  /// Mesh edges that cut across an edge of the solid, with NewVertex::gap as weight, and the sides
+  /// of the triangles in faces_ with weight 0.
   std::vector<PairedEdge> edges_;
   /// Triangles that lie in no sheet and of which no side cuts across an edge of the solid.
   std::vector<std::size_t> faces_;
@@ -374,8 +376,8 @@ class FeatureInserter {
   std::vector<bool> touched_;  ///< triangles that a flip has changed in this pass
 };
 
-/// Removes and returns the triangles in which edges are sought, usually a small part. These touch a
-/// vertex with sheets, or may share a mesh edge between two vertices of such triangles.
+/// Removes and returns the triangles in which edges of the solid are sought, usually a small part.
+/// These have a vertex with sheets, or have two vertices in common with such triangles.
 std::vector<Triangle> takeFeaturePart(std::vector<Triangle>& triangles,
                                       const std::vector<VertexSheets>& sheets) {
   std::vector<bool> isNear(sheets.size());
@@ -395,7 +397,7 @@ std::vector<Triangle> takeFeaturePart(std::vector<Triangle>& triangles,
   return part;
 }
 
-/// Removes vertices without triangles.
+/// Removes the vertices that no triangle uses, and their sheets.
 void removeUnused(IndexMesh& mesh, std::vector<VertexSheets>& sheets) {
   std::vector<bool> isUsed(mesh.positions.size());
   for (const Triangle& t : mesh.triangles)
@@ -435,7 +437,7 @@ void insertFeatures(IndexMesh& mesh, std::vector<VertexSheets>& sheets, const Pr
     mesh.triangles = std::move(rest);
     return;
   }
-  // Run twice: the repair may leave a triangle without a corner vertex, because a folded triangle
+  // Run twice: after unfoldSheets() a triangle may lack a corner vertex, because a folded triangle
   // had that vertex.
   for (const double begin : {0.0, 0.5}) {
     FeatureInserter(mesh, sheets, subProgress(progress, begin, begin + 0.3)).run();

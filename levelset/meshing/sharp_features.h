@@ -13,7 +13,8 @@
 namespace levelset {
 
 /// Unit normals of the sheets that meet at a vertex; a sheet is a smooth part of the surface. A
-/// vertex on a smooth part has one sheet, on an edge two, at a corner three. `count` 0: unknown.
+/// vertex on a smooth part has one sheet, on an edge two, at a corner three. `count` 0: the sheets
+/// are unknown.
 struct VertexSheets {
   static constexpr std::size_t kMost = 4;
   std::uint8_t count = 0;
@@ -45,17 +46,17 @@ inline constexpr double kOneSheetCosine = 0.9;
 /// Accuracy of the tangent planes to which a vertex was fitted.
 struct SheetQuality {
   double misfit = 0;  ///< largest distance of the vertex from a plane, voxels
-  double bend = 1;    ///< largest second difference of the field where the planes come from, voxels
+  double bend = 1;    ///< largest second difference of the field beside the planes, voxels
 };
 
 /// Finds the vertices near confirmed edges of the solid and moves them onto the edges.
 /// An edge is confirmed when three conditions hold. A vertex has several sheets, the surface around
-/// it lies in these, and each sheet is somewhere much flatter than a round surface that turns as
-/// far. On a smooth surface no edge is confirmed, whatever its curvature. Edges that are rounded by
-/// a voxel or more are not confirmed either: the values beside them differ from the distances to
-/// the planes. A vertex moves to the point where the planes of its sheets meet. The planes come
-/// from the flattest parts nearby, since the field is not linear at the grid points next to an
-/// edge.
+/// it lies in the planes of these sheets, and each sheet is somewhere much flatter than a round
+/// surface that turns by the same angle. On a smooth surface no edge is confirmed, whatever its
+/// curvature. Edges that are rounded by a voxel or more are not confirmed either: the values beside
+/// them differ from the distances to the planes. A vertex moves to the point where the planes of
+/// its sheets meet. The planes come from the flattest parts nearby, since the field is not linear
+/// at the grid points next to an edge.
 /// @param field    field whose zero set the mesh is
 /// @param sheets   one for each vertex
 /// @param quality  one for each vertex
@@ -66,7 +67,7 @@ struct SheetQuality {
                                                 const Progress& progress);
 
 /// Returns how far one end of a segment is from the nearest sheet through the other end, voxels. 0
-/// when the segment runs in a sheet of either vertex.
+/// when the segment runs in a sheet of either end, or an end has no sheets.
 [[nodiscard]] double sheetGap(const openvdb::Vec3d& from, const VertexSheets& fromSheets,
                               const openvdb::Vec3d& to, const VertexSheets& toSheets);
 

@@ -19,7 +19,8 @@ using openvdb::FloatGrid;
 /// Largest distance of a vertex without sheets from a neighbour's sheet that it adopts, and from
 /// the intersection of the adopted sheets, voxels.
 constexpr double kAdoptReach = 1.25;
-/// A vertex is not moved to a point within this distance of another vertex, voxels.
+/// A vertex that adopts sheets does not move to a point within this distance of another vertex,
+/// voxels.
 constexpr double kApart = 0.05;
 /// Diagonals of a quadrilateral whose sheetGap differs by less, voxels, are equally good.
 constexpr double kSameGap = 0.02;
@@ -64,10 +65,10 @@ struct FaceSegment {
   }
 };
 
-/// Slots of the four cells around an edge, counter-clockwise about its axis. The two bits of a slot
-/// are the offsets of the edge in the cell along axis + 1 (high) and axis + 2 (low), as in
-/// cell_table.h. kRingStep is the axis along which a cell differs from the next one (0: axis + 1,
-/// 1: axis + 2).
+/// Slots of the four cells around a crossed grid edge, counter-clockwise about its axis. The two
+/// bits of a slot are the offsets of the edge in the cell along axis + 1 (high) and axis + 2 (low),
+/// as in cell_table.h. kRingStep is the axis along which a cell differs from the next one (0: axis
+/// + 1, 1: axis + 2).
 constexpr std::array<unsigned, 4> kRing = {0, 2, 3, 1};
 constexpr std::array<int, 4> kRingStep = {0, 1, 0, 1};
 
@@ -143,7 +144,7 @@ class DualMesher {
   }
 
   /// Returns true when the side of the quadrilateral from slot kRing[i] to the next one lies on a
-  /// face that both cells pass twice.
+  /// cell face that the polygons of both adjacent cells pass twice.
   [[nodiscard]] bool isDoubled(const std::array<std::uint32_t, 4>& cells, int axis,
                                std::size_t i) const {
     const int step = (axis + 1 + kRingStep[i]) % 3;
@@ -156,8 +157,8 @@ class DualMesher {
   }
 
   /// Returns the segment on the face between the cells in the slots kRing[i] and kRing[i + 1]. The
-  /// edge has the same offset along the second axis of the face in both cells. This offset gives
-  /// the side of the edge on which the face lies.
+  /// crossed grid edge that starts at `low` has the same offset along the second axis of the face
+  /// in both cells. This offset gives the side of the edge on which the face lies.
   [[nodiscard]] static FaceSegment segmentAt(const Coord& low, int axis, bool lowInside,
                                              std::size_t i) {
     const int other = (axis + 2 - kRingStep[i]) % 3;  // second axis of the face, beside `axis`

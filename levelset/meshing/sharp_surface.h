@@ -14,7 +14,7 @@ struct SharpMesh : IndexMesh {
 /// Meshes the zero set in index space with the edges and corners that the field implies. The mesh
 /// has one vertex for each polygon of a cell and one quadrilateral for each crossed edge [Ju02,
 /// Nie04]. Vertices are added for edges and corners between the cells (sharp_features.h). The mesh
-/// is closed and 2-manifold, as the uniform mesh is.
+/// is closed and 2-manifold, as the mesh of marchCells() is.
 /// @throws Cancelled
 [[nodiscard]] SharpMesh sharpSurface(const CellSurface& surface, const openvdb::FloatGrid& grid,
                                      const Progress& progress);

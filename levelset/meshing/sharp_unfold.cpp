@@ -13,13 +13,15 @@ namespace {
 using openvdb::Vec3d;
 using Triangle = MeshTriangle;
 
-/// Least height of a triangle in its sheet, voxels; a lower triangle counts as folded. Least
-/// decrease of the sum of deficits by a flip, voxels.
+/// kLeastHeight: least height of a triangle in its sheet, voxels; a lower triangle counts as
+/// folded. kLeastGain: least decrease, voxels, of the sum of deficit() over the triangles that a
+/// flip or a removal changes.
 constexpr double kLeastHeight = 0.02, kLeastGain = 1e-3;
-/// Height assigned to a triangle that lies in no sheet: less than that of any other.
+/// Height assigned to a triangle that lies in no sheet, voxels: less than that of any triangle in a
+/// sheet.
 constexpr double kOffSheets = -10;
-/// Largest number of passes. A flip can require another flip, and a removed vertex can require
-/// flips.
+/// Largest number of passes in run(), and of passes over the edges in flip(). A flip can require
+/// another flip, and a removed vertex can require flips.
 constexpr int kUnfoldPasses = 8;
 
 class SheetUnfolder {
@@ -80,9 +82,9 @@ class SheetUnfolder {
     return all;
   }
 
-  /// Flips mesh edges where this decreases the sum of the deficits of both triangles beside the
-  /// edge. Triangles are turned over in their sheet if vertices along an edge of the solid are out
-  /// of order. A triangle has no area if its three vertices lie on such an edge.
+  /// Flips mesh edges where this decreases the sum of deficit() of both triangles beside the edge.
+  /// Triangles are turned over in their sheet if vertices along an edge of the solid are out of
+  /// order. A triangle has no area if its three vertices lie on such an edge.
   void flip(double done) {
     for (int pass = 0; pass < kUnfoldPasses; ++pass) {
       report(progress_, done);
@@ -110,13 +112,14 @@ class SheetUnfolder {
     }
   }
 
-  /// Returns the amount by which the height of a triangle is below kLeastHeight, voxels; at least
-  /// 0.
+  /// Returns the amount by which a triangle's height in its sheet is below kLeastHeight, voxels; 0
+  /// if it is not below.
   [[nodiscard]] double deficit(const Triangle& t) const {
     return std::max(0.0, kLeastHeight - heightInSheet(t));
   }
 
-  /// Returns the decrease of both triangles' deficits by a flip, voxels.
+  /// Returns the decrease of the sum of deficit() of the edge's two triangles by a flip, voxels; 0
+  /// if the flip is impossible.
   [[nodiscard]] double gain(const PairedEdge& edge, const EdgeFlip& flip) const {
     if (!flip.isPossible) return 0;
     return deficit(triangles_[edge.triangle[0]]) + deficit(triangles_[edge.triangle[1]]) -
@@ -161,9 +164,10 @@ class SheetUnfolder {
     return hasChanged;
   }
 
-  /// Returns true when `to` can replace its neighbour `from`. The mesh must stay a manifold: their
-  /// only common neighbours are the two vertices opposite to their edge. The sum of the triangles'
-  /// deficits must decrease.
+  /// Returns true when `to` can replace its neighbour `from`, given the triangles at `from` (`fan`)
+  /// and at `to` (`other`). This pass must not have changed any of them, and `to` must have as many
+  /// sheets as `from` or more. The mesh must stay a manifold: their only common neighbours are the
+  /// two vertices opposite to their edge. The sum of deficit() over `fan` must decrease.
   [[nodiscard]] bool canStandFor(const std::vector<std::size_t>& fan, std::uint32_t from,
                                  std::uint32_t to, const std::vector<std::size_t>& other) const {
     if (sheets_[to].count < sheets_[from].count) return false;
@@ -193,8 +197,8 @@ class SheetUnfolder {
   std::vector<Triangle>& triangles_;
   std::vector<VertexSheets>& sheets_;
   const Progress& progress_;
-  std::vector<std::size_t> faces_;  ///< folded triangles
-  std::vector<bool> touched_;       ///< triangles changed in this pass
+  std::vector<std::size_t> faces_;  ///< indices of the folded triangles
+  std::vector<bool> touched_;       ///< [triangle]: true when this pass changed it
 };
 
 }  // namespace

@@ -15,29 +15,32 @@ using openvdb::FloatGrid;
 
 /// Second difference, in voxels, up to which the field counts as smooth at a grid point.
 constexpr double kSmooth = 0.15;
-/// Largest deviation of the values around a grid point from a plane of unit slope, voxels.
+/// Largest deviation, voxels, from a plane of unit slope of the values in one cell at a grid point,
+/// if they are to define the tangent plane there.
 constexpr double kPlanar = 0.1;
-/// Up to this second difference, central differences alone give the plane of a grid point. Above
-/// it, one octant's values may give a better plane beside an edge.
+/// Up to this second difference, voxels, central differences alone give the tangent plane of a grid
+/// point. Above it, the values of one of its eight cells may give a better plane beside an edge.
 constexpr double kSurelySmooth = 0.02;
-/// Values this close to a plane of unit slope are those of a flat face.
+/// Field values that differ from a plane of unit slope by less, voxels, are those of a flat face.
 constexpr double kFlat = 1e-4;
 /// A plane is dropped when another plane of its sheet has an error smaller by this factor.
 constexpr double kWorse = 4;
 /// Eigenvalues of the matrix Σ n nᵀ over the planes' normals below this share of the largest are
 /// noise.
 constexpr double kRank = 0.05;
-/// Largest distance from the cell, in voxels, at which a plane may touch the surface.
+/// Largest distance from the cell, voxels, of the foot of a plane: the point of the plane nearest
+/// to its grid point, where it touches the surface.
 constexpr double kTouchMargin = 0.75;
-/// Largest field value at the point where a plane touches the surface, voxels. Beside an edge, a
-/// plane may extend beyond its face.
+/// Largest magnitude of the field at the foot of a plane, voxels. Beside an edge, a plane may
+/// extend beyond its face.
 constexpr double kOffSurface = 0.3;
 /// Largest distance of a vertex from its cell, voxels.
 constexpr double kVertexReach = 1;
-/// Largest distance of a vertex from the planes of its sheets, voxels.
+/// Largest distance of a vertex from a plane, voxels, up to which the plane counts as one of its
+/// sheets.
 constexpr double kOffSheet = 0.05;
 
-/// Largest number of Newton steps of a vertex along its normal.
+/// Largest number of Newton steps that move a vertex along its normal to the zero of the field.
 constexpr int kSettleSteps = 4;
 /// kSettleReach: largest distance from its cell, voxels, to which these steps may move a vertex,
 /// since the error of the linear zero crossings is not larger. kLeastSlope: least slope of the
@@ -73,7 +76,7 @@ struct VertexPlacer::Plane {
   Vector3d normal = Vector3d::Zero();
   Vector3d gradient = Vector3d::Zero();  ///< gradient of the field, by central differences
   double distance = 0;                   ///< distance of the grid point from the plane, voxels
-  double error = 0;  ///< deviation of the surrounding values from the plane, voxels
+  double error = 0;  ///< deviation of the values around the grid point from it, voxels
   /// Bend of the field at the grid point, voxels: the largest second difference along an axis, or
   /// the sum of all three if it is larger. The sum is invariant under rotation.
   double bend = 0;
@@ -98,7 +101,7 @@ class VertexPlacer::BlockField {
     return values_[static_cast<std::size_t>(((x + 1) * kDim + y + 1) * kDim + z + 1)];
   }
 
-  /// Interpolates trilinearly, at most one voxel outside the block.
+  /// Interpolates the field trilinearly, at a point of the block or at most one voxel outside it.
   [[nodiscard]] double interpolated(const Vector3d& p) const {
     std::array<int, 3> low;
     Vector3d t;
@@ -116,8 +119,8 @@ class VertexPlacer::BlockField {
     return sum;
   }
 
-  /// Interpolates trilinearly, corrected by second differences: third order on a smooth field.
-  /// Coordinates in [0, 8].
+  /// Interpolates the field trilinearly, corrected by second differences: third order on a smooth
+  /// field. The coordinates of `p` lie in [0, 8].
   [[nodiscard]] double curved(const Vector3d& p) const {
     std::array<int, 3> low;
     Vector3d t;
@@ -179,8 +182,8 @@ class VertexPlacer::BlockField {
 
   /// Estimates the plane from one of the eight cells at the grid point. Beside an edge of the
   /// solid, central differences mix two faces. The cell whose values lie nearest to a plane of unit
-  /// slope belongs to one face.
-  /// @param limit  largest deviation of these values from such a plane, voxels
+  /// slope belongs to one face. If no cell is within `limit`, the plane does not change.
+  /// @param limit  largest deviation of a cell's values from a plane of unit slope, voxels
   void chooseOctant(int x, int y, int z, double limit, Plane& plane) const {
     double best = limit;
     for (int octant = 0; octant < 8; ++octant) {
@@ -263,8 +266,8 @@ class VertexPlacer::Impl {
   }
 
   /// Computes the vertex on a smooth surface. The mean of the crossings lies as far inside a curved
-  /// surface as their tangent planes lie outside. So the midpoint is on the surface to higher
-  /// order.
+  /// surface as their tangent planes lie outside. So the midpoint between both, along the mean
+  /// normal, is on the surface to higher order.
   [[nodiscard]] DualVertex placeSmooth(const Vector3d& centre) const {
     Vector3d mean = Vector3d::Zero();
     for (const auto& [point, normal] : crossings_) mean += normal;
@@ -299,8 +302,10 @@ class VertexPlacer::Impl {
     if (isInCell(p, kSettleReach)) vertex.smooth = p;
   }
 
-  /// Computes the vertex on the edge or corner where the planes meet. It may lie a little outside
-  /// the cell: it is on the surface there, and the nearest point of the cell is not.
+  /// Computes the vertex on the edge or corner where the tangent planes of the cell's grid points
+  /// meet. It may lie up to kVertexReach outside the cell: it is on the surface there, and the
+  /// nearest point of the cell is not. If no such point exists, moves the vertex to the nearest
+  /// plane.
   void placeByPlanes(const Vector3d& centre, unsigned corners, DualVertex& vertex) {
     for (const auto& [touch, reach] :
          {std::pair(kTouchMargin, 0.0), std::pair(0.0, 0.0), std::pair(kTouchMargin, kVertexReach),
@@ -323,7 +328,8 @@ class VertexPlacer::Impl {
     }
   }
 
-  /// Collects the planes that touch the surface in the cell or within `margin` of it.
+  /// Collects the tangent planes of the cell's corners in the bit mask `corners` that touch the
+  /// surface in the cell or within `margin` voxels of it.
   void collectPlanes(unsigned corners, double margin) {
     planes_.clear();
     for (int corner = 0; corner < 8; ++corner) {
@@ -352,7 +358,7 @@ class VertexPlacer::Impl {
 
   BlockField field_;
   int x_ = 0, y_ = 0, z_ = 0;  ///< lowest grid point of the current cell, relative to the block
-  std::vector<std::pair<Vector3d, Vector3d>> crossings_;  ///< zero crossings and gradients there
+  std::vector<std::pair<Vector3d, Vector3d>> crossings_;  ///< zero crossings, gradients there
   std::vector<FacePlane> planes_;
 };
 

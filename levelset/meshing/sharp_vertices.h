@@ -15,8 +15,8 @@ namespace levelset {
 struct FacePlane {
   Eigen::Vector3d normal;
   double offset = 0;
-  double error = 0;  ///< deviation of the field values that define the plane from it, voxels
-  double bend = 0;   ///< largest second difference of these values, voxels
+  double error = 0;  ///< deviation of the plane from the values that define it, voxels
+  double bend = 0;   ///< largest second difference of those values, voxels
   [[nodiscard]] double above(const Eigen::Vector3d& p) const { return normal.dot(p) - offset; }
 };
 
@@ -36,12 +36,14 @@ struct DualVertex {
   double bend = 1;  ///< largest second difference of the values that define the planes, voxels
 };
 
-/// Computes the vertices of the cells of one block, with positions relative to its origin.
+/// Computes the vertices of the dual mesh in the cells of one block of 8³ voxels. Positions are in
+/// voxels, relative to the block's origin.
 class VertexPlacer {
  public:
   VertexPlacer(const openvdb::FloatGrid& grid, const openvdb::Coord& origin);
   ~VertexPlacer();
-  /// Returns the vertex of a polygon of the cell (x, y, z), given the polygon's crossed edges.
+  /// Returns the vertex of a polygon of the cell (x, y, z), given the polygon's `count` crossed
+  /// edges, numbered as in cell_table.h.
   [[nodiscard]] DualVertex place(int x, int y, int z, const std::uint8_t* edges, std::size_t count);
 
  private:

@@ -27,17 +27,17 @@
 ///   static constexpr std::size_t operandCount = 1;
 ///   static constexpr bool takesMore = false;          // further operands may follow
 ///   static constexpr Slope slope = Slope::Any;
-///   static constexpr double partTolerance = 0;        // voxels, see regionOfInterest
+///   static constexpr double partTolerance = 0;        // voxels: accuracy of regionOfInterest()
 ///   static constexpr bool makesPart = false;          // run() computes only OperatorRun::roi
-///   static constexpr bool makesSurface = false;       // the result is the band of an open surface
+///   static constexpr bool makesSurface = false;       // true: the result is a surface band
 ///   static constexpr ErrorModel errorModel = {};
 ///   static void check(const Options&, const GivenOptions&);      // throws UsageError
-///   static double longestSide(const Options&, Plans operands);   // world units, for --resolution
+///   static double longestSide(const Options&, Plans operands);   // world units, of --resolution
 ///   static ValuePlan plan(const Options&, Plans operands, const OperatorRun&);
 ///   static RegionOfInterest regionOfInterest(const Options&, const OperatorPlans&, std::size_t
 ///                                            operand, const RegionOfInterest& ofResult);
 ///   static std::optional<Cost> cost(const Options&, const OperatorPlans&);
-///   static double leastRadius(const Options&);        // least radius of curvature, world units
+///   static double leastRadius(const Options&);        // of the result's curvature, world units
 ///   static bool makesField(const Options&);           // true: the result is a FieldGrid
 /// };
 ///
@@ -46,7 +46,8 @@
 /// and field. By default, plan() returns the plan of the first operand.
 ///
 /// regionOfInterest() returns the part of a band operand that decides the result inside `ofResult`,
-/// to the bit or to `partTolerance`. An operator without this function reads complete operands.
+/// to the bit or with an error of at most `partTolerance` voxels. An operator without this function
+/// reads complete operands.
 namespace levelset {
 
 struct OperatorText {
@@ -55,7 +56,7 @@ struct OperatorText {
   const char* summary = "";          ///< effect of the operator, one line
   const char* details = "";          ///< facts that the option descriptions do not give
   const char* example = "";          ///< a complete command line
-  const char* formerName = nullptr;  ///< a name that scripts used before; it keeps working
+  const char* formerName = nullptr;  ///< former name that old scripts use; null: none
 };
 
 /// Slope |∇φ| of the band that an operator computes.
@@ -66,26 +67,28 @@ enum class Slope {
 };
 
 /// Bound of the distance between the triangulated zero set of a result and the exact surface that
-/// the action describes. Away from creases it is `constant` × voxel × (voxel / radius)^(order − 1)
-/// with the least radius of curvature; beside creases it is `creaseConstant` × voxel. The
-/// regression suite measures the constants.
+/// the action describes. Away from creases it is `constant` × voxel × (voxel / radius)^(order − 1),
+/// where `radius` is the least radius of curvature of that surface. Beside creases it is
+/// `creaseConstant` × voxel. `voxel` is the voxel size. The regression suite measures the
+/// constants.
 struct ErrorModel {
   double order = 1;           ///< order of convergence in the voxel size
-  double constant = 0;        ///< 0: exact away from creases
-  double creaseConstant = 0;  ///< 0: the operator creates no creases
+  double constant = 0;        ///< factor of the bound away from creases; 0: exact there
+  double creaseConstant = 0;  ///< factor beside creases; 0: no new creases
   const char* source = "";    ///< case of the regression suite that measured it, docs/regression.md
 };
 
-// Error constants of the triangles alone, on smooth surfaces and beside creases. They are the
-// column `mesh_linf_vx` of results.csv, on smooth surfaces times radius / voxel: the largest value
-// over all resolutions and placements of the quick budget, rounded up. An operator that resamples
-// or moves a surface adds an error of about the same size.
+// Constants of an ErrorModel for the triangulation of exact distances: kTriangleError on smooth
+// surfaces, kCreaseError beside creases. Each is the largest value, rounded up, of the column
+// `mesh_linf_vx` in the results.csv of the regression suite's quick runs. On smooth surfaces that
+// column is multiplied by radius / voxel. An operator that resamples or moves a surface adds an
+// error of about the same size.
 inline constexpr double kTriangleError = 0.35;
 inline constexpr double kCreaseError = 0.55;
 
 /// Largest difference, in voxels, between a redistanced region of interest and the same region of
-/// the redistanced complete band. Redistancing keeps values that are accurate already, and it may
-/// keep a value in one of the two and replace it in the other.
+/// the redistanced complete band. Redistancing keeps values that are accurate already, so it may
+/// keep a value in the region and replace the same value in the complete band.
 inline constexpr double kDistanceTolerance = 1e-4;
 
 using Plans = std::span<const ValuePlan>;
@@ -119,7 +122,7 @@ struct ErrorEstimate {
 /// Inputs of a run beside operands and options, and its outputs beside the result.
 struct OperatorRun {
   RegionOfInterest roi = {};              ///< part of the result that later operators read
-  std::optional<ValuePlan> planned = {};  ///< plan of the complete result; empty: not known
+  std::optional<ValuePlan> planned = {};  ///< plan of the complete result; empty: unknown
   bool isPartial = false;  ///< true: the first operand was computed with a reduced half width
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
@@ -128,7 +131,7 @@ struct OperatorRun {
   std::vector<ErrorEstimate> errors = {};
   /// Reason why the result misses a requested tolerance; empty: it meets the tolerance.
   std::string failure = {};
-  Figures figures = {};      ///< details for the report
+  Figures figures = {};      ///< figures for the report of the run
   Figures certificate = {};  ///< sign certificate of a band that was built from a mesh; else empty
 };
 

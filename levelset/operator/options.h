@@ -19,8 +19,8 @@
 /// or three lengths), Box3d, M44d, std::string, std::vector<double> (one or three numbers),
 /// std::vector<V3d> (points), ScalarField, Attribute, NamedVelocity, Length, VoxelSize (--voxel and
 /// --resolution), Mask (--mask, --mask-min, --mask-max and --mask-invert), and std::optional of
-/// these. Any member may take a table of its values as the third argument; a member of another type
-/// must:
+/// these. Any member may take a table of names and values as the third argument; a member of
+/// another type must:
 /// visit("side", &Options::side, {{"in", ShellSide::In}, {"out", ShellSide::Out}}, {...}).
 /// The default is the initial value of the member; an empty std::optional has none.
 namespace levelset {
@@ -39,11 +39,12 @@ struct OptionInfo {
   bool required = false;
   /// ≥ 0: index of the argument that gives the value without the option's name; −1: named only.
   int position = -1;
-  bool allowsVoxels = true;          ///< for OptionUnit::Length: may be given in voxels
-  const char* formerName = nullptr;  ///< a name that scripts used before; it keeps working
+  bool allowsVoxels = true;          ///< true: a length may also be given in voxels
+  const char* formerName = nullptr;  ///< former option name in old scripts; null: none
 };
 
-/// Length whose default is a number of voxels. The command line resolves it to world units.
+/// Length in world units or in voxels, for options whose default is a number of voxels. The command
+/// line resolves it to world units.
 struct Length {
   double number = 0;
   bool isVoxels = false;  ///< true: `number` is in voxels; false: in world units

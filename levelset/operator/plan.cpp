@@ -13,7 +13,8 @@ double ValuePlan::activeVoxels() const {
   if (!(voxelSize > 0)) return 0;
   const double inLayers = area / (voxelSize * voxelSize) * 2 * halfWidth;
   if (bounds.isEmpty()) return inLayers;
-  // Parts of the surface may share grid points. The number of grid points in the bounds is a limit.
+  // Nearby parts of the surface may share active voxels. The number of grid points in the bounds,
+  // extended by the half width, is a limit.
   double all = 1;
   for (int axis = 0; axis < 3; ++axis)
     all *= (bounds.max[axis] - bounds.min[axis]) / voxelSize + 2 * halfWidth + 1;

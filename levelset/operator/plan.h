@@ -4,8 +4,8 @@
 
 namespace levelset {
 
-/// Estimate of a value before it is computed. It suffices to resolve lengths in voxels or percent
-/// and to estimate cost.
+/// Estimate of a value (a band, mesh or field) before it is computed. It suffices to resolve
+/// lengths in voxels or percent and to estimate cost.
 struct ValuePlan {
   Imath::Box3d bounds = {};  ///< bounds of the zero set or of the vertices, world units
   double area = 0;           ///< area of the surface, world units²
@@ -16,9 +16,10 @@ struct ValuePlan {
 
   [[nodiscard]] bool isBand() const { return voxelSize > 0; }
   [[nodiscard]] double longestSide() const;
-  /// Number of active voxels of a band of this area.
+  /// Number of active voxels of a band of this area; 0 if the value is no band.
   [[nodiscard]] double activeVoxels() const;
-  /// Number of grid points in a layer one voxel thick along the surface of a band.
+  /// Number of grid points in a layer one voxel thick along the surface of a band; 0 if the value
+  /// is no band.
   [[nodiscard]] double layer() const;
 };
 
@@ -26,7 +27,8 @@ struct ValuePlan {
 /// voxels in the leaf blocks of a band are active.
 inline constexpr double kBytesPerVoxel = 12;
 
-/// The box with all its faces moved outwards by `by`. An infinite box stays infinite.
+/// The box with all its faces moved outwards by `by`, in the unit of the box; negative: inwards. An
+/// infinite box stays infinite.
 [[nodiscard]] Imath::Box3d grown(Imath::Box3d box, double by);
 
 }  // namespace levelset
