@@ -97,8 +97,8 @@ using Region = std::optional<openvdb::CoordBBox>;
 
 /// Computes the signs of the tiles of a node. The grid points of a tile lie at least a voxel from
 /// the surface, so adjacent tiles have the same sign. Only a tile without an adjacent tile before
-/// it evaluates the winding number. Where the region covers a part of a tile, the sign is that of
-/// this part; the parts of two adjacent tiles are adjacent too.
+/// it on an axis evaluates the winding number. Where `region`, the index box to compute, covers a
+/// part of a tile, the sign is that of this part; the parts of two adjacent tiles are adjacent too.
 template <typename Node>
 void signTiles(Node& node, const SignField& field, const V3i& origin, float background,
                const Region& region) {

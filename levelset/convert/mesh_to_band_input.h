@@ -8,7 +8,8 @@
 namespace levelset::convert {
 
 /// Checks the input of meshToBand, in this order: the voxel size and half width, the vertices and
-/// triangles, the index range, the memory, the precision of the coordinates.
+/// triangles, the voxel size against the size of the mesh, the index range, the memory, the
+/// precision of the coordinates.
 /// @throws UsageError, InvalidInput, ResourceLimit
 void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options);
 

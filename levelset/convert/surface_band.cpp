@@ -95,8 +95,9 @@ class SideOfSurface {
       const double length = distance < kTouching ? 0 : distance;
       return {ahead < 0 ? -length : length, length < reach_};
     }
-    // If the closest point is on the border, the value is the distance from the plane through it
-    // with the pseudonormal of the border. It continues the distance smoothly beyond the border.
+    // If the closest point is on the border, the value is the signed distance from the plane
+    // through this point, perpendicular to the border's pseudonormal there. It continues the
+    // distance smoothly beyond the border.
     const double beyond = (offset - direction.normal * ahead).length();
     const bool isOn = direction.normal != V3d(0) && beyond <= kBeyond && std::abs(ahead) < reach_;
     return {std::abs(ahead) < kTouching ? 0 : ahead, isOn, beyond};
@@ -175,8 +176,9 @@ SurfaceGrids measureBlocks(const LocalMesh& mesh, const SideOfSurface& side, con
 /// Returns true when the sign change between two neighbouring grid points is not at the surface,
 /// but half way between the front of one part of the surface and the back of another. At the
 /// surface, the two distances differ by at most a voxel. If the parts are close together, the
-/// difference may be small too; then the distances on both sides slope against the change.
-/// @param here, next values of the two grid points
+/// difference may be small too. Then the next grid points on both sides show it: away from the sign
+/// change, the values change in the opposite direction.
+/// @param here, next signed distances at the two grid points, world units
 /// @param last, after values of the grid points before `here` and behind `next`; null: inactive
 bool isContradiction(float here, float next, const float* last, const float* after, float voxel) {
   if ((here < 0) == (next < 0)) return false;

@@ -15,7 +15,7 @@ namespace levelset {
 inline constexpr double kMinSurfaceHalfWidth = 4;
 
 struct SurfaceBandOptions {
-  double halfWidth = 5;  ///< voxels, at least kMinSurfaceHalfWidth
+  double halfWidth = 5;  ///< half width of the band, voxels, at least kMinSurfaceHalfWidth
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };

@@ -15,7 +15,7 @@ using Imath::V3d;
 using Imath::V3i;
 using List = std::vector<std::uint32_t>;
 
-constexpr std::size_t kTaskSize = 2048;  // triangles of a cell that becomes a task of its own
+constexpr std::size_t kTaskSize = 2048;  // minimum number of triangles of a cell that is a task
 constexpr std::size_t kShare = std::size_t{1} << 50;  // progress units of the complete traversal
 
 struct Cell {

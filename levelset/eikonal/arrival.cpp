@@ -32,7 +32,7 @@ constexpr double kBytesPerGridPoint = 24;
 // least the time for this depth in magnitude, so the point stays inside when its time rounds to
 // zero.
 constexpr double kLeastDepth = 1e-7;
-// Fraction of the total progress that the start times take.
+// Fraction of the reported progress at which all start times are computed.
 constexpr double kStarted = 0.1;
 
 /// Returns the slowness, 1 / speed, as a function of index positions; kFar where the front cannot

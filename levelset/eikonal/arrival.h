@@ -23,18 +23,19 @@ enum class FrontMethod {
 struct ArrivalOptions {
   FrontMethod method = FrontMethod::Sweeping;
   /// Order of the upwind differences, 1 or 2. With 2, a grid point falls back to first order where
-  /// the second-order difference is not upwind.
+  /// no second-order difference is upwind, or where its time would precede those it is computed
+  /// from.
   int order = 2;
-  /// Speed, world units per unit of time. The front does not pass where it is zero, negative or
-  /// NaN. Empty: 1.
+  /// Speed, world units per unit of time. The front does not pass where the speed is zero,
+  /// negative, infinite or NaN. Empty: 1 everywhere.
   ScalarField speed = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
 
 struct ArrivalFigures {
-  std::size_t reached = 0;  ///< grid points with a time
-  std::size_t started = 0;  ///< grid points with a start time
+  std::size_t reached = 0;  ///< grid points that the front reaches before the latest time
+  std::size_t started = 0;  ///< grid points with a start time, near the surface or the points
   /// Grid points that fell back from second to first order on one axis or more.
   std::size_t firstOrder = 0;
 };
@@ -53,7 +54,8 @@ struct FrontDistance {
 /// Computes when a front arrives at the grid points around the surface of `solid`. It starts on the
 /// surface at time 0 and moves to both sides; times are negative inside.
 /// Within two voxels of the surface, the time is integrated along the straight segment to the
-/// closest point, if the speed varies little on the segment.
+/// closest point of the surface. On segments longer than a voxel, the speed must not vary by more
+/// than a factor of two.
 /// @param until  the latest time; at speed 1 a distance, world units
 /// @throws UsageError for an order other than 1 or 2, or `until` not positive and finite
 /// @throws InvalidInput for an empty solid, or when the speed is nowhere positive on its surface
@@ -82,7 +84,8 @@ struct FrontDistance {
 struct FrontOptions {
   Length to = Length::voxels(8);
   ScalarField speed;             ///< world units per unit of time
-  std::vector<Imath::V3d> from;  ///< world units; empty: the surface
+  std::vector<Imath::V3d> from;  ///< start points, world units; empty: the front starts at the
+                                 ///< surface of the operand
   int order = 2;
   Attribute extend;
 

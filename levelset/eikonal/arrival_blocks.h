@@ -67,10 +67,11 @@ class ArrivalBlocks {
  public:
   struct Settings {
     double until = 0;  ///< latest time to compute, scaled as in ArrivalBlock
-    std::function<double(const openvdb::Coord&)> slowness = {};  ///< relative slowness; empty: 1
+    /// Slowness at a grid point divided by the typical slowness; empty: 1 everywhere.
+    std::function<double(const openvdb::Coord&)> slowness = {};
     /// Level set whose negative values mark the inside; null: no grid point is inside.
     const openvdb::FloatTree* side = nullptr;
-    std::shared_ptr<const PointSources> sources = {};  ///< null: starts at a surface
+    std::shared_ptr<const PointSources> sources = {};  ///< point sources; null: starts at a surface
     std::size_t maxMemory = kNoMemoryLimit;
     Progress progress = {};
   };

@@ -37,7 +37,8 @@ constexpr double kBytesPerLeaf = 2300;
 // Maximum number of samples for the typical slowness.
 constexpr std::size_t kProbes = 1000;
 
-/// Integrates the slowness along a straight segment with Simpson's rule. Returns kFar when the
+/// Integrates the slowness along a straight segment with Simpson's rule. Positions are in index
+/// space; `spacing` is the largest distance of samples, voxels. Returns kFar when the
 /// front cannot pass on the segment, or when the segment may not be the fastest path.
 float straightTime(const Vec3d& from, const Vec3d& to, const Slowness& slowness, double spacing) {
   const double length = (to - from).length();

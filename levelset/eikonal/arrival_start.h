@@ -11,8 +11,8 @@ namespace levelset::eikonal {
 /// Slowness at an index position; kFar where the front cannot pass. Safe to call from many threads.
 using Slowness = std::function<double(const openvdb::Vec3d&)>;
 
-/// Distance from the surface or source point, in voxels, up to which start times are computed
-/// directly. Second-order differences read two grid points towards the start.
+/// Distance from the surface or source point, in voxels, up to which start times are integrated
+/// along straight segments. Second-order differences read two grid points towards the start.
 inline constexpr double kStartWidth = 2;
 
 /// Options for computing the times at which a front starts.

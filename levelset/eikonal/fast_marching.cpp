@@ -71,8 +71,8 @@ class Marcher {
     double time = solveUpwind(terms, slowness);
     bool first = order_ == 2 && terms.hasFirst;
     // A time must not precede the times that it is computed from (causality). If it does, two
-    // fallbacks follow: first-order differences, then first order without the correction by the
-    // straight time. The last one is always causal but the least accurate.
+    // fallbacks follow: first-order differences, then first order without the correction by
+    // StraightTime. The second fallback is always causal but the least accurate.
     if (terms.hasSecond && time < terms.latest - straight.slack()) {
       time = solveUpwind(gather(block, n, 1, straight), slowness);
       first = true;
@@ -86,8 +86,8 @@ class Marcher {
     queue_.push({stored, block.number, n});
   }
 
-  /// Collects upwind values from accepted neighbours. A neighbour on the other side of the start
-  /// surface counts with its time negated.
+  /// Collects the times of accepted neighbours on the upwind side of each axis. A neighbour on the
+  /// other side of the start surface counts with its time negated.
   static UpwindTerms gather(const ArrivalBlock& block, Index n, int order,
                             const StraightTime& straight) {
     UpwindTerms terms;

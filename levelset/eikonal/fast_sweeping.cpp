@@ -18,19 +18,20 @@ using openvdb::Coord;
 using openvdb::Index;
 using Mask = ArrivalBlock::Mask;
 
-// Smallest improvement of a time that counts, as a fraction of the time for one voxel at the speed
-// of the grid point.
+// Smallest change of an arrival time that is stored, as a fraction of the time for one voxel at the
+// speed of the grid point.
 constexpr float kImprovement = 1e-5f;
-// Length of the time window after the earliest pending change: the larger of kWindow, the time for
-// half a voxel at typical speed, and the fraction kWindowShare of that earliest time. Blocks with
-// later changes wait, since their times would change again. The fraction serves slow media, where
+// Length of the time window of a round. It starts at the earliest arrival time that changed and is
+// not yet processed. Its length is the larger of kWindow, the time for half a voxel at typical
+// speed, and the fraction kWindowShare of that earliest time. Blocks whose changed times are all
+// later wait, since these times would change again. The fraction serves slow media, where
 // the front needs long for a voxel.
 constexpr float kWindow = 0.5f, kWindowShare = 0.05f;
 constexpr std::size_t kBlocksPerTask = 8;
 
-/// Latest time of the first-order solution. With `lookahead` it lies beyond `until`, because the
-/// second-order solution reads later times: by the time for one voxel at the local speed or a
-/// twentieth of `until`, whichever is larger.
+/// Latest arrival time to compute: `until`, the latest requested time. With `lookahead` it is
+/// later, because the second-order solution reads first-order times after `until`. The addition is
+/// the time for one voxel at the local speed or a twentieth of `until`, whichever is larger.
 struct SweepLimit {
   float until = 0;
   bool lookahead = false;
@@ -43,24 +44,27 @@ int parityOf(const Coord& origin) {
   return ((origin.x() >> 3) & 1) * 4 + ((origin.y() >> 3) & 1) * 2 + ((origin.z() >> 3) & 1);
 }
 
-/// State of a block during sweeping; ArrivalBlock holds its times.
+/// State of a block during sweeping; ArrivalBlock holds its arrival times. Neighbours d = 0 … 5 are
+/// the blocks at −x, +x, −y, +y, −z, +z.
 struct BlockState {
-  float earliest = kFar;  ///< time of the earliest change not yet processed; kFar: block is clean
+  float earliest = kFar;  ///< earliest changed time not yet processed; kFar: block is clean
   bool seen = false;      ///< the first-order solver processed the block before
   std::uint8_t dirtyNeighbours = 0;  ///< dirty flags, bit d: times of neighbour d changed
   /// Bit d: times that neighbour d reads have changed, so that neighbour must get a dirty flag.
   /// Written only by the task that processes this block.
   std::uint8_t dirtiedNeighbours = 0;
   std::array<float, 6> earliestAtFace{};  ///< earliest changed time that neighbour d reads
-  /// Offsets of the grid points to solve, sorted by first-order time; empty before the first visit.
+  /// Offsets of the grid points that the second-order solver computes, sorted by first-order time;
+  /// nullopt before its first visit of the block.
   std::optional<std::vector<std::uint16_t>> order;
   std::unique_ptr<std::array<float, ArrivalBlock::kSize>> second;  ///< second-order times
 };
 
 /// Scheduler of dirty blocks: calls work(block, state) until no block is dirty.
-/// Each round takes the eight parities of block positions in turn. It skips blocks whose changes
-/// lie beyond a time window. Blocks of one parity do not touch and run in parallel. The order is
-/// fixed, so the result does not depend on the number of threads.
+/// A parity is one of the eight combinations of even and odd block indices on x, y and z. Each
+/// round takes the parities in turn. It skips blocks whose changed times are after a time window.
+/// Blocks of one parity do not touch and run in parallel. The order is fixed, so the result does
+/// not depend on the number of threads.
 class Rounds {
  public:
   explicit Rounds(ArrivalBlocks& blocks) : blocks_(blocks) {}
@@ -153,8 +157,8 @@ void markDirty(BlockState& state, Index n, float time, Index depth) {
     }
 }
 
-/// Gauss-Seidel sweeps over one block, padded with the nearest layer of its neighbours. Each sweep
-/// visits only grid points beside a change.
+/// Gauss-Seidel sweeps over one block, padded with the nearest layer of grid points of its six
+/// neighbouring blocks. Each sweep visits only grid points beside a changed time.
 class FirstOrderWorker {
  public:
   FirstOrderWorker(ArrivalBlock& block, BlockState& state, const SweepLimit& limit)
@@ -168,7 +172,7 @@ class FirstOrderWorker {
 
   void run() {
     markPending();
-    // The first sweep runs away from the dirty neighbours.
+    // The first sweep runs away from the neighbouring blocks whose times changed.
     const int start = (state_.dirtyNeighbours & 2 ? 4 : 0) | (state_.dirtyNeighbours & 8 ? 2 : 0) |
                       (state_.dirtyNeighbours & 32 ? 1 : 0);
     constexpr std::array<int, 8> kGray = {0, 1, 3, 2, 6, 7, 5, 4};
@@ -209,8 +213,8 @@ class FirstOrderWorker {
       }
   }
 
-  /// Marks the grid points to solve: all on the first visit of the block, later those beside dirty
-  /// neighbours.
+  /// Marks the grid points to solve: all on the first visit of the block, later those on the faces
+  /// towards neighbouring blocks whose times changed.
   void markPending() {
     if (!state_.seen) {
       pending_.fill(~std::uint64_t{0});
@@ -251,8 +255,8 @@ class FirstOrderWorker {
     }
   }
 
-  /// Marks the neighbours of a changed grid point that have later times: only they depend on its
-  /// time.
+  /// Marks the neighbours in the block that have later times than the changed grid point (x, y, z):
+  /// only they depend on its time.
   void markReaders(int x, int y, int z) {
     const std::size_t here = slot(x, y, z);
     const auto mark = [&](int i, int j, int k) {
@@ -267,7 +271,7 @@ class FirstOrderWorker {
     if (z < 7) mark(x, y, z + 1);
   }
 
-  /// Solves one grid point.
+  /// Computes the first-order time of a grid point from those of its six neighbours.
   /// @return true when the time improved
   bool relax(int x, int y, int z) {
     const std::size_t s = slot(x, y, z);
@@ -304,7 +308,7 @@ class FirstOrderWorker {
   ArrivalBlock& block_;
   BlockState& state_;
   SweepLimit limit_;
-  Times times_;  ///< times of the block and, in the border, of its six neighbours
+  Times times_;  ///< times of the block and, in the border, of its six neighbouring blocks
   /// Grid points to solve: one word for each x, bit 8 y + z.
   std::array<std::uint64_t, 8> pending_{};
   Mask changed_;
@@ -353,7 +357,8 @@ class SecondOrderWorker {
   }
 
  private:
-  /// Marks the two layers of the block beside each dirty neighbour.
+  /// Marks the two layers of grid points of the block beside each neighbouring block whose times
+  /// changed.
   void markPending() {
     for (std::size_t d = 0; d < 6; ++d)
       if (state_.dirtyNeighbours >> d & 1) pending_ |= facingLayers()[d];
@@ -451,6 +456,7 @@ class SecondOrderWorker {
     UpwindTerms terms;
     std::array<double, 3> near{}, missed{};  // for each term: nearest upwind time, and error of a
                                              // first-order difference of the straight time
+                                             // from a point source (StraightTime)
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const std::size_t step = kStep[axis];
       const Neighbour a = look(here - step, side), b = look(here + step, side);
@@ -481,8 +487,8 @@ class SecondOrderWorker {
       return solveUpwind(plain, slowness);
     };
     // A time must not precede the times that it is computed from (causality). If it does, two
-    // fallbacks follow: first-order differences, then first order without the correction by the
-    // straight time. The last one is always causal but the least accurate.
+    // fallbacks follow: first-order differences, then first order without the correction by
+    // StraightTime. The second fallback is always causal but the least accurate.
     if (terms.hasSecond && time < terms.latest - straight.slack()) {
       time = inFirstOrder(1);
       first = true;
@@ -496,8 +502,8 @@ class SecondOrderWorker {
   ArrivalBlock& block_;
   BlockState& state_;
   SweepLimit limit_;
-  /// First- and second-order times of the block and of two layers of its neighbours, negative
-  /// inside.
+  /// First- and second-order times of the block and of two layers of grid points in each
+  /// neighbouring block, negative inside the start surface.
   std::array<float, 12 * 12 * 12> first_, second_;
   Mask pending_;  ///< grid points to solve in this round
 };

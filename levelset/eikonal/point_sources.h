@@ -36,7 +36,7 @@ struct StraightTime {
     if (slowness == 0) return 0;
     const double along = up ? away[static_cast<int>(axis)] : -away[static_cast<int>(axis)];
     const double square = away.lengthSqr(), here = std::sqrt(square);
-    if (along > here / 2) return 0;  // neighbour farther from the source: a detour
+    if (along > here / 2) return 0;  // x + d is farther from the source than x: a detour
     const double near = std::sqrt(square + 2 * along + 1);
     const double difference =
         second ? (3 * here - 4 * near + std::sqrt(square + 4 * along + 4)) / 2 : here - near;
@@ -52,7 +52,7 @@ struct StraightTime {
   }
 };
 
-/// Source points of a front, index space.
+/// Points from which a front starts, index space.
 class PointSources {
  public:
   /// @param slowness  slowness at each point; kFar where the front cannot pass
@@ -61,8 +61,9 @@ class PointSources {
   PointSources(const PointSources&) = delete;
   PointSources& operator=(const PointSources&) = delete;
 
-  /// Returns the straight time from the nearest source, or one without correction where the front
-  /// is more than twice as fast as at the source: T0 would then add more error than it removes.
+  /// Returns the straight time from the nearest source. Returns one without correction at the
+  /// source itself, and where the front is more than twice as fast as at the source: T0 would then
+  /// add more error than it removes.
   [[nodiscard]] StraightTime straightTime(const openvdb::Coord& gridPoint, double slowness) const {
     const openvdb::Vec3d x = gridPoint.asVec3d();
     const std::uint32_t i =

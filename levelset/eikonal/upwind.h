@@ -41,7 +41,7 @@ struct UpwindTerms {
 
  private:
   void add(double value, double weight, double near) {
-    // Insert sorted by value.
+    // Keeps the terms sorted by value: solveUpwind() drops the latest ones first.
     int i = count++;
     for (; i > 0 && term[i - 1].value > value; --i) term[i] = term[i - 1];
     term[i] = {value, weight};
@@ -55,9 +55,9 @@ struct UpwindTerms {
 [[nodiscard]] inline double solveUpwind(const UpwindTerms& terms, double slowness) {
   const double base = terms.term[0].value,
                square = std::max(0.0, slowness * slowness - terms.known);
-  // An axis counts if its value is earlier than the time from the earlier axes alone: then the sum
-  // at that value is below slowness². The sum rises from value to value, so the search runs from
-  // the last axis.
+  // An axis counts if its value is earlier than the time from the axes with earlier values alone.
+  // Then the sum of weight (u − value)² over these axes, with u at its value, is below slowness².
+  // The sum rises from value to value, so the search runs from the last axis.
   int count = terms.count;
   for (; count > 1; --count) {
     double sum = 0;

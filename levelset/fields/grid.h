@@ -47,7 +47,8 @@ class FieldGrid {
   std::shared_ptr<const VdbField> field_;
 };
 
-/// Interpolates the grid trilinearly, with the background outside.
+/// Interpolates the grid trilinearly, inactive values included. Where the grid stores no value, the
+/// background takes its place.
 /// @throws InvalidInput for a vector grid
 [[nodiscard]] ScalarField asScalarField(const FieldGrid& grid);
 

@@ -28,8 +28,7 @@ struct ReadBandOptions {
 /// @param path  a .vdb file, or "-" for standard input
 /// @throws IoError when the file cannot be opened
 /// @throws InvalidInput when the file is damaged or lacks the requested grid, or the grid breaks
-/// the
-///         invariants of a band
+///         the invariants of a band
 /// @throws ResourceLimit before the grid exceeds options.maxMemory or the machine's memory
 [[nodiscard]] NarrowBand readBand(const std::filesystem::path& path,
                                   const ReadBandOptions& options = {});

@@ -83,7 +83,8 @@ void checkBloscHeader(const VdbBytes& bytes, const char* block, std::size_t stor
     bytes.fail("the header of a compressed block states a wrong size");
 }
 
-/// Skips stored data that unpack to `expected` bytes. Returns the stored size.
+/// Skips stored data that unpack to `expected` bytes. Returns the stored size in bytes, with the
+/// length field.
 std::size_t takeData(VdbBytes& bytes, std::uint32_t compression, std::size_t expected) {
   namespace io = openvdb::io;
   if ((compression & (io::COMPRESS_BLOSC | io::COMPRESS_ZIP)) == 0) {
@@ -151,7 +152,8 @@ void unpack(const VdbBytes& bytes, const char* data, std::size_t size, std::uint
   }
 }
 
-/// Fills in all values of a node: those stored in the file, and replacements for the others.
+/// Fills in all values of a node: those stored in the file, and ValueBlock::inactive for inactive
+/// values that are not stored.
 template <typename T, typename Mask>
 void expand(const VdbBytes& bytes, const ValueBlock<T, Mask>& block, const Storage<T>& storage,
             const Mask& active, T* values) {

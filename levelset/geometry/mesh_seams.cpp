@@ -21,7 +21,8 @@ bool anyCoincide(const std::vector<Imath::V3d>& positions) {
 
 /// Border edge: an edge with only one triangle.
 struct BorderSide {
-  std::uint32_t low, high;  ///< representatives of all border vertices at its two ends; low ≤ high
+  /// For each end, the vertex that represents all border vertices at its position; low ≤ high.
+  std::uint32_t low, high;
   std::uint32_t atLow, atHigh;  ///< vertices of the triangle itself at these ends
   bool rises;                   ///< the triangle runs along the edge from low to high
 };
@@ -81,7 +82,7 @@ void join(DisjointSets& vertices, const BorderSide& a, const BorderSide& b) {
 
 /// Joins border edges at equal positions. In triangle order, edges that run in opposite directions
 /// are paired like brackets. The triangles of one surface component are consecutive in a mesh, so
-/// two components that share an edge stay separate. The remaining edges are joined to the first
+/// two components that share an edge stay separate. The unpaired edges are joined to the first
 /// edge at their position. Three faces at an edge, or two of opposite orientation, thus share one
 /// edge, as in a mesh without seams.
 void joinSides(const std::vector<BorderSide>& border, DisjointSets& vertices) {
@@ -144,7 +145,7 @@ std::optional<TriMesh> withoutSeams(const TriMesh& mesh, std::size_t maxMemory) 
   requireMemory(triangles * 3 * kSideBytes, maxMemory);
   std::vector<BorderSide> border = findBorder(mesh);
   if (border.empty()) return std::nullopt;
-  // Bytes of the border edges, their order and their position table; then those of the result.
+  // Bytes of the border edges, their order and their position table; then of the resulting mesh.
   constexpr double kBorderBytes = sizeof(BorderSide) + 2 * 8 + kTableBytes;
   requireMemory(static_cast<double>(border.size()) * kBorderBytes + triangles * 12 + vertices * 32,
                 maxMemory);

@@ -11,12 +11,14 @@ namespace levelset {
 
 /// Second difference, in voxels, above which a sample may lie beyond a crease.
 inline constexpr double kCreaseBend = 0.3;
-/// A sample counts as beyond a crease only if the second difference at its end of the line exceeds
-/// that at the other end by this factor. On a smooth curved surface the factor is never reached.
+/// The first or last of four samples on a line counts as beyond a crease only if the second
+/// difference at its end exceeds that at the other end by this factor. On a smooth curved surface
+/// the factor is never reached.
 inline constexpr float kCreaseOneSided = 3;
 
 /// Limits four consecutive samples on a line. If an outer one (v0 or v3) lies beyond a crease,
 /// replaces it by parabolic extrapolation of the other three.
+/// @param bendLimit  kCreaseBend in the units of the samples
 inline void limitAtCrease(float& v0, float v1, float v2, float& v3, float bendLimit) {
   const float before = v0 - 2 * v1 + v2, after = v1 - 2 * v2 + v3;
   if (std::abs(before) > bendLimit && std::abs(before) > kCreaseOneSided * std::abs(after))
@@ -26,7 +28,7 @@ inline void limitAtCrease(float& v0, float v1, float v2, float& v3, float bendLi
 }
 
 /// Returns true when a second difference along the lines of a cell's 4³ samples (x slowest) exceeds
-/// the limit. The loops have no branches, so that the compiler vectorises them: almost all cells
+/// `bendLimit`. The loops have no branches, so that the compiler vectorises them: almost all cells
 /// have no crease and need only this test.
 inline bool bendsMoreThan(const std::array<float, 64>& s, float bendLimit) {
   int bent = 0;

@@ -83,7 +83,7 @@ class BlockFiller {
   }
 
   /// Descends from blocks of kRoot³ to blocks of kLower³ grid points, serially, because there are
-  /// few.
+  /// few such blocks.
   void descend(const openvdb::Coord& origin, int edge, const openvdb::CoordBBox& domain) {
     if (!domain.hasOverlap(openvdb::CoordBBox::createCube(origin, edge))) return;
     const Side side = sideOf(origin, edge);

@@ -119,9 +119,9 @@ class SlopeStencil {
     return least <= high && most >= low;
   }
 
-  /// Returns the deviation of |∇φ| from 1 beside a sheet thinner than two voxels; nullopt where
-  /// there is no such sheet. Uses the differences away from the sheet, because a difference towards
-  /// it spans both of its sides.
+  /// Returns the deviation of |∇φ| from 1 beside a sheet of solid or void thinner than two voxels;
+  /// nullopt where there is no such sheet. Uses the differences away from the sheet, because a
+  /// difference towards it spans both of its sides.
   [[nodiscard]] std::optional<double> residualBesideSheet() const {
     const bool isInside = centre_ < 0;
     double sum = 0;
@@ -186,8 +186,8 @@ void checkLeaf(const LeafNode& leaf, float background, SlopeStencil& stencil, Le
       out.badSlope.add(c, static_cast<float>(std::sqrt(upwind)));
     }
     if (!measureResidual) continue;
-    // Where distances from two sides meet, only one-sided differences are correct. Elsewhere
-    // central differences are more accurate. A field of wrong slope fails both.
+    // Where distances to two parts of the surface meet, only one-sided differences are correct.
+    // Elsewhere central differences are more accurate. A field of wrong slope fails both.
     double residual = std::min(std::abs(std::sqrt(upwind) - 1),
                                std::abs(std::sqrt(stencil.centralSquaredSlope()) - 1));
     if (stencil.hasCrossing())
@@ -226,7 +226,7 @@ LeafFindings checkLeaves(const FloatGrid& grid, const Progress& progress) {
   return total;
 }
 
-/// Checks the values of tiles. Active tiles are counted separately.
+/// Checks the values of tiles. Counts active tiles in `active`, other faults in `out`.
 void checkTiles(const FloatGrid& grid, Finding& active, LeafFindings& out) {
   const float background = grid.background();
   for (auto tile = grid.tree().cbeginValueAll(); tile; ++tile) {

@@ -24,8 +24,8 @@ struct SurfaceMoments {
   [[nodiscard]] SurfaceMoments about(const openvdb::Vec3d& shift) const;
 };
 
-/// Exact moments of a flat triangle. Its mean curvature is zero: the curvature of a mesh lies in
-/// its edges.
+/// Exact moments of a flat triangle about the origin of its coordinates. Its mean curvature is
+/// zero: the curvature of a mesh lies in its edges.
 [[nodiscard]] SurfaceMoments flatTriangleMoments(const openvdb::Vec3d& a, const openvdb::Vec3d& b,
                                                  const openvdb::Vec3d& c);
 

@@ -108,9 +108,9 @@ void describeComponents(const SurfaceComponents& components,
   for (std::size_t i = 0; i < sums.size(); ++i) {
     result.euler += components.figures[i].euler;
     ++result.surfaces;
-    // The sign of the volume tells a component that faces outwards from a cavity. The volume under
-    // the flat triangles decides: where the surface bends strongly within a voxel, the volume under
-    // the curved triangles may have the wrong sign.
+    // The sign of its volume distinguishes a component that faces outwards from a cavity. The
+    // volume under the flat triangles decides: where the surface bends strongly within a voxel, the
+    // volume under the curved triangles may have the wrong sign.
     const double volume = components.figures[i].volume;
     if (volume > 0) ++result.components;
     if (volume < 0) ++result.cavities;

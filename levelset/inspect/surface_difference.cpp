@@ -61,7 +61,7 @@ class SampleScan {
       : target_(target), creases_(creases), reach_(reach) {}
 
   /// Measures one sample.
-  /// @return the distance to `target`, world units; 0 near a crease
+  /// @return the distance to `target`, world units; 0 within `reach` of a crease point
   double visit(const V3d& point) {
     const double limit =
         sums_.samples == 0 ? std::numeric_limits<double>::max() : last_ + (point - at_).length();
@@ -87,8 +87,8 @@ class SampleScan {
   DifferenceSums sums_;
 };
 
-/// Divides a triangle into parts with sides of at most `spacing` and measures the distances of
-/// their midpoints.
+/// Divides a triangle into parts with sides of at most `spacing`, world units, and measures the
+/// distances from their midpoints to the target of `scan`. Sides have at most kMaxParts parts.
 /// @return the largest of these distances, without those near creases
 double visitMiddles(const V3d& a, const V3d& b, const V3d& c, double spacing, SampleScan& scan) {
   const double longest =
@@ -125,8 +125,8 @@ DifferenceSums scanAll(std::size_t count, const SampleScan& fresh, const Progres
   return sums;
 }
 
-/// Returns the indices of the triangles with at least 0.75 times the largest distance. If these are
-/// more than 4,096, returns the 4,096 with the largest distances.
+/// Returns the indices of the triangles whose distance is positive and at least 0.75 times
+/// `largest`. If these are more than 4,096, returns the 4,096 with the largest distances.
 std::vector<std::uint32_t> farthest(const std::vector<float>& distances, double largest) {
   constexpr double kLargePart = 0.75;
   constexpr std::size_t kMaxCount = 4096;
@@ -212,8 +212,8 @@ std::vector<float> turnsOf(const TriMesh& mesh) {
   return turns;
 }
 
-/// Largest turn, radians, in each cell of a coarse grid; around() also reads the 26 neighbouring
-/// cells.
+/// Largest turn of the surface at a vertex, radians, in each cubic cell of edge `cell`. around()
+/// also reads the 26 neighbouring cells.
 class TurnGrid {
  public:
   explicit TurnGrid(double cell) : cell_(cell) {}
@@ -283,8 +283,8 @@ SurfaceDifference surfaceDifference(const TriangleSurface& a, const TriangleSurf
 
 std::vector<V3d> findCreases(const TriMesh& fine, double fineVoxel, const TriMesh& coarse,
                              double coarseVoxel) {
-  // Smallest turn of a crease. Two planes that meet at 45 degrees reach it at the vertices beside
-  // the triangles that cut off their edge.
+  // Smallest turn of a crease. Two planes that meet at 45 degrees reach this turn at the vertices
+  // beside the triangles with which the mesh cuts off their edge.
   constexpr double kMinTurn = 30 * std::numbers::pi / 180;
   // Bounds of the turn in the coarse mesh divided by that in the fine mesh. For a resolved bend the
   // ratio is 2. For an edge it is 0.7 to 1.2, depending on the position of the edge in the grid.

@@ -10,7 +10,7 @@
 
 namespace levelset {
 
-/// A triangle mesh prepared for distance queries. Copies share it.
+/// A triangle mesh prepared for distance queries. Copies share the mesh and its search tree.
 class TriangleSurface {
  public:
   TriangleSurface() = default;
@@ -20,7 +20,7 @@ class TriangleSurface {
   /// Returns false for a default-constructed surface, which has no data.
   [[nodiscard]] bool isValid() const { return data_ != nullptr; }
   [[nodiscard]] const TriMesh& mesh() const;
-  /// Unsigned distance of a point, world units; exact to rounding.
+  /// Unsigned distance of a point from the mesh, world units; exact to rounding.
   /// @param limit  known upper bound of the distance; a tight bound makes the search faster
   [[nodiscard]] double distance(const Imath::V3d& point, double limit) const;
 

@@ -17,7 +17,7 @@ using openvdb::Vec3d;
 
 struct TetCorner {
   Vec3d p;
-  std::array<double, 2> phi;  ///< values of both fields
+  std::array<double, 2> phi;  ///< values of the two fields A and B
 };
 using Tet = std::array<TetCorner, 4>;
 

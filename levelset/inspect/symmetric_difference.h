@@ -6,8 +6,8 @@
 
 namespace levelset {
 
-/// Volume, in voxels, of the points that lie inside exactly one of two fields on the same grid
-/// points. Each cell is split into tetrahedra with linear fields.
+/// Volume, in voxels, of the points that lie inside (negative) exactly one of two fields on the
+/// same grid points. Each cell is split into tetrahedra with linear fields.
 [[nodiscard]] double symmetricDifference(const openvdb::FloatTree& a, const openvdb::FloatTree& b);
 
 }  // namespace levelset

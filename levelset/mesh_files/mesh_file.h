@@ -10,15 +10,15 @@
 
 /// Reads and writes triangle meshes in PLY, OBJ, STL and OFF files, each also compressed as `.gz`.
 /// The extension determines the format, unless it is given. Polygons are split into triangles;
-/// unused elements are skipped.
+/// elements other than vertices and faces are skipped.
 ///
 /// PLY and OBJ also hold vertex attributes. PLY uses `nx ny nz`, `s t` (also read: `u v`,
 /// `texture_u texture_v`) and `red green blue`, with or without `alpha`, as uchar, ushort or float.
 /// OBJ uses `vn` and `vt`, and for colours the numbers after the coordinates of `v`. A vertex with
 /// several pairs of `vt` and `vn` becomes several vertices: the first keeps its index and the
-/// others follow after all vertices. PLY and OBJ keep the seams of attributes, with their duplicate
-/// vertices. STL and OFF hold no attributes, so writing them merges the duplicate vertices. Reading
-/// a PLY file with `attributes` = false merges them too.
+/// duplicates follow after all vertices of the file. PLY and OBJ keep the seams of attributes, with
+/// their duplicate vertices. STL and OFF hold no attributes, so writing them merges the duplicate
+/// vertices. Reading a PLY file with `attributes` = false merges them too.
 namespace levelset {
 
 struct ReadMeshOptions {

@@ -36,10 +36,10 @@ class MeshBuilder {
   [[nodiscard]] std::size_t vertexCount() const { return mesh_.positions.size(); }
   /// Reserves memory for the counts of a header. The caller has checked them against the size of
   /// the file.
-  /// @param attributeBytes  memory of the vertex attributes
+  /// @param attributeBytes  memory of the vertex attributes, bytes
   void reserve(std::size_t vertices, std::size_t triangles, std::size_t attributeBytes = 0);
-  /// Declares the precision of the stored numbers. Without it, the precision is Float if every
-  /// coordinate fits a float.
+  /// Declares the precision of the coordinates in the file. If it is not called, the precision is
+  /// Float when every coordinate is exactly a float, else Double.
   void declarePrecision(CoordinatePrecision precision);
 
   /// Adds a vertex. `place` is its position for messages, `at` the reading position for the
@@ -87,7 +87,7 @@ class MeshBuilder {
   const ReadMeshOptions& options_;
   std::string_view input_;
   std::vector<Polygon> polygons_;
-  std::vector<std::uint32_t> splitVertices_;  // original vertex of each duplicate
+  std::vector<std::uint32_t> splitVertices_;  // index of the original vertex, for each duplicate
   std::size_t readerBytes_ = 0;
   std::uint64_t highestIndex_ = 0;
   std::string highestUnit_ = "line";  // unit of the position of the face with highestIndex_; a
@@ -98,9 +98,9 @@ class MeshBuilder {
   bool allFloat_ = true;
 };
 
-/// Splits a polygon into corners.size() − 2 triangles. Uses a fan for few corners if the fan stays
-/// inside the polygon; otherwise clips ears, projected along the axis nearest to the polygon's
-/// normal.
+/// Splits a polygon into corners.size() − 2 triangles. Uses a fan of triangles from one corner for
+/// few corners if the fan stays inside the polygon; otherwise clips ears, projected along the axis
+/// nearest to the polygon's normal.
 /// @return false when the polygon is too complex to split in reasonable time
 [[nodiscard]] bool splitPolygon(std::span<const std::uint32_t> corners,
                                 const std::vector<Imath::V3d>& positions,
@@ -171,7 +171,8 @@ class TextCursor {
 /// Refuses binary data where text is expected.
 void requireText(std::string_view input, const std::string& name, const char* format);
 
-/// Refuses data after the elements that the header promises: the header then promises too few.
+/// Refuses data after the elements that the header promises: the header then promises too few
+/// elements.
 /// @param what  the data that has been read: "the 12 triangles that its header promises"
 void requireNoTrailingData(std::string_view input, std::size_t end, const std::string& name,
                            const std::string& what);
@@ -194,9 +195,9 @@ void writeOff(ByteWriter& out, const TriMesh& mesh, const Progress& progress);
                                    const std::string& name);
 [[nodiscard]] MeshFileInfo offInfo(std::string_view head, std::size_t fileSize,
                                    const std::string& name);
-/// Returns true when a PLY file of that size can hold the elements of its header if every face is a
-/// triangle. Otherwise the file is truncated or has faces of fewer corners, and only a full read
-/// can decide.
+/// Returns true when a PLY file of `fileSize` bytes can hold the elements of its header if every
+/// face is a triangle. Otherwise the file is truncated or has faces of fewer corners, and only a
+/// full read can decide.
 [[nodiscard]] bool plyHoldsTriangles(std::string_view head, std::size_t fileSize,
                                      const std::string& name);
 

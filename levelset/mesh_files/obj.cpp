@@ -218,7 +218,8 @@ class ObjReader {
     while (cursor_.skipBlanks('#', true)) skipToken();
   }
 
-  /// Reads the numbers after the coordinates: three or four are a colour, a single one is a weight.
+  /// Reads the numbers after the coordinates of a vertex. Three or four are a colour; one or two
+  /// (a weight) are ignored.
   void readColor() {
     std::array<double, 4> numbers = {1, 1, 1, 1};
     std::size_t count = 0;

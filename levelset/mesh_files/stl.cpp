@@ -61,8 +61,8 @@ bool isBinary(std::string_view input, std::size_t fileSize) {
   return !beginsWithSolid(input) || input.substr(0, 1024).find('\0') != std::string_view::npos;
 }
 
-/// Number of triangles that a file of that size can hold. Checks the number that its header
-/// promises.
+/// Number of triangles that a file of `fileSize` bytes can hold. Refuses a header that promises
+/// more.
 std::size_t facetCapacity(std::string_view head, std::size_t fileSize, const std::string& name) {
   if (fileSize < kStlHeaderSize)
     failFile(name,

@@ -25,8 +25,8 @@ SampleCell cellOf(const V3d& p) {
   return cell;
 }
 
-/// Cubes of edge kCellSize that contain sample points, each with the triangles whose enlarged boxes
-/// overlap it.
+/// Cubes of edge kCellSize that contain sample points. Each has a list of the triangles whose
+/// bounding boxes, enlarged by the search distance, overlap it.
 class SampleCells {
  public:
   explicit SampleCells(std::span<const V3d> points) {

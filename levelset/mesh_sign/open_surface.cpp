@@ -126,7 +126,8 @@ class OpenSurfaceWalk {
   }
 
   /// Adds the crossed edges from the block's grid points in the positive directions. With `both`,
-  /// also adds the crossed edges that end at them and start in the neighbours on the negative side.
+  /// also adds the crossed edges that end at its grid points and start in the neighbouring blocks
+  /// on the negative side.
   void crossedEdgesIn(const V3i& origin, bool both, std::vector<CrossedEdge>& out) const {
     for (int x = 0; x < kBlockDim; ++x)
       for (int y = 0; y < kBlockDim; ++y)

@@ -82,9 +82,9 @@ bool segmentMeets(const V3d& p, const V3d& q, int sideP, int sideQ, const Triang
   return (s0 >= 0 && s1 >= 0 && s2 >= 0) || (s0 <= 0 && s1 <= 0 && s2 <= 0);
 }
 
-/// Returns true when a line through the common first corner separates the two triangles in some
-/// axis projection. They then share that corner only. This decides nearly all pairs of a flat fan,
-/// for which orient3d would need exact arithmetic.
+/// Returns true when a line through the common first corner separates the two triangles, projected
+/// along projectionAxis(a). They then share that corner only. This decides nearly all pairs of
+/// triangles in a flat fan, for which orient3d would need exact arithmetic.
 bool separateAtCorner(const TriangleCorners& a, const TriangleCorners& b) {
   const int axis = projectionAxis(a);
   const V2d corner = dropAxis(a[0], axis);
@@ -103,7 +103,8 @@ bool separateAtCorner(const TriangleCorners& a, const TriangleCorners& b) {
   return isBetween(p, q) || isBetween(q, p);
 }
 
-/// Returns true when the two triangles meet outside their shared vertices and edge.
+/// Returns true when the two triangles meet outside their shared vertices and edge, or share all
+/// three vertices.
 bool trianglesMeet(const Triangle& first, const Triangle& second,
                    const std::vector<V3d>& positions) {
   // Rotate the shared vertices to the front. Faces of a 2-manifold traverse a shared edge in
@@ -147,8 +148,8 @@ bool trianglesMeet(const Triangle& first, const Triangle& second,
 }
 
 /// Finds intersecting triangles by halving space across its longest side until each part contains
-/// few triangles. If several parts contain the same pair, one part reports it: the part with the
-/// lowest corner of the intersection of both bounding boxes.
+/// few triangles. If several parts contain the same pair, one part reports it: the part that
+/// contains the lowest corner of the intersection of the two triangles' bounding boxes.
 class PairSearch {
  public:
   PairSearch(const std::vector<Triangle>& triangles, const std::vector<V3d>& positions,
@@ -187,7 +188,7 @@ class PairSearch {
   using List = std::vector<std::uint32_t>;
   struct Part {
     List triangles;
-    Imath::Box3d region;  // excludes its upper faces, except at the upper end of space
+    Imath::Box3d region;  // excludes its upper faces, except where they bound the mesh
   };
   static constexpr std::size_t kFew = 24;
   static constexpr int kDeepest = 60;

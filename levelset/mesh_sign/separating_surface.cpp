@@ -20,10 +20,11 @@ namespace {
 
 using Imath::V3d;
 using Polygon = std::vector<V3d>;
-/// Connected polygons that are kept or dropped together.
+/// Connected polygons that are kept in the separating surface, or dropped from it, together.
 using Sheet = std::vector<Polygon>;
 
-/// Number of points above which the winding number is summed over a tree.
+/// Number of patches above which a tree of all triangles (WindingField) sums the winding numbers
+/// even if no triangles cross. With crossings the tree always does.
 constexpr std::size_t kFewPoints = 16;
 /// Distance relative to the polygon's size: corners nearer to a cutting plane count as on it.
 constexpr double kOnPlane = 1e-12;
@@ -113,7 +114,7 @@ class SeparatingSurface {
       kept[patches[i]] = separates(t, corners(t));
     });
     LocalMesh result{mesh_.points, {}};
-    std::map<std::uint32_t, Sheet> dropped;  // other patches, by their lowest triangle index
+    std::map<std::uint32_t, Sheet> dropped;  // patches not kept, by their lowest triangle index
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
       if (isCrossed(t)) continue;
       const std::uint32_t patch = groups_.find(t);
@@ -304,7 +305,7 @@ class SeparatingSurface {
   }
 
   /// Adds those of the dropped sheets to `result` whose sample points all lie within kShallow of
-  /// it.
+  /// the surface in `result`.
   static void addShallow(const std::vector<Sheet>& sheets, LocalMesh& result) {
     // First test one point of each sheet. This excludes most sheets that lie deep in the solid.
     std::vector<V3d> points;

@@ -10,12 +10,12 @@ namespace {
 using Imath::V3d;
 using Imath::V3i;
 
-/// Mesh and fans, whose crossings with grid lines give an integer winding number, and the
-/// correction of this integer.
+/// Mesh and the fans of triangles that close its boundary, and the correction of their winding
+/// number. Crossings with grid lines give this number, an integer.
 struct ClosedMesh {
   LocalMesh mesh;
   std::vector<int> weights;            ///< multiplicity of each triangle; empty: 1 each
-  std::vector<WeightedTriangle> rest;  ///< triangles whose winding number is added to the integer
+  std::vector<WeightedTriangle> rest;  ///< triangles whose winding number is added as a correction
 };
 
 /// Closes each loop of the boundary by a fan of triangles around the mean of its vertices. The

@@ -54,8 +54,8 @@ class SignField {
 
   Rule rule_;
   double flip_ = 1;
-  /// Triangles whose winding number is added to the integer: the fans with negative weights, or all
-  /// triangles of the mesh. Empty for a mesh without boundary.
+  /// Triangles whose winding number is added to the integer winding number from `lines_`: the fans
+  /// with negative weights, or all triangles of the mesh. Empty for a mesh without boundary.
   WindingField field_;
   LineCrossings lines_;
 };

@@ -175,7 +175,7 @@ double BlockDistance::nearest(const Spheres& spheres, const V3f& point) {
   return std::sqrt(best);
 }
 
-/// Measures the eight children of the cell around `centre`.
+/// Computes the distances at the grid points of the eight children of the cell around `centre`.
 /// @param level  size of the children: 1 for 4³ points, 2 for 2³ points, 3 for single points
 void BlockDistance::splitCell(int level, const V3f& centre) {
   const float offset = static_cast<float>(kBlockDim >> level) / 2;

@@ -55,7 +55,7 @@ double solidAngle(const V3d& a, const V3d& b, const V3d& c, const V3d& point) {
   const double lu = u.length(), lv = v.length(), lw = w.length();
   const double numerator = u.dot(v.cross(w));
   const double denominator = lu * lv * lw + u.dot(v) * lw + v.dot(w) * lu + w.dot(u) * lv;
-  // On the triangle, return the mean of the values on its two sides, ±1/2.
+  // On the triangle, returns 0: the mean of the values +1/2 and −1/2 on its two sides.
   if (numerator == 0 && denominator <= 0) return 0;
   return std::atan2(numerator, denominator) * 2 * kQuarterPi;
 }
