@@ -327,7 +327,7 @@ Graph parseLines(const Script& script, const std::map<std::string, std::string>&
   try {
     return parse(reader, false, outer);
   } catch (const UsageError& error) {
-    // The reader is at the word after the action that failed.
+    // The error is in the line of the last word that was read, the word before `reader.next`.
     const std::size_t word = std::min(reader.next, script.words.size());
     throw UsageError(
         fmt::format("{} ({})", error.what(), script.location(word > 0 ? word - 1 : 0)));

@@ -292,7 +292,8 @@ class StepTable {
     return text;
   }
 
-  /// Warnings, notes, resolved lengths, certificate, details and default options of a step.
+  /// Formats the warnings, notes, resolved lengths, certificate, details and default options of a
+  /// step as HTML.
   static std::string moreOf(const StepReport& step) {
     std::string items, folds;
     for (const std::string& warning : step.notes.warnings)

@@ -13,7 +13,7 @@ namespace {
 /// peaks of run reports.
 constexpr double kWorkingFactor = 4;
 
-/// Limit for the meshes that are read during planning, bytes.
+/// Limit for the meshes that are read or generated during planning, bytes.
 constexpr double kMaxPlanningBytes = 1 << 28;
 
 /// Half width, in voxels, that estimateError() reads of a band: the cells of the zero set and

@@ -90,11 +90,11 @@ class TaskScheduler {
     if (running_.size() >= settings_.threads) return {};
     for (std::size_t i = firstUnfinished_; i < std::min(tasks_.size(), firstFailure_.load()); ++i) {
       const bool canStart = states_[i] == State::Waiting && isReady(i);
-      if (i == firstUnfinished_ && isFinished(i)) {  // isReady() may have skipped it
+      if (i == firstUnfinished_ && isFinished(i)) {  // isReady() may have set task i to Skipped
         ++firstUnfinished_;
         continue;
       }
-      // Results of tasks far ahead would occupy memory for a long time.
+      // The results of tasks that are many barriers ahead would occupy memory for a long time.
       if (barriersBefore_[i] >= barriersBefore_[firstUnfinished_] + settings_.threads) break;
       if (!canStart) continue;
       // Later tasks wait as well: small tasks could otherwise delay a large one forever.

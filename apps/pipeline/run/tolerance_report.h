@@ -28,7 +28,8 @@ struct ToleranceRound {
 /// Outcome of a run with `--tolerance`.
 struct ToleranceReport {
   std::string written;  ///< tolerance as the user wrote it
-  /// First choice of the error models, world units; 0: no model applies.
+  /// Voxel size that the error models predict before the first run, world units; 0: no model
+  /// applies.
   double modelVoxelSize = 0;
   std::vector<std::string> models;  ///< regression cases that measured these error models
   double voxelSize = 0;             ///< voxel size of the result, world units

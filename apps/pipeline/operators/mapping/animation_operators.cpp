@@ -77,7 +77,7 @@ FileSequence textureSequence(const Invocation& in) {
 }
 
 /// Returns the file that is read for a frame.
-/// @param first  option with the number of the file of frame 1
+/// @param first  name of the option that gives the number in the file name of frame 1
 /// @param frame  number of the frame, 1 or more
 std::filesystem::path frameFile(const Invocation& in, const FileSequence& sequence,
                                 const char* first, std::size_t frame) {
@@ -91,7 +91,8 @@ std::vector<std::string> outFiles(const Invocation& in) {
   return files;
 }
 
-/// Checks that the files of all frames exist before anything is computed.
+/// Checks that the files of all frames after frame 0 exist, before anything is computed. Frame 0
+/// uses the operands.
 void requireFrames(const Invocation& in, const FileSequence& sequence, const char* first) {
   for (std::size_t f = 1; f < framesOf(in); ++f) {
     const std::filesystem::path file = frameFile(in, sequence, first, f);

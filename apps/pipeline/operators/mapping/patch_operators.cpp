@@ -142,8 +142,8 @@ void requireSize(Invocation& in, const mapping::PatchReport& report) {
   }
 }
 
-/// Reports the sizes and counts of new patches. Warns about slowed particles, and about a
-/// relaxation that did not converge.
+/// Reports the sizes and counts of new patches. Warns about particles that were slowed so that they
+/// do not collide where a spline bends, and about a relaxation that did not converge.
 void tellPatches(Invocation& in, const mapping::PatchReport& report,
                  const std::vector<mapping::Patch>& patches) {
   std::size_t particles = 0;

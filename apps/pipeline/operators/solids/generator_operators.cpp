@@ -23,8 +23,8 @@ using Imath::V3d;
 using levelset::NarrowBand;
 using levelset::ShapeOptions;
 
-/// A texture generator with its parameters, lengths in world units: its extent, its boxes, and the
-/// functions that check the parameters and build the solid.
+/// A texture generator with its parameters, lengths in world units: its extent, the boxes of its
+/// tile and of its solid, and the functions that check the parameters and build the solid.
 struct Generator {
   levelset::ShapeExtent extent;
   mapping::TileBox box;
