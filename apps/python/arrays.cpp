@@ -149,7 +149,8 @@ levelset::NarrowBand bandOfSamples(const V3d& origin, double voxel,
   const float* samples = values.data();
   for (py::ssize_t i = 0; i < places.shape(0); ++i, samples += Leaf::SIZE) {
     auto* leaf = new Leaf(coord(places, i), 0.0F, true);
-    std::copy(samples, samples + Leaf::SIZE, leaf->buffer().data());  // z varies fastest in both
+    std::copy(samples, samples + Leaf::SIZE,
+              leaf->buffer().data());  // z varies fastest in the samples and in the leaf
     tree.addLeaf(leaf);
   }
   return levelset::makeBand(grid);

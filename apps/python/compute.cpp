@@ -25,7 +25,7 @@ namespace py = pybind11;
 namespace python {
 namespace {
 
-std::size_t maxMemory = 0;  // memory limit of all runs, bytes; 0: a share of the free memory
+std::size_t maxMemory = 0;  // memory limit of all runs, bytes; 0: 80 % of the free memory
 
 /// Removes temporary files that killed processes left in the folder of an output file.
 void removeLeftovers(const std::filesystem::path& target) {
@@ -58,7 +58,8 @@ class Run {
   }
 
   void end() { goesOn_ = false; }
-  /// Returns true when the run is complete.
+  /// Waits at most `time` for the end of the run. Returns true when the run has ended, also after
+  /// an error.
   bool wait(std::chrono::milliseconds time) {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, time, [this] { return isDone_; });
@@ -68,7 +69,7 @@ class Run {
     return {action_, fraction_};
   }
 
-  // Valid when the run is complete.
+  // Valid after wait() has returned true.
   [[nodiscard]] Outcome& outcome() { return outcome_; }
   [[nodiscard]] bool isWhole() const { return isWhole_; }
 

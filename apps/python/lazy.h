@@ -65,8 +65,8 @@ class Lazy {
 class Request {
  public:
   enum class Depth {
-    Unknown,  ///< begins at computed values
-    Whole     ///< complete graph, for graph files
+    Unknown,  ///< nodes whose values are already computed are inputs and are not computed again
+    Whole     ///< all nodes, also those that are already computed; for graph files
   };
   explicit Request(const std::vector<LazyPtr>& results, Depth depth = Depth::Unknown);
 
@@ -74,15 +74,16 @@ class Request {
   /// Receives the value of a node from the runner. Needs no interpreter lock.
   void keep(std::size_t node, const pipeline::Value& value);
   /// Stores the received values in the lazy values.
-  /// @param isDone  the run was complete
+  /// @param isDone  true if the run ended without an error
   void settle(bool isDone);
 
  private:
   void add(Lazy& lazy, Depth depth);
 
   pipeline::Graph graph_;
-  std::vector<LazyPtr> nodes_;                  ///< lazy values of the nodes of `graph_`
-  std::map<const Lazy*, std::size_t> numbers_;  ///< indices of the nodes of `graph_`
+  std::vector<LazyPtr> nodes_;  ///< lazy value of each node of `graph_`, by node index
+  std::map<const Lazy*, std::size_t>
+      numbers_;               ///< index in `graph_` of the node of each lazy value
   std::vector<char> isKept_;  ///< for each node: its value may be requested after the run
   std::vector<std::optional<pipeline::Value>> values_;
 };

@@ -28,9 +28,9 @@ struct Bound {
     Unmeasured,  ///< `stated` is the limit itself, for a run that is too long to measure; never
                  ///< stale
   };
-  /// Ratio of the limit to the measured figure.
+  /// Ratio of the limit to the measured figure, for Kind::Measured.
   static constexpr double kMargin = 1.5;
-  /// Measured order minus limit.
+  /// Measured order of convergence minus the limit on it, for Kind::Order.
   static constexpr double kOrderMargin = 0.3;
   /// Largest accepted ratio of the limit to the figure found in a run. A looser limit guards
   /// nothing: the bound is stale, and fails.

@@ -29,10 +29,10 @@ struct Sample {
 [[nodiscard]] const std::vector<Imath::V3d>& subVoxelPhases();
 
 struct Case {
-  std::string name = {};  ///< argument of --case
-  std::string group =
-      {};  ///< name of the operator, for the plots: each group of cases has one plot
-  std::string title = {};       ///< description in one line
+  std::string name = {};   ///< argument of --case
+  std::string group = {};  ///< name of the plot that shows the case, such as "offset"; the cases of
+                           ///< a group share one plot
+  std::string title = {};  ///< description in one line
   std::string definition = {};  ///< computation, exact answer and meaning of the column value_error
   std::string citation = {};    ///< keys of REFERENCES.md, or the kind of the exact answer
   std::vector<int> quick = {}, full = {};  ///< resolutions; empty for cases with outcomes only

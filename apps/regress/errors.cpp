@@ -88,7 +88,8 @@ Tally meshErrors(const NarrowBand& result, const Truth& truth, Mesher mesher) {
   openvdb::tools::volumeToMesh(levelset::vdb(result), points, quads);
   const auto at = [&](openvdb::Index32 i) { return levelset::toImath(openvdb::Vec3d(points[i])); };
   for (openvdb::Index32 i = 0; i < points.size(); ++i) tally.add(truth.distance(at(i)));
-  // Renderers draw each quad as two triangles.
+  // Renderers draw each quad as two triangles, so the error counts at the centre of each triangle
+  // too.
   for (const openvdb::Vec4I& q : quads)
     for (const int k : {1, 2})
       tally.add(truth.distance((at(q[0]) + at(q[k]) + at(q[k + 1])) / 3.0));

@@ -42,7 +42,7 @@ struct TimeInterval {
 };
 
 /// Measures the advection of an exact band by all schemes, and by OpenVDB. value_error is the
-/// symmetric difference of start and end.
+/// volume of the symmetric difference of start and end over the exact volume.
 /// @param finestPeer  finest resolution at which OpenVDB runs in the quick budget
 void carry(Recorder& out, const std::string& variant, const Sample& at, const Truth& truth,
            const TimeInterval& journey, int finestPeer) {

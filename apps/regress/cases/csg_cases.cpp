@@ -63,7 +63,7 @@ void combineBalls(Recorder& out) {
 /// distances differ by K or more, it is the surface of one solid alone. In between it is an arc,
 /// along which a − b runs from −K to K.
 struct SmoothArc {
-  double radius = 0;  ///< K
+  double radius = 0;  ///< blend radius K of smin(a, b), world units
   std::function<V3d(double a, double b)> position =
       {};  ///< point of the plane at the distances a and b from the two surfaces
 

@@ -34,7 +34,8 @@ std::string asLongAsTheBand(const Integrator& i) {
   return std::string(i.name) + ", steps as long as the band";
 }
 
-/// Longest stable step of explicit Euler, voxels².
+/// Longest stable time step of explicit Euler for curvature flow, in units of the squared voxel
+/// size.
 constexpr double kExplicitStep = 0.16;
 
 /// Returns options for steps that are 1000 times as long as the longest stable explicit step, with
@@ -48,7 +49,8 @@ CurvatureFlowOptions longSteps(FlowScheme scheme, double voxelSize) {
 /// Measures the flow of a sphere. value_error is the mean distance between surface and exact
 /// surface, over the exact radius.
 void shrinkSphere(Recorder& out) {
-  constexpr double kTime = (1 - 0.25) / 4;  // R² = R0² − 4 t, to half the radius
+  constexpr double kTime =
+      (1 - 0.25) / 4;  // time in which the radius R falls from 1 to 1/2: R² = 1 − 4 t
   for (const Sample& at : out.samples()) {
     const NarrowBand solid = exactBand(ball(at.shift, 1), at.voxelSize);
     const Truth truth = ball(at.shift, 0.5);
@@ -76,7 +78,7 @@ void shrinkSphere(Recorder& out) {
 
 /// Measured errors at the end of a flow, or limits on them.
 struct FlowErrors {
-  double mean, largest;   ///< distance of the surface, voxels
+  double mean, largest;   ///< distance between the surface and the exact surface, voxels
   double volume;          ///< relative error of the volume
   double missedHits = 0;  ///< missing and surplus zeros along rays, over the exact zeros
   bool isLimit = false;   ///< true: limits of a run that is too long to measure
@@ -142,8 +144,8 @@ void stiff(Recorder& out) {
     CurvatureFlowOptions options = longSteps(i.scheme, kVoxelSize);
     options.preservesVolume = true;
     // To first order, the elongation ε decays as exp(−4 t); the neglected second-order term is 0.06
-    // voxel. Implicit Euler, with steps 800 and 1000 times as long as an explicit one, would have
-    // an error of 0.1 voxel.
+    // voxel. First-order implicit Euler, with steps 800 and 1000 times as long as an explicit one,
+    // would have an error of 0.1 voxel.
     expectLongSteps(out, std::string("an oval becomes rounder, ") + i.name,
                     exactBand(oval(centre, kElongation, kElongation), kVoxelSize), kTime, options,
                     oval(centre, kElongation * std::exp(-4 * kTime), kElongation), measured);

@@ -73,7 +73,7 @@ Truth spindle(const V3d& centre, double radius, double tube) {
     const double toRing = std::hypot(away - radius, up);
     if (toRing >= tube) return toRing - tube;
     // Inside, the closest point is the foot on the tube's circle if this foot lies on the same side
-    // of the axis, otherwise the tip on the axis.
+    // of the axis, otherwise the tip, where the surface meets the axis.
     const double foot = toRing > 0 ? radius + (away - radius) / toRing * tube : radius + tube;
     const double toTip = std::hypot(away, up - tip);
     return -(foot >= 0 ? std::min(tube - toRing, toTip) : toTip);

@@ -79,7 +79,7 @@ double radiusError(const NarrowBand& band, const Wedge& w, const V3d& corner, do
 /// the surface is further than `reach` from the edge.
 double changeBeyond(const NarrowBand& blended, const NarrowBand& plain, const V3d& corner,
                     double reach) {
-  constexpr double kMargin = 0.1;  // voxels
+  constexpr double kMargin = 0.1;  // added to `reach`, voxels
   const levelset::BandSampler before(plain, levelset::Interpolation::Tricubic);
   const openvdb::FloatGrid& grid = levelset::vdb(blended);
   double largest = 0;

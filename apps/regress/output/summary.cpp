@@ -77,7 +77,8 @@ void addOrders(const Row& before, Row& row) {
 }  // namespace
 
 std::vector<Row> summarize(const std::vector<Row>& rows) {
-  // Groups keep the order of their first rows.
+  // A group holds the rows of one variant, tool and resolution. Groups keep the order of their
+  // first rows.
   std::vector<std::vector<const Row*>> groups;
   for (const Row& row : rows) {
     const auto it = std::find_if(groups.begin(), groups.end(), [&](const auto& group) {
@@ -195,7 +196,7 @@ std::vector<Judgement> judge(const Case& of, const std::vector<Row>& summary, Bu
     const auto has = [&](const std::vector<int>& some) {
       return std::find(some.begin(), some.end(), bound.resolution) != some.end();
     };
-    // The other budget judges the bounds at its own resolutions.
+    // A bound at a resolution that only the other budget runs is no failure.
     if (!met && (bound.resolution == 0 || has(resolutions) || !(has(of.full) || has(of.quick))))
       judgements.push_back(
           {bound, bound.resolution, 0, false, "no row has this variant and resolution"});

@@ -7,7 +7,7 @@
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
 
-/// OpenVDB 10's own tools on the same input, with their defaults.
+/// OpenVDB 10's own tools with their defaults, on the same input as Levelsmith's operators.
 namespace regress::peer {
 
 inline constexpr const char* kRebuild = "OpenVDB levelSetRebuild";

@@ -18,7 +18,8 @@ NarrowBand dilate(const NarrowBand& band, int voxels) {
 NarrowBand curvatureFlow(const NarrowBand& band, double time) {
   const auto grid = levelset::vdb(band).deepCopy();
   openvdb::tools::LevelSetFilter<openvdb::FloatGrid> filter(*grid);
-  // OpenVDB's speed is (k1 + k2) / 2, half of ours. Its step of h²/3 is a step of h²/6 of our time.
+  // OpenVDB's speed is (k1 + k2) / 2, half of ours. Its time step of h²/3 is a step of h²/6 of our
+  // time; h is the voxel size.
   const double h = band.voxelSize(), step = h * h / 6;
   for (long left = std::lround(time / step); left > 0; --left) filter.meanCurvature();
   return adopt(grid);

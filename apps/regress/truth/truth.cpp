@@ -18,7 +18,8 @@ double capVolume(double radius, double height) {
   return kPi * height * height * (3 * radius - height) / 3;
 }
 
-/// Signed distance to the corner of a rectangle in a half plane, from the distances to both sides.
+/// Signed distance to the corner of a rectangle, the profile of a cylinder, from the signed
+/// distances x and y to its two sides.
 double cornerDistance(double x, double y) {
   return std::hypot(std::max(x, 0.0), std::max(y, 0.0)) + std::min(0.0, std::max(x, y));
 }
@@ -45,7 +46,7 @@ Truth box(const V3d& centre, const V3d& size, double rounding) {
                 const V3d out(std::max(q.x, 0.0), std::max(q.y, 0.0), std::max(q.z, 0.0));
                 return out.length() + std::min(0.0, std::max({q.x, q.y, q.z})) - rounding;
               },
-          // Steiner's formula.
+          // Steiner's formula for the volume and area of a box that is offset by `rounding`.
           .volume =
               size.x * size.y * size.z + faces * r + kPi * r * r * edges + 4 * kPi / 3 * r * r * r,
           .area = faces + 2 * kPi * r * edges + 4 * kPi * r * r,
@@ -122,7 +123,8 @@ Truth twoBalls(CsgOperation operation, const V3d& centreA, double radiusA, const
     const bool inside = operation == CsgOperation::Union          ? fromA < 0 || fromB < 0
                         : operation == CsgOperation::Intersection ? fromA < 0 && fromB < 0
                                                                   : fromA < 0 && fromB >= 0;
-    // Nearest of the circle and of the points of each sphere that bound the solid.
+    // Distance to the nearest point of the circle where the spheres meet, and of the parts of both
+    // spheres that bound the solid.
     const double along = a.dot(axis);
     double nearest = std::hypot((a - along * axis).length() - ring, along - plane);
     const V3d footA = a.normalized() * radiusA, footB = b.normalized() * radiusB;
