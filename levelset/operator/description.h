@@ -32,7 +32,7 @@
 ///   static constexpr bool makesSurface = false;       // true: the result is a surface band
 ///   static constexpr ErrorModel errorModel = {};
 ///   static void check(const Options&, const GivenOptions&);      // throws UsageError
-///   static double longestSide(const Options&, Plans operands);   // world units, of --resolution
+///   static double longestSide(const Options&, Plans operands);   // world units, for --resolution
 ///   static ValuePlan plan(const Options&, Plans operands, const OperatorRun&);
 ///   static RegionOfInterest regionOfInterest(const Options&, const OperatorPlans&, std::size_t
 ///                                            operand, const RegionOfInterest& ofResult);

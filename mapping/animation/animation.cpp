@@ -137,7 +137,8 @@ class Animation {
   AnimationReport run() {
     for (std::size_t k = 1; k < keys_.size(); ++k) {
       warnOfLayers(k);
-      // If the base moves, footprintsOf() checks this on the base of the key's frame.
+      // Checks that the patches lie on the base. If the base moves, footprintsOf() checks them on
+      // the base of the key's frame.
       if (!bases_.areMoving()) atFrame(keys_[k].frame, [&] { requireOn(bases_.at(0), k); });
     }
     for (std::size_t k = 0; k < keys_.size(); ++k) {
@@ -197,7 +198,8 @@ class Animation {
     for (const Footprint& one : from) {
       levelset::report(options_.progress, done_);
       moved.push_back(carryFootprint(base, one, options_.carry));
-      // A footprint that stops moving must keep the same bits.
+      // A footprint that stops moving must keep the same bits, so that its frames count as
+      // unchanged.
       if (farthestMove(one, moved.back()) <= 1e-6 * base.voxelSize()) moved.back() = one;
     }
     return moved;
@@ -325,7 +327,8 @@ class Animation {
                    "between the two",
                    f));
     }
-    // Radians. Halfway, sides have shrunk by the cosine of half the angle.
+    // Largest turn without a warning, radians. Halfway along the path, the sides are shorter by the
+    // factor cos(turn / 2).
     constexpr double kMostTurn = 1;
     if (isNew && options_.carry == CarryRule::Corners && std::abs(path.turn()) > kMostTurn) {
       warnOnce(
@@ -346,7 +349,7 @@ class Animation {
   }
 
   /// Adds a warning once for each key.
-  /// @param key  last key with this warning, counted from 1
+  /// @param key  last key with this warning, counted from 1; 0: none
   void warnOnce(std::size_t& key, std::string warning) {
     if (key == key_ + 1) return;
     key = key_ + 1;
@@ -386,7 +389,8 @@ class Animation {
     return worst;
   }
 
-  /// Warns about distortion and large displacements, once for each key.
+  /// Warns about outlines that are stretched since their key or moved far since the previous frame.
+  /// Each warning is issued once for each key.
   void warnOfDrift(std::size_t f, const Footprints& before, const Footprints& now,
                    const Footprints& first) {
     const Drift drift = worstDrift(first, now);
@@ -424,11 +428,13 @@ class Animation {
   double done_ = 0;
   std::uint64_t baseHash_ = 0, pathHash_ = 0;
   Footprints origins_;  ///< footprints at frame 0
-  /// Footprints of the last key, carried to the base of the current frame; the same on the key's
-  /// own base; footprints of the current frame, interpolated towards the next key.
+  /// own_: footprints of the last key, carried to the base of the current frame. first_: the same
+  /// footprints on the base of the key's frame. shown_: footprints of the current frame,
+  /// interpolated between own_ and those of the next key.
   Footprints own_, first_, shown_;
   Footprints goal_;  ///< footprints of the next key
-  /// Footprints of the next key, carried to the base of each frame since the last key.
+  /// [frame − frame of the last key]: footprints of the next key, carried back to the base of that
+  /// frame.
   std::vector<Footprints> later_;
   std::vector<PatchPath> paths_;
   std::vector<Patch> patches_;
@@ -473,7 +479,8 @@ AnimationReport animateTexture(const NarrowBand& base, const NarrowBand& texture
   std::size_t reused = 0;
   double finest = HUGE_VAL, coarsest = 0;
   TextureOptions mapping = options.texture;
-  // The box of frame 0 is used for all frames, so that a growing texture also grows in the result.
+  // The texture's box at frame 0 is used for all frames, so that a growing texture also grows in
+  // the result.
   const bool keepsBox = options.textures && !mapping.textureBox;
   if (keepsBox) mapping.textureBox = texture.zeroSetBounds();
   AnimationReport report = animatePatches(base, keys, options.animation, [&](const PatchFrame& f) {

@@ -17,24 +17,25 @@
 namespace mapping {
 
 /// Rebuilds patches on a base.
-/// @param footprints  new positions: one for each patch, or one for a grid of patches
+/// @param footprints  positions to which the patches move: one for each patch, or one for a grid of
+///         patches
 /// @param origins     the footprints at frame 0, on the base of frame 0
 /// @return as many patches as the first key frame has, in the same order
 using PatchMaker = std::function<std::vector<Patch>(
     const levelset::NarrowBand& base, std::span<const Footprint> footprints,
     std::span<const Footprint> origins, const levelset::Progress& progress)>;
 
-/// Patch options that rebuild a patch with about as many particles as it has, for a patch whose own
-/// options are unknown. Layers of the scheme Reduced stay separate relaxed nets. With any other
-/// scheme particles follow ∇φ. If the patch does not name its scheme, it counts as Reduced if its
-/// layers have different counts.
+/// Options that rebuild a patch with about as many particles as it has, for a patch whose own
+/// options are unknown. A patch of LayerScheme::Reduced, whose layers are relaxed one by one, keeps
+/// its scheme. Any other patch gets LayerScheme::Conforming: particles follow ∇φ. If `patch.scheme`
+/// is empty, a patch counts as Reduced if its layers have different numbers of particles.
 [[nodiscard]] PatchOptions optionsLike(const Patch& patch);
 
 /// Key frame: patches at one frame, on the base of that frame.
 struct AnimationKey {
   std::vector<Patch> patches;
-  /// Outlines that follow the base between the keys; one for each patch, or one for a grid of
-  /// patches.
+  /// Outlines of the patches, which follow the base between the key frames; one for each patch, or
+  /// one for a grid of patches.
   std::vector<PatchOutline> outlines;
   std::size_t frame = 0;
 };
@@ -50,7 +51,7 @@ struct AnimationOptions {
   BandFrames bases = {};  ///< bases of the frames from 1 on; empty: the base does not change
   PatchMaker make = {};   ///< rebuilds patches like those of the first key at new positions
   /// Factor for the drift warning. It is issued when a side or diagonal of a carried patch has
-  /// become longer or shorter than at its key by more than this factor.
+  /// become longer or shorter than at its key frame by more than this factor.
   double driftWarning = 1.5;
   levelset::Progress progress = {};
 };
@@ -58,15 +59,17 @@ struct AnimationOptions {
 /// Changes of the patches at one frame.
 struct FrameReport {
   std::size_t frame = 0;
-  std::vector<std::array<Imath::V3d, 4>> corners;  ///< corners of each outline
+  std::vector<std::array<Imath::V3d, 4>> corners;  ///< corners of each moved outline
   /// Largest displacement of a corner since the previous frame, world units.
   double farthestMove = 0;
-  Drift drift = {};       ///< largest drift of an outline, relative to the previous or the next key
-  bool isRemade = false;  ///< true: the patches were rebuilt
+  /// Largest drift of an outline, relative to its shape at the previous or at the next key.
+  Drift drift = {};
+  bool isRemade = false;    ///< true: the patches were rebuilt
   std::size_t skipped = 0;  ///< patches left out because they fold, see TextureOptions::skipFolds
 };
 
-/// Data of one frame, passed to `visit` of animatePatches(). References are valid during the call.
+/// Base and patches of one frame, passed to `visit` of animatePatches(). References are valid
+/// during the call.
 struct PatchFrame {
   std::size_t index = 0;
   const levelset::NarrowBand& base;

@@ -20,14 +20,15 @@ using Imath::V2d;
 using Imath::V3d;
 using levelset::NarrowBand;
 
-/// Finds the tangent vector at the centre whose geodesic, traced over the vector's length, ends at
-/// `goal`. Starts with direction and length of the shortest path. Each step traces the geodesic and
-/// corrects the vector by the gap to `goal`, as if the surface were flat. Since geodesics spread on
-/// a curved surface, a step reduces the gap but does not close it. Returns none if a gap remains.
+/// Finds the tangent vector at the frame's centre whose geodesic, traced over the vector's length,
+/// ends at `goal`. Starts with direction and length of the shortest path. Each step traces the
+/// geodesic and corrects the vector by the gap to `goal`, as if the surface were flat. Since
+/// geodesics spread on a curved surface, a step reduces the gap but does not close it. Returns none
+/// if the gap stays above kNear.
 std::optional<V3d> geodesicTo(const SurfaceField& field, const SurfaceFrame& frame,
                               const V3d& goal) {
   constexpr int kMostShots = 24;
-  constexpr double kHit = 1e-4, kNear = 0.05;  // gaps at which to stop and to accept, voxels
+  constexpr double kHit = 1e-4, kNear = 0.05;  // largest gap: to stop, to accept; voxels
   const std::vector<V3d> path = geodesic(field, 0, frame.centre, goal);
   if (path.size() < 2) return {};
   V3d best = frame.inPlane(path[1] - path[0]).normalized() * pathLength(path);
@@ -97,7 +98,8 @@ Footprint footprintOf(const NarrowBand& base, const PatchOutline& outline) {
   const std::array<V3d, 4>& c = footprint.corners;
   const V3d u = outline.direction ? *outline.direction : c[1] + c[2] - c[0] - c[3];
   V3d direction = frame.inPlane(u);
-  // The corners of a patch that goes all around an object give no direction; any one is suitable.
+  // The corners of a patch that goes all around an object give no direction of u; any tangent
+  // direction is suitable.
   if (!(direction.length() > 1e-3 * u.length())) direction = eastOf(frame.normal);
   footprint.direction = direction.normalized();
   footprint.normal = frame.normal;

@@ -18,7 +18,7 @@ struct PatchOutline {
   /// Direction of u at `middle`, for a patch that was placed around this point as a decal; empty:
   /// it is derived from the corners.
   std::optional<Imath::V3d> direction = {};
-  double height = 0;  ///< world units, positive
+  double height = 0;  ///< height of the patch, world units, positive
 };
 
 /// Outline of a patch: its corners, its height, and the middle of its particles on the surface.
@@ -26,10 +26,11 @@ struct PatchOutline {
 
 /// Footprint of a patch on one base: its corners, absolute and relative to its centre.
 struct Footprint {
-  std::array<Imath::V3d, 4> corners;  ///< on the zero set
-  /// Point on the zero set; unit direction of u; unit normal.
+  std::array<Imath::V3d, 4> corners;  ///< corners, on the zero set
+  /// Centre of the patch on the zero set; unit direction of u there; unit normal there.
   Imath::V3d centre, direction, normal;
-  /// Geodesic coordinates of the corners relative to the centre, see withReach(); empty: unknown.
+  /// Geodesic coordinates of the corners relative to the centre, world units along u and v, see
+  /// withReach(); empty: unknown.
   std::optional<std::array<Imath::V2d, 4>> reach = {};
   double height = 0;  ///< height of the patch, world units
   [[nodiscard]] bool operator==(const Footprint&) const = default;
@@ -44,8 +45,8 @@ struct Footprint {
 /// Adds the geodesic coordinates of the corners relative to the centre: world units along u and
 /// along v, which is anticlockwise from u seen from outside. `reach` stays empty if no geodesic
 /// from the centre ends at a corner.
-/// @param keepsDirection  false: the direction becomes the mean direction from corners 0 and 3 to
-///         corners 1 and 2
+/// @param keepsDirection  false: `footprint.direction` becomes the mean direction from corners 0
+///         and 3 to corners 1 and 2
 [[nodiscard]] Footprint withReach(const levelset::NarrowBand& base, Footprint footprint,
                                   bool keepsDirection = false);
 
@@ -63,7 +64,7 @@ enum class CarryRule {
 [[nodiscard]] Footprint carryFootprint(const levelset::NarrowBand& base, const Footprint& footprint,
                                        CarryRule rule);
 
-/// Largest displacement of a corner, world units.
+/// Largest displacement of a corner from one footprint to another, world units.
 [[nodiscard]] double farthestMove(const Footprint& from, const Footprint& to);
 
 /// Least and largest ratio of the straight length of a side or diagonal to its length in an earlier
@@ -76,8 +77,8 @@ struct Drift {
 /// Computes the ratios of the lengths in `now` to those in `first`.
 [[nodiscard]] Drift driftBetween(const Footprint& first, const Footprint& now);
 
-/// Moves a point rigidly with a footprint: u, v and the normal are rotated into those of the other
-/// footprint; lengths are kept.
+/// Moves a point rigidly with a patch, from the footprint `from` to `to`: u, v and the normal are
+/// rotated into those of `to`; lengths are kept.
 [[nodiscard]] Imath::V3d movedAlong(const Footprint& from, const Footprint& to,
                                     const Imath::V3d& point);
 

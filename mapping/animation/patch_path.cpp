@@ -126,7 +126,8 @@ SurfaceFrame PatchPath::frameAt(double part) const {
 }
 
 void PatchPath::findCornerPaths() {
-  constexpr double kJump = 4;  // largest step of a corner, as a multiple of its mean step
+  // Largest step between two samples of a corner's path, as a multiple of the mean step.
+  constexpr double kJump = 4;
   const SurfaceField field(base_);
   const double voxel = base_.voxelSize();
   double farthest = pathLength(path_);
@@ -166,7 +167,7 @@ Footprint PatchPath::at(double part) const {
   if (part <= 0) return from_;
   if (part >= 1) return to_;
   Footprint result = from_;
-  // If both heights are equal, this form yields the same bits.
+  // If both heights are equal, this form yields the bits of `from_.height`.
   result.height = from_.height + (to_.height - from_.height) * part;
   if (isConstant_) return result;
   const SurfaceField field(base_);

@@ -14,18 +14,19 @@ struct SurfaceFrame;
 
 /// Path of a patch from one position to another on one base, for key frames [Brodersen07 §10.3].
 ///
-/// The centre moves along a geodesic. u is transported along it, and the angle that remains at the
-/// end is distributed evenly, so that patches may rotate. Under CarryRule::Corners each corner has
-/// its own geodesic, as in the thesis. The geodesic is obtained by straightening a path beside the
-/// centre's path, so that around a pipe all corners go around the same side. Under CarryRule::Rigid
-/// the geodesic coordinates of the corners are interpolated linearly.
+/// The centre moves along a geodesic. u is transported along it. The angle that remains to the u of
+/// the end position is distributed evenly over the path, so that patches may rotate. Under
+/// CarryRule::Corners each corner has its own geodesic, as in [Brodersen07 §10.3]. The geodesic is
+/// obtained by straightening a path beside the centre's path, so that around a pipe all corners go
+/// around the same side. Under CarryRule::Rigid the geodesic coordinates of the corners are
+/// interpolated linearly.
 class PatchPath {
  public:
   /// Computes the path.
   /// @param guide  path of the centre on a similar base, which the new path follows so that it does
   ///         not jump to the other side; empty: the shortest path
-  /// @throws InvalidInput if the surface does not connect the two positions, or a footprint has no
-  ///         reach under CarryRule::Rigid
+  /// @throws InvalidInput if the surface does not connect the two positions, or, under
+  ///         CarryRule::Rigid, a footprint has no `reach`
   PatchPath(const levelset::NarrowBand& base, Footprint from, Footprint to, CarryRule rule,
             const std::vector<Imath::V3d>& guide = {});
 

@@ -23,8 +23,8 @@ struct SurfaceFrame {
   return {footprint.centre, footprint.direction, footprint.normal};
 }
 
-/// End points of the geodesics from the centre to the four corners; empty if the surface breaks off
-/// before one of them.
+/// End points of the geodesics from the frame's centre to the four corners; empty if the surface
+/// breaks off before a corner.
 /// @param reach  geodesic coordinates of the corners along u and v, world units
 [[nodiscard]] std::optional<std::array<Imath::V3d, 4>> cornersFrom(
     const SurfaceField& field, const SurfaceFrame& frame, const std::array<Imath::V2d, 4>& reach);

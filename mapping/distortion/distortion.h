@@ -11,7 +11,7 @@
 
 namespace mapping {
 
-/// Least and largest value, and the 1 %, 50 % and 99 % quantiles.
+/// Least and largest of a set of values, and their 1 %, 50 % and 99 % quantiles.
 struct Spread {
   double least = 0, percent1 = 0, median = 0, percent99 = 0, most = 0;
 };
@@ -21,7 +21,7 @@ struct Distortion {
   /// Number of samples, and of samples where the map is inverted.
   std::size_t samples = 0, folded = 0;
   /// Jacobian determinant of patch → texture, times the median of its positive reciprocals; 1
-  /// everywhere for a box, ≤ 0 at folds.
+  /// everywhere if the patch is a box, ≤ 0 at folds.
   Spread jacobian;
   /// Sample with the least Jacobian, in world and texture coordinates.
   Imath::V3d foldPoint{0}, foldUvw{0};

@@ -19,8 +19,8 @@ namespace {
 
 using Imath::V3d;
 
-/// True if the tetrahedra with this order of the axes have a positive volume in texture space: even
-/// permutations.
+/// True for an even permutation of the axes: the tetrahedra with this order then have a positive
+/// volume in texture space.
 bool isEvenOrder(int order) {
   const auto& axes = Lattice::kOrders[static_cast<std::size_t>(order)];
   return (axes[0] + 1) % 3 == axes[1];
@@ -34,7 +34,7 @@ V3d middleOf(const Lattice::Corners& c) {
   return (c[0] + c[1] + c[2] + c[3]) / 4.0;
 }
 
-/// Results for one cell.
+/// Results of the test of one cell of particles.
 struct CellVolume {
   double size = 0, folded = 0, undecided = 0;  ///< volumes in texture space
   double typical = 0;                          ///< typical determinant of texture → patch

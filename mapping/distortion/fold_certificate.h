@@ -26,17 +26,17 @@ enum class FoldVerdict {
 /// A point where a map is inverted.
 struct FoldPoint {
   Imath::V3d position{0}, uvw{0};  ///< world position; texture coordinates
-  double jacobian = 0;             ///< in the unit of FoldCertificate::leastJacobian
+  double jacobian = 0;             ///< determinant / median, as FoldCertificate::leastJacobian
 };
 
 struct FoldCertificate {
   static constexpr std::size_t kMostPoints = 5;
-  std::size_t pieces = 0;  ///< number of tetrahedra, or parts of cells, that were tested
+  std::size_t pieces = 0;  ///< number of tetrahedra, parts of cells, or cubes that were tested
   /// Shares of the volume, in the domain of the map, that certainly fold and that remain undecided.
   double foldedShare = 0, undecidedShare = 0;
-  /// Least determinant found, divided by the median determinant; 1 for a box, ≤ 0 at folds. Prism
-  /// maps and meshes use the determinant of texture → patch, smooth maps that of patch → texture,
-  /// each in the direction in which the map is defined.
+  /// Least Jacobian determinant found, divided by the median determinant; 1 if the patch is a box,
+  /// ≤ 0 at folds. Prism maps and meshes use the determinant of texture → patch, smooth maps that
+  /// of patch → texture, each in the direction in which the map is defined.
   double leastJacobian = 0;
   double unit = 1;  ///< the median determinant: world units³ per unit cube, or its reciprocal
   /// Points of different cells, the worst first; at most kMostPoints.
@@ -75,7 +75,8 @@ struct FoldCertificate {
 /// particles are summed by polynomials; the error of the slopes is at most 1e-5 of the mean slope.
 void evaluateRbf(const RbfMap& map, const Patch& patch, std::vector<MapSample>& samples);
 
-/// Samples a smooth map like sampleMap in distortion.h, by evaluateRbf if there are many particles.
+/// Samples a smooth map like sampleMap in distortion.h, by evaluateRbf if there are 4000 particles
+/// or more and the kernel is φ(r) = r.
 [[nodiscard]] std::vector<MapSample> sampleRbf(const RbfMap& map, const Patch& patch,
                                                double embedDepth);
 

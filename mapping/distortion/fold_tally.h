@@ -9,7 +9,7 @@
 
 namespace mapping {
 
-/// Sorts folds, the worst first, and keeps the first kMostPoints.
+/// Sorts folds by their Jacobian, the least first, and keeps the first kMostPoints.
 inline void keepWorst(std::vector<FoldPoint>& places) {
   std::stable_sort(places.begin(), places.end(),
                    [](const FoldPoint& a, const FoldPoint& b) { return a.jacobian < b.jacobian; });

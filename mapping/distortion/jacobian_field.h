@@ -18,8 +18,9 @@ struct JacobianFieldOptions {
 
 /// Computes the Jacobian determinant of a map at the grid points in the space above a patch,
 /// divided by the median determinant of the certificate. It is ≤ 0 where the map is inverted. Where
-/// a folded patch overlaps itself, the field has the least value. The determinants at the worst
-/// points of the certificate are written to the nearest grid points. The background is 1.
+/// a folded patch overlaps itself, the field has the least of the overlapping values. The
+/// determinants at the worst points of the certificate are written to the nearest grid points. The
+/// background is 1.
 /// @throws UsageError for a voxel size that is not positive
 /// @throws ResourceLimit if it needs more than `maxMemory` bytes
 [[nodiscard]] levelset::FieldGrid jacobianField(const Patch& patch, const RbfMap& map,
@@ -28,7 +29,8 @@ struct JacobianFieldOptions {
 [[nodiscard]] levelset::FieldGrid jacobianField(const Patch& patch, const PrismMap& map,
                                                 const FoldCertificate& certificate,
                                                 const JacobianFieldOptions& options);
-/// Computes the same field for the piecewise linear map through the particle layers (layer_map.h).
+/// Computes the Jacobian field for the piecewise linear map through the particle layers
+/// (layer_map.h).
 [[nodiscard]] levelset::FieldGrid jacobianField(const Patch& patch,
                                                 const FoldCertificate& certificate,
                                                 const JacobianFieldOptions& options);

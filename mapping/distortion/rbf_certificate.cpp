@@ -23,50 +23,54 @@ using Imath::Box3d;
 using Imath::M33d;
 using Imath::V3d;
 
-// Largest errors of the sum of the far particles' slopes, for a certificate and for samples. A map
-// that preserves lengths has slopes of 1.
+// Largest error of the far particles' contribution to the map's slopes: kProofTolerance for a
+// certificate, kSlopeTolerance for samples. A map that preserves lengths has slopes of 1.
 constexpr double kProofTolerance = 1e-2;
 constexpr double kSlopeTolerance = 1e-5;
-// Margin of the bounds for rounding errors.
+// Added to the bounds on the map's slopes and values, for rounding errors.
 constexpr double kProofRounding = 1e-9;
 // Largest number of cubes tested within one cube of the size of a particle's cell. The second limit
 // applies if the first leaves cubes undecided and no fold was found.
 constexpr std::size_t kFewCubes = 80, kMostCubes = 800;
-constexpr double kSmallestCube = 1.0 / 32;  // half edge length, mean particle spacings
+// Half edge length, in mean particle spacings, of cubes that are not halved further.
+constexpr double kSmallestCube = 1.0 / 32;
 
 V3d rowOf(const M33d& m, int k) {
   return {m[k][0], m[k][1], m[k][2]};
 }
 
-/// Second derivatives xx, yy, zz, xy, xz, yz of u, v and w, each a vector of three.
+/// Second derivatives xx, yy, zz, xy, xz, yz of the map, each a vector with the components u, v and
+/// w.
 using Curvature = std::array<V3d, 6>;
 
-/// Change of the slopes from the middle of a cube to the point at offset `s`, as columns.
+/// Change of the map's slopes, due to the second derivatives `h`, from the middle of a cube to the
+/// point at offset `s`. The columns are the derivatives along x, y and z.
 std::array<V3d, 3> changeAt(const Curvature& h, const V3d& s) {
   return {h[0] * s.x + h[3] * s.y + h[4] * s.z, h[3] * s.x + h[1] * s.y + h[5] * s.z,
           h[4] * s.x + h[5] * s.y + h[2] * s.z};
 }
 
-/// Slopes and curvature of a smooth map in the middle of a cube, and bounds on the change of its
-/// slopes.
+/// Slopes, second derivatives and value of a smooth map in the middle of a cube, and bounds on the
+/// change of its slopes.
 struct CubeSlopes {
   M33d slopes;
   Curvature curvature{};
   V3d value{0};
   V3d rowStray{0};      ///< bound on the change of each row of the slopes
-  double relative = 0;  ///< bound of |slopes⁻¹ (slopes elsewhere) − 1|
+  double relative = 0;  ///< bound of |slopes⁻¹ (slopes at a point of the cube) − 1|
   double determinant = 0;
 };
 
 /// Approximation of the unit vector from a near particle to the points of a ball, and the bound on
 /// its error.
 struct KinkBound {
-  /// Curved: value and derivative in the middle. Straight: value in the middle. Any: zero.
+  /// Terms of the approximation. Curved: the vector's value and derivative in the middle of the
+  /// ball. Straight: its value in the middle. Any: none, so it is zero.
   enum class Kind { Curved, Straight, Any } kind = Kind::Any;
   double error = 1;
 };
 
-/// @param ratio  radius of the ball divided by the distance of its middle from the particle
+/// @param ratio  radius of the ball divided by the distance of the ball's middle from the particle
 KinkBound kinkBound(double ratio) {
   // The factor of ratioⁿ in the Taylor series of the unit vector is at most √((n + 1) / n). Without
   // value and derivative, the series begins with n = 2.
@@ -87,7 +91,7 @@ CubeSlopes slopesIn(const RbfCubes& cubes, const RbfCube& cube) {
   for (int k = 0; k < 3; ++k)
     for (std::size_t axis = 0; axis < 3; ++axis)
       result.slopes[k][static_cast<int>(axis)] = far[1 + axis][k];
-  // Terms 4 to 9 are xx, xy, xz, yy, yz, zz.
+  // Terms 4 to 9 of the polynomial are xx, xy, xz, yy, yz, zz.
   result.curvature = {far[4] * 2.0, far[7] * 2.0, far[9] * 2.0, far[5], far[6], far[8]};
   const double radius = cube.radius();
   for (const std::uint32_t i : cube.near) {
@@ -114,8 +118,8 @@ CubeSlopes slopesIn(const RbfCubes& cubes, const RbfCube& cube) {
 }
 
 /// Bounds the change of the slopes in the cube: for each row, and relative to the slopes in the
-/// middle. For the relative bound, each change is multiplied by the inverse of these slopes before
-/// its norm is taken.
+/// middle of the cube. For the relative bound, each change is multiplied by the inverse of the
+/// middle's slopes before its norm is taken.
 void boundSlopes(const RbfCubes& cubes, const RbfCube& cube, CubeSlopes& at) {
   at.determinant = at.slopes.determinant();
   const std::array<V3d, 3> inverse =
@@ -132,7 +136,8 @@ void boundSlopes(const RbfCubes& cubes, const RbfCube& cube, CubeSlopes& at) {
     stray += applyColumns(inverse, particle.weight).length() * bound.error;
     for (int k = 0; k < 3; ++k) at.rowStray[k] += std::abs(particle.weight[k]) * bound.error;
   }
-  // Terms of degree 3 and more change the slopes by at most the sum of their largest slopes.
+  // The polynomial's terms of degree 3 and more change the slopes by at most the sum of the terms'
+  // largest slopes.
   for (std::size_t n = 10; n < TaylorPolynomial::kTerms; ++n) {
     const auto& p = TaylorPolynomial::powers()[n];
     const double power = std::pow(cube.half, p.total() - 1);
@@ -140,8 +145,8 @@ void boundSlopes(const RbfCubes& cubes, const RbfCube& cube, CubeSlopes& at) {
     stray += applyColumns(inverse, cube.far[n]).length() * slope;
     for (int k = 0; k < 3; ++k) at.rowStray[k] += std::abs(cube.far[n][k]) * slope;
   }
-  // The curvature changes the slopes linearly. The norm of a linear function is largest at a corner
-  // of the cube, and equal at opposite corners.
+  // The second derivatives change the slopes linearly. The norm of a linear function is largest at
+  // a corner of the cube, and equal at opposite corners.
   double bend = 0;
   V3d rowBend(0);
   for (int corner = 0; corner < 4; ++corner) {
@@ -161,17 +166,19 @@ void boundSlopes(const RbfCubes& cubes, const RbfCube& cube, CubeSlopes& at) {
   if (!std::isfinite(at.relative)) at.relative = HUGE_VAL;
 }
 
-/// Inputs shared by all cubes.
+/// Inputs of the certificate that all cubes share.
 struct ProofScene {
   const RbfMap& map;
   const RbfCubes& cubes;
   const CellTree& tree;
   V3d origin, sizes;
   Box3d wanted;  ///< range of u, v and w that the texture covers
-  /// Sign of the determinant without folds; least half edge of a cube that is halved, world units.
+  /// hand: sign of the determinant where the map does not fold. smallest: half edge length, world
+  /// units, of cubes that are not halved further.
   double hand, smallest;
 
-  /// True if cells of the particles extend into the cube of half edge `half` around the centre.
+  /// True if cells of the particles extend into the cube of half edge `half` around the centre of
+  /// `cube`.
   [[nodiscard]] bool isInPatch(const RbfCube& cube, double half) const {
     const V3d middle = cube.center + origin;
     return tree.visit({middle - V3d(half), middle + V3d(half)},
@@ -189,7 +196,7 @@ struct ProofScene {
   }
 };
 
-/// Results for one cube of the size of a particle's cell.
+/// Results of the test of one starting cube, which has about the size of a particle's cell.
 struct CubeProof {
   double size = 0, folded = 0, undecided = 0;
   std::vector<double> determinants;
@@ -212,7 +219,7 @@ void lookAtCenter(const ProofScene& scene, const RbfCube& cube, const CubeSlopes
   const V3d place = cube.center + scene.origin;
   const double volume = scene.hand * scene.sizes.x * scene.sizes.y * scene.sizes.z;
   double determinant = scene.hand * scene.cubes.slopes(cube, cube.center).determinant();
-  // The exact map decides, so that the polynomial's error cannot cause a fold.
+  // The exact map decides, so that the polynomial's error cannot yield a false fold.
   if (!(determinant > 0)) determinant = volume * scene.map.jacobian(place).determinant();
   if (determinant > 0) proof.determinants.push_back(determinant);
   if (!(determinant < proof.least)) return;
@@ -292,7 +299,8 @@ Box3d worldBoxOf(const Lattice& lattice) {
   return box;
 }
 
-/// Distributes the samples to octants until each has few, and evaluates them there.
+/// Distributes the samples to octants until each has few samples or few near particles, and
+/// evaluates the map at the samples there.
 /// @param chosen  indices of the samples in the cube
 void fillWithin(const RbfCubes& cubes, const V3d& origin, const V3d& sizes, const RbfCube& cube,
                 std::vector<std::uint32_t> chosen, std::vector<MapSample>& samples) {

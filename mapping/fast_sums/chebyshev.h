@@ -8,7 +8,7 @@
 namespace mapping {
 
 template <std::size_t In, std::size_t Out>
-/// Weights of the In input values for each of the Out output values.
+/// Weights of the In input values in each of the Out output values: [output][input].
 using NodeWeights = std::array<std::array<double, In>, Out>;
 
 /// Chebyshev nodes of [−1, 1].
@@ -23,7 +23,8 @@ const std::array<double, Nodes>& chebyshevNodes() {
   return nodes;
 }
 
-/// Values at `at` of the Lagrange polynomials, which are 1 at one node and 0 at the others.
+/// Values at `at` of the Lagrange polynomials of the Chebyshev nodes, each of which is 1 at one
+/// node and 0 at all other nodes.
 template <std::size_t Nodes>
 std::array<double, Nodes> lagrangeAt(double at) {
   const std::array<double, Nodes>& nodes = chebyshevNodes<Nodes>();
@@ -37,7 +38,7 @@ std::array<double, Nodes> lagrangeAt(double at) {
   return values;
 }
 
-/// Weights that interpolate at each of the points `at` from the values at the nodes.
+/// Weights that interpolate at each of the points `at` from the values at the Chebyshev nodes.
 template <std::size_t Nodes, std::size_t Out>
 NodeWeights<Nodes, Out> interpolation(const std::array<double, Out>& at) {
   NodeWeights<Nodes, Out> weights;

@@ -67,7 +67,7 @@ std::uint32_t ClusterTree::nearest(std::uint32_t point) const {
           best = std::min(best, std::pair((points_[order_[n]] - p).length2(), order_[n]));
       continue;
     }
-    // The nearer child is visited first.
+    // The nearer child is pushed last, so that it is visited first.
     const auto first = static_cast<std::size_t>(node.child);
     const bool isFirstNearer =
         squaredGap(nodes_[first].box, place) <= squaredGap(nodes_[first + 1].box, place);

@@ -9,15 +9,16 @@
 /// Variants of the vector code behind addRbfSums, for tests that compare them.
 namespace mapping {
 
-/// Adds the contributions of `count` particles to u, v and w at `points` points. `particles` has
-/// six numbers for each particle: position and weights. `chosen` has the indices of the particles.
+/// Adds weight × φ(distance) of `count` particles to the sums u, v and w at `points` points.
+/// `particles` has six numbers for each particle: position and weights. `chosen` has the indices of
+/// the particles.
 using RbfAdder = void (*)(const double* particles, const std::uint32_t* chosen, std::size_t count,
                           const double* x, const double* y, const double* z, double* u, double* v,
                           double* w, std::size_t points);
 
-/// The loops for all kernels, compiled for one instruction set.
+/// The functions for all kernels, compiled for one instruction set.
 struct RbfAdders {
-  const char* name;      ///< plain, avx2, avx512
+  const char* name;      ///< instruction set: plain, avx2 or avx512
   const RbfAdder* each;  ///< array with one function for each RbfKernel, in the order of the enum
 };
 

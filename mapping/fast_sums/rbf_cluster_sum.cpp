@@ -11,7 +11,7 @@ using Imath::V3d;
 
 namespace {
 
-// Two boxes are far from each other if their gap exceeds this multiple of the larger radius.
+// Two boxes are far from each other if their gap exceeds this multiple of the larger half diagonal.
 constexpr double kFarGap = 1;
 constexpr std::size_t kSequential = 2000;  // children of nodes with fewer points run in one task
 
@@ -107,8 +107,9 @@ void RbfClusterSum::addSources(std::size_t at, std::vector<std::uint32_t>& sourc
     sources.push_back(static_cast<std::uint32_t>(first + n));
 }
 
-/// Divides the candidate nodes: `sources` gets the particles and Chebyshev nodes that are summed at
-/// this node, `rest` the nodes that are too near and are left to its children.
+/// Divides the candidate nodes of the tree. `sources` gets the indices in Pass::sources of the
+/// particles and Chebyshev nodes that are summed at the node `at`. `rest` gets the tree nodes that
+/// are too near and are left to the children of `at`.
 void RbfClusterSum::chooseSources(std::size_t at, std::span<const std::uint32_t> candidates,
                                   std::vector<std::uint32_t>& sources,
                                   std::vector<std::uint32_t>& rest) const {

@@ -33,10 +33,10 @@ class RbfClusterSum {
   static constexpr std::size_t kNodes = 7;  ///< number of Chebyshev nodes along each axis
   static constexpr std::size_t kCubeNodes = kNodes * kNodes * kNodes;
   using Cube = std::array<double, kCubeNodes>;
-  using Cubes = std::array<Cube, 3>;  ///< values at the nodes for u, v and w
+  using Cubes = std::array<Cube, 3>;  ///< values of u, v and w at the nodes of a box
   using Shift = std::array<NodeWeights<kNodes, kNodes>, 3>;
 
-  /// Position and size of a box's node cube.
+  /// Position and size of the cube of Chebyshev nodes of a box.
   struct Frame {
     Imath::V3d center, half;  ///< centre, and half edge lengths of the box; 1 in place of 0
     double radius = 0;
@@ -50,7 +50,8 @@ class RbfClusterSum {
   void gatherLeaf(std::size_t node, Pass& pass) const;
   void descend(std::size_t node, std::span<const std::uint32_t> candidates, const Cubes& inherited,
                Pass& pass) const;
-  /// True if a box has no more particles than Chebyshev nodes, so that dividing it saves nothing.
+  /// True for a leaf, and for a box with no more particles than Chebyshev nodes, which dividing
+  /// would not make cheaper.
   [[nodiscard]] bool isBottom(std::size_t node) const {
     return nodes_[node].isLeaf() || nodes_[node].count() <= kCubeNodes;
   }

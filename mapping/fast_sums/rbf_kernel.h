@@ -8,11 +8,11 @@
 namespace mapping {
 
 /// φ takes r in mean particle spacings, so that a map does not depend on the unit of length. For
-/// homogeneous kernels (r, r³) the map does not depend on the spacing either, apart from the
-/// scale of the relaxation λ. The same holds for r² log r, which is homogeneous up to a
-/// polynomial that the side conditions cancel.
+/// homogeneous kernels (r, r³) the map does not depend on the spacing either, apart from the scale
+/// of the relaxation λ of the fit. The same holds for r² log r, which is homogeneous up to a
+/// polynomial that the side conditions on the weights cancel.
 enum class RbfKernel : std::uint8_t {
-  Biharmonic,   ///< r: conditionally negative definite of order 1, least bending
+  Biharmonic,   ///< r: conditionally negative definite of order 1, least bending energy
   Triharmonic,  ///< r³: conditionally positive definite of order 2
   ThinPlate,    ///< r² log r: conditionally positive definite of order 2
   Sum,          ///< r³ + r² log r: conditionally positive definite of order 2
@@ -25,7 +25,7 @@ enum class RbfKernel : std::uint8_t {
 /// Kernels as structs of static functions, so that loops are compiled for each kernel.
 ///   kSign                 +1 if Σ a_i a_j φ(|p_i − p_j|) ≥ 0 for all a orthogonal to the linear
 ///                         polynomials, −1 if ≤ 0
-///   value(r), slope(r)    φ and φ′
+///   value(r), slope(r)    φ(r) and φ′(r)
 ///   sixth(d)              ≥ |d⁶φ/dt⁶| / 6! along any straight line at distance d or more;
 ///                         decreases with d
 ///   slopeBound(lo, hi)    ≥ |φ′| for r in [lo, hi]
@@ -124,7 +124,7 @@ struct Laplacian {
   static constexpr double kSign = 1;
   static double value(double r) {
     const LaplacianShape& k = kLaplacian;
-    const double at = std::max(r, 1e-100);  // the limit at 0: both terms are linear there
+    const double at = std::max(r, 1e-100);  // avoids 0/0 at r = 0, where φ has the limit 1
     return k.scale * (k.a * std::expm1(-k.fast * at) - k.b * std::expm1(-k.slow * at)) / at;
   }
   static double slope(double r) {

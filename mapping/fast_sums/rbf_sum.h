@@ -17,8 +17,8 @@ struct RbfParticle {
 };
 
 /// Positions (x, y, z) and sums (u, v, w) of a set of points, one array for each component, so that
-/// plain loops over them are vectorised. The instruction set is chosen at run time; all give the
-/// same bits.
+/// plain loops over them are vectorised. The instruction set is chosen at run time; all instruction
+/// sets give the same bits.
 struct RbfPoints {
   std::vector<double> x, y, z, u, v, w;
   explicit RbfPoints(std::size_t count)
@@ -26,7 +26,8 @@ struct RbfPoints {
   [[nodiscard]] std::size_t size() const { return x.size(); }
 };
 
-/// Adds Σ ω_i φ(|x − p_i|) over the chosen particles at each point, in the order of `chosen`.
+/// Adds Σ ω_i φ(|x − p_i|) to the sums u, v and w of each point x, over the particles with the
+/// indices `chosen`, in this order. A particle has the position p_i and the weights ω_i.
 void addRbfSums(RbfKernel kernel, std::span<const RbfParticle> particles,
                 std::span<const std::uint32_t> chosen, RbfPoints& points);
 
