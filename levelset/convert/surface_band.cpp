@@ -188,7 +188,7 @@ bool isContradiction(float here, float next, const float* last, const float* aft
 }
 
 /// Deactivates the voxels next to a sign change that is not at the surface.
-/// @return their number
+/// @return number of deactivated voxels
 std::size_t removeContradictions(openvdb::FloatGrid& grid) {
   const float voxel = static_cast<float>(grid.voxelSize()[0]), background = grid.background();
   openvdb::tree::LeafManager<openvdb::FloatTree> leaves(grid.tree());

@@ -69,14 +69,15 @@ struct FrontDistance {
 /// segments, as far as the speed is nearly linear in the position. Where it is not, this start ball
 /// has a radius of two voxels. With order 2 the singularity at the nearest point is factored out:
 /// at constant speed, times from one point are exact to single precision [Treister16].
-/// @throws UsageError also when there is no point, or one that is not finite
+/// @throws as arrivalTimes(); UsageError also without a point, for a point that is not finite, or
+///         for a `lattice` without a grid
 [[nodiscard]] ArrivalTimes arrivalTimesFromPoints(const NarrowBand& lattice,
                                                   std::span<const Imath::V3d> sources, double until,
                                                   const ArrivalOptions& options = {});
 
 /// Computes the distance up to `reach` (world units) on both sides of the surface, with a front
 /// instead of closest points. redistance() is more accurate and as fast where the speed is 1.
-/// @throws UsageError also when a speed is set, or `reach` is below one voxel
+/// @throws as arrivalTimes(); UsageError also when a speed is set, or `reach` is below one voxel
 [[nodiscard]] FrontDistance frontDistance(const NarrowBand& solid, double reach,
                                           const ArrivalOptions& options = {});
 

@@ -77,7 +77,7 @@ class ArrivalBlocks {
   };
   explicit ArrivalBlocks(Settings settings);
 
-  /// Creates the blocks that hold the given grid points and stores their start times.
+  /// Creates the blocks that hold the grid points of `times` and stores their start times.
   /// @throws InvalidInput when the speed is positive at none of the grid points
   void start(const std::vector<StartTime>& times);
   /// Returns the block at `origin` and creates it if needed. A new block has no slowness before the

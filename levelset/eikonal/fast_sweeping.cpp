@@ -505,7 +505,7 @@ class SecondOrderWorker {
   /// First- and second-order times of the block and of two layers of grid points in each
   /// neighbouring block, negative inside the start surface.
   std::array<float, 12 * 12 * 12> first_, second_;
-  Mask pending_;  ///< grid points to solve in this round
+  Mask pending_;  ///< grid points of the block whose times are still to be computed
 };
 
 float earliestUnknown(const ArrivalBlock& block) {

@@ -23,7 +23,7 @@ struct UpwindTerm {
 struct UpwindTerms {
   UpwindTerm term[3];
   int count = 0;
-  double latest = -std::numeric_limits<double>::max();  ///< latest T₁ of all axes
+  double latest = -std::numeric_limits<double>::max();  ///< latest T₁ (UpwindTerm) of all axes
   bool hasFirst = false, hasSecond = false;  ///< terms of first or second order are present
   double known = 0;  ///< sum of the known squared derivatives along axes without a term
 

@@ -227,7 +227,7 @@ struct StreamArchive : openvdb::io::Archive {
   }
 };
 
-/// Copies a grid without its metadata, except those that this library sets. The tree is shared.
+/// Copies a grid without its metadata; sets name, class and creator. The tree is shared.
 template <typename GridT>
 typename GridT::Ptr namedGrid(const GridT& source, const std::string& name) {
   using Tree = typename GridT::TreeType;

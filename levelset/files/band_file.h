@@ -70,7 +70,7 @@ struct GridInfo {
   bool isLevelSet = false;         ///< level set of numbers, which readBand accepts
   std::uint64_t activeVoxels = 0;  ///< 0 when the file does not state it
   double voxelSize = 0;            ///< world units; 0 when the voxels are not cubes of equal size
-  double halfWidth = 0;            ///< voxels; 0 for other classes than level set
+  double halfWidth = 0;  ///< half width of a level set, voxels; else 0, and 0 if voxelSize is 0
   /// Box of the active voxels, index space. Empty when the file does not state it or the grid has
   /// no active voxel.
   Imath::Box3d indexBounds;

@@ -94,7 +94,7 @@ class InputFile {
 }
 
 /// Fills `bytes` with data from next(address, size), which returns the number of bytes it delivers.
-/// Stops when it returns 0 or `stopAt` bytes are present.
+/// Stops when next() returns 0 or `stopAt` bytes are present.
 /// @param expected  expected number of bytes; 0 when unknown
 /// @param limit  memory limit in bytes
 /// @param inflated  true for decompressed data, for messages

@@ -95,7 +95,7 @@ class ByteWriter {
   void writeNumber(float value);
   void writeNumber(std::uint64_t value);
 
-  /// Writes the remaining bytes and completes the file. @throws IoError
+  /// Writes the bytes still in the buffer and completes the file. @throws IoError
   void commit();
 
  private:

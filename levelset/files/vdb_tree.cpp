@@ -57,7 +57,7 @@ struct ValueBlock {
   Mask selection;  // for each inactive value: on for inactive[1], off for inactive[0]
   Index count;     // number of stored values
   bool activeOnly;
-  const char* data;  // starts with the length if compressed
+  const char* data;  // stored values; if compressed, their length precedes them
   std::size_t size;
 };
 

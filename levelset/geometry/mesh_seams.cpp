@@ -10,8 +10,8 @@
 namespace levelset {
 namespace {
 
-/// Returns true when two vertices have equal positions. Otherwise there is nothing to join, and the
-/// edges need not be sorted.
+/// Returns true when two vertices have equal positions. Otherwise the mesh has no seam to close,
+/// and the edges need not be sorted.
 bool anyCoincide(const std::vector<Imath::V3d>& positions) {
   convert::PositionTable table(positions, positions.size());
   for (std::uint32_t v = 0; v < positions.size(); ++v)
@@ -61,8 +61,8 @@ std::vector<BorderSide> findBorder(const TriMesh& mesh) {
 }
 
 /// Sets the representatives of the ends of border edges: border vertices at equal positions get the
-/// same one. Other vertices do not take part, so surface components that merely touch keep their
-/// own vertices.
+/// same one. Vertices off the border do not take part, so surface components that merely touch keep
+/// their own vertices.
 void findEndVertices(const std::vector<Imath::V3d>& positions, std::vector<BorderSide>& border) {
   convert::PositionTable table(positions, border.size());
   for (BorderSide& side : border) {

@@ -12,7 +12,7 @@
 namespace levelset {
 
 struct ComponentFigures {
-  double volume = 0;  ///< signed: negative for the wall of a cavity
+  double volume = 0;  ///< signed volume that the component encloses; negative for a cavity
   double area = 0;
   long euler = 0;  ///< Euler characteristic V − E + F, valid if each edge has two triangles
 };

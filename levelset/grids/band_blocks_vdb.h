@@ -48,7 +48,8 @@ class BandBlocks {
   /// Number of a grid point: 512 × block + offset; kNone outside all blocks.
   [[nodiscard]] std::uint32_t find(const openvdb::Coord& gridPoint) const;
 
-  /// Reads all leaf values of a tree of the same topology, divided by `unit`.
+  /// Reads all leaf values of a tree of the same topology, divided by `unit` (the voxel size gives
+  /// values in voxels).
   [[nodiscard]] Field read(const openvdb::FloatTree& tree, double unit) const;
   /// Writes the active values to the tree, multiplied by `unit`.
   void write(const Field& field, double unit, openvdb::FloatTree& tree) const;

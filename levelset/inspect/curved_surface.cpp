@@ -20,8 +20,10 @@ constexpr double kLargestLift = 0.4;
 /// Minimum cosine between the normals at the corners of a triangle and its own normal. A lower
 /// value indicates an edge of the solid.
 constexpr double kSmoothCosine = 0.85;
+// Newton's method moves a point of a triangle along the normal onto the zero set: maximum number of
+// steps, and step, voxels, below which it stops. The remaining error is about the square of the
+// last step.
 constexpr int kLiftSteps = 4;
-// Largest last step of Newton's method, voxels. The remaining error is about its square.
 constexpr double kLiftTolerance = 1e-3;
 
 struct QuadratureNode {

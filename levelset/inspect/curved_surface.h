@@ -60,7 +60,7 @@ class CurvedSurface {
  private:
   struct Node {
     openvdb::Vec3d position, areaVector;
-    double meanCurvature = 0;  ///< mean curvature times triangle area
+    double meanCurvature = 0;  ///< (k1 + k2) / 2 at the node, times the triangle's area
     bool isFlat = true;
   };
   [[nodiscard]] Node node(std::size_t triangle, bool bends, double u, double v, Cache& cache) const;

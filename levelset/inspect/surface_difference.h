@@ -33,8 +33,8 @@ struct SurfaceDifferenceOptions {
   /// Maximum side of the parts into which triangles are divided for sampling, world units.
   double spacing = 0;
   std::vector<Imath::V3d> creases = {};  ///< points along creases, world units
-  double creaseRadius = 0;  ///< world units; samples within it of a crease point are counted
-                            ///< separately
+  double creaseRadius = 0;  ///< radius around the crease points, world units; samples within it
+                            ///< count for SurfaceDifference::crease
   Progress progress = {};
 };
 

@@ -90,8 +90,9 @@ class MeshBuilder {
   std::vector<std::uint32_t> splitVertices_;  // index of the original vertex, for each duplicate
   std::size_t readerBytes_ = 0;
   std::uint64_t highestIndex_ = 0;
-  std::string highestUnit_ = "line";  // unit of the position of the face with highestIndex_; a
-                                      // copy, because the reader frees the name of the element
+  std::string highestUnit_ = "line";  // unit of FilePosition of the face with the highest vertex
+                                      // index; a copy, because the reader frees the name of the
+                                      // element
   std::size_t highestNumber_ = 0;
   std::size_t added_ = 0;
   bool precisionDeclared_ = false, droppedAttributes_ = false;

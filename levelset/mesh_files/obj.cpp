@@ -255,7 +255,8 @@ class ObjReader {
     builder_.addFace(corners_, place, cursor_.at());
   }
 
-  /// Reads the index of a texture coordinate (part 0) or of a normal (part 1).
+  /// Reads the index of a texture coordinate (part 0) or of a normal (part 1) of a face corner.
+  /// Skips further parts, and both when attributes are not requested.
   void readPart(std::size_t part, FilePosition place, Seams::Pair& pair) {
     if (!builder_.wantsAttributes() || part > 1) {
       static_cast<void>(cursor_.integer("the index of a texture coordinate or normal"));

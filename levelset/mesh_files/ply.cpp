@@ -269,7 +269,7 @@ void readElements(const Header& header, std::string_view data, MeshBuilder& buil
 }
 
 /// Marks the properties of all attributes as skipped.
-/// @return true when there were any
+/// @return true when the header has a property of an attribute
 bool skipAttributes(Header& header) {
   bool any = false;
   for (Element& element : header.elements)

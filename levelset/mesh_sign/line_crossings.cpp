@@ -69,8 +69,8 @@ int firstBehind(const V3d& a, const V3d& b, const V3d& c, const V2d& q, int fron
   return behind;
 }
 
-/// Range of z that the projected triangle covers at this y, slightly enlarged. The caller tests
-/// each z in it exactly.
+/// Range of z that the triangle a, b, c in the plane (y, z) covers on the line of constant `y`,
+/// slightly enlarged. The caller tests each z in it exactly.
 std::pair<double, double> rangeAt(double y, const V2d& a, const V2d& b, const V2d& c) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   const auto visit = [&](const V2d& p, const V2d& q) {

@@ -188,7 +188,8 @@ class PairSearch {
   using List = std::vector<std::uint32_t>;
   struct Part {
     List triangles;
-    Imath::Box3d region;  // excludes its upper faces, except where they bound the mesh
+    Imath::Box3d region;  // box of the part, without its upper faces, except where they
+                          // bound the mesh
   };
   static constexpr std::size_t kFew = 24;
   static constexpr int kDeepest = 60;

@@ -70,7 +70,8 @@ class BlockDistance {
   Imath::V3d centre_;
   std::array<double, kBlockVoxels> distances_{};
   bool anyWithin_ = false;
-  std::array<Spheres, 3> lists_;  // candidates of the block, of its current 4³ cell and 2³ cell
+  std::array<Spheres, 3> lists_;  // bounding spheres of the triangles that can be nearest in
+                                  // the block, in its current 4³ cell and in its 2³ cell
   std::vector<float> squared_;    // squared distances to the sphere centres
   // Corners of the candidates, relative to the centre of the block.
   std::vector<std::array<Imath::V3d, 3>> corners_;
