@@ -40,7 +40,7 @@ struct Bound {
   static constexpr double kLoosestOrder = 1;
 
   std::string variant = {};
-  std::string figure = {};  ///< name of a column, see columns.h
+  std::string figure = {};  ///< name of a column of results.csv, such as "surface_l1_vx"
   Kind kind = Kind::Measured;
   double stated = 0;
   int resolution = 0;  ///< resolution at which the bound holds, voxels per unit of length; 0: all

@@ -60,7 +60,7 @@ class GraphRun {
     Unneeded,  // no requested result depends on it
     Compute,   // its operator must run
     Load,      // its value is read from the cache, for a node that runs or for the caller
-    UpToDate   // nothing to do: its files are unchanged, and no node that runs takes its value
+    UpToDate   // not to run: it has run, its files are unchanged, or no node that runs needs it
   };
   /// Failure of a node on a region of interest. The node may succeed on complete values.
   struct RegionFailure {};
@@ -121,7 +121,7 @@ class GraphRun {
   std::vector<char> isComputedForPlan_;
   // Per node: error while it ran for its plan; null: none.
   std::vector<std::exception_ptr> planningFailures_;
-  double planningBytes_ = 0;  // memory of the meshes computed for planning
+  double planningBytes_ = 0;  // memory of the meshes computed for planning, bytes
   // Per node: it failed on a region of interest, and must run again on complete values.
   std::vector<char> needsFullValues_;
   RunningSteps running_;

@@ -20,8 +20,9 @@ struct RunSettings {
   bool dryRun = false;
   bool measureErrors = false;  ///< estimate each result's error; costs a pass over the result
   std::size_t maxMemory = levelset::kNoMemoryLimit;
-  bool fullValues = false;           ///< ignore regions of interest (--no-roi)
-  std::size_t thumbnails = 0;        ///< number of steps with a thumbnail; none in dry runs
+  bool fullValues = false;  ///< ignore regions of interest (--no-roi)
+  std::size_t thumbnails =
+      0;  ///< number of nodes, from the first, that get a thumbnail in the report; none in dry runs
   std::filesystem::path cache = {};  ///< folder of cached results; empty: no cache
   // Branches run concurrently, so several threads call these functions. Calls never overlap, except
   // those of `progress` and `shouldContinue`.

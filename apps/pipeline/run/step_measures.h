@@ -17,7 +17,7 @@ namespace pipeline {
 void estimateError(const Value& value, const Invocation& invocation, StepNotes& notes);
 
 /// Records the kind and size of a result in its step.
-/// @param dryRun  `value` is a plan
+/// @param dryRun  true: `value` contains only a plan, so sizes are estimates
 void describeResult(const Value& value, bool dryRun, StepReport& step);
 
 /// Measures the CPU time that threads spend inside a TBB arena.
@@ -34,8 +34,9 @@ class ArenaCpu : public tbb::task_scheduler_observer {
 
  private:
   mutable std::mutex mutex_;
-  std::map<pthread_t, double> since_;  // CPU seconds at entry, of threads inside the arena
-  double past_ = 0;                    // CPU seconds of threads that have left the arena
+  std::map<pthread_t, double>
+      since_;        // for each thread inside the arena, its CPU seconds when it entered
+  double past_ = 0;  // CPU seconds that threads spent in the arena before they left it
 };
 
 class StepClock;

@@ -21,7 +21,8 @@ struct ToleranceParts {
   std::vector<std::size_t> constant;
   std::vector<std::size_t> again;  ///< nodes that are computed at each voxel size that is tried
   std::vector<std::size_t> ends;   ///< nodes that write, draw, print or check
-  /// Nodes of `again` whose error is compared with the tolerance: level sets and meshes.
+  /// Nodes of `again` whose error is compared with the tolerance: level sets and meshes that `ends`
+  /// or no node reads.
   std::vector<std::size_t> outputs;
   std::vector<std::size_t> lasting;  ///< nodes whose values are operands of `ends` or of no node
 };

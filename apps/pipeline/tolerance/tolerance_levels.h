@@ -97,7 +97,8 @@ class LevelRunner {
   const Graph& graph_;
   const ToleranceParts& parts_;
   const RunSettings& settings_;
-  /// Nodes whose values are kept: outputs, their source meshes and level sets, `lasting`.
+  /// Nodes whose values are kept after a run: outputs, the meshes and level sets from which they
+  /// come, and ToleranceParts::lasting.
   std::vector<std::size_t> watched_;
   std::map<std::size_t, Value> once_;  ///< values that computeOnce() computed, by node index
   std::vector<std::size_t> meshes_;    ///< nodes of the meshes that are converted to level sets

@@ -16,7 +16,8 @@ using levelset::NarrowBand;
 namespace {
 
 /// Returns the largest ratio of an element to its predecessor. `differences` are the volumes of the
-/// symmetric differences of target and morph, step by step. A result below 1 means a strict fall.
+/// symmetric differences of target and morph, step by step. Below 1, they fall strictly; after a
+/// difference of 0 the ratio counts as 1.
 double mostLeft(const std::vector<double>& differences) {
   double most = 0;
   for (std::size_t i = 1; i < differences.size(); ++i)

@@ -11,9 +11,9 @@
 namespace regress {
 namespace {
 
-/// Column with the share of missing values: grid points without a value, or zeros of φ that a ray
-/// misses. They have no error, so the share must be 0 where errors are bounded, unless the case
-/// bounds the share itself.
+/// Column with the share of missing values: inactive grid points, or missing and surplus zeros
+/// along rays. The share must be 0 where errors are bounded, unless the case bounds the share
+/// itself.
 struct Presence {
   const char* figure;
   const char* errors[2];  ///< prefixes of the error columns in which missing values do not count

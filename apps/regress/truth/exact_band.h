@@ -14,7 +14,8 @@ namespace regress {
 /// Samples a distance times 1.5 + 0.8 sin(x/4w) sin(y/4w) sin(z/4w) on the voxels of the exact
 /// band. Values are clipped at the background. The surface is unchanged; its slopes |∇φ| are 0.7 to
 /// 2.3.
-/// @param wave  w, world units; with the voxel size as w, the waves get shorter with the voxels
+/// @param wave  length w of the formula, world units; with the voxel size as w, finer voxels have
+///         shorter waves
 [[nodiscard]] levelset::NarrowBand perturbedBand(const Truth& truth, double voxelSize, double wave);
 
 }  // namespace regress

@@ -18,8 +18,9 @@ struct Region {
       {};  ///< true at points that count; empty: all points count
 };
 
-/// Returns the share of the region's grid points that are not active in the grid. Missing grid
-/// points have no error, so this share has its own bound. NaN if the region contains no grid point.
+/// Returns the share of the region's grid points that are not active in the grid. Grid points
+/// without a leaf add nothing to the columns of errors, so the share has its own bound. NaN if the
+/// region contains no grid point.
 [[nodiscard]] double missingShare(const Region& region, const openvdb::FloatGrid& grid);
 [[nodiscard]] double missingShare(const Region& region, const openvdb::Vec3SGrid& grid);
 

@@ -19,7 +19,7 @@ struct Truth {
   Distance distance;
   std::optional<double> volume = {}, area = {};
   Imath::V3d centre = {};  ///< centre of a ball that holds the solid
-  double reach = 1;        ///< radius of that ball; the rays cross it
+  double reach = 1;        ///< radius of that ball, which the measuring rays cross
   /// Returns true at points where the band is compared with the exact distance. Empty: at all
   /// points.
   std::function<bool(const Imath::V3d&)> compared = {};

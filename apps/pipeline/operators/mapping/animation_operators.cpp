@@ -258,7 +258,7 @@ mapping::PatchMaker makerLike(const std::vector<Patch>& patches) {
 
 /// Reads the level set of a frame. Warns about repairs once for each frame, although a frame may be
 /// read several times.
-/// @param told  frames whose warnings were already given
+/// @param told  frames about whose repairs a warning was already given
 NarrowBand readFrame(Invocation& in, std::size_t frame, const std::filesystem::path& file,
                      std::set<std::size_t>& told) {
   levelset::BandRepairs repairs;

@@ -213,7 +213,7 @@ PatchGridResult asSet(mapping::PatchResult result) {
 }
 
 /// Returns the options of a patch that moves from the footprint `origin` to `now`. Its spline and
-/// directions move with it. The caller checks if its corners have become clockwise.
+/// directions move with it. The animation checks later if the corners have become clockwise.
 mapping::PatchOptions optionsElsewhere(mapping::PatchOptions options,
                                        const mapping::Footprint& origin,
                                        const mapping::Footprint& now, const Progress& progress) {

@@ -203,8 +203,8 @@ void coarsen(Invocation& in, render::Scene& scene) {
 Value draw(Invocation& in) {
   render::Scene scene = sceneOf(in);
   coarsen(in, scene);
-  // Soft expressions and morphs are drawn by cpu unless a renderer is given, since the judge is
-  // slow on them.
+  // Scenes with a soft CSG expression or a morph are drawn by `cpu` unless --renderer is given,
+  // since the judge (Embree) is slow on them.
   const std::string renderer =
       scene.isBlended() && !in.given("renderer") ? "cpu" : in.text("renderer");
   const bool isBoth = renderer == "both";
