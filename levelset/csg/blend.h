@@ -22,8 +22,9 @@ enum class BlendMethod {
 struct BlendOptions {
   BlendSide side = BlendSide::Both;
   BlendMethod method = BlendMethod::Curvature;
-  /// Fillet only: largest distance from the seam to the middle of the arc, world units, > 0. Empty:
-  /// twice the radius, which limits the ball where the surfaces meet at less than 39°.
+  /// For BlendMethod::Fillet only: largest distance from the seam to the middle of the arc, world
+  /// units, > 0. Empty: twice the radius, which limits the ball where the surfaces meet at less
+  /// than 39°.
   std::optional<double> reach = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
@@ -35,9 +36,9 @@ struct BlendOptions {
 /// Brodersen07 §6.3]. Here κ = k1 + k2, d is the distance to the curve, and D falls smoothly from 1
 /// to 0 at `radius`. Unlike the plain flow of the sources, this flow moves only points with a
 /// curvature above 1/radius, so it converges to a fillet. A right-angled crease becomes a circular
-/// arc of that radius, within 10 %. A sharper crease becomes as round as `radius` on both sides
-/// allows. Nothing changes farther than `radius` from the curve, so solids that are near but do not
-/// intersect stay apart.
+/// arc of that radius, within 10 %. A sharper crease becomes only as round as a change within the
+/// distance `radius` of the curve allows. Nothing changes farther than `radius` from the curve, so
+/// solids that are near but do not intersect stay apart.
 ///
 /// BlendMethod::Fillet rolls a ball of that radius along the seam, in contact with both surfaces.
 /// Between planes at an angle θ (of the space between them) the result is an arc of that radius.
@@ -51,7 +52,8 @@ struct BlendOptions {
 /// @throws InvalidInput if a solid is empty or the radius is larger than the solids
 /// @throws ResourceLimit if the memory estimate exceeds the limit
 /// @throws Cancelled
-/// @note Curvature needs O(radius) steps over the grid points around the curve.
+/// @note BlendMethod::Curvature takes O(radius / voxel size) steps over the grid points around the
+///       curve.
 [[nodiscard]] CsgResult blend(CsgOperation operation, const NarrowBand& a, const NarrowBand& b,
                               double radius, const BlendOptions& options = {});
 
@@ -65,7 +67,8 @@ struct BlendOperator {
     double radius = 0;  ///< radius of the rounding, world units
     CsgOperation operation = CsgOperation::Union;
     BlendMethod method = BlendMethod::Curvature;
-    std::optional<double> reach;  ///< BlendOptions::reach, world units
+    std::optional<double> reach;  ///< as BlendOptions::reach: largest distance from the seam to the
+                                  ///< middle of the arc, world units; empty: twice the radius
     BlendSide side = BlendSide::Both;
 
     template <class Visitor>

@@ -94,7 +94,7 @@ std::vector<NarrowBand> onOneGrid(std::span<const NarrowBand> solids, const CsgO
         i + 1, solids[i].voxelSize(), finest - solids.begin() + 1, finest->voxelSize()));
   }
   // Voxel sizes may differ in the last bits. Equal half widths then give different backgrounds, so
-  // all bands are ended at the smallest background.
+  // all bands are shortened to the smallest background.
   float background = vdb(result.front()).background();
   for (const NarrowBand& solid : result) background = std::min(background, vdb(solid).background());
   for (NarrowBand& solid : result)
@@ -104,9 +104,9 @@ std::vector<NarrowBand> onOneGrid(std::span<const NarrowBand> solids, const CsgO
 
 using Leaf = FloatTree::LeafNodeType;
 
-/// Restores the old values of a redistanced leaf where both differ by at most 0.05 voxels. Also
-/// deactivates voxels that have become active within 0.05 voxels of the half width: where faces lie
-/// on grid points, rounding decides if voxels at exactly the half width are active.
+/// Restores the old values of a redistanced leaf where old and new value differ by at most 0.05
+/// voxels. Also deactivates voxels that have become active within 0.05 voxels of the half width:
+/// where faces lie on grid points, rounding decides if voxels at exactly the half width are active.
 /// @param old  leaf before redistancing; null: there was none
 void keepGoodValues(Leaf& leaf, const Leaf* old, float background, double voxelSize) {
   constexpr double kSame = 0.05;  // voxels: error of redistancing along ridges of the distance
@@ -135,8 +135,9 @@ std::set<openvdb::Coord> blocksAbout(const std::vector<openvdb::Coord>& blocks, 
   return all;
 }
 
-/// Redistances the field within the half width of coincident faces that bound no solid. Works only
-/// near these faces, so the cost and the result do not depend on the rest of the solid.
+/// Redistances the field within the half width of coincident faces: faces of both operands that lie
+/// on each other and bound no solid in the result. Works only near these faces, so the cost and the
+/// result do not depend on the rest of the solid.
 /// @param faces  origins of the blocks that contain such faces
 void redistanceAbout(const std::vector<openvdb::Coord>& faces, FloatGrid& grid) {
   const double voxelSize = grid.voxelSize()[0];
@@ -190,8 +191,9 @@ FloatGrid::Ptr mergePair(CsgOperation operation, const FloatGrid& first, const F
   const FloatGrid::Ptr result = minimumOf(operation, a, b);
   correctSeam(*result, a, b, signs);
   pruneOneSided(result->tree());
-  // Coincident faces that bound no solid may end at an edge of the result. The plane model of
-  // correctSeam() is wrong there, so the band is redistanced.
+  // Faces of the operands that lie on each other and bound no solid may end at an edge of the
+  // result. There correctSeam(), which fits planes to the surfaces, is wrong, so the band is
+  // redistanced.
   const std::vector<openvdb::Coord> faces = coincidentFaces(first, second, signs);
   if (!faces.empty() && eikonal::hasZeroCrossing(result->tree())) redistanceAbout(faces, *result);
   return result;

@@ -40,9 +40,9 @@ struct CsgResult {
 [[nodiscard]] NarrowBand subtract(const NarrowBand& a, const NarrowBand& b);
 
 /// Returns the distance, in voxels, around a region of the result within which the operands
-/// determine the result in that region. Distances are corrected up to the half width from the seam,
-/// from surfaces up to the half width away. Near coincident faces complete blocks of 8³ are
-/// redistanced, which adds three blocks.
+/// determine the result in that region. Distances within the half width of the seam are corrected,
+/// by measuring surfaces up to the half width away. Near faces where two operands coincide,
+/// complete blocks of 8³ are redistanced, which adds three blocks.
 [[nodiscard]] constexpr double seamReach(double halfWidth) {
   constexpr double kBlocks = 3 * 8;
   return 2 * halfWidth + kBlocks;

@@ -26,7 +26,7 @@ struct Contact {
   double depth;  ///< distance of the least deep inside neighbour, voxels, negative
 };
 
-/// Reads both operands with their signs, in voxels.
+/// Reads the distances of both operands in voxels, multiplied by their signs ±1 of CsgSigns.
 struct SignedPair {
   FloatGrid::ConstAccessor a, b;
   double first, second;
@@ -55,9 +55,10 @@ Coord stepped(Coord c, int axis, int step) {
   return c;
 }
 
-/// Returns true if a grid point is between two touching faces. The gradients are opposite there,
-/// and along one axis both neighbours are inside. Along every other axis the face continues, so two
-/// spheres that touch in a point stay separate.
+/// Returns true if a grid point is between two touching faces. The gradients of both distances are
+/// opposite there, and along one axis both neighbours are inside a solid. Along every other axis
+/// the face continues, so two spheres that touch in a point stay separate. Sets `depth`, see
+/// Contact.
 bool isContact(const SignedPair& pair, const Coord& c, double& depth) {
   if (!pair.isOnBoth(c)) return false;
   Vec3d slopeU, slopeV;

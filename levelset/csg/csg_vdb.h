@@ -43,8 +43,8 @@ struct ClosedPair {
                                                       const CsgSigns& signs);
 
 /// Returns the origins of the leaf blocks in which the surfaces of both operands coincide with
-/// opposite orientation. Such faces bound no solid in the result. But the minimum of the distances
-/// is zero, or nearly zero, along them, and refers to them nearby.
+/// opposite orientation. Such faces bound no solid in the result. But the minimum of both distances
+/// is zero, or nearly zero, along these faces, and is the distance to them nearby.
 [[nodiscard]] std::vector<openvdb::Coord> coincidentFaces(const openvdb::FloatGrid& a,
                                                           const openvdb::FloatGrid& b,
                                                           const CsgSigns& signs);

@@ -18,7 +18,8 @@ using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 using Manager = openvdb::tree::LeafManager<FloatTree>;
 
-// The weight is 1 up to this distance from the seam curve, as a fraction of the radius.
+// The weight of the flow is 1 up to this distance from the seam curve, as a fraction of the radius
+// of the rounding.
 constexpr double kFullWeight = 0.7;
 // Largest stable explicit step for κ = k1 + k2 in three dimensions, voxels², with a margin.
 constexpr double kExplicitStep = 0.15;
@@ -34,7 +35,8 @@ double fade(double x) {
   return 1 - x * x * x * (10 + x * (6 * x - 15));
 }
 
-/// Computes φ_t without the weight at a grid point of a dense block, by central differences.
+/// Computes φ_t at a grid point of a dense block by central differences, without the factor D of
+/// seamStep().
 double speed(const eikonal::DenseBlock& b, int x, int y, int z, const SeamFlow& flow) {
   const auto v = [&](int i, int j, int k) {
     return static_cast<double>(b.at(x + i, y + j, z + k));

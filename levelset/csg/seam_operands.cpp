@@ -17,11 +17,11 @@ using openvdb::FloatTree;
 using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
-// Margin around the part of the band that changes, voxels. It contains the surface next to that
-// part.
+// Margin that cutOut() adds around the part of the band that a blend changes, voxels. It contains
+// the surface next to that part.
 constexpr double kSurfaceMargin = 8;
 
-/// Adds a block that contains signs only, no distances.
+/// Adds the block at `origin` with the signs of `source`, as ± background and without distances.
 void addSigns(const FloatTree& source, const Coord& origin, FloatTree& target) {
   const float background = target.background();
   const LeafNode* leaf = source.probeConstLeaf(origin);

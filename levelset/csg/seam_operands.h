@@ -16,7 +16,7 @@ struct SeamRequest {
 /// Two operands on one grid.
 struct SeamOperands {
   NarrowBand a, b;
-  std::vector<std::string> notes;  ///< a note if one operand was resampled
+  std::vector<std::string> notes;  ///< one note if an operand was resampled, else empty
 };
 
 /// Resamples the solid with the larger voxels to the grid of the other one, unless both have the

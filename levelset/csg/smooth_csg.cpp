@@ -27,8 +27,8 @@ using SmoothLeaf = openvdb::FloatTree::LeafNodeType;
 // the smaller distance is at most K/4, and the other one at most K larger.
 constexpr double kReadRadii = 1.25;
 
-/// Returns the index box of the grid points from which the zero set of a solid is at most `extent`
-/// voxels away.
+/// Returns an index box that contains all grid points within `extent` voxels of the zero set of a
+/// solid.
 CoordBBox boxAround(const FloatGrid& grid, double extent) {
   CoordBBox box = grid.evalActiveVoxelBoundingBox();
   if (!box.empty()) box.expand(static_cast<int>(std::ceil(std::min(extent, 1e8))));

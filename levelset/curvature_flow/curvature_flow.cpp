@@ -18,18 +18,18 @@ using flow::CurvatureState;
 using flow::CurvatureSteps;
 using flow::NearSurface;
 
-// Default tolerance of the time steps together, voxels.
+// Default limit of the error of all time steps together, rms over the surface, voxels.
 constexpr double kDefaultTolerance = 0.02;
 // Largest and smallest ratio of successive steps, and safety factor on the step length that the
 // error estimate allows.
 constexpr double kMostGrowth = 3, kMostShrinkage = 0.2, kSafety = 0.8;
-// Length of the first step, before an estimate exists, voxels².
+// Longest first step after each redistancing, which has no error control, voxels².
 constexpr double kFirstStep = 10 * flow::kExplicitStep;
-// The band is redistanced when it limits the next step to less than this fraction of the wanted
-// step, or of the time in which the surface moves by kFlowTravel.
+// The band is redistanced when it limits the next step to less than this fraction of both the
+// wanted step and the time in which the surface moves by kFlowTravel.
 constexpr double kLeastShare = 0.4;
-// Number of fields in memory during a step, and the fraction of active grid points in the blocks of
-// a band.
+// Number of fields (a float for each grid point of the blocks) in memory during a step, and the
+// fraction of active grid points in the blocks of a band.
 constexpr double kFields = 9, kFilled = 0.45;
 constexpr double kVolumeTolerance = 1e-6;  // relative error of the preserved volume
 constexpr std::size_t kMostFlowSteps = 100000;
@@ -125,7 +125,8 @@ class CurvatureFlow {
                     now_ * voxel_ * voxel_, time_ * voxel_ * voxel_));
   }
 
-  /// Integrates until the band must be redistanced, the surface has vanished or the time is over.
+  /// Integrates until the band must be redistanced, the surface has vanished or is at rest, or the
+  /// time is over.
   /// @return the field after the last step, not redistanced
   openvdb::FloatGrid::Ptr runOn(const openvdb::FloatGrid& grid) {
     CurvatureState state(grid, options_.mask);
@@ -157,9 +158,10 @@ class CurvatureFlow {
     return state.toGrid(grid);
   }
 
-  /// Returns true when the surface is at rest, by its current rate. Long steps and redistancing
-  /// leave a roughness whose rate may exceed the limit. So the displacement of the surface since
-  /// redistancing, over the time `elapsed`, is tested too.
+  /// Returns true when the current rate moves the surface less than kRestMove allows: it is at
+  /// rest. Long steps and redistancing leave a roughness whose rate may exceed that limit. So the
+  /// mean rate, the displacement of the surface since redistancing divided by the time `elapsed`,
+  /// is tested too.
   static bool isAtRest(const CurvatureState& state, const NearSurface& near, double meanCurvature,
                        double elapsed) {
     const double rounding = meanCurvature * meanCurvature;
@@ -190,7 +192,8 @@ class CurvatureFlow {
 
   FlowScheme cheapest(double dt, double left) const {
     if (options_.scheme != FlowScheme::Auto) return options_.scheme;
-    // Cost of the remaining time `left` with steps of length dt.
+    // Predicted cost of the remaining time `left` with steps of length dt; explicit steps choose
+    // their own length.
     const auto cost = [&](FlowScheme scheme) {
       return scheme == FlowScheme::Explicit ? flow::predictedCost(scheme, left)
                                             : left / dt * flow::predictedCost(scheme, dt);

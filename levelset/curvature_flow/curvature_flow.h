@@ -37,12 +37,13 @@ struct CurvatureFlowResult {
   /// Scheme used for most of the time; Auto: no step was taken.
   FlowScheme scheme = FlowScheme::Auto;
   std::size_t steps = 0;
-  /// Evaluations of φ_t over the band, with other work in units of their cost.
+  /// Evaluations of φ_t over the band; the work of implicit solves is counted in units of one
+  /// evaluation.
   std::size_t evaluations = 0;
   std::size_t redistances = 0;  ///< number of distance transforms
   /// Estimated error of the time steps, rms over the surface, world units.
   double errorEstimate = 0;
-  double shortestStep = 0;  ///< lower limit of steps shortened for the tolerance, world units²
+  double shortestStep = 0;  ///< the tolerance shortens no step below this length, world units²
   double longestStep = 0;   ///< longest step taken, world units²
   /// Time after which the surface was at rest, world units². Set only with preservesVolume.
   std::optional<double> restedAfter = {};
@@ -51,9 +52,9 @@ struct CurvatureFlowResult {
 /// Moves the surface inwards with the speed κ = k1 + k2 for a `time` in world units²: a ball obeys
 /// R² = R0² − 4 time. The topology may change, and parts may vanish. The differences for κ|∇φ| are
 /// of fourth order where the surface is smooth at the scale of the voxels. The band is redistanced
-/// only when the surface has moved 1.5 voxels. The default tolerance of the time steps is 0.02
-/// voxels. [Meyer14, Smereka03, Sommeijer98] With preservesVolume the flow ends when the surface is
-/// at rest.
+/// when the surface has moved by about 1.5 voxels, not in each step. The default tolerance of the
+/// time steps is 0.02 voxels. [Meyer14, Smereka03, Sommeijer98] With preservesVolume the flow ends
+/// when the surface is at rest.
 /// @throws UsageError for a time, step or tolerance that is not positive and finite (time may be 0)
 /// @throws InvalidInput if `solid` is empty, or vanishes during the flow; the message gives the
 ///         time

@@ -14,16 +14,18 @@ using openvdb::FloatGrid;
 using openvdb::Vec3d;
 using LeafNode = openvdb::FloatTree::LeafNodeType;
 
-constexpr float kNear = 1;  // distance from the zero set in measureNearSurface(), voxels
-// Least sum of the trilinear weights of the corners of a leader's cell that lie in the core. With a
-// smaller sum the grid point does not follow a leader.
+constexpr float kNear = 1;  // voxels: measureNearSurface() counts grid points with |φ| below this
+// A leader is the closest point of a grid point on |φ| = kFlowLeader. The trilinear weights of
+// those corners of its grid cell that lie in the core have at least this sum. With a smaller sum
+// the grid point follows no leader.
 constexpr float kLeastSum = 0.1f;
 
 // Bound of the magnitude of principal curvatures, voxels⁻¹. Close to a focus or a crease, level
 // sets are not parallel and their curvature difference is unbounded.
 constexpr double kMostBent = 0.12;
 
-constexpr double kDifferencesReach = 2.8284271247461903;  // length of (2, 2, 0), voxels
+constexpr double kDifferencesReach = 2.8284271247461903;  // length of (2, 2, 0), the farthest grid
+                                                          // point that differences read, voxels
 static_assert(kFlowWidth >= kFlowCore + kDifferencesReach);
 
 struct Nothing {};
@@ -93,8 +95,8 @@ void CurvatureState::findCore(std::size_t i, PaddedBlock& block, Bending& bendin
     const double phi = static_cast<double>(std::abs(start_[i][it.pos()]));
     if (!(phi < kFlowCore)) continue;
     core_[i].setOn(it.pos());
-    // Curvatures are needed only at the corners of cells that contain leaders. These lie within a
-    // cell diagonal of |φ| = kFlowLeader.
+    // Curvatures are needed only at the corners of cells that contain leaders (points with |φ| =
+    // kFlowLeader). These corners lie within a cell diagonal of that level set.
     if (phi < kFlowLeader - 1.8) continue;
     const Coord c = LeafNode::offsetToLocalCoord(it.pos());
     std::tie(bending.sums[i][it.pos()], bending.squares[i][it.pos()]) =

@@ -18,11 +18,11 @@ namespace levelset::flow {
 ///   level set |φ| = kFlowLeader. The rate φ_t of the grid point is that at the leader plus a
 ///   constant: the difference in curvature of their level sets at the last redistancing. So all
 ///   level sets move with the surface.
-/// - kFlowTravel: the surface may move by this distance before the band is redistanced. The
-/// differences read values up to 2.83 voxels away. Distances must extend that far beyond the core.
-/// Otherwise the rates of the outermost leaders are wrong, and long steps transport the error to
-/// the surface (test CurvatureFlow.IsExactInLongSteps). The level set of the leaders must also be
-/// 2.83 voxels from the surface after the surface has moved by kFlowTravel. With 2.2 voxels
+/// - kFlowTravel: the surface may move by this distance before the band is redistanced.
+/// The differences read values up to 2.83 voxels away. Distances must extend that far beyond the
+/// core. Otherwise the rates of the outermost leaders are wrong, and long steps transport the error
+/// to the surface (test CurvatureFlow.IsExactInLongSteps). The level set of the leaders must also
+/// be 2.83 voxels from the surface after the surface has moved by kFlowTravel. With 2.2 voxels
 /// instead, a ball with a radius of 32 voxels lost a thousandth of a voxel at each redistancing.
 inline constexpr double kFlowWidth = 8.1, kFlowCore = 5.2, kFlowLeader = 4.3, kFlowTravel = 1.5;
 

@@ -122,8 +122,9 @@ void CurvatureSteps::eulerStep(double dt) {
   });
 }
 
-// Equations 16 to 18 of [Meyer14], for the change since the beginning of the step instead of the
-// value: the recursion multiplies rounding errors by about s², and the change is small.
+// Equations 16 to 18 of [Meyer14], for the change of φ since the beginning of the step instead of φ
+// itself: the recursion over s stages multiplies rounding errors by about s², and the change is
+// small.
 void CurvatureSteps::legendreStep(double dt) {
   const int stages = legendreStages(dt);
   const auto b = [](int j) { return j < 2 ? 1.0 / 3 : (j * j + j - 2.0) / (2.0 * j * (j + 1)); };

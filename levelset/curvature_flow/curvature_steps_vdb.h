@@ -29,9 +29,9 @@ class CurvatureSteps {
   /// Takes one step. rate() must be the rate of the state's current value; the step updates both.
   /// @return estimated error of the step, rms over the surface, voxels
   double take(FlowScheme scheme, double dt);
-  /// Reverts the last step.
+  /// Restores the value and the rate that the state had before the last step.
   void undo();
-  /// Adds `by` voxels times the mask weights to all values. Does not update rate().
+  /// Adds `by` voxels times the mask weight to φ at each grid point. Does not update rate().
   void raise(double by);
   /// Recomputes rate(), after raise() or a change of the shift.
   void refreshRate();
@@ -55,7 +55,7 @@ class CurvatureSteps {
   CurvatureState& state_;
   std::function<void()> pulse_;
   Field before_, rate_, rateBefore_, last_, older_, stageRate_;
-  std::unique_ptr<HelmholtzSolver> solver_;  ///< created at first use
+  std::unique_ptr<HelmholtzSolver> solver_;  ///< created at the first implicit step
   double work_ = 0;
 };
 

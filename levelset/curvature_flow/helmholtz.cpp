@@ -11,7 +11,7 @@ struct NoBuffer {};
 constexpr double kSolved = 1e-5;
 // Largest eigenvalue of the negative Laplacian, voxels⁻².
 constexpr double kLargestEigenvalue = 12;
-// A smaller weight counts as zero, since it would make the system nearly singular.
+// A smaller mask weight counts as zero, since it would make the system nearly singular.
 constexpr float kLeastWeight = 1e-3f;
 
 }  // namespace

@@ -8,9 +8,10 @@
 
 namespace levelset::flow {
 
-/// Solver of (1/w − dt Δ) change = dt rate / w on the grid points of a band, with homogeneous
-/// Neumann conditions at the ends of the band. Uses conjugate gradients with sums in a fixed order.
-/// The change is zero where the weight w is zero.
+/// Solver of a linearly implicit Euler step, (1/w − dt Δ) change = dt rate / w, on the grid points
+/// of a band, with homogeneous Neumann conditions at the ends of the band. Uses conjugate gradients
+/// with sums in a fixed order. Here dt is the step in voxels², `rate` is φ_t, `change` is that of φ
+/// over the step, and w is the mask weight. The change is zero where w is zero.
 ///
 /// Eigen's ConjugateGradient is not used: it needs contiguous vectors, while the fields of this
 /// solver are blocks that are read with an apron. It adds the products of single-precision vectors
@@ -38,7 +39,7 @@ class HelmholtzSolver {
   const BandBlocks& blocks_;
   const Field& weights_;
   std::vector<BandBlocks::Mask> unknown_;
-  Field neighbours_;  ///< how many of the six neighbours are in the band
+  Field neighbours_;  ///< number of neighbours (0 to 6) of each grid point that are in the band
   Field residual_, scaled_, direction_, product_;
 };
 

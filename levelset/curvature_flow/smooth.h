@@ -19,7 +19,8 @@ enum class SmoothKind {
 };
 
 struct SmoothOptions {
-  std::optional<Mask> mask = {};  ///< weight of the filtered values against the given ones
+  /// Weight of the filtered values: 0 keeps the given value, 1 takes the filtered one. Empty: 1.
+  std::optional<Mask> mask = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
