@@ -123,7 +123,8 @@ int runGraph(const pipeline::Graph& graph) {
                       threads, kMostThreads));
     limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
                                                   static_cast<std::size_t>(threads));
-    arena.initialize(static_cast<int>(threads));  // the number may exceed that of the cores
+    arena.initialize(static_cast<int>(
+        threads));  // `threads` may exceed the number of cores, the default size of an arena
   }
   if (globals.contains("no-clobber")) levelset::setClobberDefault(false);
   pipeline::checkRunTargets(graph);

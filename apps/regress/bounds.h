@@ -68,8 +68,8 @@ struct MeasuredAt {
 };
 
 /// The bounds of a case, added figure by figure. The full budget runs five placements at each
-/// resolution, the quick budget often only one. So a resolution of both budgets has two entries
-/// where the worst figures differ by more than the margin.
+/// resolution, the quick budget often only one. So a resolution that both budgets run has two
+/// entries if their worst figures differ by more than the margin.
 class Bounds {
  public:
   /// Adds bounds on a magnitude, which must be at most Bound::kMargin times the measured one. A

@@ -43,7 +43,8 @@ class CacheKeys {
 
   const Cache& cache_;
   std::size_t maxMemory_;
-  std::string program_;  // digest of the program file
+  std::string program_;  // digest of the executable or library that contains the operators; part of
+                         // each key
 };
 
 }  // namespace pipeline

@@ -71,7 +71,7 @@ void checkText(const Param& param, const std::string& text, const std::string& w
 
 enum class Flow {
   Makes,         ///< takes its operands off the stack of the chain and pushes its result
-  PassesThrough  ///< leaves its operand on the stack: write, measure, check, info, render
+  PassesThrough  ///< leaves its operand on the stack, as write, measure, check, info and render do
 };
 
 using levelset::Slope;

@@ -128,7 +128,8 @@ class GraphRun {
   std::vector<std::optional<StepReport>> steps_;  // one per node; empty: did not run
   // Printed text of finished nodes; empty: not finished.
   std::vector<std::optional<std::string>> pendingOutput_;
-  // First node that is not yet reported, and end of the nodes to report.
+  // Index of the first node whose messages are not yet reported, and of the node before which
+  // reporting stops.
   std::size_t nextReported_ = 0, reportEnd_ = kNone;
   std::mutex mutex_;  // guards values, states, steps, output and the callbacks of the settings
   Values values_;     // last member: decideStates() initializes the others

@@ -212,7 +212,7 @@ class ToleranceRun {
   }
 
   /// Decides if the measured error of an output falls with the voxel size. It does not fall if the
-  /// mesh has parts inside the solid, or creases finer than the tolerance. The error is then
+  /// source mesh has parts inside the solid, or creases finer than the tolerance. The error is then
   /// estimated instead.
   bool measuredFalls(double voxel, double error, std::size_t output) {
     const auto last = measured_.find(output);

@@ -47,9 +47,9 @@ struct Level {
 
 /// Difference between the surfaces of one result in a fine and in a coarse run.
 struct LevelDifference {
-  double smooth = 0, crease = 0,
-         creaseShare = 0;  ///< largest distances away from and near creases, world units; share of
-                           ///< the samples near creases
+  /// `smooth`, `crease`: two-sided Hausdorff distances away from and near creases, world units.
+  /// `creaseShare`: share of the sample points that lie near creases.
+  double smooth = 0, crease = 0, creaseShare = 0;
 };
 
 /// Runs a graph at several voxel sizes and compares the surfaces of its outputs. ToleranceParts

@@ -29,7 +29,7 @@ struct Length {
 [[nodiscard]] Length parseLength(std::string_view text, std::string_view where);
 /// Parses "x,y,z".
 [[nodiscard]] Imath::V3d parsePoint(std::string_view text, std::string_view where);
-/// Parses points separated by blanks.
+/// Parses points "x,y,z", separated by blanks.
 [[nodiscard]] std::vector<Imath::V3d> parsePoints(std::string_view text, std::string_view where);
 /// Parses "LOW HIGH": two points, LOW less than HIGH on every axis.
 [[nodiscard]] Imath::Box3d parseBox(std::string_view text, std::string_view where);

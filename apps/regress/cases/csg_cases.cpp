@@ -111,8 +111,8 @@ Truth smoothBalls(const V3d& centreA, double radiusA, const V3d& centreB, double
     const V3d in(x, y, 0), b(apart, 0, 0);
     const double toA = in.length() - radiusA, toB = (in - b).length() - radiusB;
     double least = arc.distance(in);
-    // The nearest point of a ball is on the surface of the union only if the other ball is K or
-    // more away from it.
+    // The nearest point of one ball lies on the surface of the smooth union only if it is at least
+    // `radius` away from the other ball.
     const V3d footA = in.normalized() * radiusA, footB = b + (in - b).normalized() * radiusB;
     if ((footA - b).length() - radiusB >= radius) least = std::min(least, std::abs(toA));
     if (footB.length() - radiusA >= radius) least = std::min(least, std::abs(toB));

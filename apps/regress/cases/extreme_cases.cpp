@@ -99,7 +99,8 @@ void pastTheAxis(Recorder& out) {
       const std::string name = touching ? "balls that touch" : "balls 0.3 voxels apart";
       const V3d middle = (a + b) / 2.0;
       Truth judged = pair;
-      // Near the contact, no grid point lies between the two surfaces.
+      // Near the contact, no grid point lies between the two surfaces, so points within 4 voxels of
+      // it are not compared.
       judged.compared = [=](const V3d& p) { return (p - middle).length() > 4 * at.voxelSize; };
       out.measure({"union of " + name, at, judged}, kOurs, [&] {
         return levelset::unite(exactBand(ball(a, 0.5), at.voxelSize),

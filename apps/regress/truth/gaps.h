@@ -25,8 +25,8 @@ struct Region {
 [[nodiscard]] double missingShare(const Region& region, const openvdb::Vec3SGrid& grid);
 
 /// Returns the region of the exact band without its ends: distances up to the half width minus a
-/// voxel, or up to half of a half width below two voxels. At the ends of a band, rounding and the
-/// error of φ decide which grid points are active.
+/// voxel, or up to half the half width if that is below two voxels. At the ends of a band, rounding
+/// and the error of φ decide which grid points are active.
 [[nodiscard]] Region bandRegion(const Truth& truth, double halfWidth, double voxelSize);
 
 }  // namespace regress

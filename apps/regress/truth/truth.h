@@ -49,7 +49,7 @@ struct Truth {
 /// Union of two solids that do not meet.
 [[nodiscard]] Truth apart(const Truth& a, const Truth& b);
 
-/// Rotation about the origin that is aligned with no axis or diagonal of the grid.
+/// Rotation about an axis through the origin that is parallel to no axis or diagonal of the grid.
 [[nodiscard]] Imath::M44d skewRotation();
 
 }  // namespace regress

@@ -124,8 +124,8 @@ Plan planScatter(Invocation& in) {
   const std::vector<double> size = in.lengths("size");
   const bool isAuto = in.text("height") == "auto";
   plan.patchSize = {size[0], size[1], isAuto ? 0 : in.length("height")};
-  // Discs placed at random in a plane until no more fit cover about seven tenths of the area that
-  // the densest packing covers.
+  // Discs placed at random in a plane until no more fit cover about 0.7 times the area that the
+  // densest packing covers. That packing has one disc per 0.866 × distance².
   constexpr double kPacked = 0.7 / 0.866;
   const double distance = in.given("distance") ? in.length("distance") : 0;
   plan.patchCount = in.given("count") ? static_cast<double>(in.integer("count"))

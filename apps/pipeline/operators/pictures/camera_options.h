@@ -23,7 +23,7 @@ void addCameraParams(std::vector<Param>& params);
 [[nodiscard]] render::Camera cameraOf(Invocation& in, const Imath::Box3d& bounds,
                                       const render::Camera* known = nullptr);
 
-/// Checks the camera options as far as this needs no operand.
+/// Checks the camera options before the operand is known.
 /// @throws levelset::UsageError for --to without --from, and for too wide a --fov
 void validateCamera(const Invocation& in);
 

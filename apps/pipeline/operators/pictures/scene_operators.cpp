@@ -92,7 +92,7 @@ Plan planScene(Invocation& in) {
     plan.bounds.extendBy(one.bounds);
     plan.area += one.area;
     plan.halfWidth = std::max(plan.halfWidth, one.halfWidth);
-    if (one.voxelSize == 0) continue;  // a mesh
+    if (one.voxelSize == 0) continue;  // a mesh, which has no voxels
     plan.voxelSize = plan.voxelSize > 0 ? std::min(plan.voxelSize, one.voxelSize) : one.voxelSize;
   }
   // `vx` is the smallest voxel size of the parts, and `%` refers to the diagonal of all parts, so
