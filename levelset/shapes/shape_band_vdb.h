@@ -1,6 +1,7 @@
 #pragma once
 
-// Bands of solids whose distance is given by a formula. Includes OpenVDB: for .cpp files only.
+// Builds bands of solids whose distance is given by a formula. Includes OpenVDB: for .cpp files
+// only.
 
 #include <fmt/core.h>
 

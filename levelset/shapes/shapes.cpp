@@ -58,8 +58,8 @@ void requireFits(const ShapeExtent& extent, double voxelSize, const ShapeOptions
                     "or move it towards the origin",
                     voxelSize, index));
   }
-  // A piece of the surface of the size of a leaf face (8² voxels) overlaps the leaves across the
-  // width of the band, and about one leaf more.
+  // The band around a piece of the surface of the size of a leaf face (8² voxels) overlaps about (2
+  // · half width) / 8 leaves along its normal, and about two leaves more.
   double leaves = extent.area / (64 * voxelSize * voxelSize) * (2 * options.halfWidth + 15) / 8;
   if (!isEverywhere(options.region)) {
     const V3d blocks = options.region.size() / (8 * voxelSize) + V3d(2);
@@ -91,9 +91,9 @@ double quadrantDistance(double u, double v) {
 
 /// Distance to the profile of a torus in the half plane r ≥ 0, with r the distance from the axis
 /// and z along it. The profile is a disc of radius `tube` around (radius, 0). If `tube` exceeds
-/// `radius`, the axis cuts the disc, and the part beyond belongs to the opposite side. A point
-/// whose nearest circle point lies beyond the axis is then nearest to the cusp, where the circle
-/// meets the axis.
+/// `radius`, the axis cuts the disc, and the part of the disc with r < 0 is left out. A point whose
+/// nearest point of the disc's border has r < 0 is then nearest to the cusp, where the border meets
+/// the axis.
 double ringDistance(double r, double z, double radius, double tube) {
   const double toCenter = length2d(r - radius, z);
   if (tube > radius && tube * (radius - r) > radius * toCenter) {

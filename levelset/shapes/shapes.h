@@ -14,12 +14,12 @@ namespace levelset {
 
 struct ShapeOptions {
   double halfWidth = 3;               ///< half width of the band, voxels, at least 1
-  Imath::Box3d region = kEverywhere;  ///< world box; the band is cropped() to it
+  Imath::Box3d region = kEverywhere;  ///< world box that is needed; blocks outside may be left out
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
 
-// Errors of all functions:
+// Errors of the functions make…(), below:
 // @throws UsageError if a size, the voxel size or the half width is not positive and finite
 // @throws InvalidInput if the voxel is larger than the shape
 // @throws ResourceLimit if the memory estimate or the 32-bit grid index exceeds its limit
@@ -30,23 +30,25 @@ struct ShapeOptions {
 /// Builds an axis-aligned box. @param size  full edge lengths
 [[nodiscard]] NarrowBand makeBox(const Imath::V3d& size, const Imath::V3d& center, double voxelSize,
                                  const ShapeOptions& options = {});
-/// Builds a torus: all points within `tube` of a circle of `radius` around the axis.
+/// Builds a torus: all points within the distance `tube` of a circle of radius `radius` around the
+/// axis.
 /// @param axis  direction of the axis through `center`, any length but zero
 [[nodiscard]] NarrowBand makeTorus(double radius, double tube, const Imath::V3d& center,
                                    const Imath::V3d& axis, double voxelSize,
                                    const ShapeOptions& options = {});
-/// Builds a cylinder of full height `height`, centred at `center`.
+/// Builds a cylinder of full height `height` along `axis`, centred at `center`.
 [[nodiscard]] NarrowBand makeCylinder(double radius, double height, const Imath::V3d& center,
                                       const Imath::V3d& axis, double voxelSize,
                                       const ShapeOptions& options = {});
-/// Builds a capsule: all points within `radius` of a line segment.
+/// Builds a capsule: all points within the distance `radius` of the line segment from `from` to
+/// `to`.
 [[nodiscard]] NarrowBand makeCapsule(const Imath::V3d& from, const Imath::V3d& to, double radius,
                                      double voxelSize, const ShapeOptions& options = {});
 
 /// Extent of a shape, known before its band is built. It determines the memory of the band.
 struct ShapeExtent {
   Imath::Box3d bounds;  ///< bounds of the surface, world units
-  double area = 0;      ///< surface area, world units²; sum over parts that overlap
+  double area = 0;      ///< surface area, world units²; overlapping parts count in full
 };
 [[nodiscard]] ShapeExtent sphereExtent(double radius, const Imath::V3d& center);
 [[nodiscard]] ShapeExtent boxExtent(const Imath::V3d& size, const Imath::V3d& center);

@@ -1,6 +1,6 @@
 #pragma once
 
-// Checks and distance functions shared by the sources of the generators.
+// Checks and distance functions that the .cpp files of the texture generators share.
 
 #include <fmt/core.h>
 
@@ -100,7 +100,8 @@ Imath::V3d slopeOf(const Distance& distance, const Imath::V3d& p, double step) {
 
 /// Finds the point nearest to p on the part of a solid's surface that lies in a face or edge of a
 /// box, by Newton steps. Along the axes that are `fixed`, the point has the coordinates of
-/// `corner`; the others follow from tangent planes of the solid. For a plane one step suffices.
+/// `corner`; its other coordinates follow from tangent planes of the solid. For a plane one step
+/// suffices. `step` is the step of slopeOf().
 template <typename Distance>
 Imath::V3d footWithin(const Distance& distance, const Imath::V3d& p, const Imath::V3d& corner,
                       const std::array<bool, 3>& fixed, double step) {
@@ -125,12 +126,13 @@ Imath::V3d footWithin(const Distance& distance, const Imath::V3d& p, const Imath
   return foot;
 }
 
-/// Exact distance to the intersection of a solid and a box. Inside, it is the distance to the
-/// nearer surface. Outside, the nearest point lies on the solid, on the box, or where the solid
-/// meets faces of the box.
-/// @param distance  exact near the solid's surface; its magnitude nowhere exceeds the exact
-///         distance
-/// @param exact     distance up to which the result is exact; beyond it may be smaller
+/// Exact signed distance to the intersection of a solid and a box. Inside the intersection, it is
+/// the distance to the nearer of both surfaces. Outside, the nearest point lies on the solid, on
+/// the box, or where the solid meets faces of the box.
+/// @param distance  signed distance to the solid, exact near its surface; its magnitude nowhere
+///         exceeds the exact distance
+/// @param exact     distance, world units, up to which the result is exact; further away the result
+///         may be smaller
 template <typename Distance>
 double clippedDistance(const Distance& distance, const Imath::V3d& p, const Imath::Box3d& box,
                        double exact, double voxelSize) {
@@ -163,13 +165,14 @@ double clippedDistance(const Distance& distance, const Imath::V3d& p, const Imat
 }
 
 /// Builds a band from a field with the right sign and zero set, unit slope beside the zero set, and
-/// values that nowhere exceed the distance. The field is sampled at the grid points, and the
+/// magnitudes that nowhere exceed the distance. The field is sampled at the grid points, and the
 /// distances are then computed by closest points.
 template <typename Field>
 levelset::NarrowBand makeFromField(const levelset::ShapeExtent& extent, double voxelSize,
                                    const levelset::ShapeOptions& options, const Field& field) {
   levelset::checkShape(extent, voxelSize, options);
-  // Voxels: the tricubic interpolant at the zero set reads values up to this distance.
+  // Half width of the sampled band, voxels: the tricubic interpolant at the zero set reads values
+  // up to this distance.
   constexpr double kSampledHalfWidth = 4;
   levelset::NarrowBand sampled =
       levelset::makeShape(extent, voxelSize,

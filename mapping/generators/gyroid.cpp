@@ -20,8 +20,8 @@ constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kSteepest = 1.7320508075688773;
 // Area of the gyroid surface in one cell, in units of the squared cell edge.
 constexpr double kCellArea = 3.0968;
-// Distance from the axis of a strut to the gyroid surface where the strut is thinnest, in cell
-// edges.
+// Distance from the axis of a labyrinth's strut to the gyroid surface where the strut is thinnest,
+// as a multiple of the cell edge.
 constexpr double kNeck = kThickestGyroidWall / 2;
 
 /// Value and derivatives of sin x cos y + sin y cos z + sin z cos x at a point, in radians.
@@ -63,7 +63,7 @@ double distanceToFoot(const V3d& p, V3d x) {
     x -= g.slope * (g.value / std::max(g.slope.length2(), 0.25));
   }
   // Projects p onto the tangent plane of the surface at x, a few times. This moves x towards the
-  // foot, to the side on which Newton's method converges.
+  // foot point, into the region in which Newton's method converges.
   for (int i = 0; i < 4; ++i) {
     const GyroidJet g(x);
     const double squared = std::max(g.slope.length2(), 0.25);
@@ -94,14 +94,15 @@ double distanceToFoot(const V3d& p, V3d x) {
   return std::abs(gyroidValue(x)) < 1e-9 ? (x - p).length() : HUGE_VAL;
 }
 
-/// Distance from p to the gyroid surface, radians. A foot much further away than the lower bound
-/// `least` may not be the nearest one. Newton's method then also starts from eight positions around
-/// p.
+/// Distance from p to the gyroid surface, radians. A foot point much further away than the lower
+/// bound `least` of the distance may not be the nearest one. Newton's method then also starts from
+/// eight positions around p.
 double distanceToSurface(const V3d& p) {
   const double least = std::abs(gyroidValue(p)) / kSteepest;
   double best = distanceToFoot(p, p);
-  // kPlain: ratio of distance to lower bound at the necks, up to which the first foot is accepted.
-  // kAround: offset of the further starts along each axis, radians.
+  // kPlain: ratio of distance to lower bound up to which the first foot point is accepted. The
+  // ratio reaches this value at the necks of the labyrinths. kAround: offset of the eight further
+  // starts from p along each axis, radians.
   constexpr double kPlain = 1.34, kAround = 0.4;
   if (best <= kPlain * least) return best;
   for (int corner = 0; corner < 8; ++corner) {
@@ -134,8 +135,8 @@ class GyroidField {
  public:
   GyroidField(const Gyroid& gyroid, const V3d& corner, double reach)
       : isSheet_(gyroid.kind == GyroidKind::Sheet),
-        // World units. The solid consists of the points whose distance (unsigned for a sheet,
-        // signed for a network) is below this offset.
+        // World units. The solid consists of the points whose distance to the gyroid surface
+        // (unsigned for a sheet, signed for a network) is below this offset.
         offset_(isSheet_ ? gyroid.thickness / 2 : gyroid.thickness / 2 - kNeck * gyroid.cell),
         cell_(gyroid.cell),
         corner_(corner),

@@ -15,8 +15,8 @@ using levelset::ShapeOptions;
 
 // Upper bound of the sum of the magnitudes of the weights of cubic convolution, in one dimension.
 constexpr double kCubicWeights = 1.25;
-// Upper bound of the slope of cubic convolution in one dimension, per node spacing, relative to the
-// largest difference of neighbouring nodes.
+// Upper bound of the slope of cubic convolution in one dimension, per spacing of the nodes,
+// relative to the largest difference between the values of neighbouring nodes.
 constexpr double kCubicSlope = 1.5;
 
 void requireHeightmap(const Heightmap& heightmap, const V3d& center) {
@@ -105,8 +105,8 @@ class HeightSurface {
   }
 
  private:
-  /// Position along one axis: the node before it, the fraction `t` of the way to the next node, and
-  /// the number of intervals.
+  /// Position along one axis: the node before it, the fraction `t` of the distance to the next
+  /// node, and the number `count` of intervals between nodes.
   struct Station {
     int node;
     double t, count;
@@ -173,8 +173,8 @@ class HeightSurface {
   int columns_, rows_;
 };
 
-/// Bounds of the height above the base that the surface may have, world units. Cubic interpolation
-/// may exceed 0 and `height`.
+/// Bounds of the interpolated heights above the base, world units. With cubic interpolation they
+/// may lie outside [0, `height`].
 HeightSurface::Range worldRange(const Heightmap& heightmap) {
   HeightSurface::Range range = HeightSurface(heightmap).range();
   return {range.low * heightmap.height, range.high * heightmap.height};
@@ -201,7 +201,8 @@ class HeightField {
                                       (p.y - tile_.min.y) / heightmap_.size.y);
     const double above = p.z - zero_ - jet.value * heightmap_.height;
     // The steepest slope of the entire surface gives a lower bound of the distance. Near the
-    // surface the local slope gives a better value; further away it could miss a cliff.
+    // surface the local slope gives a better value. Further away a value from the local slope could
+    // exceed the distance to a cliff.
     double value = above / steepest_;
     if (std::abs(value) < trusted_) {
       const V2d slope(jet.slope.x / heightmap_.size.x, jet.slope.y / heightmap_.size.y);

@@ -38,11 +38,11 @@ void requireHexagons(const Hexagons& hexagons, const V3d& center) {
 }
 
 /// Signed distance to a hexagon around the origin.
-/// @param apothem  distance from its centre to its flats
+/// @param apothem  distance from the hexagon's centre to its sides
 double hexagonDistance(double x, double y, double apothem) {
   x = std::abs(x);
   y = std::abs(y);
-  // After mirroring at 30 degrees the flat across x is the nearest one.
+  // After mirroring at the line at 30 degrees, the side perpendicular to x is the nearest one.
   if (y * kRoot3 > x) {
     const double mirrored = (x + kRoot3 * y) / 2;
     y = std::abs((kRoot3 * x - y) / 2);
@@ -100,7 +100,8 @@ ShapeExtent hexagonsExtent(const Hexagons& hexagons, const V3d& center) {
   const Imath::Box3d bounds = hexagonsBox(hexagons, center).whole;
   const V3d size = bounds.size();
   const V2d period = hexagonPeriod(hexagons);
-  // Area of the six flats of each hexagon, per area of the plate; horizontal faces are added below.
+  // Area of the six upright sides of each hexagon, per area of the plate. Horizontal faces are
+  // added below.
   const double walls = 2 * kRoot3 * hexagons.size * hexagons.height / (period.x * period.y);
   return {bounds, size.x * size.y * (2 + walls) + 2 * (size.x + size.y) * size.z};
 }
@@ -119,7 +120,7 @@ levelset::NarrowBand makeHexagons(const Hexagons& hexagons, const V3d& center, d
   const TileBox box = hexagonsBox(hexagons, center);
   const V2d period = hexagonPeriod(hexagons);
   // The side of the tile at its smallest y passes through the centres of the hexagons in the first
-  // row. A side between two rows would cut slivers off the corners of the next row.
+  // row. A side of the tile between two rows would cut slivers off the corners of the next row.
   const V3d origin(box.tile.min.x + period.x / 2, box.tile.min.y, box.tile.max.z - hexagons.height);
   const HexagonField pattern(hexagons, origin);
   const double exact = (options.halfWidth + 0.5) * voxelSize;

@@ -11,16 +11,18 @@ enum class HexagonKind {
   Honeycomb  ///< walls between hexagonal cells
 };
 
-/// Hexagons with flats across x, in rows along x, with or without a plate. Every second row is
-/// shifted by half a spacing. With an even number of rows the pattern continues across the sides of
-/// its tile.
+/// Hexagons with two sides perpendicular to x, in rows along x, with or without a plate below them.
+/// Every second row is shifted by half a spacing. With an even number of rows the pattern continues
+/// across the sides of its tile.
 struct Hexagons {
   HexagonKind kind = HexagonKind::Raised;
-  double size = 1;      ///< width of a hexagon across its flats, world units
-  double gap = 0.2;     ///< gap between hexagons, or thickness of a honeycomb's walls
-  double height = 0.5;  ///< height above the plate
-  double base = 0.2;    ///< thickness of the plate; 0: separate pillars, or cells open at both ends
-  /// Rounding radius of the upper edges, and of the upright edges of raised hexagons.
+  double size = 1;      ///< distance of opposite sides of a hexagon, world units
+  double gap = 0.2;     ///< gap between hexagons, or thickness of honeycomb walls; world units
+  double height = 0.5;  ///< height of the hexagons or walls above the plate, world units
+  /// Thickness of the plate, world units. 0: no plate; pillars are separate, and honeycomb cells
+  /// are open at both ends.
+  double base = 0.2;
+  /// Rounding radius of the upper edges, and of the upright edges of raised hexagons; world units.
   double rounding = 0;
   Tiling tiling = {};
 };
@@ -33,7 +35,7 @@ void checkHexagons(const Hexagons& hexagons, const Imath::V3d& center, double vo
 
 /// Builds hexagons.
 /// @throws UsageError for lengths out of range, and a rounding larger than the height or half the
-///         width of pillars or walls
+///         width of pillars or honeycomb walls
 /// @throws InvalidInput for a size or gap under two voxels
 /// @throws ResourceLimit if the memory estimate exceeds the limit
 /// @throws Cancelled if the progress callback cancels

@@ -41,16 +41,17 @@ void requireKnurl(const Knurl& knurl, const V3d& center) {
   }
 }
 
-/// Profile of the relief across the grooves, as heights at four stations per pitch. The stations
+/// Profile of the top face across the grooves, as heights at four stations per pitch. The stations
 /// are the bottom of a groove, the edge of the crest, the middle between two grooves, and the edge
-/// of the crest before the next groove. They are numbered continuously, so that neighbouring
-/// grooves compute the same bits.
+/// of the crest before the next groove. Stations are numbered continuously over all grooves, so
+/// that neighbouring grooves compute the same bits for a shared station.
 class GrooveStations {
  public:
   explicit GrooveStations(const Knurl& knurl)
       : pitch_(knurl.pitch),
         depth_(depthOf(knurl)),
-        // Half width of a groove's mouth. Sharp crests have no flat land between the grooves.
+        // Half width of a groove at the height of the crests. Sharp crests leave no flat strip
+        // between the grooves.
         mouth_(std::min(depth_ * std::tan(knurl.flankAngle / 2), knurl.pitch / 2)),
         isSharp_(mouth_ > knurl.pitch / 2 * (1 - 1e-9)) {}
 
@@ -61,7 +62,8 @@ class GrooveStations {
     return rest == 1 ? static_cast<double>(groove) * pitch_ + mouth_
                      : static_cast<double>(groove + 1) * pitch_ - mouth_;
   }
-  /// Height of a station: −depth at the bottom of a groove, zero on the crests.
+  /// Height of a station above the crests, world units: −depth at the bottom of a groove, zero on
+  /// the crests.
   [[nodiscard]] double height(long station) const { return (station & 3) == 0 ? -depth_ : 0; }
 
  private:
@@ -70,7 +72,7 @@ class GrooveStations {
 };
 
 /// Indices of the first and last groove of one family that may meet a box. Grooves are counted
-/// along the family's normal, (cos, −sin) or (cos, sin) of the groove angle.
+/// along the family's normal: (cos a, −sin a) or (cos a, sin a), with the groove angle a.
 struct GrooveRange {
   long first, last;
 };
@@ -85,8 +87,8 @@ GrooveRange groovesOver(const Imath::Box2d& box, const V2d& normal, double pitch
   return {static_cast<long>(std::floor(low)) - 1, static_cast<long>(std::ceil(high)) + 1};
 }
 
-/// Adds the flat faces of a groove: its two flanks and half of the flat crest on each side, along
-/// the entire box.
+/// Adds the flat faces of a groove to the relief: its two flanks and half of the flat crest on each
+/// side. They extend from −`length` to `length` along the groove.
 void addGroove(const Knurl& knurl, const GrooveStations& stations, long groove, double length,
                ReliefMesh& relief) {
   const double angle = knurl.pattern == KnurlPattern::Straight ? 0 : knurl.grooveAngle;
@@ -100,8 +102,8 @@ void addGroove(const Knurl& knurl, const GrooveStations& stations, long groove, 
                 corner(station, length)});
 }
 
-/// Adds the flat faces around the crossing of two grooves. Each quadrant has a flank of each
-/// groove, and the flat crest between them.
+/// Adds the flat faces around the crossing of two grooves to the relief. Each of the four quadrants
+/// between the grooves has a flank of each groove, and the flat crest between both flanks.
 void addCrossing(const Knurl& knurl, const GrooveStations& stations, long first, long second,
                  ReliefMesh& relief) {
   const double c = 2 * std::cos(knurl.grooveAngle), s = 2 * std::sin(knurl.grooveAngle);
@@ -133,11 +135,12 @@ double crossingCount(const Knurl& knurl, const TileBox& box) {
 
 levelset::TriMesh knurlMesh(const Knurl& knurl, const V3d& center, const ShapeOptions& options) {
   const TileBox box = knurlBox(knurl, center);
-  // Bytes: 24 triangles with their vertices, edges and maps.
+  // Bytes for each crossing of two grooves, or for each single groove: 24 triangles with their
+  // vertices, edges and map entries.
   constexpr double kBytesPerCrossing = 6000;
   levelset::requireMemory(crossingCount(knurl, box) * kBytesPerCrossing, options.maxMemory);
   // The relief is built in a frame whose x and y start at a corner of the tile, where the first
-  // grooves meet, and whose z starts at the crests.
+  // grooves of both families meet, and whose z is 0 at the crests.
   const V3d corner = box.tile.min;
   const Imath::Box2d rectangle(V2d(box.whole.min.x - corner.x, box.whole.min.y - corner.y),
                                V2d(box.whole.max.x - corner.x, box.whole.max.y - corner.y));

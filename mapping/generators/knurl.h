@@ -17,20 +17,20 @@ enum class KnurlPattern {
 /// long.
 struct Knurl {
   KnurlPattern pattern = KnurlPattern::Diamond;
-  double pitch = 1;  ///< distance of neighbouring grooves, across them, world units
-  double depth = 0;  ///< depth of the grooves; 0: the depth at which the crests become sharp
+  double pitch = 1;  ///< distance of neighbouring grooves, measured across them, world units
+  double depth = 0;  ///< depth of the grooves, world units; 0: sharpDepth()
   double flankAngle = 1.570796326795;  ///< radians between the two flanks of a groove
   /// Angle of the grooves from y, radians; ignored for straight grooves.
   double grooveAngle = 0.5235987756;
-  double base = 0;  ///< thickness of solid below the grooves, world units
+  double base = 0;  ///< thickness of the plate below the grooves, world units
   Tiling tiling = {};
 };
 
-/// The depth at which crests become sharp.
+/// Depth of the grooves at which the crests between them become sharp, world units.
 [[nodiscard]] double sharpDepth(const Knurl& knurl);
 
 [[nodiscard]] TileBox knurlBox(const Knurl& knurl, const Imath::V3d& center);
-/// Bounds and area, including the area of the grooves.
+/// Bounds of the plate and its surface area, including the area of the grooves.
 [[nodiscard]] levelset::ShapeExtent knurlExtent(const Knurl& knurl, const Imath::V3d& center);
 /// Throws the usage and input errors of `makeKnurl` without building anything.
 void checkKnurl(const Knurl& knurl, const Imath::V3d& center, double voxelSize,

@@ -19,8 +19,9 @@ V3d crossSide(V3d a, V3d b, int axis, double side) {
   return p;
 }
 
-/// Clips a convex polygon at a plane.
-/// @param sign  1: keep the part below `side`; −1: keep the part above
+/// Clips a convex polygon at the plane where coordinate `axis` equals `side`.
+/// @param sign  1: keeps the part with smaller coordinates; −1: keeps the part with larger
+///         coordinates
 std::vector<V3d> cutOff(const std::vector<V3d>& polygon, int axis, double side, double sign) {
   std::vector<V3d> kept;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -33,7 +34,7 @@ std::vector<V3d> cutOff(const std::vector<V3d>& polygon, int axis, double side, 
   return kept;
 }
 
-/// True if the polygon has a vertex that is not on the plane.
+/// True if the polygon has a vertex that is not on the plane where coordinate `axis` equals `side`.
 bool hasWidth(const std::vector<V3d>& polygon, int axis, double side) {
   for (const V3d& p : polygon)
     if (p[axis] != side) return true;

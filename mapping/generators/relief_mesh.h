@@ -10,13 +10,14 @@
 
 namespace mapping {
 
-/// A closed mesh under a relief of convex, flat facets (internal). Facets that share an edge must
-/// give its ends with the same bits; clipping at the sides of a rectangle preserves this.
+/// Closed mesh of the solid under a relief of convex, flat facets (internal). Facets that share an
+/// edge must give the ends of this edge with the same bits. Clipping at the sides of the rectangle
+/// preserves this property.
 class ReliefMesh {
  public:
-  /// @param rectangle  range of x and y, to which facets are clipped
-  /// @param snap       corners of facets within this distance of a side of the rectangle are moved
-  ///         onto it
+  /// @param rectangle  range of x and y of the solid, to which facets are clipped
+  /// @param snap       distance, world units: corners of facets nearer to a side of the rectangle
+  ///         are moved onto the side
   ReliefMesh(const Imath::Box2d& rectangle, double snap) : rectangle_(rectangle), snap_(snap) {}
 
   /// Adds a facet.

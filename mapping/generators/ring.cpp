@@ -16,9 +16,9 @@ using levelset::ShapeOptions;
 constexpr int kMostRings = 1'000'000;
 
 // Default spacing and lean of the rings of a sheet; spacings in ring radii, lean in radians. They
-// give the largest least distance between the circles of the rings, 0.5022 radii. Three distances
-// are then equal: to the next ring of the row, to the linked rings, and to the ring three rows
-// away.
+// maximise the least distance between the centre lines of two rings, which becomes 0.5022 radii.
+// Three distances from a ring are then equal: to the next ring of its row, to the linked rings, and
+// to the ring three rows away.
 constexpr double kBestColumn = 2.50219, kBestRow = 0.62,
                  kBestLean = 34.7207 * 3.14159265358979323846 / 180;
 
@@ -27,7 +27,7 @@ V2d ringSpacing(const Ring& ring) {
   return {kBestColumn * ring.radius, kBestRow * ring.radius};
 }
 
-/// Radius of a round wire that contains the section of the wire.
+/// Radius of the round wire that circumscribes the wire's section, world units.
 double wireReach(const Ring& ring) {
   return ring.section ? ring.section->length() / 2 : ring.tube;
 }
@@ -82,8 +82,8 @@ struct Circle {
   [[nodiscard]] V3d at(double angle) const {
     return center + (along * std::cos(angle) + across * std::sin(angle)) * radius;
   }
-  /// Coordinates of a point in the half plane through the axis: distance outwards from the circle,
-  /// and distance along the axis.
+  /// Coordinates of a point in the half plane through the point and the axis: distance outwards
+  /// from the circle, and distance from the circle's plane along the axis.
   [[nodiscard]] V2d profile(const V3d& p) const {
     const V3d d = p - center;
     const double u = d ^ along, v = d ^ across;
@@ -111,7 +111,7 @@ double distanceOfCircles(const Circle& a, const Circle& b) {
 
 /// True if one circle passes exactly once through the disc of the other.
 bool holdsRing(const Circle& a, const Circle& b) {
-  // Solves for the points where b meets the plane of a: s + c cos t + d sin t = 0.
+  // Finds the angles t on circle b at which b meets the plane of a: s + c cos t + d sin t = 0.
   const double s = (b.center - a.center) ^ a.axis, c = b.radius * (b.along ^ a.axis),
                d = b.radius * (b.across ^ a.axis), size = std::sqrt(c * c + d * d);
   if (!(std::abs(s) < size)) return false;
@@ -137,7 +137,7 @@ void requireMail(const Ring& ring) {
   }
 }
 
-/// Half size of a ring's bounding box.
+/// Half size of a ring's bounding box, world units.
 V3d ringHalfSize(const Ring& ring) {
   const double lean = ringLean(ring, 0), c = std::abs(std::cos(lean)), s = std::abs(std::sin(lean));
   if (!ring.section) return V3d(ring.radius, ring.radius * c, ring.radius * s) + V3d(ring.tube);
@@ -152,7 +152,8 @@ V3d sheetMiddle(const Ring& ring) {
   return {(ring.columns - 1 + aside) * spacing.x / 2, (ring.rows - 1) * spacing.y / 2, 0};
 }
 
-/// Signed distance to the union of all rings; exact up to `reach`, and cut off there.
+/// Signed distance to the union of all rings, clipped by `bounds`; exact up to `reach`, world
+/// units, and cut off there.
 class RingField {
  public:
   RingField(const Ring& ring, const V3d& origin, const Imath::Box3d& bounds, double reach)
@@ -180,8 +181,8 @@ class RingField {
   }
 
  private:
-  /// Returns the first (or last) integer of 0 … count − 1 that is not below (above) `place`;
-  /// `count` (or −1) if there is none.
+  /// Returns the first integer of 0 … count − 1 that is not below `place`, or `count` if there is
+  /// none. If not `isFirst`: the last integer not above `place`, or −1.
   static int nth(double place, int count, bool isFirst) {
     return static_cast<int>(isFirst ? std::clamp(std::ceil(place), 0.0, double(count))
                                     : std::clamp(std::floor(place), -1.0, double(count - 1)));
@@ -217,8 +218,8 @@ double ringClearance(const Ring& ring) {
   const V2d spacing = ringSpacing(ring);
   const double reach = 2 * (ring.radius + wireReach(ring));
   double least = HUGE_VAL;
-  // The arrangement repeats after two rows. So it suffices to pair the rings of the first two rows
-  // with the rings around them.
+  // The arrangement of the rings repeats after two rows. So it suffices to pair the rings of the
+  // first two rows with the rings around these.
   const double ranges = std::min<double>(ring.rows, reach / spacing.y + 1) *
                         std::min<double>(ring.columns, 2 * reach / spacing.x + 3);
   if (ranges > kMostRings) return -2 * wireReach(ring);
@@ -272,8 +273,8 @@ levelset::NarrowBand makeRing(const Ring& ring, const V3d& center, double voxelS
                               const ShapeOptions& options) {
   checkRing(ring, center, voxelSize, options);
   const ShapeExtent extent = ringExtent(ring, center);
-  // Distances may be cut off here: a block of 8³ voxels has no voxel in the band if its centre is
-  // further away than the half width plus 6.1 voxels.
+  // Distances may be cut off at `reach`: a block of 8³ voxels has no voxel in the band if its
+  // centre is further away than the half width plus 6.1 voxels.
   const double reach = (options.halfWidth + 8) * voxelSize;
   return levelset::makeShape(extent, voxelSize, options,
                              RingField(ring, center - sheetMiddle(ring), extent.bounds, reach));

@@ -12,7 +12,7 @@ namespace mapping {
 /// lean alternately to either side, and every second row is shifted by half a spacing. Each ring is
 /// linked with two rings of the previous row and two of the next row.
 struct Ring {
-  double radius = 1;  ///< from the ring's centre to the middle of its wire, world units
+  double radius = 1;  ///< distance from the ring's centre to the middle of its wire, world units
   double tube = 0.2;  ///< radius of round wire, world units
   /// Section of flat wire, which replaces `tube`: width across the ring, and height along its axis,
   /// world units.
@@ -30,17 +30,19 @@ struct Ring {
   [[nodiscard]] bool isSheet() const { return columns > 1 || rows > 1; }
 };
 
-/// Centre of ring (column, row), in a frame whose origin is the centre of ring (0, 0).
+/// Centre of ring (column, row), world units, in a frame whose origin is the centre of ring (0, 0).
 [[nodiscard]] Imath::V3d ringCenter(const Ring& ring, int column, int row);
 /// Lean of a row about x, radians.
 [[nodiscard]] double ringLean(const Ring& ring, int row);
 
-/// Least clearance between the wires of any two rings of the sheet; HUGE_VAL for one ring. Flat
-/// wire counts as round wire through its corners. Negative if wires overlap.
+/// Least clearance between the wires of any two rings of the sheet, world units; HUGE_VAL for one
+/// ring. Flat wire counts as round wire through the corners of its section. Negative if wires
+/// overlap.
 [[nodiscard]] double ringClearance(const Ring& ring);
 
-/// Boxes of the rings. The tile of a sheet is `columns` by `rows` spacings; with an even number of
-/// rows the sheet repeats after it. The tile of a single ring is its bounding box.
+/// Boxes `tile` and `whole` of the rings. The tile of a sheet is `columns` by `rows` spacings; with
+/// an even number of rows the sheet repeats after one tile. The tile of a single ring is its
+/// bounding box.
 [[nodiscard]] TileBox ringBox(const Ring& ring, const Imath::V3d& center);
 [[nodiscard]] levelset::ShapeExtent ringExtent(const Ring& ring, const Imath::V3d& center);
 void checkRing(const Ring& ring, const Imath::V3d& center, double voxelSize,

@@ -17,13 +17,13 @@ double stepOf(const Scales& scales) {
   return scales.step > 0 ? scales.step : scales.length / 2;
 }
 
-/// Thickness of a scale. With thickness 0 the scale is so thick that its lower face is inside the
-/// plate.
+/// Thickness of a scale, world units. With the option 0 the scale is so thick that its lower face
+/// is inside the plate.
 double thicknessOf(const Scales& scales) {
   return scales.thickness > 0 ? scales.thickness : 1.1 * scales.length * std::tan(scales.tilt);
 }
 
-/// Gap between a scale and the scale under its tip.
+/// Gap between a scale and the scale under its tip, world units.
 double rowGap(const Scales& scales) {
   return stepOf(scales) * std::sin(scales.tilt) - scales.thickness;
 }
@@ -71,7 +71,8 @@ void requireScales(const Scales& scales, const V3d& center) {
 constexpr double kRowOverlap = 0.06;
 
 /// Outline of the tongues of a row, in their plane: a sheet whose border has two arcs for each
-/// scale. The arcs meet at the tip of the scale, and in notches with the arcs of its neighbours.
+/// scale. The two arcs of a scale meet at its tip. Beside the scale they meet the arcs of its
+/// neighbours in notches.
 class ScaleOutline {
  public:
   explicit ScaleOutline(const Scales& scales)
@@ -93,8 +94,8 @@ class ScaleOutline {
     v = std::abs(v);
     const double along = u - middle_, across = v + aside_;
     const double fromCenter = std::sqrt(along * along + across * across);
-    // Outside both arcs the tip is nearest. Inside, where the nearest arc belongs to a neighbour,
-    // the notch is nearest.
+    // Beyond the ends of both arcs the tip is the nearest point. Inside the outline, where the
+    // nearest arc would belong to a neighbour, the notch is nearest.
     if (fromCenter > radius_ - rounding_ && across * (radius_ - rounding_) < aside_ * fromCenter) {
       const double beyond = u - length_;
       return std::sqrt(beyond * beyond + v * v);
@@ -135,12 +136,12 @@ class ScalesField {
   }
 
  private:
-  /// Distance to the nearest scale of a row.
+  /// Signed distance to the nearest scale of a row.
   [[nodiscard]] double scale(const V3d& p, double row) const {
     const double aside = std::remainder(row, 2.0) != 0 ? scales_.width / 2 : 0;
     const V3d q(std::remainder(p.x - aside, scales_.width), p.y - row * step_, p.z);
     const double u = q ^ along_, r = scales_.rounding, half = thickness_ / 2;
-    // The root ends inside the plate.
+    // Ends the scale at its root, which lies inside the plate.
     const double outline = std::max(outline_.distance(u, q.x), -thickness_ + r - u);
     return convexEdge(outline, std::abs((q ^ normal_) + half) - half + r) - r;
   }
@@ -164,7 +165,7 @@ TileBox scalesBox(const Scales& scales, const V3d& center) {
 ShapeExtent scalesExtent(const Scales& scales, const V3d& center) {
   const Imath::Box3d bounds = scalesBox(scales, center).whole;
   const V3d size = bounds.size();
-  // Area of both faces of all scales, and of their edges.
+  // Area of both faces of all scales, and of the edges of the scales, per area of the plate.
   const double faces = 2 * scales.length / stepOf(scales) + 2 * scales.thickness *
                                                                 (scales.length + scales.width) /
                                                                 (stepOf(scales) * scales.width);
@@ -186,11 +187,11 @@ levelset::NarrowBand makeScales(const Scales& scales, const V3d& center, double 
   checkScales(scales, center, voxelSize, options);
   const TileBox box = scalesBox(scales, center);
   const V3d origin(box.tile.min.x + scales.width / 2, box.tile.min.y, box.tile.min.z + scales.base);
-  // Distances may be cut off here: a block of 8³ voxels has no voxel in the band if its centre is
-  // further away than the half width plus 6.1 voxels.
+  // Distances to the pattern may be cut off 8 voxels beyond `exact`: a block of 8³ voxels has no
+  // voxel in the band if its centre is further away than the half width plus 6.1 voxels.
   const double exact = (options.halfWidth + 0.5) * voxelSize;
   const ScalesField pattern(scales, origin, exact + 8 * voxelSize);
-  // The box is open at the top, so that it does not clip the tips.
+  // The clipping box is open at the top, so that it does not clip the tips of the scales.
   Imath::Box3d cut = box.whole;
   cut.max.z = HUGE_VAL;
   return levelset::makeShape(scalesExtent(scales, center), voxelSize, options, [&](const V3d& p) {

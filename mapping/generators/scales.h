@@ -7,16 +7,19 @@
 namespace mapping {
 
 /// Scales of fish or reptiles on a plate: flat tongues in rows along x, with tips towards +y. Each
-/// row is shifted by half a width and lies under the tips of the previous row. With an even number
-/// of rows the pattern continues across the sides of its tile.
+/// row is shifted along x by half a width and lies under the tips of the previous row. With an even
+/// number of rows the pattern continues across the sides of its tile.
 struct Scales {
-  double length = 1.4;        ///< length of a scale, from the plate to its tip, world units
+  /// Length of a scale along its slope, from the plate to its tip, world units.
+  double length = 1.4;
   double width = 1;           ///< width of a scale, and distance between scales of a row
-  double thickness = 0;       ///< thickness of a scale; 0: solid down to the plate
-  double tilt = 0.349065850;  ///< angle to the plate, radians
-  double step = 0;            ///< distance between rows; 0: half a length
-  double tip = 0;       ///< length of the pointed part; 0: half a width, which makes a half circle
-  double rounding = 0;  ///< rounding radius of the edges, world units
+  double thickness = 0;       ///< thickness of a scale, world units; 0: solid down to the plate
+  double tilt = 0.349065850;  ///< angle of a scale to the plate, radians
+  double step = 0;            ///< distance between rows, world units; 0: half a length
+  /// Length of the pointed part of a scale, world units; 0: half a width, which makes a half
+  /// circle.
+  double tip = 0;
+  double rounding = 0;  ///< rounding radius of the scales' edges, world units
   double base = 0.3;    ///< thickness of the plate, world units
   Tiling tiling = {};
 };
