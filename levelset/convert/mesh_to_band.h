@@ -32,7 +32,7 @@ struct SignCertificate {
   std::size_t nonManifoldEdges = 0;       ///< edges with three or more faces
   std::ptrdiff_t selfIntersections = -1;  ///< pairs of intersecting triangles; -1: not searched
   SignMode method = SignMode::Auto;       ///< method used: Closed or Winding
-  bool flipped = false;                   ///< true when a mesh that faced inwards was reversed
+  bool flipped = false;  ///< true when the mesh faces inwards and counts as reversed
 
   /// Fraction of the voxels next to the zero set with an ambiguous winding number w,
   /// |w − 0.5| < 0.25. 1 if no voxel is next to the zero set.
@@ -45,9 +45,9 @@ struct MeshToBandOptions {
   SignMode sign = SignMode::Auto;
   Nesting nesting = Nesting::Parity;    ///< used with SignMode::Closed only
   bool acceptSign = false;              ///< accept an ambiguous sign, or a mesh without an inside
-  bool searchSelfIntersections = true;  ///< false: Auto assumes that the mesh has none
-  /// Region of interest. Distances outside it are not computed, unless the mesh has holes: then it
-  /// is ignored. The certificate describes the complete mesh, except for ambiguousShare.
+  bool searchSelfIntersections = true;  ///< false: Auto assumes no self-intersections
+  /// Region of interest. Distances outside it are not computed, unless the mesh has holes: then the
+  /// region is ignored. The certificate describes the complete mesh, except for ambiguousShare.
   RegionOfInterest roi = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};

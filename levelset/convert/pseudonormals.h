@@ -32,8 +32,8 @@ class Pseudonormals {
   [[nodiscard]] std::size_t borderEdges() const { return borderEdges_; }
 
   struct Direction {
-    Imath::V3d normal{0};  ///< unit length; zero if all adjacent faces are degenerate
-    bool onBorder = false;
+    Imath::V3d normal{0};   ///< unit length; zero if all adjacent faces are degenerate
+    bool onBorder = false;  ///< true at an edge with one face and at the ends of such an edge
   };
   /// Returns the pseudonormal of a part of a triangle. 0 to 2: corner; 3 to 5: edge from corner
   /// part − 3 to the next; 6: face.

@@ -68,7 +68,7 @@ class SideOfSurface {
   [[nodiscard]] double search() const { return std::sqrt(reach_ * reach_ + kBeyond * kBeyond); }
 
   /// Computes the signed distance of a grid point.
-  /// @param p           in the frame of the mesh, voxels
+  /// @param p           position of the grid point in the frame of the mesh, voxels
   /// @param distance    distance of the grid point from the nearest triangle, voxels
   /// @param candidates  triangles that may be nearest
   [[nodiscard]] SignedPoint at(const V3d& p, double distance,

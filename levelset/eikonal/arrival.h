@@ -35,7 +35,8 @@ struct ArrivalOptions {
 
 struct ArrivalFigures {
   std::size_t reached = 0;  ///< grid points that the front reaches before the latest time
-  std::size_t started = 0;  ///< grid points with a start time, near the surface or the points
+  /// Grid points with a start time, near the surface or the source points.
+  std::size_t started = 0;
   /// Grid points that fell back from second to first order on one axis or more.
   std::size_t firstOrder = 0;
 };
@@ -84,7 +85,7 @@ struct FrontDistance {
 /// Options of the operators `fast-marching` and `fast-sweeping`.
 struct FrontOptions {
   Length to = Length::voxels(8);
-  ScalarField speed;             ///< world units per unit of time
+  ScalarField speed;             ///< speed of the front, world units per unit of time
   std::vector<Imath::V3d> from;  ///< start points, world units; empty: the front starts at the
                                  ///< surface of the operand
   int order = 2;

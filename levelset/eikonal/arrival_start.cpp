@@ -18,8 +18,8 @@ using openvdb::FloatTree;
 using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
-// Largest radius around a point source, voxels, in which start times are computed directly. So
-// close to the source, the front is too curved for upwind differences.
+// Largest radius around a point source, voxels, in which start times are integrated along straight
+// segments. So close to the source, the front is too curved for upwind differences.
 constexpr double kStartBall = 8;
 // Limits of the speed within the start ball of a point source, as fractions of the speed at the
 // source: deviation from a linear function (kLeastLinear), and change of that linear function
@@ -38,8 +38,8 @@ constexpr double kBytesPerLeaf = 2300;
 constexpr std::size_t kProbes = 1000;
 
 /// Integrates the slowness along a straight segment with Simpson's rule. Positions are in index
-/// space; `spacing` is the largest distance of samples, voxels. Returns kFar when the
-/// front cannot pass on the segment, or when the segment may not be the fastest path.
+/// space; `spacing` is the largest distance of samples, voxels. Returns kFar when the front cannot
+/// pass on the segment, or when the segment may not be the fastest path.
 float straightTime(const Vec3d& from, const Vec3d& to, const Slowness& slowness, double spacing) {
   const double length = (to - from).length();
   const int pieces = 2 * std::max(1, static_cast<int>(std::ceil(length / (2 * spacing))));
@@ -75,8 +75,8 @@ const std::vector<Vec3d>& halfVoxelOffsets() {
 }
 
 /// Returns the radius, voxels, of the ball around a source point in which the speed is nearly
-/// linear. No path that leaves the ball is faster than a straight one within it. 0 where the front
-/// cannot pass at the point.
+/// linear, at most kStartBall. No path that leaves the ball is faster than a straight one within
+/// it. 0 where the front cannot pass at the point.
 double linearRadius(const Vec3d& point, const Slowness& slowness) {
   const auto speed = [&](const Vec3d& p) {
     const double here = slowness(p);

@@ -17,7 +17,7 @@ inline constexpr double kStartWidth = 2;
 
 /// Options for computing the times at which a front starts.
 struct ArrivalStart {
-  Slowness slowness = {};  ///< empty: 1 everywhere
+  Slowness slowness = {};  ///< slowness of the front; empty: 1 everywhere
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };

@@ -24,13 +24,13 @@ constexpr float kImprovement = 1e-5f;
 // Length of the time window of a round. It starts at the earliest arrival time that changed and is
 // not yet processed. Its length is the larger of kWindow, the time for half a voxel at typical
 // speed, and the fraction kWindowShare of that earliest time. Blocks whose changed times are all
-// later wait, since these times would change again. The fraction serves slow media, where
-// the front needs long for a voxel.
+// later wait, since these times would change again. The fraction serves slow media, where the front
+// needs long for a voxel.
 constexpr float kWindow = 0.5f, kWindowShare = 0.05f;
 constexpr std::size_t kBlocksPerTask = 8;
 
 /// Latest arrival time to compute: `until`, the latest requested time. With `lookahead` it is
-/// later, because the second-order solution reads first-order times after `until`. The addition is
+/// later, because the second-order solution reads first-order times after `until`. It is later by
 /// the time for one voxel at the local speed or a twentieth of `until`, whichever is larger.
 struct SweepLimit {
   float until = 0;

@@ -79,7 +79,7 @@ class Formulas {
   }
 
  private:
-  /// Parses the text. The parser's constructor refuses a text that is too long.
+  /// Parses the text of the formulas. The parser's constructor refuses a text that is too long.
   static Formula read(const std::string& text, const Variables& variables) {
     try {
       return {text, variables};

@@ -196,7 +196,7 @@ auto readFrom(const fs::path& path, const ReadBandOptions& options, const Take& 
 
 // === Writing
 
-/// A file buffer that reports how much of the expected data has been written.
+/// A file buffer that reports the bytes written as a fraction of the expected bytes.
 class ReportingFile : public std::filebuf {
  public:
   ReportingFile(const Progress& progress, double expected)

@@ -26,6 +26,7 @@ struct ReadBandOptions {
 /// Reads a level set as a band. Values stored as half floats or doubles become floats. A damaged
 /// file causes an error, never a hang.
 /// @param path  a .vdb file, or "-" for standard input
+/// @throws UsageError for a .nvdb file
 /// @throws IoError when the file cannot be opened
 /// @throws InvalidInput when the file is damaged or lacks the requested grid, or the grid breaks
 ///         the invariants of a band
@@ -54,7 +55,8 @@ struct WriteBandOptions {
 /// equal bytes: the content hash replaces OpenVDB's random identifier.
 /// @throws IoError
 /// @throws UsageError for an unknown format
-/// @throws InvalidInput for a default-constructed band
+/// @throws InvalidInput for a default-constructed band, an open surface, or voxels too small for a
+///         NanoVDB file
 void writeBand(const std::filesystem::path& path, const NarrowBand& band,
                const WriteBandOptions& options = {});
 

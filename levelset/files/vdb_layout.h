@@ -63,7 +63,7 @@ struct VdbMetadata {
 
 /// One grid of a file, without its tree.
 struct VdbEntry {
-  std::string name, type;  ///< type: OpenVDB's name, without the suffix for half floats
+  std::string name, type;  ///< type: OpenVDB's tree type, without the suffix for half floats
   std::string instanceOf;  ///< unique name of the grid that owns a shared tree; else empty
   std::string uniqueName;
   bool half = false;

@@ -20,7 +20,7 @@ namespace levelset {
 class BoxTree {
  public:
   BoxTree() = default;
-  /// @param bound  (item, low, high): extends the box by an item
+  /// @param bound  (item, low, high): extends the box from `low` to `high` by an item
   /// @param coordinate  (item, axis): coordinate by which an item is sorted to one side of a split
   template <typename Bound, typename Coordinate>
   BoxTree(std::size_t count, const Bound& bound, const Coordinate& coordinate) : order_(count) {

@@ -18,7 +18,7 @@ class PointTree {
   /// Keeps a view of the points: the caller keeps them alive.
   explicit PointTree(std::span<const openvdb::Vec3d> points);
   /// Index of the point that is nearest to `query` and nearer than `limit`; the lowest index among
-  /// equals. kNone when there is no such point.
+  /// points at equal distance. kNone when there is no such point.
   [[nodiscard]] std::uint32_t nearest(const openvdb::Vec3d& query, double limit) const;
 
  private:

@@ -73,7 +73,7 @@ struct AxisWeights {
 /// The N³ samples around an index position, x slowest, and the position as a fraction of its cell.
 template <int N>
 struct SampleBlock {
-  /// Number of samples on each axis below the cell that holds the position.
+  /// Number of samples on each axis before the lowest corner of the cell that holds the position.
   static constexpr int kBefore = N / 2 - 1;
   openvdb::Coord origin;  ///< index coordinates of the first sample
   openvdb::Vec3d fraction;

@@ -150,8 +150,8 @@ CurvedSurface::Node CurvedSurface::node(std::size_t triangle, bool bends, double
       break;
     }
   }
-  // (k1 + k2) dA = n · (n_u × S_v + S_u × n_v), with the interpolated normals. Across an edge of
-  // the solid, these normals turn by the angle of the edge.
+  // (k1 + k2) dA = n · (n_u × S_v + S_u × n_v) for the surface S(u, v) and its interpolated unit
+  // normals n(u, v). Across an edge of the solid, these normals turn by the angle of the edge.
   const double length = normal.length();
   if (length > 0.1) {
     const Vec3d unit = normal / length;

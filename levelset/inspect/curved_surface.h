@@ -51,8 +51,8 @@ class CurvedSurface {
   struct Sample {
     openvdb::Vec3d position;
     double area = 0;
-    bool isFlat = true;  ///< true: lies on a triangle that stays flat, mainly at an edge, which the
-                         ///< interpolant would round
+    bool isFlat = true;  ///< true: the point lies on a triangle that stays flat, mainly at an edge
+                         ///< of the solid, which the interpolant would round
   };
   /// Midpoint of a triangle and the triangle's area.
   [[nodiscard]] Sample middle(std::size_t triangle, Cache& cache) const;

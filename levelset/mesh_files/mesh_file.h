@@ -34,7 +34,9 @@ struct ReadMeshOptions {
 
 /// Reads a mesh.
 /// @param path  a file, or "-" for standard input (requires options.format)
+/// @throws UsageError for an unknown format
 /// @throws IoError when the file cannot be opened or read
+/// @throws ResourceLimit when the mesh exceeds options.maxMemory or the machine's memory
 /// @throws InvalidInput when the file is empty, truncated or without triangles. Also throws when a
 ///         count exceeds the file's size, an index is out of range, or a coordinate or attribute is
 ///         not finite.
@@ -50,7 +52,9 @@ struct WriteMeshOptions {
 /// Writes a mesh to a temporary file and renames it over the target (FileTarget).
 /// @throws IoError
 /// @throws UsageError for an unknown format
-/// @throws InvalidInput for attributes whose number differs from that of the vertices
+/// @throws InvalidInput for attributes whose number differs from that of the vertices, or when
+/// single
+///         precision is too coarse for an STL file
 void writeMesh(const std::filesystem::path& path, const TriMesh& mesh,
                const WriteMeshOptions& options = {});
 

@@ -42,8 +42,8 @@ class MeshBuilder {
   /// Float when every coordinate is exactly a float, else Double.
   void declarePrecision(CoordinatePrecision precision);
 
-  /// Adds a vertex. `place` is its position for messages, `at` the reading position for the
-  /// progress.
+  /// Adds a vertex. `place` is its position in the file for messages, `at` the reading position for
+  /// the progress.
   void addVertex(double x, double y, double z, FilePosition place, const char* at);
   /// Adds an attribute of the last vertex: normal, texture coordinate or colour.
   /// @throws InvalidInput for numbers that are not finite

@@ -82,10 +82,12 @@ struct Header {
 [[nodiscard]] Header readHeader(std::string_view input, const std::string& name);
 
 /// Checks that the file can hold all elements that the header promises.
+/// @param dataSize  number of bytes after the header
 /// @throws InvalidInput
 void checkPromises(const Header& header, std::size_t dataSize, const std::string& name);
 
-/// Checks that the header has vertices and faces, and that the file can hold them.
+/// Checks that the header has vertices and faces, and that the file can hold all elements.
+/// @param dataSize  number of bytes after the header
 /// @throws InvalidInput
 void checkHeader(const Header& header, std::size_t dataSize, const std::string& name);
 

@@ -58,7 +58,7 @@ int firstBehind(const V3d& a, const V3d& b, const V3d& c, const V2d& q, int fron
   int before = static_cast<int>(std::floor(x - error));
   int behind = static_cast<int>(std::floor(x + error)) + 1;
   // Bisection by the exact predicate. `before` lies on the −x side or in the plane, `behind` on the
-  // +x side. Integers between the two lie within the rounding error of x.
+  // +x side. Integers between `before` and `behind` lie within the rounding error of x.
   while (behind - before > 1) {
     const int middle = before + (behind - before) / 2;
     if (orient3d(a, b, c, V3d(middle, q.x, q.y)) == front)

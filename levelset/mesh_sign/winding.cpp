@@ -33,8 +33,8 @@ V3d centroid(const WeightedTriangle& t) {
   return (t.corners[0] + t.corners[1] + t.corners[2]) / 3;
 }
 
-/// Bound on the triangle's winding number at all points of the ball: its area, divided by 4π times
-/// the smallest possible squared distance.
+/// Bound on the triangle's winding number at all points of the ball around `centre`: its area,
+/// divided by 4π times the smallest possible squared distance. Infinite if they may touch.
 double boundOf(const WeightedTriangle& t, const V3d& centre, double radius) {
   const V3d middle = centroid(t);
   double reach = 0;

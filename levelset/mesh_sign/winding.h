@@ -33,8 +33,8 @@ class WindingField {
   [[nodiscard]] double exact(const Imath::V3d& point) const;
   /// Winding number at `point`, with an error of at most `tolerance`.
   [[nodiscard]] double within(double tolerance, const Imath::V3d& point) const;
-  /// Bound on the magnitude of the winding number at all points of the ball. Infinite near the
-  /// triangles.
+  /// Bound on the magnitude of the winding number at all points of the ball around `centre`.
+  /// Infinite near the triangles.
   [[nodiscard]] double bound(const Imath::V3d& centre, double radius) const;
 
  private:
