@@ -48,9 +48,13 @@ struct ParticleLayer {
 };
 
 enum class LayerScheme {
-  Reduced,     ///< scheme B: one relaxed patch per offset layer, from its own advected corners
-  Conforming,  ///< scheme A: each particle follows ∇φ; inner layers lie on its straight path
-  Spline       ///< scheme C: the surface's particles travel along a curve and rotate with it
+  /// Scheme B: each layer is relaxed between its own corners, moved up from the layer below.
+  Reduced,
+  /// Scheme A: each particle at w = 0 follows ∇φ to the top layer; inner layers lie on the straight
+  /// lines between the two.
+  Conforming,
+  /// Scheme C: the particles at w = 0 travel along a curve and rotate with it.
+  Spline
 };
 
 struct Patch {
@@ -65,22 +69,26 @@ struct Patch {
   [[nodiscard]] std::size_t particleCount() const;
 };
 
-/// Mean distance of neighbouring particles within the layers.
+/// Mean distance of neighbouring particles within the layers, world units.
 [[nodiscard]] double meanSpacing(const Patch& patch);
 
 /// Measurements of a new patch.
 struct PatchReport {
   double uLength = 0, vLength = 0;  ///< mean lengths of the rows and columns at w = 0, world units
   double cellAreaVariation = 0;     ///< standard deviation / mean of the cell areas at w = 0
-  std::size_t relaxIterations = 0;  ///< sum over all layers
-  bool isRelaxed = true;  ///< true: the last iteration moved no particle by more than 1e-3 voxel
-  /// Largest distance from a given corner to the surface, world units.
+  std::size_t relaxIterations = 0;  ///< iterations of the relaxation, summed over all layers
+  /// True: in every layer, the last iteration moved no particle by more than 1e-3 voxel.
+  bool isRelaxed = true;
+  /// Largest distance from a given corner or side point to the surface, world units. For a decal:
+  /// distance from the given centre.
   double projectionDistance = 0;
-  /// Spline only: number of particles that were slowed to avoid their neighbours.
+  /// Spline only: number of particles that were slowed, so as not to hit neighbours or move
+  /// backwards.
   std::size_t slowed = 0;
 };
 
-/// Transform of the layers that grows with w, about the axis of the patch.
+/// Transform of the layers that grows with w, about the axis of the patch: its normal at the
+/// middle.
 struct LayerTransform {
   double twist = 0;  ///< radians, anticlockwise seen from outside, at w = 1
   double taper = 1;  ///< scale across the axis at w = 1, positive

@@ -11,11 +11,11 @@
 
 namespace mapping {
 
-/// An RbfMap restricted to a block. Particles far from the block are summed into a polynomial of
-/// degree five in each axis, given by its values at Chebyshev nodes. Octants inherit the
-/// polynomial, so each particle is summed once for a large neighbourhood. Near particles are summed
-/// at the grid points. The polynomial's error is bounded particle by particle, and the sum of the
-/// bounds stays below the tolerance.
+/// An RbfMap restricted to a block of grid points. Particles far from the block are summed into a
+/// polynomial of degree five in each axis, given by its values at Chebyshev nodes. Octants inherit
+/// the polynomial, so each particle is summed once for a large neighbourhood. Near particles are
+/// summed at the grid points. The polynomial's error is bounded particle by particle, and the sum
+/// of the bounds stays below the tolerance.
 class RbfBlock final : public BlockMap {
  public:
   RbfBlock(const RbfMap& map, const GridBlock& block, double tolerance);
@@ -30,12 +30,12 @@ class RbfBlock final : public BlockMap {
  private:
   static constexpr std::size_t kNodes = 6;  ///< Chebyshev nodes along each axis
   static constexpr std::size_t kCubeNodes = kNodes * kNodes * kNodes;
-  /// Values of u, v and w at the nodes, summed over the particles in the polynomial.
+  /// Parts of u, v and w at the Chebyshev nodes, summed over the particles in the polynomial.
   using Values = std::array<std::array<double, kCubeNodes>, 3>;
 
   RbfBlock(const RbfBlock& parent, int bits);
-  /// Moves candidates that are far enough from the block into the polynomial; the others go to
-  /// `near_`.
+  /// Adds the candidates (indices of particles) that are far enough from the block to the
+  /// polynomial, and the others to `near_`.
   void chooseFar(std::span<const std::uint32_t> candidates);
   /// Returns the far candidates and adds the others to `near_`.
   template <typename Kernel>
@@ -45,7 +45,7 @@ class RbfBlock final : public BlockMap {
   [[nodiscard]] Imath::Box3d boundsFor(Kernel kernel) const;
 
   const RbfMap& map_;
-  GridBlock block_;  ///< in mean particle spacings, relative to the map's origin
+  GridBlock block_;  ///< grid points, in mean particle spacings relative to the map's origin
   double tolerance_;
   double error_ = 0;  ///< error bound of the polynomial, in u, v and w
   Values far_{};

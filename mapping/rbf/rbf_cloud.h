@@ -12,19 +12,19 @@ namespace mapping {
 
 struct RbfMapOptions;
 
-/// Properties of the particles of an RBF map, and how its system was solved.
+/// Properties of the particles of an RBF map, and how the linear system of its weights was solved.
 struct RbfSolveReport {
   std::size_t merged = 0;    ///< particles with the position and target of another
   std::size_t averaged = 0;  ///< particles with the position of another but a different target
   int directions = 3;        ///< dimension of the particles' span: 3, 2 in a plane, 1 on a line
-  /// Estimated condition number of the system orthogonal to the polynomials, in the 1-norm. For an
-  /// iterative solution: of the preconditioned system, in the 2-norm on the Krylov space. 0:
-  /// nothing was solved.
+  /// Estimated condition number of the system, restricted to weights orthogonal to the linear
+  /// polynomials, in the 1-norm. For an iterative solution: of the preconditioned system, in the
+  /// 2-norm on the Krylov space. 0: nothing was solved.
   double condition = 0;
-  bool isRegularized = false;  ///< true: the diagonal was increased beyond λ
+  bool isRegularized = false;  ///< true: the diagonal of the matrix was increased beyond λ
   bool isIterative = false;
   std::size_t iterations = 0;  ///< iterations of the Krylov method
-  /// Residual of the linear system in u, v, w; excludes the deviation due to λ.
+  /// Largest residual of the linear system in u, v, w; excludes the deviation due to λ.
   double solveResidual = 0;
   std::vector<std::string> notes;  ///< messages for the user, one sentence each
 };
@@ -48,7 +48,7 @@ struct RbfCloud {
 /// 1e-6 of its size is not counted in `directions`.
 /// @throws UsageError for λ that is negative or not finite
 /// @throws InvalidInput for no points, numbers that are not finite, and coincident points whose
-///         targets are further apart than those of neighbours
+///         targets differ by more than those of nearest neighbours do on average
 [[nodiscard]] RbfCloud makeRbfCloud(std::span<const Imath::V3d> points,
                                     std::span<const Imath::V3d> targets, std::span<const char> near,
                                     const RbfMapOptions& options, RbfSolveReport& report);

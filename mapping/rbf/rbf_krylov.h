@@ -5,12 +5,13 @@
 namespace mapping {
 
 /// Computes the weights of solveRbf by restarted, flexible GMRES [Saad93] in the space orthogonal
-/// to the polynomials. Matrix products use RbfClusterSum, or direct sums for kernels that grow
-/// faster than r. Each restart and the final test use the residual of the direct sum, so that
+/// to the linear polynomials. Matrix products use RbfClusterSum, or direct sums for kernels that
+/// grow faster than r. Each restart and the final test use the residual of the direct sum, so that
 /// errors of the fast sum do not affect the result. The preconditioner solves separately for the
 /// particles of each leaf of a tree with their neighbours, and then for a coarse subset of all
 /// particles [Beatson00].
-/// @param q  orthonormal basis of the polynomials at the particles, n × (1 + directions)
+/// @param q  orthonormal basis of the linear polynomials' values at the n particles, n × (1 +
+///         cloud.directions)
 /// @return weights and their image under the matrix. Orthogonal to the polynomials, the residual is
 ///         at most options.solveTolerance times the extent of the targets in u, v and w.
 /// @throws ResourceLimit if the memory estimate exceeds the limit

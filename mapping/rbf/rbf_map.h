@@ -20,14 +20,16 @@ namespace mapping {
 struct RbfMapOptions {
   RbfKernel kernel = RbfKernel::Biharmonic;
   /// Relaxation λ ≥ 0 of the particles at the surface (lambdaNear) and of all others (lambdaFar).
-  /// It is added to ±φ on the diagonal. φ takes r in mean particle spacings. For φ(r) = r, λ is a
-  /// length in mean particle spacings; decaying kernels have φ(0) = 1.
+  /// It is added to the diagonal of the matrix of ±φ(r), with φ the kernel and r the distance of
+  /// two particles in mean particle spacings. For φ(r) = r, λ is a length in mean particle
+  /// spacings; decaying kernels have φ(0) = 1.
   double lambdaNear = 0.005, lambdaFar = 0.25;
-  /// Largest number of particles for a direct solution. Above it, or if the factors exceed
-  /// maxMemory, the system is solved iteratively.
+  /// Largest number of particles for a direct solution. Above it, or if the matrix factors exceed
+  /// maxMemory, the system is solved iteratively. Systems of at most 500 particles are always
+  /// solved directly.
   std::size_t denseLimit = 10000;
-  /// Tolerance of the iterative solver: largest residual in u, v and w, as a share of the targets'
-  /// extent.
+  /// Tolerance of the iterative solver: largest residual in u, v and w, as a share of the extent of
+  /// the particles' texture coordinates.
   double solveTolerance = 1e-6;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};
@@ -39,12 +41,12 @@ struct RbfMapOptions {
 /// for every λ. A map does not depend on the unit of length, nor on the position and orientation of
 /// the patch.
 ///
-/// Linear polynomials suffice for all kernels, see RbfKernel. In the interior of the particles of a
-/// smooth map and for λ = 0, the error decreases with the spacing h as h⁴ or faster for growing
-/// kernels. It decreases as h² for the two decaying kernels, whose width shrinks with the spacing.
-/// A direct solution takes n² doubles and n³/3 operations. An iterative solution takes about 4 kB
-/// per particle, n² operations for each of a few restarts, and n log n for each step between them.
-/// For kernels that grow faster than r each step takes n² operations.
+/// Linear polynomials suffice for all kernels, see RbfKernel. If the particles sample a smooth map
+/// and λ = 0, the error inside their cloud decreases with their spacing h as h⁴ or faster for
+/// growing kernels. It decreases as h² for the two decaying kernels, whose width shrinks with the
+/// spacing. For n particles, a direct solution takes n² doubles and n³/3 operations. An iterative
+/// solution takes about 4 kB per particle, n² operations for each of a few restarts, and n log n
+/// for each step between them. For kernels that grow faster than r each step takes n² operations.
 ///
 /// Coincident particles count as one, with the mean of their targets. If all particles lie in one
 /// plane, A maps the plane's normal to the normal of the plane's image, scaled by the mean scale in
@@ -57,8 +59,9 @@ class RbfMap final : public PatchMap {
   /// @param near  n values; true for particles with lambdaNear
   /// @throws UsageError for λ or a tolerance that is negative or not finite
   /// @throws InvalidInput for no points, numbers that are not finite, and coincident points whose
-  ///         targets are further apart than those of neighbours
-  /// @throws ResourceLimit if the matrix would exceed options.maxMemory, before it is allocated
+  ///         targets differ by more than those of nearest neighbours do on average
+  /// @throws ResourceLimit if the memory estimate of the solution exceeds options.maxMemory, before
+  ///         it is allocated
   /// @throws NumericalError if the iteration stagnates
   RbfMap(std::span<const Imath::V3d> points, std::span<const Imath::V3d> targets,
          std::span<const char> near, const RbfMapOptions& options = {});
@@ -71,7 +74,7 @@ class RbfMap final : public PatchMap {
                                                      double tolerance) const override;
   /// Largest |Φ(p_i) − uvw_i| over the particles.
   [[nodiscard]] double maxResidual() const { return maxResidual_; }
-  /// Largest residual for u, v and w separately.
+  /// Largest residual over the particles, for u, v and w separately.
   [[nodiscard]] const Imath::V3d& axisResidual() const { return axisResidual_; }
   /// Mean distance of a particle to its nearest neighbour, world units; 1 for a single particle.
   [[nodiscard]] double meanSpacing() const { return spacing_; }

@@ -16,8 +16,8 @@ namespace mapping {
 /// subset of particles is solved. The object keeps references to the cloud and the tree.
 class RbfPreconditioner {
  public:
-  /// @param cloud  particles in the order of the tree
-  /// @param q      orthonormal basis of the polynomials at the particles
+  /// @param cloud  particles in the order of the tree, each leaf a contiguous range
+  /// @param q      orthonormal basis of the linear polynomials' values at the particles
   RbfPreconditioner(const RbfCloud& cloud, RbfKernel kernel, const ClusterTree& tree,
                     const Eigen::MatrixXd& q);
 
@@ -45,7 +45,8 @@ class RbfPreconditioner {
   const Eigen::MatrixXd& q_;
   std::vector<Leaf> leaves_;
   std::vector<std::uint32_t> coarse_;
-  /// Orthonormal basis of the coarse weights that are orthogonal to the polynomials.
+  /// Orthonormal basis of the weights of the coarse particles that are orthogonal to the linear
+  /// polynomials.
   Eigen::MatrixXd coarseQ_;
   Eigen::LLT<Eigen::MatrixXd> coarseFactors_;
 };

@@ -16,14 +16,14 @@ struct RbfMapOptions;
 /// Columns u, v and w; one row per particle.
 using RbfColumns = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
-/// Weights orthogonal to the polynomials, and their product with the RBF matrix s φ + λ, with s the
-/// sign of the kernel.
+/// Weights orthogonal to the linear polynomials, and their product with the RBF matrix s φ + λ,
+/// with s the sign of the kernel.
 struct RbfFit {
   RbfColumns weights, image;
 };
 
-/// Coefficients of Φ(x) = constant + linear x + Σ weights_i φ(|x − p_i|), in the coordinates of the
-/// cloud.
+/// Coefficients of Φ(x) = constant + linear x + Σ weights_i φ(|x − p_i|), with x and p_i in the
+/// coordinates of the cloud: mean particle spacings from its centre.
 struct RbfSolution {
   std::vector<Imath::V3d> weights;
   Imath::V3d constant{0};
@@ -31,8 +31,8 @@ struct RbfSolution {
 };
 
 /// Solves for the weights. With s the kernel's sign, s φ + λ is positive definite on the vectors
-/// orthogonal to the polynomials that the particles distinguish. The system is solved there by
-/// Cholesky factorisation, or iteratively above options.denseLimit and if the factors exceed
+/// orthogonal to the linear polynomials that the particles distinguish. The system is solved there
+/// by Cholesky factorisation, or iteratively above options.denseLimit and if the factors exceed
 /// options.maxMemory. If the particles span fewer than three directions, a similarity completes the
 /// affine part, see RbfMap.
 /// @throws ResourceLimit if the memory estimate exceeds options.maxMemory

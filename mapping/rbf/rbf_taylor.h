@@ -14,7 +14,7 @@
 namespace mapping {
 
 /// A polynomial in x, y, z of total degree at most five with vector coefficients: the Taylor
-/// expansion of the far particles' sum around a point.
+/// expansion, around a point, of the affine part of an RBF map and the sum over far particles.
 class TaylorPolynomial {
  public:
   static constexpr int kDegree = 5;
@@ -24,17 +24,18 @@ class TaylorPolynomial {
     [[nodiscard]] int total() const { return x + y + z; }
   };
   TaylorPolynomial() { terms_.fill(Imath::V3d(0)); }
-  /// Powers of each term, ordered by total degree.
+  /// Powers of x, y and z in each term, ordered by total degree.
   static const std::array<Powers, kTerms>& powers();
 
   [[nodiscard]] const Imath::V3d& operator[](std::size_t term) const { return terms_[term]; }
   void addAffine(const Imath::V3d& value, const Imath::M33d& rows);
-  /// Adds weight × |offset + s|, expanded in s, by the recurrence of [Duan01].
+  /// Adds weight × |offset + s|, expanded in the offset s from the centre of the expansion, by the
+  /// recurrence of [Duan01].
   /// @pre offset is not zero
   void addDistance(const Imath::V3d& offset, const Imath::V3d& weight);
   /// Re-expands the polynomial around a point that is displaced by `by` from the old centre.
   void shift(const Imath::V3d& by);
-  /// Jacobian at s: gradients of the three components as rows.
+  /// Jacobian at the offset s from the centre: gradients of the three components as rows.
   [[nodiscard]] Imath::M33d slopes(const Imath::V3d& s) const;
   [[nodiscard]] Imath::V3d value(const Imath::V3d& s) const;
 
@@ -42,26 +43,27 @@ class TaylorPolynomial {
   std::array<Imath::V3d, kTerms> terms_;
 };
 
-/// Expansion of a smooth map around the centre of a cube. The map is scaled: u, v and w are
-/// multiplied by the extents of the patch, so that slopes are about 1.
+/// Expansion of an RBF map around the centre of a cube. The map is scaled: u, v and w are
+/// multiplied by the extents of the patch in world units, so that slopes are about 1.
 struct RbfCube {
   Imath::V3d center{0};  ///< centre of the cube, relative to the map's origin, world units
   double half = 0;       ///< half edge length, world units
   TaylorPolynomial far;
-  /// Error bounds of the polynomial in the ball around the cube, in scaled units.
+  /// Error bounds of the polynomial in the ball around the cube: of the scaled slopes, and of the
+  /// scaled u, v and w.
   double slopeError = 0, valueError = 0;
   std::vector<std::uint32_t> near;  ///< particles that the polynomial does not contain
 
   [[nodiscard]] double radius() const { return half * 1.7320508075688774; }
 };
 
-/// Hierarchy of cubes for a smooth map. Particles far from a cube are summed into its polynomial,
+/// Hierarchy of cubes for an RBF map. Particles far from a cube are summed into its polynomial,
 /// which its octants inherit.
 class RbfCubes {
  public:
-  /// @param map        a map with the kernel r
+  /// @param map        a map with the kernel φ(r) = r
   /// @param sizes      factors by which u, v and w are scaled
-  /// @param tolerance  error bound for the slopes of all far particles together, in scaled units
+  /// @param tolerance  error bound for the scaled slopes of all far particles together
   RbfCubes(const RbfMap& map, const Imath::V3d& sizes, double tolerance);
 
   [[nodiscard]] RbfCube root(const Imath::V3d& center, double half) const;
@@ -70,10 +72,10 @@ class RbfCubes {
   /// Particles with scaled weights; positions in world units, relative to the map's origin.
   [[nodiscard]] std::span<const RbfParticle> particles() const { return particles_; }
   [[nodiscard]] double weightNorm(std::uint32_t particle) const { return norms_[particle]; }
-  /// Scaled Jacobian at a point of the cube, gradients as rows. At a particle the particle's own
-  /// term, which has no derivative there, adds nothing.
+  /// Scaled Jacobian at a point of the cube (relative to the map's origin, world units), gradients
+  /// as rows. At a particle the particle's own term, which has no derivative there, adds nothing.
   [[nodiscard]] Imath::M33d slopes(const RbfCube& cube, const Imath::V3d& point) const;
-  /// Scaled u, v and w at a point of the cube.
+  /// Scaled u, v and w at a point of the cube, given relative to the map's origin, world units.
   [[nodiscard]] Imath::V3d value(const RbfCube& cube, const Imath::V3d& point) const;
 
  private:

@@ -42,9 +42,9 @@ struct ScatteredPoints {
 /// Poisson-disc sampling of the zero set. Candidates are distributed by area. With a distance, they
 /// are accepted in random order unless an accepted point is too near. With a count, the most
 /// crowded candidates are removed until that many remain [Yuksel15]. Distances are measured along a
-/// surface that bends evenly between two points with normals [Bowers10]. Points on opposite sides
-/// of a part thinner than a quarter of the least distance ignore each other. The same seed gives
-/// the same points.
+/// surface that bends evenly from the normal of one point to that of the other [Bowers10]. Points
+/// on opposite sides of a part thinner than a quarter of the least distance ignore each other. The
+/// same seed gives the same points.
 /// @throws UsageError unless exactly one of count and distance is positive, or for a scale that is
 ///         not positive and finite, with its position
 /// @throws InvalidInput for a base without a surface, or a weight that leaves no position
@@ -53,15 +53,16 @@ struct ScatteredPoints {
                                             const ScatterDensity& density);
 
 /// Distance of two points along a surface that bends evenly from normal to normal, world units. It
-/// is infinite if the normals differ by more than 120° within `thin`, world units, because the
-/// points then lie on opposite sides.
+/// is infinite if the points are less than `thin` (world units) apart and their normals differ by
+/// more than 120°, because they then lie on opposite sides of a thin part.
 [[nodiscard]] double surfaceDistance(const SurfacePoint& a, const SurfacePoint& b, double thin);
 
-/// Least distance of any two points, divided by their mean scale; infinite if no two points are
-/// within `reach`.
-/// @param reach  largest distance that counts, in scales, positive
-/// @param kept   points on opposite sides of a part thinner than a quarter of this length ignore
-///         each other
+/// Least distance of any two points, divided by their mean scale, world units. Infinite if no pair
+/// is examined.
+/// @param reach  distance up to which all pairs are examined, divided by the points' largest scale,
+///         world units, positive
+/// @param kept   least distance that the points should have, divided by their mean scale, world
+///         units; points on opposite sides of a part thinner than a quarter of it ignore each other
 [[nodiscard]] double leastDistance(std::span<const SurfacePoint> points, double reach, double kept);
 
 }  // namespace mapping

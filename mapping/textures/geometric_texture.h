@@ -25,22 +25,26 @@ enum class TextureMerge {
 };
 
 enum class TextureMap {
-  Rbf,   ///< smooth, defined everywhere, relaxed by λ
-  Prism  ///< prism map: piecewise linear in tetrahedra between the particles, which must be dense
+  /// Radial basis functions (RbfMap): smooth, defined everywhere, relaxed by λ.
+  Rbf,
+  /// PrismMap: piecewise linear in tetrahedra between the particles of the patch, which must be
+  /// dense.
+  Prism
 };
 
 struct TextureOptions {
   TextureMerge merge = TextureMerge::Union;
   TextureMap map = TextureMap::Rbf;
-  /// Depth of the texture below the surface, world units; empty: one voxel.
+  /// Depth of the texture below the surface, world units; empty: one voxel of the base.
   std::optional<double> embedDepth = {};
-  double blend = 0;  ///< radius of the blend along the seam, world units; 0: no blend
+  /// Radius of the blend along the seam of texture and base, world units; 0: no blend.
+  double blend = 0;
   /// Box that is mapped to the unit cube of u, v, w; empty: the box of the texture's zero set. An
   /// RBF map also maps parts of the texture outside the box, to positions beyond the patch. A prism
   /// map cuts off these parts.
   std::optional<Imath::Box3d> textureBox = {};
   /// Voxel size of the result, world units. Empty: the smaller of the base's voxel size and the
-  /// texture's voxel size times the smallest stretch.
+  /// texture's voxel size times the smallest stretch of the maps.
   std::optional<double> voxelSize = {};
   double halfWidth = 3;        ///< half width of the result's band, voxels
   RbfMapOptions rbf = {};      ///< solveTolerance is ignored: a tenth of mapTolerance is used
@@ -53,11 +57,14 @@ struct TextureOptions {
 
 /// CPU time of the steps, seconds summed over all threads.
 struct TextureCost {
-  double setup = 0;        ///< solving for the map, or building its tetrahedra
-  double certificate = 0;  ///< measuring the distortion, and certifying the map
-  double mapping = 0;      ///< evaluating the texture at the grid points
-  double distance = 0;     ///< restoring distances
-  double merging = 0;      ///< merging with the other pieces and the base
+  double setup = 0;  ///< solving for the map, or building its tetrahedra
+  /// Measuring the distortion, and certifying that the map does not fold.
+  double certificate = 0;
+  /// Evaluating the texture at the grid points of the result.
+  double mapping = 0;
+  double distance = 0;  ///< restoring distances in the mapped textures
+  /// Merging the mapped textures with each other and with the base.
+  double merging = 0;
 };
 
 /// Measurements over all patches. Distortion and certificate are those of the worst patch.
@@ -69,7 +76,9 @@ struct TextureReport {
   double operationsPerPoint = 0;
   Distortion distortion = {};
   FoldCertificate certificate = {};
-  double mapResidual = 0;  ///< largest |Φ(p) − uvw| × texture size, world units
+  /// Largest |Φ(p) − uvw| × texture size over all particles p with texture coordinates uvw, for the
+  /// map Φ; world units.
+  double mapResidual = 0;
   /// Largest error of the map's fast evaluation at random grid points, texture voxels.
   double mapError = 0;
   std::size_t mapErrorPoints = 0;
@@ -89,9 +98,10 @@ struct TextureResult {
 /// @param minStretch  smallest stretch of the map from the texture to the patches
 [[nodiscard]] double resultVoxelSize(double base, double texture, double minStretch);
 
-/// Builds the RBF map of a patch from its particles and rims to their texture coordinates. λ is
-/// lambdaNear for the particles at w = 0. The rims reduce the error beside the patch's sides. For
-/// an embedded texture the columns continue linearly beyond the first or last layer.
+/// Builds the RBF map of a patch from its particles and rims to their texture coordinates. A rim
+/// consists of the particles just outside a layer, see ParticleLayer. λ is lambdaNear for the
+/// particles at w = 0. The rims reduce the error beside the patch's sides. For an embedded texture
+/// the columns continue linearly beyond the first or last layer.
 /// @param embedDepth  depth of the texture below the surface, in w; negative: its lift above the
 ///         last layer
 [[nodiscard]] RbfMap patchToTexture(const Patch& patch, const RbfMapOptions& options = {},
@@ -106,8 +116,9 @@ struct CertifiedRbf {
 };
 
 /// Builds and certifies the RBF map of a patch for an embedded texture. Particles that continue the
-/// columns below the surface may make the map fold, as below a crease. If the map without these
-/// particles does not fold, that map is returned, and isExtrapolated is true.
+/// columns to the embedded part of the texture may make the map fold, as below a crease. If the map
+/// folds with these particles and not without them, the map without them is returned, and
+/// isExtrapolated is true.
 /// @param cost  the times for setup and certificate are added to it
 [[nodiscard]] CertifiedRbf certifiedRbf(const Patch& patch, double embedDepth,
                                         const RbfMapOptions& options, TextureCost& cost);

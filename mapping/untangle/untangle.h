@@ -17,11 +17,11 @@ namespace mapping {
 struct UntangleOptions {
   /// Depth of the texture below the surface, in w; negative: its lift above w = 1.
   double embedDepth = 0;
-  /// True: particles on the sides slide on the surface too; false: they stay.
+  /// True: particles on the sides of the layer at w = 0 slide on the surface too; false: they stay.
   bool freeSides = false;
-  /// Size of the unit cube of u, v, w in the undeformed shape. Empty: the size of the patch, so
-  /// that its proportions do not count as distortion. Only the ratios of the sizes matter, not
-  /// their unit.
+  /// Size of the unit cube of u, v, w in the undeformed (rest) box, world units. Empty: the size of
+  /// the patch, so that its proportions do not count as distortion. For minimiseDistortion() only
+  /// the ratios of the three sizes matter.
   std::optional<Imath::V3d> proportions = {};
   std::size_t mostIterations = 1000;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
@@ -32,7 +32,8 @@ struct UntangleOptions {
 /// six tetrahedra, is inverted or has no volume. Cells where this cannot be excluded count too.
 struct FoldCount {
   std::size_t folded = 0, cells = 0;
-  /// Least determinant at the corners of cells and in the tetrahedra; 1 at rest.
+  /// Least Jacobian determinant at the corners of cells and in their tetrahedra; 1 for the rest
+  /// box: the mean lengths of the patch, or `proportions` if given.
   double leastJacobian = 0;
 };
 [[nodiscard]] FoldCount countFolds(const Patch& patch, double embedDepth = 0);
@@ -47,9 +48,9 @@ struct Untangling {
 };
 
 /// Moves particles until no cell folds, by minimising an energy that is finite for folds and
-/// forbids them in the limit [Garanzha21]. If the sides of the patch cross each other on the
-/// surface, no position of the other particles removes that fold. In that case the patch with the
-/// fewest folds is returned.
+/// forbids them in the limit ε → 0 of its parameter [Garanzha21]. If the sides of the patch cross
+/// each other on the surface, no position of the other particles removes that fold. If folds
+/// remain, the last patch is returned if it has fewer folds than the input, otherwise the input.
 /// @param base  the solid on which the patch was built
 /// @throws InvalidInput for a patch without layers, with particles that are not finite, or that
 ///         does not lie on the base
@@ -60,11 +61,12 @@ struct Untangling {
 [[nodiscard]] Untangling untangle(const levelset::NarrowBand& base, const Patch& patch,
                                   const UntangleOptions& options = {});
 
-/// Symmetric Dirichlet energy of the elements, relative to an undeformed (rest) box of the given
-/// proportions. The size of the box is the one with the least energy. A map that keeps the
-/// proportions has energy 6.
+/// Symmetric Dirichlet energy of the elements (PrismElements) of a patch, relative to an undeformed
+/// (rest) box of the given proportions. The size of the box is the one with the least energy. A map
+/// that keeps the proportions has energy 6.
 struct ElementDistortion {
-  double mean = 0;  ///< mean weighted by rest volume, which is minimised
+  /// Mean over the elements, weighted by their volumes in the rest box; this mean is minimised.
+  double mean = 0;
   double median = 0, percent99 = 0, most = 0;
 };
 
