@@ -6,7 +6,7 @@
 namespace levelset {
 namespace {
 
-/// Voxels added to the largest displacement. Distances are clipped at the sum.
+/// Voxels added to the largest displacement of the surface. The morph clips distances at the sum.
 constexpr double kBeyondMoved = 8;
 
 }  // namespace

@@ -10,17 +10,17 @@
 namespace levelset {
 
 struct MaskedOptions {
-  /// Half width of the result, voxels; empty: that of the operand.
+  /// Half width of the result, voxels; empty: the half width of the given solid.
   std::optional<double> halfWidth = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
 
 /// Applies a change of a solid where a mask allows it. Morphs from the solid to the changed solid;
-/// at each point, the fraction of the morph is the weight of the mask. The surface stays where the
+/// at each point, the fraction of the morph is the mask's weight there. The surface stays where the
 /// weight is 0.
 /// @param farthest  largest distance by which the change moves the surface, world units
-/// @param change    computes the changed solid, and reports its progress
+/// @param change    computes the changed solid, reporting its progress to the argument
 /// @throws UsageError for an invalid mask
 /// @throws InvalidInput if a solid or the result is empty
 /// @throws ResourceLimit

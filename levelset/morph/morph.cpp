@@ -21,12 +21,13 @@ using openvdb::FloatTree;
 using TreeManager = openvdb::tree::LeafManager<FloatTree>;
 using LeafNode = FloatTree::LeafNodeType;
 
-// First guess of the distance between the surfaces, voxels; doubled until it suffices.
+// First guess of the largest distance between the surfaces of solid and target, voxels; doubled
+// until it suffices. Also the least accepted distance limit.
 constexpr double kFirstReach = 8;
 // Progress (0 to 1) after the target is resampled, and after the distances are computed.
 constexpr double kUntilResampled = 0.05, kUntilDistances = 0.4;
-// Distances must extend this many voxels beyond the points that the surface passes, so that
-// interpolation reads no background values.
+// Distances must extend this many voxels beyond the points that the surface passes during the
+// morph, so that interpolation reads no background values.
 constexpr double kBesideSurface = 4;
 
 void checkMorph(const NarrowBand& solid, const NarrowBand& target, const MorphOptions& options) {
@@ -94,7 +95,8 @@ struct DistancePair {
         }
         const float mixed = (1 - s) * values[n] + s * b[n];
         // A point beyond the computed distances both inside the solid and outside the target has
-        // the values −background and +background. At one half their mean is 0; count it as inside.
+        // the values −background and +background. At the fraction 0.5 of the morph their mean is 0;
+        // count the point as inside.
         values[n] = mixed == 0 && values[n] <= -farInside ? -onSide : mixed;
       }
     });
@@ -103,7 +105,7 @@ struct DistancePair {
 };
 
 /// Computes the band at the fraction `part` of the morph.
-/// @param distances  redistances a field
+/// @param distances  redistances a field to the half width of the solid
 NarrowBand intermediate(const DistancePair& pair, double part, const MorphOptions& options,
                         const std::function<FloatGrid::Ptr(const FloatGrid&)>& distances) {
   const FloatGrid::Ptr field = pair.at(part, options.mask);
@@ -125,7 +127,7 @@ NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphO
       resampleLike(target, solid,
                    {.maxMemory = options.maxMemory,
                     .progress = subProgress(options.progress, 0, kUntilResampled)});
-  // The surface stays in the box around the active voxels of both solids.
+  // During the morph the surface stays in the box around the active voxels of both solids.
   openvdb::CoordBBox region = vdb(solid).evalActiveVoxelBoundingBox();
   region.expand(vdb(goal).evalActiveVoxelBoundingBox());
   region.expand(static_cast<int>(kBesideSurface));
@@ -145,8 +147,8 @@ NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphO
   const bool isDirect = isOnTarget && options.steps == 1;  // the result is the target itself
   double done = kUntilResampled;
   for (double reach = options.farthest.value_or(kFirstReach); !isDirect; reach *= 2) {
-    // Each attempt takes about as long as all earlier ones together, so it gets half of the
-    // remaining progress.
+    // Each attempt with a doubled `reach` takes about as long as all earlier attempts together, so
+    // it gets half of the remaining progress.
     const double half = (done + kUntilDistances) / 2, quarter = (done + half) / 2;
     pair.from = distances(vdb(solid), reach, done, quarter, region);
     pair.to = distances(vdb(goal), reach, quarter, half, region);

@@ -14,30 +14,30 @@ struct MorphOptions {
   int steps = 1;
   double until = 1;  ///< last fraction of the morph, in (0, 1]; 1 ends on the target
   /// Hausdorff distance to the target, world units, at which the morph stops: the first step within
-  /// it is the last. Empty: all steps are computed.
+  /// this distance is the last step. Empty: all steps are computed.
   std::optional<double> tolerance = {};
-  /// Scales the fraction at each point by its weight. The last step is then no longer the target.
+  /// Scales the fraction of the morph at each point by the mask's weight there. The last step is
+  /// then no longer the target.
   std::optional<Mask> mask = {};
-  /// Distance from both surfaces, voxels, up to which distances are computed; larger ones are
-  /// clipped. A limit saves time when the solids are known to differ only near their surfaces.
-  /// Empty: distances are computed wherever the surface passes.
+  /// Distance from both surfaces, voxels, at least 8, up to which distances are computed; larger
+  /// distances are clipped. A limit saves time when the solids are known to differ only near their
+  /// surfaces. Empty: distances are computed wherever the surface passes.
   std::optional<double> farthest = {};
-  /// Receives every step, 1 to `steps`, including the last.
+  /// Receives the band of every step and its number, 1 to `steps`, including the last step.
   std::function<void(const NarrowBand& step, int number)> keep = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
 
-/// Moves the surface of `solid` towards that of `target`, on the grid of `solid`.
-/// At fraction s the surface is the zero set of (1 − s) · distance to the solid + s · distance to
-/// the target, redistanced. Both distances are exact and known wherever the surface passes. A point
-/// inside only one of the solids changes sides once, at a fraction of its own. So every step is
-/// nearer to the target than the previous step, whatever the topology.
+/// Moves the surface of `solid` towards that of `target`, on the grid of `solid`. At fraction s the
+/// surface is the zero set of (1 − s) · distance to the solid + s · distance to the target,
+/// redistanced. Both distances are exact and known wherever the surface passes. A point inside only
+/// one of the solids changes sides once, at a fraction of its own. So every step is nearer to the
+/// target than the previous step, whatever the topology.
 /// @throws UsageError for fewer than one step, `until` outside (0, 1], a tolerance that is not
-///         positive, or an invalid mask
+///         positive, `farthest` below 8, or an invalid mask
 /// @throws InvalidInput if a solid is empty, or if the surface vanishes at some fraction because
-/// the
-///         solids do not overlap
+///         the solids do not overlap
 /// @throws ResourceLimit when the distances do not fit into memory
 /// @throws Cancelled
 [[nodiscard]] NarrowBand morph(const NarrowBand& solid, const NarrowBand& target,
@@ -54,7 +54,7 @@ struct MorphOperator {
     std::string until = "converged";
     std::optional<double> tolerance;  ///< Hausdorff distance to the target, world units
     std::optional<Mask> mask;
-    /// Receives every step, see MorphOptions::keep.
+    /// Receives the band of every step and its number, see MorphOptions::keep.
     std::function<void(const NarrowBand& step, int number)> keep;
 
     template <class Visitor>

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kMostMorphSteps = 100000;
 
-/// Last fraction of the morph, in (0, 1], from the text of --until.
+/// Converts the text of --until to the last fraction of the morph, in (0, 1].
 double partOfTheWay(const std::string& until) {
   if (until == "converged") return 1;
   double part = 0;

@@ -13,12 +13,12 @@
 namespace levelset {
 namespace {
 
-/// Offsets a solid by `distance` and back. Unites the result of a closing with the given solid, and
-/// intersects that of an opening with it. Otherwise rounding could move edges at grid points past
-/// their original position.
+/// Offsets a solid by `distance` (world units, > 0 for a closing, < 0 for an opening) and back.
+/// Unites the result of a closing with the given solid, and intersects the result of an opening
+/// with it. Otherwise rounding could move edges at grid points past their original position.
 NarrowBand offsetAndBack(const NarrowBand& solid, double distance, const OffsetOptions& options) {
   OffsetOptions first = options, second = options;
-  // The second offset recomputes its band anyway, so the first half width is the default.
+  // The second offset recomputes its band anyway, so the first offset uses the default half width.
   first.halfWidth = {};
   first.progress = subProgress(options.progress, 0, 0.5);
   second.progress = subProgress(options.progress, 0.5, 1);
@@ -48,7 +48,7 @@ void checkShell(const NarrowBand& solid, double thickness) {
                     thickness, solid.voxelSize()));
 }
 
-/// Offsets the solid inwards, to get the cavity of a shell.
+/// Offsets the solid inwards by `depth` (world units), to get the cavity of a shell.
 NarrowBand cavityOf(const NarrowBand& solid, double depth, const OffsetOptions& options) {
   try {
     return offset(solid, -depth, options);

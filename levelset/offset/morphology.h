@@ -25,9 +25,9 @@ namespace levelset {
                                  const OffsetOptions& options = {});
 
 enum class ShellSide {
-  In,   ///< wall inside the surface of the solid
-  Out,  ///< wall outside the surface of the solid
-  Both  ///< half of the thickness on each side
+  In,   ///< the wall lies inside the surface of the solid
+  Out,  ///< the wall lies outside the surface of the solid
+  Both  ///< half of the wall's thickness lies on each side of the surface
 };
 
 /// Hollows a solid: keeps a wall along its surface.

@@ -6,7 +6,8 @@
 namespace levelset {
 namespace {
 
-/// Applies a change to the solid; with a mask, only where the mask allows it.
+/// Applies `change`, an opening, a closing or a shell, to the solid; with a mask, only where the
+/// mask allows it.
 /// @param farthest  largest distance by which the change moves the surface, world units
 template <class Options, class Change>
 NarrowBand changed(const NarrowBand& solid, const Options& options, double farthest,
@@ -35,8 +36,8 @@ ValuePlan MorphologyOperator::plan(const Options& options, Plans operands, const
   return plan;
 }
 
-/// The surface moves by the radius and back. Each of the two offsets also reads the field around
-/// the surface.
+/// Extends the region by twice the radius, since the surface moves by the radius and back, and by
+/// the distance around the surface that each of the two offsets reads.
 RegionOfInterest MorphologyOperator::regionOfInterest(const Options& options,
                                                       const OperatorPlans& plans, std::size_t,
                                                       const RegionOfInterest& ofResult) {
@@ -53,7 +54,7 @@ std::optional<Cost> MorphologyOperator::cost(const Options& options, const Opera
   const double layer = solid.layer(), distance = options.radius / solid.voxelSize;
   Cost cost = costOfOffset(layer, layer, distance, solid.halfWidth);
   cost += costOfOffset(layer, layer, distance, plans.result.halfWidth);
-  cost.bytes += kBytesPerVoxel * solid.activeVoxels();  // the solid after the first offset
+  cost.bytes += kBytesPerVoxel * solid.activeVoxels();  // band of the solid after the first offset
   return cost;
 }
 

@@ -15,11 +15,10 @@ namespace {
 
 using LeafNode = openvdb::FloatTree::LeafNodeType;
 
-// Distance from the moved surface, voxels, within which the interpolant reads the field before
-// re-distancing.
+// Distance from the moved surface, voxels, within which re-distancing reads the shifted field.
 constexpr double kPadding = 3;
-// Voxels by which offset lengths between the sampled closest points may exceed the range of the
-// sampled lengths.
+// Voxels by which offset lengths at points of the surface between the sampled points may lie
+// outside the range of the sampled lengths.
 constexpr double kRangeMargin = 0.5;
 
 double checkedHalfWidth(const NarrowBand& solid, const OffsetOptions& options) {
@@ -47,8 +46,8 @@ eikonal::DistanceRequest nearSurfaceRequest(const OffsetOptions& options, double
   return request;
 }
 
-/// Re-distances a shifted field, as distances to the old surface minus the offset are only a bound
-/// where parts of the moved surface meet.
+/// Re-distances a field. Distances to the old surface minus the offset are only a bound where parts
+/// of the moved surface meet.
 /// @param done  progress so far, 0 to 1
 NarrowBand redistanced(const openvdb::FloatGrid& field, double halfWidth,
                        const OffsetOptions& options, double done) {
@@ -84,8 +83,8 @@ class Lengths {
   struct Range {
     double low = INFINITY, high = -INFINITY;
   };
-  /// Range of the lengths over the points of the surface that are closest to the grid points near
-  /// it.
+  /// Range of the offset lengths, voxels, over the surface points that are closest to the grid
+  /// points beside the surface.
   [[nodiscard]] Range range(const OffsetOptions& options) const {
     Range all;
     std::mutex mutex;

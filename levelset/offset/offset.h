@@ -12,7 +12,7 @@
 namespace levelset {
 
 struct OffsetOptions {
-  /// Half width of the result, voxels; empty: that of the operand.
+  /// Half width of the result, voxels; empty: the half width of the given solid.
   std::optional<double> halfWidth = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
@@ -29,10 +29,10 @@ struct OffsetOptions {
                                 const OffsetOptions& options = {});
 
 /// Offsets each point of the surface along its normal by the local value of `distance`. Implements
-/// displacement maps and masked offsets. The new surface is the zero set of
-/// φ(x) − distance(closest point of x), re-distanced once. Parts with zero distance stay. Overhangs
-/// cannot occur: where the distance varies too fast along the surface, the new surface passes
-/// through the farthest point along each normal.
+/// displacement maps and masked offsets. The new surface is the zero set of φ(x) − distance(closest
+/// point of x), re-distanced once. Parts of the surface with `distance` 0 stay. Overhangs cannot
+/// occur: where the distance varies too fast along the surface, the new surface passes through the
+/// farthest point along each normal.
 /// @param distance  world units, any sign
 /// @throws as offset()
 /// @throws InvalidInput if `distance` is not finite at a point; names the point
@@ -40,8 +40,9 @@ struct OffsetOptions {
                                   const OffsetOptions& options = {});
 
 /// Estimates the cost of moving a surface.
-/// @param before,after  ValuePlan::layer() of the surface before and after the offset
-/// @param distance      offset, voxels, any sign
+/// @param before,after  grid points in a layer along the surface before and after the offset, from
+///         ValuePlan::layer()
+/// @param distance      distance by which the surface moves, voxels, any sign
 /// @param halfWidth     half width of the result, voxels
 [[nodiscard]] Cost costOfOffset(double before, double after, double distance, double halfWidth);
 
@@ -53,8 +54,8 @@ struct OffsetOperator {
   static constexpr ErrorModel errorModel{2, kTriangleError, kCreaseError, "offset-sphere"};
 
   struct Options {
-    std::optional<double> distance;  ///< world units; empty if `by` is given
-    ScalarField by;                  ///< distance at each point of the surface, world units
+    std::optional<double> distance;  ///< world units, for all points; empty if `by` is given
+    ScalarField by;                  ///< offset at each point, world units; else empty
     std::optional<double> halfWidth;
     std::optional<Mask> mask;
 

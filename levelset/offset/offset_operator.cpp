@@ -7,7 +7,7 @@
 namespace levelset {
 
 Cost costOfOffset(double before, double after, double distance, double halfWidth) {
-  constexpr double kShell = 3;  // half width of the first distances at the moved surface, voxels
+  constexpr double kShell = 3;  // half width of the first transform at the moved surface, voxels
   Cost cost = costOfDistances(std::max(before, after), kShell);
   cost.seconds += 1e-9 * before * 700 * std::abs(distance);
   cost.bytes += 15 * before * std::abs(distance);
@@ -35,7 +35,8 @@ NarrowBand OffsetOperator::run(std::vector<NarrowBand> operands, const Options& 
   OffsetOptions settings{
       .halfWidth = options.halfWidth, .maxMemory = run.maxMemory, .progress = run.progress};
   // If the operand is narrowed to a region of interest, give the result the half width of the
-  // complete result. The distance over which closest points propagate affects the last bits.
+  // complete result, so that both have the same bits. The distance over which closest points
+  // propagate affects the last bits.
   if (run.isPartial) settings.halfWidth = run.planned->halfWidth;
   NarrowBand solid = std::move(operands[0]);
   operands.clear();
@@ -53,7 +54,7 @@ NarrowBand OffsetOperator::run(std::vector<NarrowBand> operands, const Options& 
 ValuePlan OffsetOperator::plan(const Options& options, Plans operands, const OperatorRun&) {
   ValuePlan plan = operands[0];
   if (options.halfWidth) plan.halfWidth = *options.halfWidth;
-  if (!options.distance) return plan;  // the values of --by are not known before the run
+  if (!options.distance) return plan;  // the field of --by is not evaluated before the run
   const double before = plan.bounds.size().length();
   plan.bounds = grown(plan.bounds, *options.distance);
   const double after = plan.bounds.isEmpty() ? 0 : plan.bounds.size().length();
@@ -75,7 +76,8 @@ std::optional<Cost> OffsetOperator::cost(const Options& options, const OperatorP
   const double distance = options.distance ? *options.distance / solid.voxelSize : 0;
   const double before = solid.layer();
   Cost cost = costOfOffset(before, plans.result.layer(), distance, plans.result.halfWidth);
-  // A variable distance is first evaluated at the points of the surface.
+  // A variable distance is first evaluated at the points of the surface, which takes a further
+  // distance transform.
   if (options.by || options.mask) {
     cost += costOfDistances(before, 12);
     cost.bytes += 60 * solid.activeVoxels();

@@ -92,8 +92,8 @@ Cost costOfSamples(const ValuePlan& source, const ValuePlan& target) {
 RegionOfInterest sampledRegion(const OperatorPlans& plans, const RegionOfInterest& ofResult,
                                const M44d& toSource) {
   const ValuePlan &source = plans.operands[0], &target = plans.result;
-  // Sum of the squared stretches along the three axes. Its root bounds the stretch in any
-  // direction.
+  // Sum of the squared factors by which `toSource` stretches the three axes. Its root bounds the
+  // stretch in any direction.
   double squares = 0;
   for (int i = 0; i < 3; ++i)
     for (int k = 0; k < 3; ++k) squares += toSource[i][k] * toSource[i][k];
@@ -203,7 +203,7 @@ RegionOfInterest TransformOperator::regionOfInterest(const Options& options,
   const M44d toSource = placementOf(options).inverse();
   if (options.bake) return sampledRegion(plans, ofResult, toSource);
   RegionOfInterest read = ofResult;
-  read.halfWidth *= 1 + 1e-6;  // the background value is rounded before it is scaled
+  read.halfWidth *= 1 + 1e-6;  // margin: the background value is rounded before it is scaled
   if (!isEverywhere(ofResult.region))
     read.region = grown(movedBox(ofResult.region, toSource), plans.operands[0].voxelSize);
   return read;

@@ -31,17 +31,17 @@ using openvdb::Vec3d;
 using Leaf = FloatTree::LeafNodeType;
 
 const double kCubeDiagonal = std::sqrt(3.0);
-/// Largest distance from a position to a sample of its tricubic interpolation, voxels of the
+/// Largest distance from a position to a sample that tricubic interpolation reads, voxels of the
 /// source.
 const double kTricubicReach = 2 * kCubeDiagonal;
 /// Distance from the surface within which re-distancing reads values, voxels of the target: two
-/// grid points on each side, and the samples around them.
+/// grid points on each side of the surface, and the samples around these points.
 constexpr double kReadReach = 3.5;
 /// Voxels that supported() adds to the source band on each side, by thickening it twice.
 constexpr double kThickened = 4;
 
-/// Maps between target and source indices, and the factor from source values to distances in the
-/// target.
+/// Matrices between index positions in the target and the source grid, and the factor from source
+/// values to distances in the target.
 struct Placement {
   Imath::M44d targetToSource, sourceToTarget;
   /// Factor from source values to target distances: the smallest stretch of the transform, so that
@@ -69,7 +69,8 @@ class ResampleKernel {
         placement_(placement),
         creaseBend_(static_cast<float>(kCreaseBend * placement.sourceVoxel / placement.scale)) {}
 
-  /// Adds the leaves of the target that can contain voxels of the source's band.
+  /// Adds the leaves of the target that can contain voxels of the target's band: those near a leaf
+  /// of the source.
   void addLeaves() {
     std::vector<const Leaf*> leaves;
     source_.tree().getNodes(leaves);
@@ -99,8 +100,8 @@ class ResampleKernel {
     });
   }
 
-  /// Sets the signs of tiles. A tile never contains the surface, so the sign at its centre
-  /// suffices.
+  /// Sets the signs of the target's tiles. A tile never contains the surface, so the sign at its
+  /// centre suffices.
   void fillTiles() {
     openvdb::tree::NodeManager<FloatTree, FloatTree::RootNodeType::LEVEL - 1> nodes(target_.tree());
     nodes.foreachTopDown([this](auto& node, std::size_t = 0) { fillTilesOf(node); });
@@ -113,7 +114,7 @@ class ResampleKernel {
     Vec3d low(std::numeric_limits<double>::max()), high(-std::numeric_limits<double>::max());
     const openvdb::CoordBBox box = leaf.getNodeBoundingBox();
     for (int i = 0; i < 8; ++i) {
-      // One voxel more on each side, because cells extend over the faces of the leaf.
+      // One voxel more on each side, because interpolation cells extend over the faces of the leaf.
       const Vec3d corner((i & 4) ? box.max()[0] + 1 : box.min()[0] - 1,
                          (i & 2) ? box.max()[1] + 1 : box.min()[1] - 1,
                          (i & 1) ? box.max()[2] + 1 : box.min()[2] - 1);
@@ -139,8 +140,8 @@ class ResampleKernel {
     return result;
   }
 
-  /// Decides, by the Lipschitz bound at the block's centre, if a block can contain voxels of the
-  /// target's band.
+  /// Decides, from the distance at the block's centre and its Lipschitz bound, if a block of the
+  /// target can contain voxels of the target's band.
   [[nodiscard]] bool isNearBand(const Coord& origin, const Accessor& accessor) const {
     const Vec3d p = placement_.toSource(origin.asVec3d() + Vec3d(3.5));
     const Coord cell = Coord::round(p);
@@ -160,8 +161,8 @@ class ResampleKernel {
       else
         leaf.setValueOff(n, std::copysign(background, value));
     };
-    // For most grid points of a leaf, the nearest sample alone shows that they are outside the
-    // band.
+    // For most grid points of a target leaf, the nearest source value alone shows that they are
+    // outside the band.
     const Coord nearest = Coord::round(p);
     const double offset = (p - nearest.asVec3d()).length() * placement_.sourceVoxel;
     const float sample = accessor.getValue(nearest);
@@ -184,8 +185,8 @@ class ResampleKernel {
     take(block.value());
   }
 
-  /// Background with the sign of the nearest sample, for positions at or beyond the end of the
-  /// band.
+  /// Target background with the sign of the source value nearest to `p`, for positions at or beyond
+  /// the end of the source band.
   [[nodiscard]] float signAt(const Vec3d& p, const Accessor& accessor) const {
     return std::copysign(target_.background(), accessor.getValue(Coord::round(p)));
   }
@@ -224,9 +225,9 @@ Placement placementOf(const NarrowBand& solid, const Imath::M44d& sourceToWorld,
   return place;
 }
 
-/// Extends the source band to the distance that sampling and re-distancing read. Extrapolated
-/// values are inactive and differ from ± background. They only support the interpolation;
-/// re-distancing replaces the distances there.
+/// Extends the source band to the distance that sampling and re-distancing read. The added values
+/// are extrapolated; they are inactive and differ from ± background. They only support the
+/// interpolation; re-distancing replaces the distances there.
 FloatGrid::Ptr supported(const NarrowBand& solid, const Placement& place, std::size_t maxMemory,
                          const Progress& progress) {
   const double needed = sampledWidth(place.targetVoxel / place.sourceVoxel);
@@ -240,17 +241,18 @@ FloatGrid::Ptr supported(const NarrowBand& solid, const Placement& place, std::s
 }
 
 /// Checks the memory estimate before any block is built.
-/// @param refinement  number of target voxels along a source voxel
+/// @param refinement  number of target voxels along the edge of a source voxel
 void checkMemory(const NarrowBand& solid, double refinement, double halfWidth,
                  std::size_t maxMemory) {
-  // Estimate the source voxels at the surface, then the leaves of the target. The target exists
-  // twice, sampled and re-distanced.
+  // Estimates the number of source voxels in one layer at the surface, then the leaves of the
+  // target. The target exists twice, sampled and re-distanced.
   const double surface = static_cast<double>(solid.activeVoxelCount()) / (2 * solid.halfWidth());
   const double leaves = surface * refinement * refinement / 64 * (2 * halfWidth + 15) / 8;
   requireMemory(leaves * 2 * 2300, maxMemory);
 }
 
-/// Checks that the target's voxels are smaller than the solid, before the band is widened.
+/// Checks, before the source band is widened, that a target voxel is no larger than the longest
+/// side of the solid.
 void requireSmallerVoxels(const NarrowBand& solid, const Imath::M44d& sourceToWorld,
                           const Placement& place) {
   const Imath::V3d size = solid.zeroSetBounds().size();

@@ -12,7 +12,7 @@
 namespace levelset {
 
 struct ResampleOptions {
-  /// Half width of the result, voxels; empty: that of the operand.
+  /// Half width of the result, voxels; empty: the half width of the given solid, or of `like`.
   std::optional<double> halfWidth = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
@@ -24,8 +24,9 @@ struct ResampleOptions {
 [[nodiscard]] double sampledWidth(double ratio);
 
 /// Resamples a solid on the axis-aligned grid of integer multiples of `voxelSize`. Interpolates
-/// with tricubic Catmull-Rom splines where the source band allows, and re-distances the result.
-/// Works per leaf block, so the bits do not depend on the number of threads.
+/// with tricubic Catmull-Rom splines where the source band holds all samples, else trilinearly.
+/// Then re-distances the result. Works per leaf block, so the bits do not depend on the number of
+/// threads.
 /// @throws UsageError unless the voxel size is positive and finite, and the half width at least 1
 /// @throws InvalidInput if the solid is empty or the voxels are too large for it
 /// @throws ResourceLimit if the memory estimate or the 32-bit grid index exceeds its limit
@@ -34,7 +35,7 @@ struct ResampleOptions {
 
 /// Resamples a solid on the grid points of another transform.
 /// @param indexToWorld  rotation, uniform scale, translation
-/// @throws as resample(); InvalidInput for any other transform
+/// @throws as resample(), and InvalidInput if the transform shears, mirrors or scales unevenly
 [[nodiscard]] NarrowBand resampleTo(const NarrowBand& solid, const Imath::M44d& indexToWorld,
                                     const ResampleOptions& options = {});
 
@@ -72,11 +73,12 @@ struct ResampleOperator {
   static std::optional<Cost> cost(const Options& options, const OperatorPlans& plans);
 };
 
-/// Estimates the cost of resampling a solid on another grid and of re-distancing the result.
+/// Estimates the cost of resampling the solid `source` on the grid of `target` and of re-distancing
+/// the result.
 [[nodiscard]] Cost costOfSamples(const ValuePlan& source, const ValuePlan& target);
 
 /// Region of a solid that is read when only `ofResult` of a resampled result is computed.
-/// @param plans     the solid as the first operand, and the result
+/// @param plans     plans of the solid, as the first operand, and of the result
 /// @param toSource  matrix from world positions in the result to world positions in the solid
 [[nodiscard]] RegionOfInterest sampledRegion(const OperatorPlans& plans,
                                              const RegionOfInterest& ofResult,

@@ -42,13 +42,14 @@ void requireAffine(const Imath::M44d& matrix) {
   }
 }
 
-/// Limit of coordinates and stretches, so that volumes do not overflow double precision.
+/// Limit of the magnitude of coordinates and stretches, so that volumes do not overflow double
+/// precision.
 constexpr double kFarthest = 1e100;
 /// Largest accepted rounding error of the world position of a grid's origin, voxels.
 constexpr double kPositionTolerance = 1e-6;
 
-/// Checks that double precision resolves the world position of a grid's origin to a small fraction
-/// of a voxel.
+/// Checks that double precision resolves the world position of a grid's origin to
+/// kPositionTolerance voxels.
 void requirePrecision(const Imath::M44d& indexToWorld, double voxelSize) {
   double farthest = 0;
   for (int axis = 0; axis < 3; ++axis)
@@ -107,7 +108,7 @@ NarrowBand transform(NarrowBand solid, const Imath::M44d& matrix) {
   openvdb::FloatGrid& grid = editVdb(solid);
   grid.setTransform(transform);
   const double scale = std::cbrt(Imath::M44d(matrix).determinant());
-  // The determinant of a rotation is one up to rounding; keep the bits of the distances then.
+  // The determinant of a rotation is one up to rounding; then the distances keep their bits.
   if (std::abs(scale - 1) > 1e-9) scaleDistances(grid, scale, background);
   return solid;
 }

@@ -10,7 +10,8 @@
 
 namespace levelset {
 
-/// Transforms a solid exactly, by its grid transform. A uniform scale also scales the distances.
+/// Transforms a solid exactly, by changing its grid transform. A uniform scale also scales the
+/// distances.
 /// @param matrix  rotation, uniform scale, translation; world' = world * matrix, with Imath's row
 ///                vectors
 /// @throws UsageError if the matrix is not affine and invertible
@@ -23,8 +24,8 @@ struct BakeOptions {
   Progress progress = {};
 };
 
-/// Transforms a solid by any invertible affine matrix. Resamples it on the axis-aligned grid of
-/// `voxelSize` and re-distances it.
+/// Transforms a solid by any invertible affine matrix. Resamples the solid on the axis-aligned grid
+/// of `voxelSize` and re-distances it.
 /// @param voxelSize  voxel size of the result, world units
 /// @throws UsageError if the matrix is not affine and invertible
 /// @throws further errors as resample()
@@ -32,8 +33,9 @@ struct BakeOptions {
                               const BakeOptions& options = {});
 
 /// Transforms the vertices of a mesh. A mirroring matrix also reverses the triangles. Normals
-/// transform by the inverse transpose and stay unit vectors. `spacing` of the result is that of the
-/// original coordinates, scaled. Files store the new coordinates in double precision.
+/// transform by the inverse transpose and stay unit vectors. TriMesh::spacing (the rounding error)
+/// of the result is that of the original coordinates, scaled. Files store the new coordinates in
+/// double precision.
 /// @throws UsageError if the matrix is not affine and invertible
 /// @throws InvalidInput if attributes do not fit the vertices, or a coordinate exceeds 1e100
 [[nodiscard]] TriMesh transform(TriMesh mesh, const Imath::M44d& matrix);
@@ -42,15 +44,15 @@ struct BakeOptions {
 struct TransformOperator {
   static const OperatorText text;
   static constexpr Slope slope = Slope::OfOperands;
-  static constexpr double partTolerance = kDistanceTolerance;  // with `bake`; else to the bit
+  static constexpr double partTolerance = kDistanceTolerance;  // voxels; without `bake` 0
   static constexpr ErrorModel errorModel{2, 0.65, 0, "resample-chain"};
 
   struct Options {
-    std::optional<Imath::M44d> matrix;    ///< row vectors, translation in the last row
+    std::optional<Imath::M44d> matrix;    ///< matrix for row vectors, translation in the last row
     std::optional<Imath::V3d> translate;  ///< displacement, world units
     std::vector<double> rotate;  ///< degrees: one angle about `axis`, or about x, then y, then z
     Imath::V3d axis = Imath::V3d(0, 0, 1);
-    std::vector<double> scale;         ///< one factor, or three for x, y and z
+    std::vector<double> scale;         ///< scale factors: one, or three for x, y and z
     std::optional<int> mirror;         ///< axis normal to the mirror plane, 0 to 2: x, y, z
     Imath::V3d about = Imath::V3d(0);  ///< fixed point of mirror, scale and rotate, world units
     bool bake = false;
