@@ -23,8 +23,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMaxLinks = 40;          // limit of the Linux kernel for nested symbolic links
-constexpr std::size_t kMaxStem = 180;  // bytes; keeps the name of the temporary file below NAME_MAX
+constexpr int kMaxLinks = 40;  // limit of the Linux kernel for nested symbolic links
+// Bytes of the target's name that the name of the temporary file keeps, to stay below NAME_MAX.
+constexpr std::size_t kMaxStem = 180;
 constexpr std::size_t kCopyChunk = 1 << 20;
 
 std::atomic<bool> mayClobber{true};

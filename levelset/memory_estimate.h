@@ -13,7 +13,8 @@ struct MemoryEstimate {
   openvdb::CoordBBox surface;      ///< bounds of the surface, index space
   double area = 0;                 ///< area of the surface, voxels²
   double inside = 0, outside = 0;  ///< largest computed distances on the two sides, voxels
-  std::optional<openvdb::CoordBBox> region = {};  ///< limits the grid points; empty: no limit
+  /// Index box that limits the grid points; empty: no limit.
+  std::optional<openvdb::CoordBBox> region = {};
   double bytesPerGridPoint = 20;
 };
 

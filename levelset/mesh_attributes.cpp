@@ -74,8 +74,8 @@ V3d transformedNormal(const V3d& normal, const std::array<V3d, 3>& slopes, doubl
   const double bySize = 1 / size, byLength = 1 / length;
   const V3d a = slopes[0] * bySize, b = slopes[1] * bySize, c = slopes[2] * bySize,
             n = normal * byLength;
-  // The cross products are the columns of the cofactor matrix: the inverse transpose times the
-  // determinant. The factor does not matter, since the result is normalised.
+  // The cross products are the columns of the cofactor matrix of the Jacobian: the inverse
+  // transpose times the determinant. The factor does not matter, since the result is normalised.
   const V3d moved = hand * (n.x * b.cross(c) + n.y * c.cross(a) + n.z * a.cross(b));
   // If the Jacobian is singular, `moved` consists of rounding errors only. `sum` bounds its terms.
   inA *= bySize, inB *= bySize, inC *= bySize;

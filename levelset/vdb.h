@@ -36,7 +36,7 @@ struct VdbAccess {
 [[nodiscard]] NarrowBand makeBand(openvdb::FloatGrid::Ptr grid);
 
 /// Makes the band of an open surface, as makeBand does.
-/// @param beyond  see VdbGrid; its background is 0
+/// @param beyond  distances from the border, see VdbGrid::beyond; its background is 0
 [[nodiscard]] NarrowBand makeOpenBand(openvdb::FloatGrid::Ptr grid,
                                       std::shared_ptr<const openvdb::FloatTree> beyond);
 

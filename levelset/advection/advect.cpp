@@ -29,8 +29,8 @@ void requireTime(double time, const char* what) {
     throw UsageError(fmt::format("the {} is {}; give a finite time", what, time));
 }
 
-/// Moves vertices by at most 0.3 voxels onto the zero set of the tricubic interpolant. Vertices for
-/// which Newton's method does not converge, such as those on a crease, stay.
+/// Moves vertices by at most 0.3 voxels onto the zero set of the tricubic interpolant of the band.
+/// Vertices for which Newton's method does not converge, such as those on a crease, stay.
 void projectVertices(TriMesh& mesh, const NarrowBand& band) {
   constexpr int kNewtonSteps = 4;
   constexpr double kMostProjection = 0.3;  // voxels
@@ -79,7 +79,7 @@ NarrowBand bandOf(const TriMesh& mesh, const NarrowBand& model, const AdvectOpti
   return transform(unit, model.indexToWorld());
 }
 
-/// Offsets the band until its volume is `volume`.
+/// Offsets the band until its volume is `volume`, world units³.
 NarrowBand withVolume(NarrowBand band, double volume, const AdvectOptions& options) {
   constexpr int kTries = 6;
   constexpr double kTolerance = 1e-5;

@@ -24,15 +24,15 @@ using openvdb::FloatTree;
 using openvdb::Index;
 using LeafNode = FloatTree::LeafNodeType;
 
-// Semi-Lagrangian: limits of a step. Length of a characteristic in voxels, and strain: the norm of
-// the velocity gradient times the step.
+// Semi-Lagrangian: limits of a step. Length of a characteristic (path of a grid point) in voxels,
+// and strain: the norm of the velocity gradient times the step.
 constexpr double kFarthestFoot = 4, kFootStrain = 0.5;
 // Half width of the working band of the semi-Lagrangian scheme, voxels. The interpolation stencils
 // of all grid points beside the zero set, and those of the distance transform that follows, then
 // contain no background values.
 constexpr double kFootWidth = 5;
-// Upwind: Courant number, travel of the surface before the band is redistanced, and half width of
-// the working band, both in voxels. The band must contain the stencils after the travel.
+// Upwind: Courant number of a step, travel of the surface before the band is redistanced, and half
+// width of the working band, both in voxels. The band must contain the stencils after the travel.
 constexpr double kCfl = 0.5, kUpwindTravel = 1.5, kUpwindWidth = 6;
 
 std::vector<LeafNode*> leavesOf(FloatTree& tree) {

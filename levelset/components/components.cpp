@@ -27,7 +27,8 @@ using FloatLeaf = FloatTree::LeafNodeType;
 using LabelLeaf = Int32Tree::LeafNodeType;
 using BlockSet = std::set<Coord>;
 
-/// Largest difference, in voxels, between an old and a recomputed distance that count as equal.
+/// Largest difference, in voxels, between the distances of a grid point before and after the flip
+/// that count as equal.
 constexpr float kSameDistance = 0.02f;
 /// Smallest magnitude, in voxels, of a value whose sign was flipped. It keeps the sign of a value
 /// that was zero.
@@ -97,8 +98,9 @@ class RegionFlip {
     }
   }
 
-  /// Corrects the signs of a leaf. Near vanishing surfaces only, also sets the values to ±
-  /// background and deactivates them. In blocks of `both_`, renew() corrects the distances.
+  /// Corrects the signs of a leaf. If only vanishing surfaces are near, also sets the values to ±
+  /// background and deactivates them. If a remaining surface is near too (blocks in `both_`),
+  /// renew() corrects the distances.
   void flipLeaf(FloatLeaf& leaf) const {
     const LabelLeaf& labels = *map_.labels().probeConstLeaf(leaf.origin());
     const bool nearVanishing = vanishing_.count(leaf.origin()) > 0;
@@ -142,8 +144,8 @@ class RegionFlip {
     return result;
   }
 
-  /// Returns the world box that contains the blocks of `both_` and all surfaces within the half
-  /// width of them.
+  /// Returns the world box of the blocks near a vanishing and a remaining surface (`both_`),
+  /// extended by more than the half width, so that it contains all surfaces near them.
   [[nodiscard]] Imath::Box3d worldBoxOfBoth() const {
     openvdb::BBoxd box;
     for (const Coord& origin : both_) {
@@ -154,8 +156,8 @@ class RegionFlip {
     return {toImath(world.min()), toImath(world.max())};
   }
 
-  /// Recomputes the distances in the blocks of `both_`. Grid points whose nearest surface has
-  /// vanished get their distance from a redistanced copy.
+  /// Recomputes the distances in the blocks near both a vanished and a remaining surface (`both_`).
+  /// Grid points whose nearest surface has vanished get their distance from a redistanced copy.
   void renew(NarrowBand& result) const {
     // The copy is one voxel wider than the result, so that a distance just below the background of
     // the result is not clamped.
@@ -186,7 +188,8 @@ class RegionFlip {
 
   /// Returns true if a value is still correct after surfaces have vanished. An inactive value had
   /// no surface within the half width. An active value is correct if `distance`, recomputed from
-  /// the remaining surfaces, is not larger.
+  /// the remaining surfaces, is not larger. A value beside a remaining surface always counts as
+  /// correct.
   [[nodiscard]] bool isRight(const FloatLeaf& leaf, openvdb::Index i, float distance,
                              FloatGrid::ConstAccessor& signs) const {
     if (!leaf.isValueOn(i)) return true;
@@ -256,7 +259,9 @@ NarrowBand keepLargest(const NarrowBand& solid, std::size_t count, const Progres
 
 SliversDropped dropSlivers(const NarrowBand& solid, const NarrowBand& cutter,
                            const Progress& progress) {
-  constexpr float kDepth = 0.5, kNear = 1;  // voxels
+  // Depth that a sliver does not reach, and largest distance of its grid points from the surface of
+  // the cutter, voxels.
+  constexpr float kDepth = 0.5, kNear = 1;
   const RegionMap map(vdb(solid), subProgress(progress, 0, 0.5));
   const std::vector<Region>& regions = map.regions();
   const auto voxel = static_cast<float>(solid.voxelSize());

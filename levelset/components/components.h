@@ -15,9 +15,9 @@
 namespace levelset {
 
 struct Topology {
-  std::size_t components = 0;  ///< connected solids
-  std::size_t surfaces = 0;    ///< surface components
-  std::size_t cavities = 0;    ///< enclosed voids
+  std::size_t components = 0;  ///< number of connected solids
+  std::size_t surfaces = 0;    ///< number of connected pieces of the surface
+  std::size_t cavities = 0;    ///< number of enclosed voids
 };
 /// Counts the connected solids, the surface components and the cavities of a band.
 [[nodiscard]] Topology topology(const NarrowBand& solid);
@@ -34,7 +34,7 @@ struct Topology {
 inline constexpr double kAnyVolume = std::numeric_limits<double>::infinity();
 
 /// Fills enclosed cavities. The volume of a cavity excludes a solid inside it. Filling the cavity
-/// merges such a solid with it. An empty band stays empty.
+/// merges such a solid with the solid around the cavity. An empty band stays empty.
 /// @param maxVolume  largest volume to fill, world units³; default: all cavities
 /// @throws UsageError if `maxVolume` is negative or not a number
 [[nodiscard]] NarrowBand fillCavities(const NarrowBand& solid, double maxVolume = kAnyVolume,
@@ -46,9 +46,10 @@ struct SliversDropped {
 };
 
 /// Removes the thin slivers that rounding leaves in a difference or split where the surface of the
-/// cutter coincides with that of the cut solid. A sliver is a component that is nowhere half a
-/// voxel deep and lies within a voxel of the cutter's surface. Grid points whose nearest surface
-/// remains keep their bits. If all components are slivers, they stay.
+/// cutter (the solid that is subtracted, or that splits) coincides with that of the cut solid. A
+/// sliver is a component that is nowhere half a voxel deep and lies within a voxel of the cutter's
+/// surface. Grid points whose nearest surface remains keep their bits. If all components are
+/// slivers, they stay.
 /// @pre both bands are solids; the half width of `cutter` is at least twice the voxel size of
 ///      `solid`
 [[nodiscard]] SliversDropped dropSlivers(const NarrowBand& solid, const NarrowBand& cutter,

@@ -124,8 +124,9 @@ class BallRoller {
     if (!findBall(x, ball)) return {};
     const Vec3d toCentre = ball.centre - x;
     const double p = toCentre.dot(ball.normalA), q = toCentre.dot(ball.normalB);
-    if (p < ball.cosine * q || q < ball.cosine * p)
-      return {};  // x is not between the radii to the contact points
+    // Outside the angle between the radii to the contact points, the fillet is not the nearest
+    // surface.
+    if (p < ball.cosine * q || q < ball.cosine * p) return {};
     const Vec3d edge =
         ball.centre - (ball.normalA + ball.normalB) * (ball.radius / (1 + ball.cosine));
     if (curve_.nearest(edge, kSeamShare * ball.radius + kSeamSlack) == eikonal::PointTree::kNone)

@@ -24,8 +24,8 @@ constexpr float kLeastSum = 0.1f;
 // sets are not parallel and their curvature difference is unbounded.
 constexpr double kMostBent = 0.12;
 
-constexpr double kDifferencesReach = 2.8284271247461903;  // length of (2, 2, 0), the farthest grid
-                                                          // point that differences read, voxels
+// Distance to the farthest grid point that differences read, (2, 2, 0), voxels.
+constexpr double kDifferencesReach = 2.8284271247461903;
 static_assert(kFlowWidth >= kFlowCore + kDifferencesReach);
 
 struct Nothing {};

@@ -10,13 +10,13 @@ using openvdb::Vec3d;
 
 constexpr int kMaxIterations = 8;
 constexpr double kFootReach = 2;    // largest distance of the search from its start, voxels
-constexpr double kLongestStep = 1;  // voxels
+constexpr double kLongestStep = 1;  // longest Newton step, voxels
 // The iteration stops when the estimated error after a step falls below this, in voxels. The
 // estimate is the cube of the step's length times the square of the curvature.
 constexpr double kTolerance = 2e-5;
-constexpr double kLongestLastStep = 0.6;
-// Least second derivative, along the surface, of half the squared distance from the query point. It
-// is 1 on a plane.
+constexpr double kLongestLastStep = 0.6;  // the iteration ends only after a shorter step, voxels
+// Lower bound of the second derivative, along the surface, of half the squared distance from the
+// query point. The derivative is 1 on a plane.
 constexpr double kLeastCurvature = 0.1;
 
 /// Computes two unit vectors perpendicular to a unit vector and to each other.
@@ -37,7 +37,7 @@ struct NewtonStep {
 /// Computes one Newton step of the constrained problem. Along the normal, the step leads to φ = 0;
 /// along the tangents, to the point whose distance from the query point is stationary. The normal
 /// part includes the second-order term.
-/// @param toFrom  vector to the query point
+/// @param toFrom  vector from the current point to the query point, voxels
 NewtonStep newtonStep(const Jet& jet, double slope, const Vec3d& toFrom) {
   const Vec3d n = jet.gradient / slope;
   const double along = -jet.value / slope;
@@ -100,7 +100,8 @@ Foot closestPointByOneStep(const Jet& jet, const Vec3d& from, const Vec3d& start
 }
 
 bool changesSignAround(const DenseBlock& block, const Vec3d& point) {
-  // A curved surface can bulge this far through the face of a cell before a corner changes sign.
+  // A curved surface can bulge this far, in voxels, through the face of a cell before a corner
+  // changes sign.
   constexpr double kBulge = 0.25;
   int low[3], high[3];
   for (int i = 0; i < 3; ++i) {

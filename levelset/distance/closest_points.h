@@ -29,8 +29,8 @@ struct ClosestPointOptions {
                                       const ClosestPointOptions& options = {});
 
 /// Extends a scalar attribute off the surface along its normals: each grid point within the half
-/// width gets the value of the attribute at its closest point, so ∇φ · ∇q = 0. Other grid points
-/// get 0.
+/// width gets the value of the attribute at its closest point of the surface, so ∇φ · ∇q = 0. Other
+/// grid points get 0.
 /// @throws as closestPoints()
 /// @throws UsageError also when `attribute` is an empty function
 /// @throws InvalidInput also when the attribute is not finite

@@ -27,8 +27,8 @@ using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 using Block = NearestPoints::Block;
 
-// If the surface points of two neighbouring grid points are farther apart than this, in voxels,
-// they belong to different parts of the surface.
+// If the nearest surface points of two neighbouring grid points are farther apart than this, in
+// voxels, these points belong to different parts of the surface.
 constexpr double kOtherPart = 2;
 // Refinement of a surface point decreases its distance from the grid point by at most this, in
 // voxels.
@@ -40,10 +40,11 @@ constexpr double kPolishGain = 0.5;
 // reached at a radius of curvature of about 8 voxels, and its lower limit is kRounding.
 constexpr double kTricubicError = 0.03, kMostError = 1e-3, kRounding = 1e-6;
 
-// Number of searches for a foot point, each of which starts where the one before left its block.
+// Number of searches for a foot point. Each starts where the search before it left its dense block,
+// the stored values around a leaf.
 constexpr int kAttempts = 4;
 
-/// Point of the zero set and its distance, in voxels.
+/// Point of the zero set, in index space, and its distance from a grid point, voxels.
 struct Closest {
   Vec3d point;
   double distance = 0;
@@ -89,8 +90,9 @@ class Polisher {
 
  private:
   /// Finds the closest point of the zero set to x near a surface point. The search starts on the
-  /// sharp patches if the surface point lies on them, else on the interpolant. If the point that it
-  /// finds lies in the domain of the other representation, the search continues on that one.
+  /// sharp patches (triangles near edges) if the surface point lies on them, else on the
+  /// interpolant. If the point that it finds lies in the domain of the other of the two, the search
+  /// continues on that one.
   Closest polish(const Vec3d& x, std::uint32_t point) {
     const Vec3d start = points_.positions[point];
     if (!points_.sharp[point]) {
@@ -266,7 +268,8 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
   estimate.inside = reach.inside;
   estimate.outside = reach.outside;
   estimate.region = request.region;
-  estimate.bytesPerGridPoint = 25;  // state and result, with the unused grid points of blocks
+  // Bytes for the state of propagate.h and the result, including unused grid points in the blocks.
+  estimate.bytesPerGridPoint = 25;
   checkMemory(estimate, request.maxMemory);
   report(request.progress, 0.3);
 

@@ -74,14 +74,15 @@ class BlockWorker {
     }
   }
 
-  /// Returns the neighbour blocks that the new surface points of this block may bring nearer
-  /// points: bit i for neighbour i. Ignores squared distances of `limit`, voxels², and more.
+  /// Returns the neighbour blocks in which a changed surface point of this block may be nearer than
+  /// the present one: bit i for neighbour i. Ignores squared distances of `limit`, voxels², and
+  /// more.
   [[nodiscard]] std::uint32_t outbox(float limit) const;
 
  private:
   // Squared distances of the block, with a padding of two grid points. Values in the padding are
-  // -1, so no offer is nearer there and rows of four need no bounds check. The padding holds no
-  // values of neighbour blocks: readNeighbour() reads them from their blocks.
+  // -1, so no offered surface point is nearer there, and rows of four need no bounds check. The
+  // padding holds no values of neighbour blocks: readNeighbour() reads them from their blocks.
   using Held = PaddedLeaf<2, 16>;
 
   [[nodiscard]] openvdb::Vec3f local(std::uint32_t point) const {
@@ -100,8 +101,9 @@ class BlockWorker {
     queue_.push_back(n);
   }
 
-  /// Offers a surface point to the 27 grid points around `c`, in coordinates of the block. `c` may
-  /// lie one grid point outside the block.
+  /// Offers a surface point to the 27 grid points around `c`, in coordinates of the block. A grid
+  /// point takes it if it is nearer than its present one. `c` may lie one grid point outside the
+  /// block.
   void offerAround(const Coord& c, std::uint32_t point) {
     const openvdb::Vec3f at = local(point);
     const float dz = at[2] - static_cast<float>(c.z() - 1);
@@ -114,7 +116,8 @@ class BlockWorker {
         const Float4 squared = squareZ + (dx * dx + dy * dy);
         Float4 held;
         std::memcpy(&held, held_.at(x, y, c.z() - 1), sizeof(held));
-        const Int4 better = squared < held;  // a tie keeps the first point, so the order is fixed
+        // A tie keeps the earlier point. The order of offers is fixed, and so is the result.
+        const Int4 better = squared < held;
         std::uint64_t any[2];
         std::memcpy(any, &better, sizeof(any));
         if (!(any[0] | any[1])) continue;
@@ -227,7 +230,7 @@ void NearestPoints::seedBesideSurface() {
     if (!reach_.region || reach_.region->isInside(points_.gridPoints[i]))
       seed(points_.gridPoints[i], i, true);
   // Points on edges and corners may be nearer to a grid point than all points on faces, so they are
-  // offered to the corners of their cells.
+  // offered to the corners of the grid cells that contain them.
   for (std::size_t i = points_.gridPoints.size(); i < points_.size(); ++i) {
     const Coord cell = Coord::floor(points_.positions[i]);
     for (int corner = 0; corner < 8; ++corner) {

@@ -26,14 +26,17 @@ class NearestPoints {
     openvdb::Coord origin;
     std::array<std::uint32_t, 512> nearest;  ///< index of the nearest surface point, or kNone
     /// Squared distance to the nearest surface point, voxels². If there is none yet: the square of
-    /// the largest distance to compute.
+    /// the largest distance to compute plus a margin.
     std::array<float, 512> squared;
     Mask inside;  ///< grid points with φ < 0
-    Mask own;     ///< grid points beside the zero set that still have their own surface point
-    std::array<Block*, 27> neighbours{};  ///< 26 neighbours; null: no block
-    openvdb::Coord low, high;  ///< bounds of the block's grid points in the region, inclusive
+    /// Grid points beside the zero set whose nearest surface point is the one found for themselves.
+    Mask own;
+    /// The 26 neighbour blocks, x slowest; null: no block. Entry 13, the block itself, is null.
+    std::array<Block*, 27> neighbours{};
+    /// Bounds of the block's grid points in the region, inclusive, relative to `origin`.
+    openvdb::Coord low, high;
     /// Bit i is set when neighbour i has changed at the shared border and this block has not read
-    /// it.
+    /// the change.
     std::atomic<std::uint32_t> dirtyNeighbours = 0;
     Mask queued;  ///< grid points that must offer their surface point to their neighbours
   };

@@ -52,8 +52,9 @@ NarrowBand redistance(NarrowBand field, const RedistanceOptions& options) {
 }
 
 Cost costOfDistances(double layer, double halfWidth) {
-  // The first term is for the surface points, the second for the closest point of each grid point.
-  // Smooth surfaces take less time, faceted surfaces with edges everywhere take more.
+  // The first term in each sum is for the points on the surface, the second for the closest point
+  // of each grid point. Smooth surfaces take less time, faceted surfaces with edges everywhere take
+  // more.
   return {1e-9 * layer * (1250 + 1060 * 2 * halfWidth), layer * (540 + 6 * 2 * halfWidth)};
 }
 

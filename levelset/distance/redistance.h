@@ -15,7 +15,8 @@ namespace levelset {
 struct RedistanceOptions {
   /// Half width of the result, voxels; empty: that of the operand.
   std::optional<double> halfWidth = {};
-  std::optional<Imath::Box3d> region = {};  ///< world box: distances are computed only inside it
+  /// World box in which distances are computed; empty: everywhere.
+  std::optional<Imath::Box3d> region = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
@@ -51,7 +52,8 @@ inline constexpr double kReadBySurface = 6;
 [[nodiscard]] NarrowBand redistance(NarrowBand field, const RedistanceOptions& options = {});
 
 /// Estimates the cost of redistancing.
-/// @param layer      ValuePlan::layer() of the surface
+/// @param layer      number of grid points in a layer one voxel thick along the surface, see
+///                   ValuePlan::layer()
 /// @param halfWidth  half width of the result, voxels
 [[nodiscard]] Cost costOfDistances(double layer, double halfWidth);
 

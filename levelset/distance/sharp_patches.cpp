@@ -24,8 +24,8 @@ using LeafNode = FloatTree::LeafNodeType;
 
 // Second difference of the distance, voxels, above which a grid point may lie beside an edge.
 constexpr double kSharpBend = 0.15;
-// Number of cells from an edge in which the edge, or the bisector planes of its faces, affect the
-// interpolant.
+// Number of cells around a cell with an edge in which the edge, or the bisector plane of its faces,
+// affects the interpolant.
 constexpr int kZone = 3;
 // An edge is rejected when a part of the surface with the opposite orientation lies nearer than
 // this, in voxels. Values between both parts depend on both, and planes fitted to them lie on
@@ -92,11 +92,11 @@ FloatGrid::Ptr bentPart(const FloatGrid& field, const std::optional<CoordBBox>& 
 }
 
 /// Triangles of a mesh near edges and corners, sorted by the cells of their centroids. Finds the
-/// parts of a solid that are thinner than kThin.
+/// parts of a solid that are thinner than kThin voxels.
 class SheetTable {
  public:
   explicit SheetTable(const SharpMesh& mesh) {
-    openvdb::MaskTree near;  // leaves within kThin of an edge or corner
+    openvdb::MaskTree near;  // leaves within kThin voxels of an edge or corner
     for (std::size_t v = 0; v < mesh.sheets.size(); ++v)
       for (int corner = 0; corner < 8 && mesh.sheets[v].count > 1; ++corner)
         near.touchLeaf(Coord::floor(mesh.positions[v] + Vec3d(corner & 4 ? kThin : -kThin,
@@ -170,8 +170,9 @@ SharpPatches::SharpPatches(const FloatGrid& field, const std::optional<CoordBBox
   border_.topologyUnion(zone_);
   openvdb::tools::dilateActiveValues(border_, 1, openvdb::tools::NN_FACE_EDGE_VERTEX,
                                      openvdb::tools::IGNORE_TILES);
-  // The patches extend by a cell beyond the zone. Otherwise a query at the border of the zone could
-  // find the last triangle in the zone, although the surface beyond it is nearer.
+  // The patches extend by two cells beyond the zone, the cells in which they replace the
+  // interpolant. Otherwise a query at the border of the zone could find the last triangle in the
+  // zone, although the surface beyond it is nearer.
   openvdb::MaskTree around(border_);
   openvdb::tools::dilateActiveValues(around, 1, openvdb::tools::NN_FACE_EDGE_VERTEX,
                                      openvdb::tools::IGNORE_TILES);

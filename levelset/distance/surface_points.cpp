@@ -26,7 +26,8 @@ constexpr std::array<std::array<int, 3>, 6> kDirections = {
 // Largest difference, about, between zero crossings by linear interpolation on grid edges and those
 // of the tricubic interpolant, voxels.
 constexpr double kCrossingTolerance = 0.05;
-// Largest difference, about, between the linear zero crossings and the sharp patches, voxels.
+// Largest difference, about, between the linear zero crossings and the sharp patches (triangles
+// near edges), voxels.
 constexpr double kSharpTolerance = 0.5;
 
 Vec3d vectorOf(const std::array<int, 3>& d) {
@@ -130,9 +131,9 @@ void forEachBlock(const FloatTree& tree, const std::vector<const LeafNode*>& lea
 }
 
 /// Extrapolates the field to a grid point whose value is the background. Takes the mean over the
-/// axes, at least the background; returns 0 when no axis has two distances to extrapolate from. The
-/// extrapolation is quadratic where the second difference is small, so that the interpolation of
-/// smooth fields keeps its order.
+/// six axis directions, each value at least the background in magnitude. Returns 0 when no
+/// direction has two distances to extrapolate from. The extrapolation is quadratic where the second
+/// difference is small, so that the interpolation of smooth fields keeps its order.
 float extrapolate(const DenseBlock& block, int x, int y, int z, float background) {
   constexpr float kGentle = 0.25f;
   const float sign = block.at(x, y, z) < 0 ? -1.0f : 1.0f;
