@@ -122,8 +122,8 @@ void Request::keep(std::size_t node, const Value& value) {
 
 void Request::settle(bool isDone) {
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
-    // With a cache, a run may complete without this value, if the values derived from it are in the
-    // cache.
+    // With a cache, a run may complete without the value of a node, if the values derived from it
+    // are in the cache.
     const bool isMissing = isKept_[i] && !values_[i] && graph_.nodes[i].makes();
     if (isDone ? !isMissing : values_[i].has_value()) nodes_[i]->settle(std::move(values_[i]));
   }

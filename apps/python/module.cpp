@@ -267,7 +267,7 @@ py::tuple makeJob(const std::string& text, const std::string& name, const Texts&
   return py::make_tuple(job.graph, job.places, job.globals);
 }
 
-/// Runs a job. Returns the same tuple as compute().
+/// Runs a job. Returns (report, printed, warnings, notes, exception or None).
 py::tuple runJob(const std::string& graph, const std::vector<std::string>& places,
                  const Texts& globals, const std::string& cache) {
   const pipeline::Graph whole = python::graphOf({graph, places, globals});

@@ -17,8 +17,8 @@ void addErrors(const levelset::NarrowBand& result, const Truth& truth, Mesher me
                Figures& figures, int rays = kRayCount);
 
 /// Adds the surface columns and the volume error against a reference band. value_error is the
-/// volume of the symmetric difference over that of the reference. Surface distances are the larger
-/// of those from `result` to `reference` and back.
+/// volume of the symmetric difference over the volume of the reference. A surface distance is the
+/// larger of the two from `result` to `reference` and back.
 void addDifferences(const levelset::NarrowBand& result, const levelset::NarrowBand& reference,
                     Figures& figures);
 

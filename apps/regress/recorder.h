@@ -59,7 +59,8 @@ class Recorder {
   }
   void set(const std::string& column, double value) { result_.rows.back().figures[column] = value; }
 
-  /// Adds the outcome that `work` throws a levelset::Error with this exit code.
+  /// Adds the outcome of the statement that `work` throws a levelset::Error with the exit code
+  /// `code`.
   void expectRefusal(const std::string& variant, levelset::ExitCode code,
                      const std::function<void()>& work);
   /// Adds the outcome of a statement. `work` returns true if the statement holds, and a text with

@@ -25,7 +25,7 @@ class CacheKeys {
   ///   other files
   /// - nodes that write to something other than a file, or that write files beside their value
   /// - nodes whose result is not repeatable (Operator::isRepeatable)
-  /// - nodes that depend on one of these
+  /// - nodes that depend on a node that cannot be cached
   [[nodiscard]] std::vector<std::optional<std::string>> of(const Graph& graph,
                                                            const std::vector<char>& needed) const;
 

@@ -40,7 +40,7 @@ std::string completionTable() {
   return text + "  *) params='' ;;\n  esac\n}\n";
 }
 
-/// Shell function that is part of both scripts.
+/// Shell function that is part of both the bash and the zsh script.
 constexpr const char* kVariables = R"sh(
 # Prints `NAME=` for each variable that a `set` line of a script sets.
 _levelsmith_variables() {

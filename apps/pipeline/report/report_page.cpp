@@ -323,7 +323,7 @@ class StepTable {
   bool hasPictures_ = false;
 };
 
-// === The other sections
+// === Sections of the page beside the table of steps
 
 std::string headingOf(const RunReport& report) {
   std::string text = fmt::format(

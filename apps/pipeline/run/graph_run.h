@@ -132,7 +132,7 @@ class GraphRun {
   // reporting stops.
   std::size_t nextReported_ = 0, reportEnd_ = kNone;
   std::mutex mutex_;  // guards values, states, steps, output and the callbacks of the settings
-  Values values_;     // last member: decideStates() initializes the others
+  Values values_;     // last member: its initializer, decideStates(), also sets members above
 };
 
 }  // namespace pipeline

@@ -45,7 +45,8 @@ struct StepReport {
   std::string action;
   bool isCached = false;                          ///< the result comes from an earlier run
   std::map<std::string, std::string> parameters;  ///< options as the user wrote them, by name
-  std::map<std::string, std::string> defaults;    ///< default values of the other options, by name
+  std::map<std::string, std::string>
+      defaults;  ///< default values of the options that the user left out, by name
   StepNotes notes;
   double wallSeconds = 0, cpuSeconds = 0;
   double peakBytes = 0;  ///< peak resident memory of the process, bytes

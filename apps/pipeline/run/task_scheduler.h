@@ -32,7 +32,7 @@ struct ScheduleResult {
   std::vector<char> isDone;  ///< one flag per task
   /// Index of the failed task that is first in the list. All tasks before it were tried.
   std::optional<std::size_t> failed = {};
-  std::exception_ptr failure = {};  ///< exception that this task threw
+  std::exception_ptr failure = {};  ///< exception that the failed task threw; null: none failed
 };
 
 /// Runs tasks on the caller's thread, and on further threads when several tasks can start.

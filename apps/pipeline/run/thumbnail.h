@@ -20,7 +20,8 @@ struct Thumbnail {
 /// Draws a level set, mesh or scene with the CPU renderer. The camera looks from the front, right
 /// and above; a scene with a camera uses its own. A value that cannot be drawn gets no picture and
 /// a reason, so a run never fails because of a thumbnail. The same holds for a value whose picture
-/// would exceed the memory that the limit leaves. The bytes depend on the value alone.
+/// would exceed the memory that the limit leaves. The bytes of the picture depend on the value
+/// alone.
 /// @param maxMemory  memory limit of the process, bytes
 [[nodiscard]] Thumbnail thumbnailOf(const Value& value, std::size_t maxMemory);
 

@@ -48,7 +48,8 @@ struct Plan {
   /// Returns the plan in the form that the operators of the library levelset read.
   [[nodiscard]] levelset::ValuePlan estimate() const;
   void set(const levelset::ValuePlan& estimate);
-  /// Estimated number of active voxels of a band with this area.
+  /// Estimated number of active voxels of a band with the area, voxel size and half width of the
+  /// plan.
   [[nodiscard]] double activeVoxels() const;
   /// Estimated memory of the value, bytes.
   [[nodiscard]] double bytes() const;

@@ -131,8 +131,8 @@ double quickest(double away, double z, double depth, double speed) {
         [&](double x) { return std::hypot(x, depth) + std::hypot(away - x, z) / speed; });
   const double direct = std::hypot(away, z + depth);
   if (speed <= 1) return direct;
-  // The head wave meets the plane at the critical angle, follows the plane, and returns at the same
-  // angle.
+  // The head wave meets the plane at the critical angle, follows the plane, and leaves it downwards
+  // at the same angle.
   const double cosine = std::sqrt(1 - 1 / (speed * speed)), tangent = 1 / (speed * cosine);
   const double along = away - (depth - z) * tangent;
   return along < 0 ? direct : std::min(direct, (depth - z) / cosine + along / speed);

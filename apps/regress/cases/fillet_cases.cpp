@@ -126,7 +126,7 @@ void roundWedges(Recorder& out) {
 
 /// Returns the largest relative error of the fillet's radius r between crossed cylinders of radius
 /// R, with axes along x and y through one point. NaN if the surface is not found. A ball that
-/// touches both from outside rolls along the ellipses |x| = |y|, x² + z² = (R + r)².
+/// touches both cylinders from outside rolls along the ellipses |x| = |y|, x² + z² = (R + r)².
 double crossedError(const NarrowBand& band, const V3d& centre, double cylinderRadius,
                     double radius) {
   const levelset::BandSampler phi(band, levelset::Interpolation::Tricubic);

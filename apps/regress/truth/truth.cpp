@@ -110,7 +110,8 @@ Truth twoBalls(CsgOperation operation, const V3d& centreA, double radiusA, const
                double radiusB) {
   const V3d axis = (centreB - centreA).normalized();
   const double gap = (centreB - centreA).length();
-  // Position along the axis of the plane in which the spheres meet, and radius of the circle there.
+  // Position along the axis of the plane in which the spheres meet, and radius of the circle in
+  // which they meet.
   const double plane = (gap * gap + radiusA * radiusA - radiusB * radiusB) / (2 * gap);
   const double ring = std::sqrt(radiusA * radiusA - plane * plane);
   const double heightA = radiusA - plane, heightB = radiusB - (gap - plane);
@@ -162,8 +163,8 @@ Truth twoBalls(CsgOperation operation, const V3d& centreA, double radiusA, const
 }
 
 // The solid is one of revolution. Its profile in the half plane (x along the axis, y from it) has
-// two arcs and the arc of the fillet between them. The distance of the fillet's centre from both
-// circles is the fillet's radius.
+// the arcs of both balls and the arc of the fillet between them. The distance of the fillet's
+// centre from the circles of both balls is the fillet's radius.
 Truth filletedBalls(const V3d& centreA, double radiusA, const V3d& centreB, double radiusB,
                     double fillet) {
   const V3d axis = (centreB - centreA).normalized();
@@ -184,8 +185,8 @@ Truth filletedBalls(const V3d& centreA, double radiusA, const V3d& centreB, doub
   Truth truth{.distance = distance,
               .centre = (centreA + centreB) / 2.0,
               .reach = gap / 2 + std::max(radiusA, radiusB)};
-  // Volume and area of both balls without the caps beyond the planes where the arcs touch.
-  // Simpson's rule adds the part between these planes.
+  // Volume and area of both balls without the caps beyond the planes where the fillet touches the
+  // balls. Simpson's rule adds the part between these planes.
   const double touchA = x * radiusA / sumA, touchB = gap - (gap - x) * radiusB / sumB;
   const double heightA = radiusA - touchA, heightB = radiusB - (gap - touchB);
   double volume = 4 * kPi / 3 * (std::pow(radiusA, 3) + std::pow(radiusB, 3)) -

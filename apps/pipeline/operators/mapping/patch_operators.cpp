@@ -24,7 +24,7 @@ using levelset::UsageError;
 
 constexpr std::array<const char*, 4> kSides = {"side0", "side1", "side2", "side3"};
 
-/// Checks --corners, or --at and --size, and the options that belong to one of them.
+/// Checks --corners, or --at and --size, and the options that fit only corners or only a centre.
 /// @throws levelset::UsageError for a wrong combination
 void validateOutline(const Invocation& in) {
   const std::string& name = in.op().name;
