@@ -33,7 +33,7 @@ struct LayerSize {
 
 /// Chooses the spacing that gives about two thousand particles over all layers, world units; at
 /// least 1.5 voxels.
-/// @param times  number of copies of each layer
+/// @param times  number of patch layers that each given layer stands for
 [[nodiscard]] double chooseSpacing(double voxelSize, std::span<const LayerSize> layers,
                                    std::size_t times = 1);
 
@@ -47,7 +47,7 @@ void checkParticleCount(double count, double spacing, const PatchOptions& option
 
 /// Computes distances to the base in the space above a patch, given points along the outline of the
 /// patch.
-/// @param lean  distance by which layers may extend sideways beyond the space above the outline,
+/// @param lean  distance by which layers may extend sideways beyond the space above `outline`,
 ///         world units
 [[nodiscard]] levelset::NarrowBand sweepAbove(const levelset::NarrowBand& base,
                                               std::span<const Imath::V3d> outline,
@@ -56,7 +56,7 @@ void checkParticleCount(double count, double spacing, const PatchOptions& option
 
 /// Schemes A and C: builds the layers by moving the particles of the surface. A layer whose
 /// particle spacing comes to differ by over a quarter from that on the surface is resampled, unless
-/// the options give counts.
+/// the options give the numbers of cells.
 [[nodiscard]] std::vector<ParticleLayer> layersFromSurface(const levelset::NarrowBand& base,
                                                            const ParticleLayer& surface,
                                                            std::span<const Imath::V3d> outline,

@@ -15,8 +15,8 @@ struct Relaxation {
 
 /// Relaxes the inner particles of a layer as masses of a spring net. The net has structural, shear
 /// and flexion springs [Provot95] and fixed borders. After each step, its particles are projected
-/// onto φ = layer.height. The rest length of a spring is the mean spacing of the borders parallel
-/// to it.
+/// onto φ = layer.height. The rest length of a spring along a row or column is interpolated between
+/// the mean spacings of the two borders parallel to it.
 /// @param isRing  the last column equals the first one, and moves with it
 Relaxation relax(const levelset::NarrowBand& band, ParticleLayer& layer, bool isRing = false);
 

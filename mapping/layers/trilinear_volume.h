@@ -7,7 +7,8 @@
 
 namespace mapping {
 
-/// Sign of the Jacobian determinant of a trilinear map, as shares of the unit cube.
+/// Sign of the Jacobian determinant of a trilinear map from the unit cube of u, v, w to world
+/// positions, as shares of the cube.
 struct VolumeSign {
   double negative = 0;  ///< share where the determinant is proven not to be positive
   /// Share left undecided at `mostPieces`: pieces where the determinant changes sign or touches

@@ -12,16 +12,17 @@
 namespace mapping {
 
 /// One of the six tetrahedra of a cell [Brodersen07 §9]. The cell is two prisms, one over each half
-/// of its bottom, each split by its lowest and highest corner. Every tetrahedron is a path from the
-/// cell's first corner to its last, along the three axes in one of six orders. So the neighbours of
-/// a tetrahedron follow from its order and need not be stored.
+/// of its bottom, each split by its lowest and highest corner. The corners of every tetrahedron
+/// form a path along three edges of the cell, from its first corner (least u, v, w) to its last,
+/// along the three axes in one of six orders. So the neighbours of a tetrahedron follow from its
+/// order and need not be stored.
 struct Tetrahedron {
   std::array<int, 3> cell{};
   int order = 0;  ///< 0 … 5, see Lattice::kOrders
 };
 
 /// The particles of a patch as a grid of nodes with the same counts on every layer, split into
-/// tetrahedra. Outer layers of cells continue the grid linearly.
+/// tetrahedra. Outer cells, beyond the particles, continue the grid linearly.
 class Lattice {
  public:
   /// Axes (u = 0, v = 1, w = 2) in the order of a tetrahedron's path.
@@ -31,8 +32,8 @@ class Lattice {
 
   /// Builds the grid. Layers with fewer particles than the largest layer are refined on a smooth
   /// surface through their particles.
-  /// @param border  extent of the lattice beyond the layers and sides, continued linearly; a rim is
-  ///         at least one cell wide
+  /// @param border  extent of the lattice beyond the layers and sides, continued linearly; if
+  ///         border.rim > 0, the outer cells along u and v are at least as wide as the inner ones
   Lattice(const Patch& patch, const LatticeBorder& border) : nodes_(latticeNodes(patch, border)) {}
 
   [[nodiscard]] const std::array<int, 3>& cells() const { return nodes_.cells; }

@@ -15,7 +15,7 @@ namespace mapping {
 struct LatticeBorder {
   /// Depth of the texture below w = 0; if negative, its lift above w = 1; in w.
   double embedDepth = 0;
-  /// Further margin on all six sides, world units; 0: no margin and no outer cells.
+  /// Further margin on all six sides, world units; 0: no margin.
   double rim = 0;
 };
 
@@ -44,8 +44,8 @@ struct LatticeNodes {
 
 /// Builds the nodes from the particles of a patch. Layers with fewer particles than the largest
 /// layer are refined on a smooth surface through their particles.
-/// @param border  extent of the lattice beyond the layers and sides, continued linearly; a rim is
-///         at least one cell wide
+/// @param border  extent of the lattice beyond the layers and sides, continued linearly; if
+///         border.rim > 0, the outer cells along u and v are at least as wide as the inner ones
 [[nodiscard]] LatticeNodes latticeNodes(const Patch& patch, const LatticeBorder& border);
 
 }  // namespace mapping

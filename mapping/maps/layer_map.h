@@ -10,8 +10,8 @@
 
 namespace mapping {
 
-/// Maps texture coordinates to a position above the patch. The map is piecewise linear through the
-/// particles: bilinear in u and v on the two layers next to w, then linear between them
+/// Maps texture coordinates to a world position above the patch. The map is piecewise linear
+/// through the particles: bilinear in u and v on the two layers next to w, then linear between them
 /// [Brodersen07 §8.4]. Beyond the unit cube the outermost cells continue linearly.
 [[nodiscard]] Imath::V3d layerPosition(const Patch& patch, const Imath::V3d& uvw);
 

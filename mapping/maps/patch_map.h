@@ -34,8 +34,8 @@ struct GridBlock {
   using V3d = Imath::V3d;
 };
 
-/// A map restricted to the grid points of one block. Particles far from the block are summed into
-/// an expansion, and particles without influence are left out.
+/// A map restricted to the grid points of one block. An RBF map sums the particles far from the
+/// block into a polynomial; a prism map keeps only the cells that touch the block.
 class BlockMap {
  public:
   virtual ~BlockMap() = default;
@@ -48,7 +48,7 @@ class BlockMap {
   [[nodiscard]] virtual std::unique_ptr<BlockMap> octant(int bits) const = 0;
   /// Computes the texture coordinates of the 512 grid points, at index 64 i + 8 j + k; NaN where
   /// the map is not defined.
-  /// @pre edge == kLeafEdge
+  /// @pre the edge of the block is kLeafEdge
   /// @return number of particles summed or tetrahedra tested, total of all grid points
   virtual std::size_t evaluate(std::span<Imath::V3d, 512> uvw) const = 0;
 };
@@ -56,7 +56,8 @@ class BlockMap {
 /// Value and Jacobian of a map at one point.
 struct MapSample {
   Imath::V3d position, uvw;
-  /// Rows: gradients of u, v and w; not finite where the inverse has no derivative.
+  /// Rows: gradients of u, v and w; not finite where the inverse map, from u, v, w to positions, is
+  /// singular.
   Imath::M33d jacobian;
 };
 

@@ -32,9 +32,9 @@ class PrismMap final : public PatchMap {
   /// Maps texture coordinates to a world position above the patch; NaN outside the lattice.
   [[nodiscard]] Imath::V3d toPatch(const Imath::V3d& uvw) const;
   [[nodiscard]] const Lattice& lattice() const { return lattice_; }
-  /// Counts the samples whose position maps to other texture coordinates inside the texture. Such a
-  /// sample means that the offset layer passes through itself.
-  /// @param first  one such sample; unchanged if there is none
+  /// Counts the samples whose position the map sends to texture coordinates inside the texture
+  /// other than their own. Such a sample means that the offset layer passes through itself.
+  /// @param first  set to the first such sample; unchanged if there is none
   [[nodiscard]] std::size_t countOverlaps(std::span<const MapSample> samples,
                                           MapSample& first) const;
   /// True if a point of texture space lies in the unit cube, extended below or above it by the

@@ -13,8 +13,8 @@ namespace mapping {
 /// the centre are preserved, and developable surfaces are mapped without distortion. Each geodesic
 /// is traced separately (see SurfaceWalk), because passing coordinates from neighbour to neighbour
 /// [Schmidt06] accumulates errors. With LayerScheme::Reduced each layer has its own exponential
-/// map, whose centre moves along ∇φ from layer to layer. Its size grows with the distances from the
-/// centre to the middles of the sides.
+/// map, whose centre moves along ∇φ from layer to layer. The size of a layer grows with the
+/// distances from its centre to the middles of its sides, which also move along ∇φ.
 /// @param at         centre, projected along φ to the zero set
 /// @param direction  direction of u; its tangential part is used
 /// @param radius     half of the square's side, along the surface, world units

@@ -26,7 +26,7 @@ struct PatchGridResult {
   PatchReport report;          ///< measurements over all tiles
 };
 
-/// Builds the tiles of one patch between four corners, see makePatch. Neighbours share the
+/// Builds the tiles of one patch between four corners, see makePatch. Neighbouring tiles share the
 /// particles of their common border bit for bit, and the rim of each tile lies on its neighbours'
 /// particles. So textures that match at the borders of their boxes match on the surface. All layers
 /// have equal particle counts.
@@ -38,15 +38,16 @@ struct PatchGridResult {
                                             const PatchOptions& options = {});
 
 /// Builds tiles all around an axis, between the two planes through its ends that are perpendicular
-/// to it. The direction of u is around the axis, anticlockwise seen from `to`. That of v is from
-/// `from` to `to`. The last column of tiles joins the first. The tiles lie on the part of the
-/// surface that is visible from outside along lines perpendicular to the axis.
+/// to it. The direction of u is around the axis, anticlockwise seen from `to`. The direction of v
+/// is from `from` to `to`. The last column of tiles joins the first. The tiles lie on the part of
+/// the surface that is visible from outside along lines perpendicular to the axis.
 /// @param from, to  different points on the axis; a solid of revolution has its own axis
 /// @param rotation  angle about the axis at which the first column of tiles begins, radians, from
 ///         the perpendicular direction nearest to +x (or to +y for an axis along x)
 /// @throws UsageError as makePatchGrid, for fewer than 3 columns, and for mirrorU with an odd
 ///         number of columns
-/// @throws InvalidInput where no surface lies around the axis, or where it is not a single sheet
+/// @throws InvalidInput where no surface lies around the axis, or where the visible surface jumps
+///         from one part to another
 [[nodiscard]] PatchGridResult makePatchGridAround(const levelset::NarrowBand& base,
                                                   const Imath::V3d& from, const Imath::V3d& to,
                                                   double rotation, double height,

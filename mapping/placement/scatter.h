@@ -19,7 +19,7 @@ struct ScatterOptions {
   /// Density of positions; its scale also scales the patches, heights included.
   ScatterDensity density = {};
   double uSize = 0, vSize = 0;  ///< size of a patch at scale 1, world units
-  /// Direction of u, projected onto the surface; empty or zero: the direction of `cornersAround`.
+  /// Direction of u, projected onto the surface; empty or zero: the direction eastOf the normal.
   levelset::VectorField direction = {};
   double rotation = 0;      ///< rotation of u about the normal, radians
   double jitter = 0;        ///< amplitude of a random rotation to either side, radians
@@ -43,7 +43,7 @@ struct ScatterResult {
 };
 
 /// Scatters patches over a surface. A position is left out and counted if the surface bends too
-/// much or breaks off there, or if the patch would fold. If a count is given, other positions are
+/// much or breaks off there, or if the patch would fold. If a count is given, spare positions are
 /// tried instead.
 /// @param height  patch height at scale 1, world units
 /// @throws UsageError, ResourceLimit as scatterPoints and makePatch

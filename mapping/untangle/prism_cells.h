@@ -47,15 +47,15 @@ class PrismCells {
  private:
   struct Slab {
     std::size_t lower = 0;     ///< index of the lower layer; the upper layer is the next
-    std::size_t first = 0;     ///< index of its first cell
-    double from = 0, to = 0;   ///< range of w, with the embedding depth
+    std::size_t first = 0;     ///< index of its first box, see PrismCells::at
+    double from = 0, to = 0;   ///< range of w; the end slab includes the embedding depth
     std::vector<double> u, v;  ///< cell borders along u and v
     [[nodiscard]] std::size_t count() const { return (u.size() - 1) * (v.size() - 1); }
   };
   void addLayer(ParticleSum& sum, std::size_t layer, double u, double v, double share) const;
 
   std::vector<Slab> slabs_;
-  /// Columns, rows, and index of the first particle.
+  /// For each layer: number of columns, number of rows, and index of its first particle.
   std::vector<std::array<std::size_t, 3>> layers_;
   std::vector<double> w_;
 };

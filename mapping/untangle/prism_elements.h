@@ -15,19 +15,20 @@ namespace mapping {
 /// u, v and w are lengths in the undeformed (rest) shape.
 using ElementSlopes = std::array<Imath::V3d, 3>;
 
-/// Energy density of one element, per unit of its rest volume, and its derivative with respect to
-/// the slopes.
+/// Energy density of one element, per unit of its volume in the rest shape, and its derivative with
+/// respect to the slopes.
 struct ElementEnergy {
   double value = 0;  ///< infinite for slopes that the energy forbids
   ElementSlopes stress{Imath::V3d(0), Imath::V3d(0), Imath::V3d(0)};
 };
 
-/// Returns |F|² + |F⁻¹|², the symmetric Dirichlet energy: 6 for a rotation, infinite where F is
-/// inverted [Smith15].
+/// Returns |F|² + |F⁻¹|², the symmetric Dirichlet energy: 6 for a rotation, infinite where det F ≤
+/// 0 [Smith15]. F is the matrix of the slopes.
 [[nodiscard]] ElementEnergy symmetricDirichlet(const ElementSlopes& slopes);
 
 /// Returns |F|² / χ^⅔ + (1 + det²) / χ, where χ = (det + √(ε² + det²)) / 2 replaces the determinant
-/// det of F. The energy is finite for every F, and forbids folds in the limit ε → 0 [Garanzha21].
+/// det of F, the matrix of the slopes. The energy is finite for every F if ε > 0, and forbids folds
+/// in the limit ε → 0 [Garanzha21].
 [[nodiscard]] ElementEnergy foldoverEnergy(const ElementSlopes& slopes, double epsilon);
 
 [[nodiscard]] double determinantOf(const ElementSlopes& slopes);
@@ -47,8 +48,8 @@ class PrismElements {
   [[nodiscard]] double weight(std::size_t element) const { return weights_[element]; }
   [[nodiscard]] ElementSlopes slopes(std::size_t element,
                                      const std::vector<Imath::V3d>& positions) const;
-  /// Computes the derivatives of a sum over elements with respect to particle positions, from those
-  /// with respect to element slopes.
+  /// Computes the derivatives of the weighted sum of the element energies with respect to particle
+  /// positions, from `stress`, the derivatives with respect to the slopes of each element.
   [[nodiscard]] std::vector<Imath::V3d> gather(const std::vector<ElementSlopes>& stress) const;
 
   /// Contribution of one particle to an element: slopes += position × slope, column by column.
@@ -75,8 +76,8 @@ class PrismElements {
   std::vector<Entry> entries_;
   std::vector<double> weights_;
   std::vector<std::size_t> firstUse_;
-  /// For each particle, the index of each element that uses it and of its entry there; see
-  /// firstUse_.
+  /// For each particle n, the uses firstUse_[n] … firstUse_[n + 1] − 1: index of an element that
+  /// depends on the particle, and index of the element's entry for it.
   std::vector<std::array<std::uint32_t, 2>> uses_;
 };
 

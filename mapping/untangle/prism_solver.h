@@ -21,8 +21,8 @@ enum class ParticleHold : char {
 
 /// Moves particles to minimise an energy summed over elements. The method is L-BFGS in the tangent
 /// planes of the surface, preconditioned with the Laplacian of the elements [Nocedal06; Claici17].
-/// Each step is projected onto the surface and accepted only if the energy decreases enough. The
-/// result has the same bits for any number of threads.
+/// After each step, sliding particles are projected onto the surface. A step is accepted only if
+/// the energy decreases enough. The result has the same bits for any number of threads.
 class PrismSolver {
  public:
   using Density = std::function<ElementEnergy(const ElementSlopes&)>;
@@ -52,8 +52,8 @@ class PrismSolver {
   [[nodiscard]] Vectors gradientOf(const std::vector<ElementSlopes>& stress) const;
   void makeTangent(Vectors& vectors) const;
   void updateNormals();
-  /// Computes positions after a step. Returns false when a sliding particle cannot be projected
-  /// onto the surface.
+  /// Computes the positions of all particles after a step. Returns false when a sliding particle
+  /// cannot be projected onto the surface.
   bool moved(const Vectors& direction, double step, Vectors& result) const;
   [[nodiscard]] Vectors preconditioned(Vectors vectors) const;
 
@@ -61,7 +61,7 @@ class PrismSolver {
   const PrismElements& elements_;
   std::vector<ParticleHold> holds_;
   Vectors positions_, normals_;
-  double spacing_ = 0;  ///< particle spacing at rest, the unit for step lengths
+  double spacing_ = 0;  ///< mean particle spacing in the rest shape, the unit for step lengths
   std::unique_ptr<Preconditioner> preconditioner_;
 };
 
