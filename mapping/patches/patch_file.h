@@ -17,8 +17,8 @@ void writePatches(const std::filesystem::path& file, std::span<const Patch> patc
 
 /// Reads patches from a file. Errors name the position in the file.
 /// @throws IoError if the file cannot be read
-/// @throws InvalidInput if it is not a patch file, or its counts and numbers are inconsistent
-/// @throws ResourceLimit if it needs more than `maxMemory` bytes
+/// @throws InvalidInput if the file is not a patch file, or its counts and numbers are inconsistent
+/// @throws ResourceLimit if reading the file needs more than `maxMemory` bytes
 [[nodiscard]] std::vector<Patch> readPatches(const std::filesystem::path& file,
                                              std::size_t maxMemory = levelset::kNoMemoryLimit);
 

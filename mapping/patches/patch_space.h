@@ -21,12 +21,13 @@ struct PatchSpaceOptions {
 
 /// Computes distances to the base up to `height` above a patch, by fast sweeping from the narrow
 /// band in a box around the patch [Brodersen07 §8.2]. If the height is many voxels, the grid is up
-/// to four times coarser. Iso-surfaces of φ become smoother with height, and the base's own band
-/// represents the surface itself.
+/// to four times coarser. This is accurate enough, because iso-surfaces of φ become smoother with
+/// height, and the layer at w = 0 is built from the base's own band.
 /// @throws InvalidInput for an open surface whose band does not extend to the height, because such
 ///         a band cannot be extended
 /// @param border  points on the surface along the sides of the patch
-/// @param bulge   distance by which the inner surface may leave the box of the border, world units
+/// @param bulge   distance by which the surface between the sides may leave the bounding box of
+///         `border`, world units
 [[nodiscard]] levelset::NarrowBand sweepPatchSpace(const levelset::NarrowBand& base,
                                                    std::span<const Imath::V3d> border, double bulge,
                                                    double height,

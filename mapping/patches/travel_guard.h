@@ -19,7 +19,7 @@ class TravelGuard {
 
   /// Limits the moves of one step. For particles that would touch, the components that bring them
   /// closer after the contact are removed, so that they move on side by side. If that does not
-  /// suffice, the group moves as one body.
+  /// suffice, the particles that touch each other move as one body.
   void limit(std::span<const Imath::V3d> positions, std::span<Imath::V3d> moves);
 
   /// True for particles whose move was ever changed.

@@ -9,9 +9,9 @@
 namespace mapping {
 
 /// Finds paths from a to b over grid points beside φ = height, so that no path jumps through the
-/// solid to another side. It finds the shortest path, and others whose middle is elsewhere. Paths
-/// over a grid are up to 13 % too long; the true shortest path results from straightening one of
-/// them.
+/// solid to another side. It finds the shortest path, and other paths whose middle points are away
+/// from it. Paths over a grid are up to 13 % too long; the true shortest path results from
+/// straightening one of them.
 /// @param a, b  ends of the paths, on φ = height
 class GeodesicSearch {
  public:

@@ -19,8 +19,9 @@ class SurfaceField {
   /// ∇φ / |∇φ|; zero outside the band.
   [[nodiscard]] Imath::V3d normal(const Imath::V3d& p) const;
   /// Moves p along ∇φ until φ = height within a hundred-thousandth of a voxel: p ← p − (φ − height)
-  /// ∇φ. Returns false, with the last p, if p leaves the band or meets a ridge of φ, or where an
-  /// open surface breaks off.
+  /// ∇φ. At a crease, where the steps oscillate, a hundredth of a voxel suffices. Returns false,
+  /// with the last p, if p leaves the band or meets a ridge of φ, or where an open surface breaks
+  /// off.
   [[nodiscard]] bool project(Imath::V3d& p, double height) const;
   /// True if p lies more than a voxel beyond the border of an open surface, where the band
   /// continues.

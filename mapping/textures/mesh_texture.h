@@ -36,13 +36,14 @@ struct MeshTextureResult {
 };
 
 /// Moves the vertices of a mesh from texture space onto a patch, piecewise linearly through its
-/// particles: within the two layers next to w first, then between them [Brodersen07 §8.4]. The mesh
-/// may be open or closed. Its triangles are kept; they are reversed if the patch is mirrored, so
-/// that they face the same side. Beyond the unit cube the outermost cells continue linearly.
-/// Normals are transformed by the inverse transpose of the map's Jacobian in the cell of their
-/// vertex. On the border of two cells, that is the cell that begins there. They get unit
-/// length and stay on the same side of the triangles. Normals of length zero stay zero, with a
-/// note. Texture coordinates and colours are copied.
+/// particles: bilinear in u and v within the two layers next to w, then linear between them
+/// [Brodersen07 §8.4]. The mesh may be open or closed. Its triangles are kept; if the patch is
+/// mirrored, their vertex order is reversed, so that they still face the same side of the texture.
+/// Beyond the unit cube the outermost cells continue linearly. Normals are transformed by the
+/// inverse transpose of the map's Jacobian in the cell of their vertex. On the border of two cells,
+/// that is the cell that begins there. Mapped normals get unit length and stay on the same side of
+/// the triangles. Normals of length zero stay zero, with a note. Texture coordinates and colours
+/// are copied.
 /// @throws UsageError for an embedding depth that is not finite
 /// @throws InvalidInput if the mesh is empty, its box has no volume, its attributes do not match
 ///         its vertices or are not finite, or the patch folds

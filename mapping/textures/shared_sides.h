@@ -12,8 +12,8 @@ namespace mapping {
 /// of another patch or of the same one.
 using SharedSides = std::array<bool, 4>;
 
-/// Finds the sides, at w = 0, whose ends and middles coincide with those of another side to a
-/// thousandth of the particle spacing, as neighbouring tiles have them.
+/// Finds the sides, at w = 0, whose end points and middle points lie within a thousandth of the
+/// particle spacing of those of another side. Neighbouring tiles have such sides.
 [[nodiscard]] std::vector<SharedSides> sharedSides(std::span<const Patch> patches);
 
 }  // namespace mapping

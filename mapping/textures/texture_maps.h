@@ -13,7 +13,7 @@
 namespace mapping {
 
 /// Number of result voxels by which the texture's band must extend on each side of its surface. The
-/// high-order interpolant at the zero set then reads only distances.
+/// high-order interpolant at the zero set then reads only distances, no background values.
 inline constexpr double kTextureBandNeeded = 3;
 
 /// Calls `work` and adds its CPU time to `seconds`.
@@ -26,7 +26,8 @@ auto timed(double& seconds, const Work& work) {
   return result;
 }
 
-/// A map of the requested kind, with its measurements; `map` is empty for a skipped patch.
+/// Map of one patch, of the kind TextureOptions::map, with its measurements; `map` is empty for a
+/// skipped patch.
 struct ChosenMap {
   std::unique_ptr<PatchMap> map;
   Distortion distortion = {};

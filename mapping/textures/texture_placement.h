@@ -24,8 +24,9 @@ struct TexturePlacement {
   }
 };
 
-/// Returns the box that becomes the unit cube: the given one, or else the texture's own.
-/// @throws InvalidInput if it has no volume or does not meet the texture
+/// Returns the box that is mapped to the unit cube of u, v, w: `given`, or if that is empty, the
+/// texture's own box.
+/// @throws InvalidInput if the box has no volume or does not meet the texture
 [[nodiscard]] Imath::Box3d chooseTextureBox(const Imath::Box3d& own,
                                             const std::optional<Imath::Box3d>& given);
 
@@ -33,8 +34,8 @@ struct TexturePlacement {
 [[nodiscard]] bool isBeyond(const Imath::Box3d& own, const Imath::Box3d& box, double voxelSize);
 
 /// Checks a map for folds.
-/// @return notes about folds that are allowed, and about an uncertified share of the volume; often
-///         empty
+/// @return notes about folds that are allowed, and about a share of the patch's volume without a
+///         certificate; often empty
 /// @throws InvalidInput for folds that are not allowed, with the position of the worst fold
 [[nodiscard]] std::vector<std::string> checkFolds(const Distortion& distortion,
                                                   const FoldCertificate& certificate,

@@ -15,7 +15,8 @@ namespace mapping {
 struct WarpOptions {
   /// Index-to-world transform of the result: rotation, uniform scale and translation.
   Imath::M44d indexToWorld;
-  /// Typical stretch of the map, by which the texture's distances are multiplied.
+  /// Mean stretch of the map from the texture to the patch, by which the texture's distances are
+  /// multiplied.
   double scale = 1;
   /// Error bound of the map's fast evaluation, texture voxels.
   double mapTolerance = 0.05;
@@ -40,8 +41,9 @@ struct Warp {
 };
 
 /// Evaluates a texture through a map on the grid of the result. Blocks of 64³ grid points are split
-/// down to 8³ as long as the image of a block, bounded through the map's slopes, may touch the
-/// texture's band. Only such 8³ blocks are evaluated; the others lie completely inside or outside.
+/// down to 8³ as long as the image of a block under the map, bounded by BlockMap::imageBounds, may
+/// touch the texture's band. Only such 8³ blocks are evaluated; the others lie completely inside or
+/// outside.
 /// @throws InvalidInput if no block meets the texture
 /// @throws ResourceLimit before memory exceeds `maxMemory`
 [[nodiscard]] Warp warpTexture(const levelset::NarrowBand& texture,
