@@ -18,7 +18,7 @@ namespace {
 using Imath::V3d;
 using Triangle = std::array<std::uint32_t, 3>;
 
-constexpr double kLongestEdge = 1;  // voxels
+constexpr double kLongestEdge = 1;  // voxels; longer edges are split
 // Limits of a step: displacement of a vertex in voxels, strain of an edge, error of a vertex in
 // voxels. Strain is the change of an edge vector divided by its length, or by kLongestEdge for
 // shorter edges. It is limited because a split edge gets its new vertex on a curve through its end
@@ -30,8 +30,8 @@ constexpr double kShortMove = 0.25;
 // Limit of Characteristic::stageDeviation, voxels: the second velocity sample of a step against the
 // line through the first and the third.
 constexpr double kMostStageDeviation = 1;
-// Memory of a triangle and its share of the vertices, with temporary arrays for splitting and
-// moving.
+// Memory in bytes of a triangle and its share of the vertices, with temporary arrays for splitting
+// and moving.
 constexpr double kBytesPerTriangle = 100;
 // Limit of the number of triangles for each voxel² of the largest area so far, and an allowance for
 // small surfaces. A surface with more triangles is crumpled, not stretched, and its
@@ -255,7 +255,7 @@ double Front::mostStrain() const {
         for (std::size_t i = range.begin(); i != range.end(); ++i)
           for (std::size_t k = 0; k < 3; ++k) {
             const std::uint32_t a = mesh_.triangles[i][k], b = mesh_.triangles[i][(k + 1) % 3];
-            if (a > b) continue;  // the triangle on the other side handles it
+            if (a > b) continue;  // the triangle on the other side of the edge handles it
             const V3d before = mesh_.positions[b] - mesh_.positions[a];
             const V3d change = moved_[b] - moved_[a] - before;
             largest = std::max(largest, change.length2() / std::max(kLongestEdge * kLongestEdge,

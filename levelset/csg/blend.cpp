@@ -34,7 +34,8 @@ constexpr double kDuration = 1;
 constexpr double kRest = 0.03;
 constexpr double kCoarsest = 1.5;  // voxels: smallest radius that a grid can represent
 
-/// Runs the flow until no curvature exceeds 1 / radius, but at most for kDuration × radius².
+/// Runs the flow near the seam until its speed falls below kRest / radius, but at most for the time
+/// kDuration × radius².
 /// @param halfWidth  half width of the result, voxels
 FloatGrid::Ptr runFlow(FloatGrid::Ptr field, solids::SeamWeights& weights,
                        const solids::SeamFlow& flow, double halfWidth,
@@ -61,8 +62,8 @@ FloatGrid::Ptr runFlow(FloatGrid::Ptr field, solids::SeamWeights& weights,
   return eikonal::distanceTransform(*field, request);
 }
 
-/// Copies the distances of `part`, the result of the flow, into the solid where the weight is not
-/// zero.
+/// Copies the distances of `part`, the result of the flow, into the solid where the weight of the
+/// flow is not zero, which means near the seam.
 /// @param part  distances in voxels
 void putBack(const FloatGrid& part, solids::SeamWeights& weights, FloatGrid& solid) {
   FloatTree& tree = solid.tree();

@@ -34,11 +34,11 @@ struct BlendOptions {
 ///
 /// BlendMethod::Curvature integrates the flow φ_t = D(d) (κ − clamp(κ, ±1/radius)) |∇φ| [Museth02,
 /// Brodersen07 §6.3]. Here κ = k1 + k2, d is the distance to the curve, and D falls smoothly from 1
-/// to 0 at `radius`. Unlike the plain flow of the sources, this flow moves only points with a
-/// curvature above 1/radius, so it converges to a fillet. A right-angled crease becomes a circular
-/// arc of that radius, within 10 %. A sharper crease becomes only as round as a change within the
-/// distance `radius` of the curve allows. Nothing changes farther than `radius` from the curve, so
-/// solids that are near but do not intersect stay apart.
+/// to 0 at `radius`. Unlike the plain flow of the sources, this flow moves only points with |κ|
+/// above 1/radius, so it converges to a fillet. A right-angled crease becomes a circular arc of
+/// that radius, within 10 %. A sharper crease becomes only as round as a change within the distance
+/// `radius` of the curve allows. Nothing changes farther than `radius` from the curve, so solids
+/// that are near but do not intersect stay apart.
 ///
 /// BlendMethod::Fillet rolls a ball of that radius along the seam, in contact with both surfaces.
 /// Between planes at an angle θ (of the space between them) the result is an arc of that radius.

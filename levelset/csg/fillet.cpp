@@ -67,7 +67,7 @@ struct FilletSize {
     return std::min(radius, reach * sine / (1 - sine));
   }
   /// Returns the largest distance from the seam at which the surface changes: r / tan(θ/2), at the
-  /// angle θ where `reach` starts to limit the radius r.
+  /// angle θ where `reach` starts to limit the radius r, but at most `bound`.
   [[nodiscard]] double extent() const {
     const double sine = radius / (reach + radius);
     return std::min(bound, radius * std::sqrt(1 - sine * sine) / sine);

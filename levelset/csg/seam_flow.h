@@ -41,8 +41,8 @@ struct SeamFlow {
 };
 
 /// Integrates φ_t = D (κ − clamp(κ, ±1/radius)) |∇φ| over one step, with the weight D, κ = k1 + k2
-/// and φ in voxels. Only points with a curvature above 1/radius move, so the flow stops when there
-/// are none. Uses a first-order Runge-Kutta-Legendre scheme [Meyer14] with as many stages as `dt`
+/// and φ in voxels. Only points with |κ| above 1/radius move, so the flow stops when there are
+/// none. Uses a first-order Runge-Kutta-Legendre scheme [Meyer14] with as many stages as `dt`
 /// requires for stability.
 /// @return largest change of a value within one voxel of the zero set, voxels
 double seamStep(openvdb::FloatTree& field, SeamWeights& weights, const SeamFlow& flow, double dt);

@@ -224,8 +224,8 @@ class CurvatureFlow {
         wanted_ = dt;
         continue;
       }
-      // If the band has shortened dt, dt * factor is no limit of the next step, so keep the former
-      // wanted_.
+      // If the band has shortened dt, dt * factor does not limit the next step, so a longer wanted
+      // step is kept.
       wanted_ = std::max({flow::kExplicitStep, dt * factor, factor > 1 ? wanted_ : 0.0});
       if (span < time_) error_ *= std::exp(-dt / span);
       error_ += error;

@@ -72,8 +72,9 @@ struct CurvatureFlowOperator {
     double time = 0;  ///< duration of the flow, world units²
     bool preservesVolume = false;
     FlowScheme scheme = FlowScheme::Auto;
-    std::optional<double> tolerance;  ///< CurvatureFlowOptions::tolerance, world units
-    std::optional<double> step;       ///< longest step, world units²
+    std::optional<double>
+        tolerance;  ///< largest error of the time steps, world units; empty: 0.02 voxels
+    std::optional<double> step;  ///< longest step, world units²; empty: no limit
     std::optional<Mask> mask;
 
     template <class Visitor>

@@ -47,7 +47,8 @@ NarrowBand CurvatureFlowOperator::run(std::vector<NarrowBand> operands, const Op
   return std::move(result.band);
 }
 
-/// Assumes stabilized steps, whose number of stages grows with the square root of the time.
+/// The estimate assumes FlowScheme::Stabilized, whose number of stages grows with the square root
+/// of the time.
 std::optional<Cost> CurvatureFlowOperator::cost(const Options& options,
                                                 const OperatorPlans& plans) {
   const ValuePlan& solid = plans.operands[0];

@@ -74,7 +74,7 @@ Derivatives combine(const Derivatives& one, const Derivatives& two) {
 }
 
 /// Returns κ|∇φ| where the gradient has no direction: the sum of the eigenvalues of the Hessian
-/// without the one of largest magnitude, which stands for the normal.
+/// without the one of largest magnitude, whose eigenvector stands for the normal.
 float rateWithoutNormal(const Derivatives& d, int lane) {
   Eigen::Matrix3f h;
   h << d.xx[lane], d.xy[lane], d.xz[lane], d.xy[lane], d.yy[lane], d.yz[lane], d.xz[lane],

@@ -15,9 +15,9 @@ using openvdb::Vec3d;
 using LeafNode = openvdb::FloatTree::LeafNodeType;
 
 constexpr float kNear = 1;  // voxels: measureNearSurface() counts grid points with |φ| below this
-// A leader is the closest point of a grid point on |φ| = kFlowLeader. The trilinear weights of
-// those corners of its grid cell that lie in the core have at least this sum. With a smaller sum
-// the grid point follows no leader.
+// A grid point follows a leader, its closest point on |φ| = kFlowLeader, only if enough corners of
+// the leader's cell lie in the core. The trilinear weights of these corners must have at least this
+// sum.
 constexpr float kLeastSum = 0.1f;
 
 // Bound of the magnitude of principal curvatures, voxels⁻¹. Close to a focus or a crease, level

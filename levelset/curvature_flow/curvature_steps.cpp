@@ -166,7 +166,7 @@ double CurvatureSteps::implicitStep(double dt) {
   work_ += kIterationCost * solver_->solve(dt / 2, stageRate_, stageRate_, pulse_);
   state_.blocks().forEach<NoScratch>([&](std::size_t i, NoScratch&) {
     for (std::size_t n = 0; n < 512; ++n) {
-      older_[i][n] += stageRate_[i][n];  // change by the two half steps
+      older_[i][n] += stageRate_[i][n];  // change of φ by the two half steps
       last_[i][n] = older_[i][n] - last_[i][n];
       state_.value[i][n] = before_[i][n] + older_[i][n] + last_[i][n];
     }

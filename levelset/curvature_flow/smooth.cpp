@@ -28,7 +28,7 @@ constexpr double kGaussianReach = 4;
 // values, voxels.
 constexpr double kStencil = 3;
 // Half width that the filter needs, in σ. Values farther from the surface change the result little,
-// since the changes on the two sides of the surface cancel.
+// since their contributions from the two sides of the surface cancel.
 constexpr double kKnownReach = 3;
 // A band is widened when the filter needs more than this multiple of its half width.
 constexpr double kWideEnough = 1.0001;
