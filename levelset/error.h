@@ -14,7 +14,7 @@ enum class ExitCode : int {
   Input = 3,     ///< unusable data: a truncated file, an open mesh with `--sign closed`
   Resource = 4,  ///< memory, index range or image size exceeds its limit
   Numeric = 5,   ///< a numeric check failed
-  File = 6,      ///< missing, unreadable, not writable, disk full
+  File = 6,      ///< file missing, unreadable or not writable, or disk full
   Interrupted = 130
 };
 

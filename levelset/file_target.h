@@ -51,12 +51,13 @@ class FileTarget {
 /// one of these.
 [[nodiscard]] bool isStandardOutput(const std::filesystem::path& target);
 
-/// Canonical path of a file that need not exist, with all links and folders resolved. Empty for "-"
-/// and for devices, which several writers may share.
+/// Canonical path of a file that need not exist, with all links and folders resolved. Empty for
+/// "-", and for folders and devices. Several writers may share a device.
 [[nodiscard]] std::filesystem::path canonicalFile(const std::filesystem::path& file);
 
-/// Returns true when both names lead to the same file. The files need not exist. Always false for
-/// devices, which several writers may share.
+/// Returns true when both names lead to the same file. The files need not exist. If one name is
+/// "-", returns true when both stand for standard output. Otherwise returns false for devices,
+/// which several writers may share.
 [[nodiscard]] bool isSameFile(const std::filesystem::path& a, const std::filesystem::path& b);
 
 /// Removes all temporary files of this process. A thread that handles a signal may call it while

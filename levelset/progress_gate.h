@@ -10,7 +10,7 @@ namespace levelset {
 
 /// Lets parallel tasks report progress to one callback. Only one thread at a time calls it, with a
 /// fraction that never decreases. A task skips its report while another one reports, so no task
-/// waits. Internal.
+/// waits. For code of this library only.
 class ProgressGate {
  public:
   ProgressGate(const Progress& progress, std::size_t total)

@@ -193,8 +193,8 @@ void RegionMap::joinLeaves(const FloatGrid& grid, Linker& linker) const {
   }
 }
 
-/// Joins each tile with neighbouring tiles of equal or larger size and of the same sign. Its
-/// smaller neighbours are joined in their own iteration, leaves by joinLeaves().
+/// Joins each tile with neighbouring tiles of equal or larger size and of the same sign. Smaller
+/// neighbour tiles are joined when the loop reaches them, and neighbouring leaves by joinLeaves().
 void RegionMap::joinTiles(const FloatGrid& grid, Linker& linker) const {
   openvdb::tree::ValueAccessor<const FloatTree> values(grid.tree());
   openvdb::tree::ValueAccessor<const Int32Tree> labels(labels_);
@@ -216,7 +216,7 @@ void RegionMap::joinTiles(const FloatGrid& grid, Linker& linker) const {
 
 /// Joins two outside grid points on the diagonal of a cell face whose other two corners are inside.
 void RegionMap::joinDiagonals(const CellSurface& surface, Linker& linker) const {
-  constexpr int kAxes[3] = {4, 2, 1};  // corner bits
+  constexpr int kAxes[3] = {4, 2, 1};  // bit of a corner number along x, y and z
   openvdb::tree::ValueAccessor<const Int32Tree> labels(labels_);
   for (const SurfaceBlock& block : surface.blocks()) {
     surface.forEachCell(block, [&](int x, int y, int z, unsigned pattern) {

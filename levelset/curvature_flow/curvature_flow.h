@@ -72,8 +72,8 @@ struct CurvatureFlowOperator {
     double time = 0;  ///< duration of the flow, world units²
     bool preservesVolume = false;
     FlowScheme scheme = FlowScheme::Auto;
-    std::optional<double>
-        tolerance;  ///< largest error of the time steps, world units; empty: 0.02 voxels
+    /// Largest error of the time steps, rms over the surface, world units. Empty: 0.02 voxels.
+    std::optional<double> tolerance;
     std::optional<double> step;  ///< longest step, world units²; empty: no limit
     std::optional<Mask> mask;
 

@@ -41,8 +41,8 @@ inline constexpr double kReadBySurface = 6;
 /// it equals the computed distance within the error of tricubic interpolation: 1e-3 voxel at a
 /// radius of curvature of 8 voxels, less on flatter parts. So a distance field keeps its bits where
 /// radii of curvature exceed 10 voxels.
-/// @param field  correct sign everywhere, Lipschitz continuous, any slope; only values beside the
-///               zero set are read
+/// @param field  correct sign everywhere, Lipschitz continuous, any slope; values away from the
+///               zero set are only compared with the computed distances
 /// @return band of the requested half width; with `region`, distances only on the smallest box of
 ///         grid points that contains the region, and signs everywhere
 /// @throws InvalidInput if the field has no zero crossing

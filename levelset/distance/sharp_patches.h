@@ -12,8 +12,8 @@ namespace levelset::eikonal {
 
 /// Zero set near the edges and corners of a solid, as triangles in index space. Tricubic
 /// interpolation rounds edges by up to 0.75 voxel; the intersection of planes fitted to both faces
-/// does not [Ju02]. Smooth surfaces get no patches, whatever their curvature: the less the
-/// surface turns at an edge, the flatter the faces beside it must be.
+/// does not [Ju02]. Smooth surfaces get no patches, whatever their curvature: the less the surface
+/// turns at an edge, the flatter the faces beside it must be to count as an edge.
 class SharpPatches {
  public:
   /// Builds an empty set.

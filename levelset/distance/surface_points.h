@@ -13,14 +13,14 @@
 namespace levelset::eikonal {
 
 /// Closest points of the zero set, one for each grid point with a neighbour of the opposite sign.
-/// They are sorted by leaf block in tree order, then by grid point. Points on edges and corners
-/// follow.
+/// They are sorted by leaf block in tree order, then by grid point. The points on sharp edges and
+/// corners of the solid follow.
 struct SurfacePoints {
   std::vector<openvdb::Vec3d> positions;  ///< index space
   /// Grid point of each closest point. Shorter than `positions`: points on edges and corners have
   /// none.
   std::vector<openvdb::Coord> gridPoints;
-  /// Derivatives of the interpolant at each point; zero on sharp patches.
+  /// Derivatives of the interpolant at each point; zero on sharp patches (triangles near edges).
   std::vector<CompactJet> jets;
   /// Nonzero: the point lies on the sharp patches, not on the interpolant.
   std::vector<char> sharp;
