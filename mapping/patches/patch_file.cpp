@@ -76,8 +76,8 @@ Json toJson(const Patch& patch) {
   return json;
 }
 
-/// Reads the values of a document. Messages name the part of the document, such as "patch 0, layer
-/// 1".
+/// Reads the values of a JSON document. Messages name the part of the document, such as "patch 0,
+/// layer 1".
 class Reader {
  public:
   explicit Reader(std::string file) : file_(std::move(file)) {}

@@ -53,8 +53,8 @@ void addCells(const SheetIndex& sheet, bool isUp, TriMesh& mesh) {
     }
 }
 
-/// Adds a wall between two borders, possibly with different counts. Each triangle advances on the
-/// border that is behind.
+/// Adds the triangles between one side of a layer and that side of the next layer, possibly with
+/// different counts. Each triangle advances on the side of which the smaller share is done.
 void addWall(const std::vector<VertexIndex>& low, const std::vector<VertexIndex>& high,
              TriMesh& mesh) {
   std::size_t i = 0, j = 0;
@@ -78,7 +78,7 @@ TriMesh patchMesh(const Patch& patch, PatchMeshKind kind) {
   if (kind == PatchMeshKind::Sheets) {
     for (const ParticleLayer& layer : patch.layers) addCells(addSheet(layer, mesh), true, mesh);
   } else {
-    // Inner layers need only their borders: a vertex inside would have no triangle.
+    // Inner layers need only the vertices on their borders: other vertices would have no triangle.
     std::vector<std::array<std::vector<VertexIndex>, 4>> borders;
     for (const ParticleLayer& layer : patch.layers) {
       const bool isEnd = &layer == &patch.layers.front() || &layer == &patch.layers.back();

@@ -17,13 +17,15 @@ namespace {
 using Imath::V3d;
 using levelset::NarrowBand;
 
-// Voxels of distances beyond the highest layer, which the interpolation stencils read.
+// Number of voxels by which distances extend beyond the highest layer; interpolation stencils read
+// them.
 constexpr double kMarginVoxels = 6;
-// Least number of coarse voxels in the height of a patch; fewer make the layers inexact.
+// Least number of voxels of the coarser grid in the height of a patch; fewer make the layers
+// inexact.
 constexpr double kCoarseVoxels = 20;
-// Largest coarse voxel size, as a multiple of the base's voxel size.
+// Largest voxel size of the coarser grid, as a multiple of the base's voxel size.
 constexpr double kCoarsest = 4;
-// Least number of coarse voxels across the shortest side of the base's bounding box.
+// Least number of voxels of the coarser grid across the shortest side of the base's bounding box.
 constexpr double kThinnest = 12;
 // Largest |φ| of the coarse grid at the border of the patch, coarse voxels.
 constexpr double kFaithful = 0.25;
@@ -35,7 +37,8 @@ bool isFaithful(const NarrowBand& coarse, std::span<const V3d> border) {
   });
 }
 
-/// Factor by which the voxels may be larger than the base's, for layers up to a height.
+/// Factor by which the voxels may be larger than the base's, for layers up to a height in world
+/// units; 1: no coarser grid.
 double coarsestFactor(const NarrowBand& base, double height) {
   if (height < 2 * kCoarseVoxels * base.voxelSize()) return 1;
   const V3d extent = base.zeroSetBounds().size();
@@ -44,7 +47,8 @@ double coarsestFactor(const NarrowBand& base, double height) {
                                             thickness / kThinnest})));
 }
 
-/// Resamples the base to a coarser grid; empty if no point of the coarser grid lies inside.
+/// Resamples the base to a coarser grid; empty if no point of the coarser grid lies inside the
+/// base.
 std::optional<NarrowBand> coarsened(const NarrowBand& base, double factor,
                                     const PatchSpaceOptions& options) {
   try {
@@ -117,9 +121,9 @@ std::optional<NarrowBand> sweepSharedSpace(const NarrowBand& base, const PatchCr
   if (base.isEmpty() || base.isOpenSurface() || reaches(base, crowd.highest)) return {};
   const double factor = coarsestFactor(base, crowd.lowest);
   // One region around the entire base and one box per patch both extend equally far from the
-  // surface, so their costs are compared by surface area. In a box a grid point costs at least
-  // three times as much, because of the search along the box faces. With a coarser grid, one region
-  // is always chosen, because each box would resample the entire base.
+  // surface, so their costs are compared by surface area. In a box around one patch, a grid point
+  // costs at least three times as much, because of the search along the box faces. With a coarser
+  // grid, one region is always chosen, because each box would resample the entire base.
   constexpr double kBoxCost = 3;
   const double around = 2 * (crowd.highest + kMarginVoxels * base.voxelSize());
   const double boxes =

@@ -19,8 +19,9 @@ struct Entry {
   bool operator<(const Entry& other) const { return cell < other.cell; }
 };
 
-/// Share of a step after which the centres of two particles are `diameter` apart; 1 if they stay
-/// further apart.
+/// Share of a step after which the centres of two particles have come as close as `diameter`; 1 if
+/// they stay further apart or do not approach. `apart` is their offset, `relative` its change over
+/// the step.
 double contact(const V3d& apart, const V3d& relative, double diameter) {
   const double approach = apart.dot(relative);
   if (approach >= 0) return 1;
@@ -70,7 +71,7 @@ void forEachNear(std::span<const V3d> positions, std::span<const V3d> moves, dou
   }
 }
 
-/// Replaces the moves of each set by their mean.
+/// Replaces the moves of the particles of each set by their mean.
 void moveTogether(levelset::DisjointSets& sets, std::span<V3d> moves) {
   struct Sum {
     V3d moves = V3d(0);
@@ -91,9 +92,9 @@ void moveTogether(levelset::DisjointSets& sets, std::span<V3d> moves) {
 void TravelGuard::limit(std::span<const V3d> positions, std::span<V3d> moves) {
   if (!(diameter_ > 0)) return;
   // After contact two particles move side by side: the approaching component is removed from both,
-  // averaged over all contacts of a particle. This may push them into others, so it is repeated for
-  // kRounds rounds. Particles that still touch are joined into sets that move as one body. Each
-  // further round joins at least two sets, so the loop ends.
+  // averaged over all contacts of a particle. This may push them into other particles, so it is
+  // repeated for kRounds rounds. Particles that still touch are joined into sets that move as one
+  // body. Each further round joins at least two sets, so the loop ends.
   constexpr int kRounds = 12;
   std::vector<V3d> corrections(positions.size());
   std::vector<double> contacts(positions.size());

@@ -92,8 +92,8 @@ double chooseVoxelSize(const NarrowBand& base, const NarrowBand& texture, double
   return resultVoxelSize(base.voxelSize(), texture.voxelSize(), minStretch);
 }
 
-/// Index-to-world transform of the result: that of the base if the voxel sizes agree, so that
-/// merging needs no resampling.
+/// Index-to-world transform of the result: that of the base if the voxel sizes agree and the base
+/// is merged, so that merging needs no resampling. Otherwise a scaling by the voxel size.
 Imath::M44d chooseGrid(const NarrowBand& base, double voxelSize, TextureMerge merge) {
   const bool agrees = std::abs(voxelSize - base.voxelSize()) <= 1e-9 * voxelSize;
   if (agrees && merge != TextureMerge::Alone) return base.indexToWorld();
@@ -102,8 +102,9 @@ Imath::M44d chooseGrid(const NarrowBand& base, double voxelSize, TextureMerge me
   return result;
 }
 
-/// Adapts a texture to the voxels of the result. Resamples the texture if they are much coarser.
-/// Widens its band so that after warping it still covers kTextureBandNeeded voxels of the result.
+/// Adapts a texture to the voxels of the result. Resamples the texture if the result's voxels are
+/// much coarser. Widens the texture's band so that after warping it still covers kTextureBandNeeded
+/// voxels of the result.
 /// @param least, most  smallest and largest stretch of the map from the texture to the patches
 NarrowBand fitTexture(const NarrowBand& texture, double voxelSize, double least, double most,
                       const TextureOptions& options) {
@@ -125,10 +126,10 @@ NarrowBand fitTexture(const NarrowBand& texture, double voxelSize, double least,
 }
 
 /// Parts of the texture that are mapped onto each patch. A prism map ends a little outside the unit
-/// cube. So a texture that extends beyond the given box is clipped at the box, not at the end of
-/// the map. At sides that two patches share it is clipped two voxels further out, so that
-/// neighbouring tiles overlap. If they met face to face, the grid would show a gap. A texture that
-/// only touches the box is not clipped.
+/// cube. So for a prism map, a texture that extends beyond the texture box is clipped at the box,
+/// not at the end of the map. At sides that two patches share it is clipped two result voxels
+/// further out, so that neighbouring tiles overlap. If they met face to face, the grid would show a
+/// gap. A texture that only touches the box is not clipped.
 class TextureParts {
  public:
   template <typename Fit>
@@ -183,9 +184,11 @@ void requireResult(const NarrowBand& texture, const TextureReport& report,
     // The entire band of the texture is warped, even if it is wider than the result's band.
     warped = std::max(warped, static_cast<double>(texture.activeVoxelCount()) * std::pow(finer, 3));
   }
-  // Bytes of an active voxel in three fields, with its share of the inactive values of the block.
+  // Bytes of an active voxel in three fields (the warped texture, its redistanced copy, the
+  // result), with its share of the inactive values of the block.
   constexpr double kBytesPerVoxel = 40;
-  // Bytes of a warped value, with its share of the inactive values of the block.
+  // Bytes of an active voxel of the warped texture, with its share of the inactive values of the
+  // block.
   constexpr double kBytesWarped = 8;
   const double bytes = voxels * kBytesPerVoxel + warped * kBytesWarped;
   const Distortion& worst = report.distortion;
@@ -205,8 +208,9 @@ void requireResult(const NarrowBand& texture, const TextureReport& report,
 /// band are chosen.
 struct StretchRange {
   double least = HUGE_VAL, most = 0;
-  /// Least stretch for which the texture's band is widened. Regions that are compressed more are
-  /// thinner than a voxel of the result, unless the voxel size is chosen for them.
+  /// Least stretch for which the texture's band is widened. Regions of the texture that the map
+  /// compresses more are thinner than a voxel of the result, unless the voxel size is chosen for
+  /// them.
   double ofBand = HUGE_VAL;
 };
 
@@ -222,7 +226,8 @@ StretchRange stretchRange(std::span<const ChosenMap> maps, TextureMerge merge) {
   return range;
 }
 
-/// Warps the texture into the patches, one after the other, and sums their figures.
+/// Warps the texture into the patches, one after the other, and sums the counts of all warps for
+/// the report.
 class TextureWarper {
  public:
   /// Keeps references to the arguments.
@@ -257,7 +262,8 @@ class TextureWarper {
     });
   }
 
-  /// Adds the figures of all patches, and notes about omitted grid points, to the report.
+  /// Adds the operations per point over all patches, and notes about omitted grid points, to the
+  /// report.
   void finish() {
     report_.operationsPerPoint =
         static_cast<double>(operations_) / (512 * static_cast<double>(report_.blocksEvaluated));
@@ -303,7 +309,7 @@ class TextureWarper {
   std::size_t operations_ = 0, ghosts_ = 0, crumbs_ = 0;
 };
 
-/// Unites the mapped pieces of all patches.
+/// Unites the textures mapped onto all patches.
 NarrowBand join(std::vector<NarrowBand> pieces, const TextureOptions& options) {
   if (pieces.size() == 1) return std::move(pieces.front());
   return levelset::combine(levelset::CsgOperation::Union, pieces, {.maxMemory = options.maxMemory})

@@ -32,7 +32,7 @@ std::size_t countLost(const std::vector<V3d>& normals) {
   return static_cast<std::size_t>(std::count(normals.begin(), normals.end(), V3d(0)));
 }
 
-/// Moves the vertices, and with kNormals also the normals.
+/// Moves the vertices of `texture` onto the patch, and with kNormals also the normals.
 template <bool kNormals>
 void moveVertices(const levelset::TriMesh& texture, const Patch& patch,
                   const TexturePlacement& placement, const levelset::Progress& progress,
@@ -67,7 +67,7 @@ void noteLostNormals(MeshTextureResult& result) {
       result.lostNormals, result.mesh.attributes.normals.size()));
 }
 
-/// Maps the mesh without the note about lost normals.
+/// Maps the mesh onto one patch. Adds no note about normals of length zero.
 MeshTextureResult mapOnto(const levelset::TriMesh& texture, const Patch& patch,
                           const MeshTextureOptions& options) {
   if (!std::isfinite(options.embedDepth)) {

@@ -19,8 +19,8 @@ using Imath::V3d;
 using levelset::InvalidInput;
 using levelset::NarrowBand;
 
-// Share of the map's tolerance that the solver may use, and the smallest solver tolerance in u, v
-// and w.
+// Share of TextureOptions::mapTolerance that the solver of an RBF map may use, and the smallest
+// solver tolerance in u, v and w.
 constexpr double kSolveShare = 0.1, kFinestSolve = 1e-10;
 
 /// Solver tolerance in u, v and w for a map tolerance in texture voxels.
@@ -33,14 +33,15 @@ std::unique_ptr<PrismMap> buildPrismMap(const NarrowBand& base, const Patch& pat
                                         double embedDepth, const TextureOptions& options) {
   levelset::requireMemory(PrismMap::estimateBytes(patch), options.maxMemory);
   levelset::report(options.progress, 0);
-  // Margin for the texture's band, which extends beyond the texture.
+  // Margin around the lattice, world units, for the texture's band, which extends beyond the
+  // texture.
   const double rim =
       (kTextureBandNeeded + 1) * std::max(base.voxelSize(), options.voxelSize.value_or(0));
   return std::make_unique<PrismMap>(patch, LatticeBorder{.embedDepth = embedDepth, .rim = rim});
 }
 
 /// Builds and certifies the map of one patch.
-/// @param embedDepth  as a share of the patch's height
+/// @param embedDepth  depth of the texture below the surface, as a share of the patch's height
 ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double embedDepth,
                   const V3d& textureSize, double tolerance, const TextureOptions& options,
                   TextureCost& cost) {
@@ -73,8 +74,8 @@ ChosenMap makeMap(const NarrowBand& base, const Patch& patch, double embedDepth,
   return result;
 }
 
-/// Adds one solver report to the report of all maps: the worst figures, the sums of merged
-/// particles, and each note once.
+/// Adds one solver report to the report of all maps. Keeps the worst values and each note once, and
+/// sums the merged particles.
 void addSolve(const RbfSolveReport& one, TextureReport& report) {
   RbfSolveReport& all = report.solve;
   all.merged += one.merged;
@@ -101,7 +102,7 @@ std::string overlapMessage(const ChosenMap& map) {
       map.overlaps, map.distortion.samples, p.x, p.y, p.z, uvw.x, uvw.y, uvw.z);
 }
 
-/// Figures of the maps built so far, which become the figures of the report.
+/// Measurements of the maps built so far, from which the report is computed.
 struct MapFigures {
   std::vector<Distortion> distortions;
   std::vector<FoldCertificate> certificates;
@@ -121,7 +122,7 @@ bool isLeftOut(const ChosenMap& chosen, const TextureOptions& options, TextureRe
   return options.skipFolds && (folds || chosen.overlaps > 0);
 }
 
-/// Adds the figures of one map. Moves its certificate out.
+/// Adds the measurements of one map to `figures` and the report. Moves its certificate out.
 /// @throws InvalidInput for folds that are not allowed
 void addMap(ChosenMap& chosen, const V3d& textureSize, const TextureOptions& options,
             MapFigures& figures, TextureReport& report) {
@@ -136,7 +137,7 @@ void addMap(ChosenMap& chosen, const V3d& textureSize, const TextureOptions& opt
   figures.certificates.push_back(std::move(chosen.certificate));
 }
 
-/// Adds the figures of all maps to the report.
+/// Adds the measurements of all maps to the report.
 /// @throws InvalidInput if all patches were left out
 void reportMaps(const MapFigures& figures, std::size_t patches, TextureReport& report) {
   report.patches = figures.distortions.size();

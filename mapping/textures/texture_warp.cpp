@@ -33,7 +33,7 @@ constexpr int kRootEdge = 64;  // grid points along a block at the top of the hi
 constexpr double kLeafBytes = sizeof(LeafNode) + LeafNode::SIZE * sizeof(float);
 
 /// Summed-area table of the leaf nodes of a texture's grid: counts the leaves in a box in constant
-/// time.
+/// time. A cell of the table has 2^shift_ voxels along each axis.
 class Occupancy {
  public:
   explicit Occupancy(const openvdb::FloatGrid& grid) : grid_(grid) {
@@ -98,8 +98,8 @@ class Occupancy {
   const openvdb::FloatGrid& grid_;
   int shift_ = 3;
   Coord origin_, size_;
-  // Number of leaves in all cells with smaller indices along every axis; one entry more than cells
-  // along each axis.
+  // Number of leaves in all cells of the table with smaller indices along every axis; one entry
+  // more than cells along each axis.
   std::vector<std::uint32_t> sums_;
 };
 
@@ -194,9 +194,10 @@ class TextureWarp {
     return warp;
   }
 
-  /// Removes isolated inside grid points. Where a face coincides with a plane of the grid, the last
-  /// digits of the map decide the sign of its points. Each of them could become a separate solid.
-  /// If the texture has no other inside points, they are kept.
+  /// Removes isolated inside grid points. Where a face of the texture coincides with a plane of the
+  /// grid, rounding errors of the map decide the sign of the points on it. Each of them could
+  /// become a separate solid. If the warped texture has no other inside points, the isolated ones
+  /// are kept.
   /// @return number of removed points
   static std::size_t dropCrumbs(openvdb::FloatGrid& grid) {
     constexpr double kDepth = 0.1;  // voxels; deeper points are not due to rounding
@@ -229,8 +230,9 @@ class TextureWarp {
     return levelset::toImath(transform_->indexToWorld(index));
   }
 
-  /// Aligned blocks over the image of the texture's band under the layer map. The margin allows for
-  /// the difference between the layer map and the map that is evaluated.
+  /// Blocks of kRootEdge³ grid points, aligned to multiples of kRootEdge, that cover the image of
+  /// the texture's band under the layer map (see layerPosition). The margin allows for the
+  /// difference between the layer map and the map that is evaluated.
   std::vector<Block> rootBlocks() const {
     const openvdb::FloatGrid& grid = levelset::vdb(texture_);
     const CoordBBox active = grid.evalActiveVoxelBoundingBox();
@@ -271,7 +273,7 @@ class TextureWarp {
     return blocks;
   }
 
-  /// Samplers for one thread.
+  /// Samplers of the texture for one thread.
   struct Samplers {
     explicit Samplers(const levelset::NarrowBand& texture)
         : linear(texture), cubic(texture, levelset::Interpolation::Tricubic) {}
@@ -326,7 +328,8 @@ class TextureWarp {
   }
 
   void requireLeaves(std::size_t count) const {
-    // The field, its copy while distances are restored, and the result.
+    // Up to three fields have these leaves: the warped field, its copy while distances are
+    // restored, and the result.
     levelset::requireMemory(static_cast<double>(count) * 3 * kLeafBytes, options_.maxMemory);
   }
 
@@ -373,12 +376,12 @@ class TextureWarp {
     }
   }
 
-  /// Evaluates the map directly at one point of some leaves, chosen by a hash of their coordinates.
-  /// So the choice does not depend on the threads. The cost is about a twentieth of the other
-  /// evaluations.
+  /// Evaluates the map directly, without the block's expansion, at one point of some leaves, chosen
+  /// by a hash of their coordinates. So the choice does not depend on the threads. The cost is
+  /// about a twentieth of that of the fast evaluations.
   void checkAgainstDirect(const LeafNode& leaf, const std::array<V3d, LeafNode::SIZE>& uvw,
                           Piece& piece) const {
-    if (map_.isLocal()) return;  // a local map has no other evaluation
+    if (map_.isLocal()) return;  // a prism map has no approximate evaluation
     constexpr std::uint64_t kParticlesOfLeaf = 250;
     const std::uint64_t hash = hashOf(leaf.origin());
     const std::uint64_t every = 1 + patch_.particleCount() / kParticlesOfLeaf;
