@@ -19,8 +19,8 @@ std::vector<double> evenly(std::size_t count) {
   return result;
 }
 
-/// Mean distance of the outermost particles to their inner neighbours, along rows and along
-/// columns.
+/// Mean distance of the outermost particles of a layer to their inner neighbours, along rows and
+/// along columns; world units.
 std::array<double, 2> endSpacings(const ParticleLayer& layer) {
   std::array<double, 2> sum{};
   for (std::size_t j = 0; j < layer.rows; ++j)
@@ -75,7 +75,7 @@ class LatticeBuilder {
   }
 
   /// Sets the coordinates along w: those of the layers, and those of the outer nodes below and
-  /// above them.
+  /// above the layers.
   void setCoordinatesAcrossLayers() {
     std::vector<double>& w = nodes_.coordinates[2];
     const double rim = border_.rim / patch_.height, lift = std::max(0.0, -border_.embedDepth),
@@ -100,10 +100,11 @@ class LatticeBuilder {
     if (around_) addRim(layer, k);
   }
 
-  /// Adds the outer nodes along the sides and at the corners of a layer.
+  /// Adds the outer nodes of the lattice along the sides and at the corners of layer k.
   void addRim(const ParticleLayer& layer, int k) {
     const std::array<int, 3>& cells = nodes_.cells;
-    // The rim particles, if there are any, give the direction.
+    // The rim particles of the layer, if there are any, give the direction. Otherwise the last two
+    // particles do.
     const auto end = [&](const Node& to, const Node& near, const Node& far, double share) {
       if (!layer.hasRim()) return extrapolate(to, near, far, share);
       const V3d p = nodes_.position(near);

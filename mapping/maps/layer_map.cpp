@@ -35,8 +35,8 @@ LayerCell cellOf(const ParticleLayer& layer, double u, double v) {
   return {locate(u, layer.columns), locate(v, layer.rows)};
 }
 
-/// Cell of the upper layer at (u, v). Most layers have equal counts, so that one search serves both
-/// layers.
+/// Cell of the layer `high` at (u, v); `cell` is that of the layer `low`. Most layers have equal
+/// counts, so that one search serves both layers.
 LayerCell cellAbove(const ParticleLayer& low, const LayerCell& cell, const ParticleLayer& high,
                     double u, double v) {
   return low.columns == high.columns && low.rows == high.rows ? cell : cellOf(high, u, v);
@@ -59,8 +59,9 @@ LayerFrame frameOnLayer(const ParticleLayer& layer, const LayerCell& cell) {
            (high - low) * static_cast<double>(layer.rows - 1), V3d(0)}};
 }
 
-/// Computes slopes by central differences within one cell. They are exact up to rounding, because
-/// the map is trilinear in a cell.
+/// Samples the layer map at uvw, and the slopes of its inverse. They follow from central
+/// differences with `step` within one cell. The differences are exact up to rounding, because the
+/// map is trilinear in a cell.
 MapSample sampleAt(const Patch& patch, const V3d& uvw, const V3d& step) {
   std::array<V3d, 3> along;  // derivatives of the position along u, v and w
   for (int axis = 0; axis < 3; ++axis) {

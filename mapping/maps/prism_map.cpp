@@ -17,8 +17,8 @@ using Imath::V3d;
 using Cell = std::array<int, 3>;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-// Least barycentric coordinate that counts as inside. A point on a face may get one this far below
-// 0 from rounding.
+// Least barycentric coordinate of a point that counts as inside a tetrahedron. A point on a face
+// may get one this far below 0 from rounding.
 constexpr double kOnFace = -1e-9;
 
 bool isInside(const std::array<double, 4>& shares) {
@@ -67,7 +67,7 @@ class PrismBlock final : public BlockMap {
   }
 
   [[nodiscard]] Box3d imageBounds() const override {
-    // With more cells than this, the tetrahedra are much smaller than the block, and their boxes
+    // With more cells than this, the cells are much smaller than the block, and their texture boxes
     // bound the image tightly enough.
     constexpr std::size_t kFew = 32;
     Box3d bounds;
@@ -139,14 +139,15 @@ class PrismBlock final : public BlockMap {
     return image;
   }
 
-  /// Finds the tetrahedra of successive points by walking across faces. Searches all cells of the
-  /// block when a walk fails.
+  /// Finds the tetrahedra that contain successive grid points by walking across faces. Searches all
+  /// cells of the block when a walk fails.
   class Walk {
    public:
     explicit Walk(const PrismBlock& block)
         : map_(block.map_), lattice_(block.map_.lattice_), block_(block) {}
 
-    /// Resumes at the first point of the previous row, which is adjacent to the next point.
+    /// Resumes at the tetrahedron of the first grid point found in the previous row, which is near
+    /// the first grid point of the next row.
     void returnToRow() {
       current_ = first_;
       isAt_ = hasFirst_;

@@ -23,7 +23,8 @@ using ToNodes = NodeWeights<kNodes, kNodes>;
 
 const std::array<double, kNodes>& kChebyshev = chebyshevNodes<kNodes>();
 
-/// Weights that convert values at the nodes to coefficients of T_0 … T_5.
+/// Weights that convert values at the Chebyshev nodes to coefficients of the Chebyshev polynomials
+/// T_0 … T_5.
 ToNodes makeToCoefficients() {
   ToNodes weights;
   for (std::size_t k = 0; k < kNodes; ++k)
@@ -41,8 +42,8 @@ NodeWeights<kNodes, kLeaf> makeToGridPoints() {
 }
 const NodeWeights<kNodes, kLeaf> kToGridPoints = makeToGridPoints();
 
-/// Interpolation weights from the nodes of a block to the nodes of its lower or upper half along an
-/// axis.
+/// Interpolation weights from the Chebyshev nodes of a block to those of its lower or upper half
+/// along an axis.
 ToNodes toHalf(int edge, bool isUpper) {
   const double half = (0.5 * edge - 1) / (edge - 1), middle = isUpper ? 1 - half : half - 1;
   std::array<double, kNodes> at;
@@ -62,8 +63,8 @@ double radiusOf(const GridBlock& block) {
 constexpr double kLebesgue = 2.11;
 
 /// Error bound of the polynomial for a particle of weight 1 at distance `gap` from the block's
-/// hull. It is the smaller of a bound from the kernel's sixth derivatives, and a bound from the
-/// values of a decaying kernel.
+/// hull, whose longest edge is 2 halfEdge. It is the smaller of a bound from the kernel's sixth
+/// derivatives, and a bound from the values of a decaying kernel.
 template <typename Kernel>
 double farError(double halfEdge, double gap) {
   const double a = halfEdge / 2, squared = a * a;
@@ -139,8 +140,9 @@ std::vector<std::uint32_t> RbfBlock::split(Kernel, std::span<const std::uint32_t
   double halfEdge = 0;
   for (int i = 0; i < 3; ++i) halfEdge = std::max(halfEdge, half * block_.row(i).length());
 
-  // The far particles are those with the smallest errors, as many as the tolerance allows. A share
-  // of the tolerance is reserved for the octants. Errors are sorted only by their power of two.
+  // The far particles are those with the smallest error bounds, as many as the tolerance allows for
+  // their sum. A share of the tolerance is reserved for the octants. Error bounds are sorted only
+  // by their power of two.
   constexpr int kPowers = 128;
   std::array<double, kPowers> errors{};
   std::vector<std::int8_t> power(candidates.size());
@@ -208,7 +210,8 @@ Imath::Box3d RbfBlock::boundsFor(Kernel) const {
   }
   V3d extent = remainder;
   for (int k = 0; k < 3; ++k) {
-    // T_n| ≤ 1, so beyond the constant and linear terms the magnitudes of the coefficients add up.
+    // |T_n| ≤ 1, so the magnitudes of the coefficients bound all terms except the constant and
+    // linear ones.
     std::array<double, kCubeNodes> coefficients;
     transformCube(kToCoefficients, kToCoefficients, kToCoefficients,
                   far_[static_cast<std::size_t>(k)].data(), coefficients.data());

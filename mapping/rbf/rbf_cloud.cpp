@@ -23,7 +23,7 @@ using levelset::InvalidInput;
 // Two particles closer than this share of the cloud's size give matrix rows that are equal within
 // rounding errors.
 constexpr double kSmallestGap = 1e-9;
-// A cloud flatter than this share of its size leaves the gradient across it undetermined.
+// A cloud flatter than this share of its size leaves the map's gradient across it undetermined.
 constexpr double kFlattest = 1e-6;
 // Targets of coincident particles that differ by less than this share of the extent of all targets
 // count as equal.
@@ -70,7 +70,8 @@ std::pair<V3d, double> centreOf(std::span<const V3d> points) {
   return {mean, extent};
 }
 
-/// For each point, the index of the first coincident point, which represents the group.
+/// For each point, the index of the first point that coincides with it. The group of coincident
+/// points becomes one particle.
 std::vector<std::uint32_t> findLeaders(std::span<const V3d> points, double gap) {
   std::vector<std::uint32_t> order(points.size()), leader(points.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -100,8 +101,8 @@ std::vector<std::uint32_t> findLeaders(std::span<const V3d> points, double gap) 
   return leader;
 }
 
-/// Mean distance of a point to its nearest neighbour, and mean distance of the targets of these
-/// pairs.
+/// Mean distance of a point to its nearest neighbour, and mean distance between the targets of a
+/// point and of its nearest neighbour.
 std::pair<double, double> meanSpacings(std::span<const V3d> points, std::span<const V3d> targets) {
   const ClusterTree tree(points, kNeighbourLeaf);
   std::vector<std::uint32_t> nearest(points.size());
@@ -121,8 +122,9 @@ std::pair<double, double> meanSpacings(std::span<const V3d> points, std::span<co
 struct Merged {
   std::vector<V3d> points, targets;
   std::vector<char> near;
-  std::vector<std::uint32_t> place;   ///< merged index of each point
-  std::vector<std::uint32_t> leader;  ///< original index of one point of each merged one
+  std::vector<std::uint32_t> place;  ///< index in `points` of each original particle
+  /// For each merged particle, the index of the original particle whose position it gets.
+  std::vector<std::uint32_t> leader;
 };
 
 Merged mergeCoincident(std::span<const V3d> points, std::span<const V3d> targets,
@@ -148,13 +150,13 @@ Merged mergeCoincident(std::span<const V3d> points, std::span<const V3d> targets
   }
   for (std::size_t i = 0; i < points.size(); ++i)
     merged.targets[merged.place[i]] += targets[i] / count[merged.place[i]];
-  // Targets that need no averaging keep their bits.
+  // Targets of particles that were not merged keep their bits.
   for (std::size_t i = 0; i < points.size(); ++i)
     if (count[merged.place[i]] == 1) merged.targets[merged.place[i]] = targets[i];
   return merged;
 }
 
-/// Counts the merged particles, and rejects contradictory targets.
+/// Counts the merged particles, and rejects coincident particles whose targets differ too much.
 void checkMerged(const Merged& merged, std::span<const V3d> points, std::span<const V3d> targets,
                  double targetSpacing, RbfSolveReport& report) {
   if (merged.points.size() == points.size()) return;

@@ -27,8 +27,8 @@ constexpr int kMostRestarts = 30;
 // The iteration stagnates if a restart does not reduce the residual below this share of its
 // previous value.
 constexpr double kStill = 0.7;
-// Largest reduction of the residual that one restart aims at. The fast sum is not accurate enough
-// for more.
+// Smallest ratio of the residual after a restart to that before, at which a restart aims. The fast
+// sum is not accurate enough for a smaller ratio.
 constexpr double kLeastReduction = 1e-3;
 
 /// True if the kernel grows so fast that the fast sum is too inaccurate, because far particles
@@ -38,7 +38,8 @@ bool growsFast(RbfKernel kernel) {
          kernel == RbfKernel::Sum;
 }
 
-/// Reorders the particles by a tree, so that the particles of each tree node are contiguous.
+/// Reorders the particles by the order of a ClusterTree, so that the particles of each tree node
+/// are contiguous.
 RbfCloud inOrder(const RbfCloud& cloud, std::span<const std::uint32_t> order) {
   RbfCloud result = cloud;
   for (std::size_t n = 0; n < order.size(); ++n) {
@@ -65,8 +66,8 @@ class Hessenberg {
     right_[0] = residual;
   }
   /// Adds a column.
-  /// @param column  dot products of the new vector with the basis, then the norm of its remainder;
-  ///         steps + 2 values
+  /// @param column  dot products of the new Krylov vector with the basis, then the norm of its
+  ///         remainder; one value more than the basis has vectors
   void push(Eigen::VectorXd column) {
     plain_.topRows(column.size()).col(steps_) = column;
     for (Index i = 0; i < steps_; ++i) rotate(i, column[i], column[i + 1]);
@@ -129,7 +130,7 @@ class KrylovSolver {
         report_(report) {}
 
   /// Solves for the weights.
-  /// @param tolerance  largest accepted magnitude of the residual's entries
+  /// @param tolerance  largest accepted magnitude of the residual's entries, in u, v and w
   RbfFit solve(const RbfColumns& values, double tolerance) {
     const RbfColumns right = project(values), zero = RbfColumns::Zero(values.rows(), 3);
     RbfFit fit{zero, zero};
@@ -144,7 +145,8 @@ class KrylovSolver {
       if (worst <= tolerance) break;
       const bool isStill = !(worst < kStill * before);
       if ((isStill && isDirect_) || restart >= kMostRestarts) refuse(worst, tolerance);
-      // The residual may stagnate because of the errors of the fast sum.
+      // The residual may stagnate because of the errors of the fast sum, so matrix products then
+      // use direct sums.
       if (isStill) isDirect_ = true;
     }
     return fit;
@@ -256,7 +258,7 @@ RbfFit solveIteratively(const RbfCloud& cloud, const RbfMapOptions& options, con
                         const RbfColumns& values, RbfSolveReport& report) {
   const auto n = static_cast<double>(cloud.points.size());
   const double basis = 2.0 * kMostSteps * sizeof(double) * 3;
-  constexpr double kSumBytes = 500;  // per particle, for the nodes of the fast sum
+  constexpr double kSumBytes = 500;  // per particle, for the tree nodes of the fast sum
   levelset::requireMemory(n * (basis + kSumBytes) + RbfPreconditioner::estimateBytes(n),
                           options.maxMemory);
   const ClusterTree first(cloud.points, kSolveLeaf);

@@ -16,14 +16,15 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Imath::V3d;
 
-// Neighbouring particles that are solved together with those of a leaf.
+// Number of neighbouring particles that are solved together with those of a leaf.
 constexpr std::size_t kAround = 150;
-// Particles for each coarse one, until there are kMostCoarse coarse ones.
+// Number of particles for each particle of the coarse subset, until the subset has kMostCoarse
+// particles.
 constexpr std::size_t kCoarseShare = 40;
 constexpr std::size_t kMostCoarse = 2500;
 constexpr std::size_t kCoarseTile = 64;
-// Smallest shift of the diagonal, as a share of its mean. It keeps the matrix of close particles
-// positive definite.
+// Smallest shift of a matrix's diagonal, as a share of its mean, if the matrix is not positive
+// definite because particles are close together.
 constexpr double kRidge = 1e-12;
 
 /// Cholesky factors of a symmetric matrix. If it is not positive definite within rounding errors,
@@ -37,8 +38,8 @@ Eigen::LLT<MatrixXd> factor(MatrixXd system) {
   }
 }
 
-/// An orthonormal basis whose first columns span the polynomials at the chosen particles, and the
-/// number of these columns.
+/// An orthonormal basis whose first columns span the linear polynomials' values at the chosen
+/// particles, and the number of these columns.
 std::pair<MatrixXd, Index> basisOf(const MatrixXd& q, std::span<const std::uint32_t> chosen) {
   MatrixXd polynomial(static_cast<Index>(chosen.size()), q.cols());
   for (std::size_t i = 0; i < chosen.size(); ++i)
@@ -63,7 +64,7 @@ RbfPreconditioner::RbfPreconditioner(const RbfCloud& cloud, RbfKernel kernel,
 
 double RbfPreconditioner::estimateBytes(double particles) {
   const double coarse = std::min(particles / kCoarseShare, static_cast<double>(kMostCoarse));
-  constexpr double kMatrices = 5;  // matrices of the coarse particles during factorisation
+  constexpr double kMatrices = 5;  // matrices of the coarse subset during factorisation
   return particles * (3.0 * kAround * sizeof(float) + 100) +
          kMatrices * coarse * coarse * sizeof(double);
 }
@@ -90,8 +91,8 @@ void RbfPreconditioner::makeLeaf(const ClusterTree& tree, Leaf& leaf) const {
 void RbfPreconditioner::chooseCoarse() {
   const std::size_t n = cloud_.points.size();
   const std::size_t step = std::max(kCoarseShare, (n + kMostCoarse - 1) / kMostCoarse);
-  // Neighbours in the tree's order are neighbours in space, so every step-th particle gives an even
-  // subset.
+  // Neighbours in the tree's order are neighbours in space, so taking every step-th particle gives
+  // an even subset.
   for (std::size_t i = step / 2; i < n; i += step) coarse_.push_back(static_cast<std::uint32_t>(i));
 }
 

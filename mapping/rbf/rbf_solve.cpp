@@ -33,7 +33,7 @@ double signOf(RbfKernel kernel) {
   return withKernel(kernel, [](auto k) { return decltype(k)::kSign; });
 }
 
-/// Values at the particles of the polynomials that the particles can distinguish: 1, and the
+/// Values at the particles of the linear polynomials that the particles can distinguish: 1, and the
 /// coordinates along the axes in which the cloud has a width.
 MatrixXd polynomialOf(const RbfCloud& cloud) {
   const auto n = static_cast<Index>(cloud.points.size());
@@ -52,15 +52,15 @@ MatrixXd polynomialOf(const RbfCloud& cloud) {
 /// @pre u ⟂ a
 V3d turned(const V3d& u, const V3d& a, const V3d& b, bool isFirst) {
   const double cosine = a.dot(b);
-  // The least rotation is not unique. Takes half a turn about the first axis that is perpendicular
-  // to a.
+  // The least rotation is not unique. Takes half a turn about the first of the two axes
+  // perpendicular to a, so that axis is kept (`isFirst`) and the second one is reversed.
   if (cosine < -1 + 1e-12) return isFirst ? u : -u;
   return u - (a + b) * (u.dot(b) / (1 + cosine));
 }
 
-/// Gradient in the directions that the particles do not span. Normal to a plane, it is the normal
-/// of the plane's image times the mean scale in the plane, with the same handedness. Around a line,
-/// it continues the rotation and scale of the line.
+/// Gradient of the map in the directions that the particles do not span. Normal to a plane, it is
+/// the normal of the plane's image times the mean scale in the plane, with the same handedness.
+/// Around a line, it continues the rotation and scale of the line.
 Imath::M33d missingGradient(const RbfCloud& cloud, const MatrixXd& coefficients) {
   Imath::M33d result(0, 0, 0, 0, 0, 0, 0, 0, 0);
   const auto along = [&](int d) {
@@ -97,8 +97,9 @@ void addGradient(const RbfCloud& cloud, const Imath::M33d& gradient, double fact
             factor * gradient[k][axis] * cloud.points[static_cast<std::size_t>(i)][axis];
 }
 
-/// Solves by Cholesky factors, which overwrite the lower half of `system`; the upper half is kept.
-/// If the matrix is not positive definite within rounding errors, its diagonal is increased.
+/// Solves by Cholesky factors, which overwrite the lower triangle of `system`; the upper triangle
+/// is kept. If the matrix is not positive definite within rounding errors, its diagonal is
+/// increased.
 MatrixXd solveDefinite(Eigen::Ref<MatrixXd> system, const MatrixXd& right, RbfSolveReport& report) {
   const Eigen::VectorXd diagonal = system.diagonal();
   const double norm = system.cwiseAbs().colwise().sum().maxCoeff();
@@ -122,7 +123,7 @@ MatrixXd solveDefinite(Eigen::Ref<MatrixXd> system, const MatrixXd& right, RbfSo
   }
 }
 
-/// Computes weights orthogonal to the polynomials by Cholesky factorisation.
+/// Computes weights orthogonal to the linear polynomials by Cholesky factorisation.
 RbfColumns solveDirectly(const RbfCloud& cloud, RbfKernel kernel,
                          const Eigen::HouseholderQR<MatrixXd>& polynomial, const RbfColumns& values,
                          const levelset::Progress& progress, RbfSolveReport& report) {
@@ -215,8 +216,8 @@ RbfSolution solveRbf(const RbfCloud& cloud, const RbfMapOptions& options, RbfSol
         solveDirectly(cloud, options.kernel, polynomial, values, options.progress, report);
     fit.image = multiplyDirectly(cloud, options.kernel, fit.weights);
   }
-  // The polynomial fits the values that the kernels leave. The remainder is the error of the
-  // solution.
+  // The linear polynomial fits the texture coordinates minus the sums of the kernels. The remainder
+  // is the residual of the solution.
   RbfColumns rest = values - fit.image;
   const MatrixXd coefficients = polynomial.solve(rest);
   rest -= polynomialOf(cloud) * coefficients;

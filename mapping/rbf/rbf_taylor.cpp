@@ -46,8 +46,8 @@ std::size_t termOf(int x, int y, int z) {
 
 constexpr std::size_t kNoTerm = kTerms;
 
-/// Recurrence of a coefficient of |x|: the terms with one power less and with two powers less of x,
-/// y and z, and the factors of their sums.
+/// Recurrence of one coefficient of the Taylor expansion of |x|: indices of the terms with one
+/// power less and with two powers less of x, y and z, and the factors of their sums.
 struct TermParents {
   std::array<std::size_t, 3> one, two;
   double firstShare = 0, secondShare = 0;
@@ -72,10 +72,10 @@ std::array<TermParents, kTerms> makeParents() {
 }
 const std::array<TermParents, kTerms> kParents = makeParents();
 
-/// Bounds the remainder of the gradient of |x + s|, a series in |s| / |x|. The factor of (|s| /
-/// |x|)ⁿ is at most √((n + 1) / n). With t the cosine between x and s, this factor is P_n(t) x̂ −
-/// P_{n−1}(t) ŝ. Its square is (1 − t²) (P_n² + (1 − t²) P_n′² / n²), and P_n² + (1 − t²) P_n′² /
-/// (n (n + 1)) ≤ 1.
+/// Bounds the remainder of the gradient of |x + s| beyond kDegree, a series in `ratio` = |s| / |x|.
+/// The factor of (|s| / |x|)ⁿ is at most √((n + 1) / n). With t the cosine between x and s, this
+/// factor is P_n(t) x̂ − P_{n−1}(t) ŝ. Its square is (1 − t²) (P_n² + (1 − t²) P_n′² / n²), and
+/// P_n² + (1 − t²) P_n′² / (n (n + 1)) ≤ 1.
 double gradientRest(double ratio) {
   const double squared = ratio * ratio;
   return std::sqrt((kDegree + 1.0) / kDegree) * squared * squared * ratio / (1 - ratio);
@@ -96,8 +96,8 @@ void TaylorPolynomial::addAffine(const V3d& value, const M33d& rows) {
   }
 }
 
-// Applied to |x|, x·∇ gives |x| and r² ∇ gives x |x|. Together they give each coefficient from
-// those of one and two degrees less.
+// Applied to |x|, x·∇ gives |x| and r² ∇ gives x |x|. Together they give each Taylor coefficient
+// from those of one and two degrees less.
 void TaylorPolynomial::addDistance(const V3d& offset, const V3d& weight) {
   std::array<double, kTerms + 1> a;
   a[kNoTerm] = 0;
