@@ -56,7 +56,7 @@ Camera::Ray Camera::ray(double x, double y) const {
       axes.right * ((2 * x / width - 1) * half.x) + axes.up * ((1 - 2 * y / height) * half.y);
   const double end = farthest();
   if (orthoHeight) return {from + shift, axes.forward, near, end};
-  const V3d along = axes.forward + shift;  // its depth increases by 1
+  const V3d along = axes.forward + shift;  // its component along the view axis is 1
   return {from, along.normalized(), near * along.length(), far ? end * along.length() : end};
 }
 
@@ -154,8 +154,8 @@ V3d viewFrom(const V3d& up) {
         "camera: the vector up is zero or not finite; give for example 0,1,0");
   const V3d y = up / length;
   if (y == V3d(0, 1, 0)) return view;
-  // The front direction is z, made perpendicular to `up`. If `up` is close to z, the front is -y;
-  // close to -z, it is y.
+  // The front of the scene, which the camera sees, faces z, made perpendicular to `up`. If `up` is
+  // close to z, the front faces -y; if close to -z, y.
   const V3d front = std::abs(y.z) < 0.9 ? V3d(0, 0, 1) : V3d(0, y.z > 0 ? -1 : 1, 0);
   const V3d x = y.cross(front).normalized();
   return x * view.x + y * view.y + x.cross(y) * view.z;
@@ -180,7 +180,8 @@ Camera framingCamera(const Imath::Box3d& bounds, int width, int height, double v
 
   // Consider a camera at distance `back` from the target, shifted by s along an image axis. It sees
   // a box corner with coordinate x on that axis, `depth` behind the target, when |x - s| <= k (back
-  // + depth). This is linear in s and back, so each axis has a closed form.
+  // + depth). Here k is kMargin times the half extent of the picture at unit depth. This is linear
+  // in s and back, so each axis has a closed form.
   const CameraAxes axes = axesOf(camera);
   const double half[2] = {halfExtentOf(camera).x, halfExtentOf(camera).y};
   constexpr double kMargin = 0.94;  // share of the picture that the box fills

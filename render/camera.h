@@ -24,11 +24,12 @@ struct Camera {
   int width = 1024, height = 1024;  ///< size of the picture, pixels
 
   struct Ray {
-    Imath::V3d origin, direction;     ///< direction of unit length
-    double near = 0, far = kNoDepth;  ///< visible interval, distances along the direction
+    Imath::V3d origin, direction;  ///< direction of unit length
+    /// Visible interval: distances along the direction, world units.
+    double near = 0, far = kNoDepth;
   };
-  /// Ray through the image position (x, y) in pixels; (0, 0) is the upper left corner, +y points
-  /// down.
+  /// Ray through the image position (x, y) in pixels; (0, 0) is the upper left corner of the image,
+  /// +y points down.
   [[nodiscard]] Ray ray(double x, double y) const;
   [[nodiscard]] double farthest() const { return far.value_or(kNoDepth); }
   /// Unit view axis, towards `to`.

@@ -6,8 +6,8 @@ namespace render {
 enum class Filter {
   /// Trilinear interpolation.
   Trilinear,
-  /// Tricubic B-spline whose coefficients are the grid values. It is smooth, but differs from the
-  /// grid values by a sixth of their Laplacian.
+  /// Tricubic B-spline whose coefficients are the grid values. It is smooth, but at grid points it
+  /// differs from the values by about a sixth of their discrete Laplacian.
   BSpline,
   /// Quasi-interpolating tricubic B-spline with coefficients f − ∇²f/6: its error is of fourth
   /// order in the voxel size [Sigg05].

@@ -10,31 +10,37 @@ namespace render {
 
 /// Curvatures of a surface at a point.
 struct CurvatureSample {
-  double mean = 0, gauss = 0, k1 = 0,
-         k2 = 0;  ///< per world unit (gauss: per world unit squared); mean, k1 and k2 are positive
-                  ///< on a solid ball
+  /// Mean curvature, Gauss curvature, and principal curvatures k1 ≥ k2; per world unit (gauss: per
+  /// world unit squared). mean, k1 and k2 are positive on a solid ball.
+  double mean = 0, gauss = 0, k1 = 0, k2 = 0;
 };
 
 /// Intersection of a ray with a surface; world units.
 struct Hit {
   bool found = false;
   double distance = 0;  ///< from the ray's origin
-  Imath::V3d position,
-      normal;  ///< outward unit normal, from a tricubic B-spline or a mesh's vertex normals
-  Imath::V3d facetNormal;  ///< outward unit normal of the trilinear interpolant, or of the triangle
+  /// Position; outward unit normal, from a tricubic B-spline of φ or a mesh's vertex normals.
+  Imath::V3d position, normal;
+  /// Outward unit normal of the surface as drawn: of the trilinear interpolant (with a spline
+  /// filter, of the spline), or of the mesh triangle.
+  Imath::V3d facetNormal;
   CurvatureSample curvature;  ///< from the B-spline; 0 on meshes
   double viewCurvature = 0;   ///< normal curvature in the ray's direction, per world unit
-  double surfaceError = 0;    ///< bound on the distance of the drawn surface from a smooth one
-  Imath::C3f colour{0};       ///< surface colour, linear
-  double opacity = 1;         ///< surface opacity, (0, 1]
-  std::uint32_t id = 0;       ///< Solid::id or MeshPart::id
-  std::size_t solid = 0;      ///< index in Scene::solids, or Scene::meshes
+  /// Bound on the distance of the drawn surface from the smooth surface that the grid samples. On
+  /// meshes: bound on the rounding error of the hit.
+  double surfaceError = 0;
+  Imath::C3f colour{0};   ///< surface colour, linear
+  double opacity = 1;     ///< surface opacity, (0, 1]
+  std::uint32_t id = 0;   ///< Solid::id or MeshPart::id
+  std::size_t solid = 0;  ///< index in Scene::solids, or in Scene::meshes if isOnMesh
   bool isOnMesh = false;
-  bool isFlipped = false;     ///< the drawn shape is on the outside of the hit solid, as for a
-                              ///< subtracted solid; normals and curvatures describe the drawn shape
-  bool isBeyondBand = false;  ///< a blended field contributes to this hit, but its band does not
-                              ///< extend to this point
-  /// Distance at which the ray continues behind a mesh surface, clear of the hit's rounding error.
+  bool isFlipped = false;  ///< the drawn shape is on the outside of the hit solid, as for a
+                           ///< subtracted solid; normals and curvatures describe the drawn shape
+  /// The field of a solid contributes to this hit on a blended surface, but the solid's band does
+  /// not extend to this point.
+  bool isBeyondBand = false;
+  /// Distance along the ray, world units, at which it continues behind a mesh surface: far enough
+  /// not to hit the same triangle again.
   [[nodiscard]] double beyond() const { return distance + 2 * surfaceError; }
 };
 

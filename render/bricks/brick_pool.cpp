@@ -16,7 +16,7 @@ namespace {
 using openvdb::Coord;
 
 constexpr std::size_t kEntriesOfPage = 3 * BrickPool::kBlocksOfPage;
-constexpr int kMostEmptyPages = 1 << 10;  // largest edge of an empty cube, pages
+constexpr int kMostEmptyPages = 1 << 10;  // largest edge of a cube of empty pages, in pages
 // At this distance from the table's corner, single precision resolves positions to 5e-4 voxels.
 constexpr double kWidest = 8192;  // largest extent of a surface along an axis, voxels
 constexpr std::size_t kMostValues = std::numeric_limits<std::int32_t>::max();
@@ -68,8 +68,8 @@ void markEmpty(const std::array<int, 3>& size, int most, const IsEmpty& isEmpty,
       }
 }
 
-/// Fills the two-level table of a pool: finds the items of a block by the block's origin, and adds
-/// pages.
+/// Fills the two-level table of a pool (`page` and `entry`): finds the items of a block by the
+/// block's origin, and adds pages.
 class Table {
  public:
   explicit Table(BrickPool& pool) : pool_(pool) {
@@ -77,8 +77,8 @@ class Table {
     for (const int n : pool.pages) count *= static_cast<std::size_t>(n);
     pool.page.assign(count, -BrickPool::kPage);
   }
-  /// Position in `entry` of the block's item of list 1. Adds the lists of the page if they are
-  /// missing.
+  /// Position in `entry` of the block's item of list 1, the brick numbers. Adds the three lists of
+  /// the block's page if they are missing.
   std::size_t slotOf(const Coord& origin) {
     std::size_t page = 0, block = 0;
     for (int a = 0; a < 3; ++a) {
@@ -215,7 +215,7 @@ BrickPool makeBricks(const levelset::NarrowBand& band, const TableOptions& optio
   if (crossed.empty()) return pool;
   requireNarrow(crossed);
   openvdb::CoordBBox box = crossed;
-  box.expand(BrickPool::kBlock);  // so that stencils read no block outside the table
+  box.expand(BrickPool::kBlock);  // stencils of crossed cells then read no block outside the table
   for (std::size_t i = 0; i < 3; ++i) {
     const int a = static_cast<int>(i);
     pool.origin[i] = box.min()[a];

@@ -30,7 +30,8 @@ struct BrickPool {
       16;  ///< 32-bit words of a brick's mask, which has a bit for each cell
   static constexpr int kPage = 64;  ///< cells along an axis of a page, which has 8³ blocks
   static constexpr int kBlocksOfPage = 512;
-  /// Offsets in `entry` from a block's item of list 1 to its items of list 2 and of list 3.
+  /// Offsets in `entry` from a block's item of list 1 to its items of list 2 and of list 3 (see
+  /// `entry`).
   static constexpr int kFirstOfEntry = kBlocksOfPage, kStridesOfEntry = 2 * kBlocksOfPage;
   static constexpr std::size_t kCodePadding = 4;  ///< padding after the last value in `code`, bytes
   static constexpr int kStrideShift =
@@ -68,7 +69,7 @@ struct BrickPool {
   std::array<int, 3> cellsLow{}, cellsHigh{};
 
   std::size_t haloCount = 0;      ///< halo blocks with stored points
-  std::size_t blocksOmitted = 0;  ///< leaf nodes of the band of which no point is stored
+  std::size_t blocksOmitted = 0;  ///< leaf nodes of the band of which the pool stores no point
   std::size_t blocksCulled = 0;   ///< blocks that the surface crosses but the picture does not need
   [[nodiscard]] std::size_t brickCount() const { return mask.size() / kMaskWords; }
   [[nodiscard]] std::size_t valueBytes() const {
@@ -80,16 +81,17 @@ struct BrickPool {
 /// Options of makeBricks().
 struct TableOptions {
   Filter filter = Filter::Trilinear;
-  ValueBits quantization = {};  ///< storage of the values; @pre all values, or coefficients of a
-                                ///< spline, are quantized values of it
+  /// Storage of the values in the pool. @pre below 32 bits, each value of the band is one of its
+  /// quantized values
+  ValueBits quantization = {};
   /// Returns false for a ball in index space that the picture does not need. Blocks in such balls
   /// are culled. Empty: no block is culled.
   std::function<bool(const Imath::V3d& centre, double radius)> keeps = {};
 };
 
 /// Builds the brick pool of a band.
-/// @throws levelset::ResourceLimit for a surface that spans more than the table can hold, or for
-/// more values than a 32-bit index can address
+/// @throws levelset::ResourceLimit for a surface that spans more than the table can hold (8192
+///         voxels), or for more values than a 32-bit index can address
 [[nodiscard]] BrickPool makeBricks(const levelset::NarrowBand& band,
                                    const TableOptions& options = {});
 

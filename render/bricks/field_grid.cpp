@@ -18,8 +18,9 @@ using Imath::M44d;
 using Imath::V3d;
 using openvdb::Coord;
 
-constexpr double kWidestField =
-    1 << 14;  // largest extent along an axis, voxels; then the table has 2^24 pages
+// Largest extent of a band along an axis, voxels. At this extent the table of blocks has 2^24
+// pages.
+constexpr double kWidestField = 1 << 14;
 constexpr int kPageCells = 64;
 
 /// Origins of the blocks with cells in which the field may vary. A cell belongs to the block of its
@@ -73,8 +74,8 @@ double applied(const double (&taps)[6], const double* to, int stride) {
 using FieldWindow = FieldGrid::FieldWindow;
 
 /// Computes the derivatives sum[p][q][r] of order p, q, r along x, y, z of the spline Σ (f − ∇²f/6)
-/// B, one axis at a time. `own` holds the spline over the axes done so far, `bent` the sum in which
-/// one of these axes uses second differences.
+/// B, one axis at a time. `own` holds the spline over the axes processed so far. `bent` holds the
+/// sum, over these axes, of the spline with second differences along one of them.
 void splineDerivatives(const FieldWindow& f, const V3d& a, double (&sum)[3][3][3]) {
   const SplineTaps tx(a.x), ty(a.y), tz(a.z);
   double own[6][6][3], bent[6][6][3];  // indexed by x, y and order along z
@@ -97,8 +98,9 @@ void splineDerivatives(const FieldWindow& f, const V3d& a, double (&sum)[3][3][3
     }
 }
 
-/// Bound on the difference between the trilinear interpolant and a smooth function in the cell,
-/// from the second differences at its corners.
+/// Bound on the difference, in the middle cell of the window, between the trilinear interpolant and
+/// a smooth function with the same grid values. It follows from the second differences at the
+/// cell's corners.
 double interpolationErrorOf(const FieldWindow& f) {
   double error = 0;
   for (int x = 2; x < 4; ++x)
@@ -112,8 +114,8 @@ double interpolationErrorOf(const FieldWindow& f) {
   return error / 8;
 }
 
-/// Value and gradient, per voxel, of the trilinear interpolant. @param a  position in the cell,
-/// each in [0, 1]
+/// Value and gradient, per voxel, of the trilinear interpolant in the middle cell of the window.
+/// @param a  position in the cell, each coordinate in [0, 1]
 double interpolate(const FieldWindow& f, const V3d& a, V3d& gradient) {
   const auto mix = [](double u, double v, double share) { return u + (v - u) * share; };
   double face[2], alongZ[2], alongY[2];

@@ -13,8 +13,8 @@
 
 namespace render {
 
-/// The complete field of a band for rays, not only its zero set. It holds the blocks of 8³ cells in
-/// which the values are not constant, and a table that finds them. Positions are in the band's
+/// The complete field φ of a band, not only its zero set, for rays. It holds the blocks of 8³ cells
+/// in which the values are not constant, and a table that finds them. Positions are in the band's
 /// index space minus a multiple of the block size, so that blocks start at 0.
 class FieldGrid {
  public:
@@ -33,14 +33,14 @@ class FieldGrid {
   /// @throws levelset::ResourceLimit for a band that spans more voxels than the table supports
   explicit FieldGrid(const levelset::NarrowBand& band);
 
-  /// Takes over the transform of the band. Returns true when it differs from the previous one.
+  /// Copies the transform of the band. Returns true when it differs from the previous transform.
   /// @pre the band has the values that this grid was built from
   bool updateTransform(const levelset::NarrowBand& band);
 
   [[nodiscard]] const Imath::M44d& indexToWorld() const { return indexToWorld_; }
   [[nodiscard]] const Imath::M44d& worldToIndex() const { return worldToIndex_; }
   /// Number of blocks of the grid along an axis. Outside these blocks the field equals the
-  /// background.
+  /// background, the value outside the band.
   [[nodiscard]] int size(int axis) const { return size_[static_cast<std::size_t>(axis)]; }
   [[nodiscard]] double background() const { return background_; }
   [[nodiscard]] std::size_t blockCount() const { return ranges_.size(); }
@@ -79,7 +79,7 @@ class FieldGrid {
   void read(const std::array<int, 3>& low, FieldWindow& window) const;
 
   double background_ = 0;  // |φ| outside the band, world units
-  Imath::V3d corner_;      // corner of the table, in the band's index space
+  Imath::V3d corner_;      // lowest corner of the box of all blocks, in the band's index space
   std::array<int, 3> size_{}, pages_{};
   // Two-level table with pages of 8³ blocks. page_: position of the page's items in entry_; entry_:
   // number of the block. kOutside or kInside marks a page or block with a constant field.

@@ -35,8 +35,8 @@ std::vector<Coord> blocksOf(const openvdb::FloatTree& tree) {
   return blocks;
 }
 
-/// Copies the values of the 9³ points from a block's origin on, which lie in up to eight leaves.
-/// Returns true when they differ in sign.
+/// Copies the values of the 9³ grid points from a block's origin on, which lie in up to eight
+/// leaves. Returns true when the values differ in sign.
 template <typename Accessor>
 bool fill(const Accessor& accessor, Brick& brick) {
   static_assert(BrickPool::kEdge == kBlock + 1);
@@ -69,7 +69,8 @@ void findCrossings(Brick& brick) {
     }
 }
 
-/// Spline coefficients that the cells of a block read, starting one point before its origin.
+/// Spline coefficients at the 11³ grid points that the cells of a block read, starting one point
+/// before the block's origin.
 struct SplineBlock {
   static constexpr int kAround = kBlock + 3;
   float c[kAround][kAround][kAround];

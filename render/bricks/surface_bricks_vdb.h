@@ -25,8 +25,9 @@ struct Brick {
 struct HaloBlock {
   openvdb::Coord origin;
   openvdb::CoordBBox points = {};  ///< box of the points that stencils read, relative to the origin
-  std::vector<float> value = {};  ///< values of the points in the box `points`, ordered by x, y, z;
-                                  ///< empty when all equal ± the background
+  /// Values of the points in the box `points`, ordered by x, y, z. Empty for a block without a
+  /// leaf, whose values are all ± the background.
+  std::vector<float> value = {};
   bool isInside =
       false;  ///< if `value` is empty: true when the block is far inside, false when far outside
 };

@@ -54,7 +54,8 @@ bool CsgTraversal::advance() {
   return asks;
 }
 
-// Moves one ray. Returns true when it has open queries.
+// Moves one ray to its next hit, or up to the point where it needs another crossing. Returns true
+// when the ray has open queries.
 bool CsgTraversal::advance(std::size_t ray) {
   if (met_[ray] >= 0) return false;
   const auto row = [&](auto& all) {
@@ -68,7 +69,7 @@ bool CsgTraversal::advance(std::size_t ray) {
   return met_[ray] < 0;
 }
 
-// Crosses all surfaces at the distance `place`, which is the nearest one ahead of the ray.
+// Crosses the surfaces of all solids at `place`, the position of the ray's nearest crossing ahead.
 void CsgTraversal::cross(std::size_t ray, double place) {
   char* inside = inside_.data() + ray * solids_;
   const bool before = csg_.holds(inside);

@@ -24,11 +24,13 @@ class CsgTraversal {
   };
 
   /// @param solids  number of solids of the expression
-  /// @param maxDistances  largest distance along each ray; crossings beyond it do not count
+  /// @param maxDistances  largest `place` of a crossing for each ray; crossings beyond it do not
+  /// count
   CsgTraversal(const CsgExpression& csg, std::size_t solids, std::vector<double> maxDistances);
 
-  /// Open queries about a solid. Each must be answered by answer() or answerNone() before the next
-  /// advance().
+  /// Open queries about the solid with this number. Each must be answered by answer() or
+  /// answerNone() before the next advance(). `place` is the position of the crossing along the ray,
+  /// a depth or a distance, in the unit of maxDistances.
   [[nodiscard]] std::vector<Query> queriesFor(std::size_t solid) const;
   void answer(std::size_t solid, const Query& query, double place, bool enters);
   void answerNone(std::size_t solid, const Query& query);
@@ -36,7 +38,7 @@ class CsgTraversal {
   /// @return true when there are open queries
   bool advance();
 
-  /// Lets a ray continue from its present hit to its next hit.
+  /// Lets a ray continue behind its present hit: the next advance() moves it to its next hit.
   void resume(std::size_t ray) { met_[ray] = -1; }
 
   /// Number of the solid at the present hit of the ray; −1 without a hit.
@@ -53,9 +55,10 @@ class CsgTraversal {
   std::size_t solids_;
   std::vector<double> maxDistances_;
   // Indexed by ray and solid.
-  std::vector<double> place_;         // distance of the next crossing; infinite: there is none
+  std::vector<double> place_;  // position of the ray's next crossing with the solid; infinite: none
   std::vector<std::int32_t> passed_;  // number of crossings behind the ray's present position
-  std::vector<char> inside_, asked_;  // the ray is inside the solid; its query is open
+  // inside_: 1 when the ray is inside the solid. asked_: 1 when its query about the solid is open.
+  std::vector<char> inside_, asked_;
   // Indexed by ray.
   std::vector<std::int32_t> met_;  // number of the hit solid; −1: no hit
   std::vector<char> flipped_;

@@ -17,13 +17,15 @@ using Range = FieldGrid::Range;
 constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr int kMostHalvings =
     44;  // halvings of a ray segment, down to the spacing of representable positions
-constexpr double kNoise =
-    1e-13;  // relative to the largest background; values of smaller magnitude are rounding noise
+// Bound on the rounding noise of the expression's value, relative to the largest |φ| that a grid
+// has outside its band.
+constexpr double kNoise = 1e-13;
 
 /// Bernstein coefficients of a field's cubic on a ray segment.
 using FieldCubic = std::array<double, 4>;
 
-/// Bounds on a field's values and on its derivative along a ray segment.
+/// Bounds on a field's values along a ray segment (`value`), and on a third of its derivative by
+/// the segment's parameter in [0, 1] (`slope`).
 struct FieldBounds {
   Range value, slope;
 };
@@ -81,13 +83,15 @@ double valueAt(const FieldCubic& c, double s) {
 /// Traversal of one grid by a ray: the present block, and the present cell in that block.
 struct GridTraversal {
   const FieldGrid* grid;
-  V3d origin, direction;  // index space; the parameter is the world distance along the ray
+  // Ray in the grid's index space. Its parameter is the world distance from the ray's start.
+  V3d origin, direction;
   double inverse[3];
   int block[3] = {}, cell[3] = {};
-  int number = -1;  // number of the block; negative where the field is constant
+  int number = -1;  // number of the present block; negative: the field is constant in the block
   double blockExit = 0, cellExit = kNever;
-  int blockAxis = -1, cellAxis = -1;  // axis of the plane at the exit; −1: outside the table
-  Range range{0, 0};                  // range of the values in the present block or cell
+  // Axis of the face through which the ray leaves the block or cell; −1: outside the grid's blocks.
+  int blockAxis = -1, cellAxis = -1;
+  Range range{0, 0};  // range of the values in the present block or cell
   double corner[2][2][2];
 
   GridTraversal(const FieldGrid& of, const V3d& start, const V3d& along) : grid(&of) {
@@ -119,7 +123,7 @@ struct GridTraversal {
     }
     return enter < leave ? enter : kNever;
   }
-  /// Marks the ray as outside the table up to the parameter `until`.
+  /// Marks the ray as outside the grid's blocks up to the parameter `until`.
   void beAway(double until) {
     number = -1;
     blockAxis = -1;
@@ -187,7 +191,7 @@ struct GridTraversal {
   }
 
   /// Bernstein coefficients of the field along the ray between t0 and t1 within the present cell.
-  /// They are values of the blossom of its cubic.
+  /// They are values of the blossom of the field's cubic there.
   [[nodiscard]] FieldCubic cubic(double t0, double t1) const {
     if (number < 0) return {range.low, range.low, range.low, range.low};
     double p[2][3];
@@ -195,7 +199,9 @@ struct GridTraversal {
       p[0][a] = std::clamp(origin[a] + t0 * direction[a] - cell[a], 0.0, 1.0);
       p[1][a] = std::clamp(origin[a] + t1 * direction[a] - cell[a], 0.0, 1.0);
     }
-    double blossom[2][2][2];  // index 0: position at t0; 1: at t1; one index for each of x, y, z
+    // blossom[i][j][k]: interpolant with x taken at t0 (i = 0) or t1 (i = 1), and likewise y by j
+    // and z by k.
+    double blossom[2][2][2];
     for (int i = 0; i < 2; ++i)
       for (int j = 0; j < 2; ++j) {
         double line[2];
@@ -246,8 +252,8 @@ class FieldSearch {
     return values[e_.drawn];
   }
 
-  /// Records if the ray is inside the solid from t on, and a crossing at t when the side changes.
-  /// Returns true when the search continues.
+  /// Records if the ray is inside the solid from t on, and a crossing at t if it was on the other
+  /// side before. Returns true when the search continues.
   bool settle(bool isInside, double t) {
     if (!inside_) startsInside = isInside;
     const bool hasChanged = inside_ && *inside_ != isInside;
@@ -360,7 +366,8 @@ class FieldSearch {
   std::vector<double> values_;
   std::vector<FieldBounds> bounds_;
   std::vector<Range> ranges_;
-  std::vector<FieldCubic> cubics_;  // cubics of all grids for each depth of halving
+  // Cubics of all grids, one set for each number of halvings of the segment.
+  std::vector<FieldCubic> cubics_;
 };
 
 /// Clips the range [near, far] of a ray to a box. Returns nothing when the ray misses the box.

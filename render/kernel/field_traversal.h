@@ -26,24 +26,25 @@ class FieldTraversal {
   /// @throws levelset::ResourceLimit when the fields need more than maxBytes or span too many
   /// voxels
   FieldTraversal(const Scene& scene, std::size_t maxBytes);
-  /// Takes over the transforms of the solids. Returns true when a transform has changed.
+  /// Copies the transforms of the scene's solids. Returns true when a transform has changed.
   bool updateTransforms(const Scene& scene);
 
   [[nodiscard]] std::size_t bytes() const;
   [[nodiscard]] std::size_t blockCount() const;
-  /// First hit in [near, far]. A ray that is inside the solid at `near` hits where it leaves the
+  /// First hit in [near, far], distances along the ray in world units. The solid is where the
+  /// expression is negative. A ray that is inside the solid at `near` hits where it leaves the
   /// solid.
   [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction, double near,
                               double far) const;
   [[nodiscard]] bool isOccluded(const Imath::V3d& origin, const Imath::V3d& direction,
                                 double maxDistance) const;
-  /// Length of the ray inside the solid within [near, far], world units.
+  /// Length of the ray within [near, far] where the expression is negative (inside), world units.
   [[nodiscard]] double thickness(const Imath::V3d& origin, const Imath::V3d& direction, double near,
                                  double far) const;
 
  private:
   FieldExpression expression_;
-  std::vector<FieldGrid> grids_;  // one for each operand
+  std::vector<FieldGrid> grids_;  // one for each operand of expression_
   Imath::Box3d box_;  // box of all fields, world space; outside it the expression is positive
 };
 

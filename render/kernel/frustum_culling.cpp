@@ -15,8 +15,8 @@ FrustumCulling::FrustumCulling(const Scene& scene, const RenderOptions& options,
                                const Imath::Box3d& bounds) {
   const Camera& camera = scene.camera;
   const bool isLit = usesLights(options.style.style);
-  // With a CSG expression, the kernel traces occlusion rays in all directions up to the last solid,
-  // so nothing can be culled.
+  // With a CSG expression, the kernel follows occlusion rays through all solids, however far, to
+  // know where the rays start inside. So nothing can be culled.
   if (isLit && options.ambientSamples > 0 && !scene.csg.isEmpty()) return;
 
   const V3d axis = camera.axis();
@@ -41,8 +41,8 @@ FrustumCulling::FrustumCulling(const Scene& scene, const RenderOptions& options,
     }
   if (!isLit) return;
   // The Shader starts light rays at a distance of twice the surface error from the hit. The error
-  // is at most an eighth of the sum of three second differences. Each of these is at most 4 half
-  // widths, so the distance is at most 3 half widths.
+  // is at most an eighth of the sum of the second differences of φ along the three axes. Each of
+  // these is at most 4 half widths, so the distance is at most 3 half widths.
   for (const Solid& solid : scene.solids)
     if (!solid.band.isEmpty())
       margin_ = std::max(margin_, (3.1 * solid.band.halfWidth() + 0.1) * solid.band.voxelSize());
@@ -65,12 +65,12 @@ bool FrustumCulling::keeps(const V3d& centre, double radius) const {
   if (isSeen(radius + margin_ + occlusionDistance_)) return true;
   if (!hasShadows_) return false;
   // The shadow of the ball is a cone that opens away from the key light. Test if it intersects the
-  // frustum: on its axis, the points that are in front of a plane form an interval.
+  // frustum: on the cone's axis, the points that are in front of a plane form an interval.
   double from = 0, to = std::numeric_limits<double>::infinity();
   for (const Plane& plane : planes_) {
     const double room = plane.normal.dot(centre) - plane.offset + radius + margin_;
-    const double slope =
-        spread_ - plane.normal.dot(towardsKey_);  // change of `room` per world unit along the axis
+    // Change of `room` per world unit along the cone's axis, away from the light.
+    const double slope = spread_ - plane.normal.dot(towardsKey_);
     if (slope > 0)
       from = std::max(from, -room / slope);
     else if (slope < 0)

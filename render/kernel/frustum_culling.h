@@ -29,14 +29,17 @@ class FrustumCulling {
     Imath::V3d normal;
     double offset;
   };
-  double margin_ =
-      0;  // largest distance between a surface and the start of its light rays, world units
-  std::vector<Plane> planes_;     // planes of the frustum and of the bounds; empty: cull nothing
+  // Largest distance between a surface point and the start of its shadow and occlusion rays, world
+  // units.
+  double margin_ = 0;
+  // Planes of the view frustum and of the box of all surfaces. Empty: nothing is culled.
+  std::vector<Plane> planes_;
   double occlusionDistance_ = 0;  // length of ambient occlusion rays, world units
   bool hasShadows_ = false;
   Imath::V3d towardsKey_;  // unit vector towards the key light
-  double spread_ =
-      0;  // growth of a shadow cone's radius per unit of length; tangent of the light's half angle
+  // Growth of the radius of a ball's shadow cone per unit of length: tangent of the key light's
+  // half angle.
+  double spread_ = 0;
 };
 
 }  // namespace render

@@ -17,12 +17,13 @@ namespace {
 using Imath::M44d;
 using Imath::V3d;
 
-constexpr double kBesideBox = 0.0625;  // padding of a box, voxels, so that rounding does not lose a
-                                       // crossing on a face of the box
+// Padding of the box of a surface's blocks, voxels, so that rounding does not lose a crossing on a
+// face of the box.
+constexpr double kBesideBox = 0.0625;
 constexpr double kParallel = 1e30;
 constexpr std::size_t kRaysAtOnce = 1u << 18;
 
-/// A world-space box that contains all cells that the surface may cross.
+/// A world-space box that contains all cells that the band's surface may cross.
 Imath::Box3d leafBox(const levelset::NarrowBand& band) {
   openvdb::CoordBBox leaves;
   if (band.isEmpty() || !levelset::vdb(band).tree().evalLeafBoundingBox(leaves)) return {};
@@ -32,7 +33,7 @@ Imath::Box3d leafBox(const levelset::NarrowBand& band) {
                           band.indexToWorld());
 }
 
-/// An interval of a ray's parameter, voxels.
+/// An interval of a ray's parameter, which is the distance from its origin in voxels.
 struct Span {
   double enter, leave;
 };
@@ -56,7 +57,7 @@ struct PackedRays {
   std::vector<double> enter;  // distance from each ray's origin to its start at the box, voxels
   RayBlock block{0};
 
-  /// @param asked  indices of the rays that are considered
+  /// @param asked  indices in `rays` of the rays to pack; rays that miss the box are left out
   /// @param hasEnd  true: rays end at their maxDistance; false: they continue to the last surface
   PackedRays(const KernelSolid& solid, const std::vector<LightRay>& rays,
              const std::vector<std::size_t>& asked, bool hasEnd) {
@@ -66,7 +67,8 @@ struct PackedRays {
     };
     std::vector<Ready> ready;
     for (const std::size_t i : asked) {
-      // Choose a voxel as the unit of t, so that single precision suffices for any world unit.
+      // Choose a voxel as the unit of the ray parameter t, so that single precision suffices for
+      // any world unit.
       V3d origin, direction;
       solid.worldToTable.multVecMatrix(rays[i].origin, origin);
       solid.worldToTable.multDirMatrix(rays[i].direction * solid.voxelSize, direction);
@@ -385,8 +387,8 @@ void KernelScene::dimByCsg(const KernelTracer& tracer, const std::vector<LightRa
       const std::vector<CsgTraversal::Query> queries = walk.queriesFor(s);
       std::vector<std::size_t> asked;
       for (const CsgTraversal::Query& query : queries) asked.push_back(first + query.ray);
-      // Trace the rays beyond their maxDistance: if a ray ends inside a solid, only a later
-      // crossing shows that.
+      // Trace the rays beyond their maxDistance: if a ray lies entirely inside a solid, only a
+      // crossing behind its end shows that.
       PackedRays packed(solid, rays, asked, false);
       std::size_t n = 0;
       for (const CsgTraversal::Query& query : queries) {
@@ -408,7 +410,7 @@ void KernelScene::dimByCsg(const KernelTracer& tracer, const std::vector<LightRa
       }
     }
     asks = walk.advance();
-    // Rays with a hit continue only when no ray has open queries, so that all continue in one
+    // Rays with a hit continue only when no ray has open queries, so that all rays continue in one
     // batch.
     if (asks) continue;
     for (std::size_t i = first; i < last; ++i) {

@@ -37,17 +37,20 @@ struct KernelSolid {
 class KernelTracer {
  public:
   virtual ~KernelTracer() = default;
-  /// @param hits, shapes  must have as many entries as `pixels`; `shapes` is written only for hits
+  /// Finds the first crossing of the ray through each pixel with the solid's surface, after those
+  /// that pixels.passing skips. @param hits, shapes  must have as many entries as `pixels`;
+  /// `shapes` is written only for hits
   virtual void trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits,
                      ShapeBlock& shapes) const = 0;
   virtual void trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits) const = 0;
 };
 
-/// First hits with solids of the rays through a block of pixels.
+/// Hits of the rays through a block of pixels with solids, at most one for each ray.
 struct PixelHits {
   std::vector<double> depth;        ///< along the view axis, world units
-  std::vector<std::int32_t> solid;  ///< index in KernelScene::solids(), or −1
-  std::vector<char> flipped;        ///< 1: the drawn shape is on the outside of the hit solid
+  std::vector<std::int32_t> solid;  ///< index in KernelScene::solids(); −1: no hit
+  /// 1: the drawn shape is on the outside of the hit solid, as for a subtracted solid.
+  std::vector<char> flipped;
   ShapeBlock shapes;
 
   explicit PixelHits(std::size_t size)
@@ -82,29 +85,31 @@ class KernelScene {
   /// valid
   KernelScene(const Scene& scene, const RenderOptions& options);
 
-  /// Takes over the camera, and the transforms and opacities of the solids. Tables and meshes are
-  /// not changed.
+  /// Copies the camera of the scene, and the transforms and opacities of its solids. Brick tables
+  /// and meshes are not changed.
   /// @pre this object was built for any camera, not for one picture; the camera is valid; the scene
   /// has the solids and the expression that this object was built from
   void updateView(const Scene& scene);
 
   [[nodiscard]] const std::vector<KernelSolid>& solids() const { return solids_; }
-  /// World-space box of the cells that the surfaces cross, and of the meshes; empty when there are
-  /// none.
+  /// World-space box of the meshes and of the grid cells that the solids' surfaces cross; empty
+  /// when there are none. For a blended scene: Scene::bounds().
   [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }
-  /// World-space box of the blocks that the surfaces cross, and of the meshes. Its size determines
-  /// the absolute error of single-precision positions.
+  /// World-space box of the meshes and of the blocks that the solids' surfaces cross. For a blended
+  /// scene: Scene::bounds(). Its size determines the absolute error of single-precision positions.
   [[nodiscard]] const Imath::Box3d& tableBounds() const { return tableBounds_; }
   [[nodiscard]] const MeshRays& meshes() const { return meshes_; }
-  /// Traversal of a blended scene, else null. For a blended scene solids() is empty, and
-  /// castPixels() and thickness() find nothing.
+  /// Traversal of the fields of a blended scene; null for any other scene. For a blended scene
+  /// solids() is empty, and castPixels() and thickness() find nothing.
   [[nodiscard]] const FieldTraversal* fields() const { return fields_ ? &*fields_ : nullptr; }
   [[nodiscard]] std::size_t bytes() const;
-  /// Numbers of blocks of all solids, by what the tables store of them.
+  /// Numbers of blocks of all solids, by their use in the brick tables.
   struct Counts {
-    std::size_t crossed = 0, halo = 0;  // stored: blocks that the surface crosses, and halo blocks
-    std::size_t omitted = 0;            // not stored: neither crossed nor read by a stencil
-    std::size_t culled = 0;             // crossed by the surface, but irrelevant to the picture
+    // Stored: blocks that the surface crosses, and their neighbours of which stencils read points
+    // (halo).
+    std::size_t crossed = 0, halo = 0;
+    std::size_t omitted = 0;  // not stored: neither crossed nor read by a stencil
+    std::size_t culled = 0;   // crossed by the surface, but irrelevant to the picture
   };
   [[nodiscard]] const Counts& counts() const { return counts_; }
 
@@ -125,8 +130,8 @@ class KernelScene {
 
  private:
   [[nodiscard]] PixelHits castFirst(const KernelTracer& tracer, const PixelBlock& pixels) const;
-  /// True when a point is inside the drawn shape. @param inside  for each solid: nonzero when the
-  /// point is inside the solid
+  /// True when a point is inside the drawn shape: the result of the expression, or without one the
+  /// union of the solids. @param inside  for each solid: nonzero when the point is inside the solid
   [[nodiscard]] bool isInside(const std::vector<char>& inside) const;
   /// Multiplies `light` of the rays first … last − 1 by the transmittance of the solids.
   void dimBySolids(const KernelTracer& tracer, const std::vector<LightRay>& rays, std::size_t first,
@@ -134,10 +139,12 @@ class KernelScene {
   void dimByCsg(const KernelTracer& tracer, const std::vector<LightRay>& rays, std::size_t first,
                 std::size_t last, std::vector<double>& light) const;
 
-  /// @param isPicture  true: cull data that the picture does not need
+  /// @param isPicture  true: cull blocks that cannot affect the picture; false: keep the blocks for
+  /// any camera
   void makeTables(const Scene& scene, const RenderOptions& options, bool isPicture);
 
-  /// Extent of a solid's surface. After culling, the tables may hold only a part of the surface.
+  /// Extent of a solid's complete surface. After culling, the brick tables may hold only a part of
+  /// it.
   struct Extent {
     std::size_t index;  // index in Scene::solids
     Imath::Box3d cells,

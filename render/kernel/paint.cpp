@@ -14,11 +14,12 @@ namespace {
 using Imath::V2d;
 using Imath::V3d;
 
-constexpr int kSquare = 4;  // pixels along the edge of a packet
-constexpr std::size_t kMostLightRays = 1u
-                                       << 18;  // number of light rays after which a batch is traced
-constexpr double kCastError =
-    2e-3;  // bound on the error of the kernel's depths, voxels; light rays start beyond it
+constexpr int kSquare = 4;  // edge of the squares that order the pixels for tracing, pixels
+// Number of collected light rays above which they are traced.
+constexpr std::size_t kMostLightRays = 1u << 18;
+// Bound on the rounding error of the kernel's hit depths, voxels. It is added to the surface error,
+// so that light rays start farther from the surface.
+constexpr double kCastError = 2e-3;
 
 }  // namespace
 
@@ -80,7 +81,8 @@ Hit KernelPainter::hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std
   return hit;
 }
 
-// Paints the data layers from the rays through the pixels' centres.
+// Paints the layers other than the colours (depth, normal, position, id, curvature, thickness) from
+// the rays through the pixels' centres.
 void KernelPainter::paintData(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const {
   const double middleX = 0.5 * scene_.camera.width, middleY = 0.5 * scene_.camera.height;
   PixelBlock at(pixels.size());

@@ -31,11 +31,12 @@ class KernelPainter {
   struct Pixel {
     int x, y;
   };
-  /// Pixels of the box, ordered by squares of 4 × 4 pixels, so that neighbours follow each other.
+  /// Pixels of the box, ordered by squares of 4 × 4 pixels, so that pixels close to each other are
+  /// traced together.
   [[nodiscard]] static std::vector<Pixel> pixelsOf(const PixelBox& box);
   [[nodiscard]] std::size_t numberOf(const Pixel& pixel) const;
-  /// First hit of ray number i, on a solid or a mesh. @param meshNear  mesh hits nearer than this
-  /// distance are ignored, world units
+  /// First hit, on a solid or a mesh, of the ray with index i in `hits`. @param meshNear  mesh hits
+  /// nearer than this distance are ignored, world units
   [[nodiscard]] Hit hitOf(const Camera::Ray& ray, double meshNear, const PixelHits& hits,
                           std::size_t i) const;
   [[nodiscard]] Hit hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const;
@@ -44,11 +45,14 @@ class KernelPainter {
   /// The ray of one sample of a pixel.
   struct SampleRay {
     Camera::Ray ray;
-    double meshNear;  ///< distance just behind the last mesh surface that the ray hit
+    /// Mesh hits before this distance are ignored, world units. Initially the camera's near
+    /// distance, then just behind the last mesh surface that the ray hit.
+    double meshNear;
     double left = 1;  ///< transmittance of all surfaces that the ray hit so far; 0: the ray ends
   };
   /// Adds to `sums` the colours at the hits of all rays whose transmittance is not yet negligible.
-  /// @return numbers of the rays that continue through a transparent solid
+  /// @return indices of the rays that continue through a transparent solid (not through a
+  /// transparent mesh)
   std::vector<std::size_t> addSeen(const KernelTracer& tracer, const std::vector<Pixel>& pixels,
                                    int sample, const PixelHits& hits,
                                    std::vector<SampleRay>& sampleRays,

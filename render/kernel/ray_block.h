@@ -49,7 +49,7 @@ struct PixelBlock {
   [[nodiscard]] std::size_t size() const { return x.size(); }
 };
 
-/// Hits of a batch of rays or pixels.
+/// Hits of a batch of rays or pixels, one entry for each.
 struct HitBlock {
   static constexpr std::int32_t kEnters = -1, kLeaves = -2;
   std::vector<std::int32_t>

@@ -27,7 +27,7 @@ RayFan makeRayFan(const Camera& camera, const M44d& tableToWorld, double voxelSi
   const V3d axis = camera.axis();
   const Camera::PixelSteps step = camera.pixelSteps();
 
-  // Depth of the box's nearest corner.
+  // Depth along the view axis of the nearest corner of the box of the surface's blocks.
   double depth = std::numeric_limits<double>::infinity();
   for (int i = 0; i < 8; ++i) {
     const V3d p(i & 4 ? pool.high[0] : pool.low[0], i & 2 ? pool.high[1] : pool.low[1],

@@ -1,6 +1,6 @@
 // Look-up of cells and values in the tables of a BrickPool (render/bricks/brick_pool.h). Types and
-// coordinates are those of roots.glsl. Parameters named `walking` or `asked` select the active
-// lanes.
+// coordinates are those of roots.glsl: one lane for each ray, table space in voxels. Parameters
+// named `walking` or `asked` select the active lanes.
 
 struct Spot {
   Bool crosses;  // the surface may cross the cell
@@ -45,8 +45,9 @@ CellValues cellValues(Bool asked, Int brick, Int x, Int y, Int z) {
   return f;
 }
 
-// Returns the position of the first value of the block that contains the grid point (x, y, z).
-// `strides` receives the packed strides of the block's values.
+// Returns the index, in the pool's list of values, of the first value of the block that contains
+// the grid point (x, y, z). `strides` receives the packed strides of the block's values; 0 where
+// they are all equal.
 Int blockOf(Bool asked, Int x, Int y, Int z, INOUT(Int) strides) {
   Int page = loadPage(select(asked, ((x >> kPageShift) * pagesY + (y >> kPageShift)) * pagesZ + (z >> kPageShift), integer(0)));
   Bool full = AND(asked, page >= 0);

@@ -1,6 +1,6 @@
-// Look-up of cells and values in a NanoVDB grid. It replaces bricks.glsl and is the reference for
-// it. GLSL only, not C++. Coordinates are those of roots.glsl. Positions in the grid's memory are
-// indices of 32-bit words.
+// Look-up of cells and values in a NanoVDB grid. It replaces bricks.glsl, and the pictures from
+// bricks must have the same bits as those from it. GLSL only, not C++. Coordinates are those of
+// roots.glsl: table space, in voxels. Positions in the grid's memory are indices of 32-bit words.
 //
 // The grid is followed by eight background values for outside and eight for inside. They stand for
 // the values of blocks without a leaf.
@@ -15,7 +15,8 @@ struct CellValues {
   float f0, f1, f2, f3, f4, f5, f6, f7;
 };
 
-// Position of a node's child. The two words at `place` hold its distance from `node`, in bytes.
+// Position of a node's child. The two words at `place` hold the distance of the child from `node`,
+// in bytes.
 int childAt(int node, int place) {
   return node + (((loadHeld(place) >> 2) & 0x3fffffff) | loadHeld(place + 1) << 30);
 }
@@ -62,7 +63,7 @@ float nanoValue(int x, int y, int z) {
 // @param first, strides  position and strides of the block that contains the cell's lowest corner
 CellValues cellValuesIn(int first, int strides, int x, int y, int z) {
   CellValues f;
-  if (strides != 0 && (x & 7) < 7 && (y & 7) < 7 && (z & 7) < 7) {  // all corners lie in that block
+  if (strides != 0 && (x & 7) < 7 && (y & 7) < 7 && (z & 7) < 7) {  // all corners of the cell lie in that block
     int at = first + ((x & 7) << 6 | (y & 7) << 3 | (z & 7));
     f.f0 = loadValue(at);
     f.f1 = loadValue(at + 1);
@@ -99,7 +100,7 @@ Spot spotAt(bool walking, int x, int y, int z) {
   int strides;
   int first = blockOf(true, x, y, z, strides);
   bool anyLeaf = strides != 0;
-  for (int n = 1; n < 8; ++n) {  // neighbouring blocks with corners of this block's last cells
+  for (int n = 1; n < 8; ++n) {  // blocks after this one along x, y, z, which hold corners of its last cells
     if (anyLeaf) break;
     int beside;
     blockOf(true, x + 8 * (n >> 2), y + 8 * ((n >> 1) & 1), z + 8 * (n & 1), beside);

@@ -1,5 +1,6 @@
 // The kernel: finds the first crossing of a ray with the zero set of a grid of bricks. The code is
-// valid GLSL and C++. This file holds planes, and root isolation of polynomials by sign changes.
+// valid GLSL and C++. This file computes where a ray meets grid planes, and isolates roots of
+// polynomials by sign changes.
 //
 // C++ includes this text into a class. There Real, Int and Bool are vectors of lanes, and the
 // tables of the grid are members. In GLSL they are float, int and bool, and uniforms. All decisions
@@ -17,10 +18,11 @@ CONST_FLOAT kThird = 0.33333333333f;
 CONST_FLOAT kBarelyInside = -1e-30f;
 CONST_FLOAT kLeastDirection = 1e-20f;
 CONST_FLOAT kParallel = 1e30f;
-CONST_FLOAT kBesideBox = 0.0625f;  // padding of a box, voxels, so that rounding does not lose a crossing on a face of the box
+CONST_FLOAT kBesideBox = 0.0625f;  // padding of the box of the surface's blocks, voxels, so that rounding does not lose a crossing on a face of the box
 
-// Parameter at which a ray meets the plane of points k. All cells use this function. It is monotone
-// in k, and both cells at a plane get the same number, so no ray slips between them.
+// Parameter at which a ray meets the plane of the grid points with coordinate k along one axis. All
+// cells use this function. It is monotone in k, and both cells at a plane get the same number, so
+// no ray slips between them.
 Real planeAt(Int k, Real origin, Real inverse) {
   VAR distance = toReal(k) - origin;
   VAR t = distance * inverse;
@@ -31,7 +33,7 @@ Real planeAt(Int k, Real origin, Real inverse) {
 Int cellAt(Real t, Real origin, Real direction, Real inverse, Int low, Int high) {
   VAR place = origin + t * direction;
   VAR held = smaller(larger(place, toReal(low)), toReal(high));
-  Int cell = toInt(held);  // not negative
+  Int cell = toInt(held);  // `held` is not negative, so the conversion rounds down
   Bool ahead = direction >= 0.0f;
   VAR leaves = planeAt(select(ahead, cell + 1, cell), origin, inverse);
   VAR enters = planeAt(select(ahead, cell, cell + 1), origin, inverse);
@@ -62,9 +64,9 @@ Int signChanges(Real b0, Real b1, Real b2, Real b3) {
 }
 
 // Moves on from interval number `part` of [0, 1], which has the length `size` after `halvings`
-// halvings. If `divides`, the next interval is its first half, otherwise the interval that follows
-// it, with the largest length that fits. The test of that larger interval may prove it empty at
-// once.
+// halvings. If `divides`, the next interval is the first half of this one. Otherwise it is the one
+// that follows, with the largest length that fits. The test of that larger interval may prove it
+// empty at once.
 // @return true while an interval is left
 Bool nextPart(Bool open, Bool divides, INOUT(Int) part, INOUT(Int) halvings, INOUT(Real) size) {
   Bool divide = AND(open, divides);
@@ -82,8 +84,9 @@ Bool nextPart(Bool open, Bool divides, INOUT(Int) part, INOUT(Int) halvings, INO
   return AND(open, OR(divide, halvings > 0));
 }
 
-// Finds the first interval [low, high] in [0, 1] with a single sign change of the cubic, after
-// skipping `passing` sign changes. Skipped changes are subtracted from `passing`.
+// Finds the first interval [low, high] in [0, 1] with a single sign change of the cubic with
+// Bernstein coefficients b0 … b3, after skipping `passing` sign changes. Skipped changes are
+// subtracted from `passing`.
 // @return true when such an interval exists
 Bool isolate(Bool asked, Real b0, Real b1, Real b2, Real b3, INOUT(Int) passing, INOUT(Real) low,
              INOUT(Real) high) {
@@ -148,6 +151,6 @@ Real onSide(Real value, Bool inside) {
 struct Crossing {
   Bool found;
   Real share;  // position of the crossing as a fraction of the ray's segment in the cell
-  Bool enters;      // the ray enters the solid there
+  Bool enters;      // the ray enters the solid at the crossing; false: it leaves
   Bool endsInside;  // the ray's segment ends inside the solid
 };

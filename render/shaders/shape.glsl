@@ -3,9 +3,9 @@
 // coefficients (isSpline), all of these are derivatives of that spline. Types and coordinates are
 // those of roots.glsl.
 //
-// The coefficients are not computed. Instead, each value has the weight of its coefficient minus a
-// sixth of the second differences of the weights. So each value is loaded once, and none is kept in
-// an array, because Mesa 22.3 reads arrays by slow gathers.
+// The coefficients are not computed. Instead, each grid value has the weight of its coefficient
+// minus a sixth of the second differences of the weights. So each grid value is loaded once, and
+// none is kept in an array, because Mesa 22.3 reads arrays by slow gathers.
 
 CONST_FLOAT kSixth = 0.16666666667f;
 CONST_FLOAT kEighth = 0.125f;
@@ -63,7 +63,8 @@ Stencil stencilAt(Real a) {
   return w;
 }
 
-// Values of the six points of a Window along z.
+// Values of the six grid points along z of a Window (6³ points around the cell) that have the
+// indices (i, j) in x and y.
 struct Column {
   Real f0, f1, f2, f3, f4, f5;
 };
@@ -81,7 +82,8 @@ Column columnAt(IN(Window) w, int i, int j) {
   return c;
 }
 
-// A column without its first and last value. They are not stored if i or j is 0 or 5.
+// A column with 0 in place of its first and last value, which the tables do not store if i or j is
+// 0 or 5.
 Column shortColumnAt(IN(Window) w, int i, int j) {
   Int nearBlocks = firstAt(w, i, j, 0);
   Int farBlocks = firstAt(w, i, j, 1);
@@ -106,9 +108,9 @@ Real whole6(IN(Column) c, IN_ARRAY(Real, weight, 6)) {
   return sum;
 }
 
-// Derivatives in one slab of points across x; the two digits are their orders along y and z. r…: of
-// the spline with the values as coefficients. p…: of the spline with corrected coefficients, except
-// for second differences along x.
+// Derivatives along y and z in one slab (the grid points with one x); the two digits are the orders
+// along y and z. r…: for the grid values f as spline coefficients. p…: for coefficients f − ∇²f/6,
+// where ∇² lacks the second difference along x.
 struct Slab {
   Real r00, r10, r20, r01, r11, r02;
   Real p00, p10, p20, p01, p11, p02;
@@ -169,7 +171,8 @@ struct Shape {
   Real error;                         // bound on |trilinear interpolant − smooth function|, from second differences
 };
 
-// Subtracts from the derivatives what the values of a slab contribute to the second differences
+// Subtracts from the derivatives the share of one slab in a sixth of the second differences along
+// x. `value`, `slope` and `bend` are the weights valueBend, slopeBend and bendBend of the slab
 // along x.
 void takeBeside(INOUT(Shape) shape, IN(Slab) s, Real value, Real slope, Real bend) {
   shape.gx = minus(shape.gx, slope, s.r00);
@@ -202,8 +205,9 @@ Real bendOf(Real before, Real at, Real after) {
   return magnitude(bend);
 }
 
-// f…: values at the four points of a slab that are corners of the cell (points 2 and 3 along y and
-// z). b…: sums of the magnitudes of the second differences along y and z at these points.
+// f…: φ at the four points of a slab that are corners of the cell (points 2 and 3 of the Window
+// along y and z). b…: sums of the magnitudes of the second differences along y and z at these
+// points.
 struct Corners {
   Real f00, f01, f10, f11;
   Real b00, b01, b10, b11;
@@ -226,8 +230,8 @@ Corners cornersOf(IN(Column) c1, IN(Column) c2, IN(Column) c3, IN(Column) c4) {
   return c;
 }
 
-// Bound on the error of trilinear interpolation, from the corners in a slab and in its two
-// neighbouring slabs.
+// Bound on the error of trilinear interpolation at the corners of the cell in one slab (`at`), from
+// φ in that slab and in its two neighbouring slabs.
 Real errorOf(IN(Corners) before, IN(Corners) at, IN(Corners) after) {
   VAR e00 = bendOf(before.f00, at.f00, after.f00) + at.b00;
   VAR e01 = bendOf(before.f01, at.f01, after.f01) + at.b01;

@@ -8,8 +8,8 @@
 
 CONST_INT kDegree = 9;
 
-// Weights of the four spline coefficients along an axis, from cell − 1 on, in the blossom of the
-// cubic B-spline.
+// Weights of the four spline coefficients along an axis, from point cell − 1 on, in the blossom of
+// the cubic B-spline at (u, v, w).
 struct Blend {
   Real w0, w1, w2, w3;
 };
@@ -36,8 +36,9 @@ Real blended(IN(Blend) b, Real c0, Real c1, Real c2, Real c3) {
   return sum;
 }
 
-// Works on each row of four along the axis with the given stride. Replaces its spline coefficients
-// by the values of the Bézier net between the positions `from` and `to` in the cell.
+// Works on each row of four values of the net along the axis with the given stride. Replaces the
+// spline coefficients of the row by the values of the Bézier net between the positions `from` and
+// `to` in the cell.
 void bendAxis(INOUT_ARRAY(Real, net, 64), int stride, Real from, Real to) {
   Blend b0 = blendOf(from, from, from);
   Blend b1 = blendOf(from, from, to);

@@ -52,8 +52,9 @@ Crossing crossingIn(Bool asked, Int brick, Int cellX, Int cellY, Int cellZ, Real
   VAR b1 = ((e1 + e2) + e3) * kThird;
   VAR b2 = ((e4 + e5) + e6) * kThird;
 
-  // Both cells at a face must agree if the ray is inside there. If all corners of the face have one
-  // sign, that sign decides; otherwise the side at the end of the previous cell.
+  // Both cells at a face must agree if the ray is inside the solid where it crosses the face. If
+  // all corners of the face have one sign, that sign decides; otherwise the side at the end of the
+  // previous cell.
   Bool upperIn = select(entered == 0, NOT(aheadX), select(entered == 1, NOT(aheadY), NOT(aheadZ)));
   Bool upperOut = select(left == 0, aheadX, select(left == 1, aheadY, aheadZ));
   Int maskIn = faceCorners(entered, upperIn);
@@ -83,7 +84,7 @@ Crossing crossingIn(Bool asked, Int brick, Int cellX, Int cellY, Int cellZ, Real
 struct Ray {
   Real ox, oy, oz;  // position at t = 0
   Real dx, dy, dz;  // direction: derivative of the position by t
-  Real ix, iy, iz;  // 1 / direction; kParallel for a component 0
+  Real ix, iy, iz;  // 1 / direction, by component; kParallel for a component 0
   Real start, end;  // interval of t that is searched
 };
 

@@ -1,10 +1,10 @@
-// Access to the grid points around a cell, which lie in one or several blocks. Types and
+// Access to the 6³ grid points around a cell, which lie in up to eight blocks. Types and
 // coordinates are those of roots.glsl.
 
-// Six grid points on each axis, from cell − 2 on. Along an axis they lie in one block, or in a near
-// block and a far block.
+// Six grid points on each axis, from two points before the lowest corner of the cell on. Along an
+// axis they lie in one block, or in a near block and a far block.
 struct Window {
-  Int base[8];     // position of the first value of each block; bits 4, 2, 1 of the index: far along x, y, z
+  Int base[8];     // index of the first value of each block in the list of values; bits 4, 2, 1 of n in base[n]: far along x, y, z
   Int strides[8];  // packed strides of the block's values
   Bool farX[6], farY[6], farZ[6];    // the point lies in the far block of the axis
   Int stepX[6], stepY[6], stepZ[6];  // coordinate of the point within its block, 0 … 7
@@ -28,8 +28,9 @@ Window windowAt(Bool asked, Int cellX, Int cellY, Int cellZ) {
   return w;
 }
 
-// Position of the first value of column (i, j) along z in its block: in the far block along z if
-// `far` is 1, else in the near block. Adding stepZ[k] gives the position of value (i, j, k).
+// Index, in the list of values, of the first value along z of column (i, j) in its block: in the
+// far block along z if `far` is 1, else in the near block. Adding stepZ[k] gives the index of value
+// (i, j, k).
 Int firstAt(IN(Window) w, int i, int j, int far) {
   Int base = select(w.farY[j], select(w.farX[i], w.base[6 + far], w.base[2 + far]),
                       select(w.farX[i], w.base[4 + far], w.base[far]));
