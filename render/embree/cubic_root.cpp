@@ -31,10 +31,12 @@ CubicPiece splitCubic(CubicPiece& piece) {
   return {{middle, b123, b23, b[3]}, piece.low + piece.width, piece.width, piece.depth};
 }
 
-/// Searches for roots by halving [0, 1], from left to right. A piece whose coefficients have one
-/// sign has no root (convex hull). A piece whose ends differ in sign has a root.
-/// @param stopAtProof  true: returns as soon as a root is certain, at a coarse position
-/// @param all  if not null, receives all roots; then the function returns -1
+/// Searches for roots (sign changes) of the cubic by halving [0, 1], from left to right. Returns
+/// the first root, or -1. A piece whose coefficients have one sign has no root (convex hull). A
+/// piece whose ends differ in sign has a root.
+/// @param stopAtProof  true: returns as soon as a root is certain; the returned parameter is only a
+/// point near it
+/// @param all  if not null, receives all roots in ascending order; then the function returns -1
 double searchCubic(const BernsteinCubic& cubic, bool stopAtProof,
                    std::vector<double>* all = nullptr) {
   CubicPiece stack[kMaxDepth + 1];

@@ -10,8 +10,8 @@ using BernsteinCubic = std::array<double, 4>;
 
 /// Returns the first parameter in [0, 1] at which the cubic changes sign; negative when there is
 /// none. Zero counts as positive, so a cubic that touches zero from above has no root. The interval
-/// is halved repeatedly, leftmost half first, guided by Descartes' rule of signs. The search uses
-/// no tolerance, and only sums and halves of the coefficients.
+/// [0, 1] is halved repeatedly, leftmost half first, guided by Descartes' rule of signs. The search
+/// uses no tolerance, and only sums and halves of the coefficients.
 [[nodiscard]] double firstSignChange(const BernsteinCubic& cubic);
 
 /// Appends all parameters in [0, 1] at which the cubic changes sign, in ascending order. The

@@ -40,7 +40,8 @@ struct PixelPainter {
     paintColour(x, y, i);
   }
 
-  /// Paints the data layers from the ray through the pixel's centre.
+  /// Paints the layers other than the colours (depth, normal, position, id, curvature, thickness)
+  /// from the ray through the pixel's centre.
   void paintData(int x, int y, std::size_t i) const {
     const Camera::Ray ray = scene.camera.ray(x + 0.5, y + 0.5);
     if (options.thickness)

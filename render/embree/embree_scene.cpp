@@ -27,7 +27,7 @@ struct RaySolid {
   std::vector<SurfaceBlock> blocks;
   std::uint32_t id;
   std::size_t index;        // index in Scene::solids
-  std::size_t number;       // index among the solids with a surface
+  std::size_t number;       // index in EmbreeScene::Impl::solids (those with a surface)
   const EmbreeSpace* view;  // scaled space of Embree's rays, the same for all solids
   Filter filter;
   Imath::C3f colour;
@@ -43,15 +43,16 @@ struct RaySolid {
 /// precision and the best hit so far.
 struct RayQuery {
   RTCIntersectContext embree;  // first member: Embree returns its address
-  V3d origin,
-      direction;  // world space; the origin is moved to the ray's entry into the box of the scene
-  double limit;   // end of the search, distance from `origin`. It is the same for all blocks, so
-                  // that a hit has the same bits in any order of the blocks
+  // World space. The origin is moved along the ray to its entry into the box of the scene.
+  V3d origin, direction;
+  // End of the search, distance from `origin`, world units. It is the same for all blocks, so that
+  // a hit has the same bits in any order of the blocks.
+  double limit;
   double nearest;
   double scale;
   const RaySolid* solid = nullptr;
-  std::vector<std::vector<SideChange>>* changes =
-      nullptr;  // if not null, receives all crossings of the ray, by solid
+  // If not null, receives all crossings of the ray, one list for each solid.
+  std::vector<std::vector<SideChange>>* changes = nullptr;
 };
 
 IndexRay indexRayOf(const RayQuery& query, const RaySolid& solid) {
@@ -95,7 +96,8 @@ void intersectBlock(const RTCIntersectFunctionNArguments* args) {
   if (query.solid && *t == query.nearest && solid.number >= query.solid->number) return;
   query.nearest = *t;
   query.solid = &solid;
-  // The padding keeps blocks that may hold a hit at the same distance within Embree's range.
+  // The padding keeps other blocks that may contain a hit at the same distance within the range of
+  // Embree's ray.
   RTCRayN* ray = RTCRayHitN_RayN(args->rayhit, args->N);
   RTCRayN_tfar(ray, args->N, 0) = std::min(
       RTCRayN_tfar(ray, args->N, 0), static_cast<float>(*t * query.scale + EmbreeSpace::kPad));
@@ -112,8 +114,8 @@ void occludeBlock(const RTCOccludedFunctionNArguments* args) {
     RTCRayN_tfar(args->ray, args->N, 0) = -std::numeric_limits<float>::infinity();
 }
 
-/// Sorts the crossings of a ray with one solid by distance. Removes an entry and an exit at equal
-/// distance, because they cancel.
+/// Sorts the crossings of a ray with one solid by distance. Removes pairs of an entry and an exit
+/// at equal distance, because they cancel.
 void putInOrder(std::vector<SideChange>& changes) {
   std::stable_sort(changes.begin(), changes.end(),
                    [](const SideChange& a, const SideChange& b) { return a.t < b.t; });
@@ -136,7 +138,7 @@ struct CsgChange {
 
 /// Calls visit(change) for each point where the ray enters or leaves the result of `csg`, in order,
 /// until visit() returns false. Without an expression, visits the crossings of all solids.
-/// @param changes  crossings of the ray, by solid
+/// @param changes  crossings of the ray, one list for each solid
 template <typename Visit>
 void walkChanges(const CsgExpression& csg, std::vector<std::vector<SideChange>>& changes,
                  const Visit& visit) {
@@ -182,7 +184,7 @@ struct EmbreeScene::Impl {
   std::optional<FieldMarch> fields;  // set for a blended scene; then `solids` is empty
   bool isOpaque;
   Box3d allBounds;  // world-space box of the solids and meshes
-  Box3d bounds;     // world-space box of the cells that the solids' surfaces cross
+  Box3d bounds;     // world-space box of the grid cells that the solids' surfaces cross
   EmbreeSpace view;
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
@@ -197,11 +199,12 @@ struct EmbreeScene::Impl {
 
   void gather(const Scene& source, Filter filter);
   void build();
-  /// Builds a query and Embree's ray for it. Returns nothing when the ray misses the box of the
-  /// scene. `moved` receives the distance from `origin` to the query's origin.
+  /// Builds a query for a ray, and Embree's single-precision ray for it. Returns nothing when the
+  /// ray misses the box of the scene. `moved` receives the distance from `origin` to the query's
+  /// origin.
   std::optional<RayQuery> prepare(const V3d& origin, const V3d& direction, double near, double far,
                                   double& moved, RTCRay& ray) const;
-  /// All crossings of the ray, by solid, up to the far side of the scene.
+  /// All crossings of the ray up to the far side of the scene, one list for each solid.
   [[nodiscard]] std::vector<std::vector<SideChange>> allChanges(RayQuery& query, RTCRay ray) const;
   /// First point, up to `limit` of the query, where the ray enters or leaves the result of `csg`.
   std::optional<CsgChange> findCsg(RayQuery& query, RTCRay ray) const;
@@ -312,8 +315,9 @@ std::vector<std::vector<SideChange>> EmbreeScene::Impl::allChanges(RayQuery& que
   query.changes = &changes;
   RTCRayHit all;
   all.ray = ray;
-  all.ray.tfar = 2;  // beyond the scaled scene: the crossings after `limit` are also needed to know
-                     // if the ray starts inside
+  // This is beyond the end of the scaled scene, whose diagonal is 1. The crossings after `limit`
+  // also count: the first one with a solid shows if the ray starts inside it.
+  all.ray.tfar = 2;
   all.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   all.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(scene, &query.embree, &all);
@@ -390,8 +394,8 @@ std::vector<Hit> EmbreeScene::intersectVisible(const V3d& origin, const V3d& dir
     return hits;
   }
   double share = 1;
-  // Adds the mesh hits up to the distance `end`. Returns true when a surface behind them is
-  // visible.
+  // Adds the mesh hits up to the distance `end` along the ray. Returns true when a surface behind
+  // these meshes is visible.
   const auto addMeshes = [&](double end) {
     while (share >= kLeastTransmittance) {
       const Hit hit = impl_->meshes.intersect(origin, direction, near, end);

@@ -20,13 +20,13 @@ using CornerAccessor = openvdb::tree::ValueAccessor<const FloatTree, false>;
 using Join = FieldExpression::Join;
 
 constexpr double kEndless = std::numeric_limits<double>::infinity();
-constexpr double kLeastStep = 1e-7;  // smallest step, relative to the finest voxel size
-constexpr double kMostStepUp = 1e5;  // limit on the growth of repeated smallest steps
+constexpr double kLeastStep = 1e-7;  // smallest step along a ray, in finest voxel sizes
+constexpr double kMostStepUp = 1e5;  // largest factor by which repeated smallest steps grow
 constexpr double kSlopeRounding = 1 + 1e-6;
 
-/// Bound on the length of the trilinear interpolant's gradient in the 9³ cells from the leaf's
-/// origin − 1 on, per voxel. In a cell, each component is at most the largest slope of the four
-/// edges along its axis.
+/// Bound on the length of the trilinear interpolant's gradient, φ per voxel, in the 9³ cells from
+/// one point before the leaf's origin on. In a cell, each component is at most the largest slope of
+/// the four edges along its axis.
 double steepestNear(const FloatTree& tree, const Coord& origin) {
   CornerAccessor accessor(tree);
   constexpr int kPoints = 10;
@@ -51,7 +51,7 @@ double steepestNear(const FloatTree& tree, const Coord& origin) {
   return steepest;
 }
 
-/// Bound on the length of the trilinear interpolant's gradient in the entire grid, per voxel.
+/// Bound on the length of the trilinear interpolant's gradient in the entire grid, φ per voxel.
 double steepestOf(const FloatTree& tree) {
   std::vector<Coord> origins;
   for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) origins.push_back(leaf->origin());
@@ -104,8 +104,9 @@ double marchedJoin(const FieldExpression& e, Join how, double a, double b) {
 /// enters the box of a field.
 class FieldMarch::RaySegment {
  public:
-  double begin = kEndless,
-         end = 0;  // range in which the fields are not constant, distances from the ray's origin
+  // Range of the ray in which some field is not constant: distances from the ray's origin, world
+  // units. begin ≥ end: there is no such range.
+  double begin = kEndless, end = 0;
 
   RaySegment(const FieldMarch& march, const V3d& origin, const V3d& direction, double near,
              double far)
@@ -131,7 +132,8 @@ class FieldMarch::RaySegment {
   [[nodiscard]] bool isEmpty() const { return begin >= end; }
   [[nodiscard]] bool isInside(double t) { return valueAt(t) < 0; }
 
-  /// Finds the next crossing after t. Returns nothing when the ray stays on its side.
+  /// Finds the next crossing after t with the zero set of the expression. Returns nothing when
+  /// there is none up to the end of the segment.
   /// @param inside  true when the ray is inside the solid at t
   std::optional<double> nextCrossing(double t, bool inside) {
     double least = march_.leastStep_;
@@ -139,8 +141,8 @@ class FieldMarch::RaySegment {
       const double value = valueAt(t);
       if ((value < 0) != inside) return t;
       const double safe = std::abs(value) / march_.steepest_, step = std::max(safe, least);
-      // The growth of the smallest step bounds the time for a ray that runs within a face of the
-      // solid.
+      // The growth of the smallest step limits the number of steps of a ray that runs within the
+      // surface.
       least =
           safe < least ? std::min(2 * least, kMostStepUp * march_.leastStep_) : march_.leastStep_;
       const double next = std::min(std::max(t + step, nextEntry(t)), end - begin);
@@ -151,10 +153,10 @@ class FieldMarch::RaySegment {
   }
 
  private:
-  struct Part {  // the ray in the index space of a field
+  struct Part {  // the ray in the index space of one field: start + t · step
     CornerAccessor accessor;
     V3d start, step;
-    double enter, leave;  // range of t in which the field is not constant
+    double enter, leave;  // range of t in which the field is not constant; empty: enter >= leave
   };
 
   static std::pair<double, double> partIn(const MarchedField& field, const V3d& origin,

@@ -18,8 +18,8 @@ using openvdb::FloatTree;
 
 // === Cells that the surface crosses
 
-/// Bit z of rows[x][y] is set when the value at the grid point (x, y, z) of a block is negative.
-/// Each index runs from 0 to 8.
+/// Bit z of rows[x][y] is set when the value at the grid point (x, y, z) of a block is negative. x,
+/// y and z run from 0 to 8.
 using SignRows = std::array<std::array<unsigned, 9>, 9>;
 
 SignRows signRowsOf(const SurfaceBlock& block) {
@@ -49,8 +49,8 @@ void markCells(SurfaceBlock& block, unsigned x, unsigned y, unsigned cells) {
   }
 }
 
-/// Fills `crossing` and `extent` with the cells in which the spline may cross zero. Returns false
-/// when there are none.
+/// Fills `crossing` and `extent` of the block with the cells in which the spline may cross zero.
+/// Returns false when there are no such cells.
 bool markSplineCells(SurfaceBlock& block, const DrawnField& field) {
   const SplineCoefficients<8> coefficients(field.tree, block.origin, field.filter);
   block.crossing.fill(0);
@@ -65,8 +65,8 @@ bool markSplineCells(SurfaceBlock& block, const DrawnField& field) {
   return block.extent[3] != 0;
 }
 
-/// Fills `crossing` and `extent` with the cells whose corners differ in sign. Returns false when
-/// there are none.
+/// Fills `crossing` and `extent` of the block with the cells whose corners differ in sign. Returns
+/// false when there are no such cells.
 bool markCrossingCells(SurfaceBlock& block) {
   const SignRows rows = signRowsOf(block);
   block.crossing.fill(0);
@@ -89,11 +89,14 @@ bool markCrossingCells(SurfaceBlock& block) {
 struct BlockTraversal {
   const SurfaceBlock& block;
   const IndexRay& ray;
-  double enter, leave;  ///< interval of the ray's parameter within the block and within the range
-                        ///< of the search
-  int axis = -1;        ///< axis of the entry plane of the cell; -1: the ray starts inside
-  int cell[3] = {};     ///< index coordinates of the cell
-  double t = 0;         ///< ray parameter at the entry into the present cell
+  /// Interval of the ray's parameter inside the block and inside the range of the search [near,
+  /// far], world units.
+  double enter, leave;
+  /// Axis of the plane through which the ray entered the present cell; -1: the ray starts inside
+  /// the cell.
+  int axis = -1;
+  int cell[3] = {};  ///< index coordinates of the lowest corner of the present cell
+  double t = 0;      ///< ray parameter at the entry into the present cell
 
   [[nodiscard]] bool isForward(int a) const { return ray.direction[a] > 0; }
   [[nodiscard]] double exitPlane(int a, int k) const {
@@ -106,21 +109,21 @@ struct BlockTraversal {
   bool clip();
   void findFirstCell();
   int exitAxis(double& exit) const;
-  /// Computes the positions p[0] at `t` and p[1] at `exit` in the cell, from 0 to 1. On a face the
-  /// coordinate is exactly 0 or 1.
+  /// Computes the positions p[0] of the ray at `t` and p[1] at `exit` in the present cell, from 0
+  /// to 1 on each axis. On a face of the cell the coordinate is exactly 0 or 1.
   void placesInCell(double exit, int outAxis, double (&p)[2][3]) const;
   [[nodiscard]] BernsteinCubic restrictToRay(double exit, int outAxis) const;
   [[nodiscard]] std::optional<double> splineRoot(const DrawnField& field, double exit,
                                                  int outAxis) const;
-  /// Appends the roots of the spline in the cell. Returns true when the ray is inside at the entry
-  /// into the cell.
+  /// Appends the zeros of the spline along the ray in the present cell, as fractions from 0 (`t`)
+  /// to 1 (`exit`). Returns true when the ray is inside the solid at `t`.
   bool addSplineRoots(const DrawnField& field, double exit, int outAxis,
                       std::vector<double>& shares) const;
 };
 
 /// Clips the ray to the block. Returns false when the ray misses the block. When the ray meets
-/// several planes at the same parameter, the plane of the last axis is the entry plane.
-/// findFirstCell() and exitAxis() use the same order.
+/// several planes of the block at the same parameter, the plane of the last axis is the entry
+/// plane. findFirstCell() and exitAxis() use the same order.
 bool BlockTraversal::clip() {
   for (int a = 0; a < 3; ++a) {
     const int low = block.origin[a], high = low + 8;
@@ -154,7 +157,8 @@ void BlockTraversal::findFirstCell() {
     cell[a] = static_cast<int>(
         std::clamp(std::floor(ray.at(a, t)), static_cast<double>(low), static_cast<double>(high)));
     if (ray.isParallel[a]) continue;
-    // The ray crosses planes that it meets at the same parameter in the order x, y, z.
+    // If the ray meets planes of several axes at the same parameter, it crosses them in the order
+    // x, y, z.
     const bool isEarlier = axis >= 0 && a < axis, isLater = axis >= 0 && a > axis;
     const int last = forward > 0 ? high : low, first = forward > 0 ? low : high;
     while (cell[a] != last &&
@@ -217,15 +221,17 @@ bool BlockTraversal::addSplineRoots(const DrawnField& field, double exit, int ou
 }
 
 /// Bernstein coefficients of the trilinear interpolant along the ray between `t` and `exit`. They
-/// are values of its blossom at the two ends, because the interpolant is affine in each coordinate.
-/// On a face the coordinate is exactly 0 or 1.
+/// are values of the blossom of the interpolant at the two ends, because the interpolant is affine
+/// in each coordinate. On a face of the cell the coordinate is exactly 0 or 1.
 /// @param outAxis  axis of the face at `exit`; -1 when the ray ends within the cell
 BernsteinCubic BlockTraversal::restrictToRay(double exit, int outAxis) const {
   double p[2][3];
   placesInCell(exit, outAxis, p);
   unsigned c[3];
   for (int a = 0; a < 3; ++a) c[a] = static_cast<unsigned>(cell[a] - block.origin[a]);
-  double alongX[2][2][2], value[2][2][2];  // [end x][y][z], then [end x][end y][end z]
+  // Grid values interpolated along x only, and along x, y and z. Indices of interpolated axes: 0
+  // for the ray at `t`, 1 at `exit`; other indices: 0 for the lower, 1 for the upper grid point.
+  double alongX[2][2][2], value[2][2][2];
   for (unsigned y = 0; y < 2; ++y) {
     for (unsigned z = 0; z < 2; ++z) {
       const double v0 = block.value(c[0], c[1] + y, c[2] + z);
@@ -299,7 +305,7 @@ std::vector<SurfaceBlock> surfaceBlocks(const DrawnField& field) {
 namespace {
 
 /// Visits the cells of a block that are marked in `crossing`, in their order along the ray.
-/// @param far  end of the ray
+/// @param far  parameter at the end of the ray
 /// @param visit  called with the parameter and the axis of the ray's exit from the cell (axis -1:
 /// the ray ends in the cell); returns true to continue
 template <typename Visit>

@@ -14,8 +14,8 @@
 
 namespace render {
 
-/// A ray in index space. Its parameter is the world distance, so the direction does not have unit
-/// length.
+/// A ray in the index space of a band. Its parameter is the world distance, so the direction does
+/// not have unit length.
 struct IndexRay {
   Imath::V3d origin, direction, inverse;
   bool isParallel[3];  ///< true for an axis along which the ray does not move, so it meets no plane
@@ -37,11 +37,12 @@ struct SurfaceBlock {
   openvdb::Coord origin;
   std::array<const float*, 8> leaves;  ///< values of the 2³ leaves that hold the corners of the
                                        ///< cells; null where the tree has a tile
-  std::array<float, 8> tiles;          ///< values of the tiles where `leaves` is null
+  std::array<float, 8> tiles;          ///< values of the tiles where `leaves` is null, φ
   std::array<std::uint64_t, 8>
       crossing;  ///< bit y·8 + z of word x: the surface may cross cell (x, y, z)
-  std::array<std::uint8_t, 6> extent;  ///< range of the grid points of the marked cells, relative
-                                       ///< to `origin`: low x y z, high x y z
+  /// Range of the grid points of the cells marked in `crossing`, relative to `origin`: low x y z,
+  /// high x y z.
+  std::array<std::uint8_t, 6> extent;
 
   /// Grid value at `origin` + (x, y, z), each in [0, 8].
   [[nodiscard]] double value(unsigned x, unsigned y, unsigned z) const {
@@ -49,11 +50,11 @@ struct SurfaceBlock {
     const float* leaf = leaves[n];
     return static_cast<double>(leaf ? leaf[(x & 7) << 6 | (y & 7) << 3 | (z & 7)] : tiles[n]);
   }
-  /// Box of the marked cells, index space.
+  /// Box of the cells marked in `crossing`, index space.
   [[nodiscard]] Imath::Box3d bounds() const;
 };
 
-/// A grid and its interpolation.
+/// A grid of φ and its interpolation.
 struct DrawnField {
   const openvdb::FloatTree& tree;
   Filter filter = Filter::Trilinear;
@@ -64,7 +65,7 @@ struct DrawnField {
 /// a zero. The tree must outlive the blocks.
 [[nodiscard]] std::vector<SurfaceBlock> surfaceBlocks(const DrawnField& field);
 
-/// A point of a ray at which it enters or leaves the solid.
+/// A point of a ray at which it enters or leaves the solid: parameter `t` of the ray, world units.
 struct SideChange {
   double t;
   bool enters;
@@ -72,13 +73,15 @@ struct SideChange {
 
 enum class Search { FirstCrossing, AnyCrossing };
 
-/// Finds the first sign change of the field on [near, far] inside the block. With AnyCrossing, the
-/// returned parameter may lie anywhere in the cell that contains the crossing.
+/// Finds the first sign change of the field along the ray for parameters in [near, far] inside the
+/// block. With AnyCrossing, the returned parameter may lie anywhere in the cell that contains the
+/// sign change.
 [[nodiscard]] std::optional<double> findCrossing(const DrawnField& field, const SurfaceBlock& block,
                                                  const IndexRay& ray, double near, double far,
                                                  Search search);
 
-/// Appends all sign changes of the field beyond `near` inside the block, in ascending order.
+/// Appends all sign changes of the field along the ray beyond the parameter `near` inside the
+/// block, in ascending order.
 void addCrossings(const DrawnField& field, const SurfaceBlock& block, const IndexRay& ray,
                   double near, std::vector<SideChange>& found);
 

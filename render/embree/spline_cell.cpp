@@ -36,8 +36,8 @@ double weighed(const double (&c)[4][4][4], const double (&x)[4], const double (&
   return sum;
 }
 
-/// The spline along the line p + s · direction in the cell: its value and slope at s, and bounds on
-/// their changes per unit of s.
+/// The spline along the line p + s · direction in the cell: value and slope at s, and bounds on the
+/// changes of both per unit of s (slope_ and bend_).
 class LineSearch {
  public:
   LineSearch(const double (&c)[4][4][4], const V3d& p, const V3d& direction)
@@ -60,12 +60,13 @@ class LineSearch {
   }
 
   /// Returns false when the value at s = 0 is so large that the spline has no zero for s in [0, 1].
-  /// The result also holds for all directions with the same absolute components.
+  /// The result also holds for all directions whose components have the same absolute values.
   [[nodiscard]] bool mayCross() const { return std::abs(value(0)) <= slope_ * (1 + 1e-9); }
 
-  /// Reports the sign changes between low and high, in order. The caller passes the signs at both
-  /// ends, so that the two cells at a face use the same sign, whatever the rounding within a cell.
-  /// @param take  called with the parameter of each change; returns false to stop
+  /// Reports the sign changes for s between low and high, in order. The caller passes the signs at
+  /// both ends. So two cells with a common face use the same sign on it, whatever the rounding
+  /// within a cell.
+  /// @param take  called with s at each sign change; returns false to stop the search
   /// @return true when the search was stopped
   template <typename Take>
   bool search(double low, bool lowInside, double high, bool highInside, int depth,
@@ -148,7 +149,7 @@ bool SplineCell::mayCross() const {
       for (const double c : row) (c < 0 ? anyInside : anyOutside) = true;
   if (!anyInside || !anyOutside) return false;
   // The slope bound for the line from the centre to a corner covers all points of the cell: on each
-  // axis, none is farther from the centre.
+  // axis, no point is farther from the centre than the corner.
   const LineSearch toCorner(c_, V3d(0.5), V3d(0.5));
   return toCorner.mayCross();
 }

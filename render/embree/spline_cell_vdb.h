@@ -11,14 +11,14 @@
 
 namespace render {
 
-/// Spline coefficients that the size³ cells of a block read, from one point before its lowest
-/// corner on. Reads every value from the tree and not from a padded copy, so that the judge shares
-/// no code with the kernel.
+/// Spline coefficients that a block of size³ cells reads, from one grid point before the lowest
+/// corner of the block on. Reads every value from the tree and not from a padded copy, so that the
+/// judge shares no code with the kernel.
 template <int size>
 struct SplineCoefficients {
   double c[size + 3][size + 3][size + 3];
 
-  /// @param cell  index of the lowest corner of the first cell
+  /// @param cell  index coordinates of the lowest corner of the block's first cell
   /// @param filter  BSpline or BSplineQi
   SplineCoefficients(const openvdb::FloatTree& tree, const openvdb::Coord& cell, Filter filter) {
     openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> accessor(tree);
@@ -49,17 +49,17 @@ class SplineCell {
         for (int k = 0; k < 4; ++k) c_[i][j][k] = block.c[x + i][y + j][z + k];
   }
 
-  /// Returns false when the spline has no zero in the cell: all coefficients have one sign, or the
-  /// magnitude at the centre exceeds the largest possible change within the cell.
+  /// Returns false when the spline has no zero in the cell: all coefficients have one sign, or
+  /// |value| at the cell's centre exceeds the largest possible change within the cell.
   [[nodiscard]] bool mayCross() const;
-  /// Value at p. Both cells at a common face return the same bits for p on that face, because there
-  /// the farthest coefficients have weight zero.
-  /// @param p  in [0, 1]³
+  /// Value of the spline at p. Two cells with a common face return the same bits for p on that
+  /// face, because there the coefficients that only one cell reads have weight zero.
+  /// @param p  position in the cell, in [0, 1]³
   [[nodiscard]] double value(const Imath::V3d& p) const;
   /// Finds the first fraction of the segment from p to q at which the spline changes sign. The
-  /// segment is halved repeatedly. A part is skipped when the magnitude at its middle exceeds the
-  /// largest possible change within the part. A part is not halved further when the slope cannot
-  /// change its sign.
+  /// segment is halved repeatedly. A part is skipped when |value| at its middle exceeds the largest
+  /// possible change within the part. It is not halved further when the slope keeps its sign within
+  /// the part.
   [[nodiscard]] std::optional<double> firstSignChange(const Imath::V3d& p,
                                                       const Imath::V3d& q) const;
   /// Appends all fractions of the segment at which the spline changes sign, in ascending order. The

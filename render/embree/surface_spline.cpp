@@ -9,8 +9,8 @@ namespace {
 using Imath::V3d;
 using openvdb::Coord;
 
-/// Values of the 6³ grid points from cell − 2 on. The corners of the cell have the indices 2 and 3
-/// on each axis.
+/// Values of the 6³ grid points around a cell, from two points before its lowest corner on. The
+/// corners of the cell have the indices 2 and 3 on each axis.
 struct ShapeWindow {
   double f[6][6][6];
 
@@ -29,7 +29,7 @@ struct ShapeWindow {
 };
 
 /// Weights w[d] of the four coefficients for the derivative of order d of a uniform cubic B-spline,
-/// at a in [0, 1].
+/// at the fraction a in [0, 1] of a cell.
 struct SplineWeights {
   double w[3][4];
 
@@ -70,7 +70,7 @@ SurfaceShape surfaceShape(const openvdb::FloatTree& tree, const V3d& position, F
       tree, Coord(static_cast<int>(base.x), static_cast<int>(base.y), static_cast<int>(base.z)));
   const SplineWeights weights[3] = {SplineWeights(a.x), SplineWeights(a.y), SplineWeights(a.z)};
 
-  // sum[p][q][r]: derivative of order p, q, r along x, y, z, with p + q + r ≤ 2.
+  // sum[p][q][r]: derivative of the B-spline of order p, q, r along x, y, z, with p + q + r ≤ 2.
   double sum[3][3][3] = {};
   double error = 0;
   for (int x = 0; x < 4; ++x) {

@@ -9,11 +9,11 @@
 
 namespace render {
 
-/// Computes the shape at `position` (index space) from the 6³ grid values around it. The B-spline's
-/// coefficients are f − ∇²f/6, with ∇² by second differences. They remove the inward shift of a
-/// B-spline whose coefficients are the values [Sigg05]. For Filter::BSpline the coefficients are
-/// the values. For both spline filters, `trilinearGradient` is the gradient of the spline and
-/// `interpolationError` is 0.
+/// Computes the derivatives of φ at `position` (index space) from the 6³ grid values around it. The
+/// B-spline's coefficients are f − ∇²f/6, with ∇² by second differences. They remove the inward
+/// shift of a B-spline whose coefficients are the grid values f [Sigg05]. For Filter::BSpline the
+/// coefficients are the grid values. For both spline filters, `trilinearGradient` is the gradient
+/// of the spline and `interpolationError` is 0.
 [[nodiscard]] SurfaceShape surfaceShape(const openvdb::FloatTree& tree, const Imath::V3d& position,
                                         Filter filter);
 

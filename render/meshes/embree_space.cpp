@@ -42,8 +42,8 @@ RTCRay EmbreeSpace::rayFrom(const V3d& start, const V3d& direction, double maxDi
   ray.dir_x = static_cast<float>(direction.x);
   ray.dir_y = static_cast<float>(direction.y);
   ray.dir_z = static_cast<float>(direction.z);
-  // The scaled scene has a diagonal of 1 and rays start at its box, so no surface is farther
-  // than 2.
+  // The box of the scaled scene has a diagonal of 1 and rays start at that box, so no surface is
+  // farther than 2.
   ray.tfar = static_cast<float>(std::min(2.0, maxDistance * scale + kPad));
   ray.mask = ~0u;
   return ray;

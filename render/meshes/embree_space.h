@@ -11,10 +11,11 @@
 namespace render {
 
 /// A translation and uniform scaling that map a box of the scene to a box around the origin with
-/// diagonal 1. Rays start at the box, so their origins and directions, and the boxes of primitives,
-/// have rounding errors of about 2^-24 each.
+/// diagonal 1. Rays start at the box. So ray origins, ray directions and the boxes of primitives
+/// have rounding errors of about 2^-24 each in the scaled space.
 struct EmbreeSpace {
-  /// Padding of boxes and ray ends that covers these rounding errors, in the scaled space.
+  /// Padding of boxes of primitives and of ray ends that covers the rounding errors, a length in
+  /// the scaled space.
   static constexpr double kPad = 2e-6;
 
   Imath::Box3d box;   ///< slightly larger than the given bounds, world space; rays may start on it

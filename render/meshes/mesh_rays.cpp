@@ -34,7 +34,8 @@ struct MeshRays::Impl {
   void build();
   void add(const MeshPart& part, unsigned number);
   /// Computes Embree's ray, which starts where the ray enters the box of the meshes. Returns the
-  /// distance from `origin` to that start, at least `near`; nothing when the ray misses the box.
+  /// distance from `origin` to that start, at least `near`; nothing when the ray misses the box of
+  /// the meshes.
   std::optional<double> prepare(const V3d& origin, const V3d& direction, double near, double far,
                                 RTCRay& ray) const;
   void complete(const RTCRayHit& found, const V3d& start, const V3d& direction, double moved,

@@ -22,14 +22,15 @@ class MeshRays {
 
   [[nodiscard]] bool isEmpty() const;
   [[nodiscard]] const Imath::Box3d& bounds() const;
-  /// First hit with a triangle in [near, far], from either side. `solid` of the hit is the index in
-  /// Scene::meshes. Normals are interpolated from the vertices where the mesh has vertex normals.
+  /// First hit with a triangle, from either side, at a distance in [near, far], world units.
+  /// `solid` of the hit is the index in Scene::meshes. Normals are interpolated from the vertices
+  /// where the mesh has vertex normals.
   [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction, double near,
                               double far) const;
   [[nodiscard]] bool isOccluded(const Imath::V3d& origin, const Imath::V3d& direction,
                                 double far) const;
-  /// Share of light that passes all triangles in [0, far]. Triangles are ignored once the share is
-  /// below kLeastTransmittance.
+  /// Share of light that passes all triangles at distances in [0, far] along the ray, world units.
+  /// Triangles are ignored once the share is below kLeastTransmittance.
   [[nodiscard]] double transmittance(const Imath::V3d& origin, const Imath::V3d& direction,
                                      double far) const;
 

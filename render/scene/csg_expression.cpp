@@ -13,8 +13,8 @@
 namespace render {
 namespace {
 
-constexpr std::size_t kMostPending =
-    64;  // largest number of operands on the stack, a bit each in holds()
+// Largest number of operands on the stack during the evaluation; holds() stores one bit for each.
+constexpr std::size_t kMostPending = 64;
 
 }  // namespace
 
@@ -101,7 +101,8 @@ CsgExpression::CsgExpression(const std::string& text, const std::vector<std::str
 }
 
 bool CsgExpression::holds(const char* inside) const {
-  std::uint64_t stack = 0;  // one bit for each operand; the top of the stack is the lowest bit
+  // One bit for each operand: 1 if it contains the point. The top of the stack is the lowest bit.
+  std::uint64_t stack = 0;
   for (const int step : steps_) {
     if (step >= 0) {
       stack = stack << 1 | (inside[step] != 0);

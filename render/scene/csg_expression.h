@@ -28,17 +28,17 @@ class CsgExpression {
   /// most that of the distance.
   [[nodiscard]] double phi(const double* phi) const;
   [[nodiscard]] bool uses(std::size_t solid) const;
-  /// Box of the result, given boxes of the solids, all in world units.
+  /// Box that contains the result of the expression, given boxes of the solids, all in world units.
   /// @param growth  distance by which a union may extend beyond its operands, world units
   [[nodiscard]] Imath::Box3d bounds(const std::vector<Imath::Box3d>& boxes,
                                     double growth = 0) const;
-  /// Copy of the expression in which the solids have other numbers.
+  /// Copy of the expression in which the solids have the given numbers.
   /// @param numbers  new number of each solid; negative: the solid is empty
   [[nodiscard]] CsgExpression renumbered(const std::vector<int>& numbers) const;
 
   enum Step : int { Union = -1, Intersection = -2, Difference = -3, Nothing = -4 };
   /// The expression in postfix notation. An entry ≥ 0 is the number of a solid, a negative entry is
-  /// a Step. kNothing stands for an empty solid.
+  /// a Step. Nothing stands for an empty solid.
   [[nodiscard]] const std::vector<int>& postfix() const { return steps_; }
 
  private:

@@ -35,7 +35,7 @@ Join joinOf(int step) {
 }
 
 /// Converts the postfix notation of a CsgExpression into steps. Operations with an empty solid are
-/// simplified away.
+/// replaced by their result.
 class StepWriter {
  public:
   explicit StepWriter(FieldExpression& to) : to_(to) {}
@@ -61,7 +61,7 @@ class StepWriter {
   std::vector<std::optional<std::size_t>> stack_;
 };
 
-/// Largest number of nested steps that lead to the drawn value.
+/// Largest number of nested steps of the expression between an operand and the drawn value.
 int depthOf(const FieldExpression& expression) {
   std::vector<int> depth(expression.operands.size(), 0);
   for (const FieldExpression::Step& step : expression.steps)
@@ -99,8 +99,9 @@ void requireSoftness(const Scene& scene) {
   double narrowest = std::numeric_limits<double>::infinity();
   for (const FieldExpression::Operand& operand : expression.operands)
     narrowest = std::min(narrowest, operand.background);
-  // Each step of the smooth minimum changes the value by up to K/4. Far from all solids the value
-  // is the background, and after all steps it must still be positive.
+  // Each step of the smooth minimum changes the value by up to K/4. Far from all solids each
+  // operand is the background (the half width), and the value after all steps must still be
+  // positive.
   const int depth = depthOf(expression);
   const double most = narrowest * std::min(1.0, 3.999 / std::max(depth, 1));
   if (scene.softness <= most) return;

@@ -12,11 +12,12 @@
 
 namespace render {
 
-/// A function of the distances to solids; renderers draw its zero set. It is soft CSG by the smooth
-/// minimum of degree two [Quilez13],
+/// A function of the signed distances to the solids of a scene; renderers draw its zero set. It is
+/// soft CSG by the smooth minimum of degree two [Quilez13],
 ///   smin(a, b) = min(a, b) − max(K − |a − b|, 0)² / 4K,  smax(a, b) = −smin(−a, −b),
 /// or the morph (1 − s) a + s b between two solids. The distance to a solid is the trilinear
-/// interpolant on the solid's own grid, and ± the background outside its band.
+/// interpolant on the solid's own grid. Outside the solid's band it is ± the background, the half
+/// width.
 struct FieldExpression {
   enum class Join { Union, Intersection, Difference, Morph };
   /// One operation on the values numbered a and b. The numbers first count the operands, then the
@@ -65,7 +66,7 @@ struct FieldExpression {
 /// Builds the expression of a blended scene. @pre the scene passes requireFields()
 [[nodiscard]] FieldExpression fieldExpression(const Scene& scene);
 
-/// Checks the softness and the morph of a scene, which may also have neither.
+/// Checks the softness and the morph of a scene; accepts a scene that has neither.
 /// @throws levelset::UsageError for a softness below 0 or without an expression, and for
 ///         transparent solids that are blended. Also for a morph outside [0, 1], combined with an
 ///         expression, or of a number of solids other than two.

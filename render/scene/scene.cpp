@@ -17,8 +17,9 @@ Imath::Box3d Scene::bounds() const {
     boxes.push_back(solid.band.isEmpty() ? Imath::Box3d() : solid.band.zeroSetBounds());
     all.extendBy(boxes.back());
   }
-  constexpr double kMostGrowth =
-      0.25;  // distance by which a smooth union may extend beyond its operands, as a multiple of K
+  // Distance by which a smooth union may extend beyond its operands, as a multiple of the softness
+  // K.
+  constexpr double kMostGrowth = 0.25;
   if (!csg.isEmpty()) all = csg.bounds(boxes, kMostGrowth * softness);
   for (const MeshPart& part : meshes) all.extendBy(levelset::bounds(*part.mesh));
   return all;

@@ -21,7 +21,7 @@ namespace render {
 struct Light {
   Imath::V3d direction{
       -0.4, 0.7, 0.6};    ///< towards the light, in camera space (x right, y up, z towards the eye)
-  double strength = 0.8;  ///< factor of the key light's term; 0: no key light
+  double strength = 0.8;  ///< weight of the key light; 0: no key light
   double softness = 0.15;  ///< half angle of the cone of light directions, radians; it sets the
                            ///< width of penumbrae
 };
@@ -31,10 +31,11 @@ struct Solid {
   levelset::NarrowBand band;
   Imath::C3f colour{0.66f, 0.62f, 0.56f};
   std::uint32_t id = 1;
-  std::string name = {};        ///< name of the solid in the expression
-  double opacity = 1;           ///< opacity of the surface, for each crossing of a ray, (0, 1]
-  ValueBits quantization = {};  ///< storage of the values in the kernel's tables; below 32 bits,
-                                ///< the band must come from quantized()
+  std::string name = {};  ///< name of the solid in the CSG expression
+  double opacity = 1;     ///< opacity of the surface, for each crossing of a ray, (0, 1]
+  /// Storage of the band's values in the kernel's tables. Below 32 bits, the band must be a result
+  /// of quantized().
+  ValueBits quantization = {};
 };
 
 /// Triangles that are drawn together with the solids. They are lit and cast shadows like solids,
@@ -48,8 +49,8 @@ struct MeshPart {
   double opacity = 1;  ///< opacity of the surface, for each crossing of a ray, (0, 1]
 };
 
-/// Renderers end a ray when its transmittance falls below this value, as if the last surface were
-/// opaque.
+/// Renderers end a ray when the transmittance of the surfaces along it falls below this value, as
+/// if the last surface were opaque.
 inline constexpr double kLeastTransmittance = 1.0 / 512;
 
 /// Everything that a renderer draws.
@@ -61,7 +62,8 @@ struct Scene {
   std::vector<Solid> solids;
   std::vector<MeshPart> meshes = {};
   CsgExpression csg = {};  ///< expression over the solids; empty: each solid is drawn
-  double softness = 0;     ///< K of the smooth minimum in the expression, world units; 0: sharp
+  /// K of the smooth minimum in the expression, world units (FieldExpression); 0: sharp edges.
+  double softness = 0;
   std::optional<double> morph =
       {};  ///< fraction of the morph from the first solid to the second, [0, 1]; unset: no morph
   /// True when the scene is drawn as the zero set of one function of all solids' fields: a soft

@@ -10,14 +10,16 @@ using Imath::M33d;
 using Imath::V3d;
 using Join = FieldExpression::Join;
 
-constexpr double kAtEnd =
-    1 -
-    1e-6;  // relative to the background: at values of larger magnitude the band stores no distance
-constexpr double kEqualParts = 1e-6;  // difference below which the contributions of two solids
-                                      // count as equal; then the first solid counts
+// Fraction of the background, which is |φ| outside the band: at values of larger magnitude the band
+// stores no distance.
+constexpr double kAtEnd = 1 - 1e-6;
+// Difference, as a fraction of 1, up to which the contributions of two solids to a point count as
+// equal; then the id of the first solid is used.
+constexpr double kEqualParts = 1e-6;
 
-/// Result of a step of the expression: its value, its first derivatives by the operands a and b,
-/// the sign with which b is joined (−1 for a difference), and a second derivative.
+/// Result of a step of the expression: `value`, first derivatives `a` and `b` by the operands of
+/// the same names, and a second derivative. `signOfB` is −1 for a difference, which joins −b, else
+/// 1.
 struct JoinShape {
   double value, a, b;
   double signOfB;

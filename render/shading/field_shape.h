@@ -19,11 +19,12 @@ struct FieldShape {
 [[nodiscard]] FieldShape fieldShape(double value, const SurfaceShape& shape,
                                     const Imath::M44d& indexToWorld);
 
-/// Completes a hit on the zero set of an expression. Its derivatives follow from those of the
-/// fields by the chain rule. Colours are mixed by the contributions of the solids, and the id is
-/// that of the solid with the largest contribution. `position` and `distance` of the hit must be
-/// set.
-/// @param operands  shapes of the fields at the hit, in the order of FieldExpression::operands
+/// Completes a hit on the zero set of an expression. The derivatives of the expression follow from
+/// those of the fields by the chain rule. Each solid contributes by the derivative of the
+/// expression by its field. The contributions weight the colours, and the id is that of the solid
+/// with the largest one. `position` and `distance` of the hit must be set.
+/// @param operands  values and derivatives of the fields at the hit, in the order of
+/// FieldExpression::operands
 /// @param direction  direction of the ray
 void addFieldShape(Hit& hit, const FieldExpression& expression,
                    const std::vector<FieldShape>& operands, const Imath::V3d& direction);

@@ -10,7 +10,9 @@ namespace render {
 
 /// Options of all renderers.
 struct RenderOptions {
-  int samples = 4;          ///< colour samples for each pixel, at least 1; data layers use one ray
+  /// Colour samples for each pixel, at least 1. The other layers use one ray through the centre of
+  /// the pixel.
+  int samples = 4;
   int ambientSamples = 16;  ///< ambient occlusion rays for each colour sample; 0: no occlusion
   int shadowSamples = 4;    ///< shadow rays for each colour sample; 0: no shadows
   Filter filter = Filter::Trilinear;
@@ -21,8 +23,9 @@ struct RenderOptions {
   bool thickness =
       false;  ///< adds the layer thickness: length of the ray inside the solids, world units
   bool curvature = true;  ///< adds the layers curvature.mean, .gauss, .k1 and .k2
-  std::size_t maxBytes =
-      levelset::kNoMemoryLimit;  ///< memory limit for the image and the tables of the scene, bytes
+  /// Memory limit, bytes. It applies to the image and, separately, to the kernel's tables of the
+  /// scene.
+  std::size_t maxBytes = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};
 };
 

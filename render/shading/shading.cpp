@@ -11,9 +11,11 @@ using Imath::C3f;
 using Imath::V2d;
 using Imath::V3d;
 
-constexpr double kOcclusionShare = 0.25;  // length of occlusion rays relative to the scene's
-                                          // diagonal: hollows darken, open surfaces do not
-constexpr double kDefaultRange = 40;      // default curvature range, times the scene's diagonal
+// Length of occlusion rays relative to the diagonal of the surfaces' box: hollows darken, open
+// surfaces do not.
+constexpr double kOcclusionShare = 0.25;
+// Default of the curvature range (StyleOptions), multiplied by the diagonal of the surfaces' box.
+constexpr double kDefaultRange = 40;
 constexpr std::uint64_t kAmbient = 1, kShadow = 2;
 
 std::uint64_t scramble(std::uint64_t x) {  // the finaliser of SplitMix64
@@ -100,8 +102,8 @@ Shader::Frame Shader::frameOf(const Hit& hit, const V3d& direction) const {
   Frame frame{hit.position, hit.normal, hit.facetNormal};
   if (frame.facet.dot(direction) > 0) frame.facet = -frame.facet;
   if (frame.normal.dot(frame.facet) < 0) frame.normal = -frame.normal;
-  // Move the start of light rays away from the surface, beyond the ripples of the interpolant and
-  // the rounding error of the hit.
+  // Move the start of light rays away from the surface, beyond the ripples of the trilinear
+  // interpolant and the rounding error of the hit.
   frame.start += frame.facet * (2 * hit.surfaceError + 1e-9 * diagonal_);
   return frame;
 }
@@ -112,7 +114,7 @@ void Shader::addSkyRays(const Frame& frame, int x, int y, int sample,
   const PixelSequence sequence(x, y, kAmbient);
   for (int i = 0; i < count; ++i) {
     V3d d = cosineDirection(frame.normal, sequence.at(sample * count + i));
-    // The hemisphere around the smooth normal extends below the plane of the facet. Mirror
+    // The hemisphere around the smooth normal extends below the plane of the drawn facet. Mirror
     // directions that point below that plane.
     const double below = d.dot(frame.facet);
     if (below < 0) d = (d - frame.facet * (2 * below)).normalized();
@@ -204,8 +206,8 @@ C3f Shader::litColour(const Hit& hit, const Frame& frame, const V3d& direction, 
                   C3f(0.50f, 0.45f, 0.41f) * static_cast<float>(1 - upward);
   C3f result = scaled(C3f(1.06f, 1.0f, 0.90f), key);
   for (int c = 0; c < 3; ++c) {
-    // Factor of the sky light with interreflection in a hollow of the surface's colour; 1 for an
-    // open sky.
+    // Factor of the sky light with interreflection in a hollow that has the surface's colour. It is
+    // 1 where nothing blocks the sky.
     const double bounced = open / (1 - static_cast<double>(albedo[c]) * (1 - open));
     result[c] += static_cast<float>(bounced) * static_cast<float>(scene_.ambient) * sky[c];
   }
@@ -239,7 +241,8 @@ C3f Shader::inkColour(const Hit& hit, const Frame& frame, const V3d& direction) 
   const auto mark = [&](const C3f& with, double amount) {
     colour += scaled(with - colour, std::clamp(amount, 0.0, 1.0));
   };
-  // A point is a ridge if k1 exceeds −k2, otherwise a valley. A convex corner counts as a ridge.
+  // A point is a ridge if the principal curvature k1 exceeds −k2, and a valley if it is below. A
+  // convex corner counts as a ridge.
   const double ridge = hit.curvature.k1 / curvatureRange_,
                valley = -hit.curvature.k2 / curvatureRange_;
   mark(sepia, ridge > valley ? 1.5 * (ridge - 1) : 0);

@@ -36,44 +36,49 @@ class PixelSequence {
 struct LightRay {
   Imath::V3d origin, direction;  ///< direction of unit length
   double maxDistance = 0;        ///< length of the ray, world units
-  double light = 0;  ///< weight of the light that arrives if the ray is not blocked, [0, 1]
+  /// Weight of the ray if nothing blocks it: 1 for a ray to the sky; cosine of the angle to the
+  /// normal for a ray to the key light.
+  double light = 0;
 };
 
-/// Light rays of one surface point, as a range of a list: `sky` rays towards the sky from index
-/// `first` on, then `key` rays towards the key light.
+/// Light rays of one surface point, as a range of a list of LightRay: `sky` occlusion rays towards
+/// the sky from index `first` on, then `key` shadow rays towards the key light.
 struct LightRays {
   std::size_t first = 0, sky = 0, key = 0;
 };
 
 /// Shades a surface: key light with soft shadows, sky light with ambient occlusion, a cool fill
-/// light and a thin rim light. The styles tone, ink and matcap cast no light rays.
+/// light and a thin rim light. The styles tone, ink and matcap use no light rays (shadow and
+/// occlusion rays).
 class Shader {
  public:
   /// @param diagonal  diagonal of the bounding box of the surfaces, world units
   Shader(const Scene& scene, double diagonal, const RenderOptions& options);
 
-  /// Appends to `rays` the light rays of a hit on a view ray with the given direction. Pixel (x, y)
-  /// and sample select their random directions.
+  /// Appends to `rays` the light rays of a hit on a view ray with the given direction. The pixel
+  /// (x, y) and the number of the sample determine the random directions of the light rays.
   /// @param sample  number of the sample within the pixel
   [[nodiscard]] LightRays addRays(const Hit& hit, const Imath::V3d& direction, int x, int y,
                                   int sample, std::vector<LightRay>& rays) const;
 
-  /// Computes the linear colour of a hit from the transmittances of its light rays.
+  /// Computes the linear colour of a hit. @param range  light rays of the hit, from addRays()
+  /// @param transmittances  for each of `rays`: share of its light that reaches the hit
   [[nodiscard]] Imath::C3f colour(const Hit& hit, const Imath::V3d& direction,
                                   const LightRays& range, const std::vector<LightRay>& rays,
                                   const std::vector<double>& transmittances) const;
 
  private:
   struct Frame {
-    Imath::V3d start, normal, facet;  ///< start of light rays, and unit normals that face the eye:
-                                      ///< of the smooth surface and of the drawn facet
+    /// Start of the light rays. Unit normals of the smooth surface and of the drawn facet: `facet`
+    /// faces the eye, `normal` lies on the same side of the surface.
+    Imath::V3d start, normal, facet;
   };
   [[nodiscard]] Frame frameOf(const Hit& hit, const Imath::V3d& direction) const;
   void addSkyRays(const Frame& frame, int x, int y, int sample, std::vector<LightRay>& rays) const;
   void addKeyRays(const Frame& frame, int x, int y, int sample, std::vector<LightRay>& rays) const;
 
   [[nodiscard]] Imath::C3f albedoOf(const Hit& hit) const;
-  /// @param open, lit  fractions of the sky light and of the key light that arrive at the point
+  /// @param open, lit  fractions of the sky light and of the key light that reach the hit, [0, 1]
   [[nodiscard]] Imath::C3f litColour(const Hit& hit, const Frame& frame,
                                      const Imath::V3d& direction, double open, double lit) const;
   [[nodiscard]] Imath::C3f toneColour(const Hit& hit, const Frame& frame,
@@ -81,7 +86,7 @@ class Shader {
   [[nodiscard]] Imath::C3f inkColour(const Hit& hit, const Frame& frame,
                                      const Imath::V3d& direction) const;
   [[nodiscard]] Imath::C3f matcapColour(const Frame& frame) const;
-  /// Weight of the silhouette line at the hit, from 0 to 1.
+  /// Weight of the silhouette line at the hit: 1 on the line, 0 beside it.
   [[nodiscard]] double lineAt(const Hit& hit, const Frame& frame,
                               const Imath::V3d& direction) const;
 

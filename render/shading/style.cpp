@@ -98,8 +98,8 @@ double accessibilityOf(const CurvatureSample& sample, double range) {
 }
 
 double silhouetteOf(double cosine, double viewCurvature, double width) {
-  // The line covers the points that appear within `width` of the outline. A surface that is concave
-  // along the view has no outline nearby.
+  // The line covers the points that appear within `width` of the outline of the surface. A surface
+  // that is concave along the view has no outline nearby.
   const double bend = std::clamp(width * viewCurvature, 0.0, 1.0);
   const double limit = std::sqrt(bend * (2 - bend));
   return limit > 0 && cosine <= limit ? 1 : 0;

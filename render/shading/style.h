@@ -16,12 +16,14 @@
 namespace render {
 
 enum class Style {
-  Lit,        ///< the solid's colour under the lights, with shadows
-  Tone,       ///< from a cool to a warm tone, by the angle to the light, as in technical drawings
-              ///< [Gooch98]
-  Mean,       ///< mean curvature by colour, lit
-  Gauss,      ///< Gauss curvature by colour, lit
-  Principal,  ///< both principal curvatures by a two-dimensional colour table, lit
+  Lit,  ///< the solid's colour under the key light and the sky light, with shadows
+  /// A cool to a warm tone, by the angle between normal and key light, as in technical drawings
+  /// [Gooch98].
+  Tone,
+  Mean,   ///< mean curvature by colour, with light and shadows
+  Gauss,  ///< Gauss curvature by colour, with light and shadows
+  /// Both principal curvatures by a two-dimensional colour table, with light and shadows.
+  Principal,
   Accessibility,  ///< the solid's colour, darker in concave regions that large balls cannot touch
                   ///< [Miller94]
   Ink,            ///< silhouettes, ridges and valleys as lines on the colour of paper [Kindlmann03]
@@ -58,9 +60,9 @@ struct ColourImage {
 /// Options of a style.
 struct StyleOptions {
   Style style = Style::Lit;
-  /// Curvature scale, per world unit. This curvature has the colour half way from the middle to the
-  /// end of a colour map. Ridges and valleys in Style::Ink begin at it. 0 stands for 40 divided by
-  /// the diagonal of the bounding box of the surfaces.
+  /// Curvature scale, per world unit. A curvature of this size has the colour half way from the
+  /// middle to the end of a colour map. Lines of ridges and valleys in Style::Ink begin at it. 0
+  /// stands for 40 divided by the diagonal of the bounding box of the surfaces.
   double curvatureRange = 0;
   double lineWidth = 2;                            ///< width of silhouette lines, pixels
   std::shared_ptr<const ColourImage> matcap = {};  ///< picture of a shaded ball, for Style::Matcap
@@ -79,8 +81,8 @@ struct StyleOptions {
 /// less where only smaller balls can touch it.
 [[nodiscard]] double accessibilityOf(const CurvatureSample& sample, double range);
 
-/// Weight of a silhouette line at a point, from 0 to 1. The curvature along the view is used to
-/// keep the line width constant [Kindlmann03].
+/// Weight of a silhouette line at a point: 1 on the line, 0 beside it. The curvature along the view
+/// is used to keep the line width constant [Kindlmann03].
 /// @param cosine  cosine of the angle between normal and direction to the eye, from 0 to 1
 /// @param width  width of the line on the surface, world units
 [[nodiscard]] double silhouetteOf(double cosine, double viewCurvature, double width);

@@ -17,8 +17,9 @@ V3d row(const Imath::M44d& m, int i) {
   return {m[i][0], m[i][1], m[i][2]};
 }
 
-/// Normal curvature, per voxel, in the projection of a direction onto the tangent plane. It is 0
-/// for a direction parallel to the normal. @param direction  in index space, of any length
+/// Normal curvature of the surface, per voxel, along the projection of a direction onto the tangent
+/// plane. It is 0 for a direction parallel to the normal, and where the gradient vanishes. @param
+/// direction  in index space, of any length
 double curvatureAlong(const SurfaceShape& shape, const V3d& direction) {
   const double length = shape.gradient.length();
   if (!(length > 0)) return 0;

@@ -14,14 +14,15 @@ struct SurfaceShape {
   Imath::V3d trilinearGradient{
       0};                    ///< gradient of the interpolant whose zero set is drawn, φ per voxel
   Imath::M33d hessian{0.0};  ///< second derivatives of the B-spline, φ per voxel²
-  double interpolationError = 0;  ///< bound on the difference between the drawn interpolant and a
-                                  ///< smooth function, world units
+  /// Bound on the difference between φ as drawn (trilinear) and a smooth function with the same
+  /// grid values, world units; 0 for a spline filter.
+  double interpolationError = 0;
 };
 
 /// Sets normals, curvatures and surface error of a hit. @pre `isFlipped` of the hit is set
 /// @param indexToWorld  a rotation with uniform scale, and a translation
-/// @param direction  direction of the ray; where the gradient of φ vanishes, the normal is its
-/// opposite
+/// @param direction  direction of the ray; the normal is −direction where the gradient of φ
+/// vanishes
 void addShape(Hit& hit, const SurfaceShape& shape, const Imath::M44d& indexToWorld,
               const Imath::V3d& direction);
 
