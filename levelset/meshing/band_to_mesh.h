@@ -9,7 +9,8 @@
 namespace levelset {
 
 struct BandToMeshOptions {
-  /// Tolerance of the coarsening of flat parts, voxels, in [0, 1]; 0 keeps the uniform mesh.
+  /// Tolerance of the coarsening of flat parts, voxels, in [0, 1]; 0 keeps the uniform mesh of
+  /// marching cubes.
   double adaptivity = 0;
   /// Reconstructs the edges and corners that the field implies [Ju02]. Not possible together with
   /// an adaptivity above 0.
@@ -21,7 +22,8 @@ struct BandToMeshOptions {
 
 /// Converts the zero set to a triangle mesh that faces outwards. The mesh is closed and 2-manifold
 /// when the zero set is closed.
-/// @return vertices on the zero set of the trilinear interpolant to second order in the voxel size
+/// @return mesh in world coordinates; the vertices lie on the zero set of the trilinear interpolant
+///         up to second order in the voxel size
 /// @throws InvalidInput if the band is empty or has no zero crossing, or is an open surface without
 ///         `openSurface`
 /// @throws UsageError if `adaptivity` is outside [0, 1], or above 0 together with `sharp`

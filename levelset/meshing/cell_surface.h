@@ -26,11 +26,12 @@ struct SurfaceBlock {
   std::array<float, 8> neighbourFill = {};     ///< value of a neighbour that has no block
   std::array<std::uint64_t, 8> inside = {};    ///< [x]: grid points with φ < 0
   std::array<std::uint64_t, 24> crossed = {};  ///< [x·3 + axis]: edges with a change of sign
-  /// Number of crossed edges in the words of `crossed` before each word.
+  /// [word]: number of crossed edges in the words of `crossed` before this word.
   std::array<std::uint16_t, 24> rank = {};
   std::size_t firstVertex = 0, vertexCount = 0;
   std::size_t firstTriangle = 0, triangleCount = 0;
-  /// Polygons of the cell table in this block's cells. A dual mesh has one vertex for each.
+  /// Number of polygons (CellCase) in all earlier blocks, and in this block's cells. A dual mesh
+  /// has one vertex for each polygon.
   std::size_t firstCycle = 0, cycleCount = 0;
   [[nodiscard]] float value(int offset) const { return values ? values[offset] : fill; }
 };
@@ -57,7 +58,7 @@ class CellSurface {
   [[nodiscard]] std::array<std::uint64_t, 8> cornerWords(const SurfaceBlock& block, int x) const;
   /// Returns the value at a grid point relative to the block, each coordinate in [0, 8].
   [[nodiscard]] float valueAt(const SurfaceBlock& block, int x, int y, int z) const;
-  /// Returns true when the grid point is inside. Accepts any point; slow.
+  /// Returns true when the grid point is inside. Accepts any grid point, but is slow.
   [[nodiscard]] bool isInside(const openvdb::Coord& point) const;
   /// Returns the number of the vertex on the crossed edge `edge` of the cell (x, y, z), with edges
   /// numbered as in cell_table.h.

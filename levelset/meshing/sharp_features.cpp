@@ -136,7 +136,8 @@ class FeatureInserter {
     return best && best->gap > kFeatureTolerance ? best : std::nullopt;
   }
 
-  /// Returns true when a triangle lies in a sheet of one of its vertices and faces the same side.
+  /// Returns true when a triangle lies in a sheet of one of its vertices and faces the side of the
+  /// sheet's normal.
   [[nodiscard]] bool fitsSheet(const Triangle& t) const {
     const Vec3d area =
         (positions_[t[1]] - positions_[t[0]]).cross(positions_[t[2]] - positions_[t[0]]);
@@ -373,7 +374,7 @@ class FeatureInserter {
   std::vector<std::size_t> faces_;
   std::map<std::array<int, 3>, std::vector<std::uint32_t>> corners_;  ///< corner vertices by cell
   bool hasChanged_ = false;    ///< true: this pass has changed the mesh
-  std::vector<bool> touched_;  ///< triangles that a flip has changed in this pass
+  std::vector<bool> touched_;  ///< [triangle]: true when a flip of this pass has changed it
 };
 
 /// Removes and returns the triangles in which edges of the solid are sought, usually a small part.

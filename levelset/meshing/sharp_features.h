@@ -30,11 +30,11 @@ inline constexpr double kOneSheetCosine = 0.9;
 
 /// Returns true when a segment runs in one sheet. It starts at a vertex with a sheet of normal `n`
 /// and ends at a vertex with the sheets `sheets`. The chord of a round face is perpendicular to the
-/// mean of the normals at its ends.
+/// mean of the normals at its ends, which the second test uses.
 /// @param to  vector from start to end, voxels
 [[nodiscard]] inline bool isInSheet(const openvdb::Vec3d& n, const openvdb::Vec3d& to,
                                     const VertexSheets& sheets) {
-  constexpr double kOff = 0.03;  // voxels
+  constexpr double kOff = 0.03;  // voxels: largest distance of the end from the sheet's plane
   if (std::abs(n.dot(to)) < kOff) return true;
   for (std::size_t i = 0; i < sheets.count; ++i) {
     const openvdb::Vec3d other = sheetNormal(sheets, i);
@@ -57,9 +57,9 @@ struct SheetQuality {
 /// them differ from the distances to the planes. A vertex moves to the point where the planes of
 /// its sheets meet. The planes come from the flattest parts nearby, since the field is not linear
 /// at the grid points next to an edge.
-/// @param field    field whose zero set the mesh is
-/// @param sheets   one for each vertex
-/// @param quality  one for each vertex
+/// @param field    field whose zero set `mesh` triangulates in index space
+/// @param sheets   sheets at each vertex; replaced where a flatter plane is nearby
+/// @param quality  accuracy of the sheets at each vertex
 /// @return true for each vertex near a confirmed edge
 [[nodiscard]] std::vector<bool> confirmFeatures(IndexMesh& mesh, const openvdb::FloatGrid& field,
                                                 std::vector<VertexSheets>& sheets,

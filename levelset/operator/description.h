@@ -25,7 +25,7 @@
 ///
 ///   // All further members may be left out.
 ///   static constexpr std::size_t operandCount = 1;
-///   static constexpr bool takesMore = false;          // further operands may follow
+///   static constexpr bool takesMore = false;          // true: accepts more operands
 ///   static constexpr Slope slope = Slope::Any;
 ///   static constexpr double partTolerance = 0;        // voxels: accuracy of regionOfInterest()
 ///   static constexpr bool makesPart = false;          // run() computes only OperatorRun::roi
@@ -54,8 +54,8 @@ struct OperatorText {
   const char* name = "";             ///< name of the action on the command line
   const char* group = "";            ///< heading in the help
   const char* summary = "";          ///< effect of the operator, one line
-  const char* details = "";          ///< facts that the option descriptions do not give
-  const char* example = "";          ///< a complete command line
+  const char* details = "";          ///< help text: facts that the option texts do not give
+  const char* example = "";          ///< a complete command line with this action
   const char* formerName = nullptr;  ///< former name that old scripts use; null: none
 };
 
@@ -75,7 +75,7 @@ struct ErrorModel {
   double order = 1;           ///< order of convergence in the voxel size
   double constant = 0;        ///< factor of the bound away from creases; 0: exact there
   double creaseConstant = 0;  ///< factor beside creases; 0: no new creases
-  const char* source = "";    ///< case of the regression suite that measured it, docs/regression.md
+  const char* source = "";    ///< regression case that measured the constants, docs/regression.md
 };
 
 // Constants of an ErrorModel for the triangulation of exact distances: kTriangleError on smooth
@@ -108,7 +108,7 @@ struct GivenOptions {
   [[nodiscard]] bool operator()(std::string_view option) const { return isGiven(option); }
 };
 
-/// Figures of a report, as pairs of key and value.
+/// Figures of an operator for the report of a run, as pairs of key and value.
 using Figures =
     std::vector<std::pair<std::string, std::variant<double, std::size_t, bool, std::string>>>;
 

@@ -33,7 +33,7 @@ enum class OptionUnit {
 enum class OptionRange { Any, Positive, NonNegative };
 
 struct OptionInfo {
-  const char* help = "";  ///< one line, a noun phrase or a condition
+  const char* help = "";  ///< help text: one line, a noun phrase or a condition
   OptionUnit unit = OptionUnit::None;
   OptionRange range = OptionRange::Any;
   bool required = false;

@@ -23,8 +23,8 @@ struct ValuePlan {
   [[nodiscard]] double layer() const;
 };
 
-/// Memory of a band for each active voxel, bytes. Measured, because only about a third of the
-/// voxels in the leaf blocks of a band are active.
+/// Memory of a band for each active voxel, bytes. Measured; it exceeds 4 bytes, because only about
+/// a third of the voxels in the leaf blocks of a band are active.
 inline constexpr double kBytesPerVoxel = 12;
 
 /// The box with all its faces moved outwards by `by`, in the unit of the box; negative: inwards. An

@@ -117,7 +117,7 @@ class Bases {
   }
   [[nodiscard]] bool areMoving() const { return static_cast<bool>(frames_); }
   [[nodiscard]] bool mustRead(std::size_t frame) const { return frames_ && frame != frame_; }
-  /// Hash of the base returned last.
+  /// Content hash of the base that at() returned last.
   [[nodiscard]] std::uint64_t hash() const { return hash_; }
 
  private:

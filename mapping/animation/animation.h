@@ -40,9 +40,9 @@ struct AnimationKey {
   std::size_t frame = 0;
 };
 
-/// Returns the level set of a frame, for example from a file. Frame 0 is passed separately and
-/// never requested. A frame may be requested more than once. Only one returned level set is kept at
-/// a time.
+/// Returns the level set of a frame, for example from a file. The level set of frame 0 is passed
+/// separately and never requested. A frame may be requested more than once. Only one returned level
+/// set is kept at a time.
 using BandFrames = std::function<levelset::NarrowBand(std::size_t frame)>;
 
 struct AnimationOptions {
@@ -56,7 +56,7 @@ struct AnimationOptions {
   levelset::Progress progress = {};
 };
 
-/// Changes of the patches at one frame.
+/// Report on the patches at one frame.
 struct FrameReport {
   std::size_t frame = 0;
   std::vector<std::array<Imath::V3d, 4>> corners;  ///< corners of each moved outline

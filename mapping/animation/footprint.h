@@ -38,8 +38,7 @@ struct Footprint {
 
 /// Moves the corners and the middle of an outline to the closest points of the zero set.
 /// @throws InvalidInput if there is no surface, or if a point is further from it than the diagonal
-/// of
-///         the zero set's box
+///         of the bounding box of the zero set
 [[nodiscard]] Footprint footprintOf(const levelset::NarrowBand& base, const PatchOutline& outline);
 
 /// Adds the geodesic coordinates of the corners relative to the centre: world units along u and
@@ -51,9 +50,10 @@ struct Footprint {
                                   bool keepsDirection = false);
 
 enum class CarryRule {
-  Corners,  ///< each corner goes to the nearest point of the new surface [Brodersen07 §10.2]
-  /// Moves the centre to the nearest point and rotates u by the least rotation between the normals.
-  /// The corners keep their geodesic coordinates, so that the patch keeps its shape.
+  Corners,  ///< each corner goes to the nearest point of the next base [Brodersen07 §10.2]
+  /// Moves the centre to the nearest point of the next base and rotates u by the least rotation
+  /// between the normals at both points. The corners keep their geodesic coordinates, so that the
+  /// patch keeps its shape.
   Rigid
 };
 
@@ -74,7 +74,7 @@ struct Drift {
   /// Largest factor of growth or shrinkage, at least 1.
   [[nodiscard]] double factor() const;
 };
-/// Computes the ratios of the lengths in `now` to those in `first`.
+/// Computes the ratios of the lengths of sides and diagonals in `now` to those in `first`.
 [[nodiscard]] Drift driftBetween(const Footprint& first, const Footprint& now);
 
 /// Moves a point rigidly with a patch, from the footprint `from` to `to`: u, v and the normal are

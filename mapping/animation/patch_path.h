@@ -31,7 +31,7 @@ class PatchPath {
             const std::vector<Imath::V3d>& guide = {});
 
   /// Footprint at a point of the path.
-  /// @param part  share of the path by arc length, 0 to 1; the ends give the original footprints
+  /// @param part  share of the path by arc length, 0 to 1; 0 and 1 give the original footprints
   /// @throws InvalidInput if the surface breaks off before a corner
   [[nodiscard]] Footprint at(double part) const;
 

@@ -94,7 +94,7 @@ Distortion surveyDistortion(std::span<const MapSample> samples, const V3d& textu
     stretches[2 * n] = stretch.least;
     stretches[2 * n + 1] = stretch.most;
   });
-  // The median volume ratio is insensitive to slivers and folds.
+  // The median of the volume ratios, patch to texture, is insensitive to slivers and folds.
   std::vector<double> volumes;
   for (const double jacobian : jacobians)
     if (jacobian > 0) volumes.push_back(1 / jacobian);

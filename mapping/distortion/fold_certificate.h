@@ -32,14 +32,15 @@ struct FoldPoint {
 struct FoldCertificate {
   static constexpr std::size_t kMostPoints = 5;
   std::size_t pieces = 0;  ///< number of tetrahedra, parts of cells, or cubes that were tested
-  /// Shares of the volume, in the domain of the map, that certainly fold and that remain undecided.
+  /// Shares of the tested volume that certainly fold and that remain undecided. The volume is in
+  /// world space for smooth maps, in texture space otherwise.
   double foldedShare = 0, undecidedShare = 0;
   /// Least Jacobian determinant found, divided by the median determinant; 1 if the patch is a box,
   /// ≤ 0 at folds. Prism maps and meshes use the determinant of texture → patch, smooth maps that
   /// of patch → texture, each in the direction in which the map is defined.
   double leastJacobian = 0;
   double unit = 1;  ///< the median determinant: world units³ per unit cube, or its reciprocal
-  /// Points of different cells, the worst first; at most kMostPoints.
+  /// Folds in different cells or cubes, the least Jacobian first; at most kMostPoints.
   std::vector<FoldPoint> worst;
 
   [[nodiscard]] FoldVerdict verdict() const {

@@ -51,7 +51,7 @@ class LeastGrid {
       for (c[1] = ceiling(low[1]); c[1] <= high[1]; ++c[1])
         for (c[2] = ceiling(low[2]); c[2] <= high[2]; ++c[2]) {
           const auto shares = barycentric(corners, levelset::toImath(grid_->indexToWorld(c)));
-          // Points on a face belong to both of its tetrahedra.
+          // Grid points on a face belong to both tetrahedra at the face, even after rounding.
           constexpr double kOnAFace = -1e-9;
           if (std::all_of(shares.begin(), shares.end(), [](double s) { return s >= kOnAFace; }))
             visit(c, shares);

@@ -6,7 +6,8 @@
 
 #include "mapping/fast_sums/rbf_sum.h"
 
-/// Variants of the vector code behind addRbfSums, for tests that compare them.
+/// Variants of the vector code behind addRbfSums, one for each instruction set, for tests that
+/// compare them.
 namespace mapping {
 
 /// Adds weight × φ(distance) of `count` particles to the sums u, v and w at `points` points.

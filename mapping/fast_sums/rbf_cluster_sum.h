@@ -19,9 +19,8 @@ namespace mapping {
 /// no proven bound; addRbfSums() gives the exact value.
 class RbfClusterSum {
  public:
-  /// @param points  particles in the order of a ClusterTree, so that its order() is 0, 1, 2, …;
-  /// must
-  ///                outlive this object
+  /// @param points  particles in the order of a ClusterTree, so that the tree's order() is 0, 1, 2,
+  ///         …; must outlive this object
   /// @param nodes   nodes of that tree; must outlive this object
   RbfClusterSum(RbfKernel kernel, std::span<const Imath::V3d> points,
                 std::span<const ClusterTree::Node> nodes);

@@ -175,7 +175,8 @@ struct Gaussian {
     return 2 * at * std::exp(-at * at);
   }
   static double bendBound(double lo, double) {
-    const double squared = lo * lo;  // (4r² − 2) exp(−r²) has another maximum at r² = 3/2
+    // |φ″| = |4r² − 2| exp(−r²) is 2 at r = 0 and has a second maximum at r² = 3/2.
+    const double squared = lo * lo;
     if (squared > 1.5) return (4 * squared - 2) * std::exp(-squared);
     return std::max(2 * std::exp(-squared), 4 * std::exp(-1.5));
   }
@@ -184,7 +185,7 @@ struct Gaussian {
 
 }  // namespace rbf
 
-/// Calls `use` with the struct of the kernel.
+/// Calls `use` with an object of the kernel's struct in `rbf`.
 template <typename Use>
 decltype(auto) withKernel(RbfKernel kernel, const Use& use) {
   switch (kernel) {
