@@ -157,7 +157,7 @@ NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphO
     if (options.farthest || !pair.fallsShort(reach)) break;
   }
 
-  // === Steps
+  // === Steps of the morph
   NarrowBand result;
   const auto fractionOf = [&](int step) {
     return kUntilDistances + (1 - kUntilDistances) * step / options.steps;

@@ -8,7 +8,7 @@ namespace levelset {
 /// Computes the union of all balls of radius `radius` that fit into the solid. Parts thinner than
 /// twice the radius disappear. Convex edges become round; concave edges and thicker parts stay.
 /// Offsets the solid inwards, then outwards.
-/// @param radius  world units, ≥ 0
+/// @param radius  radius of the balls, world units, ≥ 0
 /// @throws UsageError unless `radius` is finite and ≥ 0
 /// @throws InvalidInput if `solid` or the result is empty
 /// @throws ResourceLimit if the memory estimate exceeds the limit
@@ -19,7 +19,7 @@ namespace levelset {
 /// Computes the complement of all balls of radius `radius` that fit outside the solid. Fills gaps
 /// narrower than twice the radius and rounds concave edges. Offsets the solid outwards, then
 /// inwards.
-/// @param radius  world units, ≥ 0
+/// @param radius  radius of the balls, world units, ≥ 0
 /// @throws as opening()
 [[nodiscard]] NarrowBand closing(const NarrowBand& solid, double radius,
                                  const OffsetOptions& options = {});
@@ -31,7 +31,7 @@ enum class ShellSide {
 };
 
 /// Hollows a solid: keeps a wall along its surface.
-/// @param thickness  world units, at least one voxel
+/// @param thickness  thickness of the wall, world units, at least one voxel
 /// @throws UsageError unless `thickness` is finite and positive
 /// @throws InvalidInput if `solid` is empty, the wall is thinner than a voxel, or the solid is too
 ///         thin for a cavity

@@ -19,8 +19,8 @@ struct OffsetOptions {
 };
 
 /// Offsets the surface along its normal by `distance`; a positive distance grows the solid.
-/// Computes distances as far as the new zero set and re-distances once, for any `distance`.
-/// @param distance  world units, any sign
+/// Computes distances up to the new zero set and re-distances once, for any `distance`.
+/// @param distance  displacement of the surface, world units, any sign
 /// @throws UsageError if `distance` is not finite
 /// @throws InvalidInput if `solid` or the result is empty
 /// @throws ResourceLimit if the memory estimate exceeds the limit, before any allocation
@@ -33,9 +33,9 @@ struct OffsetOptions {
 /// point of x), re-distanced once. Parts of the surface with `distance` 0 stay. Overhangs cannot
 /// occur: where the distance varies too fast along the surface, the new surface passes through the
 /// farthest point along each normal.
-/// @param distance  world units, any sign
+/// @param distance  displacement at a point of the surface, world units, any sign
 /// @throws as offset()
-/// @throws InvalidInput if `distance` is not finite at a point; names the point
+/// @throws InvalidInput if `distance` is not finite at a point, which the message gives
 [[nodiscard]] NarrowBand offsetBy(NarrowBand solid, const ScalarField& distance,
                                   const OffsetOptions& options = {});
 

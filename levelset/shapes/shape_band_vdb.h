@@ -16,8 +16,7 @@ namespace levelset {
 
 /// Builds the band of a solid from a distance function.
 /// @param distance  double(const V3d&): signed distance at a world position, negative inside.
-/// Outside
-///                  the band, any lower bound of its magnitude with the correct sign suffices.
+///         Outside the band, any lower bound of its magnitude with the correct sign suffices.
 /// @throws as checkShape()
 /// @throws InvalidInput if no grid point lies inside
 template <typename Distance>

@@ -44,8 +44,8 @@ constexpr double kThickened = 4;
 /// values to distances in the target.
 struct Placement {
   Imath::M44d targetToSource, sourceToTarget;
-  /// Factor from source values to target distances: the smallest stretch of the transform, so that
-  /// a scaled value is at most the distance.
+  /// Factor from source values to target distances: the smallest stretch of the transform applied
+  /// to the solid, so that a scaled value is at most the distance.
   double scale;
   double targetVoxel;  ///< voxel size of the target, world units
   double sourceVoxel;  ///< smallest voxel size of the source, world units

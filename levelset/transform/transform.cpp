@@ -127,7 +127,7 @@ TriMesh transform(TriMesh mesh, const Imath::M44d& matrix) {
   const Stretch stretch = stretchOf(matrix);
   requireStretch(stretch);
   mesh.spacing = coordinateSpacing(mesh) * stretch.greatest;
-  mesh.precision = CoordinatePrecision::Double;  // transformed coordinates need more digits
+  mesh.precision = CoordinatePrecision::Double;  // transformed coordinates may need more digits
   for (Imath::V3d& position : mesh.positions) {
     Imath::V3d moved;
     matrix.multVecMatrix(position, moved);

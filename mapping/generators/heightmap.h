@@ -11,13 +11,13 @@ namespace mapping {
 
 /// Heights at the nodes of a rectangular grid, like the pixels of a picture.
 struct HeightGrid {
-  int columns = 0, rows = 0;    ///< at least 2 of each
+  int columns = 0, rows = 0;    ///< numbers of nodes along x and y, each at least 2
   std::vector<double> heights;  ///< rows × columns, values 0 … 1; the first row has the largest y
 };
 
 enum class HeightInterpolation {
   Linear,  ///< linear along each axis, with creases along the grid lines
-  Cubic  ///< cubic convolution [Keys81]: smooth; may exceed the nodes by up to 0.29 of their range
+  Cubic    ///< cubic convolution [Keys81]: smooth; may exceed the range of values by up to 29 %
 };
 
 struct Heightmap {

@@ -13,8 +13,8 @@ enum class KnurlPattern {
 };
 
 /// A plate with V-grooves in its top, as pressed by knurling wheels [DIN82]. A tile of the diamond
-/// pattern holds two diamonds for each column and row. A tile of the straight pattern is one pitch
-/// long.
+/// pattern holds two diamonds for each column and row. Each column and each row of the straight
+/// pattern is one pitch wide.
 struct Knurl {
   KnurlPattern pattern = KnurlPattern::Diamond;
   double pitch = 1;  ///< distance of neighbouring grooves, measured across them, world units

@@ -145,7 +145,7 @@ V3d ringHalfSize(const Ring& ring) {
   return {outer, outer * c + half * s, outer * s + half * c};
 }
 
-/// Centre of the bounding box of all rings, relative to the centre of ring (0, 0).
+/// Centre of the bounding box of all rings, relative to the centre of ring (0, 0), world units.
 V3d sheetMiddle(const Ring& ring) {
   const V2d spacing = ringSpacing(ring);
   const double aside = ring.rows > 1 ? 0.5 : 0;

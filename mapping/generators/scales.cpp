@@ -88,8 +88,8 @@ class ScaleOutline {
   }
 
   /// Signed distance to the outline moved inwards by the rounding.
-  /// @param u  coordinate from the root to the tip
-  /// @param v  coordinate across, from the middle of the nearest scale
+  /// @param u  distance from the root towards the tip, in the plane of the scale
+  /// @param v  coordinate along x, from the middle of the nearest scale
   [[nodiscard]] double distance(double u, double v) const {
     v = std::abs(v);
     const double along = u - middle_, across = v + aside_;

@@ -12,7 +12,7 @@ namespace mapping {
 struct Scales {
   /// Length of a scale along its slope, from the plate to its tip, world units.
   double length = 1.4;
-  double width = 1;           ///< width of a scale, and distance between scales of a row
+  double width = 1;           ///< width of a scale and distance of scales in a row, world units
   double thickness = 0;       ///< thickness of a scale, world units; 0: solid down to the plate
   double tilt = 0.349065850;  ///< angle of a scale to the plate, radians
   double step = 0;            ///< distance between rows, world units; 0: half a length
@@ -32,7 +32,7 @@ void checkScales(const Scales& scales, const Imath::V3d& center, double voxelSiz
 /// Builds scales.
 /// @throws UsageError for lengths and angles out of range, tips longer than their scales, and rows
 ///         that do not overlap
-/// @throws InvalidInput for a width or thickness under two voxels
+/// @throws InvalidInput for a width, a thickness, or a gap under the tips, of less than two voxels
 /// @throws ResourceLimit if the memory estimate exceeds the limit
 /// @throws Cancelled if the progress callback cancels
 [[nodiscard]] levelset::NarrowBand makeScales(const Scales& scales, const Imath::V3d& center,
