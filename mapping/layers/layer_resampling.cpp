@@ -37,7 +37,8 @@ V3d positionAt(const ParticleLayer& layer, double x, double y) {
   return along(row, layer.rows, y);
 }
 
-/// Turns the rim into ordinary rows and columns, which shifts each position by one along both axes.
+/// Turns the rim into ordinary rows and columns, which shifts the index of each particle by one
+/// along both axes.
 ParticleLayer withRimInside(const ParticleLayer& layer) {
   ParticleLayer wide;
   wide.columns = layer.columns + 2;
@@ -86,7 +87,7 @@ ParticleLayer withCounts(const ParticleLayer& layer, std::size_t columns, std::s
 
 std::vector<EmbeddedParticle> embeddedParticles(const Patch& patch, double embedDepth) {
   // Least distance between neighbouring columns, as a share of their distance on the outermost
-  // layer. Columns that come closer get no embedded particle.
+  // layer. Where columns come closer, no embedded particle is added.
   constexpr double kLeastShare = 0.25;
   // Largest distance of embedded layers, in layer spacings of the patch.
   constexpr double kWidest = 1.1;

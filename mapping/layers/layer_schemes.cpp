@@ -20,7 +20,7 @@ double shareOf(std::size_t k, std::size_t count) {
   return static_cast<double>(k) / static_cast<double>(count - 1);
 }
 
-/// Copy of a layer, with the same counts and rim, at another height.
+/// Copy of a layer with the same particles and rim, but other w and height.
 ParticleLayer layerLike(const ParticleLayer& surface, double w, double height) {
   ParticleLayer layer = surface;
   layer.w = w;
@@ -82,8 +82,8 @@ ParticleLayer advected(const levelset::NarrowBand& space, const ParticleLayer& s
   return top;
 }
 
-/// Interpolates linearly between the surface and the top layer, along the straight path of each
-/// particle.
+/// Interpolates linearly at w between the positions of each particle on the surface and on the top
+/// layer.
 ParticleLayer between(const ParticleLayer& surface, const ParticleLayer& top, double height,
                       double w) {
   ParticleLayer layer = layerLike(surface, w, w * height);
@@ -95,7 +95,7 @@ ParticleLayer between(const ParticleLayer& surface, const ParticleLayer& top, do
 }
 
 /// Returns a guard whose spheres have a diameter of a twentieth of the least distance between
-/// neighbours.
+/// neighbouring particles.
 TravelGuard guardOf(const ParticleLayer& surface) {
   constexpr double kShare = 0.05;
   double least = HUGE_VAL;
@@ -169,7 +169,8 @@ V3d SweepCurve::position(double length) const {
 }
 
 V3d SweepCurve::tangent(double length) const {
-  // Interpolates between the directions of two segments; t = 0 and 1 are their middles.
+  // Interpolates between the directions of two segments; t = 0 and 1 are the middles of the
+  // segments.
   const std::size_t i = segment(length);
   const double middle = 0.5 * (lengths_[i] + lengths_[i + 1]);
   const std::size_t j =
@@ -185,7 +186,9 @@ V3d SweepCurve::tangent(double length) const {
 SplineSweep splineLayers(const ParticleLayer& surface, const SweepCurve& curve, double height,
                          std::size_t count, bool isFaded) {
   constexpr std::size_t kSteps = 32;  // integration steps between two layers
-  constexpr double kCrawl = 0.02;  // least forward motion in a step, as a share of the curve's own
+  // Least forward motion of a particle in a step, as a share of the length that the step covers on
+  // the curve.
+  constexpr double kCrawl = 0.02;
   SplineSweep sweep;
   sweep.layers.push_back(layerLike(surface, 0, 0));
   ParticleLayer layer = surface;

@@ -19,8 +19,8 @@ std::string text(const V3d& p) {
   return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x, p.y, p.z);
 }
 
-/// Coons patch: blends opposite sides and subtracts the bilinear corner term. Exact on planes, and
-/// nearly exact on quadrics.
+/// Position of a particle by a Coons patch: blends opposite sides and subtracts the bilinear corner
+/// term. Lies on the surface if that is a plane, and nearly so for a quadric.
 V3d coons(const PatchSides& border, const ParticleLayer& layer, std::size_t column,
           std::size_t row) {
   const double u = static_cast<double>(column) / static_cast<double>(layer.columns - 1);
@@ -58,7 +58,8 @@ bool sweepBlended(const SurfaceField& field, const SurfaceField& guide, const Pa
                     4 * v / static_cast<double>(layer.rows - 1));
 }
 
-/// Fills the layer by geodesics between opposite side points, which never leave the surface.
+/// Fills the rows of the layer by geodesics between opposite points of its sides, which never leave
+/// the surface.
 void sweepGeodesics(const SurfaceField& field, const std::vector<V3d>& firstRow,
                     ParticleLayer& layer) {
   std::vector<V3d> path = firstRow;
@@ -82,10 +83,11 @@ void sweepGeodesics(const SurfaceField& field, const std::vector<V3d>& firstRow,
   }
 }
 
-/// Joins shortest paths through all knots.
+/// Joins shortest paths between successive knots: the corners of a side and the given points
+/// between them.
 /// @param longest  largest length of a path between two knots
 /// @return empty if two knots are not connected, or only by a longer path; `gap` is then the index
-///         of the first knot of that pair
+///         of the first of the two knots
 std::vector<V3d> sideThrough(const SurfaceField& field, double height,
                              const std::vector<V3d>& knots, const std::vector<V3d>* below,
                              double longest, std::size_t& gap) {
@@ -222,8 +224,8 @@ void advectPoints(const levelset::NarrowBand& band, double from, double to, std:
 
 void raisePoints(const levelset::NarrowBand& band, double height, std::span<const V3d> directions,
                  std::span<V3d> points) {
-  // Longest path, as a multiple of the height difference: a direction that leans by 84 degrees
-  // needs this length.
+  // Longest straight path of a point, as a multiple of the height difference: a direction that
+  // leans by 84 degrees needs this length.
   constexpr double kFarthest = 10;
   constexpr int kHalvings = 40;
   const SurfaceField field(band);
@@ -247,7 +249,8 @@ void raisePoints(const levelset::NarrowBand& band, double height, std::span<cons
       const double middle = 0.5 * (below + above);
       (isAbove(middle) ? above : below) = middle;
     }
-    // The band holds distances only in the swept region. Values jump at its end.
+    // The band holds distances only in the region above the patch that was swept. Values jump at
+    // its end.
     if (field.value(points[i] + directions[i] * above) - height > 0.1 * field.voxelSize()) {
       throw InvalidInput(
           fmt::format("the ray from {} along {} leaves the region above the patch before "

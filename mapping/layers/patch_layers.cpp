@@ -20,7 +20,7 @@ using levelset::NarrowBand;
 using levelset::UsageError;
 
 // The linear system of an RBF map is dense: n³ / 3 operations and n² numbers for n particles. This
-// many particles cost a second or two, and are five to ten voxels apart on a patch of 100 to 200
+// many particles take a second or two, and are five to ten voxels apart on a patch of 100 to 200
 // voxels.
 constexpr double kParticleBudget = 2000;
 constexpr double kSmallestSpacing = 1.5;  // voxels; closer particles carry no more information
@@ -60,8 +60,8 @@ struct Counts {
 };
 
 /// Calls refit(layer, counts) for each layer above the surface whose particle spacing along u or v
-/// differs by over a quarter from that on the surface. If no spacing is requested and the automatic
-/// spacing for all layers together is wider than that on the surface, the automatic spacing is the
+/// differs by over a quarter from that on the surface. If no spacing is requested and
+/// chooseSpacing() for all layers gives more than the spacing on the surface, that value is the
 /// reference.
 /// @throws ResourceLimit as checkParticleCount
 template <typename Refit>
@@ -235,8 +235,8 @@ std::vector<ParticleLayer> layersFromSurface(const NarrowBand& base, const Parti
     std::vector<ParticleLayer> layers = conformingLayers(space, surface, height, options.layers);
     if (options.cells[0] == 0) {
       keepDensity(base, layers, height, options, [&](ParticleLayer& layer, const Counts& n) {
-        // Resampled particles start on the surface like the original ones, even where the surface
-        // has relief between the original ones.
+        // Resampled particles start on the surface like the original particles, even where the
+        // surface has relief between them.
         ParticleLayer start = withCounts(surface, n.columns, n.rows);
         const SurfaceField field(base);
         for (V3d& p : start.positions) (void)field.project(p, 0);
@@ -286,7 +286,8 @@ void requireCovered(const NarrowBand& base, const ParticleLayer& layer) {
         place.x, place.y, place.z));
   };
   for (const V3d& p : layer.positions) require(p);
-  // Voxels between samples: at least two lie beyond the border in a slit of four voxels.
+  // Distance between samples, voxels. In a slit four voxels wide, at least two samples then lie
+  // more than a voxel beyond the border of the surface.
   constexpr double kStepVoxels = 1;
   const auto steps = [&](const V3d& along) {
     return std::ceil(along.length() / (kStepVoxels * base.voxelSize()));

@@ -16,7 +16,8 @@ namespace {
 using Imath::V3d;
 
 constexpr std::size_t kMaxIterations = 1000;
-// Largest displacement of a particle at rest, voxels per iteration.
+// Largest displacement of any particle in an iteration after which the layer counts as at rest,
+// voxels.
 constexpr double kAtRest = 1e-3;
 // Twelve springs of unit stiffness act on a particle. 1/12 is the longest step whose overshoot the
 // momentum can compensate.
@@ -27,7 +28,8 @@ double fractionOf(std::size_t k, std::size_t count) {
   return static_cast<double>(k) / static_cast<double>(count - 1);
 }
 
-/// Bilinear interpolation at fractions u, v of a layer's columns and rows, between four particles.
+/// Bilinear interpolation of values at the particles, at fractions u, v (0 to 1) of a layer's
+/// columns and rows.
 struct Between {
   std::size_t corner, columns;
   double s, t;
@@ -50,7 +52,7 @@ struct Between {
 };
 
 struct Spring {
-  int columns, rows;  // offset of the neighbour
+  int columns, rows;  // offset of the neighbouring particle in the grid of the layer
 };
 constexpr std::array<Spring, 12> kSprings = {{{1, 0},
                                               {-1, 0},
@@ -65,8 +67,8 @@ constexpr std::array<Spring, 12> kSprings = {{{1, 0},
                                               {0, 2},
                                               {0, -2}}};  // flexion
 
-/// Rest lengths of the springs. They are interpolated linearly between the mean spacings of two
-/// opposite borders.
+/// Rest lengths of the springs. They are interpolated linearly between the mean spacings of the
+/// particles on two opposite borders.
 struct RestLengths {
   /// Element 0: springs between neighbours. Element 1: springs between particles two apart; on a
   /// bent surface these are less than twice as long.
@@ -155,8 +157,8 @@ void closeRing(std::vector<V3d>& positions, std::size_t columns) {
 
 Relaxation settle(const levelset::NarrowBand& band, ParticleLayer& layer, bool isRing);
 
-/// Corrects long-range displacements on coarser layers first, because springs propagate them by
-/// only one particle per iteration.
+/// Corrects long-range displacements on coarser copies of the layer first, because springs
+/// propagate them by only one particle per iteration.
 void settleCoarsely(const levelset::NarrowBand& band, ParticleLayer& layer, bool isRing) {
   constexpr std::size_t kFewestToCoarsen = 8;
   if (std::min(layer.columns, layer.rows) < kFewestToCoarsen) return;

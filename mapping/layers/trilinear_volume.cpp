@@ -11,12 +11,13 @@ namespace {
 
 using Imath::V3d;
 
-// The coefficient of degrees i, j, k in u, v, w is at 9 i + 3 j + k.
+// Bernstein coefficients of degree two in u, v and w. Coefficient i, j, k is at 9 i + 3 j + k.
 using Bernstein = std::array<double, 27>;
 constexpr std::array<std::size_t, 3> kBernsteinStep = {9, 3, 1};
 
-/// Edge vectors of the image of the unit cube. In along[axis][n], bits 0 and 1 of n select the ends
-/// along the two axes that follow `axis`. longest[axis] is the largest length along an axis.
+/// Edge vectors of the image of the unit cube, world units. In along[axis][n], bits 0 and 1 of n
+/// select the ends along the two axes that follow `axis`. longest[axis] is the largest length along
+/// an axis.
 struct CornerEdges {
   std::array<std::array<V3d, 4>, 3> along;
   std::array<double, 3> longest{};
@@ -34,8 +35,9 @@ struct CornerEdges {
   }
 };
 
-/// Bernstein coefficients of det(∂x/∂u, ∂x/∂v, ∂x/∂w). Each factor is linear in the two other axes.
-/// The middle coefficient of a product of two linear functions is the mean of the mixed products.
+/// Bernstein coefficients of det(∂x/∂u, ∂x/∂v, ∂x/∂w). Along each axis, the derivatives along the
+/// two other axes are linear. The middle Bernstein coefficient of the product of two linear
+/// functions is the mean of the mixed products.
 Bernstein coefficientsOf(const CornerEdges& edges, double hand) {
   Bernstein sums{};
   for (std::size_t u = 0; u < 4; ++u)      // edge along u; bits 0 and 1: ends along v, w
@@ -65,7 +67,7 @@ void halve(const Bernstein& whole, std::size_t axis, Bernstein& low, Bernstein& 
   }
 }
 
-/// Axis along which the coefficients change most.
+/// Axis along which neighbouring coefficients differ most.
 std::size_t liveliestAxis(const Bernstein& values) {
   std::array<double, 3> change{};
   for (std::size_t axis = 0; axis < 3; ++axis)

@@ -28,7 +28,7 @@ using levelset::InvalidInput;
 using levelset::NarrowBand;
 using levelset::UsageError;
 
-// Sine of 1.1 degrees, the least angle between the direction and the normal.
+// Sine of 1.1 degrees, the least angle between the given direction of u and the surface normal.
 constexpr double kLeastTangent = 0.02;
 
 /// Centre of the exponential map of one layer, and the unit directions of u and v at the centre.
@@ -67,7 +67,8 @@ std::string smallerRadius(double radius) {
   return fmt::format("use a radius below {:.4g}", radius);
 }
 
-/// Traces a geodesic to each particle of the layer.
+/// Traces a geodesic from the centre of the frame to each particle of the layer, and stores its
+/// end.
 /// @throws InvalidInput where the surface breaks off
 void walkToParticles(const NarrowBand& band, const DecalFrame& frame, double radius,
                      ParticleLayer& layer) {
@@ -117,8 +118,8 @@ std::vector<V3d> particleNormals(const NarrowBand& band, const ParticleLayer& la
   return normals;
 }
 
-/// Projection of a cell's area vector onto its normals, up to a factor; positive if the cell is not
-/// inverted.
+/// Projection of a cell's area vector onto the surface normals at its corners, up to a factor.
+/// Without mirroring, it is positive if the cell is not inverted.
 double facing(const ParticleLayer& layer, const std::vector<V3d>& normals, std::size_t column,
               std::size_t row) {
   const std::size_t a = row * layer.columns + column, b = a + 1, c = a + layer.columns, d = c + 1;
@@ -132,14 +133,15 @@ double facing(const ParticleLayer& layer, const std::vector<V3d>& normals, std::
 struct Trouble {
   double radius = std::numeric_limits<double>::infinity();
   V3d place{0};
-  /// Message after "the decal", with a placeholder for `place`; the advice on the radius follows.
+  /// Part of the message after "the decal", with a placeholder for `place`; advice on the radius
+  /// follows it.
   const char* sentence = "";
   void note(double at, const V3d& where, const char* what) {
     if (at < radius) *this = {at, where, what};
   }
 };
 
-/// Finds cells that are inverted, or that pass through the solid.
+/// Finds cells that are inverted, or that pass through the solid because it is thinner than a cell.
 void findFolds(const ParticleLayer& layer, const std::vector<V3d>& normals, double radius,
                bool isMirrored, Trouble& trouble) {
   constexpr double kOpposite = -0.5;
@@ -165,7 +167,8 @@ void findFolds(const ParticleLayer& layer, const std::vector<V3d>& normals, doub
     }
 }
 
-/// Finds particles that nearly coincide but are not neighbours in the grid of the layer.
+/// Finds particles that nearly coincide but are at least kNeighbours rows or columns apart in the
+/// layer.
 void findOverlaps(const ParticleLayer& layer, const std::vector<V3d>& normals, double radius,
                   Trouble& trouble) {
   constexpr double kNear = 0.75;  // largest distance of coinciding particles, particle spacings
@@ -246,8 +249,9 @@ std::vector<std::vector<V3d>> spokes(const NarrowBand& band, const DecalFrame& f
   return result;
 }
 
-/// Moves the frame up by one layer. The centre and the ends of the spokes, the geodesics from it to
-/// the middles of the sides, move along ∇φ.
+/// Moves the frame up by one layer. The centre moves along ∇φ, and so do the ends of `paths`, the
+/// geodesics from it to the middles of the sides.
+/// @return mean ratio of the new lengths of the paths to the old ones
 double raiseFrame(const NarrowBand& space, double from, double to, DecalFrame& frame,
                   std::vector<std::vector<V3d>>& paths) {
   std::vector<V3d> points = {frame.center};

@@ -32,7 +32,7 @@ void checkPatchArguments(const std::array<V3d, 4>& corners, double height,
 
 struct Outline {
   std::array<V3d, 4> corners;
-  /// Points on the sides between the corners, in the order of PatchOptions::sides.
+  /// Points through which the sides pass between the corners, in the order of PatchOptions::sides.
   PatchSides between;
 };
 
@@ -160,8 +160,8 @@ Outline projectOutline(const NarrowBand& base, const std::array<V3d, 4>& corners
   return outline;
 }
 
-/// Builds a layer of particles between its sides. The counts follow from the spacing, unless the
-/// options give them.
+/// Builds a layer of particles between its sides. The numbers of columns and rows follow from the
+/// spacing, unless options.cells gives them.
 ParticleLayer filledLayer(const NarrowBand& band, const NarrowBand& guide, const LayerSides& border,
                           double height, double spacing, const PatchOptions& options,
                           PatchReport& report) {
@@ -180,7 +180,8 @@ ParticleLayer filledLayer(const NarrowBand& band, const NarrowBand& guide, const
 struct Rise {
   std::vector<V3d> corners;
   std::array<std::vector<V3d>, 4> between;
-  double lean = 0;  ///< largest sideways displacement per unit of height
+  /// Largest sideways displacement of a corner per unit of height.
+  double lean = 0;
 };
 
 /// Returns the unit direction in which each corner rises; empty if the corners rise along ∇φ.
@@ -227,8 +228,8 @@ Rise riseOf(const NarrowBand& base, const Outline& outline, const PatchOptions& 
   return rise;
 }
 
-/// Moves the corners and the given points on the sides from the layer at height `from` to height
-/// `to`.
+/// Moves the corners and the given points on the sides of the patch from the layer at height `from`
+/// to height `to`.
 void raiseOutline(const NarrowBand& space, const Rise& rise, double from, double to,
                   Outline& outline) {
   if (rise.corners.empty()) {
@@ -241,8 +242,8 @@ void raiseOutline(const NarrowBand& space, const Rise& rise, double from, double
     raisePoints(space, to, rise.between[side], outline.between[side]);
 }
 
-/// Scheme B: builds the sides of each layer from its own advected corners, and a complete patch
-/// between them.
+/// Scheme B: builds the sides of each layer between its own corners, moved up from the layer below,
+/// and fills each layer with particles between its sides.
 std::vector<ParticleLayer> reducedLayers(const NarrowBand& base, Outline outline,
                                          std::vector<LayerSides> sides, double height,
                                          const PatchOptions& options, PatchReport& report) {
@@ -255,7 +256,7 @@ std::vector<ParticleLayer> reducedLayers(const NarrowBand& base, Outline outline
     sides.push_back(makeLayerSides(space, layer, outline.corners, outline.between,
                                    &sides.back().sides, &sides.front().sides));
   }
-  // Sizes that the layers will have after tapering.
+  // Sizes that the layers will have after LayerTransform::taper.
   const auto scaleOf = [&](const LayerSides& border) {
     return std::lerp(1.0, options.transform.taper, border.height / height);
   };
@@ -275,7 +276,7 @@ std::vector<ParticleLayer> reducedLayers(const NarrowBand& base, Outline outline
   return layers;
 }
 
-/// Schemes A and C: builds one patch on the surface, whose particles then move.
+/// Schemes A and C: builds the layer at w = 0, whose particles then move up to the other layers.
 std::vector<ParticleLayer> travellingLayers(const NarrowBand& base, const LayerSides& sides,
                                             double height, const PatchOptions& options,
                                             PatchReport& report) {

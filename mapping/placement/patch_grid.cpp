@@ -25,9 +25,9 @@ using levelset::InvalidInput;
 using levelset::NarrowBand;
 using levelset::UsageError;
 
-// Particles of one tile on all layers, the same as for a single patch.
+// Target for the number of particles of one tile on all layers, the same as for a single patch.
 constexpr double kMostPerTile = 2000;
-// Particles of all tiles on all layers; relaxation slows down with their number.
+// Target for the number of particles of all tiles on all layers; relaxation slows down with it.
 constexpr double kMostPerGrid = 20000;
 constexpr std::size_t kFewestCells = 4;  // cells along each side of a tile
 
@@ -83,7 +83,7 @@ struct Tile {
 };
 
 /// Cuts the part of a layer that belongs to a tile. Its rim consists of particles of the
-/// neighbouring tiles.
+/// neighbouring tiles, or of the layer's rim at the border of the layer.
 ParticleLayer cut(const ParticleLayer& whole, const Tile& tile, bool isRing) {
   ParticleLayer part;
   part.columns = tile.columns + 1;
@@ -139,8 +139,9 @@ std::vector<Patch> cutTiles(const Sheet& sheet, const PatchGridOptions& grid) {
   return patches;
 }
 
-/// An axis and two unit directions perpendicular to it. `out` points to the border between the last
-/// and the first column of tiles, `side` a quarter turn further.
+/// An axis (`from`, unit direction `along`, `length`) and two unit directions perpendicular to it.
+/// `out` points to the border between the last and the first column of tiles, `side` a quarter turn
+/// further.
 struct RoundFrame {
   V3d from, along, out, side;
   double length;
@@ -193,8 +194,8 @@ V3d seenFromOutside(const SurfaceField& field, const V3d& axis, const V3d& direc
   return axis + direction * (0.5 * (inner + outer));
 }
 
-/// Builds the surface layer. Particles of the first and last row are evenly spaced along the row,
-/// those of the other rows lie at equal angles about the axis.
+/// Builds the layer at w = 0 all around the axis. Particles of the first and last row are evenly
+/// spaced along the row, those of the other rows lie at equal angles about the axis.
 ParticleLayer roundLayer(const NarrowBand& base, const RoundFrame& frame, std::size_t columns,
                          std::size_t rows) {
   const SurfaceField field(base);
@@ -225,9 +226,10 @@ ParticleLayer roundLayer(const NarrowBand& base, const RoundFrame& frame, std::s
 }
 
 /// Checks that the surface around the axis is a single sheet, without jumps.
-/// @throws InvalidInput where neighbours are too far apart
+/// @throws InvalidInput where neighbouring particles are too far apart
 void requireOneSheet(const ParticleLayer& layer) {
-  // Largest distance of neighbours, as a multiple of their mean distance along u or v.
+  // Largest distance of neighbouring particles along u or v, as a multiple of the mean distance in
+  // that direction.
   constexpr double kFarthest = 4;
   for (const auto& [across, up] : {std::pair<std::size_t, std::size_t>{1, 0}, {0, 1}}) {
     std::vector<std::pair<double, V3d>> steps;
@@ -248,8 +250,8 @@ void requireOneSheet(const ParticleLayer& layer) {
   }
 }
 
-/// Adds the rim: it repeats the particles around the axis, and continues the columns straight at
-/// the two ends.
+/// Adds the rim of a closed ring: around the axis it repeats particles of the ring, and at the two
+/// ends it continues the columns straight.
 void addRoundRim(const NarrowBand& band, ParticleLayer& layer) {
   addRim(band, layer);
   const auto last = static_cast<int>(layer.columns) - 1, rows = static_cast<int>(layer.rows);

@@ -25,10 +25,10 @@ using Imath::V3d;
 using levelset::InvalidInput;
 using levelset::NarrowBand;
 
-// Number of positions tried for each requested patch.
+// Largest number of positions tried for each requested patch.
 constexpr std::size_t kTriesPerPatch = 3;
-// A patch that fills a gap may be closer to other patches than their least distance, by this
-// factor.
+// A patch at a spare position may come closer to others than their least distance: down to this
+// share of it.
 constexpr double kGapShare = 0.75;
 
 /// A random number in [−1, 1) for the position with this index, independent of the other positions.
@@ -40,7 +40,7 @@ double luckAt(std::uint64_t seed, std::size_t index) {
   return 2 * (static_cast<double>(z >> 11) * 0x1p-53) - 1;
 }
 
-/// Angle about the normal from the direction of u in cornersAround to a direction.
+/// Angle about the normal from eastOf(normal), the default direction of u, to a direction; radians.
 double angleTowards(const SurfacePoint& point, const V3d& direction) {
   const V3d flat = direction - point.normal * point.normal.dot(direction);
   if (!(flat.length() > 1e-6 * direction.length()) || !(direction.length() > 0)) return 0;
@@ -112,7 +112,8 @@ Attempt tryAt(const NarrowBand& base, const SurfacePoint& point, std::size_t ind
   return attempt;
 }
 
-/// Computes the distances that all patches share. Spline patches do not need any.
+/// Computes the distances to the base that all patches share, if that pays. Spline patches need no
+/// distances.
 std::optional<NarrowBand> sweepFor(const NarrowBand& base, const PatchCrowd& crowd,
                                    const PatchOptions& options) {
   if (options.scheme == LayerScheme::Spline) return {};
