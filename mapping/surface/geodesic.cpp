@@ -11,28 +11,29 @@ namespace {
 
 using Imath::V3d;
 
-// No path is shorter than its chord. A path whose length is below this multiple of its chord is
-// accepted without a search for other paths.
+// No path is shorter than its chord. A straightened path whose length is below this multiple of its
+// chord, the straight distance of its ends, is accepted without a search for other paths.
 constexpr double kNearlyStraight = 1.01;
 // A roughly straightened path is straightened fully only if its length is below this multiple of
-// the shortest length.
+// the shortest length found so far.
 constexpr double kWorthTrying = 1.02;
-// Least cosine between the normals at the ends of a segment that stays on the surface, even over an
-// edge.
+// Least cosine between the surface normals at the ends of a path segment that stays on the surface,
+// even over an edge.
 constexpr double kLeastTurnCosine = -0.7;
 // Cosine of 0.2 radians: an arc with this turn is 0.2 % longer than its chord.
 constexpr double kFlatCosine = 0.98;
 constexpr std::size_t kCoarsestSegments = 8;
 constexpr int kMaxSweeps = 600;
 constexpr int kSweepsBetweenLooks = 16;
-constexpr double kCalm = 1e-5;      // relative change of the length between two checks
+constexpr double kCalm = 1e-5;      // relative decrease of the path's length between two checks
 constexpr double kStraight = 1e-3;  // largest move of a point in the last sweep, voxels
 
 V3d tangential(const V3d& offset, const V3d& normal) {
   return offset - normal * offset.dot(normal);
 }
 
-/// Walks towards b by small steps on the surface; returns an empty path when stuck.
+/// Walks from a towards b by steps of a voxel on φ = height; returns an empty path when the walk is
+/// stuck.
 std::vector<V3d> walkTowards(const SurfaceField& field, double height, const V3d& a, const V3d& b) {
   const double step = field.voxelSize();
   const double maxSteps = 4 * (b - a).length() / step + 16;
@@ -103,8 +104,8 @@ void relaxPath(const SurfaceField& field, double height, std::vector<V3d>& path)
     }
     if (moved < kStraight * field.voxelSize()) return;
     if (sweep % kSweepsBetweenLooks != 0) continue;
-    // Near edges the points may oscillate for ever. So over-relaxation ends when the length no
-    // longer decreases, and the sweeps end when this happens again.
+    // Near edges the points may oscillate for ever. So over-relaxation ends when the path's length
+    // no longer decreases, and the sweeps end when this happens again.
     const double length = pathLength(path);
     const bool isCalm = lengthBefore - length < kCalm * length;
     if (isCalm && factor == 1) return;

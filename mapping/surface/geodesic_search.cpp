@@ -43,11 +43,11 @@ GridCell unpackCell(Key key) {
 }
 
 /// Graph of the grid points beside φ = height, built on demand. Nodes hold the state of the
-/// searches from both ends. GridCell (0, 0, 0) is the point a.
+/// searches from both ends (0: a, 1: b). GridCell (0, 0, 0) is the point a.
 class PathGraph {
  public:
   struct Node {
-    // Length of the path from a, and from b; world units.
+    // Length of the shortest path found from a, and from b; world units.
     std::array<double, 2> cost = {HUGE_VAL, HUGE_VAL};
     std::array<Key, 2> from = {};
     std::array<bool, 2> isClosed = {};
@@ -119,7 +119,7 @@ class PathGraph {
     return it->second;
   }
 
-  /// Opens the nodes around an end, at their straight distance from the end.
+  /// Opens the nodes around an end; the straight distance of each from the end is its path length.
   template <typename Estimate>
   void start(std::size_t end, const Estimate& estimate) {
     const V3d offset = (ends_[end] - ends_[0]) / step_;
@@ -173,7 +173,7 @@ struct Meeting {
   Key key;
 };
 
-/// Nodes with about equal path lengths to both ends, sorted by their sum.
+/// Nodes with about equal path lengths from both ends, sorted by the sum of both lengths.
 std::vector<Meeting> meetings(const PathGraph& graph) {
   std::vector<Meeting> result;
   for (const auto& [key, node] : graph.nodes()) {
@@ -217,10 +217,10 @@ std::vector<Path> GeodesicSearch::alternatives(double longest) const {
         },
         [](const V3d&) { return 0.0; }, [](Key, const PathGraph::Node&) { return false; });
   }
-  // Meeting points close to each other belong to the same path.
+  // Meeting points of the two searches that are close to each other belong to the same path.
   const double apart = std::max(3 * graph.step(), 0.025 * longest);
   std::vector<Path> paths;
-  // Positions and normals of the middles of the paths found.
+  // Positions and surface normals of the meeting points of the paths found.
   std::vector<std::pair<V3d, V3d>> taken;
   const std::vector<Meeting> all = meetings(graph);
   for (const Meeting& meeting : all) {

@@ -27,9 +27,9 @@ using levelset::UsageError;
 
 constexpr double kCandidatesPerPoint = 20;  // [Yuksel15] uses at least five
 constexpr double kMostPoints = 1e6;
-// Cosine between the normals of points on opposite sides of a thin part.
+// Largest cosine between the normals of points that count as on opposite sides of a thin part.
 constexpr double kOtherSide = -0.5;
-// Thickness of a thin part, as a share of the least distance of points.
+// Largest thickness of a thin part, as a share of the least distance that points should have.
 constexpr double kThin = 0.25;
 
 /// Random numbers that are equal on all platforms, unlike the standard library's distributions.
@@ -186,8 +186,8 @@ Candidates makeCandidates(const AreaSampler& sampler, const ScatterDensity& dens
 }
 
 /// Distance of two points along the surface, divided by their mean scale.
-/// @param reach  largest distance of interest, in scales; a part thinner than a quarter of it
-///         counts as thin
+/// @param reach  distance, divided by the mean scale of a and b, world units; a part thinner than a
+///         quarter of it counts as thin
 double scaledDistance(const SurfacePoint& a, const SurfacePoint& b, double reach) {
   const double scale = 0.5 * (a.scale + b.scale);
   return surfaceDistance(a, b, kThin * reach * scale) / scale;
@@ -215,8 +215,8 @@ std::vector<SurfacePoint> throwDarts(std::span<const SurfacePoint> candidates, d
   return taken;
 }
 
-/// Removes the most crowded candidates one by one. Returns the remaining ones, then the removed
-/// ones in reverse order, so that any first n points are evenly distributed.
+/// Removes the most crowded candidates one by one. Returns the remaining candidates, then the
+/// removed ones in reverse order, so that any first n of them are evenly distributed.
 std::vector<SurfacePoint> orderBySpread(std::span<const SurfacePoint> candidates, double reach,
                                         std::size_t kept) {
   PointGrid grid(reach * largestScale(candidates));
@@ -225,8 +225,8 @@ std::vector<SurfacePoint> orderBySpread(std::span<const SurfacePoint> candidates
     std::size_t index;
     double crowding;
   };
-  // Pairs nearer than `limit` have the same weight, because one of the two is removed anyway
-  // [Yuksel15].
+  // Pairs of candidates nearer than `limit` (a share of `reach`) have the same weight, because one
+  // of the two is removed anyway [Yuksel15].
   const double share = static_cast<double>(kept) / static_cast<double>(candidates.size());
   const double limit = 0.65 * (1 - std::pow(share, 1.5));
   std::vector<std::vector<Neighbour>> neighbours(candidates.size());
@@ -310,7 +310,7 @@ ScatteredPoints scatterPoints(const levelset::NarrowBand& base, const ScatterDen
   Random random(density.seed);
   double wanted = static_cast<double>(density.count);
   if (density.count == 0) {
-    // Discs cannot be packed more densely than in a hexagonal grid.
+    // Points with this least distance cannot be packed more densely than in a hexagonal grid.
     constexpr std::size_t kSurvey = 1000;
     const double disc = 0.5 * std::sqrt(3.0) * density.distance * density.distance;
     wanted = std::max(1.0, makeCandidates(sampler, density, kSurvey, random).area / disc);

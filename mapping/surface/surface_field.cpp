@@ -10,8 +10,10 @@ using Imath::V3d;
 
 constexpr int kMaxSteps = 40;
 constexpr int kUndampedSteps = 12;
-constexpr double kTolerance = 1e-5;  // voxels; close to the resolution of float distances
-constexpr double kAccepted = 1e-2;   // voxels; accepted at a crease, where the steps oscillate
+// Accepted |φ − height| before kMaxSteps, voxels; close to the resolution of float distances.
+constexpr double kTolerance = 1e-5;
+// Accepted |φ − height| after kMaxSteps, voxels; for creases, where the steps oscillate.
+constexpr double kAccepted = 1e-2;
 
 }  // namespace
 

@@ -14,7 +14,8 @@ namespace {
 
 using Imath::V3d;
 
-/// Grid point within a voxel of the surface that is nearest to `point`.
+/// Of all grid points within a voxel of the surface, the one nearest to `point`, in world
+/// coordinates.
 V3d nearestFoot(const levelset::NarrowBand& base, const V3d& point) {
   const openvdb::FloatGrid& grid = levelset::vdb(base);
   const double voxel = base.voxelSize();
@@ -71,7 +72,8 @@ V3d closestSurfacePoint(const levelset::NarrowBand& base, const V3d& point) {
                       foot.x, foot.y, foot.z, at()));
     }
   }
-  // Gradient descent of the distance to `point` along the surface; steps are halved when one fails.
+  // Gradient descent of the distance to `point` along the surface; the step length is halved when a
+  // step comes no nearer.
   double step = 1;
   for (int i = 0; i < 60 && step > 1e-3; ++i) {
     const V3d normal = field.normal(foot), offset = point - foot;

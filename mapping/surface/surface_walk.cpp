@@ -67,8 +67,8 @@ bool SurfaceWalk::step(double length) {
   const double cosine = normal_.dot(field_.normal(ahead));
   const double turn = std::acos(std::clamp(cosine, -1.0, 1.0));
   if (turn > (isShortest ? kSharpest : kMostTurn)) return inHalves();
-  // The projection makes the step too short or too long. The chord of an arc of this length and
-  // turn has the right length.
+  // The projection makes the step too short or too long. So the next position is at the chord
+  // length of an arc of length `length` whose normal turns by `turn`.
   const double half = 0.5 * turn;
   V3d next = position_ + offset * (length * (half > 1e-4 ? std::sin(half) / half : 1.0) / chord);
   if (!field_.project(next, height_)) return inHalves();

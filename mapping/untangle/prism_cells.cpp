@@ -30,7 +30,8 @@ std::vector<double> endsOf(std::size_t below, std::size_t above) {
 
 struct Share {
   std::size_t index;
-  double fraction;  ///< weight of the next particle
+  /// Weight of particle `index` + 1; particle `index` has the weight 1 − fraction.
+  double fraction;
 };
 
 Share shareAt(double t, std::size_t count) {

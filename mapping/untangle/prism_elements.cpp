@@ -13,7 +13,7 @@ namespace {
 
 using Imath::V3d;
 
-/// Derivatives of the determinant with respect to the columns.
+/// Derivatives of the determinant of f with respect to its columns.
 ElementSlopes cofactors(const ElementSlopes& f) {
   return {f[1].cross(f[2]), f[2].cross(f[0]), f[0].cross(f[1])};
 }
@@ -54,7 +54,8 @@ ElementEnergy symmetricDirichlet(const ElementSlopes& f) {
 ElementEnergy foldoverEnergy(const ElementSlopes& f, double epsilon) {
   const ElementSlopes c = cofactors(f);
   const double det = f[0].dot(c[0]), root = std::hypot(epsilon, det);
-  // For negative determinants the sum would suffer cancellation, so this equal quotient is used.
+  // For negative determinants the sum would suffer cancellation, so a quotient of equal value is
+  // used.
   const double chi = det >= 0 ? 0.5 * (det + root) : 0.5 * epsilon * epsilon / (root - det);
   ElementEnergy result;
   if (!(chi > 0)) {
@@ -79,8 +80,8 @@ PrismElements::PrismElements(const Patch& patch, const V3d& rest, double embedDe
     V3d sides = cell.box.size() * rest;
     const double size = sides.x * sides.y * sides.z;
     volume += size;
-    // A mirrored patch without folds has negative determinants. Reversing one side at rest makes
-    // them positive.
+    // A mirrored patch without folds has negative determinants. Reversing one side of the box in
+    // the rest shape makes them positive.
     if (patch.mirrored) sides.x = -sides.x;
     for (std::size_t corner = 0; corner < 8; ++corner)
       addElement(

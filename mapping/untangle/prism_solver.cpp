@@ -19,7 +19,8 @@ namespace {
 using Imath::V3d;
 
 constexpr std::size_t kRemembered = 8;  // pairs of step and gradient change that L-BFGS keeps
-// Least decrease of the energy, as a share of what the slope predicts (Armijo).
+// Least decrease of the energy in a step, as a share of the decrease that its slope along the step
+// predicts (Armijo).
 constexpr double kSufficient = 1e-4;
 constexpr int kMostHalvings = 30;
 constexpr double kLongestStep = 0.5;  // longest step of a particle, particle spacings
@@ -28,7 +29,8 @@ constexpr double kStandsStill = 1e-7;
 // in a row end the search.
 constexpr double kNoGain = 1e-11;
 constexpr int kNoGainSteps = 5;
-// Second derivative of the symmetric Dirichlet energy with respect to the slopes, at rest.
+// Second derivative of the symmetric Dirichlet energy with respect to the slopes, for the
+// undeformed (rest) shape.
 constexpr double kStiffness = 8;
 
 double innerProduct(const std::vector<V3d>& a, const std::vector<V3d>& b) {
@@ -45,7 +47,7 @@ void addScaled(std::vector<V3d>& a, const std::vector<V3d>& b, double factor) {
 
 /// Factorised Laplacian matrix of the elements, over the particles that are not fixed.
 struct PrismSolver::Preconditioner {
-  std::vector<int> unknown;  ///< index of each particle's unknown; −1: fixed
+  std::vector<int> unknown;  ///< row of each particle in the matrix; −1: fixed
   int count = 0;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor;
 
@@ -91,8 +93,8 @@ struct PrismSolver::Memory {
     pairs.push_back({std::move(step), std::move(change), product});
   }
 
-  /// Applies the approximate inverse Hessian to `vectors`; `start` is the inverse from which the
-  /// updates begin.
+  /// Applies the approximate inverse Hessian to `vectors`; `start` applies the approximate inverse
+  /// from which the updates begin.
   template <typename Start>
   Vectors apply(Vectors vectors, const Start& start) const {
     std::vector<double> alpha(pairs.size());

@@ -58,8 +58,8 @@ void checkInput(const NarrowBand& base, const Patch& patch, const UntangleOption
   levelset::requireMemory(PrismElements::estimateBytes(patch), options.maxMemory);
 }
 
-/// Constraints of all particles. Those above the surface are free; those on it slide, except that
-/// the particles on the sides are fixed unless `freeSides`.
+/// Constraints of all particles. Particles above the layer at w = 0 are free. Particles of that
+/// layer slide; those on its sides are fixed unless `freeSides`.
 std::vector<ParticleHold> holdsOf(const Patch& patch, bool freeSides) {
   std::vector<ParticleHold> holds;
   for (std::size_t k = 0; k < patch.layers.size(); ++k) {
@@ -152,11 +152,13 @@ FoldCount foldsAt(const Patch& patch, const PrismElements& elements, double embe
   return result;
 }
 
-// Iterations of the symmetric Dirichlet energy after all folds are removed.
+// Largest number of iterations that minimise the symmetric Dirichlet energy after all folds are
+// removed.
 constexpr std::size_t kSettling = 100;
 
 /// Minimises the foldover energy with smaller and smaller ε until no element is inverted
-/// [Garanzha21, §3]. Then continues with a small ε until no cell folds between its elements either.
+/// [Garanzha21, §3]. Then continues with a small ε until no trilinear cell folds at points between
+/// its elements either.
 /// @return number of iterations
 std::size_t removeFolds(PrismSolver& solver, const UntangleOptions& options,
                         const std::function<bool()>& isDone) {
@@ -187,7 +189,8 @@ std::size_t removeFolds(PrismSolver& solver, const UntangleOptions& options,
   return iterations;
 }
 
-/// Mean lengths of opposite sides on the surface, and the height of the patch, world units.
+/// Mean length of the sides along u at w = 0, the same along v, and the height of the patch, world
+/// units.
 V3d sideLengths(const Patch& patch) {
   const ParticleLayer& layer = patch.layers.front();
   double u = 0, v = 0;
@@ -208,8 +211,8 @@ ElementEnergy scaledDirichlet(ElementSlopes slopes, double scale) {
   return energy;
 }
 
-/// Scale of the rest shape for which the energy is least. |F|² is proportional to the inverse
-/// square of the scale, |F⁻¹|² to its square.
+/// Scale of the rest shape for which the symmetric Dirichlet energy is least. F is the matrix of an
+/// element's slopes. |F|² is proportional to the inverse square of the scale, |F⁻¹|² to its square.
 double bestRestScale(const PrismElements& elements, const std::vector<V3d>& positions) {
   double stretch = 0, squeeze = 0;
   for (std::size_t e = 0; e < elements.size(); ++e) {
