@@ -42,7 +42,7 @@ std::array<int, 12> linkEdges(int pattern) {
       const auto inside = [&](std::size_t i) { return (pattern >> cornerAt(loop[i & 3])) & 1; };
       for (std::size_t i = 0; i < 4; ++i) {
         if (inside(i) || !inside(i + 1)) continue;
-        std::size_t last = i + 1;  // the run of inside corners i + 1 … last
+        std::size_t last = i + 1;  // last corner of the run of inside corners from i + 1
         while (inside(last + 1)) ++last;
         next[static_cast<std::size_t>(edgeBetween(loop[i], loop[(i + 1) & 3]))] =
             edgeBetween(loop[last & 3], loop[(last + 1) & 3]);

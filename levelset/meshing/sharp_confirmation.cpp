@@ -30,8 +30,8 @@ constexpr double kOffFace = 0.35;
 /// A vertex further than this, in voxels, from a plane to which it was fitted is torn: two surfaces
 /// run through its cell, and it lies on neither.
 constexpr double kTorn = 0.3;
-/// A sheet is flat where second differences, in voxels, are below this share of the feature's angle
-/// in radians.
+/// A sheet is flat where second differences of the field, in voxels, are below this share of the
+/// angle between the feature's sheets, in radians.
 constexpr double kFlatBend = 0.06;
 /// A plane from a part of the field with second differences above kBent, voxels, is replaced by a
 /// plane nearby. The second differences there must be smaller by the factor kFlatter.
@@ -72,7 +72,8 @@ class Fans {
   std::vector<std::uint32_t> triangles_;
 };
 
-/// Returns the triangles that are connected to a vertex through vertices within `radius` of it.
+/// Returns the triangles that are connected to a vertex by mesh edges through vertices within
+/// `radius` voxels of it.
 std::vector<std::uint32_t> trianglesNear(const IndexMesh& mesh, const Fans& fans,
                                          std::uint32_t vertex, double radius) {
   const Vec3d centre = mesh.positions[vertex];

@@ -1,7 +1,7 @@
 #pragma once
 
-// Edges and corners of the solid between the vertices of a mesh. Internal header of levelset:
-// public headers must not include it.
+// Finds edges and corners of a solid that lie between the vertices of its mesh, and adds them to
+// the mesh. Internal header of levelset: public headers must not include it.
 
 #include <array>
 #include <cmath>

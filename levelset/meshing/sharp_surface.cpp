@@ -55,8 +55,8 @@ std::array<std::uint8_t, 4> facesPassedTwice(const CellCase& cell) {
 /// segments on the face would yield the same mesh edge between both cells, so each gets a vertex of
 /// its own.
 struct FaceSegment {
-  Coord insideCorner;    ///< corner that the segment cuts off
-  Coord oppositeCorner;  ///< opposite corner of the face
+  Coord insideCorner;    ///< grid point inside the solid that the segment cuts off
+  Coord oppositeCorner;  ///< grid point at the opposite corner of the cell face
   friend bool operator<(const FaceSegment& a, const FaceSegment& b) {
     return std::tie(a.insideCorner, a.oppositeCorner) < std::tie(b.insideCorner, b.oppositeCorner);
   }

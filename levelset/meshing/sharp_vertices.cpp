@@ -76,7 +76,7 @@ struct VertexPlacer::Plane {
   Vector3d normal = Vector3d::Zero();
   Vector3d gradient = Vector3d::Zero();  ///< gradient of the field, by central differences
   double distance = 0;                   ///< distance of the grid point from the plane, voxels
-  double error = 0;  ///< deviation of the values around the grid point from it, voxels
+  double error = 0;  ///< deviation of the neighbouring values from the plane, voxels
   /// Bend of the field at the grid point, voxels: the largest second difference along an axis, or
   /// the sum of all three if it is larger. The sum is invariant under rotation.
   double bend = 0;

@@ -35,8 +35,8 @@ NarrowBand OffsetOperator::run(std::vector<NarrowBand> operands, const Options& 
   OffsetOptions settings{
       .halfWidth = options.halfWidth, .maxMemory = run.maxMemory, .progress = run.progress};
   // If the operand is narrowed to a region of interest, give the result the half width of the
-  // complete result, so that both have the same bits. The distance over which closest points
-  // propagate affects the last bits.
+  // complete result, so that the computed part has the bits of the complete result. The distance
+  // over which closest points propagate affects the last bits.
   if (run.isPartial) settings.halfWidth = run.planned->halfWidth;
   NarrowBand solid = std::move(operands[0]);
   operands.clear();

@@ -59,7 +59,7 @@ struct Length {
 /// object. The command line resolves a resolution to an edge length.
 struct VoxelSize {
   double edge = 0;  ///< edge length of a voxel, world units; 0: follows from `resolution`
-  std::optional<int> resolution = {};  ///< number of voxels along the longest side, > 0
+  std::optional<int> resolution = {};  ///< number of voxels along the object's longest side, > 0
 
   /// Edge length of a voxel, world units.
   /// @param longestSide  longest side of the object, world units

@@ -145,7 +145,8 @@ class ResampleKernel {
   [[nodiscard]] bool isNearBand(const Coord& origin, const Accessor& accessor) const {
     const Vec3d p = placement_.toSource(origin.asVec3d() + Vec3d(3.5));
     const Coord cell = Coord::round(p);
-    // The value changes by at most the distance from the source voxel to the block's centre.
+    // The distance changes by at most the length from the source voxel `cell` to the block's
+    // centre.
     const double offset = (p - cell.asVec3d()).length() * placement_.sourceVoxel;
     const double here = std::abs(static_cast<double>(accessor.getValue(cell))) * placement_.scale;
     const double halfDiagonal = 3.5 * kCubeDiagonal * placement_.targetVoxel;

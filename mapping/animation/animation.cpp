@@ -96,7 +96,7 @@ void checkKeys(const std::vector<AnimationKey>& keys, const AnimationOptions& op
   }
 }
 
-/// Bases of all frames. Only one base is in memory besides that of frame 0.
+/// Provides the bases of all frames. Only one base is in memory besides that of frame 0.
 class Bases {
  public:
   Bases(const NarrowBand& first, const BandFrames& frames)
@@ -491,7 +491,7 @@ AnimationReport animateTexture(const NarrowBand& base, const NarrowBand& texture
     if (isReused) {
       ++reused;
     } else {
-      result.reset();  // frees memory before the next result
+      result.reset();  // frees memory before the next result is computed
       const bool improves = options.improve && !f.isUnchanged;
       if (improves) {
         PatchFrame part = f;

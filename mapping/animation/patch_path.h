@@ -45,7 +45,7 @@ class PatchPath {
   [[nodiscard]] bool isAlike() const { return isAlike_; }
   /// Rotation of u on the path relative to parallel transport, radians, between −π and π.
   [[nodiscard]] double turn() const { return turn_; }
-  /// True if the path could not follow the guide.
+  /// True if the centre's path could not follow the guide of the constructor.
   [[nodiscard]] bool hasJumped() const { return hasJumped_; }
 
  private:

@@ -43,7 +43,8 @@ struct Distortion {
                                                double embedDepth);
 
 /// Computes the distortion of a map from its samples.
-/// @param textureSize  size of the texture's box, which corresponds to the unit cube, world units
+/// @param textureSize  size of the texture's box, world units; the box maps to the unit cube of u,
+///         v and w
 /// @param isMirrored   true if the patch mirrors the texture on purpose
 /// @pre samples is not empty
 [[nodiscard]] Distortion surveyDistortion(std::span<const MapSample> samples,

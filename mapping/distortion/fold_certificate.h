@@ -39,7 +39,8 @@ struct FoldCertificate {
   /// ≤ 0 at folds. Prism maps and meshes use the determinant of texture → patch, smooth maps that
   /// of patch → texture, each in the direction in which the map is defined.
   double leastJacobian = 0;
-  double unit = 1;  ///< the median determinant: world units³ per unit cube, or its reciprocal
+  /// Median determinant, world units³ per unit cube; for smooth maps unit cubes per world unit³.
+  double unit = 1;
   /// Folds in different cells or cubes, the least Jacobian first; at most kMostPoints.
   std::vector<FoldPoint> worst;
 

@@ -103,7 +103,7 @@ struct Sum {
 /// transform 1/(δ²ξ² + ξ⁴ + τ²ξ⁶) is positive. τ and δ are in mean particle spacings.
 struct LaplacianShape {
   static constexpr double kTau = 0.02, kDelta = 5;
-  double fast, slow;  ///< f and s
+  double fast, slow;  ///< f and s of the formula above
   double a, b;        ///< b − a = 1
   double scale;       ///< factor that makes φ(0) = 1
   double bendAtZero;  ///< |φ″(0)|

@@ -82,12 +82,12 @@ class ScaleOutline {
     radius_ = (tip * tip + side * side) / (2 * side);
     aside_ = radius_ - side;
     notch_ = middle_ + std::sqrt(radius_ * radius_ - (half_ + aside_) * (half_ + aside_));
-    // Point where the two arcs of a scale meet after they are moved inwards by the rounding.
+    // Point where the two arcs of a scale meet after they are moved inwards by the rounding radius.
     const double inner = radius_ - rounding_;
     length_ = middle_ + std::sqrt(std::max(0.0, inner * inner - aside_ * aside_));
   }
 
-  /// Signed distance to the outline moved inwards by the rounding.
+  /// Signed distance to the outline moved inwards by the rounding radius.
   /// @param u  distance from the root towards the tip, in the plane of the scale
   /// @param v  coordinate along x, from the middle of the nearest scale
   [[nodiscard]] double distance(double u, double v) const {
