@@ -15,7 +15,7 @@ namespace levelset {
 struct FacePlane {
   Eigen::Vector3d normal;
   double offset = 0;
-  double error = 0;  ///< deviation of the plane from the values that define it, voxels
+  double error = 0;  ///< deviation of the plane from the field values that define it, voxels
   double bend = 0;   ///< largest second difference of those values, voxels
   [[nodiscard]] double above(const Eigen::Vector3d& p) const { return normal.dot(p) - offset; }
 };

@@ -129,7 +129,8 @@ struct OperatorRun {
 
   std::vector<std::string> notes = {}, warnings = {};
   std::vector<ErrorEstimate> errors = {};
-  /// Reason why the result misses a requested tolerance; empty: it meets the tolerance.
+  /// Reason why the result misses a requested tolerance; empty: the result meets the tolerance, or
+  /// none was requested.
   std::string failure = {};
   Figures figures = {};      ///< figures for the report of the run
   Figures certificate = {};  ///< sign certificate of a band that was built from a mesh; else empty

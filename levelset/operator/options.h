@@ -37,7 +37,8 @@ struct OptionInfo {
   OptionUnit unit = OptionUnit::None;
   OptionRange range = OptionRange::Any;
   bool required = false;
-  /// ≥ 0: index of the argument that gives the value without the option's name; −1: named only.
+  /// ≥ 0: index of the value among the arguments that are given without an option's name; −1: the
+  /// value needs the option's name.
   int position = -1;
   bool allowsVoxels = true;          ///< true: a length may also be given in voxels
   const char* formerName = nullptr;  ///< former option name in old scripts; null: none

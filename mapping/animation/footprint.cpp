@@ -28,7 +28,7 @@ using levelset::NarrowBand;
 std::optional<V3d> geodesicTo(const SurfaceField& field, const SurfaceFrame& frame,
                               const V3d& goal) {
   constexpr int kMostShots = 24;
-  constexpr double kHit = 1e-4, kNear = 0.05;  // voxels: gap that ends the steps, largest gap
+  constexpr double kHit = 1e-4, kNear = 0.05;  // voxels: gap to stop at, largest accepted gap
   const std::vector<V3d> path = geodesic(field, 0, frame.centre, goal);
   if (path.size() < 2) return {};
   V3d best = frame.inPlane(path[1] - path[0]).normalized() * pathLength(path);

@@ -20,7 +20,8 @@ struct TileBox {
 
 /// Computes the boxes of a pattern.
 /// @param period     width of a column along x and of a row along y, world units
-/// @param low, high  range along z in the pattern's own frame, whose origin is a corner of the tile
+/// @param low, high  range along z, world units, in the pattern's own frame, whose origin is a
+///         corner of the tile
 [[nodiscard]] TileBox tileBox(const Tiling& tiling, const Imath::V2d& period, double low,
                               double high, const Imath::V3d& center);
 
