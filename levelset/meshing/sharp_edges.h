@@ -51,8 +51,8 @@ void addSides(const std::vector<MeshTriangle>& triangles, const std::vector<std:
     const std::vector<PairedEdge>& edges, const std::vector<MeshTriangle>& triangles,
     std::size_t vertexCount);
 /// Computes the flip of an edge.
-/// @param present  keys from edgesBeside. The flip is impossible if the mesh already has the new
-/// edge.
+/// @param present  keys from edgesBeside(). The flip is impossible if the mesh already has the new
+///         edge.
 [[nodiscard]] EdgeFlip flipOf(const PairedEdge& edge, const std::vector<MeshTriangle>& triangles,
                               const std::unordered_set<std::uint64_t>& present);
 void applyFlip(const EdgeFlip& flip, const PairedEdge& edge, std::vector<MeshTriangle>& triangles,

@@ -29,8 +29,8 @@ openvdb::Vec3d toIndex(const Vector3d& p) {
   return {p.x(), p.y(), p.z()};
 }
 
-/// Returns, for each polygon of a cell, the faces of the cell that it passes twice: bit axis·2 +
-/// side.
+/// Returns, for each polygon of a cell, the faces of the cell that it passes twice, with two
+/// segments on the face: bit axis·2 + side.
 std::array<std::uint8_t, 4> facesPassedTwice(const CellCase& cell) {
   std::array<std::uint8_t, 4> result = {};
   for (int axis = 0; axis < 3; ++axis) {

@@ -1,7 +1,7 @@
 #pragma once
 
-// Position of a cell's vertex on a surface with edges and corners. Internal header of levelset:
-// public headers must not include it.
+// Position of the vertex of a cell in the dual mesh of a surface with edges and corners. Internal
+// header of levelset: public headers must not include it.
 
 #include <Eigen/Dense>
 #include <memory>
@@ -20,10 +20,11 @@ struct FacePlane {
   [[nodiscard]] double above(const Eigen::Vector3d& p) const { return normal.dot(p) - offset; }
 };
 
-/// Returns the point nearest to `centre` among those that fit the planes best [Ju02].
+/// Returns the point nearest to `centre` among the points that fit the planes best by least squares
+/// [Ju02].
 [[nodiscard]] Eigen::Vector3d fitPlanes(const std::vector<FacePlane>& planes,
                                         const Eigen::Vector3d& centre);
-/// Returns the normals of the planes that pass through a point, one for each sheet.
+/// Returns the normals of the planes that pass within 0.05 voxels of a point, one for each sheet.
 [[nodiscard]] VertexSheets sheetsAt(const Eigen::Vector3d& point,
                                     const std::vector<FacePlane>& planes);
 

@@ -7,7 +7,7 @@
 namespace levelset {
 
 Cost costOfOffset(double before, double after, double distance, double halfWidth) {
-  constexpr double kShell = 3;  // half width of the first transform at the moved surface, voxels
+  constexpr double kShell = 3;  // voxels: half width of the first distance transform
   Cost cost = costOfDistances(std::max(before, after), kShell);
   cost.seconds += 1e-9 * before * 700 * std::abs(distance);
   cost.bytes += 15 * before * std::abs(distance);

@@ -108,7 +108,8 @@ NarrowBand transform(NarrowBand solid, const Imath::M44d& matrix) {
   openvdb::FloatGrid& grid = editVdb(solid);
   grid.setTransform(transform);
   const double scale = std::cbrt(Imath::M44d(matrix).determinant());
-  // The determinant of a rotation is one up to rounding; then the distances keep their bits.
+  // The determinant of a rotation is one up to rounding; a rotation keeps the bits of the
+  // distances.
   if (std::abs(scale - 1) > 1e-9) scaleDistances(grid, scale, background);
   return solid;
 }

@@ -83,7 +83,8 @@ struct AnimationReport {
   std::vector<FrameReport> frames;
   std::size_t patchesMade = 0;  ///< number of frames whose patches were rebuilt
   std::size_t reused = 0;       ///< number of frames whose base, patches and texture did not change
-  /// Messages of all frames ("frame 3: …"), each reported for its first frame.
+  /// Messages of all frames ("frame 3: …"); a message that repeats is reported for its first frame
+  /// only.
   std::vector<std::string> warnings, notes;
 };
 
