@@ -39,7 +39,7 @@ struct GlContext::Egl {
   PFNEGLGETPLATFORMDISPLAYEXTPROC getPlatformDisplay = nullptr;
   EGLDisplay display = EGL_NO_DISPLAY;
   EGLContext context = EGL_NO_CONTEXT;
-  std::string tried;  // failed attempts with reasons, for the error message
+  std::string tried;  // failed attempts to open a context, with reasons, for the error message
 
   Egl() {
     library = dlopen("libEGL.so.1", RTLD_NOW | RTLD_LOCAL);
@@ -173,7 +173,7 @@ GlContext::Current::Current(const GlContext& context) : context_(context), lock_
   draw_ = egl.currentSurface(EGL_DRAW);
   read_ = egl.currentSurface(EGL_READ);
   before_ = egl.currentContext();
-  // Bind the API again: the bound API is a property of each thread.
+  // Bind the OpenGL API again: EGL stores the bound API for each thread.
   if (!egl.bindApi(EGL_OPENGL_API) ||
       !egl.makeCurrent(egl.display, EGL_NO_SURFACE, EGL_NO_SURFACE, egl.context)) {
     throw levelset::ResourceLimit(
@@ -189,8 +189,8 @@ GlContext::Current::~Current() {
     return;
   }
   egl.makeCurrent(egl.display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
-  // Release the thread's state here: Mesa frees it when the thread ends, and again when the process
-  // ends, and crashes if both happen at once.
+  // Release EGL's state of the thread here: Mesa frees it when the thread ends, and again when the
+  // process ends, and crashes if both happen at once.
   egl.releaseThread();
 }
 

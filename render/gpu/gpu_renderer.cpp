@@ -23,7 +23,8 @@ Image renderGpu(const Scene& scene, const RenderOptions& options) {
   }
   const GlContext context;
   const GpuTracer tracer(context, surfaces, 0, options.fromNanoVdb ? &scene : nullptr);
-  constexpr int kGpuTile = 64;  // pixels; edge of a tile; enough rays for an efficient dispatch
+  // Edge of a tile, pixels. A tile has enough rays for an efficient dispatch.
+  constexpr int kGpuTile = 64;
   return paintPicture(scene, surfaces, tracer, kGpuTile, "gpu " + context.description(), options);
 }
 

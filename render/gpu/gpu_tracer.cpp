@@ -137,7 +137,7 @@ uniform int nanoRoot, nanoTiles, nanoFar, nanoOriginX, nanoOriginY, nanoOriginZ;
 struct Variant {
   bool isPixels, isSpline, isNano;
   int valueBits;
-  int blocks;  // number of buffer textures that hold the values
+  int blocks;  // number of buffer textures that store the values of the solid
   auto operator<=>(const Variant&) const = default;
 };
 
@@ -233,7 +233,7 @@ struct GpuTracer::Impl {
   const GlContext& context;
   const GlFunctions& gl;
   const std::size_t largestTable;
-  int shift = 0;  // log2 of the number of values in a buffer texture
+  int shift = 0;  // log2 of the largest number of values in a buffer texture
   std::map<const KernelSolid*, Tables> tables;
   GLuint rays = 0, hits = 0;
   std::map<Variant, GLuint> programs;
@@ -279,7 +279,8 @@ struct GpuTracer::Impl {
     return texels;
   }
 
-  /// @param size  size of a value, bytes
+  /// Uploads the values of a solid into as many buffer textures as they need.
+  /// @param bytes, size  size of all values and of one value, bytes
   /// @param format  OpenGL's internal format of a value
   void uploadValues(Tables& t, const void* values, std::size_t bytes, std::size_t size,
                     GLenum format) {
@@ -382,8 +383,10 @@ struct GpuTracer::Impl {
   }
 
   /// Traces `count` rays and reads the hits back.
-  /// @param input  components of the rays, one array after the other
-  /// @param shapes  receives the surface's shape at the hits of pixel rays; null for listed rays
+  /// @param input  components of the rays: for pixels x, y and passing, else RayBlock's arrays, one
+  /// array after the other
+  /// @param shapes  receives the surface's shape at the hits of the rays through pixels; null for
+  /// the rays of a RayBlock
   void run(const KernelSolid& solid, const std::vector<float>& input, std::size_t count,
            HitBlock& found, ShapeBlock* shapes) {
     if (count == 0) return;

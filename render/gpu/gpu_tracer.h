@@ -16,10 +16,11 @@ class GpuTracer : public KernelTracer {
  public:
   /// @param context  must outlive the tracer
   /// @param largestTable  limit on the size of a buffer texture, bytes; 0: the limit of the driver
-  /// @param grids  source of `scene`. Its solids are uploaded as NanoVDB grids in place of brick
-  /// tables, as a reference for those tables. Null: the brick tables are uploaded.
+  /// @param grids  scene that `scene` was built from. Its solids are uploaded as NanoVDB grids in
+  /// place of brick tables, as a reference for the tables. Null: the brick tables are uploaded.
   /// @pre with `grids` the filter is trilinear
-  /// @throws levelset::ResourceLimit when the tables do not fit, or the shader does not compile
+  /// @throws levelset::ResourceLimit when the tables do not fit into the buffer textures, or the
+  /// shader does not compile
   GpuTracer(const GlContext& context, const KernelScene& scene, std::size_t largestTable = 0,
             const Scene* grids = nullptr);
   ~GpuTracer() override;

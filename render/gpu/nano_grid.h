@@ -15,9 +15,9 @@ struct NanoGrid {
   std::vector<float> words;
   int root = 0;   ///< word index of the root node
   int tiles = 0;  ///< number of tiles in the root node's table
-  int far = 0;    ///< word index of the first of the background values
+  int far = 0;    ///< word index of the first of the 16 background values
 
-  /// GLSL constants with the word offsets of members within NanoVDB's nodes.
+  /// GLSL text of constants: word offsets of members within NanoVDB's nodes.
   [[nodiscard]] static std::string layout();
 };
 

@@ -19,8 +19,8 @@ namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr std::size_t kShown = 5;
-// Largest accepted share of all pixels that differ at outlines. Where a ray passes an outline
-// within the rounding error, a hit and a miss are both right.
+// Largest accepted number of pixels whose hits differ at outlines, as a fraction of all pixels.
+// Where a ray passes an outline within the rounding error, a hit and a miss are both right.
 constexpr double kOutlineShare = 1e-5;
 // Largest relative difference of Z between two pictures of the same surface point.
 constexpr double kOneSurface = 1e-3;
@@ -195,8 +195,9 @@ class Comparer {
   [[nodiscard]] double voxelSize() const { return lengthNamed(a_, "ls:voxelSize", 1); }
 
   /// Tolerance that quantized values add to the curvatures, per voxel. It is the change of the
-  /// curvature over 1e-3 voxels, the tolerance of positions. In a band of three voxels, third
-  /// differences of the values are up to eight quantization steps.
+  /// curvature over 1e-3 voxels, the tolerance of positions. In a band of half width 3, a
+  /// quantization step is 6 · 2^-bits voxels, and rounding changes third differences of the values
+  /// by up to eight steps.
   [[nodiscard]] double curvatureStep() const {
     const double bits = lengthNamed(a_, "ls:valueBits", 32);
     return bits < 32 ? 1e-3 * 8 * 6 * std::exp2(-bits) : 0;
@@ -235,7 +236,7 @@ class Comparer {
 
   std::vector<Layer> layers() {
     std::vector<Layer> all;
-    std::set<std::string> compared;  // channels that a layer compares
+    std::set<std::string> compared;  // channels that one of the layers in `all` compares
     const auto add = [&](const std::vector<std::string>& channels, Layer layer) {
       if (!std::all_of(channels.begin(), channels.end(), [&](const auto& c) { return has(c); }))
         return;
@@ -346,7 +347,7 @@ class Comparer {
       found.median = share(0.5);
       found.p99 = share(0.99);
       // With fewer than a thousand pixels the 99.9 % percentile is the maximum. Exclude the worst
-      // pixel from it, if there are at least 100.
+      // pixel from that percentile, if there are at least 100 pixels.
       const std::size_t beyond = std::min<std::size_t>(1, sorted.size() / 100);
       found.p999 = std::min(share(0.999), sorted[sorted.size() - 1 - beyond]);
       found.largest = sorted.back();
@@ -385,7 +386,8 @@ class Comparer {
   const Image &a_, &b_;
   const ImageComparisonOptions& options_;
   std::vector<char> hitA_, hitB_;
-  std::vector<char> isCompared_;  // 1: both pictures hit the same surface in the pixel
+  std::vector<char> isCompared_;  // 1: both pictures hit the same surface in the pixel, so layers
+                                  // are compared there
   ImageComparison result_;
 };
 

@@ -12,10 +12,11 @@
 /// over all pixels is not used, because it hides an error in a single pixel.
 namespace render {
 
-/// Largest difference of a layer between pictures of two correct renderers, in the layer's measure.
+/// Largest difference of a layer between pictures of two correct renderers, in the unit of
+/// LayerComparison::measure.
 struct LayerTolerance {
-  double usual;  ///< limit for 99.9 % of the pixels
-  double worst;  ///< limit for all pixels
+  double usual;  ///< limit for 99.9 % of the compared pixels
+  double worst;  ///< limit for all compared pixels
 };
 
 struct PixelDifference {
@@ -30,10 +31,10 @@ struct LayerComparison {
   double median = 0, p99 = 0;  ///< percentiles of the differences in these pixels, in `measure`
   double p999 = 0, largest = 0;
   LayerTolerance allowed{};
-  std::vector<PixelDifference>
-      worst;  ///< pixels with the largest differences above 0, at most five, the largest first
-  /// True when the differences are within the tolerance. False for an infinite difference: then one
-  /// picture has an invalid value.
+  std::vector<PixelDifference> worst;  ///< compared pixels with the largest differences above 0, at
+                                       ///< most five, the largest first
+  /// True when the differences are within the tolerance `allowed`. False for an infinite
+  /// difference: then a picture has an invalid value (NaN) in this layer.
   [[nodiscard]] bool agrees() const {
     return std::isfinite(largest) && p999 <= allowed.usual && largest <= allowed.worst;
   }
@@ -41,11 +42,12 @@ struct LayerComparison {
 
 struct ImageComparison {
   std::size_t pixels = 0, bothHit = 0;
-  /// Numbers of pixels whose hits differ. AtOutline: pixels beside an outline of both pictures,
-  /// where rounding decides which surface is hit, or if any is. Elsewhere: all other pixels that
-  /// only one picture hits, and pixels with an invalid Z.
+  /// Numbers of pixels whose hits differ: only one picture shows a surface there, or the pictures
+  /// show different surfaces. AtOutline: pixels beside an outline of both pictures, where rounding
+  /// decides which surface is hit, or if any is. Elsewhere: all other pixels that only one picture
+  /// hits, and pixels with an invalid Z.
   std::size_t unlikeAtOutline = 0, unlikeElsewhere = 0;
-  std::size_t outlineAllowed = 0;  ///< limit of unlikeAtOutline; unlikeElsewhere must be 0
+  std::size_t outlineAllowed = 0;  ///< limit of unlikeAtOutline, pixels; unlikeElsewhere must be 0
   std::vector<PixelDifference>
       unlike;  ///< at most five pixels whose hits differ, those away from outlines first
   std::vector<LayerComparison> layers;  ///< compared layers, sorted by name

@@ -14,8 +14,9 @@
 #include "levelset/error.h"
 #include "render/camera.h"
 
-// The layout is defined in "OpenEXR File Layout". Numbers are little endian. A header is a list of
-// attributes, each with name, type, size and value. An empty name ends the list.
+// The layout of an EXR file is defined in "OpenEXR File Layout". Numbers are little endian. A
+// header is a list of attributes, each with name, type, size and value. An empty name ends the
+// list.
 
 namespace render {
 namespace {
@@ -25,8 +26,9 @@ using levelset::InvalidInput;
 constexpr std::uint32_t kExrMagic = 20000630;
 constexpr std::uint32_t kManyParts = 0x1000;
 constexpr std::size_t kLongestName = 255;
-constexpr std::size_t kMostAttributeBytes =
-    1 << 24;  // largest attribute, bytes; the largest one in use is a preview picture
+// Largest accepted size of an attribute of the header, bytes. The largest attributes in use are
+// preview pictures.
+constexpr std::size_t kMostAttributeBytes = 1 << 24;
 /// ZIP compresses by a factor of at most about 1000. A header that announces many more pixels than
 /// the file can hold at this factor is damaged.
 constexpr double kMaxCompression = 5000;
@@ -125,8 +127,8 @@ class ExrHeaderReader {
     if (part.tileWidth < 1 || part.tileHeight < 1) refuse("its tiles have a width or height of 0");
   }
 
-  /// Counts the channels in a list. Each consists of a name and 16 bytes; an empty name ends the
-  /// list.
+  /// Counts the channels in the value of a channel list attribute. Each channel has a name and 16
+  /// bytes; an empty name ends the list.
   [[nodiscard]] double channelCount(const std::string& value) const {
     double count = 0;
     std::size_t at = 0;

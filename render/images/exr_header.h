@@ -8,7 +8,7 @@
 // replace these checks: they limit width and height separately, and for the entire process, which
 // may use OpenEXR for other files too. They do not check the number of pixels, the memory of a
 // chunk, or the sizes of attributes and tables. Besides, OpenEXR has already read the header when
-// it applies them.
+// it applies these limits.
 
 namespace render {
 
@@ -17,7 +17,8 @@ namespace render {
 /// file.
 /// @param maxMemory  limit on OpenEXR's memory for one chunk, bytes
 /// @throws levelset::InvalidInput when the file is not an EXR or is damaged
-/// @throws levelset::ResourceLimit for more than kMaxPixels pixels, or a chunk above the limit
+/// @throws levelset::ResourceLimit for more than kMaxPixels pixels, or a chunk that needs more than
+/// maxMemory
 void checkExrHeader(const std::filesystem::path& path, std::size_t maxMemory);
 
 }  // namespace render

@@ -24,9 +24,10 @@ struct Image {
   std::map<std::string, std::vector<float>> channels;
   std::map<std::string, std::vector<std::uint32_t>>
       ids;  ///< channels of unsigned integers, with the same layout
-  std::map<std::string, std::string> attributes;  ///< written to the EXR header as strings
+  /// Attributes by name, written to the EXR header as strings.
+  std::map<std::string, std::string> attributes;
   std::map<std::string, std::vector<float>>
-      matrices;  ///< M44f attributes of the EXR header; 16 floats each, row by row
+      matrices;  ///< M44f attributes of the EXR header, by name; 16 floats each, row by row
 
   Image() = default;
   Image(int width_, int height_) : width(width_), height(height_) {}
@@ -41,8 +42,8 @@ struct Image {
 [[nodiscard]] std::string imageFormat(const std::filesystem::path& path,
                                       const std::string& format = {});
 
-/// Writes an image. It is written to a temporary file beside the target, which is then renamed. The
-/// bytes depend on the image alone.
+/// Writes an image. It is written to a temporary file in the same folder, which is then renamed to
+/// `path`. The bytes of the file depend on the image alone.
 ///
 /// EXR: all channels, 32 bits, ZIP compression, no date. PNG: R G B A, 8 bits, opaque without a
 /// channel A. Alpha is divided out, values above 0.6 are compressed towards 1, and the sRGB curve

@@ -69,8 +69,8 @@ Shifts shiftsOf(const openvdb::FloatTree& before, const openvdb::FloatTree& afte
       });
 }
 
-/// Step for which `largest` is a quantized value, so that the half width does not change. If
-/// rounding prevents this, the last bit may differ.
+/// Step for which `largest`, the largest |φ| of a band, is a quantized value, so that the half
+/// width does not change. If rounding prevents this, the last bit of the half width may differ.
 float stepOf(float largest, int bits) {
   const float last = static_cast<float>(1 << (bits - 1)) - 0.5f;
   const float step = largest / last;

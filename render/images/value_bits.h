@@ -5,8 +5,8 @@
 namespace render {
 
 /// Quantization of values to few bits. The quantized values are evenly spaced between minus and
-/// plus the largest magnitude. Zero is not among them, and no value changes its sign, so the
-/// surface crosses the same cells.
+/// plus the largest magnitude of the values. Zero is not among them, and no value changes its sign,
+/// so the surface crosses the same cells of the grid.
 struct ValueBits {
   int bits = 32;   ///< 8 or 16; 32: single precision, not quantized
   float step = 0;  ///< difference of neighbouring quantized values, world units
@@ -19,14 +19,15 @@ struct ValueBits {
   [[nodiscard]] bool operator==(const ValueBits&) const = default;
 };
 
-/// Displacement of a surface by quantization, voxels, measured at its crossings with grid edges.
+/// Displacement of a surface by quantization, voxels, measured at the crossings of the surface with
+/// grid edges.
 struct SurfaceShift {
   double largest = 0, rms = 0;
 };
 
 /// A band with quantized values.
 struct QuantizedBand {
-  levelset::NarrowBand band;  ///< all its values are quantized values
+  levelset::NarrowBand band;  ///< all values of the band are quantized values of `quantization`
   ValueBits quantization;
   SurfaceShift shift;
 };

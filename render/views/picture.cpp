@@ -133,8 +133,8 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
     throw levelset::UsageError(
         "soft expressions and morphs cannot be drawn from NanoVDB grids; draw from "
         "bricks");
-  constexpr double kReach =
-      2.99;  // half width that the spline filters need: 3 voxels, less a margin for rounding
+  // Half width of a band that the spline filters need, voxels: 3, less a margin for rounding.
+  constexpr double kReach = 2.99;
   for (const Solid& solid : scene.solids) {
     if (options.filter == Filter::Trilinear || solid.band.isEmpty()) continue;
     if (options.filter == Filter::BSplineQi && solid.quantization.bits != 32)

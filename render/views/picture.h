@@ -17,9 +17,9 @@ namespace render {
 /// Sum of the colours that the sample rays of a pixel see.
 struct ColourSum {
   Imath::C3f colour{0};
-  double coverage = 0;  ///< sum of the shares
-  /// Adds the colour of a surface on a ray. @param share  its weight: the surface's opacity times
-  /// the transmittance of the surfaces in front of it
+  double coverage = 0;  ///< sum of the weights `share` of all added colours
+  /// Adds the colour of a surface that a ray hits. @param share  weight of the colour: the
+  /// surface's opacity times the transmittance of the surfaces in front of it
   void add(const Imath::C3f& seen, double share) {
     colour += seen * static_cast<float>(share);
     coverage += share;
@@ -41,18 +41,21 @@ struct PictureLayers {
   /// Writes depth, normal, position and id of pixel `i`. @pre the normals of the hit are set
   void setHit(std::size_t i, const Camera& camera, const Hit& hit) const;
   void setCurvature(std::size_t i, const CurvatureSample& sample) const;
-  /// Adds the header attribute ls:warning if pixels show a blended surface outside the bands.
+  /// Adds the header attribute ls:warning if pixels show a blended surface outside the band of a
+  /// solid that contributes to it.
   void addWarnings(Image& image, const Scene& scene) const;
   /// Writes the colour of pixel `i` from the sum over `samples` rays.
   void setColour(std::size_t i, const ColourSum& sum, int samples) const;
 };
 
 /// Checks a scene and its options before a picture is drawn.
-/// @throws levelset::UsageError for an invalid camera or light, opacities outside (0, 1], or sample
-///         counts out of range; for blended scenes also for a filter other than trilinear, and for
-///         NanoVDB grids
+/// @throws levelset::UsageError for an invalid camera, light, opacity, sample count or style
+///         option. Also for options that exclude each other: NanoVDB grids or a blended scene with
+///         a filter other than trilinear, NanoVDB grids with a blended scene, and bspline-qi with
+///         quantized values
 /// @throws levelset::InvalidInput for bands that are narrower than the filter's stencil
-/// @throws levelset::ResourceLimit for an image that is too large
+/// @throws levelset::ResourceLimit for an image above the memory limit of the options, or above
+///         kMaxPixels
 /// @throws as requireFields() for blended scenes
 void requirePicture(const Scene& scene, const RenderOptions& options);
 

@@ -133,7 +133,8 @@ class Reader {
     return numbers(json, name, 1, where)[0];
   }
 
-  /// Rejects members that are not in `known`, so that a misspelt name is not ignored.
+  /// Rejects members of a JSON object whose names are not in `known`, so that a misspelt name is
+  /// not ignored.
   void requireKnown(const Json& json, const std::set<std::string>& known,
                     const std::string& where) const {
     if (!json.is_object()) refuse(where, "is not an object");
@@ -430,7 +431,9 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
   if (!solids.is_array() || !meshes.is_array() || (solids.empty() && meshes.empty()))
     reader.refuse(whole, "has no solids and no meshes");
   Parts parts(options.progress, solids.size() + meshes.size());
-  ReadSceneOptions rest = options;  // the memory limit applies to all solids and meshes together
+  // The memory limit applies to the sum of all solids and meshes, so it shrinks with each one that
+  // is read.
+  ReadSceneOptions rest = options;
   rest.maxMemory = levelset::memoryLimit(options.maxMemory);
   const auto spend = [&rest](std::size_t bytes) {
     rest.maxMemory -= std::min(rest.maxMemory, bytes);

@@ -18,10 +18,10 @@ namespace {
 using Imath::C3f;
 using Imath::V3d;
 
-constexpr double kMargin = 1.08;     // size of the picture relative to the solid
+constexpr double kMargin = 1.08;     // size of the picture relative to the bounds of the zero set
 constexpr double kLine = 1.2;        // width of a contour line, pixels
 constexpr double kZeroLine = 2.4;    // width of the zero contour, pixels
-constexpr double kFaintLine = 0.45;  // opacity of the black contour lines other than zero
+constexpr double kFaintLine = 0.45;  // opacity of the black contour lines other than φ = 0
 constexpr int kAcross = 4;           // colour samples along a pixel's side
 
 /// World positions of the pixels.

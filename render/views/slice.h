@@ -11,17 +11,17 @@ namespace render {
 
 /// A plane through a solid, and the size of the picture of that plane.
 struct SliceOptions {
-  Imath::V3d point{0},
-      normal{0, 0, 1};  ///< world units; the normal has any length and points towards the viewer
+  /// A point of the plane, world units; normal of the plane, of any length, towards the viewer.
+  Imath::V3d point{0}, normal{0, 0, 1};
   int width = 1024, height = 768;  ///< pixels
   double step = 0;  ///< difference of φ between contour lines, world units; 0: one voxel
   std::size_t maxBytes = levelset::kNoMemoryLimit;  ///< memory limit of the image, bytes
   levelset::Progress progress = {};
 };
 
-/// Draws the distance φ in a plane: blue inside and brown outside, with contour lines; the zero
-/// contour is black. Areas outside the band have a uniform colour. The up direction is z, or y for
-/// a normal along z. The picture frames the bounds of the zero set.
+/// Draws the signed distance φ to a solid in a plane: blue inside and brown outside, with contour
+/// lines; the contour φ = 0 is black. Areas outside the band have a uniform colour. The up
+/// direction is z, or y for a normal along z. The picture frames the bounds of the zero set.
 /// @return layers R G B A; phi (trilinear, ± the background outside the band) and P.X P.Y P.Z at
 ///         the pixel centres, world units
 /// @throws levelset::UsageError for a plane with a zero normal, or a size or step that is not
