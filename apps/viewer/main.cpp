@@ -32,7 +32,8 @@ void runWindow(const viewer::Arguments& arguments) {
   viewer::Window window("Levelsmith", arguments.width, arguments.height, true);
   viewer::Viewer viewer(arguments, window);
   if (!arguments.files.empty()) viewer.open(arguments.files);
-  constexpr double kIdle = 0.25;  // seconds between checks of the files
+  // Longest wait for an event, seconds; then changed files are looked for.
+  constexpr double kIdle = 0.25;
   constexpr double kAfterEvent = 0.02;
   constexpr int kFramesAfterEvent = 3;  // frames that ImGui needs until its layout is final
   int frames = kFramesAfterEvent;

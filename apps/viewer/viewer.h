@@ -25,9 +25,11 @@ class Viewer {
  public:
   Viewer(const Arguments& arguments, Window& window);
 
-  /// Reads files in the background; the present model is shown until they are read.
+  /// Reads files in the background; the present model is shown until they are read. @param isReload
+  /// true: the files are those of the present model, and the view is kept
   void open(const std::vector<std::filesystem::path>& files, bool isReload = false);
-  /// Shows a model. @param keepView  true: keeps the present camera and picked points
+  /// Shows a model. @param keepView  true: keeps the present camera and picked points; false: the
+  /// camera follows from the arguments and the model
   void show(std::shared_ptr<const Model> model, bool keepView);
 
   /// Handles external events: loaded models, finished pictures, dropped files, changed files.
@@ -39,11 +41,11 @@ class Viewer {
   /// Writes a screenshot of the entire window if the user has requested one.
   void writeInterfaceShot();
 
-  /// Requests the picture of the present view. @param width, height  pixels
+  /// Requests the picture of the present view from the drawing thread. @param width, height  pixels
   void requestPicture(int width, int height);
   [[nodiscard]] const ProgressivePicture& picture() const { return picture_; }
   [[nodiscard]] bool isBusy() const;
-  /// Adds a picked point to the list, as a click does.
+  /// Adds a picked point to the list of points in the panel, as a click on the surface does.
   void addPick(const Picked& picked);
 
  private:
@@ -87,7 +89,7 @@ class Viewer {
   ProgressivePicture picture_;
   FileList fileList_;
   FileWatch watch_;
-  double nextWatch_ = 0;  // time of the next check of the files, seconds
+  double nextWatch_ = 0;  // time of the next check of the files for changes, seconds
   bool wasMissing_ = false;
 
   std::shared_ptr<const Model> model_;

@@ -33,7 +33,8 @@ struct Arguments {
   std::optional<std::array<int, 2>> pick = {};  ///< x and y of the pixel to pick
   bool asksHelp = false, asksVersion = false;
 
-  /// True when the viewer runs without an open window.
+  /// True when the viewer runs without an open window: to write a screenshot or to print a picked
+  /// point.
   [[nodiscard]] bool isScript() const { return screenshot || pick; }
 };
 

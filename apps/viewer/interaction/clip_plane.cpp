@@ -23,14 +23,15 @@ using Imath::V3d;
 
 constexpr const char* kCutName = "clip_plane";
 constexpr double kBoxVoxels = 48;
-constexpr double kBeforeEnd =
-    1 - 1e-6;  // fraction of the half width; values of larger magnitude may be rounded background
+// Fraction of the half width: values φ of larger magnitude may be rounded background, which is |φ|
+// outside the band.
+constexpr double kBeforeEnd = 1 - 1e-6;
 // Length added to each edge of the cutting box, in voxels of that box. It leaves four of them on
 // each side of the solids, because normals read values three voxels away.
 constexpr double kBesideSolids = 8;
 
-// The tones of the action 'slice': next to the surface, at the end of the band, and inside beyond
-// the band.
+// Colours of φ, as in the action 'slice': Near…: next to the surface. Far…: at the end of the band.
+// kDeepInside: inside the solid, beyond the band.
 constexpr DisplayColour kNearInside = {0.77, 0.86, 0.91}, kFarInside = {0.35, 0.54, 0.75},
                         kNearOutside = {0.92, 0.89, 0.81}, kFarOutside = {0.81, 0.67, 0.46},
                         kDeepInside = {0.44, 0.49, 0.57};
@@ -65,9 +66,8 @@ struct PhiPainter {
   const PlacedPlane& plane;
   const render::Scene& scene;
   std::vector<std::uint8_t>& colours;
-  double voxel = 0,
-         reach =
-             0;  // voxel size of the finest band and largest half width of all bands, world units
+  // Voxel size of the finest band, and largest half width of all bands; both in world units.
+  double voxel = 0, reach = 0;
 
   PhiPainter(const render::Image& image_, const render::Camera& camera_, const PlacedPlane& plane_,
              const render::Scene& scene_, std::vector<std::uint8_t>& colours_)
@@ -108,13 +108,13 @@ struct PhiPainter {
     blend(i, colourOf(phi, pixel), phi < 0 ? 1 : 0.85 * (1 - phi / reach));
   }
 
-  /// Colour of a point of the plane.
+  /// Colour of a point of the plane with the value `phi`, world units.
   /// @param pixel  edge of a pixel at the point's depth, world units
   [[nodiscard]] DisplayColour colourOf(double phi, double pixel) const {
     DisplayColour colour = phi <= -reach * kBeforeEnd ? kDeepInside
                            : phi < 0 ? mixedTones(kNearInside, kFarInside, -phi / reach)
                                      : mixedTones(kNearOutside, kFarOutside, phi / reach);
-    // Fade out the contours if they are fewer than six pixels apart.
+    // Fade out the contours where they are six to three pixels apart; draw none below three.
     const double room = std::clamp((voxel / pixel - 3) / 3, 0.0, 1.0);
     const double whole = std::round(phi / voxel);
     double dark = 0;
@@ -177,7 +177,8 @@ ClippedScene::ClippedScene(const render::Scene& scene, const Imath::Box3d& bound
                            ClipPlane::Across across)
     : scene_(scene) {
   const double extent = std::max(bounds.size().length(), 1e-12), voxel = extent / kBoxVoxels;
-  // Keep the box small, because the length of occlusion rays depends on the bounds of all solids.
+  // Keep the cutting box small, because the length of occlusion rays depends on the bounds of all
+  // solids.
   V3d size(extent);
   if (across != ClipPlane::Across::View) {
     V3d normal(0), s, t;

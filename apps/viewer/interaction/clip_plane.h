@@ -19,8 +19,8 @@ namespace viewer {
 struct ClipPlane {
   enum class Across { X, Y, Z, View };
   Across across = Across::X;
-  /// Position, world units: the plane's coordinate on the axis; for View, its distance in front of
-  /// the centre of the solids.
+  /// Position of the plane, world units: its coordinate on the axis. For View: its distance from
+  /// the centre of the box of the solids, towards the eye.
   double offset = 0;
   bool operator==(const ClipPlane&) const = default;
 };
@@ -37,15 +37,15 @@ struct PlacedPlane {
 [[nodiscard]] PlacedPlane placed(const ClipPlane& clip, const render::Camera& camera,
                                  const Imath::Box3d& bounds);
 
-/// A scene clipped by a plane: a large box in front of the plane is subtracted from the solids. The
-/// faces of the box are flat, so a few large voxels represent them exactly.
+/// A scene clipped by a plane: a large box between the plane and the eye is subtracted from the
+/// solids. The faces of the box are flat, so a few large voxels represent them exactly.
 class ClippedScene {
  public:
   /// @param bounds  box of the solids, world units, not empty
   /// @param across  axis of all planes that at() will be called with
   ClippedScene(const render::Scene& scene, const Imath::Box3d& bounds, ClipPlane::Across across);
-  /// Moves the box to the front of `plane` and returns the scene. The plane must be perpendicular
-  /// to the axis `across` of the constructor.
+  /// Moves the subtracted box to the front of `plane` and returns the clipped scene. The plane must
+  /// be perpendicular to the axis `across` of the constructor.
   [[nodiscard]] const render::Scene& at(const PlacedPlane& plane);
 
  private:
@@ -54,14 +54,14 @@ class ClippedScene {
 };
 
 /// Paints φ on the plane over the picture of the surfaces behind the plane: blue inside and brown
-/// outside, up to the end of the bands. Contours one voxel apart are drawn where they are far
-/// enough apart in the picture; the zero contour is black.
+/// outside, up to the largest half width of the bands. Contours of φ one voxel apart are drawn
+/// where they are at least three pixels apart in the picture; the contour φ = 0 is black.
 /// @param colours  red, green, blue and alpha of each pixel of the image, a byte each
 void paintPhi(const render::Image& image, const render::Camera& camera, const PlacedPlane& plane,
               const render::Scene& scene, std::vector<std::uint8_t>& colours);
 
-/// Combines the values φ of all solids at a point to φ of the drawn shape, world units. Infinite
-/// without solids.
+/// Combines the values φ of all solids at a point to φ of the drawn shape, world units. Returns
+/// infinity without solids.
 /// @param values  φ of each solid at the point, world units
 [[nodiscard]] double scenePhi(const render::Scene& scene, const std::vector<double>& values);
 

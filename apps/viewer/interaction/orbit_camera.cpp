@@ -12,13 +12,14 @@ namespace {
 using Imath::V2d;
 using Imath::V3d;
 
-constexpr double kNearestPole = 1e-9;  // angle, radians; if the view direction is closer to a pole,
-                                       // the picture's up direction determines the azimuth
+// Angle, radians. If the view direction is closer to ±vertical_, the picture's up direction
+// determines the azimuth.
+constexpr double kNearestPole = 1e-9;
 
 constexpr double kFramed = 0.94;  // share of the picture that a framed box fills
 
-/// World position of the point at a picture position, at a depth along the view axis in world
-/// units.
+/// World position of the point that appears at the picture position `place` (pixels) and has the
+/// given depth along the view axis, world units.
 V3d worldAt(const render::Camera& camera, const V2d& place, double depth) {
   const render::Camera::Ray ray = camera.ray(place.x, place.y);
   return ray.origin + ray.direction * (depth / ray.direction.dot(camera.axis()));
@@ -56,8 +57,8 @@ void OrbitCamera::orbit(double right, double up) {
   const V3d forward = camera_.axis();
   const V3d screenUp = forward.cross(camera_.up).normalized().cross(forward);
   const double sine = std::clamp(-forward.dot(vertical_), -1.0, 1.0);
-  // Horizontal direction away from the eye. At the poles it follows from the picture's up
-  // direction.
+  // Direction away from the eye, perpendicular to vertical_. If the view direction is ±vertical_,
+  // it follows from the picture's up direction.
   V3d ahead = forward + vertical_ * sine;
   if (ahead.length() < kNearestPole) ahead = screenUp * (sine > 0 ? 1 : -1);
   ahead.normalize();
@@ -110,8 +111,8 @@ void OrbitCamera::frame(const Imath::Box3d& bounds, int width, int height) {
             up = right.cross(axis), half = 0.5 * bounds.size();
   const double aspect = static_cast<double>(std::max(width, 1)) / std::max(height, 1);
   const double slopeY = kFramed * std::tan(0.5 * camera_.verticalFov), slopeX = slopeY * aspect;
-  // Smallest distance of the eye from the centre, and smallest half height of an orthographic view,
-  // for which all corners of the box are visible.
+  // Smallest distance of the eye from the centre of the box, and smallest half height of an
+  // orthographic view, for which all corners of the box are visible.
   double distance = 1e-9, extent = 1e-9;
   for (int corner = 0; corner < 8; ++corner) {
     const V3d p(corner & 1 ? half.x : -half.x, corner & 2 ? half.y : -half.y,

@@ -7,9 +7,9 @@
 
 namespace viewer {
 
-/// A camera that the user moves: around its target, parallel to the picture, and forwards or
+/// A camera that the user moves: around its target, parallel to the picture plane, and forwards or
 /// backwards. Positions in the picture are in pixels; (0, 0) is the upper left corner, +y points
-/// down. Moves with overflow are ignored.
+/// down. A move that makes the camera invalid, as by overflow, is ignored.
 class OrbitCamera {
  public:
   OrbitCamera() = default;
@@ -20,7 +20,7 @@ class OrbitCamera {
   [[nodiscard]] render::Camera camera(int width, int height) const;
 
   /// Turns the camera around its target by angles in radians, to the right and up. It stops at the
-  /// poles.
+  /// poles, where it looks along the vertical.
   void orbit(double right, double up);
   /// Moves the camera so that the point seen at picture position `from` appears at `to`.
   /// @param depth  depth of the point along the view axis, world units
@@ -34,8 +34,8 @@ class OrbitCamera {
 
   /// Moves the camera so that the entire box is visible, without a change of the view direction.
   void frame(const Imath::Box3d& bounds, int width, int height);
-  /// Turns the camera to look against `direction` at the same target, from the same distance. So
-  /// {1, 0, 0} shows the side of the target that faces +x.
+  /// Turns the camera around its target, at the same distance, so that `direction` points from the
+  /// target to the eye. For example, {1, 0, 0} shows the side of the target that faces +x.
   void lookAgainst(const Imath::V3d& direction);
   /// Toggles between perspective and orthographic projection. The target keeps its size in the
   /// picture.
@@ -51,7 +51,9 @@ class OrbitCamera {
   void take(const render::Camera& changed);
 
   render::Camera camera_;
-  Imath::V3d vertical_{0, 1, 0};  // unit vector towards the upper pole of orbit()
+  Imath::V3d vertical_{
+      // Unit vector towards the upper pole of orbit(): up direction of the initial camera.
+      0, 1, 0};
 };
 
 }  // namespace viewer

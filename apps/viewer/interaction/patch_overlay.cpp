@@ -16,8 +16,8 @@ namespace {
 using Imath::V3d;
 
 constexpr std::array<const char*, 4> kLinesNames = {"none", "outline", "base", "all"};
-constexpr double kBehind =
-    0.12;  // opacity of a line or dot behind a surface, relative to one in front
+// Opacity of a line or dot behind a surface, relative to its opacity in front of all surfaces.
+constexpr double kBehind = 0.12;
 
 DisplayColour layerColour(double w) {
   constexpr DisplayColour kLow = {0.05, 0.62, 0.60}, kHigh = {0.95, 0.52, 0.10};

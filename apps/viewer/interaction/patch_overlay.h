@@ -10,16 +10,16 @@
 
 namespace viewer {
 
-/// Lines of the patches that are drawn.
+/// Choice of the lines and particles of patches that are drawn.
 enum class PatchLines {
   None,
-  Outline,  ///< borders of the lowest and the highest layer, and the lines between their corners
+  Outline,  ///< borders of the lowest and the highest layer, and the lines that join their corners
   Base,     ///< particles of the lowest layer, on the surface, and the lines between them
   All       ///< particles and lines of all layers
 };
 
-/// Finds the value for its name. @throws levelset::UsageError for a name other than none, outline,
-/// base and all
+/// Finds the PatchLines value with a name. @throws levelset::UsageError for a name other than none,
+/// outline, base and all
 [[nodiscard]] PatchLines patchLinesNamed(const std::string& name);
 [[nodiscard]] const char* patchLinesName(PatchLines lines);
 
@@ -35,8 +35,8 @@ struct Canvas {
 /// Draws patches, in colours from teal for the lowest layer, on the surface, to orange for the
 /// highest layer. Lines behind a surface are faint.
 /// @param camera  camera whose width and height are those of the canvas
-/// @param picture  picture of the same view, of any size; its layer Z decides if a line is behind a
-/// surface
+/// @param picture  picture of the same view, of any size; its layer Z (depth) decides if a line is
+/// behind a surface
 /// @param tolerance  depth behind a surface up to which a line still counts as in front, world
 /// units
 void drawPatches(const std::vector<mapping::Patch>& patches, PatchLines lines,

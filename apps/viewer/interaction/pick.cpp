@@ -26,9 +26,10 @@ V3d vectorAt(const render::Image& image, const char* name, std::size_t i) {
   return {part("X"), part("Y"), part("Z")};
 }
 
-/// Name of the solid or mesh that a pixel with the given id shows. If several solids have the id,
-/// the one with the nearest surface. The id of the clip plane belongs to none of them; then the
-/// solid in which the point lies deepest. @param phi  φ of each solid at the point, world units
+/// Name of the solid or mesh that a pixel with the given id shows. If several solids have the id:
+/// the solid whose surface is nearest to the point. If no solid or mesh has it, as on the clip
+/// plane: the solid in which the point lies deepest. @param phi  φ of each solid at the point,
+/// world units
 std::string nameAt(const render::Scene& scene, std::uint32_t id, const std::vector<double>& phi) {
   std::string name;
   double least = INFINITY;
@@ -75,7 +76,8 @@ std::optional<double> depthSeen(const Frame& frame, double x, double y) {
 }
 
 std::string pointText(const V3d& point) {
-  // Eight significant digits, as single precision has. Negative zero becomes zero.
+  // Eight significant digits, about the precision of the single-precision positions. Negative zero
+  // becomes zero.
   const auto digits = [](double x) { return fmt::format("{:.8g}", x == 0 ? 0 : x); };
   return fmt::format("{},{},{}", digits(point.x), digits(point.y), digits(point.z));
 }

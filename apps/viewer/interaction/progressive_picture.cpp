@@ -16,17 +16,19 @@
 namespace viewer {
 namespace {
 
-/// A pass of refinement: edge of a picture pixel in window pixels, and numbers of samples.
+/// A pass of refinement: edge of a pixel of the picture, in pixels of the window, and numbers of
+/// samples as in RenderOptions.
 struct Pass {
   int pixelSize, samples, ambientSamples, shadowSamples;
 };
 constexpr std::array<Pass, 6> kPasses = {Pass{8, 1, 0, 0}, {4, 1, 0, 0},  {2, 1, 0, 0},
                                          {1, 1, 0, 0},     {1, 1, 16, 4}, {1, 4, 16, 4}};
 
-constexpr int kCpuTileEdge = 16,
-              kGpuTileEdge = 64;     // edges of a tile, pixels; enough rays for efficient tracing
-constexpr double kOnSurface = 4e-3;  // relative to the model's diagonal; particles that are less
-                                     // deep below the surface count as on it
+// Edges of a tile of the picture, pixels. A tile has enough rays for efficient tracing.
+constexpr int kCpuTileEdge = 16, kGpuTileEdge = 64;
+// Depth behind the surface up to which patch lines count as in front of it, as a fraction of the
+// diagonal of the model's box.
+constexpr double kOnSurface = 4e-3;
 
 render::Camera shrunk(render::Camera camera, int pixelSize) {
   camera.width = std::max(1, (camera.width + pixelSize / 2) / pixelSize);
@@ -48,7 +50,7 @@ struct ProgressivePicture::Worker {
       image;  // picture of the last finished pass for `view`; null: none
 
   std::shared_ptr<const Model>
-      preparedModel;  // model that the tables in `surfaces` were built from
+      preparedModel;  // model from which the kernel's tables in `surfaces` were built
   std::optional<ClipPlane::Across> preparedCut;
   std::unique_ptr<ClippedScene> cut;
   std::unique_ptr<render::KernelScene> surfaces;
@@ -63,8 +65,8 @@ struct ProgressivePicture::Worker {
   [[nodiscard]] PlacedPlane plane() const {
     return placed(*view.clip, view.camera, view.model->solidBounds);
   }
-  /// Scene of the view, with a camera for a coarser picture. @param edge  edge of a picture pixel,
-  /// window pixels
+  /// Scene of the view, with a camera for a picture of coarser pixels. @param edge  edge of a pixel
+  /// of the picture, in pixels of the window
   [[nodiscard]] render::Scene sceneFor(int edge) {
     render::Scene scene = isCut() ? cut->at(plane()) : view.model->scene;
     scene.camera = shrunk(view.camera, edge);
@@ -107,12 +109,13 @@ struct ProgressivePicture::Worker {
     }
   }
 
-  /// Builds the kernel's tables, unless those of the previous picture fit the view.
+  /// Builds the kernel's tables, unless the tables of the previous picture were built for the same
+  /// model and the same axis of the clip plane.
   void prepare() {
     const std::optional<ClipPlane::Across> newCut =
         isCut() ? std::optional(view.clip->across) : std::nullopt;
     if (surfaces && preparedModel == view.model && preparedCut == newCut) return;
-    tracer = nullptr;  // the tracer references the tables
+    tracer = nullptr;  // the tracer references the tables in `surfaces`
     surfaces = nullptr;
     cut = nullptr;
     if (newCut)

@@ -27,7 +27,7 @@ enum class Renderer {
   Gpu
 };
 
-/// Everything that determines the rays of a picture.
+/// Model, camera, clip plane and style of a picture. A change of them needs new rays.
 struct View {
   std::shared_ptr<const Model> model;
   render::Camera camera;
@@ -38,8 +38,9 @@ struct View {
 /// Display options. A change of them recolours the present picture, without new rays.
 struct Display {
   Layer layer = Layer::Colour;
-  double curvatureRange =
-      40;  ///< curvature at the end of the colour scale, times the model's diagonal
+  /// Curvature at the end of the colour scale, multiplied by the diagonal of the box of the model's
+  /// surfaces.
+  double curvatureRange = 40;
   PatchLines patches = PatchLines::All;
   bool contours = true;  ///< draws contours of φ on the clip plane
   bool operator==(const Display&) const = default;
@@ -48,8 +49,9 @@ struct Display {
 /// A picture of a view at one level of refinement.
 struct Frame {
   View view;
-  int pixelSize = 8;        ///< edge of a pixel of `image`, window pixels
-  bool isComplete = false;  ///< the last pass is done, with all samples, light and shadow
+  int pixelSize = 8;  ///< edge of a pixel of `image`, in pixels of the window
+  /// True after the last pass: full resolution, all samples, shadows and occlusion.
+  bool isComplete = false;
   std::shared_ptr<const render::Image> image;  ///< the picture with all layers
   Canvas
       canvas;  ///< colours to display; its size may differ from that of `image` and of the window
@@ -71,7 +73,7 @@ class ProgressivePicture {
   [[nodiscard]] std::shared_ptr<const Frame> frame() const;
   /// Error that prevented the drawing of the requested view; null without an error.
   [[nodiscard]] std::exception_ptr failure() const;
-  /// Progress of the pass that is being drawn, from 0 to 1; 1 when nothing is drawn.
+  /// Progress of the pass of refinement that is being drawn, from 0 to 1; 1 when nothing is drawn.
   [[nodiscard]] double progress() const { return progress_; }
   /// Name of the back end in use: "processor", or the description of the OpenGL device.
   [[nodiscard]] std::string rendererName() const;

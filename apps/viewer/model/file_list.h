@@ -7,7 +7,7 @@
 
 namespace viewer {
 
-/// Dialog that lists the folders, and the files that the viewer can open, of a folder.
+/// Dialog that lists the subfolders of a folder, and those of its files that the viewer can open.
 class FileList {
  public:
   /// Opens the dialog in the folder `place`, or in the folder of the file `place`. If that folder

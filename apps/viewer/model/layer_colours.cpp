@@ -75,9 +75,8 @@ std::vector<std::uint8_t> depthColours(const render::Image& image) {
   for (std::size_t i = 0; i < image.pixelCount(); ++i)
     if (isHit(image, i)) range.extendBy(valueAt(z, i));
   return painted(image, [&](std::size_t i) {
-    const double grey =
-        1 - 0.85 * range.share(
-                       valueAt(z, i));  // the darkest grey, 0.15, is brighter than the background
+    // The darkest grey, 0.15 for the farthest point, is brighter than the background of the window.
+    const double grey = 1 - 0.85 * range.share(valueAt(z, i));
     return DisplayColour{grey, grey, grey};
   });
 }

@@ -22,7 +22,7 @@ inline constexpr std::array<Layer, 9> kLayers = {
 /// the names
 [[nodiscard]] Layer layerNamed(const std::string& name);
 
-/// Red, green and blue as displayed (sRGB), from 0 to 1.
+/// Red, green and blue of a displayed colour (sRGB), from 0 to 1.
 using DisplayColour = std::array<double, 3>;
 
 /// Colour for a value: blue at −1, white at 0, red at 1. Values outside this range are clamped.
@@ -30,15 +30,15 @@ using DisplayColour = std::array<double, 3>;
 /// Colour for a solid's or mesh's id, different for each id; grey for 0.
 [[nodiscard]] DisplayColour idColour(std::uint32_t id);
 
-/// Converts a layer to four bytes for each pixel: red, green, blue, alpha. Pixels without a hit are
-/// transparent.
+/// Converts a layer of a picture to four bytes for each pixel: red, green, blue, alpha. Pixels
+/// without a hit are transparent.
 /// - Colour: the pixels of a PNG of the picture.
 /// - Normals: x, y, z from −1 to 1 as red, green, blue.
 /// - Depth: white for the nearest point of the picture, dark for the farthest.
 /// - Positions: x, y, z as red, green, blue, scaled to the bounding box of the points in the
 /// picture.
-/// - Curvatures: curvature × extent (Gauss curvature × extent²) on a scale from −range to range
-/// (−range² to range²).
+/// - Curvatures: the colour scale spans curvature × extent from −range to range (Gauss curvature ×
+/// extent² from −range² to range²).
 /// @param extent  diagonal of the bounding box of the surfaces, world units
 /// @param range  product of curvature and extent at the ends of the colour scale
 /// @pre the image has the layers that renderEmbree() returns

@@ -56,7 +56,7 @@ levelset::NarrowBand bandOfMesh(const fs::path& file, const OpenOptions& options
       .band;
 }
 
-/// Files of the level sets and meshes that a scene file names. @pre readScene() accepts the file
+/// Paths of the level sets and meshes that a scene file names. @pre readScene() accepts the file
 std::vector<fs::path> solidFilesOf(const fs::path& scene) {
   std::vector<fs::path> files;
   std::ifstream stream(scene);

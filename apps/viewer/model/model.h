@@ -20,7 +20,7 @@ struct Model {
   std::vector<mapping::Patch> patches;
   Imath::Box3d solidBounds;  ///< box of the drawn surfaces, world units; empty when there are none
   Imath::Box3d bounds;       ///< box of the surfaces and of the patches' particles, world units
-  std::string description = {};  ///< number of solids, voxels and patches, as a line for the user
+  std::string description = {};  ///< numbers of solids, voxels and patches, as a line for the user
   std::vector<std::filesystem::path>
       files;  ///< files that were read: first the level set, mesh or scene, then the patches
   std::vector<std::filesystem::path> watched = {};  ///< `files`, and the files that a scene names
@@ -28,8 +28,8 @@ struct Model {
   /// Diagonal of solidBounds, world units.
   [[nodiscard]] double extent() const { return solidBounds.size().length(); }
   /// True when a clip plane can cut the solids. Blended scenes cannot be cut, because the clip
-  /// plane would be blended with the solids. Scenes with transparent solids and without an
-  /// expression cannot be cut either.
+  /// plane would be blended with the solids. Neither can open surfaces, and scenes with a
+  /// transparent solid or mesh but without an expression.
   [[nodiscard]] bool canCut() const;
 };
 
@@ -57,7 +57,7 @@ struct OpenOptions {
 void requireReadable(const std::vector<std::filesystem::path>& files);
 
 /// Files to open when the user opens `file` while the files `shown` are open. A patch is added to
-/// them, or read again. Any other file replaces them.
+/// `shown`, or read again if it is there. Any other file replaces `shown`.
 [[nodiscard]] std::vector<std::filesystem::path> filesWith(
     const std::vector<std::filesystem::path>& shown, const std::filesystem::path& file);
 
