@@ -14,11 +14,12 @@
 /// carry texture coordinates [Brodersen07 §8.2].
 namespace mapping {
 
-/// One layer of particles: an iso-surface φ = height of the base, sampled on a grid of u and v.
+/// One layer of particles on a grid of u and v. With LayerScheme::Reduced and no LayerTransform,
+/// the particles lie on the iso-surface φ = height of the base.
 struct ParticleLayer {
   std::size_t columns = 0, rows = 0;  ///< along u, along v; each at least 2
   double w = 0;                       ///< texture coordinate of the layer
-  double height = 0;                  ///< distance from the base surface, world units
+  double height = 0;                  ///< w × height of the patch, world units
   std::vector<Imath::V3d> positions;  ///< rows × columns, row major: index = row * columns + column
   /// Particles one spacing beyond each end of the rows and columns, continued straight along the
   /// surface, see beyond(); empty: no rim.
@@ -48,18 +49,20 @@ struct ParticleLayer {
 };
 
 enum class LayerScheme {
-  /// Scheme B: each layer is relaxed between its own corners, moved up from the layer below.
+  /// Scheme B: each layer is built on its own, between corners (for a decal: around a centre) that
+  /// are moved up from the layer below.
   Reduced,
-  /// Scheme A: each particle at w = 0 follows ∇φ to the top layer; inner layers lie on the straight
-  /// lines between the two.
+  /// Scheme A: each particle at w = 0 follows ∇φ to the top layer; its positions on inner layers
+  /// lie on the straight line from its start to its end.
   Conforming,
-  /// Scheme C: the particles at w = 0 travel along a curve and rotate with it.
+  /// Scheme C: the particles at w = 0 travel along a curve, PatchOptions::spline, and rotate with
+  /// it.
   Spline
 };
 
 struct Patch {
   std::array<Imath::V3d, 4> corners;  ///< on the base surface, anticlockwise seen from outside
-  double height = 0;                  ///< world units
+  double height = 0;                  ///< height of the top layer, world units
   /// True: the corners are in clockwise order seen from outside, so that the texture is mirrored.
   bool mirrored = false;
   std::vector<ParticleLayer> layers;  ///< from the surface (w = 0) outwards (w = 1)

@@ -30,7 +30,8 @@ struct RbfSolveReport {
 };
 
 /// Particles of an RBF map as the solver uses them: one for each position, in mean particle
-/// spacings relative to their centre.
+/// spacings relative to their centre. Targets are their texture coordinates, and `lambda` their
+/// relaxation λ.
 struct RbfCloud {
   std::vector<Imath::V3d> points, targets;
   std::vector<double> lambda;

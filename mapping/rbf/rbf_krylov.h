@@ -12,8 +12,9 @@ namespace mapping {
 /// particles [Beatson00].
 /// @param q  orthonormal basis of the linear polynomials' values at the n particles, n × (1 +
 ///         cloud.directions)
-/// @return weights and their image under the matrix. Orthogonal to the polynomials, the residual is
-///         at most options.solveTolerance times the extent of the targets in u, v and w.
+/// @return weights and their image under the matrix. The residual, projected orthogonally to the
+///         linear polynomials, is at most options.solveTolerance times the extent of `values` in u,
+///         v and w.
 /// @throws ResourceLimit if the memory estimate exceeds the limit
 /// @throws NumericalError if the iteration stagnates
 [[nodiscard]] RbfFit solveIteratively(const RbfCloud& cloud, const RbfMapOptions& options,

@@ -21,10 +21,11 @@ class RbfPreconditioner {
   RbfPreconditioner(const RbfCloud& cloud, RbfKernel kernel, const ClusterTree& tree,
                     const Eigen::MatrixXd& q);
 
-  /// Applies the approximate inverse. The resulting weights are orthogonal to the polynomials.
+  /// Applies the approximate inverse. The resulting weights are orthogonal to the linear
+  /// polynomials.
   [[nodiscard]] RbfColumns operator()(const RbfColumns& residual) const;
 
-  /// Memory for a number of particles, bytes.
+  /// Memory of the preconditioner for a number of particles, bytes.
   [[nodiscard]] static double estimateBytes(double particles);
 
  private:

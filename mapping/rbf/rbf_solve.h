@@ -27,14 +27,15 @@ struct RbfFit {
 struct RbfSolution {
   std::vector<Imath::V3d> weights;
   Imath::V3d constant{0};
-  Imath::M33d linear;  ///< gradients as rows
+  Imath::M33d linear;  ///< gradients of u, v and w as rows
 };
 
 /// Solves for the weights. With s the kernel's sign, s φ + λ is positive definite on the vectors
 /// orthogonal to the linear polynomials that the particles distinguish. The system is solved there
-/// by Cholesky factorisation, or iteratively above options.denseLimit and if the factors exceed
-/// options.maxMemory. If the particles span fewer than three directions, a similarity completes the
-/// affine part, see RbfMap.
+/// by Cholesky factorisation, or iteratively above options.denseLimit particles and if the factors
+/// exceed options.maxMemory, but never for 500 particles or fewer. If the particles span fewer than
+/// three directions, the affine part is completed so that it also scales the missing directions,
+/// see RbfMap.
 /// @throws ResourceLimit if the memory estimate exceeds options.maxMemory
 /// @throws NumericalError if the iteration stagnates
 [[nodiscard]] RbfSolution solveRbf(const RbfCloud& cloud, const RbfMapOptions& options,

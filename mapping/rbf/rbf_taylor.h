@@ -69,7 +69,8 @@ class RbfCubes {
   [[nodiscard]] RbfCube root(const Imath::V3d& center, double half) const;
   /// Octant of the cube. Bits 1, 2 and 4 of `bits` select the upper half along x, y and z.
   [[nodiscard]] RbfCube octant(const RbfCube& cube, int bits) const;
-  /// Particles with scaled weights; positions in world units, relative to the map's origin.
+  /// Particles with weights in scaled u, v and w; positions in world units, relative to the map's
+  /// origin.
   [[nodiscard]] std::span<const RbfParticle> particles() const { return particles_; }
   [[nodiscard]] double weightNorm(std::uint32_t particle) const { return norms_[particle]; }
   /// Scaled Jacobian at a point of the cube (relative to the map's origin, world units), gradients
@@ -79,7 +80,8 @@ class RbfCubes {
   [[nodiscard]] Imath::V3d value(const RbfCube& cube, const Imath::V3d& point) const;
 
  private:
-  /// Moves candidates that are far enough from the cube into its polynomial.
+  /// Adds candidates (indices of particles) that are far enough from the cube to its polynomial,
+  /// and the others to `cube.near`.
   void sumFar(RbfCube& cube, std::span<const std::uint32_t> candidates) const;
 
   std::vector<RbfParticle> particles_;

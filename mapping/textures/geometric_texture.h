@@ -50,12 +50,14 @@ struct TextureOptions {
   RbfMapOptions rbf = {};      ///< solveTolerance is ignored: a tenth of mapTolerance is used
   double mapTolerance = 0.05;  ///< error bound of the map's fast evaluation, texture voxels
   bool allowFolds = false;
-  bool skipFolds = false;  ///< leave out patches whose map folds, if there are several
+  /// Leave out patches whose map folds or that pass through themselves; an error if no patch is
+  /// left.
+  bool skipFolds = false;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};
 };
 
-/// CPU time of the steps, seconds summed over all threads.
+/// CPU time of the steps of mapTexture(), seconds summed over all threads.
 struct TextureCost {
   double setup = 0;  ///< solving for the map, or building its tetrahedra
   /// Measuring the distortion, and certifying that the map does not fold.
@@ -70,7 +72,8 @@ struct TextureCost {
 /// Measurements over all patches. Distortion and certificate are those of the worst patch.
 struct TextureReport {
   double voxelSize = 0;
-  std::size_t patches = 0, skipped = 0;  ///< mapped patches, and patches left out because they fold
+  /// Mapped patches, and patches left out because they fold or pass through themselves.
+  std::size_t patches = 0, skipped = 0;
   std::size_t particles = 0, blocksTested = 0, blocksEvaluated = 0;
   /// Particles summed or tetrahedra tested, per grid point of the evaluated blocks.
   double operationsPerPoint = 0;
@@ -82,7 +85,9 @@ struct TextureReport {
   /// Largest error of the map's fast evaluation at random grid points, texture voxels.
   double mapError = 0;
   std::size_t mapErrorPoints = 0;
-  RbfSolveReport solve = {};  ///< report of the solver; RBF maps only
+  /// Solver reports of all maps combined: worst values, and sums of merged particles; RBF maps
+  /// only.
+  RbfSolveReport solve = {};
   TextureCost cost = {};
   std::vector<std::string> notes;
 };

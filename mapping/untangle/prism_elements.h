@@ -33,7 +33,7 @@ struct ElementEnergy {
 
 [[nodiscard]] double determinantOf(const ElementSlopes& slopes);
 
-/// The prism cells of a patch split into elements whose slopes are linear in the particle
+/// The cells of a patch (PrismCells), split into elements whose slopes are linear in the particle
 /// positions. Each cell has 14 elements: its eight corners, where a trilinear map inverts first,
 /// and its six tetrahedra.
 class PrismElements {
@@ -44,7 +44,7 @@ class PrismElements {
 
   [[nodiscard]] std::size_t size() const { return weights_.size(); }
   [[nodiscard]] std::size_t particleCount() const { return particles_; }
-  /// Share of an element in the total rest volume.
+  /// Share of an element in the total volume of the rest shape.
   [[nodiscard]] double weight(std::size_t element) const { return weights_[element]; }
   [[nodiscard]] ElementSlopes slopes(std::size_t element,
                                      const std::vector<Imath::V3d>& positions) const;

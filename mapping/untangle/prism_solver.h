@@ -34,7 +34,8 @@ class PrismSolver {
   ~PrismSolver();
 
   /// Minimises the energy, starting from the current positions.
-  /// @return number of iterations; fewer than `mostIterations` when the energy no longer decreases
+  /// @return number of iterations; fewer than `mostIterations` when the energy hardly decreases any
+  ///         more
   std::size_t minimise(const Density& density, std::size_t mostIterations);
 
   [[nodiscard]] const std::vector<Imath::V3d>& positions() const { return positions_; }

@@ -28,8 +28,9 @@ struct UntangleOptions {
   levelset::Progress progress = {};
 };
 
-/// Number of cells in which the piecewise linear map through the particles, or one of the cell's
-/// six tetrahedra, is inverted or has no volume. Cells where this cannot be excluded count too.
+/// Number of cells (PrismCells) in which the trilinear map through the particles, or one of the
+/// cell's six tetrahedra, is inverted or has no volume. Cells where this cannot be excluded count
+/// too.
 struct FoldCount {
   std::size_t folded = 0, cells = 0;
   /// Least Jacobian determinant at the corners of cells and in their tetrahedra; 1 for the rest
@@ -49,8 +50,9 @@ struct Untangling {
 
 /// Moves particles until no cell folds, by minimising an energy that is finite for folds and
 /// forbids them in the limit ε → 0 of its parameter [Garanzha21]. If the sides of the patch cross
-/// each other on the surface, no position of the other particles removes that fold. If folds
-/// remain, the last patch is returned if it has fewer folds than the input, otherwise the input.
+/// each other on the surface, no position of the other particles removes that fold, unless
+/// `freeSides` is set. If folds remain, the last patch is returned if it has fewer folds than the
+/// input, otherwise the input.
 /// @param base  the solid on which the patch was built
 /// @throws InvalidInput for a patch without layers, with particles that are not finite, or that
 ///         does not lie on the base
@@ -78,7 +80,8 @@ struct DistortionGain {
 };
 
 /// Moves particles to minimise the symmetric Dirichlet energy [Smith15] over all elements, see
-/// ElementDistortion. The energy decreases in every step, and no step creates a fold.
+/// ElementDistortion. The energy decreases in every step. If folds appear between the elements, the
+/// last patch without folds is returned.
 /// @throws InvalidInput as untangle(), and for a patch that folds: untangle it first
 /// @throws UsageError, ResourceLimit, Cancelled as untangle()
 [[nodiscard]] DistortionGain minimiseDistortion(const levelset::NarrowBand& base,
