@@ -15,7 +15,8 @@ namespace mapping {
 [[nodiscard]] ParticleLayer withCounts(const ParticleLayer& layer, std::size_t columns,
                                        std::size_t rows);
 
-/// A particle below or above the layers of a patch, where an embedded texture lies.
+/// A particle below or above the layers of a patch, in the space of an embedded texture: world
+/// position and texture coordinates.
 struct EmbeddedParticle {
   Imath::V3d position, uvw;
 };

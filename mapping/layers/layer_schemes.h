@@ -28,8 +28,8 @@ namespace mapping {
 [[nodiscard]] ParticleLayer conformingLayer(const levelset::NarrowBand& space,
                                             const ParticleLayer& surface, double height, double w);
 
-/// A smooth curve with tangents through points (Catmull-Rom by chord lengths). It is stored as a
-/// polyline with 64 segments between two of the points.
+/// A smooth curve through given points (Catmull-Rom by chord lengths). It is stored as a polyline
+/// with 64 segments between two of the points.
 class SweepCurve {
  public:
   /// @param points  at least two; successive points differ

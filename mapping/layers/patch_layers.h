@@ -10,7 +10,7 @@
 #include "levelset/narrow_band.h"
 #include "mapping/patches/patch.h"
 
-/// Steps shared by all functions that build patches.
+/// Steps shared by the functions that build patches, such as makePatch and makeDecal.
 namespace mapping {
 
 /// Formats a point as on the command line, exact to the last bit.
@@ -27,8 +27,8 @@ struct LayerSize {
 
 [[nodiscard]] LayerSize sizeOf(const ParticleLayer& layer);
 
-/// Number of particles at a spacing s: (u/s + 3)(v/s + 3), including rims, summed over the layers
-/// of size u × v.
+/// Number of particles at a spacing s: (u/s + 3)(v/s + 3), including rims, summed over all given
+/// layers of size u × v.
 [[nodiscard]] double particlesAt(double spacing, std::span<const LayerSize> layers);
 
 /// Chooses the spacing that gives about two thousand particles over all layers, world units; at

@@ -30,7 +30,7 @@ class CellTree {
  private:
   struct Node {
     Imath::Box3d box;
-    Cell from, to;  ///< range of cells; `to` is exclusive
+    Cell from, to;  ///< range of cell indices along u, v, w; `to` is exclusive
     /// Index of the second child; the first child is the next node; 0: a single cell.
     std::size_t second = 0;
   };

@@ -43,7 +43,8 @@ class PrismMap final : public PatchMap {
 
  private:
   friend class PrismBlock;
-  /// Box around a point. It meets the box of the cell that contains the point, despite rounding.
+  /// Small world box around a point, so that it meets the box of the cell that contains the point,
+  /// despite rounding.
   [[nodiscard]] Imath::Box3d aroundPoint(const Imath::V3d& x) const;
   /// Finds the tetrahedron that contains x.
   /// @return false if there is none

@@ -15,7 +15,7 @@ namespace mapping {
 /// [Schmidt06] accumulates errors. With LayerScheme::Reduced each layer has its own exponential
 /// map, whose centre moves along ∇φ from layer to layer. The size of a layer grows with the
 /// distances from its centre to the middles of its sides, which also move along ∇φ.
-/// @param at         centre, projected along φ to the zero set
+/// @param at         centre, moved to the nearest point of the zero set
 /// @param direction  direction of u; its tangential part is used
 /// @param radius     half of the square's side, along the surface, world units
 /// @param height     height of the space above the surface that the patch covers, world units,

@@ -16,8 +16,8 @@ struct PatchResult {
 };
 
 /// Builds a patch between four corners.
-/// @param corners  u runs from corner 0 to 1, v from corner 0 to 3; projected along φ to the zero
-///         set
+/// @param corners  u runs from corner 0 to 1, v from corner 0 to 3; moved to the nearest points of
+///         the zero set
 /// @param height   height of the space above the surface that the patch covers, world units,
 ///         positive
 /// @throws UsageError for corners in clockwise order seen from outside (the message gives the right

@@ -36,7 +36,8 @@ struct PatchSite {
 struct ScatterResult {
   std::vector<Patch> patches;
   std::vector<PatchSite> sites;  ///< one for each patch
-  /// Least distance between two patch centres, divided by their mean scale, world units.
+  /// Least distance between two patch centres, divided by their mean scale, world units; infinite
+  /// for one patch.
   double distance = 0;
   std::size_t leftOut = 0;  ///< number of positions where no patch could be built
   std::string cause;        ///< reason for the first position left out
@@ -51,7 +52,8 @@ struct ScatterResult {
 [[nodiscard]] ScatterResult scatter(const levelset::NarrowBand& base, double height,
                                     const ScatterOptions& options);
 
-/// Builds patches at the sites of an earlier scatter() with another height.
+/// Builds patches at the sites of an earlier scatter() with another height, which is multiplied by
+/// the scale of each site.
 [[nodiscard]] std::vector<Patch> makePatches(const levelset::NarrowBand& base,
                                              const std::vector<PatchSite>& sites, double height,
                                              const PatchOptions& options = {});

@@ -35,7 +35,8 @@ struct ScatteredPoints {
   std::vector<SurfacePoint> points;
   /// Number of points at the front that are the result; the others are spare points.
   std::size_t wanted = 0;
-  /// Least distance between two points of the result, divided by their mean scale, world units.
+  /// Least distance between two points of the result, divided by their mean scale, world units;
+  /// infinite for one point.
   double distance = 0;
 };
 

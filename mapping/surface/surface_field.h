@@ -7,8 +7,8 @@
 
 namespace mapping {
 
-/// Access to the iso-surfaces φ = height of a base for projecting and tracing. Cheap to construct;
-/// use one object per thread.
+/// Values and gradients of φ of a base, for projecting points onto its iso-surfaces φ = height and
+/// tracing curves on them. Cheap to construct; use one object per thread.
 class SurfaceField {
  public:
   explicit SurfaceField(const levelset::NarrowBand& band);
