@@ -111,8 +111,8 @@ PatchSides makeSides(const levelset::NarrowBand& band, double height,
                      const std::array<V3d, 4>& corners, const PatchSides& between,
                      const PatchSides* below, const PatchSides* ground) {
   const SurfaceField field(band);
-  // Largest length of a side, as a multiple of its length on the surface plus the height. Half a
-  // turn along a side adds π times the height.
+  // Largest length of a path along a side, as a multiple of the sum of the side's length on the
+  // surface and the height. Half a turn along a side adds π times the height.
   constexpr double kMostGrowth = 4;
   constexpr std::array<std::array<std::size_t, 2>, 4> kEnds = {{{0, 1}, {1, 2}, {3, 2}, {0, 3}}};
   PatchSides sides;
@@ -179,7 +179,8 @@ void addRim(const levelset::NarrowBand& band, ParticleLayer& layer) {
   layer.rim.assign(2 * (layer.columns + layer.rows) + 4, V3d(0));
   const auto onwards = [&](const V3d& last, const V3d& before) {
     const V3d offset = last - before;
-    constexpr double kMostTurn = 0.5;  // cosine of the largest turn of the normal
+    // Cosine of the largest turn of the surface normal up to a rim particle.
+    constexpr double kMostTurn = 0.5;
     const std::optional<V3d> end = walkStraight(field, layer.height, last, offset, offset.length());
     const bool isAhead = end && field.normal(last).dot(field.normal(*end)) > kMostTurn;
     return isAhead ? *end : last + offset;

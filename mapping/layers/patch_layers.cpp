@@ -19,12 +19,12 @@ using Imath::V3d;
 using levelset::NarrowBand;
 using levelset::UsageError;
 
-// The linear system of an RBF map is dense: n³ / 3 operations and n² numbers for n particles. This
-// many particles take a second or two, and are five to ten voxels apart on a patch of 100 to 200
-// voxels.
+// The linear system of an RBF map is dense: n³ / 3 operations and n² numbers for n particles.
+// Solving for this many particles takes a second or two. They are five to ten voxels apart on a
+// patch of 100 to 200 voxels.
 constexpr double kParticleBudget = 2000;
 constexpr double kSmallestSpacing = 1.5;  // voxels; closer particles carry no more information
-constexpr std::size_t kFewest = 4;        // particles along a side
+constexpr std::size_t kFewest = 4;        // least number of particles along a side
 constexpr double kMostParticles = 1e6;
 
 /// Middle of a layer, and the normal and the direction of u at that point.
@@ -217,8 +217,8 @@ void checkParticleCount(double count, double spacing, const PatchOptions& option
 
 NarrowBand sweepAbove(const NarrowBand& base, std::span<const V3d> outline, const LayerSize& size,
                       double height, const PatchOptions& options, double lean) {
-  // The inner surface of a patch may leave the box of its sides, because it may bulge by a quarter
-  // of its width.
+  // The surface between the sides of a patch may leave the bounding box of the sides: it may bulge
+  // by a quarter of the patch's width.
   const double bulge = 0.25 * std::min(size.u, size.v) + lean;
   return sweepPatchSpace(base, outline, bulge, height,
                          {.shared = options.space,

@@ -145,8 +145,8 @@ class LatticeBuilder {
   const Patch& patch_;
   const LatticeBorder& border_;
   int around_;                           ///< outer cells on each side, 0 or 1
-  std::size_t columns_ = 2, rows_ = 2;   ///< largest counts of all layers
-  std::array<double, 2> wide_ = {1, 1};  ///< width of the outer cells along u and v, in inner cells
+  std::size_t columns_ = 2, rows_ = 2;   ///< largest numbers of columns and rows of all layers
+  std::array<double, 2> wide_ = {1, 1};  ///< width of outer cells along u and v, in inner cells
   int below_ = 0, lastLayer_ = 0;        ///< w-indices of the nodes of the first and the last layer
   LatticeNodes nodes_;
 };

@@ -13,7 +13,8 @@ using Imath::V3d;
 
 struct Interval {
   std::size_t cell;
-  double fraction;  ///< below 0 before the first cell, above 1 beyond the last
+  /// Position in the cell, 0 to 1; below 0 before the first cell, above 1 beyond the last.
+  double fraction;
 };
 
 Interval locate(double t, std::size_t count) {

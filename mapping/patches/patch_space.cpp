@@ -27,7 +27,7 @@ constexpr double kCoarseVoxels = 20;
 constexpr double kCoarsest = 4;
 // Least number of voxels of the coarser grid across the shortest side of the base's bounding box.
 constexpr double kThinnest = 12;
-// Largest |φ| of the coarse grid at the border of the patch, coarse voxels.
+// Largest |φ| of the coarser grid at the border of the patch, in voxels of that grid.
 constexpr double kFaithful = 0.25;
 
 bool isFaithful(const NarrowBand& coarse, std::span<const V3d> border) {

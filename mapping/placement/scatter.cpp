@@ -121,7 +121,7 @@ std::optional<NarrowBand> sweepFor(const NarrowBand& base, const PatchCrowd& cro
                           {.maxMemory = options.maxMemory, .progress = options.progress});
 }
 
-/// Number of positions to try, in order of priority.
+/// Number of positions to try, from the front of points.points, which is in order of priority.
 std::size_t triesOf(const ScatteredPoints& points) {
   return std::min(points.points.size(), kTriesPerPatch * points.wanted);
 }

@@ -68,7 +68,7 @@ class PathGraph {
   Node& node(Key key) { return nodes_.at(key); }
 
   /// Runs Dijkstra's algorithm from an end, or A* if `estimate` is not zero.
-  /// @param mayLie  true if the search may visit a position at a path length
+  /// @param mayLie  true if the search may visit a position, given its path length from `end`
   /// @param isGoal  true for a node at which the search ends
   /// @return key of the goal, or nothing
   template <typename MayLie, typename Estimate, typename IsGoal>
@@ -119,7 +119,8 @@ class PathGraph {
     return it->second;
   }
 
-  /// Opens the nodes around an end; the straight distance of each from the end is its path length.
+  /// Puts the nodes around an end into the queue; the straight distance of each from the end is its
+  /// path length.
   template <typename Estimate>
   void start(std::size_t end, const Estimate& estimate) {
     const V3d offset = (ends_[end] - ends_[0]) / step_;

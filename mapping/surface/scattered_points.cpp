@@ -25,7 +25,8 @@ using Imath::V3d;
 using levelset::InvalidInput;
 using levelset::UsageError;
 
-constexpr double kCandidatesPerPoint = 20;  // [Yuksel15] uses at least five
+// Number of candidates per requested point; [Yuksel15] uses at least five.
+constexpr double kCandidatesPerPoint = 20;
 constexpr double kMostPoints = 1e6;
 // Largest cosine between the normals of points that count as on opposite sides of a thin part.
 constexpr double kOtherSide = -0.5;
@@ -115,7 +116,7 @@ class AreaSampler {
       sums_.push_back(area_);
     }
   }
-  /// Total area in units of scale².
+  /// Area of the zero set, each part divided by the square of its local scale.
   [[nodiscard]] double area() const { return area_; }
 
   SurfacePoint operator()(Random& random) const {
@@ -157,7 +158,7 @@ class AreaSampler {
 
 struct Candidates {
   std::vector<SurfacePoint> points;
-  double area = 0;  ///< area accepted by the weight, in units of scale²
+  double area = 0;  ///< part of AreaSampler::area() that the weight accepts
 };
 
 /// Samples candidates by area and accepts each with the probability that `density.weight` gives.

@@ -30,7 +30,7 @@ V3d unitOrZero(const V3d& v) {
 }  // namespace
 
 V3d carried(const V3d& direction, const V3d& from, const V3d& to) {
-  constexpr double kOpposite = -0.99;  // cosine; beyond it the least rotation is not unique
+  constexpr double kOpposite = -0.99;  // cosine; below it the least rotation is nearly ambiguous
   const V3d axis = from.cross(to);
   const double cosine = from.dot(to);
   if (cosine < kOpposite) return unitOrZero(withoutNormal(direction, to));

@@ -125,9 +125,10 @@ enum class Meets { Nothing, Inside, Band };
 /// Results for one root block or a part of it.
 struct Piece {
   std::vector<std::unique_ptr<LeafNode>> leaves;
-  std::vector<Block> inside;  ///< blocks that are completely inside
+  std::vector<Block> inside;  ///< blocks that lie completely inside the warped texture
   std::size_t tested = 0, ghosts = 0, operations = 0, checked = 0;
-  double mapError = 0;  ///< texture voxels
+  /// Largest error of the map's fast evaluation, texture voxels.
+  double mapError = 0;
 
   void add(Piece&& part) {
     std::move(part.leaves.begin(), part.leaves.end(), std::back_inserter(leaves));
@@ -231,8 +232,8 @@ class TextureWarp {
   }
 
   /// Blocks of kRootEdge³ grid points, aligned to multiples of kRootEdge, that cover the image of
-  /// the texture's band under the layer map (see layerPosition). The margin allows for the
-  /// difference between the layer map and the map that is evaluated.
+  /// the texture's band under the layer map (see layerPosition). A margin of ghostDistance_ allows
+  /// for the difference between the layer map and the map that is evaluated.
   std::vector<Block> rootBlocks() const {
     const openvdb::FloatGrid& grid = levelset::vdb(texture_);
     const CoordBBox active = grid.evalActiveVoxelBoundingBox();
@@ -312,7 +313,7 @@ class TextureWarp {
   }
 
   /// True if the block must be subdivided or evaluated. Records the block if it lies completely
-  /// inside.
+  /// inside the warped texture.
   bool splits(const Block& block, const BlockMap& map, const Samplers& samplers,
               Piece& piece) const {
     ++piece.tested;

@@ -18,7 +18,8 @@ namespace {
 
 using Imath::V3d;
 
-constexpr std::size_t kRemembered = 8;  // pairs of step and gradient change that L-BFGS keeps
+// Number of pairs of step and gradient change that L-BFGS keeps.
+constexpr std::size_t kRemembered = 8;
 // Least decrease of the energy in a step, as a share of the decrease that its slope along the step
 // predicts (Armijo).
 constexpr double kSufficient = 1e-4;

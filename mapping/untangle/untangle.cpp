@@ -308,7 +308,7 @@ DistortionGain minimiseDistortion(const NarrowBand& base, const Patch& patch,
     // The energy forbids folds at the corners of cells; folds between corners are very rare.
     if (foldsAt(patch, elements, options.embedDepth, solver.positions()).folded > 0) break;
     found = solver.positions();
-    constexpr double kLeastGain = 1e-7;  // relative decrease of the energy in a round
+    constexpr double kLeastGain = 1e-7;  // least relative decrease of the energy in a round
     if (energy - solver.energy(density) < kLeastGain * energy) break;
   }
   result.after = distortionAt(elements, found);
