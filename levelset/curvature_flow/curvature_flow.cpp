@@ -28,9 +28,8 @@ constexpr double kFirstStep = 10 * flow::kExplicitStep;
 // The band is redistanced when it limits the next step to less than this fraction of both the
 // wanted step and the time in which the surface moves by kFlowTravel.
 constexpr double kLeastShare = 0.4;
-// Number of fields (a float for each grid point of the blocks) in memory during a step, and the
-// fraction of active grid points in the blocks of a band.
-constexpr double kFields = 9, kFilled = 0.45;
+// Number of fields (a float for each grid point of the blocks) in memory during a step.
+constexpr double kFields = 9;
 constexpr double kVolumeTolerance = 1e-6;  // relative error of the preserved volume
 constexpr std::size_t kMostFlowSteps = 100000;
 // A surface with preserved volume is at rest when its rate would move it less than this distance,
