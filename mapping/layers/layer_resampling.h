@@ -23,9 +23,9 @@ struct EmbeddedParticle {
 
 /// Particles below the layers, down to w = −embedDepth and somewhat deeper. If embedDepth is
 /// negative: above the layers, up to w = 1 − embedDepth and somewhat higher. They continue the
-/// columns of the patch linearly, in new layers at most 1.1 layer spacings apart, or more if there
-/// would be over twice as many as the patch has. Particles are left out where columns converge, as
-/// below a crease.
+/// columns of the patch linearly. The new layers are at most 1.1 layer spacings apart, or more if
+/// there would be over twice as many as the patch has. Particles are left out where columns
+/// converge, as below a crease.
 /// @param embedDepth  depth of the texture below the surface, as a share of the patch's height; 0
 ///         gives no particles
 [[nodiscard]] std::vector<EmbeddedParticle> embeddedParticles(const Patch& patch,

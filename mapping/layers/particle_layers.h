@@ -13,8 +13,8 @@
 /// Builds the particles of a patch, layer by layer [Brodersen07 §8.2].
 namespace mapping {
 
-/// Sides of a patch on one layer as polylines, between the corners 0 → 1, 1 → 2, 3 → 2 and 0 → 3,
-/// so that opposite sides run in the same direction.
+/// Sides of a patch on one layer as polylines, between the corners 0 → 1, 1 → 2, 3 → 2 and 0 → 3.
+/// Opposite sides run in the same direction.
 using PatchSides = std::array<std::vector<Imath::V3d>, 4>;
 
 /// Computes the geodesic sides between the corners on φ = height, through the given points between

@@ -14,8 +14,8 @@ namespace mapping {
 /// One of the six tetrahedra of a cell [Brodersen07 §9]. The cell is two prisms, one over each
 /// triangular half of its bottom. Each prism is three tetrahedra that share the cell's first and
 /// last corner. The corners of every tetrahedron form a path along three edges of the cell, from
-/// its first corner (least u, v, w) to its last, along the three axes in one of six orders. So the
-/// neighbours of a tetrahedron follow from its order and need not be stored.
+/// its first corner (least u, v, w) to its last. The path takes the three axes in one of six
+/// orders. So the neighbours of a tetrahedron follow from its order and need not be stored.
 struct Tetrahedron {
   std::array<int, 3> cell{};
   int order = 0;  ///< 0 … 5, see Lattice::kOrders

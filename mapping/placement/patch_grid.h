@@ -42,8 +42,9 @@ struct PatchGridResult {
 /// is from `from` to `to`. The last column of tiles joins the first. The tiles lie on the part of
 /// the surface that is visible from outside along lines perpendicular to the axis.
 /// @param from, to  different points on the axis; a solid of revolution has its own axis
-/// @param rotation  angle about the axis at which the first column of tiles begins, radians, from
-///         the perpendicular direction nearest to +x (or to +y for an axis within 26° of x)
+/// @param rotation  angle about the axis at which the first column of tiles begins, radians. It is
+///         measured from the perpendicular direction nearest to +x (or to +y for an axis within 26°
+///         of x).
 /// @throws UsageError as makePatchGrid, for fewer than 3 columns, and for mirrorU with an odd
 ///         number of columns
 /// @throws InvalidInput where no surface lies around the axis, or where the visible surface jumps

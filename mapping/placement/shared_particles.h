@@ -8,7 +8,7 @@ namespace mapping {
 
 /// Makes the particles that adjacent patches share on their sides equal again, after each patch was
 /// moved separately. Particles of one layer count as shared if in `before` they were within a
-/// thousandth of the particle spacing of each other, as those of neighbouring tiles are. Each
+/// thousandth of the particle spacing of each other. Neighbouring tiles have such particles. Each
 /// shared particle gets the mean position.
 /// @param before, after  the same patches, with the same layers
 void joinSharedParticles(std::span<const Patch> before, std::span<Patch> after);

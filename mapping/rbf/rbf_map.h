@@ -42,11 +42,12 @@ struct RbfMapOptions {
 /// the patch.
 ///
 /// Linear polynomials suffice for all kernels, see RbfKernel. If the particles sample a smooth map
-/// and λ = 0, the error inside their cloud decreases with their spacing h as h⁴ or faster for
-/// growing kernels. It decreases as h² for the two decaying kernels, whose width shrinks with the
-/// spacing. For n particles, a direct solution takes n² doubles and n³/3 operations. An iterative
-/// solution takes about 4 kB per particle, n² operations for each of a few restarts, and n log n
-/// for each step between them. For kernels that grow faster than r each step takes n² operations.
+/// and λ = 0, the error inside their cloud decreases with their spacing h. It decreases as h⁴ or
+/// faster for growing kernels. It decreases as h² for the two decaying kernels, whose width shrinks
+/// with the spacing. For n particles, a direct solution takes n² doubles and n³/3 operations. An
+/// iterative solution takes about 4 kB per particle, n² operations for each of a few restarts, and
+/// n log n for each step between them. For kernels that grow faster than r each step takes n²
+/// operations.
 ///
 /// Coincident particles count as one, with the mean of their targets. If all particles lie in one
 /// plane, A maps the plane's normal to the normal of the plane's image, scaled by the mean scale in

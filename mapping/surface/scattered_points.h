@@ -55,7 +55,7 @@ struct ScatteredPoints {
 
 /// Distance of two points along a surface that bends evenly from normal to normal, world units. It
 /// is infinite if the points are less than `thin` (world units) apart and their normals differ by
-/// more than 120°, because they then lie on opposite sides of a thin part.
+/// more than 120°. They then lie on opposite sides of a thin part.
 [[nodiscard]] double surfaceDistance(const SurfacePoint& a, const SurfacePoint& b, double thin);
 
 /// Least distance of any two points, divided by their mean scale, world units. Infinite if no pair

@@ -26,9 +26,9 @@ struct ElementEnergy {
 /// 0 [Smith15]. F is the matrix of the slopes.
 [[nodiscard]] ElementEnergy symmetricDirichlet(const ElementSlopes& slopes);
 
-/// Returns |F|² / χ^⅔ + (1 + det²) / χ, where χ = (det + √(ε² + det²)) / 2 replaces the determinant
-/// det of F, the matrix of the slopes. The energy is finite for every F if ε > 0, and forbids folds
-/// in the limit ε → 0 [Garanzha21].
+/// Returns |F|² / χ^⅔ + (1 + det²) / χ, with F the matrix of the slopes and det its determinant. χ
+/// = (det + √(ε² + det²)) / 2 replaces det. The energy is finite for every F if ε > 0, and forbids
+/// folds in the limit ε → 0 [Garanzha21].
 [[nodiscard]] ElementEnergy foldoverEnergy(const ElementSlopes& slopes, double epsilon);
 
 [[nodiscard]] double determinantOf(const ElementSlopes& slopes);
@@ -49,7 +49,7 @@ class PrismElements {
   [[nodiscard]] ElementSlopes slopes(std::size_t element,
                                      const std::vector<Imath::V3d>& positions) const;
   /// Computes the derivatives of the weighted sum of the element energies with respect to particle
-  /// positions, from `stress`, the derivatives with respect to the slopes of each element.
+  /// positions. `stress` has the derivatives of each energy with respect to the element's slopes.
   [[nodiscard]] std::vector<Imath::V3d> gather(const std::vector<ElementSlopes>& stress) const;
 
   /// Contribution of one particle to an element: slopes += position × slope, column by column.

@@ -48,7 +48,7 @@ struct Untangling {
   [[nodiscard]] bool isUntangled() const { return after.folded == 0; }
 };
 
-/// Moves particles until no cell folds, by minimising an energy that is finite for folds and
+/// Moves particles until no cell folds, by minimising foldoverEnergy(). It is finite for folds and
 /// forbids them in the limit ε → 0 of its parameter [Garanzha21]. If the sides of the patch cross
 /// each other on the surface, no position of the other particles removes that fold, unless
 /// `freeSides` is set. If folds remain, the last patch is returned if it has fewer folds than the
