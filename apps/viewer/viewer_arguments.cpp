@@ -17,8 +17,8 @@ namespace {
 
 using levelset::UsageError;
 
-constexpr long kMostResolution =
-    4096;  // voxels along the longest side of a mesh; more are not visible
+// Largest number of voxels along the longest side of a mesh; smaller voxels are not visible.
+constexpr long kMostResolution = 4096;
 
 constexpr const char* kHelp = R"(levelsmith-view [FILE…] [options]
 Shows a level set (.vdb), a mesh (.ply .obj .stl .off, also .gz) or a scene (.json), and patches (.patch) with it.

@@ -22,7 +22,8 @@ void printLine(const std::string& line) {
                                         std::strerror(errno)));
 }
 
-/// Waits until the picture is complete. @param isForPick  true: light and shadow are not needed
+/// Waits until the picture is complete. @param isForPick  true: a picture at full resolution
+/// suffices, without light and shadows
 std::shared_ptr<const Frame> finishedFrame(Window& window, Viewer& viewer, int width, int height,
                                            bool isForPick) {
   for (;;) {

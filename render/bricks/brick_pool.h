@@ -47,18 +47,19 @@ struct BrickPool {
   std::vector<std::int32_t> page;
   /// Three lists of kBlocksOfPage items for each page that is not empty, ordered by x, y, z of the
   /// block.
-  /// 1. Number of the brick for a block that the surface crosses; otherwise negative, as in `page`.
+  /// 1. Number of the brick for a block that the surface crosses. Otherwise negative, as in `page`:
+  /// minus the edge of an empty cube, in cells.
   /// 2. Position of the value of the block's first point, for each block that a stencil reads. For
-  /// blocks other than bricks only a box of points is stored, so that first point may lie outside
-  /// it.
+  /// blocks other than bricks only a box of points is stored, and the first point of the block may
+  /// lie outside that box.
   /// 3. Strides of the block's values along x and y. They are 0 where all values are equal.
   std::vector<std::int32_t> entry;
   /// kMaskWords words for each brick. Bit 64x + 8y + z is set when the surface may cross cell (x,
   /// y, z): its corners differ in sign, or, for a spline filter, bounds on the spline do.
   std::vector<std::uint32_t> mask;
   /// φ or the spline's coefficients, world units, ordered by x, y, z. First kValues values for each
-  /// brick, then the stored box of each halo block. The last kBlock + kBlock values are the
-  /// background far outside and far inside.
+  /// brick, then the stored box of each halo block. Then kBlock times the background, for blocks
+  /// far outside, and kBlock times minus the background, for blocks far inside.
   std::vector<float> value;
   /// Replaces `value` when values are quantized: little-endian codes, followed by padding so that a
   /// 32-bit load of the last code stays in bounds.

@@ -51,7 +51,8 @@ class EmbreeScene {
   /// @throws as intersect()
   [[nodiscard]] double transmittance(const Imath::V3d& origin, const Imath::V3d& direction,
                                      double far) const;
-  /// Length of the ray inside the drawn solids within [near, far], world units.
+  /// Length of the ray inside the drawn solids (the result of the expression, if there is one)
+  /// within [near, far], world units.
   /// @throws as intersect()
   [[nodiscard]] double thickness(const Imath::V3d& origin, const Imath::V3d& direction,
                                  double near = 0, double far = Camera::kNoDepth) const;

@@ -61,8 +61,8 @@ struct DrawnField {
 };
 
 /// All blocks with a cell that the surface may cross, sorted by origin. For the trilinear filter,
-/// these are the cells whose corners differ in sign; for a spline, those in which its bounds allow
-/// a zero. The tree must outlive the blocks.
+/// these are the cells whose corners differ in sign. For a spline filter, these are the cells in
+/// which bounds on the spline allow a zero. The tree must outlive the blocks.
 [[nodiscard]] std::vector<SurfaceBlock> surfaceBlocks(const DrawnField& field);
 
 /// A point of a ray at which it enters or leaves the solid: parameter `t` of the ray, world units.

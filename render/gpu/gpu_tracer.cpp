@@ -243,7 +243,7 @@ struct GpuTracer::Impl {
         gl(context_.gl()),
         largestTable(largestTable_ > 0 ? largestTable_ : context_.largestTable()) {
     shift = static_cast<int>(std::bit_width(largestTable / sizeof(float))) - 1;
-    shift = std::min(shift, 30);  // indices of values are ints
+    shift = std::min(shift, 30);  // indices of values fit into a signed 32-bit integer
     gl.CreateBuffers(1, &rays);
     gl.CreateBuffers(1, &hits);
   }

@@ -225,7 +225,7 @@ class Comparer {
     const double turn = vectorDifference("P", i) * std::min(curvature[0], curvature[1]);
     return std::isfinite(turn) ? std::min(turn, kMostTurn) : 0;
   }
-  /// Distance of P from the origin, which determines the precision of P.
+  /// Distance of the position P from the origin, world units. It determines the precision of P.
   [[nodiscard]] double distance(std::size_t i) const {
     const double d = std::hypot(value(a_, "P.X", i), value(a_, "P.Y", i), value(a_, "P.Z", i));
     return std::isfinite(d) ? d : 0;

@@ -86,7 +86,9 @@ struct ImageComparisonOptions {
 /// (their distance times the curvature, if these layers exist).
 /// - curvature: difference times the voxel size in the first header (ls:voxelSize; 1 if missing).
 /// For curvature.gauss, times its square.
+/// - thickness: as Z.
 /// - id: 0 for equal numbers, 1 for different ones.
+/// - colour: largest difference of R, G and B. Any other channel: difference of the values.
 /// @throws levelset::InvalidInput for pictures of different sizes, or without Z and A
 /// @throws levelset::UsageError for a tolerance of a missing layer, or an invalid tolerance
 [[nodiscard]] ImageComparison compareImages(const Image& first, const Image& second,

@@ -314,8 +314,8 @@ std::vector<double> KernelScene::thickness(const KernelTracer& tracer,
                      [](const Crossing& a, const Crossing& b) { return a.depth < b.depth; });
     std::fill(inside.begin(), inside.end(), 0);
     std::fill(known.begin(), known.end(), 0);
-    for (const Crossing& crossing :
-         all)  // the first crossing with each solid tells if the ray starts inside it
+    // The first crossing with each solid shows if the ray starts inside the solid.
+    for (const Crossing& crossing : all)
       if (!std::exchange(known[crossing.solid], 1))
         inside[crossing.solid] = crossing.enters ? 0 : 1;
     double from = near_;

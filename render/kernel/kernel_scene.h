@@ -74,15 +74,15 @@ struct PixelTraversal {
 class KernelScene {
  public:
   /// Prepares the scene for any camera.
-  /// @param maxBytes  memory limit of the kernel's data, bytes
+  /// @param maxBytes  memory limit of the kernel's brick tables, bytes
   /// @param filter  interpolation of the grids
   /// @pre the camera is valid
   /// @throws levelset::ResourceLimit when the estimated memory exceeds `maxBytes`, before anything
-  /// is allocated; also as makeBricks()
+  /// is allocated; also for the reasons of makeBricks()
   explicit KernelScene(const Scene& scene, std::size_t maxBytes = levelset::kNoMemoryLimit,
                        Filter filter = Filter::Trilinear);
-  /// Prepares the scene for one picture; data that cannot affect it is culled. @pre the camera is
-  /// valid
+  /// Prepares the scene for one picture from the scene's camera; blocks that cannot affect the
+  /// picture are culled. @pre the camera is valid
   KernelScene(const Scene& scene, const RenderOptions& options);
 
   /// Copies the camera of the scene, and the transforms and opacities of its solids. Brick tables
@@ -117,8 +117,8 @@ class KernelScene {
   /// intersects meshes().
   [[nodiscard]] PixelHits castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const;
   [[nodiscard]] PixelTraversal startTraversal(const PixelBlock& pixels) const;
-  /// Next hits of the rays that CsgTraversal::resume() has released; all other rays keep their
-  /// present hit.
+  /// Next hits of the rays that CsgTraversal::resume() has released, or first hits in the first
+  /// call. All other rays keep their present hit.
   [[nodiscard]] PixelHits castNext(const KernelTracer& tracer, PixelTraversal& traversal) const;
   /// @return for each pixel the length of the visible ray inside the drawn solids, along the view
   ///         axis, world units

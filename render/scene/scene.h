@@ -39,8 +39,8 @@ struct Solid {
 };
 
 /// Triangles that are drawn together with the solids. They are lit and cast shadows like solids,
-/// but cannot be used in the expression. Shading is flat unless the vertices have normals. Vertex
-/// colours (sRGB) replace `colour`.
+/// but cannot be used in the CSG expression. Shading is flat unless the vertices have normals.
+/// Vertex colours (sRGB) replace `colour`.
 struct MeshPart {
   std::shared_ptr<const levelset::TriMesh> mesh;
   Imath::C3f colour{0.66f, 0.62f, 0.56f};

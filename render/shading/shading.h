@@ -14,7 +14,8 @@
 namespace render {
 
 /// A low-discrepancy sequence of points in [0, 1)² for a pixel, the same in every run: the additive
-/// R2 sequence, with a start derived from the pixel's coordinates and a number for its purpose.
+/// R2 sequence, with a start derived from the pixel's coordinates and a number for its purpose
+/// (pixel area, occlusion or shadow).
 class PixelSequence {
  public:
   PixelSequence(int x, int y, std::uint64_t purpose);

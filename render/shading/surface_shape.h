@@ -10,10 +10,12 @@ namespace render {
 /// Derivatives of a level set at a surface point. Positions are in index space; φ is in world
 /// units.
 struct SurfaceShape {
-  Imath::V3d gradient{0};  ///< gradient of the quasi-interpolating tricubic B-spline, φ per voxel
-  Imath::V3d trilinearGradient{
-      0};                    ///< gradient of the interpolant whose zero set is drawn, φ per voxel
-  Imath::M33d hessian{0.0};  ///< second derivatives of the B-spline, φ per voxel²
+  /// Gradient of a tricubic B-spline, φ per voxel; quasi-interpolating unless the filter is
+  /// BSpline.
+  Imath::V3d gradient{0};
+  /// Gradient of the interpolant whose zero set is drawn (trilinear, or the B-spline), φ per voxel.
+  Imath::V3d trilinearGradient{0};
+  Imath::M33d hessian{0.0};  ///< second derivatives of the B-spline of `gradient`, φ per voxel²
   /// Bound on the difference between φ as drawn (trilinear) and a smooth function with the same
   /// grid values, world units; 0 for a spline filter.
   double interpolationError = 0;

@@ -24,8 +24,9 @@ struct SliceOptions {
 /// direction is z, or y for a normal along z. The picture frames the bounds of the zero set.
 /// @return layers R G B A; phi (trilinear, ± the background outside the band) and P.X P.Y P.Z at
 ///         the pixel centres, world units
-/// @throws levelset::UsageError for a plane with a zero normal, or a size or step that is not
-///         positive
+/// @throws levelset::UsageError for a plane that is not finite or has a zero normal, a size that is
+/// not positive, or a step below 0
+/// @throws levelset::ResourceLimit for more than kMaxPixels pixels, or memory above maxBytes
 /// @throws levelset::InvalidInput for a solid without surface
 /// @throws levelset::Cancelled when progress asks to stop
 [[nodiscard]] Image drawSlice(const levelset::NarrowBand& band, const SliceOptions& options);

@@ -189,7 +189,7 @@ ClippedScene::ClippedScene(const render::Scene& scene, const Imath::Box3d& bound
       size[a] = std::max(std::abs((a == 0 ? s : a == 1 ? t : normal).dot(whole)), extent / 4);
   }
   size += V3d(kBesideSolids * voxel);
-  // Place the face of the box that cuts the solids half way between grid points.
+  // Place the face of the box that cuts the solids half way between grid points of the box's grid.
   box_ = levelset::transform(levelset::makeBox(size, {0, 0, 0.5 * size.z + 0.5 * voxel}, voxel),
                              Imath::M44d().setTranslation(V3d(0, 0, -0.5 * voxel)));
 

@@ -51,9 +51,8 @@ class OrbitCamera {
   void take(const render::Camera& changed);
 
   render::Camera camera_;
-  Imath::V3d vertical_{
-      // Unit vector towards the upper pole of orbit(): up direction of the initial camera.
-      0, 1, 0};
+  // Unit vector towards the upper pole of orbit(): up direction of the initial camera.
+  Imath::V3d vertical_{0, 1, 0};
 };
 
 }  // namespace viewer

@@ -24,7 +24,7 @@ class Loader {
     std::vector<std::filesystem::path> files;
     std::shared_ptr<const Model> model;  ///< null when reading failed
     std::exception_ptr failure;          ///< error; null when reading succeeded
-    bool isReload = false;               ///< value passed to open()
+    bool isReload = false;               ///< value of `isReload` in the call of open()
   };
   /// Starts to read files. Cancels a request in progress.
   /// @param resolution  voxels along the longest side of a mesh
