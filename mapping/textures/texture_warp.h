@@ -42,8 +42,8 @@ struct Warp {
 
 /// Evaluates a texture through a map on the grid of the result. Blocks of 64³ grid points are split
 /// down to 8³ as long as the image of a block may touch the texture's band. BlockMap::imageBounds
-/// bounds the image. Only such 8³ blocks are evaluated; the others lie completely inside or
-/// outside.
+/// bounds the image. Only such 8³ blocks are evaluated; the other blocks lie completely inside or
+/// outside the warped texture.
 /// @throws InvalidInput if no block meets the texture
 /// @throws ResourceLimit before memory exceeds `maxMemory`
 [[nodiscard]] Warp warpTexture(const levelset::NarrowBand& texture,

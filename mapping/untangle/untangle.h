@@ -48,11 +48,11 @@ struct Untangling {
   [[nodiscard]] bool isUntangled() const { return after.folded == 0; }
 };
 
-/// Moves particles until no cell folds, by minimising foldoverEnergy(). It is finite for folds and
-/// forbids them in the limit ε → 0 of its parameter [Garanzha21]. If the sides of the patch cross
-/// each other on the surface, no position of the other particles removes that fold, unless
-/// `freeSides` is set. If folds remain, the last patch is returned if it has fewer folds than the
-/// input, otherwise the input.
+/// Moves particles until no cell folds, by minimising foldoverEnergy(). This energy is finite for
+/// folds and forbids them in the limit ε → 0 of its parameter [Garanzha21]. If the sides of the
+/// patch cross each other on the surface, no position of the other particles removes that fold,
+/// unless `freeSides` is set. If folds remain, the last patch is returned if it has fewer folds
+/// than the input, otherwise the input.
 /// @param base  the solid on which the patch was built
 /// @throws InvalidInput for a patch without layers, with particles that are not finite, or that
 ///         does not lie on the base
