@@ -196,8 +196,8 @@ class Comparer {
 
   /// Tolerance that quantized values add to the curvatures, per voxel. It is the change of the
   /// curvature over 1e-3 voxels, the tolerance of positions. In a band of half width 3, a
-  /// quantization step is 6 · 2^-bits voxels, and rounding changes third differences of the values
-  /// by up to eight steps.
+  /// quantization step is 6 · 2^-bits voxels. Rounding changes third differences of the values by
+  /// up to eight steps.
   [[nodiscard]] double curvatureStep() const {
     const double bits = lengthNamed(a_, "ls:valueBits", 32);
     return bits < 32 ? 1e-3 * 8 * 6 * std::exp2(-bits) : 0;

@@ -84,8 +84,8 @@ Bool nextPart(Bool open, Bool divides, INOUT(Int) part, INOUT(Int) halvings, INO
   return AND(open, OR(divide, halvings > 0));
 }
 
-// Finds the first interval [low, high] in [0, 1] with a single sign change of the cubic with
-// Bernstein coefficients b0 … b3, after skipping `passing` sign changes. Skipped changes are
+// Finds the first interval [low, high] in [0, 1] with a single sign change of a cubic, after
+// skipping `passing` sign changes. Its Bernstein coefficients are b0 … b3. Skipped changes are
 // subtracted from `passing`.
 // @return true when such an interval exists
 Bool isolate(Bool asked, Real b0, Real b1, Real b2, Real b3, INOUT(Int) passing, INOUT(Real) low,

@@ -230,8 +230,8 @@ Corners cornersOf(IN(Column) c1, IN(Column) c2, IN(Column) c3, IN(Column) c4) {
   return c;
 }
 
-// Bound on the error of trilinear interpolation at the corners of the cell in one slab (`at`), from
-// φ in that slab and in its two neighbouring slabs.
+// Bound on the error of trilinear interpolation, from second differences of φ at the corners of the
+// cell in one slab (`at`). `before` and `after` are the neighbouring slabs.
 Real errorOf(IN(Corners) before, IN(Corners) at, IN(Corners) after) {
   VAR e00 = bendOf(before.f00, at.f00, after.f00) + at.b00;
   VAR e01 = bendOf(before.f01, at.f01, after.f01) + at.b01;

@@ -111,8 +111,8 @@ void OrbitCamera::frame(const Imath::Box3d& bounds, int width, int height) {
             up = right.cross(axis), half = 0.5 * bounds.size();
   const double aspect = static_cast<double>(std::max(width, 1)) / std::max(height, 1);
   const double slopeY = kFramed * std::tan(0.5 * camera_.verticalFov), slopeX = slopeY * aspect;
-  // Smallest distance of the eye from the centre of the box, and smallest half height of an
-  // orthographic view, for which all corners of the box are visible.
+  // Smallest values for which all corners of the box are visible: distance of the eye from the
+  // centre of the box, and half height of an orthographic view.
   double distance = 1e-9, extent = 1e-9;
   for (int corner = 0; corner < 8; ++corner) {
     const V3d p(corner & 1 ? half.x : -half.x, corner & 2 ? half.y : -half.y,
