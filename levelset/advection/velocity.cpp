@@ -13,8 +13,7 @@ using Imath::V3d;
 
 void requirePeriod(double period) {
   if (!(period > 0) || !std::isfinite(period))
-    throw UsageError(
-        fmt::format("the period is {}; give a positive, finite time", period));
+    throw UsageError(fmt::format("the period is {}; give a positive, finite time", period));
 }
 
 /// Values sin²(πx) and sin(2πx).

@@ -222,7 +222,7 @@ TEST_F(Animate, RefusesPatchesBuiltDifferently) {
       refusal(
           "patch @ball --corners \"5,-1,-1 5,-1,1 5,1,1 5,1,-1\" --mirror --height 1 --levels 2 "
           "--spacing 1 --particles conforming"),
-      2, "one of patch 2 and the first patch is mirrored");
+      2, "either patch 2 or the first patch is mirrored");
   EXPECT_EQ(fileCount(), 0u);
   // A patch that is only finer is reported.
   const auto outcome = refusal(patch + "--particles reduced");
