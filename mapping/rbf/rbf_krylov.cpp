@@ -259,8 +259,10 @@ RbfFit solveIteratively(const RbfCloud& cloud, const RbfMapOptions& options, con
   const auto n = static_cast<double>(cloud.points.size());
   const double basis = 2.0 * kMostSteps * sizeof(double) * 3;
   constexpr double kSumBytes = 500;  // per particle, for the tree nodes of the fast sum
-  levelset::requireMemory(n * (basis + kSumBytes) + RbfPreconditioner::estimateBytes(n),
-                          options.maxMemory);
+  levelset::withContext("solving the RBF map", [&] {
+    levelset::requireMemory(n * (basis + kSumBytes) + RbfPreconditioner::estimateBytes(n),
+                            options.maxMemory);
+  });
   const ClusterTree first(cloud.points, kSolveLeaf);
   const std::vector<std::uint32_t> order(first.order().begin(), first.order().end());
   const RbfCloud ordered = inOrder(cloud, order);

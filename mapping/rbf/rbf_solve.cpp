@@ -211,7 +211,8 @@ RbfSolution solveRbf(const RbfCloud& cloud, const RbfMapOptions& options, RbfSol
     const MatrixXd q = polynomial.householderQ() * MatrixXd::Identity(n, 1 + cloud.directions);
     fit = solveIteratively(cloud, options, q, values, report);
   } else {
-    levelset::requireMemory(denseBytes, options.maxMemory);
+    levelset::withContext("solving the RBF map",
+                          [&] { levelset::requireMemory(denseBytes, options.maxMemory); });
     fit.weights =
         solveDirectly(cloud, options.kernel, polynomial, values, options.progress, report);
     fit.image = multiplyDirectly(cloud, options.kernel, fit.weights);

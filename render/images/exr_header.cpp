@@ -170,13 +170,13 @@ class ExrHeaderReader {
     if (!(part.width >= 1 && part.height >= 1)) refuse("it has no pixels");
     if (!(pixels <= kMaxPixels)) {
       throw levelset::ResourceLimit(
-          fmt::format("read image: {} has {:.0f}x{:.0f} pixels, which "
+          fmt::format("{} has {:.0f}x{:.0f} pixels, which "
                       "exceeds the limit of {:.0f} pixels",
                       name_, part.width, part.height, kMaxPixels));
     }
     if (pixels * std::max(1.0, part.channels) * 2 > fileBytes_ * kMaxCompression) {
       throw InvalidInput(
-          fmt::format("read image: {} announces {:.0f}x{:.0f} pixels in {:.0f} channels, "
+          fmt::format("{} announces {:.0f}x{:.0f} pixels in {:.0f} channels, "
                       "more than its {:.0f} bytes can hold; copy it again",
                       name_, part.width, part.height, part.channels, fileBytes_));
     }
@@ -201,7 +201,7 @@ class ExrHeaderReader {
     const double bytes = 2 * 4 * pixels * part.channels;
     if (bytes <= maxMemory_) return;
     throw levelset::ResourceLimit(
-        fmt::format("read image: {} has chunks of {:.3g} MB, which exceed the limit of {:.3g} MB; "
+        fmt::format("{} has chunks of {:.3g} MB, which exceed the limit of {:.3g} MB; "
                     "raise --max-memory",
                     name_, bytes * 1e-6, maxMemory_ * 1e-6));
   }
@@ -239,7 +239,7 @@ class ExrHeaderReader {
   }
   [[noreturn]] void refuse(const std::string& what) const {
     throw InvalidInput(
-        fmt::format("read image: {} is not a readable EXR image: {}; copy it again", name_, what));
+        fmt::format("{} is not a readable EXR image: {}; copy it again", name_, what));
   }
 
   std::string name_;

@@ -55,8 +55,8 @@ class MemoryStream : public Imf::OStream {
 void writeBytes(const std::filesystem::path& path, const std::vector<char>& bytes) {
   levelset::FileTarget target(path);
   const auto fail = [&] {
-    throw IoError(fmt::format("write image: {}: {}; free some space or choose another folder",
-                              path.string(), std::strerror(errno)));
+    throw IoError(fmt::format("{}: {}; free some space or choose another folder", path.string(),
+                              std::strerror(errno)));
   };
   std::FILE* file = std::fopen(target.path().c_str(), "wb");
   if (!file) fail();
@@ -72,22 +72,20 @@ void writeBytes(const std::filesystem::path& path, const std::vector<char>& byte
 
 void requireWhole(const Image& image) {
   if (image.width <= 0 || image.height <= 0) {
-    throw InvalidInput(
-        fmt::format("write image: the image has {}x{} pixels, but needs at least one", image.width,
-                    image.height));
+    throw InvalidInput(fmt::format("the image has {}x{} pixels, but needs at least one",
+                                   image.width, image.height));
   }
   const auto check = [&](const std::string& name, std::size_t size) {
     if (size == image.pixelCount()) return;
-    throw InvalidInput(fmt::format(
-        "write image: channel {} has {} values for {}x{} pixels; give one value for each pixel",
-        name, size, image.width, image.height));
+    throw InvalidInput(
+        fmt::format("channel {} has {} values for {}x{} pixels; give one value for each pixel",
+                    name, size, image.width, image.height));
   };
   for (const auto& [name, values] : image.channels) check(name, values.size());
   for (const auto& [name, values] : image.ids) check(name, values.size());
   for (const auto& [name, matrix] : image.matrices) {
     if (matrix.size() == 16) continue;
-    throw InvalidInput(
-        fmt::format("write image: matrix {} has {} numbers; give 16", name, matrix.size()));
+    throw InvalidInput(fmt::format("matrix {} has {} numbers; give 16", name, matrix.size()));
   }
 }
 
@@ -153,7 +151,7 @@ std::vector<char> encodePng(int width, int height, const std::vector<std::uint8_
   png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(png);
   std::vector<char> bytes(size);
   if (!png_image_write_to_memory(&png, bytes.data(), &size, 0, pixels.data(), 0, nullptr))
-    throw IoError(fmt::format("write image: the image cannot be encoded as PNG: {}", png.message));
+    throw IoError(fmt::format("the image cannot be encoded as PNG: {}", png.message));
   bytes.resize(size);
   return bytes;
 }
@@ -225,8 +223,7 @@ std::vector<std::uint8_t> displayColours(const Image& image) {
     const auto found = image.channels.find(names[c]);
     if (found == image.channels.end()) {
       throw levelset::UsageError(fmt::format(
-          "write image: a PNG needs the channel {}, which this image does not have; write an EXR",
-          names[c]));
+          "a PNG needs the channel {}, which this image does not have; write an EXR", names[c]));
     }
     colour[c] = &found->second;
   }
@@ -254,10 +251,10 @@ void writePng(const std::filesystem::path& path, int width, int height,
 void writeImage(const std::filesystem::path& path, const Image& image, const std::string& format) {
   const std::string kind = imageFormat(path, format);
   if (kind.empty()) {
-    throw levelset::UsageError(fmt::format(
-        "write image: {} has no supported format; use the extension .exr or .png, or give the "
-        "format",
-        path.string()));
+    throw levelset::UsageError(
+        fmt::format("{} has no supported format; use the extension .exr or .png, or give the "
+                    "format",
+                    path.string()));
   }
   requireWhole(image);
   std::vector<char> bytes;
@@ -268,7 +265,7 @@ void writeImage(const std::filesystem::path& path, const Image& image, const std
   } catch (const std::bad_alloc&) {
     throw;
   } catch (const std::exception& error) {  // thrown by OpenEXR
-    throw IoError(fmt::format("write image: {}: {}", path.string(), error.what()));
+    throw IoError(fmt::format("{}: {}", path.string(), error.what()));
   }
   writeBytes(path, bytes);
 }

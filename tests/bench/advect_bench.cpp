@@ -73,8 +73,9 @@ double show(const char* name, int resolution, const NarrowBand& ball, const Run&
   const double surface = surfaceError(result);
   fmt::print("{:>4}  {:<18} volume {:+8.3f} %  surface L1 {:7.4f} voxels  {:7.1f} s CPU\n",
              resolution, name, 100 * volume, surface, seconds);
-  rows += fmt::format("advect_bench,\"{}\",levelsmith,{},{:.9g},{:.9g},{:.9g}\n", name, resolution,
-                      surface, volume, seconds);
+  const bool isPeer = std::string(name).starts_with("OpenVDB");
+  rows += fmt::format("advect_bench,\"{}\",{},{},{:.9g},{:.9g},{:.9g}\n", name,
+                      isPeer ? "OpenVDB" : "levelsmith", resolution, surface, volume, seconds);
   return seconds;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "apps/pipeline/registry/invocation.h"
+#include "apps/pipeline/values/refusal.h"
 
 namespace pipeline {
 namespace {
@@ -52,7 +53,12 @@ RegionOfInterest readOf(const Node& node, std::size_t operand, const RegionOfInt
     if (!own) return {};
     planned.planned = own;
   }
-  RegionOfInterest read = node.op->regionOfInterest(planned, operand, of);
+  RegionOfInterest read;
+  try {
+    read = node.op->regionOfInterest(planned, operand, of);
+  } catch (const levelset::Error& error) {
+    rethrowAs(node.op->name, error, node.location);
+  }
   if (asksForSize(node)) read.region = levelset::kEverywhere;
   return read;
 }

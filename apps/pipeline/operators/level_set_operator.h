@@ -161,12 +161,10 @@ template <class Op>
 void validateOperator(const Invocation& in) {
   using Options = typename Op::Options;
   if (hasVoxelSize<Options>()) in.requireVoxelSize();
-  if constexpr (requires(const Options& options) {
-                  Op::check(options, levelset::GivenOptions());
-                }) {
-    Invocation probe = in;
-    Op::check(readOptions<Options>(probe, OptionStage::Syntax), givenIn(in));
-  }
+  Invocation probe = in;
+  [[maybe_unused]] const Options options = readOptions<Options>(probe, OptionStage::Syntax);
+  if constexpr (requires { Op::check(options, levelset::GivenOptions()); })
+    Op::check(options, givenIn(in));
 }
 
 template <class Op>

@@ -27,10 +27,10 @@ double Invocation::number(const std::string& name) const {
 long Invocation::integer(const std::string& name) const {
   return parseInteger(text(name), where(name));
 }
-void Invocation::refuseInteger(const std::string& name, long value, std::uint64_t most) const {
-  if (value < 0)
-    throw UsageError(fmt::format("{}: {} is too small; give a larger number", where(name), value));
-  throw UsageError(fmt::format("{}: {} is too large; give at most {}", where(name), value, most));
+void Invocation::refuseInteger(const std::string& name, long value) const {
+  throw UsageError(
+      value < 0 ? fmt::format("{}: {} is too small; give a larger number", where(name), value)
+                : fmt::format("{}: {} is too large; give a smaller number", where(name), value));
 }
 double Invocation::radians(const std::string& name) const {
   return number(name) * 3.14159265358979323846 / 180;

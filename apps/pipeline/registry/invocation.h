@@ -6,8 +6,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdint>
-#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -80,7 +78,7 @@ class Invocation {
   template <class T>
   [[nodiscard]] T integerAs(const std::string& name) const {
     const long value = integer(name);
-    if (!std::in_range<T>(value)) refuseInteger(name, value, std::numeric_limits<T>::max());
+    if (!std::in_range<T>(value)) refuseInteger(name, value);
     return static_cast<T>(value);
   }
   [[nodiscard]] double radians(const std::string& name) const;
@@ -141,7 +139,7 @@ class Invocation {
   [[nodiscard]] double toWorld(const std::string& name, const std::string& text,
                                const std::string& label);
   void note(const Resolved& length);
-  [[noreturn]] void refuseInteger(const std::string& name, long value, std::uint64_t most) const;
+  [[noreturn]] void refuseInteger(const std::string& name, long value) const;
   [[nodiscard]] double countIn(double voxel);
 
   const Operator* op_;

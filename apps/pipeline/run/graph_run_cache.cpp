@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "apps/pipeline/cache/cache_key.h"
+#include "apps/pipeline/values/refusal.h"
 
 namespace pipeline {
 
@@ -48,7 +49,11 @@ void GraphRun::loadFromCache(std::size_t i) {
 bool GraphRun::tryLoad(std::size_t i) {
   std::optional<Value> value;
   if (states_[i] == NodeState::Load) {
-    value = cache_->value(*keys_[i], settings_.maxMemory);
+    try {
+      value = cache_->value(*keys_[i], settings_.maxMemory);
+    } catch (const levelset::Error& error) {
+      rethrowAs(graph_.nodes[i].op->name, error, graph_.nodes[i].location);
+    }
     if (!value) return false;
   }
   Thumbnail thumbnail;

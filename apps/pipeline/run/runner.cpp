@@ -36,7 +36,7 @@ void throwFailures(const RunReport& report) {
   for (const StepReport& step : report.steps)
     if (!step.notes.failure.empty())
       throw levelset::NumericalError(
-          withLocation(step.action + ": " + step.notes.failure, step.location));
+          withLocation(sentenceOf(step.action, step.notes.failure), step.location));
 }
 
 /// Files that the actions of a graph write.

@@ -185,7 +185,9 @@ LevelSurface LevelRunner::surfaceOf(std::size_t output, const std::map<std::size
   LevelSurface level{.voxelSize = voxel};
   const auto meshOf = [&](const Value& solid) {
     level.voxelSize = solid.band().voxelSize();
-    return levelset::TriangleSurface(levelset::bandToMesh(solid.band()));
+    return levelset::withContext("the surface of a result", [&] {
+      return levelset::TriangleSurface(levelset::bandToMesh(solid.band()));
+    });
   };
   if (value.kind() == Kind::Band) {
     level.surface = level.uniform = meshOf(value);

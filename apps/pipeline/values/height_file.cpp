@@ -73,7 +73,9 @@ mapping::HeightGrid fromNumbers(std::istream& in, const std::string& name, bool 
     const std::size_t before = grid.heights.size();
     const std::string where = fmt::format("{}: '{}', line {}", kHeights, name, row);
     readLine(line, where, grid.heights);
-    levelset::requireMemory(static_cast<double>(grid.heights.size() * sizeof(double)), maxMemory);
+    levelset::withContext(where, [&] {
+      levelset::requireMemory(static_cast<double>(grid.heights.size() * sizeof(double)), maxMemory);
+    });
     const auto count = static_cast<int>(grid.heights.size() - before);
     if (count == 0) continue;
     if (grid.rows > 0 && count != grid.columns) {

@@ -87,7 +87,7 @@ template <typename T>
 const T& Value::as(Kind wanted) const {
   if (const T* value = std::get_if<T>(&data_)) return *value;
   throw levelset::UsageError(
-      fmt::format("levelsmith: the value is a {}, but a {} is needed; choose "
+      fmt::format("the value is a {}, but a {} is needed; choose "
                   "another operand, or another grid of the file",
                   kindName(kind()), kindName(wanted)));
 }

@@ -104,7 +104,8 @@ class Value {
   [[nodiscard]] const levelset::FieldGrid& field() const;
   [[nodiscard]] const render::ViewedScene& scene() const;
 
-  /// Returns the plan. Computes it from the value on the first call.
+  /// Returns the plan of the value: its kind, bounds, area and grid, which estimates need. Computes
+  /// it from the value on the first call.
   [[nodiscard]] const Plan& plan() const;
   /// Diagonal of the bounding box, world units; 0 if the box is empty.
   [[nodiscard]] double diagonal() const {

@@ -49,11 +49,13 @@ levelset::NarrowBand bandOfMesh(const fs::path& file, const OpenOptions& options
   const Imath::V3d size = levelset::bounds(mesh).size();
   const double longest = std::max({size.x, size.y, size.z});
   // Meshes with holes or wrong orientation are accepted, because they are only viewed.
-  return levelset::meshToBand(mesh, longest / static_cast<double>(options.resolution),
-                              {.acceptSign = true,
-                               .searchSelfIntersections = false,
-                               .progress = levelset::subProgress(options.progress, 0.2, 1)})
-      .band;
+  return levelset::withContext("'" + file.string() + "'", [&] {
+    return levelset::meshToBand(mesh, longest / static_cast<double>(options.resolution),
+                                {.acceptSign = true,
+                                 .searchSelfIntersections = false,
+                                 .progress = levelset::subProgress(options.progress, 0.2, 1)})
+        .band;
+  });
 }
 
 /// Paths of the level sets and meshes that a scene file names. @pre readScene() accepts the file

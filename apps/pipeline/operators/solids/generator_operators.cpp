@@ -282,6 +282,13 @@ std::vector<Param> tiled(std::vector<Param> params) {
   return params;
 }
 
+/// Checks the voxel size and the numbers of tiles before anything runs.
+void validateGenerator(const Invocation& in) {
+  requireVoxelSize(in);
+  for (const char* name : {"columns", "rows", "layers"})
+    if (in.given(name)) (void)in.integerAs<int>(name);
+}
+
 template <Generate generate>
 Operator generator(const char* name, const char* summary, const char* details, const char* example,
                    std::vector<Param> params) {
@@ -300,7 +307,7 @@ Operator generator(const char* name, const char* summary, const char* details, c
           .params = std::move(params),
           .run = makeTexture<generate>,
           .plan = planTextureSolid<generate>,
-          .validate = requireVoxelSize};
+          .validate = validateGenerator};
 }
 
 }  // namespace

@@ -137,6 +137,11 @@ TEST_F(Command, NamesTheActionOfAMessageOnce) {
   says(levelsmith(ball + "sphere --radius 1 --center 9,0,0 --voxel 0.1 ! blend --radius 0.3"),
        "levelsmith: blend: the surfaces do not intersect");
   says(levelsmith("--threads 0 " + ball + "measure"), "levelsmith: --threads: ");
+  const auto missed = levelsmith(ball + "curvature-flow --time 0.02 --tolerance 1e-12");
+  EXPECT_EQ(missed.code, 5);
+  EXPECT_NE(missed.err.find("levelsmith: curvature-flow: the error of the time steps"),
+            std::string::npos)
+      << missed.err;
   says(levelsmith("spere"), "levelsmith: there is no action");
   says(shell(command() + " " + ball + "measure --json > /dev/full"),
        "levelsmith: measure: standard output cannot be written");

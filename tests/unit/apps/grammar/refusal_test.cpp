@@ -138,7 +138,8 @@ TEST_F(Refusal, DetectableErrorsPrecedeTheRun) {
   soon("advect --field vortex --time 1 --factor \"x*t\"", 2, "use t, numbers");
   soon("advect --field vortex --time 1 --factor \"1,2\"", 2, "'1,2' holds 2 formulas; give one");
   const std::string target = "sphere --radius 1.2 --voxel 0.1 ! morph ";
-  soon(target + "--steps 4294967297", 2, "give at most 2147483647");
+  soon(target + "--steps 4294967297", 2, "is too large");
+  soon("ring --radius 1 --voxel 0.1 --columns 4294967297", 2, "is too large");
   soon(target + "--steps 2147483647", 2, "too many");
   soon(target + "--until 1.5", 2, "up to 1");
   soon(target + "--steps 3 --keep-steps step.vdb", 2, "write # for the number");

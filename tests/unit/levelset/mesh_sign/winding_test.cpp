@@ -48,6 +48,8 @@ TEST(Winding, FarClustersMeetTheTolerance) {
   for (const V3d& p : kPoints)
     for (const double tolerance : {1e-1, 1e-2, 1e-3, 1e-4})
       EXPECT_NEAR(open.within(tolerance, p), open.exact(p), tolerance) << p << ' ' << tolerance;
+  // Far from the mesh its clusters are used, not its triangles.
+  EXPECT_NE(open.within(1e-1, V3d(0, 0, 3)), open.exact(V3d(0, 0, 3)));
 }
 
 TEST(Winding, IsBoundedOnBalls) {
@@ -57,6 +59,9 @@ TEST(Winding, IsBoundedOnBalls) {
     for (const V3d& step : {V3d(0), V3d(0.09, 0, 0), V3d(0, -0.09, 0), V3d(0, 0, 0.09)})
       EXPECT_LE(std::abs(open.exact(p + step)), bound) << p;
   }
+  // Bounds far from the mesh are finite and of the order of the value.
+  const V3d far(0, 0, 6);
+  EXPECT_LT(open.bound(far, 0.1), 8 * std::abs(open.exact(far)));
 }
 
 }  // namespace winding_test
