@@ -202,7 +202,7 @@ TEST_F(Command, ShowsABarOnATerminal) {
   ASSERT_EQ(shell("script -qec '" + command() + slow + "' typed < /dev/null > /dev/null").code, 0);
   const std::string typed = support::slurp(folder_ / "typed");
   EXPECT_NE(typed.find('%'), std::string::npos) << typed;
-  EXPECT_NE(typed.find("\r"), std::string::npos);
+  EXPECT_NE(typed.find('\r'), std::string::npos);
 }
 
 TEST_F(Command, ReportsTheCertificateOfARefusedMesh) {
