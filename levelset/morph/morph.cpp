@@ -33,9 +33,10 @@ constexpr double kBesideSurface = 4;
 void checkMorph(const NarrowBand& solid, const NarrowBand& target, const MorphOptions& options) {
   if (options.mask) checkMask(*options.mask);
   if (options.farthest && !(*options.farthest >= kFirstReach && std::isfinite(*options.farthest)))
-    throw UsageError(
-        fmt::format("distances up to {} voxels from the surfaces are too few; give at least {}",
-                    *options.farthest, kFirstReach));
+    throw UsageError(fmt::format(
+        "the morph computes distances up to {} voxels from the surfaces, which is too small; "
+        "give at least {}",
+        *options.farthest, kFirstReach));
   if (options.steps < 1)
     throw UsageError(fmt::format("the number of steps is {}; give at least 1", options.steps));
   if (!(options.until > 0 && options.until <= 1))

@@ -52,8 +52,10 @@ double hexagonDistance(double x, double y, double apothem) {
   return beyond > 0 ? std::sqrt(beyond * beyond + beside * beside) : beyond;
 }
 
-/// Exact signed distance to an infinite pattern of hexagons, whose plate extends infinitely
-/// downwards. `origin` is the centre of a hexagon, at the top of the plate.
+/// Signed distance to an infinite pattern of hexagons. The plate, or without a plate the pillars or
+/// walls, extends infinitely downwards. `origin` is the centre of a hexagon, at the top of the
+/// plate. The distance is exact, except inside the plate where the top of a pillar or wall is the
+/// nearest face: there the depth is too large.
 class HexagonField {
  public:
   HexagonField(const Hexagons& hexagons, const V3d& origin)

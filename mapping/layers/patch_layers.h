@@ -47,8 +47,8 @@ void checkParticleCount(double count, double spacing, const PatchOptions& option
 
 /// Computes distances to the base in the space above a patch, given points along the outline of the
 /// patch.
-/// @param lean  distance by which layers may extend sideways beyond the space above `outline`,
-///         world units
+/// @param lean  further sideways distance that slanted layers need, world units; a quarter of the
+///         patch's shorter side is always added
 [[nodiscard]] levelset::NarrowBand sweepAbove(const levelset::NarrowBand& base,
                                               std::span<const Imath::V3d> outline,
                                               const LayerSize& size, double height,

@@ -129,7 +129,8 @@ void putInOrder(std::vector<SideChange>& changes) {
   changes = std::move(kept);
 }
 
-/// A point where a ray enters or leaves the result of the CSG expression.
+/// A point where a ray enters or leaves the result of the CSG expression, or a solid if there is no
+/// expression.
 struct CsgChange {
   double t;
   std::size_t solid;

@@ -12,8 +12,9 @@ namespace pipeline {
 /// `steps`, `tolerance` (only with --tolerance), `left_out`, `warnings`, `exit_code` and `error`.
 /// `graph`, saved to a file, is a valid input of the action `run`.
 [[nodiscard]] std::string reportJson(const RunReport& report);
-/// Formats one line for each voxel size that --tolerance tried, and one for each result of the
-/// graph with its achieved error.
+/// Formats one line for each voxel size that --tolerance tried. Then adds one line for each result
+/// of the run, with its requested and achieved error. Without results, adds one line about the
+/// voxel size that the error models choose.
 [[nodiscard]] std::vector<std::string> toleranceLines(const ToleranceReport& tolerance);
 /// Checks the files of --report and --save-graph before the run.
 /// @throws levelset::IoError if a file cannot be written

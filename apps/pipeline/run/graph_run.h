@@ -32,7 +32,8 @@ class Values {
   }
   /// Removes a value. It must be put again before the next take().
   void drop(std::size_t node) { values_[node].reset(); }
-  /// Returns a value. The last consumer becomes its only owner and may modify it in place.
+  /// Returns a value. The last call gives up the stored copy. Its consumer may then modify the
+  /// value in place, unless another consumer still shares the data.
   Value take(std::size_t node) {
     if (--uses_[node] > 0) return *values_[node];
     Value last = std::move(*values_[node]);
