@@ -203,32 +203,36 @@ void badVelocities(Recorder& out) {
 
 Bounds enrightBounds() {
   return Bounds()
-      .measured("function, front", "volume_error", {{20, 0.0184}, {24, 0.00989}, {28, 0.00783}})
-      .unmeasured("function, front", "volume_error", 0.1, {32, 64})
-      .unmeasured("function, front", "volume_error", 0.03, {128})
-      .measured("function, front", "value_error", {{20, 0.0198}, {24, 0.00986}, {28, 0.00779}})
-      .unmeasured("function, front", "value_error", 0.2, {32, 64})
-      .unmeasured("function, front", "value_error", 0.06, {128})
-      .measured("function, front", "surface_l1_vx", {{20, 0.021}, {24, 0.0128}, {28, 0.0112}})
-      .unmeasured("function, front", "surface_l1_vx", 0.5, {32, 64, 128})
-      .measured("staggered grid, front", "volume_error", {{20, 0.0146}})
-      .unmeasured("staggered grid, front", "volume_error", 0.1, {32, 64})
-      .unmeasured("staggered grid, front", "volume_error", 0.03, {128})
-      .measured("staggered grid, front", "value_error", {{20, 0.0155}})
-      .unmeasured("staggered grid, front", "value_error", 0.2, {32, 64})
-      .unmeasured("staggered grid, front", "value_error", 0.06, {128})
-      .measured("staggered grid, front", "surface_l1_vx", {{20, 0.0165}})
-      .unmeasured("staggered grid, front", "surface_l1_vx", 0.5, {32, 64, 128})
-      .measured("function, front", "missed_hits", {{20, 0.011}, {24, 0.00722}, {28, 0.00609}})
-      .unmeasured("function, front", "missed_hits", 0.025, {32, 64, 128})
-      .measured("staggered grid, front", "missed_hits", {{20, 0.011}})
-      .unmeasured("staggered grid, front", "missed_hits", 0.025, {32, 64, 128})
-      .measured("function at T/2, front", "value_error", {{20, 0.317}})
-      .unmeasured("function at T/2, front", "value_error", 0.2, {64})
-      .unmeasured("function at T/2, front", "value_error", 0.06, {128})
-      .measured("staggered grid at T/2, front", "value_error", {{20, 0.389}})
-      .unmeasured("staggered grid at T/2, front", "value_error", 0.2, {64})
-      .unmeasured("staggered grid at T/2, front", "value_error", 0.06, {128});
+      .measured("function, front", "volume_error",
+                {{20, 0.0184},
+                 {24, 0.00989},
+                 {28, 0.00783},
+                 {32, 0.00576},
+                 {64, 0.00139},
+                 {128, 0.000331}})
+      .measured("function, front", "value_error",
+                {{20, 0.0198},
+                 {24, 0.00986},
+                 {28, 0.00779},
+                 {32, 0.00574},
+                 {64, 0.00137},
+                 {128, 0.00033}})
+      .measured(
+          "function, front", "surface_l1_vx",
+          {{20, 0.021}, {24, 0.0128}, {28, 0.0112}, {32, 0.00945}, {64, 0.00462}, {128, 0.00221}})
+      .measured("staggered grid, front", "volume_error",
+                {{20, 0.0146}, {32, 0.00575}, {64, 0.00145}, {128, 0.000336}})
+      .measured("staggered grid, front", "value_error",
+                {{20, 0.0155}, {32, 0.00599}, {64, 0.00159}, {128, 0.000371}})
+      .measured("staggered grid, front", "surface_l1_vx",
+                {{20, 0.0165}, {32, 0.01}, {64, 0.00558}, {128, 0.00256}})
+      .measured("function, front", "missed_hits",
+                {{20, 0.011}, {24, 0.00722}, {28, 0.00609}, {32, 0.00304}, {64, 0.0012}, {128, 0}})
+      .measured("staggered grid, front", "missed_hits",
+                {{20, 0.011}, {32, 0.00304}, {64, 0.0016}, {128, 0}})
+      .measured("function at T/2, front", "value_error", {{20, 0.317}, {64, 0.076}, {128, 0.00461}})
+      .measured("staggered grid at T/2, front", "value_error",
+                {{20, 0.389}, {64, 0.0871}, {128, 0.00836}});
 }
 
 Bounds vortexBounds() {

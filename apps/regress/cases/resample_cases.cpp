@@ -45,28 +45,34 @@ Bounds resampleChainBounds() {
   return Bounds()
       .required("torus, 1 time", "order_surface", 1.8, 32, Sense::AtLeast)
       .order("torus, 1 time", "order_surface", {{12, 3.58}})
-      .measured("torus, 1 time", "band_in_linf_vx", {{6, 0.0322}, {8, 0.02}, {12, 0.00803}})
-      .unmeasured("torus, 1 time", "band_in_linf_vx", 0.1, {16, 32, 64})
-      .measured("torus, 1 time", "band_out_linf_vx", {{6, 0.0289}, {8, 0.0186}, {12, 0.0075}})
-      .unmeasured("torus, 1 time", "band_out_linf_vx", 0.1, {16, 32, 64})
-      .measured("torus, 1 time", "surface_l1_vx", {{6, 0.00794}, {8, 0.00458}, {12, 0.00161}})
-      .unmeasured("torus, 1 time", "surface_l1_vx", 0.02, {16, 32, 64})
-      .measured("torus, 10 times", "band_in_linf_vx", {{6, 0.138}})
-      .unmeasured("torus, 10 times", "band_in_linf_vx", 0.25, {16, 32, 64})
-      .measured("torus, 10 times", "band_out_linf_vx", {{6, 0.136}})
-      .unmeasured("torus, 10 times", "band_out_linf_vx", 0.25, {16, 32, 64})
-      .measured("torus, 10 times", "surface_l1_vx", {{6, 0.0325}})
-      .unmeasured("torus, 10 times", "surface_l1_vx", 0.05, {16, 32, 64})
-      .measured("rotated cube, 1 time", "band_in_linf_vx", {{6, 0.642}, {8, 0.452}, {12, 0.481}})
-      .unmeasured("rotated cube, 1 time", "band_in_linf_vx", 1.25, {16, 32, 64})
-      .measured("rotated cube, 1 time", "band_out_linf_vx", {{6, 1.01}, {8, 0.755}, {12, 0.979}})
+      .measured(
+          "torus, 1 time", "band_in_linf_vx",
+          {{6, 0.0322}, {8, 0.02}, {12, 0.00803}, {16, 0.00397}, {32, 0.000963}, {64, 0.00023}})
+      .measured(
+          "torus, 1 time", "band_out_linf_vx",
+          {{6, 0.0289}, {8, 0.0186}, {12, 0.0075}, {16, 0.0042}, {32, 0.000979}, {64, 0.000279}})
+      .measured("torus, 1 time", "surface_l1_vx",
+                {{6, 0.00794},
+                 {8, 0.00458},
+                 {12, 0.00161},
+                 {16, 0.000715},
+                 {32, 0.000121},
+                 {64, 2.72e-5}})
+      .measured("torus, 10 times", "band_in_linf_vx",
+                {{6, 0.138}, {16, 0.0215}, {32, 0.00408}, {64, 0.000844}})
+      .measured("torus, 10 times", "band_out_linf_vx",
+                {{6, 0.136}, {16, 0.0206}, {32, 0.00413}, {64, 0.000864}})
+      .measured("torus, 10 times", "surface_l1_vx",
+                {{6, 0.0325}, {16, 0.00373}, {32, 0.000482}, {64, 0.000101}})
+      .measured("rotated cube, 1 time", "band_in_linf_vx",
+                {{6, 0.642}, {8, 0.452}, {12, 0.481}, {16, 0.573}, {32, 0.378}, {64, 0.529}})
+      .measured("rotated cube, 1 time", "band_out_linf_vx",
+                {{6, 1.01}, {8, 0.755}, {12, 0.979}, {16, 0.848}, {32, 0.807}, {64, 0.86}})
       .ceiling(1.25)
-      .unmeasured("rotated cube, 1 time", "band_out_linf_vx", 1.25, {16, 32, 64})
-      .measured("torus, 1 time", "missed_hits", {{6, 0.00825}, {8, 0.00134}})
-      .unmeasured("torus, 1 time", "missed_hits", 0.025, {16, 32, 64})
-      .measured("torus, 10 times", "missed_hits", {{6, 0.0248}})
+      .measured("torus, 1 time", "missed_hits",
+                {{6, 0.00825}, {8, 0.00134}, {16, 0}, {32, 0}, {64, 0}})
+      .measured("torus, 10 times", "missed_hits", {{6, 0.0248}, {16, 0.00143}, {32, 0}, {64, 0}})
       .ceiling(0.025)
-      .unmeasured("torus, 10 times", "missed_hits", 0.025, {16, 32, 64})
       .required("torus, 10 times", "order_surface", 1.8, 32, Sense::AtLeast);
 }
 
