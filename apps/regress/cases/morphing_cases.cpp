@@ -77,31 +77,32 @@ Bounds morphBounds() {
   return Bounds()
       .required("sphere to shifted sphere", "value_error", kMostLeft)
       .zero("sphere to shifted sphere", "checks_failed")
-      .measured("sphere to shifted sphere", "surface_linf_vx",
-                {{5, 0.00389}, {6, 0.00255}, {8, 0.00142}})
-      .unmeasured("sphere to shifted sphere", "surface_linf_vx", 0.5, {16, 32, 64})
+      .measured(
+          "sphere to shifted sphere", "surface_linf_vx",
+          {{5, 0.00389}, {6, 0.00255}, {8, 0.00142}, {16, 0.00035}, {32, 8.53e-5}, {64, 2.02e-5}})
       .required("sphere to cube", "value_error", kMostLeft)
       .zero("sphere to cube", "checks_failed")
-      .measured("sphere to cube", "surface_linf_vx", {{5, 0.264}, {6, 0.247}, {8, 0.187}})
-      .unmeasured("sphere to cube", "surface_linf_vx", 0.5, {16, 32, 64})
+      .measured("sphere to cube", "surface_linf_vx",
+                {{5, 0.264}, {6, 0.247}, {8, 0.187}, {16, 0.22}, {32, 0.196}, {64, 0.194}})
       .required("cube to torus", "value_error", kMostLeft)
       .zero("cube to torus", "checks_failed")
-      .measured("cube to torus", "surface_linf_vx", {{5, 0.0317}, {6, 0.0194}, {8, 0.00964}})
-      .unmeasured("cube to torus", "surface_linf_vx", 0.5, {16, 32, 64})
+      .measured(
+          "cube to torus", "surface_linf_vx",
+          {{5, 0.0317}, {6, 0.0194}, {8, 0.00964}, {16, 0.00216}, {32, 0.000513}, {64, 0.000121}})
       .required("torus to sphere", "value_error", kMostLeft)
       .zero("torus to sphere", "checks_failed")
-      .measured("torus to sphere", "surface_linf_vx", {{5, 0.00384}, {6, 0.00268}, {8, 0.00133}})
-      .unmeasured("torus to sphere", "surface_linf_vx", 0.5, {16, 32, 64})
-      .measured("sphere to cube", "missed_hits", {{5, 0.0746}, {6, 0.09}, {8, 0.0409}})
+      .measured(
+          "torus to sphere", "surface_linf_vx",
+          {{5, 0.00384}, {6, 0.00268}, {8, 0.00133}, {16, 0.000353}, {32, 8.45e-5}, {64, 2.06e-5}})
+      .measured("sphere to cube", "missed_hits",
+                {{5, 0.0746}, {6, 0.09}, {8, 0.0409}, {16, 0.0235}, {32, 0.0139}, {64, 0.00455}})
       .ceiling(0.1, 6)
-      .unmeasured("sphere to cube", "missed_hits", 0.0375, {16})
-      .unmeasured("sphere to cube", "missed_hits", 0.025, {32, 64})
-      .measured("sphere to shifted sphere", "missed_hits", {{5, 0.00159}, {6, 0.00135}})
-      .unmeasured("sphere to shifted sphere", "missed_hits", 0.025, {16, 32, 64})
-      .measured("cube to torus", "missed_hits", {{5, 0.0118}, {6, 0.0066}})
-      .unmeasured("cube to torus", "missed_hits", 0.025, {16, 32, 64})
-      .measured("torus to sphere", "missed_hits", {{5, 0.00319}, {6, 0.00135}})
-      .unmeasured("torus to sphere", "missed_hits", 0.025, {16, 32, 64});
+      .measured("sphere to shifted sphere", "missed_hits",
+                {{5, 0.00159}, {6, 0.00135}, {16, 0.000172}, {32, 0}, {64, 0}})
+      .measured("cube to torus", "missed_hits",
+                {{5, 0.0118}, {6, 0.0066}, {16, 0.000476}, {32, 0}, {64, 0}})
+      .measured("torus to sphere", "missed_hits",
+                {{5, 0.00319}, {6, 0.00135}, {16, 0.000172}, {32, 0}, {64, 0}});
 }
 
 }  // namespace
