@@ -32,10 +32,10 @@ const OperatorText AdvectOperator::text{
     .group = "Flow",
     .summary = "move a solid with a velocity field",
     .details =
-        "The velocity is a built-in one (enright, vortex or rotation), three formulas in x, y, z, "
-        "r and t, or a grid of vectors (read FILE.vdb --grid NAME --as v, then --field @v), "
-        "staggered or not. A negative time "
-        "runs backwards. The scheme 'front' moves the surface as triangles and keeps volume and "
+        "The velocity is built in (enright, vortex or rotation), or three formulas in x, y, z, r "
+        "and t, or a grid of vectors, staggered or not. For a grid, write read FILE.vdb --grid "
+        "NAME --as v and then --field @v. A negative time runs backwards. The scheme 'front' moves "
+        "the surface as triangles and keeps volume and "
         "thin sheets; 'semi-lagrangian' and 'upwind' work on the grid.",
     .example =
         "levelsmith sphere --radius 0.15 --center 0.35,0.35,0.35 --voxel 0.03 ! advect "

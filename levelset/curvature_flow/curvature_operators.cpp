@@ -62,9 +62,10 @@ const OperatorText SmoothOperator::text{
     .group = "Flow",
     .summary = "smooth the surface by a filter of its distances",
     .details =
-        "--kind gaussian: a Gaussian with the standard deviation --sigma; mean: a box of the same "
-        "variance; median: the median over the grid points within sigma, which is slow for a large "
-        "sigma; taubin: a Gaussian, then a sharpening that restores the amplitude of long waves.",
+        "--kind gaussian is a Gaussian with the standard deviation --sigma. mean is a box of the "
+        "same variance. median is the median over the grid points within sigma, which is slow for "
+        "a large sigma. taubin is a Gaussian, then a sharpening that restores the amplitude of "
+        "long waves.",
     .example = "levelsmith box --size 2,2,2 --voxel 0.1 ! smooth --sigma 1vx ! measure"};
 
 NarrowBand SmoothOperator::run(std::vector<NarrowBand> operands, const Options& options,

@@ -63,8 +63,8 @@ class MeshBuilder {
   /// @throws ResourceLimit when `bytes` more bytes would exceed the memory limit
   void requireMore(double bytes) const;
   /// Adds a duplicate of a vertex, which may not have been read yet.
-  /// @return a placeholder for the corners of faces; the final number of the n-th duplicate is
-  ///         vertexCount() + n
+  /// @return a provisional number for the corners of faces; the final number of the n-th duplicate
+  ///         is vertexCount() + n
   [[nodiscard]] std::uint64_t splitVertex(std::uint64_t vertex, FilePosition place);
 
   /// Adds a face. Corners count from 0; faces with fewer than three corners are skipped.

@@ -133,7 +133,7 @@ double facing(const ParticleLayer& layer, const std::vector<V3d>& normals, std::
 struct Trouble {
   double radius = std::numeric_limits<double>::infinity();
   V3d place{0};
-  /// Part of the message after "the decal", with a placeholder for `place`; advice on the radius
+  /// Part of the message after "the decal". Its {} is replaced by `place`; advice on the radius
   /// follows it.
   const char* sentence = "";
   void note(double at, const V3d& where, const char* what) {

@@ -14,8 +14,8 @@ namespace {
 
 using Imath::V3d;
 
-/// Of all grid points within a voxel of the surface, the one nearest to `point`, in world
-/// coordinates.
+/// Finds the grid point nearest to `point` among those within a voxel of the surface. All positions
+/// are in world coordinates.
 V3d nearestFoot(const levelset::NarrowBand& base, const V3d& point) {
   const openvdb::FloatGrid& grid = levelset::vdb(base);
   const double voxel = base.voxelSize();

@@ -21,7 +21,7 @@ struct MeshTextureOptions {
   /// Box that is mapped to the unit cube of u, v, w; empty: the mesh's own box.
   std::optional<Imath::Box3d> textureBox = {};
   bool allowFolds = false;
-  /// Of many patches, leave out those whose map folds; an error if no patch is left.
+  /// Leaves out patches whose map folds. Throws an error if no patch is left.
   bool skipFolds = false;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};

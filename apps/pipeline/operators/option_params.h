@@ -136,11 +136,11 @@ std::vector<Param> paramsOf() {
 
 /// Stage of a run in which options are read. It decides which values are known.
 enum class OptionStage {
-  Syntax,   ///< before anything runs: a length is the number as written, without its unit; a field
-            ///< is a placeholder
+  Syntax,   ///< before anything runs: a length is the number as written, without its unit; fields
+            ///< are zero everywhere
   Partial,  ///< like Syntax, but a length is in world units, or NaN if `vx` or `%` has no operand
             ///< to refer to
-  Plan,     ///< operands are plans: lengths are in world units; a field is a placeholder
+  Plan,     ///< operands are plans: lengths are in world units; fields are zero everywhere
   Run       ///< all values are known
 };
 

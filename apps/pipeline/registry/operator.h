@@ -59,7 +59,7 @@ struct Param {
 /// Returns the type in words, such as "image size".
 [[nodiscard]] const char* typeName(ParamType type);
 
-/// Returns the placeholder for a value in the help, such as "L" for a length.
+/// Returns the letter or word that stands for a value in the help, such as "L" for a length.
 [[nodiscard]] std::string valueForm(const Param& param);
 
 /// Returns whether the text of the parameter names a value of the chain, "@NAME".

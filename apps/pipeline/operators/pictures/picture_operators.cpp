@@ -471,9 +471,9 @@ Operator compareImagesOperator() {
       .details =
           "Reports percentiles of the differences and the worst pixels for each layer: Z and P "
           "relative to Z, the angle between the normals N, curvatures times the voxel size, id and "
-          "colour. The exit code is 5, after everything is written, when the pictures differ by "
-          "more than those of two correct renderers may: a pixel away from outlines shows a "
-          "surface in only one picture, or a layer exceeds its tolerance.",
+          "colour. The exit code is 5 when the pictures differ by more than those of two correct "
+          "renderers may. So they do when a pixel away from outlines shows a surface in only one "
+          "picture, or when a layer exceeds its tolerance. Everything is written before that.",
       .example =
           "levelsmith sphere --radius 1 --voxel 0.1 ! render a.exr --size 64x64 --samples 1 "
           "! render b.exr --size 64x64 --samples 2 ! compare-images a.exr b.exr",
