@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include <charconv>
+
 #include "levelset/error.h"
 
 namespace pipeline {
@@ -113,6 +115,20 @@ std::array<double, 2> patchSizeOf(Invocation& in) {
     }
   }
   return {size[0], size[1]};
+}
+
+std::array<std::size_t, 2> countOf(const Invocation& in) {
+  const std::string text = in.text("count");
+  std::array<std::size_t, 2> count = {0, 0};
+  const char *at = text.data(), *end = text.data() + text.size();
+  const auto first = std::from_chars(at, end, count[0]);
+  const bool hasComma = first.ec == std::errc() && first.ptr != end && *first.ptr == ',';
+  const auto second = hasComma ? std::from_chars(first.ptr + 1, end, count[1]) : first;
+  if (!hasComma || second.ec != std::errc() || second.ptr != end || count[0] == 0 || count[1] == 0)
+    throw UsageError(
+        fmt::format("{}: '{}' is not a pair of positive integers; write numbers of tiles, as 12,3",
+                    in.where("count"), text));
+  return count;
 }
 
 std::vector<mapping::PatchOutline> outlinesOf(const std::vector<mapping::Patch>& patches) {

@@ -19,6 +19,8 @@ void validateLayers(const Invocation& in);
 /// Reads --size: lengths along u and along v, world units.
 /// @throws levelset::InvalidInput for a length over ten times the diagonal of the base
 [[nodiscard]] std::array<double, 2> patchSizeOf(Invocation& in);
+/// Reads --count "n,m", two positive integers: tiles along u and along v.
+[[nodiscard]] std::array<std::size_t, 2> countOf(const Invocation& in);
 [[nodiscard]] std::vector<mapping::PatchOutline> outlinesOf(
     const std::vector<mapping::Patch>& patches);
 /// Stores in the recipe the action and the options that the key patches of `animate` must share.
