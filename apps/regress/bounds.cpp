@@ -15,7 +15,6 @@ double Bound::limit() const {
     case Kind::Rounding:
       return stated * static_cast<double>(std::numeric_limits<float>::epsilon());
     case Kind::Required:
-    case Kind::Unmeasured:
       break;
   }
   return stated;
@@ -84,18 +83,6 @@ Bounds& Bounds::required(const std::string& variant, const std::string& figure, 
                   .stated = limit,
                   .resolution = resolution,
                   .sense = sense});
-  return *this;
-}
-
-Bounds& Bounds::unmeasured(const std::string& variant, const std::string& figure, double limit,
-                           std::initializer_list<int> resolutions) {
-  for (const int resolution : resolutions)
-    all_.push_back({.variant = variant,
-                    .figure = figure,
-                    .kind = Bound::Kind::Unmeasured,
-                    .stated = limit,
-                    .resolution = resolution,
-                    .budget = Budget::Full});
   return *this;
 }
 

@@ -25,8 +25,6 @@ struct Bound {
                ///< it, or `least` if that is larger
     Rounding,  ///< `stated` times the machine epsilon of float is the limit
     Required,  ///< `stated` is the limit itself, which follows from a requirement
-    Unmeasured,  ///< `stated` is the limit itself, for a run that is too long to measure; never
-                 ///< stale
   };
   /// Ratio of the limit to the measured figure, for Kind::Measured.
   static constexpr double kMargin = 1.5;
@@ -96,9 +94,6 @@ class Bounds {
   /// Adds a limit that follows from a requirement, not from a measurement.
   Bounds& required(const std::string& variant, const std::string& figure, double limit,
                    int resolution = 0, Sense sense = Sense::AtMost);
-  /// Adds a limit for runs of the full budget that are too long to measure.
-  Bounds& unmeasured(const std::string& variant, const std::string& figure, double limit,
-                     std::initializer_list<int> resolutions);
 
   [[nodiscard]] const std::vector<Bound>& all() const { return all_; }
   operator std::vector<Bound>() const { return all_; }  // NOLINT(google-explicit-constructor)

@@ -258,50 +258,51 @@ void thinThings(Recorder& out) {
 /// of second order: Euler steps in which the surface moves 1.5 voxels have an error of 0.75 voxel.
 Bounds curvatureSphereBounds() {
   return Bounds()
-      .measured("auto", "value_error", {{6, 0.00534}, {8, 0.00194}, {12, 0.00184}})
-      .unmeasured("auto", "value_error", 0.01, {16})
-      .unmeasured("auto", "value_error", 0.001, {32, 64})
-      .measured("auto", "surface_l1_vx", {{6, 0.016}, {8, 0.00774}, {12, 0.011}})
-      .unmeasured("auto", "surface_l1_vx", 0.04, {16, 32, 64})
+      .measured(
+          "auto", "value_error",
+          {{6, 0.00534}, {8, 0.00194}, {12, 0.00184}, {16, 0.00133}, {32, 0.000522}, {64, 7.17e-5}})
+      .measured("auto", "surface_l1_vx",
+                {{6, 0.016}, {8, 0.00774}, {12, 0.011}, {16, 0.0106}, {32, 0.00835}, {64, 0.00229}})
       .zero("auto", "checks_failed")
-      .measured("explicit", "surface_l1_vx", {{6, 0.0287}, {8, 0.0268}, {12, 0.0167}})
+      .measured("explicit", "surface_l1_vx",
+                {{6, 0.0287}, {8, 0.0268}, {12, 0.0167}, {16, 0.0124}, {32, 0.00834}, {64, 0.0101}})
       .ceiling(0.04)
-      .unmeasured("explicit", "surface_l1_vx", 0.04, {16, 32, 64})
       .zero("explicit", "checks_failed")
-      .measured("stabilized", "surface_l1_vx", {{6, 0.016}, {8, 0.00774}, {12, 0.011}})
-      .unmeasured("stabilized", "surface_l1_vx", 0.04, {16, 32, 64})
+      .measured("stabilized", "surface_l1_vx",
+                {{6, 0.016}, {8, 0.00774}, {12, 0.011}, {16, 0.0107}, {32, 0.00835}, {64, 0.00229}})
       .zero("stabilized", "checks_failed")
-      .measured("implicit", "surface_l1_vx", {{6, 0.00497}, {8, 0.00468}, {12, 0.00118}})
-      .unmeasured("implicit", "surface_l1_vx", 0.04, {16, 32, 64})
+      .measured(
+          "implicit", "surface_l1_vx",
+          {{6, 0.00497}, {8, 0.00468}, {12, 0.00118}, {16, 0.00167}, {32, 0.00393}, {64, 0.0275}})
       .zero("implicit", "checks_failed")
       .measured("stabilized, steps as long as the band", "surface_linf_vx",
-                {{6, 0.025}, {8, 0.0138}, {12, 0.018}})
-      .unmeasured("stabilized, steps as long as the band", "surface_linf_vx", 0.2, {16, 32, 64})
+                {{6, 0.025}, {8, 0.0138}, {12, 0.018}, {16, 0.0155}, {32, 0.00959}, {64, 0.00284}})
       .zero("stabilized, steps as long as the band", "checks_failed")
       .measured("implicit, steps as long as the band", "surface_linf_vx",
-                {{6, 0.0124}, {8, 0.0149}, {12, 0.0473}})
-      .unmeasured("implicit, steps as long as the band", "surface_linf_vx", 0.2, {16, 32, 64})
+                {{6, 0.0124}, {8, 0.0149}, {12, 0.0473}, {16, 0.0768}, {32, 0.163}, {64, 0.105}})
       .zero("implicit, steps as long as the band", "checks_failed")
-      .measured("auto", "missed_hits", {{6, 0.00881}, {8, 0.00638}, {12, 0.00334}})
-      .unmeasured("auto", "missed_hits", 0.025, {16, 32, 64})
-      .measured("explicit", "missed_hits", {{6, 0.0198}, {8, 0.0175}, {12, 0.00334}})
+      .measured(
+          "auto", "missed_hits",
+          {{6, 0.00881}, {8, 0.00638}, {12, 0.00334}, {16, 0.0018}, {32, 0.0011}, {64, 0.000253}})
+      .measured(
+          "explicit", "missed_hits",
+          {{6, 0.0198}, {8, 0.0175}, {12, 0.00334}, {16, 0.00247}, {32, 0.00094}, {64, 0.000759}})
       .ceiling(0.025)
-      .unmeasured("explicit", "missed_hits", 0.025, {16, 32, 64})
-      .measured("stabilized", "missed_hits", {{6, 0.00881}, {8, 0.00638}, {12, 0.00334}})
-      .unmeasured("stabilized", "missed_hits", 0.025, {16, 32, 64})
-      .measured("implicit", "missed_hits", {{8, 0.00638}})
-      .unmeasured("implicit", "missed_hits", 0.025, {16, 32, 64})
-      .measured("stabilized, steps as long as the band", "missed_hits",
-                {{6, 0.00881}, {8, 0.00638}, {12, 0.0078}})
-      .unmeasured("stabilized, steps as long as the band", "missed_hits", 0.025, {16, 32, 64})
-      .measured("implicit, steps as long as the band", "missed_hits", {{8, 0.00957}, {12, 0.0145}})
-      .unmeasured("implicit, steps as long as the band", "missed_hits", 0.025, {16, 32, 64})
-      .measured("explicit", "value_error", {{6, 0.00957}, {8, 0.0067}, {12, 0.00278}})
-      .unmeasured("explicit", "value_error", 0.001, {32, 64})
-      .measured("stabilized", "value_error", {{6, 0.00534}, {8, 0.00194}, {12, 0.00184}})
-      .unmeasured("stabilized", "value_error", 0.001, {32, 64})
-      .measured("implicit", "value_error", {{6, 0.00166}, {8, 0.00117}, {12, 0.000196}})
-      .unmeasured("implicit", "value_error", 0.001, {32, 64});
+      .measured(
+          "stabilized", "missed_hits",
+          {{6, 0.00881}, {8, 0.00638}, {12, 0.00334}, {16, 0.00202}, {32, 0.0011}, {64, 0.000253}})
+      .measured("implicit", "missed_hits", {{8, 0.00638}, {16, 0}, {32, 0.000157}, {64, 0.00152}})
+      .measured(
+          "stabilized, steps as long as the band", "missed_hits",
+          {{6, 0.00881}, {8, 0.00638}, {12, 0.0078}, {16, 0.00202}, {32, 0.0011}, {64, 0.000253}})
+      .measured("implicit, steps as long as the band", "missed_hits",
+                {{8, 0.00957}, {12, 0.0145}, {16, 0.02}, {32, 0.0182}, {64, 0.00721}})
+      .measured("explicit", "value_error",
+                {{6, 0.00957}, {8, 0.0067}, {12, 0.00278}, {32, 0.000521}, {64, 0.000316}})
+      .measured("stabilized", "value_error",
+                {{6, 0.00534}, {8, 0.00194}, {12, 0.00184}, {32, 0.000522}, {64, 7.17e-5}})
+      .measured("implicit", "value_error",
+                {{6, 0.00166}, {8, 0.00117}, {12, 0.000196}, {32, 0.000246}, {64, 0.00086}});
 }
 
 Bounds curvatureCylinderBounds() {

@@ -55,11 +55,9 @@ const char* kindName(Bound::Kind kind) {
     case Bound::Kind::Rounding:
       return "rounding";
     case Bound::Kind::Required:
-      return "required";
-    case Bound::Kind::Unmeasured:
       break;
   }
-  return "unmeasured";
+  return "required";
 }
 
 Json toJson(const Judgement& j) {

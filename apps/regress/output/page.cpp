@@ -77,11 +77,9 @@ std::string stated(const Bound& bound) {
     case Bound::Kind::Rounding:
       return fmt::format("{:g} ε", bound.stated);
     case Bound::Kind::Required:
-      return "required";
-    case Bound::Kind::Unmeasured:
       break;
   }
-  return "not measured";
+  return "required";
 }
 
 void appendBounds(const CaseResult& result, std::string& html) {

@@ -137,14 +137,12 @@ void judgePresence(const Case& of, const Row& row, const Presence& presence, Bud
   judgements.push_back({none, row.resolution, found->second, none.isMet(found->second), {}});
 }
 
-/// Adds a failure for each figure that has measured bounds, but none at the resolution of `row`. In
-/// the full budget, figures with unmeasured bounds are left out.
+/// Adds a failure for each figure that has measured bounds, but none at the resolution of `row`.
 void judgeCompleteness(const Case& of, const Row& row, Budget budget,
                        std::vector<Judgement>& judgements) {
   std::set<std::string> bounded, stated;
   for (const Bound& bound : of.bounds) {
     if (bound.variant != row.variant) continue;
-    if (bound.kind == Bound::Kind::Unmeasured && bound.isFor(budget)) stated.insert(bound.figure);
     if (bound.kind == Bound::Kind::Measured) bounded.insert(bound.figure);
     if (fits(bound, row, budget)) stated.insert(bound.figure);
   }
