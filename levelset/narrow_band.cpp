@@ -1,6 +1,8 @@
 #include "levelset/narrow_band.h"
 
 #include <fmt/core.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <array>
@@ -91,27 +93,68 @@ Imath::M44d NarrowBand::indexToWorld() const {
   return result;
 }
 
-Imath::Box3d NarrowBand::zeroSetBounds() const {
-  Imath::Box3d box;
-  if (!grid_) return box;
+std::vector<double> NarrowBand::zeroSetExtents(const std::vector<Imath::V3d>& directions) const {
+  std::vector<double> nothing(directions.size(), -std::numeric_limits<double>::infinity());
+  if (!grid_) return nothing;
   const FloatGrid& grid = *grid_->grid;
-  FloatGrid::ConstAccessor accessor = grid.getConstAccessor();
-  for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) {
-    for (auto it = leaf->cbeginValueOn(); it; ++it) {
-      const Coord c = it.getCoord();
-      const float a = *it;
+  std::vector<const LeafNode*> leaves;
+  grid.tree().getNodes(leaves);
+  const auto extendBy = [&](const openvdb::Vec3d& index, std::vector<double>& extents) {
+    const Imath::V3d p = toImath(grid.indexToWorld(index));
+    for (std::size_t d = 0; d < directions.size(); ++d)
+      extents[d] = std::max(extents[d], p.dot(directions[d]));
+  };
+  const auto addLeaf = [&](const LeafNode& leaf, FloatGrid::ConstAccessor& accessor,
+                           std::vector<double>& extents) {
+    const float* values = leaf.buffer().data();
+    constexpr openvdb::Index kStrides[3] = {LeafNode::DIM * LeafNode::DIM, LeafNode::DIM, 1};
+    for (auto it = leaf.cbeginValueOn(); it; ++it) {
+      const openvdb::Index at = it.pos();
+      const float a = values[at];
+      const Coord local = LeafNode::offsetToLocalCoord(at);
       for (int axis = 0; axis < 3; ++axis) {
-        Coord next = c;
-        next[axis] += 1;
-        float b;
-        if (!accessor.probeValue(next, b) || (a < 0) == (b < 0)) continue;
-        openvdb::Vec3d p = c.asVec3d();
+        float b = 0;
+        if (local[axis] + 1 < static_cast<int>(LeafNode::DIM)) {
+          const openvdb::Index next = at + kStrides[axis];
+          if (!leaf.isValueOn(next)) continue;
+          b = values[next];
+          if ((a < 0) == (b < 0)) continue;
+        } else {
+          Coord next = leaf.origin() + local;
+          next[axis] += 1;
+          if (!accessor.probeValue(next, b) || (a < 0) == (b < 0)) continue;
+        }
+        openvdb::Vec3d p = (leaf.origin() + local).asVec3d();
         p[axis] += static_cast<double>(a) / (static_cast<double>(a) - static_cast<double>(b));
-        box.extendBy(toImath(grid.indexToWorld(p)));
+        extendBy(p, extents);
       }
     }
-  }
-  return box;
+  };
+  return tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, leaves.size(), 64), nothing,
+      [&](const tbb::blocked_range<std::size_t>& range, std::vector<double> extents) {
+        FloatGrid::ConstAccessor accessor = grid.getConstAccessor();
+        for (std::size_t n = range.begin(); n < range.end(); ++n)
+          addLeaf(*leaves[n], accessor, extents);
+        return extents;
+      },
+      [](std::vector<double> a, const std::vector<double>& b) {
+        for (std::size_t d = 0; d < a.size(); ++d) a[d] = std::max(a[d], b[d]);
+        return a;
+      });
+}
+
+Imath::Box3d NarrowBand::zeroSetBounds() const {
+  std::vector<Imath::V3d> axes;
+  for (const double sign : {1.0, -1.0})
+    for (int axis = 0; axis < 3; ++axis) {
+      axes.emplace_back(0);
+      axes.back()[axis] = sign;
+    }
+  const std::vector<double> extents = zeroSetExtents(axes);
+  if (!std::isfinite(extents[0])) return {};
+  return {Imath::V3d(-extents[3], -extents[4], -extents[5]),
+          Imath::V3d(extents[0], extents[1], extents[2])};
 }
 
 bool NarrowBand::isOpenSurface() const {

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace levelset {
 
@@ -50,6 +51,10 @@ class NarrowBand {
   /// Bounds of the zero set, world units: box of all sign changes between neighbouring grid points,
   /// located by linear interpolation. Empty when there are none.
   [[nodiscard]] Imath::Box3d zeroSetBounds() const;
+  /// Extents of the zero set in several directions: for each direction d the largest p·d over its
+  /// points p, world units times the length of d. The points are those of zeroSetBounds(). −∞ when
+  /// there are none.
+  [[nodiscard]] std::vector<double> zeroSetExtents(const std::vector<Imath::V3d>& directions) const;
   /// Returns true for the band of an open surface, as surfaceBand() computes it from a mesh with a
   /// border. Such a surface has two sides and no inside: it can be the base of patches but is no
   /// solid.

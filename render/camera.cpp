@@ -161,10 +161,35 @@ V3d viewFrom(const V3d& up) {
   return x * view.x + y * view.y + x.cross(y) * view.z;
 }
 
-}  // namespace
+/// Position of a camera from which points fit between two slopes ±k on an image axis.
+struct Fit {
+  double back;   ///< distance from the target, world units
+  double shift;  ///< of the target along the image axis, world units
+};
 
-Camera framingCamera(const Imath::Box3d& bounds, int width, int height, double verticalFov,
-                     const V3d& up) {
+/// Fits points between several pairs of slopes. Consider a camera at distance `back` from the
+/// target, shifted by s along the axis. It sees a point with coordinate x on that axis, `depth`
+/// behind the target, at a slope within ±k when |x − s| <= k (back + depth). This is linear in s
+/// and back, so both have a closed form.
+std::vector<Fit> fits(const Extents& extents, const V3d& target, const V3d& along,
+                      const V3d& forward, const std::vector<double>& slopes) {
+  std::vector<V3d> directions;
+  for (const double k : slopes)
+    for (const double side : {1.0, -1.0}) directions.push_back(along * side - forward * k);
+  const std::vector<double> extent = extents(directions);
+  std::vector<Fit> found;
+  for (std::size_t i = 0; i < slopes.size(); ++i) {
+    const double upper = extent[2 * i] - target.dot(directions[2 * i]),
+                 lower = extent[2 * i + 1] - target.dot(directions[2 * i + 1]);
+    found.push_back({0.5 * (upper + lower) / slopes[i], 0.5 * (upper - lower)});
+  }
+  return found;
+}
+
+/// Camera that frames points, see framingCamera(). @param isCentred  centre the points also on the
+/// axis on which they do not fill the picture
+Camera framing(const Imath::Box3d& bounds, const Extents& extents, int width, int height,
+               double verticalFov, const V3d& up, bool isCentred) {
   if (bounds.isEmpty() || !isFinite(bounds.min) || !isFinite(bounds.max)) {
     throw levelset::UsageError(
         "camera: the scene has no surface to frame; give the view with --from");
@@ -178,28 +203,33 @@ Camera framingCamera(const Imath::Box3d& bounds, int width, int height, double v
   camera.from = camera.to + viewFrom(up);
   validate(camera);
 
-  // Consider a camera at distance `back` from the target, shifted by s along an image axis. It sees
-  // a box corner with coordinate x on that axis, `depth` behind the target, when |x - s| <= k (back
-  // + depth). Here k is kMargin times the half extent of the picture at unit depth. This is linear
-  // in s and back, so each axis has a closed form.
   const CameraAxes axes = axesOf(camera);
-  const double half[2] = {halfExtentOf(camera).x, halfExtentOf(camera).y};
-  constexpr double kMargin = 0.94;  // share of the picture that the box fills
+  const HalfExtent half = halfExtentOf(camera);
+  constexpr double kMargin = 0.94;  // share of the picture that the points fill
+  const V3d along[2] = {axes.right, axes.up};
+  const double widest[2] = {kMargin * half.x, kMargin * half.y};
+  // On each axis the points fit at some distance. The larger distance counts. On the other axis the
+  // points then fill a smaller share of the picture, whose middle they must be in.
   double back = 0, shift[2];
-  for (int axis = 0; axis < 2; ++axis) {
-    const double k = kMargin * half[axis];
-    double upper = -std::numeric_limits<double>::infinity(), lower = upper;
-    for (int corner = 0; corner < 8; ++corner) {
-      const V3d p =
-          V3d(corner & 1 ? bounds.max.x : bounds.min.x, corner & 2 ? bounds.max.y : bounds.min.y,
-              corner & 4 ? bounds.max.z : bounds.min.z) -
-          camera.to;
-      const double x = p.dot(axis == 0 ? axes.right : axes.up), depth = p.dot(axes.forward);
-      upper = std::max(upper, x - k * depth);
-      lower = std::max(lower, -x - k * depth);
-    }
-    shift[axis] = 0.5 * (upper - lower);
-    back = std::max(back, 0.5 * (upper + lower) / k);
+  std::size_t binding = 0;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const Fit fit = fits(extents, camera.to, along[axis], axes.forward, {widest[axis]})[0];
+    shift[axis] = fit.shift;
+    if (fit.back > back) binding = axis;
+    back = std::max(back, fit.back);
+  }
+  const std::size_t other = 1 - binding;
+  double low = 0, high = widest[other];
+  constexpr int kRounds = 3, kSlopes = 8;
+  for (int round = 0; isCentred && round < kRounds && back > 0; ++round) {
+    std::vector<double> slopes;
+    for (int n = 1; n <= kSlopes; ++n) slopes.push_back(low + (high - low) * n / kSlopes);
+    const std::vector<Fit> found = fits(extents, camera.to, along[other], axes.forward, slopes);
+    std::size_t n = 0;
+    while (n + 1 < found.size() && found[n].back > back) ++n;
+    shift[other] = found[n].shift;
+    high = slopes[n];
+    low = n > 0 ? slopes[n - 1] : low;
   }
   const double size = bounds.size().length();
   if (!(back > 0)) back = size > 0 ? size : 1;
@@ -207,6 +237,27 @@ Camera framingCamera(const Imath::Box3d& bounds, int width, int height, double v
   camera.from = camera.to - axes.forward * back;
   validate(camera);
   return camera;
+}
+
+}  // namespace
+
+Camera framingCamera(const Imath::Box3d& bounds, int width, int height, double verticalFov,
+                     const V3d& up) {
+  const Extents extents = [&](const std::vector<V3d>& directions) {
+    std::vector<double> all;
+    for (const V3d& d : directions) {
+      double extent = 0;
+      for (int a = 0; a < 3; ++a) extent += d[a] * (d[a] > 0 ? bounds.max[a] : bounds.min[a]);
+      all.push_back(extent);
+    }
+    return all;
+  };
+  return framing(bounds, extents, width, height, verticalFov, up, false);
+}
+
+Camera framingCamera(const Imath::Box3d& bounds, const Extents& extents, int width, int height,
+                     double verticalFov, const V3d& up) {
+  return framing(bounds, extents, width, height, verticalFov, up, true);
 }
 
 }  // namespace render

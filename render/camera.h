@@ -4,7 +4,9 @@
 #include <Imath/ImathMatrix.h>
 #include <Imath/ImathVec.h>
 
+#include <functional>
 #include <optional>
+#include <vector>
 
 namespace render {
 
@@ -64,5 +66,15 @@ void validate(const Camera& camera);
 [[nodiscard]] Camera framingCamera(const Imath::Box3d& bounds, int width, int height,
                                    double verticalFov = 0.6108652381980153,
                                    const Imath::V3d& up = {0, 1, 0});
+
+/// Extents of a set of points: returns for each direction d the largest p·d over its points p.
+using Extents = std::function<std::vector<double>(const std::vector<Imath::V3d>& directions)>;
+
+/// Camera that frames a set of points, seen from the same direction. Unlike the corners of a box,
+/// the points are in the middle of the picture on both axes.
+/// @param bounds  box of the points; @param extents  extents of the points, world units
+/// @throws as framingCamera() for a box
+[[nodiscard]] Camera framingCamera(const Imath::Box3d& bounds, const Extents& extents, int width,
+                                   int height, double verticalFov, const Imath::V3d& up);
 
 }  // namespace render

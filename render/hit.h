@@ -20,10 +20,10 @@ struct Hit {
   bool found = false;
   double distance = 0;  ///< from the ray's origin
   /// Position; outward unit normal, from a tricubic B-spline of φ or a mesh's vertex normals.
-  Imath::V3d position, normal;
+  Imath::V3d position{0}, normal{0};
   /// Outward unit normal of the surface as drawn: of the trilinear interpolant (with a spline
   /// filter, of the spline), or of the mesh triangle.
-  Imath::V3d facetNormal;
+  Imath::V3d facetNormal{0};
   CurvatureSample curvature;  ///< from the B-spline; 0 on meshes
   double viewCurvature = 0;   ///< normal curvature in the ray's direction, per world unit
   /// Bound on the distance of the drawn surface from the smooth surface that the grid samples. On
@@ -34,8 +34,9 @@ struct Hit {
   std::uint32_t id = 0;   ///< Solid::id or MeshPart::id
   std::size_t solid = 0;  ///< index in Scene::solids, or in Scene::meshes if isOnMesh
   bool isOnMesh = false;
-  bool isFlipped = false;  ///< the drawn shape is on the outside of the hit solid, as for a
-                           ///< subtracted solid; normals and curvatures describe the drawn shape
+  bool isOnGround = false;  ///< the hit is on Scene::ground, which shows only shadows
+  bool isFlipped = false;   ///< the drawn shape is on the outside of the hit solid, as for a
+                            ///< subtracted solid; normals and curvatures describe the drawn shape
   /// The field of a solid contributes to this hit on a blended surface, but the solid's band does
   /// not extend to this point.
   bool isBeyondBand = false;

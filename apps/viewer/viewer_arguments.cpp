@@ -244,9 +244,12 @@ render::Camera firstCamera(const Arguments& arguments, const Model& model, int w
     if (arguments.up) camera.up = *arguments.up;
     if (arguments.verticalFov) camera.verticalFov = *arguments.verticalFov;
   } else {
-    camera = render::framingCamera(bounds, width, height,
-                                   arguments.verticalFov.value_or(camera.verticalFov),
-                                   arguments.up.value_or(camera.up));
+    const double fov = arguments.verticalFov.value_or(camera.verticalFov);
+    const Imath::V3d up = arguments.up.value_or(camera.up);
+    // The particles of patches are not in the scene.
+    const bool isFramedByBox = model.bounds.isEmpty() || !model.patches.empty();
+    camera = isFramedByBox ? render::framingCamera(bounds, width, height, fov, up)
+                           : render::framingCamera(model.scene, width, height, fov, up);
   }
   if (arguments.orthoHeight) camera.orthoHeight = arguments.orthoHeight;
   camera.width = width;

@@ -11,7 +11,7 @@ Image renderCpu(const Scene& scene, const RenderOptions& options) {
   levelset::report(options.progress, 0);
   const KernelScene surfaces(scene, options);
   if (surfaces.bounds().isEmpty()) refuseEmptyScene();
-  constexpr int kCpuTile = 16;  // edge of a tile, pixels
+  constexpr int kCpuTile = 32;  // edge of a tile, pixels
   return paintPicture(scene, surfaces, CpuTracer(), kCpuTile, "cpu", options);
 }
 

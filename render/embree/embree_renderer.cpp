@@ -14,6 +14,7 @@ namespace render {
 namespace {
 
 using Imath::V2d;
+using Imath::V3d;
 
 constexpr int kTile = 16;  // edge of a tile, pixels
 
@@ -59,21 +60,27 @@ struct PixelPainter {
     std::vector<LightRay> lights;
     std::vector<double> transmittances;
     ColourSum sum;
+    const auto lightAt = [&](const Hit& hit, const V3d& direction, int s) {
+      lights.clear();
+      const LightRays range = shader.addRays(hit, direction, x, y, s, lights);
+      transmittances.clear();
+      for (const LightRay& light : lights)
+        transmittances.push_back(
+            rays.transmittance(light.origin, light.direction, light.maxDistance));
+      return Shader::lightOf(range, lights, transmittances);
+    };
     for (int s = 0; s < options.samples; ++s) {
       const V2d at = area.at(s);
       const Camera::Ray ray = scene.camera.ray(x + at.x, y + at.y);
       double seen = 1;
       for (const Hit& hit : rays.intersectVisible(ray.origin, ray.direction, ray.near, ray.far)) {
-        lights.clear();
-        const LightRays range = shader.addRays(hit, ray.direction, x, y, s, lights);
-        transmittances.clear();
-        for (const LightRay& light : lights)
-          transmittances.push_back(
-              rays.transmittance(light.origin, light.direction, light.maxDistance));
-        sum.add(shader.colour(hit, ray.direction, range, lights, transmittances),
+        sum.add(shader.colour(hit, ray.direction, lightAt(hit, ray.direction, s)),
                 seen * hit.opacity);
         seen *= 1 - hit.opacity;
       }
+      if (seen < kLeastTransmittance) continue;
+      if (const Hit hit = shader.groundHit(ray); hit.found)
+        sum.add(Imath::C3f(0), seen * shader.shadowOpacity(hit, lightAt(hit, ray.direction, s)));
     }
     layers.setColour(i, sum, options.samples);
   }

@@ -24,7 +24,8 @@ FrustumCulling::FrustumCulling(const Scene& scene, const RenderOptions& options,
     const V3d n = normal.normalized();
     planes_.push_back({n, n.dot(through)});
   };
-  for (int a = 0; a < 3; ++a) {
+  // The ground extends beyond the box of the surfaces.
+  for (int a = 0; a < 3 && !scene.ground; ++a) {
     V3d along(0);
     along[a] = 1;
     add(bounds.min, along);

@@ -11,6 +11,7 @@
 namespace render {
 namespace {
 
+using Imath::C3f;
 using Imath::V2d;
 using Imath::V3d;
 
@@ -20,6 +21,12 @@ constexpr std::size_t kMostLightRays = 1u << 18;
 // Bound on the rounding error of the kernel's hit depths, voxels. It is added to the surface error,
 // so that light rays start farther from the surface.
 constexpr double kCastError = 2e-3;
+// A lattice point has the light rays of this many colour samples, unless the pixels have fewer.
+constexpr int kLatticeSamples = 4;
+// Shadow rays from the centre of a pixel that look for shadows between lattice points.
+constexpr int kProbes = 2;
+// Lattice points in a penumbra have so many times the shadow rays of others.
+constexpr int kPenumbraSamples = 6;
 
 }  // namespace
 
@@ -33,8 +40,74 @@ KernelPainter::KernelPainter(const Scene& scene, const KernelScene& surfaces,
 
 void KernelPainter::paint(const KernelTracer& tracer, const PixelBox& box) const {
   const std::vector<Pixel> pixels = pixelsOf(box);
-  paintData(tracer, pixels);
-  paintColours(tracer, pixels);
+  const LightLattice lattice = latticeOf(tracer, box);
+  const std::vector<char> contradicts = paintData(tracer, pixels, lattice);
+  paintColours(tracer, pixels, lattice, contradicts);
+}
+
+LightLattice KernelPainter::latticeOf(const KernelTracer& tracer, const PixelBox& box) const {
+  if (options_.lightSpacing <= 1 || !scene_.isOpaque() || !usesLights(options_.style.style))
+    return {};
+  const Camera& camera = scene_.camera;
+  LightLattice lattice(box, camera.width, camera.height, options_.lightSpacing);
+  const std::vector<LightLattice::Point>& points = lattice.points();
+  PixelBlock at(points.size());
+  std::vector<Camera::Ray> views;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    at.x[i] = static_cast<float>(points[i].x - 0.5 * camera.width);
+    at.y[i] = static_cast<float>(points[i].y - 0.5 * camera.height);
+    views.push_back(camera.ray(points[i].x, points[i].y));
+  }
+  const PixelHits hits = surfaces_.castPixels(tracer, at);
+  std::vector<LightLattice::Node> nodes(points.size());
+  std::vector<LightRay> rays;
+  std::vector<LightRays> ranges(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    nodes[i].hit = hitOf(views[i], views[i].near, hits, i);
+    if (!nodes[i].hit.found) nodes[i].hit = shader_.groundHit(views[i]);
+    if (!nodes[i].hit.found) continue;
+    const auto x = static_cast<int>(points[i].x), y = static_cast<int>(points[i].y);
+    // All rays to the sky come first, as LightRays requires.
+    const int samples = std::min(options_.samples, kLatticeSamples);
+    LightRays& range = ranges[i];
+    range.first = rays.size();
+    for (int s = 0; s < samples; ++s)
+      range.sky +=
+          shader_.addRays(nodes[i].hit, views[i].direction, x, y, s, rays, LightKind::Sky).sky;
+    for (int s = 0; s < samples; ++s) {
+      const LightRays more =
+          shader_.addRays(nodes[i].hit, views[i].direction, x, y, s, rays, LightKind::Key);
+      range.key += more.key;
+      range.behind += more.behind;
+    }
+  }
+  const std::vector<double> light = surfaces_.transmittances(tracer, rays);
+  std::vector<std::size_t> inPenumbra;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!nodes[i].hit.found) continue;
+    nodes[i].light = Shader::lightOf(ranges[i], rays, light);
+    if (LightLattice::isPenumbra(nodes[i].light)) inPenumbra.push_back(i);
+  }
+  // Shadow rays are noisy where the light is partly hidden. Trace more of them there.
+  std::vector<LightRay> shadowRays;
+  std::vector<LightRays> shadowRanges;
+  for (const std::size_t i : inPenumbra) {
+    const auto x = static_cast<int>(points[i].x), y = static_cast<int>(points[i].y);
+    LightRays range;
+    range.first = shadowRays.size();
+    for (int s = 0; s < kPenumbraSamples * std::min(options_.samples, kLatticeSamples); ++s) {
+      const LightRays more =
+          shader_.addRays(nodes[i].hit, views[i].direction, x, y, s, shadowRays, LightKind::Key);
+      range.key += more.key;
+      range.behind += more.behind;
+    }
+    shadowRanges.push_back(range);
+  }
+  const std::vector<double> shadows = surfaces_.transmittances(tracer, shadowRays);
+  for (std::size_t n = 0; n < inPenumbra.size(); ++n)
+    nodes[inPenumbra[n]].light.key = Shader::lightOf(shadowRanges[n], shadowRays, shadows).key;
+  lattice.setNodes(std::move(nodes));
+  return lattice;
 }
 
 std::vector<KernelPainter::Pixel> KernelPainter::pixelsOf(const PixelBox& box) {
@@ -81,9 +154,9 @@ Hit KernelPainter::hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std
   return hit;
 }
 
-// Paints the layers other than the colours (depth, normal, position, id, curvature, thickness) from
-// the rays through the pixels' centres.
-void KernelPainter::paintData(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const {
+std::vector<char> KernelPainter::paintData(const KernelTracer& tracer,
+                                           const std::vector<Pixel>& pixels,
+                                           const LightLattice& lattice) const {
   const double middleX = 0.5 * scene_.camera.width, middleY = 0.5 * scene_.camera.height;
   PixelBlock at(pixels.size());
   for (std::size_t i = 0; i < pixels.size(); ++i) {
@@ -100,20 +173,46 @@ void KernelPainter::paintData(const KernelTracer& tracer, const std::vector<Pixe
               : depths[i] / ray.direction.dot(scene_.camera.axis()));
     }
   }
+  // Shadow rays from the centres (probes) find shadows that are thinner than the spacing of the
+  // lattice.
+  struct Probe {
+    std::size_t pixel;
+    double expected;
+    LightRays range;
+  };
+  std::vector<Probe> probes;
+  std::vector<LightRay> shadowRays;
   const PixelHits hits = surfaces_.castPixels(tracer, at);
   for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const auto& [x, y] = pixels[i];
     const std::size_t number = numberOf(pixels[i]);
-    const Camera::Ray ray = scene_.camera.ray(pixels[i].x + 0.5, pixels[i].y + 0.5);
-    const Hit hit = hitOf(ray, ray.near, hits, i);
-    if (!hit.found) continue;
-    layers_.setHit(number, scene_.camera, hit);
-    if (options_.curvature) layers_.setCurvature(number, hit.curvature);
+    const Camera::Ray ray = scene_.camera.ray(x + 0.5, y + 0.5);
+    Hit hit = hitOf(ray, ray.near, hits, i);
+    if (hit.found) {
+      layers_.setHit(number, scene_.camera, hit);
+      if (options_.curvature) layers_.setCurvature(number, hit.curvature);
+    } else {
+      hit = shader_.groundHit(ray);
+      if (!hit.found) continue;
+    }
+    const LightLattice::Estimate estimate = lattice.at(x + 0.5, y + 0.5, hit);
+    if (estimate.isKeyKnown && !LightLattice::isPenumbra(estimate.light))
+      probes.push_back({i, estimate.light.key,
+                        shader_.addShadowRays(hit, ray.direction, x, y, kProbes, shadowRays)});
   }
+  std::vector<char> contradicts(pixels.size(), 0);
+  const std::vector<double> light = surfaces_.transmittances(tracer, shadowRays);
+  for (const Probe& probe : probes) {
+    const double found = Shader::lightOf(probe.range, shadowRays, light).key;
+    // All probes of the pixel must contradict.
+    contradicts[probe.pixel] = std::abs(found - probe.expected) > 0.9 ? 1 : 0;
+  }
+  return contradicts;
 }
 
-// Paints the mean colours of samples spread over the pixels' areas.
-void KernelPainter::paintColours(const KernelTracer& tracer,
-                                 const std::vector<Pixel>& pixels) const {
+void KernelPainter::paintColours(const KernelTracer& tracer, const std::vector<Pixel>& pixels,
+                                 const LightLattice& lattice,
+                                 const std::vector<char>& contradicts) const {
   const double middleX = 0.5 * scene_.camera.width, middleY = 0.5 * scene_.camera.height;
   std::vector<ColourSum> sums(pixels.size());
   PixelBlock at(pixels.size());
@@ -125,18 +224,21 @@ void KernelPainter::paintColours(const KernelTracer& tracer,
       // precision.
       at.x[i] = static_cast<float>(pixels[i].x + shift.x - middleX);
       at.y[i] = static_cast<float>(pixels[i].y + shift.y - middleY);
-      const Camera::Ray ray = scene_.camera.ray(static_cast<double>(at.x[i]) + middleX,
-                                                static_cast<double>(at.y[i]) + middleY);
-      sampleRays.push_back({ray, ray.near});
+      const double x = static_cast<double>(at.x[i]) + middleX,
+                   y = static_cast<double>(at.y[i]) + middleY;
+      const Camera::Ray ray = scene_.camera.ray(x, y);
+      sampleRays.push_back({ray, x, y, ray.near});
     }
     if (scene_.isOpaque()) {
-      addSeen(tracer, pixels, s, surfaces_.castPixels(tracer, at), sampleRays, sums);
+      addSeen(tracer, pixels, s, surfaces_.castPixels(tracer, at), lattice, contradicts, sampleRays,
+              sums);
       continue;
     }
     PixelTraversal walk = surfaces_.startTraversal(at);
     for (bool seesMore = true; seesMore;) {
       const PixelHits hits = surfaces_.castNext(tracer, walk);
-      for (const std::size_t i : addSeen(tracer, pixels, s, hits, sampleRays, sums))
+      for (const std::size_t i :
+           addSeen(tracer, pixels, s, hits, lattice, contradicts, sampleRays, sums))
         walk.solids.resume(i);
       seesMore = std::any_of(sampleRays.begin(), sampleRays.end(), [](const SampleRay& sampleRay) {
         return sampleRay.left >= kLeastTransmittance;
@@ -149,7 +251,8 @@ void KernelPainter::paintColours(const KernelTracer& tracer,
 
 std::vector<std::size_t> KernelPainter::addSeen(const KernelTracer& tracer,
                                                 const std::vector<Pixel>& pixels, int sample,
-                                                const PixelHits& hits,
+                                                const PixelHits& hits, const LightLattice& lattice,
+                                                const std::vector<char>& contradicts,
                                                 std::vector<SampleRay>& sampleRays,
                                                 std::vector<ColourSum>& sums) const {
   struct Lit {
@@ -157,6 +260,7 @@ std::vector<std::size_t> KernelPainter::addSeen(const KernelTracer& tracer,
     Hit hit;
     V3d direction;
     double share;
+    LightLattice::Estimate estimate;
     LightRays range;
   };
   std::vector<std::size_t> throughSolids;
@@ -164,24 +268,39 @@ std::vector<std::size_t> KernelPainter::addSeen(const KernelTracer& tracer,
   std::vector<Lit> points;
   const auto addColours = [&] {
     const std::vector<double> light = surfaces_.transmittances(tracer, rays);
-    for (const Lit& point : points)
-      sums[point.pixel].add(shader_.colour(point.hit, point.direction, point.range, rays, light),
-                            point.share);
+    for (const Lit& point : points) {
+      PointLight traced = Shader::lightOf(point.range, rays, light);
+      if (point.estimate.isSkyKnown) traced.sky = point.estimate.light.sky;
+      if (point.estimate.isKeyKnown) traced.key = point.estimate.light.key;
+      if (point.hit.isOnGround)
+        sums[point.pixel].add(C3f(0), point.share * shader_.shadowOpacity(point.hit, traced));
+      else
+        sums[point.pixel].add(shader_.colour(point.hit, point.direction, traced), point.share);
+    }
     rays.clear();
     points.clear();
   };
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    auto& [ray, meshNear, left] = sampleRays[i];
+    auto& [ray, x, y, meshNear, left] = sampleRays[i];
     if (left < kLeastTransmittance) continue;
     if (rays.size() > kMostLightRays) addColours();
-    const Hit hit = hitOf(ray, meshNear, hits, i);
+    Hit hit = hitOf(ray, meshNear, hits, i);
+    if (!hit.found) hit = shader_.groundHit(ray);
     if (!hit.found) {
       left = 0;
       continue;
     }
-    points.push_back({i, hit, ray.direction, left * hit.opacity,
-                      shader_.addRays(hit, ray.direction, pixels[i].x, pixels[i].y, sample, rays)});
-    left *= 1 - hit.opacity;
+    LightLattice::Estimate estimate = lattice.at(x, y, hit);
+    if (contradicts[i]) estimate.isKeyKnown = false;
+    LightRays range;
+    if (!estimate.isSkyKnown || !estimate.isKeyKnown) {
+      const LightKind kind = estimate.isSkyKnown   ? LightKind::Key
+                             : estimate.isKeyKnown ? LightKind::Sky
+                                                   : LightKind::Both;
+      range = shader_.addRays(hit, ray.direction, pixels[i].x, pixels[i].y, sample, rays, kind);
+    }
+    points.push_back({i, hit, ray.direction, left * hit.opacity, estimate, range});
+    left = hit.isOnGround ? 0 : left * (1 - hit.opacity);
     if (hit.isOnMesh)
       meshNear = hit.beyond();
     else if (left >= kLeastTransmittance)

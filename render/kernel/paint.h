@@ -5,17 +5,13 @@
 
 #include "render/images/image.h"
 #include "render/kernel/kernel_scene.h"
+#include "render/kernel/light_lattice.h"
 #include "render/scene/scene.h"
 #include "render/shading/render_options.h"
 #include "render/shading/shading.h"
 #include "render/views/picture.h"
 
 namespace render {
-
-/// A rectangle of pixels.
-struct PixelBox {
-  int left, top, right, bottom;  ///< right and bottom are exclusive
-};
 
 /// Paints rectangles of a picture from the kernel's hits. It traces all rays of one kind (pixel
 /// centres, colour samples, lights) together.
@@ -40,11 +36,21 @@ class KernelPainter {
   [[nodiscard]] Hit hitOf(const Camera::Ray& ray, double meshNear, const PixelHits& hits,
                           std::size_t i) const;
   [[nodiscard]] Hit hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const;
-  void paintData(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const;
-  void paintColours(const KernelTracer& tracer, const std::vector<Pixel>& pixels) const;
+  /// Paints the layers other than the colours (depth, normal, position, id, curvature, thickness)
+  /// from the rays through the pixels' centres.
+  /// @return for each pixel: nonzero if a shadow ray from its centre contradicts the lattice
+  std::vector<char> paintData(const KernelTracer& tracer, const std::vector<Pixel>& pixels,
+                              const LightLattice& lattice) const;
+  /// Paints the mean colours of samples spread over the pixels' areas.
+  /// @param contradicts  result of paintData()
+  void paintColours(const KernelTracer& tracer, const std::vector<Pixel>& pixels,
+                    const LightLattice& lattice, const std::vector<char>& contradicts) const;
+  /// Traces the light at the lattice points of a box; empty if the light is not interpolated.
+  [[nodiscard]] LightLattice latticeOf(const KernelTracer& tracer, const PixelBox& box) const;
   /// The ray of one sample of a pixel.
   struct SampleRay {
     Camera::Ray ray;
+    double x, y;  ///< position in the picture, pixels
     /// Mesh hits before this distance are ignored, world units. Initially the camera's near
     /// distance, then just behind the last mesh surface that the ray hit.
     double meshNear;
@@ -54,7 +60,8 @@ class KernelPainter {
   /// @return indices of the rays that continue through a transparent solid (not through a
   /// transparent mesh)
   std::vector<std::size_t> addSeen(const KernelTracer& tracer, const std::vector<Pixel>& pixels,
-                                   int sample, const PixelHits& hits,
+                                   int sample, const PixelHits& hits, const LightLattice& lattice,
+                                   const std::vector<char>& contradicts,
                                    std::vector<SampleRay>& sampleRays,
                                    std::vector<ColourSum>& sums) const;
 

@@ -1,6 +1,7 @@
 #include "render/scene/scene.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace render {
 
@@ -23,6 +24,50 @@ Imath::Box3d Scene::bounds() const {
   if (!csg.isEmpty()) all = csg.bounds(boxes, kMostGrowth * softness);
   for (const MeshPart& part : meshes) all.extendBy(levelset::bounds(*part.mesh));
   return all;
+}
+
+std::vector<double> Scene::extents(const std::vector<Imath::V3d>& directions) const {
+  const auto extend = [](std::vector<double>& all, const std::vector<double>& more) {
+    for (std::size_t d = 0; d < all.size(); ++d) all[d] = std::max(all[d], more[d]);
+  };
+  std::vector<double> ofSolids(directions.size(), -std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < solids.size(); ++i)
+    if (csg.isEmpty() || csg.uses(i)) extend(ofSolids, solids[i].band.zeroSetExtents(directions));
+  if (!csg.isEmpty() || isBlended()) {
+    // The result may be smaller than its operands, or extend beyond them. Bound it by its box.
+    Scene withoutMeshes = *this;
+    withoutMeshes.meshes.clear();
+    const Imath::Box3d box = withoutMeshes.bounds();
+    for (std::size_t d = 0; d < directions.size() && !box.isEmpty(); ++d) {
+      double extent = 0;
+      for (int a = 0; a < 3; ++a)
+        extent += directions[d][a] * (directions[d][a] > 0 ? box.max[a] : box.min[a]);
+      ofSolids[d] = isBlended() ? extent : std::min(ofSolids[d], extent);
+    }
+  }
+  for (const MeshPart& part : meshes)
+    for (const Imath::V3d& p : part.mesh->positions)
+      for (std::size_t d = 0; d < directions.size(); ++d)
+        ofSolids[d] = std::max(ofSolids[d], p.dot(directions[d]));
+  return ofSolids;
+}
+
+Camera framingCamera(const Scene& scene, int width, int height, double verticalFov,
+                     const Imath::V3d& up) {
+  return framingCamera(
+      scene.bounds(),
+      [&](const std::vector<Imath::V3d>& directions) { return scene.extents(directions); }, width,
+      height, verticalFov, up);
+}
+
+Ground groundOf(const Scene& scene, const Imath::V3d& up) {
+  const Imath::V3d normal = up.normalized();
+  const Imath::Box3d bounds = scene.bounds();
+  const double lowest = -scene.extents({-normal})[0];
+  const Imath::V3d middle = bounds.center();
+  // Low light casts long shadows: of a slope of 1 : 3 at the edge of the disc.
+  constexpr double kReach = 3;
+  return {middle + normal * (lowest - middle.dot(normal)), normal, kReach * bounds.size().length()};
 }
 
 }  // namespace render

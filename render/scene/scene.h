@@ -53,6 +53,15 @@ struct MeshPart {
 /// if the last surface were opaque.
 inline constexpr double kLeastTransmittance = 1.0 / 512;
 
+/// A plane below the drawn surfaces that shows only their shadows. Where light is blocked, the
+/// picture is black with an opacity of the blocked share; elsewhere it is transparent. The layers
+/// other than the colours do not show the plane, and it blocks no light.
+struct Ground {
+  Imath::V3d point;   ///< a point on the plane, below the middle of the surfaces, world units
+  Imath::V3d normal;  ///< unit normal, upwards
+  double radius = 0;  ///< shadows are drawn up to this distance from `point`, world units
+};
+
 /// Everything that a renderer draws.
 struct Scene {
   Camera camera;
@@ -66,6 +75,7 @@ struct Scene {
   double softness = 0;
   std::optional<double> morph =
       {};  ///< fraction of the morph from the first solid to the second, [0, 1]; unset: no morph
+  std::optional<Ground> ground = {};
   /// True when the scene is drawn as the zero set of one function of all solids' fields: a soft
   /// expression or a morph (render/scene/field_expression.h).
   [[nodiscard]] bool isBlended() const { return softness > 0 || morph; }
@@ -73,6 +83,19 @@ struct Scene {
   [[nodiscard]] bool isOpaque() const;
   /// A world-space box that contains all drawn surfaces; empty when the scene has none.
   [[nodiscard]] Imath::Box3d bounds() const;
+  /// Extents of all drawn surfaces: for each direction d an upper bound on p·d over their points p,
+  /// world units times the length of d. It is exact, to the interpolation of the grids, unless the
+  /// scene has an expression or a morph. −∞ when the scene has no surface.
+  [[nodiscard]] std::vector<double> extents(const std::vector<Imath::V3d>& directions) const;
 };
+
+/// Default camera of a scene: frames its surfaces in a three-quarter view.
+/// @throws as framingCamera() for a box
+[[nodiscard]] Camera framingCamera(const Scene& scene, int width, int height, double verticalFov,
+                                   const Imath::V3d& up);
+
+/// Plane below the surfaces of a scene, at their lowest point. @param up  upward direction
+/// @pre the scene has a surface; `up` is not zero
+[[nodiscard]] Ground groundOf(const Scene& scene, const Imath::V3d& up);
 
 }  // namespace render

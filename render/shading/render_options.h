@@ -15,6 +15,10 @@ struct RenderOptions {
   int samples = 4;
   int ambientSamples = 16;  ///< ambient occlusion rays for each colour sample; 0: no occlusion
   int shadowSamples = 4;    ///< shadow rays for each colour sample; 0: no shadows
+  /// Distance, in pixels, of the picture points at which renderCpu() and renderGpu() trace light
+  /// rays where light varies smoothly; between them the light is interpolated. 1: every colour
+  /// sample traces its own light rays, as renderEmbree() and transparent scenes always do.
+  int lightSpacing = 4;
   Filter filter = Filter::Trilinear;
   /// renderGpu() reads NanoVDB grids in place of the kernel's tables: slower, but the same bits.
   /// Requires the trilinear filter.

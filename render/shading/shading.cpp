@@ -57,6 +57,25 @@ V3d coneDirection(const V3d& axis, double halfAngle, const V2d& u) {
   return s * (sine * std::cos(angle)) + t * (sine * std::sin(angle)) + axis * cosine;
 }
 
+/// Mean of max(0, n·d) over the directions d of a cone, for a unit vector n. The mean over a circle
+/// of the cone has a closed form. @param cosine  of the angle between n and the cone's axis
+double meanCosine(double cosine, double halfAngle) {
+  constexpr int kCircles = 32;
+  const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
+  double sum = 0;
+  for (int i = 0; i < kCircles; ++i) {
+    const double c = 1 - (i + 0.5) / kCircles * (1 - std::cos(halfAngle));
+    const double middle = cosine * c, amplitude = sine * std::sqrt(1 - c * c);
+    if (middle >= amplitude) {
+      sum += middle;
+    } else if (middle > -amplitude) {
+      const double end = std::acos(-middle / amplitude);
+      sum += (middle * end + amplitude * std::sin(end)) / std::numbers::pi;
+    }
+  }
+  return sum / kCircles;
+}
+
 C3f scaled(const C3f& colour, double factor) {
   return colour * static_cast<float>(factor);
 }
@@ -96,6 +115,17 @@ Shader::Shader(const Scene& scene, double diagonal, const RenderOptions& options
   fill_ = (right_ * -d.x + up_ * (0.3 * d.y) - forward * d.z).normalized();
   const double asked = options.style.curvatureRange;
   curvatureRange_ = asked > 0 ? asked : kDefaultRange / diagonal;
+  constexpr int kSteps = 1024;
+  for (int i = 0; i <= kSteps; ++i)
+    keyCosines_.push_back(meanCosine(2.0 * i / kSteps - 1, scene.key.softness));
+}
+
+double Shader::keyCosine(double cosine) const {
+  const double at =
+      (std::clamp(cosine, -1.0, 1.0) + 1) / 2 * static_cast<double>(keyCosines_.size() - 1);
+  const auto i = std::min(static_cast<std::size_t>(at), keyCosines_.size() - 2);
+  const double share = at - static_cast<double>(i);
+  return keyCosines_[i] * (1 - share) + keyCosines_[i + 1] * share;
 }
 
 Shader::Frame Shader::frameOf(const Hit& hit, const V3d& direction) const {
@@ -122,34 +152,63 @@ void Shader::addSkyRays(const Frame& frame, int x, int y, int sample,
   }
 }
 
-void Shader::addKeyRays(const Frame& frame, int x, int y, int sample,
-                        std::vector<LightRay>& rays) const {
+double Shader::addKeyRays(const Frame& frame, int x, int y, int sample,
+                          std::vector<LightRay>& rays) const {
   const int count = options_.shadowSamples;
   const PixelSequence sequence(x, y, kShadow);
-  for (int i = 0; i < count; ++i) {
-    const V3d d = coneDirection(key_, scene_.key.softness, sequence.at(sample * count + i));
-    const double cosine = frame.normal.dot(d);
-    if (cosine <= 0 || frame.facet.dot(d) <= 0) continue;
-    rays.push_back({frame.start, d, 4 * diagonal_, cosine});
-  }
+  double behind = 0;
+  for (int i = 0; i < count; ++i) behind += addKeyRay(frame, sequence.at(sample * count + i), rays);
+  return behind;
+}
+
+double Shader::addKeyRay(const Frame& frame, const V2d& u, std::vector<LightRay>& rays) const {
+  const V3d d = coneDirection(key_, scene_.key.softness, u);
+  const double cosine = frame.normal.dot(d);
+  if (cosine <= 0) return 0;
+  if (frame.facet.dot(d) <= 0) return cosine;
+  rays.push_back({frame.start, d, 4 * diagonal_, cosine});
+  return 0;
 }
 
 LightRays Shader::addRays(const Hit& hit, const V3d& direction, int x, int y, int sample,
-                          std::vector<LightRay>& rays) const {
+                          std::vector<LightRay>& rays, LightKind kind) const {
   LightRays range;
   range.first = rays.size();
   if (!usesLights(options_.style.style)) return range;
   const Frame frame = frameOf(hit, direction);
-  addSkyRays(frame, x, y, sample, rays);
+  if (kind != LightKind::Key) addSkyRays(frame, x, y, sample, rays);
   range.sky = rays.size() - range.first;
-  addKeyRays(frame, x, y, sample, rays);
+  if (kind != LightKind::Sky) range.behind = addKeyRays(frame, x, y, sample, rays);
   range.key = rays.size() - range.first - range.sky;
   return range;
 }
 
-C3f Shader::colour(const Hit& hit, const V3d& direction, const LightRays& range,
-                   const std::vector<LightRay>& rays,
-                   const std::vector<double>& transmittances) const {
+LightRays Shader::addShadowRays(const Hit& hit, const V3d& direction, int x, int y, int count,
+                                std::vector<LightRay>& rays) const {
+  LightRays range;
+  range.first = rays.size();
+  const Frame frame = frameOf(hit, direction);
+  const PixelSequence sequence(x, y, kShadow);
+  for (int i = 0; i < count; ++i) range.behind += addKeyRay(frame, sequence.at(i), rays);
+  range.key = rays.size() - range.first;
+  return range;
+}
+
+PointLight Shader::lightOf(const LightRays& range, const std::vector<LightRay>& rays,
+                           const std::vector<double>& transmittances) {
+  const auto shareOf = [&](std::size_t first, std::size_t count, double behind) {
+    double sum = 0, all = behind;
+    for (std::size_t i = first; i < first + count; ++i) {
+      sum += rays[i].light * transmittances[i];
+      all += rays[i].light;
+    }
+    return all > 0 ? sum / all : 1;
+  };
+  return {shareOf(range.first, range.sky, 0),
+          shareOf(range.first + range.sky, range.key, range.behind)};
+}
+
+C3f Shader::colour(const Hit& hit, const V3d& direction, const PointLight& light) const {
   const Frame frame = frameOf(hit, direction);
   switch (options_.style.style) {
     case Style::Tone:
@@ -161,17 +220,29 @@ C3f Shader::colour(const Hit& hit, const V3d& direction, const LightRays& range,
     default:
       break;
   }
-  const auto lightOf = [&](std::size_t first, std::size_t count) {
-    double sum = 0;
-    for (std::size_t i = first; i < first + count; ++i) sum += rays[i].light * transmittances[i];
-    return sum;
-  };
-  const double open =
-      options_.ambientSamples == 0 ? 1 : lightOf(range.first, range.sky) / options_.ambientSamples;
-  const double lit = options_.shadowSamples == 0
-                         ? std::max(0.0, frame.normal.dot(key_))
-                         : lightOf(range.first + range.sky, range.key) / options_.shadowSamples;
-  return litColour(hit, frame, direction, open, lit);
+  return litColour(hit, frame, direction, light);
+}
+
+Hit Shader::groundHit(const Camera::Ray& ray) const {
+  Hit hit;
+  if (!scene_.ground || !usesLights(options_.style.style)) return hit;
+  const Ground& ground = *scene_.ground;
+  const double descent = -ray.direction.dot(ground.normal);
+  if (!(descent > 0)) return hit;
+  hit.distance = (ray.origin - ground.point).dot(ground.normal) / descent;
+  hit.position = ray.origin + ray.direction * hit.distance;
+  if (!(hit.distance >= ray.near && hit.distance <= ray.far) ||
+      !((hit.position - ground.point).length() <= ground.radius))
+    return hit;
+  hit.found = hit.isOnGround = true;
+  hit.normal = hit.facetNormal = ground.normal;
+  return hit;
+}
+
+double Shader::shadowOpacity(const Hit& hit, const PointLight& light) const {
+  const double key = scene_.key.strength * keyCosine(hit.normal.dot(key_)),
+               all = scene_.ambient + key;
+  return all > 0 ? 1 - (scene_.ambient * light.sky + key * light.key) / all : 0;
 }
 
 C3f Shader::albedoOf(const Hit& hit) const {
@@ -190,10 +261,11 @@ C3f Shader::albedoOf(const Hit& hit) const {
   }
 }
 
-C3f Shader::litColour(const Hit& hit, const Frame& frame, const V3d& direction, double open,
-                      double lit) const {
+C3f Shader::litColour(const Hit& hit, const Frame& frame, const V3d& direction,
+                      const PointLight& light) const {
   const C3f albedo = albedoOf(hit);
-  const double key = scene_.key.strength * lit;
+  const double open = light.sky;
+  const double key = scene_.key.strength * light.key * keyCosine(frame.normal.dot(key_));
   const double facing = std::clamp(-direction.dot(frame.normal), 0.0, 1.0);
   const double upward = 0.5 + 0.5 * frame.normal.dot(up_);
   const double fill = 0.5 * scene_.ambient * std::max(0.0, frame.normal.dot(fill_));

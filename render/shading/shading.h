@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "render/camera.h"
 #include "render/hit.h"
 #include "render/scene/scene.h"
 #include "render/shading/render_options.h"
@@ -46,7 +47,17 @@ struct LightRay {
 /// the sky from index `first` on, then `key` shadow rays towards the key light.
 struct LightRays {
   std::size_t first = 0, sky = 0, key = 0;
+  double behind = 0;  ///< sum of LightRay::light of shadow rays that the drawn facet itself blocks
 };
+
+/// Light that reaches a surface point, as shares in [0, 1].
+struct PointLight {
+  double sky = 1;  ///< share of the sky's light that nothing blocks
+  double key = 1;  ///< share of the key light that nothing blocks
+};
+
+/// Kinds of light for which rays are traced.
+enum class LightKind { Sky, Key, Both };
 
 /// Shades a surface: key light with soft shadows, sky light with ambient occlusion, a cool fill
 /// light and a thin rim light. The styles tone, ink and matcap use no light rays (shadow and
@@ -60,13 +71,27 @@ class Shader {
   /// (x, y) and the number of the sample determine the random directions of the light rays.
   /// @param sample  number of the sample within the pixel
   [[nodiscard]] LightRays addRays(const Hit& hit, const Imath::V3d& direction, int x, int y,
-                                  int sample, std::vector<LightRay>& rays) const;
+                                  int sample, std::vector<LightRay>& rays,
+                                  LightKind kind = LightKind::Both) const;
+  /// Appends up to `count` shadow rays of a hit: those towards which the surface faces.
+  /// @return their range in `rays`
+  [[nodiscard]] LightRays addShadowRays(const Hit& hit, const Imath::V3d& direction, int x, int y,
+                                        int count, std::vector<LightRay>& rays) const;
 
-  /// Computes the linear colour of a hit. @param range  light rays of the hit, from addRays()
+  /// Computes the light that reaches a hit. @param range  light rays of the hit, from addRays()
   /// @param transmittances  for each of `rays`: share of its light that reaches the hit
+  [[nodiscard]] static PointLight lightOf(const LightRays& range, const std::vector<LightRay>& rays,
+                                          const std::vector<double>& transmittances);
+
+  /// Computes the linear colour of a hit.
   [[nodiscard]] Imath::C3f colour(const Hit& hit, const Imath::V3d& direction,
-                                  const LightRays& range, const std::vector<LightRay>& rays,
-                                  const std::vector<double>& transmittances) const;
+                                  const PointLight& light) const;
+  /// Hit of a view ray with the ground of the scene, for rays that hit no surface. Not found
+  /// without a ground, for styles without light rays, from below, and beyond the radius of the
+  /// ground.
+  [[nodiscard]] Hit groundHit(const Camera::Ray& ray) const;
+  /// Opacity of the shadow at a hit on the ground: share of the light that is blocked, [0, 1].
+  [[nodiscard]] double shadowOpacity(const Hit& hit, const PointLight& light) const;
 
  private:
   struct Frame {
@@ -76,12 +101,20 @@ class Shader {
   };
   [[nodiscard]] Frame frameOf(const Hit& hit, const Imath::V3d& direction) const;
   void addSkyRays(const Frame& frame, int x, int y, int sample, std::vector<LightRay>& rays) const;
-  void addKeyRays(const Frame& frame, int x, int y, int sample, std::vector<LightRay>& rays) const;
+  /// @return LightRays::behind
+  [[nodiscard]] double addKeyRays(const Frame& frame, int x, int y, int sample,
+                                  std::vector<LightRay>& rays) const;
+  /// @param u  random point in [0, 1)², which selects the direction within the light's cone
+  /// @return LightRays::behind of this ray
+  [[nodiscard]] double addKeyRay(const Frame& frame, const Imath::V2d& u,
+                                 std::vector<LightRay>& rays) const;
 
   [[nodiscard]] Imath::C3f albedoOf(const Hit& hit) const;
-  /// @param open, lit  fractions of the sky light and of the key light that reach the hit, [0, 1]
   [[nodiscard]] Imath::C3f litColour(const Hit& hit, const Frame& frame,
-                                     const Imath::V3d& direction, double open, double lit) const;
+                                     const Imath::V3d& direction, const PointLight& light) const;
+  /// Mean cosine between the normal and the directions of the key light, 0 for directions below the
+  /// surface. @param cosine  of the angle between the normal and the middle of the key light
+  [[nodiscard]] double keyCosine(double cosine) const;
   [[nodiscard]] Imath::C3f toneColour(const Hit& hit, const Frame& frame,
                                       const Imath::V3d& direction) const;
   [[nodiscard]] Imath::C3f inkColour(const Hit& hit, const Frame& frame,
@@ -95,6 +128,7 @@ class Shader {
   const RenderOptions& options_;
   Imath::V3d key_, fill_, up_, right_;
   double diagonal_, curvatureRange_;
+  std::vector<double> keyCosines_;  ///< of keyCosine(), for equidistant arguments from −1 to 1
 };
 
 }  // namespace render

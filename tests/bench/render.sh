@@ -1,10 +1,12 @@
 #!/bin/sh
-# Compares primary rays with OpenVDB's vdb_render on one thread, for the same bands and views. Exits 1 when
-# a bound is exceeded. vdb_render also shades and writes its picture. Its start-up time, measured with a
-# picture of 48 pixels, is subtracted.
+# Compares with OpenVDB's vdb_render on one thread. Exits 1 when a bound is exceeded.
+# 1. Primary rays, for the same bands and views. vdb_render also shades and writes its picture. Its start-up
+#    time, measured with a picture of 48 pixels, is subtracted.
+# 2. Complete lit pictures of 1024x1024 pixels. Those of Levelsmith have soft shadows, ambient occlusion and
+#    all layers; those of vdb_render have the diffuse shader.
 #   render.sh RENDER_BENCH LEVELSMITH DRAGON.ply.gz
 set -eu
-[ $# -eq 3 ] || { sed -n '2,5s/^# *//p' "$0"; exit 2; }
+[ $# -eq 3 ] || { sed -n '2,7s/^# *//p' "$0"; exit 2; }
 bench=$1 levelsmith=$2 dragon=$3
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
@@ -30,7 +32,45 @@ for name in sphere100 sphere400 dragon; do
   "$bench" "$folder/$name.vdb" >"$folder/$name.txt"
   echo "vdb_render $whole $start $name" >>"$folder/$name.txt"
 done
+
+# cpu_seconds COMMAND…: least CPU seconds of three runs
+cpu_seconds() {
+  for run in 1 2 3; do
+    /usr/bin/time -f '%U %S' -o "$folder/time" "$@" >/dev/null
+    awk '{ print $1 + $2 }' "$folder/time"
+  done | sort -n | head -1
+}
+
+# lit NAME SAMPLES BOUND: CPU seconds of lit pictures, and their ratio to vdb_render
+"$levelsmith" -q sphere --radius 256 --voxel 1 ! write "$folder/sphere256.vdb"
+lit() {
+  file=$folder/$1.vdb name=$1 samples=$2 bound=$3
+  set -- $("$bench" --view "$file")  # -translate FROM -lookat TO -fov ANGLE
+  theirs=$(cpu_seconds vdb_render "$file" "$folder/out.exr" "$@" -res 1024x1024 -samples "$samples" \
+    -shader diffuse -cpus 1 -compression none)
+  ours() {
+    from=$1 to=$2 angle=$3
+    shift 3
+    cpu_seconds "$levelsmith" -q --threads 1 read "$file" ! render "$folder/out.png" "$@" \
+      --size 1024x1024 --samples "$samples" --from "$from" --to "$to" --fov "$angle"
+  }
+  interpolated=$(ours "$2" "$4" "$6") traced=$(ours "$2" "$4" "$6" --light-spacing 1)
+  echo "lit $name $samples $bound $theirs $interpolated $traced" >>"$folder/lit.txt"
+}
+: >"$folder/lit.txt"
+lit sphere256 1 -
+lit sphere256 4 1.5
+lit sphere256 16 -
+lit dragon 4 -
+
 cat "$folder"/*.txt | awk '
+  $1 == "lit" {
+    missed_here = $4 != "-" && $6 / $5 > $4
+    printf "lit picture, %s, %s samples, CPU s: vdb_render %.2f, cpu %.2f, with every light ray traced %.2f; ratio %.2f", $2, $3, $5, $6, $7, $6 / $5
+    printf "%s%s\n", $4 == "-" ? "" : "  bound <= " $4, missed_here ? "  missed" : ""
+    if (missed_here) missed = 1
+    next
+  }
   $1 == "vdb_render" {
     name = $4
     theirs = 1024 * 768 / ($2 - $3) * 1e-6

@@ -35,7 +35,8 @@ std::string drawn(const Value& value, std::size_t maxBytes) {
   levelset::requireMemory(triangles * kBytesOfTriangle, maxBytes);
   render::Camera& camera = viewed.scene.camera;
   if (!viewed.hasCamera)
-    camera = render::framingCamera(value.plan().bounds, kThumbnailWidth, kThumbnailHeight);
+    camera = render::framingCamera(viewed.scene, kThumbnailWidth, kThumbnailHeight,
+                                   camera.verticalFov, camera.up);
   camera.width = kThumbnailWidth;
   camera.height = kThumbnailHeight;
   const render::Image image = render::renderCpu(

@@ -103,7 +103,8 @@ TEST(CpuRenderer, DrawsTheNearerOfTwoSolids) {
 TEST(CpuRenderer, HasTheColoursOfTheJudge) {
   // Rays to the lights are the same, so only rounding at occluders causes differences.
   const Scene scene = sceneOf(rings(), 96, 72);
-  const RenderOptions options = {.samples = 2, .ambientSamples = 8, .shadowSamples = 2};
+  const RenderOptions options = {
+      .samples = 2, .ambientSamples = 8, .shadowSamples = 2, .lightSpacing = 1};
   const Image ours = renderCpu(scene, options), judge = renderEmbree(scene, options);
   double sum = 0, covered = 0;
   std::size_t unlike = 0;

@@ -124,7 +124,8 @@ TEST(MeshScene, IsDrawnAloneIfTheExpressionIsEmpty) {
 
 TEST(MeshScene, ExchangesShadowsWithLevelSets) {
   const auto brightnessOf = [](const Scene& scene, std::uint32_t id) {
-    const RenderOptions options = {.samples = 1, .ambientSamples = 0, .shadowSamples = 4};
+    const RenderOptions options = {
+        .samples = 1, .ambientSamples = 0, .shadowSamples = 4, .lightSpacing = 1};
     double sums[2] = {0, 0};
     for (int k = 0; k < 2; ++k) {
       const Image image = k == 0 ? renderCpu(scene, options) : renderEmbree(scene, options);

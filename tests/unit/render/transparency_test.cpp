@@ -223,7 +223,8 @@ TEST(Transparency, AgreesOnAllRenderers) {
 
 /// Brightness of the ground under a roof, seen from below the roof.
 double brightnessUnder(const Scene& shaded, bool isJudge) {
-  const RenderOptions options = {.samples = 1, .ambientSamples = 0, .shadowSamples = 4};
+  const RenderOptions options = {
+      .samples = 1, .ambientSamples = 0, .shadowSamples = 4, .lightSpacing = 1};
   const Image image = isJudge ? renderEmbree(shaded, options) : renderCpu(shaded, options);
   double sum = 0;
   for (std::size_t i = 0; i < image.pixelCount(); ++i) {
@@ -257,7 +258,7 @@ TEST(Transparency, DimsShadowsByTheTransmittedLight) {
       const double dark = brightnessUnder(withRoof(1, csg), isJudge);
       EXPECT_LT(dark, 0.95 * open);
       EXPECT_NEAR(brightnessUnder(withRoof(0.3, csg), isJudge), dark + (open - dark) * 0.7 * 0.7,
-                  support::measured(7.73e-9) * open);
+                  support::measured(6.28e-8) * open);
     }
     const double dark = brightnessUnder(withSheet(1), isJudge);
     EXPECT_LT(dark, 0.95 * open);

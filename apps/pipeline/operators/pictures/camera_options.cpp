@@ -79,7 +79,8 @@ bool givesCamera(const Invocation& in) {
                      [&](const char* name) { return in.given(name); });
 }
 
-render::Camera cameraOf(Invocation& in, const Imath::Box3d& bounds, const render::Camera* known) {
+render::Camera cameraOf(Invocation& in, const Imath::Box3d& bounds, const render::Camera* known,
+                        const render::Scene* drawn) {
   render::Camera camera;
   if (known) {
     camera = *known;
@@ -89,7 +90,10 @@ render::Camera cameraOf(Invocation& in, const Imath::Box3d& bounds, const render
     setOptions(in, true, camera);
   } else {
     const auto [width, height] = in.imageSize("size");
-    camera = render::framingCamera(bounds, width, height, in.radians("fov"), in.point("up"));
+    const double fov = in.radians("fov");
+    const Imath::V3d up = in.point("up");
+    camera = drawn ? render::framingCamera(*drawn, width, height, fov, up)
+                   : render::framingCamera(bounds, width, height, fov, up);
     if (in.given("ortho")) camera.orthoHeight = in.length("ortho");
     setDepths(in, camera);
   }

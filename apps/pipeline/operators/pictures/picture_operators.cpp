@@ -33,9 +33,21 @@ using levelset::UsageError;
 render::Scene sceneOf(Invocation& in) {
   const Value& drawn = in.operands[0];
   render::ViewedScene viewed = sceneOf(drawn);
-  viewed.scene.camera =
-      cameraOf(in, drawn.plan().bounds, viewed.hasCamera ? &viewed.scene.camera : nullptr);
+  viewed.scene.camera = cameraOf(in, drawn.plan().bounds,
+                                 viewed.hasCamera ? &viewed.scene.camera : nullptr, &viewed.scene);
   return viewed.scene;
+}
+
+std::vector<std::string> styleNames() {
+  std::vector<std::string> names;
+  for (const render::Style style : render::kStyles) names.emplace_back(render::styleName(style));
+  return names;
+}
+
+render::Style styleNamed(const std::string& name) {
+  for (const render::Style style : render::kStyles)
+    if (name == render::styleName(style)) return style;
+  return render::Style::Lit;
 }
 
 constexpr long kMostSamples = 4096;
@@ -72,6 +84,8 @@ void validateDraw(const Invocation& in) {
     throw UsageError(
         "render: --filter bspline-qi computes spline coefficients, which cannot be stored in fewer "
         "bits; leave --value-bits out, or give another filter");
+  if (in.flag("ground") && !render::usesLights(styleNamed(style)))
+    throw UsageError(fmt::format("render: --style {} has no shadows; leave --ground out", style));
   if (in.given("curvature-range") && (style == "lit" || style == "tone" || style == "matcap"))
     throw UsageError(
         fmt::format("render: --style {} shows no curvatures; leave --curvature-range out", style));
@@ -154,18 +168,6 @@ render::Filter filterOf(const Invocation& in) {
   return render::Filter::Trilinear;
 }
 
-std::vector<std::string> styleNames() {
-  std::vector<std::string> names;
-  for (const render::Style style : render::kStyles) names.emplace_back(render::styleName(style));
-  return names;
-}
-
-render::Style styleNamed(const std::string& name) {
-  for (const render::Style style : render::kStyles)
-    if (name == render::styleName(style)) return style;
-  return render::Style::Lit;
-}
-
 render::StyleOptions styleOf(const Invocation& in) {
   render::StyleOptions options;
   options.style = styleNamed(in.text("style"));
@@ -203,12 +205,12 @@ void coarsen(Invocation& in, render::Scene& scene) {
 Value draw(Invocation& in) {
   render::Scene scene = sceneOf(in);
   coarsen(in, scene);
-  // Scenes with a soft CSG expression or a morph are drawn by `cpu` unless --renderer is given,
-  // since the judge (Embree) is slow on them.
-  const std::string renderer =
-      scene.isBlended() && !in.given("renderer") ? "cpu" : in.text("renderer");
+  if (in.flag("ground") && !scene.bounds().isEmpty())
+    scene.ground = render::groundOf(scene, scene.camera.up);
+  const std::string renderer = in.text("renderer");
   const bool isBoth = renderer == "both";
   render::RenderOptions options{.samples = in.integerAs<int>("samples"),
+                                .lightSpacing = in.integerAs<int>("light-spacing"),
                                 .filter = filterOf(in),
                                 .fromNanoVdb = in.text("tables") == "nanovdb",
                                 .style = styleOf(in),
@@ -391,9 +393,8 @@ Operator renderOperator() {
            {.name = "png", .type = ParamType::Path, .doc = "also write the colours to this .png"},
            {.name = "renderer",
             .type = ParamType::Choice,
-            .doc = "renderer; both: draws with gpu and embree, and compares the two; soft "
-                   "expressions and morphs of a scene use cpu by default",
-            .fallback = "embree",
+            .doc = "renderer; both: draws with gpu and embree, and compares the two",
+            .fallback = "cpu",
             .choices = {"gpu", "cpu", "embree", "both"}},
            {.name = "filter",
             .type = ParamType::Choice,
@@ -443,6 +444,17 @@ Operator renderOperator() {
             .doc = "number of colour samples per pixel",
             .fallback = "4",
             .range = Range::Positive},
+           {.name = "light-spacing",
+            .type = ParamType::Integer,
+            .doc = "with --renderer cpu, gpu or both: distance in pixels of the points at which "
+                   "light rays are traced; where light and surface vary smoothly, light is "
+                   "interpolated between them; 1: trace light rays for every colour sample",
+            .fallback = "4",
+            .range = Range::Positive},
+           {.name = "ground",
+            .type = ParamType::Flag,
+            .doc = "draw the shadow of the surfaces on a plane below them, across --up; the plane "
+                   "itself is transparent"},
            {.name = "format",
             .type = ParamType::Text,
             .doc = "format of the picture: exr or png; default: by its extension"}},
