@@ -19,14 +19,18 @@ enum class AdvectScheme {
   /// Interpolates φ tricubically at the feet of backward characteristics. Steps of several voxels;
   /// redistances after each step [Strain99].
   SemiLagrangian,
-  /// Upwind differences: fifth-order HJ-WENO and third-order TVD Runge-Kutta. Steps below one voxel
-  /// [Jiang00, Shu88]; redistances whenever the surface has moved 1.5 voxels.
+  /// Upwind differences and TVD Runge-Kutta steps, of the orders in AdvectOptions. Steps below one
+  /// voxel [Jiang00, Shu88]; redistances whenever the surface has moved 1.5 voxels.
   Upwind
 };
 
 struct AdvectOptions {
   double start = 0;  ///< time at which the motion starts, passed to the velocity
   AdvectScheme scheme = AdvectScheme::Front;
+  /// Order in space of the upwind scheme: 1 (upwind differences), 2 or 3 (HJ-ENO) or 5 (HJ-WENO).
+  int order = 5;
+  /// Order in time of the upwind scheme: 1 (Euler), 2 or 3 (TVD Runge-Kutta).
+  int timeOrder = 3;
   bool fixVolume = false;  ///< offset the result so that it has the volume of the given solid
   std::optional<Mask> mask = {};  ///< weight that multiplies the velocity; empty: 1
   std::size_t maxMemory = kNoMemoryLimit;
@@ -56,7 +60,7 @@ struct AdvectResult {
 ///         voxel; the class Advection keeps such parts between steps
 /// @throws InvalidInput if `solid` is empty, if the velocity is not finite on the path of the
 ///         surface, or if no part thick enough for the grid is left
-/// @throws UsageError for times that are not finite
+/// @throws UsageError for times that are not finite, and for orders that do not exist
 /// @throws ResourceLimit for too many steps, triangles or voxels
 /// @throws Cancelled
 [[nodiscard]] AdvectResult advect(NarrowBand solid, const VectorField& velocity, double time,
@@ -91,6 +95,7 @@ struct AdvectOperator {
     NamedVelocity field;
     double time = 0, start = 0;
     AdvectScheme scheme = AdvectScheme::Front;
+    int order = 5, timeOrder = 3;
     std::optional<double> period;  ///< time after which a solid moved by a built-in velocity is
                                    ///< back at its start; empty: default of that velocity
     Imath::V3d center = Imath::V3d(0), axis = Imath::V3d(0, 0, 1);
@@ -112,6 +117,13 @@ struct AdvectOperator {
              {"upwind", AdvectScheme::Upwind}},
             {.help = "scheme: front moves triangles of the surface; semi-lagrangian and upwind "
                      "move the values on the grid"});
+      visit("order", &Options::order,
+            {.help = "with --scheme upwind: order in space; 1 upwind differences, 2 or 3 HJ-ENO, 5 "
+                     "HJ-WENO",
+             .range = OptionRange::Positive});
+      visit("time-order", &Options::timeOrder,
+            {.help = "with --scheme upwind: order in time; 1 Euler, 2 or 3 TVD Runge-Kutta",
+             .range = OptionRange::Positive});
       visit(
           "period", &Options::period,
           {.help =

@@ -47,6 +47,10 @@ void AdvectOperator::check(const Options& options, const GivenOptions& given) {
     throw UsageError(
         "--period applies only to the built-in velocities enright, vortex and rotation; write the "
         "time into the formula or use --factor");
+  for (const char* option : {"order", "time-order"})
+    if (given(option) && options.scheme != AdvectScheme::Upwind)
+      throw UsageError(fmt::format(
+          "--{} applies only to the upwind scheme; leave it out, or use --scheme upwind", option));
   for (const char* option : {"center", "axis"}) {
     if (given(option) && options.field.name != "rotation")
       throw UsageError(fmt::format(
@@ -58,6 +62,8 @@ NarrowBand AdvectOperator::run(std::vector<NarrowBand> operands, const Options& 
                                OperatorRun& run) {
   const AdvectOptions settings{.start = options.start,
                                .scheme = options.scheme,
+                               .order = options.order,
+                               .timeOrder = options.timeOrder,
                                .fixVolume = options.fixVolume,
                                .mask = options.mask,
                                .maxMemory = run.maxMemory,

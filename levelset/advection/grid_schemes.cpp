@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "levelset/advection/characteristic.h"
+#include "levelset/advection/upwind_derivative.h"
 #include "levelset/distance/distance_transform.h"
 #include "levelset/distance/interpolant.h"
 #include "levelset/vdb.h"
@@ -106,27 +107,10 @@ FloatGrid::Ptr semiLagrangianStep(const FloatGrid& before, const TimeInterval& i
 
 // === Upwind
 
-/// Fifth-order weighted, essentially non-oscillatory derivative from five differences in the
-/// direction of the flow [Jiang00].
-double weno5(double a, double b, double c, double d, double e) {
-  const double s1 = 13.0 / 12 * (a - 2 * b + c) * (a - 2 * b + c) +
-                    0.25 * (a - 4 * b + 3 * c) * (a - 4 * b + 3 * c);
-  const double s2 = 13.0 / 12 * (b - 2 * c + d) * (b - 2 * c + d) + 0.25 * (b - d) * (b - d);
-  const double s3 = 13.0 / 12 * (c - 2 * d + e) * (c - 2 * d + e) +
-                    0.25 * (3 * c - 4 * d + e) * (3 * c - 4 * d + e);
-  // The differences are about 1, since |∇φ| ≈ 1, so the regularisation can be absolute.
-  constexpr double kSmall = 1e-6;
-  const double w1 = 0.1 / ((s1 + kSmall) * (s1 + kSmall)),
-               w2 = 0.6 / ((s2 + kSmall) * (s2 + kSmall)),
-               w3 = 0.3 / ((s3 + kSmall) * (s3 + kSmall));
-  return (w1 * (2 * a - 7 * b + 11 * c) + w2 * (-b + 5 * c + 2 * d) + w3 * (2 * c + 5 * d - e)) /
-         (6 * (w1 + w2 + w3));
-}
-
 /// Returns the upwind derivative of φ along an axis, voxels per voxel. The sign of `speed` selects
 /// the side.
-double upwindDerivative(const eikonal::DenseBlock& block, const Coord& c, int axis, double speed,
-                        double voxelSize) {
+double upwindSlope(const eikonal::DenseBlock& block, const Coord& c, int axis, double speed,
+                   double voxelSize, int order) {
   const int side = speed > 0 ? -1 : 1;
   std::array<double, 6> values;
   for (int k = 0; k < 6; ++k) {
@@ -135,15 +119,13 @@ double upwindDerivative(const eikonal::DenseBlock& block, const Coord& c, int ax
     values[static_cast<std::size_t>(k)] =
         static_cast<double>(block.at(at[0], at[1], at[2])) / voxelSize;
   }
-  std::array<double, 5> d;
-  for (std::size_t k = 0; k < 5; ++k) d[k] = -side * (values[k + 1] - values[k]);
-  return weno5(d[0], d[1], d[2], d[3], d[4]);
+  return -side * upwindDerivative(values, order);
 }
 
 /// Computes result = share · start + (1 − share) · (field − dt u·∇field) on the active grid points,
 /// with the velocity u at `time`.
 void eulerStage(const FloatGrid& start, const FloatGrid& field, double share, double time,
-                double dt, const TimeInterval& interval, FloatGrid& result) {
+                double dt, const TimeInterval& interval, int order, FloatGrid& result) {
   const std::vector<LeafNode*> leaves = leavesOf(result.tree());
   const double h = result.voxelSize()[0], background = static_cast<double>(result.background());
   tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
@@ -158,7 +140,7 @@ void eulerStage(const FloatGrid& start, const FloatGrid& field, double share, do
       double slope = 0;
       for (int axis = 0; axis < 3; ++axis)
         if (speed[axis] != 0)
-          slope += speed[axis] * upwindDerivative(block, c, axis, speed[axis] * dt, h);
+          slope += speed[axis] * upwindSlope(block, c, axis, speed[axis] * dt, h, order);
       const double moved = static_cast<double>(block.at(c[0], c[1], c[2])) - dt * slope * h;
       const double value =
           share * static_cast<double>(first->getValue(it.pos())) + (1 - share) * moved;
@@ -166,17 +148,6 @@ void eulerStage(const FloatGrid& start, const FloatGrid& field, double share, do
           static_cast<float>(std::clamp(value, -background + 1e-6 * h, background - 1e-6 * h)));
     }
   });
-}
-
-/// Third-order TVD Runge-Kutta step [Shu88].
-FloatGrid::Ptr upwindStep(const FloatGrid& start, const TimeInterval& interval, double from,
-                          double to) {
-  const double dt = to - from;
-  const FloatGrid::Ptr one = start.deepCopy(), two = start.deepCopy(), three = start.deepCopy();
-  eulerStage(start, start, 0, from, dt, interval, *one);
-  eulerStage(start, *one, 0.75, to, dt, interval, *two);
-  eulerStage(start, *two, 1.0 / 3, from + dt / 2, dt, interval, *three);
-  return three;
 }
 
 }  // namespace
@@ -205,7 +176,23 @@ std::size_t advectSemiLagrangian(NarrowBand& band, const TimeInterval& interval)
   return steps;
 }
 
-std::size_t advectUpwind(NarrowBand& band, const TimeInterval& interval) {
+FloatGrid::Ptr upwindStep(const FloatGrid& start, const TimeInterval& interval,
+                          const UpwindOrders& orders, double from, double to) {
+  const double dt = to - from;
+  const auto stage = [&](const FloatGrid& field, double share, double time) {
+    FloatGrid::Ptr result = start.deepCopy();
+    eulerStage(start, field, share, time, dt, interval, orders.space, *result);
+    return result;
+  };
+  const FloatGrid::Ptr one = stage(start, 0, from);
+  if (orders.time == 1) return one;
+  if (orders.time == 2) return stage(*one, 0.5, to);
+  const FloatGrid::Ptr two = stage(*one, 0.75, to);
+  return stage(*two, 1.0 / 3, from + dt / 2);
+}
+
+std::size_t advectUpwind(NarrowBand& band, const TimeInterval& interval,
+                         const UpwindOrders& orders) {
   const double halfWidth = band.halfWidth();
   FloatGrid::Ptr grid = distanceOf(vdb(band), std::max(halfWidth, kUpwindWidth), interval);
   double travelled = 0, fastest = 0;
@@ -219,7 +206,7 @@ std::size_t advectUpwind(NarrowBand& band, const TimeInterval& interval) {
     return step;
   };
   const std::size_t steps = integrate(interval, longest, [&](double from, double to) {
-    grid = upwindStep(*grid, interval, from, to);
+    grid = upwindStep(*grid, interval, orders, from, to);
     travelled += std::abs(to - from) * fastest;
     fastest = 0;
     if (travelled < kUpwindTravel) return;

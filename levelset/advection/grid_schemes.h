@@ -4,6 +4,7 @@
 
 #include "levelset/advection/time_interval.h"
 #include "levelset/narrow_band.h"
+#include "levelset/vdb.h"
 
 namespace levelset::flow {
 
@@ -13,9 +14,23 @@ namespace levelset::flow {
 /// @return the number of steps
 std::size_t advectSemiLagrangian(NarrowBand& band, const TimeInterval& interval);
 
-/// Moves a band over the time interval with HJ-WENO5 and TVD-RK3. Redistances whenever the surface
+/// Orders of the upwind scheme.
+struct UpwindOrders {
+  int space = 5;  ///< 1, 2, 3 or 5, see upwindDerivative()
+  int time = 3;   ///< 1: Euler; 2 and 3: TVD Runge-Kutta [Shu88]
+};
+
+/// Computes one step of the upwind scheme on the active grid points, without redistancing: an Euler
+/// step, or a TVD Runge-Kutta step of second or third order [Shu88].
+[[nodiscard]] openvdb::FloatGrid::Ptr upwindStep(const openvdb::FloatGrid& start,
+                                                 const TimeInterval& interval,
+                                                 const UpwindOrders& orders, double from,
+                                                 double to);
+
+/// Moves a band over the time interval with upwind differences. Redistances whenever the surface
 /// has moved 1.5 voxels.
 /// @return the number of steps, which the CFL condition determines
-std::size_t advectUpwind(NarrowBand& band, const TimeInterval& interval);
+std::size_t advectUpwind(NarrowBand& band, const TimeInterval& interval,
+                         const UpwindOrders& orders);
 
 }  // namespace levelset::flow
