@@ -2,13 +2,10 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <cmath>
-#include <iterator>
 
 #include "levelset/advection/front.h"
 #include "levelset/advection/grid_schemes.h"
-#include "levelset/advection/upwind_derivative.h"
 #include "levelset/convert/mesh_to_band.h"
 #include "levelset/error.h"
 #include "levelset/grids/sample.h"
@@ -30,16 +27,6 @@ constexpr double kMeshed = 0.05, kMoved = 0.9;
 void requireTime(double time, const char* what) {
   if (!std::isfinite(time))
     throw UsageError(fmt::format("the {} is {}; give a finite time", what, time));
-}
-
-void requireOrders(const AdvectOptions& options) {
-  if (std::find(std::begin(flow::kUpwindOrders), std::end(flow::kUpwindOrders), options.order) ==
-      std::end(flow::kUpwindOrders))
-    throw UsageError(
-        fmt::format("there is no upwind scheme of order {}; give 1, 2, 3 or 5", options.order));
-  if (options.timeOrder < 1 || options.timeOrder > 3)
-    throw UsageError(
-        fmt::format("there is no time integration of order {}; give 1, 2 or 3", options.timeOrder));
 }
 
 /// Moves vertices by at most 0.3 voxels onto the zero set of the tricubic interpolant of the band.
@@ -120,7 +107,7 @@ struct Advection::Impl {
     requireSolid(band);
     if (band.isEmpty()) throw InvalidInput("the solid is empty; give a solid with a surface");
     requireTime(time, "start time");
-    requireOrders(options);
+    flow::requireOrders({options.order, options.timeOrder});
     if (options.mask) checkMask(*options.mask);
     volumeBefore = measure(band).volume;
     if (options.scheme == AdvectScheme::Front) front.emplace(surfaceOf(band), options.maxMemory);

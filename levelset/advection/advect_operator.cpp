@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 
 #include "levelset/advection/advect.h"
+#include "levelset/advection/grid_schemes.h"
 #include "levelset/error.h"
 #include "levelset/fields/expression.h"
 
@@ -51,6 +52,7 @@ void AdvectOperator::check(const Options& options, const GivenOptions& given) {
     if (given(option) && options.scheme != AdvectScheme::Upwind)
       throw UsageError(fmt::format(
           "--{} applies only to the upwind scheme; leave it out, or use --scheme upwind", option));
+  flow::requireOrders({options.order, options.timeOrder});
   for (const char* option : {"center", "axis"}) {
     if (given(option) && options.field.name != "rotation")
       throw UsageError(fmt::format(

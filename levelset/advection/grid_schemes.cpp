@@ -1,5 +1,6 @@
 #include "levelset/advection/grid_schemes.h"
 
+#include <fmt/core.h>
 #include <openvdb/tools/Morphology.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
@@ -7,12 +8,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <vector>
 
 #include "levelset/advection/characteristic.h"
 #include "levelset/advection/upwind_derivative.h"
 #include "levelset/distance/distance_transform.h"
 #include "levelset/distance/interpolant.h"
+#include "levelset/error.h"
 #include "levelset/vdb.h"
 
 namespace levelset::flow {
@@ -151,6 +154,16 @@ void eulerStage(const FloatGrid& start, const FloatGrid& field, double share, do
 }
 
 }  // namespace
+
+void requireOrders(const UpwindOrders& orders) {
+  if (std::find(std::begin(kUpwindOrders), std::end(kUpwindOrders), orders.space) ==
+      std::end(kUpwindOrders))
+    throw UsageError(
+        fmt::format("the upwind scheme has no order {} in space; give 1, 2, 3 or 5", orders.space));
+  if (orders.time < 1 || orders.time > 3)
+    throw UsageError(
+        fmt::format("the upwind scheme has no order {} in time; give 1, 2 or 3", orders.time));
+}
 
 std::size_t advectSemiLagrangian(NarrowBand& band, const TimeInterval& interval) {
   const double halfWidth = band.halfWidth(), width = std::max(halfWidth, kFootWidth);

@@ -20,6 +20,9 @@ struct UpwindOrders {
   int time = 3;   ///< 1: Euler; 2 and 3: TVD Runge-Kutta [Shu88]
 };
 
+/// @throws UsageError for orders that do not exist
+void requireOrders(const UpwindOrders& orders);
+
 /// Computes one step of the upwind scheme on the active grid points, without redistancing: an Euler
 /// step, or a TVD Runge-Kutta step of second or third order [Shu88].
 [[nodiscard]] openvdb::FloatGrid::Ptr upwindStep(const openvdb::FloatGrid& start,

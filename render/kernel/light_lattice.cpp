@@ -68,14 +68,13 @@ LightLattice::Cell LightLattice::cellBetween(std::size_t column, std::size_t row
   return cell;
 }
 
-LightLattice::Estimate LightLattice::at(double x, double y, const Hit& hit) const {
+LightLattice::Estimate LightLattice::at(int pixelX, int pixelY, double x, double y,
+                                        const Hit& hit) const {
   if (cells_.empty()) return {};
-  const auto indexOf = [this](double at, int first, std::size_t lines) {
-    const double line = std::floor(at / spacing_) - first;
-    return static_cast<std::size_t>(std::clamp(line, 0.0, static_cast<double>(lines - 2)));
-  };
-  const std::size_t column = indexOf(x, firstColumn_, columns_.size()),
-                    row = indexOf(y, firstRow_, rows_.size());
+  // The pixel selects the cell, since the position may round to the next one. So the cell does not
+  // depend on the box.
+  const auto column = static_cast<std::size_t>(pixelX / spacing_ - firstColumn_),
+             row = static_cast<std::size_t>(pixelY / spacing_ - firstRow_);
   const Cell& cell = cells_[row * (columns_.size() - 1) + column];
   if (!cell.isSmooth || !(cell.isSkyKnown || cell.isKeyKnown)) return {};
   const auto shareOf = [](double at, double from, double to) {
@@ -86,17 +85,17 @@ LightLattice::Estimate LightLattice::at(double x, double y, const Hit& hit) cons
   const std::size_t first = nodeAt(column, row), second = nodeAt(column, row + 1);
   const std::array<const Node*, 4> corners = {&nodes_[first], &nodes_[first + 1], &nodes_[second],
                                               &nodes_[second + 1]};
-  const std::array<double, 4> weights = {(1 - right) * (1 - down), right * (1 - down),
-                                         (1 - right) * down, right * down};
+  // Equal values at the corners give the same value in between, to the bit.
+  const auto mixed = [&](const auto& of) {
+    const auto top = of(*corners[0]) + (of(*corners[1]) - of(*corners[0])) * right,
+               bottom = of(*corners[2]) + (of(*corners[3]) - of(*corners[2])) * right;
+    return top + (bottom - top) * down;
+  };
   Estimate estimate;
-  estimate.light = {0, 0};
-  V3d position(0), normal(0);
-  for (std::size_t i = 0; i < 4; ++i) {
-    position += corners[i]->hit.position * weights[i];
-    normal += corners[i]->hit.normal * weights[i];
-    estimate.light.sky += corners[i]->light.sky * weights[i];
-    estimate.light.key += corners[i]->light.key * weights[i];
-  }
+  estimate.light = {mixed([](const Node& node) { return node.light.sky; }),
+                    mixed([](const Node& node) { return node.light.key; })};
+  const V3d position = mixed([](const Node&node) { return node.hit.position; }),
+            normal = mixed([](const Node&node) { return node.hit.normal; });
   if (!isSameSurface(hit, corners[0]->hit) ||
       hit.normal.dot(normal) < kLeastCosine * normal.length() ||
       std::abs((hit.position - position).dot(normal)) > kOffPlane * cell.size)

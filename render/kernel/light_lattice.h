@@ -54,8 +54,9 @@ class LightLattice {
     return light.key > kClear && light.key < 1 - kClear;
   }
 
-  /// Estimates the light at a hit. @param x, y  position in the picture, pixels
-  [[nodiscard]] Estimate at(double x, double y, const Hit& hit) const;
+  /// Estimates the light at a hit. @param pixelX, pixelY  pixel of the sample, in the box
+  /// @param x, y  position of the sample in the picture, pixels
+  [[nodiscard]] Estimate at(int pixelX, int pixelY, double x, double y, const Hit& hit) const;
 
  private:
   struct Cell {

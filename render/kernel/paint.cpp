@@ -23,6 +23,9 @@ constexpr std::size_t kMostLightRays = 1u << 18;
 constexpr double kCastError = 2e-3;
 // A lattice point has the light rays of this many colour samples, unless the pixels have fewer.
 constexpr int kLatticeSamples = 4;
+// Light is not interpolated if a lattice point has fewer rays to the sky and to the key light than
+// this.
+constexpr int kFewestRays = 16;
 // Shadow rays from the centre of a pixel that look for shadows between lattice points.
 constexpr int kProbes = 2;
 // Lattice points in a penumbra have so many times the shadow rays of others.
@@ -48,6 +51,9 @@ void KernelPainter::paint(const KernelTracer& tracer, const PixelBox& box) const
 LightLattice KernelPainter::latticeOf(const KernelTracer& tracer, const PixelBox& box) const {
   if (options_.lightSpacing <= 1 || !scene_.isOpaque() || !usesLights(options_.style.style))
     return {};
+  // With few rays the corners of a cell agree by chance.
+  const int samples = std::min(options_.samples, kLatticeSamples);
+  if (samples * std::max(options_.ambientSamples, options_.shadowSamples) < kFewestRays) return {};
   const Camera& camera = scene_.camera;
   LightLattice lattice(box, camera.width, camera.height, options_.lightSpacing);
   const std::vector<LightLattice::Point>& points = lattice.points();
@@ -68,7 +74,6 @@ LightLattice KernelPainter::latticeOf(const KernelTracer& tracer, const PixelBox
     if (!nodes[i].hit.found) continue;
     const auto x = static_cast<int>(points[i].x), y = static_cast<int>(points[i].y);
     // All rays to the sky come first, as LightRays requires.
-    const int samples = std::min(options_.samples, kLatticeSamples);
     LightRays& range = ranges[i];
     range.first = rays.size();
     for (int s = 0; s < samples; ++s)
@@ -95,7 +100,7 @@ LightLattice KernelPainter::latticeOf(const KernelTracer& tracer, const PixelBox
     const auto x = static_cast<int>(points[i].x), y = static_cast<int>(points[i].y);
     LightRays range;
     range.first = shadowRays.size();
-    for (int s = 0; s < kPenumbraSamples * std::min(options_.samples, kLatticeSamples); ++s) {
+    for (int s = 0; s < kPenumbraSamples * samples; ++s) {
       const LightRays more =
           shader_.addRays(nodes[i].hit, views[i].direction, x, y, s, shadowRays, LightKind::Key);
       range.key += more.key;
@@ -195,8 +200,9 @@ std::vector<char> KernelPainter::paintData(const KernelTracer& tracer,
       hit = shader_.groundHit(ray);
       if (!hit.found) continue;
     }
-    const LightLattice::Estimate estimate = lattice.at(x + 0.5, y + 0.5, hit);
-    if (estimate.isKeyKnown && !LightLattice::isPenumbra(estimate.light))
+    const LightLattice::Estimate estimate = lattice.at(x, y, x + 0.5, y + 0.5, hit);
+    if (options_.shadowSamples > 0 && estimate.isKeyKnown &&
+        !LightLattice::isPenumbra(estimate.light))
       probes.push_back({i, estimate.light.key,
                         shader_.addShadowRays(hit, ray.direction, x, y, kProbes, shadowRays)});
   }
@@ -290,7 +296,7 @@ std::vector<std::size_t> KernelPainter::addSeen(const KernelTracer& tracer,
       left = 0;
       continue;
     }
-    LightLattice::Estimate estimate = lattice.at(x, y, hit);
+    LightLattice::Estimate estimate = lattice.at(pixels[i].x, pixels[i].y, x, y, hit);
     if (contradicts[i]) estimate.isKeyKnown = false;
     LightRays range;
     if (!estimate.isSkyKnown || !estimate.isKeyKnown) {

@@ -38,7 +38,11 @@ std::vector<double> Scene::extents(const std::vector<Imath::V3d>& directions) co
     Scene withoutMeshes = *this;
     withoutMeshes.meshes.clear();
     const Imath::Box3d box = withoutMeshes.bounds();
-    for (std::size_t d = 0; d < directions.size() && !box.isEmpty(); ++d) {
+    for (std::size_t d = 0; d < directions.size(); ++d) {
+      if (box.isEmpty()) {
+        ofSolids[d] = -std::numeric_limits<double>::infinity();
+        continue;
+      }
       double extent = 0;
       for (int a = 0; a < 3; ++a)
         extent += directions[d][a] * (directions[d][a] > 0 ? box.max[a] : box.min[a]);

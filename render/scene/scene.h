@@ -94,7 +94,8 @@ struct Scene {
 [[nodiscard]] Camera framingCamera(const Scene& scene, int width, int height, double verticalFov,
                                    const Imath::V3d& up);
 
-/// Plane below the surfaces of a scene, at their lowest point. @param up  upward direction
+/// Plane below the surfaces of a scene, at their lowest point. For a scene with an expression or a
+/// morph it may lie lower, see Scene::extents(). @param up  upward direction
 /// @pre the scene has a surface; `up` is not zero
 [[nodiscard]] Ground groundOf(const Scene& scene, const Imath::V3d& up);
 

@@ -134,11 +134,11 @@ TEST(LightLattice, InterpolatesOnlyWhereItsCornersAgree) {
   };
   lattice.setNodes(nodes());
   const Hit on = nodeOn(V3d(3, 1, 0), V3d(0, 0, 1), {}).hit;
-  const LightLattice::Estimate estimate = lattice.at(3, 1, on);
+  const LightLattice::Estimate estimate = lattice.at(3, 1, 3, 1, on);
   EXPECT_TRUE(estimate.isSkyKnown && estimate.isKeyKnown);
   EXPECT_NEAR(estimate.light.sky, 0.53, 1e-12);
   EXPECT_NEAR(estimate.light.key, 1, 1e-12);
-  const auto isKnown = [&](const Hit& hit) { return lattice.at(3, 1, hit).isSkyKnown; };
+  const auto isKnown = [&](const Hit& hit) { return lattice.at(3, 1, 3, 1, hit).isSkyKnown; };
   EXPECT_FALSE(isKnown(nodeOn(V3d(3, 1, 3), V3d(0, 0, 1), {}).hit)) << "in front of the plane";
   EXPECT_FALSE(isKnown(nodeOn(V3d(3, 1, 0), V3d(1, 0, 1).normalized(), {}).hit)) << "turned";
   Hit other = on;

@@ -393,7 +393,8 @@ Operator renderOperator() {
            {.name = "png", .type = ParamType::Path, .doc = "also write the colours to this .png"},
            {.name = "renderer",
             .type = ParamType::Choice,
-            .doc = "renderer; both: draws with gpu and embree, and compares the two",
+            .doc = "renderer; both: draws with gpu (cpu where there is no OpenGL) and embree, and "
+                   "compares the two",
             .fallback = "cpu",
             .choices = {"gpu", "cpu", "embree", "both"}},
            {.name = "filter",

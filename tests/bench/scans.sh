@@ -1,0 +1,69 @@
+#!/bin/sh
+# Compares operators on scans and on a sharp part with OpenVDB's vdb_tool: CPU seconds and peak memory, in one run.
+# Both read the same .vdb; the cost of reading is subtracted. Exits 1 when a bound is exceeded.
+#   scans.sh LEVELSMITH MODELS [DIM…]     MODELS has dragon_vrip.ply.gz and bunny.obj; DIM: 256 512 1024 2048
+set -eu
+[ $# -ge 2 ] || { sed -n '2,4s/^# *//p' "$0"; exit 2; }
+levelsmith=$1 models=$2
+shift 2
+[ $# -gt 0 ] || set -- 256 512 1024
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+gzip -dc "$models/dragon_vrip.ply.gz" >"$folder/dragon.ply"
+"$levelsmith" -q read "$models/bunny.obj" --no-attributes ! write "$folder/bunny.obj"
+# A machine part with sharp edges: a bracket with two bores.
+"$levelsmith" -q box --size 8,5,1 --voxel 0.05 ! box --center -3.5,0,2 --size 1,5,4 --voxel 0.05 ! union \
+  ! cylinder --center 2,0,0 --radius 1 --height 4 --voxel 0.05 ! difference \
+  ! cylinder --center -3.5,0,2.5 --axis 1,0,0 --radius 1.2 --height 4 --voxel 0.05 ! difference \
+  ! mesh --sharp ! write "$folder/bracket.obj"
+
+# cost COMMAND…: CPU seconds and peak memory in MB, the least of two runs
+cost() {
+  for run in 1 2; do
+    /usr/bin/time -f '%U %S %M' -o "$folder/time" "$@" >/dev/null 2>"$folder/log" || { cat "$folder/log" >&2; echo "failed failed"; }
+    awk '{ printf "%.2f %.0f\n", $1 + $2, $3 / 1024 }' "$folder/time"
+  done | sort -n | head -1
+}
+
+: >"$folder/table"
+for dim in "$@"; do
+  for model in dragon bunny bracket; do
+    mesh=$folder/$model.obj
+    [ "$model" != dragon ] || mesh=$folder/dragon.ply  # vdb_tool reads single-precision PLY only
+    band=$folder/$model.vdb other=$folder/$model-moved.vdb
+    "$levelsmith" -q read "$mesh" ! level-set --resolution "$dim" ! write "$band"
+    voxel=$("$levelsmith" -q read "$band" ! info | awk '$1 == "voxel_size" { print $2 }')
+    # A second solid on the same grid, moved by whole voxels.
+    "$levelsmith" -q read "$band" ! transform --translate "$(awk "BEGIN { s = 40 * $voxel; print s \",\" s \",0\" }")" \
+      ! write "$other"
+    row() {  # row NAME BOUND, with the costs in ours, theirs and the cost of reading in read_ours, read_theirs
+      echo "$model $dim $1 $2 $ours $theirs $read_ours $read_theirs" >>"$folder/table"
+    }
+    read_ours="0 0" read_theirs="0 0"
+    ours=$(cost "$levelsmith" -q --threads 2 read "$mesh" ! level-set --resolution "$dim" ! info)
+    theirs=$(cost vdb_tool -read "$mesh" -mesh2ls dim="$dim" width=3)
+    row level-set 0.5
+    read_ours=$(cost "$levelsmith" -q read "$band" ! info) read_theirs=$(cost vdb_tool -read "$band")
+    ours=$(cost "$levelsmith" -q read "$band" ! offset 5vx ! info)
+    theirs=$(cost vdb_tool -read "$band" -dilate radius=5)
+    row offset 0.25
+    ours=$(cost "$levelsmith" -q read "$band" ! smooth --sigma 1vx ! info)
+    theirs=$(cost vdb_tool -read "$band" -gauss iter=1 size=1)
+    row gaussian 0.2
+    read_ours=$(cost "$levelsmith" -q read "$band" ! read "$other" ! info)
+    read_theirs=$(cost vdb_tool -read "$band" -read "$other")
+    ours=$(cost "$levelsmith" -q read "$band" ! read "$other" ! union ! info)
+    theirs=$(cost vdb_tool -read "$band" -read "$other" -union)
+    row union 0.25
+  done
+done
+awk '
+  BEGIN { printf "%-8s %5s %-10s %9s %9s %6s %9s %9s %6s\n", "model", "dim", "operator", "ours, s", "peer, s", "ratio", "ours, MB", "peer, MB", "bound" }
+  {
+    ours = $5 - $9; theirs = $7 - $11
+    ratio = theirs > 0 ? ours / theirs : 0
+    held = ratio <= $4
+    printf "%-8s %5d %-10s %9.2f %9.2f %6.2f %9d %9d %6.2f%s\n", $1, $2, $3, ours, theirs, ratio, $6, $8, $4, held ? "" : "  missed"
+    if (!held) missed = 1
+  }
+  END { exit missed }' "$folder/table"
