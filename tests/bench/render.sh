@@ -41,27 +41,24 @@ cpu_seconds() {
   done | sort -n | head -1
 }
 
-# lit NAME SAMPLES BOUND: CPU seconds of lit pictures, and their ratio to vdb_render
+# lit NAME SAMPLES BOUND FROM TO ANGLE: CPU seconds of lit pictures from a view
 "$levelsmith" -q sphere --radius 256 --voxel 1 ! write "$folder/sphere256.vdb"
 lit() {
-  file=$folder/$1.vdb name=$1 samples=$2 bound=$3
-  set -- $("$bench" --view "$file")  # -translate FROM -lookat TO -fov ANGLE
-  theirs=$(cpu_seconds vdb_render "$file" "$folder/out.exr" "$@" -res 1024x1024 -samples "$samples" \
-    -shader diffuse -cpus 1 -compression none)
+  file=$folder/$1.vdb name=$1 samples=$2 bound=$3 from=$4 to=$5 angle=$6
+  theirs=$(cpu_seconds vdb_render "$file" "$folder/out.exr" -translate "$from" -lookat "$to" -fov "$angle" \
+    -res 1024x1024 -samples "$samples" -shader diffuse -cpus 1 -compression none)
   ours() {
-    from=$1 to=$2 angle=$3
-    shift 3
     cpu_seconds "$levelsmith" -q --threads 1 read "$file" ! render "$folder/out.png" "$@" \
       --size 1024x1024 --samples "$samples" --from "$from" --to "$to" --fov "$angle"
   }
-  interpolated=$(ours "$2" "$4" "$6") traced=$(ours "$2" "$4" "$6" --light-spacing 1)
+  interpolated=$(ours) traced=$(ours --light-spacing 1)
   echo "lit $name $samples $bound $theirs $interpolated $traced" >>"$folder/lit.txt"
 }
 : >"$folder/lit.txt"
-lit sphere256 1 -
-lit sphere256 4 1.5
-lit sphere256 16 -
-lit dragon 4 -
+for row in "1 -" "4 1.5" "16 -"; do
+  lit sphere256 $row 300,230,700 0,0,0 45
+done
+lit dragon 4 - 0.08,0.22,0.28 -0.005,0.12,0 40
 
 cat "$folder"/*.txt | awk '
   $1 == "lit" {

@@ -24,7 +24,7 @@ using render::PointLight;
 using render::Scene;
 
 /// Colours of a picture whose light is interpolated, beside those of the same picture in which each
-/// colour sample traces its own light rays, 8 times as many as usual.
+/// colour sample traces its own light rays, 16 times as many as usual.
 struct Difference {
   double rms = 0, largest = 0, mean = 0;
 };
@@ -32,8 +32,8 @@ struct Difference {
 Difference differenceOf(const Scene& scene, int spacing, const render::RenderOptions& options) {
   render::RenderOptions traced = options, interpolated = options;
   traced.lightSpacing = 1;
-  traced.ambientSamples *= 8;
-  traced.shadowSamples *= 8;
+  traced.ambientSamples *= 16;
+  traced.shadowSamples *= 16;
   interpolated.lightSpacing = spacing;
   const Image truth = renderCpu(scene, traced), image = renderCpu(scene, interpolated);
   Difference result;
