@@ -241,15 +241,17 @@ Camera framing(const Imath::Box3d& bounds, const Extents& extents, int width, in
 
 }  // namespace
 
+double extentOf(const Imath::Box3d& box, const V3d& direction) {
+  double extent = 0;
+  for (int a = 0; a < 3; ++a) extent += direction[a] * (direction[a] > 0 ? box.max[a] : box.min[a]);
+  return extent;
+}
+
 Camera framingCamera(const Imath::Box3d& bounds, int width, int height, double verticalFov,
                      const V3d& up) {
   const Extents extents = [&](const std::vector<V3d>& directions) {
     std::vector<double> all;
-    for (const V3d& d : directions) {
-      double extent = 0;
-      for (int a = 0; a < 3; ++a) extent += d[a] * (d[a] > 0 ? bounds.max[a] : bounds.min[a]);
-      all.push_back(extent);
-    }
+    for (const V3d& d : directions) all.push_back(extentOf(bounds, d));
     return all;
   };
   return framing(bounds, extents, width, height, verticalFov, up, false);

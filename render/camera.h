@@ -67,6 +67,9 @@ void validate(const Camera& camera);
                                    double verticalFov = 0.6108652381980153,
                                    const Imath::V3d& up = {0, 1, 0});
 
+/// Extent of a box: the largest p·direction over its points p. @pre the box is not empty
+[[nodiscard]] double extentOf(const Imath::Box3d& box, const Imath::V3d& direction);
+
 /// Extents of a set of points: returns for each direction d the largest p·d over its points p.
 using Extents = std::function<std::vector<double>(const std::vector<Imath::V3d>& directions)>;
 

@@ -79,12 +79,10 @@ LightLattice KernelPainter::latticeOf(const KernelTracer& tracer, const PixelBox
     for (int s = 0; s < samples; ++s)
       range.sky +=
           shader_.addRays(nodes[i].hit, views[i].direction, x, y, s, rays, LightKind::Sky).sky;
-    for (int s = 0; s < samples; ++s) {
-      const LightRays more =
-          shader_.addRays(nodes[i].hit, views[i].direction, x, y, s, rays, LightKind::Key);
-      range.key += more.key;
-      range.behind += more.behind;
-    }
+    const LightRays key = shader_.addShadowRays(nodes[i].hit, views[i].direction, x, y,
+                                                samples * options_.shadowSamples, rays);
+    range.key = key.key;
+    range.behind = key.behind;
   }
   const std::vector<double> light = surfaces_.transmittances(tracer, rays);
   std::vector<std::size_t> inPenumbra;
@@ -98,15 +96,9 @@ LightLattice KernelPainter::latticeOf(const KernelTracer& tracer, const PixelBox
   std::vector<LightRays> shadowRanges;
   for (const std::size_t i : inPenumbra) {
     const auto x = static_cast<int>(points[i].x), y = static_cast<int>(points[i].y);
-    LightRays range;
-    range.first = shadowRays.size();
-    for (int s = 0; s < kPenumbraSamples * samples; ++s) {
-      const LightRays more =
-          shader_.addRays(nodes[i].hit, views[i].direction, x, y, s, shadowRays, LightKind::Key);
-      range.key += more.key;
-      range.behind += more.behind;
-    }
-    shadowRanges.push_back(range);
+    shadowRanges.push_back(
+        shader_.addShadowRays(nodes[i].hit, views[i].direction, x, y,
+                              kPenumbraSamples * samples * options_.shadowSamples, shadowRays));
   }
   const std::vector<double> shadows = surfaces_.transmittances(tracer, shadowRays);
   for (std::size_t n = 0; n < inPenumbra.size(); ++n)

@@ -39,13 +39,8 @@ std::vector<double> Scene::extents(const std::vector<Imath::V3d>& directions) co
     withoutMeshes.meshes.clear();
     const Imath::Box3d box = withoutMeshes.bounds();
     for (std::size_t d = 0; d < directions.size(); ++d) {
-      if (box.isEmpty()) {
-        ofSolids[d] = -std::numeric_limits<double>::infinity();
-        continue;
-      }
-      double extent = 0;
-      for (int a = 0; a < 3; ++a)
-        extent += directions[d][a] * (directions[d][a] > 0 ? box.max[a] : box.min[a]);
+      const double extent =
+          box.isEmpty() ? -std::numeric_limits<double>::infinity() : extentOf(box, directions[d]);
       ofSolids[d] = isBlended() ? extent : std::min(ofSolids[d], extent);
     }
   }

@@ -152,12 +152,11 @@ void Shader::addSkyRays(const Frame& frame, int x, int y, int sample,
   }
 }
 
-double Shader::addKeyRays(const Frame& frame, int x, int y, int sample,
+double Shader::addKeyRays(const Frame& frame, int x, int y, int first, int count,
                           std::vector<LightRay>& rays) const {
-  const int count = options_.shadowSamples;
   const PixelSequence sequence(x, y, kShadow);
   double behind = 0;
-  for (int i = 0; i < count; ++i) behind += addKeyRay(frame, sequence.at(sample * count + i), rays);
+  for (int i = first; i < first + count; ++i) behind += addKeyRay(frame, sequence.at(i), rays);
   return behind;
 }
 
@@ -178,7 +177,9 @@ LightRays Shader::addRays(const Hit& hit, const V3d& direction, int x, int y, in
   const Frame frame = frameOf(hit, direction);
   if (kind != LightKind::Key) addSkyRays(frame, x, y, sample, rays);
   range.sky = rays.size() - range.first;
-  if (kind != LightKind::Sky) range.behind = addKeyRays(frame, x, y, sample, rays);
+  if (kind != LightKind::Sky)
+    range.behind =
+        addKeyRays(frame, x, y, sample * options_.shadowSamples, options_.shadowSamples, rays);
   range.key = rays.size() - range.first - range.sky;
   return range;
 }
@@ -187,9 +188,7 @@ LightRays Shader::addShadowRays(const Hit& hit, const V3d& direction, int x, int
                                 std::vector<LightRay>& rays) const {
   LightRays range;
   range.first = rays.size();
-  const Frame frame = frameOf(hit, direction);
-  const PixelSequence sequence(x, y, kShadow);
-  for (int i = 0; i < count; ++i) range.behind += addKeyRay(frame, sequence.at(i), rays);
+  range.behind = addKeyRays(frameOf(hit, direction), x, y, 0, count, rays);
   range.key = rays.size() - range.first;
   return range;
 }

@@ -101,8 +101,9 @@ class Shader {
   };
   [[nodiscard]] Frame frameOf(const Hit& hit, const Imath::V3d& direction) const;
   void addSkyRays(const Frame& frame, int x, int y, int sample, std::vector<LightRay>& rays) const;
+  /// Appends the shadow rays number `first` to first + count − 1 of the pixel.
   /// @return LightRays::behind
-  [[nodiscard]] double addKeyRays(const Frame& frame, int x, int y, int sample,
+  [[nodiscard]] double addKeyRays(const Frame& frame, int x, int y, int first, int count,
                                   std::vector<LightRay>& rays) const;
   /// @param u  random point in [0, 1)², which selects the direction within the light's cone
   /// @return LightRays::behind of this ray
