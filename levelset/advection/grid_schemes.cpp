@@ -14,7 +14,7 @@
 #include "levelset/advection/characteristic.h"
 #include "levelset/advection/upwind_derivative.h"
 #include "levelset/distance/distance_transform.h"
-#include "levelset/distance/interpolant.h"
+#include "levelset/distance/surface/interpolant.h"
 #include "levelset/error.h"
 #include "levelset/vdb.h"
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "levelset/meshing/cell_surface.h"
+#include "levelset/meshing/cells/cell_surface.h"
 #include "levelset/progress.h"
 #include "levelset/vdb.h"
 

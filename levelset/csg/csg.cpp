@@ -14,6 +14,7 @@
 
 #include "levelset/csg/csg_vdb.h"
 #include "levelset/distance/distance_transform.h"
+#include "levelset/distance/surface/surface_points.h"
 #include "levelset/error.h"
 #include "levelset/transform/resample.h"
 #include "levelset/vdb.h"

@@ -12,7 +12,7 @@
 #include "levelset/csg/csg_vdb.h"
 #include "levelset/csg/seam_curve.h"
 #include "levelset/distance/distance_transform.h"
-#include "levelset/distance/interpolant.h"
+#include "levelset/distance/surface/interpolant.h"
 #include "levelset/memory_limit.h"
 
 namespace levelset::solids {

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "levelset/distance/interpolant.h"
+#include "levelset/distance/surface/interpolant.h"
 
 namespace levelset::solids {
 namespace {

@@ -12,6 +12,7 @@
 #include "levelset/csg/seam_operands.h"
 #include "levelset/distance/distance_transform.h"
 #include "levelset/distance/redistance.h"
+#include "levelset/distance/surface/surface_points.h"
 #include "levelset/error.h"
 #include "levelset/vdb.h"
 

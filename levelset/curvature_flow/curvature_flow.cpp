@@ -9,6 +9,7 @@
 #include "levelset/curvature_flow/curvature_rate_vdb.h"
 #include "levelset/curvature_flow/curvature_steps_vdb.h"
 #include "levelset/distance/distance_transform.h"
+#include "levelset/distance/surface/surface_points.h"
 #include "levelset/error.h"
 
 namespace levelset {

@@ -10,6 +10,7 @@
 
 #include "levelset/distance/distance_transform.h"
 #include "levelset/distance/redistance.h"
+#include "levelset/distance/surface/surface_points.h"
 #include "levelset/error.h"
 #include "levelset/grids/band_blocks_vdb.h"
 

@@ -10,8 +10,8 @@
 #include <cmath>
 #include <memory>
 
-#include "levelset/distance/closest_point.h"
-#include "levelset/distance/propagate.h"
+#include "levelset/distance/moved_surface.h"
+#include "levelset/distance/redistance.h"
 #include "levelset/distance/signs.h"
 #include "levelset/error.h"
 #include "levelset/memory_estimate.h"
@@ -27,205 +27,206 @@ using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 using Block = NearestPoints::Block;
 
-// If the nearest surface points of two neighbouring grid points are farther apart than this, in
-// voxels, these points belong to different parts of the surface.
-constexpr double kOtherPart = 2;
-// Refinement of a surface point decreases its distance from the grid point by at most this, in
-// voxels.
-constexpr double kPolishGain = 0.5;
-
 // A grid point keeps its old value if that equals the computed distance within the error of
-// tricubic interpolation. So repeated redistancing does not shift a distance field. The error, in
-// voxels, is about kTricubicError times the square of the curvature. Its upper limit is kMostError,
-// reached at a radius of curvature of about 8 voxels, and its lower limit is kRounding.
-constexpr double kTricubicError = 0.03, kMostError = 1e-3, kRounding = 1e-6;
+// tricubic interpolation. So repeated redistancing does not shift a distance field. kMostError is
+// the upper limit of that error, voxels, reached at a radius of curvature of about 8 voxels.
+constexpr double kMostError = 1e-3;
 
-// Number of searches for a foot point. Each starts where the search before it left its dense block,
-// the stored values around a leaf.
-constexpr int kAttempts = 4;
+// Distance beyond the half width, voxels, from which a surface point may be the nearest.
+constexpr double kMargin = 1.5;
 
-/// Point of the zero set, in index space, and its distance from a grid point, voxels.
-struct Closest {
-  Vec3d point;
-  double distance = 0;
-  void takeIfNearer(const Closest& other) {
-    if (other.distance < distance) *this = other;
-  }
+/// Distance of a grid point, voxels, and its closest point if it is near the band.
+struct PointDistance {
+  double value = 0;
+  std::optional<Closest> closest = {};
 };
 
-/// Finds the closest point of the zero set for a grid point. Refines the nearest surface points
-/// that NearestPoints found for the grid point and for its six neighbours.
-class Polisher {
- public:
-  Polisher(const FloatTree& field, const SurfacePoints& points, const SharpPatches& patches)
-      : cache_(field), points_(points), patches_(patches) {}
-
-  /// Returns the interpolation error of distances to the surface beside a surface point, voxels.
-  [[nodiscard]] double interpolationError(std::uint32_t point) const {
-    const Jet jet = points_.jets[point].jet();
-    const double bend = jet.xx * jet.xx + jet.yy * jet.yy + jet.zz * jet.zz +
-                        2 * (jet.xy * jet.xy + jet.xz * jet.xz + jet.yz * jet.yz);
-    const double slope = jet.gradient.lengthSqr();
-    return std::max(kRounding, slope > 0 ? kTricubicError * bend / slope : 0);
-  }
-
-  Closest closest(const Block& block, openvdb::Index n) {
-    const Coord c = LeafNode::offsetToLocalCoord(n);
-    const Vec3d x = (block.origin + c).asVec3d();
-    const std::uint32_t first = block.nearest[n];
-    const Vec3d nearest = points_.positions[first];
-    Closest best{nearest, (x - nearest).length()};
-    const double start = best.distance;
-    if (!block.own.isOn(n)) best.takeIfNearer(polish(x, first));
-    for (int axis = 0; axis < 3; ++axis)
-      for (int side = -1; side <= 1; side += 2) {
-        const std::uint32_t other = neighbour(block, c, axis, side);
-        if (other == NearestPoints::kNone || other == first) continue;
-        const Vec3d point = points_.positions[other];
-        if ((point - nearest).lengthSqr() < kOtherPart * kOtherPart) continue;
-        if ((x - point).length() < start + kPolishGain) best.takeIfNearer(polish(x, other));
-      }
-    return best;
-  }
-
- private:
-  /// Finds the closest point of the zero set to x near a surface point. The search starts on the
-  /// sharp patches (triangles near edges) if the surface point lies on them, else on the
-  /// interpolant. If the point that it finds lies in the domain of the other of the two, the search
-  /// continues on that one.
-  Closest polish(const Vec3d& x, std::uint32_t point) {
-    const Vec3d start = points_.positions[point];
-    if (!points_.sharp[point]) {
-      const Foot foot = closestPointByOneStep(points_.jets[point].jet(), x, start);
-      if (foot.converged && !patches_.covers(Coord::floor(foot.point)))
-        return {foot.point, foot.distance};
-      return polishOnInterpolant(x, start);
+/// Computes the distance of a grid point from the surface moved by the requested shift.
+PointDistance distanceAt(const Block& block, openvdb::Index n, Polisher& polisher,
+                         const DistanceRequest& request) {
+  const bool inside = block.inside.isOn(n);
+  const double sign = inside ? -1 : 1;
+  PointDistance result{sign * 1e30};
+  if (block.nearest[n] != NearestPoints::kNone) {
+    result.value = sign * std::sqrt(static_cast<double>(block.squared[n])) - request.shift;
+    if (std::abs(result.value) < request.halfWidth + kPolishGain) {
+      result.closest = polisher.closest(block, n);
+      result.value = sign * result.closest->distance - request.shift;
     }
-    const TriangleTree::Hit hit = patches_.nearest(x, (x - start).length());
-    if (!hit.found) return {start, (x - start).length()};
-    if (patches_.covers(Coord::floor(hit.point))) return {hit.point, hit.distance};
-    return polishOnInterpolant(x, hit.point);
   }
+  // An inside grid point stays inside when its distance rounds to zero.
+  if (inside && request.shift == 0) result.value = std::min(result.value, -1e-7);
+  return result;
+}
 
-  /// Finds the foot point with Newton's method from `start`; returns `start` if that fails. Far
-  /// inside a solid, a large part of the surface is almost equally near. The foot point may then be
-  /// far from `start`, so a search that leaves the block restarts at that position.
-  Closest polishOnInterpolant(const Vec3d& x, Vec3d start) {
-    const Closest first{start, (x - start).length()};
-    for (int attempt = 0; attempt < kAttempts; ++attempt) {
-      const DenseBlock& block = cache_.around(start);
-      const Vec3d origin = block.origin().asVec3d();
-      const Foot foot = closestPoint(block, x - origin, start - origin);
-      if (foot.converged) {
-        if (!changesSignAround(block, foot.point)) break;
-        const Closest smooth{foot.point + origin, foot.distance};
-        if (!patches_.covers(Coord::floor(smooth.point))) return smooth;
-        const TriangleTree::Hit hit = patches_.nearest(x, foot.distance + kPolishGain);
-        return hit.found ? Closest{hit.point, hit.distance} : smooth;
-      }
-      if (!foot.left) break;
-      start = foot.point + origin;
-    }
-    return first;
-  }
-
-  static std::uint32_t neighbour(const Block& block, Coord c, int axis, int side) {
-    c[axis] += side;
-    if (c[axis] >= 0 && c[axis] < 8) return block.nearest[LeafNode::coordToOffset(c)];
-    Coord d(1);
-    d[axis] += side;
-    const Block* other = block.neighbours[static_cast<std::size_t>(d.x() * 9 + d.y() * 3 + d.z())];
-    return other ? other->nearest[LeafNode::coordToOffset(c)] : NearestPoints::kNone;
-  }
-
-  DenseBlockCache cache_;
-  const SurfacePoints& points_;
-  const SharpPatches& patches_;
-};
+/// Returns the old value if the computed one equals it within the error of interpolation, voxels.
+double keptOr(double value, double old, const Polisher& polisher, std::uint32_t surfacePoint) {
+  const double change = std::abs(value - old);
+  return change < kMostError && change < polisher.interpolationError(surfacePoint) ? old : value;
+}
 
 /// Result for one block: a leaf, or the value of a tile if no grid point is in the band and all
 /// have the same sign.
 struct LeafOrTile {
   std::unique_ptr<LeafNode> leaf;
   float tile = 0;
+  NearestPoints::Mask unreached = {};                          ///< see NearSide
+  std::vector<std::pair<openvdb::Index, float>> creases = {};  ///< see NearSide
+};
+
+void setDistance(LeafNode& leaf, openvdb::Index n, double value, const DistanceRequest& request,
+                 double voxelSize, float background) {
+  if (std::abs(value) < request.halfWidth)
+    leaf.setValueOn(n, static_cast<float>(value * voxelSize));
+  else
+    leaf.setValueOff(n, value < 0 ? -background : background);
+}
+
+/// Searches of one thread.
+struct Searches {
+  Polisher polisher;
+  MovedSurface moved;
+  Searches(const ZeroSet& surface, double shift) : polisher(surface), moved(surface, shift) {}
 };
 
 /// Computes the distances of one block.
 /// @param before  leaf of the input field; null where the field has none
-LeafOrTile makeLeaf(const Block& block, const LeafNode* before, Polisher& polisher,
+LeafOrTile makeLeaf(const Block& block, const LeafNode* before, Searches& searches,
                     const DistanceRequest& request, double voxelSize, float background) {
-  const double shift = request.shift, halfWidth = request.halfWidth;
-  auto leaf = std::make_unique<LeafNode>(block.origin, background, false);
+  Polisher& polisher = searches.polisher;
+  const double shift = request.shift;
+  LeafOrTile result{std::make_unique<LeafNode>(block.origin, background, false)};
   std::unique_ptr<ClosestPointLeaf> points;
   if (request.visitPoints) points = std::make_unique<ClosestPointLeaf>();
   bool isOn = false;
   for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n) {
-    const bool inside = block.inside.isOn(n);
-    const double sign = inside ? -1 : 1;
-    double value = sign * 1e30;
-    if (block.nearest[n] != NearestPoints::kNone) {
-      value = sign * std::sqrt(static_cast<double>(block.squared[n])) - shift;
-      if (std::abs(value) < halfWidth + kPolishGain) {
-        const Closest closest = polisher.closest(block, n);
-        value = sign * closest.distance - shift;
-        if (points) (*points)[n] = closest.point;
-      }
+    auto [value, closest] = distanceAt(block, n, polisher, request);
+    if (points && closest) (*points)[n] = closest->point;
+    if (before && shift == 0 && before->isValueOn(n))
+      value = keptOr(value, static_cast<double>(before->getValue(n)) / voxelSize, polisher,
+                     block.nearest[n]);
+    const bool isNear = value * shift < 0 && std::abs(value) < request.halfWidth;
+    if (request.nearSide && closest && isNear) {
+      const std::optional<double> found = searches.moved.distance(block, n, *closest);
+      if (!found)
+        result.unreached.setOn(n);
+      else if (*found != std::abs(value))
+        result.creases.emplace_back(n,
+                                    static_cast<float>(std::copysign(*found, value) * voxelSize));
     }
-    // An inside grid point stays inside when its distance rounds to zero.
-    if (inside && shift == 0) value = std::min(value, -1e-7);
-    if (before && shift == 0 && before->isValueOn(n)) {
-      const double kept = static_cast<double>(before->getValue(n)) / voxelSize;
-      if (std::abs(value - kept) < kMostError &&
-          std::abs(value - kept) < polisher.interpolationError(block.nearest[n]))
-        value = kept;
-    }
-    if (std::abs(value) < halfWidth)
-      leaf->setValueOn(n, static_cast<float>(value * voxelSize));
-    else
-      leaf->setValueOnly(n, value < 0 ? -background : background);
+    setDistance(*result.leaf, n, value, request, voxelSize, background);
   }
-  float tile = 0;
-  if (points && !leaf->isEmpty()) request.visitPoints(*leaf, *points);
-  if (leaf->isEmpty() && leaf->isConstant(tile, isOn)) return {nullptr, tile};
-  return {std::move(leaf), 0};
+  if (points && !result.leaf->isEmpty()) request.visitPoints(*result.leaf, *points);
+  if (result.leaf->isEmpty() && result.leaf->isConstant(result.tile, isOn)) result.leaf.reset();
+  return result;
 }
 
-FloatTree::Ptr makeTree(const FloatTree& field, const FloatTree& interpolated,
-                        const SurfacePoints& points, const SharpPatches& patches,
+/// Calls work(index, searches) for the indices below `count`, in parallel.
+template <typename Work>
+void forEachWithSearches(std::size_t count, const ZeroSet& surface, double shift,
+                         const Progress& progress, const Work& work) {
+  tbb::enumerable_thread_specific<Searches> all([&] { return Searches(surface, shift); });
+  constexpr std::size_t kBatch = 4096;
+  for (std::size_t begin = 0; begin < count; begin += kBatch) {
+    const std::size_t end = std::min(begin + kBatch, count);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 16), [&](const auto& range) {
+      Searches& searches = all.local();
+      for (std::size_t i = range.begin(); i != range.end(); ++i) work(i, searches);
+    });
+    report(progress, static_cast<double>(end) / static_cast<double>(count));
+  }
+}
+
+FloatTree::Ptr makeTree(const FloatTree& field, const ZeroSet& surface,
                         const NearestPoints& nearest, const DistanceRequest& request,
                         double voxelSize) {
   const auto background = backgroundOf(request.halfWidth, voxelSize);
   auto result = std::make_shared<FloatTree>(background);
   copySigns(
-      field, [&](const Coord& origin) { return nearest.holds(origin); }, *result);
+      field, [&](const Coord& origin) { return nearest.find(origin) != nullptr; }, *result);
 
   std::vector<const Block*> blocks;
   for (const Block& block : nearest.blocks()) blocks.push_back(&block);
   std::sort(blocks.begin(), blocks.end(),
             [](const Block* a, const Block* b) { return a->origin < b->origin; });
   std::vector<LeafOrTile> leaves(blocks.size());
-  tbb::enumerable_thread_specific<Polisher> polishers(
-      [&] { return Polisher(interpolated, points, patches); });
-  constexpr std::size_t kBatch = 4096;
-  for (std::size_t begin = 0; begin < blocks.size(); begin += kBatch) {
-    const std::size_t end = std::min(begin + kBatch, blocks.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 16), [&](const auto& range) {
-      Polisher& polisher = polishers.local();
-      for (std::size_t i = range.begin(); i != range.end(); ++i)
-        leaves[i] = makeLeaf(*blocks[i], field.probeConstLeaf(blocks[i]->origin), polisher, request,
-                             voxelSize, background);
-    });
-    report(request.progress,
-           0.6 + 0.4 * static_cast<double>(end) / static_cast<double>(blocks.size()));
-  }
+  forEachWithSearches(blocks.size(), surface, request.shift, subProgress(request.progress, 0.6, 1),
+                      [&](std::size_t i, Searches& searches) {
+                        leaves[i] = makeLeaf(*blocks[i], field.probeConstLeaf(blocks[i]->origin),
+                                             searches, request, voxelSize, background);
+                      });
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     if (leaves[i].leaf)
       result->addLeaf(leaves[i].leaf.release());
     else
       result->addTile(1, blocks[i]->origin, leaves[i].tile, false);
+    if (!leaves[i].unreached.isOff())
+      request.nearSide->unreached.touchLeaf(blocks[i]->origin)->setValueMask(leaves[i].unreached);
+    if (!leaves[i].creases.empty())
+      request.nearSide->creases.emplace_back(blocks[i]->origin, std::move(leaves[i].creases));
   }
   openvdb::tools::pruneTiles(*result);
   return result;
+}
+
+/// Returns the leaves with grid points within `reach` voxels of the given ones along each axis.
+openvdb::MaskTree leavesAround(const openvdb::MaskTree& points, double reach) {
+  openvdb::MaskTree leaves;
+  for (auto leaf = points.cbeginLeaf(); leaf; ++leaf) {
+    CoordBBox box;
+    for (auto it = leaf->cbeginValueOn(); it; ++it) box.expand(it.getCoord());
+    box.expand(static_cast<int>(std::ceil(reach)));
+    const Coord low = box.min() & ~7;
+    for (int x = low.x(); x <= box.max().x(); x += 8)
+      for (int y = low.y(); y <= box.max().y(); y += 8)
+        for (int z = low.z(); z <= box.max().z(); z += 8) leaves.touchLeaf(Coord(x, y, z));
+  }
+  return leaves;
+}
+
+/// Computes the signed distance to the zero set of `field` at some grid points, and replaces their
+/// values. The cost depends on their number only.
+/// @param points  active values of the field
+void updateDistances(FloatGrid& field, const openvdb::MaskTree& points,
+                     const DistanceRequest& request) {
+  const openvdb::MaskTree near = leavesAround(points, request.halfWidth + kMargin),
+                          wider = leavesAround(points, request.halfWidth + kReadBySurface);
+  const BlockSelection blocks{{}, &near}, edgeBlocks{{}, &wider};
+  const ZeroSet surface =
+      readZeroSet(field, blocks, &edgeBlocks, subProgress(request.progress, 0, 0.2));
+  NearestPoints nearest(field.tree(), surface.points,
+                        {request.halfWidth, request.halfWidth, {}, &near});
+  nearest.run(subProgress(request.progress, 0.3, 0.6));
+
+  std::vector<const openvdb::MaskTree::LeafNodeType*> masks;
+  for (auto leaf = points.cbeginLeaf(); leaf; ++leaf) masks.push_back(leaf.getLeaf());
+  std::vector<std::unique_ptr<LeafNode>> leaves(masks.size());
+  const double voxelSize = field.voxelSize()[0];
+  const float background = field.background();
+  forEachWithSearches(masks.size(), surface, 0, subProgress(request.progress, 0.6, 1),
+                      [&](std::size_t i, Searches& searches) {
+                        const Coord origin = masks[i]->origin();
+                        const Block* block = nearest.find(origin);
+                        leaves[i] =
+                            std::make_unique<LeafNode>(*field.tree().probeConstLeaf(origin));
+                        for (auto it = masks[i]->cbeginValueOn(); it; ++it) {
+                          const openvdb::Index n = it.pos();
+                          const auto old = static_cast<double>(leaves[i]->getValue(n));
+                          double value = std::copysign(1e30, old);
+                          if (block)
+                            value = keptOr(distanceAt(*block, n, searches.polisher, request).value,
+                                           old / voxelSize, searches.polisher, block->nearest[n]);
+                          setDistance(*leaves[i], n, value, request, voxelSize, background);
+                        }
+                      });
+  for (auto& leaf : leaves) {
+    float tile = 0;
+    bool isOn = false;
+    if (leaf->isEmpty() && leaf->isConstant(tile, isOn))
+      field.tree().addTile(1, leaf->origin(), tile, false);
+    else
+      field.tree().addLeaf(leaf.release());
+  }
 }
 
 }  // namespace
@@ -239,28 +240,15 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
   if (within)
     within->expand(static_cast<int>(std::min(1e9, std::max(reach.inside, reach.outside) + 2)));
 
-  // === Surface points
-  FloatTree::ConstPtr interpolated = field.constTreePtr();
-  const auto reportProgress = [&](double done) {
-    report(request.progress, 0.2 * done);
-    return true;
-  };
-  const SharpPatches patches =
-      request.mayHaveEdges ? SharpPatches(field, within, reportProgress) : SharpPatches();
-  SurfacePoints points = findSurfacePoints(*interpolated, within, patches);
-  if (points.thin) {
-    interpolated = thicken(field.tree());
-    points = findSurfacePoints(*interpolated, within, patches);
-  }
+  const BlockSelection blocks{within};
+  const ZeroSet surface = readZeroSet(field, blocks, request.mayHaveEdges ? &blocks : nullptr,
+                                      subProgress(request.progress, 0, 0.2));
+  const SurfacePoints& points = surface.points;
   if (points.size() == 0)
     throw InvalidInput(
         fmt::format("the field has no zero crossing{}, so there is no surface to "
                     "measure from; give a solid with a surface",
                     within ? " near the region" : ""));
-  if (points.size() >= NearestPoints::kNone)
-    throw ResourceLimit(
-        "more than 2^32 grid points lie beside the surface; use larger "
-        "voxels");
   MemoryEstimate estimate;
   for (const Coord& c : points.gridPoints) estimate.surface.expand(c);
   // There are at least 1.15 surface points for each voxel² of the surface.
@@ -278,13 +266,29 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
   nearest.run(subProgress(request.progress, 0.3, 0.6));
 
   // === Distances
-  FloatGrid::Ptr result = FloatGrid::create(makeTree(field.tree(), *interpolated, points, patches,
-                                                     nearest, request, field.voxelSize()[0]));
+  FloatGrid::Ptr result =
+      FloatGrid::create(makeTree(field.tree(), surface, nearest, request, field.voxelSize()[0]));
   result->setTransform(field.transform().copy());
   result->setName(field.getName());
   result->setGridClass(openvdb::GRID_LEVEL_SET);
   report(request.progress, 1);
   return result;
+}
+
+void mendNearSide(FloatGrid& field, const NearSide& nearSide, const DistanceRequest& request) {
+  if (!nearSide.unreached.empty()) updateDistances(field, nearSide.unreached, request);
+  const auto background = static_cast<double>(field.background());
+  for (const auto& [origin, values] : nearSide.creases) {
+    LeafNode* leaf = field.tree().touchLeaf(origin);
+    for (const auto& [n, value] : values) {
+      if (std::abs(static_cast<double>(value)) < background)
+        leaf->setValueOn(n, value);
+      else
+        leaf->setValueOff(n, std::copysign(field.background(), value));
+    }
+  }
+  openvdb::tools::pruneTiles(field.tree());
+  report(request.progress, 1);
 }
 
 }  // namespace levelset::eikonal

@@ -311,7 +311,7 @@ void NearestPoints::run(const Progress& progress) {
       for (std::size_t i = 0; i < due.size(); ++i)
         for (const Coord& origin : missing[i]) {
           const openvdb::CoordBBox extent(origin, origin.offsetBy(7));
-          if (reach_.region && !reach_.region->hasOverlap(extent)) continue;
+          if (!BlockSelection{reach_.region, reach_.leaves}.holdsBlock(extent)) continue;
           Block& block = touch(origin);
           const Coord back = due[i]->origin - origin;
           block.dirtyNeighbours.fetch_or(

@@ -7,7 +7,7 @@
 #include <deque>
 #include <unordered_map>
 
-#include "levelset/distance/surface_points.h"
+#include "levelset/distance/surface/surface_points.h"
 #include "levelset/progress.h"
 
 namespace levelset::eikonal {
@@ -45,13 +45,35 @@ class NearestPoints {
   struct Reach {
     double inside = 3, outside = 3;                 ///< largest distances from the zero set, voxels
     std::optional<openvdb::CoordBBox> region = {};  ///< box of the grid points; empty: no limit
+    const openvdb::MaskTree* leaves = nullptr;  ///< only blocks with a leaf there; null: no limit
   };
+
+  /// Returns the nearest surface point of a grid point in or near a block; kNone if there is none.
+  [[nodiscard]] static std::uint32_t nearestAt(const Block& block,
+                                               const openvdb::Coord& gridPoint) {
+    const Block* at = &block;
+    while (at) {
+      const openvdb::Coord local = gridPoint - at->origin;
+      const openvdb::Coord step((local.x() > 7) - (local.x() < 0),
+                                (local.y() > 7) - (local.y() < 0),
+                                (local.z() > 7) - (local.z() < 0));
+      if (step == openvdb::Coord(0))
+        return at->nearest[openvdb::FloatTree::LeafNodeType::coordToOffset(local)];
+      at = at->neighbours[static_cast<std::size_t>((step.x() + 1) * 9 + (step.y() + 1) * 3 +
+                                                   step.z() + 1)];
+    }
+    return kNone;
+  }
 
   NearestPoints(const openvdb::FloatTree& field, const SurfacePoints& points, const Reach& reach);
   void run(const Progress& progress);
 
   [[nodiscard]] const std::deque<Block>& blocks() const { return blocks_; }
-  [[nodiscard]] bool holds(const openvdb::Coord& origin) const { return index_.count(origin) > 0; }
+  /// Returns the block that begins at `origin`; null: none.
+  [[nodiscard]] const Block* find(const openvdb::Coord& origin) const {
+    const auto found = index_.find(origin);
+    return found == index_.end() ? nullptr : found->second;
+  }
 
  private:
   Block& touch(const openvdb::Coord& origin);

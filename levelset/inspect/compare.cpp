@@ -8,14 +8,14 @@
 #include <vector>
 
 #include "levelset/csg/csg_vdb.h"
-#include "levelset/distance/closest_point.h"
-#include "levelset/distance/surface_points.h"
+#include "levelset/distance/surface/closest_point.h"
+#include "levelset/distance/surface/surface_points.h"
 #include "levelset/error.h"
 #include "levelset/geometry/point_tree.h"
 #include "levelset/geometry/triangle_tree.h"
 #include "levelset/inspect/curved_surface.h"
 #include "levelset/inspect/symmetric_difference.h"
-#include "levelset/meshing/cell_surface.h"
+#include "levelset/meshing/cells/cell_surface.h"
 #include "levelset/progress_gate.h"
 #include "levelset/transform/resample.h"
 #include "levelset/vdb.h"

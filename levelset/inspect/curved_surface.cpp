@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "levelset/distance/surface_points.h"
+#include "levelset/distance/surface/surface_points.h"
 
 namespace levelset {
 namespace {

@@ -5,8 +5,8 @@
 #include <array>
 #include <vector>
 
-#include "levelset/distance/interpolant.h"
-#include "levelset/meshing/cell_surface.h"
+#include "levelset/distance/surface/interpolant.h"
+#include "levelset/meshing/cells/cell_surface.h"
 
 namespace levelset {
 

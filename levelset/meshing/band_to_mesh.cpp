@@ -4,9 +4,9 @@
 #include <tbb/parallel_for.h>
 
 #include "levelset/error.h"
-#include "levelset/meshing/cell_surface.h"
+#include "levelset/meshing/cells/cell_surface.h"
 #include "levelset/meshing/decimate.h"
-#include "levelset/meshing/sharp_surface.h"
+#include "levelset/meshing/sharp/sharp_surface.h"
 
 namespace levelset {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "levelset/meshing/cell_surface.h"
+#include "levelset/meshing/cells/cell_surface.h"
 
 namespace levelset {
 

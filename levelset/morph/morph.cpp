@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "levelset/distance/distance_transform.h"
+#include "levelset/distance/surface/surface_points.h"
 #include "levelset/error.h"
 #include "levelset/inspect/compare.h"
 #include "levelset/transform/resample.h"

@@ -7,6 +7,7 @@
 #include <mutex>
 
 #include "levelset/distance/distance_transform.h"
+#include "levelset/distance/surface/surface_points.h"
 #include "levelset/error.h"
 #include "levelset/vdb.h"
 
@@ -120,6 +121,11 @@ NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& option
 
   eikonal::DistanceRequest request = nearSurfaceRequest(options, distance / solid.voxelSize(), 0);
   request.progress = subProgress(options.progress, 0, 0.6);
+  const bool isWide =
+      halfWidth >= request.halfWidth && std::abs(request.shift) >= eikonal::kLeastShift;
+  if (isWide) request.halfWidth = halfWidth;
+  eikonal::NearSide nearSide;
+  if (isWide) request.nearSide = &nearSide;
   const openvdb::FloatGrid::Ptr moved = eikonal::distanceTransform(vdb(solid), request);
   if (!hasSurface(*moved))
     throw InvalidInput(
@@ -127,7 +133,13 @@ NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& option
                     "the solid is "
                     "thicker than twice that; use a smaller length",
                     distance));
-  return redistanced(*moved, halfWidth, options, 0.6);
+  if (!isWide) return redistanced(*moved, halfWidth, options, 0.6);
+  // The distances are exact except where parts of the moved surface meet.
+  eikonal::DistanceRequest mend;
+  mend.halfWidth = halfWidth;
+  mend.progress = subProgress(options.progress, 0.6, 1);
+  eikonal::mendNearSide(*moved, nearSide, mend);
+  return makeBand(moved);
 }
 
 NarrowBand offsetBy(NarrowBand solid, const ScalarField& distance, const OffsetOptions& options) {

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "levelset/distance/redistance.h"
-#include "levelset/distance/surface_points.h"
+#include "levelset/distance/surface/surface_points.h"
 #include "levelset/error.h"
 #include "levelset/grids/crease_limiter.h"
 #include "levelset/grids/grid_queries_vdb.h"

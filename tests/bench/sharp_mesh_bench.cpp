@@ -12,7 +12,7 @@
 #include <random>
 
 #include "apps/regress/truth/exact_band.h"
-#include "levelset/meshing/sharp_surface.h"
+#include "levelset/meshing/sharp/sharp_surface.h"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "levelset/distance/surface_points.h"
+#include "levelset/distance/surface/surface_points.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "levelset/meshing/sharp_features.h"
+#include "levelset/meshing/sharp/sharp_features.h"
 
 #include <tbb/parallel_for.h>
 
@@ -10,7 +10,7 @@
 #include <tuple>
 #include <utility>
 
-#include "levelset/meshing/sharp_edges.h"
+#include "levelset/meshing/sharp/sharp_edges.h"
 
 namespace levelset {
 namespace {

@@ -1,4 +1,4 @@
-#include "levelset/distance/interpolant.h"
+#include "levelset/distance/surface/interpolant.h"
 
 #include <cmath>
 #include <cstring>
@@ -81,6 +81,23 @@ Jet DenseBlock::jet(const Vec3d& p) const {
   jet.xz = dot(wz.d, gx);
   jet.yz = dot(wz.d, dy);
   return jet;
+}
+
+void DenseBlock::slope(const Vec3d& p, Jet& jet) const {
+  const int cx = static_cast<int>(std::floor(p.x())), cy = static_cast<int>(std::floor(p.y())),
+            cz = static_cast<int>(std::floor(p.z()));
+  const Weights wx(p.x() - cx), wy(p.y() - cy), wz(p.z() - cz);
+  const float* corner = values_.at(cx - 1, cy - 1, cz - 1);
+  Float4 v[4], dx[4];
+  for (int j = 0; j < 4; ++j) {
+    Float4 rows[4];
+    for (int i = 0; i < 4; ++i) rows[i] = load4(corner + (i * kSide + j) * kSide);
+    v[j] = combine(wx.w, rows);
+    dx[j] = combine(wx.d, rows);
+  }
+  const Float4 value = combine(wy.w, v), gx = combine(wy.w, dx), dy = combine(wy.d, v);
+  jet.value = dot(wz.w, value);
+  jet.gradient = Vec3d(dot(wz.w, gx), dot(wz.w, dy), dot(wz.d, value));
 }
 
 const DenseBlock& DenseBlockCache::around(const Vec3d& position) {

@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
-#include "levelset/distance/interpolant.h"
-#include "levelset/distance/sharp_patches.h"
+#include "levelset/distance/surface/interpolant.h"
+#include "levelset/distance/surface/sharp_patches.h"
 #include "levelset/vdb.h"
 
 namespace levelset::eikonal {
@@ -30,15 +30,19 @@ struct SurfacePoints {
   [[nodiscard]] std::size_t size() const { return positions.size(); }
 };
 
-/// Finds the surface points in the leaf blocks that intersect the index box `within` (empty: all).
+/// Finds the surface points in the leaf blocks `within`.
 /// At least one of two neighbours of opposite sign must have a distance: two opposite backgrounds
 /// do not locate a surface.
 [[nodiscard]] SurfacePoints findSurfacePoints(const openvdb::FloatTree& field,
-                                              const std::optional<openvdb::CoordBBox>& within,
+                                              const BlockSelection& within,
                                               const SharpPatches& patches);
 
 /// Returns the field with its band extended by two grid points on each side, by extrapolation along
 /// the axes. The extrapolation is parabolic where the field is smooth, else linear.
 [[nodiscard]] openvdb::FloatTree::Ptr thicken(const openvdb::FloatTree& field);
+
+/// Returns true when two neighbouring grid points differ in sign and one of them has a distance,
+/// which means a magnitude below the background.
+[[nodiscard]] bool hasZeroCrossing(const openvdb::FloatTree& field);
 
 }  // namespace levelset::eikonal

@@ -2,9 +2,9 @@
 
 // Internal header of levelset: public headers must not include it.
 
-#include <optional>
 #include <vector>
 
+#include "levelset/distance/surface/block_selection.h"
 #include "levelset/geometry/triangle_tree.h"
 #include "levelset/progress.h"
 
@@ -18,9 +18,9 @@ class SharpPatches {
  public:
   /// Builds an empty set.
   SharpPatches() = default;
-  /// Searches for edges and corners in the leaf blocks that intersect the index box `within`
-  /// (empty: all). Finds them only in fields of unit slope.
-  SharpPatches(const openvdb::FloatGrid& field, const std::optional<openvdb::CoordBBox>& within,
+  /// Searches for edges and corners in the leaf blocks `within`. Finds them only in fields of unit
+  /// slope.
+  SharpPatches(const openvdb::FloatGrid& field, const BlockSelection& within,
                const Progress& progress);
 
   [[nodiscard]] bool isEmpty() const { return surface_.isEmpty(); }

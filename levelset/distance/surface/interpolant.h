@@ -65,6 +65,9 @@ class DenseBlock {
   /// Interpolates value and derivatives at a position.
   /// @pre contains(p)
   [[nodiscard]] Jet jet(const openvdb::Vec3d& p) const;
+  /// Interpolates value and gradient at a position, and leaves the second derivatives in `jet`.
+  /// @pre contains(p)
+  void slope(const openvdb::Vec3d& p, Jet& jet) const;
 
  private:
   openvdb::Coord origin_;

@@ -2,7 +2,7 @@
 
 // Internal header of levelset: public headers must not include it.
 
-#include "levelset/distance/interpolant.h"
+#include "levelset/distance/surface/interpolant.h"
 
 namespace levelset::eikonal {
 
@@ -25,10 +25,17 @@ struct Foot {
                                 const openvdb::Vec3d& start);
 
 /// Finds the closest point in a single Newton step from a point on the zero set, given the
-/// derivatives there. `converged` is false when one step does not suffice. Positions may be
-/// relative to any origin.
+/// derivatives there. `converged` is false when the step is longer than `longest`, voxels. The
+/// error is of third order in the length of the step.
 [[nodiscard]] Foot closestPointByOneStep(const Jet& jet, const openvdb::Vec3d& from,
-                                         const openvdb::Vec3d& start);
+                                         const openvdb::Vec3d& start, double longest);
+
+/// Finds the closest point in at most two Newton steps from a point on the zero set, given the
+/// derivatives there. The second step keeps the second derivatives of the first, so it only reads
+/// value and gradient. The error is at most 2e-5 voxel in the distance and 1e-3 voxel along the
+/// surface. `converged` is false when two steps do not suffice. Positions are in index space.
+[[nodiscard]] Foot closestPointByTwoSteps(DenseBlockCache& blocks, const Jet& jet,
+                                          const openvdb::Vec3d& from, const openvdb::Vec3d& start);
 
 /// Returns true when the grid points around a point of the interpolant's zero set have both signs.
 /// Where values of one sign come close to zero, the interpolant may cross zero although the grid

@@ -2,7 +2,7 @@
 
 // Internal header of levelset: public headers must not include it.
 
-#include "levelset/meshing/sharp_features.h"
+#include "levelset/meshing/sharp/sharp_features.h"
 
 namespace levelset {
 

@@ -1,4 +1,4 @@
-#include "levelset/meshing/sharp_edges.h"
+#include "levelset/meshing/sharp/sharp_edges.h"
 
 #include <algorithm>
 #include <tuple>

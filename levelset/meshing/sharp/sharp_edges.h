@@ -5,7 +5,7 @@
 
 #include <unordered_set>
 
-#include "levelset/meshing/sharp_features.h"
+#include "levelset/meshing/sharp/sharp_features.h"
 
 namespace levelset {
 

@@ -1,4 +1,4 @@
-#include "levelset/distance/closest_point.h"
+#include "levelset/distance/surface/closest_point.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +14,9 @@ constexpr double kLongestStep = 1;  // longest Newton step, voxels
 // The iteration stops when the estimated error after a step falls below this, in voxels. The
 // estimate is the cube of the step's length times the square of the curvature.
 constexpr double kTolerance = 2e-5;
+// Largest error along the surface after two steps with the same second derivatives, voxels. It
+// changes the distance by half its square times the sum of curvature and inverse distance.
+constexpr double kTangentTolerance = 1e-3;
 constexpr double kLongestLastStep = 0.6;  // the iteration ends only after a shorter step, voxels
 // Lower bound of the second derivative, along the surface, of half the squared distance from the
 // query point. The derivative is 1 on a plane.
@@ -90,12 +93,34 @@ Foot closestPoint(const DenseBlock& block, const Vec3d& from, const Vec3d& start
   return foot;
 }
 
-Foot closestPointByOneStep(const Jet& jet, const Vec3d& from, const Vec3d& start) {
+Foot closestPointByOneStep(const Jet& jet, const Vec3d& from, const Vec3d& start, double longest) {
   const double slope = jet.gradient.length();
   if (!(slope > 0)) return {};
   const NewtonStep step = newtonStep(jet, slope, from - start);
-  if (!(step.length <= kLongestLastStep) || !(step.remains < kTolerance)) return {};
+  if (!(step.length <= longest)) return {};
   const Vec3d point = start + step.along;
+  return {point, (from - point).length(), true, false};
+}
+
+Foot closestPointByTwoSteps(DenseBlockCache& blocks, const Jet& jet, const Vec3d& from,
+                            const Vec3d& start) {
+  const double slope = jet.gradient.length();
+  if (!(slope > 0)) return {};
+  const NewtonStep first = newtonStep(jet, slope, from - start);
+  if (!(first.length <= kLongestLastStep)) return {};
+  Vec3d point = start + first.along;
+  if (first.remains < kTolerance) return {point, (from - point).length(), true, false};
+
+  const DenseBlock& block = blocks.around(point);
+  Jet next = jet;
+  block.slope(point - block.origin().asVec3d(), next);
+  const double nextSlope = next.gradient.length();
+  if (!(nextSlope > 0)) return {};
+  const NewtonStep second = newtonStep(next, nextSlope, from - point);
+  // Both steps use the same second derivatives, so the error decreases by the same factor each.
+  const double remains = second.length * second.length / first.length;
+  if (!(second.length < first.length) || !(remains < kTangentTolerance)) return {};
+  point += second.along;
   return {point, (from - point).length(), true, false};
 }
 

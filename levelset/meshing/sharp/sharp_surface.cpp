@@ -1,4 +1,4 @@
-#include "levelset/meshing/sharp_surface.h"
+#include "levelset/meshing/sharp/sharp_surface.h"
 
 #include <tbb/parallel_for.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "levelset/meshing/sharp_vertices.h"
+#include "levelset/meshing/sharp/sharp_vertices.h"
 #include "levelset/progress_gate.h"
 
 namespace levelset {

@@ -5,7 +5,7 @@
 #include <map>
 #include <set>
 
-#include "levelset/meshing/sharp_edges.h"
+#include "levelset/meshing/sharp/sharp_edges.h"
 
 namespace levelset {
 namespace {
@@ -30,7 +30,9 @@ class SheetUnfolder {
       : positions_(mesh.positions),
         triangles_(mesh.triangles),
         sheets_(sheets),
-        progress_(progress) {}
+        progress_(progress),
+        state_(mesh.triangles.size(), State::Unknown),
+        changedIn_(mesh.positions.size(), 0) {}
 
   void run() {
     for (int pass = 0; pass < kUnfoldPasses; ++pass) {
@@ -42,6 +44,8 @@ class SheetUnfolder {
   }
 
  private:
+  enum class State : char { Unknown, Folded, Flat };
+
   /// Returns the height of a triangle over its longest side, in the sheet that fits it best,
   /// voxels. The height is negative when the triangle is turned over in that sheet, and kOffSheets
   /// when it lies in no sheet.
@@ -64,22 +68,38 @@ class SheetUnfolder {
     return best;
   }
 
-  [[nodiscard]] std::vector<std::size_t> foldedTriangles() const {
+  /// Returns the folded triangles. Computes the heights of triangles that changed since the last
+  /// call only.
+  [[nodiscard]] std::vector<std::size_t> foldedTriangles() {
     constexpr std::size_t kChunk = 1 << 14;
     std::vector<std::vector<std::size_t>> found((triangles_.size() + kChunk - 1) / kChunk);
     tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t chunk) {
       const std::size_t end = std::min(triangles_.size(), (chunk + 1) * kChunk);
       for (std::size_t i = chunk * kChunk; i < end; ++i) {
-        const Triangle& t = triangles_[i];
-        if (std::all_of(t.begin(), t.end(),
-                        [&](std::uint32_t v) { return sheets_[v].count > 0; }) &&
-            heightInSheet(t) < kLeastHeight)
-          found[chunk].push_back(i);
+        if (state_[i] == State::Unknown)
+          state_[i] = isFolded(triangles_[i]) ? State::Folded : State::Flat;
+        if (state_[i] == State::Folded) found[chunk].push_back(i);
       }
     });
     std::vector<std::size_t> all;
     for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());
     return all;
+  }
+
+  void markChanged(std::size_t triangle) {
+    state_[triangle] = State::Unknown;
+    for (const std::uint32_t v : triangles_[triangle]) changedIn_[v] = round_;
+  }
+  /// Returns true when a triangle with a common vertex has changed since the start of the pass
+  /// before, or in the first pass.
+  [[nodiscard]] bool hasChangedAt(const Triangle& t) const {
+    return std::any_of(t.begin(), t.end(),
+                       [&](std::uint32_t v) { return changedIn_[v] == round_; });
+  }
+
+  [[nodiscard]] bool isFolded(const Triangle& t) const {
+    return std::all_of(t.begin(), t.end(), [&](std::uint32_t v) { return sheets_[v].count > 0; }) &&
+           heightInSheet(t) < kLeastHeight;
   }
 
   /// Flips mesh edges where this decreases the sum of deficit() of both triangles beside the edge.
@@ -89,6 +109,9 @@ class SheetUnfolder {
     for (int pass = 0; pass < kUnfoldPasses; ++pass) {
       report(progress_, done);
       faces_ = foldedTriangles();
+      // No flip helps a triangle while nothing around it changes.
+      std::erase_if(faces_, [&](std::size_t i) { return !hasChangedAt(triangles_[i]); });
+      ++round_;
       if (faces_.empty()) return;
       std::vector<TriangleSide> sides;
       addSides(triangles_, faces_, positions_.size(), sides);
@@ -107,6 +130,8 @@ class SheetUnfolder {
         if (gain(edge, flip) < kLeastGain) continue;
         applyFlip(flip, edge, triangles_, present);
         touched_[first] = touched_[second] = hasChanged = true;
+        markChanged(first);
+        markChanged(second);
       }
       if (!hasChanged) return;
     }
@@ -146,9 +171,11 @@ class SheetUnfolder {
         if (!canStandFor(fans[from], from, to, fans[to])) continue;
         for (const std::size_t j : fans[from]) {
           touched_[j] = true;
+          markChanged(j);
           Triangle& moved = triangles_[j];
           isGone[j] = std::find(moved.begin(), moved.end(), to) != moved.end();
           std::replace(moved.begin(), moved.end(), from, to);
+          markChanged(j);
         }
         for (const std::size_t j : fans[to]) touched_[j] = true;
         isUnused[from] = true;
@@ -158,9 +185,13 @@ class SheetUnfolder {
       if (isUnused[v]) sheets_[v].count = 0;
     std::size_t kept = 0;
     for (std::size_t i = 0; i < triangles_.size(); ++i)
-      if (!isGone[i]) triangles_[kept++] = triangles_[i];
+      if (!isGone[i]) {
+        state_[kept] = state_[i];
+        triangles_[kept++] = triangles_[i];
+      }
     const bool hasChanged = kept < triangles_.size();
     triangles_.resize(kept);
+    state_.resize(kept);
     return hasChanged;
   }
 
@@ -199,6 +230,9 @@ class SheetUnfolder {
   const Progress& progress_;
   std::vector<std::size_t> faces_;  ///< indices of the folded triangles
   std::vector<bool> touched_;       ///< [triangle]: true when this pass changed it
+  std::vector<State> state_;        ///< [triangle]
+  int round_ = 0;                   ///< number of passes over the edges so far
+  std::vector<int> changedIn_;      ///< [vertex]: round of the last change of a triangle there
 };
 
 }  // namespace

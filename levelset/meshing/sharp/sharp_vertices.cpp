@@ -1,4 +1,4 @@
-#include "levelset/meshing/sharp_vertices.h"
+#include "levelset/meshing/sharp/sharp_vertices.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,8 +13,6 @@ using Eigen::Vector3d;
 using openvdb::Coord;
 using openvdb::FloatGrid;
 
-/// Second difference, in voxels, up to which the field counts as smooth at a grid point.
-constexpr double kSmooth = 0.15;
 /// Largest deviation, voxels, from a plane of unit slope of the values in one cell at a grid point,
 /// if they are to define the tangent plane there.
 constexpr double kPlanar = 0.1;
@@ -165,7 +163,7 @@ class VertexPlacer::BlockField {
     const Vector3d bend = back + forward - Vector3d::Constant(2 * plane.distance);
     plane.error = bend.cwiseAbs().maxCoeff();
     plane.bend = std::max(plane.error, std::abs(bend.sum()));
-    plane.isSmooth = plane.error < kSmooth;
+    plane.isSmooth = plane.error < kSmoothBend;
     plane.gradient = (forward - back) / 2;
     if (plane.isSmooth) {
       plane.normal = plane.gradient;

@@ -6,7 +6,8 @@
 #include <span>
 #include <tuple>
 
-#include "levelset/meshing/sharp_vertices.h"
+#include "levelset/meshing/sharp/sharp_evidence.h"
+#include "levelset/meshing/sharp/sharp_vertices.h"
 #include "levelset/progress_gate.h"
 
 namespace levelset {
@@ -14,9 +15,6 @@ namespace {
 
 using openvdb::Vec3d;
 
-/// Largest distance of a feature (a vertex with several sheets) from the planes of its sheets,
-/// voxels.
-constexpr double kMisfit = 0.1;
 /// Inner and outer radius, voxels, of the ring around a feature in which the surface must lie in
 /// the planes of the feature's sheets.
 constexpr double kRingBegin = 0.8, kRingEnd = 2.3;
@@ -39,15 +37,9 @@ constexpr double kBent = 0.005, kFlatter = 4;
 /// Largest distance of the replacing plane from the vertex, voxels, so that both planes belong to
 /// the same face. It also limits the resulting displacement of the vertex.
 constexpr double kSameFace = 0.3;
-/// Distance from an edge, voxels, up to which field values are compared with those of a sharp edge.
-/// Inside a convex edge, or outside a concave one, the values of a sharp edge are distances to the
-/// nearer sheet. Beyond the edge they are distances to the edge.
-constexpr double kEdgeReach = 1.5;
-/// kRounded: tolerance of that comparison, voxels; at a rounded right angle, values differ by up to
-/// 2/5 of the radius of the rounding. kRoundedPart: share of the values that may exceed the
-/// tolerance. Vertices within kCornerReach voxels of a corner do not count, since a third sheet may
-/// be nearer there.
-constexpr double kRounded = 0.06, kRoundedPart = 0.15, kCornerReach = 2;
+/// Vertices within this distance of a corner, voxels, do not count as evidence of an edge, since a
+/// third sheet may be nearer there.
+constexpr double kCornerReach = 2;
 /// Distance, voxels, within which connected vertices count as beside a feature.
 constexpr double kBeside = 3;
 
@@ -72,19 +64,54 @@ class Fans {
   std::vector<std::uint32_t> triangles_;
 };
 
+/// Set of numbers: a hash table that keeps its memory when it is cleared.
+class NumberSet {
+ public:
+  void clear() { ++round_, count_ = 0; }
+  /// Adds a number. @return false if the set had it already
+  bool insert(std::uint32_t number) {
+    if (2 * ++count_ > slots_.size()) grow();
+    for (std::size_t i = number * std::size_t{2654435761};; ++i) {
+      Slot& slot = slots_[i % slots_.size()];
+      if (slot.round != round_) return slot = {round_, number}, true;
+      if (slot.number == number) return --count_, false;
+    }
+  }
+
+ private:
+  struct Slot {
+    std::uint64_t round = 0;
+    std::uint32_t number = 0;
+  };
+  void grow() {
+    const std::vector<Slot> old = std::move(slots_);
+    slots_.assign(2 * old.size(), {});
+    count_ = 1;
+    for (const Slot& slot : old)
+      if (slot.round == round_) insert(slot.number);
+  }
+
+  std::vector<Slot> slots_ = std::vector<Slot>(256);
+  std::uint64_t round_ = 1;
+  std::size_t count_ = 0;
+};
+
 /// Returns the triangles that are connected to a vertex by mesh edges through vertices within
 /// `radius` voxels of it.
 std::vector<std::uint32_t> trianglesNear(const IndexMesh& mesh, const Fans& fans,
                                          std::uint32_t vertex, double radius) {
+  thread_local NumberSet isFound, isReached;
+  isFound.clear();
+  isReached.clear();
+  isReached.insert(vertex);
   const Vec3d centre = mesh.positions[vertex];
   std::vector<std::uint32_t> vertices{vertex}, found;
   for (std::size_t i = 0; i < vertices.size(); ++i)
     for (const std::uint32_t t : fans.at(vertices[i])) {
-      if (std::find(found.begin(), found.end(), t) != found.end()) continue;
+      if (!isFound.insert(t)) continue;
       found.push_back(t);
       for (const std::uint32_t v : mesh.triangles[t])
-        if ((mesh.positions[v] - centre).lengthSqr() < radius * radius &&
-            std::find(vertices.begin(), vertices.end(), v) == vertices.end())
+        if ((mesh.positions[v] - centre).lengthSqr() < radius * radius && isReached.insert(v))
           vertices.push_back(v);
     }
   return found;
@@ -148,57 +175,6 @@ bool isConfirmed(const IndexMesh& mesh, const Fans& fans, std::uint32_t vertex,
   return area > 0 && odd <= kOddPart * area;
 }
 
-/// Number of grid points examined beside an edge, and number whose values contradict a sharp edge.
-/// Index 0 assumes a convex edge, index 1 a concave one.
-struct EdgeEvidence {
-  std::array<std::size_t, 2> points = {}, odd = {};
-
-  void add(const EdgeEvidence& other) {
-    for (std::size_t i = 0; i < 2; ++i) {
-      points[i] += other.points[i];
-      odd[i] += other.odd[i];
-    }
-  }
-  [[nodiscard]] bool isSharp() const {
-    const auto speaksFor = [&](std::size_t i) {
-      return points[i] &&
-             static_cast<double>(odd[i]) <= kRoundedPart * static_cast<double>(points[i]);
-    };
-    return speaksFor(0) || speaksFor(1);
-  }
-};
-
-/// Compares the field around a vertex with two sheets to that of a sharp edge. Inside a convex
-/// edge, the values must equal the distance to the nearer plane; beyond the edge, they must not
-/// exceed the distance to the edge. For a concave edge the same holds with the opposite signs.
-EdgeEvidence evidenceAt(const Vec3d& vertex, const VertexSheets& sheets,
-                        const openvdb::FloatGrid::ConstAccessor& field, double voxelSize,
-                        double halfWidth) {
-  const Vec3d n0 = sheetNormal(sheets, 0), n1 = sheetNormal(sheets, 1);
-  const double cosine = n0.dot(n1);
-  Vec3d along = n0.cross(n1);
-  along.normalize();
-  EdgeEvidence found;
-  const openvdb::Coord centre = openvdb::Coord::round(vertex);
-  for (const openvdb::Coord& c : openvdb::CoordBBox(centre.offsetBy(-2), centre.offsetBy(2))) {
-    const Vec3d to = c.asVec3d() - vertex;
-    const double alongEdge = to.dot(along), across = (to - along * alongEdge).length();
-    const double value = static_cast<double>(field.getValue(c)) / voxelSize;
-    // A value at the end of the band is clipped to the background and proves nothing.
-    if (std::abs(alongEdge) > kEdgeReach || std::abs(value) > halfWidth * (1 - 1e-5)) continue;
-    for (const int sign : {1, -1}) {
-      const double d0 = sign * to.dot(n0), d1 = sign * to.dot(n1), d = sign * value;
-      const bool isInside = d0 < 0 && d1 < 0 && std::min(d0, d1) > -kEdgeReach;
-      const bool isBeyond = d0 > cosine * d1 && d1 > cosine * d0 && across < kEdgeReach;
-      if (!isInside && !isBeyond) continue;
-      ++found.points[sign < 0];
-      found.odd[sign < 0] +=
-          isInside ? std::abs(d - std::max(d0, d1)) > kRounded : d > across + kRounded;
-    }
-  }
-  return found;
-}
-
 /// Returns true when two vertices have two sheets each, and each sheet of one vertex is also a
 /// sheet of the other.
 bool areSameSheets(const VertexSheets& a, const VertexSheets& b) {
@@ -251,7 +227,8 @@ SheetEstimate flatterSheet(const IndexMesh& mesh, std::span<const std::uint32_t>
   double least = kBeside * kBeside;
   for (const std::uint32_t t : triangles)
     for (const std::uint32_t v : mesh.triangles[t]) {
-      if (quality[v].bend * kFlatter > quality[own.vertex].bend || quality[v].misfit > kMisfit)
+      if (quality[v].bend * kFlatter > quality[own.vertex].bend ||
+          quality[v].misfit > kFeatureMisfit)
         continue;
       const Vec3d to = mesh.positions[v] - position;
       for (std::size_t k = 0; k < sheets[v].count; ++k) {
@@ -305,7 +282,7 @@ std::vector<bool> confirmFeatures(IndexMesh& mesh, const openvdb::FloatGrid& fie
   std::vector<bool> isBeside(mesh.positions.size());
   std::vector<std::uint32_t> features;
   for (std::uint32_t v = 0; v < sheets.size(); ++v)
-    if (sheets[v].count > 1 && quality[v].misfit <= kMisfit) features.push_back(v);
+    if (sheets[v].count > 1 && quality[v].misfit <= kFeatureMisfit) features.push_back(v);
   if (features.empty()) return isBeside;
   report(progress, 0);
   const Fans fans(mesh);
@@ -313,27 +290,27 @@ std::vector<bool> confirmFeatures(IndexMesh& mesh, const openvdb::FloatGrid& fie
   const Progress asked = subProgress(progress, 0.2, 1);
   ProgressGate gate(asked, 2 * features.size());
   std::vector<EdgeEvidence> evidence(mesh.positions.size());
-  const double voxelSize = field.voxelSize()[0];
-  const double halfWidth = static_cast<double>(field.background()) / voxelSize;
-  tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, features.size(), 64), [&](const auto& range) {
-        const auto accessor = field.getConstAccessor();
-        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          const std::uint32_t v = features[i];
-          if (sheets[v].count == 2)
-            evidence[v] = evidenceAt(mesh.positions[v], sheets[v], accessor, voxelSize, halfWidth);
-        }
-        gate.advance(range.size());
-      });
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, features.size(), 64),
+                    [&](const auto& range) {
+                      const auto accessor = field.getConstAccessor();
+                      for (std::size_t i = range.begin(); i != range.end(); ++i) {
+                        const std::uint32_t v = features[i];
+                        if (sheets[v].count == 2)
+                          evidence[v] = edgeEvidence(mesh.positions[v], sheets[v], field, accessor);
+                      }
+                      gate.advance(range.size());
+                    });
   std::vector<std::vector<std::uint32_t>> near(features.size());
   std::vector<char> isSure(features.size()), isEdge(mesh.positions.size());
   tbb::parallel_for(std::size_t{0}, features.size(), [&](std::size_t i) {
     const std::uint32_t v = features[i];
     near[i] = trianglesNear(mesh, fans, v, kBeside);
-    isSure[i] = isConfirmed(mesh, fans, v, sheets[v], quality) &&
-                hasFlatSheets(mesh, near[i], v, sheets, quality);
-    isEdge[v] = isSure[i] && isSharp(mesh, near[i], v, sheets, evidence);
-    if (!isEdge[v] && !(isSure[i] && sheets[v].count > 2)) near[i] = {};
+    const bool mayBeEdge = isSharp(mesh, near[i], v, sheets, evidence);
+    isSure[i] = (mayBeEdge || sheets[v].count > 2) &&
+                hasFlatSheets(mesh, near[i], v, sheets, quality) &&
+                isConfirmed(mesh, fans, v, sheets[v], quality);
+    isEdge[v] = isSure[i] && mayBeEdge;
+    if (!isSure[i]) near[i] = {};
     gate.advance(1);
   });
   // The values at a corner depend on three sheets, so they are not compared with those of a sharp

@@ -1,4 +1,4 @@
-#include "levelset/distance/sharp_patches.h"
+#include "levelset/distance/surface/sharp_patches.h"
 
 #include <openvdb/tools/Morphology.h>
 #include <tbb/blocked_range.h>
@@ -9,21 +9,21 @@
 #include <memory>
 #include <tuple>
 
-#include "levelset/distance/interpolant.h"
-#include "levelset/meshing/sharp_surface.h"
+#include "levelset/meshing/sharp/sharp_evidence.h"
+#include "levelset/meshing/sharp/sharp_surface.h"
 
 namespace levelset::eikonal {
 namespace {
 
 using openvdb::Coord;
-using openvdb::CoordBBox;
 using openvdb::FloatGrid;
 using openvdb::FloatTree;
 using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
-// Second difference of the distance, voxels, above which a grid point may lie beside an edge.
-constexpr double kSharpBend = 0.15;
+// Distance from a vertex on an edge, voxels, within which the surface decides where that edge is.
+// The leaves around are copied too.
+constexpr double kEdgeContext = 4;
 // Number of cells around a cell with an edge in which the edge, or the bisector plane of its faces,
 // affects the interpolant.
 constexpr int kZone = 3;
@@ -36,58 +36,42 @@ constexpr double kThin = 2;
 // so both are left to the interpolant.
 constexpr double kFacesAway = -0.9;
 
-/// Returns true when a second difference of the field exceeds `limit`, world units, at a grid point
-/// beside the surface.
-bool bends(const DenseBlock& block, double limit) {
-  constexpr int kSteps[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  for (int x = 0; x < 8; ++x)
-    for (int y = 0; y < 8; ++y)
-      for (int z = 0; z < 8; ++z) {
-        const float here = block.at(x, y, z);
-        float bend = 0;
-        bool beside = false;
-        for (const auto& s : kSteps) {
-          const float a = block.at(x - s[0], y - s[1], z - s[2]),
-                      b = block.at(x + s[0], y + s[1], z + s[2]);
-          beside = beside || (a < 0) != (here < 0) || (b < 0) != (here < 0);
-          bend = std::max(bend, std::abs(a + b - 2 * here));
-        }
-        if (beside && static_cast<double>(bend) > limit) return true;
-      }
-  return false;
+/// Adds the leaves with a grid point within `reach` voxels, at most 8, of a point along each axis.
+void touchAround(openvdb::MaskTree& leaves, const Vec3d& point, double reach) {
+  for (int corner = 0; corner < 8; ++corner)
+    leaves.touchLeaf(
+        Coord::floor(point + Vec3d(corner & 4 ? reach : -reach, corner & 2 ? reach : -reach,
+                                   corner & 1 ? reach : -reach)));
 }
 
 /// Returns a grid of the leaves that may contain an edge, with the 26 leaves or tiles around each.
-FloatGrid::Ptr bentPart(const FloatGrid& field, const std::optional<CoordBBox>& within) {
+FloatGrid::Ptr partWithEdges(const FloatGrid& field, const BlockSelection& within) {
   std::vector<const LeafNode*> leaves;
   for (auto it = field.tree().cbeginLeaf(); it; ++it)
-    if (!within || within->hasOverlap(it->getNodeBoundingBox())) leaves.push_back(it.getLeaf());
-  std::vector<char> isBent(leaves.size(), 0);
-  const double limit = kSharpBend * field.voxelSize()[0];
+    if (within.holdsBlock(it->getNodeBoundingBox())) leaves.push_back(it.getLeaf());
+  std::vector<std::vector<Vec3d>> vertices(leaves.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 64), [&](const auto& range) {
     const FloatGrid::ConstAccessor accessor(field.tree());
-    const auto block = std::make_unique<DenseBlock>();
-    for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      block->load(accessor, leaves[i]->origin());
-      isBent[i] = bends(*block, limit);
-    }
+    for (std::size_t i = range.begin(); i != range.end(); ++i)
+      vertices[i] = sharpEdgeVertices(field, accessor, leaves[i]->origin());
   });
+  openvdb::MaskTree near;  // leaves within kEdgeContext voxels of such a vertex
+  for (const std::vector<Vec3d>& found : vertices)
+    for (const Vec3d& vertex : found) touchAround(near, vertex, kEdgeContext);
   auto part = FloatGrid::create(field.background());
   part->setTransform(field.transform().copy());
   auto target = part->getAccessor();
   auto source = field.getConstAccessor();
-  for (std::size_t i = 0; i < leaves.size(); ++i) {
-    if (!isBent[i]) continue;
+  for (auto leaf = near.cbeginLeaf(); leaf; ++leaf)
     for (int k = 0; k < 27; ++k) {
       const Coord origin =
-          leaves[i]->origin().offsetBy(8 * (k / 9 - 1), 8 * (k / 3 % 3 - 1), 8 * (k % 3 - 1));
+          leaf->origin().offsetBy(8 * (k / 9 - 1), 8 * (k / 3 % 3 - 1), 8 * (k % 3 - 1));
       if (target.probeConstLeaf(origin)) continue;
-      if (const LeafNode* leaf = source.probeConstLeaf(origin))
-        target.addLeaf(new LeafNode(*leaf));
+      if (const LeafNode* there = source.probeConstLeaf(origin))
+        target.addLeaf(new LeafNode(*there));
       else
         target.addTile(1, origin, source.getValue(origin), false);
     }
-  }
   return part;
 }
 
@@ -98,10 +82,7 @@ class SheetTable {
   explicit SheetTable(const SharpMesh& mesh) {
     openvdb::MaskTree near;  // leaves within kThin voxels of an edge or corner
     for (std::size_t v = 0; v < mesh.sheets.size(); ++v)
-      for (int corner = 0; corner < 8 && mesh.sheets[v].count > 1; ++corner)
-        near.touchLeaf(Coord::floor(mesh.positions[v] + Vec3d(corner & 4 ? kThin : -kThin,
-                                                              corner & 2 ? kThin : -kThin,
-                                                              corner & 1 ? kThin : -kThin)));
+      if (mesh.sheets[v].count > 1) touchAround(near, mesh.positions[v], kThin);
     const openvdb::tree::ValueAccessor<const openvdb::MaskTree> isNear(near);
     for (const auto& [a, b, c] : mesh.triangles) {
       const Vec3d &p = mesh.positions[a], &q = mesh.positions[b], &r = mesh.positions[c];
@@ -145,9 +126,9 @@ class SheetTable {
 
 }  // namespace
 
-SharpPatches::SharpPatches(const FloatGrid& field, const std::optional<CoordBBox>& within,
+SharpPatches::SharpPatches(const FloatGrid& field, const BlockSelection& within,
                            const Progress& progress) {
-  const FloatGrid::Ptr part = bentPart(field, within);
+  const FloatGrid::Ptr part = partWithEdges(field, within);
   if (part->tree().leafCount() == 0) return;
   const CellSurface surface(*part);
   const SharpMesh mesh = sharpSurface(surface, *part, progress);

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-#include "levelset/meshing/cell_surface.h"
+#include "levelset/meshing/cells/cell_surface.h"
 #include "levelset/progress.h"
 
 namespace levelset {

@@ -1,4 +1,4 @@
-#include "levelset/distance/surface_points.h"
+#include "levelset/distance/surface/surface_points.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -8,8 +8,7 @@
 #include <atomic>
 #include <cmath>
 
-#include "levelset/distance/closest_point.h"
-#include "levelset/distance/distance_transform.h"
+#include "levelset/distance/surface/closest_point.h"
 
 namespace levelset::eikonal {
 namespace {
@@ -108,11 +107,10 @@ void forEachPointBeside(const DenseBlock& block, float background, const Visit& 
       }
 }
 
-std::vector<const LeafNode*> leavesOf(const FloatTree& tree,
-                                      const std::optional<openvdb::CoordBBox>& within) {
+std::vector<const LeafNode*> leavesOf(const FloatTree& tree, const BlockSelection& within) {
   std::vector<const LeafNode*> leaves;
   for (auto it = tree.cbeginLeaf(); it; ++it)
-    if (!within || within->hasOverlap(it->getNodeBoundingBox())) leaves.push_back(it.getLeaf());
+    if (within.holdsBlock(it->getNodeBoundingBox())) leaves.push_back(it.getLeaf());
   return leaves;
 }
 
@@ -190,8 +188,7 @@ bool isThinAt(const DenseBlock& block, int x, int y, int z, float background) {
 
 }  // namespace
 
-SurfacePoints findSurfacePoints(const FloatTree& field,
-                                const std::optional<openvdb::CoordBBox>& within,
+SurfacePoints findSurfacePoints(const FloatTree& field, const BlockSelection& within,
                                 const SharpPatches& patches) {
   const std::vector<const LeafNode*> leaves = leavesOf(field, within);
   const float background = field.background();
@@ -229,7 +226,7 @@ SurfacePoints findSurfacePoints(const FloatTree& field,
     all.thin = all.thin || part.thin;
   }
   for (const Vec3d& feature : patches.features())
-    if (!within || within->isInside(Coord::floor(feature))) all.positions.push_back(feature);
+    if (within.holds(Coord::floor(feature))) all.positions.push_back(feature);
   all.jets.resize(all.positions.size());
   all.sharp.resize(all.positions.size(), 1);
   return all;

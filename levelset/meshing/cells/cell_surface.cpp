@@ -1,4 +1,4 @@
-#include "levelset/meshing/cell_surface.h"
+#include "levelset/meshing/cells/cell_surface.h"
 
 #include <tbb/parallel_for.h>
 

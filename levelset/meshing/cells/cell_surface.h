@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "levelset/meshing/cell_table.h"
+#include "levelset/meshing/cells/cell_table.h"
 #include "levelset/vdb.h"
 
 namespace levelset {

@@ -1,4 +1,4 @@
-#include "levelset/meshing/cell_table.h"
+#include "levelset/meshing/cells/cell_table.h"
 
 #include <cassert>
 #include <limits>

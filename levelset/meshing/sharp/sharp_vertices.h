@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "levelset/meshing/sharp_features.h"
+#include "levelset/meshing/sharp/sharp_features.h"
 
 namespace levelset {
 
@@ -27,6 +27,10 @@ struct FacePlane {
 /// Returns the normals of the planes that pass within 0.05 voxels of a point, one for each sheet.
 [[nodiscard]] VertexSheets sheetsAt(const Eigen::Vector3d& point,
                                     const std::vector<FacePlane>& planes);
+
+/// Second difference, in voxels, up to which the field counts as smooth at a grid point. An edge
+/// has a larger one at a corner of each cell that it crosses.
+inline constexpr double kSmoothBend = 0.15;
 
 struct DualVertex {
   /// Point where the tangent planes estimated at the cell's grid points meet, voxels.

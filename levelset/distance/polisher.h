@@ -1,0 +1,54 @@
+#pragma once
+
+// Internal header of levelset: public headers must not include it.
+
+#include "levelset/distance/propagate.h"
+#include "levelset/distance/surface/zero_set.h"
+
+namespace levelset::eikonal {
+
+/// Refinement of a surface point decreases its distance from the grid point by at most this, in
+/// voxels.
+inline constexpr double kPolishGain = 0.5;
+
+/// Point of the zero set, in index space, and its distance from a grid point, voxels.
+struct Closest {
+  openvdb::Vec3d point;
+  double distance = 0;
+  void takeIfNearer(const Closest& other) {
+    if (other.distance < distance) *this = other;
+  }
+};
+
+/// Finds the closest point of the zero set for a grid point. Refines the nearest surface points
+/// that NearestPoints found for the grid point and for its six neighbours. One per thread.
+class Polisher {
+ public:
+  explicit Polisher(const ZeroSet& surface)
+      : cache_(*surface.interpolated), points_(surface.points), patches_(surface.patches) {}
+
+  /// Returns the interpolation error of distances to the surface beside a surface point, voxels.
+  [[nodiscard]] double interpolationError(std::uint32_t point) const;
+
+  /// Returns the closest point for the grid point number `n` of a block.
+  /// @pre the grid point has a nearest surface point
+  [[nodiscard]] Closest closest(const NearestPoints::Block& block, openvdb::Index n);
+
+ private:
+  /// Finds the closest point of the zero set to x near a surface point. The search starts on the
+  /// sharp patches (triangles near edges) if the surface point lies on them, else on the
+  /// interpolant. If the point that it finds lies in the domain of the other of the two, the search
+  /// continues on that one.
+  Closest polish(const openvdb::Vec3d& x, std::uint32_t point);
+  /// Finds the foot point with Newton's method from `start`; returns `start` if that fails. Far
+  /// inside a solid, a large part of the surface is almost equally near. The foot point may then be
+  /// far from `start`, so a search that leaves the block restarts at that position.
+  Closest polishOnInterpolant(const openvdb::Vec3d& x, openvdb::Vec3d start);
+  [[nodiscard]] bool isOnSurface(const openvdb::Vec3d& point);
+
+  DenseBlockCache cache_;
+  const SurfacePoints& points_;
+  const SharpPatches& patches_;
+};
+
+}  // namespace levelset::eikonal

@@ -1,0 +1,25 @@
+#pragma once
+
+// Internal header of levelset: public headers must not include it.
+
+#include <optional>
+
+#include "levelset/vdb.h"
+
+namespace levelset::eikonal {
+
+/// Leaf blocks of a tree. Default: all.
+struct BlockSelection {
+  std::optional<openvdb::CoordBBox> box = {};  ///< only blocks that intersect it; empty: no limit
+  const openvdb::MaskTree* leaves = nullptr;   ///< only blocks with a leaf there; null: no limit
+
+  /// @param block  index box of a leaf block
+  [[nodiscard]] bool holdsBlock(const openvdb::CoordBBox& block) const {
+    return (!box || box->hasOverlap(block)) && (!leaves || leaves->probeConstLeaf(block.min()));
+  }
+  [[nodiscard]] bool holds(const openvdb::Coord& gridPoint) const {
+    return (!box || box->isInside(gridPoint)) && (!leaves || leaves->probeConstLeaf(gridPoint));
+  }
+};
+
+}  // namespace levelset::eikonal
