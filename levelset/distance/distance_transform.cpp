@@ -10,8 +10,7 @@
 #include <cmath>
 #include <memory>
 
-#include "levelset/distance/moved_surface.h"
-#include "levelset/distance/redistance.h"
+#include "levelset/distance/polisher.h"
 #include "levelset/distance/signs.h"
 #include "levelset/error.h"
 #include "levelset/memory_estimate.h"
@@ -31,9 +30,6 @@ using Block = NearestPoints::Block;
 // tricubic interpolation. So repeated redistancing does not shift a distance field. kMostError is
 // the upper limit of that error, voxels, reached at a radius of curvature of about 8 voxels.
 constexpr double kMostError = 1e-3;
-
-// Distance beyond the half width, voxels, from which a surface point may be the nearest.
-constexpr double kMargin = 1.5;
 
 /// Distance of a grid point, voxels, and its closest point if it is near the band.
 struct PointDistance {
@@ -70,8 +66,6 @@ double keptOr(double value, double old, const Polisher& polisher, std::uint32_t 
 struct LeafOrTile {
   std::unique_ptr<LeafNode> leaf;
   float tile = 0;
-  NearestPoints::Mask unreached = {};                          ///< see NearSide
-  std::vector<std::pair<openvdb::Index, float>> creases = {};  ///< see NearSide
 };
 
 void setDistance(LeafNode& leaf, openvdb::Index n, double value, const DistanceRequest& request,
@@ -82,18 +76,10 @@ void setDistance(LeafNode& leaf, openvdb::Index n, double value, const DistanceR
     leaf.setValueOff(n, value < 0 ? -background : background);
 }
 
-/// Searches of one thread.
-struct Searches {
-  Polisher polisher;
-  MovedSurface moved;
-  Searches(const ZeroSet& surface, double shift) : polisher(surface), moved(surface, shift) {}
-};
-
 /// Computes the distances of one block.
 /// @param before  leaf of the input field; null where the field has none
-LeafOrTile makeLeaf(const Block& block, const LeafNode* before, Searches& searches,
+LeafOrTile makeLeaf(const Block& block, const LeafNode* before, Polisher& polisher,
                     const DistanceRequest& request, double voxelSize, float background) {
-  Polisher& polisher = searches.polisher;
   const double shift = request.shift;
   LeafOrTile result{std::make_unique<LeafNode>(block.origin, background, false)};
   std::unique_ptr<ClosestPointLeaf> points;
@@ -105,15 +91,6 @@ LeafOrTile makeLeaf(const Block& block, const LeafNode* before, Searches& search
     if (before && shift == 0 && before->isValueOn(n))
       value = keptOr(value, static_cast<double>(before->getValue(n)) / voxelSize, polisher,
                      block.nearest[n]);
-    const bool isNear = value * shift < 0 && std::abs(value) < request.halfWidth;
-    if (request.nearSide && closest && isNear) {
-      const std::optional<double> found = searches.moved.distance(block, n, *closest);
-      if (!found)
-        result.unreached.setOn(n);
-      else if (*found != std::abs(value))
-        result.creases.emplace_back(n,
-                                    static_cast<float>(std::copysign(*found, value) * voxelSize));
-    }
     setDistance(*result.leaf, n, value, request, voxelSize, background);
   }
   if (points && !result.leaf->isEmpty()) request.visitPoints(*result.leaf, *points);
@@ -121,17 +98,17 @@ LeafOrTile makeLeaf(const Block& block, const LeafNode* before, Searches& search
   return result;
 }
 
-/// Calls work(index, searches) for the indices below `count`, in parallel.
+/// Calls work(index, polisher) for the indices below `count`, in parallel.
 template <typename Work>
-void forEachWithSearches(std::size_t count, const ZeroSet& surface, double shift,
-                         const Progress& progress, const Work& work) {
-  tbb::enumerable_thread_specific<Searches> all([&] { return Searches(surface, shift); });
+void forEachWithPolisher(std::size_t count, const ZeroSet& surface, const Progress& progress,
+                         const Work& work) {
+  tbb::enumerable_thread_specific<Polisher> polishers([&] { return Polisher(surface); });
   constexpr std::size_t kBatch = 4096;
   for (std::size_t begin = 0; begin < count; begin += kBatch) {
     const std::size_t end = std::min(begin + kBatch, count);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 16), [&](const auto& range) {
-      Searches& searches = all.local();
-      for (std::size_t i = range.begin(); i != range.end(); ++i) work(i, searches);
+      Polisher& polisher = polishers.local();
+      for (std::size_t i = range.begin(); i != range.end(); ++i) work(i, polisher);
     });
     report(progress, static_cast<double>(end) / static_cast<double>(count));
   }
@@ -150,83 +127,19 @@ FloatTree::Ptr makeTree(const FloatTree& field, const ZeroSet& surface,
   std::sort(blocks.begin(), blocks.end(),
             [](const Block* a, const Block* b) { return a->origin < b->origin; });
   std::vector<LeafOrTile> leaves(blocks.size());
-  forEachWithSearches(blocks.size(), surface, request.shift, subProgress(request.progress, 0.6, 1),
-                      [&](std::size_t i, Searches& searches) {
+  forEachWithPolisher(blocks.size(), surface, subProgress(request.progress, 0.6, 1),
+                      [&](std::size_t i, Polisher& polisher) {
                         leaves[i] = makeLeaf(*blocks[i], field.probeConstLeaf(blocks[i]->origin),
-                                             searches, request, voxelSize, background);
+                                             polisher, request, voxelSize, background);
                       });
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     if (leaves[i].leaf)
       result->addLeaf(leaves[i].leaf.release());
     else
       result->addTile(1, blocks[i]->origin, leaves[i].tile, false);
-    if (!leaves[i].unreached.isOff())
-      request.nearSide->unreached.touchLeaf(blocks[i]->origin)->setValueMask(leaves[i].unreached);
-    if (!leaves[i].creases.empty())
-      request.nearSide->creases.emplace_back(blocks[i]->origin, std::move(leaves[i].creases));
   }
   openvdb::tools::pruneTiles(*result);
   return result;
-}
-
-/// Returns the leaves with grid points within `reach` voxels of the given ones along each axis.
-openvdb::MaskTree leavesAround(const openvdb::MaskTree& points, double reach) {
-  openvdb::MaskTree leaves;
-  for (auto leaf = points.cbeginLeaf(); leaf; ++leaf) {
-    CoordBBox box;
-    for (auto it = leaf->cbeginValueOn(); it; ++it) box.expand(it.getCoord());
-    box.expand(static_cast<int>(std::ceil(reach)));
-    const Coord low = box.min() & ~7;
-    for (int x = low.x(); x <= box.max().x(); x += 8)
-      for (int y = low.y(); y <= box.max().y(); y += 8)
-        for (int z = low.z(); z <= box.max().z(); z += 8) leaves.touchLeaf(Coord(x, y, z));
-  }
-  return leaves;
-}
-
-/// Computes the signed distance to the zero set of `field` at some grid points, and replaces their
-/// values. The cost depends on their number only.
-/// @param points  active values of the field
-void updateDistances(FloatGrid& field, const openvdb::MaskTree& points,
-                     const DistanceRequest& request) {
-  const openvdb::MaskTree near = leavesAround(points, request.halfWidth + kMargin),
-                          wider = leavesAround(points, request.halfWidth + kReadBySurface);
-  const BlockSelection blocks{{}, &near}, edgeBlocks{{}, &wider};
-  const ZeroSet surface =
-      readZeroSet(field, blocks, &edgeBlocks, subProgress(request.progress, 0, 0.2));
-  NearestPoints nearest(field.tree(), surface.points,
-                        {request.halfWidth, request.halfWidth, {}, &near});
-  nearest.run(subProgress(request.progress, 0.3, 0.6));
-
-  std::vector<const openvdb::MaskTree::LeafNodeType*> masks;
-  for (auto leaf = points.cbeginLeaf(); leaf; ++leaf) masks.push_back(leaf.getLeaf());
-  std::vector<std::unique_ptr<LeafNode>> leaves(masks.size());
-  const double voxelSize = field.voxelSize()[0];
-  const float background = field.background();
-  forEachWithSearches(masks.size(), surface, 0, subProgress(request.progress, 0.6, 1),
-                      [&](std::size_t i, Searches& searches) {
-                        const Coord origin = masks[i]->origin();
-                        const Block* block = nearest.find(origin);
-                        leaves[i] =
-                            std::make_unique<LeafNode>(*field.tree().probeConstLeaf(origin));
-                        for (auto it = masks[i]->cbeginValueOn(); it; ++it) {
-                          const openvdb::Index n = it.pos();
-                          const auto old = static_cast<double>(leaves[i]->getValue(n));
-                          double value = std::copysign(1e30, old);
-                          if (block)
-                            value = keptOr(distanceAt(*block, n, searches.polisher, request).value,
-                                           old / voxelSize, searches.polisher, block->nearest[n]);
-                          setDistance(*leaves[i], n, value, request, voxelSize, background);
-                        }
-                      });
-  for (auto& leaf : leaves) {
-    float tile = 0;
-    bool isOn = false;
-    if (leaf->isEmpty() && leaf->isConstant(tile, isOn))
-      field.tree().addTile(1, leaf->origin(), tile, false);
-    else
-      field.tree().addLeaf(leaf.release());
-  }
 }
 
 }  // namespace
@@ -273,22 +186,6 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
   result->setGridClass(openvdb::GRID_LEVEL_SET);
   report(request.progress, 1);
   return result;
-}
-
-void mendNearSide(FloatGrid& field, const NearSide& nearSide, const DistanceRequest& request) {
-  if (!nearSide.unreached.empty()) updateDistances(field, nearSide.unreached, request);
-  const auto background = static_cast<double>(field.background());
-  for (const auto& [origin, values] : nearSide.creases) {
-    LeafNode* leaf = field.tree().touchLeaf(origin);
-    for (const auto& [n, value] : values) {
-      if (std::abs(static_cast<double>(value)) < background)
-        leaf->setValueOn(n, value);
-      else
-        leaf->setValueOff(n, std::copysign(field.background(), value));
-    }
-  }
-  openvdb::tools::pruneTiles(field.tree());
-  report(request.progress, 1);
 }
 
 }  // namespace levelset::eikonal

@@ -5,8 +5,6 @@
 #include <array>
 #include <functional>
 #include <optional>
-#include <utility>
-#include <vector>
 
 #include "levelset/progress.h"
 #include "levelset/vdb.h"
@@ -16,19 +14,6 @@ namespace levelset::eikonal {
 /// Closest point of the surface for each grid point of a leaf, in index space. Valid at active grid
 /// points.
 using ClosestPointLeaf = std::array<openvdb::Vec3d, 512>;
-
-/// Least shift, voxels, for which the distances to a moved surface follow from the old surface. By
-/// a smaller shift, two parts of the surface can meet that are less than a voxel apart.
-inline constexpr double kLeastShift = 2;
-
-/// Distances to a moved surface on its near side, where the surface itself is, as far as they
-/// differ from the distance to the surface minus the shift. They differ near creases in which parts
-/// of the moved surface meet.
-struct NearSide {
-  using LeafValues = std::vector<std::pair<openvdb::Index, float>>;  ///< grid point and distance
-  std::vector<std::pair<openvdb::Coord, LeafValues>> creases;  ///< by leaf origin, world units
-  openvdb::MaskTree unreached;  ///< grid points for which MovedSurface finds no distance
-};
 
 /// Options of distanceTransform(), in voxels. With the signed distance d, the values of the result
 /// are d − shift where |d − shift| < halfWidth.
@@ -43,9 +28,6 @@ struct DistanceRequest {
   /// many threads at once and in no fixed order.
   std::function<void(const openvdb::FloatTree::LeafNodeType&, const ClosestPointLeaf&)>
       visitPoints = {};
-  /// If not null, receives the distances on the near side of the moved surface. The result has the
-  /// distances to the surface minus the shift there, until mendNearSide() is called.
-  NearSide* nearSide = nullptr;
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
@@ -59,12 +41,5 @@ struct DistanceRequest {
 /// @throws ResourceLimit before it allocates more memory than allowed
 [[nodiscard]] openvdb::FloatGrid::Ptr distanceTransform(const openvdb::FloatGrid& field,
                                                         const DistanceRequest& request);
-
-/// Writes the distances on the near side of a moved surface into the result of distanceTransform().
-/// Where MovedSurface found none, computes the distance to the zero set of `field`. The cost
-/// depends on the number of grid points near creases only.
-/// @param request  half width of the field, no shift; `region` and `visitPoints` are ignored
-void mendNearSide(openvdb::FloatGrid& field, const NearSide& nearSide,
-                  const DistanceRequest& request);
 
 }  // namespace levelset::eikonal

@@ -121,11 +121,6 @@ NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& option
 
   eikonal::DistanceRequest request = nearSurfaceRequest(options, distance / solid.voxelSize(), 0);
   request.progress = subProgress(options.progress, 0, 0.6);
-  const bool isWide =
-      halfWidth >= request.halfWidth && std::abs(request.shift) >= eikonal::kLeastShift;
-  if (isWide) request.halfWidth = halfWidth;
-  eikonal::NearSide nearSide;
-  if (isWide) request.nearSide = &nearSide;
   const openvdb::FloatGrid::Ptr moved = eikonal::distanceTransform(vdb(solid), request);
   if (!hasSurface(*moved))
     throw InvalidInput(
@@ -133,13 +128,7 @@ NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& option
                     "the solid is "
                     "thicker than twice that; use a smaller length",
                     distance));
-  if (!isWide) return redistanced(*moved, halfWidth, options, 0.6);
-  // The distances are exact except where parts of the moved surface meet.
-  eikonal::DistanceRequest mend;
-  mend.halfWidth = halfWidth;
-  mend.progress = subProgress(options.progress, 0.6, 1);
-  eikonal::mendNearSide(*moved, nearSide, mend);
-  return makeBand(moved);
+  return redistanced(*moved, halfWidth, options, 0.6);
 }
 
 NarrowBand offsetBy(NarrowBand solid, const ScalarField& distance, const OffsetOptions& options) {

@@ -93,15 +93,6 @@ Foot closestPoint(const DenseBlock& block, const Vec3d& from, const Vec3d& start
   return foot;
 }
 
-Foot closestPointByOneStep(const Jet& jet, const Vec3d& from, const Vec3d& start, double longest) {
-  const double slope = jet.gradient.length();
-  if (!(slope > 0)) return {};
-  const NewtonStep step = newtonStep(jet, slope, from - start);
-  if (!(step.length <= longest)) return {};
-  const Vec3d point = start + step.along;
-  return {point, (from - point).length(), true, false};
-}
-
 Foot closestPointByTwoSteps(DenseBlockCache& blocks, const Jet& jet, const Vec3d& from,
                             const Vec3d& start) {
   const double slope = jet.gradient.length();
