@@ -12,10 +12,10 @@
 #include <vector>
 
 #include "levelset/advection/characteristic.h"
-#include "levelset/advection/upwind_derivative.h"
 #include "levelset/distance/distance_transform.h"
 #include "levelset/distance/surface/interpolant.h"
 #include "levelset/error.h"
+#include "levelset/hamilton_jacobi/upwind_derivative.h"
 #include "levelset/vdb.h"
 
 namespace levelset::flow {

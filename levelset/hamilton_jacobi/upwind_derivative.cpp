@@ -1,4 +1,4 @@
-#include "levelset/advection/upwind_derivative.h"
+#include "levelset/hamilton_jacobi/upwind_derivative.h"
 
 #include <cmath>
 
