@@ -33,6 +33,10 @@ struct UsageError : Error {
 struct InvalidInput : Error {
   explicit InvalidInput(const std::string& sentence) : Error(ExitCode::Input, sentence) {}
 };
+/// A result has no surface. It is an error for a complete solid, but not for a part of one.
+struct NoSurface : InvalidInput {
+  using InvalidInput::InvalidInput;
+};
 struct ResourceLimit : Error {
   explicit ResourceLimit(const std::string& sentence) : Error(ExitCode::Resource, sentence) {}
 };
@@ -63,6 +67,7 @@ struct Cancelled : Error {
     case ExitCode::Done:
       break;
   }
+  if (dynamic_cast<const NoSurface*>(&error)) throw NoSurface(message);
   throw InvalidInput(message);
 }
 

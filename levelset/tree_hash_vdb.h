@@ -28,10 +28,9 @@ template <typename T>
   return hash;
 }
 
-/// Returns a hash of the transform, background, topology and values of a grid.
+/// Begins the hash of a grid with its transform and background.
 template <typename GridT>
-[[nodiscard]] std::uint64_t gridHash(const GridT& grid) {
-  using Leaf = typename GridT::TreeType::LeafNodeType;
+[[nodiscard]] std::uint64_t hashOfHeader(const GridT& grid) {
   std::uint64_t hash = 0x4c4556454c534d54ull;
   // Hashes the transform as the images of four points, because OpenVDB refuses to compute the
   // matrix for small voxels.
@@ -42,13 +41,21 @@ template <typename GridT>
     hash = mixBytes(hash, world.asPointer(), 3);
   }
   const typename GridT::ValueType background = grid.background();
-  hash = mixBytes(hash, &background, 1);
-  for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) {
-    const openvdb::Coord origin = leaf->origin();
-    hash = mixBytes(hash, origin.data(), 3);
-    hash = mixBytes(hash, &leaf->valueMask(), 1);
-    hash = mixBytes(hash, leaf->buffer().data(), Leaf::SIZE);
-  }
+  return mixBytes(hash, &background, 1);
+}
+
+/// Adds a leaf to the hash of its grid. Leaves are added in the order of the tree.
+template <typename Leaf>
+[[nodiscard]] std::uint64_t mixLeaf(std::uint64_t hash, const Leaf& leaf) {
+  const openvdb::Coord origin = leaf.origin();
+  hash = mixBytes(hash, origin.data(), 3);
+  hash = mixBytes(hash, &leaf.valueMask(), 1);
+  return mixBytes(hash, leaf.buffer().data(), Leaf::SIZE);
+}
+
+/// Completes the hash of a grid with its tiles, after all leaves.
+template <typename GridT>
+[[nodiscard]] std::uint64_t mixTiles(std::uint64_t hash, const GridT& grid) {
   // Tile values: outside the band they give the sign.
   auto it = grid.tree().cbeginValueAll();
   it.setMaxDepth(decltype(it)::LEAF_DEPTH - 1);
@@ -59,6 +66,14 @@ template <typename GridT>
     hash = mixBytes(hash, &value, 1);
   }
   return hash;
+}
+
+/// Returns a hash of the transform, background, topology and values of a grid.
+template <typename GridT>
+[[nodiscard]] std::uint64_t gridHash(const GridT& grid) {
+  std::uint64_t hash = hashOfHeader(grid);
+  for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) hash = mixLeaf(hash, *leaf);
+  return mixTiles(hash, grid);
 }
 
 }  // namespace levelset

@@ -193,7 +193,7 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
       reached.max[axis] = std::min(reached.max[axis], part.region.max[axis]);
     }
     if (reached.isEmpty())
-      throw InvalidInput(
+      throw NoSurface(
           "the requested region does not intersect the band of the mesh; choose a region that "
           "does");
     region = blocksOf(reached, *uniformTransform(voxelSize));

@@ -410,7 +410,7 @@ NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma, const SmoothO
   if (options.mask) checkMask(*options.mask);
   requireSolid(solid);
   if (solid.isEmpty())
-    throw InvalidInput(
+    throw NoSurface(
         "the solid is empty, so there is no surface to smooth; give a solid with a surface");
   const Filtering filtering{kind, sigma / solid.voxelSize()};
   if (options.mask) {

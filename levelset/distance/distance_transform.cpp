@@ -158,7 +158,7 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
                                       subProgress(request.progress, 0, 0.2));
   const SurfacePoints& points = surface.points;
   if (points.size() == 0)
-    throw InvalidInput(
+    throw NoSurface(
         fmt::format("the field has no zero crossing{}, so there is no surface to "
                     "measure from; give a solid with a surface",
                     within ? " near the region" : ""));

@@ -34,7 +34,7 @@ bool isFinite(const Imath::Box3d& box) {
 NarrowBand redistance(NarrowBand field, const RedistanceOptions& options) {
   requireSolid(field);
   if (field.isEmpty())
-    throw InvalidInput("the field is empty and has no zero crossing; give a solid with a surface");
+    throw NoSurface("the field is empty and has no zero crossing; give a solid with a surface");
   eikonal::DistanceRequest request;
   request.halfWidth = options.halfWidth.value_or(field.halfWidth());
   if (!std::isfinite(request.halfWidth) || request.halfWidth < 1)

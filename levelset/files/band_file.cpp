@@ -4,18 +4,15 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cmath>
-#include <fstream>
 #include <new>
-#include <system_error>
 
 #include "levelset/error.h"
 #include "levelset/fields/grid_vdb.h"
-#include "levelset/file_target.h"
 #include "levelset/files/byte_io.h"
 #include "levelset/files/nano_file_vdb.h"
 #include "levelset/files/vdb_layout.h"
+#include "levelset/files/vdb_writer.h"
 #include "levelset/memory_limit.h"
 
 namespace levelset {
@@ -23,9 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Byte offset of the random identifier (UUID) in a .vdb file. It follows the magic number, three
-/// version numbers and a flag.
-constexpr std::streamoff kIdentifierOffset = 8 + 3 * 4 + 1;
 /// Smallest voxel size of a NanoVDB file. NanoVDB's writer inverts the matrix with OpenVDB's
 /// AffineMap, which treats smaller voxels as singular.
 constexpr double kMinNanoVoxel = 1.5e-5;
@@ -121,6 +115,7 @@ struct ChosenGrid {
   std::string_view file;
   const std::string& name;
   const ReadBandOptions& options;
+  MappedFile* mapped = nullptr;  // owner of `file` if only a region is read; else null
   std::vector<VdbEntry> entries = readVdbEntries(file, name);
   const VdbEntry& entry = chooseGrid(entries, options.grid, name);
 
@@ -140,10 +135,16 @@ struct ChosenGrid {
                       entry.name, name));
     }
     const std::size_t limit = memoryLimit(options.maxMemory);
-    requireMemory(static_cast<double>(file.size()), limit);
-    const auto grid = GridT::create(read(
-        file, name, treeOwner(entries, entry, name),
-        VdbTreeLimits{limit - file.size(), keepsTiles, subProgress(options.progress, 0.3, 0.9)}));
+    if (!mapped) requireMemory(static_cast<double>(file.size()), limit);
+    VdbTreeLimits limits{.maxMemory = limit - file.size(),
+                         .keepsTiles = keepsTiles,
+                         .progress = subProgress(options.progress, 0.3, 0.9)};
+    if (mapped) {
+      limits.maxMemory = limit;
+      limits.region = blocksOf(options.region, *entry.transform);
+      limits.passed = [this](std::size_t end) { mapped->release(end); };
+    }
+    const auto grid = GridT::create(read(file, name, treeOwner(entries, entry, name), limits));
     grid->setTransform(entry.transform);
     grid->setName(entry.name);
     grid->setGridClass(openvdb::GridBase::stringToGridClass(entry.gridClass()));
@@ -180,6 +181,10 @@ auto readFrom(const fs::path& path, const ReadBandOptions& options, const Take& 
   }
   try {
     report(options.progress, 0);
+    if (!isEverywhere(options.region)) {
+      MappedFile mapped(path);
+      return take(ChosenGrid{mapped.view(), name, options, &mapped});
+    }
     const Bytes bytes = readBytes(path, options.maxMemory);
     report(options.progress, 0.3);
     auto result = take(ChosenGrid{bytes.view(), name, options});
@@ -196,90 +201,13 @@ auto readFrom(const fs::path& path, const ReadBandOptions& options, const Take& 
 
 // === Writing
 
-/// A file buffer that reports the bytes written as a fraction of the expected bytes.
-class ReportingFile : public std::filebuf {
- public:
-  ReportingFile(const Progress& progress, double expected)
-      : progress_(progress), expected_(expected) {}
-
- protected:
-  std::streamsize xsputn(const char* data, std::streamsize size) override {
-    constexpr double kStep = 1 << 20;
-    written_ += static_cast<double>(size);
-    if (written_ > told_ + kStep) {
-      told_ = written_;
-      // Compressed data takes fewer bytes than expected. writeVdb() reports the end after it closes
-      // the file.
-      report(progress_, std::min(0.9, written_ / expected_));
-    }
-    return std::filebuf::xsputn(data, size);
-  }
-
- private:
-  const Progress& progress_;
-  double expected_, written_ = 0, told_ = 0;
-};
-
-/// OpenVDB's writer for any seekable stream. It stores the byte offsets of the grids.
-struct StreamArchive : openvdb::io::Archive {
-  void writeGrids(std::ostream& out, const openvdb::GridBase::ConstPtr& grid) const {
-    Archive::write(out, openvdb::GridCPtrVec{grid}, true, openvdb::MetaMap());
-  }
-};
-
 /// Copies a grid without its metadata; sets name, class and creator. The tree is shared.
 template <typename GridT>
 typename GridT::Ptr namedGrid(const GridT& source, const std::string& name) {
   using Tree = typename GridT::TreeType;
   const auto grid = GridT::create(openvdb::ConstPtrCast<Tree>(source.constTreePtr()));
-  grid->setTransform(source.transform().copy());
-  grid->setName(name);
-  grid->setGridClass(source.getGridClass());
-  grid->setCreator("Levelsmith");
+  nameGrid(*grid, source.transform(), name, source.getGridClass());
   return grid;
-}
-
-std::string identifierText(std::uint64_t hash) {
-  const std::uint64_t other = hash * 0x9E3779B97F4A7C15ull;
-  return fmt::format("{:08X}-{:04X}-{:04X}-{:04X}-{:012X}", hash >> 32, (hash >> 16) & 0xFFFF,
-                     hash & 0xFFFF, other >> 48, other & 0xFFFFFFFFFFFFull);
-}
-
-void writeVdb(const fs::path& path, const openvdb::GridBase::ConstPtr& grid, std::uint64_t hash,
-              const Progress& progress) {
-  openvdb::initialize();
-  report(progress, 0);
-  std::vector<char> buffer(1 << 20);
-  ReportingFile file(progress, static_cast<double>(grid->memUsage()));
-  file.pubsetbuf(buffer.data(), static_cast<std::streamsize>(buffer.size()));
-  std::ostream out(&file);
-  out.exceptions(std::ios::badbit | std::ios::failbit);
-  if (!file.open(path, std::ios::out | std::ios::binary)) out.setstate(std::ios::failbit);
-  StreamArchive().writeGrids(out, grid);
-  out.seekp(kIdentifierOffset);
-  const std::string identifier = identifierText(hash);
-  out.write(identifier.data(), static_cast<std::streamsize>(identifier.size()));
-  if (!file.close()) out.setstate(std::ios::failbit);
-  report(progress, 1);
-}
-
-/// Writes a file by way of a temporary file, which replaces the target when it is complete.
-/// @param write  (path): writes the temporary file
-template <typename Write>
-void writeTarget(const fs::path& path, const Write& write) {
-  FileTarget target(path);
-  try {
-    errno = 0;
-    write(target.path());
-  } catch (const std::ios_base::failure&) {
-    throw IoError(
-        fmt::format("'{}' could not be written: {}; free disk space or write to another disk",
-                    path.string(), std::generic_category().message(errno != 0 ? errno : EIO)));
-  } catch (const openvdb::Exception& error) {
-    throw IoError(fmt::format("'{}' could not be written: {}; write to another file", path.string(),
-                              error.what()));
-  }
-  target.commit();
 }
 
 // === Information
@@ -365,7 +293,9 @@ void writeBand(const fs::path& path, const NarrowBand& band, const WriteBandOpti
   const auto grid = namedGrid(vdb(band), options.name);
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   writeTarget(path, [&](const fs::path& target) {
-    if (format == "vdb") return writeVdb(target, grid, band.contentHash(), options.progress);
+    if (format == "vdb")
+      return writeVdb(
+          target, grid, [&] { return band.contentHash(); }, options.progress);
     report(options.progress, 0);
     writeNanoGrid(target, *grid);
     report(options.progress, 1);
@@ -385,7 +315,8 @@ void writeField(const fs::path& path, const FieldGrid& field, const WriteBandOpt
   else
     grid = namedGrid(*source.vector, options.name);
   writeTarget(path, [&](const fs::path& target) {
-    writeVdb(target, grid, field.contentHash(), options.progress);
+    writeVdb(
+        target, grid, [&] { return field.contentHash(); }, options.progress);
   });
 }
 

@@ -19,6 +19,9 @@ namespace levelset {
 struct ReadBandOptions {
   std::string grid = {};  ///< name of the grid; empty: the only float level set of the file
   std::size_t maxMemory = kNoMemoryLimit;
+  /// Only blocks that intersect this box are read, world units. Other parts of the band are
+  /// missing, and their signs are undefined.
+  Imath::Box3d region = kEverywhere;
   BandRepairs* repairs = nullptr;  ///< receives the numbers of repaired values; may be null
   Progress progress = {};
 };

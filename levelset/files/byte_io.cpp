@@ -232,6 +232,14 @@ std::string_view MappedFile::view() const {
   return mapped_ ? std::string_view(static_cast<const char*>(mapped_), size_) : read_.view();
 }
 
+void MappedFile::release(std::size_t end) {
+  constexpr std::size_t kInterval = 1 << 26;
+  end -= end % kInterval;
+  if (!mapped_ || end <= released_) return;
+  ::madvise(static_cast<char*>(mapped_) + released_, end - released_, MADV_DONTNEED);
+  released_ = end;
+}
+
 FirstBytes readFirstBytes(const fs::path& path, std::size_t count) {
   Bytes raw;
   InputFile file(path);

@@ -52,11 +52,14 @@ class MappedFile {
   MappedFile(const MappedFile&) = delete;
   MappedFile& operator=(const MappedFile&) = delete;
   [[nodiscard]] std::string_view view() const;
+  /// Releases the pages before a byte offset from memory. They are loaded again when they are read
+  /// again. Does nothing until many pages have been passed since the last call.
+  void release(std::size_t end);
 
  private:
   Bytes read_;
   void* mapped_ = nullptr;
-  std::size_t size_ = 0;
+  std::size_t size_ = 0, released_ = 0;
 };
 
 /// The first bytes of a file, decompressed if necessary. Damage behind these bytes is not detected.

@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <functional>
+#include <optional>
 #include <streambuf>
 #include <string>
 #include <string_view>
@@ -84,6 +86,10 @@ struct VdbTreeLimits {
   std::size_t maxMemory = kNoMemoryLimit;
   /// True: active tiles stay tiles, so the memory limit does not count their voxels.
   bool keepsTiles = false;
+  /// Only leaves and active tiles that intersect this index box are read; empty: all.
+  std::optional<openvdb::CoordBBox> region = {};
+  /// Called with the byte offset up to which leaf values have been located; may be empty.
+  std::function<void(std::size_t)> passed = {};
   Progress progress = {};
 };
 

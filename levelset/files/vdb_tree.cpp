@@ -194,6 +194,7 @@ class TreeReader {
     auto tree = std::make_shared<TreeT>();
     readRoot(tree->root());
     const std::vector<std::size_t> offsets = skipLeafValues();
+    std::erase(leaves_, nullptr);
     ProgressGate gate(limits_.progress, leaves_.size());
     tbb::parallel_for(std::size_t{0}, leaves_.size(), [&](std::size_t i) {
       VdbBytes at = bytes_;
@@ -236,8 +237,9 @@ class TreeReader {
       const Coord origin = takeOrigin<typename Root::ChildNodeType>(seen);
       const T value = bytes_.value<T>();
       const bool active = bytes_.value<std::uint8_t>() != 0;
-      if (active) countTile(Root::ChildNodeType::TOTAL * 3);
-      root.addTile(origin, value, active);
+      const bool isRead = active && isNeeded<typename Root::ChildNodeType>(origin);
+      if (isRead) countTile(Root::ChildNodeType::TOTAL * 3);
+      root.addTile(origin, value, isRead);
     }
     for (std::uint32_t i = 0; i < children; ++i) {
       const Coord origin = takeOrigin<typename Root::ChildNodeType>(seen);
@@ -256,6 +258,13 @@ class TreeReader {
     return origin;
   }
 
+  /// Returns true if a node at `origin` intersects the requested region.
+  template <typename Node>
+  [[nodiscard]] bool isNeeded(const Coord& origin) const {
+    return !limits_.region ||
+           limits_.region->hasOverlap(openvdb::CoordBBox::createCube(origin, Node::DIM));
+  }
+
   /// Adds the memory that an active tile takes after importBand() has split it into voxels. Fields
   /// keep their tiles, so nothing is added for them.
   void countTile(Index log2VoxelCount) {
@@ -268,6 +277,11 @@ class TreeReader {
   template <typename Node>
   std::unique_ptr<Node> readNode(const Coord& origin) {
     if constexpr (Node::LEVEL == 0) {
+      if (!isNeeded<Node>(origin)) {
+        static_cast<void>(takeMask<typename Node::NodeMaskType>(bytes_));
+        leaves_.push_back(nullptr);
+        return nullptr;
+      }
       auto leaf = std::make_unique<Node>(openvdb::PartialCreate(), origin, storage_.background);
       leaf->setValueMask(takeMask<typename Node::NodeMaskType>(bytes_));
       if (!countOnly_) countMemory(sizeof(Node) + Node::SIZE * sizeof(T));
@@ -289,22 +303,27 @@ class TreeReader {
     auto node = std::make_unique<Node>(origin, storage_.background, false);
     for (Index i = 0; i < Node::NUM_VALUES; ++i) {
       if (children.isOn(i)) continue;
-      node->addTile(i, values[i], active.isOn(i));
-      if (active.isOn(i)) countTile(3 * Node::ChildNodeType::TOTAL);
+      using Child = typename Node::ChildNodeType;
+      const bool isRead = active.isOn(i) && isNeeded<Child>(node->offsetToGlobalCoord(i));
+      node->addTile(i, values[i], isRead);
+      if (isRead) countTile(3 * Child::TOTAL);
     }
     for (auto it = children.beginOn(); it; ++it) {
       const Coord childOrigin = node->offsetToGlobalCoord(it.pos());
-      node->addChild(readNode<typename Node::ChildNodeType>(childOrigin).release());
+      if (auto child = readNode<typename Node::ChildNodeType>(childOrigin))
+        node->addChild(child.release());
     }
     return node;
   }
 
-  /// Skips the values of all leaves. Returns the byte offset of the values of each leaf.
+  /// Skips the values of all leaves. Returns the byte offset of the values of each leaf that is
+  /// read.
   std::vector<std::size_t> skipLeafValues() {
     std::vector<std::size_t> offsets;
     offsets.reserve(leaves_.size());
     for (std::size_t i = 0; i < leaves_.size(); ++i) {
-      offsets.push_back(bytes_.position());
+      if (leaves_[i]) offsets.push_back(bytes_.position());
+      if (limits_.passed) limits_.passed(bytes_.position());
       const auto active = takeMask<typename Leaf::NodeMaskType>(bytes_);
       static_cast<void>(takeValues<T, typename Leaf::NodeMaskType>(bytes_, storage_, active));
     }

@@ -40,7 +40,7 @@ void checkShell(const NarrowBand& solid, double thickness) {
     throw UsageError(fmt::format("the thickness is {}; give a length above zero", thickness));
   requireSolid(solid);
   if (solid.isEmpty())
-    throw InvalidInput("the solid is empty, so there is no surface to thicken; give a solid");
+    throw NoSurface("the solid is empty, so there is no surface to thicken; give a solid");
   if (thickness < solid.voxelSize() * (1 - 1e-9))
     throw InvalidInput(
         fmt::format("a wall of {:.4g} is thinner than a voxel of {:.4g}; use a "

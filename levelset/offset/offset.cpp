@@ -32,7 +32,7 @@ double checkedHalfWidth(const NarrowBand& solid, const OffsetOptions& options) {
 void requireSurface(const NarrowBand& solid) {
   requireSolid(solid);
   if (solid.isEmpty())
-    throw InvalidInput("the solid is empty, so there is no surface to move; give a solid");
+    throw NoSurface("the solid is empty, so there is no surface to move; give a solid");
 }
 
 /// Requests distances near the possible positions of the new surface.
@@ -123,7 +123,7 @@ NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& option
   request.progress = subProgress(options.progress, 0, 0.6);
   const openvdb::FloatGrid::Ptr moved = eikonal::distanceTransform(vdb(solid), request);
   if (!hasSurface(*moved))
-    throw InvalidInput(
+    throw NoSurface(
         fmt::format("the result is empty after an offset of {} world units, because no part of "
                     "the solid is "
                     "thicker than twice that; use a smaller length",
@@ -161,7 +161,7 @@ NarrowBand offsetBy(NarrowBand solid, const ScalarField& distance, const OffsetO
   for (auto leaf = displaced.beginLeaf(); leaf; ++leaf)
     *moved->tree().touchLeaf(leaf->origin()) = *leaf;
   if (!hasSurface(*moved))
-    throw InvalidInput(
+    throw NoSurface(
         fmt::format("the result is empty after offsets of {:.6g} to {:.6g} world units; use "
                     "smaller lengths",
                     range.low * voxel, range.high * voxel));

@@ -85,10 +85,10 @@ RegionOfInterest simplified(RegionOfInterest roi, const Plan& plan, bool isDista
 
 std::vector<RegionOfInterest> regionsOfInterest(const Graph& graph, const std::vector<char>& runs,
                                                 const std::vector<std::optional<Plan>>& plans,
-                                                double leastHalfWidth) {
+                                                double leastHalfWidth, const Box3d& part) {
   const std::vector<char> isDistance = findDistances(graph);
   std::vector<std::optional<RegionOfInterest>> regions(graph.nodes.size());
-  for (const std::size_t result : graph.results) regions[result] = RegionOfInterest{};
+  for (const std::size_t result : graph.results) regions[result] = RegionOfInterest{.region = part};
   for (std::size_t i = graph.nodes.size(); i-- > 0;) {
     const Node& node = graph.nodes[i];
     if (!runs[i]) continue;

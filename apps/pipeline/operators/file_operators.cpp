@@ -73,6 +73,7 @@ Value read(Invocation& in) {
   levelset::BandRepairs repairs;
   const levelset::ReadBandOptions options{.grid = in.text("grid"),
                                           .maxMemory = in.maxMemory,
+                                          .region = in.roi.region,
                                           .repairs = &repairs,
                                           .progress = in.progress};
   Value value = in.given("grid") ? std::visit([](auto grid) { return Value(std::move(grid)); },
@@ -213,6 +214,7 @@ Operator readOperator() {
       .run = read,
       .plan = planRead,
       .cost = costPerVoxel(50, 0, 250),
+      .makesParts = true,
       .validate = validateRead,
       .usesStandardInput = isStandardStream,
   };

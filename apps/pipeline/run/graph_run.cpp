@@ -35,6 +35,12 @@ void GraphRun::run() {
   collectSteps();
 }
 
+Value GraphRun::runPart(std::size_t result) {
+  values_.addUse(result);
+  run();
+  return values_.take(result);
+}
+
 void GraphRun::runNodes() {
   const auto count = [&](auto... states) {
     std::size_t sum = 0;
@@ -52,6 +58,7 @@ void GraphRun::runNodes() {
     else if (const auto given = graph_.given.find(i); given != graph_.given.end())
       values_.put(i, given->second);
   }
+  if (partedWrite_) return runInParts(*partedWrite_);
   const std::size_t all = graph_.nodes.size();
   ScheduleResult done{.isDone = std::vector<char>(all, 0)};
   if (threads_ > 1 && !settings_.dryRun && hasBranches()) done = scheduleTasks();

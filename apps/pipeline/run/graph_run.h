@@ -56,6 +56,11 @@ class GraphRun {
   /// Runs the graph. The report contains all steps that ran, even if this function throws.
   void run();
 
+  /// Runs a graph on the box RunSettings::part.
+  /// @return the value of a node. It equals the complete value in the box.
+  /// @throws levelset::NoSurface if a value has no surface there
+  [[nodiscard]] Value runPart(std::size_t result);
+
  private:
   enum class NodeState {
     Unneeded,  // no requested result depends on it
@@ -73,6 +78,7 @@ class GraphRun {
   void runNodes();
   void runInOrder(const std::vector<char>& isDone, std::size_t end);
   StepReport& begin(std::size_t i);
+  void addSteps(const RunReport& part);
   void collectSteps();
   Thumbnail thumbnailFor(std::size_t i, const Value& value);
   void queueOutput(std::size_t i, const std::string& output);
@@ -94,6 +100,11 @@ class GraphRun {
   void requestFullValues(std::size_t i);
   [[nodiscard]] bool fitsInMemory(std::size_t i, const std::vector<std::size_t>& running) const;
   [[nodiscard]] std::optional<double> workingBytes(std::size_t i) const;
+
+  // Results that do not fit into memory, defined in graph_run_parts.cpp.
+  [[nodiscard]] std::optional<std::size_t> findPartedWrite() const;
+  void runInParts(std::size_t write);
+  [[nodiscard]] bool isPart() const { return !levelset::isEverywhere(settings_.part); }
 
   // Concurrent branches, defined in graph_run_tasks.cpp.
   [[nodiscard]] bool hasBranches() const;
@@ -122,6 +133,8 @@ class GraphRun {
   std::vector<char> isComputedForPlan_;
   // Per node: error while it ran for its plan; null: none.
   std::vector<std::exception_ptr> planningFailures_;
+  // Action that writes the result in parts, because the result does not fit into memory.
+  std::optional<std::size_t> partedWrite_;
   double planningBytes_ = 0;  // memory of the meshes computed for planning, bytes
   // Per node: it failed on a region of interest, and must run again on complete values.
   std::vector<char> needsFullValues_;

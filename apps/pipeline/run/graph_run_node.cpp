@@ -40,7 +40,7 @@ Value cropTo(const Value& value, const RegionOfInterest& roi) {
   if (value.kind() != Kind::Band) return value;
   levelset::NarrowBand part = levelset::cropped(value.band(), roi);
   if (part.isEmpty() && !levelset::isEverywhere(roi.region))
-    throw levelset::InvalidInput(
+    throw levelset::NoSurface(
         "no surface lies in the region of interest; use --no-roi to compute the complete value");
   return Value(std::move(part));
 }
@@ -168,7 +168,8 @@ void GraphRun::runNode(std::size_t i, StepReport& step, StepClock& clock,
     }
   } catch (...) {
     clock.stop();
-    if (isRestricted(i) && isInputError(std::current_exception())) throw RegionFailure();
+    if (!isPart() && isRestricted(i) && isInputError(std::current_exception()))
+      throw RegionFailure();
     finish(nullptr, true);
     throw;
   }

@@ -32,8 +32,8 @@ void GraphRun::planNodes() {
              return planFromMesh(i);
            }).plans;
   if (!settings_.fullValues && !cache_ && !settings_.onValue)
-    regions_ =
-        regionsOfInterest(graph_, runs, plans_, settings_.measureErrors ? kMeasuredHalfWidth : 1);
+    regions_ = regionsOfInterest(graph_, runs, plans_,
+                                 settings_.measureErrors ? kMeasuredHalfWidth : 1, settings_.part);
   if (std::any_of(regions_.begin(), regions_.end(),
                   [](const RegionOfInterest& roi) { return !roi.isWhole(); })) {
     const std::vector<char> isOverwritten = findOverwritten(graph_, runs);
@@ -45,7 +45,10 @@ void GraphRun::planNodes() {
       values_.addUse(i);
     }
   }
-  checkMemoryFor(graph_, runs, plans_, regions_, settings_.maxMemory);
+  if (isLimited() &&
+      estimatePeak(graph_, runs, plans_, regions_) > static_cast<double>(settings_.maxMemory))
+    partedWrite_ = findPartedWrite();
+  if (!partedWrite_) checkMemoryFor(graph_, runs, plans_, regions_, settings_.maxMemory);
 }
 
 /// Computes a mesh during planning if a band is computed from it. The plan of a mesh requires the

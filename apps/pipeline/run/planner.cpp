@@ -202,6 +202,17 @@ void checkMemoryFor(const Graph& graph, const std::vector<char>& runs,
                           [&] { levelset::requireMemory(peak.bytes, maxMemory); });
 }
 
+double estimatePeak(const Graph& graph, const std::vector<char>& runs,
+                    const std::vector<std::optional<Plan>>& plans,
+                    const std::vector<RegionOfInterest>& regions) {
+  std::vector<double> worked(graph.nodes.size(), 0);
+  for (std::size_t i = 0; i < worked.size(); ++i) {
+    if (!runs[i] || graph.given.contains(i)) continue;
+    if (const std::optional<Cost> cost = costOf(graph, i, plans, regions)) worked[i] = cost->bytes;
+  }
+  return findPeak(graph, runs, plans, regions, worked).bytes;
+}
+
 void explain(const Graph& graph, std::size_t maxMemory, bool fullValues,
              const std::function<void(const std::string&)>& print) {
   const std::vector<char> runs = neededNodes(graph);

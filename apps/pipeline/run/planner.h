@@ -40,6 +40,12 @@ void checkMemoryFor(const Graph& graph, const std::vector<char>& runs,
                     const std::vector<std::optional<Plan>>& plans,
                     const std::vector<RegionOfInterest>& regions, std::size_t maxMemory);
 
+/// Estimates the largest memory of a run in graph order, with the working memory of each action,
+/// bytes. Values and actions of unknown size count nothing.
+[[nodiscard]] double estimatePeak(const Graph& graph, const std::vector<char>& runs,
+                                  const std::vector<std::optional<Plan>>& plans,
+                                  const std::vector<RegionOfInterest>& regions);
+
 /// Describes a run without running it: which actions run and why, the region of interest of each
 /// value, and the estimated time and memory. Reads meshes, but computes and writes nothing.
 /// @param fullValues  ignore regions of interest

@@ -21,6 +21,9 @@ struct RunSettings {
   bool measureErrors = false;  ///< estimate each result's error; costs a pass over the result
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   bool fullValues = false;  ///< ignore regions of interest (--no-roi)
+  /// Box of the requested results that the caller reads, world units. Other parts of them may be
+  /// missing. In a smaller box than kEverywhere, a node without surface fails with NoSurface.
+  Imath::Box3d part = levelset::kEverywhere;
   std::size_t thumbnails =
       0;  ///< number of nodes, from the first, that get a thumbnail in the report; none in dry runs
   std::filesystem::path cache = {};  ///< folder of cached results; empty: no cache

@@ -1,0 +1,225 @@
+#include <fmt/core.h>
+
+#include <malloc.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <vector>
+
+#include "apps/pipeline/run/graph_run.h"
+#include "apps/pipeline/run/planner.h"
+#include "levelset/error.h"
+#include "levelset/files/band_parts_writer.h"
+
+namespace pipeline {
+namespace {
+
+using Imath::Box3d;
+using Imath::Box3i;
+using Imath::V3d;
+using Imath::V3i;
+using levelset::kPartCell;
+
+/// Coordinate beyond every band, a multiple of kPartCell. The outermost parts extend to it, because
+/// the planned bounds of a band are an estimate.
+constexpr int kFarCell = 1 << 30;
+
+/// Share of the memory limit that a part may use, by the estimate before it is computed. The
+/// surface is not spread evenly, so a part can need several times the estimate.
+constexpr double kPartShare = 0.25;
+
+/// The box of an index box with half a voxel around its grid points, world units.
+Box3d worldBox(const Box3i& cells, double voxelSize) {
+  return {(V3d(cells.min) - V3d(0.5)) * voxelSize, (V3d(cells.max) + V3d(0.5)) * voxelSize};
+}
+
+/// Returns the part of the cells within `around`, for estimates: the outermost parts are unbounded.
+Box3i within(const Box3i& cells, const Box3i& around) {
+  Box3i result = cells;
+  for (int axis = 0; axis < 3; ++axis) {
+    result.min[axis] = std::max(cells.min[axis], around.min[axis]);
+    result.max[axis] = std::min(cells.max[axis], around.max[axis]);
+  }
+  return result;
+}
+
+/// Halves a box of cells across its longest side. `around` bounds the band.
+/// @return false if the box has a single cell
+bool halve(const Box3i& cells, const Box3i& around, Box3i& low, Box3i& high) {
+  const Box3i inner = within(cells, around);
+  const V3i size = (inner.max - inner.min + V3i(1)) / kPartCell;
+  int axis = 0;
+  for (int other = 1; other < 3; ++other)
+    if (size[other] > size[axis]) axis = other;
+  if (size[axis] < 2) return false;
+  low = high = cells;
+  high.min[axis] = inner.min[axis] + size[axis] / 2 * kPartCell;
+  low.max[axis] = high.min[axis] - 1;
+  return true;
+}
+
+/// The smallest box of cells around a band, by its plan.
+Box3i cellsAround(const Plan& plan) {
+  Box3i cells;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double rim = plan.halfWidth * plan.voxelSize;
+    const auto cell = [&](double x) {
+      return static_cast<int>(std::floor(x / plan.voxelSize / kPartCell));
+    };
+    cells.min[axis] = cell(plan.bounds.min[axis] - rim) * kPartCell;
+    cells.max[axis] = (cell(plan.bounds.max[axis] + rim) + 1) * kPartCell - 1;
+  }
+  return cells;
+}
+
+/// Checks that the grid of a band is world = voxelSize × index. Parts are boxes of this grid.
+void requirePlainGrid(const levelset::NarrowBand& band) {
+  Imath::M44d plain;
+  plain.setScale(V3d(band.voxelSize()));
+  if (!band.indexToWorld().equalWithAbsError(plain, 1e-9 * band.voxelSize()))
+    throw levelset::UsageError(
+        "the band does not fit into memory, and it cannot be computed in parts, because its grid "
+        "is rotated or moved; raise --max-memory, or resample it first");
+}
+
+}  // namespace
+
+/// Finds the action that writes the only result of the run, if the run can work in parts: a chain
+/// of actions on single bands that pass on a region of interest, then `write` to a `.vdb` file.
+std::optional<std::size_t> GraphRun::findPartedWrite() const {
+  if (settings_.fullValues || cache_ || settings_.onValue || settings_.dryRun ||
+      !graph_.results.empty())
+    return {};
+  std::optional<std::size_t> last;
+  for (std::size_t i = 0; i < graph_.nodes.size(); ++i) {
+    if (states_[i] == NodeState::Unneeded) continue;
+    const Node& node = graph_.nodes[i];
+    if (last || states_[i] != NodeState::Compute) return {};
+    if (!node.makes()) {
+      Invocation invocation(*node.op, node.options);
+      if (node.op->name != "write" || invocation.text("file") == "-" ||
+          !std::filesystem::path(invocation.given("format") ? invocation.text("format")
+                                                            : "." + invocation.text("file"))
+               .string()
+               .ends_with("vdb"))
+        return {};
+      last = i;
+      continue;
+    }
+    if (node.kind != Kind::Band) continue;
+    const auto isBand = [&](std::size_t input) { return graph_.nodes[input].kind == Kind::Band; };
+    const auto bands = std::count_if(node.inputs.begin(), node.inputs.end(), isBand);
+    if (bands > 1 || !node.named.empty() || !plans_[i]) return {};
+    if (bands == 1 ? !node.op->regionOfInterest : !node.op->makesParts) return {};
+  }
+  if (!last || graph_.nodes[graph_.nodes[*last].inputs[0]].kind != Kind::Band) return {};
+  return last;
+}
+
+/// Computes and writes the result part by part. Each part is a run of its own on a region of
+/// interest.
+/// @param write  node of the action that writes
+void GraphRun::runInParts(std::size_t write) {
+  const Node& node = graph_.nodes[write];
+  const std::size_t result = node.inputs[0];
+  const Plan& plan = *plans_[result];
+
+  Graph graph = graph_;
+  graph.nodes.resize(write);
+  graph.results = {result};
+  for (std::size_t i = 0; i < write; ++i) {
+    if (graph.nodes[i].kind == Kind::Band || states_[i] == NodeState::Unneeded) continue;
+    if (!values_.has(i)) compute(i);
+    graph.given.emplace(i, values_.peek(i));
+  }
+  const std::vector<char> runs = neededNodes(graph);
+  const double budget = kPartShare * static_cast<double>(settings_.maxMemory);
+
+  Invocation writing(*node.op, node.options);
+  levelset::WriteBandOptions options{.name = writing.text("name")};
+  options.progress = [&](double fraction) {
+    if (settings_.progress) settings_.progress(write, node.op->name, fraction);
+    return !settings_.shouldContinue || settings_.shouldContinue();
+  };
+  levelset::BandPartsWriter file(writing.text("file"), options);
+  RunSettings settings = settings_;
+  settings.measureErrors = false;
+  settings.thumbnails = 0;
+  std::set<std::string> told;
+  settings.warn = [&](const std::string& text) {
+    if (told.insert(text).second) settings_.warn(text);
+  };
+  settings.note = [&](const std::string& text) {
+    if (told.insert(text).second) settings_.note(text);
+  };
+
+  const Box3i around = cellsAround(plan);
+  std::vector<Box3i> parts{{V3i(-kFarCell), V3i(kFarCell - 1)}};
+  std::size_t count = 0;
+  std::exception_ptr nothing;
+  while (!parts.empty()) {
+    const Box3i part = parts.back();
+    parts.pop_back();
+    Box3i low, high;
+    const bool canSplit = halve(part, around, low, high);
+    const auto split = [&] { parts.insert(parts.end(), {high, low}); };
+    const std::vector<RegionOfInterest> regions =
+        regionsOfInterest(graph, runs, plans_, 1, worldBox(within(part, around), plan.voxelSize));
+    if (canSplit && estimatePeak(graph, runs, plans_, regions) > budget) {
+      split();
+      continue;
+    }
+    settings.part = worldBox(part, plan.voxelSize);
+    RunReport report;
+    try {
+      const Value value = GraphRun(graph, settings, report).runPart(result);
+      requirePlainGrid(value.band());
+      file.add(value.band(), part);
+      ++count;
+    } catch (const levelset::NoSurface&) {
+      nothing = std::current_exception();  // the band does not reach this part
+    } catch (const levelset::ResourceLimit&) {
+      if (!canSplit) throw;
+      split();
+    }
+    malloc_trim(0);
+    addSteps(report);
+  }
+  if (count == 0 && nothing) std::rethrow_exception(nothing);
+  const std::string name = node.op->name;
+  if (settings_.begin) settings_.begin(name);
+  StepReport& step = begin(write);
+  StepClock clock(step, running_);
+  levelset::withContext(name, [&] { file.commit(); });
+  clock.stop();
+  step.activeVoxels = static_cast<double>(file.activeVoxelCount());
+  for (std::size_t i = 0; i <= write; ++i)
+    if (steps_[i] && !pendingOutput_[i]) queueOutput(i, "");
+  reportInOrder();
+  settings_.note(
+      fmt::format("the result was computed in {} parts to stay within --max-memory", count));
+}
+
+/// Adds the steps of the run of a part to the steps of the complete run. Costs add up.
+void GraphRun::addSteps(const RunReport& part) {
+  std::size_t i = 0;
+  for (const StepReport& step : part.steps) {
+    while (i < graph_.nodes.size() &&
+           (graph_.nodes[i].op->name != step.action || states_[i] == NodeState::Unneeded))
+      ++i;
+    if (i == graph_.nodes.size()) return;
+    if (!steps_[i]) {
+      steps_[i] = step;
+      steps_[i]->roi = {};
+    } else {
+      steps_[i]->wallSeconds += step.wallSeconds;
+      steps_[i]->cpuSeconds += step.cpuSeconds;
+      steps_[i]->peakBytes = std::max(steps_[i]->peakBytes, step.peakBytes);
+      steps_[i]->activeVoxels += step.activeVoxels;
+    }
+    ++i;
+  }
+}
+
+}  // namespace pipeline

@@ -1,0 +1,278 @@
+#include "levelset/files/band_parts_writer.h"
+
+#include <fmt/core.h>
+#include <openvdb/tools/Count.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdint>
+#include <fstream>
+#include <map>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "levelset/error.h"
+#include "levelset/file_target.h"
+#include "levelset/files/vdb_writer.h"
+#include "levelset/tree_hash_vdb.h"
+
+namespace levelset {
+namespace {
+
+namespace fs = std::filesystem;
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+using Leaf = FloatTree::LeafNodeType;
+
+using Upper = FloatTree::RootNodeType::ChildNodeType;
+using Lower = Upper::ChildNodeType;
+static_assert(Lower::DIM == kPartCell);
+
+/// Level of the tiles that take the place of a leaf.
+constexpr openvdb::Index kLeafTile = 1;
+
+/// A temporary file of leaf values, addressed by the origin of the leaf.
+class LeafStore {
+ public:
+  explicit LeafStore(const fs::path& besides) : target_(besides), name_(besides.string()) {
+    open(std::ios::out);
+  }
+
+  void put(const Leaf& leaf) {
+    file_.write(reinterpret_cast<const char*>(leaf.buffer().data()), kLeafBytes);
+    if (!file_) fail();
+    positions_[leaf.origin()] = count_++;
+  }
+
+  /// Ends writing and begins reading.
+  void beginReading() {
+    file_.close();
+    if (!file_) fail();
+    open(std::ios::in);
+  }
+
+  /// Fills a leaf with the values stored for its origin.
+  void get(Leaf& leaf) {
+    const std::uint64_t at = positions_.at(leaf.origin());
+    if (at != next_) file_.seekg(static_cast<std::streamoff>(at) * kLeafBytes);
+    leaf.buffer().allocate();
+    file_.read(reinterpret_cast<char*>(leaf.buffer().data()), kLeafBytes);
+    if (!file_) fail();
+    next_ = at + 1;
+  }
+
+ private:
+  static constexpr std::streamsize kLeafBytes = Leaf::SIZE * sizeof(float);
+
+  void open(std::ios::openmode mode) {
+    errno = 0;
+    file_.open(target_.path(), mode | std::ios::binary);
+    if (!file_) fail();
+  }
+  [[noreturn]] void fail() const {
+    throw IoError(fmt::format(
+        "the temporary file beside '{}' could not be used: {}; free disk space or write to another "
+        "disk",
+        name_, std::generic_category().message(errno != 0 ? errno : EIO)));
+  }
+
+  FileTarget target_;  // never committed, so the file is removed with this object
+  std::string name_;
+  std::fstream file_;
+  std::map<Coord, std::uint64_t> positions_;
+  std::uint64_t count_ = 0, next_ = 0;
+};
+
+/// A grid whose leaves have no values in memory. Values are read from a LeafStore while the grid is
+/// written.
+class StoredGrid : public FloatGrid {
+ public:
+  StoredGrid(const FloatTree::Ptr& tree, LeafStore& store, std::uint64_t& hash)
+      : FloatGrid(tree), store_(store), hash_(hash) {}
+
+  [[nodiscard]] openvdb::GridBase::Ptr copyGrid() override { return copy(); }
+  [[nodiscard]] openvdb::GridBase::ConstPtr copyGrid() const override { return copy(); }
+  /// Memory of the grid with its values. It is written to the file.
+  [[nodiscard]] openvdb::Index64 memUsage() const override {
+    return openvdb::tools::memUsageIfLoaded(tree());
+  }
+
+  void writeBuffers(std::ostream& out) const override {
+    hash_ = hashOfHeader(*this);
+    for (auto leaf = tree().cbeginLeaf(); leaf; ++leaf) {
+      Leaf full(*leaf);
+      store_.get(full);
+      full.writeBuffers(out, false);
+      hash_ = mixLeaf(hash_, full);
+    }
+    hash_ = mixTiles(hash_, *this);
+  }
+
+ private:
+  [[nodiscard]] std::shared_ptr<StoredGrid> copy() const {
+    const auto result = std::make_shared<StoredGrid>(
+        openvdb::ConstPtrCast<FloatTree>(constTreePtr()), store_, hash_);
+    result->insertMeta(*this);
+    result->setTransform(openvdb::ConstPtrCast<openvdb::math::Transform>(constTransformPtr()));
+    return result;
+  }
+
+  LeafStore& store_;
+  std::uint64_t& hash_;
+};
+
+}  // namespace
+
+struct BandPartsWriter::Impl {
+  Impl(fs::path target, WriteBandOptions settings)
+      : path(std::move(target)), options(std::move(settings)), store(path) {}
+
+  fs::path path;
+  WriteBandOptions options;
+  LeafStore store;
+  FloatTree::Ptr topology;  // leaves without values
+  openvdb::math::Transform::Ptr transform;
+  // By the origin of a cell with leaves: true if its first and its last grid point are inside.
+  std::map<Coord, std::pair<bool, bool>> signs;
+  std::size_t activeVoxels = 0;
+
+  void begin(const FloatGrid& part) {
+    if (!topology) {
+      topology = std::make_shared<FloatTree>(part.background());
+      transform = part.transform().copy();
+    }
+    if (part.background() != topology->background() || part.transform() != *transform)
+      throw InvalidInput(
+          "the parts of a band differ in voxel size, position or half width; write bands of one "
+          "grid");
+  }
+
+  void addLeaves(const FloatTree& part, const CoordBBox& box) {
+    for (auto leaf = part.cbeginLeaf(); leaf; ++leaf) {
+      if (!box.isInside(leaf->origin())) continue;
+      store.put(*leaf);
+      auto copy =
+          std::make_unique<Leaf>(openvdb::PartialCreate(), leaf->origin(), topology->background());
+      copy->setValueMask(leaf->valueMask());
+      activeVoxels += leaf->onVoxelCount();
+      topology->addLeaf(copy.release());
+    }
+  }
+
+  /// Copies the negative tiles within the cells that have leaves, and the signs at two corners of
+  /// these cells.
+  void addTiles(const FloatTree& part, const CoordBBox& box) {
+    std::vector<const Lower*> cells;
+    topology->getNodes(cells);
+    const openvdb::tree::ValueAccessor<const FloatTree> values(part);
+    for (const Lower* cell : cells) {
+      const Coord origin = cell->origin();
+      if (!box.isInside(origin)) continue;
+      signs[origin] = {values.getValue(origin) < 0,
+                       values.getValue(origin.offsetBy(kPartCell - 1)) < 0};
+      for (auto empty = cell->cbeginChildOff(); empty; ++empty)
+        if (values.getValue(empty.getCoord()) < 0)
+          topology->addTile(kLeafTile, empty.getCoord(), -topology->background(), false);
+    }
+  }
+
+  /// Sets the signs of the cells without leaves. Along each axis a cell continues the sign of the
+  /// cell before it, as in openvdb::tools::signedFloodFill().
+  void fillInside() {
+    std::vector<Upper*> nodes;
+    topology->getNodes(nodes);
+    for (Upper* node : nodes) fillInside(*node);
+    std::map<Coord, const Upper*> inOrder;
+    for (const Upper* node : nodes) inOrder.emplace(node->origin(), node);
+    const Upper* before = nullptr;
+    for (const auto& [origin, node] : inOrder) {
+      if (before && origin.x() == before->origin().x() && origin.y() == before->origin().y() &&
+          isInside(before->origin().offsetBy(Upper::DIM - kPartCell), true) &&
+          isInside(origin, false)) {
+        for (Coord at = before->origin().offsetBy(0, 0, Upper::DIM); at < origin;
+             at.z() += Upper::DIM)
+          topology->addTile(FloatTree::DEPTH - 1, at, -topology->background(), false);
+      }
+      before = node;
+    }
+  }
+
+  void fillInside(Upper& node) {
+    constexpr int kLog = Upper::LOG2DIM, kSide = 1 << kLog;
+    const auto& children = node.getChildMask();
+    const openvdb::Index first = children.findFirstOn();
+    if (first >= Upper::NUM_VALUES) return;
+    const auto follow = [&](int at, bool inside) {
+      const auto n = static_cast<openvdb::Index>(at);
+      return children.isOn(n) ? isInside(node.offsetToGlobalCoord(n), true) : inside;
+    };
+    bool alongX = isInside(node.offsetToGlobalCoord(first), false);
+    for (int x = 0; x < kSide; ++x) {
+      alongX = follow(x << 2 * kLog, alongX);
+      bool alongY = alongX;
+      for (int y = 0; y < kSide; ++y) {
+        const int row = (x << 2 * kLog) + (y << kLog);
+        alongY = follow(row, alongY);
+        bool alongZ = alongY;
+        for (int z = 0; z < kSide; ++z) {
+          alongZ = follow(row + z, alongZ);
+          const auto n = static_cast<openvdb::Index>(row + z);
+          if (alongZ && !children.isOn(n)) node.addTile(n, -topology->background(), false);
+        }
+      }
+    }
+  }
+
+  /// Returns the sign at the first or last grid point of a cell.
+  [[nodiscard]] bool isInside(const Coord& cell, bool last) const {
+    const auto found = signs.find(cell);
+    if (found == signs.end()) return topology->getValue(cell) < 0;
+    return last ? found->second.second : found->second.first;
+  }
+};
+
+BandPartsWriter::BandPartsWriter(const fs::path& path, const WriteBandOptions& options) {
+  const fs::path format = options.format.empty() ? path : fs::path(options.format);
+  if (!isBandFormat(format) || format.string().ends_with("nvdb"))
+    throw UsageError(
+        fmt::format("'{}' cannot be written in parts, since only .vdb files can; end the name in "
+                    ".vdb",
+                    path.string()));
+  impl_ = std::make_unique<Impl>(path, options);
+}
+
+BandPartsWriter::~BandPartsWriter() = default;
+
+void BandPartsWriter::add(const NarrowBand& part, const Imath::Box3i& cells) {
+  if (!part.shared()) return;
+  requireSolid(part);
+  const CoordBBox box(cells.min.x, cells.min.y, cells.min.z, cells.max.x, cells.max.y, cells.max.z);
+  impl_->begin(vdb(part));
+  impl_->addLeaves(vdb(part).tree(), box);
+  impl_->addTiles(vdb(part).tree(), box);
+}
+
+std::size_t BandPartsWriter::activeVoxelCount() const {
+  return impl_->activeVoxels;
+}
+
+void BandPartsWriter::commit() {
+  Impl& all = *impl_;
+  if (!all.topology)
+    throw InvalidInput(
+        fmt::format("there is no band to write to '{}'; create one first", all.path.string()));
+  all.fillInside();
+  all.store.beginReading();
+  std::uint64_t hash = 0;
+  const auto grid = std::make_shared<StoredGrid>(all.topology, all.store, hash);
+  nameGrid(*grid, *all.transform, all.options.name, openvdb::GRID_LEVEL_SET);
+  writeTarget(all.path, [&](const fs::path& target) {
+    writeVdb(
+        target, grid, [&] { return hash; }, all.options.progress);
+  });
+}
+
+}  // namespace levelset
