@@ -18,18 +18,20 @@
 #include "levelset/tree_hash_vdb.h"
 
 namespace levelset {
-namespace {
+
+// A named namespace, because BandPartsWriter::Impl has members of these types.
+namespace band_parts {
 
 namespace fs = std::filesystem;
 using openvdb::Coord;
 using openvdb::CoordBBox;
 using openvdb::FloatGrid;
 using openvdb::FloatTree;
-using Leaf = FloatTree::LeafNodeType;
+using LeafBlock = FloatTree::LeafNodeType;
 
-using Upper = FloatTree::RootNodeType::ChildNodeType;
-using Lower = Upper::ChildNodeType;
-static_assert(Lower::DIM == kPartCell);
+using UpperNode = FloatTree::RootNodeType::ChildNodeType;
+using LowerNode = UpperNode::ChildNodeType;
+static_assert(LowerNode::DIM == kPartCell);
 
 /// Level of the tiles that take the place of a leaf.
 constexpr openvdb::Index kLeafTile = 1;
@@ -41,7 +43,7 @@ class LeafStore {
     open(std::ios::out);
   }
 
-  void put(const Leaf& leaf) {
+  void put(const LeafBlock& leaf) {
     file_.write(reinterpret_cast<const char*>(leaf.buffer().data()), kLeafBytes);
     if (!file_) fail();
     positions_[leaf.origin()] = count_++;
@@ -55,7 +57,7 @@ class LeafStore {
   }
 
   /// Fills a leaf with the values stored for its origin.
-  void get(Leaf& leaf) {
+  void get(LeafBlock& leaf) {
     const std::uint64_t at = positions_.at(leaf.origin());
     if (at != next_) file_.seekg(static_cast<std::streamoff>(at) * kLeafBytes);
     leaf.buffer().allocate();
@@ -65,7 +67,7 @@ class LeafStore {
   }
 
  private:
-  static constexpr std::streamsize kLeafBytes = Leaf::SIZE * sizeof(float);
+  static constexpr std::streamsize kLeafBytes = LeafBlock::SIZE * sizeof(float);
 
   void open(std::ios::openmode mode) {
     errno = 0;
@@ -103,7 +105,7 @@ class StoredGrid : public FloatGrid {
   void writeBuffers(std::ostream& out) const override {
     hash_ = hashOfHeader(*this);
     for (auto leaf = tree().cbeginLeaf(); leaf; ++leaf) {
-      Leaf full(*leaf);
+      LeafBlock full(*leaf);
       store_.get(full);
       full.writeBuffers(out, false);
       hash_ = mixLeaf(hash_, full);
@@ -124,10 +126,9 @@ class StoredGrid : public FloatGrid {
   std::uint64_t& hash_;
 };
 
-}  // namespace
-
-struct BandPartsWriter::Impl {
-  Impl(fs::path target, WriteBandOptions settings)
+/// Members of BandPartsWriter.
+struct WriterState {
+  WriterState(fs::path target, WriteBandOptions settings)
       : path(std::move(target)), options(std::move(settings)), store(path) {}
 
   fs::path path;
@@ -154,8 +155,8 @@ struct BandPartsWriter::Impl {
     for (auto leaf = part.cbeginLeaf(); leaf; ++leaf) {
       if (!box.isInside(leaf->origin())) continue;
       store.put(*leaf);
-      auto copy =
-          std::make_unique<Leaf>(openvdb::PartialCreate(), leaf->origin(), topology->background());
+      auto copy = std::make_unique<LeafBlock>(openvdb::PartialCreate(), leaf->origin(),
+                                              topology->background());
       copy->setValueMask(leaf->valueMask());
       activeVoxels += leaf->onVoxelCount();
       topology->addLeaf(copy.release());
@@ -165,10 +166,10 @@ struct BandPartsWriter::Impl {
   /// Copies the negative tiles within the cells that have leaves, and the signs at two corners of
   /// these cells.
   void addTiles(const FloatTree& part, const CoordBBox& box) {
-    std::vector<const Lower*> cells;
+    std::vector<const LowerNode*> cells;
     topology->getNodes(cells);
     const openvdb::tree::ValueAccessor<const FloatTree> values(part);
-    for (const Lower* cell : cells) {
+    for (const LowerNode* cell : cells) {
       const Coord origin = cell->origin();
       if (!box.isInside(origin)) continue;
       signs[origin] = {values.getValue(origin) < 0,
@@ -182,29 +183,29 @@ struct BandPartsWriter::Impl {
   /// Sets the signs of the cells without leaves. Along each axis a cell continues the sign of the
   /// cell before it, as in openvdb::tools::signedFloodFill().
   void fillInside() {
-    std::vector<Upper*> nodes;
+    std::vector<UpperNode*> nodes;
     topology->getNodes(nodes);
-    for (Upper* node : nodes) fillInside(*node);
-    std::map<Coord, const Upper*> inOrder;
-    for (const Upper* node : nodes) inOrder.emplace(node->origin(), node);
-    const Upper* before = nullptr;
+    for (UpperNode* node : nodes) fillInside(*node);
+    std::map<Coord, const UpperNode*> inOrder;
+    for (const UpperNode* node : nodes) inOrder.emplace(node->origin(), node);
+    const UpperNode* before = nullptr;
     for (const auto& [origin, node] : inOrder) {
       if (before && origin.x() == before->origin().x() && origin.y() == before->origin().y() &&
-          isInside(before->origin().offsetBy(Upper::DIM - kPartCell), true) &&
+          isInside(before->origin().offsetBy(UpperNode::DIM - kPartCell), true) &&
           isInside(origin, false)) {
-        for (Coord at = before->origin().offsetBy(0, 0, Upper::DIM); at < origin;
-             at.z() += Upper::DIM)
+        for (Coord at = before->origin().offsetBy(0, 0, UpperNode::DIM); at < origin;
+             at.z() += UpperNode::DIM)
           topology->addTile(FloatTree::DEPTH - 1, at, -topology->background(), false);
       }
       before = node;
     }
   }
 
-  void fillInside(Upper& node) {
-    constexpr int kLog = Upper::LOG2DIM, kSide = 1 << kLog;
+  void fillInside(UpperNode& node) {
+    constexpr int kLog = UpperNode::LOG2DIM, kSide = 1 << kLog;
     const auto& children = node.getChildMask();
     const openvdb::Index first = children.findFirstOn();
-    if (first >= Upper::NUM_VALUES) return;
+    if (first >= UpperNode::NUM_VALUES) return;
     const auto follow = [&](int at, bool inside) {
       const auto n = static_cast<openvdb::Index>(at);
       return children.isOn(n) ? isInside(node.offsetToGlobalCoord(n), true) : inside;
@@ -234,9 +235,20 @@ struct BandPartsWriter::Impl {
   }
 };
 
-BandPartsWriter::BandPartsWriter(const fs::path& path, const WriteBandOptions& options) {
-  const fs::path format = options.format.empty() ? path : fs::path(options.format);
-  if (!isBandFormat(format) || format.string().ends_with("nvdb"))
+}  // namespace band_parts
+
+struct BandPartsWriter::Impl : band_parts::WriterState {
+  using WriterState::WriterState;
+};
+
+bool isPartsFormat(const std::filesystem::path& nameOrFormat) {
+  return isBandFormat(nameOrFormat) && nameOrFormat.extension() != ".nvdb" &&
+         nameOrFormat != "nvdb";
+}
+
+BandPartsWriter::BandPartsWriter(const std::filesystem::path& path,
+                                 const WriteBandOptions& options) {
+  if (!isPartsFormat(options.format.empty() ? path : std::filesystem::path(options.format)))
     throw UsageError(
         fmt::format("'{}' cannot be written in parts, since only .vdb files can; end the name in "
                     ".vdb",
@@ -249,7 +261,8 @@ BandPartsWriter::~BandPartsWriter() = default;
 void BandPartsWriter::add(const NarrowBand& part, const Imath::Box3i& cells) {
   if (!part.shared()) return;
   requireSolid(part);
-  const CoordBBox box(cells.min.x, cells.min.y, cells.min.z, cells.max.x, cells.max.y, cells.max.z);
+  const openvdb::CoordBBox box(cells.min.x, cells.min.y, cells.min.z, cells.max.x, cells.max.y,
+                               cells.max.z);
   impl_->begin(vdb(part));
   impl_->addLeaves(vdb(part).tree(), box);
   impl_->addTiles(vdb(part).tree(), box);
@@ -267,9 +280,9 @@ void BandPartsWriter::commit() {
   all.fillInside();
   all.store.beginReading();
   std::uint64_t hash = 0;
-  const auto grid = std::make_shared<StoredGrid>(all.topology, all.store, hash);
+  const auto grid = std::make_shared<band_parts::StoredGrid>(all.topology, all.store, hash);
   nameGrid(*grid, *all.transform, all.options.name, openvdb::GRID_LEVEL_SET);
-  writeTarget(all.path, [&](const fs::path& target) {
+  writeTarget(all.path, [&](const std::filesystem::path& target) {
     writeVdb(
         target, grid, [&] { return hash; }, all.options.progress);
   });

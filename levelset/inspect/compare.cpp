@@ -99,7 +99,7 @@ class ZeroSet {
   };
   static Points pointsOf(FloatTree::ConstPtr field) {
     eikonal::SurfacePoints points = eikonal::findSurfacePoints(*field, {}, {});
-    if (!points.thin) return {field, std::move(points)};
+    if (points.thin.empty()) return {field, std::move(points)};
     field = eikonal::thicken(*field);
     return {field, eikonal::findSurfacePoints(*field, {}, {})};
   }

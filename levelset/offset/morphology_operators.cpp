@@ -43,7 +43,8 @@ RegionOfInterest MorphologyOperator::regionOfInterest(const Options& options,
                                                       const RegionOfInterest& ofResult) {
   if (options.mask) return {};
   const ValuePlan& solid = plans.operands[0];
-  const double away = distanceReach(solid.halfWidth), back = distanceReach(plans.result.halfWidth);
+  const double away = distanceReach(solid.halfWidth) + kCutReach,
+               back = distanceReach(plans.result.halfWidth) + kCutReach;
   const double reach = 2 * options.radius + (away + back) * solid.voxelSize;
   return {.region = grown(ofResult.region, reach)};
 }

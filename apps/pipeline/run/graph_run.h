@@ -102,7 +102,6 @@ class GraphRun {
   [[nodiscard]] std::optional<double> workingBytes(std::size_t i) const;
 
   // Results that do not fit into memory, defined in graph_run_parts.cpp.
-  [[nodiscard]] std::optional<std::size_t> findPartedWrite() const;
   void runInParts(std::size_t write);
   [[nodiscard]] bool isPart() const { return !levelset::isEverywhere(settings_.part); }
 

@@ -85,38 +85,6 @@ void requirePlainGrid(const levelset::NarrowBand& band) {
 
 }  // namespace
 
-/// Finds the action that writes the only result of the run, if the run can work in parts: a chain
-/// of actions on single bands that pass on a region of interest, then `write` to a `.vdb` file.
-std::optional<std::size_t> GraphRun::findPartedWrite() const {
-  if (settings_.fullValues || cache_ || settings_.onValue || settings_.dryRun ||
-      !graph_.results.empty())
-    return {};
-  std::optional<std::size_t> last;
-  for (std::size_t i = 0; i < graph_.nodes.size(); ++i) {
-    if (states_[i] == NodeState::Unneeded) continue;
-    const Node& node = graph_.nodes[i];
-    if (last || states_[i] != NodeState::Compute) return {};
-    if (!node.makes()) {
-      Invocation invocation(*node.op, node.options);
-      if (node.op->name != "write" || invocation.text("file") == "-" ||
-          !std::filesystem::path(invocation.given("format") ? invocation.text("format")
-                                                            : "." + invocation.text("file"))
-               .string()
-               .ends_with("vdb"))
-        return {};
-      last = i;
-      continue;
-    }
-    if (node.kind != Kind::Band) continue;
-    const auto isBand = [&](std::size_t input) { return graph_.nodes[input].kind == Kind::Band; };
-    const auto bands = std::count_if(node.inputs.begin(), node.inputs.end(), isBand);
-    if (bands > 1 || !node.named.empty() || !plans_[i]) return {};
-    if (bands == 1 ? !node.op->regionOfInterest : !node.op->makesParts) return {};
-  }
-  if (!last || graph_.nodes[graph_.nodes[*last].inputs[0]].kind != Kind::Band) return {};
-  return last;
-}
-
 /// Computes and writes the result part by part. Each part is a run of its own on a region of
 /// interest.
 /// @param write  node of the action that writes

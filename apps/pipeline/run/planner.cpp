@@ -7,6 +7,7 @@
 
 #include "apps/pipeline/values/refusal.h"
 #include "levelset/error.h"
+#include "levelset/files/band_parts_writer.h"
 #include "levelset/progress.h"
 
 namespace pipeline {
@@ -213,6 +214,30 @@ double estimatePeak(const Graph& graph, const std::vector<char>& runs,
   return findPeak(graph, runs, plans, regions, worked).bytes;
 }
 
+std::optional<std::size_t> findPartedWrite(const Graph& graph, const std::vector<char>& runs,
+                                           const std::vector<std::optional<Plan>>& plans) {
+  const auto isBand = [&](std::size_t node) { return graph.nodes[node].kind == Kind::Band; };
+  std::optional<std::size_t> last;
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    if (!runs[i]) continue;
+    if (last) return {};
+    const Node& node = graph.nodes[i];
+    const std::vector<std::size_t>& inputs = node.inputs;
+    if (!node.makes()) {
+      const Invocation write(*node.op, node.options);
+      if (node.op->name != "write" || write.text("file") == "-" || !isBand(inputs[0])) return {};
+      if (!levelset::isPartsFormat(write.text(write.given("format") ? "format" : "file")))
+        return {};
+      last = i;
+    } else if (isBand(i)) {
+      const auto bands = std::count_if(inputs.begin(), inputs.end(), isBand);
+      if (bands > 1 || !node.named.empty() || !plans[i]) return {};
+      if (bands == 1 ? !node.op->regionOfInterest : ignoresRoi(node)) return {};
+    }
+  }
+  return last;
+}
+
 void explain(const Graph& graph, std::size_t maxMemory, bool fullValues,
              const std::function<void(const std::string&)>& print) {
   const std::vector<char> runs = neededNodes(graph);
@@ -271,6 +296,11 @@ void explain(const Graph& graph, std::size_t maxMemory, bool fullValues,
       findPeak(graph, runs, plans, regions, worked).bytes * 1e-6, inSeconds(seconds),
       untimed.empty() ? ""
                       : fmt::format(", plus {}, whose time is unknown", fmt::join(untimed, ", ")));
+  const bool mayBeParted =
+      !fullValues && estimatePeak(graph, runs, plans, regions) > static_cast<double>(maxMemory) &&
+      graph.results.empty() && findPartedWrite(graph, runs, plans);
+  if (mayBeParted)
+    text += "this exceeds the memory limit, so the result would be computed in parts\n";
   print(text);
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     if (!all.failures[i]) continue;
@@ -280,7 +310,7 @@ void explain(const Graph& graph, std::size_t maxMemory, bool fullValues,
       rethrowAs(graph.nodes[i].op->name, error, graph.nodes[i].location);
     }
   }
-  checkMemoryFor(graph, runs, plans, regions, maxMemory);
+  if (!mayBeParted) checkMemoryFor(graph, runs, plans, regions, maxMemory);
 }
 
 }  // namespace pipeline

@@ -150,13 +150,23 @@ float extrapolate(const DenseBlock& block, int x, int y, int z, float background
   return count > 0 ? sign * sum / count : 0;
 }
 
-void addLayer(FloatTree& tree) {
+/// Extends the band by one grid point.
+/// @param within  only in leaves of this tree; null: everywhere
+void addLayer(FloatTree& tree, const openvdb::MaskTree* within) {
   const float background = tree.background();
+  const auto isWithin = [&](const Coord& origin) {
+    return !within || within->probeConstLeaf(origin);
+  };
   std::vector<Coord> origins;
-  for (const LeafNode* leaf : leavesOf(tree, {})) origins.push_back(leaf->origin());
+  for (const LeafNode* leaf : leavesOf(tree, {}))
+    if (isWithin(leaf->origin())) origins.push_back(leaf->origin());
   for (const Coord& o : origins)
-    for (const auto& d : kDirections) tree.touchLeaf(o.offsetBy(8 * d[0], 8 * d[1], 8 * d[2]));
-  const std::vector<const LeafNode*> leaves = leavesOf(tree, {});
+    for (const auto& d : kDirections) {
+      const Coord beside = o.offsetBy(8 * d[0], 8 * d[1], 8 * d[2]);
+      if (isWithin(beside)) tree.touchLeaf(beside);
+    }
+  std::vector<const LeafNode*> leaves = leavesOf(tree, {});
+  std::erase_if(leaves, [&](const LeafNode* leaf) { return !isWithin(leaf->origin()); });
   std::vector<std::vector<std::pair<openvdb::Index, float>>> additions(leaves.size());
   forEachBlock(tree, leaves, [&](std::size_t i, const DenseBlock& block) {
     for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n) {
@@ -167,8 +177,11 @@ void addLayer(FloatTree& tree) {
     }
   });
   std::size_t i = 0;
-  for (auto leaf = tree.beginLeaf(); leaf; ++leaf, ++i)
+  for (auto leaf = tree.beginLeaf(); leaf; ++leaf) {
+    if (!isWithin(leaf->origin())) continue;
     for (const auto& [n, value] : additions[i]) leaf->setValueOnly(n, value);
+    ++i;
+  }
 }
 
 /// Returns true when the interpolant beside this grid point reads values that are clipped to the
@@ -208,7 +221,8 @@ SurfacePoints findSurfacePoints(const FloatTree& field, const BlockSelection& wi
                                                                       : CompactJet());
       found[i].gridPoints.push_back(gridPoint);
       found[i].sharp.push_back(isSharp);
-      found[i].thin = found[i].thin || isThinAt(block, x, y, z, background);
+      if (found[i].thin.empty() && isThinAt(block, x, y, z, background))
+        found[i].thin.push_back(block.origin());
     });
   });
   SurfacePoints all;
@@ -223,7 +237,7 @@ SurfacePoints findSurfacePoints(const FloatTree& field, const BlockSelection& wi
     all.gridPoints.insert(all.gridPoints.end(), part.gridPoints.begin(), part.gridPoints.end());
     all.jets.insert(all.jets.end(), part.jets.begin(), part.jets.end());
     all.sharp.insert(all.sharp.end(), part.sharp.begin(), part.sharp.end());
-    all.thin = all.thin || part.thin;
+    all.thin.insert(all.thin.end(), part.thin.begin(), part.thin.end());
   }
   for (const Vec3d& feature : patches.features())
     if (within.holds(Coord::floor(feature))) all.positions.push_back(feature);
@@ -244,8 +258,20 @@ bool hasZeroCrossing(const FloatTree& field) {
 
 FloatTree::Ptr thicken(const FloatTree& field) {
   auto result = std::make_shared<FloatTree>(field);
-  addLayer(*result);
-  addLayer(*result);
+  addLayer(*result, nullptr);
+  addLayer(*result, nullptr);
+  return result;
+}
+
+FloatTree::Ptr thicken(const FloatTree& field, const std::vector<Coord>& leaves) {
+  openvdb::MaskTree around;
+  for (const Coord& origin : leaves)
+    for (int x = -8; x <= 8; x += 8)
+      for (int y = -8; y <= 8; y += 8)
+        for (int z = -8; z <= 8; z += 8) around.touchLeaf(origin.offsetBy(x, y, z));
+  auto result = std::make_shared<FloatTree>(field);
+  addLayer(*result, &around);
+  addLayer(*result, &around);
   return result;
 }
 

@@ -24,9 +24,9 @@ struct SurfacePoints {
   std::vector<CompactJet> jets;
   /// Nonzero: the point lies on the sharp patches, not on the interpolant.
   std::vector<char> sharp;
-  /// The interpolant beside the zero set reads grid points without a distance. Call thicken() on
-  /// the field and search again.
-  bool thin = false;
+  /// Origins of the leaves in which the interpolant beside the zero set reads grid points without a
+  /// distance. Call thicken() on the field around them and search again.
+  std::vector<openvdb::Coord> thin;
   [[nodiscard]] std::size_t size() const { return positions.size(); }
 };
 
@@ -40,6 +40,12 @@ struct SurfacePoints {
 /// Returns the field with its band extended by two grid points on each side, by extrapolation along
 /// the axes. The extrapolation is parabolic where the field is smooth, else linear.
 [[nodiscard]] openvdb::FloatTree::Ptr thicken(const openvdb::FloatTree& field);
+
+/// Returns the field with the bands of some leaves, and of the 26 leaves around each, extended by
+/// two grid points. All other values keep their bits, so the end of a band at the cut of a region
+/// of interest has no effect far from the cut.
+[[nodiscard]] openvdb::FloatTree::Ptr thicken(const openvdb::FloatTree& field,
+                                              const std::vector<openvdb::Coord>& leaves);
 
 /// Returns true when two neighbouring grid points differ in sign and one of them has a distance,
 /// which means a magnitude below the background.

@@ -12,8 +12,8 @@ ZeroSet readZeroSet(const openvdb::FloatGrid& field, const BlockSelection& withi
                   edgesWithin ? SharpPatches(field, *edgesWithin, progress) : SharpPatches(),
                   {}};
   surface.points = findSurfacePoints(*surface.interpolated, within, surface.patches);
-  if (surface.points.thin) {
-    surface.interpolated = thicken(field.tree());
+  if (!surface.points.thin.empty()) {
+    surface.interpolated = thicken(field.tree(), surface.points.thin);
     surface.points = findSurfacePoints(*surface.interpolated, within, surface.patches);
   }
   if (surface.points.size() >= std::numeric_limits<std::uint32_t>::max())
