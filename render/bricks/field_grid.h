@@ -26,6 +26,10 @@ class FieldGrid {
   };
   /// Values at the 6³ grid points around a cell, starting two points before its lowest corner.
   using FieldWindow = double[6][6][6];
+  /// Numbers of blocks in which the field is the background, or minus the background.
+  static constexpr int kOutside = -1, kInside = -2;
+  /// Values of a block.
+  static constexpr std::size_t kValues = std::size_t{kPoints} * kPoints * kPoints;
 
   /// Upper bound on the memory of a band's blocks, bytes.
   [[nodiscard]] static double bytesOf(const levelset::NarrowBand& band);
@@ -66,13 +70,16 @@ class FieldGrid {
   [[nodiscard]] const float* values(int block) const {
     return values_.data() + static_cast<std::size_t>(block) * kValues;
   }
+  /// Tables of the grid, for the upload to the GPU.
+  [[nodiscard]] const std::vector<std::int32_t>& pages() const { return page_; }
+  [[nodiscard]] const std::vector<std::int32_t>& entries() const { return entry_; }
+  [[nodiscard]] const std::vector<Range>& ranges() const { return ranges_; }
+  [[nodiscard]] const std::vector<float>& allValues() const { return values_; }
   /// Value and gradient of the trilinear interpolant at a world position, and first and second
   /// derivatives of the quasi-interpolating tricubic B-spline there.
   [[nodiscard]] FieldShape shapeAt(const Imath::V3d& world) const;
 
  private:
-  static constexpr int kOutside = -1, kInside = -2;
-  static constexpr std::size_t kValues = std::size_t{kPoints} * kPoints * kPoints;
   [[nodiscard]] double constant(int block) const {
     return block == kInside ? -background_ : background_;
   }

@@ -9,9 +9,6 @@ namespace render {
 
 Image renderGpu(const Scene& scene, const RenderOptions& options) {
   requirePicture(scene, options);
-  if (scene.isBlended())
-    throw levelset::UsageError(
-        "--renderer gpu supports neither soft expressions nor morphs; use --renderer cpu");
   levelset::report(options.progress, 0);
   const KernelScene surfaces(scene, options);
   if (surfaces.bounds().isEmpty()) refuseEmptyScene();

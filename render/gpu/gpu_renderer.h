@@ -16,7 +16,6 @@ struct NoOpenGl : levelset::ResourceLimit {
 /// driver rounds as IEEE 754 requires, as Mesa's llvmpipe does, pixels have the same bits as those
 /// of renderCpu().
 /// @throws as renderCpu()
-/// @throws levelset::UsageError for blended scenes
 /// @throws NoOpenGl when OpenGL 4.5 is missing
 /// @throws levelset::ResourceLimit also when the driver rejects the shader, or the tables are too
 /// large for it

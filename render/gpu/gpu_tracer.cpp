@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "levelset/error.h"
+#include "render/gpu/gl_objects.h"
+#include "render/gpu/gpu_fields.h"
 #include "render/gpu/nano_grid.h"
 #include "render/kernel/trace_glsl.h"
 
@@ -192,38 +194,7 @@ std::string shaderText(const Variant& variant, int shift) {
 
 }  // namespace
 
-GLuint compileCompute(const GlContext& context, const std::string& text) {
-  const GlFunctions& gl = context.gl();
-  const GLuint shader = gl.CreateShader(GL_COMPUTE_SHADER), program = gl.CreateProgram();
-  const auto refuse = [&](const char* what, auto getLog, GLuint object) {
-    char log[400] = "";
-    getLog(object, sizeof log, nullptr, log);
-    gl.DeleteShader(shader);
-    gl.DeleteProgram(program);
-    throw levelset::ResourceLimit(fmt::format(
-        "the graphics driver ({}) does not {} the ray caster: {}; draw with --renderer cpu",
-        context.description(), what, log));
-  };
-  const char* lines = text.c_str();
-  gl.ShaderSource(shader, 1, &lines, nullptr);
-  gl.CompileShader(shader);
-  GLint isGood = 0;
-  gl.GetShaderiv(shader, GL_COMPILE_STATUS, &isGood);
-  if (!isGood) refuse("compile", gl.GetShaderInfoLog, shader);
-  gl.AttachShader(program, shader);
-  gl.LinkProgram(program);
-  gl.GetProgramiv(program, GL_LINK_STATUS, &isGood);
-  if (!isGood) refuse("link", gl.GetProgramInfoLog, program);
-  gl.DeleteShader(shader);
-  return program;
-}
-
 struct GpuTracer::Impl {
-  /// A buffer that shaders read as a texture. Mesa's llvmpipe gathers from textures by vectors, but
-  /// from storage blocks lane by lane.
-  struct Texels {
-    GLuint buffer = 0, texture = 0;
-  };
   struct Tables {
     Texels pages, entries, masks;
     std::vector<Texels> values;
@@ -237,6 +208,7 @@ struct GpuTracer::Impl {
   std::map<const KernelSolid*, Tables> tables;
   GLuint rays = 0, hits = 0;
   std::map<Variant, GLuint> programs;
+  std::optional<GpuFields> fields;
 
   Impl(const GlContext& context_, std::size_t largestTable_)
       : context(context_),
@@ -248,35 +220,21 @@ struct GpuTracer::Impl {
     gl.CreateBuffers(1, &hits);
   }
 
-  void release(const Texels& texels) {
-    gl.DeleteTextures(1, &texels.texture);
-    gl.DeleteBuffers(1, &texels.buffer);
-  }
   /// @pre the context is current
   void release() {
     for (auto& [solid, t] : tables) {
-      for (const Texels& texels : {t.pages, t.entries, t.masks}) release(texels);
-      for (const Texels& texels : t.values) release(texels);
+      for (const Texels& texels : {t.pages, t.entries, t.masks}) releaseTexels(context, texels);
+      for (const Texels& texels : t.values) releaseTexels(context, texels);
     }
     for (const GLuint buffer : {rays, hits}) gl.DeleteBuffers(1, &buffer);
     for (const auto& [variant, program] : programs) gl.DeleteProgram(program);
+    if (fields) fields->release();
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
   Texels texelsOf(const void* data, std::size_t bytes, GLenum format) {
-    if (bytes > largestTable) {
-      throw levelset::ResourceLimit(fmt::format(
-          "a table of {} MB does not fit into a buffer texture of {} MB, the limit of {}; "
-          "use larger voxels, or draw with --renderer cpu",
-          bytes >> 20, largestTable >> 20, context.description()));
-    }
-    Texels texels;
-    gl.CreateBuffers(1, &texels.buffer);
-    gl.NamedBufferData(texels.buffer, static_cast<GLsizeiptr>(bytes), data, GL_STATIC_DRAW);
-    gl.CreateTextures(GL_TEXTURE_BUFFER, 1, &texels.texture);
-    gl.TextureBuffer(texels.texture, format, texels.buffer);
-    return texels;
+    return makeTexels(context, largestTable, data, bytes, format);
   }
 
   /// Uploads the values of a solid into as many buffer textures as they need.
@@ -435,6 +393,7 @@ GpuTracer::GpuTracer(const GlContext& context, const KernelScene& scene, std::si
       else
         impl_->upload(solid);
     }
+    if (scene.fields()) impl_->fields.emplace(context, *scene.fields(), impl_->largestTable);
   } catch (...) {
     impl_->release();
     throw;
@@ -466,6 +425,12 @@ void GpuTracer::trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& 
     input.insert(input.end(), part->begin(), part->end());
   input.insert(input.end(), rays.passing.begin(), rays.passing.end());
   impl_->run(solid, input, rays.size, hits, nullptr);
+}
+
+std::vector<double> GpuTracer::search(const FieldTraversal& fields,
+                                      const std::vector<FieldSegment>& segments,
+                                      FieldQuestion question) const {
+  return impl_->fields->search(fields, segments, question);
 }
 
 }  // namespace render

@@ -3,14 +3,14 @@
 // Private to the GPU renderer: runs the kernel as a compute shader.
 
 #include <memory>
-#include <string>
+#include <vector>
 
 #include "render/gpu/gl_context.h"
 #include "render/kernel/kernel_scene.h"
 
 namespace render {
 
-/// Runs the kernel on the graphics processor. The brick tables of each solid are uploaded once.
+/// Runs the kernel on the graphics processor. The tables of each solid are uploaded once.
 /// Thread-safe: concurrent calls run one after the other.
 class GpuTracer : public KernelTracer {
  public:
@@ -20,7 +20,7 @@ class GpuTracer : public KernelTracer {
   /// place of brick tables, as a reference for the tables. Null: the brick tables are uploaded.
   /// @pre with `grids` the filter is trilinear
   /// @throws levelset::ResourceLimit when the tables do not fit into the buffer textures, or the
-  /// shader does not compile
+  /// shader does not compile; also for the reasons of GpuFields
   GpuTracer(const GlContext& context, const KernelScene& scene, std::size_t largestTable = 0,
             const Scene* grids = nullptr);
   ~GpuTracer() override;
@@ -28,15 +28,13 @@ class GpuTracer : public KernelTracer {
   void trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits,
              ShapeBlock& shapes) const override;
   void trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits) const override;
+  [[nodiscard]] std::vector<double> search(const FieldTraversal& fields,
+                                           const std::vector<FieldSegment>& segments,
+                                           FieldQuestion question) const override;
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-/// Compiles and links a compute shader. @pre the context is current
-/// @throws levelset::ResourceLimit when it does not compile or link; the message has the start of
-/// the driver's log
-[[nodiscard]] GLuint compileCompute(const GlContext& context, const std::string& text);
 
 }  // namespace render

@@ -217,29 +217,25 @@ struct GridTraversal {
   }
 };
 
-/// Finds the points where one ray crosses the zero set of the expression.
+/// Finds the points where one ray crosses the zero set of the expression. render/shaders/field.glsl
+/// has the same steps, and must give the same bits.
 class FieldSearch {
  public:
   std::vector<double> crossings;  // distances from `start` along the ray, world units
   bool startsInside = false;
 
-  /// @param end  length of the searched segment, world units
   /// @param wantsAll  true: finds all crossings; false: only the first one
-  FieldSearch(const FieldExpression& expression, const std::vector<FieldGrid>& grids,
-              const V3d& start, const V3d& direction, double end, bool wantsAll)
-      : e_(expression),
-        end_(end),
+  FieldSearch(const FieldTraversal& fields, const FieldSegment& segment, bool wantsAll)
+      : e_(fields.expression()),
+        end_(segment.end),
         wantsAll_(wantsAll),
-        values_(expression.valueCount()),
-        bounds_(expression.valueCount()),
-        ranges_(expression.valueCount()),
-        cubics_(grids.size() * (kMostHalvings + 1)) {
-    double largest = 0;
-    for (const FieldGrid& grid : grids) {
-      traversals_.emplace_back(grid, start, direction);
-      largest = std::max(largest, grid.background());
-    }
-    noise_ = kNoise * largest;
+        noise_(fields.noise()),
+        values_(e_.valueCount()),
+        bounds_(e_.valueCount()),
+        ranges_(e_.valueCount()),
+        cubics_(fields.grids().size() * (kMostHalvings + 1)) {
+    for (const FieldGrid& grid : fields.grids())
+      traversals_.emplace_back(grid, segment.start, segment.direction);
     walkBlocks();
   }
 
@@ -360,7 +356,7 @@ class FieldSearch {
   const FieldExpression& e_;
   double end_;
   bool wantsAll_;
-  double noise_ = 0;
+  double noise_;
   std::vector<GridTraversal> traversals_;
   std::optional<bool> inside_;
   std::vector<double> values_;
@@ -423,36 +419,31 @@ std::size_t FieldTraversal::blockCount() const {
   return sum;
 }
 
-Hit FieldTraversal::intersect(const V3d& origin, const V3d& direction, double near,
-                              double far) const {
-  Hit hit;
-  const std::optional<Range> part = partWithin(box_, origin, direction, near, far);
-  if (!part) return hit;
-  const FieldSearch found(expression_, grids_, origin + direction * part->low, direction,
-                          part->high - part->low, false);
-  if (found.crossings.empty()) return hit;
-  hit.distance = part->low + found.crossings[0];
-  hit.position = origin + direction * hit.distance;
-  std::vector<FieldShape> shapes;
-  for (const FieldGrid& grid : grids_) shapes.push_back(grid.shapeAt(hit.position));
-  addFieldShape(hit, expression_, shapes, direction);
-  return hit;
+double FieldTraversal::noise() const {
+  double largest = 0;
+  for (const FieldGrid& grid : grids_) largest = std::max(largest, grid.background());
+  return kNoise * largest;
 }
 
-bool FieldTraversal::isOccluded(const V3d& origin, const V3d& direction, double maxDistance) const {
-  const std::optional<Range> part = partWithin(box_, origin, direction, 0, maxDistance);
-  return part && !FieldSearch(expression_, grids_, origin + direction * part->low, direction,
-                              part->high - part->low, false)
-                      .crossings.empty();
+FieldTraversal::Clipped FieldTraversal::clipped(const std::vector<FieldRay>& rays) const {
+  Clipped result;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const FieldRay& ray = rays[i];
+    const std::optional<Range> part =
+        partWithin(box_, ray.origin, ray.direction, ray.near, ray.far);
+    if (!part) continue;
+    result.segments.push_back(
+        {ray.origin + ray.direction * part->low, ray.direction, part->high - part->low});
+    result.number.push_back(i);
+    result.low.push_back(part->low);
+  }
+  return result;
 }
 
-double FieldTraversal::thickness(const V3d& origin, const V3d& direction, double near,
-                                 double far) const {
-  const std::optional<Range> part = partWithin(box_, origin, direction, near, far);
-  if (!part) return 0;
-  const double end = part->high - part->low;
-  const FieldSearch found(expression_, grids_, origin + direction * part->low, direction, end,
-                          true);
+double FieldTraversal::search(const FieldSegment& segment, FieldQuestion question) const {
+  const bool isLength = question == FieldQuestion::InsideLength;
+  const FieldSearch found(*this, segment, isLength);
+  if (!isLength) return found.crossings.empty() ? kNever : found.crossings[0];
   double length = 0, from = 0;
   bool isInside = found.startsInside;
   for (const double t : found.crossings) {
@@ -460,7 +451,56 @@ double FieldTraversal::thickness(const V3d& origin, const V3d& direction, double
     from = t;
     isInside = !isInside;
   }
-  return isInside ? length + end - from : length;
+  return isInside ? length + segment.end - from : length;
+}
+
+std::vector<double> FieldTracer::search(const FieldTraversal& fields,
+                                        const std::vector<FieldSegment>& segments,
+                                        FieldQuestion question) const {
+  std::vector<double> answers;
+  answers.reserve(segments.size());
+  for (const FieldSegment& segment : segments) answers.push_back(fields.search(segment, question));
+  return answers;
+}
+
+std::vector<Hit> FieldTraversal::intersect(const FieldTracer& tracer,
+                                           const std::vector<FieldRay>& rays) const {
+  std::vector<Hit> hits(rays.size());
+  const Clipped part = clipped(rays);
+  const std::vector<double> crossings =
+      tracer.search(*this, part.segments, FieldQuestion::FirstCrossing);
+  for (std::size_t n = 0; n < crossings.size(); ++n) {
+    if (crossings[n] == kNever) continue;
+    const FieldRay& ray = rays[part.number[n]];
+    Hit& hit = hits[part.number[n]];
+    hit.distance = part.low[n] + crossings[n];
+    hit.position = ray.origin + ray.direction * hit.distance;
+    std::vector<FieldShape> shapes;
+    for (const FieldGrid& grid : grids_) shapes.push_back(grid.shapeAt(hit.position));
+    addFieldShape(hit, expression_, shapes, ray.direction);
+  }
+  return hits;
+}
+
+std::vector<char> FieldTraversal::areOccluded(const FieldTracer& tracer,
+                                              const std::vector<FieldRay>& rays) const {
+  std::vector<char> occluded(rays.size(), 0);
+  const Clipped part = clipped(rays);
+  const std::vector<double> crossings =
+      tracer.search(*this, part.segments, FieldQuestion::FirstCrossing);
+  for (std::size_t n = 0; n < crossings.size(); ++n)
+    occluded[part.number[n]] = crossings[n] == kNever ? 0 : 1;
+  return occluded;
+}
+
+std::vector<double> FieldTraversal::thickness(const FieldTracer& tracer,
+                                              const std::vector<FieldRay>& rays) const {
+  std::vector<double> lengths(rays.size(), 0);
+  const Clipped part = clipped(rays);
+  const std::vector<double> found =
+      tracer.search(*this, part.segments, FieldQuestion::InsideLength);
+  for (std::size_t n = 0; n < found.size(); ++n) lengths[part.number[n]] = found[n];
+  return lengths;
 }
 
 }  // namespace render

@@ -12,6 +12,37 @@
 
 namespace render {
 
+/// A ray in world space. The direction has unit length.
+struct FieldRay {
+  Imath::V3d origin, direction;
+  double near, far;  ///< searched part, distances along the ray, world units
+};
+
+/// A ray from a start, clipped to the box of all fields. The direction has unit length.
+struct FieldSegment {
+  Imath::V3d start, direction;
+  double end;  ///< length of the searched part, world units
+};
+
+/// Result of a search along a FieldSegment.
+enum class FieldQuestion {
+  FirstCrossing,  ///< distance of the first crossing from the start, world units; infinite if none
+  InsideLength    ///< length where the expression is negative, world units
+};
+
+class FieldTraversal;
+
+/// Interface of the searches along rays, on the processor and on the GPU. All of them return the
+/// same bits.
+class FieldTracer {
+ public:
+  virtual ~FieldTracer() = default;
+  /// Answers the question for each segment. The default does so on the calling thread.
+  [[nodiscard]] virtual std::vector<double> search(const FieldTraversal& fields,
+                                                   const std::vector<FieldSegment>& segments,
+                                                   FieldQuestion question) const;
+};
+
 /// Intersects rays with the zero set of a scene's FieldExpression, for the kernel. Thread-safe. Ray
 /// directions have unit length.
 ///
@@ -31,18 +62,33 @@ class FieldTraversal {
 
   [[nodiscard]] std::size_t bytes() const;
   [[nodiscard]] std::size_t blockCount() const;
-  /// First hit in [near, far], distances along the ray in world units. The solid is where the
-  /// expression is negative. A ray that is inside the solid at `near` hits where it leaves the
-  /// solid.
-  [[nodiscard]] Hit intersect(const Imath::V3d& origin, const Imath::V3d& direction, double near,
-                              double far) const;
-  [[nodiscard]] bool isOccluded(const Imath::V3d& origin, const Imath::V3d& direction,
-                                double maxDistance) const;
-  /// Length of the ray within [near, far] where the expression is negative (inside), world units.
-  [[nodiscard]] double thickness(const Imath::V3d& origin, const Imath::V3d& direction, double near,
-                                 double far) const;
+  [[nodiscard]] const FieldExpression& expression() const { return expression_; }
+  /// One grid for each operand of the expression.
+  [[nodiscard]] const std::vector<FieldGrid>& grids() const { return grids_; }
+  /// Bound on the rounding noise of the expression's value, world units.
+  [[nodiscard]] double noise() const;
+  /// First hits of rays. The solid is where the expression is negative. A ray that is inside the
+  /// solid at `near` hits where it leaves the solid.
+  [[nodiscard]] std::vector<Hit> intersect(const FieldTracer& tracer,
+                                           const std::vector<FieldRay>& rays) const;
+  /// Marks the rays that cross the surface: 1, else 0.
+  [[nodiscard]] std::vector<char> areOccluded(const FieldTracer& tracer,
+                                              const std::vector<FieldRay>& rays) const;
+  /// Length of each ray where the expression is negative (inside), world units.
+  [[nodiscard]] std::vector<double> thickness(const FieldTracer& tracer,
+                                              const std::vector<FieldRay>& rays) const;
+  /// Searches one segment on the processor.
+  [[nodiscard]] double search(const FieldSegment& segment, FieldQuestion question) const;
 
  private:
+  /// The rays that meet the box of the fields.
+  struct Clipped {
+    std::vector<FieldSegment> segments;
+    std::vector<std::size_t> number;  // index of each segment's ray
+    std::vector<double> low;          // distance of each segment's start from its ray's origin
+  };
+  [[nodiscard]] Clipped clipped(const std::vector<FieldRay>& rays) const;
+
   FieldExpression expression_;
   std::vector<FieldGrid> grids_;  // one for each operand of expression_
   Imath::Box3d box_;  // box of all fields, world space; outside it the expression is positive

@@ -368,8 +368,15 @@ bool KernelScene::isInside(const std::vector<char>& inside) const {
 std::vector<double> KernelScene::transmittances(const KernelTracer& tracer,
                                                 const std::vector<LightRay>& rays) const {
   std::vector<double> light(rays.size(), 1);
-  for (std::size_t i = 0; i < rays.size() && fields_; ++i)
-    if (fields_->isOccluded(rays[i].origin, rays[i].direction, rays[i].maxDistance)) light[i] = 0;
+  if (fields_) {
+    std::vector<FieldRay> asked;
+    asked.reserve(rays.size());
+    for (const LightRay& ray : rays)
+      asked.push_back({ray.origin, ray.direction, 0, ray.maxDistance});
+    const std::vector<char> occluded = fields_->areOccluded(tracer, asked);
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      if (occluded[i]) light[i] = 0;
+  }
   for (std::size_t first = 0; first < rays.size() && !fields_; first += kRaysAtOnce) {
     const std::size_t last = std::min(rays.size(), first + kRaysAtOnce);
     if (csg_.isEmpty())

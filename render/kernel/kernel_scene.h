@@ -33,10 +33,9 @@ struct KernelSolid {
 };
 
 /// Interface of the kernel's back ends, on the processor and on the GPU. All of them return the
-/// same bits.
-class KernelTracer {
+/// same bits. Fields of a blended scene are searched by FieldTracer::search().
+class KernelTracer : public FieldTracer {
  public:
-  virtual ~KernelTracer() = default;
   /// Finds the first crossing of the ray through each pixel with the solid's surface, after those
   /// that pixels.passing skips. @param hits, shapes  must have as many entries as `pixels`;
   /// `shapes` is written only for hits

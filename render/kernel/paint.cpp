@@ -31,6 +31,14 @@ constexpr int kProbes = 2;
 // Lattice points in a penumbra have so many times the shadow rays of others.
 constexpr int kPenumbraSamples = 6;
 
+std::vector<FieldRay> fieldRays(const std::vector<Camera::Ray>& rays) {
+  std::vector<FieldRay> result;
+  result.reserve(rays.size());
+  for (const Camera::Ray& ray : rays)
+    result.push_back({ray.origin, ray.direction, ray.near, ray.far});
+  return result;
+}
+
 }  // namespace
 
 KernelPainter::KernelPainter(const Scene& scene, const KernelScene& surfaces,
@@ -65,11 +73,12 @@ LightLattice KernelPainter::latticeOf(const KernelTracer& tracer, const PixelBox
     views.push_back(camera.ray(points[i].x, points[i].y));
   }
   const PixelHits hits = surfaces_.castPixels(tracer, at);
+  const std::vector<Hit> onFields = hitsOnFields(tracer, views);
   std::vector<LightLattice::Node> nodes(points.size());
   std::vector<LightRay> rays;
   std::vector<LightRays> ranges(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    nodes[i].hit = hitOf(views[i], views[i].near, hits, i);
+    nodes[i].hit = hitOf(views[i], views[i].near, hits, onFields, i);
     if (!nodes[i].hit.found) nodes[i].hit = shader_.groundHit(views[i]);
     if (!nodes[i].hit.found) continue;
     const auto x = static_cast<int>(points[i].x), y = static_cast<int>(points[i].y);
@@ -121,12 +130,17 @@ std::size_t KernelPainter::numberOf(const Pixel& pixel) const {
          static_cast<std::size_t>(pixel.x);
 }
 
+std::vector<Hit> KernelPainter::hitsOnFields(const KernelTracer& tracer,
+                                             const std::vector<Camera::Ray>& rays) const {
+  if (!surfaces_.fields()) return {};
+  return surfaces_.fields()->intersect(tracer, fieldRays(rays));
+}
+
 Hit KernelPainter::hitOf(const Camera::Ray& ray, double meshNear, const PixelHits& hits,
-                         std::size_t i) const {
-  const FieldTraversal* fields = surfaces_.fields();
+                         const std::vector<Hit>& onFields, std::size_t i) const {
   Hit onSolid;
-  if (fields)
-    onSolid = fields->intersect(ray.origin, ray.direction, ray.near, ray.far);
+  if (!onFields.empty())
+    onSolid = onFields[i];
   else if (hits.solid[i] >= 0)
     onSolid = hitOnSolid(ray, hits, i);
   if (surfaces_.meshes().isEmpty()) return onSolid;
@@ -156,19 +170,19 @@ std::vector<char> KernelPainter::paintData(const KernelTracer& tracer,
                                            const LightLattice& lattice) const {
   const double middleX = 0.5 * scene_.camera.width, middleY = 0.5 * scene_.camera.height;
   PixelBlock at(pixels.size());
+  std::vector<Camera::Ray> views;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     at.x[i] = static_cast<float>(pixels[i].x + 0.5 - middleX);
     at.y[i] = static_cast<float>(pixels[i].y + 0.5 - middleY);
+    views.push_back(scene_.camera.ray(pixels[i].x + 0.5, pixels[i].y + 0.5));
   }
   if (options_.thickness) {
-    const std::vector<double> depths = surfaces_.thickness(tracer, at);
-    for (std::size_t i = 0; i < pixels.size(); ++i) {
-      const Camera::Ray ray = scene_.camera.ray(pixels[i].x + 0.5, pixels[i].y + 0.5);
+    const FieldTraversal* fields = surfaces_.fields();
+    const std::vector<double> lengths =
+        fields ? fields->thickness(tracer, fieldRays(views)) : surfaces_.thickness(tracer, at);
+    for (std::size_t i = 0; i < pixels.size(); ++i)
       layers_.thickness[numberOf(pixels[i])] = static_cast<float>(
-          surfaces_.fields()
-              ? surfaces_.fields()->thickness(ray.origin, ray.direction, ray.near, ray.far)
-              : depths[i] / ray.direction.dot(scene_.camera.axis()));
-    }
+          fields ? lengths[i] : lengths[i] / views[i].direction.dot(scene_.camera.axis()));
   }
   // Shadow rays from the centres (probes) find shadows that are thinner than the spacing of the
   // lattice.
@@ -180,11 +194,12 @@ std::vector<char> KernelPainter::paintData(const KernelTracer& tracer,
   std::vector<Probe> probes;
   std::vector<LightRay> shadowRays;
   const PixelHits hits = surfaces_.castPixels(tracer, at);
+  const std::vector<Hit> onFields = hitsOnFields(tracer, views);
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     const auto& [x, y] = pixels[i];
     const std::size_t number = numberOf(pixels[i]);
-    const Camera::Ray ray = scene_.camera.ray(x + 0.5, y + 0.5);
-    Hit hit = hitOf(ray, ray.near, hits, i);
+    const Camera::Ray& ray = views[i];
+    Hit hit = hitOf(ray, ray.near, hits, onFields, i);
     if (hit.found) {
       layers_.setHit(number, scene_.camera, hit);
       if (options_.curvature) layers_.setCurvature(number, hit.curvature);
@@ -216,6 +231,7 @@ void KernelPainter::paintColours(const KernelTracer& tracer, const std::vector<P
   PixelBlock at(pixels.size());
   for (int s = 0; s < options_.samples; ++s) {
     std::vector<SampleRay> sampleRays;
+    std::vector<Camera::Ray> views;
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       const V2d shift = PixelSequence::overArea(pixels[i].x, pixels[i].y).at(s);
       // Build the ray from the rounded position: the kernel reads pixel positions in single
@@ -226,17 +242,19 @@ void KernelPainter::paintColours(const KernelTracer& tracer, const std::vector<P
                    y = static_cast<double>(at.y[i]) + middleY;
       const Camera::Ray ray = scene_.camera.ray(x, y);
       sampleRays.push_back({ray, x, y, ray.near});
+      views.push_back(ray);
     }
+    const std::vector<Hit> onFields = hitsOnFields(tracer, views);
     if (scene_.isOpaque()) {
-      addSeen(tracer, pixels, s, surfaces_.castPixels(tracer, at), lattice, contradicts, sampleRays,
-              sums);
+      addSeen(tracer, pixels, s, surfaces_.castPixels(tracer, at), onFields, lattice, contradicts,
+              sampleRays, sums);
       continue;
     }
     PixelTraversal walk = surfaces_.startTraversal(at);
     for (bool seesMore = true; seesMore;) {
       const PixelHits hits = surfaces_.castNext(tracer, walk);
       for (const std::size_t i :
-           addSeen(tracer, pixels, s, hits, lattice, contradicts, sampleRays, sums))
+           addSeen(tracer, pixels, s, hits, onFields, lattice, contradicts, sampleRays, sums))
         walk.solids.resume(i);
       seesMore = std::any_of(sampleRays.begin(), sampleRays.end(), [](const SampleRay& sampleRay) {
         return sampleRay.left >= kLeastTransmittance;
@@ -247,12 +265,11 @@ void KernelPainter::paintColours(const KernelTracer& tracer, const std::vector<P
     layers_.setColour(numberOf(pixels[i]), sums[i], options_.samples);
 }
 
-std::vector<std::size_t> KernelPainter::addSeen(const KernelTracer& tracer,
-                                                const std::vector<Pixel>& pixels, int sample,
-                                                const PixelHits& hits, const LightLattice& lattice,
-                                                const std::vector<char>& contradicts,
-                                                std::vector<SampleRay>& sampleRays,
-                                                std::vector<ColourSum>& sums) const {
+std::vector<std::size_t> KernelPainter::addSeen(
+    const KernelTracer& tracer, const std::vector<Pixel>& pixels, int sample, const PixelHits& hits,
+    const std::vector<Hit>& onFields, const LightLattice& lattice,
+    const std::vector<char>& contradicts, std::vector<SampleRay>& sampleRays,
+    std::vector<ColourSum>& sums) const {
   struct Lit {
     std::size_t pixel;
     Hit hit;
@@ -282,7 +299,7 @@ std::vector<std::size_t> KernelPainter::addSeen(const KernelTracer& tracer,
     auto& [ray, x, y, meshNear, left] = sampleRays[i];
     if (left < kLeastTransmittance) continue;
     if (rays.size() > kMostLightRays) addColours();
-    Hit hit = hitOf(ray, meshNear, hits, i);
+    Hit hit = hitOf(ray, meshNear, hits, onFields, i);
     if (!hit.found) hit = shader_.groundHit(ray);
     if (!hit.found) {
       left = 0;

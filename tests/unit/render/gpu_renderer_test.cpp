@@ -16,6 +16,7 @@
 #include "render/cpu/cpu_renderer.h"
 #include "render/cpu/cpu_trace.h"
 #include "render/gpu/gl_context.h"
+#include "render/gpu/gl_objects.h"
 #include "render/gpu/gpu_tracer.h"
 #include "render/images/compare_images.h"
 #include "tests/support/render_scenes.h"

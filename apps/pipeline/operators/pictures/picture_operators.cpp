@@ -152,10 +152,9 @@ Json toJson(const render::ImageComparison& found) {
 /// cannot draw the scene.
 render::Image drawByKernel(Invocation& in, const render::Scene& scene,
                            const render::RenderOptions& options) {
-  if (scene.isBlended()) return render::renderCpu(scene, options);
   try {
     return render::renderGpu(scene, options);
-  } catch (const render::NoOpenGl& error) {
+  } catch (const levelset::ResourceLimit& error) {
     in.notes.warnings.push_back(
         fmt::format("{}; --renderer both uses the processor instead", error.what()));
     return render::renderCpu(scene, options);

@@ -1,0 +1,57 @@
+#include "render/gpu/gl_objects.h"
+
+#include <fmt/core.h>
+
+#include "levelset/error.h"
+
+namespace render {
+
+Texels makeTexels(const GlContext& context, std::size_t largestTable, const void* data,
+                  std::size_t bytes, GLenum format) {
+  const GlFunctions& gl = context.gl();
+  if (bytes > largestTable) {
+    throw levelset::ResourceLimit(fmt::format(
+        "a table of {} MB does not fit into a buffer texture of {} MB, the limit of {}; "
+        "use larger voxels, or draw with --renderer cpu",
+        bytes >> 20, largestTable >> 20, context.description()));
+  }
+  Texels texels;
+  gl.CreateBuffers(1, &texels.buffer);
+  gl.NamedBufferData(texels.buffer, static_cast<GLsizeiptr>(bytes), data, GL_STATIC_DRAW);
+  gl.CreateTextures(GL_TEXTURE_BUFFER, 1, &texels.texture);
+  gl.TextureBuffer(texels.texture, format, texels.buffer);
+  return texels;
+}
+
+void releaseTexels(const GlContext& context, const Texels& texels) {
+  context.gl().DeleteTextures(1, &texels.texture);
+  context.gl().DeleteBuffers(1, &texels.buffer);
+}
+
+GLuint compileCompute(const GlContext& context, const std::string& text) {
+  const GlFunctions& gl = context.gl();
+  const GLuint shader = gl.CreateShader(GL_COMPUTE_SHADER), program = gl.CreateProgram();
+  const auto refuse = [&](const char* what, auto getLog, GLuint object) {
+    char log[400] = "";
+    getLog(object, sizeof log, nullptr, log);
+    gl.DeleteShader(shader);
+    gl.DeleteProgram(program);
+    throw levelset::ResourceLimit(fmt::format(
+        "the graphics driver ({}) does not {} the ray caster: {}; draw with --renderer cpu",
+        context.description(), what, log));
+  };
+  const char* lines = text.c_str();
+  gl.ShaderSource(shader, 1, &lines, nullptr);
+  gl.CompileShader(shader);
+  GLint isGood = 0;
+  gl.GetShaderiv(shader, GL_COMPILE_STATUS, &isGood);
+  if (!isGood) refuse("compile", gl.GetShaderInfoLog, shader);
+  gl.AttachShader(program, shader);
+  gl.LinkProgram(program);
+  gl.GetProgramiv(program, GL_LINK_STATUS, &isGood);
+  if (!isGood) refuse("link", gl.GetProgramInfoLog, program);
+  gl.DeleteShader(shader);
+  return program;
+}
+
+}  // namespace render
