@@ -385,7 +385,6 @@ TEST(FieldScene, RefusesInvalidScenes) {
     spline.filter = Filter::BSplineQi;
     EXPECT_THROW((void)draw(morphed(ball, fine, 0.5, 8, 8), spline), levelset::UsageError);
   }
-  EXPECT_THROW((void)renderGpu(morphed(ball, fine, 0.5, 8, 8), kDataOnly), levelset::UsageError);
 }
 
 TEST(KernelScene, EvaluatesTheFinerGridFirst) {

@@ -392,7 +392,8 @@ Operator renderOperator() {
            {.name = "png", .type = ParamType::Path, .doc = "also write the colours to this .png"},
            {.name = "renderer",
             .type = ParamType::Choice,
-            .doc = "renderer; both: draws with gpu (cpu where there is no OpenGL) and embree, and "
+            .doc = "renderer; both: draws with gpu (cpu where OpenGL cannot draw the scene) and "
+                   "embree, and "
                    "compares the two",
             .fallback = "cpu",
             .choices = {"gpu", "cpu", "embree", "both"}},

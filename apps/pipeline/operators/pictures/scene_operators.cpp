@@ -170,9 +170,8 @@ Operator sceneOperator() {
           "them, with the normals and colours of their vertices if they have any. Coincident "
           "surfaces on different grids are separated by rounding only, so let the subtracted solid "
           "protrude. --soft blends the distances to the solids: surfaces closer than this length "
-          "merge. --morph interpolates between the distances of two solids. Both need the "
-          "renderers cpu or embree. 'write scene.json' saves the scene, with the parts in files "
-          "beside it.",
+          "merge. --morph interpolates between the distances of two solids. 'write scene.json' "
+          "saves the scene, with the parts in files beside it.",
       .example =
           "levelsmith box --size 2,2,2 --voxel 0.05 --as b ! sphere --radius 1.3 --voxel "
           "0.03 --as s ! scene @b @s --csg 'b - s' ! render cut.png --size 320x240",
