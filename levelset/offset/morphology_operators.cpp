@@ -121,7 +121,8 @@ RegionOfInterest ShellOperator::regionOfInterest(const Options& options, const O
                                                  std::size_t, const RegionOfInterest& ofResult) {
   if (options.mask) return {};
   const double width = plans.result.halfWidth, voxel = plans.operands[0].voxelSize;
-  const double reach = options.thickness + (distanceReach(width) + seamReach(width)) * voxel;
+  const double reach =
+      options.thickness + (distanceReach(width) + kCutReach + seamReach(width)) * voxel;
   return {.region = grown(ofResult.region, reach)};
 }
 
