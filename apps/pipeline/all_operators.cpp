@@ -16,6 +16,7 @@
 #include "levelset/distance/closest_points.h"
 #include "levelset/distance/redistance.h"
 #include "levelset/eikonal/arrival.h"
+#include "levelset/emboss/emboss.h"
 #include "levelset/offset/morphology.h"
 #include "levelset/offset/offset.h"
 #include "levelset/shapes/shapes.h"
@@ -47,6 +48,7 @@ std::vector<Operator> allOperators() {
       levelSetOperator<levelset::OpenOperator>(),
       levelSetOperator<levelset::CloseOperator>(),
       levelSetOperator<levelset::ShellOperator>(),
+      levelSetOperator<levelset::EmbossOperator>(),
       levelSetOperator<levelset::KeepOperator>(),
       levelSetOperator<levelset::FillCavitiesOperator>(),
       levelSetOperator<levelset::AdvectOperator>(),
