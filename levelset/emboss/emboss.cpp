@@ -6,7 +6,6 @@
 #include <cmath>
 #include <mutex>
 #include <set>
-#include <tuple>
 
 #include "levelset/distance/distance_transform.h"
 #include "levelset/distance/redistance.h"
@@ -91,7 +90,7 @@ CoordBBox around(const EmbossCurve& curve, double reach, const CoordBBox& within
   return box;
 }
 
-/// A point of the old surface, and its move along the unit normal; index space.
+/// A point of the old surface near the curve, and its move along the unit normal; index space.
 struct Move {
   Vec3d from, normal;
   double height;
@@ -122,9 +121,8 @@ bool embossLeaf(const EmbossLeaf& distances, const eikonal::ClosestPointLeaf& po
     isReached |= d < relief.width + kVisitedSpacing;
     if (d >= limit) continue;
     const double phi = static_cast<double>(*it) / voxel + shared.shift;
-    const double height = relief.section.height(d);
-    if (height != 0 && std::abs(phi) > 0.1 && std::abs(phi) < 1.5)
-      moves.push_back({foot, (it.getCoord().asVec3d() - foot) / phi, height});
+    if (std::abs(phi) > 0.1 && std::abs(phi) < 1.5)
+      moves.push_back({foot, (it.getCoord().asVec3d() - foot) / phi, relief.section.height(d)});
     const double value = relief.section.distance(d, phi);
     if (value == phi) continue;
     const auto world = static_cast<float>(value * voxel);
@@ -198,35 +196,79 @@ Field embossedField(const NarrowBand& solid, const Relief& relief, const CoordBB
                   least * voxel, relief.width * voxel));
 }
 
-/// Refuses a height at which a moved point is nearer to an opposite part of the old surface than to
-/// its own. The normals of the two parts then differ by more than 120 degrees.
-void checkHeight(const Field& field, const Relief& relief, double voxel) {
-  constexpr double kLeastMiss = 0.25;  // voxels
+/// Distance of a moved point beyond the middle between its own and another part of the old surface,
+/// voxels, that is corrected.
+constexpr double kMostMiss = 0.1;
+
+/// Returns true when a point moves to where another part of the old surface is nearer than its own.
+bool passesMedialAxis(const Field& field, const Relief& relief, double voxel) {
   const auto accessor = field.distances->getConstAccessor();
   const double sign = relief.height < 0 ? -1 : 1;
-  const Move* worst = nullptr;
-  double most = kLeastMiss;
-  for (const Move& move : field.moves) {
+  return std::any_of(field.moves.begin(), field.moves.end(), [&](const Move& move) {
     const SampleBlock<2> block(accessor, move.from + move.height * move.normal);
     const double away = sign * (block.value() / voxel + field.shift);
-    const double miss = std::abs(move.height) - away;
-    const bool isOpposite = block.gradient().dot(move.normal) < -0.5 * voxel;
-    if (miss < most || !(isOpposite || away <= 0)) continue;
-    const auto place = [](const Move& m) {
-      return std::tuple(m.from[0], m.from[1], m.from[2], m.height);
-    };
-    if (worst && miss == most && !(place(move) < place(*worst))) continue;
-    most = miss;
-    worst = &move;
+    return std::abs(move.height) - away > kMostMiss;
+  });
+}
+
+/// Calls visit(grid point) for the grid points of a box within one voxel of a line, between the
+/// positions `from` and `to`.
+template <typename Visit>
+void alongLine(const Vec3d& from, const Vec3d& to, const CoordBBox& box, const Visit& visit) {
+  const Vec3d along = to - from, size = openvdb::math::Abs(along);
+  const int a = size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;
+  const int b = (a + 1) % 3, c = (a + 2) % 3;
+  const double low = std::max<double>(box.min()[a], std::floor(std::min(from[a], to[a]))),
+               high = std::min<double>(box.max()[a], std::ceil(std::max(from[a], to[a])));
+  Coord at;
+  for (double k = low; k <= high; ++k) {
+    const Vec3d p = from + (k - from[a]) / along[a] * along;
+    at[a] = static_cast<int>(k);
+    for (int u = -1; u <= 1; ++u)
+      for (int v = -1; v <= 1; ++v) {
+        at[b] = static_cast<int>(std::round(p[b])) + u;
+        at[c] = static_cast<int>(std::round(p[c])) + v;
+        const Vec3d off = at.asVec3d() - from;
+        const double squared = off.lengthSqr() - std::pow(off.dot(along), 2) / along.lengthSqr();
+        if (squared <= 1 && box.isInside(at)) visit(at);
+      }
   }
-  if (!worst) return;
-  const Vec3d at = field.grid->indexToWorld(worst->from);
-  throw InvalidInput(
-      fmt::format("at {:.4g},{:.4g},{:.4g} the surface would {} by {:.4g} world units, beyond the "
-                  "middle of {}; "
-                  "use a smaller height",
-                  at[0], at[1], at[2], sign < 0 ? "sink" : "rise", std::abs(worst->height) * voxel,
-                  sign < 0 ? "the solid" : "the gap to another part of the surface"));
+}
+
+/// Continues the moves along their normals beyond the medial axis, into the cells of other parts of
+/// the surface. There a grid point has a second position (d, φ): of the line that passes it. Rising
+/// joins the two solids that the positions give, sinking intersects them.
+void continueMoves(Field& field, const Relief& relief, double voxel, const CoordBBox& box) {
+  const double sign = relief.height < 0 ? -1 : 1, background = field.grid->background() / voxel;
+  const double limit = relief.width + background + kVisitedSpacing;
+  const auto distances = field.distances->getConstAccessor();
+  auto accessor = field.grid->getAccessor();
+  const auto phiAt = [&](const Coord& c) { return distances.getValue(c) / voxel + field.shift; };
+  for (const Move& move : field.moves) {
+    const Vec3d end = move.from + (relief.height + sign * background) * move.normal;
+    alongLine(move.from, end, box, [&](const Coord& at) {
+      const double phi = (at.asVec3d() - move.from).dot(move.normal);
+      constexpr double kSlack = 0.25;      // voxels
+      constexpr double kSameNormal = 0.9;  // cosine
+      if (std::abs(phiAt(at)) > std::abs(phi) + kSlack) return;
+      Vec3d gradient;
+      for (int axis = 0; axis < 3; ++axis) {
+        Coord step(0);
+        step[axis] = 1;
+        gradient[axis] = (phiAt(at + step) - phiAt(at - step)) / 2;
+      }
+      if (gradient.dot(move.normal) > kSameNormal) return;  // the foot of the line is the nearest
+      const double d = relief.curve.distance(at.asVec3d() - phi * move.normal, limit);
+      const auto value = static_cast<float>(
+          std::clamp(relief.section.distance(d, phi), -background, background) * voxel);
+      if (!(sign * value < sign * accessor.getValue(at))) return;
+      if (std::abs(value) < field.grid->background())
+        accessor.setValueOn(at, value);
+      else
+        accessor.setValueOff(at, std::copysign(field.grid->background(), value));
+      field.changed.expand(at);
+    });
+  }
 }
 
 /// Copies distances into the field: at the grid points that the emboss changed, and at those within
@@ -294,13 +336,16 @@ NarrowBand emboss(const NarrowBand& solid, const EmbossCurveShape& curve, double
   const double reach = relief.reach(halfWidth) + 2;
   CoordBBox box = around(relief.curve, relief.reach(solid.halfWidth()) + 3, grid);
   if (box.empty()) refuseFarCurve(solid, relief, options);
-  const Field field = embossedField(solid, relief, box, options);
+  Field field = embossedField(solid, relief, box, options);
   if (!field.isReached) refuseFarCurve(solid, relief, options);
-  checkHeight(field, relief, voxel);
+  if (passesMedialAxis(field, relief, voxel)) continueMoves(field, relief, voxel, box);
   if (field.changed.empty()) return keepsBits ? solid : redistanced(solid, options.progress);
 
   // === Distances to the new surface
   const Progress rest = subProgress(options.progress, 0.5, 1);
+  if (!eikonal::hasZeroCrossing(field.grid->tree()))
+    throw InvalidInput(
+        fmt::format("the result is empty with a height of {}; use a smaller depth", height));
   pruneOneSided(field.grid->tree());
   if (!keepsBits) return redistanced(makeBand(field.grid), rest);
   box = around(relief.curve, reach, grid);

@@ -37,27 +37,25 @@ struct EmbossOptions {
   Progress progress = {};
 };
 
-/// Lets the surface of a solid rise along a curve. The new surface is { s + h(d(s)) n(s) } for the
-/// points s of the old surface with the normal n(s). d(s) is the distance from s to the curve in
-/// space, so points of another part of the surface rise too if they are within the width.
+/// Lets the surface of a solid rise along a curve. Each point s of the surface moves along its
+/// normal n(s) to s + h(d(s)) n(s). Here d(s) is the distance from s to the curve in space, so
+/// points of another part of the surface move too if they are within the width. Rising adds the
+/// segments from s to the moved points to the solid; sinking removes them. So a hole may pass
+/// through a wall, a groove may run over an edge, and a ridge may join another part of the surface.
 ///
-/// Extends d off the surface by closest points: the grid point x with the closest point c gets the
-/// distance from (d(c), φ(x)) to the graph of h. The zero set of this field is the new surface. Its
-/// values are exact where the old surface is a plane and the curve is a point or a straight
-/// segment. The values near the curve are re-distanced once. Values farther than width + |height| +
-/// half width from the curve keep their bits. A height of zero returns the solid itself.
-///
-/// Overhangs cannot occur: beside an edge of the solid the new surface ends at the bisecting plane
-/// of the two faces.
+/// Extends d off the surface by closest points: a grid point x with the closest point c gets the
+/// distance from (d(c), φ(x)) to the graph of h. The zero set of this field is the new surface. The
+/// field is exact where the old surface is a plane and the curve is a point or a straight segment.
+/// Beyond the medial axis of the old surface the moves continue along their normals. Values near
+/// the curve are re-distanced once. Values farther than width + |height| + half width from the
+/// curve keep their bits. A height of zero returns the solid itself.
 /// @param width   distance from the curve at which the height falls to zero (half of the full
 ///                width), world units, > 0
 /// @param height  height on the curve, world units; negative: the surface sinks
 /// @throws UsageError if a length or a point is not finite, the width is not positive, or there is
 ///         no point
-/// @throws InvalidInput if the solid or the result is empty, if no part of the surface is within
-/// the
-///         width of the curve, or if the height passes the middle between opposite parts of the
-///         surface (inside a wall or in a gap)
+/// @throws InvalidInput if the solid or the result is empty, or if no part of the surface is within
+///         the width of the curve
 /// @throws ResourceLimit, Cancelled
 [[nodiscard]] NarrowBand emboss(const NarrowBand& solid, const EmbossCurveShape& curve,
                                 double width, double height, const EmbossOptions& options = {});
