@@ -71,6 +71,15 @@ const std::map<std::string, std::function<Options(Random&)>> kCalls = {
      [](Random& random) {
        return Options{{"distance", std::to_string(between(random, -0.35, 0.9))}};
      }},
+    {"emboss",
+     [](Random& random) {
+       static int call = 0;
+       const char* const profiles[] = {"round", "flat", "sharp", "smooth"};
+       return Options{{"curve", text(pointIn(random, 1.5)) + " " + text(pointIn(random, 1.5))},
+                      {"width", std::to_string(between(random, 0.4, 0.8))},
+                      {"height", std::to_string(between(random, -0.3, 0.4))},
+                      {"profile", profiles[call++ % 4]}};
+     }},
     {"clip",
      [](Random& random) {
        const V3d low = pointIn(random, 1) - V3d(0.5);
