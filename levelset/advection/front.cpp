@@ -290,7 +290,7 @@ StepResult Front::step(const TimeInterval& interval, double from, double longest
 }
 
 std::size_t Front::advance(const TimeInterval& interval) {
-  return integrate(interval, [&](double from, double longest) {
+  return integrate(interval.duration(), [&](double from, double longest) {
     const StepResult made = step(interval, from, longest);
     splitLongEdges(interval.maxMemory);
     largestArea_ = std::max(largestArea_, surfaceArea(mesh_));

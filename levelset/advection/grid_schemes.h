@@ -3,6 +3,7 @@
 // Internal header of levelset: public headers must not include it.
 
 #include "levelset/advection/time_interval.h"
+#include "levelset/hamilton_jacobi/upwind_derivative.h"
 #include "levelset/narrow_band.h"
 #include "levelset/vdb.h"
 
@@ -13,15 +14,6 @@ namespace levelset::flow {
 /// half width of five voxels, or of the solid's half width if that is larger.
 /// @return the number of steps
 std::size_t advectSemiLagrangian(NarrowBand& band, const TimeInterval& interval);
-
-/// Orders of the upwind scheme.
-struct UpwindOrders {
-  int space = 5;  ///< 1, 2, 3 or 5, see upwindDerivative()
-  int time = 3;   ///< 1: Euler; 2 and 3: TVD Runge-Kutta [Shu88]
-};
-
-/// @throws UsageError for orders that do not exist
-void requireOrders(const UpwindOrders& orders);
 
 /// Computes one step of the upwind scheme on the active grid points, without redistancing: an Euler
 /// step, or a TVD Runge-Kutta step of second or third order [Shu88].

@@ -7,6 +7,7 @@
 
 #include <functional>
 
+#include "levelset/hamilton_jacobi/time_steps.h"
 #include "levelset/progress.h"
 
 namespace levelset::flow {
@@ -22,32 +23,9 @@ struct TimeInterval {
   Imath::M44d toWorld;  ///< transform from index to world space, for error messages
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
+
+  [[nodiscard]] Duration duration() const { return {.from = from, .to = to, .progress = progress}; }
 };
-
-inline constexpr double kMostSteps = 20000;
-/// Length of the first step as a fraction of the time interval. A velocity that is zero at both
-/// ends of a step may move the surface in between, so the first step is short. The fraction is not
-/// a round number, so that the step is no multiple of the period of an oscillating velocity.
-inline constexpr double kFirstShare = 0.0259;
-
-/// End time of a step, and the longest allowed next step.
-struct StepResult {
-  double time, next;
-};
-
-/// Integrates the motion over the time interval step by step and reports progress.
-/// @param step  takes a step from a time towards interval.to, of at most the given positive length
-/// @return the number of steps
-/// @throws ResourceLimit when the step lengths predict more than kMostSteps steps
-std::size_t integrate(const TimeInterval& interval,
-                      const std::function<StepResult(double from, double longest)>& step);
-
-/// Integrates the motion over the time interval. A step is no longer than the limit `longest` at
-/// its start, at its end and at three times in between. Skips steps on which nothing moves.
-/// @param longest  returns the longest allowed step at a time; infinite where the velocity is zero
-/// @param step     moves the surface between two times
-std::size_t integrate(const TimeInterval& interval, const std::function<double(double)>& longest,
-                      const std::function<void(double, double)>& step);
 
 /// Checks that a velocity is finite.
 /// @throws InvalidInput with the position in world units and the time, if it is not finite

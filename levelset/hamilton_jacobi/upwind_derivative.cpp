@@ -1,6 +1,12 @@
 #include "levelset/hamilton_jacobi/upwind_derivative.h"
 
+#include <fmt/core.h>
+
+#include <algorithm>
 #include <cmath>
+#include <iterator>
+
+#include "levelset/error.h"
 
 namespace levelset::flow {
 namespace {
@@ -39,6 +45,16 @@ double eno(const std::array<double, 5>& d, int order) {
 }
 
 }  // namespace
+
+void requireOrders(const UpwindOrders& orders) {
+  if (std::find(std::begin(kUpwindOrders), std::end(kUpwindOrders), orders.space) ==
+      std::end(kUpwindOrders))
+    throw UsageError(
+        fmt::format("the upwind scheme has no order {} in space; give 1, 2, 3 or 5", orders.space));
+  if (orders.time < 1 || orders.time > 3)
+    throw UsageError(
+        fmt::format("the upwind scheme has no order {} in time; give 1, 2 or 3", orders.time));
+}
 
 double upwindDerivative(const std::array<double, 6>& values, int order) {
   std::array<double, 5> d;

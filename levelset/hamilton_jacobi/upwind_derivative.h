@@ -7,6 +7,15 @@ namespace levelset::flow {
 /// Spatial orders of upwindDerivative().
 inline constexpr int kUpwindOrders[] = {1, 2, 3, 5};
 
+/// Orders of an upwind scheme.
+struct UpwindOrders {
+  int space = 5;  ///< 1, 2, 3 or 5, see upwindDerivative()
+  int time = 3;   ///< 1: Euler; 2 and 3: TVD Runge-Kutta [Shu88]
+};
+
+/// @throws UsageError for orders that do not exist
+void requireOrders(const UpwindOrders& orders);
+
 /// Derivative at a grid point from one-sided differences, per grid spacing.
 /// @param values  values of the function: the grid point itself is values[3]; values[0 … 2] lie
 ///                behind it, where the flow comes from, and values[4] and values[5] ahead of it
