@@ -17,6 +17,7 @@
 #include "levelset/distance/redistance.h"
 #include "levelset/eikonal/arrival.h"
 #include "levelset/emboss/emboss.h"
+#include "levelset/evolve/evolve.h"
 #include "levelset/offset/morphology.h"
 #include "levelset/offset/offset.h"
 #include "levelset/shapes/shapes.h"
@@ -52,6 +53,7 @@ std::vector<Operator> allOperators() {
       levelSetOperator<levelset::KeepOperator>(),
       levelSetOperator<levelset::FillCavitiesOperator>(),
       levelSetOperator<levelset::AdvectOperator>(),
+      levelSetOperator<levelset::EvolveOperator>(),
       levelSetOperator<levelset::ReinitializeOperator>(),
       levelSetOperator<levelset::RebuildBandOperator>(),
       levelSetOperator<levelset::FastMarchingOperator>(),

@@ -108,7 +108,7 @@ MEMBERS = {
 def hint(param):
     if param["choices"] and param["hint"] == "str":
         return "Literal[" + ", ".join(repr(choice) for choice in param["choices"]) + "]"
-    if param["hint"] == "Scalar":
+    if param["hint"] in ("Scalar", "Speed"):
         return "Union[float, str, Field, Solid]"
     if param["hint"] == "Velocity":
         return "Union[str, Field]"

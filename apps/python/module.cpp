@@ -85,6 +85,8 @@ const char* hintOf(ParamType type) {
       return "Scalar";
     case ParamType::Velocity:
       return "Velocity";
+    case ParamType::Speed:
+      return "Speed";
   }
   return "";
 }

@@ -4,6 +4,8 @@
 #include <muParser.h>
 #include <oneapi/tbb/enumerable_thread_specific.h>
 
+#include <algorithm>
+#include <initializer_list>
 #include <memory>
 
 #include "levelset/error.h"
@@ -13,13 +15,15 @@ namespace {
 
 using Imath::V3d;
 
-/// Variables that a formula may use: coordinates, time or both, and their names for messages.
+/// Variables that a formula may use: coordinates, time, normal and curvature, and their names for
+/// messages.
 struct Variables {
-  bool space = false, time = false;
+  bool space = false, time = false, surface = false;
   const char* names = "";
 };
-constexpr Variables kSpace = {true, false, "x, y, z, r"}, kTime = {false, true, "t"},
-                    kSpaceAndTime = {true, true, "x, y, z, r, t"};
+constexpr Variables kSpace = {true, false, false, "x, y, z, r"}, kTime = {false, true, false, "t"},
+                    kSpaceAndTime = {true, true, false, "x, y, z, r, t"},
+                    kSurface = {true, true, true, "x, y, z, r, t, nx, ny, nz, k"};
 
 /// A muParser object and its variables. The parser binds the variables by address, so each thread
 /// needs a copy.
@@ -28,12 +32,18 @@ class Formula {
   Formula(const std::string& text, const Variables& variables)
       : text_(text), variables_(variables) {
     if (variables.space) {
-      parser_.DefineVar("x", &place_.x);
-      parser_.DefineVar("y", &place_.y);
-      parser_.DefineVar("z", &place_.z);
+      parser_.DefineVar("x", &point_.position.x);
+      parser_.DefineVar("y", &point_.position.y);
+      parser_.DefineVar("z", &point_.position.z);
       parser_.DefineVar("r", &radius_);
     }
-    if (variables.time) parser_.DefineVar("t", &time_);
+    if (variables.time) parser_.DefineVar("t", &point_.time);
+    if (variables.surface) {
+      parser_.DefineVar("nx", &point_.normal.x);
+      parser_.DefineVar("ny", &point_.normal.y);
+      parser_.DefineVar("nz", &point_.normal.z);
+      parser_.DefineVar("k", &point_.curvature);
+    }
     parser_.DefineConst("pi", M_PI);
     parser_.SetExpr(text);
   }
@@ -42,19 +52,25 @@ class Formula {
 
   /// Evaluates the formulas of the text, which commas separate, and returns their values. `count`
   /// receives the number of formulas.
-  const double* evaluate(const V3d& place, double time, int& count) {
-    place_ = place;
-    radius_ = place.length();
-    time_ = time;
+  const double* evaluate(const SurfacePoint& point, int& count) {
+    point_ = point;
+    radius_ = point.position.length();
     return parser_.Eval(count);
+  }
+
+  /// Returns true when the text contains one of the variables.
+  [[nodiscard]] bool uses(std::initializer_list<const char*> names) const {
+    const auto& used = parser_.GetUsedVar();
+    return std::any_of(names.begin(), names.end(),
+                       [&](const char* name) { return used.count(name) > 0; });
   }
 
  private:
   std::string text_;
   Variables variables_;
   mu::Parser parser_;
-  V3d place_ = V3d(0);
-  double radius_ = 0, time_ = 0;
+  SurfacePoint point_;
+  double radius_ = 0;
 };
 
 class Formulas {
@@ -63,7 +79,7 @@ class Formulas {
       : perThread_(read(text, variables)) {
     int found = 0;
     try {
-      perThread_.local().evaluate(V3d(0.5), 0.5, found);
+      perThread_.local().evaluate({V3d(0.5), 0.5, V3d(0.5), 0.5}, found);
     } catch (const mu::Parser::exception_type& error) {
       refuse(text, variables, error.GetMsg());
     }
@@ -73,9 +89,12 @@ class Formulas {
                                    count == 1 ? "one" : "three with commas between them"));
     }
   }
-  const double* operator()(const V3d& place, double time) {
+  const double* operator()(const SurfacePoint& point) {
     int count = 0;
-    return perThread_.local().evaluate(place, time, count);
+    return perThread_.local().evaluate(point, count);
+  }
+  [[nodiscard]] bool uses(std::initializer_list<const char*> names) {
+    return perThread_.local().uses(names);
   }
 
  private:
@@ -104,20 +123,28 @@ class Formulas {
 
 ScalarField scalarExpression(const std::string& text) {
   const auto formulas = std::make_shared<Formulas>(text, kSpace, 1);
-  return [formulas](const V3d& world) { return (*formulas)(world, 0)[0]; };
+  return [formulas](const V3d& world) { return (*formulas)({world})[0]; };
 }
 
 VectorField vectorExpression(const std::string& text) {
   const auto formulas = std::make_shared<Formulas>(text, kSpaceAndTime, 3);
   return [formulas](const V3d& world, double time) {
-    const double* values = (*formulas)(world, time);
+    const double* values = (*formulas)({world, time});
     return V3d(values[0], values[1], values[2]);
   };
 }
 
 std::function<double(double)> timeExpression(const std::string& text) {
   const auto formulas = std::make_shared<Formulas>(text, kTime, 1);
-  return [formulas](double time) { return (*formulas)(V3d(0), time)[0]; };
+  return [formulas](double time) { return (*formulas)({V3d(0), time})[0]; };
+}
+
+NormalSpeed speedExpression(const std::string& text) {
+  const auto formulas = std::make_shared<Formulas>(text, kSurface, 1);
+  return {.value = [formulas](const SurfacePoint& point) { return (*formulas)(point)[0]; },
+          .usesTime = formulas->uses({"t"}),
+          .usesNormal = formulas->uses({"nx", "ny", "nz"}),
+          .usesCurvature = formulas->uses({"k"})};
 }
 
 }  // namespace levelset

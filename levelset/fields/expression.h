@@ -6,9 +6,9 @@
 #include "levelset/fields/field.h"
 
 /// Fields given by formulas. Their variables are x, y, z (world units) and r = |(x, y, z)|, or t
-/// (time), or all five. The grammar is muParser's: + − * / ^, comparison, ?:, &&, ||, sin … atan2,
-/// exp, ln, sqrt, min, max, abs, sign, rint, sum, avg; and `pi`. A formula with any other variable
-/// is refused.
+/// (time), or all five; a speed has more. The grammar is muParser's: + − * / ^, comparison, ?:, &&,
+/// ||, sin … atan2, exp, ln, sqrt, min, max, abs, sign, rint, sum, avg; and `pi`. A formula with
+/// any other variable is refused.
 namespace levelset {
 
 /// Parses one formula in x, y, z, r.
@@ -21,5 +21,10 @@ namespace levelset {
 
 /// Parses one formula in t. @throws UsageError for an invalid formula
 [[nodiscard]] std::function<double(double time)> timeExpression(const std::string& text);
+
+/// Parses the speed of a surface: one formula in x, y, z, r, t, the normal nx, ny, nz and the
+/// curvature k, see SurfacePoint. The flags of the result state which of them it contains.
+/// @throws UsageError for an invalid formula
+[[nodiscard]] NormalSpeed speedExpression(const std::string& text);
 
 }  // namespace levelset

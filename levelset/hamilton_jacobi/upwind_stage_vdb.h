@@ -28,6 +28,21 @@ inline std::vector<BandLeaf*> leavesOf(openvdb::FloatTree& tree) {
   return leaves;
 }
 
+inline std::vector<const BandLeaf*> leavesOf(const openvdb::FloatTree& tree) {
+  std::vector<const BandLeaf*> leaves;
+  tree.getNodes(leaves);
+  return leaves;
+}
+
+/// Copies the values around the leaf block that begins at `origin`.
+inline StencilBlock stencilBlock(const BandAccessor& accessor, const openvdb::Coord& origin) {
+  StencilBlock block;
+  block.fill([&](const openvdb::Coord& step) {
+    return blockValues(accessor, origin.offsetBy(8 * step.x(), 8 * step.y(), 8 * step.z()));
+  });
+  return block;
+}
+
 /// Returns the position of a grid point of a leaf, index space.
 inline Imath::V3d positionOf(const BandLeaf& leaf, openvdb::Index offset) {
   return toImath(leaf.offsetToGlobalCoord(offset).asVec3d());
@@ -77,10 +92,7 @@ void eulerStage(const openvdb::FloatGrid& start, const openvdb::FloatGrid& field
     const BandAccessor accessor(field.tree());
     const openvdb::Coord origin = leaves[i]->origin();
     const BandLeaf* first = start.tree().probeConstLeaf(origin);
-    StencilBlock block;
-    block.fill([&](const openvdb::Coord& step) {
-      return blockValues(accessor, origin.offsetBy(8 * step.x(), 8 * step.y(), 8 * step.z()));
-    });
+    const StencilBlock block = stencilBlock(accessor, origin);
     const auto hamiltonian = hamiltonianIn(block, *leaves[i], accessor);
     for (auto it = leaves[i]->beginValueOn(); it; ++it) {
       const openvdb::Coord c = BandLeaf::offsetToLocalCoord(it.pos());

@@ -60,7 +60,7 @@ void checkOperands(const Node& node, const std::vector<Node>& before) {
 void checkNamed(const Node& node, const std::vector<Node>& before) {
   for (const auto& [option, number] : node.named) {
     const Node& value = before[number];
-    const bool isScalar = node.op->find(option)->type == ParamType::Scalar;
+    const bool isScalar = takesDistance(node.op->find(option)->type);
     if (value.kind == Kind::Field || (isScalar && value.kind == Kind::Band)) continue;
     throw UsageError(fmt::format("{}: --{}: '@{}' is a {}, but a {} is needed", node.op->name,
                                  option, value.name, kindName(value.kind),

@@ -43,7 +43,7 @@ std::string patternOf(const Param& param) {
 /// Returns true if a JSON number may be given in place of a text.
 bool takesNumber(ParamType type) {
   return type == ParamType::Number || type == ParamType::Degrees || type == ParamType::Length ||
-         type == ParamType::Scalar || type == ParamType::Numbers || type == ParamType::Bytes;
+         takesDistance(type) || type == ParamType::Numbers || type == ParamType::Bytes;
 }
 
 Json valueSchema(const Param& param) {

@@ -27,6 +27,12 @@ levelset::VectorField vectorField(const Invocation& in, const std::string& param
   });
 }
 
+levelset::NormalSpeed normalSpeed(const Invocation& in, const std::string& param) {
+  if (in.named.contains(param)) return levelset::speedOf(scalarField(in, param));
+  return levelset::withContext(in.where(param),
+                               [&] { return levelset::speedExpression(in.text(param)); });
+}
+
 levelset::Attribute attribute(const Invocation& in, const std::string& param) {
   const auto named = in.named.find(param);
   if (named != in.named.end() && named->second.kind() == Kind::Field &&

@@ -20,6 +20,10 @@ namespace pipeline {
 /// @throws levelset::UsageError, InvalidInput for a field of numbers
 [[nodiscard]] levelset::VectorField vectorField(const Invocation& in, const std::string& param);
 
+/// Returns the speed of a parameter of type Speed. A level set stands for its signed distance.
+/// @throws levelset::UsageError, InvalidInput for a field of vectors
+[[nodiscard]] levelset::NormalSpeed normalSpeed(const Invocation& in, const std::string& param);
+
 /// Returns the attribute of a surface that a parameter of type Scalar describes. A scalar attribute
 /// throws levelset::InvalidInput where it is not finite.
 [[nodiscard]] levelset::Attribute attribute(const Invocation& in, const std::string& param);

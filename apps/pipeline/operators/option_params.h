@@ -57,6 +57,7 @@ constexpr std::optional<ParamType> paramTypeOf(levelset::OptionUnit unit) {
   if constexpr (std::is_same_v<T, levelset::ScalarField>) return ParamType::Scalar;
   if constexpr (std::is_same_v<T, levelset::Attribute>) return ParamType::Scalar;
   if constexpr (std::is_same_v<T, levelset::NamedVelocity>) return ParamType::Velocity;
+  if constexpr (std::is_same_v<T, levelset::NormalSpeed>) return ParamType::Speed;
   return {};
 }
 
@@ -226,6 +227,8 @@ class OptionReader {
     } else if constexpr (std::is_same_v<T, levelset::Attribute>) {
       return stage_ == OptionStage::Run ? attribute(in_, name)
                                         : levelset::Attribute{anyField(), {}};
+    } else if constexpr (std::is_same_v<T, levelset::NormalSpeed>) {
+      return stage_ == OptionStage::Run ? normalSpeed(in_, name) : levelset::speedOf(anyField());
     } else {
       static_assert(std::is_same_v<T, levelset::NamedVelocity>);
       const std::string text = in_.text(name);

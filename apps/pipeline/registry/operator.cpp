@@ -51,6 +51,8 @@ const char* typeName(ParamType type) {
       return "scalar field";
     case ParamType::Velocity:
       return "velocity";
+    case ParamType::Speed:
+      return "speed";
   }
   return "";
 }
@@ -90,6 +92,7 @@ std::string valueForm(const Param& param) {
     case ParamType::Bytes:
       return "SIZE";
     case ParamType::Scalar:
+    case ParamType::Speed:
       return "X|FORMULA|@NAME";
     case ParamType::Velocity:
       return fmt::format("{}|\"FX, FY, FZ\"|@NAME", fmt::join(param.choices, "|"));
@@ -115,6 +118,8 @@ void checkField(const Param& param, const std::string& text, const std::string& 
   levelset::withContext(where, [&] {
     if (param.type == ParamType::Scalar)
       (void)levelset::scalarExpression(text);
+    else if (param.type == ParamType::Speed)
+      (void)levelset::speedExpression(text);
     else
       (void)levelset::vectorExpression(text);
   });
@@ -122,9 +127,12 @@ void checkField(const Param& param, const std::string& text, const std::string& 
 
 }  // namespace
 
+bool takesDistance(ParamType type) {
+  return type == ParamType::Scalar || type == ParamType::Speed;
+}
+
 bool namesValue(const Param& param, const std::string& text) {
-  return (param.type == ParamType::Scalar || param.type == ParamType::Velocity) &&
-         text.starts_with('@');
+  return (takesDistance(param.type) || param.type == ParamType::Velocity) && text.starts_with('@');
 }
 
 void checkText(const Param& param, const std::string& text, const std::string& where) {
@@ -186,6 +194,7 @@ void checkText(const Param& param, const std::string& text, const std::string& w
       return void(parseBytes(text, where));
     case ParamType::Scalar:
     case ParamType::Velocity:
+    case ParamType::Speed:
       return checkField(param, text, where);
   }
 }

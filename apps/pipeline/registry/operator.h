@@ -32,9 +32,10 @@ enum class ParamType {
   Path,
   ImageSize,
   Bytes,
-  Scalar,   ///< a scalar field: a number, a formula in x, y, z, r, or the @NAME of a value
-  Velocity  ///< a vector field that may depend on time: one of `choices`, three formulas, or the
-            ///< @NAME of a field
+  Scalar,    ///< a scalar field: a number, a formula in x, y, z, r, or the @NAME of a value
+  Velocity,  ///< a vector field that may depend on time: one of `choices`, three formulas, or the
+             ///< @NAME of a field
+  Speed      ///< a normal speed: a formula in x, y, z, r, t, nx, ny, nz, k, or the @NAME of a value
 };
 
 using Range = levelset::OptionRange;
@@ -61,6 +62,9 @@ struct Param {
 
 /// Returns the letter or word that stands for a value in the help, such as "L" for a length.
 [[nodiscard]] std::string valueForm(const Param& param);
+
+/// Returns whether a parameter takes the @NAME of a level set for its signed distance.
+[[nodiscard]] bool takesDistance(ParamType type);
 
 /// Returns whether the text of the parameter names a value of the chain, "@NAME".
 [[nodiscard]] bool namesValue(const Param& param, const std::string& text);
