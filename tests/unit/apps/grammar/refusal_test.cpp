@@ -137,6 +137,13 @@ TEST_F(Refusal, DetectableErrorsPrecedeTheRun) {
   soon("advect --field vortex --time 1 --factor \"1 +\"", 2, "advect: --factor");
   soon("advect --field vortex --time 1 --factor \"x*t\"", 2, "use t, numbers");
   soon("advect --field vortex --time 1 --factor \"1,2\"", 2, "'1,2' holds 2 formulas; give one");
+  soon("evolve --time 1", 2, "--speed");
+  soon("evolve --time 1 --speed \"1 +\"", 2, "evolve: --speed: the formula '1 +'");
+  soon("evolve --time 1 --speed \"q\"", 2, "use x, y, z, r, t, nx, ny, nz, k, numbers");
+  soon("evolve --time -1 --speed 1", 2, "must not be negative");
+  soon("evolve --time 1 --speed 1 --order 4", 2, "'4' is not one of 1, 2, 3, 5");
+  soon("evolve --time 1 --speed 1 --cfl 1.5", 2, "at most 1");
+  soon("evolve --time 1 --speed 1 --points 0,0,1", 2, "give both or neither");
   const std::string target = "sphere --radius 1.2 --voxel 0.1 ! morph ";
   soon(target + "--steps 4294967297", 2, "is too large");
   soon("ring --radius 1 --voxel 0.1 --columns 4294967297", 2, "is too large");

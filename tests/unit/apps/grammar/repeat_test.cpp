@@ -104,6 +104,10 @@ INSTANTIATE_TEST_SUITE_P(
              "! write semi_lagrangian.vdb "
              "! advect @a --field \"-y,x,0.2*z\" --time 0.1 --scheme upwind ! write upwind.vdb",
              {"front.vdb", "semi_lagrangian.vdb", "upwind.vdb"}},
+        Case{"evolve",
+             "read coarse.vdb --as a ! evolve @a --speed \"0.3*abs(nz) + x - 0.1*k\" --time 0.1 "
+             "! write evolve.vdb",
+             {"evolve.vdb"}},
         Case{"flow",
              "read coarse.vdb --as a ! curvature-flow @a --time 0.05 ! write curvature_flow.vdb "
              "! smooth @a --kind gaussian --sigma 1vx ! write gaussian.vdb "

@@ -57,6 +57,21 @@ TEST(Expression, KnowsOnlyMeaningfulVariables) {
   EXPECT_NE(sentence.find("use x, y, z, r, numbers"), std::string::npos) << sentence;
 }
 
+TEST(Expression, ReadsSpeedsOfASurface) {
+  const NormalSpeed speed = speedExpression("nx + 2*ny - nz*k + t + r");
+  EXPECT_EQ(speed.value({V3d(3, 4, 0), 10, V3d(1, 2, 3), -5}), 1 + 4 + 15 + 10 + 5);
+  EXPECT_TRUE(speed.usesTime && speed.usesNormal && speed.usesCurvature);
+  const NormalSpeed steady = speedExpression("x + 1"), anisotropic = speedExpression("abs(nz)"),
+                    curved = speedExpression("-k");
+  EXPECT_FALSE(steady.usesTime || steady.usesNormal || steady.usesCurvature);
+  EXPECT_TRUE(anisotropic.usesNormal);
+  EXPECT_FALSE(anisotropic.usesTime || anisotropic.usesCurvature);
+  EXPECT_TRUE(curved.usesCurvature);
+  EXPECT_FALSE(curved.usesTime || curved.usesNormal);
+  for (const char* text : {"", "1, 2", "n", "kx + 1"})
+    EXPECT_THROW((void)speedExpression(text), UsageError) << text;
+}
+
 TEST(Mask, RisesSmoothlyBetweenItsLimits) {
   Mask mask{.field = [](const V3d& p) { return p.x; }, .min = 2, .max = 4};
   EXPECT_EQ(mask.weight(V3d(1, 0, 0)), 0);
