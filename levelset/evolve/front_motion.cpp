@@ -33,12 +33,6 @@ struct Central {
   Values rate;        ///< κ|∇φ|, voxels⁻¹
 };
 
-/// F as a function of the curvature k at one point, voxels and units of time.
-struct Diffusion {
-  double coefficient = 0;  ///< (F(0) − F(k)) / k
-  double slope = 0;        ///< −∂F/∂k
-};
-
 }  // namespace
 
 /// The motion of the grid points of one leaf block at one time.
@@ -70,7 +64,7 @@ class FrontMotion::Leaf {
       if (speed != 0) value = speed * godunovSlope(slopesAt(point), speed);
     }
     if (!isInCore(point)) return value;
-    return value - diffusionAt(point).coefficient * point.rate;
+    return value - coefficientAt(point) * point.rate;
   }
 
   /// Adds the speeds at a grid point to `rates`.
@@ -86,15 +80,17 @@ class FrontMotion::Leaf {
     }
     double resistance = travel / motion_.options_.cfl;
     if (isInCore(point)) {
-      const Diffusion found = diffusionAt(point);
-      const double diffusion = std::max(std::abs(found.coefficient), std::abs(found.slope));
+      const V3d gradient = gradientAt(point);
+      const double coefficient = coefficientAt(point),
+                   derivative = derivativeAt(point, gradient, curvatureAt(point, gradient)),
+                   diffusion = std::max(std::abs(coefficient), std::abs(derivative));
       rates.diffusion = std::max(rates.diffusion, diffusion);
       resistance += diffusion / kExplicitStep;
-      if (-found.slope > rates.growth) {
-        rates.growth = -found.slope;
+      if (derivative > rates.growth) {
+        rates.growth = derivative;
         rates.growthAt = point.world;
       }
-      if (std::abs(point.phi) < kBesideSurface) travel += std::abs(found.coefficient * point.rate);
+      if (std::abs(point.phi) < kBesideSurface) travel += std::abs(coefficient * point.rate);
     }
     rates.travel = std::max(rates.travel, travel);
     rates.step = std::min(rates.step, 1 / resistance);
@@ -127,9 +123,7 @@ class FrontMotion::Leaf {
   /// @param gradient  of φ, index space; zero: the normal is not defined
   [[nodiscard]] double speedAt(const Point& point, const V3d& gradient, double curvature) const {
     SurfacePoint at{
-        .position = point.world,
-        .time = time_,
-        .curvature = std::clamp(curvature, -kMostCurvature, kMostCurvature) / motion_.voxel_};
+        .position = point.world, .time = time_, .curvature = curvature / motion_.voxel_};
     if (motion_.options_.speed.usesNormal) {
       motion_.toWorld_.multDirMatrix(gradient, at.normal);
       at.normal.normalize();
@@ -162,19 +156,33 @@ class FrontMotion::Leaf {
     });
   }
 
-  [[nodiscard]] Diffusion diffusionAt(const Point& point) const {
+  /// Returns the gradient of φ by central differences.
+  [[nodiscard]] V3d gradientAt(const Point& point) const {
     const float* p = central_->block.at(point.local[0], point.local[1], point.local[2]);
     const auto difference = [&](int step) { return static_cast<double>(p[step] - p[-step]) / 2; };
-    const V3d gradient(difference(PaddedBlock::kStepX), difference(PaddedBlock::kStepY),
-                       difference(1));
-    const double curvature = point.rate / std::max(gradient.length(), kLeastSlope);
-    const double k =
-        std::clamp(curvature, kCurvatureStep - kMostCurvature, kMostCurvature - kCurvatureStep);
-    const auto speed = [&](double at) { return speedAt(point, gradient, at); };
-    Diffusion result;
-    result.slope = (speed(k - kCurvatureStep) - speed(k + kCurvatureStep)) / (2 * kCurvatureStep);
-    result.coefficient = std::abs(k) > kCurvatureStep ? (speed(0) - speed(k)) / k : result.slope;
-    return result;
+    return {difference(PaddedBlock::kStepX), difference(PaddedBlock::kStepY), difference(1)};
+  }
+
+  /// Returns the curvature k that the speed receives, voxels⁻¹.
+  [[nodiscard]] static double curvatureAt(const Point& point, const V3d& gradient) {
+    return std::clamp(point.rate / std::max(gradient.length(), kLeastSlope), -kMostCurvature,
+                      kMostCurvature);
+  }
+
+  /// Returns ∂F/∂k, voxels² per unit of time.
+  [[nodiscard]] double derivativeAt(const Point& point, const V3d& gradient, double k) const {
+    return (speedAt(point, gradient, k + kCurvatureStep) -
+            speedAt(point, gradient, k - kCurvatureStep)) /
+           (2 * kCurvatureStep);
+  }
+
+  /// Returns (F(0) − F(k)) / k, voxels² per unit of time. Times κ|∇φ| it is the part of −F|∇φ| that
+  /// depends on the curvature, whatever the slope |∇φ|.
+  [[nodiscard]] double coefficientAt(const Point& point) const {
+    const V3d gradient = gradientAt(point);
+    const double k = curvatureAt(point, gradient);
+    if (std::abs(k) < kCurvatureStep) return -derivativeAt(point, gradient, 0);
+    return (speedAt(point, gradient, 0) - speedAt(point, gradient, k)) / k;
   }
 
   const FrontMotion& motion_;

@@ -22,9 +22,12 @@ NumericalHamiltonian upwindHamiltonian(const OneSidedSlopes& slopes,
                                        const Hamiltonian& hamiltonian) {
   // Step of the differences of H. The slopes are about 1.
   constexpr double kStep = 1e-4;
+  // Where the slopes differ by less than this on each axis, φ is smooth, and the directions at the
+  // mean slope suffice.
+  constexpr double kSmooth = 0.05;
   const V3d mean = (slopes.lower + slopes.upper) / 2;
   V3d least(HUGE_VAL), most(-HUGE_VAL);
-  for (const V3d& at : {slopes.lower, mean, slopes.upper})
+  const auto addSpeedsAt = [&](const V3d& at) {
     for (int axis = 0; axis < 3; ++axis) {
       V3d before = at, after = at;
       before[axis] -= kStep;
@@ -33,6 +36,13 @@ NumericalHamiltonian upwindHamiltonian(const OneSidedSlopes& slopes,
       least[axis] = std::min(least[axis], speed);
       most[axis] = std::max(most[axis], speed);
     }
+  };
+  addSpeedsAt(mean);
+  const V3d jump = slopes.upper - slopes.lower;
+  if (std::max({std::abs(jump.x), std::abs(jump.y), std::abs(jump.z)}) > kSmooth) {
+    addSpeedsAt(slopes.lower);
+    addSpeedsAt(slopes.upper);
+  }
   NumericalHamiltonian result;
   V3d gradient = mean;
   double dissipation = 0;
@@ -43,7 +53,7 @@ NumericalHamiltonian upwindHamiltonian(const OneSidedSlopes& slopes,
     else if (most[axis] <= 0)
       gradient[axis] = slopes.upper[axis];
     else
-      dissipation += result.speeds[axis] * (slopes.upper[axis] - slopes.lower[axis]) / 2;
+      dissipation += result.speeds[axis] * jump[axis] / 2;
   }
   result.value = hamiltonian(gradient) - dissipation;
   return result;

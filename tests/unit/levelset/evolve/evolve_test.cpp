@@ -212,7 +212,7 @@ TEST(Evolve, MovesOnlyNearPointsAndWhereTheMaskAllows) {
   const NarrowBand raised = evolve(ball, speedExpression("1"), 0.2, options).band;
   printf("tip %g bottom %g\n", raised.zeroSetBounds().max.z, raised.zeroSetBounds().min.z);
   const auto accessor = levelset::vdb(ball).getConstAccessor();
-  double moved = 0, above = 0;
+  double moved = 0;
   support::forEachActive(raised, [&](const V3d& p, double phi) {
     const openvdb::Coord c = openvdb::Coord::round(levelset::toVdb(p / h));
     const double off = std::abs(phi - accessor.getValue(c));
