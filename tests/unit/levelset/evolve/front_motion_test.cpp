@@ -1,57 +1,57 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "levelset/evolve/front_motion_vdb.h"
 #include "levelset/fields/expression.h"
 #include "levelset/hamilton_jacobi/hamiltonian.h"
-#include "levelset/shapes/shapes.h"
-#include "tests/support/measured.h"
 
 /// Orders of the schemes, without redistancing.
 namespace front_motion_test {
 
 using Imath::V3d;
-using levelset::NarrowBand;
 using levelset::flow::FrontMotion;
 using levelset::flow::kUpwindOrders;
 using levelset::flow::OneSidedSlopes;
 
-/// Returns the mean error beside the surface of a ball with a radius of 1 that grows or shrinks by
-/// a quarter. φ − F t is the exact solution, so the integration in time is exact and the error is
-/// that of the differences.
-double errorInSpace(int order, double speed, double h, const char* formula) {
-  const NarrowBand ball =
-      levelset::makeSphere(1, V3d(0.013, -0.021, 0.034), h, {.halfWidth = 0.75 / h});
-  const FrontMotion motion({.speed = levelset::speedExpression(formula), .orders = {order, 3}},
-                           ball.indexToWorld(), h);
-  openvdb::FloatGrid::Ptr grid = levelset::vdb(ball).deepCopy();
-  const double time = 0.25 / std::abs(speed);
-  const int steps = static_cast<int>(std::ceil(1 / h));
-  for (int n = 0; n < steps; ++n)
-    grid = motion.step(*grid, time * n / steps, time * (n + 1) / steps);
+/// Returns the error of a wave on φ = ± x that the speed 1 moves by 1, at |x| < 2. The row of grid
+/// points ends far from there. On the other axes the background is above φ, so that Godunov's
+/// scheme ignores it.
+double errorInSpace(int order, int direction, double h) {
+  const auto grid = openvdb::FloatGrid::create(1000);
+  grid->setTransform(levelset::uniformTransform(h));
+  const auto start = [](double x) { return x + 0.5 * std::sin(x); };
+  const int end = static_cast<int>(12 / h);
+  for (int x = -end; x <= end; ++x)
+    grid->tree().setValueOn(openvdb::Coord(x, 0, 0), static_cast<float>(start(direction * x * h)));
+  Imath::M44d toWorld;
+  toWorld.setScale(h);
+  const FrontMotion motion({.speed = levelset::speedExpression("1"), .orders = {order, 3}}, toWorld,
+                           h);
+  openvdb::FloatGrid::Ptr moved = grid;
+  constexpr int kSteps = 60;
+  for (int n = 0; n < kSteps; ++n)
+    moved = motion.step(*moved, static_cast<double>(n) / kSteps, (n + 1.0) / kSteps);
   double sum = 0, count = 0;
-  const auto accessor = levelset::vdb(ball).getConstAccessor();
-  for (auto it = grid->cbeginValueOn(); it; ++it) {
-    const double exact = static_cast<double>(accessor.getValue(it.getCoord())) - speed * time;
-    if (std::abs(exact) > 0.1) continue;
-    sum += std::abs(static_cast<double>(*it) - exact);
+  for (int x = static_cast<int>(-2 / h); x <= 2 / h; ++x) {
+    const auto value = static_cast<double>(moved->tree().getValue(openvdb::Coord(x, 0, 0)));
+    sum += std::abs(value - start(direction * x * h - 1));
     ++count;
   }
   return sum / count;
 }
 
 TEST(FrontMotion, HasItsOrderInSpace) {
-  for (const char* formula : {"1", "-1", "sqrt(nx^2 + ny^2 + nz^2)"})
+  for (const int direction : {1, -1})
     for (const int order : kUpwindOrders) {
-      const double speed = formula[0] == '-' ? -1 : 1;
-      const double coarsest = order == 5 ? 1 / 6.0 : 1 / 8.0;
-      double errors[3];
-      for (int i = 0; i < 3; ++i)
-        errors[i] = errorInSpace(order, speed, coarsest / (1 << i), formula);
-      printf("%s order %d: %g %g %g: %.3f %.3f\n", formula, order, errors[0], errors[1], errors[2],
-             std::log2(errors[0] / errors[1]), std::log2(errors[1] / errors[2]));
+      // The fifth order reaches the rounding of float sooner.
+      const double h = order == 5 ? 0.8 : 0.2;
+      const double errors[] = {errorInSpace(order, direction, h),
+                               errorInSpace(order, direction, h / 2),
+                               errorInSpace(order, direction, h / 4)};
+      for (int i = 0; i < 2; ++i)
+        EXPECT_NEAR(std::log2(errors[i] / errors[i + 1]), order, 0.2)
+            << order << " " << direction << " " << errors[i];
     }
 }
 
