@@ -18,6 +18,7 @@
 #include "levelset/eikonal/arrival.h"
 #include "levelset/emboss/emboss.h"
 #include "levelset/evolve/evolve.h"
+#include "levelset/hamilton_jacobi/pde_redistance.h"
 #include "levelset/offset/morphology.h"
 #include "levelset/offset/offset.h"
 #include "levelset/shapes/shapes.h"

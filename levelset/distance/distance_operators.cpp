@@ -43,14 +43,6 @@ std::optional<Cost> RedistanceOperator<isRequired>::cost(const Options&,
 template struct RedistanceOperator<false>;
 template struct RedistanceOperator<true>;
 
-const OperatorText ReinitializeOperator::text{
-    .name = "reinitialize",
-    .group = "Distances",
-    .summary = "compute distances again without moving the surface",
-    .details =
-        "Reads only the signs and the values beside the surface; these values may have any slope.",
-    .example = "levelsmith sphere --radius 1 --voxel 0.05 ! reinitialize --half-width 4 ! check"};
-
 const OperatorText RebuildBandOperator::text{
     .name = "rebuild-band",
     .group = "Distances",

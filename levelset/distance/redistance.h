@@ -90,11 +90,6 @@ struct RedistanceOperator {
   static std::optional<Cost> cost(const Options& options, const OperatorPlans& plans);
 };
 
-/// The operator `reinitialize`.
-struct ReinitializeOperator : RedistanceOperator<false> {
-  static const OperatorText text;
-  static constexpr ErrorModel errorModel{2, kTriangleError, 0, "redistance"};
-};
 /// The operator `rebuild-band`.
 struct RebuildBandOperator : RedistanceOperator<true> {
   static const OperatorText text;

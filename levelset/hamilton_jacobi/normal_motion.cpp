@@ -1,0 +1,96 @@
+#include <fmt/core.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+#include <vector>
+
+#include "levelset/error.h"
+#include "levelset/grids/padded_leaf_vdb.h"
+#include "levelset/hamilton_jacobi/godunov_gradient.h"
+#include "levelset/hamilton_jacobi/normal_motion_vdb.h"
+#include "levelset/hamilton_jacobi/upwind_derivative.h"
+
+namespace levelset::flow {
+namespace {
+
+using NormalBlock = PaddedLeaf<3>;
+
+/// One-sided derivatives of φ at a grid point of a block, voxels per voxel.
+OneSidedDerivatives derivativesAt(const NormalBlock& block, const openvdb::Coord& c,
+                                  double voxelSize, int order) {
+  OneSidedDerivatives result;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::array<double, 6> up, down;  // towards higher and towards lower coordinates
+    for (int k = 0; k < 6; ++k) {
+      openvdb::Coord at = c;
+      at[axis] += k - 3;
+      up[static_cast<std::size_t>(k)] =
+          static_cast<double>(*block.at(at[0], at[1], at[2])) / voxelSize;
+    }
+    openvdb::Coord last = c;
+    last[axis] += 3;
+    down[0] = static_cast<double>(*block.at(last[0], last[1], last[2])) / voxelSize;
+    for (std::size_t k = 1; k < 6; ++k) down[k] = up[6 - k];
+    result.behind[axis] = upwindDerivative(up, order);
+    result.ahead[axis] = -upwindDerivative(down, order);
+  }
+  return result;
+}
+
+/// Computes result = share · start + (1 − share) · (field + dt (G − F |∇field|)) on the active grid
+/// points.
+void normalStage(const openvdb::FloatGrid& start, const openvdb::FloatGrid& field, double share,
+                 double dt, const NormalMotion& motion, int order, openvdb::FloatGrid& result) {
+  using LeafNode = openvdb::FloatTree::LeafNodeType;
+  std::vector<LeafNode*> leaves;
+  result.tree().getNodes(leaves);
+  const double h = result.voxelSize()[0];
+  tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
+    const openvdb::Coord origin = leaves[i]->origin();
+    const LeafNode *first = start.tree().probeConstLeaf(origin),
+                   *second = motion.field.tree().probeConstLeaf(origin);
+    const openvdb::FloatGrid::ConstAccessor accessor(field.tree());
+    NormalBlock block;
+    copyPaddedLeaf(accessor, origin, NormalBlock::kPad, NormalBlock::kPad, block.values.data());
+    for (auto it = leaves[i]->beginValueOn(); it; ++it) {
+      const openvdb::Coord c = LeafNode::offsetToLocalCoord(it.pos());
+      const auto phi = static_cast<double>(*block.at(c[0], c[1], c[2]));
+      const NormalTerms terms = motion.terms(phi, static_cast<double>(second->getValue(it.pos())));
+      double rate = terms.source;
+      if (terms.speed != 0)
+        rate -= terms.speed * godunovGradient(derivativesAt(block, c, h, order), terms.speed);
+      it.setValue(static_cast<float>(share * static_cast<double>(first->getValue(it.pos())) +
+                                     (1 - share) * (phi + dt * rate)));
+    }
+  });
+}
+
+}  // namespace
+
+void requireOrders(const NormalOrders& orders) {
+  if (std::find(std::begin(kUpwindOrders), std::end(kUpwindOrders), orders.space) ==
+      std::end(kUpwindOrders))
+    throw UsageError(fmt::format("upwind differences have no order {} in space; give 1, 2, 3 or 5",
+                                 orders.space));
+  if (orders.time < 1 || orders.time > 3)
+    throw UsageError(
+        fmt::format("Runge-Kutta steps have no order {} in time; give 1, 2 or 3", orders.time));
+}
+
+openvdb::FloatGrid::Ptr normalStep(const openvdb::FloatGrid& start, const NormalMotion& motion,
+                                   const NormalOrders& orders, double dt) {
+  const auto stage = [&](const openvdb::FloatGrid& field, double share) {
+    openvdb::FloatGrid::Ptr result = start.deepCopy();
+    normalStage(start, field, share, dt, motion, orders.space, *result);
+    return result;
+  };
+  const openvdb::FloatGrid::Ptr one = stage(start, 0);
+  if (orders.time == 1) return one;
+  if (orders.time == 2) return stage(*one, 0.5);
+  const openvdb::FloatGrid::Ptr two = stage(*one, 0.75);
+  return stage(*two, 1.0 / 3);
+}
+
+}  // namespace levelset::flow
