@@ -11,6 +11,7 @@
 #include "levelset/distance/surface/surface_points.h"
 #include "levelset/error.h"
 #include "levelset/inspect/compare.h"
+#include "levelset/morph/speed_morph_vdb.h"
 #include "levelset/transform/resample.h"
 #include "levelset/vdb.h"
 
@@ -33,6 +34,8 @@ constexpr double kBesideSurface = 4;
 
 void checkMorph(const NarrowBand& solid, const NarrowBand& target, const MorphOptions& options) {
   if (options.mask) checkMask(*options.mask);
+  if (options.mask && options.method == MorphMethod::Speed)
+    throw UsageError("a mask applies only to the method distances; leave out the mask");
   if (options.farthest && !(*options.farthest >= kFirstReach && std::isfinite(*options.farthest)))
     throw UsageError(fmt::format(
         "the morph computes distances up to {} voxels from the surfaces, which is too small; "
@@ -147,7 +150,10 @@ NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphO
   // === Distances wherever the surface will pass
   DistancePair pair;
   const bool isOnTarget = options.until == 1 && !options.mask;
-  const bool isDirect = isOnTarget && options.steps == 1;  // the result is the target itself
+  const bool isFast = options.method == MorphMethod::Speed;
+  if (isFast) requireOverlap(vdb(solid), vdb(goal));
+  // The result is the target itself.
+  const bool isDirect = isOnTarget && options.steps == 1 && !isFast;
   double done = kUntilResampled;
   for (double reach = options.farthest.value_or(kFirstReach); !isDirect; reach *= 2) {
     // Each attempt with a doubled `reach` takes about as long as all earlier attempts together, so
@@ -161,17 +167,30 @@ NarrowBand morph(const NarrowBand& solid, const NarrowBand& target, const MorphO
   }
 
   // === Steps of the morph
+  std::optional<SpeedMorph> moving;
+  if (isFast) moving.emplace(*pair.from, *pair.to, options.maxMemory);
   NarrowBand result;
   const auto fractionOf = [&](int step) {
     return kUntilDistances + (1 - kUntilDistances) * step / options.steps;
   };
+  const auto surfaceAt = [&](double part, int i) {
+    const double from = fractionOf(i - 1), to = fractionOf(i);
+    if (moving) {
+      const Progress progress = subProgress(options.progress, from, to);
+      if (part == 1)
+        moving->converge(progress);
+      else
+        moving->advanceTo(-std::log1p(-part), progress);
+      return makeBand(moving->surface(solid.halfWidth()));
+    }
+    if (part == 1 && isOnTarget) return goal;
+    return intermediate(pair, part, options, [&](const FloatGrid& field) {
+      return distances(field, solid.halfWidth(), from, to);
+    });
+  };
   for (int i = 1; i <= options.steps; ++i) {
     const double part = options.until * i / options.steps;
-    result = part == 1 && isOnTarget
-                 ? goal
-                 : intermediate(pair, part, options, [&](const FloatGrid& field) {
-                     return distances(field, solid.halfWidth(), fractionOf(i - 1), fractionOf(i));
-                   });
+    result = surfaceAt(part, i);
     if (options.keep) options.keep(result, i);
     report(options.progress, fractionOf(i));
     if (options.tolerance && part < 1 && compare(result, goal).hausdorff() <= *options.tolerance)

@@ -32,8 +32,9 @@ const OperatorText MorphOperator::text{
     .group = "Flow",
     .summary = "turn the first solid into the second, step by step",
     .details =
-        "Every step is nearer to the target than the previous step; topology may change. The "
-        "result is on the grid of the first solid. --mask scales the fraction of the morph at each "
+        "Every step is nearer to the target than the previous step; topology may change. With "
+        "--method speed every part of the target must overlap the solid. The result is on the grid "
+        "of the first solid. --mask scales the fraction of the morph at each "
         "point, so the last step is not the target. Without names the operands are the two newest "
         "values, the target last.",
     .example =
@@ -49,6 +50,10 @@ void MorphOperator::check(const Options& options, const GivenOptions& given) {
     throw UsageError(
         "--tolerance stops the morph near the target, which it does not reach with --mask; leave "
         "one of them out");
+  if (given("mask") && options.method == MorphMethod::Speed)
+    throw UsageError(
+        "--mask scales the fraction of the morph, and the speed method has a time instead; leave "
+        "one of them out");
   if (options.steps > kMostMorphSteps) {
     throw UsageError(fmt::format("--steps: {} steps are too many; give at most {}", options.steps,
                                  kMostMorphSteps));
@@ -58,14 +63,15 @@ void MorphOperator::check(const Options& options, const GivenOptions& given) {
 NarrowBand MorphOperator::run(std::vector<NarrowBand> operands, const Options& options,
                               OperatorRun& run) {
   NarrowBand result = morph(operands[0], operands[1],
-                            {.steps = options.steps,
+                            {.method = options.method,
+                             .steps = options.steps,
                              .until = partOfTheWay(options.until),
                              .tolerance = options.tolerance,
                              .mask = options.mask,
                              .keep = options.keep,
                              .maxMemory = run.maxMemory,
                              .progress = run.progress});
-  if (options.tolerance) {
+  if (options.tolerance || options.method == MorphMethod::Speed) {
     run.errors.push_back({"distance to the target, largest",
                           compare(result, operands[1]).hausdorff(), "world units"});
   }

@@ -24,6 +24,20 @@ const ErrorModel& errorModel(const Operator& op) {
   return op.errorModel ? *op.errorModel : kUnmeasured;
 }
 
+std::string optionWithoutModel(const Node& node) {
+  struct Unmodelled {
+    const char *action, *option, *value;
+  };
+  constexpr Unmodelled kAll[] = {{"reinitialize", "method", "pde"}, {"morph", "method", "speed"}};
+  for (const Unmodelled& one : kAll) {
+    if (node.op->name != one.action) continue;
+    const auto given = node.options.find(one.option);
+    if (given != node.options.end() && given->second == one.value)
+      return std::string("--") + one.option + " " + one.value;
+  }
+  return {};
+}
+
 GraphModel graphModel(const Graph& graph, const std::vector<std::size_t>& nodes) {
   GraphModel all;
   for (const std::size_t i : nodes) {

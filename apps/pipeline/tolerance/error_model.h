@@ -13,6 +13,10 @@ using levelset::ErrorModel;
 /// a cautious model: first order, with creases.
 [[nodiscard]] const ErrorModel& errorModel(const Operator& op);
 
+/// Returns the option for which an action has no error model, such as "--method pde"; empty: none
+/// was given. Such methods exist for comparison.
+[[nodiscard]] std::string optionWithoutModel(const Node& node);
+
 /// Error model of a graph, known before anything runs.
 struct GraphModel {
   double order = 2;                ///< lowest convergence order of the actions

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "apps/pipeline/registry/invocation.h"
+#include "apps/pipeline/tolerance/error_model.h"
 #include "apps/pipeline/values/refusal.h"
 #include "apps/pipeline/values/units.h"
 #include "levelset/error.h"
@@ -78,6 +79,12 @@ class PartFinder {
               "{}: writes files while it computes its result, and --tolerance computes the result "
               "more than once; give voxel sizes, or do not write files here",
               node.op->name),
+          node.location));
+    if (const std::string option = optionWithoutModel(node); !option.empty())
+      throw UsageError(withLocation(
+          fmt::format("{}: {} has no bound of its error, and --tolerance needs one; leave out {}, "
+                      "or give voxel sizes in place of --tolerance",
+                      node.op->name, option, option),
           node.location));
     if (!isMaker) {
       isEnd_[i] = 1;

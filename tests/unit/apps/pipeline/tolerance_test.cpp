@@ -258,6 +258,12 @@ TEST(Tolerance, Refuses) {
   EXPECT_SAYS(refusalOf("--tolerance 0.1 sphere --radius 1 ! box --size 1,1,1 ! morph "
                         "--keep-steps a_##.vdb ! measure"),
               "writes files while it computes its result");
+  EXPECT_SAYS(refusalOf("--tolerance 0.1 sphere --radius 1 ! reinitialize --method pde ! measure"),
+              "--method pde has no bound of its error");
+  EXPECT_SAYS(
+      refusalOf("--tolerance 0.1 sphere --radius 1 ! box --size 1,1,1 ! morph --method speed "
+                "! measure"),
+      "--method speed has no bound of its error");
 }
 
 TEST(Tolerance, IsStoredInTheGraph) {
