@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <iterator>
 #include <vector>
 
@@ -18,20 +19,17 @@ namespace {
 using NormalBlock = PaddedLeaf<3>;
 
 /// One-sided derivatives of φ at a grid point of a block, voxels per voxel.
-OneSidedDerivatives derivativesAt(const NormalBlock& block, const openvdb::Coord& c,
-                                  double voxelSize, int order) {
+/// @param unit  factor from world units to voxels
+OneSidedDerivatives derivativesAt(const NormalBlock& block, const openvdb::Coord& c, double unit,
+                                  int order) {
+  constexpr std::ptrdiff_t kSteps[] = {NormalBlock::kStepX, NormalBlock::kStepY, 1};
+  const float* const here = block.at(c[0], c[1], c[2]);
   OneSidedDerivatives result;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     std::array<double, 6> up, down;  // towards higher and towards lower coordinates
-    for (int k = 0; k < 6; ++k) {
-      openvdb::Coord at = c;
-      at[axis] += k - 3;
-      up[static_cast<std::size_t>(k)] =
-          static_cast<double>(*block.at(at[0], at[1], at[2])) / voxelSize;
-    }
-    openvdb::Coord last = c;
-    last[axis] += 3;
-    down[0] = static_cast<double>(*block.at(last[0], last[1], last[2])) / voxelSize;
+    for (std::size_t k = 0; k < 6; ++k)
+      up[k] = unit * static_cast<double>(here[kSteps[axis] * (static_cast<std::ptrdiff_t>(k) - 3)]);
+    down[0] = unit * static_cast<double>(here[kSteps[axis] * 3]);
     for (std::size_t k = 1; k < 6; ++k) down[k] = up[6 - k];
     result.behind[axis] = upwindDerivative(up, order);
     result.ahead[axis] = -upwindDerivative(down, order);
@@ -46,7 +44,7 @@ void normalStage(const openvdb::FloatGrid& start, const openvdb::FloatGrid& fiel
   using LeafNode = openvdb::FloatTree::LeafNodeType;
   std::vector<LeafNode*> leaves;
   result.tree().getNodes(leaves);
-  const double h = result.voxelSize()[0];
+  const double unit = 1 / result.voxelSize()[0];
   tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
     const openvdb::Coord origin = leaves[i]->origin();
     const LeafNode *first = start.tree().probeConstLeaf(origin),
@@ -60,7 +58,7 @@ void normalStage(const openvdb::FloatGrid& start, const openvdb::FloatGrid& fiel
       const NormalTerms terms = motion.terms(phi, static_cast<double>(second->getValue(it.pos())));
       double rate = terms.source;
       if (terms.speed != 0)
-        rate -= terms.speed * godunovGradient(derivativesAt(block, c, h, order), terms.speed);
+        rate -= terms.speed * godunovGradient(derivativesAt(block, c, unit, order), terms.speed);
       it.setValue(static_cast<float>(share * static_cast<double>(first->getValue(it.pos())) +
                                      (1 - share) * (phi + dt * rate)));
     }

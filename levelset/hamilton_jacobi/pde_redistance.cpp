@@ -6,6 +6,7 @@
 #include <openvdb/tools/Prune.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -130,7 +131,9 @@ NarrowBand pdeRedistance(const NarrowBand& field, const PdeRedistanceOptions& op
   requireMemory(flow::kPdeBytes * static_cast<double>(domain.activeVoxelCount()),
                 options.maxMemory);
   const double h = field.voxelSize();
-  FloatGrid::Ptr phi = onDomain(vdb(field), domain, backgroundOf(reach + 1, h));
+  // Beyond the domain |φ| is at least as large as inside, so that no front enters from there.
+  const float beyond = std::max(backgroundOf(reach + 1, h), vdb(field).background());
+  FloatGrid::Ptr phi = onDomain(vdb(field), domain, beyond);
   const FloatGrid::Ptr sign = smearedSign(*phi);
   const flow::NormalMotion motion{*sign, [](double, double s) { return flow::NormalTerms{s, s}; }};
   const int steps = flow::pdeSteps(halfWidth);
