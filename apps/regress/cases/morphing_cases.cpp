@@ -11,6 +11,7 @@
 namespace regress {
 
 using Imath::V3d;
+using levelset::MorphMethod;
 using levelset::NarrowBand;
 
 namespace {
@@ -73,6 +74,47 @@ void morphShapes(Recorder& out) {
   });
 }
 
+/// Morphs by both methods, on the same input.
+void speedShapes(Recorder& out) {
+  const int steps = out.isQuick() ? 3 : 10;
+  for (const Sample& at : out.samples()) {
+    const V3d c = at.shift;
+    const Truth small = ball(c, 0.6), middle = ball(c, 0.8), big = ball(c, 1),
+                cube = box(c, V3d(1.3)), ring = torus(c, V3d(1, 2, 3), 0.7, 0.3);
+    const auto band = [&](const Truth& truth) { return exactBand(truth, at.voxelSize); };
+    // Both methods have the exact surface of concentric balls at every fraction.
+    for (const MorphMethod method : {MorphMethod::Speed, MorphMethod::Distances}) {
+      const std::string by = method == MorphMethod::Speed ? ", by speed" : ", by distances";
+      out.measure({"half-way between balls" + by, at, middle}, kOurs, [&] {
+        return levelset::morph(band(small), band(big), {.method = method, .until = 0.5});
+      });
+      const std::pair<const char*, std::pair<Truth, Truth>> pairs[] = {
+          {"sphere to cube", {middle, cube}}, {"torus to sphere", {ring, middle}}};
+      for (const auto& [name, shapes] : pairs) {
+        std::vector<double> differences;
+        const NarrowBand from = band(shapes.first), to = band(shapes.second);
+        const auto left = [&](const NarrowBand& step) {
+          return levelset::compare(step, to).symmetricDifference;
+        };
+        differences.push_back(left(from));
+        const auto made = out.measure({name + by, at, shapes.second}, kOurs, [&] {
+          return levelset::morph(
+              from, to,
+              {.method = method, .steps = steps, .keep = [&](const NarrowBand& step, int) {
+                 differences.push_back(left(step));
+               }});
+        });
+        if (made) out.set("value_error", mostLeft(differences));
+      }
+    }
+  }
+  const double h = 1.0 / 12;
+  const NarrowBand here = exactBand(ball(V3d(0), 0.5), h),
+                   there = exactBand(ball(V3d(2, 0, 0), 0.5), h);
+  out.expectRefusal("to a disjoint target by speed", levelset::ExitCode::Input,
+                    [&] { (void)levelset::morph(here, there, {.method = MorphMethod::Speed}); });
+}
+
 Bounds morphBounds() {
   return Bounds()
       .required("sphere to shifted sphere", "value_error", kMostLeft)
@@ -105,6 +147,12 @@ Bounds morphBounds() {
                 {{5, 0.00319}, {6, 0.00135}, {16, 0.000172}, {32, 0}, {64, 0}});
 }
 
+Bounds speedBounds() {
+  return Bounds()
+      .required("sphere to cube, by speed", "value_error", kMostLeft)
+      .required("torus to sphere, by speed", "value_error", kMostLeft);
+}
+
 }  // namespace
 
 void addMorphCases(std::vector<Case>& all) {
@@ -123,6 +171,25 @@ void addMorphCases(std::vector<Case>& all) {
        .full = {16, 32, 64},
        .bounds = morphBounds(),
        .run = morphShapes});
+  all.push_back(
+      {.name = "morph-speed",
+       .group = "morphing",
+       .title = "both methods of the morph side by side",
+       .definition =
+           "Between concentric spheres of radius 0.6 and 1, half-way is a sphere of radius 0.8: "
+           "with "
+           "the speed φ − φ_target the radius is 1 − 0.4 exp(−t), and t = ln 2. A sphere of radius "
+           "0.8 to a cube of edge 1.3, and a torus (0.7, 0.3) to the sphere, must end on the "
+           "target. "
+           "value: largest ratio of the volume of the symmetric difference of a step and the "
+           "target "
+           "to that of the previous step, in 10 steps, 3 in the quick budget. A disjoint target is "
+           "refused.",
+       .citation = "closed forms; Breen01",
+       .quick = {5, 6, 8},
+       .full = {16, 32, 64},
+       .bounds = speedBounds(),
+       .run = speedShapes});
 }
 
 }  // namespace regress
