@@ -66,24 +66,76 @@ openvdb::MaskTree pointsBesideSurface(const FloatGrid& field, int reach) {
   return tree;
 }
 
-/// Copies the field, and makes exactly the grid points of `domain` active. All others get the value
-/// ± `background`.
-FloatGrid::Ptr onDomain(const FloatGrid& field, const openvdb::MaskTree& domain, float background) {
+/// Copies the field, and makes exactly the grid points of `domain` active. Those without a value
+/// get ± `unknown`. Grid points outside the domain get ± (unknown + growth): |φ| grows by at most
+/// `growth` until the end, so that no front enters from there.
+FloatGrid::Ptr onDomain(const FloatGrid& field, const openvdb::MaskTree& domain, float unknown,
+                        float growth) {
   const FloatGrid::Ptr grid = field.deepCopy();
-  openvdb::tools::changeLevelSetBackground(grid->tree(), background);
+  openvdb::tools::changeLevelSetBackground(grid->tree(), unknown);
   grid->tree().topologyUnion(domain);
   for (PdeLeaf* leaf : pdeLeaves(*grid)) {
     const auto* wanted = domain.probeConstLeaf(leaf->origin());
     for (auto it = leaf->beginValueOn(); it; ++it)
       if (!wanted || !wanted->isValueOn(it.pos())) it.setValueOff();
   }
-  openvdb::tools::changeLevelSetBackground(grid->tree(), background);
+  openvdb::tools::changeLevelSetBackground(grid->tree(), unknown + growth);
   openvdb::tools::pruneLevelSet(grid->tree());
   return grid;
 }
 
 /// Computes S of φ0 on the active grid points, with central differences.
 FloatGrid::Ptr smearedSign(const FloatGrid& field) {
+  const FloatGrid::Ptr sign = field.deepCopy();
+  const std::vector<PdeLeaf*> leaves = pdeLeaves(*sign);
+  tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
+    forEachPoint(field, *leaves[i], [&](Index n, const float* p) {
+      double sum = 0;  // (h |∇φ0|)²
+      for (const int step : {1, PdeBlock::kStepY, PdeBlock::kStepX}) {
+        const double rise = (static_cast<double>(p[step]) - static_cast<double>(p[-step])) / 2;
+        sum += rise * rise;
+      }
+      const auto phi = static_cast<double>(*p);
+      const double norm = std::sqrt(phi * phi + sum);
+      if (leaves[i]->isValueOn(n))
+        leaves[i]->setValueOnly(n, norm > 0 ? static_cast<float>(phi / norm) : 0);
+    });
+  });
+  return sign;
+}
+
+/// Makes the grid points with |φ| below the background active, and sets all others to ±
+/// background.
+NarrowBand bandOf(FloatGrid& grid, double halfWidth) {
+  const float background = backgroundOf(halfWidth, grid.voxelSize()[0]);
+  for (PdeLeaf* leaf : pdeLeaves(grid))
+    for (auto it = leaf->beginValueOn(); it; ++it)
+      if (!(std::abs(*it) < background)) it.setValueOff();
+  openvdb::tools::changeLevelSetBackground(grid.tree(), background);
+  openvdb::tools::pruneLevelSet(grid.tree());
+  return makeBand(grid.copy());
+}
+
+}  // namespace
+
+NarrowBand pdeRedistance(const NarrowBand& field, const PdeRedistanceOptions& options) {
+  requireSolid(field);
+  const double halfWidth = options.halfWidth.value_or(field.halfWidth());
+  if (!std::isfinite(halfWidth) || halfWidth < 1)
+    throw UsageError(fmt::format("the half width is {} voxels; give at least 1", halfWidth));
+  const flow::NormalOrders orders{options.order, options.timeOrder};
+  flow::requireOrders(orders);
+
+  const int reach = flow::pdeReach(halfWidth);
+  const openvdb::MaskTree domain = pointsBesideSurface(vdb(field), reach);
+  if (domain.empty())
+    throw InvalidInput("the field is empty and has no zero crossing; give a solid with a surface");
+  requireMemory(flow::kPdeBytes * static_cast<double>(domain.activeVoxelCount()),
+                options.maxMemory);
+  const double h = field.voxelSize();
+  FloatGrid::Ptr phi =
+      onDomain(vdb(field), domain, std::max(backgroundOf(reach + 1, h), vdb(field).background()),
+               backgroundOf(halfWidth + flow::kPdeDelay + 1, h));
   const FloatGrid::Ptr sign = field.deepCopy();
   const std::vector<PdeLeaf*> leaves = pdeLeaves(*sign);
   tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
