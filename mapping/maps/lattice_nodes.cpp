@@ -19,6 +19,12 @@ std::vector<double> evenly(std::size_t count) {
   return result;
 }
 
+/// Distance by which [least, most] leaves [from, to], on the side where it leaves it further, and a
+/// little more, so that rounding keeps its ends inside. 0: it does not leave the interval.
+double excess(double least, double most, double from, double to) {
+  return (1 + 1e-9) * std::max({0.0, from - least, most - to});
+}
+
 /// Mean distance of the outermost particles of a layer to their inner neighbours, along rows and
 /// along columns; world units.
 std::array<double, 2> endSpacings(const ParticleLayer& layer) {
@@ -36,8 +42,16 @@ std::array<double, 2> endSpacings(const ParticleLayer& layer) {
 /// Builds the nodes of one lattice.
 class LatticeBuilder {
  public:
-  LatticeBuilder(const Patch& patch, const LatticeBorder& border)
-      : patch_(patch), border_(border), around_(border.rim > 0 ? 1 : 0) {}
+  LatticeBuilder(const Patch& patch, const LatticeBorder& border) : patch_(patch), border_(border) {
+    if (!border.reach.isEmpty()) {
+      const V3d &least = border.reach.min, &most = border.reach.max;
+      beyond_[0] = excess(least.x, most.x, 0, 1);
+      beyond_[1] = excess(least.y, most.y, 0, 1);
+      beyond_[2] = excess(least.z, most.z, -std::max(0.0, border.embedDepth),
+                          1 + std::max(0.0, -border.embedDepth));
+    }
+    around_ = border.rim > 0 || std::max(beyond_[0], beyond_[1]) > 0 ? 1 : 0;
+  }
 
   LatticeNodes build() {
     setCoordinatesAlongSides();
@@ -67,7 +81,7 @@ class LatticeBuilder {
         endSpacings(withCounts(patch_.layers.front(), columns_, rows_));
     for (std::size_t axis = 0; axis < 2; ++axis) {
       std::vector<double>& at = nodes_.coordinates[axis];
-      wide_[axis] = std::max(1.0, border_.rim / spacing[axis]);
+      wide_[axis] = std::max({1.0, border_.rim / spacing[axis], beyond_[axis] / at[1]});
       const double step = wide_[axis] * at[1];
       at.insert(at.begin(), -step);
       at.push_back(1 + step);
@@ -78,7 +92,11 @@ class LatticeBuilder {
   /// above the layers.
   void setCoordinatesAcrossLayers() {
     std::vector<double>& w = nodes_.coordinates[2];
-    const double rim = border_.rim / patch_.height, lift = std::max(0.0, -border_.embedDepth),
+    // As along u and v, cells that only reach for something are at least as wide as a layer.
+    const double thickness = 1 / static_cast<double>(patch_.layers.size() - 1);
+    const double rim = std::max(border_.rim / patch_.height,
+                                beyond_[2] > 0 ? std::max(beyond_[2], thickness) : 0.0),
+                 lift = std::max(0.0, -border_.embedDepth),
                  embedDepth = std::max(0.0, border_.embedDepth);
     if (rim > 0) w.push_back(-embedDepth - rim);
     if (embedDepth > 0) w.push_back(-embedDepth);
@@ -144,7 +162,8 @@ class LatticeBuilder {
 
   const Patch& patch_;
   const LatticeBorder& border_;
-  int around_;                           ///< outer cells on each side, 0 or 1
+  int around_ = 0;                       ///< outer cells on each side, 0 or 1
+  std::array<double, 3> beyond_ = {};    ///< width that `reach` needs of the outer cells; 0: none
   std::size_t columns_ = 2, rows_ = 2;   ///< largest numbers of columns and rows of all layers
   std::array<double, 2> wide_ = {1, 1};  ///< width of outer cells along u and v, in inner cells
   int below_ = 0, lastLayer_ = 0;        ///< w-indices of the nodes of the first and the last layer

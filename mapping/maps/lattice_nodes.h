@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Imath/ImathBox.h>
 #include <Imath/ImathVec.h>
 
 #include <array>
@@ -17,6 +18,9 @@ struct LatticeBorder {
   double embedDepth = 0;
   /// Further margin on all six sides, world units; 0: no margin.
   double rim = 0;
+  /// Texture coordinates that the outer cells reach on all sides, if they are further out than the
+  /// margin; empty: none.
+  Imath::Box3d reach = {};
 };
 
 /// Nodes of a lattice: a grid with the same counts on every layer.

@@ -50,7 +50,7 @@ V3d onLayer(const ParticleLayer& layer, const LayerCell& cell) {
               j.fraction);
 }
 
-LayerFrame frameOnLayer(const ParticleLayer& layer, const LayerCell& cell) {
+ForwardFrame frameOnLayer(const ParticleLayer& layer, const LayerCell& cell) {
   const auto& [i, j] = cell;
   const V3d &a = layer.at(i.cell, j.cell), &b = layer.at(i.cell + 1, j.cell),
             &c = layer.at(i.cell, j.cell + 1), &d = layer.at(i.cell + 1, j.cell + 1);
@@ -90,12 +90,12 @@ V3d layerPosition(const Patch& patch, const V3d& uvw) {
               k.fraction);
 }
 
-LayerFrame layerFrame(const Patch& patch, const V3d& uvw) {
+ForwardFrame layerFrame(const Patch& patch, const V3d& uvw) {
   const Interval k = locate(uvw.z, patch.layers.size());
   const ParticleLayer &below = patch.layers[k.cell], &above = patch.layers[k.cell + 1];
   const LayerCell cell = cellOf(below, uvw.x, uvw.y);
-  const LayerFrame low = frameOnLayer(below, cell),
-                   high = frameOnLayer(above, cellAbove(below, cell, above, uvw.x, uvw.y));
+  const ForwardFrame low = frameOnLayer(below, cell),
+                     high = frameOnLayer(above, cellAbove(below, cell, above, uvw.x, uvw.y));
   return {lerp(low.position, high.position, k.fraction),
           {lerp(low.slopes[0], high.slopes[0], k.fraction),
            lerp(low.slopes[1], high.slopes[1], k.fraction),

@@ -2,7 +2,6 @@
 
 #include <Imath/ImathVec.h>
 
-#include <array>
 #include <vector>
 
 #include "mapping/maps/patch_map.h"
@@ -15,15 +14,10 @@ namespace mapping {
 /// [Brodersen07 §8.4]. Beyond the unit cube the outermost cells continue linearly.
 [[nodiscard]] Imath::V3d layerPosition(const Patch& patch, const Imath::V3d& uvw);
 
-/// Value and derivatives of the layer map; derivatives in world units per unit of u, v and w.
-struct LayerFrame {
-  Imath::V3d position;  ///< equal to layerPosition, bit for bit
-  std::array<Imath::V3d, 3> slopes;
-};
-
-/// Evaluates the layer map with derivatives. On the border of two cells the slopes are those of the
-/// cell that begins there; on the last border, of the cell that ends there.
-[[nodiscard]] LayerFrame layerFrame(const Patch& patch, const Imath::V3d& uvw);
+/// Evaluates the layer map with derivatives. The position equals layerPosition, bit for bit. On the
+/// border of two cells the slopes are those of the cell that begins there; on the last border, of
+/// the cell that ends there.
+[[nodiscard]] ForwardFrame layerFrame(const Patch& patch, const Imath::V3d& uvw);
 
 /// Samples the layer map and the slopes of its inverse in the middle and near the corners of every
 /// cell, because a bilinear cell inverts first at a corner. Between layers of different counts, the

@@ -4,6 +4,7 @@
 #include <Imath/ImathMatrix.h>
 #include <Imath/ImathVec.h>
 
+#include <array>
 #include <memory>
 #include <span>
 
@@ -59,6 +60,13 @@ struct MapSample {
   /// Rows: gradients of u, v and w; not finite where the inverse map, from u, v, w to positions, is
   /// singular.
   Imath::M33d jacobian;
+};
+
+/// Value and derivatives of a map in the opposite direction, from texture coordinates to positions.
+struct ForwardFrame {
+  Imath::V3d position;
+  /// Derivatives along u, v and w, world units; NaN where the map is not defined.
+  std::array<Imath::V3d, 3> slopes;
 };
 
 /// A map from world positions above a patch to texture coordinates, the texture's unit cube.

@@ -299,4 +299,19 @@ V3d PrismMap::toPatch(const V3d& uvw) const {
   return mix(lattice_.corners(t), barycentric(lattice_.textureCorners(t), uvw));
 }
 
+ForwardFrame PrismMap::frame(const V3d& uvw) const {
+  Tetrahedron t;
+  if (!lattice_.locate(uvw, t)) return {V3d(kNaN), {V3d(kNaN), V3d(kNaN), V3d(kNaN)}};
+  const Lattice::Corners world = lattice_.corners(t), texture = lattice_.textureCorners(t);
+  ForwardFrame result{mix(world, barycentric(texture, uvw)), {}};
+  // Each step of the tetrahedron's path changes one texture coordinate.
+  const auto& axes = Lattice::kOrders[static_cast<std::size_t>(t.order)];
+  for (std::size_t step = 0; step < 3; ++step) {
+    const int axis = axes[step];
+    result.slopes[static_cast<std::size_t>(axis)] =
+        (world[step + 1] - world[step]) / (texture[step + 1][axis] - texture[step][axis]);
+  }
+  return result;
+}
+
 }  // namespace mapping

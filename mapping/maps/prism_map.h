@@ -31,6 +31,9 @@ class PrismMap final : public PatchMap {
   [[nodiscard]] static double estimateBytes(const Patch& patch);
   /// Maps texture coordinates to a world position above the patch; NaN outside the lattice.
   [[nodiscard]] Imath::V3d toPatch(const Imath::V3d& uvw) const;
+  /// toPatch() with derivatives. On a face between two tetrahedra they are those of the one that
+  /// Lattice::locate finds.
+  [[nodiscard]] ForwardFrame frame(const Imath::V3d& uvw) const;
   [[nodiscard]] const Lattice& lattice() const { return lattice_; }
   /// Counts the samples whose position the map sends to texture coordinates inside the texture
   /// other than their own. Such a sample means that the offset layer passes through itself.

@@ -12,6 +12,7 @@
 #include "levelset/error.h"
 #include "levelset/progress_gate.h"
 #include "mapping/maps/layer_map.h"
+#include "mapping/maps/prism_map.h"
 #include "mapping/textures/texture_placement.h"
 
 namespace mapping {
@@ -32,20 +33,34 @@ std::size_t countLost(const std::vector<V3d>& normals) {
   return static_cast<std::size_t>(std::count(normals.begin(), normals.end(), V3d(0)));
 }
 
-/// Moves the vertices of `texture` onto the patch, and with kNormals also the normals.
-template <bool kNormals>
-void moveVertices(const levelset::TriMesh& texture, const Patch& patch,
-                  const TexturePlacement& placement, const levelset::Progress& progress,
-                  levelset::TriMesh& mesh) {
+/// The layer map of a patch, as moveVertices() uses it.
+struct ByLayers {
+  const Patch& patch;
+  [[nodiscard]] V3d position(const V3d& uvw) const { return layerPosition(patch, uvw); }
+  [[nodiscard]] ForwardFrame frame(const V3d& uvw) const { return layerFrame(patch, uvw); }
+};
+
+/// The map through the tetrahedra of a patch, as moveVertices() uses it.
+struct ByPrisms {
+  const PrismMap& prisms;
+  [[nodiscard]] V3d position(const V3d& uvw) const { return prisms.toPatch(uvw); }
+  [[nodiscard]] ForwardFrame frame(const V3d& uvw) const { return prisms.frame(uvw); }
+};
+
+/// Moves the vertices of `texture` by the map, and with kNormals also the normals.
+/// @param hand  −1 if the patch is mirrored, otherwise 1
+template <bool kNormals, typename Map>
+void moveVertices(const levelset::TriMesh& texture, const Map& map,
+                  const TexturePlacement& placement, double hand,
+                  const levelset::Progress& progress, levelset::TriMesh& mesh) {
   const V3d perSize = V3d(1) / placement.box.size();
-  const double hand = patch.mirrored ? -1 : 1;
   levelset::ProgressGate gate(progress, mesh.positions.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.positions.size(), 4096),
                     [&](const auto& range) {
                       for (std::size_t i = range.begin(); i != range.end(); ++i) {
                         const V3d uvw = placement.toUvw(texture.positions[i]);
                         if constexpr (kNormals) {
-                          const LayerFrame frame = layerFrame(patch, uvw);
+                          const ForwardFrame frame = map.frame(uvw);
                           mesh.positions[i] = frame.position;
                           mesh.attributes.normals[i] = levelset::transformedNormal(
                               texture.attributes.normals[i],
@@ -53,11 +68,38 @@ void moveVertices(const levelset::TriMesh& texture, const Patch& patch,
                                frame.slopes[2] * perSize.z},
                               hand);
                         } else {
-                          mesh.positions[i] = layerPosition(patch, uvw);
+                          mesh.positions[i] = map.position(uvw);
                         }
                       }
                       gate.advance(range.size());
                     });
+}
+
+/// Moves the vertices of `texture` by the map, with its normals if it has any.
+template <typename Map>
+void moveMesh(const levelset::TriMesh& texture, const Map& map, const TexturePlacement& placement,
+              bool isMirrored, const levelset::Progress& progress, MeshTextureResult& result) {
+  levelset::TriMesh& mesh = result.mesh;
+  mesh.positions.resize(texture.positions.size());
+  mesh.attributes = texture.attributes;
+  mesh.triangles = texture.triangles;
+  const double hand = isMirrored ? -1 : 1;
+  if (texture.attributes.normals.empty()) {
+    moveVertices<false>(texture, map, placement, hand, progress, mesh);
+  } else {
+    moveVertices<true>(texture, map, placement, hand, progress, mesh);
+    result.lostNormals = countLost(mesh.attributes.normals);
+  }
+  if (isMirrored)
+    for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
+}
+
+/// Builds the tetrahedra of a patch, with outer cells for the vertices beyond the unit cube.
+PrismMap prismsFor(const levelset::TriMesh& texture, const Patch& patch,
+                   const TexturePlacement& placement) {
+  const Imath::Box3d own = levelset::bounds(texture);
+  return {patch, LatticeBorder{.embedDepth = placement.embedDepth,
+                               .reach = {placement.toUvw(own.min), placement.toUvw(own.max)}}};
 }
 
 void noteLostNormals(MeshTextureResult& result) {
@@ -87,29 +129,27 @@ MeshTextureResult mapOnto(const levelset::TriMesh& texture, const Patch& patch,
   MeshTextureResult result;
   // Bytes per particle: up to ten samples of the layer map in its cell, with their statistics.
   constexpr double kSampleBytes = 5 * 2 * 160;
+  const bool isPrism = options.map == MeshMap::Prisms;
   levelset::requireMemory(
-      kSampleBytes * static_cast<double>(patch.particleCount()) +
+      (isPrism ? PrismMap::estimateBytes(patch)
+               : kSampleBytes * static_cast<double>(patch.particleCount())) +
           (16 + bytesPerVertex(texture)) * static_cast<double>(texture.positions.size()) +
           12 * static_cast<double>(texture.triangles.size()),
       options.maxMemory);
   levelset::report(options.progress, 0);
-  result.distortion =
-      surveyDistortion(sampleLayerMap(patch, embedDepth), placement.box.size(), patch.mirrored);
-  result.certificate = certifyLayers(patch, embedDepth);
-  result.notes = checkFolds(result.distortion, result.certificate, options.allowFolds);
-
-  levelset::TriMesh& mesh = result.mesh;
-  mesh.positions.resize(texture.positions.size());
-  mesh.attributes = texture.attributes;
-  if (texture.attributes.normals.empty()) {
-    moveVertices<false>(texture, patch, placement, options.progress, mesh);
+  const auto check = [&](const std::vector<MapSample>& samples, FoldCertificate certificate) {
+    result.distortion = surveyDistortion(samples, placement.box.size(), patch.mirrored);
+    result.certificate = std::move(certificate);
+    result.notes = checkFolds(result.distortion, result.certificate, options.allowFolds);
+  };
+  if (isPrism) {
+    const PrismMap prisms = prismsFor(texture, patch, placement);
+    check(prisms.samples(), certifyPrisms(prisms, patch.mirrored));
+    moveMesh(texture, ByPrisms{prisms}, placement, patch.mirrored, options.progress, result);
   } else {
-    moveVertices<true>(texture, patch, placement, options.progress, mesh);
-    result.lostNormals = countLost(mesh.attributes.normals);
+    check(sampleLayerMap(patch, embedDepth), certifyLayers(patch, embedDepth));
+    moveMesh(texture, ByLayers{patch}, placement, patch.mirrored, options.progress, result);
   }
-  mesh.triangles = texture.triangles;
-  if (patch.mirrored)
-    for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
   return result;
 }
 

@@ -42,7 +42,8 @@ double plannedStretch(const Invocation& in, const Plan& texture, const Plan& pat
 }  // namespace
 
 bool mapsMesh(const Invocation& in) {
-  return in.text("map") == "mesh";
+  return in.text("map") == "mesh" ||
+         (in.text("map") == "shell" && in.operands[1].kind() == Kind::Mesh);
 }
 
 Imath::Box3d textureBoxOf(const Invocation& in) {
@@ -80,6 +81,7 @@ mapping::TextureOptions textureOptions(Invocation& in) {
 
 mapping::MeshTextureOptions meshTextureOptions(Invocation& in) {
   mapping::MeshTextureOptions options;
+  if (in.text("map") == "shell") options.map = mapping::MeshMap::Prisms;
   options.embedDepth = in.length("embed");
   if (in.given("texture-box")) options.textureBox = in.box("texture-box");
   options.allowFolds = in.flag("allow-folds");
@@ -117,7 +119,8 @@ void validateTextureOptions(const Invocation& in) {
   if (in.operands[0].kind() == Kind::Surface && !mapsMesh(in) && !in.flag("alone"))
     throw UsageError(in.op().name +
                      ": the base is a surface band, which has no inside to join the texture to; "
-                     "give --alone for the texture only, or move a mesh with --map mesh");
+                     "give --alone for the texture only, or move a mesh with --map mesh or --map "
+                     "shell");
   if (in.flag("alone") && in.given("blend"))
     throw UsageError(in.op().name + ": --alone has no seam to blend; leave --blend out");
   const Kind kind = in.operands[1].kind();
@@ -127,15 +130,16 @@ void validateTextureOptions(const Invocation& in) {
   if (!mapsMesh(in) && kind == Kind::Mesh) {
     throw UsageError(in.op().name +
                      ": the texture is a mesh; turn it into a solid with `level-set`, or move its "
-                     "vertices with --map mesh");
+                     "vertices with --map mesh or --map shell");
   }
   std::vector<const char*> unused;
   if (in.text("map") != "rbf") unused = {"kernel", "map-tolerance", "lambda-near", "lambda-far"};
   if (mapsMesh(in)) unused.insert(unused.end(), {"carve", "alone", "blend", "voxel", "half-width"});
   for (const char* option : unused)
     if (in.given(option))
-      throw UsageError(fmt::format("{}: --{} has no effect with --map {}; leave it out",
-                                   in.op().name, option, in.text("map")));
+      throw UsageError(fmt::format("{}: --{} has no effect with --map {}{}; leave it out",
+                                   in.op().name, option, in.text("map"),
+                                   mapsMesh(in) && in.text("map") == "shell" ? " and a mesh" : ""));
 }
 
 std::vector<Param> textureParams() {
@@ -143,8 +147,8 @@ std::vector<Param> textureParams() {
       {{.name = "map",
         .type = ParamType::Choice,
         .doc = "map from the space above the patch to the texture: rbf, smooth, by radial basis "
-               "functions; shell, piecewise linear between the particles; mesh, moves the vertices "
-               "of a mesh",
+               "functions; shell, piecewise linear between the particles, also moves the vertices "
+               "of a mesh; mesh, moves them by interpolation within the layers",
         .fallback = "rbf",
         .choices = {"rbf", "shell", "mesh"}},
        kernelParam(),

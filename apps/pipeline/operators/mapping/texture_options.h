@@ -15,7 +15,7 @@ namespace pipeline {
 [[nodiscard]] std::vector<Param> textureParams();
 /// @throws levelset::UsageError for options that exclude each other or do not fit the texture
 void validateTextureOptions(const Invocation& in);
-/// Returns true for --map mesh, where texture and result are meshes.
+/// Returns true if vertices of a mesh are moved: for --map mesh, and for --map shell with a mesh.
 [[nodiscard]] bool mapsMesh(const Invocation& in);
 /// Returns --texture-box, or the bounds of the texture.
 [[nodiscard]] Imath::Box3d textureBoxOf(const Invocation& in);

@@ -111,6 +111,11 @@ TEST(Chain, ChecksOperandsAndTheirKinds) {
                  "needs a mesh as texture");
   EXPECT_REFUSAL(onto + "read a.ply --as t ! texture @b @t @p --map mesh --blend 1",
                  "has no effect with --map mesh");
+  EXPECT_REFUSAL(onto + "read a.ply --as t ! texture @b @t @p --map shell --carve",
+                 "--carve has no effect with --map shell and a mesh");
+  EXPECT_REFUSAL(onto + "read a.ply --as t ! texture @b @t @p --map shell ! write a.vdb", "mesh");
+  EXPECT_EQ(refusal(onto + "read a.ply --as t ! texture @b @t @p --map shell ! write b.ply"),
+            "accepted");
   EXPECT_REFUSAL(onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --map-tolerance -1",
                  "map-tolerance");
   EXPECT_REFUSAL(onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --kernel cubic",
