@@ -78,12 +78,12 @@ def plot(table, target):
     with open(table) as file:
         runs = list(csv.DictReader(file))
     shown = sorted({float(run["points"]) for run in runs})
-    names = {"direct": "direct sum", "fast": "fast sum", "shell": "tetrahedra"}
+    names = {"direct": "direct sum", "fast": "fast sum", "shell": "tetrahedra", "compact": "compact kernel"}
     decades = [decade for decade in (1e6, 1e7, 1e8) if any(abs(each / decade - 1) < 0.1 for each in shown)]
     figure, axes = pyplot.subplots(1, len(decades), figsize=(3.7 * len(decades), 3.6), sharey=True, squeeze=False)
     axes = axes[0]
     for axis, points in zip(axes, decades):
-        for colour, (name, title) in zip(("C3", "C0", "C2"), names.items()):
+        for colour, (name, title) in zip(("C3", "C0", "C2", "C1"), names.items()):
             some = [run for run in runs if run["map"] == name and abs(float(run["points"]) / points - 1) < 0.1]
             some.sort(key=lambda run: int(run["particles"]))
             times = [float(run["mapping_s"]) for run in some]

@@ -7,10 +7,11 @@
 /// The radial functions φ of RBF maps [Brodersen07 table 8.1], with proven bounds.
 namespace mapping {
 
-/// φ takes r in mean particle spacings, so that a map does not depend on the unit of length. For
-/// homogeneous kernels (r, r³) the map does not depend on the spacing either, apart from the scale
-/// of the relaxation λ of the fit. The same holds for r² log r, which is homogeneous up to a
-/// polynomial that the side conditions on the weights cancel.
+/// φ takes r in mean particle spacings, and that of a compact kernel in support radii, so that a
+/// map does not depend on the unit of length. For homogeneous kernels (r, r³) the map does not
+/// depend on the spacing either, apart from the scale of the relaxation λ of the fit. The same
+/// holds for r² log r, which is homogeneous up to a polynomial that the side conditions on the
+/// weights cancel.
 enum class RbfKernel : std::uint8_t {
   Biharmonic,   ///< r: conditionally negative definite of order 1, least bending energy
   Triharmonic,  ///< r³: conditionally positive definite of order 2
@@ -19,7 +20,10 @@ enum class RbfKernel : std::uint8_t {
   /// Multi-order Laplacian, τ = 0.02 and δ = 5 [Dinh02], divided by its value at 0: positive
   /// definite and local.
   Laplacian,
-  Gaussian  ///< exp(−r²): positive definite and local
+  Gaussian,  ///< exp(−r²): positive definite and local
+  /// (1 − r)⁴ (4r + 1) for r < 1 and 0 beyond, of class C² and positive definite in space
+  /// [Wendland05 ch. 9]. The matrix of many particles is sparse.
+  Wendland
 };
 
 /// Kernels as structs of static functions, so that loops are compiled for each kernel.
@@ -32,7 +36,7 @@ enum class RbfKernel : std::uint8_t {
 ///   bendBound(lo, hi)     ≥ the norm of the Hessian of φ(|x|) for |x| in [lo, hi]; may be infinite
 ///   farBound(d)           ≥ |φ| for r ≥ d; infinite if φ grows
 /// r^(2k+1) and r^(2k) log r have the sign (−1)^(k+1) at order k + 1 in any dimension [Wendland05
-/// ch. 8]. So linear polynomials, order 2, suffice for all six kernels.
+/// ch. 8]. So linear polynomials, order 2, suffice for all seven kernels.
 namespace rbf {
 
 /// sixth() follows from Gegenbauer polynomials. Along a line, |x − p| = r √(1 − 2ct + t²) is their
@@ -183,7 +187,35 @@ struct Gaussian {
   static double farBound(double d) { return std::exp(-d * d); }
 };
 
+/// φ′ = −20 r (1 − r)³ and φ″ = 20 (1 − r)² (4r − 1). The fourth derivative jumps at r = 1.
+struct Wendland {
+  static constexpr double kSign = 1;
+  static double value(double r) {
+    const double t = std::max(1 - r, 0.0), squared = t * t;
+    return squared * squared * (4 * r + 1);
+  }
+  static double slope(double r) {
+    const double t = std::max(1 - r, 0.0);
+    return -20 * r * t * t * t;
+  }
+  static double sixth(double d) { return d < 1 ? HUGE_VAL : 0; }
+  static double slopeBound(double lo, double hi) {
+    return -slope(std::clamp(0.25, lo, hi));  // |φ′| is largest at r = 1/4
+  }
+  static double bendBound(double lo, double) {
+    // |φ′/r| decreases; |φ″| is less up to r = 2/5, and decreases from r = 1/2.
+    const double t = std::max(1 - lo, 0.0), at = std::max(lo, 0.5), u = std::max(1 - at, 0.0);
+    return std::max(20 * t * t * t, 20 * u * u * (4 * at - 1));
+  }
+  static double farBound(double d) { return value(d); }
+};
+
 }  // namespace rbf
+
+/// True for a kernel that is 0 beyond its support radius, which is then the unit of r.
+constexpr bool isCompact(RbfKernel kernel) {
+  return kernel == RbfKernel::Wendland;
+}
 
 /// Calls `use` with an object of the kernel's struct in `rbf`.
 template <typename Use>
@@ -199,6 +231,8 @@ decltype(auto) withKernel(RbfKernel kernel, const Use& use) {
       return use(rbf::Laplacian{});
     case RbfKernel::Gaussian:
       return use(rbf::Gaussian{});
+    case RbfKernel::Wendland:
+      return use(rbf::Wendland{});
     case RbfKernel::Biharmonic:
       break;
   }

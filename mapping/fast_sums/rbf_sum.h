@@ -11,7 +11,7 @@
 
 namespace mapping {
 
-/// Position of a particle, in mean particle spacings, and its weights for u, v and w.
+/// Position of a particle, in the kernel's unit of length, and its weights for u, v and w.
 struct RbfParticle {
   Imath::V3d position, weight;
 };

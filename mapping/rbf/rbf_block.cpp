@@ -82,19 +82,19 @@ double beyondTangent(double distance, double radius) {
                   0.5 * radius * radius * Kernel::bendBound(lo, hi));
 }
 
-/// Block in the map's own coordinates: in mean particle spacings, relative to the map's origin.
-GridBlock scaled(const GridBlock& block, const V3d& origin, double spacing) {
+/// Block in the map's own coordinates: in its unit of length, relative to the map's origin.
+GridBlock scaled(const GridBlock& block, const V3d& origin, double unit) {
   GridBlock result = block;
-  result.origin = (block.origin - origin) / spacing;
+  result.origin = (block.origin - origin) / unit;
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) result.rows[i][j] = block.rows[i][j] / spacing;
+    for (int j = 0; j < 3; ++j) result.rows[i][j] = block.rows[i][j] / unit;
   return result;
 }
 
 }  // namespace
 
 RbfBlock::RbfBlock(const RbfMap& map, const GridBlock& block, double tolerance)
-    : map_(map), block_(scaled(block, map.origin_, map.spacing_)), tolerance_(tolerance) {
+    : map_(map), block_(scaled(block, map.origin_, map.unit_)), tolerance_(tolerance) {
   const double half = 0.5 * (block.edge - 1);
   std::size_t n = 0;
   for (const double a : kChebyshev)
@@ -144,11 +144,16 @@ std::vector<std::uint32_t> RbfBlock::split(Kernel, std::span<const std::uint32_t
   // their sum. A share of the tolerance is reserved for the octants. Error bounds are sorted only
   // by their power of two.
   constexpr int kPowers = 128;
+  constexpr std::int8_t kNothing = -1;  // a particle that is too far to add anything
   std::array<double, kPowers> errors{};
   std::vector<std::int8_t> power(candidates.size());
   for (std::size_t n = 0; n < candidates.size(); ++n) {
     const std::uint32_t i = candidates[n];
     const double gap = (map_.particles_[i].position - center).length() - radius;
+    if (gap > 0 && Kernel::farBound(gap) == 0) {
+      power[n] = kNothing;
+      continue;
+    }
     const double error =
         gap > 0 ? map_.weightNorm_[i] * farError<Kernel>(halfEdge, gap) / tolerance_ : HUGE_VAL;
     power[n] = static_cast<std::int8_t>(
@@ -164,7 +169,7 @@ std::vector<std::uint32_t> RbfBlock::split(Kernel, std::span<const std::uint32_t
 
   std::vector<std::uint32_t> far;
   for (std::size_t n = 0; n < candidates.size(); ++n)
-    (power[n] < last ? far : near_).push_back(candidates[n]);
+    if (power[n] != kNothing) (power[n] < last ? far : near_).push_back(candidates[n]);
   return far;
 }
 

@@ -45,7 +45,7 @@ class RbfBlock final : public BlockMap {
   [[nodiscard]] Imath::Box3d boundsFor(Kernel kernel) const;
 
   const RbfMap& map_;
-  GridBlock block_;  ///< grid points, in mean particle spacings relative to the map's origin
+  GridBlock block_;  ///< grid points, in the unit and relative to the origin of the map
   double tolerance_;
   double error_ = 0;  ///< error bound of the polynomial, in u, v and w
   Values far_{};

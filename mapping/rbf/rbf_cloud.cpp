@@ -45,6 +45,12 @@ void checkArguments(std::span<const V3d> points, std::span<const V3d> targets,
       throw levelset::UsageError(fmt::format("λ is {}; give a relaxation of at least 0", lambda));
     }
   }
+  if (isCompact(options.kernel) && (!(options.support > 1) || !std::isfinite(options.support))) {
+    throw levelset::UsageError(
+        fmt::format("the support radius is {} mean particle spacings; give more than 1, so that "
+                    "particles reach their neighbours",
+                    options.support));
+  }
   if (points.size() != targets.size() || points.size() != near.size()) {
     throw InvalidInput(fmt::format("{} points, {} targets and {} flags; give equal numbers",
                                    points.size(), targets.size(), near.size()));
@@ -249,10 +255,11 @@ RbfCloud makeRbfCloud(std::span<const V3d> points, std::span<const V3d> targets,
   const auto [spacing, targetSpacing] = meanSpacings(merged.points, merged.targets);
   checkMerged(merged, points, targets, targetSpacing, report);
   cloud.spacing = merged.points.size() > 1 ? spacing * extent : 1;
+  cloud.unit = cloud.spacing * (isCompact(options.kernel) ? options.support : 1);
   cloud.targets = std::move(merged.targets);
   for (const std::uint32_t i : merged.leader) {
     // The same expression as in RbfMap, so that the positions match to the last bit.
-    cloud.points.push_back((points[i] - origin) / cloud.spacing);
+    cloud.points.push_back((points[i] - origin) / cloud.unit);
     cloud.extent = std::max(cloud.extent, largest(cloud.points.back()));
   }
   for (const char isNear : merged.near)

@@ -29,8 +29,8 @@ struct RbfSolveReport {
   std::vector<std::string> notes;  ///< messages for the user, one sentence each
 };
 
-/// Particles of an RBF map as the solver uses them: one for each position, in mean particle
-/// spacings relative to their centre. Targets are their texture coordinates, and `lambda` their
+/// Particles of an RBF map as the solver uses them: one for each position, in units of `unit`
+/// relative to their centre. Targets are their texture coordinates, and `lambda` their
 /// relaxation λ.
 struct RbfCloud {
   std::vector<Imath::V3d> points, targets;
@@ -38,7 +38,9 @@ struct RbfCloud {
   Imath::V3d origin{0};
   /// Mean distance to the nearest neighbour, world units; 1 for a single particle.
   double spacing = 1;
-  double extent = 0;  ///< largest |coordinate| of the points, mean particle spacings
+  /// Unit of the points, world units: the mean spacing, or the support radius of a compact kernel.
+  double unit = 1;
+  double extent = 0;  ///< largest |coordinate| of the points
   /// Orthonormal axes; the points span the first `directions` of them.
   std::array<Imath::V3d, 3> axes{Imath::V3d(1, 0, 0), Imath::V3d(0, 1, 0), Imath::V3d(0, 0, 1)};
   int directions = 0;
@@ -47,7 +49,9 @@ struct RbfCloud {
 /// Merges and normalises the particles. Particles closer than 1e-9 of the cloud's size are merged
 /// into one, which gets the mean of their targets. A direction in which the cloud is thinner than
 /// 1e-6 of its size is not counted in `directions`.
-/// @throws UsageError for λ that is negative or not finite
+/// @throws UsageError for λ that is negative or not finite, and a support radius of a compact
+/// kernel
+///         that is not finite or does not exceed one mean particle spacing
 /// @throws InvalidInput for no points, numbers that are not finite, and coincident points whose
 ///         targets differ by more than those of nearest neighbours do on average
 [[nodiscard]] RbfCloud makeRbfCloud(std::span<const Imath::V3d> points,

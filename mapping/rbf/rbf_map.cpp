@@ -34,6 +34,7 @@ RbfMap::RbfMap(std::span<const V3d> points, std::span<const V3d> targets,
   const RbfCloud cloud = makeRbfCloud(points, targets, near, options, solveReport_);
   origin_ = cloud.origin;
   spacing_ = cloud.spacing;
+  unit_ = cloud.unit;
   levelset::report(options.progress, 0.05);
   const RbfSolution solution = solveRbf(cloud, options, solveReport_);
   constant_ = solution.constant;
@@ -55,7 +56,7 @@ V3d RbfMap::affine(const V3d& local) const {
 }
 
 V3d RbfMap::operator()(const V3d& x) const {
-  const V3d local = (x - origin_) / spacing_;
+  const V3d local = (x - origin_) / unit_;
   V3d sum = affine(local);
   withKernel(kernel_, [&](auto kernel) {
     for (const RbfParticle& particle : particles_)
@@ -65,7 +66,7 @@ V3d RbfMap::operator()(const V3d& x) const {
 }
 
 Imath::M33d RbfMap::jacobian(const V3d& x) const {
-  const V3d local = (x - origin_) / spacing_;
+  const V3d local = (x - origin_) / unit_;
   Imath::M33d result = linear_;
   withKernel(kernel_, [&](auto kernel) {
     for (const RbfParticle& particle : particles_) {
@@ -77,7 +78,7 @@ Imath::M33d RbfMap::jacobian(const V3d& x) const {
         for (int axis = 0; axis < 3; ++axis) result[k][axis] += particle.weight[k] * slope[axis];
     }
   });
-  return result * (1 / spacing_);
+  return result * (1 / unit_);
 }
 
 std::unique_ptr<BlockMap> RbfMap::restrictTo(const GridBlock& block, double tolerance) const {
@@ -93,7 +94,7 @@ void RbfMap::measureResidual(std::span<const V3d> points, std::span<const V3d> t
     const std::size_t begin = chunk * kResidualChunk;
     RbfPoints sums(std::min(kResidualChunk, points.size() - begin));
     for (std::size_t i = 0; i < sums.size(); ++i) {
-      const V3d local = (points[begin + i] - origin_) / spacing_, value = affine(local);
+      const V3d local = (points[begin + i] - origin_) / unit_, value = affine(local);
       sums.x[i] = local.x, sums.y[i] = local.y, sums.z[i] = local.z;
       sums.u[i] = value.x, sums.v[i] = value.y, sums.w[i] = value.z;
     }

@@ -24,6 +24,9 @@ struct RbfMapOptions {
   /// two particles in mean particle spacings. For φ(r) = r, λ is a length in mean particle
   /// spacings; decaying kernels have φ(0) = 1.
   double lambdaNear = 0.005, lambdaFar = 0.25;
+  /// Support radius of a compact kernel, mean particle spacings, > 1. A larger radius reduces the
+  /// error and increases the time, in proportion to its cube.
+  double support = 4;
   /// Largest number of particles for a direct solution. Above it, or if the matrix factors exceed
   /// maxMemory, the system is solved iteratively. Systems of at most 500 particles are always
   /// solved directly.
@@ -43,11 +46,12 @@ struct RbfMapOptions {
 ///
 /// Linear polynomials suffice for all kernels, see RbfKernel. If the particles sample a smooth map
 /// and λ = 0, the error inside their cloud decreases with their spacing h. It decreases as h⁴ or
-/// faster for growing kernels. It decreases as h² for the two decaying kernels, whose width shrinks
-/// with the spacing. For n particles, a direct solution takes n² doubles and n³/3 operations. An
-/// iterative solution takes about 4 kB per particle, n² operations for each of a few restarts, and
-/// n log n for each step between them. For kernels that grow faster than r each step takes n²
-/// operations.
+/// faster for growing kernels. It decreases as h² for the three decaying kernels, whose width
+/// shrinks with the spacing. For n particles, a direct solution takes n² doubles and n³/3
+/// operations. An iterative solution takes about 4 kB per particle, n² operations for each of a few
+/// restarts, and n log n for each step between them. For kernels that grow faster than r each step
+/// takes n² operations. The matrix of a compact kernel is sparse. It is always factored, for any
+/// denseLimit.
 ///
 /// Coincident particles count as one, with the mean of their targets. If all particles lie in one
 /// plane, A maps the plane's normal to the normal of the plane's image, scaled by the mean scale in
@@ -58,7 +62,8 @@ class RbfMap final : public PatchMap {
   /// Builds the map.
   /// @param points, targets  n positions in world units, and their n texture coordinates
   /// @param near  n values; true for particles with lambdaNear
-  /// @throws UsageError for λ or a tolerance that is negative or not finite
+  /// @throws UsageError for λ or a tolerance that is negative or not finite, and for the support
+  ///         radius of a compact kernel that is not finite or not greater than 1
   /// @throws InvalidInput for no points, numbers that are not finite, and coincident points whose
   ///         targets differ by more than those of nearest neighbours do on average
   /// @throws ResourceLimit if the memory estimate of the solution exceeds options.maxMemory, before
@@ -83,11 +88,14 @@ class RbfMap final : public PatchMap {
   [[nodiscard]] std::size_t size() const { return particles_.size(); }
   [[nodiscard]] const RbfSolveReport& solveReport() const { return solveReport_; }
   [[nodiscard]] RbfKernel kernel() const { return kernel_; }
-  /// Particles with their weights; positions in mean particle spacings relative to origin().
+  /// Unit of length of particles() and linearPart(), world units: the mean spacing, or the support
+  /// radius of a compact kernel.
+  [[nodiscard]] double unit() const { return unit_; }
+  /// Particles with their weights; positions in units of unit() relative to origin().
   [[nodiscard]] std::span<const RbfParticle> particles() const { return particles_; }
   [[nodiscard]] const Imath::V3d& origin() const { return origin_; }
-  /// Affine part of the map: gradients of u, v and w as rows, per mean particle spacing; and its
-  /// value at origin().
+  /// Affine part of the map: gradients of u, v and w as rows, per unit(); and its value
+  /// at origin().
   [[nodiscard]] const Imath::M33d& linearPart() const { return linear_; }
   [[nodiscard]] const Imath::V3d& constantPart() const { return constant_; }
 
@@ -95,7 +103,7 @@ class RbfMap final : public PatchMap {
   friend class RbfBlock;
   void measureResidual(std::span<const Imath::V3d> points, std::span<const Imath::V3d> targets);
   /// Affine part of the map.
-  /// @param local  position in mean particle spacings relative to the origin
+  /// @param local  position in units of unit() relative to the origin
   [[nodiscard]] Imath::V3d affine(const Imath::V3d& local) const;
 
   RbfKernel kernel_;
@@ -103,7 +111,8 @@ class RbfMap final : public PatchMap {
   std::vector<double> weightNorm_;  ///< |ω_i| of each particle
   Imath::V3d origin_{0};            ///< mean of the particle positions, world units
   double spacing_ = 1;  ///< mean distance of a particle to its nearest neighbour, world units
-  Imath::M33d linear_;  ///< gradients of the affine part as rows, per mean particle spacing
+  double unit_ = 1;
+  Imath::M33d linear_;  ///< gradients of the affine part as rows, per unit
   Imath::V3d constant_{0};
   double maxResidual_ = 0;
   Imath::V3d axisResidual_{0};

@@ -8,11 +8,14 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "levelset/error.h"
 #include "mapping/fast_sums/rbf_sum.h"
 #include "mapping/rbf/rbf_krylov.h"
 #include "mapping/rbf/rbf_map.h"
+#include "mapping/rbf/rbf_ridge.h"
+#include "mapping/rbf/rbf_sparse.h"
 
 namespace mapping {
 namespace {
@@ -21,10 +24,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Imath::V3d;
 
-// Beyond this condition number a solution has no correct digits. Then kFirstRidge times the
-// system's norm, or 10, 100, … times as much, is added to its diagonal.
-constexpr double kWorstCondition = 1e15;
-constexpr double kFirstRidge = 1e-14;
 // Systems of at most this many particles are always solved directly.
 constexpr std::size_t kAlwaysDense = 500;
 constexpr std::size_t kChunk = 512;
@@ -103,24 +102,17 @@ void addGradient(const RbfCloud& cloud, const Imath::M33d& gradient, double fact
 MatrixXd solveDefinite(Eigen::Ref<MatrixXd> system, const MatrixXd& right, RbfSolveReport& report) {
   const Eigen::VectorXd diagonal = system.diagonal();
   const double norm = system.cwiseAbs().colwise().sum().maxCoeff();
-  for (double ridge = 0;; ridge = std::max(10 * ridge, kFirstRidge)) {
-    const Eigen::LLT<Eigen::Ref<MatrixXd>> factors(system);
-    const double reciprocal = factors.info() == Eigen::Success ? factors.rcond() : 0;
-    if (reciprocal * kWorstCondition >= 1 || ridge > 1e-3) {
-      report.condition = 1 / reciprocal;
-      if (ridge > 0) {
-        report.isRegularized = true;
-        report.notes.push_back(fmt::format(
-            "the particles' system is singular within rounding errors; {:.0e} of its norm "
-            "was added to its diagonal; some particles are much closer than others",
-            ridge));
-      }
-      return factors.solve(right);
+  std::optional<Eigen::LLT<Eigen::Ref<MatrixXd>>> factors;
+  raiseUntilDefinite(report, [&](double ridge) {
+    if (ridge > 0) {
+      system.triangularView<Eigen::StrictlyLower>() =
+          system.transpose().triangularView<Eigen::StrictlyLower>();
+      system.diagonal() = diagonal.array() + ridge * norm;
     }
-    system.triangularView<Eigen::StrictlyLower>() =
-        system.transpose().triangularView<Eigen::StrictlyLower>();
-    system.diagonal() = diagonal.array() + std::max(10 * ridge, kFirstRidge) * norm;
-  }
+    factors.emplace(system);
+    return factors->info() == Eigen::Success ? factors->rcond() : 0;
+  });
+  return factors->solve(right);
 }
 
 /// Computes weights orthogonal to the linear polynomials by Cholesky factorisation.
@@ -203,11 +195,14 @@ RbfSolution solveRbf(const RbfCloud& cloud, const RbfMapOptions& options, RbfSol
 
   const Imath::M33d missing = missingGradient(cloud, polynomial.solve(values));
   addGradient(cloud, missing, -1, values);
-  report.isIterative =
-      cloud.points.size() > kAlwaysDense && (cloud.points.size() > options.denseLimit ||
-                                             denseBytes > static_cast<double>(options.maxMemory));
+  const bool isSparse = isCompact(options.kernel);
+  report.isIterative = !isSparse && cloud.points.size() > kAlwaysDense &&
+                       (cloud.points.size() > options.denseLimit ||
+                        denseBytes > static_cast<double>(options.maxMemory));
   RbfFit fit;
-  if (report.isIterative) {
+  if (isSparse) {
+    fit = solveSparsely(cloud, options, polynomialOf(cloud), values, report);
+  } else if (report.isIterative) {
     const MatrixXd q = polynomial.householderQ() * MatrixXd::Identity(n, 1 + cloud.directions);
     fit = solveIteratively(cloud, options, q, values, report);
   } else {

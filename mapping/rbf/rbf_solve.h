@@ -23,7 +23,7 @@ struct RbfFit {
 };
 
 /// Coefficients of Φ(x) = constant + linear x + Σ weights_i φ(|x − p_i|), with x and p_i in the
-/// coordinates of the cloud: mean particle spacings from its centre.
+/// coordinates of the cloud.
 struct RbfSolution {
   std::vector<Imath::V3d> weights;
   Imath::V3d constant{0};
@@ -33,7 +33,8 @@ struct RbfSolution {
 /// Solves for the weights. With s the kernel's sign, s φ + λ is positive definite on the vectors
 /// orthogonal to the linear polynomials that the particles distinguish. The system is solved there
 /// by Cholesky factorisation, or iteratively above options.denseLimit particles and if the factors
-/// exceed options.maxMemory, but never for 500 particles or fewer. If the particles span fewer than
+/// exceed options.maxMemory, but never for 500 particles or fewer. The sparse system of a compact
+/// kernel is always solved by sparse factorisation. If the particles span fewer than
 /// three directions, the affine part is completed so that it also scales the missing directions,
 /// see RbfMap.
 /// @throws ResourceLimit if the memory estimate exceeds options.maxMemory

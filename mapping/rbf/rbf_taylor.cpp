@@ -171,7 +171,7 @@ RbfCubes::RbfCubes(const RbfMap& map, const V3d& sizes, double tolerance)
       constant_(map.constantPart() * sizes) {
   // The map uses mean particle spacings as its unit, so the weights of the kernel r are divided by
   // the spacing to get world units.
-  const double spacing = map.meanSpacing();
+  const double spacing = map.unit();
   double sum = 0;
   for (RbfParticle& particle : particles_) {
     particle.position *= spacing;

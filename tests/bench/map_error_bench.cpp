@@ -1,10 +1,12 @@
-// Measures error against run time of three methods that map grid points: the direct sum of an RBF
-// map, its fast sum, and tetrahedra. Maps 10⁶ to 10⁸ grid points of a third of a cylinder's wall
-// with 10³ to 10⁵ particles. Mapping uses one thread, solving all threads. The error is that of the
-// complete map, against the exact inverse of the map that placed the particles. Prints the 99th
-// percentile and the maximum over 2000 positions well inside. Direct sums above 10⁴ particles × 10⁷
-// points are timed on a sample of the blocks, and marked. Exits 1 when the fast sum differs from
-// the direct sum by more than 0.05 texture voxel at any point that both evaluate.
+// Measures error against run time of four methods that map grid points: the direct sum of an RBF
+// map, its fast sum, tetrahedra, and the local sum of a compact kernel with a support of four mean
+// particle spacings, solved by sparse factors. Maps 10⁶ to 10⁸ grid points of a third of a
+// cylinder's wall with 10³ to 10⁵ particles. Mapping uses one thread, solving all threads. The
+// error is that of the complete map, against the exact inverse of the map that placed the
+// particles. Prints the 99th percentile and the maximum over 2000 positions well inside. Direct
+// sums above 10⁴ particles × 10⁷ points are timed on a sample of the blocks, and marked. Exits 1
+// when the fast sum differs from the direct sum by more than 0.05 texture voxel at any point that
+// both evaluate.
 //
 //   map_error_bench [POINTS = 100000000] > map-error.csv
 
@@ -58,8 +60,9 @@ mapping::Patch makePatch(double particles) {
   return wall::makePatch(particles, std::max(4.0, std::round(kHeight / spacing) + 1));
 }
 
-mapping::RbfMap solve(const mapping::Patch& patch) {
+mapping::RbfMap solve(const mapping::Patch& patch, mapping::RbfKernel kernel) {
   mapping::RbfMapOptions options;
+  options.kernel = kernel;
   options.lambdaNear = options.lambdaFar = 0;
   options.solveTolerance = 0.1 * kTolerance / kTextureVoxels;
   return mapping::patchToTexture(patch, options);
@@ -153,18 +156,22 @@ int main(int argc, char** argv) {
   for (const std::size_t particles : {1000, 10000, 100000}) {
     const mapping::Patch patch = makePatch(static_cast<double>(particles));
     double start = now();
-    const mapping::RbfMap rbf = solve(patch);
+    const mapping::RbfMap rbf = solve(patch, mapping::RbfKernel::Biharmonic);
     const double solved = now() - start;
+    start = now();
+    const mapping::RbfMap compact = solve(patch, mapping::RbfKernel::Wendland);
+    const double factored = now() - start;
     const tbb::global_control oneThread(tbb::global_control::max_allowed_parallelism, 1);
     start = now();
     const mapping::PrismMap shell(patch, {.embedDepth = 0.05, .rim = 0.05});
     const double built = now() - start;
     const Error direct = errorOf([&](const V3d& x) { return rbf(x); });
     const Error fast = errorOf([&](const V3d& x) { return fastAt(rbf, x, 0.005); });
+    const Error local = errorOf([&](const V3d& x) { return fastAt(compact, x, 0.005); });
     const Error straight = errorOf([&](const V3d& x) { return shell(x); });
     for (double points = 1e6; points <= most * 1.01; points *= 10) {
       const std::vector<GridBlock> roots = wall::rootsOf(points);
-      Run hybrid, sum, all;
+      Run hybrid, sum, near, all;
       start = now();
       for (const GridBlock& root : roots) hybrid.descend(root, *shell.restrictTo(root, 0));
       tell("shell", rbf.size(), hybrid.points, built, now() - start, straight, false);
@@ -172,6 +179,10 @@ int main(int argc, char** argv) {
       for (const GridBlock& root : roots)
         sum.descend(root, *rbf.restrictTo(root, kTolerance / kTextureVoxels));
       tell("fast", rbf.size(), sum.points, solved, now() - start, fast, false);
+      start = now();
+      for (const GridBlock& root : roots)
+        near.descend(root, *compact.restrictTo(root, kTolerance / kTextureVoxels));
+      tell("compact", compact.size(), near.points, factored, now() - start, local, false);
       const double sums = static_cast<double>(rbf.size()) * points;
       all.share = sums > kWhole ? kSampled / sums : 1;
       for (const GridBlock& root : roots)

@@ -5,7 +5,7 @@
 //
 //   mapping_bench [PARTICLES = 10000] [POINTS = 10000000] [SOLVED = 100000]
 //
-// Then times the six kernels on a tenth of the points with 2000 particles. Last, times the
+// Then times the seven kernels on a tenth of the points with 2000 particles. Last, times the
 // iterative solution for SOLVED particles on all threads (0: skipped).
 //
 // Exits 1 when the fast sum is less than 30 times as fast as the direct one, or off by more than
@@ -86,8 +86,8 @@ void report(const char* name, const Cost& cost) {
 }
 
 void compareKernels(double points) {
-  constexpr std::array kNames = {"biharmonic", "triharmonic", "thin-plate",
-                                 "sum",        "laplacian",   "gaussian"};
+  constexpr std::array kNames = {"biharmonic", "triharmonic", "thin-plate", "sum",
+                                 "laplacian",  "gaussian",    "wendland"};
   const mapping::Patch patch = wall::makePatch(2000, kLayers);
   const std::vector<GridBlock> grid = wall::rootsOf(points);
   for (std::size_t n = 0; n < kNames.size(); ++n) {

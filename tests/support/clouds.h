@@ -13,8 +13,8 @@
 namespace mapping {
 /// Prints the kernel in test names.
 inline void PrintTo(RbfKernel kernel, std::ostream* out) {
-  constexpr std::array<const char*, 6> kNames = {"Biharmonic", "Triharmonic", "ThinPlate",
-                                                 "Sum",        "Laplacian",   "Gaussian"};
+  constexpr std::array<const char*, 7> kNames = {"Biharmonic", "Triharmonic", "ThinPlate", "Sum",
+                                                 "Laplacian",  "Gaussian",    "Wendland"};
   *out << kNames[static_cast<std::size_t>(kernel)];
 }
 }  // namespace mapping
@@ -24,7 +24,8 @@ namespace support {
 
 inline constexpr std::array kKernels = {
     mapping::RbfKernel::Biharmonic, mapping::RbfKernel::Triharmonic, mapping::RbfKernel::ThinPlate,
-    mapping::RbfKernel::Sum,        mapping::RbfKernel::Laplacian,   mapping::RbfKernel::Gaussian};
+    mapping::RbfKernel::Sum,        mapping::RbfKernel::Laplacian,   mapping::RbfKernel::Gaussian,
+    mapping::RbfKernel::Wendland};
 
 struct Cloud {
   std::vector<Imath::V3d> points, targets;

@@ -48,8 +48,8 @@ nlohmann::ordered_json energyJson(const mapping::ElementDistortion& distortion) 
           {"max", distortion.most}};
 }
 
-const std::vector<std::string> kKernelNames = {"biharmonic", "triharmonic", "thin-plate",
-                                               "sum",        "laplacian",   "gaussian"};
+const std::vector<std::string> kKernelNames = {"biharmonic", "triharmonic", "thin-plate", "sum",
+                                               "laplacian",  "gaussian",    "wendland"};
 
 bool isRelaxed(const Invocation& in) {
   return in.text("relax") != "none";
@@ -166,6 +166,7 @@ JudgedMap judgeMap(Invocation& in, const mapping::Patch& patch, double embedDept
                                                        {.kernel = kernelOf(in),
                                                         .lambdaNear = in.number("lambda-near"),
                                                         .lambdaFar = in.number("lambda-far"),
+                                                        .support = in.number("support"),
                                                         .maxMemory = in.maxMemory,
                                                         .progress = in.progress},
                                                        cost);
@@ -231,10 +232,7 @@ void validateFolds(const Invocation& in) {
   validateShell(in);
   if (in.text("relax") == "texture")
     throw UsageError("folds: --relax texture needs a texture; give --relax patch");
-  for (const char* option : {"kernel", "lambda-near", "lambda-far"})
-    if (in.text("map") != "rbf" && in.given(option))
-      throw UsageError(fmt::format("folds: --{} has no effect with --map {}; leave it out", option,
-                                   in.text("map")));
+  validateKernel(in);
 }
 
 }  // namespace
@@ -269,6 +267,26 @@ Param kernelParam() {
               "distance",
           .fallback = "biharmonic",
           .choices = kKernelNames};
+}
+
+Param supportParam() {
+  return {.name = "support",
+          .type = ParamType::Number,
+          .doc =
+              "with --kernel wendland: distance beyond which a particle has no influence, in mean "
+              "particle spacings, more than 1",
+          .fallback = "4",
+          .range = Range::Positive};
+}
+
+void validateKernel(const Invocation& in) {
+  for (const char* option : {"kernel", "support", "lambda-near", "lambda-far"})
+    if (in.text("map") != "rbf" && in.given(option))
+      throw UsageError(fmt::format("{}: --{} has no effect with --map {}; leave it out",
+                                   in.op().name, option, in.text("map")));
+  if (in.given("support") && !mapping::isCompact(kernelOf(in)))
+    throw UsageError(fmt::format("{}: --support has no effect with --kernel {}; leave it out",
+                                 in.op().name, in.text("kernel")));
 }
 
 mapping::RbfKernel kernelOf(const Invocation& in) {
@@ -365,6 +383,7 @@ Operator foldsOperator() {
             .formerName = "sink"},
            voxelParam("voxel size of the field; default: that of the base"),
            kernelParam(),
+           supportParam(),
            {.name = "lambda-near",
             .type = ParamType::Number,
             .doc = "with --map rbf: smoothing of the map at particles on the surface, in mean "

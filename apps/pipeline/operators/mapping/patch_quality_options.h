@@ -40,7 +40,10 @@ struct ImprovedPatches {
 [[nodiscard]] std::array<double, 2> sidesOf(const mapping::Patch& patch);
 
 [[nodiscard]] Param kernelParam();
+[[nodiscard]] Param supportParam();
 [[nodiscard]] mapping::RbfKernel kernelOf(const Invocation& in);
+/// @throws levelset::UsageError for options of RBF maps or of their kernels that have no effect
+void validateKernel(const Invocation& in);
 
 void addDistortion(const mapping::Distortion& distortion, nlohmann::ordered_json& json);
 [[nodiscard]] nlohmann::ordered_json certificateJson(const mapping::FoldCertificate& certificate);

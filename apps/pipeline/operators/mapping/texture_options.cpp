@@ -71,6 +71,7 @@ mapping::TextureOptions textureOptions(Invocation& in) {
   if (in.text("map") == "shell") options.map = mapping::TextureMap::Prism;
   options.mapTolerance = in.number("map-tolerance");
   options.rbf.kernel = kernelOf(in);
+  options.rbf.support = in.number("support");
   options.rbf.lambdaNear = in.number("lambda-near");
   options.rbf.lambdaFar = in.number("lambda-far");
   options.allowFolds = in.flag("allow-folds");
@@ -133,7 +134,8 @@ void validateTextureOptions(const Invocation& in) {
                      "vertices with --map mesh or --map shell");
   }
   std::vector<const char*> unused;
-  if (in.text("map") != "rbf") unused = {"kernel", "map-tolerance", "lambda-near", "lambda-far"};
+  validateKernel(in);
+  if (in.text("map") != "rbf") unused = {"map-tolerance"};
   if (mapsMesh(in)) unused.insert(unused.end(), {"carve", "alone", "blend", "voxel", "half-width"});
   for (const char* option : unused)
     if (in.given(option))
@@ -152,6 +154,7 @@ std::vector<Param> textureParams() {
         .fallback = "rbf",
         .choices = {"rbf", "shell", "mesh"}},
        kernelParam(),
+       supportParam(),
        {.name = "map-tolerance",
         .type = ParamType::Number,
         .doc = "with --map rbf: largest error of the fast evaluation of the map, in texture voxels",
