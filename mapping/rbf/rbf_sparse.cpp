@@ -103,8 +103,10 @@ SparseMatrix sparseRbfMatrix(const RbfCloud& cloud, const RbfMapOptions& options
 
 RbfFit solveSparsely(const RbfCloud& cloud, const RbfMapOptions& options,
                      const MatrixXd& polynomial, const RbfColumns& values, RbfSolveReport& report) {
+  const auto n = static_cast<Index>(cloud.points.size());
+  // The polynomials alone interpolate so few particles.
+  if (n == polynomial.cols()) return {RbfColumns::Zero(n, 3), RbfColumns::Zero(n, 3)};
   const SparseMatrix system = sparseRbfMatrix(cloud, options);
-  const Index n = system.rows();
   SparseFactors factors;
   factors.analyzePattern(system);
   levelset::withContext("solving the RBF map, whose --support sets the size of the factors", [&] {

@@ -185,7 +185,9 @@ TEST_P(Kernel, EveryInstructionSetGivesTheSameBits) {
       return bitsOf(points);
     };
     const std::vector<std::uint64_t> plain = by(mapping::supportedRbfAdders().front());
-    ASSERT_NE(plain, bitsOf(start));
+    if (count > 4) {  // the fifth point lies on a particle
+      ASSERT_NE(plain, bitsOf(start));
+    }
     for (const mapping::RbfAdders& adders : mapping::supportedRbfAdders())
       EXPECT_EQ(by(adders), plain) << adders.name << " at " << count;
     mapping::RbfPoints chosenItself = start;
