@@ -120,6 +120,12 @@ TEST(Chain, ChecksOperandsAndTheirKinds) {
                  "map-tolerance");
   EXPECT_REFUSAL(onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --kernel cubic",
                  "thin-plate");
+  EXPECT_REFUSAL(onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --support 3",
+                 "--support has no effect with --kernel biharmonic");
+  EXPECT_REFUSAL(
+      onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --kernel wendland --support 0",
+      "support");
+  EXPECT_REFUSAL(onto + "folds @b @p --map shell --support 3", "has no effect with --map shell");
   EXPECT_REFUSAL(
       onto + "box --size 1,1,1 --voxel 0.2 --as t ! texture @b @t @p --map shell --kernel sum",
       "--kernel has no effect with --map shell");
