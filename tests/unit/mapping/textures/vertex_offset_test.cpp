@@ -32,7 +32,7 @@ TEST(VertexOffset, ConvexSurfacesMoveByTheDistance) {
   EXPECT_EQ(moved.mesh.triangles, ball.triangles);
   double worst = 0;
   for (const V3d& p : moved.mesh.positions) worst = std::max(worst, std::abs(p.length() - 1.5));
-  EXPECT_LE(worst, support::measured(1e-3));
+  EXPECT_LE(worst, support::measured(1.22e-6));
   const vertex_offset::Result atOnce = vertex_offset::offsetAtOnce(ball, 0.5);
   for (std::size_t v = 0; v < atOnce.mesh.positions.size(); ++v)
     EXPECT_LT((atOnce.mesh.positions[v] - moved.mesh.positions[v]).length(),
@@ -45,7 +45,7 @@ TEST(VertexOffset, RetreatsInAValley) {
   const TriMesh base = valley();
   const double distance = 0.3;
   EXPECT_EQ(intersections(base), 0u);
-  EXPECT_GT(intersections(vertex_offset::offsetAtOnce(base, distance).mesh), 100u);
+  EXPECT_GT(intersections(vertex_offset::offsetAtOnce(base, distance).mesh), 30u);
   const vertex_offset::Result moved = vertex_offset::offsetWithRetreat(base, distance, 16);
   EXPECT_EQ(intersections(moved.mesh), 0u);
   EXPECT_GT(moved.locked, 50u);
