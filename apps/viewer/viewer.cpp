@@ -44,6 +44,7 @@ Viewer::Viewer(const Arguments& arguments, Window& window)
       display_(arguments.display),
       style_(arguments.style) {
   std::snprintf(screenshotName_.data(), screenshotName_.size(), "view.png");
+  std::snprintf(resultName_.data(), resultName_.size(), "textured.vdb");
   showMessage("Drop a file here, or press Ctrl+O to open one.");
 }
 
@@ -69,12 +70,13 @@ void Viewer::show(std::shared_ptr<const Model> model, bool keepView) {
         clip_.offset = model_->solidBounds.center()[static_cast<int>(clip_.across)];
     }
   }
+  restartPatchEditor();
   window_.setTitle(namesOf(model_->files) + " – Levelsmith");
   showMessage(fmt::format("{}: {}.", namesOf(model_->files), model_->description));
 }
 
 bool Viewer::isPanelShown() const {
-  return !arguments_.isScript() || arguments_.isInterface;
+  return !arguments_.isScript() || arguments_.isInterface || arguments_.play;
 }
 
 void Viewer::frameBesidePanel() {
@@ -99,6 +101,7 @@ void Viewer::showFailure(const std::exception_ptr& failure, const std::string& i
 
 void Viewer::update() {
   takeModel();
+  takePreview();
   takeFrame();
   takeKeys();
   for (const std::filesystem::path& file : window_.takeDrops())
@@ -150,7 +153,8 @@ void Viewer::reload() {
 }
 
 bool Viewer::isBusy() const {
-  return loader_.isLoading() || pendingPick_ || picture_.progress() < 1;
+  return loader_.isLoading() || pendingPick_ || picture_.progress() < 1 ||
+         (worker_ && worker_->isBusy());
 }
 
 // === Keys
@@ -211,6 +215,9 @@ void Viewer::press(unsigned character) {
     case 'c':
       isClipped_ = !isClipped_;
       break;
+    case 'e':
+      togglePatchEditor();
+      break;
     case 'p':
       asksScreenshot_ = true;
       break;
@@ -236,6 +243,7 @@ void Viewer::pressSpecial(const KeyPress& key) {
     fileList_.show(model_ && !model_->files.empty() ? model_->files.front() : ".");
   if (key.withControl && key.key == GLFW_KEY_C) copyPicks();
   if (key.withControl && key.key == GLFW_KEY_Q) window_.close();
+  if (key.key == GLFW_KEY_BACKSPACE && editor_ && editor_->removeSelected()) requestPreview();
   if (key.key == GLFW_KEY_LEFT) camera_.orbit(-kTurnPerKey, 0);
   if (key.key == GLFW_KEY_RIGHT) camera_.orbit(kTurnPerKey, 0);
   if (key.key == GLFW_KEY_UP) camera_.orbit(0, kTurnPerKey);
@@ -264,16 +272,29 @@ void Viewer::useMouse(int width, int height) {
                    height);
     const bool isLeft = io.MouseClicked[0], isOther = io.MouseClicked[1] || io.MouseClicked[2];
     if (drag_ == Drag::None && (isLeft || isOther)) {
-      drag_ = isOther || io.KeyShift ? Drag::Pan : Drag::Orbit;
+      if (isOther || io.KeyShift)
+        drag_ = Drag::Pan;
+      else
+        drag_ = editor_ && editor_->press(place, camera_.camera(width, height)) ? Drag::Patch
+                                                                                : Drag::Orbit;
+      if (drag_ == Drag::Patch) requestPreview();
       dragStart_ = dragLast_ = place;
       dragDepth_ = depth;
       hasDragged_ = false;
     }
   }
   if (drag_ == Drag::None) return;
-  dragTo(place, width, height);
+  if (drag_ == Drag::Patch) {
+    if (editor_ && editor_->moveTo(place, camera_.camera(width, height))) requestPreview();
+  } else {
+    dragTo(place, width, height);
+  }
   if (io.MouseDown[0] || io.MouseDown[1] || io.MouseDown[2]) return;
-  if (!hasDragged_ && drag_ == Drag::Orbit) pickAt(place, false);
+  if (!hasDragged_ && drag_ == Drag::Orbit && !editor_) pickAt(place, false);
+  if (drag_ == Drag::Patch && editor_) {
+    editor_->release();
+    requestPreview();
+  }
   drag_ = Drag::None;
 }
 
@@ -337,7 +358,7 @@ void Viewer::requestPicture(int width, int height) {
   pictureWidth_ = width;
   pictureHeight_ = height;
   if (!model_) return;
-  View view{model_, camera_.camera(width, height), std::nullopt, style_};
+  View view{shownModel(), camera_.camera(width, height), std::nullopt, style_};
   if (isClipped_ && model_->canCut()) view.clip = clip_;
   picture_.request(view, display_);
 }
@@ -377,11 +398,13 @@ void Viewer::writeInterfaceShot() {
 
 void Viewer::drawInterface(int width, int height) {
   useMouse(width, height);
+  drawPatchLines(width, height);
   drawMarks(width, height);
   drawPanel();
   drawStatus();
   drawScreenshotDialog();
   drawKeysDialog();
+  drawResultDialog();
   if (const auto chosen = fileList_.draw(isEscaped_))
     open(filesWith(model_ ? model_->files : std::vector<std::filesystem::path>{}, *chosen));
   isEntered_ = isEscaped_ = false;

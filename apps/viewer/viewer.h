@@ -10,11 +10,13 @@
 #include <vector>
 
 #include "apps/viewer/interaction/orbit_camera.h"
+#include "apps/viewer/interaction/patch_editor.h"
 #include "apps/viewer/interaction/pick.h"
 #include "apps/viewer/interaction/progressive_picture.h"
 #include "apps/viewer/model/file_list.h"
 #include "apps/viewer/model/file_watch.h"
 #include "apps/viewer/model/loader.h"
+#include "apps/viewer/model/patch_preview.h"
 #include "apps/viewer/viewer_arguments.h"
 #include "apps/viewer/window.h"
 
@@ -58,11 +60,23 @@ class Viewer {
   void takeKeys();
   void press(unsigned character);
   void pressSpecial(const KeyPress& press);
+  [[nodiscard]] std::shared_ptr<const Model> shownModel() const;
   void watchFiles();
   void reload();
 
   void useMouse(int width, int height);
   void dragTo(const Imath::V2d& place, int width, int height);
+  // === Making a patch, viewer_patch.cpp
+  void togglePatchEditor();
+  void restartPatchEditor();
+  void requestPreview();
+  void takePreview();
+  void copyPatch(bool isChain);
+  void saveResult();
+  void drawPatchEditorPart();
+  void drawPatchLines(int width, int height);
+  void drawResultDialog();
+
   void pickAt(const Imath::V2d& place, bool isForTarget);
   void finishPick();
   void copyPicks();
@@ -101,7 +115,7 @@ class Viewer {
   std::shared_ptr<const Frame> frame_;  // frame that the window shows
   int pictureWidth_ = 1, pictureHeight_ = 1;
 
-  enum class Drag { None, Orbit, Pan };
+  enum class Drag { None, Orbit, Pan, Patch };
   Drag drag_ = Drag::None;
   Imath::V2d dragStart_, dragLast_;
   double dragDepth_ = 1;
@@ -109,6 +123,13 @@ class Viewer {
   std::optional<std::array<int, 2>> pendingPick_;
   bool isPickForTarget_ = false;
   std::vector<Picked> picks_;
+
+  // The patch that the user makes; both null outside the mode in which a patch is made.
+  std::unique_ptr<PatchEditor> editor_;
+  std::unique_ptr<PatchWorker> worker_;
+  std::shared_ptr<const PatchPreview> preview_;
+  bool asksResult_ = false;
+  std::array<char, 512> resultName_{};
 
   // Enter or Escape was pressed since the last frame. ImGui misses keys that are released within
   // one frame.

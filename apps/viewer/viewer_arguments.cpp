@@ -41,6 +41,7 @@ Options for scripts, without an open window (a display is required, for example 
   --screenshot FILE   writes the complete picture, .png or .exr, and exits
   --interface         the screenshot shows the entire window
   --pick X,Y          prints the surface point at a pixel as JSON, and exits
+  --play FILE         plays simulated mouse and keyboard input first; docs/viewer.md lists the commands
 
 Left button: turn; middle or right: move; wheel: zoom; click: pick a point. docs/viewer.md lists the keys.
 )";
@@ -143,6 +144,7 @@ const std::map<std::string, Setter>& setters() {
        [](Arguments& to, const std::string& text) { to.renderer = rendererNamed(text); }},
       {"--screenshot", [](Arguments& to, const std::string& text) { to.screenshot = text; }},
       {"--pick", [](Arguments& to, const std::string& text) { to.pick = parsePixel(text); }},
+      {"--play", [](Arguments& to, const std::string& text) { to.play = text; }},
   };
   return all;
 }
@@ -174,7 +176,8 @@ void requireSense(const Arguments& arguments) {
         "levelsmith-view: --interface requires a screenshot; add --screenshot "
         "FILE");
   if (arguments.isScript() && arguments.files.empty())
-    throw UsageError("levelsmith-view: --screenshot and --pick need a file to show; give its name");
+    throw UsageError(
+        "levelsmith-view: --screenshot, --pick and --play need a file to show; give its name");
   if (arguments.to && !arguments.from)
     throw UsageError("levelsmith-view: --to requires --from; add --from");
   if (arguments.verticalFov && !(*arguments.verticalFov < std::numbers::pi))

@@ -29,13 +29,14 @@ struct Arguments {
   long resolution = 256;  ///< voxels along the longest side of a mesh
   Renderer renderer = Renderer::Auto;
   std::optional<std::filesystem::path> screenshot = {};
-  bool isInterface = false;                     ///< the screenshot shows the entire window
-  std::optional<std::array<int, 2>> pick = {};  ///< x and y of the pixel to pick
+  bool isInterface = false;                        ///< the screenshot shows the entire window
+  std::optional<std::array<int, 2>> pick = {};     ///< x and y of the pixel to pick
+  std::optional<std::filesystem::path> play = {};  ///< script of simulated input
   bool asksHelp = false, asksVersion = false;
 
-  /// True when the viewer runs without an open window: to write a screenshot or to print a picked
-  /// point.
-  [[nodiscard]] bool isScript() const { return screenshot || pick; }
+  /// True when the viewer runs without an open window: to write a screenshot, to print a picked
+  /// point, or to play simulated input.
+  [[nodiscard]] bool isScript() const { return screenshot || pick || play; }
 };
 
 /// Parses the command line.

@@ -41,6 +41,7 @@ void Viewer::drawPanel() {
   drawLayerPart();
   drawClipPart();
   drawPatchPart();
+  drawPatchEditorPart();
   drawPointPart();
   ImGui::PopItemWidth();
   ImGui::End();
@@ -223,7 +224,7 @@ void Viewer::drawKeysDialog() {
   if (asksKeys_) ImGui::OpenPopup(kTitle);
   asksKeys_ = false;
   if (!ImGui::BeginPopupModal(kTitle, nullptr, ImGuiWindowFlags_AlwaysAutoResize)) return;
-  constexpr std::array<std::array<const char*, 2>, 14> kKeys = {{
+  constexpr std::array<std::array<const char*, 2>, 16> kKeys = {{
       {"left button", "turn; with shift: move"},
       {"middle, right", "move"},
       {"wheel", "zoom in and out at the pointer"},
@@ -235,6 +236,8 @@ void Viewer::drawKeysDialog() {
       {"t", "turn about the point under the pointer"},
       {"l, L", "next layer, previous layer"},
       {"c", "clip plane"},
+      {"e", "make a patch: press on the surface, drag corners and sides"},
+      {"backspace", "remove the point of the patch that was moved last"},
       {"p", "write a picture"},
       {"r", "read the files again"},
       {"Ctrl+O, C, Q", "open a file, copy all points, quit"},

@@ -1,11 +1,18 @@
 #include "apps/viewer/viewer_script.h"
 
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
 #include <fmt/core.h>
 
+#include <array>
+#include <cctype>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <utility>
+#include <vector>
 
+#include "apps/viewer/interaction/input_script.h"
 #include "apps/viewer/interaction/pick.h"
 #include "apps/viewer/screenshot.h"
 #include "apps/viewer/viewer.h"
@@ -22,6 +29,96 @@ void printLine(const std::string& line) {
                                         std::strerror(errno)));
 }
 
+/// Returns a picture of the window. It draws several frames, because ImGui computes the layout in
+/// one frame and uses it in the next.
+Canvas windowShot(Window& window, Viewer& viewer, int width, int height) {
+  constexpr int kFrames = 3;
+  Canvas shot;
+  viewer.update();
+  for (int i = 0; i < kFrames; ++i)
+    shot = window.drawInMemory(width, height, [&] { viewer.drawInterface(width, height); });
+  return shot;
+}
+
+/// Converts the name of a key in a script. @throws levelset::UsageError for an unknown name
+KeyPress keyNamed(const std::string& name) {
+  if (name.size() == 1) return {.character = static_cast<unsigned char>(name[0])};
+  if (name.size() == 6 && name.starts_with("ctrl+"))
+    return {.key = std::toupper(static_cast<unsigned char>(name[5])), .withControl = true};
+  constexpr std::array<std::pair<const char*, int>, 7> kNames = {{{"backspace", GLFW_KEY_BACKSPACE},
+                                                                  {"escape", GLFW_KEY_ESCAPE},
+                                                                  {"enter", GLFW_KEY_ENTER},
+                                                                  {"left", GLFW_KEY_LEFT},
+                                                                  {"right", GLFW_KEY_RIGHT},
+                                                                  {"up", GLFW_KEY_UP},
+                                                                  {"down", GLFW_KEY_DOWN}}};
+  for (const auto& [known, key] : kNames)
+    if (name == known) return {.key = key};
+  throw levelset::UsageError(
+      fmt::format("levelsmith-view: --play: the key '{}' is unknown; give a character, backspace, "
+                  "escape, enter, left, right, up, down, or ctrl+ and a letter",
+                  name));
+}
+
+/// Plays simulated input in a window in memory. Each step takes one frame.
+class Player {
+ public:
+  Player(Window& window, Viewer& viewer, int width, int height)
+      : window_(window), viewer_(viewer), width_(width), height_(height) {}
+
+  void play(const std::vector<InputStep>& steps) {
+    for (const InputStep& step : steps) take(step);
+    wait();
+  }
+
+ private:
+  void take(const InputStep& step) {
+    switch (step.kind) {
+      case InputStep::Kind::Move:
+        mouse_.x = static_cast<float>(step.place.x);
+        mouse_.y = static_cast<float>(step.place.y);
+        break;
+      case InputStep::Kind::Press:
+      case InputStep::Kind::Release:
+        mouse_.isDown[static_cast<std::size_t>(step.button)] = step.kind == InputStep::Kind::Press;
+        break;
+      case InputStep::Kind::Key:
+        window_.simulateKey(keyNamed(step.text));
+        break;
+      case InputStep::Kind::Wait:
+        wait();
+        break;
+      case InputStep::Kind::Picture:
+        render::writePng(step.text, width_, height_,
+                         windowShot(window_, viewer_, width_, height_).colours);
+        break;
+      case InputStep::Kind::Copied:
+        printLine(window_.clipboard());
+        break;
+    }
+    window_.simulateMouse(mouse_);
+    drawFrame();
+  }
+
+  void drawFrame() {
+    viewer_.update();
+    (void)window_.drawInMemory(width_, height_, [&] { viewer_.drawInterface(width_, height_); });
+    viewer_.requestPicture(width_, height_);
+  }
+
+  void wait() {
+    do {
+      window_.wait(0.02);
+      drawFrame();
+    } while (viewer_.isBusy());
+  }
+
+  Window& window_;
+  Viewer& viewer_;
+  int width_, height_;
+  Window::Mouse mouse_;
+};
+
 /// Waits until the picture is complete. @param isForPick  true: a picture at full resolution
 /// suffices, without light and shadows
 std::shared_ptr<const Frame> finishedFrame(Window& window, Viewer& viewer, int width, int height,
@@ -36,23 +133,14 @@ std::shared_ptr<const Frame> finishedFrame(Window& window, Viewer& viewer, int w
   }
 }
 
-/// Returns a picture of the window. It draws several frames, because ImGui computes the layout in
-/// one frame and uses it in the next.
-Canvas windowShot(Window& window, Viewer& viewer, int width, int height) {
-  constexpr int kFrames = 3;
-  Canvas shot;
-  viewer.update();
-  for (int i = 0; i < kFrames; ++i)
-    shot = window.drawInMemory(width, height, [&] { viewer.drawInterface(width, height); });
-  return shot;
-}
-
 }  // namespace
 
 void runScript(const Arguments& arguments) {
   if (arguments.screenshot)
     levelset::FileTarget(
         *arguments.screenshot);  // throws before any work if the file cannot be written
+  std::vector<InputStep> steps;
+  if (arguments.play) steps = readInputScript(*arguments.play);
   const auto model = std::make_shared<const Model>(
       openModel(arguments.files, {.resolution = arguments.resolution}));
   if (arguments.clip && !model->canCut())
@@ -70,6 +158,8 @@ void runScript(const Arguments& arguments) {
   Viewer viewer(arguments, window);
   viewer.requestPicture(camera.width, camera.height);
   viewer.show(model, false);
+  if (arguments.play) Player(window, viewer, width, height).play(steps);
+  if (!arguments.screenshot && !arguments.pick) return;
   const std::shared_ptr<const Frame> frame =
       finishedFrame(window, viewer, width, height, !arguments.screenshot);
   if (arguments.pick) {

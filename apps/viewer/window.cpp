@@ -204,6 +204,10 @@ void Window::drawFrame(int width, int height, bool isInMemory,
     io.DisplaySize = {static_cast<float>(width), static_cast<float>(height)};
     io.DisplayFramebufferScale = {1, 1};
   }
+  if (simulated_) {
+    io.MousePos = {simulated_->x, simulated_->y};
+    std::copy(simulated_->isDown.begin(), simulated_->isDown.end(), io.MouseDown);
+  }
   ImGui::NewFrame();
   ImDrawList& behind = *ImGui::GetBackgroundDrawList();
   drawBackground(behind, io.DisplaySize.x, io.DisplaySize.y);
@@ -262,6 +266,11 @@ std::vector<std::filesystem::path> Window::takeDrops() {
 
 void Window::setClipboard(const std::string& text) {
   glfwSetClipboardString(window_, text.c_str());
+}
+
+std::string Window::clipboard() const {
+  const char* text = glfwGetClipboardString(window_);
+  return text ? text : "";
 }
 
 }  // namespace viewer

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -56,6 +58,17 @@ class Window {
   [[nodiscard]] std::vector<std::filesystem::path> takeDrops();
 
   void setClipboard(const std::string& text);
+  [[nodiscard]] std::string clipboard() const;
+
+  /// State of a mouse that a script moves.
+  struct Mouse {
+    float x = 0, y = 0;               ///< position, pixels
+    std::array<bool, 3> isDown = {};  ///< left, right and middle button
+  };
+  /// From now on the interface sees this mouse instead of the user's.
+  void simulateMouse(const Mouse& mouse) { simulated_ = mouse; }
+  /// Adds a key press to those that takeKeys() returns.
+  void simulateKey(const KeyPress& key) { keys_.push_back(key); }
 
  private:
   void drawFrame(int width, int height, bool isInMemory, const std::function<void()>& interface);
@@ -63,6 +76,7 @@ class Window {
   GLFWwindow* window_ = nullptr;
   unsigned texture_ = 0;
   bool hasPicture_ = false;
+  std::optional<Mouse> simulated_;
   std::vector<KeyPress> keys_;
   std::vector<std::filesystem::path> drops_;
 };

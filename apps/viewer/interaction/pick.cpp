@@ -75,13 +75,6 @@ std::optional<double> depthSeen(const Frame& frame, double x, double y) {
   return std::isfinite(depth) ? std::optional(depth) : std::nullopt;
 }
 
-std::string pointText(const V3d& point) {
-  // Eight significant digits, about the precision of the single-precision positions. Negative zero
-  // becomes zero.
-  const auto digits = [](double x) { return fmt::format("{:.8g}", x == 0 ? 0 : x); };
-  return fmt::format("{},{},{}", digits(point.x), digits(point.y), digits(point.z));
-}
-
 std::string pickedJson(const std::optional<Picked>& picked) {
   if (!picked) return "null";
   const auto list = [](const V3d& v) {  // the sum turns negative zeros to zeros

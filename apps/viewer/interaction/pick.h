@@ -6,6 +6,7 @@
 #include <string>
 
 #include "apps/viewer/interaction/progressive_picture.h"
+#include "apps/viewer/model/point_text.h"
 
 namespace viewer {
 
@@ -23,9 +24,6 @@ struct Picked {
 /// Depth of the surface at the picture position (x, y) in window pixels, along the view axis, world
 /// units. Nothing if there is no surface. The frame may have any pixel size.
 [[nodiscard]] std::optional<double> depthSeen(const Frame& frame, double x, double y);
-
-/// Formats a point as "x,y,z", the form of the command line.
-[[nodiscard]] std::string pointText(const Imath::V3d& point);
 
 /// Formats a picked point as a JSON object {"position": […], "normal": […], "phi": …, "solid":
 /// "…"}; returns "null" without a point.
