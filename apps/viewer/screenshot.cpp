@@ -31,6 +31,7 @@ void writeScreenshot(const std::filesystem::path& file, const Frame& frame) {
   render::Image image = *frame.image;
   render::RenderOptions options;
   options.style.style = frame.view.style;
+  options.thickness = frame.view.hasThickness;
   image.attributes = render::sceneAttributes(scene, options);
   render::addViewAttributes(image, scene, frame.view.model->extent());
   render::writeImage(file, image);

@@ -42,7 +42,8 @@ Viewer::Viewer(const Arguments& arguments, Window& window)
       clip_(arguments.clip.value_or(ClipPlane{})),
       isClipped_(arguments.clip.has_value()),
       display_(arguments.display),
-      style_(arguments.style) {
+      style_(arguments.style),
+      opacity_(arguments.opacity) {
   std::snprintf(screenshotName_.data(), screenshotName_.size(), "view.png");
   std::snprintf(resultName_.data(), resultName_.size(), "textured.vdb");
   showMessage("Drop a file here, or press Ctrl+O to open one.");
@@ -153,8 +154,7 @@ void Viewer::reload() {
 }
 
 bool Viewer::isBusy() const {
-  return loader_.isLoading() || pendingPick_ || picture_.progress() < 1 ||
-         (worker_ && worker_->isBusy());
+  return loader_.isLoading() || pendingPick_ || picture_.isBusy() || (worker_ && worker_->isBusy());
 }
 
 // === Keys
@@ -241,7 +241,9 @@ void Viewer::press(unsigned character) {
 void Viewer::pressSpecial(const KeyPress& key) {
   if (key.withControl && key.key == GLFW_KEY_O)
     fileList_.show(model_ && !model_->files.empty() ? model_->files.front() : ".");
-  if (key.withControl && key.key == GLFW_KEY_C) copyPicks();
+  if (key.withControl && key.key == GLFW_KEY_C) editor_ ? copyPatch(false) : copyPicks();
+  if (key.withControl && key.key == GLFW_KEY_K) copyPatch(true);
+  if (key.withControl && key.key == GLFW_KEY_S && editor_) asksResult_ = true;
   if (key.withControl && key.key == GLFW_KEY_Q) window_.close();
   if (key.key == GLFW_KEY_BACKSPACE && editor_ && editor_->removeSelected()) requestPreview();
   if (key.key == GLFW_KEY_LEFT) camera_.orbit(-kTurnPerKey, 0);
@@ -358,7 +360,9 @@ void Viewer::requestPicture(int width, int height) {
   pictureWidth_ = width;
   pictureHeight_ = height;
   if (!model_) return;
-  View view{shownModel(), camera_.camera(width, height), std::nullopt, style_};
+  View view{
+      shownModel(), camera_.camera(width, height),     std::nullopt, style_, arguments_.matcap,
+      opacity_,     display_.layer == Layer::Thickness};
   if (isClipped_ && model_->canCut()) view.clip = clip_;
   picture_.request(view, display_);
 }

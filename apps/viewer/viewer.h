@@ -112,6 +112,7 @@ class Viewer {
   bool isClipped_ = false;
   Display display_;
   render::Style style_;
+  double opacity_ = 1;                  // factor of the opacities of all solids and meshes
   std::shared_ptr<const Frame> frame_;  // frame that the window shows
   int pictureWidth_ = 1, pictureHeight_ = 1;
 

@@ -28,8 +28,10 @@ Shows a level set (.vdb), a mesh (.ply .obj .stl .off, also .gz) or a scene (.js
   --up X,Y,Z          up direction                                      [0,1,0]
   --fov DEGREES       vertical field of view                            [35]
   --ortho L           orthographic projection; height of the view, world units
-  --layer NAME        displayed layer: colour, normal, depth, position, mean, gauss, k1, k2 or id
-  --style NAME        shading style: lit, tone, mean, gauss, principal, accessibility or ink
+  --layer NAME        displayed layer: colour, normal, depth, position, mean, gauss, k1, k2, id or thickness
+  --style NAME        shading style: lit, tone, mean, gauss, principal, accessibility, ink or matcap
+  --matcap FILE       with --style matcap: a PNG of a shaded ball       [a ball of the viewer]
+  --opacity N         opacity of the surfaces, above 0 and at most 1    [1]
   --range N           curvature at the ends of the colours, times the model's diagonal [40]
   --clip PLANE        clip plane that shows phi: x=0.1, y=0.1, z=0.1, or view=0.1 (in front of the centre)
   --patches LINES     lines of the patches: none, outline, base or all  [all]
@@ -77,8 +79,6 @@ double parsePositive(const std::string& text, const std::string& option) {
 render::Style styleNamed(const std::string& name) {
   std::string all;
   for (const render::Style style : render::kStyles) {
-    if (style == render::Style::Matcap)
-      continue;  // the style needs a picture of a ball, which has no option
     if (render::styleName(style) == name) return style;
     all += (all.empty() ? "" : ", ") + std::string(render::styleName(style));
   }
@@ -124,6 +124,18 @@ const std::map<std::string, Setter>& setters() {
       {"--layer",
        [](Arguments& to, const std::string& text) { to.display.layer = layerNamed(text); }},
       {"--style", [](Arguments& to, const std::string& text) { to.style = styleNamed(text); }},
+      {"--matcap",
+       [](Arguments& to, const std::string& text) {
+         to.matcap = std::make_shared<const render::ColourImage>(render::readColourPng(text));
+       }},
+      {"--opacity",
+       [](Arguments& to, const std::string& text) {
+         to.opacity = parsePositive(text, "--opacity");
+         if (to.opacity > 1)
+           throw UsageError(fmt::format(
+               "levelsmith-view: --opacity {} is out of range; give more than 0 and at most 1",
+               text));
+       }},
       {"--range",
        [](Arguments& to, const std::string& text) {
          to.display.curvatureRange = parsePositive(text, "--range");
@@ -178,6 +190,9 @@ void requireSense(const Arguments& arguments) {
   if (arguments.isScript() && arguments.files.empty())
     throw UsageError(
         "levelsmith-view: --screenshot, --pick and --play need a file to show; give its name");
+  if (arguments.matcap && arguments.style != render::Style::Matcap)
+    throw UsageError(
+        "levelsmith-view: --matcap applies only to --style matcap; add --style matcap");
   if (arguments.to && !arguments.from)
     throw UsageError("levelsmith-view: --to requires --from; add --from");
   if (arguments.verticalFov && !(*arguments.verticalFov < std::numbers::pi))

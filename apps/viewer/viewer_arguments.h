@@ -4,6 +4,7 @@
 
 #include <array>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,6 +27,8 @@ struct Arguments {
   std::optional<ClipPlane> clip = {};
   Display display = {};
   render::Style style = render::Style::Lit;
+  std::shared_ptr<const render::ColourImage> matcap = {};  ///< null: the viewer's own
+  double opacity = 1;     ///< factor of the opacities of all solids and meshes
   long resolution = 256;  ///< voxels along the longest side of a mesh
   Renderer renderer = Renderer::Auto;
   std::optional<std::filesystem::path> screenshot = {};

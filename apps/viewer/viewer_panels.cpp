@@ -97,11 +97,13 @@ void Viewer::drawLayerPart() {
   }
   if (display_.layer == Layer::Colour && ImGui::BeginCombo("style", render::styleName(style_))) {
     for (const render::Style style : render::kStyles)
-      if (style != render::Style::Matcap &&
-          ImGui::Selectable(render::styleName(style), style == style_))
-        style_ = style;
+      if (ImGui::Selectable(render::styleName(style), style == style_)) style_ = style;
     ImGui::EndCombo();
   }
+  constexpr double kFaintest = 0.05;
+  if (display_.layer == Layer::Colour && model_ && !model_->scene.isBlended() &&
+      slideDouble("opacity", opacity_, kFaintest, 1, "%.2f"))
+    opacity_ = std::clamp(opacity_, kFaintest, 1.0);
   if (display_.layer < Layer::MeanCurvature || display_.layer > Layer::K2) return;
   double range = display_.curvatureRange;
   constexpr double kLow = 1, kHigh = 1000;
@@ -224,7 +226,7 @@ void Viewer::drawKeysDialog() {
   if (asksKeys_) ImGui::OpenPopup(kTitle);
   asksKeys_ = false;
   if (!ImGui::BeginPopupModal(kTitle, nullptr, ImGuiWindowFlags_AlwaysAutoResize)) return;
-  constexpr std::array<std::array<const char*, 2>, 16> kKeys = {{
+  constexpr std::array<std::array<const char*, 2>, 17> kKeys = {{
       {"left button", "turn; with shift: move"},
       {"middle, right", "move"},
       {"wheel", "zoom in and out at the pointer"},
@@ -241,6 +243,7 @@ void Viewer::drawKeysDialog() {
       {"p", "write a picture"},
       {"r", "read the files again"},
       {"Ctrl+O, C, Q", "open a file, copy all points, quit"},
+      {"Ctrl+C, K, S", "of a patch: copy the action, copy the chain, write it"},
   }};
   for (const auto& [key, what] : kKeys) {
     textOf(key);

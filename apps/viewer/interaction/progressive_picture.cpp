@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 
+#include "apps/viewer/model/matcap_ball.h"
 #include "levelset/memory_limit.h"
 #include "render/cpu/cpu_tracer.h"
 #include "render/gpu/gl_context.h"
@@ -52,6 +53,7 @@ struct ProgressivePicture::Worker {
   std::shared_ptr<const Model>
       preparedModel;  // model from which the kernel's tables in `surfaces` were built
   std::optional<ClipPlane::Across> preparedCut;
+  double preparedOpacity = 1;
   std::unique_ptr<ClippedScene> cut;
   std::unique_ptr<render::KernelScene> surfaces;
   std::unique_ptr<render::GlContext> context;
@@ -70,6 +72,11 @@ struct ProgressivePicture::Worker {
   [[nodiscard]] render::Scene sceneFor(int edge) {
     render::Scene scene = isCut() ? cut->at(plane()) : view.model->scene;
     scene.camera = shrunk(view.camera, edge);
+    if (view.opacity == 1 || scene.isBlended()) return scene;
+    // The box of the clip plane, which follows the model's solids, stays opaque.
+    for (std::size_t i = 0; i < view.model->scene.solids.size(); ++i)
+      scene.solids[i].opacity *= view.opacity;
+    for (render::MeshPart& part : scene.meshes) part.opacity *= view.opacity;
     return scene;
   }
 
@@ -110,11 +117,13 @@ struct ProgressivePicture::Worker {
   }
 
   /// Builds the kernel's tables, unless the tables of the previous picture were built for the same
-  /// model and the same axis of the clip plane.
+  /// model, the same axis of the clip plane and the same opacity.
   void prepare() {
     const std::optional<ClipPlane::Across> newCut =
         isCut() ? std::optional(view.clip->across) : std::nullopt;
-    if (surfaces && preparedModel == view.model && preparedCut == newCut) return;
+    if (surfaces && preparedModel == view.model && preparedCut == newCut &&
+        preparedOpacity == view.opacity)
+      return;
     tracer = nullptr;  // the tracer references the tables in `surfaces`
     surfaces = nullptr;
     cut = nullptr;
@@ -126,6 +135,7 @@ struct ProgressivePicture::Worker {
         scene, levelset::memoryLimit(levelset::kNoMemoryLimit));
     preparedModel = view.model;
     preparedCut = newCut;
+    preparedOpacity = view.opacity;
     findTracer();
   }
 
@@ -138,6 +148,8 @@ struct ProgressivePicture::Worker {
     options.ambientSamples = how.ambientSamples;
     options.shadowSamples = how.shadowSamples;
     options.style.style = view.style;
+    options.style.matcap = view.matcap ? view.matcap : matcapBall();
+    options.thickness = view.hasThickness;
     options.maxBytes = levelset::memoryLimit(levelset::kNoMemoryLimit);
     render::requirePicture(scene, options);
     surfaces->updateView(scene);
@@ -213,6 +225,12 @@ std::exception_ptr ProgressivePicture::failure() const {
   return failure_;
 }
 
+bool ProgressivePicture::isBusy() const {
+  const std::scoped_lock lock(mutex_);
+  if (!lastRequest_ || failure_) return false;
+  return pending_ || !frame_ || !frame_->isComplete || !isSame(frame_->view, lastRequest_->view);
+}
+
 std::string ProgressivePicture::rendererName() const {
   const std::scoped_lock lock(mutex_);
   return rendererName_;
@@ -272,7 +290,8 @@ bool isSame(const render::Camera& a, const render::Camera& b) {
 }
 
 bool isSame(const View& a, const View& b) {
-  return a.model == b.model && a.clip == b.clip && a.style == b.style && isSame(a.camera, b.camera);
+  return a.model == b.model && a.clip == b.clip && a.style == b.style && a.matcap == b.matcap &&
+         a.opacity == b.opacity && a.hasThickness == b.hasThickness && isSame(a.camera, b.camera);
 }
 
 }  // namespace viewer

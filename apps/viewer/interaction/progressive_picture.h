@@ -27,12 +27,17 @@ enum class Renderer {
   Gpu
 };
 
-/// Model, camera, clip plane and style of a picture. A change of them needs new rays.
+/// Model, camera, clip plane and appearance of a picture. A change of them needs new rays.
 struct View {
   std::shared_ptr<const Model> model;
   render::Camera camera;
   std::optional<ClipPlane> clip = {};
-  render::Style style = render::Style::Lit;  ///< shading style; Matcap is not supported
+  render::Style style = render::Style::Lit;
+  /// Picture of a shaded ball for the style matcap; null: matcapBall().
+  std::shared_ptr<const render::ColourImage> matcap = {};
+  /// Factor of the opacities of all solids and meshes, (0, 1]. Without effect on blended scenes.
+  double opacity = 1;
+  bool hasThickness = false;  ///< the picture has the layer thickness
 };
 
 /// Display options. A change of them recolours the present picture, without new rays.
@@ -75,6 +80,8 @@ class ProgressivePicture {
   [[nodiscard]] std::exception_ptr failure() const;
   /// Progress of the pass of refinement that is being drawn, from 0 to 1; 1 when nothing is drawn.
   [[nodiscard]] double progress() const { return progress_; }
+  /// True while the picture of the newest request is not complete, unless it failed.
+  [[nodiscard]] bool isBusy() const;
   /// Name of the back end in use: "processor", or the description of the OpenGL device.
   [[nodiscard]] std::string rendererName() const;
 

@@ -14,7 +14,7 @@ namespace viewer {
 namespace {
 
 constexpr std::array<const char*, kLayers.size()> kLayerNames = {
-    "colour", "normal", "depth", "position", "mean", "gauss", "k1", "k2", "id"};
+    "colour", "normal", "depth", "position", "mean", "gauss", "k1", "k2", "id", "thickness"};
 
 std::uint8_t displayByte(double unit) {
   return static_cast<std::uint8_t>(std::lround(255 * std::clamp(unit, 0.0, 1.0)));
@@ -93,6 +93,25 @@ std::vector<std::uint8_t> positionColours(const render::Image& image) {
   });
 }
 
+std::vector<std::uint8_t> thicknessColours(const render::Image& image) {
+  constexpr std::array<DisplayColour, 4> kColours = {
+      {{0.99, 0.96, 0.75}, {0.97, 0.62, 0.30}, {0.72, 0.21, 0.40}, {0.18, 0.07, 0.30}}};
+  const std::vector<float>& thickness = image.channels.at("thickness");
+  double most = 0;
+  for (std::size_t i = 0; i < image.pixelCount(); ++i)
+    if (isHit(image, i)) most = std::max(most, valueAt(thickness, i));
+  return painted(image, [&](std::size_t i) {
+    const double place =
+        (kColours.size() - 1) * (most > 0 ? std::clamp(valueAt(thickness, i) / most, 0.0, 1.0) : 0);
+    const auto cell = std::min(static_cast<std::size_t>(place), kColours.size() - 2);
+    const double share = place - static_cast<double>(cell);
+    DisplayColour colour;
+    for (std::size_t c = 0; c < 3; ++c)
+      colour[c] = std::lerp(kColours[cell][c], kColours[cell + 1][c], share);
+    return colour;
+  });
+}
+
 std::vector<std::uint8_t> curvatureColours(const render::Image& image, const char* name,
                                            double scale) {
   const std::vector<float>& k = image.channels.at(fmt::format("curvature.{}", name));
@@ -162,6 +181,8 @@ std::vector<std::uint8_t> layerColours(const render::Image& image, Layer layer, 
       const std::vector<std::uint32_t>& ids = image.ids.at("id");
       return painted(image, [&](std::size_t i) { return idColour(ids[i]); });
     }
+    case Layer::Thickness:
+      return thicknessColours(image);
     case Layer::Colour:
       break;
   }

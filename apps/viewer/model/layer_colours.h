@@ -10,11 +10,22 @@
 namespace viewer {
 
 /// Layer of the picture that the viewer displays.
-enum class Layer { Colour, Normal, Depth, Position, MeanCurvature, GaussCurvature, K1, K2, Id };
+enum class Layer {
+  Colour,
+  Normal,
+  Depth,
+  Position,
+  MeanCurvature,
+  GaussCurvature,
+  K1,
+  K2,
+  Id,
+  Thickness  ///< length of the view ray inside the solids
+};
 
-inline constexpr std::array<Layer, 9> kLayers = {
+inline constexpr std::array<Layer, 10> kLayers = {
     Layer::Colour,         Layer::Normal, Layer::Depth, Layer::Position, Layer::MeanCurvature,
-    Layer::GaussCurvature, Layer::K1,     Layer::K2,    Layer::Id};
+    Layer::GaussCurvature, Layer::K1,     Layer::K2,    Layer::Id,       Layer::Thickness};
 
 /// Name of a layer in options and menus: "colour", "normal", …
 [[nodiscard]] const char* layerName(Layer layer);
@@ -39,9 +50,11 @@ using DisplayColour = std::array<double, 3>;
 /// picture.
 /// - Curvatures: the colour scale spans curvature × extent from −range to range (Gauss curvature ×
 /// extent² from −range² to range²).
+/// - Thickness: the sum of the lengths of all parts of the view ray that lie inside the solids,
+/// from pale yellow for 0 to dark violet for the largest of the picture.
 /// @param extent  diagonal of the bounding box of the surfaces, world units
 /// @param range  product of curvature and extent at the ends of the colour scale
-/// @pre the image has the layers that renderEmbree() returns
+/// @pre the image has the layers that renderEmbree() returns, and for Thickness the layer thickness
 [[nodiscard]] std::vector<std::uint8_t> layerColours(const render::Image& image, Layer layer,
                                                      double extent, double range = 40);
 
