@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
 
+#include "apps/viewer/interaction/point_splats.h"
 #include "apps/viewer/model/matcap_ball.h"
+#include "apps/viewer/model/surface_discs.h"
 #include "levelset/memory_limit.h"
 #include "render/cpu/cpu_tracer.h"
 #include "render/gpu/gl_context.h"
@@ -27,6 +30,11 @@ constexpr std::array<Pass, 6> kPasses = {Pass{8, 1, 0, 0}, {4, 1, 0, 0},  {2, 1,
 
 // Edges of a tile of the picture, pixels. A tile has enough rays for efficient tracing.
 constexpr int kCpuTileEdge = 16, kGpuTileEdge = 64;
+// Number of voxels from which on discs at the surface points are drawn before rays, edge of their
+// pixels, and number of the pass that follows them.
+constexpr std::size_t kManyVoxels = 10'000'000;
+constexpr int kSplatPixelSize = 2;
+constexpr std::size_t kPassAfterSplats = 3;
 // Depth behind the surface up to which patch lines count as in front of it, as a fraction of the
 // diagonal of the model's box.
 constexpr double kOnSurface = 4e-3;
@@ -59,6 +67,10 @@ struct ProgressivePicture::Worker {
   std::unique_ptr<render::GlContext> context;
   std::unique_ptr<render::KernelTracer> tracer;
   bool hasTriedGpu = false;
+
+  // Surface discs of the solids of discsModel; empty if its scene has too few voxels for discs.
+  std::shared_ptr<const Model> discsModel;
+  std::vector<SurfaceDiscs> discs;
   std::string name = "processor";
 
   explicit Worker(const ProgressivePicture& owner_) : owner(owner_) {}
@@ -87,6 +99,44 @@ struct ProgressivePicture::Worker {
       image = nullptr;
     }
     display = request.display;
+  }
+
+  /// True when the next picture is drawn as discs: of a new view on a large grid, in a layer that
+  /// discs have.
+  [[nodiscard]] bool wantsSplats() {
+    if (image || pass != 0 || isCut() || view.opacity != 1 || view.hasThickness ||
+        (display.layer >= Layer::MeanCurvature && display.layer <= Layer::K2))
+      return false;
+    if (discsModel != view.model) {
+      discsModel = view.model;
+      discs.clear();
+      const std::vector<render::Solid>& solids = view.model->scene.solids;
+      const std::size_t voxels = std::accumulate(
+          solids.begin(), solids.end(), std::size_t{0},
+          [](std::size_t sum, const auto& solid) { return sum + solid.band.activeVoxelCount(); });
+      if (voxels >= kManyVoxels && canSplat(view.model->scene))
+        for (const render::Solid& solid : solids) discs.push_back(surfaceDiscs(solid.band));
+    }
+    return !discs.empty();
+  }
+
+  /// Draws the picture as discs. @return the picture, or null when a newer request is pending
+  std::shared_ptr<const render::Image> splatted(const std::atomic<bool>& isStale) {
+    const render::Scene scene = sceneFor(kSplatPixelSize);
+    render::validate(scene.camera);
+    return drawSplats(discs, scene, optionsFor({kSplatPixelSize, 1, 0, 0}), isStale);
+  }
+
+  [[nodiscard]] render::RenderOptions optionsFor(const Pass& how) const {
+    render::RenderOptions options;
+    options.samples = how.samples;
+    options.ambientSamples = how.ambientSamples;
+    options.shadowSamples = how.shadowSamples;
+    options.style.style = view.style;
+    options.style.matcap = view.matcap ? view.matcap : matcapBall();
+    options.thickness = view.hasThickness;
+    options.maxBytes = levelset::memoryLimit(levelset::kNoMemoryLimit);
+    return options;
   }
 
   void findTracer() {
@@ -143,14 +193,7 @@ struct ProgressivePicture::Worker {
   std::shared_ptr<const render::Image> draw(const Pass& how, std::atomic<double>& progress,
                                             const std::atomic<bool>& isStale) {
     const render::Scene scene = sceneFor(how.pixelSize);
-    render::RenderOptions options;
-    options.samples = how.samples;
-    options.ambientSamples = how.ambientSamples;
-    options.shadowSamples = how.shadowSamples;
-    options.style.style = view.style;
-    options.style.matcap = view.matcap ? view.matcap : matcapBall();
-    options.thickness = view.hasThickness;
-    options.maxBytes = levelset::memoryLimit(levelset::kNoMemoryLimit);
+    const render::RenderOptions options = optionsFor(how);
     render::requirePicture(scene, options);
     surfaces->updateView(scene);
     auto drawn = std::make_shared<render::Image>(scene.camera.width, scene.camera.height);
@@ -256,6 +299,13 @@ void ProgressivePicture::run() {
     try {
       if (isRecoloured) {
         frame = worker.shown();
+      } else if (worker.wantsSplats()) {
+        if (auto drawn = worker.splatted(isStale_)) {
+          worker.image = std::move(drawn);
+          worker.pixelSize = kSplatPixelSize;
+          worker.pass = kPassAfterSplats;
+          frame = worker.shown();
+        }
       } else {
         worker.prepare();
         const Pass& how = kPasses[worker.pass];

@@ -6,7 +6,9 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -193,6 +195,112 @@ TEST_F(ViewerCommand, StaysOpenUntilItIsClosed) {
                                  "' ball.vdb --size 300x200; echo $?\n");
   EXPECT_EQ(seen.out, "130\n130\n") << seen.err;
   EXPECT_NE(seen.err.find("interrupted"), std::string::npos);
+}
+
+/// Lines of a text.
+std::vector<std::string> linesOf(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+TEST_F(ViewerCommand, MakesAPatchWithTheMouseAndWritesItsCommand) {
+  makeBall();
+  writeFile("patch.play",
+            "key e\n"
+            "drag 300,150 310,140   # in clockwise order\n"
+            "drag 400,150 390,140\n"
+            "drag 400,250 390,240\n"
+            "drag 300,250 310,240\n"
+            "wait\npicture textured.png\n"
+            "drag 390,140 400,135   # moves a corner\n"
+            "wait\nkey ctrl+c\ncopied\nkey ctrl+k\ncopied\n"
+            "key ctrl+s\nkey enter\n"
+            "key backspace\nwait\npicture three.png\n");
+  const Outcome seen = onDisplay(
+      "view ball.vdb --from 0,0,5 --to -0.45,0,0 --size 560x400 --renderer cpu --play patch.play");
+  ASSERT_EQ(seen.code, 0) << seen.err;
+  const std::vector<std::string> lines = linesOf(seen.out);
+  ASSERT_EQ(lines.size(), 2u) << seen.out;
+  EXPECT_EQ(lines[0].find("patch --corners \""), 0u) << lines[0];
+  EXPECT_NE(lines[1].find(lines[0]), std::string::npos) << lines[1];
+  EXPECT_NE(png("textured.png").bytes, png("three.png").bytes);
+
+  // The actions make the same bits as the viewer.
+  ASSERT_EQ(shell("mv textured.vdb viewer.vdb").code, 0);
+  ASSERT_EQ(lines[1].find("levelsmith "), 0u);
+  const Outcome made = levelsmith(lines[1].substr(std::string("levelsmith ").size()));
+  ASSERT_EQ(made.code, 0) << made.err;
+  const Outcome same = shell("cmp viewer.vdb textured.vdb");
+  EXPECT_EQ(same.code, 0) << same.out << same.err;
+}
+
+TEST_F(ViewerCommand, RefusesInputScriptsThatItDoesNotKnow) {
+  makeBall();
+  writeFile("bad.play", "wait\njump 1,2\n");
+  writeFile("key.play", "key nothing\n");
+  const Outcome seen = onDisplay(
+      "view ball.vdb --play bad.play; echo $?; view ball.vdb --play key.play; echo $?\n"
+      "view ball.vdb --play no.play; echo $?; view --play bad.play; echo $?\n"
+      "view ball.vdb --opacity 1.5 --pick 1,1; echo $?\n"
+      "view ball.vdb --matcap no.png --style matcap --pick 1,1; echo $?\n");
+  EXPECT_EQ(seen.out, "2\n2\n6\n2\n2\n6\n") << seen.err;
+  EXPECT_NE(seen.err.find("bad.play:2"), std::string::npos) << seen.err;
+}
+
+TEST_F(ViewerCommand, DrawsStylesAsTheCommandDoes) {
+  makeBall();
+  const std::string camera = "--from 0.5,1,5 --to 0,0,0 --fov 30 --size 100x80";
+  const std::string cpu = " --renderer cpu " + camera;
+  const Outcome drawn = levelsmith("read ball.vdb --as b ! render m.png --style lit" + cpu +
+                                   " ! render @b matcap.png --style matcap --matcap m.png" + cpu +
+                                   " ! scene @b --opacities 0.5 ! render half.png" + cpu);
+  ASSERT_EQ(drawn.code, 0) << drawn.err;
+  const Outcome seen = onDisplay("set -e; view ball.vdb " + cpu +
+                                 " --style matcap --matcap m.png --screenshot a.png\n"
+                                 "view ball.vdb " +
+                                 cpu +
+                                 " --opacity 0.5 --screenshot b.png\n"
+                                 "view ball.vdb " +
+                                 cpu + " --layer thickness --screenshot t.png");
+  ASSERT_EQ(seen.code, 0) << seen.err;
+  EXPECT_EQ(png("a.png").bytes, png("matcap.png").bytes);
+  EXPECT_EQ(png("b.png").bytes, png("half.png").bytes);
+  EXPECT_LT(brightness(png("t.png").middle()), brightness(png("t.png").at(50, 15)));
+}
+
+class SlowViewerCommand : public ViewerCommand {};
+
+/// Four corners dragged on the bunny give a textured bunny: no number is typed.
+TEST_F(SlowViewerCommand, TexturesTheBunny) {
+  const std::filesystem::path bunny =
+      std::filesystem::path(LEVELSMITH_DATA_DIR) / "models/bunny.obj";
+  if (!std::filesystem::exists(bunny))
+    GTEST_SKIP() << "no " << bunny << "; `./dev fetch` brings it";
+  writeFile("bunny.play",
+            "key e\n"
+            "drag 560,300 540,280\ndrag 540,420 545,440\n"
+            "drag 700,430 690,440\ndrag 690,300 690,285\n"
+            "wait\npicture corners.png\n"
+            "drag 615,270 615,255   # a point of a side\n"
+            "wait\nkey ctrl+c\ncopied\nkey ctrl+s\nkey enter\n");
+  const Outcome seen =
+      onDisplay("view '" + bunny.string() +
+                "' --resolution 128 --renderer cpu --size 960x600 --play bunny.play");
+  ASSERT_EQ(seen.code, 0) << seen.err;
+  EXPECT_NE(seen.out.find(" --side"), std::string::npos) << seen.out;
+  const Outcome measured = levelsmith("read '" + bunny.string() +
+                                      "' ! level-set --resolution 128 ! measure --json "
+                                      "! read textured.vdb ! measure --json");
+  ASSERT_EQ(measured.code, 0) << measured.err;
+  const std::vector<std::string> lines = linesOf(measured.out);
+  ASSERT_EQ(lines.size(), 2u) << measured.out;
+  const double before = Json::parse(lines[0])["volume"].get<double>(),
+               after = Json::parse(lines[1])["volume"].get<double>();
+  // The scales add FIGURE % to the volume.
+  EXPECT_GT(after, 1.01 * before);
+  EXPECT_LT(after, 1.06 * before);
 }
 
 }  // namespace viewer_command_test
