@@ -71,7 +71,7 @@ void Viewer::show(std::shared_ptr<const Model> model, bool keepView) {
         clip_.offset = model_->solidBounds.center()[static_cast<int>(clip_.across)];
     }
   }
-  restartPatchEditor();
+  restartPatchEditor(keepView);
   window_.setTitle(namesOf(model_->files) + " – Levelsmith");
   showMessage(fmt::format("{}: {}.", namesOf(model_->files), model_->description));
 }
@@ -154,7 +154,9 @@ void Viewer::reload() {
 }
 
 bool Viewer::isBusy() const {
-  return loader_.isLoading() || pendingPick_ || picture_.isBusy() || (worker_ && worker_->isBusy());
+  // The newest frame and preview must also have been taken.
+  return loader_.isLoading() || pendingPick_ || picture_.isBusy() || picture_.frame() != frame_ ||
+         (worker_ && (worker_->isBusy() || worker_->preview() != preview_));
 }
 
 // === Keys

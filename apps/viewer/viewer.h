@@ -68,7 +68,8 @@ class Viewer {
   void dragTo(const Imath::V2d& place, int width, int height);
   // === Making a patch, viewer_patch.cpp
   void togglePatchEditor();
-  void restartPatchEditor();
+  /// Adapts the patch to a new model. @param keepsDesign  false: the patch is put away
+  void restartPatchEditor(bool keepsDesign);
   void requestPreview();
   void takePreview();
   void copyPatch(bool isChain);

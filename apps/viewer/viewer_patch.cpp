@@ -31,13 +31,13 @@ void Viewer::togglePatchEditor() {
   showMessage("Press on the surface to place a corner, and drag it. Four corners make a patch.");
 }
 
-void Viewer::restartPatchEditor() {
+void Viewer::restartPatchEditor(bool keepsDesign) {
   if (!editor_) return;
   const PatchDesign design = editor_->design();
   editor_ = nullptr;
   worker_ = nullptr;
   preview_ = nullptr;
-  if (!whyNoPatch(*model_).empty()) return;
+  if (!keepsDesign || !whyNoPatch(*model_).empty()) return;
   editor_ = std::make_unique<PatchEditor>(model_, design);
   worker_ = std::make_unique<PatchWorker>(model_, Window::wake);
   requestPreview();
@@ -65,7 +65,10 @@ void Viewer::takePreview() {
 void Viewer::copyPatch(bool isChain) {
   if (!preview_) return;
   const std::string& text = isChain ? preview_->chainText : preview_->patchText;
-  if (text.empty()) return;
+  if (text.empty())
+    return showMessage(isChain ? "A chain needs four corners, a texture, and a model from a level "
+                                 "set or a mesh."
+                               : "A patch needs four corners.");
   window_.setClipboard(text);
   showMessage(isChain ? "The chain of actions was copied to the clipboard."
                       : "The action 'patch' was copied to the clipboard.");

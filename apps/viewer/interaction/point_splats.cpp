@@ -100,21 +100,21 @@ bool canSplat(const render::Scene& scene) {
                       [](const render::Solid& solid) { return solid.band.isOpenSurface(); });
 }
 
-std::shared_ptr<render::Image> drawSplats(const std::vector<SurfaceDiscs>& points,
-                                          const render::Scene& scene,
+std::shared_ptr<render::Image> drawSplats(const std::vector<SurfaceDiscs>& discs,
+                                          const render::Scene& scene, double diagonal,
                                           const render::RenderOptions& options,
                                           const std::atomic<bool>& isStale) {
   const render::Camera& camera = scene.camera;
-  const DiscCamera discs(camera);
+  const DiscCamera view(camera);
   auto image = std::make_shared<render::Image>(camera.width, camera.height);
   const render::PictureLayers layers(*image, options);
-  const render::Shader shader(scene, scene.bounds().size().length(), options);
+  const render::Shader shader(scene, diagonal, options);
   // The nearest disc of each pixel, for one solid after another: its depth in the upper half, its
   // number in the lower half.
   std::vector<std::atomic<std::uint64_t>> nearest(image->pixelCount());
   std::vector<float> depths(image->pixelCount(), std::numeric_limits<float>::infinity());
-  for (std::size_t s = 0; s < points.size(); ++s) {
-    const SurfaceDiscs& part = points[s];
+  for (std::size_t s = 0; s < discs.size(); ++s) {
+    const SurfaceDiscs& part = discs[s];
     const auto radius = static_cast<double>(part.radius);
     for (auto& key : nearest) key.store(kNothing, std::memory_order_relaxed);
     constexpr std::size_t kGrain = 4096;
@@ -123,11 +123,11 @@ std::shared_ptr<render::Image> drawSplats(const std::vector<SurfaceDiscs>& point
           if (isStale) return;
           for (std::size_t i = range.begin(); i < range.end(); ++i) {
             const V3d at(part.positions[i]), normal(part.normals[i]);
-            const auto extent = discs.extentOf(at, normal, radius);
+            const auto extent = view.extentOf(at, normal, radius);
             if (!extent) continue;
             for (int y = extent->top; y <= extent->bottom; ++y)
               for (int x = extent->left; x <= extent->right; ++x)
-                if (const auto depth = discs.depthAt(x, y, at, normal, radius))
+                if (const auto depth = view.depthAt(x, y, at, normal, radius))
                   keepLeast(
                       nearest[static_cast<std::size_t>(y) * static_cast<std::size_t>(camera.width) +
                               static_cast<std::size_t>(x)],
@@ -145,7 +145,7 @@ std::shared_ptr<render::Image> drawSplats(const std::vector<SurfaceDiscs>& point
         if (key == kNothing) continue;
         const std::size_t i = key & 0xffffffffu;
         const V3d at(part.positions[i]), normal(part.normals[i]);
-        const double depth = *discs.depthAt(x, y, at, normal, radius);
+        const double depth = *view.depthAt(x, y, at, normal, radius);
         if (static_cast<float>(depth) >= depths[pixel]) continue;
         depths[pixel] = static_cast<float>(depth);
         const render::Camera::Ray ray = camera.ray(x + 0.5, y + 0.5);

@@ -19,11 +19,12 @@ namespace viewer {
 /// shadows [Brodersen07 §6.4]. Discs that face away are left out. The picture has the layers of a
 /// ray-cast picture; curvatures are 0. The nearest disc wins, and among equals the first, so the
 /// bits do not depend on the number of threads.
-/// @param points  surface points of each solid of the scene
+/// @param discs  discs of each solid of the scene
+/// @param diagonal  diagonal of the box of the surfaces, world units
 /// @param isStale  set to true from another thread: stops the drawing
 /// @return null when stopped. @pre canSplat(scene)
-[[nodiscard]] std::shared_ptr<render::Image> drawSplats(const std::vector<SurfaceDiscs>& points,
-                                                        const render::Scene& scene,
+[[nodiscard]] std::shared_ptr<render::Image> drawSplats(const std::vector<SurfaceDiscs>& discs,
+                                                        const render::Scene& scene, double diagonal,
                                                         const render::RenderOptions& options,
                                                         const std::atomic<bool>& isStale);
 

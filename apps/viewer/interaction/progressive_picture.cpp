@@ -124,7 +124,8 @@ struct ProgressivePicture::Worker {
   std::shared_ptr<const render::Image> splatted(const std::atomic<bool>& isStale) {
     const render::Scene scene = sceneFor(kSplatPixelSize);
     render::validate(scene.camera);
-    return drawSplats(discs, scene, optionsFor({kSplatPixelSize, 1, 0, 0}), isStale);
+    return drawSplats(discs, scene, view.model->extent(), optionsFor({kSplatPixelSize, 1, 0, 0}),
+                      isStale);
   }
 
   [[nodiscard]] render::RenderOptions optionsFor(const Pass& how) const {

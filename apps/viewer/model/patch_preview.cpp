@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "levelset/error.h"
+#include "levelset/files/band_file.h"
+#include "levelset/mesh_files/mesh_file.h"
 #include "levelset/transform/resample.h"
 #include "mapping/placement/make_patch.h"
 #include "mapping/surface/geodesic.h"
@@ -35,12 +37,20 @@ std::vector<V3d> pathThrough(const mapping::SurfaceField& field, const std::vect
   return path;
 }
 
-/// Actions that make the solid of the model from its file.
+/// Quotes a text for the shell.
+std::string quoted(const std::string& text) {
+  std::string result = "'";
+  for (const char c : text) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return result + "'";
+}
+
+/// Actions that make the solid of the model from its file; empty if no file has this solid alone.
 std::string baseActions(const Model& base, double voxelSize) {
-  const std::string file = base.files.empty() ? "base.vdb" : base.files.front().string();
-  std::string text = fmt::format("read '{}'", file);
-  if (base.files.empty() || base.files.front().extension() == ".vdb") return text;
-  return text + fmt::format(" ! level-set --voxel {}", voxelSize);
+  if (base.files.empty()) return "";
+  const std::string read = "read " + quoted(base.files.front().string());
+  if (levelset::isBandFormat(base.files.front())) return read;
+  if (!levelset::isMeshFormat(base.files.front())) return "";
+  return read + fmt::format(" ! level-set --voxel {}", voxelSize);
 }
 
 std::shared_ptr<const Model> modelWith(const Model& base, NarrowBand textured) {
@@ -72,10 +82,12 @@ void makePreview(const Model& base, const NarrowBand& surface, const levelset::P
   options.progress = levelset::subProgress(progress, 0.5, 1);
   preview.model =
       modelWith(base, mapping::mapTexture(surface, tile.solid, *preview.patch, options).band);
+  const std::string actions = baseActions(base, voxel);
+  if (actions.empty()) return;
   preview.chainText = fmt::format(
       "levelsmith {} --as base ! {} --as patch ! {} --as tile ! texture @base @tile @patch --voxel "
       "{} ! write textured.vdb",
-      baseActions(base, voxel), preview.patchText, tile.action, voxel);
+      actions, preview.patchText, tile.action, voxel);
 }
 
 }  // namespace

@@ -30,7 +30,8 @@ struct PatchPreview {
   bool isFine = false;
   double height = 0;      ///< of the patch, world units
   std::string patchText;  ///< the `patch` action; empty for fewer than four corners
-  std::string chainText;  ///< the actions from the base to the textured solid; empty without one
+  std::string chainText;  ///< the actions from the base to the textured solid; empty without one,
+                          ///< and for scenes
   std::string failure;    ///< reason why patch or texture could not be made; empty: none
 };
 

@@ -255,8 +255,14 @@ TEST(PatchPreview, TexturesTheSolidAndWritesTheActions) {
     const V2d size = sizeOf(preview.sides);
     EXPECT_GT(after - before, 0.2 * preview.height * size.x * size.y) << textureName(kind);
     EXPECT_LT(after - before, 1.3 * preview.height * size.x * size.y) << textureName(kind);
-    EXPECT_NE(preview.chainText.find(std::string(" ! ") + textureName(kind) + " --"),
-              std::string::npos);
+    EXPECT_EQ(preview.chainText, "");  // the model is from no file
+    Model read = *model;
+    read.files = {"it's.ply"};
+    const std::string chain = previewPatch(read, bandOf(model), design).chainText;
+    EXPECT_EQ(chain.find("levelsmith read 'it'\\''s.ply' ! level-set --voxel 0.08 --as base ! "),
+              0u)
+        << chain;
+    EXPECT_NE(chain.find(std::string(" ! ") + textureName(kind) + " --"), std::string::npos);
   }
 }
 

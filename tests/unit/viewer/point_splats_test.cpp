@@ -33,7 +33,7 @@ std::shared_ptr<render::Image> splatted(const render::Scene& scene) {
   render::RenderOptions options;
   options.samples = 1;
   options.ambientSamples = options.shadowSamples = 0;
-  return drawSplats(discs, scene, options, false);
+  return drawSplats(discs, scene, scene.bounds().size().length(), options, false);
 }
 
 TEST(SurfaceDiscs, LieOnTheSurface) {
@@ -142,7 +142,7 @@ TEST(PointSplats, LeaveOtherScenesToTheRays) {
   // Stopped at once.
   std::atomic<bool> isStale = true;
   scene.solids[0].opacity = 1;
-  EXPECT_EQ(drawSplats({surfaceDiscs(scene.solids[0].band)}, scene, {}, isStale), nullptr);
+  EXPECT_EQ(drawSplats({surfaceDiscs(scene.solids[0].band)}, scene, 1, {}, isStale), nullptr);
 }
 
 }  // namespace point_splats_test

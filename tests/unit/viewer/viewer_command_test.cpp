@@ -206,7 +206,8 @@ std::vector<std::string> linesOf(const std::string& text) {
 }
 
 TEST_F(ViewerCommand, MakesAPatchWithTheMouseAndWritesItsCommand) {
-  makeBall();
+  const Outcome ball = levelsmith("sphere --radius 1 --voxel 0.025 ! write ball.vdb");
+  ASSERT_EQ(ball.code, 0) << ball.err;
   writeFile("patch.play",
             "key e\n"
             "drag 300,150 310,140   # in clockwise order\n"
