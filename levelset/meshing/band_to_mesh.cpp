@@ -1,17 +1,17 @@
 #include "levelset/meshing/band_to_mesh.h"
 
 #include <fmt/core.h>
-#include <tbb/parallel_for.h>
+#include <utility>
 
 #include "levelset/error.h"
-#include "levelset/meshing/cells/cell_surface.h"
 #include "levelset/meshing/decimate.h"
 #include "levelset/meshing/sharp/sharp_surface.h"
+#include "levelset/meshing/world_mesh.h"
 
 namespace levelset {
 namespace {
 
-void validate(const NarrowBand& band, const BandToMeshOptions& options) {
+void validate(const BandToMeshOptions& options) {
   if (!(options.adaptivity >= 0 && options.adaptivity <= 1)) {
     throw UsageError(fmt::format("adaptivity {} is outside [0, 1]; give a number in that range",
                                  options.adaptivity));
@@ -19,36 +19,14 @@ void validate(const NarrowBand& band, const BandToMeshOptions& options) {
   if (options.sharp && options.adaptivity > 0) {
     throw UsageError("sharp and adaptivity exclude each other; omit one of them");
   }
-  if (!options.openSurface) requireSolid(band);
-  if (band.isEmpty()) {
-    throw InvalidInput("the band is empty and has no surface; check the action that computed it");
-  }
-}
-
-TriMesh toWorld(const IndexMesh& mesh, const NarrowBand& band) {
-  TriMesh result;
-  const Imath::M44d matrix = band.indexToWorld();
-  result.positions.resize(mesh.positions.size());
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.positions.size(), 4096),
-                    [&](const tbb::blocked_range<std::size_t>& range) {
-                      for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                        matrix.multVecMatrix(toImath(mesh.positions[i]), result.positions[i]);
-                      }
-                    });
-  return result;
 }
 
 }  // namespace
 
 TriMesh bandToMesh(const NarrowBand& band, const BandToMeshOptions& options) {
-  validate(band, options);
+  validate(options);
   report(options.progress, 0);
-  const CellSurface surface(vdb(band));
-  if (!surface.triangleCount()) {
-    throw InvalidInput(
-        "the band has no zero crossing and so no surface; check the action that "
-        "computed it");
-  }
+  const CellSurface surface = cellsOf(band, options.openSurface);
   report(options.progress, 0.3);
   IndexMesh mesh =
       options.sharp
@@ -59,8 +37,7 @@ TriMesh bandToMesh(const NarrowBand& band, const BandToMeshOptions& options) {
     mesh = decimate(mesh, options.adaptivity);
   }
   report(options.progress, 0.9);
-  TriMesh result = toWorld(mesh, band);
-  result.triangles = std::move(mesh.triangles);
+  TriMesh result = toWorld(std::move(mesh), band);
   report(options.progress, 1);
   return result;
 }

@@ -288,9 +288,12 @@ openvdb::Vec3d crossingPoint(const CellSurface& surface, const SurfaceBlock& blo
   const double low = static_cast<double>(block.value(x * 64 + y * 8 + z));
   const double high = static_cast<double>(
       surface.valueAt(block, x + (axis == 0), y + (axis == 1), z + (axis == 2)));
-  double t = low / (low - high);
-  if (!(t >= 0 && t <= 1)) t = 0.5;  // a value is NaN or infinite
-  const Coord point = block.origin.offsetBy(x, y, z);
+  const double t = low / (low - high);
+  // Without the test, a value that is NaN or infinite would give such a vertex.
+  return pointOnEdge(surface, block.origin.offsetBy(x, y, z), axis, t >= 0 && t <= 1 ? t : 0.5);
+}
+
+openvdb::Vec3d pointOnEdge(const CellSurface& surface, const Coord& point, int axis, double t) {
   if (t < kCornerGuard || t > 1 - kCornerGuard) {
     Coord beyond = point;
     beyond[axis] += 1;

@@ -7,6 +7,7 @@
 
 #include "levelset/grids/padded_leaf_vdb.h"
 #include "levelset/meshing/sharp/sharp_vertices.h"
+#include "levelset/meshing/sharp/tangent_planes.h"
 
 namespace levelset {
 namespace {

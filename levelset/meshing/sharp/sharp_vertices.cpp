@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "levelset/grids/padded_leaf_vdb.h"
+#include "levelset/meshing/sharp/tangent_planes.h"
 
 namespace levelset {
 namespace {
@@ -12,15 +12,8 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using openvdb::Coord;
 using openvdb::FloatGrid;
+using Plane = TangentPlane;
 
-/// Largest deviation, voxels, from a plane of unit slope of the values in one cell at a grid point,
-/// if they are to define the tangent plane there.
-constexpr double kPlanar = 0.1;
-/// Up to this second difference, voxels, central differences alone give the tangent plane of a grid
-/// point. Above it, the values of one of its eight cells may give a better plane beside an edge.
-constexpr double kSurelySmooth = 0.02;
-/// Field values that differ from a plane of unit slope by less, voxels, are those of a flat face.
-constexpr double kFlat = 1e-4;
 /// A plane is dropped when another plane of its sheet has an error smaller by this factor.
 constexpr double kWorse = 4;
 /// Eigenvalues of the matrix Σ n nᵀ over the planes' normals below this share of the largest are
@@ -68,147 +61,6 @@ bool isInCell(const Vector3d& p, double margin) {
 }
 
 }  // namespace
-
-/// Tangent plane of the surface, estimated at one grid point.
-struct VertexPlacer::Plane {
-  Vector3d normal = Vector3d::Zero();
-  Vector3d gradient = Vector3d::Zero();  ///< gradient of the field, by central differences
-  double distance = 0;                   ///< distance of the grid point from the plane, voxels
-  double error = 0;  ///< deviation of the neighbouring values from the plane, voxels
-  /// Bend of the field at the grid point, voxels: the largest second difference along an axis, or
-  /// the sum of all three if it is larger. The sum is invariant under rotation.
-  double bend = 0;
-  bool isSmooth = false;
-  bool isKnown = false;  ///< false: no plane could be estimated
-};
-
-/// Field values, in voxels, of a block and its surroundings: one grid point on the low side of each
-/// axis, two on the high side. Also estimates the tangent planes from them.
-class VertexPlacer::BlockField {
- public:
-  BlockField(const FloatGrid& grid, const Coord& origin) {
-    const auto accessor = grid.getConstAccessor();
-    const double inverse = 1 / grid.voxelSize()[0];
-    std::array<float, kDim * kDim * kDim> values;
-    copyPaddedLeaf(accessor, origin, 1, 2, values.data());
-    for (std::size_t i = 0; i < values.size(); ++i)
-      values_[i] = static_cast<double>(values[i]) * inverse;
-  }
-
-  [[nodiscard]] double value(int x, int y, int z) const {
-    return values_[static_cast<std::size_t>(((x + 1) * kDim + y + 1) * kDim + z + 1)];
-  }
-
-  /// Interpolates the field trilinearly, at a point of the block or at most one voxel outside it.
-  [[nodiscard]] double interpolated(const Vector3d& p) const {
-    std::array<int, 3> low;
-    Vector3d t;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const auto axis = static_cast<Eigen::Index>(i);
-      low[i] = std::clamp(static_cast<int>(std::floor(p[axis])), -1, kEnd - 1);
-      t[axis] = p[axis] - low[i];
-    }
-    double sum = 0;
-    for (int corner = 0; corner < 8; ++corner) {
-      const int dx = corner >> 2, dy = (corner >> 1) & 1, dz = corner & 1;
-      sum += (dx ? t[0] : 1 - t[0]) * (dy ? t[1] : 1 - t[1]) * (dz ? t[2] : 1 - t[2]) *
-             value(low[0] + dx, low[1] + dy, low[2] + dz);
-    }
-    return sum;
-  }
-
-  /// Interpolates the field trilinearly, corrected by second differences: third order on a smooth
-  /// field. The coordinates of `p` lie in [0, 8].
-  [[nodiscard]] double curved(const Vector3d& p) const {
-    std::array<int, 3> low;
-    Vector3d t;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const auto axis = static_cast<Eigen::Index>(i);
-      low[i] = std::clamp(static_cast<int>(std::floor(p[axis])), 0, kEnd - 2);
-      t[axis] = p[axis] - low[i];
-    }
-    double sum = 0;
-    for (int corner = 0; corner < 8; ++corner) {
-      const int dx = corner >> 2, dy = (corner >> 1) & 1, dz = corner & 1;
-      const int x = low[0] + dx, y = low[1] + dy, z = low[2] + dz;
-      const double here = value(x, y, z);
-      const Vector3d bend(value(x - 1, y, z) + value(x + 1, y, z) - 2 * here,
-                          value(x, y - 1, z) + value(x, y + 1, z) - 2 * here,
-                          value(x, y, z - 1) + value(x, y, z + 1) - 2 * here);
-      const double weight =
-          (dx ? t[0] : 1 - t[0]) * (dy ? t[1] : 1 - t[1]) * (dz ? t[2] : 1 - t[2]);
-      sum += weight * (here - bend.dot((t.array() * (1 - t.array())).matrix()) / 2);
-    }
-    return sum;
-  }
-
-  /// Returns the plane of a grid point, with each coordinate in [0, 8].
-  [[nodiscard]] const Plane& plane(int x, int y, int z) {
-    const auto i = static_cast<std::size_t>((x * 9 + y) * 9 + z);
-    if (!made_[i]) {
-      planes_[i] = makePlane(x, y, z);
-      made_[i] = true;
-    }
-    return planes_[i];
-  }
-
- private:
-  static constexpr int kEnd = 9, kDim = kEnd + 2;
-
-  Plane makePlane(int x, int y, int z) const {
-    Plane plane;
-    plane.distance = value(x, y, z);
-    const Vector3d back(value(x - 1, y, z), value(x, y - 1, z), value(x, y, z - 1));
-    const Vector3d forward(value(x + 1, y, z), value(x, y + 1, z), value(x, y, z + 1));
-    const Vector3d bend = back + forward - Vector3d::Constant(2 * plane.distance);
-    plane.error = bend.cwiseAbs().maxCoeff();
-    plane.bend = std::max(plane.error, std::abs(bend.sum()));
-    plane.isSmooth = plane.error < kSmoothBend;
-    plane.gradient = (forward - back) / 2;
-    if (plane.isSmooth) {
-      plane.normal = plane.gradient;
-      plane.isKnown = plane.normal.norm() > 0.5;
-    }
-    if (!plane.isSmooth) {
-      chooseOctant(x, y, z, kPlanar, plane);
-    } else if (plane.error > kSurelySmooth) {
-      chooseOctant(x, y, z, kFlat, plane);
-    }
-    if (plane.isKnown) plane.normal.normalize();
-    return plane;
-  }
-
-  /// Estimates the plane from one of the eight cells at the grid point. Beside an edge of the
-  /// solid, central differences mix two faces. The cell whose values lie nearest to a plane of unit
-  /// slope belongs to one face. If no cell is within `limit`, the plane does not change.
-  /// @param limit  largest deviation of a cell's values from a plane of unit slope, voxels
-  void chooseOctant(int x, int y, int z, double limit, Plane& plane) const {
-    double best = limit;
-    for (int octant = 0; octant < 8; ++octant) {
-      const int sx = octant & 4 ? 1 : -1, sy = octant & 2 ? 1 : -1, sz = octant & 1 ? 1 : -1;
-      const double base = plane.distance;
-      const double dx = value(x + sx, y, z) - base, dy = value(x, y + sy, z) - base,
-                   dz = value(x, y, z + sz) - base;
-      const double error = std::abs(std::sqrt(dx * dx + dy * dy + dz * dz) - 1) +
-                           std::abs(value(x + sx, y + sy, z) - base - dx - dy) +
-                           std::abs(value(x + sx, y, z + sz) - base - dx - dz) +
-                           std::abs(value(x, y + sy, z + sz) - base - dy - dz) +
-                           std::abs(value(x + sx, y + sy, z + sz) - base - dx - dy - dz);
-      if (!(error < best)) continue;
-      best = plane.error = error;
-      plane.normal = Vector3d(sx * dx, sy * dy, sz * dz);
-      plane.isKnown = true;
-      plane.isSmooth = false;
-    }
-    // Reduce `bend` only if the cell's values are flat up to rounding. At the pole of a small ball
-    // they are nearly as flat as on a face, but the field around is bent.
-    if (best < kFlat) plane.bend = best;
-  }
-
-  std::array<double, kDim * kDim * kDim> values_;
-  std::array<Plane, 729> planes_;
-  std::array<bool, 729> made_ = {};
-};
 
 /// Implementation of VertexPlacer. Positions are relative to the cell's lowest corner until place()
 /// returns.
@@ -354,7 +206,7 @@ class VertexPlacer::Impl {
     return isInCell(centre + shift, 0) ? Vector3d(centre + shift) : centre;
   }
 
-  BlockField field_;
+  TangentPlanes field_;
   int x_ = 0, y_ = 0, z_ = 0;  ///< lowest grid point of the current cell, relative to the block
   std::vector<std::pair<Vector3d, Vector3d>> crossings_;  ///< zero crossings, gradients there
   std::vector<FacePlane> planes_;

@@ -28,10 +28,6 @@ struct FacePlane {
 [[nodiscard]] VertexSheets sheetsAt(const Eigen::Vector3d& point,
                                     const std::vector<FacePlane>& planes);
 
-/// Second difference, in voxels, up to which the field counts as smooth at a grid point. An edge
-/// has a larger one at a corner of each cell that it crosses.
-inline constexpr double kSmoothBend = 0.15;
-
 struct DualVertex {
   /// Point where the tangent planes estimated at the cell's grid points meet, voxels.
   Eigen::Vector3d position;
@@ -52,8 +48,6 @@ class VertexPlacer {
   [[nodiscard]] DualVertex place(int x, int y, int z, const std::uint8_t* edges, std::size_t count);
 
  private:
-  struct Plane;
-  class BlockField;
   class Impl;
   std::unique_ptr<Impl> impl_;
 };

@@ -1,0 +1,272 @@
+#include "levelset/meshing/extended/directed_distances.h"
+
+#include <fmt/core.h>
+#include <tbb/parallel_for.h>
+
+#include <array>
+#include <cmath>
+#include <memory>
+#include <optional>
+
+#include "levelset/error.h"
+#include "levelset/geometry/box_tree.h"
+#include "levelset/meshing/sharp/tangent_planes.h"
+
+namespace levelset {
+namespace {
+
+using Eigen::Vector3d;
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using openvdb::Vec3d;
+
+/// Largest distance of an intersection from the grid edge beyond its ends, as a share of the edge.
+/// The signs of the field come from rounded values, so a surface that passes a grid point may meet
+/// only the neighbouring edge.
+constexpr double kBeyondEnd = 1e-3;
+/// The same for tangent planes, which are estimates.
+constexpr double kPlaneBeyondEnd = 0.05;
+/// Least cosine of the angle between a grid edge and a tangent plane's normal.
+constexpr double kLeastSlope = 0.05;
+/// Tolerance of the test that a grid line meets a triangle, as a share of its area. It closes the
+/// gaps that rounding leaves between adjacent triangles.
+constexpr double kOnTriangle = 1e-9;
+
+Vec3d toIndexSpace(const Vector3d& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+/// A crossed grid edge.
+struct GridEdge {
+  Coord low;
+  int axis = 0;
+  bool lowInside = false;  ///< true: the lower end is inside
+};
+
+/// Calls run(block) for each block with crossed edges, in parallel.
+template <typename PerBlock>
+void forEachSurfaceBlock(const CellSurface& surface, const PerBlock& run) {
+  const auto& blocks = surface.blocks();
+  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
+    if (blocks[i].vertexCount) run(blocks[i]);
+  });
+}
+
+GridEdge edgeAt(const SurfaceBlock& block, int x, int y, int z, int axis) {
+  return {block.origin.offsetBy(x, y, z), axis, block.value(x * 64 + y * 8 + z) < 0};
+}
+
+/// Crossings of the edges of one block with the zero set of the field.
+class FieldCrossings {
+ public:
+  FieldCrossings(const CellSurface& surface, const SurfaceBlock& block, const FloatGrid& grid)
+      : surface_(surface), block_(block), planes_(grid, block.origin) {}
+
+  [[nodiscard]] EdgeCrossing at(int x, int y, int z, int axis) {
+    const GridEdge edge = edgeAt(block_, x, y, z, axis);
+    const TangentPlane& low = planes_.plane(x, y, z);
+    const TangentPlane& high = planes_.plane(x + (axis == 0), y + (axis == 1), z + (axis == 2));
+    const Vec3d zero = crossingPoint(surface_, block_, x, y, z, axis);
+    const double t = zero[axis] - edge.low[axis];
+    const Vector3d mixed = (1 - t) * low.gradient + t * high.gradient;
+    const bool isSmooth = low.isSmooth && high.isSmooth && low.isKnown && high.isKnown;
+    if (!isSmooth)
+      if (const auto crossing = byPlanes(edge, low, high)) return *crossing;
+    const double length = mixed.norm();
+    if (length > kLeastSlope) return {zero, toIndexSpace(mixed / length)};
+    Vec3d along(0.0);
+    along[axis] = edge.lowInside ? 1 : -1;
+    return {zero, along};
+  }
+
+ private:
+  /// Share of the edge at which it meets the tangent plane of one end; empty: the plane does not
+  /// separate the ends as their signs do.
+  /// @param end  0: plane of the lower end, 1: of the upper end
+  static std::optional<double> meet(const GridEdge& edge, const TangentPlane& plane, double end) {
+    if (!plane.isKnown) return std::nullopt;
+    const double slope = plane.normal[edge.axis] * (edge.lowInside ? 1 : -1);
+    if (slope < kLeastSlope) return std::nullopt;
+    const double t = end - plane.distance / plane.normal[edge.axis];
+    if (!(t >= -kPlaneBeyondEnd && t <= 1 + kPlaneBeyondEnd)) return std::nullopt;
+    return std::clamp(t, 0.0, 1.0);
+  }
+
+  [[nodiscard]] std::optional<EdgeCrossing> byPlanes(const GridEdge& edge, const TangentPlane& low,
+                                                     const TangentPlane& high) const {
+    const auto tLow = meet(edge, low, 0), tHigh = meet(edge, high, 1);
+    if (!tLow && !tHigh) return std::nullopt;
+    const auto crossing = [&](const TangentPlane& plane, double t) {
+      return EdgeCrossing{pointOnEdge(surface_, edge.low, edge.axis, t),
+                          toIndexSpace(plane.normal)};
+    };
+    if (!tHigh) return crossing(low, *tLow);
+    if (!tLow) return crossing(high, *tHigh);
+    if (low.normal.dot(high.normal) > kSameFace)
+      return low.error <= high.error ? crossing(low, *tLow) : crossing(high, *tHigh);
+    // Two faces. The solid is their intersection if the face of the inner end lies nearer to that
+    // end than the other face; then the edge leaves the solid at the first of both planes. Else the
+    // solid is their union, and the edge leaves it at the second.
+    const double outerAtInner = edge.lowInside ? high.distance - high.normal[edge.axis]
+                                               : low.distance + low.normal[edge.axis];
+    const double innerAtInner = edge.lowInside ? low.distance : high.distance;
+    const bool isConvex = outerAtInner < innerAtInner;
+    const bool takeLower = isConvex == edge.lowInside;
+    return (*tLow < *tHigh) == takeLower ? crossing(low, *tLow) : crossing(high, *tHigh);
+  }
+
+  /// Planes whose normals have a larger dot product belong to one face.
+  static constexpr double kSameFace = 0.95;
+
+  const CellSurface& surface_;
+  const SurfaceBlock& block_;
+  TangentPlanes planes_;
+};
+
+/// Triangles of the original mesh in index space.
+class OriginalMesh {
+ public:
+  OriginalMesh(const TriMesh& mesh, const FloatGrid& grid) {
+    check(mesh);
+    std::vector<Vec3d> points(mesh.positions.size());
+    for (std::size_t i = 0; i < points.size(); ++i)
+      points[i] = grid.transform().worldToIndex(toVdb(mesh.positions[i]));
+    triangles_.resize(mesh.triangles.size());
+    for (std::size_t i = 0; i < triangles_.size(); ++i)
+      for (std::size_t k = 0; k < 3; ++k) triangles_[i][k] = points[mesh.triangles[i][k]];
+    tree_ = BoxTree(
+        triangles_.size(),
+        [&](std::uint32_t i, Vec3d& low, Vec3d& high) {
+          for (const Vec3d& p : triangles_[i]) {
+            low = openvdb::math::minComponent(low, p);
+            high = openvdb::math::maxComponent(high, p);
+          }
+        },
+        [&](std::uint32_t i, int axis) {
+          return triangles_[i][0][axis] + triangles_[i][1][axis] + triangles_[i][2][axis];
+        });
+  }
+
+  struct Hit {
+    double t = 0;  ///< share of the edge
+    Vec3d normal;
+  };
+  /// Returns the intersection with an edge that is nearest to the share `near` of the edge, the one
+  /// of the lowest triangle among equals. Its normal faces the outer end of the edge.
+  [[nodiscard]] std::optional<Hit> meet(const GridEdge& edge, double near) const {
+    Vec3d middle = edge.low.asVec3d();
+    middle[edge.axis] += 0.5;
+    constexpr double kReach = 0.5 + 2 * kBeyondEnd;
+    const double squared = kReach * kReach;
+    std::optional<Hit> best;
+    std::uint32_t bestIndex = 0;
+    tree_.search(middle, squared, [&](std::uint32_t begin, std::uint32_t end) {
+      for (std::uint32_t i = begin; i < end; ++i) {
+        const std::uint32_t index = tree_.order()[i];
+        const auto hit = meetTriangle(triangles_[index], edge);
+        if (!hit) continue;
+        const double gap = std::abs(hit->t - near), least = best ? std::abs(best->t - near) : 2;
+        if (gap > least || (gap == least && index > bestIndex)) continue;
+        best = hit;
+        bestIndex = index;
+      }
+    });
+    return best;
+  }
+
+ private:
+  using Corners = std::array<Vec3d, 3>;
+
+  static void check(const TriMesh& mesh) {
+    if (mesh.triangles.empty())
+      throw InvalidInput("the original mesh has no triangles; give the mesh of the level set");
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+      const Imath::V3d& p = mesh.positions[v];
+      if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+        throw InvalidInput(fmt::format(
+            "vertex {} of the original mesh has a coordinate that is not finite; repair the mesh",
+            v));
+    }
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+      for (const std::uint32_t v : mesh.triangles[t])
+        if (v >= mesh.positions.size())
+          throw InvalidInput(fmt::format(
+              "triangle {} of the original mesh refers to vertex {}, but there are only {} "
+              "vertices; repair the mesh",
+              t, v, mesh.positions.size()));
+  }
+
+  static std::optional<Hit> meetTriangle(const Corners& corners, const GridEdge& edge) {
+    const int u = (edge.axis + 1) % 3, v = (edge.axis + 2) % 3;
+    const Vec3d line = edge.low.asVec3d();
+    // Twice the areas, in the plane across the edge, of the triangles between the line and each
+    // side: the barycentric coordinates of the intersection.
+    std::array<double, 3> area;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3d &a = corners[(k + 1) % 3], &b = corners[(k + 2) % 3];
+      area[k] = (a[u] - line[u]) * (b[v] - line[v]) - (a[v] - line[v]) * (b[u] - line[u]);
+    }
+    const double whole = area[0] + area[1] + area[2];
+    if (whole == 0) return std::nullopt;
+    double position = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double weight = area[k] / whole;
+      if (!(weight >= -kOnTriangle)) return std::nullopt;
+      position += weight * (corners[k][edge.axis] - line[edge.axis]);
+    }
+    if (!(position >= -kBeyondEnd && position <= 1 + kBeyondEnd)) return std::nullopt;
+    Hit hit{std::clamp(position, 0.0, 1.0),
+            (corners[1] - corners[0]).cross(corners[2] - corners[0])};
+    if (!hit.normal.normalize(0)) return std::nullopt;
+    if ((hit.normal[edge.axis] > 0) != edge.lowInside) hit.normal = -hit.normal;
+    return hit;
+  }
+
+  std::vector<Corners> triangles_;
+  BoxTree tree_;
+};
+
+}  // namespace
+
+EdgeCrossings crossingsOfField(const CellSurface& surface, const FloatGrid& grid) {
+  EdgeCrossings result{std::vector<EdgeCrossing>(surface.vertexCount()), surface.vertexCount()};
+  forEachSurfaceBlock(surface, [&](const SurfaceBlock& block) {
+    FieldCrossings field(surface, block, grid);
+    std::size_t vertex = block.firstVertex;
+    CellSurface::forEachVertex(block, [&](int x, int y, int z, int axis) {
+      result.at[vertex++] = field.at(x, y, z, axis);
+    });
+  });
+  return result;
+}
+
+EdgeCrossings crossingsOfMesh(const CellSurface& surface, const FloatGrid& grid,
+                              const TriMesh& original) {
+  const OriginalMesh mesh(original, grid);
+  EdgeCrossings result{std::vector<EdgeCrossing>(surface.vertexCount())};
+  std::vector<std::size_t> missed(surface.blocks().size());
+  forEachSurfaceBlock(surface, [&](const SurfaceBlock& block) {
+    std::optional<FieldCrossings> field;
+    std::size_t vertex = block.firstVertex;
+    CellSurface::forEachVertex(block, [&](int x, int y, int z, int axis) {
+      const GridEdge edge = edgeAt(block, x, y, z, axis);
+      const double near = crossingPoint(surface, block, x, y, z, axis)[axis] - edge.low[axis];
+      EdgeCrossing& crossing = result.at[vertex++];
+      if (const auto hit = mesh.meet(edge, near)) {
+        crossing = {pointOnEdge(surface, edge.low, axis, hit->t), hit->normal};
+        return;
+      }
+      if (!field) field.emplace(surface, block, grid);
+      crossing = field->at(x, y, z, axis);
+      ++missed[block.neighbour[0]];
+    });
+  });
+  for (const std::size_t count : missed) result.fromField += count;
+  if (result.fromField == result.at.size())
+    throw InvalidInput(
+        "the original mesh meets no grid edge that the surface crosses; give the mesh from which "
+        "the level set was computed, in the same place");
+  return result;
+}
+
+}  // namespace levelset
