@@ -87,6 +87,8 @@ const char* hintOf(ParamType type) {
       return "Velocity";
     case ParamType::Speed:
       return "Speed";
+    case ParamType::Mesh:
+      return "Mesh";
   }
   return "";
 }

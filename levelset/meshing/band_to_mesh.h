@@ -29,6 +29,12 @@ struct BandToMeshOptions {
 /// @throws UsageError if `adaptivity` is outside [0, 1], or above 0 together with `sharp`
 [[nodiscard]] TriMesh bandToMesh(const NarrowBand& band, const BandToMeshOptions& options = {});
 
+enum class MeshMethod {
+  MarchingCubes,  ///< the mesh of bandToMesh()
+  Dual,           ///< the mesh of bandToMesh() with `sharp`
+  Extended        ///< the mesh of bandToExtendedMesh()
+};
+
 /// The operator `mesh` for bands.
 struct MeshOperator {
   static const OperatorText text;
@@ -37,14 +43,29 @@ struct MeshOperator {
   struct Options {
     double adaptivity = 0;
     bool sharp = false;
+    MeshMethod method = MeshMethod::MarchingCubes;
+    /// Mesh from which the band was computed, for MeshMethod::Extended; null: none.
+    const TriMesh* original = nullptr;
+
+    [[nodiscard]] bool isUniform() const {
+      return method == MeshMethod::MarchingCubes && !sharp && adaptivity <= 0;
+    }
 
     template <class Visitor>
     static void describe(Visitor& visit) {
       visit("adaptivity", &Options::adaptivity,
             {.help = "tolerance of the coarsening of flat parts, 0 to 1 voxel; 0: none",
              .range = OptionRange::NonNegative});
-      visit("sharp", &Options::sharp,
-            {.help = "reconstruct the sharp edges and corners that the distances imply"});
+      visit(
+          "sharp", &Options::sharp,
+          {.help = "reconstruct the sharp edges and corners that the distances imply; the same as "
+                   "--method dual"});
+      visit("method", &Options::method,
+            {{"marching-cubes", MeshMethod::MarchingCubes},
+             {"dual", MeshMethod::Dual},
+             {"extended", MeshMethod::Extended}},
+            {.help = "marching cubes, a dual mesh with sharp edges, or extended marching cubes, "
+                     "which adds vertices on sharp edges"});
     }
   };
 

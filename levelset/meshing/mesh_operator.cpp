@@ -1,7 +1,28 @@
+#include <fmt/core.h>
+
 #include "levelset/error.h"
 #include "levelset/meshing/band_to_mesh.h"
+#include "levelset/meshing/extended_mesh.h"
 
 namespace levelset {
+namespace {
+
+TriMesh runExtended(const NarrowBand& band, const MeshOperator::Options& options,
+                    OperatorRun& run) {
+  ExtendedMesh result =
+      bandToExtendedMesh(band, {.original = options.original, .progress = run.progress});
+  run.figures = {{"edge_vertices", result.edgeVertices},
+                 {"corner_vertices", result.cornerVertices},
+                 {"missing_crossings", result.missingCrossings}};
+  if (result.missingCrossings > 0)
+    run.notes.push_back(
+        fmt::format("{} of {} grid edges that the surface crosses miss the mesh --original; the "
+                    "level set gives their crossings",
+                    result.missingCrossings, result.crossings));
+  return std::move(result.mesh);
+}
+
+}  // namespace
 
 const OperatorText MeshOperator::text{
     .name = "mesh",
@@ -12,21 +33,26 @@ const OperatorText MeshOperator::text{
         "sides. With --sheets it is the separate surfaces of all layers.",
     .example = "levelsmith box --size 2,2,2 --voxel 0.1 ! mesh --sharp ! write box.ply"};
 
-void MeshOperator::check(const Options& options, const GivenOptions&) {
+void MeshOperator::check(const Options& options, const GivenOptions& given) {
   if (options.adaptivity > 1) throw UsageError("--adaptivity must lie between 0 and 1");
   if (options.sharp && options.adaptivity > 0)
     throw UsageError("--sharp and --adaptivity exclude each other; give one");
+  if (options.sharp && given("method") && options.method != MeshMethod::Dual)
+    throw UsageError("--sharp is --method dual; leave out --sharp, or give --method dual");
+  if (options.adaptivity > 0 && options.method != MeshMethod::MarchingCubes)
+    throw UsageError("--adaptivity is for --method marching-cubes; leave one of them out");
 }
 
 TriMesh MeshOperator::run(std::vector<NarrowBand> operands, const Options& options,
                           OperatorRun& run) {
-  return bandToMesh(
-      operands[0],
-      {.adaptivity = options.adaptivity, .sharp = options.sharp, .progress = run.progress});
+  if (options.method == MeshMethod::Extended) return runExtended(operands[0], options, run);
+  return bandToMesh(operands[0], {.adaptivity = options.adaptivity,
+                                  .sharp = options.sharp || options.method == MeshMethod::Dual,
+                                  .progress = run.progress});
 }
 
 ValuePlan MeshOperator::plan(const Options&, Plans operands, const OperatorRun&) {
-  // Number of triangles per voxel² of surface area. --sharp and --adaptivity yield no more.
+  // Number of triangles per voxel² of surface area. The other methods yield few more.
   constexpr double kTriangles = 3.35;
   const ValuePlan& solid = operands[0];
   return {.bounds = solid.bounds, .area = solid.area, .triangles = kTriangles * solid.layer()};
@@ -36,7 +62,7 @@ ValuePlan MeshOperator::plan(const Options&, Plans operands, const OperatorRun&)
 /// than a voxel from it; half a voxel is added for distances that are not exact.
 RegionOfInterest MeshOperator::regionOfInterest(const Options& options, const OperatorPlans&,
                                                 std::size_t, const RegionOfInterest&) {
-  if (options.sharp || options.adaptivity > 0) return {};
+  if (!options.isUniform()) return {};
   return {.halfWidth = 1.5};
 }
 
@@ -44,7 +70,9 @@ std::optional<Cost> MeshOperator::cost(const Options& options, const OperatorPla
   const ValuePlan& solid = plans.operands[0];
   if (!solid.isBand()) return {};
   const double layer = solid.layer();
-  if (options.sharp) return Cost{1e-9 * 1300 * layer, 420 * layer};
+  if (options.method == MeshMethod::Extended) return Cost{1e-9 * 1300 * layer, 420 * layer};
+  if (options.sharp || options.method == MeshMethod::Dual)
+    return Cost{1e-9 * 1300 * layer, 420 * layer};
   return Cost{1e-9 * 330 * layer, 40 * layer};
 }
 

@@ -60,11 +60,16 @@ void checkOperands(const Node& node, const std::vector<Node>& before) {
 void checkNamed(const Node& node, const std::vector<Node>& before) {
   for (const auto& [option, number] : node.named) {
     const Node& value = before[number];
-    const bool isScalar = takesDistance(node.op->find(option)->type);
-    if (value.kind == Kind::Field || (isScalar && value.kind == Kind::Band)) continue;
+    const ParamType type = node.op->find(option)->type;
+    const bool isMesh = type == ParamType::Mesh, isScalar = takesDistance(type);
+    if (isMesh ? value.kind == Kind::Mesh
+               : value.kind == Kind::Field || (isScalar && value.kind == Kind::Band))
+      continue;
     throw UsageError(fmt::format("{}: --{}: '@{}' is a {}, but a {} is needed", node.op->name,
                                  option, value.name, kindName(value.kind),
-                                 isScalar ? "field or a level set" : "field"));
+                                 isMesh     ? "mesh"
+                                 : isScalar ? "field or a level set"
+                                            : "field"));
   }
 }
 

@@ -53,6 +53,8 @@ const char* typeName(ParamType type) {
       return "velocity";
     case ParamType::Speed:
       return "speed";
+    case ParamType::Mesh:
+      return "mesh";
   }
   return "";
 }
@@ -96,6 +98,8 @@ std::string valueForm(const Param& param) {
       return "X|FORMULA|@NAME";
     case ParamType::Velocity:
       return fmt::format("{}|\"FX, FY, FZ\"|@NAME", fmt::join(param.choices, "|"));
+    case ParamType::Mesh:
+      return "@NAME";
   }
   return "";
 }
@@ -113,6 +117,10 @@ void checkRange(const Param& param, double number, const std::string& text,
 void checkField(const Param& param, const std::string& text, const std::string& where) {
   if (text == "@") throw UsageError(fmt::format("{}: a name must follow '@'", where));
   if (namesValue(param, text)) return;
+  if (param.type == ParamType::Mesh)
+    throw UsageError(
+        fmt::format("{}: '{}' is not the name of a mesh; name one with --as NAME and write @NAME",
+                    where, text));
   const auto& known = param.choices;
   if (std::find(known.begin(), known.end(), text) != known.end()) return;
   levelset::withContext(where, [&] {
@@ -132,7 +140,9 @@ bool takesDistance(ParamType type) {
 }
 
 bool namesValue(const Param& param, const std::string& text) {
-  return (takesDistance(param.type) || param.type == ParamType::Velocity) && text.starts_with('@');
+  return (takesDistance(param.type) || param.type == ParamType::Velocity ||
+          param.type == ParamType::Mesh) &&
+         text.starts_with('@');
 }
 
 void checkText(const Param& param, const std::string& text, const std::string& where) {
@@ -195,6 +205,7 @@ void checkText(const Param& param, const std::string& text, const std::string& w
     case ParamType::Scalar:
     case ParamType::Velocity:
     case ParamType::Speed:
+    case ParamType::Mesh:
       return checkField(param, text, where);
   }
 }

@@ -35,7 +35,8 @@ enum class ParamType {
   Scalar,    ///< a scalar field: a number, a formula in x, y, z, r, or the @NAME of a value
   Velocity,  ///< a vector field that may depend on time: one of `choices`, three formulas, or the
              ///< @NAME of a field
-  Speed      ///< a normal speed: a formula in x, y, z, r, t, nx, ny, nz, k, or the @NAME of a value
+  Speed,     ///< a normal speed: a formula in x, y, z, r, t, nx, ny, nz, k, or the @NAME of a value
+  Mesh       ///< the @NAME of a mesh
 };
 
 using Range = levelset::OptionRange;

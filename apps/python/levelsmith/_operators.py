@@ -88,6 +88,7 @@ FORMS = {
     "Scalar": "number, formula in x, y, z, r, Field or Solid",
     "Velocity": "three formulas, or a Field",
     "Speed": "number, formula in x, y, z, r, t, nx, ny, nz, k, Field or Solid",
+    "Mesh": "Mesh",
 }
 
 

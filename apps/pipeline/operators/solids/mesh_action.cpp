@@ -1,5 +1,7 @@
 #include "apps/pipeline/operators/solids/mesh_action.h"
 
+#include <fmt/core.h>
+
 #include "apps/pipeline/operators/level_set_operator.h"
 #include "levelset/error.h"
 #include "levelset/meshing/band_to_mesh.h"
@@ -21,22 +23,35 @@ levelset::TriMesh meshOfPatches(const std::vector<mapping::Patch>& patches,
 }
 
 void validateMesh(const Invocation& in) {
-  if (isPatch(in) && (in.given("adaptivity") || in.flag("sharp")))
+  for (const char* option : {"adaptivity", "sharp", "method", "original"})
+    if (isPatch(in) && in.given(option))
+      throw levelset::UsageError(
+          fmt::format("mesh: --{} applies to a level set, not to a patch; leave it out", option));
+  if (in.given("original") && in.text("method") != "extended")
     throw levelset::UsageError(
-        "mesh: --adaptivity and --sharp apply to level sets, not to a patch; leave them out");
+        "mesh: --original is for --method extended; give that method, or leave it out");
   if (!isPatch(in) && in.flag("sheets"))
     throw levelset::UsageError("mesh: --sheets is for a patch, not for a level set; leave it out");
+}
+
+void setOriginal(levelset::MeshOperator::Options& options, Invocation& in) {
+  if (in.given("original")) options.original = &in.named.at("original").mesh();
 }
 
 }  // namespace
 
 Operator meshOperator() {
   Operator op = levelSetOperator<levelset::MeshOperator>(
-      {.params = {{.name = "sheets",
+      {.params = {{.name = "original",
+                   .type = ParamType::Mesh,
+                   .doc = "mesh from which the level set was computed, for --method extended: its "
+                          "crossings with the grid edges and its normals are used"},
+                  {.name = "sheets",
                    .type = ParamType::Flag,
                    .doc = "for patches: make an open mesh of each layer of particles, in place of "
                           "one closed surface"}},
-       .validate = validateMesh});
+       .validate = validateMesh,
+       .prepare = setOriginal});
   op.operands = {{Kind::Band, Kind::Patch}};
   op.run = [ofBand = op.run](Invocation& in) {
     if (!isPatch(in)) return ofBand(in);
