@@ -28,6 +28,8 @@ constexpr double kBeyondEnd = 1e-3;
 constexpr double kPlaneBeyondEnd = 0.05;
 /// Least cosine of the angle between a grid edge and a tangent plane's normal.
 constexpr double kLeastSlope = 0.05;
+/// Largest amount, voxels, by which a tangent plane may contradict the field at an end of an edge.
+constexpr double kConsistent = 0.03;
 /// Tolerance of the test that a grid line meets a triangle, as a share of its area. It closes the
 /// gaps that rounding leaves between adjacent triangles.
 constexpr double kOnTriangle = 1e-9;
@@ -60,18 +62,18 @@ GridEdge edgeAt(const SurfaceBlock& block, int x, int y, int z, int axis) {
 class FieldCrossings {
  public:
   FieldCrossings(const CellSurface& surface, const SurfaceBlock& block, const FloatGrid& grid)
-      : surface_(surface), block_(block), planes_(grid, block.origin) {}
+      : surface_(surface), block_(block), planes_(grid, block.origin, 1) {}
 
   [[nodiscard]] EdgeCrossing at(int x, int y, int z, int axis) {
     const GridEdge edge = edgeAt(block_, x, y, z, axis);
-    const TangentPlane& low = planes_.plane(x, y, z);
-    const TangentPlane& high = planes_.plane(x + (axis == 0), y + (axis == 1), z + (axis == 2));
+    const TangentPlane low = planes_.plane(x, y, z),
+                       high = planes_.plane(x + (axis == 0), y + (axis == 1), z + (axis == 2));
     const Vec3d zero = crossingPoint(surface_, block_, x, y, z, axis);
     const double t = zero[axis] - edge.low[axis];
-    const Vector3d mixed = (1 - t) * low.gradient + t * high.gradient;
     const bool isSmooth = low.isSmooth && high.isSmooth && low.isKnown && high.isKnown;
     if (!isSmooth)
-      if (const auto crossing = byPlanes(edge, low, high)) return *crossing;
+      if (const auto crossing = byPlanes(edge, {x, y, z}, t)) return *crossing;
+    const Vector3d mixed = (1 - t) * low.gradient + t * high.gradient;
     const double length = mixed.norm();
     if (length > kLeastSlope) return {zero, toIndexSpace(mixed / length)};
     Vec3d along(0.0);
@@ -80,47 +82,78 @@ class FieldCrossings {
   }
 
  private:
-  /// Share of the edge at which it meets the tangent plane of one end; empty: the plane does not
-  /// separate the ends as their signs do.
-  /// @param end  0: plane of the lower end, 1: of the upper end
-  static std::optional<double> meet(const GridEdge& edge, const TangentPlane& plane, double end) {
-    if (!plane.isKnown) return std::nullopt;
-    const double slope = plane.normal[edge.axis] * (edge.lowInside ? 1 : -1);
-    if (slope < kLeastSlope) return std::nullopt;
-    const double t = end - plane.distance / plane.normal[edge.axis];
-    if (!(t >= -kPlaneBeyondEnd && t <= 1 + kPlaneBeyondEnd)) return std::nullopt;
-    return std::clamp(t, 0.0, 1.0);
+  /// Tangent plane beside an edge.
+  struct Candidate {
+    double t = 0;                 ///< share of the edge at which the plane meets it
+    double inner = 0, outer = 0;  ///< signed distances of the inner and the outer end, voxels
+    double error = 0;             ///< TangentPlane::error
+    Vector3d normal = Vector3d::Zero();
+  };
+
+  /// Collects the tangent planes of the corners of the four cells at an edge. A plane that does not
+  /// separate the ends as their signs do is left out.
+  void collect(const GridEdge& edge, const std::array<int, 3>& low) {
+    candidates_.clear();
+    const auto along = static_cast<std::size_t>(edge.axis);
+    const std::size_t u = (along + 1) % 3, v = (along + 2) % 3;
+    for (int step = 0; step < 2; ++step)
+      for (int du = -1; du <= 1; ++du)
+        for (int dv = -1; dv <= 1; ++dv) {
+          std::array<int, 3> at = low;
+          at[along] += step, at[u] += du, at[v] += dv;
+          const TangentPlane& plane = planes_.plane(at[0], at[1], at[2]);
+          if (!plane.isKnown) continue;
+          const double slope = plane.normal[edge.axis];
+          if (slope * (edge.lowInside ? 1 : -1) < kLeastSlope) continue;
+          const double atLow = plane.distance - step * slope -
+                               du * plane.normal[static_cast<Eigen::Index>(u)] -
+                               dv * plane.normal[static_cast<Eigen::Index>(v)];
+          const double t = -atLow / slope;
+          if (!(t >= -kPlaneBeyondEnd && t <= 1 + kPlaneBeyondEnd)) continue;
+          candidates_.push_back({std::clamp(t, 0.0, 1.0), edge.lowInside ? atLow : atLow + slope,
+                                 edge.lowInside ? atLow + slope : atLow, plane.error,
+                                 plane.normal});
+        }
   }
 
-  [[nodiscard]] std::optional<EdgeCrossing> byPlanes(const GridEdge& edge, const TangentPlane& low,
-                                                     const TangentPlane& high) const {
-    const auto tLow = meet(edge, low, 0), tHigh = meet(edge, high, 1);
-    if (!tLow && !tHigh) return std::nullopt;
-    const auto crossing = [&](const TangentPlane& plane, double t) {
-      return EdgeCrossing{pointOnEdge(surface_, edge.low, edge.axis, t),
-                          toIndexSpace(plane.normal)};
+  /// Chooses the tangent plane that an edge beside an edge or corner of the solid meets.
+  /// @param zero  share of the edge at which the linear interpolant is zero
+  [[nodiscard]] std::optional<EdgeCrossing> byPlanes(const GridEdge& edge,
+                                                     const std::array<int, 3>& low, double zero) {
+    collect(edge, low);
+    if (candidates_.empty()) return std::nullopt;
+    const auto value = [&](bool isLow) {
+      const int end = isLow ? 0 : 1;
+      return planes_.value(low[0] + end * (edge.axis == 0), low[1] + end * (edge.axis == 1),
+                           low[2] + end * (edge.axis == 2));
     };
-    if (!tHigh) return crossing(low, *tLow);
-    if (!tLow) return crossing(high, *tHigh);
-    if (low.normal.dot(high.normal) > kSameFace)
-      return low.error <= high.error ? crossing(low, *tLow) : crossing(high, *tHigh);
-    // Two faces. The solid is their intersection if the face of the inner end lies nearer to that
-    // end than the other face; then the edge leaves the solid at the first of both planes. Else the
-    // solid is their union, and the edge leaves it at the second.
-    const double outerAtInner = edge.lowInside ? high.distance - high.normal[edge.axis]
-                                               : low.distance + low.normal[edge.axis];
-    const double innerAtInner = edge.lowInside ? low.distance : high.distance;
-    const bool isConvex = outerAtInner < innerAtInner;
-    const bool takeLower = isConvex == edge.lowInside;
-    return (*tLow < *tHigh) == takeLower ? crossing(low, *tLow) : crossing(high, *tHigh);
+    const double inner = value(edge.lowInside), outer = value(!edge.lowInside);
+    bool isConvex = true, isConcave = true;
+    for (const Candidate& plane : candidates_) {
+      isConvex &= plane.inner <= inner + kConsistent;
+      isConcave &= plane.outer >= outer - kConsistent;
+    }
+    const Candidate* best = nullptr;
+    double least = 0;
+    for (const Candidate& plane : candidates_) {
+      // Distance from the inner end: the edge leaves an intersection of half-spaces at the first
+      // plane and a union of them at the last.
+      const double left = edge.lowInside ? plane.t : 1 - plane.t;
+      const double rank = isConvex == isConcave ? std::abs(plane.t - zero)
+                          : isConvex            ? left
+                                                : -left;
+      if (best && !(rank < least)) continue;
+      best = &plane;
+      least = rank;
+    }
+    return EdgeCrossing{pointOnEdge(surface_, edge.low, edge.axis, best->t),
+                        toIndexSpace(best->normal)};
   }
-
-  /// Planes whose normals have a larger dot product belong to one face.
-  static constexpr double kSameFace = 0.95;
 
   const CellSurface& surface_;
   const SurfaceBlock& block_;
   TangentPlanes planes_;
+  std::vector<Candidate> candidates_;
 };
 
 /// Triangles of the original mesh in index space.

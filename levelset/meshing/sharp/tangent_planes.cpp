@@ -1,6 +1,7 @@
 #include "levelset/meshing/sharp/tangent_planes.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "levelset/grids/padded_leaf_vdb.h"
@@ -20,13 +21,16 @@ constexpr double kFlatCell = 1e-4;
 
 }  // namespace
 
-TangentPlanes::TangentPlanes(const FloatGrid& grid, const Coord& origin) {
-  const auto accessor = grid.getConstAccessor();
+TangentPlanes::TangentPlanes(const FloatGrid& grid, const Coord& origin, int margin)
+    : margin_(margin) {
+  const auto cubed = [](int side) { return static_cast<std::size_t>(side * side * side); };
+  std::vector<float> values(cubed(kSide + 2 + 2 * margin));
+  copyPaddedLeaf(grid.getConstAccessor(), origin, 1 + margin, 2 + margin, values.data());
   const double inverse = 1 / grid.voxelSize()[0];
-  std::array<float, kDim * kDim * kDim> values;
-  copyPaddedLeaf(accessor, origin, 1, 2, values.data());
-  for (std::size_t i = 0; i < values.size(); ++i)
-    values_[i] = static_cast<double>(values[i]) * inverse;
+  values_.reserve(values.size());
+  for (const float value : values) values_.push_back(static_cast<double>(value) * inverse);
+  planes_.resize(cubed(kSide + 2 * margin));
+  made_.resize(planes_.size());
 }
 
 double TangentPlanes::interpolated(const Vector3d& p) const {
@@ -34,7 +38,7 @@ double TangentPlanes::interpolated(const Vector3d& p) const {
   Vector3d t;
   for (std::size_t i = 0; i < 3; ++i) {
     const auto axis = static_cast<Eigen::Index>(i);
-    low[i] = std::clamp(static_cast<int>(std::floor(p[axis])), -1, kEnd - 1);
+    low[i] = std::clamp(static_cast<int>(std::floor(p[axis])), -1, kSide - 1);
     t[axis] = p[axis] - low[i];
   }
   double sum = 0;
@@ -51,7 +55,7 @@ double TangentPlanes::curved(const Vector3d& p) const {
   Vector3d t;
   for (std::size_t i = 0; i < 3; ++i) {
     const auto axis = static_cast<Eigen::Index>(i);
-    low[i] = std::clamp(static_cast<int>(std::floor(p[axis])), 0, kEnd - 2);
+    low[i] = std::clamp(static_cast<int>(std::floor(p[axis])), 0, kSide - 2);
     t[axis] = p[axis] - low[i];
   }
   double sum = 0;
@@ -69,7 +73,9 @@ double TangentPlanes::curved(const Vector3d& p) const {
 }
 
 const TangentPlane& TangentPlanes::plane(int x, int y, int z) {
-  const auto i = static_cast<std::size_t>((x * 9 + y) * 9 + z);
+  const int side = kSide + 2 * margin_;
+  const auto i =
+      static_cast<std::size_t>(((x + margin_) * side + y + margin_) * side + z + margin_);
   if (!made_[i]) {
     planes_[i] = makePlane(x, y, z);
     made_[i] = true;

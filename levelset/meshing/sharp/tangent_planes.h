@@ -4,7 +4,7 @@
 // levelset: public headers must not include it.
 
 #include <Eigen/Dense>
-#include <array>
+#include <vector>
 
 #include "levelset/vdb.h"
 
@@ -31,32 +31,37 @@ struct TangentPlane {
   bool isKnown = false;  ///< false: no plane could be estimated
 };
 
-/// Field values, in voxels, of a block and its surroundings: one grid point on the low side of each
-/// axis, two on the high side. Also estimates the tangent planes from them.
+/// Field values, in voxels, of a block and its surroundings: one grid point more on the low side of
+/// each axis than there are planes, and one more on the high side. Also estimates the tangent
+/// planes from them.
 class TangentPlanes {
  public:
-  TangentPlanes(const openvdb::FloatGrid& grid, const openvdb::Coord& origin);
+  /// @param margin  number of grid points around the cells of the block that have a plane, too
+  TangentPlanes(const openvdb::FloatGrid& grid, const openvdb::Coord& origin, int margin = 0);
 
   [[nodiscard]] double value(int x, int y, int z) const {
-    return values_[static_cast<std::size_t>(((x + 1) * kDim + y + 1) * kDim + z + 1)];
+    const int before = 1 + margin_, side = kSide + 2 * before;
+    return values_[static_cast<std::size_t>(((x + before) * side + y + before) * side + z +
+                                            before)];
   }
   /// Interpolates the field trilinearly, at a point of the block or at most one voxel outside it.
   [[nodiscard]] double interpolated(const Eigen::Vector3d& p) const;
   /// Interpolates the field trilinearly, corrected by second differences: third order on a smooth
   /// field. The coordinates of `p` lie in [0, 8].
   [[nodiscard]] double curved(const Eigen::Vector3d& p) const;
-  /// Returns the plane of a grid point, with each coordinate in [0, 8].
+  /// Returns the plane of a grid point, with each coordinate in [−margin, 8 + margin].
   [[nodiscard]] const TangentPlane& plane(int x, int y, int z);
 
  private:
-  static constexpr int kEnd = 9, kDim = kEnd + 2;
+  static constexpr int kSide = 9;  ///< grid points of the block's cells along an axis
 
   [[nodiscard]] TangentPlane makePlane(int x, int y, int z) const;
   void chooseOctant(int x, int y, int z, double limit, TangentPlane& plane) const;
 
-  std::array<double, kDim * kDim * kDim> values_;
-  std::array<TangentPlane, 729> planes_;
-  std::array<bool, 729> made_ = {};
+  int margin_;
+  std::vector<double> values_;
+  std::vector<TangentPlane> planes_;
+  std::vector<bool> made_;
 };
 
 }  // namespace levelset
