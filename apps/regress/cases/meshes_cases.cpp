@@ -1,14 +1,19 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <vector>
 
 #include "apps/process_cost.h"
 #include "apps/regress/peers/peer.h"
 #include "apps/regress/recorder.h"
 #include "apps/regress/truth/exact_band.h"
+#include "apps/regress/truth/machine_part.h"
 #include "levelset/convert/mesh_to_band.h"
+#include "levelset/inspect/measure.h"
 #include "levelset/mesh_sign/triangle_distance.h"
 #include "levelset/meshing/band_to_mesh.h"
+#include "levelset/meshing/extended_mesh.h"
 #include "levelset/transform/transform.h"
 
 namespace regress {
@@ -115,6 +120,46 @@ void meshEdges(Recorder& out) {
   }
 }
 
+/// Largest distance of points to a mesh, voxels.
+double farthestFrom(const TriMesh& mesh, const std::vector<V3d>& points, double voxelSize) {
+  double largest = 0;
+  for (const V3d& p : points) largest = std::max(largest, distanceTo(mesh, p, 3 * voxelSize));
+  return largest / voxelSize;
+}
+
+void meshPart(Recorder& out) {
+  for (const Sample& at : out.samples()) {
+    const MachinePart part = machinePart(placement(at, true));
+    const levelset::NarrowBand band = levelset::meshToBand(part.mesh, at.voxelSize).band;
+    const auto measure = [&](const char* variant, const std::function<TriMesh()>& work) {
+      TriMesh mesh;
+      const apps::Cost cost = apps::costOf([&] { mesh = work(); });
+      double farthest = 0;
+      for (const V3d& p : mesh.positions)
+        farthest = std::max(farthest, std::abs(part.truth.distance(p)));
+      for (const auto& t : mesh.triangles)
+        farthest = std::max(
+            farthest,
+            std::abs(part.truth.distance(
+                (mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]]) / 3.0)));
+      out.row(variant, kOurs, at,
+              {{"voxel_size", at.voxelSize},
+               {"value_error", farthestFrom(mesh, part.edges, at.voxelSize)},
+               {"mesh_linf_vx", farthest / at.voxelSize},
+               {"volume_error", levelset::signedVolume(mesh) / *part.truth.volume - 1},
+               {"area_error", levelset::surfaceArea(mesh) / *part.truth.area - 1},
+               {"checks_failed", levelset::manifoldness(mesh).isClosedManifold() ? 0.0 : 1.0},
+               {"cpu_s", cost.cpuSeconds},
+               {"peak_bytes", cost.peakBytes}});
+    };
+    measure("marching cubes", [&] { return levelset::bandToMesh(band); });
+    measure("sharp", [&] { return levelset::bandToMesh(band, {.sharp = true}); });
+    measure("extended", [&] { return levelset::bandToExtendedMesh(band).mesh; });
+    measure("extended, original",
+            [&] { return levelset::bandToExtendedMesh(band, {.original = &part.mesh}).mesh; });
+  }
+}
+
 Bounds meshRoundTripBounds() {
   return Bounds()
       .rounding("cube", "band_in_linf_vx", 1.5)
@@ -155,6 +200,15 @@ Bounds sharpMeshBounds() {
                  {128, 0.00846}});
 }
 
+Bounds partMeshBounds() {
+  constexpr double kPublished = 0.0025;
+  Bounds bounds;
+  for (const char* variant : {"marching cubes", "sharp", "extended", "extended, original"})
+    bounds.zero(variant, "checks_failed");
+  return bounds.required("extended", "volume_error", kPublished, 64)
+      .required("extended, original", "volume_error", kPublished, 64);
+}
+
 }  // namespace
 
 void addMeshCases(std::vector<Case>& all) {
@@ -184,6 +238,23 @@ void addMeshCases(std::vector<Case>& all) {
        .full = {32, 64, 128},
        .bounds = sharpMeshBounds(),
        .run = meshEdges});
+  all.push_back(
+      {.name = "part-mesh",
+       .group = "meshing",
+       .title = "meshes of a machine part with edges, corners and a hole",
+       .definition =
+           "A rotated plate of length 1 with a chamfered corner and a round hole, of exact volume, "
+           "becomes a band and then a mesh: by marching cubes, by the dual method with sharp "
+           "edges, "
+           "and by extended marching cubes with and without the original mesh. value: largest "
+           "distance of points on the sharp edges and of the corners to the mesh, in voxels. "
+           "checks: 1 if the mesh is not closed and 2-manifold with consistent orientation. The "
+           "published error of extended marching cubes on the fandisk at 65³ is below 0.25 %.",
+       .citation = "closed forms; Kobbelt01",
+       .quick = {32, 64},
+       .full = {32, 64, 128},
+       .bounds = partMeshBounds(),
+       .run = meshPart});
 }
 
 }  // namespace regress

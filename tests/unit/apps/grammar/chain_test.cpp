@@ -92,6 +92,22 @@ TEST(Chain, RefusesInvalidNumbersBeforeTheRun) {
   EXPECT_REFUSAL("sphere --radius 1 --voxel 1 --center 1,2", "not a point");
 }
 
+TEST(Chain, ChecksTheMethodOfAMesh) {
+  const std::string ball = "sphere --radius 1 --voxel 0.1 ! ";
+  EXPECT_REFUSAL(ball + "mesh --method cubes", "is not one of marching-cubes, dual, extended");
+  EXPECT_REFUSAL(ball + "mesh --sharp --method extended", "--sharp is --method dual");
+  EXPECT_REFUSAL(ball + "mesh --sharp --method marching-cubes", "--sharp is --method dual");
+  EXPECT_REFUSAL(ball + "mesh --adaptivity 0.1 --method extended", "--adaptivity is for");
+  EXPECT_REFUSAL("read a.ply --as a ! level-set --voxel 1 ! mesh --original @a",
+                 "--original is for --method extended");
+  EXPECT_REFUSAL(ball + "mesh --method extended --original a.ply", "is not the name of a mesh");
+  EXPECT_REFUSAL(ball + "mesh --method extended --original @", "a name must follow '@'");
+  EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 --as b ! mesh --method extended --original @b",
+                 "'@b' is a level set, but a mesh is needed");
+  EXPECT_REFUSAL(ball + "patch --at 0,0,1 --size 1,1 --height 1 ! mesh --method dual",
+                 "--method applies to a level set");
+}
+
 TEST(Chain, ChecksOperandsAndTheirKinds) {
   EXPECT_REFUSAL("offset 1", "needs 1 operand");
   EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! union", "needs 2 operands but has 1");
