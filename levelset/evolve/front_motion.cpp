@@ -28,15 +28,15 @@ constexpr double kLeastSlope = 0.1;
 // The motion of grid points up to this distance counts as motion of the surface, voxels.
 constexpr double kBesideSurface = 1;
 
-struct Central {
-  PaddedBlock block;  ///< φ, voxels
-  Values rate;        ///< κ|∇φ|, voxels⁻¹
-};
-
 }  // namespace
 
 /// The motion of the grid points of one leaf block at one time.
 class FrontMotion::Leaf {
+  struct Central {
+    PaddedBlock block;  ///< φ, voxels
+    Values rate;        ///< κ|∇φ|, voxels⁻¹
+  };
+
  public:
   Leaf(const FrontMotion& motion, double time, const StencilBlock& block, const BandLeaf& leaf,
        const BandAccessor& accessor)

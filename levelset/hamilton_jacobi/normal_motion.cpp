@@ -1,16 +1,13 @@
-#include <fmt/core.h>
+#include "levelset/hamilton_jacobi/normal_motion_vdb.h"
+
 #include <tbb/parallel_for.h>
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
-#include <iterator>
 #include <vector>
 
-#include "levelset/error.h"
 #include "levelset/grids/padded_leaf_vdb.h"
-#include "levelset/hamilton_jacobi/godunov_gradient.h"
-#include "levelset/hamilton_jacobi/normal_motion_vdb.h"
+#include "levelset/hamilton_jacobi/hamiltonian.h"
 #include "levelset/hamilton_jacobi/upwind_derivative.h"
 
 namespace levelset::flow {
@@ -18,21 +15,21 @@ namespace {
 
 using NormalBlock = PaddedLeaf<3>;
 
-/// One-sided derivatives of φ at a grid point of a block, voxels per voxel.
+/// One-sided slopes of φ at a grid point of a block, voxels per voxel.
 /// @param unit  factor from world units to voxels
-OneSidedDerivatives derivativesAt(const NormalBlock& block, const openvdb::Coord& c, double unit,
-                                  int order) {
+OneSidedSlopes slopesAt(const NormalBlock& block, const openvdb::Coord& c, double unit, int order) {
   constexpr std::ptrdiff_t kSteps[] = {NormalBlock::kStepX, NormalBlock::kStepY, 1};
   const float* const here = block.at(c[0], c[1], c[2]);
-  OneSidedDerivatives result;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
+  OneSidedSlopes result;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::ptrdiff_t step = kSteps[axis];
     std::array<double, 6> up, down;  // towards higher and towards lower coordinates
     for (std::size_t k = 0; k < 6; ++k)
-      up[k] = unit * static_cast<double>(here[kSteps[axis] * (static_cast<std::ptrdiff_t>(k) - 3)]);
-    down[0] = unit * static_cast<double>(here[kSteps[axis] * 3]);
+      up[k] = unit * static_cast<double>(here[step * (static_cast<std::ptrdiff_t>(k) - 3)]);
+    down[0] = unit * static_cast<double>(here[step * 3]);
     for (std::size_t k = 1; k < 6; ++k) down[k] = up[6 - k];
-    result.behind[axis] = upwindDerivative(up, order);
-    result.ahead[axis] = -upwindDerivative(down, order);
+    result.lower[axis] = upwindDerivative(up, order);
+    result.upper[axis] = -upwindDerivative(down, order);
   }
   return result;
 }
@@ -58,7 +55,7 @@ void normalStage(const openvdb::FloatGrid& start, const openvdb::FloatGrid& fiel
       const NormalTerms terms = motion.terms(phi, static_cast<double>(second->getValue(it.pos())));
       double rate = terms.source;
       if (terms.speed != 0)
-        rate -= terms.speed * godunovGradient(derivativesAt(block, c, unit, order), terms.speed);
+        rate -= terms.speed * godunovSlope(slopesAt(block, c, unit, order), terms.speed);
       it.setValue(static_cast<float>(share * static_cast<double>(first->getValue(it.pos())) +
                                      (1 - share) * (phi + dt * rate)));
     }
@@ -67,18 +64,8 @@ void normalStage(const openvdb::FloatGrid& start, const openvdb::FloatGrid& fiel
 
 }  // namespace
 
-void requireOrders(const NormalOrders& orders) {
-  if (std::find(std::begin(kUpwindOrders), std::end(kUpwindOrders), orders.space) ==
-      std::end(kUpwindOrders))
-    throw UsageError(fmt::format("upwind differences have no order {} in space; give 1, 2, 3 or 5",
-                                 orders.space));
-  if (orders.time < 1 || orders.time > 3)
-    throw UsageError(
-        fmt::format("Runge-Kutta steps have no order {} in time; give 1, 2 or 3", orders.time));
-}
-
 openvdb::FloatGrid::Ptr normalStep(const openvdb::FloatGrid& start, const NormalMotion& motion,
-                                   const NormalOrders& orders, double dt) {
+                                   const UpwindOrders& orders, double dt) {
   const auto stage = [&](const openvdb::FloatGrid& field, double share) {
     openvdb::FloatGrid::Ptr result = start.deepCopy();
     normalStage(start, field, share, dt, motion, orders.space, *result);

@@ -4,18 +4,10 @@
 
 #include <functional>
 
+#include "levelset/hamilton_jacobi/upwind_derivative.h"
 #include "levelset/vdb.h"
 
 namespace levelset::flow {
-
-/// Orders of the schemes for φ_t + F |∇φ| = G.
-struct NormalOrders {
-  int space = 5;  ///< one of kUpwindOrders, see upwindDerivative()
-  int time = 3;   ///< 1: Euler; 2 and 3: TVD Runge-Kutta [Shu88]
-};
-
-/// @throws UsageError for orders that do not exist
-void requireOrders(const NormalOrders& orders);
 
 /// F and G of φ_t + F |∇φ| = G at a grid point.
 struct NormalTerms {
@@ -35,6 +27,6 @@ struct NormalMotion {
 /// @param dt  step, units of time; at most voxel / (√3 |F|) for stability
 [[nodiscard]] openvdb::FloatGrid::Ptr normalStep(const openvdb::FloatGrid& start,
                                                  const NormalMotion& motion,
-                                                 const NormalOrders& orders, double dt);
+                                                 const UpwindOrders& orders, double dt);
 
 }  // namespace levelset::flow

@@ -123,7 +123,7 @@ NarrowBand pdeRedistance(const NarrowBand& field, const PdeRedistanceOptions& op
   const double halfWidth = options.halfWidth.value_or(field.halfWidth());
   if (!std::isfinite(halfWidth) || halfWidth < 1)
     throw UsageError(fmt::format("the half width is {} voxels; give at least 1", halfWidth));
-  const flow::NormalOrders orders{options.order, options.timeOrder};
+  const flow::UpwindOrders orders{options.order, options.timeOrder};
   flow::requireOrders(orders);
 
   const int reach = flow::pdeReach(halfWidth);
@@ -136,56 +136,6 @@ NarrowBand pdeRedistance(const NarrowBand& field, const PdeRedistanceOptions& op
   FloatGrid::Ptr phi =
       onDomain(vdb(field), domain, std::max(backgroundOf(reach + 1, h), vdb(field).background()),
                backgroundOf(halfWidth + flow::kPdeDelay + 1, h));
-  const FloatGrid::Ptr sign = field.deepCopy();
-  const std::vector<PdeLeaf*> leaves = pdeLeaves(*sign);
-  tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
-    forEachPoint(field, *leaves[i], [&](Index n, const float* p) {
-      double sum = 0;  // (h |∇φ0|)²
-      for (const int step : {1, PdeBlock::kStepY, PdeBlock::kStepX}) {
-        const double rise = (static_cast<double>(p[step]) - static_cast<double>(p[-step])) / 2;
-        sum += rise * rise;
-      }
-      const auto phi = static_cast<double>(*p);
-      const double norm = std::sqrt(phi * phi + sum);
-      if (leaves[i]->isValueOn(n))
-        leaves[i]->setValueOnly(n, norm > 0 ? static_cast<float>(phi / norm) : 0);
-    });
-  });
-  return sign;
-}
-
-/// Makes the grid points with |φ| below the background active, and sets all others to ±
-/// background.
-NarrowBand bandOf(FloatGrid& grid, double halfWidth) {
-  const float background = backgroundOf(halfWidth, grid.voxelSize()[0]);
-  for (PdeLeaf* leaf : pdeLeaves(grid))
-    for (auto it = leaf->beginValueOn(); it; ++it)
-      if (!(std::abs(*it) < background)) it.setValueOff();
-  openvdb::tools::changeLevelSetBackground(grid.tree(), background);
-  openvdb::tools::pruneLevelSet(grid.tree());
-  return makeBand(grid.copy());
-}
-
-}  // namespace
-
-NarrowBand pdeRedistance(const NarrowBand& field, const PdeRedistanceOptions& options) {
-  requireSolid(field);
-  const double halfWidth = options.halfWidth.value_or(field.halfWidth());
-  if (!std::isfinite(halfWidth) || halfWidth < 1)
-    throw UsageError(fmt::format("the half width is {} voxels; give at least 1", halfWidth));
-  const flow::NormalOrders orders{options.order, options.timeOrder};
-  flow::requireOrders(orders);
-
-  const int reach = flow::pdeReach(halfWidth);
-  const openvdb::MaskTree domain = pointsBesideSurface(vdb(field), reach);
-  if (domain.empty())
-    throw InvalidInput("the field is empty and has no zero crossing; give a solid with a surface");
-  requireMemory(flow::kPdeBytes * static_cast<double>(domain.activeVoxelCount()),
-                options.maxMemory);
-  const double h = field.voxelSize();
-  // Beyond the domain |φ| is at least as large as inside, so that no front enters from there.
-  const float beyond = std::max(backgroundOf(reach + 1, h), vdb(field).background());
-  FloatGrid::Ptr phi = onDomain(vdb(field), domain, beyond);
   const FloatGrid::Ptr sign = smearedSign(*phi);
   const flow::NormalMotion motion{*sign, [](double, double s) { return flow::NormalTerms{s, s}; }};
   const int steps = flow::pdeSteps(halfWidth);

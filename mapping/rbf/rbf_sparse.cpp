@@ -37,8 +37,8 @@ class SparseFactors
 double inverseNorm(const SparseFactors& factors, Index n) {
   VectorXd x = VectorXd::Constant(n, 1.0 / static_cast<double>(n));
   double norm = 0;
-  constexpr int kMostSteps = 5;
-  for (int step = 0; step < kMostSteps; ++step) {
+  constexpr int kMostSolutions = 5;
+  for (int step = 0; step < kMostSolutions; ++step) {
     const VectorXd y = factors.solve(x);
     const double found = y.lpNorm<1>();
     if (step > 0 && !(found > norm)) break;

@@ -29,9 +29,9 @@ constexpr double kLeastAxis = 0.05;
 constexpr double kLeastSingular = 0.02;
 /// Largest distance of a feature from its cell, voxels. Farther away, the planes do not belong to
 /// one edge or corner.
-constexpr double kFeatureReach = 1;
+constexpr double kCellReach = 1;
 /// Least increase of the score of a flip. Flips inside a plane have none.
-constexpr double kLeastGain = 1e-6;
+constexpr double kLeastAgreement = 1e-6;
 
 struct Feature {
   Vec3d position;
@@ -69,7 +69,7 @@ class FeatureFinder {
     feature.position = fit(polygon, feature.isCorner ? 3 : 2);
     for (int i = 0; i < 3; ++i) {
       const double inCell = feature.position[i] - cell[i];
-      if (!(inCell >= -kFeatureReach && inCell <= 1 + kFeatureReach)) return std::nullopt;
+      if (!(inCell >= -kCellReach && inCell <= 1 + kCellReach)) return std::nullopt;
     }
     for (const std::uint32_t v : polygon) addSheet(normal(v), feature.sheets);
     return feature;
@@ -257,7 +257,7 @@ class ExtendedMesher {
       if (!flip.isPossible) continue;
       const double before = agreement(mesh_.triangles[edge.triangle[0]]) +
                             agreement(mesh_.triangles[edge.triangle[1]]);
-      if (agreement(flip.left) + agreement(flip.right) > before + kLeastGain)
+      if (agreement(flip.left) + agreement(flip.right) > before + kLeastAgreement)
         applyFlip(flip, edge, mesh_.triangles, present);
     }
   }
