@@ -17,7 +17,8 @@
 ///
 /// The type of the member gives the type of the option: double, int, bool (a flag), V3d (a point,
 /// or three lengths), Box3d, M44d, std::string, std::vector<double> (one or three numbers),
-/// std::vector<V3d> (points), ScalarField, Attribute, NamedVelocity, NormalSpeed, Length, VoxelSize (--voxel and
+/// std::vector<V3d> (points), ScalarField, Attribute, NamedVelocity, NormalSpeed, Length, VoxelSize
+/// (--voxel and
 /// --resolution), Mask (--mask, --mask-min, --mask-max and --mask-invert), and std::optional of
 /// these. Any member may take a table of names and values as the third argument; a member of
 /// another type must:
