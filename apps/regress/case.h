@@ -60,6 +60,7 @@ void addMeshCases(std::vector<Case>& all);
 void addRedistanceCases(std::vector<Case>& all);
 void addOffsetCases(std::vector<Case>& all);
 void addCsgCases(std::vector<Case>& all);
+void addEmbossCases(std::vector<Case>& all);
 void addMorphologyCases(std::vector<Case>& all);
 void addFilletCases(std::vector<Case>& all);
 void addEikonalCases(std::vector<Case>& all);

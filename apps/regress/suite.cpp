@@ -19,6 +19,7 @@ const std::vector<Case>& cases() {
     addRedistanceCases(list);
     addOffsetCases(list);
     addCsgCases(list);
+    addEmbossCases(list);
     addMorphologyCases(list);
     addFilletCases(list);
     addEikonalCases(list);
