@@ -20,13 +20,20 @@ namespace {
 using Imath::V2d;
 using Imath::V3d;
 
-// The patterns have unit length, pitch or size, and the defaults of their actions otherwise.
+// The patterns have unit length, pitch or size, and the defaults of their actions otherwise, to the
+// last bit.
+double radiansOf(double degrees) {
+  return degrees * std::numbers::pi / 180;
+}
+
 mapping::Scales scalesWith(const mapping::Tiling& tiling) {
-  return {.length = 1, .width = 0.7, .base = 0.2, .tiling = tiling};
+  return {.length = 1, .width = 0.7, .tilt = radiansOf(20), .base = 0.2, .tiling = tiling};
 }
 
 mapping::Knurl knurlWith(const mapping::Tiling& tiling) {
   mapping::Knurl knurl;
+  knurl.flankAngle = radiansOf(90);
+  knurl.grooveAngle = radiansOf(30);
   knurl.base = mapping::sharpDepth(knurl);
   knurl.tiling = tiling;
   return knurl;

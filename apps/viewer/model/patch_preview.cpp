@@ -69,10 +69,14 @@ void makePreview(const Model& base, const NarrowBand& surface, const levelset::P
   const Imath::V2d size = sizeOf(preview.sides);
   preview.height = heightOf(design, size);
   preview.patchText = patchAction(design, preview.height);
-  preview.patch = mapping::makePatch(
-                      surface, corners, preview.height,
-                      {.sides = design.sides, .progress = levelset::subProgress(progress, 0, 0.4)})
-                      .patch;
+  mapping::PatchOptions how{.sides = design.sides,
+                            .progress = levelset::subProgress(progress, 0, 0.4)};
+  if (!preview.isFine) {
+    constexpr double kCells = 16;
+    how.layers = 3;
+    how.spacing = std::sqrt(size.x * size.y) / kCells;
+  }
+  preview.patch = mapping::makePatch(surface, corners, preview.height, how).patch;
   if (design.texture == TextureKind::None) return;
   const double voxel = surface.voxelSize();
   const TextureTile tile =
@@ -123,8 +127,9 @@ PatchPaths sidesOf(const NarrowBand& base, const PatchDesign& design) {
 }
 
 PatchPreview previewPatch(const Model& base, const NarrowBand& surface, const PatchDesign& design,
-                          const levelset::Progress& progress) {
+                          PreviewQuality quality, const levelset::Progress& progress) {
   PatchPreview preview;
+  preview.isFine = quality == PreviewQuality::Fine;
   preview.design = design;
   try {
     preview.sides = sidesOf(surface, design);
@@ -198,13 +203,11 @@ void PatchWorker::work(const Request& request) {
     if (const auto previous = preview(); previous && request.design.isWhole())
       sides.model = previous->model;
     publish(std::move(sides));
-    publish(previewPatch(*base_, surface, request.design, goOn));
+    publish(previewPatch(*base_, surface, request.design, PreviewQuality::Coarse, goOn));
   }
   if (request.isDragging || isNewer_) return;
-  PatchPreview whole =
-      previewPatch(*base_, fine, request.design, [this](double) { return !isNewer_; });
-  whole.isFine = true;
-  publish(std::move(whole));
+  publish(previewPatch(*base_, fine, request.design, PreviewQuality::Fine,
+                       [this](double) { return !isNewer_; }));
 }
 
 void PatchWorker::run() {

@@ -47,13 +47,19 @@ struct PatchPreview {
 /// @return for each side the path, empty where the surface does not connect the points
 [[nodiscard]] PatchPaths sidesOf(const levelset::NarrowBand& base, const PatchDesign& design);
 
+/// Grids on which a preview is made.
+enum class PreviewQuality {
+  Coarse,  ///< 3 layers of about 17 x 17 particles, for a picture while the user drags
+  Fine     ///< the layers and particles that the action `patch` makes by default
+};
+
 /// Makes the patch of a design and the textured model. An error of the operators is stored as
 /// `failure`, and the sides are drawn nevertheless.
 /// @param base  model on which the patch is made; @param surface  its solid, or that solid on a
 /// coarser grid
 /// @throws levelset::Cancelled when `progress` cancels
 [[nodiscard]] PatchPreview previewPatch(const Model& base, const levelset::NarrowBand& surface,
-                                        const PatchDesign& design,
+                                        const PatchDesign& design, PreviewQuality quality,
                                         const levelset::Progress& progress = {});
 
 /// Works on previews in a background thread: sides first, then the texture on coarse voxels, then,
