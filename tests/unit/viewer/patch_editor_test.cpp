@@ -21,7 +21,6 @@
 #include "levelset/shapes/shapes.h"
 #include "mapping/surface/geodesic.h"
 #include "tests/support/files.h"
-#include "tests/support/measured.h"
 
 namespace patch_editor_test {
 
@@ -84,8 +83,8 @@ TEST(SurfaceRay, MeetsABallWhereTheRayDoes) {
       EXPECT_LT(std::abs(levelset::BandSampler(bandOf(model)).value(hit->position)), 1e-8);
     }
   // At a grazing offset of 0.95 the trilinear error of φ is magnified three times.
-  EXPECT_LT(worst, support::measured(1e-9));
-  EXPECT_LT(worstNormal, support::measured(1e-9));
+  EXPECT_LT(worst, 3e-3);
+  EXPECT_LT(worstNormal, 6e-3);
 }
 
 TEST(SurfaceRay, MissesBesideTheBallAndLeavesItFirst) {
@@ -103,7 +102,7 @@ TEST(SurfaceRay, MissesBesideTheBallAndLeavesItFirst) {
   const auto hit =
       surfaceUnder(bandOf(two), two->solidBounds, {.origin = V3d(0), .direction = {0, 0, 1}});
   ASSERT_TRUE(hit.has_value());
-  EXPECT_NEAR(hit->position.z, 2, support::measured(1e-9));
+  EXPECT_NEAR(hit->position.z, 2, 1e-3);
 }
 
 TEST(PointText, ReadsBackTheSameBits) {
@@ -221,13 +220,13 @@ TEST(PatchPreview, DrawsGreatCirclesOnABall) {
   };
   design.corners = {at(0), at(80)};
   const PatchPaths sides = sidesOf(bandOf(model), design);
-  EXPECT_NEAR(mapping::pathLength(sides[0]), 80 * std::numbers::pi / 180, support::measured(1e-9));
+  EXPECT_NEAR(mapping::pathLength(sides[0]), 80 * std::numbers::pi / 180, 5e-3);
   EXPECT_TRUE(sides[1].empty());
   // A side through a point beside the great circle is longer: two arcs.
   design.sides[0] = {V3d(0, 0.6, 0.8)};
   const double first = std::acos(0.8),
                second = std::acos(0.8 * std::cos(80 * std::numbers::pi / 180));
-  EXPECT_NEAR(mapping::pathLength(sidesOf(bandOf(model), design)[0]), first + second, support::measured(1e-9));
+  EXPECT_NEAR(mapping::pathLength(sidesOf(bandOf(model), design)[0]), first + second, 1e-2);
 }
 
 /// A patch in the middle of the ball, a third as large as that of kClockwise.
@@ -258,8 +257,8 @@ TEST(PatchPreview, TexturesTheSolidAndWritesTheActions) {
     const double before = levelset::measure(bandOf(model)).volume,
                  after = levelset::measure(bandOf(preview.model)).volume;
     const V2d size = sizeOf(preview.sides);
-    EXPECT_GT(after - before, 2 * preview.height * size.x * size.y) << textureName(kind);
-    EXPECT_LT(after - before, 0.01 * preview.height * size.x * size.y) << textureName(kind);
+    EXPECT_GT(after - before, 0.2 * preview.height * size.x * size.y) << textureName(kind);
+    EXPECT_LT(after - before, 1.3 * preview.height * size.x * size.y) << textureName(kind);
     EXPECT_EQ(preview.chainText, "");  // the model is from no file
     Model read = *model;
     read.files = {"it's.ply"};
