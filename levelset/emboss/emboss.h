@@ -65,7 +65,7 @@ struct EmbossOperator {
   static const OperatorText text;
   static constexpr Slope slope = Slope::OfOperands;
   static constexpr double partTolerance = kDistanceTolerance;
-  static constexpr ErrorModel errorModel{2, kTriangleError, kCreaseError, "emboss-ball"};
+  static constexpr ErrorModel errorModel{2, 0.5, kCreaseError, "emboss-ball"};
 
   struct Options {
     std::vector<Imath::V3d> curve;   ///< world units; empty: `points` are given
