@@ -1,11 +1,14 @@
 #include "levelset/files/band_parts_writer.h"
 
 #include <fmt/core.h>
+#include <openvdb/io/Compression.h>
+#include <openvdb/io/DelayedLoadMetadata.h>
 #include <openvdb/tools/Count.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstdint>
+#include <cstdlib>
 #include <fstream>
 #include <map>
 #include <system_error>
@@ -102,6 +105,32 @@ class StoredGrid : public FloatGrid {
     return openvdb::tools::memUsageIfLoaded(tree());
   }
 
+  /// Adds the sizes of the compressed leaves, which let OpenVDB load leaves later. OpenVDB's own
+  /// writer reads the values of all leaves for it.
+  void addLeafSizes(std::uint32_t compression) {
+    namespace io = openvdb::io;
+    const openvdb::Index32 count = tree().leafCount();
+    auto sizes = std::make_shared<io::DelayedLoadMetadata>();
+    sizes->resizeMask(count);
+    const bool isCompressed = (compression & (io::COMPRESS_BLOSC | io::COMPRESS_ZIP)) != 0;
+    if (isCompressed) sizes->resizeCompressedSize(count);
+    std::size_t i = 0;
+    for (auto leaf = tree().cbeginLeaf(); leaf; ++leaf, ++i) {
+      LeafBlock full(*leaf);
+      store_.get(full);
+      using Mask = LeafBlock::NodeMaskType;
+      const io::MaskCompress<float, Mask> mask(full.valueMask(), Mask(), full.buffer().data(),
+                                               tree().background());
+      sizes->setMask(i, mask.metadata);
+      if (!isCompressed) continue;
+      const std::size_t bytes =
+          io::writeCompressedValuesSize(full.buffer().data(), LeafBlock::SIZE, full.valueMask(),
+                                        mask.metadata, false, compression);
+      sizes->setCompressedSize(i, static_cast<std::int64_t>(sizeof(std::int64_t) + bytes));
+    }
+    insertMeta(META_FILE_DELAYED_LOAD, *sizes);
+  }
+
   void writeBuffers(std::ostream& out) const override {
     hash_ = hashOfHeader(*this);
     for (auto leaf = tree().cbeginLeaf(); leaf; ++leaf) {
@@ -124,6 +153,25 @@ class StoredGrid : public FloatGrid {
 
   LeafStore& store_;
   std::uint64_t& hash_;
+};
+
+/// Keeps OpenVDB's writer from reading the values of all leaves for the sizes of the leaves.
+class NoLeafSizes {
+ public:
+  NoLeafSizes() : wasSet_(std::getenv(kVariable) != nullptr) {
+    if (!wasSet_) ::setenv(kVariable, "1", 0);
+  }
+  ~NoLeafSizes() {
+    if (!wasSet_) ::unsetenv(kVariable);
+  }
+  /// Returns false if the user has switched the sizes off.
+  [[nodiscard]] bool areWanted() const { return !wasSet_; }
+  NoLeafSizes(const NoLeafSizes&) = delete;
+  NoLeafSizes& operator=(const NoLeafSizes&) = delete;
+
+ private:
+  static constexpr const char* kVariable = "OPENVDB_DISABLE_DELAYED_LOAD";
+  bool wasSet_;
 };
 
 /// Members of BandPartsWriter.
@@ -282,6 +330,8 @@ void BandPartsWriter::commit() {
   std::uint64_t hash = 0;
   const auto grid = std::make_shared<band_parts::StoredGrid>(all.topology, all.store, hash);
   nameGrid(*grid, *all.transform, all.options.name, openvdb::GRID_LEVEL_SET);
+  const band_parts::NoLeafSizes ownSizes;
+  if (ownSizes.areWanted()) grid->addLeafSizes(openvdb::io::Archive().compression());
   writeTarget(all.path, [&](const std::filesystem::path& target) {
     writeVdb(
         target, grid, [&] { return hash; }, all.options.progress);

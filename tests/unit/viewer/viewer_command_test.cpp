@@ -300,7 +300,6 @@ TEST_F(SlowViewerCommand, TexturesTheBunny) {
   ASSERT_EQ(lines.size(), 2u) << measured.out;
   const double before = Json::parse(lines[0])["volume"].get<double>(),
                after = Json::parse(lines[1])["volume"].get<double>();
-  // The scales add FIGURE % to the volume.
   EXPECT_GT(after, 1.01 * before);
   EXPECT_LT(after, 1.06 * before);
 }
