@@ -210,6 +210,13 @@ typename GridT::Ptr namedGrid(const GridT& source, const std::string& name) {
   return grid;
 }
 
+void writeWhole(const fs::path& path, const openvdb::GridBase::ConstPtr& grid,
+                const std::function<std::uint64_t()>& hash, const Progress& progress) {
+  writeVdb(
+      path, static_cast<double>(grid->memUsage()), [&](std::ostream& out) { writeGrid(out, grid); },
+      hash, progress);
+}
+
 // === Information
 
 template <typename T>
@@ -294,7 +301,7 @@ void writeBand(const fs::path& path, const NarrowBand& band, const WriteBandOpti
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   writeTarget(path, [&](const fs::path& target) {
     if (format == "vdb")
-      return writeVdb(
+      return writeWhole(
           target, grid, [&] { return band.contentHash(); }, options.progress);
     report(options.progress, 0);
     writeNanoGrid(target, *grid);
@@ -315,7 +322,7 @@ void writeField(const fs::path& path, const FieldGrid& field, const WriteBandOpt
   else
     grid = namedGrid(*source.vector, options.name);
   writeTarget(path, [&](const fs::path& target) {
-    writeVdb(
+    writeWhole(
         target, grid, [&] { return field.contentHash(); }, options.progress);
   });
 }

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdint>
-#include <cstdlib>
 #include <fstream>
 #include <map>
 #include <system_error>
@@ -98,17 +97,19 @@ class StoredGrid : public FloatGrid {
   StoredGrid(const FloatTree::Ptr& tree, LeafStore& store, std::uint64_t& hash)
       : FloatGrid(tree), store_(store), hash_(hash) {}
 
-  [[nodiscard]] openvdb::GridBase::Ptr copyGrid() override { return copy(); }
-  [[nodiscard]] openvdb::GridBase::ConstPtr copyGrid() const override { return copy(); }
   /// Memory of the grid with its values. It is written to the file.
   [[nodiscard]] openvdb::Index64 memUsage() const override {
     return openvdb::tools::memUsageIfLoaded(tree());
   }
 
-  /// Adds the sizes of the compressed leaves, which let OpenVDB load leaves later. OpenVDB's own
-  /// writer reads the values of all leaves for it.
-  void addLeafSizes(std::uint32_t compression) {
+  /// Adds the metadata that OpenVDB's writer adds: the statistics, and the sizes of the compressed
+  /// leaves, which let a reader load leaves later.
+  void addStatistics() {
     namespace io = openvdb::io;
+    const std::uint32_t compression = vdbCompression();
+    addStatsMetadata();
+    insertMeta(META_FILE_COMPRESSION,
+               openvdb::StringMetadata(io::compressionToString(compression)));
     const openvdb::Index32 count = tree().leafCount();
     auto sizes = std::make_shared<io::DelayedLoadMetadata>();
     sizes->resizeMask(count);
@@ -143,35 +144,8 @@ class StoredGrid : public FloatGrid {
   }
 
  private:
-  [[nodiscard]] std::shared_ptr<StoredGrid> copy() const {
-    const auto result = std::make_shared<StoredGrid>(
-        openvdb::ConstPtrCast<FloatTree>(constTreePtr()), store_, hash_);
-    result->insertMeta(*this);
-    result->setTransform(openvdb::ConstPtrCast<openvdb::math::Transform>(constTransformPtr()));
-    return result;
-  }
-
   LeafStore& store_;
   std::uint64_t& hash_;
-};
-
-/// Keeps OpenVDB's writer from reading the values of all leaves for the sizes of the leaves.
-class NoLeafSizes {
- public:
-  NoLeafSizes() : wasSet_(std::getenv(kVariable) != nullptr) {
-    if (!wasSet_) ::setenv(kVariable, "1", 0);
-  }
-  ~NoLeafSizes() {
-    if (!wasSet_) ::unsetenv(kVariable);
-  }
-  /// Returns false if the user has switched the sizes off.
-  [[nodiscard]] bool areWanted() const { return !wasSet_; }
-  NoLeafSizes(const NoLeafSizes&) = delete;
-  NoLeafSizes& operator=(const NoLeafSizes&) = delete;
-
- private:
-  static constexpr const char* kVariable = "OPENVDB_DISABLE_DELAYED_LOAD";
-  bool wasSet_;
 };
 
 /// Members of BandPartsWriter.
@@ -330,11 +304,12 @@ void BandPartsWriter::commit() {
   std::uint64_t hash = 0;
   const auto grid = std::make_shared<band_parts::StoredGrid>(all.topology, all.store, hash);
   nameGrid(*grid, *all.transform, all.options.name, openvdb::GRID_LEVEL_SET);
-  const band_parts::NoLeafSizes ownSizes;
-  if (ownSizes.areWanted()) grid->addLeafSizes(openvdb::io::Archive().compression());
+  grid->addStatistics();
   writeTarget(all.path, [&](const std::filesystem::path& target) {
     writeVdb(
-        target, grid, [&] { return hash; }, all.options.progress);
+        target, static_cast<double>(grid->memUsage()),
+        [&](std::ostream& out) { writeGridWithItsMetadata(out, *grid); }, [&] { return hash; },
+        all.options.progress);
   });
 }
 

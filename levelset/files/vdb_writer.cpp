@@ -1,10 +1,13 @@
 #include "levelset/files/vdb_writer.h"
 
 #include <fmt/core.h>
+#include <openvdb/io/GridDescriptor.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <fstream>
+#include <memory>
+#include <ostream>
 #include <system_error>
 #include <vector>
 
@@ -46,8 +49,33 @@ class ReportingFile : public std::filebuf {
 
 /// OpenVDB's writer for any seekable stream. It stores the byte offsets of the grids.
 struct StreamArchive : openvdb::io::Archive {
-  void writeGrids(std::ostream& out, const openvdb::GridBase::ConstPtr& grid) const {
+  void writeAll(std::ostream& out, const openvdb::GridBase::ConstPtr& grid) const {
     Archive::write(out, openvdb::GridCPtrVec{grid}, true, openvdb::MetaMap());
+  }
+
+  /// The steps of Archive::write() for one grid.
+  void writeInSteps(std::ostream& out, const openvdb::GridBase& grid) const {
+    auto metadata = std::make_shared<openvdb::io::StreamMetadata>();
+    openvdb::io::setStreamMetadataPtr(out, metadata, true);
+    writeHeader(out, true);
+    openvdb::MetaMap().writeMeta(out);
+    const std::int32_t count = 1;
+    out.write(reinterpret_cast<const char*>(&count), sizeof count);
+    openvdb::io::GridDescriptor descriptor(grid.getName(), grid.type(), grid.saveFloatAsHalf());
+    descriptor.writeHeader(out);
+    const std::streampos offsets = out.tellp();
+    descriptor.writeStreamPos(out);
+    descriptor.setGridPos(out.tellp());
+    setGridCompression(out, grid);
+    grid.writeMeta(out);
+    grid.writeTransform(out);
+    grid.writeTopology(out);
+    descriptor.setBlockPos(out.tellp());
+    grid.writeBuffers(out);
+    descriptor.setEndPos(out.tellp());
+    out.seekp(offsets);
+    descriptor.writeStreamPos(out);
+    descriptor.seekToEnd(out);
   }
 };
 
@@ -67,17 +95,29 @@ void nameGrid(openvdb::GridBase& grid, const openvdb::math::Transform& transform
   grid.setCreator("Levelsmith");
 }
 
-void writeVdb(const fs::path& path, const openvdb::GridBase::ConstPtr& grid,
+void writeGrid(std::ostream& out, const openvdb::GridBase::ConstPtr& grid) {
+  StreamArchive().writeAll(out, grid);
+}
+
+void writeGridWithItsMetadata(std::ostream& out, const openvdb::GridBase& grid) {
+  StreamArchive().writeInSteps(out, grid);
+}
+
+std::uint32_t vdbCompression() {
+  return StreamArchive().compression();
+}
+
+void writeVdb(const fs::path& path, double bytes, const std::function<void(std::ostream&)>& write,
               const std::function<std::uint64_t()>& hash, const Progress& progress) {
   openvdb::initialize();
   report(progress, 0);
   std::vector<char> buffer(1 << 20);
-  ReportingFile file(progress, static_cast<double>(grid->memUsage()));
+  ReportingFile file(progress, bytes);
   file.pubsetbuf(buffer.data(), static_cast<std::streamsize>(buffer.size()));
   std::ostream out(&file);
   out.exceptions(std::ios::badbit | std::ios::failbit);
   if (!file.open(path, std::ios::out | std::ios::binary)) out.setstate(std::ios::failbit);
-  StreamArchive().writeGrids(out, grid);
+  write(out);
   out.seekp(kIdentifierOffset);
   const std::string identifier = identifierText(hash());
   out.write(identifier.data(), static_cast<std::streamsize>(identifier.size()));

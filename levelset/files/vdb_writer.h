@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <iosfwd>
 #include <string>
 
 #include "levelset/progress.h"
@@ -16,11 +17,24 @@ namespace levelset {
 void nameGrid(openvdb::GridBase& grid, const openvdb::math::Transform& transform,
               const std::string& name, openvdb::GridClass gridClass);
 
-/// Writes a grid as a .vdb file. The content hash replaces OpenVDB's random identifier, so equal
+/// Writes a .vdb file of one grid with OpenVDB's writer.
+void writeGrid(std::ostream& out, const openvdb::GridBase::ConstPtr& grid);
+
+/// Writes a .vdb file of one grid as writeGrid() does, but leaves the statistics in the metadata to
+/// the caller. OpenVDB's writer computes them from the values, which need not be in memory.
+void writeGridWithItsMetadata(std::ostream& out, const openvdb::GridBase& grid);
+
+/// Compression of the leaves in the files of writeGrid().
+[[nodiscard]] std::uint32_t vdbCompression();
+
+/// Writes a .vdb file. The content hash replaces OpenVDB's random identifier, so equal
 /// grids give equal bytes.
-/// @param hash  returns the content hash; called after the grid has been written
+/// @param bytes  number of bytes without compression, for the progress
+/// @param write  calls writeGrid() or writeGridWithItsMetadata()
+/// @param hash   returns the content hash; called after the grid has been written
 /// @throws std::ios_base::failure when the file cannot be written
-void writeVdb(const std::filesystem::path& path, const openvdb::GridBase::ConstPtr& grid,
+void writeVdb(const std::filesystem::path& path, double bytes,
+              const std::function<void(std::ostream&)>& write,
               const std::function<std::uint64_t()>& hash, const Progress& progress);
 
 /// Writes a file by way of a temporary file, which replaces the target when it is complete.
