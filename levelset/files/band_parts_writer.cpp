@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <fstream>
 #include <map>
+#include <optional>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -151,12 +152,12 @@ class StoredGrid : public FloatGrid {
 /// Members of BandPartsWriter.
 struct WriterState {
   WriterState(fs::path target, WriteBandOptions settings)
-      : path(std::move(target)), options(std::move(settings)), store(path) {}
+      : path(std::move(target)), options(std::move(settings)), store(std::in_place, path) {}
 
   fs::path path;
   WriteBandOptions options;
-  LeafStore store;
-  FloatTree::Ptr topology;  // leaves without values
+  std::optional<LeafStore> store;  // empty after commit()
+  FloatTree::Ptr topology;         // leaves without values
   openvdb::math::Transform::Ptr transform;
   // By the origin of a cell with leaves: true if its first and its last grid point are inside.
   std::map<Coord, std::pair<bool, bool>> signs;
@@ -176,7 +177,7 @@ struct WriterState {
   void addLeaves(const FloatTree& part, const CoordBBox& box) {
     for (auto leaf = part.cbeginLeaf(); leaf; ++leaf) {
       if (!box.isInside(leaf->origin())) continue;
-      store.put(*leaf);
+      store->put(*leaf);
       auto copy = std::make_unique<LeafBlock>(openvdb::PartialCreate(), leaf->origin(),
                                               topology->background());
       copy->setValueMask(leaf->valueMask());
@@ -300,9 +301,9 @@ void BandPartsWriter::commit() {
     throw InvalidInput(
         fmt::format("there is no band to write to '{}'; create one first", all.path.string()));
   all.fillInside();
-  all.store.beginReading();
+  all.store->beginReading();
   std::uint64_t hash = 0;
-  const auto grid = std::make_shared<band_parts::StoredGrid>(all.topology, all.store, hash);
+  const auto grid = std::make_shared<band_parts::StoredGrid>(all.topology, *all.store, hash);
   nameGrid(*grid, *all.transform, all.options.name, openvdb::GRID_LEVEL_SET);
   grid->addStatistics();
   writeTarget(all.path, [&](const std::filesystem::path& target) {
@@ -311,6 +312,7 @@ void BandPartsWriter::commit() {
         [&](std::ostream& out) { writeGridWithItsMetadata(out, *grid); }, [&] { return hash; },
         all.options.progress);
   });
+  all.store.reset();
 }
 
 }  // namespace levelset

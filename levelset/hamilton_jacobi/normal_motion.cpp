@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -16,8 +17,10 @@ namespace {
 using NormalBlock = PaddedLeaf<3>;
 
 /// One-sided slopes of φ at a grid point of a block, voxels per voxel.
-/// @param unit  factor from world units to voxels
-OneSidedSlopes slopesAt(const NormalBlock& block, const openvdb::Coord& c, double unit, int order) {
+/// @param unit    factor from world units to voxels
+/// @param beyond  stencils that read |φ| of this size or more, world units, are of first order
+OneSidedSlopes slopesAt(const NormalBlock& block, const openvdb::Coord& c, double unit,
+                        float beyond, int order) {
   constexpr std::ptrdiff_t kSteps[] = {NormalBlock::kStepX, NormalBlock::kStepY, 1};
   const float* const here = block.at(c[0], c[1], c[2]);
   OneSidedSlopes result;
@@ -28,8 +31,11 @@ OneSidedSlopes slopesAt(const NormalBlock& block, const openvdb::Coord& c, doubl
       up[k] = unit * static_cast<double>(here[step * (static_cast<std::ptrdiff_t>(k) - 3)]);
     down[0] = unit * static_cast<double>(here[step * 3]);
     for (std::size_t k = 1; k < 6; ++k) down[k] = up[6 - k];
-    result.lower[axis] = upwindDerivative(up, order);
-    result.upper[axis] = -upwindDerivative(down, order);
+    bool isInside = true;
+    for (std::ptrdiff_t k = -3; k <= 3; ++k)
+      isInside = isInside && std::abs(here[step * k]) < beyond;
+    result.lower[axis] = upwindDerivative(up, isInside ? order : 1);
+    result.upper[axis] = -upwindDerivative(down, isInside ? order : 1);
   }
   return result;
 }
@@ -42,6 +48,7 @@ void normalStage(const openvdb::FloatGrid& start, const openvdb::FloatGrid& fiel
   std::vector<LeafNode*> leaves;
   result.tree().getNodes(leaves);
   const double unit = 1 / result.voxelSize()[0];
+  const float beyond = motion.endsWithJump ? result.background() : HUGE_VALF;
   tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
     const openvdb::Coord origin = leaves[i]->origin();
     const LeafNode *first = start.tree().probeConstLeaf(origin),
@@ -55,7 +62,7 @@ void normalStage(const openvdb::FloatGrid& start, const openvdb::FloatGrid& fiel
       const NormalTerms terms = motion.terms(phi, static_cast<double>(second->getValue(it.pos())));
       double rate = terms.source;
       if (terms.speed != 0)
-        rate -= terms.speed * godunovSlope(slopesAt(block, c, unit, order), terms.speed);
+        rate -= terms.speed * godunovSlope(slopesAt(block, c, unit, beyond, order), terms.speed);
       it.setValue(static_cast<float>(share * static_cast<double>(first->getValue(it.pos())) +
                                      (1 - share) * (phi + dt * rate)));
     }

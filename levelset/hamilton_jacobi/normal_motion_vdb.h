@@ -20,6 +20,9 @@ struct NormalTerms {
 struct NormalMotion {
   const openvdb::FloatGrid& field;  ///< the second field, with all leaves of φ
   std::function<NormalTerms(double phi, double field)> terms;
+  /// |φ| jumps to the background beyond the active grid points. Stencils that reach there are then
+  /// of first order, because higher orders overshoot.
+  bool endsWithJump = false;
 };
 
 /// Computes one step on the active grid points with Godunov's gradient. Other grid points keep

@@ -137,7 +137,11 @@ NarrowBand pdeRedistance(const NarrowBand& field, const PdeRedistanceOptions& op
       onDomain(vdb(field), domain, std::max(backgroundOf(reach + 1, h), vdb(field).background()),
                backgroundOf(halfWidth + flow::kPdeDelay + 1, h));
   const FloatGrid::Ptr sign = smearedSign(*phi);
-  const flow::NormalMotion motion{*sign, [](double, double s) { return flow::NormalTerms{s, s}; }};
+  const flow::NormalMotion motion{*sign,
+                                  [](double, double s) {
+                                    return flow::NormalTerms{s, s};
+                                  },
+                                  true};
   const int steps = flow::pdeSteps(halfWidth);
   for (int n = 0; n < steps; ++n) {
     phi = flow::normalStep(*phi, motion, orders, flow::kPdeStep * h);

@@ -17,9 +17,10 @@ inline constexpr double kPdeDelay = 3;
 inline constexpr double kPdeBytes = 48;
 
 /// Number of grid points on each side of the surface, along each axis, on which the equation is
-/// solved. Three more than the half width: the high orders read two grid points ahead of the front.
+/// solved. The stencils of the outer three are of first order, and the band's own read two grid
+/// points ahead of it.
 [[nodiscard]] inline int pdeReach(double halfWidth) {
-  return static_cast<int>(std::ceil(halfWidth)) + 3;
+  return static_cast<int>(std::ceil(halfWidth)) + 5;
 }
 
 /// Number of steps until the fronts have crossed the band.

@@ -137,9 +137,11 @@ void SpeedMorph::step(double longest) {
   const double h = phi_->voxelSize()[0], fastest = largestSpeed(kWorkingWidth);
   double dt = std::min(longest, kSpeedRelaxation);
   if (fastest * dt > kSpeedCourant) dt = kSpeedCourant / fastest;
-  const flow::NormalMotion motion{*goal_, [h](double phi, double goal) {
+  const flow::NormalMotion motion{*goal_,
+                                  [h](double phi, double goal) {
                                     return flow::NormalTerms{cutOffAt(phi, h) * (phi - goal), 0};
-                                  }};
+                                  },
+                                  false};
   const openvdb::FloatGrid::Ptr moved = flow::normalStep(*phi_, motion, {}, dt);
   time_ += dt;
   if (changedSides(*phi_, *moved)) lastChange_ = time_;

@@ -13,6 +13,10 @@
 namespace pipeline {
 namespace {
 
+/// Memory of a result that is written in parts for each of its active voxels, bytes: 200 for a
+/// block, which has about 170 active voxels.
+constexpr double kBytesPerWrittenVoxel = 1.2;
+
 /// Name of an action, with its --as name.
 std::string labelOf(const Node& node) {
   return node.op->name + (node.name.empty() ? "" : " @" + node.name);
@@ -215,7 +219,11 @@ double estimatePeak(const Graph& graph, const std::vector<char>& runs,
 }
 
 std::optional<std::size_t> findPartedWrite(const Graph& graph, const std::vector<char>& runs,
-                                           const std::vector<std::optional<Plan>>& plans) {
+                                           const std::vector<std::optional<Plan>>& plans,
+                                           const std::vector<RegionOfInterest>& regions,
+                                           std::size_t maxMemory) {
+  const auto limit = static_cast<double>(maxMemory);
+  if (!graph.results.empty() || !(estimatePeak(graph, runs, plans, regions) > limit)) return {};
   const auto isBand = [&](std::size_t node) { return graph.nodes[node].kind == Kind::Band; };
   std::optional<std::size_t> last;
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
@@ -228,6 +236,8 @@ std::optional<std::size_t> findPartedWrite(const Graph& graph, const std::vector
       if (node.op->name != "write" || write.text("file") == "-" || !isBand(inputs[0])) return {};
       if (!levelset::isPartsFormat(write.text(write.given("format") ? "format" : "file")))
         return {};
+      const std::optional<Plan>& result = plans[inputs[0]];
+      if (!result || result->activeVoxels() * kBytesPerWrittenVoxel > limit / 2) return {};
       last = i;
     } else if (isBand(i)) {
       const auto bands = std::count_if(inputs.begin(), inputs.end(), isBand);
@@ -296,9 +306,7 @@ void explain(const Graph& graph, std::size_t maxMemory, bool fullValues,
       findPeak(graph, runs, plans, regions, worked).bytes * 1e-6, inSeconds(seconds),
       untimed.empty() ? ""
                       : fmt::format(", plus {}, whose time is unknown", fmt::join(untimed, ", ")));
-  const bool mayBeParted =
-      !fullValues && estimatePeak(graph, runs, plans, regions) > static_cast<double>(maxMemory) &&
-      graph.results.empty() && findPartedWrite(graph, runs, plans);
+  const bool mayBeParted = !fullValues && findPartedWrite(graph, runs, plans, regions, maxMemory);
   if (mayBeParted)
     text += "this exceeds the memory limit, so the result would be computed in parts\n";
   print(text);

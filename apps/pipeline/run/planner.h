@@ -46,15 +46,16 @@ void checkMemoryFor(const Graph& graph, const std::vector<char>& runs,
                                   const std::vector<std::optional<Plan>>& plans,
                                   const std::vector<RegionOfInterest>& regions);
 
-/// Finds the action that writes the only result of a graph, if the result can be computed in parts:
-/// a chain of actions on single bands that pass on a region of interest, then `write` to a `.vdb`
-/// file.
+/// Finds the action that writes the only result of a graph, if the estimated memory exceeds the
+/// limit and the result can be computed in parts: a chain of actions on single bands that pass on a
+/// region of interest, then `write` to a `.vdb` file.
 /// @param runs   one flag per node that runs
 /// @param plans  one plan of the complete value per node; empty: unknown size
-/// @return index of the action; empty: the result cannot be computed in parts
+/// @return index of the action; empty: the result is not computed in parts
 [[nodiscard]] std::optional<std::size_t> findPartedWrite(
     const Graph& graph, const std::vector<char>& runs,
-    const std::vector<std::optional<Plan>>& plans);
+    const std::vector<std::optional<Plan>>& plans, const std::vector<RegionOfInterest>& regions,
+    std::size_t maxMemory);
 
 /// Describes a run without running it: which actions run and why, the region of interest of each
 /// value, and the estimated time and memory. Reads meshes, but computes and writes nothing.

@@ -329,7 +329,7 @@ TEST_F(Refusal, UnavailableThreadsExitWithFour) {
                  "--threads: 100000");
   const std::string chain = " sphere --radius 1 --voxel 0.02 ! measure";
   bool isRefused = false, isTried = false;
-  for (int kilobytes = 140'000; kilobytes < 280'000; kilobytes += 20'000) {
+  for (int kilobytes = 140'000; kilobytes < 280'000; kilobytes += 5'000) {
     const std::string under = "ulimit -v " + std::to_string(kilobytes) + "; " + command();
     if (shell(under + " --version").code != 0) continue;  // its libraries alone exceed the limit
     isTried = true;

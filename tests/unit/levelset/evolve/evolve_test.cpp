@@ -246,7 +246,7 @@ TEST(Evolve, KnowsWorldNormalsOnTurnedGrids) {
   // A speed n·u is the translation by u.
   const NarrowBand moved = evolve(ball, speedExpression("0.7*nz"), 1).band;
   const DistanceError error = errorOf(moved, ballDistance(V3d(5, 0, 0.7), 1));
-  EXPECT_LT(error.largest, measured(4.93e-4));
+  EXPECT_LT(error.largest, measured(8.29e-4));
 }
 
 TEST(Evolve, MergesBalls) {

@@ -11,7 +11,6 @@
 
 #include "levelset/csg/csg.h"
 #include "levelset/error.h"
-#include "levelset/offset/morphology.h"
 #include "levelset/shapes/shapes.h"
 #include "levelset/transform/crop.h"
 #include "levelset/vdb.h"

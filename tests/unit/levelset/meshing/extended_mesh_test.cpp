@@ -161,7 +161,7 @@ TEST(ExtendedMesh, EqualsMarchingCubesWithoutFeatures) {
 
 TEST(ExtendedMesh, PutsVerticesOnOriginal) {
   // The facets are finer than the grid, so that the normals within a cell form no feature.
-  const TriMesh original = support::torusMesh(2, 0.8, 192, 96);
+  const TriMesh original = support::torusMesh(2, 0.8, 256, 128);
   const ExtendedMesh found =
       bandToExtendedMesh(meshToBand(original, 0.1).band, {.original = &original});
   EXPECT_EQ(found.missingCrossings, 0u);

@@ -78,7 +78,7 @@ TEST(ExtremeTextures, UnitsOfTheTextureDoNotMatter) {
   EXPECT_EQ(unit.euler, 0);
   for (const double factor : {1e-3, 1e3}) {
     const Measurement other = of(factor);
-    EXPECT_NEAR(other.volume, unit.volume, support::measured(8.84e-10) * unit.volume) << factor;
+    EXPECT_NEAR(other.volume, unit.volume, support::measured(2.77e-9) * unit.volume) << factor;
     EXPECT_EQ(other.euler, 0) << factor;
   }
 }
