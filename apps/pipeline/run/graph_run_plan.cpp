@@ -45,11 +45,8 @@ void GraphRun::planNodes() {
       values_.addUse(i);
     }
   }
-  const bool needsParts = isLimited() && estimatePeak(graph_, runs, plans_, regions_) >
-                                             static_cast<double>(settings_.maxMemory);
-  if (needsParts && graph_.results.empty() && !settings_.fullValues && !cache_ &&
-      !settings_.onValue)
-    partedWrite_ = findPartedWrite(graph_, runs, plans_);
+  if (isLimited() && !settings_.fullValues && !cache_ && !settings_.onValue)
+    partedWrite_ = findPartedWrite(graph_, runs, plans_, regions_, settings_.maxMemory);
   if (!partedWrite_) checkMemoryFor(graph_, runs, plans_, regions_, settings_.maxMemory);
 }
 

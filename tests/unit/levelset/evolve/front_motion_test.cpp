@@ -5,6 +5,7 @@
 #include "levelset/evolve/front_motion_vdb.h"
 #include "levelset/fields/expression.h"
 #include "levelset/hamilton_jacobi/hamiltonian.h"
+#include "tests/support/measured.h"
 
 /// Orders of the schemes, without redistancing.
 namespace front_motion_test {
