@@ -25,14 +25,10 @@ struct RedistanceOptions {
 /// surface. Includes the reconstruction of edges from the faces that meet there.
 inline constexpr double kReadBySurface = 6;
 
-/// Distance, in voxels, beyond which the end of a band at the cut of a region does not affect the
-/// bits of the surface. Near the cut the band is extended in blocks of 8³ grid points.
-inline constexpr double kCutReach = 24;
-
 /// Radius around a point, in voxels, within which the field determines the distance computed there.
 /// @param halfWidth  half width of the result, voxels
 [[nodiscard]] inline double distanceReach(double halfWidth) {
-  return halfWidth + kReadBySurface + kCutReach;
+  return halfWidth + 2 * kReadBySurface;
 }
 
 /// Recomputes the signed distance from a field, without moving the zero set. Beside the surface

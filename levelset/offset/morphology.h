@@ -64,6 +64,7 @@ struct MorphologyOperator {
   using Options = MorphologyOptions;
   static constexpr Slope slope = Slope::OfOperands;
   static constexpr double partTolerance = kDistanceTolerance;
+  static constexpr int distancePasses = 4;
 
   static ValuePlan plan(const Options& options, Plans operands, const OperatorRun& run);
   static RegionOfInterest regionOfInterest(const Options& options, const OperatorPlans& plans,
@@ -90,6 +91,7 @@ struct ShellOperator {
   static const OperatorText text;
   static constexpr Slope slope = Slope::OfOperands;
   static constexpr double partTolerance = kDistanceTolerance;
+  static constexpr int distancePasses = 3;
   static constexpr ErrorModel errorModel{2, kTriangleError, kCreaseError, "shell"};
 
   struct Options {

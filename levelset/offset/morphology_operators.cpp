@@ -43,8 +43,7 @@ RegionOfInterest MorphologyOperator::regionOfInterest(const Options& options,
                                                       const RegionOfInterest& ofResult) {
   if (options.mask) return {};
   const ValuePlan& solid = plans.operands[0];
-  const double away = distanceReach(solid.halfWidth) + kCutReach,
-               back = distanceReach(plans.result.halfWidth) + kCutReach;
+  const double away = distanceReach(solid.halfWidth), back = distanceReach(plans.result.halfWidth);
   const double reach = 2 * options.radius + (away + back) * solid.voxelSize;
   return {.region = grown(ofResult.region, reach)};
 }
@@ -121,8 +120,7 @@ RegionOfInterest ShellOperator::regionOfInterest(const Options& options, const O
                                                  std::size_t, const RegionOfInterest& ofResult) {
   if (options.mask) return {};
   const double width = plans.result.halfWidth, voxel = plans.operands[0].voxelSize;
-  const double reach =
-      options.thickness + (distanceReach(width) + kCutReach + seamReach(width)) * voxel;
+  const double reach = options.thickness + (distanceReach(width) + seamReach(width)) * voxel;
   return {.region = grown(ofResult.region, reach)};
 }
 

@@ -66,9 +66,8 @@ RegionOfInterest OffsetOperator::regionOfInterest(const Options& options,
                                                   const OperatorPlans& plans, std::size_t,
                                                   const RegionOfInterest& ofResult) {
   if (!options.distance || options.mask || *options.distance == 0) return {};
-  // Distances are computed twice, and each time from a band that is cut.
-  const double voxels = distanceReach(plans.result.halfWidth) + kCutReach;
-  const double reach = std::abs(*options.distance) + voxels * plans.operands[0].voxelSize;
+  const double reach = std::abs(*options.distance) +
+                       distanceReach(plans.result.halfWidth) * plans.operands[0].voxelSize;
   return {.halfWidth = kReadBySurface, .region = grown(ofResult.region, reach)};
 }
 

@@ -28,6 +28,7 @@
 ///   static constexpr bool takesMore = false;          // true: accepts more operands
 ///   static constexpr Slope slope = Slope::Any;
 ///   static constexpr double partTolerance = 0;        // voxels: accuracy of regionOfInterest()
+///   static constexpr int distancePasses = 1;          // distance transforms, one after another
 ///   static constexpr bool makesPart = false;          // run() computes only OperatorRun::roi
 ///   static constexpr bool makesSurface = false;       // true: the result is a surface band
 ///   static constexpr ErrorModel errorModel = {};

@@ -11,6 +11,10 @@ namespace {
 using Imath::Box3d;
 using Imath::V3d;
 
+/// Distance from the cut of a band, in voxels, beyond which a distance transform gives the bits of
+/// the complete band. It extends the band in the blocks of 8³ grid points beside the cut.
+constexpr double kCutReach = 20;
+
 /// Decides if an option of a node is a percentage of the diagonal of its first operand. A cropped
 /// operand would have another diagonal, so the node needs operands with their complete box.
 bool asksForSize(const Node& node) {
@@ -87,6 +91,7 @@ std::vector<RegionOfInterest> regionsOfInterest(const Graph& graph, const std::v
                                                 const std::vector<std::optional<Plan>>& plans,
                                                 double leastHalfWidth, const Box3d& part) {
   const std::vector<char> isDistance = findDistances(graph);
+  const bool isPart = !levelset::isEverywhere(part);
   std::vector<std::optional<RegionOfInterest>> regions(graph.nodes.size());
   for (const std::size_t result : graph.results) regions[result] = RegionOfInterest{.region = part};
   for (std::size_t i = graph.nodes.size(); i-- > 0;) {
@@ -102,8 +107,13 @@ std::vector<RegionOfInterest> regionsOfInterest(const Graph& graph, const std::v
       else
         regions[input] = roi;
     };
-    for (std::size_t k = 0; k < node.inputs.size(); ++k)
-      ask(node.inputs[k], readOf(node, k, *regions[i], plans, plans[i]));
+    for (std::size_t k = 0; k < node.inputs.size(); ++k) {
+      RegionOfInterest read = readOf(node, k, *regions[i], plans, plans[i]);
+      if (isPart && node.kind == Kind::Band && plans[node.inputs[k]])
+        read.region = levelset::grown(
+            read.region, kCutReach * node.op->distancePasses * plans[node.inputs[k]]->voxelSize);
+      ask(node.inputs[k], read);
+    }
     for (const auto& [option, input] : node.named) ask(input, {});
   }
   std::vector<RegionOfInterest> all(graph.nodes.size());

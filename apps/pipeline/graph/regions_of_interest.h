@@ -16,7 +16,8 @@ using levelset::RegionOfInterest;
 /// @param plans  one plan of the complete value per node; empty: unknown, so the complete value is
 ///        needed
 /// @param leastHalfWidth  smallest half width that is computed of any band, voxels; at least 1
-/// @param part  box of the requested results, world units
+/// @param part  box of the requested results, world units. In a smaller box than kEverywhere, the
+///        regions are so large that the results in it have the bits of complete results.
 /// @return       one region of interest per node; the complete value for nodes that do not run and
 ///               for values that are no bands
 [[nodiscard]] std::vector<RegionOfInterest> regionsOfInterest(

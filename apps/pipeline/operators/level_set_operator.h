@@ -193,6 +193,7 @@ void addEstimates(Operator& op) {
   using levelset::OperatorPlans;
   if constexpr (requires { Op::slope; }) op.slope = Op::slope;
   if constexpr (requires { Op::partTolerance; }) op.partTolerance = Op::partTolerance;
+  if constexpr (requires { Op::distancePasses; }) op.distancePasses = Op::distancePasses;
   if constexpr (requires { Op::makesPart; }) op.makesParts = Op::makesPart;
   if constexpr (requires { Op::errorModel; }) op.errorModel = Op::errorModel;
   if constexpr (requires(const Options& options) { Op::cost(options, OperatorPlans()); })

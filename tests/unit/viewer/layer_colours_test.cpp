@@ -17,7 +17,8 @@ using Bytes = std::vector<std::uint8_t>;
 /// Three pixels: two hits and the background.
 render::Image threePixels() {
   render::Image image(3, 1);
-  for (const char* name : {"R", "G", "B", "A", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z"})
+  for (const char* name :
+       {"R", "G", "B", "A", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "thickness"})
     image.addChannel(name);
   for (const char* name : {"mean", "gauss", "k1", "k2"})
     image.addChannel(std::string("curvature.") + name);

@@ -1,58 +1,96 @@
-// Results that exceed --max-memory are computed in parts, with the bits of the complete result.
+// Results that exceed the memory limit are computed in parts, with the bytes of the complete
+// result.
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <sstream>
 #include <string>
+#include <vector>
 
+#include "apps/pipeline/grammar/chain.h"
+#include "apps/pipeline/run/runner.h"
+#include "levelset/error.h"
 #include "tests/support/command_line.h"
 
 namespace parts_test {
 
 class Parts : public support::ShellTest {
  protected:
-  /// Runs a chain without and with a memory limit and compares the files.
-  void expectEqualFiles(const std::string& limit, const std::string& chain) {
-    const auto whole = levelsmith(chain + " ! write whole.vdb");
-    ASSERT_EQ(whole.code, 0) << whole.err;
-    EXPECT_EQ(whole.err.find("parts"), std::string::npos) << whole.err;
-    const auto parts = levelsmith("--max-memory " + limit + " " + chain + " ! write parts.vdb");
-    ASSERT_EQ(parts.code, 0) << parts.err;
-    EXPECT_NE(parts.err.find(" parts to stay within --max-memory"), std::string::npos) << parts.err;
-    EXPECT_EQ(support::slurp(folder_ / "whole.vdb") == support::slurp(folder_ / "parts.vdb"), true)
-        << chain;
+  /// Runs a chain in this process.
+  /// @param chain  words separated by spaces
+  /// @return notes of the run
+  static std::string run(const std::string& chain, std::size_t maxMemory, bool fullValues = false) {
+    std::istringstream text(chain);
+    std::vector<std::string> words;
+    for (std::string word; text >> word;) words.push_back(word);
+    std::string notes;
+    const auto silent = [](const std::string&) {};
+    pipeline::RunReport report;
+    pipeline::run(pipeline::parseChain(words),
+                  {.maxMemory = maxMemory,
+                   .fullValues = fullValues,
+                   .print = silent,
+                   .warn = silent,
+                   .note = [&](const std::string& note) { notes += note + "\n"; }},
+                  report);
+    return notes;
+  }
+
+  [[nodiscard]] std::string path(const char* name) const { return (folder_ / name).string(); }
+
+  /// Runs a chain with and without a memory limit, bytes, and compares the files.
+  void expectEqualFiles(std::size_t limit, const std::string& chain) {
+    const std::string whole = path("whole.vdb"), parts = path("parts.vdb");
+    EXPECT_EQ(run(chain + " ! write " + whole, levelset::kNoMemoryLimit), "");
+    const std::string notes = run(chain + " ! write " + parts, limit);
+    EXPECT_NE(notes.find(" parts to stay within --max-memory"), std::string::npos) << notes;
+    EXPECT_EQ(support::slurp(whole) == support::slurp(parts), true) << chain;
   }
 };
 
-TEST_F(Parts, OffsetsHaveTheBitsOfTheWhole) {
-  expectEqualFiles("160M", "torus --radius 4 --tube 1.3 --voxel 0.02 ! offset 4vx");
+TEST_F(Parts, OffsetsHaveTheBytesOfTheWhole) {
+  expectEqualFiles(12'000'000, "torus --radius 9 --tube 3 --voxel 0.1 ! offset 3vx");
 }
 
-TEST_F(Parts, GaussiansOfMeshesHaveTheBitsOfTheWhole) {
-  ASSERT_EQ(levelsmith("torus --radius 2 --tube 0.6 --voxel 0.1 ! mesh ! write t.ply").code, 0);
-  expectEqualFiles("160M", "read t.ply ! level-set --voxel 0.01 ! smooth --sigma 1vx");
+TEST_F(Parts, GaussiansOfMeshesHaveTheBytesOfTheWhole) {
+  run("torus --radius 2 --tube 0.6 --voxel 0.1 ! mesh ! write " + path("t.ply"),
+      levelset::kNoMemoryLimit);
+  expectEqualFiles(9'000'000,
+                   "read " + path("t.ply") + " ! level-set --voxel 0.02 ! smooth --sigma 1vx");
 }
 
 TEST_F(Parts, FilesAreReadInParts) {
-  ASSERT_EQ(levelsmith("box --size 9,8,2 --voxel 0.025 ! write in.vdb").code, 0);
+  run("box --size 30,28,5 --voxel 0.1 ! write " + path("in.vdb"), levelset::kNoMemoryLimit);
   // The inset leaves no surface in the outer parts.
-  expectEqualFiles("160M", "read in.vdb ! offset -0.6");
-}
-
-TEST_F(Parts, OtherChainsAreRefusedAsBefore) {
-  const std::string big = "sphere --radius 1 --voxel 0.004";
-  const std::string limited = "--max-memory 130M ";
-  EXPECT_EQ(levelsmith(limited + "--no-roi " + big + " ! write a.vdb").code, 4);
-  EXPECT_EQ(levelsmith(limited + big + " ! " + big + " --center 1,0,0 ! union ! write a.vdb").code,
-            4);
-  EXPECT_EQ(levelsmith(limited + big + " ! write a.nvdb").code, 4);
-  EXPECT_EQ(fileCount(), 0u);
+  expectEqualFiles(6'000'000, "read " + path("in.vdb") + " ! offset -1.7");
 }
 
 TEST_F(Parts, AResultWithoutSurfaceIsRefused) {
-  const auto outcome =
-      levelsmith("--max-memory 130M sphere --radius 1 --voxel 0.005 ! offset -1.2 ! write a.vdb");
-  EXPECT_EQ(outcome.code, 3) << outcome.err;
+  EXPECT_THROW(
+      run("box --size 30,28,5 --voxel 0.1 ! offset -3 ! write " + path("a.vdb"), 8'000'000),
+      levelset::InvalidInput);
   EXPECT_EQ(fileCount(), 0u);
+}
+
+TEST_F(Parts, OtherChainsAreRefused) {
+  const std::string big = "sphere --radius 10 --voxel 0.1";
+  constexpr std::size_t kLimit = 6'000'000;
+  const std::string target = path("a.vdb");
+  EXPECT_THROW(run(big + " ! write " + target, kLimit, true), levelset::ResourceLimit);
+  EXPECT_THROW(run(big + " ! " + big + " --center 1,0,0 ! union ! write " + target, kLimit),
+               levelset::ResourceLimit);
+  EXPECT_THROW(run(big + " ! write " + path("a.nvdb"), kLimit), levelset::ResourceLimit);
+  EXPECT_THROW(run(big + " ! mesh ! write " + path("a.ply"), kLimit), levelset::ResourceLimit);
+  EXPECT_EQ(fileCount(), 0u);
+}
+
+TEST_F(Parts, AreAnnouncedByExplain) {
+  const auto told = levelsmith(
+      "--max-memory 150M --explain sphere --radius 1 --voxel 0.002 ! write "
+      "a.vdb");
+  EXPECT_EQ(told.code, 0) << told.err;
+  EXPECT_NE(told.out.find("the result would be computed in parts"), std::string::npos) << told.out;
 }
 
 }  // namespace parts_test
