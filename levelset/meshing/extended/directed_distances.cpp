@@ -167,6 +167,11 @@ class OriginalMesh {
     triangles_.resize(mesh.triangles.size());
     for (std::size_t i = 0; i < triangles_.size(); ++i)
       for (std::size_t k = 0; k < 3; ++k) triangles_[i][k] = points[mesh.triangles[i][k]];
+    double volume = 0;
+    const Vec3d& origin = triangles_[0][0];
+    for (const Corners& t : triangles_)
+      volume += (t[0] - origin).dot((t[1] - origin).cross(t[2] - origin));
+    isInverted_ = volume < 0;
     tree_ = BoxTree(
         triangles_.size(),
         [&](std::uint32_t i, Vec3d& low, Vec3d& high) {
@@ -183,9 +188,11 @@ class OriginalMesh {
   struct Hit {
     double t = 0;  ///< share of the edge
     Vec3d normal;
+    bool isTurned = false;  ///< the normal was reversed, so that it faces the outer end
   };
   /// Returns the intersection with an edge that is nearest to the share `near` of the edge, the one
-  /// of the lowest triangle among equals. Its normal faces the outer end of the edge.
+  /// of the lowest triangle among equals. Its normal faces the outer end of the edge. Where the
+  /// edge leaves the solid, enters it and leaves it again, the entry is not taken.
   [[nodiscard]] std::optional<Hit> meet(const GridEdge& edge, double near) const {
     Vec3d middle = edge.low.asVec3d();
     middle[edge.axis] += 0.5;
@@ -198,6 +205,10 @@ class OriginalMesh {
         const std::uint32_t index = tree_.order()[i];
         const auto hit = meetTriangle(triangles_[index], edge);
         if (!hit) continue;
+        if (best && best->isTurned != hit->isTurned) {
+          if (best->isTurned) best = hit, bestIndex = index;
+          continue;
+        }
         const double gap = std::abs(hit->t - near), least = best ? std::abs(best->t - near) : 2;
         if (gap > least || (gap == least && index > bestIndex)) continue;
         best = hit;
@@ -229,7 +240,8 @@ class OriginalMesh {
               t, v, mesh.positions.size()));
   }
 
-  static std::optional<Hit> meetTriangle(const Corners& corners, const GridEdge& edge) {
+  [[nodiscard]] std::optional<Hit> meetTriangle(const Corners& corners,
+                                                const GridEdge& edge) const {
     const int u = (edge.axis + 1) % 3, v = (edge.axis + 2) % 3;
     const Vec3d line = edge.low.asVec3d();
     // Twice the areas, in the plane across the edge, of the triangles between the line and each
@@ -251,10 +263,13 @@ class OriginalMesh {
     Hit hit{std::clamp(position, 0.0, 1.0),
             (corners[1] - corners[0]).cross(corners[2] - corners[0])};
     if (!hit.normal.normalize(0)) return std::nullopt;
-    if ((hit.normal[edge.axis] > 0) != edge.lowInside) hit.normal = -hit.normal;
+    if (isInverted_) hit.normal = -hit.normal;
+    hit.isTurned = (hit.normal[edge.axis] > 0) != edge.lowInside;
+    if (hit.isTurned) hit.normal = -hit.normal;
     return hit;
   }
 
+  bool isInverted_ = false;  ///< the triangles are oriented inwards
   std::vector<Corners> triangles_;
   BoxTree tree_;
 };

@@ -61,9 +61,7 @@ TEST(BandPartsWriter, PartsGiveTheFileOfTheWhole) {
   const NarrowBand ball = levelset::makeSphere(20, V3d(3, -2, 1), 0.1);  // contains complete cells
   const auto [whole, parts] = bothFiles(ball, boxes);
   EXPECT_EQ(whole == parts, true);
-  const auto [hollow, hollowParts] = bothFiles(levelset::shell(ball, 9), boxes);
-  EXPECT_EQ(hollow == hollowParts, true);
-  const NarrowBand two = levelset::unite(levelset::makeBox(V3d(30, 3, 4), V3d(20, 0, 0), 0.1),
+  const NarrowBand two = levelset::unite(levelset::makeBox(V3d(30, 2, 2), V3d(20, 0, 0), 0.1),
                                          levelset::makeSphere(2, V3d(-30), 0.1));
   const auto [apart, apartParts] = bothFiles(two, boxes);
   EXPECT_EQ(apart == apartParts, true);
