@@ -150,7 +150,24 @@ Bounds morphBounds() {
 Bounds speedBounds() {
   return Bounds()
       .required("sphere to cube, by speed", "value_error", kMostLeft)
-      .required("torus to sphere, by speed", "value_error", kMostLeft);
+      .required("torus to sphere, by speed", "value_error", kMostLeft)
+      .measured("half-way between balls, by speed", "surface_linf_vx",
+                {{5, 0.00824}, {6, 0.00494}, {8, 0.00283}})
+      .measured("half-way between balls, by distances", "surface_linf_vx",
+                {{5, 0.00725}, {6, 0.00469}, {8, 0.00312}})
+      .measured("sphere to cube, by speed", "surface_linf_vx", {{5, 0.264}, {6, 0.247}, {8, 0.187}})
+      .measured("torus to sphere, by speed", "surface_linf_vx",
+                {{5, 0.0139}, {6, 0.0113}, {8, 0.00994}})
+      .measured("half-way between balls, by speed", "missed_hits",
+                {{5, 0.00478}, {6, 0.00135}, {8, 0.00105}})
+      .measured("half-way between balls, by distances", "missed_hits",
+                {{5, 0.00319}, {6, 0.00135}, {8, 0.00105}})
+      .measured("sphere to cube, by speed", "missed_hits", {{5, 0.0765}, {6, 0.09}, {8, 0.0409}})
+      .measured("sphere to cube, by distances", "missed_hits",
+                {{5, 0.0746}, {6, 0.09}, {8, 0.0409}})
+      .measured("torus to sphere, by speed", "missed_hits",
+                {{5, 0.00478}, {6, 0.00135}, {8, 0.00105}})
+      .measured("torus to sphere, by distances", "missed_hits", {{5, 0.00319}, {6, 0.00135}});
 }
 
 }  // namespace
