@@ -19,7 +19,8 @@ inline constexpr int kPartCell = 128;
 
 /// Writes a band to a `.vdb` file part by part, for bands that do not fit into memory. The values
 /// wait in a temporary file beside the target. Memory: about 200 bytes for each block of 8³ grid
-/// points of the complete band. The file has the bytes that writeBand() writes for the complete band.
+/// points of the complete band. The file has the bytes that writeBand() writes for the complete
+/// band.
 class BandPartsWriter {
  public:
   /// @param options  the format must be `.vdb`

@@ -117,8 +117,8 @@ class CellSurface {
 [[nodiscard]] openvdb::Vec3d crossingPoint(const CellSurface& surface, const SurfaceBlock& block,
                                            int x, int y, int z, int axis);
 
-/// Returns the point at the share `t` of the crossed edge that starts at `low`, in index space, with
-/// the distance from the ends that crossingPoint() keeps.
+/// Returns the point at the share `t` of the crossed edge that starts at `low`, in index space,
+/// with the distance from the ends that crossingPoint() keeps.
 /// @param t  in [0, 1]
 [[nodiscard]] openvdb::Vec3d pointOnEdge(const CellSurface& surface, const openvdb::Coord& low,
                                          int axis, double t);
