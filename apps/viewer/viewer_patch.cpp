@@ -52,7 +52,10 @@ void Viewer::takePreview() {
   const std::shared_ptr<const PatchPreview> preview = worker_->preview();
   if (!preview || preview == preview_) return;
   preview_ = preview;
-  editor_->setSides(preview->sides);
+  // The preview may be of an older design, with other corners.
+  const PatchDesign& design = editor_->design();
+  if (preview->design.corners == design.corners && preview->design.sides == design.sides)
+    editor_->setSides(preview->sides);
   if (!preview->failure.empty())
     showMessage(preview->failure);
   else if (preview->isFine && preview->patch)

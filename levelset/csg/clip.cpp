@@ -15,8 +15,8 @@ namespace {
 
 using Imath::V3d;
 
-InvalidInput nothingLeft() {
-  return InvalidInput(
+NoSurface nothingLeft() {
+  return NoSurface(
       "the result is empty, because the solid lies outside the box or in front of the plane; check "
       "the position of the box or plane");
 }
@@ -59,7 +59,7 @@ NarrowBand clipBy(const NarrowBand& solid, const Progress& progress, const Dista
 
 void requireSurface(const NarrowBand& solid) {
   requireSolid(solid);
-  if (solid.isEmpty()) throw InvalidInput("the solid is empty; give a solid with a surface");
+  if (solid.isEmpty()) throw NoSurface("the solid is empty; give a solid with a surface");
 }
 
 }  // namespace

@@ -51,6 +51,7 @@ struct SmoothOperator {
   static const OperatorText text;
   static constexpr Slope slope = Slope::One;
   static constexpr double partTolerance = kDistanceTolerance;
+  static constexpr int distancePasses = 2;
   static constexpr ErrorModel errorModel{2, kTriangleError, 0, "smooth"};
 
   struct Options {

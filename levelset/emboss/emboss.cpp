@@ -167,7 +167,7 @@ Field embossedField(const NarrowBand& solid, const Relief& relief, const CoordBB
   };
   try {
     field.distances = eikonal::distanceTransform(vdb(solid), request);
-  } catch (const InvalidInput&) {
+  } catch (const NoSurface&) {
     return field;  // the surface does not pass through the box
   }
   for (std::unique_ptr<EmbossLeaf>& leaf : made) field.grid->tree().addLeaf(leaf.release());

@@ -65,6 +65,7 @@ struct EmbossOperator {
   static const OperatorText text;
   static constexpr Slope slope = Slope::OfOperands;
   static constexpr double partTolerance = kDistanceTolerance;
+  static constexpr int distancePasses = 0;  // a part that the curve does not reach is refused
   static constexpr ErrorModel errorModel{2, 0.5, kCreaseError, "emboss-ball"};
 
   struct Options {

@@ -95,6 +95,9 @@ std::function<double(const V3d&)> weightOf(const EvolveOptions& options) {
   };
 }
 
+/// Memory of a step per active grid point, bytes: four fields, in blocks that are a third active.
+constexpr double kStageBytes = 4 * kBytesPerVoxel;
+
 /// The motion of one solid.
 class Evolution {
  public:
@@ -112,6 +115,7 @@ class Evolution {
 
   EvolveResult run(NarrowBand solid) {
     grid_ = distanceTo(vdb(solid), width_);
+    requireMemory(kStageBytes * static_cast<double>(grid_->activeVoxelCount()), options_.maxMemory);
     const flow::Duration duration{.from = options_.start,
                                   .to = end_,
                                   .progress = subProgress(options_.progress, 0, 0.99),

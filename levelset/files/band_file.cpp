@@ -135,12 +135,12 @@ struct ChosenGrid {
                       entry.name, name));
     }
     const std::size_t limit = memoryLimit(options.maxMemory);
-    if (!mapped) requireMemory(static_cast<double>(file.size()), limit);
+    if (!mapped || !mapped->isMapped()) requireMemory(static_cast<double>(file.size()), limit);
     VdbTreeLimits limits{.maxMemory = limit - file.size(),
                          .keepsTiles = keepsTiles,
                          .progress = subProgress(options.progress, 0.3, 0.9)};
     if (mapped) {
-      limits.maxMemory = limit;
+      if (mapped->isMapped()) limits.maxMemory = limit;
       limits.region = blocksOf(options.region, *entry.transform);
       limits.passed = [this](std::size_t end) { mapped->release(end); };
     }
@@ -182,8 +182,11 @@ auto readFrom(const fs::path& path, const ReadBandOptions& options, const Take& 
   try {
     report(options.progress, 0);
     if (!isEverywhere(options.region)) {
-      MappedFile mapped(path);
-      return take(ChosenGrid{mapped.view(), name, options, &mapped});
+      MappedFile mapped(path, options.maxMemory);
+      report(options.progress, 0.3);
+      auto part = take(ChosenGrid{mapped.view(), name, options, &mapped});
+      report(options.progress, 1);
+      return part;
     }
     const Bytes bytes = readBytes(path, options.maxMemory);
     report(options.progress, 0.3);
@@ -339,6 +342,10 @@ std::vector<GridInfo> bandFileInfo(const fs::path& path) {
 
 bool isBandFormat(const fs::path& nameOrFormat) {
   return !bandFormat(nameOrFormat).empty();
+}
+
+bool isVdbFormat(const fs::path& nameOrFormat) {
+  return bandFormat(nameOrFormat) == "vdb";
 }
 
 }  // namespace levelset

@@ -87,5 +87,7 @@ struct GridInfo {
 [[nodiscard]] std::vector<GridInfo> bandFileInfo(const std::filesystem::path& path);
 
 [[nodiscard]] bool isBandFormat(const std::filesystem::path& nameOrFormat);
+/// Returns true for the name of a `.vdb` file, and for "vdb".
+[[nodiscard]] bool isVdbFormat(const std::filesystem::path& nameOrFormat);
 
 }  // namespace levelset

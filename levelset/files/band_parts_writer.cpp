@@ -47,6 +47,7 @@ class LeafStore {
   }
 
   void put(const LeafBlock& leaf) {
+    errno = 0;
     file_.write(reinterpret_cast<const char*>(leaf.buffer().data()), kLeafBytes);
     if (!file_) fail();
     positions_[leaf.origin()] = count_++;
@@ -54,6 +55,7 @@ class LeafStore {
 
   /// Ends writing and begins reading.
   void beginReading() {
+    errno = 0;
     file_.close();
     if (!file_) fail();
     open(std::ios::in);
@@ -61,6 +63,7 @@ class LeafStore {
 
   /// Fills a leaf with the values stored for its origin.
   void get(LeafBlock& leaf) {
+    errno = 0;
     const std::uint64_t at = positions_.at(leaf.origin());
     if (at != next_) file_.seekg(static_cast<std::streamoff>(at) * kLeafBytes);
     leaf.buffer().allocate();
@@ -105,7 +108,7 @@ class StoredGrid : public FloatGrid {
 
   /// Adds the metadata that OpenVDB's writer adds: the statistics, and the sizes of the compressed
   /// leaves, which let a reader load leaves later.
-  void addStatistics() {
+  void addStatistics(const Progress& progress) {
     namespace io = openvdb::io;
     const std::uint32_t compression = vdbCompression();
     addStatsMetadata();
@@ -118,6 +121,8 @@ class StoredGrid : public FloatGrid {
     if (isCompressed) sizes->resizeCompressedSize(count);
     std::size_t i = 0;
     for (auto leaf = tree().cbeginLeaf(); leaf; ++leaf, ++i) {
+      constexpr std::size_t kReportInterval = 4096;  // leaves
+      if (i % kReportInterval == 0) report(progress, static_cast<double>(i) / count);
       LeafBlock full(*leaf);
       store_.get(full);
       using Mask = LeafBlock::NodeMaskType;
@@ -264,14 +269,9 @@ struct BandPartsWriter::Impl : band_parts::WriterState {
   using WriterState::WriterState;
 };
 
-bool isPartsFormat(const std::filesystem::path& nameOrFormat) {
-  return isBandFormat(nameOrFormat) && nameOrFormat.extension() != ".nvdb" &&
-         nameOrFormat != "nvdb";
-}
-
 BandPartsWriter::BandPartsWriter(const std::filesystem::path& path,
                                  const WriteBandOptions& options) {
-  if (!isPartsFormat(options.format.empty() ? path : std::filesystem::path(options.format)))
+  if (!isVdbFormat(options.format.empty() ? path : std::filesystem::path(options.format)))
     throw UsageError(
         fmt::format("'{}' cannot be written in parts, since only .vdb files can; end the name in "
                     ".vdb",
@@ -305,12 +305,12 @@ void BandPartsWriter::commit() {
   std::uint64_t hash = 0;
   const auto grid = std::make_shared<band_parts::StoredGrid>(all.topology, *all.store, hash);
   nameGrid(*grid, *all.transform, all.options.name, openvdb::GRID_LEVEL_SET);
-  grid->addStatistics();
+  grid->addStatistics(subProgress(all.options.progress, 0, 0.5));
   writeTarget(all.path, [&](const std::filesystem::path& target) {
     writeVdb(
         target, static_cast<double>(grid->memUsage()),
         [&](std::ostream& out) { writeGridWithItsMetadata(out, *grid); }, [&] { return hash; },
-        all.options.progress);
+        subProgress(all.options.progress, 0.5, 1));
   });
   all.store.reset();
 }

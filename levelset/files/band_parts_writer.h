@@ -14,9 +14,6 @@ namespace levelset {
 /// OpenVDB's lower internal node.
 inline constexpr int kPartCell = 128;
 
-/// Returns true for the name of a file, or of a format, that can be written in parts: `.vdb`.
-[[nodiscard]] bool isPartsFormat(const std::filesystem::path& nameOrFormat);
-
 /// Writes a band to a `.vdb` file part by part, for bands that do not fit into memory. The values
 /// wait in a temporary file beside the target. Memory: about 200 bytes for each block of 8³ grid
 /// points of the complete band. The file has the bytes that writeBand() writes for the complete

@@ -215,13 +215,13 @@ Bytes readBytes(const fs::path& path, std::size_t maxMemory) {
   return readAll(file, maxMemory);
 }
 
-MappedFile::MappedFile(const fs::path& path) {
+MappedFile::MappedFile(const fs::path& path, std::size_t maxMemory) {
   InputFile file(path);
   mapped_ = file.mapped();
   size_ = file.expectedSize();
   if (mapped_ && !isGzip(view())) return;
   if (mapped_) ::munmap(std::exchange(mapped_, nullptr), size_);
-  read_ = readAll(file, kNoMemoryLimit);
+  read_ = readAll(file, maxMemory);
 }
 
 MappedFile::~MappedFile() {

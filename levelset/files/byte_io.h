@@ -47,11 +47,13 @@ class Bytes {
 class MappedFile {
  public:
   /// @throws as readBytes
-  explicit MappedFile(const std::filesystem::path& path);
+  explicit MappedFile(const std::filesystem::path& path, std::size_t maxMemory = kNoMemoryLimit);
   ~MappedFile();
   MappedFile(const MappedFile&) = delete;
   MappedFile& operator=(const MappedFile&) = delete;
   [[nodiscard]] std::string_view view() const;
+  /// Returns false if the bytes were read into memory.
+  [[nodiscard]] bool isMapped() const { return mapped_ != nullptr; }
   /// Releases the pages before a byte offset from memory. They are loaded again when they are read
   /// again. Does nothing until many pages have been passed since the last call.
   void release(std::size_t end);

@@ -28,14 +28,14 @@
 ///   static constexpr bool takesMore = false;          // true: accepts more operands
 ///   static constexpr Slope slope = Slope::Any;
 ///   static constexpr double partTolerance = 0;        // voxels: accuracy of regionOfInterest()
-///   static constexpr int distancePasses = 1;          // distance transforms, one after another
-///   static constexpr bool makesPart = false;          // run() computes only OperatorRun::roi
-///   static constexpr bool makesSurface = false;       // true: the result is a surface band
-///   static constexpr ErrorModel errorModel = {};
-///   static void check(const Options&, const GivenOptions&);      // throws UsageError
-///   static double longestSide(const Options&, Plans operands);   // world units, for --resolution
-///   static ValuePlan plan(const Options&, Plans operands, const OperatorRun&);
-///   static RegionOfInterest regionOfInterest(const Options&, const OperatorPlans&, std::size_t
+///   static constexpr int distancePasses = 1;          // distance transforms in a row; 0: not in
+///   parts static constexpr bool makesPart = false;          // run() computes only
+///   OperatorRun::roi static constexpr bool makesSurface = false;       // true: the result is a
+///   surface band static constexpr ErrorModel errorModel = {}; static void check(const Options&,
+///   const GivenOptions&);      // throws UsageError static double longestSide(const Options&,
+///   Plans operands);   // world units, for --resolution static ValuePlan plan(const Options&,
+///   Plans operands, const OperatorRun&); static RegionOfInterest regionOfInterest(const Options&,
+///   const OperatorPlans&, std::size_t
 ///                                            operand, const RegionOfInterest& ofResult);
 ///   static std::optional<Cost> cost(const Options&, const OperatorPlans&);
 ///   static double leastRadius(const Options&);        // of the result's curvature, world units

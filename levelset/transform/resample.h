@@ -52,6 +52,7 @@ struct ResampleOperator {
   static const OperatorText text;
   static constexpr Slope slope = Slope::One;
   static constexpr double partTolerance = kDistanceTolerance;
+  static constexpr int distancePasses = 2;
   static constexpr ErrorModel errorModel{2, 0.65, 0, "resample-chain"};
 
   struct Options {

@@ -45,6 +45,7 @@ struct TransformOperator {
   static const OperatorText text;
   static constexpr Slope slope = Slope::OfOperands;
   static constexpr double partTolerance = kDistanceTolerance;  // voxels; without `bake` 0
+  static constexpr int distancePasses = 2;
   static constexpr ErrorModel errorModel{2, 0.65, 0, "resample-chain"};
 
   struct Options {

@@ -118,7 +118,8 @@ struct Operator {
   /// Largest difference, in voxels, between a value computed on the region of interest and the
   /// complete value.
   double partTolerance = 0;
-  /// Number of distance transforms that `run` applies one after another. Beside the cut of a
+  /// Number of distance transforms that `run` applies one after another; 0: the result cannot be
+  /// computed in parts, although there is a region of interest. Beside the cut of a
   /// region, each changes the last bits of the distances in a further layer of voxels.
   int distancePasses = 1;
   bool makesParts = false;  ///< `run` computes only the region of interest, Invocation::roi

@@ -35,7 +35,7 @@ void putActionBefore(const std::string& action, StepNotes& notes) {
 }
 
 /// Crops a band to a region of interest.
-/// @throws levelset::InvalidInput if the region contains no surface
+/// @throws levelset::NoSurface if the region contains no surface
 Value cropTo(const Value& value, const RegionOfInterest& roi) {
   if (value.kind() != Kind::Band) return value;
   levelset::NarrowBand part = levelset::cropped(value.band(), roi);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 #include <vector>
 
@@ -105,12 +106,15 @@ void GraphRun::runInParts(std::size_t write) {
   const double budget = kPartShare * static_cast<double>(settings_.maxMemory);
 
   Invocation writing(*node.op, node.options);
-  levelset::WriteBandOptions options{.name = writing.text("name")};
+  levelset::WriteBandOptions options{.name = writing.text("name"),
+                                     .format = writing.text("format")};
   options.progress = [&](double fraction) {
     if (settings_.progress) settings_.progress(write, node.op->name, fraction);
     return !settings_.shouldContinue || settings_.shouldContinue();
   };
-  levelset::BandPartsWriter file(writing.text("file"), options);
+  const std::string name = node.op->name;
+  std::optional<levelset::BandPartsWriter> file;
+  levelset::withContext(name, [&] { file.emplace(writing.text("file"), options); });
   RunSettings settings = settings_;
   settings.measureErrors = false;
   settings.thumbnails = 0;
@@ -142,8 +146,10 @@ void GraphRun::runInParts(std::size_t write) {
     RunReport report;
     try {
       const Value value = GraphRun(graph, settings, report).runPart(result);
-      requirePlainGrid(value.band());
-      file.add(value.band(), part);
+      levelset::withContext(name, [&] {
+        requirePlainGrid(value.band());
+        file->add(value.band(), part);
+      });
       ++count;
     } catch (const levelset::NoSurface&) {
       nothing = std::current_exception();  // the band does not reach this part
@@ -155,13 +161,12 @@ void GraphRun::runInParts(std::size_t write) {
     addSteps(report);
   }
   if (count == 0 && nothing) std::rethrow_exception(nothing);
-  const std::string name = node.op->name;
   if (settings_.begin) settings_.begin(name);
   StepReport& step = begin(write);
   StepClock clock(step, running_);
-  levelset::withContext(name, [&] { file.commit(); });
+  levelset::withContext(name, [&] { file->commit(); });
   clock.stop();
-  step.activeVoxels = static_cast<double>(file.activeVoxelCount());
+  step.activeVoxels = static_cast<double>(file->activeVoxelCount());
   for (std::size_t i = 0; i <= write; ++i)
     if (steps_[i] && !pendingOutput_[i]) queueOutput(i, "");
   reportInOrder();
@@ -180,11 +185,11 @@ void GraphRun::addSteps(const RunReport& part) {
     if (!steps_[i]) {
       steps_[i] = step;
       steps_[i]->roi = {};
+      if (plans_[i]) steps_[i]->activeVoxels = plans_[i]->activeVoxels();  // parts overlap
     } else {
       steps_[i]->wallSeconds += step.wallSeconds;
       steps_[i]->cpuSeconds += step.cpuSeconds;
       steps_[i]->peakBytes = std::max(steps_[i]->peakBytes, step.peakBytes);
-      steps_[i]->activeVoxels += step.activeVoxels;
     }
     ++i;
   }

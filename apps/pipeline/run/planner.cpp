@@ -7,6 +7,7 @@
 
 #include "apps/pipeline/values/refusal.h"
 #include "levelset/error.h"
+#include "levelset/files/band_file.h"
 #include "levelset/files/band_parts_writer.h"
 #include "levelset/progress.h"
 
@@ -218,6 +219,29 @@ double estimatePeak(const Graph& graph, const std::vector<char>& runs,
   return findPeak(graph, runs, plans, regions, worked).bytes;
 }
 
+namespace {
+
+/// Decides if a part of the result needs only a part of each band before it.
+/// @param write  action that writes the result
+bool readsPartsOnly(const Graph& graph, std::size_t write,
+                    const std::vector<std::optional<Plan>>& plans) {
+  const std::size_t result = graph.nodes[write].inputs[0];
+  Graph part = graph;
+  part.nodes.resize(write);
+  part.results = {result};
+  const Imath::V3d corner = plans[result]->bounds.min;
+  const Imath::V3d size(levelset::kPartCell * plans[result]->voxelSize);
+  const std::vector<char> runs = neededNodes(part);
+  const std::vector<RegionOfInterest> regions =
+      regionsOfInterest(part, runs, plans, 1, Imath::Box3d(corner - size, corner));
+  for (std::size_t i = 0; i < write; ++i)
+    if (runs[i] && part.nodes[i].kind == Kind::Band && levelset::isEverywhere(regions[i].region))
+      return false;
+  return true;
+}
+
+}  // namespace
+
 std::optional<std::size_t> findPartedWrite(const Graph& graph, const std::vector<char>& runs,
                                            const std::vector<std::optional<Plan>>& plans,
                                            const std::vector<RegionOfInterest>& regions,
@@ -234,18 +258,17 @@ std::optional<std::size_t> findPartedWrite(const Graph& graph, const std::vector
     if (!node.makes()) {
       const Invocation write(*node.op, node.options);
       if (node.op->name != "write" || write.text("file") == "-" || !isBand(inputs[0])) return {};
-      if (!levelset::isPartsFormat(write.text(write.given("format") ? "format" : "file")))
-        return {};
+      if (!levelset::isVdbFormat(write.text(write.given("format") ? "format" : "file"))) return {};
       const std::optional<Plan>& result = plans[inputs[0]];
       if (!result || result->activeVoxels() * kBytesPerWrittenVoxel > limit / 2) return {};
       last = i;
     } else if (isBand(i)) {
       const auto bands = std::count_if(inputs.begin(), inputs.end(), isBand);
       if (bands > 1 || !node.named.empty() || !plans[i]) return {};
-      if (bands == 1 ? !node.op->regionOfInterest : ignoresRoi(node)) return {};
+      if (bands == 1 ? node.op->distancePasses == 0 : ignoresRoi(node)) return {};
     }
   }
-  return last;
+  return last && readsPartsOnly(graph, *last, plans) ? last : std::nullopt;
 }
 
 void explain(const Graph& graph, std::size_t maxMemory, bool fullValues,

@@ -3,10 +3,12 @@
 #include <fmt/core.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "levelset/error.h"
 #include "levelset/geometry/box_tree.h"
@@ -310,7 +312,7 @@ EdgeCrossings crossingsOfMesh(const CellSurface& surface, const FloatGrid& grid,
     });
   });
   for (const std::size_t count : missed) result.fromField += count;
-  if (result.fromField == result.at.size())
+  if (!result.at.empty() && result.fromField == result.at.size())
     throw InvalidInput(
         "the original mesh meets no grid edge that the surface crosses; give the mesh from which "
         "the level set was computed, in the same place");
