@@ -82,6 +82,12 @@ TEST_F(Parts, OtherChainsAreRefused) {
   EXPECT_THROW(run(big + " ! " + big + " --center 1,0,0 ! union ! write " + target, kLimit),
                levelset::ResourceLimit);
   EXPECT_THROW(run(big + " ! write " + path("a.nvdb"), kLimit), levelset::ResourceLimit);
+  EXPECT_THROW(run(big + " ! write " + path("A.NVDB"), kLimit), levelset::ResourceLimit);
+  EXPECT_THROW(run(big + " ! reinitialize --method pde ! write " + target, kLimit),
+               levelset::ResourceLimit);
+  EXPECT_THROW(
+      run(big + " ! emboss --points 0,0,10 --height 0.3 --width 1 ! write " + target, kLimit),
+      levelset::ResourceLimit);
   EXPECT_THROW(run(big + " ! mesh ! write " + path("a.ply"), kLimit), levelset::ResourceLimit);
   EXPECT_EQ(fileCount(), 0u);
 }
