@@ -23,7 +23,10 @@ class Parts : public support::ShellTest {
   static std::string run(const std::string& chain, std::size_t maxMemory, bool fullValues = false) {
     std::istringstream text(chain);
     std::vector<std::string> words;
-    for (std::string word; text >> word;) words.push_back(word);
+    for (std::string word; text >> word;) {
+      std::replace(word.begin(), word.end(), '~', ' ');  // blank within a word
+      words.push_back(word);
+    }
     std::string notes;
     const auto silent = [](const std::string&) {};
     pipeline::RunReport report;
@@ -65,6 +68,11 @@ TEST_F(Parts, FilesAreReadInParts) {
   run("box --size 25.8,25.8,5 --voxel 0.1 ! write " + path("in.vdb"), levelset::kNoMemoryLimit);
   // The inset leaves no surface in the outer parts.
   expectEqualFiles(50'000'000, "read " + path("in.vdb") + " ! offset -0.6");
+}
+
+TEST_F(Parts, PartsThatAClipEmptiesAreEmpty) {
+  expectEqualFiles(30'000'000,
+                   "torus --radius 9 --tube 3 --voxel 0.1 ! clip --plane 2,0,0~1,0,0 ! offset 3vx");
 }
 
 TEST_F(Parts, AResultWithoutSurfaceIsRefused) {
