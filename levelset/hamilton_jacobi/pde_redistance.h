@@ -45,7 +45,7 @@ struct ReinitializeOperator {
   static const OperatorText text;
   static constexpr Slope slope = Slope::One;
   static constexpr double partTolerance = kDistanceTolerance;
-  /// Of the exact method. The pipeline refuses --method pde with --tolerance.
+  /// Error of the exact method. The pipeline refuses --method pde with --tolerance.
   static constexpr ErrorModel errorModel{2, kTriangleError, 0, "redistance"};
 
   struct Options {

@@ -64,7 +64,7 @@ struct MorphOptions {
 struct MorphOperator {
   static const OperatorText text;
   static constexpr std::size_t operandCount = 2;
-  /// Of the method distances. The pipeline refuses --method speed with --tolerance.
+  /// Error of the method `distances`. The pipeline refuses --method speed with --tolerance.
   static constexpr ErrorModel errorModel{2, 0.45, kCreaseError, "morph"};
 
   struct Options {
