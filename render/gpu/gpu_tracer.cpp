@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
 #include <map>
 #include <optional>
 #include <utility>
@@ -209,6 +210,7 @@ struct GpuTracer::Impl {
   GLuint rays = 0, hits = 0;
   std::map<Variant, GLuint> programs;
   std::optional<GpuFields> fields;
+  double shaderSeconds = 0;
 
   Impl(const GlContext& context_, std::size_t largestTable_)
       : context(context_),
@@ -360,12 +362,16 @@ struct GpuTracer::Impl {
     bind(solid);
     const auto place = [&](const char* name) { return gl.GetUniformLocation(program, name); };
     gl.Uniform1i(place("rayCount"), static_cast<GLint>(count));
+    gl.Finish();
+    const auto begin = std::chrono::steady_clock::now();
     for (std::size_t first = 0; first < count; first += kOneRun) {
       gl.Uniform1i(place("firstRay"), static_cast<GLint>(first));
       const std::size_t groups = (std::min(kOneRun, count - first) + kGroup - 1) / kGroup;
       gl.DispatchCompute(static_cast<GLuint>(groups), 1, 1);
       gl.Finish();
     }
+    shaderSeconds +=
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
     const auto fetch = [&](auto& to, std::size_t part) {
       gl.GetNamedBufferSubData(hits, static_cast<GLintptr>(part * count * sizeof(int)),
@@ -431,6 +437,11 @@ std::vector<double> GpuTracer::search(const FieldTraversal& fields,
                                       const std::vector<FieldSegment>& segments,
                                       FieldQuestion question) const {
   return impl_->fields->search(fields, segments, question);
+}
+
+double GpuTracer::shaderSeconds() const {
+  const GlContext::Current current(impl_->context);
+  return impl_->shaderSeconds;
 }
 
 }  // namespace render

@@ -32,6 +32,10 @@ class GpuTracer : public KernelTracer {
                                            const std::vector<FieldSegment>& segments,
                                            FieldQuestion question) const override;
 
+  /// Returns the wall time, seconds, of the shaders of all trace() calls so far. The time of
+  /// transfers is not included.
+  [[nodiscard]] double shaderSeconds() const;
+
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
