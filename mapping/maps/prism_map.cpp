@@ -64,6 +64,10 @@ class PrismBlock final : public BlockMap {
       cells_.push_back(cell);
       return false;
     });
+    const auto outer = std::stable_partition(cells_.begin(), cells_.end(), [&](const Cell& cell) {
+      return !map.lattice_.isOutermost(cell);
+    });
+    inner_ = static_cast<std::size_t>(outer - cells_.begin());
   }
 
   [[nodiscard]] Box3d imageBounds() const override {
@@ -85,9 +89,7 @@ class PrismBlock final : public BlockMap {
   }
 
   [[nodiscard]] bool isTotal() const override {
-    if (std::any_of(cells_.begin(), cells_.end(),
-                    [&](const Cell& cell) { return map_.lattice_.isOutermost(cell); }))
-      return false;
+    if (inner_ < cells_.size()) return false;
     Tetrahedron t;
     return map_.find(block_.center(), t);
   }
@@ -112,8 +114,11 @@ class PrismBlock final : public BlockMap {
   PrismBlock(const PrismBlock& parent, int bits)
       : map_(parent.map_), block_(parent.block_.octant(bits)) {
     const Box3d box = around(block_);
-    for (const Cell& cell : parent.cells_)
-      if (map_.lattice_.worldBox(cell).intersects(box)) cells_.push_back(cell);
+    for (std::size_t n = 0; n < parent.cells_.size(); ++n) {
+      if (!map_.lattice_.worldBox(parent.cells_[n]).intersects(box)) continue;
+      cells_.push_back(parent.cells_[n]);
+      if (n < parent.inner_) ++inner_;
+    }
   }
 
   /// Box of the image of the block's hull under the linear map of one tetrahedron, clipped to the
@@ -140,7 +145,8 @@ class PrismBlock final : public BlockMap {
   }
 
   /// Finds the tetrahedra that contain successive grid points by walking across faces. Searches all
-  /// cells of the block when a walk fails.
+  /// cells of the block when a walk fails. An inner cell is preferred to an outermost one, see
+  /// PrismMap.
   class Walk {
    public:
     explicit Walk(const PrismBlock& block)
@@ -156,7 +162,11 @@ class PrismBlock final : public BlockMap {
 
     V3d to(const V3d& x) {
       std::array<double, 4> shares;
-      const bool found = (isAt_ && walk(x, shares)) || search(x, shares);
+      bool found = isAt_ && walk(x, shares);
+      if (!found)
+        found = search(x, block_.cells_, shares);
+      else if (block_.inner_ > 0 && lattice_.isOutermost(current_.cell))
+        search(x, std::span(block_.cells_).first(block_.inner_), shares);
       if (found) isAt_ = true;
       if (isRowStart_ && found) first_ = current_, hasFirst_ = true, isRowStart_ = false;
       return found ? mix(lattice_.textureCorners(current_), shares) : V3d(kNaN);
@@ -181,13 +191,15 @@ class PrismBlock final : public BlockMap {
       return false;
     }
 
-    bool search(const V3d& x, std::array<double, 4>& shares) {
-      for (const Cell& cell : block_.cells_) {
+    /// Leaves the current tetrahedron and `shares` as they are if no cell contains the point.
+    bool search(const V3d& x, std::span<const Cell> cells, std::array<double, 4>& shares) {
+      for (const Cell& cell : cells) {
         if (!lattice_.worldBox(cell).intersects(map_.aroundPoint(x))) continue;
         for (int order = 0; order < 6; ++order) {
-          shares = test({cell, order}, x);
-          if (!isInside(shares)) continue;
+          const std::array<double, 4> tested = test({cell, order}, x);
+          if (!isInside(tested)) continue;
           current_ = {cell, order};
+          shares = tested;
           return true;
         }
       }
@@ -209,7 +221,8 @@ class PrismBlock final : public BlockMap {
 
   const PrismMap& map_;
   GridBlock block_;
-  std::vector<Cell> cells_;
+  std::vector<Cell> cells_;  // inner cells first
+  std::size_t inner_ = 0;    // number of cells that are not outermost
 };
 
 PrismMap::PrismMap(const Patch& patch, const LatticeBorder& border)
@@ -234,13 +247,19 @@ Box3d PrismMap::aroundPoint(const V3d& x) const {
 }
 
 bool PrismMap::find(const V3d& x, Tetrahedron& t) const {
-  return tree_.visit(aroundPoint(x), [&](const Cell& cell) {
+  bool found = false;
+  tree_.visit(aroundPoint(x), [&](const Cell& cell) {
+    const bool isOuter = lattice_.isOutermost(cell);
+    if (isOuter && found) return false;
     for (int order = 0; order < 6; ++order) {
+      if (!isInside(barycentric(lattice_.corners({cell, order}), x))) continue;
       t = {cell, order};
-      if (isInside(barycentric(lattice_.corners(t), x))) return true;
+      found = true;
+      return !isOuter;
     }
     return false;
   });
+  return found;
 }
 
 V3d PrismMap::operator()(const V3d& x) const {
