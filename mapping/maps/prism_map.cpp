@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <vector>
 
@@ -166,7 +167,7 @@ class PrismBlock final : public BlockMap {
       if (!found)
         found = search(x, block_.cells_, shares);
       else if (block_.inner_ > 0 && lattice_.isOutermost(current_.cell))
-        search(x, std::span(block_.cells_).first(block_.inner_), shares);
+        search(x, rivals(), shares);
       if (found) isAt_ = true;
       if (isRowStart_ && found) first_ = current_, hasFirst_ = true, isRowStart_ = false;
       return found ? mix(lattice_.textureCorners(current_), shares) : V3d(kNaN);
@@ -206,6 +207,23 @@ class PrismBlock final : public BlockMap {
       return false;
     }
 
+    /// Inner cells that may overlap the outermost cell of the current tetrahedron. Those beside it
+    /// do not, unless the lattice folds there.
+    std::span<const Cell> rivals() {
+      const Cell& outer = current_.cell;
+      if (rivalsOf_ == outer) return rivals_;
+      rivalsOf_ = outer;
+      rivals_.clear();
+      const Box3d box = lattice_.worldBox(outer);
+      for (const Cell& cell : std::span(block_.cells_).first(block_.inner_)) {
+        bool isBeside = true;
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          isBeside = isBeside && std::abs(cell[axis] - outer[axis]) <= 1;
+        if (!isBeside && lattice_.worldBox(cell).intersects(box)) rivals_.push_back(cell);
+      }
+      return rivals_;
+    }
+
     std::array<double, 4> test(const Tetrahedron& t, const V3d& x) {
       ++tests_;
       return barycentric(lattice_.corners(t), x);
@@ -216,6 +234,8 @@ class PrismBlock final : public BlockMap {
     const PrismBlock& block_;
     Tetrahedron current_, first_;
     bool isAt_ = false, hasFirst_ = false, isRowStart_ = true;
+    Cell rivalsOf_ = {-1, -1, -1};  // the outermost cell of rivals_
+    std::vector<Cell> rivals_;
     std::size_t tests_ = 0;
   };
 
