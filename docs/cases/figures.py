@@ -1,8 +1,10 @@
 """Pictures and tables of the docs:
 figures.py sheet FOLDER TARGET COLUMNS NAME=TITLE..., row FOLDER NAME FIELD..., expect FOLDER NAME FIELD OPERATOR VALUE,
+frames FOLDER NAME TEXT...,
 plot CSV TARGET, cost CSV TARGET."""
 
 import json
+import math
 import operator
 import sys
 
@@ -33,10 +35,12 @@ def steps_of(folder, name):
 
 
 def values_of(steps, field):
-    """What each texture and each measurement of a report says of FIELD, a path with dots."""
-    values = [step["details"] for step in steps if step["action"] in ("texture", "measure")]
+    """What each texture, animation and measurement of a report says of FIELD, a path with dots and numbers of elements."""
+    if field == "step_cpu_s":
+        return [step[field[5:]] for step in steps if step["action"] in ("animate", "texture", "morph")]
+    values = [step["details"] for step in steps if step["action"] in ("animate", "texture", "measure")]
     for part in field.split("."):
-        values = [value[part] for value in values]
+        values = [value[int(part)] if isinstance(value, list) else value[part] for value in values]
     return values
 
 
@@ -44,8 +48,9 @@ def figure_of(steps, field):
     """What the last of them says, as text for a table; text in quotes is itself."""
     if field.startswith("'"):
         return field.strip("'")
-    if field == "points":
-        return f"{512 * values_of(steps, 'blocks_evaluated')[-1] / 1e6:.2f} M"
+    if field in ("points", "box"):
+        blocks = "blocks_evaluated" if field == "points" else "blocks_tested"
+        return f"{512 * values_of(steps, blocks)[-1] / 1e6:.2f} M"
     value = values_of(steps, field)[-1]
     return f"{value:.3g}" if isinstance(value, float) else str(value)
 
@@ -54,6 +59,21 @@ def row(folder, name, *fields):
     """A row of a Markdown table from FOLDER/NAME.json."""
     steps = steps_of(folder, name)
     print("| " + " | ".join(figure_of(steps, field) for field in fields) + " |")
+
+
+def frames(folder, name, *texts):
+    """A row for each frame of an animation: TEXT..., the time, the longest motion of a corner since the frame before, and the
+    lengths of the four sides, corner to corner, relative to those of the first frame."""
+
+    def sides(frame):
+        corners = frame["corners"]
+        return [math.dist(corners[i - 1], corners[i]) for i in range(4)]
+
+    entries = [step["details"]["frame"] for step in steps_of(folder, name) if step["action"] == "animate"][-1]
+    for index, entry in enumerate(entries):
+        ratios = [now / first for now, first in zip(sides(entry), sides(entries[0]))]
+        time, motion = index / (len(entries) - 1), entry["farthest_way"]
+        print("| " + " | ".join(texts + (f"{time:.2f}", f"{motion:.3f}", f"{min(ratios):.2f} to {max(ratios):.2f}")) + " |")
 
 
 def expect(folder, name, field, comparison, wanted):
@@ -138,4 +158,4 @@ def cost(table, target):
 
 
 if __name__ == "__main__":
-    {"sheet": sheet, "row": row, "expect": expect, "plot": plot, "cost": cost}[sys.argv[1]](*sys.argv[2:])
+    {"sheet": sheet, "row": row, "expect": expect, "frames": frames, "plot": plot, "cost": cost}[sys.argv[1]](*sys.argv[2:])
