@@ -3,7 +3,7 @@
 . "$(dirname "$0")/case.sh"
 standing_dragon 512
 standing_dragon 120
-echo "| | babies | particles | set-up s | certificate s | mapping s | points | distance s | merging s | folded places |"
+echo "| | babies | particles | set-up s | certificate s | mapping s | points | distance s | merging s | folds |"
 echo "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|"
 map baby-dragons read "$out/dragon512.vdb" --as mother ! read "$out/dragon120.vdb" --as baby \
   ! scatter @mother --count 40 --size 0.03,0.0135 --height 0.021 --along "0,-1,0" --jitter 40 --layers 5 --spacing 6vx --mask "z" --mask-min 0.02 --mask-max 0.021 --as places \

@@ -1,5 +1,6 @@
 # The cases source this file with "$@": CASE.sh COMMAND FOLDER. It writes solids, reports and pictures to FOLDER,
-# the sheet of pictures to docs/cases, and the table to standard output.
+# the sheet of pictures to docs/cases, and the table to standard output. If the case succeeds, the table also replaces
+# the one below the case's picture in docs/cases/README.md.
 set -eu
 levelsmith=$1
 out=$2
@@ -10,6 +11,16 @@ mkdir -p "$out"
   echo "The models are not in data/models: fetch them with ./dev fetch." >&2
   exit 1
 }
+
+case_name=$(basename "$0" .sh)
+exec 3>&1 >"$out/$case_name.md"
+finish() {
+  status=$?
+  cat "$out/$case_name.md" >&3
+  [ $status -ne 0 ] || "${PYTHON:-python3}" "$here/figures.py" insert "$here/README.md" "$case_name" "$out/$case_name.md"
+  exit $status
+}
+trap finish EXIT
 
 make() {  # make NAME CHAIN...: writes NAME.vdb unless it exists
   name=$1
@@ -35,6 +46,19 @@ picture() {  # picture NAME OPTIONS...: draws NAME.vdb
   "$levelsmith" --quiet read "$out/$name.vdb" ! render "$out/$name.png" --size 480x360 "$@"
 }
 
+scene() {  # scene PICTURE BASE NAME OPTIONS...: draws BASE.vdb and NAME.vdb together
+  drawn=$1
+  base=$2
+  name=$3
+  shift 3
+  "$levelsmith" --quiet read "$out/$base.vdb" --as base ! read "$out/$name.vdb" --as mapped \
+    ! scene @base @mapped --csg "base | mapped" ! render "$out/$drawn.png" --size 480x360 "$@"
+}
+
+difference() {  # difference REFERENCE NAME: writes the distances of the surfaces of two solids to NAME-error.json
+  "$levelsmith" --quiet --report "$out/$2-error.json" read "$out/$1.vdb" ! read "$out/$2.vdb" ! compare > /dev/null
+}
+
 solid() {  # solid NAME: writes components, cavities and Euler characteristic of NAME.vdb to NAME-solid.json
   "$levelsmith" --quiet --report "$out/$1-solid.json" read "$out/$1.vdb" ! measure > /dev/null
 }
@@ -47,8 +71,16 @@ row() {  # row NAME FIELD... "'text'": prints a row of the table from the last t
   "${PYTHON:-python3}" "$here/figures.py" row "$out" "$@"
 }
 
-frames() {  # frames NAME "text"...: prints a row of the table for each frame of the animation in NAME's report
-  "${PYTHON:-python3}" "$here/figures.py" frames "$out" "$@"
+frames() {  # frames NAME: prints a row of the table for each frame of the animation in NAME's report
+  "${PYTHON:-python3}" "$here/figures.py" frames "$out" "$1"
+}
+
+figure() {  # figure NAME FIELD: prints that figure alone
+  row "$1" "$2" | tr -d '| '
+}
+
+in_voxels() {  # in_voxels NAME FIELD VOXEL: prints a length in voxels
+  awk -v a="$(figure "$1" "$2")" -v h="$3" 'BEGIN { printf "%.2g", a / h }'
 }
 
 # expect NAME FIELD OPERATOR VALUE: exits 5 with a message unless the comparison (<, <=, =, >=, >) holds for each

@@ -6,7 +6,7 @@ standing_dragon 200
 animate crossing read "$out/bunny150.vdb" --as bunny ! read "$out/dragon200.vdb" --as dragon \
   ! patch @bunny --at 0.34,0.04,0.66 --size 0.44,0.22 --rotate -118 --height 0.28 --layers 5 --spacing 0.07 --as from \
   ! patch @bunny --at 0.34,0.05,-0.28 --size 0.44,0.22 --rotate -62 --height 0.28 --layers 5 --spacing 0.07 --as to \
-  ! animate @bunny @dragon @from @to --frames 4 --carry corners --untangle --embed 2vx --blend 2vx --voxel 0.008 --out "$out/crossing-#.vdb"
+  ! animate @bunny @dragon @from @to --frames 4 --carry corners --untangle --embed 2vx --blend 2vx --voxel 0.006 --out "$out/crossing-#.vdb"
 echo "| | CPU s | thesis |"
 echo "|---|--:|--:|"
 row crossing "'4 frames'" step_cpu_s "'–'"

@@ -1,7 +1,7 @@
 """Pictures and tables of the docs:
 figures.py sheet FOLDER TARGET COLUMNS NAME=TITLE..., row FOLDER NAME FIELD..., expect FOLDER NAME FIELD OPERATOR VALUE,
-frames FOLDER NAME TEXT...,
-plot CSV TARGET, cost CSV TARGET."""
+frames FOLDER NAME, insert PAGE NAME TABLE, thin PATCH TARGET EVERY EVERY_LAYER, equal FOLDER VOXEL DIRECT FAST SHELL,
+timing FOLDER TARGET VOXEL TITLE=RUNS..., plot CSV TARGET, cost CSV TARGET."""
 
 import json
 import math
@@ -38,7 +38,7 @@ def values_of(steps, field):
     """What each texture, animation and measurement of a report says of FIELD, a path with dots and numbers of elements."""
     if field == "step_cpu_s":
         return [step[field[5:]] for step in steps if step["action"] in ("animate", "texture", "morph")]
-    values = [step["details"] for step in steps if step["action"] in ("animate", "texture", "measure")]
+    values = [step["details"] for step in steps if step["action"] in ("animate", "texture", "measure", "compare")]
     for part in field.split("."):
         values = [value[int(part)] if isinstance(value, list) else value[part] for value in values]
     return values
@@ -52,7 +52,9 @@ def figure_of(steps, field):
         blocks = "blocks_evaluated" if field == "points" else "blocks_tested"
         return f"{512 * values_of(steps, blocks)[-1] / 1e6:.2f} M"
     value = values_of(steps, field)[-1]
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+    if not isinstance(value, float):
+        return str(value)
+    return f"{value:.3g}" if abs(value) < 999.5 else f"{value:.0f}"
 
 
 def row(folder, name, *fields):
@@ -61,9 +63,9 @@ def row(folder, name, *fields):
     print("| " + " | ".join(figure_of(steps, field) for field in fields) + " |")
 
 
-def frames(folder, name, *texts):
-    """A row for each frame of an animation: TEXT..., the time, the longest motion of a corner since the frame before, and the
-    lengths of the four sides, corner to corner, relative to those of the first frame."""
+def frames(folder, name):
+    """A row for each frame of an animation: the time, the longest motion of a corner since the frame before, and the least and
+    greatest ratio of a side, corner to corner, to that of the first frame."""
 
     def sides(frame):
         corners = frame["corners"]
@@ -73,7 +75,7 @@ def frames(folder, name, *texts):
     for index, entry in enumerate(entries):
         ratios = [now / first for now, first in zip(sides(entry), sides(entries[0]))]
         time, motion = index / (len(entries) - 1), entry["farthest_way"]
-        print("| " + " | ".join(texts + (f"{time:.2f}", f"{motion:.3f}", f"{min(ratios):.2f} to {max(ratios):.2f}")) + " |")
+        print(f"| {time:.2f} | {motion:.3f} | {min(ratios):.2f} to {max(ratios):.2f} |")
 
 
 def expect(folder, name, field, comparison, wanted):
@@ -84,6 +86,123 @@ def expect(folder, name, field, comparison, wanted):
         said = ", ".join(str(value) for value in values) or "not told"
         print(f"{name}: {field} is {said}, but {comparison} {wanted} is wanted.", file=sys.stderr)
         sys.exit(5)
+
+
+def with_table(page, name, table):
+    """The text of a page in which TABLE replaces the tables below the picture NAME.png."""
+    lines = page.splitlines()
+    found = [number for number, line in enumerate(lines) if line.startswith("![") and line.endswith(f"]({name}.png)")]
+    if len(found) != 1:
+        raise SystemExit(f"The page has {len(found)} pictures {name}.png; it needs one above the table of {name}.sh.")
+    end = found[0] + 1
+    while end < len(lines) and (not lines[end] or lines[end].startswith("|")):
+        end += 1
+    rest = [""] + lines[end:] if end < len(lines) else []
+    return "\n".join(lines[:found[0] + 1] + [""] + table.strip().splitlines() + rest) + "\n"
+
+
+def insert(page, name, table):
+    """Replaces the tables below the picture NAME.png in PAGE by the text of the file TABLE."""
+    with open(page, encoding="utf-8") as file:
+        text = file.read()
+    with open(table, encoding="utf-8") as file:
+        text = with_table(text, name, file.read())
+    with open(page, "w", encoding="utf-8") as file:
+        file.write(text)
+
+
+def thin(source, target, every, every_layer):
+    """Writes the .patch file TARGET with every EVERY-th row and column and every EVERY_LAYER-th layer of SOURCE: samples
+    of the same arrangement with a wider spacing."""
+    every, every_layer = int(every), int(every_layer)
+    with open(source, encoding="utf-8") as file:
+        document = json.load(file)
+    for patch in document["patches"]:
+        if (len(patch["levels"]) - 1) % every_layer:
+            raise SystemExit(f"{len(patch['levels'])} layers cannot be thinned by {every_layer}.")
+        patch["levels"] = patch["levels"][::every_layer]
+        patch["spacing"] *= every
+        for layer in patch["levels"]:
+            columns, rows = layer["columns"], layer["rows"]
+            if (columns - 1) % every or (rows - 1) % every:
+                raise SystemExit(f"{columns} by {rows} particles cannot be thinned by {every}.")
+            kept = [layer["positions"][row * columns:(row + 1) * columns:every] for row in range(0, rows, every)]
+            layer["columns"], layer["rows"] = len(kept[0]), len(kept)
+            layer["positions"] = [position for row in kept for position in row]
+            layer["rim"] = straight_rim(kept)
+    with open(target, "w", encoding="utf-8") as file:
+        json.dump(document, file)
+
+
+def straight_rim(rows):
+    """The rim that continues rows and columns of positions straight by one step, in the order of ParticleLayer::rim."""
+    def beyond(border, inner):
+        return [2 * a - b for a, b in zip(border, inner)]
+
+    left = [beyond(row[0], row[1]) for row in rows]
+    right = [beyond(row[-1], row[-2]) for row in rows]
+    wide = [[a, *row, b] for a, row, b in zip(left, rows, right)]
+    before = [beyond(border, inner) for border, inner in zip(wide[0], wide[1])]
+    after = [beyond(border, inner) for border, inner in zip(wide[-1], wide[-2])]
+    return before + after + left + right
+
+
+def runs_of(folder, voxel, names):
+    """For each run NAME of a list with commas: error, CPU seconds of set-up and mapping, particles. The error is the mean
+    distance of two surfaces in NAME-error.json, in voxels."""
+    runs = []
+    for name in names.split(","):
+        steps = steps_of(folder, name)
+        apart = steps_of(folder, f"{name}-error")
+        error = values_of(apart, "mean_b_to_a")[-1] / float(voxel)
+        seconds = values_of(steps, "cpu_s.setup")[-1] + values_of(steps, "cpu_s.mapping")[-1]
+        runs.append((error, seconds, values_of(steps, "particles")[-1]))
+    return sorted(runs)
+
+
+def at_error(runs, error):
+    """Seconds and particles at an error, between two runs on straight lines in logarithms; None outside the runs."""
+    from math import exp, log
+
+    for (e0, *low), (e1, *high) in zip(runs, runs[1:]):
+        if e0 <= error <= e1:
+            share = log(error / e0) / log(e1 / e0)
+            return [exp(log(a) + share * log(b / a)) for a, b in zip(low, high)]
+    return None
+
+
+def equal(folder, voxel, direct, fast, shell):
+    """A row for each run of FAST: seconds of the three maps at the error of this run."""
+    direct, fast, shell = (runs_of(folder, voxel, names) for names in (direct, fast, shell))
+    for error, seconds, particles in reversed(fast):
+        summed, tetrahedra = at_error(direct, error), at_error(shell, error)
+        if summed is None or tetrahedra is None:
+            raise SystemExit(f"No runs on both sides of the error {error:.3g}.")
+        print(f"| {error:.2g} | {particles} | {tetrahedra[1]:.0f} | {summed[0]:.3g} | {seconds:.3g} | {tetrahedra[0]:.3g} "
+              f"| {summed[0] / tetrahedra[0]:.2g} | {seconds / tetrahedra[0]:.2g} |")
+
+
+def timing(folder, target, voxel, *series):
+    """Error against CPU seconds for each TITLE=RUNS, FOLDER/TARGET.png."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, axis = pyplot.subplots(figsize=(4.8, 3.6))
+    for colour, each in zip(("C3", "C0", "C2"), series):
+        title, names = each.split("=", 1)
+        runs = runs_of(folder, voxel, names)
+        axis.loglog([run[1] for run in runs], [run[0] for run in runs], "o-", color=colour, label=title)
+        for error, seconds, particles in runs:
+            axis.annotate(str(particles), (seconds, error), fontsize=8, textcoords="offset points", xytext=(5, 4))
+    axis.set_xlabel("CPU seconds, set-up and mapping")
+    axis.set_ylabel("mean error, voxels")
+    axis.margins(x=0.15)
+    axis.grid(True, which="major", alpha=0.3)
+    axis.legend(fontsize=8)
+    figure.tight_layout()
+    figure.savefig(f"{folder}/{target}.png", dpi=100, metadata={"Software": None})
 
 
 def plot(table, target):
@@ -104,7 +223,7 @@ def plot(table, target):
     axes = axes[0]
     for axis, points in zip(axes, decades):
         for colour, (name, title) in zip(("C3", "C0", "C2", "C1"), names.items()):
-            some = [run for run in runs if run["map"] == name and abs(float(run["points"]) / points - 1) < 0.1]
+            some = [run for run in runs if run["variant"] == name and abs(float(run["points"]) / points - 1) < 0.1]
             some.sort(key=lambda run: int(run["particles"]))
             times = [float(run["mapping_s"]) for run in some]
             errors = [float(run["error_99"]) for run in some]
@@ -158,4 +277,5 @@ def cost(table, target):
 
 
 if __name__ == "__main__":
-    {"sheet": sheet, "row": row, "expect": expect, "frames": frames, "plot": plot, "cost": cost}[sys.argv[1]](*sys.argv[2:])
+    commands = (sheet, row, frames, expect, insert, thin, equal, timing, plot, cost)
+    {command.__name__: command for command in commands}[sys.argv[1]](*sys.argv[2:])

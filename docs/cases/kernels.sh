@@ -9,7 +9,7 @@ lay() {  # lay KERNEL "CASE 1" "CASE 2"
   map "kernel-$1" read "$out/bunny150.vdb" --as base ! read "$out/dragon200.vdb" --as small \
     ! patch @base --at 0.2,-0.3,0.7 --size 0.8,0.4 --height 0.4 --layers 6 --spacing 0.12 --as side \
     ! texture @base @small @side --kernel "$1" --allow-folds --embed 1vx --voxel 0.004
-  cost=$("${PYTHON:-python3}" "$here/figures.py" row "$out" "kernel-$1" cpu_s.mapping | tr -d '| ')
+  cost=$(figure "kernel-$1" cpu_s.mapping)
   [ "$1" = biharmonic ] && first=$cost
   ratio=$(awk -v a="$cost" -v b="$first" 'BEGIN { printf "%.2f", a / b }')
   row "kernel-$1" "'$1'" cpu_s.mapping "'$ratio'" "'$2'" "'$3'" stretch.percent_1 stretch.median stretch.percent_99 jacobian.percent_1 jacobian.percent_99 folded

@@ -3,7 +3,7 @@
 # [Brodersen07 figs 8.19, 8.20].
 . "$(dirname "$0")/case.sh"
 standing_bunny 150
-echo "| layers | twist | particles | least Jacobian | stretch 1 % | 99 % | folded positions | thesis: figure, layers, particles |"
+echo "| layers | twist | particles | least Jacobian | stretch 1 % | 99 % | positions that fold | thesis: figure, layers, particles |"
 echo "|--:|--:|--:|--:|--:|--:|--:|---|"
 lay() {  # lay NAME LAYERS TWIST "THESIS"
   map "twist-$1" sphere --radius 1 --voxel 0.025 --as ball ! read "$out/standing150.vdb" --as statue \

@@ -1,0 +1,20 @@
+#!/bin/sh
+# Baby dragons with the voxels of their mother [Brodersen07 fig. 8.12, its appendix B]: 512 along each. `./dev cases` does not run
+# this. The babies stay on a grid of their own, and the rays unite them with the mother; on her whole surface their voxels
+# would need some fifty times the memory of her grid.
+# baby-dragons-full.sh COMMAND FOLDER [BABIES]
+. "$(dirname "$0")/case.sh"
+standing_dragon 512
+echo "| | babies | particles of each | set-up s | certificate s | mapping s | voxels of the boxes | points | distance s | mapping s of each |"
+echo "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|"
+map baby-dragons-full read "$out/dragon512.vdb" --as mother ! read "$out/dragon512.vdb" --as baby \
+  ! scatter @mother --count "${3:-40}" --size 0.03,0.0135 --height 0.021 --along "0,-1,0" --jitter 40 --layers 4 --spacing 0.004 --mask "z" --mask-min 0.02 --mask-max 0.021 --as places \
+  ! texture @mother @baby @places --alone --embed 0.0004 --voxel 0.00006 --skip-folds
+each() { awk -v a="$(figure baby-dragons-full "$1")" -v n="$(figure baby-dragons-full patches)" 'BEGIN { printf "%.3g", a / n }'; }
+row baby-dragons-full "'here'" patches "'$(each particles)'" cpu_s.setup cpu_s.certificate cpu_s.mapping box points cpu_s.distance "'$(each cpu_s.mapping)'"
+echo "| thesis | 12 | 300 to 400 | – | – | – | 20 to 30 M each | – | – | 240 to 300 |"
+expect baby-dragons-full folded = 0
+"$levelsmith" --quiet read "$out/dragon512.vdb" --as mother ! read "$out/baby-dragons-full.vdb" --as babies ! scene @mother @babies \
+  --csg "mother | babies" --colours "0.80,0.76,0.70 0.62,0.74,0.60" ! render "$out/baby-dragons-full.png" --size 960x720 \
+  --from 0.15,-0.32,0.28 --to -0.005,0,0.13 --up 0,0,1
+sheet baby-dragons-full 1 "baby-dragons-full=babies of 512 voxels on a mother of 512"
