@@ -28,7 +28,7 @@ lay() {  # lay NAME CORNERS HEIGHT LAYERS SPACING EMBED VOXEL "THESIS": over the
   expect "latch-$1-solid" components = 1
 }
 lay small "0.834,0.312,0.405 0.866,0.347,0.373 0.846,0.371,0.381 0.815,0.336,0.413" 0.017 3 0.0105 0.0015 0.00051 "280, 4 M, 20 to 30"
-lay large "0.508,0.017,0.553 0.636,0.149,0.548 0.557,0.210,0.543 0.429,0.079,0.549" 0.055 5 0.0235 0.005 0.00132 "660, 5.6 M, 20 to 30"
+lay large "0.508,0.017,0.553 0.636,0.149,0.548 0.557,0.210,0.543 0.429,0.079,0.549" 0.055 5 0.0235 0.005 0.0012 "660, 5.6 M, 20 to 30"
 view() {  # view NAME OPTIONS...: the solids are united by the rays
   name=$1
   shift
@@ -36,7 +36,7 @@ view() {  # view NAME OPTIONS...: the solids are united by the rays
     ! read "$out/latch-small.vdb" --as small ! scene @bunnies @large @small --csg "bunnies | large | small" \
     --colours "0.80,0.76,0.70 0.72,0.55,0.25 0.55,0.58,0.62" ! render "$out/$name.png" --size 480x360 "$@"
 }
-view latches-all --from 2.3,1.2,2.9 --to 0.15,0.05,0.2 --fov 30
+view latches-all --from 2.3,1.2,2.9 --to 0.2,0.07,0.2 --fov 26
 view latches-large --from 0.85,0.35,1.9 --to 0.53,0.13,0.5 --fov 16
 view latches-small --from 1.2,0.65,1.05 --to 0.83,0.35,0.38 --fov 9
 sheet latches 3 "latches-all=a bunny on a bunny on a bunny" "latches-large=the large latch" "latches-small=the small latch"
