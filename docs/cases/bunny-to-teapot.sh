@@ -24,7 +24,7 @@ expect bunny-to-teapot frames = 7
 expect bunny-to-teapot reused = 0
 for frame in 0 2 4 6; do
   solid "starfish-to-teapot-$frame"
-  picture "starfish-to-teapot-$frame" --from 2.4,1.6,3.2 --to 0.1,-0.12,0.1 --fov 30
+  picture "starfish-to-teapot-$frame" --from 2.4,1.6,3.2 --to 0.1,-0.05,0.1 --fov 32
 done
 expect starfish-to-teapot-0-solid euler = 2
 expect starfish-to-teapot-6-solid components = 1
