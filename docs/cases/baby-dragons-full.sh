@@ -8,13 +8,18 @@ standing_dragon 512
 echo "| | babies | particles of each | set-up s | certificate s | mapping s | voxels of the boxes | points | distance s | mapping s of each |"
 echo "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|"
 map baby-dragons-full read "$out/dragon512.vdb" --as mother ! read "$out/dragon512.vdb" --as baby \
-  ! scatter @mother --count "${3:-40}" --size 0.03,0.0135 --height 0.021 --along "0,-1,0" --jitter 40 --layers 4 --spacing 0.004 --mask "z" --mask-min 0.02 --mask-max 0.021 --as places \
-  ! texture @mother @baby @places --alone --embed 0.0004 --voxel 0.00006 --skip-folds
+  ! scatter @mother --count "${3:-40}" --size 0.03,0.0135 --height 0.021 --along "0,-1,0" --jitter 40 --layers 4 --spacing 0.005 --mask "z" --mask-min 0.02 --mask-max 0.021 --as places \
+  ! texture @mother @baby @places --alone --embed 0.0004 --voxel 0.00006 --untangle --skip-folds
 each() { awk -v a="$(figure baby-dragons-full "$1")" -v n="$(figure baby-dragons-full patches)" 'BEGIN { printf "%.3g", a / n }'; }
 row baby-dragons-full "'here'" patches "'$(each particles)'" cpu_s.setup cpu_s.certificate cpu_s.mapping box points cpu_s.distance "'$(each cpu_s.mapping)'"
 echo "| thesis | 12 | 300 to 400 | – | – | – | 20 to 30 M each | – | – | 240 to 300 |"
 expect baby-dragons-full folded = 0
-"$levelsmith" --quiet read "$out/dragon512.vdb" --as mother ! read "$out/baby-dragons-full.vdb" --as babies ! scene @mother @babies \
-  --csg "mother | babies" --colours "0.80,0.76,0.70 0.62,0.74,0.60" ! render "$out/baby-dragons-full.png" --size 960x720 \
-  --from 0.15,-0.32,0.28 --to -0.005,0,0.13 --up 0,0,1
-sheet baby-dragons-full 1 "baby-dragons-full=babies of 512 voxels on a mother of 512"
+view() {  # view NAME OPTIONS...
+  name=$1
+  shift
+  "$levelsmith" --quiet read "$out/dragon512.vdb" --as mother ! read "$out/baby-dragons-full.vdb" --as babies ! scene @mother @babies \
+    --csg "mother | babies" --colours "0.80,0.76,0.70 0.62,0.74,0.60" ! render "$out/$name.png" --size 480x360 --up 0,0,1 "$@"
+}
+view babies-all --from 0.15,-0.32,0.28 --to -0.005,0,0.13
+view babies-near --from 0.25,-0.2,0.2 --to 0.085,0,0.09 --fov 12
+sheet baby-dragons-full 2 "babies-all=babies of 512 voxels on a mother of 512" "babies-near=one of them"
