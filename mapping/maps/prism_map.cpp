@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <vector>
 
@@ -64,6 +65,10 @@ class PrismBlock final : public BlockMap {
       cells_.push_back(cell);
       return false;
     });
+    const auto outer = std::stable_partition(cells_.begin(), cells_.end(), [&](const Cell& cell) {
+      return !map.lattice_.isOutermost(cell);
+    });
+    inner_ = static_cast<std::size_t>(outer - cells_.begin());
   }
 
   [[nodiscard]] Box3d imageBounds() const override {
@@ -85,9 +90,7 @@ class PrismBlock final : public BlockMap {
   }
 
   [[nodiscard]] bool isTotal() const override {
-    if (std::any_of(cells_.begin(), cells_.end(),
-                    [&](const Cell& cell) { return map_.lattice_.isOutermost(cell); }))
-      return false;
+    if (inner_ < cells_.size()) return false;
     Tetrahedron t;
     return map_.find(block_.center(), t);
   }
@@ -112,8 +115,11 @@ class PrismBlock final : public BlockMap {
   PrismBlock(const PrismBlock& parent, int bits)
       : map_(parent.map_), block_(parent.block_.octant(bits)) {
     const Box3d box = around(block_);
-    for (const Cell& cell : parent.cells_)
-      if (map_.lattice_.worldBox(cell).intersects(box)) cells_.push_back(cell);
+    for (std::size_t n = 0; n < parent.cells_.size(); ++n) {
+      if (!map_.lattice_.worldBox(parent.cells_[n]).intersects(box)) continue;
+      cells_.push_back(parent.cells_[n]);
+      if (n < parent.inner_) ++inner_;
+    }
   }
 
   /// Box of the image of the block's hull under the linear map of one tetrahedron, clipped to the
@@ -140,7 +146,8 @@ class PrismBlock final : public BlockMap {
   }
 
   /// Finds the tetrahedra that contain successive grid points by walking across faces. Searches all
-  /// cells of the block when a walk fails.
+  /// cells of the block when a walk fails. An inner cell is preferred to an outermost one, see
+  /// PrismMap.
   class Walk {
    public:
     explicit Walk(const PrismBlock& block)
@@ -156,7 +163,11 @@ class PrismBlock final : public BlockMap {
 
     V3d to(const V3d& x) {
       std::array<double, 4> shares;
-      const bool found = (isAt_ && walk(x, shares)) || search(x, shares);
+      bool found = isAt_ && walk(x, shares);
+      if (!found)
+        found = search(x, block_.cells_, shares);
+      else if (block_.inner_ > 0 && lattice_.isOutermost(current_.cell))
+        search(x, rivals(), shares);
       if (found) isAt_ = true;
       if (isRowStart_ && found) first_ = current_, hasFirst_ = true, isRowStart_ = false;
       return found ? mix(lattice_.textureCorners(current_), shares) : V3d(kNaN);
@@ -181,17 +192,36 @@ class PrismBlock final : public BlockMap {
       return false;
     }
 
-    bool search(const V3d& x, std::array<double, 4>& shares) {
-      for (const Cell& cell : block_.cells_) {
+    /// Leaves the current tetrahedron and `shares` as they are if no cell contains the point.
+    bool search(const V3d& x, std::span<const Cell> cells, std::array<double, 4>& shares) {
+      for (const Cell& cell : cells) {
         if (!lattice_.worldBox(cell).intersects(map_.aroundPoint(x))) continue;
         for (int order = 0; order < 6; ++order) {
-          shares = test({cell, order}, x);
-          if (!isInside(shares)) continue;
+          const std::array<double, 4> tested = test({cell, order}, x);
+          if (!isInside(tested)) continue;
           current_ = {cell, order};
+          shares = tested;
           return true;
         }
       }
       return false;
+    }
+
+    /// Inner cells that may overlap the outermost cell of the current tetrahedron. Those beside it
+    /// do not, unless the lattice folds there.
+    std::span<const Cell> rivals() {
+      const Cell& outer = current_.cell;
+      if (rivalsOf_ == outer) return rivals_;
+      rivalsOf_ = outer;
+      rivals_.clear();
+      const Box3d box = lattice_.worldBox(outer);
+      for (const Cell& cell : std::span(block_.cells_).first(block_.inner_)) {
+        bool isBeside = true;
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          isBeside = isBeside && std::abs(cell[axis] - outer[axis]) <= 1;
+        if (!isBeside && lattice_.worldBox(cell).intersects(box)) rivals_.push_back(cell);
+      }
+      return rivals_;
     }
 
     std::array<double, 4> test(const Tetrahedron& t, const V3d& x) {
@@ -204,12 +234,15 @@ class PrismBlock final : public BlockMap {
     const PrismBlock& block_;
     Tetrahedron current_, first_;
     bool isAt_ = false, hasFirst_ = false, isRowStart_ = true;
+    Cell rivalsOf_ = {-1, -1, -1};  // the outermost cell of rivals_
+    std::vector<Cell> rivals_;
     std::size_t tests_ = 0;
   };
 
   const PrismMap& map_;
   GridBlock block_;
-  std::vector<Cell> cells_;
+  std::vector<Cell> cells_;  // inner cells first
+  std::size_t inner_ = 0;    // number of cells that are not outermost
 };
 
 PrismMap::PrismMap(const Patch& patch, const LatticeBorder& border)
@@ -234,13 +267,19 @@ Box3d PrismMap::aroundPoint(const V3d& x) const {
 }
 
 bool PrismMap::find(const V3d& x, Tetrahedron& t) const {
-  return tree_.visit(aroundPoint(x), [&](const Cell& cell) {
+  bool found = false;
+  tree_.visit(aroundPoint(x), [&](const Cell& cell) {
+    const bool isOuter = lattice_.isOutermost(cell);
+    if (isOuter && found) return false;
     for (int order = 0; order < 6; ++order) {
+      if (!isInside(barycentric(lattice_.corners({cell, order}), x))) continue;
       t = {cell, order};
-      if (isInside(barycentric(lattice_.corners(t), x))) return true;
+      found = true;
+      return !isOuter;
     }
     return false;
   });
+  return found;
 }
 
 V3d PrismMap::operator()(const V3d& x) const {

@@ -14,7 +14,8 @@ namespace mapping {
 
 /// Piecewise linear map on the tetrahedra of a patch's lattice: a hybrid of particle layers and
 /// shell maps [Brodersen07 §9; Porumbescu05]. It is continuous and defined only in the lattice. It
-/// is invertible if no tetrahedron is inverted.
+/// is invertible if no tetrahedron is inverted. The outermost cells continue the lattice linearly
+/// and may reach back into it where the patch bends. An inner cell then has precedence.
 class PrismMap final : public PatchMap {
  public:
   PrismMap(const Patch& patch, const LatticeBorder& border);

@@ -8,7 +8,11 @@
 // when the fast sum differs from the direct sum by more than 0.05 texture voxel at any point that
 // both evaluate.
 //
-//   map_error_bench [POINTS = 100000000] > map-error.csv
+//   map_error_bench [POINTS = 100000000] > docs/figures/map-error.csv
+//   docs/cases/figures.py plot docs/figures/map-error.csv docs/plots/map-error
+//
+// The first columns are those of the result files that tests/figures.py reads. The column
+// resolution has the nominal numbers of particles and points, as 1e4x1e7.
 
 #include <fmt/core.h>
 #include <tbb/global_control.h>
@@ -142,8 +146,9 @@ V3d fastAt(const mapping::RbfMap& map, const V3d& x, double step) {
 
 void tell(const char* map, std::size_t particles, double points, double setup, double seconds,
           const Error& error, bool isSampled) {
-  fmt::print("{},{},{:.0f},{:.4g},{:.4g},{:.4g},{:.4g},{}\n", map, particles, points, setup,
-             seconds, error.percent99, error.largest, isSampled ? 1 : 0);
+  fmt::print("map_error,{},levelsmith,1e{:.0f}x1e{:.0f},{},{:.0f},{:.4g},{:.4g},{:.4g},{:.4g},{}\n",
+             map, std::log10(static_cast<double>(particles)), std::log10(points), particles, points,
+             setup, seconds, error.percent99, error.largest, isSampled ? 1 : 0);
   std::fflush(stdout);
 }
 
@@ -152,7 +157,9 @@ void tell(const char* map, std::size_t particles, double points, double setup, d
 int main(int argc, char** argv) {
   const double most = argc > 1 ? std::atof(argv[1]) : 1e8;
   double fastOff = 0;
-  fmt::print("map,particles,points,setup_s,mapping_s,error_99,error_max,sampled\n");
+  fmt::print(
+      "case,variant,tool,resolution,particles,points,setup_s,mapping_s,error_99,error_max,"
+      "sampled\n");
   for (const std::size_t particles : {1000, 10000, 100000}) {
     const mapping::Patch patch = makePatch(static_cast<double>(particles));
     double start = now();

@@ -179,6 +179,43 @@ TEST(PrismMap, BlocksAgreeWithPoints) {
   }
 }
 
+TEST(PrismMap, PrefersInnerCellsToOuterOnesThatOverlapThem) {
+  // A ring with a gap of 0.5 rad. The outer cells of each end reach into the other end.
+  const auto onOpenRing = [](const V3d& uvw) {
+    const double angle = (2 * M_PI - 0.5) * (uvw.x - 0.5), r = 2 + uvw.z;
+    return V3d(r * std::sin(angle), 3 * uvw.y, r * std::cos(angle));
+  };
+  const PrismMap map(support::patchAt(onOpenRing, 41, 4, 3), {.embedDepth = 0.1, .rim = 2});
+  const Lattice& lattice = map.lattice();
+  const auto isInOuterCell = [&](const V3d& x) {
+    bool found = false;
+    forEachTetrahedron(lattice, [&](const Tetrahedron& t) {
+      if (found || !lattice.isOutermost(t.cell)) return;
+      const std::array<double, 4> shares = mapping::barycentric(lattice.corners(t), x);
+      found = std::all_of(shares.begin(), shares.end(), [](double share) { return share > 0; });
+    });
+    return found;
+  };
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> share(0.01, 0.99);
+  Imath::M33d rows;
+  for (int i = 0; i < 3; ++i) rows[i][i] = 0.02;
+  int overlapped = 0;
+  double off = 0;
+  for (int n = 0; n < 2000; ++n) {
+    const V3d uvw(share(random), share(random), share(random)), x = map.toPatch(uvw);
+    if (n < 200 && isInOuterCell(x)) ++overlapped;
+    // The walk of the block begins at any of its corners, so x is the first point or the last.
+    std::array<V3d, 512> block;
+    const bool isFirst = n % 2 == 0;
+    const V3d origin = isFirst ? x : x - V3d(7 * 0.02);
+    (void)map.restrictTo({origin, rows, GridBlock::kLeafEdge}, 0)->evaluate(block);
+    off = std::max({off, (map(x) - uvw).length(), (block[isFirst ? 0 : 511] - uvw).length()});
+  }
+  EXPECT_GE(overlapped, 10);
+  EXPECT_LE(off, support::doubleRounding(8));
+}
+
 TEST(PrismMap, ReportsEveryFoldedTetrahedron) {
   const Patch sound = support::patchAt(onCylinder, 9, 9, 4);
   const Distortion distortion =
