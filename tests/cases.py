@@ -5,6 +5,8 @@ whose heads the script prints, with as many cells in each row. Also checks the c
 A case whose heads are not literal lines of `echo "| … |"` fails, so that no table escapes the check.
 """
 
+import contextlib
+import io
 import json
 import re
 import sys
@@ -16,6 +18,7 @@ CASES = ROOT / "docs/cases"
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(CASES))
 import figures  # noqa: E402
+import teapot  # noqa: E402
 
 
 def tables_below(page, name):
@@ -93,6 +96,41 @@ def interpolates_runs():
             and figures.at_error(runs, 2.0) is None and figures.at_error(runs, 0.001) is None)
 
 
+def measures_frames():
+    """Time, motion and sides of a square that doubles one side, and an element of a list by its number."""
+    square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    wide = [[2 * x, y, z] for x, y, z in square]
+    frames = [{"farthest_way": way, "corners": corners} for way, corners in ((0.0, square), (1.0, wide), (0.0, wide))]
+    steps = [{"action": "animate", "cpu_s": 3.0, "details": {"frame": frames}}]
+    with tempfile.TemporaryDirectory() as folder, io.StringIO() as printed, contextlib.redirect_stdout(printed):
+        (Path(folder) / "a.json").write_text(json.dumps({"steps": steps}), encoding="utf-8")
+        figures.frames(folder, "a")
+        rows = printed.getvalue()
+    wanted = "| 0.00 | 0.000 | 1.00 to 1.00 |\n| 0.50 | 1.000 | 1.00 to 2.00 |\n| 1.00 | 0.000 | 1.00 to 2.00 |\n"
+    return (rows == wanted and figures.values_of(steps, "frame.1.farthest_way") == [1.0]
+            and figures.values_of(steps, "step_cpu_s") == [3.0])
+
+
+def closes_patches():
+    """A tube of four patches becomes a closed surface of Euler characteristic 2 that faces outwards, both ways round."""
+    arc = [(1, 0), (1, 0.5523), (0.5523, 1), (0, 1)]  # a quarter of a circle
+    patches = []
+    for quarter in range(4):
+        points = arc
+        for _ in range(quarter):
+            points = [(-y, x) for x, y in points]
+        patches.append([[x, y, float(height)] for height in range(4) for x, y in points])
+    for some in (patches, [patch[12:] + patch[8:12] + patch[4:8] + patch[:4] for patch in patches]):
+        vertices, triangles = teapot.mesh(some, 8, [1] * 4)
+        corners = [[vertices[i] for i in triangle] for triangle in triangles]
+        volume = sum(x[0] * (y[1] * z[2] - y[2] * z[1]) + x[1] * (y[2] * z[0] - y[0] * z[2]) + x[2] * (y[0] * z[1] - y[1] * z[0])
+                     for x, y, z in corners) / 6
+        # The section has 32 sides: 16 sin(2 pi / 32) = 3.1214 for circles; the cubics give 3.1223.
+        if len(vertices) - len(triangles) / 2 != 2 or abs(volume / 3 - 3.1214) > 0.0025:
+            return False
+    return True
+
+
 def main():
     page = (CASES / "README.md").read_text(encoding="utf-8")
     dev = (ROOT / "dev").read_text(encoding="utf-8")
@@ -101,7 +139,7 @@ def main():
     sections = re.findall(r"`([a-z0-9-]+)\.sh`$", page, re.MULTILINE)
     if sorted(sections) != sorted(names):
         problems.append(f"./dev cases runs {names}, but README.md describes {sections}")
-    for works in (replaces_tables, thins_patches, interpolates_runs):
+    for works in (replaces_tables, thins_patches, interpolates_runs, measures_frames, closes_patches):
         if not works():
             problems.append(f"figures.py fails the check {works.__name__}")
     print("\n".join(problems), end="\n" if problems else "")

@@ -7,8 +7,8 @@ out=$2
 here=$(dirname "$0")
 models=$here/../../data/models
 mkdir -p "$out"
-[ -f "$models/bunny.obj" ] && [ -f "$models/dragon_vrip.ply.gz" ] || {
-  echo "The scanned models are not in data/models: fetch them with ./dev fetch." >&2
+[ -f "$models/bunny.obj" ] && [ -f "$models/dragon_vrip.ply.gz" ] && [ -f "$models/TeapotBufferGeometry.js" ] || {
+  echo "The models are not in data/models: fetch them with ./dev fetch." >&2
   exit 1
 }
 
@@ -32,6 +32,12 @@ map() {  # map NAME CHAIN...: writes NAME.vdb and its report
   name=$1
   shift
   "$levelsmith" --quiet --report "$out/$name.json" "$@" ! write "$out/$name.vdb"
+}
+
+animate() {  # animate NAME CHAIN...: a chain that ends with the action animate, which writes the frames; writes its report
+  name=$1
+  shift
+  "$levelsmith" --quiet --report "$out/$name.json" "$@"
 }
 
 picture() {  # picture NAME OPTIONS...: draws NAME.vdb
@@ -65,6 +71,10 @@ row() {  # row NAME FIELD... "'text'": prints a row of the table from the last t
   "${PYTHON:-python3}" "$here/figures.py" row "$out" "$@"
 }
 
+frames() {  # frames NAME: prints a row of the table for each frame of the animation in NAME's report
+  "${PYTHON:-python3}" "$here/figures.py" frames "$out" "$1"
+}
+
 figure() {  # figure NAME FIELD: prints that figure alone
   row "$1" "$2" | tr -d '| '
 }
@@ -89,4 +99,15 @@ standing_bunny() {  # standing_bunny VOXELS: z is up, as required for textures
 
 standing_dragon() {  # standing_dragon VOXELS
   make "dragon$1" read "$models/dragon_vrip.ply.gz" ! transform --rotate 90,0,0 ! level-set --resolution "$1"
+}
+
+# teapot NAME TURN SCALE PLACE VOXEL: a solid of the Utah teapot's patches, turned by the three angles TURN with z up
+teapot() {
+  "${PYTHON:-python3}" "$here/teapot.py" "$models/TeapotBufferGeometry.js" "$out"
+  chain=
+  for part in pot handle spout; do
+    chain="$chain read $out/teapot-$part.ply ! transform --rotate $2 --scale $3 --translate $4 ! level-set --voxel $5 !"
+    [ $part = pot ] || chain="$chain union !"
+  done
+  make "$1" ${chain% !}
 }

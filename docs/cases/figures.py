@@ -1,9 +1,10 @@
 """Pictures and tables of the docs:
 figures.py sheet FOLDER TARGET COLUMNS NAME=TITLE..., row FOLDER NAME FIELD..., expect FOLDER NAME FIELD OPERATOR VALUE,
-insert PAGE NAME TABLE, thin PATCH TARGET EVERY EVERY_LAYER, equal FOLDER VOXEL DIRECT FAST SHELL,
+frames FOLDER NAME, insert PAGE NAME TABLE, thin PATCH TARGET EVERY EVERY_LAYER, equal FOLDER VOXEL DIRECT FAST SHELL,
 timing FOLDER TARGET VOXEL TITLE=RUNS..., plot CSV TARGET, cost CSV TARGET."""
 
 import json
+import math
 import operator
 import sys
 
@@ -34,10 +35,12 @@ def steps_of(folder, name):
 
 
 def values_of(steps, field):
-    """What each texture and each measurement of a report says of FIELD, a path with dots."""
-    values = [step["details"] for step in steps if step["action"] in ("texture", "measure", "compare")]
+    """What each texture, animation and measurement of a report says of FIELD, a path with dots and numbers of elements."""
+    if field == "step_cpu_s":
+        return [step[field[5:]] for step in steps if step["action"] in ("animate", "texture", "morph")]
+    values = [step["details"] for step in steps if step["action"] in ("animate", "texture", "measure", "compare")]
     for part in field.split("."):
-        values = [value[part] for value in values]
+        values = [value[int(part)] if isinstance(value, list) else value[part] for value in values]
     return values
 
 
@@ -45,8 +48,9 @@ def figure_of(steps, field):
     """What the last of them says, as text for a table; text in quotes is itself."""
     if field.startswith("'"):
         return field.strip("'")
-    if field == "points":
-        return f"{512 * values_of(steps, 'blocks_evaluated')[-1] / 1e6:.2f} M"
+    if field in ("points", "box"):
+        blocks = "blocks_evaluated" if field == "points" else "blocks_tested"
+        return f"{512 * values_of(steps, blocks)[-1] / 1e6:.2f} M"
     value = values_of(steps, field)[-1]
     if not isinstance(value, float):
         return str(value)
@@ -57,6 +61,21 @@ def row(folder, name, *fields):
     """A row of a Markdown table from FOLDER/NAME.json."""
     steps = steps_of(folder, name)
     print("| " + " | ".join(figure_of(steps, field) for field in fields) + " |")
+
+
+def frames(folder, name):
+    """A row for each frame of an animation: the time, the longest motion of a corner since the frame before, and the least and
+    greatest ratio of a side, corner to corner, to that of the first frame."""
+
+    def sides(frame):
+        corners = frame["corners"]
+        return [math.dist(corners[i - 1], corners[i]) for i in range(4)]
+
+    entries = [step["details"]["frame"] for step in steps_of(folder, name) if step["action"] == "animate"][-1]
+    for index, entry in enumerate(entries):
+        ratios = [now / first for now, first in zip(sides(entry), sides(entries[0]))]
+        time, motion = index / (len(entries) - 1), entry["farthest_way"]
+        print(f"| {time:.2f} | {motion:.3f} | {min(ratios):.2f} to {max(ratios):.2f} |")
 
 
 def expect(folder, name, field, comparison, wanted):
@@ -260,5 +279,5 @@ def cost(table, target):
 
 
 if __name__ == "__main__":
-    commands = (sheet, row, expect, insert, thin, equal, timing, plot, cost)
+    commands = (sheet, row, frames, expect, insert, thin, equal, timing, plot, cost)
     {command.__name__: command for command in commands}[sys.argv[1]](*sys.argv[2:])

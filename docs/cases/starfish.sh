@@ -1,13 +1,9 @@
 #!/bin/sh
 # Fifty-five starfish scattered over a bunny [Brodersen07 fig. 8.11].
 . "$(dirname "$0")/case.sh"
+. "$here/stars.sh"
 bunny 200
-arm() { awk -v i="$1" 'BEGIN { a = atan2(0, -1) * 2 * i / 5; printf "%.6f,%.6f,0", sin(a), cos(a) }'; }
-make starfish capsule --from 0,0,0 --to "$(arm 0)" --radius 0.24 --voxel 0.03 \
-  ! capsule --from 0,0,0 --to "$(arm 1)" --radius 0.24 --voxel 0.03 ! union \
-  ! capsule --from 0,0,0 --to "$(arm 2)" --radius 0.24 --voxel 0.03 ! union \
-  ! capsule --from 0,0,0 --to "$(arm 3)" --radius 0.24 --voxel 0.03 ! union \
-  ! capsule --from 0,0,0 --to "$(arm 4)" --radius 0.24 --voxel 0.03 ! blend --radius 0.2
+starfish
 echo "| | pieces | particles | set-up s | certificate s | mapping s | points | distance s | merging s |"
 echo "|---|--:|--:|--:|--:|--:|--:|--:|--:|"
 map starfish-55 read "$out/bunny200.vdb" --as base ! read "$out/starfish.vdb" --as starfish \

@@ -17,3 +17,13 @@ star() {
     }
   }' > "$1.ply"
 }
+
+# starfish: writes five rods, blended, to starfish.vdb
+starfish() {
+  arm() { awk -v i="$1" 'BEGIN { a = atan2(0, -1) * 2 * i / 5; printf "%.6f,%.6f,0", sin(a), cos(a) }'; }
+  make starfish capsule --from 0,0,0 --to "$(arm 0)" --radius 0.24 --voxel 0.03 \
+    ! capsule --from 0,0,0 --to "$(arm 1)" --radius 0.24 --voxel 0.03 ! union \
+    ! capsule --from 0,0,0 --to "$(arm 2)" --radius 0.24 --voxel 0.03 ! union \
+    ! capsule --from 0,0,0 --to "$(arm 3)" --radius 0.24 --voxel 0.03 ! union \
+    ! capsule --from 0,0,0 --to "$(arm 4)" --radius 0.24 --voxel 0.03 ! blend --radius 0.2
+}
