@@ -104,8 +104,27 @@ std::vector<double> NarrowBand::zeroSetExtents(const std::vector<Imath::V3d>& di
     for (std::size_t d = 0; d < directions.size(); ++d)
       extents[d] = std::max(extents[d], p.dot(directions[d]));
   };
+  // Along a direction, no point of a leaf's grid edges is farther than the leaf's centre plus this.
+  std::vector<double> halfExtents;
+  for (const Imath::V3d& d : directions) {
+    double sum = 0;
+    for (const openvdb::Vec3d& row : linearPart(grid.transform()))
+      sum += std::abs(toImath(row).dot(d));
+    halfExtents.push_back(LeafNode::DIM / 2 * sum);
+  }
+  constexpr double kRounding = 1e-12;
+  const auto mayExtend = [&](const LeafNode& leaf, const std::vector<double>& extents) {
+    const Imath::V3d centre =
+        toImath(grid.indexToWorld(leaf.origin().asVec3d() + openvdb::Vec3d(LeafNode::DIM / 2)));
+    for (std::size_t d = 0; d < directions.size(); ++d) {
+      const double slack = kRounding * centre.length() * directions[d].length();
+      if (centre.dot(directions[d]) + halfExtents[d] + slack >= extents[d]) return true;
+    }
+    return false;
+  };
   const auto addLeaf = [&](const LeafNode& leaf, FloatGrid::ConstAccessor& accessor,
                            std::vector<double>& extents) {
+    if (!mayExtend(leaf, extents)) return;
     const float* values = leaf.buffer().data();
     constexpr openvdb::Index kStrides[3] = {LeafNode::DIM * LeafNode::DIM, LeafNode::DIM, 1};
     for (auto it = leaf.cbeginValueOn(); it; ++it) {
@@ -130,8 +149,13 @@ std::vector<double> NarrowBand::zeroSetExtents(const std::vector<Imath::V3d>& di
       }
     }
   };
+  // With the extents of a few leaves known, most other leaves need no search.
+  constexpr std::size_t kSample = 61;
+  std::vector<double> sampled = nothing;
+  FloatGrid::ConstAccessor sampler = grid.getConstAccessor();
+  for (std::size_t n = 0; n < leaves.size(); n += kSample) addLeaf(*leaves[n], sampler, sampled);
   return tbb::parallel_reduce(
-      tbb::blocked_range<std::size_t>(0, leaves.size(), 64), nothing,
+      tbb::blocked_range<std::size_t>(0, leaves.size(), 64), sampled,
       [&](const tbb::blocked_range<std::size_t>& range, std::vector<double> extents) {
         FloatGrid::ConstAccessor accessor = grid.getConstAccessor();
         for (std::size_t n = range.begin(); n < range.end(); ++n)
@@ -237,8 +261,9 @@ NarrowBand importBand(FloatGrid::Ptr grid, BandRepairs* repairs) {
       if (!leaf->isValueOn(i)) takes(values[i]);
     }
   }
-  for (auto it = grid->tree().beginValueOff(); it; ++it) {
-    if (it.getDepth() == FloatGrid::TreeType::DEPTH - 1) continue;
+  auto it = grid->tree().beginValueOff();
+  it.setMaxDepth(FloatGrid::TreeType::DEPTH - 2);  // tiles only
+  for (; it; ++it) {
     if (!std::isfinite(*it)) {
       throw InvalidInput(fmt::format(
           "grid '{}' holds {} in a tile; repair the file or write it again", name, *it));

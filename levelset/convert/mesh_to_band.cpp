@@ -150,7 +150,7 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
   report(progress, 0);
 
   // === Topology and method
-  const MeshTopology topology = convert::findTopology(mesh);
+  MeshTopology topology = convert::findTopology(mesh);
   report(progress, 0.05);
   SignCertificate certificate;
   certificate.closed = topology.isClosed();
@@ -177,6 +177,7 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
     local = convert::separatingSurface(local, selfIntersections.get(), field.isFlipped() ? -1 : 1,
                                        subProgress(progress, 0.5, 0.6));
   certificate.selfIntersections = selfIntersections.count();
+  topology.triangles = {};  // frees memory; `local` has a copy
   if (field.isOpen())
     addOpenSurface(local, field, options.halfWidth, maxMemory, subProgress(progress, 0.5, 0.6));
 

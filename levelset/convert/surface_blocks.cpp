@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "levelset/mesh_sign/triangle_distance.h"
 #include "levelset/progress_gate.h"
@@ -15,6 +16,7 @@ using Imath::V3d;
 using Imath::V3i;
 using List = std::vector<std::uint32_t>;
 
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr std::size_t kTaskSize = 2048;  // minimum number of triangles of a cell that is a task
 constexpr std::size_t kShare = std::size_t{1} << 50;  // progress units of the complete traversal
 
@@ -38,20 +40,26 @@ class BlockTraversal {
   }
 
  private:
+  /// Bounding box of a triangle, enlarged by reach_ and rounded outwards to single precision.
   struct Box {
-    V3d low, high;  // bounding box of a triangle, enlarged by reach_
-    double extent;  // longest side of the triangle's bounding box
+    Imath::V3f low, high;
+    float extent;  // longest side of the triangle's bounding box
   };
+  static float below(double x) { return std::nextafter(static_cast<float>(x), -kInfinity); }
+  static float above(double x) { return std::nextafter(static_cast<float>(x), kInfinity); }
 
   Box boxOf(std::size_t t) const {
     const V3d &a = mesh_.corner(t, 0), &b = mesh_.corner(t, 1), &c = mesh_.corner(t, 2);
     Box box{};
+    double extent = 0;
     for (int axis = 0; axis < 3; ++axis) {
-      box.low[axis] = std::min({a[axis], b[axis], c[axis]}) - reach_;
-      box.high[axis] = std::max({a[axis], b[axis], c[axis]}) + reach_;
+      const double low = std::min({a[axis], b[axis], c[axis]}),
+                   high = std::max({a[axis], b[axis], c[axis]});
+      box.low[axis] = below(low - reach_);
+      box.high[axis] = above(high + reach_);
+      extent = std::max(extent, high - low);
     }
-    const V3d size = box.high - box.low;
-    box.extent = std::max({size.x, size.y, size.z}) - 2 * reach_;
+    box.extent = above(extent);
     return box;
   }
 
@@ -61,7 +69,8 @@ class BlockTraversal {
     double half = kBlockDim;
     for (const Box& box : boxes_)
       for (int axis = 0; axis < 3; ++axis)
-        half = std::max({half, std::abs(box.low[axis]), std::abs(box.high[axis])});
+        half = std::max({half, std::abs(static_cast<double>(box.low[axis])),
+                         std::abs(static_cast<double>(box.high[axis]))});
     std::int64_t edge = kBlockDim;
     while (static_cast<double>(edge) <= half) edge *= 2;
     return {-edge, -edge, -edge, 2 * edge};
@@ -73,8 +82,10 @@ class BlockTraversal {
     const V3d low(static_cast<double>(cell.x), static_cast<double>(cell.y),
                   static_cast<double>(cell.z));
     for (int axis = 0; axis < 3; ++axis)
-      if (box.low[axis] > low[axis] + last || box.high[axis] < low[axis]) return false;
-    if (box.extent <= static_cast<double>(cell.size)) return true;
+      if (static_cast<double>(box.low[axis]) > low[axis] + last ||
+          static_cast<double>(box.high[axis]) < low[axis])
+        return false;
+    if (static_cast<double>(box.extent) <= static_cast<double>(cell.size)) return true;
     const TriangleFrame frame(mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2));
     const double range = reach_ + last * 0.8660255 + 1e-6;
     return frame.squaredDistance(low + V3d(last / 2)) <= range * range;

@@ -51,10 +51,10 @@ NarrowBand clipBy(const NarrowBand& solid, const Progress& progress, const Dista
   };
   if (!BlockFiller(*region, phi).fill(solidBounds(grid), subProgress(progress, 0, 0.5)))
     throw nothingLeft();
-  openvdb::FloatGrid::Ptr merged = mergePair(CsgOperation::Intersection, grid, *region);
-  if (!hasInside(*merged)) throw nothingLeft();
+  NarrowBand merged = mergePair(CsgOperation::Intersection, solid, makeBand(region));
+  if (!hasInside(vdb(merged))) throw nothingLeft();
   report(progress, 1);
-  return makeBand(std::move(merged));
+  return merged;
 }
 
 void requireSurface(const NarrowBand& solid) {

@@ -34,21 +34,20 @@ void clearSignOfZeros(FloatTree& tree) {
   });
 }
 
-/// Combines two grids by OpenVDB's CSG node operations, without pruning.
-FloatGrid::Ptr minimumOf(CsgOperation operation, const FloatGrid& a, const FloatGrid& b) {
-  FloatGrid::Ptr result = a.deepCopy();
+/// Combines `b` into `a` by OpenVDB's CSG node operations, without pruning.
+/// @param tag  openvdb::Steal to move the nodes of `b`, openvdb::DeepCopy to copy them
+template <typename Tree, typename Tag>
+void mergeInto(CsgOperation operation, FloatGrid& a, Tree& b, const Tag& tag) {
   {
-    openvdb::tree::DynamicNodeManager<FloatTree> nodes(result->tree());
-    const openvdb::DeepCopy tag;
+    openvdb::tree::DynamicNodeManager<FloatTree> nodes(a.tree());
     if (operation == CsgOperation::Union)
-      nodes.foreachTopDown(openvdb::tools::CsgUnionOp<FloatTree>(b.tree(), tag));
+      nodes.foreachTopDown(openvdb::tools::CsgUnionOp<FloatTree>(b, tag));
     else if (operation == CsgOperation::Intersection)
-      nodes.foreachTopDown(openvdb::tools::CsgIntersectionOp<FloatTree>(b.tree(), tag));
+      nodes.foreachTopDown(openvdb::tools::CsgIntersectionOp<FloatTree>(b, tag));
     else
-      nodes.foreachTopDown(openvdb::tools::CsgDifferenceOp<FloatTree>(b.tree(), tag));
+      nodes.foreachTopDown(openvdb::tools::CsgDifferenceOp<FloatTree>(b, tag));
   }
-  if (operation == CsgOperation::Difference) clearSignOfZeros(result->tree());
-  return result;
+  if (operation == CsgOperation::Difference) clearSignOfZeros(a.tree());
 }
 
 void requireSolids(std::span<const NarrowBand> solids, const CsgOptions& options) {
@@ -70,37 +69,35 @@ void requireSolids(std::span<const NarrowBand> solids, const CsgOptions& options
 
 /// Resamples all solids to the grid of the finest one, and narrows all bands to the smallest half
 /// width.
-std::vector<NarrowBand> onOneGrid(std::span<const NarrowBand> solids, const CsgOptions& options,
-                                  std::vector<std::string>& notes) {
+void bringToOneGrid(std::vector<NarrowBand>& solids, const CsgOptions& options,
+                    std::vector<std::string>& notes) {
   const auto finest = std::min_element(
       solids.begin(), solids.end(),
       [](const auto& a, const auto& b) { return a.voxelSize() < b.voxelSize() * (1 - 1e-9); });
   double halfWidth = finest->halfWidth();
   for (const NarrowBand& solid : solids) halfWidth = std::min(halfWidth, solid.halfWidth());
-  std::vector<NarrowBand> result;
   for (std::size_t i = 0; i < solids.size(); ++i) {
     if (shareTransform(vdb(*finest), vdb(solids[i]))) {
-      result.push_back(narrowed(solids[i], halfWidth));
       // Half widths that differ only by rounding need no note.
       if (halfWidth < solids[i].halfWidth() * (1 - 1e-5))
         notes.push_back(fmt::format("operand {} was narrowed to a half width of {:.6g} voxels",
                                     i + 1, halfWidth));
+      solids[i] = narrowed(std::move(solids[i]), halfWidth);
       continue;
     }
-    result.push_back(resampleTo(solids[i], finest->indexToWorld(),
-                                {.halfWidth = halfWidth, .maxMemory = options.maxMemory}));
     notes.push_back(fmt::format(
         "operand {} was resampled from voxels of {} to the grid of operand {} "
         "with voxels of {}",
         i + 1, solids[i].voxelSize(), finest - solids.begin() + 1, finest->voxelSize()));
+    solids[i] = resampleTo(solids[i], finest->indexToWorld(),
+                           {.halfWidth = halfWidth, .maxMemory = options.maxMemory});
   }
   // Voxel sizes may differ in the last bits. Equal half widths then give different backgrounds, so
   // all bands are shortened to the smallest background.
-  float background = vdb(result.front()).background();
-  for (const NarrowBand& solid : result) background = std::min(background, vdb(solid).background());
-  for (NarrowBand& solid : result)
+  float background = vdb(solids.front()).background();
+  for (const NarrowBand& solid : solids) background = std::min(background, vdb(solid).background());
+  for (NarrowBand& solid : solids)
     if (vdb(solid).background() != background) endBandAt(editVdb(solid), background);
-  return result;
 }
 
 using Leaf = FloatTree::LeafNodeType;
@@ -179,25 +176,39 @@ CsgSigns csgSigns(CsgOperation operation) {
 }
 
 FloatGrid::Ptr mergePlain(CsgOperation operation, const FloatGrid& a, const FloatGrid& b) {
-  const FloatGrid::Ptr result = minimumOf(operation, a, b);
+  const FloatGrid::Ptr result = a.deepCopy();
+  mergeInto(operation, *result, b.tree(), openvdb::DeepCopy());
   pruneOneSided(result->tree());
   return result;
 }
 
-FloatGrid::Ptr mergePair(CsgOperation operation, const FloatGrid& first, const FloatGrid& second) {
+NarrowBand mergePair(CsgOperation operation, NarrowBand a, NarrowBand b) {
   const CsgSigns signs = csgSigns(operation);
-  const std::optional<ClosedPair> closed = closeContacts(first, second, signs);
-  const FloatGrid& a = closed ? *closed->a : first;
-  const FloatGrid& b = closed ? *closed->b : second;
-  const FloatGrid::Ptr result = minimumOf(operation, a, b);
-  correctSeam(*result, a, b, signs);
-  pruneOneSided(result->tree());
+
+  // === Measure, while both operands are unchanged
+  std::vector<SharedLeaf> shared = sharedLeaves(vdb(a), vdb(b));
+  const Coincidence coincidence = coincidenceOf(vdb(a), vdb(b), signs, shared);
+  if (!coincidence.contacts.empty()) {
+    closeContacts(editVdb(a), coincidence.contacts, signs.first);
+    closeContacts(editVdb(b), coincidence.contacts, signs.second);
+    shared = sharedLeaves(vdb(a), vdb(b));
+  }
+  const std::vector<SeamDistances> distances = seamDistances(vdb(a), vdb(b), signs, shared);
+
+  // === Combine
+  FloatGrid& result = editVdb(a);
+  if (b.shared().use_count() == 1)
+    mergeInto(operation, result, editVdb(b).tree(), openvdb::Steal());
+  else
+    mergeInto(operation, result, vdb(b).tree(), openvdb::DeepCopy());
+  correctSeam(result, distances);
+  pruneOneSided(result.tree());
   // Faces of the operands that lie on each other and bound no solid may end at an edge of the
   // result. There correctSeam(), which fits planes to the surfaces, is wrong, so the band is
   // redistanced.
-  const std::vector<openvdb::Coord> faces = coincidentFaces(first, second, signs);
-  if (!faces.empty() && eikonal::hasZeroCrossing(result->tree())) redistanceAbout(faces, *result);
-  return result;
+  if (!coincidence.faces.empty() && eikonal::hasZeroCrossing(result.tree()))
+    redistanceAbout(coincidence.faces, result);
+  return a;
 }
 
 namespace {
@@ -212,10 +223,10 @@ NarrowBand uniteAll(std::vector<NarrowBand> solids, const CsgOptions& options) {
     for (std::size_t i = 0; i < half; ++i) {
       const bool isPair = 2 * i + 1 < solids.size();
       if (isPair) report(options.progress, done++ / pairs);
+      NarrowBand first = std::move(solids[2 * i]);
       solids[i] =
-          isPair
-              ? makeBand(mergePair(CsgOperation::Union, vdb(solids[2 * i]), vdb(solids[2 * i + 1])))
-              : std::move(solids[2 * i]);
+          isPair ? mergePair(CsgOperation::Union, std::move(first), std::move(solids[2 * i + 1]))
+                 : std::move(first);
     }
     solids.resize(half);
   }
@@ -224,21 +235,21 @@ NarrowBand uniteAll(std::vector<NarrowBand> solids, const CsgOptions& options) {
 
 }  // namespace
 
-CsgResult combine(CsgOperation operation, std::span<const NarrowBand> solids,
-                  const CsgOptions& options) {
-  requireSolids(solids, options);
+CsgResult combineMoved(CsgOperation operation, std::vector<NarrowBand> operands,
+                       const CsgOptions& options) {
+  requireSolids(operands, options);
   CsgResult result;
-  std::vector<NarrowBand> operands = onOneGrid(solids, options, result.notes);
+  bringToOneGrid(operands, options, result.notes);
   if (operation == CsgOperation::Union) {
     result.band = uniteAll(std::move(operands), options);
     report(options.progress, 1);
     return result;
   }
-  result.band = operands.front();
+  result.band = std::move(operands.front());
   for (std::size_t i = 1; i < operands.size(); ++i) {
     report(options.progress, static_cast<double>(i - 1) / static_cast<double>(operands.size() - 1));
-    FloatGrid::Ptr merged = mergePair(operation, vdb(result.band), vdb(operands[i]));
-    if (!hasInside(*merged)) {
+    result.band = mergePair(operation, std::move(result.band), std::move(operands[i]));
+    if (!hasInside(vdb(result.band))) {
       throw InvalidInput(operation == CsgOperation::Intersection
                              ? fmt::format("the result is empty, because operand {} does not "
                                            "overlap the intersection of the "
@@ -249,10 +260,14 @@ CsgResult combine(CsgOperation operation, std::span<const NarrowBand> solids,
                                            "operands",
                                            i + 1));
     }
-    result.band = makeBand(std::move(merged));
   }
   report(options.progress, 1);
   return result;
+}
+
+CsgResult combine(CsgOperation operation, std::span<const NarrowBand> solids,
+                  const CsgOptions& options) {
+  return combineMoved(operation, std::vector<NarrowBand>(solids.begin(), solids.end()), options);
 }
 
 namespace {

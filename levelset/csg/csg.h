@@ -34,6 +34,10 @@ struct CsgResult {
 /// @throws ResourceLimit if the memory estimate exceeds the limit
 [[nodiscard]] CsgResult combine(CsgOperation operation, std::span<const NarrowBand> solids,
                                 const CsgOptions& options = {});
+/// Combines solids as combine() does, and takes them over: reuses the memory of each solid that no
+/// other band shares.
+[[nodiscard]] CsgResult combineMoved(CsgOperation operation, std::vector<NarrowBand> solids,
+                                     const CsgOptions& options = {});
 
 [[nodiscard]] NarrowBand unite(const NarrowBand& a, const NarrowBand& b);
 [[nodiscard]] NarrowBand intersect(const NarrowBand& a, const NarrowBand& b);

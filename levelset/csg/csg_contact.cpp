@@ -20,12 +20,6 @@ using Leaf = openvdb::FloatTree::LeafNodeType;
 /// touching faces.
 constexpr double kGap = 1e-3;
 
-/// Grid point between two touching faces.
-struct Contact {
-  Coord at;
-  double depth;  ///< distance of the least deep inside neighbour, voxels, negative
-};
-
 /// Reads the distances of both operands in voxels, multiplied by their signs ±1 of CsgSigns.
 struct SignedPair {
   FloatGrid::ConstAccessor a, b;
@@ -79,36 +73,6 @@ bool isContact(const SignedPair& pair, const Coord& c, double& depth) {
   return through > 0 && slopeU.dot(slopeV) < -0.5 * slopeU.length() * slopeV.length();
 }
 
-std::vector<Contact> findContacts(const FloatGrid& a, const FloatGrid& b, const CsgSigns& signs) {
-  std::vector<const Leaf*> shared;
-  for (auto leaf = b.tree().cbeginLeaf(); leaf; ++leaf)
-    if (a.tree().probeConstLeaf(leaf->origin())) shared.push_back(leaf.getLeaf());
-  const auto gap = static_cast<float>(kGap * b.voxelSize()[0]);
-  std::vector<std::vector<Contact>> found(shared.size());
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, shared.size(), 16), [&](const auto& range) {
-    const SignedPair pair(a, b, signs);
-    for (std::size_t i = range.begin(); i != range.end(); ++i)
-      for (auto it = shared[i]->cbeginValueOn(); it; ++it) {
-        if (std::abs(*it) > gap) continue;
-        double depth = 0;
-        if (isContact(pair, it.getCoord(), depth)) found[i].push_back({it.getCoord(), depth});
-      }
-  });
-  std::vector<Contact> all;
-  for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());
-  return all;
-}
-
-FloatGrid::Ptr withContacts(const FloatGrid& grid, const std::vector<Contact>& contacts,
-                            float sign) {
-  FloatGrid::Ptr result = grid.deepCopy();
-  auto accessor = result->getAccessor();
-  const double perVoxel = static_cast<double>(sign) * grid.voxelSize()[0];
-  for (const Contact& contact : contacts)
-    accessor.setValueOn(contact.at, static_cast<float>(perVoxel * contact.depth));
-  return result;
-}
-
 /// Returns true if a grid point is next to a face that both operands share with opposite
 /// orientation, and if that face continues around the point. Round solids that touch in a point
 /// have opposite gradients too, but only on the line through the contact.
@@ -132,32 +96,66 @@ bool isBesideBoth(const SignedPair& pair, const Coord& c) {
          slopeU.dot(slopeV) < -0.999 * slopeU.length() * slopeV.length();
 }
 
-}  // namespace
-
-std::vector<Coord> coincidentFaces(const FloatGrid& a, const FloatGrid& b, const CsgSigns& signs) {
-  std::vector<const Leaf*> shared;
-  for (auto leaf = b.tree().cbeginLeaf(); leaf; ++leaf)
-    if (a.tree().probeConstLeaf(leaf->origin())) shared.push_back(leaf.getLeaf());
-  std::vector<char> found(shared.size(), 0);
-  const auto voxel = static_cast<float>(b.voxelSize()[0]);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, shared.size(), 16), [&](const auto& range) {
-    const SignedPair pair(a, b, signs);
-    for (std::size_t i = range.begin(); i != range.end(); ++i)
-      for (auto it = shared[i]->cbeginValueOn(); it && !found[i]; ++it)
-        if (std::abs(*it) < voxel && isBesideBoth(pair, it.getCoord())) found[i] = 1;
-  });
-  std::vector<Coord> leaves;
-  for (std::size_t i = 0; i < shared.size(); ++i)
-    if (found[i]) leaves.push_back(shared[i]->origin());
-  return leaves;
+/// Returns true if a leaf pair may contain a grid point on or beside two faces that coincide: both
+/// distances are nearly opposite there, and that of the second operand is below a voxel. Tests in
+/// single precision, with a margin.
+bool mayCoincide(const SharedLeaf& shared, const CsgSigns& signs, double voxelSize) {
+  const float *a = shared.a->buffer().data(), *b = shared.b->buffer().data();
+  const auto gap = static_cast<float>(3 * kGap * voxelSize), voxel = static_cast<float>(voxelSize);
+  int found = 0;
+  for (openvdb::Index n = 0; n < Leaf::SIZE; ++n)
+    found |= static_cast<int>(std::abs(signs.first * a[n] + signs.second * b[n]) <= gap) &
+             static_cast<int>(std::abs(b[n]) < voxel);
+  return found != 0;
 }
 
-std::optional<ClosedPair> closeContacts(const FloatGrid& a, const FloatGrid& b,
-                                        const CsgSigns& signs) {
-  const std::vector<Contact> contacts = findContacts(a, b, signs);
-  if (contacts.empty()) return std::nullopt;
-  return ClosedPair{withContacts(a, contacts, signs.first),
-                    withContacts(b, contacts, signs.second)};
+}  // namespace
+
+std::vector<SharedLeaf> sharedLeaves(const FloatGrid& a, const FloatGrid& b) {
+  std::vector<SharedLeaf> shared;
+  const auto inA = a.getConstAccessor();
+  for (auto leaf = b.tree().cbeginLeaf(); leaf; ++leaf)
+    if (const Leaf* other = inA.probeConstLeaf(leaf->origin()))
+      shared.push_back({other, leaf.getLeaf()});
+  return shared;
+}
+
+Coincidence coincidenceOf(const FloatGrid& a, const FloatGrid& b, const CsgSigns& signs,
+                          const std::vector<SharedLeaf>& shared) {
+  struct Found {
+    std::vector<Contact> contacts;
+    bool hasFace = false;
+  };
+  std::vector<Found> found(shared.size());
+  const double voxelSize = b.voxelSize()[0];
+  const auto voxel = static_cast<float>(voxelSize), gap = static_cast<float>(kGap * voxelSize);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, shared.size(), 16), [&](const auto& range) {
+    const SignedPair pair(a, b, signs);
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      if (!mayCoincide(shared[i], signs, voxelSize)) continue;
+      for (auto it = shared[i].b->cbeginValueOn(); it; ++it) {
+        const float distance = std::abs(*it);
+        double depth = 0;
+        if (distance <= gap && isContact(pair, it.getCoord(), depth))
+          found[i].contacts.push_back({it.getCoord(), depth});
+        if (distance < voxel && !found[i].hasFace)
+          found[i].hasFace = isBesideBoth(pair, it.getCoord());
+      }
+    }
+  });
+  Coincidence all;
+  for (std::size_t i = 0; i < shared.size(); ++i) {
+    all.contacts.insert(all.contacts.end(), found[i].contacts.begin(), found[i].contacts.end());
+    if (found[i].hasFace) all.faces.push_back(shared[i].b->origin());
+  }
+  return all;
+}
+
+void closeContacts(FloatGrid& grid, const std::vector<Contact>& contacts, float sign) {
+  auto accessor = grid.getAccessor();
+  const double perVoxel = static_cast<double>(sign) * grid.voxelSize()[0];
+  for (const Contact& contact : contacts)
+    accessor.setValueOn(contact.at, static_cast<float>(perVoxel * contact.depth));
 }
 
 }  // namespace levelset

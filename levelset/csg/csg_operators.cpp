@@ -58,8 +58,9 @@ ValuePlan planCombined(CsgOperation operation, Plans operands) {
 template <CsgOperation operation>
 NarrowBand CsgOperator<operation>::run(std::vector<NarrowBand> operands, const Options&,
                                        OperatorRun& run) {
-  return bandAndNotes(
-      combine(operation, operands, {.maxMemory = run.maxMemory, .progress = run.progress}), run);
+  return bandAndNotes(combineMoved(operation, std::move(operands),
+                                   {.maxMemory = run.maxMemory, .progress = run.progress}),
+                      run);
 }
 
 template <CsgOperation operation>

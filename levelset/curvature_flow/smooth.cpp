@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <mutex>
 #include <optional>
 
@@ -33,6 +34,9 @@ constexpr double kStencil = 3;
 constexpr double kKnownReach = 3;
 // A band is widened when the filter needs more than this multiple of its half width.
 constexpr double kWideEnough = 1.0001;
+// Smallest σ of a Gaussian filter, voxels, that rounds all edges. Slightly below 1: σ in voxels is
+// a quotient of two lengths.
+constexpr double kLeastRounding = 1 - 1e-6;
 // Number of fields, each with one float for each grid point of the leaf blocks, in memory at once.
 constexpr double kFieldsAlive = 5;
 // Largest number of values that a median may read, for all grid points together. Reading as many
@@ -121,11 +125,10 @@ class BlockFilter {
   [[nodiscard]] const BandBlocks& blocks() const { return blocks_; }
 
   [[nodiscard]] Field convolve(const Field& field, const std::vector<float>& weights) const {
-    Field a = field, b(blocks_.size());
-    for (int axis = 0; axis < 3; ++axis) {
-      alongAxis(a, axis, weights, b);
-      std::swap(a, b);
-    }
+    Field a(blocks_.size()), b(blocks_.size());
+    alongAxis<0>(field, weights, a);
+    alongAxis<1>(a, weights, b);
+    alongAxis<2>(b, weights, a);
     return a;
   }
 
@@ -184,45 +187,75 @@ class BlockFilter {
     });
   }
 
-  /// Convolves along an axis: copies each block and its neighbour blocks along the axis, then
-  /// filters the 64 lines of the block. Does not use PaddedLeaf, which copies a border on all
-  /// sides: this copy extends along one axis only, and is transposed so that the 64 lines are
-  /// contiguous.
-  void alongAxis(const Field& in, int axis, const std::vector<float>& weights, Field& out) const {
-    const int reach = static_cast<int>(weights.size()) - 1, chain = (reach + 7) / 8;
-    const std::size_t stride = axis == 0 ? 64 : axis == 1 ? 8 : 1;
-    forEachBlock<std::vector<float>>([&](std::size_t i, std::vector<float>& lines) {
-      lines.resize(static_cast<std::size_t>(8 * (2 * chain + 1)) * 64);
-      for (int k = -chain; k <= chain; ++k) {
-        Coord origin = blocks_.origin(i);
-        origin[axis] += 8 * k;
-        const std::uint32_t n = blocks_.find(origin);
-        const float* source = n == BandBlocks::kNone ? nullptr : in[n / 512].data();
-        const float constant = source ? 0 : farValue(origin);
-        float* target = lines.data() + static_cast<std::size_t>(8 * (k + chain)) * 64;
-        for (std::size_t along = 0; along < 8; ++along)
-          for (std::size_t line = 0; line < 64; ++line)
-            target[along * 64 + line] =
-                source ? source[along * stride + startOfLine(line, axis)] : constant;
-      }
-      std::array<float, 64> sums;
-      for (std::size_t along = 0; along < 8; ++along) {
-        const float* centre = lines.data() + (static_cast<std::size_t>(8 * chain) + along) * 64;
-        for (std::size_t line = 0; line < 64; ++line) sums[line] = weights[0] * centre[line];
-        for (int k = 1; k <= reach; ++k) {
-          const float w = weights[static_cast<std::size_t>(k)];
-          const float *before = centre - 64 * k, *after = centre + 64 * k;
-          for (std::size_t line = 0; line < 64; ++line)
-            sums[line] += w * (before[line] + after[line]);
-        }
-        for (std::size_t line = 0; line < 64; ++line)
-          out[i][along * stride + startOfLine(line, axis)] = sums[line];
-      }
-    });
+  /// A block and its neighbour blocks along an axis.
+  struct Chain {
+    std::vector<const float*> blocks;  ///< from the farthest before to the farthest after
+    std::vector<Values> constants;     ///< values of blocks that do not exist
+    std::vector<float> row;            ///< one row along the axis through all blocks
+  };
+
+  template <int axis>
+  void findChain(const Field& in, std::size_t i, int length, Chain& chain) const {
+    const auto count = static_cast<std::size_t>(2 * length + 1);
+    chain.blocks.resize(count);
+    chain.constants.resize(count);
+    chain.row.resize(8 * count);
+    for (std::size_t k = 0; k < count; ++k) {
+      Coord origin = blocks_.origin(i);
+      origin[axis] += 8 * (static_cast<int>(k) - length);
+      const std::uint32_t n = blocks_.find(origin);
+      if (n == BandBlocks::kNone) chain.constants[k].fill(farValue(origin));
+      chain.blocks[k] = n == BandBlocks::kNone ? chain.constants[k].data() : in[n / 512].data();
+    }
   }
 
-  static std::size_t startOfLine(std::size_t line, int axis) {
-    return axis == 0 ? line : axis == 1 ? (line >> 3) * 64 + (line & 7) : line * 8;
+  /// Convolves N contiguous values. `at(k)` returns the address of the values k grid points away
+  /// along the axis.
+  template <std::size_t N, typename At>
+  static void convolveLines(const std::vector<float>& weights, const At& at, float* out) {
+    std::array<float, N> sums;
+    const float* centre = at(0);
+    for (std::size_t n = 0; n < N; ++n) sums[n] = weights[0] * centre[n];
+    for (int k = 1; k < static_cast<int>(weights.size()); ++k) {
+      const float w = weights[static_cast<std::size_t>(k)];
+      const float *before = at(-k), *after = at(k);
+      for (std::size_t n = 0; n < N; ++n) sums[n] += w * (before[n] + after[n]);
+    }
+    std::copy(sums.begin(), sums.end(), out);
+  }
+
+  /// Convolves along an axis. Reads each block and its neighbour blocks along that axis in place:
+  /// planes of 64 contiguous values along x, rows of 8 along y. Rows along z are copied first.
+  template <int axis>
+  void alongAxis(const Field& in, const std::vector<float>& weights, Field& out) const {
+    const int reach = static_cast<int>(weights.size()) - 1, length = (reach + 7) / 8;
+    forEachBlock<Chain>([&](std::size_t i, Chain& chain) {
+      findChain<axis>(in, i, length, chain);
+      // Block of the chain, and place in it, of position p along the axis of block i.
+      const auto blockAt = [&](int p) {
+        return chain.blocks[static_cast<std::size_t>((p >> 3) + length)];
+      };
+      float* target = out[i].data();
+      if constexpr (axis == 0) {
+        for (int x = 0; x < 8; ++x)
+          convolveLines<64>(
+              weights, [&](int k) { return blockAt(x + k) + ((x + k) & 7) * 64; }, target + x * 64);
+      } else if constexpr (axis == 1) {
+        for (int x = 0; x < 8; ++x)
+          for (int y = 0; y < 8; ++y)
+            convolveLines<8>(
+                weights, [&](int k) { return blockAt(y + k) + x * 64 + ((y + k) & 7) * 8; },
+                target + x * 64 + y * 8);
+      } else {
+        for (int line = 0; line < 64; ++line) {
+          for (std::size_t b = 0; b < chain.blocks.size(); ++b)
+            std::memcpy(chain.row.data() + 8 * b, chain.blocks[b] + line * 8, 8 * sizeof(float));
+          const float* centre = chain.row.data() + static_cast<std::ptrdiff_t>(8) * length;
+          convolveLines<8>(
+              weights, [&](int k) { return centre + k; }, target + line * 8);
+        }
+      }
+    });
   }
 
   const openvdb::FloatTree& tree_;
@@ -321,6 +354,11 @@ struct Filtering {
   [[nodiscard]] double known() const {
     return kind == SmoothKind::Median ? width + 1 : passes() * kKnownReach * width;
   }
+  /// Returns true if the filtered field may have edges as sharp as the grid can hold. A Gaussian of
+  /// σ ≥ 1 voxel leaves at most exp(−π²/2), 0.7 %, of the shortest waves of the grid.
+  [[nodiscard]] bool mayLeaveEdges() const {
+    return kind != SmoothKind::Gaussian || width < kLeastRounding;
+  }
   /// Returns the largest distance from a grid point at which the filter reads values, voxels.
   [[nodiscard]] double reach() const {
     return kind == SmoothKind::Median ? width + 1 : passes() * kGaussianReach * width;
@@ -330,7 +368,7 @@ struct Filtering {
 /// Smooths the solid in an index box of grid points, or everywhere if `box` is empty. Returns
 /// nullopt if the filtered field has no zero crossing. With a box, also returns nullopt if too
 /// little of the surface lies near it to compute the distances in it.
-std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const NarrowBand& solid,
+std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, NarrowBand solid,
                                      const Filtering& filtering, const SmoothOptions& options) {
   const double voxel = solid.voxelSize();
   eikonal::DistanceRequest request;
@@ -351,9 +389,12 @@ std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const 
     if (box) request.region = around(needed);
     request.progress = subProgress(options.progress, 0, kWidened);
     field = eikonal::distanceTransform(vdb(solid), request);
-  } else {
+  } else if (box) {
     field = vdb(solid).deepCopy();
-    if (box) field->tree().clip(around(needed));
+    field->tree().clip(around(needed));
+  } else {
+    (void)editVdb(solid);  // copies the grid if another band shares it
+    field = solid.shared()->grid;
   }
 
   // === Filter
@@ -375,6 +416,7 @@ std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, const 
 
   // === Redistancing
   request.halfWidth = solid.halfWidth();
+  request.mayHaveEdges = options.mask || filtering.mayLeaveEdges();
   request.progress = subProgress(options.progress, kFiltered, 1);
   request.region.reset();
   if (!box) return makeBand(eikonal::distanceTransform(*field, request));
@@ -421,7 +463,8 @@ NarrowBand smooth(NarrowBand solid, SmoothKind kind, double sigma, const SmoothO
     if (!box.isInside(vdb(solid).evalActiveVoxelBoundingBox()))
       if (auto part = smoothedIn(box, solid, filtering, options)) return std::move(*part);
   }
-  if (auto whole = smoothedIn(std::nullopt, solid, filtering, options)) return std::move(*whole);
+  if (auto whole = smoothedIn(std::nullopt, std::move(solid), filtering, options))
+    return std::move(*whole);
   throw InvalidInput(
       fmt::format("a sigma of {} world units removes the entire solid; give a smaller "
                   "sigma",

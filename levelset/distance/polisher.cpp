@@ -1,6 +1,7 @@
 #include "levelset/distance/polisher.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "levelset/distance/surface/closest_point.h"
 
@@ -31,7 +32,77 @@ double Polisher::interpolationError(std::uint32_t point) const {
   return std::max(kRounding, slope > 0 ? kTricubicError * bend / slope : 0);
 }
 
+void Polisher::load(const NearestPoints::Block& block) {
+  loaded_ = &block;
+  const auto prefetch = [](const auto* object) {  // an object may extend over two cache lines
+    __builtin_prefetch(object);
+    __builtin_prefetch(reinterpret_cast<const char*>(object + 1) - 1);
+  };
+  // Reads the surface points of the block and of its border first and starts to fetch their
+  // positions from memory, before any position is used.
+  std::array<std::uint32_t, 512 + 6 * 64> points;
+  std::array<std::uint16_t, 512 + 6 * 64> slots;
+  std::size_t count = 0;
+  const auto list = [&](const Coord& c, std::uint32_t point) {
+    slots[count] = static_cast<std::uint16_t>(slot(c.x(), c.y(), c.z()));
+    points[count++] = point;
+    if (point != NearestPoints::kNone) prefetch(&points_.positions[point]);
+  };
+  for (openvdb::Index n = 0; n < 512; ++n) {
+    list(LeafNode::offsetToLocalCoord(n), block.nearest[n]);
+    if (block.nearest[n] != NearestPoints::kNone) prefetch(&points_.jets[block.nearest[n]]);
+  }
+  for (int axis = 0; axis < 3; ++axis)
+    for (const int side : {-1, 8})
+      for (int i = 0; i < 64; ++i) {
+        Coord c;
+        c[axis] = side;
+        c[(axis + 1) % 3] = i >> 3;
+        c[(axis + 2) % 3] = i & 7;
+        list(c, NearestPoints::nearestAt(block, block.origin + c));
+      }
+  const Vec3d origin = block.origin.asVec3d();
+  for (std::size_t i = 0; i < count; ++i) {
+    constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+    const openvdb::Vec3f position = points[i] == NearestPoints::kNone
+                                        ? openvdb::Vec3f(kNone)
+                                        : openvdb::Vec3f(points_.positions[points[i]] - origin);
+    for (int axis = 0; axis < 3; ++axis)
+      nearest_[static_cast<std::size_t>(axis)][slots[i]] = position[axis];
+  }
+
+  // For each pair of neighbours, compares their surface points. Comparisons with NaN are false. The
+  // limit is below kOtherPart by more than the rounding errors.
+  constexpr auto kLimit = static_cast<float>(kOtherPart * kOtherPart * 0.99);
+  std::array<unsigned char, std::size_t{kSide} * kSide * kSide> meets{};
+  constexpr std::size_t kSteps[] = {std::size_t{kSide} * kSide, kSide, 1};
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::size_t step = kSteps[axis];
+    for (int x = axis == 0 ? -1 : 0; x < 8; ++x)
+      for (int y = axis == 1 ? -1 : 0; y < 8; ++y) {
+        const std::size_t first = slot(x, y, axis == 2 ? -1 : 0), end = slot(x, y, 8);
+        std::array<unsigned char, kSide> isFar{};
+        for (std::size_t i = first; i < end; ++i) {
+          float squared = 0;
+          for (const auto& along : nearest_)
+            squared += (along[i + step] - along[i]) * (along[i + step] - along[i]);
+          isFar[i - first] = squared >= kLimit;
+        }
+        for (std::size_t i = first; i < end; ++i) {
+          meets[i] |= isFar[i - first];
+          meets[i + step] |= isFar[i - first];
+        }
+      }
+  }
+  meetsOther_.setOff();
+  for (openvdb::Index n = 0; n < 512; ++n) {
+    const Coord c = LeafNode::offsetToLocalCoord(n);
+    if (meets[slot(c.x(), c.y(), c.z())]) meetsOther_.setOn(n);
+  }
+}
+
 Closest Polisher::closest(const NearestPoints::Block& block, openvdb::Index n) {
+  if (loaded_ != &block) load(block);
   const Coord c = block.origin + LeafNode::offsetToLocalCoord(n);
   const Vec3d x = c.asVec3d();
   const std::uint32_t first = block.nearest[n];
@@ -39,6 +110,7 @@ Closest Polisher::closest(const NearestPoints::Block& block, openvdb::Index n) {
   Closest best{nearest, (x - nearest).length()};
   const double start = best.distance;
   if (!block.own.isOn(n)) best.takeIfNearer(polish(x, first));
+  if (!meetsOther_.isOn(n)) return best;
   for (int axis = 0; axis < 3; ++axis)
     for (int side = -1; side <= 1; side += 2) {
       Coord beside = c;

@@ -30,11 +30,15 @@ class Polisher {
   /// Returns the interpolation error of distances to the surface beside a surface point, voxels.
   [[nodiscard]] double interpolationError(std::uint32_t point) const;
 
-  /// Returns the closest point for the grid point number `n` of a block.
+  /// Returns the closest point for the grid point number `n` of a block. Fastest if all grid points
+  /// of a block follow each other.
   /// @pre the grid point has a nearest surface point
   [[nodiscard]] Closest closest(const NearestPoints::Block& block, openvdb::Index n);
 
  private:
+  /// Copies the positions of the surface points that the grid points of a block refer to, and finds
+  /// the grid points beside which another part of the surface is nearest.
+  void load(const NearestPoints::Block& block);
   /// Finds the closest point of the zero set to x near a surface point. The search starts on the
   /// sharp patches (triangles near edges) if the surface point lies on them, else on the
   /// interpolant. If the point that it finds lies in the domain of the other of the two, the search
@@ -46,7 +50,20 @@ class Polisher {
   Closest polishOnInterpolant(const openvdb::Vec3d& x, openvdb::Vec3d start);
   [[nodiscard]] bool isOnSurface(const openvdb::Vec3d& point);
 
+  // A block with a border of one grid point on each side.
+  static constexpr int kSide = 10;
+  static constexpr std::size_t slot(int x, int y, int z) {
+    return static_cast<std::size_t>(((x + 1) * kSide + y + 1) * kSide + z + 1);
+  }
+
   DenseBlockCache cache_;
+  const NearestPoints::Block* loaded_ = nullptr;  ///< block of the tables below
+  /// Nearest surface points of the block and of its border, relative to the block, one array for
+  /// each axis; NaN where there is none. The edges and corners of the border are not used.
+  std::array<std::array<float, std::size_t{kSide} * kSide * kSide>, 3> nearest_;
+  /// Grid points of the block with a neighbour whose nearest surface point may lie on another part
+  /// of the surface.
+  NearestPoints::Mask meetsOther_;
   const SurfacePoints& points_;
   const SharpPatches& patches_;
 };

@@ -8,7 +8,6 @@
 #include <cstring>
 
 #include "levelset/geometry/point_tree.h"
-#include "levelset/grids/padded_leaf_vdb.h"
 
 namespace levelset::eikonal {
 namespace {
@@ -49,28 +48,69 @@ float squareOf(double x) {
 using Float4 = float __attribute__((vector_size(16)));
 using Int4 = std::int32_t __attribute__((vector_size(16)));
 
+/// Grid points of a neighbour block that touch a block, in coordinates of that block.
+openvdb::CoordBBox borderOf(int neighbour) {
+  const Coord d = direction(neighbour);
+  openvdb::CoordBBox box;
+  for (int i = 0; i < 3; ++i) {
+    box.min()[i] = d[i] < 0 ? -1 : d[i] > 0 ? 8 : 0;
+    box.max()[i] = d[i] < 0 ? -1 : d[i] > 0 ? 8 : 7;
+  }
+  return box;
+}
+
+/// Prefetches the data that BlockWorker reads first: the block and the borders of its changed
+/// neighbours.
+void prefetchAround(const Block& block) {
+  const auto prefetchRow = [](const Block& of, int x, int y) {
+    __builtin_prefetch(&of.nearest[offsetOf(x & 7, y & 7, 0)]);
+  };
+  for (openvdb::Index n = 0; n < 512; n += 16) {
+    __builtin_prefetch(&block.nearest[n]);
+    __builtin_prefetch(&block.squared[n]);
+  }
+  const std::uint32_t news = block.dirtyNeighbours.load(std::memory_order_relaxed);
+  for (int i = 0; i < 27; ++i) {
+    if (!(news >> i & 1)) continue;
+    const openvdb::CoordBBox box = borderOf(i);
+    for (int x = box.min().x(); x <= box.max().x(); ++x)
+      for (int y = box.min().y(); y <= box.max().y(); ++y)
+        prefetchRow(*block.neighbours[static_cast<std::size_t>(i)], x, y);
+  }
+}
+
 /// Propagates surface points inside one block, and from its neighbours into it, until no distance
 /// in the block decreases.
 class BlockWorker {
  public:
   BlockWorker(Block& block, const SurfacePoints& points) : block_(block), points_(points) {
-    held_.values.fill(-1);
+    held_.fill(-1);
     for (int x = block.low.x(); x <= block.high.x(); ++x)
       for (int y = block.low.y(); y <= block.high.y(); ++y)
-        for (int z = block.low.z(); z <= block.high.z(); ++z)
-          held_.values[Held::slot(x, y, z)] = block.squared[offsetOf(x, y, z)];
+        std::copy(block.squared.begin() + offsetOf(x, y, block.low.z()),
+                  block.squared.begin() + offsetOf(x, y, block.high.z()) + 1,
+                  held_.begin() + slot(x, y, block.low.z()));
   }
 
   void relax() {
-    changed_ = block_.queued;
-    for (auto it = block_.queued.beginOn(); it; ++it) queue_.push_back(it.pos());
     const std::uint32_t news = block_.dirtyNeighbours.exchange(0, std::memory_order_relaxed);
     for (int i = 0; i < 27; ++i)
-      if (news >> i & 1) readNeighbour(i);
-    for (std::size_t head = 0; head < queue_.size(); ++head) {
-      const openvdb::Index n = queue_[head];
+      if (news >> i & 1)
+        forEachBeside(i, [&](const Coord&, std::uint32_t point) { prefetch(point); });
+    changed_ = block_.queued;
+    for (auto it = block_.queued.beginOn(); it; ++it) {
+      prefetch(block_.nearest[it.pos()]);
+      queue_[end_++] = static_cast<std::uint16_t>(it.pos());
+    }
+    for (std::size_t i = 0; i < end_; ++i) at_[queue_[i]] = local(block_.nearest[queue_[i]]);
+    for (int i = 0; i < 27; ++i)
+      if (news >> i & 1)
+        forEachBeside(
+            i, [&](const Coord& c, std::uint32_t point) { offerAround(c, point, local(point)); });
+    for (; begin_ != end_; ++begin_) {
+      const openvdb::Index n = queue_[begin_ % kQueue];
       block_.queued.setOff(n);
-      offerAround(FloatTree::LeafNodeType::offsetToLocalCoord(n), block_.nearest[n]);
+      offerAround(FloatTree::LeafNodeType::offsetToLocalCoord(n), block_.nearest[n], at_[n]);
     }
   }
 
@@ -80,94 +120,145 @@ class BlockWorker {
   [[nodiscard]] std::uint32_t outbox(float limit) const;
 
  private:
-  // Squared distances of the block, with a padding of two grid points. Values in the padding are
-  // -1, so no offered surface point is nearer there, and rows of four need no bounds check. The
-  // padding holds no values of neighbour blocks: readNeighbour() reads them from their blocks.
-  using Held = PaddedLeaf<2, 16>;
+  // Squared distances of the block in rows along z, with a padding of kBefore values before each
+  // row and more after it. Values in the padding are -1, so no offered surface point is nearer
+  // there, and four values are compared at once without a bounds check.
+  static constexpr int kRow = 16, kBefore = 2;
+  static std::ptrdiff_t slot(int x, int y, int z) {
+    return static_cast<std::ptrdiff_t>((x * 8 + y) * kRow + z + kBefore);
+  }
 
   [[nodiscard]] openvdb::Vec3f local(std::uint32_t point) const {
     return openvdb::Vec3f(points_.positions[point] - block_.origin.asVec3d());
   }
+  void prefetch(std::uint32_t point) const {
+    // A position may extend over two cache lines.
+    const Vec3d* position = &points_.positions[point];
+    __builtin_prefetch(position);
+    __builtin_prefetch(position->asPointer() + 2);
+  }
 
-  void accept(int x, int y, int z, std::uint32_t point, float squared) {
+  void accept(int x, int y, int z, std::uint32_t point, const openvdb::Vec3f& at, float squared) {
     const openvdb::Index n = offsetOf(x, y, z);
-    held_.values[Held::slot(x, y, z)] = squared;
+    held_[static_cast<std::size_t>(slot(x, y, z))] = squared;
+    at_[n] = at;
     block_.squared[n] = squared;
     block_.nearest[n] = point;
     block_.own.setOff(n);
     changed_.setOn(n);
     if (block_.queued.isOn(n)) return;
     block_.queued.setOn(n);
-    queue_.push_back(n);
+    queue_[end_++ % kQueue] = static_cast<std::uint16_t>(n);
   }
 
   /// Offers a surface point to the 27 grid points around `c`, in coordinates of the block. A grid
   /// point takes it if it is nearer than its present one. `c` may lie one grid point outside the
   /// block.
-  void offerAround(const Coord& c, std::uint32_t point) {
-    const openvdb::Vec3f at = local(point);
+  /// @param at  position of the surface point relative to the block
+  void offerAround(const Coord& c, std::uint32_t point, const openvdb::Vec3f& at) {
+    const Float4 squareX = squaresAround(at[0], c.x()), squareY = squaresAround(at[1], c.y());
     const float dz = at[2] - static_cast<float>(c.z() - 1);
     const Float4 alongZ = {dz, dz - 1, dz - 2, 1e18f};
     const Float4 squareZ = alongZ * alongZ;
-    for (int x = c.x() - 1; x <= c.x() + 1; ++x) {
-      const float dx = at[0] - static_cast<float>(x);
-      for (int y = c.y() - 1; y <= c.y() + 1; ++y) {
-        const float dy = at[1] - static_cast<float>(y);
-        const Float4 squared = squareZ + (dx * dx + dy * dy);
+    const int firstX = std::max(c.x() - 1, 0), lastX = std::min(c.x() + 1, 7),
+              firstY = std::max(c.y() - 1, 0), lastY = std::min(c.y() + 1, 7);
+    for (int x = firstX; x <= lastX; ++x)
+      for (int y = firstY; y <= lastY; ++y) {
+        const Float4 squared = squareZ + (squareX[x - c.x() + 1] + squareY[y - c.y() + 1]);
         Float4 held;
-        std::memcpy(&held, held_.at(x, y, c.z() - 1), sizeof(held));
+        std::memcpy(&held, held_.data() + slot(x, y, c.z() - 1), sizeof(held));
         // A tie keeps the earlier point. The order of offers is fixed, and so is the result.
         const Int4 better = squared < held;
         std::uint64_t any[2];
         std::memcpy(any, &better, sizeof(any));
         if (!(any[0] | any[1])) continue;
         for (int i = 0; i < 3; ++i)
-          if (better[i]) accept(x, y, c.z() - 1 + i, point, squared[i]);
+          if (better[i]) accept(x, y, c.z() - 1 + i, point, at, squared[i]);
       }
-    }
   }
 
-  void readNeighbour(int index) {
+  /// Returns the squared distances along one axis from a position to grid points c − 1, c and c
+  /// + 1.
+  static Float4 squaresAround(float position, int c) {
+    const Float4 along = position - Float4{static_cast<float>(c - 1), static_cast<float>(c),
+                                           static_cast<float>(c + 1), 0};
+    return along * along;
+  }
+
+  /// Calls work(grid point, its nearest surface point) for the border of a neighbour block.
+  template <typename Work>
+  void forEachBeside(int index, const Work& work) const {
+    const openvdb::CoordBBox box = borderOf(index);
     const Block& other = *block_.neighbours[static_cast<std::size_t>(index)];
-    const Coord d = direction(index);
-    Coord from, to;  // block coordinates
-    for (int i = 0; i < 3; ++i) {
-      from[i] = d[i] < 0 ? -1 : d[i] > 0 ? 8 : 0;
-      to[i] = d[i] < 0 ? -1 : d[i] > 0 ? 8 : 7;
-    }
-    for (int x = from.x(); x <= to.x(); ++x)
-      for (int y = from.y(); y <= to.y(); ++y)
-        for (int z = from.z(); z <= to.z(); ++z) {
+    for (int x = box.min().x(); x <= box.max().x(); ++x)
+      for (int y = box.min().y(); y <= box.max().y(); ++y)
+        for (int z = box.min().z(); z <= box.max().z(); ++z) {
           const std::uint32_t point = other.nearest[offsetOf(x & 7, y & 7, z & 7)];
-          if (point != NearestPoints::kNone) offerAround({x, y, z}, point);
+          if (point != NearestPoints::kNone) work(Coord(x, y, z), point);
         }
   }
 
   Block& block_;
   const SurfacePoints& points_;
-  Held held_;
-  std::vector<openvdb::Index> queue_;
+  std::array<float, std::size_t{8} * 8 * kRow> held_;
+  std::array<openvdb::Vec3f, 512> at_;  ///< position of the nearest surface point, if queued
+  // Ring buffer of the queued grid points. None is queued twice, so it holds at most 512.
+  static constexpr std::size_t kQueue = 512;
+  std::array<std::uint16_t, kQueue> queue_;
+  std::size_t begin_ = 0, end_ = 0;
   NearestPoints::Mask changed_;
 };
 
+/// Returns the neighbour blocks that touch a grid point at a side, edge or corner of its block: bit
+/// i for neighbour i.
+/// @param side  for each axis −1 or 1 at that end of the block, else 0
+std::uint32_t blocksBeside(const Coord& side) {
+  std::uint32_t bits = 0;
+  for (int part = 1; part < 8; ++part) {
+    const Coord toward(part & 1 ? side.x() : 0, part & 2 ? side.y() : 0, part & 4 ? side.z() : 0);
+    if (toward != Coord(0)) bits |= 1u << directionIndex(toward);
+  }
+  return bits;
+}
+
 std::uint32_t BlockWorker::outbox(float limit) const {
+  static const auto kBeside = [] {
+    std::array<std::uint32_t, 27> all{};
+    for (int i = 0; i < 27; ++i) all[static_cast<std::size_t>(i)] = blocksBeside(direction(i));
+    return all;
+  }();
   std::uint32_t bits = 0;
   for (auto it = changed_.beginOn(); it; ++it) {
     const Coord c = FloatTree::LeafNodeType::offsetToLocalCoord(it.pos());
     const Coord side((c.x() == 7) - (c.x() == 0), (c.y() == 7) - (c.y() == 0),
                      (c.z() == 7) - (c.z() == 0));
-    if (side == Coord(0)) continue;
-    const openvdb::Vec3d at(local(block_.nearest[it.pos()]));
-    for (int dx = -1; dx <= 1; ++dx)
-      for (int dy = -1; dy <= 1; ++dy)
-        for (int dz = -1; dz <= 1; ++dz) {
-          const Coord toward(dx && dx == side.x() ? dx : 0, dy && dy == side.y() ? dy : 0,
-                             dz && dz == side.z() ? dz : 0);
-          const int index = directionIndex(toward);
-          if (toward == Coord(0) || bits >> index & 1) continue;
-          if ((at - c.offsetBy(dx, dy, dz).asVec3d()).lengthSqr() < static_cast<double>(limit))
-            bits |= 1u << index;
-        }
+    const std::uint32_t around = kBeside[static_cast<std::size_t>(directionIndex(side))];
+    if ((bits & around) == around) continue;
+    // Smallest squares of the distances, along each axis, from the surface point to the neighbours
+    // of the grid point: inside this block's range, and beyond it.
+    double within[3], beyond[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto square = [&](int step) {
+        const double along = static_cast<double>(at_[it.pos()][axis]) - (c[axis] + step);
+        return along * along;
+      };
+      within[axis] = square(0);
+      for (const int step : {-1, 1})
+        if (step != side[axis]) within[axis] = std::min(within[axis], square(step));
+      beyond[axis] = side[axis] != 0 ? square(side[axis]) : 0;
+    }
+    for (int part = 1; part < 8; ++part) {
+      Coord toward(0);
+      double squared = 0;
+      bool exists = true;
+      for (int axis = 0; axis < 3; ++axis) {
+        const bool leaves = part >> axis & 1;
+        exists = exists && (!leaves || side[axis] != 0);
+        toward[axis] = leaves ? side[axis] : 0;
+        squared += leaves ? beyond[axis] : within[axis];
+      }
+      if (exists && squared < static_cast<double>(limit)) bits |= 1u << directionIndex(toward);
+    }
   }
   return bits;
 }
@@ -306,7 +397,10 @@ void NearestPoints::run(const Progress& progress) {
       again = true;
       std::vector<std::vector<Coord>> missing(due.size());
       tbb::parallel_for(tbb::blocked_range<std::size_t>(0, due.size(), 8), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i != range.end(); ++i) process(*due[i], missing[i]);
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          if (i + 1 != range.end()) prefetchAround(*due[i + 1]);
+          process(*due[i], missing[i]);
+        }
       });
       for (std::size_t i = 0; i < due.size(); ++i)
         for (const Coord& origin : missing[i]) {

@@ -67,8 +67,9 @@ void endBandAt(FloatGrid& grid, float background) {
       leaf.setValueOff(i);
     }
   });
-  for (auto it = grid.tree().beginValueOff(); it; ++it)
-    if (it.getDepth() < FloatTree::DEPTH - 1) it.setValue(std::copysign(background, *it));
+  auto tile = grid.tree().beginValueOff();
+  tile.setMaxDepth(FloatTree::DEPTH - 2);
+  for (; tile; ++tile) tile.setValue(std::copysign(background, *tile));
   grid.tree().root().setBackground(background, /*updateChildNodes=*/false);
   pruneOneSided(grid.tree());
 }

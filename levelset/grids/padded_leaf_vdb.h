@@ -46,11 +46,18 @@ void copyPadded(int before, int after, int row, float* target, const ValuesAt& v
             float* out = target +
                          (static_cast<std::ptrdiff_t>(x + before) * side + y + before) * row +
                          from(bz) + before;
-            if (source.values)
-              std::memcpy(out, source.values + ((x & 7) << 6) + ((y & 7) << 3) + (from(bz) & 7),
-                          count * sizeof(float));
-            else
+            const float* in = source.values
+                                  ? source.values + ((x & 7) << 6) + ((y & 7) << 3) + (from(bz) & 7)
+                                  : nullptr;
+            // A constant size makes the copy one or two instructions instead of a call.
+            if (!in)
               std::fill_n(out, count, source.constant);
+            else if (count == 8)
+              std::memcpy(out, in, 8 * sizeof(float));
+            else if (count == 4)
+              std::memcpy(out, in, 4 * sizeof(float));
+            else
+              for (std::size_t i = 0; i < count; ++i) out[i] = in[i];
           }
       }
 }

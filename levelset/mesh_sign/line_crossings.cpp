@@ -122,7 +122,10 @@ LineCrossings::LineCrossings(const LocalMesh& mesh, std::span<const int> weights
   std::size_t total = 0;
   for (const auto& part : found) total += part.size();
   crossings_.reserve(total);
-  for (auto& part : found) crossings_.insert(crossings_.end(), part.begin(), part.end());
+  for (auto& part : found) {
+    crossings_.insert(crossings_.end(), part.begin(), part.end());
+    part = {};
+  }
   tbb::parallel_sort(crossings_.begin(), crossings_.end());
   CrossingSum sum;
   for (std::size_t i = 0; i < crossings_.size(); ++i) {

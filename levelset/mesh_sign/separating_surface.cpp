@@ -26,6 +26,9 @@ using Sheet = std::vector<Polygon>;
 /// Number of patches above which a tree of all triangles (WindingField) sums the winding numbers
 /// even if no triangles cross. With crossings the tree always does.
 constexpr std::size_t kFewPoints = 16;
+/// Largest error of a winding number. The mesh is closed, so on a triangle the winding number is
+/// the mean of two integers, and an error below 1/2 does not change which of them exceeds 1/2.
+constexpr double kTolerance = 0.2;
 /// Distance relative to the polygon's size: corners nearer to a cutting plane count as on it.
 constexpr double kOnPlane = 1e-12;
 /// Voxels. Sheets inside the solid that lie within this distance of the separating surface stay in
@@ -106,7 +109,7 @@ class SeparatingSurface {
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
       if (largest_[t] != kNone) patches.push_back(t);
     if (pairs_.empty() && patches.size() <= 1) return mesh_;
-    if (!pairs_.empty() || patches.size() > kFewPoints) buildField();
+    if (!pairs_.empty() || patches.size() > kFewPoints) field_ = WindingField(mesh_);
     report(progress_, 0.6);
     std::vector<char> kept(mesh_.triangles.size(), 0);  // 1 at the index of a patch that stays
     tbb::parallel_for(std::size_t{0}, patches.size(), [&](std::size_t i) {
@@ -183,13 +186,6 @@ class SeparatingSurface {
     }
   }
 
-  void buildField() {
-    std::vector<WeightedTriangle> all;
-    all.reserve(mesh_.triangles.size());
-    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) all.push_back({corners(t), 1});
-    field_ = WindingField(std::move(all));
-  }
-
   /// Winding number of the mesh without the triangles `without`. The point lies in the planes of
   /// these triangles, where their solid angles are undefined.
   [[nodiscard]] double windingAt(const V3d& point, std::span<const std::uint32_t> without) const {
@@ -197,7 +193,7 @@ class SeparatingSurface {
     if (field_.isEmpty()) {
       for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) w += turnsOf(t, point);
     } else {
-      w = field_.within(0.05, point);
+      w = field_.within(kTolerance, point);
     }
     for (const std::uint32_t t : without) w -= turnsOf(t, point);
     return w;

@@ -90,7 +90,7 @@ SignField::SignField(const LocalMesh& mesh, const MeshTopology& topology, Rule r
           const bool soup = closed.mesh.triangles.empty();
           if (orientedVolume(soup ? mesh : closed.mesh, closed.weights) < 0) flip_ = -1;
         }
-        field_ = WindingField(std::move(closed.rest));
+        field_ = WindingField(closed.rest);
         return LineCrossings(closed.mesh, closed.weights, progress);
       }()) {}
 

@@ -33,6 +33,11 @@ V3d centroid(const WeightedTriangle& t) {
   return (t.corners[0] + t.corners[1] + t.corners[2]) / 3;
 }
 
+/// Number of nodes of the tree over `count` triangles.
+std::size_t nodeCount(std::size_t count) {
+  return count <= kLeafSize ? 1 : 1 + nodeCount(count / 2) + nodeCount(count - count / 2);
+}
+
 /// Bound on the triangle's winding number at all points of the ball around `centre`: its area,
 /// divided by 4π times the smallest possible squared distance. Infinite if they may touch.
 double boundOf(const WeightedTriangle& t, const V3d& centre, double radius) {
@@ -60,30 +65,57 @@ double solidAngle(const V3d& a, const V3d& b, const V3d& c, const V3d& point) {
   return std::atan2(numerator, denominator) * 2 * kQuarterPi;
 }
 
-WindingField::WindingField(std::vector<WeightedTriangle> triangles)
-    : triangles_(std::move(triangles)) {
-  if (!triangles_.empty()) build(0, triangles_.size());
+WindingField::WindingField(const std::vector<WeightedTriangle>& triangles) {
+  for (const WeightedTriangle& t : triangles) {
+    const auto first = static_cast<std::uint32_t>(own_.size());
+    own_.insert(own_.end(), t.corners.begin(), t.corners.end());
+    triangles_.push_back({{first, first + 1, first + 2}, static_cast<float>(t.weight)});
+  }
+  points_ = own_;
+  buildAll();
+}
+
+WindingField::WindingField(const LocalMesh& mesh) : points_(mesh.points) {
+  triangles_.reserve(mesh.triangles.size());
+  for (const Triangle& t : mesh.triangles) triangles_.push_back({t, 1});
+  buildAll();
+}
+
+void WindingField::buildAll() {
+  if (triangles_.empty()) return;
+  nodes_.reserve(nodeCount(triangles_.size()));
+  build(0, triangles_.size());
+}
+
+WeightedTriangle WindingField::triangle(std::size_t i) const {
+  const Member& t = triangles_[i];
+  return {{points_[t.corners[0]], points_[t.corners[1]], points_[t.corners[2]]},
+          static_cast<double>(t.weight)};
 }
 
 WindingField::Node WindingField::summarise(std::size_t begin, std::size_t end) const {
   Node node;
-  node.begin = begin, node.end = end;
+  node.begin = static_cast<std::uint32_t>(begin);
+  node.end = static_cast<std::uint32_t>(end);
   V3d plain(0), weighted(0);
   for (std::size_t i = begin; i < end; ++i) {
-    const double area = areaVector(triangles_[i]).length();
+    const WeightedTriangle t = triangle(i);
+    const double area = areaVector(t).length();
+    const V3d middle = centroid(t);
     node.area += area;
-    weighted += centroid(triangles_[i]) * area;
-    plain += centroid(triangles_[i]);
+    weighted += middle * area;
+    plain += middle;
   }
   node.centre = node.area > 0 ? weighted / node.area : plain / static_cast<double>(end - begin);
   node.dipole = V3d(0);
   node.moment = {V3d(0), V3d(0), V3d(0)};
   for (std::size_t i = begin; i < end; ++i) {
-    const V3d normal = areaVector(triangles_[i]), arm = centroid(triangles_[i]) - node.centre;
+    const WeightedTriangle t = triangle(i);
+    const V3d normal = areaVector(t), arm = centroid(t) - node.centre;
     node.dipole += normal;
     for (unsigned k = 0; k < 3; ++k) node.moment[k] += normal * arm[static_cast<int>(k)];
     double reach = 0;
-    for (const V3d& p : triangles_[i].corners) reach = std::max(reach, (p - node.centre).length2());
+    for (const V3d& p : t.corners) reach = std::max(reach, (p - node.centre).length2());
     node.spread += normal.length() * reach;
     node.radius = std::max(node.radius, std::sqrt(reach));
   }
@@ -94,23 +126,29 @@ void WindingField::build(std::size_t begin, std::size_t end) {
   const std::size_t self = nodes_.size();
   nodes_.push_back(summarise(begin, end));
   if (end - begin <= kLeafSize) return;
-  V3d low = centroid(triangles_[begin]), high = low;
-  for (std::size_t i = begin; i < end; ++i)
+  V3d low = centroid(triangle(begin)), high = low;
+  for (std::size_t i = begin; i < end; ++i) {
+    const V3d middle = centroid(triangle(i));
     for (int axis = 0; axis < 3; ++axis) {
-      low[axis] = std::min(low[axis], centroid(triangles_[i])[axis]);
-      high[axis] = std::max(high[axis], centroid(triangles_[i])[axis]);
+      low[axis] = std::min(low[axis], middle[axis]);
+      high[axis] = std::max(high[axis], middle[axis]);
     }
+  }
   const V3d size = high - low;
   const int axis = size.x >= size.y && size.x >= size.z ? 0 : (size.y >= size.z ? 1 : 2);
   const auto at = [&](std::size_t i) {
     return triangles_.begin() + static_cast<std::ptrdiff_t>(i);
   };
   const std::size_t middle = begin + (end - begin) / 2;
-  std::nth_element(at(begin), at(middle), at(end), [axis](const auto& s, const auto& t) {
-    return centroid(s)[axis] < centroid(t)[axis];
-  });
+  const auto along = [&](const Member& t) {
+    return (points_[t.corners[0]][axis] + points_[t.corners[1]][axis] +
+            points_[t.corners[2]][axis]) /
+           3;
+  };
+  std::nth_element(at(begin), at(middle), at(end),
+                   [&](const Member& s, const Member& t) { return along(s) < along(t); });
   build(begin, middle);
-  nodes_[self].right = nodes_.size();
+  nodes_[self].right = static_cast<std::uint32_t>(nodes_.size());
   build(middle, end);
 }
 
@@ -129,7 +167,7 @@ double WindingField::far(const Node& node, const V3d& point) const {
 
 double WindingField::exact(const V3d& point) const {
   double sum = 0;
-  for (const WeightedTriangle& t : triangles_) sum += turns(t, point);
+  for (std::size_t i = 0; i < triangles_.size(); ++i) sum += turns(triangle(i), point);
   return sum;
 }
 
@@ -150,7 +188,7 @@ double WindingField::within(double tolerance, const V3d& point) const {
     if (gap > 0 && error <= perArea * node.area * (gap * gap) * (gap * gap)) {
       sum += far(node, point);
     } else if (node.right == 0) {
-      for (std::size_t i = node.begin; i < node.end; ++i) sum += turns(triangles_[i], point);
+      for (std::size_t i = node.begin; i < node.end; ++i) sum += turns(triangle(i), point);
     } else {
       stack[top++] = node.right;
       stack[top++] = index + 1;
@@ -173,7 +211,7 @@ double WindingField::bound(const V3d& centre, double radius) const {
       sum += kQuarterPi * node.area / (gap * gap);
     } else if (node.right == 0) {
       for (std::size_t i = node.begin; i < node.end; ++i)
-        sum += boundOf(triangles_[i], centre, radius);
+        sum += boundOf(triangle(i), centre, radius);
     } else {
       stack[top++] = node.right;
       stack[top++] = index + 1;

@@ -4,7 +4,11 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <span>
 #include <vector>
+
+#include "levelset/mesh_sign/local_mesh.h"
 
 namespace levelset::convert {
 
@@ -14,7 +18,7 @@ namespace levelset::convert {
 [[nodiscard]] double solidAngle(const Imath::V3d& a, const Imath::V3d& b, const Imath::V3d& c,
                                 const Imath::V3d& point);
 
-/// A triangle whose solid angle counts `weight` times.
+/// A triangle whose solid angle counts `weight` times, an integer below 2²⁴.
 struct WeightedTriangle {
   std::array<Imath::V3d, 3> corners;
   double weight = 1;
@@ -26,7 +30,14 @@ struct WeightedTriangle {
 class WindingField {
  public:
   WindingField() = default;
-  explicit WindingField(std::vector<WeightedTriangle> triangles);
+  explicit WindingField(const std::vector<WeightedTriangle>& triangles);
+  /// Reads the corners of the triangles from the mesh, which must outlive the field.
+  explicit WindingField(const LocalMesh& mesh);
+  WindingField(WindingField&&) = default;
+  WindingField& operator=(WindingField&&) = default;
+  WindingField(const WindingField&) = delete;  // points_ may refer to own_
+  WindingField& operator=(const WindingField&) = delete;
+  ~WindingField() = default;
 
   [[nodiscard]] bool isEmpty() const { return triangles_.empty(); }
   /// Winding number at `point`, by direct summation over all triangles.
@@ -44,15 +55,24 @@ class WindingField {
     std::array<Imath::V3d, 3> moment;  // row k: Σ area · normal · (centroid − centre)ₖ
     // Σ |area|, and Σ |area| · max |corner − centre|²
     double area = 0, spread = 0;
-    double radius = 0;               // distance from the centre to the farthest corner
-    std::size_t begin = 0, end = 0;  // range of triangles_
-    std::size_t right = 0;           // right child, 0 for a leaf; the left child follows its parent
+    double radius = 0;                 // distance from the centre to the farthest corner
+    std::uint32_t begin = 0, end = 0;  // range of triangles_
+    std::uint32_t right = 0;  // right child, 0 for a leaf; the left child follows its parent
   };
+  /// A triangle by the indices of its corners in points_.
+  struct Member {
+    Triangle corners;
+    float weight;
+  };
+  void buildAll();
   void build(std::size_t begin, std::size_t end);
+  [[nodiscard]] WeightedTriangle triangle(std::size_t i) const;
   [[nodiscard]] Node summarise(std::size_t begin, std::size_t end) const;
   [[nodiscard]] double far(const Node& node, const Imath::V3d& point) const;
 
-  std::vector<WeightedTriangle> triangles_;
+  std::vector<Imath::V3d> own_;  // corners, unless a mesh holds them
+  std::span<const Imath::V3d> points_;
+  std::vector<Member> triangles_;
   std::vector<Node> nodes_;
 };
 

@@ -33,9 +33,10 @@ for dim in "$@"; do
     band=$folder/$model.vdb other=$folder/$model-moved.vdb
     "$levelsmith" -q read "$mesh" ! level-set --resolution "$dim" ! write "$band"
     voxel=$("$levelsmith" -q read "$band" ! info | awk '$1 == "voxel_size" { print $2 }')
-    # A second solid on the same grid, moved by whole voxels.
-    "$levelsmith" -q read "$band" ! transform --translate "$(awk "BEGIN { s = 40 * $voxel; print s \",\" s \",0\" }")" \
-      ! write "$other"
+    # A second solid on the same grid, moved by whole voxels. The mesh is moved, because moving a band moves its grid.
+    # vdb_tool -union rebuilds the band, so both results are valid bands.
+    "$levelsmith" -q read "$mesh" ! transform --translate "$(awk "BEGIN { s = 40 * $voxel; printf \"%.17g,%.17g,0\", s, s }")" \
+      ! level-set --voxel "$voxel" ! write "$other"
     row() {  # row NAME BOUND, with the costs in ours, theirs and the cost of reading in read_ours, read_theirs
       echo "$model $dim $1 $2 $ours $theirs $read_ours $read_theirs" >>"$folder/table"
     }

@@ -7,6 +7,8 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <cstdint>
+#include <memory>
 
 #include "levelset/distance/surface/closest_point.h"
 
@@ -91,20 +93,33 @@ Vec3d findFoot(const DenseBlock& block, int x, int y, int z, const Crossings& cr
   return plausible ? best.point : from + crossings.offset(crossings.nearest);
 }
 
+/// Calls visit(x, y, z, crossings) for the grid points of a block that have a zero crossing within
+/// a voxel along an axis.
 template <typename Visit>
 void forEachPointBeside(const DenseBlock& block, float background, const Visit& visit) {
+  // Signs of the block and its border: bit z + 1 of a row along z is set inside.
+  std::array<std::array<std::uint32_t, 10>, 10> inside;
+  for (int x = -1; x <= 8; ++x)
+    for (int y = -1; y <= 8; ++y) {
+      std::uint32_t bits = 0;
+      for (int z = -1; z <= 8; ++z)
+        bits |= static_cast<std::uint32_t>(block.at(x, y, z) < 0) << (z + 1);
+      inside[static_cast<std::size_t>(x + 1)][static_cast<std::size_t>(y + 1)] = bits;
+    }
   for (int x = 0; x < 8; ++x)
-    for (int y = 0; y < 8; ++y)
-      for (int z = 0; z < 8; ++z) {
-        const bool inside = block.at(x, y, z) < 0;
-        const bool beside =
-            (block.at(x - 1, y, z) < 0) != inside || (block.at(x + 1, y, z) < 0) != inside ||
-            (block.at(x, y - 1, z) < 0) != inside || (block.at(x, y + 1, z) < 0) != inside ||
-            (block.at(x, y, z - 1) < 0) != inside || (block.at(x, y, z + 1) < 0) != inside;
-        if (!beside) continue;
+    for (int y = 0; y < 8; ++y) {
+      const auto row = [&](int dx, int dy) {
+        return inside[static_cast<std::size_t>(x + 1 + dx)][static_cast<std::size_t>(y + 1 + dy)];
+      };
+      const std::uint32_t own = row(0, 0);
+      const std::uint32_t differs = (own ^ row(-1, 0)) | (own ^ row(1, 0)) | (own ^ row(0, -1)) |
+                                    (own ^ row(0, 1)) | (own ^ own << 1) | (own ^ own >> 1);
+      for (std::uint32_t bits = differs >> 1 & 0xff; bits; bits &= bits - 1) {
+        const int z = __builtin_ctz(bits);
         const Crossings crossings(block, x, y, z, background);
         if (crossings.nearestDistance() <= 1) visit(x, y, z, crossings);
       }
+    }
 }
 
 std::vector<const LeafNode*> leavesOf(const FloatTree& tree, const BlockSelection& within) {
@@ -247,11 +262,16 @@ SurfacePoints findSurfacePoints(const FloatTree& field, const BlockSelection& wi
 }
 
 bool hasZeroCrossing(const FloatTree& field) {
+  const std::vector<const LeafNode*> leaves = leavesOf(field, {});
   std::atomic<bool> found = false;
-  forEachBlock(field, leavesOf(field, {}), [&](std::size_t, const DenseBlock& block) {
-    if (!found)
-      forEachPointBeside(block, field.background(),
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 16), [&](const auto& range) {
+    const FloatGrid::ConstAccessor accessor(field);
+    const auto block = std::make_unique<DenseBlock>();
+    for (std::size_t i = range.begin(); i != range.end() && !found; ++i) {
+      block->load(accessor, leaves[i]->origin());
+      forEachPointBeside(*block, field.background(),
                          [&](int, int, int, const Crossings&) { found = true; });
+    }
   });
   return found;
 }
