@@ -18,6 +18,9 @@ using LeafNode = openvdb::FloatTree::LeafNodeType;
 
 // Distance from the moved surface, voxels, within which re-distancing reads the shifted field.
 constexpr double kPadding = 3;
+// Least shift, voxels, for which the distances to a moved surface follow from the old surface. By a
+// smaller shift, two parts of the surface can meet that are less than a voxel apart.
+constexpr double kLeastShift = 2;
 // Voxels by which offset lengths at points of the surface between the sampled points may lie
 // outside the range of the sampled lengths.
 constexpr double kRangeMargin = 0.5;
@@ -121,6 +124,8 @@ NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& option
 
   eikonal::DistanceRequest request = nearSurfaceRequest(options, distance / solid.voxelSize(), 0);
   request.progress = subProgress(options.progress, 0, 0.6);
+  request.ofMovedSurface = halfWidth >= kPadding && std::abs(request.shift) >= kLeastShift;
+  if (request.ofMovedSurface) request.halfWidth = halfWidth;
   const openvdb::FloatGrid::Ptr moved = eikonal::distanceTransform(vdb(solid), request);
   if (!hasSurface(*moved))
     throw NoSurface(
@@ -128,6 +133,7 @@ NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& option
                     "the solid is "
                     "thicker than twice that; use a smaller length",
                     distance));
+  if (request.ofMovedSurface) return makeBand(moved);
   return redistanced(*moved, halfWidth, options, 0.6);
 }
 

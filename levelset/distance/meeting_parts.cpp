@@ -1,0 +1,201 @@
+#include "levelset/distance/meeting_parts.h"
+
+#include <openvdb/tools/Prune.h>
+
+#include <cmath>
+#include <memory>
+
+#include "levelset/distance/moved_surface.h"
+#include "levelset/distance/point_distance.h"
+
+namespace levelset::eikonal {
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using openvdb::FloatGrid;
+using openvdb::MaskTree;
+using openvdb::Vec3d;
+using LeafNode = openvdb::FloatTree::LeafNodeType;
+using Block = NearestPoints::Block;
+
+// A value is kept if its foot point lies within this distance of the zero set, voxels. It is above
+// the error of tricubic interpolation at a radius of curvature of three voxels.
+constexpr double kOffSurface = 5e-3;
+// Number of times the normal is computed again at the foot point.
+constexpr int kNormals = 3;
+// The true distance exceeds the value by less than this, voxels, except far from the crease.
+constexpr double kExcess = 1.5;
+// Distance beyond that, voxels, from which a surface point may be the nearest, and from which an
+// edge may affect the surface points.
+constexpr double kMargin = 1.5, kReadBySurface = 6;
+
+/// Returns the derivative along one axis in world units per voxel: a central difference, or a
+/// one-sided one of second order at the end of the band; NAN if there are too few values.
+double slopeAt(const DenseBlock& block, const Coord& c, int axis, float background) {
+  const auto at = [&](int step) {
+    Coord p = c;
+    p[axis] += step;
+    return block.at(p.x(), p.y(), p.z());
+  };
+  const auto isDistance = [&](float v) { return std::abs(v) < background; };
+  const float here = at(0), below = at(-1), above = at(1);
+  if (isDistance(below) && isDistance(above)) return static_cast<double>(above - below) / 2;
+  for (const int side : {1, -1}) {
+    const float one = at(side), two = at(2 * side);
+    if (isDistance(one) && isDistance(two))
+      return static_cast<double>(4 * one - 3 * here - two) * side / 2;
+  }
+  return NAN;
+}
+
+/// Returns true if the foot point of a grid point, by its value and the gradient, lies on the zero
+/// set. Takes the gradient at the grid point first, then at the foot point.
+bool hasFootOnSurface(const DenseBlock& block, const Coord& c, double voxelSize, float background) {
+  const double value = static_cast<double>(block.at(c.x(), c.y(), c.z())) / voxelSize;
+  Vec3d normal(slopeAt(block, c, 0, background), slopeAt(block, c, 1, background),
+               slopeAt(block, c, 2, background));
+  for (int i = 0; i < kNormals; ++i) {
+    if (!normal.normalize() || !std::isfinite(normal.lengthSqr())) return false;
+    const Vec3d foot = c.asVec3d() - normal * value;
+    if (!DenseBlock::contains(foot)) return false;
+    Jet jet;
+    block.slope(foot, jet);
+    if (std::abs(jet.value) < kOffSurface * voxelSize) return true;
+    normal = jet.gradient;
+  }
+  return false;
+}
+
+/// Returns the grid points on the near side whose value is not the distance to the zero set.
+/// @param isInside  the near side is inside
+MaskTree wrongPoints(const FloatGrid& field, bool isInside) {
+  std::vector<const LeafNode*> leaves;
+  for (auto leaf = field.tree().cbeginLeaf(); leaf; ++leaf) leaves.push_back(leaf.getLeaf());
+  std::vector<NearestPoints::Mask> found(leaves.size());
+  const double voxelSize = field.voxelSize()[0];
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 16), [&](const auto& range) {
+    const FloatGrid::ConstAccessor accessor(field.tree());
+    const auto block = std::make_unique<DenseBlock>();
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      bool isLoaded = false;
+      for (auto it = leaves[i]->cbeginValueOn(); it; ++it) {
+        if ((*it < 0) != isInside) continue;
+        if (!isLoaded) block->load(accessor, leaves[i]->origin());
+        isLoaded = true;
+        if (!hasFootOnSurface(*block, LeafNode::offsetToLocalCoord(it.pos()), voxelSize,
+                              field.background()))
+          found[i].setOn(it.pos());
+      }
+    }
+  });
+  MaskTree points;
+  for (std::size_t i = 0; i < leaves.size(); ++i)
+    if (!found[i].isOff()) points.touchLeaf(leaves[i]->origin())->setValueMask(found[i]);
+  return points;
+}
+
+std::vector<const MaskTree::LeafNodeType*> leavesOf(const MaskTree& tree) {
+  std::vector<const MaskTree::LeafNodeType*> leaves;
+  for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) leaves.push_back(leaf.getLeaf());
+  return leaves;
+}
+
+/// Returns the leaves with a grid point as near to one of `points` along each axis as its value
+/// plus `margin`, voxels.
+MaskTree leavesAround(const MaskTree& points, const FloatGrid& field, double margin) {
+  MaskTree leaves;
+  const double voxelSize = field.voxelSize()[0];
+  for (auto leaf = points.cbeginLeaf(); leaf; ++leaf) {
+    const LeafNode* values = field.tree().probeConstLeaf(leaf->origin());
+    for (auto it = leaf->cbeginValueOn(); it; ++it) {
+      const double value = std::abs(static_cast<double>(values->getValue(it.pos()))) / voxelSize;
+      CoordBBox box(it.getCoord(), it.getCoord());
+      box.expand(static_cast<int>(std::ceil(value + margin)));
+      const Coord low = box.min() & ~7;
+      for (int x = low.x(); x <= box.max().x(); x += 8)
+        for (int y = low.y(); y <= box.max().y(); y += 8)
+          for (int z = low.z(); z <= box.max().z(); z += 8) leaves.touchLeaf(Coord(x, y, z));
+    }
+  }
+  return leaves;
+}
+
+/// Distances found for grid points of one leaf, voxels, and the grid points without one.
+struct Found {
+  std::vector<std::pair<openvdb::Index, double>> values;
+  NearestPoints::Mask missing;
+};
+
+void setAll(FloatGrid& field, const Coord& origin, const Found& found, double halfWidth) {
+  if (found.values.empty()) return;
+  LeafNode* leaf = field.tree().touchLeaf(origin);
+  for (const auto& [n, value] : found.values)
+    setDistance(*leaf, n, value, halfWidth, field.voxelSize()[0], field.background());
+}
+
+/// Computes the signed distances of some grid points to the zero set of `field`, and sets them. The
+/// cost depends on their number.
+void measureFromField(FloatGrid& field, const MaskTree& points, double halfWidth) {
+  const MaskTree near = leavesAround(points, field, kExcess + kMargin),
+                 wider = leavesAround(points, field, kExcess + kReadBySurface);
+  const BlockSelection blocks{{}, &near}, edgeBlocks{{}, &wider};
+  const ZeroSet surface = readZeroSet(field, blocks, &edgeBlocks, {});
+  NearestPoints nearest(field.tree(), surface.points, {halfWidth, halfWidth, {}, &near});
+  nearest.run({});
+
+  const auto masks = leavesOf(points);
+  std::vector<Found> found(masks.size());
+  const double voxelSize = field.voxelSize()[0];
+  DistanceRequest request;
+  request.halfWidth = halfWidth;
+  forEachWithPolisher(masks.size(), surface, {}, [&](std::size_t i, Polisher& polisher) {
+    const Block* block = nearest.find(masks[i]->origin());
+    const LeafNode* values = field.tree().probeConstLeaf(masks[i]->origin());
+    for (auto it = masks[i]->cbeginValueOn(); it; ++it) {
+      const openvdb::Index n = it.pos();
+      const double old = static_cast<double>(values->getValue(n)) / voxelSize;
+      double value = std::copysign(1e30, old);
+      if (block && block->nearest[n] != NearestPoints::kNone)
+        value = keptOr(distanceAt(*block, n, polisher, request).value, old, polisher,
+                       block->nearest[n]);
+      found[i].values.emplace_back(n, value);
+    }
+  });
+  for (std::size_t i = 0; i < masks.size(); ++i)
+    setAll(field, masks[i]->origin(), found[i], halfWidth);
+}
+
+}  // namespace
+
+void correctMeetingParts(FloatGrid& field, const ZeroSet& surface, const NearestPoints& nearest,
+                         const DistanceRequest& request) {
+  const MaskTree wrong = wrongPoints(field, request.shift > 0);
+  const auto masks = leavesOf(wrong);
+  std::vector<Found> found(masks.size());
+  tbb::enumerable_thread_specific<MovedSurface> searches(
+      [&] { return MovedSurface(surface, request.shift); });
+  forEachWithPolisher(masks.size(), surface, {}, [&](std::size_t i, Polisher& polisher) {
+    const Block& block = *nearest.find(masks[i]->origin());
+    MovedSurface& moved = searches.local();
+    for (auto it = masks[i]->cbeginValueOn(); it; ++it) {
+      const openvdb::Index n = it.pos();
+      const auto [value, closest] = distanceAt(block, n, polisher, request);
+      const auto distance = closest ? moved.distance(block, n, *closest) : std::nullopt;
+      if (distance)
+        found[i].values.emplace_back(n, std::copysign(*distance, value));
+      else
+        found[i].missing.setOn(n);
+    }
+  });
+  MaskTree missing;
+  for (std::size_t i = 0; i < masks.size(); ++i)
+    if (!found[i].missing.isOff())
+      missing.touchLeaf(masks[i]->origin())->setValueMask(found[i].missing);
+  if (!missing.empty()) measureFromField(field, missing, request.halfWidth);
+  for (std::size_t i = 0; i < masks.size(); ++i)
+    setAll(field, masks[i]->origin(), found[i], request.halfWidth);
+  openvdb::tools::pruneTiles(field.tree());
+}
+
+}  // namespace levelset::eikonal
