@@ -7,6 +7,7 @@
 
 #include "levelset/distance/moved_surface.h"
 #include "levelset/distance/point_distance.h"
+#include "levelset/grids/box_mask_vdb.h"
 
 namespace levelset::eikonal {
 namespace {
@@ -19,20 +20,26 @@ using openvdb::Vec3d;
 using LeafNode = openvdb::FloatTree::LeafNodeType;
 using Block = NearestPoints::Block;
 
-// A value is kept if its foot point lies within this distance of the zero set, voxels. It is above
-// the error of tricubic interpolation at a radius of curvature of three voxels.
-constexpr double kOffSurface = 5e-3;
+// A value is kept if its foot point lies within a tolerance of the zero set. The tolerance is about
+// the error of tricubic interpolation: kPerBend times the sum of the squares of the second
+// differences, between kFlat and kRound, voxels.
+constexpr double kPerBend = 2, kFlat = 3e-4, kRound = 5e-3;
 // Number of times the normal is computed again at the foot point.
 constexpr int kNormals = 3;
 // The true distance exceeds the value by less than this, voxels, except far from the crease.
-constexpr double kExcess = 1.5;
+constexpr double kExcess = 1;
 // Distance beyond that, voxels, from which a surface point may be the nearest, and from which an
 // edge may affect the surface points.
-constexpr double kMargin = 1.5, kReadBySurface = 6;
+constexpr double kMargin = 1.5, kReadBySurface = 1;
 
-/// Returns the derivative along one axis in world units per voxel: a central difference, or a
-/// one-sided one of second order at the end of the band; NAN if there are too few values.
-double slopeAt(const DenseBlock& block, const Coord& c, int axis, float background) {
+/// First and second derivatives of the field along one axis.
+struct AxisSlope {
+  double first = 0, second = 0;
+};
+
+/// Central differences at a grid point, world units. At the end of the band, a one-sided first
+/// difference of second order; NAN if there are too few values.
+AxisSlope slopeAt(const DenseBlock& block, const Coord& c, int axis, float background) {
   const auto at = [&](int step) {
     Coord p = c;
     p[axis] += step;
@@ -40,28 +47,36 @@ double slopeAt(const DenseBlock& block, const Coord& c, int axis, float backgrou
   };
   const auto isDistance = [&](float v) { return std::abs(v) < background; };
   const float here = at(0), below = at(-1), above = at(1);
-  if (isDistance(below) && isDistance(above)) return static_cast<double>(above - below) / 2;
+  if (isDistance(below) && isDistance(above))
+    return {static_cast<double>(above - below) / 2, static_cast<double>(above + below - 2 * here)};
   for (const int side : {1, -1}) {
     const float one = at(side), two = at(2 * side);
     if (isDistance(one) && isDistance(two))
-      return static_cast<double>(4 * one - 3 * here - two) * side / 2;
+      return {static_cast<double>(4 * one - 3 * here - two) * side / 2,
+              static_cast<double>(here - 2 * one + two)};
   }
-  return NAN;
+  return {NAN, 0};
 }
 
 /// Returns true if the foot point of a grid point, by its value and the gradient, lies on the zero
 /// set. Takes the gradient at the grid point first, then at the foot point.
 bool hasFootOnSurface(const DenseBlock& block, const Coord& c, double voxelSize, float background) {
   const double value = static_cast<double>(block.at(c.x(), c.y(), c.z())) / voxelSize;
-  Vec3d normal(slopeAt(block, c, 0, background), slopeAt(block, c, 1, background),
-               slopeAt(block, c, 2, background));
+  Vec3d normal;
+  double bend = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const AxisSlope slope = slopeAt(block, c, axis, background);
+    normal[axis] = slope.first;
+    bend += slope.second * slope.second / (voxelSize * voxelSize);
+  }
+  const double tolerance = std::clamp(kPerBend * bend, kFlat, kRound);
   for (int i = 0; i < kNormals; ++i) {
     if (!normal.normalize() || !std::isfinite(normal.lengthSqr())) return false;
     const Vec3d foot = c.asVec3d() - normal * value;
     if (!DenseBlock::contains(foot)) return false;
     Jet jet;
     block.slope(foot, jet);
-    if (std::abs(jet.value) < kOffSurface * voxelSize) return true;
+    if (std::abs(jet.value) < tolerance * voxelSize) return true;
     normal = jet.gradient;
   }
   return false;
@@ -101,10 +116,10 @@ std::vector<const MaskTree::LeafNodeType*> leavesOf(const MaskTree& tree) {
   return leaves;
 }
 
-/// Returns the leaves with a grid point as near to one of `points` along each axis as its value
-/// plus `margin`, voxels.
-MaskTree leavesAround(const MaskTree& points, const FloatGrid& field, double margin) {
-  MaskTree leaves;
+/// Returns the grid points that are as near to one of `points`, along each axis, as its value plus
+/// `margin`, voxels.
+MaskTree boxesAround(const MaskTree& points, const FloatGrid& field, double margin) {
+  MaskTree around;
   const double voxelSize = field.voxelSize()[0];
   for (auto leaf = points.cbeginLeaf(); leaf; ++leaf) {
     const LeafNode* values = field.tree().probeConstLeaf(leaf->origin());
@@ -112,13 +127,10 @@ MaskTree leavesAround(const MaskTree& points, const FloatGrid& field, double mar
       const double value = std::abs(static_cast<double>(values->getValue(it.pos()))) / voxelSize;
       CoordBBox box(it.getCoord(), it.getCoord());
       box.expand(static_cast<int>(std::ceil(value + margin)));
-      const Coord low = box.min() & ~7;
-      for (int x = low.x(); x <= box.max().x(); x += 8)
-        for (int y = low.y(); y <= box.max().y(); y += 8)
-          for (int z = low.z(); z <= box.max().z(); z += 8) leaves.touchLeaf(Coord(x, y, z));
+      addBox(around, box);
     }
   }
-  return leaves;
+  return around;
 }
 
 /// Distances found for grid points of one leaf, voxels, and the grid points without one.
@@ -137,9 +149,9 @@ void setAll(FloatGrid& field, const Coord& origin, const Found& found, double ha
 /// Computes the signed distances of some grid points to the zero set of `field`, and sets them. The
 /// cost depends on their number.
 void measureFromField(FloatGrid& field, const MaskTree& points, double halfWidth) {
-  const MaskTree near = leavesAround(points, field, kExcess + kMargin),
-                 wider = leavesAround(points, field, kExcess + kReadBySurface);
-  const BlockSelection blocks{{}, &near}, edgeBlocks{{}, &wider};
+  const MaskTree near = boxesAround(points, field, kExcess + kMargin),
+                 wider = boxesAround(points, field, kExcess + kReadBySurface);
+  const BlockSelection blocks{{}, &near}, edgeBlocks{{}, &wider, &wider};
   const ZeroSet surface = readZeroSet(field, blocks, &edgeBlocks, {});
   NearestPoints nearest(field.tree(), surface.points, {halfWidth, halfWidth, {}, &near});
   nearest.run({});

@@ -13,7 +13,8 @@ namespace levelset::eikonal {
 /// creases in which parts of the moved surface meet. A value φ is correct if the point
 /// x − φ ∇φ/|∇φ| lies on the moved surface. MovedSurface computes the other values. Where it fails,
 /// the distance to the zero set of `field` is computed.
-/// @param field    distances minus the shift, in a band of request.halfWidth around the moved surface
+/// @param field    distances minus the shift, in a band of request.halfWidth around the moved
+/// surface
 /// @param surface  surface before it moves, and in `nearest` the nearest point of each grid point
 void correctMeetingParts(openvdb::FloatGrid& field, const ZeroSet& surface,
                          const NearestPoints& nearest, const DistanceRequest& request);

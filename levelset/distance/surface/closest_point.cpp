@@ -86,7 +86,8 @@ Foot closestPoint(const DenseBlock& block, const Vec3d& from, const Vec3d& start
     if (!(slope > 0)) return foot;
     const NewtonStep step = newtonStep(jet, slope, from - y);
     if (!std::isfinite(step.length)) return foot;
-    Vec3d move = step.length > kLongestStep ? step.along * (kLongestStep / step.length) : step.along;
+    Vec3d move =
+        step.length > kLongestStep ? step.along * (kLongestStep / step.length) : step.along;
     // The second derivatives jump between cells, so that full steps can cycle around the solution.
     if (move.dot(last) < -kReversal * last.lengthSqr()) move *= 0.5;
     y += move;

@@ -9,6 +9,7 @@
 #include <memory>
 #include <tuple>
 
+#include "levelset/grids/box_mask_vdb.h"
 #include "levelset/meshing/sharp/sharp_evidence.h"
 #include "levelset/meshing/sharp/sharp_surface.h"
 
@@ -21,9 +22,9 @@ using openvdb::FloatTree;
 using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
-// Distance along each axis from a vertex with the values of a sharp edge, voxels, within which cells
-// are meshed. A confirmed edge has such a vertex within 3 voxels; the surface up to 3 voxels farther
-// confirms it, and its patches reach 5 voxels.
+// Distance along each axis from a vertex with the values of a sharp edge, voxels, within which
+// cells are meshed. A confirmed edge has such a vertex within 3 voxels; the surface up to 3 voxels
+// farther confirms it, and its patches reach 5 voxels.
 constexpr int kMeshReach = 9;
 // Number of cells around a cell with an edge in which the edge, or the bisector plane of its faces,
 // affects the interpolant.
@@ -45,25 +46,6 @@ void touchAround(openvdb::MaskTree& leaves, const Vec3d& point, double reach) {
                                    corner & 1 ? reach : -reach)));
 }
 
-/// Adds the cells of a box to a set.
-void addBox(openvdb::MaskTree& cells, const openvdb::CoordBBox& box) {
-  const Coord first = box.min() & ~7;
-  Coord origin;
-  for (origin.x() = first.x(); origin.x() <= box.max().x(); origin.x() += 8)
-    for (origin.y() = first.y(); origin.y() <= box.max().y(); origin.y() += 8)
-      for (origin.z() = first.z(); origin.z() <= box.max().z(); origin.z() += 8) {
-        openvdb::CoordBBox part(origin, origin.offsetBy(7));
-        part.intersect(box);
-        part.translate(-origin);
-        const auto row = static_cast<std::uint64_t>((2 << part.max().z()) - (1 << part.min().z()));
-        std::uint64_t slab = 0;
-        for (int y = part.min().y(); y <= part.max().y(); ++y) slab |= row << (8 * y);
-        auto& mask = cells.touchLeaf(origin)->getValueMask();
-        for (int x = part.min().x(); x <= part.max().x(); ++x)
-          mask.getWord<std::uint64_t>(static_cast<openvdb::Index>(x)) |= slab;
-      }
-}
-
 /// Returns the cells within kMeshReach of the vertices with the values of a sharp edge.
 openvdb::MaskTree cellsNearEdges(const FloatGrid& field, const BlockSelection& within) {
   std::vector<const LeafNode*> leaves;
@@ -79,6 +61,7 @@ openvdb::MaskTree cellsNearEdges(const FloatGrid& field, const BlockSelection& w
   for (const std::vector<Vec3d>& found : vertices)
     for (const Vec3d& vertex : found) {
       const Coord cell = Coord::floor(vertex);
+      if (within.edgeCells && !within.edgeCells->isValueOn(cell)) continue;
       addBox(cells, {cell.offsetBy(-kMeshReach), cell.offsetBy(kMeshReach)});
     }
   return cells;

@@ -73,7 +73,8 @@ constexpr std::array<unsigned, 4> kRing = {0, 2, 3, 1};
 constexpr std::array<int, 4> kRingStep = {0, 1, 0, 1};
 
 constexpr std::uint32_t kNoPolygon = 0xffffffffu;
-constexpr std::array<std::uint32_t, 4> kNoPolygons = {kNoPolygon, kNoPolygon, kNoPolygon, kNoPolygon};
+constexpr std::array<std::uint32_t, 4> kNoPolygons = {kNoPolygon, kNoPolygon, kNoPolygon,
+                                                      kNoPolygon};
 
 class DualMesher {
  public:
@@ -341,9 +342,10 @@ class DualMesher {
   const CellSurface& surface_;
   const FloatGrid& grid_;
   const Progress& progress_;
-  std::vector<DualVertex> vertices_;                 ///< one for each polygon of a cell
-  std::vector<std::uint8_t> twice_;                  ///< facesPassedTwice() of each polygon
-  /// Polygons around each crossed edge, by slot; kNoPolygon where the cell does not belong to the surface.
+  std::vector<DualVertex> vertices_;  ///< one for each polygon of a cell
+  std::vector<std::uint8_t> twice_;   ///< facesPassedTwice() of each polygon
+  /// Polygons around each crossed edge, by slot; kNoPolygon where the cell does not belong to the
+  /// surface.
   std::vector<std::array<std::uint32_t, 4>> cells_;
   std::vector<FaceSegment> segments_;
   std::vector<std::size_t> firstTriangle_;
