@@ -2,6 +2,7 @@
 
 #include <openvdb/tools/Prune.h>
 
+#include <array>
 #include <cmath>
 #include <memory>
 
@@ -23,7 +24,7 @@ using Block = NearestPoints::Block;
 // A value is kept if its foot point lies within a tolerance of the zero set. The tolerance is about
 // the error of tricubic interpolation: kPerBend times the sum of the squares of the second
 // differences, between kFlat and kRound, voxels.
-constexpr double kPerBend = 2, kFlat = 3e-4, kRound = 5e-3;
+constexpr double kPerBend = 3, kFlat = 3e-4, kRound = 5e-3;
 // Number of times the normal is computed again at the foot point.
 constexpr int kNormals = 3;
 // The true distance exceeds the value by less than this, voxels, except far from the crease.
@@ -32,30 +33,36 @@ constexpr double kExcess = 1;
 // edge may affect the surface points.
 constexpr double kMargin = 1.5, kReadBySurface = 1;
 
-/// First and second derivatives of the field along one axis.
+/// First and second differences of the field along one axis, world units.
 struct AxisSlope {
   double first = 0, second = 0;
 };
 
-/// Central differences at a grid point, world units. At the end of the band, a one-sided first
-/// difference of second order; NAN if there are too few values.
+/// Differences at a grid point along one axis. The first one is central, or one-sided of second
+/// order at the end of the band; NAN if there are too few values. The second one is the least of
+/// those in the five nearest grid points: a crease beside the grid point does not count.
 AxisSlope slopeAt(const DenseBlock& block, const Coord& c, int axis, float background) {
-  const auto at = [&](int step) {
+  std::array<float, 5> v;
+  std::array<bool, 5> isDistance;
+  for (int i = 0; i < 5; ++i) {
     Coord p = c;
-    p[axis] += step;
-    return block.at(p.x(), p.y(), p.z());
-  };
-  const auto isDistance = [&](float v) { return std::abs(v) < background; };
-  const float here = at(0), below = at(-1), above = at(1);
-  if (isDistance(below) && isDistance(above))
-    return {static_cast<double>(above - below) / 2, static_cast<double>(above + below - 2 * here)};
-  for (const int side : {1, -1}) {
-    const float one = at(side), two = at(2 * side);
-    if (isDistance(one) && isDistance(two))
-      return {static_cast<double>(4 * one - 3 * here - two) * side / 2,
-              static_cast<double>(here - 2 * one + two)};
+    p[axis] += i - 2;
+    const auto k = static_cast<std::size_t>(i);
+    v[k] = block.at(p.x(), p.y(), p.z());
+    isDistance[k] = std::abs(v[k]) < background;
   }
-  return {NAN, 0};
+  AxisSlope slope{NAN, INFINITY};
+  for (std::size_t i = 1; i < 4; ++i)
+    if (isDistance[i - 1] && isDistance[i] && isDistance[i + 1])
+      slope.second =
+          std::min(slope.second, static_cast<double>(std::abs(v[i - 1] - 2 * v[i] + v[i + 1])));
+  if (isDistance[1] && isDistance[3])
+    slope.first = static_cast<double>(v[3] - v[1]) / 2;
+  else if (isDistance[3] && isDistance[4])
+    slope.first = static_cast<double>(4 * v[3] - 3 * v[2] - v[4]) / 2;
+  else if (isDistance[1] && isDistance[0])
+    slope.first = static_cast<double>(3 * v[2] - 4 * v[1] + v[0]) / 2;
+  return slope;
 }
 
 /// Returns true if the foot point of a grid point, by its value and the gradient, lies on the zero
