@@ -3,8 +3,10 @@
 #include <openvdb/tools/Prune.h>
 
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <memory>
+#include <unordered_map>
 
 #include "levelset/distance/moved_surface.h"
 #include "levelset/distance/point_distance.h"
@@ -24,14 +26,16 @@ using Block = NearestPoints::Block;
 // A value is kept if its foot point lies within a tolerance of the zero set. The tolerance is about
 // the error of tricubic interpolation: kPerBend times the sum of the squares of the second
 // differences, between kFlat and kRound, voxels.
-constexpr double kPerBend = 3, kFlat = 3e-4, kRound = 5e-3;
+constexpr double kPerBend = 3, kFlat = 1e-4, kRound = 5e-3;
 // Number of times the normal is computed again at the foot point.
 constexpr int kNormals = 3;
-// The true distance exceeds the value by less than this, voxels, except far from the crease.
-constexpr double kExcess = 1;
-// Distance beyond that, voxels, from which a surface point may be the nearest, and from which an
-// edge may affect the surface points.
-constexpr double kMargin = 1.5, kReadBySurface = 1;
+// Number of rounds in which grid points take crease points from their neighbours, and least
+// decrease of a distance, voxels.
+constexpr int kRounds = 4;
+constexpr double kLeastGain = 1e-3;
+// Distance beyond the half width, voxels, from which a surface point may be the nearest, or an edge
+// may affect it.
+constexpr double kMargin = 1.5;
 
 /// First and second differences of the field along one axis, world units.
 struct AxisSlope {
@@ -123,48 +127,39 @@ std::vector<const MaskTree::LeafNodeType*> leavesOf(const MaskTree& tree) {
   return leaves;
 }
 
-/// Returns the grid points that are as near to one of `points`, along each axis, as its value plus
-/// `margin`, voxels.
-MaskTree boxesAround(const MaskTree& points, const FloatGrid& field, double margin) {
+/// Returns the grid points within `reach` voxels of one of `points` along each axis.
+MaskTree boxesAround(const MaskTree& points, double reach) {
   MaskTree around;
-  const double voxelSize = field.voxelSize()[0];
-  for (auto leaf = points.cbeginLeaf(); leaf; ++leaf) {
-    const LeafNode* values = field.tree().probeConstLeaf(leaf->origin());
+  for (auto leaf = points.cbeginLeaf(); leaf; ++leaf)
     for (auto it = leaf->cbeginValueOn(); it; ++it) {
-      const double value = std::abs(static_cast<double>(values->getValue(it.pos()))) / voxelSize;
       CoordBBox box(it.getCoord(), it.getCoord());
-      box.expand(static_cast<int>(std::ceil(value + margin)));
+      box.expand(static_cast<int>(std::ceil(reach)));
       addBox(around, box);
     }
-  }
   return around;
 }
 
-/// Distances found for grid points of one leaf, voxels, and the grid points without one.
-struct Found {
-  std::vector<std::pair<openvdb::Index, double>> values;
-  NearestPoints::Mask missing;
-};
+/// Signed distances of grid points of one leaf, voxels.
+using LeafDistances = std::vector<std::pair<openvdb::Index, double>>;
 
-void setAll(FloatGrid& field, const Coord& origin, const Found& found, double halfWidth) {
-  if (found.values.empty()) return;
+void setAll(FloatGrid& field, const Coord& origin, const LeafDistances& values, double halfWidth) {
+  if (values.empty()) return;
   LeafNode* leaf = field.tree().touchLeaf(origin);
-  for (const auto& [n, value] : found.values)
+  for (const auto& [n, value] : values)
     setDistance(*leaf, n, value, halfWidth, field.voxelSize()[0], field.background());
 }
 
 /// Computes the signed distances of some grid points to the zero set of `field`, and sets them. The
 /// cost depends on their number.
 void measureFromField(FloatGrid& field, const MaskTree& points, double halfWidth) {
-  const MaskTree near = boxesAround(points, field, kExcess + kMargin),
-                 wider = boxesAround(points, field, kExcess + kReadBySurface);
-  const BlockSelection blocks{{}, &near}, edgeBlocks{{}, &wider, &wider};
+  const MaskTree near = boxesAround(points, halfWidth + kMargin);
+  const BlockSelection blocks{{}, &near}, edgeBlocks{{}, &near, &near};
   const ZeroSet surface = readZeroSet(field, blocks, &edgeBlocks, {});
   NearestPoints nearest(field.tree(), surface.points, {halfWidth, halfWidth, {}, &near});
   nearest.run({});
 
   const auto masks = leavesOf(points);
-  std::vector<Found> found(masks.size());
+  std::vector<LeafDistances> found(masks.size());
   const double voxelSize = field.voxelSize()[0];
   DistanceRequest request;
   request.halfWidth = halfWidth;
@@ -178,42 +173,127 @@ void measureFromField(FloatGrid& field, const MaskTree& points, double halfWidth
       if (block && block->nearest[n] != NearestPoints::kNone)
         value = keptOr(distanceAt(*block, n, polisher, request).value, old, polisher,
                        block->nearest[n]);
-      found[i].values.emplace_back(n, value);
+      found[i].emplace_back(n, value);
     }
   });
   for (std::size_t i = 0; i < masks.size(); ++i)
     setAll(field, masks[i]->origin(), found[i], halfWidth);
 }
 
+/// Distances of the grid points whose value is not the distance to the moved surface.
+class CreaseDistances {
+ public:
+  CreaseDistances(const MaskTree& wrong, const ZeroSet& surface, const NearestPoints& nearest,
+                  const DistanceRequest& request)
+      : leaves_(leavesOf(wrong)),
+        surface_(surface),
+        nearest_(nearest),
+        request_(request),
+        points_(leaves_.size()),
+        searches_([&surface, &request] { return MovedSurface(surface, request.shift); }) {}
+
+  /// Finds the distance of each grid point by itself.
+  void search() {
+    forEachWithPolisher(leaves_.size(), surface_, {}, [&](std::size_t i, Polisher& polisher) {
+      const Block& block = *nearest_.find(leaves_[i]->origin());
+      for (auto it = leaves_[i]->cbeginValueOn(); it; ++it) {
+        Point point;
+        point.n = it.pos();
+        const auto [value, closest] = distanceAt(block, point.n, polisher, request_);
+        point.sign = value < 0 ? -1 : 1;
+        if (closest) point.found = searches_.local().distance(block, point.n, *closest);
+        points_[i].push_back(std::move(point));
+      }
+    });
+  }
+
+  /// Starts the search again from the crease points of the neighbours, where these are nearer. So
+  /// the nearest of several creases is found.
+  void adoptFromNeighbours() {
+    for (int round = 0; round < kRounds; ++round) {
+      std::unordered_map<Coord, const MovedSurface::CreasePoint*, std::hash<Coord>> creases;
+      for (std::size_t i = 0; i < points_.size(); ++i)
+        for (const Point& point : points_[i])
+          if (point.found && point.found->crease)
+            creases.emplace(gridPoint(i, point), &*point.found->crease);
+      std::vector<std::vector<std::optional<MovedSurface::Result>>> better(points_.size());
+      std::atomic<bool> hasChanged = false;
+      tbb::parallel_for(std::size_t{0}, points_.size(), [&](std::size_t i) {
+        const Block& block = *nearest_.find(leaves_[i]->origin());
+        better[i].resize(points_[i].size());
+        for (std::size_t k = 0; k < points_[i].size(); ++k) {
+          const Point& point = points_[i][k];
+          if (point.found && !point.found->crease) continue;
+          const Coord c = gridPoint(i, point);
+          const MovedSurface::CreasePoint* start = nullptr;
+          double least = point.found ? point.found->distance - kLeastGain : INFINITY;
+          for (int step = 0; step < 27; ++step) {
+            const auto there =
+                creases.find(c.offsetBy(step / 9 - 1, step / 3 % 3 - 1, step % 3 - 1));
+            if (step == 13 || there == creases.end()) continue;
+            const double distance = (there->second->point - c.asVec3d()).length();
+            if (distance >= least) continue;
+            least = distance;
+            start = there->second;
+          }
+          if (!start) continue;
+          auto found = searches_.local().distanceFrom(block, point.n, *start);
+          if (!found || (point.found && found->distance > point.found->distance - kLeastGain))
+            continue;
+          better[i][k] = std::move(found);
+          hasChanged = true;
+        }
+      });
+      if (!hasChanged) return;
+      for (std::size_t i = 0; i < points_.size(); ++i)
+        for (std::size_t k = 0; k < points_[i].size(); ++k)
+          if (better[i][k]) points_[i][k].found = std::move(better[i][k]);
+    }
+  }
+
+  /// Writes the distances into the field. Returns the grid points for which none was found.
+  [[nodiscard]] MaskTree write(FloatGrid& field) const {
+    MaskTree missing;
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      LeafDistances values;
+      for (const Point& point : points_[i])
+        if (point.found)
+          values.emplace_back(point.n, point.sign * point.found->distance);
+        else
+          missing.setValueOn(gridPoint(i, point));
+      setAll(field, leaves_[i]->origin(), values, request_.halfWidth);
+    }
+    return missing;
+  }
+
+ private:
+  struct Point {
+    openvdb::Index n = 0;
+    double sign = 1;
+    std::optional<MovedSurface::Result> found = {};
+  };
+  [[nodiscard]] Coord gridPoint(std::size_t leaf, const Point& point) const {
+    return leaves_[leaf]->origin() + LeafNode::offsetToLocalCoord(point.n);
+  }
+
+  std::vector<const MaskTree::LeafNodeType*> leaves_;
+  const ZeroSet& surface_;
+  const NearestPoints& nearest_;
+  const DistanceRequest& request_;
+  std::vector<std::vector<Point>> points_;  ///< by leaf
+  tbb::enumerable_thread_specific<MovedSurface> searches_;
+};
+
 }  // namespace
 
 void correctMeetingParts(FloatGrid& field, const ZeroSet& surface, const NearestPoints& nearest,
                          const DistanceRequest& request) {
   const MaskTree wrong = wrongPoints(field, request.shift > 0);
-  const auto masks = leavesOf(wrong);
-  std::vector<Found> found(masks.size());
-  tbb::enumerable_thread_specific<MovedSurface> searches(
-      [&] { return MovedSurface(surface, request.shift); });
-  forEachWithPolisher(masks.size(), surface, {}, [&](std::size_t i, Polisher& polisher) {
-    const Block& block = *nearest.find(masks[i]->origin());
-    MovedSurface& moved = searches.local();
-    for (auto it = masks[i]->cbeginValueOn(); it; ++it) {
-      const openvdb::Index n = it.pos();
-      const auto [value, closest] = distanceAt(block, n, polisher, request);
-      const auto distance = closest ? moved.distance(block, n, *closest) : std::nullopt;
-      if (distance)
-        found[i].values.emplace_back(n, std::copysign(*distance, value));
-      else
-        found[i].missing.setOn(n);
-    }
-  });
-  MaskTree missing;
-  for (std::size_t i = 0; i < masks.size(); ++i)
-    if (!found[i].missing.isOff())
-      missing.touchLeaf(masks[i]->origin())->setValueMask(found[i].missing);
+  CreaseDistances distances(wrong, surface, nearest, request);
+  distances.search();
+  distances.adoptFromNeighbours();
+  const MaskTree missing = distances.write(field);
   if (!missing.empty()) measureFromField(field, missing, request.halfWidth);
-  for (std::size_t i = 0; i < masks.size(); ++i)
-    setAll(field, masks[i]->origin(), found[i], request.halfWidth);
   openvdb::tools::pruneTiles(field.tree());
 }
 

@@ -35,7 +35,7 @@ constexpr double kLeastSine = 0.17;
 // If a point of the moved surface is nearer to another plane face by a length, the crease is as far
 // away as that length divided by the sine of the angle between the faces. On curved faces it is at
 // most kCreaseFactor times as far. A length below kClose, voxels, is neglected if the search fails.
-constexpr double kCreaseFactor = 3, kClose = 2e-3;
+constexpr double kCreaseFactor = 3, kClose = 1e-4;
 
 }  // namespace
 
@@ -45,8 +45,9 @@ MovedSurface::MovedSurface(const ZeroSet& surface, double shift)
       patches_(surface.patches),
       shift_(shift) {}
 
-std::optional<double> MovedSurface::distance(const NearestPoints::Block& block, openvdb::Index n,
-                                             const Closest& closest) {
+std::optional<MovedSurface::Result> MovedSurface::distance(const NearestPoints::Block& block,
+                                                           openvdb::Index n,
+                                                           const Closest& closest) {
   const Vec3d x = (block.origin + LeafNode::offsetToLocalCoord(n)).asVec3d();
   const double sign = block.inside.isOn(n) ? -1 : 1;
   Vec3d normal = (x - closest.point) * sign;
@@ -54,25 +55,55 @@ std::optional<double> MovedSurface::distance(const NearestPoints::Block& block, 
   if (!normal.normalize()) return std::nullopt;
   const double least = std::abs(sign * closest.distance - shift_);
 
-  std::vector<Vec3d> parts{closest.point};
+  std::vector<Vec3d> parts{closest.point}, seen = parts;
   Vec3d meeting = closest.point + normal * shift_;
   NearerPart nearer = nearerPart(block, meeting, parts);
-  if (nearer.kind == Nearer::None) return least;
+  if (nearer.kind == Nearer::None) return Result{least};
   const Vec3d start = meeting;
   const double gap = std::abs(shift_) - nearer.distance;
   const bool isClose = nearer.kind == Nearer::Part && gap < kClose;
   for (int i = 0; i < kSets && nearer.kind == Nearer::Part && parts.size() < kParts; ++i) {
     parts.push_back(nearer.point);
+    seen.push_back(nearer.point);
     const Meeting kind = meetActive(x, parts, meeting);
-    if (kind == Meeting::Smooth) return least;
+    if (kind == Meeting::Smooth) return Result{least};
     if (kind == Meeting::Failed) break;
     nearer = nearerPart(block, meeting, parts);
     const double found = (x - meeting).length();
     if (nearer.kind == Nearer::None && found > least - kNearer &&
         (meeting - start).length() < kCreaseFactor * gap / kLeastSine)
-      return found;
+      return nearestPair(block, x, start, seen, {found, CreasePoint{meeting, parts}});
   }
-  return isClose ? std::optional(least) : std::nullopt;
+  return isClose ? std::optional(Result{least}) : std::nullopt;
+}
+
+/// Where more than two parts are near, several creases are. Returns the nearest of `best` and of
+/// the crease points of all pairs of parts.
+/// @param start  start of the searches
+MovedSurface::Result MovedSurface::nearestPair(const NearestPoints::Block& block, const Vec3d& x,
+                                               const Vec3d& start, const std::vector<Vec3d>& feet,
+                                               Result best) {
+  if (feet.size() < 3) return best;
+  for (std::size_t i = 0; i < feet.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      CreasePoint crease{start, {feet[i], feet[j]}};
+      if (meetActive(x, crease.feet, crease.point) != Meeting::Found) continue;
+      const double distance = (x - crease.point).length();
+      if (distance < best.distance - kNearer &&
+          nearerPart(block, crease.point, crease.feet).kind == Nearer::None)
+        best = {distance, std::move(crease)};
+    }
+  return best;
+}
+
+std::optional<MovedSurface::Result> MovedSurface::distanceFrom(const NearestPoints::Block& block,
+                                                               openvdb::Index n,
+                                                               CreasePoint start) {
+  const Vec3d x = (block.origin + LeafNode::offsetToLocalCoord(n)).asVec3d();
+  if (meetActive(x, start.feet, start.point) != Meeting::Found ||
+      nearerPart(block, start.point, start.feet).kind != Nearer::None)
+    return std::nullopt;
+  return Result{(x - start.point).length(), std::move(start)};
 }
 
 /// As meet(), but drops the parts that do not decide where the nearest point is.
@@ -163,7 +194,9 @@ MovedSurface::Meeting MovedSurface::meet(const Vec3d& x, std::vector<Vec3d>& fee
     }
     const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3> gram =
         normals.transpose() * normals;
-    if (!(gram.determinant() > kLeastSine * kLeastSine)) return Meeting::Smooth;
+    // Opposite normals are those of a gap that has closed.
+    if (!(gram.determinant() > kLeastSine * kLeastSine))
+      return gram.minCoeff() > 0 ? Meeting::Smooth : Meeting::Failed;
     const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1> along = gram.inverse() * right;
     const Eigen::Vector3d offset = normals * along;
     const Vec3d target = x + Vec3d(offset.x(), offset.y(), offset.z());
