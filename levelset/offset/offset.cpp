@@ -114,6 +114,10 @@ class Lengths {
 
 }  // namespace
 
+bool followsFromOld(double distance, double halfWidth) {
+  return halfWidth >= kPadding && std::abs(distance) >= kLeastShift;
+}
+
 NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& options) {
   if (!std::isfinite(distance))
     throw UsageError(fmt::format("the distance is {}; give a finite length", distance));
@@ -124,7 +128,7 @@ NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& option
 
   eikonal::DistanceRequest request = nearSurfaceRequest(options, distance / solid.voxelSize(), 0);
   request.progress = subProgress(options.progress, 0, 0.6);
-  request.ofMovedSurface = halfWidth >= kPadding && std::abs(request.shift) >= kLeastShift;
+  request.ofMovedSurface = followsFromOld(request.shift, halfWidth);
   if (request.ofMovedSurface) request.halfWidth = halfWidth;
   const openvdb::FloatGrid::Ptr moved = eikonal::distanceTransform(vdb(solid), request);
   if (!hasSurface(*moved))
