@@ -2,15 +2,13 @@
 
 #include <fmt/core.h>
 #include <openvdb/tools/Prune.h>
-#include <tbb/blocked_range.h>
-#include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 #include <memory>
 
-#include "levelset/distance/polisher.h"
+#include "levelset/distance/meeting_parts.h"
+#include "levelset/distance/point_distance.h"
 #include "levelset/distance/signs.h"
 #include "levelset/error.h"
 #include "levelset/memory_estimate.h"
@@ -26,55 +24,12 @@ using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 using Block = NearestPoints::Block;
 
-// A grid point keeps its old value if that equals the computed distance within the error of
-// tricubic interpolation. So repeated redistancing does not shift a distance field. kMostError is
-// the upper limit of that error, voxels, reached at a radius of curvature of about 8 voxels.
-constexpr double kMostError = 1e-3;
-
-/// Distance of a grid point, voxels, and its closest point if it is near the band.
-struct PointDistance {
-  double value = 0;
-  std::optional<Closest> closest = {};
-};
-
-/// Computes the distance of a grid point from the surface moved by the requested shift.
-PointDistance distanceAt(const Block& block, openvdb::Index n, Polisher& polisher,
-                         const DistanceRequest& request) {
-  const bool inside = block.inside.isOn(n);
-  const double sign = inside ? -1 : 1;
-  PointDistance result{sign * 1e30};
-  if (block.nearest[n] != NearestPoints::kNone) {
-    result.value = sign * std::sqrt(static_cast<double>(block.squared[n])) - request.shift;
-    if (std::abs(result.value) < request.halfWidth + kPolishGain) {
-      result.closest = polisher.closest(block, n);
-      result.value = sign * result.closest->distance - request.shift;
-    }
-  }
-  // An inside grid point stays inside when its distance rounds to zero.
-  if (inside && request.shift == 0) result.value = std::min(result.value, -1e-7);
-  return result;
-}
-
-/// Returns the old value if the computed one equals it within the error of interpolation, voxels.
-double keptOr(double value, double old, const Polisher& polisher, std::uint32_t surfacePoint) {
-  const double change = std::abs(value - old);
-  return change < kMostError && change < polisher.interpolationError(surfacePoint) ? old : value;
-}
-
 /// Result for one block: a leaf, or the value of a tile if no grid point is in the band and all
 /// have the same sign.
 struct LeafOrTile {
   std::unique_ptr<LeafNode> leaf;
   float tile = 0;
 };
-
-void setDistance(LeafNode& leaf, openvdb::Index n, double value, const DistanceRequest& request,
-                 double voxelSize, float background) {
-  if (std::abs(value) < request.halfWidth)
-    leaf.setValueOn(n, static_cast<float>(value * voxelSize));
-  else
-    leaf.setValueOff(n, value < 0 ? -background : background);
-}
 
 /// Computes the distances of one block.
 /// @param before  leaf of the input field; null where the field has none
@@ -91,27 +46,11 @@ LeafOrTile makeLeaf(const Block& block, const LeafNode* before, Polisher& polish
     if (before && shift == 0 && before->isValueOn(n))
       value = keptOr(value, static_cast<double>(before->getValue(n)) / voxelSize, polisher,
                      block.nearest[n]);
-    setDistance(*result.leaf, n, value, request, voxelSize, background);
+    setDistance(*result.leaf, n, value, request.halfWidth, voxelSize, background);
   }
   if (points && !result.leaf->isEmpty()) request.visitPoints(*result.leaf, *points);
   if (result.leaf->isEmpty() && result.leaf->isConstant(result.tile, isOn)) result.leaf.reset();
   return result;
-}
-
-/// Calls work(index, polisher) for the indices below `count`, in parallel.
-template <typename Work>
-void forEachWithPolisher(std::size_t count, const ZeroSet& surface, const Progress& progress,
-                         const Work& work) {
-  tbb::enumerable_thread_specific<Polisher> polishers([&] { return Polisher(surface); });
-  constexpr std::size_t kBatch = 4096;
-  for (std::size_t begin = 0; begin < count; begin += kBatch) {
-    const std::size_t end = std::min(begin + kBatch, count);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 16), [&](const auto& range) {
-      Polisher& polisher = polishers.local();
-      for (std::size_t i = range.begin(); i != range.end(); ++i) work(i, polisher);
-    });
-    report(progress, static_cast<double>(end) / static_cast<double>(count));
-  }
 }
 
 FloatTree::Ptr makeTree(const FloatTree& field, const ZeroSet& surface,
@@ -182,6 +121,7 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
   FloatGrid::Ptr result =
       FloatGrid::create(makeTree(field.tree(), surface, nearest, request, field.voxelSize()[0]));
   result->setTransform(field.transform().copy());
+  if (request.ofMovedSurface) correctMeetingParts(*result, surface, nearest, request);
   result->setName(field.getName());
   result->setGridClass(openvdb::GRID_LEVEL_SET);
   report(request.progress, 1);

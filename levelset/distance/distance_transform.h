@@ -24,6 +24,9 @@ struct DistanceRequest {
   /// Searches for edges and corners of the surface. Pass false for a surface without any, such as
   /// after a long smoothing.
   bool mayHaveEdges = true;
+  /// Makes the values distances to the moved surface everywhere. They differ from d − shift beside
+  /// the creases in which parts of the moved surface meet.
+  bool ofMovedSurface = false;
   /// Called with each leaf of the result that has active values and with its closest points, from
   /// many threads at once and in no fixed order.
   std::function<void(const openvdb::FloatTree::LeafNodeType&, const ClosestPointLeaf&)>

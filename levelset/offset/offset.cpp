@@ -18,6 +18,9 @@ using LeafNode = openvdb::FloatTree::LeafNodeType;
 
 // Distance from the moved surface, voxels, within which re-distancing reads the shifted field.
 constexpr double kPadding = 3;
+// Least shift, voxels, for which the distances to a moved surface follow from the old surface. By a
+// smaller shift, two parts of the surface can meet that are less than a voxel apart.
+constexpr double kLeastShift = 2;
 // Voxels by which offset lengths at points of the surface between the sampled points may lie
 // outside the range of the sampled lengths.
 constexpr double kRangeMargin = 0.5;
@@ -111,6 +114,10 @@ class Lengths {
 
 }  // namespace
 
+bool followsFromOld(double distance, double halfWidth) {
+  return halfWidth >= kPadding && std::abs(distance) >= kLeastShift;
+}
+
 NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& options) {
   if (!std::isfinite(distance))
     throw UsageError(fmt::format("the distance is {}; give a finite length", distance));
@@ -121,6 +128,8 @@ NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& option
 
   eikonal::DistanceRequest request = nearSurfaceRequest(options, distance / solid.voxelSize(), 0);
   request.progress = subProgress(options.progress, 0, 0.6);
+  request.ofMovedSurface = followsFromOld(request.shift, halfWidth);
+  if (request.ofMovedSurface) request.halfWidth = halfWidth;
   const openvdb::FloatGrid::Ptr moved = eikonal::distanceTransform(vdb(solid), request);
   if (!hasSurface(*moved))
     throw NoSurface(
@@ -128,6 +137,7 @@ NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& option
                     "the solid is "
                     "thicker than twice that; use a smaller length",
                     distance));
+  if (request.ofMovedSurface) return makeBand(moved);
   return redistanced(*moved, halfWidth, options, 0.6);
 }
 

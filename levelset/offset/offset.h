@@ -19,7 +19,9 @@ struct OffsetOptions {
 };
 
 /// Offsets the surface along its normal by `distance`; a positive distance grows the solid.
-/// Computes distances up to the new zero set and re-distances once, for any `distance`.
+/// Computes distances up to the new zero set. Where parts of the moved surface meet, the nearest
+/// point of their crease is found by Newton's method. Small distances and narrow bands are
+/// re-distanced instead, see followsFromOld().
 /// @param distance  displacement of the surface, world units, any sign
 /// @throws UsageError if `distance` is not finite
 /// @throws InvalidInput if `solid` or the result is empty
@@ -38,6 +40,10 @@ struct OffsetOptions {
 /// @throws InvalidInput if `distance` is not finite at a point, which the message gives
 [[nodiscard]] NarrowBand offsetBy(NarrowBand solid, const ScalarField& distance,
                                   const OffsetOptions& options = {});
+
+/// Returns true if offset() computes the distances to the moved surface from the old one alone.
+/// @param distance, halfWidth  voxels
+[[nodiscard]] bool followsFromOld(double distance, double halfWidth);
 
 /// Estimates the cost of moving a surface.
 /// @param before,after  grid points in a layer along the surface before and after the offset, from

@@ -11,7 +11,10 @@ Cost costOfOffset(double before, double after, double distance, double halfWidth
   Cost cost = costOfDistances(std::max(before, after), kShell);
   cost.seconds += 1e-9 * before * 700 * std::abs(distance);
   cost.bytes += 15 * before * std::abs(distance);
-  return cost += costOfDistances(after, halfWidth);
+  Cost second = costOfDistances(after, halfWidth);
+  // Only the grid points beside creases are measured a second time.
+  if (followsFromOld(distance, halfWidth)) second.seconds *= 0.4;
+  return cost += second;
 }
 
 const OperatorText OffsetOperator::text{

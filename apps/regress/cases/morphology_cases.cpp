@@ -79,10 +79,12 @@ Bounds openingClosingBounds() {
   return Bounds()
       .measured(
           "opening of a box", "band_in_linf_vx",
-          {{12, 0.0297}, {16, 0.00944}, {24, 0.00863}, {32, 0.0109}, {64, 0.00265}, {128, 0.00143}})
-      .measured(
-          "opening of a box", "band_out_linf_vx",
-          {{12, 0.032}, {16, 0.015}, {24, 0.00858}, {32, 0.00936}, {64, 0.00235}, {128, 0.00138}})
+          {{12, 0.0297}, {16, 0.00944}, {24, 0.00863}, {32, 0.0109}, {64, 0.00131}, {128, 0.00143}})
+      .measured("opening of a box", "band_out_linf_vx",
+                {{12, 0.00483}, {32, 0.00936}, {128, 0.00138}})
+      .rounding("opening of a box", "band_out_linf_vx", 2, 16)
+      .rounding("opening of a box", "band_out_linf_vx", 2, 24)
+      .rounding("opening of a box", "band_out_linf_vx", 2.5, 64)
       .measured("opening of a box", "surface_l1_vx",
                 {{12, 0.0072},
                  {16, 0.00297},
@@ -91,19 +93,13 @@ Bounds openingClosingBounds() {
                  {64, 0.000223},
                  {128, 0.000142}})
       .measured("closing of a box", "band_in_linf_vx",
-                {{12, 0.000939},
-                 {16, 0.000124},
-                 {24, 0.000313},
-                 {32, 0.00117},
-                 {64, 0.000514},
-                 {128, 0.0002}})
-      .measured("closing of a box", "band_out_linf_vx",
-                {{12, 0.00196},
-                 {16, 0.000124},
-                 {24, 0.000313},
-                 {32, 0.0016},
-                 {64, 0.00072},
-                 {128, 0.000226}})
+                {{12, 0.00012}, {32, 0.00012}, {128, 0.0002}})
+      .rounding("closing of a box", "band_in_linf_vx", 1.5, 16)
+      .rounding("closing of a box", "band_in_linf_vx", 1.5, 24)
+      .rounding("closing of a box", "band_in_linf_vx", 1.5, 64)
+      .measured(
+          "closing of a box", "band_out_linf_vx",
+          {{12, 0.0155}, {16, 0.0062}, {24, 0.00234}, {32, 0.0016}, {64, 0.00128}, {128, 0.00145}})
       .measured("opening of a box", "missed_hits",
                 {{12, 0.00262}, {16, 0.00218}, {32, 0.000205}, {128, 0.000162}})
       .measured(
@@ -125,9 +121,9 @@ Bounds shellBounds() {
                 {{12, 0.00177}, {16, 0.000185}, {24, 3.06e-5}, {32, 1.7e-5}, {64, 4.29e-6}})
       .ceiling(0.002)
       .measured("wall of a sphere", "band_in_linf_vx",
-                {{12, 0.00076}, {16, 0.000429}, {24, 0.000195}, {32, 0.0001}, {64, 2.79e-5}})
+                {{12, 0.00076}, {16, 0.000429}, {24, 9.49e-05}, {32, 0.0001}, {64, 2.79e-5}})
       .measured("wall of a sphere", "band_out_linf_vx",
-                {{12, 0.000751}, {16, 0.000428}, {24, 0.000162}, {32, 0.000103}, {64, 2.77e-5}})
+                {{12, 0.000751}, {16, 0.000203}, {24, 0.000162}, {32, 0.000103}, {64, 2.77e-5}})
       .measured("wall of a sphere", "missed_hits", {{12, 0.000456}, {32, 8.09e-5}});
 }
 

@@ -89,14 +89,14 @@ Bounds offsetSphereBounds() {
       .measured("-5 voxels", "surface_l1_vx",
                 {{8, 0.00281}, {24, 3.96e-5}, {32, 2.03e-5}, {64, 4.45e-6}, {128, 1.2e-6}})
       .measured("-5 voxels", "band_in_linf_vx",
-                {{8, 0.00827}, {24, 0.000176}, {32, 9.93e-5}, {64, 2.5e-5}, {128, 1.12e-5}})
+                {{8, 0.000753}, {24, 0.000176}, {32, 9.93e-5}, {64, 2.5e-5}, {128, 1.12e-5}})
       .measured("-5 voxels", "band_out_linf_vx",
-                {{8, 0.00827}, {24, 0.00015}, {32, 8.3e-5}, {64, 2.36e-5}, {128, 1.02e-5}});
+                {{8, 0.000889}, {24, 0.00015}, {32, 8.3e-5}, {64, 2.36e-5}, {128, 1.02e-5}});
 }
 
 Bounds offsetCubeBounds() {
   return Bounds()
-      .measured("cube, -5 voxels", "band_in_linf_vx", {{14, 0.0563}})
+      .rounding("cube, -5 voxels", "band_in_linf_vx", 1.5, 14)
       .rounding("cube, -5 voxels", "band_in_linf_vx", 1.5, 20)
       .rounding("cube, -5 voxels", "band_in_linf_vx", 2, 32)
       .rounding("cube, -5 voxels", "band_in_linf_vx", 1.5, 40)
@@ -108,31 +108,32 @@ Bounds offsetCubeBounds() {
       .rounding("cube, -5 voxels", "band_out_linf_vx", 2, 40)
       .rounding("cube, -5 voxels", "band_out_linf_vx", 2, 80)
       .rounding("cube, -5 voxels", "band_out_linf_vx", 2, 160)
-      .measured("rotated cube, -5 voxels", "band_in_linf_vx",
-                {{14, 0.0208},
-                 {20, 1.79e-5},
-                 {32, 0.000116},
-                 {40, 0.00134},
-                 {80, 0.000299},
-                 {160, 0.000253}})
+      .rounding("rotated cube, -5 voxels", "band_in_linf_vx", 1.5, 14)
+      .rounding("rotated cube, -5 voxels", "band_in_linf_vx", 2, 20)
+      .rounding("rotated cube, -5 voxels", "band_in_linf_vx", 3, 32)
+      .rounding("rotated cube, -5 voxels", "band_in_linf_vx", 3, 40)
+      .rounding("rotated cube, -5 voxels", "band_in_linf_vx", 3.5, 80)
+      .rounding("rotated cube, -5 voxels", "band_in_linf_vx", 3.5, 160)
       .measured("rotated cube, -5 voxels", "band_out_linf_vx",
                 {{14, 0.322},
                  {20, 0.000335},
                  {32, 0.000297},
                  {40, 0.00435},
                  {80, 0.00181},
-                 {160, 0.00154}})
+                 {160, 0.0038}})
       .measured(
           "cube, +5 voxels", "band_in_linf_vx",
           {{14, 0.0139}, {20, 0.00854}, {32, 0.00854}, {40, 0.0139}, {80, 0.0139}, {160, 0.0139}})
-      .measured(
-          "cube, +5 voxels", "band_out_linf_vx",
-          {{14, 0.0125}, {20, 0.00748}, {32, 0.00748}, {40, 0.0125}, {80, 0.0125}, {160, 0.0125}})
+      .measured("cube, +5 voxels", "band_out_linf_vx",
+                {{14, 0.0046}, {40, 0.0046}, {80, 0.0046}, {160, 0.0046}})
+      .rounding("cube, +5 voxels", "band_out_linf_vx", 2.5, 20)
+      .rounding("cube, +5 voxels", "band_out_linf_vx", 2, 32)
       .measured(
           "rotated cube, +5 voxels", "band_in_linf_vx",
           {{14, 0.0147}, {20, 0.0107}, {32, 0.0138}, {40, 0.0135}, {80, 0.0123}, {160, 0.0127}})
-      .measured("rotated cube, +5 voxels", "band_out_linf_vx",
-                {{14, 0.013}, {20, 0.0114}, {32, 0.0119}, {40, 0.015}, {80, 0.0124}, {160, 0.0137}})
+      .measured(
+          "rotated cube, +5 voxels", "band_out_linf_vx",
+          {{14, 0.013}, {20, 0.00457}, {32, 0.00467}, {40, 0.015}, {80, 0.0124}, {160, 0.0137}})
       .measured("cube, +5 voxels", "surface_l1_vx",
                 {{14, 0.00171},
                  {20, 0.00104},
@@ -201,13 +202,14 @@ Bounds offsetLawsBounds() {
           {{6, 0.00515}, {8, 0.00355}, {12, 0.00322}, {16, 0.00353}, {32, 0.00202}, {64, 0.00138}})
       .measured(
           "box, +5 then -5", "band_in_linf_vx",
-          {{6, 0.00338}, {8, 0.00119}, {12, 0.00103}, {16, 0.00338}, {32, 0.00158}, {64, 0.00474}})
-      .measured(
-          "box, +5 then -5", "band_out_linf_vx",
-          {{6, 0.0132}, {8, 0.00223}, {12, 0.00345}, {16, 0.0132}, {32, 0.00419}, {64, 0.0144}})
+          {{6, 0.00684}, {8, 0.00119}, {12, 0.00041}, {16, 0.00684}, {32, 0.00158}, {64, 0.00474}})
+      // Curvature jumps where the roundings of the box begin. Tricubic interpolation is off by up to
+      // 0.008 voxel there, so the way back has this error.
+      .measured("box, +5 then -5", "band_out_linf_vx",
+                {{6, 0.0237}, {8, 0.011}, {12, 0.0174}, {16, 0.0237}, {32, 0.0196}, {64, 0.0144}})
       .measured("sphere, +3 then +4", "missed_hits", {{6, 0.00068}, {16, 0}, {32, 0}, {64, 0}})
       .measured("box, +3 then +4", "missed_hits",
-                {{6, 0.000822}, {12, 0.000778}, {16, 0.00057}, {32, 0.000551}, {64, 0.000179}});
+                {{6, 0.000822}, {12, 0}, {16, 0.00057}, {32, 0.000551}, {64, 0.000179}});
 }
 
 }  // namespace

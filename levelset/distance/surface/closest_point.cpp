@@ -8,7 +8,7 @@ namespace {
 
 using openvdb::Vec3d;
 
-constexpr int kMaxIterations = 8;
+constexpr int kMaxIterations = 12;
 constexpr double kFootReach = 2;    // largest distance of the search from its start, voxels
 constexpr double kLongestStep = 1;  // longest Newton step, voxels
 // The iteration stops when the estimated error after a step falls below this, in voxels. The
@@ -18,6 +18,8 @@ constexpr double kTolerance = 2e-5;
 // changes the distance by half its square times the sum of curvature and inverse distance.
 constexpr double kTangentTolerance = 1e-3;
 constexpr double kLongestLastStep = 0.6;  // the iteration ends only after a shorter step, voxels
+// A step that undoes more than this share of the step before is halved.
+constexpr double kReversal = 0.3;
 // Lower bound of the second derivative, along the surface, of half the squared distance from the
 // query point. The derivative is 1 on a plane.
 constexpr double kLeastCurvature = 0.1;
@@ -76,7 +78,7 @@ NewtonStep newtonStep(const Jet& jet, double slope, const Vec3d& toFrom) {
 
 Foot closestPoint(const DenseBlock& block, const Vec3d& from, const Vec3d& start) {
   Foot foot{start, (from - start).length(), false, false};
-  Vec3d y = start;
+  Vec3d y = start, last(0);
   for (int i = 0; i < kMaxIterations; ++i) {
     if (!DenseBlock::contains(y)) return foot;
     const Jet jet = block.jet(y);
@@ -84,13 +86,27 @@ Foot closestPoint(const DenseBlock& block, const Vec3d& from, const Vec3d& start
     if (!(slope > 0)) return foot;
     const NewtonStep step = newtonStep(jet, slope, from - y);
     if (!std::isfinite(step.length)) return foot;
-    y += step.length > kLongestStep ? step.along * (kLongestStep / step.length) : step.along;
+    Vec3d move =
+        step.length > kLongestStep ? step.along * (kLongestStep / step.length) : step.along;
+    // The second derivatives jump between cells, so that full steps can cycle around the solution.
+    if (move.dot(last) < -kReversal * last.lengthSqr()) move *= 0.5;
+    y += move;
+    last = move;
     if ((y - start).lengthSqr() > kFootReach * kFootReach)
       return Foot{y, foot.distance, false, true};
     if (step.length <= kLongestLastStep && step.remains < kTolerance)
       return Foot{y, (from - y).length(), true, false};
   }
   return foot;
+}
+
+Foot closestPointByOneStep(const Jet& jet, const Vec3d& from, const Vec3d& start, double longest) {
+  const double slope = jet.gradient.length();
+  if (!(slope > 0)) return {};
+  const NewtonStep step = newtonStep(jet, slope, from - start);
+  if (!(step.length <= longest)) return {};
+  const Vec3d point = start + step.along;
+  return {point, (from - point).length(), true, false};
 }
 
 Foot closestPointByTwoSteps(DenseBlockCache& blocks, const Jet& jet, const Vec3d& from,

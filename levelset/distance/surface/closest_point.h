@@ -24,6 +24,12 @@ struct Foot {
 [[nodiscard]] Foot closestPoint(const DenseBlock& block, const openvdb::Vec3d& from,
                                 const openvdb::Vec3d& start);
 
+/// Finds the closest point in a single Newton step from a point on the zero set, given the
+/// derivatives there. `converged` is false when the step is longer than `longest`, voxels. The
+/// error is of third order in the length of the step.
+[[nodiscard]] Foot closestPointByOneStep(const Jet& jet, const openvdb::Vec3d& from,
+                                         const openvdb::Vec3d& start, double longest);
+
 /// Finds the closest point in at most two Newton steps from a point on the zero set, given the
 /// derivatives there. The second step keeps the second derivatives of the first, so it only reads
 /// value and gradient. The error is at most 2e-5 voxel in the distance and 1e-3 voxel along the

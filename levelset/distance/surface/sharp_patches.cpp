@@ -9,6 +9,7 @@
 #include <memory>
 #include <tuple>
 
+#include "levelset/grids/box_mask_vdb.h"
 #include "levelset/meshing/sharp/sharp_evidence.h"
 #include "levelset/meshing/sharp/sharp_surface.h"
 
@@ -21,9 +22,10 @@ using openvdb::FloatTree;
 using openvdb::Vec3d;
 using LeafNode = FloatTree::LeafNodeType;
 
-// Distance from a vertex on an edge, voxels, within which the surface decides where that edge is.
-// The leaves around are copied too.
-constexpr double kEdgeContext = 4;
+// Distance along each axis from a vertex with the values of a sharp edge, voxels, within which
+// cells are meshed. A confirmed edge has such a vertex within 3 voxels; the surface up to 3 voxels
+// farther confirms it, and its patches reach 5 voxels.
+constexpr int kMeshReach = 9;
 // Number of cells around a cell with an edge in which the edge, or the bisector plane of its faces,
 // affects the interpolant.
 constexpr int kZone = 3;
@@ -44,8 +46,8 @@ void touchAround(openvdb::MaskTree& leaves, const Vec3d& point, double reach) {
                                    corner & 1 ? reach : -reach)));
 }
 
-/// Returns a grid of the leaves that may contain an edge, with the 26 leaves or tiles around each.
-FloatGrid::Ptr partWithEdges(const FloatGrid& field, const BlockSelection& within) {
+/// Returns the cells within kMeshReach of the vertices with the values of a sharp edge.
+openvdb::MaskTree cellsNearEdges(const FloatGrid& field, const BlockSelection& within) {
   std::vector<const LeafNode*> leaves;
   for (auto it = field.tree().cbeginLeaf(); it; ++it)
     if (within.holdsBlock(it->getNodeBoundingBox())) leaves.push_back(it.getLeaf());
@@ -55,24 +57,14 @@ FloatGrid::Ptr partWithEdges(const FloatGrid& field, const BlockSelection& withi
     for (std::size_t i = range.begin(); i != range.end(); ++i)
       vertices[i] = sharpEdgeVertices(field, accessor, leaves[i]->origin());
   });
-  openvdb::MaskTree near;  // leaves within kEdgeContext voxels of such a vertex
+  openvdb::MaskTree cells;
   for (const std::vector<Vec3d>& found : vertices)
-    for (const Vec3d& vertex : found) touchAround(near, vertex, kEdgeContext);
-  auto part = FloatGrid::create(field.background());
-  part->setTransform(field.transform().copy());
-  auto target = part->getAccessor();
-  auto source = field.getConstAccessor();
-  for (auto leaf = near.cbeginLeaf(); leaf; ++leaf)
-    for (int k = 0; k < 27; ++k) {
-      const Coord origin =
-          leaf->origin().offsetBy(8 * (k / 9 - 1), 8 * (k / 3 % 3 - 1), 8 * (k % 3 - 1));
-      if (target.probeConstLeaf(origin)) continue;
-      if (const LeafNode* there = source.probeConstLeaf(origin))
-        target.addLeaf(new LeafNode(*there));
-      else
-        target.addTile(1, origin, source.getValue(origin), false);
+    for (const Vec3d& vertex : found) {
+      const Coord cell = Coord::floor(vertex);
+      if (within.edgeCells && !within.edgeCells->isValueOn(cell)) continue;
+      addBox(cells, {cell.offsetBy(-kMeshReach), cell.offsetBy(kMeshReach)});
     }
-  return part;
+  return cells;
 }
 
 /// Triangles of a mesh near edges and corners, sorted by the cells of their centroids. Finds the
@@ -128,10 +120,10 @@ class SheetTable {
 
 SharpPatches::SharpPatches(const FloatGrid& field, const BlockSelection& within,
                            const Progress& progress) {
-  const FloatGrid::Ptr part = partWithEdges(field, within);
-  if (part->tree().leafCount() == 0) return;
-  const CellSurface surface(*part);
-  const SharpMesh mesh = sharpSurface(surface, *part, progress);
+  const openvdb::MaskTree cells = cellsNearEdges(field, within);
+  if (cells.empty()) return;
+  const CellSurface surface(field, &cells);
+  const SharpMesh mesh = sharpSurface(surface, field, progress);
 
   // === Confirmed edges
   const bool hasFeatures = std::any_of(mesh.sheets.begin(), mesh.sheets.end(),

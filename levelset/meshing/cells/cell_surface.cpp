@@ -95,8 +95,12 @@ std::vector<Coord> blocksBetweenTiles(const FloatGrid& grid) {
 
 }  // namespace
 
-CellSurface::CellSurface(const FloatGrid& grid) : grid_(grid) {
-  collectBlocks();
+CellSurface::CellSurface(const FloatGrid& grid, const openvdb::MaskTree* cells) : grid_(grid) {
+  if (cells)
+    collectBlocks(*cells);
+  else
+    collectAllBlocks();
+  sortBlocks();
   linkBlocks();
   tbb::parallel_for(std::size_t{0}, blocks_.size(), [&](std::size_t i) { countBlock(blocks_[i]); });
   numberAll();
@@ -104,7 +108,7 @@ CellSurface::CellSurface(const FloatGrid& grid) : grid_(grid) {
 
 /// Collects the leaves, and the blocks in tiles that contain a cell with corners of both signs. A
 /// cell belongs to the block of its lowest corner, which may lie in a tile.
-void CellSurface::collectBlocks() {
+void CellSurface::collectAllBlocks() {
   const FloatTree& tree = grid_.tree();
   blocks_.reserve(tree.leafCount());
   for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
@@ -149,6 +153,33 @@ void CellSurface::collectBlocks() {
     block.fill = fill;
     blocks_.push_back(block);
   }
+  for (SurfaceBlock& block : blocks_) block.chosen.fill(~0ull);
+}
+
+/// Collects the blocks of the given cells and the blocks with their upper corners.
+void CellSurface::collectBlocks(const openvdb::MaskTree& cells) {
+  std::vector<Coord> origins;
+  for (auto leaf = cells.cbeginLeaf(); leaf; ++leaf)
+    for (unsigned side = 0; side < 8; ++side) origins.push_back(shifted(leaf->origin(), side));
+  sortUnique(origins);
+  FloatGrid::ConstAccessor accessor = grid_.getConstAccessor();
+  const openvdb::tree::ValueAccessor<const openvdb::MaskTree> chosen(cells);
+  blocks_.reserve(origins.size());
+  for (const Coord& origin : origins) {
+    SurfaceBlock block;
+    block.origin = origin;
+    if (const LeafNode* leaf = accessor.probeConstLeaf(origin))
+      block.values = leaf->buffer().data();
+    else
+      block.fill = accessor.getValue(origin);
+    if (const auto* mask = chosen.probeConstLeaf(origin))
+      for (openvdb::Index x = 0; x < kSide; ++x)
+        block.chosen[x] = mask->valueMask().getWord<std::uint64_t>(x);
+    blocks_.push_back(block);
+  }
+}
+
+void CellSurface::sortBlocks() {
   // Order the blocks as a tree orders its leaves. Whether a block is a leaf depends on the width of
   // the band, and the order of the triangles must not depend on that width.
   std::sort(blocks_.begin(), blocks_.end(), [](const SurfaceBlock& a, const SurfaceBlock& b) {

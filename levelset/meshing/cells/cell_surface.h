@@ -25,6 +25,7 @@ struct SurfaceBlock {
   std::array<std::uint32_t, 8> neighbour = {};
   std::array<float, 8> neighbourFill = {};     ///< value of a neighbour that has no block
   std::array<std::uint64_t, 8> inside = {};    ///< [x]: grid points with φ < 0
+  std::array<std::uint64_t, 8> chosen = {};    ///< [x]: cells that belong to the surface
   std::array<std::uint64_t, 24> crossed = {};  ///< [x·3 + axis]: edges with a change of sign
   /// [word]: number of crossed edges in the words of `crossed` before this word.
   std::array<std::uint16_t, 24> rank = {};
@@ -36,15 +37,18 @@ struct SurfaceBlock {
   [[nodiscard]] float value(int offset) const { return values ? values[offset] : fill; }
 };
 
-/// All cells and edges of a grid whose corners or ends have both signs, in blocks.
+/// The cells and edges of a grid whose corners or ends have both signs, in blocks: all of them, or
+/// a part of the cells.
 /// The blocks are ordered by position, as OpenVDB orders leaves, whether they are leaves or tiles.
 /// A grid point with φ < 0 is inside. Outside the leaves the tiles give the values, so a band that
 /// was cut off at a box still yields a closed surface.
 class CellSurface {
  public:
   /// Collects the blocks, links them to their neighbours, and numbers vertices and triangles.
+  /// @param cells  lowest corners of the cells that belong to the surface; null: all cells. The
+  /// edges around a cell are numbered even if their other cells do not belong to it.
   /// @throws ResourceLimit when the blocks or the vertices of the surface exceed 32-bit indices
-  explicit CellSurface(const openvdb::FloatGrid& grid);
+  explicit CellSurface(const openvdb::FloatGrid& grid, const openvdb::MaskTree* cells = nullptr);
 
   static constexpr std::uint32_t kNoBlock = 0xffffffffu;
 
@@ -65,15 +69,17 @@ class CellSurface {
   [[nodiscard]] std::uint32_t vertexOf(const SurfaceBlock& block, int x, int y, int z,
                                        int edge) const;
 
-  /// Calls visit(x, y, z, pattern) for each cell of the block with corners of both signs. Bit c of
-  /// `pattern` is set when corner c is inside.
+  /// Calls visit(x, y, z, pattern) for each cell of the surface in the block with corners of both
+  /// signs. Bit c of `pattern` is set when corner c is inside.
   template <typename Visit>
   void forEachCell(const SurfaceBlock& block, Visit&& visit) const {
     for (int x = 0; x < 8; ++x) {
+      const std::uint64_t chosen = block.chosen[static_cast<std::size_t>(x)];
+      if (!chosen) continue;
       const auto words = cornerWords(block, x);
       std::uint64_t any = 0, all = ~0ull;
       for (const std::uint64_t word : words) any |= word, all &= word;
-      for (std::uint64_t left = any & ~all; left; left &= left - 1) {
+      for (std::uint64_t left = any & ~all & chosen; left; left &= left - 1) {
         const int bit = __builtin_ctzll(left);
         unsigned pattern = 0;
         for (unsigned corner = 0; corner < 8; ++corner) {
@@ -99,7 +105,9 @@ class CellSurface {
 
  private:
   using Slab = std::array<std::uint64_t, 4>;
-  void collectBlocks();
+  void collectAllBlocks();
+  void collectBlocks(const openvdb::MaskTree& cells);
+  void sortBlocks();
   void linkBlocks();
   [[nodiscard]] Slab slabWords(const SurfaceBlock& block, int x) const;
   [[nodiscard]] std::uint64_t insideWord(const SurfaceBlock& block, unsigned side, int x) const;

@@ -50,8 +50,11 @@ std::vector<PairedEdge> pairSides(std::vector<TriangleSide> sides) {
                   [&](const TriangleSide& a, const TriangleSide& b) { return key(a) == key(b); }),
       sides.end());
   std::vector<PairedEdge> edges;
-  for (std::size_t i = 0; i + 1 < sides.size(); i += 2)
+  for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
+    if (sides[i].low != sides[i + 1].low || sides[i].high != sides[i + 1].high) continue;
     edges.push_back({sides[i].low, sides[i].high, {sides[i].triangle, sides[i + 1].triangle}});
+    ++i;
+  }
   return edges;
 }
 

@@ -43,8 +43,9 @@ struct EdgeFlip {
 /// Adds each edge of the chosen triangles to `sides`, once for each of the two triangles beside it.
 void addSides(const std::vector<MeshTriangle>& triangles, const std::vector<std::size_t>& chosen,
               std::size_t vertexCount, std::vector<TriangleSide>& sides);
-/// Pairs the triangle sides of a closed mesh into edges, ordered by vertex indices. `sides` must
-/// contain each edge once for each of the two triangles beside it; repeats are ignored.
+/// Pairs triangle sides into edges, ordered by vertex indices. `sides` must contain each edge once
+/// for each of the one or two triangles beside it; repeats are ignored. Edges at the border of the
+/// mesh, with one triangle, yield no pair.
 [[nodiscard]] std::vector<PairedEdge> pairSides(std::vector<TriangleSide> sides);
 /// Returns the keys of all mesh edges between vertices that a flip of one of `edges` could join.
 [[nodiscard]] std::unordered_set<std::uint64_t> edgesBeside(

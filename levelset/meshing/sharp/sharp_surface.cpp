@@ -72,6 +72,10 @@ struct FaceSegment {
 constexpr std::array<unsigned, 4> kRing = {0, 2, 3, 1};
 constexpr std::array<int, 4> kRingStep = {0, 1, 0, 1};
 
+constexpr std::uint32_t kNoPolygon = 0xffffffffu;
+constexpr std::array<std::uint32_t, 4> kNoPolygons = {kNoPolygon, kNoPolygon, kNoPolygon,
+                                                      kNoPolygon};
+
 class DualMesher {
  public:
   DualMesher(const CellSurface& surface, const FloatGrid& grid, const Progress& progress)
@@ -80,7 +84,7 @@ class DualMesher {
   SharpMesh run() {
     vertices_.resize(surface_.cycleCount());
     twice_.resize(surface_.cycleCount());
-    cells_.resize(surface_.vertexCount());
+    cells_.resize(surface_.vertexCount(), kNoPolygons);
     const Progress placed = subProgress(progress_, 0, 0.4);
     ProgressGate gate(placed, surface_.blocks().size());
     forEachBlock([&](const SurfaceBlock& block) {
@@ -143,6 +147,12 @@ class DualMesher {
     });
   }
 
+  /// Returns true when all cells around a crossed edge belong to the surface. Other edges get no
+  /// quadrilateral.
+  [[nodiscard]] static bool isComplete(const std::array<std::uint32_t, 4>& cells) {
+    return std::find(cells.begin(), cells.end(), kNoPolygon) == cells.end();
+  }
+
   /// Returns true when the side of the quadrilateral from slot kRing[i] to the next one lies on a
   /// cell face that the polygons of both adjacent cells pass twice.
   [[nodiscard]] bool isDoubled(const std::array<std::uint32_t, 4>& cells, int axis,
@@ -184,7 +194,7 @@ class DualMesher {
     std::vector<std::vector<std::uint32_t>> around(without.size());
     for (const auto& cells : cells_)
       for (const std::uint32_t v : cells) {
-        if (!isWithout[v]) continue;
+        if (v == kNoPolygon || !isWithout[v]) continue;
         const auto slot = std::lower_bound(without.begin(), without.end(), v) - without.begin();
         auto& list = around[static_cast<std::size_t>(slot)];
         list.insert(list.end(), cells.begin(), cells.end());
@@ -195,6 +205,7 @@ class DualMesher {
   void adoptFrom(const std::vector<std::uint32_t>& around, DualVertex& vertex) const {
     std::vector<FacePlane> planes;
     for (const std::uint32_t v : around) {
+      if (v == kNoPolygon) continue;
       const DualVertex& other = vertices_[v];
       for (std::size_t i = 0; i < other.sheets.count; ++i) {
         const openvdb::Vec3f& n = other.sheets.normal[i];
@@ -206,7 +217,8 @@ class DualMesher {
     if (planes.empty()) return;
     const Vector3d fitted = fitPlanes(planes, vertex.position);
     const auto isTaken = [&](std::uint32_t v) {
-      return &vertices_[v] != &vertex && (vertices_[v].position - fitted).norm() < kApart;
+      return v != kNoPolygon && &vertices_[v] != &vertex &&
+             (vertices_[v].position - fitted).norm() < kApart;
     };
     if ((fitted - vertex.position).norm() > kAdoptReach ||
         std::any_of(around.begin(), around.end(), isTaken))
@@ -229,12 +241,16 @@ class DualMesher {
     return mesh;
   }
 
+  /// Calls visit(number, lower end, axis, true if the lower end is inside) for each crossed edge
+  /// whose four cells all belong to the surface.
   template <typename Visit>
   void forEachCrossing(const SurfaceBlock& block, const Visit& visit) const {
     std::size_t vertex = block.firstVertex;
     CellSurface::forEachVertex(block, [&](int x, int y, int z, int axis) {
+      const std::size_t number = vertex++;
+      if (!isComplete(cells_[number])) return;
       const bool lowInside = block.value(x * 64 + y * 8 + z) < 0;
-      visit(vertex++, block.origin.offsetBy(x, y, z), axis, lowInside);
+      visit(number, block.origin.offsetBy(x, y, z), axis, lowInside);
     });
   }
 
@@ -326,9 +342,11 @@ class DualMesher {
   const CellSurface& surface_;
   const FloatGrid& grid_;
   const Progress& progress_;
-  std::vector<DualVertex> vertices_;                 ///< one for each polygon of a cell
-  std::vector<std::uint8_t> twice_;                  ///< facesPassedTwice() of each polygon
-  std::vector<std::array<std::uint32_t, 4>> cells_;  ///< polygons around each crossed edge, by slot
+  std::vector<DualVertex> vertices_;  ///< one for each polygon of a cell
+  std::vector<std::uint8_t> twice_;   ///< facesPassedTwice() of each polygon
+  /// Polygons around each crossed edge, by slot; kNoPolygon where the cell does not belong to the
+  /// surface.
+  std::vector<std::array<std::uint32_t, 4>> cells_;
   std::vector<FaceSegment> segments_;
   std::vector<std::size_t> firstTriangle_;
 };

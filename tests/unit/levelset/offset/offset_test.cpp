@@ -5,7 +5,9 @@
 
 #include <Imath/ImathMatrix.h>
 
+#include <algorithm>
 #include <limits>
+#include <vector>
 
 #include "levelset/error.h"
 #include "levelset/grids/sample.h"
@@ -112,7 +114,7 @@ TEST(Offset, KeepsARotatedCubeSharp) {
     EXPECT_LE(shrunk.l1, support::measured(7.36e-7)) << turn;
     const BandError grown =
         bandError(offset(cube, 5), [&](const V3d& p) { return turnedBox(20, turn)(p) - 5; });
-    EXPECT_LE(grown.linf, support::measured(0.0176)) << turn;
+    EXPECT_LE(grown.linf, support::measured(0.0387)) << turn;
     EXPECT_LE(grown.l1, support::measured(2.86e-4)) << turn;
   }
 }
@@ -242,6 +244,80 @@ TEST(Offset, MergesSurfacesThatMeet) {
     if (std::abs(q.x) > 1.5) worst = std::max(worst, std::abs(value - std::max(truth, -3.0)));
   });
   EXPECT_LE(worst, support::measured(0.371, 0.5));
+}
+
+/// Ball given by centre and radius, voxels.
+struct Ball {
+  V3d centre;
+  double radius = 0;
+};
+
+bool isInAny(const std::vector<Ball>& balls, const V3d& p) {
+  return std::any_of(balls.begin(), balls.end(), [&](const Ball& ball) {
+    return (p - ball.centre).length() < ball.radius - 1e-9;
+  });
+}
+
+/// Signed distance to the union of balls. Inside, the nearest point of the surface lies on a ball,
+/// on the circle of two balls or at a point of three balls.
+double unionDistance(const std::vector<Ball>& balls, const V3d& p) {
+  double outside = INFINITY, inside = INFINITY;
+  const auto tryPoint = [&](const V3d& q) {
+    if (!isInAny(balls, q)) inside = std::min(inside, (p - q).length());
+  };
+  for (std::size_t i = 0; i < balls.size(); ++i) {
+    const V3d to = p - balls[i].centre;
+    outside = std::min(outside, to.length() - balls[i].radius);
+    tryPoint(balls[i].centre + to.normalized() * balls[i].radius);
+    for (std::size_t j = 0; j < i; ++j) {
+      const V3d between = balls[i].centre - balls[j].centre;
+      const double length = between.length();
+      const V3d along = between / length;
+      const auto square = [](double x) { return x * x; };
+      const double at =
+          (square(length) + square(balls[j].radius) - square(balls[i].radius)) / (2 * length);
+      const double squared = square(balls[j].radius) - square(at);
+      if (!(squared > 0)) continue;
+      const V3d middle = balls[j].centre + along * at;
+      const V3d across = (p - middle) - along * (p - middle).dot(along);
+      tryPoint(middle + across.normalized() * std::sqrt(squared));
+      for (std::size_t k = 0; k < j; ++k) {  // the circle meets a third ball at two points
+        const V3d to3 = balls[k].centre - middle;
+        const double height = to3.dot(along), radius = std::sqrt(squared);
+        V3d u = to3 - along * height;
+        const double flat = u.length();
+        if (!(flat > 0)) continue;
+        u /= flat;
+        const double cosine = (square(flat) + square(height) + squared - square(balls[k].radius)) /
+                              (2 * flat * radius);
+        if (std::abs(cosine) > 1) continue;
+        const V3d v = along.cross(u) * std::sqrt(1 - square(cosine));
+        for (const double side : {-1.0, 1.0}) tryPoint(middle + (u * cosine + v * side) * radius);
+      }
+    }
+  }
+  return outside < 0 ? -inside : outside;
+}
+
+// The surfaces of the balls meet in creases and corners after the offset only.
+TEST(Offset, MeasuresCreasesInWhichPartsMeet) {
+  std::vector<Ball> balls, grown;
+  for (const V3d& c : {V3d(0), V3d(17, 3, -2), V3d(7, 15, 5), V3d(6, -4, 15), V3d(-13, 9, 6)})
+    balls.push_back({kCentre + c, 6.5 + 0.2 * c.x / 3});
+  grown = balls;
+  const double distance = 6;
+  for (Ball& ball : grown) ball.radius += distance;
+  const Shape solid = [&](const V3d& p) { return unionDistance(balls, p); };
+  const NarrowBand moved = offset(sample(solid, 40), distance);
+  double l1 = 0, linf = 0, count = 0;
+  support::forEachActive(moved, [&](const V3d& p, double value) {
+    const double error = std::abs(value - unionDistance(grown, p));
+    l1 += error;
+    linf = std::max(linf, error);
+    ++count;
+  });
+  EXPECT_LE(l1 / count, support::measured(3.22e-4));
+  EXPECT_LE(linf, support::measured(1.92e-3));
 }
 
 TEST(Offset, KeepsTheSolidForDistanceZero) {

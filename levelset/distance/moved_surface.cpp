@@ -1,0 +1,243 @@
+#include "levelset/distance/moved_surface.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "levelset/distance/surface/closest_point.h"
+
+namespace levelset::eikonal {
+namespace {
+
+using openvdb::Coord;
+using openvdb::Vec3d;
+using LeafNode = openvdb::FloatTree::LeafNodeType;
+
+// Another part of the surface counts as nearer if it is nearer by more than this, voxels.
+constexpr double kNearer = 5e-4;
+// Points of the surface within this distance of each other, voxels, belong to the same part.
+constexpr double kSamePart = 0.75;
+// Square of the largest distance of a surface point from the place where the surface is nearest to
+// the point in question, voxels².
+constexpr double kBetweenPoints = 8;
+// Longest Newton step with the derivatives at a surface point, and its error, voxels.
+constexpr double kStepOfJet = 2.5, kStepError = 0.1;
+// Number of steps of the search for a point of the crease, and number of sets of parts to try.
+constexpr int kMoves = 16, kSets = 6;
+// Number of searches for a foot point. Each starts where the search before it moved too far.
+constexpr int kFollows = 4;
+// The search ends after a step of less than kLastMove voxels. No step is longer than kLongestMove.
+constexpr double kLastMove = 1e-4, kLongestMove = 1;
+// Least square root of the determinant of the scalar products of the unit normals at a crease: the
+// sine of 10° for two normals. The moved surface counts as smooth below it; the distance is then
+// too small by less than 0.4 percent.
+constexpr double kLeastSine = 0.17;
+// If a point of the moved surface is nearer to another plane face by a length, the crease is as far
+// away as that length divided by the sine of the angle between the faces. On curved faces it is at
+// most kCreaseFactor times as far. A length below kClose, voxels, is neglected if the search fails.
+constexpr double kCreaseFactor = 3, kClose = 1e-4;
+
+}  // namespace
+
+MovedSurface::MovedSurface(const ZeroSet& surface, double shift)
+    : cache_(*surface.interpolated),
+      points_(surface.points),
+      patches_(surface.patches),
+      shift_(shift) {}
+
+std::optional<MovedSurface::Result> MovedSurface::distance(const NearestPoints::Block& block,
+                                                           openvdb::Index n,
+                                                           const Closest& closest) {
+  const Vec3d x = (block.origin + LeafNode::offsetToLocalCoord(n)).asVec3d();
+  const double sign = block.inside.isOn(n) ? -1 : 1;
+  Vec3d normal = (x - closest.point) * sign;
+  if (!(closest.distance > 1e-3)) normal = points_.jets[block.nearest[n]].jet().gradient;
+  if (!normal.normalize()) return std::nullopt;
+  const double least = std::abs(sign * closest.distance - shift_);
+
+  std::vector<Vec3d> parts{closest.point}, seen = parts;
+  Vec3d meeting = closest.point + normal * shift_;
+  NearerPart nearer = nearerPart(block, meeting, parts);
+  if (nearer.kind == Nearer::None) return Result{least};
+  const Vec3d start = meeting;
+  const double gap = std::abs(shift_) - nearer.distance;
+  const bool isClose = nearer.kind == Nearer::Part && gap < kClose;
+  for (int i = 0; i < kSets && nearer.kind == Nearer::Part && parts.size() < kParts; ++i) {
+    parts.push_back(nearer.point);
+    seen.push_back(nearer.point);
+    const Meeting kind = meetActive(x, parts, meeting);
+    if (kind == Meeting::Smooth) return Result{least};
+    if (kind == Meeting::Failed) break;
+    nearer = nearerPart(block, meeting, parts);
+    const double found = (x - meeting).length();
+    if (nearer.kind == Nearer::None && found > least - kNearer &&
+        (meeting - start).length() < kCreaseFactor * gap / kLeastSine)
+      return nearestPair(block, x, start, seen, {found, CreasePoint{meeting, parts}});
+  }
+  return isClose ? std::optional(Result{least}) : std::nullopt;
+}
+
+/// Where more than two parts are near, several creases are. Returns the nearest of `best` and of
+/// the crease points of all pairs of parts.
+/// @param start  start of the searches
+MovedSurface::Result MovedSurface::nearestPair(const NearestPoints::Block& block, const Vec3d& x,
+                                               const Vec3d& start, const std::vector<Vec3d>& feet,
+                                               Result best) {
+  if (feet.size() < 3) return best;
+  for (std::size_t i = 0; i < feet.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      CreasePoint crease{start, {feet[i], feet[j]}};
+      if (meetActive(x, crease.feet, crease.point) != Meeting::Found) continue;
+      const double distance = (x - crease.point).length();
+      if (distance < best.distance - kNearer &&
+          nearerPart(block, crease.point, crease.feet).kind == Nearer::None)
+        best = {distance, std::move(crease)};
+    }
+  return best;
+}
+
+std::optional<MovedSurface::Result> MovedSurface::distanceFrom(const NearestPoints::Block& block,
+                                                               openvdb::Index n,
+                                                               CreasePoint start) {
+  const Vec3d x = (block.origin + LeafNode::offsetToLocalCoord(n)).asVec3d();
+  if (meetActive(x, start.feet, start.point) != Meeting::Found ||
+      nearerPart(block, start.point, start.feet).kind != Nearer::None)
+    return std::nullopt;
+  return Result{(x - start.point).length(), std::move(start)};
+}
+
+/// As meet(), but drops the parts that do not decide where the nearest point is.
+MovedSurface::Meeting MovedSurface::meetActive(const Vec3d& x, std::vector<Vec3d>& feet,
+                                               Vec3d& meeting) {
+  while (feet.size() > 1) {
+    std::array<double, kParts> multipliers = {};
+    const Meeting kind = meet(x, feet, meeting, multipliers);
+    if (kind != Meeting::Found) return kind;
+    const auto end = multipliers.begin() + static_cast<std::ptrdiff_t>(feet.size());
+    const auto least = std::min_element(multipliers.begin(), end);
+    if (*least > -kLastMove) return Meeting::Found;
+    feet.erase(feet.begin() + (least - multipliers.begin()));
+  }
+  return Meeting::Failed;
+}
+
+/// Finds the part of the surface that is nearest to a point of the moved surface, and nearer than
+/// the shift. Looks at the surface points of eight grid points around `at`, at least half a voxel
+/// away along each axis: beside the border of two parts, a surface point may be of either part.
+/// @param parts  a point on each part that is known already
+MovedSurface::NearerPart MovedSurface::nearerPart(const NearestPoints::Block& block,
+                                                  const Vec3d& at,
+                                                  const std::vector<Vec3d>& parts) {
+  const double distance = std::abs(shift_);
+  const Coord low = Coord::floor(at - Vec3d(0.5));
+  std::uint32_t last = NearestPoints::kNone;
+  NearerPart nearest;
+  double least = distance - kNearer;
+  for (int corner = 0; corner < 8; ++corner) {
+    const std::uint32_t point =
+        NearestPoints::nearestAt(block, low.offsetBy(corner >> 1 & 2, corner & 2, corner << 1 & 2));
+    if (point == NearestPoints::kNone) return {Nearer::Unknown};
+    if (point == last) continue;
+    last = point;
+    const Vec3d start = points_.positions[point];
+    const auto isKnown = [&](const Vec3d& p) {
+      return std::any_of(parts.begin(), parts.end(), [&](const Vec3d& part) {
+        return (p - part).lengthSqr() < kSamePart * kSamePart;
+      });
+    };
+    if (isKnown(start)) continue;
+    const bool mayBeNearer = (start - at).lengthSqr() < distance * distance + kBetweenPoints;
+    if (points_.sharp[point]) {
+      // The surface may be nearer where the patches end.
+      if (mayBeNearer || patches_.nearest(at, least).found) return {Nearer::Unknown};
+      continue;
+    }
+    const Foot near = closestPointByOneStep(points_.jets[point].jet(), at, start, kStepOfJet);
+    if (near.converged && (near.distance > distance + kStepError || isKnown(near.point))) continue;
+    if (!near.converged && !mayBeNearer) continue;
+    Vec3d foot = near.converged ? near.point : start;
+    if (!follow(foot, at)) {
+      if (!mayBeNearer) continue;
+      return {Nearer::Unknown};
+    }
+    const double found = (at - foot).length();
+    if (found >= least || isKnown(foot)) continue;
+    least = found;
+    nearest = {Nearer::Part, foot, found};
+  }
+  return nearest;
+}
+
+/// Finds the point nearest to x among those that are as far from all parts as the surface moves.
+/// The normals of the moved parts there span the vector from x to that point.
+/// @param feet     a point on each part; becomes the closest point to `meeting`
+/// @param meeting  start of the search
+/// @param multipliers  factors of the normals; one below 0 shows that the nearest point of the
+/// moved
+///                     surface is nearer to the other parts only
+MovedSurface::Meeting MovedSurface::meet(const Vec3d& x, std::vector<Vec3d>& feet, Vec3d& meeting,
+                                         std::array<double, kParts>& multipliers) {
+  const auto count = static_cast<Eigen::Index>(feet.size());
+  Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3> normals(3, count);
+  Vec3d lastStep(0), lastTarget(0);
+  for (int i = 0; i < kMoves; ++i) {
+    Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1> right(count);
+    for (Eigen::Index k = 0; k < count; ++k) {
+      Vec3d& foot = feet[static_cast<std::size_t>(k)];
+      if (!follow(foot, meeting)) return Meeting::Failed;
+      Vec3d n = meeting - foot;
+      const double length = n.length();
+      if (!(length > 0)) return Meeting::Failed;
+      n /= length;
+      normals.col(k) = Eigen::Vector3d(n.x(), n.y(), n.z());
+      right[k] = std::abs(shift_) - length + n.dot(meeting - x);
+    }
+    const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3> gram =
+        normals.transpose() * normals;
+    // Opposite normals are those of a gap that has closed.
+    if (!(gram.determinant() > kLeastSine * kLeastSine))
+      return gram.minCoeff() > 0 ? Meeting::Smooth : Meeting::Failed;
+    const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1> along = gram.inverse() * right;
+    const Eigen::Vector3d offset = normals * along;
+    const Vec3d target = x + Vec3d(offset.x(), offset.y(), offset.z());
+    Vec3d step = target - meeting;
+    const double length = step.length();
+    if (!std::isfinite(length)) return Meeting::Failed;
+    if (length < kLastMove) {
+      meeting = target;
+      for (Eigen::Index k = 0; k < count; ++k) multipliers[static_cast<std::size_t>(k)] = along[k];
+      return Meeting::Found;
+    }
+    if (length > kLongestMove) step *= kLongestMove / length;
+    // Anderson acceleration [Walker11]: the normals turn as the point moves along the crease, so
+    // that the plain iteration converges slowly far from the crease.
+    Vec3d next = meeting + step;
+    if (i > 0 && length <= kLongestMove) {
+      const Vec3d change = step - lastStep;
+      const double squared = change.lengthSqr();
+      const double mix = squared > 0 ? step.dot(change) / squared : 0;
+      if (std::abs(mix) < 2) next -= (next - lastTarget) * mix;
+    }
+    lastStep = step;
+    lastTarget = meeting + step;
+    meeting = next;
+  }
+  return Meeting::Failed;
+}
+
+/// Moves a foot point to the closest point of the same part for `from`. Returns false where sharp
+/// patches replace the interpolant.
+bool MovedSurface::follow(Vec3d& foot, const Vec3d& from) {
+  for (int i = 0; i < kFollows; ++i) {
+    const DenseBlock& block = cache_.around(foot);
+    const Vec3d origin = block.origin().asVec3d();
+    const Foot found = closestPoint(block, from - origin, foot - origin);
+    if (!found.converged && !found.left) return false;
+    foot = found.point + origin;
+    if (!found.converged) continue;
+    return !patches_.covers(Coord::floor(foot));
+  }
+  return false;
+}
+
+}  // namespace levelset::eikonal

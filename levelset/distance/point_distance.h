@@ -1,0 +1,55 @@
+#pragma once
+
+// Internal header of levelset: public headers must not include it.
+
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "levelset/distance/distance_transform.h"
+#include "levelset/distance/polisher.h"
+
+namespace levelset::eikonal {
+
+/// Distance of a grid point, voxels, and its closest point if it is near the band.
+struct PointDistance {
+  double value = 0;
+  std::optional<Closest> closest = {};
+};
+
+/// Computes the distance of a grid point from the surface, minus the requested shift.
+/// @param n  number of the grid point in the block
+[[nodiscard]] PointDistance distanceAt(const NearestPoints::Block& block, openvdb::Index n,
+                                       Polisher& polisher, const DistanceRequest& request);
+
+/// Returns the old value if the computed one equals it within the error of interpolation, voxels.
+/// So repeated redistancing does not shift a distance field.
+[[nodiscard]] double keptOr(double value, double old, const Polisher& polisher,
+                            std::uint32_t surfacePoint);
+
+/// Sets a grid point to a distance, or to the background beyond the half width.
+/// @param value, halfWidth  voxels
+/// @param background  world units
+void setDistance(openvdb::FloatTree::LeafNodeType& leaf, openvdb::Index n, double value,
+                 double halfWidth, double voxelSize, float background);
+
+/// Calls work(index, polisher) for the indices below `count`, in parallel.
+template <typename Work>
+void forEachWithPolisher(std::size_t count, const ZeroSet& surface, const Progress& progress,
+                         const Work& work) {
+  tbb::enumerable_thread_specific<Polisher> polishers([&] { return Polisher(surface); });
+  constexpr std::size_t kBatch = 4096;
+  for (std::size_t begin = 0; begin < count; begin += kBatch) {
+    const std::size_t end = std::min(begin + kBatch, count);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 16), [&](const auto& range) {
+      Polisher& polisher = polishers.local();
+      for (std::size_t i = range.begin(); i != range.end(); ++i) work(i, polisher);
+    });
+    report(progress, static_cast<double>(end) / static_cast<double>(count));
+  }
+}
+
+}  // namespace levelset::eikonal
