@@ -41,9 +41,9 @@ TEST_F(Instances, HaveThePictureOfTheMergedSolid) {
          found.compared, found.unlike, found.median / voxel, found.p999 / voxel,
          found.largest / voxel, found.worstX, found.worstY, found.p99OfAll / voxel);
   EXPECT_GT(found.compared, 15000u);
-  EXPECT_LT(static_cast<double>(found.unlike), 100);
-  EXPECT_LT(found.p999 / voxel, support::measured(0.3));
-  EXPECT_LT(found.largest / voxel, support::measured(0.6, 1));
+  EXPECT_LE(found.unlike, 27u);  // measured: 9
+  EXPECT_LT(found.p999 / voxel, support::measured(0.33));
+  EXPECT_LT(found.largest / voxel, support::measured(0.77, 1));
   const json scene = json::parse(mapped.out);
   EXPECT_EQ(scene["solids"].size(), 1u);
   ASSERT_EQ(scene["mapped"].size(), 1u);
@@ -54,16 +54,17 @@ TEST_F(Instances, HaveThePictureOfTheMergedSolid) {
 
 TEST_F(Instances, OfClippedTilesHaveThePictureOfTheMergedSolid) {
   const std::string grip =
-      "cylinder --radius 5 --height 10 --voxel 0.1 --as grip ! patch-grid @grip --count 8,3 "
-      "--around '0,0,-3 0,0,3' --height 0.8 --as p ! knurl --pitch 1 --columns 2 --rows 2 "
-      "--overlap "
-      "0.4 --voxel 0.04 --as k ! texture @grip @k @p --map shell --texture-box '-1,-1,0 1,1,0.6' ";
-  const auto merged = levelsmith(grip + "--voxel 0.05 ! render merged.exr" + kView);
+      "cylinder --radius 5 --height 8 --voxel 0.16 --as grip ! patch-grid @grip --count 6,2 "
+      "--around '0,0,-2 0,0,2' --height 0.8 --layers 3 --as p ! knurl --pitch 1 --columns 2 --rows "
+      "2 "
+      "--overlap 0.4 --voxel 0.06 --as k ! texture @grip @k @p --map shell --texture-box "
+      "'-1.1547,-2,-0.5 1.1547,2,0.5' ";
+  const std::string view = " --size 320x240 --from 18,11,14 --to 0,0,0 --samples 1 ";
+  const auto merged = levelsmith(grip + "--voxel 0.08 ! render merged.exr" + view);
   ASSERT_EQ(merged.code, 0) << merged.err;
-  const auto mapped =
-      levelsmith(grip + "--instances ! render mapped.exr" + kView + "! info --json");
+  const auto mapped = levelsmith(grip + "--instances ! render mapped.exr" + view + "! info --json");
   ASSERT_EQ(mapped.code, 0) << mapped.err;
-  const double voxel = 0.05;
+  const double voxel = 0.08;
   const support::DepthAgreement found = compare("merged.exr", "mapped.exr", voxel);
   printf("grip: %zu hits, %zu compared, %zu unlike: %g %g %g (%zu %zu) %g\n", found.hits,
          found.compared, found.unlike, found.median / voxel, found.p999 / voxel,
