@@ -63,7 +63,9 @@ PlacedTexture placeTexture(const NarrowBand& base, const NarrowBand& texture,
                  [&](std::size_t n) { placed.push_back(n); });
   const double voxelSize = texture.voxelSize();
   result.report.voxelSize = voxelSize * result.report.distortion.stretch.median;
-  const TextureParts parts(texture, box, patches, result.report.voxelSize,
+  // Voxels of the texture on the patches, along the direction of the largest stretch: clipped parts
+  // then overlap by at least as many voxels of the texture.
+  const TextureParts parts(texture, box, patches, voxelSize * result.report.distortion.stretch.most,
                            isBeyond(own, box, voxelSize),
                            [](const NarrowBand& part) { return part; });
   std::map<SharedSides, std::size_t> groups;
