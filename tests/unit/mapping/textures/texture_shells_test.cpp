@@ -65,7 +65,7 @@ TEST(TextureShells, HaveTheNodesOfThePrismMap) {
   for (const ParticleLayer& layer : patch.layers)
     largest = std::max(largest, layer.positions.size());
   EXPECT_GE(inside, largest * patch.layers.size());
-  EXPECT_LT(worst, 2e-6);  // half a spacing of floats at the size of the patch, on three axes
+  EXPECT_LT(worst, support::rounding(2));  // half a spacing of floats on each axis
   // The outer cells reach a voxel of the texture beyond it.
   for (int a = 0; a < 3; ++a) {
     const auto& along = shell.coordinates[static_cast<std::size_t>(a)];
