@@ -61,7 +61,10 @@ TEST_F(Instances, OfClippedTilesHaveThePictureOfTheMergedSolid) {
   ASSERT_EQ(merged.code, 0) << merged.err;
   const auto mapped = levelsmith(ribs + "--instances ! render mapped.exr" + view + "! info --json");
   ASSERT_EQ(mapped.code, 0) << mapped.err;
-  EXPECT_EQ(json::parse(mapped.out)["mapped"][0]["shells"], 12);
+  // The two rows of tiles have different shared sides, so there are two clipped copies.
+  const json scene = json::parse(mapped.out);
+  ASSERT_EQ(scene["mapped"].size(), 2u);
+  EXPECT_EQ(scene["mapped"][0]["shells"], 6);
   const double voxel = 0.1;
   const support::DepthAgreement found = compare("merged.exr", "mapped.exr", voxel);
   EXPECT_GT(found.compared, 5000u);
