@@ -29,10 +29,12 @@ struct Hit {
   /// Bound on the distance of the drawn surface from the smooth surface that the grid samples. On
   /// meshes: bound on the rounding error of the hit.
   double surfaceError = 0;
-  Imath::C3f colour{0};   ///< surface colour, linear
-  double opacity = 1;     ///< surface opacity, (0, 1]
-  std::uint32_t id = 0;   ///< Solid::id or MeshPart::id
-  std::size_t solid = 0;  ///< index in Scene::solids, or in Scene::meshes if isOnMesh
+  Imath::C3f colour{0};  ///< surface colour, linear
+  double opacity = 1;    ///< surface opacity, (0, 1]
+  std::uint32_t id = 0;  ///< Solid::id, MeshPart::id or MappedTexture::id
+  /// Index in Scene::solids, or in Scene::meshes if isOnMesh. On a mapped texture: number of solids
+  /// plus the index in Scene::mapped.
+  std::size_t solid = 0;
   bool isOnMesh = false;
   bool isOnGround = false;  ///< the hit is on Scene::ground, which shows only shadows
   bool isFlipped = false;   ///< the drawn shape is on the outside of the hit solid, as for a

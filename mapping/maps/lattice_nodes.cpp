@@ -11,6 +11,9 @@ namespace {
 using Imath::V3d;
 using Node = LatticeNodes::Node;
 
+/// Least width of an outer cell along u and v, in inner cells.
+constexpr double kThinnest = 1e-3;
+
 /// Evenly spaced coordinates from 0 to 1.
 std::vector<double> evenly(std::size_t count) {
   std::vector<double> result(count, 1);
@@ -81,7 +84,8 @@ class LatticeBuilder {
         endSpacings(withCounts(patch_.layers.front(), columns_, rows_));
     for (std::size_t axis = 0; axis < 2; ++axis) {
       std::vector<double>& at = nodes_.coordinates[axis];
-      wide_[axis] = std::max({1.0, border_.rim / spacing[axis], beyond_[axis] / at[1]});
+      wide_[axis] = std::max(
+          {border_.isTight ? kThinnest : 1.0, border_.rim / spacing[axis], beyond_[axis] / at[1]});
       const double step = wide_[axis] * at[1];
       at.insert(at.begin(), -step);
       at.push_back(1 + step);
@@ -93,7 +97,8 @@ class LatticeBuilder {
   void setCoordinatesAcrossLayers() {
     std::vector<double>& w = nodes_.coordinates[2];
     // As along u and v, cells that only reach for something are at least as wide as a layer.
-    const double thickness = 1 / static_cast<double>(patch_.layers.size() - 1);
+    const double thickness =
+        border_.isTight ? 0 : 1 / static_cast<double>(patch_.layers.size() - 1);
     const double rim = std::max(border_.rim / patch_.height,
                                 beyond_[2] > 0 ? std::max(beyond_[2], thickness) : 0.0),
                  lift = std::max(0.0, -border_.embedDepth),

@@ -21,6 +21,9 @@ struct LatticeBorder {
   /// Texture coordinates that the outer cells reach on all sides, if they are further out than the
   /// margin; empty: none.
   Imath::Box3d reach = {};
+  /// True: the outer cells are no wider than `rim` and `reach` need. False: they are at least as
+  /// wide as the inner ones.
+  bool isTight = false;
 };
 
 /// Nodes of a lattice: a grid with the same counts on every layer.
@@ -48,8 +51,7 @@ struct LatticeNodes {
 
 /// Builds the nodes from the particles of a patch. Layers with fewer particles than the largest
 /// layer are refined on a smooth surface through their particles.
-/// @param border  extent of the lattice beyond the layers and sides, continued linearly; if
-///         border.rim > 0, the outer cells along u and v are at least as wide as the inner ones
+/// @param border  extent of the lattice beyond the layers and sides, continued linearly
 [[nodiscard]] LatticeNodes latticeNodes(const Patch& patch, const LatticeBorder& border);
 
 }  // namespace mapping

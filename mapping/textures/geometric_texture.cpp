@@ -5,19 +5,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <span>
 
 #include "levelset/components/components.h"
 #include "levelset/csg/blend.h"
-#include "levelset/csg/clip.h"
 #include "levelset/csg/csg.h"
 #include "levelset/distance/redistance.h"
 #include "levelset/error.h"
 #include "levelset/grids/sample.h"
 #include "levelset/transform/resample.h"
-#include "mapping/textures/shared_sides.h"
 #include "mapping/textures/texture_maps.h"
+#include "mapping/textures/texture_parts.h"
 #include "mapping/textures/texture_warp.h"
 
 namespace mapping {
@@ -27,7 +25,6 @@ using Imath::Box3d;
 using Imath::V3d;
 using levelset::InvalidInput;
 using levelset::NarrowBand;
-using levelset::UsageError;
 
 // Relative error of the sampled stretch. If stretched texture voxels are smaller than the base's by
 // less than this share, the base's voxel size is kept.
@@ -37,55 +34,6 @@ constexpr double kStretchError = 0.01;
 constexpr double kCoarser = 6;
 // A map whose least stretch is below this share of the median stretch counts as compressing.
 constexpr double kSqueezed = 0.2;
-void checkArguments(const NarrowBand& base, const NarrowBand& texture,
-                    std::span<const Patch> patches, const TextureOptions& options) {
-  const auto requirePositive = [](double value, const char* name) {
-    if (!(value > 0) || !std::isfinite(value)) {
-      throw UsageError(fmt::format("the {} is {}; give a positive number", name, value));
-    }
-  };
-  if (options.voxelSize) requirePositive(*options.voxelSize, "voxel size");
-  if (!(options.halfWidth >= 1) || !std::isfinite(options.halfWidth)) {
-    throw UsageError(fmt::format("the half width is {}; give at least 1 voxel", options.halfWidth));
-  }
-  if (!(options.mapTolerance >= 0) || !std::isfinite(options.mapTolerance)) {
-    throw UsageError(fmt::format("the map's tolerance is {} texture voxels; give at least 0",
-                                 options.mapTolerance));
-  }
-  if (options.embedDepth && !std::isfinite(*options.embedDepth)) {
-    throw UsageError(
-        fmt::format("the embedding depth is {}; give a length with --embed", *options.embedDepth));
-  }
-  const double diagonal = base.zeroSetBounds().size().length();
-  if (options.embedDepth && std::abs(*options.embedDepth) > diagonal) {
-    throw InvalidInput(
-        fmt::format("the embedding depth of {:.6g} exceeds the diagonal of the base, {:.6g}; "
-                    "give a smaller --embed",
-                    *options.embedDepth, diagonal));
-  }
-  if (!(options.blend >= 0) || !std::isfinite(options.blend)) {
-    throw UsageError(
-        fmt::format("the blend radius is {}; give a length of at least 0", options.blend));
-  }
-  if (options.merge != TextureMerge::Alone && base.isOpenSurface()) {
-    throw levelset::InvalidInput(
-        "the base is an open surface, which has no inside; give --alone for the "
-        "texture alone, or map a mesh with --map mesh");
-  }
-  requireSolid(texture);
-  if (base.isEmpty() || texture.isEmpty()) {
-    throw InvalidInput(fmt::format("the {} has no surface; give a solid with at least one voxel",
-                                   base.isEmpty() ? "base" : "texture"));
-  }
-  if (patches.empty()) throw UsageError("there is no patch; build one with `patch`");
-  for (const Patch& patch : patches) {
-    if (patch.layers.size() < 2 || !(patch.height > 0)) {
-      throw InvalidInput("the patch has no layers of particles; build it with `patch`");
-    }
-    requirePatchOn(base, patch);
-  }
-}
-
 double chooseVoxelSize(const NarrowBand& base, const NarrowBand& texture, double minStretch,
                        const TextureOptions& options) {
   if (options.voxelSize) return *options.voxelSize;
@@ -124,49 +72,6 @@ NarrowBand fitTexture(const NarrowBand& texture, double voxelSize, double least,
   return levelset::redistance(fitted,
                               {.halfWidth = std::ceil(needed), .maxMemory = options.maxMemory});
 }
-
-/// Parts of the texture that are mapped onto each patch. A prism map ends a little outside the unit
-/// cube. So for a prism map, a texture that extends beyond the texture box is clipped at the box,
-/// not at the end of the map. At sides that two patches share it is clipped two result voxels
-/// further out, so that neighbouring tiles overlap. If they met face to face, the grid would show a
-/// gap. A texture that only touches the box is not clipped.
-class TextureParts {
- public:
-  template <typename Fit>
-  TextureParts(const NarrowBand& texture, const Box3d& box, std::span<const Patch> patches,
-               double voxelSize, bool isCut, const Fit& fit) {
-    if (!isCut) {
-      parts_.emplace(SharedSides{}, fit(texture));
-      ofPatch_.resize(patches.size(), SharedSides{});
-      return;
-    }
-    ofPatch_ = sharedSides(patches);
-    // Voxels of the result by which clipped parts overlap their neighbours.
-    constexpr double kBeyond = 2;
-    double u = HUGE_VAL, v = HUGE_VAL;
-    for (const Patch& patch : patches) {
-      const ParticleLayer& layer = patch.layers.front();
-      u = std::min(u, patch.spacing * static_cast<double>(layer.columns - 1));
-      v = std::min(v, patch.spacing * static_cast<double>(layer.rows - 1));
-    }
-    const double alongU = kBeyond * voxelSize / u * box.size().x,
-                 alongV = kBeyond * voxelSize / v * box.size().y;
-    for (const SharedSides& sides : ofPatch_) {
-      if (parts_.contains(sides)) continue;
-      Box3d wider = box;
-      if (sides[0]) wider.min.x -= alongU;
-      if (sides[1]) wider.max.x += alongU;
-      if (sides[2]) wider.min.y -= alongV;
-      if (sides[3]) wider.max.y += alongV;
-      parts_.emplace(sides, fit(levelset::clip(texture, wider)));
-    }
-  }
-  [[nodiscard]] const NarrowBand& of(std::size_t patch) const { return parts_.at(ofPatch_[patch]); }
-
- private:
-  std::map<SharedSides, NarrowBand> parts_;
-  std::vector<SharedSides> ofPatch_;
-};
 
 /// Checks the memory estimate of the result, from the voxel count of the texture, before anything
 /// is allocated.
@@ -370,7 +275,7 @@ TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture, cons
 
 TextureResult mapTexture(const NarrowBand& base, const NarrowBand& texture,
                          std::span<const Patch> patches, const TextureOptions& options) {
-  checkArguments(base, texture, patches, options);
+  requireTextureArguments(base, texture, patches, options);
   TextureResult result;
   TextureReport& report = result.report;
   const Box3d box = chooseTextureBox(texture.zeroSetBounds(), options.textureBox);

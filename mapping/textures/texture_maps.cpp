@@ -164,7 +164,8 @@ void reportMaps(const MapFigures& figures, std::size_t patches, TextureReport& r
 
 std::vector<ChosenMap> makeMaps(const NarrowBand& base, const NarrowBand& texture,
                                 std::span<const Patch> patches, const TextureExtent& extent,
-                                const TextureOptions& options, TextureReport& report) {
+                                const TextureOptions& options, TextureReport& report,
+                                const std::function<void(std::size_t)>& use) {
   const V3d textureSize = extent.box.size();
   const double tolerance = solveTolerance(texture, textureSize, options.mapTolerance);
   std::vector<ChosenMap> maps;
@@ -182,6 +183,10 @@ std::vector<ChosenMap> makeMaps(const NarrowBand& base, const NarrowBand& textur
       continue;
     }
     addMap(chosen, textureSize, options, figures, report);
+    if (use) {
+      use(maps.size());
+      chosen.map.reset();
+    }
     maps.push_back(std::move(chosen));
   }
   reportMaps(figures, patches.size(), report);

@@ -3,6 +3,7 @@
 // Private to geometric textures: the maps of the patches and their measurements.
 
 #include <ctime>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -56,6 +57,8 @@ struct TextureExtent {
 
 /// Builds and certifies the maps of all patches; a skipped patch gets no map. Other folds are
 /// errors, or notes if folds are allowed. Adds the measurements to the report.
+/// @param use  if given, called with the number of each patch that is not skipped, as soon as its
+///         map is certified; the map is then freed
 /// @throws InvalidInput for folds that are not allowed, and if all patches were skipped
 /// @throws NumericalError if the iterative solver of an RBF map stagnates
 /// @throws ResourceLimit if the memory estimate exceeds the limit
@@ -63,6 +66,7 @@ struct TextureExtent {
                                               const levelset::NarrowBand& texture,
                                               std::span<const Patch> patches,
                                               const TextureExtent& extent,
-                                              const TextureOptions& options, TextureReport& report);
+                                              const TextureOptions& options, TextureReport& report,
+                                              const std::function<void(std::size_t)>& use = {});
 
 }  // namespace mapping

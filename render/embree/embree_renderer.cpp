@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <mutex>
 
+#include "levelset/error.h"
 #include "render/shading/shading.h"
 #include "render/views/picture.h"
 
@@ -90,6 +91,9 @@ struct PixelPainter {
 
 Image renderEmbree(const Scene& scene, const RenderOptions& options) {
   requirePicture(scene, options);
+  if (!scene.mapped.empty())
+    throw levelset::UsageError(
+        "the Embree renderer does not draw mapped textures; give --renderer cpu or gpu");
   levelset::report(options.progress, 0);
   const EmbreeScene rays(scene, options.filter);
   if (rays.bounds().isEmpty()) refuseEmptyScene();

@@ -20,7 +20,8 @@ namespace render {
 /// the pixel's centre: Z (distance along the view axis, +inf for a miss), N.X N.Y N.Z, P.X P.Y P.Z,
 /// curvature.* and id (0: none). Lengths are world units. Header attributes record scene and
 /// options.
-/// @throws levelset::UsageError for an invalid camera, or sample counts out of range
+/// @throws levelset::UsageError for an invalid camera, sample counts out of range, or a scene with
+///         mapped textures
 /// @throws levelset::InvalidInput when there is no surface in the scene
 /// @throws levelset::ResourceLimit for an image that is too large
 /// @throws levelset::Cancelled when progress asks to stop

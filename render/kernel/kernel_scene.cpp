@@ -133,11 +133,13 @@ struct PackedRays {
 
 }  // namespace
 
-KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter) : meshes_(scene) {
+KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter)
+    : meshes_(scene), mapped_(scene) {
   makeTables(scene, {.filter = filter, .maxBytes = maxBytes}, false);
 }
 
-KernelScene::KernelScene(const Scene& scene, const RenderOptions& options) : meshes_(scene) {
+KernelScene::KernelScene(const Scene& scene, const RenderOptions& options)
+    : meshes_(scene), mapped_(scene) {
   makeTables(scene, options, true);
 }
 
@@ -151,6 +153,7 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
   // surface crosses is not known yet.
   double leaves = 0;
   Imath::Box3d box = meshes_.bounds();
+  box.extendBy(mapped_.bounds());
   for (const Solid& solid : scene.solids) {
     if (solid.band.isEmpty()) continue;
     leaves += static_cast<double>(levelset::vdb(solid.band).tree().leafCount());
@@ -160,8 +163,10 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
   const double kCopies = options.filter == Filter::BSplineQi ? 4 * 512 : 0;
   const double kBytesOfBlock = 2 * 4 * (BrickPool::kValues + BrickPool::kMaskWords) + kCopies;
   levelset::requireMemory(leaves * kBytesOfBlock, options.maxBytes);
-  const FrustumCulling culling =
-      isPicture && !box.isEmpty() ? FrustumCulling(scene, options, box) : FrustumCulling();
+  // Culling knows how far light rays start from solids and meshes, but not from mapped textures.
+  const FrustumCulling culling = isPicture && !box.isEmpty() && mapped_.isEmpty()
+                                     ? FrustumCulling(scene, options, box)
+                                     : FrustumCulling();
   for (std::size_t i = 0; i < scene.solids.size(); ++i) {
     const Solid& source = scene.solids[i];
     if (source.band.isEmpty() || (!scene.csg.isEmpty() && !scene.csg.uses(i))) continue;
@@ -210,7 +215,9 @@ void KernelScene::updateView(const Scene& scene) {
   }
   near_ = scene.camera.near;
   far_ = scene.camera.farthest();
-  bounds_ = tableBounds_ = meshes_.bounds();
+  bounds_ = meshes_.bounds();
+  bounds_.extendBy(mapped_.bounds());
+  tableBounds_ = bounds_;
   for (const Extent& extent : extents_) {
     const M44d toWorld = scene.solids[extent.index].band.indexToWorld();
     bounds_.extendBy(Imath::transform(extent.cells, toWorld));
@@ -229,7 +236,7 @@ void KernelScene::updateView(const Scene& scene) {
 std::size_t KernelScene::bytes() const {
   std::size_t sum = fields_ ? fields_->bytes() : 0;
   for (const KernelSolid& solid : solids_) sum += solid.pool.bytes();
-  return sum;
+  return sum + mapped_.bytes();
 }
 
 PixelHits KernelScene::castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const {
@@ -387,6 +394,10 @@ std::vector<double> KernelScene::transmittances(const KernelTracer& tracer,
   for (std::size_t i = 0; i < rays.size() && !meshes_.isEmpty(); ++i)
     if (light[i] >= kLeastTransmittance)
       light[i] *= meshes_.transmittance(rays[i].origin, rays[i].direction, rays[i].maxDistance);
+  for (std::size_t i = 0; i < rays.size() && !mapped_.isEmpty(); ++i)
+    if (light[i] >= kLeastTransmittance &&
+        mapped_.isOccluded(rays[i].origin, rays[i].direction, rays[i].maxDistance))
+      light[i] = 0;
   return light;
 }
 

@@ -14,6 +14,7 @@
 #include "render/kernel/field_traversal.h"
 #include "render/kernel/ray_block.h"
 #include "render/kernel/ray_fan.h"
+#include "render/mapped/mapped_rays.h"
 #include "render/meshes/mesh_rays.h"
 #include "render/scene/csg_expression.h"
 #include "render/scene/scene.h"
@@ -91,13 +92,15 @@ class KernelScene {
   void updateView(const Scene& scene);
 
   [[nodiscard]] const std::vector<KernelSolid>& solids() const { return solids_; }
-  /// World-space box of the meshes and of the grid cells that the solids' surfaces cross; empty
-  /// when there are none. For a blended scene: Scene::bounds().
+  /// World-space box of the meshes, the shells of mapped textures and the grid cells that the
+  /// solids' surfaces cross; empty when there are none. For a blended scene: Scene::bounds().
   [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }
-  /// World-space box of the meshes and of the blocks that the solids' surfaces cross. For a blended
-  /// scene: Scene::bounds(). Its size determines the absolute error of single-precision positions.
+  /// World-space box of the meshes, the shells of mapped textures and the blocks that the solids'
+  /// surfaces cross. For a blended scene: Scene::bounds(). Its size determines the absolute error
+  /// of single-precision positions.
   [[nodiscard]] const Imath::Box3d& tableBounds() const { return tableBounds_; }
   [[nodiscard]] const MeshRays& meshes() const { return meshes_; }
+  [[nodiscard]] const MappedRays& mapped() const { return mapped_; }
   /// Traversal of the fields of a blended scene; null for any other scene. For a blended scene
   /// solids() is empty, and castPixels() and thickness() find nothing.
   [[nodiscard]] const FieldTraversal* fields() const { return fields_ ? &*fields_ : nullptr; }
@@ -112,8 +115,8 @@ class KernelScene {
   };
   [[nodiscard]] const Counts& counts() const { return counts_; }
 
-  /// First hits of the rays through pixels with the solids. Meshes are not included: the caller
-  /// intersects meshes().
+  /// First hits of the rays through pixels with the solids. Meshes and mapped textures are not
+  /// included: the caller intersects meshes() and mapped().
   [[nodiscard]] PixelHits castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const;
   [[nodiscard]] PixelTraversal startTraversal(const PixelBlock& pixels) const;
   /// Next hits of the rays that CsgTraversal::resume() has released, or first hits in the first
@@ -154,6 +157,7 @@ class KernelScene {
   std::vector<KernelSolid> solids_;  // sorted by voxel size and id
   CsgExpression csg_;                // uses indices of solids_
   MeshRays meshes_;
+  MappedRays mapped_;
   std::optional<FieldTraversal> fields_;
   Imath::Box3d bounds_, tableBounds_;
   double near_ = 0, far_ = Camera::kNoDepth;  // visible depth range of the camera, world units

@@ -143,10 +143,19 @@ Hit KernelPainter::hitOf(const Camera::Ray& ray, double meshNear, const PixelHit
     onSolid = onFields[i];
   else if (hits.solid[i] >= 0)
     onSolid = hitOnSolid(ray, hits, i);
-  if (surfaces_.meshes().isEmpty()) return onSolid;
-  const double far = onSolid.found ? onSolid.distance : ray.far;
-  const Hit onMesh = surfaces_.meshes().intersect(ray.origin, ray.direction, meshNear, far);
-  return onMesh.found ? onMesh : onSolid;
+  Hit nearest = onSolid;
+  const auto farthest = [&] { return nearest.found ? nearest.distance : ray.far; };
+  if (!surfaces_.meshes().isEmpty()) {
+    const Hit onMesh =
+        surfaces_.meshes().intersect(ray.origin, ray.direction, meshNear, farthest());
+    if (onMesh.found) nearest = onMesh;
+  }
+  if (!surfaces_.mapped().isEmpty()) {
+    const Hit onTexture =
+        surfaces_.mapped().intersect(ray.origin, ray.direction, ray.near, farthest());
+    if (onTexture.found) nearest = onTexture;
+  }
+  return nearest;
 }
 
 Hit KernelPainter::hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const {

@@ -4,6 +4,19 @@
 #include <limits>
 
 namespace render {
+namespace {
+
+/// Calls visit(position) for the nodes of all shells, world units.
+template <typename Visit>
+void forEachNode(const std::vector<MappedTexture>& mapped, const Visit& visit) {
+  for (const MappedTexture& texture : mapped) {
+    if (texture.band.isEmpty() || !texture.shells) continue;
+    for (const PrismShell& shell : *texture.shells)
+      for (const Imath::V3f& offset : shell.offsets) visit(shell.centre + Imath::V3d(offset));
+  }
+}
+
+}  // namespace
 
 bool Scene::isOpaque() const {
   const auto hidesAll = [](const auto& part) { return part.opacity == 1; };
@@ -23,6 +36,7 @@ Imath::Box3d Scene::bounds() const {
   constexpr double kMostGrowth = 0.25;
   if (!csg.isEmpty()) all = csg.bounds(boxes, kMostGrowth * softness);
   for (const MeshPart& part : meshes) all.extendBy(levelset::bounds(*part.mesh));
+  forEachNode(mapped, [&](const Imath::V3d& p) { all.extendBy(p); });
   return all;
 }
 
@@ -35,9 +49,10 @@ std::vector<double> Scene::extents(const std::vector<Imath::V3d>& directions) co
     if (csg.isEmpty() || csg.uses(i)) extend(ofSolids, solids[i].band.zeroSetExtents(directions));
   if (!csg.isEmpty() || isBlended()) {
     // The result may be smaller than its operands, or extend beyond them. Bound it by its box.
-    Scene withoutMeshes = *this;
-    withoutMeshes.meshes.clear();
-    const Imath::Box3d box = withoutMeshes.bounds();
+    Scene withoutOthers = *this;
+    withoutOthers.meshes.clear();
+    withoutOthers.mapped.clear();
+    const Imath::Box3d box = withoutOthers.bounds();
     for (std::size_t d = 0; d < directions.size(); ++d) {
       const double extent =
           box.isEmpty() ? -std::numeric_limits<double>::infinity() : extentOf(box, directions[d]);
@@ -48,6 +63,10 @@ std::vector<double> Scene::extents(const std::vector<Imath::V3d>& directions) co
     for (const Imath::V3d& p : part.mesh->positions)
       for (std::size_t d = 0; d < directions.size(); ++d)
         ofSolids[d] = std::max(ofSolids[d], p.dot(directions[d]));
+  forEachNode(mapped, [&](const Imath::V3d& p) {
+    for (std::size_t d = 0; d < directions.size(); ++d)
+      ofSolids[d] = std::max(ofSolids[d], p.dot(directions[d]));
+  });
   return ofSolids;
 }
 

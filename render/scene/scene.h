@@ -14,6 +14,7 @@
 #include "render/camera.h"
 #include "render/images/value_bits.h"
 #include "render/scene/csg_expression.h"
+#include "render/scene/mapped_texture.h"
 
 namespace render {
 
@@ -70,6 +71,8 @@ struct Scene {
                           ///< by ambient occlusion
   std::vector<Solid> solids;
   std::vector<MeshPart> meshes = {};
+  /// Textures drawn through maps, beside the solids. renderEmbree() does not draw them.
+  std::vector<MappedTexture> mapped = {};
   CsgExpression csg = {};  ///< expression over the solids; empty: each solid is drawn
   /// K of the smooth minimum in the expression, world units (FieldExpression); 0: sharp edges.
   double softness = 0;
@@ -85,7 +88,8 @@ struct Scene {
   [[nodiscard]] Imath::Box3d bounds() const;
   /// Extents of all drawn surfaces: for each direction d an upper bound on p·d over their points p,
   /// world units times the length of d. It is exact, to the interpolation of the grids, unless the
-  /// scene has an expression or a morph. −∞ when the scene has no surface.
+  /// scene has an expression, a morph or a mapped texture (whose shells count). −∞ when the scene
+  /// has no surface.
   [[nodiscard]] std::vector<double> extents(const std::vector<Imath::V3d>& directions) const;
 };
 

@@ -133,6 +133,14 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
     throw levelset::UsageError(
         "soft expressions and morphs cannot be drawn from NanoVDB grids; draw from "
         "bricks");
+  if (!scene.mapped.empty() && options.filter != Filter::Trilinear)
+    throw levelset::UsageError(
+        fmt::format("mapped textures support only the trilinear filter, not {}; omit the filter",
+                    filterName(options.filter)));
+  if (!scene.mapped.empty() && options.thickness)
+    throw levelset::UsageError(
+        "the thickness of solids with mapped textures cannot be measured; omit --thickness, or map "
+        "the texture without --instances");
   // Half width of a band that the spline filters need, voxels: 3, less a margin for rounding.
   constexpr double kReach = 2.99;
   for (const Solid& solid : scene.solids) {
@@ -180,6 +188,11 @@ std::map<std::string, std::string> sceneAttributes(const Scene& scene,
     meshes +=
         fmt::format("{}{} triangles", meshes.empty() ? "" : ", ", part.mesh->triangles.size());
   if (!meshes.empty()) attributes["ls:mesh"] = meshes;
+  std::string mapped;
+  for (const MappedTexture& texture : scene.mapped)
+    mapped += fmt::format("{}{:016x} in {} shells", mapped.empty() ? "" : ", ",
+                          texture.band.contentHash(), texture.shells ? texture.shells->size() : 0);
+  if (!mapped.empty()) attributes["ls:mapped"] = mapped;
   attributes["ls:style"] = styleName(options.style.style);
   if (!scene.csg.isEmpty()) attributes["ls:csg"] = scene.csg.text();
   if (scene.softness > 0) attributes["ls:soft"] = fmt::format("{}", scene.softness);

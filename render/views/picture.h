@@ -50,9 +50,9 @@ struct PictureLayers {
 
 /// Checks a scene and its options before a picture is drawn.
 /// @throws levelset::UsageError for an invalid camera, light, opacity, sample count or style
-///         option. Also for options that exclude each other: NanoVDB grids or a blended scene with
-///         a filter other than trilinear, NanoVDB grids with a blended scene, and bspline-qi with
-///         quantized values
+///         option. Also for options that exclude each other: NanoVDB grids, a blended scene or
+///         mapped textures with a filter other than trilinear, NanoVDB grids with a blended scene,
+///         bspline-qi with quantized values, and thickness with mapped textures
 /// @throws levelset::InvalidInput for bands that are narrower than the filter's stencil
 /// @throws levelset::ResourceLimit for an image above the memory limit of the options, or above
 ///         kMaxPixels

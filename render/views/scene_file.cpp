@@ -351,6 +351,10 @@ void requireSceneNames(const std::vector<std::string>& names) {
 void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
                 const levelset::Progress& progress) {
   const Scene& scene = viewed.scene;
+  if (!scene.mapped.empty())
+    throw levelset::UsageError(
+        "a scene file cannot hold mapped textures; draw the scene with `render`, or map the "
+        "texture without --instances");
   requireNames(scene);
   requireLight(scene);
   requireOpacity(scene);

@@ -29,7 +29,8 @@ struct ViewedScene {
 /// Existing files are replaced.
 /// @throws levelset::IoError when a file cannot be written
 /// @throws levelset::InvalidInput for invalid colours
-/// @throws levelset::UsageError for an invalid opacity
+/// @throws levelset::UsageError for an invalid opacity, and for mapped textures, which a file
+///         cannot hold
 void writeScene(const std::filesystem::path& file, const ViewedScene& scene,
                 const levelset::Progress& progress = {});
 

@@ -14,6 +14,7 @@ for size in 64 128; do "$build/tests/advect_bench" function=1 staggered=1 $size 
 "$build/tests/map_error_bench" 1e7 || status=1
 "$build/tests/vertex_offset_bench" "$here/../../data/models/bunny.obj" || status=1
 "$here/scales_on_dragon.sh" "$build/apps/levelsmith" "$here/../../data/models/dragon_vrip.ply.gz" || status=1
+"$here/mapped_scales.sh" "$build/apps/levelsmith" "$build/tests/depth_agreement" "$here/../../data/models/bunny.obj" || status=1
 "$here/mesh_to_band.sh" "$build/tests/mesh_to_band_bench" "$here/../../data/models/dragon_vrip.ply.gz" || status=1
 "$build/tests/render_cost_bench" || status=1
 "$here/scans.sh" "$build/apps/levelsmith" "$here/../../data/models" || status=1

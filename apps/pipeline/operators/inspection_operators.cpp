@@ -212,6 +212,12 @@ Json valueInfo(const Value& value) {
     for (const render::MeshPart& part : scene.meshes)
       json["meshes"].push_back(
           {{"name", part.name}, {"id", part.id}, {"triangles", part.mesh->triangles.size()}});
+    for (const render::MappedTexture& texture : scene.mapped)
+      json["mapped"].push_back({{"name", texture.name},
+                                {"id", texture.id},
+                                {"voxel_size", texture.band.voxelSize()},
+                                {"active_voxels", texture.band.activeVoxelCount()},
+                                {"shells", texture.shells->size()}});
     if (!scene.csg.isEmpty()) json["csg"] = scene.csg.text();
     if (scene.softness > 0) json["soft"] = scene.softness;
     if (scene.morph) json["morph"] = *scene.morph;

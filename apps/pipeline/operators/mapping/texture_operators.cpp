@@ -1,7 +1,10 @@
 #include <fmt/core.h>
 
+#include <iterator>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <span>
+#include <utility>
 
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/declarations.h"
@@ -12,6 +15,8 @@
 #include "mapping/patches/patch.h"
 #include "mapping/textures/geometric_texture.h"
 #include "mapping/textures/mesh_texture.h"
+#include "mapping/textures/texture_shells.h"
+#include "render/views/scene_file.h"
 
 namespace pipeline {
 namespace {
@@ -112,7 +117,59 @@ void tellMapError(Invocation& in, const mapping::TextureReport& report, double t
   }
 }
 
+render::PrismShell shellOf(mapping::TextureShell shell) {
+  return {.cells = shell.cells,
+          .coordinates = std::move(shell.coordinates),
+          .centre = shell.centre,
+          .offsets = std::move(shell.offsets)};
+}
+
+/// Returns a scene of the base and the texture in a shell for each patch. Base and textures count
+/// as one solid, with one id and colour, as if they were merged.
+Value textureInstances(Invocation& in) {
+  mapping::TextureOptions options = textureOptions(in);
+  options.progress = in.progress;
+  const ImprovedPatches improved = patchesFor(in, textureBoxOf(in));
+  mapping::PlacedTexture placed =
+      mapping::placeTexture(in.band(0), in.band(1), improved.patches, options);
+  render::ViewedScene viewed;
+  if (!in.flag("alone")) viewed.scene.solids.push_back({.band = in.band(0), .name = "base"});
+  std::size_t shellBytes = 0;
+  for (mapping::ShellGroup& group : placed.groups) {
+    std::vector<render::PrismShell> shells;
+    shells.reserve(group.shells.size());
+    for (mapping::TextureShell& shell : group.shells) {
+      shellBytes += sizeof(shell) + shell.offsets.size() * sizeof(shell.offsets[0]);
+      for (const std::vector<double>& along : shell.coordinates)
+        shellBytes += along.size() * sizeof(double);
+      shells.push_back(shellOf(std::move(shell)));
+    }
+    viewed.scene.mapped.push_back(
+        {.band = group.texture,
+         .shells = std::make_shared<const std::vector<render::PrismShell>>(std::move(shells)),
+         .name = fmt::format("texture{}", viewed.scene.mapped.size() + 1)});
+  }
+  const mapping::TextureReport& report = placed.report;
+  nlohmann::ordered_json json;
+  json["patches"] = report.patches;
+  json["skipped"] = report.skipped;
+  json["height"] = improved.patches.front().height;
+  json["particles"] = report.particles;
+  json["shell_bytes"] = shellBytes;
+  json["cpu_s"] = costJson(report.cost);
+  addDistortion(report.distortion, json);
+  json["certificate"] = certificateJson(report.certificate);
+  json.update(improved.figures);
+  in.notes.detailsJson = json.dump();
+  in.notes.notes.insert(in.notes.notes.end(), report.notes.begin(), report.notes.end());
+  in.notes.notes.push_back(fmt::format(
+      "the texture is kept once, in {} shells of {:.3g} MB; smallest Jacobian {:.3g}",
+      report.patches, static_cast<double>(shellBytes) / 1e6, report.distortion.jacobian.least));
+  return Value(std::move(viewed));
+}
+
 Value texture(Invocation& in) {
+  if (in.flag("instances")) return textureInstances(in);
   if (mapsMesh(in)) return textureMesh(in);
   mapping::TextureOptions options = textureOptions(in);
   options.progress = in.progress;
@@ -140,6 +197,44 @@ Value texture(Invocation& in) {
   return Value(std::move(result.band));
 }
 
+Kind resultOfTexture(const Invocation& in) {
+  if (in.flag("instances")) return Kind::Scene;
+  return mapsMesh(in) ? Kind::Mesh : Kind::Band;
+}
+
+Plan planTextureOrScene(Invocation& in) {
+  if (!in.flag("instances")) return planTexture(in);
+  Plan plan = in.operands[0].plan();
+  plan.kind = Kind::Scene;
+  plan.bounds.extendBy(in.operands[2].plan().bounds);
+  return plan;
+}
+
+void validateTexture(const Invocation& in) {
+  if (in.flag("instances")) {
+    if (in.text("map") != "shell" || in.operands[1].kind() == Kind::Mesh)
+      throw levelset::UsageError(
+          "texture: --instances needs a solid as texture and the piecewise linear map; give --map "
+          "shell");
+    for (const char* option : {"carve", "blend", "voxel", "half-width"})
+      if (in.given(option))
+        throw levelset::UsageError(
+            fmt::format("texture: --instances makes no merged grid, so --{} has no effect; leave "
+                        "one of them out",
+                        option));
+  }
+  validateTextureOptions(in);
+}
+
+std::vector<Param> paramsOfTexture() {
+  std::vector<Param> params = textureParams();
+  params.push_back({.name = "instances",
+                    .type = ParamType::Flag,
+                    .doc = "with --map shell: return a scene of the base and the texture, kept "
+                           "once and mapped when 'render' draws it, in place of a merged solid"});
+  return params;
+}
+
 }  // namespace
 
 Operator textureOperator() {
@@ -150,19 +245,20 @@ Operator textureOperator() {
       .details =
           "The operands are base, texture and patch. The box of the texture's zero set is the unit "
           "cube of u, v, w. A map that folds is an error, whose message gives the position of the "
-          "fold.",
+          "fold. With --instances the result is a scene for 'render'. It needs a small part of the "
+          "memory of a merged solid.",
       .example =
           "levelsmith box --size 40,40,10 --voxel 0.5 --as base ! torus --radius 4 --tube "
           "1.5 --voxel 0.25 --as rings "
           "! patch @base --corners \"-10,-10,5 10,-10,5 10,10,5 -10,10,5\" --height 8 "
           "--layers 6 --as p "
           "! texture @base @rings @p --map rbf --blend 1 ! write out.vdb ! mesh ! write out.ply",
-      .params = textureParams(),
+      .params = paramsOfTexture(),
       .operands = {{Kind::Band, Kind::Surface}, {Kind::Band, Kind::Mesh}, {Kind::Patch}},
-      .resultKind = [](const Invocation& in) { return mapsMesh(in) ? Kind::Mesh : Kind::Band; },
+      .resultKind = resultOfTexture,
       .run = texture,
-      .plan = planTexture,
-      .validate = validateTextureOptions,
+      .plan = planTextureOrScene,
+      .validate = validateTexture,
   };
 }
 

@@ -208,6 +208,11 @@ Value draw(Invocation& in) {
     scene.ground = render::groundOf(scene, scene.camera.up);
   const std::string renderer = in.text("renderer");
   const bool isBoth = renderer == "both";
+  if (!scene.mapped.empty() && (isBoth || renderer == "embree"))
+    throw UsageError(
+        fmt::format("render: --renderer {} does not draw mapped textures; give --renderer cpu or "
+                    "gpu, or map the texture without --instances",
+                    renderer));
   render::RenderOptions options{.samples = in.integerAs<int>("samples"),
                                 .lightSpacing = in.integerAs<int>("light-spacing"),
                                 .filter = filterOf(in),
