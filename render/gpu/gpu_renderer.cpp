@@ -20,8 +20,8 @@ Image renderGpu(const Scene& scene, const RenderOptions& options) {
   }
   const GlContext context;
   const GpuTracer tracer(context, surfaces, 0, options.fromNanoVdb ? &scene : nullptr);
-  // Edge of a tile, pixels. A tile has enough rays for an efficient dispatch.
-  constexpr int kGpuTile = 64;
+  // Edge of a tile, pixels. Each dispatch waits for the device, so a tile has many rays.
+  constexpr int kGpuTile = 256;
   return paintPicture(scene, surfaces, tracer, kGpuTile, "gpu " + context.description(), options);
 }
 

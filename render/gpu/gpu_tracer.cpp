@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
+#include <cstring>
 #include <map>
 #include <optional>
 #include <utility>
@@ -211,6 +212,7 @@ struct GpuTracer::Impl {
   std::map<Variant, GLuint> programs;
   std::optional<GpuFields> fields;
   double shaderSeconds = 0;
+  std::vector<int> fetched;  // hits of the last run, as in the buffer
 
   Impl(const GlContext& context_, std::size_t largestTable_)
       : context(context_),
@@ -373,17 +375,20 @@ struct GpuTracer::Impl {
     shaderSeconds +=
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-    const auto fetch = [&](auto& to, std::size_t part) {
-      gl.GetNamedBufferSubData(hits, static_cast<GLintptr>(part * count * sizeof(int)),
-                               static_cast<GLsizeiptr>(count * sizeof(int)), to.data());
+    // One transfer for all arrays: each call waits for the device.
+    fetched.resize(parts * count);
+    gl.GetNamedBufferSubData(hits, 0, static_cast<GLsizeiptr>(fetched.size() * sizeof(int)),
+                             fetched.data());
+    const auto copyTo = [&](auto& to, std::size_t part) {
+      std::memcpy(to.data(), fetched.data() + part * count, count * sizeof(int));
     };
-    fetch(found.found, 0);
-    fetch(found.t, 1);
-    fetch(found.x, 2);
-    fetch(found.y, 3);
-    fetch(found.z, 4);
+    copyTo(found.found, 0);
+    copyTo(found.t, 1);
+    copyTo(found.x, 2);
+    copyTo(found.y, 3);
+    copyTo(found.z, 4);
     for (std::size_t p = 0; shapes && p < ShapeBlock::kParts; ++p)
-      fetch(shapes->part[p], kHitParts + p);
+      copyTo(shapes->part[p], kHitParts + p);
     context.check("tracing the rays");
   }
 };
