@@ -13,7 +13,7 @@ trap 'rm -rf "$folder"' EXIT
 status=0
 
 "$tests" --gtest_brief=1 --gtest_filter='Gpu*' >"$folder/tests" 2>&1 || status=1
-grep -a '^\[\|Failure\|differ' "$folder/tests" | head -40
+grep -a '^\[  FAILED\|^\[  PASSED\|different bits' "$folder/tests" | sort -u | head -60 || true
 
 gzip -dc "$dragon" >"$folder/dragon.ply"
 "$levelsmith" -q sphere --radius 100 --center 0.3,0.2,0.1 --voxel 1 ! write "$folder/sphere100.vdb"
