@@ -66,7 +66,8 @@ FloatTree::Ptr makeTree(const FloatTree& field, const ZeroSet& surface,
   std::sort(blocks.begin(), blocks.end(),
             [](const Block* a, const Block* b) { return a->origin < b->origin; });
   std::vector<LeafOrTile> leaves(blocks.size());
-  forEachWithPolisher(blocks.size(), surface, subProgress(request.progress, 0.6, 1),
+  forEachWithPolisher(blocks.size(), surface,
+                      subProgress(request.progress, 0.6, request.ofMovedSurface ? 0.8 : 1),
                       [&](std::size_t i, Polisher& polisher) {
                         leaves[i] = makeLeaf(*blocks[i], field.probeConstLeaf(blocks[i]->origin),
                                              polisher, request, voxelSize, background);
@@ -121,7 +122,8 @@ FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& 
   FloatGrid::Ptr result =
       FloatGrid::create(makeTree(field.tree(), surface, nearest, request, field.voxelSize()[0]));
   result->setTransform(field.transform().copy());
-  if (request.ofMovedSurface) correctMeetingParts(*result, surface, nearest, request);
+  if (request.ofMovedSurface)
+    correctMeetingParts(*result, surface, nearest, request, subProgress(request.progress, 0.8, 1));
   result->setName(field.getName());
   result->setGridClass(openvdb::GRID_LEVEL_SET);
   report(request.progress, 1);

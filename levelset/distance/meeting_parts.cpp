@@ -33,6 +33,8 @@ constexpr int kNormals = 3;
 // decrease of a distance, voxels.
 constexpr int kRounds = 4;
 constexpr double kLeastGain = 1e-3;
+// Distances measured from the field are trusted to about this, voxels, beside creases.
+constexpr double kMeasured = 0.1;
 // Distance beyond the half width, voxels, from which a surface point may be the nearest, or an edge
 // may affect it.
 constexpr double kMargin = 1.5;
@@ -193,15 +195,17 @@ class CreaseDistances {
         searches_([&surface, &request] { return MovedSurface(surface, request.shift); }) {}
 
   /// Finds the distance of each grid point by itself.
-  void search() {
-    forEachWithPolisher(leaves_.size(), surface_, {}, [&](std::size_t i, Polisher& polisher) {
+  void search(const Progress& progress) {
+    forEachWithPolisher(leaves_.size(), surface_, progress, [&](std::size_t i, Polisher& polisher) {
       const Block& block = *nearest_.find(leaves_[i]->origin());
       for (auto it = leaves_[i]->cbeginValueOn(); it; ++it) {
         Point point;
         point.n = it.pos();
         const auto [value, closest] = distanceAt(block, point.n, polisher, request_);
         point.sign = value < 0 ? -1 : 1;
+        point.plain = std::abs(value);
         if (closest) point.found = searches_.local().distance(block, point.n, *closest);
+        point.hasFailed = !point.found;
         points_[i].push_back(std::move(point));
       }
     });
@@ -238,7 +242,8 @@ class CreaseDistances {
           }
           if (!start) continue;
           auto found = searches_.local().distanceFrom(block, point.n, *start);
-          if (!found || (point.found && found->distance > point.found->distance - kLeastGain))
+          if (!found || found->distance < point.plain - kLeastGain ||
+              (point.found && found->distance > point.found->distance - kLeastGain))
             continue;
           better[i][k] = std::move(found);
           hasChanged = true;
@@ -251,25 +256,44 @@ class CreaseDistances {
     }
   }
 
-  /// Writes the distances into the field. Returns the grid points for which none was found.
+  /// Writes the distances into the field. Returns the grid points whose own search has failed.
   [[nodiscard]] MaskTree write(FloatGrid& field) const {
-    MaskTree missing;
+    MaskTree failed;
     for (std::size_t i = 0; i < points_.size(); ++i) {
       LeafDistances values;
       for (const Point& point : points_[i])
-        if (point.found)
-          values.emplace_back(point.n, point.sign * point.found->distance);
+        if (point.hasFailed)
+          failed.setValueOn(gridPoint(i, point));
         else
-          missing.setValueOn(gridPoint(i, point));
+          values.emplace_back(point.n, point.sign * point.found->distance);
       setAll(field, leaves_[i]->origin(), values, request_.halfWidth);
     }
-    return missing;
+    return failed;
+  }
+
+  /// Where a search has failed, writes the distance to a neighbour's crease, unless the field has a
+  /// much smaller one.
+  void writeAdopted(FloatGrid& field) const {
+    const FloatGrid::ConstAccessor accessor(field.tree());
+    const double voxelSize = field.voxelSize()[0];
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      LeafDistances values;
+      for (const Point& point : points_[i]) {
+        if (!point.hasFailed || !point.found) continue;
+        const auto measured = static_cast<double>(accessor.getValue(gridPoint(i, point)));
+        if (point.found->distance < std::abs(measured) / voxelSize + kMeasured)
+          values.emplace_back(point.n, point.sign * point.found->distance);
+      }
+      setAll(field, leaves_[i]->origin(), values, request_.halfWidth);
+    }
   }
 
  private:
   struct Point {
     openvdb::Index n = 0;
     double sign = 1;
+    bool hasFailed = false;  ///< the search by itself found no distance
+    double plain = 0;        ///< lower bound of the distance, voxels: the distance minus the shift
     std::optional<MovedSurface::Result> found = {};
   };
   [[nodiscard]] Coord gridPoint(std::size_t leaf, const Point& point) const {
@@ -287,13 +311,17 @@ class CreaseDistances {
 }  // namespace
 
 void correctMeetingParts(FloatGrid& field, const ZeroSet& surface, const NearestPoints& nearest,
-                         const DistanceRequest& request) {
+                         const DistanceRequest& request, const Progress& progress) {
+  if (!hasZeroCrossing(field.tree())) return;
   const MaskTree wrong = wrongPoints(field, request.shift > 0);
   CreaseDistances distances(wrong, surface, nearest, request);
-  distances.search();
+  report(progress, 0.2);
+  distances.search(subProgress(progress, 0.2, 0.7));
   distances.adoptFromNeighbours();
-  const MaskTree missing = distances.write(field);
-  if (!missing.empty()) measureFromField(field, missing, request.halfWidth);
+  const MaskTree failed = distances.write(field);
+  report(progress, 0.8);
+  if (!failed.empty()) measureFromField(field, failed, request.halfWidth);
+  distances.writeAdopted(field);
   openvdb::tools::pruneTiles(field.tree());
 }
 

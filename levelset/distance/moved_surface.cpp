@@ -32,6 +32,9 @@ constexpr double kLastMove = 1e-4, kLongestMove = 1;
 // sine of 10° for two normals. The moved surface counts as smooth below it; the distance is then
 // too small by less than 0.4 percent.
 constexpr double kLeastSine = 0.17;
+// Parts that meet at less than 10° come nearer to the moved surface by less than this share of the
+// distance. A larger gap shows that two searches have found the same foot point.
+constexpr double kSmoothGap = 0.02;
 // If a point of the moved surface is nearer to another plane face by a length, the crease is as far
 // away as that length divided by the sine of the angle between the faces. On curved faces it is at
 // most kCreaseFactor times as far. A length below kClose, voxels, is neglected if the search fails.
@@ -66,7 +69,8 @@ std::optional<MovedSurface::Result> MovedSurface::distance(const NearestPoints::
     parts.push_back(nearer.point);
     seen.push_back(nearer.point);
     const Meeting kind = meetActive(x, parts, meeting);
-    if (kind == Meeting::Smooth) return Result{least};
+    if (kind == Meeting::Smooth && gap < kSmoothGap * least + kNearer) return Result{least};
+    if (kind == Meeting::Smooth) break;
     if (kind == Meeting::Failed) break;
     nearer = nearerPart(block, meeting, parts);
     const double found = (x - meeting).length();
@@ -162,10 +166,21 @@ MovedSurface::NearerPart MovedSurface::nearerPart(const NearestPoints::Block& bl
     }
     const double found = (at - foot).length();
     if (found >= least || isKnown(foot)) continue;
+    if (!isOnOuterSide(foot, at))
+      return {Nearer::Unknown};  // in another body, or beyond a thin wall
     least = found;
     nearest = {Nearer::Part, foot, found};
   }
   return nearest;
+}
+
+/// Returns true if a point lies on the side of the surface to which it moves.
+/// @param foot  closest point of the surface
+bool MovedSurface::isOnOuterSide(const Vec3d& foot, const Vec3d& point) {
+  const DenseBlock& block = cache_.around(foot);
+  Jet jet;
+  block.slope(foot - block.origin().asVec3d(), jet);
+  return (point - foot).dot(jet.gradient) * shift_ > 0;
 }
 
 /// Finds the point nearest to x among those that are as far from all parts as the surface moves.

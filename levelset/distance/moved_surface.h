@@ -64,6 +64,7 @@ class MovedSurface {
                                    openvdb::Vec3d& meeting);
   [[nodiscard]] Meeting meet(const openvdb::Vec3d& x, std::vector<openvdb::Vec3d>& feet,
                              openvdb::Vec3d& meeting, std::array<double, kParts>& multipliers);
+  [[nodiscard]] bool isOnOuterSide(const openvdb::Vec3d& foot, const openvdb::Vec3d& point);
   [[nodiscard]] bool follow(openvdb::Vec3d& foot, const openvdb::Vec3d& from);
 
   DenseBlockCache cache_;

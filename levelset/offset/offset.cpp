@@ -16,10 +16,11 @@ namespace {
 
 using LeafNode = openvdb::FloatTree::LeafNodeType;
 
-// Distance from the moved surface, voxels, within which re-distancing reads the shifted field.
+// Distance from the moved surface, voxels, within which re-distancing reads the shifted field, and
+// least half width for which no re-distancing is needed.
 constexpr double kPadding = 3;
-// Least shift, voxels, for which the distances to a moved surface follow from the old surface. By a
-// smaller shift, two parts of the surface can meet that are less than a voxel apart.
+// Least shift, voxels, for which the distances to a moved surface follow from the old surface.
+// After a smaller shift, parts that meet can be so near to each other that they count as one part.
 constexpr double kLeastShift = 2;
 // Voxels by which offset lengths at points of the surface between the sampled points may lie
 // outside the range of the sampled lengths.
@@ -129,6 +130,7 @@ NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& option
   eikonal::DistanceRequest request = nearSurfaceRequest(options, distance / solid.voxelSize(), 0);
   request.progress = subProgress(options.progress, 0, 0.6);
   request.ofMovedSurface = followsFromOld(request.shift, halfWidth);
+  if (request.ofMovedSurface) request.progress = options.progress;
   if (request.ofMovedSurface) request.halfWidth = halfWidth;
   const openvdb::FloatGrid::Ptr moved = eikonal::distanceTransform(vdb(solid), request);
   if (!hasSurface(*moved))

@@ -19,9 +19,9 @@ struct OffsetOptions {
 };
 
 /// Offsets the surface along its normal by `distance`; a positive distance grows the solid.
-/// Computes distances up to the new zero set. Where parts of the moved surface meet, the nearest
-/// point of their crease is found by Newton's method. Small distances and narrow bands are
-/// re-distanced instead, see followsFromOld().
+/// Computes distances to the old zero set, as far as the new band reaches. Where parts of the moved
+/// surface meet, the nearest point of their crease is found by Newton's method. Small distances and
+/// narrow bands are re-distanced instead, see followsFromOld().
 /// @param distance  displacement of the surface, world units, any sign
 /// @throws UsageError if `distance` is not finite
 /// @throws InvalidInput if `solid` or the result is empty

@@ -25,9 +25,10 @@ constexpr std::size_t kOneRun =
     1u << 18;  // rays of a dispatch, few enough to finish within the time limits of drivers
 constexpr int kRayParts = 12, kHitParts = 5;
 
-/// Bindings of storage blocks (Binding) and of texture units (Unit) in the shader.
-enum Binding : GLuint { kRays, kHits };
-enum Unit : GLuint { kPages, kEntries, kMasks, kFirstValues };
+/// Bindings of storage blocks in the shader.
+constexpr GLuint kRays = 0, kHits = 1;
+/// Bindings of texture units in the shader.
+constexpr GLuint kPages = 0, kEntries = 1, kMasks = 2, kFirstValues = 3;
 
 /// GLSL definitions of the types, macros and table look-ups that render/shaders/*.glsl use.
 constexpr const char* kDialect = R"GLSL(

@@ -37,10 +37,10 @@ std::array<std::uint8_t, 4> facesPassedTwice(const CellCase& cell) {
     for (int side = 0; side < 2; ++side) {
       std::array<int, 4> count = {};
       for (int edge = 0; edge < 12; ++edge) {
-        const int cycle = cell.cycleOfEdge[static_cast<std::size_t>(edge)];
+        const std::int8_t cycle = cell.cycleOfEdge[static_cast<std::size_t>(edge)];
         if (cycle < 0 || edgeAxis(edge) == axis) continue;
         if (edgeOffset(edge)[static_cast<std::size_t>(axis)] == side) {
-          ++count[static_cast<std::size_t>(cycle)];
+          ++count[static_cast<std::uint8_t>(cycle)];
         }
       }
       for (std::size_t cycle = 0; cycle < 4; ++cycle) {

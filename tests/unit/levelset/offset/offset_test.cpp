@@ -299,25 +299,49 @@ double unionDistance(const std::vector<Ball>& balls, const V3d& p) {
   return outside < 0 ? -inside : outside;
 }
 
-// The surfaces of the balls meet in creases and corners after the offset only.
-TEST(Offset, MeasuresCreasesInWhichPartsMeet) {
-  std::vector<Ball> balls, grown;
+/// Balls whose surfaces meet in creases and corners after an offset by 6 voxels only.
+std::vector<Ball> apartBalls() {
+  std::vector<Ball> balls;
   for (const V3d& c : {V3d(0), V3d(17, 3, -2), V3d(7, 15, 5), V3d(6, -4, 15), V3d(-13, 9, 6)})
     balls.push_back({kCentre + c, 6.5 + 0.2 * c.x / 3});
-  grown = balls;
-  const double distance = 6;
-  for (Ball& ball : grown) ball.radius += distance;
-  const Shape solid = [&](const V3d& p) { return unionDistance(balls, p); };
-  const NarrowBand moved = offset(sample(solid, 40), distance);
-  double l1 = 0, linf = 0, count = 0;
-  support::forEachActive(moved, [&](const V3d& p, double value) {
-    const double error = std::abs(value - unionDistance(grown, p));
-    l1 += error;
-    linf = std::max(linf, error);
-    ++count;
-  });
-  EXPECT_LE(l1 / count, support::measured(3.22e-4));
-  EXPECT_LE(linf, support::measured(1.92e-3));
+  return balls;
+}
+
+NarrowBand sampledBalls() {
+  const std::vector<Ball> balls = apartBalls();
+  return sample([&](const V3d& p) { return unionDistance(balls, p); }, 40);
+}
+
+TEST(Offset, MeasuresCreasesInWhichPartsMeet) {
+  std::vector<Ball> grown = apartBalls();
+  for (Ball& ball : grown) ball.radius += 6;
+  const BandError error =
+      bandError(offset(sampledBalls(), 6), [&](const V3d& p) { return unionDistance(grown, p); });
+  EXPECT_LE(error.l1, support::measured(3.22e-4));
+  EXPECT_LE(error.linf, support::measured(1.92e-3));
+}
+
+TEST(Offset, FillsANarrowGapCompletely) {
+  // Two slabs, 1 voxel apart; their edges are far from the middle.
+  const auto slab = [](const V3d& p, double height) {
+    const V3d r = p - kCentre - V3d(0, 0, height);
+    const V3d q(std::abs(r.x) - 20, std::abs(r.y) - 20, std::abs(r.z) - 5);
+    const V3d out(std::max(q.x, 0.0), std::max(q.y, 0.0), std::max(q.z, 0.0));
+    return out.length() + std::min(0.0, std::max({q.x, q.y, q.z}));
+  };
+  const NarrowBand slabs =
+      sample([&](const V3d& p) { return std::min(slab(p, -5.5), slab(p, 5.5)); }, 32);
+  OffsetOptions options;
+  for (const double halfWidth : {3.0, 6.0}) {
+    options.halfWidth = halfWidth;
+    const NarrowBand filled = offset(slabs, 2, options);
+    support::forEachActive(filled, [&](const V3d& p, double value) {
+      const V3d r = p - kCentre;
+      if (std::abs(r.x) < 12 && std::abs(r.y) < 12 && std::abs(r.z) < 3)
+        ADD_FAILURE() << "value " << value << " in the filled gap at " << p.x << ',' << p.y << ','
+                      << p.z;
+    });
+  }
 }
 
 TEST(Offset, KeepsTheSolidForDistanceZero) {
@@ -351,14 +375,15 @@ TEST(SlowOffset, MeetsItsBoundsOnTheSphereOfSixtyFour) {
 }
 
 TEST(Offset, DoesNotDependOnThreads) {
-  const NarrowBand cube = sample(box(12), 14);
-  std::uint64_t hashes[3];
-  for (const std::size_t threads : {1, 2, 4}) {
-    hashes[threads / 2] =
-        support::onThreads(threads, [&] { return offset(cube, 6).contentHash(); });
+  for (const NarrowBand& solid : {sample(box(12), 14), sampledBalls()}) {
+    std::uint64_t hashes[3];
+    for (const std::size_t threads : {1, 2, 4}) {
+      hashes[threads / 2] =
+          support::onThreads(threads, [&] { return offset(solid, 6).contentHash(); });
+    }
+    EXPECT_EQ(hashes[0], hashes[1]);
+    EXPECT_EQ(hashes[0], hashes[2]);
   }
-  EXPECT_EQ(hashes[0], hashes[1]);
-  EXPECT_EQ(hashes[0], hashes[2]);
 }
 
 TEST(Offset, Refuses) {
