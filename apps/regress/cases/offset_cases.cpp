@@ -203,8 +203,8 @@ Bounds offsetLawsBounds() {
       .measured(
           "box, +5 then -5", "band_in_linf_vx",
           {{6, 0.00684}, {8, 0.00119}, {12, 0.00041}, {16, 0.00684}, {32, 0.00158}, {64, 0.00474}})
-      // Curvature jumps where the roundings of the box begin. Tricubic interpolation is off by up to
-      // 0.008 voxel there, so the way back has this error.
+      // Curvature jumps where the roundings of the box begin. Tricubic interpolation is off by up
+      // to 0.008 voxel there, so the way back has this error.
       .measured("box, +5 then -5", "band_out_linf_vx",
                 {{6, 0.0237}, {8, 0.011}, {12, 0.0174}, {16, 0.0237}, {32, 0.0196}, {64, 0.0144}})
       .measured("sphere, +3 then +4", "missed_hits", {{6, 0.00068}, {16, 0}, {32, 0}, {64, 0}})

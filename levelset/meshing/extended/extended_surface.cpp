@@ -85,7 +85,8 @@ class FeatureFinder {
     Vec3d centre(0.0);
     for (const std::uint32_t v : polygon) centre += crossings_.at[v].point;
     centre /= static_cast<double>(polygon.size());
-    Eigen::MatrixXd normals(polygon.size(), 3);  // JacobiSVD gives thin U and V of dynamic sizes only
+    Eigen::MatrixXd normals(polygon.size(),
+                            3);  // JacobiSVD gives thin U and V of dynamic sizes only
     Eigen::VectorXd heights(polygon.size());
     for (std::size_t i = 0; i < polygon.size(); ++i) {
       const auto row = static_cast<Eigen::Index>(i);
@@ -93,8 +94,7 @@ class FeatureFinder {
       normals.row(row) << n[0], n[1], n[2];
       heights[row] = n.dot(crossings_.at[polygon[i]].point - centre);
     }
-    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(normals,
-                                                Eigen::ComputeThinU | Eigen::ComputeThinV);
+    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(normals, Eigen::ComputeThinU | Eigen::ComputeThinV);
     const auto& values = svd.singularValues();
     Vector3d shift = Vector3d::Zero();
     for (Eigen::Index i = 0; i < std::min(rank, values.size()); ++i)
