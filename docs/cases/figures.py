@@ -73,7 +73,7 @@ def frames(folder, name):
 
     entries = [step["details"]["frame"] for step in steps_of(folder, name) if step["action"] == "animate"][-1]
     for index, entry in enumerate(entries):
-        ratios = [now / first for now, first in zip(sides(entry), sides(entries[0]))]
+        ratios = [length / start for length, start in zip(sides(entry), sides(entries[0]))]
         time, motion = index / (len(entries) - 1), entry["farthest_way"]
         print(f"| {time:.2f} | {motion:.3f} | {min(ratios):.2f} to {max(ratios):.2f} |")
 
