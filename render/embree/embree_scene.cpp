@@ -71,15 +71,7 @@ std::optional<double> crossingOf(const RayQuery& query, const RaySolid& solid, u
 void boundBlock(const RTCBoundsFunctionArguments* args) {
   const auto& solid = *static_cast<const RaySolid*>(args->geometryUserPtr);
   const Box3d box = Imath::transform(solid.blocks[args->primID].bounds(), solid.indexToWorld);
-  const V3d low = (box.min - solid.view->centre) * solid.view->scale - V3d(EmbreeSpace::kPad);
-  const V3d high = (box.max - solid.view->centre) * solid.view->scale + V3d(EmbreeSpace::kPad);
-  RTCBounds& bounds = *args->bounds_o;
-  bounds.lower_x = static_cast<float>(low.x);
-  bounds.lower_y = static_cast<float>(low.y);
-  bounds.lower_z = static_cast<float>(low.z);
-  bounds.upper_x = static_cast<float>(high.x);
-  bounds.upper_y = static_cast<float>(high.y);
-  bounds.upper_z = static_cast<float>(high.z);
+  *args->bounds_o = solid.view->boundsOf(box);
 }
 
 void intersectBlock(const RTCIntersectFunctionNArguments* args) {
@@ -187,16 +179,9 @@ struct EmbreeScene::Impl {
   Box3d allBounds;  // world-space box of the solids and meshes
   Box3d bounds;     // world-space box of the grid cells that the solids' surfaces cross
   EmbreeSpace view;
-  RTCDevice device = nullptr;
-  RTCScene scene = nullptr;
+  EmbreeTree tree;
 
   Impl(const Scene& source, Filter filter);
-  ~Impl() {
-    if (scene) rtcReleaseScene(scene);
-    if (device) rtcReleaseDevice(device);
-  }
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
 
   void gather(const Scene& source, Filter filter);
   void build();
@@ -227,13 +212,7 @@ EmbreeScene::Impl::Impl(const Scene& source, Filter filter)
   allBounds = bounds;
   allBounds.extendBy(meshes.bounds());
   if (bounds.isEmpty()) return;
-  try {
-    build();
-  } catch (...) {  // no destructor runs when a constructor throws
-    if (scene) rtcReleaseScene(scene);
-    if (device) rtcReleaseDevice(device);
-    throw;
-  }
+  build();
 }
 
 void EmbreeScene::Impl::gather(const Scene& source, Filter filter) {
@@ -269,34 +248,23 @@ void EmbreeScene::Impl::gather(const Scene& source, Filter filter) {
 }
 
 void EmbreeScene::Impl::build() {
-  device = rtcNewDevice(nullptr);
-  requireEmbree(device);
-  scene = rtcNewScene(device);
-  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+  tree.open();
   for (RaySolid& solid : solids) {
     solid.view = &view;
-    const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
-    rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(solid.blocks.size()));
-    rtcSetGeometryUserData(geometry, &solid);
-    rtcSetGeometryBoundsFunction(
-        geometry, [](const RTCBoundsFunctionArguments* args) { boundBlock(args); }, nullptr);
-    rtcSetGeometryIntersectFunction(
-        geometry, [](const RTCIntersectFunctionNArguments* args) { intersectBlock(args); });
-    rtcSetGeometryOccludedFunction(
-        geometry, [](const RTCOccludedFunctionNArguments* args) { occludeBlock(args); });
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometry(scene, geometry);
-    rtcReleaseGeometry(geometry);
+    tree.addPrimitives(
+        solid.blocks.size(), &solid,
+        [](const RTCBoundsFunctionArguments* args) { boundBlock(args); },
+        [](const RTCIntersectFunctionNArguments* args) { intersectBlock(args); },
+        [](const RTCOccludedFunctionNArguments* args) { occludeBlock(args); });
   }
-  rtcCommitScene(scene);
-  requireEmbree(device);
+  tree.build();
 }
 
 std::optional<RayQuery> EmbreeScene::Impl::prepare(const V3d& origin, const V3d& direction,
                                                    double near, double far, double& moved,
                                                    RTCRay& ray) const {
   requireRay(origin, direction);
-  if (!scene) return std::nullopt;
+  if (!tree.scene) return std::nullopt;
   const auto entry = view.entryOf(origin, direction, near, far);
   if (!entry) return std::nullopt;
   moved = *entry;
@@ -321,7 +289,7 @@ std::vector<std::vector<SideChange>> EmbreeScene::Impl::allChanges(RayQuery& que
   all.ray.tfar = 2;
   all.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   all.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(scene, &query.embree, &all);
+  rtcIntersect1(tree.scene, &query.embree, &all);
   query.changes = nullptr;
   return changes;
 }
@@ -373,7 +341,7 @@ Hit EmbreeScene::Impl::intersectSolids(const V3d& origin, const V3d& direction, 
   }
   rayHit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   rayHit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(scene, &query->embree, &rayHit);
+  rtcIntersect1(tree.scene, &query->embree, &rayHit);
   if (query->solid) complete(hit, *query, *query->solid, moved, query->nearest);
   return hit;
 }
@@ -449,7 +417,7 @@ bool EmbreeScene::isOccluded(const V3d& origin, const V3d& direction, double nea
   auto query = impl_->prepare(origin, direction, near, far, moved, ray);
   if (!query) return false;
   if (!impl_->csg.isEmpty()) return impl_->findCsg(*query, ray).has_value();
-  rtcOccluded1(impl_->scene, &query->embree, &ray);
+  rtcOccluded1(impl_->tree.scene, &query->embree, &ray);
   return ray.tfar < 0;
 }
 

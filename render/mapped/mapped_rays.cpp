@@ -66,20 +66,13 @@ struct MappedRays::Impl {
   std::vector<std::unique_ptr<Texture>> textures;
   Box3d bounds;
   EmbreeSpace view;
-  RTCDevice device = nullptr;
-  RTCScene scene = nullptr;
+  EmbreeTree tree;
 
   explicit Impl(const Scene& source);
-  ~Impl() {
-    if (scene) rtcReleaseScene(scene);
-    if (device) rtcReleaseDevice(device);
-  }
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
 
   void build();
   static std::optional<ShellHit> findHit(const Texture& texture, std::size_t shell,
-                                         const Query& query, Search search);
+                                         const Query& query);
   static void boundShell(const RTCBoundsFunctionArguments* args);
   static void intersectShell(const RTCIntersectFunctionNArguments* args);
   static void occludeShell(const RTCOccludedFunctionNArguments* args);
@@ -100,40 +93,22 @@ MappedRays::Impl::Impl(const Scene& source) {
   }
   if (textures.empty()) return;
   view = EmbreeSpace(bounds);
-  try {
-    build();
-  } catch (...) {  // no destructor runs when a constructor throws
-    if (scene) rtcReleaseScene(scene);
-    if (device) rtcReleaseDevice(device);
-    throw;
-  }
+  build();
 }
 
 void MappedRays::Impl::build() {
-  device = rtcNewDevice(nullptr);
-  requireEmbree(device);
-  scene = rtcNewScene(device);
-  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+  tree.open();
   for (const auto& texture : textures) {
     texture->view = &view;
-    const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
-    rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(texture->walkers.size()));
-    rtcSetGeometryUserData(geometry, texture.get());
-    rtcSetGeometryBoundsFunction(geometry, boundShell, nullptr);
-    rtcSetGeometryIntersectFunction(geometry, intersectShell);
-    rtcSetGeometryOccludedFunction(geometry, occludeShell);
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometry(scene, geometry);
-    rtcReleaseGeometry(geometry);
+    tree.addPrimitives(texture->walkers.size(), texture.get(), boundShell, intersectShell,
+                       occludeShell);
   }
-  rtcCommitScene(scene);
-  requireEmbree(device);
+  tree.build();
 }
 
 std::optional<MappedRays::Impl::ShellHit> MappedRays::Impl::findHit(const Texture& texture,
                                                                     std::size_t shell,
-                                                                    const Query& query,
-                                                                    Search search) {
+                                                                    const Query& query) {
   const TextureRays::Reader reader = texture.rays.reader();
   std::optional<ShellHit> best;
   double far = query.nearest;
@@ -150,7 +125,7 @@ std::optional<MappedRays::Impl::ShellHit> MappedRays::Impl::findHit(const Textur
         // tetrahedron, where rounding may hide it from both segments.
         if (isFirst) wasInside = TextureRays::isInside(reader, from + (to - from) * start);
         const bool isInside = TextureRays::isInside(reader, to);
-        std::optional<double> share = texture.rays.firstCrossing(from, to, start, search);
+        std::optional<double> share = texture.rays.firstCrossing(from, to, start);
         if (!share && isInside != wasInside) share = 1;
         wasInside = isInside;
         if (!share) return true;
@@ -165,23 +140,14 @@ std::optional<MappedRays::Impl::ShellHit> MappedRays::Impl::findHit(const Textur
 
 void MappedRays::Impl::boundShell(const RTCBoundsFunctionArguments* args) {
   const auto& texture = *static_cast<const Texture*>(args->geometryUserPtr);
-  const Box3d& box = texture.walkers[args->primID].bounds();
-  const V3d low = (box.min - texture.view->centre) * texture.view->scale - V3d(EmbreeSpace::kPad);
-  const V3d high = (box.max - texture.view->centre) * texture.view->scale + V3d(EmbreeSpace::kPad);
-  RTCBounds& bounds = *args->bounds_o;
-  bounds.lower_x = static_cast<float>(low.x);
-  bounds.lower_y = static_cast<float>(low.y);
-  bounds.lower_z = static_cast<float>(low.z);
-  bounds.upper_x = static_cast<float>(high.x);
-  bounds.upper_y = static_cast<float>(high.y);
-  bounds.upper_z = static_cast<float>(high.z);
+  *args->bounds_o = texture.view->boundsOf(texture.walkers[args->primID].bounds());
 }
 
 void MappedRays::Impl::intersectShell(const RTCIntersectFunctionNArguments* args) {
   if (!args->valid[0]) return;
   auto& query = *reinterpret_cast<Query*>(args->context);
   const auto& texture = *static_cast<const Texture*>(args->geometryUserPtr);
-  const auto hit = findHit(texture, args->primID, query, Search::FirstCrossing);
+  const auto hit = findHit(texture, args->primID, query);
   if (!hit) return;
   // At equal distances the first shell of the first texture counts, in any order of the calls.
   const ShellHit& best = query.hit;
@@ -203,14 +169,14 @@ void MappedRays::Impl::occludeShell(const RTCOccludedFunctionNArguments* args) {
   if (!args->valid[0]) return;
   const auto& query = *reinterpret_cast<const Query*>(args->context);
   const auto& texture = *static_cast<const Texture*>(args->geometryUserPtr);
-  if (findHit(texture, args->primID, query, Search::FirstCrossing))
+  if (findHit(texture, args->primID, query))
     RTCRayN_tfar(args->ray, args->N, 0) = -std::numeric_limits<float>::infinity();
 }
 
 std::optional<double> MappedRays::Impl::prepare(const V3d& origin, const V3d& direction,
                                                 double near, double far, Query& query,
                                                 RTCRay& ray) const {
-  if (!scene) return std::nullopt;
+  if (!tree.scene) return std::nullopt;
   const auto moved = view.entryOf(origin, direction, near, far);
   if (!moved) return std::nullopt;
   rtcInitIntersectContext(&query.embree);
@@ -229,7 +195,7 @@ MappedRays::MappedRays(MappedRays&&) noexcept = default;
 MappedRays& MappedRays::operator=(MappedRays&&) noexcept = default;
 
 bool MappedRays::isEmpty() const {
-  return impl_->scene == nullptr;
+  return impl_->tree.scene == nullptr;
 }
 const Box3d& MappedRays::bounds() const {
   return impl_->bounds;
@@ -252,7 +218,7 @@ Hit MappedRays::intersect(const V3d& origin, const V3d& direction, double near, 
   if (!moved) return hit;
   found.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   found.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(impl_->scene, &query.embree, &found);
+  rtcIntersect1(impl_->tree.scene, &query.embree, &found);
   if (!query.hit.texture) return hit;
   const Impl::ShellHit& best = query.hit;
   const Impl::Texture& texture = *best.texture;
@@ -280,7 +246,7 @@ bool MappedRays::isOccluded(const V3d& origin, const V3d& direction, double far)
   Impl::Query query;
   RTCRay ray;
   if (!impl_->prepare(origin, direction, 0, far, query, ray)) return false;
-  rtcOccluded1(impl_->scene, &query.embree, &ray);
+  rtcOccluded1(impl_->tree.scene, &query.embree, &ray);
   return ray.tfar < 0;
 }
 

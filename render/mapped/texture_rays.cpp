@@ -41,8 +41,8 @@ const SurfaceBlock* TextureRays::blockAt(const Coord& origin) const {
   return found != blocks_.end() && found->origin == origin ? &*found : nullptr;
 }
 
-std::optional<double> TextureRays::firstCrossing(const V3d& from, const V3d& to, double near,
-                                                 Search search) const {
+std::optional<double> TextureRays::firstCrossing(const V3d& from, const V3d& to,
+                                                 double near) const {
   const IndexRay ray(from, to - from);
   const DrawnField field{levelset::vdb(band_).tree()};
   Coord block;
@@ -58,7 +58,8 @@ std::optional<double> TextureRays::firstCrossing(const V3d& from, const V3d& to,
   }
   for (;;) {
     if (const SurfaceBlock* found = blockAt(block))
-      if (const auto share = findCrossing(field, *found, ray, near, 1, search)) return share;
+      if (const auto share = findCrossing(field, *found, ray, near, 1, Search::FirstCrossing))
+        return share;
     const int a = static_cast<int>(std::min_element(next.begin(), next.end()) - next.begin());
     if (!(next[static_cast<std::size_t>(a)] < 1)) return std::nullopt;
     block[a] += ray.direction[a] > 0 ? kBlockEdge : -kBlockEdge;

@@ -31,10 +31,9 @@ class TextureRays {
   [[nodiscard]] static bool isInside(const Reader& reader, const Imath::V3d& index);
   /// First sign change of the interpolant along a segment in index space, as a share of the segment
   /// in [near, 1]. It may miss a sign change at an end of the segment that is within rounding; the
-  /// sides of both ends show it. With Search::AnyCrossing the share is that of any point in the
-  /// cell of the sign change.
+  /// sides of both ends show it.
   [[nodiscard]] std::optional<double> firstCrossing(const Imath::V3d& from, const Imath::V3d& to,
-                                                    double near, Search search) const;
+                                                    double near) const;
   /// Derivatives of φ at a point in index space.
   [[nodiscard]] SurfaceShape shapeAt(const Imath::V3d& index) const;
   /// Derivatives of index coordinates with respect to the texture's world coordinates, for row

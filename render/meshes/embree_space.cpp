@@ -49,6 +49,49 @@ RTCRay EmbreeSpace::rayFrom(const V3d& start, const V3d& direction, double maxDi
   return ray;
 }
 
+RTCBounds EmbreeSpace::boundsOf(const Box3d& world) const {
+  const V3d low = (world.min - centre) * scale - V3d(kPad);
+  const V3d high = (world.max - centre) * scale + V3d(kPad);
+  RTCBounds bounds = {};
+  bounds.lower_x = static_cast<float>(low.x);
+  bounds.lower_y = static_cast<float>(low.y);
+  bounds.lower_z = static_cast<float>(low.z);
+  bounds.upper_x = static_cast<float>(high.x);
+  bounds.upper_y = static_cast<float>(high.y);
+  bounds.upper_z = static_cast<float>(high.z);
+  return bounds;
+}
+
+EmbreeTree::~EmbreeTree() {
+  if (scene) rtcReleaseScene(scene);
+  if (device) rtcReleaseDevice(device);
+}
+
+void EmbreeTree::open() {
+  device = rtcNewDevice(nullptr);
+  requireEmbree(device);
+  scene = rtcNewScene(device);
+  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+}
+
+void EmbreeTree::addPrimitives(std::size_t count, void* data, RTCBoundsFunction bounds,
+                               RTCIntersectFunctionN intersect, RTCOccludedFunctionN occluded) {
+  const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
+  rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(count));
+  rtcSetGeometryUserData(geometry, data);
+  rtcSetGeometryBoundsFunction(geometry, bounds, nullptr);
+  rtcSetGeometryIntersectFunction(geometry, intersect);
+  rtcSetGeometryOccludedFunction(geometry, occluded);
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometry(scene, geometry);
+  rtcReleaseGeometry(geometry);
+}
+
+void EmbreeTree::build() {
+  rtcCommitScene(scene);
+  requireEmbree(device);
+}
+
 void requireEmbree(RTCDevice device) {
   const RTCError error = rtcGetDeviceError(device);
   if (error == RTC_ERROR_NONE) return;

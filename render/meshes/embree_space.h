@@ -6,6 +6,7 @@
 #include <Imath/ImathVec.h>
 #include <embree3/rtcore.h>
 
+#include <cstddef>
 #include <optional>
 
 namespace render {
@@ -33,9 +34,31 @@ struct EmbreeSpace {
   /// @param maxDistance  length of the ray, world units
   [[nodiscard]] RTCRay rayFrom(const Imath::V3d& start, const Imath::V3d& direction,
                                double maxDistance) const;
+  /// Bounds of a world-space box in the scaled space, padded by kPad.
+  [[nodiscard]] RTCBounds boundsOf(const Imath::Box3d& world) const;
 };
 
 /// Checks for an error of Embree. @throws levelset::ResourceLimit when the device reports one
 void requireEmbree(RTCDevice device);
+
+/// Embree's device and scene, both released by the destructor.
+struct EmbreeTree {
+  RTCDevice device = nullptr;
+  RTCScene scene = nullptr;  ///< null: no primitives
+
+  EmbreeTree() = default;
+  ~EmbreeTree();
+  EmbreeTree(const EmbreeTree&) = delete;
+  EmbreeTree& operator=(const EmbreeTree&) = delete;
+
+  /// Creates the device and an empty scene. @throws levelset::ResourceLimit when Embree fails
+  void open();
+  /// Adds primitives of the program's own kind.
+  /// @param data  passed to the functions as geometryUserPtr
+  void addPrimitives(std::size_t count, void* data, RTCBoundsFunction bounds,
+                     RTCIntersectFunctionN intersect, RTCOccludedFunctionN occluded);
+  /// Builds the tree. @throws levelset::ResourceLimit when Embree fails
+  void build();
+};
 
 }  // namespace render

@@ -20,16 +20,9 @@ struct MeshRays::Impl {
   bool isOpaque;
   Box3d bounds;
   EmbreeSpace view;
-  RTCDevice device = nullptr;
-  RTCScene scene = nullptr;
+  EmbreeTree tree;
 
   explicit Impl(const Scene& source);
-  ~Impl() {
-    if (scene) rtcReleaseScene(scene);
-    if (device) rtcReleaseDevice(device);
-  }
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
 
   void build();
   void add(const MeshPart& part, unsigned number);
@@ -50,29 +43,19 @@ MeshRays::Impl::Impl(const Scene& source) : parts(source.meshes) {
       for (const std::uint32_t v : triangle) bounds.extendBy(part.mesh->positions[v]);
   if (bounds.isEmpty()) return;
   view = EmbreeSpace(bounds);
-  try {
-    build();
-  } catch (...) {  // no destructor runs when a constructor throws
-    if (scene) rtcReleaseScene(scene);
-    if (device) rtcReleaseDevice(device);
-    throw;
-  }
+  build();
 }
 
 void MeshRays::Impl::build() {
-  device = rtcNewDevice(nullptr);
-  requireEmbree(device);
-  scene = rtcNewScene(device);
-  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+  tree.open();
   for (std::size_t n = 0; n < parts.size(); ++n)
     if (!parts[n].mesh->isEmpty()) add(parts[n], static_cast<unsigned>(n));
-  rtcCommitScene(scene);
-  requireEmbree(device);
+  tree.build();
 }
 
 void MeshRays::Impl::add(const MeshPart& part, unsigned number) {
   const levelset::TriMesh& mesh = *part.mesh;
-  const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  const RTCGeometry geometry = rtcNewGeometry(tree.device, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
                                                                RTC_FORMAT_FLOAT3, 3 * sizeof(float),
                                                                mesh.positions.size()));
@@ -86,15 +69,15 @@ void MeshRays::Impl::add(const MeshPart& part, unsigned number) {
     for (const auto& triangle : mesh.triangles)
       indices = std::copy(triangle.begin(), triangle.end(), indices);
     rtcCommitGeometry(geometry);
-    rtcAttachGeometryByID(scene, geometry, number);
+    rtcAttachGeometryByID(tree.scene, geometry, number);
   }
   rtcReleaseGeometry(geometry);
-  requireEmbree(device);
+  requireEmbree(tree.device);
 }
 
 std::optional<double> MeshRays::Impl::prepare(const V3d& origin, const V3d& direction, double near,
                                               double far, RTCRay& ray) const {
-  if (!scene) return std::nullopt;
+  if (!tree.scene) return std::nullopt;
   const auto moved = view.entryOf(origin, direction, near, far);
   if (moved) ray = view.rayFrom(origin + direction * *moved, direction, far - *moved);
   return moved;
@@ -145,7 +128,7 @@ MeshRays::MeshRays(MeshRays&&) noexcept = default;
 MeshRays& MeshRays::operator=(MeshRays&&) noexcept = default;
 
 bool MeshRays::isEmpty() const {
-  return impl_->scene == nullptr;
+  return impl_->tree.scene == nullptr;
 }
 const Box3d& MeshRays::bounds() const {
   return impl_->bounds;
@@ -160,7 +143,7 @@ Hit MeshRays::intersect(const V3d& origin, const V3d& direction, double near, do
   found.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  rtcIntersect1(impl_->scene, &context, &found);
+  rtcIntersect1(impl_->tree.scene, &context, &found);
   if (found.hit.geomID == RTC_INVALID_GEOMETRY_ID) return hit;
   impl_->complete(found, origin + direction * *moved, direction, *moved, hit);
   if (hit.distance > far) hit.found = false;
@@ -172,7 +155,7 @@ bool MeshRays::isOccluded(const V3d& origin, const V3d& direction, double far) c
   if (!impl_->prepare(origin, direction, 0, far, ray)) return false;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  rtcOccluded1(impl_->scene, &context, &ray);
+  rtcOccluded1(impl_->tree.scene, &context, &ray);
   return ray.tfar < 0;
 }
 
