@@ -7,7 +7,7 @@
 #include <cmath>
 #include <memory>
 
-#include "levelset/distance/meeting_parts.h"
+#include "levelset/distance/moved/meeting_parts.h"
 #include "levelset/distance/point_distance.h"
 #include "levelset/distance/signs.h"
 #include "levelset/error.h"

@@ -18,7 +18,7 @@ PointDistance distanceAt(const NearestPoints::Block& block, openvdb::Index n, Po
   const double sign = inside ? -1 : 1;
   PointDistance result{sign * 1e30};
   if (block.nearest[n] != NearestPoints::kNone) {
-    result.value = sign * std::sqrt(static_cast<double>(block.squared[n])) - request.shift;
+    result.value = sign * polisher.nearestDistance(block, n) - request.shift;
     if (std::abs(result.value) < request.halfWidth + kPolishGain) {
       result.closest = polisher.closest(block, n);
       result.value = sign * result.closest->distance - request.shift;

@@ -30,6 +30,13 @@ class Polisher {
   /// Returns the interpolation error of distances to the surface beside a surface point, voxels.
   [[nodiscard]] double interpolationError(std::uint32_t point) const;
 
+  /// Returns the distance of the grid point number `n` of a block from its nearest surface point,
+  /// voxels.
+  [[nodiscard]] double nearestDistance(const NearestPoints::Block& block, openvdb::Index n) const {
+    const openvdb::Coord c = block.origin + openvdb::FloatTree::LeafNodeType::offsetToLocalCoord(n);
+    return (points_.positions[block.nearest[n]] - c.asVec3d()).length();
+  }
+
   /// Returns the closest point for the grid point number `n` of a block. Fastest if all grid points
   /// of a block follow each other.
   /// @pre the grid point has a nearest surface point

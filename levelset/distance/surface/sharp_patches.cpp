@@ -24,8 +24,9 @@ using LeafNode = FloatTree::LeafNodeType;
 
 // Distance along each axis from a vertex with the values of a sharp edge, voxels, within which
 // cells are meshed. A confirmed edge has such a vertex within 3 voxels; the surface up to 3 voxels
-// farther confirms it, and its patches reach 5 voxels.
-constexpr int kMeshReach = 9;
+// farther confirms it, and its patches reach 5 voxels. Where only some cells are of interest, their
+// own vertices confirm the edges.
+constexpr int kMeshReach = 9, kReachOfSome = 6;
 // Number of cells around a cell with an edge in which the edge, or the bisector plane of its faces,
 // affects the interpolant.
 constexpr int kZone = 3;
@@ -51,18 +52,19 @@ openvdb::MaskTree cellsNearEdges(const FloatGrid& field, const BlockSelection& w
   std::vector<const LeafNode*> leaves;
   for (auto it = field.tree().cbeginLeaf(); it; ++it)
     if (within.holdsBlock(it->getNodeBoundingBox())) leaves.push_back(it.getLeaf());
-  std::vector<std::vector<Vec3d>> vertices(leaves.size());
+  std::vector<std::vector<SharpVertex>> vertices(leaves.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 64), [&](const auto& range) {
     const FloatGrid::ConstAccessor accessor(field.tree());
     for (std::size_t i = range.begin(); i != range.end(); ++i)
       vertices[i] = sharpEdgeVertices(field, accessor, leaves[i]->origin());
   });
   openvdb::MaskTree cells;
-  for (const std::vector<Vec3d>& found : vertices)
-    for (const Vec3d& vertex : found) {
-      const Coord cell = Coord::floor(vertex);
+  for (const std::vector<SharpVertex>& found : vertices)
+    for (const SharpVertex& vertex : found) {
+      const Coord cell = Coord::floor(vertex.position);
       if (within.edgeCells && !within.edgeCells->isValueOn(cell)) continue;
-      addBox(cells, {cell.offsetBy(-kMeshReach), cell.offsetBy(kMeshReach)});
+      const int reach = within.edgeCells ? kReachOfSome : kMeshReach;
+      addBox(cells, {cell.offsetBy(-reach), cell.offsetBy(reach)});
     }
   return cells;
 }

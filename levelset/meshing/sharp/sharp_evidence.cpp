@@ -111,12 +111,12 @@ EdgeEvidence edgeEvidence(const Vec3d& vertex, const VertexSheets& sheets,
   return found;
 }
 
-std::vector<Vec3d> sharpEdgeVertices(const openvdb::FloatGrid& grid,
-                                     const openvdb::FloatGrid::ConstAccessor& field,
-                                     const Coord& origin) {
+std::vector<SharpVertex> sharpEdgeVertices(const openvdb::FloatGrid& grid,
+                                           const openvdb::FloatGrid::ConstAccessor& field,
+                                           const Coord& origin) {
   const BlockSigns signs(grid, field, origin);
   std::optional<VertexPlacer> placer;
-  std::vector<Vec3d> found;
+  std::vector<SharpVertex> found;
   for (int x = 0; x < 8; ++x)
     for (int y = 0; y < 8; ++y)
       for (int z = 0; z < 8; ++z) {
@@ -131,7 +131,7 @@ std::vector<Vec3d> sharpEdgeVertices(const openvdb::FloatGrid& grid,
           const Eigen::Vector3d& p = vertex.position;
           const Vec3d position = origin.asVec3d() + Vec3d(p.x(), p.y(), p.z());
           if (edgeEvidence(position, vertex.sheets, grid, field).isSharp())
-            found.push_back(position);
+            found.push_back({position, vertex.sheets});
         }
       }
   return found;

@@ -31,11 +31,17 @@ struct EdgeEvidence {
                                         const openvdb::FloatGrid& grid,
                                         const openvdb::FloatGrid::ConstAccessor& field);
 
-/// Returns the vertices in the cells of one leaf block at which the field is that of a sharp edge,
-/// in index space. Every edge that confirmFeatures() confirms has such a vertex within 3 voxels of
+/// Vertex of the dual mesh at which the field is that of a sharp edge.
+struct SharpVertex {
+  openvdb::Vec3d position;  ///< index space
+  VertexSheets sheets;      ///< two
+};
+
+/// Returns the vertices in the cells of one leaf block at which the field is that of a sharp edge.
+/// Every edge that confirmFeatures() confirms has such a vertex within 3 voxels of
 /// each of its vertices. So a search for edges can skip the blocks without one. Cells that are
 /// smooth at all corners are skipped.
-[[nodiscard]] std::vector<openvdb::Vec3d> sharpEdgeVertices(
+[[nodiscard]] std::vector<SharpVertex> sharpEdgeVertices(
     const openvdb::FloatGrid& grid, const openvdb::FloatGrid::ConstAccessor& field,
     const openvdb::Coord& origin);
 

@@ -1,4 +1,4 @@
-#include "levelset/distance/moved_surface.h"
+#include "levelset/distance/moved/moved_surface.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -15,30 +15,41 @@ using LeafNode = openvdb::FloatTree::LeafNodeType;
 
 // Another part of the surface counts as nearer if it is nearer by more than this, voxels.
 constexpr double kNearer = 5e-4;
+// The same for sharp patches, whose vertices are fitted to planes, and distance beyond that of the
+// moved surface in which the patches are searched, voxels.
+constexpr double kNearerPatch = 1e-3, kPastEnd = 1;
 // Points of the surface within this distance of each other, voxels, belong to the same part.
 constexpr double kSamePart = 0.75;
+// A search near a crease starts from surface points whose distance differs from the shift by less
+// than kStartOff, voxels, on up to kStartParts parts.
+constexpr double kStartOff = 1;
+constexpr std::size_t kStartParts = 4;
 // Square of the largest distance of a surface point from the place where the surface is nearest to
 // the point in question, voxels².
 constexpr double kBetweenPoints = 8;
 // Longest Newton step with the derivatives at a surface point, and its error, voxels.
 constexpr double kStepOfJet = 2.5, kStepError = 0.1;
 // Number of steps of the search for a point of the crease, and number of sets of parts to try.
-constexpr int kMoves = 16, kSets = 6;
+constexpr int kMoves = 40, kSets = 6;
 // Number of searches for a foot point. Each starts where the search before it moved too far.
 constexpr int kFollows = 4;
+// A surface point is at most about this much farther than the closest point of its part, voxels.
+constexpr double kSampleGap = 0.01;
 // The search ends after a step of less than kLastMove voxels. No step is longer than kLongestMove.
 constexpr double kLastMove = 1e-4, kLongestMove = 1;
 // Least square root of the determinant of the scalar products of the unit normals at a crease: the
-// sine of 10° for two normals. The moved surface counts as smooth below it; the distance is then
-// too small by less than 0.4 percent.
-constexpr double kLeastSine = 0.17;
-// Parts that meet at less than 10° come nearer to the moved surface by less than this share of the
+// sine of about 1° for two normals. The moved surface counts as smooth below it; the distance is
+// then too small by less than 5e-5 of it.
+constexpr double kLeastSine = 0.02;
+// Parts that meet at less than 1° come nearer to the moved surface by less than this share of the
 // distance. A larger gap shows that two searches have found the same foot point.
-constexpr double kSmoothGap = 0.02;
+constexpr double kSmoothGap = 0.002;
 // If a point of the moved surface is nearer to another plane face by a length, the crease is as far
 // away as that length divided by the sine of the angle between the faces. On curved faces it is at
 // most kCreaseFactor times as far. A length below kClose, voxels, is neglected if the search fails.
 constexpr double kCreaseFactor = 3, kClose = 1e-4;
+// Least such length that shows that a point is beside a crease, voxels.
+constexpr double kBesideCrease = 0.05;
 
 }  // namespace
 
@@ -48,37 +59,37 @@ MovedSurface::MovedSurface(const ZeroSet& surface, double shift)
       patches_(surface.patches),
       shift_(shift) {}
 
-std::optional<MovedSurface::Result> MovedSurface::distance(const NearestPoints::Block& block,
-                                                           openvdb::Index n,
-                                                           const Closest& closest) {
+MovedSurface::Search MovedSurface::distance(const NearestPoints::Block& block, openvdb::Index n,
+                                            const Closest& closest) {
   const Vec3d x = (block.origin + LeafNode::offsetToLocalCoord(n)).asVec3d();
   const double sign = block.inside.isOn(n) ? -1 : 1;
   Vec3d normal = (x - closest.point) * sign;
   if (!(closest.distance > 1e-3)) normal = points_.jets[block.nearest[n]].jet().gradient;
-  if (!normal.normalize()) return std::nullopt;
+  if (!normal.normalize()) return {};
   const double least = std::abs(sign * closest.distance - shift_);
 
   std::vector<Vec3d> parts{closest.point}, seen = parts;
   Vec3d meeting = closest.point + normal * shift_;
   NearerPart nearer = nearerPart(block, meeting, parts);
-  if (nearer.kind == Nearer::None) return Result{least};
+  if (nearer.kind == Nearer::None) return {Result{least}};
   const Vec3d start = meeting;
   const double gap = std::abs(shift_) - nearer.distance;
-  const bool isClose = nearer.kind == Nearer::Part && gap < kClose;
+  const bool isPart = nearer.kind == Nearer::Part;
   for (int i = 0; i < kSets && nearer.kind == Nearer::Part && parts.size() < kParts; ++i) {
     parts.push_back(nearer.point);
     seen.push_back(nearer.point);
     const Meeting kind = meetActive(x, parts, meeting);
-    if (kind == Meeting::Smooth && gap < kSmoothGap * least + kNearer) return Result{least};
+    if (kind == Meeting::Smooth && gap < kSmoothGap * least + kNearer) return {Result{least}};
     if (kind == Meeting::Smooth) break;
     if (kind == Meeting::Failed) break;
     nearer = nearerPart(block, meeting, parts);
     const double found = (x - meeting).length();
     if (nearer.kind == Nearer::None && found > least - kNearer &&
         (meeting - start).length() < kCreaseFactor * gap / kLeastSine)
-      return nearestPair(block, x, start, seen, {found, CreasePoint{meeting, parts}});
+      return {nearestPair(block, x, start, seen, {found, CreasePoint{meeting, parts}})};
   }
-  return isClose ? std::optional(Result{least}) : std::nullopt;
+  if (isPart && gap < kClose) return {Result{least}};
+  return {std::nullopt, isPart && gap > kBesideCrease};
 }
 
 /// Where more than two parts are near, several creases are. Returns the nearest of `best` and of
@@ -98,6 +109,48 @@ MovedSurface::Result MovedSurface::nearestPair(const NearestPoints::Block& block
         best = {distance, std::move(crease)};
     }
   return best;
+}
+
+std::optional<MovedSurface::Result> MovedSurface::distanceNear(const NearestPoints::Block& block,
+                                                               openvdb::Index n,
+                                                               const Vec3d& near) {
+  const std::vector<Vec3d> feet = partsAround(block, near);
+  std::optional<Result> best;
+  for (std::size_t i = 0; i < feet.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      auto found = distanceFrom(block, n, {near, {feet[j], feet[i]}});
+      if (found && (!best || found->distance < best->distance)) best = std::move(found);
+    }
+  return best;
+}
+
+/// Returns the closest points of the parts that are about as far from a point as the surface moves,
+/// the nearest first.
+std::vector<Vec3d> MovedSurface::partsAround(const NearestPoints::Block& block,
+                                             const Vec3d& point) {
+  std::vector<std::pair<double, std::uint32_t>> near;
+  const Coord low = Coord::floor(point).offsetBy(-1);
+  for (const Coord& c : openvdb::CoordBBox(low, low.offsetBy(3))) {
+    const std::uint32_t number = NearestPoints::nearestAt(block, c);
+    if (number == NearestPoints::kNone) continue;
+    const double off = (points_.positions[number] - point).length() - std::abs(shift_);
+    if (std::abs(off) < kStartOff) near.emplace_back(off, number);
+  }
+  std::sort(near.begin(), near.end());
+  near.erase(std::unique(near.begin(), near.end()), near.end());
+  std::vector<Vec3d> feet;
+  for (const auto& [off, number] : near) {
+    Vec3d foot = points_.positions[number];
+    const auto isKnown = [&] {
+      return std::any_of(feet.begin(), feet.end(), [&](const Vec3d& other) {
+        return (other - foot).lengthSqr() < kSamePart * kSamePart;
+      });
+    };
+    if (isKnown() || !follow(foot, point) || isKnown()) continue;
+    feet.push_back(foot);
+    if (feet.size() == kStartParts) break;
+  }
+  return feet;
 }
 
 std::optional<MovedSurface::Result> MovedSurface::distanceFrom(const NearestPoints::Block& block,
@@ -152,8 +205,9 @@ MovedSurface::NearerPart MovedSurface::nearerPart(const NearestPoints::Block& bl
     if (isKnown(start)) continue;
     const bool mayBeNearer = (start - at).lengthSqr() < distance * distance + kBetweenPoints;
     if (points_.sharp[point]) {
-      // The surface may be nearer where the patches end.
-      if (mayBeNearer || patches_.nearest(at, least).found) return {Nearer::Unknown};
+      const PatchDistance patch = patchDistance(at);
+      if (patch == PatchDistance::Nearer) return {Nearer::Unknown};
+      if (patch == PatchDistance::PastEnd && mayBeNearer) return {Nearer::Unknown};
       continue;
     }
     const Foot near = closestPointByOneStep(points_.jets[point].jet(), at, start, kStepOfJet);
@@ -161,7 +215,9 @@ MovedSurface::NearerPart MovedSurface::nearerPart(const NearestPoints::Block& bl
     if (!near.converged && !mayBeNearer) continue;
     Vec3d foot = near.converged ? near.point : start;
     if (!follow(foot, at)) {
-      if (!mayBeNearer) continue;
+      // Near a centre of curvature, all surface points are about equally far.
+      const bool isNearer = (start - at).length() < distance - kSampleGap;
+      if (!mayBeNearer || (!isNearer && patchDistance(at) != PatchDistance::Nearer)) continue;
       return {Nearer::Unknown};
     }
     const double found = (at - foot).length();
@@ -172,6 +228,15 @@ MovedSurface::NearerPart MovedSurface::nearerPart(const NearestPoints::Block& bl
     nearest = {Nearer::Part, foot, found};
   }
   return nearest;
+}
+
+/// Compares the distance of a point from the sharp patches with that of the moved surface.
+MovedSurface::PatchDistance MovedSurface::patchDistance(const Vec3d& at) const {
+  const double distance = std::abs(shift_);
+  const TriangleTree::Hit hit = patches_.nearest(at, distance + kPastEnd);
+  if (hit.found && hit.distance < distance - kNearerPatch) return PatchDistance::Nearer;
+  return hit.found && patches_.covers(Coord::floor(hit.point)) ? PatchDistance::Farther
+                                                               : PatchDistance::PastEnd;
 }
 
 /// Returns true if a point lies on the side of the surface to which it moves.

@@ -32,15 +32,27 @@ class MovedSurface {
     double distance = 0;
     std::optional<CreasePoint> crease = {};
   };
+  /// Result of a search; none if it fails.
+  struct Search {
+    std::optional<Result> result = {};
+    /// Another part is nearer to the moved surface than the closest point, by kBesideCrease voxels
+    /// or more. So the nearest point of the moved surface lies on a crease, also if the search
+    /// fails.
+    bool isBesideCrease = false;
+  };
 
   /// Finds the distance of a grid point on the near side from the moved surface. If the normal at
   /// the closest point of the surface meets the moved surface, the distance is the length of that
   /// line. Otherwise another part of the surface is nearer there, and the moved parts meet in a
   /// crease. Then the nearest point of the crease lies at the same distance from two or three
-  /// parts; Newton's method finds it. Returns none if it fails.
+  /// parts; Newton's method finds it.
   /// @param closest  closest point of the surface for the grid point number `n` of the block
-  [[nodiscard]] std::optional<Result> distance(const NearestPoints::Block& block, openvdb::Index n,
-                                               const Closest& closest);
+  [[nodiscard]] Search distance(const NearestPoints::Block& block, openvdb::Index n,
+                                const Closest& closest);
+
+  /// As distance(), but searches for a crease beside `near`, which lies near the moved surface.
+  [[nodiscard]] std::optional<Result> distanceNear(const NearestPoints::Block& block,
+                                                   openvdb::Index n, const openvdb::Vec3d& near);
 
   /// As distance(), but starts from a crease point of a neighbouring grid point.
   [[nodiscard]] std::optional<Result> distanceFrom(const NearestPoints::Block& block,
@@ -49,12 +61,19 @@ class MovedSurface {
  private:
   enum class Nearer { None, Part, Unknown };
   enum class Meeting { Found, Smooth, Failed };
+  enum class PatchDistance {
+    Nearer,   ///< the patches are nearer
+    Farther,  ///< they are not, and the surface beside them is not nearer either
+    PastEnd,  ///< they are not nearer, but the surface may be where they end
+  };
   struct NearerPart {
     Nearer kind = Nearer::None;
     openvdb::Vec3d point = {};  ///< closest point of the nearer part
     double distance = 0;        ///< its distance, voxels
   };
 
+  [[nodiscard]] std::vector<openvdb::Vec3d> partsAround(const NearestPoints::Block& block,
+                                                        const openvdb::Vec3d& point);
   [[nodiscard]] Result nearestPair(const NearestPoints::Block& block, const openvdb::Vec3d& x,
                                    const openvdb::Vec3d& start,
                                    const std::vector<openvdb::Vec3d>& feet, Result best);
@@ -64,6 +83,7 @@ class MovedSurface {
                                    openvdb::Vec3d& meeting);
   [[nodiscard]] Meeting meet(const openvdb::Vec3d& x, std::vector<openvdb::Vec3d>& feet,
                              openvdb::Vec3d& meeting, std::array<double, kParts>& multipliers);
+  [[nodiscard]] PatchDistance patchDistance(const openvdb::Vec3d& at) const;
   [[nodiscard]] bool isOnOuterSide(const openvdb::Vec3d& foot, const openvdb::Vec3d& point);
   [[nodiscard]] bool follow(openvdb::Vec3d& foot, const openvdb::Vec3d& from);
 
