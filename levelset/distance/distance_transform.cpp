@@ -40,6 +40,7 @@ LeafOrTile makeLeaf(const Block& block, const LeafNode* before, Polisher& polish
   std::unique_ptr<ClosestPointLeaf> points;
   if (request.visitPoints) points = std::make_unique<ClosestPointLeaf>();
   bool isOn = false;
+  polisher.prepare(block, nearBand(block, request));
   for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n) {
     auto [value, closest] = distanceAt(block, n, polisher, request);
     if (points && closest) (*points)[n] = closest->point;

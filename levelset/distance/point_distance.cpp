@@ -10,7 +10,21 @@ namespace {
 // of curvature of about 8 voxels.
 constexpr double kMostError = 1e-3;
 
+double unrefined(const NearestPoints::Block& block, openvdb::Index n, double shift) {
+  const double distance = std::sqrt(static_cast<double>(block.squared[n]));
+  return (block.inside.isOn(n) ? -distance : distance) - shift;
+}
+
 }  // namespace
+
+NearestPoints::Mask nearBand(const NearestPoints::Block& block, const DistanceRequest& request) {
+  NearestPoints::Mask near;
+  for (openvdb::Index n = 0; n < 512; ++n)
+    if (block.nearest[n] != NearestPoints::kNone &&
+        std::abs(unrefined(block, n, request.shift)) < request.halfWidth + kPolishGain)
+      near.setOn(n);
+  return near;
+}
 
 PointDistance distanceAt(const NearestPoints::Block& block, openvdb::Index n, Polisher& polisher,
                          const DistanceRequest& request) {
@@ -18,7 +32,7 @@ PointDistance distanceAt(const NearestPoints::Block& block, openvdb::Index n, Po
   const double sign = inside ? -1 : 1;
   PointDistance result{sign * 1e30};
   if (block.nearest[n] != NearestPoints::kNone) {
-    result.value = sign * std::sqrt(static_cast<double>(block.squared[n])) - request.shift;
+    result.value = unrefined(block, n, request.shift);
     if (std::abs(result.value) < request.halfWidth + kPolishGain) {
       result.closest = polisher.closest(block, n);
       result.value = sign * result.closest->distance - request.shift;

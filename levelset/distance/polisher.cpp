@@ -101,6 +101,23 @@ void Polisher::load(const NearestPoints::Block& block) {
   }
 }
 
+void Polisher::prepare(const NearestPoints::Block& block, const NearestPoints::Mask& gridPoints) {
+  if (loaded_ != &block) load(block);
+  preparedBlock_ = &block;
+  prepared_.setOff();
+  searches_.clear();
+  for (auto it = gridPoints.beginOn(); it; ++it) {
+    const openvdb::Index n = it.pos();
+    const std::uint32_t point = block.nearest[n];
+    if (point == NearestPoints::kNone || block.own.isOn(n) || points_.sharp[point]) continue;
+    prepared_.setOn(n);
+    entry_[n] = static_cast<std::uint16_t>(searches_.size());
+    searches_.push_back({(block.origin + LeafNode::offsetToLocalCoord(n)).asVec3d(),
+                         points_.positions[point], &points_.jets[point]});
+  }
+  closestPointsByTwoSteps(cache_, searches_, feet_);
+}
+
 Closest Polisher::closest(const NearestPoints::Block& block, openvdb::Index n) {
   if (loaded_ != &block) load(block);
   const Coord c = block.origin + LeafNode::offsetToLocalCoord(n);
@@ -109,7 +126,10 @@ Closest Polisher::closest(const NearestPoints::Block& block, openvdb::Index n) {
   const Vec3d nearest = points_.positions[first];
   Closest best{nearest, (x - nearest).length()};
   const double start = best.distance;
-  if (!block.own.isOn(n)) best.takeIfNearer(polish(x, first));
+  if (!block.own.isOn(n))
+    best.takeIfNearer(preparedBlock_ == &block && prepared_.isOn(n)
+                          ? polishFrom(feet_[entry_[n]], x, first)
+                          : polish(x, first));
   if (!meetsOther_.isOn(n)) return best;
   for (int axis = 0; axis < 3; ++axis)
     for (int side = -1; side <= 1; side += 2) {
@@ -127,15 +147,21 @@ Closest Polisher::closest(const NearestPoints::Block& block, openvdb::Index n) {
 Closest Polisher::polish(const Vec3d& x, std::uint32_t point) {
   const Vec3d start = points_.positions[point];
   if (!points_.sharp[point]) {
-    const Foot foot = closestPointByTwoSteps(cache_, points_.jets[point].jet(), x, start);
-    if (foot.converged && !patches_.covers(Coord::floor(foot.point)) && isOnSurface(foot.point))
-      return {foot.point, foot.distance};
-    return polishOnInterpolant(x, start);
+    searches_.assign(1, {x, start, &points_.jets[point]});
+    std::vector<Foot> feet;
+    closestPointsByTwoSteps(cache_, searches_, feet);
+    return polishFrom(feet[0], x, point);
   }
   const TriangleTree::Hit hit = patches_.nearest(x, (x - start).length());
   if (!hit.found) return {start, (x - start).length()};
   if (patches_.covers(Coord::floor(hit.point))) return {hit.point, hit.distance};
   return polishOnInterpolant(x, hit.point);
+}
+
+Closest Polisher::polishFrom(const Foot& foot, const Vec3d& x, std::uint32_t point) {
+  if (foot.converged && !patches_.covers(Coord::floor(foot.point)) && isOnSurface(foot.point))
+    return {foot.point, foot.distance};
+  return polishOnInterpolant(x, points_.positions[point]);
 }
 
 Closest Polisher::polishOnInterpolant(const Vec3d& x, Vec3d start) {

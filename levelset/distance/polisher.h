@@ -3,6 +3,7 @@
 // Internal header of levelset: public headers must not include it.
 
 #include "levelset/distance/propagate.h"
+#include "levelset/distance/surface/closest_point.h"
 #include "levelset/distance/surface/zero_set.h"
 
 namespace levelset::eikonal {
@@ -27,6 +28,10 @@ class Polisher {
   explicit Polisher(const ZeroSet& surface)
       : cache_(*surface.interpolated), points_(surface.points), patches_(surface.patches) {}
 
+  /// Computes the closest points of some grid points of a block together, for the calls of
+  /// closest() that follow on this block. They give the same results without it, but take longer.
+  void prepare(const NearestPoints::Block& block, const NearestPoints::Mask& gridPoints);
+
   /// Returns the interpolation error of distances to the surface beside a surface point, voxels.
   [[nodiscard]] double interpolationError(std::uint32_t point) const;
 
@@ -44,6 +49,8 @@ class Polisher {
   /// interpolant. If the point that it finds lies in the domain of the other of the two, the search
   /// continues on that one.
   Closest polish(const openvdb::Vec3d& x, std::uint32_t point);
+  /// Continues polish() after the two Newton steps of `foot` on the interpolant.
+  Closest polishFrom(const Foot& foot, const openvdb::Vec3d& x, std::uint32_t point);
   /// Finds the foot point with Newton's method from `start`; returns `start` if that fails. Far
   /// inside a solid, a large part of the surface is almost equally near. The foot point may then be
   /// far from `start`, so a search that leaves the block restarts at that position.
@@ -64,6 +71,11 @@ class Polisher {
   /// Grid points of the block with a neighbour whose nearest surface point may lie on another part
   /// of the surface.
   NearestPoints::Mask meetsOther_;
+  const NearestPoints::Block* preparedBlock_ = nullptr;
+  NearestPoints::Mask prepared_;          ///< grid points of that block with an entry in `feet_`
+  std::array<std::uint16_t, 512> entry_;  ///< number of the entry, for each grid point
+  std::vector<JetSearch> searches_;
+  std::vector<Foot> feet_;
   const SurfacePoints& points_;
   const SharpPatches& patches_;
 };

@@ -2,9 +2,13 @@
 
 // Internal header of levelset: public headers must not include it.
 
+#include <algorithm>
 #include <array>
+#include <cstdint>
+#include <cstring>
 #include <vector>
 
+#include "levelset/distance/surface/lanes.h"
 #include "levelset/grids/padded_leaf_vdb.h"
 #include "levelset/vdb.h"
 
@@ -27,6 +31,10 @@ struct Jet {
 struct CompactJet {
   std::array<float, 10> numbers{};
   CompactJet() = default;
+  CompactJet(const JetOf<DoubleLanes>& jets, int lane)
+      : CompactJet(Jet{jets.value[lane], vectorOf(jets.gradient, lane), jets.xx[lane],
+                       jets.yy[lane], jets.zz[lane], jets.xy[lane], jets.xz[lane], jets.yz[lane]}) {
+  }
   explicit CompactJet(const Jet& jet) {
     const double all[] = {jet.value, jet.gradient.x(), jet.gradient.y(), jet.gradient.z(), jet.xx,
                           jet.yy,    jet.zz,           jet.xy,           jet.xz,           jet.yz};
@@ -57,6 +65,30 @@ class DenseBlock {
   [[nodiscard]] float at(int x, int y, int z) const {
     return values_.values[Values::slot(x, y, z)];
   }
+  /// Returns true if the values in a box of grid points have both signs.
+  /// @param low, high  the box, inclusive; it has at most four grid points along z
+  [[nodiscard]] bool changesSign(const std::array<int, 3>& low,
+                                 const std::array<int, 3>& high) const {
+    // Reads four values of each row at once, and ignores those outside the box. So there are few
+    // branches, which would be taken at random.
+    const int z = std::min(low[2], kSide - kPad - kLanes);
+    const IntLanes place = IntLanes{0, 1, 2, 3} + z, isIn = (place >= low[2]) & (place <= high[2]);
+    IntLanes any = {0, 0, 0, 0}, all = {-1, -1, -1, -1};
+    for (int x = low[0]; x <= high[0]; ++x)
+      for (int y = low[1]; y <= high[1]; ++y) {
+        FloatLanes row;
+        std::memcpy(&row, values_.at(x, y, z), sizeof(row));
+        const IntLanes inside = row < 0;
+        any |= inside;
+        all &= inside;
+      }
+    any &= isIn;
+    all |= ~isIn;
+    std::array<std::int64_t, 2> some, every;
+    std::memcpy(some.data(), &any, sizeof(any));
+    std::memcpy(every.data(), &all, sizeof(all));
+    return (some[0] | some[1]) != 0 && (every[0] & every[1]) != -1;
+  }
   [[nodiscard]] static bool contains(const openvdb::Vec3d& p) {
     for (int i = 0; i < 3; ++i)
       if (!(p[i] >= kDomainMin && p[i] < kDomainMax)) return false;
@@ -69,7 +101,12 @@ class DenseBlock {
   /// @pre contains(p)
   void slope(const openvdb::Vec3d& p, Jet& jet) const;
 
+  /// Interpolates value and derivatives at a position for each lane, with the same bits as jet().
+  /// @pre contains() each position
+  void jets(const Triple<DoubleLanes>& p, JetOf<DoubleLanes>& result) const;
+
  private:
+  friend class DenseBlockCache;
   openvdb::Coord origin_;
   Values values_;
 };
@@ -81,6 +118,11 @@ class DenseBlockCache {
   /// Returns the block of the leaf that contains `position` (index space). Valid until the next
   /// call.
   const DenseBlock& around(const openvdb::Vec3d& position);
+  /// Returns the block of the leaf that begins at `origin`. Valid until the next call.
+  const DenseBlock& at(const openvdb::Coord& origin);
+  /// Interpolates value and gradient at a position for each lane, in index space, and leaves the
+  /// second derivatives in `result`. Gives the same bits as DenseBlock::slope().
+  void slopes(const Triple<DoubleLanes>& positions, JetOf<DoubleLanes>& result);
 
  private:
   struct Slot {
