@@ -30,6 +30,10 @@ struct PointDistance {
 [[nodiscard]] PointDistance distanceAt(const NearestPoints::Block& block, openvdb::Index n,
                                        Polisher& polisher, const DistanceRequest& request);
 
+/// Computes distanceAt() for a grid point of nearBand().
+[[nodiscard]] PointDistance nearDistanceAt(const NearestPoints::Block& block, openvdb::Index n,
+                                           Polisher& polisher, const DistanceRequest& request);
+
 /// Returns the old value if the computed one equals it within the error of interpolation, voxels.
 /// So repeated redistancing does not shift a distance field.
 [[nodiscard]] double keptOr(double value, double old, const Polisher& polisher,

@@ -1,6 +1,8 @@
 #include "levelset/distance/surface/interpolant.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 
 namespace levelset::eikonal {
@@ -86,9 +88,56 @@ struct LaneCells {
 
 void DenseBlock::load(const openvdb::FloatGrid::ConstAccessor& accessor, const Coord& origin) {
   origin_ = origin;
-  values_.fill([&](const Coord& step) {
-    return blockValues(accessor, origin.offsetBy(8 * step.x(), 8 * step.y(), 8 * step.z()));
-  });
+  // Rows of a neighbour block: address of the first, and steps to the next one along x and y. The
+  // rows of a constant block are one row.
+  struct Rows {
+    const float* first;
+    int stepX, stepY;
+  };
+  std::array<float, 8> constants[27];
+  Rows rows[27];
+  for (int i = 0; i < 27; ++i) {
+    const BlockValues values = blockValues(
+        accessor, origin.offsetBy(8 * (i / 9) - 8, 8 * (i / 3 % 3) - 8, 8 * (i % 3) - 8));
+    if (!values.values) constants[i].fill(values.constant);
+    rows[i] = values.values ? Rows{values.values, 64, 8} : Rows{constants[i].data(), 0, 0};
+  }
+  // This is faster than copyPadded(), because the sizes of the copies are constants.
+  static_assert(kPad == 4);
+  float* out = values_.values.data();
+  for (int x = -kPad; x < 8 + kPad; ++x)
+    for (int y = -kPad; y < 8 + kPad; ++y, out += kSide) {
+      const Rows* along = rows + ((x >> 3) + 1) * 9 + ((y >> 3) + 1) * 3;
+      const auto row = [&](int i) {
+        return along[i].first + (x & 7) * along[i].stepX + (y & 7) * along[i].stepY;
+      };
+      std::memcpy(out, row(0) + 4, 4 * sizeof(float));
+      std::memcpy(out + 4, row(1), 8 * sizeof(float));
+      std::memcpy(out + 12, row(2), 4 * sizeof(float));
+    }
+}
+
+bool DenseBlock::changesSign(const std::array<int, 3>& low, const std::array<int, 3>& high) const {
+  // Reads four values of each row at once, and ignores those outside the box. Reads nine rows, some
+  // of them twice in a small box. So there are no branches, which would be taken at random.
+  const int z = std::min(low[2], kSide - kPad - kLanes);
+  const IntLanes place = IntLanes{0, 1, 2, 3} + z, isIn = (place >= low[2]) & (place <= high[2]);
+  const float* first = values_.at(low[0], low[1], z);
+  const std::ptrdiff_t lastX = (high[0] - low[0]) * std::ptrdiff_t{kSide * kSide},
+                       lastY = (high[1] - low[1]) * std::ptrdiff_t{kSide};
+  IntLanes any = {0, 0, 0, 0}, all = {-1, -1, -1, -1};
+  for (const std::ptrdiff_t x : {std::ptrdiff_t{0}, std::ptrdiff_t{kSide * kSide}, lastX})
+    for (const std::ptrdiff_t y : {std::ptrdiff_t{0}, std::ptrdiff_t{kSide}, lastY}) {
+      const IntLanes inside = loadFour(first + x + y) < 0;
+      any |= inside;
+      all &= inside;
+    }
+  any &= isIn;
+  all |= ~isIn;
+  std::int64_t some[2], every[2];
+  std::memcpy(some, &any, sizeof(any));
+  std::memcpy(every, &all, sizeof(all));
+  return (some[0] | some[1]) != 0 && (every[0] & every[1]) != -1;
 }
 
 Jet DenseBlock::jet(const Vec3d& p) const {

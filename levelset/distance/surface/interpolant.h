@@ -2,10 +2,7 @@
 
 // Internal header of levelset: public headers must not include it.
 
-#include <algorithm>
 #include <array>
-#include <cstdint>
-#include <cstring>
 #include <vector>
 
 #include "levelset/distance/surface/lanes.h"
@@ -66,29 +63,9 @@ class DenseBlock {
     return values_.values[Values::slot(x, y, z)];
   }
   /// Returns true if the values in a box of grid points have both signs.
-  /// @param low, high  the box, inclusive; it has at most four grid points along z
+  /// @param low, high  the box, inclusive; it has two or three grid points along each axis
   [[nodiscard]] bool changesSign(const std::array<int, 3>& low,
-                                 const std::array<int, 3>& high) const {
-    // Reads four values of each row at once, and ignores those outside the box. So there are few
-    // branches, which would be taken at random.
-    const int z = std::min(low[2], kSide - kPad - kLanes);
-    const IntLanes place = IntLanes{0, 1, 2, 3} + z, isIn = (place >= low[2]) & (place <= high[2]);
-    IntLanes any = {0, 0, 0, 0}, all = {-1, -1, -1, -1};
-    for (int x = low[0]; x <= high[0]; ++x)
-      for (int y = low[1]; y <= high[1]; ++y) {
-        FloatLanes row;
-        std::memcpy(&row, values_.at(x, y, z), sizeof(row));
-        const IntLanes inside = row < 0;
-        any |= inside;
-        all &= inside;
-      }
-    any &= isIn;
-    all |= ~isIn;
-    std::array<std::int64_t, 2> some, every;
-    std::memcpy(some.data(), &any, sizeof(any));
-    std::memcpy(every.data(), &all, sizeof(all));
-    return (some[0] | some[1]) != 0 && (every[0] & every[1]) != -1;
-  }
+                                 const std::array<int, 3>& high) const;
   [[nodiscard]] static bool contains(const openvdb::Vec3d& p) {
     for (int i = 0; i < 3; ++i)
       if (!(p[i] >= kDomainMin && p[i] < kDomainMax)) return false;

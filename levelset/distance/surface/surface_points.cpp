@@ -221,6 +221,12 @@ SurfacePoints surfacePointsOf(const DenseBlock& block, float background,
   SurfacePoints found;
   std::vector<Crossings> crossingsOf;  // one for each search
   std::vector<FootSearch> searches;
+  constexpr std::size_t kUsual = 96;  // a plane through a block has about as many surface points
+  found.positions.reserve(kUsual);
+  found.gridPoints.reserve(kUsual);
+  found.sharp.reserve(kUsual);
+  crossingsOf.reserve(kUsual);
+  searches.reserve(kUsual);
   forEachPointBeside(block, background, [&](int x, int y, int z, const Crossings& crossings) {
     const Coord gridPoint = block.origin().offsetBy(x, y, z);
     TriangleTree::Hit hit;
