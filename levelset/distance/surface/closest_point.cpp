@@ -129,7 +129,7 @@ struct LaneSteps {
   NewtonStep<DoubleLanes> step;
 };
 
-/// Computes a Newton step from the points `y`.
+/// Computes a Newton step for each lane.
 LEVELSET_AVX2_CLONE
 void stepsFrom(const JetOf<DoubleLanes>& jets, const Triple<DoubleLanes>& toFrom,
                LaneSteps& result) {
@@ -309,13 +309,9 @@ bool changesSignAround(const DenseBlock& block, const Vec3d& point) {
   // A curved surface can bulge this far, in voxels, through the face of a cell before a corner
   // changes sign.
   constexpr double kBulge = 0.25;
-  std::array<int, 3> low, high;
-  for (int i = 0; i < 3; ++i) {
-    const auto axis = static_cast<std::size_t>(i);
-    low[axis] = static_cast<int>(std::floor(point[i] - kBulge));
-    high[axis] = static_cast<int>(std::floor(point[i] + kBulge)) + 1;
-  }
-  return block.changesSign(low, high);
+  const DoubleLanes p = {point.x(), point.y(), point.z(), 0};
+  const IntLanes low = floorOf(p - kBulge), high = floorOf(p + kBulge) + 1;
+  return block.changesSign({low[0], low[1], low[2]}, {high[0], high[1], high[2]});
 }
 
 }  // namespace levelset::eikonal
