@@ -152,7 +152,7 @@ TEST(ClosestPointLanes, SearchesByTwoStepsFindTheClosestPointsOnTheirOwn) {
     error = std::max(error, std::abs(feet[i].distance - exact.distance));
   }
   EXPECT_GT(converged, feet.size() / 2);
-  EXPECT_LE(error, support::measured(1e-4));
+  EXPECT_LE(error, support::measured(2.43e-7));
 }
 
 TEST(ClosestPointLanes, SignsChangeAroundThePointsOfTheSurface) {
