@@ -13,8 +13,9 @@
 #include "levelset/vdb.h"
 
 /// Compiles a function for AVX2, too, and takes that version on machines that have it. Both give
-/// the same bits: AVX2 does not imply fused operations. Functions that it calls must be
-/// LEVELSET_INLINE. Sanitizers start after the selection runs, so that they take one version.
+/// the same bits, because AVX2 does not contain fused operations. Functions on lanes that it calls
+/// must be LEVELSET_INLINE. Sanitized builds have one version, since the selection runs before the
+/// sanitizers start.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
     !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define LEVELSET_AVX2_CLONE __attribute__((target_clones("avx2", "default")))
@@ -84,16 +85,14 @@ LEVELSET_INLINE IntLanes floorOf(const DoubleLanes& x) {
 
 /// Swaps lanes and components: afterwards, rows[i][j] is the former rows[j][i].
 LEVELSET_INLINE void transpose(FloatLanes (&rows)[4]) {
-  const IntLanes low = {0, 4, 1, 5}, high = {2, 6, 3, 7}, first = {0, 1, 4, 5},
-                 second = {2, 3, 6, 7};
-  const FloatLanes a = __builtin_shuffle(rows[0], rows[1], low),
-                   b = __builtin_shuffle(rows[0], rows[1], high),
-                   c = __builtin_shuffle(rows[2], rows[3], low),
-                   d = __builtin_shuffle(rows[2], rows[3], high);
-  rows[0] = __builtin_shuffle(a, c, first);
-  rows[1] = __builtin_shuffle(a, c, second);
-  rows[2] = __builtin_shuffle(b, d, first);
-  rows[3] = __builtin_shuffle(b, d, second);
+  const FloatLanes a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 1, 5),
+                   b = __builtin_shufflevector(rows[0], rows[1], 2, 6, 3, 7),
+                   c = __builtin_shufflevector(rows[2], rows[3], 0, 4, 1, 5),
+                   d = __builtin_shufflevector(rows[2], rows[3], 2, 6, 3, 7);
+  rows[0] = __builtin_shufflevector(a, c, 0, 1, 4, 5);
+  rows[1] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
+  rows[2] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
+  rows[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
 
 /// Vector with components of type double, or of one number for each lane.
