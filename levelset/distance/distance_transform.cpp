@@ -40,9 +40,15 @@ LeafOrTile makeLeaf(const Block& block, const LeafNode* before, Polisher& polish
   std::unique_ptr<ClosestPointLeaf> points;
   if (request.visitPoints) points = std::make_unique<ClosestPointLeaf>();
   bool isOn = false;
-  for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n) {
-    auto [value, closest] = distanceAt(block, n, polisher, request);
-    if (points && closest) (*points)[n] = closest->point;
+  const NearestPoints::Mask near = nearBand(block, request);
+  polisher.prepare(block, near);
+  float* values = result.leaf->buffer().data();
+  for (auto it = near.beginOff(); it; ++it)
+    if (distanceAt(block, it.pos(), polisher, request).value < 0) values[it.pos()] = -background;
+  for (auto it = near.beginOn(); it; ++it) {
+    const openvdb::Index n = it.pos();
+    auto [value, closest] = nearDistanceAt(block, n, polisher, request);
+    if (points) (*points)[n] = closest->point;
     if (before && shift == 0 && before->isValueOn(n))
       value = keptOr(value, static_cast<double>(before->getValue(n)) / voxelSize, polisher,
                      block.nearest[n]);
@@ -63,8 +69,12 @@ FloatTree::Ptr makeTree(const FloatTree& field, const ZeroSet& surface,
 
   std::vector<const Block*> blocks;
   for (const Block& block : nearest.blocks()) blocks.push_back(&block);
-  std::sort(blocks.begin(), blocks.end(),
-            [](const Block* a, const Block* b) { return a->origin < b->origin; });
+  // Blocks in a cube of 4³ blocks follow each other, so that the dense copies of their surroundings
+  // are used again.
+  std::sort(blocks.begin(), blocks.end(), [](const Block* a, const Block* b) {
+    const Coord cubeA = a->origin & ~31, cubeB = b->origin & ~31;
+    return cubeA != cubeB ? cubeA < cubeB : a->origin < b->origin;
+  });
   std::vector<LeafOrTile> leaves(blocks.size());
   forEachWithPolisher(blocks.size(), surface,
                       subProgress(request.progress, 0.6, request.ofMovedSurface ? 0.8 : 1),

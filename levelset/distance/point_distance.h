@@ -20,10 +20,19 @@ struct PointDistance {
   std::optional<Closest> closest = {};
 };
 
+/// Returns the grid points of a block whose distance minus the requested shift may be below the
+/// half width.
+[[nodiscard]] NearestPoints::Mask nearBand(const NearestPoints::Block& block,
+                                           const DistanceRequest& request);
+
 /// Computes the distance of a grid point from the surface, minus the requested shift.
 /// @param n  number of the grid point in the block
 [[nodiscard]] PointDistance distanceAt(const NearestPoints::Block& block, openvdb::Index n,
                                        Polisher& polisher, const DistanceRequest& request);
+
+/// Computes distanceAt() for a grid point of nearBand().
+[[nodiscard]] PointDistance nearDistanceAt(const NearestPoints::Block& block, openvdb::Index n,
+                                           Polisher& polisher, const DistanceRequest& request);
 
 /// Returns the old value if the computed one equals it within the error of interpolation, voxels.
 /// So repeated redistancing does not shift a distance field.

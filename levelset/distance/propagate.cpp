@@ -67,7 +67,7 @@ void prefetchAround(const Block& block) {
   };
   for (openvdb::Index n = 0; n < 512; n += 16) {
     __builtin_prefetch(&block.nearest[n]);
-    __builtin_prefetch(&(*block.squared)[n]);
+    __builtin_prefetch(&block.squared[n]);
   }
   const std::uint32_t news = block.dirtyNeighbours.load(std::memory_order_relaxed);
   for (int i = 0; i < 27; ++i) {
@@ -87,8 +87,8 @@ class BlockWorker {
     held_.fill(-1);
     for (int x = block.low.x(); x <= block.high.x(); ++x)
       for (int y = block.low.y(); y <= block.high.y(); ++y)
-        std::copy(block.squared->begin() + offsetOf(x, y, block.low.z()),
-                  block.squared->begin() + offsetOf(x, y, block.high.z()) + 1,
+        std::copy(block.squared.begin() + offsetOf(x, y, block.low.z()),
+                  block.squared.begin() + offsetOf(x, y, block.high.z()) + 1,
                   held_.begin() + slot(x, y, block.low.z()));
   }
 
@@ -142,7 +142,7 @@ class BlockWorker {
     const openvdb::Index n = offsetOf(x, y, z);
     held_[static_cast<std::size_t>(slot(x, y, z))] = squared;
     at_[n] = at;
-    (*block_.squared)[n] = squared;
+    block_.squared[n] = squared;
     block_.nearest[n] = point;
     block_.own.setOff(n);
     changed_.setOn(n);
@@ -293,9 +293,8 @@ NearestPoints::Block& NearestPoints::touch(const Coord& origin) {
   }
   const float inside = squareOf(reach_.inside + kBlockMargin),
               outside = squareOf(reach_.outside + kBlockMargin);
-  block.squared = std::make_unique<std::array<float, 512>>();
   for (openvdb::Index n = 0; n < 512; ++n)
-    (*block.squared)[n] = block.inside.isOn(n) ? inside : outside;
+    block.squared[n] = block.inside.isOn(n) ? inside : outside;
   for (int i = 0; i < 27; ++i) {
     const auto found = index_.find(origin + blockStep(i));
     if (i == 13 || found == index_.end()) continue;
@@ -310,8 +309,8 @@ void NearestPoints::seed(const Coord& gridPoint, std::uint32_t point, bool own) 
   const openvdb::Index n = FloatTree::LeafNodeType::coordToOffset(gridPoint);
   const auto squared =
       static_cast<float>((points_.positions[point] - gridPoint.asVec3d()).lengthSqr());
-  if (block.nearest[n] != kNone && squared >= (*block.squared)[n]) return;
-  (*block.squared)[n] = squared;
+  if (block.nearest[n] != kNone && squared >= block.squared[n]) return;
+  block.squared[n] = squared;
   block.nearest[n] = point;
   block.own.set(n, own);
   block.queued.setOn(n);
@@ -417,7 +416,6 @@ void NearestPoints::run(const Progress& progress) {
     fraction += (1 - fraction) / 8;
     report(progress, fraction);
   }
-  for (Block& block : blocks_) block.squared.reset();
 }
 
 }  // namespace levelset::eikonal

@@ -5,7 +5,6 @@
 #include <array>
 #include <atomic>
 #include <deque>
-#include <memory>
 #include <unordered_map>
 
 #include "levelset/distance/surface/surface_points.h"
@@ -27,8 +26,8 @@ class NearestPoints {
     openvdb::Coord origin;
     std::array<std::uint32_t, 512> nearest;  ///< index of the nearest surface point, or kNone
     /// Squared distance to the nearest surface point, voxels². If there is none yet: the square of
-    /// the largest distance to compute plus a margin. Null after run(), to save memory.
-    std::unique_ptr<std::array<float, 512>> squared;
+    /// the largest distance to compute plus a margin.
+    std::array<float, 512> squared;
     Mask inside;  ///< grid points with φ < 0
     /// Grid points beside the zero set whose nearest surface point is the one found for themselves.
     Mask own;

@@ -5,6 +5,7 @@
 #include <array>
 #include <vector>
 
+#include "levelset/distance/surface/lanes.h"
 #include "levelset/grids/padded_leaf_vdb.h"
 #include "levelset/vdb.h"
 
@@ -27,6 +28,10 @@ struct Jet {
 struct CompactJet {
   std::array<float, 10> numbers{};
   CompactJet() = default;
+  CompactJet(const JetOf<DoubleLanes>& jets, int lane)
+      : CompactJet(Jet{jets.value[lane], vectorOf(jets.gradient, lane), jets.xx[lane],
+                       jets.yy[lane], jets.zz[lane], jets.xy[lane], jets.xz[lane], jets.yz[lane]}) {
+  }
   explicit CompactJet(const Jet& jet) {
     const double all[] = {jet.value, jet.gradient.x(), jet.gradient.y(), jet.gradient.z(), jet.xx,
                           jet.yy,    jet.zz,           jet.xy,           jet.xz,           jet.yz};
@@ -57,6 +62,10 @@ class DenseBlock {
   [[nodiscard]] float at(int x, int y, int z) const {
     return values_.values[Values::slot(x, y, z)];
   }
+  /// Returns true if the values in a box of grid points have both signs.
+  /// @param low, high  the box, inclusive; it has two or three grid points along each axis
+  [[nodiscard]] bool changesSign(const std::array<int, 3>& low,
+                                 const std::array<int, 3>& high) const;
   [[nodiscard]] static bool contains(const openvdb::Vec3d& p) {
     for (int i = 0; i < 3; ++i)
       if (!(p[i] >= kDomainMin && p[i] < kDomainMax)) return false;
@@ -69,7 +78,12 @@ class DenseBlock {
   /// @pre contains(p)
   void slope(const openvdb::Vec3d& p, Jet& jet) const;
 
+  /// Interpolates value and derivatives at a position for each lane, with the same bits as jet().
+  /// @pre contains() each position
+  void jets(const Triple<DoubleLanes>& p, JetOf<DoubleLanes>& result) const;
+
  private:
+  friend class DenseBlockCache;
   openvdb::Coord origin_;
   Values values_;
 };
@@ -81,6 +95,11 @@ class DenseBlockCache {
   /// Returns the block of the leaf that contains `position` (index space). Valid until the next
   /// call.
   const DenseBlock& around(const openvdb::Vec3d& position);
+  /// Returns the block of the leaf that begins at `origin`. Valid until the next call.
+  const DenseBlock& at(const openvdb::Coord& origin);
+  /// Interpolates value and gradient at a position for each lane, in index space, and leaves the
+  /// second derivatives in `result`. Gives the same bits as DenseBlock::slope().
+  void slopes(const Triple<DoubleLanes>& positions, JetOf<DoubleLanes>& result);
 
  private:
   struct Slot {

@@ -31,7 +31,7 @@ constexpr double kCrossingTolerance = 0.05;
 // near edges), voxels.
 constexpr double kSharpTolerance = 0.5;
 
-Vec3d vectorOf(const std::array<int, 3>& d) {
+Vec3d directionVector(const std::array<int, 3>& d) {
   return Vec3d(d[0], d[1], d[2]);
 }
 
@@ -54,7 +54,8 @@ struct Crossings {
   }
   [[nodiscard]] double nearestDistance() const { return at[static_cast<std::size_t>(nearest)]; }
   [[nodiscard]] Vec3d offset(int i) const {
-    return vectorOf(kDirections[static_cast<std::size_t>(i)]) * at[static_cast<std::size_t>(i)];
+    return directionVector(kDirections[static_cast<std::size_t>(i)]) *
+           at[static_cast<std::size_t>(i)];
   }
 };
 
@@ -78,9 +79,8 @@ Vec3d firstGuess(const DenseBlock& block, int x, int y, int z, const Crossings& 
 /// Finds the closest point of the zero set to a grid point beside it, in the frame of the block. A
 /// crossing nearer than the point that Newton's method found is used as another start. So the
 /// nearer wall of a narrow gap is found.
-Vec3d findFoot(const DenseBlock& block, int x, int y, int z, const Crossings& crossings) {
-  const Vec3d from(x, y, z);
-  Foot best = closestPoint(block, from, from + firstGuess(block, x, y, z, crossings));
+/// @param best  closest point from the start firstGuess()
+Vec3d footOf(const DenseBlock& block, const Vec3d& from, const Crossings& crossings, Foot best) {
   for (int i = 0; i < 6; ++i) {
     const double distance = crossings.at[static_cast<std::size_t>(i)];
     if (distance > 1 || (best.converged && distance > best.distance - kCrossingTolerance)) continue;
@@ -214,6 +214,65 @@ bool isThinAt(const DenseBlock& block, int x, int y, int z, float background) {
   return false;
 }
 
+/// Finds the surface points of one leaf. They do not include points on edges and corners.
+SurfacePoints surfacePointsOf(const DenseBlock& block, float background,
+                              const SharpPatches& patches) {
+  const Vec3d origin = block.origin().asVec3d();
+  SurfacePoints found;
+  std::vector<Crossings> crossingsOf;  // one for each search
+  std::vector<FootSearch> searches;
+  constexpr std::size_t kUsual = 96;  // a plane through a block has about as many surface points
+  found.positions.reserve(kUsual);
+  found.gridPoints.reserve(kUsual);
+  found.sharp.reserve(kUsual);
+  crossingsOf.reserve(kUsual);
+  searches.reserve(kUsual);
+  forEachPointBeside(block, background, [&](int x, int y, int z, const Crossings& crossings) {
+    const Coord gridPoint = block.origin().offsetBy(x, y, z);
+    TriangleTree::Hit hit;
+    if (patches.touches(gridPoint))
+      hit = patches.nearest(gridPoint.asVec3d(), crossings.nearestDistance() + kSharpTolerance);
+    const bool isSharp = hit.found && patches.covers(Coord::floor(hit.point));
+    if (!isSharp) {
+      const Vec3d from(x, y, z);
+      searches.push_back({from, from + firstGuess(block, x, y, z, crossings)});
+      crossingsOf.push_back(crossings);
+    }
+    found.positions.push_back(hit.point);
+    found.gridPoints.push_back(gridPoint);
+    found.sharp.push_back(isSharp);
+    if (found.thin.empty() && isThinAt(block, x, y, z, background))
+      found.thin.push_back(block.origin());
+  });
+  std::vector<Foot> feet;
+  closestPoints(block, searches, feet);
+  std::vector<Vec3d> places;  // positions of the jets, relative to the block
+  std::vector<std::size_t> owners;
+  std::size_t search = 0;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (found.sharp[i]) continue;
+    found.positions[i] =
+        origin + footOf(block, searches[search].from, crossingsOf[search], feet[search]);
+    ++search;
+    const Vec3d local = found.positions[i] - origin;
+    if (!DenseBlock::contains(local)) continue;
+    places.push_back(local);
+    owners.push_back(i);
+  }
+  found.jets.resize(found.size());
+  for (std::size_t first = 0; first < places.size(); first += kLanes) {
+    const std::size_t count = std::min<std::size_t>(kLanes, places.size() - first);
+    Triple<DoubleLanes> p;
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      setLane(p, static_cast<int>(lane), places[first + std::min(lane, count - 1)]);
+    JetOf<DoubleLanes> jets;
+    block.jets(p, jets);
+    for (std::size_t lane = 0; lane < count; ++lane)
+      found.jets[owners[first + lane]] = CompactJet(jets, static_cast<int>(lane));
+  }
+  return found;
+}
+
 }  // namespace
 
 SurfacePoints findSurfacePoints(const FloatTree& field, const BlockSelection& within,
@@ -222,23 +281,7 @@ SurfacePoints findSurfacePoints(const FloatTree& field, const BlockSelection& wi
   const float background = field.background();
   std::vector<SurfacePoints> found(leaves.size());
   forEachBlock(field, leaves, [&](std::size_t i, const DenseBlock& block) {
-    forEachPointBeside(block, background, [&](int x, int y, int z, const Crossings& crossings) {
-      const Vec3d origin = block.origin().asVec3d();
-      const Coord gridPoint = block.origin().offsetBy(x, y, z);
-      TriangleTree::Hit hit;
-      if (patches.touches(gridPoint))
-        hit = patches.nearest(gridPoint.asVec3d(), crossings.nearestDistance() + kSharpTolerance);
-      const bool isSharp = hit.found && patches.covers(Coord::floor(hit.point));
-      if (!isSharp) hit.point = origin + findFoot(block, x, y, z, crossings);
-      const Vec3d local = hit.point - origin;
-      found[i].positions.push_back(hit.point);
-      found[i].jets.push_back(!isSharp && DenseBlock::contains(local) ? CompactJet(block.jet(local))
-                                                                      : CompactJet());
-      found[i].gridPoints.push_back(gridPoint);
-      found[i].sharp.push_back(isSharp);
-      if (found[i].thin.empty() && isThinAt(block, x, y, z, background))
-        found[i].thin.push_back(block.origin());
-    });
+    found[i] = surfacePointsOf(block, background, patches);
   });
   SurfacePoints all;
   std::size_t count = 0;
