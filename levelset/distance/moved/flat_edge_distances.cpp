@@ -25,18 +25,30 @@ using openvdb::Vec3d;
 using LeafNode = openvdb::FloatTree::LeafNodeType;
 
 // Distances from a vertex on an edge, voxels, at which the faces beside it are known to be flat: on
-// the face, and along the edge. Where two such edges lead to a corner, their last vertices are at
-// most kToCorner from it.
-constexpr double kBesideFlatEdge = 3.5, kAlongFlatEdge = 1.5, kToCorner = 6;
+// the face, and along the edge; kAlongNarrow for faces that were fitted to a narrow strip. Where
+// two such edges lead to a corner, their last vertices are at most kToCorner from it.
+constexpr double kBesideFlatEdge = 3.5, kAlongFlatEdge = 1.5, kAlongNarrow = 0.5, kToCorner = 6;
 // Distance along each axis, voxels, within which an edge has a grid point with a wrong value.
 constexpr int kToFlatEdge = 2;
 // Distances to a rounding are at most off by kMostFlatChange, voxels. Values that differ by less
 // than kLeastFlatChange from the distance to flat faces are as exact as these.
 constexpr double kMostFlatChange = 0.05, kLeastFlatChange = 3e-4;
 // Faces count as the same if the dot product of their unit normals is larger. Number of faces that
-// may meet in a corner.
+// may meet in a corner, and least determinant of the unit normals of three of them.
 constexpr double kSameFace = 0.99;
 constexpr std::size_t kMostFaces = 6;
+constexpr double kLeastDeterminant = 0.1;
+
+/// Returns true if three of the planes meet in a point.
+bool haveCorner(const std::vector<FlatFace>& faces) {
+  for (std::size_t i = 2; i < faces.size(); ++i)
+    for (std::size_t j = 1; j < i; ++j)
+      for (std::size_t k = 0; k < j; ++k)
+        if (std::abs(faces[i].normal.dot(faces[j].normal.cross(faces[k].normal))) >
+            kLeastDeterminant)
+          return true;
+  return false;
+}
 
 /// Edges between flat faces of a field, by position.
 class FlatEdges {
@@ -122,7 +134,11 @@ class FlatEdges {
       }
       if (faces.size() > kMostFaces) return std::nullopt;
     }
-    if (faces.size() < 3 && near.front().along > kAlongFlatEdge) return std::nullopt;
+    const bool isAlong = std::any_of(near.begin(), near.end(), [](const Near& one) {
+      const auto& [first, second] = one.edge->faces;
+      return one.along < (first.isNarrow || second.isNarrow ? kAlongNarrow : kAlongFlatEdge);
+    });
+    if (!isAlong && !haveCorner(faces)) return std::nullopt;
     const double found = nearestOnPolyhedron(faces, point).distance;
     return isConvex ? found : -found;
   }

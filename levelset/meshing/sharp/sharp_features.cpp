@@ -21,6 +21,9 @@ using Triangle = MeshTriangle;
 /// A mesh edge or triangle within this distance, voxels, of the edge or corner of the solid stays
 /// as it is.
 constexpr double kFeatureTolerance = 0.01;
+/// Largest distance, voxels, of a vertex beyond an edge of its face if it is to move onto the edge.
+/// Its neighbour on the other face is at least kOffEdge voxels from the plane of the first face.
+constexpr double kBeyondEdge = 0.05, kOffEdge = 0.1;
 /// Largest distance of a new vertex from the middle of the mesh edge or triangle that it splits,
 /// voxels.
 constexpr double kFeatureReach = 1.5;
@@ -86,6 +89,7 @@ class FeatureInserter {
         progress_(progress) {}
 
   void run() {
+    pullOntoEdges();
     collectCorners();
     for (int pass = 0; pass < kPasses; ++pass) {
       const auto reportProgress = [&](double done) { report(progress_, (pass + done) / kPasses); };
@@ -103,6 +107,46 @@ class FeatureInserter {
   }
 
  private:
+  /// Moves vertices that lie on one face, slightly beyond its edge, onto the edge.
+  void pullOntoEdges() {
+    std::vector<std::pair<std::uint32_t, NewVertex>> moved;
+    for (const Triangle& t : triangles_)
+      for (std::size_t i = 0; i < 3; ++i)
+        for (const std::uint32_t b : {t[(i + 1) % 3], t[(i + 2) % 3]})
+          if (sheets_[t[i]].count == 1)
+            if (auto vertex = onEdge(t[i], b)) moved.emplace_back(t[i], *vertex);
+    std::sort(moved.begin(), moved.end(), [](const auto& p, const auto& q) {
+      return std::tie(p.first, p.second.gap) < std::tie(q.first, q.second.gap);
+    });
+    std::uint32_t last = kNoVertex;
+    for (const auto& [v, vertex] : moved) {
+      if (v == last) continue;
+      last = v;
+      positions_[v] = vertex.position;
+      sheets_[v] = vertex.sheets;
+    }
+  }
+
+  /// Returns the nearest position on the edge between the sheet of vertex `a` and one of the sheets
+  /// of its neighbour `b`, if `a` lies slightly beyond that edge.
+  [[nodiscard]] std::optional<NewVertex> onEdge(std::uint32_t a, std::uint32_t b) const {
+    const Vec3d na = sheetNormal(sheets_[a], 0), to = positions_[b] - positions_[a];
+    std::optional<NewVertex> best;
+    for (std::size_t i = 0; i < sheets_[b].count; ++i) {
+      const Vec3d nb = sheetNormal(sheets_[b], i);
+      const double cosine = na.dot(nb), above = -nb.dot(to), other = na.dot(to);
+      if (std::abs(cosine) > kCreaseCosine || std::abs(above) > kBeyondEdge ||
+          std::abs(other) < kOffEdge || above * other >= 0)
+        continue;
+      const Vec3d along = nb - na * cosine;  // in the plane of `a`
+      const Vec3d shift = along * (-above / along.lengthSqr());
+      if (best && best->gap <= shift.length()) continue;
+      best = NewVertex{positions_[a] + shift, sheets_[a], shift.length()};
+      addSheet(best->sheets, nb);
+    }
+    return best;
+  }
+
   [[nodiscard]] double gapBetween(std::uint32_t a, std::uint32_t b) const {
     return sheetGap(positions_[a], sheets_[a], positions_[b], sheets_[b]);
   }

@@ -119,6 +119,40 @@ TEST(Offset, KeepsARotatedCubeSharp) {
   }
 }
 
+/// Cuboid of half sizes `half`, rotated as in turnedBox(); not rotated if `turn` is negative.
+Shape turnedCuboid(const V3d& half, int turn, const V3d& centre) {
+  Imath::M44d back;
+  if (turn >= 0) back.setEulerAngles(V3d(0.3 + 0.37 * turn, 0.5 + 0.11 * turn, 0.7 - 0.23 * turn));
+  back.transpose();
+  return [=](const V3d& p) {
+    V3d r;
+    back.multDirMatrix(p - centre, r);
+    const V3d q(std::abs(r.x) - half.x, std::abs(r.y) - half.y, std::abs(r.z) - half.z);
+    const V3d out(std::max(q.x, 0.0), std::max(q.y, 0.0), std::max(q.z, 0.0));
+    return out.length() + std::min(0.0, std::max({q.x, q.y, q.z}));
+  };
+}
+
+TEST(Offset, RestoresEdgesAndCornersOnTheWayBack) {
+  // The roundings of the first offset become edges again. Curvature jumps beside the roundings.
+  for (int turn = -1; turn < 3; ++turn) {
+    const Shape solid = turnedCuboid(V3d(24, 18, 12), turn, kCentre);
+    const NarrowBand back = offset(offset(sample(solid, 35), 5), -5);
+    EXPECT_LE(bandError(back, solid).linf, support::measured(3.5e-4)) << turn;
+    EXPECT_LE(bandError(back, solid).l1, support::measured(9.2e-6)) << turn;
+  }
+}
+
+TEST(Offset, FindsTheCornersOfNarrowBoxes) {
+  // Both edges of the narrow faces are near. They must not count as a corner with the wide face.
+  for (const V3d& centre : {V3d(0.5), V3d(0.25, 0.5, 0.75), kCentre}) {
+    const NarrowBand solid = sample(turnedCuboid(V3d(7.2, 5.4, 4.2), -1, centre), 10);
+    EXPECT_LE(bandError(offset(solid, -2.4), turnedCuboid(V3d(4.8, 3, 1.8), -1, centre)).linf,
+              support::measured(8.6e-6))
+        << centre;
+  }
+}
+
 TEST(Offset, DoesNotSharpenRoundSolids) {
   // Curvatures of 1/3 to 1/5 per voxel: curved, but no edge.
   for (const double radius : {3.0, 4.0, 5.0}) {
