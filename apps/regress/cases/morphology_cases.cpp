@@ -77,9 +77,11 @@ void hollow(Recorder& out) {
 
 Bounds openingClosingBounds() {
   return Bounds()
-      .measured(
-          "opening of a box", "band_in_linf_vx",
-          {{12, 0.0297}, {16, 0.00944}, {24, 0.00863}, {32, 0.0109}, {64, 0.00131}, {128, 0.00143}})
+      .measured("opening of a box", "band_in_linf_vx",
+                {{12, 0.00481}, {32, 0.00483}, {128, 0.00143}})
+      .rounding("opening of a box", "band_in_linf_vx", 2.5, 64)
+      .rounding("opening of a box", "band_in_linf_vx", 2.5, 24)
+      .rounding("opening of a box", "band_in_linf_vx", 2.5, 16)
       .measured("opening of a box", "band_out_linf_vx",
                 {{12, 0.00483}, {32, 0.00936}, {128, 0.00138}})
       .rounding("opening of a box", "band_out_linf_vx", 2, 16)
@@ -97,9 +99,13 @@ Bounds openingClosingBounds() {
       .rounding("closing of a box", "band_in_linf_vx", 1.5, 16)
       .rounding("closing of a box", "band_in_linf_vx", 1.5, 24)
       .rounding("closing of a box", "band_in_linf_vx", 1.5, 64)
-      .measured(
-          "closing of a box", "band_out_linf_vx",
-          {{12, 0.0155}, {16, 0.0062}, {24, 0.00234}, {32, 0.0016}, {64, 0.00128}, {128, 0.00145}})
+      .measured("closing of a box", "band_out_linf_vx",
+                {{12, 0.000316},
+                 {16, 0.000275},
+                 {24, 9.91e-05},
+                 {32, 0.00034},
+                 {64, 0.000228},
+                 {128, 0.000195}})
       .measured("opening of a box", "missed_hits",
                 {{12, 0.00262}, {16, 0.00218}, {32, 0.000205}, {128, 0.000162}})
       .measured(

@@ -25,6 +25,9 @@ constexpr double kTouchMargin = 0.75;
 /// Largest magnitude of the field at the foot of a plane, voxels. Beside an edge, a plane may
 /// extend beyond its face.
 constexpr double kOffSurface = 0.3;
+/// A point this far outside a cell, voxels, counts as on its border: faces may run through grid
+/// points.
+constexpr double kOnBorder = 1e-4;
 /// Largest distance of a vertex from its cell, voxels.
 constexpr double kVertexReach = 1;
 /// Largest distance of a vertex from a plane, voxels, up to which the plane counts as one of its
@@ -158,8 +161,8 @@ class VertexPlacer::Impl {
   /// plane.
   void placeByPlanes(const Vector3d& centre, unsigned corners, DualVertex& vertex) {
     for (const auto& [touch, reach] :
-         {std::pair(kTouchMargin, 0.0), std::pair(0.0, 0.0), std::pair(kTouchMargin, kVertexReach),
-          std::pair(0.0, kVertexReach)}) {
+         {std::pair(kTouchMargin, kOnBorder), std::pair(kOnBorder, kOnBorder),
+          std::pair(kTouchMargin, kVertexReach), std::pair(kOnBorder, kVertexReach)}) {
       collectPlanes(corners, touch);
       if (planes_.empty()) continue;
       const Vector3d fitted = fitPlanes(planes_, centre);
