@@ -12,10 +12,10 @@ status=0
 run() {  # run NAME OPTION… : a row of the table
   name=$1
   shift
-  /usr/bin/time -f '%e %U %M' -o "$folder/time" "$levelsmith" "$@" 2>"$folder/log" || { cat "$folder/log" >&2; exit 1; }
+  /usr/bin/time -f '%e %U %S %M' -o "$folder/time" "$levelsmith" "$@" 2>"$folder/log" || { cat "$folder/log" >&2; exit 1; }
   parts=$(sed -n 's/.*computed in \([0-9]*\) parts.*/\1/p' "$folder/log")
-  awk -v name="$name" -v parts="${parts:-1}" '{ printf "%-34s %7.1f %9.1f %8.0f %6d\n", name, $1, $2, $3 / 1024, parts }' "$folder/time"
-  megabytes=$(awk '{ print int($3 / 1024) }' "$folder/time")
+  awk -v name="$name" -v parts="${parts:-1}" '{ printf "%-34s %7.1f %9.1f %8.0f %6d\n", name, $1, $2 + $3, $4 / 1024, parts }' "$folder/time"
+  megabytes=$(awk '{ print int($4 / 1024) }' "$folder/time")
 }
 
 printf '%-34s %7s %9s %8s %6s\n' run "wall, s" "CPU, s" "peak, MB" parts
