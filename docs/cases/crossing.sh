@@ -31,4 +31,4 @@ frames crossing | sed 's/^/| corners /'
 frames crossing-rigid | sed 's/^/| rigid /'
 expect crossing frames = 4
 expect crossing reused = 0
-sheet crossing 4 "crossing-0=t = 0" "crossing-1=t = 0.33" "crossing-2=t = 0.66" "crossing-3=t = 1"
+sheet crossing 4 "crossing-0=t = 0" "crossing-1=t = 0.33" "crossing-2=t = 0.67" "crossing-3=t = 1"

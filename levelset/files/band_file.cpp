@@ -157,6 +157,19 @@ struct ChosenGrid {
     return withContext(name, [&] { return importBand(grid, options.repairs); });
   }
 
+  void visitBlocks(const std::function<void(const Imath::V3d&)>& visit) const {
+    if (!hasNumbers(entry)) refuseType("float, half and double");
+    const auto visitLeaf = [&](const openvdb::Coord& origin) {
+      visit(toImath(entry.transform->indexToWorld(origin.asVec3d() + openvdb::Vec3d(3.5))));
+    };
+    const auto readTopology = [&](std::string_view bytes, const std::string& of,
+                                  const VdbEntry& owner, VdbTreeLimits limits) {
+      limits.visit = visitLeaf;
+      return readVdbTree(bytes, of, owner, limits);
+    };
+    static_cast<void>(load<openvdb::FloatGrid>(readTopology, true));
+  }
+
   [[nodiscard]] FieldGrid field() const {
     if (hasNumbers(entry)) {
       const auto grid = load<openvdb::FloatGrid>(readVdbTree, true);
@@ -276,6 +289,16 @@ GridInfo describe(const VdbEntry& entry, const VdbEntry& owner, std::string_view
 
 NarrowBand readBand(const fs::path& path, const ReadBandOptions& options) {
   return readFrom(path, options, [](const ChosenGrid& chosen) { return chosen.band(); });
+}
+
+void visitBlocks(const fs::path& path, const ReadBandOptions& options,
+                 const std::function<void(const Imath::V3d&)>& visit) {
+  ReadBandOptions part = options;
+  part.region = Imath::Box3d(Imath::V3d(0));  // the file is mapped then, and not held in memory
+  static_cast<void>(readFrom(path, part, [&](const ChosenGrid& chosen) {
+    chosen.visitBlocks(visit);
+    return true;
+  }));
 }
 
 FieldGrid readField(const fs::path& path, const ReadBandOptions& options) {

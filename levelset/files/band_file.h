@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -42,6 +43,13 @@ struct ReadBandOptions {
 /// @throws as readBand; also InvalidInput for NaN or infinite values
 [[nodiscard]] FieldGrid readField(const std::filesystem::path& path,
                                   const ReadBandOptions& options = {});
+
+/// Calls visit with the centre of each block of 8³ grid points of a level set, world units. Reads
+/// no values, so memory holds only the upper nodes of the tree.
+/// @param options  `region` is ignored
+/// @throws as readBand
+void visitBlocks(const std::filesystem::path& path, const ReadBandOptions& options,
+                 const std::function<void(const Imath::V3d&)>& visit);
 
 /// Result of readGrid: a level set as a band, any other grid as a field.
 using BandOrField = std::variant<NarrowBand, FieldGrid>;

@@ -88,6 +88,8 @@ struct VdbTreeLimits {
   bool keepsTiles = false;
   /// Only leaves and active tiles that intersect this index box are read; empty: all.
   std::optional<openvdb::CoordBBox> region = {};
+  /// Called with the origin of each leaf; no leaf is read then. May be empty.
+  std::function<void(const openvdb::Coord&)> visit = {};
   /// Called with the byte offset up to which leaf values have been located; may be empty.
   std::function<void(std::size_t)> passed = {};
   Progress progress = {};

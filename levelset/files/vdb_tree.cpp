@@ -193,6 +193,7 @@ class TreeReader {
   typename TreeT::Ptr read() {
     auto tree = std::make_shared<TreeT>();
     readRoot(tree->root());
+    if (limits_.visit) return tree;
     const std::vector<std::size_t> offsets = skipLeafValues();
     std::erase(leaves_, nullptr);
     ProgressGate gate(limits_.progress, leaves_.size());
@@ -277,7 +278,8 @@ class TreeReader {
   template <typename Node>
   std::unique_ptr<Node> readNode(const Coord& origin) {
     if constexpr (Node::LEVEL == 0) {
-      if (!isNeeded<Node>(origin)) {
+      if (limits_.visit) limits_.visit(origin);
+      if (limits_.visit || !isNeeded<Node>(origin)) {
         static_cast<void>(takeMask<typename Node::NodeMaskType>(bytes_));
         leaves_.push_back(nullptr);
         return nullptr;

@@ -10,6 +10,7 @@
 
 #include "apps/pipeline/run/graph_run.h"
 #include "apps/pipeline/run/planner.h"
+#include "apps/pipeline/run/surface_spread.h"
 #include "levelset/error.h"
 #include "levelset/files/band_parts_writer.h"
 
@@ -26,9 +27,9 @@ using levelset::kPartCell;
 /// the planned bounds of a band are an estimate.
 constexpr int kFarCell = 1 << 30;
 
-/// Share of the memory limit that a part may use, by the estimate before it is computed. The
-/// surface is not spread evenly, so a part can need several times the estimate.
-constexpr double kPartShare = 0.25;
+/// Share of the memory limit that a part may use, by the estimate before it is computed. The rest
+/// is for the mesh, for the result's blocks and for the error of the estimate.
+constexpr double kPartShare = 0.4;
 
 /// The box of an index box with half a voxel around its grid points, world units.
 Box3d worldBox(const Box3i& cells, double voxelSize) {
@@ -103,7 +104,12 @@ void GraphRun::runInParts(std::size_t write) {
     graph.given.emplace(i, values_.peek(i));
   }
   const std::vector<char> runs = neededNodes(graph);
-  const double budget = kPartShare * static_cast<double>(settings_.maxMemory);
+  // Memory is in proportion to the surface in a part.
+  const double budget = kPartShare * static_cast<double>(settings_.maxMemory),
+               whole = estimatePeak(graph, runs, plans_, regionsOfInterest(graph, runs, plans_));
+  std::size_t first = 0;
+  while (graph.nodes[first].kind != Kind::Band || !runs[first]) ++first;
+  const ShareOfBox share = shareOfBox(graph, first, *plans_[first]);
 
   Invocation writing(*node.op, node.options);
   levelset::WriteBandOptions options{.name = writing.text("name"),
@@ -118,6 +124,11 @@ void GraphRun::runInParts(std::size_t write) {
   RunSettings settings = settings_;
   settings.measureErrors = false;
   settings.thumbnails = 0;
+  // The allocator keeps what an action has released, and the memory limit counts it.
+  settings.begin = [&](const std::string& action) {
+    malloc_trim(0);
+    if (settings_.begin) settings_.begin(action);
+  };
   std::set<std::string> told;
   settings.warn = [&](const std::string& text) {
     if (told.insert(text).second) settings_.warn(text);
@@ -138,7 +149,7 @@ void GraphRun::runInParts(std::size_t write) {
     const auto split = [&] { parts.insert(parts.end(), {high, low}); };
     const std::vector<RegionOfInterest> regions =
         regionsOfInterest(graph, runs, plans_, 1, worldBox(within(part, around), plan.voxelSize));
-    if (canSplit && estimatePeak(graph, runs, plans_, regions) > budget) {
+    if (canSplit && whole * share(regions[first].region) > budget) {
       split();
       continue;
     }

@@ -60,6 +60,25 @@ TEST(BandFile, KeepsEveryBit) {
   EXPECT_EQ(again.indexToWorld(), band.indexToWorld());
 }
 
+TEST(BandFile, BlocksAreVisitedAtTheCentresOfTheLeaves) {
+  const TemporaryFolder folder;
+  NarrowBand band = sphere();
+  levelset::editVdb(band).transform().postRotate(0.3, openvdb::math::Y_AXIS);
+  levelset::writeBand(folder / "a.vdb", band);
+  std::vector<Imath::V3d> centres;
+  levelset::visitBlocks(folder / "a.vdb", {},
+                        [&](const Imath::V3d& centre) { centres.push_back(centre); });
+  const FloatGrid& grid = levelset::vdb(band);
+  ASSERT_EQ(centres.size(), grid.tree().leafCount());
+  ASSERT_GT(centres.size(), 7u);
+  std::size_t i = 0;
+  for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf, ++i) {
+    const openvdb::Vec3d centre(leaf->origin().x() + 3.5, leaf->origin().y() + 3.5,
+                                leaf->origin().z() + 3.5);
+    EXPECT_LT((centres[i] - levelset::toImath(grid.indexToWorld(centre))).length(), 1e-12);
+  }
+}
+
 TEST(BandFile, IsReadByOpenVdbWithTheSameValues) {
   const TemporaryFolder folder;
   const NarrowBand band = sphere();
