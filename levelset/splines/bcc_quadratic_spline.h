@@ -10,8 +10,8 @@ namespace levelset {
 /// s ∈ {−1, 1}³ of the grid cube of the cell, divided by eight.
 template <class Scalar>
 struct BccCell {
-  Scalar mean{};
-  std::array<Scalar, 3> difference{};
+  Scalar mean = Scalar(0);
+  std::array<Scalar, 3> difference = {Scalar(0), Scalar(0), Scalar(0)};
 };
 
 /// Returns the cell's numbers from the eight data of its grid cube.
