@@ -12,11 +12,11 @@
 
 namespace regress {
 
-using Imath::V3d;
 using levelset::BccCell;
 using levelset::BccPartition;
 using levelset::BccQuadraticSpline;
-using Form = levelset::BernsteinTetrahedron<2, V3d>;
+template <class Real>
+using Form = levelset::BernsteinTetrahedron<2, KalbeNumbers<Real>>;
 
 namespace {
 
@@ -29,11 +29,12 @@ constexpr int kSide = 2 * kSteps + 1;  ///< lattice points across a cell
 constexpr int kRing = 3;               ///< cells beyond the first and the last datum that are read
 
 struct Accumulator {
-  V3d data{0.0}, max{0.0}, sum{0.0}, squares{0.0};
+  std::array<double, 3> data{}, max{}, sum{}, squares{};
 
-  void add(const V3d& error, double times, bool isDatum) {
-    for (int f = 0; f < 3; ++f) {
-      const double e = std::abs(error[f]);
+  template <class Real>
+  void add(const KalbeNumbers<Real>& error, double times, bool isDatum) {
+    for (std::size_t f = 0; f < 3; ++f) {
+      const double e = std::abs(static_cast<double>(error.of[f]));
       max[f] = std::max(max[f], e);
       sum[f] += times * e;
       squares[f] += times * e * e;
@@ -41,18 +42,17 @@ struct Accumulator {
     }
   }
   void add(const Accumulator& other) {
-    for (int f = 0; f < 3; ++f) {
+    for (std::size_t f = 0; f < 3; ++f) {
       data[f] = std::max(data[f], other.data[f]);
       max[f] = std::max(max[f], other.max[f]);
+      sum[f] += other.sum[f];
+      squares[f] += other.squares[f];
     }
-    sum += other.sum;
-    squares += other.squares;
   }
   [[nodiscard]] KalbeTables::Row errors(double count) const {
     KalbeTables::Row row;
-    for (int f = 0; f < 3; ++f)
-      row[static_cast<std::size_t>(f)] = {data[f], max[f], sum[f] / count,
-                                          std::sqrt(squares[f] / count)};
+    for (std::size_t f = 0; f < 3; ++f)
+      row[f] = {data[f], max[f], sum[f] / count, std::sqrt(squares[f] / count)};
     return row;
   }
 };
@@ -70,18 +70,19 @@ struct MeasuredPoint {
 };
 
 /// Tables that are the same for all cells.
+template <class Real>
 struct CellPoints {
-  std::array<std::array<double, 4>, kPoints> linear{};
-  std::array<std::array<double, 10>, kPoints> quadratic{};
+  std::array<std::array<Real, 4>, kPoints> linear{};
+  std::array<std::array<Real, 10>, kPoints> quadratic{};
   std::vector<std::vector<MeasuredPoint>> own;  ///< for each tetrahedron, the points it measures
   std::vector<std::vector<MeasuredPoint>> all;  ///< for each tetrahedron, all of its points
 
   CellPoints() : own(BccPartition::kTetrahedra), all(BccPartition::kTetrahedra) {
     constexpr auto kExponents = levelset::bernsteinExponents<4, kDegree>();
     for (int p = 0; p < kPoints; ++p) {
-      const auto point = levelset::bernsteinDomainPoint<double>(kExponents[p]);
+      const auto point = levelset::bernsteinDomainPoint<Real>(kExponents[p]);
       linear[p] = point;
-      quadratic[p] = levelset::bernsteinBasis<4, 2, double>(point);
+      quadratic[p] = levelset::bernsteinBasis<4, 2, Real>(point);
     }
     std::map<std::array<int, 3>, std::pair<int, std::size_t>> first;
     for (int t = 0; t < BccPartition::kTetrahedra; ++t) {
@@ -110,20 +111,23 @@ struct CellPoints {
 };
 
 /// BccCells of the grid from −½ to ½ with n steps, and of some cells around it.
+template <class Real>
 class CellGrid {
  public:
   explicit CellGrid(int n) : side_(n + 2 * kRing + 2) {
-    const double h = 1.0 / n;
+    const Real h = Real(1) / Real(n);
     const int data = side_ + 1;
-    std::vector<V3d> values(static_cast<std::size_t>(data * data * data));
+    std::vector<KalbeNumbers<Real>> values(static_cast<std::size_t>(data * data * data));
     const auto place = [&](int side, int i, int j, int k) {
       return static_cast<std::size_t>(((i + kRing) * side + j + kRing) * side + k + kRing);
     };
-    std::vector<KalbeHeight> heights;
-    for (int k = -kRing; k < data - kRing; ++k) heights.push_back(kalbeHeight(k * h - 0.5));
+    std::vector<KalbeHeight<Real>> heights;
+    for (int k = -kRing; k < data - kRing; ++k)
+      heights.push_back(kalbeHeight<Real>(Real(k) * h - Real(0.5)));
     for (int i = -kRing; i < data - kRing; ++i)
       for (int j = -kRing; j < data - kRing; ++j) {
-        const KalbeColumn column = kalbeColumn(i * h - 0.5, j * h - 0.5, 0);
+        const KalbeColumn<Real> column =
+            kalbeColumn<Real>(Real(i) * h - Real(0.5), Real(j) * h - Real(0.5), 0);
         for (int k = -kRing; k < data - kRing; ++k)
           values[place(data, i, j, k)] =
               kalbeValue(column, heights[static_cast<std::size_t>(k + kRing)]);
@@ -136,84 +140,87 @@ class CellGrid {
           cells_[place(side_, i, j, k)] = levelset::bccCell(sample, {i, j, k});
   }
 
-  const BccCell<V3d>& operator()(const std::array<int, 3>& cell) const {
+  const BccCell<KalbeNumbers<Real>>& operator()(const std::array<int, 3>& cell) const {
     return cells_[static_cast<std::size_t>(((cell[0] + kRing) * side_ + cell[1] + kRing) * side_ +
                                            cell[2] + kRing)];
   }
 
  private:
   int side_;
-  std::vector<BccCell<V3d>> cells_;
+  std::vector<BccCell<KalbeNumbers<Real>>> cells_;
 };
 
 /// Derivatives by x at the four vertices of a tetrahedron, per grid spacing. They are linear.
-std::array<V3d, 4> slopesAtVertices(const Form& form,
-                                    const levelset::BarycentricMap<4, double>& map) {
-  std::array<V3d, 4> slopes{};
+template <class Real>
+std::array<KalbeNumbers<Real>, 4> slopesAtVertices(const Form<Real>& form,
+                                                   const levelset::BarycentricMap<4, Real>& map) {
+  std::array<KalbeNumbers<Real>, 4> slopes{};
   for (int v = 0; v < 4; ++v) {
-    slopes[v] = V3d(0);
+    slopes[v] = KalbeNumbers<Real>(0);
     for (int m = 0; m < 4; ++m) {
       std::array<int, 4> e{};
       ++e[v];
       ++e[m];
-      slopes[v] += 2 * map.rows[m][0] * form.at(e);
+      slopes[v] += (2 * map.rows[m][0]) * form.at(e);
     }
   }
   return slopes;
 }
 
-}  // namespace
-
-KalbeTables kalbeTables(int n, bool withSecond, const std::function<void()>& tick) {
-  static const CellPoints points;
-  const CellGrid cells(n);
-  const double h = 1.0 / n;
+template <class Real>
+KalbeTables measuredTables(int n, bool withSecond, const std::function<void()>& tick) {
+  static const CellPoints<Real> points;
+  const CellGrid<Real> cells(n);
+  const Real h = Real(1) / Real(n);
   // The position of a lattice point of the cells −1 to n, along an axis.
   const auto position = [&](int cell, int step) {
-    return (kSteps * cell + kSteps / 2 + step - kSteps) * (h / kSteps) - 0.5;
+    return Real(kSteps * cell + kSteps / 2 + step - kSteps) * (h / kSteps) - Real(0.5);
   };
-  std::array<levelset::BarycentricMap<4, double>, BccPartition::kTetrahedra> maps{};
+  std::array<levelset::BarycentricMap<4, Real>, BccPartition::kTetrahedra> maps{};
   for (int t = 0; t < BccPartition::kTetrahedra; ++t)
-    maps[t] = BccPartition::barycentric<double>({{0, 0, 0}, t});
-  std::vector<KalbeHeight> heights;
+    maps[t] = BccPartition::barycentric<Real>({{0, 0, 0}, t});
+  std::vector<KalbeHeight<Real>> heights;
   for (int k = -1; k <= n; ++k)
     for (int s = 0; s < kSide; ++s) heights.push_back(kalbeHeight(position(k, s)));
 
   const auto measureColumn = [&](int i, int j) {
     Accumulators result;
-    std::array<std::vector<KalbeColumn>, 3> columns;
+    std::array<std::vector<KalbeColumn<Real>>, 3> columns;
     for (int order = 0; order < (withSecond ? 3 : 2); ++order)
       for (int x = 0; x < kSide; ++x)
         for (int y = 0; y < kSide; ++y)
           columns[order].push_back(kalbeColumn(position(i, x), position(j, y), order));
     for (int k = i % 2 == 0 ? 0 : -1; k <= n; k += 2) {
-      const KalbeHeight* const height = &heights[static_cast<std::size_t>((k + 1) * kSide)];
+      const KalbeHeight<Real>* const height = &heights[static_cast<std::size_t>((k + 1) * kSide)];
       for (int t = 0; t < BccPartition::kTetrahedra; ++t) {
         const levelset::PartitionTetrahedron tetrahedron{{i, j, k}, t};
-        const Form q3 = BccQuadraticSpline<3>::fromCells<V3d>(cells, tetrahedron);
-        const Form q2 = BccQuadraticSpline<2>::fromCells<V3d>(cells, tetrahedron);
-        const std::array<V3d, 4> slopes = slopesAtVertices(q2, maps[t]);
+        const Form<Real> q3 =
+            BccQuadraticSpline<3>::fromCells<KalbeNumbers<Real>>(cells, tetrahedron);
+        const Form<Real> q2 =
+            BccQuadraticSpline<2>::fromCells<KalbeNumbers<Real>>(cells, tetrahedron);
+        const std::array<KalbeNumbers<Real>, 4> slopes = slopesAtVertices(q2, maps[t]);
         for (const MeasuredPoint& p : points.own[t]) {
           const auto& quadratic = points.quadratic[p.row];
           const auto& linear = points.linear[p.row];
-          V3d value3(0.0), value2(0.0), slope(0.0);
+          KalbeNumbers<Real> value3(0), value2(0), slope(0);
           for (int c = 0; c < 10; ++c) {
             value3 += quadratic[c] * q3.coefficients[c];
             value2 += quadratic[c] * q2.coefficients[c];
           }
           for (int v = 0; v < 4; ++v) slope += linear[v] * slopes[v];
-          const V3d exact = kalbeValue(columns[0][p.column], height[p.z]);
-          const V3d exactSlope = kalbeValue(columns[1][p.column], height[p.z]);
+          const KalbeNumbers<Real> exact = kalbeValue(columns[0][p.column], height[p.z]);
+          const KalbeNumbers<Real> exactSlope = kalbeValue(columns[1][p.column], height[p.z]);
           result.valueOfQ3.add(value3 - exact, p.times, p.isDatum);
           result.valueOfQ2.add(value2 - exact, p.times, p.isDatum);
-          result.slopeOfQ2.add(slope / h - exactSlope, p.times, p.isDatum);
+          result.slopeOfQ2.add(Real(n) * slope - exactSlope, p.times, p.isDatum);
         }
         if (!withSecond) continue;
-        V3d second(0.0);
+        KalbeNumbers<Real> second(0);
         for (int v = 0; v < 4; ++v) second += maps[t].rows[v][0] * slopes[v];
         for (const MeasuredPoint& p : points.all[t])
-          result.secondOfQ2.add(second / (h * h) - kalbeValue(columns[2][p.column], height[p.z]), 1,
-                                p.isDatum);
+          result.secondOfQ2.add(
+              Real(n) * Real(n) * second - kalbeValue(columns[2][p.column], height[p.z]), 1,
+              p.isDatum);
       }
     }
     return result;
@@ -239,6 +246,23 @@ KalbeTables kalbeTables(int n, bool withSecond, const std::function<void()>& tic
   }
   return {all.valueOfQ3.errors(count), all.valueOfQ2.errors(count), all.slopeOfQ2.errors(count),
           all.secondOfQ2.errors(count)};
+}
+
+}  // namespace
+
+template <>
+KalbeTables kalbeTables<float>(int n, bool withSecond, const std::function<void()>& tick) {
+  return measuredTables<float>(n, withSecond, tick);
+}
+
+template <>
+KalbeTables kalbeTables<double>(int n, bool withSecond, const std::function<void()>& tick) {
+  return measuredTables<double>(n, withSecond, tick);
+}
+
+template <>
+KalbeTables kalbeTables<long double>(int n, bool withSecond, const std::function<void()>& tick) {
+  return measuredTables<long double>(n, withSecond, tick);
 }
 
 }  // namespace regress

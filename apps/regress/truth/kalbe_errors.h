@@ -27,7 +27,17 @@ struct KalbeTables {
 /// the functions themselves. The second derivative at a data point is that of the worst tetrahedron
 /// there.
 /// @param withSecond  computes the second derivatives, too
+/// @tparam Real  precision of the data, the splines and the functions: float, double, long double.
+///               Sums are in double precision
 /// @param tick  called many times; may throw
+template <class Real = double>
 [[nodiscard]] KalbeTables kalbeTables(int n, bool withSecond, const std::function<void()>& tick);
+
+template <>
+KalbeTables kalbeTables<float>(int n, bool withSecond, const std::function<void()>& tick);
+template <>
+KalbeTables kalbeTables<double>(int n, bool withSecond, const std::function<void()>& tick);
+template <>
+KalbeTables kalbeTables<long double>(int n, bool withSecond, const std::function<void()>& tick);
 
 }  // namespace regress
