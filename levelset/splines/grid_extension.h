@@ -12,9 +12,9 @@ namespace levelset {
 /// Rule for the data beyond the border of a grid, axis by axis. A spline of order two keeps its
 /// order up to the border only with data that continue smoothly.
 enum class GridExtension {
-  Clamp,     ///< datum of the border: the error of values is O(h) there
-  Linear,    ///< line through two data: values O(h²), gradients O(h)
-  Quadratic  ///< parabola through three data: values O(h²), gradients O(h²)
+  Clamp,     ///< datum of the border. Errors there: values O(h), gradients O(1)
+  Linear,    ///< line through two data. Errors there: values O(h²), gradients O(h)
+  Quadratic  ///< parabola through three data. Errors there: values and gradients O(h²)
 };
 
 /// Data of a box of a grid, extended to all whole numbers. An axis with fewer data than the rule
