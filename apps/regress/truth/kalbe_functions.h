@@ -5,8 +5,8 @@
 
 namespace regress {
 
-/// Test functions of the tables of [Kalbe11]: blob, fr and ml (Marschner and Lobb, α = 1/4 and
-/// f_M = 6).
+/// Test functions of the tables of [Kalbe11]: blob, fr and ml [Marschner94], with α = 1/4 and
+/// f_M = 6.
 inline constexpr std::array<const char*, 3> kKalbeFunctions = {"blob", "fr", "ml"};
 
 /// One number for each test function, with arithmetic function by function.
