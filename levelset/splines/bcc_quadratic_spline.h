@@ -40,6 +40,9 @@ BccCell<SampleScalar<Sample>> bccCell(const Sample& sample, const std::array<int
 /// over the cells that meet at v_a, with the weights BccPartition::ownerWeights(). This equals
 /// the weights printed in [Kalbe11], except where data at equal distances are printed with unequal
 /// weights: there the order of the data is not free.
+///
+/// The cells at the border of a grid are complete: ExtendedGrid (grid_extension.h) gives the data
+/// beyond it, so that the spline covers the whole box of the data.
 template <int K = 2>
 class BccQuadraticSpline : public BccPartition {
   static_assert(K >= 1);

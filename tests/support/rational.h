@@ -5,7 +5,7 @@
 #include <cstdint>
 
 /// Exact rational arithmetic and random data for tests of splines.
-namespace test {
+namespace support {
 
 using Rational = boost::multiprecision::number<boost::multiprecision::cpp_rational_backend,
                                                boost::multiprecision::et_off>;
@@ -44,4 +44,4 @@ std::array<Scalar, Vertices> randomWeights(int seed, int sum) {
   return weights;
 }
 
-}  // namespace test
+}  // namespace support

@@ -174,7 +174,8 @@ KalbeTables measuredTables(int n, bool withSecond, const std::function<void()>& 
   const Real h = Real(1) / Real(n);
   // The position of a lattice point of the cells −1 to n, along an axis.
   const auto position = [&](int cell, int step) {
-    return Real(kSteps * cell + kSteps / 2 + step - kSteps) * (h / kSteps) - Real(0.5);
+    const int steps = kSteps * cell + kSteps / 2 + step - kSteps;
+    return Real(steps) * (h / kSteps) - Real(0.5);
   };
   std::array<levelset::BarycentricMap<4, Real>, BccPartition::kTetrahedra> maps{};
   for (int t = 0; t < BccPartition::kTetrahedra; ++t)

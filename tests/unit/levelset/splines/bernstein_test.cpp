@@ -9,16 +9,16 @@
 #include "levelset/splines/lagrange_form.h"
 #include "tests/support/rational.h"
 
-using test::Rational;
+namespace bernstein_test {
 
-namespace levelset {
-namespace {
+using namespace levelset;
+using support::Rational;
 
 template <int Vertices, int Degree>
 BernsteinForm<Vertices, Degree, Rational> randomForm(int seed) {
   BernsteinForm<Vertices, Degree, Rational> form;
   for (int n = 0; n < form.kCount; ++n)
-    form.coefficients[n] = Rational(test::randomWhole(seed, n)) / 7;
+    form.coefficients[n] = Rational(support::randomWhole(seed, n)) / 7;
   return form;
 }
 
@@ -45,10 +45,10 @@ template <int Vertices, int Degree>
 void checkForm() {
   SCOPED_TRACE(testing::Message() << Vertices << " vertices, degree " << Degree);
   const auto form = randomForm<Vertices, Degree>(1);
-  const auto p = test::randomWeights<Rational, Vertices>(2, 1);
-  const auto q = test::randomWeights<Rational, Vertices>(3, 1);
-  const auto u = test::randomWeights<Rational, Vertices>(4, 0);
-  const auto w = test::randomWeights<Rational, Vertices>(5, 0);
+  const auto p = support::randomWeights<Rational, Vertices>(2, 1);
+  const auto q = support::randomWeights<Rational, Vertices>(3, 1);
+  const auto u = support::randomWeights<Rational, Vertices>(4, 0);
+  const auto w = support::randomWeights<Rational, Vertices>(5, 0);
   constexpr auto kExponents = bernsteinExponents<Vertices, Degree>();
 
   // The order of the coefficients, and the value by the basis.
@@ -78,7 +78,7 @@ void checkForm() {
   // The blossom: its diagonal, symmetry, and affinity in each argument.
   std::array<std::array<Rational, Vertices>, Degree> diagonal, mixed;
   diagonal.fill(p);
-  for (int i = 0; i < Degree; ++i) mixed[i] = test::randomWeights<Rational, Vertices>(10 + i, 1);
+  for (int i = 0; i < Degree; ++i) mixed[i] = support::randomWeights<Rational, Vertices>(10 + i, 1);
   EXPECT_EQ(form.blossom(diagonal), form.value(p));
   auto permuted = mixed;
   std::sort(permuted.begin(), permuted.end());
@@ -257,5 +257,4 @@ TEST(Bernstein, RefusesFlatSimplices) {
   EXPECT_THROW((void)barycentricMap(flat), InvalidInput);
 }
 
-}  // namespace
-}  // namespace levelset
+}  // namespace bernstein_test

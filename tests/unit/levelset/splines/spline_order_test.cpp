@@ -12,10 +12,10 @@
 #include "tests/support/measured.h"
 #include "tests/support/rational.h"
 
-using test::Rational;
+namespace spline_order_test {
 
-namespace levelset {
-namespace {
+using namespace levelset;
+using support::Rational;
 
 using Point = std::array<double, 3>;
 
@@ -175,5 +175,4 @@ TEST(GridExtension, UsesFewerDataOnThinGrids) {
   EXPECT_THROW((ExtendedGrid(sample, {2, 0, 1}, GridExtension::Linear)), UsageError);
 }
 
-}  // namespace
-}  // namespace levelset
+}  // namespace spline_order_test

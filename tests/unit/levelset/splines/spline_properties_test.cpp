@@ -12,17 +12,17 @@
 #include "levelset/splines/quadratic_super_spline.h"
 #include "tests/support/rational.h"
 
-using test::Rational;
+namespace spline_properties_test {
 
-namespace levelset {
-namespace {
+using namespace levelset;
+using support::Rational;
 
 using Point = std::array<Rational, 3>;
 using Offset = std::array<int, 3>;
 
 Point randomPoint(int seed) {
   Point p;
-  for (int d = 0; d < 3; ++d) p[d] = Rational(test::randomWhole(seed, d)) / 17;
+  for (int d = 0; d < 3; ++d) p[d] = Rational(support::randomWhole(seed, d)) / 17;
   return p;
 }
 
@@ -102,7 +102,7 @@ struct Polynomial {
   int seed;
   int ofXyz = 0;
 
-  [[nodiscard]] Rational c(int n) const { return Rational(test::randomWhole(seed, n)) / 3; }
+  [[nodiscard]] Rational c(int n) const { return Rational(support::randomWhole(seed, n)) / 3; }
   [[nodiscard]] Rational operator()(const Point& p) const {
     return c(0) + c(1) * p[0] + c(2) * p[1] + c(3) * p[2] + c(4) * p[0] * p[1] +
            c(5) * p[0] * p[2] + c(6) * p[1] * p[2] + c(7) * p[0] * p[0] + c(8) * p[1] * p[1] +
@@ -155,7 +155,7 @@ TEST(SplineProperties, BccSplinesReproduceLinesAtTheData) {
   const auto linear = [](int i, int j, int k) { return Rational(2 * i - 3 * j + 5 * k + 1); };
   for (int n = 0; n < 50; ++n) {
     std::array<int, 3> d;
-    for (int axis = 0; axis < 3; ++axis) d[axis] = test::randomWhole(n, axis);
+    for (int axis = 0; axis < 3; ++axis) d[axis] = support::randomWhole(n, axis);
     const Point x = {Rational(d[0]), Rational(d[1]), Rational(d[2])};
     const Rational exact = linear(d[0], d[1], d[2]);
     EXPECT_EQ(splineValue(BccQuadraticSpline<1>{}, linear, x), exact);
@@ -195,7 +195,7 @@ std::array<int, 8> printedWeights(BccPartition::Kind kind, int vertex, bool isHe
 
 template <int K>
 void expectPrintedWeights(const Offset& cell) {
-  const test::RandomGrid<> sample{23};
+  const support::RandomGrid<> sample{23};
   constexpr auto kExponents = bernsteinExponents<4, 2>();
   for (int index = 0; index < BccPartition::kTetrahedra; ++index) {
     const PartitionTetrahedron t{cell, index};
@@ -243,7 +243,7 @@ TEST(SplineProperties, BccSplineHasThePrintedWeights) {
 }
 
 TEST(SplineProperties, DeterminingSetsGiveTheSameCoefficients) {
-  const test::RandomGrid<> sample{31};
+  const support::RandomGrid<> sample{31};
   const std::array<int, 3> cell = {-2, 7, 1};
   const auto quadratic = QuadraticSuperSpline::determiningSet(sample, cell);
   const auto cubic = CubicC1Spline::determiningSet(sample, cell);
@@ -341,14 +341,14 @@ TEST(DeterminingSet, FindsKnownDimensions) {
 /// Restriction of a spline to a segment inside one tetrahedron.
 template <class Spline>
 void expectSegments() {
-  const test::RandomGrid<> sample{41};
+  const support::RandomGrid<> sample{41};
   for (int n = 0; n < 40; ++n) {
     const PartitionTetrahedron t = Spline::locate(randomPoint(n));
     const auto vertices = Spline::template vertices<Rational>(t);
     const auto inside = [&](int seed) {
       std::array<Rational, 4> w;
       Rational sum = 0;
-      for (int v = 0; v < 4; ++v) sum += w[v] = test::randomWhole(seed, v) + 51;
+      for (int v = 0; v < 4; ++v) sum += w[v] = support::randomWhole(seed, v) + 51;
       Point p{};
       for (int v = 0; v < 4; ++v)
         for (int d = 0; d < 3; ++d) p[d] += w[v] / sum * vertices[v][d];
@@ -371,5 +371,4 @@ TEST(SplineProperties, RestrictToSegments) {
   expectSegments<BccQuadraticSpline<2>>();
 }
 
-}  // namespace
-}  // namespace levelset
+}  // namespace spline_properties_test

@@ -8,10 +8,10 @@
 #include "levelset/splines/smoothness.h"
 #include "tests/support/rational.h"
 
-using test::Rational;
+namespace spline_smoothness_test {
 
-namespace levelset {
-namespace {
+using namespace levelset;
+using support::Rational;
 
 /// Smoothness across all faces of the tetrahedra of a cell, with random data: counts of the
 /// conditions that were tested and that hold exactly.
@@ -25,7 +25,7 @@ struct Tally {
 template <class Spline, class Wanted>
 Tally tallyOf(const std::array<int, 3>& cell, const Wanted& wanted) {
   Tally tally;
-  const test::RandomGrid<> sample{11};
+  const support::RandomGrid<> sample{11};
   for (int index = 0; index < Spline::kTetrahedra; ++index) {
     const PartitionTetrahedron t{cell, index};
     const auto vertices = Spline::template vertices<Rational>(t);
@@ -106,7 +106,7 @@ TEST(SplineSmoothness, OfQuadraticSuperSplineIsExactExceptAtCentres) {
 
 /// A jump of one coefficient must show, or the tests above would prove nothing.
 TEST(SplineSmoothness, FindsOneWrongCoefficient) {
-  const test::RandomGrid<> sample{5};
+  const support::RandomGrid<> sample{5};
   const PartitionTetrahedron t{{0, 0, 0}, 0};
   const PartitionTetrahedron other = CubicC1Spline::neighbour(t, 1);
   const auto vertices = CubicC1Spline::vertices<Rational>(t);
@@ -144,9 +144,8 @@ TEST(SplineSmoothness, OfSecondOrderHoldsForPolynomials) {
        residuals([](int i, int j, int k) { return Rational(i * j * k + i * i); }))
     EXPECT_EQ(r, 0);
   int jumps = 0;
-  for (const Rational& r : residuals(test::RandomGrid<>{3})) jumps += r != 0;
+  for (const Rational& r : residuals(support::RandomGrid<>{3})) jumps += r != 0;
   EXPECT_EQ(jumps, 3);
 }
 
-}  // namespace
-}  // namespace levelset
+}  // namespace spline_smoothness_test

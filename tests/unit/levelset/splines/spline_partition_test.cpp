@@ -10,10 +10,10 @@
 #include "levelset/splines/type6_partition.h"
 #include "tests/support/rational.h"
 
-using test::Rational;
+namespace spline_partition_test {
 
-namespace levelset {
-namespace {
+using namespace levelset;
+using support::Rational;
 
 using Point = std::array<Rational, 3>;
 
@@ -92,7 +92,7 @@ void checkLocation() {
     // Multiples of 1/8 often lie on faces and edges; multiples of 1/77 seldom do.
     const int denominator = n % 2 == 0 ? 8 : 77;
     Point p;
-    for (int d = 0; d < 3; ++d) p[d] = Rational(test::randomWhole(3, n, d)) / denominator;
+    for (int d = 0; d < 3; ++d) p[d] = Rational(support::randomWhole(3, n, d)) / denominator;
     const PartitionTetrahedron t = Partition::locate(p);
     const auto weights = barycentricMap(Partition::template vertices<Rational>(t)).coordinates(p);
     for (const Rational& w : weights) EXPECT_GE(w, 0);
@@ -119,7 +119,7 @@ TEST(SplinePartition, LocatesPointsInBccCells) {
 TEST(SplinePartition, FindsTheClosestBccSite) {
   for (int n = 0; n < 2000; ++n) {
     Point p;
-    for (int d = 0; d < 3; ++d) p[d] = Rational(test::randomWhole(5, n, d)) / 33;
+    for (int d = 0; d < 3; ++d) p[d] = Rational(support::randomWhole(5, n, d)) / 33;
     const auto distance = [&](const std::array<int, 3>& cell) {
       Rational sum = 0;
       for (int d = 0; d < 3; ++d) {
@@ -162,5 +162,4 @@ TEST(SplinePartition, HasCellsAtVerticesWithAffineWeights) {
   }
 }
 
-}  // namespace
-}  // namespace levelset
+}  // namespace spline_partition_test
