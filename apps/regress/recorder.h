@@ -68,10 +68,13 @@ class Recorder {
   void expect(const std::string& variant, const std::string& expected,
               const std::function<std::pair<bool, std::string>()>& work);
 
+  /// Lets the caller cancel. Long work calls it many times.
+  /// @throws Cancelled
+  void tick();
+
   [[nodiscard]] CaseResult finish();
 
  private:
-  void tick();
   std::optional<levelset::NarrowBand> measure(
       const std::string& variant, const Sample& at, const std::string& tool,
       const std::function<levelset::NarrowBand()>& work,

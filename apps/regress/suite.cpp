@@ -28,6 +28,7 @@ const std::vector<Case>& cases() {
     addAdvectionCases(list);
     addMorphCases(list);
     addResampleCases(list);
+    addKalbeCases(list);
     addExtremeCases(list);
     addBadInputCases(list);
     return list;
