@@ -61,7 +61,7 @@ void checkIsosurface(const Volume& volume, const ValueRange& range,
 std::vector<openvdb::Coord> findBlocks(const TrilinearSurface& surface, double reach,
                                        std::size_t maxMemory) {
   openvdb::MaskTree blocks;
-  openvdb::MaskTree::Accessor accessor(blocks);
+  openvdb::tree::ValueAccessor<openvdb::MaskTree> accessor(blocks);
   std::size_t count = 0;
   for (std::size_t item = 0; item < surface.itemCount(); ++item) {
     openvdb::Vec3d low, high;

@@ -73,14 +73,14 @@ struct TrilinearSurface::SlabOfPieces {
 TrilinearSurface::TrilinearSurface(const Volume& volume, const ValueRange& range, double voxelSize,
                                    double halfWidth, std::size_t maxMemory,
                                    const Progress& progress)
-    : volume_(volume), unit_(volume.highest() - volume.lowest()) {
+    : volume_(volume), unit_(volume.highest() - volume.lowest()), voxelSize_(voxelSize) {
   functions_ = 0;
   for (const auto& [limit, sign] : {std::pair(range.low, 1.0), std::pair(range.high, -1.0)}) {
     if (!limit) continue;
     limit_[static_cast<std::size_t>(functions_)] = *limit;
     sign_[static_cast<std::size_t>(functions_++)] = sign;
   }
-  placeFrame(voxelSize, halfWidth);
+  placeFrame(halfWidth);
   collectPieces(maxMemory, subProgress(progress, 0, 0.7));
   collectFaces(maxMemory);
   report_.pieces = pieces_.size();
@@ -102,23 +102,23 @@ TrilinearSurface::TrilinearSurface(const Volume& volume, const ValueRange& range
   levelset::report(progress, 1);
 }
 
-void TrilinearSurface::placeFrame(double voxelSize, double halfWidth) {
+void TrilinearSurface::placeFrame(double halfWidth) {
   const Imath::M44d& map = volume_.grid().indexToWorld;
   const Imath::Box3d bounds = volume_.grid().bounds();
   for (int axis = 0; axis < 3; ++axis) {
     const double farthest =
-        std::max(std::abs(bounds.min[axis]), std::abs(bounds.max[axis])) / voxelSize + halfWidth;
+        std::max(std::abs(bounds.min[axis]), std::abs(bounds.max[axis])) / voxelSize_ + halfWidth;
     if (!(farthest < kIndexLimit))
       throw ResourceLimit(
           fmt::format("at voxel size {} the grid index {:.3g} of the volume exceeds 32 bits; use a "
                       "larger --voxel",
-                      voxelSize, farthest));
+                      voxelSize_, farthest));
     // A multiple of 8, so that blocks relative to the base are blocks of the grid.
-    base_[axis] = 8 * static_cast<int>(std::floor(bounds.center()[axis] / voxelSize / 8));
+    base_[axis] = 8 * static_cast<int>(std::floor(bounds.center()[axis] / voxelSize_ / 8));
   }
-  axes_ = toMat(map, 1 / voxelSize);
+  axes_ = toMat(map, 1 / voxelSize_);
   toIndex_ = axes_.inverse(0.0);
-  for (int axis = 0; axis < 3; ++axis) origin_[axis] = map[3][axis] / voxelSize - base_[axis];
+  for (int axis = 0; axis < 3; ++axis) origin_[axis] = map[3][axis] / voxelSize_ - base_[axis];
   const Mat3d metric = axes_ * axes_.transpose();
   for (int level = 0; level < kMostLevels; ++level) {
     const double edge = 1.0 / (1 << level);
@@ -247,9 +247,7 @@ void TrilinearSurface::collectFaces(std::size_t maxMemory) {
                     maxMemory);
     }
   for (const BorderFace& face : faces_) report_.closedArea += coveredArea(face);
-  const double voxel =
-      volume_.grid().spacing().x / Vec3d(axes_(0, 0), axes_(0, 1), axes_(0, 2)).length();
-  report_.closedArea *= voxel * voxel;
+  report_.closedArea *= voxelSize_ * voxelSize_;
 }
 
 void TrilinearSurface::addFace(int axis, bool isHigh, int a, int b) {

@@ -40,7 +40,7 @@ class TrilinearSurface {
   struct SlabOfPieces;
   using Corners = std::array<float, 8>;
 
-  void placeFrame(double voxelSize, double halfWidth);
+  void placeFrame(double halfWidth);
   void collectPieces(std::size_t maxMemory, const Progress& progress);
   void collectSlab(int k, SlabOfPieces& out) const;
   void split(const Corners& corner, const std::array<float, 3>& first, int level,
@@ -58,6 +58,7 @@ class TrilinearSurface {
   int functions_ = 1;
   std::array<double, 2> limit_{}, sign_{};
   double unit_ = 1;  ///< range of the values of the volume
+  double voxelSize_ = 1;
   openvdb::Coord base_;
   Vec3d origin_;          ///< position of index 0
   Mat3d axes_, toIndex_;  ///< rows: edges of a cell; inverse
