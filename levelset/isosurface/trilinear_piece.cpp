@@ -277,6 +277,7 @@ double squaredDistance(const Cubic& f, const Mat3d& metric, const Mat3d& inverse
   double best = Search(f, metric, inverse, target).from(start);
   // The crossings of the surface with the edges are points of the surface in any case. The search
   // from the nearest one finds what the first search missed.
+  const bool isBent = f.bend() > kMostBend * f.gradient(Vec3d(0.5)).length();
   double nearest = kInfinite;
   Vec3d crossing(0.0);
   for (int axis = 0; axis < 3; ++axis)
@@ -290,6 +291,8 @@ double squaredDistance(const Cubic& f, const Mat3d& metric, const Mat3d& inverse
       p[axis] = t;
       const Vec3d d = p - target;
       const double squared = d.dot(metric * d);
+      // A surface that bends strongly may have several locally closest points.
+      if (isBent) best = std::min(best, Search(f, metric, inverse, target).from(p));
       if (squared >= nearest) continue;
       nearest = squared;
       crossing = p;

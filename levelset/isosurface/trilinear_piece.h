@@ -38,6 +38,10 @@ struct Cubic {
   [[nodiscard]] double bend() const;
 };
 
+/// Largest bend of a piece, relative to the gradient and to the edge of the piece. A cell is split
+/// until its pieces bend less, or three times.
+inline constexpr double kMostBend = 0.2;
+
 /// Part of a cell of a volume, in which the surface bends little. `corner` are the values of the
 /// function whose zero set is the surface, positive inside. A part is the complete cell or one of
 /// its 8, 64, … subcells.

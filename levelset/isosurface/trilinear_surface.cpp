@@ -11,9 +11,6 @@
 namespace levelset::trilinear {
 namespace {
 
-// A piece is split until its surface bends less than this: the deviation from the linear part of
-// the function, relative to its gradient and to the edge of the piece.
-constexpr double kMostBend = 0.2;
 // A sample that equals the isovalue counts as outside by this share of the range of the values. It
 // moves the surface by less than single precision resolves, and no sample lies on it.
 constexpr float kOutside = 0x1p-24f;
