@@ -18,11 +18,15 @@ class Search {
   Search(const Cubic& f, const Mat3d& metric, const Mat3d& inverse, const Vec3d& target)
       : f_(f), metric_(metric), inverse_(inverse), target_(target) {}
 
+  /// Returns true if the last search ended at a point where the distance falls in no direction.
+  [[nodiscard]] bool isOptimal() const { return isOptimal_; }
+
   /// Returns the squared distance of the point that the search from `start` ends at; infinite if it
   /// ends off the surface.
   double from(const Vec3d& start) {
     p_ = start;
     fixed_ = {};
+    hasMultiplier_ = isOptimal_ = false;
     int releases = 0;
     for (int step = 0; step < kMostSteps; ++step) {
       const int free = freeCount();
@@ -30,8 +34,11 @@ class Search {
       const double moved = free == 1 ? alongEdge() : newtonStep();
       if (moved < 0) break;  // no step is possible
       if (moved > 1e-9) continue;
-      if (releases >= 4 || !release()) break;
-      ++releases;
+      if (!release()) {
+        isOptimal_ = true;
+        break;
+      }
+      if (++releases > 4) break;
     }
     return result();
   }
@@ -228,7 +235,7 @@ class Search {
   Vec3d target_, p_;
   std::array<bool, 3> fixed_{};
   double multiplier_ = 0;
-  bool hasMultiplier_ = false;
+  bool hasMultiplier_ = false, isOptimal_ = false;
 };
 
 /// Bilinear function on the unit square.
@@ -272,36 +279,42 @@ double Cubic::bend() const {
 
 double squaredDistance(const Cubic& f, const Mat3d& metric, const Mat3d& inverse,
                        const Vec3d& target) {
+  Search search(f, metric, inverse, target);
   Vec3d start = target;
   for (int axis = 0; axis < 3; ++axis) start[axis] = std::clamp(start[axis], 0.0, 1.0);
-  double best = Search(f, metric, inverse, target).from(start);
-  // The crossings of the surface with the edges are points of the surface in any case. The search
-  // from the nearest one finds what the first search missed.
-  const bool isBent = f.bend() > kMostBend * f.gradient(Vec3d(0.5)).length();
-  double nearest = kInfinite;
-  Vec3d crossing(0.0);
+  double best = search.from(start);
+  // A surface that bends strongly may have several locally closest points.
+  bool isSure = search.isOptimal() && std::isfinite(best) &&
+                f.bend() <= kMostBend * f.gradient(Vec3d(0.5)).length();
+  // The crossings of the surface with the edges are points of the surface in any case. A search
+  // from the nearest one finds what the first search missed; if need be, one from each of them.
+  std::array<Vec3d, 12> crossings;
+  std::size_t count = 0, nearest = 0;
+  double least = kInfinite;
   for (int axis = 0; axis < 3; ++axis)
     for (int side = 0; side < 4; ++side) {
       Vec3d p(0.0);
       p[(axis + 1) % 3] = side & 1;
       p[(axis + 2) % 3] = side >> 1;
-      const double at0 = f.value(p), slope = f.gradient(p)[axis];
-      const double t = -at0 / slope;
+      const double t = -f.value(p) / f.gradient(p)[axis];
       if (!(t >= 0 && t <= 1)) continue;
       p[axis] = t;
       const Vec3d d = p - target;
       const double squared = d.dot(metric * d);
-      // A surface that bends strongly may have several locally closest points.
-      if (isBent) best = std::min(best, Search(f, metric, inverse, target).from(p));
-      if (squared >= nearest) continue;
-      nearest = squared;
-      crossing = p;
+      if (squared < least) {
+        least = squared;
+        nearest = count;
+      }
+      crossings[count++] = p;
     }
-  if (nearest < best || !std::isfinite(best)) {
-    best = std::min(best, nearest);
-    if (std::isfinite(nearest))
-      best = std::min(best, Search(f, metric, inverse, target).from(crossing));
-  }
+  if (count == 0) return best;
+  if (isSure && best <= least) return best;
+  const double again = search.from(crossings[nearest]);
+  isSure = isSure && search.isOptimal();
+  best = std::min({best, least, again});
+  if (isSure) return best;
+  for (std::size_t n = 0; n < count; ++n)
+    if (n != nearest) best = std::min(best, search.from(crossings[n]));
   return best;
 }
 
