@@ -204,7 +204,7 @@ VolumeHeader readNrrdHeader(const std::filesystem::path& path, std::string_view 
   else if (count < 0 || (count > 0 && header.encoding == Encoding::Compressed))
     refuseFile(name, "has a 'byte skip' that its encoding does not support; write it as raw");
   else
-    header.offset += static_cast<std::uint64_t>(count);
+    header.behindLines = static_cast<std::uint64_t>(count);
   return header;
 }
 

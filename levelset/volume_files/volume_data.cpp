@@ -93,6 +93,8 @@ StoredBytes findBytes(const VolumeHeader& header, std::size_t count, std::size_t
   if (header.offset > bytes.size()) refuseLength(header, name, size, 0);
   bytes.remove_prefix(header.offset);
   bytes = behindLines(bytes, header.lines, name);
+  if (header.behindLines > bytes.size()) refuseLength(header, name, size, 0);
+  bytes.remove_prefix(header.behindLines);
   if (header.encoding == Encoding::Compressed) {
     requireBytes(static_cast<double>(size), limit, name);
     const auto inflated = std::make_shared<Bytes>(decompress(bytes, name, size));

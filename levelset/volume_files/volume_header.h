@@ -44,7 +44,8 @@ struct VolumeHeader {
   /// compressed.
   std::uint64_t offset = 0;
   bool isAtEnd = false;     ///< true: the numbers are the last bytes of the file, not at `offset`
-  std::uint64_t lines = 0;  ///< number of lines to skip before the numbers
+  std::uint64_t lines = 0;  ///< number of lines between `offset` and the numbers
+  std::uint64_t behindLines = 0;  ///< number of bytes between these lines and the numbers
   Encoding encoding = Encoding::Raw;
   bool mustFill = false;  ///< true: no byte may follow the numbers
   std::vector<std::string> notes = {};

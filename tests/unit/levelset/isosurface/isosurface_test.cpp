@@ -313,7 +313,14 @@ TEST(Isosurface, SamplesEqualToTheIsovalueAreOutside) {
   EXPECT_EQ(made.report.closedArea, 0);
   const auto m = levelset::measure(made.band);
   EXPECT_EQ(m.components, 1u);
-  EXPECT_NEAR(m.volume, 64, measured(0.3));
+  const BandError error = errorOf(made.band, [](const V3d& p) {
+    const V3d out(std::abs(p.x - 4) - 2, std::abs(p.y - 4) - 2, std::abs(p.z - 4) - 2);
+    const V3d ahead(std::max(out.x, 0.0), std::max(out.y, 0.0), std::max(out.z, 0.0));
+    return ahead.length() + std::min(std::max({out.x, out.y, out.z}), 0.0);
+  });
+  EXPECT_EQ(error.wrongSigns, 0u);
+  EXPECT_LT(error.inside, measured(1e-3));
+  EXPECT_LT(error.outside, measured(1e-3));
 }
 
 TEST(Isosurface, BetweenTwoLimitsIsAShell) {
@@ -338,7 +345,7 @@ TEST(Isosurface, BorderClosesTheSolid) {
   const IsosurfaceResult made = isosurface(volume, {.low = 0.0});
   EXPECT_NEAR(made.report.closedArea, M_PI, measured(6e-3));
   const BandError error = errorOf(made.band, [](const V3d& p) {
-    if (p.length() < 1 && p.z > 0) return -std::min(1 - p.length(), p.z);
+    if (p.length() < 1 && p.z >= 0) return -std::min(1 - p.length(), p.z);
     if (p.z >= 0) return p.length() - 1;
     const double rim = std::hypot(p.x, p.y);
     return rim < 1 ? -p.z : std::hypot(rim - 1, p.z);

@@ -76,7 +76,7 @@ V3d placeBy(const support::SformRows& rows, const V3d& index) {
 }
 
 void expectPlaces(const Volume& volume, const support::SformRows& rows, double tolerance) {
-  for (const V3d index : {V3d(0), V3d(2, 0, 0), V3d(0, 1, 0), V3d(0, 0, 1), V3d(2, 1, 1)}) {
+  for (const V3d& index : {V3d(0), V3d(2, 0, 0), V3d(0, 1, 0), V3d(0, 0, 1), V3d(2, 1, 1)}) {
     const V3d error = index * volume.grid().indexToWorld - placeBy(rows, index);
     EXPECT_LE(error.length(), tolerance) << index;
   }
@@ -352,7 +352,7 @@ TEST(VolumeFiles, FogVolumesBecomeVolumes) {
   const auto grid = openvdb::FloatGrid::create(0);
   grid->setGridClass(openvdb::GRID_FOG_VOLUME);
   grid->setTransform(openvdb::math::Transform::createLinearTransform(0.5));
-  for (int n = 0; n < 3; ++n) grid->tree().setValue(openvdb::Coord(n, 4, -2), 1.0f + n);
+  for (int n = 0; n < 3; ++n) grid->tree().setValue(openvdb::Coord(n, 4, -2), static_cast<float>(1 + n));
   const Volume volume = levelset::volumeOf(levelset::importField(grid));
   EXPECT_EQ(volume.size(), V3i(5, 3, 3));
   EXPECT_EQ(volume.at(1, 1, 1), 1);
@@ -386,7 +386,7 @@ TEST(VolumeFiles, TruncatedFilesAreRefused) {
   expectRefused(folder, "a.nii", nifti.substr(0, 200), "ends inside its header");
   expectRefused(folder, "b.nii.gz", gzip(nifti + shorter), "has 23 bytes");
   const std::string whole = gzip(nifti + data);
-  expectRefused(folder, "c.nii.gz", whole.substr(0, whole.size() / 2), "ends in the middle");
+  expectRefused(folder, "c.nii.gz", whole.substr(0, whole.size() - 12), "ends in the middle");
   const std::string meta =
       "NDims = 3\nDimSize = 3 2 2\nElementType = MET_SHORT\nElementDataFile = LOCAL\n";
   expectRefused(folder, "a.mha", meta + shorter, "has 23 bytes");
