@@ -168,8 +168,10 @@ std::vector<Param> solidParams() {
           halfWidthParam()};
 }
 
-Operator solidOperator() {
-  return {.group = "Volumes",
+Operator solidOperator(const char* name, const char* summary) {
+  return {.name = name,
+          .group = "Volumes",
+          .summary = summary,
           .operands = {{Kind::Volume, Kind::Field}},
           .resultKind = [](const Invocation&) { return Kind::Band; },
           .run = makeIsosurface,
@@ -279,9 +281,9 @@ Operator histogramOperator() {
 }
 
 Operator isosurfaceOperator() {
-  Operator op = solidOperator();
-  op.name = "isosurface";
-  op.summary = "make a solid of all points of a volume with values above an isovalue, or below it";
+  Operator op = solidOperator(
+      "isosurface",
+      "make a solid of all points of a volume with values above an isovalue, or below it");
   op.details =
       "The distances are those to the surface of the interpolated values itself, not to "
       "triangles, in world space: the volume may be anisotropic, oblique or sheared. A value that "
@@ -302,9 +304,8 @@ Operator isosurfaceOperator() {
 }
 
 Operator thresholdOperator() {
-  Operator op = solidOperator();
-  op.name = "threshold";
-  op.summary = "make a solid of all points of a volume with values between two limits";
+  Operator op = solidOperator(
+      "threshold", "make a solid of all points of a volume with values between two limits");
   op.details =
       "The interpolated values decide, and the distances are exact as those of 'isosurface'. "
       "'keep' and 'fill-cavities' then choose its parts.";
