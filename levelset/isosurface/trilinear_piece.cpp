@@ -9,6 +9,8 @@ namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr int kMostSteps = 24;
+// Number of times that a bent piece is halved at most while it is searched.
+constexpr int kRefinements = 10;
 
 /// Search for the closest point of the zero set in the unit cube: Newton's method on the condition
 /// grad |p − target|² + λ grad f = 0, f = 0. A coordinate that reaches a face of the cube is fixed
@@ -256,36 +258,14 @@ void limitToPositive(double at0, double at1, double& from, double& to) {
   }
 }
 
-}  // namespace
-
-Cubic::Cubic(const std::array<float, 8>& corner) {
-  std::array<double, 8> v{};
-  for (std::size_t n = 0; n < 8; ++n) v[n] = static_cast<double>(corner[n]);
-  c[0] = v[0];
-  c[1] = v[4] - v[0];
-  c[2] = v[2] - v[0];
-  c[3] = v[1] - v[0];
-  c[4] = v[6] - v[4] - v[2] + v[0];
-  c[5] = v[5] - v[4] - v[1] + v[0];
-  c[6] = v[3] - v[2] - v[1] + v[0];
-  c[7] = v[7] - v[6] - v[5] - v[3] + v[4] + v[2] + v[1] - v[0];
-}
-
-double Cubic::bend() const {
-  const Vec3d second = mixed(Vec3d(0.5));
-  return 0.25 * (std::abs(second[0]) + std::abs(second[1]) + std::abs(second[2])) +
-         0.125 * std::abs(c[7]);
-}
-
-double squaredDistance(const Cubic& f, const Mat3d& metric, const Mat3d& inverse,
-                       const Vec3d& target) {
+/// Closest point by searches in the complete cube.
+double searchedDistance(const Cubic& f, const Mat3d& metric, const Mat3d& inverse,
+                        const Vec3d& target) {
   Search search(f, metric, inverse, target);
   Vec3d start = target;
   for (int axis = 0; axis < 3; ++axis) start[axis] = std::clamp(start[axis], 0.0, 1.0);
   double best = search.from(start);
-  // A surface that bends strongly may have several locally closest points.
-  bool isSure = search.isOptimal() && std::isfinite(best) &&
-                f.bend() <= kMostBend * f.gradient(Vec3d(0.5)).length();
+  bool isSure = search.isOptimal() && std::isfinite(best);
   // The crossings of the surface with the edges are points of the surface in any case. A search
   // from the nearest one finds what the first search missed; if need be, one from each of them.
   std::array<Vec3d, 12> crossings;
@@ -315,6 +295,81 @@ double squaredDistance(const Cubic& f, const Mat3d& metric, const Mat3d& inverse
   if (isSure) return best;
   for (std::size_t n = 0; n < count; ++n)
     if (n != nearest) best = std::min(best, search.from(crossings[n]));
+  return best;
+}
+
+/// A cube in which a bent surface is searched.
+struct BentPart {
+  Cubic f;
+  Mat3d metric, inverse;
+  Vec3d target;
+  double radius = 0;  ///< half of the longest diagonal
+};
+
+/// Searches a bent surface in octants, down to those in which it bends little. Skips octants that
+/// are too far away.
+void refine(const BentPart& part, int levels, double& best) {
+  if (levels == 0 || !part.f.isBent()) {
+    best = std::min(best, searchedDistance(part.f, part.metric, part.inverse, part.target));
+    return;
+  }
+  for (int octant = 0; octant < 8; ++octant) {
+    const Vec3d low(octant >> 2, octant >> 1 & 1, octant & 1);
+    const Vec3d away = (low + Vec3d(0.5)) / 2 - part.target;
+    const double nearest = std::sqrt(away.dot(part.metric * away)) - part.radius / 2;
+    if (nearest > 0 && nearest * nearest >= best) continue;
+    std::array<double, 8> corner{};
+    int positive = 0;
+    for (int n = 0; n < 8; ++n) {
+      const double value = part.f.value((low + Vec3d(n >> 2, n >> 1 & 1, n & 1)) / 2);
+      corner[static_cast<std::size_t>(n)] = value;
+      positive += value > 0;
+    }
+    if (positive == 0 || positive == 8) continue;
+    refine({Cubic(corner), part.metric * 0.25, part.inverse * 4.0, part.target * 2.0 - low,
+            part.radius / 2},
+           levels - 1, best);
+  }
+}
+
+}  // namespace
+
+Cubic::Cubic(const std::array<float, 8>& corner)
+    : Cubic(std::array<double, 8>{static_cast<double>(corner[0]), static_cast<double>(corner[1]),
+                                  static_cast<double>(corner[2]), static_cast<double>(corner[3]),
+                                  static_cast<double>(corner[4]), static_cast<double>(corner[5]),
+                                  static_cast<double>(corner[6]), static_cast<double>(corner[7])}) {
+}
+
+Cubic::Cubic(const std::array<double, 8>& v) {
+  c[0] = v[0];
+  c[1] = v[4] - v[0];
+  c[2] = v[2] - v[0];
+  c[3] = v[1] - v[0];
+  c[4] = v[6] - v[4] - v[2] + v[0];
+  c[5] = v[5] - v[4] - v[1] + v[0];
+  c[6] = v[3] - v[2] - v[1] + v[0];
+  c[7] = v[7] - v[6] - v[5] - v[3] + v[4] + v[2] + v[1] - v[0];
+}
+
+bool Cubic::isBent() const {
+  return bend() > kMostBend * gradient(Vec3d(0.5)).length();
+}
+
+double Cubic::bend() const {
+  const Vec3d second = mixed(Vec3d(0.5));
+  return 0.25 * (std::abs(second[0]) + std::abs(second[1]) + std::abs(second[2])) +
+         0.125 * std::abs(c[7]);
+}
+
+double squaredDistance(const Cubic& f, const Mat3d& metric, const Mat3d& inverse,
+                       const Vec3d& target) {
+  if (!f.isBent()) return searchedDistance(f, metric, inverse, target);
+  double longest = 0;
+  for (const Vec3d& diagonal : {Vec3d(1, 1, 1), Vec3d(-1, 1, 1), Vec3d(1, -1, 1), Vec3d(1, 1, -1)})
+    longest = std::max(longest, diagonal.dot(metric * diagonal));
+  double best = kInfinite;
+  refine({f, metric, inverse, target, std::sqrt(longest) / 2}, kRefinements, best);
   return best;
 }
 

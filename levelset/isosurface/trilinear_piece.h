@@ -12,6 +12,10 @@ namespace levelset::trilinear {
 using openvdb::Mat3d;
 using openvdb::Vec3d;
 
+/// Largest bend of a piece, relative to the gradient and to the edge of the piece. A cell is split
+/// until its pieces bend less, or three times.
+inline constexpr double kMostBend = 0.2;
+
 /// Trilinear function on the unit cube, as a polynomial.
 struct Cubic {
   /// Coefficients of 1, x, y, z, xy, xz, yz, xyz.
@@ -19,6 +23,7 @@ struct Cubic {
 
   Cubic() = default;
   /// @param corner  values at the corners, x slowest: corner 4x + 2y + z
+  explicit Cubic(const std::array<double, 8>& corner);
   explicit Cubic(const std::array<float, 8>& corner);
 
   [[nodiscard]] double value(const Vec3d& p) const {
@@ -34,13 +39,11 @@ struct Cubic {
   [[nodiscard]] Vec3d mixed(const Vec3d& p) const {
     return {c[4] + c[7] * p[2], c[5] + c[7] * p[1], c[6] + c[7] * p[0]};
   }
+  /// Returns true if the bend exceeds kMostBend, relative to the gradient.
+  [[nodiscard]] bool isBent() const;
   /// Bound of the difference between the function and its linear part at the centre of the cube.
   [[nodiscard]] double bend() const;
 };
-
-/// Largest bend of a piece, relative to the gradient and to the edge of the piece. A cell is split
-/// until its pieces bend less, or three times.
-inline constexpr double kMostBend = 0.2;
 
 /// Part of a cell of a volume, in which the surface bends little. `corner` are the values of the
 /// function whose zero set is the surface, positive inside. A part is the complete cell or one of

@@ -190,8 +190,7 @@ void TrilinearSurface::split(const Corners& corner, const std::array<float, 3>& 
                              std::vector<Piece>& out) const {
   const float edge = 1.0f / static_cast<float>(1 << level);
   const Cubic f(corner);
-  const double slope = f.gradient(Vec3d(0.5)).length();
-  if (level + 1 == kMostLevels || f.bend() <= kMostBend * slope) {
+  if (level + 1 == kMostLevels || !f.isBent()) {
     Piece piece{.corner = corner, .first = first, .edge = edge, .low = {}, .high = {}};
     setBounds(piece);
     out.push_back(piece);
