@@ -274,7 +274,7 @@ Bytes decompress(std::string_view compressed, const std::string& name, std::size
   return inflated;
 }
 
-bool isCompressed(std::string_view bytes) {
+bool isGzipData(std::string_view bytes) {
   return isGzip(bytes);
 }
 

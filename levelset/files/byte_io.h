@@ -83,7 +83,7 @@ struct FirstBytes {
 [[nodiscard]] Bytes decompress(std::string_view compressed, const std::string& name,
                                std::size_t count);
 /// Returns true when the bytes begin as gzip data does.
-[[nodiscard]] bool isCompressed(std::string_view bytes);
+[[nodiscard]] bool isGzipData(std::string_view bytes);
 
 /// Name of the input in messages: the file name in quotes, or "standard input".
 [[nodiscard]] std::string inputName(const std::filesystem::path& path);

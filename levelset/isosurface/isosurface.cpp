@@ -19,10 +19,10 @@ namespace levelset {
 namespace {
 
 using trilinear::TrilinearSurface;
-using Leaf = openvdb::FloatTree::LeafNodeType;
+using BandLeaf = openvdb::FloatTree::LeafNodeType;
 
 // Memory of a leaf block with its share of the tree's nodes, bytes.
-constexpr double kBytesPerLeaf = 2300;
+constexpr double kBytesPerBandLeaf = 2300;
 
 void checkIsosurface(const Volume& volume, const ValueRange& range,
                      const IsosurfaceOptions& options) {
@@ -78,10 +78,10 @@ std::vector<openvdb::Coord> findBlocks(const TrilinearSurface& surface, double r
           if (accessor.probeConstLeaf(at)) continue;
           accessor.touchLeaf(at);
           if (++count % 4096 == 0)
-            requireMemory(static_cast<double>(count) * kBytesPerLeaf, maxMemory);
+            requireMemory(static_cast<double>(count) * kBytesPerBandLeaf, maxMemory);
         }
   }
-  requireMemory(static_cast<double>(count) * kBytesPerLeaf, maxMemory);
+  requireMemory(static_cast<double>(count) * kBytesPerBandLeaf, maxMemory);
   std::vector<openvdb::Coord> origins;
   origins.reserve(count);
   for (auto leaf = blocks.cbeginLeaf(); leaf; ++leaf) origins.push_back(leaf->origin());
@@ -90,19 +90,19 @@ std::vector<openvdb::Coord> findBlocks(const TrilinearSurface& surface, double r
 }
 
 /// Measures the distances of the grid points of a block. @return null: the band does not reach it
-std::unique_ptr<Leaf> measureBlock(const TrilinearSurface& surface, const openvdb::Coord& block,
-                                   double halfWidth, double voxelSize, float background) {
-  auto leaf = std::make_unique<Leaf>(block + surface.base(), background, false);
+std::unique_ptr<BandLeaf> measureBlock(const TrilinearSurface& surface, const openvdb::Coord& block,
+                                       double halfWidth, double voxelSize, float background) {
+  auto leaf = std::make_unique<BandLeaf>(block + surface.base(), background, false);
   float* values = leaf->buffer().data();
   TrilinearSurface::Hint hint;
-  for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
+  for (openvdb::Index n = 0; n < BandLeaf::SIZE; ++n) {
     // Successive grid points are neighbours, so that the closest piece of one is a good guess for
     // the next.
     openvdb::Coord local(static_cast<int>(n >> 6), static_cast<int>((n >> 3) & 7),
                          static_cast<int>(n & 7));
     if (local[0] & 1) local[1] = 7 - local[1];
     if (local[1] & 1) local[2] = 7 - local[2];
-    const openvdb::Index at = Leaf::coordToOffset(local);
+    const openvdb::Index at = BandLeaf::coordToOffset(local);
     const openvdb::Vec3d place = (block + local).asVec3d();
     const double distance = surface.distance(place, halfWidth, hint);
     const bool isInside = surface.isInside(place);
@@ -143,7 +143,7 @@ IsosurfaceResult isosurface(const Volume& volume, const ValueRange& range,
   const std::vector<openvdb::Coord> blocks = findBlocks(surface, options.halfWidth, limit);
   // Slices, so that cancelling takes effect quickly and the reports come from one thread.
   constexpr std::size_t kSlice = 512;
-  std::vector<std::unique_ptr<Leaf>> slice(std::min(kSlice, blocks.size()));
+  std::vector<std::unique_ptr<BandLeaf>> slice(std::min(kSlice, blocks.size()));
   bool anyInside = false;
   for (std::size_t from = 0; from < blocks.size(); from += kSlice) {
     const std::size_t count = std::min(kSlice, blocks.size() - from);
@@ -154,8 +154,8 @@ IsosurfaceResult isosurface(const Volume& volume, const ValueRange& range,
     for (std::size_t n = 0; n < count; ++n) {
       if (!slice[n]) continue;
       const float* values = slice[n]->buffer().data();
-      anyInside = anyInside ||
-                  std::any_of(values, values + Leaf::SIZE, [](float value) { return value < 0; });
+      anyInside = anyInside || std::any_of(values, values + BandLeaf::SIZE,
+                                           [](float value) { return value < 0; });
       grid->tree().addLeaf(slice[n].release());
     }
     report(options.progress,

@@ -115,7 +115,7 @@ StoredBytes inflateFile(const VolumeHeader& header, std::size_t count, std::size
   const MappedFile file(header.dataFile, limit, false);
   const double whole = static_cast<double>(header.offset) + static_cast<double>(size);
   requireBytes(whole, limit, name);
-  if (!isCompressed(file.view()))
+  if (!isGzipData(file.view()))
     refuseFile(name, "has a name that ends in .gz but is not compressed; rename it");
   const std::size_t needed = header.offset + size;
   const auto inflated =

@@ -72,7 +72,7 @@ StoredRange rangeOfNumbers(const char* begin, std::size_t from, std::size_t to) 
   return range;
 }
 
-std::uint64_t mixed(std::uint64_t hash, std::uint64_t word) {
+std::uint64_t mixedHash(std::uint64_t hash, std::uint64_t word) {
   hash = (hash ^ word) * 0x9e3779b97f4a7c15u;
   return hash ^ (hash >> 29);
 }
@@ -248,7 +248,7 @@ std::uint64_t Volume::contentHash() const {
     std::uint64_t word = 0;
     static_assert(sizeof value <= sizeof word);
     std::memcpy(&word, &value, sizeof value);
-    hash = mixed(hash, word);
+    hash = mixedHash(hash, word);
   };
   for (int axis = 0; axis < 3; ++axis) add(grid_.size[axis]);
   for (int row = 0; row < 4; ++row)
@@ -257,10 +257,10 @@ std::uint64_t Volume::contentHash() const {
   add(scale_.intercept);
   const std::size_t bytes = memoryUse(), whole = bytes / 8 * 8;
   for (std::size_t n = 0; n < whole; n += 8)
-    hash = mixed(hash, loadNumber<std::uint64_t>(data_.begin + n));
+    hash = mixedHash(hash, loadNumber<std::uint64_t>(data_.begin + n));
   std::uint64_t last = 0;
   std::memcpy(&last, data_.begin + whole, bytes - whole);
-  return mixed(hash, last);
+  return mixedHash(hash, last);
 }
 
 }  // namespace levelset

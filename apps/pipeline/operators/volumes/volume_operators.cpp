@@ -98,7 +98,7 @@ Value printHistogram(Invocation& in) {
 
 // === Solids
 
-levelset::ValueRange rangeOf(const Invocation& in) {
+levelset::ValueRange valueRangeOf(const Invocation& in) {
   if (in.op().name == "threshold") return {in.number("low"), in.number("high")};
   const double value = in.number("value");
   return in.text("inside") == "below" ? levelset::ValueRange{{}, value}
@@ -111,7 +111,7 @@ Value makeIsosurface(Invocation& in) {
       .halfWidth = in.number("half-width"), .maxMemory = in.maxMemory, .progress = in.progress};
   if (in.given("voxel")) options.voxelSize = in.length("voxel");
   if (in.text("border") == "refuse") options.border = levelset::VolumeBorder::Refuse;
-  levelset::IsosurfaceResult made = levelset::isosurface(volume, rangeOf(in), options);
+  levelset::IsosurfaceResult made = levelset::isosurface(volume, valueRangeOf(in), options);
   const levelset::IsosurfaceReport& report = made.report;
   in.notes.detailsJson = Json{
       {"filter", in.text("filter")},
