@@ -4,7 +4,7 @@
 
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/declarations.h"
-#include "apps/pipeline/operators/volumes/volume_params.h"
+#include "apps/pipeline/operators/volume_params.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"

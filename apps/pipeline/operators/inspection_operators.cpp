@@ -5,7 +5,7 @@
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/json_output.h"
-#include "apps/pipeline/operators/volumes/volume_params.h"
+#include "apps/pipeline/operators/volume_params.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
 #include "levelset/files/band_file.h"

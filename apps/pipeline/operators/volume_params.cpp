@@ -1,4 +1,4 @@
-#include "apps/pipeline/operators/volumes/volume_params.h"
+#include "apps/pipeline/operators/volume_params.h"
 
 #include <fmt/core.h>
 
