@@ -44,6 +44,8 @@ const char* className(Kind kind) {
       return "Surface";
     case Kind::Scene:
       return "Scene";
+    case Kind::Volume:
+      return "Scan";
   }
   return "";
 }

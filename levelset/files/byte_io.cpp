@@ -22,8 +22,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kReadChunk = 1 << 22;
-// zlib's windowBits: a window of 2¹⁵ bytes; adding 16 selects the gzip format.
-constexpr int kGzipWindow = 15 + 16;
+// zlib's windowBits: a window of 2¹⁵ bytes; adding 16 selects the gzip format, adding 32 detects
+// gzip or zlib.
+constexpr int kGzipWindow = 15 + 16, kAnyWindow = 15 + 32;
 
 std::string systemMessage(int error) {
   return std::generic_category().message(error);
@@ -127,8 +128,9 @@ bool isGzip(std::string_view bytes) {
 /// Decompresses consecutive gzip members. Ignores data after them, as gzip does.
 class Inflater {
  public:
-  Inflater(std::string_view input, std::string name) : rest_(input), name_(std::move(name)) {
-    if (inflateInit2(&stream_, kGzipWindow) != Z_OK)
+  Inflater(std::string_view input, std::string name, int window = kGzipWindow)
+      : rest_(input), name_(std::move(name)) {
+    if (inflateInit2(&stream_, window) != Z_OK)
       throw ResourceLimit("not enough memory to decompress; close other programs");
   }
   ~Inflater() { inflateEnd(&stream_); }
@@ -215,11 +217,11 @@ Bytes readBytes(const fs::path& path, std::size_t maxMemory) {
   return readAll(file, maxMemory);
 }
 
-MappedFile::MappedFile(const fs::path& path, std::size_t maxMemory) {
+MappedFile::MappedFile(const fs::path& path, std::size_t maxMemory, bool inflates) {
   InputFile file(path);
   mapped_ = file.mapped();
   size_ = file.expectedSize();
-  if (mapped_ && !isGzip(view())) return;
+  if (mapped_ && (!inflates || !isGzip(view()))) return;
   if (mapped_) ::munmap(std::exchange(mapped_, nullptr), size_);
   read_ = readAll(file, maxMemory);
 }
@@ -264,6 +266,16 @@ FirstBytes readFirstBytes(const fs::path& path, std::size_t count) {
   }
   inflated.resize(produced);
   return {std::move(inflated), fileSize > 0 && produced < count ? produced : 0};
+}
+
+Bytes decompress(std::string_view compressed, const std::string& name, std::size_t count) {
+  Bytes inflated;
+  fill(inflated, count, kNoMemoryLimit, count, name, true, Inflater(compressed, name, kAnyWindow));
+  return inflated;
+}
+
+bool isGzipData(std::string_view bytes) {
+  return isGzip(bytes);
 }
 
 struct ByteWriter::Deflater {

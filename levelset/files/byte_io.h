@@ -12,8 +12,8 @@
 #include "levelset/file_target.h"
 #include "levelset/progress.h"
 
-// Private to levelset/files and levelset/mesh_files: reads and writes complete files in memory,
-// with or without gzip compression.
+// Private to levelset/files, levelset/mesh_files and levelset/volume_files: reads and writes
+// complete files in memory, with or without gzip compression.
 
 namespace levelset {
 
@@ -47,7 +47,9 @@ class Bytes {
 class MappedFile {
  public:
   /// @throws as readBytes
-  explicit MappedFile(const std::filesystem::path& path, std::size_t maxMemory = kNoMemoryLimit);
+  /// @param inflates  false: leaves gzip data as it is in the file
+  explicit MappedFile(const std::filesystem::path& path, std::size_t maxMemory = kNoMemoryLimit,
+                      bool inflates = true);
   ~MappedFile();
   MappedFile(const MappedFile&) = delete;
   MappedFile& operator=(const MappedFile&) = delete;
@@ -72,6 +74,16 @@ struct FirstBytes {
 /// Reads the first bytes of a file.
 /// @param count  maximum number of bytes
 [[nodiscard]] FirstBytes readFirstBytes(const std::filesystem::path& path, std::size_t count);
+
+/// Decompresses gzip or zlib data, up to a number of bytes. Data behind these bytes is ignored.
+/// @param name   name of the input in messages
+/// @param count  maximum number of bytes of the result
+/// @throws InvalidInput when the compressed data is damaged
+/// @throws ResourceLimit when the memory cannot be allocated
+[[nodiscard]] Bytes decompress(std::string_view compressed, const std::string& name,
+                               std::size_t count);
+/// Returns true when the bytes begin as gzip data does.
+[[nodiscard]] bool isGzipData(std::string_view bytes);
 
 /// Name of the input in messages: the file name in quotes, or "standard input".
 [[nodiscard]] std::string inputName(const std::filesystem::path& path);

@@ -23,6 +23,7 @@ struct Reader {
 // Each source file of readers provides its own list.
 [[nodiscard]] std::vector<Reader> meshReaders();
 [[nodiscard]] std::vector<Reader> gridReaders();
+[[nodiscard]] std::vector<Reader> volumeReaders();
 [[nodiscard]] std::vector<Reader> pictureReaders();
 [[nodiscard]] std::vector<Reader> documentReaders();
 [[nodiscard]] std::vector<Reader> grammarReaders();

@@ -33,6 +33,12 @@ namespace pipeline {
 [[nodiscard]] Operator checkOperator();
 [[nodiscard]] Operator infoOperator();
 
+[[nodiscard]] Operator volumeOperator();
+[[nodiscard]] Operator blurOperator();
+[[nodiscard]] Operator histogramOperator();
+[[nodiscard]] Operator isosurfaceOperator();
+[[nodiscard]] Operator thresholdOperator();
+
 [[nodiscard]] Operator sceneOperator();
 
 [[nodiscard]] Operator sliceOperator();

@@ -4,11 +4,13 @@
 
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/declarations.h"
+#include "apps/pipeline/operators/volume_params.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 #include "levelset/files/band_file.h"
 #include "levelset/mesh_files/mesh_file.h"
+#include "levelset/volume_files/volume_file.h"
 #include "mapping/patches/patch_file.h"
 
 namespace pipeline {
@@ -26,9 +28,11 @@ Kind fileKind(const Invocation& in) {
   if (levelset::isBandFormat(name)) return Kind::Band;
   if (mapping::isPatchFormat(name)) return Kind::Patch;
   if (render::isSceneFormat(name)) return Kind::Scene;
+  const bool isRead = in.op().name == "read";
+  if (isRead && levelset::isVolumeFormat(name)) return Kind::Volume;
   throw UsageError(fmt::format(
       "{}: '{}' is of no known format; use ply, obj, stl or off (also .gz), vdb{}, patch or json",
-      in.op().name, name, in.op().name == "write" ? ", nvdb" : ""));
+      in.op().name, name, isRead ? ", nii, mha, nrrd, mrc, raw" : ", nvdb"));
 }
 
 /// Returns the kind of the value that `read` makes. The grid that --grid names may be a field; the
@@ -48,6 +52,11 @@ Value read(Invocation& in) {
   const std::filesystem::path file = in.text("file");
   if (fileKind(in) == Kind::Patch)
     return Value(PatchValue{.patches = mapping::readPatches(file, in.maxMemory)});
+  if (fileKind(in) == Kind::Volume) {
+    levelset::ReadVolumeOptions options = volumeOptions(in);
+    options.notes = &in.notes.notes;
+    return Value(levelset::readVolume(file, options));
+  }
   if (fileKind(in) == Kind::Scene) {
     const auto warn = [&](const levelset::BandRepairs& repairs, const auto& source) {
       for (const std::string& told : sentencesOf(repairs, source))
@@ -87,6 +96,11 @@ Value read(Invocation& in) {
 /// Plans the value. A mesh is read completely, since lengths in % refer to its size. For a band,
 /// the header of the file suffices.
 Plan planRead(Invocation& in) {
+  if (fileKind(in) == Kind::Volume) {
+    const levelset::VolumeFileInfo info =
+        levelset::volumeFileInfo(in.text("file"), volumeOptions(in));
+    return planOf(info.grid, info.type);
+  }
   if (fileKind(in) != Kind::Band) return read(in).plan();
   for (const levelset::GridInfo& grid : levelset::bandFileInfo(in.text("file"))) {
     if (in.given("grid") ? grid.name != in.text("grid") : !grid.isLevelSet) continue;
@@ -112,6 +126,7 @@ Plan planRead(Invocation& in) {
 
 void validateRead(const Invocation& in) {
   const Kind kind = fileKind(in);
+  checkVolumeOptions(in, kind == Kind::Volume);
   if (kind != Kind::Mesh && in.flag("no-attributes"))
     throw UsageError(fmt::format(
         "read: --no-attributes is for meshes, and this is a {}; leave it out", kindName(kind)));
@@ -129,11 +144,12 @@ void validateWrite(const Invocation& in) {
   if (held != kind && !(held == Kind::Field && kind == Kind::Band)) {
     throw UsageError(
         fmt::format("write: a {} cannot be written as '{}'; {}", kindName(held), formatName(in),
-                    held == Kind::Band    ? "put 'mesh' before it, or write .vdb"
-                    : held == Kind::Field ? "write .vdb"
-                    : held == Kind::Patch ? "write .patch, or put 'mesh' before it"
-                    : held == Kind::Scene ? "write .json"
-                                          : "put 'level-set' before it, or write .ply"));
+                    held == Kind::Band     ? "put 'mesh' before it, or write .vdb"
+                    : held == Kind::Field  ? "write .vdb"
+                    : held == Kind::Patch  ? "write .patch, or put 'mesh' before it"
+                    : held == Kind::Scene  ? "write .json"
+                    : held == Kind::Volume ? "put 'isosurface' before it"
+                                           : "put 'level-set' before it, or write .ply"));
   }
   if ((kind == Kind::Mesh || kind == Kind::Patch || kind == Kind::Scene) && in.given("name"))
     throw UsageError(fmt::format(
@@ -181,17 +197,18 @@ Value write(Invocation& in) {
 }  // namespace
 
 Operator readOperator() {
-  return {
+  Operator op{
       .name = "read",
       .group = "Files",
       .summary =
-          "read a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb), patches "
-          "(patch), a scene (json)",
+          "read a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb), a volume (nii, "
+          "hdr, mha, mhd, nrrd, nhdr, mrc, map, raw), patches (patch), a scene (json)",
       .details =
           "A .vdb with more than one level set needs --grid. A grid that is not a level set needs "
           "--grid, too; it becomes a field of numbers or of vectors, which may be staggered. "
           "Meshes keep the normals, texture coordinates and colours of their vertices in PLY and "
-          "OBJ. '-' is standard input and needs --format.",
+          "OBJ. Volumes keep their spacing and orientation; a .raw needs --size and --type. "
+          "'-' is standard input and needs --format.",
       .example = "levelsmith read dragon.ply.gz ! info",
       .params = {{.name = "file",
                   .type = ParamType::Path,
@@ -200,8 +217,8 @@ Operator readOperator() {
                   .position = 0},
                  {.name = "format",
                   .type = ParamType::Text,
-                  .doc = "format of the file: ply, obj, stl, off, vdb, patch or json; default: by "
-                         "its extension"},
+                  .doc = "format of the file: ply, obj, stl, off, vdb, nii, mha, nrrd, mrc, raw, "
+                         "patch or json; default: by its extension"},
                  {.name = "grid",
                   .type = ParamType::Text,
                   .doc = "name of the grid to read from a .vdb"},
@@ -218,6 +235,8 @@ Operator readOperator() {
       .validate = validateRead,
       .usesStandardInput = isStandardStream,
   };
+  for (Param& param : volumeFileParams()) op.params.push_back(std::move(param));
+  return op;
 }
 
 Operator writeOperator() {

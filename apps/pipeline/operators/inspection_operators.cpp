@@ -5,6 +5,7 @@
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/json_output.h"
+#include "apps/pipeline/operators/volume_params.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
 #include "levelset/files/band_file.h"
@@ -12,6 +13,7 @@
 #include "levelset/inspect/compare.h"
 #include "levelset/inspect/measure.h"
 #include "levelset/mesh_files/mesh_file.h"
+#include "levelset/volume_files/volume_file.h"
 
 namespace pipeline {
 namespace {
@@ -149,8 +151,11 @@ void validateInfo(const Invocation& in) {
   const std::string name = formatName(in);
   if (levelset::isMeshFormat(name)) return;
   if (levelset::isBandFormat(name) && !name.ends_with("nvdb")) return;
+  if (levelset::isVolumeFormat(name) && !levelset::isRawFormat(name)) return;
   throw levelset::UsageError(fmt::format(
-      "info: '{}' is of no known format; info reads ply, obj, stl, off (also .gz) and vdb", name));
+      "info: '{}' is of no known format; info reads ply, obj, stl, off (also .gz), vdb, "
+      "nii, mha, nrrd and mrc",
+      name));
 }
 
 Json fileInfo(const std::string& file, const std::string& format) {
@@ -163,6 +168,17 @@ Json fileInfo(const std::string& file, const std::string& format) {
     json["vertices"] = countOrNull(info.vertices);
     json["faces"] = countOrNull(info.faces);
     if (!info.attributes.empty()) json["attributes"] = info.attributes;
+    return json;
+  }
+  if (levelset::isVolumeFormat(name)) {
+    const levelset::VolumeFileInfo info = levelset::volumeFileInfo(file, {.format = format});
+    json["format"] = info.format;
+    addVolumeGrid(json, info.grid);
+    json["type"] = info.storedType;
+    json["big_endian"] = info.isBigEndian;
+    json["encoding"] = info.encoding;
+    json["slope"] = info.scale.slope;
+    json["intercept"] = info.scale.intercept;
     return json;
   }
   json["grids"] = Json::array();
@@ -201,6 +217,16 @@ Json valueInfo(const Value& value) {
     json["active_voxels"] = field.activeVoxelCount();
     json["bytes"] = field.memoryUse();
     json["hash"] = fmt::format("{:016x}", field.contentHash());
+  } else if (value.kind() == Kind::Volume) {
+    const levelset::Volume& volume = value.volume();
+    addVolumeGrid(json, volume.grid());
+    json["type"] = levelset::volumeTypeName(volume.type());
+    json["slope"] = volume.scale().slope;
+    json["intercept"] = volume.scale().intercept;
+    json["range"] = Json::array({volume.lowest(), volume.highest()});
+    json["bytes"] = volume.memoryUse();
+    json["mapped"] = volume.isMapped();
+    json["hash"] = fmt::format("{:016x}", volume.contentHash());
   } else if (value.kind() == Kind::Scene) {
     const render::Scene& scene = value.scene().scene;
     json["solids"] = Json::array();
@@ -338,13 +364,14 @@ Operator infoOperator() {
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! info",
       .params = {{.name = "file",
                   .type = ParamType::Path,
-                  .doc = "mesh or .vdb file to describe; default: the newest value",
+                  .doc = "mesh, volume or .vdb file to describe; default: the newest value",
                   .position = 0},
                  {.name = "format",
                   .type = ParamType::Text,
                   .doc = "format of the file; default: by its extension"},
                  jsonParam()},
-      .operands = {{Kind::Band, Kind::Mesh, Kind::Patch, Kind::Field, Kind::Surface, Kind::Scene}},
+      .operands = {{Kind::Band, Kind::Mesh, Kind::Patch, Kind::Field, Kind::Surface, Kind::Scene,
+                    Kind::Volume}},
       .operandsOptional = true,
       .flow = Flow::PassesThrough,
       .run = info,

@@ -57,6 +57,8 @@ const char* reasonAgainst(Kind kind) {
       return "a field has no thumbnail";
     case Kind::Surface:
       return "an open surface has no thumbnail";
+    case Kind::Volume:
+      return "a volume has no thumbnail";
     default:
       return nullptr;
   }

@@ -25,6 +25,8 @@ const char* kindName(Kind kind) {
       return "surface band";
     case Kind::Scene:
       return "scene";
+    case Kind::Volume:
+      return "volume";
   }
   return "";
 }
@@ -52,10 +54,19 @@ double Plan::activeVoxels() const {
 }
 
 double Plan::bytes() const {
-  if (kind == Kind::Field) return fieldBytes;
+  if (kind == Kind::Field || kind == Kind::Volume) return fieldBytes;
   // Three vertex indices for each triangle, and one position for every two triangles.
   if (kind == Kind::Mesh) return (3 * sizeof(std::uint32_t) + sizeof(Imath::V3d) / 2.0) * triangles;
   return levelset::kBytesPerVoxel * activeVoxels();
+}
+
+Plan planOf(const levelset::VolumeGrid& grid, levelset::VolumeType type) {
+  Plan plan{.kind = Kind::Volume, .bounds = grid.bounds()};
+  const Imath::V3d spacing = grid.spacing();
+  plan.voxelSize = std::min({spacing.x, spacing.y, spacing.z});
+  plan.fieldBytes = static_cast<double>(grid.size.x) * grid.size.y * grid.size.z *
+                    static_cast<double>(levelset::volumeTypeSize(type));
+  return plan;
 }
 
 Value::Value(TriMesh mesh) : data_(std::make_shared<const TriMesh>(std::move(mesh))) {}
@@ -64,6 +75,8 @@ Value::Value(PatchValue patch) : data_(std::make_shared<const PatchValue>(std::m
 Value::Value(levelset::FieldGrid field) : data_(std::move(field)) {}
 Value::Value(render::ViewedScene scene)
     : data_(std::make_shared<const render::ViewedScene>(std::move(scene))) {}
+Value::Value(levelset::Volume volume)
+    : data_(std::make_shared<const levelset::Volume>(std::move(volume))) {}
 Value::Value(Plan plan) : plan_(plan) {}
 
 Kind Value::kind() const {
@@ -78,6 +91,8 @@ Kind Value::kind() const {
       return Kind::Field;
     case 5:
       return Kind::Scene;
+    case 6:
+      return Kind::Volume;
     default:
       return plan_->kind;
   }
@@ -109,6 +124,10 @@ const render::ViewedScene& Value::scene() const {
   return *as<std::shared_ptr<const render::ViewedScene>>(Kind::Scene);
 }
 
+const levelset::Volume& Value::volume() const {
+  return *as<std::shared_ptr<const levelset::Volume>>(Kind::Volume);
+}
+
 const Plan& Value::plan() const {
   if (plan_) return *plan_;
   Plan plan;
@@ -136,6 +155,9 @@ const Plan& Value::plan() const {
       plan.bounds = field().bounds();
       plan.voxelSize = field().voxelSize();
       plan.fieldBytes = static_cast<double>(field().memoryUse());
+      break;
+    case Kind::Volume:
+      plan = planOf(volume().grid(), volume().type());
       break;
     case Kind::Scene:
       plan.bounds = scene().scene.bounds();

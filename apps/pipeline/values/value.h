@@ -14,6 +14,7 @@
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
 #include "levelset/operator/plan.h"
+#include "levelset/volumes/volume.h"
 #include "mapping/animation/animation.h"
 #include "mapping/patches/patch.h"
 #include "render/views/scene_file.h"
@@ -26,7 +27,8 @@ enum class Kind {
   Patch,
   Field,
   Surface,  ///< a band around an open surface: a base for patches
-  Scene
+  Scene,
+  Volume  ///< numbers on a regular grid, from a scanner or a simulation
 };
 [[nodiscard]] const char* kindName(Kind kind);
 
@@ -38,7 +40,7 @@ struct Plan {
   double area = 0;           ///< surface area, world units²
   double voxelSize = 0;      ///< voxel size, world units; 0: the value has no voxels
   double halfWidth = 0;      ///< half width, voxels; bands and scenes only
-  double fieldBytes = 0;     ///< memory of a field, bytes; fields only
+  double fieldBytes = 0;     ///< memory of a field or volume, bytes; only those
   double triangles = 0;      ///< number of triangles; meshes only; 0: unknown
   /// Patches only: size along u, size along v and height, world units. Height 0: the texture that
   /// is mapped will determine it.
@@ -54,6 +56,9 @@ struct Plan {
   /// Estimated memory of the value, bytes.
   [[nodiscard]] double bytes() const;
 };
+
+/// Plans a volume. Its voxel size is the smallest spacing.
+[[nodiscard]] Plan planOf(const levelset::VolumeGrid& grid, levelset::VolumeType type);
 
 /// Description of how patches were built, to rebuild them on another base or at another position.
 struct PatchRecipe {
@@ -92,17 +97,19 @@ class Value {
   explicit Value(PatchValue patch);
   explicit Value(levelset::FieldGrid field);
   explicit Value(render::ViewedScene scene);
+  explicit Value(levelset::Volume volume);
   explicit Value(Plan plan);
 
   [[nodiscard]] Kind kind() const;
-  // mesh(), band(), patch(), field() and scene() return the value as that kind. A file may contain
-  // another kind than its name suggests.
+  // mesh(), band(), patch(), field(), scene() and volume() return the value as that kind. A file
+  // may contain another kind than its name suggests.
   // @throws levelset::UsageError if the value is of another kind
   [[nodiscard]] const levelset::TriMesh& mesh() const;
   [[nodiscard]] const levelset::NarrowBand& band() const;
   [[nodiscard]] const PatchValue& patch() const;
   [[nodiscard]] const levelset::FieldGrid& field() const;
   [[nodiscard]] const render::ViewedScene& scene() const;
+  [[nodiscard]] const levelset::Volume& volume() const;
 
   /// Returns the plan of the value: its kind, bounds, area and grid, which estimates need. Computes
   /// it from the value on the first call.
@@ -118,7 +125,7 @@ class Value {
 
   std::variant<std::monostate, std::shared_ptr<const levelset::TriMesh>, levelset::NarrowBand,
                std::shared_ptr<const PatchValue>, levelset::FieldGrid,
-               std::shared_ptr<const render::ViewedScene>>
+               std::shared_ptr<const render::ViewedScene>, std::shared_ptr<const levelset::Volume>>
       data_;
   mutable std::optional<Plan> plan_;
 };

@@ -322,4 +322,10 @@ class Scene(_Drawn):
     __slots__ = ()
 
 
-classes = {c.__name__: c for c in (Solid, Surface, Mesh, Patch, Field, Scene)}
+class Scan(Value):
+    """Numbers on a regular grid, from a scanner or a simulation."""
+
+    __slots__ = ()
+
+
+classes = {c.__name__: c for c in (Solid, Surface, Mesh, Patch, Field, Scene, Scan)}

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <vector>
+
+#include "apps/pipeline/operators/json_output.h"
+#include "apps/pipeline/registry/invocation.h"
+#include "apps/pipeline/registry/operator.h"
+#include "levelset/volume_files/volume_file.h"
+
+namespace pipeline {
+
+/// Options of `read` for volumes.
+[[nodiscard]] std::vector<Param> volumeFileParams();
+/// Options that the user gave for a volume.
+[[nodiscard]] levelset::ReadVolumeOptions volumeOptions(const Invocation& in);
+/// Refuses options for volumes on other files, and a raw file without its layout.
+/// @throws UsageError
+void checkVolumeOptions(const Invocation& in, bool isVolume);
+
+/// Adds size, spacing, origin, orientation and the index-to-world map to a JSON object.
+void addVolumeGrid(Json& json, const levelset::VolumeGrid& grid);
+
+}  // namespace pipeline

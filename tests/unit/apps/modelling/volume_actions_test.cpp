@@ -1,0 +1,87 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/command_line.h"
+#include "tests/support/measured.h"
+#include "tests/support/volume_files.h"
+
+namespace volume_actions_test {
+
+using Json = nlohmann::json;
+
+class VolumeActions : public support::ShellTest {
+ protected:
+  Json json(const std::string& arguments) {
+    const support::Outcome outcome = levelsmith(arguments);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return outcome.code == 0 ? Json::parse(outcome.out) : Json();
+  }
+};
+
+TEST_F(VolumeActions, ReadDescribeAndConvertAFile) {
+  const support::SformRows sform = {{{2, 0, 0, -2}, {0, 3, 0, -1.5}, {0, 0, 4, -2}}};
+  writeFile("a.nii", support::nifti1(4, 16, true, sform).bytes +
+                         support::numberBytes<std::int16_t>(support::smallNumbers(true), true));
+  for (const char* command : {"info a.nii --json", "read a.nii ! info --json"}) {
+    const Json info = json(command);
+    EXPECT_EQ(info["size"], Json({3, 2, 2}));
+    EXPECT_EQ(info["spacing"], Json({2.0, 3.0, 4.0}));
+    EXPECT_EQ(info["orientation"], "RAS");
+    EXPECT_EQ(info["type"], "i16");
+  }
+  EXPECT_EQ(json("read a.nii ! info --json")["range"], Json({-40.0, 37.0}));
+  writeFile("a.raw", support::numberBytes<std::uint8_t>(support::smallNumbers(false), false));
+  EXPECT_EQ(json("read a.raw --size 3,2,2 --type u8 ! info --json")["range"], Json({5.0, 82.0}));
+}
+
+TEST_F(VolumeActions, IsosurfaceIsASolidLikeOthers) {
+  const Json ball = json("volume sphere --size 41 --radius 0.7 ! isosurface 0 ! measure --json");
+  EXPECT_NEAR(ball["volume"], 4 * M_PI / 3 * 0.343, support::measured(5e-3));
+  const Json shell = json(
+      "volume sphere --size 41 --radius 0.7 ! threshold 0 0.2 ! fill-cavities ! measure --json");
+  EXPECT_NEAR(shell["volume"], ball["volume"], support::measured(1e-5));
+  const Json torus = json("volume torus --size 41 ! isosurface 0 ! measure --json");
+  EXPECT_EQ(torus["euler"], 0);
+  EXPECT_EQ(levelsmith("volume marschner-lobb ! isosurface 0.5 ! check").code, 0);
+}
+
+TEST_F(VolumeActions, ReportStatesWhatWasClosed) {
+  const support::Outcome outcome = levelsmith(
+      "--report run.json volume sphere --size 21 ! isosurface 0 --inside below ! measure");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("closed there, on an area of 24 "), std::string::npos) << outcome.err;
+  EXPECT_NE(support::slurp(folder_ / "run.json").find("\"closed_area\""), std::string::npos);
+  EXPECT_REFUSED(
+      levelsmith("volume sphere --size 21 ! isosurface 0 --inside below --border refuse ! info"), 3,
+      "reaches the border");
+}
+
+TEST_F(VolumeActions, HistogramSuggestsIsovalues) {
+  const Json found = json("volume sphere --size 21 ! histogram --classes 2 --json");
+  EXPECT_EQ(found["otsu"].size(), 1u);
+  EXPECT_EQ(found["counts"].size(), 256u);
+  EXPECT_NE(levelsmith("volume sphere ! histogram").out.find("steepest"), std::string::npos);
+}
+
+TEST_F(VolumeActions, RefusalsNameTheFileAndHaveCode3) {
+  const std::string header = support::nifti1(16, 32, false, support::kOblique).bytes;
+  writeFile("short.nii", header + "12");
+  EXPECT_REFUSED(levelsmith("read short.nii ! info"), 3, "short.nii' has 2 bytes");
+  support::ByteText nan{header};
+  for (int n = 0; n < 12; ++n) nan.append<float>(NAN);
+  writeFile("nan.nii", nan.bytes);
+  EXPECT_REFUSED(levelsmith("read nan.nii ! info"), 3, "nan.nii': the value at the grid point");
+  support::ByteText wide = support::nifti2(2, false, support::kOblique);
+  for (std::size_t axis = 0; axis < 3; ++axis) wide.put<std::int64_t>(24 + 8 * axis, 2147483647);
+  writeFile("wide.nii", wide.bytes);
+  EXPECT_REFUSED(levelsmith("read wide.nii ! info"), 3, "wide.nii' states the size");
+  EXPECT_REFUSED(levelsmith("volume sphere ! isosurface 7 ! info"), 3, "no value");
+  writeFile("a.raw", "123");
+  EXPECT_REFUSED(levelsmith("read a.raw ! info"), 2, "--size and --type");
+  EXPECT_REFUSED(levelsmith("read a.raw --size 2,1,1 --type u8 ! info"), 3, "check --size");
+  EXPECT_REFUSED(levelsmith("read a.vdb --size 2,1,1 ! info"), 2, "--size describes a .raw");
+}
+
+}  // namespace volume_actions_test
