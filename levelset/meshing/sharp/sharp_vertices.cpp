@@ -37,10 +37,10 @@ constexpr double kOffSheet = 0.05;
 /// Largest number of Newton steps that move a vertex along its normal to the zero of the field.
 constexpr int kSettleSteps = 4;
 /// kSettleReach: largest distance from its cell, voxels, to which these steps may move a vertex,
-/// since the error of the linear zero crossings is not larger. kLeastSlope: least slope of the
+/// since the error of the linear zero crossings is not larger. kLeastFieldSlope: least slope of the
 /// field along the normal for which the steps are made.
 constexpr double kSettleReach = 0.15;
-constexpr double kLeastSlope = 0.5;
+constexpr double kLeastFieldSlope = 0.5;
 
 openvdb::Vec3f toSheet(const Vector3d& normal) {
   return {static_cast<float>(normal.x()), static_cast<float>(normal.y()),
@@ -148,7 +148,7 @@ class VertexPlacer::Impl {
     double slope = 0;
     for (const auto& [point, gradient] : crossings_) slope += gradient.dot(normal);
     slope /= static_cast<double>(crossings_.size());
-    if (!(slope > kLeastSlope)) return;
+    if (!(slope > kLeastFieldSlope)) return;
     Vector3d p = vertex.smooth;
     for (int i = 0; i < kSettleSteps && isInCell(p, 1); ++i)
       p -= normal * (field_.curved(p + cell) / slope);
