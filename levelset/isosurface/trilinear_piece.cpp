@@ -11,6 +11,8 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr int kMostSteps = 24;
 // Number of times that a bent piece is halved at most while it is searched.
 constexpr int kRefinements = 10;
+// The same for a piece that bends little.
+constexpr int kPlainRefinements = 1;
 
 /// Search for the closest point of the zero set in the unit cube: Newton's method on the condition
 /// grad |p − target|² + λ grad f = 0, f = 0. A coordinate that reaches a face of the cube is fixed
@@ -20,8 +22,25 @@ class Search {
   Search(const Cubic& f, const Mat3d& metric, const Mat3d& inverse, const Vec3d& target)
       : f_(f), metric_(metric), inverse_(inverse), target_(target) {}
 
-  /// Returns true if the last search ended at a point where the distance falls in no direction.
-  [[nodiscard]] bool isOptimal() const { return isOptimal_; }
+  /// Returns true if the last search proved that no point of the surface in the cube is nearer: the
+  /// distance falls in no direction, and the Hessian of the Lagrangian is positive definite in the
+  /// cube, by diagonal dominance.
+  [[nodiscard]] bool isGlobal() const {
+    if (!isOptimal_) return false;
+    const Vec3d most(std::max(std::abs(f_.c[4]), std::abs(f_.c[4] + f_.c[7])),
+                     std::max(std::abs(f_.c[5]), std::abs(f_.c[5] + f_.c[7])),
+                     std::max(std::abs(f_.c[6]), std::abs(f_.c[6] + f_.c[7])));
+    std::array<double, 3> others{};
+    for (std::size_t a = 0; a < 3; ++a)
+      for (std::size_t b = a + 1; b < 3; ++b) {
+        const auto x = static_cast<int>(a), y = static_cast<int>(b);
+        const double share = (std::abs(metric_(x, y)) + std::abs(multiplier_) * most[x + y - 1]) /
+                             std::sqrt(metric_(x, x) * metric_(y, y));
+        others[a] += share;
+        others[b] += share;
+      }
+    return *std::max_element(others.begin(), others.end()) < 1;
+  }
 
   /// Returns the squared distance of the point that the search from `start` ends at; infinite if it
   /// ends off the surface.
@@ -258,61 +277,58 @@ void limitToPositive(double at0, double at1, double& from, double& to) {
   }
 }
 
-/// Closest point by searches in the complete cube.
-double searchedDistance(const Cubic& f, const Mat3d& metric, const Mat3d& inverse,
-                        const Vec3d& target) {
-  Search search(f, metric, inverse, target);
-  Vec3d start = target;
-  for (int axis = 0; axis < 3; ++axis) start[axis] = std::clamp(start[axis], 0.0, 1.0);
-  double best = search.from(start);
-  bool isSure = search.isOptimal() && std::isfinite(best);
-  // The crossings of the surface with the edges are points of the surface in any case. A search
-  // from the nearest one finds what the first search missed; if need be, one from each of them.
-  std::array<Vec3d, 12> crossings;
-  std::size_t count = 0, nearest = 0;
-  double least = kInfinite;
-  for (int axis = 0; axis < 3; ++axis)
-    for (int side = 0; side < 4; ++side) {
-      Vec3d p(0.0);
-      p[(axis + 1) % 3] = side & 1;
-      p[(axis + 2) % 3] = side >> 1;
-      const double t = -f.value(p) / f.gradient(p)[axis];
-      if (!(t >= 0 && t <= 1)) continue;
-      p[axis] = t;
-      const Vec3d d = p - target;
-      const double squared = d.dot(metric * d);
-      if (squared < least) {
-        least = squared;
-        nearest = count;
-      }
-      crossings[count++] = p;
-    }
-  if (count == 0) return best;
-  if (isSure && best <= least) return best;
-  const double again = search.from(crossings[nearest]);
-  isSure = isSure && search.isOptimal();
-  best = std::min({best, least, again});
-  if (isSure) return best;
-  for (std::size_t n = 0; n < count; ++n)
-    if (n != nearest) best = std::min(best, search.from(crossings[n]));
-  return best;
-}
-
-/// A cube in which a bent surface is searched.
-struct BentPart {
+/// A cube in which the surface is searched.
+struct Part {
   Cubic f;
   Mat3d metric, inverse;
   Vec3d target;
   double radius = 0;  ///< half of the longest diagonal
 };
 
-/// Searches a bent surface in octants, down to those in which it bends little. Skips octants that
-/// are too far away.
-void refine(const BentPart& part, int levels, double& best) {
-  if (levels == 0 || !part.f.isBent()) {
-    best = std::min(best, searchedDistance(part.f, part.metric, part.inverse, part.target));
-    return;
+/// Points at which the surface crosses the edges of the cube.
+struct Crossings {
+  std::array<Vec3d, 12> points;
+  std::size_t count = 0;
+
+  explicit Crossings(const Cubic& f) {
+    for (int axis = 0; axis < 3; ++axis)
+      for (int side = 0; side < 4; ++side) {
+        Vec3d p(0.0);
+        p[(axis + 1) % 3] = side & 1;
+        p[(axis + 2) % 3] = side >> 1;
+        const double t = -f.value(p) / f.gradient(p)[axis];
+        if (!(t >= 0 && t <= 1)) continue;
+        p[axis] = t;
+        points[count++] = p;
+      }
   }
+};
+
+/// Searches from the points at which the surface crosses edges of the cube. They are points of the
+/// surface in any case.
+void searchFromEdges(const Part& part, Search& search, double& best) {
+  const Crossings crossings(part.f);
+  for (std::size_t n = 0; n < crossings.count; ++n) {
+    const Vec3d d = crossings.points[n] - part.target;
+    const double found = search.from(crossings.points[n]);
+    best = std::min({best, d.dot(part.metric * d), found});
+    if (std::isfinite(found) && search.isGlobal()) return;
+  }
+}
+
+/// Searches the surface in a cube, and lowers the squared distance `best`. Unless a search proves
+/// that its point is the closest one, octants are searched, too: at most `levels` times, and at
+/// most `plain` times where the surface bends little. Skips octants that are too far away.
+void refine(const Part& part, int levels, int plain, double& best) {
+  if (part.f.isFurther(part.inverse, part.target, best)) return;
+  Search search(part.f, part.metric, part.inverse, part.target);
+  Vec3d start = part.target;
+  for (int axis = 0; axis < 3; ++axis) start[axis] = std::clamp(start[axis], 0.0, 1.0);
+  const double first = search.from(start);
+  best = std::min(best, first);
+  if (std::isfinite(first) && search.isGlobal()) return;
+  const bool isBent = part.f.isBent() || part.f.isBentOnFace();
+  if (levels == 0 || (!isBent && plain == 0)) return searchFromEdges(part, search, best);
   for (int octant = 0; octant < 8; ++octant) {
     const Vec3d low(octant >> 2, octant >> 1 & 1, octant & 1);
     const Vec3d away = (low + Vec3d(0.5)) / 2 - part.target;
@@ -328,7 +344,7 @@ void refine(const BentPart& part, int levels, double& best) {
     if (positive == 0 || positive == 8) continue;
     refine({Cubic(corner), part.metric * 0.25, part.inverse * 4.0, part.target * 2.0 - low,
             part.radius / 2},
-           levels - 1, best);
+           levels - 1, isBent ? plain : plain - 1, best);
   }
 }
 
@@ -356,6 +372,22 @@ bool Cubic::isBent() const {
   return bend() > kMostBend * gradient(Vec3d(0.5)).length();
 }
 
+bool Cubic::isBentOnFace() const {
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double side : {0.0, 1.0}) {
+      const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+      Vec3d center(0.5);
+      center[axis] = side;
+      const Vec3d slope = gradient(center);
+      const double mixedTerm = std::abs(mixed(center)[u + v - 1]) / 4;
+      // The function on the face differs from its value at the centre by at most this.
+      if (std::abs(value(center)) > (std::abs(slope[u]) + std::abs(slope[v])) / 2 + mixedTerm)
+        continue;
+      if (mixedTerm > kMostBend * std::hypot(slope[u], slope[v])) return true;
+    }
+  return false;
+}
+
 double Cubic::bend() const {
   const Vec3d second = mixed(Vec3d(0.5));
   return 0.25 * (std::abs(second[0]) + std::abs(second[1]) + std::abs(second[2])) +
@@ -363,13 +395,13 @@ double Cubic::bend() const {
 }
 
 double squaredDistance(const Cubic& f, const Mat3d& metric, const Mat3d& inverse,
-                       const Vec3d& target) {
-  if (!f.isBent()) return searchedDistance(f, metric, inverse, target);
+                       const Vec3d& target, double most) {
   double longest = 0;
   for (const Vec3d& diagonal : {Vec3d(1, 1, 1), Vec3d(-1, 1, 1), Vec3d(1, -1, 1), Vec3d(1, 1, -1)})
     longest = std::max(longest, diagonal.dot(metric * diagonal));
-  double best = kInfinite;
-  refine({f, metric, inverse, target, std::sqrt(longest) / 2}, kRefinements, best);
+  double best = most;
+  refine({f, metric, inverse, target, std::sqrt(longest) / 2}, kRefinements, kPlainRefinements,
+         best);
   return best;
 }
 

@@ -3,6 +3,7 @@
 // Internal header of levelset: public headers must not include it.
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 
 #include "levelset/vdb.h"
@@ -41,6 +42,17 @@ struct Cubic {
   }
   /// Returns true if the bend exceeds kMostBend, relative to the gradient.
   [[nodiscard]] bool isBent() const;
+  /// Returns true if the same holds for the curve of zeros on a face of the cube, although the
+  /// surface itself may bend little. This happens where the surface touches the face.
+  [[nodiscard]] bool isBentOnFace() const;
+  /// Returns true if the bounds of the function show that its zeros are further from a point.
+  /// @param inverse  inverse of the metric; @param squared  squared distance
+  [[nodiscard]] bool isFurther(const Mat3d& inverse, const Vec3d& target, double squared) const {
+    // The surface lies between two planes: those of the linear part plus and minus the bend.
+    const Vec3d center(0.5), slope = gradient(center);
+    const double between = std::abs(value(center) + slope.dot(target - center)) - bend();
+    return between > 0 && between * between > squared * slope.dot(inverse * slope);
+  }
   /// Bound of the difference between the function and its linear part at the centre of the cube.
   [[nodiscard]] double bend() const;
 };
@@ -65,13 +77,16 @@ struct BorderFace {
   std::array<float, 3> low, high;  ///< bounds, in the frame of the search
 };
 
-/// Finds the closest point of the zero set in a piece.
+/// Finds the closest point of the zero set in a piece. A point with the property of a closest point
+/// is the closest one if the Lagrangian with its multiplier is convex on the piece. Without this
+/// proof, the search begins at further points, and then in octants of the piece.
 /// @param metric    inner products of the edges of the piece, in the frame of the search
 /// @param inverse   inverse of `metric`
 /// @param target    position whose closest point is searched, in the unit cube of the piece
-/// @return squared distance in the frame of the search; infinite if there is none
+/// @param most      squared distance above which the result does not matter
+/// @return squared distance in the frame of the search; `most` or more if it is at least `most`
 [[nodiscard]] double squaredDistance(const Cubic& f, const Mat3d& metric, const Mat3d& inverse,
-                                     const Vec3d& target);
+                                     const Vec3d& target, double most);
 
 /// Squared distance of a point from the part of a border face that the solid covers; infinite if it
 /// covers none. The curves at which a function is zero are left out: they belong to pieces.

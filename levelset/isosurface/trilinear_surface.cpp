@@ -308,12 +308,7 @@ double TrilinearSurface::squaredTo(std::size_t item, const Vec3d& position, cons
     target[axis] =
         (index[axis] - static_cast<double>(piece.first[static_cast<std::size_t>(axis)])) / edge;
   const auto level = static_cast<std::size_t>(levelOf(piece.edge));
-  // The surface lies between two planes: those of the linear part plus and minus the bend.
-  const Vec3d center(0.5), slope = f.gradient(center);
-  const double between = std::abs(f.value(center) + slope.dot(target - center)) - f.bend();
-  if (between > 0 && between * between > best * slope.dot(inverse_[level] * slope))
-    return kInfinite;
-  return squaredDistance(f, metric_[level], inverse_[level], target);
+  return squaredDistance(f, metric_[level], inverse_[level], target, best);
 }
 
 double TrilinearSurface::distance(const Vec3d& position, double most, Hint& hint) const {

@@ -140,22 +140,20 @@ TEST(Isosurface, DistancesToTrilinearPiecesAreExact) {
       corner[n] = static_cast<float>(normal.dot(p) + offset + bend * uniform(random));
     }
     const levelset::trilinear::Cubic f(corner);
-    // Cells with stronger bends are split.
-    if (f.isBent()) continue;
     const Mat3d& edge = edges[round % 3];
     const Mat3d metric = edge * edge.transpose();
     const Vec3d target(0.5 + 3 * uniform(random), 0.5 + 3 * uniform(random),
                        0.5 + 3 * uniform(random));
     const double expected = std::sqrt(searched(f, metric, target));
-    const double found =
-        std::sqrt(levelset::trilinear::squaredDistance(f, metric, metric.inverse(0.0), target));
+    const double found = std::sqrt(
+        levelset::trilinear::squaredDistance(f, metric, metric.inverse(0.0), target, HUGE_VAL));
     if (std::isinf(expected)) continue;
     ++count;
     worst = std::max(worst, found - expected);
     // The search of this test has an error of its own, so it may end further away.
     EXPECT_GT(found - expected, -1e-5);
   }
-  EXPECT_LT(worst, 1e-14);  // 1.8e-15 among 17,000
+  EXPECT_LT(worst, 1e-14);  // 1.8e-15 among 20,000
 }
 
 TEST(Isosurface, NoisyCellsAreMeasuredExactly) {
@@ -196,9 +194,34 @@ TEST(Isosurface, NoisyCellsAreMeasuredExactly) {
     excess = std::max(excess, found - least);
     nearer = std::max(nearer, least - found);
   }
-  EXPECT_LT(excess, measured(1e-7));
+  EXPECT_LT(excess, measured(1.19e-7));
   // The spacing of the points bounds this difference.
-  EXPECT_LT(nearer, measured(0.02));
+  EXPECT_LT(nearer, measured(9.7e-3));
+}
+
+TEST(Isosurface, DistancesOfNoisyIntegersDifferByAtMostTheSpacing) {
+  // A third of the samples equal the isovalue, so that the surface has needles and touches faces of
+  // cells. A distance that is too large shows as a difference above one voxel.
+  std::mt19937 random(5);
+  VolumeGrid grid = cubeGrid(20);
+  const Volume volume =
+      sampled(grid, [&](const V3d&) { return static_cast<double>(random() % 3) - 1; });
+  const IsosurfaceResult made = isosurface(volume, {.low = 0.0});
+  const auto& tree = levelset::vdb(made.band);
+  auto accessor = tree.getConstAccessor();
+  double most = 0;
+  std::size_t count = 0;
+  for (auto it = tree.cbeginValueOn(); it; ++it)
+    for (int axis = 0; axis < 3; ++axis) {
+      openvdb::Coord next = it.getCoord();
+      ++next[axis];
+      if (!accessor.isValueOn(next)) continue;
+      const double step = static_cast<double>(*it) - static_cast<double>(accessor.getValue(next));
+      most = std::max(most, std::abs(step) / made.band.voxelSize());
+      ++count;
+    }
+  EXPECT_GT(count, 20'000u);
+  EXPECT_LT(most, 1 + support::rounding(4));
 }
 
 // === Convergence to an analytic surface
@@ -210,9 +233,9 @@ TEST(Isosurface, OfASphereConvergesInSecondOrder) {
     bool isOblique;
     double finest;  ///< measured largest error at the finest grid, world units
   };
-  for (const Case& one :
-       {Case{"isotropic", V3d(1), false, 4e-4}, Case{"anisotropic", V3d(1, 1, 2.5), false, 1.56e-3},
-        Case{"oblique", V3d(1, 2, 1), true, 1e-3}}) {
+  for (const Case& one : {Case{"isotropic", V3d(1), false, 4.12e-4},
+                          Case{"anisotropic", V3d(1, 1, 2.5), false, 1.56e-3},
+                          Case{"oblique", V3d(1, 2, 1), true, 1.1e-3}}) {
     SCOPED_TRACE(one.name);
     std::vector<BandError> errors;
     for (const int n : {16, 32, 64}) {
@@ -246,7 +269,7 @@ TEST(Isosurface, OfALinearFunctionIsAPlaneInAnyFrame) {
     if (at.length() > 0.5) continue;  // further away, the border of the volume is nearer
     worst = std::max(worst, std::abs(static_cast<double>(*it) - (at.dot(normal) - 0.1)));
   }
-  EXPECT_LT(worst, measured(3e-7));
+  EXPECT_LT(worst, measured(1.63e-8));
 }
 
 // === Sides, types and limits
@@ -270,7 +293,7 @@ TEST(Isosurface, SidesAreComplements) {
   }
   EXPECT_GT(compared, 1000u);
   EXPECT_NEAR(levelset::measure(above.band).volume + levelset::measure(below.band).volume, 8,
-              measured(4e-3));
+              measured(1.04e-3));
 }
 
 TEST(Isosurface, TypesAndRescalingGiveTheSameSurface) {
@@ -298,7 +321,7 @@ TEST(Isosurface, TypesAndRescalingGiveTheSameSurface) {
   const levelset::NarrowBand one = solid(volumeOf(bytes, VolumeType::U8, {}));
   EXPECT_EQ(solid(volumeOf(words, VolumeType::I16, {0.25, 125})).contentHash(), one.contentHash());
   EXPECT_EQ(solid(volumeOf(negative, VolumeType::I16, {-0.5, 0})).contentHash(), one.contentHash());
-  EXPECT_LT(errorOf(one, unitSphere).outside, measured(0.02));
+  EXPECT_LT(errorOf(one, unitSphere).outside, measured(6.81e-3));
   EXPECT_TRUE(levelset::check(one).passed());
 }
 
@@ -309,7 +332,7 @@ TEST(Isosurface, SamplesEqualToTheIsovalueAreOutside) {
   const Volume volume = sampled(grid, [](const V3d& p) {
     return std::max({std::abs(p.x - 4), std::abs(p.y - 4), std::abs(p.z - 4)}) < 1.5 ? 1.0 : 0.0;
   });
-  const IsosurfaceResult made = isosurface(volume, {.low = 0.0}, {.voxelSize = 0.25});
+  const IsosurfaceResult made = isosurface(volume, {.low = 0.0}, {.voxelSize = 0.5});
   EXPECT_EQ(made.report.closedArea, 0);
   const auto m = levelset::measure(made.band);
   EXPECT_EQ(m.components, 1u);
@@ -344,7 +367,7 @@ TEST(Isosurface, BorderClosesTheSolid) {
   grid.indexToWorld[3][2] = 0;  // z from 0 to 2.6
   const Volume volume = sampled(grid, [](const V3d& p) { return 1 - p.length(); });
   const IsosurfaceResult made = isosurface(volume, {.low = 0.0});
-  EXPECT_NEAR(made.report.closedArea, M_PI, measured(6e-3));
+  EXPECT_NEAR(made.report.closedArea, M_PI, measured(3.38e-3));
   const BandError error = errorOf(made.band, [](const V3d& p) {
     if (p.length() < 1 && p.z >= 0) return -std::min(1 - p.length(), p.z);
     if (p.z >= 0) return p.length() - 1;
