@@ -37,7 +37,7 @@ NiftiFields fieldsOfNifti1(const BinaryHeader& h) {
   f.offset = number(108);
   f.slope = number(112);
   f.intercept = number(116);
-  f.units = h.at<std::int8_t>(123);
+  f.units = h.at<std::uint8_t>(123);
   f.qform = h.at<std::int16_t>(252);
   f.sform = h.at<std::int16_t>(254);
   f.quaternion = {number(256), number(260), number(264)};

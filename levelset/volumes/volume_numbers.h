@@ -12,18 +12,10 @@ namespace levelset {
 /// Calls visit(T()) with the C++ type of the stored numbers.
 template <typename Visit>
 decltype(auto) withStoredType(VolumeType type, const Visit& visit) {
-  switch (type) {
-    case VolumeType::U8:
-      return visit(std::uint8_t());
-    case VolumeType::I8:
-      return visit(std::int8_t());
-    case VolumeType::U16:
-      return visit(std::uint16_t());
-    case VolumeType::I16:
-      return visit(std::int16_t());
-    case VolumeType::F32:
-      break;
-  }
+  if (type == VolumeType::U8) return visit(std::uint8_t());
+  if (type == VolumeType::I8) return visit(std::int8_t());
+  if (type == VolumeType::U16) return visit(std::uint16_t());
+  if (type == VolumeType::I16) return visit(std::int16_t());
   return visit(float());
 }
 
