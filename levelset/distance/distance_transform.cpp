@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "levelset/distance/moved/meeting_parts.h"
-#include "levelset/distance/point_distance.h"
+#include "levelset/distance/nearest/point_distance.h"
 #include "levelset/distance/signs.h"
 #include "levelset/error.h"
 #include "levelset/memory_estimate.h"

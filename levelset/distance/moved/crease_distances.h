@@ -9,8 +9,8 @@
 #include <unordered_map>
 #include <vector>
 
-#include "levelset/distance/distance_transform.h"
 #include "levelset/distance/moved/moved_surface.h"
+#include "levelset/distance/nearest/distance_request.h"
 
 namespace levelset::eikonal {
 

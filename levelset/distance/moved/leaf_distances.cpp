@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "levelset/distance/point_distance.h"
+#include "levelset/distance/nearest/point_distance.h"
 #include "levelset/grids/box_mask_vdb.h"
 
 namespace levelset::eikonal {

@@ -11,7 +11,7 @@
 #include "levelset/distance/moved/crease_distances.h"
 #include "levelset/distance/moved/flat_edge_distances.h"
 #include "levelset/distance/moved/leaf_distances.h"
-#include "levelset/distance/point_distance.h"
+#include "levelset/distance/nearest/point_distance.h"
 
 namespace levelset::eikonal {
 namespace {

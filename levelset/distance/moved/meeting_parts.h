@@ -2,8 +2,8 @@
 
 // Internal header of levelset: public headers must not include it.
 
-#include "levelset/distance/distance_transform.h"
-#include "levelset/distance/propagate.h"
+#include "levelset/distance/nearest/distance_request.h"
+#include "levelset/distance/nearest/propagate.h"
 #include "levelset/distance/surface/zero_set.h"
 
 namespace levelset::eikonal {

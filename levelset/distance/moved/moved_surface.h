@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "levelset/distance/polisher.h"
+#include "levelset/distance/nearest/polisher.h"
 
 namespace levelset::eikonal {
 

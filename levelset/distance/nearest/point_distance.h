@@ -9,8 +9,8 @@
 #include <algorithm>
 #include <optional>
 
-#include "levelset/distance/distance_transform.h"
-#include "levelset/distance/polisher.h"
+#include "levelset/distance/nearest/distance_request.h"
+#include "levelset/distance/nearest/polisher.h"
 
 namespace levelset::eikonal {
 

@@ -2,7 +2,7 @@
 
 // Internal header of levelset: public headers must not include it.
 
-#include "levelset/distance/propagate.h"
+#include "levelset/distance/nearest/propagate.h"
 #include "levelset/distance/surface/closest_point.h"
 #include "levelset/distance/surface/zero_set.h"
 

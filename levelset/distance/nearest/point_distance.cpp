@@ -1,4 +1,4 @@
-#include "levelset/distance/point_distance.h"
+#include "levelset/distance/nearest/point_distance.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "levelset/distance/propagate.h"
+#include "levelset/distance/nearest/propagate.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>

@@ -1,4 +1,4 @@
-#include "levelset/distance/polisher.h"
+#include "levelset/distance/nearest/polisher.h"
 
 #include <algorithm>
 #include <cstring>
