@@ -62,9 +62,8 @@ std::string roiText(const RegionOfInterest& roi, const Plan& plan) {
 double bytesOf(const std::optional<Plan>& plan, const RegionOfInterest& roi) {
   if (!plan) return 0;
   if (plan->kind == Kind::Mesh) return plan->bytes();
-  const bool isTold =
-      (plan->kind == Kind::Band && plan->voxelSize > 0) || plan->kind == Kind::Field ||
-      plan->kind == Kind::Volume;
+  const bool isTold = (plan->kind == Kind::Band && plan->voxelSize > 0) ||
+                      plan->kind == Kind::Field || plan->kind == Kind::Volume;
   return isTold ? restricted(*plan, roi).bytes() : 0;
 }
 
