@@ -36,15 +36,16 @@ ValuePlan MorphologyOperator::plan(const Options& options, Plans operands, const
   return plan;
 }
 
-/// Extends the region by twice the radius, since the surface moves by the radius and back, and by
-/// the distance around the surface that each of the two offsets reads.
+/// Extends the region by the reach of both offsets, away and back.
 RegionOfInterest MorphologyOperator::regionOfInterest(const Options& options,
                                                       const OperatorPlans& plans, std::size_t,
                                                       const RegionOfInterest& ofResult) {
   if (options.mask) return {};
   const ValuePlan& solid = plans.operands[0];
-  const double away = distanceReach(solid.halfWidth), back = distanceReach(plans.result.halfWidth);
-  const double reach = 2 * options.radius + (away + back) * solid.voxelSize;
+  const double radius = options.radius / solid.voxelSize,
+               away = offsetReach(radius, solid.halfWidth),
+               back = offsetReach(radius, plans.result.halfWidth);
+  const double reach = (away + back) * solid.voxelSize;
   return {.region = grown(ofResult.region, reach)};
 }
 
@@ -120,7 +121,7 @@ RegionOfInterest ShellOperator::regionOfInterest(const Options& options, const O
                                                  std::size_t, const RegionOfInterest& ofResult) {
   if (options.mask) return {};
   const double width = plans.result.halfWidth, voxel = plans.operands[0].voxelSize;
-  const double reach = options.thickness + (distanceReach(width) + seamReach(width)) * voxel;
+  const double reach = (offsetReach(options.thickness / voxel, width) + seamReach(width)) * voxel;
   return {.region = grown(ofResult.region, reach)};
 }
 

@@ -7,6 +7,7 @@
 #include <mutex>
 
 #include "levelset/distance/distance_transform.h"
+#include "levelset/distance/redistance.h"
 #include "levelset/distance/surface/surface_points.h"
 #include "levelset/error.h"
 #include "levelset/vdb.h"
@@ -117,6 +118,13 @@ class Lengths {
 
 bool followsFromOld(double distance, double halfWidth) {
   return halfWidth >= kPadding && std::abs(distance) >= kLeastShift;
+}
+
+double offsetReach(double distance, double halfWidth) {
+  // Other offsets compute the shifted field first, and then the distances from it.
+  const double more =
+      followsFromOld(distance, halfWidth) ? eikonal::kCreaseReach : distanceReach(kPadding);
+  return std::abs(distance) + distanceReach(halfWidth) + more;
 }
 
 NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& options) {

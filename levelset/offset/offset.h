@@ -45,6 +45,11 @@ struct OffsetOptions {
 /// @param distance, halfWidth  voxels
 [[nodiscard]] bool followsFromOld(double distance, double halfWidth);
 
+/// Distance along each axis, voxels, from a grid point within which the solid determines the result
+/// of offset() there.
+/// @param distance, halfWidth  voxels
+[[nodiscard]] double offsetReach(double distance, double halfWidth);
+
 /// Estimates the cost of moving a surface.
 /// @param before,after  grid points in a layer along the surface before and after the offset, from
 ///         ValuePlan::layer()

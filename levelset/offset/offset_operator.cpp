@@ -69,8 +69,8 @@ RegionOfInterest OffsetOperator::regionOfInterest(const Options& options,
                                                   const OperatorPlans& plans, std::size_t,
                                                   const RegionOfInterest& ofResult) {
   if (!options.distance || options.mask || *options.distance == 0) return {};
-  const double reach = std::abs(*options.distance) +
-                       distanceReach(plans.result.halfWidth) * plans.operands[0].voxelSize;
+  const double voxel = plans.operands[0].voxelSize;
+  const double reach = offsetReach(*options.distance / voxel, plans.result.halfWidth) * voxel;
   return {.halfWidth = kReadBySurface, .region = grown(ofResult.region, reach)};
 }
 

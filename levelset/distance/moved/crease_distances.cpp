@@ -25,11 +25,15 @@ using Block = NearestPoints::Block;
 // decrease of a distance, voxels.
 constexpr int kRounds = 4;
 constexpr double kLeastGain = 1e-3;
-// Distance along each axis, voxels, in which a failed search starts again from other crease points.
-// Number of these, and least distance from each other, voxels. Edge of the cells that hold them.
-constexpr double kAround = 6, kApart = 0.5;
-constexpr std::size_t kStarts = 6;
+// Distance along each axis, voxels, to the grid points from whose crease points a failed search
+// starts again. Edge of the cells that hold these grid points.
+constexpr int kAround = 6;
 constexpr int kCell = 4;
+// Number of crease points from which a search starts again, and least distance between them,
+// voxels.
+constexpr std::size_t kStarts = 6;
+constexpr double kApart = 0.5;
+static_assert(kRounds + kAround == kCreaseReach);
 // Distance along each axis, voxels, in which zero crossings are searched. If the search from a grid
 // point failed, a distance to a crease is trusted up to kTrusted, voxels, above its lower bound.
 // Distances measured from the field are trusted to about kMeasured, voxels, beside creases.
@@ -123,7 +127,7 @@ void CreaseDistances::searchAgain(const FloatGrid& field) {
         if (found && (!point.found || found->distance < point.found->distance))
           point.found = std::move(found);
       };
-      for (const MovedSurface::CreasePoint* start : nearestCreases(cells, c.asVec3d())) {
+      for (const MovedSurface::CreasePoint* start : nearestCreases(cells, c)) {
         take(search.distanceFrom(block, point.n, *start));
         point.bound = std::min(point.bound, (start->point - c.asVec3d()).length());
       }
@@ -180,8 +184,8 @@ bool CreaseDistances::isTrusted(const Point& point) {
   return !point.hasFailed || point.found->distance < point.plain + kTrusted;
 }
 
-Coord CreaseDistances::cellOf(const Vec3d& point) {
-  return Coord::floor(point / double{kCell});
+Coord CreaseDistances::cellOf(const Coord& c) {
+  return Coord::floor(c.asVec3d() / double{kCell});
 }
 
 MaskTree CreaseDistances::failedPoints() const {
@@ -196,22 +200,23 @@ CreaseDistances::Cells CreaseDistances::creasesByCell(const MaskTree& within) co
   Cells cells;
   for (std::size_t i = 0; i < points_.size(); ++i)
     for (const Point& point : points_[i])
-      if (!point.hasFailed && point.found->crease &&
-          within.isValueOn(Coord::round(point.found->crease->point)))
-        cells[cellOf(point.found->crease->point)].push_back(&*point.found->crease);
+      if (const Coord c = gridPoint(i, point);
+          !point.hasFailed && point.found->crease && within.isValueOn(c))
+        cells[cellOf(c)].push_back({c, &*point.found->crease});
   return cells;
 }
 
-/// Returns up to kStarts crease points in the order of their distances from x, at least half a
-/// voxel apart.
+/// Returns up to kStarts crease points of the grid points around x in the order of their distances
+/// from x, at least kApart from each other.
 std::vector<const MovedSurface::CreasePoint*> CreaseDistances::nearestCreases(const Cells& cells,
-                                                                              const Vec3d& x) {
+                                                                              const Coord& x) {
   std::vector<std::pair<double, const MovedSurface::CreasePoint*>> near;
-  const Coord low = cellOf(x - Vec3d(kAround)), high = cellOf(x + Vec3d(kAround));
-  for (const Coord& cell : CoordBBox(low, high))
+  const CoordBBox around(x.offsetBy(-kAround), x.offsetBy(kAround));
+  for (const Coord& cell : CoordBBox(cellOf(around.min()), cellOf(around.max())))
     if (const auto found = cells.find(cell); found != cells.end())
-      for (const MovedSurface::CreasePoint* crease : found->second)
-        near.emplace_back((crease->point - x).lengthSqr(), crease);
+      for (const auto& [c, crease] : found->second)
+        if (around.isInside(c))
+          near.emplace_back((crease->point - x.asVec3d()).lengthSqr(), crease);
   std::stable_sort(near.begin(), near.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<const MovedSurface::CreasePoint*> starts;

@@ -60,14 +60,16 @@ class CreaseDistances {
   void add(const openvdb::Coord& c, const Point& point, Missing& missing) const;
   [[nodiscard]] static bool isTrusted(const Point& point);
 
-  /// Crease points by the cell of kCell³ voxels that contains them.
-  using Cells = std::unordered_map<openvdb::Coord, std::vector<const MovedSurface::CreasePoint*>,
-                                   std::hash<openvdb::Coord>>;
-  [[nodiscard]] static openvdb::Coord cellOf(const openvdb::Vec3d& point);
+  /// Grid points and their crease points by cells of kCell³ grid points.
+  using Cells =
+      std::unordered_map<openvdb::Coord,
+                         std::vector<std::pair<openvdb::Coord, const MovedSurface::CreasePoint*>>,
+                         std::hash<openvdb::Coord>>;
+  [[nodiscard]] static openvdb::Coord cellOf(const openvdb::Coord& c);
   [[nodiscard]] openvdb::MaskTree failedPoints() const;
   [[nodiscard]] Cells creasesByCell(const openvdb::MaskTree& within) const;
   [[nodiscard]] static std::vector<const MovedSurface::CreasePoint*> nearestCreases(
-      const Cells& cells, const openvdb::Vec3d& x);
+      const Cells& cells, const openvdb::Coord& x);
   [[nodiscard]] static std::vector<openvdb::Vec3d> nearestCrossings(
       const openvdb::FloatGrid::ConstAccessor& field, const openvdb::Coord& from);
   [[nodiscard]] openvdb::Coord gridPoint(std::size_t leaf, const Point& point) const;

@@ -72,7 +72,9 @@ class FlatEdges {
           for (std::size_t i = range.begin(); i != range.end(); ++i) {
             if (!accessor.probeConstLeaf(blocks[i]->origin())) continue;
             for (const SharpVertex& v : sharpEdgeVertices(field, accessor, blocks[i]->origin()))
-              if (const auto edge = flatEdge(v, field, accessor)) found[i].push_back(*edge);
+              if (const auto edge = flatEdge(v, field, accessor);
+                  edge && hasPointBeside(near, edge->vertex))
+                found[i].push_back(*edge);
           }
         });
     for (std::size_t i = 0; i < blocks.size(); ++i)
@@ -144,6 +146,15 @@ class FlatEdges {
   }
 
  private:
+  /// Returns true if one of the grid points is within kToFlatEdge voxels along each axis.
+  [[nodiscard]] static bool hasPointBeside(const MaskTree& points, const Vec3d& vertex) {
+    CoordBBox box(Coord::round(vertex), Coord::round(vertex));
+    box.expand(kToFlatEdge);
+    for (const Coord& c : box)
+      if (points.isValueOn(c)) return true;
+    return false;
+  }
+
   struct Near {
     double along = 0;  ///< distance of the closest point from the vertex along the edge, voxels
     const FlatEdge* edge = nullptr;

@@ -15,6 +15,10 @@ namespace levelset::eikonal {
 /// points.
 using ClosestPointLeaf = std::array<openvdb::Vec3d, 512>;
 
+/// Distance along each axis, voxels, to the other grid points that contribute to the distance of a
+/// grid point from a moved surface.
+inline constexpr int kCreaseReach = 10;
+
 /// Options of distanceTransform(), in voxels. With the signed distance d, the values of the result
 /// are d − shift where |d − shift| < halfWidth.
 struct DistanceRequest {
