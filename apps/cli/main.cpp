@@ -149,7 +149,7 @@ int runGraph(const pipeline::Graph& graph) {
   settings.maxMemory = maxMemory;
   settings.fullValues = globals.contains("no-roi");
   if (globals.contains("cache")) settings.cache = globals.at("cache");
-  settings.measureErrors = verbose || globals.contains("report");
+  settings.measureErrors = settings.measurePeaks = verbose || globals.contains("report");
   if (globals.contains("report") && pipeline::isPage(globals.at("report")))
     settings.thumbnails = pipeline::kMostThumbnails;
   settings.begin = [](const std::string& action) { cli::tellAction(action); };

@@ -110,7 +110,7 @@ class Run {
     pipeline::RunSettings settings;
     settings.maxMemory = options_.maxMemory > 0 ? options_.maxMemory : memoryLimit();
     settings.cache = options_.cache;
-    settings.measureErrors = options_.measureErrors;
+    settings.measureErrors = settings.measurePeaks = options_.measureErrors;
     if (pipeline::isPage(options_.report)) settings.thumbnails = pipeline::kMostThumbnails;
     settings.begin = [this](const std::string& action) {
       if (!goesOn_) throw levelset::Cancelled(action + ": cancelled");

@@ -18,6 +18,7 @@ GraphRun::GraphRun(const Graph& graph, const RunSettings& settings, RunReport& r
       threads_(std::min(
           static_cast<std::size_t>(tbb::this_task_arena::max_concurrency()),
           tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism))),
+      running_(settings.measurePeaks),
       values_(decideStates()) {}
 
 void GraphRun::run() {

@@ -19,6 +19,9 @@ namespace pipeline {
 struct RunSettings {
   bool dryRun = false;
   bool measureErrors = false;  ///< estimate each result's error; costs a pass over the result
+  /// Measures the peak memory of each step by itself. This resets the peak of the process, which
+  /// tools such as `time` read.
+  bool measurePeaks = false;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   bool fullValues = false;  ///< ignore regions of interest (--no-roi)
   /// Box of the requested results that the caller reads, world units. Other parts of them may be
@@ -52,7 +55,9 @@ struct StepReport {
       defaults;  ///< default values of the options that the user left out, by name
   StepNotes notes;
   double wallSeconds = 0, cpuSeconds = 0;
-  double peakBytes = 0;  ///< peak resident memory of the process, bytes
+  /// Peak resident memory of the process, bytes: during the step with RunSettings::measurePeaks,
+  /// else since the start of the process.
+  double peakBytes = 0;
   std::string resultName, resultKind;
   std::string location;  ///< position in the script, "FILE, line 4"; empty: none
   /// Number of active voxels, voxel size in world units, and half width in voxels, of a band.

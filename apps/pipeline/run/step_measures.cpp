@@ -91,7 +91,7 @@ double ArenaCpu::seconds() const {
 void RunningSteps::add(StepClock& clock) {
   const std::lock_guard lock(mutex_);
   updatePeaks();
-  apps::resetPeakResident();
+  if (resetsPeaks_) apps::resetPeakResident();
   clocks_.push_back(&clock);
   if (clocks_.size() < 2) return;
   for (StepClock* const running : clocks_) running->isAlone_ = false;
@@ -105,7 +105,7 @@ void RunningSteps::remove(StepClock& clock) {
 
 void RunningSteps::resetPeak() {
   const std::lock_guard lock(mutex_);
-  if (clocks_.empty()) apps::resetPeakResident();
+  if (resetsPeaks_ && clocks_.empty()) apps::resetPeakResident();
 }
 
 void RunningSteps::updatePeaks() {

@@ -44,10 +44,12 @@ class StepClock;
 /// The clocks of the steps that run at the same time.
 class RunningSteps {
  public:
+  /// @param resetsPeaks  each step's peak is its own; false: the peak of the process so far
+  explicit RunningSteps(bool resetsPeaks) : resetsPeaks_(resetsPeaks) {}
   void add(StepClock& clock);
   void remove(StepClock& clock);
-  /// Resets the peak resident memory of the process if no step runs. Memory that was used before
-  /// then counts for no step.
+  /// Resets the peak resident memory of the process, if steps reset it and none runs. Memory that
+  /// was used before then counts for no step.
   void resetPeak();
 
  private:
@@ -55,6 +57,7 @@ class RunningSteps {
 
   std::mutex mutex_;
   std::vector<StepClock*> clocks_;
+  bool resetsPeaks_;
 };
 
 /// Measures time and memory of a step until stop(). A step that runs alone gets the CPU time of the

@@ -65,6 +65,7 @@ LevelRunner::LevelRunner(const Graph& graph, const ToleranceParts& parts,
 
 RunSettings LevelRunner::settingsFor(const PartGraph& part) const {
   RunSettings settings = settings_;
+  settings.measurePeaks = true;  // they predict the memory of finer voxels
   if (settings_.progress)
     settings.progress = [this, &part](std::size_t index, const std::string& action,
                                       double fraction) {

@@ -216,7 +216,7 @@ TEST(ReportPage, ShowsComputedAndNeededRegions) {
   const support::TemporaryFolder folder;
   const std::string file = (folder / "a.ply").string();
   const std::string chain =
-      "sphere --radius 2 --voxel 0.1 --half-width 7 ! offset 0.1 ! clip --box 1,1,1_3,3,3 ! mesh ! "
+      "sphere --radius 4 --voxel 0.1 --half-width 7 ! offset 0.1 ! clip --box 2,2,2_5,5,5 ! mesh ! "
       "write " +
       file;
   std::vector<std::string> words = support::wordsOf(chain);
