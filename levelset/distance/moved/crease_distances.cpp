@@ -68,6 +68,8 @@ void CreaseDistances::search(const Progress& progress) {
         point.found = std::move(found);
         point.isBesideCrease = isBesideCrease;
       }
+      // The plain distance stands in the field already.
+      if (point.found && !point.found->crease) continue;
       point.hasFailed = !point.found;
       points_[i].push_back(std::move(point));
     }
@@ -79,7 +81,7 @@ void CreaseDistances::adoptFromNeighbours() {
     std::unordered_map<Coord, const MovedSurface::CreasePoint*, std::hash<Coord>> creases;
     for (std::size_t i = 0; i < points_.size(); ++i)
       for (const Point& point : points_[i])
-        if (point.found && point.found->crease)
+        if (point.found)
           creases.emplace(gridPoint(i, point), &*point.found->crease);
     std::vector<std::vector<std::pair<std::size_t, MovedSurface::Result>>> better(points_.size());
     std::atomic<bool> hasChanged = false;
@@ -87,7 +89,6 @@ void CreaseDistances::adoptFromNeighbours() {
       const Block& block = *nearest_.find(leaves_[i]->origin());
       for (std::size_t k = 0; k < points_[i].size(); ++k) {
         const Point& point = points_[i][k];
-        if (point.found && !point.found->crease) continue;
         const Coord c = gridPoint(i, point);
         const MovedSurface::CreasePoint* start = nullptr;
         double least = point.found ? point.found->distance - kLeastGain : INFINITY;
@@ -188,6 +189,13 @@ Coord CreaseDistances::cellOf(const Coord& c) {
   return Coord::floor(c.asVec3d() / double{kCell});
 }
 
+MaskTree CreaseDistances::gridPoints() const {
+  MaskTree all;
+  for (std::size_t i = 0; i < points_.size(); ++i)
+    for (const Point& point : points_[i]) all.setValueOn(gridPoint(i, point));
+  return all;
+}
+
 MaskTree CreaseDistances::failedPoints() const {
   MaskTree failed;
   for (std::size_t i = 0; i < points_.size(); ++i)
@@ -201,7 +209,7 @@ CreaseDistances::Cells CreaseDistances::creasesByCell(const MaskTree& within) co
   for (std::size_t i = 0; i < points_.size(); ++i)
     for (const Point& point : points_[i])
       if (const Coord c = gridPoint(i, point);
-          !point.hasFailed && point.found->crease && within.isValueOn(c))
+          !point.hasFailed && within.isValueOn(c))
         cells[cellOf(c)].push_back({c, &*point.found->crease});
   return cells;
 }

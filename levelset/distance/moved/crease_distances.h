@@ -22,7 +22,7 @@ class CreaseDistances {
   CreaseDistances(const openvdb::MaskTree& wrong, const ZeroSet& surface,
                   const NearestPoints& nearest, const DistanceRequest& request);
 
-  /// Finds the distance of each grid point by itself.
+  /// Finds the distance of each grid point by itself. Forgets the grid points whose value is right.
   void search(const Progress& progress);
 
   /// Starts the search again from the crease points of the neighbours, where these are nearer. So
@@ -33,6 +33,10 @@ class CreaseDistances {
   /// from zero crossings of the field. The nearest point of the moved surface lies on a crease
   /// wherever the plain distance is wrong.
   void searchAgain(const openvdb::FloatGrid& field);
+
+  /// Returns the grid points whose nearest point of the moved surface lies on a crease, and those
+  /// whose search failed.
+  [[nodiscard]] openvdb::MaskTree gridPoints() const;
 
   /// Grid points without a trusted distance, and the grid points around them in which the moved
   /// surface may be nearest.

@@ -23,10 +23,10 @@ using openvdb::Vec3d;
 using LeafNode = openvdb::FloatTree::LeafNodeType;
 using Block = NearestPoints::Block;
 
-// A value is kept if its foot point lies within a tolerance of the zero set. The tolerance is about
+// A value is kept if its foot point lies within a tolerance of the zero set. The tolerance is above
 // the error of tricubic interpolation: kPerBend times the sum of the squares of the second
 // differences, between kFlat and kRound, voxels.
-constexpr double kPerBend = 3, kFlat = 1e-4, kRound = 5e-3;
+constexpr double kPerBend = 30, kFlat = 1e-4, kRound = 5e-3;
 // Number of times the normal is computed again at the foot point.
 constexpr int kNormals = 3;
 
@@ -162,7 +162,7 @@ void correctMeetingParts(FloatGrid& field, const ZeroSet& surface, const Nearest
   if (!missing.points.empty())
     measureFromField(field, missing.points, missing.near, request.halfWidth);
   distances.improveMeasured(field);
-  measureFlatEdges(field, wrong, request.halfWidth);
+  measureFlatEdges(field, distances.gridPoints(), request.halfWidth);
   openvdb::tools::pruneTiles(field.tree());
 }
 
