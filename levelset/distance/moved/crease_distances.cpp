@@ -3,8 +3,8 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
+#include <memory>
 
 #include "levelset/distance/moved/leaf_distances.h"
 #include "levelset/distance/nearest/point_distance.h"
@@ -77,19 +77,20 @@ void CreaseDistances::search(const Progress& progress) {
 }
 
 void CreaseDistances::adoptFromNeighbours() {
+  std::unordered_map<Coord, const MovedSurface::CreasePoint*, std::hash<Coord>> creases;
+  for (std::size_t i = 0; i < points_.size(); ++i)
+    for (const Point& point : points_[i])
+      if (point.found) creases.emplace(gridPoint(i, point), &*point.found->crease);
+  std::unique_ptr<MaskTree> beside;  // grid points beside those that changed in the round before
   for (int round = 0; round < kRounds; ++round) {
-    std::unordered_map<Coord, const MovedSurface::CreasePoint*, std::hash<Coord>> creases;
-    for (std::size_t i = 0; i < points_.size(); ++i)
-      for (const Point& point : points_[i])
-        if (point.found)
-          creases.emplace(gridPoint(i, point), &*point.found->crease);
     std::vector<std::vector<std::pair<std::size_t, MovedSurface::Result>>> better(points_.size());
-    std::atomic<bool> hasChanged = false;
     tbb::parallel_for(std::size_t{0}, points_.size(), [&](std::size_t i) {
+      if (beside && !beside->probeConstLeaf(leaves_[i]->origin())) return;
       const Block& block = *nearest_.find(leaves_[i]->origin());
       for (std::size_t k = 0; k < points_[i].size(); ++k) {
         const Point& point = points_[i][k];
         const Coord c = gridPoint(i, point);
+        if (beside && !beside->isValueOn(c)) continue;
         const MovedSurface::CreasePoint* start = nullptr;
         double least = point.found ? point.found->distance - kLeastGain : INFINITY;
         for (int step = 0; step < 27; ++step) {
@@ -106,12 +107,18 @@ void CreaseDistances::adoptFromNeighbours() {
             (point.found && found->distance > point.found->distance - kLeastGain))
           continue;
         better[i].emplace_back(k, std::move(*found));
-        hasChanged = true;
       }
     });
-    if (!hasChanged) return;
+    MaskTree changed;
     for (std::size_t i = 0; i < points_.size(); ++i)
-      for (auto& [k, found] : better[i]) points_[i][k].found = std::move(found);
+      for (auto& [k, found] : better[i]) {
+        Point& point = points_[i][k];
+        point.found = std::move(found);
+        creases[gridPoint(i, point)] = &*point.found->crease;
+        changed.setValueOn(gridPoint(i, point));
+      }
+    if (changed.empty()) return;
+    beside = std::make_unique<MaskTree>(boxesAround(changed, 1));
   }
 }
 

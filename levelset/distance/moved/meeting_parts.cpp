@@ -119,7 +119,7 @@ MaskTree wrongPoints(const FloatGrid& field, bool isInside) {
 /// @param near  grid points around them; contains the part of the zero set that is nearest to them
 void measureFromField(FloatGrid& field, const MaskTree& points, const MaskTree& near,
                       double halfWidth) {
-  const BlockSelection blocks{{}, &near}, edgeBlocks{{}, &near, &near};
+  const BlockSelection blocks{{}, &near, &near}, edgeBlocks{{}, &near, &near, &near};
   const ZeroSet surface = readZeroSet(field, blocks, &edgeBlocks, {});
   NearestPoints nearest(field.tree(), surface.points, {halfWidth, halfWidth, {}, &near});
   nearest.run({});

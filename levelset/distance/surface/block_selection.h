@@ -12,6 +12,8 @@ namespace levelset::eikonal {
 struct BlockSelection {
   std::optional<openvdb::CoordBBox> box = {};  ///< only blocks that intersect it; empty: no limit
   const openvdb::MaskTree* leaves = nullptr;   ///< only blocks with a leaf there; null: no limit
+  /// Grid points whose closest points are searched; null: no limit.
+  const openvdb::MaskTree* gridPoints = nullptr;
   /// Cells, by their lowest corner, in which edges of the surface are searched; null: no limit.
   const openvdb::MaskTree* edgeCells = nullptr;
 

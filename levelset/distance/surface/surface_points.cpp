@@ -215,8 +215,10 @@ bool isThinAt(const DenseBlock& block, int x, int y, int z, float background) {
 }
 
 /// Finds the surface points of one leaf. They do not include points on edges and corners.
+/// @param among  only for these grid points; null: for all
 SurfacePoints surfacePointsOf(const DenseBlock& block, float background,
-                              const SharpPatches& patches) {
+                              const SharpPatches& patches,
+                              const openvdb::MaskTree::LeafNodeType* among) {
   const Vec3d origin = block.origin().asVec3d();
   SurfacePoints found;
   std::vector<Crossings> crossingsOf;  // one for each search
@@ -229,6 +231,7 @@ SurfacePoints surfacePointsOf(const DenseBlock& block, float background,
   searches.reserve(kUsual);
   forEachPointBeside(block, background, [&](int x, int y, int z, const Crossings& crossings) {
     const Coord gridPoint = block.origin().offsetBy(x, y, z);
+    if (among && !among->isValueOn(gridPoint)) return;
     TriangleTree::Hit hit;
     if (patches.touches(gridPoint))
       hit = patches.nearest(gridPoint.asVec3d(), crossings.nearestDistance() + kSharpTolerance);
@@ -281,7 +284,9 @@ SurfacePoints findSurfacePoints(const FloatTree& field, const BlockSelection& wi
   const float background = field.background();
   std::vector<SurfacePoints> found(leaves.size());
   forEachBlock(field, leaves, [&](std::size_t i, const DenseBlock& block) {
-    found[i] = surfacePointsOf(block, background, patches);
+    const auto* among =
+        within.gridPoints ? within.gridPoints->probeConstLeaf(block.origin()) : nullptr;
+    found[i] = surfacePointsOf(block, background, patches, among);
   });
   SurfacePoints all;
   std::size_t count = 0;

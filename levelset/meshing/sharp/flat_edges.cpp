@@ -20,6 +20,9 @@ struct Window {
 };
 constexpr double kBegin = 2;
 constexpr Window kWindows[] = {{5.5, 2, 3e-4}, {3, 1, 1e-4}};
+// Largest deviation of the values from the vertex's plane, voxels. Faces that bend more are not
+// flat, which spares the fit.
+constexpr double kBendsAway = 0.2;
 // Largest distance of the grid points from the plane of the face, voxels.
 constexpr double kOffPlane = 2;
 // Least number of grid points. A plane has four unknowns.
@@ -46,8 +49,10 @@ std::optional<FlatFace> fitFace(const Vec3d& vertex, const Vec3d& normal, const 
       continue;
     float value = 0;
     if (!field.probeValue(c, value)) continue;
+    const double deviation = static_cast<double>(value) / voxelSize - normal.dot(to);
+    if (std::abs(deviation) > kBendsAway) return std::nullopt;
     rows.emplace_back(to.x(), to.y(), to.z(), 1);
-    values.push_back(static_cast<double>(value) / voxelSize - normal.dot(to));
+    values.push_back(deviation);
   }
   if (rows.size() < kLeastPoints) return std::nullopt;
   Eigen::Matrix<double, Eigen::Dynamic, 4> matrix(static_cast<Eigen::Index>(rows.size()), 4);

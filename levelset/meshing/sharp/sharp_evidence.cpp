@@ -1,7 +1,7 @@
 #include "levelset/meshing/sharp/sharp_evidence.h"
 
 #include <algorithm>
-#include <bitset>
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -29,39 +29,55 @@ class BlockSigns {
  public:
   BlockSigns(const openvdb::FloatGrid& grid, const openvdb::FloatGrid::ConstAccessor& field,
              const Coord& origin) {
-    copyPaddedLeaf(field, origin, 1, 2, values_.data());
+    std::array<float, std::size_t{kDim} * kDim * kDim> values;
+    copyPaddedLeaf(field, origin, 1, 2, values.data());
     const auto limit = static_cast<float>(kSmoothBend * grid.voxelSize()[0]);
-    for (int x = 0; x <= 8; ++x)
-      for (int y = 0; y <= 8; ++y)
-        for (int z = 0; z <= 8; ++z) {
-          const std::size_t n = slot(x, y, z);
-          float bend = 0;
-          for (const std::size_t step : {kDim * kDim, kDim, std::size_t{1}})
-            bend = std::max(bend, std::abs(values_[n - step] + values_[n + step] - 2 * values_[n]));
-          inside_[n] = values_[n] < 0;
-          bent_[n] = !(bend < limit);
+    for (int x = 0; x < kSide; ++x)
+      for (int y = 0; y < kSide; ++y) {
+        const float* v = values.data() + ((x + 1) * kDim + y + 1) * kDim + 1;
+        std::array<bool, kSide> isInside, isBent;
+        for (int z = 0; z < kSide; ++z) {
+          const float twice = 2 * v[z];
+          const float alongX = std::abs(v[z - kDim * kDim] + v[z + kDim * kDim] - twice),
+                      alongY = std::abs(v[z - kDim] + v[z + kDim] - twice),
+                      alongZ = std::abs(v[z - 1] + v[z + 1] - twice);
+          isInside[static_cast<std::size_t>(z)] = v[z] < 0;
+          isBent[static_cast<std::size_t>(z)] =
+              !(alongX < limit) | !(alongY < limit) | !(alongZ < limit);
         }
+        inside_[row(x, y)] = bits(isInside);
+        bent_[row(x, y)] = bits(isBent);
+      }
+  }
+  /// Returns the cells of a row with corners on both sides and a bent corner: bit z for each.
+  [[nodiscard]] unsigned bentCrossings(int x, int y) const {
+    unsigned any = 0, all = ~0u, bent = 0;
+    for (const std::size_t i : {row(x, y), row(x, y + 1), row(x + 1, y), row(x + 1, y + 1)}) {
+      any |= inside_[i] | inside_[i] >> 1;
+      all &= inside_[i] & inside_[i] >> 1;
+      bent |= bent_[i] | bent_[i] >> 1;
+    }
+    return any & ~all & bent & 0xff;
   }
   /// Pattern of the corners of a cell that are inside, as in cell_table.h.
-  [[nodiscard]] unsigned pattern(int x, int y, int z) const { return corners(inside_, x, y, z); }
-  [[nodiscard]] bool isBent(int x, int y, int z) const { return corners(bent_, x, y, z) != 0; }
-
- private:
-  static constexpr std::size_t kDim = 11;
-  using Bits = std::bitset<kDim * kDim * kDim>;
-  static std::size_t slot(int x, int y, int z) {
-    return static_cast<std::size_t>(((x + 1) * 11 + y + 1) * 11 + z + 1);
-  }
-  static unsigned corners(const Bits& bits, int x, int y, int z) {
+  [[nodiscard]] unsigned pattern(int x, int y, int z) const {
     unsigned result = 0;
     for (int corner = 0; corner < 8; ++corner)
-      result |= unsigned{bits[slot(x + (corner >> 2), y + (corner >> 1 & 1), z + (corner & 1))]}
+      result |= (inside_[row(x + (corner >> 2), y + (corner >> 1 & 1))] >> (z + (corner & 1)) & 1u)
                 << corner;
     return result;
   }
 
-  std::array<float, kDim * kDim * kDim> values_;
-  Bits inside_, bent_;
+ private:
+  static constexpr int kSide = 9, kDim = kSide + 2;
+  static std::size_t row(int x, int y) { return static_cast<std::size_t>(x * kSide + y); }
+  static unsigned bits(const std::array<bool, kSide>& values) {
+    unsigned result = 0;
+    for (std::size_t i = 0; i < kSide; ++i) result |= unsigned{values[i]} << i;
+    return result;
+  }
+
+  std::array<unsigned, std::size_t{kSide} * kSide> inside_, bent_;  // rows along z, bit z for each
 };
 
 }  // namespace
@@ -119,9 +135,9 @@ std::vector<SharpVertex> sharpEdgeVertices(const openvdb::FloatGrid& grid,
   std::vector<SharpVertex> found;
   for (int x = 0; x < 8; ++x)
     for (int y = 0; y < 8; ++y)
-      for (int z = 0; z < 8; ++z) {
+      for (unsigned cells = signs.bentCrossings(x, y); cells; cells &= cells - 1) {
+        const int z = __builtin_ctz(cells);
         const unsigned pattern = signs.pattern(x, y, z);
-        if (pattern == 0 || pattern == 255 || !signs.isBent(x, y, z)) continue;
         if (!placer) placer.emplace(grid, origin);
         const CellCase& cell = cellTable()[pattern];
         const std::uint8_t* edges = cell.cycleEdges.data();
