@@ -1,5 +1,7 @@
 #include "levelset/grids/box_mask_vdb.h"
 
+#include <cmath>
+
 namespace levelset {
 
 using openvdb::Coord;
@@ -20,6 +22,18 @@ void addBox(openvdb::MaskTree& points, const openvdb::CoordBBox& box) {
         for (int x = part.min().x(); x <= part.max().x(); ++x)
           mask.getWord<std::uint64_t>(static_cast<openvdb::Index>(x)) |= slab;
       }
+}
+
+void addBall(openvdb::MaskTree& points, const Coord& centre, double radius) {
+  const double squared = radius * radius;
+  const int reach = static_cast<int>(radius);
+  for (int x = -reach; x <= reach; ++x)
+    for (int y = -reach; y <= reach; ++y) {
+      const double rest = squared - x * x - y * y;
+      if (rest < 0) continue;
+      const int z = static_cast<int>(std::sqrt(rest));
+      addBox(points, {centre.offsetBy(x, y, -z), centre.offsetBy(x, y, z)});
+    }
 }
 
 }  // namespace levelset

@@ -11,4 +11,8 @@ namespace levelset {
 /// @param box  in index space, both corners included
 void addBox(openvdb::MaskTree& points, const openvdb::CoordBBox& box);
 
+/// Sets the grid points of a ball.
+/// @param radius  voxels, at least 0; points at this distance are included
+void addBall(openvdb::MaskTree& points, const openvdb::Coord& centre, double radius);
+
 }  // namespace levelset

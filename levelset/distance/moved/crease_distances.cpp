@@ -41,7 +41,7 @@ constexpr int kCrossings = 4;
 constexpr double kTrusted = 1e-3, kMeasured = 0.1;
 // Distance beyond the largest distance to measure, voxels, from which a surface point may be the
 // nearest, or an edge may affect it.
-constexpr double kMargin = 1.5;
+constexpr double kMargin = 2;
 
 }  // namespace
 
@@ -57,6 +57,10 @@ CreaseDistances::CreaseDistances(const MaskTree& wrong, const ZeroSet& surface,
 void CreaseDistances::search(const Progress& progress) {
   forEachWithPolisher(leaves_.size(), surface_, progress, [&](std::size_t i, Polisher& polisher) {
     const Block& block = *nearest_.find(leaves_[i]->origin());
+    NearestPoints::Mask known = leaves_[i]->getValueMask();
+    for (auto it = leaves_[i]->cbeginValueOn(); it; ++it)
+      known.set(it.pos(), block.nearest[it.pos()] != NearestPoints::kNone);
+    polisher.prepare(block, known);
     for (auto it = leaves_[i]->cbeginValueOn(); it; ++it) {
       Point point;
       point.n = it.pos();
@@ -182,9 +186,7 @@ void CreaseDistances::add(const Coord& c, const Point& point, Missing& missing) 
   missing.points.setValueOn(c);
   double farthest = std::min(request_.halfWidth, point.bound);
   if (point.found) farthest = std::min(farthest, point.found->distance);
-  CoordBBox box(c, c);
-  box.expand(static_cast<int>(std::ceil(farthest + kMargin)));
-  addBox(missing.near, box);
+  addBall(missing.near, c, farthest + kMargin);
 }
 
 bool CreaseDistances::isTrusted(const Point& point) {

@@ -68,4 +68,16 @@ TEST(BoxMask, JoinsBoxesThatOverlap) {
   EXPECT_LT(points.activeVoxelCount(), volumes);
 }
 
+TEST(BoxMask, SetsExactlyThePointsOfABall) {
+  for (const double radius : {0.0, 1.0, 1.5, 5.0, 9.3}) {
+    SCOPED_TRACE(radius);
+    const Coord centre(-3, 6, 8);
+    openvdb::MaskTree points, wanted;
+    levelset::addBall(points, centre, radius);
+    for (const Coord& c : CoordBBox(centre.offsetBy(-10), centre.offsetBy(10)))
+      if ((c - centre).asVec3d().lengthSqr() <= radius * radius) wanted.setValueOn(c);
+    EXPECT_EQ(differences(points, wanted), 0u);
+  }
+}
+
 }  // namespace box_mask_test
