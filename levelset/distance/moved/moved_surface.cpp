@@ -31,6 +31,8 @@ constexpr double kBetweenPoints = 8;
 constexpr double kStepOfJet = 2.5, kStepError = 0.1;
 // Number of steps of the search for a point of the crease, and number of sets of parts to try.
 constexpr int kMoves = 40, kSets = 6;
+// The search fails after this many steps in a row none of which is the shortest so far.
+constexpr int kStalled = 8;
 // Number of searches for a foot point. Each starts where the search before it moved too far.
 constexpr int kFollows = 4;
 // A surface point is at most about this much farther than the closest point of its part, voxels.
@@ -260,6 +262,8 @@ MovedSurface::Meeting MovedSurface::meet(const Vec3d& x, std::vector<Vec3d>& fee
   const auto count = static_cast<Eigen::Index>(feet.size());
   Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3> normals(3, count);
   Vec3d lastStep(0), lastTarget(0);
+  double shortest = INFINITY;
+  int stalled = 0;
   for (int i = 0; i < kMoves; ++i) {
     Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1> right(count);
     for (Eigen::Index k = 0; k < count; ++k) {
@@ -288,6 +292,9 @@ MovedSurface::Meeting MovedSurface::meet(const Vec3d& x, std::vector<Vec3d>& fee
       for (Eigen::Index k = 0; k < count; ++k) multipliers[static_cast<std::size_t>(k)] = along[k];
       return Meeting::Found;
     }
+    stalled = length < shortest ? 0 : stalled + 1;
+    if (stalled == kStalled) return Meeting::Failed;
+    shortest = std::min(shortest, length);
     if (length > kLongestMove) step *= kLongestMove / length;
     // Anderson acceleration [Walker11]: the normals turn as the point moves along the crease, so
     // that the plain iteration converges slowly far from the crease.
