@@ -53,25 +53,18 @@ bool haveCorner(const std::vector<FlatFace>& faces) {
 /// Edges between flat faces of a field, by position.
 class FlatEdges {
  public:
-  /// Searches for them in the leaf blocks near the grid points `near`.
+  /// Searches for them near the grid points `near`.
   FlatEdges(const FloatGrid& field, const MaskTree& near) {
-    MaskTree leaves;
-    for (auto leaf = near.cbeginLeaf(); leaf; ++leaf) {
-      CoordBBox box = leaf->getNodeBoundingBox();
-      leaf->evalActiveBoundingBox(box, false);
-      box.expand(kToFlatEdge);
-      for (int x = box.min().x() & ~7; x <= box.max().x(); x += 8)
-        for (int y = box.min().y() & ~7; y <= box.max().y(); y += 8)
-          for (int z = box.min().z() & ~7; z <= box.max().z(); z += 8) leaves.touchLeaf({x, y, z});
-    }
-    const auto blocks = leavesOf(leaves);
+    // A vertex lies in its cell or close beside it.
+    const MaskTree cells = boxesAround(near, kToFlatEdge + 1);
+    const auto blocks = leavesOf(cells);
     std::vector<std::vector<FlatEdge>> found(blocks.size());
     tbb::parallel_for(
         tbb::blocked_range<std::size_t>(0, blocks.size(), 16), [&](const auto& range) {
           const FloatGrid::ConstAccessor accessor(field.tree());
           for (std::size_t i = range.begin(); i != range.end(); ++i) {
             if (!accessor.probeConstLeaf(blocks[i]->origin())) continue;
-            for (const SharpVertex& v : sharpEdgeVertices(field, accessor, blocks[i]->origin()))
+            for (const SharpVertex& v : sharpEdgeVertices(field, accessor, blocks[i]->origin(), blocks[i]))
               if (const auto edge = flatEdge(v, field, accessor);
                   edge && hasPointBeside(near, edge->vertex))
                 found[i].push_back(*edge);

@@ -129,14 +129,16 @@ EdgeEvidence edgeEvidence(const Vec3d& vertex, const VertexSheets& sheets,
 
 std::vector<SharpVertex> sharpEdgeVertices(const openvdb::FloatGrid& grid,
                                            const openvdb::FloatGrid::ConstAccessor& field,
-                                           const Coord& origin) {
+                                           const Coord& origin,
+                                           const openvdb::MaskTree::LeafNodeType* cells) {
   const BlockSigns signs(grid, field, origin);
   std::optional<VertexPlacer> placer;
   std::vector<SharpVertex> found;
   for (int x = 0; x < 8; ++x)
     for (int y = 0; y < 8; ++y)
-      for (unsigned cells = signs.bentCrossings(x, y); cells; cells &= cells - 1) {
-        const int z = __builtin_ctz(cells);
+      for (unsigned row = signs.bentCrossings(x, y); row; row &= row - 1) {
+        const int z = __builtin_ctz(row);
+        if (cells && !cells->isValueOn(origin.offsetBy(x, y, z))) continue;
         const unsigned pattern = signs.pattern(x, y, z);
         if (!placer) placer.emplace(grid, origin);
         const CellCase& cell = cellTable()[pattern];

@@ -41,8 +41,9 @@ struct SharpVertex {
 /// Every edge that confirmFeatures() confirms has such a vertex within 3 voxels of
 /// each of its vertices. So a search for edges can skip the blocks without one. Cells that are
 /// smooth at all corners are skipped.
+/// @param cells  only in these cells, given by their lowest corners; null: in all
 [[nodiscard]] std::vector<SharpVertex> sharpEdgeVertices(
     const openvdb::FloatGrid& grid, const openvdb::FloatGrid::ConstAccessor& field,
-    const openvdb::Coord& origin);
+    const openvdb::Coord& origin, const openvdb::MaskTree::LeafNodeType* cells = nullptr);
 
 }  // namespace levelset
