@@ -39,9 +39,39 @@ static_assert(kRounds + kAround == kCreaseReach);
 // Distances measured from the field are trusted to about kMeasured, voxels, beside creases.
 constexpr int kCrossings = 4;
 constexpr double kTrusted = 1e-3, kMeasured = 0.1;
+// A failed search may be beside an edge if at least kLeastFlat grid points within kFlatReach voxels
+// have second differences of at most kFlatBend voxels along each axis.
+constexpr int kFlatReach = 4, kLeastFlat = 6;
+constexpr double kFlatBend = 3e-4;
 // Distance beyond the largest distance to measure, voxels, from which a surface point may be the
 // nearest, or an edge may affect it.
 constexpr double kMargin = 2;
+
+/// Returns true if the field around a grid point has values of flat faces. Looks at every second
+/// grid point.
+bool isBesideFlatFace(const FloatGrid::ConstAccessor& field, const Coord& at, double voxelSize) {
+  const auto limit = static_cast<float>(kFlatBend * voxelSize);
+  const auto isFlat = [&](const Coord& c) {
+    float value = 0;
+    if (!field.probeValue(c, value)) return false;
+    for (int axis = 0; axis < 3; ++axis) {
+      Coord before = c, after = c;
+      --before[axis];
+      ++after[axis];
+      float low = 0, high = 0;
+      if (!field.probeValue(before, low) || !field.probeValue(after, high) ||
+          std::abs(low + high - 2 * value) > limit)
+        return false;
+    }
+    return true;
+  };
+  int flat = 0;
+  for (int x = -kFlatReach; x <= kFlatReach; x += 2)
+    for (int y = -kFlatReach; y <= kFlatReach; y += 2)
+      for (int z = -kFlatReach; z <= kFlatReach; z += 2)
+        if (isFlat(at.offsetBy(x, y, z)) && ++flat == kLeastFlat) return true;
+  return false;
+}
 
 }  // namespace
 
@@ -68,9 +98,10 @@ void CreaseDistances::search(const Progress& progress) {
       point.sign = value < 0 ? -1 : 1;
       point.plain = std::abs(value);
       if (closest) {
-        auto [found, isBesideCrease] = searches_.local().distance(block, point.n, *closest);
-        point.found = std::move(found);
-        point.isBesideCrease = isBesideCrease;
+        auto found = searches_.local().distance(block, point.n, *closest);
+        point.found = std::move(found.result);
+        point.isBesideCrease = found.isBesideCrease;
+        point.meetsPatches = found.meetsPatches;
       }
       // The plain distance stands in the field already.
       if (point.found && !point.found->crease) continue;
@@ -156,10 +187,17 @@ CreaseDistances::Missing CreaseDistances::write(FloatGrid& field) const {
     for (const Point& point : points_[i])
       if (isTrusted(point))
         values.emplace_back(point.n, point.sign * std::max(point.found->distance, point.plain));
-      else
-        add(gridPoint(i, point), point, missing);
     setAll(field, leaves_[i]->origin(), values, request_.halfWidth);
   }
+  const FloatGrid::ConstAccessor accessor(field.tree());
+  for (std::size_t i = 0; i < points_.size(); ++i)
+    for (const Point& point : points_[i]) {
+      if (isTrusted(point)) continue;
+      const Coord c = gridPoint(i, point);
+      const bool mayHaveEdge =
+          point.meetsPatches || isBesideFlatFace(accessor, c, field.voxelSize()[0]);
+      add(c, point, mayHaveEdge, missing);
+    }
   return missing;
 }
 
@@ -182,11 +220,13 @@ void CreaseDistances::improveMeasured(FloatGrid& field) const {
   }
 }
 
-void CreaseDistances::add(const Coord& c, const Point& point, Missing& missing) const {
+void CreaseDistances::add(const Coord& c, const Point& point, bool mayHaveEdge,
+                          Missing& missing) const {
   missing.points.setValueOn(c);
   double farthest = std::min(request_.halfWidth, point.bound);
   if (point.found) farthest = std::min(farthest, point.found->distance);
   addBall(missing.near, c, farthest + kMargin);
+  if (mayHaveEdge) addBall(missing.nearEdges, c, farthest + kMargin);
 }
 
 bool CreaseDistances::isTrusted(const Point& point) {

@@ -39,9 +39,9 @@ class CreaseDistances {
   [[nodiscard]] openvdb::MaskTree gridPoints() const;
 
   /// Grid points without a trusted distance, and the grid points around them in which the moved
-  /// surface may be nearest.
+  /// surface may be nearest; `nearEdges`: only around those beside edges of the surface.
   struct Missing {
-    openvdb::MaskTree points, near;
+    openvdb::MaskTree points, near, nearEdges;
   };
 
   /// Writes the trusted distances into the field.
@@ -56,12 +56,12 @@ class CreaseDistances {
     openvdb::Index n = 0;
     double sign = 1;
     bool hasFailed = false;       ///< the search by itself found no distance
-    bool isBesideCrease = false;  ///< as in MovedSurface::Search
+    bool isBesideCrease = false, meetsPatches = false;  ///< as in MovedSurface::Search
     double plain = 0;  ///< lower bound of the distance, voxels: the distance minus the shift
     std::optional<MovedSurface::Result> found = {};
     double bound = INFINITY;  ///< upper bound: distance of a crease point of another grid point
   };
-  void add(const openvdb::Coord& c, const Point& point, Missing& missing) const;
+  void add(const openvdb::Coord& c, const Point& point, bool mayHaveEdge, Missing& missing) const;
   [[nodiscard]] static bool isTrusted(const Point& point);
 
   /// Grid points and their crease points by cells of kCell³ grid points.

@@ -26,7 +26,7 @@ using Block = NearestPoints::Block;
 // A value is kept if its foot point lies within a tolerance of the zero set. The tolerance is above
 // the error of tricubic interpolation: kPerBend times the sum of the squares of the second
 // differences, between kFlat and kRound, voxels.
-constexpr double kPerBend = 30, kFlat = 1e-4, kRound = 5e-3;
+constexpr double kPerBend = 10, kFlat = 1e-4, kRound = 5e-3;
 // Number of times the normal is computed again at the foot point.
 constexpr int kNormals = 3;
 
@@ -117,10 +117,11 @@ MaskTree wrongPoints(const FloatGrid& field, bool isInside) {
 /// Computes the signed distances of some grid points to the zero set of `field`, and sets them. The
 /// cost depends on their number.
 /// @param near  grid points around them; contains the part of the zero set that is nearest to them
-void measureFromField(FloatGrid& field, const MaskTree& points, const MaskTree& near,
-                      double halfWidth) {
-  const BlockSelection blocks{{}, &near, &near}, edgeBlocks{{}, &near, &near, &near};
-  const ZeroSet surface = readZeroSet(field, blocks, &edgeBlocks, {});
+void measureFromField(FloatGrid& field, const CreaseDistances::Missing& missing, double halfWidth) {
+  const auto& [points, near, nearEdges] = missing;
+  const BlockSelection blocks{{}, &near, &near}, edgeBlocks{{}, &nearEdges, nullptr, &nearEdges};
+  const ZeroSet surface =
+      readZeroSet(field, blocks, nearEdges.empty() ? nullptr : &edgeBlocks, {});
   NearestPoints nearest(field.tree(), surface.points, {halfWidth, halfWidth, {}, &near});
   nearest.run({});
 
@@ -160,7 +161,7 @@ void correctMeetingParts(FloatGrid& field, const ZeroSet& surface, const Nearest
   const auto missing = distances.write(field);
   report(progress, 0.8);
   if (!missing.points.empty())
-    measureFromField(field, missing.points, missing.near, request.halfWidth);
+    measureFromField(field, missing, request.halfWidth);
   distances.improveMeasured(field);
   measureFlatEdges(field, distances.gridPoints(), request.halfWidth);
   openvdb::tools::pruneTiles(field.tree());

@@ -69,6 +69,7 @@ MovedSurface::Search MovedSurface::distance(const NearestPoints::Block& block, o
   if (!(closest.distance > 1e-3)) normal = points_.jets[block.nearest[n]].jet().gradient;
   if (!normal.normalize()) return {};
   const double least = std::abs(sign * closest.distance - shift_);
+  meetsPatches_ = false;
 
   std::vector<Vec3d> parts{closest.point}, seen = parts;
   Vec3d meeting = closest.point + normal * shift_;
@@ -91,7 +92,7 @@ MovedSurface::Search MovedSurface::distance(const NearestPoints::Block& block, o
       return {nearestPair(block, x, start, seen, {found, CreasePoint{meeting, parts}})};
   }
   if (isPart && gap < kClose) return {Result{least}};
-  return {std::nullopt, isPart && gap > kBesideCrease};
+  return {std::nullopt, isPart && gap > kBesideCrease, meetsPatches_};
 }
 
 /// Where more than two parts are near, several creases are. Returns the nearest of `best` and of
@@ -207,6 +208,7 @@ MovedSurface::NearerPart MovedSurface::nearerPart(const NearestPoints::Block& bl
     if (isKnown(start)) continue;
     const bool mayBeNearer = (start - at).lengthSqr() < distance * distance + kBetweenPoints;
     if (points_.sharp[point]) {
+      meetsPatches_ = true;
       const PatchDistance patch = patchDistance(at);
       if (patch == PatchDistance::Nearer) return {Nearer::Unknown};
       if (patch == PatchDistance::PastEnd && mayBeNearer) return {Nearer::Unknown};
@@ -322,7 +324,9 @@ bool MovedSurface::follow(Vec3d& foot, const Vec3d& from) {
     if (!found.converged && !found.left) return false;
     foot = found.point + origin;
     if (!found.converged) continue;
-    return !patches_.covers(Coord::floor(foot));
+    const bool isOnPatches = patches_.covers(Coord::floor(foot));
+    meetsPatches_ |= isOnPatches;
+    return !isOnPatches;
   }
   return false;
 }

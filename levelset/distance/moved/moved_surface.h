@@ -39,6 +39,8 @@ class MovedSurface {
     /// or more. So the nearest point of the moved surface lies on a crease, also if the search
     /// fails.
     bool isBesideCrease = false;
+    /// The search fails, and comes to sharp patches of the surface (triangles near edges).
+    bool meetsPatches = false;
   };
 
   /// Finds the distance of a grid point on the near side from the moved surface. If the normal at
@@ -91,6 +93,7 @@ class MovedSurface {
   const SurfacePoints& points_;
   const SharpPatches& patches_;
   const double shift_;
+  bool meetsPatches_ = false;  ///< the last search came to sharp patches
 };
 
 }  // namespace levelset::eikonal
