@@ -238,13 +238,6 @@ Coord CreaseDistances::cellOf(const Coord& c) {
   return Coord::floor(c.asVec3d() / double{kCell});
 }
 
-MaskTree CreaseDistances::gridPoints() const {
-  MaskTree all;
-  for (std::size_t i = 0; i < points_.size(); ++i)
-    for (const Point& point : points_[i]) all.setValueOn(gridPoint(i, point));
-  return all;
-}
-
 MaskTree CreaseDistances::failedPoints() const {
   MaskTree failed;
   for (std::size_t i = 0; i < points_.size(); ++i)
@@ -257,8 +250,7 @@ CreaseDistances::Cells CreaseDistances::creasesByCell(const MaskTree& within) co
   Cells cells;
   for (std::size_t i = 0; i < points_.size(); ++i)
     for (const Point& point : points_[i])
-      if (const Coord c = gridPoint(i, point);
-          !point.hasFailed && within.isValueOn(c))
+      if (const Coord c = gridPoint(i, point); !point.hasFailed && within.isValueOn(c))
         cells[cellOf(c)].push_back({c, &*point.found->crease});
   return cells;
 }
