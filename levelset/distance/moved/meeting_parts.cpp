@@ -135,7 +135,7 @@ void measureFromField(FloatGrid& field, const CreaseDistances::Missing& missing,
     for (auto it = masks[i]->cbeginValueOn(); it; ++it) {
       const openvdb::Index n = it.pos();
       const double old = static_cast<double>(values->getValue(n)) / voxelSize;
-      double value = std::copysign(1e30, old);
+      double value = old < 0 ? -1e30 : 1e30;
       if (block && block->nearest[n] != NearestPoints::kNone)
         value = keptOr(distanceAt(*block, n, polisher, request).value, old, polisher,
                        block->nearest[n]);
