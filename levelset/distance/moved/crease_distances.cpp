@@ -269,7 +269,8 @@ std::vector<const MovedSurface::CreasePoint*> CreaseDistances::nearestCreases(co
   std::stable_sort(near.begin(), near.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<const MovedSurface::CreasePoint*> starts;
-  for (const auto& [squared, crease] : near) {
+  for (const auto& one : near) {
+    const MovedSurface::CreasePoint* crease = one.second;
     const bool isKnown = std::any_of(starts.begin(), starts.end(), [&](const auto* other) {
       return (other->point - crease->point).lengthSqr() < kApart * kApart;
     });
@@ -299,7 +300,8 @@ std::vector<Vec3d> CreaseDistances::nearestCrossings(const FloatGrid::ConstAcces
   std::stable_sort(near.begin(), near.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<Vec3d> starts;
-  for (const auto& [squared, crossing] : near) {
+  for (const auto& one : near) {
+    const Vec3d& crossing = one.second;
     const bool isKnown = std::any_of(starts.begin(), starts.end(), [&](const Vec3d& other) {
       return (other - crossing).lengthSqr() < kApart * kApart;
     });
