@@ -10,8 +10,10 @@
 #include <OpenEXR/ImfMatrixAttribute.h>
 #include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfStringAttribute.h>
+#include <OpenEXR/ImfThreading.h>
 #include <fmt/core.h>
 #include <png.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -19,6 +21,7 @@
 #include <cstdio>
 #include <cstring>
 #include <memory>
+#include <mutex>
 
 #include "levelset/error.h"
 #include "levelset/file_target.h"
@@ -97,6 +100,17 @@ Imf::Slice sliceOf(Imf::PixelType type, const T* data, int width, int minX = 0, 
                           sizeof(T) * static_cast<std::size_t>(width));
 }
 
+/// Starts OpenEXR's threads. They code blocks of lines, which can take longer than the picture.
+/// Returns the number of threads for one file, within the limit of the process.
+int codingThreads() {
+  const auto allowed = static_cast<int>(
+      tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+  static std::mutex starting;
+  const std::scoped_lock lock(starting);
+  if (allowed > 1 && Imf::globalThreadCount() < allowed) Imf::setGlobalThreadCount(allowed);
+  return allowed > 1 ? allowed : 0;
+}
+
 std::vector<char> encodeExr(const Image& image) {
   Imf::Header header(image.width, image.height);
   header.compression() = Imf::ZIP_COMPRESSION;
@@ -118,7 +132,7 @@ std::vector<char> encodeExr(const Image& image) {
   }
   MemoryStream stream;
   {
-    Imf::OutputFile file(stream, header, 0);
+    Imf::OutputFile file(stream, header, codingThreads());
     file.setFrameBuffer(frame);
     file.writePixels(image.height);
   }
@@ -282,7 +296,7 @@ Image readExr(const std::filesystem::path& path, std::size_t maxMemory) {
   }
   try {
     checkExrHeader(path, maxMemory);
-    Imf::InputFile file(name.c_str(), 0);
+    Imf::InputFile file(name.c_str(), codingThreads());
     return readOpenExr(file, name, maxMemory);
   } catch (const levelset::Error&) {
     throw;

@@ -13,6 +13,8 @@ const int kMostHalvings = 44;
 // Mesa's llvmpipe ends loops without notice after 65535 iterations of all loops of up to 16 rays. A
 // ray that needs this many is marked as lost, and the processor searches it.
 const int kMostSteps = 2000;
+// 2⁻⁵⁰ as a quotient of exact numbers: not all drivers round long decimal literals correctly.
+const double kLeastWidth = 1.0lf / 1125899906842624.0lf;
 const int kGridNumbers = 16;  // numbers of each field in `numbers`
 const int kFirstGridNumber = 4;
 const int kPointsOfBlock = 729;
@@ -438,7 +440,7 @@ void solve(double t0, double t1) {
     }
     ++n;
     REAL width = b - a;
-    open = open && n < 100 && width > 8.8817841970012523e-16lf;
+    open = open && n < 100 && width > kLeastWidth;
   }
   if (crosses) {
     REAL middle = 0.5lf * (a + b);
