@@ -9,25 +9,15 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 status=0
 
-# run NAME OPTION… : a row of the table. The program resets the peak of its memory in each step, so that `time` prints that of
-# the last step only. The peak is read while the program runs.
+# run NAME OPTION… : a row of the table
 run() {
   name=$1
   shift
-  /usr/bin/time -f '%e %U %S' -o "$folder/time" "$levelsmith" "$@" 2>"$folder/log" &
-  timer=$!
-  peak=0
-  while kill -0 $timer 2>/dev/null; do
-    child=$(pgrep -P $timer) || true
-    now=$(awk '/^VmHWM:/ { print $2 }' "/proc/${child:-none}/status" 2>/dev/null) || true
-    [ "${now:-0}" -le "$peak" ] || peak=$now
-    sleep 0.05
-  done
-  wait $timer || { cat "$folder/log" >&2; exit 1; }
-  megabytes=$((peak / 1024))
+  /usr/bin/time -f '%e %U %S %M' -o "$folder/time" "$levelsmith" "$@" 2>"$folder/log" || { cat "$folder/log" >&2; exit 1; }
+  megabytes=$(awk '{ print int($4 / 1024) }' "$folder/time")
   parts=$(sed -n 's/.*computed in \([0-9]*\) parts.*/\1/p' "$folder/log")
-  awk -v name="$name" -v parts="${parts:-1}" -v peak="$megabytes" \
-    '{ printf "%-34s %7.1f %9.1f %8d %6d\n", name, $1, $2 + $3, peak, parts }' "$folder/time"
+  awk -v name="$name" -v parts="${parts:-1}" \
+    '{ printf "%-34s %7.1f %9.1f %8d %6d\n", name, $1, $2 + $3, $4 / 1024, parts }' "$folder/time"
 }
 
 printf '%-34s %7s %9s %8s %6s\n' run "wall, s" "CPU, s" "peak, MB" parts
