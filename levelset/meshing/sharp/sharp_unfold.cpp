@@ -20,6 +20,9 @@ constexpr double kLeastHeight = 0.02, kLeastGain = 1e-3;
 /// Height assigned to a triangle that lies in no sheet, voxels: less than that of any triangle in a
 /// sheet.
 constexpr double kOffSheets = -10;
+/// Longest side of a triangle after a removal, voxels. Longer triangles along a curved edge of the
+/// solid would cut through it.
+constexpr double kLongestSide = 3;
 /// Largest number of passes in run(), and of passes over the edges in flip(). A flip can require
 /// another flip, and a removed vertex can require flips.
 constexpr int kUnfoldPasses = 8;
@@ -46,14 +49,18 @@ class SheetUnfolder {
  private:
   enum class State : char { Unknown, Folded, Flat };
 
+  [[nodiscard]] double longestSide(const Triangle& t) const {
+    const Vec3d &a = positions_[t[0]], &b = positions_[t[1]], &c = positions_[t[2]];
+    return std::sqrt(std::max({(b - a).lengthSqr(), (c - b).lengthSqr(), (a - c).lengthSqr()}));
+  }
+
   /// Returns the height of a triangle over its longest side, in the sheet that fits it best,
   /// voxels. The height is negative when the triangle is turned over in that sheet, and kOffSheets
   /// when it lies in no sheet.
   [[nodiscard]] double heightInSheet(const Triangle& t) const {
     const Vec3d &a = positions_[t[0]], &b = positions_[t[1]], &c = positions_[t[2]];
     const Vec3d area = (b - a).cross(c - a);
-    const double longest =
-        std::sqrt(std::max({(b - a).lengthSqr(), (c - b).lengthSqr(), (a - c).lengthSqr()}));
+    const double longest = longestSide(t);
     double best = kOffSheets;
     for (std::size_t i = 0; i < 3; ++i) {
       const VertexSheets& sheets = sheets_[t[i]];
@@ -198,7 +205,8 @@ class SheetUnfolder {
   /// Returns true when `to` can replace its neighbour `from`, given the triangles at `from` (`fan`)
   /// and at `to` (`other`). This pass must not have changed any of them, and `to` must have as many
   /// sheets as `from` or more. The mesh must stay a manifold: their only common neighbours are the
-  /// two vertices opposite to their edge. The sum of deficit() over `fan` must decrease.
+  /// two vertices opposite to their edge. The sum of deficit() over `fan` must decrease, and no
+  /// triangle may become longer than kLongestSide.
   [[nodiscard]] bool canStandFor(const std::vector<std::size_t>& fan, std::uint32_t from,
                                  std::uint32_t to, const std::vector<std::size_t>& other) const {
     if (sheets_[to].count < sheets_[from].count) return false;
@@ -219,6 +227,7 @@ class SheetUnfolder {
       before += deficit(moved);
       if (std::find(moved.begin(), moved.end(), to) != moved.end()) continue;
       std::replace(moved.begin(), moved.end(), from, to);
+      if (longestSide(moved) > std::max(kLongestSide, longestSide(triangles_[j]))) return false;
       after += deficit(moved);
     }
     return before - after > kLeastGain;
