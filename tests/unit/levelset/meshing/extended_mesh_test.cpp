@@ -134,6 +134,41 @@ TEST(ExtendedMesh, FindsEdgesAndCornersWithoutOriginal) {
   }
 }
 
+/// Ring of radii 1 and 1.5 with fine facets, turned and moved.
+TriMesh turnedRing(double angle, double shift) {
+  constexpr std::uint32_t kFacets = 720;
+  TriMesh mesh;
+  for (std::uint32_t i = 0; i < kFacets; ++i) {
+    const double at = 2 * std::numbers::pi * i / kFacets;
+    for (const V3d& p : {V3d(1, 0, -0.5), V3d(1.5, 0, -0.5), V3d(1.5, 0, 0.5), V3d(1, 0, 0.5)})
+      mesh.positions.emplace_back(p.x * std::cos(at), p.x * std::sin(at), p.z);
+    const std::uint32_t a = 4 * i, b = 4 * ((i + 1) % kFacets);
+    for (std::uint32_t k = 0; k < 4; ++k) {
+      const std::uint32_t next = (k + 1) % 4;
+      mesh.triangles.push_back({a + k, b + k, b + next});
+      mesh.triangles.push_back({a + k, b + next, a + next});
+    }
+  }
+  return support::transformed(mesh, [&](const V3d& p) {
+    return support::turned(p, angle) + V3d(shift, 0.3 * shift, 0.1 * shift);
+  });
+}
+
+TEST(ExtendedMesh, KeepsTrianglesShortAlongCurvedEdges) {
+  // In these placements, repeated removals of vertices left edges of 3.9 and 3.7 voxels.
+  const double h = 1 / 11.0;
+  for (const auto& [angle, shift] : {std::pair(0.3, 0.0), std::pair(0.85, 11 / 8.0)}) {
+    const NarrowBand band = meshToBand(turnedRing(angle, shift * h), h).band;
+    const TriMesh mesh = bandToExtendedMesh(band).mesh;
+    double longest = 0;
+    for (const auto& t : mesh.triangles)
+      for (std::size_t k = 0; k < 3; ++k)
+        longest =
+            std::max(longest, (mesh.positions[t[k]] - mesh.positions[t[(k + 1) % 3]]).length());
+    EXPECT_LT(longest / h, 3) << angle;
+  }
+}
+
 TEST(ExtendedMesh, ConvergesOnSphereWithOrderTwo) {
   double before = 0;
   for (const double h : {0.1, 0.05, 0.025}) {
