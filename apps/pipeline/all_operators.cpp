@@ -43,6 +43,7 @@ std::vector<Operator> allOperators() {
       blurOperator(),
       histogramOperator(),
       isosurfaceOperator(),
+      isosurfaceMeshOperator(),
       thresholdOperator(),
       levelSetOperator<levelset::UnionOperator>(),
       levelSetOperator<levelset::IntersectionOperator>(),

@@ -102,6 +102,8 @@ class Volume {
                static_cast<std::size_t>(grid_.size.x) +
            static_cast<std::size_t>(i);
   }
+  /// Address of the stored numbers, of type() and in the order of index(), at any alignment.
+  [[nodiscard]] const char* numbers() const { return data_.begin; }
   /// Trilinear interpolation. Positions outside the grid are moved to its border.
   /// @param position  index coordinates
   [[nodiscard]] double trilinear(const Imath::V3d& position) const;

@@ -36,6 +36,7 @@ namespace pipeline {
 [[nodiscard]] Operator volumeOperator();
 [[nodiscard]] Operator blurOperator();
 [[nodiscard]] Operator histogramOperator();
+[[nodiscard]] Operator isosurfaceMeshOperator();
 [[nodiscard]] Operator isosurfaceOperator();
 [[nodiscard]] Operator thresholdOperator();
 

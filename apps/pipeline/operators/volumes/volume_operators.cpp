@@ -9,6 +9,7 @@
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
 #include "levelset/isosurface/isosurface.h"
+#include "levelset/isosurface/isosurface_mesh.h"
 #include "levelset/volume_files/volume_file.h"
 #include "levelset/volumes/histogram.h"
 #include "levelset/volumes/synthetic.h"
@@ -182,6 +183,46 @@ Operator solidOperator(const char* name, const char* summary) {
           .validate = validateIsosurface};
 }
 
+// === Meshes
+
+Value makeIsosurfaceMesh(Invocation& in) {
+  using levelset::MeshBorder;
+  const std::string border = in.text("border");
+  const levelset::IsosurfaceMeshOptions options{
+      .isInsideBelow = in.text("inside") == "below",
+      .filter = *levelset::volumeFilterNamed(in.text("filter")),
+      .border = border == "open"     ? MeshBorder::Open
+                : border == "refuse" ? MeshBorder::Refuse
+                                     : MeshBorder::Close,
+      .hasNormals = !in.flag("no-normals"),
+      .maxMemory = in.maxMemory,
+      .progress = in.progress};
+  levelset::IsosurfaceMesh made =
+      levelset::isosurfaceMesh(volumeIn(in), in.number("value"), options);
+  in.notes.detailsJson = Json{
+      {"filter", in.text("filter")},
+      {"cells", made.cells},
+      {"border_points",
+       made.borderPoints}}.dump();
+  if (made.borderPoints > 0)
+    in.notes.warnings.push_back(
+        fmt::format("the solid reaches the border of the volume at {} grid points; the mesh {}",
+                    made.borderPoints, border == "open" ? "is open there" : "was closed there"));
+  return Value(std::move(made.mesh));
+}
+
+/// Plans the mesh. As with the solid, the surface of the bounding box stands for that of the mesh.
+Plan planIsosurfaceMesh(Invocation& in) {
+  const Plan& of = in.operands[0].plan();
+  Plan plan{.kind = Kind::Mesh, .bounds = of.bounds};
+  if (!of.bounds.isEmpty() && of.voxelSize > 0) {
+    const Imath::V3d size = of.bounds.size();
+    plan.area = 2 * (size.x * size.y + size.y * size.z + size.z * size.x);
+    plan.triangles = 2 * plan.area / (of.voxelSize * of.voxelSize);
+  }
+  return plan;
+}
+
 }  // namespace
 
 Operator volumeOperator() {
@@ -322,6 +363,48 @@ Operator thresholdOperator() {
                 .position = 1}};
   for (Param& param : solidParams()) op.params.push_back(std::move(param));
   return op;
+}
+
+Operator isosurfaceMeshOperator() {
+  return {
+      .name = "isosurface-mesh",
+      .group = "Volumes",
+      .summary = "make a triangle mesh of the isosurface of a volume, by marching cubes",
+      .details =
+          "Fast, without a level set between. Vertices lie on the surface of the filter, triangles "
+          "do not. For a certified solid with exact distances use 'isosurface'. A grid point of "
+          "the isovalue is outside.",
+      .example =
+          "levelsmith volume marschner-lobb ! isosurface-mesh 0.5 --filter tricubic ! measure",
+      .params = {{.name = "value",
+                  .type = ParamType::Number,
+                  .doc = "isovalue",
+                  .required = true,
+                  .position = 0},
+                 {.name = "inside",
+                  .type = ParamType::Choice,
+                  .doc = "side of the isovalue that is inside",
+                  .fallback = "above",
+                  .choices = {"above", "below"}},
+                 {.name = "filter",
+                  .type = ParamType::Choice,
+                  .doc = "function between the grid points, on whose surface the vertices lie",
+                  .fallback = "trilinear",
+                  .choices = {"trilinear", "tricubic"}},
+                 {.name = "border",
+                  .type = ParamType::Choice,
+                  .doc = "treatment of a surface that reaches the border of the volume: close it "
+                         "with the faces of the volume's box, leave it open, or refuse it",
+                  .fallback = "close",
+                  .choices = {"close", "open", "refuse"}},
+                 {.name = "no-normals",
+                  .type = ParamType::Flag,
+                  .doc = "leave out the normals of the vertices"}},
+      .operands = {{Kind::Volume, Kind::Field}},
+      .resultKind = [](const Invocation&) { return Kind::Mesh; },
+      .run = makeIsosurfaceMesh,
+      .plan = planIsosurfaceMesh,
+  };
 }
 
 }  // namespace pipeline
