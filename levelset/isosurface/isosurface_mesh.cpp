@@ -451,7 +451,7 @@ class IsosurfaceMesher {
   template <typename T>
   void addVertex(const Samples<T>& samples, int axis, const V3i& p, std::uint64_t vertex) {
     V3d place(p);
-    V3d gradient;
+    V3d gradient(0);
     if (p[axis] < 0 || p[axis] + 1 >= volume_.size()[axis]) {  // on the border of the volume
       const bool isLow = p[axis] < 0;
       if (isLow) place[axis] = 0;

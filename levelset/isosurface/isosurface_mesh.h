@@ -43,7 +43,7 @@ struct IsosurfaceMesh {
 /// finite differences of fourth order in the interior of the volume. The result does not depend on
 /// the number of threads.
 /// @throws UsageError for an isovalue that is not finite, or another filter
-/// @throws NoSurface when no value, or every value, is inside (in an open mesh)
+/// @throws NoSurface when no value, or every value, is inside
 /// @throws InvalidInput for a volume with one grid point along an axis, or with MeshBorder::Refuse
 ///         when the solid reaches the border
 /// @throws ResourceLimit before the memory exceeds its limit, or for more than 2³² − 1 vertices

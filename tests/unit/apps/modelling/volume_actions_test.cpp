@@ -58,6 +58,20 @@ TEST_F(VolumeActions, ReportStatesWhatWasClosed) {
       "reaches the border");
 }
 
+TEST_F(VolumeActions, IsosurfaceMeshIsAMeshLikeOthers) {
+  const Json mesh = json(
+      "volume sphere --size 41 --radius 0.7 ! isosurface-mesh 0 --filter tricubic ! measure "
+      "--json");
+  EXPECT_NEAR(mesh["volume"], 4 * M_PI / 3 * 0.343, support::measured(3e-3));
+  EXPECT_EQ(levelsmith("volume sphere ! isosurface-mesh 0 ! write ball.ply").code, 0);
+  EXPECT_NE(support::slurp(folder_ / "ball.ply").find("property float nx"), std::string::npos);
+  const std::string below = "volume sphere --size 21 ! isosurface-mesh 0 --inside below ";
+  EXPECT_NE(levelsmith(below + "! info").err.find("border of the volume at 2402 grid points"),
+            std::string::npos);
+  EXPECT_REFUSED(levelsmith(below + "--border refuse ! info"), 3, "reaches the border");
+  EXPECT_REFUSED(levelsmith("volume sphere ! isosurface-mesh 7 ! info"), 3, "no value");
+}
+
 TEST_F(VolumeActions, HistogramSuggestsIsovalues) {
   const Json found = json("volume sphere --size 21 ! histogram --classes 2 --json");
   EXPECT_EQ(found["otsu"].size(), 1u);
