@@ -13,6 +13,12 @@ constexpr int kMostSteps = 24;
 constexpr int kRefinements = 10;
 // The same for a piece that bends little.
 constexpr int kPlainRefinements = 1;
+// Off-diagonal elements below this share of the trace are rounding errors of a diagonal metric.
+constexpr double kDiagonal = 1e-13;
+// Largest number of steps that raise a lower bound of a distance, and the share by which the bound
+// must exceed a distance, because of rounding.
+constexpr int kBoundRounds = 5;
+constexpr double kBoundMargin = 1e-9;
 
 /// Search for the closest point of the zero set in the unit cube: Newton's method on the condition
 /// grad |p − target|² + λ grad f = 0, f = 0. A coordinate that reaches a face of the cube is fixed
@@ -320,7 +326,7 @@ void searchFromEdges(const Part& part, Search& search, double& best) {
 /// that its point is the closest one, octants are searched, too: at most `levels` times, and at
 /// most `plain` times where the surface bends little. Skips octants that are too far away.
 void refine(const Part& part, int levels, int plain, double& best) {
-  if (part.f.isFurther(part.inverse, part.target, best)) return;
+  if (part.f.isFurther(part.metric, part.inverse, part.target, best)) return;
   Search search(part.f, part.metric, part.inverse, part.target);
   Vec3d start = part.target;
   for (int axis = 0; axis < 3; ++axis) start[axis] = std::clamp(start[axis], 0.0, 1.0);
@@ -385,6 +391,37 @@ bool Cubic::isBentOnFace() const {
         continue;
       if (mixedTerm > kMostBend * std::hypot(slope[u], slope[v])) return true;
     }
+  return false;
+}
+
+bool Cubic::isFurther(const Mat3d& metric, const Mat3d& inverse, const Vec3d& target,
+                      double squared) const {
+  const Vec3d center(0.5), slope = gradient(center);
+  const double bent = bend();
+  const double atTarget = value(center) + slope.dot(target - center);
+  const double between = std::abs(atTarget) - bent;
+  if (between > 0 && between * between > squared * slope.dot(inverse * slope)) return true;
+  // The distance to the part of the slab in the cube has a lower bound for each multiplier of the
+  // slab's plane: the minimum of the Lagrangian over the cube. With a diagonal metric the minimum is
+  // known. Newton's method finds the largest bound, which is piecewise quadratic.
+  const double off = std::abs(metric(0, 1)) + std::abs(metric(0, 2)) + std::abs(metric(1, 2));
+  if (off > kDiagonal * (metric(0, 0) + metric(1, 1) + metric(2, 2))) return false;
+  double sign = 0, multiplier = 0;
+  for (int round = 0; round < kBoundRounds; ++round) {
+    double linear = atTarget, distance = 0, rate = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double wanted = target[axis] - sign * multiplier * slope[axis] / metric(axis, axis);
+      const double held = std::clamp(wanted, 0.0, 1.0), moved = held - target[axis];
+      linear += slope[axis] * moved;
+      distance += metric(axis, axis) * moved * moved;
+      if (wanted == held) rate += slope[axis] * slope[axis] / metric(axis, axis);
+    }
+    if (round == 0) sign = linear > 0 ? 1 : -1;
+    const double excess = sign * linear - bent;
+    if (distance + 2 * multiplier * excess > squared * (1 + kBoundMargin)) return true;
+    if (!(excess > 0) || !(rate > 0)) return false;
+    multiplier += excess / rate;
+  }
   return false;
 }
 

@@ -45,14 +45,13 @@ struct Cubic {
   /// Returns true if the same holds for the curve of zeros on a face of the cube, although the
   /// surface itself may bend little. This happens where the surface touches the face.
   [[nodiscard]] bool isBentOnFace() const;
-  /// Returns true if the bounds of the function show that its zeros are further from a point.
-  /// @param inverse  inverse of the metric; @param squared  squared distance
-  [[nodiscard]] bool isFurther(const Mat3d& inverse, const Vec3d& target, double squared) const {
-    // The surface lies between two planes: those of the linear part plus and minus the bend.
-    const Vec3d center(0.5), slope = gradient(center);
-    const double between = std::abs(value(center) + slope.dot(target - center)) - bend();
-    return between > 0 && between * between > squared * slope.dot(inverse * slope);
-  }
+  /// Returns true if bounds of the function show that its zeros in the cube are further from a point
+  /// than a distance. The zeros lie between two planes: those of the linear part at the centre plus
+  /// and minus the bend.
+  /// @param metric, inverse  as squaredDistance()
+  /// @param squared          squared distance
+  [[nodiscard]] bool isFurther(const Mat3d& metric, const Mat3d& inverse, const Vec3d& target,
+                               double squared) const;
   /// Bound of the difference between the function and its linear part at the centre of the cube.
   [[nodiscard]] double bend() const;
 };
