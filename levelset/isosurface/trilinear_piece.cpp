@@ -20,6 +20,11 @@ constexpr double kDiagonal = 1e-13;
 constexpr int kBoundRounds = 5;
 constexpr double kBoundMargin = 1e-9;
 
+bool isDiagonal(const Mat3d& metric) {
+  const double off = std::abs(metric(0, 1)) + std::abs(metric(0, 2)) + std::abs(metric(1, 2));
+  return off <= kDiagonal * (metric(0, 0) + metric(1, 1) + metric(2, 2));
+}
+
 /// Search for the closest point of the zero set in the unit cube: Newton's method on the condition
 /// grad |p − target|² + λ grad f = 0, f = 0. A coordinate that reaches a face of the cube is fixed
 /// there, and released when the multiplier of the face shows that the distance falls inwards.
@@ -29,24 +34,9 @@ class Search {
       : f_(f), metric_(metric), inverse_(inverse), target_(target) {}
 
   /// Returns true if the last search proved that no point of the surface in the cube is nearer: the
-  /// distance falls in no direction, and the Hessian of the Lagrangian is positive definite in the
-  /// cube, by diagonal dominance.
-  [[nodiscard]] bool isGlobal() const {
-    if (!isOptimal_) return false;
-    const Vec3d most(std::max(std::abs(f_.c[4]), std::abs(f_.c[4] + f_.c[7])),
-                     std::max(std::abs(f_.c[5]), std::abs(f_.c[5] + f_.c[7])),
-                     std::max(std::abs(f_.c[6]), std::abs(f_.c[6] + f_.c[7])));
-    std::array<double, 3> others{};
-    for (std::size_t a = 0; a < 3; ++a)
-      for (std::size_t b = a + 1; b < 3; ++b) {
-        const auto x = static_cast<int>(a), y = static_cast<int>(b);
-        const double share = (std::abs(metric_(x, y)) + std::abs(multiplier_) * most[x + y - 1]) /
-                             std::sqrt(metric_(x, x) * metric_(y, y));
-        others[a] += share;
-        others[b] += share;
-      }
-    return *std::max_element(others.begin(), others.end()) < 1;
-  }
+  /// distance falls in no direction, and the Lagrangian grows from the point to all others of the
+  /// surface.
+  [[nodiscard]] bool isGlobal() const { return isOptimal_ && (isConvex() || growsOnSurface()); }
 
   /// Returns the squared distance of the point that the search from `start` ends at; infinite if it
   /// ends off the surface.
@@ -71,6 +61,73 @@ class Search {
   }
 
  private:
+  /// Returns true if the Hessian of the Lagrangian is positive definite in the cube, by diagonal
+  /// dominance.
+  [[nodiscard]] bool isConvex() const {
+    const Vec3d most(std::max(std::abs(f_.c[4]), std::abs(f_.c[4] + f_.c[7])),
+                     std::max(std::abs(f_.c[5]), std::abs(f_.c[5] + f_.c[7])),
+                     std::max(std::abs(f_.c[6]), std::abs(f_.c[6] + f_.c[7])));
+    std::array<double, 3> others{};
+    for (std::size_t a = 0; a < 3; ++a)
+      for (std::size_t b = a + 1; b < 3; ++b) {
+        const auto x = static_cast<int>(a), y = static_cast<int>(b);
+        const double share = (std::abs(metric_(x, y)) + std::abs(multiplier_) * most[x + y - 1]) /
+                             std::sqrt(metric_(x, x) * metric_(y, y));
+        others[a] += share;
+        others[b] += share;
+      }
+    return *std::max_element(others.begin(), others.end()) < 1;
+  }
+
+  /// Returns true if the quadratic and the cubic term of the Lagrangian are positive on all vectors
+  /// u from the point to other points of the surface in the cube. They are nearly tangent: f = 0
+  /// there bounds their part along the normal by a multiple of u². All lengths are measured by the
+  /// metric, which must be diagonal.
+  [[nodiscard]] bool growsOnSurface() const {
+    if (!isDiagonal(metric_)) return false;
+    const Vec3d scale(std::sqrt(metric_(0, 0)), std::sqrt(metric_(1, 1)), std::sqrt(metric_(2, 2)));
+    const Vec3d mixed = f_.mixed(p_);
+    const double xy = mixed[0] / (scale[0] * scale[1]), xz = mixed[1] / (scale[0] * scale[2]),
+                 yz = mixed[2] / (scale[1] * scale[2]);
+    // The product of the three components of u is at most |u|³ / sqrt(27).
+    const double cubic = std::abs(f_.c[7]) / (scale[0] * scale[1] * scale[2] * std::sqrt(27.0));
+    Vec3d normal = f_.gradient(p_) / scale;
+    const double slope = normal.length();
+    if (!(slope > 0)) return false;
+    normal /= slope;
+    double squared = 0;  // of the distance to the farthest corner of the cube
+    for (int axis = 0; axis < 3; ++axis) {
+      const double across = scale[axis] * std::max(p_[axis], 1 - p_[axis]);
+      squared += across * across;
+    }
+    const double reach = std::sqrt(squared);
+    // The largest sum of a row bounds the second derivatives in all directions.
+    const double second = std::max(
+        {std::abs(xy) + std::abs(xz), std::abs(xy) + std::abs(yz), std::abs(xz) + std::abs(yz)});
+    const double off = (second / 2 + cubic * reach) / slope * reach;  // share of u along the normal
+    if (!(off < 1)) return false;
+    const double m = multiplier_;
+    const auto times = [&](const Vec3d& v) {  // the Hessian of the Lagrangian
+      return Vec3d(v[0] + m * (xy * v[1] + xz * v[2]), v[1] + m * (xy * v[0] + yz * v[2]),
+                   v[2] + m * (xz * v[0] + yz * v[1]));
+    };
+    int least = 0;
+    for (int axis = 1; axis < 3; ++axis)
+      if (std::abs(normal[axis]) < std::abs(normal[least])) least = axis;
+    Vec3d a(0.0);
+    a[least] = 1;
+    a = normal.cross(a);
+    a /= a.length();
+    const Vec3d b = normal.cross(a), ha = times(a), hb = times(b), hn = times(normal);
+    const double aa = a.dot(ha), ab = a.dot(hb), bb = b.dot(hb);
+    const double lowest = (aa + bb - std::sqrt((aa - bb) * (aa - bb) + 4 * ab * ab)) / 2;
+    const double an = a.dot(hn), bn = b.dot(hn);
+    const double coupling = std::sqrt(an * an + bn * bn), along = std::max(0.0, -normal.dot(hn));
+    return lowest > 0 && lowest * (1 - off * off) - 2 * coupling * off - along * off * off -
+                                 2 * std::abs(m) * cubic * reach >
+                             0;
+  }
+
   [[nodiscard]] int freeCount() const {
     return static_cast<int>(std::count(fixed_.begin(), fixed_.end(), false));
   }
@@ -326,10 +383,9 @@ void searchFromEdges(const Part& part, Search& search, double& best) {
 /// that its point is the closest one, octants are searched, too: at most `levels` times, and at
 /// most `plain` times where the surface bends little. Skips octants that are too far away.
 void refine(const Part& part, int levels, int plain, double& best) {
-  if (part.f.isFurther(part.metric, part.inverse, part.target, best)) return;
+  Vec3d start;
+  if (part.f.isFurther(part.metric, part.inverse, part.target, best, start)) return;
   Search search(part.f, part.metric, part.inverse, part.target);
-  Vec3d start = part.target;
-  for (int axis = 0; axis < 3; ++axis) start[axis] = std::clamp(start[axis], 0.0, 1.0);
   const double first = search.from(start);
   best = std::min(best, first);
   if (std::isfinite(first) && search.isGlobal()) return;
@@ -395,32 +451,42 @@ bool Cubic::isBentOnFace() const {
 }
 
 bool Cubic::isFurther(const Mat3d& metric, const Mat3d& inverse, const Vec3d& target,
-                      double squared) const {
+                      double squared, Vec3d& start) const {
   const Vec3d center(0.5), slope = gradient(center);
   const double bent = bend();
   const double atTarget = value(center) + slope.dot(target - center);
   const double between = std::abs(atTarget) - bent;
   if (between > 0 && between * between > squared * slope.dot(inverse * slope)) return true;
+  for (int axis = 0; axis < 3; ++axis) start[axis] = std::clamp(target[axis], 0.0, 1.0);
+  if (!isDiagonal(metric)) return false;
   // The distance to the part of the slab in the cube has a lower bound for each multiplier of the
-  // slab's plane: the minimum of the Lagrangian over the cube. With a diagonal metric the minimum is
-  // known. Newton's method finds the largest bound, which is piecewise quadratic.
-  const double off = std::abs(metric(0, 1)) + std::abs(metric(0, 2)) + std::abs(metric(1, 2));
-  if (off > kDiagonal * (metric(0, 0) + metric(1, 1) + metric(2, 2))) return false;
-  double sign = 0, multiplier = 0;
+  // slab's plane: the minimum of the Lagrangian over the cube. With a diagonal metric the minimum
+  // is known. Newton's method finds the largest bound, which is piecewise quadratic.
+  const double sign = atTarget + slope.dot(start - target) > 0 ? 1 : -1;
+  double multiplier = 0;
   for (int round = 0; round < kBoundRounds; ++round) {
     double linear = atTarget, distance = 0, rate = 0;
     for (int axis = 0; axis < 3; ++axis) {
       const double wanted = target[axis] - sign * multiplier * slope[axis] / metric(axis, axis);
-      const double held = std::clamp(wanted, 0.0, 1.0), moved = held - target[axis];
+      start[axis] = std::clamp(wanted, 0.0, 1.0);
+      const double moved = start[axis] - target[axis];
       linear += slope[axis] * moved;
       distance += metric(axis, axis) * moved * moved;
-      if (wanted == held) rate += slope[axis] * slope[axis] / metric(axis, axis);
+      if (wanted == start[axis]) rate += slope[axis] * slope[axis] / metric(axis, axis);
     }
-    if (round == 0) sign = linear > 0 ? 1 : -1;
     const double excess = sign * linear - bent;
     if (distance + 2 * multiplier * excess > squared * (1 + kBoundMargin)) return true;
-    if (!(excess > 0) || !(rate > 0)) return false;
-    multiplier += excess / rate;
+    if (!(rate > 0)) return false;
+    if (excess > 0) {
+      multiplier += excess / rate;
+      continue;
+    }
+    // From the face of the slab to the plane in its middle.
+    multiplier += sign * linear / rate;
+    for (int axis = 0; axis < 3; ++axis)
+      start[axis] =
+          std::clamp(target[axis] - sign * multiplier * slope[axis] / metric(axis, axis), 0.0, 1.0);
+    return false;
   }
   return false;
 }

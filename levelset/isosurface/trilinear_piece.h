@@ -45,13 +45,15 @@ struct Cubic {
   /// Returns true if the same holds for the curve of zeros on a face of the cube, although the
   /// surface itself may bend little. This happens where the surface touches the face.
   [[nodiscard]] bool isBentOnFace() const;
-  /// Returns true if bounds of the function show that its zeros in the cube are further from a point
-  /// than a distance. The zeros lie between two planes: those of the linear part at the centre plus
-  /// and minus the bend.
+  /// Returns true if bounds of the function show that its zeros in the cube are further from a
+  /// point than a distance. The zeros lie between two planes: those of the linear part at the
+  /// centre plus and minus the bend.
   /// @param metric, inverse  as squaredDistance()
   /// @param squared          squared distance
+  /// @param start            receives a point of the cube near its closest zero, if the result is
+  ///                         false
   [[nodiscard]] bool isFurther(const Mat3d& metric, const Mat3d& inverse, const Vec3d& target,
-                               double squared) const;
+                               double squared, Vec3d& start) const;
   /// Bound of the difference between the function and its linear part at the centre of the cube.
   [[nodiscard]] double bend() const;
 };
