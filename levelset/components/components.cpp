@@ -34,6 +34,11 @@ constexpr float kSameDistance = 0.02f;
 /// that was zero.
 constexpr float kLeastDistance = 1e-3f;
 
+/// Returns a value of the given magnitude on the side of `value`. Zeros of both signs are outside.
+float onSideOf(float value, float magnitude) {
+  return value < 0 ? -magnitude : magnitude;
+}
+
 /// Flips connected regions of grid points from inside to outside or from outside to inside. The
 /// surfaces between a flipped region and its neighbours vanish. Grid points whose nearest surface
 /// remains keep their bits.
@@ -137,7 +142,7 @@ class RegionFlip {
         const float own = leaf->getValue(i);
         if (std::abs(own) < voxel && isBesideSurface(before, c, before.getValue(c)) &&
             !isBesideSurface(after, c, own)) {
-          leaf->setValueOnly(i, std::copysign(voxel, own));
+          leaf->setValueOnly(i, onSideOf(own, voxel));
         }
       }
     }
@@ -179,8 +184,7 @@ class RegionFlip {
         const float distance = std::abs(in.getValue(c));
         if (!isFlipped(labels.getValue(c)) && isRight(leaf, i, distance, old)) continue;
         const bool inBand = distance < grid.background();
-        leaf.setValueOnly(i,
-                          std::copysign(inBand ? distance : grid.background(), leaf.getValue(i)));
+        leaf.setValueOnly(i, onSideOf(leaf.getValue(i), inBand ? distance : grid.background()));
         leaf.setActiveState(i, inBand);
       }
     }

@@ -54,6 +54,7 @@ NarrowBand LevelSetOperator::run(const TriMesh& mesh, const Options& options, Op
                                    .roi = run.roi,
                                    .maxMemory = run.maxMemory,
                                    .progress = run.progress,
+                                   .onMeshRead = run.releaseOperands,
                                    .onCertificate = [&](const SignCertificate& certificate) {
                                      run.certificate = figuresOf(certificate);
                                      run.notes.push_back(describe(certificate));

@@ -177,7 +177,9 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
     local = convert::separatingSurface(local, selfIntersections.get(), field.isFlipped() ? -1 : 1,
                                        subProgress(progress, 0.5, 0.6));
   certificate.selfIntersections = selfIntersections.count();
-  topology.triangles = {};  // frees memory; `local` has a copy
+  const Imath::Box3d meshBounds = bounds(mesh);
+  std::vector<convert::Triangle>().swap(topology.triangles);  // frees memory; `local` has a copy
+  if (options.onMeshRead) options.onMeshRead();
   if (field.isOpen())
     addOpenSurface(local, field, options.halfWidth, maxMemory, subProgress(progress, 0.5, 0.6));
 
@@ -186,7 +188,7 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
   const double halfWidth = std::min(options.halfWidth, part.halfWidth);
   std::optional<openvdb::CoordBBox> region;
   if (!isEverywhere(part.region)) {
-    Imath::Box3d reached = bounds(mesh);
+    Imath::Box3d reached = meshBounds;
     const V3d rim((halfWidth + 1) * voxelSize);
     reached = {reached.min - rim, reached.max + rim};
     for (int axis = 0; axis < 3; ++axis) {

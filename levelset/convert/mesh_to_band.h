@@ -51,6 +51,9 @@ struct MeshToBandOptions {
   RegionOfInterest roi = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
+  /// Called when the mesh is not read any more, before most of the work. The caller may then delete
+  /// it to save memory.
+  std::function<void()> onMeshRead = {};
   /// Called with the complete certificate, even if meshToBand then throws because of it.
   std::function<void(const SignCertificate&)> onCertificate = {};
 };

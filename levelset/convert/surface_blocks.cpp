@@ -3,8 +3,8 @@
 #include <tbb/task_group.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <limits>
 
 #include "levelset/mesh_sign/triangle_distance.h"
 #include "levelset/progress_gate.h"
@@ -16,7 +16,6 @@ using Imath::V3d;
 using Imath::V3i;
 using List = std::vector<std::uint32_t>;
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr std::size_t kTaskSize = 2048;  // minimum number of triangles of a cell that is a task
 constexpr std::size_t kShare = std::size_t{1} << 50;  // progress units of the complete traversal
 
@@ -29,51 +28,52 @@ class BlockTraversal {
   BlockTraversal(const LocalMesh& mesh, double reach, const BlockVisitor& visit,
                  const Progress& progress, const std::optional<Imath::Box3i>& region)
       : mesh_(mesh), reach_(reach), visit_(visit), gate_(progress, kShare), region_(region) {
-    boxes_.resize(mesh.triangles.size());
-    for (std::size_t t = 0; t < boxes_.size(); ++t) boxes_[t] = boxOf(t);
+    double half = kBlockDim;
+    for (const Imath::V3d& point : mesh.points)
+      for (int axis = 0; axis < 3; ++axis) half = std::max(half, std::abs(point[axis]) + reach);
+    root_ = kBlockDim;
+    // The largest unit is left free, so that rounding outwards stays inside.
+    while (static_cast<double>(root_) * (1 - 4.0 / kUnits) <= half) root_ *= 2;
+    unit_ = static_cast<double>(2 * root_) / kUnits;
+    boxes_.reserve(mesh.triangles.size());
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) boxes_.push_back(boxOf(t));
   }
 
   void run() {
     List all(mesh_.triangles.size());
     for (std::size_t t = 0; t < all.size(); ++t) all[t] = static_cast<std::uint32_t>(t);
-    group_.run_and_wait([&] { traverse(rootCell(), all, kShare); });
+    const Cell root = {-root_, -root_, -root_, 2 * root_};
+    group_.run_and_wait([&] { traverse(root, all, kShare); });
   }
 
  private:
-  /// Bounding box of a triangle, enlarged by reach_ and rounded outwards to single precision.
+  // Boxes are stored in units of the root cell's edge divided by kUnits. Meshes have many
+  // triangles, so two bytes for each number save memory.
+  static constexpr int kUnits = 1 << 16;
+  /// Bounding box of a triangle, enlarged by reach_ and rounded outwards, in units from the lowest
+  /// corner of the root cell.
   struct Box {
-    Imath::V3f low, high;
-    float extent;  // longest side of the triangle's bounding box
+    std::array<std::uint16_t, 3> low, high;
+    std::uint16_t extent;  // longest side of the triangle's bounding box, rounded up
   };
-  static float below(double x) { return std::nextafter(static_cast<float>(x), -kInfinity); }
-  static float above(double x) { return std::nextafter(static_cast<float>(x), kInfinity); }
 
   Box boxOf(std::size_t t) const {
     const V3d &a = mesh_.corner(t, 0), &b = mesh_.corner(t, 1), &c = mesh_.corner(t, 2);
     Box box{};
     double extent = 0;
+    const auto units = [this](double length) {
+      return static_cast<std::uint16_t>(std::clamp(length / unit_, 0.0, kUnits - 1.0));
+    };
     for (int axis = 0; axis < 3; ++axis) {
       const double low = std::min({a[axis], b[axis], c[axis]}),
-                   high = std::max({a[axis], b[axis], c[axis]});
-      box.low[axis] = below(low - reach_);
-      box.high[axis] = above(high + reach_);
+                   high = std::max({a[axis], b[axis], c[axis]}), root = static_cast<double>(root_);
+      const auto i = static_cast<std::size_t>(axis);
+      box.low[i] = units(low - reach_ + root - unit_ / 2);
+      box.high[i] = units(high + reach_ + root + unit_);
       extent = std::max(extent, high - low);
     }
-    box.extent = above(extent);
+    box.extent = units(extent + unit_);
     return box;
-  }
-
-  /// Returns the root cell: a cube of 8 · 2ⁿ grid points along an edge, centred at the origin, that
-  /// contains all points within reach_ of the mesh.
-  Cell rootCell() const {
-    double half = kBlockDim;
-    for (const Box& box : boxes_)
-      for (int axis = 0; axis < 3; ++axis)
-        half = std::max({half, std::abs(static_cast<double>(box.low[axis])),
-                         std::abs(static_cast<double>(box.high[axis]))});
-    std::int64_t edge = kBlockDim;
-    while (static_cast<double>(edge) <= half) edge *= 2;
-    return {-edge, -edge, -edge, 2 * edge};
   }
 
   bool touches(std::uint32_t t, const Cell& cell) const {
@@ -81,11 +81,12 @@ class BlockTraversal {
     const double last = static_cast<double>(cell.size - 1);
     const V3d low(static_cast<double>(cell.x), static_cast<double>(cell.y),
                   static_cast<double>(cell.z));
-    for (int axis = 0; axis < 3; ++axis)
-      if (static_cast<double>(box.low[axis]) > low[axis] + last ||
-          static_cast<double>(box.high[axis]) < low[axis])
-        return false;
-    if (static_cast<double>(box.extent) <= static_cast<double>(cell.size)) return true;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double from = low[axis] + static_cast<double>(root_);
+      const auto i = static_cast<std::size_t>(axis);
+      if (box.low[i] * unit_ > from + last || box.high[i] * unit_ < from) return false;
+    }
+    if (box.extent * unit_ <= static_cast<double>(cell.size)) return true;
     const TriangleFrame frame(mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2));
     const double range = reach_ + last * 0.8660255 + 1e-6;
     return frame.squaredDistance(low + V3d(last / 2)) <= range * range;
@@ -140,6 +141,8 @@ class BlockTraversal {
   const BlockVisitor& visit_;
   ProgressGate gate_;
   std::optional<Imath::Box3i> region_;
+  std::int64_t root_ = 0;  // half the edge of the root cell, grid points
+  double unit_ = 1;        // unit of the boxes, voxels
   std::vector<Box> boxes_;
   tbb::task_group group_;
 };

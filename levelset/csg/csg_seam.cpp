@@ -534,9 +534,9 @@ void correctSeam(FloatGrid& result, const std::vector<SeamDistances>& distances)
       const float old = leaf->getValue(n);
       const auto value = static_cast<float>(std::max(distance, std::abs(static_cast<double>(old))));
       if (value < background)
-        leaf->setValueOnly(n, std::copysign(value, old));
+        leaf->setValueOnly(n, old < 0 ? -value : value);  // -0 is outside
       else
-        leaf->setValueOff(n, std::copysign(background, old));
+        leaf->setValueOff(n, old < 0 ? -background : background);
     }
   });
 }

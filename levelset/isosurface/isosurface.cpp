@@ -115,7 +115,7 @@ std::unique_ptr<BandLeaf> measureBlock(const Surface& surface, const openvdb::Co
     if (!(distance < halfWidth)) continue;
     const auto world = static_cast<float>(distance * voxelSize);
     if (!(world < background)) continue;
-    values[at] = isInside ? -world : world;
+    values[at] = isInside && world > 0 ? -world : world;  // a distance of 0 counts as outside
     leaf->setValueOn(at);
   }
   if (leaf->isEmpty()) leaf.reset();

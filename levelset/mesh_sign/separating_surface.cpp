@@ -91,6 +91,12 @@ void cut(const Polygon& polygon, const V3d& point, const V3d& normal, std::vecto
   }
 }
 
+/// Frees the unused memory of an array. Shrinking copies the array, so a small rest is kept.
+template <class T>
+void shrink(std::vector<T>& array) {
+  if (array.capacity() > array.size() + array.size() / 4) array.shrink_to_fit();
+}
+
 class SeparatingSurface {
  public:
   SeparatingSurface(const LocalMesh& mesh, std::span<const TrianglePair> pairs, double flip,
@@ -116,7 +122,12 @@ class SeparatingSurface {
       const std::uint32_t t = largest_[patches[i]];
       kept[patches[i]] = separates(t, corners(t));
     });
-    LocalMesh result{mesh_.points, {}};
+    LocalMesh result;
+    // Without the space for the pieces, the arrays would double in size while they grow.
+    const std::size_t pieces = kPiecesOfPair * pairs_.size();
+    result.points.reserve(mesh_.points.size() + 3 * pieces);
+    result.points = mesh_.points;
+    result.triangles.reserve(mesh_.triangles.size() + pieces);
     std::map<std::uint32_t, Sheet> dropped;  // patches not kept, by their lowest triangle index
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
       if (isCrossed(t)) continue;
@@ -132,11 +143,16 @@ class SeparatingSurface {
     for (auto& [patch, sheet] : dropped) sheets.push_back(std::move(sheet));
     addPieces(result, sheets);
     addShallow(sheets, result);
+    field_ = WindingField();  // frees memory
+    shrink(result.points);
+    shrink(result.triangles);
     return result;
   }
 
  private:
   static constexpr std::uint32_t kNone = 0xffffffffu;
+  // Usual number of triangles into which a pair of crossing triangles is cut.
+  static constexpr std::size_t kPiecesOfPair = 8;
 
   [[nodiscard]] std::array<V3d, 3> corners(std::uint32_t t) const {
     return {mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2)};

@@ -127,6 +127,9 @@ struct OperatorRun {
   bool isPartial = false;  ///< true: the first operand was computed with a reduced half width
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
+  /// Drops the caller's references to the operands, to save memory. Afterwards an operator must not
+  /// read its mesh operand. Null: the caller needs them.
+  std::function<void()> releaseOperands = {};
 
   std::vector<std::string> notes = {}, warnings = {};
   std::vector<ErrorEstimate> errors = {};

@@ -94,12 +94,11 @@ VolumeHeader readMrcHeader(const std::filesystem::path& path, std::string_view b
   if (order == std::array<std::int32_t, 3>{0, 0, 0}) order = {1, 2, 3};
   std::array<bool, 3> isUsed{};
   for (std::int32_t& axis : order) {
-    --axis;
-    if (axis < 0 || axis > 2 || isUsed[static_cast<std::size_t>(axis)])
+    if (axis < 1 || axis > 3 || isUsed[static_cast<std::size_t>(axis - 1)])
       refuseFile(name, fmt::format("has the axes MAPC, MAPR, MAPS = {}, {}, {}, which are not 1, 2 "
                                    "and 3 in any order; repair its header",
                                    integers(64)[0], integers(64)[1], integers(64)[2]));
-    isUsed[static_cast<std::size_t>(axis)] = true;
+    isUsed[static_cast<std::size_t>(--axis)] = true;
   }
   const V3d length = vector(40), degrees = vector(52), origin = vector(196);
   V3d spacing(1);

@@ -249,6 +249,11 @@ void Volume::findRange(const Progress& progress) {
   }
   lowest_ = std::min(scale_(whole.low), scale_(whole.high));
   highest_ = std::max(scale_(whole.low), scale_(whole.high));
+  if (!std::isfinite(highest_ - lowest_))
+    throw InvalidInput(
+        fmt::format("the rescale slope {} and intercept {} of the volume make values beyond the "
+                    "range of numbers; repair the header of the file",
+                    scale_.slope, scale_.intercept));
 }
 
 std::uint64_t Volume::contentHash() const {

@@ -7,6 +7,7 @@
 #include <fmt/core.h>
 
 #include <array>
+#include <exception>
 #include <string_view>
 #include <vector>
 
@@ -28,9 +29,6 @@ struct GlContext::Egl {
   decltype(&eglGetProcAddress) getProcAddress = nullptr;
   decltype(&eglQueryString) queryString = nullptr;
   decltype(&eglInitialize) initialize = nullptr;
-  decltype(&eglGetCurrentContext) currentContext = nullptr;
-  decltype(&eglGetCurrentDisplay) currentDisplay = nullptr;
-  decltype(&eglGetCurrentSurface) currentSurface = nullptr;
   decltype(&eglBindAPI) bindApi = nullptr;
   decltype(&eglCreateContext) createContext = nullptr;
   decltype(&eglDestroyContext) destroyContext = nullptr;
@@ -54,9 +52,6 @@ struct GlContext::Egl {
     load(getProcAddress, "eglGetProcAddress");
     load(queryString, "eglQueryString");
     load(initialize, "eglInitialize");
-    load(currentContext, "eglGetCurrentContext");
-    load(currentDisplay, "eglGetCurrentDisplay");
-    load(currentSurface, "eglGetCurrentSurface");
     load(bindApi, "eglBindAPI");
     load(createContext, "eglCreateContext");
     load(destroyContext, "eglDestroyContext");
@@ -142,9 +137,39 @@ struct GlContext::Egl {
   }
 };
 
-GlContext::GlContext() : egl_(std::make_unique<Egl>()) {
+/// A job that waits for the context's thread, and its result.
+struct GlContext::Waiting {
+  const std::function<void()>& job;
+  std::exception_ptr failure;
+  bool isDone = false;
+};
+
+GlContext::GlContext() : egl_(std::make_unique<Egl>()), thread_([this] { work(); }) {
+  try {
+    run([this] { open(); });
+  } catch (...) {
+    end();
+    throw;
+  }
+}
+
+GlContext::~GlContext() {
+  end();
+}
+
+void GlContext::end() {
+  {
+    const std::scoped_lock lock(mutex_);
+    isEnding_ = true;
+  }
+  hasWork_.notify_all();
+  thread_.join();
+}
+
+void GlContext::open() {
   egl_->open();
-  const Current current(*this);
+  if (!egl_->makeCurrent(egl_->display, EGL_NO_SURFACE, EGL_NO_SURFACE, egl_->context))
+    throw NoOpenGl(fmt::format("the OpenGL context cannot be made current; {}", kRemedy));
   const auto load = [&](auto& function, const char* name) {
     function =
         reinterpret_cast<std::remove_reference_t<decltype(function)>>(egl_->getProcAddress(name));
@@ -165,33 +190,39 @@ GlContext::GlContext() : egl_(std::make_unique<Egl>()) {
   tableCount_ = static_cast<int>(units);
 }
 
-GlContext::~GlContext() = default;
-
-GlContext::Current::Current(const GlContext& context) : context_(context), lock_(context.mutex_) {
-  Egl& egl = *context.egl_;
-  display_ = egl.currentDisplay();
-  draw_ = egl.currentSurface(EGL_DRAW);
-  read_ = egl.currentSurface(EGL_READ);
-  before_ = egl.currentContext();
-  // Bind the OpenGL API again: EGL stores the bound API for each thread.
-  if (!egl.bindApi(EGL_OPENGL_API) ||
-      !egl.makeCurrent(egl.display, EGL_NO_SURFACE, EGL_NO_SURFACE, egl.context)) {
-    throw levelset::ResourceLimit(
-        "the OpenGL context cannot be made current on this thread; try again, or draw with "
-        "--renderer cpu");
+void GlContext::work() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    hasWork_.wait(lock, [this] { return isEnding_ || !waiting_.empty(); });
+    if (waiting_.empty()) break;
+    Waiting& next = *waiting_.front();
+    waiting_.pop_front();
+    lock.unlock();
+    try {
+      next.job();
+    } catch (...) {
+      next.failure = std::current_exception();
+    }
+    lock.lock();
+    next.isDone = true;
+    hasAnswer_.notify_all();
   }
-}
-
-GlContext::Current::~Current() {
-  Egl& egl = *context_.egl_;
-  if (before_ != EGL_NO_CONTEXT) {
-    egl.makeCurrent(display_, draw_, read_, before_);
-    return;
-  }
-  egl.makeCurrent(egl.display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+  lock.unlock();
+  if (egl_->context != EGL_NO_CONTEXT)
+    egl_->makeCurrent(egl_->display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+  egl_->close();
   // Release EGL's state of the thread here: Mesa frees it when the thread ends, and again when the
   // process ends, and crashes if both happen at once.
-  egl.releaseThread();
+  egl_->releaseThread();
+}
+
+void GlContext::run(const std::function<void()>& job) const {
+  Waiting mine{job, nullptr};
+  std::unique_lock lock(mutex_);
+  waiting_.push_back(&mine);
+  hasWork_.notify_one();
+  hasAnswer_.wait(lock, [&] { return mine.isDone; });
+  if (mine.failure) std::rethrow_exception(mine.failure);
 }
 
 void GlContext::check(const char* what) const {

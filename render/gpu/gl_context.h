@@ -5,11 +5,15 @@
 
 #include <GL/glcorearb.h>
 
+#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <thread>
 
 #include "render/gpu/gpu_renderer.h"
 
@@ -20,6 +24,7 @@ namespace render {
   X(PFNGLBINDBUFFERBASEPROC, BindBufferBase)                 \
   X(PFNGLBINDTEXTUREUNITPROC, BindTextureUnit)               \
   X(PFNGLCOMPILESHADERPROC, CompileShader)                   \
+  X(PFNGLCOPYNAMEDBUFFERSUBDATAPROC, CopyNamedBufferSubData) \
   X(PFNGLCREATEBUFFERSPROC, CreateBuffers)                   \
   X(PFNGLCREATEPROGRAMPROC, CreateProgram)                   \
   X(PFNGLCREATESHADERPROC, CreateShader)                     \
@@ -33,7 +38,6 @@ namespace render {
   X(PFNGLGETERRORPROC, GetError)                             \
   X(PFNGLGETGRAPHICSRESETSTATUSPROC, GetGraphicsResetStatus) \
   X(PFNGLGETINTEGER64VPROC, GetInteger64v)                   \
-  X(PFNGLGETNAMEDBUFFERSUBDATAPROC, GetNamedBufferSubData)   \
   X(PFNGLGETPROGRAMINFOLOGPROC, GetProgramInfoLog)           \
   X(PFNGLGETPROGRAMIVPROC, GetProgramiv)                     \
   X(PFNGLGETSHADERINFOLOGPROC, GetShaderInfoLog)             \
@@ -41,8 +45,11 @@ namespace render {
   X(PFNGLGETSTRINGPROC, GetString)                           \
   X(PFNGLGETUNIFORMLOCATIONPROC, GetUniformLocation)         \
   X(PFNGLLINKPROGRAMPROC, LinkProgram)                       \
+  X(PFNGLMAPNAMEDBUFFERRANGEPROC, MapNamedBufferRange)       \
   X(PFNGLMEMORYBARRIERPROC, MemoryBarrier)                   \
   X(PFNGLNAMEDBUFFERDATAPROC, NamedBufferData)               \
+  X(PFNGLNAMEDBUFFERSTORAGEPROC, NamedBufferStorage)         \
+  X(PFNGLNAMEDBUFFERSUBDATAPROC, NamedBufferSubData)         \
   X(PFNGLSHADERSOURCEPROC, ShaderSource)                     \
   X(PFNGLTEXTUREBUFFERPROC, TextureBuffer)                   \
   X(PFNGLUNIFORM1FVPROC, Uniform1fv)                         \
@@ -56,7 +63,9 @@ struct GlFunctions {
 #undef LEVELSMITH_GL_MEMBER
 };
 
-/// An OpenGL 4.5 context without a window. Hardware devices are preferred to software rendering.
+/// An OpenGL 4.5 context without a window, on a thread of its own. Hardware devices are preferred
+/// to software rendering. The context stays current on that thread, because drivers take long to
+/// move a context from thread to thread.
 class GlContext {
  public:
   /// @throws NoOpenGl when EGL or OpenGL 4.5 is missing; the message lists the devices that were
@@ -66,21 +75,11 @@ class GlContext {
   GlContext(const GlContext&) = delete;
   GlContext& operator=(const GlContext&) = delete;
 
-  /// Makes the context current on the calling thread and locks it against other threads. The
-  /// destructor restores the previous context.
-  class Current {
-   public:
-    explicit Current(const GlContext& context);
-    ~Current();
-    Current(const Current&) = delete;
-    Current& operator=(const Current&) = delete;
+  /// Runs a job on the context's thread and waits for its end. Jobs of several threads run one
+  /// after the other. Exceptions of the job are thrown here.
+  void run(const std::function<void()>& job) const;
 
-   private:
-    const GlContext& context_;
-    std::unique_lock<std::mutex> lock_;
-    void *display_, *draw_, *read_, *before_;
-  };
-
+  /// OpenGL's functions. Only jobs of run() may call them.
   const GlFunctions& gl() const { return gl_; }
   /// Name of the renderer and OpenGL version, from the driver.
   [[nodiscard]] const std::string& description() const { return description_; }
@@ -88,19 +87,29 @@ class GlContext {
   [[nodiscard]] std::size_t largestTable() const { return largestTable_; }
   /// Number of buffer textures that a compute shader can access.
   [[nodiscard]] int tableCount() const { return tableCount_; }
-  /// Checks for OpenGL errors. @pre the context is current
+  /// Checks for OpenGL errors. Only jobs of run() may call this function.
   /// @param what  operation that has just run, such as "tracing the rays"; part of the message
   /// @throws levelset::ResourceLimit when the context was lost or OpenGL reports an error
   void check(const char* what) const;
 
  private:
   struct Egl;
+  struct Waiting;
+
+  void open();  // opens the context on the calling thread
+  void work();  // loop of the context's thread
+  void end();   // stops the context's thread
+
   std::unique_ptr<Egl> egl_;
   GlFunctions gl_;
   std::string description_;
   std::size_t largestTable_ = 0;
   int tableCount_ = 0;
   mutable std::mutex mutex_;
+  mutable std::condition_variable hasWork_, hasAnswer_;
+  mutable std::deque<Waiting*> waiting_;  // jobs that have not started
+  bool isEnding_ = false;
+  std::thread thread_;  // the last member: it uses the others
 };
 
 }  // namespace render

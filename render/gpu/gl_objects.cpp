@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+
 #include "levelset/error.h"
 
 namespace render {
@@ -26,6 +28,32 @@ Texels makeTexels(const GlContext& context, std::size_t largestTable, const void
 void releaseTexels(const GlContext& context, const Texels& texels) {
   context.gl().DeleteTextures(1, &texels.texture);
   context.gl().DeleteBuffers(1, &texels.buffer);
+}
+
+void GrowingBuffer::reserve(const GlContext& context, std::size_t bytes) {
+  if (bytes <= capacity_) return;
+  const std::size_t wanted = std::max(bytes, capacity_ + capacity_ / 2);
+  release(context);
+  const GlFunctions& gl = context.gl();
+  constexpr GLbitfield kMapping = GL_MAP_READ_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
+  const GLbitfield flags = use_ == Use::Upload  ? GL_DYNAMIC_STORAGE_BIT
+                           : use_ == Use::Fetch ? kMapping | GL_CLIENT_STORAGE_BIT
+                                                : 0;
+  gl.CreateBuffers(1, &name_);
+  gl.NamedBufferStorage(name_, static_cast<GLsizeiptr>(wanted), nullptr, flags);
+  context.check("allocating memory for rays");
+  if (use_ == Use::Fetch) {
+    mapped_ = gl.MapNamedBufferRange(name_, 0, static_cast<GLsizeiptr>(wanted), kMapping);
+    context.check("mapping memory of the graphics driver");
+  }
+  capacity_ = wanted;
+}
+
+void GrowingBuffer::release(const GlContext& context) {
+  if (name_ != 0) context.gl().DeleteBuffers(1, &name_);  // this ends the mapping, too
+  name_ = 0;
+  capacity_ = 0;
+  mapped_ = nullptr;
 }
 
 GLuint compileCompute(const GlContext& context, const std::string& text) {

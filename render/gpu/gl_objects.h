@@ -15,16 +15,42 @@ struct Texels {
   GLuint buffer = 0, texture = 0;
 };
 
-/// Uploads data as a buffer texture. @pre the context is current
+/// Uploads data as a buffer texture. Runs in a job of GlContext::run().
 /// @param format  OpenGL's internal format of a texel
 /// @param largestTable  limit on the size of a buffer texture, bytes
 /// @throws levelset::ResourceLimit when the data does not fit
 [[nodiscard]] Texels makeTexels(const GlContext& context, std::size_t largestTable,
                                 const void* data, std::size_t bytes, GLenum format);
-/// @pre the context is current
+/// Runs in a job of GlContext::run().
 void releaseTexels(const GlContext& context, const Texels& texels);
 
-/// Compiles and links a compute shader. @pre the context is current
+/// A buffer of at least the size that was last reserved. It grows and never shrinks, because
+/// drivers take long to allocate. All functions run in jobs of GlContext::run().
+class GrowingBuffer {
+ public:
+  enum class Use {
+    Upload,  ///< written with NamedBufferSubData
+    Device,  ///< read and written by shaders only
+    Fetch    ///< target of copies, mapped into the memory of the process
+  };
+  explicit GrowingBuffer(Use use) : use_(use) {}
+
+  /// Makes room for `bytes`. The contents are lost if the buffer grows.
+  /// @throws levelset::ResourceLimit when the memory of the device does not suffice
+  void reserve(const GlContext& context, std::size_t bytes);
+  void release(const GlContext& context);
+  [[nodiscard]] GLuint name() const { return name_; }
+  /// Address of the contents. @pre the buffer is for Use::Fetch
+  [[nodiscard]] const void* mapped() const { return mapped_; }
+
+ private:
+  Use use_;
+  GLuint name_ = 0;
+  std::size_t capacity_ = 0;
+  const void* mapped_ = nullptr;
+};
+
+/// Compiles and links a compute shader. Runs in a job of GlContext::run().
 /// @throws levelset::ResourceLimit when it does not compile or link; the message has the start of
 /// the driver's log
 [[nodiscard]] GLuint compileCompute(const GlContext& context, const std::string& text);

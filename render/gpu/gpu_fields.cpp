@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 #include <string>
 
@@ -87,9 +88,7 @@ GpuFields::GpuFields(const GlContext& context, const FieldTraversal& fields,
                      std::size_t largestTable)
     : context_(context), largestTable_(largestTable) {
   requireFew(fields.expression(), static_cast<std::size_t>(context.tableCount()));
-  const GlFunctions& gl = context_.gl();
   try {
-    for (GLuint* buffer : {&numbers_, &rays_, &found_}) gl.CreateBuffers(1, buffer);
     for (const FieldGrid& grid : fields.grids()) upload(grid);
   } catch (...) {
     release();
@@ -120,7 +119,7 @@ void GpuFields::release() {
   const GlFunctions& gl = context_.gl();
   for (const Texels& table : tables_) releaseTexels(context_, table);
   tables_.clear();
-  for (const GLuint buffer : {numbers_, rays_, found_}) gl.DeleteBuffers(1, &buffer);
+  for (GrowingBuffer* buffer : {&numbers_, &rays_, &found_, &fetched_}) buffer->release(context_);
   if (program_ != 0) gl.DeleteProgram(program_);
 }
 
@@ -137,43 +136,54 @@ std::vector<double> GpuFields::search(const FieldTraversal& fields,
     input.push_back(segment.end);
   }
   const std::vector<double> numbers = numbersOf(fields);
-  {
-    const GlContext::Current current(context_);
-    const GlFunctions& gl = context_.gl();
-    if (program_ == 0) program_ = compileCompute(context_, fieldShaderText(fields.expression()));
-    gl.UseProgram(program_);
-    const auto fill = [&](GLuint buffer, GLuint place, const double* data, std::size_t count) {
-      gl.NamedBufferData(buffer, static_cast<GLsizeiptr>(count * sizeof(double)), data,
-                         GL_STREAM_DRAW);
-      gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, place, buffer);
-    };
-    fill(rays_, kRaysOfFields, input.data(), input.size());
-    fill(found_, kAnswers, nullptr, answers.size());
-    fill(numbers_, kNumbers, numbers.data(), numbers.size());
-    const std::size_t grids = tables_.size() / kGridTables;
-    for (std::size_t n = 0; n < tables_.size(); ++n)
-      gl.BindTextureUnit(static_cast<GLuint>(n % kGridTables * grids + n / kGridTables),
-                         tables_[n].texture);
-    const auto set = [&](const char* name, std::size_t value) {
-      gl.Uniform1i(gl.GetUniformLocation(program_, name), static_cast<GLint>(value));
-    };
-    set("rayCount", segments.size());
-    set("wantsLength", question == FieldQuestion::InsideLength ? 1 : 0);
-    for (std::size_t first = 0; first < segments.size(); first += kFieldRun) {
-      set("firstRay", first);
-      const std::size_t rays = std::min(kFieldRun, segments.size() - first);
-      gl.DispatchCompute(static_cast<GLuint>((rays + kFieldGroup - 1) / kFieldGroup), 1, 1);
-      gl.Finish();
-    }
-    gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-    gl.GetNamedBufferSubData(found_, 0, static_cast<GLsizeiptr>(answers.size() * sizeof(double)),
-                             answers.data());
-    context_.check("searching the fields");
-  }
+  context_.run([&] { run(fields.expression(), numbers, input, question, answers); });
   // Rays that the shader gave up, see kMostSteps in render/shaders/field.glsl.
   for (std::size_t n = 0; n < answers.size(); ++n)
     if (answers[n] == kLost) answers[n] = fields.search(segments[n], question);
   return answers;
+}
+
+void GpuFields::run(const FieldExpression& expression, const std::vector<double>& numbers,
+                    const std::vector<double>& input, FieldQuestion question,
+                    std::vector<double>& answers) {
+  const GlFunctions& gl = context_.gl();
+  if (program_ == 0) program_ = compileCompute(context_, fieldShaderText(expression));
+  gl.UseProgram(program_);
+  const auto fill = [&](GrowingBuffer& buffer, const std::vector<double>& data) {
+    const std::size_t bytes = data.size() * sizeof(double);
+    buffer.reserve(context_, bytes);
+    gl.NamedBufferSubData(buffer.name(), 0, static_cast<GLsizeiptr>(bytes), data.data());
+  };
+  fill(rays_, input);
+  fill(numbers_, numbers);
+  const std::size_t answerBytes = answers.size() * sizeof(double);
+  found_.reserve(context_, answerBytes);
+  fetched_.reserve(context_, answerBytes);
+  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, kRaysOfFields, rays_.name());
+  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, kAnswers, found_.name());
+  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, kNumbers, numbers_.name());
+  const std::size_t grids = tables_.size() / kGridTables;
+  for (std::size_t n = 0; n < tables_.size(); ++n)
+    gl.BindTextureUnit(static_cast<GLuint>(n % kGridTables * grids + n / kGridTables),
+                       tables_[n].texture);
+  const auto set = [&](const char* name, std::size_t value) {
+    gl.Uniform1i(gl.GetUniformLocation(program_, name), static_cast<GLint>(value));
+  };
+  set("rayCount", answers.size());
+  set("wantsLength", question == FieldQuestion::InsideLength ? 1 : 0);
+  for (std::size_t first = 0; first < answers.size(); first += kFieldRun) {
+    set("firstRay", first);
+    const std::size_t count = std::min(kFieldRun, answers.size() - first);
+    gl.DispatchCompute(static_cast<GLuint>((count + kFieldGroup - 1) / kFieldGroup), 1, 1);
+    gl.Finish();
+  }
+  gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+  gl.CopyNamedBufferSubData(found_.name(), fetched_.name(), 0, 0,
+                            static_cast<GLsizeiptr>(answerBytes));
+  gl.MemoryBarrier(GL_CLIENT_MAPPED_BUFFER_BARRIER_BIT);
+  gl.Finish();
+  context_.check("searching the fields");
+  std::memcpy(answers.data(), fetched_.mapped(), answerBytes);
 }
 
 }  // namespace render

@@ -18,7 +18,7 @@ class GpuFields {
   /// Largest numbers of fields and of steps in an expression.
   static constexpr std::size_t kMostFields = 8, kMostJoins = 24;
 
-  /// Uploads the fields. @pre the context is current
+  /// Uploads the fields. Runs in a job of GlContext::run().
   /// @param context  must outlive this object
   /// @param largestTable  limit on the size of a buffer texture, bytes
   /// @throws levelset::ResourceLimit for an expression of more fields or steps than the limits, and
@@ -26,7 +26,7 @@ class GpuFields {
   GpuFields(const GlContext& context, const FieldTraversal& fields, std::size_t largestTable);
   GpuFields(const GpuFields&) = delete;
   GpuFields& operator=(const GpuFields&) = delete;
-  /// Frees all objects in the context. @pre the context is current
+  /// Frees all objects in the context. Runs in a job of GlContext::run().
   void release();
 
   /// Answers as FieldTracer::search(). @pre `fields` has the grids that were uploaded
@@ -36,11 +36,16 @@ class GpuFields {
 
  private:
   void upload(const FieldGrid& grid);
+  /// Runs in a job of GlContext::run(). @param input  the rays, as the shader reads them
+  void run(const FieldExpression& expression, const std::vector<double>& numbers,
+           const std::vector<double>& input, FieldQuestion question, std::vector<double>& answers);
 
   const GlContext& context_;
   std::size_t largestTable_;
   std::vector<Texels> tables_;  // pages, entries, ranges and values of each grid
-  GLuint numbers_ = 0, rays_ = 0, found_ = 0, program_ = 0;
+  GrowingBuffer numbers_{GrowingBuffer::Use::Upload}, rays_{GrowingBuffer::Use::Upload},
+      found_{GrowingBuffer::Use::Device}, fetched_{GrowingBuffer::Use::Fetch};
+  GLuint program_ = 0;
 };
 
 }  // namespace render

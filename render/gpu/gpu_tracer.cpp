@@ -61,6 +61,9 @@ layout(binding = 2) uniform isamplerBuffer masks;
 layout(std430, binding = 0) readonly buffer Rays { float rays[]; };
 layout(std430, binding = 1) writeonly buffer Hits { int hits[]; };
 
+// OpenGL lets drivers round a quotient of floats to a neighbour. A quotient in double precision
+// rounds to the nearest float.
+Real reciprocal(Real v) { return float(1.0lf / double(v)); }
 Real real(float v) { return v; }
 Int integer(int v) { return v; }
 Bool no() { return false; }
@@ -209,11 +212,11 @@ struct GpuTracer::Impl {
   const std::size_t largestTable;
   int shift = 0;  // log2 of the largest number of values in a buffer texture
   std::map<const KernelSolid*, Tables> tables;
-  GLuint rays = 0, hits = 0;
+  GrowingBuffer rays{GrowingBuffer::Use::Upload}, hits{GrowingBuffer::Use::Device},
+      fetched{GrowingBuffer::Use::Fetch};
   std::map<Variant, GLuint> programs;
   std::optional<GpuFields> fields;
   double shaderSeconds = 0;
-  std::vector<int> fetched;  // hits of the last run, as in the buffer
 
   Impl(const GlContext& context_, std::size_t largestTable_)
       : context(context_),
@@ -221,17 +224,14 @@ struct GpuTracer::Impl {
         largestTable(largestTable_ > 0 ? largestTable_ : context_.largestTable()) {
     shift = static_cast<int>(std::bit_width(largestTable / sizeof(float))) - 1;
     shift = std::min(shift, 30);  // indices of values fit into a signed 32-bit integer
-    gl.CreateBuffers(1, &rays);
-    gl.CreateBuffers(1, &hits);
   }
 
-  /// @pre the context is current
   void release() {
     for (auto& [solid, t] : tables) {
       for (const Texels& texels : {t.pages, t.entries, t.masks}) releaseTexels(context, texels);
       for (const Texels& texels : t.values) releaseTexels(context, texels);
     }
-    for (const GLuint buffer : {rays, hits}) gl.DeleteBuffers(1, &buffer);
+    for (GrowingBuffer* buffer : {&rays, &hits, &fetched}) buffer->release(context);
     for (const auto& [variant, program] : programs) gl.DeleteProgram(program);
     if (fields) fields->release();
   }
@@ -339,8 +339,8 @@ struct GpuTracer::Impl {
     gl.BindTextureUnit(kPages, t.pages.texture);
     gl.BindTextureUnit(kEntries, t.entries.texture);
     gl.BindTextureUnit(kMasks, t.masks.texture);
-    bindTo(kRays, rays);
-    bindTo(kHits, hits);
+    bindTo(kRays, rays.name());
+    bindTo(kHits, hits.name());
     for (std::size_t b = 0; b < t.values.size(); ++b)
       gl.BindTextureUnit(kFirstValues + static_cast<GLuint>(b), t.values[b].texture);
   }
@@ -350,18 +350,19 @@ struct GpuTracer::Impl {
   /// array after the other
   /// @param shapes  receives the surface's shape at the hits of the rays through pixels; null for
   /// the rays of a RayBlock
+  /// Runs in a job of GlContext::run().
   void run(const KernelSolid& solid, const std::vector<float>& input, std::size_t count,
            HitBlock& found, ShapeBlock* shapes) {
-    if (count == 0) return;
-    const GlContext::Current current(context);
     const GLuint program = programFor(solid, shapes != nullptr);
     gl.UseProgram(program);
     setNumbers(program, solid);
-    gl.NamedBufferData(rays, static_cast<GLsizeiptr>(input.size() * sizeof(float)), input.data(),
-                       GL_STREAM_DRAW);
+    const std::size_t inputBytes = input.size() * sizeof(float);
     const std::size_t parts = kHitParts + (shapes ? ShapeBlock::kParts : 0);
-    gl.NamedBufferData(hits, static_cast<GLsizeiptr>(parts * count * sizeof(int)), nullptr,
-                       GL_STREAM_READ);
+    const std::size_t hitBytes = parts * count * sizeof(int);
+    rays.reserve(context, inputBytes);
+    hits.reserve(context, hitBytes);
+    fetched.reserve(context, hitBytes);
+    gl.NamedBufferSubData(rays.name(), 0, static_cast<GLsizeiptr>(inputBytes), input.data());
     bind(solid);
     const auto place = [&](const char* name) { return gl.GetUniformLocation(program, name); };
     gl.Uniform1i(place("rayCount"), static_cast<GLint>(count));
@@ -376,12 +377,13 @@ struct GpuTracer::Impl {
     shaderSeconds +=
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-    // One transfer for all arrays: each call waits for the device.
-    fetched.resize(parts * count);
-    gl.GetNamedBufferSubData(hits, 0, static_cast<GLsizeiptr>(fetched.size() * sizeof(int)),
-                             fetched.data());
+    gl.CopyNamedBufferSubData(hits.name(), fetched.name(), 0, 0, static_cast<GLsizeiptr>(hitBytes));
+    gl.MemoryBarrier(GL_CLIENT_MAPPED_BUFFER_BARRIER_BIT);
+    gl.Finish();
+    context.check("tracing the rays");
     const auto copyTo = [&](auto& to, std::size_t part) {
-      std::memcpy(to.data(), fetched.data() + part * count, count * sizeof(int));
+      std::memcpy(to.data(), static_cast<const int*>(fetched.mapped()) + part * count,
+                  count * sizeof(int));
     };
     copyTo(found.found, 0);
     copyTo(found.t, 1);
@@ -390,32 +392,31 @@ struct GpuTracer::Impl {
     copyTo(found.z, 4);
     for (std::size_t p = 0; shapes && p < ShapeBlock::kParts; ++p)
       copyTo(shapes->part[p], kHitParts + p);
-    context.check("tracing the rays");
   }
 };
 
 GpuTracer::GpuTracer(const GlContext& context, const KernelScene& scene, std::size_t largestTable,
                      const Scene* grids) {
-  const GlContext::Current current(context);
   impl_ = std::make_unique<Impl>(context, largestTable);
-  try {
-    for (const KernelSolid& solid : scene.solids()) {
-      if (grids)
-        impl_->upload(solid, grids->solids[solid.index].band);
-      else
-        impl_->upload(solid);
+  context.run([&] {
+    try {
+      for (const KernelSolid& solid : scene.solids()) {
+        if (grids)
+          impl_->upload(solid, grids->solids[solid.index].band);
+        else
+          impl_->upload(solid);
+      }
+      if (scene.fields()) impl_->fields.emplace(context, *scene.fields(), impl_->largestTable);
+    } catch (...) {
+      impl_->release();
+      throw;
     }
-    if (scene.fields()) impl_->fields.emplace(context, *scene.fields(), impl_->largestTable);
-  } catch (...) {
-    impl_->release();
-    throw;
-  }
+  });
 }
 
 GpuTracer::~GpuTracer() {
   try {
-    const GlContext::Current current(impl_->context);
-    impl_->release();
+    impl_->context.run([&] { impl_->release(); });
   } catch (const levelset::Error&) {  // the context was lost, and its objects with it
   }
 }
@@ -426,7 +427,8 @@ void GpuTracer::trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlo
   input.insert(input.end(), pixels.y.begin(), pixels.y.end());
   input.insert(input.end(), pixels.passing.begin(),
                pixels.passing.end());  // integers up to 2^24 are exact as floats
-  impl_->run(solid, input, pixels.size(), hits, &shapes);
+  if (pixels.size() == 0) return;
+  impl_->context.run([&] { impl_->run(solid, input, pixels.size(), hits, &shapes); });
 }
 
 void GpuTracer::trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits) const {
@@ -436,7 +438,8 @@ void GpuTracer::trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& 
                            &rays.iy, &rays.iz, &rays.start, &rays.end})
     input.insert(input.end(), part->begin(), part->end());
   input.insert(input.end(), rays.passing.begin(), rays.passing.end());
-  impl_->run(solid, input, rays.size, hits, nullptr);
+  if (rays.size == 0) return;
+  impl_->context.run([&] { impl_->run(solid, input, rays.size, hits, nullptr); });
 }
 
 std::vector<double> GpuTracer::search(const FieldTraversal& fields,
@@ -446,8 +449,9 @@ std::vector<double> GpuTracer::search(const FieldTraversal& fields,
 }
 
 double GpuTracer::shaderSeconds() const {
-  const GlContext::Current current(impl_->context);
-  return impl_->shaderSeconds;
+  double seconds = 0;
+  impl_->context.run([&] { seconds = impl_->shaderSeconds; });
+  return seconds;
 }
 
 }  // namespace render

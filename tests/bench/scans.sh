@@ -57,7 +57,7 @@ for dim in "$@"; do
     read_ours="0 0" read_theirs="0 0"
     ours=$(cost "$levelsmith" -q --threads 2 read "$mesh" ! level-set --resolution "$dim" ! info)
     theirs=$(cost vdb_tool -read "$mesh" -mesh2ls dim="$dim" width=3)
-    row level-set 0.5 0.5
+    row level-set 0.5 0.5  # the bounds hold at 1024 and 2048
     read_ours=$(cost "$levelsmith" -q read "$band" ! info) read_theirs=$(cost vdb_tool -read "$band")
     ours=$(cost "$levelsmith" -q read "$band" ! offset 5vx ! info)
     theirs=$(cost vdb_tool -read "$band" -dilate radius=5)

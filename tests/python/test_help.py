@@ -74,7 +74,7 @@ def test_the_stub_matches_the_registry(ls):
     public = {n for n in ls.__all__}
     known = set(functions) | set(classes)
     assert public <= known | {"__version__"}
-    for cls in ("Solid", "Mesh", "Value", "Field", "Patch", "Scene", "Surface"):
+    for cls in ("Solid", "Mesh", "Value", "Field", "Patch", "Scan", "Scene", "Surface"):
         hinted = {n.name for n in classes[cls].body if isinstance(n, ast.FunctionDef)}
         for member in hinted:
             assert hasattr(getattr(ls, cls), member)

@@ -1,5 +1,7 @@
 #include "apps/pipeline/operators/level_set_operator.h"
 
+#include <malloc.h>
+
 #include <iterator>
 #include <nlohmann/json.hpp>
 
@@ -36,6 +38,11 @@ OperatorRun runOf(const Invocation& in) {
       .roi = in.roi, .isPartial = in.isPartial, .maxMemory = in.maxMemory, .progress = in.progress};
   if (in.planned) run.planned = in.planned->estimate();
   return run;
+}
+
+void releaseOperands(Invocation& in) {
+  in.operands.clear();
+  malloc_trim(0);  // the allocator keeps freed memory between the blocks in use
 }
 
 void fileNotes(levelset::OperatorRun& run, StepNotes& notes) {

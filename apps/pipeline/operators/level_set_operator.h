@@ -58,6 +58,8 @@ constexpr std::size_t operandCount() {
 [[nodiscard]] levelset::GivenOptions givenIn(const Invocation& in);
 [[nodiscard]] std::vector<ValuePlan> operandPlans(const Invocation& in);
 [[nodiscard]] OperatorRun runOf(const Invocation& in);
+/// Drops the references to the operands, and returns freed memory to the system.
+void releaseOperands(Invocation& in);
 /// Moves the messages and figures of an operator's run into the notes of its step in the report.
 void fileNotes(OperatorRun& run, StepNotes& notes);
 
@@ -89,8 +91,11 @@ Value valueOf(Result result) {
 template <class Op>
 Value runOn(Invocation& in, const typename Op::Options& options, OperatorRun& run) {
   if constexpr (TakesMesh<Op>)
-    if (!TakesBands<Op> || in.operands[0].kind() == Kind::Mesh)
+    if (!TakesBands<Op> || in.operands[0].kind() == Kind::Mesh) {
+      if constexpr (std::is_same_v<decltype(Op::run(in.mesh(), options, run)), NarrowBand>)
+        run.releaseOperands = [&in] { releaseOperands(in); };
       return valueOf(Op::run(in.mesh(), options, run));
+    }
   if constexpr (TakesBands<Op>) {
     std::vector<NarrowBand> bands;
     for (const Value& operand : in.operands) bands.push_back(operand.band());

@@ -238,13 +238,6 @@ Coord CreaseDistances::cellOf(const Coord& c) {
   return Coord::floor(c.asVec3d() / double{kCell});
 }
 
-MaskTree CreaseDistances::gridPoints() const {
-  MaskTree all;
-  for (std::size_t i = 0; i < points_.size(); ++i)
-    for (const Point& point : points_[i]) all.setValueOn(gridPoint(i, point));
-  return all;
-}
-
 MaskTree CreaseDistances::failedPoints() const {
   MaskTree failed;
   for (std::size_t i = 0; i < points_.size(); ++i)
@@ -257,8 +250,7 @@ CreaseDistances::Cells CreaseDistances::creasesByCell(const MaskTree& within) co
   Cells cells;
   for (std::size_t i = 0; i < points_.size(); ++i)
     for (const Point& point : points_[i])
-      if (const Coord c = gridPoint(i, point);
-          !point.hasFailed && within.isValueOn(c))
+      if (const Coord c = gridPoint(i, point); !point.hasFailed && within.isValueOn(c))
         cells[cellOf(c)].push_back({c, &*point.found->crease});
   return cells;
 }
@@ -277,7 +269,8 @@ std::vector<const MovedSurface::CreasePoint*> CreaseDistances::nearestCreases(co
   std::stable_sort(near.begin(), near.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<const MovedSurface::CreasePoint*> starts;
-  for (const auto& [squared, crease] : near) {
+  for (const auto& one : near) {
+    const MovedSurface::CreasePoint* crease = one.second;
     const bool isKnown = std::any_of(starts.begin(), starts.end(), [&](const auto* other) {
       return (other->point - crease->point).lengthSqr() < kApart * kApart;
     });
@@ -307,7 +300,8 @@ std::vector<Vec3d> CreaseDistances::nearestCrossings(const FloatGrid::ConstAcces
   std::stable_sort(near.begin(), near.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<Vec3d> starts;
-  for (const auto& [squared, crossing] : near) {
+  for (const auto& one : near) {
+    const Vec3d& crossing = one.second;
     const bool isKnown = std::any_of(starts.begin(), starts.end(), [&](const Vec3d& other) {
       return (other - crossing).lengthSqr() < kApart * kApart;
     });

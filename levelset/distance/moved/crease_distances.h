@@ -34,10 +34,6 @@ class CreaseDistances {
   /// wherever the plain distance is wrong.
   void searchAgain(const openvdb::FloatGrid& field);
 
-  /// Returns the grid points whose nearest point of the moved surface lies on a crease, and those
-  /// whose search failed.
-  [[nodiscard]] openvdb::MaskTree gridPoints() const;
-
   /// Grid points without a trusted distance, and the grid points around them in which the moved
   /// surface may be nearest; `nearEdges`: only around those beside edges of the surface.
   struct Missing {
@@ -55,7 +51,7 @@ class CreaseDistances {
   struct Point {
     openvdb::Index n = 0;
     double sign = 1;
-    bool hasFailed = false;       ///< the search by itself found no distance
+    bool hasFailed = false;                             ///< the search by itself found no distance
     bool isBesideCrease = false, meetsPatches = false;  ///< as in MovedSurface::Search
     double plain = 0;  ///< lower bound of the distance, voxels: the distance minus the shift
     std::optional<MovedSurface::Result> found = {};

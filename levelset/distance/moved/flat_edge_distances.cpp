@@ -59,17 +59,18 @@ class FlatEdges {
     const MaskTree cells = boxesAround(near, kToFlatEdge + 1);
     const auto blocks = leavesOf(cells);
     std::vector<std::vector<FlatEdge>> found(blocks.size());
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, blocks.size(), 16), [&](const auto& range) {
-          const FloatGrid::ConstAccessor accessor(field.tree());
-          for (std::size_t i = range.begin(); i != range.end(); ++i) {
-            if (!accessor.probeConstLeaf(blocks[i]->origin())) continue;
-            for (const SharpVertex& v : sharpEdgeVertices(field, accessor, blocks[i]->origin(), blocks[i]))
-              if (const auto edge = flatEdge(v, field, accessor);
-                  edge && hasPointBeside(near, edge->vertex))
-                found[i].push_back(*edge);
-          }
-        });
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size(), 16),
+                      [&](const auto& range) {
+                        const FloatGrid::ConstAccessor accessor(field.tree());
+                        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+                          if (!accessor.probeConstLeaf(blocks[i]->origin())) continue;
+                          for (const SharpVertex& v :
+                               sharpEdgeVertices(field, accessor, blocks[i]->origin(), blocks[i]))
+                            if (const auto edge = flatEdge(v, field, accessor);
+                                edge && hasPointBeside(near, edge->vertex))
+                              found[i].push_back(*edge);
+                        }
+                      });
     for (std::size_t i = 0; i < blocks.size(); ++i)
       if (!found[i].empty()) edges_[blocks[i]->origin()] = std::move(found[i]);
   }

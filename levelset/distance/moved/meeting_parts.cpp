@@ -120,8 +120,7 @@ MaskTree wrongPoints(const FloatGrid& field, bool isInside) {
 void measureFromField(FloatGrid& field, const CreaseDistances::Missing& missing, double halfWidth) {
   const auto& [points, near, nearEdges] = missing;
   const BlockSelection blocks{{}, &near, &near}, edgeBlocks{{}, &nearEdges, nullptr, &nearEdges};
-  const ZeroSet surface =
-      readZeroSet(field, blocks, nearEdges.empty() ? nullptr : &edgeBlocks, {});
+  const ZeroSet surface = readZeroSet(field, blocks, nearEdges.empty() ? nullptr : &edgeBlocks, {});
   NearestPoints nearest(field.tree(), surface.points, {halfWidth, halfWidth, {}, &near});
   nearest.run({});
 
@@ -136,7 +135,7 @@ void measureFromField(FloatGrid& field, const CreaseDistances::Missing& missing,
     for (auto it = masks[i]->cbeginValueOn(); it; ++it) {
       const openvdb::Index n = it.pos();
       const double old = static_cast<double>(values->getValue(n)) / voxelSize;
-      double value = std::copysign(1e30, old);
+      double value = old < 0 ? -1e30 : 1e30;
       if (block && block->nearest[n] != NearestPoints::kNone)
         value = keptOr(distanceAt(*block, n, polisher, request).value, old, polisher,
                        block->nearest[n]);
@@ -160,10 +159,9 @@ void correctMeetingParts(FloatGrid& field, const ZeroSet& surface, const Nearest
   distances.searchAgain(field);
   const auto missing = distances.write(field);
   report(progress, 0.8);
-  if (!missing.points.empty())
-    measureFromField(field, missing, request.halfWidth);
+  if (!missing.points.empty()) measureFromField(field, missing, request.halfWidth);
   distances.improveMeasured(field);
-  measureFlatEdges(field, distances.gridPoints(), request.halfWidth);
+  measureFlatEdges(field, wrong, request.halfWidth);
   openvdb::tools::pruneTiles(field.tree());
 }
 

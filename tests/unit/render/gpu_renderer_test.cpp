@@ -154,7 +154,7 @@ TEST(GlContext, OutlivesAnotherContext) {
   const GpuTracer tracer(first, surfaces);
   {
     const GlContext second;
-    const GlContext::Current current(second);
+    second.run([] {});
   }
   PixelBlock pixels(64);
   HitBlock hits(pixels.size());
@@ -165,9 +165,10 @@ TEST(GlContext, OutlivesAnotherContext) {
 
 TEST(GlContext, ReportsShadersThatDoNotCompile) {
   const GlContext context;
-  const GlContext::Current current(context);
-  const std::string words = refusalOf(
-      [&] { (void)compileCompute(context, "#version 450 core\nvoid main() { x = 1; }"); });
+  const std::string words = refusalOf([&] {
+    context.run(
+        [&] { (void)compileCompute(context, "#version 450 core\nvoid main() { x = 1; }"); });
+  });
   EXPECT_NE(words.find("does not compile"), std::string::npos) << words;
   EXPECT_NE(words.find("--renderer cpu"), std::string::npos) << words;
 }

@@ -131,6 +131,20 @@ TEST(KeepLargest, RestoresDistanceBesideARemovedSolid) {
   EXPECT_LT(changed, 400u);  // only beside the small solid
 }
 
+TEST(KeepLargest, CountsNegativeZerosAsOutside) {
+  // A value of -0 above a face, which is measured again because a ball beside it vanishes.
+  const auto slab = [](const V3d& p) {
+    return std::max({std::abs(p.x) - 12, std::abs(p.y) - 12, std::abs(p.z + 8) - 8});
+  };
+  const auto both = [&](const V3d& p) {
+    if ((p - V3d(0, 0, 1)).length() < 0.1) return -0.0;
+    return std::min(slab(p), ball(p, V3d(0.3, 0.2, 4.4), 1.9));
+  };
+  const NarrowBand kept = keepLargest(sample(both, 20), 1);
+  EXPECT_EQ(topology(kept).components, 1u);
+  EXPECT_EQ(topology(kept).surfaces, 1u);
+}
+
 TEST(KeepLargest, BreaksTiesByPosition) {
   const NarrowBand twins = sample(
       [](const V3d& p) { return std::min(ball(p, V3d(-16, 0, 0), 5), ball(p, V3d(16, 0, 0), 5)); },

@@ -383,6 +383,21 @@ TEST(Isosurface, BorderClosesTheSolid) {
               "reaches the border");
 }
 
+TEST(Isosurface, ClosingFacesAreOutside) {
+  // The closing face lies on grid points, whose distance is 0.
+  VolumeGrid grid;
+  grid.size = V3i(17);
+  const IsosurfaceResult made = isosurface(
+      sampled(grid, [](const V3d& p) { return 6.2 - (p - V3d(8, 8, 0)).length(); }), {.low = 0.0});
+  const auto& tree = levelset::vdb(made.band).tree();
+  std::size_t zeros = 0;
+  for (auto value = tree.cbeginValueOn(); value; ++value) {
+    zeros += *value == 0;
+    EXPECT_FALSE(std::signbit(*value) && *value == 0) << value.getCoord();
+  }
+  EXPECT_GT(zeros, 100u);
+}
+
 TEST(Isosurface, IsTheSameOnAnyNumberOfThreads) {
   const Volume volume = levelset::marschnerLobb(24);
   std::uint64_t first = 0;
