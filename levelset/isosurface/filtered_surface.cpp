@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "levelset/error.h"
-#include "levelset/volumes/filters/axis_weights.h"
+#include "levelset/volumes/filters/filter_weights.h"
 
 namespace levelset {
 namespace {
@@ -31,8 +31,8 @@ double largestWeightSum(VolumeFilter filter) {
   double largest = 0;
   constexpr int kSteps = 256;
   for (int n = 0; n <= kSteps; ++n) {
-    const AxisWeights axis =
-        axisWeights(filter, 4 + static_cast<double>(n) / kSteps, 10, GridExtension::Quadratic);
+    const FilterWeights axis =
+        filterWeights(filter, 4 + static_cast<double>(n) / kSteps, 10, GridExtension::Quadratic);
     double sum = 0;
     for (const double w : axis.weight[0]) sum += std::abs(w);
     largest = std::max(largest, sum);

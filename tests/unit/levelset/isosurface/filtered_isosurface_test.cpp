@@ -33,8 +33,8 @@ using support::measured;
 using support::measuredOrder;
 using support::refusal;
 
-constexpr std::array kSmooth = {VolumeFilter::Tricubic,     VolumeFilter::BSpline,
-                                VolumeFilter::BSplineQi,    VolumeFilter::WindowedSinc,
+constexpr std::array kSmooth = {VolumeFilter::Tricubic,       VolumeFilter::BSpline,
+                                VolumeFilter::BSplineQi,      VolumeFilter::WindowedSinc,
                                 VolumeFilter::SuperQuadratic, VolumeFilter::CubicC1,
                                 VolumeFilter::BccQuadratic};
 
@@ -59,8 +59,8 @@ VolumeGrid cubeGrid(int n) {
 }
 
 struct BandError {
-  double largest = 0;           ///< world units
-  std::size_t wrongSigns = 0;   ///< grid points further than the error from the surface
+  double largest = 0;          ///< world units
+  std::size_t wrongSigns = 0;  ///< grid points further than the error from the surface
 };
 
 BandError errorOf(const levelset::NarrowBand& band, const std::function<double(const V3d&)>& phi) {
@@ -99,7 +99,9 @@ TEST(FilteredIsosurface, ConvergesToASphereAndATorus) {
         EXPECT_EQ(error.wrongSigns, 0u);
         errors[n] = error.largest;
       }
-      std::printf("%s %d: %.3g %.3g %.3g: %.2f %.2f\n", std::string(factsOf(filter).name).c_str(), isTorus, errors[0], errors[1], errors[2], std::log2(errors[0]/errors[1]), std::log2(errors[1]/errors[2]));
+      std::printf("%s %d: %.3g %.3g %.3g: %.2f %.2f\n", std::string(factsOf(filter).name).c_str(),
+                  isTorus, errors[0], errors[1], errors[2], std::log2(errors[0] / errors[1]),
+                  std::log2(errors[1] / errors[2]));
     }
 }
 
@@ -128,7 +130,8 @@ Excess againstDensePoints(const Volume& volume, VolumeFilter filter, double isov
           at[b] = static_cast<double>(u) / fine;
           at[c] = static_cast<double>(v) / fine;
           const double value = f.value(at) - isovalue;
-          if ((n == 0 || n == steps) && value > 0) points.push_back(at * volume.grid().indexToWorld);
+          if ((n == 0 || n == steps) && value > 0)
+            points.push_back(at * volume.grid().indexToWorld);
           if (n > 0 && (value > 0) != (lastValue > 0)) {
             V3d low = last, high = at;
             for (int bisection = 0; bisection < 30; ++bisection) {
@@ -171,7 +174,9 @@ TEST(FilteredIsosurface, FindsTheClosestPointsOfNoisyData) {
   for (const VolumeFilter filter : kSmooth) {
     SCOPED_TRACE(factsOf(filter).name);
     const Excess found = againstDensePoints(volume, filter, 0.0, 12);
-    std::printf("%s: further %.3g nearer %.3g wrong %zu of %zu\n", std::string(factsOf(filter).name).c_str(), found.further, found.nearer, found.wrongSides, found.count);
+    std::printf("%s: further %.3g nearer %.3g wrong %zu of %zu\n",
+                std::string(factsOf(filter).name).c_str(), found.further, found.nearer,
+                found.wrongSides, found.count);
   }
 }
 
@@ -181,7 +186,10 @@ TEST(FilteredIsosurface, Timing) {
     if (filter == VolumeFilter::Box) continue;
     const auto t = clock();
     const auto made = isosurface(volume, {.low = 0.0}, {.filter = filter});
-    std::printf("%s %.2f s %lu voxels %lu pieces\n", std::string(factsOf(filter).name).c_str(), double(clock() - t) / CLOCKS_PER_SEC, (unsigned long)levelset::vdb(made.band).activeVoxelCount(), (unsigned long)made.report.pieces);
+    std::printf("%s %.2f s %lu voxels %lu pieces\n", std::string(factsOf(filter).name).c_str(),
+                double(clock() - t) / CLOCKS_PER_SEC,
+                (unsigned long)levelset::vdb(made.band).activeVoxelCount(),
+                (unsigned long)made.report.pieces);
   }
 }
 
