@@ -15,30 +15,46 @@ namespace {
 using openvdb::Mat3d;
 using openvdb::Vec3d;
 
-// Edge of a subcell, in cells.
-constexpr double kSubcell = 0.5;
 // Samples below and above a cell on which its values may depend.
-constexpr int kReachBelow = 2, kReachAbove = 3;
-constexpr double kBytesPerFilteredPiece = 64 + 2 * 40.0;
+constexpr int kReachBelow = 2, kReachAbove = 3, kReachCount = kReachBelow + kReachAbove + 1;
+// Part of a border face that is searched as one, in cells.
+constexpr double kFaceEdge = 0.5;
+// Largest edge of a box that holds a piece, and smallest edges of boxes that are split: because the
+// surface bends in them, and because the surface may pass between their corners. In cells.
+constexpr double kLargestBox = 0.5, kSmallestBent = 0.125, kSmallestSearched = 0.0625;
+// A box is split when the gradient may change in it by this part of itself.
+constexpr double kMostChange = 1;
+constexpr double kBytesPerFilteredPiece = 68 + 2 * 40.0;
 
-/// Largest sum of the magnitudes of the weights of a filter: values lie within this factor times
-/// half the range of the samples, from its middle.
-double largestWeightSum(VolumeFilter filter) {
-  // The two splines have these bounds by their coefficients; those of the cubic are positive.
-  if (filter == VolumeFilter::SuperQuadratic) return 9.0 / 8;
-  if (filter == VolumeFilter::BccQuadratic) return 5.0 / 4;
-  if (!isTensorProduct(filter)) return 1;
-  double largest = 0;
+FilterBounds boundsOf(VolumeFilter filter) {
+  // The splines on tetrahedra: the weights of the values are known, and linear programs give the
+  // least factors of the second derivatives (2, 1.5 and 3.25). The first has a reserve for the
+  // jumps of its gradient.
+  if (filter == VolumeFilter::SuperQuadratic) return {9.0 / 8, 3, true};
+  if (filter == VolumeFilter::CubicC1) return {1, 1.5, true};
+  if (filter == VolumeFilter::BccQuadratic) return {5.0 / 4, 3.25, true};
+  double value = 0, curvature = 0;
   constexpr int kSteps = 256;
   for (int n = 0; n <= kSteps; ++n) {
     const FilterWeights axis =
         filterWeights(filter, 4 + static_cast<double>(n) / kSteps, 10, GridExtension::Quadratic);
     double sum = 0;
     for (const double w : axis.weight[0]) sum += std::abs(w);
-    largest = std::max(largest, sum);
+    value = std::max(value, sum);
+    // Weights of the second differences: twofold partial sums of the weights of the samples.
+    double once = 0, twice = 0;
+    sum = 0;
+    for (const double w : axis.weight[2]) {
+      once += w;
+      twice += once;
+      sum += std::abs(twice);
+    }
+    curvature = std::max(curvature, sum);
   }
-  // The sum changes by less than this between two steps.
-  return std::pow(largest + 0.001, 3);
+  // The sums change by less than this between two steps.
+  value += 0.001;
+  curvature += 0.05;
+  return {value * value * value, curvature * value * value};
 }
 
 /// Part of a triangle in which the linear interpolant of three values is positive.
@@ -296,7 +312,7 @@ FilteredSurface::FilteredSurface(const Volume& volume, VolumeFilter filter, cons
       metric_(frame_.axes * frame_.axes.transpose()),
       voxelSize_(voxelSize),
       unit_(volume.highest() - volume.lowest()),
-      excess_(largestWeightSum(filter)) {
+      bounds_(boundsOf(filter)) {
   for (const auto& [limit, sign] : {std::pair(range.low, 1.0), std::pair(range.high, -1.0)}) {
     if (!limit) continue;
     limit_[static_cast<std::size_t>(functions_)] = *limit;
@@ -355,87 +371,118 @@ void FilteredSurface::collectSlab(int k, SlabOfPieces& out) const {
   const Imath::V3i size = volume_.volume().size();
   for (int j = 0; j + 1 < size.y; ++j)
     for (int i = 0; i + 1 < size.x; ++i)
-      if (mayHoldSurface({i, j, k})) collectCell({i, j, k}, out);
+      if (double curvature = 0; mayHoldSurface({i, j, k}, curvature))
+        collectCell({i, j, k}, curvature, out);
 }
 
-bool FilteredSurface::mayHoldSurface(const Imath::V3i& cell) const {
+bool FilteredSurface::mayHoldSurface(const Imath::V3i& cell, double& curvature) const {
   const Volume& volume = volume_.volume();
   const Imath::V3i size = volume.size();
-  double low = std::numeric_limits<double>::infinity(), high = -low;
-  const auto add = [&](double value) {
-    low = std::min(low, value);
-    high = std::max(high, value);
-  };
+  constexpr std::size_t kCount = kReachCount;
+  std::array<double, kCount * kCount * kCount> sample{};  // x fastest
+  const Imath::V3i first = cell - Imath::V3i(kReachBelow);
   bool isInner = true;
   for (int axis = 0; axis < 3; ++axis)
-    isInner = isInner && cell[axis] >= kReachBelow && cell[axis] + kReachAbove < size[axis];
-  constexpr std::size_t kCount = kReachBelow + kReachAbove + 1;
+    isInner = isInner && first[axis] >= 0 && cell[axis] + kReachAbove < size[axis];
   if (isInner) {
-    std::array<double, kCount> run{};
-    for (int k = cell.z - kReachBelow; k <= cell.z + kReachAbove; ++k)
-      for (int j = cell.y - kReachBelow; j <= cell.y + kReachAbove; ++j) {
-        volume.storedRun(volume.index(cell.x - kReachBelow, j, k), run);
-        for (const double stored : run) add(stored);
-      }
-    low = volume.scale()(low);
-    high = volume.scale()(high);
-    if (low > high) std::swap(low, high);
+    std::size_t at = 0;
+    for (int k = 0; k < kReachCount; ++k)
+      for (int j = 0; j < kReachCount; ++j, at += kCount)
+        volume.storedRun(volume.index(first.x, first.y + j, first.z + k), {&sample[at], kCount});
+    for (double& value : sample) value = volume.scale()(value);
   } else {
-    const ExtendedGrid sample([&](int i, int j, int k) { return volume.at(i, j, k); },
-                              {size.x, size.y, size.z}, GridExtension::Quadratic);
-    for (int k = cell.z - kReachBelow; k <= cell.z + kReachAbove; ++k)
-      for (int j = cell.y - kReachBelow; j <= cell.y + kReachAbove; ++j)
-        for (int i = cell.x - kReachBelow; i <= cell.x + kReachAbove; ++i) add(sample(i, j, k));
+    const ExtendedGrid extended([&](int i, int j, int k) { return volume.at(i, j, k); },
+                                {size.x, size.y, size.z}, GridExtension::Quadratic);
+    std::size_t at = 0;
+    for (int k = 0; k < kReachCount; ++k)
+      for (int j = 0; j < kReachCount; ++j)
+        for (int i = 0; i < kReachCount; ++i)
+          sample[at++] = extended(first.x + i, first.y + j, first.z + k);
   }
-  const double middle = (low + high) / 2, half = excess_ * (high - low) / 2;
+  const auto [low, high] = std::minmax_element(sample.begin(), sample.end());
+  const double middle = (*low + *high) / 2, half = bounds_.value * (*high - *low) / 2;
+  bool may = false;
   for (int n = 0; n < functions_; ++n)
-    if (std::abs(limit_[static_cast<std::size_t>(n)] - middle) <= half) return true;
-  return false;
-}
+    may = may || std::abs(limit_[static_cast<std::size_t>(n)] - middle) <= half;
+  if (!may) return false;
 
-void FilteredSurface::collectCell(const Imath::V3i& cell, SlabOfPieces& out) const {
-  // Values at the 3³ corners of the subcells.
-  constexpr int kSide = 3;
-  std::array<double, 27> values{};
-  const auto place = [&](int x, int y, int z) {
-    return Vec3d(cell.x + kSubcell * x, cell.y + kSubcell * y, cell.z + kSubcell * z);
-  };
-  const auto at = [&](int x, int y, int z) -> double& {
-    return values[static_cast<std::size_t>((x * kSide + y) * kSide + z)];
-  };
-  for (int x = 0; x < kSide; ++x)
-    for (int y = 0; y < kSide; ++y)
-      for (int z = 0; z < kSide; ++z) at(x, y, z) = valueAt(place(x, y, z));
-  bool any = false;
-  for (int n = 0; n < functions_; ++n)
-    for (int octant = 0; octant < 8; ++octant) {
-      const int x = octant >> 2, y = octant >> 1 & 1, z = octant & 1;
-      const auto corner = [&](int c) {
-        return std::array{x + (c >> 2), y + (c >> 1 & 1), z + (c & 1)};
-      };
-      const auto isInsideAt = [&](int c) {
-        const auto p = corner(c);
-        return functionAt(n, at(p[0], p[1], p[2])) > 0;
-      };
-      // An edge of the subcell whose ends lie on different sides.
-      for (int edge = 0; edge < 24; ++edge) {
-        const int from = edge & 7, to = from ^ (1 << (edge >> 3));
-        if (!isInsideAt(from) || isInsideAt(to)) continue;
-        const auto a = corner(from), b = corner(to);
-        if (const auto piece =
-                pieceIn(place(x, y, z), n, place(a[0], a[1], a[2]), place(b[0], b[1], b[2]))) {
-          out.pieces.push_back(*piece);
-          any = true;
-        }
-        break;
-      }
+  double largest = 0;
+  constexpr std::array<std::size_t, 3> kStride = {1, kCount, kCount * kCount};
+  for (std::size_t at = 0; at < sample.size(); ++at)
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::size_t step = kStride[axis], place = at / step % kCount;
+      if (place + 2 < kCount)
+        largest =
+            std::max(largest, std::abs(sample[at] - 2 * sample[at + step] + sample[at + 2 * step]));
+      const std::size_t other = kStride[(axis + 1) % 3];
+      if (bounds_.usesMixed && place + 1 < kCount && at / other % kCount + 1 < kCount)
+        largest = std::max(largest, std::abs(sample[at] - sample[at + step] - sample[at + other] +
+                                             sample[at + step + other]));
     }
-  out.cells += any;
+  curvature = bounds_.curvature * largest / unit_;
+  return true;
 }
 
-std::optional<FilteredSurface::Piece> FilteredSurface::pieceIn(const Vec3d& first, int function,
-                                                               const Vec3d& inside,
-                                                               const Vec3d& outside) const {
+void FilteredSurface::collectCell(const Imath::V3i& cell, double curvature,
+                                  SlabOfPieces& out) const {
+  Box box{.first = Vec3d(cell.x, cell.y, cell.z)};
+  for (std::size_t c = 0; c < 8; ++c) box.value[c] = valueAt(box.corner(c));
+  const std::size_t before = out.pieces.size();
+  for (int n = 0; n < functions_; ++n) collectBox(box, n, curvature, out);
+  out.cells += out.pieces.size() > before;
+}
+
+void FilteredSurface::collectBox(const Box& box, int function, double curvature,
+                                 SlabOfPieces& out) const {
+  std::array<double, 8> f{};
+  unsigned inside = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t c = 0; c < 8; ++c) {
+    f[c] = functionAt(function, box.value[c]);
+    inside |= f[c] > 0 ? 1u << c : 0;
+    least = std::min(least, std::abs(f[c]));
+  }
+  bool split = false;
+  if (inside == 0 || inside == 255) {
+    // The function differs from the trilinear interpolant of the corners by this at most.
+    const double most = 3 * curvature * box.edge * box.edge / 8;
+    if (least > most || box.edge < 2 * kSmallestSearched) return;
+    split = true;
+  } else if (box.edge > kLargestBox) {
+    split = true;
+  } else {
+    // An edge of the box whose ends lie on different sides.
+    for (std::size_t edge = 0; edge < 24; ++edge) {
+      const std::size_t from = edge & 7, to = from ^ (std::size_t{1} << (edge >> 3));
+      if (!(f[from] > 0) || f[to] > 0) continue;
+      double slope = 0;
+      const Piece piece = pieceIn(box, function, box.corner(from), box.corner(to), slope);
+      split = box.edge > 1.5 * kSmallestBent && box.edge * curvature > kMostChange * slope;
+      if (!split) out.pieces.push_back(piece);
+      break;
+    }
+  }
+  if (!split) return;
+  std::array<double, 27> values{};
+  for (std::size_t n = 0; n < 27; ++n) {
+    const std::size_t x = n / 9, y = n / 3 % 3, z = n % 3;
+    values[n] = x % 2 == 0 && y % 2 == 0 && z % 2 == 0
+                    ? box.value[2 * x + y + z / 2]
+                    : valueAt(box.first + box.edge / 2 *
+                                              Vec3d(static_cast<double>(x), static_cast<double>(y),
+                                                    static_cast<double>(z)));
+  }
+  for (std::size_t octant = 0; octant < 8; ++octant) {
+    const std::size_t x = octant >> 2, y = octant >> 1 & 1, z = octant & 1;
+    Box part{.first = box.first + box.edge / 2 * Box::offset(octant), .edge = box.edge / 2};
+    for (std::size_t c = 0; c < 8; ++c)
+      part.value[c] = values[(x + (c >> 2)) * 9 + (y + (c >> 1 & 1)) * 3 + z + (c & 1)];
+    collectBox(part, function, curvature, out);
+  }
+}
+
+FilteredSurface::Piece FilteredSurface::pieceIn(const Box& box, int function, const Vec3d& inside,
+                                                const Vec3d& outside, double& slopeHere) const {
   // Bisection keeps a crossing between the two ends.
   Vec3d in = inside, out = outside;
   constexpr int kBisections = 12;
@@ -447,6 +494,8 @@ std::optional<FilteredSurface::Piece> FilteredSurface::pieceIn(const Vec3d& firs
   const VolumeDerivatives d = volume_.derivatives({start[0], start[1], start[2]});
   Piece piece;
   piece.function = function;
+  piece.edge = static_cast<float>(box.edge);
+  slopeHere = d.gradient.length() / unit_;
   // Gradient in the frame of the search, and the size of the second derivatives there.
   const Vec3d gradient = frame_.toIndex * Vec3d(d.gradient.x, d.gradient.y, d.gradient.z);
   Mat3d hessian;
@@ -458,15 +507,15 @@ std::optional<FilteredSurface::Piece> FilteredSurface::pieceIn(const Vec3d& firs
     for (int c = 0; c < 3; ++c) size += hessian(r, c) * hessian(r, c);
   const double slope = gradient.length();
   double furthest = 0;
-  for (int c = 0; c < 8; ++c) {
-    const Vec3d corner = first + kSubcell * Vec3d(c >> 2, c >> 1 & 1, c & 1) - start;
+  for (std::size_t c = 0; c < 8; ++c) {
+    const Vec3d corner = box.corner(c) - start;
     furthest = std::max(furthest, std::sqrt(corner.dot(metric_ * corner)));
   }
   // Twice the second-order term. It is an estimate, not a bound: third derivatives are left out.
   const double bend = slope > 0 ? std::sqrt(size) / slope * furthest * furthest : furthest;
   for (int axis = 0; axis < 3; ++axis) {
     const auto n = static_cast<std::size_t>(axis);
-    piece.first[n] = static_cast<float>(first[axis]);
+    piece.first[n] = static_cast<float>(box.first[axis]);
     piece.start[n] = static_cast<float>(start[axis]);
     piece.normal[n] = slope > 0 ? static_cast<float>(gradient[axis] / slope) : 0;
   }
@@ -483,13 +532,13 @@ void FilteredSurface::collectFaces() {
   for (int axis = 0; axis < 3; ++axis) {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     const int countU = 2 * (size[u] - 1), countV = 2 * (size[v] - 1);
-    const double area = row(u).cross(row(v)).length() * kSubcell * kSubcell;
+    const double area = row(u).cross(row(v)).length() * kFaceEdge * kFaceEdge;
     for (const double side : {0.0, last_[axis]}) {
       const auto place = [&](int a, int b) {
         Vec3d index;
         index[axis] = side;
-        index[u] = kSubcell * a;
-        index[v] = kSubcell * b;
+        index[u] = kFaceEdge * a;
+        index[v] = kFaceEdge * b;
         return index;
       };
       std::vector<double> depth(static_cast<std::size_t>((countU + 1) * (countV + 1)));
@@ -534,9 +583,9 @@ void FilteredSurface::bound(std::size_t item, Vec3d& low, Vec3d& high) const {
   const Piece& piece = pieces_[item];
   low = Vec3d(std::numeric_limits<double>::max());
   high = -low;
-  for (int c = 0; c < 8; ++c) {
+  for (std::size_t c = 0; c < 8; ++c) {
     const Vec3d p = frame_.place(Vec3d(piece.first[0], piece.first[1], piece.first[2]) +
-                                 kSubcell * Vec3d(c >> 2, c >> 1 & 1, c & 1));
+                                 static_cast<double>(piece.edge) * Box::offset(c));
     low = openvdb::math::minComponent(low, p);
     high = openvdb::math::maxComponent(high, p);
   }
@@ -610,7 +659,8 @@ double FilteredSurface::distance(const Vec3d& position, double most, Hint& hint)
         bool isHere = true;
         for (int axis = 0; axis < 3; ++axis) {
           const double low = static_cast<double>(piece.first[static_cast<std::size_t>(axis)]);
-          isHere = isHere && known->index[axis] >= low && known->index[axis] <= low + kSubcell;
+          isHere = isHere && known->index[axis] >= low &&
+                   known->index[axis] <= low + static_cast<double>(piece.edge);
         }
         if (isHere) continue;
       }

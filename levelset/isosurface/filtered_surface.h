@@ -14,13 +14,25 @@
 
 namespace levelset {
 
+/// Bounds that hold for a filter with any samples.
+struct FilterBounds {
+  /// Values lie within this factor times half the range of the samples, from its middle.
+  double value = 1;
+  /// Each second derivative along an axis is at most this factor times the largest second
+  /// difference of the samples.
+  double curvature = 1;
+  bool usesMixed = false;  ///< the second differences include those along two axes
+};
+
 /// Boundary of the solid of all points whose filtered value lies in a range, inside the box of the
 /// volume. Positions are those of a SurfaceFrame.
 ///
-/// Each cell of the volume is cut into eight subcells. A subcell whose corners have values on both
-/// sides of a limit holds a piece of the surface. Distances are local minima that Newton's method
-/// finds from a point of each piece that may be nearest. A part of the surface that passes between
-/// the corners of all subcells is not found.
+/// Each cell of the volume is split into boxes. A box whose corners have values on both sides of a
+/// limit holds a piece of the surface. A bound of the second derivatives tells where the surface
+/// may pass between the corners of a box; such boxes are split, and boxes in which the surface may
+/// bend strongly too. The smallest boxes have 1/16 of a cell's edge, so that only parts of the
+/// surface that pass between points of that distance are missed. Distances are local minima that
+/// Newton's method finds from a point of each piece that may be nearest.
 class FilteredSurface {
  public:
   /// @param halfWidth  largest distance that will be asked for, voxels
@@ -48,14 +60,28 @@ class FilteredSurface {
  private:
   using Vec3d = openvdb::Vec3d;
 
-  /// Surface in a subcell.
+  /// Box of index space, with the values at its corners.
+  struct Box {
+    Vec3d first;      ///< lowest corner
+    double edge = 1;  ///< cells
+    std::array<double, 8> value{};
+
+    static Vec3d offset(std::size_t c) {
+      return {static_cast<double>(c >> 2), static_cast<double>(c >> 1 & 1),
+              static_cast<double>(c & 1)};
+    }
+    [[nodiscard]] Vec3d corner(std::size_t c) const { return first + edge * offset(c); }
+  };
+
+  /// Surface in a box.
   struct Piece {
-    std::array<float, 3> first;   ///< lowest corner of the subcell, index coordinates
+    std::array<float, 3> first;   ///< lowest corner of the box, index coordinates
     std::array<float, 3> start;   ///< point of the surface, index coordinates
     std::array<float, 3> normal;  ///< unit normal there
-    float radius = 0;             ///< distance of the furthest corner of the subcell from it
+    float radius = 0;             ///< distance of the furthest corner of the box from it
     /// Estimate, with a reserve, of the distance of the piece from its tangent plane.
     float bend = 0;
+    float edge = 1;  ///< edge of the box, cells
     int function = 0;
   };
   struct Face {
@@ -70,11 +96,15 @@ class FilteredSurface {
 
   void collectPieces(std::size_t maxMemory, const Progress& progress);
   void collectSlab(int k, SlabOfPieces& out) const;
-  void collectCell(const Imath::V3i& cell, SlabOfPieces& out) const;
+  void collectCell(const Imath::V3i& cell, double curvature, SlabOfPieces& out) const;
+  /// @param curvature  bound of the second derivatives of the functions along each axis, per cell²
+  void collectBox(const Box& box, int function, double curvature, SlabOfPieces& out) const;
   void collectFaces();
-  [[nodiscard]] bool mayHoldSurface(const Imath::V3i& cell) const;
-  [[nodiscard]] std::optional<Piece> pieceIn(const Vec3d& first, int function, const Vec3d& inside,
-                                             const Vec3d& outside) const;
+  [[nodiscard]] bool mayHoldSurface(const Imath::V3i& cell, double& curvature) const;
+  /// @param slope  becomes the length of the function's gradient at the start of the piece, per
+  /// cell
+  [[nodiscard]] Piece pieceIn(const Box& box, int function, const Vec3d& inside,
+                              const Vec3d& outside, double& slope) const;
   [[nodiscard]] double functionAt(int n, double value) const {
     return sign_[static_cast<std::size_t>(n)] * (value - limit_[static_cast<std::size_t>(n)]) /
            unit_;
@@ -94,9 +124,9 @@ class FilteredSurface {
   double voxelSize_ = 1;
   int functions_ = 0;
   std::array<double, 2> limit_{}, sign_{};
-  double unit_ = 1;    ///< range of the values of the volume
-  double excess_ = 1;  ///< largest sum of the magnitudes of the weights of the filter
-  Vec3d last_;         ///< index of the last grid point
+  double unit_ = 1;  ///< range of the values of the volume
+  FilterBounds bounds_;
+  Vec3d last_;  ///< index of the last grid point
   std::vector<Piece> pieces_;
   std::vector<Face> faces_;
   BoxTree tree_;
