@@ -19,11 +19,10 @@ using openvdb::Vec3d;
 constexpr int kReachBelow = 2, kReachAbove = 3, kReachCount = kReachBelow + kReachAbove + 1;
 // Part of a border face that is searched as one, in cells.
 constexpr double kFaceEdge = 0.5;
-// Largest edge of a box that holds a piece, and smallest edges of boxes that are split: because the
-// surface bends in them, and because the surface may pass between their corners. In cells.
-constexpr double kLargestBox = 0.5, kSmallestBent = 0.125, kSmallestSearched = 0.0625;
+// Edges of the largest boxes that hold a piece, and of the smallest boxes, in cells.
+constexpr double kLargestBox = 0.5, kSmallestBox = 0.0625;
 // A box is split when the gradient may change in it by this part of itself.
-constexpr double kMostChange = 1;
+constexpr double kMostChange = 0.5;
 constexpr double kBytesPerFilteredPiece = 68 + 2 * 40.0;
 
 FilterBounds boundsOf(VolumeFilter filter) {
@@ -125,7 +124,10 @@ struct FilteredSurface::SlabOfPieces {
 class FilteredSurface::Descent {
  public:
   Descent(const FilteredSurface& surface, int function, const Vec3d& target)
-      : s_(surface), function_(function), target_(target) {}
+      : s_(surface),
+        function_(function),
+        target_(target),
+        hasCreases_(factsOf(surface.volume_.filter()).continuity < 1) {}
 
   /// @param known  closest point of an earlier search, in which this one may end early; or null
   /// @return empty if the search does not reach the surface or ends at `known`
@@ -161,11 +163,16 @@ class FilteredSurface::Descent {
   [[nodiscard]] bool solve(const State& at, const Mat3d& a, const Vec3d& r, double f, Vec3d& d,
                            double& multiplier) const;
   [[nodiscard]] bool tangentStep(const State& at, Vec3d& step, double& multiplier) const;
+  /// Goes to the first nearer point of the surface among those of the step, halved repeatedly.
+  /// @param beyond  becomes the gradient of the last point that was tried
+  [[nodiscard]] bool advance(State& at, Vec3d step, double& best, Vec3d& beyond) const;
+  [[nodiscard]] bool creaseStep(const State& at, const Vec3d& beyond, Vec3d& step) const;
   [[nodiscard]] bool release(State& at, double multiplier) const;
 
   const FilteredSurface& s_;
   int function_;
   Vec3d target_;
+  bool hasCreases_;  ///< the gradient jumps
 };
 
 void FilteredSurface::Descent::evaluate(State& at) const {
@@ -271,6 +278,31 @@ bool FilteredSurface::Descent::release(State& at, double multiplier) const {
   return true;
 }
 
+bool FilteredSurface::Descent::advance(State& at, Vec3d step, double& best, Vec3d& beyond) const {
+  for (int half = 0; half < kMostHalvings; ++half, step *= 0.5) {
+    State next = at;
+    move(next, step);
+    if (!returnToSurface(next)) continue;
+    beyond = next.g;
+    const double found = squared(next);
+    if (!(found < best)) continue;
+    at = next;
+    best = found;
+    return true;
+  }
+  return false;
+}
+
+bool FilteredSurface::Descent::creaseStep(const State& at, const Vec3d& beyond, Vec3d& step) const {
+  if (at.fixed[0] || at.fixed[1] || at.fixed[2]) return false;
+  const Vec3d along = at.g.cross(beyond);
+  const double squaredLength = along.dot(s_.metric_ * along);
+  constexpr double kLeastJump = 1e-6;  // part of the gradient
+  if (!(along.length() > kLeastJump * at.g.length() * beyond.length())) return false;
+  step = -(along.dot(weighted(at)) / squaredLength) * along;
+  return step.dot(s_.metric_ * step) >= kConverged * kConverged;
+}
+
 std::optional<FilteredSurface::Foot> FilteredSurface::Descent::run(const Vec3d& start,
                                                                    const Foot* known) {
   State at;
@@ -288,15 +320,12 @@ std::optional<FilteredSurface::Foot> FilteredSurface::Descent::run(const Vec3d& 
     if (!tangentStep(at, step, multiplier)) break;
     bool isConverged = step.dot(s_.metric_ * step) < kConverged * kConverged;
     if (!isConverged) {
-      bool isNearer = false;
-      for (int half = 0; half < kMostHalvings && !isNearer; ++half, step *= 0.5) {
-        State next = at;
-        move(next, step);
-        if (!returnToSurface(next) || !(squared(next) < best)) continue;
-        at = next;
-        best = squared(at);
-        isNearer = true;
-      }
+      Vec3d beyond(0.0);
+      bool isNearer = advance(at, step, best, beyond);
+      // The gradient jumps between the last two points, so that the closest point lies on the
+      // crease between them. This step goes along the crease.
+      if (!isNearer && hasCreases_ && creaseStep(at, beyond, step))
+        isNearer = advance(at, step, best, beyond);
       isConverged = !isNearer;
     }
     if (isConverged && (releases++ >= kMostReleases || !release(at, multiplier))) break;
@@ -446,7 +475,7 @@ void FilteredSurface::collectBox(const Box& box, int function, double curvature,
   if (inside == 0 || inside == 255) {
     // The function differs from the trilinear interpolant of the corners by this at most.
     const double most = 3 * curvature * box.edge * box.edge / 8;
-    if (least > most || box.edge < 2 * kSmallestSearched) return;
+    if (least > most || box.edge <= kSmallestBox) return;
     split = true;
   } else if (box.edge > kLargestBox) {
     split = true;
@@ -457,7 +486,7 @@ void FilteredSurface::collectBox(const Box& box, int function, double curvature,
       if (!(f[from] > 0) || f[to] > 0) continue;
       double slope = 0;
       const Piece piece = pieceIn(box, function, box.corner(from), box.corner(to), slope);
-      split = box.edge > 1.5 * kSmallestBent && box.edge * curvature > kMostChange * slope;
+      split = box.edge > kSmallestBox && box.edge * curvature > kMostChange * slope;
       if (!split) out.pieces.push_back(piece);
       break;
     }
