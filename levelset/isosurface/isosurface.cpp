@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "levelset/error.h"
+#include "levelset/isosurface/filtered_surface.h"
 #include "levelset/isosurface/trilinear_surface.h"
 #include "levelset/memory_limit.h"
 #include "levelset/vdb.h"
@@ -39,6 +40,8 @@ void checkIsosurface(const Volume& volume, const ValueRange& range,
   if (options.voxelSize < 0 || !std::isfinite(options.voxelSize))
     throw UsageError(
         fmt::format("the voxel size is {}; give a positive length", options.voxelSize));
+  if (options.filter == VolumeFilter::Box)
+    throw UsageError("the filter box is not continuous, so it has no surface; choose another");
   const Imath::V3i size = volume.size();
   if (std::min({size.x, size.y, size.z}) < 2)
     throw InvalidInput(fmt::format(
@@ -58,7 +61,8 @@ void checkIsosurface(const Volume& volume, const ValueRange& range,
 
 /// Origins of the blocks of 8³ grid points that the band may reach, in ascending order, relative to
 /// the base of the surface.
-std::vector<openvdb::Coord> findBlocks(const TrilinearSurface& surface, double reach,
+template <class Surface>
+std::vector<openvdb::Coord> findBlocks(const Surface& surface, double reach,
                                        std::size_t maxMemory) {
   openvdb::MaskTree blocks;
   openvdb::tree::ValueAccessor<openvdb::MaskTree> accessor(blocks);
@@ -90,11 +94,12 @@ std::vector<openvdb::Coord> findBlocks(const TrilinearSurface& surface, double r
 }
 
 /// Measures the distances of the grid points of a block. @return null: the band does not reach it
-std::unique_ptr<BandLeaf> measureBlock(const TrilinearSurface& surface, const openvdb::Coord& block,
+template <class Surface>
+std::unique_ptr<BandLeaf> measureBlock(const Surface& surface, const openvdb::Coord& block,
                                        double halfWidth, double voxelSize, float background) {
   auto leaf = std::make_unique<BandLeaf>(block + surface.base(), background, false);
   float* values = leaf->buffer().data();
-  TrilinearSurface::Hint hint;
+  typename Surface::Hint hint;
   for (openvdb::Index n = 0; n < BandLeaf::SIZE; ++n) {
     // Successive grid points are neighbours, so that the closest piece of one is a good guess for
     // the next.
@@ -117,11 +122,10 @@ std::unique_ptr<BandLeaf> measureBlock(const TrilinearSurface& surface, const op
   return leaf;
 }
 
-}  // namespace
-
-IsosurfaceResult isosurface(const Volume& volume, const ValueRange& range,
-                            const IsosurfaceOptions& options) {
-  checkIsosurface(volume, range, options);
+/// Builds the band of a surface. `makeSurface` finds the surface.
+template <class MakeSurface>
+IsosurfaceResult bandOf(const Volume& volume, const IsosurfaceOptions& options,
+                        const MakeSurface& makeSurface) {
   const Imath::V3d spacing = volume.grid().spacing();
   const double voxelSize =
       options.voxelSize > 0 ? options.voxelSize : std::min({spacing.x, spacing.y, spacing.z});
@@ -129,8 +133,7 @@ IsosurfaceResult isosurface(const Volume& volume, const ValueRange& range,
   const auto grid = emptyLevelSet(uniformTransform(voxelSize), options.halfWidth);
   report(options.progress, 0);
 
-  const TrilinearSurface surface(volume, range, voxelSize, options.halfWidth, limit,
-                                 subProgress(options.progress, 0, 0.2));
+  const auto surface = makeSurface(voxelSize, limit, subProgress(options.progress, 0, 0.2));
   IsosurfaceResult result;
   result.report = surface.report();
   if (options.border == VolumeBorder::Refuse && result.report.closedArea > 0)
@@ -168,6 +171,22 @@ IsosurfaceResult isosurface(const Volume& volume, const ValueRange& range,
   openvdb::tools::signedFloodFill(grid->tree());
   result.band = makeBand(grid);
   return result;
+}
+
+}  // namespace
+
+IsosurfaceResult isosurface(const Volume& volume, const ValueRange& range,
+                            const IsosurfaceOptions& options) {
+  checkIsosurface(volume, range, options);
+  const auto make = [&]<class Surface>(auto&&... filter) {
+    return bandOf(
+        volume, options, [&](double voxelSize, std::size_t limit, const Progress& progress) {
+          return Surface(volume, filter..., range, voxelSize, options.halfWidth, limit, progress);
+        });
+  };
+  if (options.filter == VolumeFilter::Trilinear)
+    return make.template operator()<TrilinearSurface>();
+  return make.template operator()<FilteredSurface>(options.filter);
 }
 
 }  // namespace levelset

@@ -1,12 +1,12 @@
 #include "levelset/isosurface/trilinear_surface.h"
 
-#include <fmt/core.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "levelset/error.h"
+#include "levelset/isosurface/surface_frame.h"
 
 namespace levelset::trilinear {
 namespace {
@@ -16,13 +16,6 @@ namespace {
 constexpr float kOutside = 0x1p-24f;
 // Memory of a piece with its part of the search tree, bytes.
 constexpr double kBytesPerPiece = sizeof(Piece) + 2 * 40.0;
-
-Mat3d toMat(const Imath::M44d& m, double factor) {
-  Mat3d out;
-  for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 3; ++column) out(row, column) = m[row][column] * factor;
-  return out;
-}
 
 bool crosses(const std::array<float, 8>& corner) {
   int positive = 0;
@@ -100,22 +93,11 @@ TrilinearSurface::TrilinearSurface(const Volume& volume, const ValueRange& range
 }
 
 void TrilinearSurface::placeFrame(double halfWidth) {
-  const Imath::M44d& map = volume_.grid().indexToWorld;
-  const Imath::Box3d bounds = volume_.grid().bounds();
-  for (int axis = 0; axis < 3; ++axis) {
-    const double farthest =
-        std::max(std::abs(bounds.min[axis]), std::abs(bounds.max[axis])) / voxelSize_ + halfWidth;
-    if (!(farthest < kIndexLimit))
-      throw ResourceLimit(
-          fmt::format("at voxel size {} the grid index {:.3g} of the volume exceeds 32 bits; use a "
-                      "larger --voxel",
-                      voxelSize_, farthest));
-    // A multiple of 8, so that blocks relative to the base are blocks of the grid.
-    base_[axis] = 8 * static_cast<int>(std::floor(bounds.center()[axis] / voxelSize_ / 8));
-  }
-  axes_ = toMat(map, 1 / voxelSize_);
-  toIndex_ = axes_.inverse(0.0);
-  for (int axis = 0; axis < 3; ++axis) origin_[axis] = map[3][axis] / voxelSize_ - base_[axis];
+  const SurfaceFrame frame(volume_.grid(), voxelSize_, halfWidth);
+  base_ = frame.base;
+  origin_ = frame.origin;
+  axes_ = frame.axes;
+  toIndex_ = frame.toIndex;
   const Mat3d metric = axes_ * axes_.transpose();
   for (int level = 0; level < kMostLevels; ++level) {
     const double edge = 1.0 / (1 << level);

@@ -7,14 +7,14 @@
 #include "levelset/splines/bcc_quadratic_spline.h"
 #include "levelset/splines/cubic_c1_spline.h"
 #include "levelset/splines/quadratic_super_spline.h"
-#include "levelset/volumes/filters/axis_weights.h"
+#include "levelset/volumes/filters/filter_weights.h"
 
 namespace levelset {
 namespace {
 
 using Imath::V3d;
 
-constexpr std::size_t kMost = AxisWeights::kMost;
+constexpr std::size_t kMost = FilterWeights::kMost;
 
 /// Sums the samples with the weights of three axes, derivatives up to an order. The sums run along
 /// x, then y, then z.
@@ -22,9 +22,9 @@ template <int Order>
 VolumeDerivatives tensorProduct(const Volume& volume, VolumeFilter filter, const V3d& index,
                                 GridExtension border) {
   const Imath::V3i size = volume.size();
-  const AxisWeights x = axisWeights(filter, index.x, size.x, border),
-                    y = axisWeights(filter, index.y, size.y, border),
-                    z = axisWeights(filter, index.z, size.z, border);
+  const FilterWeights x = filterWeights(filter, index.x, size.x, border),
+                      y = filterWeights(filter, index.y, size.y, border),
+                      z = filterWeights(filter, index.z, size.z, border);
   // Sums by the orders of the derivatives along x, y and z.
   double sums[3][3][3] = {};
   std::array<double, kMost> run{};

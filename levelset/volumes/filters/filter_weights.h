@@ -12,7 +12,7 @@ namespace levelset {
 /// Weights of the samples along one axis, of a filter that is a product of functions of one
 /// coordinate. All samples lie in the grid: the weights of samples beyond the border are given to
 /// those that extend them.
-struct AxisWeights {
+struct FilterWeights {
   static constexpr int kMost = 6;
   int first = 0;  ///< index of the first sample
   int count = 1;  ///< number of samples
@@ -27,7 +27,7 @@ struct AxisWeights {
 /// the cell above, and at the end of the axis that of the last cell.
 /// @param position  0 ≤ position ≤ size − 1
 /// @pre isTensorProduct(filter)
-[[nodiscard]] AxisWeights axisWeights(VolumeFilter filter, double position, int size,
-                                      GridExtension border);
+[[nodiscard]] FilterWeights filterWeights(VolumeFilter filter, double position, int size,
+                                          GridExtension border);
 
 }  // namespace levelset

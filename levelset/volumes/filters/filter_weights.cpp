@@ -1,4 +1,4 @@
-#include "levelset/volumes/filters/axis_weights.h"
+#include "levelset/volumes/filters/filter_weights.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@ namespace {
 struct Taps {
   int count = 0;
   int before = 0;  ///< number of samples below the cell
-  std::array<std::array<double, AxisWeights::kMost>, 3> weight{};
+  std::array<std::array<double, FilterWeights::kMost>, 3> weight{};
 };
 
 Taps linearTaps(double a) {
@@ -122,8 +122,8 @@ bool isTensorProduct(VolumeFilter filter) {
   return filter <= VolumeFilter::WindowedSinc;
 }
 
-AxisWeights axisWeights(VolumeFilter filter, double position, int size, GridExtension border) {
-  AxisWeights result;
+FilterWeights filterWeights(VolumeFilter filter, double position, int size, GridExtension border) {
+  FilterWeights result;
   if (filter == VolumeFilter::Box || size == 1) {
     result.first = std::min(static_cast<int>(position + 0.5), size - 1);
     result.weight[0][0] = 1;

@@ -1,0 +1,198 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <random>
+#include <string>
+
+#include "levelset/error.h"
+#include "levelset/inspect/check.h"
+#include "levelset/inspect/measure.h"
+#include "levelset/isosurface/isosurface.h"
+#include "levelset/vdb.h"
+#include "levelset/volumes/filters/filtered_volume.h"
+#include "levelset/volumes/synthetic.h"
+#include "tests/support/files.h"
+#include "tests/support/measured.h"
+#include "tests/support/threads.h"
+
+namespace filtered_isosurface_test {
+
+using Imath::V3d;
+using Imath::V3i;
+using levelset::factsOf;
+using levelset::FilteredVolume;
+using levelset::isosurface;
+using levelset::IsosurfaceResult;
+using levelset::UsageError;
+using levelset::Volume;
+using levelset::VolumeFilter;
+using levelset::VolumeGrid;
+using support::measured;
+using support::measuredOrder;
+using support::refusal;
+
+constexpr std::array kSmooth = {VolumeFilter::Tricubic,       VolumeFilter::BSpline,
+                                VolumeFilter::BSplineQi,      VolumeFilter::WindowedSinc,
+                                VolumeFilter::SuperQuadratic, VolumeFilter::CubicC1,
+                                VolumeFilter::BccQuadratic};
+
+Volume sampled(const VolumeGrid& grid, const std::function<double(const V3d&)>& function) {
+  std::vector<float> values;
+  for (int k = 0; k < grid.size.z; ++k)
+    for (int j = 0; j < grid.size.y; ++j)
+      for (int i = 0; i < grid.size.x; ++i)
+        values.push_back(static_cast<float>(function(V3d(i, j, k) * grid.indexToWorld)));
+  return {grid, std::move(values)};
+}
+
+/// Grid of n cells along each side of the cube [−1.3, 1.3]³.
+VolumeGrid cubeGrid(int n) {
+  VolumeGrid grid;
+  grid.size = V3i(n + 1);
+  for (int axis = 0; axis < 3; ++axis) {
+    grid.indexToWorld[axis][axis] = 2.6 / n;
+    grid.indexToWorld[3][axis] = -1.3;
+  }
+  return grid;
+}
+
+struct BandError {
+  double largest = 0;          ///< world units
+  std::size_t wrongSigns = 0;  ///< grid points further than the error from the surface
+};
+
+BandError errorOf(const levelset::NarrowBand& band, const std::function<double(const V3d&)>& phi) {
+  BandError error;
+  const auto& grid = levelset::vdb(band);
+  for (auto it = grid.cbeginValueOn(); it; ++it) {
+    const double exact = phi(levelset::toImath(grid.transform().indexToWorld(it.getCoord())));
+    const double off = std::abs(static_cast<double>(*it) - exact);
+    error.largest = std::max(error.largest, off);
+    error.wrongSigns += std::abs(exact) > off && (*it < 0) != (exact < 0);
+  }
+  return error;
+}
+
+double sphere(const V3d& p) {
+  return p.length() - 0.8;
+}
+
+double torus(const V3d& p) {
+  return std::hypot(std::hypot(p.x, p.y) - 0.75, p.z) - 0.35;
+}
+
+TEST(FilteredIsosurface, ConvergesToASphereAndATorus) {
+  for (const VolumeFilter filter : kSmooth)
+    for (const bool isTorus : {false, true}) {
+      SCOPED_TRACE(factsOf(filter).name);
+      const auto phi = isTorus ? torus : sphere;
+      // Values that are not distances, with an equal gradient at the surface.
+      const auto data = [&](const V3d& p) { return std::tanh(-phi(p)); };
+      std::array<double, 3> errors{};
+      for (std::size_t n = 0; n < 3; ++n) {
+        const Volume volume = sampled(cubeGrid(12 << n), data);
+        const IsosurfaceResult made = isosurface(volume, {.low = 0.0}, {.filter = filter});
+        EXPECT_EQ(made.report.closedArea, 0);
+        const BandError error = errorOf(made.band, phi);
+        EXPECT_EQ(error.wrongSigns, 0u);
+        errors[n] = error.largest;
+      }
+      std::printf("%s %d: %.3g %.3g %.3g: %.2f %.2f\n", std::string(factsOf(filter).name).c_str(),
+                  isTorus, errors[0], errors[1], errors[2], std::log2(errors[0] / errors[1]),
+                  std::log2(errors[1] / errors[2]));
+    }
+}
+
+/// Distances of the band against those to dense points of the surface, which are never nearer.
+struct Excess {
+  double further = 0, nearer = 0;  ///< voxels
+  std::size_t wrongSides = 0, count = 0;
+};
+
+Excess againstDensePoints(const Volume& volume, VolumeFilter filter, double isovalue, int fine) {
+  const FilteredVolume f(volume, filter);
+  const IsosurfaceResult made =
+      isosurface(volume, {.low = isovalue}, {.filter = filter, .halfWidth = 2});
+  const V3i size = volume.size();
+  std::vector<V3d> points;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int b = (axis + 1) % 3, c = (axis + 2) % 3;
+    for (int u = 0; u <= (size[b] - 1) * fine; ++u)
+      for (int v = 0; v <= (size[c] - 1) * fine; ++v) {
+        V3d last;
+        double lastValue = 0;
+        const int steps = 8 * (size[axis] - 1);
+        for (int n = 0; n <= steps; ++n) {
+          V3d at;
+          at[axis] = n / 8.0;
+          at[b] = static_cast<double>(u) / fine;
+          at[c] = static_cast<double>(v) / fine;
+          const double value = f.value(at) - isovalue;
+          if ((n == 0 || n == steps) && value > 0)
+            points.push_back(at * volume.grid().indexToWorld);
+          if (n > 0 && (value > 0) != (lastValue > 0)) {
+            V3d low = last, high = at;
+            for (int bisection = 0; bisection < 30; ++bisection) {
+              const V3d middle = (low + high) / 2;
+              ((f.value(middle) > isovalue) == (lastValue > 0) ? low : high) = middle;
+            }
+            points.push_back(low * volume.grid().indexToWorld);
+          }
+          last = at;
+          lastValue = value;
+        }
+      }
+  }
+  Excess found;
+  const auto& tree = levelset::vdb(made.band);
+  const Imath::M44d toIndex = volume.grid().indexToWorld.inverse();
+  for (auto it = tree.cbeginValueOn(); it; ++it) {
+    const V3d at = levelset::toImath(tree.transform().indexToWorld(it.getCoord()));
+    double least = HUGE_VAL;
+    for (const V3d& point : points) least = std::min(least, (point - at).length2());
+    least = std::sqrt(least) / made.band.voxelSize();
+    const double distance = std::abs(static_cast<double>(*it)) / made.band.voxelSize();
+    found.further = std::max(found.further, distance - least);
+    found.nearer = std::max(found.nearer, least - distance);
+    const V3d index = at * toIndex;
+    bool isInside = f.value(index) > isovalue;
+    for (int axis = 0; axis < 3; ++axis)
+      isInside = isInside && index[axis] >= 0 && index[axis] <= size[axis] - 1;
+    found.wrongSides += distance > 1e-6 && isInside != (*it < 0);
+    ++found.count;
+  }
+  return found;
+}
+
+TEST(FilteredIsosurface, FindsTheClosestPointsOfNoisyData) {
+  for (unsigned seed = 1; seed < 13; ++seed) {
+  VolumeGrid grid = cubeGrid(5);
+  if (seed % 2) { grid.indexToWorld[0][0] *= 0.6; grid.indexToWorld[1][0] += 0.2; grid.indexToWorld[2][1] += 0.1; }
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const Volume volume = sampled(grid, [&](const V3d&) { return uniform(random); });
+  for (const VolumeFilter filter : kSmooth) {
+    SCOPED_TRACE(factsOf(filter).name);
+    const Excess found = againstDensePoints(volume, filter, 0.0, 12);
+    std::printf("%s: further %.3g nearer %.3g wrong %zu of %zu\n",
+                std::string(factsOf(filter).name).c_str(), found.further, found.nearer,
+                found.wrongSides, found.count);
+  }}
+}
+
+TEST(FilteredIsosurface, Timing) {
+  const Volume volume = levelset::sphereVolume(64, 0.6);
+  for (const VolumeFilter filter : levelset::kVolumeFilters) {
+    if (filter == VolumeFilter::Box) continue;
+    const auto t = clock();
+    const auto made = isosurface(volume, {.low = 0.0}, {.filter = filter});
+    std::printf("%s %.2f s %lu voxels %lu pieces\n", std::string(factsOf(filter).name).c_str(),
+                double(clock() - t) / CLOCKS_PER_SEC,
+                (unsigned long)levelset::vdb(made.band).activeVoxelCount(),
+                (unsigned long)made.report.pieces);
+  }
+}
+
+}  // namespace filtered_isosurface_test
