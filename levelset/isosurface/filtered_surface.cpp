@@ -310,6 +310,7 @@ std::optional<FilteredSurface::Foot> FilteredSurface::Descent::run(const Vec3d& 
   if (!returnToSurface(at)) return {};
   double best = squared(at);
   int releases = 0;
+  bool isMinimum = false;
   for (int n = 0; n < kMostSteps; ++n) {
     if (known) {
       const Vec3d way = at.x - known->index;
@@ -319,6 +320,7 @@ std::optional<FilteredSurface::Foot> FilteredSurface::Descent::run(const Vec3d& 
     double multiplier = 0;
     if (!tangentStep(at, step, multiplier)) break;
     bool isConverged = step.dot(s_.metric_ * step) < kConverged * kConverged;
+    isMinimum = isConverged && !(at.fixed[0] || at.fixed[1] || at.fixed[2]);
     if (!isConverged) {
       Vec3d beyond(0.0);
       bool isNearer = advance(at, step, best, beyond);
@@ -330,7 +332,7 @@ std::optional<FilteredSurface::Foot> FilteredSurface::Descent::run(const Vec3d& 
     }
     if (isConverged && (releases++ >= kMostReleases || !release(at, multiplier))) break;
   }
-  return Foot{at.x, best};
+  return Foot{at.x, best, isMinimum};
 }
 
 FilteredSurface::FilteredSurface(const Volume& volume, VolumeFilter filter, const ValueRange& range,
@@ -683,7 +685,8 @@ double FilteredSurface::distance(const Vec3d& position, double most, Hint& hint)
       const Piece& piece = pieces_[tree_.order()[n]];
       if (squaredBound(piece, position) >= best) continue;
       const bool bendsLittle = piece.bend < kLittleBend * piece.radius;
-      const Foot* known = foot && bendsLittle && function == piece.function ? &*foot : nullptr;
+      const Foot* known =
+          foot && foot->isMinimum && bendsLittle && function == piece.function ? &*foot : nullptr;
       if (known) {
         bool isHere = true;
         for (int axis = 0; axis < 3; ++axis) {

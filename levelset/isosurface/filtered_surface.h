@@ -89,7 +89,8 @@ class FilteredSurface {
   };
   struct Foot {
     Vec3d index;
-    double squared = 0;
+    double squared = 0;      ///< squared distance, voxels²
+    bool isMinimum = false;  ///< the search converged here, and not on the border
   };
   struct SlabOfPieces;
   class Descent;
