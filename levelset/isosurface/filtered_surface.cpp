@@ -168,6 +168,8 @@ class FilteredSurface::Descent {
   [[nodiscard]] bool advance(State& at, Vec3d step, double& best, Vec3d& beyond) const;
   [[nodiscard]] bool creaseStep(const State& at, const Vec3d& beyond, Vec3d& step) const;
   [[nodiscard]] bool release(State& at, double multiplier) const;
+  /// Fixes coordinates on the border of which the step leads outside. @return true if there are any
+  [[nodiscard]] bool fixOutward(State& at, const Vec3d& step) const;
 
   const FilteredSurface& s_;
   int function_;
@@ -278,6 +280,18 @@ bool FilteredSurface::Descent::release(State& at, double multiplier) const {
   return true;
 }
 
+bool FilteredSurface::Descent::fixOutward(State& at, const Vec3d& step) const {
+  bool isAny = false;
+  for (int axis = 0; axis < 3; ++axis) {
+    bool& fixed = at.fixed[static_cast<std::size_t>(axis)];
+    const bool leaves =
+        (at.x[axis] <= 0 && step[axis] < 0) || (at.x[axis] >= s_.last_[axis] && step[axis] > 0);
+    if (fixed || !leaves) continue;
+    fixed = isAny = true;
+  }
+  return isAny;
+}
+
 bool FilteredSurface::Descent::advance(State& at, Vec3d step, double& best, Vec3d& beyond) const {
   for (int half = 0; half < kMostHalvings; ++half, step *= 0.5) {
     State next = at;
@@ -319,6 +333,8 @@ std::optional<FilteredSurface::Foot> FilteredSurface::Descent::run(const Vec3d& 
     Vec3d step;
     double multiplier = 0;
     if (!tangentStep(at, step, multiplier)) break;
+    // A step that begins on the border and leads outside has no length.
+    if (fixOutward(at, step)) continue;
     bool isConverged = step.dot(s_.metric_ * step) < kConverged * kConverged;
     isMinimum = isConverged && !(at.fixed[0] || at.fixed[1] || at.fixed[2]);
     if (!isConverged) {

@@ -108,8 +108,10 @@ levelset::ValueRange valueRangeOf(const Invocation& in) {
 
 Value makeIsosurface(Invocation& in) {
   const Volume volume = volumeIn(in);
-  levelset::IsosurfaceOptions options{
-      .halfWidth = in.number("half-width"), .maxMemory = in.maxMemory, .progress = in.progress};
+  levelset::IsosurfaceOptions options{.filter = *levelset::volumeFilterNamed(in.text("filter")),
+                                      .halfWidth = in.number("half-width"),
+                                      .maxMemory = in.maxMemory,
+                                      .progress = in.progress};
   if (in.given("voxel")) options.voxelSize = in.length("voxel");
   if (in.text("border") == "refuse") options.border = levelset::VolumeBorder::Refuse;
   levelset::IsosurfaceResult made = levelset::isosurface(volume, valueRangeOf(in), options);
@@ -152,12 +154,21 @@ void validateIsosurface(const Invocation& in) {
                     in.text("low"), in.text("high")));
 }
 
+/// Names of all continuous filters.
+std::vector<std::string> filterNames() {
+  std::vector<std::string> names;
+  for (const levelset::VolumeFilter filter : levelset::kVolumeFilters)
+    if (levelset::factsOf(filter).continuity >= 0)
+      names.emplace_back(levelset::factsOf(filter).name);
+  return names;
+}
+
 std::vector<Param> solidParams() {
   return {{.name = "filter",
            .type = ParamType::Choice,
-           .doc = "function between the grid points",
+           .doc = "function between the grid points, on whose surface the distances are measured",
            .fallback = "trilinear",
-           .choices = {"trilinear"}},
+           .choices = filterNames()},
           {.name = "border",
            .type = ParamType::Choice,
            .doc = "treatment of a solid that reaches the border of the volume: close it with the "
