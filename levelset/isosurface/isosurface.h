@@ -6,14 +6,10 @@
 
 #include "levelset/narrow_band.h"
 #include "levelset/progress.h"
+#include "levelset/volumes/filters/volume_filter.h"
 #include "levelset/volumes/volume.h"
 
 namespace levelset {
-
-/// Reconstruction filter: the function between the grid points of a volume.
-enum class VolumeFilter {
-  Trilinear  ///< trilinear interpolation in each cell of eight grid points
-};
 
 /// Values of a volume that belong to a solid: those above `low` and below `high`. A value that
 /// equals a limit does not belong to it.

@@ -17,6 +17,30 @@ enum class GridExtension {
   Quadratic  ///< parabola through three data. Errors there: values and gradients O(h²)
 };
 
+/// Data along one axis that stand for a datum: whole weights that sum to one.
+struct ExtensionWeights {
+  int count = 1;
+  std::array<int, 3> index{};
+  std::array<long long, 3> weight{1, 0, 0};
+};
+
+/// Returns the data that stand for the datum n of an axis with `size` data.
+constexpr ExtensionWeights extensionWeights(int n, int size, GridExtension rule) {
+  const int last = size - 1;
+  if (n >= 0 && n <= last) return {1, {n, 0, 0}, {1, 0, 0}};
+  const int border = n < 0 ? 0 : last, inward = n < 0 ? 1 : -1;
+  const long long d = n < 0 ? -static_cast<long long>(n) : n - last;
+  const int points = std::min(rule == GridExtension::Clamp    ? 1
+                              : rule == GridExtension::Linear ? 2
+                                                              : 3,
+                              size);
+  if (points == 1) return {1, {border, 0, 0}, {1, 0, 0}};
+  if (points == 2) return {2, {border, border + inward, 0}, {1 + d, -d, 0}};
+  return {3,
+          {border, border + inward, border + 2 * inward},
+          {(d + 1) * (d + 2) / 2, -d * (d + 2), d * (d + 1) / 2}};
+}
+
 /// Data of a box of a grid, extended to all whole numbers. An axis with fewer data than the rule
 /// needs uses the rule of its number of data.
 template <GridSample Sample>
@@ -34,7 +58,9 @@ class ExtendedGrid {
 
   Scalar operator()(int i, int j, int k) const {
     if (isInside(i, 0) && isInside(j, 1) && isInside(k, 2)) return sample_(i, j, k);
-    const Axis x = along(i, 0), y = along(j, 1), z = along(k, 2);
+    const ExtensionWeights x = extensionWeights(i, size_[0], rule_),
+                           y = extensionWeights(j, size_[1], rule_),
+                           z = extensionWeights(k, size_[2], rule_);
     Scalar sum(0);
     for (int c = 0; c < z.count; ++c)
       for (int b = 0; b < y.count; ++b)
@@ -45,30 +71,7 @@ class ExtendedGrid {
   }
 
  private:
-  /// Data along one axis, with whole weights that sum to one.
-  struct Axis {
-    int count = 1;
-    std::array<int, 3> index{};
-    std::array<long long, 3> weight{1, 0, 0};
-  };
-
   [[nodiscard]] bool isInside(int n, int axis) const { return n >= 0 && n < size_[axis]; }
-
-  [[nodiscard]] Axis along(int n, int axis) const {
-    const int last = size_[axis] - 1;
-    if (isInside(n, axis)) return {1, {n, 0, 0}, {1, 0, 0}};
-    const int border = n < 0 ? 0 : last, inward = n < 0 ? 1 : -1;
-    const long long d = n < 0 ? -static_cast<long long>(n) : n - last;
-    const int points = std::min(rule_ == GridExtension::Clamp    ? 1
-                                : rule_ == GridExtension::Linear ? 2
-                                                                 : 3,
-                                size_[axis]);
-    if (points == 1) return {1, {border, 0, 0}, {1, 0, 0}};
-    if (points == 2) return {2, {border, border + inward, 0}, {1 + d, -d, 0}};
-    return {3,
-            {border, border + inward, border + 2 * inward},
-            {(d + 1) * (d + 2) / 2, -d * (d + 2), d * (d + 1) / 2}};
-  }
 
   Sample sample_;
   std::array<int, 3> size_;

@@ -189,6 +189,15 @@ void Volume::storedRow(int j, int k, std::span<float> out) const {
   });
 }
 
+void Volume::storedRun(std::size_t first, std::span<double> out) const {
+  withStoredType(type_, [&](auto number) {
+    using T = decltype(number);
+    const char* from = data_.begin + first * sizeof(T);
+    for (std::size_t i = 0; i < out.size(); ++i)
+      out[i] = static_cast<double>(loadNumber<T>(from + i * sizeof(T)));
+  });
+}
+
 double Volume::trilinear(const V3d& position) const {
   std::array<int, 3> low{}, high{};
   std::array<double, 3> t{};

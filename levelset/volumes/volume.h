@@ -94,6 +94,8 @@ class Volume {
   /// Copies the stored numbers of the row (0…size.x − 1, j, k). Every stored number fits a float
   /// exactly. @param out  size.x numbers
   void storedRow(int j, int k, std::span<float> out) const;
+  /// Copies successive stored numbers. @param first  index() of the first grid point
+  void storedRun(std::size_t first, std::span<double> out) const;
   [[nodiscard]] std::size_t index(int i, int j, int k) const {
     return (static_cast<std::size_t>(k) * static_cast<std::size_t>(grid_.size.y) +
             static_cast<std::size_t>(j)) *
