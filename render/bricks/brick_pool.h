@@ -11,10 +11,11 @@
 #include "levelset/narrow_band.h"
 #include "render/filter.h"
 #include "render/images/value_bits.h"
+#include "render/volumes/volume_surface.h"
 
 namespace render {
 
-/// Values of a band that the kernel's rays read, and a two-level table that finds them by position.
+/// Values of a band or volume that the kernel's rays read, and a two-level table that finds them by position.
 /// The pool holds all values of the blocks of 8³ cells that the surface crosses (bricks). Of their
 /// neighbours (halo blocks) it holds only the points that curvature stencils read. The members are
 /// plain arrays, so that they can be uploaded to the GPU.
@@ -70,7 +71,8 @@ struct BrickPool {
   std::array<int, 3> cellsLow{}, cellsHigh{};
 
   std::size_t haloCount = 0;      ///< halo blocks with stored points
-  std::size_t blocksOmitted = 0;  ///< leaf nodes of the band of which the pool stores no point
+  /// Leaf nodes of the band, or blocks of the volume, of which the pool stores no point.
+  std::size_t blocksOmitted = 0;
   std::size_t blocksCulled = 0;   ///< blocks that the surface crosses but the picture does not need
   [[nodiscard]] std::size_t brickCount() const { return mask.size() / kMaskWords; }
   [[nodiscard]] std::size_t valueBytes() const {
@@ -95,5 +97,9 @@ struct TableOptions {
 ///         voxels), or for more values than a 32-bit index can address
 [[nodiscard]] BrickPool makeBricks(const levelset::NarrowBand& band,
                                    const TableOptions& options = {});
+/// Builds the brick pool of an isosurface of a volume: positions are in the volume's index space,
+/// and values are those of its field. @pre options.quantization has 32 bits
+/// @throws as above
+[[nodiscard]] BrickPool makeBricks(const VolumeSurface& surface, const TableOptions& options = {});
 
 }  // namespace render

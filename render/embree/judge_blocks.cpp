@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "render/embree/cubic_root.h"
 #include "render/embree/judge_blocks_vdb.h"
@@ -53,6 +54,7 @@ void markCells(SurfaceBlock& block, unsigned x, unsigned y, unsigned cells) {
 /// Returns false when there are no such cells.
 bool markSplineCells(SurfaceBlock& block, const DrawnField& field) {
   const SplineCoefficients<8> coefficients(field.tree, block.origin, field.filter);
+  if (!coefficients.haveBothSigns()) return false;
   block.crossing.fill(0);
   block.extent = {8, 8, 8, 0, 0, 0};
   for (int x = 0; x < 8; ++x)
@@ -78,6 +80,20 @@ bool markCrossingCells(SurfaceBlock& block) {
       const unsigned cells = (some | some >> 1) & ~(all & all >> 1) & 0xffu;
       markCells(block, x, y, cells);
     }
+  }
+  return block.extent[3] != 0;
+}
+
+/// Clears the cells outside a box. Returns false when no cell is left.
+bool keepCells(SurfaceBlock& block, const openvdb::CoordBBox& cells) {
+  if (cells.isInside(openvdb::CoordBBox::createCube(block.origin, 8))) return true;
+  const std::array<std::uint64_t, 8> marked = std::exchange(block.crossing, {});
+  block.extent = {8, 8, 8, 0, 0, 0};
+  for (unsigned n = 0; n < 512; ++n) {
+    const unsigned x = n >> 6, y = n >> 3 & 7, z = n & 7;
+    const Coord cell =
+        block.origin.offsetBy(static_cast<int>(x), static_cast<int>(y), static_cast<int>(z));
+    if ((marked[x] >> (8 * y + z) & 1) && cells.isInside(cell)) markCells(block, x, y, 1u << z);
   }
   return block.extent[3] != 0;
 }
@@ -293,7 +309,7 @@ std::vector<SurfaceBlock> surfaceBlocks(const DrawnField& field) {
       }
       const bool crosses = field.filter == Filter::Trilinear ? markCrossingCells(block)
                                                              : markSplineCells(block, field);
-      if (crosses) found[i] = block;
+      if (crosses && keepCells(block, field.cells)) found[i] = block;
     }
   });
   std::vector<SurfaceBlock> blocks;
