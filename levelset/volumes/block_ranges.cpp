@@ -116,8 +116,7 @@ Slice sliceOf(RowReader& rows, const V3i& points, const V3i& size, int k) {
     const std::vector<float>& row = rows.read(j, k);
     for (int b = 0; b < size.x; ++b) {
       const int low = b * kBlock, high = std::min(low + kBlock, points.x - 1);
-      Range range = narrow[static_cast<std::size_t>(b)] =
-          rangeOf(row, low + kReach, high + kReach);
+      Range range = narrow[static_cast<std::size_t>(b)] = rangeOf(row, low + kReach, high + kReach);
       widen(range, rangeOf(row, low, low + kReach - 1));
       widen(range, rangeOf(row, high + kReach + 1, high + 2 * kReach));
       wide[static_cast<std::size_t>(b)] = range;
@@ -237,8 +236,8 @@ std::vector<V3i> BlockRanges::crossedWidely(double isovalue, double widening) co
   // Extended values are rounded to single precision.
   constexpr double kRounding = 1e-6;
   return blocksWith(wide_, wideGroups_, [&](double low, double high) {
-    const double room = widening * (high - low) +
-                        kRounding * std::max({high - low, std::abs(low), std::abs(high)});
+    const double room =
+        widening * (high - low) + kRounding * std::max({high - low, std::abs(low), std::abs(high)});
     return low - room <= isovalue && isovalue <= high + room;
   });
 }

@@ -128,7 +128,7 @@ void fillPool(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks
     pool.entry[slot + BrickPool::kStridesOfEntry] = strideX << BrickPool::kStrideShift | strideY;
   };
   std::size_t held = 0;
-  for (std::size_t i = 0; i < bricks.size(); ++i, held += BrickPool::kValues) {
+  for (std::size_t i = 0; i < bricks.size(); ++i, held += pool.brickValues()) {
     const std::size_t slot = table.slotOf(bricks[i]->origin);
     pool.entry[slot] = static_cast<std::int32_t>(i);
     hold(slot, held, kEdge * kEdge, kEdge);
@@ -152,12 +152,12 @@ void fillPool(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks
                     held, kMostValues));
   }
   markEmptyCubes(pool);
-  pool.value.resize(bricks.size() * BrickPool::kValues);
+  pool.value.resize(bricks.size() * pool.brickValues());
   pool.value.reserve(held);
   pool.mask.resize(bricks.size() * BrickPool::kMaskWords);
   tbb::parallel_for(std::size_t{0}, bricks.size(), [&](std::size_t i) {
     std::copy(bricks[i]->value.begin(), bricks[i]->value.end(),
-              pool.value.begin() + static_cast<std::ptrdiff_t>(i * BrickPool::kValues));
+              pool.value.begin() + static_cast<std::ptrdiff_t>(i * pool.brickValues()));
     std::copy(bricks[i]->mask.begin(), bricks[i]->mask.end(),
               pool.mask.begin() + static_cast<std::ptrdiff_t>(i * BrickPool::kMaskWords));
   });
@@ -218,7 +218,9 @@ BrickPool makePool(const GridSource& grid, float background, const TableOptions&
   pool.blocksCulled = bricks.culled;
   pool.blocksOmitted = grid.storedBlocks();
   if (bricks.kept.empty()) return pool;
-  const std::vector<HaloBlock> beside = haloBlocks(grid, bricks.kept);
+  const std::vector<HaloBlock> beside = tetrahedralDegree(options.filter) > 0
+                                            ? std::vector<HaloBlock>()
+                                            : haloBlocks(grid, bricks.kept);
   fillPool(pool, bricks.kept, beside, background);
   for (const auto& brick : bricks.kept) pool.blocksOmitted -= grid.isStored(brick->origin);
   for (const HaloBlock& block : beside)

@@ -74,9 +74,7 @@ struct SplineBlock {
   static constexpr int kAround = kBlock + 3;
   float c[kAround][kAround][kAround];
 
-  SplineBlock(GridReader& grid, const Coord& origin) {
-    grid.copyPadded(origin, 1, 2, &c[0][0][0]);
-  }
+  SplineBlock(GridReader& grid, const Coord& origin) { grid.copyPadded(origin, 1, 2, &c[0][0][0]); }
 
   using SignRows = std::array<std::array<unsigned, kAround>, kAround>;
   /// Signs of the coefficients: bit z of rows[x][y] is set when c[x][y][z] is negative.
@@ -305,12 +303,13 @@ Bricks bricksOf(const GridSource& grid, const TableOptions& options) {
     auto brick = std::make_unique<Brick>();
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       brick->origin = blocks[i];
-      const bool differ = fill(*reader, *brick);
-      if (options.filter == Filter::Trilinear) {
+      if (tetrahedralDegree(options.filter) > 0) {
+        fillCubes(*reader, options.filter, *brick);
+      } else if (const bool differ = fill(*reader, *brick); options.filter != Filter::Trilinear) {
+        findSplineCrossings(*reader, *brick);
+      } else {
         if (!differ) continue;
         findCrossings(*brick);
-      } else {
-        findSplineCrossings(*reader, *brick);
       }
       keepCells(cells, *brick);
       if (brick->mask == decltype(brick->mask){}) continue;

@@ -17,7 +17,7 @@ namespace render {
 /// A block of 8³ cells that the surface crosses, with values and mask in the layout of BrickPool.
 struct Brick {
   openvdb::Coord origin;
-  std::array<float, BrickPool::kValues> value;
+  std::vector<float> value = std::vector<float>(BrickPool::kValues);
   std::array<std::uint32_t, BrickPool::kMaskWords> mask;
 };
 
@@ -62,12 +62,15 @@ class GridSource {
 [[nodiscard]] std::unique_ptr<GridSource> treeSource(const openvdb::FloatTree& tree);
 /// Samples of a volume's field, or for Filter::BSplineQi the spline's coefficients.
 /// @pre the surface outlives the source
-[[nodiscard]] std::unique_ptr<GridSource> volumeSource(const VolumeSurface& surface,
-                                                       Filter filter);
+[[nodiscard]] std::unique_ptr<GridSource> volumeSource(const VolumeSurface& surface, Filter filter);
 
 /// Builds a copy of the tree in which each leaf value f is replaced by the spline's coefficient f −
 /// ∇²f/6.
 [[nodiscard]] openvdb::FloatTree::Ptr quasiInterpolated(const openvdb::FloatTree& tree);
+
+/// Copies the data around the cells of a block, and sets the mask bits of the cells in which a
+/// spline on tetrahedra may cross zero: those whose Bernstein coefficients differ in sign.
+void fillCubes(GridReader& grid, Filter filter, Brick& brick);
 
 /// Blocks that the surface of a grid crosses.
 struct Bricks {

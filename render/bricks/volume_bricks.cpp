@@ -61,8 +61,8 @@ class VolumeBricks : public GridSource {
     return origins;
   }
   [[nodiscard]] CoordBBox cells() const override {
-    const V3i size = surface_.volume().size();
-    return {Coord(0), Coord(size.x - 2, size.y - 2, size.z - 2)};
+    const auto [first, last] = surface_.cells(filter_);
+    return {Coord(first.x, first.y, first.z), Coord(last.x, last.y, last.z)};
   }
   [[nodiscard]] std::size_t storedBlocks() const override {
     const V3i size = surface_.volume().size();

@@ -11,6 +11,7 @@
 #include "render/embree/field_march.h"
 #include "render/embree/judge_blocks_vdb.h"
 #include "render/embree/surface_spline_vdb.h"
+#include "render/embree/tetra_cell_vdb.h"
 #include "render/embree/volume_tree_vdb.h"
 #include "render/meshes/embree_space.h"
 #include "render/meshes/mesh_rays.h"
@@ -39,6 +40,7 @@ struct RaySolid {
 
   [[nodiscard]] DrawnField field() const { return {*tree, filter, cells}; }
   [[nodiscard]] SurfaceShape shapeAt(const V3d& world) const {
+    if (tetrahedralDegree(filter) > 0) return tetraShape(*tree, world * worldToIndex, filter);
     return surfaceShape(*tree, world * worldToIndex, filter);
   }
 };
@@ -228,13 +230,17 @@ void EmbreeScene::Impl::gather(const Scene& source, Filter filter) {
     entry.isVolume = solid.volume != nullptr;
     if (solid.volume) {
       entry.tree = treeOf(*solid.volume);
-      const Imath::V3i size = solid.volume->volume().size();
-      entry.cells = {openvdb::Coord(0), openvdb::Coord(size.x - 2, size.y - 2, size.z - 2)};
+      const auto [first, last] = solid.volume->cells(filter);
+      entry.cells = {openvdb::Coord(first.x, first.y, first.z),
+                     openvdb::Coord(last.x, last.y, last.z)};
     } else {
       entry.tree = levelset::vdb(solid.band).treePtr();
     }
     entry.voxelSize = solid.voxelSize();
     entry.indexToWorld = solid.indexToWorld();
+    // The cubes of the partition are centred at the grid points.
+    if (tetrahedralDegree(filter) > 0)
+      entry.indexToWorld = Imath::M44d().setTranslation(V3d(-0.5)) * entry.indexToWorld;
     entry.worldToIndex = entry.indexToWorld.inverse();
     entry.filter = filter;
     entry.blocks = surfaceBlocks(entry.field());

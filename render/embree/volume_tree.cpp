@@ -15,8 +15,7 @@ openvdb::FloatTree::Ptr treeOf(const VolumeSurface& surface) {
   const levelset::Volume& volume = surface.volume();
   const Imath::V3i size = volume.size();
   const levelset::ExtendedGrid values([&](int i, int j, int k) { return volume.at(i, j, k); },
-                                      {size.x, size.y, size.z},
-                                      levelset::GridExtension::Quadratic);
+                                      {size.x, size.y, size.z}, levelset::GridExtension::Quadratic);
   const openvdb::CoordBBox points(
       Coord(-kBeyond), Coord(size.x - 1 + kBeyond, size.y - 1 + kBeyond, size.z - 1 + kBeyond));
   std::vector<Coord> origins;

@@ -140,7 +140,9 @@ uniform int nanoRoot, nanoTiles, nanoFar, nanoOriginX, nanoOriginY, nanoOriginZ;
 
 /// Properties of rays and grid that select a shader.
 struct Variant {
-  bool isPixels, isSpline, isNano;
+  bool isPixels;
+  Filter filter;
+  bool isNano;
   int valueBits;
   int blocks;  // number of buffer textures that store the values of the solid
   auto operator<=>(const Variant&) const = default;
@@ -184,15 +186,18 @@ std::string shaderText(const Variant& variant, int shift) {
              "const int kBrickEdge = {}, kBrickValues = {}, kPageShift = {},\n"
              "          kFirstOfEntry = {}, kStridesOfEntry = {}, kStrideShift = {},\n"
              "          kHitParts = {}, kShapeParts = {}, kEnters = {}, kLeaves = {};\n"
-             "const bool isSpline = {};\n",
+             "const bool isSpline = {};\n"
+             "const int tetraDegree = {}, kCubeEdge = {}, kCubeValues = {};\n",
              kGroup, BrickPool::kEdge, BrickPool::kValues,
              std::countr_zero(static_cast<unsigned>(BrickPool::kPage)), BrickPool::kFirstOfEntry,
              BrickPool::kStridesOfEntry, BrickPool::kStrideShift, kHitParts, ShapeBlock::kParts,
-             HitBlock::kEnters, HitBlock::kLeaves, variant.isSpline) +
+             HitBlock::kEnters, HitBlock::kLeaves,
+             variant.filter == Filter::BSpline || variant.filter == Filter::BSplineQi,
+             tetrahedralDegree(variant.filter), BrickPool::kCubeEdge, BrickPool::kCubeValues) +
          kDialect + valueText(variant, shift) + kRootsKernel +
          (variant.isNano ? kNanoText + NanoGrid::layout() + kNanoVdbKernel : kBricksKernel) +
-         kWindowKernel + kSplineKernel + kTraceKernel + kShapeKernel +
-         (variant.isPixels ? kPixelRays : kListedRays) + kMain;
+         kWindowKernel + kSplineKernel + kTetraKernel + kTraceKernel + kShapeKernel +
+         kTetraShapeKernel + (variant.isPixels ? kPixelRays : kListedRays) + kMain;
 }
 
 }  // namespace
@@ -291,7 +296,7 @@ struct GpuTracer::Impl {
   GLuint programFor(const KernelSolid& solid, bool isPixels) {
     const Tables& t = tables.at(&solid);
     const Variant variant{.isPixels = isPixels,
-                          .isSpline = solid.pool.filter != Filter::Trilinear,
+                          .filter = solid.pool.filter,
                           .isNano = t.nano.has_value(),
                           .valueBits = t.nano ? 32 : solid.pool.quantization.bits,
                           .blocks = static_cast<int>(t.values.size())};

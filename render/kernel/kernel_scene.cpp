@@ -174,7 +174,7 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
   }
   // For BSplineQi the leaves are copied, to store the spline's coefficients.
   const double kCopies = options.filter == Filter::BSplineQi ? 4 * 512 : 0;
-  const double kBytesOfBlock = 2 * 4 * (BrickPool::kValues + BrickPool::kMaskWords) + kCopies;
+  const double kBytesOfBlock = 2 * 4 * (BrickPool::kCubeValues + BrickPool::kMaskWords) + kCopies;
   levelset::requireMemory(leaves * kBytesOfBlock, options.maxBytes);
   // Culling knows how far light rays start from solids and meshes, but not from mapped textures.
   const FrustumCulling culling = isPicture && !box.isEmpty() && mapped_.isEmpty()
@@ -199,7 +199,7 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
     if (pool.brickCount() + pool.blocksCulled == 0) continue;
     Extent& extent = extents_.emplace_back();
     extent.index = i;
-    const V3d origin(pool.origin[0], pool.origin[1], pool.origin[2]);
+    const V3d origin = V3d(pool.origin[0], pool.origin[1], pool.origin[2]) - V3d(pool.shift());
     const auto boxOf = [&](const std::array<int, 3>& low, const std::array<int, 3>& high) {
       return Imath::Box3d(origin + V3d(low[0], low[1], low[2]),
                           origin + V3d(high[0], high[1], high[2]));
@@ -242,9 +242,9 @@ void KernelScene::updateView(const Scene& scene) {
   if (bounds_.isEmpty()) bounds_ = tableBounds_ = scene.volumeBounds();
   for (KernelSolid& solid : solids_) {
     solid.opacity = scene.solids[solid.index].opacity;
-    const V3d corner(solid.pool.origin[0], solid.pool.origin[1], solid.pool.origin[2]);
-    solid.tableToWorld =
-        M44d().setTranslation(corner) * scene.solids[solid.index].indexToWorld();
+    const V3d corner = V3d(solid.pool.origin[0], solid.pool.origin[1], solid.pool.origin[2]) -
+                       V3d(solid.pool.shift());
+    solid.tableToWorld = M44d().setTranslation(corner) * scene.solids[solid.index].indexToWorld();
     solid.worldToTable = solid.tableToWorld.inverse();
     solid.fan = makeRayFan(scene.camera, solid.tableToWorld, solid.voxelSize, solid.pool);
   }

@@ -47,9 +47,7 @@ struct Solid {
     return volume ? volume->indexToWorld() : band.indexToWorld();
   }
   /// Edge length of a voxel; of a volume, the largest spacing of its grid. World units.
-  [[nodiscard]] double voxelSize() const {
-    return volume ? volume->voxelSize() : band.voxelSize();
-  }
+  [[nodiscard]] double voxelSize() const { return volume ? volume->voxelSize() : band.voxelSize(); }
   /// Bounds of the surface, world units.
   [[nodiscard]] Imath::Box3d bounds() const;
 };

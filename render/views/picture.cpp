@@ -192,7 +192,7 @@ std::map<std::string, std::string> sceneAttributes(const Scene& scene,
   }
   std::map<std::string, std::string> attributes = {
       {"ls:filter", filterName(filter)},
-      {"ls:normal", filter == Filter::BSpline ? "bspline" : "bspline-qi"},
+      {"ls:normal", filter == Filter::Trilinear ? "bspline-qi" : filterName(filter)},
       {"ls:grid", grids},
       {"ls:voxelSize", voxelSizes},
       {"ls:valueBits", bits}};

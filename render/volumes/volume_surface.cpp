@@ -68,6 +68,8 @@ double VolumeSurface::voxelSize() const {
 }
 
 bool VolumeSurface::isEmpty() const {
+  const V3i blocks = ranges_->size();
+  if (blocks.x == 0 || blocks.y == 0 || blocks.z == 0) return true;
   return inside_ == VolumeInside::Above
              ? !(volume_->highest() > isovalue_ && volume_->lowest() <= isovalue_)
              : !(volume_->lowest() < isovalue_ && volume_->highest() >= isovalue_);
@@ -76,14 +78,20 @@ bool VolumeSurface::isEmpty() const {
 std::vector<V3i> VolumeSurface::blocks(Filter filter) const {
   if (filter == Filter::Trilinear)
     return ranges_->crossed(isovalue_, inside_ == VolumeInside::Below);
-  // A coefficient f − ∇²f/6 is twice the value less the mean of its six neighbours.
-  return ranges_->crossedWidely(isovalue_, filter == Filter::BSplineQi ? 1 : 0);
+  // A coefficient f − ∇²f/6 is twice the value less the mean of its six neighbours. A coefficient
+  // of the quadratic super spline has negative weights of at most 1/16 in sum.
+  const double widening = filter == Filter::BSplineQi        ? 1
+                          : filter == Filter::SuperQuadratic ? 1.0 / 16
+                                                             : 0;
+  return ranges_->crossedWidely(isovalue_, widening);
 }
 
 void VolumeSurface::copyField(const V3i& low, const V3i& size, float* out) const {
   const V3i points = volume_->size();
   const levelset::VolumeScale scale = volume_->scale();
-  const auto isWithin = [](int n, int count, int reach) { return n >= -reach && n < count + reach; };
+  const auto isWithin = [](int n, int count, int reach) {
+    return n >= -reach && n < count + reach;
+  };
   // The part of a row along x that lies in the volume.
   const int from = std::clamp(low.x, 0, points.x), to = std::clamp(low.x + size.x, from, points.x);
   std::array<double, 32> buffer;

@@ -5,6 +5,7 @@
 #include <Imath/ImathVec.h>
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "levelset/progress.h"
@@ -35,8 +36,7 @@ class VolumeSurface {
   /// Finds the ranges of the blocks of the volume.
   /// @throws UsageError for an isovalue that is NaN or infinite
   /// @throws Cancelled
-  VolumeSurface(levelset::Volume volume, double isovalue,
-                VolumeInside inside = VolumeInside::Above,
+  VolumeSurface(levelset::Volume volume, double isovalue, VolumeInside inside = VolumeInside::Above,
                 const levelset::Progress& progress = {});
 
   /// The surface of another isovalue of the same volume, which needs no further pass over its
@@ -51,11 +51,17 @@ class VolumeSurface {
   [[nodiscard]] const Imath::M44d& indexToWorld() const { return volume_->grid().indexToWorld; }
   /// Largest distance between neighbouring grid points along an axis, world units.
   [[nodiscard]] double voxelSize() const;
-  /// Returns true when no grid point or every grid point is inside.
+  /// Returns true when no grid point or every grid point is inside, or the grid has no cells.
   [[nodiscard]] bool isEmpty() const;
   /// Blocks of 8³ cells that may hold a crossed cell, by their lowest grid points, ordered by x, y,
   /// z.
   [[nodiscard]] std::vector<Imath::V3i> blocks(Filter filter) const;
+  /// Range of the cells in which the surface is drawn, both ends included. Filters on tetrahedra
+  /// have a cell around each grid point, and draw those with all 27 data in the volume.
+  [[nodiscard]] std::pair<Imath::V3i, Imath::V3i> cells(Filter filter) const {
+    const int first = tetrahedralDegree(filter) > 0 ? 1 : 0;
+    return {Imath::V3i(first), volume_->size() - Imath::V3i(2)};
+  }
   /// f at a value of the volume.
   [[nodiscard]] float field(double value) const {
     return static_cast<float>(inside_ == VolumeInside::Above ? isovalue_ - value

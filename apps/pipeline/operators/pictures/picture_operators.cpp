@@ -61,8 +61,7 @@ render::ViewedScene volumeScene(Invocation& in) {
     in.notes.warnings.push_back(
         fmt::format("render: the picture is empty, because no surface of the volume has the "
                     "isovalue {}; its values lie between {:.6g} and {:.6g}",
-                    in.text("isovalue"), surface->volume().lowest(),
-                    surface->volume().highest()));
+                    in.text("isovalue"), surface->volume().lowest(), surface->volume().highest()));
   render::ViewedScene viewed;
   viewed.scene.solids.push_back({.band = {}, .volume = surface});
   return viewed;
@@ -203,7 +202,8 @@ render::Image drawByKernel(Invocation& in, const render::Scene& scene,
 }
 
 render::Filter filterOf(const Invocation& in) {
-  for (const render::Filter filter : {render::Filter::BSpline, render::Filter::BSplineQi})
+  for (const render::Filter filter : {render::Filter::BSpline, render::Filter::BSplineQi,
+                                      render::Filter::SuperQuadratic, render::Filter::CubicC1})
     if (in.text("filter") == render::filterName(filter)) return filter;
   return render::Filter::Trilinear;
 }
@@ -456,9 +456,11 @@ Operator renderOperator() {
             .type = ParamType::Choice,
             .doc =
                 "interpolation between grid points: trilinear; bspline, a tricubic B-spline, which "
-                "shrinks the solid; bspline-qi, the same spline with corrected coefficients",
+                "shrinks the solid; bspline-qi, the same spline with corrected coefficients; "
+                "super-quadratic and cubic-c1, splines on 24 tetrahedra around each grid point, "
+                "which smooth the values",
             .fallback = "trilinear",
-            .choices = {"trilinear", "bspline", "bspline-qi"}},
+            .choices = {"trilinear", "bspline", "bspline-qi", "super-quadratic", "cubic-c1"}},
            {.name = "isovalue",
             .type = ParamType::Number,
             .doc = "for a volume: draw the surface on which the interpolated values equal this "

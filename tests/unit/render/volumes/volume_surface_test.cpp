@@ -1,0 +1,295 @@
+// Isosurfaces of volumes: the kernel on both processors against the judge and against closed
+// forms.
+
+#include "render/volumes/volume_surface.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "levelset/error.h"
+#include "levelset/isosurface/isosurface.h"
+#include "levelset/splines/grid_extension.h"
+#include "levelset/volumes/synthetic.h"
+#include "render/cpu/cpu_renderer.h"
+#include "render/embree/embree_renderer.h"
+#include "render/gpu/gpu_renderer.h"
+#include "render/images/compare_images.h"
+#include "tests/support/measured.h"
+
+namespace volume_surface_test {
+
+using Imath::M44d;
+using Imath::V3d;
+using Imath::V3i;
+using levelset::Volume;
+using support::measured;
+using namespace render;
+
+constexpr Filter kFilters[] = {Filter::Trilinear, Filter::BSpline, Filter::BSplineQi,
+                               Filter::SuperQuadratic, Filter::CubicC1};
+
+RenderOptions optionsOf(Filter filter) {
+  return {.samples = 1, .ambientSamples = 0, .shadowSamples = 0, .filter = filter};
+}
+
+Volume filled(const levelset::VolumeGrid& grid, const std::function<double(const V3d&)>& function) {
+  std::vector<float> values;
+  for (int k = 0; k < grid.size.z; ++k)
+    for (int j = 0; j < grid.size.y; ++j)
+      for (int i = 0; i < grid.size.x; ++i)
+        values.push_back(static_cast<float>(function(V3d(i, j, k) * grid.indexToWorld)));
+  return {grid, std::move(values)};
+}
+
+/// A sheared and mirrored map with three spacings, for grids of 30 points on each axis.
+M44d obliqueMap() {
+  const M44d linear(-0.05, 0.02, 0, 0, 0.01, 0.09, 0, 0, 0.02, -0.01, 0.06, 0, 0, 0, 0, 1);
+  const V3d middle = V3d(14.5) * linear;
+  return linear * M44d().setTranslation(-middle);
+}
+
+/// Noise of whole numbers from 0 to 255 around a ball, as bytes.
+Volume noisyBytes(int size) {
+  std::mt19937 random(3);
+  const auto bytes = std::make_shared<std::vector<unsigned char>>();
+  const double middle = 0.5 * (size - 1);
+  for (int k = 0; k < size; ++k)
+    for (int j = 0; j < size; ++j)
+      for (int i = 0; i < size; ++i) {
+        const double d = 100 - 8 * ((V3d(i, j, k) - V3d(middle)).length() - 0.3 * size);
+        const int noise = static_cast<int>(random() % 61) - 30;
+        bytes->push_back(
+            static_cast<unsigned char>(std::clamp(static_cast<int>(d) + noise, 0, 255)));
+      }
+  return {{V3i(size), M44d()},
+          levelset::VolumeType::U8,
+          {},
+          {bytes, reinterpret_cast<const char*>(bytes->data())}};
+}
+
+Scene sceneOf(const VolumeSurface& surface, int width = 96, int height = 72) {
+  Scene scene;
+  scene.solids.push_back({.band = {}, .volume = std::make_shared<const VolumeSurface>(surface)});
+  scene.camera = framingCamera(scene, width, height, scene.camera.verticalFov, scene.camera.up);
+  return scene;
+}
+
+/// Pixels that only one of two pictures shows a surface in, and the largest difference in depth of
+/// the others.
+struct DepthDifference {
+  std::size_t both = 0, onlyOne = 0;
+  double most = 0;
+};
+
+DepthDifference depthDifference(const Image& a, const Image& b) {
+  DepthDifference result;
+  const std::vector<float>&za = a.channels.at("Z"), &zb = b.channels.at("Z");
+  for (std::size_t i = 0; i < za.size(); ++i) {
+    const bool isA = std::isfinite(za[i]), isB = std::isfinite(zb[i]);
+    result.onlyOne += isA != isB;
+    if (!isA || !isB) continue;
+    ++result.both;
+    result.most = std::max(result.most, std::abs(static_cast<double>(za[i]) - zb[i]));
+  }
+  return result;
+}
+
+void expectProven(const Scene& scene, Filter filter, const std::string& what) {
+  const RenderOptions options = optionsOf(filter);
+  const Image ours = renderCpu(scene, options), judge = renderEmbree(scene, options);
+  const ImageComparison judged = compareImages(ours, judge);
+  EXPECT_TRUE(judged.agrees()) << filterName(filter) << ", " << what << ": " << judged.reason();
+  const DepthDifference depth = depthDifference(ours, judge);
+  EXPECT_GT(depth.both, 100u) << filterName(filter) << ", " << what;
+  EXPECT_EQ(depth.onlyOne, 0u) << filterName(filter) << ", " << what;
+  EXPECT_EQ(compareImages(ours, renderGpu(scene, options), {.exact = true}).differentBits, 0u)
+      << filterName(filter) << ", " << what;
+}
+
+TEST(VolumeSurface, KernelAndJudgeAgree) {
+  const auto ball = [](const V3d& p) { return 0.6 - p.length(); };
+  const VolumeSurface surfaces[] = {
+      {levelset::sphereVolume(33, 0.6), 0},
+      {levelset::marschnerLobb(41), 0.5},
+      {levelset::torusVolume(30, 0.6, 0.25), 0.01},
+      {noisyBytes(24), 100.5},
+      {noisyBytes(24), 100},  // many values equal the isovalue
+      {noisyBytes(24), 100, VolumeInside::Below},
+      {filled({V3i(30), obliqueMap()}, ball), 0},
+      {filled({V3i(40, 25, 12), M44d().setScale(V3d(0.05, 0.08, 0.17))},
+              [&](const V3d& p) { return ball(p - V3d(1)); }),
+       0.02}};
+  for (const VolumeSurface& surface : surfaces)
+    for (const Filter filter : kFilters) {
+      expectProven(sceneOf(surface), filter,
+                   std::to_string(&surface - surfaces) + ", default view");
+      Scene scene = sceneOf(surface, 96, 72);
+      const V3d middle = surface.volume().grid().bounds().center(),
+                half = surface.volume().grid().bounds().size() / 2;
+      for (const V3d& side : {V3d(1, 0.3, -0.2)}) {
+        scene.camera.from = middle + side * half.length() * 2;
+        scene.camera.to = middle;
+        scene.camera.up = V3d(0, 0, 1);
+        expectProven(scene, filter, std::to_string(&surface - surfaces));
+      }
+    }
+}
+
+TEST(VolumeSurface, HasTheDepthOfTheJudgeWithinAHundredThousandthOfAVoxel) {
+  // The eye is close, and the voxel is the unit, so that single-precision depths are fine enough.
+  const auto ball = [](const V3d& p) { return 8 - (p - V3d(12.1, 11.7, 12.3)).length(); };
+  Scene scene = sceneOf({filled({V3i(25), M44d()}, ball), 0}, 96, 96);
+  scene.camera.from = V3d(12, 12, 24);
+  scene.camera.to = V3d(12);
+  scene.camera.up = V3d(0, 1, 0);
+  scene.camera.orthoHeight = 12;
+  for (const Filter filter : kFilters) {
+    const DepthDifference found = depthDifference(renderCpu(scene, optionsOf(filter)),
+                                                  renderEmbree(scene, optionsOf(filter)));
+    EXPECT_EQ(found.onlyOne, 0u);
+    EXPECT_GT(found.both, 9000u);
+    EXPECT_LE(found.most, measured(1.9e-6, 1e-5)) << filterName(filter);
+  }
+}
+
+/// Largest distance of the drawn points from a ball of radius 0.6, and largest angle of the normals
+/// from the radius.
+std::pair<double, double> ballErrors(const Scene& scene, Filter filter) {
+  const Image image = renderCpu(scene, optionsOf(filter));
+  const auto at = [&](const std::string& name, std::size_t i) {
+    return V3d(image.channels.at(name + ".X")[i], image.channels.at(name + ".Y")[i],
+               image.channels.at(name + ".Z")[i]);
+  };
+  double distance = 0, angle = 0;
+  for (std::size_t i = 0; i < image.pixelCount(); ++i) {
+    if (!std::isfinite(image.channels.at("Z")[i])) continue;
+    const V3d p = at("P", i);
+    distance = std::max(distance, std::abs(p.length() - 0.6));
+    angle = std::max(angle, (at("N", i) - p.normalized()).length());
+  }
+  return {distance, angle};
+}
+
+TEST(VolumeSurface, ConvergesToABall) {
+  const auto [coarse, coarseAngle] =
+      ballErrors(sceneOf({levelset::sphereVolume(21, 0.6), 0}), Filter::Trilinear);
+  const auto [fine, fineAngle] =
+      ballErrors(sceneOf({levelset::sphereVolume(81, 0.6), 0}), Filter::Trilinear);
+  EXPECT_GE(std::log2(coarse / fine) / 2, support::measuredOrder(2));
+  EXPECT_LE(fineAngle, coarseAngle / 8);
+  const auto [coarseQi, coarseQiAngle] =
+      ballErrors(sceneOf({levelset::sphereVolume(21, 0.6), 0}), Filter::BSplineQi);
+  const auto [fineQi, fineQiAngle] =
+      ballErrors(sceneOf({levelset::sphereVolume(41, 0.6), 0}), Filter::BSplineQi);
+  EXPECT_GE(std::log2(coarseQi / fineQi), support::measuredOrder(3));
+  EXPECT_LE(fineQiAngle, coarseQiAngle / 4);
+}
+
+TEST(VolumeSurface, HasNormalsTowardsTheOutsideOnBothSides) {
+  // The same surface; solid on the other side. Sheared and mirrored axes.
+  const auto ball = [](const V3d& p) { return 0.6 - p.length(); };
+  const Volume volume = filled({V3i(30), obliqueMap()}, ball);
+  EXPECT_LE(ballErrors(sceneOf({volume, 0}), Filter::Trilinear).second, measured(0.012));
+  const Volume negated = filled({V3i(30), obliqueMap()}, [&](const V3d& p) { return -ball(p); });
+  const Image a = renderCpu(sceneOf({volume, 0}), optionsOf(Filter::Trilinear)),
+              b = renderCpu(sceneOf({negated, 0, VolumeInside::Below}),
+                            optionsOf(Filter::Trilinear));
+  EXPECT_EQ(compareImages(a, b, {.exact = true}).differentBits, 0u);
+}
+
+TEST(VolumeSurface, IsThatOfTheLevelSet) {
+  const Volume volume = levelset::marschnerLobb(41);
+  const double voxel = 0.05;
+  Scene ofVolume = sceneOf({volume, 0.5}, 96, 72);
+  // Look at the middle, away from the border, where the level set is closed.
+  ofVolume.camera.from = V3d(0.35, 0.3, 0.9);
+  ofVolume.camera.to = V3d(0.1, 0.1, 0);
+  Scene ofBand = ofVolume;
+  ofBand.solids[0].volume = nullptr;
+  ofBand.solids[0].band =
+      levelset::isosurface(volume, {.low = 0.5}, {.voxelSize = voxel / 2}).band;
+  const Image a = renderCpu(ofVolume, optionsOf(Filter::Trilinear)),
+              b = renderCpu(ofBand, optionsOf(Filter::Trilinear));
+  const std::vector<float>&za = a.channels.at("Z"), &zb = b.channels.at("Z");
+  std::size_t close = 0, all = 0;
+  for (std::size_t i = 0; i < za.size(); ++i) {
+    if (!std::isfinite(za[i]) && !std::isfinite(zb[i])) continue;
+    ++all;
+    close += std::abs(za[i] - zb[i]) < static_cast<float>(voxel);
+  }
+  EXPECT_GT(all, 5000u);
+  EXPECT_GE(static_cast<double>(close), 0.99 * static_cast<double>(all));
+}
+
+TEST(VolumeSurface, EndsWhereAPlateauBegins) {
+  // Values of 1 above the plane z = 10, less below it: with the isovalue 1 nothing is inside, and
+  // with less the surface lies below the plateau.
+  const Volume volume =
+      filled({V3i(21), M44d()}, [](const V3d& p) { return std::min(p.z / 10, 1.0); });
+  EXPECT_TRUE(VolumeSurface(volume, 1).isEmpty());
+  const VolumeSurface below(volume, 1, VolumeInside::Below);
+  ASSERT_FALSE(below.isEmpty());
+  Scene scene = sceneOf(below, 64, 64);
+  scene.camera.from = V3d(9.7, 10.2, 40);
+  scene.camera.to = V3d(9.7, 10.2, 0);
+  scene.camera.up = V3d(0, 1, 0);
+  scene.camera.orthoHeight = 8;
+  const Image ours = renderCpu(scene, optionsOf(Filter::Trilinear));
+  for (const float z : ours.channels.at("Z")) ASSERT_NEAR(z, 30, support::rounding(300));
+  EXPECT_EQ(depthDifference(ours, renderEmbree(scene, optionsOf(Filter::Trilinear))).onlyOne, 0u);
+}
+
+TEST(VolumeSurface, WithAnIsovalueOutsideTheRangeIsEmpty) {
+  const VolumeSurface surface(levelset::sphereVolume(20, 0.6), 5);
+  EXPECT_TRUE(surface.isEmpty());
+  EXPECT_TRUE(surface.blocks(Filter::Trilinear).empty());
+  EXPECT_TRUE(surface.bounds().isEmpty());
+  const Scene scene = sceneOf(surface, 32, 24);
+  for (const Image& image :
+       {renderCpu(scene), renderGpu(scene), renderEmbree(scene, optionsOf(Filter::Trilinear))})
+    for (const float z : image.channels.at("Z")) EXPECT_TRUE(std::isinf(z));
+  EXPECT_FALSE(surface.withIsovalue(0).isEmpty());
+}
+
+TEST(VolumeSurface, RefusesWhatHasNoSurface) {
+  const Volume volume = levelset::sphereVolume(8, 0.6);
+  EXPECT_THROW(VolumeSurface(volume, std::numeric_limits<double>::quiet_NaN()),
+               levelset::UsageError);
+  EXPECT_THROW((void)VolumeSurface(volume, 0).withIsovalue(HUGE_VAL), levelset::UsageError);
+  Scene scene = sceneOf({volume, 0}, 16, 16);
+  scene.solids[0].quantization.bits = 8;
+  EXPECT_THROW(renderCpu(scene), levelset::UsageError);
+  // A grid with one layer of points has no cells.
+  const VolumeSurface flat(filled({V3i(9, 9, 1), M44d()}, [](const V3d& p) { return p.x - 4; }),
+                           0.5);
+  EXPECT_TRUE(flat.blocks(Filter::BSplineQi).empty());
+  const Image image = renderCpu(sceneOf(flat, 16, 16));
+  for (const float z : image.channels.at("Z")) EXPECT_TRUE(std::isinf(z));
+}
+
+TEST(VolumeSurface, CopiesTheExtendedField) {
+  const Volume volume = noisyBytes(11);
+  const VolumeSurface surface(volume, 90.5);
+  const levelset::ExtendedGrid grid([&](int i, int j, int k) { return volume.at(i, j, k); },
+                                    {11, 11, 11}, levelset::GridExtension::Quadratic);
+  const V3i low(-4, 5, -2), size(9, 10, 40);
+  std::vector<float> copied(9 * 10 * 40);
+  surface.copyField(low, size, copied.data());
+  std::size_t n = 0;
+  const auto isNear = [](int i) { return i >= -2 && i < 13; };
+  for (int x = low.x; x < low.x + size.x; ++x)
+    for (int y = low.y; y < low.y + size.y; ++y)
+      for (int z = low.z; z < low.z + size.z; ++z)
+        ASSERT_EQ(copied[n++],
+                  isNear(x) && isNear(y) && isNear(z) ? surface.field(grid(x, y, z)) : 0);
+}
+
+}  // namespace volume_surface_test
