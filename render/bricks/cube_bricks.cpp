@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "levelset/splines/cubic_c1_spline.h"
 #include "levelset/splines/quadratic_super_spline.h"
@@ -11,12 +12,52 @@ namespace {
 
 constexpr int kCubes = BrickPool::kBlock, kData = BrickPool::kCubeEdge;
 
-/// Range of the Bernstein coefficients in a cube.
+/// Numbers of a row of cubes along z.
+struct CubeRow {
+  std::array<float, kCubes> v{};
+
+  CubeRow() = default;
+  explicit CubeRow(int all) { v.fill(static_cast<float>(all)); }
+
+  CubeRow& operator+=(const CubeRow& b) {
+    return apply(b, [](float& x, float y) { x += y; });
+  }
+  CubeRow& operator-=(const CubeRow& b) {
+    return apply(b, [](float& x, float y) { x -= y; });
+  }
+  CubeRow& operator*=(const CubeRow& b) {
+    return apply(b, [](float& x, float y) { x *= y; });
+  }
+  CubeRow& operator/=(const CubeRow& b) {
+    return apply(b, [](float& x, float y) { x /= y; });
+  }
+  friend CubeRow operator+(CubeRow a, const CubeRow& b) { return a += b; }
+  friend CubeRow operator-(CubeRow a, const CubeRow& b) { return a -= b; }
+  friend CubeRow operator*(CubeRow a, const CubeRow& b) { return a *= b; }
+  friend CubeRow operator/(CubeRow a, const CubeRow& b) { return a /= b; }
+  friend CubeRow operator-(const CubeRow& a) { return CubeRow(0) - a; }
+
+ private:
+  template <typename Work>
+  CubeRow& apply(const CubeRow& b, const Work& work) {
+    for (std::size_t z = 0; z < v.size(); ++z) work(v[z], b.v[z]);
+    return *this;
+  }
+};
+
+/// Ranges of the Bernstein coefficients in the cubes of a row.
 struct CoefficientRange {
-  double low = HUGE_VAL, high = -HUGE_VAL;
-  void add(double b) {
-    low = std::min(low, b);
-    high = std::max(high, b);
+  CubeRow low, high;
+
+  CoefficientRange() {
+    low.v.fill(std::numeric_limits<float>::max());
+    high.v.fill(std::numeric_limits<float>::lowest());
+  }
+  void add(const CubeRow& b) {
+    for (std::size_t z = 0; z < b.v.size(); ++z) {
+      low.v[z] = std::min(low.v[z], b.v[z]);
+      high.v[z] = std::max(high.v[z], b.v[z]);
+    }
   }
 };
 
@@ -27,7 +68,7 @@ void overSigns(const Use& use) {
 }
 
 /// All coefficients are means of those that are visited here.
-CoefficientRange rangeOf(const levelset::QuadraticDeterminingSet<double>& set) {
+CoefficientRange rangeOf(const levelset::QuadraticDeterminingSet<CubeRow>& set) {
   CoefficientRange range;
   for (int x = -1; x <= 1; ++x)
     for (int y = -1; y <= 1; ++y)
@@ -37,11 +78,11 @@ CoefficientRange rangeOf(const levelset::QuadraticDeterminingSet<double>& set) {
   return range;
 }
 
-CoefficientRange rangeOf(const levelset::CubicDeterminingSet<double>& set) {
+CoefficientRange rangeOf(const levelset::CubicDeterminingSet<CubeRow>& set) {
   CoefficientRange range;
-  for (const double b : set.corners) range.add(b);
+  for (const CubeRow& b : set.corners) range.add(b);
   for (const auto& edges : set.edges)
-    for (const double b : edges) range.add(b);
+    for (const CubeRow& b : edges) range.add(b);
   for (int face = 0; face < 6; ++face)
     for (int other = 0; other < 6; ++other)
       if (face / 2 != other / 2)
@@ -62,9 +103,6 @@ void fillCubes(GridReader& grid, Filter filter, Brick& brick) {
   grid.copyPadded(brick.origin, 1, 1, brick.value.data());
   brick.mask = {};
   const float* data = brick.value.data();
-  const auto at = [data](int x, int y, int z) {
-    return data[((x + 1) * kData + y + 1) * kData + z + 1];
-  };
   // Least and largest datum of the 27 around each cube, axis by axis.
   std::array<std::array<float, BrickPool::kCubeValues>, 2> most;
   std::copy(brick.value.begin(), brick.value.end(), most[0].begin());
@@ -76,25 +114,37 @@ void fillCubes(GridReader& grid, Filter filter, Brick& brick) {
       most[0][i] = std::min({most[0][i], most[0][j], most[0][k]});
       most[1][i] = std::max({most[1][i], most[1][j], most[1][k]});
     }
-  constexpr double kRounding = 1e-5;  // of single precision in the kernel, with a margin
+  constexpr float kRounding = 1e-5f;  // of single precision here and in the kernel, with a margin
   for (int x = 0; x < kCubes; ++x)
-    for (int y = 0; y < kCubes; ++y)
+    for (int y = 0; y < kCubes; ++y) {
+      const int first = (x * kData + y) * kData;
+      std::array<float, kCubes> room;
+      unsigned open = 0;
       for (int z = 0; z < kCubes; ++z) {
-        const auto n = static_cast<std::size_t>((x * kData + y) * kData + z);
-        const auto low = static_cast<double>(most[0][n]), high = static_cast<double>(most[1][n]);
+        const auto n = static_cast<std::size_t>(first + z);
+        const float low = most[0][n], high = most[1][n];
         // Negative weights of the quadratic super spline have a sum of at most 1/16.
-        const double widening = filter == Filter::SuperQuadratic ? (high - low) / 16 : 0;
-        const double room = kRounding * std::max(std::abs(low), std::abs(high));
-        if (low - widening >= room || high + widening < -room) continue;
-        const auto sample = [&](int i, int j, int k) { return static_cast<double>(at(i, j, k)); };
-        const CoefficientRange range =
-            filter == Filter::CubicC1
-                ? rangeOf(levelset::CubicC1Spline::determiningSet(sample, {x, y, z}))
-                : rangeOf(levelset::QuadraticSuperSpline::determiningSet(sample, {x, y, z}));
-        if (range.low >= room || range.high < -room) continue;
-        const unsigned bit = static_cast<unsigned>(x << 6 | y << 3 | z);
-        brick.mask[bit >> 5] |= 1u << (bit & 31);
+        const float widening = filter == Filter::SuperQuadratic ? (high - low) / 16 : 0;
+        const float around = kRounding * std::max(std::abs(low), std::abs(high));
+        room[static_cast<std::size_t>(z)] = around;
+        if (low - widening < around && high + widening >= -around) open |= 1u << z;
       }
+      if (open == 0) continue;
+      const auto sample = [&](int i, int j, int k) {
+        CubeRow row;
+        std::copy_n(data + first + ((i + 1) * kData + j + 1) * kData + k + 1, kCubes,
+                    row.v.begin());
+        return row;
+      };
+      const CoefficientRange range =
+          filter == Filter::CubicC1
+              ? rangeOf(levelset::CubicC1Spline::determiningSet(sample, {0, 0, 0}))
+              : rangeOf(levelset::QuadraticSuperSpline::determiningSet(sample, {0, 0, 0}));
+      for (std::size_t z = 0; z < kCubes; ++z)
+        if (!(range.low.v[z] < room[z] && range.high.v[z] >= -room[z])) open &= ~(1u << z);
+      const unsigned bit = static_cast<unsigned>(x << 6 | y << 3);
+      brick.mask[bit >> 5] |= open << (bit & 31);
+    }
 }
 
 }  // namespace render

@@ -501,6 +501,16 @@ Crossing tetraCrossingIn(Bool asked, Int brick, Int cellX, Int cellY, Int cellZ,
   crossing.found = no();
   crossing.enters = no();
   crossing.share = real(0.0f);
+  // The cubic of the segment with the crossing, the part of it that holds the crossing, and the ends
+  // of the segment.
+  Real h0 = real(0.0f);
+  Real h1 = real(0.0f);
+  Real h2 = real(0.0f);
+  Real h3 = real(0.0f);
+  Real foundLow = real(0.0f);
+  Real foundHigh = real(0.0f);
+  Real begin = real(0.0f);
+  Real end = real(0.0f);
   Bool open = asked;
   Bool known = carried;
   Bool side = inside;
@@ -558,11 +568,15 @@ Crossing tetraCrossingIn(Bool asked, Int brick, Int cellX, Int cellY, Int cellZ,
       Real high;
       Bool found = isolate(searched, b0, b1, b2, b3, passing, low, high);
       if (any(found)) {
-        Bool startsInside = blossom(b0, b1, b2, b3, low, low, low) < 0.0f;
-        Real within = bisect(b0, b1, b2, b3, startsInside, low, high);
-        VAR share = from + within * (to - from);
-        crossing.share = select(found, share, crossing.share);
-        crossing.enters = select(found, NOT(startsInside), crossing.enters);
+        // The roots of all lanes are computed together after the loop.
+        h0 = select(found, b0, h0);
+        h1 = select(found, b1, h1);
+        h2 = select(found, b2, h2);
+        h3 = select(found, b3, h3);
+        foundLow = select(found, low, foundLow);
+        foundHigh = select(found, high, foundHigh);
+        begin = select(found, from, begin);
+        end = select(found, to, end);
         crossing.found = OR(crossing.found, found);
         open = AND(open, NOT(found));
       }
@@ -576,5 +590,12 @@ Crossing tetraCrossingIn(Bool asked, Int brick, Int cellX, Int cellY, Int cellZ,
     more = AND(open, from < 1.0f);
   }
   crossing.endsInside = side;
+  if (any(crossing.found)) {
+    Bool startsInside = blossom(h0, h1, h2, h3, foundLow, foundLow, foundLow) < 0.0f;
+    Real within = bisect(h0, h1, h2, h3, startsInside, foundLow, foundHigh);
+    VAR share = begin + within * (end - begin);
+    crossing.share = share;
+    crossing.enters = NOT(startsInside);
+  }
   return crossing;
 }
