@@ -54,7 +54,7 @@ bool TetraCell::mayCross() const {
   };
   return withTetraSpline(filter_, [&](const auto& spline) {
     bool anyInside = false, anyOutside = false;
-    for (int t = 0; t < levelset::Type6Partition::kTetrahedra; ++t)
+    for (int t = 0; t < levelset::Type6Partition::kTetrahedra && !(anyInside && anyOutside); ++t)
       for (const double b : spline.coefficients(sample, {{}, t}).coefficients)
         (b < 0 ? anyInside : anyOutside) = true;
     return anyInside && anyOutside;
