@@ -187,7 +187,8 @@ void expectProven(const Scene& scene, Filter filter, const std::string& what) {
 TEST(Filters, OfSplinesAgreeWithTheJudge) {
   const NarrowBand sheet = levelset::makeBox(V3d(30, 30, 1.2), V3d(0.1, 0.2, 0.3), 1),
                    needle = levelset::makeCapsule(V3d(-40, 3, 2), V3d(40, 7, 5), 1, 1);
-  for (const Filter filter : {Filter::BSpline, Filter::BSplineQi}) {
+  for (const Filter filter :
+       {Filter::BSpline, Filter::BSplineQi, Filter::SuperQuadratic, Filter::CubicC1}) {
     for (const auto& [name, band] :
          {std::pair{"rings", support::rings()}, {"sheet", sheet}, {"needle", needle}}) {
       expectProven(support::sceneOf(band), filter, name);

@@ -29,13 +29,13 @@ namespace {
 
 using levelset::UsageError;
 
-bool isVolume(const Value& value) {
-  return value.kind() == Kind::Volume || value.kind() == Kind::Field;
+bool isVolume(Kind kind) {
+  return kind == Kind::Volume || kind == Kind::Field;
 }
 
 /// Refuses volumes without --isovalue, and its options without a volume.
 void requireIsovalue(const Invocation& in) {
-  if (isVolume(in.operands[0])) {
+  if (isVolume(in.operands[0].plan().kind)) {
     if (!in.given("isovalue"))
       throw UsageError(
           "render: a volume has no surface without an isovalue; give --isovalue, and see "
@@ -71,8 +71,7 @@ render::ViewedScene volumeScene(Invocation& in) {
 /// operand, if it has one.
 render::Scene sceneOf(Invocation& in) {
   const Value& drawn = in.operands[0];
-  requireIsovalue(in);
-  render::ViewedScene viewed = isVolume(drawn) ? volumeScene(in) : sceneOf(drawn);
+  render::ViewedScene viewed = isVolume(drawn.kind()) ? volumeScene(in) : sceneOf(drawn);
   viewed.scene.camera = cameraOf(in, drawn.plan().bounds,
                                  viewed.hasCamera ? &viewed.scene.camera : nullptr, &viewed.scene);
   return viewed.scene;
@@ -332,9 +331,7 @@ RegionOfInterest roiOfDraw(Invocation& in, std::size_t, const RegionOfInterest&)
 }
 
 Plan planDraw(Invocation& in) {
-  const Kind kind = in.operands[0].plan().kind;
-  if (in.given("isovalue") && kind != Kind::Volume && kind != Kind::Field)
-    throw UsageError("render: --isovalue is for volumes; leave it out");
+  requireIsovalue(in);
   (void)cameraOf(in, in.operands[0].plan().bounds);
   return in.operands[0].plan();
 }

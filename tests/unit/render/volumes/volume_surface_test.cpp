@@ -23,6 +23,7 @@
 #include "render/gpu/gpu_renderer.h"
 #include "render/images/compare_images.h"
 #include "tests/support/measured.h"
+#include "tests/support/volume_scenes.h"
 
 namespace volume_surface_test {
 
@@ -30,7 +31,10 @@ using Imath::M44d;
 using Imath::V3d;
 using Imath::V3i;
 using levelset::Volume;
+using support::filled;
 using support::measured;
+using support::noisyBytes;
+using support::obliqueMap;
 using namespace render;
 
 constexpr Filter kFilters[] = {Filter::Trilinear, Filter::BSpline, Filter::BSplineQi,
@@ -38,41 +42,6 @@ constexpr Filter kFilters[] = {Filter::Trilinear, Filter::BSpline, Filter::BSpli
 
 RenderOptions optionsOf(Filter filter) {
   return {.samples = 1, .ambientSamples = 0, .shadowSamples = 0, .filter = filter};
-}
-
-Volume filled(const levelset::VolumeGrid& grid, const std::function<double(const V3d&)>& function) {
-  std::vector<float> values;
-  for (int k = 0; k < grid.size.z; ++k)
-    for (int j = 0; j < grid.size.y; ++j)
-      for (int i = 0; i < grid.size.x; ++i)
-        values.push_back(static_cast<float>(function(V3d(i, j, k) * grid.indexToWorld)));
-  return {grid, std::move(values)};
-}
-
-/// A sheared and mirrored map with three spacings, for grids of 30 points on each axis.
-M44d obliqueMap() {
-  const M44d linear(-0.05, 0.02, 0, 0, 0.01, 0.09, 0, 0, 0.02, -0.01, 0.06, 0, 0, 0, 0, 1);
-  const V3d middle = V3d(14.5) * linear;
-  return linear * M44d().setTranslation(-middle);
-}
-
-/// Noise of whole numbers from 0 to 255 around a ball, as bytes.
-Volume noisyBytes(int size) {
-  std::mt19937 random(3);
-  const auto bytes = std::make_shared<std::vector<unsigned char>>();
-  const double middle = 0.5 * (size - 1);
-  for (int k = 0; k < size; ++k)
-    for (int j = 0; j < size; ++j)
-      for (int i = 0; i < size; ++i) {
-        const double d = 100 - 8 * ((V3d(i, j, k) - V3d(middle)).length() - 0.3 * size);
-        const int noise = static_cast<int>(random() % 61) - 30;
-        bytes->push_back(
-            static_cast<unsigned char>(std::clamp(static_cast<int>(d) + noise, 0, 255)));
-      }
-  return {{V3i(size), M44d()},
-          levelset::VolumeType::U8,
-          {},
-          {bytes, reinterpret_cast<const char*>(bytes->data())}};
 }
 
 Scene sceneOf(const VolumeSurface& surface, int width = 96, int height = 72) {
@@ -111,23 +80,8 @@ void expectJudged(const Image& ours, const Scene& scene, Filter filter, const st
   EXPECT_EQ(depth.onlyOne, 0u) << filterName(filter) << ", " << what;
 }
 
-/// Surfaces that are difficult for ray casters, with their names.
-std::vector<std::pair<std::string, VolumeSurface>> surfaces() {
-  const auto ball = [](const V3d& p) { return 0.6 - p.length(); };
-  const auto shiftedBall = [](const V3d& p) { return 0.6 - (p - V3d(1)).length(); };
-  return {{"waves", {levelset::marschnerLobb(41), 0.5}},
-          {"values that equal the isovalue", {noisyBytes(24), 100}},
-          {"sheared ball", {filled({V3i(30), obliqueMap()}, ball), 0}},
-          {"ball", {levelset::sphereVolume(33, 0.6), 0}},
-          {"torus", {levelset::torusVolume(30, 0.6, 0.25), 0.01}},
-          {"noise", {noisyBytes(24), 100.5}},
-          {"noise, inside below", {noisyBytes(24), 100, VolumeInside::Below}},
-          {"three spacings",
-           {filled({V3i(40, 25, 12), M44d().setScale(V3d(0.05, 0.08, 0.17))}, shiftedBall), 0.02}}};
-}
-
 TEST(VolumeSurface, KernelAndJudgeAgree) {
-  for (const auto& [name, surface] : surfaces())
+  for (const auto& [name, surface] : support::volumeSurfaces())
     for (const Filter filter : kFilters) {
       Scene scene = sceneOf(surface, 64, 48);
       expectJudged(renderCpu(scene, optionsOf(filter)), scene, filter, name);
@@ -140,7 +94,7 @@ TEST(VolumeSurface, KernelAndJudgeAgree) {
 }
 
 TEST(VolumeSurface, HasTheSameBitsOnBothProcessors) {
-  const std::vector<std::pair<std::string, VolumeSurface>> all = surfaces();
+  const std::vector<std::pair<std::string, VolumeSurface>> all = support::volumeSurfaces();
   for (std::size_t n = 0; n < 3; ++n)
     for (const Filter filter : kFilters) {
       const Scene scene = sceneOf(all[n].second);
