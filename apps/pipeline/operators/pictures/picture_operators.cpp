@@ -71,6 +71,7 @@ render::ViewedScene volumeScene(Invocation& in) {
 /// operand, if it has one.
 render::Scene sceneOf(Invocation& in) {
   const Value& drawn = in.operands[0];
+  requireIsovalue(in);
   render::ViewedScene viewed = isVolume(drawn.kind()) ? volumeScene(in) : sceneOf(drawn);
   viewed.scene.camera = cameraOf(in, drawn.plan().bounds,
                                  viewed.hasCamera ? &viewed.scene.camera : nullptr, &viewed.scene);

@@ -54,7 +54,7 @@ TEST_F(Pictures, HaveEqualBitsOnGpuAndProcessorAndAgreeWithEmbree) {
 TEST_F(Pictures, OfVolumesAreProvenWithAllFilters) {
   for (const char* filter : {"trilinear", "bspline", "bspline-qi", "super-quadratic", "cubic-c1"}) {
     const Outcome drawn = levelsmith(
-        std::string("volume marschner-lobb ! render v.exr --isovalue 0.5 --size 48x36 --samples 1 "
+        std::string("volume marschner-lobb ! render v.exr --isovalue 0.5 --size 96x72 --samples 1 "
                     "--renderer both --filter ") +
         filter);
     EXPECT_EQ(drawn.code, 0) << filter << drawn.err;
