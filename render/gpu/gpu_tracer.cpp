@@ -180,6 +180,14 @@ std::string valueText(const Variant& variant, int shift) {
                     1 - (1 << (variant.valueBits - 1)));
 }
 
+constexpr const char* kLoadThree = R"GLSL(
+void loadThree(Int first, inout Real a, inout Real b, inout Real c) {
+  a = loadValue(first);
+  b = loadValue(first + 1);
+  c = loadValue(first + 2);
+}
+)GLSL";
+
 std::string shaderText(const Variant& variant, int shift) {
   return fmt::format(
              "#version 450 core\nlayout(local_size_x = {}) in;\n"
@@ -194,7 +202,7 @@ std::string shaderText(const Variant& variant, int shift) {
              HitBlock::kEnters, HitBlock::kLeaves,
              variant.filter == Filter::BSpline || variant.filter == Filter::BSplineQi,
              tetrahedralDegree(variant.filter), BrickPool::kCubeEdge, BrickPool::kCubeValues) +
-         kDialect + valueText(variant, shift) + kRootsKernel +
+         kDialect + valueText(variant, shift) + kLoadThree + kRootsKernel +
          (variant.isNano ? kNanoText + NanoGrid::layout() + kNanoVdbKernel : kBricksKernel) +
          kWindowKernel + kSplineKernel + kTetraKernel + kTraceKernel + kShapeKernel +
          kTetraShapeKernel + (variant.isPixels ? kPixelRays : kListedRays) + kMain;
