@@ -19,9 +19,11 @@
 #include "levelset/splines/grid_extension.h"
 #include "levelset/volumes/synthetic.h"
 #include "render/cpu/cpu_renderer.h"
+#include "render/cpu/cpu_trace.h"
 #include "render/embree/embree_renderer.h"
 #include "render/gpu/gpu_renderer.h"
 #include "render/images/compare_images.h"
+#include "render/kernel/kernel_scene.h"
 #include "tests/support/measured.h"
 #include "tests/support/volume_scenes.h"
 
@@ -106,6 +108,37 @@ TEST(VolumeSurface, HasTheSameBitsOnBothProcessors) {
                 0u)
           << filterName(filter) << ", " << all[n].first;
     }
+}
+
+TEST(VolumeSurface, HasTheSameBitsWithAllInstructionSets) {
+  const Scene scene = sceneOf({noisyBytes(24), 100.5});
+  PixelBlock pixels(96 * 72);
+  for (std::size_t n = 0; n < pixels.size(); ++n) {
+    pixels.x[n] = static_cast<float>(n % 96) - 47.5f;
+    pixels.y[n] = static_cast<float>(n / 96) - 35.5f;
+  }
+  for (const Filter filter : {Filter::SuperQuadratic, Filter::CubicC1}) {
+    const KernelScene kernel(scene, levelset::kNoMemoryLimit, filter);
+    const KernelSolid& solid = kernel.solids().at(0);
+    HitBlock first(pixels.size());
+    ShapeBlock firstShapes(pixels.size());
+    tracePixels(solid.pool, solid.fan, pixels, first, firstShapes, InstructionSet::Sse2);
+    std::size_t hits = 0;
+    for (const InstructionSet set : instructionSets()) {
+      HitBlock other(pixels.size());
+      ShapeBlock otherShapes(pixels.size());
+      tracePixels(solid.pool, solid.fan, pixels, other, otherShapes, set);
+      ASSERT_EQ(other.found, first.found);
+      for (std::size_t n = 0; n < pixels.size(); ++n) {
+        if (first.found[n] == 0) continue;
+        ++hits;
+        ASSERT_EQ(other.t[n], first.t[n]);
+        for (std::size_t p = 0; p < ShapeBlock::kParts; ++p)
+          ASSERT_EQ(otherShapes.part[p][n], firstShapes.part[p][n]);
+      }
+    }
+    EXPECT_GT(hits, 1000u);
+  }
 }
 
 TEST(VolumeSurface, HasTheDepthOfTheJudgeWithinAHundredThousandthOfAVoxel) {
