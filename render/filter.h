@@ -11,8 +11,18 @@ enum class Filter {
   BSpline,
   /// Quasi-interpolating tricubic B-spline with coefficients f − ∇²f/6: its error is of fourth
   /// order in the voxel size [Sigg05].
-  BSplineQi
+  BSplineQi,
+  /// Quadratic super spline on the type-6 partition, smooth but for the middles of cubes [Kalbe11].
+  SuperQuadratic,
+  /// Cubic C¹ spline on the type-6 partition [Kalbe11].
+  CubicC1
 };
+
+/// Degree of a spline on the tetrahedra of the type-6 partition; 0 for other filters. The cubes of
+/// the partition are centred at the grid points.
+[[nodiscard]] constexpr int tetrahedralDegree(Filter filter) {
+  return filter == Filter::SuperQuadratic ? 2 : filter == Filter::CubicC1 ? 3 : 0;
+}
 
 [[nodiscard]] constexpr const char* filterName(Filter filter) {
   switch (filter) {
@@ -20,6 +30,10 @@ enum class Filter {
       return "bspline";
     case Filter::BSplineQi:
       return "bspline-qi";
+    case Filter::SuperQuadratic:
+      return "super-quadratic";
+    case Filter::CubicC1:
+      return "cubic-c1";
     default:
       return "trilinear";
   }

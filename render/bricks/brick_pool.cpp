@@ -128,7 +128,7 @@ void fillPool(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks
     pool.entry[slot + BrickPool::kStridesOfEntry] = strideX << BrickPool::kStrideShift | strideY;
   };
   std::size_t held = 0;
-  for (std::size_t i = 0; i < bricks.size(); ++i, held += BrickPool::kValues) {
+  for (std::size_t i = 0; i < bricks.size(); ++i, held += pool.brickValues()) {
     const std::size_t slot = table.slotOf(bricks[i]->origin);
     pool.entry[slot] = static_cast<std::int32_t>(i);
     hold(slot, held, kEdge * kEdge, kEdge);
@@ -152,12 +152,12 @@ void fillPool(BrickPool& pool, const std::vector<std::unique_ptr<Brick>>& bricks
                     held, kMostValues));
   }
   markEmptyCubes(pool);
-  pool.value.resize(bricks.size() * BrickPool::kValues);
+  pool.value.resize(bricks.size() * pool.brickValues());
   pool.value.reserve(held);
   pool.mask.resize(bricks.size() * BrickPool::kMaskWords);
   tbb::parallel_for(std::size_t{0}, bricks.size(), [&](std::size_t i) {
     std::copy(bricks[i]->value.begin(), bricks[i]->value.end(),
-              pool.value.begin() + static_cast<std::ptrdiff_t>(i * BrickPool::kValues));
+              pool.value.begin() + static_cast<std::ptrdiff_t>(i * pool.brickValues()));
     std::copy(bricks[i]->mask.begin(), bricks[i]->mask.end(),
               pool.mask.begin() + static_cast<std::ptrdiff_t>(i * BrickPool::kMaskWords));
   });
@@ -196,21 +196,10 @@ void requireNarrow(const openvdb::CoordBBox& crossed) {
                   spans[0], spans[1], spans[2], kWidest));
 }
 
-}  // namespace
-
-std::size_t BrickPool::bytes() const {
-  return 4 * (page.size() + entry.size() + mask.size()) + valueBytes();
-}
-
-BrickPool makeBricks(const levelset::NarrowBand& band, const TableOptions& options) {
+BrickPool makePool(const GridSource& grid, float background, const TableOptions& options) {
   BrickPool pool;
   pool.filter = options.filter;
-  if (band.isEmpty()) return pool;
-  openvdb::FloatTree::ConstPtr coefficients;
-  if (options.filter == Filter::BSplineQi)
-    coefficients = quasiInterpolated(levelset::vdb(band).tree());
-  const openvdb::FloatTree& tree = coefficients ? *coefficients : levelset::vdb(band).tree();
-  const Bricks bricks = bricksOf(tree, options);
+  const Bricks bricks = bricksOf(grid, options);
   const openvdb::CoordBBox& crossed = bricks.crossed;
   if (crossed.empty()) return pool;
   requireNarrow(crossed);
@@ -227,14 +216,40 @@ BrickPool makeBricks(const levelset::NarrowBand& band, const TableOptions& optio
         (box.max()[a] - box.min()[a] + BrickPool::kBlock + BrickPool::kPage - 1) / BrickPool::kPage;
   }
   pool.blocksCulled = bricks.culled;
-  pool.blocksOmitted = tree.leafCount();
+  pool.blocksOmitted = grid.storedBlocks();
   if (bricks.kept.empty()) return pool;
-  fillPool(pool, bricks.kept, haloBlocks(tree, bricks.kept), levelset::vdb(band).background());
-  pool.blocksOmitted -= pool.haloCount;
-  for (const auto& brick : bricks.kept)
-    pool.blocksOmitted -= tree.probeConstLeaf(brick->origin) != nullptr;
+  const std::vector<HaloBlock> beside = tetrahedralDegree(options.filter) > 0
+                                            ? std::vector<HaloBlock>()
+                                            : haloBlocks(grid, bricks.kept);
+  fillPool(pool, bricks.kept, beside, background);
+  for (const auto& brick : bricks.kept) pool.blocksOmitted -= grid.isStored(brick->origin);
+  for (const HaloBlock& block : beside)
+    pool.blocksOmitted -= !block.value.empty() && grid.isStored(block.origin);
   if (options.quantization.bits != 32) encode(pool, options.quantization);
   return pool;
+}
+
+}  // namespace
+
+std::size_t BrickPool::bytes() const {
+  return 4 * (page.size() + entry.size() + mask.size()) + valueBytes();
+}
+
+BrickPool makeBricks(const levelset::NarrowBand& band, const TableOptions& options) {
+  if (band.isEmpty()) {
+    BrickPool nothing;
+    nothing.filter = options.filter;
+    return nothing;
+  }
+  openvdb::FloatTree::ConstPtr coefficients;
+  if (options.filter == Filter::BSplineQi)
+    coefficients = quasiInterpolated(levelset::vdb(band).tree());
+  const openvdb::FloatTree& tree = coefficients ? *coefficients : levelset::vdb(band).tree();
+  return makePool(*treeSource(tree), levelset::vdb(band).background(), options);
+}
+
+BrickPool makeBricks(const VolumeSurface& surface, const TableOptions& options) {
+  return makePool(*volumeSource(surface, options.filter), 0, options);
 }
 
 }  // namespace render

@@ -11,21 +11,28 @@
 #include "levelset/narrow_band.h"
 #include "render/filter.h"
 #include "render/images/value_bits.h"
+#include "render/volumes/volume_surface.h"
 
 namespace render {
 
-/// Values of a band that the kernel's rays read, and a two-level table that finds them by position.
-/// The pool holds all values of the blocks of 8³ cells that the surface crosses (bricks). Of their
-/// neighbours (halo blocks) it holds only the points that curvature stencils read. The members are
-/// plain arrays, so that they can be uploaded to the GPU.
+/// Values of a band or volume that the kernel's rays read, and a two-level table that finds them by
+/// position. The pool holds all values of the blocks of 8³ cells that the surface crosses (bricks).
+/// Of their neighbours (halo blocks) it holds only the points that curvature stencils read. The
+/// members are plain arrays, so that they can be uploaded to the GPU.
 ///
 /// Positions are in table space: the band's index space minus `origin`. Blocks, pages of 8³ blocks
-/// and empty cubes start at multiples of their edge there.
+/// and empty cubes start at multiples of their edge there. For filters on tetrahedra, positions are
+/// larger by half a voxel, so that the grid point n lies in the middle of cell n. Their tables have
+/// no halo blocks.
 struct BrickPool {
   static constexpr int kBlock = 8;  ///< cells of a block along an axis
   static constexpr int kEdge =
       kBlock + 1;  ///< grid points of a brick along an axis, with those of its last face
   static constexpr int kValues = kEdge * kEdge * kEdge;
+  /// The same for filters on tetrahedra: a brick then has the 27 data around each cell, from one
+  /// point before the block on.
+  static constexpr int kCubeEdge = kBlock + 2;
+  static constexpr int kCubeValues = kCubeEdge * kCubeEdge * kCubeEdge;
   static constexpr int kMaskWords =
       16;  ///< 32-bit words of a brick's mask, which has a bit for each cell
   static constexpr int kPage = 64;  ///< cells along an axis of a page, which has 8³ blocks
@@ -57,9 +64,9 @@ struct BrickPool {
   /// kMaskWords words for each brick. Bit 64x + 8y + z is set when the surface may cross cell (x,
   /// y, z): its corners differ in sign, or, for a spline filter, bounds on the spline do.
   std::vector<std::uint32_t> mask;
-  /// φ or the spline's coefficients, world units, ordered by x, y, z. First kValues values for each
-  /// brick, then the stored box of each halo block. Then kBlock times the background, for blocks
-  /// far outside, and kBlock times minus the background, for blocks far inside.
+  /// φ or the spline's coefficients, world units, ordered by x, y, z. First brickValues() values
+  /// for each brick, then the stored box of each halo block. Then kBlock times the background, for
+  /// blocks far outside, and kBlock times minus the background, for blocks far inside.
   std::vector<float> value;
   /// Replaces `value` when values are quantized: little-endian codes, followed by padding so that a
   /// 32-bit load of the last code stays in bounds.
@@ -69,9 +76,16 @@ struct BrickPool {
   /// Range of the cells that the surface crosses, in table space; the upper end is exclusive.
   std::array<int, 3> cellsLow{}, cellsHigh{};
 
-  std::size_t haloCount = 0;      ///< halo blocks with stored points
-  std::size_t blocksOmitted = 0;  ///< leaf nodes of the band of which the pool stores no point
-  std::size_t blocksCulled = 0;   ///< blocks that the surface crosses but the picture does not need
+  std::size_t haloCount = 0;  ///< halo blocks with stored points
+  /// Leaf nodes of the band, or blocks of the volume, of which the pool stores no point.
+  std::size_t blocksOmitted = 0;
+  std::size_t blocksCulled = 0;  ///< blocks that the surface crosses but the picture does not need
+  /// Number of values of a brick.
+  [[nodiscard]] std::size_t brickValues() const {
+    return tetrahedralDegree(filter) > 0 ? kCubeValues : kValues;
+  }
+  /// Distance from positions in index space to those in table space before `origin` is subtracted.
+  [[nodiscard]] double shift() const { return tetrahedralDegree(filter) > 0 ? 0.5 : 0; }
   [[nodiscard]] std::size_t brickCount() const { return mask.size() / kMaskWords; }
   [[nodiscard]] std::size_t valueBytes() const {
     return code.empty() ? value.size() * sizeof value[0] : code.size() - kCodePadding;
@@ -95,5 +109,9 @@ struct TableOptions {
 ///         voxels), or for more values than a 32-bit index can address
 [[nodiscard]] BrickPool makeBricks(const levelset::NarrowBand& band,
                                    const TableOptions& options = {});
+/// Builds the brick pool of an isosurface of a volume: positions are in the volume's index space,
+/// and values are those of its field. @pre options.quantization has 32 bits
+/// @throws as above
+[[nodiscard]] BrickPool makeBricks(const VolumeSurface& surface, const TableOptions& options = {});
 
 }  // namespace render

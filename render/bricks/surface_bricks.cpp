@@ -37,10 +37,9 @@ std::vector<Coord> blocksOf(const openvdb::FloatTree& tree) {
 
 /// Copies the values of the 9³ grid points from a block's origin on, which lie in up to eight
 /// leaves. Returns true when the values differ in sign.
-template <typename Accessor>
-bool fill(const Accessor& accessor, Brick& brick) {
+bool fill(GridReader& grid, Brick& brick) {
   static_assert(BrickPool::kEdge == kBlock + 1);
-  levelset::copyPaddedLeaf(accessor, brick.origin, 0, 1, brick.value.data());
+  grid.copyPadded(brick.origin, 0, 1, brick.value.data());
   bool anyInside = false, anyOutside = false;
   for (const float v : brick.value) (v < 0 ? anyInside : anyOutside) = true;
   return anyInside && anyOutside;
@@ -75,10 +74,7 @@ struct SplineBlock {
   static constexpr int kAround = kBlock + 3;
   float c[kAround][kAround][kAround];
 
-  template <typename Accessor>
-  SplineBlock(const Accessor& accessor, const Coord& origin) {
-    levelset::copyPaddedLeaf(accessor, origin, 1, 2, &c[0][0][0]);
-  }
+  SplineBlock(GridReader& grid, const Coord& origin) { grid.copyPadded(origin, 1, 2, &c[0][0][0]); }
 
   using SignRows = std::array<std::array<unsigned, kAround>, kAround>;
   /// Signs of the coefficients: bit z of rows[x][y] is set when c[x][y][z] is negative.
@@ -152,9 +148,8 @@ struct SplineBlock {
 };
 
 /// Sets the mask bits of the cells in which the spline may cross zero.
-template <typename Accessor>
-void findSplineCrossings(const Accessor& accessor, Brick& brick) {
-  const SplineBlock block(accessor, brick.origin);
+void findSplineCrossings(GridReader& grid, Brick& brick) {
+  const SplineBlock block(grid, brick.origin);
   const SplineBlock::SignRows signs = block.signRows();
   brick.mask = {};
   for (int x = 0; x < kBlock; ++x)
@@ -165,6 +160,15 @@ void findSplineCrossings(const Accessor& accessor, Brick& brick) {
       const unsigned bit = static_cast<unsigned>(x << 6 | y << 3);
       brick.mask[bit >> 5] |= (mixed & block.openCells(x, y)) << (bit & 31);
     }
+}
+
+/// Clears the mask bits of the cells outside a box.
+void keepCells(const CoordBBox& cells, Brick& brick) {
+  const CoordBBox block = CoordBBox::createCube(brick.origin, kBlock);
+  if (cells.isInside(block)) return;
+  for (int n = 0; n < kBlock * kBlock * kBlock; ++n)
+    if (!cells.isInside(brick.origin.offsetBy(n >> 6, n >> 3 & 7, n & 7)))
+      brick.mask[static_cast<std::size_t>(n >> 5)] &= ~(1u << (n & 31));
 }
 
 /// Calls work(first, last) with the first and the last crossed cell of each row of cells along z
@@ -216,14 +220,56 @@ void addPartsBeside(const Brick& brick, std::vector<Part>& parts) {
   }
 }
 
+/// Reader of a tree's values.
+class TreeReader : public GridReader {
+ public:
+  explicit TreeReader(const openvdb::FloatTree& tree) : accessor_(tree) {}
+  void copyPadded(const Coord& origin, int before, int after, float* out) override {
+    levelset::copyPaddedLeaf(accessor_, origin, before, after, out);
+  }
+  void read(HaloBlock& block) override {
+    const Leaf* leaf = accessor_.probeConstLeaf(block.origin);
+    if (!leaf) {
+      block.isInside = accessor_.getValue(block.origin) < 0;
+      return;
+    }
+    block.value.reserve(block.points.volume());
+    for (const Coord& point : block.points)
+      block.value.push_back(leaf->buffer().data()[Leaf::coordToOffset(point)]);
+  }
+
+ private:
+  openvdb::tree::ValueAccessor<const openvdb::FloatTree> accessor_;
+};
+
+class TreeSource : public GridSource {
+ public:
+  explicit TreeSource(const openvdb::FloatTree& tree) : tree_(tree) {}
+  [[nodiscard]] std::vector<Coord> blocks() const override { return blocksOf(tree_); }
+  [[nodiscard]] std::size_t storedBlocks() const override { return tree_.leafCount(); }
+  [[nodiscard]] bool isStored(const Coord& origin) const override {
+    return tree_.probeConstLeaf(origin) != nullptr;
+  }
+  [[nodiscard]] std::unique_ptr<GridReader> reader() const override {
+    return std::make_unique<TreeReader>(tree_);
+  }
+
+ private:
+  const openvdb::FloatTree& tree_;
+};
+
 }  // namespace
+
+std::unique_ptr<GridSource> treeSource(const openvdb::FloatTree& tree) {
+  return std::make_unique<TreeSource>(tree);
+}
 
 openvdb::FloatTree::Ptr quasiInterpolated(const openvdb::FloatTree& tree) {
   openvdb::FloatTree::Ptr result(new openvdb::FloatTree(tree));
   openvdb::tree::LeafManager<openvdb::FloatTree> leaves(*result);
   leaves.foreach ([&](Leaf& leaf, std::size_t) {
-    const openvdb::tree::ValueAccessor<const openvdb::FloatTree> accessor(tree);
-    const SplineBlock f(accessor, leaf.origin());
+    TreeReader reader(tree);
+    const SplineBlock f(reader, leaf.origin());
     float* values = leaf.buffer().data();
     for (int x = 1; x <= kBlock; ++x)
       for (int y = 1; y <= kBlock; ++y)
@@ -240,10 +286,11 @@ openvdb::FloatTree::Ptr quasiInterpolated(const openvdb::FloatTree& tree) {
   return result;
 }
 
-Bricks bricksOf(const openvdb::FloatTree& tree, const TableOptions& options) {
+Bricks bricksOf(const GridSource& grid, const TableOptions& options) {
   // Radius, in voxels, of a ball that contains a block and the stencils of its cells.
   constexpr double kRadius = 0.5 * kBlock * std::numbers::sqrt3 + 3;
-  const std::vector<Coord> blocks = blocksOf(tree);
+  const std::vector<Coord> blocks = grid.blocks();
+  const CoordBBox cells = grid.cells();
   std::vector<std::unique_ptr<Brick>> bricks(blocks.size());
   struct Sum {
     CoordBBox crossed, cells;
@@ -251,19 +298,21 @@ Bricks bricksOf(const openvdb::FloatTree& tree, const TableOptions& options) {
   };
   tbb::enumerable_thread_specific<Sum> sums;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size(), 64), [&](const auto& range) {
-    const openvdb::tree::ValueAccessor<const openvdb::FloatTree> accessor(tree);
+    const std::unique_ptr<GridReader> reader = grid.reader();
     Sum& sum = sums.local();
     auto brick = std::make_unique<Brick>();
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       brick->origin = blocks[i];
-      const bool differ = fill(accessor, *brick);
-      if (options.filter == Filter::Trilinear) {
+      if (tetrahedralDegree(options.filter) > 0) {
+        fillCubes(*reader, options.filter, *brick);
+      } else if (const bool differ = fill(*reader, *brick); options.filter != Filter::Trilinear) {
+        findSplineCrossings(*reader, *brick);
+      } else {
         if (!differ) continue;
         findCrossings(*brick);
-      } else {
-        findSplineCrossings(accessor, *brick);
-        if (brick->mask == decltype(brick->mask){}) continue;
       }
+      keepCells(cells, *brick);
+      if (brick->mask == decltype(brick->mask){}) continue;
       const Coord& origin = brick->origin;
       sum.crossed.expand(origin);
       overCrossedRows(*brick, [&](const Coord& first, const Coord& last) {
@@ -291,7 +340,7 @@ Bricks bricksOf(const openvdb::FloatTree& tree, const TableOptions& options) {
   return result;
 }
 
-std::vector<HaloBlock> haloBlocks(const openvdb::FloatTree& tree,
+std::vector<HaloBlock> haloBlocks(const GridSource& grid,
                                   const std::vector<std::unique_ptr<Brick>>& bricks) {
   std::vector<Part> parts;
   for (const auto& brick : bricks) addPartsBeside(*brick, parts);
@@ -307,18 +356,8 @@ std::vector<HaloBlock> haloBlocks(const openvdb::FloatTree& tree,
     blocks.back().points.expand(part.points);
   }
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size(), 64), [&](const auto& range) {
-    const openvdb::tree::ValueAccessor<const openvdb::FloatTree> accessor(tree);
-    for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      HaloBlock& block = blocks[i];
-      const Leaf* leaf = accessor.probeConstLeaf(block.origin);
-      if (!leaf) {
-        block.isInside = accessor.getValue(block.origin) < 0;
-        continue;
-      }
-      block.value.reserve(block.points.volume());
-      for (const Coord& point : block.points)
-        block.value.push_back(leaf->buffer().data()[Leaf::coordToOffset(point)]);
-    }
+    const std::unique_ptr<GridReader> reader = grid.reader();
+    for (std::size_t i = range.begin(); i != range.end(); ++i) reader->read(blocks[i]);
   });
   return blocks;
 }

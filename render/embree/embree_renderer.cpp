@@ -94,6 +94,11 @@ Image renderEmbree(const Scene& scene, const RenderOptions& options) {
   if (!scene.mapped.empty())
     throw levelset::UsageError(
         "the Embree renderer does not draw mapped textures; give --renderer cpu or gpu");
+  double points = 0;  // of volumes, whose values are copied
+  for (const Solid& solid : scene.solids)
+    if (solid.volume) points += static_cast<double>(solid.volume->volume().grid().pointCount());
+  constexpr double kBytesOfPoint = 5;
+  levelset::requireMemory(points * kBytesOfPoint, options.maxBytes);
   levelset::report(options.progress, 0);
   const EmbreeScene rays(scene, options.filter);
   if (rays.bounds().isEmpty()) refuseEmptyScene();

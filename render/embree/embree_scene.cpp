@@ -11,6 +11,8 @@
 #include "render/embree/field_march.h"
 #include "render/embree/judge_blocks_vdb.h"
 #include "render/embree/surface_spline_vdb.h"
+#include "render/embree/tetra_cell_vdb.h"
+#include "render/embree/volume_tree_vdb.h"
 #include "render/meshes/embree_space.h"
 #include "render/meshes/mesh_rays.h"
 #include "render/shading/surface_shape.h"
@@ -22,7 +24,10 @@ using Imath::Box3d;
 using Imath::V3d;
 
 struct RaySolid {
-  levelset::NarrowBand band;  // keeps the tree alive
+  openvdb::FloatTree::ConstPtr tree;
+  openvdb::CoordBBox cells = openvdb::CoordBBox::inf();  // cells in which the surface is drawn
+  bool isVolume;
+  double voxelSize;
   Imath::M44d indexToWorld, worldToIndex;
   std::vector<SurfaceBlock> blocks;
   std::uint32_t id;
@@ -33,9 +38,10 @@ struct RaySolid {
   Imath::C3f colour;
   double opacity;
 
-  [[nodiscard]] DrawnField field() const { return {levelset::vdb(band).tree(), filter}; }
+  [[nodiscard]] DrawnField field() const { return {*tree, filter, cells}; }
   [[nodiscard]] SurfaceShape shapeAt(const V3d& world) const {
-    return surfaceShape(levelset::vdb(band).tree(), world * worldToIndex, filter);
+    if (tetrahedralDegree(filter) > 0) return tetraShape(*tree, world * worldToIndex, filter);
+    return surfaceShape(*tree, world * worldToIndex, filter);
   }
 };
 
@@ -211,6 +217,7 @@ EmbreeScene::Impl::Impl(const Scene& source, Filter filter)
   gather(source, filter);
   allBounds = bounds;
   allBounds.extendBy(meshes.bounds());
+  if (allBounds.isEmpty()) allBounds = source.volumeBounds();
   if (bounds.isEmpty()) return;
   build();
 }
@@ -218,10 +225,22 @@ EmbreeScene::Impl::Impl(const Scene& source, Filter filter)
 void EmbreeScene::Impl::gather(const Scene& source, Filter filter) {
   for (std::size_t i = 0; i < source.solids.size(); ++i) {
     const Solid& solid = source.solids[i];
-    if (solid.band.isEmpty() || (!source.csg.isEmpty() && !source.csg.uses(i))) continue;
+    if (solid.isEmpty() || (!source.csg.isEmpty() && !source.csg.uses(i))) continue;
     RaySolid entry;
-    entry.band = solid.band;
-    entry.indexToWorld = solid.band.indexToWorld();
+    entry.isVolume = solid.volume != nullptr;
+    if (solid.volume) {
+      entry.tree = treeOf(*solid.volume);
+      const auto [first, last] = solid.volume->cells(filter);
+      entry.cells = {openvdb::Coord(first.x, first.y, first.z),
+                     openvdb::Coord(last.x, last.y, last.z)};
+    } else {
+      entry.tree = levelset::vdb(solid.band).treePtr();
+    }
+    entry.voxelSize = solid.voxelSize();
+    entry.indexToWorld = solid.indexToWorld();
+    // The cubes of the partition are centred at the grid points.
+    if (tetrahedralDegree(filter) > 0)
+      entry.indexToWorld = Imath::M44d().setTranslation(V3d(-0.5)) * entry.indexToWorld;
     entry.worldToIndex = entry.indexToWorld.inverse();
     entry.filter = filter;
     entry.blocks = surfaceBlocks(entry.field());
@@ -234,7 +253,7 @@ void EmbreeScene::Impl::gather(const Scene& source, Filter filter) {
     if (!entry.blocks.empty()) solids.push_back(std::move(entry));
   }
   std::stable_sort(solids.begin(), solids.end(), [](const RaySolid& a, const RaySolid& b) {
-    const double u = a.band.voxelSize(), v = b.band.voxelSize();
+    const double u = a.voxelSize, v = b.voxelSize;
     return u != v ? u < v : a.id < b.id;
   });
   std::vector<int> numbers(source.solids.size(), -1);
@@ -313,7 +332,11 @@ void EmbreeScene::Impl::complete(Hit& hit, const RayQuery& query, const RaySolid
   hit.solid = solid.index;
   hit.colour = solid.colour;
   hit.opacity = solid.opacity;
-  addShape(hit, solid.shapeAt(hit.position), solid.indexToWorld, query.direction);
+  const SurfaceShape shape = solid.shapeAt(hit.position);
+  if (solid.isVolume)
+    addVolumeShape(hit, shape, solid.worldToIndex, solid.voxelSize, query.direction);
+  else
+    addShape(hit, shape, solid.indexToWorld, query.direction);
 }
 
 EmbreeScene::EmbreeScene(const Scene& scene, Filter filter)

@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "render/embree/cubic_root.h"
 #include "render/embree/judge_blocks_vdb.h"
 #include "render/embree/spline_cell_vdb.h"
+#include "render/embree/tetra_cell_vdb.h"
 
 namespace render {
 namespace {
@@ -53,6 +55,7 @@ void markCells(SurfaceBlock& block, unsigned x, unsigned y, unsigned cells) {
 /// Returns false when there are no such cells.
 bool markSplineCells(SurfaceBlock& block, const DrawnField& field) {
   const SplineCoefficients<8> coefficients(field.tree, block.origin, field.filter);
+  if (!coefficients.haveBothSigns()) return false;
   block.crossing.fill(0);
   block.extent = {8, 8, 8, 0, 0, 0};
   for (int x = 0; x < 8; ++x)
@@ -78,6 +81,36 @@ bool markCrossingCells(SurfaceBlock& block) {
       const unsigned cells = (some | some >> 1) & ~(all & all >> 1) & 0xffu;
       markCells(block, x, y, cells);
     }
+  }
+  return block.extent[3] != 0;
+}
+
+/// The same for a spline on tetrahedra.
+bool markTetraCells(SurfaceBlock& block, const DrawnField& field) {
+  block.crossing.fill(0);
+  block.extent = {8, 8, 8, 0, 0, 0};
+  for (int x = 0; x < 8; ++x)
+    for (int y = 0; y < 8; ++y) {
+      unsigned cells = 0;
+      for (int z = 0; z < 8; ++z)
+        cells |=
+            unsigned{TetraCell(field.tree, block.origin.offsetBy(x, y, z), field.filter).mayCross()}
+            << z;
+      markCells(block, static_cast<unsigned>(x), static_cast<unsigned>(y), cells);
+    }
+  return block.extent[3] != 0;
+}
+
+/// Clears the cells outside a box. Returns false when no cell is left.
+bool keepCells(SurfaceBlock& block, const openvdb::CoordBBox& cells) {
+  if (cells.isInside(openvdb::CoordBBox::createCube(block.origin, 8))) return true;
+  const std::array<std::uint64_t, 8> marked = std::exchange(block.crossing, {});
+  block.extent = {8, 8, 8, 0, 0, 0};
+  for (unsigned n = 0; n < 512; ++n) {
+    const unsigned x = n >> 6, y = n >> 3 & 7, z = n & 7;
+    const Coord cell =
+        block.origin.offsetBy(static_cast<int>(x), static_cast<int>(y), static_cast<int>(z));
+    if ((marked[x] >> (8 * y + z) & 1) && cells.isInside(cell)) markCells(block, x, y, 1u << z);
   }
   return block.extent[3] != 0;
 }
@@ -204,8 +237,11 @@ std::optional<double> BlockTraversal::splineRoot(const DrawnField& field, double
                                                  int outAxis) const {
   double p[2][3];
   placesInCell(exit, outAxis, p);
-  const SplineCell spline(
-      SplineCoefficients<1>(field.tree, Coord(cell[0], cell[1], cell[2]), field.filter));
+  const Coord at(cell[0], cell[1], cell[2]);
+  if (tetrahedralDegree(field.filter) > 0)
+    return TetraCell(field.tree, at, field.filter)
+        .firstSignChange(V3d(p[0][0], p[0][1], p[0][2]), V3d(p[1][0], p[1][1], p[1][2]));
+  const SplineCell spline(SplineCoefficients<1>(field.tree, at, field.filter));
   return spline.firstSignChange(V3d(p[0][0], p[0][1], p[0][2]), V3d(p[1][0], p[1][1], p[1][2]));
 }
 
@@ -214,9 +250,15 @@ bool BlockTraversal::addSplineRoots(const DrawnField& field, double exit, int ou
   double p[2][3];
   placesInCell(exit, outAxis, p);
   const V3d start(p[0][0], p[0][1], p[0][2]);
-  const SplineCell spline(
-      SplineCoefficients<1>(field.tree, Coord(cell[0], cell[1], cell[2]), field.filter));
-  spline.addSignChanges(start, V3d(p[1][0], p[1][1], p[1][2]), shares);
+  const V3d end(p[1][0], p[1][1], p[1][2]);
+  const Coord at(cell[0], cell[1], cell[2]);
+  if (tetrahedralDegree(field.filter) > 0) {
+    const TetraCell spline(field.tree, at, field.filter);
+    spline.addSignChanges(start, end, shares);
+    return spline.value(start) < 0;
+  }
+  const SplineCell spline(SplineCoefficients<1>(field.tree, at, field.filter));
+  spline.addSignChanges(start, end, shares);
   return spline.value(start) < 0;
 }
 
@@ -291,9 +333,10 @@ std::vector<SurfaceBlock> surfaceBlocks(const DrawnField& field) {
         block.leaves[n] = leaf ? leaf->buffer().data() : nullptr;
         block.tiles[n] = leaf ? 0 : accessor.getValue(at);
       }
-      const bool crosses = field.filter == Filter::Trilinear ? markCrossingCells(block)
-                                                             : markSplineCells(block, field);
-      if (crosses) found[i] = block;
+      const bool crosses = tetrahedralDegree(field.filter) > 0 ? markTetraCells(block, field)
+                           : field.filter == Filter::Trilinear ? markCrossingCells(block)
+                                                               : markSplineCells(block, field);
+      if (crosses && keepCells(block, field.cells)) found[i] = block;
     }
   });
   std::vector<SurfaceBlock> blocks;

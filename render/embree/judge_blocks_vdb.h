@@ -58,6 +58,8 @@ struct SurfaceBlock {
 struct DrawnField {
   const openvdb::FloatTree& tree;
   Filter filter = Filter::Trilinear;
+  /// Box of the cells in which the surface is drawn.
+  openvdb::CoordBBox cells = openvdb::CoordBBox::inf();
 };
 
 /// All blocks with a cell that the surface may cross, sorted by origin. For the trilinear filter,

@@ -36,6 +36,15 @@ struct SplineCoefficients {
                           6;
         }
   }
+
+  /// Returns false when all coefficients have one sign, so that the spline has no zero.
+  [[nodiscard]] bool haveBothSigns() const {
+    bool anyInside = false, anyOutside = false;
+    for (const auto& plane : c)
+      for (const auto& row : plane)
+        for (const double v : row) (v < 0 ? anyInside : anyOutside) = true;
+    return anyInside && anyOutside;
+  }
 };
 
 /// The tricubic B-spline on one cell.

@@ -143,7 +143,9 @@ uniform int nanoRoot, nanoTiles, nanoFar, nanoOriginX, nanoOriginY, nanoOriginZ;
 
 /// Properties of rays and grid that select a shader.
 struct Variant {
-  bool isPixels, isSpline, isNano;
+  bool isPixels;
+  Filter filter;
+  bool isNano;
   int valueBits;
   int blocks;  // number of buffer textures that store the values of the solid
   auto operator<=>(const Variant&) const = default;
@@ -181,21 +183,32 @@ std::string valueText(const Variant& variant, int shift) {
                     1 - (1 << (variant.valueBits - 1)));
 }
 
+constexpr const char* kLoadThree = R"GLSL(
+void loadThree(Int first, inout Real a, inout Real b, inout Real c) {
+  a = loadValue(first);
+  b = loadValue(first + 1);
+  c = loadValue(first + 2);
+}
+)GLSL";
+
 std::string shaderText(const Variant& variant, int shift) {
   return fmt::format(
              "#version 450 core\nlayout(local_size_x = {}) in;\n"
              "const int kBrickEdge = {}, kBrickValues = {}, kPageShift = {},\n"
              "          kFirstOfEntry = {}, kStridesOfEntry = {}, kStrideShift = {},\n"
              "          kHitParts = {}, kShapeParts = {}, kEnters = {}, kLeaves = {};\n"
-             "const bool isSpline = {};\n",
+             "const bool isSpline = {};\n"
+             "const int tetraDegree = {}, kCubeEdge = {}, kCubeValues = {};\n",
              kGroup, BrickPool::kEdge, BrickPool::kValues,
              std::countr_zero(static_cast<unsigned>(BrickPool::kPage)), BrickPool::kFirstOfEntry,
              BrickPool::kStridesOfEntry, BrickPool::kStrideShift, kHitParts, ShapeBlock::kParts,
-             HitBlock::kEnters, HitBlock::kLeaves, variant.isSpline) +
-         kDialect + valueText(variant, shift) + kRootsKernel +
+             HitBlock::kEnters, HitBlock::kLeaves,
+             variant.filter == Filter::BSpline || variant.filter == Filter::BSplineQi,
+             tetrahedralDegree(variant.filter), BrickPool::kCubeEdge, BrickPool::kCubeValues) +
+         kDialect + valueText(variant, shift) + kLoadThree + kRootsKernel +
          (variant.isNano ? kNanoText + NanoGrid::layout() + kNanoVdbKernel : kBricksKernel) +
-         kWindowKernel + kSplineKernel + kTraceKernel + kShapeKernel +
-         (variant.isPixels ? kPixelRays : kListedRays) + kMain;
+         kWindowKernel + kSplineKernel + kTetraKernel + kTraceKernel + kShapeKernel +
+         kTetraShapeKernel + (variant.isPixels ? kPixelRays : kListedRays) + kMain;
 }
 
 }  // namespace
@@ -291,7 +304,7 @@ struct GpuTracer::Impl {
   GLuint programFor(const KernelSolid& solid, bool isPixels) {
     const Tables& t = tables.at(&solid);
     const Variant variant{.isPixels = isPixels,
-                          .isSpline = solid.pool.filter != Filter::Trilinear,
+                          .filter = solid.pool.filter,
                           .isNano = t.nano.has_value(),
                           .valueBits = t.nano ? 32 : solid.pool.quantization.bits,
                           .blocks = static_cast<int>(t.values.size())};

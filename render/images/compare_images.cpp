@@ -252,16 +252,32 @@ class Comparer {
                           }});
     const double h = voxelSize();
     const double rough = curvatureStep();
+    // Curvatures above one per voxel, which surfaces of volumes have, are compared relatively.
+    const auto bend = [this, h](std::size_t i) {
+      double most = 1;
+      for (const Image* image : {&a_, &b_})
+        for (const char* name : {"curvature.k1", "curvature.k2"}) {
+          const double k = h * std::abs(value(*image, name, i));
+          if (std::isfinite(k)) most = std::max(most, k);
+        }
+      return most;
+    };
     for (const auto& [name, usual] : {std::pair{"mean", 1e-4}, {"k1", 1e-3}, {"k2", 1e-3}}) {
       const std::string channel = std::string("curvature.") + name;
-      add({channel},
-          {channel, "per voxel", {usual + rough, kInfinite}, [this, channel, h](std::size_t i) {
-             return h * apart(value(a_, channel, i), value(b_, channel, i));
-           }});
+      add({channel}, {channel,
+                      "per voxel",
+                      {usual + rough, kInfinite},
+                      [this, channel, h, bend](std::size_t i) {
+                        return h * apart(value(a_, channel, i), value(b_, channel, i)) / bend(i);
+                      }});
     }
     add({"curvature.gauss"},
-        {"curvature.gauss", "per voxel²", {1e-4 + rough, kInfinite}, [this, h](std::size_t i) {
-           return h * h * apart(value(a_, "curvature.gauss", i), value(b_, "curvature.gauss", i));
+        {"curvature.gauss",
+         "per voxel²",
+         {1e-4 + rough, kInfinite},
+         [this, h, bend](std::size_t i) {
+           return h * h * apart(value(a_, "curvature.gauss", i), value(b_, "curvature.gauss", i)) /
+                  (bend(i) * bend(i));
          }});
     // If the camera is close to the solid, the error of positions is relative to the size of the
     // solid.

@@ -44,8 +44,11 @@ FrustumCulling::FrustumCulling(const Scene& scene, const RenderOptions& options,
   // The Shader starts light rays at a distance of twice the surface error from the hit. The error
   // is at most an eighth of the sum of the second differences of φ along the three axes. Each of
   // these is at most 4 half widths, so the distance is at most 3 half widths.
+  // The error of a volume's surface is at most one voxel.
   for (const Solid& solid : scene.solids)
-    if (!solid.band.isEmpty())
+    if (solid.volume)
+      margin_ = std::max(margin_, 2.1 * solid.voxelSize());
+    else if (!solid.band.isEmpty())
       margin_ = std::max(margin_, (3.1 * solid.band.halfWidth() + 0.1) * solid.band.voxelSize());
   // This term covers the surface error of meshes, which is single-precision rounding relative to
   // their size, and the rounding of keeps().

@@ -34,6 +34,14 @@ Imath::Box3d leafBox(const levelset::NarrowBand& band) {
                           band.indexToWorld());
 }
 
+/// Upper bound on the length of a vector's image by the linear part of a map, for unit vectors.
+double largestGrowth(const M44d& map) {
+  double sum = 0;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) sum += map[i][j] * map[i][j];
+  return std::sqrt(sum);
+}
+
 /// An interval of a ray's parameter, which is the distance from its origin in voxels.
 struct Span {
   double enter, leave;
@@ -155,13 +163,18 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
   Imath::Box3d box = meshes_.bounds();
   box.extendBy(mapped_.bounds());
   for (const Solid& solid : scene.solids) {
-    if (solid.band.isEmpty()) continue;
+    if (solid.isEmpty()) continue;
+    if (solid.volume) {
+      leaves += static_cast<double>(solid.volume->blocks(options.filter).size());
+      box.extendBy(solid.volume->volume().grid().bounds());
+      continue;
+    }
     leaves += static_cast<double>(levelset::vdb(solid.band).tree().leafCount());
     box.extendBy(leafBox(solid.band));
   }
   // For BSplineQi the leaves are copied, to store the spline's coefficients.
   const double kCopies = options.filter == Filter::BSplineQi ? 4 * 512 : 0;
-  const double kBytesOfBlock = 2 * 4 * (BrickPool::kValues + BrickPool::kMaskWords) + kCopies;
+  const double kBytesOfBlock = 2 * 4 * (BrickPool::kCubeValues + BrickPool::kMaskWords) + kCopies;
   levelset::requireMemory(leaves * kBytesOfBlock, options.maxBytes);
   // Culling knows how far light rays start from solids and meshes, but not from mapped textures.
   const FrustumCulling culling = isPicture && !box.isEmpty() && mapped_.isEmpty()
@@ -169,22 +182,24 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
                                      : FrustumCulling();
   for (std::size_t i = 0; i < scene.solids.size(); ++i) {
     const Solid& source = scene.solids[i];
-    if (source.band.isEmpty() || (!scene.csg.isEmpty() && !scene.csg.uses(i))) continue;
-    const M44d toWorld = source.band.indexToWorld();
+    if (source.isEmpty() || (!scene.csg.isEmpty() && !scene.csg.uses(i))) continue;
+    const M44d toWorld = source.indexToWorld();
+    const double growth = source.volume ? largestGrowth(toWorld) : source.voxelSize();
     KernelSolid solid;
     TableOptions tables{.filter = options.filter, .quantization = source.quantization};
     if (isPicture)
       tables.keeps = [&](const V3d& centre, double radius) {
-        return culling.keeps(centre * toWorld, radius * source.band.voxelSize());
+        return culling.keeps(centre * toWorld, radius * growth);
       };
-    solid.pool = makeBricks(source.band, tables);
+    solid.pool =
+        source.volume ? makeBricks(*source.volume, tables) : makeBricks(source.band, tables);
     const BrickPool& pool = solid.pool;
     counts_.omitted += pool.blocksOmitted;
     counts_.culled += pool.blocksCulled;
     if (pool.brickCount() + pool.blocksCulled == 0) continue;
     Extent& extent = extents_.emplace_back();
     extent.index = i;
-    const V3d origin(pool.origin[0], pool.origin[1], pool.origin[2]);
+    const V3d origin = V3d(pool.origin[0], pool.origin[1], pool.origin[2]) - V3d(pool.shift());
     const auto boxOf = [&](const std::array<int, 3>& low, const std::array<int, 3>& high) {
       return Imath::Box3d(origin + V3d(low[0], low[1], low[2]),
                           origin + V3d(high[0], high[1], high[2]));
@@ -196,7 +211,8 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
     counts_.halo += pool.haloCount;
     solid.index = i;
     solid.id = source.id;
-    solid.voxelSize = source.band.voxelSize();
+    solid.voxelSize = source.voxelSize();
+    solid.isVolume = source.volume != nullptr;
     solids_.push_back(std::move(solid));
   }
   std::stable_sort(solids_.begin(), solids_.end(), [](const KernelSolid& a, const KernelSolid& b) {
@@ -219,15 +235,16 @@ void KernelScene::updateView(const Scene& scene) {
   bounds_.extendBy(mapped_.bounds());
   tableBounds_ = bounds_;
   for (const Extent& extent : extents_) {
-    const M44d toWorld = scene.solids[extent.index].band.indexToWorld();
+    const M44d toWorld = scene.solids[extent.index].indexToWorld();
     bounds_.extendBy(Imath::transform(extent.cells, toWorld));
     tableBounds_.extendBy(Imath::transform(extent.blocks, toWorld));
   }
+  if (bounds_.isEmpty()) bounds_ = tableBounds_ = scene.volumeBounds();
   for (KernelSolid& solid : solids_) {
     solid.opacity = scene.solids[solid.index].opacity;
-    const V3d corner(solid.pool.origin[0], solid.pool.origin[1], solid.pool.origin[2]);
-    solid.tableToWorld =
-        M44d().setTranslation(corner) * scene.solids[solid.index].band.indexToWorld();
+    const V3d corner = V3d(solid.pool.origin[0], solid.pool.origin[1], solid.pool.origin[2]) -
+                       V3d(solid.pool.shift());
+    solid.tableToWorld = M44d().setTranslation(corner) * scene.solids[solid.index].indexToWorld();
     solid.worldToTable = solid.tableToWorld.inverse();
     solid.fan = makeRayFan(scene.camera, solid.tableToWorld, solid.voxelSize, solid.pool);
   }

@@ -28,6 +28,7 @@ struct KernelSolid {
   std::size_t index = 0;  ///< index in Scene::solids
   std::uint32_t id = 0;
   double voxelSize = 1, opacity = 1;
+  bool isVolume = false;
   BrickPool pool;
   RayFan fan;
   Imath::M44d tableToWorld, worldToTable;
@@ -93,7 +94,8 @@ class KernelScene {
 
   [[nodiscard]] const std::vector<KernelSolid>& solids() const { return solids_; }
   /// World-space box of the meshes, the shells of mapped textures and the grid cells that the
-  /// solids' surfaces cross; empty when there are none. For a blended scene: Scene::bounds().
+  /// solids' surfaces cross; empty when there are none. For a blended scene: Scene::bounds(). If a
+  /// volume has no surface and nothing else is drawn: Scene::volumeBounds().
   [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }
   /// World-space box of the meshes, the shells of mapped textures and the blocks that the solids'
   /// surfaces cross. For a blended scene: Scene::bounds(). Its size determines the absolute error

@@ -169,7 +169,10 @@ Hit KernelPainter::hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std
   hit.colour = scene_.solids[solid.index].colour;
   hit.opacity = solid.opacity;
   hit.isFlipped = hits.flipped[i] != 0;
-  addShape(hit, hits.shapes.at(i), solid.tableToWorld, ray.direction);
+  if (solid.isVolume)
+    addVolumeShape(hit, hits.shapes.at(i), solid.worldToTable, solid.voxelSize, ray.direction);
+  else
+    addShape(hit, hits.shapes.at(i), solid.tableToWorld, ray.direction);
   hit.surfaceError += kCastError * solid.voxelSize;
   return hit;
 }

@@ -24,11 +24,28 @@ bool Scene::isOpaque() const {
          std::all_of(meshes.begin(), meshes.end(), hidesAll);
 }
 
+Imath::Box3d Solid::bounds() const {
+  if (isEmpty()) return {};
+  return volume ? volume->bounds() : band.zeroSetBounds();
+}
+
+bool Scene::hasVolume() const {
+  return std::any_of(solids.begin(), solids.end(),
+                     [](const Solid& solid) { return solid.volume != nullptr; });
+}
+
+Imath::Box3d Scene::volumeBounds() const {
+  Imath::Box3d all;
+  for (const Solid& solid : solids)
+    if (solid.volume) all.extendBy(solid.volume->volume().grid().bounds());
+  return all;
+}
+
 Imath::Box3d Scene::bounds() const {
   std::vector<Imath::Box3d> boxes;
   Imath::Box3d all;
   for (const Solid& solid : solids) {
-    boxes.push_back(solid.band.isEmpty() ? Imath::Box3d() : solid.band.zeroSetBounds());
+    boxes.push_back(solid.bounds());
     all.extendBy(boxes.back());
   }
   // Distance by which a smooth union may extend beyond its operands, as a multiple of the softness
@@ -46,7 +63,9 @@ std::vector<double> Scene::extents(const std::vector<Imath::V3d>& directions) co
   };
   std::vector<double> ofSolids(directions.size(), -std::numeric_limits<double>::infinity());
   for (std::size_t i = 0; i < solids.size(); ++i)
-    if (csg.isEmpty() || csg.uses(i)) extend(ofSolids, solids[i].band.zeroSetExtents(directions));
+    if (csg.isEmpty() || csg.uses(i))
+      extend(ofSolids, solids[i].volume ? solids[i].volume->extents(directions)
+                                        : solids[i].band.zeroSetExtents(directions));
   if (!csg.isEmpty() || isBlended()) {
     // The result may be smaller than its operands, or extend beyond them. Bound it by its box.
     Scene withoutOthers = *this;
@@ -72,8 +91,11 @@ std::vector<double> Scene::extents(const std::vector<Imath::V3d>& directions) co
 
 Camera framingCamera(const Scene& scene, int width, int height, double verticalFov,
                      const Imath::V3d& up) {
+  const Imath::Box3d bounds = scene.bounds();
+  if (bounds.isEmpty() && scene.hasVolume())
+    return framingCamera(scene.volumeBounds(), width, height, verticalFov, up);
   return framingCamera(
-      scene.bounds(),
+      bounds,
       [&](const std::vector<Imath::V3d>& directions) { return scene.extents(directions); }, width,
       height, verticalFov, up);
 }

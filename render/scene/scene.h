@@ -15,6 +15,7 @@
 #include "render/images/value_bits.h"
 #include "render/scene/csg_expression.h"
 #include "render/scene/mapped_texture.h"
+#include "render/volumes/volume_surface.h"
 
 namespace render {
 
@@ -27,7 +28,7 @@ struct Light {
                            ///< width of penumbrae
 };
 
-/// A level set in a scene, with its appearance.
+/// A level set or an isosurface of a volume in a scene, with its appearance.
 struct Solid {
   levelset::NarrowBand band;
   Imath::C3f colour{0.66f, 0.62f, 0.56f};
@@ -37,6 +38,18 @@ struct Solid {
   /// Storage of the band's values in the kernel's tables. Below 32 bits, the band must be a result
   /// of quantized().
   ValueBits quantization = {};
+  /// If not null, this isosurface is drawn and `band` is empty.
+  std::shared_ptr<const VolumeSurface> volume = {};
+
+  [[nodiscard]] bool isEmpty() const { return volume ? volume->isEmpty() : band.isEmpty(); }
+  /// Transform from the grid's index space to world space.
+  [[nodiscard]] Imath::M44d indexToWorld() const {
+    return volume ? volume->indexToWorld() : band.indexToWorld();
+  }
+  /// Edge length of a voxel; of a volume, the largest spacing of its grid. World units.
+  [[nodiscard]] double voxelSize() const { return volume ? volume->voxelSize() : band.voxelSize(); }
+  /// Bounds of the surface, world units.
+  [[nodiscard]] Imath::Box3d bounds() const;
 };
 
 /// Triangles that are drawn together with the solids. They are lit and cast shadows like solids,
@@ -84,6 +97,10 @@ struct Scene {
   [[nodiscard]] bool isBlended() const { return softness > 0 || morph; }
   /// True when no surface is transparent.
   [[nodiscard]] bool isOpaque() const;
+  /// True when a volume is among the solids.
+  [[nodiscard]] bool hasVolume() const;
+  /// World-space box of the grids of all volumes; empty without volumes.
+  [[nodiscard]] Imath::Box3d volumeBounds() const;
   /// A world-space box that contains all drawn surfaces; empty when the scene has none.
   [[nodiscard]] Imath::Box3d bounds() const;
   /// Extents of all drawn surfaces: for each direction d an upper bound on p·d over their points p,

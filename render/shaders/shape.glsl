@@ -316,14 +316,3 @@ Shape shapeAt(Bool asked, Int cellX, Int cellY, Int cellZ, Real a, Real b, Real 
   }
   return shape;
 }
-
-// Shape of the surface at the hit of a ray.
-Shape shapeOf(IN(Ray) ray, IN(Hit) hit) {
-  VAR x = (ray.ox - toReal(hit.x)) + hit.t * ray.dx;
-  VAR y = (ray.oy - toReal(hit.y)) + hit.t * ray.dy;
-  VAR z = (ray.oz - toReal(hit.z)) + hit.t * ray.dz;
-  VAR a = smaller(larger(x, 0.0f), 1.0f);
-  VAR b = smaller(larger(y, 0.0f), 1.0f);
-  VAR c = smaller(larger(z, 0.0f), 1.0f);
-  return shapeAt(hit.found, hit.x, hit.y, hit.z, a, b, c);
-}

@@ -225,7 +225,9 @@ Hit trace(Ray ray, Int passing) {
       VAR outZ = fromZ + tExit * ray.dz;
       VAR z1 = smaller(larger(outZ, 0.0f), 1.0f);
       Crossing crossing;
-      if (isSpline)
+      if (tetraDegree > 0)
+        crossing = tetraCrossingIn(asked, brick, x, y, z, x0, y0, z0, x1, y1, z1, carried, inside, passing);
+      else if (isSpline)
         crossing = splineCrossingIn(asked, x, y, z, x0, y0, z0, x1, y1, z1, carried, inside, passing);
       else
         crossing = crossingIn(asked, brick, x, y, z, x0, y0, z0, x1, y1, z1, entered, axis, aheadX,

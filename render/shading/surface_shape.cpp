@@ -83,4 +83,21 @@ void addShape(Hit& hit, const SurfaceShape& shape, const Imath::M44d& indexToWor
   hit.viewCurvature = -hit.viewCurvature;
 }
 
+void addVolumeShape(Hit& hit, const SurfaceShape& shape, const Imath::M44d& worldToIndex,
+                    double voxelSize, const V3d& direction) {
+  const V3d rows[3] = {row(worldToIndex, 0), row(worldToIndex, 1), row(worldToIndex, 2)};
+  SurfaceShape world;
+  for (int i = 0; i < 3; ++i) {
+    world.gradient[i] = rows[i].dot(shape.gradient);
+    world.trilinearGradient[i] = rows[i].dot(shape.trilinearGradient);
+    for (int j = 0; j < 3; ++j) world.hessian[i][j] = rows[i].dot(rows[j] * shape.hessian);
+  }
+  const double slope = world.gradient.length();
+  world.interpolationError =
+      shape.interpolationError < slope * voxelSize ? shape.interpolationError / slope : 0;
+  if (shape.interpolationError > 0 && !(world.interpolationError > 0))
+    world.interpolationError = voxelSize;
+  addShape(hit, world, Imath::M44d(), direction);
+}
+
 }  // namespace render

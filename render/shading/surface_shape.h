@@ -28,4 +28,12 @@ struct SurfaceShape {
 void addShape(Hit& hit, const SurfaceShape& shape, const Imath::M44d& indexToWorld,
               const Imath::V3d& direction);
 
+/// The same for the field of a volume, whose grid may be anisotropic or sheared and whose gradient
+/// may have any length.
+/// @param shape  derivatives per grid spacing
+/// @param worldToIndex  any invertible affine map
+/// @param voxelSize  largest value of the surface error, world units
+void addVolumeShape(Hit& hit, const SurfaceShape& shape, const Imath::M44d& worldToIndex,
+                    double voxelSize, const Imath::V3d& direction);
+
 }  // namespace render

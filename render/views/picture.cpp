@@ -143,8 +143,17 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
         "the texture without --instances");
   // Half width of a band that the spline filters need, voxels: 3, less a margin for rounding.
   constexpr double kReach = 2.99;
+  if (scene.hasVolume() && (scene.isBlended() || !scene.csg.isEmpty()))
+    throw levelset::UsageError(
+        "a volume cannot be an operand of an expression or a morph, because its isosurface may be "
+        "open; make a solid of it with isosurface");
   for (const Solid& solid : scene.solids) {
-    if (options.filter == Filter::Trilinear || solid.band.isEmpty()) continue;
+    if (solid.volume && solid.quantization.bits != 32)
+      throw levelset::UsageError(
+          "the values of a volume are stored in 32 bits in the tables; omit --value-bits");
+    if (solid.volume && options.fromNanoVdb)
+      throw levelset::UsageError("a volume cannot be drawn from NanoVDB grids; draw from bricks");
+    if (options.filter == Filter::Trilinear || solid.volume || solid.band.isEmpty()) continue;
     if (options.filter == Filter::BSplineQi && solid.quantization.bits != 32)
       throw levelset::UsageError(
           fmt::format("the filter bspline-qi does not support values of {} bits; use 32 "
@@ -170,16 +179,20 @@ std::map<std::string, std::string> sceneAttributes(const Scene& scene,
   const Filter filter = options.filter;
   std::string grids, voxelSizes, bits;
   for (const Solid& solid : scene.solids) {
-    if (solid.band.isEmpty()) continue;
+    if (solid.isEmpty()) continue;
     const char* comma = grids.empty() ? "" : ", ";
-    grids += fmt::format("{}{} {:016x}", comma, levelset::vdb(solid.band).getName(),
-                         solid.band.contentHash());
-    voxelSizes += fmt::format("{}{}", comma, solid.band.voxelSize());
+    if (solid.volume)
+      grids += fmt::format("{}volume {:016x} at {}", comma, solid.volume->volume().contentHash(),
+                           solid.volume->isovalue());
+    else
+      grids += fmt::format("{}{} {:016x}", comma, levelset::vdb(solid.band).getName(),
+                           solid.band.contentHash());
+    voxelSizes += fmt::format("{}{}", comma, solid.voxelSize());
     bits += fmt::format("{}{}", comma, solid.quantization.bits);
   }
   std::map<std::string, std::string> attributes = {
       {"ls:filter", filterName(filter)},
-      {"ls:normal", filter == Filter::BSpline ? "bspline" : "bspline-qi"},
+      {"ls:normal", filter == Filter::Trilinear ? "bspline-qi" : filterName(filter)},
       {"ls:grid", grids},
       {"ls:voxelSize", voxelSizes},
       {"ls:valueBits", bits}};

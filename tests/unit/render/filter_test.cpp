@@ -174,10 +174,19 @@ TEST(Filters, NormalsAndCurvaturesConverge) {
 }
 
 /// Expects the same bits of the kernel on both processors, and agreement with the judge.
-void expectProven(const Scene& scene, Filter filter, const std::string& what) {
+/// @param isAlongLattice  rays run in planes between cells
+void expectProven(const Scene& scene, Filter filter, const std::string& what,
+                  bool isAlongLattice = false) {
   const RenderOptions options = optionsOf(filter);
   const Image ours = renderCpu(scene, options);
-  const ImageComparison judged = compareImages(ours, renderEmbree(scene, options));
+  ImageComparisonOptions allowed;
+  // Planes between tetrahedra lie there, too, and the derivatives jump across them. Both answers
+  // are correct.
+  if (isAlongLattice && tetrahedralDegree(filter) > 0)
+    for (const char* layer :
+         {"N", "curvature.mean", "curvature.gauss", "curvature.k1", "curvature.k2"})
+      allowed.tolerances[layer] = {HUGE_VAL, HUGE_VAL};
+  const ImageComparison judged = compareImages(ours, renderEmbree(scene, options), allowed);
   EXPECT_GT(judged.bothHit, 5u) << filterName(filter) << ", " << what;
   EXPECT_TRUE(judged.agrees()) << filterName(filter) << ", " << what << ": " << judged.reason();
   EXPECT_EQ(compareImages(ours, renderGpu(scene, options), {.exact = true}).differentBits, 0u)
@@ -187,12 +196,13 @@ void expectProven(const Scene& scene, Filter filter, const std::string& what) {
 TEST(Filters, OfSplinesAgreeWithTheJudge) {
   const NarrowBand sheet = levelset::makeBox(V3d(30, 30, 1.2), V3d(0.1, 0.2, 0.3), 1),
                    needle = levelset::makeCapsule(V3d(-40, 3, 2), V3d(40, 7, 5), 1, 1);
-  for (const Filter filter : {Filter::BSpline, Filter::BSplineQi}) {
+  for (const Filter filter :
+       {Filter::BSpline, Filter::BSplineQi, Filter::SuperQuadratic, Filter::CubicC1}) {
     for (const auto& [name, band] :
          {std::pair{"rings", support::rings()}, {"sheet", sheet}, {"needle", needle}}) {
       expectProven(support::sceneOf(band), filter, name);
       for (const V3d& from : {V3d(100, 0, 0), V3d(0, 0, -100)})
-        expectProven(support::alongTheLattice(band, from), filter, name);
+        expectProven(support::alongTheLattice(band, from), filter, name, true);
     }
     // Faces lie on planes of grid points, some of them between blocks. No ray may slip through
     // where only rounding decides the side. (Rays within such a face have no side.)

@@ -14,6 +14,7 @@
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
+#include "levelset/volume_files/volume_file.h"
 #include "render/camera.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/embree/embree_renderer.h"
@@ -28,11 +29,50 @@ namespace {
 
 using levelset::UsageError;
 
+bool isVolume(Kind kind) {
+  return kind == Kind::Volume || kind == Kind::Field;
+}
+
+/// Refuses volumes without --isovalue, and its options without a volume.
+void requireIsovalue(const Invocation& in) {
+  if (isVolume(in.operands[0].plan().kind)) {
+    if (!in.given("isovalue"))
+      throw UsageError(
+          "render: a volume has no surface without an isovalue; give --isovalue, and see "
+          "'histogram' for suggestions");
+    return;
+  }
+  for (const char* name : {"isovalue", "inside"})
+    if (in.given(name))
+      throw UsageError(fmt::format("render: --{} is for volumes; leave it out", name));
+}
+
+/// Scene with the isosurface of a volume.
+render::ViewedScene volumeScene(Invocation& in) {
+  const Value& value = in.operands[0];
+  levelset::Volume volume = value.kind() == Kind::Field
+                                ? levelset::volumeOf(value.field(), in.maxMemory)
+                                : value.volume();
+  const double isovalue = in.number("isovalue");
+  const auto surface = std::make_shared<const render::VolumeSurface>(
+      std::move(volume), isovalue,
+      in.text("inside") == "below" ? render::VolumeInside::Below : render::VolumeInside::Above);
+  if (surface->isEmpty())
+    in.notes.warnings.push_back(
+        fmt::format("render: the picture is empty, because no surface of the volume has the "
+                    "isovalue {}; its values lie between {:.6g} and {:.6g}",
+                    in.text("isovalue"), surface->volume().lowest(), surface->volume().highest()));
+  render::ViewedScene viewed;
+  viewed.scene.solids.push_back({.band = {}, .volume = surface});
+  return viewed;
+}
+
 /// Builds the scene to draw from the operand. The camera options override the camera of the
 /// operand, if it has one.
 render::Scene sceneOf(Invocation& in) {
   const Value& drawn = in.operands[0];
-  render::ViewedScene viewed = sceneOf(drawn);
+  requireIsovalue(in);
+  render::ViewedScene viewed = isVolume(drawn.kind()) ? volumeScene(in) : sceneOf(drawn);
   viewed.scene.camera = cameraOf(in, drawn.plan().bounds,
                                  viewed.hasCamera ? &viewed.scene.camera : nullptr, &viewed.scene);
   return viewed.scene;
@@ -162,7 +202,8 @@ render::Image drawByKernel(Invocation& in, const render::Scene& scene,
 }
 
 render::Filter filterOf(const Invocation& in) {
-  for (const render::Filter filter : {render::Filter::BSpline, render::Filter::BSplineQi})
+  for (const render::Filter filter : {render::Filter::BSpline, render::Filter::BSplineQi,
+                                      render::Filter::SuperQuadratic, render::Filter::CubicC1})
     if (in.text("filter") == render::filterName(filter)) return filter;
   return render::Filter::Trilinear;
 }
@@ -183,6 +224,10 @@ render::StyleOptions styleOf(const Invocation& in) {
 void coarsen(Invocation& in, render::Scene& scene) {
   const int bits = std::stoi(in.text("value-bits"));
   if (bits == 32) return;
+  if (scene.hasVolume())
+    throw UsageError(
+        "render: the values of a volume are stored in 32 bits in the ray caster; leave "
+        "--value-bits out");
   double bytes = 0;
   for (const render::Solid& solid : scene.solids)
     bytes += static_cast<double>(solid.band.memoryUse());
@@ -287,6 +332,7 @@ RegionOfInterest roiOfDraw(Invocation& in, std::size_t, const RegionOfInterest&)
 }
 
 Plan planDraw(Invocation& in) {
+  requireIsovalue(in);
   (void)cameraOf(in, in.operands[0].plan().bounds);
   return in.operands[0].plan();
 }
@@ -376,7 +422,9 @@ Operator renderOperator() {
   Operator picture = {
       .name = "render",
       .group = "Pictures",
-      .summary = "draw a level set, a mesh or a scene to an EXR with all layers, or a PNG",
+      .summary =
+          "draw a level set, an isosurface of a volume, a mesh or a scene to an EXR with all "
+          "layers, or a PNG",
       .details =
           "Layers of the EXR: R G B A, Z (along the view axis, +inf for a miss), N.X N.Y N.Z, P.X "
           "P.Y P.Z, curvature.mean .gauss .k1 .k2, id. Without --from, the view is the scene's "
@@ -406,9 +454,20 @@ Operator renderOperator() {
             .type = ParamType::Choice,
             .doc =
                 "interpolation between grid points: trilinear; bspline, a tricubic B-spline, which "
-                "shrinks the solid; bspline-qi, the same spline with corrected coefficients",
+                "shrinks the solid; bspline-qi, the same spline with corrected coefficients; "
+                "super-quadratic and cubic-c1, splines on 24 tetrahedra around each grid point, "
+                "which smooth the values",
             .fallback = "trilinear",
-            .choices = {"trilinear", "bspline", "bspline-qi"}},
+            .choices = {"trilinear", "bspline", "bspline-qi", "super-quadratic", "cubic-c1"}},
+           {.name = "isovalue",
+            .type = ParamType::Number,
+            .doc = "for a volume: draw the surface on which the interpolated values equal this "
+                   "number"},
+           {.name = "inside",
+            .type = ParamType::Choice,
+            .doc = "for a volume: side of the isovalue that is solid",
+            .fallback = "above",
+            .choices = {"above", "below"}},
            {.name = "tables",
             .type = ParamType::Choice,
             .doc = "with --renderer gpu or both: data that the shader reads; bricks, or a NanoVDB "
@@ -464,7 +523,7 @@ Operator renderOperator() {
            {.name = "format",
             .type = ParamType::Text,
             .doc = "format of the picture: exr or png; default: by its extension"}},
-      .operands = {{Kind::Band, Kind::Mesh, Kind::Scene}},
+      .operands = {{Kind::Band, Kind::Mesh, Kind::Scene, Kind::Volume, Kind::Field}},
       .flow = Flow::PassesThrough,
       .run = draw,
       .plan = planDraw,

@@ -51,6 +51,28 @@ TEST_F(Pictures, HaveEqualBitsOnGpuAndProcessorAndAgreeWithEmbree) {
   EXPECT_EQ(levelsmith("compare-images g.exr b.exr").code, 0);
 }
 
+TEST_F(Pictures, OfVolumesAreProvenWithAllFilters) {
+  for (const char* filter : {"trilinear", "bspline", "bspline-qi", "super-quadratic", "cubic-c1"}) {
+    const Outcome drawn = levelsmith(
+        std::string("volume marschner-lobb ! render v.exr --isovalue 0.5 --size 96x72 --samples 1 "
+                    "--renderer both --filter ") +
+        filter);
+    EXPECT_EQ(drawn.code, 0) << filter << drawn.err;
+  }
+}
+
+TEST_F(Pictures, OfVolumesNeedAnIsovalue) {
+  const std::string chain = "volume sphere --size 12 ! render v.exr --size 16x12 ";
+  EXPECT_EQ(levelsmith(chain).code, 2);
+  EXPECT_EQ(levelsmith(chain + "--isovalue nan").code, 2);
+  EXPECT_EQ(levelsmith(chain + "--isovalue 0 --value-bits 8").code, 2);
+  EXPECT_EQ(levelsmith("sphere --radius 1 --voxel 0.2 ! render v.exr --isovalue 0").code, 2);
+  const Outcome empty = levelsmith(chain + "--isovalue 9");
+  EXPECT_EQ(empty.code, 0) << empty.err;
+  EXPECT_NE(empty.err.find("the picture is empty"), std::string::npos) << empty.err;
+  EXPECT_EQ(levelsmith(chain + "--isovalue 0 --inside below").code, 0);
+}
+
 TEST_F(Pictures, OfTheNanoVdbGridHaveEqualBits) {
   draw("torus --radius 1 --tube 0.4", "n.exr --renderer both --tables nanovdb --samples 1");
   draw("torus --radius 1 --tube 0.4", "c.exr --renderer cpu --samples 1");

@@ -1,0 +1,296 @@
+// Isosurfaces of volumes: the kernel on both processors against the judge and against closed
+// forms.
+
+#include "render/volumes/volume_surface.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "levelset/error.h"
+#include "levelset/isosurface/isosurface.h"
+#include "levelset/splines/grid_extension.h"
+#include "levelset/volumes/synthetic.h"
+#include "render/cpu/cpu_renderer.h"
+#include "render/cpu/cpu_trace.h"
+#include "render/embree/embree_renderer.h"
+#include "render/gpu/gpu_renderer.h"
+#include "render/images/compare_images.h"
+#include "render/kernel/kernel_scene.h"
+#include "tests/support/measured.h"
+#include "tests/support/volume_scenes.h"
+
+namespace volume_surface_test {
+
+using Imath::M44d;
+using Imath::V3d;
+using Imath::V3i;
+using levelset::Volume;
+using support::filled;
+using support::measured;
+using support::noisyBytes;
+using support::obliqueMap;
+using namespace render;
+
+constexpr Filter kFilters[] = {Filter::Trilinear, Filter::BSpline, Filter::BSplineQi,
+                               Filter::SuperQuadratic, Filter::CubicC1};
+
+RenderOptions optionsOf(Filter filter) {
+  return {.samples = 1, .ambientSamples = 0, .shadowSamples = 0, .filter = filter};
+}
+
+Scene sceneOf(const VolumeSurface& surface, int width = 96, int height = 72) {
+  Scene scene;
+  scene.solids.push_back({.band = {}, .volume = std::make_shared<const VolumeSurface>(surface)});
+  scene.camera = framingCamera(scene, width, height, scene.camera.verticalFov, scene.camera.up);
+  return scene;
+}
+
+/// Pixels that only one of two pictures shows a surface in, and the largest difference in depth of
+/// the others.
+struct DepthDifference {
+  std::size_t both = 0, onlyOne = 0;
+  double most = 0;
+};
+
+DepthDifference depthDifference(const Image& a, const Image& b) {
+  DepthDifference result;
+  const std::vector<float>&za = a.channels.at("Z"), &zb = b.channels.at("Z");
+  for (std::size_t i = 0; i < za.size(); ++i) {
+    const bool isA = std::isfinite(za[i]), isB = std::isfinite(zb[i]);
+    result.onlyOne += isA != isB;
+    if (!isA || !isB) continue;
+    ++result.both;
+    result.most = std::max(result.most, std::abs(static_cast<double>(za[i]) - zb[i]));
+  }
+  return result;
+}
+
+void expectJudged(const Image& ours, const Scene& scene, Filter filter, const std::string& what) {
+  const Image judge = renderEmbree(scene, optionsOf(filter));
+  // The curvatures of noise are large, and few pixels are compared.
+  ImageComparisonOptions allowed;
+  for (const char* layer : {"curvature.mean", "curvature.gauss"})
+    allowed.tolerances[layer] = {measured(1.65e-4), HUGE_VAL};
+  const ImageComparison judged = compareImages(ours, judge, allowed);
+  EXPECT_TRUE(judged.agrees()) << filterName(filter) << ", " << what << ": " << judged.reason();
+  const DepthDifference depth = depthDifference(ours, judge);
+  EXPECT_GT(depth.both, 100u) << filterName(filter) << ", " << what;
+  EXPECT_EQ(depth.onlyOne, 0u) << filterName(filter) << ", " << what;
+}
+
+TEST(VolumeSurface, KernelAndJudgeAgree) {
+  const auto all = support::volumeSurfaces();
+  for (std::size_t n = 0; n < all.size(); ++n)
+    for (const Filter filter : kFilters) {
+      const bool isBSpline = filter == Filter::BSpline || filter == Filter::BSplineQi;
+      if (isBSpline && n > 2) continue;  // the judge is slow, and the traversal is the same
+      const Scene scene = sceneOf(all[n].second, 64, 48);
+      expectJudged(renderCpu(scene, optionsOf(filter)), scene, filter, all[n].first);
+    }
+}
+
+TEST(VolumeSurface, HasTheSameBitsOnBothProcessors) {
+  const std::vector<std::pair<std::string, VolumeSurface>> all = support::volumeSurfaces();
+  for (std::size_t n = 0; n < 3; ++n)
+    for (const Filter filter : kFilters) {
+      const Scene scene = sceneOf(all[n].second);
+      EXPECT_EQ(compareImages(renderCpu(scene, optionsOf(filter)),
+                              renderGpu(scene, optionsOf(filter)), {.exact = true})
+                    .differentBits,
+                0u)
+          << filterName(filter) << ", " << all[n].first;
+    }
+}
+
+TEST(VolumeSurface, HasTheSameBitsWithAllInstructionSets) {
+  const Scene scene = sceneOf({noisyBytes(24), 100.5});
+  PixelBlock pixels(96 * 72);
+  for (std::size_t n = 0; n < pixels.size(); ++n) {
+    pixels.x[n] = static_cast<float>(n % 96) - 47.5f;
+    pixels.y[n] = static_cast<float>(n / 96) - 35.5f;
+  }
+  for (const Filter filter : {Filter::SuperQuadratic, Filter::CubicC1}) {
+    const KernelScene kernel(scene, levelset::kNoMemoryLimit, filter);
+    const KernelSolid& solid = kernel.solids().at(0);
+    HitBlock first(pixels.size());
+    ShapeBlock firstShapes(pixels.size());
+    tracePixels(solid.pool, solid.fan, pixels, first, firstShapes, InstructionSet::Sse2);
+    std::size_t hits = 0;
+    for (const InstructionSet set : instructionSets()) {
+      HitBlock other(pixels.size());
+      ShapeBlock otherShapes(pixels.size());
+      tracePixels(solid.pool, solid.fan, pixels, other, otherShapes, set);
+      ASSERT_EQ(other.found, first.found);
+      for (std::size_t n = 0; n < pixels.size(); ++n) {
+        if (first.found[n] == 0) continue;
+        ++hits;
+        ASSERT_EQ(other.t[n], first.t[n]);
+        for (std::size_t p = 0; p < ShapeBlock::kParts; ++p)
+          ASSERT_EQ(otherShapes.part[p][n], firstShapes.part[p][n]);
+      }
+    }
+    EXPECT_GT(hits, 1000u);
+  }
+}
+
+TEST(VolumeSurface, HasTheDepthOfTheJudgeWithinAHundredThousandthOfAVoxel) {
+  // The eye is close, and the voxel is the unit, so that single-precision depths are fine enough.
+  const auto ball = [](const V3d& p) { return 8 - (p - V3d(12.1, 11.7, 12.3)).length(); };
+  Scene scene = sceneOf({filled({V3i(25), M44d()}, ball), 0}, 96, 96);
+  scene.camera.from = V3d(12, 12, 24);
+  scene.camera.to = V3d(12);
+  scene.camera.up = V3d(0, 1, 0);
+  scene.camera.orthoHeight = 12;
+  for (const Filter filter : kFilters) {
+    const DepthDifference found = depthDifference(renderCpu(scene, optionsOf(filter)),
+                                                  renderEmbree(scene, optionsOf(filter)));
+    EXPECT_EQ(found.onlyOne, 0u);
+    EXPECT_GT(found.both, 9000u);
+    EXPECT_LE(found.most, measured(1.9e-6, 1e-5)) << filterName(filter);
+  }
+}
+
+/// Largest distance of the drawn points from a ball of radius 0.6, and largest angle of the normals
+/// from the radius.
+std::pair<double, double> ballErrors(const Scene& scene, Filter filter) {
+  const Image image = renderCpu(scene, optionsOf(filter));
+  const auto at = [&](const std::string& name, std::size_t i) {
+    return V3d(image.channels.at(name + ".X")[i], image.channels.at(name + ".Y")[i],
+               image.channels.at(name + ".Z")[i]);
+  };
+  double distance = 0, angle = 0;
+  for (std::size_t i = 0; i < image.pixelCount(); ++i) {
+    if (!std::isfinite(image.channels.at("Z")[i])) continue;
+    const V3d p = at("P", i);
+    distance = std::max(distance, std::abs(p.length() - 0.6));
+    angle = std::max(angle, (at("N", i) - p.normalized()).length());
+  }
+  return {distance, angle};
+}
+
+TEST(VolumeSurface, ConvergesToABall) {
+  struct Expected {
+    Filter filter;
+    double order, angleOrder;
+  };
+  for (const auto& [filter, order, angleOrder] :
+       {Expected{Filter::Trilinear, 2.01, 3.47}, Expected{Filter::BSpline, 2.01, 3.1},
+        Expected{Filter::BSplineQi, 3.85, 3.46}, Expected{Filter::SuperQuadratic, 2.03, 1.97},
+        Expected{Filter::CubicC1, 2.02, 1.88}}) {
+    const auto [coarse, coarseAngle] =
+        ballErrors(sceneOf({levelset::sphereVolume(21, 0.6), 0}), filter);
+    const auto [fine, fineAngle] =
+        ballErrors(sceneOf({levelset::sphereVolume(41, 0.6), 0}), filter);
+    EXPECT_GE(std::log2(coarse / fine), support::measuredOrder(order)) << filterName(filter);
+    EXPECT_GE(std::log2(coarseAngle / fineAngle), support::measuredOrder(angleOrder))
+        << filterName(filter);
+  }
+}
+
+TEST(VolumeSurface, HasNormalsTowardsTheOutsideOnBothSides) {
+  // The same surface; solid on the other side. Sheared and mirrored axes.
+  const auto ball = [](const V3d& p) { return 0.6 - p.length(); };
+  const Volume volume = filled({V3i(30), obliqueMap()}, ball);
+  EXPECT_LE(ballErrors(sceneOf({volume, 0}), Filter::Trilinear).second, measured(0.012));
+  const Volume negated = filled({V3i(30), obliqueMap()}, [&](const V3d& p) { return -ball(p); });
+  const Image a = renderCpu(sceneOf({volume, 0}), optionsOf(Filter::Trilinear)),
+              b = renderCpu(sceneOf({negated, 0, VolumeInside::Below}),
+                            optionsOf(Filter::Trilinear));
+  EXPECT_EQ(compareImages(a, b, {.exact = true}).differentBits, 0u);
+}
+
+TEST(VolumeSurface, IsThatOfTheLevelSet) {
+  const Volume volume = levelset::marschnerLobb(41);
+  const double voxel = 0.05;
+  Scene ofVolume = sceneOf({volume, 0.5}, 96, 72);
+  // Look at the middle, away from the border, where the level set is closed.
+  ofVolume.camera.from = V3d(0.35, 0.3, 0.9);
+  ofVolume.camera.to = V3d(0.1, 0.1, 0);
+  Scene ofBand = ofVolume;
+  ofBand.solids[0].volume = nullptr;
+  ofBand.solids[0].band = levelset::isosurface(volume, {.low = 0.5}, {.voxelSize = voxel / 2}).band;
+  const Image a = renderCpu(ofVolume, optionsOf(Filter::Trilinear)),
+              b = renderCpu(ofBand, optionsOf(Filter::Trilinear));
+  const std::vector<float>&za = a.channels.at("Z"), &zb = b.channels.at("Z");
+  std::size_t close = 0, all = 0;
+  for (std::size_t i = 0; i < za.size(); ++i) {
+    if (!std::isfinite(za[i]) && !std::isfinite(zb[i])) continue;
+    ++all;
+    close += std::abs(za[i] - zb[i]) < static_cast<float>(voxel);
+  }
+  EXPECT_GT(all, 5000u);
+  EXPECT_GE(static_cast<double>(close), 0.99 * static_cast<double>(all));
+}
+
+TEST(VolumeSurface, EndsWhereAPlateauBegins) {
+  // Values of 1 above the plane z = 10, less below it: with the isovalue 1 nothing is inside, and
+  // with less the surface lies below the plateau.
+  const Volume volume =
+      filled({V3i(21), M44d()}, [](const V3d& p) { return std::min(p.z / 10, 1.0); });
+  EXPECT_TRUE(VolumeSurface(volume, 1).isEmpty());
+  const VolumeSurface below(volume, 1, VolumeInside::Below);
+  ASSERT_FALSE(below.isEmpty());
+  Scene scene = sceneOf(below, 64, 64);
+  scene.camera.from = V3d(9.7, 10.2, 40);
+  scene.camera.to = V3d(9.7, 10.2, 0);
+  scene.camera.up = V3d(0, 1, 0);
+  scene.camera.orthoHeight = 8;
+  const Image ours = renderCpu(scene, optionsOf(Filter::Trilinear));
+  for (const float z : ours.channels.at("Z")) ASSERT_NEAR(z, 30, support::rounding(300));
+  EXPECT_EQ(depthDifference(ours, renderEmbree(scene, optionsOf(Filter::Trilinear))).onlyOne, 0u);
+}
+
+TEST(VolumeSurface, WithAnIsovalueOutsideTheRangeIsEmpty) {
+  const VolumeSurface surface(levelset::sphereVolume(20, 0.6), 5);
+  EXPECT_TRUE(surface.isEmpty());
+  EXPECT_TRUE(surface.blocks(Filter::Trilinear).empty());
+  EXPECT_TRUE(surface.bounds().isEmpty());
+  const Scene scene = sceneOf(surface, 32, 24);
+  for (const Image& image :
+       {renderCpu(scene), renderGpu(scene), renderEmbree(scene, optionsOf(Filter::Trilinear))})
+    for (const float z : image.channels.at("Z")) EXPECT_TRUE(std::isinf(z));
+  EXPECT_FALSE(surface.withIsovalue(0).isEmpty());
+}
+
+TEST(VolumeSurface, RefusesWhatHasNoSurface) {
+  const Volume volume = levelset::sphereVolume(8, 0.6);
+  EXPECT_THROW(VolumeSurface(volume, std::numeric_limits<double>::quiet_NaN()),
+               levelset::UsageError);
+  EXPECT_THROW((void)VolumeSurface(volume, 0).withIsovalue(HUGE_VAL), levelset::UsageError);
+  Scene scene = sceneOf({volume, 0}, 16, 16);
+  scene.solids[0].quantization.bits = 8;
+  EXPECT_THROW(renderCpu(scene), levelset::UsageError);
+  // A grid with one layer of points has no cells.
+  const VolumeSurface flat(filled({V3i(9, 9, 1), M44d()}, [](const V3d& p) { return p.x - 4; }),
+                           0.5);
+  EXPECT_TRUE(flat.blocks(Filter::BSplineQi).empty());
+  const Image image = renderCpu(sceneOf(flat, 16, 16));
+  for (const float z : image.channels.at("Z")) EXPECT_TRUE(std::isinf(z));
+}
+
+TEST(VolumeSurface, CopiesTheExtendedField) {
+  const Volume volume = noisyBytes(11);
+  const VolumeSurface surface(volume, 90.5);
+  const levelset::ExtendedGrid grid([&](int i, int j, int k) { return volume.at(i, j, k); },
+                                    {11, 11, 11}, levelset::GridExtension::Quadratic);
+  const V3i low(-4, 5, -2), size(9, 10, 40);
+  std::vector<float> copied(9 * 10 * 40);
+  surface.copyField(low, size, copied.data());
+  std::size_t n = 0;
+  const auto isNear = [](int i) { return i >= -2 && i < 13; };
+  for (int x = low.x; x < low.x + size.x; ++x)
+    for (int y = low.y; y < low.y + size.y; ++y)
+      for (int z = low.z; z < low.z + size.z; ++z)
+        ASSERT_EQ(copied[n++],
+                  isNear(x) && isNear(y) && isNear(z) ? surface.field(grid(x, y, z)) : 0);
+}
+
+}  // namespace volume_surface_test
