@@ -96,6 +96,78 @@ CoefficientRange rangeOf(const levelset::CubicDeterminingSet<CubeRow>& set) {
   return range;
 }
 
+/// The 27 data around each cube of a row.
+struct CubeData {
+  std::array<CubeRow, 27> rows;
+
+  [[nodiscard]] const CubeRow& at(const std::array<int, 3>& offset) const {
+    return rows[static_cast<std::size_t>(9 * (offset[0] + 1) + 3 * (offset[1] + 1) + offset[2] +
+                                         1)];
+  }
+};
+
+CubeRow scaled(CubeRow row, float factor) {
+  for (float& v : row.v) v *= factor;
+  return row;
+}
+
+/// The same as levelset::CubicC1Spline::determiningSet(), with sums that are computed once.
+levelset::CubicDeterminingSet<CubeRow> cubicSet(const CubeData& data) {
+  // Sums of the data at 0 or a sign along two axes, at a height of −1, 0 or 1 along the third.
+  std::array<std::array<std::array<std::array<CubeRow, 3>, 2>, 2>, 3> around;
+  for (int axis = 0; axis < 3; ++axis)
+    for (int a = 0; a < 2; ++a)
+      for (int b = 0; b < 2; ++b)
+        for (int height = -1; height <= 1; ++height) {
+          CubeRow& sum = around[static_cast<std::size_t>(axis)][static_cast<std::size_t>(a)]
+                               [static_cast<std::size_t>(b)][static_cast<std::size_t>(height + 1)];
+          for (int n = 0; n < 4; ++n) {
+            std::array<int, 3> offset{};
+            offset[static_cast<std::size_t>(axis)] = height;
+            offset[static_cast<std::size_t>((axis + 1) % 3)] = n & 1 ? 2 * a - 1 : 0;
+            offset[static_cast<std::size_t>((axis + 2) % 3)] = n & 2 ? 2 * b - 1 : 0;
+            sum += data.at(offset);
+          }
+        }
+  const auto aroundAt = [&](std::size_t axis, const std::array<int, 3>& s,
+                            int height) -> const CubeRow& {
+    return around[axis][s[(axis + 1) % 3] > 0 ? 1 : 0][s[(axis + 2) % 3] > 0 ? 1 : 0]
+                 [static_cast<std::size_t>(height + 1)];
+  };
+  levelset::CubicDeterminingSet<CubeRow> set;
+  overSigns([&](const std::array<int, 3>& s) {
+    const auto corner = static_cast<std::size_t>(set.cornerOf(s));
+    set.corners[corner] = scaled(aroundAt(2, s, 0) + aroundAt(2, s, s[2]), 1.0f / 8);
+    for (std::size_t along = 0; along < 3; ++along)
+      set.edges[corner][along] = scaled(aroundAt(along, s, 0), 5.0f / 24) +
+                                 scaled(aroundAt(along, s, s[along]), 1.0f / 24);
+  });
+  for (std::size_t along = 0; along < 3; ++along) {
+    const std::size_t a = (along + 1) % 3, b = (along + 2) % 3;
+    for (int n = 0; n < 4; ++n) {
+      std::array<int, 3> s{};
+      s[a] = n & 1 ? 1 : -1;
+      s[b] = n & 2 ? 1 : -1;
+      const CubeRow fours = scaled(aroundAt(along, s, 0), 14.0f / 96) +
+                            scaled(aroundAt(along, s, 1) + aroundAt(along, s, -1), 1.0f / 96);
+      for (const auto& [face, other] : {std::array{a, b}, std::array{b, a}}) {
+        std::array<int, 3> middle{}, up{}, down{};
+        up[along] = 1;
+        down[along] = -1;
+        CubeRow near = data.at(middle), beside = data.at(up) + data.at(down);
+        middle[face] = up[face] = down[face] = s[face];
+        near += data.at(middle);
+        beside += data.at(up) + data.at(down);
+        const auto axis = static_cast<int>(face), edgeAxis = static_cast<int>(other);
+        set.centroids[static_cast<std::size_t>(set.faceOf(axis, s[face]))]
+                     [static_cast<std::size_t>(set.faceOf(edgeAxis, s[other]))] =
+            fours + scaled(near, 12.0f / 96) + scaled(beside, 2.0f / 96);
+      }
+    }
+  }
+  return set;
+}
+
 }  // namespace
 
 void fillCubes(GridReader& grid, Filter filter, Brick& brick) {
@@ -130,15 +202,14 @@ void fillCubes(GridReader& grid, Filter filter, Brick& brick) {
         if (low - widening < around && high + widening >= -around) open |= 1u << z;
       }
       if (open == 0) continue;
-      const auto sample = [&](int i, int j, int k) {
-        CubeRow row;
-        std::copy_n(data + first + ((i + 1) * kData + j + 1) * kData + k + 1, kCubes,
-                    row.v.begin());
-        return row;
-      };
+      CubeData around;
+      for (int n = 0; n < 27; ++n)
+        std::copy_n(data + first + (n / 9 * kData + n / 3 % 3) * kData + n % 3, kCubes,
+                    around.rows[static_cast<std::size_t>(n)].v.begin());
+      const auto sample = [&](int i, int j, int k) { return around.at({i, j, k}); };
       const CoefficientRange range =
           filter == Filter::CubicC1
-              ? rangeOf(levelset::CubicC1Spline::determiningSet(sample, {0, 0, 0}))
+              ? rangeOf(cubicSet(around))
               : rangeOf(levelset::QuadraticSuperSpline::determiningSet(sample, {0, 0, 0}));
       for (std::size_t z = 0; z < kCubes; ++z)
         if (!(range.low.v[z] < room[z] && range.high.v[z] >= -room[z])) open &= ~(1u << z);

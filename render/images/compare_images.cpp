@@ -257,6 +257,7 @@ class Comparer {
       double most = 1;
       for (const Image* image : {&a_, &b_})
         for (const char* name : {"curvature.k1", "curvature.k2"}) {
+          if (!has(name)) continue;
           const double k = h * std::abs(value(*image, name, i));
           if (std::isfinite(k)) most = std::max(most, k);
         }

@@ -16,7 +16,9 @@
 
 #include "levelset/error.h"
 #include "levelset/isosurface/isosurface.h"
+#include "levelset/splines/cubic_c1_spline.h"
 #include "levelset/splines/grid_extension.h"
+#include "levelset/splines/quadratic_super_spline.h"
 #include "levelset/volumes/synthetic.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/cpu/cpu_trace.h"
@@ -108,6 +110,50 @@ TEST(VolumeSurface, HasTheSameBitsOnBothProcessors) {
                 0u)
           << filterName(filter) << ", " << all[n].first;
     }
+}
+
+/// Returns true when the mask of a pool marks a cell, given in the index space of the volume.
+bool isMarked(const BrickPool& pool, const V3i& cell) {
+  const V3i at = cell - V3i(pool.origin[0], pool.origin[1], pool.origin[2]);
+  for (int a = 0; a < 3; ++a)
+    if (at[a] < 0 || at[a] >= 64 * pool.pages[static_cast<std::size_t>(a)]) return false;
+  const int page = ((at.x >> 6) * pool.pages[1] + (at.y >> 6)) * pool.pages[2] + (at.z >> 6);
+  const int lists = pool.page[static_cast<std::size_t>(page)];
+  if (lists < 0) return false;
+  const int slot = (at.x >> 3 & 7) << 6 | (at.y >> 3 & 7) << 3 | (at.z >> 3 & 7);
+  const int brick = pool.entry[static_cast<std::size_t>(lists + slot)];
+  const int bit = (at.x & 7) << 6 | (at.y & 7) << 3 | (at.z & 7);
+  return brick >= 0 &&
+         (pool.mask[static_cast<std::size_t>(16 * brick + (bit >> 5))] >> (bit & 31) & 1);
+}
+
+template <typename Spline>
+void expectMarks(const Spline& spline, Filter filter) {
+  const Volume volume = noisyBytes(24);
+  const VolumeSurface surface(volume, 100.5);
+  const BrickPool pool = makeBricks(surface, {.filter = filter});
+  const auto sample = [&](int i, int j, int k) { return 100.5 - volume.at(i, j, k); };
+  std::size_t marked = 0;
+  for (int x = 1; x < 23; ++x)
+    for (int y = 1; y < 23; ++y)
+      for (int z = 1; z < 23; ++z) {
+        double low = HUGE_VAL, high = -HUGE_VAL;
+        for (int t = 0; t < Spline::kTetrahedra; ++t)
+          for (const double b : spline.coefficients(sample, {{x, y, z}, t}).coefficients) {
+            low = std::min(low, b);
+            high = std::max(high, b);
+          }
+        const double rounding = 2e-5 * 160;
+        if (std::min(std::abs(low), std::abs(high)) < rounding) continue;
+        marked += isMarked(pool, V3i(x, y, z));
+        ASSERT_EQ(isMarked(pool, V3i(x, y, z)), low < 0 && high > 0) << filterName(filter);
+      }
+  EXPECT_GT(marked, 500u);
+}
+
+TEST(VolumeSurface, MarksTheCubesWhoseCoefficientsDifferInSign) {
+  expectMarks(levelset::QuadraticSuperSpline(), Filter::SuperQuadratic);
+  expectMarks(levelset::CubicC1Spline(), Filter::CubicC1);
 }
 
 TEST(VolumeSurface, HasTheSameBitsWithAllInstructionSets) {
