@@ -9,7 +9,7 @@
 
 #include "levelset/geometry/box_tree.h"
 #include "levelset/isosurface/isosurface.h"
-#include "levelset/isosurface/surface_frame.h"
+#include "levelset/isosurface/volume_frame.h"
 #include "levelset/volumes/filters/filtered_volume.h"
 
 namespace levelset {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "levelset/error.h"
-#include "levelset/isosurface/surface_frame.h"
+#include "levelset/isosurface/volume_frame.h"
 
 namespace levelset::trilinear {
 namespace {

@@ -30,6 +30,8 @@ constexpr double kLeastSingular = 0.02;
 /// Largest distance of a feature from its cell, voxels. Farther away, the planes do not belong to
 /// one edge or corner.
 constexpr double kCellReach = 1;
+/// Longest side of a triangle from which a vertex was removed, voxels.
+constexpr double kLongestSide = 3;
 /// Least increase of the score of a flip. Flips inside a plane have none.
 constexpr double kLeastAgreement = 1e-6;
 
@@ -274,7 +276,7 @@ class ExtendedMesher {
       for (const std::uint32_t v : t)
         if (!isFeature(v)) sheets[v] = {1, {openvdb::Vec3f(crossings_.at[v].normal)}};
     }
-    unfoldSheets(mesh_, sheets, subProgress(progress_, 0.8, 1));
+    unfoldSheets(mesh_, sheets, subProgress(progress_, 0.8, 1), kLongestSide);
     dropUnused();
   }
 

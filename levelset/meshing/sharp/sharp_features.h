@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "levelset/meshing/cells/cell_surface.h"
@@ -82,6 +83,9 @@ void insertFeatures(IndexMesh& mesh, std::vector<VertexSheets>& sheets, const Pr
 /// arise where vertices of neighbouring cells coincide or have exchanged their order. The repair
 /// flips mesh edges, then removes vertices from the triangles; these vertices remain in the list
 /// without sheets. The surface stays in place and 2-manifold.
-void unfoldSheets(IndexMesh& mesh, std::vector<VertexSheets>& sheets, const Progress& progress);
+/// @param longest  longest side of a triangle after a removal, voxels. Longer triangles along a
+/// curved edge of the solid cut through it.
+void unfoldSheets(IndexMesh& mesh, std::vector<VertexSheets>& sheets, const Progress& progress,
+                  double longest = std::numeric_limits<double>::infinity());
 
 }  // namespace levelset

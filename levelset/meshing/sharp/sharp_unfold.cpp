@@ -20,19 +20,18 @@ constexpr double kLeastHeight = 0.02, kLeastGain = 1e-3;
 /// Height assigned to a triangle that lies in no sheet, voxels: less than that of any triangle in a
 /// sheet.
 constexpr double kOffSheets = -10;
-/// Longest side of a triangle after a removal, voxels. Longer triangles along a curved edge of the
-/// solid would cut through it.
-constexpr double kLongestSide = 3;
 /// Largest number of passes in run(), and of passes over the edges in flip(). A flip can require
 /// another flip, and a removed vertex can require flips.
 constexpr int kUnfoldPasses = 8;
 
 class SheetUnfolder {
  public:
-  SheetUnfolder(IndexMesh& mesh, std::vector<VertexSheets>& sheets, const Progress& progress)
+  SheetUnfolder(IndexMesh& mesh, std::vector<VertexSheets>& sheets, double longest,
+                const Progress& progress)
       : positions_(mesh.positions),
         triangles_(mesh.triangles),
         sheets_(sheets),
+        longest_(longest),
         progress_(progress),
         state_(mesh.triangles.size(), State::Unknown),
         changedIn_(mesh.positions.size(), 0) {}
@@ -206,7 +205,7 @@ class SheetUnfolder {
   /// and at `to` (`other`). This pass must not have changed any of them, and `to` must have as many
   /// sheets as `from` or more. The mesh must stay a manifold: their only common neighbours are the
   /// two vertices opposite to their edge. The sum of deficit() over `fan` must decrease, and no
-  /// triangle may become longer than kLongestSide.
+  /// triangle may become longer than longest_ and than it was.
   [[nodiscard]] bool canStandFor(const std::vector<std::size_t>& fan, std::uint32_t from,
                                  std::uint32_t to, const std::vector<std::size_t>& other) const {
     if (sheets_[to].count < sheets_[from].count) return false;
@@ -227,7 +226,7 @@ class SheetUnfolder {
       before += deficit(moved);
       if (std::find(moved.begin(), moved.end(), to) != moved.end()) continue;
       std::replace(moved.begin(), moved.end(), from, to);
-      if (longestSide(moved) > std::max(kLongestSide, longestSide(triangles_[j]))) return false;
+      if (longestSide(moved) > std::max(longest_, longestSide(triangles_[j]))) return false;
       after += deficit(moved);
     }
     return before - after > kLeastGain;
@@ -236,6 +235,7 @@ class SheetUnfolder {
   std::vector<Vec3d>& positions_;
   std::vector<Triangle>& triangles_;
   std::vector<VertexSheets>& sheets_;
+  const double longest_;
   const Progress& progress_;
   std::vector<std::size_t> faces_;  ///< indices of the folded triangles
   std::vector<bool> touched_;       ///< [triangle]: true when this pass changed it
@@ -246,8 +246,9 @@ class SheetUnfolder {
 
 }  // namespace
 
-void unfoldSheets(IndexMesh& mesh, std::vector<VertexSheets>& sheets, const Progress& progress) {
-  SheetUnfolder(mesh, sheets, progress).run();
+void unfoldSheets(IndexMesh& mesh, std::vector<VertexSheets>& sheets, const Progress& progress,
+                  double longest) {
+  SheetUnfolder(mesh, sheets, longest, progress).run();
 }
 
 }  // namespace levelset

@@ -1,4 +1,4 @@
-#include "levelset/isosurface/surface_frame.h"
+#include "levelset/isosurface/volume_frame.h"
 
 #include <fmt/core.h>
 
