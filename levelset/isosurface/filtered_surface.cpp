@@ -140,6 +140,7 @@ class FilteredSurface::Descent {
   static constexpr double kConverged = 1e-6;   // voxels; the distance is off by its square
   static constexpr double kOnSurface = 1e-10;  // voxels
   static constexpr double kSamePoint = 0.05;   // voxels
+  static constexpr double kAtBorder = 1e-11;   // cells; below it, a step ends by rounding
 
   struct State {
     Vec3d x;
@@ -284,9 +285,10 @@ bool FilteredSurface::Descent::fixOutward(State& at, const Vec3d& step) const {
   bool isAny = false;
   for (int axis = 0; axis < 3; ++axis) {
     bool& fixed = at.fixed[static_cast<std::size_t>(axis)];
-    const bool leaves =
-        (at.x[axis] <= 0 && step[axis] < 0) || (at.x[axis] >= s_.last_[axis] && step[axis] > 0);
-    if (fixed || !leaves) continue;
+    const bool isUpper = step[axis] > 0;
+    const double limit = isUpper ? s_.last_[axis] : 0;
+    if (fixed || step[axis] == 0 || std::abs(at.x[axis] - limit) > kAtBorder) continue;
+    at.x[axis] = limit;
     fixed = isAny = true;
   }
   return isAny;
