@@ -95,9 +95,8 @@ Camera framingCamera(const Scene& scene, int width, int height, double verticalF
   if (bounds.isEmpty() && scene.hasVolume())
     return framingCamera(scene.volumeBounds(), width, height, verticalFov, up);
   return framingCamera(
-      bounds,
-      [&](const std::vector<Imath::V3d>& directions) { return scene.extents(directions); }, width,
-      height, verticalFov, up);
+      bounds, [&](const std::vector<Imath::V3d>& directions) { return scene.extents(directions); },
+      width, height, verticalFov, up);
 }
 
 Ground groundOf(const Scene& scene, const Imath::V3d& up) {
