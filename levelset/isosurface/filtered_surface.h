@@ -9,6 +9,7 @@
 
 #include "levelset/geometry/box_tree.h"
 #include "levelset/isosurface/isosurface.h"
+#include "levelset/isosurface/surface_pieces.h"
 #include "levelset/isosurface/volume_frame.h"
 #include "levelset/volumes/filters/filtered_volume.h"
 
@@ -24,8 +25,10 @@ struct FilterBounds {
   bool usesMixed = false;  ///< the second differences include those along two axes
 };
 
+[[nodiscard]] FilterBounds boundsOf(VolumeFilter filter);
+
 /// Boundary of the solid of all points whose filtered value lies in a range, inside the box of the
-/// volume. Positions are those of a SurfaceFrame.
+/// volume. Positions are those of a VolumeFrame.
 ///
 /// Each cell of the volume is split into boxes. A box whose corners have values on both sides of a
 /// limit holds a piece of the surface. A bound of the second derivatives tells where the surface
@@ -92,10 +95,9 @@ class FilteredSurface {
     double squared = 0;      ///< squared distance, voxels²
     bool isMinimum = false;  ///< the search converged here, and not on the border
   };
-  struct SlabOfPieces;
+  using SlabOfPieces = SlabOf<Piece>;
   class Descent;
 
-  void collectPieces(std::size_t maxMemory, const Progress& progress);
   void collectSlab(int k, SlabOfPieces& out) const;
   void collectCell(const Imath::V3i& cell, double curvature, SlabOfPieces& out) const;
   /// @param curvature  bound of the second derivatives of the functions along each axis, per cell²
@@ -107,8 +109,8 @@ class FilteredSurface {
   [[nodiscard]] Piece pieceIn(const Box& box, int function, const Vec3d& inside,
                               const Vec3d& outside, double& slope) const;
   [[nodiscard]] double functionAt(int n, double value) const {
-    return sign_[static_cast<std::size_t>(n)] * (value - limit_[static_cast<std::size_t>(n)]) /
-           unit_;
+    const auto at = static_cast<std::size_t>(n);
+    return limits_.sign[at] * (value - limits_.limit[at]) / unit_;
   }
   /// Smallest of the functions: positive inside the solid.
   [[nodiscard]] double depthAt(const Vec3d& index) const;
@@ -120,11 +122,10 @@ class FilteredSurface {
   [[nodiscard]] double squaredToFaces(const Vec3d& position, double best) const;
 
   FilteredVolume volume_;
-  SurfaceFrame frame_;
+  VolumeFrame frame_;
   openvdb::Mat3d metric_;  ///< inner products of the edges of a cell
   double voxelSize_ = 1;
-  int functions_ = 0;
-  std::array<double, 2> limit_{}, sign_{};
+  ValueLimits limits_;
   double unit_ = 1;  ///< range of the values of the volume
   FilterBounds bounds_;
   Vec3d last_;  ///< index of the last grid point

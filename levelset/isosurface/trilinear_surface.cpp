@@ -55,45 +55,25 @@ int levelOf(float edge) {
 
 }  // namespace
 
-struct TrilinearSurface::SlabOfPieces {
-  std::vector<Piece> pieces;
-  std::uint64_t cells = 0;
-};
-
 TrilinearSurface::TrilinearSurface(const Volume& volume, const ValueRange& range, double voxelSize,
                                    double halfWidth, std::size_t maxMemory,
                                    const Progress& progress)
-    : volume_(volume), unit_(volume.highest() - volume.lowest()), voxelSize_(voxelSize) {
-  functions_ = 0;
-  for (const auto& [limit, sign] : {std::pair(range.low, 1.0), std::pair(range.high, -1.0)}) {
-    if (!limit) continue;
-    limit_[static_cast<std::size_t>(functions_)] = *limit;
-    sign_[static_cast<std::size_t>(functions_++)] = sign;
-  }
+    : volume_(volume),
+      limits_(range),
+      unit_(volume.highest() - volume.lowest()),
+      voxelSize_(voxelSize) {
   placeFrame(halfWidth);
-  collectPieces(maxMemory, subProgress(progress, 0, 0.7));
+  report_.cells =
+      collectSlabs(volume.size().z - 1, kBytesPerPiece, maxMemory, subProgress(progress, 0, 0.7),
+                   pieces_, [this](int k, SlabOfPieces& out) { collectSlab(k, out); });
   collectFaces(maxMemory);
   report_.pieces = pieces_.size();
-  if (itemCount() > std::numeric_limits<std::uint32_t>::max())
-    throw ResourceLimit("the surface has more than 4 billion pieces; crop the volume");
-  tree_ = BoxTree(
-      itemCount(),
-      [&](std::uint32_t item, Vec3d& low, Vec3d& high) {
-        Vec3d from, to;
-        bound(item, from, to);
-        low = openvdb::math::minComponent(low, from);
-        high = openvdb::math::maxComponent(high, to);
-      },
-      [&](std::uint32_t item, int axis) {
-        Vec3d from, to;
-        bound(item, from, to);
-        return from[axis] + to[axis];
-      });
+  tree_ = treeOf(*this, itemCount());
   levelset::report(progress, 1);
 }
 
 void TrilinearSurface::placeFrame(double halfWidth) {
-  const SurfaceFrame frame(volume_.grid(), voxelSize_, halfWidth);
+  const VolumeFrame frame(volume_.grid(), voxelSize_, halfWidth);
   base_ = frame.base;
   origin_ = frame.origin;
   axes_ = frame.axes;
@@ -108,28 +88,9 @@ void TrilinearSurface::placeFrame(double halfWidth) {
 
 float TrilinearSurface::functionAt(int n, double stored) const {
   const auto at = static_cast<std::size_t>(n);
-  const auto value = static_cast<float>(sign_[at] * (volume_.scale()(stored) - limit_[at]) / unit_);
+  const auto value =
+      static_cast<float>(limits_.sign[at] * (volume_.scale()(stored) - limits_.limit[at]) / unit_);
   return value == 0 ? -kOutside : value;
-}
-
-void TrilinearSurface::collectPieces(std::size_t maxMemory, const Progress& progress) {
-  const int slabs = volume_.size().z - 1;
-  constexpr int kSlice = 16;
-  std::vector<SlabOfPieces> slice(kSlice);
-  for (int from = 0; from < slabs; from += kSlice) {
-    const int count = std::min(kSlice, slabs - from);
-    tbb::parallel_for(0, count, [&](int n) {
-      slice[static_cast<std::size_t>(n)] = {};
-      collectSlab(from + n, slice[static_cast<std::size_t>(n)]);
-    });
-    for (int n = 0; n < count; ++n) {
-      SlabOfPieces& slab = slice[static_cast<std::size_t>(n)];
-      pieces_.insert(pieces_.end(), slab.pieces.begin(), slab.pieces.end());
-      report_.cells += slab.cells;
-    }
-    requireMemory(static_cast<double>(pieces_.size()) * kBytesPerPiece, maxMemory);
-    levelset::report(progress, static_cast<double>(from + count) / slabs);
-  }
 }
 
 void TrilinearSurface::collectSlab(int k, SlabOfPieces& out) const {
@@ -152,7 +113,7 @@ void TrilinearSurface::collectSlab(int k, SlabOfPieces& out) const {
       }
       const auto [low, high] = std::minmax_element(stored.begin(), stored.end());
       if (*low == *high) continue;
-      for (int n = 0; n < functions_; ++n) {
+      for (int n = 0; n < limits_.count; ++n) {
         // The function is monotonic in the stored number.
         if ((functionAt(n, static_cast<double>(*low)) > 0) ==
             (functionAt(n, static_cast<double>(*high)) > 0))
@@ -236,8 +197,8 @@ void TrilinearSurface::addFace(int axis, bool isHigh, int a, int b) {
   first[u] = a;
   first[v] = b;
   BorderFace face;
-  face.functions = functions_;
-  for (int n = 0; n < functions_; ++n) {
+  face.functions = limits_.count;
+  for (int n = 0; n < limits_.count; ++n) {
     bool anyPositive = false;
     for (int c = 0; c < 4; ++c) {
       Imath::V3i at = first;
@@ -325,7 +286,7 @@ bool TrilinearSurface::isInside(const Vec3d& position) const {
     stored[n] = volume_.stored(volume_.index(cell.x + static_cast<int>(n >> 2),
                                              cell.y + static_cast<int>(n >> 1 & 1),
                                              cell.z + static_cast<int>(n & 1)));
-  for (int function = 0; function < functions_; ++function) {
+  for (int function = 0; function < limits_.count; ++function) {
     Corners corner{};
     for (std::size_t n = 0; n < 8; ++n) corner[n] = functionAt(function, stored[n]);
     if (!(Cubic(corner).value(t) > 0)) return false;

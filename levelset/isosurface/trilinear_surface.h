@@ -7,6 +7,7 @@
 
 #include "levelset/geometry/box_tree.h"
 #include "levelset/isosurface/isosurface.h"
+#include "levelset/isosurface/surface_pieces.h"
 #include "levelset/isosurface/trilinear_piece.h"
 
 namespace levelset::trilinear {
@@ -37,11 +38,10 @@ class TrilinearSurface {
   [[nodiscard]] const IsosurfaceReport& report() const { return report_; }
 
  private:
-  struct SlabOfPieces;
+  using SlabOfPieces = SlabOf<Piece>;
   using Corners = std::array<float, 8>;
 
   void placeFrame(double halfWidth);
-  void collectPieces(std::size_t maxMemory, const Progress& progress);
   void collectSlab(int k, SlabOfPieces& out) const;
   void split(const Corners& corner, const std::array<float, 3>& first, int level,
              std::vector<Piece>& out) const;
@@ -55,8 +55,7 @@ class TrilinearSurface {
   [[nodiscard]] Vec3d place(const Vec3d& index) const { return origin_ + index * axes_; }
 
   const Volume& volume_;
-  int functions_ = 1;
-  std::array<double, 2> limit_{}, sign_{};
+  ValueLimits limits_;
   double unit_ = 1;  ///< range of the values of the volume
   double voxelSize_ = 1;
   openvdb::Coord base_;

@@ -9,7 +9,7 @@
 
 namespace levelset {
 
-SurfaceFrame::SurfaceFrame(const VolumeGrid& grid, double voxelSize, double halfWidth) {
+VolumeFrame::VolumeFrame(const VolumeGrid& grid, double voxelSize, double halfWidth) {
   const Imath::M44d& map = grid.indexToWorld;
   const Imath::Box3d bounds = grid.bounds();
   for (int axis = 0; axis < 3; ++axis) {

@@ -9,11 +9,11 @@ namespace levelset {
 
 /// Frame in which distances to a surface in a volume are measured. Positions are in voxels of the
 /// result, relative to the grid point `base`, so that integers are grid points.
-struct SurfaceFrame {
+struct VolumeFrame {
   /// @param halfWidth  width of the band around the volume that must have valid grid indices,
   /// voxels
   /// @throws ResourceLimit
-  SurfaceFrame(const VolumeGrid& grid, double voxelSize, double halfWidth);
+  VolumeFrame(const VolumeGrid& grid, double voxelSize, double halfWidth);
 
   [[nodiscard]] openvdb::Vec3d place(const openvdb::Vec3d& index) const {
     return origin + index * axes;

@@ -12,18 +12,9 @@
 
 #include "levelset/volumes/synthetic.h"
 #include "render/volumes/volume_surface.h"
+#include "tests/support/volumes.h"
 
 namespace support {
-
-inline levelset::Volume filled(const levelset::VolumeGrid& grid,
-                               const std::function<double(const Imath::V3d&)>& function) {
-  std::vector<float> values;
-  for (int k = 0; k < grid.size.z; ++k)
-    for (int j = 0; j < grid.size.y; ++j)
-      for (int i = 0; i < grid.size.x; ++i)
-        values.push_back(static_cast<float>(function(Imath::V3d(i, j, k) * grid.indexToWorld)));
-  return {grid, std::move(values)};
-}
 
 /// A sheared and mirrored map with three spacings, for grids of 30 points on each axis.
 inline Imath::M44d obliqueMap() {
@@ -58,14 +49,14 @@ inline std::vector<std::pair<std::string, render::VolumeSurface>> volumeSurfaces
   const auto shiftedBall = [](const Imath::V3d& p) { return 0.6 - (p - Imath::V3d(1)).length(); };
   return {{"waves", {levelset::marschnerLobb(41), 0.5}},
           {"values that equal the isovalue", {noisyBytes(24), 100}},
-          {"sheared ball", {filled({Imath::V3i(30), obliqueMap()}, ball), 0}},
+          {"sheared ball", {sampled({Imath::V3i(30), obliqueMap()}, ball), 0}},
           {"ball", {levelset::sphereVolume(33, 0.6), 0}},
           {"torus", {levelset::torusVolume(30, 0.6, 0.25), 0.01}},
           {"noise", {noisyBytes(24), 100.5}},
           {"noise, inside below", {noisyBytes(24), 100, render::VolumeInside::Below}},
           {"three spacings",
-           {filled({Imath::V3i(40, 25, 12), Imath::M44d().setScale(Imath::V3d(0.05, 0.08, 0.17))},
-                   shiftedBall),
+           {sampled({Imath::V3i(40, 25, 12), Imath::M44d().setScale(Imath::V3d(0.05, 0.08, 0.17))},
+                    shiftedBall),
             0.02}}};
 }
 

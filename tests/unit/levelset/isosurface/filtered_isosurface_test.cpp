@@ -14,6 +14,7 @@
 #include "tests/support/files.h"
 #include "tests/support/measured.h"
 #include "tests/support/threads.h"
+#include "tests/support/volumes.h"
 
 namespace filtered_isosurface_test {
 
@@ -27,51 +28,18 @@ using levelset::UsageError;
 using levelset::Volume;
 using levelset::VolumeFilter;
 using levelset::VolumeGrid;
+using support::BandError;
+using support::cubeGrid;
+using support::errorOf;
 using support::measured;
 using support::measuredOrder;
 using support::refusal;
+using support::sampled;
 
 constexpr std::array kSmooth = {VolumeFilter::Tricubic,       VolumeFilter::BSpline,
                                 VolumeFilter::BSplineQi,      VolumeFilter::WindowedSinc,
                                 VolumeFilter::SuperQuadratic, VolumeFilter::CubicC1,
                                 VolumeFilter::BccQuadratic};
-
-Volume sampled(const VolumeGrid& grid, const std::function<double(const V3d&)>& function) {
-  std::vector<float> values;
-  for (int k = 0; k < grid.size.z; ++k)
-    for (int j = 0; j < grid.size.y; ++j)
-      for (int i = 0; i < grid.size.x; ++i)
-        values.push_back(static_cast<float>(function(V3d(i, j, k) * grid.indexToWorld)));
-  return {grid, std::move(values)};
-}
-
-/// Grid of n cells along each side of the cube [−1.3, 1.3]³.
-VolumeGrid cubeGrid(int n) {
-  VolumeGrid grid;
-  grid.size = V3i(n + 1);
-  for (int axis = 0; axis < 3; ++axis) {
-    grid.indexToWorld[axis][axis] = 2.6 / n;
-    grid.indexToWorld[3][axis] = -1.3;
-  }
-  return grid;
-}
-
-struct BandError {
-  double largest = 0;          ///< world units
-  std::size_t wrongSigns = 0;  ///< grid points further than the error from the surface
-};
-
-BandError errorOf(const levelset::NarrowBand& band, const std::function<double(const V3d&)>& phi) {
-  BandError error;
-  const auto& grid = levelset::vdb(band);
-  for (auto it = grid.cbeginValueOn(); it; ++it) {
-    const double exact = phi(levelset::toImath(grid.transform().indexToWorld(it.getCoord())));
-    const double off = std::abs(static_cast<double>(*it) - exact);
-    error.largest = std::max(error.largest, off);
-    error.wrongSigns += std::abs(exact) > off && (*it < 0) != (exact < 0);
-  }
-  return error;
-}
 
 double sphere(const V3d& p) {
   return p.length() - 0.8;
@@ -101,7 +69,7 @@ TEST(FilteredIsosurface, ConvergesToASphere) {
       EXPECT_EQ(made.report.closedArea, 0);
       const BandError error = errorOf(made.band, sphere);
       EXPECT_EQ(error.wrongSigns, 0u);
-      errors[n] = error.largest;
+      errors[n] = error.largest();
     }
     EXPECT_GT(std::log2(errors[0] / errors[1]), measuredOrder(expected.order));
     EXPECT_LT(errors[1], measured(expected.error));
@@ -206,7 +174,7 @@ TEST(FilteredIsosurface, ClosesTheBorder) {
       }
       return outside > 0 ? std::sqrt(outside) : -depth;
     });
-    EXPECT_LT(error.largest, measured(1e-6));
+    EXPECT_LT(error.largest(), measured(1e-6));
     EXPECT_EQ(error.wrongSigns, 0u);
   }
 }

@@ -19,6 +19,7 @@
 #include "tests/support/files.h"
 #include "tests/support/measured.h"
 #include "tests/support/threads.h"
+#include "tests/support/volumes.h"
 
 namespace isosurface_mesh_test {
 
@@ -34,29 +35,16 @@ using levelset::Volume;
 using levelset::VolumeFilter;
 using levelset::VolumeGrid;
 using levelset::VolumeType;
+using support::cubeGrid;
 using support::measured;
 using support::refusal;
+using support::sampled;
 
 VolumeGrid gridOf(const V3i& size, const M44d& map) {
   VolumeGrid grid;
   grid.size = size;
   grid.indexToWorld = map;
   return grid;
-}
-
-/// Grid of n³ points of the cube [−1.3, 1.3]³.
-VolumeGrid cubeGrid(int n) {
-  const double step = 2.6 / (n - 1);
-  return gridOf(V3i(n), M44d(step, 0, 0, 0, 0, step, 0, 0, 0, 0, step, 0, -1.3, -1.3, -1.3, 1));
-}
-
-Volume sampled(const VolumeGrid& grid, const std::function<double(const V3d&)>& function) {
-  std::vector<float> values;
-  for (int k = 0; k < grid.size.z; ++k)
-    for (int j = 0; j < grid.size.y; ++j)
-      for (int i = 0; i < grid.size.x; ++i)
-        values.push_back(static_cast<float>(function(V3d(i, j, k) * grid.indexToWorld)));
-  return {grid, std::move(values)};
 }
 
 /// Volume of random integers with few different values, so that many equal the isovalue.
@@ -76,8 +64,8 @@ struct Errors {
 
 /// Errors on a smooth function of which one level is the unit sphere.
 Errors errorsOn(int n, VolumeFilter filter) {
-  const Volume volume =
-      sampled(cubeGrid(n), [](const V3d& p) { return std::exp(-p.length2()) - std::exp(-1.0); });
+  const Volume volume = sampled(
+      cubeGrid(n - 1), [](const V3d& p) { return std::exp(-p.length2()) - std::exp(-1.0); });
   const TriMesh mesh = isosurfaceMesh(volume, 0, {.filter = filter}).mesh;
   EXPECT_TRUE(levelset::manifoldness(mesh).isClosedManifold());
   Errors errors;

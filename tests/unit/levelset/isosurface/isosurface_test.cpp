@@ -15,6 +15,7 @@
 #include "tests/support/files.h"
 #include "tests/support/measured.h"
 #include "tests/support/threads.h"
+#include "tests/support/volumes.h"
 
 namespace isosurface_test {
 
@@ -30,30 +31,12 @@ using levelset::Volume;
 using levelset::VolumeBorder;
 using levelset::VolumeGrid;
 using levelset::VolumeType;
+using support::BandError;
+using support::cubeGrid;
+using support::errorOf;
 using support::measured;
 using support::refusal;
-
-Volume sampled(const VolumeGrid& grid, const std::function<double(const V3d&)>& function) {
-  std::vector<float> values;
-  for (int k = 0; k < grid.size.z; ++k)
-    for (int j = 0; j < grid.size.y; ++j)
-      for (int i = 0; i < grid.size.x; ++i)
-        values.push_back(static_cast<float>(function(V3d(i, j, k) * grid.indexToWorld)));
-  return {grid, std::move(values)};
-}
-
-/// Grid of about n points along each side of the cube [−1.3, 1.3]³, with spacings in a ratio.
-VolumeGrid cubeGrid(int n, const V3d& ratio = V3d(1)) {
-  VolumeGrid grid;
-  M44d map;
-  for (int axis = 0; axis < 3; ++axis) {
-    grid.size[axis] = static_cast<int>(n / ratio[axis]) + 1;
-    map[axis][axis] = 2.6 / (grid.size[axis] - 1);
-    map[3][axis] = -1.3;
-  }
-  grid.indexToWorld = map;
-  return grid;
-}
+using support::sampled;
 
 /// Turns a grid about the origin, and shears it.
 VolumeGrid oblique(VolumeGrid grid) {
@@ -62,24 +45,6 @@ VolumeGrid oblique(VolumeGrid grid) {
   shear[1][0] = 0.25;
   grid.indexToWorld = grid.indexToWorld * shear * turn;
   return grid;
-}
-
-struct BandError {
-  double inside = 0, outside = 0;  ///< largest error on each side, world units
-  std::size_t wrongSigns = 0;      ///< grid points further than the error from the surface
-};
-
-BandError errorOf(const levelset::NarrowBand& band, const std::function<double(const V3d&)>& phi) {
-  BandError error;
-  const auto& grid = levelset::vdb(band);
-  for (auto it = grid.cbeginValueOn(); it; ++it) {
-    const double exact = phi(levelset::toImath(grid.transform().indexToWorld(it.getCoord())));
-    const double off = std::abs(static_cast<double>(*it) - exact);
-    double& side = exact < 0 ? error.inside : error.outside;
-    side = std::max(side, off);
-    error.wrongSigns += std::abs(exact) > off && (*it < 0) != (exact < 0);
-  }
-  return error;
 }
 
 double unitSphere(const V3d& p) {

@@ -10,6 +10,7 @@
 
 #include "levelset/volumes/filters/filtered_volume.h"
 #include "tests/support/measured.h"
+#include "tests/support/volumes.h"
 
 namespace volume_filter_test {
 
@@ -25,20 +26,12 @@ using levelset::VolumeFilterFacts;
 using levelset::VolumeGrid;
 using support::measured;
 using support::measuredOrder;
-
-Volume filled(const VolumeGrid& grid, const std::function<double(const V3d&)>& function) {
-  std::vector<float> values;
-  for (int k = 0; k < grid.size.z; ++k)
-    for (int j = 0; j < grid.size.y; ++j)
-      for (int i = 0; i < grid.size.x; ++i)
-        values.push_back(static_cast<float>(function(V3d(i, j, k))));
-  return {grid, std::move(values)};
-}
+using support::sampled;
 
 Volume noise(const V3i& size) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> uniform(-1, 1);
-  return filled({size, {}}, [&](const V3d&) { return uniform(random); });
+  return sampled({size, {}}, [&](const V3d&) { return uniform(random); });
 }
 
 /// Largest differences of values, gradients and second derivatives.
@@ -104,7 +97,7 @@ Difference fromPolynomial(VolumeFilter filter, int degree, double margin) {
   const Polynomial polynomial(degree);
   const V3i size(9, 8, 7);
   const FilteredVolume f(
-      filled({size, {}}, [&](const V3d& p) { return polynomial.derivative(p, V3i(0)); }), filter);
+      sampled({size, {}}, [&](const V3d& p) { return polynomial.derivative(p, V3i(0)); }), filter);
   std::mt19937 random(5);
   std::uniform_real_distribution<double> uniform(0, 1);
   Difference found;
@@ -221,8 +214,7 @@ Difference waveError(VolumeFilter filter, int n, double margin) {
   VolumeGrid grid;
   grid.size = V3i(n + 1);
   for (int axis = 0; axis < 3; ++axis) grid.indexToWorld[axis][axis] = 2.0 / n;
-  const FilteredVolume f(filled(grid, [&](const V3d& p) { return wave(p * grid.indexToWorld); }),
-                         filter);
+  const FilteredVolume f(sampled(grid, [&](const V3d& p) { return wave(p); }), filter);
   std::mt19937 random(8);
   std::uniform_real_distribution<double> uniform(margin, 2 - margin);
   Difference found;
@@ -299,9 +291,8 @@ TEST(VolumeFilter, WorldDerivativesFollowAnObliqueMap) {
   const auto quadratic = [](const V3d& p) {
     return 1 + p.x - 2 * p.y + p.x * p.y + 0.5 * p.z * p.z;
   };
-  const FilteredVolume f(
-      filled(grid, [&](const V3d& p) { return quadratic(p * grid.indexToWorld); }),
-      VolumeFilter::Tricubic);
+  const FilteredVolume f(sampled(grid, [&](const V3d& p) { return quadratic(p); }),
+                         VolumeFilter::Tricubic);
   const V3d at = V3d(2.3, 4.1, 6.6) * grid.indexToWorld;
   const VolumeDerivatives found = f.worldDerivatives(at);
   // The samples are rounded to single precision.
@@ -316,7 +307,7 @@ TEST(VolumeFilter, WorksOnSmallGridsAndAnyPosition) {
   for (const VolumeFilter filter : kVolumeFilters)
     for (const V3i& size : {V3i(1), V3i(2), V3i(1, 2, 3)}) {
       SCOPED_TRACE(factsOf(filter).name);
-      const FilteredVolume f(filled({size, {}}, [](const V3d&) { return 2.5; }), filter);
+      const FilteredVolume f(sampled({size, {}}, [](const V3d&) { return 2.5; }), filter);
       for (const V3d& p : {V3d(0), V3d(0.5, 0.7, 1.2), V3d(-1e30, 1e30, 4), V3d(NAN, 0, 0)}) {
         const VolumeDerivatives at = f.derivatives(p);
         EXPECT_NEAR(at.value, 2.5, 1e-14);

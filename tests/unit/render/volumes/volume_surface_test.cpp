@@ -190,7 +190,7 @@ TEST(VolumeSurface, HasTheSameBitsWithAllInstructionSets) {
 TEST(VolumeSurface, HasTheDepthOfTheJudgeWithinAHundredThousandthOfAVoxel) {
   // The eye is close, and the voxel is the unit, so that single-precision depths are fine enough.
   const auto ball = [](const V3d& p) { return 8 - (p - V3d(12.1, 11.7, 12.3)).length(); };
-  Scene scene = sceneOf({filled({V3i(25), M44d()}, ball), 0}, 96, 96);
+  Scene scene = sceneOf({sampled({V3i(25), M44d()}, ball), 0}, 96, 96);
   scene.camera.from = V3d(12, 12, 24);
   scene.camera.to = V3d(12);
   scene.camera.up = V3d(0, 1, 0);
@@ -244,9 +244,9 @@ TEST(VolumeSurface, ConvergesToABall) {
 TEST(VolumeSurface, HasNormalsTowardsTheOutsideOnBothSides) {
   // The same surface; solid on the other side. Sheared and mirrored axes.
   const auto ball = [](const V3d& p) { return 0.6 - p.length(); };
-  const Volume volume = filled({V3i(30), obliqueMap()}, ball);
+  const Volume volume = sampled({V3i(30), obliqueMap()}, ball);
   EXPECT_LE(ballErrors(sceneOf({volume, 0}), Filter::Trilinear).second, measured(0.012));
-  const Volume negated = filled({V3i(30), obliqueMap()}, [&](const V3d& p) { return -ball(p); });
+  const Volume negated = sampled({V3i(30), obliqueMap()}, [&](const V3d& p) { return -ball(p); });
   const Image a = renderCpu(sceneOf({volume, 0}), optionsOf(Filter::Trilinear)),
               b = renderCpu(sceneOf({negated, 0, VolumeInside::Below}),
                             optionsOf(Filter::Trilinear));
@@ -280,7 +280,7 @@ TEST(VolumeSurface, EndsWhereAPlateauBegins) {
   // Values of 1 above the plane z = 10, less below it: with the isovalue 1 nothing is inside, and
   // with less the surface lies below the plateau.
   const Volume volume =
-      filled({V3i(21), M44d()}, [](const V3d& p) { return std::min(p.z / 10, 1.0); });
+      sampled({V3i(21), M44d()}, [](const V3d& p) { return std::min(p.z / 10, 1.0); });
   EXPECT_TRUE(VolumeSurface(volume, 1).isEmpty());
   const VolumeSurface below(volume, 1, VolumeInside::Below);
   ASSERT_FALSE(below.isEmpty());
@@ -315,7 +315,7 @@ TEST(VolumeSurface, RefusesWhatHasNoSurface) {
   scene.solids[0].quantization.bits = 8;
   EXPECT_THROW(renderCpu(scene), levelset::UsageError);
   // A grid with one layer of points has no cells.
-  const VolumeSurface flat(filled({V3i(9, 9, 1), M44d()}, [](const V3d& p) { return p.x - 4; }),
+  const VolumeSurface flat(sampled({V3i(9, 9, 1), M44d()}, [](const V3d& p) { return p.x - 4; }),
                            0.5);
   EXPECT_TRUE(flat.blocks(Filter::BSplineQi).empty());
   const Image image = renderCpu(sceneOf(flat, 16, 16));
