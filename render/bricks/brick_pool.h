@@ -17,8 +17,8 @@ namespace render {
 
 /// Values of a band or volume that the kernel's rays read, and a two-level table that finds them by
 /// position. The pool holds all values of the blocks of 8³ cells that the surface crosses (bricks).
-/// Of their neighbours (halo blocks) it holds only the points that curvature stencils read. The
-/// members are plain arrays, so that they can be uploaded to the GPU.
+/// Neighbouring blocks (halo blocks) are stored in part: only the points that curvature stencils
+/// read. The members are plain arrays, so that they can be uploaded to the GPU.
 ///
 /// Positions are in table space: the band's index space minus `origin`. Blocks, pages of 8³ blocks
 /// and empty cubes start at multiples of their edge there. For filters on tetrahedra, positions are

@@ -217,6 +217,7 @@ void GlContext::work() {
 }
 
 void GlContext::run(const std::function<void()>& job) const {
+  if (std::this_thread::get_id() == thread_.get_id()) return job();
   Waiting mine{job, nullptr};
   std::unique_lock lock(mutex_);
   waiting_.push_back(&mine);

@@ -76,7 +76,7 @@ class GlContext {
   GlContext& operator=(const GlContext&) = delete;
 
   /// Runs a job on the context's thread and waits for its end. Jobs of several threads run one
-  /// after the other. Exceptions of the job are thrown here.
+  /// after the other. A job may call run() itself. Exceptions of the job are thrown here.
   void run(const std::function<void()>& job) const;
 
   /// OpenGL's functions. Only jobs of run() may call them.

@@ -32,16 +32,25 @@ void releaseTexels(const GlContext& context, const Texels& texels) {
 
 void GrowingBuffer::reserve(const GlContext& context, std::size_t bytes) {
   if (bytes <= capacity_) return;
-  const std::size_t wanted = std::max(bytes, capacity_ + capacity_ / 2);
+  std::size_t wanted = std::max(bytes, capacity_ + capacity_ / 2);
   release(context);
   const GlFunctions& gl = context.gl();
   constexpr GLbitfield kMapping = GL_MAP_READ_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
   const GLbitfield flags = use_ == Use::Upload  ? GL_DYNAMIC_STORAGE_BIT
                            : use_ == Use::Fetch ? kMapping | GL_CLIENT_STORAGE_BIT
                                                 : 0;
-  gl.CreateBuffers(1, &name_);
-  gl.NamedBufferStorage(name_, static_cast<GLsizeiptr>(wanted), nullptr, flags);
-  context.check("allocating memory for rays");
+  const auto allocate = [&](std::size_t size) {
+    gl.CreateBuffers(1, &name_);
+    gl.NamedBufferStorage(name_, static_cast<GLsizeiptr>(size), nullptr, flags);
+    context.check("allocating memory for rays");
+  };
+  try {
+    allocate(wanted);
+  } catch (const levelset::ResourceLimit&) {  // there may be room for what is needed now
+    release(context);
+    wanted = bytes;
+    allocate(wanted);
+  }
   if (use_ == Use::Fetch) {
     mapped_ = gl.MapNamedBufferRange(name_, 0, static_cast<GLsizeiptr>(wanted), kMapping);
     context.check("mapping memory of the graphics driver");

@@ -61,9 +61,9 @@ layout(binding = 2) uniform isamplerBuffer masks;
 layout(std430, binding = 0) readonly buffer Rays { float rays[]; };
 layout(std430, binding = 1) writeonly buffer Hits { int hits[]; };
 
-// OpenGL lets drivers round a quotient of floats to a neighbour. A quotient in double precision
-// rounds to the nearest float.
-Real reciprocal(Real v) { return float(1.0lf / double(v)); }
+// OpenGL lets drivers round a quotient of floats to a neighbour. A quotient of two floats in double
+// precision is never so close to the middle of two floats that its last bits decide.
+Real quotient(Real a, Real b) { return float(double(a) / double(b)); }
 Real real(float v) { return v; }
 Int integer(int v) { return v; }
 Bool no() { return false; }

@@ -302,7 +302,13 @@ struct CubicForm {
        b111, b112, b113, b122, b123, b133, b222, b223, b233, b333;
 };
 
-QuadraticForm quadraticForm(IN(Cube) c) {
+// Sums of the data along axes of the cube, with halves as weights, from which the coefficients of
+// both splines are made. t: along x; a: along x and y; b: along x and z; d: of the middle layer.
+struct CubeSums {
+  Real t00, t01, t02, t10, t11, t12, t20, t21, t22, a0, a1, a2, b2, b3, d2, d3;
+};
+
+CubeSums sumsOf(IN(Cube) c) {
   VAR t00 = ((c.c000 + c.c100) + c.c200) * 0.5f;
   VAR t01 = ((c.c001 + c.c101) + c.c201) * 0.5f;
   VAR t02 = ((c.c002 + c.c102) + c.c202) * 0.5f;
@@ -322,14 +328,36 @@ QuadraticForm quadraticForm(IN(Cube) c) {
   VAR f2 = ((c.c002 + c.c012) + c.c022) * 0.5f;
   VAR d2 = ((f0 + f1) + f2) * 0.5f;
   VAR d3 = ((f0 + f1) - f2) * 0.5f;
-  VAR q22 = ((a0 + a1) + a2) * 0.5f;
-  VAR q33 = ((a0 + a1) - a2) * 0.5f;
-  VAR q23 = a0;
-  VAR q12 = (a0 + b2) * 0.5f;
-  VAR q13 = (a0 + b3) * 0.5f;
-  VAR q11 = t00 * 0.5f + (t10 + t01) * 0.25f;
-  VAR q02 = (((a0 + b2) + d2) - q22) * 0.5f;
-  VAR q03 = (((a0 + b3) + d3) - q33) * 0.5f;
+  CubeSums sums;
+  sums.t00 = t00;
+  sums.t01 = t01;
+  sums.t02 = t02;
+  sums.t10 = t10;
+  sums.t11 = t11;
+  sums.t12 = t12;
+  sums.t20 = t20;
+  sums.t21 = t21;
+  sums.t22 = t22;
+  sums.a0 = a0;
+  sums.a1 = a1;
+  sums.a2 = a2;
+  sums.b2 = b2;
+  sums.b3 = b3;
+  sums.d2 = d2;
+  sums.d3 = d3;
+  return sums;
+}
+
+QuadraticForm quadraticForm(IN(Cube) c) {
+  CubeSums s = sumsOf(c);
+  VAR q22 = ((s.a0 + s.a1) + s.a2) * 0.5f;
+  VAR q33 = ((s.a0 + s.a1) - s.a2) * 0.5f;
+  VAR q23 = s.a0;
+  VAR q12 = (s.a0 + s.b2) * 0.5f;
+  VAR q13 = (s.a0 + s.b3) * 0.5f;
+  VAR q11 = s.t00 * 0.5f + (s.t10 + s.t01) * 0.25f;
+  VAR q02 = (((s.a0 + s.b2) + s.d2) - q22) * 0.5f;
+  VAR q03 = (((s.a0 + s.b3) + s.d3) - q33) * 0.5f;
   VAR faces = 5.0f * c.c000 + 3.0f * ((c.c100 + c.c200) + (c.c010 + c.c001));
   VAR edges = ((c.c110 + c.c210) + (c.c101 + c.c201)) + c.c011;
   VAR q01 = (faces + (edges - (c.c111 + c.c211))) * 0.0625f;
@@ -349,47 +377,29 @@ QuadraticForm quadraticForm(IN(Cube) c) {
 }
 
 CubicForm cubicForm(IN(Cube) c) {
-  VAR t00 = ((c.c000 + c.c100) + c.c200) * 0.5f;
-  VAR t01 = ((c.c001 + c.c101) + c.c201) * 0.5f;
-  VAR t02 = ((c.c002 + c.c102) + c.c202) * 0.5f;
-  VAR t10 = ((c.c010 + c.c110) + c.c210) * 0.5f;
-  VAR t11 = ((c.c011 + c.c111) + c.c211) * 0.5f;
-  VAR t12 = ((c.c012 + c.c112) + c.c212) * 0.5f;
-  VAR t20 = ((c.c020 + c.c120) + c.c220) * 0.5f;
-  VAR t21 = ((c.c021 + c.c121) + c.c221) * 0.5f;
-  VAR t22 = ((c.c022 + c.c122) + c.c222) * 0.5f;
-  VAR a0 = ((t00 + t10) + t20) * 0.5f;
-  VAR a1 = ((t01 + t11) + t21) * 0.5f;
-  VAR a2 = ((t02 + t12) + t22) * 0.5f;
-  VAR b2 = ((t00 + t01) + t02) * 0.5f;
-  VAR b3 = ((t00 + t01) - t02) * 0.5f;
-  VAR f0 = ((c.c000 + c.c010) + c.c020) * 0.5f;
-  VAR f1 = ((c.c001 + c.c011) + c.c021) * 0.5f;
-  VAR f2 = ((c.c002 + c.c012) + c.c022) * 0.5f;
-  VAR d2 = ((f0 + f1) + f2) * 0.5f;
-  VAR d3 = ((f0 + f1) - f2) * 0.5f;
+  CubeSums s = sumsOf(c);
   VAR p00 = c.c100 + c.c200;
   VAR p01 = c.c101 + c.c201;
   VAR p02 = c.c102 + c.c202;
   VAR p10 = c.c110 + c.c210;
   VAR p20 = c.c120 + c.c220;
-  VAR b222 = ((a0 + a1) + a2) * 0.5f;
-  VAR b333 = ((a0 + a1) - a2) * 0.5f;
-  VAR b223 = ((5.0f * a0 + a1) + a2) * (1.0f / 6.0f);
-  VAR b233 = ((5.0f * a0 + a1) - a2) * (1.0f / 6.0f);
-  VAR e12 = (5.0f * t00 + 3.0f * ((t10 + t20) + t01)) + (t11 + t21);
-  VAR o12 = (3.0f * t02 + t12) + t22;
+  VAR b222 = ((s.a0 + s.a1) + s.a2) * 0.5f;
+  VAR b333 = ((s.a0 + s.a1) - s.a2) * 0.5f;
+  VAR b223 = ((5.0f * s.a0 + s.a1) + s.a2) * (1.0f / 6.0f);
+  VAR b233 = ((5.0f * s.a0 + s.a1) - s.a2) * (1.0f / 6.0f);
+  VAR e12 = (5.0f * s.t00 + 3.0f * ((s.t10 + s.t20) + s.t01)) + (s.t11 + s.t21);
+  VAR o12 = (3.0f * s.t02 + s.t12) + s.t22;
   VAR b122 = (e12 + o12) * (1.0f / 12.0f);
   VAR b133 = (e12 - o12) * (1.0f / 12.0f);
-  VAR b123 = ((13.0f * t00 + 7.0f * (t10 + t20)) + (3.0f * t01 + (t11 + t21))) * (1.0f / 24.0f);
-  VAR e11 = (26.0f * t00 + 10.0f * (t10 + t01)) + 2.0f * t11;
-  VAR e112 = (e11 + 7.0f * t20) + t21;
-  VAR o112 = 7.0f * t02 + t12;
+  VAR b123 = ((13.0f * s.t00 + 7.0f * (s.t10 + s.t20)) + (3.0f * s.t01 + (s.t11 + s.t21))) * (1.0f / 24.0f);
+  VAR e11 = (26.0f * s.t00 + 10.0f * (s.t10 + s.t01)) + 2.0f * s.t11;
+  VAR e112 = (e11 + 7.0f * s.t20) + s.t21;
+  VAR o112 = 7.0f * s.t02 + s.t12;
   VAR b112 = (e112 + o112) * (1.0f / 48.0f);
   VAR b113 = (e112 - o112) * (1.0f / 48.0f);
   VAR b111 = e11 * (1.0f / 48.0f);
-  VAR b022 = ((a0 + b2) + d2) * (1.0f / 3.0f);
-  VAR b033 = ((a0 + b3) + d3) * (1.0f / 3.0f);
+  VAR b022 = ((s.a0 + s.b2) + s.d2) * (1.0f / 3.0f);
+  VAR b033 = ((s.a0 + s.b3) + s.d3) * (1.0f / 3.0f);
   VAR e23 = (8.0f * c.c000 + 5.0f * (p00 + (c.c010 + c.c020))) + 2.0f * (p10 + p20);
   VAR b023 = (e23 + (2.0f * c.c001 + ((p01 + c.c011) + c.c021))) * (1.0f / 24.0f);
   VAR e01 = ((16.0f * c.c000 + 10.0f * p00) + 7.0f * (c.c010 + c.c001)) + (3.0f * (p10 + p01) + 2.0f * c.c011);
@@ -465,7 +475,8 @@ Real weighted(IN(Weights) w, IN(Weights) a) { return weighted(w, a.w0, a.w1, a.w
 // Share of a segment at which a linear function with the values a and b at its ends changes sign; 1
 // if it does not.
 Real shareOf(Real a, Real b) {
-  VAR share = a / (a - b);
+  VAR change = a - b;
+  VAR share = quotient(a, change);
   return select(differ(a < 0.0f, b < 0.0f), share, real(1.0f));
 }
 

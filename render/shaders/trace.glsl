@@ -101,7 +101,7 @@ Real onlyFar(Real d) {
   return select(AND(d > -kLeastDirection, d < kLeastDirection), real(0.0f), d);
 }
 
-Real inverseOf(Real d) { return select(d == 0.0f, real(kParallel), reciprocal(d)); }
+Real inverseOf(Real d) { return select(d == 0.0f, real(kParallel), quotient(real(1.0f), d)); }
 
 // The ray through pixel (x, y), clipped to the box of the blocks that the surface crosses.
 Ray viewRay(Real x, Real y) {

@@ -28,22 +28,6 @@ void requireIsovalue(double isovalue) {
         fmt::format("the isovalue {} is not a finite number; give a number", isovalue));
 }
 
-/// Value of a grid point beyond the border.
-double extendedValue(const levelset::Volume& volume, int i, int j, int k) {
-  const V3i size = volume.size();
-  const auto rule = levelset::GridExtension::Quadratic;
-  const levelset::ExtensionWeights x = levelset::extensionWeights(i, size.x, rule),
-                                   y = levelset::extensionWeights(j, size.y, rule),
-                                   z = levelset::extensionWeights(k, size.z, rule);
-  double sum = 0;
-  for (std::size_t c = 0; c < static_cast<std::size_t>(z.count); ++c)
-    for (std::size_t b = 0; b < static_cast<std::size_t>(y.count); ++b)
-      for (std::size_t a = 0; a < static_cast<std::size_t>(x.count); ++a)
-        sum += static_cast<double>(x.weight[a] * y.weight[b] * z.weight[c]) *
-               volume.at(x.index[a], y.index[b], z.index[c]);
-  return sum;
-}
-
 }  // namespace
 
 VolumeSurface::VolumeSurface(levelset::Volume volume, double isovalue, VolumeInside inside,
@@ -89,6 +73,9 @@ std::vector<V3i> VolumeSurface::blocks(Filter filter) const {
 void VolumeSurface::copyField(const V3i& low, const V3i& size, float* out) const {
   const V3i points = volume_->size();
   const levelset::VolumeScale scale = volume_->scale();
+  const levelset::ExtendedGrid extended(
+      [this](int i, int j, int k) { return volume_->at(i, j, k); }, {points.x, points.y, points.z},
+      levelset::GridExtension::Quadratic);
   const auto isWithin = [](int n, int count, int reach) {
     return n >= -reach && n < count + reach;
   };
@@ -120,9 +107,8 @@ void VolumeSurface::copyField(const V3i& low, const V3i& size, float* out) const
           x = to - low.x - 1;
           continue;
         }
-        column[x * stepX] = isNear && isWithin(i, points.x, kReach)
-                                ? field(extendedValue(*volume_, i, j, k))
-                                : 0.0f;
+        column[x * stepX] =
+            isNear && isWithin(i, points.x, kReach) ? field(extended(i, j, k)) : 0.0f;
       }
     }
 }
