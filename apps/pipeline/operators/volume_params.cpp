@@ -92,6 +92,20 @@ void checkVolumeOptions(const Invocation& in, bool isVolume) {
   if (isRaw) static_cast<void>(volumeOptions(in));
 }
 
+levelset::Volume volumeIn(const Invocation& in) {
+  const Value& value = in.operands[0];
+  return value.kind() == Kind::Field ? levelset::volumeOf(value.field(), in.maxMemory)
+                                     : value.volume();
+}
+
+Param insideParam(std::string doc) {
+  return {.name = "inside",
+          .type = ParamType::Choice,
+          .doc = std::move(doc),
+          .fallback = "above",
+          .choices = {"above", "below"}};
+}
+
 void addVolumeGrid(Json& json, const levelset::VolumeGrid& grid) {
   const auto vector = [](const auto& v) { return Json::array({v.x, v.y, v.z}); };
   const Imath::M44d& m = grid.indexToWorld;

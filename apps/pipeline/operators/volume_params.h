@@ -17,6 +17,11 @@ namespace pipeline {
 /// @throws UsageError
 void checkVolumeOptions(const Invocation& in, bool isVolume);
 
+/// Volume of the first operand. A field from a .vdb becomes one.
+[[nodiscard]] levelset::Volume volumeIn(const Invocation& in);
+/// Option --inside of operators that take an isovalue.
+[[nodiscard]] Param insideParam(std::string doc = "side of the isovalue that is inside");
+
 /// Adds size, spacing, origin, orientation and the index-to-world map to a JSON object.
 void addVolumeGrid(Json& json, const levelset::VolumeGrid& grid);
 

@@ -11,10 +11,10 @@
 #include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/json_output.h"
 #include "apps/pipeline/operators/pictures/camera_options.h"
+#include "apps/pipeline/operators/volume_params.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
-#include "levelset/volume_files/volume_file.h"
 #include "render/camera.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/embree/embree_renderer.h"
@@ -49,13 +49,9 @@ void requireIsovalue(const Invocation& in) {
 
 /// Scene with the isosurface of a volume.
 render::ViewedScene volumeScene(Invocation& in) {
-  const Value& value = in.operands[0];
-  levelset::Volume volume = value.kind() == Kind::Field
-                                ? levelset::volumeOf(value.field(), in.maxMemory)
-                                : value.volume();
   const double isovalue = in.number("isovalue");
   const auto surface = std::make_shared<const render::VolumeSurface>(
-      std::move(volume), isovalue,
+      volumeIn(in), isovalue,
       in.text("inside") == "below" ? render::VolumeInside::Below : render::VolumeInside::Above);
   if (surface->isEmpty())
     in.notes.warnings.push_back(
@@ -463,11 +459,7 @@ Operator renderOperator() {
             .type = ParamType::Number,
             .doc = "for a volume: draw the surface on which the interpolated values equal this "
                    "number"},
-           {.name = "inside",
-            .type = ParamType::Choice,
-            .doc = "for a volume: side of the isovalue that is solid",
-            .fallback = "above",
-            .choices = {"above", "below"}},
+           insideParam("for a volume: side of the isovalue that is solid"),
            {.name = "tables",
             .type = ParamType::Choice,
             .doc = "with --renderer gpu or both: data that the shader reads; bricks, or a NanoVDB "

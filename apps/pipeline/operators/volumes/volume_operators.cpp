@@ -6,11 +6,11 @@
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/json_output.h"
+#include "apps/pipeline/operators/volume_params.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
 #include "levelset/isosurface/isosurface.h"
 #include "levelset/isosurface/isosurface_mesh.h"
-#include "levelset/volume_files/volume_file.h"
 #include "levelset/volumes/histogram.h"
 #include "levelset/volumes/synthetic.h"
 
@@ -18,13 +18,6 @@ namespace pipeline {
 namespace {
 
 using levelset::Volume;
-
-/// Volume of the first operand. A field from a .vdb becomes one.
-Volume volumeIn(const Invocation& in) {
-  const Value& value = in.operands[0];
-  return value.kind() == Kind::Field ? levelset::volumeOf(value.field(), in.maxMemory)
-                                     : value.volume();
-}
 
 Kind makesVolume(const Invocation&) {
   return Kind::Volume;
@@ -180,6 +173,16 @@ std::vector<Param> solidParams() {
           halfWidthParam()};
 }
 
+/// An exact search for each voxel of the band. docs/volumes.md has the times of the filters.
+std::optional<Cost> costOfSolid(Invocation& in) {
+  const std::string filter = in.text("filter");
+  const double nanoseconds = filter == "trilinear"                         ? 6500
+                             : filter == "windowed-sinc"                   ? 227'000
+                             : filter == "tricubic" || filter == "bspline" ? 58'000
+                                                                           : 97'000;
+  return costPerVoxel(nanoseconds, 60)(in);
+}
+
 Operator solidOperator(const char* name, const char* summary) {
   return {.name = name,
           .group = "Volumes",
@@ -188,8 +191,7 @@ Operator solidOperator(const char* name, const char* summary) {
           .resultKind = [](const Invocation&) { return Kind::Band; },
           .run = makeIsosurface,
           .plan = planIsosurface,
-          // An exact search for each voxel of the band.
-          .cost = costPerVoxel(6500, 60),
+          .cost = costOfSolid,
           .slope = Slope::One,
           .validate = validateIsosurface};
 }
@@ -346,11 +348,7 @@ Operator isosurfaceOperator() {
                 .doc = "isovalue",
                 .required = true,
                 .position = 0},
-               {.name = "inside",
-                .type = ParamType::Choice,
-                .doc = "side of the isovalue that is inside",
-                .fallback = "above",
-                .choices = {"above", "below"}}};
+               insideParam()};
   for (Param& param : solidParams()) op.params.push_back(std::move(param));
   return op;
 }
@@ -392,11 +390,7 @@ Operator isosurfaceMeshOperator() {
                   .doc = "isovalue",
                   .required = true,
                   .position = 0},
-                 {.name = "inside",
-                  .type = ParamType::Choice,
-                  .doc = "side of the isovalue that is inside",
-                  .fallback = "above",
-                  .choices = {"above", "below"}},
+                 insideParam(),
                  {.name = "filter",
                   .type = ParamType::Choice,
                   .doc = "function between the grid points, on whose surface the vertices lie",
