@@ -50,8 +50,8 @@ class BlockRanges {
 
   Imath::V3i size_, groups_;
   VolumeScale scale_;
-  // Ranges of stored numbers, before rescaling; ordered by x, y, z. Of the 9³ grid points of a
-  // block's cells, and of the 13³ from two points before them on.
+  // Ranges of stored numbers, before rescaling; ordered by x, y, z. Narrow ranges cover the 9³ grid
+  // points of a block's cells. Wide ranges cover 13³ points, from two points before them on.
   std::vector<Range> narrow_, wide_, narrowGroups_, wideGroups_;
 };
 

@@ -34,8 +34,9 @@ class CreaseDistances {
   /// wherever the plain distance is wrong.
   void searchAgain(const openvdb::FloatGrid& field);
 
-  /// Grid points without a trusted distance, and the grid points around them in which the moved
-  /// surface may be nearest; `nearEdges`: only around those beside edges of the surface.
+  /// Grid points without a trusted distance (`points`), and those around them to which the moved
+  /// surface may be nearest (`near`). `nearEdges` are the part of `near` around points beside edges
+  /// of the surface.
   struct Missing {
     openvdb::MaskTree points, near, nearEdges;
   };
