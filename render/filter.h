@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+
 namespace render {
 
 /// Interpolation of a grid's values. Renderers draw the zero set of the interpolating function.
@@ -38,5 +40,8 @@ enum class Filter {
       return "trilinear";
   }
 }
+
+inline constexpr std::array kFilters = {Filter::Trilinear, Filter::BSpline, Filter::BSplineQi,
+                                        Filter::SuperQuadratic, Filter::CubicC1};
 
 }  // namespace render

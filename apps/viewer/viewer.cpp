@@ -55,8 +55,15 @@ void Viewer::open(const std::vector<std::filesystem::path>& files, bool isReload
 }
 
 void Viewer::show(std::shared_ptr<const Model> model, bool keepView) {
-  const bool wasEmpty = !model_ || model_->bounds.isEmpty();
+  const bool wasEmpty = !model_ || model_->bounds.isEmpty(), hadVolume = model_ && model_->volume;
   model_ = std::move(model);
+  if (!model_->volume) {
+    isosurface_ = {};
+    display_.slices = {};
+  } else if (!keepView || !hadVolume) {
+    isosurface_ = firstIsosurface(arguments_, *model_);
+    display_.slices = firstSlices(arguments_, *model_);
+  }
   watch_ = FileWatch(model_->watched);
   wasMissing_ = false;
   if (!keepView || wasEmpty) {
@@ -363,8 +370,8 @@ void Viewer::requestPicture(int width, int height) {
   pictureHeight_ = height;
   if (!model_) return;
   View view{
-      shownModel(), camera_.camera(width, height),     std::nullopt, style_, arguments_.matcap,
-      opacity_,     display_.layer == Layer::Thickness};
+      shownModel(), camera_.camera(width, height),      std::nullopt, style_, arguments_.matcap,
+      opacity_,     display_.layer == Layer::Thickness, isosurface_};
   if (isClipped_ && model_->canCut()) view.clip = clip_;
   picture_.request(view, display_);
 }

@@ -91,6 +91,8 @@ class Viewer {
   void drawViewPart();
   void drawLayerPart();
   void drawClipPart();
+  void drawVolumePart();
+  void drawHistogram();
   void drawPatchPart();
   void drawPointPart();
   void drawStatus();
@@ -113,6 +115,7 @@ class Viewer {
   bool isClipped_ = false;
   Display display_;
   render::Style style_;
+  IsosurfaceView isosurface_;           // of the model's volume, if it has one
   double opacity_ = 1;                  // factor of the opacities of all solids and meshes
   std::shared_ptr<const Frame> frame_;  // frame that the window shows
   int pictureWidth_ = 1, pictureHeight_ = 1;

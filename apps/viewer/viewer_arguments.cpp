@@ -21,11 +21,12 @@ using levelset::UsageError;
 constexpr long kMostResolution = 4096;
 
 constexpr const char* kHelp = R"(levelsmith-view [FILE…] [options]
-Shows a level set (.vdb), a mesh (.ply .obj .stl .off, also .gz) or a scene (.json), and patches (.patch) with it.
+Shows a level set (.vdb), a volume (.nii .mha .nrrd .mrc …), a mesh (.ply .obj .stl .off, also .gz) or a scene (.json),
+and patches (.patch) with it.
 
   --size WxH          size of the picture, pixels                       [1280x800]
   --from, --to X,Y,Z  position of the eye and target                    [frames the model]
-  --up X,Y,Z          up direction                                      [0,1,0]
+  --up X,Y,Z          up direction                                      [0,1,0; of a volume 0,0,1]
   --fov DEGREES       vertical field of view                            [35]
   --ortho L           orthographic projection; height of the view, world units
   --layer NAME        displayed layer: colour, normal, depth, position, mean, gauss, k1, k2, id or thickness
@@ -34,6 +35,11 @@ Shows a level set (.vdb), a mesh (.ply .obj .stl .off, also .gz) or a scene (.js
   --opacity N         opacity of the surfaces, above 0 and at most 1    [1]
   --range N           curvature at the ends of the colours, times the model's diagonal [40]
   --clip PLANE        clip plane that shows phi: x=0.1, y=0.1, z=0.1, or view=0.1 (in front of the centre)
+  --isovalue N        of a volume: value of the isosurface, or none     [the first one that 'histogram' suggests]
+  --inside SIDE       of a volume: side of the isovalue that is solid, above or below [above]
+  --filter NAME       of a volume: interpolation, as in 'render'        [trilinear]
+  --slices i=N,j=N,k=N  of a volume: slices across axes of its grid, by index
+  --grey LOW,HIGH     of a volume: values that slices show as black and as white [all but 1 % of the values]
   --patches LINES     lines of the patches: none, outline, base or all  [all]
   --resolution N      voxels along the longest side of a mesh           [256]
   --renderer NAME     auto, cpu or gpu                                  [auto]
@@ -84,6 +90,37 @@ render::Style styleNamed(const std::string& name) {
   }
   throw UsageError(
       fmt::format("levelsmith-view: --style '{}' is unknown; give one of {}", name, all));
+}
+
+render::Filter filterNamed(const std::string& name) {
+  std::string all;
+  for (const render::Filter filter : render::kFilters) {
+    if (render::filterName(filter) == name) return filter;
+    all += (all.empty() ? "" : ", ") + std::string(render::filterName(filter));
+  }
+  throw UsageError(
+      fmt::format("levelsmith-view: --filter '{}' is unknown; give one of {}", name, all));
+}
+
+void setInside(Arguments& to, const std::string& text) {
+  if (text != "above" && text != "below")
+    throw UsageError(
+        fmt::format("levelsmith-view: --inside '{}' is unknown; give above or below", text));
+  to.isBelowInside = text == "below";
+}
+
+std::array<double, 2> parseGrey(const std::string& text) {
+  const std::size_t comma = text.find(',');
+  if (comma == std::string::npos)
+    throw UsageError(fmt::format(
+        "levelsmith-view: --grey '{}' is not a pair of values; give LOW,HIGH, for example 0,255",
+        text));
+  const double low = pipeline::parseNumber(text.substr(0, comma), whereOf("--grey")),
+               high = pipeline::parseNumber(text.substr(comma + 1), whereOf("--grey"));
+  if (!(low < high))
+    throw UsageError(fmt::format(
+        "levelsmith-view: --grey {} is not ascending; give the value of black first", text));
+  return {low, high};
 }
 
 Renderer rendererNamed(const std::string& name) {
@@ -141,6 +178,18 @@ const std::map<std::string, Setter>& setters() {
          to.display.curvatureRange = parsePositive(text, "--range");
        }},
       {"--clip", [](Arguments& to, const std::string& text) { to.clip = parseClipPlane(text); }},
+      {"--isovalue",
+       [](Arguments& to, const std::string& text) {
+         to.hidesIsosurface = text == "none";
+         if (to.hidesIsosurface)
+           to.isovalue.reset();
+         else
+           to.isovalue = pipeline::parseNumber(text, whereOf("--isovalue"));
+       }},
+      {"--inside", setInside},
+      {"--filter", [](Arguments& to, const std::string& text) { to.filter = filterNamed(text); }},
+      {"--slices", [](Arguments& to, const std::string& text) { to.slices = parseSlices(text); }},
+      {"--grey", [](Arguments& to, const std::string& text) { to.grey = parseGrey(text); }},
       {"--patches",
        [](Arguments& to, const std::string& text) { to.display.patches = patchLinesNamed(text); }},
       {"--resolution",
@@ -245,6 +294,44 @@ std::string viewerHelp() {
   return kHelp;
 }
 
+IsosurfaceView firstIsosurface(const Arguments& arguments, const Model& model) {
+  IsosurfaceView view = firstIsosurface(*model.volume);
+  view.isShown = !arguments.hidesIsosurface;
+  view.isovalue = arguments.isovalue.value_or(view.isovalue);
+  if (arguments.isBelowInside) view.inside = render::VolumeInside::Below;
+  view.filter = arguments.filter.value_or(view.filter);
+  return view;
+}
+
+SliceView firstSlices(const Arguments& arguments, const Model& model) {
+  SliceView slices = firstSlices(*model.volume);
+  slices.at = arguments.slices;
+  if (arguments.grey) {
+    slices.black = (*arguments.grey)[0];
+    slices.white = (*arguments.grey)[1];
+  }
+  return slices;
+}
+
+void requireFit(const Arguments& arguments, const Model& model) {
+  if (arguments.hasVolumeOption() && !model.volume)
+    throw UsageError(
+        "levelsmith-view: --isovalue, --inside, --filter, --slices and --grey are for volumes, and "
+        "the model is none; omit them");
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (!arguments.slices[axis]) continue;
+    const int last = model.volume->surface.volume().size()[static_cast<int>(axis)] - 1;
+    if (!(*arguments.slices[axis] >= 0 && *arguments.slices[axis] <= last))
+      throw UsageError(fmt::format(
+          "levelsmith-view: --slices: {} = {} lies outside the grid; give an index from 0 to {}",
+          "ijk"[axis], *arguments.slices[axis], last));
+  }
+  if (arguments.clip && !model.canCut())
+    throw levelset::InvalidInput(
+        "levelsmith-view: --clip needs solids that can be cut, and the model has none; omit "
+        "--clip");
+}
+
 render::Camera firstCamera(const Arguments& arguments, const Model& model, int width, int height) {
   render::Camera camera;
   const Imath::Box3d nothing(Imath::V3d(-1), Imath::V3d(1));
@@ -263,9 +350,10 @@ render::Camera firstCamera(const Arguments& arguments, const Model& model, int w
     if (arguments.verticalFov) camera.verticalFov = *arguments.verticalFov;
   } else {
     const double fov = arguments.verticalFov.value_or(camera.verticalFov);
-    const Imath::V3d up = arguments.up.value_or(camera.up);
-    // The particles of patches are not in the scene.
-    const bool isFramedByBox = model.bounds.isEmpty() || !model.patches.empty();
+    // In the coordinates of medical images, z points to the head.
+    const Imath::V3d up = arguments.up.value_or(model.volume ? Imath::V3d(0, 0, 1) : camera.up);
+    // The particles of patches are not in the scene, and isosurfaces of volumes change.
+    const bool isFramedByBox = model.bounds.isEmpty() || !model.patches.empty() || model.volume;
     camera = isFramedByBox ? render::framingCamera(bounds, width, height, fov, up)
                            : render::framingCamera(model.scene, width, height, fov, up);
   }

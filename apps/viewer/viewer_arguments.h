@@ -28,6 +28,14 @@ struct Arguments {
   Display display = {};
   render::Style style = render::Style::Lit;
   std::shared_ptr<const render::ColourImage> matcap = {};  ///< null: the viewer's own
+  // === For a volume; unset: the viewer's own choice
+  std::optional<double> isovalue = {};
+  bool hidesIsosurface = false;  ///< --isovalue none
+  bool isBelowInside = false;    ///< --inside below
+  std::optional<render::Filter> filter = {};
+  std::array<std::optional<double>, 3> slices = {};  ///< positions across i, j and k, grid indices
+  std::optional<std::array<double, 2>> grey = {};    ///< values shown as black and as white
+
   double opacity = 1;     ///< factor of the opacities of all solids and meshes
   long resolution = 256;  ///< voxels along the longest side of a mesh
   Renderer renderer = Renderer::Auto;
@@ -39,6 +47,10 @@ struct Arguments {
 
   /// True when the viewer runs without an open window: to write a screenshot, to print a picked
   /// point, or to play simulated input.
+  [[nodiscard]] bool hasVolumeOption() const {
+    return isovalue || hidesIsosurface || isBelowInside || filter || grey || slices[0] ||
+           slices[1] || slices[2];
+  }
   [[nodiscard]] bool isScript() const { return screenshot || pick || play; }
 };
 
@@ -47,6 +59,14 @@ struct Arguments {
 [[nodiscard]] Arguments parseArguments(const std::vector<std::string>& words);
 /// Text of levelsmith-view --help.
 [[nodiscard]] std::string viewerHelp();
+
+/// Isosurface and slices that are shown first of the model's volume. @pre the model has a volume
+[[nodiscard]] IsosurfaceView firstIsosurface(const Arguments& arguments, const Model& model);
+[[nodiscard]] SliceView firstSlices(const Arguments& arguments, const Model& model);
+/// Refuses options that do not apply to the model.
+/// @throws levelset::UsageError for an option for volumes, without a volume
+/// @throws levelset::InvalidInput for a clip plane, with a model that cannot be clipped
+void requireFit(const Arguments& arguments, const Model& model);
 
 /// Initial camera for a model: from the options, else from the scene file, else a camera that
 /// frames the model.

@@ -5,6 +5,7 @@
 #include <array>
 #include <numbers>
 
+#include "apps/viewer/panel_parts.h"
 #include "apps/viewer/viewer.h"
 
 // Members of Viewer that draw the panel, the dialogs and the status line of the window.
@@ -15,15 +16,6 @@ using Imath::V3d;
 
 void textOf(const std::string& text) {
   ImGui::TextUnformatted(text.c_str());
-}
-
-bool beginPart(const char* title) {
-  return ImGui::CollapsingHeader(title, ImGuiTreeNodeFlags_DefaultOpen);
-}
-
-/// Draws a slider for a double. Returns true when the user has moved it.
-bool slideDouble(const char* label, double& value, double low, double high, const char* format) {
-  return ImGui::SliderScalar(label, ImGuiDataType_Double, &value, &low, &high, format);
 }
 
 }  // namespace
@@ -39,9 +31,12 @@ void Viewer::drawPanel() {
   drawFilePart();
   drawViewPart();
   drawLayerPart();
-  drawClipPart();
-  drawPatchPart();
-  drawPatchEditorPart();
+  drawVolumePart();
+  if (!model_ || !model_->volume) {
+    drawClipPart();
+    drawPatchPart();
+    drawPatchEditorPart();
+  }
   drawPointPart();
   ImGui::PopItemWidth();
   ImGui::End();
@@ -158,7 +153,8 @@ void Viewer::drawPointPart() {
     textOf(fmt::format("{}: {:.5g}, {:.5g}, {:.5g}", i + 1, p.x, p.y, p.z));
     if (i + 1 < picks_.size()) continue;
     textOf(fmt::format("   normal {:.3f}, {:.3f}, {:.3f}", n.x, n.y, n.z));
-    textOf(fmt::format("   on {}, phi {:.2g}", picked.solid, picked.phi));
+    textOf(picked.value ? fmt::format("   of {}, value {:.5g}", picked.solid, *picked.value)
+                        : fmt::format("   on {}, phi {:.2g}", picked.solid, picked.phi));
   }
   if (ImGui::Button("Copy all")) copyPicks();
   ImGui::SameLine();

@@ -143,10 +143,7 @@ void runScript(const Arguments& arguments) {
   if (arguments.play) steps = readInputScript(*arguments.play);
   const auto model = std::make_shared<const Model>(
       openModel(arguments.files, {.resolution = arguments.resolution}));
-  if (arguments.clip && !model->canCut())
-    throw levelset::InvalidInput(
-        "levelsmith-view: --clip needs solids that can be cut, and the model has none; omit "
-        "--clip");
+  requireFit(arguments, *model);
   // The size in a scene file is used if --size is not given, as in 'levelsmith render'.
   const bool isSceneSize = model->camera && !arguments.hasSize;
   const int width = isSceneSize ? model->camera->width : arguments.width,

@@ -39,10 +39,11 @@ VolumeSurface::VolumeSurface(levelset::Volume volume, double isovalue, VolumeIns
   ranges_ = std::make_shared<const levelset::BlockRanges>(*volume_, progress);
 }
 
-VolumeSurface VolumeSurface::withIsovalue(double isovalue) const {
+VolumeSurface VolumeSurface::withIsovalue(double isovalue, VolumeInside inside) const {
   requireIsovalue(isovalue);
   VolumeSurface other = *this;
   other.isovalue_ = isovalue;
+  other.inside_ = inside;
   return other;
 }
 

@@ -42,7 +42,10 @@ class VolumeSurface {
   /// The surface of another isovalue of the same volume, which needs no further pass over its
   /// values.
   /// @throws UsageError for an isovalue that is NaN or infinite
-  [[nodiscard]] VolumeSurface withIsovalue(double isovalue) const;
+  [[nodiscard]] VolumeSurface withIsovalue(double isovalue) const {
+    return withIsovalue(isovalue, inside_);
+  }
+  [[nodiscard]] VolumeSurface withIsovalue(double isovalue, VolumeInside inside) const;
 
   [[nodiscard]] const levelset::Volume& volume() const { return *volume_; }
   [[nodiscard]] double isovalue() const { return isovalue_; }

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "apps/viewer/interaction/volume_slices.h"
 #include "levelset/grids/sample.h"
 
 namespace viewer {
@@ -46,12 +47,44 @@ std::string nameAt(const render::Scene& scene, std::uint32_t id, const std::vect
   return name;
 }
 
+/// Point of the slices at a position in window pixels, if it lies in front of a surface.
+/// @param surface  depth of the surface there; infinite without one
+std::optional<SlicePoint> sliceSeen(const Frame& frame, double x, double y, double surface) {
+  if (!frame.view.model->volume) return std::nullopt;
+  const std::optional<SlicePoint> seen = sliceAt(frame.view.model->volume->surface.volume(),
+                                                 frame.display.slices, frame.view.camera, x, y);
+  return seen && seen->depth < surface ? seen : std::nullopt;
+}
+
+/// Point of the isosurface or of a slice of a volume.
+/// @param i  number of the pixel in the image
+std::optional<Picked> pickInVolume(const Frame& frame, int x, int y, std::size_t i) {
+  const render::Image& image = *frame.image;
+  const levelset::Volume& volume = frame.view.model->volume->surface.volume();
+  const auto depth = static_cast<double>(image.channels.at("Z")[i]);
+  Picked picked;
+  picked.phi = NAN;
+  picked.solid = frame.view.model->scene.solids.front().name;
+  if (const auto slice = sliceSeen(frame, x + 0.5, y + 0.5, depth)) {
+    picked.position = slice->position;
+    picked.normal = sliceNormal(volume, slice->axis);
+    picked.value = slice->value;
+    return picked;
+  }
+  if (!std::isfinite(depth)) return std::nullopt;
+  picked.position = vectorAt(image, "P", i);
+  picked.normal = vectorAt(image, "N", i);
+  picked.value = volume.trilinear(picked.position * volume.grid().indexToWorld.inverse());
+  return picked;
+}
+
 }  // namespace
 
 std::optional<Picked> pick(const Frame& frame, int x, int y) {
   const render::Image& image = *frame.image;
   if (x < 0 || y < 0 || x >= image.width || y >= image.height) return std::nullopt;
   const std::size_t i = pixelAt(image, x, y);
+  if (frame.view.model->volume) return pickInVolume(frame, x, y, i);
   if (!std::isfinite(image.channels.at("Z")[i])) return std::nullopt;
   Picked picked{.position = vectorAt(image, "P", i), .normal = vectorAt(image, "N", i)};
   const render::Scene& scene = frame.view.model->scene;
@@ -72,6 +105,7 @@ std::optional<double> depthSeen(const Frame& frame, double x, double y) {
   const std::size_t i =
       pixelAt(image, place(x, camera.width, image.width), place(y, camera.height, image.height));
   const auto depth = static_cast<double>(image.channels.at("Z")[i]);
+  if (const auto slice = sliceSeen(frame, x, y, depth)) return slice->depth;
   return std::isfinite(depth) ? std::optional(depth) : std::nullopt;
 }
 
@@ -80,10 +114,11 @@ std::string pickedJson(const std::optional<Picked>& picked) {
   const auto list = [](const V3d& v) {  // the sum turns negative zeros to zeros
     return nlohmann::ordered_json{v.x + 0.0, v.y + 0.0, v.z + 0.0};
   };
-  const nlohmann::ordered_json json = {{"position", list(picked->position)},
-                                       {"normal", list(picked->normal)},
-                                       {"phi", picked->phi},
-                                       {"solid", picked->solid}};
+  nlohmann::ordered_json json = {{"position", list(picked->position)},
+                                 {"normal", list(picked->normal)},
+                                 {"phi", picked->phi},
+                                 {"solid", picked->solid}};
+  if (picked->value) json["value"] = *picked->value;
   return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "apps/viewer/interaction/point_splats.h"
+#include "apps/viewer/interaction/volume_slices.h"
 #include "apps/viewer/model/matcap_ball.h"
 #include "apps/viewer/model/surface_discs.h"
 #include "levelset/memory_limit.h"
@@ -62,6 +63,7 @@ struct ProgressivePicture::Worker {
       preparedModel;  // model from which the kernel's tables in `surfaces` were built
   std::optional<ClipPlane::Across> preparedCut;
   double preparedOpacity = 1;
+  IsosurfaceView preparedIsosurface;
   std::unique_ptr<ClippedScene> cut;
   std::unique_ptr<render::KernelScene> surfaces;
   std::unique_ptr<render::GlContext> context;
@@ -84,10 +86,11 @@ struct ProgressivePicture::Worker {
   [[nodiscard]] render::Scene sceneFor(int edge) {
     render::Scene scene = isCut() ? cut->at(plane()) : view.model->scene;
     scene.camera = shrunk(view.camera, edge);
+    if (view.model->volume) placeIsosurface(*view.model->volume, view.isosurface, scene);
     if (view.opacity == 1 || scene.isBlended()) return scene;
     // The box of the clip plane, which follows the model's solids, stays opaque.
-    for (std::size_t i = 0; i < view.model->scene.solids.size(); ++i)
-      scene.solids[i].opacity *= view.opacity;
+    const std::size_t solids = std::min(view.model->scene.solids.size(), scene.solids.size());
+    for (std::size_t i = 0; i < solids; ++i) scene.solids[i].opacity *= view.opacity;
     for (render::MeshPart& part : scene.meshes) part.opacity *= view.opacity;
     return scene;
   }
@@ -136,6 +139,7 @@ struct ProgressivePicture::Worker {
     options.style.style = view.style;
     options.style.matcap = view.matcap ? view.matcap : matcapBall();
     options.thickness = view.hasThickness;
+    options.filter = view.isosurface.filter;
     options.maxBytes = levelset::memoryLimit(levelset::kNoMemoryLimit);
     return options;
   }
@@ -168,12 +172,12 @@ struct ProgressivePicture::Worker {
   }
 
   /// Builds the kernel's tables, unless the tables of the previous picture were built for the same
-  /// model, the same axis of the clip plane and the same opacity.
+  /// model, the same isosurface, the same axis of the clip plane and the same opacity.
   void prepare() {
     const std::optional<ClipPlane::Across> newCut =
         isCut() ? std::optional(view.clip->across) : std::nullopt;
     if (surfaces && preparedModel == view.model && preparedCut == newCut &&
-        preparedOpacity == view.opacity)
+        preparedOpacity == view.opacity && preparedIsosurface == view.isosurface)
       return;
     tracer = nullptr;  // the tracer references the tables in `surfaces`
     surfaces = nullptr;
@@ -183,10 +187,11 @@ struct ProgressivePicture::Worker {
     const render::Scene scene = sceneFor(1);
     render::validate(scene.camera);
     surfaces = std::make_unique<render::KernelScene>(
-        scene, levelset::memoryLimit(levelset::kNoMemoryLimit));
+        scene, levelset::memoryLimit(levelset::kNoMemoryLimit), view.isosurface.filter);
     preparedModel = view.model;
     preparedCut = newCut;
     preparedOpacity = view.opacity;
+    preparedIsosurface = view.isosurface;
     findTracer();
   }
 
@@ -216,6 +221,7 @@ struct ProgressivePicture::Worker {
   [[nodiscard]] std::shared_ptr<const Frame> shown() {
     auto frame = std::make_shared<Frame>();
     frame->view = view;
+    frame->display = display;
     frame->pixelSize = pixelSize;
     frame->isComplete = pass == kPasses.size();
     frame->image = image;
@@ -224,9 +230,15 @@ struct ProgressivePicture::Worker {
               layerColours(*image, display.layer, view.model->extent(), display.curvatureRange)};
     if (isCut() && display.contours)
       paintPhi(*image, shrunk(view.camera, pixelSize), plane(), view.model->scene, canvas.colours);
-    if (display.patches != PatchLines::None && !view.model->patches.empty()) {
-      if (canvas.width != view.camera.width || canvas.height != view.camera.height)
-        canvas = stretched(canvas, view.camera.width, view.camera.height);
+    const bool hasSlices = view.model->volume && !display.slices.isEmpty();
+    const bool hasPatches = display.patches != PatchLines::None && !view.model->patches.empty();
+    if ((hasSlices || hasPatches) &&
+        (canvas.width != view.camera.width || canvas.height != view.camera.height))
+      canvas = stretched(canvas, view.camera.width, view.camera.height);
+    if (hasSlices)
+      paintSlices(view.model->volume->surface.volume(), display.slices, view.camera, *image,
+                  canvas);
+    if (hasPatches) {
       drawPatches(view.model->patches, display.patches, view.camera, *image,
                   kOnSurface * view.model->bounds.size().length(), canvas);
     }
@@ -342,7 +354,8 @@ bool isSame(const render::Camera& a, const render::Camera& b) {
 
 bool isSame(const View& a, const View& b) {
   return a.model == b.model && a.clip == b.clip && a.style == b.style && a.matcap == b.matcap &&
-         a.opacity == b.opacity && a.hasThickness == b.hasThickness && isSame(a.camera, b.camera);
+         a.opacity == b.opacity && a.hasThickness == b.hasThickness &&
+         a.isosurface == b.isosurface && isSame(a.camera, b.camera);
 }
 
 }  // namespace viewer

@@ -37,7 +37,8 @@ struct View {
   std::shared_ptr<const render::ColourImage> matcap = {};
   /// Factor of the opacities of all solids and meshes, (0, 1]. Without effect on blended scenes.
   double opacity = 1;
-  bool hasThickness = false;  ///< the picture has the layer thickness
+  bool hasThickness = false;       ///< the picture has the layer thickness
+  IsosurfaceView isosurface = {};  ///< of the model's volume, if it has one
 };
 
 /// Display options. A change of them recolours the present picture, without new rays.
@@ -47,13 +48,15 @@ struct Display {
   /// surfaces.
   double curvatureRange = 40;
   PatchLines patches = PatchLines::All;
-  bool contours = true;  ///< draws contours of φ on the clip plane
+  bool contours = true;   ///< draws contours of φ on the clip plane
+  SliceView slices = {};  ///< slices through the model's volume, if it has one
   bool operator==(const Display&) const = default;
 };
 
 /// A picture of a view at one level of refinement.
 struct Frame {
   View view;
+  Display display;    ///< options of `canvas`
   int pixelSize = 8;  ///< edge of a pixel of `image`, in pixels of the window
   /// True after the last pass: full resolution, all samples, shadows and occlusion.
   bool isComplete = false;

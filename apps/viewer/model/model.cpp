@@ -12,6 +12,7 @@
 #include "levelset/files/band_file.h"
 #include "levelset/mesh.h"
 #include "levelset/mesh_files/mesh_file.h"
+#include "levelset/volume_files/volume_file.h"
 #include "mapping/patches/patch_file.h"
 #include "render/views/scene_file.h"
 
@@ -21,15 +22,18 @@ namespace {
 namespace fs = std::filesystem;
 using levelset::UsageError;
 
-constexpr const char* kFormats = "vdb, ply, obj, stl or off (also .gz), json or patch";
+constexpr const char* kFormats =
+    "vdb, nii, mha, mhd, nrrd, nhdr, mrc or map, ply, obj, stl or off (also .gz), json or patch";
 
-enum class FileKind { Band, Mesh, Scene, Patch, Unknown };
+enum class FileKind { Band, Volume, Mesh, Scene, Patch, Unknown };
 
 FileKind kindOf(const fs::path& file) {
   if (mapping::isPatchFormat(file.string())) return FileKind::Patch;
   if (render::isSceneFormat(file.string())) return FileKind::Scene;
   if (levelset::isMeshFormat(file)) return FileKind::Mesh;
   if (levelset::isBandFormat(file)) return FileKind::Band;
+  // A raw file has no header, and the viewer has no options for its layout.
+  if (levelset::isVolumeFormat(file) && !levelset::isRawFormat(file)) return FileKind::Volume;
   return FileKind::Unknown;
 }
 
@@ -58,6 +62,28 @@ levelset::NarrowBand bandOfMesh(const fs::path& file, const OpenOptions& options
   });
 }
 
+/// Name of the first grid of numbers in a .vdb file without a level set; empty for other files.
+std::string volumeGridOf(const fs::path& file) {
+  if (!levelset::isVdbFormat(file)) return "";
+  const std::vector<levelset::GridInfo> grids = levelset::bandFileInfo(file);
+  const auto isLevelSet = [](const levelset::GridInfo& grid) { return grid.isLevelSet; };
+  if (std::any_of(grids.begin(), grids.end(), isLevelSet)) return "";
+  for (const levelset::GridInfo& grid : grids)
+    for (const char* type : {"float", "half", "double"})
+      if (grid.type == type) return grid.name;
+  return "";
+}
+
+void showVolume(const fs::path& file, const levelset::Volume& volume, const OpenOptions& options,
+                Model& model) {
+  model.volume = std::make_shared<const ShownVolume>(
+      shownVolume(volume, levelset::subProgress(options.progress, 0.5, 1)));
+  model.scene.solids.push_back(
+      {.band = {},
+       .name = solidNameOf(file),
+       .volume = std::make_shared<const render::VolumeSurface>(model.volume->surface)});
+}
+
 /// Paths of the level sets and meshes that a scene file names. @pre readScene() accepts the file
 std::vector<fs::path> solidFilesOf(const fs::path& scene) {
   std::vector<fs::path> files;
@@ -79,6 +105,14 @@ void readSolids(const fs::path& file, FileKind kind, const OpenOptions& options,
     model.scene = std::move(viewed.scene);
     const std::vector<fs::path> named = solidFilesOf(file);
     model.watched.insert(model.watched.end(), named.begin(), named.end());
+  } else if (kind == FileKind::Volume) {
+    const levelset::Progress progress = levelset::subProgress(options.progress, 0, 0.5);
+    showVolume(file, levelset::readVolume(file, {.progress = progress}), options, model);
+  } else if (const std::string grid = volumeGridOf(file); !grid.empty()) {
+    const levelset::Progress progress = levelset::subProgress(options.progress, 0, 0.5);
+    const levelset::FieldGrid field =
+        levelset::readField(file, {.grid = grid, .progress = progress});
+    showVolume(file, levelset::volumeOf(field), options, model);
   } else {
     levelset::NarrowBand band = kind == FileKind::Mesh
                                     ? bandOfMesh(file, options)
@@ -90,16 +124,23 @@ void readSolids(const fs::path& file, FileKind kind, const OpenOptions& options,
 void measureModel(Model& model) {
   std::size_t voxels = 0, particles = 0;
   for (const render::Solid& solid : model.scene.solids) {
-    voxels += solid.band.activeVoxelCount();
+    if (!solid.volume) voxels += solid.band.activeVoxelCount();
   }
-  model.solidBounds = model.scene.bounds();
+  // The view must not depend on the isovalue.
+  model.solidBounds = model.volume ? model.scene.volumeBounds() : model.scene.bounds();
   model.bounds = model.solidBounds;
   for (const mapping::Patch& patch : model.patches) {
     for (const mapping::ParticleLayer& level : patch.layers)
       for (const Imath::V3d& particle : level.positions) model.bounds.extendBy(particle);
     particles += patch.particleCount();
   }
-  if (!model.scene.solids.empty())
+  if (model.volume) {
+    const levelset::Volume& volume = model.volume->surface.volume();
+    const Imath::V3i size = volume.size();
+    model.description =
+        fmt::format("volume of {} x {} x {} {}, values {:.6g} to {:.6g}", size.x, size.y, size.z,
+                    levelset::volumeTypeName(volume.type()), volume.lowest(), volume.highest());
+  } else if (!model.scene.solids.empty())
     model.description =
         fmt::format("{} solid{}, {:.2f} million voxels", model.scene.solids.size(),
                     model.scene.solids.size() == 1 ? "" : "s", static_cast<double>(voxels) * 1e-6);
@@ -119,7 +160,8 @@ bool Model::canCut() const {
   // Clipping subtracts a box by a CSG expression. Without an expression of its own, the scene's
   // solids would be joined to a union, which hides surfaces inside transparent solids.
   const bool hidesNothing = scene.isOpaque() || !scene.csg.isEmpty();
-  return !solidBounds.isEmpty() && !scene.solids.empty() && !scene.isBlended() && hidesNothing &&
+  return !volume && !solidBounds.isEmpty() && !scene.solids.empty() && !scene.isBlended() &&
+         hidesNothing &&
          std::none_of(scene.solids.begin(), scene.solids.end(),
                       [](const render::Solid& solid) { return solid.band.isOpenSurface(); });
 }
@@ -142,8 +184,8 @@ void requireReadable(const std::vector<fs::path>& files) {
     if (kind == FileKind::Patch) continue;
     if (solid)
       throw UsageError(
-          fmt::format("open: '{}' is a second level set, mesh or scene after '{}'; open one of "
-                      "them, or combine both in a scene (see levelsmith help scene)",
+          fmt::format("open: '{}' is a second level set, volume, mesh or scene after '{}'; open "
+                      "one of them, or combine both in a scene (see levelsmith help scene)",
                       file.string(), solid->string()));
     solid = &file;
   }

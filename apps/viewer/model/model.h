@@ -3,10 +3,12 @@
 #include <Imath/ImathBox.h>
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "apps/viewer/model/shown_volume.h"
 #include "levelset/progress.h"
 #include "mapping/patches/patch.h"
 #include "render/scene/scene.h"
@@ -18,7 +20,10 @@ struct Model {
   render::Scene scene;                        ///< solids and meshes; its camera is not used
   std::optional<render::Camera> camera = {};  ///< camera of the scene file, if one is set there
   std::vector<mapping::Patch> patches;
-  Imath::Box3d solidBounds;  ///< box of the drawn surfaces, world units; empty when there are none
+  /// If not null, the only solid of the scene is the first isosurface of this volume.
+  std::shared_ptr<const ShownVolume> volume = {};
+  Imath::Box3d solidBounds;  ///< box of the drawn surfaces or of the volume's grid, world units;
+                             ///< empty when there are none
   Imath::Box3d bounds;       ///< box of the surfaces and of the patches' particles, world units
   std::string description = {};  ///< numbers of solids, voxels and patches, as a line for the user
   std::vector<std::filesystem::path>
@@ -29,7 +34,7 @@ struct Model {
   [[nodiscard]] double extent() const { return solidBounds.size().length(); }
   /// True when a clip plane can cut the solids. Blended scenes cannot be cut, because the clip
   /// plane would be blended with the solids. Neither can open surfaces, and scenes with a
-  /// transparent solid or mesh but without an expression.
+  /// transparent solid or mesh but without an expression, and volumes.
   [[nodiscard]] bool canCut() const;
 };
 
@@ -42,17 +47,17 @@ struct OpenOptions {
 /// True for file names with an extension that the viewer can open.
 [[nodiscard]] bool canOpen(const std::filesystem::path& file);
 
-/// Reads a level set, a mesh (which is converted to a level set) or a scene, and the patches that
-/// are shown together with it.
-/// @param files  at most one level set, mesh or scene, and any number of patches, in any order
-/// @throws levelset::UsageError for an unknown extension, or more than one level set, mesh or scene
-/// @throws as readBand(), readMesh(), meshToBand(), readScene() and readPatches()
+/// Reads a level set, a mesh (which is converted to a level set), a volume or a scene, and the
+/// patches that are shown together with it. A .vdb file without a level set is read as a volume.
+/// @param files  at most one file that is no patch, and any number of patches, in any order
+/// @throws levelset::UsageError for an unknown extension, or a second file that is no patch
+/// @throws as readBand(), readVolume(), readMesh(), meshToBand(), readScene() and readPatches()
 [[nodiscard]] Model openModel(const std::vector<std::filesystem::path>& files,
                               const OpenOptions& options = {});
 
 /// Checks files before they are read: each must exist and have a known extension, and at most one
-/// may be a level set, mesh or scene.
-/// @throws levelset::UsageError for an unknown extension, or a second level set, mesh or scene
+/// may be other than a patch.
+/// @throws levelset::UsageError for an unknown extension, or a second file that is no patch
 /// @throws levelset::IoError for a missing file
 void requireReadable(const std::vector<std::filesystem::path>& files);
 

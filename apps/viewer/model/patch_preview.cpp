@@ -97,8 +97,9 @@ void makePreview(const Model& base, const NarrowBand& surface, const levelset::P
 }  // namespace
 
 std::string whyNoPatch(const Model& model) {
-  if (model.scene.solids.size() == 1 && model.scene.meshes.empty() && !model.scene.isBlended() &&
-      !model.solidBounds.isEmpty() && !model.scene.solids.front().band.isOpenSurface())
+  if (!model.volume && model.scene.solids.size() == 1 && model.scene.meshes.empty() &&
+      !model.scene.isBlended() && !model.solidBounds.isEmpty() &&
+      !model.scene.solids.front().band.isOpenSurface())
     return "";
   return "A patch needs a model with exactly one solid; open a level set or a mesh.";
 }

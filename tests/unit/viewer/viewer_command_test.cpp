@@ -49,6 +49,14 @@ int brightness(const Pixel& p) {
   return p[0] + p[1] + p[2];
 }
 
+/// Lines of a text.
+std::vector<std::string> linesOf(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
 class ViewerCommand : public support::ShellTest {
  protected:
   void SetUp() override {
@@ -166,16 +174,57 @@ TEST_F(ViewerCommand, RefusesInvalidRequests) {
       "view '' --pick 1,1; echo $?; view ball.txt --pick 1,1; echo $?\n"
       "view ball.vdb ball.vdb; echo $?\n"
       "view ball.vdb --layer colours --pick 1,1; echo $?\n"
+      "view ball.vdb --isovalue 3 --pick 1,1; echo $?\n"
       "view ball.vdb --pick 9,9 --size 9x9; echo $?\n"
       "view ball.vdb --screenshot no/such/folder.png; echo $?\n"
       "view ball.vdb --size 100000x100000 --screenshot a.png; echo $?\n"
       "view ball.vdb --from 0,0,0 --to 0,0,0 --pick 1,1; echo $?\n");
-  EXPECT_EQ(seen.out, "6\n6\n3\n3\n2\n2\n2\n2\n2\n6\n4\n2\n") << seen.err;
+  EXPECT_EQ(seen.out, "6\n6\n3\n3\n2\n2\n2\n2\n2\n2\n6\n4\n2\n") << seen.err;
   std::size_t sentences = 0;
   for (std::size_t at = 0; (at = seen.err.find("levelsmith-view: ", at)) != std::string::npos; ++at)
     ++sentences;
-  EXPECT_EQ(sentences, 12u) << seen.err;
+  EXPECT_EQ(sentences, 13u) << seen.err;
   EXPECT_FALSE(exists("a.png"));
+}
+
+TEST_F(ViewerCommand, ShowsIsosurfacesAndSlicesOfVolumes) {
+  // Values x + 10 y + 100 z at 3 x 3 x 3 points, as text.
+  std::string numbers;
+  for (int n = 0; n < 27; ++n)
+    numbers += std::to_string(n % 3 + 10 * (n / 3 % 3) + 100 * (n / 9)) + " ";
+  writeFile("steps.nrrd",
+            "NRRD0004\ntype: float\ndimension: 3\nsizes: 3 3 3\nencoding: ascii\n\n" + numbers);
+  writeFile("drag.play",
+            "wait\n"
+            "drag 60,350 135,350 # the middle of the histogram\n"
+            "wait\nclick 60,567\ncopied\n");
+  const std::string camera = "--from 9,7,5 --to 1,1,1 --up 0,0,1 --size 120x90";
+  const Outcome seen =
+      onDisplay("set -e; camera='" + camera +
+                "'\n"
+                "view steps.nrrd $camera --isovalue 111 --filter cubic-c1 --screenshot s.png\n"
+                "view steps.nrrd $camera --isovalue none --slices i=1.5 --grey 0,222 --pick 60,45\n"
+                "view steps.nrrd --size 700x640 --play drag.play\n"
+                "view steps.nrrd $camera --slices i=2.5 --pick 1,1 || echo $?\n"
+                "view steps.nrrd $camera --clip x=1 --pick 1,1 || echo $?\n"
+                "view steps.nrrd --filter cubic --pick 1,1 || echo $?\n"
+                "view steps.nrrd --grey 5,5 --pick 1,1 || echo $?\n");
+  ASSERT_EQ(seen.code, 0) << seen.err;
+  const Outcome drawn =
+      levelsmith("read steps.nrrd ! render d.png --isovalue 111 --filter cubic-c1 " + camera);
+  ASSERT_EQ(drawn.code, 0) << drawn.err;
+  EXPECT_EQ(png("s.png").bytes, png("d.png").bytes);
+  const std::vector<std::string> lines = linesOf(seen.out);
+  ASSERT_EQ(lines.size(), 6u) << seen.out;
+  const Json slice = Json::parse(lines[0]);
+  EXPECT_NEAR(slice["position"][0].get<double>(), 1.5, 1e-12);
+  EXPECT_NEAR(
+      slice["value"].get<double>(),
+      1.5 + 10 * slice["position"][1].get<double>() + 100 * slice["position"][2].get<double>(),
+      1e-4);
+  ASSERT_EQ(lines[1].find("isosurface "), 0u) << lines[1];
+  EXPECT_NEAR(std::stod(lines[1].substr(11)), 111, 6);
+  EXPECT_EQ(lines[2] + lines[3] + lines[4] + lines[5], "2322");
 }
 
 TEST_F(ViewerCommand, ReportsAMissingDisplay) {
@@ -195,14 +244,6 @@ TEST_F(ViewerCommand, StaysOpenUntilItIsClosed) {
                                  "' ball.vdb --size 300x200; echo $?\n");
   EXPECT_EQ(seen.out, "130\n130\n") << seen.err;
   EXPECT_NE(seen.err.find("interrupted"), std::string::npos);
-}
-
-/// Lines of a text.
-std::vector<std::string> linesOf(const std::string& text) {
-  std::vector<std::string> lines;
-  std::istringstream stream(text);
-  for (std::string line; std::getline(stream, line);) lines.push_back(line);
-  return lines;
 }
 
 TEST_F(ViewerCommand, MakesAPatchWithTheMouseAndWritesItsCommand) {
@@ -292,14 +333,13 @@ TEST_F(SlowViewerCommand, TexturesTheBunny) {
                 "' --resolution 128 --renderer cpu --size 960x600 --play bunny.play");
   ASSERT_EQ(seen.code, 0) << seen.err;
   EXPECT_NE(seen.out.find(" --side"), std::string::npos) << seen.out;
-  const Outcome measured = levelsmith("read '" + bunny.string() +
-                                      "' ! level-set --resolution 128 ! measure --json "
-                                      "! read textured.vdb ! measure --json");
-  ASSERT_EQ(measured.code, 0) << measured.err;
-  const std::vector<std::string> lines = linesOf(measured.out);
-  ASSERT_EQ(lines.size(), 2u) << measured.out;
-  const double before = Json::parse(lines[0])["volume"].get<double>(),
-               after = Json::parse(lines[1])["volume"].get<double>();
+  const auto volumeOf = [&](const std::string& chain) {
+    const Outcome measured = levelsmith(chain + " ! measure --json");
+    EXPECT_EQ(measured.code, 0) << measured.err;
+    return Json::parse(measured.out)["volume"].get<double>();
+  };
+  const double before = volumeOf("read '" + bunny.string() + "' ! level-set --resolution 128"),
+               after = volumeOf("read textured.vdb");
   EXPECT_GT(after, 1.01 * before);
   EXPECT_LT(after, 1.06 * before);
 }

@@ -198,8 +198,7 @@ render::Image drawByKernel(Invocation& in, const render::Scene& scene,
 }
 
 render::Filter filterOf(const Invocation& in) {
-  for (const render::Filter filter : {render::Filter::BSpline, render::Filter::BSplineQi,
-                                      render::Filter::SuperQuadratic, render::Filter::CubicC1})
+  for (const render::Filter filter : render::kFilters)
     if (in.text("filter") == render::filterName(filter)) return filter;
   return render::Filter::Trilinear;
 }
