@@ -70,7 +70,7 @@ std::vector<Operator> allOperators() {
       levelSetOperator<levelset::SmoothOperator>(),
       morphOperator(),
       levelSetOperator<levelset::TransformOperator>(),
-      levelSetOperator<levelset::ResampleOperator>(),
+      resampleOperator(),
       levelSetOperator<levelset::ClipOperator>(),
       patchOperator(),
       decalOperator(),

@@ -39,6 +39,7 @@ namespace pipeline {
 [[nodiscard]] Operator isosurfaceMeshOperator();
 [[nodiscard]] Operator isosurfaceOperator();
 [[nodiscard]] Operator thresholdOperator();
+[[nodiscard]] Operator resampleOperator();
 
 [[nodiscard]] Operator sceneOperator();
 

@@ -6,12 +6,15 @@
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/json_output.h"
+#include "apps/pipeline/operators/level_set_operator.h"
 #include "apps/pipeline/operators/volume_params.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
 #include "levelset/isosurface/isosurface.h"
 #include "levelset/isosurface/isosurface_mesh.h"
+#include "levelset/transform/resample.h"
 #include "levelset/volumes/histogram.h"
+#include "levelset/volumes/resample_volume.h"
 #include "levelset/volumes/synthetic.h"
 
 namespace pipeline {
@@ -147,11 +150,11 @@ void validateIsosurface(const Invocation& in) {
                     in.text("low"), in.text("high")));
 }
 
-/// Names of all continuous filters.
-std::vector<std::string> filterNames() {
+/// Names of all filters that are continuous to an order; −1: of all filters.
+std::vector<std::string> filterNames(int continuity) {
   std::vector<std::string> names;
   for (const levelset::VolumeFilter filter : levelset::kVolumeFilters)
-    if (levelset::factsOf(filter).continuity >= 0)
+    if (levelset::factsOf(filter).continuity >= continuity)
       names.emplace_back(levelset::factsOf(filter).name);
   return names;
 }
@@ -161,7 +164,7 @@ std::vector<Param> solidParams() {
            .type = ParamType::Choice,
            .doc = "function between the grid points, on whose surface the distances are measured",
            .fallback = "trilinear",
-           .choices = filterNames()},
+           .choices = filterNames(0)},
           {.name = "border",
            .type = ParamType::Choice,
            .doc = "treatment of a solid that reaches the border of the volume: close it with the "
@@ -236,7 +239,88 @@ Plan planIsosurfaceMesh(Invocation& in) {
   return plan;
 }
 
+// === Resampling
+
+bool isVolumeOperand(const Invocation& in) {
+  return !in.operands.empty() &&
+         (in.operands[0].kind() == Kind::Volume || in.operands[0].kind() == Kind::Field);
+}
+
+double spacingIn(Invocation& in) {
+  const Imath::Box3d& bounds = in.operands[0].plan().bounds;
+  const Imath::V3d size = bounds.isEmpty() ? Imath::V3d(0) : bounds.size();
+  return in.voxelSize(std::max({size.x, size.y, size.z}));
+}
+
+Value resampleVolume(Invocation& in) {
+  const double spacing = spacingIn(in);
+  const Volume volume = volumeIn(in);
+  const Imath::V3d present = volume.grid().spacing();
+  if (spacing > 1.5 * std::max({present.x, present.y, present.z}))
+    in.notes.warnings.push_back(
+        fmt::format("resample: the voxels are larger than those of the volume; detail finer than "
+                    "{:.4g} becomes false detail unless 'blur' removes it first",
+                    2 * spacing));
+  return Value(levelset::resampled(volume, spacing,
+                                   {.filter = *levelset::volumeFilterNamed(in.text("filter")),
+                                    .maxMemory = in.maxMemory,
+                                    .progress = in.progress}));
+}
+
+Plan planResampledVolume(Invocation& in) {
+  const Plan& of = in.operands[0].plan();
+  Plan plan = of;
+  plan.kind = Kind::Volume;
+  const double spacing = spacingIn(in);
+  if (of.bounds.isEmpty() || !(spacing > 0)) return plan;
+  // The grid of the result depends on the bounds only.
+  levelset::VolumeGrid grid;
+  grid.size = Imath::V3i(2);
+  grid.indexToWorld.setScale(of.bounds.size());
+  for (int axis = 0; axis < 3; ++axis) grid.indexToWorld[3][axis] = of.bounds.min[axis];
+  return planOf(levelset::resampledGrid(grid, spacing), levelset::VolumeType::F32);
+}
+
 }  // namespace
+
+Operator resampleOperator() {
+  const Operator ofSolids = levelSetOperator<levelset::ResampleOperator>();
+  Operator op = ofSolids;
+  op.summary = "resample a solid or a volume on an axis-aligned grid of another voxel size";
+  op.details =
+      "The grid points of the result lie at multiples of the voxel size. A filter removes no "
+      "detail: blur a volume before you resample it on a coarser grid.";
+  op.params.push_back(
+      {.name = "filter",
+       .type = ParamType::Choice,
+       .doc =
+           "for a volume: function between its grid points; box, the nearest value, keeps labels",
+       .fallback = "tricubic",
+       .choices = filterNames(-1)});
+  op.operands = {{Kind::Band, Kind::Volume, Kind::Field}};
+  op.resultKind = [](const Invocation& in) {
+    return isVolumeOperand(in) ? Kind::Volume : Kind::Band;
+  };
+  op.run = [ofSolids](Invocation& in) {
+    return isVolumeOperand(in) ? resampleVolume(in) : ofSolids.run(in);
+  };
+  op.plan = [ofSolids](Invocation& in) {
+    return isVolumeOperand(in) ? planResampledVolume(in) : ofSolids.plan(in);
+  };
+  op.cost = [ofSolids](Invocation& in) -> std::optional<Cost> {
+    if (isVolumeOperand(in)) return std::nullopt;
+    return ofSolids.cost(in);
+  };
+  op.validate = [ofSolids](const Invocation& in) {
+    const bool isVolume = isVolumeOperand(in);
+    for (const char* name : {"filter", "half-width"})
+      if (in.given(name) && isVolume == (std::string(name) == "half-width"))
+        throw levelset::UsageError(fmt::format("resample: --{} is for {}; leave it out", name,
+                                               isVolume ? "solids" : "volumes"));
+    isVolume ? in.requireVoxelSize() : ofSolids.validate(in);
+  };
+  return op;
+}
 
 Operator volumeOperator() {
   return {

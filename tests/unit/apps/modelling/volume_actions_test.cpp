@@ -72,6 +72,25 @@ TEST_F(VolumeActions, IsosurfaceMeshIsAMeshLikeOthers) {
   EXPECT_REFUSED(levelsmith("volume sphere ! isosurface-mesh 7 ! info"), 3, "no value");
 }
 
+TEST_F(VolumeActions, ResampleTakesVolumesAndSolids) {
+  const std::string ball = "volume sphere --size 41 --radius 0.7 ";
+  const Json info = json(ball + "! resample --voxel 0.04 --filter bspline-qi ! info --json");
+  EXPECT_EQ(info["size"], Json({51, 51, 51}));
+  EXPECT_NEAR(info["spacing"][0].get<double>(), 0.04, 1e-12);
+  const Json measured = json(ball + "! resample --resolution 50 ! isosurface 0 ! measure --json");
+  EXPECT_NEAR(measured["volume"], 4 * M_PI / 3 * 0.343, support::measured(2e-3));
+  EXPECT_NE(levelsmith(ball + "! resample --voxel 0.1 ! info").err.find("false detail"),
+            std::string::npos);
+  EXPECT_EQ(levelsmith(ball + "! resample --voxel 0.02 --filter box ! info").err, "");
+  EXPECT_REFUSED(levelsmith(ball + "! resample --voxel 0.1 --half-width 3 ! info"), 2, "solids");
+  EXPECT_REFUSED(
+      levelsmith("sphere --radius 1 --voxel 0.1 ! resample --voxel 0.2 --filter box ! info"), 2,
+      "volumes");
+  EXPECT_REFUSED(levelsmith(ball + "! resample ! info"), 2, "--voxel");
+  EXPECT_REFUSED(levelsmith(ball + "! resample --voxel 1e-9 ! info"), 4, "voxel");
+  EXPECT_REFUSED(levelsmith("--max-memory 1M " + ball + "! resample --voxel 0.005 ! info"), 4, "");
+}
+
 TEST_F(VolumeActions, HistogramSuggestsIsovalues) {
   const Json found = json("volume sphere --size 21 ! histogram --classes 2 --json");
   EXPECT_EQ(found["otsu"].size(), 1u);
