@@ -35,14 +35,11 @@ using Imath::M44d;
 using Imath::V3d;
 using Imath::V3i;
 using levelset::Volume;
-using support::filled;
 using support::measured;
 using support::noisyBytes;
 using support::obliqueMap;
+using support::sampled;
 using namespace render;
-
-constexpr Filter kFilters[] = {Filter::Trilinear, Filter::BSpline, Filter::BSplineQi,
-                               Filter::SuperQuadratic, Filter::CubicC1};
 
 RenderOptions optionsOf(Filter filter) {
   return {.samples = 1, .ambientSamples = 0, .shadowSamples = 0, .filter = filter};
