@@ -12,7 +12,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 status=0
 
-"$tests" --gtest_brief=1 --gtest_filter='Gpu*' >"$folder/tests" 2>&1 || status=1
+"$tests" --gtest_brief=1 --gtest_filter='Gpu*:VolumeSurface.HasTheSameBits*:Filters.OfSplines*' >"$folder/tests" 2>&1 || status=1
 grep -a '^\[  FAILED\|^\[  PASSED\|different bits' "$folder/tests" | sort -u | head -60 || true
 
 gzip -dc "$dragon" >"$folder/dragon.ply"
