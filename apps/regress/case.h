@@ -70,6 +70,7 @@ void addAdvectionCases(std::vector<Case>& all);
 void addMorphCases(std::vector<Case>& all);
 void addResampleCases(std::vector<Case>& all);
 void addKalbeCases(std::vector<Case>& all);
+void addLookupCases(std::vector<Case>& all);
 void addExtremeCases(std::vector<Case>& all);
 void addBadInputCases(std::vector<Case>& all);
 

@@ -29,6 +29,7 @@ const std::vector<Case>& cases() {
     addMorphCases(list);
     addResampleCases(list);
     addKalbeCases(list);
+    addLookupCases(list);
     addExtremeCases(list);
     addBadInputCases(list);
     return list;
