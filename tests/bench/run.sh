@@ -21,6 +21,7 @@ for size in 64 128; do "$build/tests/advect_bench" function=1 staggered=1 $size 
 "$here/render.sh" "$build/tests/render_bench" "$build/apps/levelsmith" "$here/../../data/models/dragon_vrip.ply.gz" || status=1
 "$here/out_of_core.sh" "$build/apps/levelsmith" "$here/../../data/models/dragon_vrip.ply.gz" || status=1
 "$build/tests/tolerance_bench" "$here/../../data/models/bunny.obj" "$here/../../data/models/dragon_vrip_res4.ply.gz" || status=1
+"$build/tests/projection_bench" marschner-lobb 129 || status=1
 "$here/volumes.sh" "$build/apps/levelsmith" "$here/../../data/models/ch2.nii.gz" || status=1
 "$here/startup.sh" "$build/apps/levelsmith" || status=1
 "$here/pipeline.sh" "$build/apps/levelsmith" || status=1

@@ -125,7 +125,7 @@ bool isTensorProduct(VolumeFilter filter) {
 FilterWeights filterWeights(VolumeFilter filter, double position, int size, GridExtension border) {
   FilterWeights result;
   if (filter == VolumeFilter::Box || size == 1) {
-    result.first = std::min(static_cast<int>(position + 0.5), size - 1);
+    result.first = std::min(static_cast<int>(std::floor(position + 0.5)), size - 1);
     result.weight[0][0] = 1;
     return result;
   }

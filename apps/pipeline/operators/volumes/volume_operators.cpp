@@ -78,7 +78,8 @@ Value printHistogram(Invocation& in) {
     in.output += fmt::format("otsu {}          {:.6g}\n", n + 1, found.otsu[n]);
   in.output += fmt::format("steepest        {:.6g}\n", found.steepest);
   // At most 32 lines, each with a bar in proportion to the root of the count.
-  constexpr std::size_t kMostLines = 32, kBar = 40;
+  constexpr std::size_t kMostLines = 32;
+  constexpr double kBar = 40;
   const std::size_t bins = found.counts.size(), joined = (bins + kMostLines - 1) / kMostLines;
   std::vector<std::uint64_t> lines((bins + joined - 1) / joined, 0);
   for (std::size_t bin = 0; bin < bins; ++bin) lines[bin / joined] += found.counts[bin];
@@ -88,7 +89,7 @@ Value printHistogram(Invocation& in) {
     const double share = std::sqrt(static_cast<double>(lines[n]) / most);
     in.output += fmt::format(
         "{:>12.6g} {:>12} {}\n", found.low + static_cast<double>(n * joined) * width, lines[n],
-        std::string(static_cast<std::size_t>(share * static_cast<double>(kBar) + 0.5), '#'));
+        std::string(static_cast<std::size_t>(std::lround(share * kBar)), '#'));
   }
   return in.operands[0];
 }
