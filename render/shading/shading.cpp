@@ -216,6 +216,8 @@ C3f Shader::colour(const Hit& hit, const V3d& direction, const PointLight& light
       return inkColour(hit, frame, direction);
     case Style::Matcap:
       return matcapColour(frame);
+    case Style::ReflectionLines:
+      return reflectionColour(frame, direction);
     default:
       break;
   }
@@ -325,6 +327,14 @@ C3f Shader::inkColour(const Hit& hit, const Frame& frame, const V3d& direction) 
 C3f Shader::matcapColour(const Frame& frame) const {
   return options_.style.matcap->at(0.5 + 0.49 * frame.normal.dot(right_),
                                    0.5 - 0.49 * frame.normal.dot(up_));
+}
+
+C3f Shader::reflectionColour(const Frame& frame, const V3d& direction) const {
+  const V3d mirrored = direction - frame.normal * (2 * direction.dot(frame.normal));
+  const double line = reflectionLineAt(mirrored, up_, right_, options_.style.reflectionLines);
+  // A little light from above shows the shape between the lines.
+  const double upward = 0.75 + 0.25 * frame.normal.dot(up_);
+  return scaled(C3f(0.03f) + C3f(0.80f, 0.82f, 0.85f) * static_cast<float>(line), upward);
 }
 
 }  // namespace render

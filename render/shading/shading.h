@@ -60,8 +60,8 @@ struct PointLight {
 enum class LightKind { Sky, Key, Both };
 
 /// Shades a surface: key light with soft shadows, sky light with ambient occlusion, a cool fill
-/// light and a thin rim light. The styles tone, ink and matcap use no light rays (shadow and
-/// occlusion rays).
+/// light and a thin rim light. The styles tone, ink, matcap and reflection-lines use no light
+/// rays (shadow and occlusion rays).
 class Shader {
  public:
   /// @param diagonal  diagonal of the bounding box of the surfaces, world units
@@ -121,6 +121,7 @@ class Shader {
   [[nodiscard]] Imath::C3f inkColour(const Hit& hit, const Frame& frame,
                                      const Imath::V3d& direction) const;
   [[nodiscard]] Imath::C3f matcapColour(const Frame& frame) const;
+  [[nodiscard]] Imath::C3f reflectionColour(const Frame& frame, const Imath::V3d& direction) const;
   /// Weight of the silhouette line at the hit: 1 on the line, 0 beside it.
   [[nodiscard]] double lineAt(const Hit& hit, const Frame& frame,
                               const Imath::V3d& direction) const;

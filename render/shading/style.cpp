@@ -57,13 +57,16 @@ const char* styleName(Style style) {
       return "ink";
     case Style::Matcap:
       return "matcap";
+    case Style::ReflectionLines:
+      return "reflection-lines";
     default:
       return "lit";
   }
 }
 
 bool usesLights(Style style) {
-  return style != Style::Tone && style != Style::Ink && style != Style::Matcap;
+  return style != Style::Tone && style != Style::Ink && style != Style::Matcap &&
+         style != Style::ReflectionLines;
 }
 
 C3f meanColour(const CurvatureSample& sample, double range) {
@@ -103,6 +106,14 @@ double silhouetteOf(double cosine, double viewCurvature, double width) {
   const double bend = std::clamp(width * viewCurvature, 0.0, 1.0);
   const double limit = std::sqrt(bend * (2 - bend));
   return limit > 0 && cosine <= limit ? 1 : 0;
+}
+
+double reflectionLineAt(const Imath::V3d& direction, const Imath::V3d& up, const Imath::V3d& side,
+                        int lines) {
+  const Imath::V3d ahead = up.cross(side);
+  const double angle = std::atan2(direction.dot(side), direction.dot(ahead));
+  // The edges of the stripes are soft over a fifth of their period.
+  return ramp(-0.3, 0.3, std::cos(lines * angle));
 }
 
 float linearFromSrgb(float x) {

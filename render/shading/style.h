@@ -27,14 +27,18 @@ enum class Style {
   Accessibility,  ///< the solid's colour, darker in concave regions that large balls cannot touch
                   ///< [Miller94]
   Ink,            ///< silhouettes, ridges and valleys as lines on the colour of paper [Kindlmann03]
-  Matcap  ///< colours from a picture of a shaded ball, looked up by the normal in camera space
+  Matcap,  ///< colours from a picture of a shaded ball, looked up by the normal in camera space
+  /// Dark and bright stripes: reflections of parallel lines at infinity in a mirroring surface. The
+  /// stripes break where the normal jumps, and bend where the curvature jumps [Kalbe11].
+  ReflectionLines
 };
 
-/// Name of a style: "lit", "tone", "mean", "gauss", "principal", "accessibility", "ink", "matcap".
+/// Name of a style: "lit", "tone", "mean", "gauss", "principal", "accessibility", "ink", "matcap",
+/// "reflection-lines".
 [[nodiscard]] const char* styleName(Style style);
 inline constexpr std::array kStyles = {Style::Lit,   Style::Tone,      Style::Mean,
                                        Style::Gauss, Style::Principal, Style::Accessibility,
-                                       Style::Ink,   Style::Matcap};
+                                       Style::Ink,   Style::Matcap,    Style::ReflectionLines};
 
 /// A colour picture with linear values.
 struct ColourImage {
@@ -65,6 +69,7 @@ struct StyleOptions {
   /// stands for 40 divided by the diagonal of the bounding box of the surfaces.
   double curvatureRange = 0;
   double lineWidth = 2;                            ///< width of silhouette lines, pixels
+  int reflectionLines = 32;                        ///< lines around, for Style::ReflectionLines
   std::shared_ptr<const ColourImage> matcap = {};  ///< picture of a shaded ball, for Style::Matcap
 };
 
@@ -80,6 +85,13 @@ struct StyleOptions {
 /// 1/2 where the largest ball that can touch the point from outside has the radius 1 / range, and
 /// less where only smaller balls can touch it.
 [[nodiscard]] double accessibilityOf(const CurvatureSample& sample, double range);
+
+/// Brightness of the stripes in a direction, 0 to 1: `lines` bright lines around the axis `up`,
+/// parallel to it and equally far apart.
+/// @param direction  direction of the reflected ray, unit length
+/// @param up, side  unit vectors at a right angle
+[[nodiscard]] double reflectionLineAt(const Imath::V3d& direction, const Imath::V3d& up,
+                                      const Imath::V3d& side, int lines);
 
 /// Weight of a silhouette line at a point: 1 on the line, 0 beside it. The curvature along the view
 /// is used to keep the line width constant [Kindlmann03].

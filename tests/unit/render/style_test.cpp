@@ -125,6 +125,35 @@ TEST(Styles, InkTheRimOfABallInTheRequestedWidth) {
   }
 }
 
+TEST(Styles, ReflectionLinesLieAtEqualAngles) {
+  const V3d up(0, 0, 1), side(0, 1, 0);
+  constexpr int kLines = 12;
+  for (int n = 0; n < 2 * kLines; ++n)
+    for (const double height : {-0.9, 0.0, 0.6}) {
+      const double angle = M_PI * n / kLines, r = std::sqrt(1 - height * height);
+      // Zero is the direction up × side.
+      const V3d direction(-r * std::cos(angle), r * std::sin(angle), height);
+      EXPECT_EQ(reflectionLineAt(direction, up, side, kLines), n % 2 == 0 ? 1 : 0) << n;
+    }
+}
+
+TEST(Styles, ReflectionLinesOnABallFollowFromItsNormal) {
+  RenderOptions options = {.samples = 1};
+  options.style.style = Style::ReflectionLines;
+  options.style.reflectionLines = 8;
+  const Image image = renderCpu(ballScene(), options);
+  // At the pixel x, the normal of the ball has the angle asin(x) and the reflection twice that.
+  int compared = 0;
+  for (int x = 15; x < 105; ++x) {
+    const double angle = 2 * std::asin((x + 0.5 - 60) * 0.02);
+    const double wave = std::cos(8 * (M_PI - angle));
+    if (std::abs(wave) < 0.5) continue;
+    ++compared;
+    EXPECT_EQ(pixelOf(image, x, 60).x > 0.3f, wave > 0) << x;
+  }
+  EXPECT_GT(compared, 40);
+}
+
 class MatcapFile {
  public:
   MatcapFile() {

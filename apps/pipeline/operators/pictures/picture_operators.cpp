@@ -122,7 +122,11 @@ void validateDraw(const Invocation& in) {
         "bits; leave --value-bits out, or give another filter");
   if (in.flag("ground") && !render::usesLights(styleNamed(style)))
     throw UsageError(fmt::format("render: --style {} has no shadows; leave --ground out", style));
-  if (in.given("curvature-range") && (style == "lit" || style == "tone" || style == "matcap"))
+  if (in.given("reflection-lines") && style != "reflection-lines")
+    throw UsageError(fmt::format(
+        "render: --style {} shows no reflections; leave --reflection-lines out", style));
+  if (in.given("curvature-range") &&
+      (style == "lit" || style == "tone" || style == "matcap" || style == "reflection-lines"))
     throw UsageError(
         fmt::format("render: --style {} shows no curvatures; leave --curvature-range out", style));
   if (render::imageFormat(in.text("file"), in.text("format")).empty()) {
@@ -208,6 +212,7 @@ render::StyleOptions styleOf(const Invocation& in) {
   options.style = styleNamed(in.text("style"));
   if (in.given("curvature-range")) options.curvatureRange = in.number("curvature-range");
   options.lineWidth = in.number("line");
+  options.reflectionLines = in.integerAs<int>("reflection-lines");
   if (in.given("matcap"))
     options.matcap = std::make_shared<const render::ColourImage>(
         render::readColourPng(in.text("matcap"), in.maxMemory));
@@ -491,6 +496,11 @@ Operator renderOperator() {
             .doc = "with --style tone or ink: width of the silhouette lines, in pixels",
             .fallback = "2",
             .range = Range::NonNegative},
+           {.name = "reflection-lines",
+            .type = ParamType::Integer,
+            .doc = "with --style reflection-lines: number of lines around the scene",
+            .fallback = "32",
+            .range = Range::Positive},
            {.name = "thickness",
             .type = ParamType::Flag,
             .doc = "add a layer to the EXR with the length of each pixel's ray inside the solids, "
