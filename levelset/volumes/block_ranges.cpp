@@ -196,6 +196,20 @@ std::size_t BlockRanges::bytes() const {
          (narrow_.size() + wide_.size() + narrowGroups_.size() + wideGroups_.size());
 }
 
+std::vector<Range> BlockRanges::valuesOf(const std::vector<Range>& stored) const {
+  std::vector<Range> values;
+  values.reserve(stored.size());
+  for (const Range& range : stored) {
+    double low = scale_(static_cast<double>(range.low)),
+           high = scale_(static_cast<double>(range.high));
+    if (low > high) std::swap(low, high);
+    constexpr float kFar = std::numeric_limits<float>::infinity();
+    values.push_back({std::nextafter(static_cast<float>(low), -kFar),
+                      std::nextafter(static_cast<float>(high), kFar)});
+  }
+  return values;
+}
+
 template <typename Takes>
 std::vector<V3i> BlockRanges::blocksWith(const std::vector<Range>& ofBlocks,
                                          const std::vector<Range>& ofGroups,

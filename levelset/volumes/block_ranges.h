@@ -32,6 +32,14 @@ class BlockRanges {
   /// Memory of the ranges, bytes.
   [[nodiscard]] std::size_t bytes() const;
 
+  /// Ranges of the values in all blocks, ordered by x, y, z. The trilinear interpolant in the cells
+  /// of a block has no other values.
+  [[nodiscard]] std::vector<Range> blockValues() const { return valuesOf(narrow_); }
+  /// Ranges of the values in groups of 8³ blocks, ordered by x, y, z.
+  [[nodiscard]] std::vector<Range> groupValues() const { return valuesOf(narrowGroups_); }
+  /// Number of groups along each axis.
+  [[nodiscard]] Imath::V3i groups() const { return groups_; }
+
   /// Finds the blocks that have a grid point with a value above the isovalue, and one with a value
   /// of at most the isovalue. The surface of the trilinear interpolant lies in these blocks.
   /// @param isOpenAbove  true: in place of that, a value below the isovalue, and one of at least it
@@ -43,6 +51,8 @@ class BlockRanges {
   [[nodiscard]] std::vector<Imath::V3i> crossedWidely(double isovalue, double widening) const;
 
  private:
+  /// Ranges of stored numbers, rescaled to values and rounded outwards.
+  [[nodiscard]] std::vector<Range> valuesOf(const std::vector<Range>& stored) const;
   template <typename Takes>
   [[nodiscard]] std::vector<Imath::V3i> blocksWith(const std::vector<Range>& ofBlocks,
                                                    const std::vector<Range>& ofGroups,

@@ -48,6 +48,8 @@ class VolumeSurface {
   [[nodiscard]] VolumeSurface withIsovalue(double isovalue, VolumeInside inside) const;
 
   [[nodiscard]] const levelset::Volume& volume() const { return *volume_; }
+  /// Ranges of the blocks of the volume, shared by all isosurfaces of it.
+  [[nodiscard]] const levelset::BlockRanges& ranges() const { return *ranges_; }
   [[nodiscard]] double isovalue() const { return isovalue_; }
   [[nodiscard]] VolumeInside inside() const { return inside_; }
   /// Any invertible affine map.

@@ -15,6 +15,7 @@
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
+#include "levelset/volumes/histogram.h"
 #include "render/camera.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/embree/embree_renderer.h"
@@ -23,6 +24,7 @@
 #include "render/images/image.h"
 #include "render/kernel/frustum_culling.h"
 #include "render/scene/scene.h"
+#include "render/views/volume_light.h"
 
 namespace pipeline {
 namespace {
@@ -36,24 +38,26 @@ bool isVolume(Kind kind) {
 /// Refuses volumes without --isovalue, and its options without a volume.
 void requireIsovalue(const Invocation& in) {
   if (isVolume(in.operands[0].plan().kind)) {
-    if (!in.given("isovalue"))
+    if (!in.given("isovalue") && !in.given("transfer"))
       throw UsageError(
           "render: a volume has no surface without an isovalue; give --isovalue, and see "
-          "'histogram' for suggestions");
+          "'histogram' for suggestions, or give --transfer");
     return;
   }
-  for (const char* name : {"isovalue", "inside"})
+  for (const char* name : {"isovalue", "inside", "transfer", "no-shading"})
     if (in.given(name))
       throw UsageError(fmt::format("render: --{} is for volumes; leave it out", name));
 }
 
 /// Scene with the isosurface of a volume.
 render::ViewedScene volumeScene(Invocation& in) {
-  const double isovalue = in.number("isovalue");
+  const levelset::Volume volume = volumeIn(in);
+  const bool hasIsovalue = in.given("isovalue");
+  // No value is above the largest one, so that isosurface is empty.
   const auto surface = std::make_shared<const render::VolumeSurface>(
-      volumeIn(in), isovalue,
+      volume, hasIsovalue ? in.number("isovalue") : volume.highest(),
       in.text("inside") == "below" ? render::VolumeInside::Below : render::VolumeInside::Above);
-  if (surface->isEmpty())
+  if (hasIsovalue && surface->isEmpty())
     in.notes.warnings.push_back(
         fmt::format("render: the picture is empty, because no surface of the volume has the "
                     "isovalue {}; its values lie between {:.6g} and {:.6g}",
@@ -61,6 +65,26 @@ render::ViewedScene volumeScene(Invocation& in) {
   render::ViewedScene viewed;
   viewed.scene.solids.push_back({.band = {}, .volume = surface});
   return viewed;
+}
+
+/// Transfer function of --transfer: points, or the suggestion for the histogram.
+render::DirectVolume directVolumeOf(Invocation& in, const render::Scene& scene) {
+  const render::VolumeSurface& surface = *scene.solids.front().volume;
+  const std::string text = in.text("transfer");
+  const std::vector<render::TransferPoint> points =
+      text == "auto" ? render::suggestedTransfer(levelset::histogram(surface.volume()))
+                     : render::parseTransfer(text);
+  if (text == "auto")
+    in.notes.notes.push_back(
+        fmt::format("render: --transfer \"{}\"", render::transferText(points)));
+  const Imath::V3d spacing = surface.volume().grid().spacing();
+  const render::DirectVolume volume(
+      surface, render::TransferFunction(points, std::min({spacing.x, spacing.y, spacing.z})));
+  in.notes.detailsJson = Json{{"skipped_blocks", volume.skippedShare()}}.dump();
+  if (volume.skippedShare() == 1 && surface.isEmpty())
+    in.notes.warnings.push_back(
+        "render: the picture is empty, because no value of the volume has an opacity");
+  return volume;
 }
 
 /// Builds the scene to draw from the operand. The camera options override the camera of the
@@ -122,6 +146,12 @@ void validateDraw(const Invocation& in) {
         "bits; leave --value-bits out, or give another filter");
   if (in.flag("ground") && !render::usesLights(styleNamed(style)))
     throw UsageError(fmt::format("render: --style {} has no shadows; leave --ground out", style));
+  if (in.given("transfer") && in.text("transfer") != "auto")
+    (void)render::parseTransfer(in.text("transfer"));
+  if (in.flag("no-shading") && !in.given("transfer"))
+    throw UsageError("render: --no-shading applies only to --transfer; leave it out");
+  if (in.given("transfer") && in.flag("ground"))
+    throw UsageError("render: a volume drawn with --transfer has no shadow; leave --ground out");
   if (in.given("reflection-lines") && style != "reflection-lines")
     throw UsageError(fmt::format(
         "render: --style {} shows no reflections; leave --reflection-lines out", style));
@@ -246,6 +276,22 @@ void coarsen(Invocation& in, render::Scene& scene) {
       bits, most.largest, most.rms));
 }
 
+/// Compares the colours of a volume by the kernel and by the judge.
+void requireSameLight(const render::Image& image, const render::Image& judged) {
+  // The judge's steps change the light by 1e-4, and the kernel omits the last 1/512.
+  constexpr float kTolerance = 1.0f / 256;
+  for (const char* name : {"R", "G", "B", "A"}) {
+    const std::vector<float>&a = image.channels.at(name), &b = judged.channels.at(name);
+    for (std::size_t i = 0; i < a.size(); ++i)
+      if (!(std::abs(a[i] - b[i]) <= kTolerance * std::max(1.0f, std::abs(b[i]))))
+        throw levelset::NumericalError(fmt::format(
+            "render: the light of the volume differs from that of the judge in channel {} of the "
+            "pixel {},{}: {} and {}; please report it with the command",
+            name, i % static_cast<std::size_t>(image.width),
+            i / static_cast<std::size_t>(image.width), a[i], b[i]));
+  }
+}
+
 Value draw(Invocation& in) {
   render::Scene scene = sceneOf(in);
   coarsen(in, scene);
@@ -267,14 +313,31 @@ Value draw(Invocation& in) {
                                 .maxBytes = in.maxMemory,
                                 .progress = in.progress};
   if (isBoth) options.progress = levelset::subProgress(in.progress, 0, 0.5);
-  const render::Image image = renderer == "cpu"   ? render::renderCpu(scene, options)
-                              : renderer == "gpu" ? render::renderGpu(scene, options)
-                              : isBoth            ? drawByKernel(in, scene, options)
-                                                  : render::renderEmbree(scene, options);
+  render::Image image = renderer == "cpu"   ? render::renderCpu(scene, options)
+                        : renderer == "gpu" ? render::renderGpu(scene, options)
+                        : isBoth            ? drawByKernel(in, scene, options)
+                                            : render::renderEmbree(scene, options);
   if (const auto read = image.attributes.find("ls:read"); read != image.attributes.end())
     in.notes.notes.push_back(fmt::format("render: {}", read->second));
   if (const auto told = image.attributes.find("ls:warning"); told != image.attributes.end())
     in.notes.warnings.push_back(fmt::format("render: {}", told->second));
+  render::Image surfaces,
+      judged;  // for --renderer both: without the volume's light, with the judge's
+  if (isBoth) surfaces = image;
+  if (in.given("transfer")) {
+    const render::DirectVolume volume = directVolumeOf(in, scene);
+    render::VolumeLightOptions light{.samples = options.samples,
+                                     .isShaded = !in.flag("no-shading"),
+                                     .isJudged = renderer == "embree"};
+    if (isBoth) {
+      judged = surfaces;
+      light.isJudged = true;
+      render::addVolumeLight(judged, scene, volume, light);
+      light.isJudged = false;
+    }
+    render::addVolumeLight(image, scene, volume, light);
+    image.attributes["ls:transfer"] = render::transferText(volume.transfer().points());
+  }
   render::writeImage(in.text("file"), image, in.text("format"));
   if (in.given("png")) render::writeImage(in.text("png"), image, "png");
   if (isBoth) {
@@ -284,9 +347,10 @@ Value draw(Invocation& in) {
     options.ambientSamples = options.shadowSamples = 0;
     options.progress = levelset::subProgress(in.progress, 0.5, 1);
     const render::ImageComparison found =
-        render::compareImages(image, render::renderEmbree(scene, options));
+        render::compareImages(surfaces, render::renderEmbree(scene, options));
     in.notes.detailsJson = toJson(found).dump();
-    if (found.bothHit == 0)
+    if (in.given("transfer")) requireSameLight(image, judged);
+    if (found.bothHit == 0 && !in.given("transfer"))
       in.notes.warnings.push_back(
           "render: no pixel shows a surface in both pictures (kernel and embree), so no layer was "
           "compared");
@@ -464,6 +528,14 @@ Operator renderOperator() {
             .doc = "for a volume: draw the surface on which the interpolated values equal this "
                    "number"},
            insideParam("for a volume: side of the isovalue that is solid"),
+           {.name = "transfer",
+            .type = ParamType::Text,
+            .doc = "for a volume: draw it by direct volume rendering. Points VALUE:OPACITY or "
+                   "VALUE:OPACITY/RED,GREEN,BLUE, separated by blanks; the opacity, below 1, is "
+                   "that of a layer one voxel thick. Or auto: from the histogram"},
+           {.name = "no-shading",
+            .type = ParamType::Flag,
+            .doc = "with --transfer: colours do not depend on the gradient of the values"},
            {.name = "tables",
             .type = ParamType::Choice,
             .doc = "with --renderer gpu or both: data that the shader reads; bricks, or a NanoVDB "

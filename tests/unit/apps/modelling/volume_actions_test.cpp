@@ -72,6 +72,23 @@ TEST_F(VolumeActions, IsosurfaceMeshIsAMeshLikeOthers) {
   EXPECT_REFUSED(levelsmith("volume sphere ! isosurface-mesh 7 ! info"), 3, "no value");
 }
 
+TEST_F(VolumeActions, RenderDrawsVolumesByTheirTransferFunction) {
+  const std::string ball = "volume sphere --size 30 --radius 0.7 ! render a.exr --size 60x45 ";
+  const support::Outcome suggested = levelsmith(ball + "--transfer auto --renderer both");
+  EXPECT_EQ(suggested.code, 0) << suggested.err;
+  EXPECT_NE(suggested.err.find("render: --transfer \""), std::string::npos) << suggested.err;
+  EXPECT_EQ(levelsmith(ball + "--transfer '0:0 0.2:0.1/1,0,0' --isovalue 0.4 --renderer both").code,
+            0);
+  EXPECT_NE(levelsmith(ball + "--transfer 5:0").err.find("no value of the volume has an opacity"),
+            std::string::npos);
+  EXPECT_REFUSED(levelsmith(ball + "--transfer 0:1"), 2, "less than 1");
+  EXPECT_REFUSED(levelsmith(ball + "--transfer 0"), 2, "VALUE:OPACITY");
+  EXPECT_REFUSED(levelsmith(ball), 2, "--transfer");
+  EXPECT_REFUSED(levelsmith(ball + "--isovalue 0 --no-shading"), 2, "--transfer");
+  EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 0.1 ! render a.png --transfer 0:0.1"), 2,
+                 "volumes");
+}
+
 TEST_F(VolumeActions, ResampleTakesVolumesAndSolids) {
   const std::string ball = "volume sphere --size 41 --radius 0.7 ";
   const Json info = json(ball + "! resample --voxel 0.04 --filter bspline-qi ! info --json");

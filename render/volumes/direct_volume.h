@@ -1,0 +1,81 @@
+#pragma once
+
+#include <Imath/ImathMatrix.h>
+#include <Imath/ImathVec.h>
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "render/volumes/transfer_function.h"
+#include "render/volumes/volume_surface.h"
+
+namespace render {
+
+/// Light that reaches the eye along a ray through a volume.
+struct VolumeLight {
+  Imath::V3d colour = Imath::V3d(0);  ///< emitted in the volume, linear
+  double transmittance = 1;           ///< share of the light from behind that passes the volume
+};
+
+/// Light that brightens the colours of a volume by the direction of its gradient.
+struct VolumeShading {
+  Imath::V3d toLight{0, 0, 1};  ///< unit vector towards the light, world space
+  double ambient = 0.35;        ///< brightness where the light does not reach, [0, 1]
+};
+
+/// A volume that is drawn by direct volume rendering: each point emits and absorbs light by the
+/// transfer function of the trilinear interpolant. Along a ray the emission–absorption integral is
+///
+///     C = ∫ c(s) τ(s) exp(−∫₀ˢ τ(t) dt) ds,
+///
+/// with the extinction τ and the colour c [Max95]. In each cell the interpolant is a cubic along
+/// the ray. It is replaced by linear pieces, so short that the optical depth of a cell changes by
+/// less than a tolerance. The integral over a piece is pre-integrated in closed form.
+/// Blocks of 8³ cells without extinction are skipped.
+///
+/// The class has value semantics. Copies share the numbers and the ranges of the volume. All
+/// methods may run concurrently.
+class DirectVolume {
+ public:
+  /// Error of the optical depth of a cell that linear pieces may cause.
+  static constexpr double kTolerance = 1e-4;
+
+  /// @param volume  an isosurface of the volume, whose ranges are shared
+  /// @param tolerance  error of the optical depth of a cell, > 0
+  DirectVolume(const VolumeSurface& volume, TransferFunction transfer,
+               double tolerance = kTolerance);
+
+  [[nodiscard]] const levelset::Volume& volume() const { return volume_; }
+  [[nodiscard]] const TransferFunction& transfer() const { return transfer_; }
+  [[nodiscard]] const Imath::M44d& worldToIndex() const { return worldToIndex_; }
+  /// Share of the blocks that are skipped, because all their values have no extinction.
+  [[nodiscard]] double skippedShare() const;
+
+  /// Integrates along a ray until less than kLeastTransmittance of the light passes.
+  /// @param direction  unit length
+  /// @param near, far  part of the ray, distances in world units; `far` may be infinite
+  /// @param shading  null: colours do not depend on the gradient
+  [[nodiscard]] VolumeLight light(const Imath::V3d& origin, const Imath::V3d& direction,
+                                  double near, double far,
+                                  const VolumeShading* shading = nullptr) const;
+  /// Brightness of a point by the direction of the gradient, [0, 1]. The gradient is interpolated
+  /// between central differences at the grid points. @param index  position in the grid
+  [[nodiscard]] double brightness(const Imath::V3d& index, const VolumeShading& shading) const;
+
+ private:
+  template <typename Number>
+  [[nodiscard]] VolumeLight lightOf(const Imath::V3d& origin, const Imath::V3d& direction,
+                                    double near, double far, const VolumeShading* shading) const;
+
+  levelset::Volume volume_;
+  TransferFunction transfer_;
+  double tolerance_;
+  Imath::M44d worldToIndex_;
+  double plainGradient_;        // gradients of half this size count as no surface, per world unit
+  Imath::V3i blocks_, groups_;  // along each axis
+  std::vector<char> hasExtinction_;  // of blocks, ordered by x, y, z
+  std::vector<char> groupHasExtinction_;
+};
+
+}  // namespace render

@@ -1,0 +1,332 @@
+// Direct volume rendering against closed forms and against the judge.
+
+#include "render/volumes/direct_volume.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <array>
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "levelset/error.h"
+#include "levelset/volumes/synthetic.h"
+#include "render/cpu/cpu_renderer.h"
+#include "render/embree/volume_integral.h"
+#include "render/views/volume_light.h"
+#include "tests/support/measured.h"
+#include "tests/support/volume_scenes.h"
+
+namespace direct_volume_test {
+
+using Imath::C3f;
+using Imath::M44d;
+using Imath::V3d;
+using Imath::V3i;
+using levelset::UsageError;
+using levelset::Volume;
+using support::measured;
+using support::sampled;
+using namespace render;
+
+/// Opacity of a layer of one voxel that has an extinction per voxel.
+double opacityOf(double extinction) {
+  return -std::expm1(-extinction);
+}
+
+DirectVolume directVolume(const Volume& volume, const std::vector<TransferPoint>& points,
+                          double tolerance = DirectVolume::kTolerance) {
+  const V3d spacing = volume.grid().spacing();
+  return {VolumeSurface(volume, 0),
+          TransferFunction(points, std::min({spacing.x, spacing.y, spacing.z})), tolerance};
+}
+
+double differenceOf(const VolumeLight& a, const VolumeLight& b) {
+  const V3d d = a.colour - b.colour;
+  return std::max(
+      {std::abs(d.x), std::abs(d.y), std::abs(d.z), std::abs(a.transmittance - b.transmittance)});
+}
+
+/// A transfer function with colours, a gap and two peaks.
+const std::vector<TransferPoint> kBusy = {
+    {-0.6, 0, C3f(1, 0.2f, 0.1f)},     {-0.3, 0.2, C3f(0.9f, 0.4f, 0.1f)},
+    {-0.1, 0, C3f(0.2f, 0.5f, 0.9f)},  {0.1, 0, C3f(0.2f, 0.5f, 0.9f)},
+    {0.3, 0.1, C3f(0.3f, 0.9f, 0.4f)}, {0.5, 0.02, C3f(1)}};
+
+/// Rays towards random points of the box of a volume, some along its axes and through its points.
+std::vector<std::array<V3d, 2>> raysThrough(const Volume& volume, std::size_t count) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit(0, 1);
+  const M44d& map = volume.grid().indexToWorld;
+  const V3d last = V3d(volume.size() - V3i(1));
+  std::vector<std::array<V3d, 2>> rays;
+  for (std::size_t n = 0; n < count; ++n) {
+    V3d target(unit(random), unit(random), unit(random));
+    target = target * last;
+    V3d away(unit(random) - 0.5, unit(random) - 0.5, unit(random) - 0.5);
+    // Through grid points inside: on the border, rounding decides if a ray meets the volume.
+    for (int axis = 0; n % 4 == 1 && axis < 3; ++axis)
+      if (last[axis] > 1) target[axis] = std::clamp(std::round(target[axis]), 1.0, last[axis] - 1);
+    if (n % 8 == 1) away = V3d(0, n % 16 == 1 ? 1 : 0, n % 16 == 1 ? 0 : -1);
+    V3d direction;
+    map.multDirMatrix(away, direction);
+    direction.normalize();
+    const double distance = n % 5 == 0 ? 0 : 40 * volume.grid().spacing().x;  // inside, outside
+    rays.push_back({target * map - direction * distance, direction});
+  }
+  return rays;
+}
+
+TEST(TransferFunction, IntegratesInClosedForm) {
+  const TransferFunction transfer(kBusy, 0.1);
+  for (const double from : {-1.0, -0.45, 0.0, 0.2})
+    for (const double to : {-0.25, 0.35, 0.7}) {
+      // Simpson's rule on 4000 intervals.
+      constexpr int kSteps = 8000;
+      double sum = 0;
+      V3d light(0);
+      const double h = (to - from) / kSteps;
+      for (int n = 0; n <= kSteps; ++n) {
+        const double weight = (n == 0 || n == kSteps ? 1 : n % 2 == 1 ? 4 : 2) * h / 3;
+        sum += weight * transfer.extinction(from + n * h);
+        light += transfer.emission(from + n * h) * weight;
+      }
+      const auto low = transfer.integral(from), high = transfer.integral(to);
+      EXPECT_NEAR(high.extinction - low.extinction, sum, 1e-6);
+      EXPECT_NEAR((high.emission - low.emission - light).length(), 0, 1e-6);
+    }
+  EXPECT_TRUE(transfer.isEmptyBetween(-0.1, 0.1));
+  EXPECT_TRUE(transfer.isEmptyBetween(-5, -0.6));
+  EXPECT_FALSE(transfer.isEmptyBetween(-0.1, 0.11));
+  EXPECT_FALSE(transfer.isEmptyBetween(-5, 5));
+  EXPECT_FALSE(transfer.isEmptyBetween(0.5, 0.6));
+  EXPECT_NEAR(transfer.extinction(-0.3), -std::log(0.8) / 0.1, 1e-12);
+}
+
+TEST(TransferFunction, ReadsWhatItWrites) {
+  const auto points = parseTransfer("40:0 60:0.1/1,0.8,0.7  -1.5e2:.25");
+  ASSERT_EQ(points.size(), 3u);
+  EXPECT_EQ(points[1], (TransferPoint{60, 0.1, C3f(1, 0.8f, 0.7f)}));
+  EXPECT_EQ(parseTransfer(transferText(points)), points);
+  for (const char* text : {"", "40", "40:", "40:x", "40:0.1/1", "40:0.1/1,2", "40:0.1/1,2,3,4",
+                           "40:0.1,50:0.2", "40:0.1/", "a:0.1"})
+    EXPECT_THROW((void)parseTransfer(text), UsageError) << text;
+  const auto refused = [](std::vector<TransferPoint> all, double voxel = 1) {
+    EXPECT_THROW(TransferFunction(std::move(all), voxel), UsageError);
+  };
+  refused({});
+  refused({{1, 1}});
+  refused({{1, -0.1}});
+  refused({{NAN, 0.1}});
+  refused({{1, NAN}});
+  refused({{1, 0.1}, {1, 0.2}});
+  refused({{1, 0.1, C3f(-1, 0, 0)}});
+  refused({{1, 0.1}}, 0);
+}
+
+TEST(DirectVolume, AbsorbsExponentiallyInAConstantDensity) {
+  const Volume volume = sampled({V3i(11, 11, 11), M44d()}, [](const V3d&) { return 5; });
+  for (const double extinction : {1e-6, 0.01, 0.3, 0.6}) {
+    const DirectVolume direct =
+        directVolume(volume, {{5, opacityOf(extinction), C3f(1, 0.5f, 0.25f)}});
+    const VolumeLight light = direct.light(V3d(-3, 4.3, 5.2), V3d(1, 0, 0), 0, HUGE_VAL);
+    const double passed = std::exp(-10 * extinction);
+    EXPECT_NEAR(light.transmittance, passed < kLeastTransmittance ? 0 : passed, 1e-12);
+    EXPECT_NEAR(light.colour.x, passed < kLeastTransmittance ? 1 : 1 - passed, 1e-12);
+    EXPECT_NEAR(light.colour.y, 0.5 * light.colour.x, 1e-12);
+    // A part of the ray.
+    EXPECT_NEAR(direct.light(V3d(-3, 4.3, 5.2), V3d(1, 0, 0), 5, 6.5).transmittance,
+                std::exp(-1.5 * extinction), 1e-12);
+  }
+}
+
+TEST(DirectVolume, IntegratesLinearValuesInClosedForm) {
+  // The extinction equals the value x, from 0 to 2, so the optical depth is 2.
+  const Volume volume =
+      sampled({V3i(9, 5, 5), M44d().setScale(V3d(0.25))}, [](const V3d& p) { return p.x; });
+  const DirectVolume direct =
+      directVolume(volume, {{0, 0, C3f(0)}, {2, opacityOf(0.25 * 2), C3f(1)}});
+  const VolumeLight light = direct.light(V3d(-1, 0.3, 0.4), V3d(1, 0, 0), 0, HUGE_VAL);
+  EXPECT_NEAR(light.transmittance, std::exp(-2), 1e-12);
+  // ∫ (x/2) x exp(−x²/2) dx over [0, 2] = (√(π/2) erf(√2) − 2 exp(−2)) / 2.
+  const double truth = 0.5 * (std::sqrt(M_PI / 2) * std::erf(std::sqrt(2.0)) - 2 * std::exp(-2));
+  EXPECT_NEAR(light.colour.x, truth, measured(2e-4));
+}
+
+TEST(DirectVolume, AgreesWithTheJudge) {
+  const auto wave = [](const V3d& p) {
+    return 0.8 * std::sin(2.3 * p.x + 0.4) * std::cos(1.7 * p.y) + 0.3 * std::sin(3 * p.z);
+  };
+  const V3d far(1e6, -2e6, 5e5);
+  M44d farMap = support::obliqueMap();
+  for (int axis = 0; axis < 3; ++axis) farMap[3][axis] += far[axis];
+  const std::vector<Volume> volumes = {
+      sampled({V3i(30), support::obliqueMap()}, wave),
+      sampled({V3i(30), farMap}, [&](const V3d& p) { return wave(p - far); }),
+      sampled({V3i(70, 9, 2), M44d().setScale(V3d(0.1, 0.4, 1))}, wave)};
+  for (const Volume& volume : volumes) {
+    const DirectVolume direct = directVolume(volume, kBusy);
+    VolumeShading shading;
+    shading.toLight = V3d(1, 2, 3).normalized();
+    std::size_t lit = 0;
+    double largest = 0;
+    for (const auto& [origin, direction] : raysThrough(volume, 300))
+      for (const VolumeShading* with : {static_cast<const VolumeShading*>(nullptr),
+                                        static_cast<const VolumeShading*>(&shading)}) {
+        const VolumeLight light = direct.light(origin, direction, 0, HUGE_VAL, with),
+                          judged = judgedLight(direct, origin, direction, 0, HUGE_VAL, with, 64);
+        lit += light.transmittance < 0.99;
+        // Where the ray ends early, its last point counts as opaque.
+        if (light.transmittance > 0) largest = std::max(largest, differenceOf(light, judged));
+      }
+    EXPECT_GT(lit, 100u);
+    EXPECT_LT(largest, measured(2.9e-4));
+  }
+}
+
+TEST(DirectVolume, ConvergesWithItsTolerance) {
+  const Volume volume = levelset::marschnerLobb(30);
+  const std::vector<TransferPoint> points = {
+      {0.35, 0, C3f(1, 0, 0)}, {0.5, 0.3, C3f(0, 1, 0)}, {0.65, 0, C3f(0, 0, 1)}};
+  std::array<double, 3> errors{};
+  const auto rays = raysThrough(volume, 200);
+  for (std::size_t n = 0; n < 3; ++n) {
+    const DirectVolume direct = directVolume(volume, points,
+                                             std::pow(10.0, -1.0 - 2.0 * static_cast<double>(n))),
+                       fine = directVolume(volume, points, 1e-9);
+    for (const auto& [origin, direction] : rays) {
+      const VolumeLight a = direct.light(origin, direction, 0, HUGE_VAL),
+                        b = fine.light(origin, direction, 0, HUGE_VAL);
+      if (a.transmittance > 0 && b.transmittance > 0)
+        errors[n] = std::max(errors[n], differenceOf(a, b));
+    }
+  }
+  EXPECT_LT(errors[2], measured(2e-4));
+  EXPECT_LT(errors[2], errors[1]);
+  EXPECT_LT(errors[1], errors[0]);
+  // The judge's steps of second order come closer, too.
+  const DirectVolume fine = directVolume(volume, points, 1e-9);
+  std::array<double, 3> judged{};
+  for (std::size_t n = 0; n < 3; ++n)
+    for (const auto& [origin, direction] : rays) {
+      const VolumeLight a = fine.light(origin, direction, 0, HUGE_VAL);
+      if (a.transmittance > 0)
+        judged[n] = std::max(judged[n], differenceOf(a, judgedLight(fine, origin, direction, 0,
+                                                                    HUGE_VAL, nullptr, 8 << n)));
+    }
+  EXPECT_GT(judged[0] / judged[1], 2.5);
+  EXPECT_LT(judged[2], measured(2.2e-4));
+}
+
+TEST(DirectVolume, InTheOpaqueLimitIsTheIsosurface) {
+  const Volume volume = levelset::sphereVolume(41, 0.7);
+  const DirectVolume direct =
+      directVolume(volume, {{-1e-6, 0, C3f(0.5f)}, {1e-6, 1 - 1e-15, C3f(0.5f)}});
+  const double voxel = volume.grid().spacing().x;
+  for (const V3d& to : {V3d(0), V3d(0.2, 0.3, -0.1), V3d(-0.4, 0.1, 0.3)}) {
+    const V3d eye(3, 2, 1), direction = (to - eye).normalized();
+    const double middle = -eye.dot(direction);
+    const double hit = middle - std::sqrt(0.49 - (eye + direction * middle).length2());
+    EXPECT_EQ(direct.light(eye, direction, 0, hit - 0.1 * voxel).transmittance, 1);
+    EXPECT_EQ(direct.light(eye, direction, 0, hit + 0.5 * voxel).transmittance, 0);
+    EXPECT_NEAR(direct.light(eye, direction, 0, HUGE_VAL).colour.x, 0.5, 1e-6);
+  }
+}
+
+TEST(DirectVolume, KeepsItsFormInExtremes) {
+  const Volume volume = levelset::sphereVolume(20, 0.6);
+  const V3d eye(3, 0.1, 0.2), ahead(-1, 0, 0);
+  // No opacity anywhere.
+  const DirectVolume nothing = directVolume(volume, {{0, 0}});
+  EXPECT_EQ(nothing.skippedShare(), 1);
+  EXPECT_EQ(nothing.light(eye, ahead, 0, HUGE_VAL).transmittance, 1);
+  // A thousand times the usual extinction, and colours far above one.
+  const DirectVolume dense = directVolume(volume, {{-1, 1 - 1e-12, C3f(1e6f)}});
+  const VolumeLight light = dense.light(eye, ahead, 0, HUGE_VAL);
+  EXPECT_EQ(light.transmittance, 0);
+  EXPECT_NEAR(light.colour.x, 1e6, 1);
+  // Rays beside the volume, behind it, and an empty part.
+  for (const auto& [origin, direction] :
+       {std::pair(V3d(3, 1.2, 0), ahead), {eye, V3d(1, 0, 0)}, {V3d(3, 1, 1), V3d(0, 0, 1)}})
+    EXPECT_EQ(dense.light(origin, direction, 0, HUGE_VAL).transmittance, 1);
+  EXPECT_EQ(dense.light(eye, ahead, 2, 2).transmittance, 1);
+  // A ray on a face of the box, and on an edge.
+  EXPECT_EQ(dense.light(V3d(3, 1, 0), ahead, 0, HUGE_VAL).transmittance, 0);
+  EXPECT_EQ(dense.light(V3d(3, 1, -1), ahead, 0, HUGE_VAL).transmittance, 0);
+  // A single layer has no cells.
+  const Volume flat = sampled({V3i(5, 5, 1), M44d()}, [](const V3d&) { return 1; });
+  EXPECT_EQ(directVolume(flat, {{1, 0.5}}).light(V3d(2, 2, 3), V3d(0, 0, -1), 0, 9).transmittance,
+            1);
+}
+
+TEST(DirectVolume, TakesAllTypesOfNumbers) {
+  // Bytes with a falling scale, beside the same values as floats.
+  const Volume bytes = support::noisyBytes(20);
+  std::vector<float> values;
+  for (std::size_t n = 0; n < bytes.grid().pointCount(); ++n)
+    values.push_back(static_cast<float>(bytes.scale()(bytes.stored(n))));
+  const Volume floats(bytes.grid(), std::move(values));
+  const std::vector<TransferPoint> points = {{90, 0}, {110, 0.2, C3f(1, 0, 0)}, {130, 0}};
+  const DirectVolume a = directVolume(bytes, points), b = directVolume(floats, points);
+  EXPECT_EQ(a.skippedShare(), b.skippedShare());
+  for (const auto& [origin, direction] : raysThrough(bytes, 100))
+    EXPECT_EQ(differenceOf(a.light(origin, direction, 0, HUGE_VAL),
+                           b.light(origin, direction, 0, HUGE_VAL)),
+              0);
+}
+
+TEST(DirectVolume, EndsAtSurfacesOfThePicture) {
+  const Volume volume = levelset::sphereVolume(30, 0.8);
+  const VolumeSurface surface(volume, 0.3);  // a ball of radius 0.5
+  Scene scene;
+  scene.solids.push_back({.band = {}, .volume = std::make_shared<const VolumeSurface>(surface)});
+  scene.camera.from = V3d(0, 0, 5);
+  scene.camera.to = V3d(0);
+  scene.camera.width = 60;
+  scene.camera.height = 40;
+  RenderOptions options;
+  options.samples = 1;
+  const Image plain = renderCpu(scene, options);
+  const DirectVolume direct(surface, TransferFunction({{-0.2, 0}, {0, 0.02, C3f(0, 1, 0)}}, 0.07));
+  Image image = plain;
+  addVolumeLight(image, scene, direct, {.samples = 1, .isShaded = false});
+  std::size_t before = 0, beside = 0;
+  for (int y = 0; y < 40; ++y)
+    for (int x = 0; x < 60; ++x) {
+      const auto i = static_cast<std::size_t>(60 * y + x);
+      const Camera::Ray ray = scene.camera.ray(x + 0.5, y + 0.5);
+      const double depth = static_cast<double>(plain.channels.at("Z")[i]);
+      const VolumeLight light = direct.light(ray.origin, ray.direction, 0,
+                                             depth / ray.direction.dot(scene.camera.axis()));
+      const auto expected = static_cast<float>(
+          light.colour.y + light.transmittance * static_cast<double>(plain.channels.at("G")[i]));
+      EXPECT_EQ(image.channels.at("G")[i], expected);
+      // The sample of a pixel at the outline may miss what its middle shows.
+      if ((plain.channels.at("A")[i] == 1) != std::isfinite(depth)) continue;
+      if (std::isfinite(depth)) {
+        ++before;
+        EXPECT_EQ(image.channels.at("A")[i], 1);
+      } else if (light.transmittance < 1) {
+        ++beside;
+        EXPECT_NEAR(static_cast<double>(image.channels.at("A")[i]), 1 - light.transmittance, 1e-7);
+      }
+    }
+  EXPECT_GT(before, 50u);
+  EXPECT_GT(beside, 50u);
+
+  Image serial = plain, shaded = plain, again = plain;
+  addVolumeLight(shaded, scene, direct);
+  {
+    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+    addVolumeLight(serial, scene, direct);
+  }
+  addVolumeLight(again, scene, direct, {.isStopped = [] { return true; }});
+  EXPECT_EQ(shaded.channels, serial.channels);
+  EXPECT_EQ(again.channels, plain.channels);
+  EXPECT_NE(shaded.channels, image.channels);
+  scene.solids[0].opacity = 0.5;
+  EXPECT_THROW(addVolumeLight(image, scene, direct), UsageError);
+}
+
+}  // namespace direct_volume_test
