@@ -55,7 +55,7 @@ void markCells(SurfaceBlock& block, unsigned x, unsigned y, unsigned cells) {
 /// Returns false when there are no such cells.
 bool markSplineCells(SurfaceBlock& block, const DrawnField& field) {
   const SplineCoefficients<8> coefficients(field.tree, block.origin, field.filter);
-  if (!coefficients.haveBothSigns()) return false;
+  if (!coefficients.mayCross()) return false;
   block.crossing.fill(0);
   block.extent = {8, 8, 8, 0, 0, 0};
   for (int x = 0; x < 8; ++x)

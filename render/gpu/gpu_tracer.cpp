@@ -197,14 +197,14 @@ std::string shaderText(const Variant& variant, int shift) {
              "const int kBrickEdge = {}, kBrickValues = {}, kPageShift = {},\n"
              "          kFirstOfEntry = {}, kStridesOfEntry = {}, kStrideShift = {},\n"
              "          kHitParts = {}, kShapeParts = {}, kEnters = {}, kLeaves = {};\n"
-             "const bool isSpline = {};\n"
+             "const bool isSpline = {}, isTricubic = {};\n"
              "const int tetraDegree = {}, kCubeEdge = {}, kCubeValues = {};\n",
              kGroup, BrickPool::kEdge, BrickPool::kValues,
              std::countr_zero(static_cast<unsigned>(BrickPool::kPage)), BrickPool::kFirstOfEntry,
              BrickPool::kStridesOfEntry, BrickPool::kStrideShift, kHitParts, ShapeBlock::kParts,
-             HitBlock::kEnters, HitBlock::kLeaves,
-             variant.filter == Filter::BSpline || variant.filter == Filter::BSplineQi,
-             tetrahedralDegree(variant.filter), BrickPool::kCubeEdge, BrickPool::kCubeValues) +
+             HitBlock::kEnters, HitBlock::kLeaves, isTricubicInCells(variant.filter),
+             variant.filter == Filter::Tricubic, tetrahedralDegree(variant.filter),
+             BrickPool::kCubeEdge, BrickPool::kCubeValues) +
          kDialect + valueText(variant, shift) + kLoadThree + kRootsKernel +
          (variant.isNano ? kNanoText + NanoGrid::layout() + kNanoVdbKernel : kBricksKernel) +
          kWindowKernel + kSplineKernel + kTetraKernel + kTraceKernel + kShapeKernel +

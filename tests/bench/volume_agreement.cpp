@@ -65,8 +65,7 @@ int main(int argc, char** argv) try {
   fmt::print("{:<36}{:<18}{:>9}{:>9}{:>10}{:>10}{:>10}\n", "surface", "filter", "both", "one only",
              "median", "99.9 %", "largest");
   for (const auto& [name, surface] : support::volumeSurfaces())
-    for (const Filter filter : {Filter::Trilinear, Filter::BSpline, Filter::BSplineQi,
-                                Filter::SuperQuadratic, Filter::CubicC1}) {
+    for (const Filter filter : kFilters) {
       Scene scene;
       scene.solids.push_back(
           {.band = {}, .volume = std::make_shared<const VolumeSurface>(surface)});

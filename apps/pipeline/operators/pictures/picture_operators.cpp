@@ -198,8 +198,7 @@ render::Image drawByKernel(Invocation& in, const render::Scene& scene,
 }
 
 render::Filter filterOf(const Invocation& in) {
-  for (const render::Filter filter : {render::Filter::BSpline, render::Filter::BSplineQi,
-                                      render::Filter::SuperQuadratic, render::Filter::CubicC1})
+  for (const render::Filter filter : render::kFilters)
     if (in.text("filter") == render::filterName(filter)) return filter;
   return render::Filter::Trilinear;
 }
@@ -448,13 +447,15 @@ Operator renderOperator() {
             .choices = {"gpu", "cpu", "embree", "both"}},
            {.name = "filter",
             .type = ParamType::Choice,
-            .doc =
-                "interpolation between grid points: trilinear; bspline, a tricubic B-spline, which "
-                "shrinks the solid; bspline-qi, the same spline with corrected coefficients; "
-                "super-quadratic and cubic-c1, splines on 24 tetrahedra around each grid point, "
-                "which smooth the values",
+            .doc = "interpolation between grid points: trilinear; tricubic, Catmull-Rom splines "
+                   "through "
+                   "the values; bspline, a tricubic B-spline, which shrinks the solid; bspline-qi, "
+                   "the same spline with corrected coefficients; "
+                   "super-quadratic and cubic-c1, splines on 24 tetrahedra around each grid point, "
+                   "which smooth the values",
             .fallback = "trilinear",
-            .choices = {"trilinear", "bspline", "bspline-qi", "super-quadratic", "cubic-c1"}},
+            .choices = {"trilinear", "tricubic", "bspline", "bspline-qi", "super-quadratic",
+                        "cubic-c1"}},
            {.name = "isovalue",
             .type = ParamType::Number,
             .doc = "for a volume: draw the surface on which the interpolated values equal this "

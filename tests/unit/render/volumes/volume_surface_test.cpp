@@ -19,6 +19,8 @@
 #include "levelset/splines/cubic_c1_spline.h"
 #include "levelset/splines/grid_extension.h"
 #include "levelset/splines/quadratic_super_spline.h"
+#include "levelset/volumes/filters/filtered_volume.h"
+#include "levelset/volumes/filters/volume_filter.h"
 #include "levelset/volumes/synthetic.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/cpu/cpu_trace.h"
@@ -35,14 +37,11 @@ using Imath::M44d;
 using Imath::V3d;
 using Imath::V3i;
 using levelset::Volume;
-using support::filled;
 using support::measured;
 using support::noisyBytes;
 using support::obliqueMap;
+using support::sampled;
 using namespace render;
-
-constexpr Filter kFilters[] = {Filter::Trilinear, Filter::BSpline, Filter::BSplineQi,
-                               Filter::SuperQuadratic, Filter::CubicC1};
 
 RenderOptions optionsOf(Filter filter) {
   return {.samples = 1, .ambientSamples = 0, .shadowSamples = 0, .filter = filter};
@@ -92,8 +91,8 @@ TEST(VolumeSurface, KernelAndJudgeAgree) {
   const auto all = support::volumeSurfaces();
   for (std::size_t n = 0; n < all.size(); ++n)
     for (const Filter filter : kFilters) {
-      const bool isBSpline = filter == Filter::BSpline || filter == Filter::BSplineQi;
-      if (isBSpline && n > 2) continue;  // the judge is slow, and the traversal is the same
+      if (isTricubicInCells(filter) && n > 2)
+        continue;  // the judge is slow, and the traversal is the same
       const Scene scene = sceneOf(all[n].second, 64, 48);
       expectJudged(renderCpu(scene, optionsOf(filter)), scene, filter, all[n].first);
     }
@@ -154,6 +153,34 @@ void expectMarks(const Spline& spline, Filter filter) {
 TEST(VolumeSurface, MarksTheCubesWhoseCoefficientsDifferInSign) {
   expectMarks(levelset::QuadraticSuperSpline(), Filter::SuperQuadratic);
   expectMarks(levelset::CubicC1Spline(), Filter::CubicC1);
+}
+
+TEST(VolumeSurface, MarksTheCellsThatTheSurfaceOfTheFilterCrosses) {
+  const Volume volume = noisyBytes(20);
+  const VolumeSurface surface(volume, 100.5);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> place(0, 1);
+  for (const Filter filter : kFilters) {
+    const auto named = levelset::volumeFilterNamed(filterName(filter));
+    ASSERT_TRUE(named) << filterName(filter);
+    const levelset::FilteredVolume interpolant(volume, *named);
+    const BrickPool pool = makeBricks(surface, {.filter = filter});
+    std::size_t crossed = 0;
+    for (int x = 1; x < 18; ++x)
+      for (int y = 1; y < 18; ++y)
+        for (int z = 1; z < 18; ++z) {
+          bool above = false, below = false;
+          for (int n = 0; n < 40; ++n) {
+            const V3d in(place(random), place(random), place(random));
+            const double v = interpolant.value(V3d(x, y, z) + in - V3d(pool.shift()));
+            (v > 100.5 ? above : below) = true;
+          }
+          if (!above || !below) continue;
+          ++crossed;
+          ASSERT_TRUE(isMarked(pool, V3i(x, y, z))) << filterName(filter);
+        }
+    EXPECT_GT(crossed, 500u) << filterName(filter);
+  }
 }
 
 TEST(VolumeSurface, HasTheSameBitsWithAllInstructionSets) {
@@ -228,9 +255,9 @@ TEST(VolumeSurface, ConvergesToABall) {
     double order, angleOrder;
   };
   for (const auto& [filter, order, angleOrder] :
-       {Expected{Filter::Trilinear, 2.01, 3.47}, Expected{Filter::BSpline, 2.01, 3.1},
-        Expected{Filter::BSplineQi, 3.85, 3.46}, Expected{Filter::SuperQuadratic, 2.03, 1.97},
-        Expected{Filter::CubicC1, 2.02, 1.88}}) {
+       {Expected{Filter::Trilinear, 2.01, 3.47}, Expected{Filter::Tricubic, 2.69, 2.05},
+        Expected{Filter::BSpline, 2.01, 3.1}, Expected{Filter::BSplineQi, 3.85, 3.46},
+        Expected{Filter::SuperQuadratic, 2.03, 1.97}, Expected{Filter::CubicC1, 2.02, 1.88}}) {
     const auto [coarse, coarseAngle] =
         ballErrors(sceneOf({levelset::sphereVolume(21, 0.6), 0}), filter);
     const auto [fine, fineAngle] =
