@@ -231,6 +231,12 @@ BrickPool makePool(const GridSource& grid, float background, const TableOptions&
 
 }  // namespace
 
+double BrickPool::valueAt(std::size_t i) const {
+  if (quantization.bits == 32) return static_cast<double>(value[i]);
+  const int held = quantization.bits == 16 ? code[2 * i] | code[2 * i + 1] << 8 : code[i];
+  return static_cast<double>(quantization.valueOf(held));
+}
+
 std::size_t BrickPool::bytes() const {
   return 4 * (page.size() + entry.size() + mask.size()) + valueBytes();
 }

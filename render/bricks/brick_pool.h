@@ -91,6 +91,8 @@ struct BrickPool {
     return code.empty() ? value.size() * sizeof value[0] : code.size() - kCodePadding;
   }
   [[nodiscard]] std::size_t bytes() const;
+  /// Item i of `value`, or of `code` as the number that it stands for.
+  [[nodiscard]] double valueAt(std::size_t i) const;
 };
 
 /// Options of makeBricks().

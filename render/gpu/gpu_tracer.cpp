@@ -42,6 +42,7 @@ constexpr const char* kDialect = R"GLSL(
 #define INOUT_ARRAY(Type, name, size) inout Type name[size]
 #define CONST_INT const int
 #define CONST_FLOAT const float
+#define NUMBER(x) (x)
 #define AND(a, b) ((a) && (b))
 #define OR(a, b) ((a) || (b))
 #define NOT(a) (!(a))
@@ -107,9 +108,9 @@ int passingNumber(int n) { return int(rays[2 * rayCount + n]); }
 void addShape(int n, Ray ray, Hit hit) {
   // llvmpipe executes all branches, but skips loops that no ray enters.
   for (int i = hit.found ? 0 : 1; i < 1; ++i) {
-    Shape s = shapeOf(ray, hit);
+    Shape s = shapeOf(hit);
     float parts[kShapeParts] = float[kShapeParts](s.gx, s.gy, s.gz, s.tx, s.ty, s.tz, s.hxx, s.hyy,
-                                                  s.hzz, s.hxy, s.hxz, s.hyz, s.error);
+                                                  s.hzz, s.hxy, s.hxz, s.hyz, s.error, s.inX, s.inY, s.inZ);
     for (int p = 0; p < kShapeParts; ++p)
       hits[(kHitParts + p) * rayCount + n] = floatBitsToInt(parts[p]);
   }

@@ -186,6 +186,7 @@ struct Shape {
   Real gx, gy, gz;                    // gradient of the B-spline, φ per voxel
   Real tx, ty, tz;                    // gradient of the trilinear interpolant, φ per voxel
   Real hxx, hyy, hzz, hxy, hxz, hyz;  // Hessian of the B-spline, φ per voxel²
+  Real inX, inY, inZ;                 // position in the cell, from 0 to 1
   Real error;                         // bound on |trilinear interpolant − smooth function|, from second differences
 };
 

@@ -26,8 +26,8 @@ Blend catmullRomBlendOf(Real u, Real v, Real w) {
   VAR q2 = v * w;
   VAR p1 = q0 * u + q1 * ru;
   VAR p2 = q1 * u + q2 * ru;
-  VAR n1 = p1 * (1.0f / 6.0f);
-  VAR n2 = p2 * (1.0f / 6.0f);
+  VAR n1 = p1 * NUMBER(1.0 / 6.0);
+  VAR n2 = p2 * NUMBER(1.0 / 6.0);
   VAR w1 = (q0 * ru + p1) + n2;
   VAR w2 = (q2 * u + p2) + n1;
   Blend b;
@@ -193,14 +193,14 @@ Crossing splineCrossingIn(Bool asked, Int cellX, Int cellY, Int cellZ, Real x0, 
       }
     }
   }
-  b[1] = b[1] * (1.0f / 9.0f);
-  b[2] = b[2] * (1.0f / 36.0f);
-  b[3] = b[3] * (1.0f / 84.0f);
-  b[4] = b[4] * (1.0f / 126.0f);
-  b[5] = b[5] * (1.0f / 126.0f);
-  b[6] = b[6] * (1.0f / 84.0f);
-  b[7] = b[7] * (1.0f / 36.0f);
-  b[8] = b[8] * (1.0f / 9.0f);
+  b[1] = b[1] * NUMBER(1.0 / 9.0);
+  b[2] = b[2] * NUMBER(1.0 / 36.0);
+  b[3] = b[3] * NUMBER(1.0 / 84.0);
+  b[4] = b[4] * NUMBER(1.0 / 126.0);
+  b[5] = b[5] * NUMBER(1.0 / 126.0);
+  b[6] = b[6] * NUMBER(1.0 / 84.0);
+  b[7] = b[7] * NUMBER(1.0 / 36.0);
+  b[8] = b[8] * NUMBER(1.0 / 9.0);
   b[0] = select(carried, onSide(b[0], inside), b[0]);
 
   Crossing crossing;

@@ -1,5 +1,6 @@
 #include "render/views/slice.h"
 
+#include <Imath/ImathColor.h>
 #include <fmt/core.h>
 #include <tbb/parallel_for.h>
 
