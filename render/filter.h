@@ -21,12 +21,15 @@ enum class Filter {
   /// Quadratic super spline on the type-6 partition, smooth but for the middles of cubes [Kalbe11].
   SuperQuadratic,
   /// Cubic C¹ spline on the type-6 partition [Kalbe11].
-  CubicC1
+  CubicC1,
+  /// Quadratic C¹ spline Q₂ on truncated octahedra of a body-centred cubic lattice [Kalbe11].
+  BccQuadratic
 };
 
 /// All filters, in the order of the enumeration.
-inline constexpr std::array kFilters = {Filter::Trilinear, Filter::Tricubic,       Filter::BSpline,
-                                        Filter::BSplineQi, Filter::SuperQuadratic, Filter::CubicC1};
+inline constexpr std::array kFilters = {
+    Filter::Trilinear,      Filter::Tricubic, Filter::BSpline,     Filter::BSplineQi,
+    Filter::SuperQuadratic, Filter::CubicC1,  Filter::BccQuadratic};
 
 /// Degree of a spline on the tetrahedra of the type-6 partition; 0 for other filters. The cubes of
 /// the partition are centred at the grid points.
@@ -51,6 +54,8 @@ inline constexpr std::array kFilters = {Filter::Trilinear, Filter::Tricubic,    
       return "super-quadratic";
     case Filter::CubicC1:
       return "cubic-c1";
+    case Filter::BccQuadratic:
+      return "bcc-quadratic";
     default:
       return "trilinear";
   }

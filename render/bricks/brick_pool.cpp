@@ -218,9 +218,10 @@ BrickPool makePool(const GridSource& grid, float background, const TableOptions&
   pool.blocksCulled = bricks.culled;
   pool.blocksOmitted = grid.storedBlocks();
   if (bricks.kept.empty()) return pool;
-  const std::vector<HaloBlock> beside = tetrahedralDegree(options.filter) > 0
-                                            ? std::vector<HaloBlock>()
-                                            : haloBlocks(grid, bricks.kept);
+  const bool isClosed =
+      tetrahedralDegree(options.filter) > 0 || options.filter == Filter::BccQuadratic;
+  const std::vector<HaloBlock> beside =
+      isClosed ? std::vector<HaloBlock>() : haloBlocks(grid, bricks.kept);
   fillPool(pool, bricks.kept, beside, background);
   for (const auto& brick : bricks.kept) pool.blocksOmitted -= grid.isStored(brick->origin);
   for (const HaloBlock& block : beside)

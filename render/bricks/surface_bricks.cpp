@@ -373,6 +373,8 @@ Bricks bricksOf(const GridSource& grid, const TableOptions& options) {
       brick->origin = blocks[i];
       if (tetrahedralDegree(options.filter) > 0) {
         fillCubes(*reader, options.filter, *brick);
+      } else if (options.filter == Filter::BccQuadratic) {
+        fillSites(*reader, *brick);
       } else if (const bool differ = fill(*reader, *brick); options.filter != Filter::Trilinear) {
         findSplineCrossings(*reader, options.filter, *brick);
       } else {

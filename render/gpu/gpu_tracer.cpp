@@ -190,6 +190,10 @@ void loadThree(Int first, inout Real a, inout Real b, inout Real c) {
   b = loadValue(first + 1);
   c = loadValue(first + 2);
 }
+void loadFour(Int first, inout Real a, inout Real b, inout Real c, inout Real d) {
+  loadThree(first, a, b, c);
+  d = loadValue(first + 3);
+}
 )GLSL";
 
 std::string shaderText(const Variant& variant, int shift) {
@@ -198,18 +202,20 @@ std::string shaderText(const Variant& variant, int shift) {
              "const int kBrickEdge = {}, kBrickValues = {}, kPageShift = {},\n"
              "          kFirstOfEntry = {}, kStridesOfEntry = {}, kStrideShift = {},\n"
              "          kHitParts = {}, kShapeParts = {}, kEnters = {}, kLeaves = {};\n"
-             "const bool isSpline = {}, isTricubic = {};\n"
-             "const int tetraDegree = {}, kCubeEdge = {}, kCubeValues = {};\n",
+             "const bool isSpline = {}, isTricubic = {}, isBcc = {};\n"
+             "const int tetraDegree = {}, kCubeEdge = {}, kCubeValues = {}, kSites = {};\n",
              kGroup, BrickPool::kEdge, BrickPool::kValues,
              std::countr_zero(static_cast<unsigned>(BrickPool::kPage)), BrickPool::kFirstOfEntry,
              BrickPool::kStridesOfEntry, BrickPool::kStrideShift, kHitParts, ShapeBlock::kParts,
              HitBlock::kEnters, HitBlock::kLeaves, isTricubicInCells(variant.filter),
-             variant.filter == Filter::Tricubic, tetrahedralDegree(variant.filter),
-             BrickPool::kCubeEdge, BrickPool::kCubeValues) +
+             variant.filter == Filter::Tricubic, variant.filter == Filter::BccQuadratic,
+             tetrahedralDegree(variant.filter), BrickPool::kCubeEdge, BrickPool::kCubeValues,
+             BrickPool::kSites) +
          kDialect + valueText(variant, shift) + kLoadThree + kRootsKernel +
          (variant.isNano ? kNanoText + NanoGrid::layout() + kNanoVdbKernel : kBricksKernel) +
-         kWindowKernel + kSplineKernel + kTetraKernel + kTraceKernel + kShapeKernel +
-         kTetraShapeKernel + (variant.isPixels ? kPixelRays : kListedRays) + kMain;
+         kWindowKernel + kSplineKernel + kTetraKernel + kBccKernel + kTraceKernel + kShapeKernel +
+         kBccShapeKernel + kTetraShapeKernel + (variant.isPixels ? kPixelRays : kListedRays) +
+         kMain;
 }
 
 }  // namespace

@@ -30,6 +30,7 @@ struct ExactKernel {
 
   static constexpr int kBrickEdge = BrickPool::kEdge, kBrickValues = BrickPool::kValues;
   static constexpr int kCubeEdge = BrickPool::kCubeEdge, kCubeValues = BrickPool::kCubeValues;
+  static constexpr int kSites = BrickPool::kSites;
   static constexpr int kPageShift = 6;
   static_assert(1 << kPageShift == BrickPool::kPage);
   static constexpr int kFirstOfEntry = BrickPool::kFirstOfEntry,
@@ -71,6 +72,10 @@ struct ExactKernel {
     b = loadValue(first + 1);
     c = loadValue(first + 2);
   }
+  void loadFour(Int first, Real& a, Real& b, Real& c, Real& d) const {
+    loadThree(first, a, b, c);
+    d = loadValue(first + 3);
+  }
   [[nodiscard]] Int loadPage(Int i) const { return pool.page[static_cast<std::size_t>(i)]; }
   [[nodiscard]] Int loadEntry(Int i) const { return pool.entry[static_cast<std::size_t>(i)]; }
   [[nodiscard]] Int loadMask(Int i) const {
@@ -86,6 +91,8 @@ struct ExactKernel {
 #include "render/shaders/spline.glsl"
 //
 #include "render/shaders/tetra.glsl"
+//
+#include "render/shaders/bcc.glsl"
 
   /// Value of the grid point (x, y, z) of table space.
   [[nodiscard]] Real pointAt(Int x, Int y, Int z) {
@@ -112,9 +119,9 @@ struct ExactKernel {
 class FieldNearCell {
  public:
   FieldNearCell(const BrickPool& pool, const V3i& cell) : kernel_(pool), cell_(cell) {
+    brick_ = kernel_.spotAt(true, cell.x, cell.y, cell.z).brick;
     if (kernel_.tetraDegree > 0) {
-      const ExactKernel::Spot spot = kernel_.spotAt(true, cell.x, cell.y, cell.z);
-      cube_ = kernel_.cubeData(true, spot.brick, cell.x, cell.y, cell.z);
+      cube_ = kernel_.cubeData(true, brick_, cell.x, cell.y, cell.z);
       return;
     }
     if (!isTricubicInCells(pool.filter)) return;
@@ -130,6 +137,8 @@ class FieldNearCell {
   [[nodiscard]] double valueAt(const V3d& place) {
     if (kernel_.tetraDegree > 0) return ofTetrahedra(place - V3d(cell_) - V3d(0.5));
     if (isTricubicInCells(kernel_.pool.filter)) return ofSpline(place - V3d(cell_));
+    if (kernel_.pool.filter == Filter::BccQuadratic)
+      return ofOctahedra(place - V3d(cell_) - V3d(0.5));
     V3i cell;
     for (int a = 0; a < 3; ++a)
       cell[a] = std::clamp(static_cast<int>(std::floor(place[a])), cell_[a] - 1, cell_[a] + 1);
@@ -153,6 +162,13 @@ class FieldNearCell {
                                              : kernel_.fixedAt(kernel_.cubicForm(c), w);
     return kernel_.weighted(w, kernel_.fixedAt(q, w));
   }
+  [[nodiscard]] double ofOctahedra(const V3d& p) {
+    const ExactKernel::BccTet t = kernel_.bccTetAt(cell_.x, cell_.y, cell_.z, p.x, p.y, p.z);
+    const ExactKernel::Weights w = kernel_.bccWeights(t.kind, kernel_.fromSite(t, p.x, p.y, p.z));
+    const ExactKernel::QuadraticForm q =
+        kernel_.bccForm(true, brick_, cell_.x, cell_.y, cell_.z, t);
+    return kernel_.weighted(w, kernel_.fixedAt(q, w));
+  }
   [[nodiscard]] double ofSpline(const V3d& p) {
     const ExactKernel::Blend x = kernel_.blendOf(p.x, p.x, p.x), y = kernel_.blendOf(p.y, p.y, p.y),
                              z = kernel_.blendOf(p.z, p.z, p.z);
@@ -170,6 +186,7 @@ class FieldNearCell {
 
   ExactKernel kernel_;
   V3i cell_;
+  int brick_;
   ExactKernel::Cube cube_{};
   std::array<double, 64> net_{};
 };

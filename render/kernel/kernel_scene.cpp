@@ -181,7 +181,9 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
   }
   // For BSplineQi the leaves are copied, to store the spline's coefficients.
   const double kCopies = options.filter == Filter::BSplineQi ? 4 * 512 : 0;
-  const double kBytesOfBlock = 2 * 4 * (BrickPool::kCubeValues + BrickPool::kMaskWords) + kCopies;
+  const double kBytesOfBlock =
+      2 * 4 * (std::max(BrickPool::kCubeValues, 4 * BrickPool::kSites) + BrickPool::kMaskWords) +
+      kCopies;
   levelset::requireMemory(leaves * kBytesOfBlock, options.maxBytes);
   // Culling knows how far light rays start from solids and meshes, but not from mapped textures.
   const FrustumCulling culling = isPicture && !box.isEmpty() && mapped_.isEmpty()

@@ -62,6 +62,8 @@ Shape shapeOf(IN(Hit) hit) {
   Shape shape;
   if (tetraDegree > 0)
     shape = tetraShapeAt(hit.found, hit.x, hit.y, hit.z, hit.inX, hit.inY, hit.inZ);
+  else if (isBcc)
+    shape = bccShapeAt(hit.found, hit.x, hit.y, hit.z, hit.inX, hit.inY, hit.inZ);
   else
     shape = shapeAt(hit.found, hit.x, hit.y, hit.z, hit.inX, hit.inY, hit.inZ);
   shape.inX = hit.inX;

@@ -231,6 +231,8 @@ Hit trace(Ray ray, Int passing) {
       Crossing crossing;
       if (tetraDegree > 0)
         crossing = tetraCrossingIn(asked, brick, x, y, z, x0, y0, z0, x1, y1, z1, carried, inside, passing);
+      else if (isBcc)
+        crossing = bccCrossingIn(asked, brick, x, y, z, x0, y0, z0, x1, y1, z1, carried, inside, passing);
       else if (isSpline)
         crossing = splineCrossingIn(asked, x, y, z, x0, y0, z0, x1, y1, z1, carried, inside, passing);
       else

@@ -190,7 +190,7 @@ TEST(VolumeSurface, HasTheSameBitsWithAllInstructionSets) {
     pixels.x[n] = static_cast<float>(n % 96) - 47.5f;
     pixels.y[n] = static_cast<float>(n / 96) - 35.5f;
   }
-  for (const Filter filter : {Filter::SuperQuadratic, Filter::CubicC1}) {
+  for (const Filter filter : kFilters) {
     const KernelScene kernel(scene, levelset::kNoMemoryLimit, filter);
     const KernelSolid& solid = kernel.solids().at(0);
     HitBlock first(pixels.size());
@@ -258,7 +258,8 @@ TEST(VolumeSurface, ConvergesToABall) {
   for (const auto& [filter, order, angleOrder] :
        {Expected{Filter::Trilinear, 2.01, 3.47}, Expected{Filter::Tricubic, 2.69, 2.05},
         Expected{Filter::BSpline, 2.01, 3.1}, Expected{Filter::BSplineQi, 3.85, 3.46},
-        Expected{Filter::SuperQuadratic, 2.03, 1.97}, Expected{Filter::CubicC1, 2.02, 1.88}}) {
+        Expected{Filter::SuperQuadratic, 2.03, 1.97}, Expected{Filter::CubicC1, 2.02, 1.88},
+        Expected{Filter::BccQuadratic, 2.03, 1.87}}) {
     const auto [coarse, coarseAngle] =
         ballErrors(sceneOf({levelset::sphereVolume(21, 0.6), 0}), filter);
     const auto [fine, fineAngle] =
