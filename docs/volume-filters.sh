@@ -11,7 +11,7 @@ draw() {  # draw NAME SIZE FILTER
     --from 0.9,-2.2,2.1 --to 0,0,-0.1 --up 0,0,1 --fov 50 --size 480x400 --samples 16
 }
 draw fine 321 bspline-qi
-for filter in trilinear bspline bspline-qi super-quadratic cubic-c1; do draw "$filter" 41 "$filter"; done
-"${PYTHON:-python3}" "$here/cases/figures.py" sheet "$out" "$here/volume-filters" 3 \
-  "fine=321³ samples, bspline-qi" "trilinear=trilinear" "bspline=bspline" \
-  "bspline-qi=bspline-qi" "super-quadratic=super-quadratic" "cubic-c1=cubic-c1"
+for filter in trilinear tricubic bspline bspline-qi super-quadratic cubic-c1 bcc-quadratic; do draw "$filter" 41 "$filter"; done
+"${PYTHON:-python3}" "$here/cases/figures.py" sheet "$out" "$here/volume-filters" 4 \
+  "fine=321³ samples, bspline-qi" "trilinear=trilinear" "tricubic=tricubic" "bspline=bspline" \
+  "bspline-qi=bspline-qi" "super-quadratic=super-quadratic" "cubic-c1=cubic-c1" "bcc-quadratic=bcc-quadratic"

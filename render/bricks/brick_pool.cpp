@@ -218,9 +218,10 @@ BrickPool makePool(const GridSource& grid, float background, const TableOptions&
   pool.blocksCulled = bricks.culled;
   pool.blocksOmitted = grid.storedBlocks();
   if (bricks.kept.empty()) return pool;
-  const std::vector<HaloBlock> beside = tetrahedralDegree(options.filter) > 0
-                                            ? std::vector<HaloBlock>()
-                                            : haloBlocks(grid, bricks.kept);
+  const bool isClosed =
+      tetrahedralDegree(options.filter) > 0 || options.filter == Filter::BccQuadratic;
+  const std::vector<HaloBlock> beside =
+      isClosed ? std::vector<HaloBlock>() : haloBlocks(grid, bricks.kept);
   fillPool(pool, bricks.kept, beside, background);
   for (const auto& brick : bricks.kept) pool.blocksOmitted -= grid.isStored(brick->origin);
   for (const HaloBlock& block : beside)
@@ -230,6 +231,12 @@ BrickPool makePool(const GridSource& grid, float background, const TableOptions&
 }
 
 }  // namespace
+
+double BrickPool::valueAt(std::size_t i) const {
+  if (quantization.bits == 32) return static_cast<double>(value[i]);
+  const int held = quantization.bits == 16 ? code[2 * i] | code[2 * i + 1] << 8 : code[i];
+  return static_cast<double>(quantization.valueOf(held));
+}
 
 std::size_t BrickPool::bytes() const {
   return 4 * (page.size() + entry.size() + mask.size()) + valueBytes();

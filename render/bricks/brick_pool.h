@@ -22,8 +22,8 @@ namespace render {
 ///
 /// Positions are in table space: the band's index space minus `origin`. Blocks, pages of 8³ blocks
 /// and empty cubes start at multiples of their edge there. For filters on tetrahedra, positions are
-/// larger by half a voxel, so that the grid point n lies in the middle of cell n. Their tables have
-/// no halo blocks.
+/// larger by half a voxel, so that the grid point n lies in the middle of cell n. Their tables and
+/// those of Filter::BccQuadratic have no halo blocks.
 struct BrickPool {
   static constexpr int kBlock = 8;  ///< cells of a block along an axis
   static constexpr int kEdge =
@@ -33,6 +33,10 @@ struct BrickPool {
   /// point before the block on.
   static constexpr int kCubeEdge = kBlock + 2;
   static constexpr int kCubeValues = kCubeEdge * kCubeEdge * kCubeEdge;
+  /// For Filter::BccQuadratic a brick has four numbers for each site of the lattice in the 12³
+  /// cells from two cells before the block on: mean and half differences along x, y, z of the eight
+  /// values around the site. Sites with even numbers come first, then those with odd ones.
+  static constexpr int kSites = 2 * 6 * 6 * 6;
   static constexpr int kMaskWords =
       16;  ///< 32-bit words of a brick's mask, which has a bit for each cell
   static constexpr int kPage = 64;  ///< cells along an axis of a page, which has 8³ blocks
@@ -82,7 +86,9 @@ struct BrickPool {
   std::size_t blocksCulled = 0;  ///< blocks that the surface crosses but the picture does not need
   /// Number of values of a brick.
   [[nodiscard]] std::size_t brickValues() const {
-    return tetrahedralDegree(filter) > 0 ? kCubeValues : kValues;
+    return tetrahedralDegree(filter) > 0    ? kCubeValues
+           : filter == Filter::BccQuadratic ? 4 * kSites
+                                            : kValues;
   }
   /// Distance from positions in index space to those in table space before `origin` is subtracted.
   [[nodiscard]] double shift() const { return tetrahedralDegree(filter) > 0 ? 0.5 : 0; }
@@ -91,6 +97,8 @@ struct BrickPool {
     return code.empty() ? value.size() * sizeof value[0] : code.size() - kCodePadding;
   }
   [[nodiscard]] std::size_t bytes() const;
+  /// Item i of `value`, or of `code` as the number that it stands for.
+  [[nodiscard]] double valueAt(std::size_t i) const;
 };
 
 /// Options of makeBricks().

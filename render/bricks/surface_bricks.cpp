@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -68,8 +69,8 @@ void findCrossings(Brick& brick) {
     }
 }
 
-/// Spline coefficients at the 11³ grid points that the cells of a block read, starting one point
-/// before the block's origin.
+/// Spline coefficients, or values for Filter::Tricubic, at the 11³ grid points that the cells of a
+/// block read, starting one point before the block's origin.
 struct SplineBlock {
   static constexpr int kAround = kBlock + 3;
   float c[kAround][kAround][kAround];
@@ -138,8 +139,67 @@ struct SplineBlock {
     return open;
   }
 
+  /// Row of cells (x, y) as bits: bit z is set when Bézier coefficients of the Catmull-Rom spline
+  /// in cell (x, y, z) differ in sign.
+  [[nodiscard]] unsigned openTricubicCells(int x, int y) const {
+    Row least, most;
+    least.fill(std::numeric_limits<float>::max());
+    most.fill(std::numeric_limits<float>::lowest());
+    const auto widen = [&](std::size_t z, float v) {
+      least[z] = std::min(least[z], v);
+      most[z] = std::max(most[z], v);
+    };
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 4; ++j)
+        for (std::size_t z = 0; z < kAround; ++z) widen(z, c[x + i][y + j][z]);
+    // The magnitudes of the weights of a coefficient sum to at most (4/3)³ = 64/27.
+    constexpr float kRounding = 1e-5f;
+    unsigned open = 0;
+    Row room;
+    for (std::size_t z = 0; z < kBlock; ++z) {
+      const float low = std::min({least[z], least[z + 1], least[z + 2], least[z + 3]}),
+                  high = std::max({most[z], most[z + 1], most[z + 2], most[z + 3]});
+      const float widening = (high - low) * (37.0f / 54);
+      room[z] = kRounding * std::max(std::abs(low), std::abs(high));
+      if (low - widening < room[z] && high + widening >= -room[z]) open |= 1u << z;
+    }
+    if (open == 0) return 0;
+    std::array<std::array<Row, 4>, 4> net;
+    for (std::size_t i = 0; i < 4; ++i)
+      for (std::size_t j = 0; j < 4; ++j)
+        std::copy_n(c[x + static_cast<int>(i)][y + static_cast<int>(j)], kAround,
+                    net[i][j].begin());
+    for (std::size_t n = 0; n < 4; ++n) toBezier(net[0][n], net[1][n], net[2][n], net[3][n]);
+    for (std::size_t n = 0; n < 4; ++n) toBezier(net[n][0], net[n][1], net[n][2], net[n][3]);
+    least.fill(std::numeric_limits<float>::max());
+    most.fill(std::numeric_limits<float>::lowest());
+    for (const auto& rows : net)
+      for (const Row& f : rows)
+        for (std::size_t z = 0; z < kBlock; ++z) {
+          widen(z, f[z + 1]);
+          widen(z, f[z + 1] + (f[z + 2] - f[z]) * (1.0f / 6));
+          widen(z, f[z + 2] - (f[z + 3] - f[z + 1]) * (1.0f / 6));
+          widen(z, f[z + 2]);
+        }
+    for (std::size_t z = 0; z < kBlock; ++z)
+      if (!(least[z] < room[z] && most[z] >= -room[z])) open &= ~(1u << z);
+    return open;
+  }
+
  private:
   using Row = std::array<float, kAround>;
+  /// Replaces four successive rows of values by the Bézier coefficients between the second and the
+  /// third.
+  static void toBezier(Row& f0, Row& f1, Row& f2, Row& f3) {
+    for (std::size_t z = 0; z < kAround; ++z) {
+      const float a = f1[z], b = f2[z];
+      const float first = a + (b - f0[z]) * (1.0f / 6), second = b - (f3[z] - a) * (1.0f / 6);
+      f0[z] = a;
+      f1[z] = first;
+      f2[z] = second;
+      f3[z] = b;
+    }
+  }
   /// Replaces each entry by the largest of `count` consecutive entries (3 or 4) from it on.
   static void takeLargest(Row& row, std::size_t count) {
     for (std::size_t z = 0; z + 1 < kAround; ++z) row[z] = std::max(row[z], row[z + 1]);
@@ -148,10 +208,18 @@ struct SplineBlock {
 };
 
 /// Sets the mask bits of the cells in which the spline may cross zero.
-void findSplineCrossings(GridReader& grid, Brick& brick) {
+void findSplineCrossings(GridReader& grid, Filter filter, Brick& brick) {
   const SplineBlock block(grid, brick.origin);
-  const SplineBlock::SignRows signs = block.signRows();
   brick.mask = {};
+  if (filter == Filter::Tricubic) {
+    for (int x = 0; x < kBlock; ++x)
+      for (int y = 0; y < kBlock; ++y) {
+        const unsigned bit = static_cast<unsigned>(x << 6 | y << 3);
+        brick.mask[bit >> 5] |= block.openTricubicCells(x, y) << (bit & 31);
+      }
+    return;
+  }
+  const SplineBlock::SignRows signs = block.signRows();
   for (int x = 0; x < kBlock; ++x)
     for (int y = 0; y < kBlock; ++y) {
       const unsigned mixed =
@@ -305,8 +373,10 @@ Bricks bricksOf(const GridSource& grid, const TableOptions& options) {
       brick->origin = blocks[i];
       if (tetrahedralDegree(options.filter) > 0) {
         fillCubes(*reader, options.filter, *brick);
+      } else if (options.filter == Filter::BccQuadratic) {
+        fillSites(*reader, *brick);
       } else if (const bool differ = fill(*reader, *brick); options.filter != Filter::Trilinear) {
-        findSplineCrossings(*reader, *brick);
+        findSplineCrossings(*reader, options.filter, *brick);
       } else {
         if (!differ) continue;
         findCrossings(*brick);

@@ -38,7 +38,7 @@ class GridReader {
  public:
   virtual ~GridReader() = default;
   /// Copies a block of 8³ grid points and those around it, ordered by x, y, z.
-  /// @param before, after  number of grid points before and after the block on each axis, at most 2
+  /// @param before, after  number of grid points before and after the block on each axis, at most 3
   virtual void copyPadded(const openvdb::Coord& origin, int before, int after, float* out) = 0;
   /// Reads the values of the points in `block.points`.
   virtual void read(HaloBlock& block) = 0;
@@ -71,6 +71,10 @@ class GridSource {
 /// Copies the data around the cells of a block, and sets the mask bits of the cells in which a
 /// spline on tetrahedra may cross zero: those whose Bernstein coefficients differ in sign.
 void fillCubes(GridReader& grid, Filter filter, Brick& brick);
+
+/// Computes the numbers of the sites around a block for Filter::BccQuadratic. Sets the mask bits of
+/// the cells in which bounds on the Bernstein coefficients allow a zero.
+void fillSites(GridReader& grid, Brick& brick);
 
 /// Blocks that the surface of a grid crosses.
 struct Bricks {

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "levelset/error.h"
+#include "render/embree/bcc_cell_vdb.h"
 #include "render/embree/embree_renderer.h"
 #include "render/embree/field_march.h"
 #include "render/embree/judge_blocks_vdb.h"
@@ -40,6 +41,7 @@ struct RaySolid {
 
   [[nodiscard]] DrawnField field() const { return {*tree, filter, cells}; }
   [[nodiscard]] SurfaceShape shapeAt(const V3d& world) const {
+    if (filter == Filter::BccQuadratic) return bccShape(*tree, world * worldToIndex);
     if (tetrahedralDegree(filter) > 0) return tetraShape(*tree, world * worldToIndex, filter);
     return surfaceShape(*tree, world * worldToIndex, filter);
   }

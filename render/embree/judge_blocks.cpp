@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "render/embree/bcc_cell_vdb.h"
 #include "render/embree/cubic_root.h"
 #include "render/embree/judge_blocks_vdb.h"
 #include "render/embree/spline_cell_vdb.h"
@@ -55,7 +56,7 @@ void markCells(SurfaceBlock& block, unsigned x, unsigned y, unsigned cells) {
 /// Returns false when there are no such cells.
 bool markSplineCells(SurfaceBlock& block, const DrawnField& field) {
   const SplineCoefficients<8> coefficients(field.tree, block.origin, field.filter);
-  if (!coefficients.haveBothSigns()) return false;
+  if (!coefficients.mayCross()) return false;
   block.crossing.fill(0);
   block.extent = {8, 8, 8, 0, 0, 0};
   for (int x = 0; x < 8; ++x)
@@ -87,15 +88,17 @@ bool markCrossingCells(SurfaceBlock& block) {
 
 /// The same for a spline on tetrahedra.
 bool markTetraCells(SurfaceBlock& block, const DrawnField& field) {
+  const auto mayCross = [&](const Coord& cell) {
+    return field.filter == Filter::BccQuadratic
+               ? BccCell(field.tree, cell).mayCross()
+               : TetraCell(field.tree, cell, field.filter).mayCross();
+  };
   block.crossing.fill(0);
   block.extent = {8, 8, 8, 0, 0, 0};
   for (int x = 0; x < 8; ++x)
     for (int y = 0; y < 8; ++y) {
       unsigned cells = 0;
-      for (int z = 0; z < 8; ++z)
-        cells |=
-            unsigned{TetraCell(field.tree, block.origin.offsetBy(x, y, z), field.filter).mayCross()}
-            << z;
+      for (int z = 0; z < 8; ++z) cells |= unsigned{mayCross(block.origin.offsetBy(x, y, z))} << z;
       markCells(block, static_cast<unsigned>(x), static_cast<unsigned>(y), cells);
     }
   return block.extent[3] != 0;
@@ -238,6 +241,9 @@ std::optional<double> BlockTraversal::splineRoot(const DrawnField& field, double
   double p[2][3];
   placesInCell(exit, outAxis, p);
   const Coord at(cell[0], cell[1], cell[2]);
+  if (field.filter == Filter::BccQuadratic)
+    return BccCell(field.tree, at)
+        .firstSignChange(V3d(p[0][0], p[0][1], p[0][2]), V3d(p[1][0], p[1][1], p[1][2]));
   if (tetrahedralDegree(field.filter) > 0)
     return TetraCell(field.tree, at, field.filter)
         .firstSignChange(V3d(p[0][0], p[0][1], p[0][2]), V3d(p[1][0], p[1][1], p[1][2]));
@@ -252,6 +258,11 @@ bool BlockTraversal::addSplineRoots(const DrawnField& field, double exit, int ou
   const V3d start(p[0][0], p[0][1], p[0][2]);
   const V3d end(p[1][0], p[1][1], p[1][2]);
   const Coord at(cell[0], cell[1], cell[2]);
+  if (field.filter == Filter::BccQuadratic) {
+    const BccCell spline(field.tree, at);
+    spline.addSignChanges(start, end, shares);
+    return spline.value(start) < 0;
+  }
   if (tetrahedralDegree(field.filter) > 0) {
     const TetraCell spline(field.tree, at, field.filter);
     spline.addSignChanges(start, end, shares);
@@ -333,7 +344,9 @@ std::vector<SurfaceBlock> surfaceBlocks(const DrawnField& field) {
         block.leaves[n] = leaf ? leaf->buffer().data() : nullptr;
         block.tiles[n] = leaf ? 0 : accessor.getValue(at);
       }
-      const bool crosses = tetrahedralDegree(field.filter) > 0 ? markTetraCells(block, field)
+      const bool isOnTetrahedra =
+          tetrahedralDegree(field.filter) > 0 || field.filter == Filter::BccQuadratic;
+      const bool crosses = isOnTetrahedra                      ? markTetraCells(block, field)
                            : field.filter == Filter::Trilinear ? markCrossingCells(block)
                                                                : markSplineCells(block, field);
       if (crosses && keepCells(block, field.cells)) found[i] = block;

@@ -11,9 +11,16 @@ using openvdb::Coord;
 
 constexpr int kDepth = 40;  // largest number of halvings of a segment
 
-/// Values w of the four cubic B-spline basis functions at a in [0, 1], or of their derivatives.
-void basis(double a, bool isSlope, double (&w)[4]) {
+/// Values w of the four cubic basis functions at a in [0, 1], or of their derivatives.
+/// @param isBernstein  true: Bernstein polynomials; false: uniform B-splines
+void basis(double a, bool isBernstein, bool isSlope, double (&w)[4]) {
   const double b = 1 - a;
+  if (isBernstein) {
+    const double values[4] = {b * b * b, 3 * a * b * b, 3 * a * a * b, a * a * a};
+    const double slopes[4] = {-3 * b * b, 3 * b * (b - 2 * a), 3 * a * (2 * b - a), 3 * a * a};
+    std::copy_n(isSlope ? slopes : values, 4, w);
+    return;
+  }
   if (isSlope) {
     w[0] = -b * b / 2;
     w[1] = a * (3 * a - 4) / 2;
@@ -40,16 +47,19 @@ double weighed(const double (&c)[4][4][4], const double (&x)[4], const double (&
 /// changes of both per unit of s (slope_ and bend_).
 class LineSearch {
  public:
-  LineSearch(const double (&c)[4][4][4], const V3d& p, const V3d& direction)
-      : c_(c), p_(p), direction_(direction) {
+  LineSearch(const double (&c)[4][4][4], bool isBernstein, const V3d& p, const V3d& direction)
+      : c_(c), isBernstein_(isBernstein), p_(p), direction_(direction) {
     // A derivative of a spline is a convex combination of differences of its coefficients, so the
-    // largest difference bounds the derivative.
+    // largest difference bounds the derivative. For Bernstein polynomials it is 3 times that along
+    // one axis, 6 times for the second derivative along an axis, and 9 times for a mixed one.
     for (int a = 0; a < 3; ++a) {
-      const double first = mostDifference(a, -1);
+      const double first = (isBernstein ? 3 : 1) * mostDifference(a, -1);
       slope_ += std::abs(direction[a]) * first;
-      for (int b = 0; b < 3; ++b)
-        bend_ +=
-            std::abs(direction[a] * direction[b]) * mostDifference(std::min(a, b), std::max(a, b));
+      for (int b = 0; b < 3; ++b) {
+        const double factor = !isBernstein ? 1 : a == b ? 6 : 9;
+        bend_ += std::abs(direction[a] * direction[b]) * factor *
+                 mostDifference(std::min(a, b), std::max(a, b));
+      }
     }
   }
 
@@ -99,7 +109,7 @@ class LineSearch {
   }
   void place(double s, double (&w)[3][4], int along) const {
     for (int a = 0; a < 3; ++a)
-      basis(std::clamp(p_[a] + s * direction_[a], 0.0, 1.0), a == along, w[a]);
+      basis(std::clamp(p_[a] + s * direction_[a], 0.0, 1.0), isBernstein_, a == along, w[a]);
   }
   [[nodiscard]] double bisected(double low, bool lowInside, double high) const {
     for (int n = 0; n < 60; ++n) {
@@ -134,6 +144,7 @@ class LineSearch {
   }
 
   const double (&c_)[4][4][4];
+  bool isBernstein_;
   V3d p_, direction_;
   double slope_ = 0, bend_ = 0;
   int evaluations_ = 0;
@@ -141,6 +152,24 @@ class LineSearch {
 };
 
 }  // namespace
+
+void SplineCell::toBernstein() {
+  // Hermite form of the Catmull-Rom spline: the slope at a grid point is half the difference of its
+  // neighbours, and the inner coefficients lie a third of the slope beside the outer ones.
+  for (int axis = 0; axis < 3; ++axis)
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 4; ++j) {
+        double* f[4];
+        for (int n = 0; n < 4; ++n)
+          f[n] = axis == 0 ? &c_[n][i][j] : axis == 1 ? &c_[i][n][j] : &c_[i][j][n];
+        const double low = *f[1], high = *f[2];
+        const double slopeLow = 0.5 * (high - *f[0]), slopeHigh = 0.5 * (*f[3] - low);
+        *f[0] = low;
+        *f[1] = low + slopeLow / 3;
+        *f[2] = high - slopeHigh / 3;
+        *f[3] = high;
+      }
+}
 
 bool SplineCell::mayCross() const {
   bool anyInside = false, anyOutside = false;
@@ -150,17 +179,17 @@ bool SplineCell::mayCross() const {
   if (!anyInside || !anyOutside) return false;
   // The slope bound for the line from the centre to a corner covers all points of the cell: on each
   // axis, no point is farther from the centre than the corner.
-  const LineSearch toCorner(c_, V3d(0.5), V3d(0.5));
+  const LineSearch toCorner(c_, isBernstein_, V3d(0.5), V3d(0.5));
   return toCorner.mayCross();
 }
 
 double SplineCell::value(const V3d& p) const {
-  return LineSearch(c_, p, V3d(0)).value(0);
+  return LineSearch(c_, isBernstein_, p, V3d(0)).value(0);
 }
 
 std::optional<double> SplineCell::firstSignChange(const V3d& p, const V3d& q) const {
   std::optional<double> first;
-  LineSearch line(c_, p, q - p);
+  LineSearch line(c_, isBernstein_, p, q - p);
   line.search(0, value(p) < 0, 1, value(q) < 0, kDepth, [&](double at) {
     first = at;
     return false;
@@ -169,7 +198,7 @@ std::optional<double> SplineCell::firstSignChange(const V3d& p, const V3d& q) co
 }
 
 void SplineCell::addSignChanges(const V3d& p, const V3d& q, std::vector<double>& found) const {
-  LineSearch line(c_, p, q - p);
+  LineSearch line(c_, isBernstein_, p, q - p);
   line.search(0, value(p) < 0, 1, value(q) < 0, kDepth, [&](double at) {
     found.push_back(at);
     return true;

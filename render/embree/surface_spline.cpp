@@ -29,19 +29,25 @@ struct ShapeWindow {
 };
 
 /// Weights w[d] of the four coefficients for the derivative of order d of a uniform cubic B-spline,
-/// at the fraction a in [0, 1] of a cell.
+/// at the fraction a in [0, 1] of a cell. For Filter::Tricubic, weights of the values.
 struct SplineWeights {
   double w[3][4];
 
-  explicit SplineWeights(double a) {
+  SplineWeights(double a, Filter filter) {
     const double b = 1 - a;
-    const double rows[3][4] = {
+    const double convolution[3][4] = {{((2 - a) * a - 1) * a / 2, (a * a * (3 * a - 5) + 2) / 2,
+                                       (a * a * (4 - 3 * a) + a) / 2, (a - 1) * a * a / 2},
+                                      {((4 - 3 * a) * a - 1) / 2, (9 * a - 10) * a / 2,
+                                       ((8 - 9 * a) * a + 1) / 2, (3 * a - 2) * a / 2},
+                                      {2 - 3 * a, 9 * a - 5, 4 - 9 * a, 3 * a - 1}};
+    const double bspline[3][4] = {
         {b * b * b / 6, (3 * a * a * a - 6 * a * a + 4) / 6, (3 * b * b * b - 6 * b * b + 4) / 6,
          a * a * a / 6},
         {-b * b / 2, (3 * a * a - 4 * a) / 2, -(3 * b * b - 4 * b) / 2, a * a / 2},
         {b, 3 * a - 2, 3 * b - 2, a}};
     for (int d = 0; d < 3; ++d)
-      for (int i = 0; i < 4; ++i) w[d][i] = rows[d][i];
+      for (int i = 0; i < 4; ++i)
+        w[d][i] = filter == Filter::Tricubic ? convolution[d][i] : bspline[d][i];
   }
 };
 
@@ -68,7 +74,7 @@ SurfaceShape surfaceShape(const openvdb::FloatTree& tree, const V3d& position, F
   const V3d a = position - base;
   const ShapeWindow window(
       tree, Coord(static_cast<int>(base.x), static_cast<int>(base.y), static_cast<int>(base.z)));
-  const SplineWeights weights[3] = {SplineWeights(a.x), SplineWeights(a.y), SplineWeights(a.z)};
+  const SplineWeights weights[3] = {{a.x, filter}, {a.y, filter}, {a.z, filter}};
 
   // sum[p][q][r]: derivative of the B-spline of order p, q, r along x, y, z, with p + q + r ≤ 2.
   double sum[3][3][3] = {};
@@ -79,7 +85,8 @@ SurfaceShape surfaceShape(const openvdb::FloatTree& tree, const V3d& position, F
       for (int z = 0; z < 4; ++z) {
         const V3d second = window.secondDifferences(x + 1, y + 1, z + 1);
         double c = window.f[x + 1][y + 1][z + 1];
-        if (filter != Filter::BSpline) c -= (second.x + second.y + second.z) / 6;
+        if (filter == Filter::Trilinear || filter == Filter::BSplineQi)
+          c -= (second.x + second.y + second.z) / 6;
         for (int r = 0; r < 3; ++r) row[r] += c * weights[2].w[r][z];
         const bool isCorner = (x == 1 || x == 2) && (y == 1 || y == 2) && (z == 1 || z == 2);
         if (isCorner) {

@@ -42,6 +42,7 @@ constexpr const char* kDialect = R"GLSL(
 #define INOUT_ARRAY(Type, name, size) inout Type name[size]
 #define CONST_INT const int
 #define CONST_FLOAT const float
+#define NUMBER(x) (x)
 #define AND(a, b) ((a) && (b))
 #define OR(a, b) ((a) || (b))
 #define NOT(a) (!(a))
@@ -107,9 +108,9 @@ int passingNumber(int n) { return int(rays[2 * rayCount + n]); }
 void addShape(int n, Ray ray, Hit hit) {
   // llvmpipe executes all branches, but skips loops that no ray enters.
   for (int i = hit.found ? 0 : 1; i < 1; ++i) {
-    Shape s = shapeOf(ray, hit);
+    Shape s = shapeOf(hit);
     float parts[kShapeParts] = float[kShapeParts](s.gx, s.gy, s.gz, s.tx, s.ty, s.tz, s.hxx, s.hyy,
-                                                  s.hzz, s.hxy, s.hxz, s.hyz, s.error);
+                                                  s.hzz, s.hxy, s.hxz, s.hyz, s.error, s.inX, s.inY, s.inZ);
     for (int p = 0; p < kShapeParts; ++p)
       hits[(kHitParts + p) * rayCount + n] = floatBitsToInt(parts[p]);
   }
@@ -189,6 +190,10 @@ void loadThree(Int first, inout Real a, inout Real b, inout Real c) {
   b = loadValue(first + 1);
   c = loadValue(first + 2);
 }
+void loadFour(Int first, inout Real a, inout Real b, inout Real c, inout Real d) {
+  loadThree(first, a, b, c);
+  d = loadValue(first + 3);
+}
 )GLSL";
 
 std::string shaderText(const Variant& variant, int shift) {
@@ -197,18 +202,20 @@ std::string shaderText(const Variant& variant, int shift) {
              "const int kBrickEdge = {}, kBrickValues = {}, kPageShift = {},\n"
              "          kFirstOfEntry = {}, kStridesOfEntry = {}, kStrideShift = {},\n"
              "          kHitParts = {}, kShapeParts = {}, kEnters = {}, kLeaves = {};\n"
-             "const bool isSpline = {};\n"
-             "const int tetraDegree = {}, kCubeEdge = {}, kCubeValues = {};\n",
+             "const bool isSpline = {}, isTricubic = {}, isBcc = {};\n"
+             "const int tetraDegree = {}, kCubeEdge = {}, kCubeValues = {}, kSites = {};\n",
              kGroup, BrickPool::kEdge, BrickPool::kValues,
              std::countr_zero(static_cast<unsigned>(BrickPool::kPage)), BrickPool::kFirstOfEntry,
              BrickPool::kStridesOfEntry, BrickPool::kStrideShift, kHitParts, ShapeBlock::kParts,
-             HitBlock::kEnters, HitBlock::kLeaves,
-             variant.filter == Filter::BSpline || variant.filter == Filter::BSplineQi,
-             tetrahedralDegree(variant.filter), BrickPool::kCubeEdge, BrickPool::kCubeValues) +
+             HitBlock::kEnters, HitBlock::kLeaves, isTricubicInCells(variant.filter),
+             variant.filter == Filter::Tricubic, variant.filter == Filter::BccQuadratic,
+             tetrahedralDegree(variant.filter), BrickPool::kCubeEdge, BrickPool::kCubeValues,
+             BrickPool::kSites) +
          kDialect + valueText(variant, shift) + kLoadThree + kRootsKernel +
          (variant.isNano ? kNanoText + NanoGrid::layout() + kNanoVdbKernel : kBricksKernel) +
-         kWindowKernel + kSplineKernel + kTetraKernel + kTraceKernel + kShapeKernel +
-         kTetraShapeKernel + (variant.isPixels ? kPixelRays : kListedRays) + kMain;
+         kWindowKernel + kSplineKernel + kTetraKernel + kBccKernel + kTraceKernel + kShapeKernel +
+         kBccShapeKernel + kTetraShapeKernel + (variant.isPixels ? kPixelRays : kListedRays) +
+         kMain;
 }
 
 }  // namespace

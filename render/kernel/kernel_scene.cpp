@@ -11,6 +11,7 @@
 
 #include "levelset/vdb.h"
 #include "render/kernel/frustum_culling.h"
+#include "render/kernel/hit_refinement.h"
 
 namespace render {
 namespace {
@@ -139,6 +140,12 @@ struct PackedRays {
   }
 };
 
+/// Depth of hit n of the rays through pixels, world units.
+double depthOf(const KernelSolid& solid, const PixelBlock& pixels, std::size_t n,
+               const HitBlock& hits, const ShapeBlock& shapes) {
+  return solid.fan.depthAt(refinedParameter(solid, pixels, n, hits, shapes));
+}
+
 }  // namespace
 
 KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter)
@@ -174,7 +181,9 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
   }
   // For BSplineQi the leaves are copied, to store the spline's coefficients.
   const double kCopies = options.filter == Filter::BSplineQi ? 4 * 512 : 0;
-  const double kBytesOfBlock = 2 * 4 * (BrickPool::kCubeValues + BrickPool::kMaskWords) + kCopies;
+  const double kBytesOfBlock =
+      2 * 4 * (std::max(BrickPool::kCubeValues, 4 * BrickPool::kSites) + BrickPool::kMaskWords) +
+      kCopies;
   levelset::requireMemory(leaves * kBytesOfBlock, options.maxBytes);
   // Culling knows how far light rays start from solids and meshes, but not from mapped textures.
   const FrustumCulling culling = isPicture && !box.isEmpty() && mapped_.isEmpty()
@@ -271,7 +280,7 @@ PixelHits KernelScene::castFirst(const KernelTracer& tracer, const PixelBlock& p
     tracer.trace(solid, pixels, hits, shapes);
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       if (!hits.found[i]) continue;
-      const double depth = solid.fan.depthAt(hits.t[i]);
+      const double depth = depthOf(solid, pixels, i, hits, shapes);
       if (depth > far_) continue;
       if (result.solid[i] >= 0 && result.depth[i] <= depth) continue;
       result.depth[i] = depth;
@@ -312,9 +321,11 @@ PixelHits KernelScene::castNext(const KernelTracer& tracer, PixelTraversal& trav
           continue;
         }
         const std::size_t ray = queries[n].ray;
-        next[s].depth[ray] = solid.fan.depthAt(hits.t[n]);
+        next[s].depth[ray] = depthOf(solid, asked, n, hits, shapes);
         next[s].shapes.take(ray, shapes, n);
-        walk.answer(s, queries[n], next[s].depth[ray], hits.found[n] == HitBlock::kEnters);
+        // The order of the crossings is that of the kernel's parameters.
+        walk.answer(s, queries[n], solid.fan.depthAt(static_cast<double>(hits.t[n])),
+                    hits.found[n] == HitBlock::kEnters);
       }
     }
   } while (walk.advance());
@@ -354,8 +365,8 @@ std::vector<double> KernelScene::thickness(const KernelTracer& tracer,
       std::vector<std::size_t> rest;
       for (std::size_t n = 0; n < open.size(); ++n) {
         if (!hits.found[n]) continue;
-        crossings[open[n]].push_back(
-            {solids_[s].fan.depthAt(hits.t[n]), s, hits.found[n] == HitBlock::kEnters});
+        crossings[open[n]].push_back({solids_[s].fan.depthAt(static_cast<double>(hits.t[n])), s,
+                                      hits.found[n] == HitBlock::kEnters});
         rest.push_back(open[n]);
       }
       open = std::move(rest);

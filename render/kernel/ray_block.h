@@ -63,16 +63,26 @@ struct HitBlock {
 /// Shape of the surface at the hits: the members of struct Shape in render/shaders/shape.glsl, in
 /// their order. Derivatives are per voxel, along the axes of table space.
 struct ShapeBlock {
-  static constexpr std::size_t kParts = 13;
+  static constexpr std::size_t kParts = 16;
   std::array<std::vector<float>, kParts> part;
 
   explicit ShapeBlock(std::size_t size) {
     for (std::vector<float>& p : part) p.resize(size);
   }
   [[nodiscard]] SurfaceShape at(std::size_t i) const;
+  /// Gradient of the drawn surface, as in SurfaceShape.
+  [[nodiscard]] Imath::V3d drawnGradient(std::size_t i) const { return threeFrom(3, i); }
+  /// Position of the hit in its cell, from 0 to 1 on each axis.
+  [[nodiscard]] Imath::V3d placeInCell(std::size_t i) const { return threeFrom(13, i); }
   /// Copies entry i of `from` to entry `to`.
   void take(std::size_t to, const ShapeBlock& from, std::size_t i) {
     for (std::size_t p = 0; p < kParts; ++p) part[p][to] = from.part[p][i];
+  }
+
+ private:
+  [[nodiscard]] Imath::V3d threeFrom(std::size_t p, std::size_t i) const {
+    return {static_cast<double>(part[p][i]), static_cast<double>(part[p + 1][i]),
+            static_cast<double>(part[p + 2][i])};
   }
 };
 

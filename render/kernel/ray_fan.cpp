@@ -46,12 +46,18 @@ RayFan makeRayFan(const Camera& camera, const M44d& tableToWorld, double voxelSi
             down = directionIn(worldToTable, step.down);
   const bool isOrtho = camera.orthoHeight.has_value();
   const double spread = isOrtho ? 1 : depth, turn = isOrtho ? 0 : fan.depthPerStep;
-  set(fan.origin, (camera.from + axis * depth) * worldToTable);
-  set(fan.originX, right * spread);
-  set(fan.originY, down * spread);
-  set(fan.direction, forward * fan.depthPerStep);
-  set(fan.directionX, right * turn);
-  set(fan.directionY, down * turn);
+  fan.exactOrigin = (camera.from + axis * depth) * worldToTable;
+  fan.exactOriginX = right * spread;
+  fan.exactOriginY = down * spread;
+  fan.exactDirection = forward * fan.depthPerStep;
+  fan.exactDirectionX = right * turn;
+  fan.exactDirectionY = down * turn;
+  set(fan.origin, fan.exactOrigin);
+  set(fan.originX, fan.exactOriginX);
+  set(fan.originY, fan.exactOriginY);
+  set(fan.direction, fan.exactDirection);
+  set(fan.directionX, fan.exactDirectionX);
+  set(fan.directionY, fan.exactDirectionY);
   for (std::size_t a = 0; a < 3; ++a) {
     fan.low[a] = static_cast<float>(pool.low[a]);
     fan.high[a] = static_cast<float>(pool.high[a]);

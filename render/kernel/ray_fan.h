@@ -2,6 +2,8 @@
 
 #include <Imath/ImathMatrix.h>
 
+#include <utility>
+
 #include "render/bricks/brick_pool.h"
 #include "render/camera.h"
 
@@ -18,10 +20,17 @@ struct RayFan {
   float direction[3], directionX[3], directionY[3];
   float low[3], high[3];  ///< box of the blocks that the surface crosses, table space
 
+  // The same rays in double precision.
+  Imath::V3d exactOrigin, exactOriginX, exactOriginY, exactDirection, exactDirectionX,
+      exactDirectionY;
+
   double depth = 0;         ///< depth of the plane t = 0, world units along the view axis
   double depthPerStep = 0;  ///< increase of depth per unit of t, world units
-  [[nodiscard]] double depthAt(float t) const {
-    return depth + static_cast<double>(t) * depthPerStep;
+  [[nodiscard]] double depthAt(double t) const { return depth + t * depthPerStep; }
+  /// Origin and direction of the ray through a pixel, in double precision.
+  [[nodiscard]] std::pair<Imath::V3d, Imath::V3d> exactRay(double x, double y) const {
+    return {exactOrigin + exactOriginX * x + exactOriginY * y,
+            exactDirection + exactDirectionX * x + exactDirectionY * y};
   }
 };
 

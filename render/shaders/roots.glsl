@@ -7,6 +7,9 @@
 // depend on sums, products and comparisons of floats alone, so that all processors return the same
 // bits. Inactive lanes load from index 0.
 //
+// NUMBER(…) rounds a constant to the precision of Real: hit_refinement.cpp includes parts of this
+// code with doubles.
+//
 // Coordinates are those of table space: grid points have integer coordinates, starting at 0. Cell
 // (i, j, k) spans the points i … i+1, j … j+1, k … k+1. Negative values are inside, zero is
 // outside.
@@ -14,7 +17,7 @@
 CONST_INT kNone = 3;             // number that stands for no axis
 CONST_INT kMostHalvings = 12;    // largest number of halvings of a ray segment in a cell with several crossings
 CONST_INT kBisections = 20;      // halvings of an interval that holds one crossing
-CONST_FLOAT kThird = 0.33333333333f;
+CONST_FLOAT kThird = NUMBER(1.0 / 3.0);
 CONST_FLOAT kBarelyInside = -1e-30f;
 CONST_FLOAT kLeastDirection = 1e-20f;
 CONST_FLOAT kParallel = 1e30f;

@@ -1,7 +1,7 @@
 // Shape of the surface at a hit: gradient and Hessian of the tricubic B-spline with coefficients f
-// − ∇²f/6 [Sigg05], and gradient of the trilinear interpolant. If the grid stores spline
-// coefficients (isSpline), all of these are derivatives of that spline. Types and coordinates are
-// those of roots.glsl.
+// − ∇²f/6 [Sigg05], and gradient of the trilinear interpolant. If the filter is a tricubic spline
+// (isSpline), all of these are derivatives of that spline. Types and coordinates are those of
+// roots.glsl.
 //
 // The coefficients are not computed. Instead, each grid value has the weight of its coefficient
 // minus a sixth of the second differences of the weights. So each grid value is loaded once, and
@@ -44,6 +44,25 @@ void fillStencil(INOUT_ARRAY(Real, weight, 6), INOUT_ARRAY(Real, bend, 6), Real 
 
 Stencil stencilAt(Real a) {
   VAR b = 1.0f - a;
+  Stencil w;
+  if (isTricubic) {
+    VAR c0 = a * b * b * -0.5f;
+    VAR c3 = a * a * b * -0.5f;
+    VAR c1 = (1.5f * a - 2.5f) * (a * a) + 1.0f;
+    VAR c2 = (1.5f * b - 2.5f) * (b * b) + 1.0f;
+    VAR d0 = (1.5f * a - 0.5f) * b;
+    VAR d1 = (4.5f * a - 5.0f) * a;
+    VAR d2 = (5.0f - 4.5f * b) * b;
+    VAR d3 = (0.5f - 1.5f * b) * a;
+    VAR e0 = 2.0f - 3.0f * a;
+    VAR e1 = 9.0f * a - 5.0f;
+    VAR e2 = 9.0f * b - 5.0f;
+    VAR e3 = 2.0f - 3.0f * b;
+    fillStencil(w.value, w.valueBend, c0, c1, c2, c3);
+    fillStencil(w.slope, w.slopeBend, d0, d1, d2, d3);
+    fillStencil(w.bend, w.bendBend, e0, e1, e2, e3);
+    return w;
+  }
   VAR aa = a * a;
   VAR bb = b * b;
   VAR v0 = bb * b * kSixth;
@@ -56,7 +75,6 @@ Stencil stencilAt(Real a) {
   VAR s3 = aa * 0.5f;
   VAR b1 = 3.0f * a - 2.0f;
   VAR b2 = 3.0f * b - 2.0f;
-  Stencil w;
   fillStencil(w.value, w.valueBend, v0, v1, v2, v3);
   fillStencil(w.slope, w.slopeBend, s0, s1, s2, s3);
   fillStencil(w.bend, w.bendBend, b, b1, b2, a);
@@ -168,6 +186,7 @@ struct Shape {
   Real gx, gy, gz;                    // gradient of the B-spline, φ per voxel
   Real tx, ty, tz;                    // gradient of the trilinear interpolant, φ per voxel
   Real hxx, hyy, hzz, hxy, hxz, hyz;  // Hessian of the B-spline, φ per voxel²
+  Real inX, inY, inZ;                 // position in the cell, from 0 to 1
   Real error;                         // bound on |trilinear interpolant − smooth function|, from second differences
 };
 

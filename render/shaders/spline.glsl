@@ -1,5 +1,6 @@
-// Crossings of a ray with the zero set of a tricubic B-spline whose coefficients the grid stores.
-// Types and coordinates are those of roots.glsl.
+// Crossings of a ray with the zero set of a tricubic B-spline whose coefficients the grid stores, or
+// of the Catmull-Rom spline through its values (isTricubic) [Keys81]. Types and coordinates are
+// those of roots.glsl.
 //
 // Along a line the spline has degree 9 within a cell. Its Bernstein coefficients follow from the
 // Bézier net of the box that the ray's segment spans. Each coefficient is a sum of nonnegative
@@ -8,13 +9,37 @@
 
 CONST_INT kDegree = 9;
 
-// Weights of the four spline coefficients along an axis, from point cell − 1 on, in the blossom of
-// the cubic B-spline at (u, v, w).
+// Weights of the four grid values along an axis, from point cell − 1 on, in the blossom of the spline
+// at (u, v, w).
 struct Blend {
   Real w0, w1, w2, w3;
 };
 
+// For the Catmull-Rom spline. Its Bézier points in the cell are f1, f1 + (f2 − f0)/6, f2 − (f3 −
+// f1)/6 and f2. `p…` are their weights.
+Blend catmullRomBlendOf(Real u, Real v, Real w) {
+  VAR ru = 1.0f - u;
+  VAR rv = 1.0f - v;
+  VAR rw = 1.0f - w;
+  VAR q0 = rv * rw;
+  VAR q1 = v * rw + w * rv;
+  VAR q2 = v * w;
+  VAR p1 = q0 * u + q1 * ru;
+  VAR p2 = q1 * u + q2 * ru;
+  VAR n1 = p1 * NUMBER(1.0 / 6.0);
+  VAR n2 = p2 * NUMBER(1.0 / 6.0);
+  VAR w1 = (q0 * ru + p1) + n2;
+  VAR w2 = (q2 * u + p2) + n1;
+  Blend b;
+  b.w0 = 0.0f - n1;
+  b.w1 = w1;
+  b.w2 = w2;
+  b.w3 = 0.0f - n2;
+  return b;
+}
+
 Blend blendOf(Real u, Real v, Real w) {
+  if (isTricubic) return catmullRomBlendOf(u, v, w);
   VAR rw = 1.0f - w;
   VAR p0 = rw * (1.0f - v) * 0.5f;
   VAR p1 = (rw * (1.0f + v) + w * (2.0f - v)) * 0.5f;
@@ -37,7 +62,7 @@ Real blended(IN(Blend) b, Real c0, Real c1, Real c2, Real c3) {
 }
 
 // Works on each row of four values of the net along the axis with the given stride. Replaces the
-// spline coefficients of the row by the values of the Bézier net between the positions `from` and
+// grid values of the row by the values of the Bézier net between the positions `from` and
 // `to` in the cell.
 void bendAxis(INOUT_ARRAY(Real, net, 64), int stride, Real from, Real to) {
   Blend b0 = blendOf(from, from, from);
@@ -168,14 +193,14 @@ Crossing splineCrossingIn(Bool asked, Int cellX, Int cellY, Int cellZ, Real x0, 
       }
     }
   }
-  b[1] = b[1] * (1.0f / 9.0f);
-  b[2] = b[2] * (1.0f / 36.0f);
-  b[3] = b[3] * (1.0f / 84.0f);
-  b[4] = b[4] * (1.0f / 126.0f);
-  b[5] = b[5] * (1.0f / 126.0f);
-  b[6] = b[6] * (1.0f / 84.0f);
-  b[7] = b[7] * (1.0f / 36.0f);
-  b[8] = b[8] * (1.0f / 9.0f);
+  b[1] = b[1] * NUMBER(1.0 / 9.0);
+  b[2] = b[2] * NUMBER(1.0 / 36.0);
+  b[3] = b[3] * NUMBER(1.0 / 84.0);
+  b[4] = b[4] * NUMBER(1.0 / 126.0);
+  b[5] = b[5] * NUMBER(1.0 / 126.0);
+  b[6] = b[6] * NUMBER(1.0 / 84.0);
+  b[7] = b[7] * NUMBER(1.0 / 36.0);
+  b[8] = b[8] * NUMBER(1.0 / 9.0);
   b[0] = select(carried, onSide(b[0], inside), b[0]);
 
   Crossing crossing;

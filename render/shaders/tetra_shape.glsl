@@ -58,13 +58,16 @@ Shape tetraShapeAt(Bool asked, Int cellX, Int cellY, Int cellZ, Real a, Real b, 
 }
 
 // Shape of the surface at the hit of a ray.
-Shape shapeOf(IN(Ray) ray, IN(Hit) hit) {
-  VAR x = (ray.ox - toReal(hit.x)) + hit.t * ray.dx;
-  VAR y = (ray.oy - toReal(hit.y)) + hit.t * ray.dy;
-  VAR z = (ray.oz - toReal(hit.z)) + hit.t * ray.dz;
-  VAR a = smaller(larger(x, 0.0f), 1.0f);
-  VAR b = smaller(larger(y, 0.0f), 1.0f);
-  VAR c = smaller(larger(z, 0.0f), 1.0f);
-  if (tetraDegree > 0) return tetraShapeAt(hit.found, hit.x, hit.y, hit.z, a, b, c);
-  return shapeAt(hit.found, hit.x, hit.y, hit.z, a, b, c);
+Shape shapeOf(IN(Hit) hit) {
+  Shape shape;
+  if (tetraDegree > 0)
+    shape = tetraShapeAt(hit.found, hit.x, hit.y, hit.z, hit.inX, hit.inY, hit.inZ);
+  else if (isBcc)
+    shape = bccShapeAt(hit.found, hit.x, hit.y, hit.z, hit.inX, hit.inY, hit.inZ);
+  else
+    shape = shapeAt(hit.found, hit.x, hit.y, hit.z, hit.inX, hit.inY, hit.inZ);
+  shape.inX = hit.inX;
+  shape.inY = hit.inY;
+  shape.inZ = hit.inZ;
+  return shape;
 }

@@ -131,6 +131,7 @@ struct Hit {
   Bool enters;
   Real t;
   Int x, y, z;  // cell of the hit
+  Real inX, inY, inZ;  // position in the cell, from 0 to 1: the zero that was found, more exact than t
 };
 
 // Finds the first crossing of a ray with the surface after skipping `passing` crossings.
@@ -142,6 +143,9 @@ Hit trace(Ray ray, Int passing) {
   hit.found = no();
   hit.enters = no();
   hit.t = ray.start;
+  hit.inX = real(0.0f);
+  hit.inY = real(0.0f);
+  hit.inZ = real(0.0f);
   Bool alive = ray.start <= ray.end;
   VAR t = ray.start;
   Int x = cellAt(t, ray.ox, ray.dx, ray.ix, integer(0), integer(tableSizeX - 1));
@@ -227,6 +231,8 @@ Hit trace(Ray ray, Int passing) {
       Crossing crossing;
       if (tetraDegree > 0)
         crossing = tetraCrossingIn(asked, brick, x, y, z, x0, y0, z0, x1, y1, z1, carried, inside, passing);
+      else if (isBcc)
+        crossing = bccCrossingIn(asked, brick, x, y, z, x0, y0, z0, x1, y1, z1, carried, inside, passing);
       else if (isSpline)
         crossing = splineCrossingIn(asked, x, y, z, x0, y0, z0, x1, y1, z1, carried, inside, passing);
       else
@@ -237,6 +243,10 @@ Hit trace(Ray ray, Int passing) {
       hit.found = OR(hit.found, hits);
       hit.enters = select(hits, crossing.enters, hit.enters);
       hit.t = select(hits, place, hit.t);
+      VAR rest = 1.0f - crossing.share;
+      hit.inX = select(hits, between(x0, x1, crossing.share, rest), hit.inX);
+      hit.inY = select(hits, between(y0, y1, crossing.share, rest), hit.inY);
+      hit.inZ = select(hits, between(z0, z1, crossing.share, rest), hit.inZ);
       solved = OR(solved, asked);
       inside = select(asked, crossing.endsInside, inside);
       alive = AND(alive, NOT(hits));

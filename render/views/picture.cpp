@@ -154,11 +154,13 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
     if (solid.volume && options.fromNanoVdb)
       throw levelset::UsageError("a volume cannot be drawn from NanoVDB grids; draw from bricks");
     if (options.filter == Filter::Trilinear || solid.volume || solid.band.isEmpty()) continue;
-    if (options.filter == Filter::BSplineQi && solid.quantization.bits != 32)
+    const bool isComputed =
+        options.filter == Filter::BSplineQi || options.filter == Filter::BccQuadratic;
+    if (isComputed && solid.quantization.bits != 32)
       throw levelset::UsageError(
-          fmt::format("the filter bspline-qi does not support values of {} bits; use 32 "
-                      "bits, or another filter",
-                      solid.quantization.bits));
+          fmt::format("the filter {} does not support values of {} bits; use 32 bits, or another "
+                      "filter",
+                      filterName(options.filter), solid.quantization.bits));
     if (solid.band.halfWidth() >= kReach) continue;
     throw levelset::InvalidInput(fmt::format(
         "the filter {} reads values up to 3 voxels from the surface, but the band has a "

@@ -64,9 +64,15 @@ std::vector<V3i> VolumeSurface::blocks(Filter filter) const {
   if (filter == Filter::Trilinear)
     return ranges_->crossed(isovalue_, inside_ == VolumeInside::Below);
   // A coefficient f − ∇²f/6 is twice the value less the mean of its six neighbours. A coefficient
-  // of the quadratic super spline has negative weights of at most 1/16 in sum.
+  // of the quadratic super spline has negative weights of at most 1/16 in sum. A Bézier coefficient
+  // of the tricubic filter has weights along each axis that sum to 1, with magnitudes of 4/3 in
+  // sum. So the magnitudes of its 64 weights sum to at most 64/27, and the negative ones to half of
+  // 64/27 − 1. One of the spline on octahedra is a mean of values mean + difference · v at
+  // vertices v, whose negative weights sum to at most 1/8.
   const double widening = filter == Filter::BSplineQi        ? 1
+                          : filter == Filter::Tricubic       ? 37.0 / 54
                           : filter == Filter::SuperQuadratic ? 1.0 / 16
+                          : filter == Filter::BccQuadratic   ? 1.0 / 8
                                                              : 0;
   return ranges_->crossedWidely(isovalue_, widening);
 }

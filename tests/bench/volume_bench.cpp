@@ -69,8 +69,7 @@ void benchmark(const levelset::Volume& volume, double isovalue) {
   Scene scene;
   scene.solids.push_back({.band = {}});
   const std::vector<PixelBlock> pixels = allPixels();
-  for (const Filter filter : {Filter::Trilinear, Filter::BSpline, Filter::BSplineQi,
-                              Filter::SuperQuadratic, Filter::CubicC1}) {
+  for (const Filter filter : kFilters) {
     const std::string name = filterName(filter);
     const auto other = std::make_shared<const VolumeSurface>(surface.withIsovalue(isovalue));
     tell(name + "_blocks_s", timeOf([&] { (void)other->blocks(filter); }));

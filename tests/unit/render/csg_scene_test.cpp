@@ -299,7 +299,7 @@ std::vector<Crossing> allCrossings(const KernelSolid& solid, float x, float y) {
     ShapeBlock shapes(pixel.size());
     tracer.trace(solid, pixel, hits, shapes);
     if (!hits.found[0]) break;
-    all.push_back({solid.fan.depthAt(hits.t[0]),
+    all.push_back({solid.fan.depthAt(static_cast<double>(hits.t[0])),
                    hits.found[0] == HitBlock::kEnters,
                    {hits.x[0], hits.y[0], hits.z[0]}});
   }

@@ -516,13 +516,15 @@ Operator renderOperator() {
             .choices = {"gpu", "cpu", "embree", "both"}},
            {.name = "filter",
             .type = ParamType::Choice,
-            .doc =
-                "interpolation between grid points: trilinear; bspline, a tricubic B-spline, which "
-                "shrinks the solid; bspline-qi, the same spline with corrected coefficients; "
-                "super-quadratic and cubic-c1, splines on 24 tetrahedra around each grid point, "
-                "which smooth the values",
+            .doc = "interpolation between grid points: trilinear; tricubic, Catmull-Rom splines "
+                   "through "
+                   "the values; bspline, a tricubic B-spline, which shrinks the solid; bspline-qi, "
+                   "the "
+                   "same spline with corrected coefficients; super-quadratic, cubic-c1 and "
+                   "bcc-quadratic, splines on tetrahedra, which smooth the values",
             .fallback = "trilinear",
-            .choices = {"trilinear", "bspline", "bspline-qi", "super-quadratic", "cubic-c1"}},
+            .choices = {"trilinear", "tricubic", "bspline", "bspline-qi", "super-quadratic",
+                        "cubic-c1", "bcc-quadratic"}},
            {.name = "isovalue",
             .type = ParamType::Number,
             .doc = "for a volume: draw the surface on which the interpolated values equal this "

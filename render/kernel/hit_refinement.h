@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstddef>
+
+#include "render/kernel/kernel_scene.h"
+
+namespace render {
+
+/// Moves a hit of the kernel to its ray in double precision.
+///
+/// The hit lies on the surface within roundings of 1e-7 of the values in its cell. But it lies up
+/// to 1e-5 voxel beside the ray, because origin, direction and parameter of the ray are rounded. So
+/// the ray is intersected with the tangent plane of the surface at the hit. If the ray is nearly
+/// parallel to the surface, both roundings grow. Then the zero is found by secants of the field in
+/// double precision.
+/// @param pixels, hits, shapes  the rays, and what the kernel found
+/// @param n  index of a hit
+/// @return parameter of the ray; that of `hits` where no better one is found
+[[nodiscard]] double refinedParameter(const KernelSolid& solid, const PixelBlock& pixels,
+                                      std::size_t n, const HitBlock& hits,
+                                      const ShapeBlock& shapes);
+
+}  // namespace render
