@@ -59,9 +59,16 @@ void Viewer::show(std::shared_ptr<const Model> model, bool keepView) {
   model_ = std::move(model);
   if (!model_->volume) {
     isosurface_ = {};
+    light_ = {};
     display_.slices = {};
   } else if (!keepView || !hadVolume) {
     isosurface_ = firstIsosurface(arguments_, *model_);
+    light_ = firstLight(arguments_, *model_);
+    const levelset::VolumeHistogram& histogram = model_->volume->histogram;
+    const double span = std::max(histogram.high - histogram.low, 1e-30);
+    transferEditor_ = TransferEditor(
+        light_.transfer.empty() ? render::suggestedTransfer(histogram) : light_.transfer,
+        histogram.low, histogram.low + span);
     display_.slices = firstSlices(arguments_, *model_);
   }
   watch_ = FileWatch(model_->watched);
@@ -371,7 +378,7 @@ void Viewer::requestPicture(int width, int height) {
   if (!model_) return;
   View view{
       shownModel(), camera_.camera(width, height),      std::nullopt, style_, arguments_.matcap,
-      opacity_,     display_.layer == Layer::Thickness, isosurface_};
+      opacity_,     display_.layer == Layer::Thickness, isosurface_,  light_};
   if (isClipped_ && model_->canCut()) view.clip = clip_;
   picture_.request(view, display_);
 }

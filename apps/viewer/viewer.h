@@ -13,6 +13,7 @@
 #include "apps/viewer/interaction/patch_editor.h"
 #include "apps/viewer/interaction/pick.h"
 #include "apps/viewer/interaction/progressive_picture.h"
+#include "apps/viewer/interaction/transfer_editor.h"
 #include "apps/viewer/model/file_list.h"
 #include "apps/viewer/model/file_watch.h"
 #include "apps/viewer/model/loader.h"
@@ -93,6 +94,8 @@ class Viewer {
   void drawClipPart();
   void drawVolumePart();
   void drawHistogram();
+  void drawLightPart();
+  void editTransfer(const Imath::V2d& place, const Imath::V2d& reach, bool isOver);
   void drawPatchPart();
   void drawPointPart();
   void drawStatus();
@@ -115,7 +118,10 @@ class Viewer {
   bool isClipped_ = false;
   Display display_;
   render::Style style_;
-  IsosurfaceView isosurface_;           // of the model's volume, if it has one
+  // Of the model's volume, if it has one. The editor keeps the points while the light is off.
+  IsosurfaceView isosurface_;
+  LightView light_;
+  TransferEditor transferEditor_;
   double opacity_ = 1;                  // factor of the opacities of all solids and meshes
   std::shared_ptr<const Frame> frame_;  // frame that the window shows
   int pictureWidth_ = 1, pictureHeight_ = 1;

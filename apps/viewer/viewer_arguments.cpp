@@ -39,6 +39,7 @@ and patches (.patch) with it.
   --isovalue N        of a volume: value of the isosurface, or none     [the first one that 'histogram' suggests]
   --inside SIDE       of a volume: side of the isovalue that is solid, above or below [above]
   --filter NAME       of a volume: interpolation, as in 'render'        [trilinear]
+  --transfer POINTS   of a volume: direct volume rendering, as in 'render', or auto
   --slices i=N,j=N,k=N  of a volume: slices across axes of its grid, by index
   --grey LOW,HIGH     of a volume: values that slices show as black and as white [all but 1 % of the values]
   --patches LINES     lines of the patches: none, outline, base or all  [all]
@@ -189,6 +190,11 @@ const std::map<std::string, Setter>& setters() {
        }},
       {"--inside", setInside},
       {"--filter", [](Arguments& to, const std::string& text) { to.filter = filterNamed(text); }},
+      {"--transfer",
+       [](Arguments& to, const std::string& text) {
+         if (text != "auto") (void)render::TransferFunction(render::parseTransfer(text), 1);
+         to.transfer = text;
+       }},
       {"--slices", [](Arguments& to, const std::string& text) { to.slices = parseSlices(text); }},
       {"--grey", [](Arguments& to, const std::string& text) { to.grey = parseGrey(text); }},
       {"--patches",
@@ -297,11 +303,18 @@ std::string viewerHelp() {
 
 IsosurfaceView firstIsosurface(const Arguments& arguments, const Model& model) {
   IsosurfaceView view = firstIsosurface(*model.volume);
-  view.isShown = !arguments.hidesIsosurface;
+  view.isShown = !arguments.hidesIsosurface && (arguments.isovalue || arguments.transfer.empty());
   view.isovalue = arguments.isovalue.value_or(view.isovalue);
   if (arguments.isBelowInside) view.inside = render::VolumeInside::Below;
   view.filter = arguments.filter.value_or(view.filter);
   return view;
+}
+
+LightView firstLight(const Arguments& arguments, const Model& model) {
+  if (arguments.transfer.empty()) return {};
+  return {.transfer = arguments.transfer == "auto"
+                          ? render::suggestedTransfer(model.volume->histogram)
+                          : render::parseTransfer(arguments.transfer)};
 }
 
 SliceView firstSlices(const Arguments& arguments, const Model& model) {
@@ -317,8 +330,8 @@ SliceView firstSlices(const Arguments& arguments, const Model& model) {
 void requireFit(const Arguments& arguments, const Model& model) {
   if (arguments.hasVolumeOption() && !model.volume)
     throw UsageError(
-        "levelsmith-view: --isovalue, --inside, --filter, --slices and --grey are for volumes, and "
-        "the model is none; omit them");
+        "levelsmith-view: --isovalue, --inside, --filter, --transfer, --slices and --grey are for "
+        "volumes, and the model is none; omit them");
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (!arguments.slices[axis]) continue;
     const int last = model.volume->surface.volume().size()[static_cast<int>(axis)] - 1;
@@ -335,6 +348,8 @@ void requireFit(const Arguments& arguments, const Model& model) {
 
 render::Camera firstCamera(const Arguments& arguments, const Model& model, int width, int height) {
   render::Camera camera;
+  // In the coordinates of medical images, z points to the head.
+  if (model.volume) camera.up = Imath::V3d(0, 0, 1);
   const Imath::Box3d nothing(Imath::V3d(-1), Imath::V3d(1));
   const Imath::Box3d& bounds = model.bounds.isEmpty() ? nothing : model.bounds;
   if (model.camera && !arguments.from) {
@@ -351,8 +366,7 @@ render::Camera firstCamera(const Arguments& arguments, const Model& model, int w
     if (arguments.verticalFov) camera.verticalFov = *arguments.verticalFov;
   } else {
     const double fov = arguments.verticalFov.value_or(camera.verticalFov);
-    // In the coordinates of medical images, z points to the head.
-    const Imath::V3d up = arguments.up.value_or(model.volume ? Imath::V3d(0, 0, 1) : camera.up);
+    const Imath::V3d up = arguments.up.value_or(camera.up);
     // The particles of patches are not in the scene, and isosurfaces of volumes change.
     const bool isFramedByBox = model.bounds.isEmpty() || !model.patches.empty() || model.volume;
     camera = isFramedByBox ? render::framingCamera(bounds, width, height, fov, up)

@@ -33,6 +33,7 @@ struct Arguments {
   bool hidesIsosurface = false;  ///< --isovalue none
   bool isBelowInside = false;    ///< --inside below
   std::optional<render::Filter> filter = {};
+  std::string transfer = {};  ///< points of the transfer function, or "auto"; empty: none
   std::array<std::optional<double>, 3> slices = {};  ///< positions across i, j and k, grid indices
   std::optional<std::array<double, 2>> grey = {};    ///< values shown as black and as white
 
@@ -48,8 +49,8 @@ struct Arguments {
   /// True when the viewer runs without an open window: to write a screenshot, to print a picked
   /// point, or to play simulated input.
   [[nodiscard]] bool hasVolumeOption() const {
-    return isovalue || hidesIsosurface || isBelowInside || filter || grey || slices[0] ||
-           slices[1] || slices[2];
+    return isovalue || hidesIsosurface || isBelowInside || filter || grey || !transfer.empty() ||
+           slices[0] || slices[1] || slices[2];
   }
   [[nodiscard]] bool isScript() const { return screenshot || pick || play; }
 };
@@ -60,8 +61,10 @@ struct Arguments {
 /// Text of levelsmith-view --help.
 [[nodiscard]] std::string viewerHelp();
 
-/// Isosurface and slices that are shown first of the model's volume. @pre the model has a volume
+/// Isosurface, light and slices that are shown first of the model's volume. @pre the model has a
+/// volume
 [[nodiscard]] IsosurfaceView firstIsosurface(const Arguments& arguments, const Model& model);
+[[nodiscard]] LightView firstLight(const Arguments& arguments, const Model& model);
 [[nodiscard]] SliceView firstSlices(const Arguments& arguments, const Model& model);
 /// Refuses options that do not apply to the model.
 /// @throws levelset::UsageError for an option for volumes, without a volume

@@ -50,6 +50,8 @@ void Viewer::drawVolumePart() {
   if (ImGui::Checkbox("low values inside", &isBelow))
     isosurface_.inside = isBelow ? render::VolumeInside::Below : render::VolumeInside::Above;
 
+  drawLightPart();
+
   SliceView& slices = display_.slices;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double last = volume.size()[static_cast<int>(axis)] - 1;
@@ -76,14 +78,65 @@ void Viewer::drawVolumePart() {
   }
 }
 
+void Viewer::drawLightPart() {
+  bool hasLight = !light_.transfer.empty();
+  if (ImGui::Checkbox("light", &hasLight)) {
+    light_.transfer = hasLight ? transferEditor_.points() : std::vector<render::TransferPoint>{};
+    // An isosurface hides what lies inside.
+    if (hasLight) isosurface_.isShown = false;
+    showMessage(hasLight ? "Drag points in the histogram; press elsewhere to add one, and the "
+                           "right button to remove one."
+                         : "The volume has no light of its own.");
+  }
+  if (!hasLight) return;
+  ImGui::SameLine();
+  ImGui::Checkbox("shading", &light_.isShaded);
+  ImGui::SameLine();
+  if (ImGui::Button("Copy##transfer")) {
+    window_.setClipboard(
+        fmt::format("--transfer \"{}\"", render::transferText(transferEditor_.points())));
+    showMessage("The transfer function was copied to the clipboard, as an option of 'render'.");
+  }
+  const std::optional<std::size_t> selected = transferEditor_.selected();
+  if (!selected) return;
+  // The widget shows and edits colours in sRGB.
+  constexpr float kGamma = 2.2f;
+  Imath::C3f colour = transferEditor_.points()[*selected].colour;
+  for (int c = 0; c < 3; ++c) colour[c] = std::pow(std::clamp(colour[c], 0.0f, 1.0f), 1 / kGamma);
+  if (ImGui::ColorEdit3("colour", &colour.x, ImGuiColorEditFlags_NoInputs)) {
+    for (int c = 0; c < 3; ++c) colour[c] = std::pow(colour[c], kGamma);
+    transferEditor_.setColour(colour);
+    light_.transfer = transferEditor_.points();
+  }
+}
+
+void Viewer::editTransfer(const Imath::V2d& place, const Imath::V2d& reach, bool isOver) {
+  if (isOver && ImGui::IsMouseClicked(0)) transferEditor_.press(place.x, place.y, reach.x, reach.y);
+  if (isOver && ImGui::IsMouseClicked(1))
+    transferEditor_.removeAt(place.x, place.y, reach.x, reach.y);
+  if (ImGui::IsMouseDown(0))
+    transferEditor_.moveTo(place.x, place.y);
+  else
+    transferEditor_.release();
+  light_.transfer = transferEditor_.points();
+}
+
 void Viewer::drawHistogram() {
   const levelset::VolumeHistogram& histogram = model_->volume->histogram;
   const float width = std::max(ImGui::GetContentRegionAvail().x, 16.0f);
   const ImVec2 corner = ImGui::GetCursorScreenPos();
   ImGui::InvisibleButton("histogram", {width, kHistogramHeight});
   const double span = histogram.high - histogram.low;
-  if (ImGui::IsItemActive() && span > 0) {
-    const auto share = static_cast<double>((ImGui::GetIO().MousePos.x - corner.x) / width);
+  const ImVec2 mouse = ImGui::GetIO().MousePos;
+  const auto share = static_cast<double>((mouse.x - corner.x) / width);
+  const bool hasLight = !light_.transfer.empty();
+  if (hasLight && span > 0) {
+    constexpr double kReach = 7;  // pixels
+    editTransfer(
+        {share, 1 - static_cast<double>((mouse.y - corner.y) / kHistogramHeight)},
+        {kReach / static_cast<double>(width), kReach / static_cast<double>(kHistogramHeight)},
+        ImGui::IsItemHovered());
+  } else if (ImGui::IsItemActive() && span > 0) {
     isosurface_.isovalue = asWritten(histogram.low + std::clamp(share, 0.0, 1.0) * span);
     isosurface_.isShown = true;
   }
@@ -113,6 +166,23 @@ void Viewer::drawHistogram() {
   for (const double value : histogram.otsu) mark(value, IM_COL32(110, 170, 110, 160), 1);
   mark(histogram.steepest, IM_COL32(110, 150, 220, 160), 1);
   if (isosurface_.isShown) mark(isosurface_.isovalue, IM_COL32(255, 196, 60, 255), 2);
+  if (!hasLight) return;
+  const auto placeOf = [&](const render::TransferPoint& point) {
+    return ImVec2(corner.x + static_cast<float>(transferEditor_.xOf(point)) * width,
+                  end.y - static_cast<float>(TransferEditor::yOf(point)) * kHistogramHeight);
+  };
+  const std::vector<render::TransferPoint>& points = transferEditor_.points();
+  for (std::size_t n = 0; n + 1 < points.size(); ++n)
+    list.AddLine(placeOf(points[n]), placeOf(points[n + 1]), IM_COL32(235, 235, 235, 200), 1.5f);
+  for (std::size_t n = 0; n < points.size(); ++n) {
+    const auto byte = [](float linear) {
+      return static_cast<int>(255 * std::pow(std::clamp(linear, 0.0f, 1.0f), 1 / 2.2f));
+    };
+    const Imath::C3f& c = points[n].colour;
+    list.AddCircleFilled(placeOf(points[n]), transferEditor_.selected() == n ? 6.0f : 4.5f,
+                         IM_COL32(255, 255, 255, 255));
+    list.AddCircleFilled(placeOf(points[n]), 3.5f, IM_COL32(byte(c.x), byte(c.y), byte(c.z), 255));
+  }
 }
 
 }  // namespace viewer

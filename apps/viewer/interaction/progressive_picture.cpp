@@ -17,6 +17,7 @@
 #include "render/kernel/kernel_scene.h"
 #include "render/kernel/paint.h"
 #include "render/views/picture.h"
+#include "render/views/volume_light.h"
 
 namespace viewer {
 namespace {
@@ -64,6 +65,12 @@ struct ProgressivePicture::Worker {
   std::optional<ClipPlane::Across> preparedCut;
   double preparedOpacity = 1;
   IsosurfaceView preparedIsosurface;
+  std::vector<render::TransferPoint> preparedTransfer;
+  std::optional<render::DirectVolume> directVolume;
+  // Light of the volume in the last picture of `view` with this edge of a pixel; passes that add
+  // samples only have the same light.
+  std::vector<render::VolumeLight> light;
+  int lightPixelSize = 0;
   std::unique_ptr<ClippedScene> cut;
   std::unique_ptr<render::KernelScene> surfaces;
   std::unique_ptr<render::GlContext> context;
@@ -77,6 +84,7 @@ struct ProgressivePicture::Worker {
 
   explicit Worker(const ProgressivePicture& owner_) : owner(owner_) {}
 
+  [[nodiscard]] bool hasLight() const { return view.model->volume && !view.light.transfer.empty(); }
   [[nodiscard]] bool isCut() const { return view.clip && view.model->canCut(); }
   [[nodiscard]] PlacedPlane plane() const {
     return placed(*view.clip, view.camera, view.model->solidBounds);
@@ -87,7 +95,7 @@ struct ProgressivePicture::Worker {
     render::Scene scene = isCut() ? cut->at(plane()) : view.model->scene;
     scene.camera = shrunk(view.camera, edge);
     if (view.model->volume) placeIsosurface(*view.model->volume, view.isosurface, scene);
-    if (view.opacity == 1 || scene.isBlended()) return scene;
+    if (view.opacity == 1 || scene.isBlended() || hasLight()) return scene;
     // The box of the clip plane, which follows the model's solids, stays opaque.
     const std::size_t solids = std::min(view.model->scene.solids.size(), scene.solids.size());
     for (std::size_t i = 0; i < solids; ++i) scene.solids[i].opacity *= view.opacity;
@@ -100,6 +108,7 @@ struct ProgressivePicture::Worker {
       view = request.view;
       pass = 0;
       image = nullptr;
+      lightPixelSize = 0;
     }
     display = request.display;
   }
@@ -182,6 +191,7 @@ struct ProgressivePicture::Worker {
     tracer = nullptr;  // the tracer references the tables in `surfaces`
     surfaces = nullptr;
     cut = nullptr;
+    if (preparedModel != view.model) directVolume.reset();
     if (newCut)
       cut = std::make_unique<ClippedScene>(view.model->scene, view.model->solidBounds, *newCut);
     const render::Scene scene = sceneFor(1);
@@ -215,7 +225,27 @@ struct ProgressivePicture::Worker {
       progress = static_cast<double>(++done) / (across * down);
     });
     if (isStale) return nullptr;
+    if (hasLight()) addLight(*drawn, scene, how.pixelSize, isStale);
+    if (isStale) return nullptr;
     return drawn;
+  }
+
+  void addLight(render::Image& drawn, const render::Scene& scene, int edge,
+                const std::atomic<bool>& isStale) {
+    if (!directVolume || preparedTransfer != view.light.transfer) {
+      directVolume = viewer::directVolume(*view.model->volume, view.light);
+      preparedTransfer = view.light.transfer;
+      lightPixelSize = 0;
+    }
+    if (lightPixelSize != edge) {
+      light = render::volumeLight(drawn, scene, *directVolume,
+                                  {.samples = 1, .isShaded = view.light.isShaded, .isStopped = [&] {
+                                     return isStale.load();
+                                   }});
+      if (isStale) return;
+      lightPixelSize = edge;
+    }
+    render::addVolumeLight(drawn, light);
   }
 
   [[nodiscard]] std::shared_ptr<const Frame> shown() {
@@ -355,7 +385,7 @@ bool isSame(const render::Camera& a, const render::Camera& b) {
 bool isSame(const View& a, const View& b) {
   return a.model == b.model && a.clip == b.clip && a.style == b.style && a.matcap == b.matcap &&
          a.opacity == b.opacity && a.hasThickness == b.hasThickness &&
-         a.isosurface == b.isosurface && isSame(a.camera, b.camera);
+         a.isosurface == b.isosurface && a.light == b.light && isSame(a.camera, b.camera);
 }
 
 }  // namespace viewer

@@ -39,6 +39,7 @@ struct View {
   double opacity = 1;
   bool hasThickness = false;       ///< the picture has the layer thickness
   IsosurfaceView isosurface = {};  ///< of the model's volume, if it has one
+  LightView light = {};            ///< of the model's volume; then `opacity` has no effect
 };
 
 /// Display options. A change of them recolours the present picture, without new rays.

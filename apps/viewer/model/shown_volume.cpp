@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <numeric>
@@ -57,6 +58,12 @@ SliceView firstSlices(const ShownVolume& volume) {
     slices.white = histogram.high;
   }
   return slices;
+}
+
+render::DirectVolume directVolume(const ShownVolume& volume, const LightView& view) {
+  const Imath::V3d spacing = volume.surface.volume().grid().spacing();
+  return {volume.surface,
+          render::TransferFunction(view.transfer, std::min({spacing.x, spacing.y, spacing.z}))};
 }
 
 void placeIsosurface(const ShownVolume& volume, const IsosurfaceView& view, render::Scene& scene) {

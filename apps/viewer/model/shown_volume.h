@@ -3,10 +3,12 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "levelset/volumes/histogram.h"
 #include "render/filter.h"
 #include "render/scene/scene.h"
+#include "render/volumes/direct_volume.h"
 #include "render/volumes/volume_surface.h"
 
 namespace viewer {
@@ -31,6 +33,13 @@ struct IsosurfaceView {
   bool operator==(const IsosurfaceView&) const = default;
 };
 
+/// Light of a volume in a view. A change of it needs new rays.
+struct LightView {
+  std::vector<render::TransferPoint> transfer = {};  ///< empty: the volume has no light of its own
+  bool isShaded = true;                              ///< colours depend on the gradient
+  bool operator==(const LightView&) const = default;
+};
+
 /// Slices through a volume, parallel to the planes of its grid. They show the trilinear
 /// interpolant as shades of grey.
 struct SliceView {
@@ -45,6 +54,9 @@ struct SliceView {
 /// that cover all values but half a percent at both ends.
 [[nodiscard]] IsosurfaceView firstIsosurface(const ShownVolume& volume);
 [[nodiscard]] SliceView firstSlices(const ShownVolume& volume);
+
+/// The volume with a transfer function. @pre the view has a transfer function
+[[nodiscard]] render::DirectVolume directVolume(const ShownVolume& volume, const LightView& view);
 
 /// Replaces the solids of a scene by the isosurface of a view, or by nothing if it is not shown.
 void placeIsosurface(const ShownVolume& volume, const IsosurfaceView& view, render::Scene& scene);

@@ -15,6 +15,7 @@
 #include "apps/viewer/viewer_arguments.h"
 #include "levelset/error.h"
 #include "render/cpu/cpu_renderer.h"
+#include "render/views/volume_light.h"
 #include "tests/support/files.h"
 #include "tests/support/volumes.h"
 
@@ -200,6 +201,29 @@ TEST(ShownVolume, DrawsTheIsosurfaceThatTheRendererDraws) {
   picture.request(view, display);
   for (const float depth : finished(picture, view, display)->image->channels.at("Z"))
     EXPECT_FALSE(std::isfinite(depth));
+}
+
+TEST(ShownVolume, DrawsTheLightOfTheVolume) {
+  const auto model = ballModel();
+  View view{model, cameraFrom({3, 2, 1}), std::nullopt};
+  view.isosurface = {.isovalue = 6};
+  view.opacity = 0.5;  // without effect
+  ProgressivePicture picture(Renderer::Cpu);
+  const Display display;
+  for (const double opacity : {0.01, 0.1}) {
+    view.light.transfer = {{0, 0}, {5, opacity, Imath::C3f(1, 0.2f, 0)}};
+    picture.request(view, display);
+    const auto frame = finished(picture, view, display);
+    render::Scene scene = model->scene;
+    placeIsosurface(*model->volume, view.isosurface, scene);
+    scene.camera = view.camera;
+    render::Image drawn = render::renderCpu(scene);
+    render::addVolumeLight(
+        drawn, render::volumeLight(drawn, scene, directVolume(*model->volume, view.light),
+                                   {.samples = 1}));
+    EXPECT_EQ(frame->image->channels.at("R"), drawn.channels.at("R"));
+    EXPECT_EQ(frame->image->channels.at("A"), drawn.channels.at("A"));
+  }
 }
 
 TEST(ShownVolume, PicksPointsOfTheSurfaceAndOfSlices) {

@@ -197,14 +197,15 @@ TEST_F(ViewerCommand, ShowsIsosurfacesAndSlicesOfVolumes) {
   writeFile("drag.play",
             "wait\n"
             "drag 60,350 135,350 # the middle of the histogram\n"
-            "wait\nclick 60,567\ncopied\n");
+            "wait\nclick 60,591\ncopied\n"
+            "click 26,492\nwait\nclick 180,492\ncopied\n");
   const std::string camera = "--from 9,7,5 --to 1,1,1 --up 0,0,1 --size 120x90";
   const Outcome seen =
       onDisplay("set -e; camera='" + camera +
                 "'\n"
                 "view steps.nrrd $camera --isovalue 111 --filter cubic-c1 --screenshot s.png\n"
                 "view steps.nrrd $camera --isovalue none --slices i=1.5 --grey 0,222 --pick 60,45\n"
-                "view steps.nrrd --size 700x640 --play drag.play\n"
+                "view steps.nrrd --size 700x700 --play drag.play\n"
                 "view steps.nrrd $camera --slices i=2.5 --pick 1,1 || echo $?\n"
                 "view steps.nrrd $camera --clip x=1 --pick 1,1 || echo $?\n"
                 "view steps.nrrd --filter cubic --pick 1,1 || echo $?\n"
@@ -215,7 +216,7 @@ TEST_F(ViewerCommand, ShowsIsosurfacesAndSlicesOfVolumes) {
   ASSERT_EQ(drawn.code, 0) << drawn.err;
   EXPECT_EQ(png("s.png").bytes, png("d.png").bytes);
   const std::vector<std::string> lines = linesOf(seen.out);
-  ASSERT_EQ(lines.size(), 6u) << seen.out;
+  ASSERT_EQ(lines.size(), 7u) << seen.out;
   const Json slice = Json::parse(lines[0]);
   EXPECT_NEAR(slice["position"][0].get<double>(), 1.5, 1e-12);
   EXPECT_NEAR(
@@ -224,7 +225,8 @@ TEST_F(ViewerCommand, ShowsIsosurfacesAndSlicesOfVolumes) {
       1e-4);
   ASSERT_EQ(lines[1].find("isosurface "), 0u) << lines[1];
   EXPECT_NEAR(std::stod(lines[1].substr(11)), 111, 6);
-  EXPECT_EQ(lines[2] + lines[3] + lines[4] + lines[5], "2322");
+  EXPECT_EQ(lines[2].find("--transfer \""), 0u) << lines[2];
+  EXPECT_EQ(lines[3] + lines[4] + lines[5] + lines[6], "2322");
 }
 
 TEST_F(ViewerCommand, ReportsAMissingDisplay) {

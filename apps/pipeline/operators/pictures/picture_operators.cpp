@@ -321,8 +321,8 @@ Value draw(Invocation& in) {
     in.notes.notes.push_back(fmt::format("render: {}", read->second));
   if (const auto told = image.attributes.find("ls:warning"); told != image.attributes.end())
     in.notes.warnings.push_back(fmt::format("render: {}", told->second));
-  render::Image surfaces,
-      judged;  // for --renderer both: without the volume's light, with the judge's
+  // For --renderer both: the picture without the volume's light, and with that of the judge.
+  render::Image surfaces, judged;
   if (isBoth) surfaces = image;
   if (in.given("transfer")) {
     const render::DirectVolume volume = directVolumeOf(in, scene);
@@ -332,10 +332,10 @@ Value draw(Invocation& in) {
     if (isBoth) {
       judged = surfaces;
       light.isJudged = true;
-      render::addVolumeLight(judged, scene, volume, light);
+      render::addVolumeLight(judged, render::volumeLight(judged, scene, volume, light));
       light.isJudged = false;
     }
-    render::addVolumeLight(image, scene, volume, light);
+    render::addVolumeLight(image, render::volumeLight(image, scene, volume, light));
     image.attributes["ls:transfer"] = render::transferText(volume.transfer().points());
   }
   render::writeImage(in.text("file"), image, in.text("format"));

@@ -290,7 +290,7 @@ TEST(DirectVolume, EndsAtSurfacesOfThePicture) {
   const Image plain = renderCpu(scene, options);
   const DirectVolume direct(surface, TransferFunction({{-0.2, 0}, {0, 0.02, C3f(0, 1, 0)}}, 0.07));
   Image image = plain;
-  addVolumeLight(image, scene, direct, {.samples = 1, .isShaded = false});
+  addVolumeLight(image, volumeLight(plain, scene, direct, {.samples = 1, .isShaded = false}));
   std::size_t before = 0, beside = 0;
   for (int y = 0; y < 40; ++y)
     for (int x = 0; x < 60; ++x) {
@@ -316,17 +316,17 @@ TEST(DirectVolume, EndsAtSurfacesOfThePicture) {
   EXPECT_GT(beside, 50u);
 
   Image serial = plain, shaded = plain, again = plain;
-  addVolumeLight(shaded, scene, direct);
+  addVolumeLight(shaded, volumeLight(plain, scene, direct));
   {
     const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-    addVolumeLight(serial, scene, direct);
+    addVolumeLight(serial, volumeLight(plain, scene, direct));
   }
-  addVolumeLight(again, scene, direct, {.isStopped = [] { return true; }});
+  addVolumeLight(again, volumeLight(plain, scene, direct, {.isStopped = [] { return true; }}));
   EXPECT_EQ(shaded.channels, serial.channels);
   EXPECT_EQ(again.channels, plain.channels);
   EXPECT_NE(shaded.channels, image.channels);
   scene.solids[0].opacity = 0.5;
-  EXPECT_THROW(addVolumeLight(image, scene, direct), UsageError);
+  EXPECT_THROW((void)volumeLight(plain, scene, direct), UsageError);
 }
 
 }  // namespace direct_volume_test
