@@ -50,14 +50,28 @@ std::string text(const V3d& v) {
 }  // namespace
 
 Camera::Ray Camera::ray(double x, double y) const {
-  const CameraAxes axes = axesOf(*this);
-  const HalfExtent half = halfExtentOf(*this);
-  const V3d shift =
-      axes.right * ((2 * x / width - 1) * half.x) + axes.up * ((1 - 2 * y / height) * half.y);
-  const double end = farthest();
-  if (orthoHeight) return {from + shift, axes.forward, near, end};
-  const V3d along = axes.forward + shift;  // its component along the view axis is 1
-  return {from, along.normalized(), near * along.length(), far ? end * along.length() : end};
+  return CameraRays(*this).at(x, y);
+}
+
+CameraRays::CameraRays(const Camera& camera) : camera_(camera) {
+  const CameraAxes axes = axesOf(camera);
+  const HalfExtent half = halfExtentOf(camera);
+  right_ = axes.right;
+  up_ = axes.up;
+  forward_ = axes.forward;
+  halfWidth_ = half.x;
+  halfHeight_ = half.y;
+}
+
+Camera::Ray CameraRays::at(double x, double y) const {
+  const V3d shift = right_ * ((2 * x / camera_.width - 1) * halfWidth_) +
+                    up_ * ((1 - 2 * y / camera_.height) * halfHeight_);
+  const double end = camera_.farthest();
+  if (camera_.orthoHeight) return {camera_.from + shift, forward_, camera_.near, end};
+  const V3d along = forward_ + shift;  // its component along the view axis is 1
+  const double length = along.length();
+  return {camera_.from, along.normalized(), camera_.near * length,
+          camera_.far ? end * length : end};
 }
 
 Camera::PixelSteps Camera::pixelSteps() const {

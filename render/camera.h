@@ -50,6 +50,21 @@ struct Camera {
   [[nodiscard]] Imath::M44d worldToNdc() const;
 };
 
+/// Rays of a camera. Its axes are computed once, and the rays have the bits of Camera::ray().
+/// @pre the camera outlives the object
+class CameraRays {
+ public:
+  explicit CameraRays(const Camera& camera);
+  [[nodiscard]] Camera::Ray at(double x, double y) const;
+  /// As Camera::axis().
+  [[nodiscard]] const Imath::V3d& axis() const { return forward_; }
+
+ private:
+  const Camera& camera_;
+  Imath::V3d right_, up_, forward_;
+  double halfWidth_, halfHeight_;
+};
+
 /// Largest number of pixels of an image; larger images are refused.
 inline constexpr double kMaxPixels = 268435456;  // 2^28
 

@@ -46,13 +46,16 @@ KernelPainter::KernelPainter(const Scene& scene, const KernelScene& surfaces,
     : scene_(scene),
       surfaces_(surfaces),
       options_(options),
+      camera_(scene.camera),
       shader_(scene, surfaces.bounds().size().length(), options),
       layers_(image, options) {}
 
 void KernelPainter::paint(const KernelTracer& tracer, const PixelBox& box) const {
   const std::vector<Pixel> pixels = pixelsOf(box);
   const LightLattice lattice = latticeOf(tracer, box);
-  const std::vector<char> contradicts = paintData(tracer, pixels, lattice);
+  const bool isColoursOnly = !options_.layers && !usesLights(options_.style.style);
+  const std::vector<char> contradicts =
+      isColoursOnly ? std::vector<char>(pixels.size(), 0) : paintData(tracer, pixels, lattice);
   paintColours(tracer, pixels, lattice, contradicts);
 }
 
@@ -70,7 +73,7 @@ LightLattice KernelPainter::latticeOf(const KernelTracer& tracer, const PixelBox
   for (std::size_t i = 0; i < points.size(); ++i) {
     at.x[i] = static_cast<float>(points[i].x - 0.5 * camera.width);
     at.y[i] = static_cast<float>(points[i].y - 0.5 * camera.height);
-    views.push_back(camera.ray(points[i].x, points[i].y));
+    views.push_back(camera_.at(points[i].x, points[i].y));
   }
   const PixelHits hits = surfaces_.castPixels(tracer, at);
   const std::vector<Hit> onFields = hitsOnFields(tracer, views);
@@ -162,7 +165,7 @@ Hit KernelPainter::hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std
   const KernelSolid& solid = surfaces_.solids()[static_cast<std::size_t>(hits.solid[i])];
   Hit hit;
   hit.found = true;
-  hit.distance = hits.depth[i] / ray.direction.dot(scene_.camera.axis());
+  hit.distance = hits.depth[i] / ray.direction.dot(camera_.axis());
   hit.position = ray.origin + ray.direction * hit.distance;
   hit.id = solid.id;
   hit.solid = solid.index;
@@ -186,7 +189,7 @@ std::vector<char> KernelPainter::paintData(const KernelTracer& tracer,
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     at.x[i] = static_cast<float>(pixels[i].x + 0.5 - middleX);
     at.y[i] = static_cast<float>(pixels[i].y + 0.5 - middleY);
-    views.push_back(scene_.camera.ray(pixels[i].x + 0.5, pixels[i].y + 0.5));
+    views.push_back(camera_.at(pixels[i].x + 0.5, pixels[i].y + 0.5));
   }
   if (options_.thickness) {
     const FieldTraversal* fields = surfaces_.fields();
@@ -194,7 +197,7 @@ std::vector<char> KernelPainter::paintData(const KernelTracer& tracer,
         fields ? fields->thickness(tracer, fieldRays(views)) : surfaces_.thickness(tracer, at);
     for (std::size_t i = 0; i < pixels.size(); ++i)
       layers_.thickness[numberOf(pixels[i])] = static_cast<float>(
-          fields ? lengths[i] : lengths[i] / views[i].direction.dot(scene_.camera.axis()));
+          fields ? lengths[i] : lengths[i] / views[i].direction.dot(camera_.axis()));
   }
   // Shadow rays from the centres (probes) find shadows that are thinner than the spacing of the
   // lattice.
@@ -252,7 +255,7 @@ void KernelPainter::paintColours(const KernelTracer& tracer, const std::vector<P
       at.y[i] = static_cast<float>(pixels[i].y + shift.y - middleY);
       const double x = static_cast<double>(at.x[i]) + middleX,
                    y = static_cast<double>(at.y[i]) + middleY;
-      const Camera::Ray ray = scene_.camera.ray(x, y);
+      const Camera::Ray ray = camera_.at(x, y);
       sampleRays.push_back({ray, x, y, ray.near});
       views.push_back(ray);
     }

@@ -73,6 +73,7 @@ class KernelPainter {
   const Scene& scene_;
   const KernelScene& surfaces_;
   const RenderOptions& options_;
+  CameraRays camera_;
   Shader shader_;
   PictureLayers layers_;
 };

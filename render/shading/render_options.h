@@ -26,6 +26,9 @@ struct RenderOptions {
   StyleOptions style = {};  ///< shading style of the colours
   bool thickness =
       false;  ///< adds the layer thickness: length of the ray inside the solids, world units
+  /// False: renderCpu() and renderGpu() draw colours only, and leave the other layers empty where
+  /// the style needs no light. The colours have the same bits.
+  bool layers = true;
   bool curvature = true;  ///< adds the layers curvature.mean, .gauss, .k1 and .k2
   /// Memory limit, bytes. It applies to the image and, separately, to the kernel's tables of the
   /// scene.

@@ -209,6 +209,19 @@ TEST(Styles, RefuseInvalidPictures) {
   EXPECT_THROW((void)renderCpu(ballScene(), options), levelset::UsageError);
 }
 
+TEST(Styles, WithoutLightNeedNoLayers) {
+  const Scene scene = support::sceneOf(support::rings(), 80, 60);
+  for (const Style style : {Style::Tone, Style::Ink, Style::Lit}) {
+    RenderOptions options{.samples = 2, .ambientSamples = 2, .style = {.style = style}};
+    const Image all = renderCpu(scene, options);
+    options.layers = false;
+    const Image colours = renderCpu(scene, options);
+    for (const char* channel : {"R", "G", "B", "A"})
+      EXPECT_EQ(colours.channels.at(channel), all.channels.at(channel));
+    EXPECT_EQ(colours.channels.at("N.X") == all.channels.at("N.X"), style == Style::Lit);
+  }
+}
+
 TEST(Styles, AgreeOnGpuAndProcessor) {
   const MatcapFile file;
   for (const Style style : kStyles) {

@@ -312,6 +312,8 @@ Value draw(Invocation& in) {
                                 .thickness = in.flag("thickness"),
                                 .maxBytes = in.maxMemory,
                                 .progress = in.progress};
+  options.layers = isBoth || scene.isBlended() ||
+                   render::imageFormat(in.text("file"), in.text("format")) != "png";
   if (isBoth) options.progress = levelset::subProgress(in.progress, 0, 0.5);
   render::Image image = renderer == "cpu"   ? render::renderCpu(scene, options)
                         : renderer == "gpu" ? render::renderGpu(scene, options)

@@ -282,6 +282,33 @@ TEST(VolumeSurface, HasNormalsTowardsTheOutsideOnBothSides) {
   EXPECT_EQ(compareImages(a, b, {.exact = true}).differentBits, 0u);
 }
 
+TEST(VolumeSurface, IsTheIsosurfaceOfTheFilteredVolume) {
+  const auto all = support::volumeSurfaces();
+  for (const std::size_t n : {0u, 2u})
+    for (const Filter filter : kFilters) {
+      // The coefficients of a picture are f − ∇²f/6, those of a FilteredVolume a product along the
+      // axes.
+      if (filter == Filter::BSplineQi) continue;
+      const VolumeSurface& surface = all[n].second;
+      const levelset::FilteredVolume interpolant(
+          surface.volume(), levelset::volumeFilterNamed(filterName(filter)).value());
+      const M44d toIndex = surface.indexToWorld().inverse();
+      const Image image = renderCpu(sceneOf(surface, 64, 48), optionsOf(filter));
+      std::size_t hits = 0;
+      double most = 0;  // distance from the isosurface, grid spacings
+      for (std::size_t i = 0; i < image.pixelCount(); ++i) {
+        if (!std::isfinite(image.channels.at("Z")[i])) continue;
+        ++hits;
+        const V3d p(image.channels.at("P.X")[i], image.channels.at("P.Y")[i],
+                    image.channels.at("P.Z")[i]);
+        const levelset::VolumeDerivatives at = interpolant.derivatives(p * toIndex);
+        most = std::max(most, std::abs(at.value - surface.isovalue()) / at.gradient.length());
+      }
+      EXPECT_GT(hits, 300u) << filterName(filter);
+      EXPECT_LE(most, measured(1.09e-6)) << filterName(filter) << ", " << all[n].first;
+    }
+}
+
 TEST(VolumeSurface, IsThatOfTheLevelSet) {
   const Volume volume = levelset::marschnerLobb(41);
   const double voxel = 0.05;
