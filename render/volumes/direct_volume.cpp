@@ -50,16 +50,19 @@ double cubicAt(const Cubic& b, double t) {
 struct LightSum {
   VolumeLight light;
 
-  /// Adds a piece on which the value is linear. @param length  world units
-  void addLinear(const TransferFunction& transfer, double from, double to, double length,
-                 double brightness) {
+  /// Adds a piece on which the value is linear.
+  /// @param from, to  values at its ends
+  /// @param begin, end  integrals of the transfer function up to these values
+  /// @param length  world units
+  void addLinear(const TransferFunction& transfer, double from, double to,
+                 const TransferFunction::Integral& begin, const TransferFunction::Integral& end,
+                 double length, double brightness) {
     TransferFunction::Integral part;
     const double rise = to - from;
     // Where the values hardly differ, the difference of the integrals is lost in rounding.
     if (std::abs(rise) > 1e-9 * (std::abs(from) + std::abs(to))) {
-      const auto high = transfer.integral(to), low = transfer.integral(from);
       const double scale = length / rise;
-      part = {(high.extinction - low.extinction) * scale, (high.emission - low.emission) * scale};
+      part = {(end.extinction - begin.extinction) * scale, (end.emission - begin.emission) * scale};
     } else {
       const double middle = 0.5 * (from + to);
       part = {transfer.extinction(middle) * length, transfer.emission(middle) * length};
@@ -70,6 +73,30 @@ struct LightSum {
     light.transmittance *= 1 - absorbed;
   }
 };
+
+/// Slope of the values in a cell, per grid spacing: central differences at its corners, one-sided
+/// at the border of the grid, interpolated. @param numberAt  stored number of a grid point
+template <typename NumberAt>
+V3d slopeAt(const NumberAt& numberAt, const V3i& last, const V3i& cell, const V3d& share) {
+  V3d slope(0);
+  for (int corner = 0; corner < 8; ++corner) {
+    const int offset[3] = {corner >> 2, corner >> 1 & 1, corner & 1};
+    double weight = 1;
+    V3i at = cell;
+    for (int axis = 0; axis < 3; ++axis) {
+      weight *= offset[axis] ? share[axis] : 1 - share[axis];
+      at[axis] = std::min(cell[axis] + offset[axis], last[axis]);
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      V3i low = at, high = at;
+      low[axis] = std::max(at[axis] - 1, 0);
+      high[axis] = std::min(at[axis] + 1, last[axis]);
+      if (high[axis] > low[axis])
+        slope[axis] += weight * (numberAt(high) - numberAt(low)) / (high[axis] - low[axis]);
+    }
+  }
+  return slope;
+}
 
 }  // namespace
 
@@ -107,23 +134,11 @@ double DirectVolume::brightness(const V3d& index, const VolumeShading& shading) 
     cell[axis] = std::clamp(static_cast<int>(index[axis]), 0, std::max(last[axis] - 1, 0));
     share[axis] = std::clamp(index[axis] - cell[axis], 0.0, 1.0);
   }
-  V3d slope(0);  // per grid spacing
-  for (int corner = 0; corner < 8; ++corner) {
-    const V3i at = cell + V3i(corner >> 2, corner >> 1 & 1, corner & 1);
-    double weight = 1;
-    for (int axis = 0; axis < 3; ++axis)
-      weight *= at[axis] > cell[axis] ? share[axis] : 1 - share[axis];
-    if (weight == 0) continue;
-    for (int axis = 0; axis < 3; ++axis) {
-      V3i low = at, high = at;
-      low[axis] = std::max(at[axis] - 1, 0);
-      high[axis] = std::min(at[axis] + 1, last[axis]);
-      if (high[axis] == low[axis]) continue;
-      slope[axis] += weight *
-                     (volume_.at(high.x, high.y, high.z) - volume_.at(low.x, low.y, low.z)) /
-                     (high[axis] - low[axis]);
-    }
-  }
+  return brightnessOf(
+      slopeAt([&](const V3i& p) { return volume_.at(p.x, p.y, p.z); }, last, cell, share), shading);
+}
+
+double DirectVolume::brightnessOf(const V3d& slope, const VolumeShading& shading) const {
   // Gradients are transformed by the inverse transpose of the map from index to world space.
   const Imath::M44d& m = worldToIndex_;
   const V3d gradient(m[0][0] * slope.x + m[0][1] * slope.y + m[0][2] * slope.z,
@@ -147,13 +162,14 @@ VolumeLight DirectVolume::lightOf(const V3d& origin, const V3d& direction, doubl
   worldToIndex_.multVecMatrix(origin, from);
   worldToIndex_.multDirMatrix(direction, step);
   double t = near, end = far;
+  const V3d perStep(1 / step.x, 1 / step.y, 1 / step.z);
   for (int axis = 0; axis < 3; ++axis) {
     const double last = points[axis] - 1;
     if (step[axis] == 0) {
       if (!(from[axis] >= 0 && from[axis] <= last)) return sum.light;
       continue;
     }
-    const double a = -from[axis] / step[axis], b = (last - from[axis]) / step[axis];
+    const double a = -from[axis] * perStep[axis], b = (last - from[axis]) * perStep[axis];
     t = std::max(t, std::min(a, b));
     end = std::min(end, std::max(a, b));
   }
@@ -172,7 +188,7 @@ VolumeLight DirectVolume::lightOf(const V3d& origin, const V3d& direction, doubl
     for (int axis = 0; axis < 3; ++axis) {
       if (step[axis] == 0) continue;
       const double plane = step[axis] > 0 ? low[axis] + size : low[axis];
-      const double at = (plane - from[axis]) / step[axis];
+      const double at = (plane - from[axis]) * perStep[axis];
       if (at < exit) {
         exit = at;
         across = axis;
@@ -199,7 +215,11 @@ VolumeLight DirectVolume::lightOf(const V3d& origin, const V3d& direction, doubl
       sizeof(Number), sizeof(Number) * static_cast<std::size_t>(points.x),
       sizeof(Number) * static_cast<std::size_t>(points.x) * static_cast<std::size_t>(points.y)};
   const levelset::VolumeScale scale = volume_.scale();
-  const double steepest = transfer_.steepest();
+  const auto numberAt = [&](const V3i& p) {
+    return static_cast<double>(levelset::loadNumber<Number>(
+        numbers + static_cast<std::size_t>(p.x) * strides[0] +
+        static_cast<std::size_t>(p.y) * strides[1] + static_cast<std::size_t>(p.z) * strides[2]));
+  };
   while (!isOutside && t < end) {
     const V3i block(cell.x >> 3, cell.y >> 3, cell.z >> 3);
     const V3i group(block.x >> 3, block.y >> 3, block.z >> 3);
@@ -221,32 +241,40 @@ VolumeLight DirectVolume::lightOf(const V3d& origin, const V3d& direction, doubl
     for (std::size_t n = 0; n < 8; ++n)
       f[n] = scale(static_cast<double>(levelset::loadNumber<Number>(
           corner + (n >> 2) * strides[0] + (n >> 1 & 1) * strides[1] + (n & 1) * strides[2])));
+    const V3i cellBefore = cell;
     const V3d low(cell);
     const double start = t;
     t = leave(cell, 1);
     const double length = t - start;
     const auto [least, most] = std::minmax_element(f.begin(), f.end());
-    const double extinction = transfer_.largestBetween(*least, *most);
-    if (!(length > 0) || extinction == 0) continue;
+    const TransferFunction::Bounds bounds = transfer_.boundsBetween(*least, *most);
+    if (!(length > 0) || bounds.extinction == 0) continue;
     const auto local = [&](double at) {
       V3d p = from + step * at - low;
       for (int axis = 0; axis < 3; ++axis) p[axis] = std::clamp(p[axis], 0.0, 1.0);
       return p;
     };
     const Cubic cubic = cubicOf(f, local(start), local(t));
-    const double brightness =
-        shading ? this->brightness(low + local(0.5 * (start + t)), *shading) : 1;
-    // A cubic differs from its linear pieces by at most 3/4 of its second difference over n².
+    const double brightness = shading ? brightnessOf(slopeAt(numberAt, points - V3i(1), cellBefore,
+                                                             local(0.5 * (start + t))) *
+                                                         scale.slope,
+                                                     *shading)
+                                      : 1;
+    // The mean of a cubic on its linear pieces differs by half its second difference over n².
     const double bend = std::max(std::abs(cubic[0] - 2 * cubic[1] + cubic[2]),
                                  std::abs(cubic[1] - 2 * cubic[2] + cubic[3]));
-    const double linear = std::sqrt(0.75 * bend * steepest * length / tolerance_);
-    const double wanted = std::ceil(std::max({linear, extinction * length / kDeepPiece, 1.0}));
+    const double linear = std::sqrt(0.5 * bend * bounds.slope * length / tolerance_);
+    const double wanted =
+        std::ceil(std::max({linear, bounds.extinction * length / kDeepPiece, 1.0}));
     const int pieces = static_cast<int>(std::min(wanted, static_cast<double>(kMostPieces)));
     double value = cubic[0];
+    TransferFunction::Integral integral = transfer_.integral(value);
     for (int n = 1; n <= pieces && sum.light.transmittance >= kLeastTransmittance; ++n) {
       const double next = n == pieces ? cubic[3] : cubicAt(cubic, static_cast<double>(n) / pieces);
-      sum.addLinear(transfer_, value, next, length / pieces, brightness);
+      const TransferFunction::Integral upToNext = transfer_.integral(next);
+      sum.addLinear(transfer_, value, next, integral, upToNext, length / pieces, brightness);
       value = next;
+      integral = upToNext;
     }
     if (sum.light.transmittance < kLeastTransmittance) {
       // As for surfaces, the last point counts as opaque.

@@ -39,7 +39,7 @@ struct VolumeShading {
 class DirectVolume {
  public:
   /// Error of the optical depth of a cell that linear pieces may cause.
-  static constexpr double kTolerance = 1e-4;
+  static constexpr double kTolerance = 3e-4;
 
   /// @param volume  an isosurface of the volume, whose ranges are shared
   /// @param tolerance  error of the optical depth of a cell, > 0
@@ -64,6 +64,8 @@ class DirectVolume {
   [[nodiscard]] double brightness(const Imath::V3d& index, const VolumeShading& shading) const;
 
  private:
+  /// @param slope  gradient of the values, per grid spacing
+  [[nodiscard]] double brightnessOf(const Imath::V3d& slope, const VolumeShading& shading) const;
   template <typename Number>
   [[nodiscard]] VolumeLight lightOf(const Imath::V3d& origin, const Imath::V3d& direction,
                                     double near, double far, const VolumeShading* shading) const;

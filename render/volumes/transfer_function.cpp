@@ -55,21 +55,22 @@ TransferFunction::TransferFunction(std::vector<TransferPoint> points, double vox
     extinctions_.push_back(-std::log1p(-point.opacity) / voxel);
 
   constexpr double kFar = std::numeric_limits<double>::infinity();
-  pieces_.push_back({-kFar, kFar, extinctions_[0], 0, colourOf(points_[0]), V3d(0), {}});
+  pieces_.push_back({-kFar, kFar, 0, extinctions_[0], 0, colourOf(points_[0]), V3d(0), {}});
   for (std::size_t n = 0; n + 1 < points_.size(); ++n) {
     Piece piece{points_[n].value,
                 points_[n + 1].value - points_[n].value,
+                0,
                 extinctions_[n],
                 extinctions_[n + 1] - extinctions_[n],
                 colourOf(points_[n]),
                 colourOf(points_[n + 1]) - colourOf(points_[n]),
                 {}};
     if (n > 0) piece.before = pieces_.back().upTo(piece.low);
-    steepest_ = std::max(steepest_, std::abs(piece.rise) / piece.width);
+    piece.slope = piece.rise / piece.width;
     pieces_.push_back(piece);
   }
-  Piece last{
-      points_.back().value, kFar, extinctions_.back(), 0, colourOf(points_.back()), V3d(0), {}};
+  Piece last{points_.back().value,     kFar,   0, extinctions_.back(), 0,
+             colourOf(points_.back()), V3d(0), {}};
   if (pieces_.size() > 1) last.before = pieces_.back().upTo(last.low);
   pieces_.push_back(last);
 }
@@ -97,10 +98,13 @@ const TransferFunction::Piece& TransferFunction::pieceAt(double value) const {
   return pieces_[n];
 }
 
+double TransferFunction::extinctionIn(const Piece& piece, double value) {
+  return piece.rise == 0 ? piece.extinction : piece.extinction + piece.slope * (value - piece.low);
+}
+
 double TransferFunction::extinction(double value) const {
-  const Piece& piece = pieceAt(value);
-  return piece.rise == 0 ? piece.extinction
-                         : piece.extinction + piece.rise * ((value - piece.low) / piece.width);
+  // At the end of a piece, rounding may leave a negative number.
+  return std::max(extinctionIn(pieceAt(value), value), 0.0);
 }
 
 V3d TransferFunction::emission(double value) const {
@@ -117,12 +121,17 @@ TransferFunction::Integral TransferFunction::integral(double value) const {
   return {extinctions_[0] * length, colourOf(points_[0]) * (extinctions_[0] * length)};
 }
 
-double TransferFunction::largestBetween(double low, double high) const {
-  double largest = std::max(extinction(low), extinction(high));
-  for (std::size_t n = 0; n < points_.size(); ++n)
-    if (points_[n].value > low && points_[n].value < high)
-      largest = std::max(largest, extinctions_[n]);
-  return largest;
+TransferFunction::Bounds TransferFunction::boundsBetween(double low, double high) const {
+  // The first piece that reaches beyond `low`, and all that begin below `high`.
+  std::size_t n = pieces_.size() - 1;
+  while (n > 0 && !(low >= pieces_[n].low)) --n;
+  Bounds bounds{std::max(extinctionIn(pieces_[n], low), 0.0), std::abs(pieces_[n].slope)};
+  for (; n + 1 < pieces_.size() && pieces_[n + 1].low < high; ++n) {
+    bounds.extinction = std::max(bounds.extinction, pieces_[n + 1].extinction);
+    bounds.slope = std::max(bounds.slope, std::abs(pieces_[n + 1].slope));
+  }
+  bounds.extinction = std::max(bounds.extinction, extinctionIn(pieces_[n], high));
+  return bounds;
 }
 
 std::vector<TransferPoint> parseTransfer(const std::string& text) {

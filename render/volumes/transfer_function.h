@@ -44,29 +44,32 @@ class TransferFunction {
     Imath::V3d emission = Imath::V3d(0);
   };
   [[nodiscard]] Integral integral(double value) const;
-  /// Largest extinction at the values from `low` to `high`, per world unit.
-  [[nodiscard]] double largestBetween(double low, double high) const;
+  /// Bounds over a range of values: the largest extinction, per world unit, and its largest change
+  /// for a change of the value, per world unit and value unit.
+  struct Bounds {
+    double extinction = 0, slope = 0;
+  };
+  [[nodiscard]] Bounds boundsBetween(double low, double high) const;
   /// True when the extinction is 0 at all values from `low` to `high`.
   [[nodiscard]] bool isEmptyBetween(double low, double high) const {
-    return largestBetween(low, high) == 0;
+    return boundsBetween(low, high).extinction == 0;
   }
-  /// Largest change of the extinction for a change of the value, per world unit and value unit.
-  [[nodiscard]] double steepest() const { return steepest_; }
 
  private:
   struct Piece {  // from a point to the next one
     double low = 0, width = 0;
+    double slope = 0;                 // of the extinction, over the value
     double extinction = 0, rise = 0;  // at `low`; difference at the next point
     Imath::V3d colour, turn;          // the same of the colour
     Integral before;                  // integral up to `low`
     [[nodiscard]] Integral upTo(double value) const;
   };
   [[nodiscard]] const Piece& pieceAt(double value) const;
+  [[nodiscard]] static double extinctionIn(const Piece& piece, double value);
 
   std::vector<TransferPoint> points_;
   std::vector<double> extinctions_;  // of the points, per world unit
   std::vector<Piece> pieces_;        // the first and the last extend to infinity
-  double steepest_ = 0;
 };
 
 /// Parses "VALUE:OPACITY" or "VALUE:OPACITY/RED,GREEN,BLUE" for each point, separated by blanks.
