@@ -10,6 +10,7 @@ namespace {
 using Imath::V3d;
 using Imath::V3i;
 
+// NOLINTBEGIN(bugprone-macro-parentheses): names of parameters
 #define VAR Real
 #define IN(Type) const Type&
 #define INOUT(Type) Type&
@@ -21,6 +22,7 @@ using Imath::V3i;
 #define AND(a, b) ((a) && (b))
 #define OR(a, b) ((a) || (b))
 #define NOT(a) (!(a))
+// NOLINTEND(bugprone-macro-parentheses)
 
 /// The kernel's functions for one ray in double precision, with the tables of a pool.
 struct ExactKernel {

@@ -134,9 +134,10 @@ Image drawSlice(const levelset::NarrowBand& band, const SliceOptions& options) {
                             static_cast<std::size_t>(x);
       const double left = x - 0.5 * options.width, top = y - 0.5 * options.height;
       C3f sum(0);
-      for (int n = 0; n < kAcross * kAcross; ++n)
-        sum += painter.colour(
-            frame.at(left + (n % kAcross + 0.5) / kAcross, top + (n / kAcross + 0.5) / kAcross));
+      for (int row = 0; row < kAcross; ++row)
+        for (int column = 0; column < kAcross; ++column)
+          sum += painter.colour(
+              frame.at(left + (column + 0.5) / kAcross, top + (row + 0.5) / kAcross));
       const V3d middle = frame.at(left + 0.5, top + 0.5);
       for (int c = 0; c < 3; ++c) {
         colours[c][i] = sum[c] / (kAcross * kAcross);

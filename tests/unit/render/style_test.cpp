@@ -162,7 +162,8 @@ class MatcapFile {
     for (const char* name : {"R", "G", "B"}) image.addChannel(name, 0.1f);
     for (std::size_t i = 0; i < image.pixelCount(); ++i) {
       image.channels["R"][i] = 0.5f * static_cast<float>(i % 64) / 63;
-      image.channels["G"][i] = 0.5f * static_cast<float>(i / 64) / 63;
+      const std::size_t row = i / 64;
+      image.channels["G"][i] = 0.5f * static_cast<float>(row) / 63;
     }
     writeImage(path, image);
   }

@@ -188,7 +188,8 @@ TEST(VolumeSurface, HasTheSameBitsWithAllInstructionSets) {
   PixelBlock pixels(96 * 72);
   for (std::size_t n = 0; n < pixels.size(); ++n) {
     pixels.x[n] = static_cast<float>(n % 96) - 47.5f;
-    pixels.y[n] = static_cast<float>(n / 96) - 35.5f;
+    const std::size_t row = n / 96;
+    pixels.y[n] = static_cast<float>(row) - 35.5f;
   }
   for (const Filter filter : kFilters) {
     const KernelScene kernel(scene, levelset::kNoMemoryLimit, filter);
