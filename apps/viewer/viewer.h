@@ -13,12 +13,12 @@
 #include "apps/viewer/interaction/patch_editor.h"
 #include "apps/viewer/interaction/pick.h"
 #include "apps/viewer/interaction/progressive_picture.h"
-#include "apps/viewer/interaction/transfer_editor.h"
 #include "apps/viewer/model/file_list.h"
 #include "apps/viewer/model/file_watch.h"
 #include "apps/viewer/model/loader.h"
 #include "apps/viewer/model/patch_preview.h"
 #include "apps/viewer/viewer_arguments.h"
+#include "apps/viewer/volume/transfer_editor.h"
 #include "apps/viewer/window.h"
 
 namespace viewer {

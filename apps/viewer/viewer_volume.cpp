@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "apps/viewer/model/point_text.h"
 #include "apps/viewer/panel_parts.h"
+#include "apps/viewer/text/point_text.h"
 #include "apps/viewer/viewer.h"
 
 // Members of Viewer that draw the part of the panel for a volume.

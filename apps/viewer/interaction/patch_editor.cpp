@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "apps/viewer/interaction/surface_ray.h"
-#include "apps/viewer/model/point_text.h"
+#include "apps/viewer/text/point_text.h"
 #include "levelset/grids/sample.h"
 
 namespace viewer {

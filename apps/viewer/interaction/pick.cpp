@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "apps/viewer/interaction/volume_slices.h"
+#include "apps/viewer/volume/volume_slices.h"
 #include "levelset/grids/sample.h"
 
 namespace viewer {

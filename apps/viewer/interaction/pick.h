@@ -6,7 +6,7 @@
 #include <string>
 
 #include "apps/viewer/interaction/progressive_picture.h"
-#include "apps/viewer/model/point_text.h"
+#include "apps/viewer/text/point_text.h"
 
 namespace viewer {
 

@@ -7,17 +7,17 @@
 #include <numeric>
 
 #include "apps/viewer/interaction/point_splats.h"
-#include "apps/viewer/interaction/volume_slices.h"
 #include "apps/viewer/model/matcap_ball.h"
 #include "apps/viewer/model/surface_discs.h"
+#include "apps/viewer/volume/volume_slices.h"
 #include "levelset/memory_limit.h"
 #include "render/cpu/cpu_tracer.h"
+#include "render/direct/volume_light.h"
 #include "render/gpu/gl_context.h"
 #include "render/gpu/gpu_tracer.h"
 #include "render/kernel/kernel_scene.h"
 #include "render/kernel/paint.h"
 #include "render/views/picture.h"
-#include "render/views/volume_light.h"
 
 namespace viewer {
 namespace {
@@ -267,7 +267,7 @@ struct ProgressivePicture::Worker {
       canvas = stretched(canvas, view.camera.width, view.camera.height);
     if (hasSlices)
       paintSlices(view.model->volume->surface.volume(), display.slices, view.camera, *image,
-                  canvas);
+                  canvas.colours);
     if (hasPatches) {
       drawPatches(view.model->patches, display.patches, view.camera, *image,
                   kOnSurface * view.model->bounds.size().length(), canvas);

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/viewer/model/shown_volume.h"
+#include "apps/viewer/volume/shown_volume.h"
 #include "levelset/progress.h"
 #include "mapping/patches/patch.h"
 #include "render/scene/scene.h"

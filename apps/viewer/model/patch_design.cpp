@@ -7,7 +7,7 @@
 #include <numbers>
 #include <numeric>
 
-#include "apps/viewer/model/point_text.h"
+#include "apps/viewer/text/point_text.h"
 #include "levelset/grids/sample.h"
 #include "mapping/generators/hexagons.h"
 #include "mapping/generators/knurl.h"

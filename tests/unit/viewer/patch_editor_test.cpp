@@ -13,7 +13,7 @@
 #include "apps/viewer/interaction/patch_editor.h"
 #include "apps/viewer/interaction/surface_ray.h"
 #include "apps/viewer/model/patch_preview.h"
-#include "apps/viewer/model/point_text.h"
+#include "apps/viewer/text/point_text.h"
 #include "levelset/csg/csg.h"
 #include "levelset/error.h"
 #include "levelset/grids/sample.h"

@@ -10,12 +10,12 @@
 
 #include "apps/viewer/interaction/pick.h"
 #include "apps/viewer/interaction/progressive_picture.h"
-#include "apps/viewer/interaction/volume_slices.h"
 #include "apps/viewer/model/model.h"
 #include "apps/viewer/viewer_arguments.h"
+#include "apps/viewer/volume/volume_slices.h"
 #include "levelset/error.h"
 #include "render/cpu/cpu_renderer.h"
-#include "render/views/volume_light.h"
+#include "render/direct/volume_light.h"
 #include "tests/support/files.h"
 #include "tests/support/volumes.h"
 
@@ -146,15 +146,16 @@ TEST(ShownVolume, SurfacesHideSlicesAsFarAsTheyAreOpaque) {
   camera.orthoHeight = 0.5;
   render::Image picture(4, 1);
   picture.channels["Z"] = {INFINITY, 4, 4, 6};
-  Canvas canvas{4, 1, {0, 0, 0, 0, 200, 100, 50, 255, 200, 100, 50, 51, 200, 100, 50, 255}};
-  paintSlices(volume, slices, camera, picture, canvas);
+  std::vector<std::uint8_t> colours = {0,   0,   0,  0,  200, 100, 50, 255,
+                                       200, 100, 50, 51, 200, 100, 50, 255};
+  paintSlices(volume, slices, camera, picture, colours);
   const std::vector<std::uint8_t> expected = {
       128, 128, 128, 255,  // nothing else: grey of the middle between black and white
       200, 100, 50,  255,  // an opaque surface in front
       142, 122, 112, 255,  // a surface of opacity 0.2 in front
       128, 128, 128, 255,  // a surface behind
   };
-  EXPECT_EQ(canvas.colours, expected);
+  EXPECT_EQ(colours, expected);
 }
 
 TEST(ShownVolume, BeginsWithASuggestedIsovalueAndGreysOfAlmostAllValues) {

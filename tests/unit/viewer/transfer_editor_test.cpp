@@ -1,6 +1,6 @@
 // Editing of a transfer function with the mouse.
 
-#include "apps/viewer/interaction/transfer_editor.h"
+#include "apps/viewer/volume/transfer_editor.h"
 
 #include <gtest/gtest.h>
 

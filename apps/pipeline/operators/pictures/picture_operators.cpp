@@ -18,13 +18,13 @@
 #include "levelset/volumes/histogram.h"
 #include "render/camera.h"
 #include "render/cpu/cpu_renderer.h"
+#include "render/direct/volume_light.h"
 #include "render/embree/embree_renderer.h"
 #include "render/gpu/gpu_renderer.h"
 #include "render/images/compare_images.h"
 #include "render/images/image.h"
 #include "render/kernel/frustum_culling.h"
 #include "render/scene/scene.h"
-#include "render/views/volume_light.h"
 
 namespace pipeline {
 namespace {

@@ -13,8 +13,8 @@
 #include "levelset/isosurface/isosurface.h"
 #include "levelset/isosurface/isosurface_mesh.h"
 #include "levelset/transform/resample.h"
+#include "levelset/volumes/filters/resample_volume.h"
 #include "levelset/volumes/histogram.h"
-#include "levelset/volumes/resample_volume.h"
 #include "levelset/volumes/synthetic.h"
 
 namespace pipeline {
@@ -87,9 +87,9 @@ Value printHistogram(Invocation& in) {
   const double width = (found.high - found.low) / static_cast<double>(bins);
   for (std::size_t n = 0; n < lines.size(); ++n) {
     const double share = std::sqrt(static_cast<double>(lines[n]) / most);
-    in.output += fmt::format(
-        "{:>12.6g} {:>12} {}\n", found.low + static_cast<double>(n * joined) * width, lines[n],
-        std::string(static_cast<std::size_t>(std::lround(share * kBar)), '#'));
+    in.output += fmt::format("{:>12.6g} {:>12} {}\n",
+                             found.low + static_cast<double>(n * joined) * width, lines[n],
+                             std::string(static_cast<std::size_t>(std::lround(share * kBar)), '#'));
   }
   return in.operands[0];
 }

@@ -52,8 +52,8 @@ TEST_F(Pictures, HaveEqualBitsOnGpuAndProcessorAndAgreeWithEmbree) {
 }
 
 TEST_F(Pictures, OfVolumesAreProvenWithAllFilters) {
-  for (const char* filter :
-       {"trilinear", "tricubic", "bspline", "bspline-qi", "super-quadratic", "cubic-c1", "bcc-quadratic"}) {
+  for (const char* filter : {"trilinear", "tricubic", "bspline", "bspline-qi", "super-quadratic",
+                             "cubic-c1", "bcc-quadratic"}) {
     const Outcome drawn = levelsmith(
         std::string("volume marschner-lobb ! render v.exr --isovalue 0.5 --size 96x72 --samples 1 "
                     "--renderer both --filter ") +

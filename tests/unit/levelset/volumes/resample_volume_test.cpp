@@ -7,7 +7,7 @@
 
 #include "levelset/error.h"
 #include "levelset/volumes/filters/filtered_volume.h"
-#include "levelset/volumes/resample_volume.h"
+#include "levelset/volumes/filters/resample_volume.h"
 #include "tests/support/measured.h"
 #include "tests/support/volumes.h"
 

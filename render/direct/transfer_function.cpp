@@ -1,4 +1,4 @@
-#include "render/volumes/transfer_function.h"
+#include "render/direct/transfer_function.h"
 
 #include <fmt/core.h>
 

@@ -1,4 +1,4 @@
-#include "apps/viewer/interaction/volume_slices.h"
+#include "apps/viewer/volume/volume_slices.h"
 
 #include <Imath/ImathMatrix.h>
 #include <tbb/blocked_range.h>
@@ -83,22 +83,23 @@ V3d sliceNormal(const levelset::Volume& volume, std::size_t axis) {
 }
 
 void paintSlices(const levelset::Volume& volume, const SliceView& slices,
-                 const render::Camera& camera, const render::Image& picture, Canvas& canvas) {
+                 const render::Camera& camera, const render::Image& picture,
+                 std::vector<std::uint8_t>& colours) {
   const SliceFinder finder(volume, slices, camera);
   const std::vector<float>& depths = picture.channels.at("Z");
   const auto place = [](int at, int size, int of) {
     return std::min(static_cast<int>((at + 0.5) * of / size), of - 1);
   };
   const auto paintRow = [&](int y) {
-    const auto row = static_cast<std::size_t>(place(y, canvas.height, picture.height)) *
+    const auto row = static_cast<std::size_t>(place(y, camera.height, picture.height)) *
                      static_cast<std::size_t>(picture.width);
-    for (int x = 0; x < canvas.width; ++x) {
+    for (int x = 0; x < camera.width; ++x) {
       const std::optional<SlicePoint> seen = finder.at(x + 0.5, y + 0.5);
       if (!seen) continue;
       const auto surface = static_cast<double>(
-          depths[row + static_cast<std::size_t>(place(x, canvas.width, picture.width))]);
-      std::uint8_t* p = canvas.colours.data() +
-                        4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(canvas.width) +
+          depths[row + static_cast<std::size_t>(place(x, camera.width, picture.width))]);
+      std::uint8_t* p = colours.data() +
+                        4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(camera.width) +
                              static_cast<std::size_t>(x));
       // Where the ray through the middle of a pixel meets no surface, the pixel may show an edge.
       const double before =
@@ -109,7 +110,7 @@ void paintSlices(const levelset::Volume& volume, const SliceView& slices,
       p[3] = 255;
     }
   };
-  tbb::parallel_for(tbb::blocked_range<int>(0, canvas.height, 8), [&](const auto& rows) {
+  tbb::parallel_for(tbb::blocked_range<int>(0, camera.height, 8), [&](const auto& rows) {
     for (int y = rows.begin(); y < rows.end(); ++y) paintRow(y);
   });
 }

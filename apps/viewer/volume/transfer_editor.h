@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "render/volumes/transfer_function.h"
+#include "render/direct/transfer_function.h"
 
 namespace viewer {
 

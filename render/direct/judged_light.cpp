@@ -1,4 +1,4 @@
-#include "render/embree/volume_integral.h"
+#include "render/direct/judged_light.h"
 
 #include <algorithm>
 #include <cmath>

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "levelset/volumes/histogram.h"
+#include "render/direct/direct_volume.h"
 #include "render/filter.h"
 #include "render/scene/scene.h"
-#include "render/volumes/direct_volume.h"
 #include "render/volumes/volume_surface.h"
 
 namespace viewer {

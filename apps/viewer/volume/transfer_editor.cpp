@@ -1,4 +1,4 @@
-#include "apps/viewer/interaction/transfer_editor.h"
+#include "apps/viewer/volume/transfer_editor.h"
 
 #include <algorithm>
 #include <cmath>

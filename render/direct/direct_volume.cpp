@@ -1,4 +1,4 @@
-#include "render/volumes/direct_volume.h"
+#include "render/direct/direct_volume.h"
 
 #include <algorithm>
 #include <array>

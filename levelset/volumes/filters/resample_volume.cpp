@@ -1,4 +1,4 @@
-#include "levelset/volumes/resample_volume.h"
+#include "levelset/volumes/filters/resample_volume.h"
 
 #include <fmt/core.h>
 #include <tbb/blocked_range.h>

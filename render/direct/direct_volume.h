@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "render/volumes/transfer_function.h"
+#include "render/direct/transfer_function.h"
 #include "render/volumes/volume_surface.h"
 
 namespace render {

@@ -1,4 +1,4 @@
-#include "apps/viewer/model/shown_volume.h"
+#include "apps/viewer/volume/shown_volume.h"
 
 #include <fmt/core.h>
 
@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "apps/pipeline/values/units.h"
-#include "apps/viewer/model/point_text.h"
+#include "apps/viewer/text/point_text.h"
 #include "levelset/error.h"
 
 namespace viewer {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "render/volumes/direct_volume.h"
+#include "render/direct/direct_volume.h"
 
 namespace render {
 

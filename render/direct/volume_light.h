@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "levelset/progress.h"
+#include "render/direct/direct_volume.h"
 #include "render/images/image.h"
 #include "render/scene/scene.h"
-#include "render/volumes/direct_volume.h"
 
 namespace render {
 

@@ -1,4 +1,4 @@
-#include "render/views/volume_light.h"
+#include "render/direct/volume_light.h"
 
 #include <tbb/parallel_for.h>
 
@@ -7,7 +7,7 @@
 
 #include "levelset/error.h"
 #include "levelset/progress_gate.h"
-#include "render/embree/volume_integral.h"
+#include "render/direct/judged_light.h"
 #include "render/shading/shading.h"
 
 namespace render {

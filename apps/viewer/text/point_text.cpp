@@ -1,4 +1,4 @@
-#include "apps/viewer/model/point_text.h"
+#include "apps/viewer/text/point_text.h"
 
 #include <fmt/core.h>
 

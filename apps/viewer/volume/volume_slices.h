@@ -2,10 +2,11 @@
 
 #include <Imath/ImathVec.h>
 
+#include <cstdint>
 #include <optional>
+#include <vector>
 
-#include "apps/viewer/interaction/patch_overlay.h"
-#include "apps/viewer/model/shown_volume.h"
+#include "apps/viewer/volume/shown_volume.h"
 #include "levelset/volumes/volume.h"
 #include "render/camera.h"
 #include "render/images/image.h"
@@ -32,9 +33,10 @@ struct SlicePoint {
 
 /// Paints slices over a picture. A surface in front of a slice hides it as far as the surface is
 /// opaque; surfaces behind it are hidden.
-/// @param camera  camera whose width and height are those of the canvas
 /// @param picture  picture of the same view, of any size; its layer Z is the depth of the surfaces
+/// @param colours  red, green, blue and alpha of each pixel of the camera, a byte each
 void paintSlices(const levelset::Volume& volume, const SliceView& slices,
-                 const render::Camera& camera, const render::Image& picture, Canvas& canvas);
+                 const render::Camera& camera, const render::Image& picture,
+                 std::vector<std::uint8_t>& colours);
 
 }  // namespace viewer

@@ -1,6 +1,6 @@
 // Direct volume rendering against closed forms and against the judge.
 
-#include "render/volumes/direct_volume.h"
+#include "render/direct/direct_volume.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -13,8 +13,8 @@
 #include "levelset/error.h"
 #include "levelset/volumes/synthetic.h"
 #include "render/cpu/cpu_renderer.h"
-#include "render/embree/volume_integral.h"
-#include "render/views/volume_light.h"
+#include "render/direct/judged_light.h"
+#include "render/direct/volume_light.h"
 #include "tests/support/measured.h"
 #include "tests/support/volume_scenes.h"
 
