@@ -32,6 +32,14 @@ std::string namesOf(const std::vector<std::filesystem::path>& files) {
   return names;
 }
 
+/// True when isovalues and slices of one volume fit the other: same grid and range of values.
+bool isSameGrid(const std::shared_ptr<const ShownVolume>& a,
+                const std::shared_ptr<const ShownVolume>& b) {
+  if (!a || !b) return false;
+  const levelset::Volume &x = a->surface.volume(), &y = b->surface.volume();
+  return x.size() == y.size() && x.lowest() == y.lowest() && x.highest() == y.highest();
+}
+
 }  // namespace
 
 Viewer::Viewer(const Arguments& arguments, Window& window)
@@ -55,17 +63,19 @@ void Viewer::open(const std::vector<std::filesystem::path>& files, bool isReload
 }
 
 void Viewer::show(std::shared_ptr<const Model> model, bool keepView) {
-  const bool wasEmpty = !model_ || model_->bounds.isEmpty(), hadVolume = model_ && model_->volume;
+  if (!model_) requireFit(arguments_, *model);
+  const bool wasEmpty = !model_ || model_->bounds.isEmpty();
+  const bool keepsVolume = keepView && model_ && isSameGrid(model_->volume, model->volume);
   model_ = std::move(model);
   if (!model_->volume) {
     isosurface_ = {};
     light_ = {};
     display_.slices = {};
-  } else if (!keepView || !hadVolume) {
+  } else if (!keepsVolume) {
     isosurface_ = firstIsosurface(arguments_, *model_);
     light_ = firstLight(arguments_, *model_);
     const levelset::VolumeHistogram& histogram = model_->volume->histogram;
-    const double span = std::max(histogram.high - histogram.low, 1e-30);
+    const double span = histogram.high > histogram.low ? histogram.high - histogram.low : 1;
     transferEditor_ = TransferEditor(
         light_.transfer.empty() ? render::suggestedTransfer(histogram) : light_.transfer,
         histogram.low, histogram.low + span);

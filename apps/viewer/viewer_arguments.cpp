@@ -36,7 +36,7 @@ and patches (.patch) with it.
   --opacity N         opacity of the surfaces, above 0 and at most 1    [1]
   --range N           curvature at the ends of the colours, times the model's diagonal [40]
   --clip PLANE        clip plane that shows phi: x=0.1, y=0.1, z=0.1, or view=0.1 (in front of the centre)
-  --isovalue N        of a volume: value of the isosurface, or none     [the first one that 'histogram' suggests]
+  --isovalue N        of a volume: value of the isosurface, or none     [with --transfer: none; else the first of 'histogram']
   --inside SIDE       of a volume: side of the isovalue that is solid, above or below [above]
   --filter NAME       of a volume: interpolation, as in 'render'        [trilinear]
   --transfer POINTS   of a volume: direct volume rendering, as in 'render', or auto
@@ -108,7 +108,7 @@ void setInside(Arguments& to, const std::string& text) {
   if (text != "above" && text != "below")
     throw UsageError(
         fmt::format("levelsmith-view: --inside '{}' is unknown; give above or below", text));
-  to.isBelowInside = text == "below";
+  to.inside = text == "below" ? render::VolumeInside::Below : render::VolumeInside::Above;
 }
 
 std::array<double, 2> parseGrey(const std::string& text) {
@@ -305,7 +305,7 @@ IsosurfaceView firstIsosurface(const Arguments& arguments, const Model& model) {
   IsosurfaceView view = firstIsosurface(*model.volume);
   view.isShown = !arguments.hidesIsosurface && (arguments.isovalue || arguments.transfer.empty());
   view.isovalue = arguments.isovalue.value_or(view.isovalue);
-  if (arguments.isBelowInside) view.inside = render::VolumeInside::Below;
+  view.inside = arguments.inside.value_or(view.inside);
   view.filter = arguments.filter.value_or(view.filter);
   return view;
 }

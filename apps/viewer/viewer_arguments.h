@@ -31,7 +31,7 @@ struct Arguments {
   // === For a volume; unset: the viewer's own choice
   std::optional<double> isovalue = {};
   bool hidesIsosurface = false;  ///< --isovalue none
-  bool isBelowInside = false;    ///< --inside below
+  std::optional<render::VolumeInside> inside = {};
   std::optional<render::Filter> filter = {};
   std::string transfer = {};  ///< points of the transfer function, or "auto"; empty: none
   std::array<std::optional<double>, 3> slices = {};  ///< positions across i, j and k, grid indices
@@ -46,12 +46,13 @@ struct Arguments {
   std::optional<std::filesystem::path> play = {};  ///< script of simulated input
   bool asksHelp = false, asksVersion = false;
 
-  /// True when the viewer runs without an open window: to write a screenshot, to print a picked
-  /// point, or to play simulated input.
+  /// True when an option for volumes is given.
   [[nodiscard]] bool hasVolumeOption() const {
-    return isovalue || hidesIsosurface || isBelowInside || filter || grey || !transfer.empty() ||
+    return isovalue || hidesIsosurface || inside || filter || grey || !transfer.empty() ||
            slices[0] || slices[1] || slices[2];
   }
+  /// True when the viewer runs without an open window: to write a screenshot, to print a picked
+  /// point, or to play simulated input.
   [[nodiscard]] bool isScript() const { return screenshot || pick || play; }
 };
 

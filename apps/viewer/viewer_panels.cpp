@@ -34,9 +34,9 @@ void Viewer::drawPanel() {
   drawVolumePart();
   if (!model_ || !model_->volume) {
     drawClipPart();
-    drawPatchPart();
     drawPatchEditorPart();
   }
+  drawPatchPart();
   drawPointPart();
   ImGui::PopItemWidth();
   ImGui::End();

@@ -14,6 +14,12 @@ namespace {
 
 constexpr float kHistogramHeight = 64;  // pixels
 
+/// Inverse of render::linearFromSrgb(). Values outside 0 to 1 are clamped.
+float srgbFromLinear(float x) {
+  x = std::clamp(x, 0.0f, 1.0f);
+  return x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x, 1 / 2.4f) - 0.055f;
+}
+
 }  // namespace
 
 void Viewer::drawVolumePart() {
@@ -86,25 +92,22 @@ void Viewer::drawLightPart() {
     if (hasLight) isosurface_.isShown = false;
     showMessage(hasLight ? "Drag points in the histogram; press elsewhere to add one, and the "
                            "right button to remove one."
-                         : "The volume has no light of its own.");
+                         : "Direct volume rendering is off.");
   }
   if (!hasLight) return;
   ImGui::SameLine();
   ImGui::Checkbox("shading", &light_.isShaded);
   ImGui::SameLine();
   if (ImGui::Button("Copy##transfer")) {
-    window_.setClipboard(
-        fmt::format("--transfer \"{}\"", render::transferText(transferEditor_.points())));
-    showMessage("The transfer function was copied to the clipboard, as an option of 'render'.");
+    window_.setClipboard(lightText(light_, isosurface_));
+    showMessage("The transfer function was copied to the clipboard, as options of 'render'.");
   }
   const std::optional<std::size_t> selected = transferEditor_.selected();
   if (!selected) return;
-  // The widget shows and edits colours in sRGB.
-  constexpr float kGamma = 2.2f;
   Imath::C3f colour = transferEditor_.points()[*selected].colour;
-  for (int c = 0; c < 3; ++c) colour[c] = std::pow(std::clamp(colour[c], 0.0f, 1.0f), 1 / kGamma);
+  for (int c = 0; c < 3; ++c) colour[c] = srgbFromLinear(colour[c]);
   if (ImGui::ColorEdit3("colour", &colour.x, ImGuiColorEditFlags_NoInputs)) {
-    for (int c = 0; c < 3; ++c) colour[c] = std::pow(colour[c], kGamma);
+    for (int c = 0; c < 3; ++c) colour[c] = render::linearFromSrgb(colour[c]);
     transferEditor_.setColour(colour);
     light_.transfer = transferEditor_.points();
   }
@@ -175,9 +178,7 @@ void Viewer::drawHistogram() {
   for (std::size_t n = 0; n + 1 < points.size(); ++n)
     list.AddLine(placeOf(points[n]), placeOf(points[n + 1]), IM_COL32(235, 235, 235, 200), 1.5f);
   for (std::size_t n = 0; n < points.size(); ++n) {
-    const auto byte = [](float linear) {
-      return static_cast<int>(255 * std::pow(std::clamp(linear, 0.0f, 1.0f), 1 / 2.2f));
-    };
+    const auto byte = [](float linear) { return static_cast<int>(255 * srgbFromLinear(linear)); };
     const Imath::C3f& c = points[n].colour;
     list.AddCircleFilled(placeOf(points[n]), transferEditor_.selected() == n ? 6.0f : 4.5f,
                          IM_COL32(255, 255, 255, 255));

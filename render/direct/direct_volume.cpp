@@ -18,7 +18,8 @@ using levelset::Volume;
 
 /// Optical depth of a piece above which it is split, so that light from its far end is absorbed.
 constexpr double kDeepPiece = 0.1;
-constexpr int kMostPieces = 64;
+// Only peaks of the transfer function that are thinner than 1e-4 of the values in a cell need more.
+constexpr int kMostPieces = 4096;
 
 /// Values of the trilinear interpolant along a segment of a cell, as a cubic in Bernstein form.
 using Cubic = std::array<double, 4>;
@@ -50,27 +51,16 @@ double cubicAt(const Cubic& b, double t) {
 struct LightSum {
   VolumeLight light;
 
-  /// Adds a piece on which the value is linear.
-  /// @param from, to  values at its ends
-  /// @param begin, end  integrals of the transfer function up to these values
-  /// @param length  world units
-  void addLinear(const TransferFunction& transfer, double from, double to,
-                 const TransferFunction::Integral& begin, const TransferFunction::Integral& end,
-                 double length, double brightness) {
-    TransferFunction::Integral part;
-    const double rise = to - from;
-    // Where the values hardly differ, the difference of the integrals is lost in rounding.
-    if (std::abs(rise) > 1e-9 * (std::abs(from) + std::abs(to))) {
-      const double scale = length / rise;
-      part = {(end.extinction - begin.extinction) * scale, (end.emission - begin.emission) * scale};
-    } else {
-      const double middle = 0.5 * (from + to);
-      part = {transfer.extinction(middle) * length, transfer.emission(middle) * length};
-    }
-    if (!(part.extinction > 0)) return;
-    const double absorbed = -std::expm1(-part.extinction);
-    light.colour += part.emission * (brightness * light.transmittance * absorbed / part.extinction);
-    light.transmittance *= 1 - absorbed;
+  /// Adds a piece on which the values go linearly from `from` to `to`. @param length  world units
+  void addLinear(const TransferFunction& transfer, double from, double to, double length,
+                 double brightness) {
+    transfer.alongRun(from, to, [&](const TransferFunction::Part& part) {
+      if (!(part.extinction > 0)) return;
+      const double absorbed = -std::expm1(-part.extinction * part.share * length);
+      light.colour +=
+          part.emission * (brightness * light.transmittance * absorbed / part.extinction);
+      light.transmittance *= 1 - absorbed;
+    });
   }
 };
 
@@ -98,11 +88,17 @@ V3d slopeAt(const NumberAt& numberAt, const V3i& last, const V3i& cell, const V3
   return slope;
 }
 
+double voxelOf(const Volume& volume) {
+  const V3d spacing = volume.grid().spacing();
+  return std::min({spacing.x, spacing.y, spacing.z});
+}
+
 }  // namespace
 
-DirectVolume::DirectVolume(const VolumeSurface& volume, TransferFunction transfer, double tolerance)
+DirectVolume::DirectVolume(const VolumeSurface& volume, std::vector<TransferPoint> points,
+                           double tolerance)
     : volume_(volume.volume()),
-      transfer_(std::move(transfer)),
+      transfer_(std::move(points), voxelOf(volume_)),
       tolerance_(tolerance),
       worldToIndex_(volume.indexToWorld().inverse()),
       blocks_(volume.ranges().size()),
@@ -268,13 +264,10 @@ VolumeLight DirectVolume::lightOf(const V3d& origin, const V3d& direction, doubl
         std::ceil(std::max({linear, bounds.extinction * length / kDeepPiece, 1.0}));
     const int pieces = static_cast<int>(std::min(wanted, static_cast<double>(kMostPieces)));
     double value = cubic[0];
-    TransferFunction::Integral integral = transfer_.integral(value);
     for (int n = 1; n <= pieces && sum.light.transmittance >= kLeastTransmittance; ++n) {
       const double next = n == pieces ? cubic[3] : cubicAt(cubic, static_cast<double>(n) / pieces);
-      const TransferFunction::Integral upToNext = transfer_.integral(next);
-      sum.addLinear(transfer_, value, next, integral, upToNext, length / pieces, brightness);
+      sum.addLinear(transfer_, value, next, length / pieces, brightness);
       value = next;
-      integral = upToNext;
     }
     if (sum.light.transmittance < kLeastTransmittance) {
       // As for surfaces, the last point counts as opaque.

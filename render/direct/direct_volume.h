@@ -31,8 +31,9 @@ struct VolumeShading {
 ///
 /// with the extinction τ and the colour c [Max95]. In each cell the interpolant is a cubic along
 /// the ray. It is replaced by linear pieces, so short that the optical depth of a cell changes by
-/// less than a tolerance. The integral over a piece is pre-integrated in closed form.
-/// Blocks of 8³ cells without extinction are skipped.
+/// less than a tolerance. Linear pieces are cut at the points of the transfer function, and
+/// integrated in closed form, as in pre-integrated volume rendering [Engel01]. A cell has at most
+/// 4096 pieces. Blocks of 8³ cells without extinction are skipped.
 ///
 /// The class has value semantics. Copies share the numbers and the ranges of the volume. All
 /// methods may run concurrently.
@@ -42,8 +43,12 @@ class DirectVolume {
   static constexpr double kTolerance = 3e-4;
 
   /// @param volume  an isosurface of the volume, whose ranges are shared
+  /// @param points  of the transfer function; opacities are those of a layer as thick as the
+  /// smallest
+  ///        spacing of the grid
   /// @param tolerance  error of the optical depth of a cell, > 0
-  DirectVolume(const VolumeSurface& volume, TransferFunction transfer,
+  /// @throws as TransferFunction
+  DirectVolume(const VolumeSurface& volume, std::vector<TransferPoint> points,
                double tolerance = kTolerance);
 
   [[nodiscard]] const levelset::Volume& volume() const { return volume_; }

@@ -38,6 +38,40 @@ std::vector<double> planesAlong(const V3d& origin, const V3d& step, const Imath:
   return planes;
 }
 
+/// Steps along a ray in one cell.
+struct CellSteps {
+  const DirectVolume& volume;
+  V3d start, step;
+  double brightness = 1;
+  VolumeLight& light;
+
+  [[nodiscard]] double valueAt(double t) const {
+    return volume.volume().trilinear(start + step * t);
+  }
+
+  /// Adds the light between two distances. @param from, to  values there
+  void add(double begin, double end, double from, double to, int depth) const {
+    const auto& points = volume.transfer().points();
+    const bool hasPoint =
+        std::any_of(points.begin(), points.end(), [&](const TransferPoint& point) {
+          return std::min(from, to) < point.value && point.value < std::max(from, to);
+        });
+    constexpr int kDeepest = 24;
+    const double middle = 0.5 * (begin + end), value = valueAt(middle);
+    if (hasPoint && depth < kDeepest) {
+      add(begin, middle, from, value, depth + 1);
+      add(middle, end, value, to, depth + 1);
+      return;
+    }
+    const double extinction = volume.transfer().extinction(value);
+    if (!(extinction > 0)) return;
+    const double passed = std::exp(-extinction * (end - begin));
+    light.colour += volume.transfer().emission(value) *
+                    (brightness * light.transmittance * (1 - passed) / extinction);
+    light.transmittance *= passed;
+  }
+};
+
 }  // namespace
 
 VolumeLight judgedLight(const DirectVolume& volume, const V3d& origin, const V3d& direction,
@@ -52,15 +86,13 @@ VolumeLight judgedLight(const DirectVolume& volume, const V3d& origin, const V3d
     const double brightness =
         shading ? volume.brightness(start + step * (0.5 * (planes[n - 1] + planes[n])), *shading)
                 : 1;
+    const CellSteps cell{volume, start, step, brightness, light};
+    double from = cell.valueAt(planes[n - 1]);
     for (int s = 0; s < steps && length > 0; ++s) {
-      const V3d at = start + step * (planes[n - 1] + (s + 0.5) * length);
-      const double value = volume.volume().trilinear(at);
-      const double extinction = volume.transfer().extinction(value);
-      if (!(extinction > 0)) continue;
-      const double passed = std::exp(-extinction * length);
-      light.colour += volume.transfer().emission(value) *
-                      (brightness * light.transmittance * (1 - passed) / extinction);
-      light.transmittance *= passed;
+      const double begin = planes[n - 1] + s * length, end = begin + length;
+      const double to = cell.valueAt(end);
+      cell.add(begin, end, from, to, 0);
+      from = to;
     }
   }
   return light;

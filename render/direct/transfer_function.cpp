@@ -51,81 +51,69 @@ TransferFunction::TransferFunction(std::vector<TransferPoint> points, double vox
           fmt::format("the transfer function has two points at the value {}; give one of them, or "
                       "move one a little",
                       points_[n].value));
-  for (const TransferPoint& point : points_)
-    extinctions_.push_back(-std::log1p(-point.opacity) / voxel);
-
+  const auto extinctionOf = [&](const TransferPoint& point) {
+    return -std::log1p(-point.opacity) / voxel;
+  };
   constexpr double kFar = std::numeric_limits<double>::infinity();
-  pieces_.push_back({-kFar, kFar, 0, extinctions_[0], 0, colourOf(points_[0]), V3d(0), {}});
+  const auto addConstant = [&](double low, const TransferPoint& point) {
+    pieces_.push_back({low, kFar, extinctionOf(point), 0, colourOf(point), V3d(0)});
+  };
+  addConstant(-kFar, points_.front());
   for (std::size_t n = 0; n + 1 < points_.size(); ++n) {
-    Piece piece{points_[n].value,
-                points_[n + 1].value - points_[n].value,
-                0,
-                extinctions_[n],
-                extinctions_[n + 1] - extinctions_[n],
-                colourOf(points_[n]),
-                colourOf(points_[n + 1]) - colourOf(points_[n]),
-                {}};
-    if (n > 0) piece.before = pieces_.back().upTo(piece.low);
-    piece.slope = piece.rise / piece.width;
-    pieces_.push_back(piece);
+    const TransferPoint &a = points_[n], &b = points_[n + 1];
+    const double width = b.value - a.value;
+    pieces_.push_back({a.value, width, extinctionOf(a), (extinctionOf(b) - extinctionOf(a)) / width,
+                       colourOf(a), colourOf(b) - colourOf(a)});
   }
-  Piece last{points_.back().value,     kFar,   0, extinctions_.back(), 0,
-             colourOf(points_.back()), V3d(0), {}};
-  if (pieces_.size() > 1) last.before = pieces_.back().upTo(last.low);
-  pieces_.push_back(last);
+  addConstant(points_.back().value, points_.back());
 }
 
-TransferFunction::Integral TransferFunction::Piece::upTo(double value) const {
-  Integral sum = before;
-  const double length = value - low;
-  if (rise == 0 && turn == V3d(0)) {
-    sum.extinction += extinction * length;
-    sum.emission += colour * (extinction * length);
-    return sum;
-  }
-  // With s from 0 to 1 along the piece, colour × extinction is a quadratic polynomial of s.
-  const double s = length / width;
-  sum.extinction += length * (extinction + 0.5 * rise * s);
-  sum.emission += length * (colour * extinction + (colour * rise + turn * extinction) * (0.5 * s) +
-                            turn * (rise * s * s / 3));
-  return sum;
-}
-
-const TransferFunction::Piece& TransferFunction::pieceAt(double value) const {
+std::size_t TransferFunction::pieceAt(double value) const {
   // Few points are usual, so a linear search is fast.
   std::size_t n = pieces_.size() - 1;
   while (n > 0 && !(value >= pieces_[n].low)) --n;
-  return pieces_[n];
+  return n;
 }
 
 double TransferFunction::extinctionIn(const Piece& piece, double value) {
-  return piece.rise == 0 ? piece.extinction : piece.extinction + piece.slope * (value - piece.low);
-}
-
-double TransferFunction::extinction(double value) const {
   // At the end of a piece, rounding may leave a negative number.
-  return std::max(extinctionIn(pieceAt(value), value), 0.0);
+  return piece.slope == 0 ? piece.extinction
+                          : std::max(piece.extinction + piece.slope * (value - piece.low), 0.0);
 }
 
-V3d TransferFunction::emission(double value) const {
-  const Piece& piece = pieceAt(value);
+V3d TransferFunction::emissionIn(const Piece& piece, double value) {
   const V3d colour = piece.turn == V3d(0)
                          ? piece.colour
                          : piece.colour + piece.turn * ((value - piece.low) / piece.width);
-  return colour * extinction(value);
+  return colour * extinctionIn(piece, value);
 }
 
-TransferFunction::Integral TransferFunction::integral(double value) const {
-  if (value >= points_[0].value) return pieceAt(value).upTo(value);
-  const double length = value - points_[0].value;
-  return {extinctions_[0] * length, colourOf(points_[0]) * (extinctions_[0] * length)};
+TransferFunction::Part TransferFunction::partOf(const Piece& piece, double from, double to,
+                                                double share) {
+  const double middle = 0.5 * (from + to);
+  Part part{share, extinctionIn(piece, middle), V3d(0)};
+  if (part.extinction == 0) return part;
+  if (piece.slope == 0 && piece.turn == V3d(0)) {
+    part.emission = piece.colour * part.extinction;
+    return part;
+  }
+  // Simpson's rule is exact for quadratic polynomials.
+  part.emission =
+      (emissionIn(piece, from) + emissionIn(piece, middle) * 4.0 + emissionIn(piece, to)) / 6;
+  return part;
+}
+
+double TransferFunction::extinction(double value) const {
+  return extinctionIn(pieces_[pieceAt(value)], value);
+}
+
+V3d TransferFunction::emission(double value) const {
+  return emissionIn(pieces_[pieceAt(value)], value);
 }
 
 TransferFunction::Bounds TransferFunction::boundsBetween(double low, double high) const {
-  // The first piece that reaches beyond `low`, and all that begin below `high`.
-  std::size_t n = pieces_.size() - 1;
-  while (n > 0 && !(low >= pieces_[n].low)) --n;
-  Bounds bounds{std::max(extinctionIn(pieces_[n], low), 0.0), std::abs(pieces_[n].slope)};
+  std::size_t n = pieceAt(low);
+  Bounds bounds{extinctionIn(pieces_[n], low), std::abs(pieces_[n].slope)};
   for (; n + 1 < pieces_.size() && pieces_[n + 1].low < high; ++n) {
     bounds.extinction = std::max(bounds.extinction, pieces_[n + 1].extinction);
     bounds.slope = std::max(bounds.slope, std::abs(pieces_[n + 1].slope));
@@ -164,9 +152,9 @@ std::vector<TransferPoint> parseTransfer(const std::string& text) {
 std::string transferText(const std::vector<TransferPoint>& points) {
   std::string text;
   for (const TransferPoint& point : points) {
-    text += fmt::format("{}{:.4g}:{:.4g}", text.empty() ? "" : " ", point.value, point.opacity);
+    text += fmt::format("{}{}:{}", text.empty() ? "" : " ", point.value, point.opacity);
     if (point.colour != Imath::C3f(1))
-      text += fmt::format("/{:.4g},{:.4g},{:.4g}", point.colour.x, point.colour.y, point.colour.z);
+      text += fmt::format("/{},{},{}", point.colour.x, point.colour.y, point.colour.z);
   }
   return text;
 }
@@ -179,11 +167,16 @@ std::vector<TransferPoint> suggestedTransfer(const levelset::VolumeHistogram& hi
                last =
                    histogram.otsu.size() < 2 ? first + 0.3 * (high - first) : histogram.otsu.back();
   const double soft = 0.25 * (first - low);
-  return {{first - soft, 0, faint},
-          {first + soft, 0.02, faint},
-          {last, 0.03, faint},
-          {last + 0.15 * (high - last), 0.25, dense},
-          {std::max(high, last + 0.2 * (high - last)), 0.5, dense}};
+  // Short numbers are easier to edit.
+  const auto shortened = [&](double value) {
+    const double near = std::stod(fmt::format("{:.4g}", value));
+    return std::abs(near - value) < 1e-3 * span ? near : value;
+  };
+  return {{shortened(first - soft), 0, faint},
+          {shortened(first + soft), 0.02, faint},
+          {shortened(last), 0.03, faint},
+          {shortened(last + 0.15 * (high - last)), 0.25, dense},
+          {shortened(std::max(high, last + 0.2 * (high - last))), 0.5, dense}};
 }
 
 }  // namespace render

@@ -19,8 +19,9 @@ std::vector<VolumeLight> volumeLight(const Image& image, const Scene& scene,
                                      const VolumeLightOptions& options) {
   if (!scene.isOpaque())
     throw levelset::UsageError(
-        "a volume in light of its own cannot be drawn with transparent solids or meshes; make "
-        "them opaque");
+        "direct volume rendering does not support transparent solids or meshes; make them opaque");
+  levelset::requireMemory(static_cast<double>(image.pixelCount()) * sizeof(VolumeLight),
+                          options.maxBytes);
   VolumeShading shading;
   shading.toLight = keyDirection(scene);
   const VolumeShading* shadingOrNone = options.isShaded ? &shading : nullptr;

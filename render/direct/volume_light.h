@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <vector>
 
+#include "levelset/memory_limit.h"
 #include "levelset/progress.h"
 #include "render/direct/direct_volume.h"
 #include "render/images/image.h"
@@ -15,6 +17,7 @@ struct VolumeLightOptions {
   bool isShaded = true;                  ///< colours depend on the gradient and the key light
   bool isJudged = false;                 ///< integrate by the code of the judge, which is slower
   std::function<bool()> isStopped = {};  ///< returns true to stop; the light is then unfinished
+  std::size_t maxBytes = levelset::kNoMemoryLimit;  ///< limit of the light's memory, bytes
   levelset::Progress progress = {};
 };
 
@@ -24,6 +27,7 @@ struct VolumeLightOptions {
 /// @return one entry for each pixel
 /// @throws levelset::UsageError for transparent solids or meshes, whose order along a ray is not
 ///         in the picture
+/// @throws levelset::ResourceLimit for more memory than options.maxBytes
 /// @throws levelset::Cancelled
 [[nodiscard]] std::vector<VolumeLight> volumeLight(const Image& image, const Scene& scene,
                                                    const DirectVolume& volume,

@@ -36,6 +36,14 @@ VolumeSurface::VolumeSurface(levelset::Volume volume, double isovalue, VolumeIns
       isovalue_(isovalue),
       inside_(inside) {
   requireIsovalue(isovalue);
+  // Sums of products of values must fit single precision.
+  constexpr double kLargest = 1e30;
+  const double largest = std::max(std::abs(volume_->lowest()), std::abs(volume_->highest()));
+  if (!(largest <= kLargest))
+    throw levelset::InvalidInput(
+        fmt::format("the volume has values up to {:.3g}, but at most {:.0e} can be drawn; divide "
+                    "the values by a constant",
+                    largest, kLargest));
   ranges_ = std::make_shared<const levelset::BlockRanges>(*volume_, progress);
 }
 

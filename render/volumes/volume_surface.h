@@ -35,6 +35,7 @@ class VolumeSurface {
 
   /// Finds the ranges of the blocks of the volume.
   /// @throws UsageError for an isovalue that is NaN or infinite
+  /// @throws InvalidInput for values above 1e30
   /// @throws Cancelled
   VolumeSurface(levelset::Volume volume, double isovalue, VolumeInside inside = VolumeInside::Above,
                 const levelset::Progress& progress = {});

@@ -5,7 +5,7 @@
 
 namespace regress {
 
-/// Test functions of the tables of [Kalbe11]: blob, fr and ml [Marschner94], with α = 1/4 and
+/// Test functions of the tables of [Kalbe11]: blob, fr and ml [MarschnerLobb94], with α = 1/4 and
 /// f_M = 6.
 inline constexpr std::array<const char*, 3> kKalbeFunctions = {"blob", "fr", "ml"};
 

@@ -20,9 +20,26 @@ double firstIsovalueOf(const levelset::VolumeHistogram& histogram) {
                                           : histogram.otsu.front());
 }
 
+std::string surfaceOptions(const IsosurfaceView& view) {
+  std::string text;
+  if (view.filter != render::Filter::Trilinear)
+    text += fmt::format(" --filter {}", render::filterName(view.filter));
+  if (view.inside == render::VolumeInside::Below) text += " --inside below";
+  return text;
+}
+
+/// A copy of a volume in memory. Another program may change or shorten a mapped file at any time.
+levelset::Volume copied(const levelset::Volume& volume) {
+  const auto numbers = std::make_shared<const std::vector<char>>(
+      volume.numbers(), volume.numbers() + volume.memoryUse());
+  return {
+      volume.grid(), volume.type(), volume.scale(), {.owner = numbers, .begin = numbers->data()}};
+}
+
 }  // namespace
 
 ShownVolume shownVolume(levelset::Volume volume, const levelset::Progress& progress) {
+  if (volume.isMapped()) volume = copied(volume);
   levelset::VolumeHistogram histogram =
       levelset::histogram(volume, {.progress = levelset::subProgress(progress, 0, 0.5)});
   const double isovalue = firstIsovalueOf(histogram);
@@ -61,9 +78,7 @@ SliceView firstSlices(const ShownVolume& volume) {
 }
 
 render::DirectVolume directVolume(const ShownVolume& volume, const LightView& view) {
-  const Imath::V3d spacing = volume.surface.volume().grid().spacing();
-  return {volume.surface,
-          render::TransferFunction(view.transfer, std::min({spacing.x, spacing.y, spacing.z}))};
+  return {volume.surface, view.transfer};
 }
 
 void placeIsosurface(const ShownVolume& volume, const IsosurfaceView& view, render::Scene& scene) {
@@ -94,10 +109,14 @@ std::array<std::optional<double>, 3> parseSlices(const std::string& text) {
 }
 
 std::string isosurfaceText(const IsosurfaceView& view) {
-  std::string text = fmt::format("isosurface {:.8g}", view.isovalue);
-  if (view.filter != render::Filter::Trilinear)
-    text += fmt::format(" --filter {}", render::filterName(view.filter));
-  if (view.inside == render::VolumeInside::Below) text += " --inside below";
+  return fmt::format("isosurface {:.8g}{}", view.isovalue, surfaceOptions(view));
+}
+
+std::string lightText(const LightView& view, const IsosurfaceView& isosurface) {
+  std::string text = fmt::format("--transfer \"{}\"", render::transferText(view.transfer));
+  if (!view.isShaded) text += " --no-shading";
+  if (isosurface.isShown)
+    text += fmt::format(" --isovalue {:.8g}{}", isosurface.isovalue, surfaceOptions(isosurface));
   return text;
 }
 

@@ -19,7 +19,7 @@ struct ShownVolume {
   levelset::VolumeHistogram histogram;
 };
 
-/// Prepares a volume for the viewer.
+/// Prepares a volume for the viewer. Numbers in a mapped file are copied.
 /// @throws levelset::Cancelled
 [[nodiscard]] ShownVolume shownVolume(levelset::Volume volume,
                                       const levelset::Progress& progress = {});
@@ -67,5 +67,8 @@ void placeIsosurface(const ShownVolume& volume, const IsosurfaceView& view, rend
 
 /// Operator that makes a solid of the isosurface, for example "isosurface 40 --filter cubic-c1".
 [[nodiscard]] std::string isosurfaceText(const IsosurfaceView& view);
+/// Options of `render` that draw the light, and the isosurface if it is shown.
+/// @pre the light has a transfer function
+[[nodiscard]] std::string lightText(const LightView& view, const IsosurfaceView& isosurface);
 
 }  // namespace viewer

@@ -18,8 +18,10 @@ namespace levelset {
 using Imath::V3d;
 
 VolumeGrid resampledGrid(const VolumeGrid& grid, double spacing) {
-  if (!(spacing > 0) || !std::isfinite(spacing))
-    throw UsageError(fmt::format("the voxel size is {}; give a positive length", spacing));
+  constexpr double kLargest = 1e30;
+  if (!(spacing > 0 && spacing <= kLargest))
+    throw UsageError(fmt::format("the voxel size is {}; give a positive length of at most {:.0e}",
+                                 spacing, kLargest));
   const Imath::Box3d bounds = grid.bounds();
   VolumeGrid result;
   V3d first;

@@ -15,7 +15,8 @@ struct ResampleVolumeOptions {
 /// Grid of a resampled volume: its points lie at integer multiples of `spacing` and cover the
 /// bounds of `grid`.
 /// @param spacing  distance between neighbouring grid points along each axis, world units
-/// @throws UsageError for a spacing that is not positive and finite; ResourceLimit when the indices
+/// @throws UsageError for a spacing that is not positive or above 1e30; ResourceLimit when the
+/// indices
 ///         exceed 32 bits
 [[nodiscard]] VolumeGrid resampledGrid(const VolumeGrid& grid, double spacing);
 

@@ -287,6 +287,10 @@ TEST(ShownVolume, ParsesSlicesAndWritesTheOperator) {
                             .inside = render::VolumeInside::Below,
                             .filter = render::Filter::CubicC1}),
             "isosurface -0.25 --filter cubic-c1 --inside below");
+  const LightView light{.transfer = {{1, 0}, {2, 0.5}}, .isShaded = false};
+  EXPECT_EQ(lightText(light, {.isShown = false}), "--transfer \"1:0 2:0.5\" --no-shading");
+  EXPECT_EQ(lightText({.transfer = {{1, 0.5}}}, {.isovalue = 3}),
+            "--transfer \"1:0.5\" --isovalue 3");
 }
 
 }  // namespace shown_volume_test

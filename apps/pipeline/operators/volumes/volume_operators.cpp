@@ -257,7 +257,7 @@ Value resampleVolume(Invocation& in) {
   const double spacing = spacingIn(in);
   const Volume volume = volumeIn(in);
   const Imath::V3d present = volume.grid().spacing();
-  if (spacing > 1.5 * std::max({present.x, present.y, present.z}))
+  if (spacing > 1.5 * std::min({present.x, present.y, present.z}))
     in.notes.warnings.push_back(
         fmt::format("resample: the voxels are larger than those of the volume; detail finer than "
                     "{:.4g} becomes false detail unless 'blur' removes it first",

@@ -37,9 +37,7 @@ double opacityOf(double extinction) {
 
 DirectVolume directVolume(const Volume& volume, const std::vector<TransferPoint>& points,
                           double tolerance = DirectVolume::kTolerance) {
-  const V3d spacing = volume.grid().spacing();
-  return {VolumeSurface(volume, 0),
-          TransferFunction(points, std::min({spacing.x, spacing.y, spacing.z})), tolerance};
+  return {VolumeSurface(volume, 0), points, tolerance};
 }
 
 double differenceOf(const VolumeLight& a, const VolumeLight& b) {
@@ -92,10 +90,31 @@ TEST(TransferFunction, IntegratesInClosedForm) {
         sum += weight * transfer.extinction(from + n * h);
         light += transfer.emission(from + n * h) * weight;
       }
-      const auto low = transfer.integral(from), high = transfer.integral(to);
-      EXPECT_NEAR(high.extinction - low.extinction, sum, 1e-6);
-      EXPECT_NEAR((high.emission - low.emission - light).length(), 0, 1e-6);
+      for (const bool isRising : {true, false}) {
+        double share = 0, extinction = 0;
+        V3d emission(0);
+        transfer.alongRun(isRising ? from : to, isRising ? to : from,
+                          [&](const TransferFunction::Part& part) {
+                            share += part.share;
+                            extinction += part.share * part.extinction;
+                            emission += part.emission * part.share;
+                          });
+        EXPECT_NEAR(share, 1, 1e-12);
+        EXPECT_NEAR(extinction * (to - from), sum, 1e-6);
+        EXPECT_NEAR((emission * (to - from) - light).length(), 0, 1e-6);
+      }
     }
+  // A run of one value, also at a point.
+  for (const double value : {-0.3, 0.05, 0.2, 9.0})
+    transfer.alongRun(value, value, [&](const TransferFunction::Part& part) {
+      EXPECT_EQ(part.share, 1);
+      EXPECT_NEAR(part.extinction, transfer.extinction(value), 1e-12);
+    });
+  // Noise near zero, far from the first point of the function.
+  const TransferFunction wide({{-1000, 0.1}, {1000, 0.5}}, 1);
+  wide.alongRun(-1e-13, 3e-13, [&](const TransferFunction::Part& part) {
+    EXPECT_NEAR(part.extinction, wide.extinction(0), 1e-12);
+  });
   EXPECT_TRUE(transfer.isEmptyBetween(-0.1, 0.1));
   EXPECT_TRUE(transfer.isEmptyBetween(-5, -0.6));
   EXPECT_FALSE(transfer.isEmptyBetween(-0.1, 0.11));
@@ -109,6 +128,8 @@ TEST(TransferFunction, ReadsWhatItWrites) {
   ASSERT_EQ(points.size(), 3u);
   EXPECT_EQ(points[1], (TransferPoint{60, 0.1, C3f(1, 0.8f, 0.7f)}));
   EXPECT_EQ(parseTransfer(transferText(points)), points);
+  const std::vector<TransferPoint> near = {{60000.001, 0.99999}, {60000.0017, 1e-9, C3f(0.1f)}};
+  EXPECT_EQ(parseTransfer(transferText(near)), near);
   for (const char* text : {"", "40", "40:", "40:x", "40:0.1/1", "40:0.1/1,2", "40:0.1/1,2,3,4",
                            "40:0.1,50:0.2", "40:0.1/", "a:0.1"})
     EXPECT_THROW((void)parseTransfer(text), UsageError) << text;
@@ -123,6 +144,55 @@ TEST(TransferFunction, ReadsWhatItWrites) {
   refused({{1, 0.1}, {1, 0.2}});
   refused({{1, 0.1, C3f(-1, 0, 0)}});
   refused({{1, 0.1}}, 0);
+}
+
+TEST(TransferFunction, SuggestsOneForAnyHistogram) {
+  for (const auto& [low, high] :
+       {std::pair(0.0, 254.0), {10000.0, 10010.0}, {-1e-6, 2e-6}, {5.0, 5.0}}) {
+    const Volume volume = sampled({V3i(12), M44d()}, [&](const V3d& p) {
+      return low + (high - low) * std::clamp((p.x - 3) / 6, 0.0, 1.0);
+    });
+    const auto points = suggestedTransfer(levelset::histogram(volume));
+    const TransferFunction transfer(points, 1);
+    for (std::size_t n = 1; n < points.size(); ++n) EXPECT_LT(points[n - 1].value, points[n].value);
+    EXPECT_EQ(parseTransfer(transferText(points)), points);
+    EXPECT_GT(transfer.extinction(high), 0);
+    if (high > low) {
+      EXPECT_EQ(transfer.extinction(low), 0);
+    }
+  }
+}
+
+TEST(DirectVolume, FindsPeaksThatAreThinnerThanTheValuesOfACell) {
+  // The values rise by one in each cell, and the peak is 1e-3 wide: its optical depth is exact.
+  const Volume volume = sampled({V3i(9), M44d()}, [](const V3d& p) { return p.x; });
+  const double depth = 0.5 * 1e-3 * std::log(1 / (1 - opacityOf(30)));
+  const DirectVolume thin = directVolume(volume, {{4.4995, 0}, {4.5, opacityOf(30)}, {4.5005, 0}});
+  EXPECT_NEAR(thin.light(V3d(-1, 4.2, 4.3), V3d(1, 0, 0), 0, HUGE_VAL).transmittance,
+              std::exp(-depth), 1e-9);
+  EXPECT_NEAR(judgedLight(thin, V3d(-1, 4.2, 4.3), V3d(1, 0, 0), 0, HUGE_VAL).transmittance,
+              std::exp(-depth), measured(3e-5));
+}
+
+TEST(DirectVolume, BrightnessFollowsTheGradientInWorldSpace) {
+  // A linear field on sheared, mirrored axes: its gradient is the same everywhere.
+  const V3d gradient(1, -2, 0.5);
+  const Volume volume =
+      sampled({V3i(30), support::obliqueMap()}, [&](const V3d& p) { return p.dot(gradient); });
+  const DirectVolume direct = directVolume(volume, kBusy);
+  const double size = gradient.length(), voxel = [&] {
+    const V3d s = volume.grid().spacing();
+    return std::max({s.x, s.y, s.z});
+  }();
+  const double plain = 0.02 * (volume.highest() - volume.lowest()) / voxel;
+  for (const V3d& to : {V3d(-1, 2, -0.5), V3d(1, -2, 0.5), V3d(0, 0, 1), V3d(-1, 0, 0)}) {
+    VolumeShading shading;
+    shading.toLight = to.normalized();
+    const double facing = std::max(0.0, -gradient.dot(shading.toLight) / size);
+    const double truth = 1 - size / (size + plain) * (1 - shading.ambient) * (1 - facing);
+    for (const V3d& index : {V3d(4.3, 5.5, 6.7), V3d(0, 0, 0), V3d(29, 29, 29)})
+      EXPECT_NEAR(direct.brightness(index, shading), truth, 1e-5);
+  }
 }
 
 TEST(DirectVolume, AbsorbsExponentiallyInAConstantDensity) {
@@ -178,7 +248,10 @@ TEST(DirectVolume, AgreesWithTheJudge) {
                           judged = judgedLight(direct, origin, direction, 0, HUGE_VAL, with, 64);
         lit += light.transmittance < 0.99;
         // Where the ray ends early, its last point counts as opaque.
-        if (light.transmittance > 0) largest = std::max(largest, differenceOf(light, judged));
+        if (light.transmittance > 0)
+          largest = std::max(largest, differenceOf(light, judged));
+        else
+          EXPECT_LT(differenceOf(light, judged), kLeastTransmittance);
       }
     EXPECT_GT(lit, 100u);
     EXPECT_LT(largest, measured(1.14e-3));
@@ -288,7 +361,7 @@ TEST(DirectVolume, EndsAtSurfacesOfThePicture) {
   RenderOptions options;
   options.samples = 1;
   const Image plain = renderCpu(scene, options);
-  const DirectVolume direct(surface, TransferFunction({{-0.2, 0}, {0, 0.02, C3f(0, 1, 0)}}, 0.07));
+  const DirectVolume direct(surface, {{-0.2, 0}, {0, 0.02, C3f(0, 1, 0)}});
   Image image = plain;
   addVolumeLight(image, volumeLight(plain, scene, direct, {.samples = 1, .isShaded = false}));
   std::size_t before = 0, beside = 0;
