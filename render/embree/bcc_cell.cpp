@@ -14,6 +14,12 @@ using levelset::PartitionTetrahedron;
 using openvdb::Coord;
 using BccSpline = levelset::BccQuadraticSpline<2>;
 
+/// Negative weights of a Bernstein coefficient have a sum of at most 1/8.
+bool isOpenRange(double low, double high) {
+  const double room = (high - low) / 8;
+  return low - room < 0 && high + room >= 0;
+}
+
 }  // namespace
 
 BccCell::BccCell(const openvdb::FloatTree& tree, const Coord& cell) : cell_(cell) {
@@ -39,9 +45,7 @@ std::array<double, 3> BccCell::inGrid(const V3d& p) const {
 
 bool BccCell::mayCross() const {
   const auto [low, high] = std::minmax_element(data_.begin(), data_.end());
-  // Negative weights of a coefficient have a sum of at most 1/8.
-  const double room = (*high - *low) / 8;
-  return *low - room < 0 && *high + room >= 0;
+  return isOpenRange(*low, *high);
 }
 
 double BccCell::value(const V3d& p) const {
@@ -121,6 +125,19 @@ SurfaceShape BccCell::shape(const V3d& p) const {
     for (int j = 0; j < 3; ++j)
       shape.hessian[i][j] = found.hessian[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
   return shape;
+}
+
+bool bccMayCross(const openvdb::FloatTree& tree, const Coord& block) {
+  openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> accessor(tree);
+  double low = HUGE_VAL, high = -HUGE_VAL;
+  for (int x = -2; x <= 10; ++x)
+    for (int y = -2; y <= 10; ++y)
+      for (int z = -2; z <= 10; ++z) {
+        const auto value = static_cast<double>(accessor.getValue(block.offsetBy(x, y, z)));
+        low = std::min(low, value);
+        high = std::max(high, value);
+      }
+  return isOpenRange(low, high);
 }
 
 SurfaceShape bccShape(const openvdb::FloatTree& tree, const V3d& position) {

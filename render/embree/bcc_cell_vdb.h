@@ -40,6 +40,10 @@ class BccCell {
   std::array<double, kPoints * kPoints * kPoints> data_;  // ordered by x, y, z
 };
 
+/// Returns false when the values in the cells of a block of 8³, and around them, prove that the
+/// spline has no zero in the block.
+[[nodiscard]] bool bccMayCross(const openvdb::FloatTree& tree, const openvdb::Coord& block);
+
 /// Derivatives of the spline of a grid. @param position  in index space
 [[nodiscard]] SurfaceShape bccShape(const openvdb::FloatTree& tree, const Imath::V3d& position);
 

@@ -93,6 +93,7 @@ bool markTetraCells(SurfaceBlock& block, const DrawnField& field) {
                ? BccCell(field.tree, cell).mayCross()
                : TetraCell(field.tree, cell, field.filter).mayCross();
   };
+  if (field.filter == Filter::BccQuadratic && !bccMayCross(field.tree, block.origin)) return false;
   block.crossing.fill(0);
   block.extent = {8, 8, 8, 0, 0, 0};
   for (int x = 0; x < 8; ++x)

@@ -130,6 +130,18 @@ TEST(CompareImages, MeasuresAnglesAndCurvaturesInVoxels) {
   EXPECT_TRUE(found.agrees()) << found.reason();
 }
 
+TEST(CompareImages, AcceptsJumpsOfNormalsOfTheSuperSpline) {
+  Image first = disc(), second = disc();
+  second.channels["N.X"][at(30, 30)] = 0.01f;
+  EXPECT_FALSE(compareImages(first, second).agrees());
+  first.attributes["ls:normal"] = "super-quadratic";
+  EXPECT_FALSE(compareImages(first, second).agrees());
+  second.attributes["ls:normal"] = "super-quadratic";
+  EXPECT_TRUE(compareImages(first, second).agrees());
+  for (int y = 25; y < 35; ++y) second.channels["N.X"][at(31, y)] = 0.01f;
+  EXPECT_FALSE(compareImages(first, second).agrees());
+}
+
 TEST(CompareImages, NeverAcceptsNaNAsAgreement) {
   Image other = disc();
   other.channels["curvature.gauss"][at(31, 31)] = std::nanf("");
