@@ -87,7 +87,7 @@ class DistanceSweep {
 
   // Number of slabs that are resolved together, see MeetingParts::resolve(). The slabs beside them
   // are read again each time.
-  static constexpr int kResolved = 3;
+  static constexpr int kResolved = 2;
 
   const FloatGrid& field_;
   const DistanceRequest& request_;
@@ -191,7 +191,7 @@ void DistanceSweep::makeLeaves(int slab) {
   polishers_->forEach(blocks.size(), [&](std::size_t i, Polisher& polisher) {
     leaves[i] = makeLeaf(*blocks[i], field_.tree().probeConstLeaf(blocks[i]->origin), polisher,
                          request_, field_.voxelSize()[0], background);
-    if (!meeting_) blocks[i]->squared.reset();
+    blocks[i]->squared.release();
   });
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     if (leaves[i].leaf)
@@ -214,7 +214,6 @@ void DistanceSweep::follow(int final) {
   while (searched_ < search) {
     const auto blocks = nearest_->blocksOf(++searched_);
     meeting_->search(searched_, {blocks.begin(), blocks.end()});
-    for (Block* block : blocks) block->squared.reset();
   }
   const int resolve = isEnd ? last_ : searched_ - CreaseDistances::kSlabsAround;
   while (resolved_ + kResolved <= resolve) {

@@ -78,8 +78,8 @@ bool isBesideFlatFace(const FloatGrid::ConstAccessor& field, const Coord& at, do
 
 CreaseDistances::CreaseDistances(const ZeroSet& surface, Polishers& polishers,
                                  const DistanceRequest& request)
-    : request_(request), polishers_(polishers), searches_([&surface, &request] {
-        return MovedSurface(surface, request.shift, request.halfWidth);
+    : request_(request), polishers_(polishers), searches_([&surface, &polishers, &request] {
+        return MovedSurface(surface, polishers.local().cache(), request.shift, request.halfWidth);
       }) {}
 
 void CreaseDistances::search(int slab, const std::vector<WrongPoints>& wrong) {
@@ -89,55 +89,63 @@ void CreaseDistances::search(int slab, const std::vector<WrongPoints>& wrong) {
     const auto& [owner, mask] = wrong[i];
     const Block& block = *owner;
     leaves[i].block = owner;
-    NearestPoints::Mask known = mask;
-    for (auto it = mask.beginOn(); it; ++it)
-      known.set(it.pos(), block.nearest[it.pos()] != NearestPoints::kNone);
-    polisher.prepare(block, known);
+    polisher.prepare(block, mask);
     for (auto it = mask.beginOn(); it; ++it) {
       Point point;
       point.n = it.pos();
-      const auto [value, closest] = distanceAt(block, point.n, polisher, request_);
+      const auto [value, closest] = nearDistanceAt(block, point.n, polisher, request_);
       point.sign = value < 0 ? -1 : 1;
       point.plain = std::abs(value);
-      if (closest) {
-        auto found = searches_.local().distance(block, point.n, *closest);
-        point.found = std::move(found.result);
-        point.isBesideCrease = found.isBesideCrease;
-        point.meetsPatches = found.meetsPatches;
-      }
+      auto found = searches_.local().distance(block, point.n, *closest);
+      point.found = std::move(found.result);
+      point.isBesideCrease = found.isBesideCrease;
+      point.meetsPatches = found.meetsPatches;
       // The plain distance stands in the field already.
       if (point.found && !point.found->crease) continue;
       point.hasFailed = !point.found;
       leaves[i].points.push_back(std::move(point));
     }
+    leaves[i].points.shrink_to_fit();
   });
   std::erase_if(leaves, [](const Leaf& leaf) { return leaf.points.empty(); });
 }
 
 void CreaseDistances::resolve(int first, int last, FloatGrid& field) {
-  Leaves leaves = around(first, last);
+  Leaves leaves = takeAround(last);
   adoptFromNeighbours(leaves);
   searchAgain(leaves, first, last, field);
   writeTrusted(first - 1, field);
   keep(leaves, first, last);
   writeTrusted(last - 1, field);
-  searched_.erase(searched_.begin(), searched_.upper_bound(last - kSlabsAround));
 }
 
-/// Returns the searched points of some slabs, and those within kCreaseReach voxels of them.
-CreaseDistances::Leaves CreaseDistances::around(int first, int last) const {
-  const int low = 8 * first - kCreaseReach, high = 8 * last + 7 + kCreaseReach;
+/// Returns the searched points of the slabs up to `last` and those within kCreaseReach voxels.
+/// Keeps those that are within that distance of the next slab.
+CreaseDistances::Leaves CreaseDistances::takeAround(int last) {
+  // Copies the points of a leaf between two positions along x.
+  const auto copyBetween = [](const Leaf& leaf, int low, int high, Leaves& copies) {
+    Leaf copy{leaf.block, {}};
+    for (const Point& point : leaf.points)
+      if (const int x = leaf.gridPoint(point).x(); x >= low && x <= high)
+        copy.points.push_back(point);
+    if (!copy.points.empty()) copies.push_back(std::move(copy));
+  };
+  constexpr int kAll = std::numeric_limits<int>::max();
+  const int end = 8 * last + 8;
   Leaves leaves;
-  for (auto slab = searched_.lower_bound(first - kSlabsAround);
-       slab != searched_.upper_bound(last + kSlabsAround); ++slab)
-    for (const Leaf& leaf : slab->second) {
-      Leaf& copy = leaves.emplace_back(leaf);
-      if (slab->first >= first && slab->first <= last) continue;
-      std::erase_if(copy.points, [&](const Point& point) {
-        const int x = leaf.gridPoint(point).x();
-        return x < low || x > high;
-      });
+  std::map<int, Leaves> kept;
+  auto slab = searched_.begin();
+  for (; slab != searched_.end() && slab->first <= last; ++slab) {
+    for (Leaf& leaf : slab->second) {
+      copyBetween(leaf, end - kCreaseReach, kAll, kept[slab->first]);
+      leaves.push_back(std::move(leaf));
     }
+  }
+  searched_.erase(searched_.begin(), slab);
+  for (slab = searched_.begin(); slab != searched_.upper_bound(last + kSlabsAround); ++slab)
+    for (const Leaf& leaf : slab->second) copyBetween(leaf, -kAll, end + kCreaseReach - 1, leaves);
+  std::erase_if(kept, [](const auto& some) { return some.second.empty(); });
+  searched_.merge(kept);
   return leaves;
 }
 

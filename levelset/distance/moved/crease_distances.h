@@ -34,7 +34,7 @@ class CreaseDistances {
   static constexpr int kSlabsAround = (kCreaseReach + 7) / 8;
 
   /// Finds the distance of each grid point by itself. Forgets the grid points whose value is right.
-  /// @param wrong  grid points of one slab
+  /// @param wrong  grid points of one slab, with distances minus the shift below the half width
   void search(int slab, const std::vector<WrongPoints>& wrong);
 
   /// Completes the distances of the slabs first to last. Starts the search again from the crease
@@ -94,7 +94,7 @@ class CreaseDistances {
   };
 
   [[nodiscard]] static bool isTrusted(const Point& point);
-  [[nodiscard]] Leaves around(int first, int last) const;
+  [[nodiscard]] Leaves takeAround(int last);
   void adoptFromNeighbours(Leaves& leaves);
   void searchAgain(Leaves& leaves, int first, int last, const openvdb::FloatGrid& field);
   void keep(const Leaves& leaves, int first, int last);

@@ -64,13 +64,14 @@ double farthestMeeting(double shift, double halfWidth) {
 
 /// Largest distance along each axis, voxels, from a grid point to the foot points of its search.
 double farthestFoot(double shift, double halfWidth) {
-  return 2 * farthestMeeting(shift, halfWidth) + std::abs(shift);
+  return farthestMeeting(shift, halfWidth) + std::abs(shift) + 2 * halfWidth;
 }
 
 }  // namespace
 
-MovedSurface::MovedSurface(const ZeroSet& surface, double shift, double halfWidth)
-    : cache_(*surface.interpolated),
+MovedSurface::MovedSurface(const ZeroSet& surface, DenseBlockCache& cache, double shift,
+                           double halfWidth)
+    : cache_(cache),
       points_(surface.points),
       patches_(surface.patches),
       shift_(shift),

@@ -17,7 +17,8 @@ class MovedSurface {
  public:
   /// @param shift      length by which the surface moves, voxels; outwards if positive
   /// @param halfWidth  largest distance of interest, voxels
-  MovedSurface(const ZeroSet& surface, double shift, double halfWidth);
+  /// @param cache      dense copies of the field
+  MovedSurface(const ZeroSet& surface, DenseBlockCache& cache, double shift, double halfWidth);
 
   /// Distance along each axis, voxels, from a grid point within which its search reads the nearest
   /// surface points of other grid points. A crease point farther away counts as not found.
@@ -97,7 +98,7 @@ class MovedSurface {
   [[nodiscard]] bool follow(openvdb::Vec3d& foot, const openvdb::Vec3d& from);
   [[nodiscard]] bool isWithin(const openvdb::Vec3d& point, double distance) const;
 
-  DenseBlockCache cache_;
+  DenseBlockCache& cache_;
   const SurfacePoints& points_;
   const SharpPatches& patches_;
   const double shift_, halfWidth_;

@@ -11,7 +11,7 @@ namespace {
 constexpr double kMostError = 1e-3;
 
 double unrefined(const NearestPoints::Block& block, openvdb::Index n, double shift) {
-  const double distance = std::sqrt(static_cast<double>((*block.squared)[n]));
+  const double distance = std::sqrt(static_cast<double>(block.squared[n]));
   return (block.inside.isOn(n) ? -distance : distance) - shift;
 }
 

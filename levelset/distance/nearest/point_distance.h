@@ -52,6 +52,9 @@ class Polishers {
   explicit Polishers(const ZeroSet& surface)
       : polishers_([&surface] { return Polisher(surface); }) {}
 
+  /// Returns the polisher of this thread.
+  [[nodiscard]] Polisher& local() { return polishers_.local(); }
+
   /// Calls work(index, polisher) for the indices below `count`, in parallel.
   template <typename Work>
   void forEach(std::size_t count, const Work& work) {

@@ -28,6 +28,9 @@ class Polisher {
   explicit Polisher(const ZeroSet& surface)
       : cache_(*surface.interpolated), points_(surface.points), patches_(surface.patches) {}
 
+  /// Dense copies of the field, for other searches of the same thread.
+  [[nodiscard]] DenseBlockCache& cache() { return cache_; }
+
   /// Call after blocks were deleted: a new block may have the address of the last one.
   void forgetBlock() { loaded_ = preparedBlock_ = nullptr; }
 

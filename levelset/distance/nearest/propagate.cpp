@@ -70,7 +70,7 @@ void prefetchAround(const Block& block) {
   };
   for (openvdb::Index n = 0; n < 512; n += 16) {
     __builtin_prefetch(&block.nearest[n]);
-    __builtin_prefetch(&(*block.squared)[n]);
+    __builtin_prefetch(&block.squared[n]);
   }
   const std::uint32_t news = block.dirtyNeighbours.load(std::memory_order_relaxed);
   for (int i = 0; i < 27; ++i) {
@@ -90,8 +90,8 @@ class BlockWorker {
     held_.fill(-1);
     for (int x = block.low.x(); x <= block.high.x(); ++x)
       for (int y = block.low.y(); y <= block.high.y(); ++y)
-        std::copy(block.squared->begin() + offsetOf(x, y, block.low.z()),
-                  block.squared->begin() + offsetOf(x, y, block.high.z()) + 1,
+        std::copy(block.squared.begin() + offsetOf(x, y, block.low.z()),
+                  block.squared.begin() + offsetOf(x, y, block.high.z()) + 1,
                   held_.begin() + slot(x, y, block.low.z()));
   }
 
@@ -145,7 +145,7 @@ class BlockWorker {
     const openvdb::Index n = offsetOf(x, y, z);
     held_[static_cast<std::size_t>(slot(x, y, z))] = squared;
     at_[n] = at;
-    (*block_.squared)[n] = squared;
+    block_.squared[n] = squared;
     block_.nearest[n] = point;
     block_.own.setOff(n);
     changed_.setOn(n);
@@ -288,8 +288,7 @@ NearestPoints::Block& NearestPoints::touch(const Coord& origin) {
   Block& block = *owners.emplace_back(std::make_unique<Block>());
   slot = &block;
   block.origin = origin;
-  block.squared = std::make_unique<std::array<float, 512>>();
-  block.nearest.fill(kNone);
+  std::fill_n(&block.nearest[0], 512, kNone);
   block.low = Coord(0);
   block.high = Coord(7);
   if (reach_.region) {
@@ -305,7 +304,7 @@ NearestPoints::Block& NearestPoints::touch(const Coord& origin) {
   const float inside = squareOf(reach_.inside + kBlockMargin),
               outside = squareOf(reach_.outside + kBlockMargin);
   for (openvdb::Index n = 0; n < 512; ++n)
-    (*block.squared)[n] = block.inside.isOn(n) ? inside : outside;
+    block.squared[n] = block.inside.isOn(n) ? inside : outside;
   for (int i = 0; i < 27; ++i) {
     const auto found = index_.find(origin + blockStep(i));
     if (i == 13 || found == index_.end()) continue;
@@ -320,8 +319,8 @@ void NearestPoints::seed(const Coord& gridPoint, std::uint32_t point, bool own) 
   const openvdb::Index n = FloatTree::LeafNodeType::coordToOffset(gridPoint);
   const auto squared =
       static_cast<float>((points_.positions[point] - gridPoint.asVec3d()).lengthSqr());
-  if (block.nearest[n] != kNone && squared >= (*block.squared)[n]) return;
-  (*block.squared)[n] = squared;
+  if (block.nearest[n] != kNone && squared >= block.squared[n]) return;
+  block.squared[n] = squared;
   block.nearest[n] = point;
   block.own.set(n, own);
   block.queued.setOn(n);

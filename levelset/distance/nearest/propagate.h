@@ -25,12 +25,27 @@ class NearestPoints {
   static constexpr std::uint32_t kNone = 0xffffffffu;
   using Mask = openvdb::util::NodeMask<3>;
 
+  /// One number for each grid point of a block. Has the size of the values of a leaf, so that
+  /// released memory of one kind serves the other.
+  template <typename T>
+  class Numbers {
+   public:
+    [[nodiscard]] T& operator[](std::size_t n) { return numbers_[n]; }
+    [[nodiscard]] const T& operator[](std::size_t n) const { return numbers_[n]; }
+    [[nodiscard]] const T* begin() const { return numbers_.get(); }
+    void release() { numbers_.reset(); }
+
+   private:
+    std::unique_ptr<T[]> numbers_ = std::make_unique_for_overwrite<T[]>(512);
+  };
+
   struct Block {
     openvdb::Coord origin;
-    std::array<std::uint32_t, 512> nearest;  ///< index of the nearest surface point, or kNone
+    Numbers<std::uint32_t> nearest;  ///< index of the nearest surface point, or kNone
     /// Squared distance to the nearest surface point, voxels². If there is none yet: the square of
-    /// the largest distance to compute plus a margin. Null once the block's distances are computed.
-    std::unique_ptr<std::array<float, 512>> squared;
+    /// the largest distance to compute plus a margin. Released once the distances of the block are
+    /// computed.
+    Numbers<float> squared;
     Mask inside;  ///< grid points with φ < 0
     /// Grid points beside the zero set whose nearest surface point is the one found for themselves.
     Mask own;
