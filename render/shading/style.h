@@ -69,7 +69,7 @@ struct StyleOptions {
   /// stands for 40 divided by the diagonal of the bounding box of the surfaces.
   double curvatureRange = 0;
   double lineWidth = 2;                            ///< width of silhouette lines, pixels
-  int reflectionLines = 32;                        ///< lines around, for Style::ReflectionLines
+  int reflectionLines = 32;                        ///< number of lines, for Style::ReflectionLines
   std::shared_ptr<const ColourImage> matcap = {};  ///< picture of a shaded ball, for Style::Matcap
 };
 
@@ -86,8 +86,8 @@ struct StyleOptions {
 /// less where only smaller balls can touch it.
 [[nodiscard]] double accessibilityOf(const CurvatureSample& sample, double range);
 
-/// Brightness of the stripes in a direction, 0 to 1: `lines` bright lines around the axis `up`,
-/// parallel to it and equally far apart.
+/// Brightness of the stripes in a direction, 0 to 1. There are `lines` bright lines parallel to the
+/// axis `up`, at equal angles around it.
 /// @param direction  direction of the reflected ray, unit length
 /// @param up, side  unit vectors at a right angle
 [[nodiscard]] double reflectionLineAt(const Imath::V3d& direction, const Imath::V3d& up,

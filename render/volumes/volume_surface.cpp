@@ -75,8 +75,8 @@ std::vector<V3i> VolumeSurface::blocks(Filter filter) const {
   // of the quadratic super spline has negative weights of at most 1/16 in sum. A Bézier coefficient
   // of the tricubic filter has weights along each axis that sum to 1, with magnitudes of 4/3 in
   // sum. So the magnitudes of its 64 weights sum to at most 64/27, and the negative ones to half of
-  // 64/27 − 1. One of the spline on octahedra is a mean of values mean + difference · v at
-  // vertices v, whose negative weights sum to at most 1/8.
+  // 64/27 − 1. A coefficient of the spline on octahedra is a mean of linear functions at
+  // vertices, whose negative weights sum to at most 1/8.
   const double widening = filter == Filter::BSplineQi        ? 1
                           : filter == Filter::Tricubic       ? 37.0 / 54
                           : filter == Filter::SuperQuadratic ? 1.0 / 16

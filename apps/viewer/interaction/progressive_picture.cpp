@@ -67,8 +67,8 @@ struct ProgressivePicture::Worker {
   IsosurfaceView preparedIsosurface;
   std::vector<render::TransferPoint> preparedTransfer;
   std::optional<render::DirectVolume> directVolume;
-  // Light of the volume in the last picture of `view` with this edge of a pixel; passes that add
-  // samples only have the same light.
+  // Light of the volume in the last picture of `view`, and the edge of a pixel there. Passes that
+  // only add samples have the same light.
   std::vector<render::VolumeLight> light;
   int lightPixelSize = 0;
   std::unique_ptr<ClippedScene> cut;

@@ -27,8 +27,8 @@ struct SlicePoint {
                                                 const SliceView& slices,
                                                 const render::Camera& camera, double x, double y);
 
-/// Outward normal of the slices across an axis of the grid: the unit vector perpendicular to them
-/// that points towards larger indices.
+/// Normal of the slices across an axis of the grid: the unit vector perpendicular to them that
+/// points towards larger indices.
 [[nodiscard]] Imath::V3d sliceNormal(const levelset::Volume& volume, std::size_t axis);
 
 /// Paints slices over a picture. A surface in front of a slice hides it as far as the surface is

@@ -608,7 +608,8 @@ Operator renderOperator() {
             .range = Range::NonNegative},
            {.name = "reflection-lines",
             .type = ParamType::Integer,
-            .doc = "with --style reflection-lines: number of lines around the scene",
+            .doc = "with --style reflection-lines: number of lines, at equal angles around the "
+                   "vertical axis of the picture",
             .fallback = "32",
             .range = Range::Positive},
            {.name = "thickness",
