@@ -6,6 +6,8 @@
 
 #include <chrono>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <thread>
 
 #include "apps/viewer/interaction/pick.h"
@@ -273,6 +275,23 @@ TEST(ShownVolume, OpensGridsOfNumbersThatAreNoLevelSets) {
       << model.description;
   EXPECT_TRUE(canOpen("head.nii.gz"));
   EXPECT_FALSE(canOpen("head.raw"));
+}
+
+TEST(ShownVolume, SurvivesFilesThatShrink) {
+  const support::TemporaryFolder folder;
+  const auto file = folder / "steps.mha";
+  {
+    std::ofstream stream(file, std::ios::binary);
+    stream << "ObjectType = Image\nNDims = 3\nDimSize = 16 16 64\nElementType = MET_UCHAR\n"
+              "BinaryData = True\nBinaryDataByteOrderMSB = False\nElementDataFile = LOCAL\n";
+    for (int n = 0; n < 16 * 16 * 64; ++n) stream.put(static_cast<char>(n / 256));
+  }
+  const Model model = openModel({file});
+  ASSERT_TRUE(model.volume);
+  std::filesystem::resize_file(file, 0);
+  const levelset::Volume& volume = model.volume->surface.volume();
+  EXPECT_FALSE(volume.isMapped());
+  EXPECT_EQ(volume.at(15, 15, 63), 63);
 }
 
 TEST(ShownVolume, ParsesSlicesAndWritesTheOperator) {

@@ -82,6 +82,16 @@ TEST_F(VolumeActions, RenderDrawsVolumesByTheirTransferFunction) {
   EXPECT_NE(levelsmith(ball + "--transfer 5:0").err.find("no value of the volume has an opacity"),
             std::string::npos);
   EXPECT_REFUSED(levelsmith(ball + "--transfer 0:1"), 2, "less than 1");
+  EXPECT_REFUSED(levelsmith("--dry-run " + ball + "--transfer '0:0.1 0:0.2'"), 2, "two points");
+  EXPECT_REFUSED(levelsmith(ball + "--transfer 0:0.1 --inside below"), 2, "--isovalue");
+  EXPECT_REFUSED(levelsmith(ball + "--transfer 0:0.1 --filter tricubic"), 2, "--isovalue");
+  // A PNG in a style without light shows the surface behind the light, too.
+  const std::string tone = "volume sphere --size 30 --radius 0.7 ! render ";
+  const std::string how =
+      " --size 60x45 --isovalue 0.4 --style tone --transfer '0:0 0.5:0.3/1,0,0'";
+  EXPECT_EQ(levelsmith(tone + "a.exr --png beside.png" + how).code, 0);
+  EXPECT_EQ(levelsmith(tone + "alone.png" + how).code, 0);
+  EXPECT_EQ(support::slurp(folder_ / "beside.png"), support::slurp(folder_ / "alone.png"));
   EXPECT_REFUSED(levelsmith(ball + "--transfer 0"), 2, "VALUE:OPACITY");
   EXPECT_REFUSED(levelsmith(ball), 2, "--transfer");
   EXPECT_REFUSED(levelsmith(ball + "--isovalue 0 --no-shading"), 2, "--transfer");
