@@ -8,7 +8,8 @@ namespace render {
 enum class Filter {
   /// Trilinear interpolation.
   Trilinear,
-  /// Cubic convolution along each axis, also called Catmull-Rom spline [Keys81]. It interpolates the
+  /// Cubic convolution along each axis, also called Catmull-Rom spline [Keys81]. It interpolates
+  /// the
   /// values.
   Tricubic,
   /// Tricubic B-spline whose coefficients are the grid values. It is smooth, but at grid points it
