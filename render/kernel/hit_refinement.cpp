@@ -193,19 +193,16 @@ class FieldNearCell {
   std::array<double, 64> net_{};
 };
 
-}  // namespace
-
-double refinedParameter(const KernelSolid& solid, const PixelBlock& pixels, std::size_t n,
-                        const HitBlock& hits, const ShapeBlock& shapes) {
+/// Parameter at which a ray crosses the surface near a hit.
+/// @param origin, direction  the exact ray, table space
+/// @param place, gradient  position and gradient of the drawn surface that the kernel found
+/// @param found  parameter that the kernel found
+double crossingNear(const KernelSolid& solid, const V3i& cell, const V3d& origin,
+                    const V3d& direction, const V3d& place, const V3d& gradient, double found) {
   constexpr double kMostMove = 0.05;  // voxels; larger moves lead to another surface
   constexpr double kGrazing = 0.1;    // sine of the angle between the ray and the surface
   constexpr int kMostSecants = 8;
   constexpr double kConverged = 1e-9;
-  const auto found = static_cast<double>(hits.t[n]);
-  const V3i cell(hits.x[n], hits.y[n], hits.z[n]);
-  const V3d place = V3d(cell) + shapes.placeInCell(n), gradient = shapes.drawnGradient(n);
-  const auto [origin, direction] =
-      solid.fan.exactRay(static_cast<double>(pixels.x[n]), static_cast<double>(pixels.y[n]));
   const double slope = gradient.dot(direction);
   double t = gradient.dot(place - origin) / slope;
   const auto isNear = [&] { return std::abs(t - found) < kMostMove; };
@@ -224,6 +221,20 @@ double refinedParameter(const KernelSolid& solid, const PixelBlock& pixels, std:
     t -= step;
   }
   return planeT;
+}
+
+}  // namespace
+
+double refineHit(const KernelSolid& solid, const PixelBlock& pixels, std::size_t n,
+                 const HitBlock& hits, ShapeBlock& shapes) {
+  const V3i cell(hits.x[n], hits.y[n], hits.z[n]);
+  const V3d place = V3d(cell) + shapes.placeInCell(n);
+  const auto [origin, direction] =
+      solid.fan.exactRay(static_cast<double>(pixels.x[n]), static_cast<double>(pixels.y[n]));
+  const double t = crossingNear(solid, cell, origin, direction, place, shapes.drawnGradient(n),
+                                static_cast<double>(hits.t[n]));
+  shapes.move(n, origin + direction * t - place, solid.pool.filter != Filter::Trilinear);
+  return t;
 }
 
 }  // namespace render

@@ -13,11 +13,11 @@ namespace render {
 /// the ray is intersected with the tangent plane of the surface at the hit. If the ray is nearly
 /// parallel to the surface, both roundings grow. Then the zero is found by secants of the field in
 /// double precision.
-/// @param pixels, hits, shapes  the rays, and what the kernel found
+/// @param pixels, hits  the rays, and what the kernel found
+/// @param shapes  the gradients of hit n are moved to the new position by the Hessian
 /// @param n  index of a hit
 /// @return parameter of the ray; that of `hits` where no better one is found
-[[nodiscard]] double refinedParameter(const KernelSolid& solid, const PixelBlock& pixels,
-                                      std::size_t n, const HitBlock& hits,
-                                      const ShapeBlock& shapes);
+[[nodiscard]] double refineHit(const KernelSolid& solid, const PixelBlock& pixels, std::size_t n,
+                               const HitBlock& hits, ShapeBlock& shapes);
 
 }  // namespace render

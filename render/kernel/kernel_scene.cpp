@@ -140,10 +140,10 @@ struct PackedRays {
   }
 };
 
-/// Depth of hit n of the rays through pixels, world units.
-double depthOf(const KernelSolid& solid, const PixelBlock& pixels, std::size_t n,
-               const HitBlock& hits, const ShapeBlock& shapes) {
-  return solid.fan.depthAt(refinedParameter(solid, pixels, n, hits, shapes));
+/// Depth of hit n of the rays through pixels after its refinement, world units.
+double refinedDepth(const KernelSolid& solid, const PixelBlock& pixels, std::size_t n,
+                    const HitBlock& hits, ShapeBlock& shapes) {
+  return solid.fan.depthAt(refineHit(solid, pixels, n, hits, shapes));
 }
 
 }  // namespace
@@ -280,7 +280,7 @@ PixelHits KernelScene::castFirst(const KernelTracer& tracer, const PixelBlock& p
     tracer.trace(solid, pixels, hits, shapes);
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       if (!hits.found[i]) continue;
-      const double depth = depthOf(solid, pixels, i, hits, shapes);
+      const double depth = refinedDepth(solid, pixels, i, hits, shapes);
       if (depth > far_) continue;
       if (result.solid[i] >= 0 && result.depth[i] <= depth) continue;
       result.depth[i] = depth;
@@ -321,7 +321,7 @@ PixelHits KernelScene::castNext(const KernelTracer& tracer, PixelTraversal& trav
           continue;
         }
         const std::size_t ray = queries[n].ray;
-        next[s].depth[ray] = depthOf(solid, asked, n, hits, shapes);
+        next[s].depth[ray] = refinedDepth(solid, asked, n, hits, shapes);
         next[s].shapes.take(ray, shapes, n);
         // The order of the crossings is that of the kernel's parameters.
         walk.answer(s, queries[n], solid.fan.depthAt(static_cast<double>(hits.t[n])),

@@ -13,4 +13,11 @@ SurfaceShape ShapeBlock::at(std::size_t i) const {
   return shape;
 }
 
+void ShapeBlock::move(std::size_t i, const Imath::V3d& by, bool isDrawn) {
+  const Imath::V3d change = by * at(i).hessian;
+  for (std::size_t p = 0; p < (isDrawn ? 6u : 3u); ++p)
+    part[p][i] =
+        static_cast<float>(static_cast<double>(part[p][i]) + change[static_cast<int>(p % 3)]);
+}
+
 }  // namespace render

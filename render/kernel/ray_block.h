@@ -74,6 +74,10 @@ struct ShapeBlock {
   [[nodiscard]] Imath::V3d drawnGradient(std::size_t i) const { return threeFrom(3, i); }
   /// Position of the hit in its cell, from 0 to 1 on each axis.
   [[nodiscard]] Imath::V3d placeInCell(std::size_t i) const { return threeFrom(13, i); }
+  /// Moves the gradients of entry i to a position nearby, by the Hessian.
+  /// @param by  difference of the positions, voxels along the axes of table space
+  /// @param isDrawn  true: the Hessian is that of the drawn surface, whose gradient moves, too
+  void move(std::size_t i, const Imath::V3d& by, bool isDrawn);
   /// Copies entry i of `from` to entry `to`.
   void take(std::size_t to, const ShapeBlock& from, std::size_t i) {
     for (std::size_t p = 0; p < kParts; ++p) part[p][to] = from.part[p][i];

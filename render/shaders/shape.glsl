@@ -186,8 +186,8 @@ struct Shape {
   Real gx, gy, gz;                    // gradient of the B-spline, φ per voxel
   Real tx, ty, tz;                    // gradient of the trilinear interpolant, φ per voxel
   Real hxx, hyy, hzz, hxy, hxz, hyz;  // Hessian of the B-spline, φ per voxel²
-  Real inX, inY, inZ;                 // position in the cell, from 0 to 1
   Real error;                         // bound on |trilinear interpolant − smooth function|, from second differences
+  Real inX, inY, inZ;                 // position in the cell, from 0 to 1
 };
 
 // Subtracts from the derivatives the share of one slab in a sixth of the second differences along

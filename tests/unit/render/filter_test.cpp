@@ -199,8 +199,8 @@ void expectProven(const Scene& scene, Filter filter, const std::string& what,
   const ImageComparison judged = compareImages(ours, renderEmbree(scene, options), allowed);
   EXPECT_GT(judged.bothHit, 5u) << filterName(filter) << ", " << what;
   EXPECT_TRUE(judged.agrees()) << filterName(filter) << ", " << what << ": " << judged.reason();
-  EXPECT_EQ(compareImages(ours, renderGpu(scene, options), {.exact = true}).differentBits, 0u)
-      << filterName(filter) << ", " << what;
+  const ImageComparison bits = compareImages(ours, renderGpu(scene, options), {.exact = true});
+  EXPECT_EQ(bits.differentBits, 0u) << filterName(filter) << ", " << what << ": " << bits.reason();
 }
 
 TEST(Filters, OfSplinesAgreeWithTheJudge) {

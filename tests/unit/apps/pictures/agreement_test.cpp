@@ -109,11 +109,7 @@ bool isOffOutlines(const Image& image, const Scene& scene, int x, int y) {
 /// Tests the required agreement at 1024x768.
 void expectAgreement(const Scene& scene, const std::string& what) {
   const Image ours = renderCpu(scene, kData), judge = renderEmbree(scene, kData);
-  ImageComparisonOptions options;
-  // Known defect: since hits are refined in double precision, the normal of one pixel of the bunny
-  // differs by 0.0024 radians.
-  if (what == "bunny") options.tolerances["N"] = {2e-4, 0.0036};
-  const ImageComparison found = compareImages(ours, judge, options);
+  const ImageComparison found = compareImages(ours, judge);
   EXPECT_TRUE(found.agrees()) << what << ": " << found.reason();
   EXPECT_GT(found.bothHit, found.pixels / 10) << what;
   EXPECT_EQ(found.unlikeElsewhere, 0u) << what;
