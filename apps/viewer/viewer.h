@@ -118,7 +118,7 @@ class Viewer {
   bool isClipped_ = false;
   Display display_;
   render::Style style_;
-  // Of the model's volume, if it has one. The editor keeps the points while the light is off.
+  // Isosurface and light of the model's volume. The editor keeps its points while the light is off.
   IsosurfaceView isosurface_;
   LightView light_;
   TransferEditor transferEditor_;

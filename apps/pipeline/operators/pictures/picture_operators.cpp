@@ -11,14 +11,12 @@
 #include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/json_output.h"
 #include "apps/pipeline/operators/pictures/camera_options.h"
-#include "apps/pipeline/operators/volume_params.h"
+#include "apps/pipeline/operators/pictures/volume_pictures.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
-#include "levelset/volumes/histogram.h"
 #include "render/camera.h"
 #include "render/cpu/cpu_renderer.h"
-#include "render/direct/volume_light.h"
 #include "render/embree/embree_renderer.h"
 #include "render/gpu/gpu_renderer.h"
 #include "render/images/compare_images.h"
@@ -31,76 +29,12 @@ namespace {
 
 using levelset::UsageError;
 
-bool isVolume(Kind kind) {
-  return kind == Kind::Volume || kind == Kind::Field;
-}
-
-/// Refuses volumes without --isovalue, and its options without a volume.
-void requireIsovalue(const Invocation& in) {
-  if (isVolume(in.operands[0].plan().kind)) {
-    if (!in.given("isovalue") && !in.given("transfer"))
-      throw UsageError(
-          "render: a volume has no surface without an isovalue; give --isovalue, and see "
-          "'histogram' for suggestions, or give --transfer");
-    return;
-  }
-  for (const char* name : {"isovalue", "inside", "transfer", "no-shading"})
-    if (in.given(name))
-      throw UsageError(fmt::format("render: --{} is for volumes; leave it out", name));
-}
-
-bool hasCells(const render::VolumeSurface& surface) {
-  const Imath::V3i blocks = surface.ranges().size();
-  return blocks.x > 0 && blocks.y > 0 && blocks.z > 0;
-}
-
-/// Scene with the isosurface of a volume.
-render::ViewedScene volumeScene(Invocation& in) {
-  const levelset::Volume volume = volumeIn(in);
-  const bool hasIsovalue = in.given("isovalue");
-  // No value is above the largest one, so that isosurface is empty.
-  const auto surface = std::make_shared<const render::VolumeSurface>(
-      volume, hasIsovalue ? in.number("isovalue") : volume.highest(),
-      in.text("inside") == "below" ? render::VolumeInside::Below : render::VolumeInside::Above);
-  if (!hasCells(*surface))
-    in.notes.warnings.push_back(
-        "render: the picture is empty, because the volume has a single layer of grid points, and "
-        "no "
-        "cells between them");
-  else if (hasIsovalue && surface->isEmpty())
-    in.notes.warnings.push_back(
-        fmt::format("render: the picture is empty, because no surface of the volume has the "
-                    "isovalue {}; its values lie between {:.6g} and {:.6g}",
-                    in.text("isovalue"), surface->volume().lowest(), surface->volume().highest()));
-  render::ViewedScene viewed;
-  viewed.scene.solids.push_back({.band = {}, .volume = surface});
-  return viewed;
-}
-
-/// Volume with the transfer function of --transfer: points, or the suggestion for the histogram.
-render::DirectVolume directVolumeOf(Invocation& in, const render::Scene& scene) {
-  const render::VolumeSurface& surface = *scene.solids.front().volume;
-  const std::string text = in.text("transfer");
-  const std::vector<render::TransferPoint> points =
-      text == "auto" ? render::suggestedTransfer(levelset::histogram(surface.volume()))
-                     : render::parseTransfer(text);
-  if (text == "auto")
-    in.notes.notes.push_back(
-        fmt::format("render: --transfer \"{}\"", render::transferText(points)));
-  const render::DirectVolume volume(surface, points);
-  in.notes.detailsJson = Json{{"skipped_blocks", volume.skippedShare()}}.dump();
-  if (volume.skippedShare() == 1 && surface.isEmpty() && hasCells(surface))
-    in.notes.warnings.push_back(
-        "render: the picture is empty, because no value of the volume has an opacity");
-  return volume;
-}
-
 /// Builds the scene to draw from the operand. The camera options override the camera of the
 /// operand, if it has one.
 render::Scene sceneOf(Invocation& in) {
   const Value& drawn = in.operands[0];
-  requireIsovalue(in);
-  render::ViewedScene viewed = isVolume(drawn.kind()) ? volumeScene(in) : sceneOf(drawn);
+  requireVolumeOptions(in);
+  render::ViewedScene viewed = isVolumeKind(drawn.kind()) ? volumeScene(in) : sceneOf(drawn);
   viewed.scene.camera = cameraOf(in, drawn.plan().bounds,
                                  viewed.hasCamera ? &viewed.scene.camera : nullptr, &viewed.scene);
   return viewed.scene;
@@ -156,19 +90,7 @@ void validateDraw(const Invocation& in) {
         filter));
   if (in.flag("ground") && !render::usesLights(styleNamed(style)))
     throw UsageError(fmt::format("render: --style {} has no shadows; leave --ground out", style));
-  if (in.given("transfer") && in.text("transfer") != "auto")
-    (void)render::TransferFunction(render::parseTransfer(in.text("transfer")), 1);
-  for (const char* name : {"filter", "inside"})
-    if (in.given("transfer") && !in.given("isovalue") && in.given(name))
-      throw UsageError(
-          fmt::format("render: --{} concerns the isosurface, and --transfer alone draws none; "
-                      "leave --{} out, or "
-                      "give --isovalue",
-                      name, name));
-  if (in.flag("no-shading") && !in.given("transfer"))
-    throw UsageError("render: --no-shading applies only to --transfer; leave it out");
-  if (in.given("transfer") && in.flag("ground"))
-    throw UsageError("render: a volume drawn with --transfer has no shadow; leave --ground out");
+  validateVolumePicture(in);
   if (in.given("reflection-lines") && style != "reflection-lines")
     throw UsageError(fmt::format(
         "render: --style {} shows no reflections; leave --reflection-lines out", style));
@@ -248,6 +170,13 @@ render::Image drawByKernel(Invocation& in, const render::Scene& scene,
   }
 }
 
+std::vector<std::string> pictureFilterNames() {
+  std::vector<std::string> names;
+  for (const render::Filter filter : render::kFilters)
+    names.emplace_back(render::filterName(filter));
+  return names;
+}
+
 render::Filter filterOf(const Invocation& in) {
   for (const render::Filter filter : render::kFilters)
     if (in.text("filter") == render::filterName(filter)) return filter;
@@ -291,46 +220,6 @@ void coarsen(Invocation& in, render::Scene& scene) {
   in.notes.notes.push_back(fmt::format(
       "render: values of {} bits displace the surface by at most {:.2g} voxels, {:.2g} voxels rms",
       bits, most.largest, most.rms));
-}
-
-/// Compares the colours of a volume by the kernel and by the judge.
-void requireSameLight(const render::Image& image, const render::Image& judged) {
-  // Both have errors of about 1e-3 of the brightest light, and the kernel omits the last 1/512.
-  constexpr float kTolerance = 1.0f / 128;
-  for (const char* name : {"R", "G", "B", "A"}) {
-    const std::vector<float>&a = image.channels.at(name), &b = judged.channels.at(name);
-    const float brightest = b.empty() ? 0 : *std::max_element(b.begin(), b.end());
-    for (std::size_t i = 0; i < a.size(); ++i)
-      if (!(std::abs(a[i] - b[i]) <= kTolerance * std::max(1.0f, brightest)))
-        throw levelset::NumericalError(fmt::format(
-            "render: the light of the volume differs from that of the judge in channel {} of the "
-            "pixel {},{}: {} and {}; please report it with the command",
-            name, i % static_cast<std::size_t>(image.width),
-            i / static_cast<std::size_t>(image.width), a[i], b[i]));
-  }
-}
-
-/// Adds the light of --transfer to a picture. @param judged  receives the picture with the light of
-/// the judge; null: it is not computed
-void addLight(Invocation& in, const render::Scene& scene, const render::RenderOptions& options,
-              render::Image& image, render::Image* judged) {
-  const render::DirectVolume volume = directVolumeOf(in, scene);
-  // The judge skips no blocks, so it takes more time.
-  const double middle = judged ? 0.3 : 1;
-  render::VolumeLightOptions light{.samples = options.samples,
-                                   .isShaded = !in.flag("no-shading"),
-                                   .isJudged = in.text("renderer") == "embree",
-                                   .maxBytes = in.maxMemory,
-                                   .progress = levelset::subProgress(in.progress, 0.1, middle)};
-  const std::vector<render::VolumeLight> all = render::volumeLight(image, scene, volume, light);
-  if (judged) {
-    *judged = image;
-    light.isJudged = true;
-    light.progress = levelset::subProgress(in.progress, middle, 0.9);
-    render::addVolumeLight(*judged, render::volumeLight(*judged, scene, volume, light));
-  }
-  render::addVolumeLight(image, all);
-  image.attributes["ls:transfer"] = render::transferText(volume.transfer().points());
 }
 
 Value draw(Invocation& in) {
@@ -430,7 +319,7 @@ RegionOfInterest roiOfDraw(Invocation& in, std::size_t, const RegionOfInterest&)
 }
 
 Plan planDraw(Invocation& in) {
-  requireIsovalue(in);
+  requireVolumeOptions(in);
   (void)cameraOf(in, in.operands[0].plan().bounds);
   return in.operands[0].plan();
 }
@@ -551,29 +440,11 @@ Operator renderOperator() {
            {.name = "filter",
             .type = ParamType::Choice,
             .doc = "interpolation between grid points: trilinear; tricubic, Catmull-Rom splines "
-                   "through "
-                   "the values; bspline, a tricubic B-spline, which shrinks the solid; bspline-qi, "
-                   "the "
-                   "same spline with corrected coefficients; super-quadratic, cubic-c1 and "
-                   "bcc-quadratic, splines on tetrahedra, which smooth the values",
+                   "through the values; bspline, a tricubic B-spline, which shrinks the solid; "
+                   "bspline-qi, the same spline with corrected coefficients; super-quadratic, "
+                   "cubic-c1 and bcc-quadratic, splines on tetrahedra, which smooth the values",
             .fallback = "trilinear",
-            .choices = {"trilinear", "tricubic", "bspline", "bspline-qi", "super-quadratic",
-                        "cubic-c1", "bcc-quadratic"}},
-           {.name = "isovalue",
-            .type = ParamType::Number,
-            .doc = "for a volume: draw the surface on which the interpolated values equal this "
-                   "number"},
-           insideParam("for a volume: side of the isovalue that is solid"),
-           {.name = "transfer",
-            .type = ParamType::Text,
-            .doc =
-                "for a volume: draw it by direct volume rendering. Points VALUE:OPACITY or "
-                "VALUE:OPACITY/RED,GREEN,BLUE, separated by blanks; the opacity, below 1, is "
-                "that of a layer one voxel thick. Or auto: from the histogram. The values between "
-                "grid points are trilinear; --filter concerns the isosurface"},
-           {.name = "no-shading",
-            .type = ParamType::Flag,
-            .doc = "with --transfer: colours do not depend on the gradient of the values"},
+            .choices = pictureFilterNames()},
            {.name = "tables",
             .type = ParamType::Choice,
             .doc = "with --renderer gpu or both: data that the shader reads; bricks, or a NanoVDB "
@@ -648,6 +519,10 @@ Operator renderOperator() {
                    (in.given("png") && levelset::isStandardOutput(in.text("png")));
           },
   };
+  const std::vector<Param> ofVolumes = volumePictureParams();
+  const auto filter = std::find_if(picture.params.begin(), picture.params.end(),
+                                   [](const Param& param) { return param.name == "filter"; });
+  picture.params.insert(std::next(filter), ofVolumes.begin(), ofVolumes.end());
   addCameraParams(picture.params);
   return picture;
 }
