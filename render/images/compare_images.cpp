@@ -316,7 +316,8 @@ class Comparer {
                         }});
     // Angle between unit vectors, by a formula that is precise for small angles. For grazing rays
     // the positions differ, and the normals differ by that distance times the curvature.
-    const double mostTurn = jumps() ? kInfinite : 1.7e-3;
+    constexpr double kMostJump = 0.1;  // 0.04 at a pixel of a scanned head
+    const double mostTurn = jumps() ? kMostJump : 1.7e-3;
     add({"N.X", "N.Y", "N.Z"}, {"N", "radians", {2e-4, mostTurn}, [this](std::size_t i) {
                                   const double d = vectorDifference("N", i);
                                   const double angle = d <= 2 ? 2 * std::asin(d / 2) : kInfinite;

@@ -138,6 +138,9 @@ TEST(CompareImages, AcceptsJumpsOfNormalsOfTheSuperSpline) {
   EXPECT_FALSE(compareImages(first, second).agrees());
   second.attributes["ls:normal"] = "super-quadratic";
   EXPECT_TRUE(compareImages(first, second).agrees());
+  second.channels["N.X"][at(30, 30)] = 0.2f;
+  EXPECT_FALSE(compareImages(first, second).agrees());
+  second.channels["N.X"][at(30, 30)] = 0.01f;
   for (int y = 25; y < 35; ++y) second.channels["N.X"][at(31, y)] = 0.01f;
   EXPECT_FALSE(compareImages(first, second).agrees());
 }
