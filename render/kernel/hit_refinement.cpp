@@ -227,6 +227,7 @@ double crossingNear(const KernelSolid& solid, const V3i& cell, const V3d& origin
 
 double refineHit(const KernelSolid& solid, const PixelBlock& pixels, std::size_t n,
                  const HitBlock& hits, ShapeBlock& shapes) {
+  shapes.flush(n);
   const V3i cell(hits.x[n], hits.y[n], hits.z[n]);
   const V3d place = V3d(cell) + shapes.placeInCell(n);
   const auto [origin, direction] =

@@ -1,5 +1,8 @@
 #include "render/kernel/ray_block.h"
 
+#include <cmath>
+#include <limits>
+
 namespace render {
 
 SurfaceShape ShapeBlock::at(std::size_t i) const {
@@ -18,6 +21,11 @@ void ShapeBlock::move(std::size_t i, const Imath::V3d& by, bool isDrawn) {
   for (std::size_t p = 0; p < (isDrawn ? 6u : 3u); ++p)
     part[p][i] =
         static_cast<float>(static_cast<double>(part[p][i]) + change[static_cast<int>(p % 3)]);
+}
+
+void ShapeBlock::flush(std::size_t i) {
+  for (std::vector<float>& p : part)
+    if (std::abs(p[i]) < std::numeric_limits<float>::min()) p[i] = 0;
 }
 
 }  // namespace render

@@ -78,6 +78,9 @@ struct ShapeBlock {
   /// @param by  difference of the positions, voxels along the axes of table space
   /// @param isDrawn  true: the Hessian is that of the drawn surface, whose gradient moves, too
   void move(std::size_t i, const Imath::V3d& by, bool isDrawn);
+  /// Sets numbers of entry i that are too small for single precision (denormal), and negative
+  /// zeros, to 0. Some GPUs compute 0 in their place.
+  void flush(std::size_t i);
   /// Copies entry i of `from` to entry `to`.
   void take(std::size_t to, const ShapeBlock& from, std::size_t i) {
     for (std::size_t p = 0; p < kParts; ++p) part[p][to] = from.part[p][i];

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <string>
 
@@ -171,6 +172,20 @@ TEST(GlContext, ReportsShadersThatDoNotCompile) {
   });
   EXPECT_NE(words.find("does not compile"), std::string::npos) << words;
   EXPECT_NE(words.find("--renderer cpu"), std::string::npos) << words;
+}
+
+TEST(ShapeBlock, DropsNumbersThatGpusComputeAsZero) {
+  ShapeBlock shapes(2);
+  for (std::size_t p = 0; p < ShapeBlock::kParts; ++p) {
+    shapes.part[p][0] = p % 3 == 0 ? -1.7e-41f : p % 3 == 1 ? -0.0f : 1.2e-38f;
+    shapes.part[p][1] = -1.7e-41f;
+  }
+  shapes.flush(0);
+  for (std::size_t p = 0; p < ShapeBlock::kParts; ++p) {
+    EXPECT_EQ(shapes.part[p][0], p % 3 == 2 ? 1.2e-38f : 0.0f);
+    EXPECT_FALSE(std::signbit(shapes.part[p][0]));
+    EXPECT_EQ(shapes.part[p][1], -1.7e-41f);
+  }
 }
 
 TEST(GpuRenderer, Refuses) {
