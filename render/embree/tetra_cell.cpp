@@ -112,22 +112,11 @@ void TetraCell::overPieces(const V3d& p, const V3d& q, const Visit& visit) const
 }
 
 std::optional<double> TetraCell::firstSignChange(const V3d& p, const V3d& q) const {
-  std::optional<double> first;
-  overPieces(p, q, [&](const BernsteinCubic& cubic, double from, double to) {
-    if (const double s = render::firstSignChange(cubic); s >= 0) first = from + s * (to - from);
-    return !first;
-  });
-  return first;
+  return firstSignChangeOn([&](const auto& visit) { overPieces(p, q, visit); });
 }
 
 void TetraCell::addSignChanges(const V3d& p, const V3d& q, std::vector<double>& found) const {
-  std::vector<double> shares;
-  overPieces(p, q, [&](const BernsteinCubic& cubic, double from, double to) {
-    shares.clear();
-    render::addSignChanges(cubic, shares);
-    for (const double s : shares) found.push_back(from + s * (to - from));
-    return true;
-  });
+  addSignChangesOn([&](const auto& visit) { overPieces(p, q, visit); }, found);
 }
 
 SurfaceShape TetraCell::shape(const V3d& p) const {
