@@ -153,8 +153,8 @@ void fillSites(GridReader& grid, Brick& brick) {
       for (int y = 0; y < kSitesOfAxis; ++y)
         for (int z = 0; z < kSitesOfAxis; ++z) {
           const float* first = points.data() +
-                               ((2 * x + parity) * kSitePoints + 2 * y + parity) * kSitePoints + 2 * z +
-                               parity;
+                               ((2 * x + parity) * kSitePoints + 2 * y + parity) * kSitePoints +
+                               2 * z + parity;
           std::array<double, 4> sum{};
           for (int corner = 0; corner < 8; ++corner) {
             const int i = corner >> 2, j = corner >> 1 & 1, k = corner & 1;
