@@ -30,6 +30,12 @@ struct VdbAccess {
 /// Returns the grid of a band, for editing. Copies the grid first when another band shares it.
 [[nodiscard]] openvdb::FloatGrid& editVdb(NarrowBand& band);
 
+/// Takes the grid out of a band that is not used any more. A shared band keeps its grid too.
+[[nodiscard]] inline openvdb::FloatGrid::Ptr takeVdb(NarrowBand&& band) {
+  const std::shared_ptr<VdbGrid> own = std::move(VdbAccess::slot(band));
+  return own.use_count() == 1 ? std::move(own->grid) : own->grid;
+}
+
 /// Makes a band of a grid and sets its class to level set. The grid must fulfil the invariants of a
 /// band: background > 0, a transform of rotation, uniform scale and translation, no active tiles,
 /// inactive values ± background. Debug builds assert the first two; the others are not checked.
