@@ -147,8 +147,9 @@ NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& option
   request.ofMovedSurface = followsFromOld(request.shift, halfWidth);
   if (request.ofMovedSurface) request.progress = options.progress;
   if (request.ofMovedSurface) request.halfWidth = halfWidth;
-  const openvdb::FloatGrid::Ptr moved =
-      eikonal::distanceTransform(takeVdb(std::move(solid)), request);
+  openvdb::FloatGrid::Ptr own = takeUnshared(solid);
+  const openvdb::FloatGrid::Ptr moved = own ? eikonal::distanceTransform(std::move(own), request)
+                                            : eikonal::distanceTransform(vdb(solid), request);
   if (!hasSurface(*moved))
     throw NoSurface(
         fmt::format("the result is empty after an offset of {} world units, because no part of "

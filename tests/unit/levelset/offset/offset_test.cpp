@@ -455,6 +455,19 @@ TEST(Offset, FreesTheSolidOnTheWayUnlessItIsShared) {
   EXPECT_EQ(tree->leafCount(), leaves);
 }
 
+/// Another owner edits the grid in place if it is the only one.
+TEST(Offset, HoldsASharedSolidUntilTheEnd) {
+  const NarrowBand solid = makeBox(V3d(6, 2, 2), V3d(0), 0.1);
+  long least = 1000;
+  OffsetOptions options;
+  options.progress = [&](double) {
+    least = std::min(least, solid.shared().use_count());
+    return true;
+  };
+  (void)offset(solid, 0.3, options);
+  EXPECT_EQ(least, 2);
+}
+
 TEST(Offset, FindsDistantBodies) {
   // The sweep passes slabs without a surface between the bodies.
   const NarrowBand left = makeSphere(8, V3d(0), 1), right = makeSphere(8, V3d(2000.5, 0.3, 0.1), 1);
