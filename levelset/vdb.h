@@ -30,6 +30,16 @@ struct VdbAccess {
 /// Returns the grid of a band, for editing. Copies the grid first when another band shares it.
 [[nodiscard]] openvdb::FloatGrid& editVdb(NarrowBand& band);
 
+/// Takes the grid out of a band that is not used any more. Returns null, and leaves the band as it
+/// is, if another band shares the grid. Keep the band as long as its grid is read: without it, the
+/// other band would count as the only one, and its grid could be edited.
+[[nodiscard]] inline openvdb::FloatGrid::Ptr takeUnshared(NarrowBand& band) {
+  std::shared_ptr<VdbGrid>& slot = VdbAccess::slot(band);
+  if (slot.use_count() > 1) return nullptr;
+  const std::shared_ptr<VdbGrid> own = std::move(slot);
+  return std::move(own->grid);
+}
+
 /// Makes a band of a grid and sets its class to level set. The grid must fulfil the invariants of a
 /// band: background > 0, a transform of rotation, uniform scale and translation, no active tiles,
 /// inactive values ± background. Debug builds assert the first two; the others are not checked.

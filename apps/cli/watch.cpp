@@ -15,6 +15,7 @@
 
 #include "levelset/error.h"
 #include "levelset/file_target.h"
+#include "levelset/memory_limit.h"
 
 namespace cli {
 namespace {
@@ -35,13 +36,6 @@ std::string memorySentence() {
   _exit(code);
 }
 
-std::size_t residentBytes() {
-  std::ifstream statm("/proc/self/statm");
-  std::size_t pages = 0, resident = 0;
-  statm >> pages >> resident;
-  return resident * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
-}
-
 void watch(sigset_t signals, std::size_t maxBytes) {
   constexpr timespec kInterval{0, 50'000'000};
   for (;;) {
@@ -51,7 +45,7 @@ void watch(sigset_t signals, std::size_t maxBytes) {
              static_cast<int>(levelset::ExitCode::Interrupted));
     if (signal > 0)
       endNow("\nlevelsmith: ended by a signal; unfinished files are removed\n", 128 + signal);
-    if (residentBytes() > maxBytes)
+    if (levelset::residentBytes() > maxBytes)
       endNow(memorySentence().c_str(), static_cast<int>(levelset::ExitCode::Resource));
   }
 }

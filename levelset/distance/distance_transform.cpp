@@ -5,7 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
+#include <numeric>
+#include <optional>
 
 #include "levelset/distance/moved/meeting_parts.h"
 #include "levelset/distance/nearest/point_distance.h"
@@ -59,85 +62,281 @@ LeafOrTile makeLeaf(const Block& block, const LeafNode* before, Polisher& polish
   return result;
 }
 
-FloatTree::Ptr makeTree(const FloatTree& field, const ZeroSet& surface,
-                        const NearestPoints& nearest, const DistanceRequest& request,
-                        double voxelSize) {
-  const auto background = backgroundOf(request.halfWidth, voxelSize);
-  auto result = std::make_shared<FloatTree>(background);
-  copySigns(
-      field, [&](const Coord& origin) { return nearest.find(origin) != nullptr; }, *result);
+/// Returns the number of slabs on each side of a slab to which a distance extends.
+int slabsWithin(double voxels) {
+  return static_cast<int>(std::min(1e6, std::ceil(voxels / 8)));
+}
 
-  std::vector<const Block*> blocks;
-  for (const Block& block : nearest.blocks()) blocks.push_back(&block);
-  // Blocks in a cube of 4³ blocks follow each other, so that the dense copies of their surroundings
-  // are used again.
+/// Computes a distance transform slab by slab, in ascending order of x. A slab is a layer of leaf
+/// blocks. Each step follows the step before it at the distance that it needs, so only the slabs
+/// between the first step and the last one are in memory.
+class DistanceSweep {
+ public:
+  /// @param owned  the tree of the field, if its leaves may be deleted; else null
+  DistanceSweep(const FloatGrid& field, FloatTree* owned, const DistanceRequest& request);
+  FloatGrid::Ptr run();
+
+ private:
+  void checkMemory() const;
+  void findAllPoints();
+  void findPoints(int slab);
+  void makeLeaves(int slab);
+  void copySignsOf(int slab);
+  void follow(int final);
+  void release();
+
+  // Number of slabs that are resolved together, see MeetingParts::resolve(). The slabs beside them
+  // are read again each time.
+  static constexpr int kResolved = 2;
+
+  const FloatGrid& field_;
+  const DistanceRequest& request_;
+  NearestPoints::Reach reach_;
+  BlockSelection within_;
+  FloatTree::Ptr thickened_;
+  FloatTree* owned_;
+  ZeroSet surface_;
+  std::optional<SurfacePointSearch> search_;
+  std::optional<NearestPoints> nearest_;
+  std::optional<Polishers> polishers_;
+  FloatGrid::Ptr result_;
+  std::optional<MeetingParts> meeting_;
+  std::map<int, std::vector<std::size_t>> pointBlocks_;     ///< blocks of search_, by slab
+  std::map<int, std::vector<Coord>> inputLeaves_;           ///< origins, by slab
+  int last_ = 0;                                            ///< last slab of the result
+  int found_ = 0, made_ = 0, searched_ = 0, resolved_ = 0;  ///< last slab of each step
+};
+
+NearestPoints::Reach reachOf(const DistanceRequest& request) {
+  return {std::max(0.0, request.halfWidth - request.shift),
+          std::max(0.0, request.halfWidth + request.shift), request.region};
+}
+
+/// Returns the blocks in which surface points are searched.
+BlockSelection blocksWithPoints(const NearestPoints::Reach& reach) {
+  BlockSelection blocks{reach.region};
+  if (blocks.box)
+    blocks.box->expand(static_cast<int>(std::min(1e9, std::max(reach.inside, reach.outside) + 2)));
+  return blocks;
+}
+
+DistanceSweep::DistanceSweep(const FloatGrid& field, FloatTree* owned,
+                             const DistanceRequest& request)
+    : field_(field),
+      request_(request),
+      reach_(reachOf(request)),
+      within_(blocksWithPoints(reach_)),
+      owned_(owned),
+      surface_{field.constTreePtr(),
+               request.mayHaveEdges
+                   ? SharpPatches(field, within_, subProgress(request.progress, 0, 0.1))
+                   : SharpPatches(),
+               {}} {}
+
+void DistanceSweep::checkMemory() const {
+  MemoryEstimate estimate;
+  estimate.surface = search_->bounds();
+  // There are at least 1.15 surface points for each voxel² of the surface.
+  estimate.area = static_cast<double>(search_->size()) / 1.15;
+  estimate.inside = reach_.inside;
+  estimate.outside = reach_.outside;
+  estimate.region = request_.region;
+  // Bytes for the state of propagate.h and the result, including unused grid points in the blocks.
+  estimate.bytesPerGridPoint = 25;
+  eikonal::checkMemory(estimate, request_.maxMemory);
+}
+
+/// Finds the surface points of a slab and gives them to their grid points.
+void DistanceSweep::findPoints(int slab) {
+  if (const auto blocks = pointBlocks_.find(slab); blocks != pointBlocks_.end()) {
+    const auto gridPoints = search_->find(blocks->second, surface_.points);
+    for (std::size_t i = 0; i < gridPoints.size(); ++i)
+      nearest_->seed(gridPoints[i], search_->first(blocks->second[i]));
+  }
+  nearest_->seedFeatures(search_->countOfGridPoints(), slab);
+}
+
+/// Finds the surface points of all slabs, because those at the boundary of a region depend on all.
+void DistanceSweep::findAllPoints() {
+  std::vector<std::size_t> all(search_->blockCount());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  std::vector<Coord> gridPoints;
+  for (const std::vector<Coord>& part : search_->find(all, surface_.points))
+    gridPoints.insert(gridPoints.end(), part.begin(), part.end());
+  nearest_->seed(gridPoints, 0);
+  nearest_->seedFeatures(gridPoints.size());
+  nearest_->seedRegionBoundary(gridPoints);
+}
+
+void DistanceSweep::copySignsOf(int slab) {
+  const auto leaves = inputLeaves_.find(slab);
+  if (leaves == inputLeaves_.end()) return;
+  for (const Coord& origin : leaves->second)
+    if (!nearest_->find(origin))
+      copyLeafSigns(*field_.tree().probeConstLeaf(origin), result_->tree());
+}
+
+/// Computes the distances of a slab.
+void DistanceSweep::makeLeaves(int slab) {
+  copySignsOf(slab);
+  std::vector<Block*> blocks = nearest_->blocksOf(slab);
+  // Blocks in a square of 4² blocks follow each other, so that the dense copies of their
+  // surroundings are used again.
   std::sort(blocks.begin(), blocks.end(), [](const Block* a, const Block* b) {
-    const Coord cubeA = a->origin & ~31, cubeB = b->origin & ~31;
-    return cubeA != cubeB ? cubeA < cubeB : a->origin < b->origin;
+    const Coord squareA = a->origin & ~31, squareB = b->origin & ~31;
+    return squareA != squareB ? squareA < squareB : a->origin < b->origin;
   });
   std::vector<LeafOrTile> leaves(blocks.size());
-  forEachWithPolisher(blocks.size(), surface,
-                      subProgress(request.progress, 0.6, request.ofMovedSurface ? 0.8 : 1),
-                      [&](std::size_t i, Polisher& polisher) {
-                        leaves[i] = makeLeaf(*blocks[i], field.probeConstLeaf(blocks[i]->origin),
-                                             polisher, request, voxelSize, background);
-                      });
+  const float background = result_->background();
+  polishers_->forEach(blocks.size(), [&](std::size_t i, Polisher& polisher) {
+    leaves[i] = makeLeaf(*blocks[i], field_.tree().probeConstLeaf(blocks[i]->origin), polisher,
+                         request_, field_.voxelSize()[0], background);
+    blocks[i]->squared.release();
+  });
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     if (leaves[i].leaf)
-      result->addLeaf(leaves[i].leaf.release());
+      result_->tree().addLeaf(leaves[i].leaf.release());
     else
-      result->addTile(1, blocks[i]->origin, leaves[i].tile, false);
+      result_->tree().addTile(1, blocks[i]->origin, leaves[i].tile, false);
   }
-  openvdb::tools::pruneTiles(*result);
-  return result;
+}
+
+/// Runs the steps after the propagation.
+/// @param final  last slab for which the propagation is complete
+void DistanceSweep::follow(int final) {
+  const bool isEnd = final >= last_;
+  // A block reads the nearest surface points of its neighbours.
+  const int make = isEnd ? last_ : final - 1;
+  while (made_ < make) makeLeaves(++made_);
+  if (!meeting_) return;
+  const int search =
+      isEnd ? last_ : std::min(make - 1, final - MeetingParts::slabsOfSearch(request_));
+  while (searched_ < search) {
+    const auto blocks = nearest_->blocksOf(++searched_);
+    meeting_->search(searched_, {blocks.begin(), blocks.end()});
+  }
+  const int resolve = isEnd ? last_ : searched_ - CreaseDistances::kSlabsAround;
+  while (resolved_ + kResolved <= resolve) {
+    meeting_->resolve(resolved_ + 1, resolved_ + kResolved);
+    resolved_ += kResolved;
+  }
+  if (isEnd && resolved_ < last_) meeting_->resolve(resolved_ + 1, last_);
+}
+
+/// Releases the slabs that no step reads any more.
+void DistanceSweep::release() {
+  // Newton's method for the distance of a grid point starts at the nearest surface point of a
+  // neighbour and moves by at most eight voxels. It reads a leaf and four grid points beside it.
+  const double reach = std::max(reach_.inside, reach_.outside) + 2;
+  int blocks = made_ - 1, field = blocks - slabsWithin(reach + 8 + 7 + DenseBlock::kPad);
+  if (meeting_) {
+    const int from = resolved_ - CreaseDistances::kSlabsAround;
+    blocks = std::min(blocks, from - MeetingParts::slabsOfSearch(request_));
+    field = std::min(field, from - MeetingParts::fieldSlabsOfSearch(request_));
+  }
+  const int points = blocks - slabsWithin(reach);
+  field = std::min(field, points);
+  nearest_->releaseUpTo(blocks);
+  for (; !pointBlocks_.empty() && pointBlocks_.begin()->first <= points;
+       pointBlocks_.erase(pointBlocks_.begin())) {
+    // Blocks of a slab with successive numbers are released together.
+    const std::vector<std::size_t>& all = pointBlocks_.begin()->second;
+    for (std::size_t i = 0; i < all.size();) {
+      std::size_t end = i + 1;
+      while (end < all.size() && all[end] == all[end - 1] + 1) ++end;
+      const std::size_t first = search_->first(all[i]), last = search_->first(all[end - 1] + 1);
+      surface_.points.positions.release(first, last);
+      surface_.points.jets.release(first, last);
+      surface_.points.sharp.release(first, last);
+      i = end;
+    }
+  }
+  const auto deleteFrom = [&](FloatTree& tree, const Coord& origin) {
+    if (tree.probeConstLeaf(origin)) tree.addTile(1, origin, tree.background(), false);
+  };
+  if (!owned_ && !thickened_) return;
+  if (inputLeaves_.empty() || inputLeaves_.begin()->first > field) return;
+  for (; !inputLeaves_.empty() && inputLeaves_.begin()->first <= field;
+       inputLeaves_.erase(inputLeaves_.begin()))
+    for (const Coord& origin : inputLeaves_.begin()->second) {
+      if (owned_) deleteFrom(*owned_, origin);
+      if (thickened_) deleteFrom(*thickened_, origin);
+    }
+  // Accessors keep pointers to leaves.
+  if (owned_) owned_->clearAllAccessors();
+  if (thickened_) thickened_->clearAllAccessors();
+}
+
+FloatGrid::Ptr DistanceSweep::run() {
+  search_.emplace(*surface_.interpolated, within_, surface_.patches);
+  if (!search_->thin().empty()) {
+    thickened_ = thicken(field_.tree(), search_->thin());
+    surface_.interpolated = thickened_;
+    search_.emplace(*surface_.interpolated, within_, surface_.patches);
+  }
+  if (search_->size() == 0)
+    throw NoSurface(
+        fmt::format("the field has no zero crossing{}, so there is no surface to "
+                    "measure from; give a solid with a surface",
+                    within_.box ? " near the region" : ""));
+  checkMemory();
+  report(request_.progress, 0.1);
+
+  surface_.points = search_->reserve();
+  nearest_.emplace(field_.tree(), surface_.points, reach_);
+  polishers_.emplace(surface_);
+  result_ = FloatGrid::create(backgroundOf(request_.halfWidth, field_.voxelSize()[0]));
+  result_->setTransform(field_.transform().copy());
+  copyTileSigns(field_.tree(), result_->tree());
+  if (request_.ofMovedSurface) meeting_.emplace(surface_, *polishers_, request_, *result_);
+
+  // === Range of the slabs
+  for (auto leaf = field_.tree().cbeginLeaf(); leaf; ++leaf)
+    inputLeaves_[NearestPoints::slabOf(leaf->origin())].push_back(leaf->origin());
+  for (std::size_t i = 0; i < search_->blockCount(); ++i)
+    pointBlocks_[NearestPoints::slabOf(search_->origin(i))].push_back(i);
+  CoordBBox surface = search_->bounds();
+  for (const Vec3d& feature : search_->features()) surface.expand(Coord::floor(feature));
+  const int beyond = slabsWithin(std::max(reach_.inside, reach_.outside) + 2) + 1;
+  int first = NearestPoints::slabOf(surface.min()) - beyond;
+  last_ = NearestPoints::slabOf(surface.max()) + beyond;
+  if (!inputLeaves_.empty()) {
+    first = std::min(first, inputLeaves_.begin()->first);
+    last_ = std::max(last_, inputLeaves_.rbegin()->first);
+  }
+  found_ = made_ = searched_ = resolved_ = first - 1;
+
+  // === Steps
+  nearest_->beginAt(first);
+  if (request_.region) findAllPoints();
+  const double steps = last_ - first + 1.0, end = meeting_ ? 0.8 : 1;
+  for (int g = first >> 1; nearest_->lastFinal() < last_; ++g) {
+    if (!request_.region)
+      while (found_ < 2 * g + 1) findPoints(++found_);
+    nearest_->advance(g);
+    follow(nearest_->lastFinal());
+    release();
+    report(request_.progress,
+           0.1 + (end - 0.1) * std::clamp((nearest_->lastFinal() - first + 1) / steps, 0.0, 1.0));
+  }
+  if (meeting_) meeting_->finish();
+  openvdb::tools::pruneTiles(result_->tree());
+  result_->setName(field_.getName());
+  result_->setGridClass(openvdb::GRID_LEVEL_SET);
+  report(request_.progress, 1);
+  return result_;
 }
 
 }  // namespace
 
 FloatGrid::Ptr distanceTransform(const FloatGrid& field, const DistanceRequest& request) {
-  NearestPoints::Reach reach;
-  reach.outside = std::max(0.0, request.halfWidth + request.shift);
-  reach.inside = std::max(0.0, request.halfWidth - request.shift);
-  reach.region = request.region;
-  std::optional<CoordBBox> within = request.region;
-  if (within)
-    within->expand(static_cast<int>(std::min(1e9, std::max(reach.inside, reach.outside) + 2)));
+  return DistanceSweep(field, nullptr, request).run();
+}
 
-  const BlockSelection blocks{within};
-  const ZeroSet surface = readZeroSet(field, blocks, request.mayHaveEdges ? &blocks : nullptr,
-                                      subProgress(request.progress, 0, 0.2));
-  const SurfacePoints& points = surface.points;
-  if (points.size() == 0)
-    throw NoSurface(
-        fmt::format("the field has no zero crossing{}, so there is no surface to "
-                    "measure from; give a solid with a surface",
-                    within ? " near the region" : ""));
-  MemoryEstimate estimate;
-  for (const Coord& c : points.gridPoints) estimate.surface.expand(c);
-  // There are at least 1.15 surface points for each voxel² of the surface.
-  estimate.area = static_cast<double>(points.size()) / 1.15;
-  estimate.inside = reach.inside;
-  estimate.outside = reach.outside;
-  estimate.region = request.region;
-  // Bytes for the state of propagate.h and the result, including unused grid points in the blocks.
-  estimate.bytesPerGridPoint = 25;
-  checkMemory(estimate, request.maxMemory);
-  report(request.progress, 0.3);
-
-  // === Nearest surface point of each grid point
-  NearestPoints nearest(field.tree(), points, reach);
-  nearest.run(subProgress(request.progress, 0.3, 0.6));
-
-  // === Distances
-  FloatGrid::Ptr result =
-      FloatGrid::create(makeTree(field.tree(), surface, nearest, request, field.voxelSize()[0]));
-  result->setTransform(field.transform().copy());
-  if (request.ofMovedSurface)
-    correctMeetingParts(*result, surface, nearest, request, subProgress(request.progress, 0.8, 1));
-  result->setName(field.getName());
-  result->setGridClass(openvdb::GRID_LEVEL_SET);
-  report(request.progress, 1);
-  return result;
+FloatGrid::Ptr distanceTransform(FloatGrid::Ptr&& field, const DistanceRequest& request) {
+  const FloatGrid::Ptr own = std::move(field);
+  const bool isShared = own.use_count() > 1 || own->treePtr().use_count() > 2;
+  return DistanceSweep(*own, isShared ? nullptr : &own->tree(), request).run();
 }
 
 }  // namespace levelset::eikonal

@@ -98,8 +98,9 @@ class ZeroSet {
     eikonal::SurfacePoints points;
   };
   static Points pointsOf(FloatTree::ConstPtr field) {
-    eikonal::SurfacePoints points = eikonal::findSurfacePoints(*field, {}, {});
-    if (points.thin.empty()) return {field, std::move(points)};
+    std::vector<openvdb::Coord> thin;
+    eikonal::SurfacePoints points = eikonal::findSurfacePoints(*field, {}, {}, &thin);
+    if (thin.empty()) return {field, std::move(points)};
     field = eikonal::thicken(*field);
     return {field, eikonal::findSurfacePoints(*field, {}, {})};
   }

@@ -120,6 +120,13 @@ bool followsFromOld(double distance, double halfWidth) {
   return halfWidth >= kPadding && std::abs(distance) >= kLeastShift;
 }
 
+// This reach is measured, not proven: the test RegionOfInterest.OffsetsHaveEqualBits compares
+// regions of random solids with the complete result, to the bit. A bound that holds in all cases
+// adds the reach of the search for creases, MovedSurface::reach(), and is about 16 voxels larger
+// for a shift of 5 voxels. It has three terms. A grid point reads the searches of others within
+// kCreaseReach. A search reads nearest surface points within MovedSurface::reach(). These are
+// determined by the field within the distance that they propagate and distanceReach(0). Searches
+// rarely go that far: on the dragon, 0.4 % of them pass 3 voxels and none passes 12.
 double offsetReach(double distance, double halfWidth) {
   // Other offsets compute the shifted field first, and then the distances from it.
   const double more =
@@ -140,7 +147,9 @@ NarrowBand offset(NarrowBand solid, double distance, const OffsetOptions& option
   request.ofMovedSurface = followsFromOld(request.shift, halfWidth);
   if (request.ofMovedSurface) request.progress = options.progress;
   if (request.ofMovedSurface) request.halfWidth = halfWidth;
-  const openvdb::FloatGrid::Ptr moved = eikonal::distanceTransform(vdb(solid), request);
+  openvdb::FloatGrid::Ptr own = takeUnshared(solid);
+  const openvdb::FloatGrid::Ptr moved = own ? eikonal::distanceTransform(std::move(own), request)
+                                            : eikonal::distanceTransform(vdb(solid), request);
   if (!hasSurface(*moved))
     throw NoSurface(
         fmt::format("the result is empty after an offset of {} world units, because no part of "

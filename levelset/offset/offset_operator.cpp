@@ -79,6 +79,10 @@ std::optional<Cost> OffsetOperator::cost(const Options& options, const OperatorP
   const double distance = options.distance ? *options.distance / solid.voxelSize : 0;
   const double before = solid.layer();
   Cost cost = costOfOffset(before, plans.result.layer(), distance, plans.result.halfWidth);
+  // A distance transform sweeps the grid along x. About this many voxels are in memory at once.
+  constexpr double kSweep = 176;
+  const double extent = plans.result.bounds.size().x / plans.result.voxelSize;
+  if (extent > kSweep) cost.bytes *= kSweep / extent;
   // A variable distance is first evaluated at the points of the surface, which takes a further
   // distance transform.
   if (options.by || options.mask) {

@@ -13,6 +13,7 @@
 #include "apps/pipeline/run/surface_spread.h"
 #include "levelset/error.h"
 #include "levelset/files/band_parts_writer.h"
+#include "levelset/memory_limit.h"
 
 namespace pipeline {
 namespace {
@@ -27,9 +28,11 @@ using levelset::kPartCell;
 /// the planned bounds of a band are an estimate.
 constexpr int kFarCell = 1 << 30;
 
-/// Share of the memory limit that a part may use, by the estimate before it is computed. The rest
-/// is for the mesh, for the result's blocks and for the error of the estimate.
+/// Share of the available memory that a part may use, by the estimate before it is computed. The
+/// rest is for the mesh, for the result's blocks and for the error of the estimate.
 constexpr double kPartShare = 0.4;
+/// Share of the available memory at which a part is given up, to be divided.
+constexpr double kLargestShare = 0.9;
 
 /// The box of an index box with half a voxel around its grid points, world units.
 Box3d worldBox(const Box3i& cells, double voxelSize) {
@@ -75,6 +78,16 @@ Box3i cellsAround(const Plan& plan) {
   return cells;
 }
 
+/// Returns plans with bounds as narrow along x as those of parts. The estimates of operators that
+/// sweep the grid along x depend on that extent.
+std::vector<std::optional<Plan>> narrowPlans(std::vector<std::optional<Plan>> plans) {
+  for (std::optional<Plan>& plan : plans)
+    if (plan && plan->voxelSize > 0 && !plan->bounds.isEmpty())
+      plan->bounds.max.x =
+          std::min(plan->bounds.max.x, plan->bounds.min.x + kPartCell * plan->voxelSize);
+  return plans;
+}
+
 /// Checks that the grid of a band is world = voxelSize × index. Parts are boxes of this grid.
 void requirePlainGrid(const levelset::NarrowBand& band) {
   Imath::M44d plain;
@@ -104,9 +117,12 @@ void GraphRun::runInParts(std::size_t write) {
     graph.given.emplace(i, values_.peek(i));
   }
   const std::vector<char> runs = neededNodes(graph);
+  const auto available = static_cast<double>(levelset::memoryLeft(settings_.maxMemory));
+  const std::size_t inUse = levelset::residentBytes();
   // Memory is in proportion to the surface in a part.
-  const double budget = kPartShare * static_cast<double>(settings_.maxMemory),
-               whole = estimatePeak(graph, runs, plans_, regionsOfInterest(graph, runs, plans_));
+  double budget = kPartShare * available;
+  const double whole =
+      estimatePeak(graph, runs, narrowPlans(plans_), regionsOfInterest(graph, runs, plans_));
   std::size_t first = 0;
   while (graph.nodes[first].kind != Kind::Band || !runs[first]) ++first;
   const ShareOfBox share = shareOfBox(graph, first, *plans_[first]);
@@ -137,6 +153,16 @@ void GraphRun::runInParts(std::size_t write) {
     if (told.insert(text).second) settings_.note(text);
   };
 
+  // Gives up a part that takes more than its estimate, before the limit ends the process.
+  bool canSplit = false;
+  settings.shouldContinue = [&] {
+    if (canSplit && inUse<settings_.maxMemory&& static_cast<double>(
+                            levelset::residentBytes())> static_cast<double>(inUse) +
+                        kLargestShare * available)
+      throw levelset::ResourceLimit("the part does not fit into memory");
+    return !settings_.shouldContinue || settings_.shouldContinue();
+  };
+
   const Box3i around = cellsAround(plan);
   std::vector<Box3i> parts{{V3i(-kFarCell), V3i(kFarCell - 1)}};
   std::size_t count = 0;
@@ -145,11 +171,12 @@ void GraphRun::runInParts(std::size_t write) {
     const Box3i part = parts.back();
     parts.pop_back();
     Box3i low, high;
-    const bool canSplit = halve(part, around, low, high);
+    canSplit = halve(part, around, low, high);
     const auto split = [&] { parts.insert(parts.end(), {high, low}); };
     const std::vector<RegionOfInterest> regions =
         regionsOfInterest(graph, runs, plans_, 1, worldBox(within(part, around), plan.voxelSize));
-    if (canSplit && whole * share(regions[first].region) > budget) {
+    const double estimate = whole * share(regions[first].region);
+    if (canSplit && estimate > budget) {
       split();
       continue;
     }
@@ -166,6 +193,7 @@ void GraphRun::runInParts(std::size_t write) {
       nothing = std::current_exception();  // the band does not reach this part
     } catch (const levelset::ResourceLimit&) {
       if (!canSplit) throw;
+      budget = std::min(budget, estimate / 2);
       split();
     }
     malloc_trim(0);

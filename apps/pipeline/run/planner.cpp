@@ -9,6 +9,7 @@
 #include "levelset/error.h"
 #include "levelset/files/band_file.h"
 #include "levelset/files/band_parts_writer.h"
+#include "levelset/memory_limit.h"
 #include "levelset/progress.h"
 
 namespace pipeline {
@@ -246,7 +247,7 @@ std::optional<std::size_t> findPartedWrite(const Graph& graph, const std::vector
                                            const std::vector<std::optional<Plan>>& plans,
                                            const std::vector<RegionOfInterest>& regions,
                                            std::size_t maxMemory) {
-  const auto limit = static_cast<double>(maxMemory);
+  const auto limit = static_cast<double>(levelset::memoryLeft(maxMemory));
   if (!graph.results.empty() || !(estimatePeak(graph, runs, plans, regions) > limit)) return {};
   const auto isBand = [&](std::size_t node) { return graph.nodes[node].kind == Kind::Band; };
   std::optional<std::size_t> last;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 
 #include "levelset/distance/moved/leaf_distances.h"
@@ -75,56 +76,93 @@ bool isBesideFlatFace(const FloatGrid::ConstAccessor& field, const Coord& at, do
 
 }  // namespace
 
-CreaseDistances::CreaseDistances(const MaskTree& wrong, const ZeroSet& surface,
-                                 const NearestPoints& nearest, const DistanceRequest& request)
-    : leaves_(leavesOf(wrong)),
-      surface_(surface),
-      nearest_(nearest),
-      request_(request),
-      points_(leaves_.size()),
-      searches_([&surface, &request] { return MovedSurface(surface, request.shift); }) {}
+CreaseDistances::CreaseDistances(const ZeroSet& surface, Polishers& polishers,
+                                 const DistanceRequest& request)
+    : request_(request), polishers_(polishers), searches_([&surface, &polishers, &request] {
+        return MovedSurface(surface, polishers.local().cache(), request.shift, request.halfWidth);
+      }) {}
 
-void CreaseDistances::search(const Progress& progress) {
-  forEachWithPolisher(leaves_.size(), surface_, progress, [&](std::size_t i, Polisher& polisher) {
-    const Block& block = *nearest_.find(leaves_[i]->origin());
-    NearestPoints::Mask known = leaves_[i]->getValueMask();
-    for (auto it = leaves_[i]->cbeginValueOn(); it; ++it)
-      known.set(it.pos(), block.nearest[it.pos()] != NearestPoints::kNone);
-    polisher.prepare(block, known);
-    for (auto it = leaves_[i]->cbeginValueOn(); it; ++it) {
+void CreaseDistances::search(int slab, const std::vector<WrongPoints>& wrong) {
+  Leaves& leaves = searched_[slab];
+  leaves.resize(wrong.size());
+  polishers_.forEach(wrong.size(), [&](std::size_t i, Polisher& polisher) {
+    const auto& [owner, mask] = wrong[i];
+    const Block& block = *owner;
+    leaves[i].block = owner;
+    polisher.prepare(block, mask);
+    for (auto it = mask.beginOn(); it; ++it) {
       Point point;
       point.n = it.pos();
-      const auto [value, closest] = distanceAt(block, point.n, polisher, request_);
+      const auto [value, closest] = nearDistanceAt(block, point.n, polisher, request_);
       point.sign = value < 0 ? -1 : 1;
       point.plain = std::abs(value);
-      if (closest) {
-        auto found = searches_.local().distance(block, point.n, *closest);
-        point.found = std::move(found.result);
-        point.isBesideCrease = found.isBesideCrease;
-        point.meetsPatches = found.meetsPatches;
-      }
+      auto found = searches_.local().distance(block, point.n, *closest);
+      point.found = std::move(found.result);
+      point.isBesideCrease = found.isBesideCrease;
+      point.meetsPatches = found.meetsPatches;
       // The plain distance stands in the field already.
       if (point.found && !point.found->crease) continue;
       point.hasFailed = !point.found;
-      points_[i].push_back(std::move(point));
+      leaves[i].points.push_back(std::move(point));
     }
+    leaves[i].points.shrink_to_fit();
   });
+  std::erase_if(leaves, [](const Leaf& leaf) { return leaf.points.empty(); });
 }
 
-void CreaseDistances::adoptFromNeighbours() {
+void CreaseDistances::resolve(int first, int last, FloatGrid& field) {
+  Leaves leaves = takeAround(last);
+  adoptFromNeighbours(leaves);
+  searchAgain(leaves, first, last, field);
+  writeTrusted(first - 1, field);
+  keep(leaves, first, last);
+  writeTrusted(last - 1, field);
+}
+
+/// Returns the searched points of the slabs up to `last` and those within kCreaseReach voxels.
+/// Keeps those that are within that distance of the next slab.
+CreaseDistances::Leaves CreaseDistances::takeAround(int last) {
+  // Copies the points of a leaf between two positions along x.
+  const auto copyBetween = [](const Leaf& leaf, int low, int high, Leaves& copies) {
+    Leaf copy{leaf.block, {}};
+    for (const Point& point : leaf.points)
+      if (const int x = leaf.gridPoint(point).x(); x >= low && x <= high)
+        copy.points.push_back(point);
+    if (!copy.points.empty()) copies.push_back(std::move(copy));
+  };
+  constexpr int kAll = std::numeric_limits<int>::max();
+  const int end = 8 * last + 8;
+  Leaves leaves;
+  std::map<int, Leaves> kept;
+  auto slab = searched_.begin();
+  for (; slab != searched_.end() && slab->first <= last; ++slab) {
+    for (Leaf& leaf : slab->second) {
+      copyBetween(leaf, end - kCreaseReach, kAll, kept[slab->first]);
+      leaves.push_back(std::move(leaf));
+    }
+  }
+  searched_.erase(searched_.begin(), slab);
+  for (slab = searched_.begin(); slab != searched_.upper_bound(last + kSlabsAround); ++slab)
+    for (const Leaf& leaf : slab->second) copyBetween(leaf, -kAll, end + kCreaseReach - 1, leaves);
+  std::erase_if(kept, [](const auto& some) { return some.second.empty(); });
+  searched_.merge(kept);
+  return leaves;
+}
+
+void CreaseDistances::adoptFromNeighbours(Leaves& leaves) {
   std::unordered_map<Coord, const MovedSurface::CreasePoint*, std::hash<Coord>> creases;
-  for (std::size_t i = 0; i < points_.size(); ++i)
-    for (const Point& point : points_[i])
-      if (point.found) creases.emplace(gridPoint(i, point), &*point.found->crease);
+  for (const Leaf& leaf : leaves)
+    for (const Point& point : leaf.points)
+      if (point.found) creases.emplace(leaf.gridPoint(point), &*point.found->crease);
   std::unique_ptr<MaskTree> beside;  // grid points beside those that changed in the round before
   for (int round = 0; round < kRounds; ++round) {
-    std::vector<std::vector<std::pair<std::size_t, MovedSurface::Result>>> better(points_.size());
-    tbb::parallel_for(std::size_t{0}, points_.size(), [&](std::size_t i) {
-      if (beside && !beside->probeConstLeaf(leaves_[i]->origin())) return;
-      const Block& block = *nearest_.find(leaves_[i]->origin());
-      for (std::size_t k = 0; k < points_[i].size(); ++k) {
-        const Point& point = points_[i][k];
-        const Coord c = gridPoint(i, point);
+    std::vector<std::vector<std::pair<std::size_t, MovedSurface::Result>>> better(leaves.size());
+    tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
+      const Block& block = *leaves[i].block;
+      if (beside && !beside->probeConstLeaf(block.origin)) return;
+      for (std::size_t k = 0; k < leaves[i].points.size(); ++k) {
+        const Point& point = leaves[i].points[k];
+        const Coord c = leaves[i].gridPoint(point);
         if (beside && !beside->isValueOn(c)) continue;
         const MovedSurface::CreasePoint* start = nullptr;
         double least = point.found ? point.found->distance - kLeastGain : INFINITY;
@@ -145,27 +183,39 @@ void CreaseDistances::adoptFromNeighbours() {
       }
     });
     MaskTree changed;
-    for (std::size_t i = 0; i < points_.size(); ++i)
+    for (std::size_t i = 0; i < leaves.size(); ++i)
       for (auto& [k, found] : better[i]) {
-        Point& point = points_[i][k];
+        Point& point = leaves[i].points[k];
+        const Coord c = leaves[i].gridPoint(point);
         point.found = std::move(found);
-        creases[gridPoint(i, point)] = &*point.found->crease;
-        changed.setValueOn(gridPoint(i, point));
+        creases[c] = &*point.found->crease;
+        changed.setValueOn(c);
       }
     if (changed.empty()) return;
     beside = std::make_unique<MaskTree>(boxesAround(changed, 1));
   }
 }
 
-void CreaseDistances::searchAgain(const FloatGrid& field) {
-  const Cells cells = creasesByCell(boxesAround(failedPoints(), kAround));
-  tbb::parallel_for(std::size_t{0}, points_.size(), [&](std::size_t i) {
-    const Block& block = *nearest_.find(leaves_[i]->origin());
+void CreaseDistances::searchAgain(Leaves& leaves, int first, int last, const FloatGrid& field) {
+  const auto isOwn = [&](const Leaf& leaf) {
+    const int slab = NearestPoints::slabOf(leaf.block->origin);
+    return slab >= first && slab <= last;
+  };
+  MaskTree failed;
+  for (const Leaf& leaf : leaves)
+    if (isOwn(leaf))
+      for (const Point& point : leaf.points)
+        if (point.hasFailed) failed.setValueOn(leaf.gridPoint(point));
+  if (failed.empty()) return;
+  const Cells cells = creasesByCell(leaves, boxesAround(failed, kAround));
+  tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
+    if (!isOwn(leaves[i])) return;
+    const Block& block = *leaves[i].block;
     const FloatGrid::ConstAccessor accessor(field.tree());
-    for (Point& point : points_[i]) {
+    for (Point& point : leaves[i].points) {
       if (!point.hasFailed) continue;
       MovedSurface& search = searches_.local();
-      const Coord c = gridPoint(i, point);
+      const Coord c = leaves[i].gridPoint(point);
       const auto take = [&](std::optional<MovedSurface::Result> found) {
         if (found && (!point.found || found->distance < point.found->distance))
           point.found = std::move(found);
@@ -180,20 +230,48 @@ void CreaseDistances::searchAgain(const FloatGrid& field) {
   });
 }
 
-CreaseDistances::Missing CreaseDistances::write(FloatGrid& field) const {
-  Missing missing;
-  for (std::size_t i = 0; i < points_.size(); ++i) {
-    LeafDistances values;
-    for (const Point& point : points_[i])
-      if (isTrusted(point))
-        values.emplace_back(point.n, point.sign * std::max(point.found->distance, point.plain));
-    setAll(field, leaves_[i]->origin(), values, request_.halfWidth);
+/// Keeps of each point of some slabs what remains to be used.
+void CreaseDistances::keep(const Leaves& leaves, int first, int last) {
+  for (const Leaf& leaf : leaves) {
+    const int slab = NearestPoints::slabOf(leaf.block->origin);
+    if (slab < first || slab > last) continue;
+    ResolvedLeaf resolved{leaf.block->origin, {}, {}};
+    for (const Point& point : leaf.points) {
+      if (isTrusted(point)) {
+        resolved.trusted.emplace_back(point.n,
+                                      point.sign * std::max(point.found->distance, point.plain));
+        continue;
+      }
+      Resolved& other = resolved.others.emplace_back();
+      other.n = static_cast<std::uint16_t>(point.n);
+      other.isInside = point.sign < 0;
+      other.isBesideCrease = point.isBesideCrease;
+      other.meetsPatches = point.meetsPatches;
+      other.plain = point.plain;
+      other.bound = point.bound;
+      if (point.found) other.found = point.found->distance;
+    }
+    resolved_[slab].push_back(std::move(resolved));
   }
+}
+
+/// Writes the trusted distances of the slabs up to `last`. The search beside a slab reads the field
+/// as it was before.
+void CreaseDistances::writeTrusted(int last, FloatGrid& field) {
+  for (; !resolved_.empty() && resolved_.begin()->first <= last; resolved_.erase(resolved_.begin()))
+    for (ResolvedLeaf& leaf : resolved_.begin()->second) {
+      setAll(field, leaf.origin, leaf.trusted, request_.halfWidth);
+      if (!leaf.others.empty()) missing_.push_back({leaf.origin, {}, std::move(leaf.others)});
+    }
+}
+
+CreaseDistances::Missing CreaseDistances::finish(FloatGrid& field) {
+  writeTrusted(std::numeric_limits<int>::max(), field);
+  Missing missing;
   const FloatGrid::ConstAccessor accessor(field.tree());
-  for (std::size_t i = 0; i < points_.size(); ++i)
-    for (const Point& point : points_[i]) {
-      if (isTrusted(point)) continue;
-      const Coord c = gridPoint(i, point);
+  for (const ResolvedLeaf& leaf : missing_)
+    for (const Resolved& point : leaf.others) {
+      const Coord c = leaf.origin + LeafNode::offsetToLocalCoord(point.n);
       const bool mayHaveEdge =
           point.meetsPatches || isBesideFlatFace(accessor, c, field.voxelSize()[0]);
       add(c, point, mayHaveEdge, missing);
@@ -204,27 +282,24 @@ CreaseDistances::Missing CreaseDistances::write(FloatGrid& field) const {
 void CreaseDistances::improveMeasured(FloatGrid& field) const {
   const FloatGrid::ConstAccessor accessor(field.tree());
   const double voxelSize = field.voxelSize()[0];
-  for (std::size_t i = 0; i < points_.size(); ++i) {
+  for (const ResolvedLeaf& leaf : missing_) {
     LeafDistances values;
-    for (const Point& point : points_[i]) {
-      if (isTrusted(point)) continue;
-      double distance =
-          std::abs(static_cast<double>(accessor.getValue(gridPoint(i, point)))) / voxelSize;
-      const double found = point.found ? point.found->distance : INFINITY;
-      if (found < distance || (point.isBesideCrease && found < distance + kMeasured))
-        distance = found;
+    for (const Resolved& point : leaf.others) {
+      const Coord c = leaf.origin + LeafNode::offsetToLocalCoord(point.n);
+      double distance = std::abs(static_cast<double>(accessor.getValue(c))) / voxelSize;
+      if (point.found < distance || (point.isBesideCrease && point.found < distance + kMeasured))
+        distance = point.found;
       distance = std::min(distance, point.bound);
-      values.emplace_back(point.n, point.sign * std::max(distance, point.plain));
+      values.emplace_back(point.n, (point.isInside ? -1 : 1) * std::max(distance, point.plain));
     }
-    setAll(field, leaves_[i]->origin(), values, request_.halfWidth);
+    setAll(field, leaf.origin, values, request_.halfWidth);
   }
 }
 
-void CreaseDistances::add(const Coord& c, const Point& point, bool mayHaveEdge,
+void CreaseDistances::add(const Coord& c, const Resolved& point, bool mayHaveEdge,
                           Missing& missing) const {
   missing.points.setValueOn(c);
-  double farthest = std::min(request_.halfWidth, point.bound);
-  if (point.found) farthest = std::min(farthest, point.found->distance);
+  const double farthest = std::min({request_.halfWidth, point.bound, point.found});
   addBall(missing.near, c, farthest + kMargin);
   if (mayHaveEdge) addBall(missing.nearEdges, c, farthest + kMargin);
 }
@@ -238,19 +313,12 @@ Coord CreaseDistances::cellOf(const Coord& c) {
   return Coord::floor(c.asVec3d() / double{kCell});
 }
 
-MaskTree CreaseDistances::failedPoints() const {
-  MaskTree failed;
-  for (std::size_t i = 0; i < points_.size(); ++i)
-    for (const Point& point : points_[i])
-      if (point.hasFailed) failed.setValueOn(gridPoint(i, point));
-  return failed;
-}
-
-CreaseDistances::Cells CreaseDistances::creasesByCell(const MaskTree& within) const {
+CreaseDistances::Cells CreaseDistances::creasesByCell(const Leaves& leaves,
+                                                      const MaskTree& within) {
   Cells cells;
-  for (std::size_t i = 0; i < points_.size(); ++i)
-    for (const Point& point : points_[i])
-      if (const Coord c = gridPoint(i, point); !point.hasFailed && within.isValueOn(c))
+  for (const Leaf& leaf : leaves)
+    for (const Point& point : leaf.points)
+      if (const Coord c = leaf.gridPoint(point); !point.hasFailed && within.isValueOn(c))
         cells[cellOf(c)].push_back({c, &*point.found->crease});
   return cells;
 }
@@ -309,10 +377,6 @@ std::vector<Vec3d> CreaseDistances::nearestCrossings(const FloatGrid::ConstAcces
     if (starts.size() == kStarts) break;
   }
   return starts;
-}
-
-Coord CreaseDistances::gridPoint(std::size_t leaf, const Point& point) const {
-  return leaves_[leaf]->origin() + LeafNode::offsetToLocalCoord(point.n);
 }
 
 }  // namespace levelset::eikonal

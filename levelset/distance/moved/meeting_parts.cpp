@@ -86,32 +86,33 @@ bool hasFootOnSurface(const DenseBlock& block, const Coord& c, double voxelSize,
   return false;
 }
 
-/// Returns the grid points on the near side whose value is not the distance to the zero set.
+/// Returns the grid points of some blocks on the near side whose value is not the distance to the
+/// zero set.
 /// @param isInside  the near side is inside
-MaskTree wrongPoints(const FloatGrid& field, bool isInside) {
-  std::vector<const LeafNode*> leaves;
-  for (auto leaf = field.tree().cbeginLeaf(); leaf; ++leaf) leaves.push_back(leaf.getLeaf());
-  std::vector<NearestPoints::Mask> found(leaves.size());
+std::vector<WrongPoints> wrongPoints(const FloatGrid& field,
+                                     const std::vector<const Block*>& blocks, bool isInside) {
+  std::vector<WrongPoints> found(blocks.size());
   const double voxelSize = field.voxelSize()[0];
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 16), [&](const auto& range) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size(), 8), [&](const auto& range) {
     const FloatGrid::ConstAccessor accessor(field.tree());
     const auto block = std::make_unique<DenseBlock>();
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      found[i].block = blocks[i];
+      const LeafNode* leaf = accessor.probeConstLeaf(blocks[i]->origin);
+      if (!leaf) continue;
       bool isLoaded = false;
-      for (auto it = leaves[i]->cbeginValueOn(); it; ++it) {
+      for (auto it = leaf->cbeginValueOn(); it; ++it) {
         if ((*it < 0) != isInside) continue;
-        if (!isLoaded) block->load(accessor, leaves[i]->origin());
+        if (!isLoaded) block->load(accessor, leaf->origin());
         isLoaded = true;
         if (!hasFootOnSurface(*block, LeafNode::offsetToLocalCoord(it.pos()), voxelSize,
                               field.background()))
-          found[i].setOn(it.pos());
+          found[i].mask.setOn(it.pos());
       }
     }
   });
-  MaskTree points;
-  for (std::size_t i = 0; i < leaves.size(); ++i)
-    if (!found[i].isOff()) points.touchLeaf(leaves[i]->origin())->setValueMask(found[i]);
-  return points;
+  std::erase_if(found, [](const WrongPoints& wrong) { return wrong.mask.isOff(); });
+  return found;
 }
 
 /// Computes the signed distances of some grid points to the zero set of `field`, and sets them. The
@@ -122,6 +123,8 @@ void measureFromField(FloatGrid& field, const CreaseDistances::Missing& missing,
   const BlockSelection blocks{{}, &near, &near}, edgeBlocks{{}, &nearEdges, nullptr, &nearEdges};
   const ZeroSet surface = readZeroSet(field, blocks, nearEdges.empty() ? nullptr : &edgeBlocks, {});
   NearestPoints nearest(field.tree(), surface.points, {halfWidth, halfWidth, {}, &near});
+  nearest.seed(surface.gridPoints, 0);
+  nearest.seedFeatures(surface.gridPoints.size());
   nearest.run({});
 
   const auto masks = leavesOf(points);
@@ -129,7 +132,7 @@ void measureFromField(FloatGrid& field, const CreaseDistances::Missing& missing,
   const double voxelSize = field.voxelSize()[0];
   DistanceRequest request;
   request.halfWidth = halfWidth;
-  forEachWithPolisher(masks.size(), surface, {}, [&](std::size_t i, Polisher& polisher) {
+  Polishers(surface).forEach(masks.size(), [&](std::size_t i, Polisher& polisher) {
     const Block* block = nearest.find(masks[i]->origin());
     const LeafNode* values = field.tree().probeConstLeaf(masks[i]->origin());
     for (auto it = masks[i]->cbeginValueOn(); it; ++it) {
@@ -148,21 +151,18 @@ void measureFromField(FloatGrid& field, const CreaseDistances::Missing& missing,
 
 }  // namespace
 
-void correctMeetingParts(FloatGrid& field, const ZeroSet& surface, const NearestPoints& nearest,
-                         const DistanceRequest& request, const Progress& progress) {
-  if (!hasZeroCrossing(field.tree())) return;
-  const MaskTree wrong = wrongPoints(field, request.shift > 0);
-  CreaseDistances distances(wrong, surface, nearest, request);
-  report(progress, 0.2);
-  distances.search(subProgress(progress, 0.2, 0.7));
-  distances.adoptFromNeighbours();
-  distances.searchAgain(field);
-  const auto missing = distances.write(field);
-  report(progress, 0.8);
-  if (!missing.points.empty()) measureFromField(field, missing, request.halfWidth);
-  distances.improveMeasured(field);
-  measureFlatEdges(field, wrong, request.halfWidth);
-  openvdb::tools::pruneTiles(field.tree());
+void MeetingParts::search(int slab, const std::vector<const Block*>& blocks) {
+  const std::vector<WrongPoints> wrong = wrongPoints(field_, blocks, request_.shift > 0);
+  for (const WrongPoints& one : wrong) wrong_.touchLeaf(one.block->origin)->setValueMask(one.mask);
+  distances_.search(slab, wrong);
+}
+
+void MeetingParts::finish() {
+  const auto missing = distances_.finish(field_);
+  if (!missing.points.empty()) measureFromField(field_, missing, request_.halfWidth);
+  distances_.improveMeasured(field_);
+  measureFlatEdges(field_, wrong_, request_.halfWidth);
+  openvdb::tools::pruneTiles(field_.tree());
 }
 
 }  // namespace levelset::eikonal

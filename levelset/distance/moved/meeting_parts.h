@@ -2,6 +2,10 @@
 
 // Internal header of levelset: public headers must not include it.
 
+#include <cmath>
+#include <vector>
+
+#include "levelset/distance/moved/crease_distances.h"
 #include "levelset/distance/nearest/distance_request.h"
 #include "levelset/distance/nearest/propagate.h"
 #include "levelset/distance/surface/zero_set.h"
@@ -12,12 +16,40 @@ namespace levelset::eikonal {
 /// surface. Wrong values lie on the side of the moved surface on which the old surface is, beside
 /// creases in which moved parts meet. A value φ is correct if the point x − φ ∇φ/|∇φ| lies on the
 /// moved surface. MovedSurface computes the other values. Where it fails, the distance to the zero
-/// set of `field` is computed.
-/// @param field    distances minus the shift, in a band of request.halfWidth around the moved
-///                 surface. Stays as it is if it has no zero crossing.
-/// @param surface  surface before it moves; `nearest` has its nearest point for each grid point
-void correctMeetingParts(openvdb::FloatGrid& field, const ZeroSet& surface,
-                         const NearestPoints& nearest, const DistanceRequest& request,
-                         const Progress& progress);
+/// set of the corrected field is computed. Works slab by slab (all leaf blocks with the same x).
+class MeetingParts {
+ public:
+  /// Keeps references to all parameters.
+  /// @param surface  surface before it moves
+  /// @param field    distances minus the shift, in a band of request.halfWidth around the moved
+  ///                 surface
+  MeetingParts(const ZeroSet& surface, Polishers& polishers, const DistanceRequest& request,
+               openvdb::FloatGrid& field)
+      : request_(request), field_(field), distances_(surface, polishers, request) {}
+
+  /// Number of slabs on each side of a slab that a search reads.
+  [[nodiscard]] static int slabsOfSearch(const DistanceRequest& request) {
+    return static_cast<int>(std::ceil(MovedSurface::reach(request.shift, request.halfWidth) / 8));
+  }
+  /// As above, for the field before the shift.
+  [[nodiscard]] static int fieldSlabsOfSearch(const DistanceRequest& request) {
+    return static_cast<int>(
+        std::ceil(MovedSurface::fieldReach(request.shift, request.halfWidth) / 8));
+  }
+
+  /// Searches the wrong values of a slab. Slabs must come in ascending order.
+  /// @pre the slab and those beside it in the field are complete
+  void search(int slab, const std::vector<const NearestPoints::Block*>& blocks);
+  /// Corrects most of the wrong values of the slabs first to last, see CreaseDistances::resolve().
+  void resolve(int first, int last) { distances_.resolve(first, last, field_); }
+  /// Corrects the other values.
+  void finish();
+
+ private:
+  const DistanceRequest& request_;
+  openvdb::FloatGrid& field_;
+  CreaseDistances distances_;
+  openvdb::MaskTree wrong_;
+};
 
 }  // namespace levelset::eikonal

@@ -52,18 +52,52 @@ constexpr double kSmoothGap = 0.002;
 constexpr double kCreaseFactor = 3, kClose = 1e-4;
 // Least such length that shows that a point is beside a crease, voxels.
 constexpr double kBesideCrease = 0.05;
+// Distance along each axis, voxels, from the place in question to the grid points whose nearest
+// surface points nearerPart() and partsAround() look at.
+constexpr double kAroundMeeting = 2;
+
+/// Largest distance along each axis, voxels, from a grid point to its crease point. The nearest one
+/// is within the half width if it matters. The rest is for searches that come to another one first.
+double farthestMeeting(double shift, double halfWidth) {
+  return 2 * halfWidth + std::max(8.0, std::abs(shift));
+}
+
+/// Largest distance along each axis, voxels, from a grid point to the foot points of its search.
+double farthestFoot(double shift, double halfWidth) {
+  return farthestMeeting(shift, halfWidth) + std::abs(shift) + 2 * halfWidth;
+}
 
 }  // namespace
 
-MovedSurface::MovedSurface(const ZeroSet& surface, double shift)
-    : cache_(*surface.interpolated),
+MovedSurface::MovedSurface(const ZeroSet& surface, DenseBlockCache& cache, double shift,
+                           double halfWidth)
+    : cache_(cache),
       points_(surface.points),
       patches_(surface.patches),
-      shift_(shift) {}
+      shift_(shift),
+      halfWidth_(halfWidth) {}
+
+double MovedSurface::reach(double shift, double halfWidth) {
+  return farthestMeeting(shift, halfWidth) + kAroundMeeting;
+}
+
+double MovedSurface::fieldReach(double shift, double halfWidth) {
+  // The last search for a foot point moves by up to two voxels. Its leaf extends by seven.
+  return farthestFoot(shift, halfWidth) + 2 + 7 + DenseBlock::kPad;
+}
+
+/// Returns true if a point is within a distance of the grid point of the present search, along each
+/// axis.
+bool MovedSurface::isWithin(const Vec3d& point, double distance) const {
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(std::abs(point[axis] - gridPoint_[axis]) <= distance)) return false;
+  return true;
+}
 
 MovedSurface::Search MovedSurface::distance(const NearestPoints::Block& block, openvdb::Index n,
                                             const Closest& closest) {
   const Vec3d x = (block.origin + LeafNode::offsetToLocalCoord(n)).asVec3d();
+  gridPoint_ = x;
   const double sign = block.inside.isOn(n) ? -1 : 1;
   Vec3d normal = (x - closest.point) * sign;
   if (!(closest.distance > 1e-3)) normal = points_.jets[block.nearest[n]].jet().gradient;
@@ -117,6 +151,7 @@ MovedSurface::Result MovedSurface::nearestPair(const NearestPoints::Block& block
 std::optional<MovedSurface::Result> MovedSurface::distanceNear(const NearestPoints::Block& block,
                                                                openvdb::Index n,
                                                                const Vec3d& near) {
+  gridPoint_ = (block.origin + LeafNode::offsetToLocalCoord(n)).asVec3d();
   const std::vector<Vec3d> feet = partsAround(block, near);
   std::optional<Result> best;
   for (std::size_t i = 0; i < feet.size(); ++i)
@@ -160,6 +195,7 @@ std::optional<MovedSurface::Result> MovedSurface::distanceFrom(const NearestPoin
                                                                openvdb::Index n,
                                                                CreasePoint start) {
   const Vec3d x = (block.origin + LeafNode::offsetToLocalCoord(n)).asVec3d();
+  gridPoint_ = x;
   if (meetActive(x, start.feet, start.point) != Meeting::Found ||
       nearerPart(block, start.point, start.feet).kind != Nearer::None)
     return std::nullopt;
@@ -290,6 +326,7 @@ MovedSurface::Meeting MovedSurface::meet(const Vec3d& x, std::vector<Vec3d>& fee
     const double length = step.length();
     if (!std::isfinite(length)) return Meeting::Failed;
     if (length < kLastMove) {
+      if (!isWithin(target, farthestMeeting(shift_, halfWidth_))) return Meeting::Failed;
       meeting = target;
       for (Eigen::Index k = 0; k < count; ++k) multipliers[static_cast<std::size_t>(k)] = along[k];
       return Meeting::Found;
@@ -318,6 +355,7 @@ MovedSurface::Meeting MovedSurface::meet(const Vec3d& x, std::vector<Vec3d>& fee
 /// patches replace the interpolant.
 bool MovedSurface::follow(Vec3d& foot, const Vec3d& from) {
   for (int i = 0; i < kFollows; ++i) {
+    if (!isWithin(foot, farthestFoot(shift_, halfWidth_))) return false;
     const DenseBlock& block = cache_.around(foot);
     const Vec3d origin = block.origin().asVec3d();
     const Foot found = closestPoint(block, from - origin, foot - origin);

@@ -15,8 +15,16 @@ namespace levelset::eikonal {
 /// the distances of the grid points on the near side, where the surface itself is. One per thread.
 class MovedSurface {
  public:
-  /// @param shift  length by which the surface moves, voxels; outwards if positive
-  MovedSurface(const ZeroSet& surface, double shift);
+  /// @param shift      length by which the surface moves, voxels; outwards if positive
+  /// @param halfWidth  largest distance of interest, voxels
+  /// @param cache      dense copies of the field
+  MovedSurface(const ZeroSet& surface, DenseBlockCache& cache, double shift, double halfWidth);
+
+  /// Distance along each axis, voxels, from a grid point within which its search reads the nearest
+  /// surface points of other grid points. A crease point farther away counts as not found.
+  [[nodiscard]] static double reach(double shift, double halfWidth);
+  /// As above, for the field. A search that would read farther away fails.
+  [[nodiscard]] static double fieldReach(double shift, double halfWidth);
 
   /// Most parts of the surface that are equally far from a point of a crease.
   static constexpr std::size_t kParts = 3;
@@ -88,12 +96,14 @@ class MovedSurface {
   [[nodiscard]] PatchDistance patchDistance(const openvdb::Vec3d& at) const;
   [[nodiscard]] bool isOnOuterSide(const openvdb::Vec3d& foot, const openvdb::Vec3d& point);
   [[nodiscard]] bool follow(openvdb::Vec3d& foot, const openvdb::Vec3d& from);
+  [[nodiscard]] bool isWithin(const openvdb::Vec3d& point, double distance) const;
 
-  DenseBlockCache cache_;
+  DenseBlockCache& cache_;
   const SurfacePoints& points_;
   const SharpPatches& patches_;
-  const double shift_;
-  bool meetsPatches_ = false;  ///< the last search came to sharp patches
+  const double shift_, halfWidth_;
+  openvdb::Vec3d gridPoint_ = {};  ///< of the present search
+  bool meetsPatches_ = false;      ///< the last search came to sharp patches
 };
 
 }  // namespace levelset::eikonal

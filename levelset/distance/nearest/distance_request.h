@@ -15,8 +15,9 @@ namespace levelset::eikonal {
 /// points.
 using ClosestPointLeaf = std::array<openvdb::Vec3d, 512>;
 
-/// Distance along each axis, voxels, to the other grid points that contribute to the distance of a
-/// grid point from a moved surface.
+/// Distance along each axis, voxels, to the other grid points whose crease points contribute to the
+/// distance of a grid point from a moved surface. It follows from the rounds in which grid points
+/// take crease points from neighbours, and from the reach of the searches that start again.
 inline constexpr int kCreaseReach = 10;
 
 /// Options of distanceTransform(), in voxels. With the signed distance d, the values of the result

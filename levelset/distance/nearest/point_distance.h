@@ -45,20 +45,28 @@ struct PointDistance {
 void setDistance(openvdb::FloatTree::LeafNodeType& leaf, openvdb::Index n, double value,
                  double halfWidth, double voxelSize, float background);
 
-/// Calls work(index, polisher) for the indices below `count`, in parallel.
-template <typename Work>
-void forEachWithPolisher(std::size_t count, const ZeroSet& surface, const Progress& progress,
-                         const Work& work) {
-  tbb::enumerable_thread_specific<Polisher> polishers([&] { return Polisher(surface); });
-  constexpr std::size_t kBatch = 4096;
-  for (std::size_t begin = 0; begin < count; begin += kBatch) {
-    const std::size_t end = std::min(begin + kBatch, count);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 16), [&](const auto& range) {
-      Polisher& polisher = polishers.local();
+/// Polishers of all threads.
+class Polishers {
+ public:
+  /// Keeps a reference to `surface`.
+  explicit Polishers(const ZeroSet& surface)
+      : polishers_([&surface] { return Polisher(surface); }) {}
+
+  /// Returns the polisher of this thread.
+  [[nodiscard]] Polisher& local() { return polishers_.local(); }
+
+  /// Calls work(index, polisher) for the indices below `count`, in parallel.
+  template <typename Work>
+  void forEach(std::size_t count, const Work& work) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 8), [&](const auto& range) {
+      Polisher& polisher = polishers_.local();
+      polisher.forgetBlock();
       for (std::size_t i = range.begin(); i != range.end(); ++i) work(i, polisher);
     });
-    report(progress, static_cast<double>(end) / static_cast<double>(count));
   }
-}
+
+ private:
+  tbb::enumerable_thread_specific<Polisher> polishers_;
+};
 
 }  // namespace levelset::eikonal

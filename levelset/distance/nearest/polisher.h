@@ -28,6 +28,12 @@ class Polisher {
   explicit Polisher(const ZeroSet& surface)
       : cache_(*surface.interpolated), points_(surface.points), patches_(surface.patches) {}
 
+  /// Dense copies of the field, for other searches of the same thread.
+  [[nodiscard]] DenseBlockCache& cache() { return cache_; }
+
+  /// Call after blocks were deleted: a new block may have the address of the last one.
+  void forgetBlock() { loaded_ = preparedBlock_ = nullptr; }
+
   /// Computes the closest points of some grid points of a block together, for closest(). This is
   /// faster than one after another, and gives the same bits.
   /// @pre the grid points have a nearest surface point

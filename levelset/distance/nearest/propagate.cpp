@@ -21,6 +21,9 @@ using Block = NearestPoints::Block;
 // grid points may lie half a voxel apart along the surface.
 constexpr double kBlockMargin = 0.5;
 
+// Number of rounds that a slab runs before it can be final.
+constexpr int kLeastRounds = 2;
+
 int directionIndex(const Coord& d) {
   return (d.x() + 1) * 9 + (d.y() + 1) * 3 + d.z() + 1;
 }
@@ -221,6 +224,10 @@ std::uint32_t blocksBeside(const Coord& side) {
   return bits;
 }
 
+bool isDue(const Block& block) {
+  return block.dirtyNeighbours.load(std::memory_order_relaxed) || !block.queued.isOff();
+}
+
 std::uint32_t BlockWorker::outbox(float limit) const {
   static const auto kBeside = [] {
     std::array<std::uint32_t, 27> all{};
@@ -267,18 +274,21 @@ std::uint32_t BlockWorker::outbox(float limit) const {
 
 NearestPoints::NearestPoints(const FloatTree& field, const SurfacePoints& points,
                              const Reach& reach)
-    : field_(field), accessor_(field), points_(points), reach_(reach) {
-  seedBesideSurface();
-  if (reach_.region) seedRegionBoundary();
-}
+    : field_(field),
+      accessor_(field),
+      points_(points),
+      reach_(reach),
+      reachInSlabs_(static_cast<int>(
+          std::min(1e6, std::ceil((std::max(reach.inside, reach.outside) + kBlockMargin) / 8)))) {}
 
 NearestPoints::Block& NearestPoints::touch(const Coord& origin) {
   Block*& slot = index_[origin];
   if (slot) return *slot;
-  Block& block = blocks_.emplace_back();
+  auto& owners = slabs_[slabOf(origin)][static_cast<std::size_t>(parity(origin) & 3)];
+  Block& block = *owners.emplace_back(std::make_unique<Block>());
   slot = &block;
   block.origin = origin;
-  block.nearest.fill(kNone);
+  std::fill_n(&block.nearest[0], 512, kNone);
   block.low = Coord(0);
   block.high = Coord(7);
   if (reach_.region) {
@@ -316,23 +326,38 @@ void NearestPoints::seed(const Coord& gridPoint, std::uint32_t point, bool own) 
   block.queued.setOn(n);
 }
 
-void NearestPoints::seedBesideSurface() {
-  for (std::uint32_t i = 0; i < points_.gridPoints.size(); ++i)
-    if (!reach_.region || reach_.region->isInside(points_.gridPoints[i]))
-      seed(points_.gridPoints[i], i, true);
-  // Points on edges and corners may be nearer to a grid point than all points on faces, so they are
-  // offered to the corners of the grid cells that contain them.
-  for (std::size_t i = points_.gridPoints.size(); i < points_.size(); ++i) {
-    const Coord cell = Coord::floor(points_.positions[i]);
-    for (int corner = 0; corner < 8; ++corner) {
-      const Coord c = cell.offsetBy(corner >> 2, corner >> 1 & 1, corner & 1);
-      if (!reach_.region || reach_.region->isInside(c))
-        seed(c, static_cast<std::uint32_t>(i), false);
+void NearestPoints::seed(const std::vector<Coord>& gridPoints, std::size_t first) {
+  for (std::size_t i = 0; i < gridPoints.size(); ++i)
+    if (!reach_.region || reach_.region->isInside(gridPoints[i]))
+      seed(gridPoints[i], static_cast<std::uint32_t>(first + i), true);
+}
+
+void NearestPoints::seedFeatures(std::size_t first) {
+  for (std::size_t i = first; i < points_.size(); ++i) seedCorners(i, {});
+}
+
+void NearestPoints::seedFeatures(std::size_t first, int slab) {
+  if (features_.empty())
+    for (std::size_t i = first; i < points_.size(); ++i) {
+      const Coord cell = Coord::floor(points_.positions[i]);
+      features_[slabOf(cell)].push_back(i);
+      if (const int next = slabOf(cell.offsetBy(1, 0, 0)); next != slabOf(cell))
+        features_[next].push_back(i);
     }
+  if (const auto found = features_.find(slab); found != features_.end())
+    for (const std::size_t i : found->second) seedCorners(i, slab);
+}
+
+void NearestPoints::seedCorners(std::size_t point, std::optional<int> slab) {
+  const Coord cell = Coord::floor(points_.positions[point]);
+  for (int corner = 0; corner < 8; ++corner) {
+    const Coord c = cell.offsetBy(corner >> 2, corner >> 1 & 1, corner & 1);
+    if ((!slab || slabOf(c) == *slab) && (!reach_.region || reach_.region->isInside(c)))
+      seed(c, static_cast<std::uint32_t>(point), false);
   }
 }
 
-void NearestPoints::seedRegionBoundary() {
+void NearestPoints::seedRegionBoundary(const std::vector<Coord>& gridPoints) {
   // If the closest point of a grid point lies outside the region, the segment between both crosses
   // the boundary of the region. With correct surface points on the boundary, no block outside the
   // region is needed.
@@ -357,8 +382,7 @@ void NearestPoints::seedRegionBoundary() {
       for (std::size_t i = 0; i < nearest.size(); ++i)
         if (nearest[i] != PointTree::kNone)
           seed(gridPoint(i), nearest[i],
-               nearest[i] < points_.gridPoints.size() &&
-                   points_.gridPoints[nearest[i]] == gridPoint(i));
+               nearest[i] < gridPoints.size() && gridPoints[nearest[i]] == gridPoint(i));
     }
 }
 
@@ -376,45 +400,85 @@ void NearestPoints::process(Block& block, std::vector<Coord>& missing) const {
   }
 }
 
+void NearestPoints::runRound(int slab) {
+  for (std::size_t parity = 0; parity < 4; ++parity) {
+    const auto found = slabs_.find(slab);
+    if (found == slabs_.end()) return;
+    std::vector<Block*> due;
+    for (const auto& block : found->second[parity])
+      if (isDue(*block)) due.push_back(block.get());
+    if (due.empty()) continue;
+    std::vector<std::vector<Coord>> missing(due.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, due.size(), 8), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i != range.end(); ++i) {
+        if (i + 1 != range.end()) prefetchAround(*due[i + 1]);
+        process(*due[i], missing[i]);
+      }
+    });
+    for (std::size_t i = 0; i < due.size(); ++i)
+      for (const Coord& origin : missing[i]) {
+        const openvdb::CoordBBox extent(origin, origin.offsetBy(7));
+        if (slabOf(origin) <= final_ ||
+            !BlockSelection{reach_.region, reach_.leaves}.holdsBlock(extent))
+          continue;
+        Block& block = touch(origin);
+        const Coord back = due[i]->origin - origin;
+        block.dirtyNeighbours.fetch_or(
+            1u << directionIndex({back.x() / 8, back.y() / 8, back.z() / 8}));
+      }
+  }
+}
+
+bool NearestPoints::isQuiet(int slab) const {
+  const auto found = slabs_.find(slab);
+  if (found == slabs_.end()) return true;
+  for (const auto& blocks : found->second)
+    for (const auto& block : blocks)
+      if (isDue(*block)) return false;
+  return true;
+}
+
+void NearestPoints::advance(int g) {
+  for (int even = 2 * g; even > final_; even -= 2) {
+    runRound(even);
+    if (even - 1 > final_) runRound(even - 1);
+  }
+  while (final_ + 1 + reachInSlabs_ <= 2 * (g - kLeastRounds)) {
+    for (int slab = final_ + 1; slab <= final_ + 1 + reachInSlabs_; ++slab)
+      if (!isQuiet(slab)) return;
+    ++final_;
+  }
+}
+
+std::vector<Block*> NearestPoints::blocksOf(int slab) const {
+  std::vector<Block*> blocks;
+  const auto found = slabs_.find(slab);
+  if (found == slabs_.end()) return blocks;
+  for (const auto& some : found->second)
+    for (const auto& block : some) blocks.push_back(block.get());
+  return blocks;
+}
+
+void NearestPoints::releaseUpTo(int slab) {
+  while (!slabs_.empty() && slabs_.begin()->first <= slab) {
+    for (const auto& some : slabs_.begin()->second)
+      for (const auto& block : some) {
+        for (std::size_t i = 0; i < 27; ++i)
+          if (block->neighbours[i]) block->neighbours[i]->neighbours[26 - i] = nullptr;
+        index_.erase(block->origin);
+      }
+    slabs_.erase(slabs_.begin());
+  }
+}
+
 void NearestPoints::run(const Progress& progress) {
-  std::array<std::vector<Block*>, 8> byParity;
-  std::size_t sorted = 0;
-  const auto sortNew = [&] {
-    for (; sorted < blocks_.size(); ++sorted)
-      byParity[static_cast<std::size_t>(parity(blocks_[sorted].origin))].push_back(
-          &blocks_[sorted]);
-  };
-  sortNew();
-  double fraction = 0;
-  for (bool again = true; again;) {
-    again = false;
-    for (auto& candidates : byParity) {
-      std::vector<Block*> due;
-      for (Block* block : candidates)
-        if (block->dirtyNeighbours.load(std::memory_order_relaxed) || !block->queued.isOff())
-          due.push_back(block);
-      if (due.empty()) continue;
-      again = true;
-      std::vector<std::vector<Coord>> missing(due.size());
-      tbb::parallel_for(tbb::blocked_range<std::size_t>(0, due.size(), 8), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          if (i + 1 != range.end()) prefetchAround(*due[i + 1]);
-          process(*due[i], missing[i]);
-        }
-      });
-      for (std::size_t i = 0; i < due.size(); ++i)
-        for (const Coord& origin : missing[i]) {
-          const openvdb::CoordBBox extent(origin, origin.offsetBy(7));
-          if (!BlockSelection{reach_.region, reach_.leaves}.holdsBlock(extent)) continue;
-          Block& block = touch(origin);
-          const Coord back = due[i]->origin - origin;
-          block.dirtyNeighbours.fetch_or(
-              1u << directionIndex({back.x() / 8, back.y() / 8, back.z() / 8}));
-        }
-      sortNew();
-    }
-    fraction += (1 - fraction) / 8;
-    report(progress, fraction);
+  if (slabs_.empty()) return;
+  const int first = firstSlab() - reachInSlabs_;
+  beginAt(first);
+  for (int g = first >> 1; final_ < lastSlab(); ++g) {
+    advance(g);
+    const double range = std::max(1, lastSlab() - first + 1);
+    report(progress, std::clamp((final_ - first) / range, 0.0, 1.0));
   }
 }
 

@@ -4,8 +4,11 @@
 
 #include <array>
 #include <atomic>
-#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
 #include <unordered_map>
+#include <vector>
 
 #include "levelset/distance/surface/surface_points.h"
 #include "levelset/progress.h"
@@ -22,12 +25,27 @@ class NearestPoints {
   static constexpr std::uint32_t kNone = 0xffffffffu;
   using Mask = openvdb::util::NodeMask<3>;
 
+  /// One number for each grid point of a block. Has the size of the values of a leaf, so that
+  /// released memory of one kind serves the other.
+  template <typename T>
+  class Numbers {
+   public:
+    [[nodiscard]] T& operator[](std::size_t n) { return numbers_[n]; }
+    [[nodiscard]] const T& operator[](std::size_t n) const { return numbers_[n]; }
+    [[nodiscard]] const T* begin() const { return numbers_.get(); }
+    void release() { numbers_.reset(); }
+
+   private:
+    std::unique_ptr<T[]> numbers_ = std::make_unique_for_overwrite<T[]>(512);
+  };
+
   struct Block {
     openvdb::Coord origin;
-    std::array<std::uint32_t, 512> nearest;  ///< index of the nearest surface point, or kNone
+    Numbers<std::uint32_t> nearest;  ///< index of the nearest surface point, or kNone
     /// Squared distance to the nearest surface point, voxels². If there is none yet: the square of
-    /// the largest distance to compute plus a margin.
-    std::array<float, 512> squared;
+    /// the largest distance to compute plus a margin. Released once the distances of the block are
+    /// computed.
+    Numbers<float> squared;
     Mask inside;  ///< grid points with φ < 0
     /// Grid points beside the zero set whose nearest surface point is the one found for themselves.
     Mask own;
@@ -66,9 +84,45 @@ class NearestPoints {
   }
 
   NearestPoints(const openvdb::FloatTree& field, const SurfacePoints& points, const Reach& reach);
+
+  /// Gives surface points to their grid points. Seeds must come before those of seedFeatures() in
+  /// the same slab.
+  /// @param first  number of the first surface point
+  void seed(const std::vector<openvdb::Coord>& gridPoints, std::size_t first);
+  /// Offers the points on edges and corners to the corners of the grid cells that contain them.
+  /// Such a point may be nearer to a grid point than all points on faces.
+  /// @param first  number of the first of these points
+  void seedFeatures(std::size_t first);
+  /// As above, for the grid points of one slab.
+  void seedFeatures(std::size_t first, int slab);
+  /// Gives the nearest surface points to the grid points at the boundary of the region.
+  /// @param gridPoints  grid points of the surface points
+  void seedRegionBoundary(const std::vector<openvdb::Coord>& gridPoints);
+
+  /// Propagates all surface points that were seeded.
   void run(const Progress& progress);
 
-  [[nodiscard]] const std::deque<Block>& blocks() const { return blocks_; }
+  // A slab has all blocks with the same x, and is numbered by x / 8. A block reads only its
+  // neighbours, so the rounds need not run over all slabs at once: advance(g) runs round j of the
+  // slabs 2 (g − j) and 2 (g − j) − 1, for all j. Each block then sees its neighbours in the same
+  // states as in rounds over all blocks, and gets the same bits.
+
+  [[nodiscard]] static int slabOf(const openvdb::Coord& gridPoint) { return gridPoint.x() >> 3; }
+  /// Sets the first slab that can get a block.
+  void beginAt(int slab) { final_ = slab - 1; }
+  /// Runs one round of each slab up to 2g. Slabs up to 2g + 1 must be seeded.
+  void advance(int g);
+  /// Last slab whose blocks do not change any more. A slab is final when neither it nor the slabs
+  /// after it that a surface point can reach have anything to do. Later offers to it are ignored.
+  [[nodiscard]] int lastFinal() const { return final_; }
+  /// Range of the slabs that have blocks. @pre there are blocks
+  [[nodiscard]] int firstSlab() const { return slabs_.begin()->first; }
+  [[nodiscard]] int lastSlab() const { return slabs_.rbegin()->first; }
+  /// Returns the blocks of a slab.
+  [[nodiscard]] std::vector<Block*> blocksOf(int slab) const;
+  /// Deletes the blocks of the slabs up to `slab`.
+  void releaseUpTo(int slab);
+
   /// Returns the block that begins at `origin`; null: none.
   [[nodiscard]] const Block* find(const openvdb::Coord& origin) const {
     const auto found = index_.find(origin);
@@ -76,17 +130,24 @@ class NearestPoints {
   }
 
  private:
+  /// Blocks of a slab by the parities of y and z.
+  using Slab = std::array<std::vector<std::unique_ptr<Block>>, 4>;
+
   Block& touch(const openvdb::Coord& origin);
-  void seedBesideSurface();
-  void seedRegionBoundary();
   void seed(const openvdb::Coord& gridPoint, std::uint32_t point, bool own);
+  void seedCorners(std::size_t point, std::optional<int> slab);
   void process(Block& block, std::vector<openvdb::Coord>& missing) const;
+  void runRound(int slab);
+  [[nodiscard]] bool isQuiet(int slab) const;
 
   const openvdb::FloatTree& field_;
   openvdb::FloatGrid::ConstAccessor accessor_;
   const SurfacePoints& points_;
   Reach reach_;
-  std::deque<Block> blocks_;
+  std::map<int, Slab> slabs_;
+  int final_ = 0;
+  int reachInSlabs_;  ///< number of slabs to which a surface point can reach on each side
+  std::map<int, std::vector<std::size_t>> features_;  ///< points on edges and corners, by slab
   std::unordered_map<openvdb::Coord, Block*, std::hash<openvdb::Coord>> index_;
 };
 

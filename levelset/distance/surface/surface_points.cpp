@@ -8,9 +8,12 @@
 #include <atomic>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <memory>
+#include <numeric>
 
 #include "levelset/distance/surface/closest_point.h"
+#include "levelset/error.h"
 
 namespace levelset::eikonal {
 namespace {
@@ -41,7 +44,8 @@ struct Crossings {
   std::array<double, 6> at;
   int nearest = 0;
 
-  Crossings(const DenseBlock& block, int x, int y, int z, float background) {
+  template <typename Block>
+  Crossings(const Block& block, int x, int y, int z, float background) {
     const float here = block.at(x, y, z);
     for (int i = 0; i < 6; ++i) {
       const auto& d = kDirections[static_cast<std::size_t>(i)];
@@ -95,8 +99,8 @@ Vec3d footOf(const DenseBlock& block, const Vec3d& from, const Crossings& crossi
 
 /// Calls visit(x, y, z, crossings) for the grid points of a block that have a zero crossing within
 /// a voxel along an axis.
-template <typename Visit>
-void forEachPointBeside(const DenseBlock& block, float background, const Visit& visit) {
+template <typename Block, typename Visit>
+void forEachPointBeside(const Block& block, float background, const Visit& visit) {
   // Signs of the block and its border: bit z + 1 of a row along z is set inside.
   std::array<std::array<std::uint32_t, 10>, 10> inside;
   for (int x = -1; x <= 8; ++x)
@@ -122,6 +126,21 @@ void forEachPointBeside(const DenseBlock& block, float background, const Visit& 
     }
 }
 
+/// Dense copy of a leaf block and of two grid points on each side of it.
+class NearBlock {
+ public:
+  void load(const FloatGrid::ConstAccessor& accessor, const Coord& origin) {
+    origin_ = origin;
+    copyPaddedLeaf(accessor, origin, 2, 2, values_.values.data());
+  }
+  [[nodiscard]] const Coord& origin() const { return origin_; }
+  [[nodiscard]] float at(int x, int y, int z) const { return *values_.at(x, y, z); }
+
+ private:
+  Coord origin_;
+  PaddedLeaf<2> values_;
+};
+
 std::vector<const LeafNode*> leavesOf(const FloatTree& tree, const BlockSelection& within) {
   std::vector<const LeafNode*> leaves;
   for (auto it = tree.cbeginLeaf(); it; ++it)
@@ -129,15 +148,22 @@ std::vector<const LeafNode*> leavesOf(const FloatTree& tree, const BlockSelectio
   return leaves;
 }
 
+std::vector<Coord> originsOf(const std::vector<const LeafNode*>& leaves) {
+  std::vector<Coord> origins;
+  origins.reserve(leaves.size());
+  for (const LeafNode* leaf : leaves) origins.push_back(leaf->origin());
+  return origins;
+}
+
 /// Calls work(index of a leaf, dense block of the leaf) for all leaves, in parallel.
-template <typename Work>
-void forEachBlock(const FloatTree& tree, const std::vector<const LeafNode*>& leaves,
-                  const Work& work) {
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 16), [&](const auto& range) {
+/// @tparam Block  DenseBlock or NearBlock
+template <typename Block, typename Work>
+void forEachBlock(const FloatTree& tree, const std::vector<Coord>& origins, const Work& work) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, origins.size(), 8), [&](const auto& range) {
     const FloatGrid::ConstAccessor accessor(tree);
-    const auto block = std::make_unique<DenseBlock>();
+    const auto block = std::make_unique<Block>();
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      block->load(accessor, leaves[i]->origin());
+      block->load(accessor, origins[i]);
       work(i, *block);
     }
   });
@@ -183,7 +209,7 @@ void addLayer(FloatTree& tree, const openvdb::MaskTree* within) {
   std::vector<const LeafNode*> leaves = leavesOf(tree, {});
   std::erase_if(leaves, [&](const LeafNode* leaf) { return !isWithin(leaf->origin()); });
   std::vector<std::vector<std::pair<openvdb::Index, float>>> additions(leaves.size());
-  forEachBlock(tree, leaves, [&](std::size_t i, const DenseBlock& block) {
+  forEachBlock<DenseBlock>(tree, originsOf(leaves), [&](std::size_t i, const DenseBlock& block) {
     for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n) {
       const Coord c = LeafNode::offsetToLocalCoord(n);
       if (std::abs(block.at(c.x(), c.y(), c.z())) != background) continue;
@@ -201,7 +227,7 @@ void addLayer(FloatTree& tree, const openvdb::MaskTree* within) {
 
 /// Returns true when the interpolant beside this grid point reads values that are clipped to the
 /// background.
-bool isThinAt(const DenseBlock& block, int x, int y, int z, float background) {
+bool isThinAt(const NearBlock& block, int x, int y, int z, float background) {
   const float here = std::abs(block.at(x, y, z));
   for (const auto& d : kDirections) {
     const float one = std::abs(block.at(x + d[0], y + d[1], z + d[2]));
@@ -214,13 +240,20 @@ bool isThinAt(const DenseBlock& block, int x, int y, int z, float background) {
   return false;
 }
 
+/// Surface points of one leaf.
+struct LeafPoints {
+  std::vector<Vec3d> positions;
+  std::vector<Coord> gridPoints;
+  std::vector<CompactJet> jets;
+  std::vector<char> sharp;
+};
+
 /// Finds the surface points of one leaf. They do not include points on edges and corners.
 /// @param among  only for these grid points; null: for all
-SurfacePoints surfacePointsOf(const DenseBlock& block, float background,
-                              const SharpPatches& patches,
-                              const openvdb::MaskTree::LeafNodeType* among) {
+LeafPoints surfacePointsOf(const DenseBlock& block, float background, const SharpPatches& patches,
+                           const openvdb::MaskTree::LeafNodeType* among) {
   const Vec3d origin = block.origin().asVec3d();
-  SurfacePoints found;
+  LeafPoints found;
   std::vector<Crossings> crossingsOf;  // one for each search
   std::vector<FootSearch> searches;
   constexpr std::size_t kUsual = 96;  // a plane through a block has about as many surface points
@@ -244,15 +277,13 @@ SurfacePoints surfacePointsOf(const DenseBlock& block, float background,
     found.positions.push_back(hit.point);
     found.gridPoints.push_back(gridPoint);
     found.sharp.push_back(isSharp);
-    if (found.thin.empty() && isThinAt(block, x, y, z, background))
-      found.thin.push_back(block.origin());
   });
   std::vector<Foot> feet;
   closestPoints(block, searches, feet);
   std::vector<Vec3d> places;  // positions of the jets, relative to the block
   std::vector<std::size_t> owners;
   std::size_t search = 0;
-  for (std::size_t i = 0; i < found.size(); ++i) {
+  for (std::size_t i = 0; i < found.positions.size(); ++i) {
     if (found.sharp[i]) continue;
     found.positions[i] =
         origin + footOf(block, searches[search].from, crossingsOf[search], feet[search]);
@@ -262,7 +293,7 @@ SurfacePoints surfacePointsOf(const DenseBlock& block, float background,
     places.push_back(local);
     owners.push_back(i);
   }
-  found.jets.resize(found.size());
+  found.jets.resize(found.positions.size());
   for (std::size_t first = 0; first < places.size(); first += kLanes) {
     const std::size_t count = std::min<std::size_t>(kLanes, places.size() - first);
     Triple<DoubleLanes> p;
@@ -278,35 +309,92 @@ SurfacePoints surfacePointsOf(const DenseBlock& block, float background,
 
 }  // namespace
 
-SurfacePoints findSurfacePoints(const FloatTree& field, const BlockSelection& within,
-                                const SharpPatches& patches) {
-  const std::vector<const LeafNode*> leaves = leavesOf(field, within);
+SurfacePointSearch::SurfacePointSearch(const FloatTree& field, const BlockSelection& within,
+                                       const SharpPatches& patches)
+    : field_(field),
+      within_(within),
+      patches_(patches),
+      origins_(originsOf(leavesOf(field, within))) {
   const float background = field.background();
-  std::vector<SurfacePoints> found(leaves.size());
-  forEachBlock(field, leaves, [&](std::size_t i, const DenseBlock& block) {
+  struct Count {
+    std::uint32_t points = 0;
+    bool isThin = false;
+    openvdb::CoordBBox bounds = {};
+  };
+  std::vector<Count> counts(origins_.size());
+  forEachBlock<NearBlock>(field, origins_, [&](std::size_t i, const NearBlock& block) {
     const auto* among =
-        within.gridPoints ? within.gridPoints->probeConstLeaf(block.origin()) : nullptr;
-    found[i] = surfacePointsOf(block, background, patches, among);
+        within_.gridPoints ? within_.gridPoints->probeConstLeaf(block.origin()) : nullptr;
+    Count& count = counts[i];
+    forEachPointBeside(block, background, [&](int x, int y, int z, const Crossings&) {
+      const Coord gridPoint = block.origin().offsetBy(x, y, z);
+      if (among && !among->isValueOn(gridPoint)) return;
+      ++count.points;
+      count.bounds.expand(gridPoint);
+      if (!count.isThin) count.isThin = isThinAt(block, x, y, z, background);
+    });
   });
-  SurfacePoints all;
-  std::size_t count = 0;
-  for (const SurfacePoints& part : found) count += part.size();
-  all.positions.reserve(count);
-  all.gridPoints.reserve(count);
-  all.jets.reserve(count);
-  all.sharp.reserve(count);
-  for (const SurfacePoints& part : found) {
-    all.positions.insert(all.positions.end(), part.positions.begin(), part.positions.end());
-    all.gridPoints.insert(all.gridPoints.end(), part.gridPoints.begin(), part.gridPoints.end());
-    all.jets.insert(all.jets.end(), part.jets.begin(), part.jets.end());
-    all.sharp.insert(all.sharp.end(), part.sharp.begin(), part.sharp.end());
-    all.thin.insert(all.thin.end(), part.thin.begin(), part.thin.end());
-  }
   for (const Vec3d& feature : patches.features())
-    if (within.holds(Coord::floor(feature))) all.positions.push_back(feature);
-  all.jets.resize(all.positions.size());
-  all.sharp.resize(all.positions.size(), 1);
-  return all;
+    if (within.holds(Coord::floor(feature))) features_.push_back(feature);
+  std::size_t sum = 0;
+  first_.push_back(0);
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    sum += counts[i].points;
+    first_.push_back(static_cast<std::uint32_t>(sum));
+    if (counts[i].isThin) thin_.push_back(origins_[i]);
+    if (counts[i].points > 0) bounds_.expand(counts[i].bounds);
+  }
+  if (sum + features_.size() >= std::numeric_limits<std::uint32_t>::max())
+    throw ResourceLimit(
+        "more than 2^32 grid points lie beside the surface; use larger "
+        "voxels");
+}
+
+SurfacePoints SurfacePointSearch::reserve() const {
+  SurfacePoints points;
+  points.positions = PageArray<Vec3d>(size());
+  points.jets = PageArray<CompactJet>(size());
+  points.sharp = PageArray<char>(size());
+  for (std::size_t i = 0; i < features_.size(); ++i) {
+    points.positions[countOfGridPoints() + i] = features_[i];
+    points.sharp[countOfGridPoints() + i] = 1;
+  }
+  return points;
+}
+
+std::vector<std::vector<Coord>> SurfacePointSearch::find(const std::vector<std::size_t>& blocks,
+                                                         SurfacePoints& points) const {
+  std::vector<std::vector<Coord>> gridPoints(blocks.size());
+  std::vector<Coord> origins;
+  origins.reserve(blocks.size());
+  for (const std::size_t block : blocks) origins.push_back(origins_[block]);
+  forEachBlock<DenseBlock>(field_, origins, [&](std::size_t i, const DenseBlock& block) {
+    const auto* among =
+        within_.gridPoints ? within_.gridPoints->probeConstLeaf(block.origin()) : nullptr;
+    LeafPoints found = surfacePointsOf(block, field_.background(), patches_, among);
+    const std::size_t first = first_[blocks[i]];
+    std::copy(found.positions.begin(), found.positions.end(), points.positions.data() + first);
+    std::copy(found.jets.begin(), found.jets.end(), points.jets.data() + first);
+    std::copy(found.sharp.begin(), found.sharp.end(), points.sharp.data() + first);
+    gridPoints[i] = std::move(found.gridPoints);
+  });
+  return gridPoints;
+}
+
+SurfacePoints findSurfacePoints(const FloatTree& field, const BlockSelection& within,
+                                const SharpPatches& patches, std::vector<Coord>* thin,
+                                std::vector<Coord>* gridPoints) {
+  const SurfacePointSearch search(field, within, patches);
+  if (thin) *thin = search.thin();
+  if (thin && !thin->empty()) return {};
+  SurfacePoints points = search.reserve();
+  std::vector<std::size_t> all(search.blockCount());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  const auto found = search.find(all, points);
+  if (gridPoints)
+    for (const std::vector<Coord>& part : found)
+      gridPoints->insert(gridPoints->end(), part.begin(), part.end());
+  return points;
 }
 
 bool hasZeroCrossing(const FloatTree& field) {

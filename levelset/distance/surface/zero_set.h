@@ -11,6 +11,8 @@ struct ZeroSet {
   openvdb::FloatTree::ConstPtr interpolated;  ///< the field, thickened if its band is too thin
   SharpPatches patches;
   SurfacePoints points;
+  /// Grid point of each surface point that has one, in the same order.
+  std::vector<openvdb::Coord> gridPoints = {};
 };
 
 /// Reads the zero set of a field in the leaf blocks `within`.

@@ -5,11 +5,13 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <iterator>
 #include <limits>
 
 #include "levelset/error.h"
+#include "tests/support/threads.h"
 
 namespace image_test {
 
@@ -52,6 +54,23 @@ Image gradientImage() {
 
 using ImageExr = ImageFiles;
 using ImagePng = ImageFiles;
+
+TEST_F(ImageExr, HasTheSameBytesOnAnyNumberOfThreads) {
+  // Many blocks of lines, which are compressed on several threads.
+  Image image(301, 403);
+  std::uint32_t noise = 1;
+  for (const char* name : {"R", "G", "B", "Z"})
+    for (float& value : image.addChannel(name)) {
+      noise = noise * 1664525u + 1013904223u;
+      value = static_cast<float>(noise >> 20);
+    }
+  support::onThreads(1, [&] { writeImage(file("one.exr"), image); });
+  support::onThreads(7, [&] { writeImage(file("seven.exr"), image); });
+  EXPECT_GT(bytesOf(file("one.exr")).size(), 100'000u);
+  EXPECT_TRUE(bytesOf(file("one.exr")) == bytesOf(file("seven.exr")));
+  const Image back = support::onThreads(7, [&] { return readExr(file("one.exr")); });
+  EXPECT_TRUE(back.channels == image.channels);
+}
 
 TEST_F(ImageExr, IsReadBackToTheBit) {
   const Image image = gradientImage();

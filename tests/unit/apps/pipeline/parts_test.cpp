@@ -9,8 +9,12 @@
 #include <vector>
 
 #include "apps/pipeline/grammar/chain.h"
+#include "apps/pipeline/registry/invocation.h"
+#include "apps/pipeline/registry/operator.h"
 #include "apps/pipeline/run/runner.h"
 #include "levelset/error.h"
+#include "levelset/meshing/band_to_mesh.h"
+#include "levelset/shapes/shapes.h"
 #include "tests/support/command_line.h"
 
 namespace parts_test {
@@ -73,6 +77,31 @@ TEST_F(Parts, FilesAreReadInParts) {
 TEST_F(Parts, PartsThatAClipEmptiesAreEmpty) {
   expectEqualFiles(30'000'000,
                    "torus --radius 9 --tube 3 --voxel 0.1 ! clip --plane 2,0,0~1,0,0 ! offset 3vx");
+}
+
+TEST_F(Parts, TheMemoryOfTheProgramCounts) {
+  // The program takes about 50 MB without any value.
+  const std::string in = path("in.vdb"), whole = path("whole.vdb"), parts = path("parts.vdb");
+  run("box --size 1,6,1 --voxel 0.01 ! write " + in, levelset::kNoMemoryLimit);
+  run("read " + in + " ! offset 5vx ! write " + whole, levelset::kNoMemoryLimit);
+  const auto told = levelsmith("--max-memory 150M read " + in + " ! offset 5vx ! write " + parts);
+  EXPECT_EQ(told.code, 0) << told.err;
+  EXPECT_NE(told.err.find(" parts to stay within --max-memory"), std::string::npos) << told.err;
+  EXPECT_TRUE(support::slurp(whole) == support::slurp(parts));
+}
+
+TEST_F(Parts, ConversionsReleaseTheirMesh) {
+  const pipeline::Operator& op = *pipeline::findOperator("level-set");
+  pipeline::Invocation conversion(op, {{"voxel", "0.05"}});
+  conversion.operands.emplace_back(
+      levelset::bandToMesh(levelset::makeSphere(1, Imath::V3d(0), 0.05), {}));
+  double released = 1;
+  conversion.progress = [&](double done) {
+    if (conversion.operands.empty()) released = std::min(released, done);
+    return true;
+  };
+  EXPECT_FALSE(op.run(conversion).band().isEmpty());
+  EXPECT_LT(released, 0.7);
 }
 
 TEST_F(Parts, AResultWithoutSurfaceIsRefused) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <openvdb/tools/Diagnostics.h>
 
+#include <cmath>
 #include <ctime>
 
 #include "levelset/error.h"
@@ -204,6 +205,23 @@ TEST(MeshToBand, GivesTheSameBitsForAnyThreadCount) {
     });
   }
   for (std::size_t i = 2; i < hashes.size(); ++i) EXPECT_EQ(hashes[i], hashes[i % 2]);
+}
+
+TEST(MeshToBand, DoesNotReadTheMeshAfterItSaysSo) {
+  for (const bool isOpen : {false, true}) {
+    const TriMesh mesh = isOpen ? sphereMesh(1, V3d(0.01), 10, 0.7) : torusMesh(1, 0.4, 64, 32);
+    MeshToBandOptions options{.acceptSign = isOpen};
+    const std::uint64_t wanted = meshToBand(mesh, 0.05, options).band.contentHash();
+    TriMesh copy = mesh;
+    std::size_t calls = 0;
+    options.onMeshRead = [&] {
+      ++calls;
+      for (V3d& p : copy.positions) p = V3d(NAN);
+      for (auto& t : copy.triangles) t = {0, 0, 0};
+    };
+    EXPECT_EQ(meshToBand(copy, 0.05, options).band.contentHash(), wanted);
+    EXPECT_EQ(calls, 1u);
+  }
 }
 
 TEST(MeshToBand, StopsWhenCancelled) {

@@ -6,7 +6,9 @@
 #include <Imath/ImathMatrix.h>
 
 #include <algorithm>
+#include <functional>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include "levelset/error.h"
@@ -419,6 +421,63 @@ TEST(Offset, DoesNotDependOnThreads) {
     EXPECT_EQ(hashes[0], hashes[1]);
     EXPECT_EQ(hashes[0], hashes[2]);
   }
+}
+
+/// Returns the least number of leaves that a grid has while its solid is offset.
+std::size_t leastLeavesDuringOffset(NarrowBand solid,
+                                    const std::weak_ptr<openvdb::FloatGrid>& grid) {
+  std::size_t least = grid.lock()->tree().leafCount();
+  OffsetOptions options;
+  options.progress = [&](double) {
+    const auto held = grid.lock();
+    least = std::min<std::size_t>(least, held ? held->tree().leafCount() : 0);
+    return true;
+  };
+  (void)offset(std::move(solid), 0.3, options);
+  return least;
+}
+
+TEST(Offset, FreesTheSolidOnTheWayUnlessItIsShared) {
+  const auto longBox = [] { return makeBox(V3d(60, 2, 2), V3d(0), 0.1); };
+  NarrowBand own = longBox();
+  const std::weak_ptr<openvdb::FloatGrid> grid = own.shared()->grid;
+  const std::size_t leaves = vdb(own).tree().leafCount();
+  EXPECT_LT(leastLeavesDuringOffset(std::move(own), grid), leaves / 2);
+
+  const NarrowBand shared = longBox();
+  const std::uint64_t hash = shared.contentHash();
+  EXPECT_EQ(leastLeavesDuringOffset(shared, shared.shared()->grid), leaves);
+  EXPECT_EQ(shared.contentHash(), hash);
+  const openvdb::FloatTree::Ptr tree = vdb(shared).deepCopy()->treePtr();
+  const auto other = std::make_shared<openvdb::FloatGrid>(tree);
+  other->setTransform(vdb(shared).transform().copy());
+  (void)offset(makeBand(other), 0.3);
+  EXPECT_EQ(tree->leafCount(), leaves);
+}
+
+/// Another owner edits the grid in place if it is the only one.
+TEST(Offset, HoldsASharedSolidUntilTheEnd) {
+  const NarrowBand solid = makeBox(V3d(6, 2, 2), V3d(0), 0.1);
+  long least = 1000;
+  OffsetOptions options;
+  options.progress = [&](double) {
+    least = std::min(least, solid.shared().use_count());
+    return true;
+  };
+  (void)offset(solid, 0.3, options);
+  EXPECT_EQ(least, 2);
+}
+
+TEST(Offset, FindsDistantBodies) {
+  // The sweep passes slabs without a surface between the bodies.
+  const NarrowBand left = makeSphere(8, V3d(0), 1), right = makeSphere(8, V3d(2000.5, 0.3, 0.1), 1);
+  const NarrowBand both = offset(unite(left, right), 4);
+  const NarrowBand alone = offset(left, 4);
+  std::size_t compared = 0;
+  for (auto it = vdb(alone).tree().cbeginValueOn(); it; ++it, ++compared)
+    ASSERT_EQ(vdb(both).tree().getValue(it.getCoord()), *it);
+  EXPECT_GT(compared, 1000u);
+  EXPECT_EQ(vdb(both).activeVoxelCount(), compared + vdb(offset(right, 4)).activeVoxelCount());
 }
 
 TEST(Offset, Refuses) {
