@@ -21,7 +21,7 @@ using Imath::V3f;
 
 /// Cosine between the normals at the ends of an edge, after the second one is mirrored at the plane
 /// through the middle of the edge. On a circular arc it is 1 for normals of the same side, also at
-/// a sharp edge and between two sheets that face each other.
+/// a sharp edge and between two sheets that face each other [Konig09].
 float edgeCosine(const PointCloud& cloud, std::uint32_t i, std::uint32_t j) {
   V3d along = cloud.positions[j] - cloud.positions[i];
   const double length = along.length();

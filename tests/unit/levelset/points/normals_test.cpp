@@ -83,9 +83,10 @@ TEST(PointNormals, ConvergeOnSphereAndTorus) {
         const double error = meanAngle(truth, found);
         RecordProperty("error", std::to_string(error));
         // The spacing halves from one count to the next.
-        if (before > 0)
+        if (before > 0) {
           EXPECT_GT(std::log2(before / error), degree == FitDegree::One ? 0.8 : 1.7)
               << isTorus << " " << static_cast<int>(degree) << " " << count << " " << error;
+        }
         std::printf(
             "torus %d degree %d count %zu mean %.3g worst %.3g quadratic %.2f doubtful %g\n",
             isTorus, static_cast<int>(degree), count, error, worstAngle(truth, found),
