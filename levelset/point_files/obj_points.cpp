@@ -64,14 +64,12 @@ class ObjPointReader {
   CloudBuilder& builder_;
 };
 
-void writeTriple(ByteWriter& out, const char* keyword, const Imath::V3d& v, bool asFloat) {
+template <typename Vector>
+void writeTriple(ByteWriter& out, const char* keyword, const Vector& v) {
   out.write(keyword);
   for (int axis = 0; axis < 3; ++axis) {
     out.write(" ");
-    if (asFloat)
-      out.writeNumber(static_cast<float>(v[axis]));
-    else
-      out.writeNumber(v[axis]);
+    out.writeNumber(v[axis]);
   }
 }
 
@@ -102,11 +100,10 @@ bool objLacksFaces(std::string_view input) {
 }
 
 void writeObjPoints(ByteWriter& out, const PointCloud& cloud, const Progress& progress) {
-  const bool asFloat = cloud.precision == CoordinatePrecision::Float;
   const bool asBytes = hasByteColors(cloud), withAlpha = hasAlpha(cloud);
   WriteProgress steps(progress, cloud.size());
   for (std::size_t i = 0; i < cloud.size(); ++i) {
-    writeTriple(out, "v", cloud.positions[i], asFloat);
+    writeTriple(out, "v", cloud.positions[i]);
     for (int part = 0; part < (cloud.colors.empty() ? 0 : withAlpha ? 4 : 3); ++part) {
       out.write(" ");
       // A byte n is written as n / 255 with the digits that identify it as a float.
@@ -119,7 +116,7 @@ void writeObjPoints(ByteWriter& out, const PointCloud& cloud, const Progress& pr
     steps.step();
   }
   for (const Imath::V3f& normal : cloud.normals) {
-    writeTriple(out, "vn", Imath::V3d(normal), true);
+    writeTriple(out, "vn", normal);
     out.write("\n");
   }
 }

@@ -316,17 +316,9 @@ std::optional<std::size_t> countOnLine(const Lines& lines) {
   return static_cast<std::size_t>(points);
 }
 
-void writeReal(ByteWriter& out, double value, bool asFloat) {
-  if (asFloat)
-    out.writeNumber(static_cast<float>(value));
-  else
-    out.writeNumber(value);
-}
-
 /// Writes the points as lines. `names` begins the line of column names; null: no such line.
 void writeLines(ByteWriter& out, const PointCloud& cloud, const Progress& progress,
                 const char* separator, const char* names, bool hasMore) {
-  const bool asFloat = cloud.precision == CoordinatePrecision::Float;
   const bool withAlpha = hasMore && hasAlpha(cloud);
   const auto join = [&](const char* text) { out.write(separator), out.write(text); };
   if (names) {
@@ -343,7 +335,7 @@ void writeLines(ByteWriter& out, const PointCloud& cloud, const Progress& progre
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     for (int axis = 0; axis < 3; ++axis) {
       if (axis > 0) out.write(separator);
-      writeReal(out, cloud.positions[i][axis], asFloat);
+      out.writeNumber(cloud.positions[i][axis]);
     }
     for (int axis = 0; axis < (cloud.normals.empty() ? 0 : 3); ++axis) {
       out.write(separator);
@@ -443,14 +435,13 @@ void writeCsvPoints(ByteWriter& out, const PointCloud& cloud, const Progress& pr
 }
 
 void writePtsPoints(ByteWriter& out, const PointCloud& cloud, const Progress& progress) {
-  const bool asFloat = cloud.precision == CoordinatePrecision::Float;
   out.writeNumber(std::uint64_t{cloud.size()});
   out.write("\n");
   WriteProgress steps(progress, cloud.size());
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     for (int axis = 0; axis < 3; ++axis) {
       if (axis > 0) out.write(" ");
-      writeReal(out, cloud.positions[i][axis], asFloat);
+      out.writeNumber(cloud.positions[i][axis]);
     }
     if (!cloud.colors.empty()) {
       out.write(" 0");

@@ -88,10 +88,10 @@ TEST_F(PointActions, NormalsWarnOfAGuess) {
 TEST_F(PointActions, RefusalsHaveTheirCode) {
   writeFile("a.xyz", "0 0 0\n1 0 0\n2 0 0\n");
   writeFile("bad.xyz", "0 0 0\n1 0 nan\n");
-  writeFile("cut.pts", "5\n0 0 0\n");
+  writeFile("cut.pts", "5\n0.000 0.000 0.000\n0.5 0.5 0.5\n");
   writeFile("box.json", "{}");
   expectRefusal("read bad.xyz ! info", 3, "line 2");
-  expectRefusal("read cut.pts ! info", 3, "ends after 1 of 5");
+  expectRefusal("read cut.pts ! info", 3, "ends after 2 of 5");
   expectRefusal("read none.xyz ! info", 6, "none.xyz");
   expectRefusal("read a.xyz ! normals", 3, "lie on a line");
   expectRefusal("read a.xyz ! normals --neighbours 2", 2, "at least 3");

@@ -79,6 +79,7 @@ TEST(PointFiles, FloatsStayFloats) {
     writePoints(folder / name, cloud);
     const PointCloud read = readPoints(folder / name);
     EXPECT_EQ(read.positions, cloud.positions) << name;
+    EXPECT_EQ(read.precision, CoordinatePrecision::Float) << name;
   }
 }
 
@@ -238,7 +239,7 @@ TEST(PointFiles, DamagedFilesAreRefusedWithThePlace) {
       "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n";
   EXPECT_SAYS(refused(folder, "a.ply", head + "end_header\n1 2\n3 4\n"), "no element 'vertex'");
   const std::string whole = head + "property float z\nend_header\n1 2 3\n";
-  EXPECT_SAYS(refused(folder, "a.ply", whole + "4 5\n"), "ends within");
+  EXPECT_SAYS(refused(folder, "a.ply", whole + "4.25 5\n"), "ends within");
   EXPECT_SAYS(refused(folder, "a.ply", whole + "4 5 nan\n"), "line 9");
   EXPECT_SAYS(refused(folder, "a.ply", whole + "4 5 6\n7\n"), "has data after");
   EXPECT_SAYS(refused(folder, "a.ply", whole + "4 5 6 7\n"), "more values on the line");

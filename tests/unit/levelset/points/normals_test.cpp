@@ -73,34 +73,35 @@ NormalsResult normalsOf(const PointCloud& cloud, const NormalsOptions& options =
 }
 
 TEST(PointNormals, ConvergeOnSphereAndTorus) {
-  const std::size_t counts[] = {2000, 8000, 32000};
-  for (const bool isTorus : {false, true})
-    for (const FitDegree degree : {FitDegree::One, FitDegree::Two, FitDegree::Adaptive}) {
-      double before = 0;
-      for (const std::size_t count : counts) {
-        const PointCloud truth = isTorus ? torusCloud(count) : ballCloud(count);
-        const NormalsResult found = normalsOf(truth, {.degree = degree});
-        const double error = meanAngle(truth, found);
-        RecordProperty("error", std::to_string(error));
+  // Mean errors at 32,000 points, measured: degree 1, degree 2.
+  constexpr double kMeasured[2][2] = {{1.74e-3, 4.3e-7}, {4.0e-3, 3.6e-4}};
+  // The third-order terms of a sphere vanish, so degree 2 gains an order there.
+  constexpr double kOrders[2][2] = {{0.97, 2.9}, {0.97, 1.9}};
+  for (const std::size_t shape : {0, 1}) {
+    double before[3] = {};
+    for (const std::size_t count : {2000, 8000, 32000}) {
+      const PointCloud truth = shape == 1 ? torusCloud(count) : ballCloud(count);
+      for (const FitDegree degree : {FitDegree::Adaptive, FitDegree::One, FitDegree::Two}) {
+        const double error = meanAngle(truth, normalsOf(truth, {.degree = degree}));
+        const std::size_t kind = degree == FitDegree::One ? 0 : 1;
+        double& coarse = before[static_cast<std::size_t>(degree)];
         // The spacing halves from one count to the next.
-        if (before > 0) {
-          EXPECT_GT(std::log2(before / error), degree == FitDegree::One ? 0.8 : 1.7)
-              << isTorus << " " << static_cast<int>(degree) << " " << count << " " << error;
+        if (coarse > 0) {
+          EXPECT_GT(std::log2(coarse / error), kOrders[shape][kind]) << error;
         }
-        std::printf(
-            "torus %d degree %d count %zu mean %.3g worst %.3g quadratic %.2f doubtful %g\n",
-            isTorus, static_cast<int>(degree), count, error, worstAngle(truth, found),
-            static_cast<double>(found.report.quadratic) / static_cast<double>(count),
-            found.report.doubtful);
-        before = error;
+        if (count == 32000) {
+          EXPECT_LT(error, 1.5 * kMeasured[shape][kind]);
+        }
+        coarse = error;
       }
     }
+  }
 }
 
 TEST(PointNormals, PointOutwardsEverywhere) {
   for (const PointCloud& truth : {ballCloud(3000), torusCloud(5000)}) {
     const NormalsResult found = normalsOf(truth);
-    EXPECT_LT(worstAngle(truth, found), 0.1);
+    EXPECT_LT(worstAngle(truth, found), 0.02);
     EXPECT_EQ(found.report.components, 1u);
     EXPECT_EQ(found.report.guessed, 0u);
     EXPECT_EQ(found.report.missing, 0u);
@@ -114,7 +115,7 @@ TEST(PointNormals, CrossSharpEdges) {
   const NormalsResult found = normalsOf(truth);
   std::size_t wrong = 0;
   for (std::size_t i = 0; i < truth.size(); ++i)
-    wrong += V3d(truth.normals[i]).dot(V3d(found.cloud.normals[i])) < 0.5 ? 1 : 0;
+    wrong += V3d(truth.normals[i]).dot(V3d(found.cloud.normals[i])) < 0 ? 1 : 0;
   EXPECT_EQ(wrong, 0u);
 }
 
@@ -130,7 +131,7 @@ TEST(PointNormals, CavitiesPointInwards) {
     }
   const NormalsResult found = normalsOf(cloud);
   EXPECT_EQ(found.report.components, 4u);
-  EXPECT_LT(worstAngle(cloud, found), 0.2);
+  EXPECT_LT(worstAngle(cloud, found), 5e-3);
 }
 
 TEST(PointNormals, ThinSheetsFaceApart) {
@@ -150,8 +151,7 @@ TEST(PointNormals, AveragesNoise) {
   std::normal_distribution<double> noise(0, 0.005);
   for (V3d& p : truth.positions) p += V3d(noise(random), noise(random), noise(random));
   const NormalsResult found = normalsOf(truth, {.neighbours = 30});
-  std::printf("noise: mean %.3g\n", meanAngle(truth, found));
-  EXPECT_LT(meanAngle(truth, found), 0.15);
+  EXPECT_LT(meanAngle(truth, found), 0.035);  // measured: 0.023
   EXPECT_EQ(found.report.components, 1u);
 }
 
@@ -168,7 +168,7 @@ TEST(PointNormals, DoNotDependOnPlaceAndScale) {
   // Spacing 1e-9.
   PointCloud tiny = truth;
   for (V3d& p : tiny.positions) p *= 2e-8;
-  EXPECT_LT(worstAngle(truth, normalsOf(tiny)), 0.05);
+  EXPECT_LT(worstAngle(truth, normalsOf(tiny)), 1.3e-4);  // measured: 8.6e-5
 }
 
 TEST(PointNormals, OfAPlaneAreItsNormal) {
