@@ -7,6 +7,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
+#include <optional>
+#include <vector>
 
 #include "levelset/error.h"
 #include "levelset/memory_limit.h"

@@ -3,8 +3,10 @@
 #include <fmt/core.h>
 #include <tbb/parallel_for.h>
 
+#include <array>
 #include <atomic>
 #include <cmath>
+#include <vector>
 
 #include "levelset/error.h"
 #include "levelset/points/processing/point_spacing.h"
