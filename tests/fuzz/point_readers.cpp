@@ -32,8 +32,8 @@ void readTextPoints(std::string_view bytes) {
 
 std::vector<Reader> pointReaders() {
   return {{"points", readTextPoints},
-          {"points-ply", [](std::string_view bytes) { readPointsAs("points.ply", bytes); }},
-          {"points-obj", [](std::string_view bytes) { readPointsAs("points.obj", bytes); }}};
+          {"points_ply", [](std::string_view bytes) { readPointsAs("points.ply", bytes); }},
+          {"points_obj", [](std::string_view bytes) { readPointsAs("points.obj", bytes); }}};
 }
 
 }  // namespace fuzz
