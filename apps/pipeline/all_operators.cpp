@@ -8,7 +8,6 @@
 #include "levelset/convert/mesh_to_band.h"
 #include "levelset/convert/surface_band.h"
 #include "levelset/csg/blend.h"
-#include "levelset/csg/clip.h"
 #include "levelset/csg/csg.h"
 #include "levelset/csg/smooth_csg.h"
 #include "levelset/curvature_flow/curvature_flow.h"
@@ -22,8 +21,6 @@
 #include "levelset/offset/morphology.h"
 #include "levelset/offset/offset.h"
 #include "levelset/shapes/shapes.h"
-#include "levelset/transform/resample.h"
-#include "levelset/transform/transform.h"
 
 namespace pipeline {
 
@@ -45,6 +42,10 @@ std::vector<Operator> allOperators() {
       isosurfaceOperator(),
       isosurfaceMeshOperator(),
       thresholdOperator(),
+      sampleOperator(),
+      normalsOperator(),
+      outliersOperator(),
+      thinOperator(),
       levelSetOperator<levelset::UnionOperator>(),
       levelSetOperator<levelset::IntersectionOperator>(),
       levelSetOperator<levelset::DifferenceOperator>(),
@@ -69,9 +70,9 @@ std::vector<Operator> allOperators() {
       levelSetOperator<levelset::CurvatureFlowOperator>(),
       levelSetOperator<levelset::SmoothOperator>(),
       morphOperator(),
-      levelSetOperator<levelset::TransformOperator>(),
+      transformOperator(),
       resampleOperator(),
-      levelSetOperator<levelset::ClipOperator>(),
+      clipOperator(),
       patchOperator(),
       decalOperator(),
       patchGridOperator(),

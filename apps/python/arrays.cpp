@@ -90,6 +90,45 @@ py::object meshArray(const py::object& owner, const TriMesh& mesh, const std::st
   return py::none();
 }
 
+py::object cloudArray(const py::object& owner, const levelset::PointCloud& cloud,
+                      const std::string& list) {
+  if (list == "positions") return rowsView<V3d, double, 3>(owner, cloud.positions);
+  if (list == "normals" && !cloud.normals.empty())
+    return rowsView<Imath::V3f, float, 3>(owner, cloud.normals);
+  if (list == "colors" && !cloud.colors.empty())
+    return rowsView<Imath::V4f, float, 4>(owner, cloud.colors);
+  if (list == "radii" && !cloud.radii.empty())
+    return rowsView<float, float, 1>(owner, cloud.radii).attr("reshape")(-1);
+  if (list == "weights" && !cloud.weights.empty())
+    return rowsView<float, float, 1>(owner, cloud.weights).attr("reshape")(-1);
+  return py::none();
+}
+
+levelset::PointCloud cloudFromArrays(const py::array& positions, const py::object& normals) {
+  const auto rows = [](const py::array& array, const char* name) {
+    const bool isFloat = array.dtype().kind() == 'f';
+    if (!isFloat || array.ndim() != 2 || array.shape(1) != 3)
+      throw InvalidInput(fmt::format(
+          "PointCloud: the array {} has shape {}; give shape (n, 3) of float32 or float64", name,
+          shapeText(array)));
+    return py::array_t<double, py::array::c_style | py::array::forcecast>(array);
+  };
+  const auto places = rows(positions, "positions");
+  levelset::PointCloud cloud;
+  if (positions.itemsize() < 8) cloud.precision = levelset::CoordinatePrecision::Float;
+  const double* p = places.data();
+  for (py::ssize_t i = 0; i < places.shape(0); ++i, p += 3)
+    cloud.positions.emplace_back(p[0], p[1], p[2]);
+  if (!normals.is_none()) {
+    const auto directions = rows(py::array(normals), "normals");
+    const double* n = directions.data();
+    for (py::ssize_t i = 0; i < directions.shape(0); ++i, n += 3)
+      cloud.normals.emplace_back(Imath::V3d(n[0], n[1], n[2]));
+  }
+  levelset::withContext("PointCloud", [&] { levelset::requirePoints(cloud); });
+  return cloud;
+}
+
 DenseBand bandArray(const levelset::NarrowBand& band, const std::optional<Imath::Box3d>& box,
                     std::size_t maxMemory) {
   const openvdb::FloatGrid& grid = levelset::vdb(band);

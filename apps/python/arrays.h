@@ -26,6 +26,21 @@ namespace python {
 [[nodiscard]] pybind11::object meshArray(const pybind11::object& owner,
                                          const levelset::TriMesh& mesh, const std::string& list);
 
+/// Builds a point cloud from numpy arrays.
+/// @param positions  n × 3 floats
+/// @param normals  n × 3 floats, or None
+/// @throws levelset::InvalidInput for other shapes and types, and numbers that are not finite
+[[nodiscard]] levelset::PointCloud cloudFromArrays(const pybind11::array& positions,
+                                                   const pybind11::object& normals);
+
+/// Returns a list of a point cloud as a read-only numpy array that shares its memory; None for an
+/// attribute that the cloud does not have.
+/// @param owner  Python object that keeps the cloud alive
+/// @param list   positions, normals, colors, radii or weights
+[[nodiscard]] pybind11::object cloudArray(const pybind11::object& owner,
+                                          const levelset::PointCloud& cloud,
+                                          const std::string& list);
+
 /// Signed distances at the grid points of a box.
 struct DenseBand {
   pybind11::array_t<float> values;

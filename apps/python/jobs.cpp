@@ -102,6 +102,7 @@ Graph graphOf(const Job& job) {
 
 std::string bytesOf(const Value& value) {
   if (value.kind() == Kind::Mesh) return pipeline::bytesOf(value.mesh());
+  if (value.kind() == Kind::Points) return pipeline::bytesOf(value.cloud());
   if (value.kind() != Kind::Band && value.kind() != Kind::Field)
     throw UsageError(fmt::format(
         "pickle: a {} cannot be sent to another process; send the values computed from it, "
@@ -123,6 +124,14 @@ Value valueOf(Kind kind, const std::string& bytes) {
       throw levelset::InvalidInput(
           "pickle: the bytes of a mesh are damaged or from another version; pickle the mesh again");
     return Value(std::move(mesh));
+  }
+  if (kind == Kind::Points) {
+    levelset::PointCloud cloud;
+    if (!pipeline::readCloudBytes(bytes, cloud))
+      throw levelset::InvalidInput(
+          "pickle: the bytes of a point cloud are damaged or from another version; pickle it "
+          "again");
+    return Value(std::move(cloud));
   }
   const TemporaryFolder folder;
   std::ofstream out(folder.file(), std::ios::binary);

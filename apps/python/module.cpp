@@ -46,6 +46,8 @@ const char* className(Kind kind) {
       return "Scene";
     case Kind::Volume:
       return "Scan";
+    case Kind::Points:
+      return "PointCloud";
   }
   return "";
 }
@@ -375,6 +377,14 @@ PYBIND11_MODULE(_core, module) {
              });
              return python::meshArray(owner, value.mesh(), list);
            })
+      .def("cloud_array",
+           [](const py::object& self, const std::string& list) {
+             const auto& value = valueOf(self.cast<const Handle&>());
+             const py::capsule owner(new pipeline::Value(value), [](void* held) {
+               delete static_cast<pipeline::Value*>(held);
+             });
+             return python::cloudArray(owner, value.cloud(), list);
+           })
       .def("band_array", [](const Handle& node, const py::object& box) {
         const pipeline::Value value = valueOf(node);
         const python::DenseBand dense =
@@ -392,6 +402,9 @@ PYBIND11_MODULE(_core, module) {
   module.def("graph", graphText);
   module.def("mesh", [](const py::array& vertices, const py::array& faces) {
     return given(pipeline::Value(python::meshFromArrays(vertices, faces)));
+  });
+  module.def("cloud", [](const py::array& positions, const py::object& normals) {
+    return given(pipeline::Value(python::cloudFromArrays(positions, normals)));
   });
   module.def("samples", [](const Point& origin, double voxel,
                            const py::array_t<std::int32_t, py::array::c_style>& blocks,

@@ -12,8 +12,8 @@
 #include "levelset/file_target.h"
 #include "levelset/progress.h"
 
-// Private to levelset/files, levelset/mesh_files and levelset/volume_files: reads and writes
-// complete files in memory, with or without gzip compression.
+// Private to levelset/files, mesh_files, point_files and volume_files: reads and writes complete
+// files in memory, with or without gzip compression.
 
 namespace levelset {
 

@@ -11,7 +11,8 @@
 #include "levelset/files/byte_io.h"
 #include "levelset/mesh_files/mesh_file.h"
 
-// Private to levelset/mesh_files: shared code of the mesh readers and writers.
+// Private to levelset/mesh_files and levelset/point_files: shared code of the readers and writers
+// of meshes. Readers of point clouds share the text cursor and the messages.
 
 namespace levelset {
 

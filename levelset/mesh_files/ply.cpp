@@ -11,140 +11,19 @@
 #include "levelset/error.h"
 #include "levelset/mesh_files/mesh_parts.h"
 #include "levelset/mesh_files/ply_header.h"
+#include "levelset/mesh_files/ply_source.h"
 
 namespace levelset {
 namespace {
 
+using ply::AsciiSource;
+using ply::BinarySource;
 using ply::Element;
 using ply::Encoding;
 using ply::Header;
 using ply::Property;
 using ply::Role;
 using ply::Type;
-
-template <typename T>
-T load(const char* p, bool swap) {
-  char bytes[sizeof(T)];
-  std::memcpy(bytes, p, sizeof(T));
-  if (swap) std::reverse(bytes, bytes + sizeof(T));
-  return std::bit_cast<T>(bytes);
-}
-
-template <bool kSwap>
-class BinarySource {
- public:
-  BinarySource(std::string_view data, std::size_t, const std::string& name)
-      : p_(data.data()), end_(data.data() + data.size()), name_(name) {}
-
-  void begin(const Element& element, std::size_t index) {
-    element_ = &element;
-    index_ = index;
-  }
-  void end() {}
-  [[nodiscard]] FilePosition place() const { return {element_->name.c_str(), index_}; }
-  [[nodiscard]] const char* at() const { return p_; }
-
-  double value(Type type) {
-    require(ply::sizeOf(type));
-    const char* p = p_;
-    p_ += ply::sizeOf(type);
-    switch (type) {
-      case Type::Int8:
-        return static_cast<signed char>(*p);
-      case Type::Uint8:
-        return static_cast<unsigned char>(*p);
-      case Type::Int16:
-        return load<std::int16_t>(p, kSwap);
-      case Type::Uint16:
-        return load<std::uint16_t>(p, kSwap);
-      case Type::Int32:
-        return load<std::int32_t>(p, kSwap);
-      case Type::Uint32:
-        return load<std::uint32_t>(p, kSwap);
-      case Type::Float:
-        return static_cast<double>(load<float>(p, kSwap));
-      case Type::Double:
-        return load<double>(p, kSwap);
-    }
-    return 0;
-  }
-  void skip(Type type, std::size_t count) {
-    requireList(type, count);
-    p_ += count * ply::sizeOf(type);
-  }
-  /// Checks that a list of `count` values is present.
-  void requireList(Type type, std::size_t count) {
-    if (count > static_cast<std::size_t>(end_ - p_) / ply::sizeOf(type)) failShort();
-  }
-
- private:
-  void require(std::size_t size) {
-    if (static_cast<std::size_t>(end_ - p_) < size) failShort();
-  }
-  [[noreturn]] void failShort() const {
-    failAt(name_, place(),
-           "the file ends within this element; it is truncated or damaged: download or export it "
-           "again");
-  }
-
-  const char* p_;
-  const char* end_;
-  const std::string& name_;
-  const Element* element_ = nullptr;
-  std::size_t index_ = 0;
-};
-
-/// Reads one element per line. Refuses a line with too many values, which would shift the values of
-/// all later elements.
-class AsciiSource {
- public:
-  AsciiSource(std::string_view data, std::size_t headerLines, const std::string& name)
-      : cursor_(data, name, headerLines + 1), name_(name) {}
-
-  void begin(const Element& element, std::size_t) { element_ = &element; }
-  void end() {
-    if (cursor_.skipBlanks(0))
-      failAt(
-          name_, place(),
-          fmt::format(
-              "there are more values on the line than an element '{}' has; export the mesh again",
-              element_->name));
-  }
-  [[nodiscard]] FilePosition place() const { return cursor_.place(); }
-  [[nodiscard]] const char* at() const { return cursor_.at(); }
-
-  double value(Type type) {
-    if (!cursor_.skipToToken(0)) failEnd();
-    const double number = cursor_.number("a number");
-    // A value declared float is rounded to float. A number beyond the range of float is returned as
-    // written, so that the caller can refuse it.
-    const bool isFloat =
-        type == Type::Float && std::abs(number) <= std::numeric_limits<float>::max();
-    return isFloat ? static_cast<double>(static_cast<float>(number)) : number;
-  }
-  void skip(Type, std::size_t count) {
-    for (std::size_t i = 0; i < count; ++i) {
-      if (!cursor_.skipToToken(0)) failEnd();
-      static_cast<void>(cursor_.token());
-    }
-  }
-  void requireList(Type, std::size_t count) {
-    if (count > cursor_.remaining()) failEnd();
-  }
-
- private:
-  [[noreturn]] void failEnd() const {
-    failAt(name_, place(),
-           fmt::format(
-               "the file ends within the elements '{}'; it is truncated or damaged: download or "
-               "export it again",
-               element_->name));
-  }
-
-  TextCursor cursor_;
-  const std::string& name_;
-  const Element* element_ = nullptr;
-};
 
 template <typename Source>
 class ElementReader {
@@ -203,17 +82,22 @@ class ElementReader {
       const double value = source_.value(property.type);
       const bool isWhole = property.type < Type::Float;
       const bool isColor = property.role >= Role::Red && property.role <= Role::Alpha;
-      of(property.role) = isColor && isWhole && hasColors_ ? share(value, property.type) : value;
+      of(property.role) =
+          isColor && isWhole && hasColors_
+              ? ply::colorShare(value, property.type, builder_.name(), source_.place())
+              : value;
       if (property.type == Type::Float && ply::isAttribute(property.role)) requireFloat(value);
       return;
     }
     const std::size_t count =
-        wholeNumber(source_.value(*property.listCount), "the length of a list");
+        ply::wholeNumber(source_.value(*property.listCount), "the length of a list",
+                         builder_.name(), source_.place());
     if (property.role != Role::Corners) return source_.skip(property.type, count);
     source_.requireList(property.type, count);
     corners_.resize(count);
     for (std::uint64_t& corner : corners_)
-      corner = wholeNumber(source_.value(property.type), "the index of a vertex");
+      corner = ply::wholeNumber(source_.value(property.type), "the index of a vertex",
+                                builder_.name(), source_.place());
   }
 
   /// Refuses an attribute beyond the range of its type float, which an ASCII file can contain.
@@ -224,32 +108,6 @@ class ElementReader {
            fmt::format("{} exceeds the range of the property's type float, 3.4e38; repair "
                        "the mesh, or read it without attributes (--no-attributes)",
                        value));
-  }
-
-  /// Returns an integer colour as a fraction of the maximum of its type (255 or 65535), rounded to
-  /// float.
-  double share(double value, Type type) const {
-    const double full = type == Type::Uint8 ? 255 : 65535;
-    if (!(value >= 0 && value <= full) || std::floor(value) != value) {
-      failAt(builder_.name(), source_.place(),
-             fmt::format("a colour holds {}, which is not an integer from 0 to {}; repair the "
-                         "mesh, or read it without attributes (--no-attributes)",
-                         value, full));
-    }
-    return static_cast<double>(static_cast<float>(value) / static_cast<float>(full));
-  }
-
-  std::uint64_t wholeNumber(double value, const char* what) const {
-    constexpr double kLimit = 1e15;  // doubles represent integers exactly up to 9e15
-    if (value >= 0 && value < kLimit) {
-      const auto whole = static_cast<std::uint64_t>(value);
-      if (static_cast<double>(whole) == value) return whole;
-    }
-    failAt(
-        builder_.name(), source_.place(),
-        fmt::format(
-            "{} is {}, which is not an integer from 0 to 1e15; repair the mesh or export it again",
-            what, value));
   }
 
   Source& source_;
@@ -266,6 +124,13 @@ void readElements(const Header& header, std::string_view data, MeshBuilder& buil
   for (const Element& element : header.elements) reader.read(element);
   requireNoTrailingData(data, static_cast<std::size_t>(source.at() - data.data()), builder.name(),
                         "the elements that its header promises");
+}
+
+/// Marks the properties that only point clouds have as skipped.
+void skipPointRoles(Header& header) {
+  for (Element& element : header.elements)
+    for (Property& p : element.properties)
+      if (ply::isPointRole(p.role)) p.role = Role::Skip;
 }
 
 /// Marks the properties of all attributes as skipped.
@@ -309,6 +174,7 @@ void reserveElements(const Header& header, std::size_t dataSize, MeshBuilder& bu
 
 void readPly(std::string_view input, MeshBuilder& builder) {
   Header header = ply::readHeader(input, builder.name());
+  skipPointRoles(header);
   if (builder.wantsAttributes()) {
     for (const std::string& what : header.unsupported) builder.noteUnsupported(what);
   } else if (skipAttributes(header)) {

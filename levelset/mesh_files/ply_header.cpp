@@ -3,10 +3,12 @@
 #include <fmt/core.h>
 
 #include <charconv>
+#include <cmath>
 #include <utility>
 
 #include "levelset/error.h"
 #include "levelset/mesh_files/mesh_parts.h"
+#include "levelset/mesh_files/ply_source.h"
 
 namespace levelset::ply {
 namespace {
@@ -139,7 +141,7 @@ class HeaderReader {
     };
     if (property.role != Role::Skip &&
         std::any_of(element.properties.begin(), element.properties.end(), isSame)) {
-      if (isAttribute(property.role))
+      if (isAttribute(property.role) || isPointRole(property.role))
         property.role = Role::Skip;  // skips a repeated attribute: the first one counts
       else
         fail(fmt::format("the property '{}' occurs twice", name));
@@ -180,10 +182,12 @@ class HeaderReader {
     return type == Type::Uint8 || type == Type::Uint16 || type >= Type::Float;
   }
   static constexpr std::pair<std::string_view, Role> kAttributes[] = {
-      {"nx", Role::Nx},       {"ny", Role::Ny},   {"nz", Role::Nz},       {"u", Role::U},
-      {"v", Role::V},         {"s", Role::U},     {"t", Role::V},         {"texture_u", Role::U},
-      {"texture_v", Role::V}, {"red", Role::Red}, {"green", Role::Green}, {"blue", Role::Blue},
-      {"alpha", Role::Alpha}};
+      {"nx", Role::Nx},        {"ny", Role::Ny},         {"nz", Role::Nz},
+      {"u", Role::U},          {"v", Role::V},           {"s", Role::U},
+      {"t", Role::V},          {"texture_u", Role::U},   {"texture_v", Role::V},
+      {"red", Role::Red},      {"green", Role::Green},   {"blue", Role::Blue},
+      {"alpha", Role::Alpha},  {"radius", Role::Radius}, {"confidence", Role::Weight},
+      {"weight", Role::Weight}};
 
   std::string_view input_;
   const std::string& name_;
@@ -225,6 +229,30 @@ void checkHeader(const Header& header, std::size_t dataSize, const std::string& 
     failFile(name,
              "has no element 'face' with a list 'vertex_indices'; export the mesh with its faces");
   }
+}
+
+double colorShare(double value, Type type, const std::string& name, FilePosition place) {
+  const double full = type == Type::Uint8 ? 255 : 65535;
+  if (!(value >= 0 && value <= full) || std::floor(value) != value) {
+    failAt(name, place,
+           fmt::format("a colour holds {}, which is not an integer from 0 to {}; repair the "
+                       "file, or read it without attributes (--no-attributes)",
+                       value, full));
+  }
+  return static_cast<double>(static_cast<float>(value) / static_cast<float>(full));
+}
+
+std::uint64_t wholeNumber(double value, const char* what, const std::string& name,
+                          FilePosition place) {
+  constexpr double kLimit = 1e15;  // doubles represent integers exactly up to 9e15
+  if (value >= 0 && value < kLimit) {
+    const auto whole = static_cast<std::uint64_t>(value);
+    if (static_cast<double>(whole) == value) return whole;
+  }
+  failAt(name, place,
+         fmt::format(
+             "{} is {}, which is not an integer from 0 to 1e15; repair the file or export it again",
+             what, value));
 }
 
 }  // namespace levelset::ply

@@ -12,12 +12,34 @@
 namespace levelset::ply {
 
 enum class Type { Int8, Uint8, Int16, Uint16, Int32, Uint32, Float, Double };
-enum class Role { Skip, X, Y, Z, Nx, Ny, Nz, U, V, Red, Green, Blue, Alpha, Corners };
+enum class Role {
+  Skip,
+  X,
+  Y,
+  Z,
+  Nx,
+  Ny,
+  Nz,
+  U,
+  V,
+  Red,
+  Green,
+  Blue,
+  Alpha,
+  Radius,
+  Weight,
+  Corners
+};
 constexpr std::size_t kRoles = static_cast<std::size_t>(Role::Corners) + 1;
 enum class Encoding { Ascii, Little, Big };
 
 constexpr bool isAttribute(Role role) {
   return role >= Role::Nx && role <= Role::Alpha;
+}
+
+/// Returns true for properties that point clouds have and meshes do not.
+constexpr bool isPointRole(Role role) {
+  return role == Role::Radius || role == Role::Weight;
 }
 
 constexpr std::size_t sizeOf(Type type) {

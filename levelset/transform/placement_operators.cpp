@@ -31,36 +31,6 @@ M44d rotationOf(const TransformOperator::Options& options) {
   return matrix;
 }
 
-/// Combines the options into one matrix. Their order is matrix, mirror, scale, rotate, translate.
-M44d placementOf(const TransformOperator::Options& options) {
-  M44d matrix = options.matrix.value_or(M44d());
-  M44d there, back;
-  there.setTranslation(-options.about);
-  back.setTranslation(options.about);
-  matrix = matrix * there;
-  if (options.mirror) {
-    M44d mirror;
-    mirror[*options.mirror][*options.mirror] = -1;
-    matrix = matrix * mirror;
-  }
-  if (!options.scale.empty()) {
-    const std::vector<double>& factors = options.scale;
-    M44d scale;
-    scale.setScale(factors.size() == 1 ? V3d(factors[0]) : V3d(factors[0], factors[1], factors[2]));
-    matrix = matrix * scale;
-  }
-  if (!options.rotate.empty()) matrix = matrix * rotationOf(options);
-  matrix = matrix * back;
-  if (options.translate) {
-    M44d move;
-    move.setTranslation(*options.translate);
-    matrix = matrix * move;
-  }
-  if (!(std::abs(matrix.determinant()) > 0))
-    throw UsageError("the matrix is singular; give an invertible matrix");
-  return matrix;
-}
-
 bool isSimilarityMatrix(const M44d& m) {
   const V3d x(m[0][0], m[0][1], m[0][2]), y(m[1][0], m[1][1], m[1][2]),
       z(m[2][0], m[2][1], m[2][2]);
@@ -151,10 +121,39 @@ const OperatorText TransformOperator::text{
         "levelsmith box --size 2,1,1 --voxel 0.05 ! transform --rotate 30 --translate "
         "1,0,0 ! measure"};
 
+M44d TransformOperator::matrixOf(const Options& options) {
+  M44d matrix = options.matrix.value_or(M44d());
+  M44d there, back;
+  there.setTranslation(-options.about);
+  back.setTranslation(options.about);
+  matrix = matrix * there;
+  if (options.mirror) {
+    M44d mirror;
+    mirror[*options.mirror][*options.mirror] = -1;
+    matrix = matrix * mirror;
+  }
+  if (!options.scale.empty()) {
+    const std::vector<double>& factors = options.scale;
+    M44d scale;
+    scale.setScale(factors.size() == 1 ? V3d(factors[0]) : V3d(factors[0], factors[1], factors[2]));
+    matrix = matrix * scale;
+  }
+  if (!options.rotate.empty()) matrix = matrix * rotationOf(options);
+  matrix = matrix * back;
+  if (options.translate) {
+    M44d move;
+    move.setTranslation(*options.translate);
+    matrix = matrix * move;
+  }
+  if (!(std::abs(matrix.determinant()) > 0))
+    throw UsageError("the matrix is singular; give an invertible matrix");
+  return matrix;
+}
+
 void TransformOperator::check(const Options& options, const GivenOptions& given) {
   if (options.rotate.size() > 1 && given("axis"))
     throw UsageError("--axis needs a single angle, but --rotate has three; leave out --axis");
-  const M44d matrix = placementOf(options);
+  const M44d matrix = matrixOf(options);
   if (given.isMesh) {
     if (options.bake || options.voxel)
       throw UsageError(
@@ -172,7 +171,7 @@ void TransformOperator::check(const Options& options, const GivenOptions& given)
 
 NarrowBand TransformOperator::run(std::vector<NarrowBand> operands, const Options& options,
                                   OperatorRun& run) {
-  const M44d matrix = placementOf(options);
+  const M44d matrix = matrixOf(options);
   NarrowBand band = std::move(operands[0]);
   operands.clear();
   if (!options.bake) return transform(std::move(band), matrix);
@@ -181,11 +180,11 @@ NarrowBand TransformOperator::run(std::vector<NarrowBand> operands, const Option
 }
 
 TriMesh TransformOperator::run(const TriMesh& mesh, const Options& options, OperatorRun&) {
-  return transform(mesh, placementOf(options));
+  return transform(mesh, matrixOf(options));
 }
 
 ValuePlan TransformOperator::plan(const Options& options, Plans operands, const OperatorRun&) {
-  const M44d matrix = placementOf(options);
+  const M44d matrix = matrixOf(options);
   ValuePlan plan = operands[0];
   plan.bounds = movedBox(plan.bounds, matrix);
   const double scale = std::cbrt(std::abs(matrix.determinant()));
@@ -200,7 +199,7 @@ ValuePlan TransformOperator::plan(const Options& options, Plans operands, const 
 RegionOfInterest TransformOperator::regionOfInterest(const Options& options,
                                                      const OperatorPlans& plans, std::size_t,
                                                      const RegionOfInterest& ofResult) {
-  const M44d toSource = placementOf(options).inverse();
+  const M44d toSource = matrixOf(options).inverse();
   if (options.bake) return sampledRegion(plans, ofResult, toSource);
   RegionOfInterest read = ofResult;
   read.halfWidth *= 1 + 1e-6;  // margin: the background value is rounded before it is scaled

@@ -86,6 +86,9 @@ struct TransformOperator {
     }
   };
 
+  /// Combines the options into one matrix. Their order is matrix, mirror, scale, rotate, translate.
+  /// @throws UsageError for an axis without direction, and for a singular matrix
+  [[nodiscard]] static Imath::M44d matrixOf(const Options& options);
   static void check(const Options& options, const GivenOptions& given);
   static NarrowBand run(std::vector<NarrowBand> operands, const Options& options, OperatorRun& run);
   static TriMesh run(const TriMesh& mesh, const Options& options, OperatorRun& run);

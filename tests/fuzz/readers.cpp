@@ -42,8 +42,8 @@ class ScratchFolder {
 const std::vector<Reader>& readers() {
   static const std::vector<Reader> all = [] {
     std::vector<Reader> list;
-    for (const auto& part : {meshReaders(), gridReaders(), volumeReaders(), pictureReaders(),
-                             documentReaders(), grammarReaders()})
+    for (const auto& part : {meshReaders(), gridReaders(), volumeReaders(), pointReaders(),
+                             pictureReaders(), documentReaders(), grammarReaders()})
       list.insert(list.end(), part.begin(), part.end());
     return list;
   }();

@@ -24,6 +24,7 @@ struct Reader {
 [[nodiscard]] std::vector<Reader> meshReaders();
 [[nodiscard]] std::vector<Reader> gridReaders();
 [[nodiscard]] std::vector<Reader> volumeReaders();
+[[nodiscard]] std::vector<Reader> pointReaders();
 [[nodiscard]] std::vector<Reader> pictureReaders();
 [[nodiscard]] std::vector<Reader> documentReaders();
 [[nodiscard]] std::vector<Reader> grammarReaders();

@@ -202,3 +202,31 @@ def test_invalid_functions_are_refused(ls):
     refuse(ball, voxel=1e-6, kind=ls.ResourceError)
     with pytest.raises(ZeroDivisionError):
         ls.from_function(lambda p: 1 // 0, bounds, 0.2)
+
+
+def test_point_clouds_from_arrays(ls):
+    normals = (CUBE - 0.5).astype(numpy.float32)
+    cloud = ls.PointCloud(CUBE, normals)
+    assert (cloud.positions == CUBE).all() and (cloud.normals == normals).all()
+    assert cloud.radii is None and cloud.colors is None and cloud.weights is None
+    assert cloud.info()["points"] == 8 and cloud.info()["spacing"]["mean"] == 1
+    assert ls.PointCloud(CUBE).normals is None
+    moved = cloud.transform(scale=2)
+    assert isinstance(moved, ls.PointCloud) and (moved.positions == 2 * CUBE).all()
+    assert cloud.thin(count=3).positions.shape == (3, 3)
+    sampled = ls.Mesh(CUBE, FACES).sample(count=500)
+    assert sampled.positions.shape == (500, 3)
+    for bad in (CUBE[:, :2], CUBE.astype(int), CUBE * numpy.nan):
+        with pytest.raises(ls.InputError):
+            ls.PointCloud(bad)
+    with pytest.raises(ls.InputError):
+        ls.PointCloud(CUBE, normals[:3])
+
+
+def test_point_clouds_are_read_from_files(ls, tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text("x,y,z,r,g,b,radius,weight\n1,2,3,255,0,0,0.5,0.25\n")
+    cloud = ls.read(str(file))
+    assert isinstance(cloud, ls.PointCloud)
+    assert cloud.colors.tolist() == [[1, 0, 0, 1]]
+    assert cloud.radii.tolist() == [0.5] and cloud.weights.tolist() == [0.25]

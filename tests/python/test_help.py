@@ -68,13 +68,13 @@ def test_the_stub_matches_the_registry(ls):
         assert sorted(names) == sorted(inspect.signature(getattr(ls, name)).parameters), name
     solid = {n.name: n for n in classes["Solid"].body if isinstance(n, ast.FunctionDef)}
     assert ast.unparse(solid["fast_marching"].returns) == "Union[Solid, Field]"
-    assert ast.unparse(functions["transform"].returns) == "Union[Solid, Mesh]"
+    assert ast.unparse(functions["transform"].returns) == "Union[Solid, Mesh, PointCloud]"
     assert ast.unparse(solid["transform"].returns) == "Solid"
     assert all(n.args.posonlyargs + n.args.args for n in solid.values())
     public = {n for n in ls.__all__}
     known = set(functions) | set(classes)
     assert public <= known | {"__version__"}
-    for cls in ("Solid", "Mesh", "Value", "Field", "Patch", "Scan", "Scene", "Surface"):
+    for cls in ("Solid", "Mesh", "Value", "Field", "Patch", "PointCloud", "Scan", "Scene", "Surface"):
         hinted = {n.name for n in classes[cls].body if isinstance(n, ast.FunctionDef)}
         for member in hinted:
             assert hasattr(getattr(ls, cls), member)

@@ -110,7 +110,7 @@ void touch(const fs::path& file) {
 std::uint64_t hashOf(const Value& value) {
   if (value.kind() == Kind::Band) return value.band().contentHash();
   if (value.kind() == Kind::Field) return value.field().contentHash();
-  return 0;  // mesh: the stored bytes contain a digest
+  return 0;  // mesh or point cloud: the stored bytes contain a digest
 }
 
 }  // namespace
@@ -142,7 +142,7 @@ Cache::Cache(fs::path folder) : folder_(std::move(folder)) {
 }
 
 bool Cache::canHold(Kind kind) {
-  return kind == Kind::Band || kind == Kind::Field || kind == Kind::Mesh;
+  return kind == Kind::Band || kind == Kind::Field || kind == Kind::Mesh || kind == Kind::Points;
 }
 
 fs::path Cache::entryPath(const std::string& key, const char* extension) const {
@@ -186,6 +186,11 @@ std::optional<Value> Cache::value(const std::string& key, std::size_t maxMemory)
       if (!readMeshBytes(contentsOf(entryPath(key, kMesh)), mesh)) return {};
       return Value(std::move(mesh));
     }
+    if (kind == kindName(Kind::Points)) {
+      levelset::PointCloud cloud;
+      if (!readCloudBytes(contentsOf(entryPath(key, kMesh)), cloud)) return {};
+      return Value(std::move(cloud));
+    }
     const levelset::ReadBandOptions options{.grid = json.at("grid").get<std::string>(),
                                             .maxMemory = maxMemory};
     Value value = kind == kindName(Kind::Field)
@@ -220,10 +225,11 @@ std::string Cache::put(const std::string& key, const CachedStep& step, const Val
       json["kind"] = kindName(value->kind());
       json["hash"] = hashOf(*value);
       const char* extension = kGrid;
-      if (value->kind() == Kind::Mesh) {
+      if (value->kind() == Kind::Mesh || value->kind() == Kind::Points) {
         extension = kMesh;
         std::ofstream out(whole, std::ios::binary);
-        const std::string bytes = bytesOf(value->mesh());
+        const std::string bytes =
+            value->kind() == Kind::Mesh ? bytesOf(value->mesh()) : bytesOf(value->cloud());
         out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
         if (!out.flush()) throw levelset::IoError("a write failed; check the free disk space");
       } else if (value->kind() == Kind::Field) {

@@ -148,6 +148,8 @@ std::optional<std::string> CacheKeys::keyOf(const Value& given) const {
   add(text, "given", kindName(given.kind()));
   if (given.kind() == Kind::Mesh) {
     add(text, "mesh", digestOf(bytesOf(given.mesh())));
+  } else if (given.kind() == Kind::Points) {
+    add(text, "points", digestOf(bytesOf(given.cloud())));
   } else if (given.kind() == Kind::Field) {
     add(text, "field", fmt::format("{:016x}", given.field().contentHash()));
   } else if (given.kind() == Kind::Band) {

@@ -41,6 +41,13 @@ namespace pipeline {
 [[nodiscard]] Operator thresholdOperator();
 [[nodiscard]] Operator resampleOperator();
 
+[[nodiscard]] Operator sampleOperator();
+[[nodiscard]] Operator normalsOperator();
+[[nodiscard]] Operator outliersOperator();
+[[nodiscard]] Operator thinOperator();
+[[nodiscard]] Operator transformOperator();
+[[nodiscard]] Operator clipOperator();
+
 [[nodiscard]] Operator sceneOperator();
 
 [[nodiscard]] Operator sliceOperator();

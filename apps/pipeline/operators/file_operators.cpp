@@ -10,6 +10,7 @@
 #include "levelset/file_target.h"
 #include "levelset/files/band_file.h"
 #include "levelset/mesh_files/mesh_file.h"
+#include "levelset/point_files/point_file.h"
 #include "levelset/volume_files/volume_file.h"
 #include "mapping/patches/patch_file.h"
 
@@ -22,17 +23,26 @@ bool isStandardStream(const Invocation& in) {
   return in.text("file") == "-";
 }
 
+/// Decides if `read` makes points of a file that may hold a mesh: with --points, and if it has no
+/// faces.
+bool readsPoints(const Invocation& in) {
+  return in.flag("points") || levelset::lacksFaces(in.text("file"), in.text("format"));
+}
+
 Kind fileKind(const Invocation& in) {
   const std::string name = formatName(in);
-  if (levelset::isMeshFormat(name)) return Kind::Mesh;
+  const bool isRead = in.op().name == "read";
+  if (levelset::isPointFormat(name)) return Kind::Points;
+  if (levelset::isMeshFormat(name)) return isRead && readsPoints(in) ? Kind::Points : Kind::Mesh;
   if (levelset::isBandFormat(name)) return Kind::Band;
   if (mapping::isPatchFormat(name)) return Kind::Patch;
   if (render::isSceneFormat(name)) return Kind::Scene;
-  const bool isRead = in.op().name == "read";
   if (isRead && levelset::isVolumeFormat(name)) return Kind::Volume;
-  throw UsageError(fmt::format(
-      "{}: '{}' is of no known format; use ply, obj, stl or off (also .gz), vdb{}, patch or json",
-      in.op().name, name, isRead ? ", nii, mha, nrrd, mrc, raw" : ", nvdb"));
+  throw UsageError(
+      fmt::format("{}: '{}' is of no known format; use ply, obj, stl, off, xyz, csv or pts (also "
+                  ".gz), vdb{}, patch or "
+                  "json",
+                  in.op().name, name, isRead ? ", nii, mha, nrrd, mrc, raw" : ", nvdb"));
 }
 
 /// Returns the kind of the value that `read` makes. The grid that --grid names may be a field; the
@@ -48,8 +58,27 @@ Kind readKind(const Invocation& in) {
   return kind;
 }
 
+/// Reads points. Of a mesh format without a reader of points, reads the mesh and keeps its
+/// vertices.
+Value readCloud(Invocation& in) {
+  const std::filesystem::path file = in.text("file");
+  if (levelset::holdsPoints(formatName(in)))
+    return Value(levelset::readPoints(file, {.format = in.text("format"),
+                                             .attributes = !in.flag("no-attributes"),
+                                             .maxMemory = in.maxMemory,
+                                             .notes = &in.notes.notes,
+                                             .progress = in.progress}));
+  levelset::TriMesh mesh = levelset::readMesh(
+      file, {.format = in.text("format"), .maxMemory = in.maxMemory, .progress = in.progress});
+  levelset::PointCloud cloud;
+  cloud.positions = std::move(mesh.positions);
+  cloud.precision = mesh.precision;
+  return Value(std::move(cloud));
+}
+
 Value read(Invocation& in) {
   const std::filesystem::path file = in.text("file");
+  if (fileKind(in) == Kind::Points) return readCloud(in);
   if (fileKind(in) == Kind::Patch)
     return Value(PatchValue{.patches = mapping::readPatches(file, in.maxMemory)});
   if (fileKind(in) == Kind::Volume) {
@@ -127,9 +156,14 @@ Plan planRead(Invocation& in) {
 void validateRead(const Invocation& in) {
   const Kind kind = fileKind(in);
   checkVolumeOptions(in, kind == Kind::Volume);
-  if (kind != Kind::Mesh && in.flag("no-attributes"))
-    throw UsageError(fmt::format(
-        "read: --no-attributes is for meshes, and this is a {}; leave it out", kindName(kind)));
+  if (kind != Kind::Mesh && kind != Kind::Points && in.flag("no-attributes"))
+    throw UsageError(
+        fmt::format("read: --no-attributes is for meshes and point clouds, and this is a {}; leave "
+                    "it out",
+                    kindName(kind)));
+  if (kind != Kind::Points && in.flag("points"))
+    throw UsageError(fmt::format("read: --points is for meshes, and this is a {}; leave it out",
+                                 kindName(kind)));
   if (kind != Kind::Band && in.given("grid"))
     throw UsageError(fmt::format(
         "read: --grid picks a grid of a .vdb, and this is a {}; leave it out", kindName(kind)));
@@ -141,7 +175,8 @@ void validateRead(const Invocation& in) {
 
 void validateWrite(const Invocation& in) {
   const Kind kind = fileKind(in), held = in.operands[0].kind();
-  if (held != kind && !(held == Kind::Field && kind == Kind::Band)) {
+  const bool isCloud = held == Kind::Points && levelset::holdsPoints(formatName(in));
+  if (held != kind && !isCloud && !(held == Kind::Field && kind == Kind::Band)) {
     throw UsageError(
         fmt::format("write: a {} cannot be written as '{}'; {}", kindName(held), formatName(in),
                     held == Kind::Band     ? "put 'mesh' before it, or write .vdb"
@@ -149,12 +184,14 @@ void validateWrite(const Invocation& in) {
                     : held == Kind::Patch  ? "write .patch, or put 'mesh' before it"
                     : held == Kind::Scene  ? "write .json"
                     : held == Kind::Volume ? "put 'isosurface' before it"
+                    : held == Kind::Points ? "write .ply, .obj, .xyz, .csv or .pts"
+                    : kind == Kind::Points ? "put 'sample' before it, or write .ply"
                                            : "put 'level-set' before it, or write .ply"));
   }
-  if ((kind == Kind::Mesh || kind == Kind::Patch || kind == Kind::Scene) && in.given("name"))
+  if (kind != Kind::Band && in.given("name"))
     throw UsageError(fmt::format(
         "write: --name is the name of a grid in a .vdb, and this file is a {}; leave it out",
-        kindName(kind)));
+        kindName(isCloud ? held : kind)));
   if (kind == Kind::Scene && levelset::isStandardOutput(in.text("file")))
     throw UsageError(
         "write: a scene stores its level sets in files beside its own file, so it cannot go to "
@@ -177,6 +214,13 @@ Value write(Invocation& in) {
                          {.name = in.given("name") ? in.text("name") : value.field().name(),
                           .format = in.text("format"),
                           .progress = in.progress});
+  } else if (value.kind() == Kind::Points) {
+    levelset::writePoints(file, value.cloud(),
+                          {.format = in.text("format"), .progress = in.progress});
+    if (const std::string lost = unwritableAttributes(formatName(in), value.cloud()); !lost.empty())
+      in.notes.warnings.push_back(
+          fmt::format("{} cannot store the {}, which were left out; write .ply to keep them",
+                      file.string(), lost));
   } else if (value.kind() == Kind::Mesh) {
     levelset::writeMesh(
         file, value.mesh(),
@@ -202,12 +246,18 @@ Operator readOperator() {
       .group = "Files",
       .summary =
           "read a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb), a volume (nii, "
-          "hdr, mha, mhd, nrrd, nhdr, mrc, map, raw), patches (patch), a scene (json)",
+          "hdr, mha, mhd, nrrd, nhdr, mrc, map, raw), points (xyz, csv, pts, and ply or obj "
+          "without "
+          "faces), patches (patch), a scene (json)",
       .details =
           "A .vdb with more than one level set needs --grid. A grid that is not a level set needs "
           "--grid, too; it becomes a field of numbers or of vectors, which may be staggered. "
           "Meshes keep the normals, texture coordinates and colours of their vertices in PLY and "
-          "OBJ. Volumes keep their spacing and orientation; a .raw needs --size and --type. "
+          "OBJ. Point clouds keep normals, colours, radii and weights. In xyz and csv, a header "
+          "line "
+          "names the columns (x, y, z, nx, ny, nz, r, g, b, a, radius, weight); without it, their "
+          "number decides. Volumes keep their spacing and orientation; a .raw needs --size and "
+          "--type. "
           "'-' is standard input and needs --format.",
       .example = "levelsmith read dragon.ply.gz ! info",
       .params = {{.name = "file",
@@ -217,16 +267,19 @@ Operator readOperator() {
                   .position = 0},
                  {.name = "format",
                   .type = ParamType::Text,
-                  .doc = "format of the file: ply, obj, stl, off, vdb, nii, mha, nrrd, mrc, raw, "
-                         "patch or json; default: by its extension"},
+                  .doc = "format of the file: ply, obj, stl, off, xyz, csv, pts, vdb, nii, mha, "
+                         "nrrd, mrc, raw, patch or json; default: by its extension"},
                  {.name = "grid",
                   .type = ParamType::Text,
                   .doc = "name of the grid to read from a .vdb"},
                  {.name = "no-attributes",
                   .type = ParamType::Flag,
-                  .doc = "for meshes: read positions and triangles only, without normals, texture "
-                         "coordinates and colours",
-                  .formerName = "bare"}},
+                  .doc = "for meshes and point clouds: read positions and triangles only, without "
+                         "normals, texture coordinates, colours, radii and weights",
+                  .formerName = "bare"},
+                 {.name = "points",
+                  .type = ParamType::Flag,
+                  .doc = "read the vertices of a mesh as a point cloud"}},
       .resultKind = readKind,
       .run = read,
       .plan = planRead,
@@ -244,8 +297,8 @@ Operator writeOperator() {
       .name = "write",
       .group = "Files",
       .summary =
-          "write a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb, nvdb), "
-          "patches (patch), a scene (json)",
+          "write a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb, nvdb), points "
+          "(ply, obj, xyz, csv, pts, also .gz), patches (patch), a scene (json)",
       .details =
           "Data is written to a temporary file in the same folder, which replaces an existing file "
           "only when it is complete. The level sets and meshes of a scene go to .vdb and .ply "
@@ -259,14 +312,14 @@ Operator writeOperator() {
                   .position = 0},
                  {.name = "format",
                   .type = ParamType::Text,
-                  .doc = "format of the file: ply, obj, stl, off, vdb, nvdb, patch or json; "
-                         "default: by its extension"},
+                  .doc = "format of the file: ply, obj, stl, off, xyz, csv, pts, vdb, nvdb, patch "
+                         "or json; default: by its extension"},
                  {.name = "name",
                   .type = ParamType::Text,
                   .doc =
                       "name of the grid in a .vdb or .nvdb; a field keeps its own name by default",
                   .fallback = "surface"}},
-      .operands = {{Kind::Mesh, Kind::Band, Kind::Field, Kind::Patch, Kind::Scene}},
+      .operands = {{Kind::Mesh, Kind::Band, Kind::Field, Kind::Patch, Kind::Scene, Kind::Points}},
       .flow = Flow::PassesThrough,
       .run = write,
       .cost = costPerVoxel(50, 0, 20),

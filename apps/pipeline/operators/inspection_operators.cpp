@@ -13,6 +13,8 @@
 #include "levelset/inspect/compare.h"
 #include "levelset/inspect/measure.h"
 #include "levelset/mesh_files/mesh_file.h"
+#include "levelset/point_files/point_file.h"
+#include "levelset/points/processing/point_spacing.h"
 #include "levelset/volume_files/volume_file.h"
 
 namespace pipeline {
@@ -149,19 +151,27 @@ Json countOrNull(std::uint64_t count) {
 void validateInfo(const Invocation& in) {
   if (!in.given("file")) return;
   const std::string name = formatName(in);
-  if (levelset::isMeshFormat(name)) return;
+  if (levelset::isMeshFormat(name) || levelset::isPointFormat(name)) return;
   if (levelset::isBandFormat(name) && !name.ends_with("nvdb")) return;
   if (levelset::isVolumeFormat(name) && !levelset::isRawFormat(name)) return;
-  throw levelset::UsageError(fmt::format(
-      "info: '{}' is of no known format; info reads ply, obj, stl, off (also .gz), vdb, "
-      "nii, mha, nrrd and mrc",
-      name));
+  throw levelset::UsageError(
+      fmt::format("info: '{}' is of no known format; info reads ply, obj, stl, off, xyz, csv, pts "
+                  "(also .gz), vdb, "
+                  "nii, mha, nrrd and mrc",
+                  name));
 }
 
 Json fileInfo(const std::string& file, const std::string& format) {
   Json json;
   json["file"] = file;
   const std::string name = format.empty() ? file : format;
+  if (levelset::isPointFormat(name) || levelset::lacksFaces(file, format)) {
+    const levelset::PointFileInfo info = levelset::pointFileInfo(file, format);
+    json["format"] = info.format;
+    json["points"] = countOrNull(info.points);
+    if (!info.attributes.empty()) json["attributes"] = info.attributes;
+    return json;
+  }
   if (levelset::isMeshFormat(name)) {
     const levelset::MeshFileInfo info = levelset::meshFileInfo(file, format);
     json["format"] = info.format;
@@ -195,7 +205,24 @@ Json fileInfo(const std::string& file, const std::string& format) {
   return json;
 }
 
-Json valueInfo(const Value& value) {
+void addCloud(Json& json, const levelset::PointCloud& cloud, Invocation& in) {
+  json["points"] = cloud.size();
+  if (const std::string attributes = describe(cloud); !attributes.empty())
+    json["attributes"] = attributes;
+  const levelset::PointSpacing spacing = levelset::pointSpacing(cloud, in.maxMemory, in.progress);
+  json["duplicates"] = spacing.duplicates;
+  if (spacing.greatest > 0)
+    json["spacing"] = {{"mean", spacing.mean},
+                       {"median", spacing.median},
+                       {"percentile_5", spacing.percentile5},
+                       {"percentile_95", spacing.percentile95},
+                       {"least", spacing.least},
+                       {"greatest", spacing.greatest}};
+  else
+    json["spacing"] = nullptr;
+}
+
+Json valueInfo(const Value& value, Invocation& in) {
   Json json;
   json["kind"] = kindName(value.kind());
   json["bounds"] = toJson(value.plan().bounds);
@@ -227,6 +254,8 @@ Json valueInfo(const Value& value) {
     json["bytes"] = volume.memoryUse();
     json["mapped"] = volume.isMapped();
     json["hash"] = fmt::format("{:016x}", volume.contentHash());
+  } else if (value.kind() == Kind::Points) {
+    addCloud(json, value.cloud(), in);
   } else if (value.kind() == Kind::Scene) {
     const render::Scene& scene = value.scene().scene;
     json["solids"] = Json::array();
@@ -279,7 +308,7 @@ Value info(Invocation& in) {
   if (in.given("file")) {
     json = fileInfo(in.text("file"), in.text("format"));
   } else if (!in.operands.empty()) {
-    json = valueInfo(in.operands[0]);
+    json = valueInfo(in.operands[0], in);
   } else {
     throw levelset::UsageError(
         "info: there is nothing to describe; name a file, or put info after an action that makes a "
@@ -361,17 +390,20 @@ Operator infoOperator() {
       .name = "info",
       .group = "Inspection",
       .summary = "describe the newest value, or a file without loading its voxels",
+      .details =
+          "For a point cloud, spacing describes the distances from each point to its nearest "
+          "neighbour at another position; duplicates are points at the position of an earlier one.",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! info",
       .params = {{.name = "file",
                   .type = ParamType::Path,
-                  .doc = "mesh, volume or .vdb file to describe; default: the newest value",
+                  .doc = "mesh, volume, point or .vdb file to describe; default: the newest value",
                   .position = 0},
                  {.name = "format",
                   .type = ParamType::Text,
                   .doc = "format of the file; default: by its extension"},
                  jsonParam()},
       .operands = {{Kind::Band, Kind::Mesh, Kind::Patch, Kind::Field, Kind::Surface, Kind::Scene,
-                    Kind::Volume}},
+                    Kind::Volume, Kind::Points}},
       .operandsOptional = true,
       .flow = Flow::PassesThrough,
       .run = info,

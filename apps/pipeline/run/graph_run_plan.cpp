@@ -50,8 +50,9 @@ void GraphRun::planNodes() {
   if (!partedWrite_) checkMemoryFor(graph_, runs, plans_, regions_, settings_.maxMemory);
 }
 
-/// Computes a mesh during planning if a band is computed from it. The plan of a mesh requires the
-/// mesh itself. Does nothing if the meshes computed for planning already exceed the limit.
+/// Computes a mesh or a point cloud during planning if a band is computed from it. Their plan
+/// requires the value itself. Does nothing if the values computed for planning already exceed the
+/// limit.
 std::optional<Plan> GraphRun::planFromMesh(std::size_t i) {
   const double most = std::min(kMaxPlanningBytes, static_cast<double>(settings_.maxMemory) / 8);
   const bool feedsBand = std::any_of(graph_.nodes.begin() + static_cast<std::ptrdiff_t>(i),
@@ -74,6 +75,10 @@ std::optional<Plan> GraphRun::planFromMesh(std::size_t i) {
   }
   isComputedForPlan_[i] = 1;
   if (!values_.has(i)) return {};
+  if (values_.peek(i).kind() == Kind::Points) {
+    planningBytes_ += values_.peek(i).plan().bytes();
+    return values_.peek(i).plan();
+  }
   const levelset::TriMesh& mesh = values_.peek(i).mesh();
   planningBytes_ += static_cast<double>(mesh.positions.size() * sizeof(mesh.positions[0]) +
                                         mesh.triangles.size() * sizeof(mesh.triangles[0]));

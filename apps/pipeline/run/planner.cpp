@@ -62,7 +62,7 @@ std::string roiText(const RegionOfInterest& roi, const Plan& plan) {
 /// Estimated bytes of a value within its region of interest; 0 if unknown.
 double bytesOf(const std::optional<Plan>& plan, const RegionOfInterest& roi) {
   if (!plan) return 0;
-  if (plan->kind == Kind::Mesh) return plan->bytes();
+  if (plan->kind == Kind::Mesh || plan->kind == Kind::Points) return plan->bytes();
   const bool isTold = (plan->kind == Kind::Band && plan->voxelSize > 0) ||
                       plan->kind == Kind::Field || plan->kind == Kind::Volume;
   return isTold ? restricted(*plan, roi).bytes() : 0;
@@ -156,7 +156,7 @@ ValuePlans planValues(const Graph& graph, const std::vector<char>& runs, std::si
       plans[i] = given->second.plan();
       continue;
     }
-    if (node.inputs.empty() && node.kind == Kind::Mesh) {
+    if (node.inputs.empty() && (node.kind == Kind::Mesh || node.kind == Kind::Points)) {
       plans[i] = mesh(i);
       continue;
     }

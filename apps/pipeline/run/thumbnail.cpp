@@ -59,6 +59,8 @@ const char* reasonAgainst(Kind kind) {
       return "an open surface has no thumbnail";
     case Kind::Volume:
       return "a volume has no thumbnail";
+    case Kind::Points:
+      return "a point cloud has no thumbnail";
     default:
       return nullptr;
   }

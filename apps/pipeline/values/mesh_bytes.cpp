@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <cstring>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
@@ -55,6 +56,13 @@ struct ByteReader {
 
 constexpr std::size_t kDigestSize = 32;
 
+/// Returns true when the bytes begin with the digest of the others.
+bool hasDigest(const std::string& bytes) {
+  if (bytes.size() < kDigestSize) return false;
+  const std::string_view all = bytes;
+  return all.substr(0, kDigestSize) == digestOf(all.substr(kDigestSize));
+}
+
 }  // namespace
 
 std::string bytesOf(const levelset::TriMesh& mesh) {
@@ -74,9 +82,7 @@ std::string bytesOf(const levelset::TriMesh& mesh) {
 }
 
 bool readMeshBytes(const std::string& bytes, levelset::TriMesh& mesh) {
-  if (bytes.size() < kDigestSize ||
-      bytes.compare(0, kDigestSize, digestOf(bytes.substr(kDigestSize))) != 0)
-    return false;
+  if (!hasDigest(bytes)) return false;
   ByteReader reader{bytes.data() + kDigestSize, bytes.size() - kDigestSize};
   reader.readList(mesh.positions);
   reader.readList(mesh.triangles);
@@ -89,6 +95,29 @@ bool readMeshBytes(const std::string& bytes, levelset::TriMesh& mesh) {
   reader.read(more.precision);
   reader.read(more.colorPrecision);
   reader.read(more.hasAlpha);
+  return reader.isWhole && reader.left == 0;
+}
+
+std::string bytesOf(const levelset::PointCloud& cloud) {
+  std::string bytes;
+  addList(bytes, cloud.positions);
+  addList(bytes, cloud.normals);
+  addList(bytes, cloud.colors);
+  addList(bytes, cloud.radii);
+  addList(bytes, cloud.weights);
+  addBytes(bytes, cloud.precision);
+  return digestOf(bytes) + bytes;
+}
+
+bool readCloudBytes(const std::string& bytes, levelset::PointCloud& cloud) {
+  if (!hasDigest(bytes)) return false;
+  ByteReader reader{bytes.data() + kDigestSize, bytes.size() - kDigestSize};
+  reader.readList(cloud.positions);
+  reader.readList(cloud.normals);
+  reader.readList(cloud.colors);
+  reader.readList(cloud.radii);
+  reader.readList(cloud.weights);
+  reader.read(cloud.precision);
   return reader.isWhole && reader.left == 0;
 }
 

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "levelset/mesh.h"
+#include "levelset/points/point_cloud.h"
 
 namespace pipeline {
 
@@ -13,5 +14,10 @@ namespace pipeline {
 /// @return false if the bytes are damaged or have another format; `mesh` is then unchanged or
 /// incomplete
 [[nodiscard]] bool readMeshBytes(const std::string& bytes, levelset::TriMesh& mesh);
+
+/// Encodes a point cloud bit for bit, as bytesOf(mesh) does.
+[[nodiscard]] std::string bytesOf(const levelset::PointCloud& cloud);
+/// Decodes the bytes of bytesOf(cloud), as readMeshBytes() does.
+[[nodiscard]] bool readCloudBytes(const std::string& bytes, levelset::PointCloud& cloud);
 
 }  // namespace pipeline

@@ -27,6 +27,8 @@ const char* kindName(Kind kind) {
       return "scene";
     case Kind::Volume:
       return "volume";
+    case Kind::Points:
+      return "point cloud";
   }
   return "";
 }
@@ -55,9 +57,19 @@ double Plan::activeVoxels() const {
 
 double Plan::bytes() const {
   if (kind == Kind::Field || kind == Kind::Volume) return fieldBytes;
+  if (kind == Kind::Points) return points * pointBytes;
   // Three vertex indices for each triangle, and one position for every two triangles.
   if (kind == Kind::Mesh) return (3 * sizeof(std::uint32_t) + sizeof(Imath::V3d) / 2.0) * triangles;
   return levelset::kBytesPerVoxel * activeVoxels();
+}
+
+double bytesPerPoint(const levelset::PointCloud& cloud) {
+  double bytes = sizeof(cloud.positions[0]);
+  if (!cloud.normals.empty()) bytes += sizeof(cloud.normals[0]);
+  if (!cloud.colors.empty()) bytes += sizeof(cloud.colors[0]);
+  if (!cloud.radii.empty()) bytes += sizeof(cloud.radii[0]);
+  if (!cloud.weights.empty()) bytes += sizeof(cloud.weights[0]);
+  return bytes;
 }
 
 Plan planOf(const levelset::VolumeGrid& grid, levelset::VolumeType type) {
@@ -77,6 +89,8 @@ Value::Value(render::ViewedScene scene)
     : data_(std::make_shared<const render::ViewedScene>(std::move(scene))) {}
 Value::Value(levelset::Volume volume)
     : data_(std::make_shared<const levelset::Volume>(std::move(volume))) {}
+Value::Value(levelset::PointCloud cloud)
+    : data_(std::make_shared<const levelset::PointCloud>(std::move(cloud))) {}
 Value::Value(Plan plan) : plan_(plan) {}
 
 Kind Value::kind() const {
@@ -93,6 +107,8 @@ Kind Value::kind() const {
       return Kind::Scene;
     case 6:
       return Kind::Volume;
+    case 7:
+      return Kind::Points;
     default:
       return plan_->kind;
   }
@@ -128,6 +144,10 @@ const levelset::Volume& Value::volume() const {
   return *as<std::shared_ptr<const levelset::Volume>>(Kind::Volume);
 }
 
+const levelset::PointCloud& Value::cloud() const {
+  return *as<std::shared_ptr<const levelset::PointCloud>>(Kind::Points);
+}
+
 const Plan& Value::plan() const {
   if (plan_) return *plan_;
   Plan plan;
@@ -158,6 +178,11 @@ const Plan& Value::plan() const {
       break;
     case Kind::Volume:
       plan = planOf(volume().grid(), volume().type());
+      break;
+    case Kind::Points:
+      plan.bounds = bounds(cloud());
+      plan.points = static_cast<double>(cloud().size());
+      plan.pointBytes = bytesPerPoint(cloud());
       break;
     case Kind::Scene:
       plan.bounds = scene().scene.bounds();

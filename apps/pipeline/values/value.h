@@ -14,6 +14,7 @@
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
 #include "levelset/operator/plan.h"
+#include "levelset/points/point_cloud.h"
 #include "levelset/volumes/volume.h"
 #include "mapping/animation/animation.h"
 #include "mapping/patches/patch.h"
@@ -28,7 +29,8 @@ enum class Kind {
   Field,
   Surface,  ///< a band around an open surface: a base for patches
   Scene,
-  Volume  ///< numbers on a regular grid, from a scanner or a simulation
+  Volume,  ///< numbers on a regular grid, from a scanner or a simulation
+  Points   ///< points without connectivity, from a scanner or a simulation
 };
 [[nodiscard]] const char* kindName(Kind kind);
 
@@ -42,6 +44,8 @@ struct Plan {
   double halfWidth = 0;      ///< half width, voxels; bands and scenes only
   double fieldBytes = 0;     ///< memory of a field or volume, bytes; only those
   double triangles = 0;      ///< number of triangles; meshes only; 0: unknown
+  double points = 0;         ///< number of points of a point cloud; 0: unknown
+  double pointBytes = 0;     ///< memory of a point, bytes; point clouds only
   /// Patches only: size along u, size along v and height, world units. Height 0: the texture that
   /// is mapped will determine it.
   Imath::V3d patchSize = Imath::V3d(0);
@@ -59,6 +63,9 @@ struct Plan {
 
 /// Plans a volume. Its voxel size is the smallest spacing.
 [[nodiscard]] Plan planOf(const levelset::VolumeGrid& grid, levelset::VolumeType type);
+
+/// Memory of a point with its attributes, bytes.
+[[nodiscard]] double bytesPerPoint(const levelset::PointCloud& cloud);
 
 /// Description of how patches were built, to rebuild them on another base or at another position.
 struct PatchRecipe {
@@ -98,11 +105,12 @@ class Value {
   explicit Value(levelset::FieldGrid field);
   explicit Value(render::ViewedScene scene);
   explicit Value(levelset::Volume volume);
+  explicit Value(levelset::PointCloud cloud);
   explicit Value(Plan plan);
 
   [[nodiscard]] Kind kind() const;
-  // mesh(), band(), patch(), field(), scene() and volume() return the value as that kind. A file
-  // may contain another kind than its name suggests.
+  // mesh(), band(), patch(), field(), scene(), volume() and cloud() return the value as that kind.
+  // A file may contain another kind than its name suggests.
   // @throws levelset::UsageError if the value is of another kind
   [[nodiscard]] const levelset::TriMesh& mesh() const;
   [[nodiscard]] const levelset::NarrowBand& band() const;
@@ -110,6 +118,7 @@ class Value {
   [[nodiscard]] const levelset::FieldGrid& field() const;
   [[nodiscard]] const render::ViewedScene& scene() const;
   [[nodiscard]] const levelset::Volume& volume() const;
+  [[nodiscard]] const levelset::PointCloud& cloud() const;
 
   /// Returns the plan of the value: its kind, bounds, area and grid, which estimates need. Computes
   /// it from the value on the first call.
@@ -125,7 +134,8 @@ class Value {
 
   std::variant<std::monostate, std::shared_ptr<const levelset::TriMesh>, levelset::NarrowBand,
                std::shared_ptr<const PatchValue>, levelset::FieldGrid,
-               std::shared_ptr<const render::ViewedScene>, std::shared_ptr<const levelset::Volume>>
+               std::shared_ptr<const render::ViewedScene>, std::shared_ptr<const levelset::Volume>,
+               std::shared_ptr<const levelset::PointCloud>>
       data_;
   mutable std::optional<Plan> plan_;
 };

@@ -25,6 +25,7 @@ from ._values import (
     Field,
     Mesh,
     Patch,
+    PointCloud,
     Scan,
     Scene,
     Solid,
@@ -47,7 +48,7 @@ _operators.install(globals())
 
 __all__ = [
     "Cancelled", "Error", "FileError", "InputError", "NumericalError", "ResourceError", "UsageError",
-    "Field", "Mesh", "Patch", "Scan", "Scene", "Solid", "Surface", "Value", "Volume", "Warning",
+    "Field", "Mesh", "Patch", "PointCloud", "Scan", "Scene", "Solid", "Surface", "Value", "Volume", "Warning",
     "compute", "graph", "last_report", "map", "set_cache", "set_max_memory", "set_threads",
     "from_array", "from_function",
     *_operators.names,

@@ -328,4 +328,39 @@ class Scan(Value):
     __slots__ = ()
 
 
-classes = {c.__name__: c for c in (Solid, Surface, Mesh, Patch, Field, Scene, Scan)}
+class PointCloud(Value):
+    """Points without connectivity: `PointCloud(positions, normals=None)` from arrays of (n, 3) floats."""
+
+    __slots__ = ()
+
+    def __init__(self, positions, normals=None):
+        normals = None if normals is None else numpy.asarray(normals)
+        self._node = _core.cloud(numpy.asarray(positions), normals)
+
+    @property
+    def positions(self):
+        """Positions, world units: (n, 3) float64, read-only, no copy. Computes the value."""
+        return self._known().cloud_array("positions")
+
+    @property
+    def normals(self):
+        """Normals, (n, 3) float32; None if the cloud has none."""
+        return self._known().cloud_array("normals")
+
+    @property
+    def colors(self):
+        """Red, green, blue and alpha, (n, 4) float32; None if the cloud has none."""
+        return self._known().cloud_array("colors")
+
+    @property
+    def radii(self):
+        """Radii, world units, (n,) float32; None if the cloud has none."""
+        return self._known().cloud_array("radii")
+
+    @property
+    def weights(self):
+        """Weights of confidence, (n,) float32; None if the cloud has none."""
+        return self._known().cloud_array("weights")
+
+
+classes = {c.__name__: c for c in (Solid, Surface, Mesh, Patch, Field, Scene, Scan, PointCloud)}

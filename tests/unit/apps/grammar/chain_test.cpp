@@ -159,7 +159,7 @@ TEST(Chain, GivesStandardStreamsToOneActionOnly) {
   EXPECT_REFUSAL("--report - sphere --radius 1 --voxel 1 ! measure --json", "--report");
   EXPECT_REFUSAL("read - --format ply ! read - --format ply", "standard input is already used");
   EXPECT_REFUSAL("info -", "info: '-' has no extension that gives the format; give --format");
-  EXPECT_REFUSAL("info a.xyz", "no known format");
+  EXPECT_REFUSAL("info a.txt", "no known format");
   EXPECT_EQ(refusal("sphere --radius 1 --voxel 1 ! measure ! check"), "accepted");
 }
 

@@ -61,7 +61,7 @@ TEST_F(Refusal, UsageErrorsExitWithTwo) {
   EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 0.1 ! offset nan"), 2, "finite");
   EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 0.1 ! render a.png --size 0x0"), 2,
                  "is empty");
-  EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 0.1 ! write a.xyz"), 2, "format");
+  EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 0.1 ! write a.txt"), 2, "format");
   EXPECT_REFUSED(levelsmith("sphere --radius 1"), 2, "--voxel");
   EXPECT_REFUSED(levelsmith("-v help"), 2, "help must be the only action");
   writeTetrahedron("tetra.ply");
@@ -102,7 +102,7 @@ TEST_F(Refusal, DetectableErrorsPrecedeTheRun) {
   const auto soon = [&](const std::string& rest, int code, const char* part) {
     EXPECT_REFUSED(levelsmith(large + rest, 5), code, part);
   };
-  soon("write a.xyz", 2, "no known format");
+  soon("write a.txt", 2, "no known format");
   soon("write a.ply", 2, "put 'mesh' before it");
   soon("mesh ! write a.ply --name x", 2, "--name");
   soon("mesh --adaptivity 2 ! write a.ply", 2, "between 0 and 1");

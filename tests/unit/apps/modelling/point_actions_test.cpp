@@ -1,0 +1,116 @@
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/support/command_line.h"
+
+namespace point_actions_test {
+
+using Json = nlohmann::json;
+
+class PointActions : public support::ShellTest {
+ protected:
+  Json json(const std::string& arguments) {
+    const support::Outcome outcome = levelsmith(arguments);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return outcome.code == 0 ? Json::parse(outcome.out) : Json();
+  }
+  void expectRefusal(const std::string& arguments, int code, const std::string& part) {
+    const support::Outcome outcome = levelsmith(arguments);
+    EXPECT_EQ(outcome.code, code) << arguments << "\n" << outcome.err;
+    EXPECT_NE(outcome.err.find(part), std::string::npos) << outcome.err;
+  }
+};
+
+constexpr const char* kSampled = "sphere --radius 1 --voxel 0.05 ! mesh ! sample --count 2000 ! ";
+
+TEST_F(PointActions, SampleWriteReadAndDescribe) {
+  const Json made = json(std::string(kSampled) + "write a.ply ! info --json");
+  EXPECT_EQ(made["kind"], "point cloud");
+  EXPECT_EQ(made["points"], 2000);
+  EXPECT_EQ(made["attributes"], "normals");
+  EXPECT_EQ(made["duplicates"], 0);
+  // 2000 points on the area 4 pi, at most the distance of a hexagonal lattice.
+  EXPECT_LT(made["spacing"]["mean"], 0.0852);
+  EXPECT_GT(made["spacing"]["mean"], 0.06);
+  const Json read = json("read a.ply ! info --json");
+  EXPECT_EQ(read["spacing"], made["spacing"]);
+  EXPECT_EQ(json("info a.ply --json")["points"], 2000);
+  for (const char* name : {"b.xyz", "b.csv", "b.obj", "b.csv.gz"}) {
+    const std::string file = name;
+    EXPECT_EQ(json("read a.ply ! write " + file + " ! read " + file + " ! info --json")["spacing"],
+              made["spacing"])
+        << name;
+  }
+  const support::Outcome lost = levelsmith("read a.ply ! write b.pts");
+  EXPECT_EQ(lost.code, 0);
+  EXPECT_NE(lost.err.find("cannot store the normals"), std::string::npos) << lost.err;
+}
+
+TEST_F(PointActions, AMeshFileIsAMeshUnlessItHasNoFaces) {
+  ASSERT_EQ(levelsmith("box --size 1,1,1 --voxel 0.25 ! mesh ! write a.obj ! write a.stl").code, 0);
+  EXPECT_EQ(json("read a.obj ! info --json")["kind"], "mesh");
+  EXPECT_EQ(json("read a.obj --points ! info --json")["kind"], "point cloud");
+  EXPECT_EQ(json("read a.stl --points ! info --json")["kind"], "point cloud");
+  writeFile("b.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+  EXPECT_EQ(json("read b.obj ! info --json")["points"], 3);
+  expectRefusal("read b.obj ! measure", 2, "point cloud");
+  writeFile("c.xyz", "0 0 0\n1 1 1\n");
+  EXPECT_EQ(json("read - --format xyz <c.xyz ! info --json")["points"], 2);
+}
+
+TEST_F(PointActions, ActionsWorkOnClouds) {
+  const Json thinned = json(std::string(kSampled) + "thin --radius 0.2 ! info --json");
+  EXPECT_GE(thinned["spacing"]["least"], 0.2);
+  EXPECT_EQ(json(std::string(kSampled) + "thin --count 100 ! info --json")["points"], 100);
+  const Json clipped = json(std::string(kSampled) + "clip --plane \"0,0,0 0,0,1\" ! info --json");
+  EXPECT_NEAR(clipped["points"].get<double>(), 1000, 60);
+  EXPECT_LE(clipped["bounds"]["max"][2], 0);
+  const Json moved =
+      json(std::string(kSampled) + "transform --scale 2 --translate 10,0,0 ! info --json");
+  EXPECT_NEAR(moved["bounds"]["max"][0].get<double>(), 12, 0.05);
+  EXPECT_EQ(json(std::string(kSampled) + "outliers ! info --json")["points"], 2000);
+  const Json mirrored =
+      json(std::string(kSampled) + "transform --mirror x ! normals --neighbours 12 ! info --json");
+  EXPECT_EQ(mirrored["attributes"], "normals");
+}
+
+TEST_F(PointActions, NormalsWarnOfAGuess) {
+  std::string plane;
+  for (int i = 0; i < 20; ++i)
+    for (int j = 0; j < 20; ++j) plane += std::to_string(i) + " " + std::to_string(j) + " 0\n";
+  writeFile("plane.xyz", plane);
+  const support::Outcome outcome = levelsmith("read plane.xyz ! normals ! write n.ply");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("is a guess"), std::string::npos) << outcome.err;
+}
+
+TEST_F(PointActions, RefusalsHaveTheirCode) {
+  writeFile("a.xyz", "0 0 0\n1 0 0\n2 0 0\n");
+  writeFile("bad.xyz", "0 0 0\n1 0 nan\n");
+  writeFile("cut.pts", "5\n0.000 0.000 0.000\n0.5 0.5 0.5\n");
+  writeFile("box.json", "{}");
+  expectRefusal("read bad.xyz ! info", 3, "line 2");
+  expectRefusal("read cut.pts ! info", 3, "ends after 2 of 5");
+  expectRefusal("read none.xyz ! info", 6, "none.xyz");
+  expectRefusal("read a.xyz ! normals", 3, "lie on a line");
+  expectRefusal("read a.xyz ! normals --neighbours 2", 2, "at least 3");
+  expectRefusal("read a.xyz ! thin", 2, "either --radius or --count");
+  expectRefusal("read a.xyz ! thin --count 4", 3, "3 different positions");
+  expectRefusal("read a.xyz ! clip --box \"5,5,5 6,6,6\"", 3, "none of the 3 points");
+  expectRefusal("read a.xyz ! transform --scale 2 --bake", 2, "point cloud");
+  expectRefusal("read a.xyz ! write a.vdb", 2, "write .ply");
+  expectRefusal("read a.xyz ! write a.stl", 2, "write .ply");
+  expectRefusal("read a.xyz --points --grid x ! info", 2, "--grid");
+  expectRefusal("sphere --radius 1 --voxel 0.2 ! mesh ! write a.xyz", 2, "sample");
+  expectRefusal("sphere --radius 1 --voxel 0.2 ! mesh ! sample", 2, "either --count or --spacing");
+}
+
+TEST_F(PointActions, ADryRunPlansClouds) {
+  writeFile("a.xyz", "0 0 0\n1 0 0\n2 1 0\n");
+  const support::Outcome outcome =
+      levelsmith("--dry-run read a.xyz ! normals ! thin --radius 1% ! write b.ply");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+}
+
+}  // namespace point_actions_test
