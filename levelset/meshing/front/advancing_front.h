@@ -1,0 +1,40 @@
+#pragma once
+
+// Internal header of levelset: public headers must not include it.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "levelset/meshing/front/front_surface.h"
+#include "levelset/progress.h"
+
+namespace levelset {
+
+/// Mesh of an advancing front.
+struct FrontMesh {
+  std::vector<Imath::V3d> positions;
+  std::vector<Imath::V3d> normals;  ///< of the surface, unit length
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  std::size_t filled = 0;  ///< triangles that fill holes the front left, the last ones in the list
+  bool isClosed = false;   ///< no front is left
+};
+
+struct FrontOptions {
+  double shortest = 0, longest = 0;  ///< limits of FrontSurface::edgeLength()
+  std::size_t maxTriangles = 0;
+  Progress progress = {};
+};
+
+/// Meshes one component of a closed surface by an advancing front [Schreiner06]. The front starts
+/// at a triangle. An edge of the front gets a triangle whose third vertex is a vertex of the front
+/// nearby, or a new one: a predicted position that is projected onto the surface. A vertex on
+/// another part of the front splits the front or merges two fronts. Each edge has one triangle on
+/// each side, also if the front gets stuck.
+/// @param start  position near the surface
+/// @throws Cancelled
+[[nodiscard]] FrontMesh advanceFront(const FrontSurface& surface, const Imath::V3d& start,
+                                     const FrontOptions& options);
+
+}  // namespace levelset

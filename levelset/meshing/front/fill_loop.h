@@ -1,0 +1,25 @@
+#pragma once
+
+// Internal header of levelset: public headers must not include it.
+
+#include <Imath/ImathVec.h>
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+namespace levelset {
+
+/// Triangulates a closed loop of edges with the least sum of areas [Barequet95]. Triangles against
+/// the normals of their vertices count many times; long sides count a little.
+/// @param loop  vertices; the hole lies to the left of each edge
+/// @param isUsed  (a, b): a triangle has this directed edge already
+/// @return triangles in counter-clockwise order; empty if there is no triangulation, or for a loop
+///         of more than 200 edges
+[[nodiscard]] std::vector<std::array<std::uint32_t, 3>> fillLoop(
+    const std::vector<std::uint32_t>& loop, const std::vector<Imath::V3d>& positions,
+    const std::vector<Imath::V3d>& normals,
+    const std::function<bool(std::uint32_t, std::uint32_t)>& isUsed);
+
+}  // namespace levelset
