@@ -72,9 +72,9 @@ double cross(const Flat& o, const Flat& p, const Flat& q) {
 }
 
 bool segmentsMeet(const Flat& a, const Flat& b, const Flat& c, const Flat& d) {
-  const double ab_c = cross(a, b, c), ab_d = cross(a, b, d), cd_a = cross(c, d, a),
-               cd_b = cross(c, d, b);
-  return (ab_c > 0) != (ab_d > 0) && (cd_a > 0) != (cd_b > 0);
+  const double cOfAb = cross(a, b, c), dOfAb = cross(a, b, d), aOfCd = cross(c, d, a),
+               bOfCd = cross(c, d, b);
+  return (cOfAb > 0) != (dOfAb > 0) && (aOfCd > 0) != (bOfCd > 0);
 }
 
 /// Third vertex for a triangle at an edge of the front.
