@@ -43,8 +43,8 @@ constexpr bool isPointRole(Role role) {
 }
 
 constexpr std::size_t sizeOf(Type type) {
-  constexpr std::size_t sizes[] = {1, 1, 2, 2, 4, 4, 4, 8};
-  return sizes[static_cast<int>(type)];
+  constexpr std::size_t kSizes[] = {1, 1, 2, 2, 4, 4, 4, 8};
+  return kSizes[static_cast<int>(type)];
 }
 
 /// Property of an element, in the order of the data.
