@@ -114,14 +114,14 @@ class HeaderReader {
   }
 
   Type readType(std::string_view word) const {
-    constexpr std::pair<const char*, Type> names[] = {
+    constexpr std::pair<const char*, Type> kNames[] = {
         {"char", Type::Int8},     {"int8", Type::Int8},     {"uchar", Type::Uint8},
         {"uint8", Type::Uint8},   {"short", Type::Int16},   {"int16", Type::Int16},
         {"ushort", Type::Uint16}, {"uint16", Type::Uint16}, {"int", Type::Int32},
         {"int32", Type::Int32},   {"uint", Type::Uint32},   {"uint32", Type::Uint32},
         {"float", Type::Float},   {"float32", Type::Float}, {"double", Type::Double},
         {"float64", Type::Double}};
-    for (const auto& [name, type] : names)
+    for (const auto& [name, type] : kNames)
       if (word == name) return type;
     fail(fmt::format("the type '{}' is unknown", word));
   }
