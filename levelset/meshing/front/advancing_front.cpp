@@ -82,7 +82,7 @@ struct Candidate {
   std::uint32_t vertex = kNewVertex;
   std::uint32_t visit = 0;  ///< edge of the front that begins at the vertex
   V3d point, normal;
-  double angle = 0;  ///< of the triangle at the vertex, radians
+  double angle = 0;  ///< angle of the triangle at the vertex, radians
 };
 
 class AdvancingFront {
@@ -143,8 +143,8 @@ class AdvancingFront {
   ItemGrid vertices_;
   using Entry = std::tuple<int, double, std::uint32_t>;  ///< tries, squared length, edge
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue_;
-  // Of the present edge.
-  double length_ = 0;  ///< of the new edges
+  // State for the present edge.
+  double length_ = 0;  ///< length of new edges
   std::vector<std::uint32_t> near_;
   std::vector<Candidate> candidates_;
 };

@@ -6,7 +6,7 @@ namespace levelset {
 
 /// Degree of the polynomial that is fitted to the neighbourhood of a point.
 enum class FitDegree {
-  Adaptive,  ///< of the degrees 1 and 2, the one with the smaller error of prediction
+  Adaptive,  ///< degree 1 or 2, the one with the smaller error of prediction
   One,
   Two
 };
