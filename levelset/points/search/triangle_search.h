@@ -1,0 +1,49 @@
+#pragma once
+
+// For the .cpp files of this library only.
+
+#include "levelset/geometry/closest_on_triangle.h"
+#include "levelset/mesh.h"
+#include "levelset/points/search/overlap_tree.h"
+
+namespace levelset::points {
+
+/// Triangle with its number.
+struct TriangleItem {
+  static constexpr bool kHasExtent = true;
+  std::array<Imath::V3d, 3> corners;
+  std::uint32_t index;
+
+  [[nodiscard]] ItemBox box() const;
+  [[nodiscard]] Imath::V3d closestPoint(const Imath::V3d& from) const;
+  [[nodiscard]] double squaredDistance(const Imath::V3d& from) const;
+  [[nodiscard]] bool isSameAs(const TriangleItem& other) const { return corners == other.corners; }
+};
+
+inline ItemBox TriangleItem::box() const {
+  ItemBox box{corners[0], corners[0]};
+  for (int axis = 0; axis < 3; ++axis)
+    for (const Imath::V3d& p : corners) {
+      box.low[axis] = std::min(box.low[axis], p[axis]);
+      box.high[axis] = std::max(box.high[axis], p[axis]);
+    }
+  return box;
+}
+
+inline Imath::V3d TriangleItem::closestPoint(const Imath::V3d& from) const {
+  return closestOnTriangle(from, corners[0], corners[1], corners[2]).point;
+}
+
+inline double TriangleItem::squaredDistance(const Imath::V3d& from) const {
+  const Imath::V3d d = closestPoint(from) - from;
+  return d.x * d.x + d.y * d.y + d.z * d.z;
+}
+
+/// Triangles in a tree, for searches of the closest ones.
+using TriangleSearch = OverlapTree<TriangleItem, SiblingBoxes>;
+extern template class OverlapTree<TriangleItem, SiblingBoxes>;
+
+/// Makes the tree of a mesh. Copies the corners.
+[[nodiscard]] TriangleSearch makeTriangleSearch(const TriMesh& mesh);
+
+}  // namespace levelset::points
