@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <random>
 #include <string>
 
 #include "levelset/error.h"
@@ -47,6 +48,28 @@ inline std::string readText(const std::filesystem::path& path) {
 
 inline void writeText(const std::filesystem::path& path, const std::string& text) {
   std::ofstream(path, std::ios::binary) << text;
+}
+
+/// Returns the bytes of a file with one to four random changes: a byte or bit that differs, bytes
+/// that are missing, or text that is inserted.
+inline std::string mutated(std::string bytes, std::mt19937& random) {
+  for (std::size_t change = 0; change <= random() % 4; ++change) {
+    const std::size_t at = random() % bytes.size();
+    switch (random() % 4) {
+      case 0:
+        bytes[at] = static_cast<char>(random());
+        break;
+      case 1:
+        bytes[at] = static_cast<char>(bytes[at] ^ (1 << random() % 8));
+        break;
+      case 2:
+        bytes.erase(at, random() % 5);
+        break;
+      default:
+        bytes.insert(at, random() % 2 ? "9" : "-1 ");
+    }
+  }
+  return bytes;
 }
 
 /// Runs `action`, expects an exception of type `ErrorT`, and returns its message.

@@ -279,24 +279,7 @@ TEST(PointFiles, MutatedFilesAreReadOrRefused) {
     writePoints(folder / name, smallCloud(true));
     const std::string seed = support::readText(folder / name);
     for (int round = 0; round < 60; ++round) {
-      std::string bytes = seed;
-      for (std::size_t change = 0; change <= random() % 4; ++change) {
-        const std::size_t at = random() % bytes.size();
-        switch (random() % 4) {
-          case 0:
-            bytes[at] = static_cast<char>(random());
-            break;
-          case 1:
-            bytes[at] = static_cast<char>(bytes[at] ^ (1 << random() % 8));
-            break;
-          case 2:
-            bytes.erase(at, random() % 5);
-            break;
-          default:
-            bytes.insert(at, random() % 2 ? "9" : "-1 ");
-        }
-      }
-      writeText(folder / name, bytes);
+      writeText(folder / name, support::mutated(seed, random));
       (void)levelset::lacksFaces(folder / name);
       try {
         const PointCloud cloud = readPoints(folder / name, {.maxMemory = std::size_t{64} << 20});

@@ -538,24 +538,7 @@ TEST(VolumeFiles, MutatedFilesAreReadOrRefused) {
   std::size_t readable = 0, refused = 0;
   for (const auto& [name, seed] : seeds)
     for (int round = 0; round < 80; ++round) {
-      std::string bytes = seed;
-      for (std::size_t change = 0; change <= random() % 4; ++change) {
-        const std::size_t at = random() % bytes.size();
-        switch (random() % 4) {
-          case 0:
-            bytes[at] = static_cast<char>(random());
-            break;
-          case 1:
-            bytes[at] = static_cast<char>(bytes[at] ^ (1 << random() % 8));
-            break;
-          case 2:
-            bytes.erase(at, random() % 5);
-            break;
-          default:
-            bytes.insert(at, random() % 2 ? "9" : "-1 ");
-        }
-      }
-      writeText(folder / name, bytes);
+      writeText(folder / name, support::mutated(seed, random));
       try {
         const Volume volume = readVolume(folder / name, {.maxMemory = std::size_t{64} << 20});
         EXPECT_TRUE(std::isfinite(volume.lowest()) && std::isfinite(volume.highest()));
