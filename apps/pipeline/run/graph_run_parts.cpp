@@ -155,10 +155,10 @@ void GraphRun::runInParts(std::size_t write) {
 
   // Gives up a part that takes more than its estimate, before the limit ends the process.
   bool canSplit = false;
+  const double most = static_cast<double>(inUse) + kLargestShare * available;
   settings.shouldContinue = [&] {
-    if (canSplit && inUse<settings_.maxMemory&& static_cast<double>(
-                            levelset::residentBytes())> static_cast<double>(inUse) +
-                        kLargestShare * available)
+    if (canSplit &&
+        inUse<settings_.maxMemory&& static_cast<double>(levelset::residentBytes())> most)
       throw levelset::ResourceLimit("the part does not fit into memory");
     return !settings_.shouldContinue || settings_.shouldContinue();
   };
