@@ -7,30 +7,30 @@
 #include <span>
 #include <vector>
 
+#include "levelset/points/search/point_search.h"
+
 namespace levelset::points {
 
-/// A point near another one.
-struct Neighbour {
-  double squared;       ///< squared distance, world units²
-  std::uint32_t index;  ///< number of the point in the cloud
-};
+/// A point near another one: its number in the cloud, and its squared distance.
+using Neighbour = Found;
 
-/// Points in a k-d tree, for searches of the k nearest points. Points at equal positions count
-/// once, by the one of lowest number, so that many of them do not slow down a search. Results do
-/// not depend on the structure of the tree: neighbours are sorted by distance, then by number. All
-/// searches of nearest points in levelset/points/processing go through this class.
+/// The different positions of a point cloud in a tree. Points at equal positions count once, by the
+/// one of lowest number: many of them would fill all neighbourhoods. Results do not depend on the
+/// structure of the tree: neighbours are sorted by distance, then by number.
 class PointNeighbours {
  public:
   /// Builds the tree in parallel. Copies the positions.
   explicit PointNeighbours(std::span<const Imath::V3d> positions);
 
   /// Number of different positions.
-  [[nodiscard]] std::size_t size() const { return items_.size(); }
-  [[nodiscard]] std::size_t duplicates() const { return count_ - items_.size(); }
+  [[nodiscard]] std::size_t size() const { return tree_.size(); }
+  [[nodiscard]] std::size_t duplicates() const { return count_ - tree_.size(); }
   /// Number of the n-th point in the order of the tree, n < size(). Points near each other in this
   /// order are near each other in space.
-  [[nodiscard]] std::uint32_t at(std::size_t n) const { return items_[n].index; }
-  [[nodiscard]] const Imath::V3d& positionAt(std::size_t n) const { return items_[n].position; }
+  [[nodiscard]] std::uint32_t at(std::size_t n) const { return tree_.items()[n].index; }
+  [[nodiscard]] const Imath::V3d& positionAt(std::size_t n) const {
+    return tree_.items()[n].position;
+  }
   /// Lowest number of the points at the position of point `index`.
   [[nodiscard]] std::uint32_t first(std::uint32_t index) const {
     return first_.empty() ? index : first_[index];
@@ -38,7 +38,9 @@ class PointNeighbours {
 
   /// Finds the `count` points nearest to `from`, including one at `from` itself.
   /// @param found  receives the points, nearest first; fewer if the cloud has fewer positions
-  void nearest(const Imath::V3d& from, std::size_t count, std::vector<Neighbour>& found) const;
+  void nearest(const Imath::V3d& from, std::size_t count, std::vector<Neighbour>& found) const {
+    tree_.closest(from, count, found);
+  }
 
   /// Finds all points nearer to `from` than `radius`, sorted by number.
   void within(const Imath::V3d& from, double radius, std::vector<Neighbour>& found) const;
@@ -47,17 +49,7 @@ class PointNeighbours {
   [[nodiscard]] static double bytesFor(std::size_t points);
 
  private:
-  struct Item {
-    Imath::V3d position;
-    std::uint32_t index;
-    std::uint32_t axis;  ///< axis of the split at this item
-  };
-  struct Query;
-  void build(std::size_t begin, std::size_t end);
-  template <typename Look>
-  void visit(std::size_t begin, std::size_t end, Query& query, const Look& look) const;
-
-  std::vector<Item> items_;
+  PointSearch tree_;
   std::vector<std::uint32_t> first_;  ///< empty without duplicates
   std::size_t count_ = 0;
 };
