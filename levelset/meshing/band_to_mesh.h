@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
 #include "levelset/operator/cost.h"
@@ -32,7 +34,8 @@ struct BandToMeshOptions {
 enum class MeshMethod {
   MarchingCubes,  ///< the mesh of bandToMesh()
   Dual,           ///< the mesh of bandToMesh() with `sharp`
-  Extended        ///< the mesh of bandToExtendedMesh()
+  Extended,       ///< the mesh of bandToExtendedMesh()
+  AdvancingFront  ///< the mesh of bandToFrontMesh()
 };
 
 /// The operator `mesh` for bands.
@@ -46,6 +49,10 @@ struct MeshOperator {
     MeshMethod method = MeshMethod::MarchingCubes;
     /// Mesh from which the band was computed, for MeshMethod::Extended; null: none.
     const TriMesh* original = nullptr;
+    /// Longest edges of MeshMethod::AdvancingFront, world units; empty: 16 voxels.
+    std::optional<double> edgeLength = {};
+    /// Angle between the normals at the ends of its edges, degrees.
+    double angleDegrees = 20;
 
     [[nodiscard]] bool isUniform() const {
       return method == MeshMethod::MarchingCubes && !sharp && adaptivity <= 0;
@@ -63,9 +70,20 @@ struct MeshOperator {
       visit("method", &Options::method,
             {{"marching-cubes", MeshMethod::MarchingCubes},
              {"dual", MeshMethod::Dual},
-             {"extended", MeshMethod::Extended}},
-            {.help = "marching cubes, a dual mesh with sharp edges, or extended marching cubes, "
-                     "which adds vertices on sharp edges"});
+             {"extended", MeshMethod::Extended},
+             {"advancing-front", MeshMethod::AdvancingFront}},
+            {.help = "marching cubes; a dual mesh with sharp edges; extended marching cubes, which "
+                     "adds vertices on sharp edges; or an advancing front, which makes nearly "
+                     "equilateral triangles"});
+      visit("edge-length", &Options::edgeLength,
+            {.help = "longest edges, for --method advancing-front; default: 16 voxels",
+             .unit = OptionUnit::Length,
+             .range = OptionRange::Positive});
+      visit(
+          "angle", &Options::angleDegrees,
+          {.help = "angle between the normals at the ends of an edge, in degrees, at most 57, for "
+                   "--method advancing-front: edges are shorter where the surface bends more",
+           .range = OptionRange::Positive});
     }
   };
 

@@ -1,8 +1,11 @@
 #include <fmt/core.h>
 
+#include <numbers>
+
 #include "levelset/error.h"
 #include "levelset/meshing/band_to_mesh.h"
 #include "levelset/meshing/extended_mesh.h"
+#include "levelset/meshing/front_mesh.h"
 
 namespace levelset {
 namespace {
@@ -22,6 +25,27 @@ TriMesh runExtended(const NarrowBand& band, const MeshOperator::Options& options
   return std::move(result.mesh);
 }
 
+TriMesh runFront(const NarrowBand& band, const MeshOperator::Options& options, OperatorRun& run) {
+  BandFrontMesh result =
+      bandToFrontMesh(band, {.edgeLength = options.edgeLength.value_or(0),
+                             .angle = options.angleDegrees * std::numbers::pi / 180,
+                             .progress = run.progress});
+  run.figures = {{"components", result.components},
+                 {"uniform_components", result.uniform},
+                 {"filled_triangles", result.filled}};
+  if (result.uniform > 0)
+    run.notes.push_back(
+        fmt::format("the front did not close on {} of {} components, so they have the triangles of "
+                    "marching cubes; smooth the solid first, or use a finer voxel",
+                    result.uniform, result.components));
+  if (result.otherTopology > 0)
+    run.notes.push_back(fmt::format(
+        "{} of {} components have another number of handles than in the mesh of marching cubes; "
+        "use a finer voxel to resolve thin parts",
+        result.otherTopology, result.components));
+  return std::move(result.mesh);
+}
+
 }  // namespace
 
 const OperatorText MeshOperator::text{
@@ -30,7 +54,10 @@ const OperatorText MeshOperator::text{
     .summary = "turn a level set, or the space of a patch, into a closed triangle mesh",
     .details =
         "The mesh of a patch is one closed surface: its lowest layer, its highest layer and its "
-        "sides. With --sheets it is the separate surfaces of all layers.",
+        "sides. With --sheets it is the separate surfaces of all layers. An advancing front suits "
+        "smooth solids. Where it does not close, as on noisy scans, a component keeps the "
+        "triangles "
+        "of marching cubes, with a note.",
     .example = "levelsmith box --size 2,2,2 --voxel 0.1 ! mesh --sharp ! write box.ply"};
 
 void MeshOperator::check(const Options& options, const GivenOptions& given) {
@@ -39,6 +66,11 @@ void MeshOperator::check(const Options& options, const GivenOptions& given) {
     throw UsageError("--sharp and --adaptivity exclude each other; give one");
   if (options.sharp && given("method") && options.method != MeshMethod::Dual)
     throw UsageError("--sharp is --method dual; leave out --sharp, or give --method dual");
+  if (options.method != MeshMethod::AdvancingFront && (given("edge-length") || given("angle")))
+    throw UsageError(
+        "--edge-length and --angle are for --method advancing-front; give that method, or leave "
+        "them out");
+  if (!(options.angleDegrees <= 57)) throw UsageError("--angle must be at most 57 degrees");
   if (options.adaptivity > 0 && options.method != MeshMethod::MarchingCubes)
     throw UsageError("--adaptivity is for --method marching-cubes; leave one of them out");
 }
@@ -46,6 +78,7 @@ void MeshOperator::check(const Options& options, const GivenOptions& given) {
 TriMesh MeshOperator::run(std::vector<NarrowBand> operands, const Options& options,
                           OperatorRun& run) {
   if (options.method == MeshMethod::Extended) return runExtended(operands[0], options, run);
+  if (options.method == MeshMethod::AdvancingFront) return runFront(operands[0], options, run);
   return bandToMesh(operands[0], {.adaptivity = options.adaptivity,
                                   .sharp = options.sharp || options.method == MeshMethod::Dual,
                                   .progress = run.progress});
@@ -71,6 +104,7 @@ std::optional<Cost> MeshOperator::cost(const Options& options, const OperatorPla
   if (!solid.isBand()) return {};
   const double layer = solid.layer();
   if (options.method == MeshMethod::Extended) return Cost{1e-9 * 1300 * layer, 420 * layer};
+  if (options.method == MeshMethod::AdvancingFront) return Cost{1e-9 * 20000 * layer, 550 * layer};
   if (options.sharp || options.method == MeshMethod::Dual)
     return Cost{1e-9 * 1300 * layer, 420 * layer};
   return Cost{1e-9 * 330 * layer, 40 * layer};

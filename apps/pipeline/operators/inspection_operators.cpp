@@ -1,5 +1,7 @@
 #include <fmt/core.h>
 
+#include <numbers>
+
 #include <cmath>
 
 #include "apps/pipeline/operators/common.h"
@@ -12,6 +14,7 @@
 #include "levelset/inspect/check.h"
 #include "levelset/inspect/compare.h"
 #include "levelset/inspect/measure.h"
+#include "levelset/inspect/mesh_quality.h"
 #include "levelset/mesh_files/mesh_file.h"
 #include "levelset/point_files/point_file.h"
 #include "levelset/points/processing/point_spacing.h"
@@ -63,6 +66,14 @@ Value measure(Invocation& in) {
     json["non_manifold_vertices"] = manifold.nonManifoldVertices;
     json["triangles"] = value.mesh().triangles.size();
     json["vertices"] = value.mesh().positions.size();
+    const levelset::MeshQuality quality = levelset::meshQuality(value.mesh());
+    constexpr double kDegrees = 180 / std::numbers::pi;
+    json["least_angle_degrees"] = quality.leastAngle * kDegrees;
+    json["mean_least_angle_degrees"] = quality.meanLeast * kDegrees;
+    json["radius_ratio"] = quality.radiusRatio;
+    json["valence_six"] = quality.valenceSix;
+    json["shortest_edge"] = quality.shortestEdge;
+    json["longest_edge"] = quality.longestEdge;
   }
   in.notes.detailsJson = json.dump();
   if (asksJson(in)) {
@@ -331,7 +342,10 @@ Operator measureOperator() {
           "measure volume, area, bounds, topology, centroid, inertia and mean curvature of a solid",
       .details =
           "Inertia is about the centroid for density 1; mean_curvature is the integral of "
-          "(k1 + k2) / 2 over the surface; euler is V - E + F of the surface.",
+          "(k1 + k2) / 2 over the surface; euler is V - E + F of the surface. For a mesh, "
+          "radius_ratio is the mean of 2 r / R of its triangles, with the radii of the inscribed "
+          "and "
+          "the circumscribed circle, and valence_six the share of vertices with six triangles.",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! measure --json",
       .params = {jsonParam()},
       .operands = {{Kind::Band, Kind::Mesh}},

@@ -23,7 +23,7 @@ levelset::TriMesh meshOfPatches(const std::vector<mapping::Patch>& patches,
 }
 
 void validateMesh(const Invocation& in) {
-  for (const char* option : {"adaptivity", "sharp", "method", "original"})
+  for (const char* option : {"adaptivity", "sharp", "method", "original", "edge-length", "angle"})
     if (isPatch(in) && in.given(option))
       throw levelset::UsageError(
           fmt::format("mesh: --{} applies to a level set, not to a patch; leave it out", option));

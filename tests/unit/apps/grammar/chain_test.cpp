@@ -98,6 +98,10 @@ TEST(Chain, ChecksTheMethodOfAMesh) {
   EXPECT_REFUSAL(ball + "mesh --sharp --method extended", "--sharp is --method dual");
   EXPECT_REFUSAL(ball + "mesh --sharp --method marching-cubes", "--sharp is --method dual");
   EXPECT_REFUSAL(ball + "mesh --adaptivity 0.1 --method extended", "--adaptivity is for");
+  EXPECT_REFUSAL(ball + "mesh --edge-length 1", "are for --method advancing-front");
+  EXPECT_REFUSAL(ball + "mesh --method dual --angle 10", "are for --method advancing-front");
+  EXPECT_REFUSAL(ball + "mesh --method advancing-front --angle 60", "at most 57 degrees");
+  EXPECT_REFUSAL(ball + "mesh --method advancing-front --sharp", "--sharp is --method dual");
   EXPECT_REFUSAL("read a.ply --as a ! level-set --voxel 1 ! mesh --original @a",
                  "--original is for --method extended");
   EXPECT_REFUSAL(ball + "mesh --method extended --original a.ply", "is not the name of a mesh");
