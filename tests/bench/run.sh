@@ -26,6 +26,9 @@ for size in 64 128; do "$build/tests/advect_bench" function=1 staggered=1 $size 
 "$here/volume_picture.sh" "$build/apps/levelsmith" "$here/../../data/models/ch2.nii.gz" || status=1
 "$here/volume_rays.sh" "$build/tests/volume_bench" "$build/tests/render_bench" "$build/apps/levelsmith" || status=1
 "$build/tests/volume_agreement" || status=1
+"$here/front_mesh.sh" "$build/apps/levelsmith" "$here/../../data/models" || status=1
+"$build/tests/point_normals_bench" "$here/../../data/models/dragon_vrip.ply.gz" || status=1
+"$here/points.sh" "$build/apps/levelsmith" "$here/../../data/models/dragon_vrip.ply.gz" || status=1
 if [ -x "$build/tests/points_search_bench" ]; then
   "$build/tests/points_search_bench" "$here/../../data/models/bunny.obj" "$here/../../data/models/dragon_vrip.ply.gz" || status=1
 fi
