@@ -8,6 +8,10 @@
 
 namespace render {
 
+/// Renderers end a ray when the transmittance of the surfaces and volumes along it falls below this
+/// value, as if the last one were opaque.
+inline constexpr double kLeastTransmittance = 1.0 / 512;
+
 /// Curvatures of a surface at a point.
 struct CurvatureSample {
   /// Mean curvature, Gauss curvature, and principal curvatures k1 ≥ k2; per world unit (gauss: per

@@ -1,16 +1,19 @@
 #pragma once
 
+#include <Imath/ImathBox.h>
 #include <Imath/ImathMatrix.h>
 #include <Imath/ImathVec.h>
 
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "render/direct/transfer_function.h"
 #include "render/volumes/volume_surface.h"
 
 namespace render {
+
+struct LightStart;
+struct LightTables;
 
 /// Light that reaches the eye along a ray through a volume.
 struct VolumeLight {
@@ -24,6 +27,12 @@ struct VolumeShading {
   double ambient = 0.35;        ///< brightness where the light does not reach, [0, 1]
 };
 
+/// Part of a ray through a volume.
+struct VolumeSegment {
+  Imath::V3d origin, direction;  ///< world space; unit length
+  double near, far;              ///< distances in world units; `far` may be infinite
+};
+
 /// A volume that is drawn by direct volume rendering: each point emits and absorbs light by the
 /// transfer function of the trilinear interpolant. Along a ray the emission–absorption integral is
 ///
@@ -33,7 +42,8 @@ struct VolumeShading {
 /// the ray. It is replaced by linear pieces, so short that the optical depth of a cell changes by
 /// less than a tolerance. Linear pieces are cut at the points of the transfer function, and
 /// integrated in closed form, as in pre-integrated volume rendering [Engel01]. A cell has at most
-/// 4096 pieces. Blocks of 8³ cells without extinction are skipped.
+/// 4096 pieces. Blocks of 8³ cells without extinction are skipped. The code is
+/// render/shaders/direct.glsl, which the GPU runs, too.
 ///
 /// The class has value semantics. Copies share the numbers and the ranges of the volume. All
 /// methods may run concurrently.
@@ -51,9 +61,11 @@ class DirectVolume {
   DirectVolume(const VolumeSurface& volume, std::vector<TransferPoint> points,
                double tolerance = kTolerance);
 
-  [[nodiscard]] const levelset::Volume& volume() const { return volume_; }
+  [[nodiscard]] const levelset::Volume& volume() const;
   [[nodiscard]] const TransferFunction& transfer() const { return transfer_; }
-  [[nodiscard]] const Imath::M44d& worldToIndex() const { return worldToIndex_; }
+  [[nodiscard]] const Imath::M44d& worldToIndex() const;
+  /// Bounds of the grid points, world units.
+  [[nodiscard]] Imath::Box3d bounds() const { return volume().grid().bounds(); }
   /// Share of the blocks that are skipped, because all their values have no extinction.
   [[nodiscard]] double skippedShare() const;
 
@@ -65,24 +77,18 @@ class DirectVolume {
                                   double near, double far,
                                   const VolumeShading* shading = nullptr) const;
   /// Brightness of a point by the direction of the gradient, [0, 1]. The gradient is interpolated
-  /// between central differences at the grid points. @param index  position in the grid
+  /// between central differences at the grid points. The judge uses this function; the kernel has
+  /// its own. @param index  position in the grid
   [[nodiscard]] double brightness(const Imath::V3d& index, const VolumeShading& shading) const;
 
- private:
-  /// @param slope  gradient of the values, per grid spacing
-  [[nodiscard]] double brightnessOf(const Imath::V3d& slope, const VolumeShading& shading) const;
-  template <typename Number>
-  [[nodiscard]] VolumeLight lightOf(const Imath::V3d& origin, const Imath::V3d& direction,
-                                    double near, double far, const VolumeShading* shading) const;
+  /// Data for the back ends of the kernel. Copies of this object share them.
+  [[nodiscard]] const std::shared_ptr<const LightTables>& tables() const { return tables_; }
+  /// A ray for the kernel.
+  [[nodiscard]] LightStart start(const VolumeSegment& segment) const;
 
-  levelset::Volume volume_;
+ private:
   TransferFunction transfer_;
-  double tolerance_;
-  Imath::M44d worldToIndex_;
-  double plainGradient_;        // gradients of half this size count as no surface, per world unit
-  Imath::V3i blocks_, groups_;  // along each axis
-  std::vector<char> hasExtinction_;  // of blocks, ordered by x, y, z
-  std::vector<char> groupHasExtinction_;
+  std::shared_ptr<const LightTables> tables_;
 };
 
 }  // namespace render

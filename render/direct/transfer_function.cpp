@@ -88,21 +88,6 @@ V3d TransferFunction::emissionIn(const Piece& piece, double value) {
   return colour * extinctionIn(piece, value);
 }
 
-TransferFunction::Part TransferFunction::partOf(const Piece& piece, double from, double to,
-                                                double share) {
-  const double middle = 0.5 * (from + to);
-  Part part{share, extinctionIn(piece, middle), V3d(0)};
-  if (part.extinction == 0) return part;
-  if (piece.slope == 0 && piece.turn == V3d(0)) {
-    part.emission = piece.colour * part.extinction;
-    return part;
-  }
-  // Simpson's rule is exact for quadratic polynomials.
-  part.emission =
-      (emissionIn(piece, from) + emissionIn(piece, middle) * 4.0 + emissionIn(piece, to)) / 6;
-  return part;
-}
-
 double TransferFunction::extinction(double value) const {
   return extinctionIn(pieces_[pieceAt(value)], value);
 }
@@ -111,15 +96,23 @@ V3d TransferFunction::emission(double value) const {
   return emissionIn(pieces_[pieceAt(value)], value);
 }
 
-TransferFunction::Bounds TransferFunction::boundsBetween(double low, double high) const {
+bool TransferFunction::isEmptyBetween(double low, double high) const {
   std::size_t n = pieceAt(low);
-  Bounds bounds{extinctionIn(pieces_[n], low), std::abs(pieces_[n].slope)};
-  for (; n + 1 < pieces_.size() && pieces_[n + 1].low < high; ++n) {
-    bounds.extinction = std::max(bounds.extinction, pieces_[n + 1].extinction);
-    bounds.slope = std::max(bounds.slope, std::abs(pieces_[n + 1].slope));
+  if (extinctionIn(pieces_[n], low) > 0) return false;
+  for (; n + 1 < pieces_.size() && pieces_[n + 1].low < high; ++n)
+    if (pieces_[n + 1].extinction > 0) return false;
+  return extinctionIn(pieces_[n], high) == 0;
+}
+
+std::vector<double> TransferFunction::pieceNumbers() const {
+  std::vector<double> numbers;
+  for (const Piece& piece : pieces_) {
+    const bool hasOneColour = piece.turn == V3d(0);
+    numbers.insert(numbers.end(), {piece.low, hasOneColour ? 0 : piece.width, piece.extinction,
+                                   piece.slope, piece.colour.x, piece.colour.y, piece.colour.z,
+                                   piece.turn.x, piece.turn.y, piece.turn.z});
   }
-  bounds.extinction = std::max(bounds.extinction, extinctionIn(pieces_[n], high));
-  return bounds;
+  return numbers;
 }
 
 std::vector<TransferPoint> parseTransfer(const std::string& text) {

@@ -38,41 +38,11 @@ class TransferFunction {
   [[nodiscard]] double extinction(double value) const;
   /// Emitted light at a value: colour × extinction, per world unit.
   [[nodiscard]] Imath::V3d emission(double value) const;
-  /// Bounds over a range of values: the largest extinction, per world unit, and its largest change
-  /// for a change of the value, per world unit and value unit.
-  struct Bounds {
-    double extinction = 0, slope = 0;
-  };
-  [[nodiscard]] Bounds boundsBetween(double low, double high) const;
   /// True when the extinction is 0 at all values from `low` to `high`.
-  [[nodiscard]] bool isEmptyBetween(double low, double high) const {
-    return boundsBetween(low, high).extinction == 0;
-  }
-  /// Part of a run of linear values that lies between two points: its share of the run, and the
-  /// means of extinction and emission on it, per world unit.
-  struct Part {
-    double share = 0, extinction = 0;
-    Imath::V3d emission = Imath::V3d(0);
-  };
-  /// Calls visit(Part) for the parts of a run whose values go linearly from `from` to `to`, in that
-  /// order. The means are exact.
-  template <typename Visit>
-  void alongRun(double from, double to, const Visit& visit) const {
-    const bool isRising = from <= to;
-    std::size_t n = pieceAt(from);
-    if (!isRising && from == pieces_[n].low && n > 0) --n;
-    double at = from;
-    for (;;) {
-      const bool isLast = isRising ? n + 1 == pieces_.size() || pieces_[n + 1].low >= to
-                                   : n == 0 || pieces_[n].low <= to;
-      const double next = isLast ? to : isRising ? pieces_[n + 1].low : pieces_[n].low;
-      const double share = isLast && at == from ? 1 : (next - at) / (to - from);
-      if (share > 0) visit(partOf(pieces_[n], at, next, share));
-      if (isLast) return;
-      at = next;
-      isRising ? ++n : --n;
-    }
-  }
+  [[nodiscard]] bool isEmptyBetween(double low, double high) const;
+  /// Numbers of the pieces between the points for the kernel, see render/shaders/transfer.glsl.
+  [[nodiscard]] std::vector<double> pieceNumbers() const;
+  [[nodiscard]] int pieceCount() const { return static_cast<int>(pieces_.size()); }
 
  private:
   struct Piece {  // from a point to the next one
@@ -84,7 +54,6 @@ class TransferFunction {
   [[nodiscard]] std::size_t pieceAt(double value) const;
   [[nodiscard]] static double extinctionIn(const Piece& piece, double value);
   [[nodiscard]] static Imath::V3d emissionIn(const Piece& piece, double value);
-  [[nodiscard]] static Part partOf(const Piece& piece, double from, double to, double share);
 
   std::vector<TransferPoint> points_;
   std::vector<Piece> pieces_;  // the first and the last extend to infinity

@@ -14,6 +14,7 @@
 #include "levelset/error.h"
 #include "render/gpu/gl_objects.h"
 #include "render/gpu/gpu_fields.h"
+#include "render/gpu/gpu_light.h"
 #include "render/gpu/nano_grid.h"
 #include "render/kernel/trace_glsl.h"
 
@@ -236,12 +237,14 @@ struct GpuTracer::Impl {
       fetched{GrowingBuffer::Use::Fetch};
   std::map<Variant, GLuint> programs;
   std::optional<GpuFields> fields;
+  GpuLight light;
   double shaderSeconds = 0;
 
   Impl(const GlContext& context_, std::size_t largestTable_)
       : context(context_),
         gl(context_.gl()),
-        largestTable(largestTable_ > 0 ? largestTable_ : context_.largestTable()) {
+        largestTable(largestTable_ > 0 ? largestTable_ : context_.largestTable()),
+        light(context_, largestTable) {
     shift = static_cast<int>(std::bit_width(largestTable / sizeof(float))) - 1;
     shift = std::min(shift, 30);  // indices of values fit into a signed 32-bit integer
   }
@@ -254,6 +257,7 @@ struct GpuTracer::Impl {
     for (GrowingBuffer* buffer : {&rays, &hits, &fetched}) buffer->release(context);
     for (const auto& [variant, program] : programs) gl.DeleteProgram(program);
     if (fields) fields->release();
+    light.release();
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
@@ -466,6 +470,12 @@ std::vector<double> GpuTracer::search(const FieldTraversal& fields,
                                       const std::vector<FieldSegment>& segments,
                                       FieldQuestion question) const {
   return impl_->fields->search(fields, segments, question);
+}
+
+std::vector<VolumeLight> GpuTracer::volumeLight(const DirectVolume& volume,
+                                                const std::vector<VolumeSegment>& segments,
+                                                const VolumeShading* shading) const {
+  return impl_->light.light(volume, segments, shading);
 }
 
 double GpuTracer::shaderSeconds() const {

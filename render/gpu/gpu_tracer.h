@@ -31,6 +31,10 @@ class GpuTracer : public KernelTracer {
   [[nodiscard]] std::vector<double> search(const FieldTraversal& fields,
                                            const std::vector<FieldSegment>& segments,
                                            FieldQuestion question) const override;
+  /// @throws levelset::ResourceLimit for the reasons of GpuLight::light()
+  [[nodiscard]] std::vector<VolumeLight> volumeLight(const DirectVolume& volume,
+                                                     const std::vector<VolumeSegment>& segments,
+                                                     const VolumeShading* shading) const override;
 
   /// Returns the wall time, seconds, of the shaders of all trace() calls so far. The time of
   /// transfers is not included.

@@ -148,6 +148,16 @@ double refinedDepth(const KernelSolid& solid, const PixelBlock& pixels, std::siz
 
 }  // namespace
 
+std::vector<VolumeLight> KernelTracer::volumeLight(const DirectVolume& volume,
+                                                   const std::vector<VolumeSegment>& segments,
+                                                   const VolumeShading* shading) const {
+  std::vector<VolumeLight> light;
+  light.reserve(segments.size());
+  for (const auto& [origin, direction, near, far] : segments)
+    light.push_back(volume.light(origin, direction, near, far, shading));
+  return light;
+}
+
 KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter)
     : meshes_(scene), mapped_(scene) {
   makeTables(scene, {.filter = filter, .maxBytes = maxBytes}, false);

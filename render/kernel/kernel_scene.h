@@ -10,6 +10,7 @@
 
 #include "levelset/memory_limit.h"
 #include "render/bricks/brick_pool.h"
+#include "render/direct/direct_volume.h"
 #include "render/kernel/csg_traversal.h"
 #include "render/kernel/field_traversal.h"
 #include "render/kernel/ray_block.h"
@@ -44,6 +45,11 @@ class KernelTracer : public FieldTracer {
   virtual void trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits,
                      ShapeBlock& shapes) const = 0;
   virtual void trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits) const = 0;
+  /// Light of a volume on parts of rays. The default integrates on the calling thread.
+  /// @param shading  null: colours do not depend on the gradient
+  [[nodiscard]] virtual std::vector<VolumeLight> volumeLight(
+      const DirectVolume& volume, const std::vector<VolumeSegment>& segments,
+      const VolumeShading* shading) const;
 };
 
 /// Hits of the rays through a block of pixels with solids, at most one for each ray.

@@ -12,6 +12,7 @@
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
 #include "render/camera.h"
+#include "render/hit.h"
 #include "render/images/value_bits.h"
 #include "render/scene/csg_expression.h"
 #include "render/scene/mapped_texture.h"
@@ -62,10 +63,6 @@ struct MeshPart {
   std::string name = {};
   double opacity = 1;  ///< opacity of the surface, for each crossing of a ray, (0, 1]
 };
-
-/// Renderers end a ray when the transmittance of the surfaces along it falls below this value, as
-/// if the last surface were opaque.
-inline constexpr double kLeastTransmittance = 1.0 / 512;
 
 /// A plane below the drawn surfaces that shows only their shadows. Where light is blocked, the
 /// picture is black with an opacity of the blocked share; elsewhere it is transparent. The layers

@@ -12,7 +12,7 @@
 #include "apps/viewer/volume/volume_slices.h"
 #include "levelset/memory_limit.h"
 #include "render/cpu/cpu_tracer.h"
-#include "render/direct/volume_light.h"
+#include "render/views/volume_light.h"
 #include "render/gpu/gl_context.h"
 #include "render/gpu/gpu_tracer.h"
 #include "render/kernel/kernel_scene.h"

@@ -17,7 +17,7 @@
 #include "apps/viewer/volume/volume_slices.h"
 #include "levelset/error.h"
 #include "render/cpu/cpu_renderer.h"
-#include "render/direct/volume_light.h"
+#include "render/views/volume_light.h"
 #include "tests/support/files.h"
 #include "tests/support/volumes.h"
 

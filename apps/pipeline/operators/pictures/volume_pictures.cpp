@@ -12,7 +12,7 @@
 #include "apps/pipeline/operators/volume_params.h"
 #include "levelset/error.h"
 #include "levelset/volumes/histogram.h"
-#include "render/direct/volume_light.h"
+#include "render/views/volume_light.h"
 
 namespace pipeline {
 namespace {

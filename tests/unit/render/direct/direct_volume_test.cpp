@@ -14,7 +14,9 @@
 #include "levelset/volumes/synthetic.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/direct/judged_light.h"
-#include "render/direct/volume_light.h"
+#include "render/direct/light_kernel.h"
+#include "render/direct/light_tables.h"
+#include "render/views/volume_light.h"
 #include "tests/support/measured.h"
 #include "tests/support/volume_scenes.h"
 
@@ -76,6 +78,20 @@ std::vector<std::array<V3d, 2>> raysThrough(const Volume& volume, std::size_t co
   return rays;
 }
 
+/// Calls visit(part) for the parts of a run of linear values, as the kernel finds them.
+template <typename Visit>
+void alongRun(const TransferFunction& transfer, double from, double to, const Visit& visit) {
+  const std::vector<double> pieces = transfer.pieceNumbers();
+  TransferKernel kernel(pieces, transfer.pieceCount());
+  int steps = 0, n = kernel.firstPiece(from, to, steps);
+  double at = from;
+  for (bool isLast = false; !isLast;) {
+    const TransferKernel::Part part = kernel.nextPart(from, to, n, at);
+    isLast = part.isLast;
+    visit(part);
+  }
+}
+
 TEST(TransferFunction, IntegratesInClosedForm) {
   const TransferFunction transfer(kBusy, 0.1);
   for (const double from : {-1.0, -0.45, 0.0, 0.2})
@@ -93,12 +109,12 @@ TEST(TransferFunction, IntegratesInClosedForm) {
       for (const bool isRising : {true, false}) {
         double share = 0, extinction = 0;
         V3d emission(0);
-        transfer.alongRun(isRising ? from : to, isRising ? to : from,
-                          [&](const TransferFunction::Part& part) {
-                            share += part.share;
-                            extinction += part.share * part.extinction;
-                            emission += part.emission * part.share;
-                          });
+        alongRun(transfer, isRising ? from : to, isRising ? to : from,
+                 [&](const TransferKernel::Part& part) {
+                   share += part.share;
+                   extinction += part.share * part.extinction;
+                   emission += V3d(part.red, part.green, part.blue) * part.share;
+                 });
         EXPECT_NEAR(share, 1, 1e-12);
         EXPECT_NEAR(extinction * (to - from), sum, 1e-6);
         EXPECT_NEAR((emission * (to - from) - light).length(), 0, 1e-6);
@@ -106,13 +122,13 @@ TEST(TransferFunction, IntegratesInClosedForm) {
     }
   // A run of one value, also at a point.
   for (const double value : {-0.3, 0.05, 0.2, 9.0})
-    transfer.alongRun(value, value, [&](const TransferFunction::Part& part) {
+    alongRun(transfer, value, value, [&](const TransferKernel::Part& part) {
       EXPECT_EQ(part.share, 1);
       EXPECT_NEAR(part.extinction, transfer.extinction(value), 1e-12);
     });
   // Noise near zero, far from the first point of the function.
   const TransferFunction wide({{-1000, 0.1}, {1000, 0.5}}, 1);
-  wide.alongRun(-1e-13, 3e-13, [&](const TransferFunction::Part& part) {
+  alongRun(wide, -1e-13, 3e-13, [&](const TransferKernel::Part& part) {
     EXPECT_NEAR(part.extinction, wide.extinction(0), 1e-12);
   });
   EXPECT_TRUE(transfer.isEmptyBetween(-0.1, 0.1));
@@ -160,6 +176,39 @@ TEST(TransferFunction, SuggestsOneForAnyHistogram) {
     if (high > low) {
       EXPECT_EQ(transfer.extinction(low), 0);
     }
+  }
+}
+
+TEST(DirectVolume, AbsorbsByTheExponentialFunction) {
+  const Volume volume = sampled({V3i(2), M44d()}, [](const V3d&) { return 1; });
+  const DirectVolume direct = directVolume(volume, {{1, 0.5}});
+  LightKernel<float> kernel(*direct.tables(), nullptr);
+  double largest = 0;
+  for (double depth = 1e-12; depth < 200; depth *= 1.01) {
+    const double truth = -std::expm1(-depth);
+    largest = std::max(largest, std::abs(kernel.absorbedBy(depth) - truth) / truth);
+  }
+  EXPECT_LT(largest, 3 * std::numeric_limits<double>::epsilon());
+  EXPECT_EQ(kernel.absorbedBy(0), 0);
+}
+
+TEST(DirectVolume, HasEnoughPieces) {
+  const Volume volume = sampled({V3i(2), M44d()}, [](const V3d&) { return 1; });
+  const DirectVolume direct = directVolume(volume, {{1, 0.5}});
+  LightKernel<float> kernel(*direct.tables(), nullptr);
+  for (double square = 1e-3; square < 1e9; square *= 1.37)
+    EXPECT_EQ(kernel.pieceCountOf(square, 0.5),
+              static_cast<int>(std::clamp(std::ceil(std::sqrt(square)), 1.0, 4096.0)));
+  for (int n = 1; n <= 4096; n += 5) {
+    EXPECT_EQ(kernel.pieceCountOf(static_cast<double>(n) * n, 0), n);
+    EXPECT_EQ(kernel.pieceCountOf(std::nextafter(static_cast<double>(n) * n, HUGE_VAL), 0),
+              std::min(n + 1, 4096));
+    EXPECT_EQ(kernel.pieceCountOf(0, n), n);
+    EXPECT_EQ(kernel.pieceCountOf(0, n - 0.5), n);
+  }
+  for (const double much : {4096.5, 1e300, HUGE_VAL}) {
+    EXPECT_EQ(kernel.pieceCountOf(much * much, 1), 4096);
+    EXPECT_EQ(kernel.pieceCountOf(1, much), 4096);
   }
 }
 

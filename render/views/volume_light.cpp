@@ -1,4 +1,4 @@
-#include "render/direct/volume_light.h"
+#include "render/views/volume_light.h"
 
 #include <tbb/parallel_for.h>
 
