@@ -8,6 +8,7 @@
 #include <mutex>
 
 #include "levelset/error.h"
+#include "render/direct/judged_light.h"
 #include "render/shading/shading.h"
 #include "render/views/picture.h"
 
@@ -25,6 +26,7 @@ struct PixelPainter {
   const RenderOptions& options;
   Shader shader;
   PictureLayers layers;
+  VolumeShading shading;
 
   PixelPainter(const Scene& scene_, const EmbreeScene& rays_, const RenderOptions& options_,
                Image& image)
@@ -32,7 +34,9 @@ struct PixelPainter {
         rays(rays_),
         options(options_),
         shader(scene_, rays_.bounds().size().length(), options_),
-        layers(image, options_) {}
+        layers(image, scene_, options_) {
+    shading.toLight = keyDirection(scene_);
+  }
 
   void paint(int x, int y) const {
     const std::size_t i =
@@ -50,9 +54,17 @@ struct PixelPainter {
       layers.thickness[i] =
           static_cast<float>(rays.thickness(ray.origin, ray.direction, ray.near, ray.far));
     const Hit hit = rays.intersect(ray.origin, ray.direction, ray.near, ray.far);
+    if (layers.volume[0])
+      layers.setVolume(i, volumeLight(ray, ray.near, hit.found ? hit.distance : ray.far));
     if (!hit.found) return;
     layers.setHit(i, scene.camera, hit);
     if (options.curvature) layers.setCurvature(i, hit.curvature);
+  }
+
+  /// Light of the scene's volume on a part of a ray.
+  [[nodiscard]] VolumeLight volumeLight(const Camera::Ray& ray, double near, double far) const {
+    return judgedLight(scene.volumePart->volume, ray.origin, ray.direction, near, far,
+                       scene.volumePart->isShaded ? &shading : nullptr);
   }
 
   /// Paints the mean colour of the pixel's samples.
@@ -73,13 +85,22 @@ struct PixelPainter {
     for (int s = 0; s < options.samples; ++s) {
       const V2d at = area.at(s);
       const Camera::Ray ray = scene.camera.ray(x + at.x, y + at.y);
-      double seen = 1;
+      double seen = 1, lit = ray.near;
+      const auto addVolume = [&](double far) {
+        if (!scene.volumePart || !(lit < far)) return;
+        const VolumeLight light = volumeLight(ray, lit, far);
+        sum.add(light, seen);
+        seen *= light.transmittance;
+        lit = far;
+      };
       for (const Hit& hit : rays.intersectVisible(ray.origin, ray.direction, ray.near, ray.far)) {
+        addVolume(hit.distance);
         sum.add(shader.colour(hit, ray.direction, lightAt(hit, ray.direction, s)),
                 seen * hit.opacity);
         seen *= 1 - hit.opacity;
       }
       if (seen < kLeastTransmittance) continue;
+      addVolume(ray.far);
       if (const Hit hit = shader.groundHit(ray); hit.found)
         sum.add(Imath::C3f(0), seen * shader.shadowOpacity(hit, lightAt(hit, ray.direction, s)));
     }

@@ -36,6 +36,7 @@ struct Layer {
   std::string name, measure;
   LayerTolerance allowed;
   Difference at;
+  bool isOfMisses = false;  ///< compared also in pixels that no surface is hit in
 };
 
 double apart(double a, double b) {
@@ -110,6 +111,7 @@ class Comparer {
     hitA_ = hits(a_);
     hitB_ = hits(b_);
     isCompared_.assign(result_.pixels, 0);
+    areMissed_.assign(result_.pixels, 0);
   }
 
   /// Calls visit(index) for a pixel and its up to eight neighbours.
@@ -171,6 +173,7 @@ class Comparer {
         const bool isInner = areHit && isInnerOutline(x, y);
         result_.bothHit += areHit && !isInner;
         isCompared_[i] = areHit && !isInner;
+        areMissed_[i] = hitA_[i] == kMissed && hitB_[i] == kMissed;
         if (hitA_[i] == hitB_[i] && !isBroken && !isInner) continue;
         shown[i] = hitB_[i] == kHit && !isInner ? -1 : 1;
         // Require the outline in both pictures: a hole that only one picture has is surrounded by
@@ -243,6 +246,16 @@ class Comparer {
   }
   [[nodiscard]] double depth(std::size_t i) const {
     return std::max(std::abs(value(a_, "Z", i)), std::abs(value(b_, "Z", i)));
+  }
+
+  /// Largest finite number in channels of both pictures, and at least 1.
+  [[nodiscard]] double largestOf(const std::vector<std::string>& channels) const {
+    double most = 1;
+    for (const std::string& channel : channels)
+      for (std::size_t i = 0; has(channel) && i < result_.pixels; ++i)
+        for (const Image* image : {&a_, &b_})
+          if (const double v = value(*image, channel, i); std::isfinite(v)) most = std::max(most, v);
+    return most;
   }
 
   std::vector<Layer> layers() {
@@ -323,6 +336,20 @@ class Comparer {
                                   const double angle = d <= 2 ? 2 * std::asin(d / 2) : kInfinite;
                                   return std::max(0.0, angle - turnBetweenPlaces(i));
                                 }});
+    // Both renderers have errors of about 1e-3 of the brightest light, and the kernel ends a ray
+    // when less than 1/512 of the light passes.
+    constexpr double kLightError = 1.0 / 128;
+    const std::vector<std::string> light = {"volume.R", "volume.G", "volume.B", "volume.A"};
+    add(light, {"volume",
+                "relative to the brightest",
+                {kLightError, kLightError},
+                [this, light, brightest = largestOf(light)](std::size_t i) {
+                  double most = 0;
+                  for (const std::string& c : light)
+                    most = std::max(most, apart(value(a_, c, i), value(b_, c, i)));
+                  return most / brightest;
+                },
+                true});
     for (const auto& [name, channel] : a_.channels) {
       if (compared.count(name) || name == "A" || !has(name)) continue;
       add({name}, {name, "absolute", {kInfinite, kInfinite}, [this, name = name](std::size_t i) {
@@ -356,7 +383,7 @@ class Comparer {
       return p.value > q.value;
     };
     for (std::size_t i = 0; i < result_.pixels; ++i) {
-      if (!isCompared_[i]) continue;
+      if (!isCompared_[i] && !(layer.isOfMisses && areMissed_[i])) continue;
       const double difference = layer.at(i);
       shown[i] = static_cast<float>(difference);
       sorted.push_back(difference);
@@ -418,6 +445,7 @@ class Comparer {
   std::vector<char> hitA_, hitB_;
   std::vector<char> isCompared_;  // 1: both pictures hit the same surface in the pixel, so layers
                                   // are compared there
+  std::vector<char> areMissed_;   // 1: no picture hits a surface in the pixel
   ImageComparison result_;
 };
 

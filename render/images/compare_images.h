@@ -27,7 +27,7 @@ struct PixelDifference {
 struct LayerComparison {
   std::string layer;           ///< "Z", "N", "P", "curvature.mean", "id", "colour" …
   std::string measure;         ///< measure of the difference: "relative", "radians" …
-  std::size_t compared = 0;    ///< number of pixels that show the same surface in both pictures
+  std::size_t compared = 0;    ///< number of pixels in which the layer is compared
   double median = 0, p99 = 0;  ///< percentiles of the differences in these pixels, in `measure`
   double p999 = 0, largest = 0;
   LayerTolerance allowed{};
@@ -87,6 +87,8 @@ struct ImageComparisonOptions {
 /// - curvature: difference times the voxel size in the first header (ls:voxelSize; 1 if missing).
 /// For curvature.gauss, times its square.
 /// - thickness: as Z.
+/// - volume, of the layers volume.R, .G, .B and .A: largest difference, relative to the largest
+/// number in them or to 1. It is compared also in pixels that both pictures miss.
 /// - id: 0 for equal numbers, 1 for different ones.
 /// - colour: largest difference of R, G and B. Any other channel: difference of the values.
 /// @throws levelset::InvalidInput for pictures of different sizes, or without Z and A

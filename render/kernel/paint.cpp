@@ -48,7 +48,7 @@ KernelPainter::KernelPainter(const Scene& scene, const KernelScene& surfaces,
       options_(options),
       camera_(scene.camera),
       shader_(scene, surfaces.bounds().size().length(), options),
-      layers_(image, options) {}
+      layers_(image, scene, options) {}
 
 void KernelPainter::paint(const KernelTracer& tracer, const PixelBox& box) const {
   const std::vector<Pixel> pixels = pixelsOf(box);
@@ -210,11 +210,14 @@ std::vector<char> KernelPainter::paintData(const KernelTracer& tracer,
   std::vector<LightRay> shadowRays;
   const PixelHits hits = surfaces_.castPixels(tracer, at);
   const std::vector<Hit> onFields = hitsOnFields(tracer, views);
+  std::vector<VolumeSegment> inVolume;  // from the camera to the first surfaces
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     const auto& [x, y] = pixels[i];
     const std::size_t number = numberOf(pixels[i]);
     const Camera::Ray& ray = views[i];
     Hit hit = hitOf(ray, ray.near, hits, onFields, i);
+    if (layers_.volume[0])
+      inVolume.push_back({ray.origin, ray.direction, ray.near, hit.found ? hit.distance : ray.far});
     if (hit.found) {
       layers_.setHit(number, scene_.camera, hit);
       if (options_.curvature) layers_.setCurvature(number, hit.curvature);
@@ -227,6 +230,10 @@ std::vector<char> KernelPainter::paintData(const KernelTracer& tracer,
         !LightLattice::isPenumbra(estimate.light))
       probes.push_back({i, estimate.light.key,
                         shader_.addShadowRays(hit, ray.direction, x, y, kProbes, shadowRays)});
+  }
+  if (layers_.volume[0]) {
+    const std::vector<VolumeLight> light = lightOfVolume(tracer, inVolume);
+    for (std::size_t i = 0; i < pixels.size(); ++i) layers_.setVolume(numberOf(pixels[i]), light[i]);
   }
   std::vector<char> contradicts(pixels.size(), 0);
   const std::vector<double> light = surfaces_.transmittances(tracer, shadowRays);
@@ -256,7 +263,7 @@ void KernelPainter::paintColours(const KernelTracer& tracer, const std::vector<P
       const double x = static_cast<double>(at.x[i]) + middleX,
                    y = static_cast<double>(at.y[i]) + middleY;
       const Camera::Ray ray = camera_.at(x, y);
-      sampleRays.push_back({ray, x, y, ray.near});
+      sampleRays.push_back({.ray = ray, .x = x, .y = y, .meshNear = ray.near, .lit = ray.near});
       views.push_back(ray);
     }
     const std::vector<Hit> onFields = hitsOnFields(tracer, views);
@@ -278,6 +285,36 @@ void KernelPainter::paintColours(const KernelTracer& tracer, const std::vector<P
   }
   for (std::size_t i = 0; i < pixels.size(); ++i)
     layers_.setColour(numberOf(pixels[i]), sums[i], options_.samples);
+}
+
+std::vector<VolumeLight> KernelPainter::lightOfVolume(
+    const KernelTracer& tracer, const std::vector<VolumeSegment>& segments) const {
+  VolumeShading shading;
+  shading.toLight = keyDirection(scene_);
+  return tracer.volumeLight(scene_.volumePart->volume, segments,
+                            scene_.volumePart->isShaded ? &shading : nullptr);
+}
+
+void KernelPainter::addVolume(const KernelTracer& tracer, const std::vector<Hit>& hits,
+                              std::vector<SampleRay>& sampleRays,
+                              std::vector<ColourSum>& sums) const {
+  std::vector<VolumeSegment> segments;
+  std::vector<std::size_t> numbers;  // of the rays of `segments`
+  for (std::size_t i = 0; i < sampleRays.size(); ++i) {
+    SampleRay& sampleRay = sampleRays[i];
+    const Camera::Ray& ray = sampleRay.ray;
+    const double far = hits[i].found ? hits[i].distance : ray.far;
+    if (sampleRay.left < kLeastTransmittance || !(sampleRay.lit < far)) continue;
+    segments.push_back({ray.origin, ray.direction, sampleRay.lit, far});
+    numbers.push_back(i);
+    sampleRay.lit = far;
+  }
+  const std::vector<VolumeLight> light = lightOfVolume(tracer, segments);
+  for (std::size_t n = 0; n < numbers.size(); ++n) {
+    double& left = sampleRays[numbers[n]].left;
+    sums[numbers[n]].add(light[n], left);
+    left *= light[n].transmittance;
+  }
 }
 
 std::vector<std::size_t> KernelPainter::addSeen(
@@ -310,11 +347,21 @@ std::vector<std::size_t> KernelPainter::addSeen(
     rays.clear();
     points.clear();
   };
+  // The light of a volume lies in front of the hits, and may hide them.
+  std::vector<Hit> behindVolume;
+  if (scene_.volumePart) {
+    behindVolume.resize(pixels.size());
+    for (std::size_t i = 0; i < pixels.size(); ++i)
+      if (sampleRays[i].left >= kLeastTransmittance)
+        behindVolume[i] = hitOf(sampleRays[i].ray, sampleRays[i].meshNear, hits, onFields, i);
+    addVolume(tracer, behindVolume, sampleRays, sums);
+  }
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    auto& [ray, x, y, meshNear, left] = sampleRays[i];
+    auto& [ray, x, y, meshNear, left, lit] = sampleRays[i];
     if (left < kLeastTransmittance) continue;
     if (rays.size() > kMostLightRays) addColours();
-    Hit hit = hitOf(ray, meshNear, hits, onFields, i);
+    Hit hit =
+        scene_.volumePart ? behindVolume[i] : hitOf(ray, meshNear, hits, onFields, i);
     if (!hit.found) hit = shader_.groundHit(ray);
     if (!hit.found) {
       left = 0;

@@ -58,8 +58,16 @@ class KernelPainter {
     /// Mesh hits before this distance are ignored, world units. Initially the camera's near
     /// distance, then just behind the last mesh surface that the ray hit.
     double meshNear;
-    double left = 1;  ///< transmittance of all surfaces that the ray hit so far; 0: the ray ends
+    double left = 1;  ///< transmittance of all surfaces and volumes so far; 0: the ray ends
+    double lit;       ///< distance up to which the light of the volume is in the sums
   };
+  /// Light of the scene's volume on parts of rays. @pre the scene has a volume
+  [[nodiscard]] std::vector<VolumeLight> lightOfVolume(
+      const KernelTracer& tracer, const std::vector<VolumeSegment>& segments) const;
+  /// Adds to `sums` the light of the scene's volume in front of the next hits, and dims the rays.
+  /// @param hits  one for each ray; without a hit the ray leaves the scene
+  void addVolume(const KernelTracer& tracer, const std::vector<Hit>& hits,
+                 std::vector<SampleRay>& sampleRays, std::vector<ColourSum>& sums) const;
   /// Adds to `sums` the colours at the hits of all rays whose transmittance is not yet negligible.
   /// @return indices of the rays that continue through a transparent solid (not through a
   /// transparent mesh)

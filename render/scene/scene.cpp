@@ -38,6 +38,7 @@ Imath::Box3d Scene::volumeBounds() const {
   Imath::Box3d all;
   for (const Solid& solid : solids)
     if (solid.volume) all.extendBy(solid.volume->volume().grid().bounds());
+  if (volumePart) all.extendBy(volumePart->volume.bounds());
   return all;
 }
 
@@ -91,12 +92,18 @@ std::vector<double> Scene::extents(const std::vector<Imath::V3d>& directions) co
 
 Camera framingCamera(const Scene& scene, int width, int height, double verticalFov,
                      const Imath::V3d& up) {
-  const Imath::Box3d bounds = scene.bounds();
-  if (bounds.isEmpty() && scene.hasVolume())
-    return framingCamera(scene.volumeBounds(), width, height, verticalFov, up);
-  return framingCamera(
-      bounds, [&](const std::vector<Imath::V3d>& directions) { return scene.extents(directions); },
-      width, height, verticalFov, up);
+  Imath::Box3d bounds = scene.bounds();
+  if (bounds.isEmpty()) return framingCamera(scene.volumeBounds(), width, height, verticalFov, up);
+  Imath::Box3d lit;  // grid of the volume that is drawn without an isosurface
+  if (scene.volumePart && !scene.hasVolume()) lit = scene.volumePart->volume.bounds();
+  bounds.extendBy(lit);
+  const auto extents = [&](const std::vector<Imath::V3d>& directions) {
+    std::vector<double> all = scene.extents(directions);
+    for (std::size_t d = 0; d < all.size() && !lit.isEmpty(); ++d)
+      all[d] = std::max(all[d], extentOf(lit, directions[d]));
+    return all;
+  };
+  return framingCamera(bounds, extents, width, height, verticalFov, up);
 }
 
 Ground groundOf(const Scene& scene, const Imath::V3d& up) {

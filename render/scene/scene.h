@@ -12,6 +12,7 @@
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
 #include "render/camera.h"
+#include "render/direct/direct_volume.h"
 #include "render/hit.h"
 #include "render/images/value_bits.h"
 #include "render/scene/csg_expression.h"
@@ -64,6 +65,14 @@ struct MeshPart {
   double opacity = 1;  ///< opacity of the surface, for each crossing of a ray, (0, 1]
 };
 
+/// A volume that is drawn by direct volume rendering, in front of, around and behind the surfaces
+/// of a scene. It casts no shadow and receives none.
+struct VolumePart {
+  DirectVolume volume;
+  bool isShaded = true;  ///< colours depend on the gradient and the key light
+  std::string name = {};
+};
+
 /// A plane below the drawn surfaces that shows only their shadows. Where light is blocked, the
 /// picture is black with an opacity of the blocked share; elsewhere it is transparent. The layers
 /// other than the colours do not show the plane, and it blocks no light.
@@ -83,6 +92,8 @@ struct Scene {
   std::vector<MeshPart> meshes = {};
   /// Textures drawn through maps, beside the solids. renderEmbree() does not draw them.
   std::vector<MappedTexture> mapped = {};
+  /// Not with a ground, on which the volume would have no shadow.
+  std::optional<VolumePart> volumePart = {};
   CsgExpression csg = {};  ///< expression over the solids; empty: each solid is drawn
   /// K of the smooth minimum in the expression, world units (FieldExpression); 0: sharp edges.
   double softness = 0;
@@ -96,7 +107,8 @@ struct Scene {
   [[nodiscard]] bool isOpaque() const;
   /// True when a volume is among the solids.
   [[nodiscard]] bool hasVolume() const;
-  /// World-space box of the grids of all volumes; empty without volumes.
+  /// World-space box of the grids of all volumes, of solids and of volumePart; empty without
+  /// volumes.
   [[nodiscard]] Imath::Box3d volumeBounds() const;
   /// A world-space box that contains all drawn surfaces; empty when the scene has none.
   [[nodiscard]] Imath::Box3d bounds() const;
@@ -107,7 +119,8 @@ struct Scene {
   [[nodiscard]] std::vector<double> extents(const std::vector<Imath::V3d>& directions) const;
 };
 
-/// Default camera of a scene: frames its surfaces in a three-quarter view.
+/// Default camera of a scene: frames its surfaces in a three-quarter view, and the grid of a volume
+/// of which it draws no isosurface.
 /// @throws as framingCamera() for a box
 [[nodiscard]] Camera framingCamera(const Scene& scene, int width, int height, double verticalFov,
                                    const Imath::V3d& up);

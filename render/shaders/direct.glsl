@@ -187,6 +187,7 @@ void addLinear(INOUT(VolumeRay) ray, double from, double to, double length, doub
   int n = firstPiece(from, to, steps);
   double at = from;
   bool isLast = false;
+  ++steps;
   while (!isLast) {
     ++steps;
     Part part = nextPart(from, to, n, at);
@@ -209,12 +210,19 @@ void addLinear(INOUT(VolumeRay) ray, double from, double to, double length, doub
 
 // Number of linear pieces for a cubic: the least n of which n² is at least `square`, and n at least
 // `least`. A rounded root would depend on the driver.
-int pieceCountOf(double square, double least) {
+int pieceCountOf(double square, double least, INOUT(int) steps) {
   double most = double(kMostPieces);
   if (!(square < most * most && least < most)) return kMostPieces;
   int n = int(sqrt(float(square)));
-  while (n > 0 && double(n - 1) * double(n - 1) >= square) n = n - 1;
-  while (double(n) * double(n) < square) n = n + 1;
+  steps += 2;
+  while (n > 0 && double(n - 1) * double(n - 1) >= square) {
+    n = n - 1;
+    ++steps;
+  }
+  while (double(n) * double(n) < square) {
+    n = n + 1;
+    ++steps;
+  }
   n = double(n) < least ? int(least) : n;
   n = double(n) < least ? n + 1 : n;
   return n > 1 ? n : 1;
@@ -248,7 +256,7 @@ void addCell(INOUT(VolumeRay) ray, double exit, INOUT(int) steps, int mostSteps)
     brightness = brightnessIn(ray.x, ray.y, ray.z, inCell(ray.fromX, ray.stepX, middle, ray.x),
                               inCell(ray.fromY, ray.stepY, middle, ray.y),
                               inCell(ray.fromZ, ray.stepZ, middle, ray.z));
-    steps += 8;
+    steps += 9;
   }
   // The mean of a cubic on its n linear pieces differs by half its second difference over n².
   VAR bendLow = b0 - 2.0 * b1 + b2;
@@ -256,13 +264,15 @@ void addCell(INOUT(VolumeRay) ray, double exit, INOUT(int) steps, int mostSteps)
   VAR square = 0.5 * greater(magnitude(bendLow), magnitude(bendHigh)) * bounds.slope * length / tolerance;
   // Deep pieces are split, so that light from their far ends is absorbed.
   VAR deep = bounds.extinction * length * piecesPerDepth;
-  int count = pieceCountOf(square, deep);
+  int count = pieceCountOf(square, deep, steps);
   int n = ray.pieces;
   VAR share = double(n) / double(count);
   double value = n == 0 ? b0 : cubicAt(b0, b1, b2, b3, share);
   VAR pieceLength = length / double(count);
+  ++steps;
   while (n < count && ray.passed >= leastPassed && steps < mostSteps) {
     ++n;
+    ++steps;
     share = double(n) / double(count);
     double next = n == count ? b3 : cubicAt(b0, b1, b2, b3, share);
     addLinear(ray, value, next, pieceLength, brightness, steps);
@@ -291,18 +301,43 @@ int stepAt(int x, int y, int z) {
   return !groupHasExtinction(group) ? 64 : (!blockHasExtinction(block) ? 8 : 1);
 }
 
-// Distance at which a ray leaves a box of cells across the planes of one axis.
-double leaves(int low, int size, double from, double step, double perStep, double end) {
-  double plane = double(step > 0.0 ? low + size : low);
-  VAR at = (plane - from) * perStep;
-  return step == 0.0 ? end : at;
+// Distance at which a ray crosses a plane of grid points.
+double distanceOf(int plane, double from, double perStep) {
+  VAR at = (double(plane) - from) * perStep;
+  return at;
 }
 
-// Index of the cell or block in which a ray goes on.
-int nextCell(int cell, int low, int size, bool isAcross, double from, double step, double t) {
+// Distance at which a ray leaves a box of cells across the planes of one axis.
+double leaves(int low, int size, double from, double step, double perStep, double end) {
+  return step == 0.0 ? end : distanceOf(step > 0.0 ? low + size : low, from, perStep);
+}
+
+// True when a ray that steps from cell to cell has crossed a plane before it leaves a box at the
+// distance t across the planes of the axis `across`. Of planes at one distance it crosses those of
+// the lower axis first.
+bool isCrossed(int plane, int axis, int across, double from, double perStep, double t) {
+  double at = distanceOf(plane, from, perStep);
+  return at < t || (at == t && axis < across);
+}
+
+// Index of the cell on one axis, behind a box of cells [low, low + size) that a ray leaves at the
+// distance t. It is that of a ray that steps from cell to cell, so that skipped blocks do not change
+// the light.
+int nextCell(int cell, int low, int size, int axis, int across, double from, double step,
+             double perStep, double t) {
+  bool isUp = step > 0.0;
+  if (axis == across) return isUp ? low + size : low - 1;
+  if (size == 1 || step == 0.0) return cell;
+  int first = isUp ? cell : low;
+  int last = isUp ? low + size - 1 : cell;
   VAR place = from + step * t;
-  int inside = size == 1 ? cell : int(held(floor(place), double(low), double(low + size - 1)));
-  return isAcross ? (step > 0.0 ? low + size : low - 1) : inside;
+  int n = int(held(floor(place), double(first), double(last)));
+  // Rounding of the position may have passed one plane too many or too few.
+  bool isAbove = isCrossed(n + 1, axis, across, from, perStep, t) == isUp;
+  bool isBelow = isCrossed(n, axis, across, from, perStep, t) != isUp;
+  if (isAbove && n < last) return n + 1;
+  if (isBelow && n > first) return n - 1;
+  return n;
 }
 
 // Follows a ray until it ends. If more than `mostSteps` iterations of loops are needed, ray.pieces
@@ -330,9 +365,9 @@ void follow(INOUT(VolumeRay) ray, int mostSteps) {
     exit = greater(exit, ray.t);
     if (size == 1) addCell(ray, exit, steps, mostSteps);
     if (ray.pieces == 0) {
-      int x = nextCell(ray.x, lowX, size, across == 0, ray.fromX, ray.stepX, exit);
-      int y = nextCell(ray.y, lowY, size, across == 1, ray.fromY, ray.stepY, exit);
-      int z = nextCell(ray.z, lowZ, size, across == 2, ray.fromZ, ray.stepZ, exit);
+      int x = nextCell(ray.x, lowX, size, 0, across, ray.fromX, ray.stepX, perX, exit);
+      int y = nextCell(ray.y, lowY, size, 1, across, ray.fromY, ray.stepY, perY, exit);
+      int z = nextCell(ray.z, lowZ, size, 2, across, ray.fromZ, ray.stepZ, perZ, exit);
       bool isOut = across == 3 || x < 0 || y < 0 || z < 0 || x > pointsX - 2 || y > pointsY - 2 ||
                    z > pointsZ - 2;
       ray.t = exit;

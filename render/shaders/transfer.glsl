@@ -4,7 +4,8 @@
 // Extinction and colour are linear between the points of the function, and constant beyond them. So
 // each piece has a first value, a width, the extinction and its slope, the colour, and the
 // difference to the colour of the next point. The first piece and the last extend to infinity. The
-// width is 0 in a piece of one colour. steps counts the iterations of loops, because drivers limit them.
+// width is 0 in a piece of one colour. `steps` counts the iterations of loops, with the one that ends
+// each loop, because drivers limit their sum.
 
 CONST_INT kPieceNumbers = 10;  // numbers of a piece
 CONST_INT kWidth = 1;
@@ -23,6 +24,7 @@ double pieceLow(int n) { return pieceNumber(n * kPieceNumbers); }
 // Number of the piece that holds a value.
 int pieceAt(double value, INOUT(int) steps) {
   int n = pieceCount - 1;
+  ++steps;
   while (n > 0 && value < pieceLow(n)) {
     n = n - 1;
     ++steps;
@@ -66,6 +68,7 @@ Bounds boundsBetween(double low, double high, INOUT(int) steps) {
   Bounds bounds;
   bounds.extinction = extinctionIn(n, low);
   bounds.slope = magnitude(pieceNumber(n * kPieceNumbers + kSlope));
+  ++steps;
   while (n + 1 < pieceCount && pieceLow(n + 1 < pieceCount ? n + 1 : n) < high) {
     n = n + 1;
     ++steps;

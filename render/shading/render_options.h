@@ -30,6 +30,8 @@ struct RenderOptions {
   /// the style needs no light. The colours have the same bits.
   bool layers = true;
   bool curvature = true;  ///< adds the layers curvature.mean, .gauss, .k1 and .k2
+  /// Adds the layers volume.R .G .B .A to a picture with Scene::volumePart.
+  bool volumeLight = true;
   /// Memory limit, bytes. It applies to the image and, separately, to the kernel's tables of the
   /// scene.
   std::size_t maxBytes = levelset::kNoMemoryLimit;

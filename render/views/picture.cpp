@@ -18,7 +18,7 @@ constexpr int kMaxSamples = 65536;
 
 }  // namespace
 
-PictureLayers::PictureLayers(Image& image, const RenderOptions& options) {
+PictureLayers::PictureLayers(Image& image, const Scene& scene, const RenderOptions& options) {
   r = image.addChannel("R").data();
   g = image.addChannel("G").data();
   b = image.addChannel("B").data();
@@ -33,6 +33,9 @@ PictureLayers::PictureLayers(Image& image, const RenderOptions& options) {
   for (int i = 0; options.curvature && i < 4; ++i)
     curvature[i] = image.addChannel(fmt::format("curvature.{}", kinds[i])).data();
   if (options.thickness) thickness = image.addChannel("thickness").data();
+  const char* lights[4] = {"R", "G", "B", "A"};
+  for (int c = 0; scene.volumePart && options.volumeLight && c < 4; ++c)
+    volume[c] = image.addChannel(fmt::format("volume.{}", lights[c])).data();
   auto& ids = image.ids["id"];
   ids.assign(image.pixelCount(), 0);
   id = ids.data();
@@ -61,6 +64,11 @@ void PictureLayers::addWarnings(Image& image, const Scene& scene) const {
 void PictureLayers::setCurvature(std::size_t i, const CurvatureSample& sample) const {
   const double values[4] = {sample.mean, sample.gauss, sample.k1, sample.k2};
   for (int k = 0; k < 4; ++k) curvature[k][i] = static_cast<float>(values[k]);
+}
+
+void PictureLayers::setVolume(std::size_t i, const VolumeLight& light) const {
+  for (int c = 0; c < 3; ++c) volume[c][i] = static_cast<float>(light.colour[c]);
+  volume[3][i] = static_cast<float>(1 - light.transmittance);
 }
 
 void PictureLayers::setColour(std::size_t i, const ColourSum& sum, int samples) const {
@@ -123,6 +131,10 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
   if (options.fromNanoVdb && options.filter != Filter::Trilinear)
     throw levelset::UsageError(
         "NanoVDB grids support only the trilinear filter; use that filter, or draw from bricks");
+  if (scene.volumePart && scene.ground)
+    throw levelset::UsageError(
+        "a volume with a transfer function has no shadow; leave --ground out, or draw the scene "
+        "without the volume");
   requireFields(scene);
   if (scene.isBlended() && options.filter != Filter::Trilinear)
     throw levelset::UsageError(
@@ -168,7 +180,8 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
         filterName(options.filter), solid.band.halfWidth()));
   }
   const double pixels = static_cast<double>(scene.camera.width) * scene.camera.height;
-  const double channels = 12 + (options.curvature ? 4 : 0) + (options.thickness ? 1 : 0);
+  const double channels = 12 + (options.curvature ? 4 : 0) + (options.thickness ? 1 : 0) +
+                          (scene.volumePart && options.volumeLight ? 4 : 0);
   levelset::requireMemory(pixels * 4 * channels, options.maxBytes);
 }
 
@@ -208,6 +221,11 @@ std::map<std::string, std::string> sceneAttributes(const Scene& scene,
     mapped += fmt::format("{}{:016x} in {} shells", mapped.empty() ? "" : ", ",
                           texture.band.contentHash(), texture.shells ? texture.shells->size() : 0);
   if (!mapped.empty()) attributes["ls:mapped"] = mapped;
+  if (scene.volumePart) {
+    const DirectVolume& volume = scene.volumePart->volume;
+    attributes["ls:volume"] = fmt::format("volume {:016x}", volume.volume().contentHash());
+    attributes["ls:transfer"] = transferText(volume.transfer().points());
+  }
   attributes["ls:style"] = styleName(options.style.style);
   if (!scene.csg.isEmpty()) attributes["ls:csg"] = scene.csg.text();
   if (scene.softness > 0) attributes["ls:soft"] = fmt::format("{}", scene.softness);

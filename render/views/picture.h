@@ -6,6 +6,7 @@
 #include <map>
 #include <string>
 
+#include "render/direct/direct_volume.h"
 #include "render/hit.h"
 #include "render/images/image.h"
 #include "render/scene/scene.h"
@@ -24,6 +25,11 @@ struct ColourSum {
     colour += seen * static_cast<float>(share);
     coverage += share;
   }
+  /// Adds the light of a volume. @param share  transmittance of all that is in front of it
+  void add(const VolumeLight& light, double share) {
+    colour += Imath::C3f(light.colour * share);
+    coverage += share * (1 - light.transmittance);
+  }
 };
 
 /// Pointers to the pixels of a picture's layers, so that tiles can be written in parallel. Null:
@@ -33,14 +39,17 @@ struct PictureLayers {
   float *n[3], *p[3];
   float* curvature[4] = {};
   float* thickness = nullptr;
+  float* volume[4] = {};  ///< light of the volume in front of the first surface, and its opacity
   std::uint32_t* id;
   mutable std::atomic<std::size_t> beyondBand =
       0;  ///< number of pixels whose hit has Hit::isBeyondBand
 
-  PictureLayers(Image& image, const RenderOptions& options);
+  PictureLayers(Image& image, const Scene& scene, const RenderOptions& options);
   /// Writes depth, normal, position and id of pixel `i`. @pre the normals of the hit are set
   void setHit(std::size_t i, const Camera& camera, const Hit& hit) const;
   void setCurvature(std::size_t i, const CurvatureSample& sample) const;
+  /// @pre the picture has the layers of a volume
+  void setVolume(std::size_t i, const VolumeLight& light) const;
   /// Adds the header attribute ls:warning if pixels show a blended surface outside the band of a
   /// solid that contributes to it.
   void addWarnings(Image& image, const Scene& scene) const;

@@ -18,6 +18,7 @@
 #include "levelset/files/json_depth.h"
 #include "levelset/mesh_files/mesh_file.h"
 #include "levelset/transform/transform.h"
+#include "levelset/volume_files/volume_file.h"
 #include "render/scene/field_expression.h"
 #include "render/views/picture.h"
 
@@ -65,6 +66,7 @@ std::vector<std::string> solidNames(const Scene& scene) {
 void requireNames(const Scene& scene) {
   std::vector<std::string> names = solidNames(scene);
   for (const MeshPart& part : scene.meshes) names.push_back(part.name);
+  if (scene.volumePart) names.push_back(scene.volumePart->name);
   requireSceneNames(names);
 }
 
@@ -326,6 +328,59 @@ void readMeshPart(const Reader& reader, const Json& json, const std::filesystem:
   scene.meshes.push_back(std::move(part));
 }
 
+/// The volume with its grid placed in the world by a transform.
+levelset::Volume placedBy(const Imath::M44d& transform, const levelset::Volume& volume,
+                          const levelset::Progress& progress) {
+  for (int row = 0; row < 4; ++row)
+    if (transform[row][3] != (row == 3 ? 1 : 0))
+      throw InvalidInput("the last column of the transform is not 0, 0, 0, 1");
+  levelset::VolumeGrid grid = volume.grid();
+  grid.indexToWorld = grid.indexToWorld * transform;
+  // The copy shares the numbers.
+  const auto owner = std::make_shared<const levelset::Volume>(volume);
+  return {grid,
+          volume.type(),
+          volume.scale(),
+          {owner, owner->numbers(), owner->isMapped()},
+          progress};
+}
+
+void readVolumePart(const Reader& reader, const Json& json, const std::filesystem::path& file,
+                    const ReadSceneOptions& options, const levelset::Progress& progress,
+                    Scene& scene) {
+  const std::string where = "volume 1";
+  reader.requireKnown(json, {"name", "file", "frame", "transform", "transfer", "shading"}, where);
+  levelset::ReadVolumeOptions how{.maxMemory = options.maxMemory, .progress = progress};
+  if (json.contains("frame")) {
+    const double frame = reader.number(json, "frame", where);
+    if (!(frame >= 0 && frame <= 1e9) || frame != std::floor(frame))
+      reader.refuse(where, "has a \"frame\" that is not an integer of at least 0");
+    how.frame = static_cast<int>(frame);
+  }
+  const std::string name = reader.text(json, "name", where),
+                    transfer = reader.text(json, "transfer", where);
+  bool isShaded = true;
+  if (json.contains("shading")) {
+    if (!json.at("shading").is_boolean())
+      reader.refuse(where, "has a \"shading\" that is not true or false");
+    isShaded = json.at("shading").get<bool>();
+  }
+  const std::vector<TransferPoint> points =
+      reader.withContext(where, [&] { return parseTransfer(transfer); });
+  const std::filesystem::path source = reader.partFile(json, file, where);
+  if (!levelset::isVolumeFormat(source) || levelset::isRawFormat(source))
+    reader.refuse(where, "has a \"file\" without the header of a volume; use NIfTI, MetaImage, "
+                         "NRRD or MRC");
+  levelset::Volume volume = levelset::readVolume(source, how);
+  reader.withContext(where, [&] {
+    if (json.contains("transform"))
+      volume = placedBy(reader.matrix(json, where), volume, progress);
+    // The isovalue has no effect: the surface provides the ranges of the values.
+    const VolumeSurface surface(volume, volume.highest(), VolumeInside::Above, progress);
+    scene.volumePart = VolumePart{DirectVolume(surface, points), isShaded, name};
+  });
+}
+
 }  // namespace
 
 bool isSceneFormat(const std::string& name) {
@@ -339,12 +394,12 @@ void requireSceneNames(const std::vector<std::string>& names) {
     if (name.empty() || std::isdigit(static_cast<unsigned char>(name[0])) ||
         !std::all_of(name.begin(), name.end(), isWord))
       throw levelset::UsageError(
-          fmt::format("scene: '{}' is not a valid name of a solid or mesh; use letters, digits and "
-                      "_, and no digit first",
+          fmt::format("scene: '{}' is not a valid name of a part; use letters, digits and _, and no "
+                      "digit first",
                       name));
     if (!seen.insert(name).second)
       throw levelset::UsageError(fmt::format(
-          "scene: '{}' is the name of two solids or meshes; give each a different name", name));
+          "scene: '{}' is the name of two parts; give each a different name", name));
   }
 }
 
@@ -355,6 +410,10 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
     throw levelset::UsageError(
         "a scene file cannot hold mapped textures; draw the scene with `render`, or map the "
         "texture without --instances");
+  if (scene.volumePart)
+    throw levelset::UsageError(
+        "a scene file cannot hold the numbers of a volume; write the scene without the volume, and "
+        "add the volume's file to the list \"volumes\" of the scene file");
   requireNames(scene);
   requireLight(scene);
   requireOpacity(scene);
@@ -416,8 +475,8 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
   if (reader.number(json, "version", whole) != kVersion)
     reader.refuse(whole, fmt::format("is not of version {}", kVersion));
   reader.requireKnown(json,
-                      {"format", "version", "camera", "light", "ambient", "solids", "meshes", "csg",
-                       "soft", "morph"},
+                      {"format", "version", "camera", "light", "ambient", "solids", "meshes",
+                       "volumes", "csg", "soft", "morph"},
                       whole);
   ViewedScene viewed;
   Scene& scene = viewed.scene;
@@ -432,11 +491,14 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
   const Json none = Json::array();
   const Json& solids = json.contains("solids") ? json.at("solids") : none;
   const Json& meshes = json.contains("meshes") ? json.at("meshes") : none;
-  if (!solids.is_array() || !meshes.is_array() || (solids.empty() && meshes.empty()))
-    reader.refuse(whole, "has no solids and no meshes");
-  Parts parts(options.progress, solids.size() + meshes.size());
-  // The memory limit applies to the sum of all solids and meshes, so it shrinks with each one that
-  // is read.
+  const Json& volumes = json.contains("volumes") ? json.at("volumes") : none;
+  if (!solids.is_array() || !meshes.is_array() || !volumes.is_array() ||
+      (solids.empty() && meshes.empty() && volumes.empty()))
+    reader.refuse(whole, "has no solids, no meshes and no volumes");
+  if (volumes.size() > 1)
+    reader.refuse(whole, "has several \"volumes\", but a scene can have one");
+  Parts parts(options.progress, solids.size() + meshes.size() + volumes.size());
+  // The memory limit applies to the sum of all parts, so it shrinks with each one that is read.
   ReadSceneOptions rest = options;
   rest.maxMemory = levelset::memoryLimit(options.maxMemory);
   const auto spend = [&rest](std::size_t bytes) {
@@ -450,6 +512,8 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
     readMeshPart(reader, entry, file, rest, parts.next(), scene);
     spend(bytesOf(*scene.meshes.back().mesh));
   }
+  for (const Json& entry : volumes)
+    readVolumePart(reader, entry, file, rest, parts.next(), scene);
   reader.withContext(whole, [&] { requireNames(scene); });
   std::set<std::uint32_t> ids;
   const auto isNew = [&](const auto& part) { return ids.insert(part.id).second; };

@@ -284,6 +284,14 @@ Json valueInfo(const Value& value, Invocation& in) {
                                 {"voxel_size", texture.band.voxelSize()},
                                 {"active_voxels", texture.band.activeVoxelCount()},
                                 {"shells", texture.shells->size()}});
+    if (scene.volumePart) {
+      const Imath::V3i size = scene.volumePart->volume.volume().size();
+      json["volumes"].push_back(
+          {{"name", scene.volumePart->name},
+           {"size", {size.x, size.y, size.z}},
+           {"transfer",
+            render::transferText(scene.volumePart->volume.transfer().points())}});
+    }
     if (!scene.csg.isEmpty()) json["csg"] = scene.csg.text();
     if (scene.softness > 0) json["soft"] = scene.softness;
     if (scene.morph) json["morph"] = *scene.morph;

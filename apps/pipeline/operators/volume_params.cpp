@@ -92,8 +92,8 @@ void checkVolumeOptions(const Invocation& in, bool isVolume) {
   if (isRaw) static_cast<void>(volumeOptions(in));
 }
 
-levelset::Volume volumeIn(const Invocation& in) {
-  const Value& value = in.operands[0];
+levelset::Volume volumeIn(const Invocation& in, std::size_t operand) {
+  const Value& value = in.operands[operand];
   return value.kind() == Kind::Field ? levelset::volumeOf(value.field(), in.maxMemory)
                                      : value.volume();
 }

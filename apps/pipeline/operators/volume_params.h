@@ -17,8 +17,8 @@ namespace pipeline {
 /// @throws UsageError
 void checkVolumeOptions(const Invocation& in, bool isVolume);
 
-/// Volume of the first operand. A field from a .vdb becomes one.
-[[nodiscard]] levelset::Volume volumeIn(const Invocation& in);
+/// Volume of an operand, by default of the first. A field from a .vdb becomes one.
+[[nodiscard]] levelset::Volume volumeIn(const Invocation& in, std::size_t operand = 0);
 /// Option --inside of operators that take an isovalue.
 [[nodiscard]] Param insideParam(std::string doc = "side of the isovalue that is inside");
 

@@ -95,7 +95,7 @@ class DiscCamera {
 
 bool canSplat(const render::Scene& scene) {
   return !scene.solids.empty() && scene.meshes.empty() && scene.csg.isEmpty() &&
-         !scene.isBlended() && scene.isOpaque() &&
+         !scene.isBlended() && scene.isOpaque() && !scene.volumePart &&
          std::none_of(scene.solids.begin(), scene.solids.end(),
                       [](const render::Solid& solid) { return solid.band.isOpenSurface(); });
 }
@@ -107,7 +107,7 @@ std::shared_ptr<render::Image> drawSplats(const std::vector<SurfaceDiscs>& discs
   const render::Camera& camera = scene.camera;
   const DiscCamera view(camera);
   auto image = std::make_shared<render::Image>(camera.width, camera.height);
-  const render::PictureLayers layers(*image, options);
+  const render::PictureLayers layers(*image, scene, options);
   const render::Shader shader(scene, diagonal, options);
   // The nearest disc of each pixel, for one solid after another: its depth in the upper half, its
   // number in the lower half.

@@ -12,7 +12,6 @@
 #include "apps/viewer/volume/volume_slices.h"
 #include "levelset/memory_limit.h"
 #include "render/cpu/cpu_tracer.h"
-#include "render/views/volume_light.h"
 #include "render/gpu/gl_context.h"
 #include "render/gpu/gpu_tracer.h"
 #include "render/kernel/kernel_scene.h"
@@ -67,10 +66,7 @@ struct ProgressivePicture::Worker {
   IsosurfaceView preparedIsosurface;
   std::vector<render::TransferPoint> preparedTransfer;
   std::optional<render::DirectVolume> directVolume;
-  // Light of the volume in the last picture of `view`, and the edge of a pixel there. Passes that
-  // only add samples have the same light.
-  std::vector<render::VolumeLight> light;
-  int lightPixelSize = 0;
+  std::shared_ptr<const Model> directVolumeModel;  // model of directVolume
   std::unique_ptr<ClippedScene> cut;
   std::unique_ptr<render::KernelScene> surfaces;
   std::unique_ptr<render::GlContext> context;
@@ -89,12 +85,23 @@ struct ProgressivePicture::Worker {
   [[nodiscard]] PlacedPlane plane() const {
     return placed(*view.clip, view.camera, view.model->solidBounds);
   }
+  /// The volume with the transfer function of the view.
+  [[nodiscard]] const render::DirectVolume& volumeWithTransfer() {
+    if (!directVolume || directVolumeModel != view.model ||
+        preparedTransfer != view.light.transfer) {
+      directVolume = viewer::directVolume(*view.model->volume, view.light);
+      directVolumeModel = view.model;
+      preparedTransfer = view.light.transfer;
+    }
+    return *directVolume;
+  }
   /// Scene of the view, with a camera for a picture of coarser pixels. @param edge  edge of a pixel
   /// of the picture, in pixels of the window
   [[nodiscard]] render::Scene sceneFor(int edge) {
     render::Scene scene = isCut() ? cut->at(plane()) : view.model->scene;
     scene.camera = shrunk(view.camera, edge);
     if (view.model->volume) placeIsosurface(*view.model->volume, view.isosurface, scene);
+    if (hasLight()) scene.volumePart = {volumeWithTransfer(), view.light.isShaded};
     if (view.opacity == 1 || scene.isBlended() || hasLight()) return scene;
     // The box of the clip plane, which follows the model's solids, stays opaque.
     const std::size_t solids = std::min(view.model->scene.solids.size(), scene.solids.size());
@@ -108,7 +115,6 @@ struct ProgressivePicture::Worker {
       view = request.view;
       pass = 0;
       image = nullptr;
-      lightPixelSize = 0;
     }
     display = request.display;
   }
@@ -149,6 +155,7 @@ struct ProgressivePicture::Worker {
     options.style.matcap = view.matcap ? view.matcap : matcapBall();
     options.thickness = view.hasThickness;
     options.filter = view.isosurface.filter;
+    options.volumeLight = false;
     options.maxBytes = levelset::memoryLimit(levelset::kNoMemoryLimit);
     return options;
   }
@@ -191,7 +198,6 @@ struct ProgressivePicture::Worker {
     tracer = nullptr;  // the tracer references the tables in `surfaces`
     surfaces = nullptr;
     cut = nullptr;
-    if (preparedModel != view.model) directVolume.reset();
     if (newCut)
       cut = std::make_unique<ClippedScene>(view.model->scene, view.model->solidBounds, *newCut);
     const render::Scene scene = sceneFor(1);
@@ -225,27 +231,7 @@ struct ProgressivePicture::Worker {
       progress = static_cast<double>(++done) / (across * down);
     });
     if (isStale) return nullptr;
-    if (hasLight()) addLight(*drawn, scene, how.pixelSize, isStale);
-    if (isStale) return nullptr;
     return drawn;
-  }
-
-  void addLight(render::Image& drawn, const render::Scene& scene, int edge,
-                const std::atomic<bool>& isStale) {
-    if (!directVolume || preparedTransfer != view.light.transfer) {
-      directVolume = viewer::directVolume(*view.model->volume, view.light);
-      preparedTransfer = view.light.transfer;
-      lightPixelSize = 0;
-    }
-    if (lightPixelSize != edge) {
-      light = render::volumeLight(drawn, scene, *directVolume,
-                                  {.samples = 1, .isShaded = view.light.isShaded, .isStopped = [&] {
-                                     return isStale.load();
-                                   }});
-      if (isStale) return;
-      lightPixelSize = edge;
-    }
-    render::addVolumeLight(drawn, light);
   }
 
   [[nodiscard]] std::shared_ptr<const Frame> shown() {

@@ -84,12 +84,12 @@ void showVolume(const fs::path& file, const levelset::Volume& volume, const Open
        .volume = std::make_shared<const render::VolumeSurface>(model.volume->surface)});
 }
 
-/// Paths of the level sets and meshes that a scene file names. @pre readScene() accepts the file
+/// Paths of the level sets, meshes and volumes that a scene file names. @pre readScene() accepts the file
 std::vector<fs::path> solidFilesOf(const fs::path& scene) {
   std::vector<fs::path> files;
   std::ifstream stream(scene);
   const auto json = nlohmann::json::parse(stream, nullptr, false);
-  for (const char* list : {"solids", "meshes"}) {
+  for (const char* list : {"solids", "meshes", "volumes"}) {
     if (!json.is_object() || !json.contains(list) || !json[list].is_array()) continue;
     for (const auto& part : json[list])
       if (part.is_object() && part.contains("file") && part["file"].is_string())
@@ -128,6 +128,7 @@ void measureModel(Model& model) {
   }
   // The view must not depend on the isovalue.
   model.solidBounds = model.volume ? model.scene.volumeBounds() : model.scene.bounds();
+  if (model.scene.volumePart) model.solidBounds.extendBy(model.scene.volumeBounds());
   model.bounds = model.solidBounds;
   for (const mapping::Patch& patch : model.patches) {
     for (const mapping::ParticleLayer& level : patch.layers)
@@ -148,6 +149,8 @@ void measureModel(Model& model) {
     model.description +=
         fmt::format("{}{} mesh{}", model.description.empty() ? "" : "; ", model.scene.meshes.size(),
                     model.scene.meshes.size() == 1 ? "" : "es");
+  if (model.scene.volumePart)
+    model.description += fmt::format("{}1 volume", model.description.empty() ? "" : "; ");
   if (!model.patches.empty())
     model.description +=
         fmt::format("{}{} patch{}, {} particles", model.description.empty() ? "" : "; ",

@@ -17,7 +17,6 @@
 #include "apps/viewer/volume/volume_slices.h"
 #include "levelset/error.h"
 #include "render/cpu/cpu_renderer.h"
-#include "render/views/volume_light.h"
 #include "tests/support/files.h"
 #include "tests/support/volumes.h"
 
@@ -220,10 +219,8 @@ TEST(ShownVolume, DrawsTheLightOfTheVolume) {
     render::Scene scene = model->scene;
     placeIsosurface(*model->volume, view.isosurface, scene);
     scene.camera = view.camera;
-    render::Image drawn = render::renderCpu(scene);
-    render::addVolumeLight(
-        drawn, render::volumeLight(drawn, scene, directVolume(*model->volume, view.light),
-                                   {.samples = 1}));
+    scene.volumePart = {directVolume(*model->volume, view.light)};
+    const render::Image drawn = render::renderCpu(scene);
     EXPECT_EQ(frame->image->channels.at("R"), drawn.channels.at("R"));
     EXPECT_EQ(frame->image->channels.at("A"), drawn.channels.at("A"));
   }

@@ -200,7 +200,7 @@ render::StyleOptions styleOf(const Invocation& in) {
 void coarsen(Invocation& in, render::Scene& scene) {
   const int bits = std::stoi(in.text("value-bits"));
   if (bits == 32) return;
-  if (scene.hasVolume())
+  if (scene.hasVolume() || isVolumeKind(in.operands[0].kind()))
     throw UsageError(
         "render: the values of a volume are stored in 32 bits in the ray caster; leave "
         "--value-bits out");
@@ -225,6 +225,9 @@ void coarsen(Invocation& in, render::Scene& scene) {
 Value draw(Invocation& in) {
   render::Scene scene = sceneOf(in);
   coarsen(in, scene);
+  if (in.flag("ground") && scene.volumePart)
+    throw UsageError(
+        "render: a volume with a transfer function has no shadow; leave --ground out");
   if (in.flag("ground") && !scene.bounds().isEmpty())
     scene.ground = render::groundOf(scene, scene.camera.up);
   const std::string renderer = in.text("renderer");
@@ -242,24 +245,20 @@ Value draw(Invocation& in) {
                                 .thickness = in.flag("thickness"),
                                 .maxBytes = in.maxMemory,
                                 .progress = in.progress};
-  options.layers = isBoth || scene.isBlended() || in.given("transfer") ||
-                   render::imageFormat(in.text("file"), in.text("format")) != "png";
-  // The light takes most of the time.
-  const double surfaceShare = in.given("transfer") ? 0.1 : isBoth ? 0.5 : 1;
+  const bool isExr = render::imageFormat(in.text("file"), in.text("format")) != "png";
+  options.layers = isBoth || scene.isBlended() || isExr;
+  options.volumeLight = isBoth || isExr;
+  const double surfaceShare = isBoth ? 0.5 : 1;
   options.progress = levelset::subProgress(in.progress, 0, surfaceShare);
   render::Image image = renderer == "cpu"   ? render::renderCpu(scene, options)
                         : renderer == "gpu" ? render::renderGpu(scene, options)
                         : isBoth            ? drawByKernel(in, scene, options)
                                             : render::renderEmbree(scene, options);
   const auto read = image.attributes.find("ls:read");
-  if (read != image.attributes.end() && (!in.given("transfer") || in.given("isovalue")))
+  if (read != image.attributes.end() && (!scene.solids.empty() || !scene.meshes.empty()))
     in.notes.notes.push_back(fmt::format("render: {}", read->second));
   if (const auto told = image.attributes.find("ls:warning"); told != image.attributes.end())
     in.notes.warnings.push_back(fmt::format("render: {}", told->second));
-  // For --renderer both: the picture without the volume's light, and with that of the judge.
-  render::Image surfaces, judged;
-  if (isBoth) surfaces = image;
-  if (in.given("transfer")) addLight(in, scene, options, image, isBoth ? &judged : nullptr);
   render::writeImage(in.text("file"), image, in.text("format"));
   if (in.given("png")) render::writeImage(in.text("png"), image, "png");
   if (isBoth) {
@@ -267,13 +266,11 @@ Value draw(Invocation& in) {
     // centres of pixels, and colours have no tolerance.
     options.samples = 1;
     options.ambientSamples = options.shadowSamples = 0;
-    options.progress =
-        levelset::subProgress(in.progress, in.given("transfer") ? 0.9 : surfaceShare, 1);
+    options.progress = levelset::subProgress(in.progress, surfaceShare, 1);
     const render::ImageComparison found =
-        render::compareImages(surfaces, render::renderEmbree(scene, options));
+        render::compareImages(image, render::renderEmbree(scene, options));
     in.notes.detailsJson = toJson(found).dump();
-    if (in.given("transfer")) requireSameLight(image, judged);
-    if (found.bothHit == 0 && !in.given("transfer"))
+    if (found.bothHit == 0 && !scene.volumePart)
       in.notes.warnings.push_back(
           "render: no pixel shows a surface in both pictures (kernel and embree), so no layer was "
           "compared");

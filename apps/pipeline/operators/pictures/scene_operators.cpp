@@ -10,6 +10,8 @@
 
 #include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/pictures/camera_options.h"
+#include "apps/pipeline/operators/pictures/volume_pictures.h"
+#include "apps/pipeline/operators/volume_params.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "apps/pipeline/values/units.h"
 #include "levelset/error.h"
@@ -85,7 +87,26 @@ std::vector<double> partOpacities(const Invocation& in) {
   return opacities;
 }
 
+/// Requires --transfer for a volume, and at most one volume. @throws UsageError
+void requireVolumes(const Invocation& in) {
+  const auto count =
+      std::count_if(in.operands.begin(), in.operands.end(),
+                    [](const Value& operand) { return isVolumeKind(operand.plan().kind); });
+  if (count > 1)
+    throw UsageError(fmt::format(
+        "scene: {} of the parts are volumes, but a scene can have one; draw the others as surfaces "
+        "with isosurface or isosurface-mesh",
+        count));
+  if (count == 1 && !in.given("transfer"))
+    throw UsageError(
+        "scene: a volume is drawn by direct volume rendering; give --transfer, as --transfer auto, "
+        "or make a surface of it with isosurface");
+  if (count == 0 && in.given("transfer"))
+    throw UsageError("scene: --transfer is for volumes; leave it out");
+}
+
 Plan planScene(Invocation& in) {
+  requireVolumes(in);
   Plan plan{.kind = Kind::Scene};
   for (const Value& operand : in.operands) {
     const Plan& one = operand.plan();
@@ -116,6 +137,13 @@ Value makeScene(Invocation& in) {
   for (std::size_t i = 0; i < in.operands.size(); ++i) {
     const Imath::C3f& colour = colours[i % colours.size()];
     const auto id = static_cast<std::uint32_t>(i + 1);
+    if (isVolumeKind(in.operands[i].kind())) {
+      const levelset::Volume volume = volumeIn(in, i);
+      const render::VolumeSurface surface(volume, volume.highest());
+      scene.volumePart = volumePartOf(in, surface);
+      scene.volumePart->name = names[i];
+      continue;
+    }
     if (in.operands[i].kind() == Kind::Mesh) {
       scene.meshes.push_back({std::make_shared<const levelset::TriMesh>(in.mesh(i)), colour, id,
                               names[i], opacities[i]});
@@ -143,6 +171,7 @@ Value makeScene(Invocation& in) {
 
 void validateScene(const Invocation& in) {
   validateCamera(in);
+  validateTransfer(in);
   if (in.given("soft") && !in.given("csg"))
     throw UsageError(
         "scene: --soft blends the solids of a CSG expression; give --csg, too, as --csg 'a | b'");
@@ -162,7 +191,8 @@ Operator sceneOperator() {
   Operator scene = {
       .name = "scene",
       .group = "Pictures",
-      .summary = "combine level sets and meshes in one picture, or solids by a CSG expression",
+      .summary =
+          "combine level sets, meshes and a volume in one picture, or solids by a CSG expression",
       .details =
           "With --csg the rays of 'render' combine the solids: a | b is the union, a & b the "
           "intersection, a - b the difference. Solids are not resampled; each keeps its voxels. "
@@ -170,8 +200,9 @@ Operator sceneOperator() {
           "them, with the normals and colours of their vertices if they have any. Coincident "
           "surfaces on different grids are separated by rounding only, so let the subtracted solid "
           "protrude. --soft blends the distances to the solids: surfaces closer than this length "
-          "merge. --morph interpolates between the distances of two solids. 'write scene.json' "
-          "saves the scene, with the parts in files beside it.",
+          "merge. --morph interpolates between the distances of two solids. One part may be a volume, "
+          "drawn by --transfer in front of, around and behind the surfaces. 'write scene.json' "
+          "saves a scene without a volume, with the parts in files beside it.",
       .example =
           "levelsmith box --size 2,2,2 --voxel 0.05 --as b ! sphere --radius 1.3 --voxel "
           "0.03 --as s ! scene @b @s --csg 'b - s' ! render cut.png --size 320x240",
@@ -193,12 +224,14 @@ Operator sceneOperator() {
             .doc = "names of the parts, separated by blanks; default: those of --as"},
            {.name = "colours",
             .type = ParamType::Points,
-            .doc = "colours of the parts, red,green,blue from 0 to 1 each, separated by blanks"},
+            .doc = "colours of the parts, red,green,blue from 0 to 1 each, separated by blanks; a "
+                   "volume has the colours of --transfer instead"},
            {.name = "opacities",
             .type = ParamType::Text,
             .doc = "opacities of the parts, above 0 and up to 1, separated by blanks; below 1 a "
-                   "surface is transparent in the layers R G B A and casts a weaker shadow"}},
-      .operands = {{Kind::Band, Kind::Mesh}},
+                   "surface is transparent in the layers R G B A and casts a weaker shadow; a "
+                   "volume has the opacities of --transfer instead"}},
+      .operands = {{Kind::Band, Kind::Mesh, Kind::Volume, Kind::Field}},
       .takesMore = true,
       .readsNames = true,
       .resultKind = [](const Invocation&) { return Kind::Scene; },
@@ -206,6 +239,7 @@ Operator sceneOperator() {
       .plan = planScene,
       .validate = validateScene,
   };
+  for (const Param& param : transferParams()) scene.params.push_back(param);
   addCameraParams(scene.params);
   return scene;
 }

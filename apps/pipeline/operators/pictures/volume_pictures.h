@@ -14,6 +14,14 @@ namespace pipeline {
 
 /// Returns true for the kinds of operands that are drawn as volumes.
 [[nodiscard]] bool isVolumeKind(Kind kind);
+/// Options --transfer and --no-shading.
+[[nodiscard]] std::vector<Param> transferParams();
+/// Checks the options of transferParams() before anything runs. @throws UsageError
+void validateTransfer(const Invocation& in);
+/// Volume with the transfer function of --transfer: points, or the suggestion for the histogram.
+/// @param surface  any isosurface of the volume
+[[nodiscard]] render::VolumePart volumePartOf(Invocation& in, const render::VolumeSurface& surface);
+
 /// Options of `render` for volumes.
 [[nodiscard]] std::vector<Param> volumePictureParams();
 /// Checks the options for volumes before anything runs. @throws UsageError
@@ -22,14 +30,7 @@ void validateVolumePicture(const Invocation& in);
 /// @throws UsageError
 void requireVolumeOptions(const Invocation& in);
 
-/// Scene with the isosurface of a volume. Without --isovalue the isosurface is empty.
+/// Scene with the isosurface of --isovalue, and the volume with the transfer function of --transfer.
 [[nodiscard]] render::ViewedScene volumeScene(Invocation& in);
-/// Adds the light of --transfer to a picture of volumeScene().
-/// @param judged  receives the picture with the light of the judge; null: it is not computed
-void addLight(Invocation& in, const render::Scene& scene, const render::RenderOptions& options,
-              render::Image& image, render::Image* judged);
-/// Compares the colours of a volume by the kernel and by the judge.
-/// @throws NumericalError when they differ
-void requireSameLight(const render::Image& image, const render::Image& judged);
 
 }  // namespace pipeline

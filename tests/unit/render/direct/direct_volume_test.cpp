@@ -3,7 +3,6 @@
 #include "render/direct/direct_volume.h"
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <array>
 #include <cmath>
@@ -12,11 +11,9 @@
 
 #include "levelset/error.h"
 #include "levelset/volumes/synthetic.h"
-#include "render/cpu/cpu_renderer.h"
 #include "render/direct/judged_light.h"
 #include "render/direct/light_kernel.h"
 #include "render/direct/light_tables.h"
-#include "render/views/volume_light.h"
 #include "tests/support/measured.h"
 #include "tests/support/volume_scenes.h"
 
@@ -196,19 +193,23 @@ TEST(DirectVolume, HasEnoughPieces) {
   const Volume volume = sampled({V3i(2), M44d()}, [](const V3d&) { return 1; });
   const DirectVolume direct = directVolume(volume, {{1, 0.5}});
   LightKernel<float> kernel(*direct.tables(), nullptr);
+  const auto count = [&](double square, double least) {
+    int steps = 0;
+    return kernel.pieceCountOf(square, least, steps);
+  };
   for (double square = 1e-3; square < 1e9; square *= 1.37)
-    EXPECT_EQ(kernel.pieceCountOf(square, 0.5),
+    EXPECT_EQ(count(square, 0.5),
               static_cast<int>(std::clamp(std::ceil(std::sqrt(square)), 1.0, 4096.0)));
   for (int n = 1; n <= 4096; n += 5) {
-    EXPECT_EQ(kernel.pieceCountOf(static_cast<double>(n) * n, 0), n);
-    EXPECT_EQ(kernel.pieceCountOf(std::nextafter(static_cast<double>(n) * n, HUGE_VAL), 0),
+    EXPECT_EQ(count(static_cast<double>(n) * n, 0), n);
+    EXPECT_EQ(count(std::nextafter(static_cast<double>(n) * n, HUGE_VAL), 0),
               std::min(n + 1, 4096));
-    EXPECT_EQ(kernel.pieceCountOf(0, n), n);
-    EXPECT_EQ(kernel.pieceCountOf(0, n - 0.5), n);
+    EXPECT_EQ(count(0, n), n);
+    EXPECT_EQ(count(0, n - 0.5), n);
   }
   for (const double much : {4096.5, 1e300, HUGE_VAL}) {
-    EXPECT_EQ(kernel.pieceCountOf(much * much, 1), 4096);
-    EXPECT_EQ(kernel.pieceCountOf(1, much), 4096);
+    EXPECT_EQ(count(much * much, 1), 4096);
+    EXPECT_EQ(count(1, much), 4096);
   }
 }
 
@@ -398,57 +399,80 @@ TEST(DirectVolume, TakesAllTypesOfNumbers) {
               0);
 }
 
-TEST(DirectVolume, EndsAtSurfacesOfThePicture) {
-  const Volume volume = levelset::sphereVolume(30, 0.8);
-  const VolumeSurface surface(volume, 0.3);  // a ball of radius 0.5
-  Scene scene;
-  scene.solids.push_back({.band = {}, .volume = std::make_shared<const VolumeSurface>(surface)});
-  scene.camera.from = V3d(0, 0, 5);
-  scene.camera.to = V3d(0);
-  scene.camera.width = 60;
-  scene.camera.height = 40;
-  RenderOptions options;
-  options.samples = 1;
-  const Image plain = renderCpu(scene, options);
-  const DirectVolume direct(surface, {{-0.2, 0}, {0, 0.02, C3f(0, 1, 0)}});
-  Image image = plain;
-  addVolumeLight(image, volumeLight(plain, scene, direct, {.samples = 1, .isShaded = false}));
-  std::size_t before = 0, beside = 0;
-  for (int y = 0; y < 40; ++y)
-    for (int x = 0; x < 60; ++x) {
-      const auto i = static_cast<std::size_t>(60 * y + x);
-      const Camera::Ray ray = scene.camera.ray(x + 0.5, y + 0.5);
-      const double depth = static_cast<double>(plain.channels.at("Z")[i]);
-      const VolumeLight light = direct.light(ray.origin, ray.direction, 0,
-                                             depth / ray.direction.dot(scene.camera.axis()));
-      const auto expected = static_cast<float>(
-          light.colour.y + light.transmittance * static_cast<double>(plain.channels.at("G")[i]));
-      EXPECT_EQ(image.channels.at("G")[i], expected);
-      // The sample of a pixel at the outline may miss what its middle shows.
-      if ((plain.channels.at("A")[i] == 1) != std::isfinite(depth)) continue;
-      if (std::isfinite(depth)) {
-        ++before;
-        EXPECT_EQ(image.channels.at("A")[i], 1);
-      } else if (light.transmittance < 1) {
-        ++beside;
-        EXPECT_NEAR(static_cast<double>(image.channels.at("A")[i]), 1 - light.transmittance, 1e-7);
+TEST(DirectVolume, HasTheSameBitsWithoutSkippedBlocks) {
+  const auto wave = [](const V3d& p) {
+    return 0.8 * std::sin(2.3 * p.x + 0.4) * std::cos(1.7 * p.y) + 0.3 * std::sin(3 * p.z);
+  };
+  std::vector<float> ball;  // far from all borders of blocks, so that whole groups are empty
+  constexpr int kSize = 150;
+  for (int n = 0; n < kSize * kSize * kSize; ++n) {
+    const V3d p(n % kSize, n / kSize % kSize, n / kSize / kSize);
+    ball.push_back(static_cast<float>(std::max(0.0, 20 - (p - V3d(110, 30, 100)).length())));
+  }
+  const std::vector<std::pair<Volume, std::vector<TransferPoint>>> cases = {
+      {Volume({V3i(kSize), M44d().setScale(V3d(0.1, 0.2, 0.15))}, std::move(ball)),
+       {{0, 0}, {20, 0.1, C3f(1, 0, 0)}}},
+      {sampled({V3i(60), support::obliqueMap()}, wave),
+       {{0.6, 0, C3f(1, 0, 0)}, {0.7, 0.2, C3f(0, 1, 0)}, {0.8, 0}}},
+      {levelset::sphereVolume(65, 0.8), {{0.5, 0}, {0.6, 0.05, C3f(1, 0, 0)}}}};
+  VolumeShading shading;
+  shading.toLight = V3d(1, 2, 3).normalized();
+  for (const auto& [volume, points] : cases) {
+    const DirectVolume direct = directVolume(volume, points);
+    EXPECT_GT(direct.skippedShare(), 0.5);
+    LightTables full = *direct.tables();
+    full.hasExtinction.assign(full.hasExtinction.size(), 1);
+    full.groupHasExtinction.assign(full.groupHasExtinction.size(), 1);
+    LightKernel<float> kernel(full, &shading);
+    std::size_t lit = 0;
+    auto rays = raysThrough(volume, 400);
+    // Along axes, planes and diagonals of the grid, where planes of two axes are crossed at once.
+    for (int n = 0; n < 27; ++n) {
+      const V3d step(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+      if (step == V3d(0)) continue;
+      for (const V3d& target : {V3d(12, 12, 12), V3d(110, 30, 100), V3d(30.5, 30, 29.5)}) {
+        const M44d& map = volume.grid().indexToWorld;
+        V3d direction;
+        map.multDirMatrix(step, direction);
+        direction.normalize();
+        rays.push_back({target * map - direction * 60, direction});
       }
     }
-  EXPECT_GT(before, 50u);
-  EXPECT_GT(beside, 50u);
-
-  Image serial = plain, shaded = plain, again = plain;
-  addVolumeLight(shaded, volumeLight(plain, scene, direct));
-  {
-    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-    addVolumeLight(serial, volumeLight(plain, scene, direct));
+    for (const auto& [origin, direction] : rays) {
+      const VolumeLight light = direct.light(origin, direction, 0, HUGE_VAL, &shading);
+      const LightStart start = direct.start({origin, direction, 0, HUGE_VAL});
+      if (!start.isInside) continue;
+      auto ray = LightKernel<float>::rayOf(start);
+      kernel.follow(ray, std::numeric_limits<int>::max());
+      EXPECT_EQ(ray.passed, light.transmittance);
+      EXPECT_EQ(V3d(ray.red, ray.green, ray.blue), light.colour);
+      lit += light.transmittance < 1;
+    }
+    EXPECT_GT(lit, 40u);
   }
-  addVolumeLight(again, volumeLight(plain, scene, direct, {.isStopped = [] { return true; }}));
-  EXPECT_EQ(shaded.channels, serial.channels);
-  EXPECT_EQ(again.channels, plain.channels);
-  EXPECT_NE(shaded.channels, image.channels);
-  scene.solids[0].opacity = 0.5;
-  EXPECT_THROW((void)volumeLight(plain, scene, direct), UsageError);
+}
+
+TEST(DirectVolume, ErrsByLessThanAShareOf512WhereARayEndsEarly) {
+  // A ray through layers of colours of up to 2, the last of them the brightest.
+  const Volume volume = sampled({V3i(40, 3, 3), M44d()}, [](const V3d& p) { return p.x; });
+  double largest = 0;
+  std::size_t ended = 0;
+  for (double extinction = 0.1; extinction < 2; extinction *= 1.1) {
+    const DirectVolume direct = directVolume(
+        volume, {{0, opacityOf(extinction), C3f(0)}, {39, opacityOf(extinction), C3f(2)}});
+    const VolumeLight light = direct.light(V3d(-1, 1, 1), V3d(1, 0, 0), 0, HUGE_VAL);
+    // ∫ (2x/39) k exp(−kx) dx over [0, 39].
+    const double k = extinction, left = std::exp(-39 * k);
+    const double truth = 2.0 / 39 * ((1 - left) / k - 39 * left);
+    EXPECT_EQ(light.transmittance == 0, left < kLeastTransmittance);
+    ended += light.transmittance == 0;
+    const double error = std::abs(light.colour.x - truth);
+    EXPECT_LT(error, light.transmittance == 0 ? 2 * kLeastTransmittance : 1e-3);
+    if (light.transmittance == 0) largest = std::max(largest, error);
+  }
+  EXPECT_GT(ended, 20u);
+  EXPECT_LT(largest, measured(1e-3));
+  EXPECT_GT(largest, 1e-5);
 }
 
 }  // namespace direct_volume_test
