@@ -228,8 +228,8 @@ int pieceCountOf(double square, double least, INOUT(int) steps) {
   return n > 1 ? n : 1;
 }
 
-// Adds the light of a cell, from ray.t to `exit`, or goes on with it. ray.pieces stays above 0 if the
-// number of steps does not suffice.
+// Adds the light of a cell, from ray.t to `exit`, or goes on with it. At least one piece is done. If
+// the number of steps does not suffice for all of them, ray.pieces is above 0 afterwards.
 void addCell(INOUT(VolumeRay) ray, double exit, INOUT(int) steps, int mostSteps) {
   CellCorners f = cornersOf(ray.x, ray.y, ray.z);
   double low = lesser(lesser(lesser(f.f0, f.f1), lesser(f.f2, f.f3)),
@@ -270,7 +270,7 @@ void addCell(INOUT(VolumeRay) ray, double exit, INOUT(int) steps, int mostSteps)
   double value = n == 0 ? b0 : cubicAt(b0, b1, b2, b3, share);
   VAR pieceLength = length / double(count);
   ++steps;
-  while (n < count && ray.passed >= leastPassed && steps < mostSteps) {
+  while (n < count && ray.passed >= leastPassed && (n == ray.pieces || steps < mostSteps)) {
     ++n;
     ++steps;
     share = double(n) / double(count);

@@ -350,11 +350,10 @@ TEST(VolumeScene, RefusesAGround) {
   EXPECT_THROW((void)renderCpu(scene, kNoRays), levelset::UsageError);
 }
 
-class VolumeSceneFile : public support::FolderTest {
+class VolumeSceneFile : public testing::Test {
  protected:
   /// A volume of x + 10 z, of 3×4×5 bytes with a spacing of 2, as MetaImage.
   void SetUp() override {
-    support::FolderTest::SetUp();
     std::ofstream file(folder_ / "ramp.mha", std::ios::binary);
     file << "ObjectType = Image\nNDims = 3\nBinaryData = True\nDimSize = 3 4 5\n"
             "ElementSpacing = 2 2 2\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
@@ -367,6 +366,8 @@ class VolumeSceneFile : public support::FolderTest {
         << R"(, "volumes": )" << volumes << "}";
     return readScene(folder_ / "scene.json");
   }
+
+  support::TemporaryFolder folder_;
 };
 
 TEST_F(VolumeSceneFile, HoldsAVolumeWithItsTransferFunction) {
