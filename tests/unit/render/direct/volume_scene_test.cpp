@@ -266,7 +266,7 @@ TEST(VolumeScene, AgreesWithTheJudge) {
                                     [](const LayerComparison& l) { return l.layer == "volume"; });
     ASSERT_NE(light, found.layers.end());
     EXPECT_GT(light->compared, cpu.pixelCount() - 10);
-    EXPECT_LT(light->largest, measured(2e-3));
+    EXPECT_LT(light->largest, measured(1.92e-3));
     // The colours have the light of the same ray, apart from the samples' places in the pixel.
     scene.solids[0].opacity = 0.5;
     scene.meshes[0].opacity = 0.3;
@@ -276,7 +276,7 @@ TEST(VolumeScene, AgreesWithTheJudge) {
       for (std::size_t i = 0; i < a.pixelCount(); ++i)
         largest = std::max(
             largest, std::abs(static_cast<double>(a.channels.at(name)[i] - b.channels.at(name)[i])));
-    EXPECT_LT(largest, measured(2e-3));
+    EXPECT_LT(largest, measured(1.7e-3));
     // Another transfer function is found.
     std::vector<TransferPoint> others = points;
     for (TransferPoint& point : others) point.opacity *= 0.9;
@@ -295,6 +295,7 @@ TEST(VolumeScene, WritesTheLightOfTheMiddleOfEachPixel) {
   const V3d back = -rays.axis(), right = scene.camera.up.cross(back).normalized();
   shading.toLight = (right * d.x + back.cross(right) * d.y + back * d.z).normalized();
   std::size_t hit = 0;
+  double largest = 0;
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x) {
       const auto i = static_cast<std::size_t>(y * image.width + x);
@@ -303,10 +304,13 @@ TEST(VolumeScene, WritesTheLightOfTheMiddleOfEachPixel) {
       const VolumeLight light = scene.volumePart->volume.light(
           ray.origin, ray.direction, 0, depth / ray.direction.dot(rays.axis()), &shading);
       hit += std::isfinite(depth);
-      EXPECT_NEAR(static_cast<double>(image.channels.at("volume.R")[i]), light.colour.x, 2e-5);
-      EXPECT_NEAR(static_cast<double>(image.channels.at("volume.A")[i]), 1 - light.transmittance,
-                  2e-5);
+      for (const auto& [name, value] : {std::pair{"volume.R", light.colour.x},
+                                        {"volume.A", 1 - light.transmittance}})
+        largest = std::max(
+            largest, std::abs(static_cast<double>(image.channels.at(name)[i]) - value));
     }
+  // The layer Z is in single precision.
+  EXPECT_LT(largest, measured(3.78e-7));
   EXPECT_GT(hit, 200u);
   RenderOptions without = kNoRays;
   without.volumeLight = false;
