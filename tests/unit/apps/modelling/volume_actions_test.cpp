@@ -3,6 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "render/images/image.h"
 #include "tests/support/command_line.h"
 #include "tests/support/measured.h"
 #include "tests/support/volume_files.h"
@@ -97,6 +98,52 @@ TEST_F(VolumeActions, RenderDrawsVolumesByTheirTransferFunction) {
   EXPECT_REFUSED(levelsmith(ball + "--isovalue 0 --no-shading"), 2, "--transfer");
   EXPECT_REFUSED(levelsmith("sphere --radius 1 --voxel 0.1 ! render a.png --transfer 0:0.1"), 2,
                  "volumes");
+}
+
+TEST_F(VolumeActions, ScenesDrawAVolumeAmongSurfaces) {
+  const std::string ball = "volume sphere --size 30 --radius 0.7 --as ball ! ";
+  const std::string core = "sphere --radius 0.3 --voxel 0.03 --as core ! ";
+  const std::string scene = ball + core + "scene @ball @core ";
+  const std::string transfer = "--transfer '0:0 0.2:0.1/1,0,0' ";
+  EXPECT_EQ(levelsmith(scene + transfer + "! render a.exr --size 60x45 --renderer both").code, 0);
+  EXPECT_EQ(levelsmith(scene + transfer +
+                       "! render a.exr --size 60x45 --renderer cpu ! render b.exr --size 60x45 "
+                       "--renderer gpu ! compare-images a.exr b.exr --exact")
+                .code,
+            0);
+  EXPECT_EQ(json(scene + transfer + "! info --json")["volumes"][0]["name"], "ball");
+  EXPECT_NE(levelsmith(scene + "--transfer auto ! info").err.find("scene: --transfer \""),
+            std::string::npos);
+  EXPECT_REFUSED(levelsmith("--dry-run " + scene + "! info"), 2, "--transfer");
+  EXPECT_REFUSED(levelsmith(ball + core + "scene @core " + transfer + "! info"), 2, "volumes");
+  EXPECT_REFUSED(levelsmith(ball + "scene @ball @ball " + transfer + "! info"), 2, "can have one");
+  EXPECT_REFUSED(levelsmith(scene + "--no-shading ! info"), 2, "--transfer");
+  EXPECT_REFUSED(levelsmith(scene + "--transfer 0:1 ! info"), 2, "less than 1");
+  EXPECT_REFUSED(levelsmith(scene + transfer + "! render a.exr --ground"), 2, "no shadow");
+  EXPECT_REFUSED(levelsmith(scene + transfer + "! write scene.json"), 2, "\"volumes\"");
+  EXPECT_REFUSED(levelsmith(scene + transfer + "--csg ball ! info"), 2, "ball");
+
+  // From a file, in which the mesh stands in the way of the right half of the volume.
+  writeFile("grey.mha",
+            "ObjectType = Image\nNDims = 3\nBinaryData = False\nDimSize = 2 2 2\n"
+            "ElementType = MET_UCHAR\nElementDataFile = LOCAL\n9 9 9 9 9 9 9 9\n");
+  writeFile("wall.obj", "v 0.5 -9 2\nv 9 -9 2\nv 9 9 2\nv 0.5 9 2\nf 1 2 3 4\n");
+  writeFile("scene.json",
+            R"({"format": "levelsmith scene", "version": 1,
+                "camera": {"from": [0.5, 0.5, 9], "to": [0.5, 0.5, 0], "ortho": 0.8, "size": [40, 40]},
+                "meshes": [{"name": "wall", "file": "wall.obj"}],
+                "volumes": [{"name": "grey", "file": "grey.mha", "transfer": "0:0.75/0,1,0",
+                             "transform": [-1,0,0,0, 0,-1,0,0, 0,0,1,0, 0,0,0,1]}]})");
+  const support::Outcome drawn = levelsmith("read scene.json ! render wall.exr --renderer both");
+  EXPECT_EQ(drawn.code, 0) << drawn.err;
+  const render::Image image = render::readExr(folder_ / "wall.exr");
+  const auto at = [&](const char* name, int x) {
+    return static_cast<double>(image.channels.at(name)[static_cast<std::size_t>(20 * 40 + x)]);
+  };
+  EXPECT_NEAR(at("A", 10), 0.75, 1e-6);
+  EXPECT_NEAR(at("G", 10), 0.75, 1e-6);
+  EXPECT_EQ(at("volume.A", 30), 0);
+  EXPECT_GT(at("R", 30), 0.1);
 }
 
 TEST_F(VolumeActions, ResampleTakesVolumesAndSolids) {
