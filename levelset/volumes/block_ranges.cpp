@@ -203,8 +203,8 @@ std::vector<Range> BlockRanges::valuesOf(const std::vector<Range>& stored) const
     double low = scale_(static_cast<double>(range.low)),
            high = scale_(static_cast<double>(range.high));
     if (low > high) std::swap(low, high);
-    // Rounded outwards, but exact numbers stay: a transfer function often starts at the value of the
-    // background.
+    // Rounded outwards, but exact numbers stay: a transfer function often starts at the value of
+    // the background.
     constexpr float kFar = std::numeric_limits<float>::infinity();
     auto below = static_cast<float>(low), above = static_cast<float>(high);
     if (static_cast<double>(below) > low) below = std::nextafter(below, -kFar);

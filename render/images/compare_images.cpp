@@ -254,7 +254,8 @@ class Comparer {
     for (const std::string& channel : channels)
       for (std::size_t i = 0; has(channel) && i < result_.pixels; ++i)
         for (const Image* image : {&a_, &b_})
-          if (const double v = value(*image, channel, i); std::isfinite(v)) most = std::max(most, v);
+          if (const double v = value(*image, channel, i); std::isfinite(v))
+            most = std::max(most, v);
     return most;
   }
 

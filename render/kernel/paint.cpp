@@ -233,7 +233,8 @@ std::vector<char> KernelPainter::paintData(const KernelTracer& tracer,
   }
   if (layers_.volume[0]) {
     const std::vector<VolumeLight> light = lightOfVolume(tracer, inVolume);
-    for (std::size_t i = 0; i < pixels.size(); ++i) layers_.setVolume(numberOf(pixels[i]), light[i]);
+    for (std::size_t i = 0; i < pixels.size(); ++i)
+      layers_.setVolume(numberOf(pixels[i]), light[i]);
   }
   std::vector<char> contradicts(pixels.size(), 0);
   const std::vector<double> light = surfaces_.transmittances(tracer, shadowRays);
@@ -360,8 +361,7 @@ std::vector<std::size_t> KernelPainter::addSeen(
     auto& [ray, x, y, meshNear, left, lit] = sampleRays[i];
     if (left < kLeastTransmittance) continue;
     if (rays.size() > kMostLightRays) addColours();
-    Hit hit =
-        scene_.volumePart ? behindVolume[i] : hitOf(ray, meshNear, hits, onFields, i);
+    Hit hit = scene_.volumePart ? behindVolume[i] : hitOf(ray, meshNear, hits, onFields, i);
     if (!hit.found) hit = shader_.groundHit(ray);
     if (!hit.found) {
       left = 0;

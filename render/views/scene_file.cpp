@@ -338,11 +338,8 @@ levelset::Volume placedBy(const Imath::M44d& transform, const levelset::Volume& 
   grid.indexToWorld = grid.indexToWorld * transform;
   // The copy shares the numbers.
   const auto owner = std::make_shared<const levelset::Volume>(volume);
-  return {grid,
-          volume.type(),
-          volume.scale(),
-          {owner, owner->numbers(), owner->isMapped()},
-          progress};
+  return {
+      grid, volume.type(), volume.scale(), {owner, owner->numbers(), owner->isMapped()}, progress};
 }
 
 void readVolumePart(const Reader& reader, const Json& json, const std::filesystem::path& file,
@@ -369,12 +366,12 @@ void readVolumePart(const Reader& reader, const Json& json, const std::filesyste
       reader.withContext(where, [&] { return parseTransfer(transfer); });
   const std::filesystem::path source = reader.partFile(json, file, where);
   if (!levelset::isVolumeFormat(source) || levelset::isRawFormat(source))
-    reader.refuse(where, "has a \"file\" without the header of a volume; use NIfTI, MetaImage, "
-                         "NRRD or MRC");
+    reader.refuse(where,
+                  "has a \"file\" without the header of a volume; use NIfTI, MetaImage, "
+                  "NRRD or MRC");
   levelset::Volume volume = levelset::readVolume(source, how);
   reader.withContext(where, [&] {
-    if (json.contains("transform"))
-      volume = placedBy(reader.matrix(json, where), volume, progress);
+    if (json.contains("transform")) volume = placedBy(reader.matrix(json, where), volume, progress);
     // The isovalue has no effect: the surface provides the ranges of the values.
     const VolumeSurface surface(volume, volume.highest(), VolumeInside::Above, progress);
     scene.volumePart = VolumePart{DirectVolume(surface, points), isShaded, name};
@@ -393,13 +390,13 @@ void requireSceneNames(const std::vector<std::string>& names) {
     const auto isWord = [](unsigned char c) { return std::isalnum(c) || c == '_'; };
     if (name.empty() || std::isdigit(static_cast<unsigned char>(name[0])) ||
         !std::all_of(name.begin(), name.end(), isWord))
-      throw levelset::UsageError(
-          fmt::format("scene: '{}' is not a valid name of a part; use letters, digits and _, and no "
-                      "digit first",
-                      name));
-    if (!seen.insert(name).second)
       throw levelset::UsageError(fmt::format(
-          "scene: '{}' is the name of two parts; give each a different name", name));
+          "scene: '{}' is not a valid name of a part; use letters, digits and _, and no "
+          "digit first",
+          name));
+    if (!seen.insert(name).second)
+      throw levelset::UsageError(
+          fmt::format("scene: '{}' is the name of two parts; give each a different name", name));
   }
 }
 
@@ -495,8 +492,7 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
   if (!solids.is_array() || !meshes.is_array() || !volumes.is_array() ||
       (solids.empty() && meshes.empty() && volumes.empty()))
     reader.refuse(whole, "has no solids, no meshes and no volumes");
-  if (volumes.size() > 1)
-    reader.refuse(whole, "has several \"volumes\", but a scene can have one");
+  if (volumes.size() > 1) reader.refuse(whole, "has several \"volumes\", but a scene can have one");
   Parts parts(options.progress, solids.size() + meshes.size() + volumes.size());
   // The memory limit applies to the sum of all parts, so it shrinks with each one that is read.
   ReadSceneOptions rest = options;
@@ -512,8 +508,7 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
     readMeshPart(reader, entry, file, rest, parts.next(), scene);
     spend(bytesOf(*scene.meshes.back().mesh));
   }
-  for (const Json& entry : volumes)
-    readVolumePart(reader, entry, file, rest, parts.next(), scene);
+  for (const Json& entry : volumes) readVolumePart(reader, entry, file, rest, parts.next(), scene);
   reader.withContext(whole, [&] { requireNames(scene); });
   std::set<std::uint32_t> ids;
   const auto isNew = [&](const auto& part) { return ids.insert(part.id).second; };

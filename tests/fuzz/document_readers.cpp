@@ -21,7 +21,7 @@ void readPatch(std::string_view bytes) {
   });
 }
 
-/// Writes the level set and the mesh that the scenes of the corpus name.
+/// Writes the level set, the mesh and the volume that the scenes of the corpus name.
 void writeSceneParts() {
   const levelset::NarrowBand ball = levelset::makeSphere(1, Imath::V3d(0), 0.25);
   levelset::writeBand(scratchFile("ball.vdb", ""), ball);
@@ -29,6 +29,10 @@ void writeSceneParts() {
   mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   mesh.triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};
   levelset::writeMesh(scratchFile("corner.ply", ""), mesh);
+  static_cast<void>(
+      scratchFile("ramp.mha",
+                  "ObjectType = Image\nNDims = 3\nBinaryData = False\nDimSize = 2 2 2\n"
+                  "ElementType = MET_UCHAR\nElementDataFile = LOCAL\n1 2 3 4 5 6 7 8\n"));
 }
 
 void readScene(std::string_view bytes) {

@@ -289,8 +289,7 @@ Json valueInfo(const Value& value, Invocation& in) {
       json["volumes"].push_back(
           {{"name", scene.volumePart->name},
            {"size", {size.x, size.y, size.z}},
-           {"transfer",
-            render::transferText(scene.volumePart->volume.transfer().points())}});
+           {"transfer", render::transferText(scene.volumePart->volume.transfer().points())}});
     }
     if (!scene.csg.isEmpty()) json["csg"] = scene.csg.text();
     if (scene.softness > 0) json["soft"] = scene.softness;

@@ -226,6 +226,28 @@ TEST(ShownVolume, DrawsTheLightOfTheVolume) {
   }
 }
 
+TEST(ShownVolume, DrawsTheVolumeOfASceneFile) {
+  const support::TemporaryFolder folder;
+  std::ofstream(folder / "ramp.mha")
+      << "ObjectType = Image\nNDims = 3\nBinaryData = False\nDimSize = 2 2 2\n"
+         "ElementType = MET_UCHAR\nElementDataFile = LOCAL\n1 2 3 4 5 6 7 8\n";
+  std::ofstream(folder / "scene.json") << R"({"format": "levelsmith scene", "version": 1,
+             "volumes": [{"name": "ramp", "file": "ramp.mha", "transfer": "0:0 8:0.4/1,0.5,0"}]})";
+  const auto model = std::make_shared<const Model>(openModel({folder / "scene.json"}));
+  EXPECT_EQ(model->bounds.size(), V3d(1));
+  EXPECT_EQ(model->description, "1 volume");
+  const View view{model, render::framingCamera(model->bounds, 48, 36), std::nullopt};
+  const Display display;
+  ProgressivePicture picture(Renderer::Cpu);
+  picture.request(view, display);
+  const auto frame = finished(picture, view, display);
+  render::Scene scene = model->scene;
+  scene.camera = view.camera;
+  const render::Image drawn = render::renderCpu(scene);
+  EXPECT_EQ(frame->image->channels.at("R"), drawn.channels.at("R"));
+  EXPECT_GT(drawn.channels.at("R")[18 * 48 + 24], 0.1f);
+}
+
 TEST(ShownVolume, PicksPointsOfTheSurfaceAndOfSlices) {
   const auto model = ballModel();
   View view{model, cameraFrom({9, 0, 0}), std::nullopt};

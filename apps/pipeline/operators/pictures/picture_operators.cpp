@@ -226,8 +226,7 @@ Value draw(Invocation& in) {
   render::Scene scene = sceneOf(in);
   coarsen(in, scene);
   if (in.flag("ground") && scene.volumePart)
-    throw UsageError(
-        "render: a volume with a transfer function has no shadow; leave --ground out");
+    throw UsageError("render: a volume with a transfer function has no shadow; leave --ground out");
   if (in.flag("ground") && !scene.bounds().isEmpty())
     scene.ground = render::groundOf(scene, scene.camera.up);
   const std::string renderer = in.text("renderer");

@@ -200,7 +200,8 @@ Operator sceneOperator() {
           "them, with the normals and colours of their vertices if they have any. Coincident "
           "surfaces on different grids are separated by rounding only, so let the subtracted solid "
           "protrude. --soft blends the distances to the solids: surfaces closer than this length "
-          "merge. --morph interpolates between the distances of two solids. One part may be a volume, "
+          "merge. --morph interpolates between the distances of two solids. One part may be a "
+          "volume, "
           "drawn by --transfer in front of, around and behind the surfaces. 'write scene.json' "
           "saves a scene without a volume, with the parts in files beside it.",
       .example =

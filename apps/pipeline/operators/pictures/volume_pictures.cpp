@@ -89,8 +89,8 @@ void validateTransfer(const Invocation& in) {
   if (in.given("transfer") && in.text("transfer") != "auto")
     (void)render::TransferFunction(render::parseTransfer(in.text("transfer")), 1);
   if (in.flag("no-shading") && !in.given("transfer"))
-    throw UsageError(fmt::format("{}: --no-shading applies only to --transfer; leave it out",
-                                 in.op().name));
+    throw UsageError(
+        fmt::format("{}: --no-shading applies only to --transfer; leave it out", in.op().name));
 }
 
 void validateVolumePicture(const Invocation& in) {
@@ -102,8 +102,7 @@ void validateVolumePicture(const Invocation& in) {
                       "leave --{} out, or give --isovalue",
                       name, name));
   if (in.given("transfer") && in.flag("ground"))
-    throw UsageError(
-        "render: a volume with a transfer function has no shadow; leave --ground out");
+    throw UsageError("render: a volume with a transfer function has no shadow; leave --ground out");
 }
 
 std::vector<Param> transferParams() {

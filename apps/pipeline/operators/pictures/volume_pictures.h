@@ -30,7 +30,8 @@ void validateVolumePicture(const Invocation& in);
 /// @throws UsageError
 void requireVolumeOptions(const Invocation& in);
 
-/// Scene with the isosurface of --isovalue, and the volume with the transfer function of --transfer.
+/// Scene with the isosurface of --isovalue, and the volume with the transfer function of
+/// --transfer.
 [[nodiscard]] render::ViewedScene volumeScene(Invocation& in);
 
 }  // namespace pipeline

@@ -82,8 +82,7 @@ Seen middleOf(const Image& image) {
 /// Puts a layer of the slab in front of what is seen.
 Seen behind(double length, const Seen& back) {
   const double passed = std::exp(-kExtinction * length);
-  return {V3d(C3f(kGlow)) * (1 - passed) + back.colour * passed,
-          1 - passed * (1 - back.alpha)};
+  return {V3d(C3f(kGlow)) * (1 - passed) + back.colour * passed, 1 - passed * (1 - back.alpha)};
 }
 
 Seen over(const Seen& front, double opacity, const Seen& back) {
@@ -117,8 +116,7 @@ TEST(VolumeScene, EndsAtOpaqueSurfacesInFrontInsideAndBehind) {
     scene.solids.push_back({.band = levelset::makeBox(V3d(40, 40, 4), V3d(0, 0, top - 2), 1)});
     Scene alone = scene;
     alone.volumePart.reset();
-    expectSeen(scene,
-               behind(std::clamp(10 - top, 0.0, 10.0), middleOf(renderCpu(alone, kNoRays))),
+    expectSeen(scene, behind(std::clamp(10 - top, 0.0, 10.0), middleOf(renderCpu(alone, kNoRays))),
                "solid below " + std::to_string(top));
   }
 }
@@ -126,8 +124,7 @@ TEST(VolumeScene, EndsAtOpaqueSurfacesInFrontInsideAndBehind) {
 TEST(VolumeScene, IsBlendedBetweenTransparentSurfaces) {
   // In front, inside, inside, and behind, where an opaque sheet ends the ray.
   Scene scene = slab();
-  const std::vector<std::pair<double, double>> sheets = {
-      {12, 0.2}, {8.5, 0.35}, {3, 0.6}, {-1, 1}};
+  const std::vector<std::pair<double, double>> sheets = {{12, 0.2}, {8.5, 0.35}, {3, 0.6}, {-1, 1}};
   std::vector<Seen> alone;
   for (const auto& [z, opacity] : sheets) {
     Scene one = slab();
@@ -181,8 +178,7 @@ TEST(VolumeScene, HidesSurfacesBehindDenseParts) {
   EXPECT_EQ(seen.alpha, 1);
   EXPECT_LT((seen.colour - truth).length(), kLeastTransmittance);
   EXPECT_LT((seen.colour - V3d(C3f(kGlow))).length(), support::rounding(1));
-  EXPECT_LT((middleOf(renderEmbree(scene, kNoRays)).colour - truth).length(),
-            support::rounding(1));
+  EXPECT_LT((middleOf(renderEmbree(scene, kNoRays)).colour - truth).length(), support::rounding(1));
   EXPECT_EQ(compareImages(renderCpu(scene), renderGpu(scene), {.exact = true}).reason(), "");
 }
 
@@ -248,9 +244,8 @@ TEST(VolumeScene, HasTheSameBitsOnBothProcessors) {
   // A blended scene.
   Scene soft = mixed(functions()[0]);
   soft.solids[0].name = "a";
-  soft.solids.push_back({.band = levelset::makeSphere(0.3, V3d(-0.3, 0.1, 0.1), 0.03),
-                         .id = 3,
-                         .name = "b"});
+  soft.solids.push_back(
+      {.band = levelset::makeSphere(0.3, V3d(-0.3, 0.1, 0.1), 0.03), .id = 3, .name = "b"});
   soft.csg = CsgExpression("a | b", {"a", "b"});
   soft.softness = 0.05;
   expectEqual(soft, lit, "soft");
@@ -274,8 +269,8 @@ TEST(VolumeScene, AgreesWithTheJudge) {
     double largest = 0;
     for (const char* name : {"R", "G", "B", "A"})
       for (std::size_t i = 0; i < a.pixelCount(); ++i)
-        largest = std::max(
-            largest, std::abs(static_cast<double>(a.channels.at(name)[i] - b.channels.at(name)[i])));
+        largest = std::max(largest, std::abs(static_cast<double>(a.channels.at(name)[i] -
+                                                                 b.channels.at(name)[i])));
     EXPECT_LT(largest, measured(1.7e-3));
     // Another transfer function is found.
     std::vector<TransferPoint> others = points;
@@ -304,10 +299,10 @@ TEST(VolumeScene, WritesTheLightOfTheMiddleOfEachPixel) {
       const VolumeLight light = scene.volumePart->volume.light(
           ray.origin, ray.direction, 0, depth / ray.direction.dot(rays.axis()), &shading);
       hit += std::isfinite(depth);
-      for (const auto& [name, value] : {std::pair{"volume.R", light.colour.x},
-                                        {"volume.A", 1 - light.transmittance}})
-        largest = std::max(
-            largest, std::abs(static_cast<double>(image.channels.at(name)[i]) - value));
+      for (const auto& [name, value] :
+           {std::pair{"volume.R", light.colour.x}, {"volume.A", 1 - light.transmittance}})
+        largest =
+            std::max(largest, std::abs(static_cast<double>(image.channels.at(name)[i]) - value));
     }
   // The layer Z is in single precision.
   EXPECT_LT(largest, measured(3.78e-7));
@@ -384,10 +379,9 @@ TEST_F(VolumeSceneFile, HoldsAVolumeWithItsTransferFunction) {
   EXPECT_EQ(part.volume.transfer().points(), parseTransfer("0:0 40:0.1/1,0,0"));
   EXPECT_EQ(part.volume.volume().at(2, 3, 4), 42);
   EXPECT_EQ(part.volume.bounds().size(), V3d(4, 6, 8));
-  const ViewedScene moved =
-      read("[{" + ramp +
-               R"(, "shading": false, "transform": [1,0,0,0, 0,0.5,0,0, 0,0,1,0, 5,6,7,1]}])",
-           R"([{"name": "sheet", "file": "sheet.ply"}])");
+  const ViewedScene moved = read(
+      "[{" + ramp + R"(, "shading": false, "transform": [1,0,0,0, 0,0.5,0,0, 0,0,1,0, 5,6,7,1]}])",
+      R"([{"name": "sheet", "file": "sheet.ply"}])");
   EXPECT_FALSE(moved.scene.volumePart->isShaded);
   EXPECT_EQ(moved.scene.meshes.size(), 1u);
   EXPECT_EQ(moved.scene.volumePart->volume.bounds().size(), V3d(4, 3, 8));
