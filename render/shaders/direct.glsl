@@ -5,7 +5,8 @@
 //
 // Coordinates are those of the grid: points have integer coordinates, starting at 0.
 
-CONST_INT kMostPieces = 4096;  // only peaks of the transfer function that are thinner than 1e-4 of the values in a cell need more
+// Only peaks of the transfer function that are thinner than 1e-4 of the values in a cell need more.
+CONST_INT kMostPieces = 4096;
 
 // A ray and the light on it so far. Distances are in world units.
 struct VolumeRay {
