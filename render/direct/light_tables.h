@@ -14,19 +14,19 @@ namespace render {
 
 struct VolumeShading;
 
-/// Indices in LightNumbers: constants of the kernel (render/shaders/direct.glsl).
-enum LightNumber {
-  kScaleSlope,
-  kScaleIntercept,
-  kPieceTolerance,
-  kPiecesPerDepth,  ///< linear pieces for each unit of optical depth, at least
-  kLeastPassed,     ///< a ray ends below this transmittance
-  kPlainGradient,   ///< gradients of this size count half as a surface, per world unit
-  kAmbientLight,
-  kToLight,
-  kWorldToIndex = kToLight + 3,  ///< linear part, by rows
-  kLightNumbers = kWorldToIndex + 9
-};
+// Indices in LightNumbers: constants of the kernel (render/shaders/direct.glsl).
+inline constexpr int kScaleSlope = 0;
+inline constexpr int kScaleIntercept = 1;
+inline constexpr int kPieceTolerance = 2;
+inline constexpr int kPiecesPerDepth =
+    3;                                  ///< linear pieces for each unit of optical depth, at least
+inline constexpr int kLeastPassed = 4;  ///< a ray ends below this transmittance
+inline constexpr int kPlainGradient =
+    5;  ///< such gradients count half as a surface, per world unit
+inline constexpr int kAmbientLight = 6;
+inline constexpr int kToLight = 7;
+inline constexpr int kWorldToIndex = 10;  ///< linear part, by rows
+inline constexpr int kLightNumbers = 19;
 using LightNumbers = std::array<double, kLightNumbers>;
 
 struct LightTables {

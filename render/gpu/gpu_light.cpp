@@ -26,7 +26,7 @@ constexpr std::size_t kLightAnswers = 4;      // colour and transmittance
 constexpr int kMostSteps = 2000;
 
 /// Bindings of storage blocks in the shader.
-enum LightBinding : GLuint { kRaysOfLight, kLightFound, kLightConstants };
+constexpr GLuint kRaysOfLight = 0, kLightFound = 1, kLightConstants = 2;
 
 constexpr const char* kLightDialect = R"GLSL(
 #define VAR precise double
@@ -140,12 +140,9 @@ std::string lightShaderText(VolumeType type) {
              "          kRayNumbers = {}, kAnswers = {}, kMostSteps = {},\n"
              "          kWordShift = {}, kNumberBits = {};\n"
              "#define NUMBER(word, low) {}\n",
-             kLightGroup, static_cast<int>(kScaleSlope), static_cast<int>(kScaleIntercept),
-             static_cast<int>(kPieceTolerance), static_cast<int>(kPiecesPerDepth),
-             static_cast<int>(kLeastPassed), static_cast<int>(kPlainGradient),
-             static_cast<int>(kAmbientLight), static_cast<int>(kToLight),
-             static_cast<int>(kWorldToIndex), static_cast<int>(kLightNumbers), kLightRayNumbers,
-             kLightAnswers, kMostSteps,
+             kLightGroup, kScaleSlope, kScaleIntercept, kPieceTolerance, kPiecesPerDepth,
+             kLeastPassed, kPlainGradient, kAmbientLight, kToLight, kWorldToIndex, kLightNumbers,
+             kLightRayNumbers, kLightAnswers, kMostSteps,
              bytesOf(type) == 1   ? 2
              : bytesOf(type) == 2 ? 1
                                   : 0,

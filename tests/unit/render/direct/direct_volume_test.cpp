@@ -407,7 +407,7 @@ TEST(DirectVolume, HasTheSameBitsWithoutSkippedBlocks) {
   std::vector<float> ball;  // far from all borders of blocks, so that whole groups are empty
   constexpr int kSize = 150;
   for (int n = 0; n < kSize * kSize * kSize; ++n) {
-    const V3d p(n % kSize, n / kSize % kSize, n / kSize / kSize);
+    const V3d p(V3i(n % kSize, n / kSize % kSize, n / kSize / kSize));
     ball.push_back(static_cast<float>(std::max(0.0, 20 - (p - V3d(110, 30, 100)).length())));
   }
   const std::vector<std::pair<Volume, std::vector<TransferPoint>>> cases = {
@@ -429,7 +429,7 @@ TEST(DirectVolume, HasTheSameBitsWithoutSkippedBlocks) {
     auto rays = raysThrough(volume, 400);
     // Along axes, planes and diagonals of the grid, where planes of two axes are crossed at once.
     for (int n = 0; n < 27; ++n) {
-      const V3d step(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+      const V3d step(V3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1));
       if (step == V3d(0)) continue;
       for (const V3d& target : {V3d(12, 12, 12), V3d(110, 30, 100), V3d(30.5, 30, 29.5)}) {
         const M44d& map = volume.grid().indexToWorld;
