@@ -186,6 +186,7 @@ const Plan& Value::plan() const {
       break;
     case Kind::Scene:
       plan.bounds = scene().scene.bounds();
+      plan.bounds.extendBy(scene().scene.volumeBounds());
       for (const render::Solid& solid : scene().scene.solids) {
         const double h = solid.band.voxelSize();
         plan.voxelSize = plan.voxelSize > 0 ? std::min(plan.voxelSize, h) : h;

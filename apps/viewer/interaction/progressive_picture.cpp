@@ -181,10 +181,12 @@ struct ProgressivePicture::Worker {
         if (owner.renderer_ == Renderer::Gpu) throw;
       }
     }
-    if (!tracer) {
-      tracer = std::make_unique<render::CpuTracer>();
-      name = "processor";
-    }
+    if (!tracer) useProcessor();
+  }
+
+  void useProcessor() {
+    tracer = std::make_unique<render::CpuTracer>();
+    name = "processor";
   }
 
   /// Builds the kernel's tables, unless the tables of the previous picture were built for the same
@@ -220,18 +222,29 @@ struct ProgressivePicture::Worker {
     surfaces->updateView(scene);
     auto drawn = std::make_shared<render::Image>(scene.camera.width, scene.camera.height);
     const render::KernelPainter painter(scene, *surfaces, options, *drawn);
+    try {
+      paintTiles(painter, *drawn, progress, isStale);
+    } catch (const levelset::ResourceLimit&) {  // the volume does not fit into the GPU's memory
+      if (owner.renderer_ == Renderer::Gpu || name == "processor") throw;
+      useProcessor();
+      paintTiles(painter, *drawn, progress, isStale);
+    }
+    if (isStale) return nullptr;
+    return drawn;
+  }
+
+  void paintTiles(const render::KernelPainter& painter, const render::Image& drawn,
+                  std::atomic<double>& progress, const std::atomic<bool>& isStale) const {
     const int edge = context && name != "processor" ? kGpuTileEdge : kCpuTileEdge;
-    const int across = (drawn->width + edge - 1) / edge, down = (drawn->height + edge - 1) / edge;
+    const int across = (drawn.width + edge - 1) / edge, down = (drawn.height + edge - 1) / edge;
     std::atomic<int> done = 0;
     tbb::parallel_for(0, across * down, [&](int number) {
       if (isStale) return;
       const int left = number % across * edge, top = number / across * edge;
-      painter.paint(*tracer, {left, top, std::min(left + edge, drawn->width),
-                              std::min(top + edge, drawn->height)});
+      painter.paint(*tracer, {left, top, std::min(left + edge, drawn.width),
+                              std::min(top + edge, drawn.height)});
       progress = static_cast<double>(++done) / (across * down);
     });
-    if (isStale) return nullptr;
-    return drawn;
   }
 
   [[nodiscard]] std::shared_ptr<const Frame> shown() {

@@ -165,7 +165,9 @@ Value makeScene(Invocation& in) {
   if (in.given("morph")) scene.morph = in.number("morph");
   render::requireFields(scene);
   viewed.hasCamera = givesCamera(in);
-  if (viewed.hasCamera) viewed.scene.camera = cameraOf(in, viewed.scene.bounds());
+  Imath::Box3d bounds = scene.bounds();
+  bounds.extendBy(scene.volumeBounds());
+  if (viewed.hasCamera) scene.camera = cameraOf(in, bounds);
   return Value(std::move(viewed));
 }
 

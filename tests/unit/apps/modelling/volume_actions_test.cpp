@@ -114,6 +114,9 @@ TEST_F(VolumeActions, ScenesDrawAVolumeAmongSurfaces) {
   EXPECT_EQ(json(scene + transfer + "! info --json")["volumes"][0]["name"], "ball");
   EXPECT_NE(levelsmith(scene + "--transfer auto ! info").err.find("scene: --transfer \""),
             std::string::npos);
+  // A scene of the volume alone.
+  EXPECT_EQ(levelsmith(ball + "scene @ball --size 30x20 " + transfer + "! render a.png").code, 0);
+  EXPECT_EQ(levelsmith(ball + "scene @ball " + transfer + "! render a.png --from 3,2,1").code, 0);
   EXPECT_REFUSED(levelsmith("--dry-run " + scene + "! info"), 2, "--transfer");
   EXPECT_REFUSED(levelsmith(ball + core + "scene @core " + transfer + "! info"), 2, "volumes");
   EXPECT_REFUSED(levelsmith(ball + "scene @ball @ball " + transfer + "! info"), 2, "can have one");
