@@ -14,7 +14,7 @@
 #include "levelset/grids/sample.h"
 #include "levelset/points/field/meshless.h"
 #include "levelset/points/field/oriented_points.h"
-#include "levelset/points/field/sample_field.h"
+#include "levelset/points/field/signed_field.h"
 
 namespace levelset {
 namespace {
@@ -27,7 +27,7 @@ using SupportLeaf = openvdb::FloatTree::LeafNodeType;
 
 void checkOptions(const OrientedPoints& points, double voxelSize,
                   const PointsToBandOptions& options) {
-  constexpr std::size_t kFewest = 6, kMost = 100;
+  constexpr std::size_t kFewest = 6, kMost = 1000;
   if (options.neighbours != 0 && (options.neighbours < kFewest || options.neighbours > kMost))
     throw UsageError(fmt::format("the number of neighbours is {}; give {} to {}",
                                  options.neighbours, kFewest, kMost));
@@ -185,13 +185,17 @@ PointsToBandResult pointsToBand(const PointCloud& cloud, double voxelSize,
         100 * opposedShare));
   report(options.progress, 0.1);
   const points::SignedField field(points, fieldOf(points, options));
-  Imath::Box3d box = points.box;
+  points::SampleFrame frame{points.centre, points.box, voxelSize};
   constexpr double kMargin = 0.1;  // of the diagonal
-  const V3d margin(kMargin * box.size().length() + 4 * voxelSize);
-  box.min -= margin;
-  box.max += margin;
-  openvdb::FloatGrid::Ptr samples = points::sampleField(field, box, voxelSize, options.maxMemory,
-                                                        subProgress(options.progress, 0.3, 0.7));
+  const V3d margin(kMargin * points.box.size().length() + 4 * voxelSize);
+  frame.box.min -= margin;
+  frame.box.max += margin;
+  std::vector<openvdb::Coord> blocks;
+  blocks.reserve(points.size());
+  for (const V3d& p : points.positions) blocks.push_back(points::blockAt(frame, p));
+  openvdb::FloatGrid::Ptr samples = points::sampleField(
+      [&field](const V3d& at, points::FieldMemory& memory) { return field.value(at, memory); },
+      frame, std::move(blocks), options.maxMemory, subProgress(options.progress, 0.3, 0.7));
   const std::size_t droppedParts = points::dropPartsWithoutPoints(*samples, points);
   eikonal::DistanceRequest request;
   request.halfWidth = options.halfWidth;

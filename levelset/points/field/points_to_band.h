@@ -60,7 +60,7 @@ inline constexpr double kOpposedLimit = 0.1;
 
 struct PointsToBandOptions {
   PointMethod method = PointMethod::MovingLeastSquares;
-  /// Number of points that determine the surface at a position, from 6 to 100; 0: that of
+  /// Number of points that determine the surface at a position, from 6 to 1000; 0: that of
   /// defaultNeighbours().
   std::size_t neighbours = 0;
   double halfWidth = 3;  ///< half width of the band, voxels, at least 1

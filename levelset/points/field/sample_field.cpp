@@ -32,13 +32,13 @@ struct SampledBlock {
 
 class BlockSampler {
  public:
-  BlockSampler(const SignedField& field, const Imath::Box3d& box, double voxelSize)
-      : field_(field), box_(box), voxelSize_(voxelSize) {}
+  BlockSampler(const SampledField& field, const SampleFrame& frame)
+      : field_(field), frame_(frame) {}
 
   [[nodiscard]] SampledBlock sample(const Coord& origin) const {
     SampledBlock block{std::make_unique<Leaf>(origin)};
-    SignedField::Memory memory;
-    const auto limit = static_cast<float>(kSampledWidth * voxelSize_);
+    FieldMemory memory;
+    const auto limit = static_cast<float>(kSampledWidth * frame_.voxelSize);
     for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
       const Coord local = Leaf::offsetToLocalCoord(n);
       const auto value = static_cast<float>(at(origin + local, memory));
@@ -53,19 +53,18 @@ class BlockSampler {
   }
 
  private:
-  [[nodiscard]] double at(const Coord& index, SignedField::Memory& memory) const {
-    const V3d relative = voxelSize_ * V3d(index.x(), index.y(), index.z()) - field_.points().centre;
+  [[nodiscard]] double at(const Coord& index, FieldMemory& memory) const {
+    const V3d relative = frame_.voxelSize * V3d(index.x(), index.y(), index.z()) - frame_.centre;
     double outside = -std::numeric_limits<double>::infinity();
     for (int axis = 0; axis < 3; ++axis)
-      outside =
-          std::max({outside, box_.min[axis] - relative[axis], relative[axis] - box_.max[axis]});
-    if (outside > kSampledWidth * voxelSize_) return outside;
-    return std::max(outside, field_.value(relative, memory));
+      outside = std::max(
+          {outside, frame_.box.min[axis] - relative[axis], relative[axis] - frame_.box.max[axis]});
+    if (outside > kSampledWidth * frame_.voxelSize) return outside;
+    return std::max(outside, field_(relative, memory));
   }
 
-  const SignedField& field_;
-  const Imath::Box3d& box_;
-  double voxelSize_;
+  const SampledField& field_;
+  const SampleFrame& frame_;
 };
 
 void sortUnique(std::vector<Coord>& blocks) {
@@ -73,29 +72,26 @@ void sortUnique(std::vector<Coord>& blocks) {
   blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
 }
 
-Coord blockOf(const V3d& index) {
+}  // namespace
+
+Coord blockAt(const SampleFrame& frame, const V3d& position) {
+  const V3d index = (position + frame.centre) / frame.voxelSize;
   return Coord::floor(openvdb::Vec3d(index.x, index.y, index.z)) & ~(kSide - 1);
 }
 
-}  // namespace
-
-openvdb::FloatGrid::Ptr sampleField(const SignedField& field, const Imath::Box3d& box,
-                                    double voxelSize, std::size_t maxMemory,
+openvdb::FloatGrid::Ptr sampleField(const SampledField& field, const SampleFrame& frame,
+                                    std::vector<Coord> wave, std::size_t maxMemory,
                                     const Progress& progress) {
-  const auto background = static_cast<float>(kSampledWidth * voxelSize);
+  const auto background = static_cast<float>(kSampledWidth * frame.voxelSize);
   auto grid = openvdb::FloatGrid::create(background);
-  grid->setTransform(uniformTransform(voxelSize));
+  grid->setTransform(uniformTransform(frame.voxelSize));
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   openvdb::FloatTree& tree = grid->tree();
 
-  const OrientedPoints& points = field.points();
-  std::vector<Coord> wave;
-  wave.reserve(points.size());
-  for (const V3d& p : points.positions) wave.push_back(blockOf((p + points.centre) / voxelSize));
   sortUnique(wave);
   const auto first = static_cast<double>(wave.size());
   const std::size_t most = memoryLeft(memoryLimit(maxMemory));
-  const BlockSampler sampler(field, box, voxelSize);
+  const BlockSampler sampler(field, frame);
   double count = 0;
   while (!wave.empty()) {
     // Batches bound the time between two reports.
@@ -138,7 +134,7 @@ openvdb::FloatGrid::Ptr sampleField(const SignedField& field, const Imath::Box3d
   if (!hasInside || !hasOutside)
     throw NoSurface(
         "the points enclose no grid point, so they have no surface; use smaller voxels, or check "
-        "the normals");
+        "normals and radii");
   return grid;
 }
 

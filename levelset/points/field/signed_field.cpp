@@ -12,6 +12,7 @@ using Imath::V3d;
 /// Distances from the closest point, in spacings, between which the near field is blended with the
 /// far field.
 constexpr double kNearEnd = 1.2, kFarStart = 2.2;
+constexpr double kFewNeighbours = 17;
 
 /// 0 up to 0, 1 from 1 on, with a continuous slope.
 double smoothStep(double t) {
@@ -22,9 +23,13 @@ double smoothStep(double t) {
 }  // namespace
 
 SignedField::SignedField(const OrientedPoints& points, PointField near)
-    : points_(points), near_(std::move(near)), winding_(points) {}
+    : points_(points),
+      near_(std::move(near)),
+      // Users ask for many neighbours where noise is larger than the spacing.
+      reach_(std::max(1.0, std::sqrt(static_cast<double>(near_.neighbours) / kFewNeighbours))),
+      winding_(points) {}
 
-double SignedField::far(const V3d& at, double closest, Memory& memory) const {
+double SignedField::far(const V3d& at, double closest, FieldMemory& memory) const {
   // The winding number changes by at most 1/2 for each `closest`. So the sign of a definite one
   // holds in its neighbourhood.
   constexpr double kDefinite = 0.25, kSameSide = 0.3;
@@ -36,12 +41,13 @@ double SignedField::far(const V3d& at, double closest, Memory& memory) const {
   return (1 - 2 * memory.winding) * closest;
 }
 
-double SignedField::value(const V3d& at, Memory& memory) const {
+double SignedField::value(const V3d& at, FieldMemory& memory) const {
   std::vector<Found>& found = memory.found;
   const Found first = points_.search.closest(at, std::numeric_limits<double>::infinity());
   const double closest = std::sqrt(first.squared);
   // Neighbouring points have similar spacings.
-  if (closest > 2 * kFarStart * points_.spacings[first.index]) return far(at, closest, memory);
+  if (closest > 2 * kFarStart * reach_ * points_.spacings[first.index])
+    return far(at, closest, memory);
   points_.search.closest(at, near_.neighbours, found);
   double spacing = 0, weights = 0;
   for (const Found& f : found) {
@@ -50,7 +56,8 @@ double SignedField::value(const V3d& at, Memory& memory) const {
     spacing += weight * points_.spacings[f.index];
   }
   spacing = weights > 0 ? spacing / weights : points_.spacings[first.index];
-  const double share = smoothStep((closest / spacing - kNearEnd) / (kFarStart - kNearEnd));
+  const double share =
+      smoothStep((closest / (reach_ * spacing) - kNearEnd) / (kFarStart - kNearEnd));
   if (share == 0) return near_.value(at, found);
   if (share == 1) return far(at, closest, memory);
   return (1 - share) * near_.value(at, found) + share * far(at, closest, memory);

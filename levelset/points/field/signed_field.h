@@ -4,6 +4,7 @@
 
 #include "levelset/points/field/point_field.h"
 #include "levelset/points/field/point_winding.h"
+#include "levelset/points/field/sample_field.h"
 
 namespace levelset::points {
 
@@ -17,22 +18,15 @@ class SignedField {
   /// @param points  must outlive the field
   SignedField(const OrientedPoints& points, PointField near);
 
-  /// Memory of one thread, for positions near each other.
-  struct Memory {
-    std::vector<Found> found = {};
-    Imath::V3d at = Imath::V3d(0);  ///< position of the last winding number
-    double winding = 0.5;
-  };
-
   /// @param at  relative to OrientedPoints::centre
-  [[nodiscard]] double value(const Imath::V3d& at, Memory& memory) const;
-  [[nodiscard]] const OrientedPoints& points() const { return points_; }
+  [[nodiscard]] double value(const Imath::V3d& at, FieldMemory& memory) const;
 
  private:
-  [[nodiscard]] double far(const Imath::V3d& at, double closest, Memory& memory) const;
+  [[nodiscard]] double far(const Imath::V3d& at, double closest, FieldMemory& memory) const;
 
   const OrientedPoints& points_;
   PointField near_;
+  double reach_;  ///< size of the near field, relative to that of few neighbours
   PointWinding winding_;
 };
 

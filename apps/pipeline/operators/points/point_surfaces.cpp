@@ -8,6 +8,7 @@
 #include "levelset/convert/mesh_to_band.h"
 #include "levelset/error.h"
 #include "levelset/files/band_file.h"
+#include "levelset/points/field/particles.h"
 #include "levelset/points/field/points_to_band.h"
 
 namespace pipeline {
@@ -39,8 +40,32 @@ std::string certificateJson(const SupportCertificate& c) {
       .dump();
 }
 
+levelset::ParticleKernel kernelOf(const Invocation& in) {
+  const std::string word = in.text("kernel");
+  if (word == "balls") return levelset::ParticleKernel::Balls;
+  if (word == "blobs") return levelset::ParticleKernel::Blobs;
+  return word == "zhu-bridson" ? levelset::ParticleKernel::ZhuBridson
+                               : levelset::ParticleKernel::Anisotropic;
+}
+
+bool isOfParticles(const Invocation& in) {
+  return in.text("method") == "particles";
+}
+
+Value surfaceOfParticles(Invocation& in, double voxelSize) {
+  return Value(particlesToBand(in.operands[0].cloud(), voxelSize,
+                               {.kernel = kernelOf(in),
+                                .radius = in.given("radius") ? in.length("radius") : 0,
+                                .reach = in.number("reach"),
+                                .halfWidth = in.number("half-width"),
+                                .maxMemory = in.maxMemory,
+                                .progress = in.progress}));
+}
+
 Value surfaceOfPoints(Invocation& in) {
   const levelset::PointCloud& cloud = in.operands[0].cloud();
+  const double voxelSize = in.voxelSize(in.operands[0].plan().estimate().longestSide());
+  if (isOfParticles(in)) return surfaceOfParticles(in, voxelSize);
   const PointsToBandOptions options{
       .method = methodOf(in),
       .neighbours = in.given("neighbours") ? in.integerAs<std::size_t>("neighbours") : 0,
@@ -56,7 +81,6 @@ Value surfaceOfPoints(Invocation& in) {
               fmt::format("{:.2g} % of the surface is a guess, since no point lies near it",
                           100 * certificate.unsupportedShare()));
       }};
-  const double voxelSize = in.voxelSize(in.operands[0].plan().estimate().longestSide());
   levelset::PointsToBandResult result = levelset::pointsToBand(cloud, voxelSize, options);
   if (in.given("support")) levelset::writeField(in.text("support"), result.support);
   return Value(std::move(result.band));
@@ -87,14 +111,14 @@ Operator conversionOperator() {
   Operator op = ofMeshes;
   op.summary = "turn a mesh or a point cloud into a level set with exact distances";
   op.details +=
-      " A point cloud needs normals, see 'normals'. --method meshless joins planes through the "
-      "points; its surface "
-      "contains the points but for a small share of their spacing. --method mls fits a quadratic "
-      "height function "
-      "to the points near each position, and smooths noise. Far from the points, the winding "
-      "number decides on the side, and closes holes. The certificate states which share of the "
-      "surface is a guess, since no point lies within two spacings. Above 1 % it is an error "
-      "without --accept-sign.";
+      " A point cloud needs normals, see 'normals'. --method mls fits a quadratic height function "
+      "to "
+      "the points near each position. It smooths noise; raise --neighbours if the noise exceeds "
+      "the spacing. --method meshless blends planes through the points. Far from the points, the "
+      "winding number decides on the side, and closes holes. The certificate in the report states "
+      "which share of the surface is a guess, since no point lies within two spacings. Above 1 % "
+      "this is an error without --accept-sign. --method particles makes the surface of a fluid. "
+      "It takes points inside a volume, without normals.";
   op.operands = {{Kind::Mesh, Kind::Points}};
   for (Param& param : op.params)
     if (param.name == "accept-sign")
@@ -105,11 +129,11 @@ Operator conversionOperator() {
                        .type = ParamType::Choice,
                        .doc = "surface through a point cloud",
                        .fallback = "mls",
-                       .choices = {"mls", "meshless"}});
+                       .choices = {"mls", "meshless", "particles"}});
   op.params.push_back({.name = "neighbours",
                        .type = ParamType::Integer,
                        .doc =
-                           "number of points that determine the surface at a position, 6 to 100; "
+                           "number of points that determine the surface at a position, 6 to 1000; "
                            "default: 16 for mls, 12 for meshless",
                        .range = Range::Positive});
   op.params.push_back(
@@ -117,6 +141,26 @@ Operator conversionOperator() {
        .type = ParamType::Path,
        .doc = "write the distances from the surface to the nearest point, in spacings, to this "
               ".vdb"});
+  op.params.push_back({.name = "kernel",
+                       .type = ParamType::Choice,
+                       .doc = "with --method particles: union of balls; sum of Gaussians; ball of "
+                              "averages; or sum of kernels that are flattened like their "
+                              "neighbourhood, which gives the smoothest surface",
+                       .fallback = "anisotropic",
+                       .choices = {"balls", "blobs", "zhu-bridson", "anisotropic"}});
+  op.params.push_back({.name = "radius",
+                       .type = ParamType::Length,
+                       .doc =
+                           "with --method particles: radius of a particle; default: the radii of "
+                           "the cloud, or 0.8 times the median distance between neighbours",
+                       .range = Range::Positive,
+                       .allowsVoxels = false});
+  op.params.push_back(
+      {.name = "reach",
+       .type = ParamType::Number,
+       .doc = "with --method particles: reach of a particle in its radii, 1.5 to 10",
+       .fallback = "3",
+       .range = Range::Positive});
   op.run = [ofMeshes](Invocation& in) {
     return takesPoints(in) ? surfaceOfPoints(in) : ofMeshes.run(in);
   };
@@ -131,11 +175,20 @@ Operator conversionOperator() {
     ofMeshes.validate(in);
     if (takesPoints(in)) {
       refuseOptions(in, {"sign", "nested", "skip-intersection-test"}, "meshes", "point cloud");
+      for (const char* name : {"kernel", "radius", "reach"})
+        if (in.given(name) && !isOfParticles(in))
+          throw UsageError(
+              fmt::format("level-set: --{} needs --method particles; leave it out", name));
+      for (const char* name : {"neighbours", "support"})
+        if (in.given(name) && isOfParticles(in))
+          throw UsageError(fmt::format(
+              "level-set: --{} does not apply to --method particles; leave it out", name));
       if (in.given("support") && !levelset::isVdbFormat(in.text("support")))
         throw UsageError(fmt::format("level-set: --support writes .vdb files only, not '{}'",
                                      in.text("support")));
     } else if (!in.operands.empty()) {
-      refuseOptions(in, {"method", "neighbours", "support"}, "point clouds", "mesh");
+      refuseOptions(in, {"method", "neighbours", "support", "kernel", "radius", "reach"},
+                    "point clouds", "mesh");
     }
   };
   return op;

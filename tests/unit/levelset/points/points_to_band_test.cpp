@@ -266,8 +266,8 @@ TEST(PointsToBand, RefusesOptionsOutOfRange) {
   const auto refused = [&](const PointsToBandOptions& options) {
     return refusal<UsageError>([&] { (void)pointsToBand(cloud, 0.1, options); });
   };
-  EXPECT_SAYS(refused({.neighbours = 5}), "give 6 to 100");
-  EXPECT_SAYS(refused({.neighbours = 101}), "give 6 to 100");
+  EXPECT_SAYS(refused({.neighbours = 5}), "give 6 to 1000");
+  EXPECT_SAYS(refused({.neighbours = 1001}), "give 6 to 1000");
   EXPECT_SAYS(refused({.halfWidth = 0.5}), "half width");
   EXPECT_SAYS(refused({.supportRadius = 0}), "support radius");
   EXPECT_THROW((void)pointsToBand(cloud, 0.1, {.maxMemory = 1000}), levelset::ResourceLimit);
