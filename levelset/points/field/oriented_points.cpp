@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "levelset/error.h"
+#include "levelset/memory_limit.h"
 
 namespace levelset::points {
 namespace {
@@ -57,8 +58,12 @@ void requireSpread(const OrientedPoints& points) {
 
 }  // namespace
 
-OrientedPoints orient(const PointCloud& cloud) {
+OrientedPoints orient(const PointCloud& cloud, std::size_t maxMemory) {
   requireNormals(cloud);
+  constexpr double kPointBytes =
+      260;  // while the second tree is built; the winding number needs less
+  requireMemory(kPointBytes * static_cast<double>(cloud.size()),
+                memoryLeft(memoryLimit(maxMemory)));
   OrientedPoints points;
   points.centre = bounds(cloud).center();
   std::vector<V3d> relative;

@@ -34,6 +34,8 @@ inline constexpr std::size_t kMinSurfacePoints = 4;
 /// Prepares a cloud. Points at equal positions become one, with their mean normal.
 /// @throws InvalidInput for a cloud without normals, with a normal of length zero, with fewer than
 ///         four different positions, or with all positions on a line
-[[nodiscard]] OrientedPoints orient(const PointCloud& cloud);
+/// @throws ResourceLimit
+[[nodiscard]] OrientedPoints orient(const PointCloud& cloud,
+                                    std::size_t maxMemory = kNoMemoryLimit);
 
 }  // namespace levelset::points

@@ -174,7 +174,7 @@ std::string describe(const SupportCertificate& c) {
 PointsToBandResult pointsToBand(const PointCloud& cloud, double voxelSize,
                                 const PointsToBandOptions& options) {
   report(options.progress, 0);
-  const OrientedPoints points = points::orient(cloud);
+  const OrientedPoints points = points::orient(cloud, options.maxMemory);
   checkOptions(points, voxelSize, options);
   const double opposedShare =
       static_cast<double>(points.opposed) / static_cast<double>(points.size());
