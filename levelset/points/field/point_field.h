@@ -2,8 +2,6 @@
 
 // Internal header of levelset: public headers must not include it.
 
-#include <array>
-#include <cmath>
 #include <functional>
 #include <vector>
 
@@ -24,13 +22,6 @@ struct PointField {
 [[nodiscard]] inline double pointWeight(double squared) {
   const double t = squared < 1 ? 1 - squared : 0;
   return t * t * t;
-}
-
-/// Two unit vectors that are perpendicular to a unit normal and to each other.
-[[nodiscard]] inline std::array<Imath::V3d, 2> tangents(const Imath::V3d& normal) {
-  const Imath::V3d axis = std::abs(normal.x) < 0.6 ? Imath::V3d(1, 0, 0) : Imath::V3d(0, 1, 0);
-  const Imath::V3d u = axis.cross(normal).normalized();
-  return {u, normal.cross(u)};
 }
 
 /// Distance to a quadratic height function that is fitted to the closest points and their normals.

@@ -13,6 +13,7 @@
 #include "levelset/fields/grid_vdb.h"
 #include "levelset/grids/sample.h"
 #include "levelset/points/field/meshless.h"
+#include "levelset/points/field/multilevel_partition.h"
 #include "levelset/points/field/oriented_points.h"
 #include "levelset/points/field/signed_field.h"
 
@@ -37,6 +38,9 @@ void checkOptions(const OrientedPoints& points, double voxelSize,
   if (!(options.supportRadius > 0) || !std::isfinite(options.supportRadius))
     throw UsageError(fmt::format("the support radius is {} spacings; give a positive number",
                                  options.supportRadius));
+  if (!(options.tolerance > 0) || !std::isfinite(options.tolerance))
+    throw UsageError(
+        fmt::format("the tolerance is {} spacings; give a positive number", options.tolerance));
   const V3d size = points.box.size();
   checkVoxelSize(voxelSize, std::max({size.x, size.y, size.z}));
   double reach = 0;
@@ -58,6 +62,10 @@ PointField fieldOf(const OrientedPoints& points, const PointsToBandOptions& opti
                               subProgress(options.progress, 0.1, 0.3));
     case PointMethod::MovingLeastSquares:
       return points::movingLeastSquares(points, neighbours);
+    case PointMethod::MultilevelPartition:
+      return points::multilevelPartition(
+          points, neighbours, options.tolerance * points.medianSpacing, options.maxMemory,
+          subProgress(options.progress, 0.1, 0.3));
   }
   return {};
 }
@@ -160,7 +168,15 @@ void addResiduals(const NarrowBand& band, const OrientedPoints& points,
 }  // namespace
 
 std::size_t defaultNeighbours(PointMethod method) {
-  return method == PointMethod::Meshless ? 12 : 16;
+  switch (method) {
+    case PointMethod::Meshless:
+      return 12;
+    case PointMethod::MovingLeastSquares:
+      return 16;
+    case PointMethod::MultilevelPartition:
+      return 15;
+  }
+  return 0;
 }
 
 std::string describe(const SupportCertificate& c) {

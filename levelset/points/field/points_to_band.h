@@ -19,7 +19,10 @@ enum class PointMethod {
   Meshless,
   /// A quadratic height function, fitted to the points and normals near each position [Levin03,
   /// Alexa03]. Smooths noise.
-  MovingLeastSquares
+  MovingLeastSquares,
+  /// An octree of quadratic height functions, blended with each other [Ohtake03]. Keeps sharp
+  /// edges and corners.
+  MultilevelPartition
 };
 
 /// Number of points that determine the surface at a position, if the caller gives none.
@@ -63,6 +66,9 @@ struct PointsToBandOptions {
   /// Number of points that determine the surface at a position, from 6 to 1000; 0: that of
   /// defaultNeighbours().
   std::size_t neighbours = 0;
+  /// For MultilevelPartition: aimed distance of the points from the surface, in the median spacing,
+  /// positive.
+  double tolerance = 0.02;
   double halfWidth = 3;  ///< half width of the band, voxels, at least 1
   /// Largest distance of a supported place from the cloud, in spacings.
   double supportRadius = 2;

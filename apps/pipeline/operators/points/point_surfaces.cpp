@@ -24,7 +24,9 @@ bool takesPoints(const Invocation& in) {
 }
 
 PointMethod methodOf(const Invocation& in) {
-  return in.text("method") == "meshless" ? PointMethod::Meshless : PointMethod::MovingLeastSquares;
+  const std::string word = in.text("method");
+  if (word == "meshless") return PointMethod::Meshless;
+  return word == "mpu" ? PointMethod::MultilevelPartition : PointMethod::MovingLeastSquares;
 }
 
 std::string certificateJson(const SupportCertificate& c) {
@@ -112,13 +114,13 @@ Operator conversionOperator() {
   op.summary = "turn a mesh or a point cloud into a level set with exact distances";
   op.details +=
       " A point cloud needs normals, see 'normals'. --method mls fits a quadratic height function "
-      "to "
-      "the points near each position. It smooths noise; raise --neighbours if the noise exceeds "
-      "the spacing. --method meshless blends planes through the points. Far from the points, the "
-      "winding number decides on the side, and closes holes. The certificate in the report states "
-      "which share of the surface is a guess, since no point lies within two spacings. Above 1 % "
-      "this is an error without --accept-sign. --method particles makes the surface of a fluid. "
-      "It takes points inside a volume, without normals.";
+      "to the points near each position. It smooths noise; raise --neighbours if the noise exceeds "
+      "the spacing. --method mpu blends such functions of the cells of an octree, and keeps sharp "
+      "edges. --method meshless blends planes through the points. Far from the points, the winding "
+      "number decides on the side, and closes holes. The certificate in the report states which "
+      "share of the surface is a guess, since no point lies within two spacings. Above 1 % this is "
+      "an error without --accept-sign. --method particles makes the surface of a fluid. It takes "
+      "points inside a volume, without normals.";
   op.operands = {{Kind::Mesh, Kind::Points}};
   for (Param& param : op.params)
     if (param.name == "accept-sign")
@@ -129,12 +131,12 @@ Operator conversionOperator() {
                        .type = ParamType::Choice,
                        .doc = "surface through a point cloud",
                        .fallback = "mls",
-                       .choices = {"mls", "meshless", "particles"}});
+                       .choices = {"mls", "mpu", "meshless", "particles"}});
   op.params.push_back({.name = "neighbours",
                        .type = ParamType::Integer,
                        .doc =
                            "number of points that determine the surface at a position, 6 to 1000; "
-                           "default: 16 for mls, 12 for meshless",
+                           "default: 16 for mls, 15 for mpu, 12 for meshless",
                        .range = Range::Positive});
   op.params.push_back(
       {.name = "support",
