@@ -7,7 +7,7 @@
 // NOISE    standard deviation of each coordinate, in fractions of the diagonal of the bounding box
 // NORMALS  given, estimated (by `normals`), or flipped (half of them, then estimated)
 // VARIANT  blue (noise), uneven (uniform random), hole (a cap is removed)
-// METHOD   mls, meshless, poisson, front, pcl-poisson; default: all
+// METHOD   mls, mpu, meshless, poisson, front, pcl-poisson; default: all
 //
 // Prints a line of CSV for each method: mean and largest distance in point spacings from the result
 // to the true surface and back, the mean angle between normals in degrees, the error of the volume,
@@ -238,7 +238,7 @@ int main(int argc, char** argv) try {
   const std::size_t neighbours =
       deviation < 0.1
           ? 0
-          : std::min<std::size_t>(500, 16 + static_cast<std::size_t>(40 * deviation * deviation));
+          : std::min<std::size_t>(200, 16 + static_cast<std::size_t>(300 * deviation * deviation));
   double normalSeconds = 0;
   if (normals == "flipped")
     for (std::size_t i = 0; i < cloud.size(); i += 2) cloud.normals[i] = -cloud.normals[i];
@@ -258,6 +258,7 @@ int main(int argc, char** argv) try {
   };
   std::vector<std::pair<std::string, std::function<TriMesh()>>> methods{
       {"mls", [&] { return ours(levelset::PointMethod::MovingLeastSquares); }},
+      {"mpu", [&] { return ours(levelset::PointMethod::MultilevelPartition); }},
       {"meshless", [&] { return ours(levelset::PointMethod::Meshless); }},
       {"poisson", [&] { return poisson(cloud, spacing); }},
       {"front", [&] { return advancingFront(cloud); }},
