@@ -5,7 +5,6 @@
 #include "apps/pipeline/registry/operator.h"
 #include "levelset/advection/advect.h"
 #include "levelset/components/components.h"
-#include "levelset/convert/mesh_to_band.h"
 #include "levelset/convert/surface_band.h"
 #include "levelset/csg/blend.h"
 #include "levelset/csg/csg.h"
@@ -33,7 +32,7 @@ std::vector<Operator> allOperators() {
       levelSetOperator<levelset::TorusOperator>(),
       levelSetOperator<levelset::CylinderOperator>(),
       levelSetOperator<levelset::CapsuleOperator>(),
-      levelSetOperator<levelset::LevelSetOperator>(),
+      conversionOperator(),
       levelSetOperator<levelset::SurfaceBandOperator>(),
       meshOperator(),
       volumeOperator(),

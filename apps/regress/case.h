@@ -58,6 +58,7 @@ struct Case {
 void addShapeCases(std::vector<Case>& all);
 void addMeshCases(std::vector<Case>& all);
 void addRedistanceCases(std::vector<Case>& all);
+void addPointCases(std::vector<Case>& all);
 void addOffsetCases(std::vector<Case>& all);
 void addCsgCases(std::vector<Case>& all);
 void addEmbossCases(std::vector<Case>& all);

@@ -17,6 +17,7 @@ const std::vector<Case>& cases() {
     addShapeCases(list);
     addMeshCases(list);
     addRedistanceCases(list);
+    addPointCases(list);
     addOffsetCases(list);
     addCsgCases(list);
     addEmbossCases(list);

@@ -45,6 +45,7 @@ namespace pipeline {
 [[nodiscard]] Operator normalsOperator();
 [[nodiscard]] Operator outliersOperator();
 [[nodiscard]] Operator thinOperator();
+[[nodiscard]] Operator conversionOperator();
 [[nodiscard]] Operator transformOperator();
 [[nodiscard]] Operator clipOperator();
 

@@ -120,6 +120,10 @@ class OverlapTree {
   /// Items in the order of the tree. Items near each other in this order are near each other in
   /// space.
   [[nodiscard]] const std::vector<Item>& items() const { return items_; }
+  /// Gives each item the number of its place in items().
+  void renumber() {
+    for (std::size_t i = 0; i < items_.size(); ++i) items_[i].index = static_cast<std::uint32_t>(i);
+  }
   /// Estimated memory while the tree is built, bytes for each item: an item, and at most half a
   /// node twice, since nodes of subtrees are copied.
   [[nodiscard]] static constexpr double bytesPerItem() { return sizeof(Item) + sizeof(Node); }

@@ -3,10 +3,13 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/support/command_line.h"
+#include "tests/support/files.h"
+#include "tests/support/measured.h"
 
 namespace point_actions_test {
 
 using Json = nlohmann::json;
+using support::measured;
 
 class PointActions : public support::ShellTest {
  protected:
@@ -104,6 +107,55 @@ TEST_F(PointActions, RefusalsHaveTheirCode) {
   expectRefusal("read a.xyz --points --grid x ! info", 2, "--grid");
   expectRefusal("sphere --radius 1 --voxel 0.2 ! mesh ! write a.xyz", 2, "sample");
   expectRefusal("sphere --radius 1 --voxel 0.2 ! mesh ! sample", 2, "either --count or --spacing");
+}
+
+TEST_F(PointActions, ALevelSetOfPointsHasACertificate) {
+  const Json ball =
+      json(std::string(kSampled) +
+           "level-set --voxel 0.04 --support support.vdb --method mls ! measure --json");
+  // The points lie on a mesh of triangles inside the ball.
+  EXPECT_NEAR(ball["volume"].get<double>(), 4.18879, measured(0.0063));
+  EXPECT_EQ(ball["euler"], 2);
+  EXPECT_EQ(json("info support.vdb --json")["grids"].size(), 1);
+  const support::Outcome report =
+      levelsmith("--report r.json " + std::string(kSampled) + "level-set --resolution 50 ! info");
+  ASSERT_EQ(report.code, 0) << report.err;
+  const Json steps = Json::parse(support::readText(folder_ / "r.json"))["steps"];
+  Json certificate;
+  for (const Json& step : steps)
+    if (step.contains("certificate")) certificate = step["certificate"];
+  EXPECT_EQ(certificate["points"], 2000);
+  EXPECT_EQ(certificate["unsupported_share"], 0);
+  EXPECT_LT(certificate["mean_residual"], 0.01);
+}
+
+TEST_F(PointActions, ALevelSetOfPointsRefusesAGuess) {
+  const std::string half = std::string(kSampled) + "clip --plane \"0,0,0.3 0,0,1\" ! ";
+  expectRefusal(half + "level-set --voxel 0.04 ! info", 3, "--accept-sign");
+  const support::Outcome accepted =
+      levelsmith(half + "level-set --voxel 0.04 --accept-sign ! check");
+  EXPECT_EQ(accepted.code, 0) << accepted.err;
+  EXPECT_NE(accepted.err.find("is a guess"), std::string::npos) << accepted.err;
+  writeFile("a.xyz", "0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n");
+  expectRefusal("read a.xyz ! level-set --voxel 0.1 ! info", 3, "`normals`");
+  expectRefusal(std::string(kSampled) + "level-set --voxel 0.1 --sign closed ! info", 2, "meshes");
+  expectRefusal(std::string(kSampled) + "level-set --voxel 0.1 --support s.ply ! info", 2, ".vdb");
+  expectRefusal(std::string(kSampled) + "level-set --voxel 0.1 --neighbours 3 ! info", 2,
+                "6 to 1000");
+  expectRefusal("sphere --radius 1 --voxel 0.2 ! mesh ! level-set --voxel 0.2 --method mls", 2,
+                "point clouds");
+}
+
+TEST_F(PointActions, ALevelSetOfParticlesNeedsNoNormals) {
+  writeFile("a.xyz", "0 0 0\n0.5 0 0\n0 0.5 0\n0 0 0.5\n");
+  const std::string particles = "read a.xyz ! level-set --method particles --voxel 0.05 ";
+  const Json balls = json(particles + "--kernel balls --radius 0.2 ! measure --json");
+  EXPECT_EQ(balls["components"], 4);
+  EXPECT_NEAR(balls["volume"].get<double>(), 4 * 4.18879 * 0.008, measured(2e-4));
+  EXPECT_EQ(json(particles + "! measure --json")["components"], 1);
+  expectRefusal(particles + "--support s.vdb ! info", 2, "does not apply");
+  expectRefusal("read a.xyz ! level-set --voxel 0.05 --radius 1 ! info", 2, "--method particles");
+  expectRefusal(particles + "--reach 20 ! info", 2, "1.5 to 10");
 }
 
 TEST_F(PointActions, ADryRunPlansClouds) {

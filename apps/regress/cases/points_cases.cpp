@@ -1,0 +1,158 @@
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "apps/regress/recorder.h"
+#include "apps/regress/truth/exact_band.h"
+#include "levelset/meshing/band_to_mesh.h"
+#include "levelset/points/field/particles.h"
+#include "levelset/points/field/points_to_band.h"
+#include "levelset/points/processing/normals.h"
+#include "levelset/points/processing/sample_mesh.h"
+
+namespace regress {
+
+using Imath::V3d;
+using levelset::PointCloud;
+using levelset::PointMethod;
+
+namespace {
+
+V3d gradient(const Truth& truth, const V3d& at) {
+  constexpr double kStep = 1e-5;
+  V3d slope;
+  for (int axis = 0; axis < 3; ++axis) {
+    V3d step(0);
+    step[axis] = kStep;
+    slope[axis] = truth.distance(at + step) - truth.distance(at - step);
+  }
+  return slope.normalized();
+}
+
+/// Points on the surface of a solid, with its normals, at a distance of two voxels.
+PointCloud pointsOn(const Truth& truth, double voxelSize) {
+  // The mesh only distributes the points: they are moved to the surface of the closed form.
+  PointCloud cloud =
+      sampleMesh(levelset::bandToMesh(exactBand(truth, voxelSize)), {.spacing = 2 * voxelSize});
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    V3d& p = cloud.positions[i];
+    for (int n = 0; n < 3; ++n) p -= truth.distance(p) * gradient(truth, p);
+    cloud.normals[i] = Imath::V3f(gradient(truth, p));
+  }
+  return cloud;
+}
+
+struct PointShape {
+  const char* name;
+  Truth truth;
+};
+
+std::vector<PointShape> shapes(const V3d& shift) {
+  return {{"sphere", ball(shift, 0.4)},
+          {"torus", torus(shift, V3d(1, 2, 3), 0.35, 0.15)},
+          {"cube", box(shift, V3d(0.7))}};
+}
+
+struct NamedMethod {
+  const char* name;
+  PointMethod method;
+};
+constexpr NamedMethod kPointMethods[] = {{"mls", PointMethod::MovingLeastSquares},
+                                         {"meshless", PointMethod::Meshless}};
+
+void cleanPoints(Recorder& out) {
+  for (const Sample& at : out.samples())
+    for (const PointShape& shape : shapes(at.shift)) {
+      const PointCloud cloud = pointsOn(shape.truth, at.voxelSize);
+      for (const NamedMethod& method : kPointMethods)
+        out.measure({std::string(shape.name) + ", " + method.name, at, shape.truth}, kOurs, [&] {
+          return pointsToBand(cloud, at.voxelSize, {.method = method.method}).band;
+        });
+    }
+}
+
+/// Points with a noise of a fifth of their spacing, and normals that are computed from them.
+void noisyPoints(Recorder& out) {
+  constexpr std::size_t kNeighbours = 40;
+  for (const Sample& at : out.samples())
+    for (const PointShape& shape : shapes(at.shift)) {
+      PointCloud cloud = pointsOn(shape.truth, at.voxelSize);
+      std::mt19937_64 random(1);
+      std::normal_distribution<double> noise(0, 0.2 * 2 * at.voxelSize);
+      for (V3d& p : cloud.positions)
+        for (int axis = 0; axis < 3; ++axis) p[axis] += noise(random);
+      cloud = levelset::estimateNormals(std::move(cloud), {.neighbours = kNeighbours}).cloud;
+      for (const NamedMethod& method : kPointMethods)
+        out.measure({std::string(shape.name) + ", " + method.name, at, shape.truth}, kOurs, [&] {
+          return pointsToBand(cloud, at.voxelSize,
+                              {.method = method.method, .neighbours = kNeighbours})
+              .band;
+        });
+    }
+}
+
+void particleBalls(Recorder& out) {
+  for (const Sample& at : out.samples()) {
+    const V3d a = at.shift, b = at.shift + V3d(0.4, 0.1, 0);
+    const PointCloud cloud{.positions = {a, b}, .radii = {0.35F, 0.25F}};
+    const Truth truth = twoBalls(levelset::CsgOperation::Union, a, double{cloud.radii[0]}, b,
+                                 double{cloud.radii[1]});
+    out.measure({"two balls", at, truth}, kOurs, [&] {
+      return particlesToBand(cloud, at.voxelSize, {.kernel = levelset::ParticleKernel::Balls});
+    });
+  }
+}
+
+Bounds cleanPointBounds() {
+  return Bounds();
+}
+
+Bounds noisyPointBounds() {
+  return Bounds();
+}
+
+Bounds particleBounds() {
+  return Bounds();
+}
+
+}  // namespace
+
+void addPointCases(std::vector<Case>& all) {
+  all.push_back({.name = "points-clean",
+                 .group = "points",
+                 .title = "surfaces of points without noise",
+                 .definition =
+                     "Points with exact normals, two voxels apart, on a sphere of radius 0.4, a "
+                     "torus of radii 0.35 and 0.15, and a cube of edge 0.7. Solids by 'level-set "
+                     "--method mls' and 'meshless'.",
+                 .citation = "closed form",
+                 .quick = {16, 32},
+                 .full = {32, 64, 128},
+                 .bounds = cleanPointBounds(),
+                 .run = cleanPoints});
+  all.push_back({.name = "points-noise",
+                 .group = "points with noise",
+                 .title = "surfaces of noisy points without normals",
+                 .definition =
+                     "The points of 'points-clean', with a noise whose standard deviation is a "
+                     "fifth of their spacing. Normals come from 40 neighbours, and so do the "
+                     "surfaces.",
+                 .citation = "closed form",
+                 .quick = {24, 32},
+                 .full = {32, 64},
+                 .bounds = noisyPointBounds(),
+                 .run = noisyPoints});
+  all.push_back({.name = "points-particles",
+                 .group = "particles",
+                 .title = "union of the balls of particles",
+                 .definition = "Two balls of radii 0.35 and 0.25 whose surfaces meet in a circle.",
+                 .citation = "closed form",
+                 .quick = {16, 32},
+                 .full = {32, 64, 128},
+                 .bounds = particleBounds(),
+                 .run = particleBalls});
+}
+
+}  // namespace regress

@@ -1,0 +1,32 @@
+#pragma once
+
+// Internal header of levelset: public headers must not include it.
+
+#include <functional>
+#include <vector>
+
+#include "levelset/points/field/oriented_points.h"
+#include "levelset/points/search/point_search.h"
+
+namespace levelset::points {
+
+/// Function of space near the points. Its zero set is the surface, it is negative inside, and its
+/// slope is about 1. Takes a position relative to OrientedPoints::centre and its closest points,
+/// nearest first. Several threads may call it at once.
+struct PointField {
+  std::function<double(const Imath::V3d&, const std::vector<Found>&)> value;
+  std::size_t neighbours;  ///< number of closest points that `value` takes
+};
+
+/// Weight of a point at a squared distance, in fractions of the squared cut-off [Sigg06, 4.10].
+[[nodiscard]] inline double pointWeight(double squared) {
+  const double t = squared < 1 ? 1 - squared : 0;
+  return t * t * t;
+}
+
+/// Distance to a quadratic height function that is fitted to the closest points and their normals.
+/// The weights depend smoothly on the position, so the field is smooth.
+/// @param neighbours  number of points that are fitted
+[[nodiscard]] PointField movingLeastSquares(const OrientedPoints& points, std::size_t neighbours);
+
+}  // namespace levelset::points

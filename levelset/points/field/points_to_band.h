@@ -1,0 +1,106 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string>
+
+#include "levelset/fields/grid.h"
+#include "levelset/narrow_band.h"
+#include "levelset/points/point_cloud.h"
+#include "levelset/progress.h"
+
+/// Solids from point clouds without connectivity.
+namespace levelset {
+
+/// Surface through a cloud of points with normals.
+enum class PointMethod {
+  /// Partition of unity over planes that are shifted towards an interpolating surface
+  /// [Sigg06, 4.3].
+  Meshless,
+  /// A quadratic height function, fitted to the points and normals near each position [Levin03,
+  /// Alexa03]. Smooths noise.
+  MovingLeastSquares,
+  /// An octree of quadratic height functions, blended with each other [Ohtake03]. Keeps sharp
+  /// edges and corners.
+  MultilevelPartition
+};
+
+/// Number of points that determine the surface at a position, if the caller gives none.
+[[nodiscard]] std::size_t defaultNeighbours(PointMethod method);
+
+/// Support certificate: where points determine the surface, and where it is a guess across a hole.
+/// A place on the surface is supported when its distance to the closest point of the cloud is at
+/// most `PointsToBandOptions::supportRadius` times the spacing about that point. Points whose
+/// normal opposes that of the surface do not count.
+struct SupportCertificate {
+  std::size_t points = 0;      ///< number of different positions
+  double medianSpacing = 0;    ///< distance between neighbouring points, world units
+  double area = 0;             ///< area of the surface, world units²
+  double unsupportedArea = 0;  ///< area of the part that is a guess, world units²
+  double largestGap = 0;       ///< largest distance to the closest point, in its spacings
+  /// Mean distance of the points from the surface, in the median spacing. Points outside the band
+  /// count with its half width.
+  double meanResidual = 0;
+  std::size_t farPoints = 0;  ///< points outside the band, or farther than their spacing
+  /// Solids and cavities that were dropped, since fewer than four points lie beside them.
+  std::size_t droppedParts = 0;
+  /// Share of the points whose normal opposes the mean normal of their neighbours.
+  double opposedShare = 0;
+
+  /// Fraction of the area that is a guess.
+  [[nodiscard]] double unsupportedShare() const { return area > 0 ? unsupportedArea / area : 1; }
+};
+
+/// Returns a summary of the certificate in one line of text.
+[[nodiscard]] std::string describe(const SupportCertificate& certificate);
+
+/// Limit of SupportCertificate::unsupportedShare(). Above it pointsToBand() refuses the cloud,
+/// unless the option acceptUnsupported is set.
+inline constexpr double kUnsupportedLimit = 0.01;
+
+/// Limit of SupportCertificate::opposedShare, as above. A thin sheet has opposed normals too.
+inline constexpr double kOpposedLimit = 0.1;
+
+struct PointsToBandOptions {
+  PointMethod method = PointMethod::MovingLeastSquares;
+  /// Number of points that determine the surface at a position, from 6 to 1000; 0: that of
+  /// defaultNeighbours().
+  std::size_t neighbours = 0;
+  /// For MultilevelPartition: aimed distance of the points from the surface, in the median spacing,
+  /// positive.
+  double tolerance = 0.02;
+  double halfWidth = 3;  ///< half width of the band, voxels, at least 1
+  /// Largest distance of a supported place from the cloud, in spacings.
+  double supportRadius = 2;
+  /// Accept a surface of which a large part is a guess, and normals that oppose each other.
+  bool acceptUnsupported = false;
+  std::size_t maxMemory = kNoMemoryLimit;
+  Progress progress = {};
+  /// Called with the certificate, even if pointsToBand() then throws because of it.
+  std::function<void(const SupportCertificate&)> onCertificate = {};
+};
+
+struct PointsToBandResult {
+  NarrowBand band;
+  SupportCertificate certificate;
+  /// Distance from the surface to the closest point of the cloud, in spacings about that point, at
+  /// the grid points beside the surface.
+  FieldGrid support;
+};
+
+/// Makes the solid of a cloud with normals: samples the field of a method on the grid, then
+/// computes exact distances to its surface. The field is sampled only beside the surface, which is
+/// followed from block to block, across holes too. A surface that does not close is cut by a box
+/// about the cloud, larger on each side by a tenth of its diagonal. That part is a guess, too.
+/// @param voxelSize  world units; grid points lie at its integer multiples
+/// @throws UsageError for options out of range
+/// @throws InvalidInput for a cloud without normals, with a normal of length zero, with fewer than
+///         four different positions, or with all positions on a line; when a share of the surface
+///         above kUnsupportedLimit is a guess, or a share of the normals above kOpposedLimit
+///         opposes their neighbours; when the voxel is larger than the cloud
+/// @throws NoSurface when the field has no zero at the points
+/// @throws ResourceLimit, Cancelled
+[[nodiscard]] PointsToBandResult pointsToBand(const PointCloud& cloud, double voxelSize,
+                                              const PointsToBandOptions& options = {});
+
+}  // namespace levelset
