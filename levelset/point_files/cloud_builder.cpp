@@ -138,6 +138,14 @@ bool hasAlpha(const PointCloud& cloud) {
                      [](const Imath::V4f& color) { return color[3] != 1; });
 }
 
+void requireColorPart(const std::string& name, FilePosition place, double part) {
+  if (!(part >= 0 && part <= 255))
+    failAt(name, place,
+           fmt::format("a colour holds {}, which is not between 0 and 255; repair the line, or "
+                       "read the file without attributes (--no-attributes)",
+                       part));
+}
+
 unsigned char colorByte(float part) {
   return static_cast<unsigned char>(std::lround(std::clamp(part, 0.0f, 1.0f) * 255));
 }
