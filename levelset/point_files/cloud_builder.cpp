@@ -11,7 +11,6 @@
 namespace levelset::point_files {
 namespace {
 
-constexpr double kMostCoordinate = std::numeric_limits<float>::max();
 constexpr std::size_t kMostPoints = std::numeric_limits<std::uint32_t>::max();
 
 template <typename T>
