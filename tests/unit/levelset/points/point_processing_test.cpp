@@ -307,6 +307,13 @@ TEST(Outliers, RemovesPlantedPointsOnly) {
 
 TEST(Outliers, KeepsLatticesAndSinglePlaces) {
   EXPECT_EQ(withoutOutliers(cloudOf(lattice(7))).removed, 0u);
+  EXPECT_EQ(withoutOutliers(cloudOf(lattice(24))).removed, 0u);
+  std::vector<V3d> square, line;
+  for (int i = 0; i < 10000; ++i) square.emplace_back(i % 100, i / 100, 0);
+  EXPECT_EQ(withoutOutliers(cloudOf(square)).removed, 0u);
+  // The mean distances of the first two points are 1.9 and 1.7 of the median; the limit is 1.6.
+  for (int i = 0; i < 1000; ++i) line.emplace_back(i, 0, 0);
+  EXPECT_EQ(withoutOutliers(cloudOf(line)).removed, 4u);
   EXPECT_EQ(withoutOutliers(cloudOf({V3d(1)})).removed, 0u);
   EXPECT_EQ(withoutOutliers(cloudOf({V3d(1), V3d(2)})).removed, 0u);
   EXPECT_EQ(withoutOutliers(cloudOf(std::vector<V3d>(1000000, V3d(5)))).removed, 0u);
