@@ -210,9 +210,9 @@ TEST(PointNormals, DoubtIsMeasuredWithoutGuessedParts) {
   for (const V3d& p : ball.positions)
     if (p.z < -0.5) bowl.positions.push_back(p);
   const double alone = normalsOf(bowl).report.doubtful;
-  EXPECT_GT(alone, 0.1);
+  EXPECT_GT(alone, 0.4);  // measured: 0.48
   EXPECT_EQ(withPlane(bowl).guessed, 1u);
-  EXPECT_NEAR(withPlane(bowl).doubtful, alone, 0.02);
+  EXPECT_EQ(withPlane(bowl).doubtful, alone);
 }
 
 TEST(PointNormals, DuplicatesShareANormal) {
