@@ -11,7 +11,6 @@
 namespace levelset::point_files {
 namespace {
 
-constexpr double kMostCoordinate = std::numeric_limits<float>::max();
 constexpr std::size_t kMostPoints = std::numeric_limits<std::uint32_t>::max();
 
 template <typename T>
@@ -136,6 +135,14 @@ bool hasByteColors(const PointCloud& cloud) {
 bool hasAlpha(const PointCloud& cloud) {
   return std::any_of(cloud.colors.begin(), cloud.colors.end(),
                      [](const Imath::V4f& color) { return color[3] != 1; });
+}
+
+void requireColorPart(const std::string& name, FilePosition place, double part) {
+  if (!(part >= 0 && part <= 255))
+    failAt(name, place,
+           fmt::format("a colour holds {}, which is not between 0 and 255; repair the line, or "
+                       "read the file without attributes (--no-attributes)",
+                       part));
 }
 
 unsigned char colorByte(float part) {

@@ -79,6 +79,9 @@ void writePtsPoints(ByteWriter& out, const PointCloud& cloud, const Progress& pr
 [[nodiscard]] bool hasByteColors(const PointCloud& cloud);
 /// Returns true when an alpha differs from 1.
 [[nodiscard]] bool hasAlpha(const PointCloud& cloud);
+/// Checks a part of a colour in a text: an integer from 0 to 255, or a fraction.
+/// @throws InvalidInput
+void requireColorPart(const std::string& name, FilePosition place, double part);
 /// Returns the byte of a part of a colour.
 [[nodiscard]] unsigned char colorByte(float part);
 

@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "levelset/error.h"
@@ -24,7 +25,7 @@ class ObjPointReader {
                                 cloud.normals.size(), cloud.size()));
       cloud.normals = {};
     }
-    if (!cloud.colors.empty()) cloud.colors.resize(cloud.size(), Imath::V4f(1));
+    if (!cloud.colors.empty()) finishColors(cloud);
   }
 
  private:
@@ -50,18 +51,34 @@ class ObjPointReader {
     const FilePosition place = cursor_.place();
     builder_.addPosition(readVector("a coordinate"), place, cursor_.at());
     if (!builder_.wantsAttributes()) return;
-    Imath::V4f color(1);
+    Imath::V4d color(kNotGiven);
     int count = 0;
     for (; count < 4 && cursor_.skipBlanks('#', true); ++count)
-      color[count] = static_cast<float>(cursor_.number("a weight or colour after the coordinates"));
+      color[count] = cursor_.number("a weight or colour after the coordinates");
     if (count < 3) return;  // one or two numbers are a weight of a curve, which is not kept
+    for (int part = 0; part < count; ++part) {
+      requireColorPart(builder_.name(), place, color[part]);
+      exceedsOne_ = exceedsOne_ || color[part] > 1;
+    }
     PointCloud& cloud = builder_.cloud();
-    cloud.colors.resize(cloud.size() - 1, Imath::V4f(1));  // white for points without a colour
-    builder_.addColor(color, place);
+    cloud.colors.resize(cloud.size() - 1, Imath::V4f(kNotGiven));
+    builder_.addColor(Imath::V4f(color), place);
   }
+
+  /// Scales the colours, once all are known. Points without a colour become white, and colours
+  /// without alpha opaque.
+  void finishColors(PointCloud& cloud) const {
+    cloud.colors.resize(cloud.size(), Imath::V4f(kNotGiven));
+    for (Imath::V4f& color : cloud.colors)
+      for (int part = 0; part < 4; ++part)
+        color[part] = color[part] == kNotGiven ? 1 : exceedsOne_ ? color[part] / 255 : color[part];
+  }
+
+  static constexpr float kNotGiven = -1;  ///< stands for a part of a colour that the file lacks
 
   TextCursor cursor_;
   CloudBuilder& builder_;
+  bool exceedsOne_ = false;
 };
 
 template <typename Vector>
@@ -110,7 +127,7 @@ void writeObjPoints(ByteWriter& out, const PointCloud& cloud, const Progress& pr
       if (asBytes)
         out.writeNumber(static_cast<float>(colorByte(cloud.colors[i][part])) / 255);
       else
-        out.writeNumber(cloud.colors[i][part]);
+        out.writeNumber(std::clamp(cloud.colors[i][part], 0.0f, 1.0f));
     }
     out.write("\n");
     steps.step();

@@ -13,16 +13,17 @@
 ///
 /// PLY: `x y z`, and if present `nx ny nz`, `red green blue` with or without `alpha`, `radius`, and
 /// `confidence` or `weight`. OBJ: `v`, colours behind the coordinates, and one `vn` for each `v`.
-/// XYZ and CSV: one point on a line, separated by blanks, commas or semicolons. The columns follow
-/// from a header line of names, also behind `#` or `//`. Without it their number decides:
+/// XYZ and CSV: one point on a line, separated by blanks, commas or semicolons. Decimal commas are
+/// refused. A line with the number of points may precede them. The columns follow from a header
+/// line of names, also behind `#` or `//`. Without it their number decides:
 ///   3: x y z
 ///   4: x y z, and a number that is not kept (intensity)
 ///   6: x y z and a normal; a colour if all numbers are integers from 0 to 255, and one exceeds 1
 ///   7: x y z, a number that is not kept, and a colour
 ///   9: x y z, a normal and a colour
-/// PTS: a line with the number of points, then x y z, and if present intensity and colour. Several
-/// such blocks may follow each other. Colours in text are integers from 0 to 255, or fractions if
-/// none exceeds 1.
+/// PTS: a line with the number of points, then x y z, and if present intensity and colour. Six
+/// columns are a colour. Several such blocks may follow each other. Colours in text and OBJ are
+/// integers from 0 to 255, or fractions if none exceeds 1.
 namespace levelset {
 
 struct ReadPointsOptions {

@@ -34,12 +34,10 @@ class Lines {
   /// Moves to the next line that is neither empty nor a comment. Returns false at the end.
   bool next() {
     while (at_ < text_.size()) {
-      const void* found = std::memchr(text_.data() + at_, '\n', text_.size() - at_);
-      const std::size_t end =
-          found ? static_cast<std::size_t>(static_cast<const char*>(found) - text_.data())
-                : text_.size();
+      const std::size_t end = lineEnd();
       line_ = text_.substr(at_, end - at_);
-      at_ = std::min(end + 1, text_.size());
+      const bool isPair = text_.substr(end).starts_with("\r\n");
+      at_ = std::min(end + (isPair ? 2 : 1), text_.size());
       ++number_;
       const std::size_t first = line_.find_first_not_of(" \t\r\v\f");
       if (first == std::string_view::npos) continue;
@@ -56,27 +54,32 @@ class Lines {
   [[nodiscard]] std::string_view line() const { return line_; }
   /// Last comment before the present line, without its sign.
   [[nodiscard]] std::string_view comment() const { return comment_; }
+  [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] FilePosition place() const { return {"line", number_}; }
   [[nodiscard]] const char* at() const { return text_.data() + at_; }
   [[noreturn]] void fail(const std::string& what) const {
     failAt(name_, place(), what + "; repair the line or export the points again");
   }
 
-  /// Splits the present line into numbers. Returns empty when a word is no number.
+  /// Splits the present line into numbers. Returns empty when a word is no number. Refuses numbers
+  /// with an empty field, and those that different signs separate.
   [[nodiscard]] std::optional<std::size_t> numbers(std::array<double, kMostColumns>& out) const {
     const char* p = line_.data();
     const char* end = p + line_.size();
     std::size_t count = 0;
     bool needsNumber = false;  // a comma has been read, and no number behind it
+    bool hasEmpty = false, hasComma = false, hasSemicolon = false, hasBlank = false;
     while (true) {
       while (p != end && static_cast<unsigned char>(*p) <= ' ') ++p;
       if (p == end) break;
       if (*p == ',' || *p == ';') {
-        if (needsNumber || count == 0) return std::nullopt;
+        hasEmpty = hasEmpty || needsNumber || count == 0;
+        (*p == ',' ? hasComma : hasSemicolon) = true;
         needsNumber = true;
         ++p;
         continue;
       }
+      hasBlank = hasBlank || (count > 0 && !needsNumber);
       if (count == kMostColumns) return std::nullopt;
       if (*p == '+') ++p;
       const auto [next, error] = std::from_chars(p, end, out[count]);
@@ -87,11 +90,29 @@ class Lines {
       p = next;
       needsNumber = false;
     }
-    if (needsNumber) return std::nullopt;
+    if (hasComma && (hasSemicolon || hasBlank))
+      failAt(name_, place(),
+             fmt::format("the line has commas, and {} between numbers; write decimal commas as "
+                         "points, or use one separator",
+                         hasSemicolon ? "semicolons" : "blanks"));
+    if (hasEmpty || needsNumber)
+      fail("the line has an empty field, before, behind or between separators");
     return count;
   }
 
  private:
+  /// Position of the next line end: a line feed, a carriage return, or the end of the text.
+  std::size_t lineEnd() {
+    const auto find = [&](char sign, std::size_t from, std::size_t to) {
+      const void* found = std::memchr(text_.data() + from, sign, to - from);
+      return found ? static_cast<std::size_t>(static_cast<const char*>(found) - text_.data()) : to;
+    };
+    // The line feed is kept for later lines: a file may have carriage returns only.
+    if (!isFeedKnown_ || feed_ < at_) feed_ = find('\n', at_, text_.size());
+    isFeedKnown_ = true;
+    return find('\r', at_, feed_);
+  }
+
   /// Value of a number that a double cannot hold: infinite if its exponent is positive, else 0.
   static double extreme(const char* p, const char* end) {
     const char* exponent = std::find_if(p, end, [](char c) { return c == 'e' || c == 'E'; });
@@ -104,6 +125,8 @@ class Lines {
   std::string_view text_, line_, comment_;
   const std::string& name_;
   std::size_t at_ = 0, number_ = 0;
+  std::size_t feed_ = 0;  ///< position of a line feed; the first one behind at_, unless feed_ < at_
+  bool isFeedKnown_ = false;
 };
 
 std::vector<std::string> wordsOf(std::string_view text) {
@@ -261,11 +284,7 @@ class PointLines {
   void addColor(FilePosition place) {
     const Imath::V4d color(of(Column::Red), of(Column::Green), of(Column::Blue), of(Column::Alpha));
     for (int part = 0; part < 4; ++part) {
-      if (!(color[part] >= 0 && color[part] <= 255))
-        failAt(builder_.name(), place,
-               fmt::format("a colour holds {}, which is not between 0 and 255; repair the line, or "
-                           "read the file without attributes (--no-attributes)",
-                           color[part]));
+      requireColorPart(builder_.name(), place, color[part]);
       if (part < 3 || layout_.has(Column::Alpha)) exceedsOne_ = exceedsOne_ || color[part] > 1;
     }
     builder_.addColor(Imath::V4f(color), place);
@@ -279,6 +298,27 @@ class PointLines {
   bool mayBeColors_ = true, exceedsOne_ = false;
 };
 
+enum class CommentKind { Names, Text, Unclear };
+
+/// Decides if a comment names the columns. It has as many words as there are columns, and x, y and
+/// z are among them.
+CommentKind kindOf(std::string_view comment, const Layout& layout) {
+  const auto& columns = layout.columns;
+  const auto isIdentifier = [](const std::string& word) {
+    return std::all_of(word.begin(), word.end(), [](char c) {
+      return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
+    });
+  };
+  const std::vector<std::string> words = wordsOf(comment);
+  const bool startsWithPosition = std::all_of(columns.begin(), columns.begin() + 3,
+                                              [](Column column) { return column <= Column::Z; });
+  if (startsWithPosition) return CommentKind::Names;
+  if (columns[0] == Column::X && std::all_of(words.begin(), words.end(), isIdentifier))
+    return CommentKind::Names;
+  return comment.find_first_of(":=") != std::string_view::npos ? CommentKind::Text
+                                                               : CommentKind::Unclear;
+}
+
 /// Finds the layout from the present line, and from the comment before it. Sets `isHeader` when the
 /// line holds names, not a point.
 Layout layoutOf(const Lines& lines, bool& isHeader) {
@@ -289,8 +329,14 @@ Layout layoutOf(const Lines& lines, bool& isHeader) {
     if (auto layout = layoutOfNames(lines.line())) return *layout;
     lines.fail("the first line holds neither numbers nor the names x, y and z of columns");
   }
-  if (auto layout = layoutOfNames(lines.comment()); layout && layout->columns.size() == *count)
-    return *layout;
+  if (auto layout = layoutOfNames(lines.comment()); layout && layout->columns.size() == *count) {
+    const CommentKind kind = kindOf(lines.comment(), *layout);
+    if (kind == CommentKind::Names) return *layout;
+    if (kind == CommentKind::Unclear)
+      lines.fail(
+          "the comment before the line may name the columns or not; write the names into a line "
+          "without '#' or '//', or remove the comment");
+  }
   if (auto layout = layoutOfCount(*count, false)) return *layout;
   lines.fail(fmt::format(
       "the line has {} numbers, and only 3, 4, 6, 7 or 9 have a known meaning; name the columns "
@@ -316,6 +362,68 @@ std::optional<std::size_t> countOnLine(const Lines& lines) {
   return static_cast<std::size_t>(points);
 }
 
+/// Lines before the first point of an XYZ or CSV file.
+struct XyzHeader {
+  Layout layout = {};
+  std::optional<std::size_t> promised = {};  ///< number of points, if a line gives it
+  bool hasPoints = false;
+};
+
+/// Reads the lines before the first point, which is the present line afterwards. A line of names
+/// and a line with the number of points may come in any order.
+XyzHeader readXyzHeader(Lines& lines) {
+  XyzHeader header;
+  header.promised = countOnLine(lines);
+  if (header.promised && !lines.next()) return header;
+  bool isHeader = false;
+  header.layout = layoutOf(lines, isHeader);
+  if (isHeader && !lines.next()) return header;
+  if (isHeader && !header.promised) {
+    header.promised = countOnLine(lines);
+    if (header.promised && !lines.next()) return header;
+  }
+  header.hasPoints = true;
+  return header;
+}
+
+/// Reads the line with the number of points of a block of a PTS file.
+std::size_t ptsCount(const Lines& lines, bool isFirst) {
+  std::array<double, kMostColumns> numbers;
+  if (const auto count = countOnLine(lines)) return *count;
+  if (isFirst && lines.numbers(numbers).value_or(0) >= 3)
+    failAt(lines.name(), lines.place(),
+           "the number of points is missing; read the file with --format xyz, or write the number "
+           "into the first line");
+  lines.fail("the number of points is missing");
+}
+
+/// Writes the parts of colours as bytes. If no byte exceeds 1, they are written as fractions, since
+/// readers would take the bytes for those.
+class ColorText {
+ public:
+  ColorText(const PointCloud& cloud, bool withAlpha) : parts_(withAlpha ? 4 : 3) {
+    asFractions_ = std::none_of(cloud.colors.begin(), cloud.colors.end(), [&](const auto& color) {
+      for (int part = 0; part < parts_; ++part)
+        if (colorByte(color[part]) > 1) return true;
+      return false;
+    });
+  }
+  void write(ByteWriter& out, const Imath::V4f& color, const char* separator) const {
+    for (int part = 0; part < parts_; ++part) {
+      const unsigned char byte = colorByte(color[part]);
+      out.write(separator);
+      if (asFractions_)
+        out.writeNumber(static_cast<float>(byte) / 255);
+      else
+        out.writeNumber(std::uint64_t{byte});
+    }
+  }
+
+ private:
+  int parts_;
+  bool asFractions_ = false;
+};
+
 /// Writes the points as lines. `names` begins the line of column names; null: no such line.
 void writeLines(ByteWriter& out, const PointCloud& cloud, const Progress& progress,
                 const char* separator, const char* names, bool hasMore) {
@@ -331,6 +439,7 @@ void writeLines(ByteWriter& out, const PointCloud& cloud, const Progress& progre
     if (hasMore && !cloud.weights.empty()) join("weight");
     out.write("\n");
   }
+  const ColorText colors(cloud, withAlpha);
   WriteProgress steps(progress, cloud.size());
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -341,10 +450,7 @@ void writeLines(ByteWriter& out, const PointCloud& cloud, const Progress& progre
       out.write(separator);
       out.writeNumber(cloud.normals[i][axis]);
     }
-    for (int part = 0; part < (cloud.colors.empty() ? 0 : withAlpha ? 4 : 3); ++part) {
-      out.write(separator);
-      out.writeNumber(std::uint64_t{colorByte(cloud.colors[i][part])});
-    }
+    if (!cloud.colors.empty()) colors.write(out, cloud.colors[i], separator);
     if (hasMore && !cloud.radii.empty()) out.write(separator), out.writeNumber(cloud.radii[i]);
     if (hasMore && !cloud.weights.empty()) out.write(separator), out.writeNumber(cloud.weights[i]);
     out.write("\n");
@@ -358,13 +464,17 @@ void readXyzPoints(std::string_view input, CloudBuilder& builder) {
   requireText(input, builder.name(), "XYZ or CSV");
   Lines lines(input, builder.name());
   if (!lines.next()) return;
-  bool isHeader = false;
-  PointLines points(lines, builder, layoutOf(lines, isHeader));
-  if (isHeader && !lines.next()) return;
+  const XyzHeader header = readXyzHeader(lines);
+  if (!header.hasPoints) return;
+  PointLines points(lines, builder, header.layout);
   do {
     points.readLine();
   } while (lines.next());
   points.finish();
+  if (header.promised && *header.promised != builder.cloud().size())
+    failFile(builder.name(), fmt::format("promises {} points and holds {}; download or export it "
+                                         "again",
+                                         *header.promised, builder.cloud().size()));
 }
 
 void readPtsPoints(std::string_view input, CloudBuilder& builder) {
@@ -373,16 +483,15 @@ void readPtsPoints(std::string_view input, CloudBuilder& builder) {
   std::optional<PointLines> points;
   std::size_t columns = 0;
   while (lines.next()) {
-    const std::optional<std::size_t> count = countOnLine(lines);
-    if (!count) lines.fail("the number of points is missing");
-    if (*count > input.size() / 6 + 1)
-      lines.fail(fmt::format("the line promises {} points, more than the file can hold", *count));
-    for (std::size_t i = 0; i < *count; ++i) {
+    const std::size_t count = ptsCount(lines, !points);
+    if (count > input.size() / 6 + 1)
+      lines.fail(fmt::format("the line promises {} points, more than the file can hold", count));
+    for (std::size_t i = 0; i < count; ++i) {
       if (!lines.next())
         failFile(builder.name(),
                  fmt::format("ends after {} of {} points; it is truncated: download or export it "
                              "again",
-                             i, *count));
+                             i, count));
       std::array<double, kMostColumns> numbers;
       const std::optional<std::size_t> found = lines.numbers(numbers);
       if (!points) {
@@ -394,7 +503,7 @@ void readPtsPoints(std::string_view input, CloudBuilder& builder) {
         points.emplace(lines, builder, *layout);
       }
       if (found == std::size_t{1} && columns != 1)
-        lines.fail(fmt::format("only {} of {} points precede this line", i, *count));
+        lines.fail(fmt::format("only {} of {} points precede this line", i, count));
       points->readLine();
     }
   }
@@ -405,18 +514,15 @@ PointFileInfo xyzPointInfo(std::string_view head, const std::string& name) {
   requireText(head, name, "XYZ or CSV");
   Lines lines(head, name);
   if (!lines.next()) failFile(name, "holds no points; export it again");
-  bool isHeader = false;
-  const Layout layout = layoutOf(lines, isHeader);
-  return {"text", 0, attributeNames(layout)};
+  const XyzHeader header = readXyzHeader(lines);
+  return {"text", header.promised.value_or(0), attributeNames(header.layout)};
 }
 
 PointFileInfo ptsPointInfo(std::string_view head, const std::string& name) {
   requireText(head, name, "PTS");
   Lines lines(head, name);
   if (!lines.next()) failFile(name, "holds no points; export it again");
-  const std::optional<std::size_t> count = countOnLine(lines);
-  if (!count) lines.fail("the number of points is missing");
-  PointFileInfo info{"pts", *count};
+  PointFileInfo info{"pts", ptsCount(lines, true)};
   std::array<double, kMostColumns> numbers;
   if (lines.next())
     if (const auto found = lines.numbers(numbers))
@@ -437,6 +543,7 @@ void writeCsvPoints(ByteWriter& out, const PointCloud& cloud, const Progress& pr
 void writePtsPoints(ByteWriter& out, const PointCloud& cloud, const Progress& progress) {
   out.writeNumber(std::uint64_t{cloud.size()});
   out.write("\n");
+  const ColorText colors(cloud, false);
   WriteProgress steps(progress, cloud.size());
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -445,10 +552,7 @@ void writePtsPoints(ByteWriter& out, const PointCloud& cloud, const Progress& pr
     }
     if (!cloud.colors.empty()) {
       out.write(" 0");
-      for (int part = 0; part < 3; ++part) {
-        out.write(" ");
-        out.writeNumber(std::uint64_t{colorByte(cloud.colors[i][part])});
-      }
+      colors.write(out, cloud.colors[i], " ");
     }
     out.write("\n");
     steps.step();

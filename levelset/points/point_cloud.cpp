@@ -56,7 +56,11 @@ void requirePoints(const PointCloud& cloud) {
   requireCount(cloud.radii.size(), n, "radii");
   requireCount(cloud.weights.size(), n, "weights");
   const auto isFinite = [](const auto& v) { return isFiniteVector(v); };
-  requireEach(cloud.positions, "a coordinate is not a finite number at point", isFinite);
+  requireEach(cloud.positions, "a coordinate is not a number of magnitude up to 3.4e38 at point",
+              [](const Imath::V3d& p) {
+                return std::abs(p.x) <= kMostCoordinate && std::abs(p.y) <= kMostCoordinate &&
+                       std::abs(p.z) <= kMostCoordinate;
+              });
   requireEach(cloud.normals, "a normal is not finite at point", isFinite);
   requireEach(cloud.colors, "a colour is not finite at point", isFinite);
   requireEach(cloud.radii, "the radius is not a positive number at point",

@@ -141,7 +141,8 @@ PointFit fitPoint(const Neighbourhood& near, FitDegree degree) {
 
 NormalsResult estimateNormals(PointCloud cloud, const NormalsOptions& options) {
   if (options.neighbours < 3)
-    throw UsageError("fewer than 3 neighbours do not determine a plane; give at least 3");
+    throw UsageError("fewer than 3 neighbours determine no plane; give at least 3");
+  points::requireNeighbours(options.neighbours);
   requirePoints(cloud);
   if (cloud.isEmpty()) throw InvalidInput("the point cloud has no points; read another file");
   constexpr double kBytesPerPoint = 160;
@@ -180,6 +181,10 @@ NormalsResult estimateNormals(PointCloud cloud, const NormalsOptions& options) {
     }
     gate.advance(range.size());
   });
+  if (tree.size() < 3)
+    throw InvalidInput(
+        "the point cloud has fewer than 3 different positions, and a normal needs 3; read a file "
+        "with more points");
   if (missing == tree.size())
     throw InvalidInput(
         "all points lie on a line within rounding, so no surface passes through them; check the "

@@ -12,7 +12,7 @@ enum class FitDegree {
 };
 
 struct NormalsOptions {
-  int neighbours = 20;  ///< number of nearest points that are fitted, at least 3
+  int neighbours = 20;  ///< number of nearest points that are fitted, from 3 to 1000
   FitDegree degree = FitDegree::Adaptive;
   bool isOriented = true;  ///< false: the sign of each normal is arbitrary
   std::size_t maxMemory = kNoMemoryLimit;
@@ -25,7 +25,8 @@ struct NormalsReport {
   std::size_t quadratic = 0;   ///< points whose neighbourhood was fitted with degree 2
   std::size_t components = 0;  ///< connected parts, each of which was oriented alone
   std::size_t guessed = 0;     ///< parts whose winding number does not show the outside, as a plane
-  /// Share of the tested points at which the winding number contradicts the normal.
+  /// Share of the tested points at which the winding number contradicts the normal. Points of
+  /// guessed parts are not tested.
   double doubtful = 0;
 };
 
@@ -39,8 +40,8 @@ struct NormalsResult {
 /// then turns each connected part outwards by its winding number [Barill18]. A part inside an odd
 /// number of others is a cavity, whose normals point into it. Replaces present normals. Points at
 /// equal positions share a normal.
-/// @throws UsageError for fewer than 3 neighbours
-/// @throws InvalidInput for a cloud without points, and when all points lie on a line
+/// @throws UsageError for fewer than 3 or more than 1000 neighbours
+/// @throws InvalidInput for a cloud of fewer than 3 positions, and when all points lie on a line
 /// @throws ResourceLimit, Cancelled
 [[nodiscard]] NormalsResult estimateNormals(PointCloud cloud, const NormalsOptions& options = {});
 

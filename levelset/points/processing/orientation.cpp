@@ -170,8 +170,7 @@ void addDisks(const PointCloud& cloud, const NeighbourGraph& graph, const Part& 
   for (std::size_t k = 0; k < part.size(); k += stride) {
     const std::uint32_t i = part.begin[k];
     const V3d centre = cloud.positions[i], normal(cloud.normals[i]);
-    const double area =
-        static_cast<double>(graph.area(i)) * static_cast<double>(std::min(stride, part.size() - k));
+    const double area = graph.area(i) * static_cast<double>(std::min(stride, part.size() - k));
     if (!(area > 0)) continue;
     V3d u = std::abs(normal.x) < 0.6 ? V3d(1, 0, 0) : V3d(0, 1, 0);
     u = (u - normal * normal.dot(u)).normalized();
@@ -197,7 +196,7 @@ std::vector<double> windingsOn(const PointCloud& cloud, const NeighbourGraph& gr
   tbb::parallel_for(std::size_t{0}, tests, [&](std::size_t k) {
     const std::uint32_t i = part.begin[k * part.size() / tests];
     // The triangles near the point contribute equal amounts of opposite sign on its two sides.
-    const V3d step = 0.25 * std::sqrt(static_cast<double>(graph.area(i))) * V3d(cloud.normals[i]);
+    const V3d step = 0.25 * std::sqrt(graph.area(i)) * V3d(cloud.normals[i]);
     windings[k] = (field.within(kTolerance, cloud.positions[i] + step) +
                    field.within(kTolerance, cloud.positions[i] - step)) /
                   2;
@@ -243,7 +242,7 @@ void NeighbourGraph::set(std::uint32_t point, const std::vector<Neighbour>& foun
     edges[count++] = other.index;
     squared = other.squared;
   }
-  if (count > 0) areas_[point] = static_cast<float>(M_PI * squared / static_cast<double>(count));
+  if (count > 0) areas_[point] = M_PI * squared / static_cast<double>(count);
 }
 
 Orientation orientNormals(PointCloud& cloud, const NeighbourGraph& graph,
@@ -304,11 +303,13 @@ Orientation orientNormals(PointCloud& cloud, const NeighbourGraph& graph,
   constexpr double kMostDifference = 0.25;
   const convert::WindingField field = fieldOfAll();
   std::size_t tested = 0, doubtful = 0;
-  for (const Part& part : parts)
-    for (const double winding : windingsOn(cloud, graph, part, field)) {
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    if (own[p] == 0) continue;  // the outside is a guess
+    for (const double winding : windingsOn(cloud, graph, parts[p], field)) {
       ++tested;
       doubtful += std::abs(winding - 0.5) > kMostDifference ? 1 : 0;
     }
+  }
   if (tested > 0) result.doubtful = static_cast<double>(doubtful) / static_cast<double>(tested);
   report(progress, 1);
   return result;

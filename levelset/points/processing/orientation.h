@@ -18,18 +18,18 @@ class NeighbourGraph {
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
   explicit NeighbourGraph(std::size_t points)
-      : edges_(points * kEdges, kNone), areas_(points, 0.0f) {}
+      : edges_(points * kEdges, kNone), areas_(points, 0.0) {}
   /// Sets the edges of a point. `found` is the result of PointNeighbours::nearest at the point.
   void set(std::uint32_t point, const std::vector<Neighbour>& found);
   [[nodiscard]] const std::uint32_t* edges(std::size_t point) const {
     return edges_.data() + point * kEdges;
   }
   /// Area of the surface around a point, world units²; 0 for a point that has no edges.
-  [[nodiscard]] float area(std::size_t point) const { return areas_[point]; }
+  [[nodiscard]] double area(std::size_t point) const { return areas_[point]; }
 
  private:
   std::vector<std::uint32_t> edges_;
-  std::vector<float> areas_;
+  std::vector<double> areas_;
 };
 
 struct Orientation {

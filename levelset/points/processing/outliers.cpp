@@ -27,6 +27,7 @@ double medianOf(std::vector<double> values) {
 OutlierResult withoutOutliers(const PointCloud& cloud, const OutlierOptions& options) {
   if (options.neighbours < 1)
     throw UsageError("the number of neighbours is below 1; give a positive number");
+  points::requireNeighbours(options.neighbours);
   if (!(options.deviations > 0) || !std::isfinite(options.deviations))
     throw UsageError("the number of deviations is not positive; give a positive number");
   requirePoints(cloud);

@@ -5,7 +5,7 @@
 namespace levelset {
 
 struct OutlierOptions {
-  int neighbours = 16;  ///< number of nearest points that decide on a point, > 0
+  int neighbours = 16;  ///< number of nearest points that decide on a point, from 1 to 1000
   /// Number of standard deviations above the median at which a point is an outlier, > 0.
   double deviations = 6;
   std::size_t maxMemory = kNoMemoryLimit;

@@ -16,8 +16,6 @@ namespace {
 
 using Imath::V3d;
 
-constexpr double kFarthestPoint = 1e100;
-
 bool isAffineMap(const Imath::M44d& m) {
   for (int i = 0; i < 4; ++i)
     for (int k = 0; k < 4; ++k)
@@ -48,23 +46,29 @@ PointCloud transform(PointCloud cloud, const Imath::M44d& matrix) {
                                      V3d(matrix[1][0], matrix[1][1], matrix[1][2]),
                                      V3d(matrix[2][0], matrix[2][1], matrix[2][2])};
   const bool turns = slopes != std::array{V3d(1, 0, 0), V3d(0, 1, 0), V3d(0, 0, 1)};
-  const auto scale = static_cast<float>(std::cbrt(std::abs(determinant)));
+  const double scale = std::cbrt(std::abs(determinant));
   cloud.precision = CoordinatePrecision::Double;  // transformed coordinates may need more digits
-  std::atomic<bool> isFar = false;
+  std::atomic<bool> isFar = false, hasRadii = true;
   tbb::parallel_for(std::size_t{0}, cloud.size(), [&](std::size_t i) {
     V3d moved;
     matrix.multVecMatrix(cloud.positions[i], moved);
     for (int axis = 0; axis < 3; ++axis)
-      if (!(std::abs(moved[axis]) < kFarthestPoint)) isFar = true;
+      if (!(std::abs(moved[axis]) <= kMostCoordinate)) isFar = true;
     cloud.positions[i] = moved;
     if (turns && !cloud.normals.empty())
       cloud.normals[i] =
           Imath::V3f(transformedNormal(V3d(cloud.normals[i]), slopes, determinant < 0 ? -1 : 1));
-    if (!cloud.radii.empty()) cloud.radii[i] *= scale;
+    if (cloud.radii.empty()) return;
+    const float radius = static_cast<float>(scale * static_cast<double>(cloud.radii[i]));
+    if (!(radius > 0) || !std::isfinite(radius)) hasRadii = false;
+    cloud.radii[i] = radius;
   });
   if (isFar)
     throw InvalidInput(
-        "a point moves farther than 1e100 from the origin; change the unit of length");
+        "a coordinate exceeds 3.4e38, the greatest number of type float; choose a smaller scale");
+  if (!hasRadii)
+    throw InvalidInput(
+        "a radius leaves the range of float, 1.4e-45 to 3.4e38; choose another scale");
   return cloud;
 }
 

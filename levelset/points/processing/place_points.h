@@ -13,7 +13,8 @@ namespace levelset {
 /// determinant's magnitude. Files store the new coordinates in double precision.
 /// @param matrix  affine and invertible; world' = world * matrix, with Imath's row vectors
 /// @throws UsageError if the matrix is not affine and invertible
-/// @throws InvalidInput if the lists of the cloud do not fit, or a coordinate exceeds 1e100
+/// @throws InvalidInput if the lists of the cloud do not fit, a coordinate exceeds 3.4e38, or
+///         a radius leaves the range of float
 [[nodiscard]] PointCloud transform(PointCloud cloud, const Imath::M44d& matrix);
 
 /// Keeps the points inside a box, with those on its faces.

@@ -1,10 +1,13 @@
 #include "levelset/points/processing/point_neighbours.h"
 
+#include <fmt/core.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <utility>
+
+#include "levelset/error.h"
 
 namespace levelset::points {
 namespace {
@@ -18,6 +21,12 @@ bool isBefore(const V3d& a, const V3d& b) {
 }
 
 }  // namespace
+
+void requireNeighbours(std::int64_t neighbours) {
+  if (neighbours > kMostNeighbours)
+    throw UsageError(fmt::format("{} neighbours are more than the maximum of {}; give fewer",
+                                 neighbours, kMostNeighbours));
+}
 
 PointNeighbours::PointNeighbours(std::span<const V3d> positions) : count_(positions.size()) {
   std::vector<PointItem> items(positions.size());

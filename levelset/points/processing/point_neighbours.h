@@ -14,6 +14,13 @@ namespace levelset::points {
 /// A point near another one: its number in the cloud, and its squared distance.
 using Neighbour = Found;
 
+/// Greatest number of neighbours that operators search for. More of them are no neighbourhood, and
+/// take memory and time.
+inline constexpr int kMostNeighbours = 1000;
+
+/// @throws UsageError for more than kMostNeighbours
+void requireNeighbours(std::int64_t neighbours);
+
 /// The different positions of a point cloud in a tree. Points at equal positions count once, by the
 /// one of lowest number: many of them would fill all neighbourhoods. Results do not depend on the
 /// structure of the tree: neighbours are sorted by distance, then by number.

@@ -17,52 +17,94 @@ namespace {
 
 using Imath::V3d;
 
+// Numbers of cells. Those of the usual grid count from the lowest point and have 32 bits.
+using NearCell = std::uint32_t;
+// Those of a grid with far points count from the origin. They are whole numbers.
+using FarCell = double;
+
+constexpr double kMostNearCells = 4e9;
+constexpr double kMostExactCell = 0x1p53;
+
+/// Cell along an axis. Cells are a little longer than the radius, so rounding does not matter.
+template <typename Cell>
+Cell cellOf(double coordinate, double low, double edge);
+
+template <>
+NearCell cellOf<NearCell>(double coordinate, double low, double edge) {
+  return static_cast<NearCell>((coordinate - low) / edge);
+}
+
+/// The number of the cell is exact below 2^53. Beyond it, two different coordinates are farther
+/// apart than the radius, so points in other cells along this axis need no test.
+template <>
+FarCell cellOf<FarCell>(double coordinate, double, double edge) {
+  const double cell = std::floor(coordinate / edge);
+  const double rest = std::fma(-cell, edge, coordinate);
+  return rest < 0 ? cell - 1 : rest >= edge ? cell + 1 : cell;
+}
+
+bool isOdd(NearCell cell) {
+  return (cell & 1) != 0;
+}
+bool isOdd(FarCell cell) {
+  return std::fmod(cell, 2) != 0;
+}
+
+/// Moves to a cell beside another one. Returns false if there is none to test.
+bool shift(NearCell& cell, int by) {
+  if (by < 0 && cell == 0) return false;
+  cell += static_cast<NearCell>(by);
+  return true;
+}
+bool shift(FarCell& cell, int by) {
+  if (by != 0 && std::abs(cell) >= kMostExactCell) return false;
+  cell += by;
+  return true;
+}
+
 /// Cell of a grid, with one point in it.
+template <typename Cell>
 struct CellEntry {
-  std::array<std::uint32_t, 3> cell;  // along z, y and x, so that a row along x is contiguous
+  std::array<Cell, 3> cell;  // along z, y and x, so that a row along x is contiguous
   std::uint32_t index;
 };
 
 /// Range of entries in one cell. The chosen points of the cell are moved to its front.
+template <typename Cell>
 struct CellRange {
-  std::array<std::uint32_t, 3> cell;
+  std::array<Cell, 3> cell;
   std::uint32_t begin, end;
   std::uint32_t chosen = 0;
 };
 
 /// Colour of a cell. Two cells of one colour have a cell between them.
-unsigned colorOf(const std::array<std::uint32_t, 3>& cell) {
-  return (cell[0] & 1) | (cell[1] & 1) << 1 | (cell[2] & 1) << 2;
+template <typename Cell>
+unsigned colorOf(const std::array<Cell, 3>& cell) {
+  return (isOdd(cell[0]) ? 1u : 0u) | (isOdd(cell[1]) ? 2u : 0u) | (isOdd(cell[2]) ? 4u : 0u);
 }
 
 /// Points in a grid of cells whose edges are at least as long as the radius.
+template <typename Cell>
 class DiskGrid {
  public:
-  DiskGrid(const std::vector<V3d>& positions, double radius)
-      : positions_(positions), squared_(radius * radius) {
-    V3d low(std::numeric_limits<double>::infinity()), high = -low;
-    for (const V3d& p : positions)
-      for (int axis = 0; axis < 3; ++axis) {
-        low[axis] = std::min(low[axis], p[axis]);
-        high[axis] = std::max(high[axis], p[axis]);
-      }
-    // A cell is a little longer than the radius, since the division below rounds.
-    double edge = radius * 1.0001;
-    for (int axis = 0; axis < 3; ++axis) edge = std::max(edge, (high[axis] - low[axis]) / 4e9);
+  /// @param low  least coordinates of the points
+  DiskGrid(const std::vector<V3d>& positions, double radius, double edge, const V3d& low)
+      : positions_(positions),
+        // Points at one position are near each other for any radius.
+        squared_(std::max(radius * radius, std::numeric_limits<double>::denorm_min())) {
     entries_.resize(positions.size());
     tbb::parallel_for(std::size_t{0}, positions.size(), [&](std::size_t i) {
-      CellEntry& entry = entries_[i];
+      Entry& entry = entries_[i];
       for (int axis = 0; axis < 3; ++axis)
         entry.cell[static_cast<std::size_t>(2 - axis)] =
-            static_cast<std::uint32_t>((positions[i][axis] - low[axis]) / edge);
+            cellOf<Cell>(positions[i][axis], low[axis], edge);
       entry.index = static_cast<std::uint32_t>(i);
     });
-    tbb::parallel_sort(entries_.begin(), entries_.end(),
-                       [](const CellEntry& a, const CellEntry& b) {
-                         if (a.cell != b.cell) return a.cell < b.cell;
-                         const std::uint64_t first = mixed(0, a.index), second = mixed(0, b.index);
-                         return first != second ? first < second : a.index < b.index;
-                       });
+    tbb::parallel_sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) {
+      if (a.cell != b.cell) return a.cell < b.cell;
+      const std::uint64_t first = mixed(0, a.index), second = mixed(0, b.index);
+      return first != second ? first < second : a.index < b.index;
+    });
     for (std::size_t i = 0; i < entries_.size(); ++i) {
       const auto at = static_cast<std::uint32_t>(i);
       if (i == 0 || entries_[i].cell != entries_[i - 1].cell)
@@ -83,7 +125,7 @@ class DiskGrid {
                           gate.advance(range.size());
                         });
     std::vector<std::uint32_t> chosen;
-    for (const CellRange& range : cells_)
+    for (const Range& range : cells_)
       for (std::uint32_t i = 0; i < range.chosen; ++i)
         chosen.push_back(entries_[range.begin + i].index);
     tbb::parallel_sort(chosen.begin(), chosen.end());
@@ -91,25 +133,31 @@ class DiskGrid {
   }
 
  private:
-  [[nodiscard]] bool isNearChosen(const V3d& p, const CellRange& range) const {
+  using Entry = CellEntry<Cell>;
+  using Range = CellRange<Cell>;
+
+  [[nodiscard]] bool isNearChosen(const V3d& p, const Range& range) const {
     for (std::uint32_t i = range.begin; i < range.begin + range.chosen; ++i)
       if ((positions_[entries_[i].index] - p).length2() < squared_) return true;
     return false;
   }
 
-  void chooseIn(CellRange& range) {
-    std::array<const CellRange*, 26> near{};
+  void chooseIn(Range& range) {
+    std::array<const Range*, 26> near{};
+    Cell first = range.cell[2], last = range.cell[2];
+    shift(first, -1);
+    shift(last, 1);
     std::size_t count = 0;
     for (int dz = -1; dz <= 1; ++dz)
       for (int dy = -1; dy <= 1; ++dy) {
-        std::array<std::uint32_t, 3> from = range.cell;
+        std::array<Cell, 3> from = range.cell;
         if (!shift(from[0], dz) || !shift(from[1], dy)) continue;
-        from[2] -= from[2] > 0 ? 1 : 0;
+        from[2] = first;
         auto found = std::lower_bound(
             cells_.begin(), cells_.end(), from,
-            [](const CellRange& a, const std::array<std::uint32_t, 3>& b) { return a.cell < b; });
+            [](const Range& a, const std::array<Cell, 3>& b) { return a.cell < b; });
         for (; found != cells_.end() && found->cell[0] == from[0] && found->cell[1] == from[1] &&
-               found->cell[2] <= range.cell[2] + 1;
+               found->cell[2] <= last;
              ++found)
           if (&*found != &range && found->chosen > 0) near[count++] = &*found;
       }
@@ -121,18 +169,35 @@ class DiskGrid {
     }
   }
 
-  static bool shift(std::uint32_t& coordinate, int by) {
-    if (by < 0 && coordinate == 0) return false;
-    coordinate += static_cast<std::uint32_t>(by);
-    return true;
-  }
-
   const std::vector<V3d>& positions_;
   double squared_;
-  std::vector<CellEntry> entries_;
-  std::vector<CellRange> cells_;
+  std::vector<Entry> entries_;
+  std::vector<Range> cells_;
   std::array<std::vector<std::uint32_t>, 8> byColor_;
 };
+
+/// Numbers of the first points at each position, ascending.
+std::vector<std::uint32_t> differentPositions(const std::vector<V3d>& positions) {
+  const PointNeighbours tree(positions);
+  std::vector<std::uint32_t> numbers;
+  numbers.reserve(tree.size());
+  for (std::size_t n = 0; n < tree.size(); ++n) numbers.push_back(tree.at(n));
+  tbb::parallel_sort(numbers.begin(), numbers.end());
+  return numbers;
+}
+
+/// Adds the lowest other numbers until there are `count`.
+/// @param numbers  ascending
+/// @param all  number of points, at least `count`
+std::vector<std::uint32_t> withDuplicates(std::vector<std::uint32_t> numbers, std::size_t all,
+                                          std::size_t count) {
+  std::vector<char> isChosen(all, 0);
+  for (const std::uint32_t number : numbers) isChosen[number] = 1;
+  for (std::uint32_t i = 0; i < all && numbers.size() < count; ++i)
+    if (!isChosen[i]) numbers.push_back(i);
+  tbb::parallel_sort(numbers.begin(), numbers.end());
+  return numbers;
+}
 
 /// Weight by which a sample at a distance crowds another one.
 class Crowding {
@@ -207,7 +272,24 @@ class SampleHeap {
 
 std::vector<std::uint32_t> poissonDisk(const std::vector<V3d>& positions, double radius,
                                        const Progress& progress) {
-  return DiskGrid(positions, radius).choose(progress);
+  V3d low(std::numeric_limits<double>::infinity()), high = -low;
+  for (const V3d& p : positions)
+    for (int axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], p[axis]);
+      high[axis] = std::max(high[axis], p[axis]);
+    }
+  double extent = 0, farthest = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    extent = std::max(extent, high[axis] - low[axis]);
+    farthest = std::max({farthest, std::abs(low[axis]), std::abs(high[axis])});
+  }
+  // A cell is a little longer than the radius, since the number of a near cell is rounded.
+  double edge = radius * 1.0001;
+  if (extent <= kMostNearCells * edge)
+    return DiskGrid<NearCell>(positions, radius, edge, low).choose(progress);
+  constexpr double kMostFarCells = 1e300;
+  edge = std::max(edge, farthest / kMostFarCells);
+  return DiskGrid<FarCell>(positions, radius, edge, low).choose(progress);
 }
 
 std::vector<std::uint32_t> eliminateSamples(const std::vector<V3d>& positions, std::size_t count,
@@ -215,12 +297,19 @@ std::vector<std::uint32_t> eliminateSamples(const std::vector<V3d>& positions, s
   // Few candidates lie within a fraction of the final distance, so a Poisson-disk sample of that
   // fraction loses no quality. It bounds the number of neighbours where the points are dense.
   constexpr double kCandidateShare = 0.25;
+  constexpr double kLeastRadius = 1e-150;  // the squares of smaller numbers lose digits
   double radius = kCandidateShare * greatest;
   std::vector<std::uint32_t> candidates =
       poissonDisk(positions, radius, subProgress(progress, 0, 0.3));
-  while (candidates.size() < count && radius > 0) {
-    radius /= 2;
-    candidates = poissonDisk(positions, radius, {});
+  if (candidates.size() < count) {
+    std::vector<std::uint32_t> different = differentPositions(positions);
+    if (different.size() <= count)
+      return withDuplicates(std::move(different), positions.size(), count);
+    while (candidates.size() < count) {
+      radius /= 2;
+      report(progress, 0.3);
+      candidates = radius > kLeastRadius ? poissonDisk(positions, radius, {}) : different;
+    }
   }
   std::vector<V3d> places;
   places.reserve(candidates.size());

@@ -62,7 +62,9 @@ PointCloud sampleMesh(const TriMesh& mesh, const SampleOptions& options) {
   constexpr double kMost = 4e9, kCandidates = 5, kBytesPerPoint = 70, kBytesPerCandidate = 130;
   if (!(wanted < kMost / kCandidates))
     throw ResourceLimit(
-        fmt::format("the surface would take {:.3g} points, more than 8e8; give fewer", wanted));
+        fmt::format("the surface would take {:.3g} points, more than 8e8; give a smaller count or "
+                    "a larger spacing",
+                    wanted));
   requireMemory(
       wanted * (kBytesPerPoint + (options.isBlueNoise ? kCandidates * kBytesPerCandidate : 0)),
       memoryLimit(options.maxMemory));

@@ -12,6 +12,7 @@
 #include "levelset/points/processing/normals.h"
 #include "levelset/points/processing/outliers.h"
 #include "levelset/points/processing/place_points.h"
+#include "levelset/points/processing/point_neighbours.h"
 #include "levelset/points/processing/sample_mesh.h"
 #include "levelset/points/processing/thin.h"
 #include "levelset/transform/transform.h"
@@ -65,6 +66,13 @@ Plan planSample(Invocation& in) {
   const double spacing = in.given("spacing") ? in.length("spacing") : 0;
   plan.points = in.given("count") ? static_cast<double>(in.integer("count"))
                                   : plan.area / (std::sqrt(3.0) / 2 * spacing * spacing);
+  // The area is an estimate, so only far too many points are refused here.
+  constexpr double kFarTooMany = 4e9;
+  if (!(plan.points < kFarTooMany))
+    throw levelset::ResourceLimit(
+        fmt::format("the surface would take about {:.3g} points, more than 8e8; give a smaller "
+                    "count or a larger spacing",
+                    plan.points));
   plan.pointBytes = sizeof(Imath::V3d) + (in.flag("no-normals") ? 0 : sizeof(Imath::V3f));
   return plan;
 }
@@ -131,11 +139,11 @@ Value computeNormals(Invocation& in) {
         "turn them with 'transform' or read normals with the file",
         found.guessed, found.components));
   constexpr double kMostDoubtful = 0.1;
-  if (found.guessed == 0 && found.doubtful > kMostDoubtful)
+  if (found.doubtful > kMostDoubtful)
     in.notes.warnings.push_back(fmt::format(
-        "normals: at {:.0f} % of the tested points, the winding number does not confirm "
+        "normals: at {:.0f} % of the tested points{}, the winding number does not confirm "
         "the outside; the surface is open there, or its normals are inconsistent",
-        100 * found.doubtful));
+        100 * found.doubtful, found.guessed > 0 ? " of the other parts" : ""));
   return Value(std::move(result.cloud));
 }
 
@@ -151,6 +159,11 @@ Param neighboursParam(const char* doc, const char* fallback) {
           .doc = doc,
           .fallback = fallback,
           .range = Range::Positive};
+}
+
+void requireFewNeighbours(const Invocation& in) {
+  levelset::withContext(in.op().name,
+                        [&] { levelset::points::requireNeighbours(in.integer("neighbours")); });
 }
 
 }  // namespace
@@ -214,7 +227,7 @@ Operator normalsOperator() {
           "connected part is turned outwards by its winding number; a part inside another one is "
           "a cavity. Present normals are replaced.",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! mesh ! sample --count 2000 ! normals",
-      .params = {neighboursParam("number of nearest points that are fitted, at least 3", "20"),
+      .params = {neighboursParam("number of nearest points that are fitted, from 3 to 1000", "20"),
                  {.name = "degree",
                   .type = ParamType::Choice,
                   .doc = "degree of the height function; auto: for each point, the one with the "
@@ -233,7 +246,8 @@ Operator normalsOperator() {
           [](const Invocation& in) {
             if (in.integer("neighbours") < 3)
               throw UsageError(
-                  "normals: --neighbours is below 3, which determine no plane; give at least 3");
+                  "normals: fewer than 3 --neighbours determine no plane; give at least 3");
+            requireFewNeighbours(in);
           },
   };
 }
@@ -251,7 +265,8 @@ Operator outliersOperator() {
       .example =
           "levelsmith sphere --radius 1 --voxel 0.05 ! mesh ! sample --count 2000 ! outliers ! "
           "info",
-      .params = {neighboursParam("number of nearest points that decide on a point", "16"),
+      .params = {neighboursParam("number of nearest points that decide on a point, at most 1000",
+                                 "16"),
                  {.name = "deviations",
                   .type = ParamType::Number,
                   .doc = "number of standard deviations above the median",
@@ -261,6 +276,7 @@ Operator outliersOperator() {
       .resultKind = makesPoints,
       .run = removeOutliers,
       .cost = costPerPoint(6000, 60),
+      .validate = requireFewNeighbours,
   };
 }
 

@@ -86,6 +86,25 @@ TEST_F(PointActions, NormalsWarnOfAGuess) {
   const support::Outcome outcome = levelsmith("read plane.xyz ! normals ! write n.ply");
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_NE(outcome.err.find("is a guess"), std::string::npos) << outcome.err;
+  EXPECT_EQ(outcome.err.find("does not confirm"), std::string::npos) << outcome.err;
+}
+
+TEST_F(PointActions, NormalsWarnOfDoubtBesideAGuess) {
+  // A bowl, and a plane far from it.
+  ASSERT_EQ(
+      levelsmith(std::string(kSampled) + "clip --plane \"0,0,-0.5 0,0,1\" ! write bowl.xyz").code,
+      0);
+  std::string points = support::slurp(folder_ / "bowl.xyz");
+  for (int i = 0; i < 20; ++i)
+    for (int j = 0; j < 20; ++j)
+      points += std::to_string(0.05 * i) + " " + std::to_string(0.05 * j) + " 40 0 0 1\n";
+  writeFile("both.xyz", points);
+  const support::Outcome outcome = levelsmith("read both.xyz ! normals ! write n.ply");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("of 1 of 2 connected parts is a guess"), std::string::npos)
+      << outcome.err;
+  EXPECT_NE(outcome.err.find("of the tested points of the other parts"), std::string::npos)
+      << outcome.err;
 }
 
 TEST_F(PointActions, RefusalsHaveTheirCode) {
@@ -97,7 +116,17 @@ TEST_F(PointActions, RefusalsHaveTheirCode) {
   expectRefusal("read cut.pts ! info", 3, "ends after 2 of 5");
   expectRefusal("read none.xyz ! info", 6, "none.xyz");
   expectRefusal("read a.xyz ! normals", 3, "lie on a line");
-  expectRefusal("read a.xyz ! normals --neighbours 2", 2, "at least 3");
+  expectRefusal("read a.xyz ! normals --neighbours 2", 2, "fewer than 3 --neighbours");
+  for (const char* action : {"normals", "outliers"})
+    expectRefusal(std::string("read a.xyz ! ") + action + " --neighbours 1001", 2,
+                  std::string(action) + ": 1001 neighbours are more than the maximum of 1000");
+  writeFile("comma.csv", "1,5;2,5;3,5\n");
+  expectRefusal("read comma.csv ! info", 3, "decimal commas");
+  writeFile("bare.pts", "0 0 0\n1 0 0\n");
+  expectRefusal("read bare.pts ! info", 3, "--format xyz");
+  expectRefusal("read a.xyz ! transform --scale 2e38 ! write b.xyz", 3, "3.4e38");
+  expectRefusal("sphere --radius 1 --voxel 0.2 ! mesh ! sample --spacing 1e-200", 4,
+                "give a smaller count or a larger spacing");
   expectRefusal("read a.xyz ! thin", 2, "either --radius or --count");
   expectRefusal("read a.xyz ! thin --count 4", 3, "3 different positions");
   expectRefusal("read a.xyz ! clip --box \"5,5,5 6,6,6\"", 3, "none of the 3 points");

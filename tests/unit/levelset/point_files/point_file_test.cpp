@@ -85,7 +85,7 @@ TEST(PointFiles, FloatsStayFloats) {
 
 TEST(PointFiles, ColumnsFollowFromTheirNumber) {
   const TemporaryFolder folder;
-  const PointCloud three = readText(folder, "a.xyz", "# a scan\n\n1 2 3\r\n4\t5 6e0\n+7, -8; .5");
+  const PointCloud three = readText(folder, "a.xyz", "# a scan\n\n1 2 3\r\n4\t5 6e0\n+7, -8, .5");
   EXPECT_EQ(three.positions, (std::vector{V3d(1, 2, 3), V3d(4, 5, 6), V3d(7, -8, 0.5)}));
   EXPECT_EQ(readText(folder, "a.xyz", "1 2 3 -400\n4 5 6 7\n").size(), 2u);
   const PointCloud normals = readText(folder, "a.xyz", "1 2 3 0 0 1\n4 5 6 1 0 0\n");
@@ -121,6 +121,93 @@ TEST(PointFiles, ColumnsFollowFromNames) {
   EXPECT_TRUE(readText(folder, "a.csv", "x,y,z,nx,ny\n1,2,3,4,5\n").normals.empty());
 }
 
+TEST(PointFiles, DecimalCommasAreRefused) {
+  const TemporaryFolder folder;
+  for (const char* text : {"1,5;2,5;3,5\n", "1;2;3\n1;2,5;3\n", "1,5 2,5 3,5\n", "x;y;z\n1,5;2;3\n",
+                           "1 2,5\t3\n", "1,5;2,5;\n"})
+    EXPECT_SAYS(refused(folder, "a.csv", text), "decimal commas") << text;
+  EXPECT_SAYS(refused(folder, "a.pts", "1\n1,5 2,5 3,5\n"), "decimal commas");
+  EXPECT_EQ(readText(folder, "a.csv", "1 , 2,\t3 \n4;5; 6\n").positions,
+            (std::vector{V3d(1, 2, 3), V3d(4, 5, 6)}));
+}
+
+TEST(PointFiles, AllLineEndsAreKnown) {
+  const TemporaryFolder folder;
+  const std::vector points = {V3d(1, 2, 3), V3d(4, 5, 6), V3d(7, 8, 9)};
+  for (const std::string end : {"\n", "\r\n", "\r"})
+    for (const bool isLast : {false, true}) {
+      const std::string text =
+          "1 2 3" + end + end + "4 5 6" + end + "7 8 9" + (isLast ? end : std::string());
+      EXPECT_EQ(readText(folder, "a.xyz", "# a scan" + end + text).positions, points);
+      EXPECT_EQ(readText(folder, "a.pts", "3" + end + text).positions, points);
+      EXPECT_SAYS(refused(folder, "a.xyz", text + end + "0 x 0"), isLast ? "line 6" : "line 5");
+    }
+  EXPECT_EQ(readText(folder, "a.xyz", "1 2 3\r4 5 6\n7 8 9\r\n").positions, points);
+}
+
+TEST(PointFiles, CommentsDoNotShiftColumns) {
+  const TemporaryFolder folder;
+  // As many words as columns, with a label before the names.
+  EXPECT_EQ(readText(folder, "a.xyz", "# format: x y z\n1 2 3 4\n").positions[0], V3d(1, 2, 3));
+  EXPECT_EQ(readText(folder, "a.xyz", "# axes = x y z up\n1 2 3 0 0 1\n").positions[0],
+            V3d(1, 2, 3));
+  // Names with the coordinates in front, whatever follows.
+  const PointCloud named =
+      readText(folder, "a.xyz", "# y x z nx ny nz intensity(dB)\n1 2 3 0 0 1 -9\n");
+  EXPECT_EQ(named.positions[0], V3d(2, 1, 3));
+  EXPECT_EQ(named.normals[0], V3f(0, 0, 1));
+  EXPECT_EQ(readText(folder, "a.xyz", "# x nx y ny z nz\n1 0 2 0 3 1\n").positions[0],
+            V3d(1, 2, 3));
+  // Either the names of four columns, or a text.
+  EXPECT_SAYS(refused(folder, "a.xyz", "# time x y z\n9 1 2 3\n"), "may name the columns or not");
+  EXPECT_EQ(readText(folder, "a.xyz", "time x y z\n9 1 2 3\n").positions[0], V3d(1, 2, 3));
+}
+
+TEST(PointFiles, TheNumberOfPointsMayStandBeforeThem) {
+  const TemporaryFolder folder;
+  const std::vector points = {V3d(1, 2, 3), V3d(4, 5, 6)};
+  for (const std::string head : {"//X Y Z\n2\n", "2\n", "X Y Z\n2\n", "2\nX,Y,Z\n"}) {
+    EXPECT_EQ(readText(folder, "a.xyz", head + "1 2 3\n4 5 6\n").positions, points) << head;
+    EXPECT_EQ(levelset::pointFileInfo(folder / "a.xyz").points, 2u) << head;
+    EXPECT_SAYS(refused(folder, "a.xyz", head + "1 2 3\n"), "promises 2 points and holds 1");
+    EXPECT_SAYS(refused(folder, "a.xyz", head), "holds no points");
+  }
+}
+
+TEST(PointFiles, DarkColorsKeepTheirBytes) {
+  const TemporaryFolder folder;
+  PointCloud cloud = smallCloud(false);
+  const float one = 1.0f / 255;
+  for (const V4f& brightest : {V4f(0, 0, 0, 1), V4f(one, 0, 0, 1), V4f(2 * one, one, 0, 1),
+                               V4f(one, 0, one, one), V4f(1, 0, 0, one)})
+    for (const char* name : {"a.ply", "a.obj", "a.xyz", "a.csv", "a.pts"}) {
+      const std::string text = name;
+      const bool hasAlpha =
+          brightest[3] == 1 || text == "a.ply" || text == "a.obj" || text == "a.csv";
+      if (!hasAlpha) continue;
+      cloud.colors = {V4f(0, one, 0, 1), brightest, V4f(0, 0, 0, 1)};
+      if (brightest[3] != 1) cloud.colors[0][3] = cloud.colors[2][3] = 0;
+      writePoints(folder / name, cloud);
+      EXPECT_EQ(readPoints(folder / name).colors, cloud.colors) << name << brightest;
+    }
+}
+
+TEST(PointFiles, ObjColorsMayBeBytes) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(readText(folder, "a.obj", "v 1 0 0 51 0 0\nv 2 0 0\nv 3 0 0 1 0 255\nv 4 0 0\n").colors,
+            (std::vector{V4f(0.2f, 0, 0, 1), V4f(1), V4f(1.0f / 255, 0, 1, 1), V4f(1)}));
+  EXPECT_EQ(readText(folder, "a.obj", "v 1 0 0 51 0 0 255\nv 2 0 0 0 0 0 0\n").colors,
+            (std::vector{V4f(0.2f, 0, 0, 1), V4f(0)}));
+  EXPECT_SAYS(refused(folder, "a.obj", "v 1 0 0 256 0 0\n"), "between 0 and 255");
+  EXPECT_SAYS(refused(folder, "a.obj", "v 1 0 0 0 -1 0\n"), "between 0 and 255");
+  // Intensities above 1 are limited, so that they are not taken for bytes.
+  PointCloud bright = smallCloud(false);
+  bright.colors = {V4f(1.5f, 0.25f, 0, 1), V4f(-1, 0, 0, 1), V4f(1)};
+  writePoints(folder / "a.obj", bright);
+  EXPECT_EQ(readPoints(folder / "a.obj").colors[0], V4f(1, 0.25f, 0, 1));
+  EXPECT_EQ(readPoints(folder / "a.obj").colors[1], V4f(0, 0, 0, 1));
+}
+
 TEST(PointFiles, PtsHasBlocksWithCounts) {
   const TemporaryFolder folder;
   const PointCloud cloud =
@@ -129,6 +216,9 @@ TEST(PointFiles, PtsHasBlocksWithCounts) {
   EXPECT_EQ(cloud.colors[1], V4f(0, 0.2f, 0, 1));
   EXPECT_SAYS(refused(folder, "a.pts", "3\n1 2 3\n4 5 6\n"), "ends after 2 of 3");
   EXPECT_SAYS(refused(folder, "a.pts", "1\n1 2 3\n4 5 6\n"), "number of points is missing");
+  EXPECT_SAYS(refused(folder, "a.pts", "1 2 3\n4 5 6\n"), "with --format xyz");
+  // Six columns are a colour, since PTS has no normals.
+  EXPECT_EQ(readText(folder, "a.pts", "1\n1 2 3 0 0 1\n").colors[0], V4f(0, 0, 1, 1));
   EXPECT_SAYS(refused(folder, "a.pts", "3\n1 2 3\n4 5 6\n2\n"), "only 2 of 3 points");
   EXPECT_SAYS(refused(folder, "a.pts", "99999\n1 2 3\n"), "more than the file can hold");
   EXPECT_SAYS(refused(folder, "a.pts", "1\n1 2\n"), "3, 4, 6 or 7");
@@ -224,8 +314,10 @@ TEST(PointFiles, DamagedFilesAreRefusedWithThePlace) {
   EXPECT_SAYS(refused(folder, "a.xyz", "1 2 1e39\n"), "beyond the range of float");
   EXPECT_SAYS(refused(folder, "a.xyz", "1 2 3\n1 2\n"), "has 2 numbers");
   EXPECT_SAYS(refused(folder, "a.xyz", "1 2 3\n1 2 x\n"), "other than numbers");
-  EXPECT_SAYS(refused(folder, "a.csv", "1,,3\n1,2,3\n"), "neither numbers nor the names");
-  EXPECT_SAYS(refused(folder, "a.csv", "1,2,3\n1,2,\n"), "other than numbers");
+  EXPECT_SAYS(refused(folder, "a.csv", "1,,3\n1,2,3\n"), "an empty field");
+  EXPECT_SAYS(refused(folder, "a.csv", "1,2,3\n1,2,\n"), "line 2: the line has an empty field");
+  EXPECT_SAYS(refused(folder, "a.csv", "1,2,3,\n4,5,6,\n"), "an empty field");
+  EXPECT_SAYS(refused(folder, "a.csv", ";1;2;3\n"), "an empty field");
   EXPECT_SAYS(refused(folder, "a.xyz", "1 2 3 4 5\n"), "only 3, 4, 6, 7 or 9");
   EXPECT_SAYS(refused(folder, "a.csv", "a,b,c\n1,2,3\n"), "names x, y and z");
   EXPECT_SAYS(refused(folder, "a.csv", "x,y,z,r,g,b\n1,2,3,256,0,0\n"), "between 0 and 255");

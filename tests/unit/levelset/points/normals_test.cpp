@@ -165,6 +165,14 @@ TEST(PointNormals, DoNotDependOnPlaceAndScale) {
   for (V3d& p : far.positions) p = V3d(1048576.0) + p * 0x1p-20;
   const NormalsResult a = normalsOf(near), b = normalsOf(far);
   EXPECT_EQ(a.cloud.normals, b.cloud.normals);
+  // Powers of two round nothing. The areas of points are beyond the range of float.
+  for (const double scale : {0x1p66, 0x1p126, 0x1p-80, 0x1p-126}) {
+    PointCloud scaled = truth;
+    for (V3d& p : scaled.positions) p *= scale;
+    const NormalsResult found = normalsOf(scaled);
+    EXPECT_EQ(found.cloud.normals, normalsOf(truth).cloud.normals) << scale;
+    EXPECT_EQ(found.report.guessed, 0u) << scale;
+  }
   // Spacing 1e-9.
   PointCloud tiny = truth;
   for (V3d& p : tiny.positions) p *= 2e-8;
@@ -184,6 +192,27 @@ TEST(PointNormals, OfAPlaneAreItsNormal) {
   for (const V3f& n : found.cloud.normals) EXPECT_NEAR((V3d(n) - normal).length(), 0, 1e-6);
   // A plane encloses nothing, so its outside is a guess: the largest component is positive.
   EXPECT_EQ(found.report.guessed, found.report.components);
+}
+
+TEST(PointNormals, DoubtIsMeasuredWithoutGuessedParts) {
+  PointCloud plane;
+  for (int j = 0; j < 30; ++j)
+    for (int i = 0; i < 30; ++i) plane.positions.emplace_back(0.05 * i, 0.05 * j, 40);
+  const auto withPlane = [&](PointCloud cloud) {
+    cloud.positions.insert(cloud.positions.end(), plane.positions.begin(), plane.positions.end());
+    return normalsOf(cloud).report;
+  };
+  const PointCloud ball = ballCloud(2000);
+  EXPECT_EQ(withPlane(ball).guessed, 1u);
+  EXPECT_EQ(withPlane(ball).doubtful, 0);
+  // A bowl is open: its winding number is between that of a plane and that of a sphere.
+  PointCloud bowl;
+  for (const V3d& p : ball.positions)
+    if (p.z < -0.5) bowl.positions.push_back(p);
+  const double alone = normalsOf(bowl).report.doubtful;
+  EXPECT_GT(alone, 0.4);  // measured: 0.48
+  EXPECT_EQ(withPlane(bowl).guessed, 1u);
+  EXPECT_EQ(withPlane(bowl).doubtful, alone);
 }
 
 TEST(PointNormals, DuplicatesShareANormal) {
@@ -213,14 +242,19 @@ TEST(PointNormals, RefuseCloudsWithoutASurface) {
     return refusal<InvalidInput>([&] { (void)estimateNormals(cloud); });
   };
   EXPECT_SAYS(refuses({}), "no points");
-  EXPECT_SAYS(refuses({V3d(1)}), "lie on a line");
-  EXPECT_SAYS(refuses({V3d(1), V3d(2)}), "lie on a line");
-  EXPECT_SAYS(refuses(std::vector<V3d>(1000000, V3d(1))), "lie on a line");
+  EXPECT_SAYS(refuses({V3d(1)}), "fewer than 3 different positions");
+  EXPECT_SAYS(refuses({V3d(1), V3d(2)}), "fewer than 3 different positions");
+  EXPECT_SAYS(refuses(std::vector<V3d>(1000000, V3d(1))), "fewer than 3 different positions");
+  EXPECT_SAYS(refuses({V3d(1), V3d(2), V3d(3)}), "lie on a line");
   std::vector<V3d> line;
   for (int i = 0; i < 1000; ++i) line.emplace_back(1e6 + i * 0.1, 2 * i, -i);
   EXPECT_SAYS(refuses(line), "lie on a line");
   (void)refusal<levelset::UsageError>(
       [] { (void)estimateNormals(ballCloud(10), {.neighbours = 2}); });
+  EXPECT_SAYS(refusal<levelset::UsageError>(
+                  [] { (void)estimateNormals(ballCloud(10), {.neighbours = 1001}); }),
+              "1001 neighbours are more than the maximum of 1000");
+  EXPECT_EQ(normalsOf(ballCloud(10), {.neighbours = 1000}).report.missing, 0u);
   (void)refusal<levelset::ResourceLimit>(
       [] { (void)estimateNormals(ballCloud(10), {.maxMemory = 100}); });
   // Three points determine a plane.

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "levelset/error.h"
+#include "levelset/point_files/point_file.h"
 #include "levelset/points/processing/outliers.h"
 #include "levelset/points/processing/place_points.h"
 #include "levelset/points/processing/point_neighbours.h"
@@ -172,6 +173,51 @@ TEST(Thin, RadiusIsTheLeastDistanceAndCoversAllPoints) {
   expectPoissonDisk(mixed, thin(mixed, {.radius = 0.5}), 0.5);
 }
 
+TEST(Thin, FarPointsDoNotHideNearOnes) {
+  // The farthest points need more than 2^32, 2^53 and 2^64 cells.
+  for (const double far : {1e5, 1e12, 1e16, 1e30})
+    for (const double sign : {1.0, -1.0}) {
+      SCOPED_TRACE(sign * far);
+      std::vector<V3d> points = randomPoints(2000, V3d(-0.5), 1e-4);
+      for (const V3d& p : randomPoints(200, V3d(far * sign), 0)) points.push_back(p);
+      // Neighbours of each other in the last bits, and duplicates.
+      for (int i = 0; i < 200; ++i) {
+        V3d p(far * sign, -0.5, far * sign);
+        for (int k = 0; k < i % 20; ++k) p.x = std::nextafter(p.x, 0);
+        points.push_back(p);
+      }
+      const PointCloud cloud = cloudOf(points);
+      for (const double radius : {1e-5, 3e-6}) {
+        const PointCloud kept = thin(cloud, {.radius = radius});
+        expectPoissonDisk(cloud, kept, radius);
+        EXPECT_EQ(support::onThreads(1, [&] { return thin(cloud, {.radius = radius}).positions; }),
+                  kept.positions);
+      }
+      for (const std::size_t count : {10, 500, 1999})
+        EXPECT_EQ(thin(cloud, {.count = count}).size(), count);
+    }
+}
+
+TEST(Thin, AFarPointDoesNotPutAllOthersIntoOneCell) {
+  // The test of all pairs in one cell takes half a minute.
+  std::vector<V3d> points = randomPoints(100000);
+  points.push_back(V3d(1e12, 0, 0));
+  EXPECT_EQ(thin(cloudOf(points), {.radius = 1e-6}).size(), 100001u);
+  EXPECT_EQ(thin(cloudOf(points), {.count = 30000}).size(), 30000u);
+}
+
+TEST(Thin, LatticesOnTheBordersOfFarCellsStay) {
+  // The edges of the cells are a little longer than the spacing.
+  for (const double spacing : {1.0, 0.1, 1e-3}) {
+    std::vector<V3d> points = lattice(12, V3d(-6 * spacing), spacing);
+    points.push_back(V3d(1e15));
+    const PointCloud cloud = cloudOf(points);
+    const double least = pointSpacing(cloud).least;
+    EXPECT_EQ(thin(cloud, {.radius = least}).positions, cloud.positions);
+    expectPoissonDisk(cloud, thin(cloud, {.radius = 1.5 * spacing}), 1.5 * spacing);
+  }
+}
+
 TEST(Thin, RadiusBelowTheSpacingKeepsAllPoints) {
   const PointCloud cloud = cloudOf(lattice(8));
   EXPECT_EQ(thin(cloud, {.radius = 1}).positions, cloud.positions);
@@ -261,12 +307,23 @@ TEST(Outliers, RemovesPlantedPointsOnly) {
 
 TEST(Outliers, KeepsLatticesAndSinglePlaces) {
   EXPECT_EQ(withoutOutliers(cloudOf(lattice(7))).removed, 0u);
+  EXPECT_EQ(withoutOutliers(cloudOf(lattice(24))).removed, 0u);
+  std::vector<V3d> square, line;
+  for (int i = 0; i < 10000; ++i) square.emplace_back(i % 100, i / 100, 0);
+  EXPECT_EQ(withoutOutliers(cloudOf(square)).removed, 0u);
+  // The mean distances of the first two points are 1.9 and 1.7 of the median; the limit is 1.6.
+  for (int i = 0; i < 1000; ++i) line.emplace_back(i, 0, 0);
+  EXPECT_EQ(withoutOutliers(cloudOf(line)).removed, 4u);
   EXPECT_EQ(withoutOutliers(cloudOf({V3d(1)})).removed, 0u);
   EXPECT_EQ(withoutOutliers(cloudOf({V3d(1), V3d(2)})).removed, 0u);
   EXPECT_EQ(withoutOutliers(cloudOf(std::vector<V3d>(1000000, V3d(5)))).removed, 0u);
   (void)refusal<InvalidInput>([] { (void)withoutOutliers({}); });
   (void)refusal<UsageError>([] { (void)withoutOutliers(cloudOf({V3d(1)}), {.neighbours = 0}); });
   (void)refusal<UsageError>([] { (void)withoutOutliers(cloudOf({V3d(1)}), {.deviations = 0}); });
+  EXPECT_SAYS(
+      refusal<UsageError>([] { (void)withoutOutliers(cloudOf({V3d(1)}), {.neighbours = 1001}); }),
+      "maximum of 1000");
+  EXPECT_EQ(withoutOutliers(cloudOf(lattice(5)), {.neighbours = 1000}).removed, 0u);
 }
 
 // === Placement
@@ -298,8 +355,29 @@ TEST(PlacePoints, NormalsAndRadiiFollowTheMatrix) {
   flat.setScale(V3d(1, 1, 0));
   (void)refusal<UsageError>([&] { (void)transform(cloud, flat); });
   Imath::M44d huge;
-  huge.setScale(1e101);
-  (void)refusal<InvalidInput>([&] { (void)transform(cloud, huge); });
+  huge.setScale(1e39);
+  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)transform(cloud, huge); }),
+              "a coordinate exceeds 3.4e38");
+}
+
+TEST(PlacePoints, ResultsFitIntoFiles) {
+  const support::TemporaryFolder folder;
+  PointCloud cloud = cloudOf({V3d(0), V3d(1, 0, 0)});
+  cloud.radii = {0.5f, 2};
+  const auto scaled = [&](double scale) {
+    Imath::M44d matrix;
+    matrix.setScale(scale);
+    return transform(cloud, matrix);
+  };
+  for (const double scale : {3e38 / 2, 1e38, 1e-38, 1e-44}) {
+    writePoints(folder / "a.csv", scaled(scale));
+    EXPECT_EQ(levelset::readPoints(folder / "a.csv").positions[1], V3d(scale, 0, 0));
+  }
+  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)scaled(2e38); }), "a radius leaves");
+  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)scaled(1e-46); }), "a radius leaves");
+  // The writer checks coordinates, too: noise can move points beyond the range of files.
+  EXPECT_SAYS(refusal<InvalidInput>([&] { writePoints(folder / "a.ply", cloudOf({V3d(1e39)})); }),
+              "3.4e38 at point 0");
 }
 
 TEST(PlacePoints, ClipKeepsPointsOfTheBoxAndTheHalfSpace) {
@@ -363,6 +441,22 @@ TEST(SampleMesh, SpacingGivesTheCount) {
   EXPECT_TRUE(cloud.normals.empty());
   // Measured: a mean distance of 0.76 of that of the lattice.
   EXPECT_NEAR(pointSpacing(cloud).mean, 0.76 * 0.05, 0.02 * 0.05);
+}
+
+TEST(SampleMesh, PositionsThatCollapseAreAllUsed) {
+  // Coordinates near 1e6 are multiples of 1.2e-10, so the triangle has few different ones.
+  levelset::TriMesh mesh;
+  mesh.positions = {V3d(1e6), V3d(1e6 + 1e-9, 1e6, 1e6), V3d(1e6, 1e6 + 1e-9, 1e6)};
+  mesh.triangles = {{0, 1, 2}};
+  const PointCloud kept = sampleMesh(mesh, {.count = 8000});
+  EXPECT_EQ(kept.size(), 8000u);
+  // The candidates are five times as many independent points.
+  const PointCloud candidates = sampleMesh(mesh, {.count = 40000, .isBlueNoise = false});
+  const std::size_t different = PointNeighbours(candidates.positions).size();
+  EXPECT_LT(different, 300u);  // measured: 216
+  EXPECT_EQ(PointNeighbours(kept.positions).size(), different);
+  // The test of all pairs at one place takes minutes.
+  EXPECT_EQ(sampleMesh(mesh, {.count = 100000}).size(), 100000u);
 }
 
 TEST(SampleMesh, RefusesUnusableInput) {
