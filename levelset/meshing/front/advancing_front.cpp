@@ -39,6 +39,11 @@ constexpr double kOpenWedge = 2.6;
 // Edges farther than this from the plane of a triangle belong to another part of the surface, edge
 // lengths.
 constexpr double kOtherSheet = 0.8;
+// Longest diagonals of a hole that is filled, edge lengths. The holes that a front leaves are narrow.
+constexpr double kLongestDiagonal = 3;
+
+// Longest sides of a triangle, share of the longest edge length.
+constexpr double kLongestSide = 2;
 
 V3d anyPerpendicular(const V3d& n) {
   const V3d axis = std::abs(n.x) < 0.6 ? V3d(1, 0, 0) : V3d(0, 1, 0);
@@ -90,7 +95,8 @@ class AdvancingFront {
   AdvancingFront(const FrontSurface& surface, const FrontOptions& options)
       : surface_(surface),
         options_(options),
-        edges_(2 * options.longest),
+        cell_(kLongestSide * options.longest),
+        edges_(cell_),
         vertices_(4 * options.shortest) {}
 
   FrontMesh run(const V3d& start);
@@ -138,6 +144,7 @@ class AdvancingFront {
 
   const FrontSurface& surface_;
   const FrontOptions& options_;
+  double cell_;  ///< length of the longest edges
   FrontMesh mesh_;
   FrontEdges edges_;
   ItemGrid vertices_;
@@ -163,6 +170,7 @@ bool AdvancingFront::begin(const V3d& start) {
   const V3d normal = (second->point - first->point).cross(third->point - first->point).normalized();
   for (const Foot* foot : {&*first, &*second, &*third}) {
     if (!(normal.dot(foot->normal) > kTries[1].leastNormal)) return false;
+    if ((foot->point - first->point).length() > cell_) return false;
     addVertex(foot->point, foot->normal);
   }
   useTriangle(0, 1, 2);
@@ -313,6 +321,8 @@ bool AdvancingFront::isValid(std::uint32_t edge, const Candidate& third, const T
   const double least =
       std::min({third.angle, angleBetween(b - a, c - a), angleBetween(a - b, c - b)});
   if (!(least >= limits.leastAngle)) return false;
+  // The search for edges nearby relies on it.
+  if (std::max((c - a).length2(), (c - b).length2()) > cell_ * cell_) return false;
   const V3d normal = (b - a).cross(c - a).normalized();
   for (const V3d* n : {&normalAt(e.a), &normalAt(e.b), &third.normal})
     if (!(normal.dot(*n) >= limits.leastNormal)) return false;
@@ -380,9 +390,12 @@ void AdvancingFront::fillHoles() {
     for (std::uint32_t f = edge; loop.empty() || f != edge; f = edges_[f].next) loop.push_back(f);
     std::vector<std::uint32_t> vertices;
     for (const std::uint32_t f : loop) vertices.push_back(edges_[f].a);
-    const auto triangles =
-        fillLoop(vertices, mesh_.positions, mesh_.normals,
-                 [&](std::uint32_t a, std::uint32_t b) { return edges_.isUsed(a, b); });
+    double longest = 0;
+    for (const std::uint32_t v : vertices) longest = std::max(longest, surface_.edgeLength(at(v)));
+    const auto triangles = fillLoop(
+        vertices, mesh_.positions, mesh_.normals,
+        [&](std::uint32_t a, std::uint32_t b) { return edges_.isUsed(a, b); },
+        kLongestDiagonal * longest);
     for (const std::uint32_t f : loop) edges_.remove(f);
     if (triangles.empty()) mesh_.isClosed = false;
     for (const auto& t : triangles) useTriangle(t[0], t[1], t[2]);
@@ -394,8 +407,9 @@ FrontMesh AdvancingFront::run(const V3d& start) {
   if (!begin(start)) return std::move(mesh_);
   std::vector<std::uint32_t> stuck;
   std::size_t before = 0;  // triangles when the stuck edges were tried last
-  const auto expected = static_cast<double>(std::max<std::size_t>(options_.maxTriangles, 1)) / 4;
-  while (mesh_.triangles.size() < options_.maxTriangles) {
+  const std::size_t most = 3 * options_.expectedTriangles / 2 + 1000;
+  std::size_t tries = 0;
+  while (true) {
     if (queue_.empty()) {
       if (stuck.empty() || mesh_.triangles.size() == before) break;
       before = mesh_.triangles.size();
@@ -407,10 +421,12 @@ FrontMesh AdvancingFront::run(const V3d& start) {
     const auto [level, length, edge] = queue_.top();
     queue_.pop();
     if (!edges_[edge].isActive) continue;
+    if (++tries % 1024 == 0)
+      report(options_.progress, std::min(0.99, static_cast<double>(mesh_.triangles.size()) /
+                                                   static_cast<double>(most)));
     if (giveTriangle(edge)) {
-      if (mesh_.triangles.size() % 1024 == 0)
-        report(options_.progress,
-               std::min(0.99, static_cast<double>(mesh_.triangles.size()) / expected));
+      // A front that winds about itself does not end.
+      if (mesh_.triangles.size() > most) return std::move(mesh_);
       continue;
     }
     if (level + 1 < static_cast<int>(kTries.size())) {
