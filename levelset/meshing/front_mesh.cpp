@@ -29,6 +29,7 @@ using Imath::V3d;
 constexpr double kLongest = 16;
 /// Scales of the edge lengths for the tries of a component whose front does not close.
 constexpr double kScales[] = {1, 0.7};
+constexpr std::uint32_t kNone = 0xffffffffu;
 
 /// One component of the mesh of marching cubes.
 struct Component {
@@ -207,25 +208,18 @@ bool isMeshOf(const FrontMesh& front, const Component& component, const Componen
          vertices.areNear(front, scale, 2 * voxel);
 }
 
-void append(const FrontMesh& front, TriMesh& mesh) {
-  const auto base = static_cast<std::uint32_t>(mesh.positions.size());
-  mesh.positions.insert(mesh.positions.end(), front.positions.begin(), front.positions.end());
-  for (const auto& t : front.triangles)
-    mesh.triangles.push_back({base + t[0], base + t[1], base + t[2]});
-}
-
 /// Appends some triangles of a mesh with the vertices that they use.
-void append(const TriMesh& from, const std::vector<std::array<std::uint32_t, 3>>& triangles,
+/// @param numbers  for each vertex its new number, or kNone
+void append(const std::vector<V3d>& positions,
+            const std::vector<std::array<std::uint32_t, 3>>& triangles,
             std::vector<std::uint32_t>& numbers, TriMesh& mesh) {
-  constexpr std::uint32_t kNone = 0xffffffffu;
-  numbers.resize(from.positions.size(), kNone);
   for (const auto& t : triangles) {
     std::array<std::uint32_t, 3> own;
     for (std::size_t i = 0; i < 3; ++i) {
       std::uint32_t& number = numbers[t[i]];
       if (number == kNone) {
         number = static_cast<std::uint32_t>(mesh.positions.size());
-        mesh.positions.push_back(from.positions[t[i]]);
+        mesh.positions.push_back(positions[t[i]]);
       }
       own[i] = number;
     }
@@ -289,15 +283,16 @@ BandFrontMesh bandToFrontMesh(const NarrowBand& band, const FrontMeshOptions& op
   // === Result
   BandFrontMesh result;
   result.components = components.size();
-  std::vector<std::uint32_t> numbers;
+  std::vector<std::uint32_t> numbers(uniform.positions.size(), kNone), ofFront;
   for (std::size_t i = 0; i < components.size(); ++i) {
     if (!fronts[i].isClosed) {
-      append(uniform, components[i].triangles, numbers, result.mesh);
+      append(uniform.positions, components[i].triangles, numbers, result.mesh);
       ++result.uniform;
       continue;
     }
     result.filled += fronts[i].filled;
-    append(fronts[i], result.mesh);
+    ofFront.assign(fronts[i].positions.size(), kNone);
+    append(fronts[i].positions, fronts[i].triangles, ofFront, result.mesh);
   }
   report(options.progress, 1);
   return result;

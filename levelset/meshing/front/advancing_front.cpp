@@ -6,7 +6,7 @@
 #include <queue>
 #include <tuple>
 
-#include "levelset/meshing/front/fill_loop.h"
+#include "levelset/meshing/front/fill_holes.h"
 #include "levelset/meshing/front/front_edges.h"
 
 namespace levelset {
@@ -39,8 +39,6 @@ constexpr double kOpenWedge = 2.6;
 // Edges farther than this from the plane of a triangle belong to another part of the surface, edge
 // lengths.
 constexpr double kOtherSheet = 0.8;
-// Longest diagonals of a hole that is filled, edge lengths. The holes that a front leaves are narrow.
-constexpr double kLongestDiagonal = 3;
 
 // Longest sides of a triangle, share of the longest edge length.
 constexpr double kLongestSide = 2;
@@ -112,7 +110,7 @@ class AdvancingFront {
   [[nodiscard]] bool isFree(std::uint32_t edge, const Candidate& third) const;
   [[nodiscard]] bool isClear(const Candidate& third, std::uint32_t edge, const Try& limits) const;
   void addTriangle(std::uint32_t edge, const Candidate& third);
-  void fillHoles();
+  [[nodiscard]] std::vector<std::vector<std::uint32_t>> loops() const;
 
   std::uint32_t addVertex(const V3d& point, const V3d& normal) {
     mesh_.positions.push_back(point);
@@ -381,26 +379,19 @@ bool AdvancingFront::giveTriangle(std::uint32_t edge) {
   return false;
 }
 
-/// Fills the loops that are left.
-void AdvancingFront::fillHoles() {
-  mesh_.isClosed = true;
+/// Returns the vertices of the loops that are left.
+std::vector<std::vector<std::uint32_t>> AdvancingFront::loops() const {
+  std::vector<std::vector<std::uint32_t>> all;
+  std::vector<bool> isSeen(edges_.count());
   for (std::uint32_t edge = 0; edge < edges_.count(); ++edge) {
-    if (!edges_[edge].isActive) continue;
-    std::vector<std::uint32_t> loop;
-    for (std::uint32_t f = edge; loop.empty() || f != edge; f = edges_[f].next) loop.push_back(f);
-    std::vector<std::uint32_t> vertices;
-    for (const std::uint32_t f : loop) vertices.push_back(edges_[f].a);
-    double longest = 0;
-    for (const std::uint32_t v : vertices) longest = std::max(longest, surface_.edgeLength(at(v)));
-    const auto triangles = fillLoop(
-        vertices, mesh_.positions, mesh_.normals,
-        [&](std::uint32_t a, std::uint32_t b) { return edges_.isUsed(a, b); },
-        kLongestDiagonal * longest);
-    for (const std::uint32_t f : loop) edges_.remove(f);
-    if (triangles.empty()) mesh_.isClosed = false;
-    for (const auto& t : triangles) useTriangle(t[0], t[1], t[2]);
-    mesh_.filled += triangles.size();
+    if (!edges_[edge].isActive || isSeen[edge]) continue;
+    auto& loop = all.emplace_back();
+    for (std::uint32_t f = edge; !isSeen[f]; f = edges_[f].next) {
+      isSeen[f] = true;
+      loop.push_back(edges_[f].a);
+    }
   }
+  return all;
 }
 
 FrontMesh AdvancingFront::run(const V3d& start) {
@@ -436,7 +427,7 @@ FrontMesh AdvancingFront::run(const V3d& start) {
       stuck.push_back(edge);
     }
   }
-  fillHoles();
+  fillHoles(surface_, loops(), mesh_);
   return std::move(mesh_);
 }
 

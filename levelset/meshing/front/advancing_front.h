@@ -17,7 +17,7 @@ struct FrontMesh {
   std::vector<Imath::V3d> positions;
   std::vector<Imath::V3d> normals;  ///< unit normals of the surface
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::size_t filled = 0;  ///< triangles that fill holes the front left, the last ones in the list
+  std::size_t filled = 0;  ///< triangles that fill holes the front left
   bool isClosed = false;   ///< no front is left
 };
 

@@ -9,8 +9,8 @@ namespace {
 using Imath::V3d;
 
 constexpr std::size_t kLongestLoop = 200;
-// Factor of the area of a triangle whose normal is perpendicular to that of a vertex.
-constexpr double kLeaning = 20;
+// Factor of the area of a triangle whose normal leans away from that of a vertex.
+constexpr double kLeaning = 100;
 // Weight of the squared sides of a triangle, beside its area. Avoids needles.
 constexpr double kSides = 0.01;
 
@@ -26,12 +26,15 @@ std::vector<std::array<std::uint32_t, 3>> fillLoop(
     const V3d &a = positions[loop[i]], &b = positions[loop[j]], &c = positions[loop[k]];
     const V3d twice = (b - a).cross(c - a);
     const double area = twice.length();
-    double least = 1;
+    double least = 1, sum = 0;
     if (area > 0)
-      for (const std::size_t v : {i, j, k})
-        least = std::min(least, twice.dot(normals[loop[v]]) / area);
-    if (least < 0) return static_cast<double>(INFINITY);
-    return area * (1 + kLeaning * std::max(0.0, 1 - 5 * least)) +
+      for (const std::size_t v : {i, j, k}) {
+        const double cosine = twice.dot(normals[loop[v]]) / area;
+        least = std::min(least, cosine);
+        sum += cosine;
+      }
+    if (sum < 0) return static_cast<double>(INFINITY);  // folded
+    return area * (1 + kLeaning * std::max(0.0, 0.2 - least)) +
            kSides * ((b - a).length2() + (c - b).length2() + (a - c).length2());
   };
   // A diagonal must be a new edge of the mesh.

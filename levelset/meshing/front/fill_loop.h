@@ -12,8 +12,8 @@
 namespace levelset {
 
 /// Triangulates a closed loop of edges with the least sum of areas [Barequet95]. Long sides count a
-/// little. Triangles against the normals of their vertices are not allowed, and those that lean away
-/// from them count many times.
+/// little. Triangles against the mean normal of their vertices are not allowed. Triangles that lean
+/// away from the normal of a vertex count many times.
 /// @param loop  vertices; the hole lies to the left of each edge
 /// @param isUsed  (a, b): a triangle has this directed edge already
 /// @param longest  diagonals are no longer
