@@ -36,11 +36,26 @@ struct Component {
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<std::uint32_t> vertices;
   ComponentFigures figures;
-  std::uint32_t start = 0;  ///< vertex with the largest edge length
-  double expected = 0;      ///< number of triangles of the new mesh
+  std::vector<std::uint32_t> starts;  ///< some vertices with large edge lengths, the largest first
+  double expected = 0;                ///< number of triangles of the new mesh
   // Parts of area and volume that chords of the edge lengths cut off.
   double chordArea = 0, chordVolume = 0;
 };
+
+/// Returns vertices where a front may start: the one with the largest edge length, then some with
+/// nearly as large ones.
+std::vector<std::uint32_t> startsOf(const std::vector<std::uint32_t>& vertices,
+                                    const std::vector<double>& lengths) {
+  constexpr std::size_t kStarts = 8;
+  const auto isShorter = [&](std::uint32_t v, std::uint32_t w) { return lengths[v] < lengths[w]; };
+  const std::uint32_t first = *std::max_element(vertices.begin(), vertices.end(), isShorter);
+  std::vector<std::uint32_t> large;
+  for (const std::uint32_t v : vertices)
+    if (lengths[v] >= 0.9 * lengths[first]) large.push_back(v);
+  std::vector<std::uint32_t> starts = {first};
+  for (std::size_t i = 1; i < kStarts; ++i) starts.push_back(large[i * large.size() / kStarts]);
+  return starts;
+}
 
 std::vector<Component> componentsOf(const TriMesh& mesh, const EdgeLengths& edges) {
   const std::vector<double>& lengths = edges.lengths;
@@ -50,16 +65,15 @@ std::vector<Component> componentsOf(const TriMesh& mesh, const EdgeLengths& edge
   for (std::uint32_t v = 0; v < mesh.positions.size(); ++v)
     if (const std::uint32_t i = found.componentOfVertex[v]; i != SurfaceComponents::kNoComponent)
       components[i].vertices.push_back(v);
+  for (Component& component : components) component.starts = startsOf(component.vertices, lengths);
   const double shape = std::sqrt(3.0) / 4;
   for (const auto& t : mesh.triangles) {
     Component& component = components[found.componentOfVertex[t[0]]];
-    if (component.triangles.empty()) component.start = t[0];
     component.triangles.push_back(t);
     double length = 0, curvature = 0;
     for (const std::uint32_t v : t) {
       length += lengths[v] / 3;
       curvature += edges.curvatures[v] / 3;
-      if (lengths[v] > lengths[component.start]) component.start = v;
     }
     const V3d &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
     const double area = (b - a).cross(c - a).length() / 2;
@@ -78,7 +92,8 @@ class ComponentVertices {
       : points_([&] {
           std::vector<openvdb::Vec3d> points;
           points.reserve(component.vertices.size());
-          for (const std::uint32_t v : component.vertices) points.push_back(toVdb(mesh.positions[v]));
+          for (const std::uint32_t v : component.vertices)
+            points.push_back(toVdb(mesh.positions[v]));
           return points;
         }()),
         tree_(points_) {
@@ -151,9 +166,7 @@ class ZeroSetFront : public FrontSurface {
   [[nodiscard]] double edgeLength(const V3d& point) const override {
     return std::max(shortest_, scale_ * vertices_.lengthAt(point));
   }
-  [[nodiscard]] double longest() const {
-    return std::max(shortest_, scale_ * vertices_.longest());
-  }
+  [[nodiscard]] double longest() const { return std::max(shortest_, scale_ * vertices_.longest()); }
 
  private:
   /// Distance from the vertices of marching cubes within which the zero set is their component,
@@ -270,10 +283,12 @@ BandFrontMesh bandToFrontMesh(const NarrowBand& band, const FrontMeshOptions& op
       FrontOptions front;
       front.shortest = limits.shortest;
       front.longest = surface.longest();
-      front.expectedTriangles =
-          static_cast<std::size_t>(component.expected / (scale * scale)) + 1;
+      front.expectedTriangles = static_cast<std::size_t>(component.expected / (scale * scale)) + 1;
       front.progress = progressOf(share);
-      fronts[i] = advanceFront(surface, uniform.positions[component.start], front);
+      for (const std::uint32_t start : component.starts) {
+        fronts[i] = advanceFront(surface, uniform.positions[start], front);
+        if (!fronts[i].triangles.empty()) break;
+      }
       if (isMeshOf(fronts[i], component, vertices, scale, band.voxelSize())) return;
     }
     fronts[i] = {};

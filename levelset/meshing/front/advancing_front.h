@@ -22,7 +22,7 @@ struct FrontMesh {
 };
 
 struct FrontOptions {
-  double shortest = 0, longest = 0;  ///< limits of FrontSurface::edgeLength()
+  double shortest = 0, longest = 0;   ///< limits of FrontSurface::edgeLength()
   std::size_t expectedTriangles = 0;  ///< about; a front with many more stops open
   Progress progress = {};
 };

@@ -79,9 +79,9 @@ EdgeLengths edgeLengths(const NarrowBand& band, const TriMesh& surface, const Ed
         for (std::size_t v = range.begin(); v < range.end(); ++v) {
           const double curvature = largestCurvature(field, surface.positions[v], voxel);
           result.curvatures[v] = curvature;
-          result.lengths[v] =
-              curvature > 0 ? std::clamp(chord / curvature, limits.shortest, limits.longest)
-                            : limits.longest;
+          result.lengths[v] = curvature > 0
+                                  ? std::clamp(chord / curvature, limits.shortest, limits.longest)
+                                  : limits.longest;
         }
       });
   limitGradation(surface, result.lengths);

@@ -14,7 +14,8 @@ namespace {
 
 using Loop = std::vector<std::uint32_t>;
 
-constexpr int kRings = 2;
+constexpr std::uint32_t kNoVertex = 0xffffffffu;
+constexpr int kRings = 3;
 // Longest diagonals of a hole, edge lengths. The holes that a front leaves are narrow.
 constexpr double kLongestDiagonal = 3;
 
@@ -126,13 +127,20 @@ Loop HoleFiller::boundaryOf(const std::set<std::uint32_t>& triangles, const Loop
 
 bool HoleFiller::widenAndFill(const Loop& hole) {
   std::set<std::uint32_t> around;
-  Loop loop = hole;
   for (int ring = 0; ring < kRings; ++ring) {
-    for (std::size_t i = 0; i < loop.size(); ++i)
-      addFan(loop[i], loop[(i + 1) % loop.size()], around);
-    loop = boundaryOf(around, hole);
-    if (loop.empty()) return false;
-    if (fill(loop, around)) return true;
+    std::set<std::pair<std::uint32_t, std::uint32_t>> spokes;
+    for (std::size_t i = 0; i < hole.size(); ++i)
+      spokes.insert({hole[i], hole[(i + 1) % hole.size()]});
+    for (const std::uint32_t t : around)
+      for (std::size_t i = 0; i < 3; ++i)
+        spokes.insert({mesh_.triangles[t][i], mesh_.triangles[t][(i + 1) % 3]});
+    std::uint32_t last = kNoVertex;
+    for (const auto& [vertex, neighbour] : spokes) {
+      if (vertex != last) addFan(vertex, neighbour, around);
+      last = vertex;
+    }
+    const Loop loop = boundaryOf(around, hole);
+    if (!loop.empty() && fill(loop, around)) return true;
   }
   return false;
 }

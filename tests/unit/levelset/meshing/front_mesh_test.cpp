@@ -186,9 +186,9 @@ TEST(FillLoop, TriangulatesAPolygonWithTheLeastArea) {
   }
   EXPECT_NEAR(area, 0.9, support::rounding(1));
   // All diagonals are in use.
-  EXPECT_TRUE(fillLoop(loop, positions, normals, [](std::uint32_t, std::uint32_t) {
-                return true;
-              }, 2).empty());
+  EXPECT_TRUE(fillLoop(
+                  loop, positions, normals, [](std::uint32_t, std::uint32_t) { return true; }, 2)
+                  .empty());
 }
 
 }  // namespace front_mesh_test
