@@ -102,6 +102,7 @@ class AdvancingFront {
  private:
   bool begin(const V3d& start);
   bool giveTriangle(std::uint32_t edge);
+  void retryNearby();
   void findCandidates(std::uint32_t edge, const Try& limits);
   [[nodiscard]] double wedgeAtStart(std::uint32_t edge) const;
   [[nodiscard]] double wedgeAtEnd(std::uint32_t edge) const;
@@ -379,6 +380,15 @@ bool AdvancingFront::giveTriangle(std::uint32_t edge) {
   return false;
 }
 
+/// Tries the stuck edges near a new triangle again.
+void AdvancingFront::retryNearby() {
+  for (const std::uint32_t other : near_) {
+    if (!edges_[other].isActive || !edges_[other].isStuck) continue;
+    edges_.setStuck(other, false);
+    push(other);
+  }
+}
+
 /// Returns the vertices of the loops that are left.
 std::vector<std::vector<std::uint32_t>> AdvancingFront::loops() const {
   std::vector<std::vector<std::uint32_t>> all;
@@ -396,19 +406,9 @@ std::vector<std::vector<std::uint32_t>> AdvancingFront::loops() const {
 
 FrontMesh AdvancingFront::run(const V3d& start) {
   if (!begin(start)) return std::move(mesh_);
-  std::vector<std::uint32_t> stuck;
-  std::size_t before = 0;  // triangles when the stuck edges were tried last
   const std::size_t most = 3 * options_.expectedTriangles / 2 + 1000;
   std::size_t tries = 0;
-  while (true) {
-    if (queue_.empty()) {
-      if (stuck.empty() || mesh_.triangles.size() == before) break;
-      before = mesh_.triangles.size();
-      for (const std::uint32_t edge : stuck)
-        if (edges_[edge].isActive) push(edge);
-      stuck.clear();
-      continue;
-    }
+  while (!queue_.empty()) {
     const auto [level, length, edge] = queue_.top();
     queue_.pop();
     if (!edges_[edge].isActive) continue;
@@ -418,13 +418,12 @@ FrontMesh AdvancingFront::run(const V3d& start) {
     if (giveTriangle(edge)) {
       // A front that winds about itself does not end.
       if (mesh_.triangles.size() > most) return std::move(mesh_);
-      continue;
-    }
-    if (level + 1 < static_cast<int>(kTries.size())) {
+      retryNearby();
+    } else if (level + 1 < static_cast<int>(kTries.size())) {
       edges_.setLevel(edge, level + 1);
       push(edge);
     } else {
-      stuck.push_back(edge);
+      edges_.setStuck(edge, true);
     }
   }
   fillHoles(surface_, loops(), mesh_);
