@@ -19,11 +19,10 @@ struct FrontMeshOptions {
 };
 
 struct BandFrontMesh {
-  TriMesh mesh;                   ///< in world coordinates
-  std::size_t components = 0;     ///< components of the surface
-  std::size_t uniform = 0;        ///< components that have the triangles of marching cubes
-  std::size_t otherTopology = 0;  ///< components whose Euler characteristic differs from theirs
-  std::size_t filled = 0;         ///< triangles that fill holes the fronts left
+  TriMesh mesh;                ///< in world coordinates
+  std::size_t components = 0;  ///< components of the surface
+  std::size_t uniform = 0;     ///< components that have the triangles of marching cubes
+  std::size_t filled = 0;      ///< triangles that fill holes the fronts left
 };
 
 /// Converts the zero set to a mesh of nearly equilateral triangles by an advancing front

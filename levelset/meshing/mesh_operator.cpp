@@ -38,11 +38,6 @@ TriMesh runFront(const NarrowBand& band, const MeshOperator::Options& options, O
         fmt::format("the front did not close on {} of {} components, so they have the triangles of "
                     "marching cubes; smooth the solid first, or use a finer voxel",
                     result.uniform, result.components));
-  if (result.otherTopology > 0)
-    run.notes.push_back(fmt::format(
-        "{} of {} components have another number of handles than in the mesh of marching cubes; "
-        "use a finer voxel to resolve thin parts",
-        result.otherTopology, result.components));
   return std::move(result.mesh);
 }
 

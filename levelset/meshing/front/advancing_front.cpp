@@ -6,7 +6,7 @@
 #include <queue>
 #include <tuple>
 
-#include "levelset/meshing/front/fill_loop.h"
+#include "levelset/meshing/front/fill_holes.h"
 #include "levelset/meshing/front/front_edges.h"
 
 namespace levelset {
@@ -39,6 +39,9 @@ constexpr double kOpenWedge = 2.6;
 // Edges farther than this from the plane of a triangle belong to another part of the surface, edge
 // lengths.
 constexpr double kOtherSheet = 0.8;
+
+// Longest sides of a triangle, share of the longest edge length.
+constexpr double kLongestSide = 2;
 
 V3d anyPerpendicular(const V3d& n) {
   const V3d axis = std::abs(n.x) < 0.6 ? V3d(1, 0, 0) : V3d(0, 1, 0);
@@ -90,7 +93,8 @@ class AdvancingFront {
   AdvancingFront(const FrontSurface& surface, const FrontOptions& options)
       : surface_(surface),
         options_(options),
-        edges_(2 * options.longest),
+        cell_(kLongestSide * options.longest),
+        edges_(cell_),
         vertices_(4 * options.shortest) {}
 
   FrontMesh run(const V3d& start);
@@ -98,6 +102,7 @@ class AdvancingFront {
  private:
   bool begin(const V3d& start);
   bool giveTriangle(std::uint32_t edge);
+  void retryNearby();
   void findCandidates(std::uint32_t edge, const Try& limits);
   [[nodiscard]] double wedgeAtStart(std::uint32_t edge) const;
   [[nodiscard]] double wedgeAtEnd(std::uint32_t edge) const;
@@ -106,7 +111,7 @@ class AdvancingFront {
   [[nodiscard]] bool isFree(std::uint32_t edge, const Candidate& third) const;
   [[nodiscard]] bool isClear(const Candidate& third, std::uint32_t edge, const Try& limits) const;
   void addTriangle(std::uint32_t edge, const Candidate& third);
-  void fillHoles();
+  [[nodiscard]] std::vector<std::vector<std::uint32_t>> loops() const;
 
   std::uint32_t addVertex(const V3d& point, const V3d& normal) {
     mesh_.positions.push_back(point);
@@ -138,6 +143,7 @@ class AdvancingFront {
 
   const FrontSurface& surface_;
   const FrontOptions& options_;
+  double cell_;  ///< length of the longest edges
   FrontMesh mesh_;
   FrontEdges edges_;
   ItemGrid vertices_;
@@ -163,6 +169,7 @@ bool AdvancingFront::begin(const V3d& start) {
   const V3d normal = (second->point - first->point).cross(third->point - first->point).normalized();
   for (const Foot* foot : {&*first, &*second, &*third}) {
     if (!(normal.dot(foot->normal) > kTries[1].leastNormal)) return false;
+    if ((foot->point - first->point).length() > cell_) return false;
     addVertex(foot->point, foot->normal);
   }
   useTriangle(0, 1, 2);
@@ -313,6 +320,8 @@ bool AdvancingFront::isValid(std::uint32_t edge, const Candidate& third, const T
   const double least =
       std::min({third.angle, angleBetween(b - a, c - a), angleBetween(a - b, c - b)});
   if (!(least >= limits.leastAngle)) return false;
+  // The search for edges nearby relies on it.
+  if (std::max((c - a).length2(), (c - b).length2()) > cell_ * cell_) return false;
   const V3d normal = (b - a).cross(c - a).normalized();
   for (const V3d* n : {&normalAt(e.a), &normalAt(e.b), &third.normal})
     if (!(normal.dot(*n) >= limits.leastNormal)) return false;
@@ -371,56 +380,53 @@ bool AdvancingFront::giveTriangle(std::uint32_t edge) {
   return false;
 }
 
-/// Fills the loops that are left.
-void AdvancingFront::fillHoles() {
-  mesh_.isClosed = true;
-  for (std::uint32_t edge = 0; edge < edges_.count(); ++edge) {
-    if (!edges_[edge].isActive) continue;
-    std::vector<std::uint32_t> loop;
-    for (std::uint32_t f = edge; loop.empty() || f != edge; f = edges_[f].next) loop.push_back(f);
-    std::vector<std::uint32_t> vertices;
-    for (const std::uint32_t f : loop) vertices.push_back(edges_[f].a);
-    const auto triangles =
-        fillLoop(vertices, mesh_.positions, mesh_.normals,
-                 [&](std::uint32_t a, std::uint32_t b) { return edges_.isUsed(a, b); });
-    for (const std::uint32_t f : loop) edges_.remove(f);
-    if (triangles.empty()) mesh_.isClosed = false;
-    for (const auto& t : triangles) useTriangle(t[0], t[1], t[2]);
-    mesh_.filled += triangles.size();
+/// Tries the stuck edges near a new triangle again.
+void AdvancingFront::retryNearby() {
+  for (const std::uint32_t other : near_) {
+    if (!edges_[other].isActive || !edges_[other].isStuck) continue;
+    edges_.setStuck(other, false);
+    push(other);
   }
+}
+
+/// Returns the vertices of the loops that are left.
+std::vector<std::vector<std::uint32_t>> AdvancingFront::loops() const {
+  std::vector<std::vector<std::uint32_t>> all;
+  std::vector<bool> isSeen(edges_.count());
+  for (std::uint32_t edge = 0; edge < edges_.count(); ++edge) {
+    if (!edges_[edge].isActive || isSeen[edge]) continue;
+    auto& loop = all.emplace_back();
+    for (std::uint32_t f = edge; !isSeen[f]; f = edges_[f].next) {
+      isSeen[f] = true;
+      loop.push_back(edges_[f].a);
+    }
+  }
+  return all;
 }
 
 FrontMesh AdvancingFront::run(const V3d& start) {
   if (!begin(start)) return std::move(mesh_);
-  std::vector<std::uint32_t> stuck;
-  std::size_t before = 0;  // triangles when the stuck edges were tried last
-  const auto expected = static_cast<double>(std::max<std::size_t>(options_.maxTriangles, 1)) / 4;
-  while (mesh_.triangles.size() < options_.maxTriangles) {
-    if (queue_.empty()) {
-      if (stuck.empty() || mesh_.triangles.size() == before) break;
-      before = mesh_.triangles.size();
-      for (const std::uint32_t edge : stuck)
-        if (edges_[edge].isActive) push(edge);
-      stuck.clear();
-      continue;
-    }
+  const std::size_t most = 3 * options_.expectedTriangles / 2 + 1000;
+  std::size_t tries = 0;
+  while (!queue_.empty()) {
     const auto [level, length, edge] = queue_.top();
     queue_.pop();
     if (!edges_[edge].isActive) continue;
+    if (++tries % 1024 == 0)
+      report(options_.progress, std::min(0.99, static_cast<double>(mesh_.triangles.size()) /
+                                                   static_cast<double>(most)));
     if (giveTriangle(edge)) {
-      if (mesh_.triangles.size() % 1024 == 0)
-        report(options_.progress,
-               std::min(0.99, static_cast<double>(mesh_.triangles.size()) / expected));
-      continue;
-    }
-    if (level + 1 < static_cast<int>(kTries.size())) {
+      // A front that winds about itself does not end.
+      if (mesh_.triangles.size() > most) return std::move(mesh_);
+      retryNearby();
+    } else if (level + 1 < static_cast<int>(kTries.size())) {
       edges_.setLevel(edge, level + 1);
       push(edge);
     } else {
-      stuck.push_back(edge);
+      edges_.setStuck(edge, true);
     }
   }
-  fillHoles();
+  fillHoles(surface_, loops(), mesh_);
   return std::move(mesh_);
 }
 

@@ -17,13 +17,13 @@ struct FrontMesh {
   std::vector<Imath::V3d> positions;
   std::vector<Imath::V3d> normals;  ///< unit normals of the surface
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::size_t filled = 0;  ///< triangles that fill holes the front left, the last ones in the list
+  std::size_t filled = 0;  ///< triangles that fill holes the front left
   bool isClosed = false;   ///< no front is left
 };
 
 struct FrontOptions {
-  double shortest = 0, longest = 0;  ///< limits of FrontSurface::edgeLength()
-  std::size_t maxTriangles = 0;
+  double shortest = 0, longest = 0;   ///< limits of FrontSurface::edgeLength()
+  std::size_t expectedTriangles = 0;  ///< about; a front with many more stops open
   Progress progress = {};
 };
 

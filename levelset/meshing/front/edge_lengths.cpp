@@ -67,23 +67,25 @@ void limitGradation(const TriMesh& surface, std::vector<double>& lengths) {
 
 }  // namespace
 
-std::vector<double> edgeLengths(const NarrowBand& band, const TriMesh& surface,
-                                const EdgeLimits& limits) {
+EdgeLengths edgeLengths(const NarrowBand& band, const TriMesh& surface, const EdgeLimits& limits) {
   const double voxel = band.voxelSize(), chord = 2 * std::sin(limits.angle / 2);
-  std::vector<double> lengths(surface.positions.size());
+  EdgeLengths result;
+  result.lengths.resize(surface.positions.size());
+  result.curvatures.resize(surface.positions.size());
   tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, lengths.size(), 1024),
+      tbb::blocked_range<std::size_t>(0, surface.positions.size(), 1024),
       [&](const tbb::blocked_range<std::size_t>& range) {
         const BandSampler field(band, Interpolation::Tricubic);
         for (std::size_t v = range.begin(); v < range.end(); ++v) {
           const double curvature = largestCurvature(field, surface.positions[v], voxel);
-          lengths[v] = curvature > 0
-                           ? std::clamp(chord / curvature, limits.shortest, limits.longest)
-                           : limits.longest;
+          result.curvatures[v] = curvature;
+          result.lengths[v] = curvature > 0
+                                  ? std::clamp(chord / curvature, limits.shortest, limits.longest)
+                                  : limits.longest;
         }
       });
-  limitGradation(surface, lengths);
-  return lengths;
+  limitGradation(surface, result.lengths);
+  return result;
 }
 
 }  // namespace levelset

@@ -15,11 +15,17 @@ struct EdgeLimits {
   double angle = 0;  ///< between the normals at the ends of an edge
 };
 
+/// Figures at the vertices of a mesh.
+struct EdgeLengths {
+  std::vector<double> lengths;
+  std::vector<double> curvatures;  ///< largest absolute curvatures
+};
+
 /// Returns the edge length at each vertex of a mesh of the zero set: the chord of the angle on a
 /// circle of the largest curvature, within the limits. Lengths change by at most kGradation per
 /// unit of length along the edges of the mesh.
-[[nodiscard]] std::vector<double> edgeLengths(const NarrowBand& band, const TriMesh& surface,
-                                              const EdgeLimits& limits);
+[[nodiscard]] EdgeLengths edgeLengths(const NarrowBand& band, const TriMesh& surface,
+                                      const EdgeLimits& limits);
 
 /// Largest change of edge lengths per unit of length.
 inline constexpr double kGradation = 0.25;

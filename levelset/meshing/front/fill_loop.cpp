@@ -9,8 +9,8 @@ namespace {
 using Imath::V3d;
 
 constexpr std::size_t kLongestLoop = 200;
-// Factor of the area of a triangle whose normal is opposite to those of its vertices.
-constexpr double kFolded = 100;
+// Factor of the area of a triangle whose normal leans away from that of a vertex.
+constexpr double kLeaning = 100;
 // Weight of the squared sides of a triangle, beside its area. Avoids needles.
 constexpr double kSides = 0.01;
 
@@ -19,23 +19,28 @@ constexpr double kSides = 0.01;
 std::vector<std::array<std::uint32_t, 3>> fillLoop(
     const std::vector<std::uint32_t>& loop, const std::vector<V3d>& positions,
     const std::vector<V3d>& normals,
-    const std::function<bool(std::uint32_t, std::uint32_t)>& isUsed) {
+    const std::function<bool(std::uint32_t, std::uint32_t)>& isUsed, double longest) {
   const std::size_t n = loop.size();
   if (n < 3 || n > kLongestLoop) return {};
   const auto weight = [&](std::size_t i, std::size_t j, std::size_t k) {
     const V3d &a = positions[loop[i]], &b = positions[loop[j]], &c = positions[loop[k]];
     const V3d twice = (b - a).cross(c - a);
     const double area = twice.length();
-    double least = 1;
+    double least = 1, sum = 0;
     if (area > 0)
-      for (const std::size_t v : {i, j, k})
-        least = std::min(least, twice.dot(normals[loop[v]]) / area);
-    return area * (1 + kFolded * std::max(0.0, 0.2 - least)) +
+      for (const std::size_t v : {i, j, k}) {
+        const double cosine = twice.dot(normals[loop[v]]) / area;
+        least = std::min(least, cosine);
+        sum += cosine;
+      }
+    if (sum < 0) return static_cast<double>(INFINITY);  // folded
+    return area * (1 + kLeaning * std::max(0.0, 0.2 - least)) +
            kSides * ((b - a).length2() + (c - b).length2() + (a - c).length2());
   };
   // A diagonal must be a new edge of the mesh.
   const auto isDiagonal = [&](std::size_t i, std::size_t k) {
-    return loop[i] != loop[k] && !isUsed(loop[i], loop[k]) && !isUsed(loop[k], loop[i]);
+    return loop[i] != loop[k] && !isUsed(loop[i], loop[k]) && !isUsed(loop[k], loop[i]) &&
+           (positions[loop[k]] - positions[loop[i]]).length2() <= longest * longest;
   };
   // cost[i][k]: least cost of the polygon from vertex i to vertex k.
   std::vector<double> cost(n * n, INFINITY);

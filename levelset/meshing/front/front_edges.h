@@ -18,7 +18,8 @@ struct FrontEdge {
   std::uint32_t a = 0, b = 0;        ///< vertices
   std::uint32_t prev = 0, next = 0;  ///< edges of the same loop
   bool isActive = false;
-  int level = 0;  ///< number of failed tries
+  int level = 0;         ///< number of failed tries
+  bool isStuck = false;  ///< all tries failed
 };
 
 /// The loops of a front, and a grid for the edges near a position. Deterministic.
@@ -32,6 +33,7 @@ class FrontEdges {
   [[nodiscard]] std::size_t activeCount() const { return active_; }
 
   void setLevel(std::uint32_t edge, int level) { edges_[edge].level = level; }
+  void setStuck(std::uint32_t edge, bool isStuck) { edges_[edge].isStuck = isStuck; }
 
   /// Adds an edge that is not linked yet.
   std::uint32_t add(std::uint32_t a, std::uint32_t b, const Imath::V3d& from, const Imath::V3d& to);
