@@ -29,7 +29,7 @@ using Imath::V3d;
 constexpr double kLongest = 16;
 /// Scales of the edge lengths for the tries of a component whose front does not close.
 constexpr double kScales[] = {1, 0.7};
-constexpr std::uint32_t kNone = 0xffffffffu;
+constexpr std::uint32_t kUnnumbered = 0xffffffffu;
 
 /// One component of the mesh of marching cubes.
 struct Component {
@@ -222,7 +222,7 @@ bool isMeshOf(const FrontMesh& front, const Component& component, const Componen
 }
 
 /// Appends some triangles of a mesh with the vertices that they use.
-/// @param numbers  for each vertex its new number, or kNone
+/// @param numbers  for each vertex its new number, or kUnnumbered
 void append(const std::vector<V3d>& positions,
             const std::vector<std::array<std::uint32_t, 3>>& triangles,
             std::vector<std::uint32_t>& numbers, TriMesh& mesh) {
@@ -230,7 +230,7 @@ void append(const std::vector<V3d>& positions,
     std::array<std::uint32_t, 3> own;
     for (std::size_t i = 0; i < 3; ++i) {
       std::uint32_t& number = numbers[t[i]];
-      if (number == kNone) {
+      if (number == kUnnumbered) {
         number = static_cast<std::uint32_t>(mesh.positions.size());
         mesh.positions.push_back(positions[t[i]]);
       }
@@ -298,7 +298,7 @@ BandFrontMesh bandToFrontMesh(const NarrowBand& band, const FrontMeshOptions& op
   // === Result
   BandFrontMesh result;
   result.components = components.size();
-  std::vector<std::uint32_t> numbers(uniform.positions.size(), kNone), ofFront;
+  std::vector<std::uint32_t> numbers(uniform.positions.size(), kUnnumbered), ofFront;
   for (std::size_t i = 0; i < components.size(); ++i) {
     if (!fronts[i].isClosed) {
       append(uniform.positions, components[i].triangles, numbers, result.mesh);
@@ -306,7 +306,7 @@ BandFrontMesh bandToFrontMesh(const NarrowBand& band, const FrontMeshOptions& op
       continue;
     }
     result.filled += fronts[i].filled;
-    ofFront.assign(fronts[i].positions.size(), kNone);
+    ofFront.assign(fronts[i].positions.size(), kUnnumbered);
     append(fronts[i].positions, fronts[i].triangles, ofFront, result.mesh);
   }
   report(options.progress, 1);

@@ -10,10 +10,11 @@
 namespace levelset {
 
 struct FrontMeshOptions {
-  /// Longest edges, world units, at least one voxel; 0: 16 voxels.
+  /// Largest target length of edges, world units, at least one voxel; 0: 16 voxels. Edges reach
+  /// about twice the target.
   double edgeLength = 0;
   /// Angle between the normals at the ends of an edge, radians, in (0, 1]. Edges are shorter where
-  /// the surface bends more, but not below one voxel.
+  /// the surface bends more, but not below one voxel. A sphere loses 3/8 angle² of its volume.
   double angle = 20 * std::numbers::pi / 180;
   Progress progress = {};
 };
@@ -28,8 +29,9 @@ struct BandFrontMesh {
 /// Converts the zero set to a mesh of nearly equilateral triangles by an advancing front
 /// [Schreiner06]. The vertices lie on the zero set of the tricubic interpolant. Edge lengths follow
 /// from the curvature; they change by at most 0.25 per unit of length along the surface. A
-/// component whose front does not close gets the mesh of bandToMesh(). The mesh is closed,
-/// 2-manifold and faces outwards.
+/// component gets the mesh of bandToMesh() if its front does not close, or if area, volume or Euler
+/// characteristic show that the front is another surface. The mesh is closed, 2-manifold and faces
+/// outwards.
 /// @throws InvalidInput if the band is empty or has no zero crossing or is an open surface
 /// @throws UsageError if an option is outside its range
 /// @throws Cancelled

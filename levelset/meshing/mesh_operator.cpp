@@ -35,7 +35,7 @@ TriMesh runFront(const NarrowBand& band, const MeshOperator::Options& options, O
                  {"filled_triangles", result.filled}};
   if (result.uniform > 0)
     run.notes.push_back(
-        fmt::format("the front did not close on {} of {} components, so they have the triangles of "
+        fmt::format("the front found no mesh of {} of {} components, so they have the triangles of "
                     "marching cubes; smooth the solid first, or use a finer voxel",
                     result.uniform, result.components));
   return std::move(result.mesh);
@@ -50,9 +50,9 @@ const OperatorText MeshOperator::text{
     .details =
         "The mesh of a patch is one closed surface: its lowest layer, its highest layer and its "
         "sides. With --sheets it is the separate surfaces of all layers. An advancing front suits "
-        "smooth solids. Where it does not close, as on noisy scans, a component keeps the "
-        "triangles "
-        "of marching cubes, with a note.",
+        "smooth solids. Where it finds no mesh, as on noisy scans, a component keeps the triangles "
+        "of marching cubes, with a note. Its long edges cut material off curved parts: give a "
+        "smaller --angle for more accuracy.",
     .example = "levelsmith box --size 2,2,2 --voxel 0.1 ! mesh --sharp ! write box.ply"};
 
 void MeshOperator::check(const Options& options, const GivenOptions& given) {
@@ -80,8 +80,8 @@ TriMesh MeshOperator::run(std::vector<NarrowBand> operands, const Options& optio
 }
 
 ValuePlan MeshOperator::plan(const Options&, Plans operands, const OperatorRun&) {
-  // Number of triangles per voxel² of surface area. Other methods yield few more, and the
-  // advancing front far fewer.
+  // Number of triangles per voxel² of surface area. An advancing front yields far fewer, the other
+  // methods few more.
   constexpr double kTriangles = 3.35;
   const ValuePlan& solid = operands[0];
   return {.bounds = solid.bounds, .area = solid.area, .triangles = kTriangles * solid.layer()};

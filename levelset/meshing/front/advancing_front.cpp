@@ -15,7 +15,7 @@ namespace {
 using Foot = FrontSurface::Foot;
 using Imath::V3d;
 
-constexpr double kTurn = 2 * std::numbers::pi, kIdealAngle = std::numbers::pi / 3;
+constexpr double kFullTurn = 2 * std::numbers::pi, kIdealAngle = std::numbers::pi / 3;
 constexpr std::uint32_t kNewVertex = 0xffffffffu;
 
 /// Limits of a try. Each edge that gets no triangle is tried again with looser limits.
@@ -41,7 +41,7 @@ constexpr double kOpenWedge = 2.6;
 constexpr double kOtherSheet = 0.8;
 
 // Longest sides of a triangle, share of the longest edge length.
-constexpr double kLongestSide = 2;
+constexpr double kLongestFrontSide = 2;
 
 V3d anyPerpendicular(const V3d& n) {
   const V3d axis = std::abs(n.x) < 0.6 ? V3d(1, 0, 0) : V3d(0, 1, 0);
@@ -52,7 +52,7 @@ V3d anyPerpendicular(const V3d& n) {
 double turn(const V3d& normal, const V3d& from, const V3d& to) {
   const double angle =
       std::atan2(normal.dot(from.cross(to)), from.dot(to) - from.dot(normal) * to.dot(normal));
-  return angle < 0 ? angle + kTurn : angle;
+  return angle < 0 ? angle + kFullTurn : angle;
 }
 
 double angleBetween(const V3d& u, const V3d& v) {
@@ -93,7 +93,7 @@ class AdvancingFront {
   AdvancingFront(const FrontSurface& surface, const FrontOptions& options)
       : surface_(surface),
         options_(options),
-        cell_(kLongestSide * options.longest),
+        cell_(kLongestFrontSide * options.longest),
         edges_(cell_),
         vertices_(4 * options.shortest) {}
 
@@ -182,7 +182,7 @@ double AdvancingFront::wedgeAtStart(std::uint32_t edge) const {
   const FrontEdge& e = edges_[edge];
   const V3d& origin = at(e.a);
   const double angle = turn(normalAt(e.a), at(e.b) - origin, at(edges_[e.prev].a) - origin);
-  return angle > 0 ? angle : kTurn;
+  return angle > 0 ? angle : kFullTurn;
 }
 
 double AdvancingFront::wedgeAtEnd(std::uint32_t edge) const {

@@ -14,7 +14,7 @@ namespace {
 
 using Loop = std::vector<std::uint32_t>;
 
-constexpr std::uint32_t kNoVertex = 0xffffffffu;
+constexpr std::uint32_t kNoSpoke = 0xffffffffu;
 constexpr int kRings = 3;
 // Longest diagonals of a hole, edge lengths. The holes that a front leaves are narrow.
 constexpr double kLongestDiagonal = 3;
@@ -134,7 +134,7 @@ bool HoleFiller::widenAndFill(const Loop& hole) {
     for (const std::uint32_t t : around)
       for (std::size_t i = 0; i < 3; ++i)
         spokes.insert({mesh_.triangles[t][i], mesh_.triangles[t][(i + 1) % 3]});
-    std::uint32_t last = kNoVertex;
+    std::uint32_t last = kNoSpoke;
     for (const auto& [vertex, neighbour] : spokes) {
       if (vertex != last) addFan(vertex, neighbour, around);
       last = vertex;
