@@ -18,11 +18,11 @@ inline constexpr double kMostCoordinate = std::numeric_limits<float>::max();
 /// Points of a surface or of a volume, without connectivity. Each list of attributes is empty or
 /// has one entry for each point.
 struct PointCloud {
-  std::vector<Imath::V3d> positions;  ///< n × 3, world units, within kMostCoordinate
-  std::vector<Imath::V3f> normals;    ///< n × 3, outwards, finite, any length; zero: no normal
-  std::vector<Imath::V4f> colors;     ///< n × 4, red, green, blue, alpha; full intensity is 1
-  std::vector<float> radii;           ///< n, world units, positive
-  std::vector<float> weights;         ///< n, confidence, not negative
+  std::vector<Imath::V3d> positions = {};  ///< n × 3, world units, within kMostCoordinate
+  std::vector<Imath::V3f> normals = {};    ///< n × 3, outwards, any length; zero: no normal
+  std::vector<Imath::V4f> colors = {};     ///< n × 4, red, green, blue, alpha, 1 is full
+  std::vector<float> radii = {};           ///< n, world units, positive
+  std::vector<float> weights = {};         ///< n, confidence, not negative
   /// Type of the positions in a file.
   CoordinatePrecision precision = CoordinatePrecision::Double;
 

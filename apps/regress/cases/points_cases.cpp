@@ -106,15 +106,42 @@ void particleBalls(Recorder& out) {
 }
 
 Bounds cleanPointBounds() {
-  return Bounds();
+  return Bounds()
+      .measured("cube, meshless", "surface_l1_vx", {{16, 0.0854}, {32, 0.0535}, {64, 0.0269}})
+      .measured("cube, meshless", "surface_linf_vx",
+                {{16, 1.15}, {32, 0.948, Budget::Quick}, {32, 1.42, Budget::Full}, {64, 1.12}})
+      .measured("cube, mls", "surface_l1_vx", {{16, 0.0961}, {32, 0.0587}, {64, 0.0282}})
+      .measured("cube, mls", "surface_linf_vx", {{16, 0.599}, {32, 0.639}, {64, 0.881}})
+      .measured("sphere, meshless", "surface_l1_vx", {{16, 0.0266}, {32, 0.0125}, {64, 0.00635}})
+      .measured("sphere, meshless", "surface_linf_vx", {{16, 0.156}, {32, 0.0888}, {64, 0.0465}})
+      .measured("sphere, mls", "surface_l1_vx", {{16, 0.0108}, {32, 0.00122}, {64, 0.000149}})
+      .measured("sphere, mls", "surface_linf_vx", {{16, 0.0215}, {32, 0.00274}, {64, 0.000373}})
+      .measured("torus, meshless", "surface_l1_vx", {{16, 0.0435}, {32, 0.02}, {64, 0.00985}})
+      .measured("torus, meshless", "surface_linf_vx", {{16, 0.373}, {32, 0.173}, {64, 0.0933}})
+      .measured("torus, mls", "surface_l1_vx", {{16, 0.0717}, {32, 0.0095}, {64, 0.00111}})
+      .measured("torus, mls", "surface_linf_vx", {{16, 0.211}, {32, 0.0294}, {64, 0.00409}});
 }
 
 Bounds noisyPointBounds() {
-  return Bounds();
+  return Bounds()
+      .measured("cube, meshless", "surface_l1_vx", {{24, 0.251}, {32, 0.224}})
+      .measured("cube, meshless", "surface_linf_vx", {{24, 2.07}, {32, 1.11}})
+      .measured("cube, mls", "surface_l1_vx", {{24, 0.254}, {32, 0.217}})
+      .measured("cube, mls", "surface_linf_vx", {{24, 1.18}, {32, 1.14}})
+      .measured("sphere, meshless", "surface_l1_vx", {{24, 0.166}, {32, 0.172}})
+      .measured("sphere, meshless", "surface_linf_vx", {{24, 0.946}, {32, 0.8}})
+      .measured("sphere, mls", "surface_l1_vx", {{24, 0.103}, {32, 0.109}})
+      .measured("sphere, mls", "surface_linf_vx", {{24, 0.422}, {32, 0.465}})
+      .measured("torus, meshless", "surface_l1_vx", {{24, 0.197}, {32, 0.187}})
+      .measured("torus, meshless", "surface_linf_vx", {{24, 0.842}, {32, 0.903}})
+      .measured("torus, mls", "surface_l1_vx", {{24, 0.156}, {32, 0.145}})
+      .measured("torus, mls", "surface_linf_vx", {{24, 0.602}, {32, 0.641}});
 }
 
 Bounds particleBounds() {
-  return Bounds();
+  return Bounds()
+      .measured("two balls", "surface_l1_vx", {{16, 0.00893}, {32, 0.00401}, {64, 0.00221}})
+      .measured("two balls", "surface_linf_vx", {{16, 0.242}, {32, 0.262}, {64, 0.279}});
 }
 
 }  // namespace
@@ -129,7 +156,7 @@ void addPointCases(std::vector<Case>& all) {
                      "--method mls' and 'meshless'.",
                  .citation = "closed form",
                  .quick = {16, 32},
-                 .full = {32, 64, 128},
+                 .full = {32, 64},
                  .bounds = cleanPointBounds(),
                  .run = cleanPoints});
   all.push_back({.name = "points-noise",
@@ -140,8 +167,8 @@ void addPointCases(std::vector<Case>& all) {
                      "fifth of their spacing. Normals come from 40 neighbours, and so do the "
                      "surfaces.",
                  .citation = "closed form",
-                 .quick = {24, 32},
-                 .full = {32, 64},
+                 .quick = {24},
+                 .full = {32},
                  .bounds = noisyPointBounds(),
                  .run = noisyPoints});
   all.push_back({.name = "points-particles",
@@ -150,7 +177,7 @@ void addPointCases(std::vector<Case>& all) {
                  .definition = "Two balls of radii 0.35 and 0.25 whose surfaces meet in a circle.",
                  .citation = "closed form",
                  .quick = {16, 32},
-                 .full = {32, 64, 128},
+                 .full = {32, 64},
                  .bounds = particleBounds(),
                  .run = particleBalls});
 }
