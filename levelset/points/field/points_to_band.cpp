@@ -197,7 +197,9 @@ PointsToBandResult pointsToBand(const PointCloud& cloud, double voxelSize,
   if (opposedShare > kOpposedLimit && !options.acceptUnsupported)
     throw InvalidInput(fmt::format(
         "the normals of {:.2g} % of the points oppose those of their neighbours, so they do not "
-        "tell inside from outside; compute them with `normals`, or accept them with --accept-sign",
+        "tell inside from outside; compute them with `normals`, with more neighbours if the points "
+        "are "
+        "noisy, or accept them with --accept-sign",
         100 * opposedShare));
   report(options.progress, 0.1);
   const points::SignedField field(points, fieldOf(points, options));

@@ -19,15 +19,25 @@ namespace {
 using Imath::V3d;
 using Imath::V3f;
 
-/// Cosine between the normals at the ends of an edge, after the second one is mirrored at the plane
-/// through the middle of the edge. On a circular arc it is 1 for normals of the same side, also at
-/// a sharp edge and between two sheets that face each other [Konig09].
-float edgeCosine(const PointCloud& cloud, std::uint32_t i, std::uint32_t j) {
+/// How the normals at the ends of an edge agree.
+struct EdgeAgreement {
+  /// Cosine between the normals, after the second one is mirrored at the plane through the middle
+  /// of the edge. On a circular arc it is 1 for normals of the same side, also at a sharp edge and
+  /// between two sheets that face each other [Konig09].
+  float cosine;
+  /// From 0 to 1. An edge along a normal says little: noise makes such edges inside one sheet, and
+  /// the mirror image turns their normals.
+  float trust;
+};
+
+EdgeAgreement agreement(const PointCloud& cloud, std::uint32_t i, std::uint32_t j) {
   V3d along = cloud.positions[j] - cloud.positions[i];
   const double length = along.length();
   if (length > 0) along /= length;
   const V3d from(cloud.normals[i]), to(cloud.normals[j]);
-  return static_cast<float>(from.dot(to - 2 * along.dot(to) * along));
+  const double steep = std::max(std::abs(along.dot(from)), std::abs(along.dot(to)));
+  return {static_cast<float>(from.dot(to - 2 * along.dot(to) * along)),
+          static_cast<float>(1 - std::pow(steep, 4))};
 }
 
 bool hasNormal(const PointCloud& cloud, std::uint32_t i) {
@@ -85,9 +95,9 @@ void lowerTo(std::uint64_t& value, std::uint64_t key) {
   }
 }
 
-/// Weight of an edge, 0 for parallel normals, as bits that sort like the number.
-std::uint32_t weightBits(float cosine) {
-  return std::bit_cast<std::uint32_t>(std::max(0.0f, 1 - std::abs(cosine)));
+/// Weight of an edge, 0 for parallel normals across it, as bits that sort like the number.
+std::uint32_t weightBits(const EdgeAgreement& edge) {
+  return std::bit_cast<std::uint32_t>(std::max(0.0f, 1 - edge.trust * std::abs(edge.cosine)));
 }
 
 /// Turns the normals along a minimum spanning tree of each connected part, by the method of
@@ -103,7 +113,7 @@ std::vector<std::uint32_t> alignNormals(PointCloud& cloud, const NeighbourGraph&
       for (std::size_t i = range.begin(); i < range.end(); ++i) work(static_cast<std::uint32_t>(i));
     });
   };
-  // Calls look(slot, other point, cosine) for the edges from a point to other sets.
+  // Calls look(other point, agreement) for the edges from a point to other sets.
   const auto forEachEdge = [&](std::uint32_t i, const auto& look) {
     if (!hasNormal(cloud, i)) return;
     const std::uint32_t* edges = graph.edges(i);
@@ -111,15 +121,15 @@ std::vector<std::uint32_t> alignNormals(PointCloud& cloud, const NeighbourGraph&
       const std::uint32_t j = edges[slot];
       if (j == NeighbourGraph::kNone || !hasNormal(cloud, j)) continue;
       if (sets.parent(i) == sets.parent(j)) continue;
-      look(j, edgeCosine(cloud, i, j));
+      look(j, agreement(cloud, i, j));
     }
   };
   for (int round = 0;; ++round) {
     report(progress, 1 - 1.0 / (1 + round));
     std::fill(best.begin(), best.end(), kNoEdge);
     forEachPoint([&](std::uint32_t i) {
-      forEachEdge(i, [&](std::uint32_t j, float cosine) {
-        const std::uint64_t key = std::uint64_t{weightBits(cosine)} << 32 | i;
+      forEachEdge(i, [&](std::uint32_t j, const EdgeAgreement& edge) {
+        const std::uint64_t key = std::uint64_t{weightBits(edge)} << 32 | i;
         lowerTo(best[sets.parent(i)], key);
         lowerTo(best[sets.parent(j)], key);
       });
@@ -135,11 +145,11 @@ std::vector<std::uint32_t> alignNormals(PointCloud& cloud, const NeighbourGraph&
       const auto i = static_cast<std::uint32_t>(best[root] & 0xffffffffu);
       const auto bits = static_cast<std::uint32_t>(best[root] >> 32);
       bool isFound = false;
-      forEachEdge(i, [&](std::uint32_t j, float cosine) {
-        if (isFound || weightBits(cosine) != bits) return;
+      forEachEdge(i, [&](std::uint32_t j, const EdgeAgreement& edge) {
+        if (isFound || weightBits(edge) != bits) return;
         if (sets.parent(i) != root && sets.parent(j) != root) return;
         isFound = true;
-        joins.push_back({i, j, cosine < 0});
+        joins.push_back({i, j, edge.cosine < 0});
       });
     }
     if (joins.empty()) break;

@@ -271,4 +271,20 @@ TEST(PointNormals, BitsDoNotDependOnThreads) {
   EXPECT_EQ(one.report.doubtful, seven.report.doubtful);
 }
 
+TEST(PointNormals, HaveTheRightSideInNoise) {
+  // Noise of half a spacing: many neighbours lie above or below each other.
+  const PointCloud truth = torusCloud(8000);
+  PointCloud noisy = truth;
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0, 0.02);
+  for (V3d& p : noisy.positions) p += V3d(noise(random), noise(random), noise(random));
+  for (const int neighbours : {20, 60}) {
+    const NormalsResult result = normalsOf(noisy, {.neighbours = neighbours});
+    std::size_t wrong = 0;
+    for (std::size_t i = 0; i < truth.size(); ++i)
+      if (truth.normals[i].dot(result.cloud.normals[i]) < 0) ++wrong;
+    EXPECT_LE(wrong, 8) << neighbours;
+  }
+}
+
 }  // namespace normals_test
