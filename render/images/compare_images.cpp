@@ -25,7 +25,7 @@ constexpr std::size_t kShown = 5;
 constexpr double kOutlineShare = 1e-5;
 // Largest relative difference of Z between two pictures of the same surface point.
 constexpr double kOneSurface = 1e-3;
-enum : char { kMissed, kHit, kBroken };
+constexpr char kMissed = 0, kHit = 1, kBroken = 2;
 
 using Difference = std::function<double(std::size_t)>;
 
@@ -68,7 +68,8 @@ class Comparer {
     compareCoverage();
     const std::vector<Layer> all = layers();
     for (const auto& [name, tolerance] : options_.tolerances)
-      if (std::none_of(all.begin(), all.end(), [&](const Layer& l) { return l.name == name; }))
+      if (std::none_of(all.begin(), all.end(),
+                       [&name = name](const Layer& l) { return l.name == name; }))
         throw levelset::UsageError(
             fmt::format("the pictures have no common layer '{}'; their common layers are {}", name,
                         namesOf(all)));

@@ -110,38 +110,63 @@ Bounds cleanPointBounds() {
       .measured("cube, meshless", "surface_l1_vx", {{16, 0.0854}, {32, 0.0535}, {64, 0.0269}})
       .measured("cube, meshless", "surface_linf_vx",
                 {{16, 1.15}, {32, 0.948, Budget::Quick}, {32, 1.42, Budget::Full}, {64, 1.12}})
+      .measured("cube, meshless", "missed_hits", {{16, 0.0701}, {32, 0.0367}, {64, 0.0172}})
       .measured("cube, mls", "surface_l1_vx", {{16, 0.0961}, {32, 0.0587}, {64, 0.0282}})
       .measured("cube, mls", "surface_linf_vx", {{16, 0.599}, {32, 0.639}, {64, 0.881}})
+      .measured("cube, mls", "missed_hits", {{16, 0.0976}, {32, 0.0471}, {64, 0.0246}})
       .measured("sphere, meshless", "surface_l1_vx", {{16, 0.0266}, {32, 0.0125}, {64, 0.00635}})
       .measured("sphere, meshless", "surface_linf_vx", {{16, 0.156}, {32, 0.0888}, {64, 0.0465}})
+      .measured("sphere, meshless", "missed_hits",
+                {{16, 0.0115},
+                 {32, 0.000684, Budget::Quick},
+                 {32, 0.00275, Budget::Full},
+                 {64, 0.000669}})
       .measured("sphere, mls", "surface_l1_vx", {{16, 0.0108}, {32, 0.00122}, {64, 0.000149}})
       .measured("sphere, mls", "surface_linf_vx", {{16, 0.0215}, {32, 0.00274}, {64, 0.000373}})
+      .measured("sphere, mls", "missed_hits",
+                {{16, 0.00209}, {32, 0.000684, Budget::Quick}, {32, 0.000344, Budget::Full}})
       .measured("torus, meshless", "surface_l1_vx", {{16, 0.0435}, {32, 0.02}, {64, 0.00985}})
       .measured("torus, meshless", "surface_linf_vx", {{16, 0.373}, {32, 0.173}, {64, 0.0933}})
+      .measured(
+          "torus, meshless", "missed_hits",
+          {{16, 0.0268}, {32, 0.0105, Budget::Quick}, {32, 0.00667, Budget::Full}, {64, 0.00154}})
       .measured("torus, mls", "surface_l1_vx", {{16, 0.0717}, {32, 0.0095}, {64, 0.00111}})
-      .measured("torus, mls", "surface_linf_vx", {{16, 0.211}, {32, 0.0294}, {64, 0.00409}});
+      .measured("torus, mls", "surface_linf_vx", {{16, 0.211}, {32, 0.0294}, {64, 0.00409}})
+      .measured("torus, mls", "missed_hits",
+                {{16, 0.0361}, {32, 0.00574, Budget::Quick}, {32, 0.00333, Budget::Full}});
 }
 
 Bounds noisyPointBounds() {
   return Bounds()
       .measured("cube, meshless", "surface_l1_vx", {{24, 0.251}, {32, 0.224}})
       .measured("cube, meshless", "surface_linf_vx", {{24, 2.07}, {32, 1.11}})
+      .measured("cube, meshless", "missed_hits", {{24, 0.0893}, {32, 0.0787}})
       .measured("cube, mls", "surface_l1_vx", {{24, 0.254}, {32, 0.217}})
       .measured("cube, mls", "surface_linf_vx", {{24, 1.18}, {32, 1.14}})
+      .measured("cube, mls", "missed_hits", {{24, 0.11}, {32, 0.0922}})
       .measured("sphere, meshless", "surface_l1_vx", {{24, 0.166}, {32, 0.172}})
       .measured("sphere, meshless", "surface_linf_vx", {{24, 0.946}, {32, 0.8}})
+      .measured("sphere, meshless", "missed_hits", {{24, 0.0442}, {32, 0.0271}})
       .measured("sphere, mls", "surface_l1_vx", {{24, 0.103}, {32, 0.109}})
       .measured("sphere, mls", "surface_linf_vx", {{24, 0.422}, {32, 0.465}})
+      .measured("sphere, mls", "missed_hits", {{24, 0.0354}, {32, 0.0165}})
       .measured("torus, meshless", "surface_l1_vx", {{24, 0.197}, {32, 0.187}})
       .measured("torus, meshless", "surface_linf_vx", {{24, 0.842}, {32, 0.903}})
+      .measured("torus, meshless", "missed_hits", {{24, 0.06}, {32, 0.0441}})
       .measured("torus, mls", "surface_l1_vx", {{24, 0.156}, {32, 0.145}})
-      .measured("torus, mls", "surface_linf_vx", {{24, 0.602}, {32, 0.641}});
+      .measured("torus, mls", "surface_linf_vx", {{24, 0.602}, {32, 0.641}})
+      .measured("torus, mls", "missed_hits", {{24, 0.0382}, {32, 0.0329}});
 }
 
 Bounds particleBounds() {
   return Bounds()
       .measured("two balls", "surface_l1_vx", {{16, 0.00893}, {32, 0.00401}, {64, 0.00221}})
-      .measured("two balls", "surface_linf_vx", {{16, 0.242}, {32, 0.262}, {64, 0.279}});
+      .measured("two balls", "surface_linf_vx", {{16, 0.242}, {32, 0.262}, {64, 0.279}})
+      .measured("two balls", "missed_hits",
+                {{16, 0.00817},
+                 {32, 0.00935, Budget::Quick},
+                 {32, 0.00615, Budget::Full},
+                 {64, 0.00122}});
 }
 
 }  // namespace

@@ -153,7 +153,7 @@ class CellFitter {
           extremes = {i, j};
         }
     if (least >= kEdgeCosine) return false;
-    const V3d first = normal(extremes[0]), second = normal(extremes[1]);
+    const V3d &first = normal(extremes[0]), &second = normal(extremes[1]);
     const V3d across = first.cross(second).normalized();
     std::vector<int> side(found.size());
     std::array<std::size_t, 3> sizes{};

@@ -195,7 +195,7 @@ class OverlapTree {
   /// Upper bound of the depth: at most 2³² items, of which three quarters go to one child.
   static constexpr std::size_t kMaxDepth = 96;
 
-  enum : std::uint32_t { kLeaf = 3, kSameLeaf = 4 };
+  static constexpr std::uint32_t kLeaf = 3, kSameLeaf = 4;
 
   struct Node {
     Bounds bounds;
