@@ -19,7 +19,8 @@ std::string mismatch(const Operator& op, std::size_t index, Kind found,
   const char* remedy = "";
   if (found == Kind::Mesh && allowed == std::vector{Kind::Band})
     remedy = "; put 'level-set' before it";
-  if (found == Kind::Band && allowed == std::vector{Kind::Mesh}) remedy = "; put 'mesh' before it";
+  if (found == Kind::Band && !allowed.empty() && allowed[0] == Kind::Mesh)
+    remedy = "; put 'mesh' before it";
   if (found == Kind::Surface)
     remedy = "; it has no inside, so only patches and 'texture --alone' can use it";
   if (found == Kind::Patch) remedy = "; 'texture' builds a level set from it";
