@@ -17,9 +17,9 @@ namespace {
 
 using Imath::V3d;
 
-// Numbers of cells. Those of the usual grid count from the lowest point and have 32 bits.
+// Number of a cell in the usual grid, from the lowest point on.
 using NearCell = std::uint32_t;
-// Those of a grid with far points count from the origin. They are whole numbers.
+// Number of a cell in a grid with far points, from the origin on. It is a whole number.
 using FarCell = double;
 
 constexpr double kMostNearCells = 4e9;

@@ -275,14 +275,19 @@ TEST(Thin, SurvivesAnyPoints) {
 
 TEST(Thin, RefusesUnusableOptions) {
   const PointCloud cloud = cloudOf(randomPoints(10));
-  (void)refusal<UsageError>([&] { (void)thin(cloud, {}); });
-  (void)refusal<UsageError>([&] { (void)thin(cloud, {.radius = 1, .count = 1}); });
-  (void)refusal<UsageError>([&] { (void)thin(cloud, {.radius = 0}); });
-  (void)refusal<UsageError>([&] { (void)thin(cloud, {.radius = NAN}); });
-  (void)refusal<UsageError>([&] { (void)thin(cloud, {.count = 0}); });
-  (void)refusal<InvalidInput>([&] { (void)thin(PointCloud(), {.radius = 1}); });
-  (void)refusal<levelset::ResourceLimit>(
-      [&] { (void)thin(cloud, {.radius = 1, .maxMemory = 100}); });
+  const auto refused = [&](const levelset::ThinOptions& options) {
+    return refusal<UsageError>([&] { (void)thin(cloud, options); });
+  };
+  EXPECT_SAYS(refused({}), "either a radius or a count");
+  EXPECT_SAYS(refused({.radius = 1, .count = 1}), "either a radius or a count");
+  EXPECT_SAYS(refused({.radius = 0}), "the radius is not a positive number");
+  EXPECT_SAYS(refused({.radius = NAN}), "the radius is not a positive number");
+  EXPECT_SAYS(refused({.count = 0}), "the count is 0");
+  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)thin(PointCloud(), {.radius = 1}); }),
+              "has no points");
+  EXPECT_SAYS(
+      refusal<levelset::ResourceLimit>([&] { (void)thin(cloud, {.radius = 1, .maxMemory = 100}); }),
+      "memory");
 }
 
 // === Outliers
@@ -461,14 +466,18 @@ TEST(SampleMesh, PositionsThatCollapseAreAllUsed) {
 
 TEST(SampleMesh, RefusesUnusableInput) {
   const levelset::TriMesh box = support::boxMesh(V3d(0), V3d(1));
-  (void)refusal<UsageError>([&] { (void)sampleMesh(box, {}); });
-  (void)refusal<UsageError>([&] { (void)sampleMesh(box, {.count = 0}); });
-  (void)refusal<UsageError>([&] { (void)sampleMesh(box, {.spacing = -1}); });
-  (void)refusal<UsageError>([&] { (void)sampleMesh(box, {.count = 1, .noise = -1}); });
-  (void)refusal<levelset::ResourceLimit>([&] { (void)sampleMesh(box, {.spacing = 1e-9}); });
+  const auto refused = [&](const levelset::SampleOptions& options) {
+    return refusal<UsageError>([&] { (void)sampleMesh(box, options); });
+  };
+  EXPECT_SAYS(refused({}), "either a count or a spacing");
+  EXPECT_SAYS(refused({.count = 0}), "the count is 0");
+  EXPECT_SAYS(refused({.spacing = -1}), "the spacing is not a positive number");
+  EXPECT_SAYS(refused({.count = 1, .noise = -1}), "the noise is negative");
+  EXPECT_SAYS(refusal<levelset::ResourceLimit>([&] { (void)sampleMesh(box, {.spacing = 1e-9}); }),
+              "give a smaller count or");
   levelset::TriMesh flat = box;
   for (V3d& p : flat.positions) p = V3d(p.x, 0, 0);
-  (void)refusal<InvalidInput>([&] { (void)sampleMesh(flat, {.count = 1}); });
+  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)sampleMesh(flat, {.count = 1}); }), "has no area");
 }
 
 TEST(PointProcessing, BitsDoNotDependOnThreads) {
