@@ -5,9 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <memory>
-#include <mutex>
 
 #include "levelset/memory_limit.h"
 #include "levelset/points/field/local_quadric.h"

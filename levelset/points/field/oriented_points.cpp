@@ -11,6 +11,7 @@
 
 #include "levelset/error.h"
 #include "levelset/memory_limit.h"
+#include "levelset/points/processing/point_neighbours.h"
 
 namespace levelset::points {
 namespace {
@@ -60,44 +61,30 @@ void requireSpread(const OrientedPoints& points) {
 
 OrientedPoints orient(const PointCloud& cloud, std::size_t maxMemory) {
   requireNormals(cloud);
-  constexpr double kPointBytes =
-      260;  // while the second tree is built; the winding number needs less
-  requireMemory(kPointBytes * static_cast<double>(cloud.size()),
-                memoryLeft(memoryLimit(maxMemory)));
+  constexpr double kPointBytes = 80;  // positions, normals, sums, spacings and numbers
+  requireMemory(
+      kPointBytes * static_cast<double>(cloud.size()) + PointNeighbours::bytesFor(cloud.size()),
+      memoryLeft(memoryLimit(maxMemory)));
   OrientedPoints points;
   points.centre = bounds(cloud).center();
   std::vector<V3d> relative;
   relative.reserve(cloud.size());
   for (const V3d& p : cloud.positions) relative.push_back(p - points.centre);
 
-  // One point for each position: the one of lowest number among equal ones.
-  std::vector<V3d> sums(cloud.size(), V3d(0)), kept;
-  std::vector<std::uint32_t> numbers;
-  {
-    const PointSearch all = makePointSearch(relative);
-    std::vector<std::uint32_t> first(cloud.size());
-    tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t n) {
-      const PointItem& item = all.items()[n];
-      first[item.index] = all.closest(item.position, std::numeric_limits<double>::infinity()).index;
-    });
-    for (std::size_t i = 0; i < cloud.size(); ++i) {
-      sums[first[i]] += V3d(cloud.normals[i]).normalized();
-      if (first[i] != i) continue;
-      kept.push_back(relative[i]);
-      numbers.push_back(static_cast<std::uint32_t>(i));
-    }
-  }
-  points.search = makePointSearch(kept);
-  for (const PointItem& item : points.search.items()) {
-    const std::uint32_t number = numbers[item.index];
+  PointNeighbours different(relative);
+  std::vector<V3d> sums(cloud.size(), V3d(0));
+  for (std::size_t i = 0; i < cloud.size(); ++i)
+    sums[different.first(static_cast<std::uint32_t>(i))] += V3d(cloud.normals[i]).normalized();
+  for (std::size_t n = 0; n < different.size(); ++n) {
+    const std::uint32_t number = different.at(n);
     // Opposite normals cancel out: the first one counts.
     constexpr double kCancelled = 1e-6;
     const V3d sum = sums[number].length() > kCancelled ? sums[number] : V3d(cloud.normals[number]);
-    points.positions.push_back(item.position);
+    points.positions.push_back(different.positionAt(n));
     points.normals.push_back(sum.normalized());
-    points.box.extendBy(item.position);
+    points.box.extendBy(different.positionAt(n));
   }
-  points.search.renumber();
+  points.search = std::move(different).takeSearch();
   requireSpread(points);
 
   points.spacings.resize(points.size());

@@ -6,12 +6,12 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <numbers>
+#include <memory>
 
 #include "levelset/distance/distance_transform.h"
 #include "levelset/error.h"
 #include "levelset/points/field/sample_field.h"
+#include "levelset/points/processing/point_neighbours.h"
 #include "levelset/points/processing/point_spacing.h"
 
 namespace levelset {
@@ -52,27 +52,18 @@ Particles prepare(const PointCloud& cloud, const ParticleOptions& options) {
   std::vector<V3d> all;
   all.reserve(cloud.size());
   for (const V3d& p : cloud.positions) all.push_back(p - particles.centre);
-  std::vector<std::uint32_t> first(cloud.size());
-  {
-    const PointSearch search = points::makePointSearch(all);
-    tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
-      first[i] = search.closest(all[i], std::numeric_limits<double>::infinity()).index;
-    });
-  }
-  std::vector<std::uint32_t> number(cloud.size());
+  points::PointNeighbours different(all);
+  std::vector<double> radii(cloud.size(), 0);
   for (std::size_t i = 0; i < all.size(); ++i) {
-    const double radius = common > 0 ? common : double{cloud.radii[i]};
-    if (first[i] == i) {
-      number[i] = static_cast<std::uint32_t>(particles.positions.size());
-      particles.positions.push_back(all[i]);
-      particles.radii.push_back(radius);
-    } else {
-      double& kept = particles.radii[number[first[i]]];
-      kept = std::max(kept, radius);
-    }
+    double& kept = radii[different.first(static_cast<std::uint32_t>(i))];
+    kept = std::max(kept, common > 0 ? common : double{cloud.radii[i]});
+  }
+  for (std::size_t n = 0; n < different.size(); ++n) {
+    particles.positions.push_back(different.positionAt(n));
+    particles.radii.push_back(radii[different.at(n)]);
   }
   particles.largest = *std::max_element(particles.radii.begin(), particles.radii.end());
-  particles.search = points::makePointSearch(particles.positions);
+  particles.search = std::move(different).takeSearch();
   return particles;
 }
 

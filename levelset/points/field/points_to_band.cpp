@@ -11,7 +11,6 @@
 #include "levelset/distance/distance_transform.h"
 #include "levelset/error.h"
 #include "levelset/fields/grid_vdb.h"
-#include "levelset/grids/sample.h"
 #include "levelset/points/field/meshless.h"
 #include "levelset/points/field/multilevel_partition.h"
 #include "levelset/points/field/oriented_points.h"
@@ -35,9 +34,6 @@ void checkOptions(const OrientedPoints& points, double voxelSize,
   if (!std::isfinite(options.halfWidth) || options.halfWidth < 1)
     throw UsageError(
         fmt::format("the half width is {} voxels; give at least 1", options.halfWidth));
-  if (!(options.supportRadius > 0) || !std::isfinite(options.supportRadius))
-    throw UsageError(fmt::format("the support radius is {} spacings; give a positive number",
-                                 options.supportRadius));
   if (!(options.tolerance > 0) || !std::isfinite(options.tolerance))
     throw UsageError(
         fmt::format("the tolerance is {} spacings; give a positive number", options.tolerance));
@@ -90,7 +86,7 @@ double gapAt(const OrientedPoints& points, const V3d& at, const V3d& normal,
 
 /// Computes the distances from the surface to the cloud, at the grid points beside the surface.
 LeafSupport supportOf(const openvdb::FloatGrid& band, const OrientedPoints& points,
-                      double supportRadius, SupportLeaf& leaf) {
+                      SupportLeaf& leaf) {
   LeafSupport support;
   const double voxel = band.voxelSize()[0];
   auto read = band.getConstAccessor();
@@ -112,7 +108,7 @@ LeafSupport supportOf(const openvdb::FloatGrid& band, const OrientedPoints& poin
     // The integral of a hat function of the distance is the area.
     const double area = voxel * voxel * (1 - std::abs(phi) / voxel);
     support.area += area;
-    if (gap > supportRadius) support.unsupportedArea += area;
+    if (gap > kSupportRadius) support.unsupportedArea += area;
     support.largestGap = std::max(support.largestGap, gap);
   }
   return support;
@@ -120,7 +116,7 @@ LeafSupport supportOf(const openvdb::FloatGrid& band, const OrientedPoints& poin
 
 /// Distances from the surface to the cloud. Adds their figures to the certificate.
 FieldGrid supportField(const openvdb::FloatGrid& band, const OrientedPoints& points,
-                       double supportRadius, SupportCertificate& certificate) {
+                       SupportCertificate& certificate) {
   auto grid = openvdb::FloatGrid::create(0);
   grid->setTransform(band.transform().copy());
   grid->setName("support");
@@ -137,9 +133,8 @@ FieldGrid supportField(const openvdb::FloatGrid& band, const OrientedPoints& poi
   std::vector<SupportLeaf*> leaves;
   grid->tree().getNodes(leaves);
   std::vector<LeafSupport> supports(leaves.size());
-  tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
-    supports[i] = supportOf(band, points, supportRadius, *leaves[i]);
-  });
+  tbb::parallel_for(std::size_t{0}, leaves.size(),
+                    [&](std::size_t i) { supports[i] = supportOf(band, points, *leaves[i]); });
   for (const LeafSupport& s : supports) {
     certificate.area += s.area;
     certificate.unsupportedArea += s.unsupportedArea;
@@ -225,7 +220,7 @@ PointsToBandResult pointsToBand(const PointCloud& cloud, double voxelSize,
                                  .medianSpacing = points.medianSpacing,
                                  .droppedParts = droppedParts,
                                  .opposedShare = opposedShare};
-  FieldGrid support = supportField(vdb(band), points, options.supportRadius, certificate);
+  FieldGrid support = supportField(vdb(band), points, certificate);
   addResiduals(band, points, certificate);
   if (options.onCertificate) options.onCertificate(certificate);
   if (certificate.unsupportedShare() > kUnsupportedLimit && !options.acceptUnsupported)

@@ -30,7 +30,7 @@ enum class PointMethod {
 
 /// Support certificate: where points determine the surface, and where it is a guess across a hole.
 /// A place on the surface is supported when its distance to the closest point of the cloud is at
-/// most `PointsToBandOptions::supportRadius` times the spacing about that point. Points whose
+/// most kSupportRadius times the spacing about that point. Points whose
 /// normal opposes that of the surface do not count.
 struct SupportCertificate {
   std::size_t points = 0;      ///< number of different positions
@@ -54,6 +54,9 @@ struct SupportCertificate {
 /// Returns a summary of the certificate in one line of text.
 [[nodiscard]] std::string describe(const SupportCertificate& certificate);
 
+/// Largest distance of a supported place from the cloud, in spacings.
+inline constexpr double kSupportRadius = 2;
+
 /// Limit of SupportCertificate::unsupportedShare(). Above it pointsToBand() refuses the cloud,
 /// unless the option acceptUnsupported is set.
 inline constexpr double kUnsupportedLimit = 0.01;
@@ -70,8 +73,6 @@ struct PointsToBandOptions {
   /// positive.
   double tolerance = 0.02;
   double halfWidth = 3;  ///< half width of the band, voxels, at least 1
-  /// Largest distance of a supported place from the cloud, in spacings.
-  double supportRadius = 2;
   /// Accept a surface of which a large part is a guess, and normals that oppose each other.
   bool acceptUnsupported = false;
   std::size_t maxMemory = kNoMemoryLimit;

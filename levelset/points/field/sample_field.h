@@ -16,6 +16,7 @@ struct FieldMemory {
   std::vector<Found> found = {};
   Imath::V3d at = Imath::V3d(0);  ///< position of the last winding number
   double winding = 0.5;
+  bool isNear = false;  ///< the last position was near the points
 };
 
 /// Field to sample, at positions relative to a centre. Several threads may call it at once.

@@ -43,21 +43,25 @@ double SignedField::far(const V3d& at, double closest, FieldMemory& memory) cons
 
 double SignedField::value(const V3d& at, FieldMemory& memory) const {
   std::vector<Found>& found = memory.found;
-  const Found first = points_.search.closest(at, std::numeric_limits<double>::infinity());
-  const double closest = std::sqrt(first.squared);
-  // Neighbouring points have similar spacings.
-  if (closest > 2 * kFarStart * reach_ * points_.spacings[first.index])
-    return far(at, closest, memory);
+  if (!memory.isNear) {
+    // Far from the points, the closest one suffices. Neighbouring points have similar spacings.
+    const Found first = points_.search.closest(at, std::numeric_limits<double>::infinity());
+    const double distance = std::sqrt(first.squared);
+    if (distance > 2 * kFarStart * reach_ * points_.spacings[first.index])
+      return far(at, distance, memory);
+  }
   points_.search.closest(at, near_.neighbours, found);
+  const double closest = std::sqrt(found.front().squared);
   double spacing = 0, weights = 0;
   for (const Found& f : found) {
     const double weight = pointWeight(f.squared / found.back().squared);
     weights += weight;
     spacing += weight * points_.spacings[f.index];
   }
-  spacing = weights > 0 ? spacing / weights : points_.spacings[first.index];
+  spacing = weights > 0 ? spacing / weights : points_.spacings[found.front().index];
   const double share =
       smoothStep((closest / (reach_ * spacing) - kNearEnd) / (kFarStart - kNearEnd));
+  memory.isNear = share < 1;
   if (share == 0) return near_.value(at, found);
   if (share == 1) return far(at, closest, memory);
   return (1 - share) * near_.value(at, found) + share * far(at, closest, memory);

@@ -52,6 +52,13 @@ class PointNeighbours {
   /// Finds all points nearer to `from` than `radius`, sorted by number.
   void within(const Imath::V3d& from, double radius, std::vector<Neighbour>& found) const;
 
+  /// Takes the tree out of a list that is not used any more. Its items have the numbers of their
+  /// order in the tree.
+  [[nodiscard]] PointSearch takeSearch() && {
+    tree_.renumber();
+    return std::move(tree_);
+  }
+
   /// Estimated memory of the tree while it is built, bytes.
   [[nodiscard]] static double bytesFor(std::size_t points);
 

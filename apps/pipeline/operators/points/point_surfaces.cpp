@@ -71,6 +71,7 @@ Value surfaceOfPoints(Invocation& in) {
   const PointsToBandOptions options{
       .method = methodOf(in),
       .neighbours = in.given("neighbours") ? in.integerAs<std::size_t>("neighbours") : 0,
+      .tolerance = in.number("fit-error"),
       .halfWidth = in.number("half-width"),
       .acceptUnsupported = in.flag("accept-sign"),
       .maxMemory = in.maxMemory,
@@ -138,6 +139,13 @@ Operator conversionOperator() {
                            "number of points that determine the surface at a position, 6 to 1000; "
                            "default: 16 for mls, 15 for mpu, 12 for meshless",
                        .range = Range::Positive});
+  op.params.push_back({.name = "fit-error",
+                       .type = ParamType::Number,
+                       .doc =
+                           "with --method mpu: aimed distance of the points from the surface, in "
+                           "point spacings",
+                       .fallback = "0.02",
+                       .range = Range::Positive});
   op.params.push_back(
       {.name = "support",
        .type = ParamType::Path,
@@ -181,6 +189,8 @@ Operator conversionOperator() {
         if (in.given(name) && !isOfParticles(in))
           throw UsageError(
               fmt::format("level-set: --{} needs --method particles; leave it out", name));
+      if (in.given("fit-error") && in.text("method") != "mpu")
+        throw UsageError("level-set: --fit-error needs --method mpu; leave it out");
       for (const char* name : {"neighbours", "support"})
         if (in.given(name) && isOfParticles(in))
           throw UsageError(fmt::format(
@@ -189,7 +199,8 @@ Operator conversionOperator() {
         throw UsageError(fmt::format("level-set: --support writes .vdb files only, not '{}'",
                                      in.text("support")));
     } else if (!in.operands.empty()) {
-      refuseOptions(in, {"method", "neighbours", "support", "kernel", "radius", "reach"},
+      refuseOptions(in,
+                    {"method", "neighbours", "fit-error", "support", "kernel", "radius", "reach"},
                     "point clouds", "mesh");
     }
   };

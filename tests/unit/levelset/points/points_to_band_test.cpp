@@ -286,7 +286,6 @@ TEST(PointsToBand, RefusesOptionsOutOfRange) {
   EXPECT_SAYS(refused({.neighbours = 5}), "give 6 to 1000");
   EXPECT_SAYS(refused({.neighbours = 1001}), "give 6 to 1000");
   EXPECT_SAYS(refused({.halfWidth = 0.5}), "half width");
-  EXPECT_SAYS(refused({.supportRadius = 0}), "support radius");
   EXPECT_SAYS(refused({.tolerance = 0}), "tolerance");
   EXPECT_THROW((void)pointsToBand(cloud, 0.1, {.maxMemory = 1000}), levelset::ResourceLimit);
   EXPECT_THROW((void)pointsToBand(cloud, 0.1, {.progress = [](double f) { return f < 0.5; }}),
