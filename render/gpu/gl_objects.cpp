@@ -30,6 +30,12 @@ void releaseTexels(const GlContext& context, const Texels& texels) {
   context.gl().DeleteBuffers(1, &texels.buffer);
 }
 
+void GrowingBuffer::upload(const GlContext& context, std::span<const double> numbers) {
+  reserve(context, numbers.size_bytes());
+  context.gl().NamedBufferSubData(name_, 0, static_cast<GLsizeiptr>(numbers.size_bytes()),
+                                  numbers.data());
+}
+
 void GrowingBuffer::reserve(const GlContext& context, std::size_t bytes) {
   if (bytes <= capacity_) return;
   std::size_t wanted = std::max(bytes, capacity_ + capacity_ / 2);

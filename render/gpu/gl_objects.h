@@ -3,6 +3,7 @@
 // Private to the GPU renderer: tables and programs in an OpenGL context.
 
 #include <cstddef>
+#include <span>
 #include <string>
 
 #include "render/gpu/gl_context.h"
@@ -38,6 +39,9 @@ class GrowingBuffer {
   /// Makes room for `bytes`. The contents are lost if the buffer grows.
   /// @throws levelset::ResourceLimit when the memory of the device does not suffice
   void reserve(const GlContext& context, std::size_t bytes);
+  /// Makes room for numbers, and copies them into the buffer. @pre the buffer is for Use::Upload
+  /// @throws levelset::ResourceLimit as reserve()
+  void upload(const GlContext& context, std::span<const double> numbers);
   void release(const GlContext& context);
   [[nodiscard]] GLuint name() const { return name_; }
   /// Address of the contents. @pre the buffer is for Use::Fetch

@@ -149,13 +149,8 @@ void GpuFields::run(const FieldExpression& expression, const std::vector<double>
   const GlFunctions& gl = context_.gl();
   if (program_ == 0) program_ = compileCompute(context_, fieldShaderText(expression));
   gl.UseProgram(program_);
-  const auto fill = [&](GrowingBuffer& buffer, const std::vector<double>& data) {
-    const std::size_t bytes = data.size() * sizeof(double);
-    buffer.reserve(context_, bytes);
-    gl.NamedBufferSubData(buffer.name(), 0, static_cast<GLsizeiptr>(bytes), data.data());
-  };
-  fill(rays_, input);
-  fill(numbers_, numbers);
+  rays_.upload(context_, input);
+  numbers_.upload(context_, numbers);
   const std::size_t answerBytes = answers.size() * sizeof(double);
   found_.reserve(context_, answerBytes);
   fetched_.reserve(context_, answerBytes);

@@ -237,14 +237,9 @@ void GpuLight::run(const std::vector<double>& input, const std::vector<double>& 
   gl.UseProgram(program);
   const std::size_t rays = answers.size() / kLightAnswers;
   std::fill(answers.begin(), answers.end(), -1.0);  // not done
-  const auto fill = [&](GrowingBuffer& buffer, const std::vector<double>& data) {
-    const std::size_t bytes = data.size() * sizeof(double);
-    buffer.reserve(context_, bytes);
-    gl.NamedBufferSubData(buffer.name(), 0, static_cast<GLsizeiptr>(bytes), data.data());
-  };
-  fill(rays_, input);
-  fill(numbers_, numbers);
-  fill(found_, answers);
+  rays_.upload(context_, input);
+  numbers_.upload(context_, numbers);
+  found_.upload(context_, answers);
   const std::size_t answerBytes = answers.size() * sizeof(double);
   fetched_.reserve(context_, answerBytes);
   gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, kRaysOfLight, rays_.name());
@@ -252,22 +247,19 @@ void GpuLight::run(const std::vector<double>& input, const std::vector<double>& 
   gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, kLightConstants, numbers_.name());
   gl.BindTextureUnit(0, values_.texture);
   gl.BindTextureUnit(1, marks_.texture);
-  const auto set = [&](const char* name, std::size_t value) {
+  const auto set = [&](const char* name, auto value) {
     gl.Uniform1i(gl.GetUniformLocation(program, name), static_cast<GLint>(value));
   };
-  const auto setInt = [&](const char* name, int value) {
-    gl.Uniform1i(gl.GetUniformLocation(program, name), value);
-  };
-  setInt("pointsX", tables.volume.size().x);
-  setInt("pointsY", tables.volume.size().y);
-  setInt("pointsZ", tables.volume.size().z);
-  setInt("blocksY", tables.blocks.y);
-  setInt("blocksZ", tables.blocks.z);
-  setInt("groupsY", tables.groups.y);
-  setInt("groupsZ", tables.groups.z);
-  setInt("shaded", isShaded ? 1 : 0);
+  set("pointsX", tables.volume.size().x);
+  set("pointsY", tables.volume.size().y);
+  set("pointsZ", tables.volume.size().z);
+  set("blocksY", tables.blocks.y);
+  set("blocksZ", tables.blocks.z);
+  set("groupsY", tables.groups.y);
+  set("groupsZ", tables.groups.z);
+  set("shaded", isShaded ? 1 : 0);
   set("firstBlock", tables.groupHasExtinction.size());
-  set("pieceCount", static_cast<std::size_t>(tables.pieceCount));
+  set("pieceCount", tables.pieceCount);
   set("rayCount", rays);
   for (bool isDone = false; !isDone;) {
     for (std::size_t first = 0; first < rays; first += kLightRun) {
