@@ -5,6 +5,8 @@
 #include <cstring>
 #include <limits>
 
+#include "levelset/geometry/perpendicular.h"
+
 namespace levelset::convert {
 namespace {
 
@@ -34,12 +36,6 @@ Float4 load4(const float* values) {
   Float4 result;
   std::memcpy(&result, values, sizeof(result));
   return result;
-}
-
-/// A unit vector perpendicular to u.
-V3d anyPerpendicular(const V3d& u) {
-  const V3d axis = std::abs(u.x) < 0.6 ? V3d(1, 0, 0) : V3d(0, 1, 0);
-  return (axis - u * u.dot(axis)).normalized();
 }
 
 }  // namespace

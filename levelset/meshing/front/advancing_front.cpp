@@ -6,6 +6,7 @@
 #include <queue>
 #include <tuple>
 
+#include "levelset/geometry/perpendicular.h"
 #include "levelset/meshing/front/fill_holes.h"
 #include "levelset/meshing/front/front_edges.h"
 
@@ -40,13 +41,8 @@ constexpr double kOpenWedge = 2.6;
 // lengths.
 constexpr double kOtherSheet = 0.8;
 
-// Longest sides of a triangle, share of the longest edge length.
+// Longest side of a triangle, in the longest edge length.
 constexpr double kLongestFrontSide = 2;
-
-V3d anyPerpendicular(const V3d& n) {
-  const V3d axis = std::abs(n.x) < 0.6 ? V3d(1, 0, 0) : V3d(0, 1, 0);
-  return n.cross(axis).normalized();
-}
 
 /// Returns the counter-clockwise angle from one direction to another about a normal, in [0, 2π).
 double turn(const V3d& normal, const V3d& from, const V3d& to) {
@@ -159,7 +155,7 @@ bool AdvancingFront::begin(const V3d& start) {
   const auto first = surface_.project(start);
   if (!first) return false;
   const double length = surface_.edgeLength(first->point);
-  const V3d along = anyPerpendicular(first->normal);
+  const V3d along = tangents(first->normal)[1];
   const auto second = surface_.project(first->point + along * length);
   if (!second) return false;
   const V3d across = first->normal.cross(along);

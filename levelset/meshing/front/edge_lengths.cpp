@@ -3,10 +3,12 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <queue>
 #include <utility>
 
+#include "levelset/geometry/perpendicular.h"
 #include "levelset/grids/sample.h"
 
 namespace levelset {
@@ -19,16 +21,14 @@ using Imath::V3d;
 double largestCurvature(const BandSampler& field, const V3d& at, double voxel) {
   const V3d normal = field.gradient(at).normalized();
   if (!(normal.length2() > 0.5)) return 0;
-  const V3d axis = std::abs(normal.x) < 0.6 ? V3d(1, 0, 0) : V3d(0, 1, 0);
-  const V3d tangents[] = {normal.cross(axis).normalized(),
-                          normal.cross(normal.cross(axis).normalized())};
+  const std::array<V3d, 2> along = tangents(normal);
   double shape[2][2];
   for (int i = 0; i < 2; ++i) {
-    const V3d step = tangents[i] * voxel;
+    const V3d step = along[i] * voxel;
     const V3d change =
         (field.gradient(at + step).normalized() - field.gradient(at - step).normalized()) /
         (2 * voxel);
-    for (int j = 0; j < 2; ++j) shape[i][j] = change.dot(tangents[j]);
+    for (int j = 0; j < 2; ++j) shape[i][j] = change.dot(along[j]);
   }
   const double mean = (shape[0][0] + shape[1][1]) / 2, half = (shape[0][0] - shape[1][1]) / 2,
                twist = (shape[0][1] + shape[1][0]) / 2;

@@ -1,6 +1,9 @@
 #include "levelset/points/field/local_quadric.h"
 
 #include <Eigen/Cholesky>
+#include <cmath>
+
+#include "levelset/geometry/perpendicular.h"
 
 namespace levelset::points {
 namespace {

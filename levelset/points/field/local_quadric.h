@@ -5,17 +5,8 @@
 #include <Imath/ImathVec.h>
 
 #include <Eigen/Core>
-#include <array>
-#include <cmath>
 
 namespace levelset::points {
-
-/// Two unit vectors that are perpendicular to a unit normal and to each other.
-[[nodiscard]] inline std::array<Imath::V3d, 2> tangents(const Imath::V3d& normal) {
-  const Imath::V3d axis = std::abs(normal.x) < 0.6 ? Imath::V3d(1, 0, 0) : Imath::V3d(0, 1, 0);
-  const Imath::V3d u = axis.cross(normal).normalized();
-  return {u, normal.cross(u)};
-}
 
 /// Quadratic height function over a plane.
 struct LocalQuadric {

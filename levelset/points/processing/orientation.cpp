@@ -11,6 +11,7 @@
 #include <limits>
 #include <numeric>
 
+#include "levelset/geometry/perpendicular.h"
 #include "levelset/mesh_sign/winding.h"
 
 namespace levelset::points {
@@ -182,9 +183,7 @@ void addDisks(const PointCloud& cloud, const NeighbourGraph& graph, const Part& 
     const V3d centre = cloud.positions[i], normal(cloud.normals[i]);
     const double area = graph.area(i) * static_cast<double>(std::min(stride, part.size() - k));
     if (!(area > 0)) continue;
-    V3d u = std::abs(normal.x) < 0.6 ? V3d(1, 0, 0) : V3d(0, 1, 0);
-    u = (u - normal * normal.dot(u)).normalized();
-    const V3d v = normal.cross(u);
+    const auto [u, v] = tangents(normal);
     // Circumradius of an equilateral triangle of this area.
     const double radius = std::sqrt(4 * area / (3 * std::sqrt(3.0)));
     convert::WeightedTriangle disk;
