@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include "levelset/rbf/rbf_taylor.h"
 #include "mapping/distortion/distortion.h"
 #include "mapping/distortion/fold_certificate.h"
 #include "mapping/distortion/fold_tally.h"
@@ -13,7 +14,6 @@
 #include "mapping/maps/dual_basis.h"
 #include "mapping/maps/layer_map.h"
 #include "mapping/rbf/rbf_map.h"
-#include "mapping/rbf/rbf_taylor.h"
 #include "mapping/untangle/prism_cells.h"
 
 namespace mapping {
@@ -22,6 +22,10 @@ namespace {
 using Imath::Box3d;
 using Imath::M33d;
 using Imath::V3d;
+using levelset::rbf::RbfCube;
+using levelset::rbf::RbfCubes;
+using levelset::rbf::RbfParticle;
+using levelset::rbf::TaylorPolynomial;
 
 // Largest error of the far particles' contribution to the map's slopes: kProofTolerance for a
 // certificate, kSlopeTolerance for samples. A map that preserves lengths has slopes of 1.
@@ -339,14 +343,14 @@ FoldCertificate certifyRbf(const RbfMap& map, const Patch& patch, double embedDe
     return nothing;
   }
   const V3d sizes = meanExtents(patch);
-  const RbfCubes cubes(map, sizes, kProofTolerance);
+  const RbfCubes cubes(map.function(), sizes, kProofTolerance);
   const Lattice lattice(patch, {.embedDepth = embedDepth, .rim = 0});
   const CellTree tree(lattice);
   const ProofScene scene{
       map,
       cubes,
       tree,
-      map.origin(),
+      map.function().origin(),
       sizes,
       {V3d(0, 0, -std::max(0.0, embedDepth)), V3d(1, 1, 1 + std::max(0.0, -embedDepth))},
       patch.mirrored ? -1.0 : 1.0,
@@ -376,15 +380,15 @@ FoldCertificate certifyRbf(const RbfMap& map, const Patch& patch, double embedDe
 void evaluateRbf(const RbfMap& map, const Patch& patch, std::vector<MapSample>& samples) {
   if (samples.empty()) return;
   const V3d sizes = meanExtents(patch);
-  const RbfCubes cubes(map, sizes, kSlopeTolerance);
+  const RbfCubes cubes(map.function(), sizes, kSlopeTolerance);
   Box3d box;
   for (const MapSample& sample : samples) box.extendBy(sample.position);
   const V3d sides = box.size();
   std::vector<std::uint32_t> all(samples.size());
   for (std::size_t n = 0; n < all.size(); ++n) all[n] = static_cast<std::uint32_t>(n);
-  const RbfCube root = cubes.root(box.center() - map.origin(),
+  const RbfCube root = cubes.root(box.center() - map.function().origin(),
                                   0.5 * std::max({sides.x, sides.y, sides.z}) * (1 + 1e-9));
-  fillWithin(cubes, map.origin(), sizes, root, std::move(all), samples);
+  fillWithin(cubes, map.function().origin(), sizes, root, std::move(all), samples);
 }
 
 std::vector<MapSample> sampleRbf(const RbfMap& map, const Patch& patch, double embedDepth) {

@@ -5,13 +5,20 @@
 #include <cmath>
 #include <numeric>
 
-#include "mapping/fast_sums/chebyshev.h"
-#include "mapping/fast_sums/rbf_sum.h"
+#include "levelset/rbf/sums/chebyshev.h"
+#include "levelset/rbf/sums/rbf_sum.h"
 
 namespace mapping {
 
 using Imath::M33d;
 using Imath::V3d;
+using levelset::rbf::chebyshevNodes;
+using levelset::rbf::interpolation;
+using levelset::rbf::NodeWeights;
+using levelset::rbf::RbfFunction;
+using levelset::rbf::RbfParticle;
+using levelset::rbf::RbfPoints;
+using levelset::rbf::transformCube;
 
 namespace {
 
@@ -93,8 +100,10 @@ GridBlock scaled(const GridBlock& block, const V3d& origin, double unit) {
 
 }  // namespace
 
-RbfBlock::RbfBlock(const RbfMap& map, const GridBlock& block, double tolerance)
-    : map_(map), block_(scaled(block, map.origin_, map.unit_)), tolerance_(tolerance) {
+RbfBlock::RbfBlock(const RbfFunction& function, const GridBlock& block, double tolerance)
+    : function_(function),
+      block_(scaled(block, function.origin(), function.unit())),
+      tolerance_(tolerance) {
   const double half = 0.5 * (block.edge - 1);
   std::size_t n = 0;
   for (const double a : kChebyshev)
@@ -102,17 +111,17 @@ RbfBlock::RbfBlock(const RbfMap& map, const GridBlock& block, double tolerance)
       for (const double c : kChebyshev) {
         const V3d x =
             block_.center() + (block_.row(0) * a + block_.row(1) * b + block_.row(2) * c) * half;
-        const V3d value = map.affine(x);
+        const V3d value = function.affine(x);
         for (std::size_t k = 0; k < 3; ++k) far_[k][n] = value[static_cast<int>(k)];
         ++n;
       }
-  std::vector<std::uint32_t> all(map.size());
+  std::vector<std::uint32_t> all(function.particles().size());
   std::iota(all.begin(), all.end(), 0u);
   chooseFar(all);
 }
 
 RbfBlock::RbfBlock(const RbfBlock& parent, int bits)
-    : map_(parent.map_),
+    : function_(parent.function_),
       block_(parent.block_.octant(bits)),
       tolerance_(parent.tolerance_),
       error_(parent.error_) {
@@ -129,7 +138,7 @@ void RbfBlock::chooseFar(std::span<const std::uint32_t> candidates) {
     return;
   }
   const std::vector<std::uint32_t> far =
-      withKernel(map_.kernel_, [&](auto kernel) { return split(kernel, candidates); });
+      withKernel(function_.kernel(), [&](auto kernel) { return split(kernel, candidates); });
   if (!far.empty()) sumFar(far);
 }
 
@@ -149,13 +158,14 @@ std::vector<std::uint32_t> RbfBlock::split(Kernel, std::span<const std::uint32_t
   std::vector<std::int8_t> power(candidates.size());
   for (std::size_t n = 0; n < candidates.size(); ++n) {
     const std::uint32_t i = candidates[n];
-    const double gap = (map_.particles_[i].position - center).length() - radius;
+    const double gap = (function_.particles()[i].position - center).length() - radius;
     if (gap > 0 && Kernel::farBound(gap) == 0) {
       power[n] = kNothing;
       continue;
     }
     const double error =
-        gap > 0 ? map_.weightNorm_[i] * farError<Kernel>(halfEdge, gap) / tolerance_ : HUGE_VAL;
+        gap > 0 ? function_.weightNorms()[i] * farError<Kernel>(halfEdge, gap) / tolerance_
+                : HUGE_VAL;
     power[n] = static_cast<std::int8_t>(
         error < 1 ? std::clamp(std::ilogb(std::max(error, 1e-300)) + kPowers - 1, 0, kPowers - 2)
                   : kPowers - 1);
@@ -185,7 +195,7 @@ void RbfBlock::sumFar(std::span<const std::uint32_t> far) {
         nodes.x[n] = x.x, nodes.y[n] = x.y, nodes.z[n] = x.z;
         ++n;
       }
-  addRbfSums(map_.kernel_, map_.particles_, far, nodes);
+  addRbfSums(function_.kernel(), function_.particles(), far, nodes);
   for (std::size_t i = 0; i < kCubeNodes; ++i) {
     far_[0][i] += nodes.u[i];
     far_[1][i] += nodes.v[i];
@@ -194,7 +204,7 @@ void RbfBlock::sumFar(std::span<const std::uint32_t> far) {
 }
 
 Imath::Box3d RbfBlock::imageBounds() const {
-  return withKernel(map_.kernel_, [&](auto kernel) { return boundsFor(kernel); });
+  return withKernel(function_.kernel(), [&](auto kernel) { return boundsFor(kernel); });
 }
 
 template <typename Kernel>
@@ -204,7 +214,8 @@ Imath::Box3d RbfBlock::boundsFor(Kernel) const {
   V3d value(0), remainder(error_);
   M33d gradient(0, 0, 0, 0, 0, 0, 0, 0, 0);
   for (const std::uint32_t i : near_) {
-    const V3d offset = center - map_.particles_[i].position, weight = map_.particles_[i].weight;
+    const V3d offset = center - function_.particles()[i].position,
+              weight = function_.particles()[i].weight;
     const double distance = offset.length();
     value += weight * Kernel::value(distance);
     const V3d slope = distance > 0 ? offset * (Kernel::slope(distance) / distance) : V3d(0);
@@ -248,7 +259,7 @@ std::size_t RbfBlock::evaluate(std::span<V3d, 512> uvw) const {
                   block_.row(2) * static_cast<double>(n & 7);
     points.x[n] = x.x, points.y[n] = x.y, points.z[n] = x.z;
   }
-  addRbfSums(map_.kernel_, map_.particles_, near_, points);
+  addRbfSums(function_.kernel(), function_.particles(), near_, points);
   for (std::size_t n = 0; n < uvw.size(); ++n) uvw[n] = V3d(points.u[n], points.v[n], points.w[n]);
   return near_.size() * uvw.size();
 }

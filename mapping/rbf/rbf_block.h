@@ -6,19 +6,19 @@
 #include <span>
 #include <vector>
 
+#include "levelset/rbf/rbf_function.h"
 #include "mapping/maps/patch_map.h"
-#include "mapping/rbf/rbf_map.h"
 
 namespace mapping {
 
-/// An RbfMap restricted to a block of grid points. Particles far from the block are summed into a
-/// polynomial of degree five in each axis, given by its values at Chebyshev nodes. Octants inherit
-/// the polynomial, so each particle is summed once for a large neighbourhood. Near particles are
-/// summed at the grid points. The polynomial's error is bounded particle by particle, and the sum
-/// of the bounds stays below the tolerance.
+/// A radial basis function restricted to a block of grid points. Particles far from the block are
+/// summed into a polynomial of degree five in each axis, given by its values at Chebyshev nodes.
+/// Octants inherit the polynomial, so each particle is summed once for a large neighbourhood. Near
+/// particles are summed at the grid points. The polynomial's error is bounded particle by particle,
+/// and the sum of the bounds stays below the tolerance.
 class RbfBlock final : public BlockMap {
  public:
-  RbfBlock(const RbfMap& map, const GridBlock& block, double tolerance);
+  RbfBlock(const levelset::rbf::RbfFunction& function, const GridBlock& block, double tolerance);
 
   [[nodiscard]] Imath::Box3d imageBounds() const override;
   [[nodiscard]] std::unique_ptr<BlockMap> octant(int bits) const override;
@@ -44,8 +44,8 @@ class RbfBlock final : public BlockMap {
   template <typename Kernel>
   [[nodiscard]] Imath::Box3d boundsFor(Kernel kernel) const;
 
-  const RbfMap& map_;
-  GridBlock block_;  ///< grid points, in the unit and relative to the origin of the map
+  const levelset::rbf::RbfFunction& function_;
+  GridBlock block_;  ///< grid points, in the unit and relative to the origin of the function
   double tolerance_;
   double error_ = 0;  ///< error bound of the polynomial, in u, v and w
   Values far_{};

@@ -8,24 +8,25 @@
 #include <random>
 #include <vector>
 
-#include "mapping/rbf/rbf_map.h"
+#include "levelset/rbf/sums/rbf_kernel.h"
 
-namespace mapping {
+namespace levelset::rbf {
 /// Prints the kernel in test names.
 inline void PrintTo(RbfKernel kernel, std::ostream* out) {
   constexpr std::array<const char*, 7> kNames = {"Biharmonic", "Triharmonic", "ThinPlate", "Sum",
                                                  "Laplacian",  "Gaussian",    "Wendland"};
   *out << kNames[static_cast<std::size_t>(kernel)];
 }
-}  // namespace mapping
+}  // namespace levelset::rbf
 
 /// Particles for RBF maps.
 namespace support {
 
 inline constexpr std::array kKernels = {
-    mapping::RbfKernel::Biharmonic, mapping::RbfKernel::Triharmonic, mapping::RbfKernel::ThinPlate,
-    mapping::RbfKernel::Sum,        mapping::RbfKernel::Laplacian,   mapping::RbfKernel::Gaussian,
-    mapping::RbfKernel::Wendland};
+    levelset::rbf::RbfKernel::Biharmonic, levelset::rbf::RbfKernel::Triharmonic,
+    levelset::rbf::RbfKernel::ThinPlate,  levelset::rbf::RbfKernel::Sum,
+    levelset::rbf::RbfKernel::Laplacian,  levelset::rbf::RbfKernel::Gaussian,
+    levelset::rbf::RbfKernel::Wendland};
 
 struct Cloud {
   std::vector<Imath::V3d> points, targets;
@@ -58,15 +59,6 @@ Cloud lattice(int edge, const Map& map, const Imath::V3d& shift = Imath::V3d(0))
         cloud.add(p + shift, map(p), k == 0);
       }
   return cloud;
-}
-
-/// @param options  all options except λ
-inline mapping::RbfMap fit(const Cloud& cloud, double lambda, mapping::RbfMapOptions options = {}) {
-  options.lambdaNear = options.lambdaFar = lambda;
-  return {cloud.points, cloud.targets, cloud.near, options};
-}
-inline mapping::RbfMap fit(const Cloud& cloud, double lambda, mapping::RbfKernel kernel) {
-  return fit(cloud, lambda, mapping::RbfMapOptions{.kernel = kernel});
 }
 
 }  // namespace support

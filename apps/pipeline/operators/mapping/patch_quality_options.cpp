@@ -284,7 +284,7 @@ void validateKernel(const Invocation& in) {
     if (in.text("map") != "rbf" && in.given(option))
       throw UsageError(fmt::format("{}: --{} has no effect with --map {}; leave it out",
                                    in.op().name, option, in.text("map")));
-  if (in.given("support") && !mapping::isCompact(kernelOf(in)))
+  if (in.given("support") && !levelset::rbf::isCompact(kernelOf(in)))
     throw UsageError(fmt::format("{}: --support has no effect with --kernel {}; leave it out",
                                  in.op().name, in.text("kernel")));
 }

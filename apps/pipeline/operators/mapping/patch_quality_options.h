@@ -9,7 +9,7 @@
 #include "apps/pipeline/registry/invocation.h"
 #include "mapping/distortion/distortion.h"
 #include "mapping/distortion/fold_certificate.h"
-#include "mapping/fast_sums/rbf_kernel.h"
+#include "mapping/rbf/rbf_map.h"
 #include "mapping/patches/patch.h"
 
 // Options that untangle, relax and certify patches, for actions that map onto patches.

@@ -11,6 +11,7 @@
 #include "levelset/csg/csg.h"
 #include "levelset/error.h"
 #include "levelset/fields/grid.h"
+#include "levelset/rbf/rbf_taylor.h"
 #include "levelset/shapes/shapes.h"
 #include "mapping/distortion/distortion.h"
 #include "mapping/distortion/jacobian_field.h"
@@ -19,7 +20,6 @@
 #include "mapping/maps/prism_map.h"
 #include "mapping/placement/make_patch.h"
 #include "mapping/rbf/rbf_map.h"
-#include "mapping/rbf/rbf_taylor.h"
 #include "mapping/textures/geometric_texture.h"
 #include "mapping/textures/mesh_texture.h"
 #include "mapping/untangle/prism_cells.h"
@@ -345,7 +345,7 @@ TEST(RbfTaylor, PolynomialsOfDistancesHaveTheStatedOrder) {
   // At half the distance the error of the value falls to a sixty-fourth, because the next term has
   // degree six.
   const V3d way(1.5, -2, 0.5), weight(1, -0.5, 2), direction(0.3, 0.4, -0.2);
-  mapping::TaylorPolynomial polynomial;
+  levelset::rbf::TaylorPolynomial polynomial;
   polynomial.addDistance(way, weight);
   double last = 0;
   for (const double step : {0.25, 0.125, 0.0625}) {
@@ -356,7 +356,7 @@ TEST(RbfTaylor, PolynomialsOfDistancesHaveTheStatedOrder) {
       EXPECT_NEAR(std::log2(last / error), 6, support::measured(0.123));
     }
     last = error;
-    mapping::TaylorPolynomial shifted = polynomial;
+    levelset::rbf::TaylorPolynomial shifted = polynomial;
     shifted.shift(V3d(0.1, -0.2, 0.3));
     EXPECT_LE((shifted.value(s - V3d(0.1, -0.2, 0.3)) - polynomial.value(s)).length(),
               support::doubleRounding(8));
@@ -380,17 +380,17 @@ TEST(RbfTaylor, CubesSatisfyTheirBounds) {
   const Patch patch = patchAt(wavy, 12, 12, 4);
   const mapping::RbfMap map = mapping::patchToTexture(patch);
   const V3d sizes = mapping::meanExtents(patch);
-  const mapping::RbfCubes cubes(map, sizes, 1e-2);
-  mapping::RbfCube cube = cubes.root(V3d(0), 2);
+  const levelset::rbf::RbfCubes cubes(map.function(), sizes, 1e-2);
+  levelset::rbf::RbfCube cube = cubes.root(V3d(0), 2);
   bool hasFar = false;
   for (int layer = 0; layer < 6; ++layer) {
     for (int n = 0; n < 20; ++n) {
       const V3d s =
           V3d(2 * unit(random) - 1, 2 * unit(random) - 1, 2 * unit(random) - 1) * cube.half;
       const V3d place = cube.center + s;
-      const V3d value = map(place + map.origin()) * sizes;
+      const V3d value = map(place + map.function().origin()) * sizes;
       EXPECT_LE((cubes.value(cube, place) - value).length(), cube.valueError + 1e-12);
-      const Imath::M33d exact = map.jacobian(place + map.origin()),
+      const Imath::M33d exact = map.jacobian(place + map.function().origin()),
                         found = cubes.slopes(cube, place);
       double squares = 0;
       for (int k = 0; k < 3; ++k)

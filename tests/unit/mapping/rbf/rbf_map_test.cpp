@@ -10,7 +10,7 @@
 
 #include "levelset/error.h"
 #include "mapping/rbf/rbf_block.h"
-#include "tests/support/clouds.h"
+#include "tests/support/map_clouds.h"
 #include "tests/support/measured.h"
 
 namespace rbf_map_test {

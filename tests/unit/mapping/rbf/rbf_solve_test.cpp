@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "levelset/error.h"
-#include "mapping/fast_sums/cluster_tree.h"
-#include "mapping/fast_sums/rbf_cluster_sum.h"
+#include "levelset/rbf/sums/cluster_tree.h"
+#include "levelset/rbf/sums/rbf_cluster_sum.h"
 #include "mapping/rbf/rbf_map.h"
-#include "tests/support/clouds.h"
+#include "tests/support/map_clouds.h"
 #include "tests/support/measured.h"
 #include "tests/support/threads.h"
 
@@ -201,7 +201,7 @@ TEST_P(Solve, IterationAgreesWithFactorization) {
         fit(cloud, lambda, {.kernel = GetParam(), .denseLimit = 600, .solveTolerance = tolerance});
     const RbfSolveReport& report = map.solveReport();
     // The sparse matrix of a compact kernel is always factored.
-    EXPECT_EQ(report.isIterative, !mapping::isCompact(GetParam()));
+    EXPECT_EQ(report.isIterative, !levelset::rbf::isCompact(GetParam()));
     EXPECT_FALSE(dense.solveReport().isIterative);
     if (report.isIterative) {
       EXPECT_GT(report.iterations, 2u);
@@ -246,13 +246,13 @@ TEST(ClusterSum, ApproximatesTheDirectSum) {
   const Cloud cloud = slab(30);
   std::mt19937 random(4);
   std::normal_distribution<double> normal;
-  const mapping::ClusterTree tree(cloud.points, 128);
+  const levelset::rbf::ClusterTree tree(cloud.points, 128);
   std::vector<V3d> points, weights;
   for (const std::uint32_t i : tree.order()) {
     points.push_back(cloud.points[i]);
     weights.emplace_back(normal(random), normal(random), normal(random));
   }
-  const mapping::RbfClusterSum fast(RbfKernel::Biharmonic, points, tree.nodes());
+  const levelset::rbf::RbfClusterSum fast(RbfKernel::Biharmonic, points, tree.nodes());
   const std::vector<V3d> sums = fast(weights);
   double worst = 0, largest = 0;
   for (std::size_t i = 0; i < points.size(); i += 13) {
@@ -271,7 +271,7 @@ TEST(ClusterTree, FindsNeighbours) {
   std::vector<V3d> points;
   for (int i = 0; i < 700; ++i) points.emplace_back(unit(random), unit(random) / 9, i % 3);
   for (int i = 0; i < 40; ++i) points.push_back(points[5]);
-  const mapping::ClusterTree tree(points, 7);
+  const levelset::rbf::ClusterTree tree(points, 7);
   const Imath::Box3d box(V3d(0.2, 0, 0), V3d(0.5, 0.1, 0.2));
   for (std::uint32_t i = 0; i < points.size(); i += 11) {
     std::pair best(HUGE_VAL, i);
@@ -286,7 +286,7 @@ TEST(ClusterTree, FindsNeighbours) {
   }
   std::vector<std::pair<double, std::uint32_t>> all;
   for (std::uint32_t j = 0; j < points.size(); ++j)
-    all.emplace_back(mapping::squaredGap(Imath::Box3d(points[j], points[j]), box), j);
+    all.emplace_back(levelset::rbf::squaredGap(Imath::Box3d(points[j], points[j]), box), j);
   std::sort(all.begin(), all.end());
   const std::vector<std::uint32_t> around = tree.around(box, 300);
   ASSERT_EQ(around.size(), 300u);

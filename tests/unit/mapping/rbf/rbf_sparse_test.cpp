@@ -1,4 +1,4 @@
-#include "mapping/rbf/rbf_sparse.h"
+#include "levelset/rbf/rbf_sparse.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 
 #include "levelset/error.h"
 #include "mapping/rbf/rbf_map.h"
-#include "tests/support/clouds.h"
+#include "tests/support/map_clouds.h"
 #include "tests/support/measured.h"
 #include "tests/support/threads.h"
 
@@ -31,7 +31,7 @@ RbfMapOptions compact(double support) {
   return {.kernel = RbfKernel::Wendland, .support = support};
 }
 
-mapping::RbfCloud cloudOf(const Cloud& cloud, RbfMapOptions options) {
+levelset::rbf::RbfCloud cloudOf(const Cloud& cloud, RbfMapOptions options) {
   mapping::RbfSolveReport report;
   options.lambdaNear = options.lambdaFar = 0;
   return makeRbfCloud(cloud.points, cloud.targets, cloud.near, options, report);
@@ -64,11 +64,11 @@ TEST(CompactKernel, SparseMatrixHasTheEntriesOfTheDenseOne) {
   const Cloud cloud = lattice(6, bend);
   for (const double support : {1.5, 3.0, 20.0}) {
     const RbfMapOptions options = compact(support);
-    const mapping::RbfCloud at = cloudOf(cloud, options);
+    const levelset::rbf::RbfCloud at = cloudOf(cloud, options);
     std::vector<std::uint32_t> all(at.points.size());
     for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
-    const Eigen::MatrixXd dense = mapping::rbfMatrix(at, options.kernel, all);
-    const auto lower = mapping::sparseRbfMatrix(at, options);
+    const Eigen::MatrixXd dense = levelset::rbf::rbfMatrix(at, options.kernel, all);
+    const auto lower = levelset::rbf::sparseRbfMatrix(at, options);
     EXPECT_EQ(Eigen::MatrixXd(Eigen::MatrixXd(lower).selfadjointView<Eigen::Lower>()), dense)
         << support;
     // Beyond the support radius nothing is stored.
@@ -84,7 +84,7 @@ TEST(CompactKernel, MatrixIsPositiveDefiniteForAnySupport) {
   double last = 2;
   for (const double support : {1.2, 2.0, 4.0, 8.0}) {
     const Eigen::MatrixXd matrix =
-        mapping::rbfMatrix(cloudOf(cloud, compact(support)), RbfKernel::Wendland, all);
+        levelset::rbf::rbfMatrix(cloudOf(cloud, compact(support)), RbfKernel::Wendland, all);
     const double least =
         Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(matrix).eigenvalues().minCoeff();
     EXPECT_GT(least, 0) << support;
@@ -104,7 +104,7 @@ TEST(CompactKernel, ReportsItsCondition) {
   for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
   for (const double support : {1.5, 4.0, 10.0}) {
     const Eigen::MatrixXd matrix =
-        mapping::rbfMatrix(cloudOf(cloud, compact(support)), RbfKernel::Wendland, all);
+        levelset::rbf::rbfMatrix(cloudOf(cloud, compact(support)), RbfKernel::Wendland, all);
     const double truth = matrix.cwiseAbs().colwise().sum().maxCoeff() *
                          matrix.inverse().cwiseAbs().colwise().sum().maxCoeff();
     const double condition = fit(cloud, 0, compact(support)).solveReport().condition;
@@ -118,7 +118,8 @@ TEST(CompactKernel, InterpolatesForAnySupport) {
   for (const double support : {1.01, 1.5, 3.0, 6.0, 12.0, 40.0}) {
     const RbfMap map = fit(cloud, 0, compact(support));
     EXPECT_LT(map.maxResidual(), support::doubleRounding(250)) << support;
-    EXPECT_NEAR(map.unit(), support * map.meanSpacing(), support::doubleRounding(4) * support);
+    EXPECT_NEAR(map.function().unit(), support * map.meanSpacing(),
+                support::doubleRounding(4) * support);
     EXPECT_FALSE(map.solveReport().isIterative || map.solveReport().isRegularized);
   }
 }
@@ -151,7 +152,7 @@ TEST(CompactKernel, DistantParticlesAddNothing) {
   const Cloud cloud = lattice(7, bend);
   const RbfMap map = fit(cloud, 0, compact(1.8));
   const V3d x(2.2, 1.7, 3.1), far(400, -300, 100);
-  EXPECT_EQ(map.jacobian(far), map.linearPart() * (1 / map.unit()));
+  EXPECT_EQ(map.jacobian(far), map.function().linearPart() * (1 / map.function().unit()));
   Imath::M33d rows;
   for (int i = 0; i < 3; ++i) rows[i][i] = 0.02;
   std::array<V3d, 512> uvw;

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "mapping/rbf/rbf_solve.h"
+#include "levelset/rbf/rbf_solve.h"
 
-namespace mapping {
+namespace levelset::rbf {
 
 /// Computes the weights of solveRbf by restarted, flexible GMRES [Saad93] in the space orthogonal
 /// to the linear polynomials. Matrix products use RbfClusterSum, or direct sums for kernels that
@@ -17,8 +17,8 @@ namespace mapping {
 ///         v and w.
 /// @throws ResourceLimit if the memory estimate exceeds the limit
 /// @throws NumericalError if the iteration stagnates
-[[nodiscard]] RbfFit solveIteratively(const RbfCloud& cloud, const RbfMapOptions& options,
+[[nodiscard]] RbfFit solveIteratively(const RbfCloud& cloud, const RbfOptions& options,
                                       const Eigen::MatrixXd& q, const RbfColumns& values,
                                       RbfSolveReport& report);
 
-}  // namespace mapping
+}  // namespace levelset::rbf

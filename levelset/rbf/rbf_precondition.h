@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "mapping/fast_sums/cluster_tree.h"
-#include "mapping/rbf/rbf_solve.h"
+#include "levelset/rbf/rbf_solve.h"
+#include "levelset/rbf/sums/cluster_tree.h"
 
-namespace mapping {
+namespace levelset::rbf {
 
 /// A two-level approximate inverse of the RBF matrix s φ + λ, with s the sign of the kernel
 /// [Beatson00]. First, each leaf of a tree is solved separately together with neighbouring
@@ -52,4 +52,4 @@ class RbfPreconditioner {
   Eigen::LLT<Eigen::MatrixXd> coarseFactors_;
 };
 
-}  // namespace mapping
+}  // namespace levelset::rbf

@@ -9,9 +9,9 @@
 #include <span>
 #include <vector>
 
-#include "mapping/rbf/rbf_map.h"
+#include "levelset/rbf/rbf_function.h"
 
-namespace mapping {
+namespace levelset::rbf {
 
 /// A polynomial in x, y, z of total degree at most five with vector coefficients: the Taylor
 /// expansion, around a point, of the affine part of an RBF map and the sum over far particles.
@@ -61,10 +61,10 @@ struct RbfCube {
 /// which its octants inherit.
 class RbfCubes {
  public:
-  /// @param map        a map with the kernel φ(r) = r
+  /// @param function        a function with the kernel φ(r) = r
   /// @param sizes      factors by which u, v and w are scaled
   /// @param tolerance  error bound for the scaled slopes of all far particles together
-  RbfCubes(const RbfMap& map, const Imath::V3d& sizes, double tolerance);
+  RbfCubes(const RbfFunction& function, const Imath::V3d& sizes, double tolerance);
 
   [[nodiscard]] RbfCube root(const Imath::V3d& center, double half) const;
   /// Octant of the cube. Bits 1, 2 and 4 of `bits` select the upper half along x, y and z.
@@ -91,4 +91,4 @@ class RbfCubes {
   double farRatio_ = 0;  ///< largest ratio of a cube's radius to the distance of a far particle
 };
 
-}  // namespace mapping
+}  // namespace levelset::rbf

@@ -6,12 +6,10 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "mapping/fast_sums/rbf_kernel.h"
-#include "mapping/rbf/rbf_cloud.h"
+#include "levelset/rbf/rbf_cloud.h"
+#include "levelset/rbf/sums/rbf_kernel.h"
 
-namespace mapping {
-
-struct RbfMapOptions;
+namespace levelset::rbf {
 
 /// Columns u, v and w; one row per particle.
 using RbfColumns = Eigen::Matrix<double, Eigen::Dynamic, 3>;
@@ -36,10 +34,10 @@ struct RbfSolution {
 /// exceed options.maxMemory, but never for 500 particles or fewer. The sparse system of a compact
 /// kernel is always solved by sparse factorisation. If the particles span fewer than
 /// three directions, the affine part is completed so that it also scales the missing directions,
-/// see RbfMap.
+/// see RbfFunction.
 /// @throws ResourceLimit if the memory estimate exceeds options.maxMemory
 /// @throws NumericalError if the iteration stagnates
-[[nodiscard]] RbfSolution solveRbf(const RbfCloud& cloud, const RbfMapOptions& options,
+[[nodiscard]] RbfSolution solveRbf(const RbfCloud& cloud, const RbfOptions& options,
                                    RbfSolveReport& report);
 
 /// Computes (s φ + λ) times the weights by direct summation, with s the sign of the kernel.
@@ -50,4 +48,4 @@ struct RbfSolution {
 [[nodiscard]] Eigen::MatrixXd rbfMatrix(const RbfCloud& cloud, RbfKernel kernel,
                                         std::span<const std::uint32_t> chosen);
 
-}  // namespace mapping
+}  // namespace levelset::rbf

@@ -1,4 +1,4 @@
-#include "mapping/rbf/rbf_krylov.h"
+#include "levelset/rbf/rbf_krylov.h"
 
 #include <fmt/core.h>
 
@@ -9,12 +9,11 @@
 #include <numeric>
 
 #include "levelset/error.h"
-#include "mapping/fast_sums/cluster_tree.h"
-#include "mapping/fast_sums/rbf_cluster_sum.h"
-#include "mapping/rbf/rbf_map.h"
-#include "mapping/rbf/rbf_precondition.h"
+#include "levelset/rbf/rbf_precondition.h"
+#include "levelset/rbf/sums/cluster_tree.h"
+#include "levelset/rbf/sums/rbf_cluster_sum.h"
 
-namespace mapping {
+namespace levelset::rbf {
 namespace {
 
 using Eigen::Index;
@@ -118,7 +117,7 @@ class Hessenberg {
 /// w.
 class KrylovSolver {
  public:
-  KrylovSolver(const RbfCloud& cloud, const RbfMapOptions& options, const MatrixXd& q,
+  KrylovSolver(const RbfCloud& cloud, const RbfOptions& options, const MatrixXd& q,
                const ClusterTree& tree, RbfSolveReport& report)
       : cloud_(cloud),
         options_(options),
@@ -154,9 +153,9 @@ class KrylovSolver {
 
  private:
   [[noreturn]] void refuse(double worst, double tolerance) const {
-    throw levelset::NumericalError(fmt::format(
-        "after {} iterations for {} particles the residual stagnates at {:.3g} in texture "
-        "coordinates, but {:.3g} is required; use a larger λ, more evenly spaced particles, the "
+    throw NumericalError(fmt::format(
+        "after {} iterations for {} particles the residual stagnates at {:.3g}, but {:.3g} is "
+        "required; use a larger λ, more evenly spaced particles, the "
         "biharmonic kernel or a larger tolerance",
         report_.iterations, cloud_.points.size(), worst, tolerance));
   }
@@ -243,7 +242,7 @@ class KrylovSolver {
   }
 
   const RbfCloud& cloud_;
-  const RbfMapOptions& options_;
+  const RbfOptions& options_;
   const MatrixXd& q_;
   double sign_;
   RbfClusterSum sum_;
@@ -254,14 +253,13 @@ class KrylovSolver {
 
 }  // namespace
 
-RbfFit solveIteratively(const RbfCloud& cloud, const RbfMapOptions& options, const MatrixXd& q,
+RbfFit solveIteratively(const RbfCloud& cloud, const RbfOptions& options, const MatrixXd& q,
                         const RbfColumns& values, RbfSolveReport& report) {
   const auto n = static_cast<double>(cloud.points.size());
   const double basis = 2.0 * kMostSteps * sizeof(double) * 3;
   constexpr double kSumBytes = 500;  // per particle, for the tree nodes of the fast sum
-  levelset::withContext("solving the RBF map", [&] {
-    levelset::requireMemory(n * (basis + kSumBytes) + RbfPreconditioner::estimateBytes(n),
-                            options.maxMemory);
+  withContext("solving the RBF map", [&] {
+    requireMemory(n * (basis + kSumBytes) + RbfPreconditioner::estimateBytes(n), options.maxMemory);
   });
   const ClusterTree first(cloud.points, kSolveLeaf);
   const std::vector<std::uint32_t> order(first.order().begin(), first.order().end());
@@ -280,4 +278,4 @@ RbfFit solveIteratively(const RbfCloud& cloud, const RbfMapOptions& options, con
   return result;
 }
 
-}  // namespace mapping
+}  // namespace levelset::rbf

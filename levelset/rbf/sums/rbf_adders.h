@@ -4,11 +4,11 @@
 #include <cstdint>
 #include <span>
 
-#include "mapping/fast_sums/rbf_sum.h"
+#include "levelset/rbf/sums/rbf_sum.h"
 
 /// Variants of the vector code behind addRbfSums, one for each instruction set, for tests that
 /// compare them.
-namespace mapping {
+namespace levelset::rbf {
 
 /// Adds weight × φ(distance) of `count` particles to the sums u, v and w at `points` points.
 /// `particles` has six numbers for each particle: position and weights. `chosen` has the indices of
@@ -30,4 +30,4 @@ struct RbfAdders {
 void addRbfSums(const RbfAdders& adders, RbfKernel kernel, std::span<const RbfParticle> particles,
                 std::span<const std::uint32_t> chosen, RbfPoints& points);
 
-}  // namespace mapping
+}  // namespace levelset::rbf

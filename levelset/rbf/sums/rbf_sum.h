@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
-#include "mapping/fast_sums/rbf_kernel.h"
+#include "levelset/rbf/sums/rbf_kernel.h"
 
-namespace mapping {
+namespace levelset::rbf {
 
 /// Position of a particle, in the kernel's unit of length, and its weights for u, v and w.
 struct RbfParticle {
@@ -31,4 +31,4 @@ struct RbfPoints {
 void addRbfSums(RbfKernel kernel, std::span<const RbfParticle> particles,
                 std::span<const std::uint32_t> chosen, RbfPoints& points);
 
-}  // namespace mapping
+}  // namespace levelset::rbf

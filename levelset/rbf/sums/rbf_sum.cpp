@@ -2,37 +2,38 @@
 // vectorised. The flags do not change the results: each point's sum runs over the particles in a
 // fixed order.
 
-#include "mapping/fast_sums/rbf_sum.h"
+#include "levelset/rbf/sums/rbf_sum.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <type_traits>
 
-#include "mapping/fast_sums/rbf_adders.h"
+#include "levelset/rbf/sums/rbf_adders.h"
 
-namespace mapping {
+namespace levelset::rbf {
 namespace {
 
 constexpr std::size_t kTile = 64;  // points per call of an adder; they fit the first-level cache
 
-const double kScale = rbf::kLaplacian.scale, kA = rbf::kLaplacian.a, kB = rbf::kLaplacian.b,
-             kFast = rbf::kLaplacian.fast, kSlow = rbf::kLaplacian.slow;
+const double kScale = kernels::kLaplacian.scale, kA = kernels::kLaplacian.a,
+             kB = kernels::kLaplacian.b, kFast = kernels::kLaplacian.fast,
+             kSlow = kernels::kLaplacian.slow;
 
 namespace plain {
-#include "mapping/fast_sums/rbf_sum_tile.inc"
+#include "levelset/rbf/sums/rbf_sum_tile.inc"
 }
 #if defined(__x86_64__)
 #pragma GCC push_options
 #pragma GCC target("avx2")
 namespace avx2 {
-#include "mapping/fast_sums/rbf_sum_tile.inc"
+#include "levelset/rbf/sums/rbf_sum_tile.inc"
 }
 #pragma GCC pop_options
 #pragma GCC push_options
 #pragma GCC target("avx512f,avx512vl,avx512dq,prefer-vector-width=512")
 namespace avx512 {
-#include "mapping/fast_sums/rbf_sum_tile.inc"
+#include "levelset/rbf/sums/rbf_sum_tile.inc"
 }
 #pragma GCC pop_options
 #endif
@@ -80,4 +81,4 @@ void addRbfSums(RbfKernel kernel, std::span<const RbfParticle> particles,
   addRbfSums(widest, kernel, particles, chosen, points);
 }
 
-}  // namespace mapping
+}  // namespace levelset::rbf

@@ -1,9 +1,9 @@
-#include "mapping/rbf/rbf_taylor.h"
+#include "levelset/rbf/rbf_taylor.h"
 
 #include <cmath>
 #include <numeric>
 
-namespace mapping {
+namespace levelset::rbf {
 namespace {
 
 using Imath::M33d;
@@ -165,13 +165,13 @@ M33d TaylorPolynomial::slopes(const V3d& s) const {
   return result;
 }
 
-RbfCubes::RbfCubes(const RbfMap& map, const V3d& sizes, double tolerance)
-    : particles_(map.particles().begin(), map.particles().end()),
-      linear_(map.linearPart()),
-      constant_(map.constantPart() * sizes) {
+RbfCubes::RbfCubes(const RbfFunction& function, const V3d& sizes, double tolerance)
+    : particles_(function.particles().begin(), function.particles().end()),
+      linear_(function.linearPart()),
+      constant_(function.constantPart() * sizes) {
   // The map uses mean particle spacings as its unit, so the weights of the kernel r are divided by
   // the spacing to get world units.
-  const double spacing = map.unit();
+  const double spacing = function.unit();
   double sum = 0;
   for (RbfParticle& particle : particles_) {
     particle.position *= spacing;
@@ -250,4 +250,4 @@ V3d RbfCubes::value(const RbfCube& cube, const V3d& point) const {
   return result;
 }
 
-}  // namespace mapping
+}  // namespace levelset::rbf

@@ -5,7 +5,7 @@
 #include <cstddef>
 
 /// Polynomial interpolation at Chebyshev nodes, along one axis and over cubes of nodes.
-namespace mapping {
+namespace levelset::rbf {
 
 template <std::size_t In, std::size_t Out>
 /// Weights of the In input values in each of the Out output values: [output][input].
@@ -74,4 +74,4 @@ void transformCube(const NodeWeights<In, Out>& a, const NodeWeights<In, Out>& b,
     }
 }
 
-}  // namespace mapping
+}  // namespace levelset::rbf

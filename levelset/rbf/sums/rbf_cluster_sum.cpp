@@ -1,11 +1,11 @@
-#include "mapping/fast_sums/rbf_cluster_sum.h"
+#include "levelset/rbf/sums/rbf_cluster_sum.h"
 
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 
-namespace mapping {
+namespace levelset::rbf {
 
 using Imath::V3d;
 
@@ -197,4 +197,4 @@ std::vector<V3d> RbfClusterSum::operator()(std::span<const V3d> weights) const {
   return std::move(pass.sums);
 }
 
-}  // namespace mapping
+}  // namespace levelset::rbf

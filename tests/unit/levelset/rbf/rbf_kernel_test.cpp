@@ -1,4 +1,4 @@
-#include "mapping/fast_sums/rbf_kernel.h"
+#include "levelset/rbf/sums/rbf_kernel.h"
 
 #include <gtest/gtest.h>
 
@@ -10,16 +10,16 @@
 #include <string>
 #include <vector>
 
-#include "mapping/fast_sums/rbf_adders.h"
-#include "mapping/fast_sums/rbf_sum.h"
+#include "levelset/rbf/sums/rbf_adders.h"
+#include "levelset/rbf/sums/rbf_sum.h"
 #include "tests/support/clouds.h"
 #include "tests/support/measured.h"
 
 namespace rbf_kernel_test {
 
 using Imath::V3d;
-using mapping::RbfKernel;
-using mapping::withKernel;
+using levelset::rbf::RbfKernel;
+using levelset::rbf::withKernel;
 
 class Kernel : public ::testing::TestWithParam<RbfKernel> {
  protected:
@@ -125,7 +125,7 @@ TEST_P(Kernel, SixthDerivativeIsBounded) {
   // Sharp for the homogeneous kernels, far from sharp for the sums of exponentials.
   // The derivatives of a compact kernel jump at its support radius.
   const bool isSharp = GetParam() != RbfKernel::Laplacian && GetParam() != RbfKernel::Gaussian;
-  if (mapping::isCompact(GetParam())) {
+  if (levelset::rbf::isCompact(GetParam())) {
     EXPECT_EQ(sixth(1), 0);
     EXPECT_EQ(sixth(0.999), HUGE_VAL);
   } else {
@@ -134,13 +134,13 @@ TEST_P(Kernel, SixthDerivativeIsBounded) {
 }
 
 TEST_P(Kernel, VectorCodeAgreesWithScalarCode) {
-  const std::vector<mapping::RbfParticle> particle = {{V3d(0), V3d(1, -2, 0.5)}};
+  const std::vector<levelset::rbf::RbfParticle> particle = {{V3d(0), V3d(1, -2, 0.5)}};
   const std::vector<std::uint32_t> chosen = {0};
   std::vector<double> radii = {0, 1e-140, 1e-20, 1, std::sqrt(0.5), 25, 400};
   for (double r = 1e-9; r < 1e5; r *= 1.0137) radii.push_back(r);
-  for (const mapping::RbfAdders& adders : mapping::supportedRbfAdders()) {
+  for (const levelset::rbf::RbfAdders& adders : levelset::rbf::supportedRbfAdders()) {
     SCOPED_TRACE(adders.name);
-    mapping::RbfPoints points(radii.size());
+    levelset::rbf::RbfPoints points(radii.size());
     for (std::size_t i = 0; i < radii.size(); ++i) points.z[i] = radii[i];
     addRbfSums(adders, GetParam(), particle, chosen, points);
     for (std::size_t i = 0; i < radii.size(); ++i) {
@@ -159,7 +159,7 @@ TEST_P(Kernel, EveryInstructionSetGivesTheSameBits) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> unit(-1, 1);
   const auto place = [&] { return V3d(unit(random), unit(random), unit(random)); };
-  std::vector<mapping::RbfParticle> particles;
+  std::vector<levelset::rbf::RbfParticle> particles;
   std::vector<std::uint32_t> chosen;
   for (std::uint32_t n = 0; n < 200; ++n) {
     particles.push_back({place() * std::pow(10, 3 * unit(random)), place()});
@@ -167,30 +167,30 @@ TEST_P(Kernel, EveryInstructionSetGivesTheSameBits) {
   }
   std::shuffle(chosen.begin(), chosen.end(), random);
   for (const std::size_t count : {1, 2, 3, 5, 7, 64, 1021}) {
-    mapping::RbfPoints start(count);
+    levelset::rbf::RbfPoints start(count);
     for (std::size_t i = 0; i < count; ++i) {
       const V3d x = i % 17 == 4 ? particles[i % 200].position : place() * 10;
       start.x[i] = x.x, start.y[i] = x.y, start.z[i] = x.z;
       start.u[i] = unit(random), start.v[i] = unit(random), start.w[i] = unit(random);
     }
-    const auto bitsOf = [](const mapping::RbfPoints& points) {
+    const auto bitsOf = [](const levelset::rbf::RbfPoints& points) {
       std::vector<std::uint64_t> bits;
       for (const auto* numbers : {&points.u, &points.v, &points.w})
         for (const double number : *numbers) bits.push_back(std::bit_cast<std::uint64_t>(number));
       return bits;
     };
-    const auto by = [&](const mapping::RbfAdders& adders) {
-      mapping::RbfPoints points = start;
+    const auto by = [&](const levelset::rbf::RbfAdders& adders) {
+      levelset::rbf::RbfPoints points = start;
       addRbfSums(adders, GetParam(), particles, chosen, points);
       return bitsOf(points);
     };
-    const std::vector<std::uint64_t> plain = by(mapping::supportedRbfAdders().front());
+    const std::vector<std::uint64_t> plain = by(levelset::rbf::supportedRbfAdders().front());
     if (count > 4) {  // the fifth point lies on a particle
       ASSERT_NE(plain, bitsOf(start));
     }
-    for (const mapping::RbfAdders& adders : mapping::supportedRbfAdders())
+    for (const levelset::rbf::RbfAdders& adders : levelset::rbf::supportedRbfAdders())
       EXPECT_EQ(by(adders), plain) << adders.name << " at " << count;
-    mapping::RbfPoints chosenItself = start;
+    levelset::rbf::RbfPoints chosenItself = start;
     addRbfSums(GetParam(), particles, chosen, chosenItself);
     EXPECT_EQ(bitsOf(chosenItself), plain) << count;
   }
@@ -205,15 +205,15 @@ TEST(RbfAdders, IncludeEveryInstructionSetOfTheProcessor) {
     expected.emplace_back("avx512");
 #endif
   std::vector<std::string> found;
-  for (const mapping::RbfAdders& adders : mapping::supportedRbfAdders())
+  for (const levelset::rbf::RbfAdders& adders : levelset::rbf::supportedRbfAdders())
     found.emplace_back(adders.name);
   EXPECT_EQ(found, expected);
 }
 
 // The limit at 0, where the closed form cannot be evaluated, and the far field of a point charge.
 TEST(LaplacianKernel, HasItsLimits) {
-  using mapping::rbf::kLaplacian;
-  using mapping::rbf::Laplacian;
+  using levelset::rbf::kernels::kLaplacian;
+  using levelset::rbf::kernels::Laplacian;
   constexpr double kDelta = 5;
   EXPECT_NEAR(1 / (4 * M_PI * kDelta * kDelta * kLaplacian.scale), 0.014529, support::rounding(3));
   EXPECT_NEAR(kLaplacian.fast * kLaplacian.fast, 2474.74, support::measured(0.00487));

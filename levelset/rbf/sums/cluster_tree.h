@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace mapping {
+namespace levelset::rbf {
 
 /// Squared distance between two boxes; 0 if they touch or overlap.
 [[nodiscard]] double squaredGap(const Imath::Box3d& a, const Imath::Box3d& b);
@@ -53,4 +53,4 @@ class ClusterTree {
   std::vector<Node> nodes_;
 };
 
-}  // namespace mapping
+}  // namespace levelset::rbf

@@ -1,4 +1,4 @@
-#include "mapping/rbf/rbf_cloud.h"
+#include "levelset/rbf/rbf_cloud.h"
 
 #include <fmt/core.h>
 #include <tbb/parallel_for.h>
@@ -11,14 +11,12 @@
 #include <tuple>
 
 #include "levelset/error.h"
-#include "mapping/fast_sums/cluster_tree.h"
-#include "mapping/rbf/rbf_map.h"
+#include "levelset/rbf/sums/cluster_tree.h"
 
-namespace mapping {
+namespace levelset::rbf {
 namespace {
 
 using Imath::V3d;
-using levelset::InvalidInput;
 
 // Two particles closer than this share of the cloud's size give matrix rows that are equal within
 // rounding errors.
@@ -39,14 +37,14 @@ double largest(const V3d& p) {
 }
 
 void checkArguments(std::span<const V3d> points, std::span<const V3d> targets,
-                    std::span<const char> near, const RbfMapOptions& options) {
+                    std::span<const char> near, const RbfOptions& options) {
   for (const double lambda : {options.lambdaNear, options.lambdaFar}) {
     if (!(lambda >= 0) || !std::isfinite(lambda)) {
-      throw levelset::UsageError(fmt::format("λ is {}; give a relaxation of at least 0", lambda));
+      throw UsageError(fmt::format("λ is {}; give a relaxation of at least 0", lambda));
     }
   }
   if (isCompact(options.kernel) && (!(options.support > 1) || !std::isfinite(options.support))) {
-    throw levelset::UsageError(
+    throw UsageError(
         fmt::format("the support radius is {} mean particle spacings; give more than 1, so that "
                     "particles reach their neighbours",
                     options.support));
@@ -61,8 +59,8 @@ void checkArguments(std::span<const V3d> points, std::span<const V3d> targets,
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!isFinite(points[i]) || !isFinite(targets[i])) {
       throw InvalidInput(
-          fmt::format("particle {} at ({}, {}, {}) is not finite; build the patch again", i,
-                      points[i].x, points[i].y, points[i].z));
+          fmt::format("particle {} at ({}, {}, {}) is not finite; give finite positions and values",
+                      i, points[i].x, points[i].y, points[i].z));
     }
   }
 }
@@ -176,8 +174,8 @@ void checkMerged(const Merged& merged, std::span<const V3d> points, std::span<co
     if (off > same) differs[merged.place[i]] = 1;
     if (off > std::max(targetSpacing, same)) {
       throw InvalidInput(fmt::format(
-          "particles at ({:.6g}, {:.6g}, {:.6g}) coincide, but the texture "
-          "coordinates ({:.6g}, {:.6g}, {:.6g}) of one differ from those of the others "
+          "particles at ({:.6g}, {:.6g}, {:.6g}) coincide, but the values "
+          "({:.6g}, {:.6g}, {:.6g}) of one differ from those of the others "
           "by more than neighbours do; remove one of them",
           points[i].x, points[i].y, points[i].z, targets[i].x, targets[i].y, targets[i].z));
     }
@@ -190,13 +188,12 @@ void checkMerged(const Merged& merged, std::span<const V3d> points, std::span<co
   }
   if (report.merged > 0) {
     report.notes.push_back(fmt::format(
-        "{} particles share the position and texture coordinates of another and were left out",
-        report.merged));
+        "{} particles share the position and values of another and were left out", report.merged));
   }
   if (report.averaged > 0) {
     report.notes.push_back(fmt::format(
-        "{} particles share the position of another and were averaged with it; texture coordinates "
-        "differ from the mean by up to {:.3g}",
+        "{} particles share the position of another and were averaged with it; values differ "
+        " from the mean by up to {:.3g}",
         report.averaged, worst));
   }
 }
@@ -236,7 +233,7 @@ void findAxes(RbfCloud& cloud, RbfSolveReport& report) {
 }  // namespace
 
 RbfCloud makeRbfCloud(std::span<const V3d> points, std::span<const V3d> targets,
-                      std::span<const char> near, const RbfMapOptions& options,
+                      std::span<const char> near, const RbfOptions& options,
                       RbfSolveReport& report) {
   checkArguments(points, targets, near, options);
   RbfCloud cloud;
@@ -258,7 +255,7 @@ RbfCloud makeRbfCloud(std::span<const V3d> points, std::span<const V3d> targets,
   cloud.unit = cloud.spacing * (isCompact(options.kernel) ? options.support : 1);
   cloud.targets = std::move(merged.targets);
   for (const std::uint32_t i : merged.leader) {
-    // The same expression as in RbfMap, so that the positions match to the last bit.
+    // The same expression as in RbfFunction, so that the positions match to the last bit.
     cloud.points.push_back((points[i] - origin) / cloud.unit);
     cloud.extent = std::max(cloud.extent, largest(cloud.points.back()));
   }
@@ -268,4 +265,4 @@ RbfCloud makeRbfCloud(std::span<const V3d> points, std::span<const V3d> targets,
   return cloud;
 }
 
-}  // namespace mapping
+}  // namespace levelset::rbf

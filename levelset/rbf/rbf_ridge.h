@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "mapping/rbf/rbf_cloud.h"
+#include "levelset/rbf/rbf_cloud.h"
 
-namespace mapping {
+namespace levelset::rbf {
 
 /// Factorises a system that may be singular within rounding errors. Beyond a condition number of
 /// 1e15 a solution has no correct digits. Then 1e-14 of the system's norm, or 10, 100, … times as
@@ -31,4 +31,4 @@ void raiseUntilDefinite(RbfSolveReport& report, const Factorise& factorise) {
   }
 }
 
-}  // namespace mapping
+}  // namespace levelset::rbf

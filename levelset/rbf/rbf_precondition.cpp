@@ -1,4 +1,4 @@
-#include "mapping/rbf/rbf_precondition.h"
+#include "levelset/rbf/rbf_precondition.h"
 
 #include <tbb/parallel_for.h>
 
@@ -7,9 +7,9 @@
 #include <cmath>
 #include <numeric>
 
-#include "mapping/fast_sums/rbf_sum.h"
+#include "levelset/rbf/sums/rbf_sum.h"
 
-namespace mapping {
+namespace levelset::rbf {
 namespace {
 
 using Eigen::Index;
@@ -158,4 +158,4 @@ RbfColumns RbfPreconditioner::operator()(const RbfColumns& residual) const {
   return weights;
 }
 
-}  // namespace mapping
+}  // namespace levelset::rbf

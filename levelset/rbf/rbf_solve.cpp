@@ -1,4 +1,4 @@
-#include "mapping/rbf/rbf_solve.h"
+#include "levelset/rbf/rbf_solve.h"
 
 #include <fmt/core.h>
 #include <tbb/parallel_for.h>
@@ -11,13 +11,12 @@
 #include <optional>
 
 #include "levelset/error.h"
-#include "mapping/fast_sums/rbf_sum.h"
-#include "mapping/rbf/rbf_krylov.h"
-#include "mapping/rbf/rbf_map.h"
-#include "mapping/rbf/rbf_ridge.h"
-#include "mapping/rbf/rbf_sparse.h"
+#include "levelset/rbf/rbf_krylov.h"
+#include "levelset/rbf/rbf_ridge.h"
+#include "levelset/rbf/rbf_sparse.h"
+#include "levelset/rbf/sums/rbf_sum.h"
 
-namespace mapping {
+namespace levelset::rbf {
 namespace {
 
 using Eigen::Index;
@@ -118,7 +117,7 @@ MatrixXd solveDefinite(Eigen::Ref<MatrixXd> system, const MatrixXd& right, RbfSo
 /// Computes weights orthogonal to the linear polynomials by Cholesky factorisation.
 RbfColumns solveDirectly(const RbfCloud& cloud, RbfKernel kernel,
                          const Eigen::HouseholderQR<MatrixXd>& polynomial, const RbfColumns& values,
-                         const levelset::Progress& progress, RbfSolveReport& report) {
+                         const Progress& progress, RbfSolveReport& report) {
   const Index n = values.rows(), rank = polynomial.matrixQR().cols();
   RbfColumns weights = RbfColumns::Zero(n, 3);
   if (n == rank) return weights;
@@ -185,7 +184,7 @@ RbfColumns multiplyDirectly(const RbfCloud& cloud, RbfKernel kernel, const RbfCo
   return result;
 }
 
-RbfSolution solveRbf(const RbfCloud& cloud, const RbfMapOptions& options, RbfSolveReport& report) {
+RbfSolution solveRbf(const RbfCloud& cloud, const RbfOptions& options, RbfSolveReport& report) {
   const auto n = static_cast<Index>(cloud.points.size());
   const double count = static_cast<double>(n), denseBytes = 1.25 * count * count * sizeof(double);
   const Eigen::HouseholderQR<MatrixXd> polynomial(polynomialOf(cloud));
@@ -206,13 +205,12 @@ RbfSolution solveRbf(const RbfCloud& cloud, const RbfMapOptions& options, RbfSol
     const MatrixXd q = polynomial.householderQ() * MatrixXd::Identity(n, 1 + cloud.directions);
     fit = solveIteratively(cloud, options, q, values, report);
   } else {
-    levelset::withContext("solving the RBF map",
-                          [&] { levelset::requireMemory(denseBytes, options.maxMemory); });
+    withContext("solving the RBF map", [&] { requireMemory(denseBytes, options.maxMemory); });
     fit.weights =
         solveDirectly(cloud, options.kernel, polynomial, values, options.progress, report);
     fit.image = multiplyDirectly(cloud, options.kernel, fit.weights);
   }
-  // The linear polynomial fits the texture coordinates minus the sums of the kernels. The remainder
+  // The linear polynomial fits the targets minus the sums of the kernels. The remainder
   // is the residual of the solution.
   RbfColumns rest = values - fit.image;
   const MatrixXd coefficients = polynomial.solve(rest);
@@ -220,9 +218,9 @@ RbfSolution solveRbf(const RbfCloud& cloud, const RbfMapOptions& options, RbfSol
   report.solveResidual = rest.cwiseAbs().maxCoeff();
   const RbfColumns& weights = fit.weights;
   if (!weights.allFinite() || !coefficients.allFinite()) {
-    throw levelset::NumericalError(
-        fmt::format("solving for {} particles overflowed; check the patch for particles that "
-                    "are much closer than others",
+    throw NumericalError(
+        fmt::format("solving for {} particles overflowed; check for particles that are "
+                    "much closer than others",
                     cloud.points.size()));
   }
 
@@ -241,4 +239,4 @@ RbfSolution solveRbf(const RbfCloud& cloud, const RbfMapOptions& options, RbfSol
   return solution;
 }
 
-}  // namespace mapping
+}  // namespace levelset::rbf

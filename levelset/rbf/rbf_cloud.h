@@ -8,11 +8,35 @@
 #include <string>
 #include <vector>
 
-namespace mapping {
+#include "levelset/progress.h"
+#include "levelset/rbf/sums/rbf_kernel.h"
 
-struct RbfMapOptions;
+namespace levelset::rbf {
 
-/// Properties of the particles of an RBF map, and how the linear system of its weights was solved.
+/// Options of a radial basis function.
+struct RbfOptions {
+  RbfKernel kernel = RbfKernel::Biharmonic;
+  /// Relaxation λ ≥ 0 of the particles at the surface (lambdaNear) and of all others (lambdaFar).
+  /// It is added to the diagonal of the matrix of ±φ(r), with φ the kernel and r the distance of
+  /// two particles in mean particle spacings. For φ(r) = r, λ is a length in mean particle
+  /// spacings; decaying kernels have φ(0) = 1.
+  double lambdaNear = 0.005, lambdaFar = 0.25;
+  /// Support radius of a compact kernel, mean particle spacings, > 1. A larger radius reduces the
+  /// error and increases the time, in proportion to its cube.
+  double support = 4;
+  /// Largest number of particles for a direct solution. Above it, or if the matrix factors exceed
+  /// maxMemory, the system is solved iteratively. Systems of at most 500 particles are always
+  /// solved directly.
+  std::size_t denseLimit = 10000;
+  /// Tolerance of the iterative solver: largest residual of a component, as a share of the extent
+  /// of the particles' values.
+  double solveTolerance = 1e-6;
+  std::size_t maxMemory = kNoMemoryLimit;
+  Progress progress = {};
+};
+
+/// Properties of the particles of a radial basis function, and how the linear system of its
+/// weights was solved.
 struct RbfSolveReport {
   std::size_t merged = 0;    ///< particles with the position and target of another
   std::size_t averaged = 0;  ///< particles with the position of another but a different target
@@ -29,16 +53,16 @@ struct RbfSolveReport {
   std::vector<std::string> notes;  ///< messages for the user, one sentence each
 };
 
-/// Particles of an RBF map as the solver uses them: one for each position, in units of `unit`
-/// relative to their centre. Targets are their texture coordinates, and `lambda` their
-/// relaxation λ.
+/// Particles of a radial basis function as the solver uses them: one for each position, in units
+/// of `unit` relative to their centre. Targets are their values, and `lambda` their relaxation λ.
 struct RbfCloud {
   std::vector<Imath::V3d> points, targets;
   std::vector<double> lambda;
   Imath::V3d origin{0};
   /// Mean distance to the nearest neighbour, world units; 1 for a single particle.
   double spacing = 1;
-  /// Unit of the points, world units: the mean spacing, or the support radius of a compact kernel.
+  /// Unit of the points, world units: the mean spacing, or the support radius of a compact
+  /// kernel.
   double unit = 1;
   double extent = 0;  ///< largest |coordinate| of the points
   /// Orthonormal axes; the points span the first `directions` of them.
@@ -56,6 +80,6 @@ struct RbfCloud {
 ///         targets differ by more than those of nearest neighbours do on average
 [[nodiscard]] RbfCloud makeRbfCloud(std::span<const Imath::V3d> points,
                                     std::span<const Imath::V3d> targets, std::span<const char> near,
-                                    const RbfMapOptions& options, RbfSolveReport& report);
+                                    const RbfOptions& options, RbfSolveReport& report);
 
-}  // namespace mapping
+}  // namespace levelset::rbf

@@ -1,4 +1,4 @@
-#include "mapping/rbf/rbf_sparse.h"
+#include "levelset/rbf/rbf_sparse.h"
 
 #include <tbb/parallel_for.h>
 
@@ -9,11 +9,10 @@
 #include <vector>
 
 #include "levelset/error.h"
-#include "mapping/fast_sums/cluster_tree.h"
-#include "mapping/rbf/rbf_map.h"
-#include "mapping/rbf/rbf_ridge.h"
+#include "levelset/rbf/rbf_ridge.h"
+#include "levelset/rbf/sums/cluster_tree.h"
 
-namespace mapping {
+namespace levelset::rbf {
 namespace {
 
 using Eigen::Index;
@@ -65,7 +64,7 @@ double normOf(const SparseMatrix& lower) {
 
 }  // namespace
 
-SparseMatrix sparseRbfMatrix(const RbfCloud& cloud, const RbfMapOptions& options) {
+SparseMatrix sparseRbfMatrix(const RbfCloud& cloud, const RbfOptions& options) {
   const std::size_t n = cloud.points.size();
   const ClusterTree tree(cloud.points, kPairLeaf);
   // Rows of the lower triangle of column j, in ascending order.
@@ -81,8 +80,8 @@ SparseMatrix sparseRbfMatrix(const RbfCloud& cloud, const RbfMapOptions& options
                     [&](std::size_t j) { begin[j + 1] = static_cast<Index>(rowsOf(j).size()); });
   begin[0] = 0;
   for (std::size_t j = 0; j < n; ++j) begin[j + 1] += begin[j];
-  levelset::withContext("solving the RBF map, whose --support sets the size of the matrix", [&] {
-    levelset::requireMemory(kEntryBytes * static_cast<double>(begin[n]), options.maxMemory);
+  withContext("solving the RBF map, whose --support sets the size of the matrix", [&] {
+    requireMemory(kEntryBytes * static_cast<double>(begin[n]), options.maxMemory);
   });
   result.resizeNonZeros(begin[n]);
   withKernel(options.kernel, [&](auto k) {
@@ -101,18 +100,17 @@ SparseMatrix sparseRbfMatrix(const RbfCloud& cloud, const RbfMapOptions& options
   return result;
 }
 
-RbfFit solveSparsely(const RbfCloud& cloud, const RbfMapOptions& options,
-                     const MatrixXd& polynomial, const RbfColumns& values, RbfSolveReport& report) {
+RbfFit solveSparsely(const RbfCloud& cloud, const RbfOptions& options, const MatrixXd& polynomial,
+                     const RbfColumns& values, RbfSolveReport& report) {
   const auto n = static_cast<Index>(cloud.points.size());
   // The polynomials alone interpolate so few particles.
   if (n == polynomial.cols()) return {RbfColumns::Zero(n, 3), RbfColumns::Zero(n, 3)};
   const SparseMatrix system = sparseRbfMatrix(cloud, options);
   SparseFactors factors;
   factors.analyzePattern(system);
-  levelset::withContext("solving the RBF map, whose --support sets the size of the factors", [&] {
-    levelset::requireMemory(
-        kEntryBytes * static_cast<double>(factors.entries() + 2 * system.nonZeros()),
-        options.maxMemory);
+  withContext("solving the RBF map, whose --support sets the size of the factors", [&] {
+    requireMemory(kEntryBytes * static_cast<double>(factors.entries() + 2 * system.nonZeros()),
+                  options.maxMemory);
   });
   levelset::report(options.progress, 0.1);
   const double norm = normOf(system);
@@ -133,4 +131,4 @@ RbfFit solveSparsely(const RbfCloud& cloud, const RbfMapOptions& options,
   return fit;
 }
 
-}  // namespace mapping
+}  // namespace levelset::rbf

@@ -7,11 +7,11 @@
 #include <span>
 #include <vector>
 
-#include "mapping/fast_sums/chebyshev.h"
-#include "mapping/fast_sums/cluster_tree.h"
-#include "mapping/fast_sums/rbf_sum.h"
+#include "levelset/rbf/sums/chebyshev.h"
+#include "levelset/rbf/sums/cluster_tree.h"
+#include "levelset/rbf/sums/rbf_sum.h"
 
-namespace mapping {
+namespace levelset::rbf {
 
 /// Computes the RBF sum of n particles at each of these particles in about n log n operations, for
 /// any kernel [Fong09]. The particles of a box are replaced by weights at its Chebyshev nodes.
@@ -67,4 +67,4 @@ class RbfClusterSum {
   std::vector<Frame> frames_;
 };
 
-}  // namespace mapping
+}  // namespace levelset::rbf

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 /// The radial functions φ of RBF maps [Brodersen07 table 8.1], with proven bounds.
-namespace mapping {
+namespace levelset::rbf {
 
 /// φ takes r in mean particle spacings, and that of a compact kernel in support radii, so that a
 /// map does not depend on the unit of length. For homogeneous kernels (r, r³) the map does not
@@ -37,7 +37,7 @@ enum class RbfKernel : std::uint8_t {
 ///   farBound(d)           ≥ |φ| for r ≥ d; infinite if φ grows
 /// r^(2k+1) and r^(2k) log r have the sign (−1)^(k+1) at order k + 1 in any dimension [Wendland05
 /// ch. 8]. So linear polynomials, order 2, suffice for all seven kernels.
-namespace rbf {
+namespace kernels {
 
 /// sixth() follows from Gegenbauer polynomials. Along a line, |x − p| = r √(1 − 2ct + t²) is their
 /// generating function, with the step t in units of r and the cosine c. Its coefficient at t⁶ is
@@ -210,7 +210,7 @@ struct Wendland {
   static double farBound(double d) { return value(d); }
 };
 
-}  // namespace rbf
+}  // namespace kernels
 
 /// True for a kernel that is 0 beyond its support radius, which is then the unit of r.
 constexpr bool isCompact(RbfKernel kernel) {
@@ -222,21 +222,21 @@ template <typename Use>
 decltype(auto) withKernel(RbfKernel kernel, const Use& use) {
   switch (kernel) {
     case RbfKernel::Triharmonic:
-      return use(rbf::Triharmonic{});
+      return use(kernels::Triharmonic{});
     case RbfKernel::ThinPlate:
-      return use(rbf::ThinPlate{});
+      return use(kernels::ThinPlate{});
     case RbfKernel::Sum:
-      return use(rbf::Sum{});
+      return use(kernels::Sum{});
     case RbfKernel::Laplacian:
-      return use(rbf::Laplacian{});
+      return use(kernels::Laplacian{});
     case RbfKernel::Gaussian:
-      return use(rbf::Gaussian{});
+      return use(kernels::Gaussian{});
     case RbfKernel::Wendland:
-      return use(rbf::Wendland{});
+      return use(kernels::Wendland{});
     case RbfKernel::Biharmonic:
       break;
   }
-  return use(rbf::Biharmonic{});
+  return use(kernels::Biharmonic{});
 }
 
-}  // namespace mapping
+}  // namespace levelset::rbf

@@ -1,4 +1,4 @@
-#include "mapping/fast_sums/cluster_tree.h"
+#include "levelset/rbf/sums/cluster_tree.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <queue>
 #include <utility>
 
-namespace mapping {
+namespace levelset::rbf {
 
 using Imath::Box3d;
 using Imath::V3d;
@@ -131,4 +131,4 @@ std::vector<std::uint32_t> ClusterTree::around(const Box3d& box, std::size_t cou
   return result;
 }
 
-}  // namespace mapping
+}  // namespace levelset::rbf
