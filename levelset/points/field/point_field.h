@@ -16,6 +16,8 @@ namespace levelset::points {
 struct PointField {
   std::function<double(const Imath::V3d&, const std::vector<Found>&)> value;
   std::size_t neighbours;  ///< number of closest points that `value` takes
+  /// Distance from the points up to which the field is good, in units of about a spacing.
+  double reach = 1;
 };
 
 /// Weight of a point at a squared distance, in fractions of the squared cut-off [Sigg06, 4.10].

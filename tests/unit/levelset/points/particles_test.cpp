@@ -1,4 +1,4 @@
-#include "levelset/points/field/particles.h"
+#include "levelset/points/surface/particles.h"
 
 #include <gtest/gtest.h>
 

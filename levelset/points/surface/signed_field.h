@@ -3,8 +3,8 @@
 // Internal header of levelset: public headers must not include it.
 
 #include "levelset/points/field/point_field.h"
-#include "levelset/points/field/point_winding.h"
-#include "levelset/points/field/sample_field.h"
+#include "levelset/points/surface/point_winding.h"
+#include "levelset/points/surface/sample_field.h"
 
 namespace levelset::points {
 

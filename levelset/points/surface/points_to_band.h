@@ -22,7 +22,11 @@ enum class PointMethod {
   MovingLeastSquares,
   /// An octree of quadratic height functions, blended with each other [Ohtake03]. Keeps sharp
   /// edges and corners.
-  MultilevelPartition
+  MultilevelPartition,
+  /// A radial basis function φ(r) = r through the points and places beside them [Carr01]. As few of
+  /// the points as its tolerance needs are its centres. The most accurate method on smooth shapes
+  /// without noise, and the slowest.
+  RadialBasis
 };
 
 /// Number of points that determine the surface at a position, if the caller gives none.
@@ -69,9 +73,12 @@ struct PointsToBandOptions {
   /// Number of points that determine the surface at a position, from 6 to 1000; 0: that of
   /// defaultNeighbours().
   std::size_t neighbours = 0;
-  /// For MultilevelPartition: aimed distance of the points from the surface, in the median spacing,
-  /// positive.
+  /// For MultilevelPartition and RadialBasis: aimed distance of the points from the surface, in the
+  /// median spacing, positive.
   double tolerance = 0.02;
+  /// For RadialBasis: relaxation λ ≥ 0, in mean distances between its particles. 0 interpolates the
+  /// centres; larger values smooth noise.
+  double lambda = 0;
   double halfWidth = 3;  ///< half width of the band, voxels, at least 1
   /// Accept a surface of which a large part is a guess, and normals that oppose each other.
   bool acceptUnsupported = false;

@@ -1,4 +1,4 @@
-#include "levelset/points/field/point_winding.h"
+#include "levelset/points/surface/point_winding.h"
 
 #include <tbb/parallel_invoke.h>
 

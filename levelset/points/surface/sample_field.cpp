@@ -1,4 +1,4 @@
-#include "levelset/points/field/sample_field.h"
+#include "levelset/points/surface/sample_field.h"
 
 #include <openvdb/tools/SignedFloodFill.h>
 #include <tbb/parallel_for.h>

@@ -1,4 +1,4 @@
-#include "levelset/points/field/particles.h"
+#include "levelset/points/surface/particles.h"
 
 #include <fmt/core.h>
 #include <tbb/parallel_for.h>
@@ -10,9 +10,9 @@
 
 #include "levelset/distance/distance_transform.h"
 #include "levelset/error.h"
-#include "levelset/points/field/sample_field.h"
 #include "levelset/points/processing/point_neighbours.h"
 #include "levelset/points/processing/point_spacing.h"
+#include "levelset/points/surface/sample_field.h"
 
 namespace levelset {
 namespace {

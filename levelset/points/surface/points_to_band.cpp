@@ -1,4 +1,4 @@
-#include "levelset/points/field/points_to_band.h"
+#include "levelset/points/surface/points_to_band.h"
 
 #include <fmt/core.h>
 #include <tbb/parallel_for.h>
@@ -14,7 +14,8 @@
 #include "levelset/points/field/meshless.h"
 #include "levelset/points/field/multilevel_partition.h"
 #include "levelset/points/field/oriented_points.h"
-#include "levelset/points/field/signed_field.h"
+#include "levelset/points/field/rbf_field.h"
+#include "levelset/points/surface/signed_field.h"
 
 namespace levelset {
 namespace {
@@ -37,6 +38,8 @@ void checkOptions(const OrientedPoints& points, double voxelSize,
   if (!(options.tolerance > 0) || !std::isfinite(options.tolerance))
     throw UsageError(
         fmt::format("the tolerance is {} spacings; give a positive number", options.tolerance));
+  if (!(options.lambda >= 0) || !std::isfinite(options.lambda))
+    throw UsageError(fmt::format("lambda is {}; give 0 or more", options.lambda));
   const V3d size = points.box.size();
   checkVoxelSize(voxelSize, std::max({size.x, size.y, size.z}));
   double reach = 0;
@@ -62,6 +65,11 @@ PointField fieldOf(const OrientedPoints& points, const PointsToBandOptions& opti
       return points::multilevelPartition(
           points, neighbours, options.tolerance * points.medianSpacing, options.maxMemory,
           subProgress(options.progress, 0.1, 0.3));
+    case PointMethod::RadialBasis:
+      return points::rbfField(points, {.tolerance = options.tolerance * points.medianSpacing,
+                                       .lambda = options.lambda,
+                                       .maxMemory = options.maxMemory,
+                                       .progress = subProgress(options.progress, 0.1, 0.5)});
   }
   return {};
 }
@@ -170,6 +178,8 @@ std::size_t defaultNeighbours(PointMethod method) {
       return 16;
     case PointMethod::MultilevelPartition:
       return 15;
+    case PointMethod::RadialBasis:
+      return 1;
   }
   return 0;
 }

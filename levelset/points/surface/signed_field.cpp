@@ -1,4 +1,4 @@
-#include "levelset/points/field/signed_field.h"
+#include "levelset/points/surface/signed_field.h"
 
 #include <algorithm>
 #include <cmath>
@@ -26,7 +26,8 @@ SignedField::SignedField(const OrientedPoints& points, PointField near)
     : points_(points),
       near_(std::move(near)),
       // Users ask for many neighbours where noise is larger than the spacing.
-      reach_(std::max(1.0, std::sqrt(static_cast<double>(near_.neighbours) / kFewNeighbours))),
+      reach_(
+          std::max(near_.reach, std::sqrt(static_cast<double>(near_.neighbours) / kFewNeighbours))),
       winding_(points) {}
 
 double SignedField::far(const V3d& at, double closest, FieldMemory& memory) const {
