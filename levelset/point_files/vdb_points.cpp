@@ -35,7 +35,7 @@ bool isPoints(const VdbEntry& entry) {
   return entry.type == kPointTree;
 }
 
-std::string listOf(const std::vector<VdbEntry>& entries) {
+std::string listOfPoints(const std::vector<VdbEntry>& entries) {
   std::string list;
   for (const VdbEntry& entry : entries)
     list += fmt::format("{}'{}' ({})", list.empty() ? "" : ", ", entry.name,
@@ -51,13 +51,13 @@ const VdbEntry& choosePoints(const std::vector<VdbEntry>& entries, const std::st
     if (chosen)
       throw InvalidInput(
           fmt::format("{} holds more than one grid of points{}: {}; {}", file,
-                      wanted.empty() ? "" : " of that name", listOf(entries),
+                      wanted.empty() ? "" : " of that name", listOfPoints(entries),
                       wanted.empty() ? "choose one with --grid" : "write them to separate files"));
     chosen = &entry;
   }
   if (!chosen)
     throw InvalidInput(fmt::format(
-        "{} holds {}, but no grid of points{}; {}", file, listOf(entries),
+        "{} holds {}, but no grid of points{}; {}", file, listOfPoints(entries),
         wanted.empty() ? "" : fmt::format(" '{}'", wanted),
         wanted.empty() ? "read a level set, and 'sample' it" : "choose another one with --grid"));
   return *chosen;
@@ -468,17 +468,18 @@ class CloudReader {
     if (builder_.wantsAttributes()) {
       readAttribute(kNormal, true,
                     [&](const Imath::V3d& v, FilePosition p) { builder_.addNormal(v, p); });
+      std::vector<float> alphas;
+      if (!presentAttributes().colors.empty())
+        readAttribute(kAlpha, false, [&](const Imath::V3d& v, FilePosition) {
+          alphas.push_back(static_cast<float>(v.x));
+        });
+      std::size_t next = 0;
       readAttribute(kColor, true, [&](const Imath::V3d& v, FilePosition p) {
+        const float alpha = alphas.empty() ? 1 : alphas[next++];
         builder_.addColor(Imath::V4f(static_cast<float>(v.x), static_cast<float>(v.y),
-                                     static_cast<float>(v.z), 1),
+                                     static_cast<float>(v.z), alpha),
                           p);
       });
-      if (std::vector<Imath::V4f>& colors = builder_.cloud().colors; !colors.empty()) {
-        std::size_t next = 0;
-        readAttribute(kAlpha, false, [&](const Imath::V3d& v, FilePosition) {
-          colors[next++][3] = static_cast<float>(v.x);
-        });
-      }
       readAttribute(kRadius, false,
                     [&](const Imath::V3d& v, FilePosition p) { builder_.addRadius(v.x, p); });
       readAttribute(kWeight, false,

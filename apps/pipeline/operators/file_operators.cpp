@@ -255,9 +255,8 @@ Operator readOperator() {
       .group = "Files",
       .summary =
           "read a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb), a volume (nii, "
-          "hdr, mha, mhd, nrrd, nhdr, mrc, map, raw), points (xyz, csv, pts, and ply or obj "
-          "without "
-          "faces, and vdb with a grid of points), patches (patch), a scene (json)",
+          "hdr, mha, mhd, nrrd, nhdr, mrc, map, raw), points (xyz, csv, pts, ply or obj without "
+          "faces, vdb with a grid of points), patches (patch), a scene (json)",
       .details =
           "A .vdb with more than one level set needs --grid. A grid that is not a level set needs "
           "--grid, too; it becomes a field of numbers or of vectors, which may be staggered. "
@@ -310,7 +309,7 @@ Operator writeOperator() {
       .group = "Files",
       .summary =
           "write a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb, nvdb), points "
-          "(ply, obj, xyz, csv, pts, also .gz, and vdb), patches (patch), a scene (json)",
+          "(ply, obj, xyz, csv, pts, also .gz, vdb), patches (patch), a scene (json)",
       .details =
           "Data is written to a temporary file in the same folder, which replaces an existing file "
           "only when it is complete. The level sets and meshes of a scene go to .vdb and .ply "

@@ -320,6 +320,28 @@ TEST(VdbPoints, OfUnknownTypesAndEmptyGridsAreRefused) {
               "holds no points");
   EXPECT_SAYS(refusal<InvalidInput>([&] { writePoints(folder / "a.vdb", PointCloud()); }),
               "no points");
+  // Names of types in the descriptor of the attributes.
+  PointCloud cloud = someCloud(3, V3d(0), 1);
+  cloud.normals = {};
+  cloud.colors = {};
+  writePoints(folder / "a.vdb", cloud);
+  const std::string text = support::readText(folder / "a.vdb");
+  const auto replaced = [&](const char* from, const char* to) {
+    std::string changed = text;
+    changed.replace(changed.find(from), std::string(from).size(), to);
+    support::writeText(folder / "changed.vdb", changed);
+  };
+  replaced("vec3s", "vec3i");
+  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)readPoints(folder / "changed.vdb"); }),
+              "positions (P) of type vec3i with codec null");
+  replaced("float", "int32");
+  std::vector<std::string> notes;
+  const PointCloud read = readPoints(folder / "changed.vdb", {.notes = &notes});
+  EXPECT_EQ(read.size(), 3u);
+  EXPECT_TRUE(read.radii.empty());
+  EXPECT_EQ(read.weights.size(), 3u);
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_NE(notes[0].find("left out: 'pscale' (int32, null)"), std::string::npos) << notes[0];
   EXPECT_SAYS(refusal<levelset::UsageError>(
                   [&] { writePoints(folder / "a.vdb.gz", someCloud(3, V3d(0), 1)); }),
               "without .gz");
