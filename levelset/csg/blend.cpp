@@ -155,7 +155,7 @@ CsgResult blend(CsgOperation operation, const NarrowBand& a, const NarrowBand& b
   // === Flow near the curve, on a copy of the blocks near it
   FloatGrid& solid = editVdb(result.band);
   solids::SeamWeights weights(curve, radiusVoxels);
-  FloatGrid::Ptr part = solids::cutOut(solid, eikonal::PointTree(curve), radiusVoxels);
+  FloatGrid::Ptr part = solids::cutOut(solid, makePointSearch(curve), radiusVoxels);
   part = runFlow(std::move(part), weights, {radiusVoxels, options.side}, result.band.halfWidth(),
                  options);
   putBack(*part, weights, solid);

@@ -87,7 +87,7 @@ double boundOf(const FloatGrid& a, const FloatGrid& b, const FilletSize& size, d
 
 /// Computes the distances to one solid in a wide band around the seam, in voxels, positive on the
 /// side of the ball.
-FloatGrid::Ptr widened(const NarrowBand& solid, float sign, const eikonal::PointTree& curve,
+FloatGrid::Ptr widened(const NarrowBand& solid, float sign, const PointSearch& curve,
                        const FilletSize& size, double halfWidth, const BlendOptions& options) {
   FloatGrid::Ptr part = cutOut(vdb(solid), curve, 2 * (size.extent() + halfWidth));
   eikonal::DistanceRequest request;
@@ -103,7 +103,7 @@ FloatGrid::Ptr widened(const NarrowBand& solid, float sign, const eikonal::Point
 class BallRoller {
  public:
   BallRoller(const FloatGrid& a, const FloatGrid& b, const FilletSize& size,
-             const eikonal::PointTree& curve)
+             const PointSearch& curve)
       : readA_(a.getConstAccessor()),
         readB_(b.getConstAccessor()),
         a_(a.tree()),
@@ -129,8 +129,7 @@ class BallRoller {
     if (p < ball.cosine * q || q < ball.cosine * p) return {};
     const Vec3d edge =
         ball.centre - (ball.normalA + ball.normalB) * (ball.radius / (1 + ball.cosine));
-    if (curve_.nearest(edge, kSeamShare * ball.radius + kSeamSlack) == eikonal::PointTree::kNone)
-      return {};
+    if (!levelset::isNear(curve_, toImath(edge), kSeamShare * ball.radius + kSeamSlack)) return {};
     return ball.radius - toCentre.length();
   }
 
@@ -181,13 +180,13 @@ class BallRoller {
   eikonal::DenseBlockCache a_, b_;
   double known_;  ///< largest distance at which the interpolant of the distances is valid, voxels
   FilletSize size_;
-  const eikonal::PointTree& curve_;
+  const PointSearch& curve_;
 };
 
 /// Returns the sorted origins of the leaf blocks that both distance grids contain and that lie
 /// within `extent` voxels of the seam curve. Elsewhere no ball touches both solids.
-std::vector<Coord> blocksBeside(const FloatTree& a, const FloatTree& b,
-                                const eikonal::PointTree& curve, double extent) {
+std::vector<Coord> blocksBeside(const FloatTree& a, const FloatTree& b, const PointSearch& curve,
+                                double extent) {
   std::vector<Coord> both;
   for (auto leaf = a.cbeginLeaf(); leaf; ++leaf)
     if (!leaf->isEmpty() && b.probeConstLeaf(leaf->origin())) both.push_back(leaf->origin());
@@ -195,7 +194,7 @@ std::vector<Coord> blocksBeside(const FloatTree& a, const FloatTree& b,
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, both.size(), 64), [&](const auto& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       const Vec3d centre = both[i].asVec3d() + Vec3d(3.5);
-      isNear[i] = curve.nearest(centre, extent + 6.1) != eikonal::PointTree::kNone;
+      isNear[i] = levelset::isNear(curve, toImath(centre), extent + 6.1);
     }
   });
   std::vector<Coord> found;
@@ -257,7 +256,7 @@ void addFillet(CsgOperation operation, const SeamOperands& operands, double radi
         "the grid cannot represent a radius of {:.3g} voxels; use smaller voxels", size.radius));
 
   // === Distances up to the diameter of the ball from both solids
-  const eikonal::PointTree tree(curve);
+  const PointSearch tree = makePointSearch(curve);
   const CsgSigns signs = csgSigns(operation);
   const auto within = [&](double from, double to) {
     BlendOptions part = options;

@@ -107,19 +107,19 @@ void forEachMoving(const Manager& manager, const MovingLeaves& moving, const Sea
 }  // namespace
 
 SeamWeights::SeamWeights(std::span<const Vec3d> curve, double radius)
-    : curve_(curve), points_(curve), radius_(radius) {}
+    : curve_(makePointSearch(curve)), radius_(radius) {}
 
 std::unique_ptr<SeamWeights::Block> SeamWeights::make(const Coord& origin) const {
   const Vec3d centre = origin.asVec3d() + Vec3d(3.5);
-  if (curve_.nearest(centre, radius_ + 6.1) == eikonal::PointTree::kNone) return nullptr;
+  if (!isNear(curve_, toImath(centre), radius_ + 6.1)) return nullptr;
   auto block = std::make_unique<Block>();
   bool any = false;
   for (openvdb::Index n = 0; n < 512; ++n) {
     const Vec3d p = (origin + LeafNode::offsetToLocalCoord(n)).asVec3d();
-    const std::uint32_t nearest = curve_.nearest(p, radius_);
+    const FoundItem nearest = curve_.closest(toImath(p), radius_ * radius_);
     double weight = 0;
-    if (nearest != eikonal::PointTree::kNone) {
-      const double d = (p - points_[nearest]).length() / radius_;
+    if (nearest.isValid()) {
+      const double d = std::sqrt(nearest.squared) / radius_;
       weight = fade((d - kFullWeight) / (1 - kFullWeight));
     }
     (*block)[n] = static_cast<float>(weight);

@@ -8,7 +8,7 @@
 #include <unordered_map>
 
 #include "levelset/csg/blend.h"
-#include "levelset/geometry/point_tree.h"
+#include "levelset/geometry/search/point_search.h"
 #include "levelset/vdb.h"
 
 namespace levelset::solids {
@@ -18,7 +18,7 @@ namespace levelset::solids {
 class SeamWeights {
  public:
   using Block = std::array<float, 512>;
-  /// @param curve   points of the seam curve in index space; must outlive this object
+  /// @param curve   points of the seam curve in index space
   /// @param radius  voxels
   SeamWeights(std::span<const openvdb::Vec3d> curve, double radius);
   /// Returns the weights of the leaf block at `origin`; null if all are zero. Not thread-safe.
@@ -29,8 +29,7 @@ class SeamWeights {
  private:
   [[nodiscard]] std::unique_ptr<Block> make(const openvdb::Coord& origin) const;
 
-  eikonal::PointTree curve_;
-  std::span<const openvdb::Vec3d> points_;
+  PointSearch curve_;
   double radius_;
   std::unordered_map<openvdb::Coord, std::unique_ptr<Block>, std::hash<openvdb::Coord>> blocks_;
 };

@@ -63,7 +63,7 @@ SeamOperands onOneGrid(const NarrowBand& a, const NarrowBand& b, const SeamReque
   return {firstIsFiner ? fine : moved, firstIsFiner ? moved : fine, {std::move(note)}};
 }
 
-FloatGrid::Ptr cutOut(const FloatGrid& solid, const eikonal::PointTree& curve, double radius) {
+FloatGrid::Ptr cutOut(const FloatGrid& solid, const PointSearch& curve, double radius) {
   const auto scale = static_cast<float>(1 / solid.voxelSize()[0]);
   FloatGrid::Ptr part = FloatGrid::create(solid.background() * scale);
   FloatTree& tree = part->tree();
@@ -72,7 +72,7 @@ FloatGrid::Ptr cutOut(const FloatGrid& solid, const eikonal::PointTree& curve, d
   for (auto leaf = solid.tree().cbeginLeaf(); leaf; ++leaf) {
     const Vec3d centre = leaf->origin().asVec3d() + Vec3d(3.5);
     const double reach = radius + kSurfaceMargin + 6.1;  // 6.1: half the diagonal of a block
-    if (curve.nearest(centre, reach) == eikonal::PointTree::kNone) continue;
+    if (!isNear(curve, toImath(centre), reach)) continue;
     inner.insert(leaf->origin());
     auto copy = std::make_unique<LeafNode>(*leaf);
     for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n)

@@ -3,7 +3,7 @@
 // For the .cpp files of levelset/csg only.
 
 #include "levelset/csg/blend.h"
-#include "levelset/geometry/point_tree.h"
+#include "levelset/geometry/search/point_search.h"
 #include "levelset/vdb.h"
 
 namespace levelset::solids {
@@ -29,6 +29,6 @@ struct SeamOperands {
 /// distances.
 /// @param radius  voxels
 [[nodiscard]] openvdb::FloatGrid::Ptr cutOut(const openvdb::FloatGrid& solid,
-                                             const eikonal::PointTree& curve, double radius);
+                                             const PointSearch& curve, double radius);
 
 }  // namespace levelset::solids

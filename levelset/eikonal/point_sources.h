@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "levelset/eikonal/upwind.h"
-#include "levelset/geometry/point_tree.h"
+#include "levelset/geometry/search/point_search.h"
 
 namespace levelset::eikonal {
 
@@ -57,7 +57,9 @@ class PointSources {
  public:
   /// @param slowness  slowness at each point; kFar where the front cannot pass
   PointSources(std::vector<openvdb::Vec3d> positions, std::vector<double> slowness)
-      : positions_(std::move(positions)), slowness_(std::move(slowness)), tree_(positions_) {}
+      : positions_(std::move(positions)),
+        slowness_(std::move(slowness)),
+        tree_(makePointSearch(positions_)) {}
   PointSources(const PointSources&) = delete;
   PointSources& operator=(const PointSources&) = delete;
 
@@ -67,7 +69,9 @@ class PointSources {
   [[nodiscard]] StraightTime straightTime(const openvdb::Coord& gridPoint, double slowness) const {
     const openvdb::Vec3d x = gridPoint.asVec3d();
     const std::uint32_t i =
-        positions_.size() == 1 ? 0 : tree_.nearest(x, std::numeric_limits<double>::max());
+        positions_.size() == 1
+            ? 0
+            : tree_.closest(toImath(x), std::numeric_limits<double>::infinity()).index;
     if (slowness_[i] > 2 * slowness || x == positions_[i]) return {};
     return {x - positions_[i], slowness_[i]};
   }
@@ -75,7 +79,7 @@ class PointSources {
  private:
   std::vector<openvdb::Vec3d> positions_;
   std::vector<double> slowness_;
-  PointTree tree_;
+  PointSearch tree_;
 };
 
 }  // namespace levelset::eikonal

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace levelset::embossing {
 
@@ -38,47 +39,40 @@ Polyline onSpline(const Polyline& line, double tolerance) {
   return result;
 }
 
-EmbossCurve::EmbossCurve(const Polyline& line) {
-  const std::vector<Vec3d>& p = line.points;
-  if (!line.isJoined || p.size() == 1) {
-    for (const Vec3d& point : p) segments_.push_back({point, point});
-  } else {
-    for (std::size_t i = 0; i + 1 < p.size(); ++i) segments_.push_back({p[i], p[i + 1]});
-    if (line.isClosed) segments_.push_back({p.back(), p.front()});
-  }
-  for (const Vec3d& point : p) bounds_.expand(point);
-  tree_ = BoxTree(
-      segments_.size(),
-      [&](std::uint32_t i, Vec3d& low, Vec3d& high) {
-        for (const Vec3d& end : {segments_[i].begin, segments_[i].end}) {
-          low = openvdb::math::minComponent(low, end);
-          high = openvdb::math::maxComponent(high, end);
-        }
-      },
-      [&](std::uint32_t i, int axis) { return segments_[i].begin[axis] + segments_[i].end[axis]; });
+ItemBox<double> SegmentItem::box() const {
+  ItemBox<double> box{begin, begin};
+  box.extendBy({end, end});
+  return box;
 }
 
-double EmbossCurve::squaredDistance(const Vec3d& from, const Segment& segment) {
-  const Vec3d along = segment.end - segment.begin, to = from - segment.begin;
-  const double squared = along.lengthSqr();
+double SegmentItem::squaredDistance(const Imath::V3d& from) const {
+  const Imath::V3d along = end - begin, to = from - begin;
+  const double squared = along.dot(along);
   const double t = squared > 0 ? std::clamp(to.dot(along) / squared, 0.0, 1.0) : 0;
-  return (to - t * along).lengthSqr();
+  const Imath::V3d gap = to - along * t;
+  return gap.dot(gap);
+}
+
+EmbossCurve::EmbossCurve(const Polyline& line) {
+  const std::vector<Vec3d>& p = line.points;
+  std::vector<SegmentItem> segments;
+  const auto add = [&](const Vec3d& begin, const Vec3d& end) {
+    segments.push_back({toImath(begin), toImath(end), static_cast<std::uint32_t>(segments.size())});
+    length_ += (end - begin).length();
+  };
+  if (!line.isJoined || p.size() == 1) {
+    for (const Vec3d& point : p) add(point, point);
+  } else {
+    for (std::size_t i = 0; i + 1 < p.size(); ++i) add(p[i], p[i + 1]);
+    if (line.isClosed) add(p.back(), p.front());
+  }
+  for (const Vec3d& point : p) bounds_.expand(point);
+  tree_ = OverlapTree<SegmentItem>(std::move(segments));
 }
 
 double EmbossCurve::distance(const Vec3d& from, double limit) const {
-  double squared = limit * limit;
-  const double before = squared;
-  tree_.search(from, squared, [&](std::uint32_t begin, std::uint32_t end) {
-    for (std::uint32_t i = begin; i < end; ++i)
-      squared = std::min(squared, squaredDistance(from, segments_[tree_.order()[i]]));
-  });
-  return squared < before ? std::sqrt(squared) : limit;
-}
-
-double EmbossCurve::length() const {
-  double sum = 0;
-  for (const Segment& segment : segments_) sum += (segment.end - segment.begin).length();
-  return sum;
+  const FoundItem found = tree_.closest(toImath(from), limit * limit);
+  return found.isValid() ? std::sqrt(found.squared) : limit;
 }
 
 }  // namespace levelset::embossing

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "levelset/geometry/box_tree.h"
+#include "levelset/geometry/search/overlap_tree.h"
 #include "levelset/vdb.h"
 
 namespace levelset::embossing {
@@ -23,7 +23,22 @@ struct Polyline {
 /// points
 [[nodiscard]] Polyline onSpline(const Polyline& line, double tolerance);
 
-/// Points or segments in a tree of bounding boxes, for distances.
+/// Line segment with its number; a separate point is a segment without length.
+struct SegmentItem {
+  using Number = double;
+  static constexpr bool kHasExtent = true;
+  Imath::V3d begin, end;
+  std::uint32_t index;
+
+  [[nodiscard]] ItemBox<double> box() const;
+  [[nodiscard]] double centre(int axis) const { return begin[axis] + end[axis]; }
+  [[nodiscard]] double squaredDistance(const Imath::V3d& from) const;
+  [[nodiscard]] bool isSameAs(const SegmentItem& other) const {
+    return begin == other.begin && end == other.end;
+  }
+};
+
+/// Points or segments in a search tree, for distances.
 class EmbossCurve {
  public:
   explicit EmbossCurve(const Polyline& line);
@@ -32,17 +47,12 @@ class EmbossCurve {
   [[nodiscard]] double distance(const openvdb::Vec3d& from, double limit) const;
   [[nodiscard]] const openvdb::BBoxd& bounds() const { return bounds_; }
   /// Sum of the lengths of the segments.
-  [[nodiscard]] double length() const;
+  [[nodiscard]] double length() const { return length_; }
 
  private:
-  struct Segment {
-    openvdb::Vec3d begin, end;
-  };
-  [[nodiscard]] static double squaredDistance(const openvdb::Vec3d& from, const Segment& segment);
-
-  std::vector<Segment> segments_;  ///< a separate point is a segment without length
+  OverlapTree<SegmentItem> tree_;
   openvdb::BBoxd bounds_;
-  BoxTree tree_;
+  double length_ = 0;
 };
 
 }  // namespace levelset::embossing

@@ -11,7 +11,7 @@
 #include "levelset/distance/surface/surface_points.h"
 #include "levelset/error.h"
 #include "levelset/evolve/front_motion_vdb.h"
-#include "levelset/geometry/point_tree.h"
+#include "levelset/geometry/search/point_search.h"
 #include "levelset/hamilton_jacobi/time_steps.h"
 #include "levelset/vdb.h"
 
@@ -62,22 +62,18 @@ void checkEvolveOptions(const NarrowBand& solid, double time, const EvolveOption
 /// Weight that falls from 1 at the points of a set to 0 at the distance `radius`.
 class FalloffWeight {
  public:
-  explicit FalloffWeight(const PointFalloff& falloff) : radius_(falloff.radius) {
-    for (const V3d& p : falloff.points) points_.push_back(toVdb(p));
-    tree_.emplace(points_);
-  }
+  explicit FalloffWeight(const PointFalloff& falloff)
+      : radius_(falloff.radius), tree_(makePointSearch(falloff.points)) {}
   double operator()(const V3d& world) const {
-    const openvdb::Vec3d p = toVdb(world);
-    const std::uint32_t nearest = tree_->nearest(p, radius_);
-    if (nearest == eikonal::PointTree::kNone) return 0;
-    const double t = std::min(1.0, (points_[nearest] - p).length() / radius_);
+    const FoundItem nearest = tree_.closest(world, radius_ * radius_);
+    if (!nearest.isValid()) return 0;
+    const double t = std::min(1.0, std::sqrt(nearest.squared) / radius_);
     return 1 - t * t * (3 - 2 * t);
   }
 
  private:
   double radius_;
-  std::vector<openvdb::Vec3d> points_;
-  std::optional<eikonal::PointTree> tree_;
+  PointSearch tree_;
 };
 
 /// Returns the product of mask and falloff; empty: 1 everywhere.

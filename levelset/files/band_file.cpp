@@ -49,7 +49,7 @@ std::string valueType(const VdbEntry& entry) {
     const std::string wide = entry.type == openvdb::Vec3DTree::treeType() ? "vec3d" : "vec3s";
     return entry.half ? wide + " as half" : wide;
   }
-  return entry.type;
+  return entry.type == "Tree_ptdataidx32_5_4_3" ? "points" : entry.type;
 }
 
 bool hasNumbers(const VdbEntry& entry) {

@@ -25,23 +25,6 @@ void initializeOnce() {
   std::call_once(once, [] { openvdb::initialize(); });
 }
 
-std::vector<VdbMetadata> readMetadata(VdbBytes& bytes) {
-  constexpr std::size_t kMinSize = 12;  // bytes: the lengths of name, type and value
-  const auto count = bytes.value<std::uint32_t>();
-  if (count > bytes.remaining() / kMinSize)
-    bytes.fail(
-        fmt::format("its header promises {} metadata entries, which the file cannot hold", count));
-  std::vector<VdbMetadata> result;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    VdbMetadata entry;
-    entry.name = bytes.text();
-    entry.type = bytes.text();
-    entry.value = bytes.text();
-    result.push_back(entry);
-  }
-  return result;
-}
-
 /// Reads the header of the file.
 /// @return true when the file stores where each grid begins and ends
 bool readFileHeader(VdbBytes& bytes) {
@@ -59,7 +42,7 @@ bool readFileHeader(VdbBytes& bytes) {
   static_cast<void>(bytes.take(2 * sizeof(std::uint32_t)));  // skips the version of the library
   const bool hasOffsets = bytes.value<char>() != 0;
   static_cast<void>(bytes.take(kIdentifierSize));
-  static_cast<void>(readMetadata(bytes));
+  static_cast<void>(readVdbMetadata(bytes));
   return hasOffsets;
 }
 
@@ -115,6 +98,23 @@ void skipTree(VdbBytes& bytes, const VdbEntry& entry, std::int64_t end) {
 }
 
 }  // namespace
+
+std::vector<VdbMetadata> readVdbMetadata(VdbBytes& bytes) {
+  constexpr std::size_t kMinSize = 12;  // bytes: the lengths of name, type and value
+  const auto count = bytes.value<std::uint32_t>();
+  if (count > bytes.remaining() / kMinSize)
+    bytes.fail(
+        fmt::format("its header promises {} metadata entries, which the file cannot hold", count));
+  std::vector<VdbMetadata> result;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    VdbMetadata entry;
+    entry.name = bytes.text();
+    entry.type = bytes.text();
+    entry.value = bytes.text();
+    result.push_back(entry);
+  }
+  return result;
+}
 
 void VdbBytes::seek(std::size_t position) {
   if (position > file_.size())
@@ -179,7 +179,7 @@ std::vector<VdbEntry> readVdbEntries(std::string_view file, const std::string& n
     if (hasOffsets && end <= 0)
       bytes.fail(fmt::format("the header does not state where grid '{}' ends", entry.name));
     entry.compression = bytes.value<std::uint32_t>();
-    entry.metadata = readMetadata(bytes);
+    entry.metadata = readVdbMetadata(bytes);
     entry.transform = readTransform(bytes, version);
     entry.treePosition = bytes.position();
     const VdbMetadata* given = entry.find(openvdb::GridBase::META_GRID_NAME);

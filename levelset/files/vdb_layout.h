@@ -13,10 +13,10 @@
 #include "levelset/progress.h"
 #include "levelset/vdb.h"
 
-// Private to levelset/files: this library's own reader of .vdb files. OpenVDB's reader trusts all
-// counts and sizes in a file. On a damaged file it loops for hours, writes past buffers or leaks
-// memory. This reader checks each count and size against the bytes present. Only the decompression
-// is OpenVDB's, for blocks whose sizes have been checked.
+// Private to levelset/files and point_files: this library's own reader of .vdb files. OpenVDB's
+// reader trusts all counts and sizes in a file. On a damaged file it loops for hours, writes past
+// buffers or leaks memory. This reader checks each count and size against the bytes present. Only
+// the decompression is OpenVDB's, for blocks whose sizes have been checked.
 
 namespace levelset {
 
@@ -77,6 +77,9 @@ struct VdbEntry {
   [[nodiscard]] const VdbMetadata* find(std::string_view key) const;
   [[nodiscard]] std::string gridClass() const;
 };
+
+/// Reads a list of metadata. @throws InvalidInput when the file is damaged
+[[nodiscard]] std::vector<VdbMetadata> readVdbMetadata(VdbBytes& bytes);
 
 /// Reads the headers of all grids of the file and skips the trees.
 /// @throws InvalidInput when the file is damaged

@@ -9,7 +9,7 @@
 #include "levelset/progress.h"
 #include "levelset/vdb.h"
 
-// Private to levelset/files: writes grids to .vdb files.
+// Private to levelset/files and point_files: writes grids to .vdb files.
 
 namespace levelset {
 

@@ -11,8 +11,8 @@
 #include "levelset/distance/surface/closest_point.h"
 #include "levelset/distance/surface/surface_points.h"
 #include "levelset/error.h"
-#include "levelset/geometry/point_tree.h"
-#include "levelset/geometry/triangle_tree.h"
+#include "levelset/geometry/search/point_search.h"
+#include "levelset/geometry/search/triangle_search.h"
 #include "levelset/inspect/curved_surface.h"
 #include "levelset/inspect/symmetric_difference.h"
 #include "levelset/meshing/cells/cell_surface.h"
@@ -53,13 +53,15 @@ class ZeroSet {
       CurvedSurface::Cache cache = surface.makeCache();
       for (std::size_t i = first; i < end; ++i) samples_[i] = surface.middle(i, cache);
     });
-    std::vector<TriangleTree::Triangle> flat;
+    std::vector<TriangleItem> flat;
     for (std::size_t i = 0; i < samples_.size(); ++i) {
       const auto& [a, b, c] = mesh.triangles[i];
       if (samples_[i].isFlat)
-        flat.push_back({mesh.positions[a], mesh.positions[b], mesh.positions[c]});
+        flat.push_back(
+            {{toImath(mesh.positions[a]), toImath(mesh.positions[b]), toImath(mesh.positions[c])},
+             static_cast<std::uint32_t>(flat.size())});
     }
-    flat_ = TriangleTree(std::move(flat));
+    flat_ = TriangleSearch(std::move(flat));
   }
 
   using Cache = eikonal::DenseBlockCache;
@@ -74,7 +76,8 @@ class ZeroSet {
   /// fail at edges, so the flat triangles there are tested as well.
   [[nodiscard]] double distance(const Vec3d& world, Cache& cache) const {
     const Vec3d query = transform_->worldToIndex(world);
-    const Vec3d start = points_.positions[tree_.nearest(query, std::numeric_limits<double>::max())];
+    constexpr double kAny = std::numeric_limits<double>::infinity();
+    const Vec3d start = points_.positions[tree_.closest(toImath(query), kAny).index];
     double best = (query - start).length();
     for (const bool atQuery : {false, true}) {
       if (atQuery && best > kOwnStart) break;
@@ -84,8 +87,8 @@ class ZeroSet {
       const eikonal::Foot foot = eikonal::closestPoint(block, query - origin, from - origin);
       if (foot.converged) best = std::min(best, foot.distance);
     }
-    const TriangleTree::Hit hit = flat_.nearest(query, best);
-    return voxelSize_ * (hit.found ? hit.distance : best);
+    const FoundItem hit = flat_.closest(toImath(query), best * best);
+    return voxelSize_ * (hit.isValid() ? std::sqrt(hit.squared) : best);
   }
 
  private:
@@ -107,17 +110,17 @@ class ZeroSet {
   ZeroSet(const FloatGrid& grid, Points found)
       : field_(std::move(found.field)),
         points_(std::move(found.points)),
-        tree_(points_.positions),
+        tree_(makePointSearch(points_.positions)),
         transform_(grid.transformPtr()),
         voxelSize_(grid.voxelSize()[0]) {}
 
   FloatTree::ConstPtr field_;
   eikonal::SurfacePoints points_;
-  eikonal::PointTree tree_;
+  PointSearch tree_;
   openvdb::math::Transform::ConstPtr transform_;
   double voxelSize_;
   std::vector<Sample> samples_;
-  TriangleTree flat_;
+  TriangleSearch flat_;
 };
 
 struct DistanceSums {

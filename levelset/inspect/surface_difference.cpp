@@ -9,8 +9,8 @@
 #include <unordered_map>
 
 #include "levelset/error.h"
-#include "levelset/geometry/point_tree.h"
-#include "levelset/geometry/triangle_tree.h"
+#include "levelset/geometry/search/point_search.h"
+#include "levelset/geometry/search/triangle_search.h"
 #include "levelset/progress_gate.h"
 #include "levelset/vdb.h"
 
@@ -20,19 +20,10 @@ using Imath::V3d;
 
 struct TriangleSurface::Data {
   TriMesh mesh;
-  TriangleTree tree;
+  TriangleSearch tree;
 };
 
 namespace {
-
-TriangleTree treeOf(const TriMesh& mesh) {
-  std::vector<TriangleTree::Triangle> triangles;
-  triangles.reserve(mesh.triangles.size());
-  for (const auto& [a, b, c] : mesh.triangles)
-    triangles.push_back(
-        {toVdb(mesh.positions[a]), toVdb(mesh.positions[b]), toVdb(mesh.positions[c])});
-  return TriangleTree(std::move(triangles));
-}
 
 /// Number of samples per task. Consecutive samples are usually close in space, which makes the
 /// searches of SampleScan fast.
@@ -57,7 +48,7 @@ struct DifferenceSums {
 /// the distance grows by at most the distance between the two samples. This bounds the search.
 class SampleScan {
  public:
-  SampleScan(const TriangleSurface& target, const eikonal::PointTree* creases, double reach)
+  SampleScan(const TriangleSurface& target, const PointSearch* creases, double reach)
       : target_(target), creases_(creases), reach_(reach) {}
 
   /// Measures one sample.
@@ -68,7 +59,7 @@ class SampleScan {
     last_ = target_.distance(point, limit);
     at_ = point;
     ++sums_.samples;
-    if (creases_ && creases_->nearest(toVdb(point), reach_) != eikonal::PointTree::kNone) {
+    if (creases_ && isNear(*creases_, point, reach_)) {
       sums_.crease = std::max(sums_.crease, last_);
       ++sums_.creaseSamples;
       return 0;
@@ -80,7 +71,7 @@ class SampleScan {
 
  private:
   const TriangleSurface& target_;
-  const eikonal::PointTree* creases_;
+  const PointSearch* creases_;
   double reach_;
   V3d at_{0};
   double last_ = 0;
@@ -150,8 +141,8 @@ std::vector<std::uint32_t> farthest(const std::vector<float>& distances, double 
 /// a quarter of it where distances are largest. The error of the largest distance is then about one
 /// percent.
 DifferenceSums differenceTo(const TriangleSurface& target, const TriangleSurface& surface,
-                            const eikonal::PointTree* creases,
-                            const SurfaceDifferenceOptions& options, const Progress& progress) {
+                            const PointSearch* creases, const SurfaceDifferenceOptions& options,
+                            const Progress& progress) {
   constexpr double kDenser = 4;
   const TriMesh& mesh = surface.mesh();
   const SampleScan fresh(target, creases, options.creaseRadius);
@@ -251,7 +242,7 @@ class TurnGrid {
 TriangleSurface::TriangleSurface(TriMesh mesh) {
   if (mesh.isEmpty())
     throw InvalidInput("a result has no surface to measure; choose a result with a surface");
-  TriangleTree tree = treeOf(mesh);
+  TriangleSearch tree = makeTriangleSearch(mesh);
   data_ = std::make_shared<const Data>(Data{std::move(mesh), std::move(tree)});
 }
 
@@ -262,17 +253,15 @@ const TriMesh& TriangleSurface::mesh() const {
 double TriangleSurface::distance(const V3d& point, double limit) const {
   // Enlarges the limit slightly, in case rounding made it too small.
   const double wide = limit < 1e300 ? limit * (1 + 1e-9) + 1e-300 : limit;
-  const TriangleTree::Hit near = data_->tree.nearest(toVdb(point), wide);
-  if (near.found) return near.distance;
-  return data_->tree.nearest(toVdb(point), 1e150).distance;
+  FoundItem near = data_->tree.closest(point, wide * wide);
+  if (!near.isValid()) near = data_->tree.closest(point, 1e300);
+  return std::sqrt(near.squared);
 }
 
 SurfaceDifference surfaceDifference(const TriangleSurface& a, const TriangleSurface& b,
                                     const SurfaceDifferenceOptions& options) {
-  std::vector<openvdb::Vec3d> points;
-  for (const V3d& point : options.creases) points.push_back(toVdb(point));
-  const eikonal::PointTree creases(points);
-  const eikonal::PointTree* near = points.empty() ? nullptr : &creases;
+  const PointSearch creases = makePointSearch(options.creases);
+  const PointSearch* near = creases.isEmpty() ? nullptr : &creases;
   DifferenceSums sums = differenceTo(b, a, near, options, subProgress(options.progress, 0, 0.5));
   sums.add(differenceTo(a, b, near, options, subProgress(options.progress, 0.5, 1)));
   return {

@@ -13,7 +13,7 @@ using openvdb::Mat3d;
 using openvdb::Vec3d;
 
 // Memory of a piece with its part of the search tree, bytes.
-constexpr double kBytesPerFilteredPiece = 68 + 2 * 40.0;
+constexpr double kBytesPerFilteredPiece = 68 + PieceTree::bytesPerItem();
 
 /// Point of the parallelogram first + s u + t v, 0 ≤ s, t ≤ 1, that is closest to a position.
 std::array<double, 2> closestOnParallelogram(const Vec3d& first, const Vec3d& u, const Vec3d& v,
@@ -143,26 +143,24 @@ double FilteredSurface::distance(const Vec3d& position, double most, Hint& hint)
   };
   if (hint.function >= 0)
     take(Descent(*this, hint.function, target).run(hint.index, nullptr), hint.function);
-  tree_.search(position, best, [&](std::uint32_t begin, std::uint32_t end) {
-    for (std::uint32_t n = begin; n < end; ++n) {
-      const Piece& piece = pieces_[tree_.order()[n]];
-      if (squaredBound(piece, position) >= best) continue;
-      const bool bendsLittle = piece.bend < kLittleBend * piece.radius;
-      const Foot* known =
-          foot && foot->isMinimum && bendsLittle && function == piece.function ? &*foot : nullptr;
-      if (known) {
-        bool isHere = true;
-        for (int axis = 0; axis < 3; ++axis) {
-          const double low = static_cast<double>(piece.first[static_cast<std::size_t>(axis)]);
-          isHere = isHere && known->index[axis] >= low &&
-                   known->index[axis] <= low + static_cast<double>(piece.edge);
-        }
-        if (isHere) continue;
+  tree_.visit(toImath(position), best, [&](const BoxItem& item) {
+    const Piece& piece = pieces_[item.index];
+    if (squaredBound(piece, position) >= best) return;
+    const bool bendsLittle = piece.bend < kLittleBend * piece.radius;
+    const Foot* known =
+        foot && foot->isMinimum && bendsLittle && function == piece.function ? &*foot : nullptr;
+    if (known) {
+      bool isHere = true;
+      for (int axis = 0; axis < 3; ++axis) {
+        const double low = static_cast<double>(piece.first[static_cast<std::size_t>(axis)]);
+        isHere = isHere && known->index[axis] >= low &&
+                 known->index[axis] <= low + static_cast<double>(piece.edge);
       }
-      take(Descent(*this, piece.function, target)
-               .run(Vec3d(piece.start[0], piece.start[1], piece.start[2]), known),
-           piece.function);
+      if (isHere) return;
     }
+    take(Descent(*this, piece.function, target)
+             .run(Vec3d(piece.start[0], piece.start[1], piece.start[2]), known),
+         piece.function);
   });
   if (foot) hint = {function, foot->index};
   return std::sqrt(best);

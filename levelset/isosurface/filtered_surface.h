@@ -7,7 +7,6 @@
 #include <optional>
 #include <vector>
 
-#include "levelset/geometry/box_tree.h"
 #include "levelset/isosurface/isosurface.h"
 #include "levelset/isosurface/surface_pieces.h"
 #include "levelset/isosurface/volume_frame.h"
@@ -131,7 +130,7 @@ class FilteredSurface {
   Vec3d last_;  ///< index of the last grid point
   std::vector<Piece> pieces_;
   std::vector<Face> faces_;
-  BoxTree tree_;
+  PieceTree tree_;
   IsosurfaceReport report_;
 };
 

@@ -12,9 +12,10 @@
 #include <vector>
 
 #include "levelset/error.h"
-#include "levelset/geometry/box_tree.h"
+#include "levelset/geometry/search/overlap_tree.h"
 #include "levelset/isosurface/isosurface.h"
 #include "levelset/progress.h"
+#include "levelset/vdb.h"
 
 namespace levelset {
 
@@ -71,26 +72,33 @@ std::uint64_t collectSlabs(int slabs, double bytesPerPiece, std::size_t maxMemor
   return cells;
 }
 
+/// Box of a part of a surface, with the number of the part.
+struct BoxItem {
+  using Number = float;
+  static constexpr bool kHasExtent = true;
+  ItemBox<float> bounds;
+  std::uint32_t index;
+
+  [[nodiscard]] const ItemBox<float>& box() const { return bounds; }
+  [[nodiscard]] float centre(int axis) const { return bounds.centre(axis); }
+  /// Several parts may have one box.
+  [[nodiscard]] bool isSameAs(const BoxItem&) const { return false; }
+};
+using PieceTree = OverlapTree<BoxItem>;
+
 /// Tree of the bounds of the first items of a surface. @param count  number of these items
 /// @throws ResourceLimit when the surface has too many items
 template <typename Surface>
-BoxTree treeOf(const Surface& surface, std::size_t count) {
-  using openvdb::Vec3d;
-  if (surface.itemCount() > std::numeric_limits<std::uint32_t>::max())
-    throw ResourceLimit("the surface has more than 4 billion pieces; crop the volume");
-  return BoxTree(
-      count,
-      [&](std::uint32_t item, Vec3d& low, Vec3d& high) {
-        Vec3d from, to;
-        surface.bound(item, from, to);
-        low = openvdb::math::minComponent(low, from);
-        high = openvdb::math::maxComponent(high, to);
-      },
-      [&](std::uint32_t item, int axis) {
-        Vec3d from, to;
-        surface.bound(item, from, to);
-        return from[axis] + to[axis];
-      });
+PieceTree treeOf(const Surface& surface, std::size_t count) {
+  if (surface.itemCount() >= std::size_t{1} << 29)
+    throw ResourceLimit("the surface has more than 500 million pieces; crop the volume");
+  std::vector<BoxItem> items(count);
+  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+    openvdb::Vec3d low, high;
+    surface.bound(i, low, high);
+    items[i] = {floatBox(toImath(low), toImath(high)), static_cast<std::uint32_t>(i)};
+  });
+  return PieceTree(std::move(items));
 }
 
 }  // namespace levelset

@@ -15,7 +15,7 @@ namespace {
 // moves the surface by less than single precision resolves, and no sample lies on it.
 constexpr float kOutside = 0x1p-24f;
 // Memory of a piece with its part of the search tree, bytes.
-constexpr double kBytesPerPiece = sizeof(Piece) + 2 * 40.0;
+constexpr double kBytesPerPiece = sizeof(Piece) + PieceTree::bytesPerItem();
 
 bool crosses(const std::array<float, 8>& corner) {
   int positive = 0;
@@ -264,9 +264,8 @@ double TrilinearSurface::distance(const Vec3d& position, double most, Hint& hint
     hint.item = item;
   };
   if (hint.item < itemCount()) look(hint.item);
-  tree_.search(position, best, [&](std::uint32_t begin, std::uint32_t end) {
-    for (std::uint32_t n = begin; n < end; ++n)
-      if (tree_.order()[n] != hint.item) look(tree_.order()[n]);
+  tree_.visit(toImath(position), best, [&](const BoxItem& item) {
+    if (item.index != hint.item) look(item.index);
   });
   return std::sqrt(best);
 }

@@ -5,7 +5,6 @@
 #include <limits>
 #include <vector>
 
-#include "levelset/geometry/box_tree.h"
 #include "levelset/isosurface/isosurface.h"
 #include "levelset/isosurface/surface_pieces.h"
 #include "levelset/isosurface/trilinear_piece.h"
@@ -66,7 +65,7 @@ class TrilinearSurface {
   std::array<Mat3d, kMostLevels> metric_, inverse_;
   std::vector<Piece> pieces_;
   std::vector<BorderFace> faces_;
-  BoxTree tree_;
+  PieceTree tree_;
   IsosurfaceReport report_;
 };
 

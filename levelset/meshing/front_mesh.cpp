@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "levelset/error.h"
-#include "levelset/geometry/point_tree.h"
+#include "levelset/geometry/search/point_search.h"
 #include "levelset/geometry/surface_components.h"
 #include "levelset/grids/sample.h"
 #include "levelset/meshing/band_to_mesh.h"
@@ -90,50 +90,44 @@ class ComponentVertices {
  public:
   ComponentVertices(const TriMesh& mesh, const EdgeLengths& edges, const Component& component)
       : points_([&] {
-          std::vector<openvdb::Vec3d> points;
+          std::vector<V3d> points;
           points.reserve(component.vertices.size());
-          for (const std::uint32_t v : component.vertices)
-            points.push_back(toVdb(mesh.positions[v]));
+          for (const std::uint32_t v : component.vertices) points.push_back(mesh.positions[v]);
           return points;
         }()),
-        tree_(points_) {
+        tree_(makePointSearch(points_)) {
     lengths_.reserve(points_.size());
     for (const std::uint32_t v : component.vertices) lengths_.push_back(edges.lengths[v]);
     longest_ = *std::max_element(lengths_.begin(), lengths_.end());
   }
 
   [[nodiscard]] std::optional<V3d> nearest(const V3d& p, double limit) const {
-    const std::uint32_t found = tree_.nearest(toVdb(p), limit);
-    if (found == eikonal::PointTree::kNone) return {};
-    const openvdb::Vec3d& q = points_[found];
-    return V3d(q.x(), q.y(), q.z());
+    const FoundItem found = tree_.closest(p, limit * limit);
+    if (!found.isValid()) return {};
+    return points_[found.index];
   }
   [[nodiscard]] double lengthAt(const V3d& p) const {
-    const std::uint32_t found = tree_.nearest(toVdb(p), 4 * longest_);
-    return lengths_[found == eikonal::PointTree::kNone ? 0 : found];
+    const FoundItem found = tree_.closest(p, 16 * longest_ * longest_);
+    return lengths_[found.isValid() ? found.index : 0];
   }
   [[nodiscard]] double longest() const { return longest_; }
 
   /// Returns true if each vertex has a vertex of a front within two edge lengths and `margin`.
   [[nodiscard]] bool areNear(const FrontMesh& front, double scale, double margin) const {
-    std::vector<openvdb::Vec3d> points;
-    points.reserve(front.positions.size());
-    for (const V3d& p : front.positions) points.push_back(toVdb(p));
-    const eikonal::PointTree tree(points);
+    const PointSearch tree = makePointSearch(front.positions);
     std::atomic<bool> all = true;
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points_.size(), 1024),
                       [&](const tbb::blocked_range<std::size_t>& range) {
                         for (std::size_t i = range.begin(); i < range.end() && all; ++i)
-                          if (tree.nearest(points_[i], 2 * scale * lengths_[i] + margin) ==
-                              eikonal::PointTree::kNone)
+                          if (!isNear(tree, points_[i], 2 * scale * lengths_[i] + margin))
                             all = false;
                       });
     return all;
   }
 
  private:
-  std::vector<openvdb::Vec3d> points_;
-  eikonal::PointTree tree_;
+  std::vector<V3d> points_;
+  PointSearch tree_;
   std::vector<double> lengths_;
   double longest_ = 0;
 };

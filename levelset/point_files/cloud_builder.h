@@ -19,11 +19,16 @@ class CloudBuilder {
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] bool wantsAttributes() const { return options_.attributes; }
+  /// Name of the grid to read; empty: the only one.
+  [[nodiscard]] const std::string& grid() const { return options_.grid; }
   [[nodiscard]] PointCloud& cloud() { return cloud_; }
+  [[nodiscard]] const PointCloud& cloud() const { return cloud_; }
   /// Reserves memory for the points that a header promises. The caller has checked their number
   /// against the size of the file.
   /// @param attributes  one entry in each list that the points will fill
   void reserve(std::size_t points, const PointCloud& attributes);
+  /// @throws ResourceLimit when `bytes` more bytes would exceed the memory limit
+  void requireMore(double bytes) const;
   /// Declares the precision of the coordinates. If it is not called, the precision is Float when
   /// every coordinate is exactly a float, else Double.
   void declarePrecision(CoordinatePrecision precision);
@@ -43,8 +48,6 @@ class CloudBuilder {
   [[nodiscard]] PointCloud finish();
 
  private:
-  void requireMore(double bytes) const;
-
   PointCloud cloud_;
   std::string name_;
   const ReadPointsOptions& options_;
@@ -56,12 +59,23 @@ void readPlyPoints(std::string_view input, CloudBuilder& builder);
 void readObjPoints(std::string_view input, CloudBuilder& builder);
 void readXyzPoints(std::string_view input, CloudBuilder& builder);
 void readPtsPoints(std::string_view input, CloudBuilder& builder);
+/// Reads a grid of points. Points come in the order of the grid.
+void readVdbPoints(std::string_view input, CloudBuilder& builder);
 
 void writePlyPoints(ByteWriter& out, const PointCloud& cloud, const Progress& progress);
 void writeObjPoints(ByteWriter& out, const PointCloud& cloud, const Progress& progress);
 void writeXyzPoints(ByteWriter& out, const PointCloud& cloud, const Progress& progress);
 void writeCsvPoints(ByteWriter& out, const PointCloud& cloud, const Progress& progress);
 void writePtsPoints(ByteWriter& out, const PointCloud& cloud, const Progress& progress);
+
+/// Writes the points as one grid. @param name  name of the grid
+void writeVdbPoints(const std::filesystem::path& path, const PointCloud& cloud,
+                    const std::string& name, const Progress& progress);
+/// Returns true if the grid of that name holds points. Without a name: if the file has points, and
+/// no level set.
+/// @throws InvalidInput
+[[nodiscard]] bool vdbHoldsPoints(std::string_view input, const std::string& grid,
+                                  const std::string& name);
 
 /// Reads the properties of a file of points from its first bytes.
 /// @param fileSize  size of the complete file; 0: unknown

@@ -18,7 +18,7 @@ using point_files::CloudBuilder;
 struct PointFormat {
   const char* extension;
   void (*read)(std::string_view, CloudBuilder&);
-  void (*write)(ByteWriter&, const PointCloud&, const Progress&);
+  void (*write)(ByteWriter&, const PointCloud&, const Progress&);  ///< null: writeVdbPoints()
   bool isOnlyPoints;  ///< false: the format also holds meshes
   bool hasNormals, hasColors, hasMore;
 };
@@ -28,7 +28,8 @@ constexpr PointFormat kPointFormats[] = {
     {"obj", point_files::readObjPoints, point_files::writeObjPoints, false, true, true, false},
     {"xyz", point_files::readXyzPoints, point_files::writeXyzPoints, true, true, true, false},
     {"csv", point_files::readXyzPoints, point_files::writeCsvPoints, true, true, true, true},
-    {"pts", point_files::readPtsPoints, point_files::writePtsPoints, true, false, true, false}};
+    {"pts", point_files::readPtsPoints, point_files::writePtsPoints, true, false, true, false},
+    {"vdb", point_files::readVdbPoints, nullptr, false, true, true, true}};
 
 struct PointFormatChoice {
   const PointFormat* format;
@@ -52,7 +53,7 @@ PointFormatChoice pointFormat(const fs::path& path, const std::string& given) {
   if (const auto choice = findPointFormat(name)) return *choice;
   throw UsageError(fmt::format(
       "'{}' names no format of points; use ply, obj, xyz, csv or pts, with .gz appended "
-      "if compressed",
+      "if compressed, or vdb",
       name.string()));
 }
 
@@ -83,6 +84,11 @@ void writePoints(const fs::path& path, const PointCloud& cloud, const WritePoint
     throw InvalidInput(
         "the point cloud has no points, and a file needs one; check the actions "
         "before it");
+  if (!choice.format->write) {
+    if (choice.isCompressed)
+      throw UsageError("a .vdb file is compressed already; write it without .gz");
+    return point_files::writeVdbPoints(path, cloud, options.name, options.progress);
+  }
   report(options.progress, 0);
   ByteWriter out(path, choice.isCompressed);
   choice.format->write(out, cloud, options.progress);
@@ -112,7 +118,8 @@ bool holdsPoints(const fs::path& nameOrFormat) {
 
 bool lacksFaces(const fs::path& path, const std::string& format) {
   const auto choice = findPointFormat(format.empty() ? path : fs::path(format));
-  if (!choice || choice->format->isOnlyPoints || path == "-") return false;
+  if (!choice || choice->format->isOnlyPoints || !choice->format->write || path == "-")
+    return false;
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return false;  // a pipe can be read only once
   try {
@@ -120,6 +127,18 @@ bool lacksFaces(const fs::path& path, const std::string& format) {
       return point_files::plyLacksFaces(readFirstBytes(path, kPointInfoBytes).bytes.view(),
                                         inputName(path));
     return point_files::objLacksFaces(MappedFile(path).view());
+  } catch (const Error&) {  // reading the file reports the error
+    return false;
+  }
+}
+
+bool holdsPointGrid(const fs::path& path, const std::string& grid, const std::string& format) {
+  const auto choice = findPointFormat(format.empty() ? path : fs::path(format));
+  if (!choice || choice->format->write || path == "-") return false;
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return false;  // a pipe can be read only once
+  try {
+    return point_files::vdbHoldsPoints(MappedFile(path).view(), grid, inputName(path));
   } catch (const Error&) {  // reading the file reports the error
     return false;
   }

@@ -8,8 +8,9 @@
 #include "levelset/points/point_cloud.h"
 #include "levelset/progress.h"
 
-/// Reads and writes point clouds: PLY, OBJ, XYZ, CSV and PTS, each also compressed as `.gz`. The
-/// extension determines the format, unless it is given.
+/// Reads and writes point clouds: PLY, OBJ, XYZ, CSV and PTS, each also compressed as `.gz`, and
+/// grids of points in OpenVDB files (`.vdb`). The extension determines the format, unless it is
+/// given.
 ///
 /// PLY: `x y z`, and if present `nx ny nz`, `red green blue` with or without `alpha`, `radius`, and
 /// `confidence` or `weight`. OBJ: `v`, colours behind the coordinates, and one `vn` for each `v`.
@@ -24,11 +25,18 @@
 /// PTS: a line with the number of points, then x y z, and if present intensity and colour. Six
 /// columns are a colour. Several such blocks may follow each other. Colours in text and OBJ are
 /// integers from 0 to 255, or fractions if none exceeds 1.
+///
+/// VDB: attributes `P`, `N`, `Cd`, `Alpha`, `pscale` (radius) and `weight`. When read, `radius` and
+/// `confidence` are known, too. Positions are stored relative to voxels, of type float,
+/// uncompressed. They come back with an error of at most 2⁻²⁶ voxel, and exactly where they are of
+/// type float and above 2⁻¹²⁶ voxel. The voxels have about eight points. Points come back in the order of the grid.
 namespace levelset {
 
 struct ReadPointsOptions {
-  /// "ply", "obj", "xyz", "csv" or "pts", with ".gz" appended if compressed; empty: by extension
+  /// "ply", "obj", "xyz", "csv" or "pts", with ".gz" appended if compressed, or "vdb"; empty: by
+  /// extension
   std::string format = {};
+  std::string grid = {};   ///< name of the grid in a .vdb file; empty: the only one of points
   bool attributes = true;  ///< false: reads positions only
   std::size_t maxMemory = kNoMemoryLimit;
   std::vector<std::string>* notes = nullptr;  ///< receives remarks about the file; may be null
@@ -46,7 +54,8 @@ struct ReadPointsOptions {
                                     const ReadPointsOptions& options = {});
 
 struct WritePointsOptions {
-  std::string format = {};  ///< as in ReadPointsOptions; PLY is written in binary
+  std::string format = {};      ///< as in ReadPointsOptions; PLY is written in binary
+  std::string name = "points";  ///< name of the grid in a .vdb file
   Progress progress = {};
 };
 
@@ -71,6 +80,12 @@ void writePoints(const std::filesystem::path& path, const PointCloud& cloud,
 /// cloud. Returns false for other formats, and when the file cannot be read.
 /// @param format  as in ReadPointsOptions
 [[nodiscard]] bool lacksFaces(const std::filesystem::path& path, const std::string& format = {});
+
+/// Returns true if readPoints() is to read a .vdb file: if the grid of that name holds points;
+/// without a name, if the file has grids of points and no level set. Returns false for other
+/// formats, and when the file cannot be read.
+[[nodiscard]] bool holdsPointGrid(const std::filesystem::path& path, const std::string& grid = {},
+                                  const std::string& format = {});
 
 /// Properties of a file of points, from its header.
 struct PointFileInfo {

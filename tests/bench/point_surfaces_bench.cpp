@@ -35,6 +35,7 @@
 #include <string>
 #include <vector>
 
+#include "levelset/geometry/search/triangle_search.h"
 #include "levelset/inspect/measure.h"
 #include "levelset/mesh_files/mesh_file.h"
 #include "levelset/meshing/band_to_mesh.h"
@@ -43,7 +44,6 @@
 #include "levelset/points/processing/normals.h"
 #include "levelset/points/processing/point_spacing.h"
 #include "levelset/points/processing/sample_mesh.h"
-#include "levelset/points/search/triangle_search.h"
 #include "levelset/shapes/shapes.h"
 
 namespace {
@@ -193,7 +193,7 @@ struct Distances {
 Distances distances(const TriMesh& from, const TriMesh& to) {
   constexpr std::size_t kSamples = 200000;
   const PointCloud samples = levelset::sampleMesh(from, {.count = kSamples, .isBlueNoise = false});
-  const levelset::points::TriangleSearch search = levelset::points::makeTriangleSearch(to);
+  const levelset::TriangleSearch search = levelset::makeTriangleSearch(to);
   Distances result;
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const auto found =

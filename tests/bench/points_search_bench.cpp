@@ -1,13 +1,12 @@
 // Compares searches of closest points and triangles: the tree with overlapping siblings
-// (levelset/points/search) with planes and with boxes, the tree of boxes (levelset/geometry),
-// Embree's point queries, nanoflann and CGAL's tree of boxes. One thread; the least CPU seconds of
-// three runs.
+// (levelset/geometry/search), Embree's point queries, nanoflann (points) and CGAL's tree of boxes
+// (triangles). One thread; the least CPU seconds of three runs.
 //
 //   points_search_bench [MESH]…     tables on standard output
 //
 // Queries "near" lie within a thousandth of the longest side from the surface, "far" ones in a box
-// twice as long as that of the mesh. Ratios are to the tree of boxes. Exits 1 when a distance
-// differs from that of the tree of boxes by more than rounding (Embree: single precision).
+// twice as long as that of the mesh. Ratios are to nanoflann and to CGAL. Exits 1 when a distance
+// differs from theirs by more than rounding (Embree: single precision).
 
 #include <CGAL/AABB_traits.h>
 #include <CGAL/AABB_tree.h>
@@ -30,19 +29,14 @@
 #include <string>
 #include <vector>
 
-#include "levelset/geometry/point_tree.h"
-#include "levelset/geometry/triangle_tree.h"
+#include "levelset/geometry/search/point_search.h"
+#include "levelset/geometry/search/triangle_search.h"
 #include "levelset/mesh_files/mesh_file.h"
-#include "levelset/points/search/point_search.h"
-#include "levelset/points/search/triangle_search.h"
 
 namespace {
 
 using Imath::V3d;
 using levelset::TriMesh;
-using levelset::points::SiblingBoxes;
-using levelset::points::SiblingPlanes;
-using openvdb::Vec3d;
 
 constexpr std::size_t kQueries = 20000;
 constexpr double kAny = std::numeric_limits<double>::infinity();
@@ -186,29 +180,15 @@ using NanoTree =
     nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, NanoCloud>, NanoCloud,
                                         3>;
 
-template <class Bounds>
 Search overlapOfPoints(const std::vector<V3d>& points) {
-  std::vector<levelset::points::PointItem> items;
-  for (const V3d& p : points) items.push_back({p, static_cast<std::uint32_t>(items.size())});
-  using Tree = levelset::points::OverlapTree<levelset::points::PointItem, Bounds>;
-  const auto tree = std::make_shared<Tree>(std::move(items));
-  const auto found = std::make_shared<std::vector<levelset::points::Found>>();
+  const auto tree = std::make_shared<levelset::PointSearch>(levelset::makePointSearch(points));
+  const auto found = std::make_shared<std::vector<levelset::FoundItem>>();
   return {[=](const V3d& from) { return std::sqrt(tree->closest(from, kAny).squared); },
           [=](const V3d& from) {
             tree->closest(from, kNeighbours, *found);
             return std::sqrt(found->back().squared);
           },
           1e-6 * static_cast<double>(tree->memoryUse())};
-}
-
-Search boxesOfPoints(const std::vector<V3d>& points) {
-  const auto copy = std::make_shared<std::vector<Vec3d>>();
-  for (const V3d& p : points) copy->push_back(levelset::toVdb(p));
-  const auto tree = std::make_shared<levelset::eikonal::PointTree>(*copy);
-  return {[=](const V3d& from) {
-    const Vec3d p = levelset::toVdb(from);
-    return ((*copy)[tree->nearest(p, kAny)] - p).length();
-  }};
 }
 
 Search embreeOfPoints(const std::vector<V3d>& points) {
@@ -233,26 +213,11 @@ Search nanoflannOfPoints(const std::vector<V3d>& points) {
           [=](const V3d& from) { return nearest(from, kNeighbours); }};
 }
 
-template <class Bounds>
 Search overlapOfTriangles(const TriMesh& mesh) {
-  std::vector<levelset::points::TriangleItem> items;
-  for (const auto& [a, b, c] : mesh.triangles)
-    items.push_back({{mesh.positions[a], mesh.positions[b], mesh.positions[c]},
-                     static_cast<std::uint32_t>(items.size())});
-  using Tree = levelset::points::OverlapTree<levelset::points::TriangleItem, Bounds>;
-  const auto tree = std::make_shared<Tree>(std::move(items));
+  const auto tree = std::make_shared<levelset::TriangleSearch>(levelset::makeTriangleSearch(mesh));
   return {[=](const V3d& from) { return std::sqrt(tree->closest(from, kAny).squared); },
           {},
           1e-6 * static_cast<double>(tree->memoryUse())};
-}
-
-Search boxesOfTriangles(const TriMesh& mesh) {
-  std::vector<levelset::TriangleTree::Triangle> triangles;
-  for (const auto& [a, b, c] : mesh.triangles)
-    triangles.push_back({levelset::toVdb(mesh.positions[a]), levelset::toVdb(mesh.positions[b]),
-                         levelset::toVdb(mesh.positions[c])});
-  const auto tree = std::make_shared<levelset::TriangleTree>(std::move(triangles));
-  return {[=](const V3d& from) { return tree->nearest(levelset::toVdb(from), kAny).distance; }};
 }
 
 Search embreeOfTriangles(const TriMesh& mesh) {
@@ -374,25 +339,21 @@ void benchmark(const std::string& name, const TriMesh& mesh) {
   const auto points = [&](const std::string& what, const auto& make) {
     return measure(what, mesh.positions, make, near, far, nearDistances, farDistances);
   };
-  const Figures peer = points("boxes", boxesOfPoints);
+  const Figures peer = points("nanoflann", nanoflannOfPoints);
   fmt::print("points\n");
-  tell("boxes", peer, peer);
-  tell("2 planes", points("2 planes", overlapOfPoints<SiblingPlanes>), peer);
-  tell("2 boxes", points("2 boxes", overlapOfPoints<SiblingBoxes>), peer);
+  tell("nanoflann", peer, peer);
   tell("Embree", points("Embree", embreeOfPoints), peer);
-  tell("nanoflann", points("nanoflann", nanoflannOfPoints), peer);
+  tell("this tree", points("this tree", overlapOfPoints), peer);
   nearDistances.clear();
   farDistances.clear();
   const auto triangles = [&](const std::string& what, const auto& make) {
     return measure(what, mesh, make, near, far, nearDistances, farDistances);
   };
-  const Figures boxes = triangles("boxes", boxesOfTriangles);
+  const Figures cgal = triangles("CGAL", cgalOfTriangles);
   fmt::print("triangles\n");
-  tell("boxes", boxes, boxes);
-  tell("2 planes", triangles("2 planes", overlapOfTriangles<SiblingPlanes>), boxes);
-  tell("2 boxes", triangles("2 boxes", overlapOfTriangles<SiblingBoxes>), boxes);
-  tell("Embree", triangles("Embree", embreeOfTriangles), boxes);
-  tell("CGAL", triangles("CGAL", cgalOfTriangles), boxes);
+  tell("CGAL", cgal, cgal);
+  tell("Embree", triangles("Embree", embreeOfTriangles), cgal);
+  tell("this tree", triangles("this tree", overlapOfTriangles), cgal);
 }
 
 /// Plate with round pins, as CAD programs tessellate them: fans and long, thin triangles.

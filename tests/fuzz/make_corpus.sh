@@ -6,7 +6,7 @@ levelsmith="$1 --quiet --threads 1"
 cd "$(dirname "$0")/corpus"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-mkdir -p ply obj stl off gzip vdb nvdb png exr patch scene graph cache
+mkdir -p ply obj stl off gzip points_vdb vdb nvdb png exr patch scene graph cache
 
 # Inside one octant, so that the file has one inner node of a few kB.
 solid="box --size 1,1,1 --center 2,2,2 --voxel 0.5 --as a"
@@ -19,6 +19,7 @@ $levelsmith $solid ! write vdb/box.vdb ! write "$work/box.nvdb"
 head -c 1000 "$work/box.nvdb" >nvdb/head.nvdb
 $levelsmith $solid ! fast-marching --to 1 ! write vdb/march.vdb
 $levelsmith $solid ! closest-point ! write vdb/closest-point.vdb
+$levelsmith $solid ! mesh ! sample --count 20 ! write points_vdb/box.vdb
 $levelsmith $solid ! render exr/box.exr --size 4x3 --samples 1 --renderer cpu --png png/box.png
 $levelsmith sphere --radius 1 --voxel 0.25 ! patch --at 0,0,1 --size 0.6,0.6 --height 0.2 --spacing 0.3 --layers 2 ! \
   write patch/sphere.patch

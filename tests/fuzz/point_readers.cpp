@@ -10,6 +10,7 @@ void readPointsAs(const char* name, std::string_view bytes) {
   const std::filesystem::path file = scratchFile(name, bytes);
   accepts([&] { static_cast<void>(levelset::pointFileInfo(file)); });
   static_cast<void>(levelset::lacksFaces(file));
+  static_cast<void>(levelset::holdsPointGrid(file));
   for (const bool attributes : {true, false}) {
     std::vector<std::string> notes;
     accepts([&] {
@@ -33,6 +34,7 @@ void readTextPoints(std::string_view bytes) {
 std::vector<Reader> pointReaders() {
   return {{"points", readTextPoints},
           {"points_ply", [](std::string_view bytes) { readPointsAs("points.ply", bytes); }},
+          {"points_vdb", [](std::string_view bytes) { readPointsAs("points.vdb", bytes); }},
           {"points_obj", [](std::string_view bytes) { readPointsAs("points.obj", bytes); }}};
 }
 

@@ -14,7 +14,7 @@ found=$(dirname "$program")/found/$reader
 mkdir -p "$found"
 case $reader in
   ply|obj|stl|off|gzip) words=mesh ;;
-  vdb|nvdb) words=vdb ;;
+  vdb|nvdb|points_vdb) words=vdb ;;
   png|exr) words=picture ;;
   graph) words="json actions" ;;
   patch|scene|cache) words=json ;;

@@ -34,7 +34,12 @@ Kind fileKind(const Invocation& in) {
   const bool isRead = in.op().name == "read";
   if (levelset::isPointFormat(name)) return Kind::Points;
   if (levelset::isMeshFormat(name)) return isRead && readsPoints(in) ? Kind::Points : Kind::Mesh;
-  if (levelset::isBandFormat(name)) return Kind::Band;
+  if (levelset::isBandFormat(name))
+    return isRead && levelset::holdsPoints(name) &&
+                   (in.flag("points") ||
+                    levelset::holdsPointGrid(in.text("file"), in.text("grid"), in.text("format")))
+               ? Kind::Points
+               : Kind::Band;
   if (mapping::isPatchFormat(name)) return Kind::Patch;
   if (render::isSceneFormat(name)) return Kind::Scene;
   if (isRead && levelset::isVolumeFormat(name)) return Kind::Volume;
@@ -64,6 +69,7 @@ Value readCloud(Invocation& in) {
   const std::filesystem::path file = in.text("file");
   if (levelset::holdsPoints(formatName(in)))
     return Value(levelset::readPoints(file, {.format = in.text("format"),
+                                             .grid = in.text("grid"),
                                              .attributes = !in.flag("no-attributes"),
                                              .maxMemory = in.maxMemory,
                                              .notes = &in.notes.notes,
@@ -162,9 +168,10 @@ void validateRead(const Invocation& in) {
                     "it out",
                     kindName(kind)));
   if (kind != Kind::Points && in.flag("points"))
-    throw UsageError(fmt::format("read: --points is for meshes, and this is a {}; leave it out",
-                                 kindName(kind)));
-  if (kind != Kind::Band && in.given("grid"))
+    throw UsageError(
+        fmt::format("read: --points is for meshes and .vdb files, and this is a {}; leave it out",
+                    kindName(kind)));
+  if (!levelset::isBandFormat(formatName(in)) && in.given("grid"))
     throw UsageError(fmt::format(
         "read: --grid picks a grid of a .vdb, and this is a {}; leave it out", kindName(kind)));
   if (kind == Kind::Scene && isStandardStream(in))
@@ -184,11 +191,11 @@ void validateWrite(const Invocation& in) {
                     : held == Kind::Patch  ? "write .patch, or put 'mesh' before it"
                     : held == Kind::Scene  ? "write .json"
                     : held == Kind::Volume ? "put 'isosurface' before it"
-                    : held == Kind::Points ? "write .ply, .obj, .xyz, .csv or .pts"
+                    : held == Kind::Points ? "write .ply, .obj, .xyz, .csv, .pts or .vdb"
                     : kind == Kind::Points ? "put 'sample' before it, or write .ply"
                                            : "put 'level-set' before it, or write .ply"));
   }
-  if (kind != Kind::Band && in.given("name"))
+  if (!levelset::isBandFormat(formatName(in)) && in.given("name"))
     throw UsageError(fmt::format(
         "write: --name is the name of a grid in a .vdb, and this file is a {}; leave it out",
         kindName(isCloud ? held : kind)));
@@ -216,7 +223,9 @@ Value write(Invocation& in) {
                           .progress = in.progress});
   } else if (value.kind() == Kind::Points) {
     levelset::writePoints(file, value.cloud(),
-                          {.format = in.text("format"), .progress = in.progress});
+                          {.format = in.text("format"),
+                           .name = in.given("name") ? in.text("name") : "points",
+                           .progress = in.progress});
     if (const std::string lost = unwritableAttributes(formatName(in), value.cloud()); !lost.empty())
       in.notes.warnings.push_back(
           fmt::format("{} cannot store the {}, which were left out; write .ply to keep them",
@@ -246,9 +255,8 @@ Operator readOperator() {
       .group = "Files",
       .summary =
           "read a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb), a volume (nii, "
-          "hdr, mha, mhd, nrrd, nhdr, mrc, map, raw), points (xyz, csv, pts, and ply or obj "
-          "without "
-          "faces), patches (patch), a scene (json)",
+          "hdr, mha, mhd, nrrd, nhdr, mrc, map, raw), points (xyz, csv, pts, ply or obj without "
+          "faces, vdb with a grid of points), patches (patch), a scene (json)",
       .details =
           "A .vdb with more than one level set needs --grid. A grid that is not a level set needs "
           "--grid, too; it becomes a field of numbers or of vectors, which may be staggered. "
@@ -256,7 +264,9 @@ Operator readOperator() {
           "OBJ. Point clouds keep normals, colours, radii and weights. In xyz and csv, a header "
           "line "
           "names the columns (x, y, z, nx, ny, nz, r, g, b, a, radius, weight); without it, their "
-          "number decides. Volumes keep their spacing and orientation; a .raw needs --size and "
+          "number decides. In a .vdb, the attributes P, N, Cd, Alpha, pscale and weight of a grid "
+          "of "
+          "points are read. Volumes keep their spacing and orientation; a .raw needs --size and "
           "--type. "
           "'-' is standard input and needs --format.",
       .example = "levelsmith read dragon.ply.gz ! info",
@@ -279,7 +289,8 @@ Operator readOperator() {
                   .formerName = "bare"},
                  {.name = "points",
                   .type = ParamType::Flag,
-                  .doc = "read the vertices of a mesh as a point cloud"}},
+                  .doc = "read the vertices of a mesh, or the grid of points of a .vdb that also "
+                         "has a level set, as a point cloud"}},
       .resultKind = readKind,
       .run = read,
       .plan = planRead,
@@ -298,27 +309,32 @@ Operator writeOperator() {
       .group = "Files",
       .summary =
           "write a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb, nvdb), points "
-          "(ply, obj, xyz, csv, pts, also .gz), patches (patch), a scene (json)",
+          "(ply, obj, xyz, csv, pts, also .gz, vdb), patches (patch), a scene (json)",
       .details =
           "Data is written to a temporary file in the same folder, which replaces an existing file "
           "only when it is complete. The level sets and meshes of a scene go to .vdb and .ply "
           "files in the same folder: the level set NAME of FILE.json goes to FILE-NAME.vdb. "
-          "Existing files of these names are replaced. The value stays on the stack.",
+          "Existing files of these names are replaced. Points in a .vdb have the attributes P, N, "
+          "Cd, "
+          "Alpha, pscale and weight, and voxels with about eight points. The value stays on the "
+          "stack.",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! mesh ! write sphere.ply",
-      .params = {{.name = "file",
-                  .type = ParamType::Path,
-                  .doc = "file to write, or - for standard output",
-                  .required = true,
-                  .position = 0},
-                 {.name = "format",
-                  .type = ParamType::Text,
-                  .doc = "format of the file: ply, obj, stl, off, xyz, csv, pts, vdb, nvdb, patch "
-                         "or json; default: by its extension"},
-                 {.name = "name",
-                  .type = ParamType::Text,
-                  .doc =
-                      "name of the grid in a .vdb or .nvdb; a field keeps its own name by default",
-                  .fallback = "surface"}},
+      .params =
+          {{.name = "file",
+            .type = ParamType::Path,
+            .doc = "file to write, or - for standard output",
+            .required = true,
+            .position = 0},
+           {.name = "format",
+            .type = ParamType::Text,
+            .doc = "format of the file: ply, obj, stl, off, xyz, csv, pts, vdb, nvdb, patch "
+                   "or json; default: by its extension"},
+           {.name = "name",
+            .type = ParamType::Text,
+            .doc =
+                "name of the grid in a .vdb or .nvdb; a field keeps its own name by default, and "
+                "points get the name 'points'",
+            .fallback = "surface"}},
       .operands = {{Kind::Mesh, Kind::Band, Kind::Field, Kind::Patch, Kind::Scene, Kind::Points}},
       .flow = Flow::PassesThrough,
       .run = write,

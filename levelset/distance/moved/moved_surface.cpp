@@ -273,7 +273,7 @@ MovedSurface::NearerPart MovedSurface::nearerPart(const NearestPoints::Block& bl
 /// Compares the distance of a point from the sharp patches with that of the moved surface.
 MovedSurface::PatchDistance MovedSurface::patchDistance(const Vec3d& at) const {
   const double distance = std::abs(shift_);
-  const TriangleTree::Hit hit = patches_.nearest(at, distance + kPastEnd);
+  const SharpPatches::Hit hit = patches_.nearest(at, distance + kPastEnd);
   if (hit.found && hit.distance < distance - kNearerPatch) return PatchDistance::Nearer;
   return hit.found && patches_.covers(Coord::floor(hit.point)) ? PatchDistance::Farther
                                                                : PatchDistance::PastEnd;

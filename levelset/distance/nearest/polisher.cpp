@@ -173,7 +173,7 @@ void Polisher::polishCandidates() {
 
 Closest Polisher::polishOnPatches(const Vec3d& x, std::uint32_t point) {
   const Vec3d start = points_.positions[point];
-  const TriangleTree::Hit hit = patches_.nearest(x, (x - start).length());
+  const SharpPatches::Hit hit = patches_.nearest(x, (x - start).length());
   if (!hit.found) return {start, (x - start).length()};
   if (patches_.covers(Coord::floor(hit.point))) return {hit.point, hit.distance};
   return polishOnInterpolant(x, hit.point);
@@ -212,7 +212,7 @@ Closest Polisher::polishOnInterpolant(const Vec3d& x, Vec3d start, const Foot* k
       if (!changesSignAround(block, foot.point)) break;
       const Closest smooth{foot.point + origin, foot.distance};
       if (!patches_.covers(Coord::floor(smooth.point))) return smooth;
-      const TriangleTree::Hit hit = patches_.nearest(x, foot.distance + kPolishGain);
+      const SharpPatches::Hit hit = patches_.nearest(x, foot.distance + kPolishGain);
       return hit.found ? Closest{hit.point, hit.distance} : smooth;
     }
     if (!foot.left) break;

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "levelset/geometry/point_tree.h"
+#include "levelset/geometry/search/point_search.h"
 
 namespace levelset::eikonal {
 namespace {
@@ -361,7 +361,7 @@ void NearestPoints::seedRegionBoundary(const std::vector<Coord>& gridPoints) {
   // If the closest point of a grid point lies outside the region, the segment between both crosses
   // the boundary of the region. With correct surface points on the boundary, no block outside the
   // region is needed.
-  const PointTree tree(points_.positions);
+  const PointSearch tree = makePointSearch(points_.positions);
   const openvdb::CoordBBox& box = *reach_.region;
   const double limit = std::max(reach_.inside, reach_.outside) + kBlockMargin;
   std::vector<std::uint32_t> nearest;
@@ -375,12 +375,12 @@ void NearestPoints::seedRegionBoundary(const std::vector<Coord>& gridPoints) {
         return face.min().offsetBy(static_cast<int>(i / row / rows),
                                    static_cast<int>(i / row % rows), static_cast<int>(i % row));
       };
-      nearest.assign(face.volume(), PointTree::kNone);
+      nearest.assign(face.volume(), kNone);
       tbb::parallel_for(std::size_t{0}, nearest.size(), [&](std::size_t i) {
-        nearest[i] = tree.nearest(gridPoint(i).asVec3d(), limit);
+        nearest[i] = tree.closest(toImath(gridPoint(i).asVec3d()), limit * limit).index;
       });
       for (std::size_t i = 0; i < nearest.size(); ++i)
-        if (nearest[i] != PointTree::kNone)
+        if (nearest[i] != kNone)
           seed(gridPoint(i), nearest[i],
                nearest[i] < gridPoints.size() && gridPoints[nearest[i]] == gridPoint(i));
     }

@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <tuple>
@@ -152,14 +153,21 @@ SharpPatches::SharpPatches(const FloatGrid& field, const BlockSelection& within,
   openvdb::tools::dilateActiveValues(around, 1, openvdb::tools::NN_FACE_EDGE_VERTEX,
                                      openvdb::tools::IGNORE_TILES);
   const openvdb::tree::ValueAccessor<const openvdb::MaskTree> used(around);
-  std::vector<TriangleTree::Triangle> triangles;
+  std::vector<TriangleItem> triangles;
   for (const auto& [a, b, c] : mesh.triangles) {
-    const TriangleTree::Triangle t{mesh.positions[a], mesh.positions[b], mesh.positions[c]};
+    const std::array<Vec3d, 3> t{mesh.positions[a], mesh.positions[b], mesh.positions[c]};
     if (std::any_of(t.begin(), t.end(),
                     [&](const Vec3d& p) { return used.isValueOn(Coord::floor(p)); }))
-      triangles.push_back(t);
+      triangles.push_back({{toImath(t[0]), toImath(t[1]), toImath(t[2])},
+                           static_cast<std::uint32_t>(triangles.size())});
   }
-  surface_ = TriangleTree(std::move(triangles));
+  surface_ = TriangleSearch(std::move(triangles));
+}
+
+SharpPatches::Hit SharpPatches::nearest(const Vec3d& from, double limit) const {
+  const auto [found, triangle] = surface_.closestItem(toImath(from), limit * limit);
+  if (!triangle) return {Vec3d(0), limit, false};
+  return {toVdb(triangle->closestPoint(toImath(from))), std::sqrt(found.squared), true};
 }
 
 }  // namespace levelset::eikonal

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "levelset/distance/surface/block_selection.h"
-#include "levelset/geometry/triangle_tree.h"
+#include "levelset/geometry/search/triangle_search.h"
 #include "levelset/progress.h"
 
 namespace levelset::eikonal {
@@ -23,6 +23,13 @@ class SharpPatches {
   SharpPatches(const openvdb::FloatGrid& field, const BlockSelection& within,
                const Progress& progress);
 
+  /// Point of the patches.
+  struct Hit {
+    openvdb::Vec3d point;
+    double distance = 0;
+    bool found = false;
+  };
+
   [[nodiscard]] bool isEmpty() const { return surface_.isEmpty(); }
   /// Returns true when the patches replace the interpolant in the cell whose lowest corner is
   /// `cell`.
@@ -37,14 +44,13 @@ class SharpPatches {
   /// depends on the field only.
   [[nodiscard]] const std::vector<openvdb::Vec3d>& features() const { return features_; }
 
-  /// Finds the nearest point of the patches within `limit` voxels.
-  [[nodiscard]] TriangleTree::Hit nearest(const openvdb::Vec3d& from, double limit) const {
-    return surface_.nearest(from, limit);
-  }
+  /// Finds the nearest point of the patches that is nearer than `limit` voxels. If there is none,
+  /// `found` is false and `distance` is `limit`.
+  [[nodiscard]] Hit nearest(const openvdb::Vec3d& from, double limit) const;
 
  private:
   std::vector<openvdb::Vec3d> features_;
-  TriangleTree surface_;
+  TriangleSearch surface_;
   openvdb::MaskTree zone_, border_;
 };
 

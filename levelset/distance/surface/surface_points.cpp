@@ -265,7 +265,7 @@ LeafPoints surfacePointsOf(const DenseBlock& block, float background, const Shar
   forEachPointBeside(block, background, [&](int x, int y, int z, const Crossings& crossings) {
     const Coord gridPoint = block.origin().offsetBy(x, y, z);
     if (among && !among->isValueOn(gridPoint)) return;
-    TriangleTree::Hit hit;
+    SharpPatches::Hit hit;
     if (patches.touches(gridPoint))
       hit = patches.nearest(gridPoint.asVec3d(), crossings.nearestDistance() + kSharpTolerance);
     const bool isSharp = hit.found && patches.covers(Coord::floor(hit.point));

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "levelset/error.h"
-#include "levelset/geometry/box_tree.h"
+#include "levelset/geometry/search/triangle_search.h"
 #include "levelset/meshing/sharp/tangent_planes.h"
 
 namespace levelset {
@@ -166,25 +166,18 @@ class OriginalMesh {
     std::vector<Vec3d> points(mesh.positions.size());
     for (std::size_t i = 0; i < points.size(); ++i)
       points[i] = grid.transform().worldToIndex(toVdb(mesh.positions[i]));
-    triangles_.resize(mesh.triangles.size());
-    for (std::size_t i = 0; i < triangles_.size(); ++i)
-      for (std::size_t k = 0; k < 3; ++k) triangles_[i][k] = points[mesh.triangles[i][k]];
+    std::vector<TriangleItem> triangles;
+    triangles.reserve(mesh.triangles.size());
     double volume = 0;
-    const Vec3d& origin = triangles_[0][0];
-    for (const Corners& t : triangles_)
-      volume += (t[0] - origin).dot((t[1] - origin).cross(t[2] - origin));
+    const Vec3d& origin = points[mesh.triangles[0][0]];
+    for (const auto& t : mesh.triangles) {
+      const Vec3d &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
+      triangles.push_back(
+          {{toImath(a), toImath(b), toImath(c)}, static_cast<std::uint32_t>(triangles.size())});
+      volume += (a - origin).dot((b - origin).cross(c - origin));
+    }
     isInverted_ = volume < 0;
-    tree_ = BoxTree(
-        triangles_.size(),
-        [&](std::uint32_t i, Vec3d& low, Vec3d& high) {
-          for (const Vec3d& p : triangles_[i]) {
-            low = openvdb::math::minComponent(low, p);
-            high = openvdb::math::maxComponent(high, p);
-          }
-        },
-        [&](std::uint32_t i, int axis) {
-          return triangles_[i][0][axis] + triangles_[i][1][axis] + triangles_[i][2][axis];
-        });
+    triangles_ = TriangleSearch(std::move(triangles));
   }
 
   struct Hit {
@@ -202,20 +195,20 @@ class OriginalMesh {
     const double squared = kReach * kReach;
     std::optional<Hit> best;
     std::uint32_t bestIndex = 0;
-    tree_.search(middle, squared, [&](std::uint32_t begin, std::uint32_t end) {
-      for (std::uint32_t i = begin; i < end; ++i) {
-        const std::uint32_t index = tree_.order()[i];
-        const auto hit = meetTriangle(triangles_[index], edge);
-        if (!hit) continue;
-        if (best && best->isTurned != hit->isTurned) {
-          if (best->isTurned) best = hit, bestIndex = index;
-          continue;
-        }
-        const double gap = std::abs(hit->t - near), least = best ? std::abs(best->t - near) : 2;
-        if (gap > least || (gap == least && index > bestIndex)) continue;
-        best = hit;
-        bestIndex = index;
+    triangles_.visit(toImath(middle), squared, [&](const TriangleItem& triangle) {
+      const auto hit = meetTriangle(
+          {toVdb(triangle.corners[0]), toVdb(triangle.corners[1]), toVdb(triangle.corners[2])},
+          edge);
+      if (!hit) return;
+      const std::uint32_t index = triangle.index;
+      if (best && best->isTurned != hit->isTurned) {
+        if (best->isTurned) best = hit, bestIndex = index;
+        return;
       }
+      const double gap = std::abs(hit->t - near), least = best ? std::abs(best->t - near) : 2;
+      if (gap > least || (gap == least && index > bestIndex)) return;
+      best = hit;
+      bestIndex = index;
     });
     return best;
   }
@@ -272,8 +265,7 @@ class OriginalMesh {
   }
 
   bool isInverted_ = false;  ///< the triangles are oriented inwards
-  std::vector<Corners> triangles_;
-  BoxTree tree_;
+  TriangleSearch triangles_;
 };
 
 }  // namespace

@@ -22,11 +22,11 @@ struct MeshlessPlanes {
   const OrientedPoints* points;
   std::vector<double> constants;  // of each point, world units
 
-  double operator()(const V3d& at, const std::vector<Found>& found) const {
+  double operator()(const V3d& at, const std::vector<FoundItem>& found) const {
     const double squaredCutOff = found.back().squared;
     double sum = 0, weights = 0;
     for (std::size_t n = 0; n + 1 < found.size(); ++n) {
-      const Found& f = found[n];
+      const FoundItem& f = found[n];
       const double weight = pointWeight(f.squared / squaredCutOff);
       weights += weight;
       sum += weight * plane(f.index, at);
@@ -55,16 +55,16 @@ MeshlessSystem meshlessSystem(const OrientedPoints& points, std::size_t perRow) 
   for (std::size_t j = 0; j <= count; ++j)
     matrix.outerIndexPtr()[j] = static_cast<std::int64_t>(j * perRow);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count), [&](const auto& range) {
-    std::vector<Found> found;
+    std::vector<FoundItem> found;
     for (std::size_t j = range.begin(); j < range.end(); ++j) {
       const V3d& at = points.positions[j];
       points.search.closest(at, perRow + 1, found);
       const double squaredCutOff = found.back().squared;
       found.pop_back();
       std::sort(found.begin(), found.end(),
-                [](const Found& a, const Found& b) { return a.index < b.index; });
+                [](const FoundItem& a, const FoundItem& b) { return a.index < b.index; });
       double sum = 0, weights = 0;
-      for (const Found& f : found) weights += pointWeight(f.squared / squaredCutOff);
+      for (const FoundItem& f : found) weights += pointWeight(f.squared / squaredCutOff);
       for (std::size_t n = 0; n < found.size(); ++n) {
         const std::uint32_t i = found[n].index;
         const double weight = pointWeight(found[n].squared / squaredCutOff) / weights;

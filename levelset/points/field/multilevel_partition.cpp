@@ -62,7 +62,7 @@ class CellFitter {
   /// Fits the functions of a cell, and sets its support.
   /// @return false if the cell is to be split
   bool fit(PartitionCell& cell, bool isLast, CellSurface& surface,
-           std::vector<Found>& found) const {
+           std::vector<FoundItem>& found) const {
     cell.support = kSupport * 2 * cell.half * std::sqrt(3.0);
     points_.search.within(cell.centre, cell.support * cell.support, found);
     // A cell with many points is split anyway.
@@ -88,14 +88,14 @@ class CellFitter {
   }
 
  private:
-  [[nodiscard]] double weight(const PartitionCell& cell, const Found& f) const {
+  [[nodiscard]] double weight(const PartitionCell& cell, const FoundItem& f) const {
     // Points at the rim of a support that was enlarged for them still count.
     constexpr double kLeast = 0.02;
     return std::max(splineWeight(std::sqrt(f.squared) / cell.support), kLeast);
   }
 
   template <class Choose>
-  [[nodiscard]] LocalQuadric quadric(const PartitionCell& cell, const std::vector<Found>& found,
+  [[nodiscard]] LocalQuadric quadric(const PartitionCell& cell, const std::vector<FoundItem>& found,
                                      const Choose& isChosen) const {
     V3d centre(0), normal(0);
     double weights = 0, radius = 0;
@@ -120,7 +120,7 @@ class CellFitter {
   }
 
   [[nodiscard]] CellSurface smooth(const PartitionCell& cell,
-                                   const std::vector<Found>& found) const {
+                                   const std::vector<FoundItem>& found) const {
     CellSurface surface;
     surface.sides[0] = quadric(cell, found, [](std::size_t) { return true; });
     surface.count = 1;
@@ -128,16 +128,17 @@ class CellFitter {
   }
 
   /// Largest distance of the points from the surface.
-  [[nodiscard]] double errorOf(const CellSurface& surface, const std::vector<Found>& found) const {
+  [[nodiscard]] double errorOf(const CellSurface& surface,
+                               const std::vector<FoundItem>& found) const {
     double error = 0;
-    for (const Found& f : found)
+    for (const FoundItem& f : found)
       error = std::max(error, std::abs(surface.distance(points_.positions[f.index])));
     return error;
   }
 
   /// Sorts the points by their normals to two or three sides of an edge or a corner
   /// [Kobbelt01, Ohtake03], and fits each side.
-  [[nodiscard]] bool fitSides(const PartitionCell& cell, const std::vector<Found>& found,
+  [[nodiscard]] bool fitSides(const PartitionCell& cell, const std::vector<FoundItem>& found,
                               CellSurface& surface) const {
     const auto normal = [&](std::size_t n) -> const V3d& {
       return points_.normals[found[n].index];
@@ -236,7 +237,7 @@ PointField multilevelPartition(const OrientedPoints& points, std::size_t neighbo
     std::vector<CellSurface> surfaces(end - begin);
     std::vector<char> isLeaf(end - begin);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end), [&](const auto& range) {
-      std::vector<Found> found;
+      std::vector<FoundItem> found;
       for (std::size_t i = range.begin(); i < range.end(); ++i)
         isLeaf[i - begin] =
             fitter.fit(partition->cells[i], level + 1 == kMostLevels, surfaces[i - begin], found);
@@ -270,7 +271,7 @@ PointField multilevelPartition(const OrientedPoints& points, std::size_t neighbo
       cell.reach = std::max(cell.reach, (child.centre - cell.centre).length() + child.reach);
     }
   }
-  return {[partition, &points](const V3d& at, const std::vector<Found>& found) {
+  return {[partition, &points](const V3d& at, const std::vector<FoundItem>& found) {
             const double value = partition->value(at);
             if (std::isfinite(value)) return value;
             const std::uint32_t first = found.front().index;  // outside all supports

@@ -91,7 +91,7 @@ OrientedPoints orient(const PointCloud& cloud, std::size_t maxMemory) {
   std::vector<char> opposes(points.size(), 0);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size()),
                     [&](const tbb::blocked_range<std::size_t>& range) {
-                      std::vector<Found> found;
+                      std::vector<FoundItem> found;
                       for (std::size_t i = range.begin(); i < range.end(); ++i) {
                         points.search.closest(points.positions[i], kSpacingNeighbours + 1, found);
                         // The disc to the last neighbour holds half of it: count - 1/2 points with
@@ -100,7 +100,7 @@ OrientedPoints orient(const PointCloud& cloud, std::size_t maxMemory) {
                         const double area = discArea / (static_cast<double>(found.size()) - 0.5);
                         points.spacings[i] = std::sqrt(area * 2 / std::numbers::sqrt3);
                         V3d mean(0);
-                        for (const Found& f : found)
+                        for (const FoundItem& f : found)
                           mean += f.index == i ? V3d(0) : points.normals[f.index];
                         opposes[i] = mean.dot(points.normals[i]) < 0 ? 1 : 0;
                       }

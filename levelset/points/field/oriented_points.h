@@ -6,8 +6,8 @@
 
 #include <vector>
 
+#include "levelset/geometry/search/point_search.h"
 #include "levelset/points/point_cloud.h"
-#include "levelset/points/search/point_search.h"
 
 namespace levelset::points {
 

@@ -14,7 +14,7 @@ namespace {
 struct LocalQuadrics {
   const OrientedPoints* points;
 
-  double operator()(const V3d& at, const std::vector<Found>& found) const {
+  double operator()(const V3d& at, const std::vector<FoundItem>& found) const {
     const double squaredCutOff = found.back().squared;
     V3d centre(0), normal(0);
     double weights = 0;

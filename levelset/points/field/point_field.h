@@ -5,8 +5,8 @@
 #include <functional>
 #include <vector>
 
+#include "levelset/geometry/search/point_search.h"
 #include "levelset/points/field/oriented_points.h"
-#include "levelset/points/search/point_search.h"
 
 namespace levelset::points {
 
@@ -14,7 +14,7 @@ namespace levelset::points {
 /// slope is about 1. Takes a position relative to OrientedPoints::centre and its closest points,
 /// nearest first. Several threads may call it at once.
 struct PointField {
-  std::function<double(const Imath::V3d&, const std::vector<Found>&)> value;
+  std::function<double(const Imath::V3d&, const std::vector<FoundItem>&)> value;
   std::size_t neighbours;  ///< number of closest points that `value` takes
   /// Distance from the points up to which the field is good, in units of about a spacing.
   double reach = 1;

@@ -43,7 +43,7 @@ double clearance(const OrientedPoints& points, std::uint32_t point, double side)
   double distance = kShare * points.spacings[point];
   for (int n = 0; n < kHalvings; ++n, distance /= 2) {
     const V3d at = points.positions[point] + side * distance * points.normals[point];
-    const Found found = points.search.closest(at, std::numeric_limits<double>::infinity());
+    const FoundItem found = points.search.closest(at, std::numeric_limits<double>::infinity());
     if (found.index == point) return distance;
   }
   return 0;
@@ -113,7 +113,7 @@ class CubeTree {
   }
   [[nodiscard]] bool isSplit(const RbfCube& cube, const OrientedPoints& points) const {
     if (cube.half <= leafHalf_) return false;
-    const Found found =
+    const FoundItem found =
         points.search.closest(cube.center + origin_, std::numeric_limits<double>::infinity());
     return std::sqrt(found.squared) < cube.radius() + kLeafReach * points.medianSpacing;
   }
@@ -166,14 +166,14 @@ std::size_t addCentres(const OrientedPoints& points, const std::vector<double>& 
   std::stable_sort(far.begin(), far.end(),
                    [&](std::uint32_t a, std::uint32_t b) { return residuals[a] > residuals[b]; });
   std::vector<bool> isBeside(points.size(), false);
-  std::vector<Found> found;
+  std::vector<FoundItem> found;
   std::size_t count = 0;
   for (const std::uint32_t i : far) {
     if (isBeside[i]) continue;
     isCentre[i] = true;
     ++count;
     points.search.closest(points.positions[i], kNeighbours, found);
-    for (const Found& f : found) isBeside[f.index] = true;
+    for (const FoundItem& f : found) isBeside[f.index] = true;
   }
   return count;
 }
@@ -211,9 +211,10 @@ PointField rbfField(const OrientedPoints& points, const RbfFieldOptions& options
     else if (aim > options.tolerance)
       aim = options.tolerance;
     else
-      return {
-          [tree](const V3d& at, const std::vector<Found>& /*found*/) { return tree->value(at); }, 1,
-          kReach};
+      return {[tree](const V3d& at, const std::vector<FoundItem>& /*found*/) {
+                return tree->value(at);
+              },
+              1, kReach};
   }
 }
 

@@ -7,12 +7,12 @@
 #include <span>
 #include <vector>
 
-#include "levelset/points/search/point_search.h"
+#include "levelset/geometry/search/point_search.h"
 
 namespace levelset::points {
 
 /// A point near another one: its number in the cloud, and its squared distance.
-using Neighbour = Found;
+using Neighbour = FoundItem;
 
 /// Greatest number of neighbours that operators search for. More of them are no neighbourhood, and
 /// take memory and time.

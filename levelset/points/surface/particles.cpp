@@ -19,8 +19,6 @@ namespace {
 
 using Imath::V3d;
 using points::FieldMemory;
-using points::Found;
-using points::PointSearch;
 
 /// Kernel (1 − t²)³ of squared distances t² in fractions of the reach.
 double particleWeight(double squared) {
@@ -68,9 +66,9 @@ Particles prepare(const PointCloud& cloud, const ParticleOptions& options) {
 }
 
 /// Distance to the nearest ball among those found.
-double toBalls(const Particles& particles, const std::vector<Found>& found) {
+double toBalls(const Particles& particles, const std::vector<FoundItem>& found) {
   double distance = std::numeric_limits<double>::infinity();
-  for (const Found& f : found)
+  for (const FoundItem& f : found)
     distance = std::min(distance, std::sqrt(f.squared) - particles.radii[f.index]);
   return distance;
 }
@@ -96,7 +94,7 @@ points::SampledField blobs(const Particles& particles, double reach) {
     const double most = reach * particles.largest;
     particles.search.within(at, most * most, memory.found);
     double sum = 0, radii = 0;
-    for (const Found& f : memory.found) {
+    for (const FoundItem& f : memory.found) {
       const double radius = particles.radii[f.index],
                    value = std::exp(-sharpness * (f.squared / (radius * radius) - 1)) - kCut;
       if (!(value > 0)) continue;
@@ -116,7 +114,7 @@ points::SampledField zhuBridson(const Particles& particles, double reach) {
     particles.search.within(at, most * most, memory.found);
     V3d centre(0);
     double radius = 0, weights = 0;
-    for (const Found& f : memory.found) {
+    for (const FoundItem& f : memory.found) {
       const double own = reach * particles.radii[f.index],
                    weight = particleWeight(f.squared / (own * own));
       weights += weight;
@@ -140,7 +138,7 @@ constexpr double kTowardsMean = 0.9, kMostFlat = 4;
 constexpr std::size_t kFewestNeighbours = 25;
 
 FlattenedParticle flatten(const Particles& particles, std::size_t i, double reach,
-                          std::vector<Found>& found) {
+                          std::vector<FoundItem>& found) {
   const V3d& at = particles.positions[i];
   // [Yu13] takes the mean of twice the reach, which moves a plane face inwards by two thirds of a
   // spacing. The moments need that many neighbours.
@@ -149,7 +147,7 @@ FlattenedParticle flatten(const Particles& particles, std::size_t i, double reac
   const auto meanWithin = [&](double limit) {
     V3d sum(0);
     double weights = 0;
-    for (const Found& f : found) {
+    for (const FoundItem& f : found) {
       const double t = std::sqrt(f.squared) / limit, weight = std::max(1 - t * t * t, 0.0);
       weights += weight;
       sum += weight * particles.positions[f.index];
@@ -161,7 +159,7 @@ FlattenedParticle flatten(const Particles& particles, std::size_t i, double reac
   if (found.size() > kFewestNeighbours) {
     const V3d middle = meanWithin(range);
     Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
-    for (const Found& f : found) {
+    for (const FoundItem& f : found) {
       const double t = std::sqrt(f.squared) / range;
       const V3d d = particles.positions[f.index] - middle;
       const Eigen::Vector3d arm(d.x, d.y, d.z);
@@ -191,13 +189,13 @@ points::SampledField anisotropic(const Particles& particles, double reach) {
   all->particles.resize(particles.positions.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, all->particles.size()),
                     [&](const tbb::blocked_range<std::size_t>& range) {
-                      std::vector<Found> found;
+                      std::vector<FoundItem> found;
                       for (std::size_t i = range.begin(); i < range.end(); ++i)
                         all->particles[i] = flatten(particles, i, reach, found);
                     });
   std::vector<V3d> centres;
   for (const FlattenedParticle& p : all->particles) centres.push_back(p.centre);
-  all->search = points::makePointSearch(centres);
+  all->search = makePointSearch(centres);
   // The longest axis of a flat kernel of equal volume.
   all->most = reach * particles.largest * std::cbrt(kMostFlat * kMostFlat);
   // A single particle is its ball.
@@ -206,7 +204,7 @@ points::SampledField anisotropic(const Particles& particles, double reach) {
   return [all](const V3d& at, FieldMemory& memory) {
     all->search.within(at, all->most * all->most, memory.found);
     double sum = 0;
-    for (const Found& f : memory.found) {
+    for (const FoundItem& f : memory.found) {
       const FlattenedParticle& p = all->particles[f.index];
       const V3d d = at - p.centre;
       sum += particleWeight((p.toUnit * Eigen::Vector3d(d.x, d.y, d.z)).squaredNorm());

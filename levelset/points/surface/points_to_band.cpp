@@ -21,7 +21,6 @@ namespace levelset {
 namespace {
 
 using Imath::V3d;
-using points::Found;
 using points::OrientedPoints;
 using points::PointField;
 using SupportLeaf = openvdb::FloatTree::LeafNodeType;
@@ -82,10 +81,10 @@ struct LeafSupport {
 /// Distance from a place on the surface to the closest point whose normal does not oppose that of
 /// the surface, in spacings about that point. The far side of a thin sheet has no such point near.
 double gapAt(const OrientedPoints& points, const V3d& at, const V3d& normal,
-             std::vector<Found>& found) {
+             std::vector<FoundItem>& found) {
   constexpr std::size_t kCandidates = 16;
   points.search.closest(at, kCandidates, found);
-  for (const Found& f : found)
+  for (const FoundItem& f : found)
     if (points.normals[f.index].dot(normal) > 0)
       return std::sqrt(f.squared) / points.spacings[f.index];
   constexpr double kFar = 10;  // farther than all of them
@@ -98,7 +97,7 @@ LeafSupport supportOf(const openvdb::FloatGrid& band, const OrientedPoints& poin
   LeafSupport support;
   const double voxel = band.voxelSize()[0];
   auto read = band.getConstAccessor();
-  std::vector<Found> found;
+  std::vector<FoundItem> found;
   for (auto value = leaf.beginValueOn(); value; ++value) {
     const openvdb::Coord index = value.getCoord();
     const double phi = read.getValue(index);

@@ -13,7 +13,7 @@ namespace levelset::points {
 
 /// Memory of one thread, for positions near each other.
 struct FieldMemory {
-  std::vector<Found> found = {};
+  std::vector<FoundItem> found = {};
   Imath::V3d at = Imath::V3d(0);  ///< position of the last winding number
   double winding = 0.5;
   bool isNear = false;  ///< the last position was near the points

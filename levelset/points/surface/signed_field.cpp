@@ -43,10 +43,10 @@ double SignedField::far(const V3d& at, double closest, FieldMemory& memory) cons
 }
 
 double SignedField::value(const V3d& at, FieldMemory& memory) const {
-  std::vector<Found>& found = memory.found;
+  std::vector<FoundItem>& found = memory.found;
   if (!memory.isNear) {
     // Far from the points, the closest one suffices. Neighbouring points have similar spacings.
-    const Found first = points_.search.closest(at, std::numeric_limits<double>::infinity());
+    const FoundItem first = points_.search.closest(at, std::numeric_limits<double>::infinity());
     const double distance = std::sqrt(first.squared);
     if (distance > 2 * kFarStart * reach_ * points_.spacings[first.index])
       return far(at, distance, memory);
@@ -54,7 +54,7 @@ double SignedField::value(const V3d& at, FieldMemory& memory) const {
   points_.search.closest(at, near_.neighbours, found);
   const double closest = std::sqrt(found.front().squared);
   double spacing = 0, weights = 0;
-  for (const Found& f : found) {
+  for (const FoundItem& f : found) {
     const double weight = pointWeight(f.squared / found.back().squared);
     weights += weight;
     spacing += weight * points_.spacings[f.index];

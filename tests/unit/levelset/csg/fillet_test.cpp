@@ -7,7 +7,7 @@
 #include "levelset/csg/blend.h"
 #include "levelset/csg/seam_operands.h"
 #include "levelset/error.h"
-#include "levelset/geometry/point_tree.h"
+#include "levelset/geometry/search/point_search.h"
 #include "levelset/grids/sample.h"
 #include "levelset/inspect/measure.h"
 #include "levelset/shapes/shapes.h"
@@ -198,7 +198,7 @@ TEST(Fillet, KnowsTheDepthInsideThickSolids) {
   // then rolled through it along the other solid.
   const NarrowBand thick = makeSphere(40, V3d(0), 1);
   const std::vector<openvdb::Vec3d> points = {{40, 0, 0}, {0, 40, 0}};
-  const eikonal::PointTree curve(points);
+  const PointSearch curve = makePointSearch(points);
   const openvdb::FloatGrid::Ptr part = solids::cutOut(vdb(thick), curve, 20);
   for (int depth = 1; depth <= 40; ++depth)
     EXPECT_LT(part->tree().getValue(openvdb::Coord(40 - depth, 0, 0)), 0) << depth;

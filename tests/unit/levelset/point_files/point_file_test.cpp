@@ -364,7 +364,7 @@ TEST(PointFiles, MemoryIsLimited) {
 
 TEST(PointFiles, MutatedFilesAreReadOrRefused) {
   const TemporaryFolder folder;
-  const char* names[] = {"a.ply", "a.obj", "a.xyz", "a.csv", "a.pts", "a.csv.gz"};
+  const char* names[] = {"a.ply", "a.obj", "a.xyz", "a.csv", "a.pts", "a.csv.gz", "a.vdb"};
   std::mt19937 random(1);
   std::size_t readable = 0, refusals = 0;
   for (const char* name : names) {
@@ -373,6 +373,7 @@ TEST(PointFiles, MutatedFilesAreReadOrRefused) {
     for (int round = 0; round < 60; ++round) {
       writeText(folder / name, support::mutated(seed, random));
       (void)levelset::lacksFaces(folder / name);
+      (void)levelset::holdsPointGrid(folder / name);
       try {
         const PointCloud cloud = readPoints(folder / name, {.maxMemory = std::size_t{64} << 20});
         EXPECT_FALSE(cloud.isEmpty());

@@ -3,25 +3,26 @@
 // For the .cpp files of this library only.
 
 #include "levelset/geometry/closest_on_triangle.h"
+#include "levelset/geometry/search/overlap_tree.h"
 #include "levelset/mesh.h"
-#include "levelset/points/search/overlap_tree.h"
 
-namespace levelset::points {
+namespace levelset {
 
 /// Triangle with its number.
 struct TriangleItem {
+  using Number = double;
   static constexpr bool kHasExtent = true;
   std::array<Imath::V3d, 3> corners;
   std::uint32_t index;
 
-  [[nodiscard]] ItemBox box() const;
+  [[nodiscard]] ItemBox<double> box() const;
   [[nodiscard]] Imath::V3d closestPoint(const Imath::V3d& from) const;
   [[nodiscard]] double squaredDistance(const Imath::V3d& from) const;
   [[nodiscard]] bool isSameAs(const TriangleItem& other) const { return corners == other.corners; }
 };
 
-inline ItemBox TriangleItem::box() const {
-  ItemBox box{corners[0], corners[0]};
+inline ItemBox<double> TriangleItem::box() const {
+  ItemBox<double> box{corners[0], corners[0]};
   for (int axis = 0; axis < 3; ++axis)
     for (const Imath::V3d& p : corners) {
       box.low[axis] = std::min(box.low[axis], p[axis]);
@@ -40,10 +41,10 @@ inline double TriangleItem::squaredDistance(const Imath::V3d& from) const {
 }
 
 /// Triangles in a tree, for searches of the closest ones.
-using TriangleSearch = OverlapTree<TriangleItem, SiblingBoxes>;
-extern template class OverlapTree<TriangleItem, SiblingBoxes>;
+using TriangleSearch = OverlapTree<TriangleItem>;
+extern template class OverlapTree<TriangleItem>;
 
 /// Makes the tree of a mesh. Copies the corners.
 [[nodiscard]] TriangleSearch makeTriangleSearch(const TriMesh& mesh);
 
-}  // namespace levelset::points
+}  // namespace levelset

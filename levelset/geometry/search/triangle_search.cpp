@@ -1,8 +1,8 @@
-#include "levelset/points/search/triangle_search.h"
+#include "levelset/geometry/search/triangle_search.h"
 
-namespace levelset::points {
+namespace levelset {
 
-template class OverlapTree<TriangleItem, SiblingBoxes>;
+template class OverlapTree<TriangleItem>;
 
 TriangleSearch makeTriangleSearch(const TriMesh& mesh) {
   std::vector<TriangleItem> items;
@@ -13,4 +13,4 @@ TriangleSearch makeTriangleSearch(const TriMesh& mesh) {
   return TriangleSearch(std::move(items));
 }
 
-}  // namespace levelset::points
+}  // namespace levelset
