@@ -56,10 +56,11 @@ const VdbEntry& choosePoints(const std::vector<VdbEntry>& entries, const std::st
     chosen = &entry;
   }
   if (!chosen)
-    throw InvalidInput(fmt::format(
-        "{} holds {}, but no grid of points{}; {}", file, listOfPoints(entries),
-        wanted.empty() ? "" : fmt::format(" '{}'", wanted),
-        wanted.empty() ? "read a level set, and 'sample' it" : "choose another one with --grid"));
+    throw InvalidInput(
+        fmt::format("{} holds {}, but no grid of points{}; {}", file, listOfPoints(entries),
+                    wanted.empty() ? "" : fmt::format(" '{}'", wanted),
+                    wanted.empty() ? "read another file, or this one without --points"
+                                   : "choose another one with --grid"));
   return *chosen;
 }
 
