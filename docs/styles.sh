@@ -17,8 +17,9 @@ dragon() {  # dragon NAME OPTIONS...
   shift
   "$levelsmith" --quiet read "$out/dragon.vdb" ! render "$out/$name.png" --size 480x360 --samples 16 --renderer cpu "$@"
 }
-for style in mean gauss principal accessibility tone; do dragon "$style" --style "$style"; done
+for style in mean gauss principal accessibility tone directions curvature-lines; do dragon "$style" --style "$style"; done
 dragon ink --style ink --curvature-range 350
+dragon second --style curvature-lines --along k2
 # A shaded ball serves as the matcap.
 "$levelsmith" --quiet sphere --radius 1 --voxel 0.02 ! render "$out/ball.png" --size 256x256 --from 0,0,5 --to 0,0,0 --ortho 2 --samples 16
 dragon matcap --style matcap --matcap "$out/ball.png"
@@ -28,5 +29,6 @@ dragon matcap --style matcap --matcap "$out/ball.png"
 "$levelsmith" --quiet read "$out/dragon.vdb" ! slice --plane "0,0.12,0 0,0,1" --step 2vx --png "$out/slice.png" --size 480x360
 "${PYTHON:-python3}" "$here/cases/figures.py" sheet "$out" "$here/styles" 3 \
   "mean=--style mean" "gauss=--style gauss" "principal=--style principal" \
-  "accessibility=--style accessibility" "tone=--style tone" "ink=--style ink" \
+  "directions=--style directions" "curvature-lines=--style curvature-lines" \
+  "second=--style curvature-lines --along k2" "accessibility=--style accessibility" "tone=--style tone" "ink=--style ink" \
   "matcap=--style matcap" "cut=scene --csg 'dragon - ball - slab'" "slice=slice --step 2vx"

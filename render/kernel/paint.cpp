@@ -220,7 +220,7 @@ std::vector<char> KernelPainter::paintData(const KernelTracer& tracer,
       inVolume.push_back({ray.origin, ray.direction, ray.near, hit.found ? hit.distance : ray.far});
     if (hit.found) {
       layers_.setHit(number, scene_.camera, hit);
-      if (options_.curvature) layers_.setCurvature(number, hit.curvature);
+      layers_.setCurvature(number, hit);
     } else {
       hit = shader_.groundHit(ray);
       if (!hit.found) continue;
@@ -402,6 +402,7 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
     const std::scoped_lock lock(reporting);
     levelset::report(options.progress, static_cast<double>(++done) / (across * down));
   });
+  finishColours(image, scene, options, surfaces.bounds().size().length());
   image.attributes = sceneAttributes(scene, options);
   image.attributes["ls:renderer"] = renderer;
   image.attributes["ls:mode"] = "exact";

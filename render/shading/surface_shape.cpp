@@ -1,7 +1,10 @@
 #include "render/shading/surface_shape.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+
+#include "levelset/geometry/perpendicular.h"
 
 namespace render {
 namespace {
@@ -29,13 +32,27 @@ double curvatureAlong(const SurfaceShape& shape, const V3d& direction) {
   return along.dot(along * shape.hessian) / (length * along.length2());
 }
 
+/// First principal direction in index space, of unit length, from the shape operator in two tangent
+/// vectors [Sigg05]. The published eigenvector vanishes for some operators, e.g. diagonal ones. The
+/// longer one of two equivalent vectors does not. Where k1 = k2 it is a tangent vector.
+V3d firstDirection(const SurfaceShape& shape) {
+  const double length = shape.gradient.length();
+  if (!(length > 0)) return V3d(0);
+  const auto [u, v] = levelset::tangents(shape.gradient / length);
+  const V3d bentU = u * shape.hessian, bentV = v * shape.hessian;
+  const double half = 0.5 * (u.dot(bentU) - v.dot(bentV)), mixed = u.dot(bentV);
+  const double spread = std::hypot(half, mixed);
+  const V3d along = half >= 0 ? u * (half + spread) + v * mixed : u * mixed + v * (spread - half);
+  return unitOr(along, u);
+}
+
 /// Principal, mean and Gauss curvatures from gradient and Hessian [Goldman05], per world unit, k1 ≥
-/// k2. Zero where the gradient vanishes.
+/// k2. Zero where the gradient vanishes. The direction is not set.
 CurvatureSample curvaturesOf(const SurfaceShape& shape, double voxelSize) {
   const V3d& g = shape.gradient;
   const Imath::M33d& h = shape.hessian;
   const double squared = g.length2(), length = std::sqrt(squared);
-  if (!(length > 0)) return {0, 0, 0, 0};
+  if (!(length > 0)) return {};
   const auto minor = [&](int i, int j) {  // cofactor (i, j) of h
     const int a = (i + 1) % 3, b = (i + 2) % 3, c = (j + 1) % 3, d = (j + 2) % 3;
     return h[a][c] * h[b][d] - h[a][d] * h[b][c];
@@ -55,8 +72,9 @@ CurvatureSample curvaturesOf(const SurfaceShape& shape, double voxelSize) {
 }
 
 /// Curvatures of the same surface with inside and outside exchanged.
-CurvatureSample flipped(const CurvatureSample& sample) {
-  return {-sample.mean, sample.gauss, -sample.k2, -sample.k1};
+CurvatureSample flipped(const CurvatureSample& sample, const V3d& normal) {
+  return {-sample.mean, sample.gauss, -sample.k2, -sample.k1,
+          asLine(normal.cross(sample.direction1))};
 }
 
 }  // namespace
@@ -73,13 +91,16 @@ void addShape(Hit& hit, const SurfaceShape& shape, const Imath::M44d& indexToWor
   const V3d axes[3] = {row(indexToWorld, 0), row(indexToWorld, 1), row(indexToWorld, 2)};
   const double voxelSize = axes[0].length();
   hit.curvature = curvaturesOf(shape, voxelSize);
+  V3d direction1;
+  indexToWorld.multDirMatrix(firstDirection(shape), direction1);
+  hit.curvature.direction1 = asLine(direction1.normalized());
   hit.viewCurvature = curvatureAlong(shape, V3d(axes[0].dot(direction), axes[1].dot(direction),
                                                 axes[2].dot(direction))) /
                       voxelSize;
   if (!hit.isFlipped) return;
   hit.facetNormal = -hit.facetNormal;
   hit.normal = -hit.normal;
-  hit.curvature = flipped(hit.curvature);
+  hit.curvature = flipped(hit.curvature, hit.normal);
   hit.viewCurvature = -hit.viewCurvature;
 }
 
