@@ -287,9 +287,6 @@ TEST(VolumeSurface, IsTheIsosurfaceOfTheFilteredVolume) {
   const auto all = support::volumeSurfaces();
   for (const std::size_t n : {0u, 2u})
     for (const Filter filter : kFilters) {
-      // The coefficients of a picture are f − ∇²f/6, those of a FilteredVolume a product along the
-      // axes.
-      if (filter == Filter::BSplineQi) continue;
       const VolumeSurface& surface = all[n].second;
       const levelset::FilteredVolume interpolant(
           surface.volume(), levelset::volumeFilterNamed(filterName(filter)).value());
