@@ -227,7 +227,7 @@ EmbreeScene::Impl::Impl(const Scene& source, Filter filter)
 void EmbreeScene::Impl::gather(const Scene& source, Filter filter) {
   for (std::size_t i = 0; i < source.solids.size(); ++i) {
     const Solid& solid = source.solids[i];
-    if (solid.isEmpty() || (!source.csg.isEmpty() && !source.csg.uses(i))) continue;
+    if (solid.isEmpty(filter) || (!source.csg.isEmpty() && !source.csg.uses(i))) continue;
     RaySolid entry;
     entry.isVolume = solid.volume != nullptr;
     if (solid.volume) {

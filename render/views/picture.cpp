@@ -215,7 +215,7 @@ std::map<std::string, std::string> sceneAttributes(const Scene& scene,
   const Filter filter = options.filter;
   std::string grids, voxelSizes, bits;
   for (const Solid& solid : scene.solids) {
-    if (solid.isEmpty()) continue;
+    if (solid.isEmpty(filter)) continue;
     const char* comma = grids.empty() ? "" : ", ";
     if (solid.volume)
       grids += fmt::format("{}volume {:016x} at {}", comma, solid.volume->volume().contentHash(),

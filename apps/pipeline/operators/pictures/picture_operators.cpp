@@ -182,12 +182,6 @@ std::vector<std::string> pictureFilterNames() {
   return names;
 }
 
-render::Filter filterOf(const Invocation& in) {
-  for (const render::Filter filter : render::kFilters)
-    if (in.text("filter") == render::filterName(filter)) return filter;
-  return render::Filter::Trilinear;
-}
-
 render::StyleOptions styleOf(const Invocation& in) {
   render::StyleOptions options;
   options.style = styleNamed(in.text("style"));
