@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <mutex>
 
+#include "render/shading/principal_direction.h"
 #include "render/shading/surface_shape.h"
 
 namespace render {
@@ -176,6 +177,12 @@ Hit KernelPainter::hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std
     addVolumeShape(hit, hits.shapes.at(i), solid.worldToTable, solid.voxelSize, ray.direction);
   else
     addShape(hit, hits.shapes.at(i), solid.tableToWorld, ray.direction);
+  if (options_.hasDirections() || showsDirections(options_.style.style)) {
+    if (solid.isVolume)
+      addVolumeDirection(hit, hits.shapes.at(i), solid.worldToTable);
+    else
+      addDirection(hit, hits.shapes.at(i), solid.tableToWorld);
+  }
   hit.surfaceError += kCastError * solid.voxelSize;
   return hit;
 }

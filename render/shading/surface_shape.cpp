@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "levelset/geometry/perpendicular.h"
+#include "render/shading/principal_direction.h"
 
 namespace render {
 namespace {
@@ -41,7 +42,7 @@ V3d firstDirection(const SurfaceShape& shape) {
   const auto [u, v] = levelset::tangents(shape.gradient / length);
   const V3d bentU = u * shape.hessian, bentV = v * shape.hessian;
   const double half = 0.5 * (u.dot(bentU) - v.dot(bentV)), mixed = u.dot(bentV);
-  const double spread = std::hypot(half, mixed);
+  const double spread = std::sqrt(half * half + mixed * mixed);
   const V3d along = half >= 0 ? u * (half + spread) + v * mixed : u * mixed + v * (spread - half);
   return unitOr(along, u);
 }
@@ -72,9 +73,20 @@ CurvatureSample curvaturesOf(const SurfaceShape& shape, double voxelSize) {
 }
 
 /// Curvatures of the same surface with inside and outside exchanged.
-CurvatureSample flipped(const CurvatureSample& sample, const V3d& normal) {
-  return {-sample.mean, sample.gauss, -sample.k2, -sample.k1,
-          asLine(normal.cross(sample.direction1))};
+CurvatureSample flipped(const CurvatureSample& sample) {
+  return {-sample.mean, sample.gauss, -sample.k2, -sample.k1};
+}
+
+/// Derivatives of the field of a volume along world axes, per world unit.
+SurfaceShape worldShape(const SurfaceShape& shape, const Imath::M44d& worldToIndex) {
+  const V3d rows[3] = {row(worldToIndex, 0), row(worldToIndex, 1), row(worldToIndex, 2)};
+  SurfaceShape world;
+  for (int i = 0; i < 3; ++i) {
+    world.gradient[i] = rows[i].dot(shape.gradient);
+    world.trilinearGradient[i] = rows[i].dot(shape.trilinearGradient);
+    for (int j = 0; j < 3; ++j) world.hessian[i][j] = rows[i].dot(rows[j] * shape.hessian);
+  }
+  return world;
 }
 
 }  // namespace
@@ -91,34 +103,37 @@ void addShape(Hit& hit, const SurfaceShape& shape, const Imath::M44d& indexToWor
   const V3d axes[3] = {row(indexToWorld, 0), row(indexToWorld, 1), row(indexToWorld, 2)};
   const double voxelSize = axes[0].length();
   hit.curvature = curvaturesOf(shape, voxelSize);
-  V3d direction1;
-  indexToWorld.multDirMatrix(firstDirection(shape), direction1);
-  hit.curvature.direction1 = asLine(direction1.normalized());
   hit.viewCurvature = curvatureAlong(shape, V3d(axes[0].dot(direction), axes[1].dot(direction),
                                                 axes[2].dot(direction))) /
                       voxelSize;
   if (!hit.isFlipped) return;
   hit.facetNormal = -hit.facetNormal;
   hit.normal = -hit.normal;
-  hit.curvature = flipped(hit.curvature, hit.normal);
+  hit.curvature = flipped(hit.curvature);
   hit.viewCurvature = -hit.viewCurvature;
 }
 
 void addVolumeShape(Hit& hit, const SurfaceShape& shape, const Imath::M44d& worldToIndex,
                     double voxelSize, const V3d& direction) {
-  const V3d rows[3] = {row(worldToIndex, 0), row(worldToIndex, 1), row(worldToIndex, 2)};
-  SurfaceShape world;
-  for (int i = 0; i < 3; ++i) {
-    world.gradient[i] = rows[i].dot(shape.gradient);
-    world.trilinearGradient[i] = rows[i].dot(shape.trilinearGradient);
-    for (int j = 0; j < 3; ++j) world.hessian[i][j] = rows[i].dot(rows[j] * shape.hessian);
-  }
+  SurfaceShape world = worldShape(shape, worldToIndex);
   const double slope = world.gradient.length();
   world.interpolationError =
       shape.interpolationError < slope * voxelSize ? shape.interpolationError / slope : 0;
   if (shape.interpolationError > 0 && !(world.interpolationError > 0))
     world.interpolationError = voxelSize;
   addShape(hit, world, Imath::M44d(), direction);
+}
+
+void addDirection(Hit& hit, const SurfaceShape& shape, const Imath::M44d& indexToWorld) {
+  V3d first;
+  indexToWorld.multDirMatrix(firstDirection(shape), first);
+  // With inside and outside exchanged, both directions change places.
+  if (hit.isFlipped) first = hit.normal.cross(first);
+  hit.curvature.direction1 = asLine(first.normalized());
+}
+
+void addVolumeDirection(Hit& hit, const SurfaceShape& shape, const Imath::M44d& worldToIndex) {
+  addDirection(hit, worldShape(shape, worldToIndex), Imath::M44d());
 }
 
 }  // namespace render

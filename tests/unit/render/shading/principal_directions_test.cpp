@@ -252,6 +252,26 @@ TEST(PrincipalDirections, AgreeWithTheJudgeAndHaveTheSameBitsOnBothProcessors) {
   }
 }
 
+TEST(PrincipalDirections, AreThoseOfSoftExpressions) {
+  Scene scene = support::sceneOf(levelset::makeCylinder(1, 8, V3d(0), V3d(0, 0, 1), 0.1), 64, 48);
+  scene.solids.push_back({.band = levelset::makeSphere(1, V3d(1.2, 0, 0), 0.1), .id = 2});
+  scene.csg = CsgExpression("a | b", {"a", "b"});
+  scene.softness = 0.25;
+  const Image ours = renderCpu(scene, optionsOf(Filter::Trilinear));
+  const ImageComparison judged =
+      compareImages(ours, renderEmbree(scene, optionsOf(Filter::Trilinear)));
+  EXPECT_TRUE(judged.agrees()) << judged.reason();
+  std::size_t onCylinder = 0;
+  for (std::size_t i = 0; i < ours.pixelCount(); ++i) {
+    const V3d p = vectorAt(ours, "P", i);
+    if (!std::isfinite(ours.channels.at("Z")[i]) || std::abs(p.z) < 2 || std::abs(p.z) > 3.5)
+      continue;
+    ++onCylinder;
+    EXPECT_LE(angleBetween(vectorAt(ours, "direction2", i), V3d(0, 0, 1)), measured(2e-6));
+  }
+  EXPECT_GT(onCylinder, 50u);
+}
+
 TEST(PrincipalDirections, AreComparedAsLinesAwayFromUmbilics) {
   const Scene scene =
       support::sceneOf(levelset::makeTorus(1, 0.4, V3d(0), V3d(0, 0, 1), 0.05), 64, 48);
