@@ -19,8 +19,8 @@ struct CurvatureSample {
   /// world unit squared). mean, k1 and k2 are positive on a solid ball.
   double mean = 0, gauss = 0, k1 = 0, k2 = 0;
   /// First principal direction: unit tangent vector along which the normal curvature is k1, with a
-  /// sign from asLine(). Any tangent vector where k1 = k2. 0 on meshes, and where the gradient
-  /// vanishes. The second principal direction is
+  /// sign from asLine(). Any tangent vector where k1 = k2. 0 on meshes, where the gradient
+  /// vanishes, and in pictures that show no directions. The second principal direction is
   /// normal × direction1, with a sign from asLine().
   Imath::V3d direction1{0};
 };
