@@ -3,6 +3,7 @@
 #include <Imath/ImathColor.h>
 #include <Imath/ImathVec.h>
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -17,7 +18,23 @@ struct CurvatureSample {
   /// Mean curvature, Gauss curvature, and principal curvatures k1 ≥ k2; per world unit (gauss: per
   /// world unit squared). mean, k1 and k2 are positive on a solid ball.
   double mean = 0, gauss = 0, k1 = 0, k2 = 0;
+  /// First principal direction: unit tangent vector along which the normal curvature is k1, with a
+  /// sign from asLine(). Any tangent vector where k1 = k2. 0 on meshes, where the gradient
+  /// vanishes, and in pictures that show no directions. The second principal direction is
+  /// normal × direction1, with a sign from asLine().
+  Imath::V3d direction1{0};
 };
+
+/// Returns the one of v and −v whose component of largest magnitude is positive; the first one, of
+/// components that differ by rounding. A direction of a line has no sign. This choice gives equal
+/// lines equal vectors.
+[[nodiscard]] inline Imath::V3d asLine(const Imath::V3d& v) {
+  constexpr double kRounding = 1e-6;
+  int most = 0;
+  for (int axis = 1; axis < 3; ++axis)
+    if (std::abs(v[axis]) > (1 + kRounding) * std::abs(v[most])) most = axis;
+  return v[most] < 0 ? -v : v;
+}
 
 /// Intersection of a ray with a surface; world units.
 struct Hit {

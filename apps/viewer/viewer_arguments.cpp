@@ -30,8 +30,8 @@ and patches (.patch) with it.
   --fov DEGREES       vertical field of view                            [35]
   --ortho L           orthographic projection; height of the view, world units
   --layer NAME        displayed layer: colour, normal, depth, position, mean, gauss, k1, k2, id or thickness
-  --style NAME        shading style: lit, tone, mean, gauss, principal, accessibility, ink, matcap or
-                      reflection-lines
+  --style NAME        shading style: lit, tone, mean, gauss, principal, accessibility, ink, matcap,
+                      reflection-lines, directions or curvature-lines
   --matcap FILE       with --style matcap: a PNG of a shaded ball       [a ball of the viewer]
   --opacity N         opacity of the surfaces, above 0 and at most 1    [1]
   --range N           curvature at the ends of the colours, times the model's diagonal [40]

@@ -44,7 +44,7 @@ FilterBounds boundsOf(VolumeFilter filter) {
   if (filter == VolumeFilter::SuperQuadratic) return {9.0 / 8, 3, true};
   if (filter == VolumeFilter::CubicC1) return {1, 1.5, true};
   if (filter == VolumeFilter::BccQuadratic) return {5.0 / 4, 3.25, true};
-  double value = 0, curvature = 0;
+  double value = 0, curvature = 0, correction = 0;
   constexpr int kSteps = 256;
   for (int n = 0; n <= kSteps; ++n) {
     const FilterWeights axis =
@@ -52,6 +52,12 @@ FilterBounds boundsOf(VolumeFilter filter) {
     double sum = 0;
     for (const double w : axis.weight[0]) sum += std::abs(w);
     value = std::max(value, sum);
+    if (filter == VolumeFilter::BSplineQi) {
+      sum = 0;
+      for (std::size_t i = 0; i < axis.weight[0].size(); ++i)
+        sum += std::abs(axis.weight[0][i] - axis.uncorrected[0][i]);
+      correction = std::max(correction, sum);
+    }
     // Weights of the second differences: twofold partial sums of the weights of the samples.
     double once = 0, twice = 0;
     sum = 0;
@@ -65,6 +71,11 @@ FilterBounds boundsOf(VolumeFilter filter) {
   // The sums change by less than this between two steps.
   value += 0.001;
   curvature += 0.05;
+  // Each axis adds its correction to the B-spline, whose weights are positive with the sum 1.
+  if (filter == VolumeFilter::BSplineQi) {
+    correction = 2 * (correction + 0.001);
+    return {value + correction, curvature + correction};
+  }
   return {value * value * value, curvature * value * value};
 }
 

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "levelset/error.h"
@@ -24,6 +25,17 @@ using BandLeaf = openvdb::FloatTree::LeafNodeType;
 
 // Memory of a leaf block with its share of the tree's nodes, bytes.
 constexpr double kBytesPerBandLeaf = 2300;
+
+/// Refuses a range that no value, or every value, lies in.
+[[noreturn]] void refuseRange(const Volume& volume, VolumeFilter filter, bool isInside) {
+  const std::string made = filter == VolumeFilter::Trilinear
+                               ? ""
+                               : fmt::format(" with the filter {}", factsOf(filter).name);
+  throw NoSurface(fmt::format(
+      "{} value of the volume{} belongs to the solid: its samples go from {:.6g} to {:.6g}; choose "
+      "an isovalue between them ('histogram' suggests some)",
+      isInside ? "every" : "no", made, volume.lowest(), volume.highest()));
+}
 
 void checkIsosurface(const Volume& volume, const ValueRange& range,
                      const IsosurfaceOptions& options) {
@@ -48,15 +60,16 @@ void checkIsosurface(const Volume& volume, const ValueRange& range,
         "the volume has {} x {} x {} grid points, but a solid needs two along each axis; use a "
         "volume, not a slice",
         size.x, size.y, size.z));
-  const bool hasInside = (!range.low || volume.highest() > *range.low) &&
-                         (!range.high || volume.lowest() < *range.high);
-  const bool hasOutside = (range.low && volume.lowest() <= *range.low) ||
-                          (range.high && volume.highest() >= *range.high);
-  if (!hasInside || !hasOutside)
-    throw NoSurface(fmt::format(
-        "{} value of the volume belongs to the solid: they go from {:.6g} to {:.6g}; choose an "
-        "isovalue between them ('histogram' suggests some)",
-        hasInside ? "every" : "no", volume.lowest(), volume.highest()));
+  double low = volume.lowest(), high = volume.highest();
+  if (options.filter != VolumeFilter::Trilinear && high > low) {
+    // Between grid points, a filter may have values beyond those of the grid points.
+    const double beyond = (boundsOf(options.filter).value - 1) * (high - low) / 2;
+    low -= beyond;
+    high += beyond;
+  }
+  const bool hasInside = (!range.low || high > *range.low) && (!range.high || low < *range.high);
+  const bool hasOutside = (range.low && low <= *range.low) || (range.high && high >= *range.high);
+  if (!hasInside || !hasOutside) refuseRange(volume, options.filter, hasInside);
 }
 
 /// Origins of the blocks of 8³ grid points that the band may reach, in ascending order, relative to
@@ -136,6 +149,7 @@ IsosurfaceResult bandOf(const Volume& volume, const IsosurfaceOptions& options,
   const auto surface = makeSurface(voxelSize, limit, subProgress(options.progress, 0, 0.2));
   IsosurfaceResult result;
   result.report = surface.report();
+  if (result.report.pieces == 0) refuseRange(volume, options.filter, result.report.closedArea > 0);
   if (options.border == VolumeBorder::Refuse && result.report.closedArea > 0)
     throw InvalidInput(fmt::format(
         "the solid reaches the border of the volume on an area of {:.6g} square units, where "

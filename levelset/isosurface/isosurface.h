@@ -54,7 +54,7 @@ struct IsosurfaceResult {
 /// size. The result does not depend on the number of threads.
 /// @throws UsageError for limits that are not finite or not in order, or for a half width of 1 or
 ///         less
-/// @throws NoSurface when no value, or every value, lies in the range
+/// @throws NoSurface when no value, or every value, of the filtered volume lies in the range
 /// @throws InvalidInput for a volume with one grid point along an axis, or with
 ///         VolumeBorder::Refuse when the solid reaches the border
 /// @throws ResourceLimit before the memory exceeds its limit

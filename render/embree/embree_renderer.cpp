@@ -58,7 +58,7 @@ struct PixelPainter {
       layers.setVolume(i, volumeLight(ray, ray.near, hit.found ? hit.distance : ray.far));
     if (!hit.found) return;
     layers.setHit(i, scene.camera, hit);
-    if (options.curvature) layers.setCurvature(i, hit.curvature);
+    layers.setCurvature(i, hit);
   }
 
   /// Light of the scene's volume on a part of a ray.
@@ -137,6 +137,7 @@ Image renderEmbree(const Scene& scene, const RenderOptions& options) {
     const std::scoped_lock lock(reporting);
     levelset::report(options.progress, static_cast<double>(++done) / (across * down));
   });
+  finishColours(image, scene, options, rays.bounds().size().length());
   image.attributes = sceneAttributes(scene, options);
   image.attributes["ls:renderer"] = fmt::format("embree {}", RTC_VERSION_STRING);
   image.attributes["ls:mode"] = "exact";

@@ -16,6 +16,7 @@
 #include "render/embree/volume_tree_vdb.h"
 #include "render/meshes/embree_space.h"
 #include "render/meshes/mesh_rays.h"
+#include "render/shading/principal_direction.h"
 #include "render/shading/surface_shape.h"
 
 namespace render {
@@ -227,7 +228,7 @@ EmbreeScene::Impl::Impl(const Scene& source, Filter filter)
 void EmbreeScene::Impl::gather(const Scene& source, Filter filter) {
   for (std::size_t i = 0; i < source.solids.size(); ++i) {
     const Solid& solid = source.solids[i];
-    if (solid.isEmpty() || (!source.csg.isEmpty() && !source.csg.uses(i))) continue;
+    if (solid.isEmpty(filter) || (!source.csg.isEmpty() && !source.csg.uses(i))) continue;
     RaySolid entry;
     entry.isVolume = solid.volume != nullptr;
     if (solid.volume) {
@@ -335,10 +336,13 @@ void EmbreeScene::Impl::complete(Hit& hit, const RayQuery& query, const RaySolid
   hit.colour = solid.colour;
   hit.opacity = solid.opacity;
   const SurfaceShape shape = solid.shapeAt(hit.position);
-  if (solid.isVolume)
+  if (solid.isVolume) {
     addVolumeShape(hit, shape, solid.worldToIndex, solid.voxelSize, query.direction);
-  else
+    addVolumeDirection(hit, shape, solid.worldToIndex);
+  } else {
     addShape(hit, shape, solid.indexToWorld, query.direction);
+    addDirection(hit, shape, solid.indexToWorld);
+  }
 }
 
 EmbreeScene::EmbreeScene(const Scene& scene, Filter filter)

@@ -1,5 +1,6 @@
 #include "render/images/compare_images.h"
 
+#include <Imath/ImathVec.h>
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -240,6 +241,27 @@ class Comparer {
     const double turn = vectorDifference("P", i) * std::min(curvature[0], curvature[1]);
     return std::isfinite(turn) ? std::min(turn, kMostTurn) : 0;
   }
+  /// Angle in radians between the lines along two direction vectors, times the difference of the
+  /// principal curvatures per voxel: the change of the shape operator that turns them so far.
+  /// Curvatures above one per voxel count relatively. At umbilics any two directions are equal.
+  [[nodiscard]] double lineDifference(const std::string& name, std::size_t i, double voxel,
+                                      double bend) const {
+    const Imath::V3d a = vectorOf(a_, name, i), b = vectorOf(b_, name, i);
+    const auto spread = [&](const Image& image) {
+      return std::abs(value(image, "curvature.k1", i) - value(image, "curvature.k2", i));
+    };
+    const double weight = voxel * std::min(spread(a_), spread(b_)) / bend;
+    if (a == b || weight == 0) return 0;
+    if (a == Imath::V3d(0) || b == Imath::V3d(0)) return kInfinite;
+    const double angle = std::atan2(a.cross(b).length(), std::abs(a.dot(b)));
+    const double result = angle * weight;
+    return std::isfinite(result) ? result : kInfinite;
+  }
+  [[nodiscard]] static Imath::V3d vectorOf(const Image& image, const std::string& name,
+                                           std::size_t i) {
+    return {value(image, name + ".X", i), value(image, name + ".Y", i),
+            value(image, name + ".Z", i)};
+  }
   /// Distance of the position P from the origin, world units. It determines the precision of P.
   [[nodiscard]] double distance(std::size_t i) const {
     const double d = std::hypot(value(a_, "P.X", i), value(a_, "P.Y", i), value(a_, "P.Z", i));
@@ -306,6 +328,14 @@ class Comparer {
            return h * h * apart(value(a_, "curvature.gauss", i), value(b_, "curvature.gauss", i)) /
                   (bend(i) * bend(i));
          }});
+    for (const std::string name : {"direction1", "direction2"}) {
+      if (!has("curvature.k1") || !has("curvature.k2")) continue;
+      add({name + ".X", name + ".Y", name + ".Z"},
+          {name,
+           "radians times k1 − k2 per voxel",
+           {1e-4 + rough, kInfinite},
+           [this, name, h, bend](std::size_t i) { return lineDifference(name, i, h, bend(i)); }});
+    }
     // If the camera is close to the solid, the error of positions is relative to the size of the
     // solid.
     const double extent =

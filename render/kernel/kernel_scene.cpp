@@ -180,7 +180,7 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
   Imath::Box3d box = meshes_.bounds();
   box.extendBy(mapped_.bounds());
   for (const Solid& solid : scene.solids) {
-    if (solid.isEmpty()) continue;
+    if (solid.isEmpty(options.filter)) continue;
     if (solid.volume) {
       leaves += static_cast<double>(solid.volume->blocks(options.filter).size());
       box.extendBy(solid.volume->volume().grid().bounds());
@@ -201,7 +201,7 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
                                      : FrustumCulling();
   for (std::size_t i = 0; i < scene.solids.size(); ++i) {
     const Solid& source = scene.solids[i];
-    if (source.isEmpty() || (!scene.csg.isEmpty() && !scene.csg.uses(i))) continue;
+    if (source.isEmpty(options.filter) || (!scene.csg.isEmpty() && !scene.csg.uses(i))) continue;
     const M44d toWorld = source.indexToWorld();
     const double growth = source.volume ? largestGrowth(toWorld) : source.voxelSize();
     KernelSolid solid;

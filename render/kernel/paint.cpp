@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <mutex>
 
+#include "render/shading/principal_direction.h"
 #include "render/shading/surface_shape.h"
 
 namespace render {
@@ -176,6 +177,12 @@ Hit KernelPainter::hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std
     addVolumeShape(hit, hits.shapes.at(i), solid.worldToTable, solid.voxelSize, ray.direction);
   else
     addShape(hit, hits.shapes.at(i), solid.tableToWorld, ray.direction);
+  if (options_.hasDirections() || showsDirections(options_.style.style)) {
+    if (solid.isVolume)
+      addVolumeDirection(hit, hits.shapes.at(i), solid.worldToTable);
+    else
+      addDirection(hit, hits.shapes.at(i), solid.tableToWorld);
+  }
   hit.surfaceError += kCastError * solid.voxelSize;
   return hit;
 }
@@ -220,7 +227,7 @@ std::vector<char> KernelPainter::paintData(const KernelTracer& tracer,
       inVolume.push_back({ray.origin, ray.direction, ray.near, hit.found ? hit.distance : ray.far});
     if (hit.found) {
       layers_.setHit(number, scene_.camera, hit);
-      if (options_.curvature) layers_.setCurvature(number, hit.curvature);
+      layers_.setCurvature(number, hit);
     } else {
       hit = shader_.groundHit(ray);
       if (!hit.found) continue;
@@ -402,6 +409,7 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
     const std::scoped_lock lock(reporting);
     levelset::report(options.progress, static_cast<double>(++done) / (across * down));
   });
+  finishColours(image, scene, options, surfaces.bounds().size().length());
   image.attributes = sceneAttributes(scene, options);
   image.attributes["ls:renderer"] = renderer;
   image.attributes["ls:mode"] = "exact";

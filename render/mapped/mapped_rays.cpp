@@ -11,6 +11,7 @@
 #include "render/mapped/shell_walk.h"
 #include "render/mapped/texture_rays_vdb.h"
 #include "render/meshes/embree_space.h"
+#include "render/shading/principal_direction.h"
 #include "render/shading/surface_shape.h"
 
 namespace render {
@@ -239,6 +240,7 @@ Hit MappedRays::intersect(const V3d& origin, const V3d& direction, double near, 
   const double steepness = shape.trilinearGradient.length();
   shape.interpolationError = steepness > 0 ? shape.interpolationError / steepness : 0;
   addShape(hit, shape, Imath::M44d(), direction);
+  addDirection(hit, shape, Imath::M44d());
   return hit;
 }
 

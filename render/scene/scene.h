@@ -43,7 +43,10 @@ struct Solid {
   /// If not null, this isosurface is drawn and `band` is empty.
   std::shared_ptr<const VolumeSurface> volume = {};
 
-  [[nodiscard]] bool isEmpty() const { return volume ? volume->isEmpty() : band.isEmpty(); }
+  /// Returns true when there is certainly no surface. @param filter  interpolation of a volume
+  [[nodiscard]] bool isEmpty(Filter filter = Filter::Trilinear) const {
+    return volume ? volume->isEmpty(filter) : band.isEmpty();
+  }
   /// Transform from the grid's index space to world space.
   [[nodiscard]] Imath::M44d indexToWorld() const {
     return volume ? volume->indexToWorld() : band.indexToWorld();

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/shading/principal_direction.h"
+
 namespace render {
 namespace {
 
@@ -96,6 +98,7 @@ void addFieldShape(Hit& hit, const FieldExpression& expression,
   hit.id = expression.operands[largest].id;
   hit.solid = expression.operands[largest].solid;
   addShape(hit, values[expression.drawn].shape, Imath::M44d(), direction);
+  addDirection(hit, values[expression.drawn].shape, Imath::M44d());
 }
 
 }  // namespace render

@@ -30,6 +30,16 @@ struct RenderOptions {
   /// the style needs no light. The colours have the same bits.
   bool layers = true;
   bool curvature = true;  ///< adds the layers curvature.mean, .gauss, .k1 and .k2
+  /// Adds the layers direction1 and direction2 with the principal directions.
+  bool directions = false;
+  /// True when the picture has the layers of curvatures, and of directions. Style::CurvatureLines
+  /// needs both.
+  [[nodiscard]] bool hasCurvature() const {
+    return curvature || style.style == Style::CurvatureLines;
+  }
+  [[nodiscard]] bool hasDirections() const {
+    return directions || style.style == Style::CurvatureLines;
+  }
   /// Adds the layers volume.R .G .B .A to a picture with Scene::volumePart.
   bool volumeLight = true;
   /// Memory limit, bytes. It applies to the image and, separately, to the kernel's tables of the

@@ -14,8 +14,6 @@ using Imath::V3d;
 // Length of occlusion rays relative to the diagonal of the surfaces' box: hollows darken, open
 // surfaces do not.
 constexpr double kOcclusionShare = 0.25;
-// Default of the curvature range (StyleOptions), multiplied by the diagonal of the surfaces' box.
-constexpr double kDefaultRange = 40;
 constexpr std::uint64_t kAmbient = 1, kShadow = 2;
 
 std::uint64_t scramble(std::uint64_t x) {  // the finaliser of SplitMix64
@@ -113,8 +111,7 @@ Shader::Shader(const Scene& scene, double diagonal, const RenderOptions& options
   const V3d& d = scene.key.direction;
   key_ = keyDirection(scene);
   fill_ = (right_ * -d.x + up_ * (0.3 * d.y) - forward * d.z).normalized();
-  const double asked = options.style.curvatureRange;
-  curvatureRange_ = asked > 0 ? asked : kDefaultRange / diagonal;
+  curvatureRange_ = curvatureRangeOf(options.style, diagonal);
   constexpr int kSteps = 1024;
   for (int i = 0; i <= kSteps; ++i)
     keyCosines_.push_back(meanCosine(2.0 * i / kSteps - 1, scene.key.softness));
@@ -255,6 +252,11 @@ C3f Shader::albedoOf(const Hit& hit) const {
       return gaussColour(hit.curvature, curvatureRange_);
     case Style::Principal:
       return principalColour(hit.curvature, curvatureRange_);
+    case Style::Directions: {
+      const V3d& first = hit.curvature.direction1;
+      return directionColour(options_.style.direction == 2 ? hit.normal.cross(first) : first,
+                             directionWeight(hit.curvature.k1, hit.curvature.k2, curvatureRange_));
+    }
     case Style::Accessibility:
       return scaled(own, accessibilityOf(hit.curvature, curvatureRange_));
     default:

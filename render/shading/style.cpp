@@ -59,9 +59,22 @@ const char* styleName(Style style) {
       return "matcap";
     case Style::ReflectionLines:
       return "reflection-lines";
+    case Style::Directions:
+      return "directions";
+    case Style::CurvatureLines:
+      return "curvature-lines";
     default:
       return "lit";
   }
+}
+
+bool showsDirections(Style style) {
+  return style == Style::Directions || style == Style::CurvatureLines;
+}
+
+double curvatureRangeOf(const StyleOptions& options, double diagonal) {
+  constexpr double kDefaultRange = 40;
+  return options.curvatureRange > 0 ? options.curvatureRange : kDefaultRange / diagonal;
 }
 
 bool usesLights(Style style) {
@@ -94,6 +107,19 @@ C3f principalColour(const CurvatureSample& sample, double range) {
   const double place = std::clamp(2 * (index + 1), 0.0, 4.0);
   const int cell = std::min(3, static_cast<int>(place));
   return mixed(kNeutral, mixed(*table[cell], *table[cell + 1], place - cell), size);
+}
+
+double directionWeight(double k1, double k2, double range) {
+  constexpr double kLeast = 1.0 / 200, kMost = 1.0 / 20;
+  return ramp(kLeast, kMost, std::abs(k1 - k2) / range);
+}
+
+C3f directionColour(const Imath::V3d& line, double weight) {
+  constexpr double kBase = 0.04, kSlope = 0.66;
+  C3f colour;
+  for (int axis = 0; axis < 3; ++axis)
+    colour[axis] = static_cast<float>(kBase + kSlope * line[axis] * line[axis]);
+  return mixed(kNeutral, colour, weight);
 }
 
 double accessibilityOf(const CurvatureSample& sample, double range) {

@@ -30,15 +30,22 @@ enum class Style {
   Matcap,  ///< colours from a picture of a shaded ball, looked up by the normal in camera space
   /// Dark and bright stripes: reflections of parallel lines at infinity in a mirroring surface. The
   /// stripes break where the normal jumps, and bend where the curvature jumps [Kalbe11].
-  ReflectionLines
+  ReflectionLines,
+  /// A principal direction by colour, with light and shadows: red, green and blue are the
+  /// squares of its coordinates, as for nerve fibres [Pajevic99].
+  Directions,
+  /// Streaks along the lines of curvature, the curves along a principal direction, by line integral
+  /// convolution in the picture [Cabral93]; with light and shadows.
+  CurvatureLines
 };
 
 /// Name of a style: "lit", "tone", "mean", "gauss", "principal", "accessibility", "ink", "matcap",
-/// "reflection-lines".
+/// "reflection-lines", "directions", "curvature-lines".
 [[nodiscard]] const char* styleName(Style style);
-inline constexpr std::array kStyles = {Style::Lit,   Style::Tone,      Style::Mean,
-                                       Style::Gauss, Style::Principal, Style::Accessibility,
-                                       Style::Ink,   Style::Matcap,    Style::ReflectionLines};
+inline constexpr std::array kStyles = {
+    Style::Lit,           Style::Tone, Style::Mean,   Style::Gauss,           Style::Principal,
+    Style::Accessibility, Style::Ink,  Style::Matcap, Style::ReflectionLines, Style::Directions,
+    Style::CurvatureLines};
 
 /// A colour picture with linear values.
 struct ColourImage {
@@ -68,10 +75,20 @@ struct StyleOptions {
   /// middle to the end of a colour map. Lines of ridges and valleys in Style::Ink begin at it. 0
   /// stands for 40 divided by the diagonal of the bounding box of the surfaces.
   double curvatureRange = 0;
-  double lineWidth = 2;                            ///< width of silhouette lines, pixels
-  int reflectionLines = 32;                        ///< number of lines, for Style::ReflectionLines
+  double lineWidth = 2;      ///< width of silhouette lines, or of streaks, pixels
+  int reflectionLines = 32;  ///< number of lines, for Style::ReflectionLines
+  /// Principal direction of Style::Directions and Style::CurvatureLines: 1, that of k1, or 2, that
+  /// of k2.
+  int direction = 1;
   std::shared_ptr<const ColourImage> matcap = {};  ///< picture of a shaded ball, for Style::Matcap
 };
+
+/// True when the style shows a principal direction, StyleOptions::direction.
+[[nodiscard]] bool showsDirections(Style style);
+
+/// Curvature range of a style for a picture. @param diagonal  of the bounding box of the surfaces,
+/// world units
+[[nodiscard]] double curvatureRangeOf(const StyleOptions& options, double diagonal);
 
 /// True when the style uses shadow rays and ambient occlusion rays.
 [[nodiscard]] bool usesLights(Style style);
@@ -81,6 +98,13 @@ struct StyleOptions {
 [[nodiscard]] Imath::C3f meanColour(const CurvatureSample& sample, double range);
 [[nodiscard]] Imath::C3f gaussColour(const CurvatureSample& sample, double range);
 [[nodiscard]] Imath::C3f principalColour(const CurvatureSample& sample, double range);
+/// Weight of the principal directions at a point, from 0 to 1. It is 0 at umbilics, where k1 = k2
+/// and the directions are undefined, and up to a difference k1 − k2 of range/200; it is 1 from
+/// range/20 on.
+[[nodiscard]] double directionWeight(double k1, double k2, double range);
+/// Linear colour for a direction of a line, which has no sign. @param line  unit vector
+/// @param weight  from 0 (neutral colour) to 1
+[[nodiscard]] Imath::C3f directionColour(const Imath::V3d& line, double weight);
 /// Accessibility of a surface point, from 0 to 1. It is 1 where the surface is not concave. It is
 /// 1/2 where the largest ball that can touch the point from outside has the radius 1 / range, and
 /// less where only smaller balls can touch it.

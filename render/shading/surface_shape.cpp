@@ -1,7 +1,11 @@
 #include "render/shading/surface_shape.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+
+#include "levelset/geometry/perpendicular.h"
+#include "render/shading/principal_direction.h"
 
 namespace render {
 namespace {
@@ -29,13 +33,27 @@ double curvatureAlong(const SurfaceShape& shape, const V3d& direction) {
   return along.dot(along * shape.hessian) / (length * along.length2());
 }
 
+/// First principal direction in index space, of unit length, from the shape operator in two tangent
+/// vectors [Sigg05]. The published eigenvector vanishes for some operators, e.g. diagonal ones. The
+/// longer one of two equivalent vectors does not. Where k1 = k2 it is a tangent vector.
+V3d firstDirection(const SurfaceShape& shape) {
+  const double length = shape.gradient.length();
+  if (!(length > 0)) return V3d(0);
+  const auto [u, v] = levelset::tangents(shape.gradient / length);
+  const V3d bentU = u * shape.hessian, bentV = v * shape.hessian;
+  const double half = 0.5 * (u.dot(bentU) - v.dot(bentV)), mixed = u.dot(bentV);
+  const double spread = std::sqrt(half * half + mixed * mixed);
+  const V3d along = half >= 0 ? u * (half + spread) + v * mixed : u * mixed + v * (spread - half);
+  return unitOr(along, u);
+}
+
 /// Principal, mean and Gauss curvatures from gradient and Hessian [Goldman05], per world unit, k1 ≥
-/// k2. Zero where the gradient vanishes.
+/// k2. Zero where the gradient vanishes. The direction is not set.
 CurvatureSample curvaturesOf(const SurfaceShape& shape, double voxelSize) {
   const V3d& g = shape.gradient;
   const Imath::M33d& h = shape.hessian;
   const double squared = g.length2(), length = std::sqrt(squared);
-  if (!(length > 0)) return {0, 0, 0, 0};
+  if (!(length > 0)) return {};
   const auto minor = [&](int i, int j) {  // cofactor (i, j) of h
     const int a = (i + 1) % 3, b = (i + 2) % 3, c = (j + 1) % 3, d = (j + 2) % 3;
     return h[a][c] * h[b][d] - h[a][d] * h[b][c];
@@ -57,6 +75,18 @@ CurvatureSample curvaturesOf(const SurfaceShape& shape, double voxelSize) {
 /// Curvatures of the same surface with inside and outside exchanged.
 CurvatureSample flipped(const CurvatureSample& sample) {
   return {-sample.mean, sample.gauss, -sample.k2, -sample.k1};
+}
+
+/// Derivatives of the field of a volume along world axes, per world unit.
+SurfaceShape worldShape(const SurfaceShape& shape, const Imath::M44d& worldToIndex) {
+  const V3d rows[3] = {row(worldToIndex, 0), row(worldToIndex, 1), row(worldToIndex, 2)};
+  SurfaceShape world;
+  for (int i = 0; i < 3; ++i) {
+    world.gradient[i] = rows[i].dot(shape.gradient);
+    world.trilinearGradient[i] = rows[i].dot(shape.trilinearGradient);
+    for (int j = 0; j < 3; ++j) world.hessian[i][j] = rows[i].dot(rows[j] * shape.hessian);
+  }
+  return world;
 }
 
 }  // namespace
@@ -85,19 +115,25 @@ void addShape(Hit& hit, const SurfaceShape& shape, const Imath::M44d& indexToWor
 
 void addVolumeShape(Hit& hit, const SurfaceShape& shape, const Imath::M44d& worldToIndex,
                     double voxelSize, const V3d& direction) {
-  const V3d rows[3] = {row(worldToIndex, 0), row(worldToIndex, 1), row(worldToIndex, 2)};
-  SurfaceShape world;
-  for (int i = 0; i < 3; ++i) {
-    world.gradient[i] = rows[i].dot(shape.gradient);
-    world.trilinearGradient[i] = rows[i].dot(shape.trilinearGradient);
-    for (int j = 0; j < 3; ++j) world.hessian[i][j] = rows[i].dot(rows[j] * shape.hessian);
-  }
+  SurfaceShape world = worldShape(shape, worldToIndex);
   const double slope = world.gradient.length();
   world.interpolationError =
       shape.interpolationError < slope * voxelSize ? shape.interpolationError / slope : 0;
   if (shape.interpolationError > 0 && !(world.interpolationError > 0))
     world.interpolationError = voxelSize;
   addShape(hit, world, Imath::M44d(), direction);
+}
+
+void addDirection(Hit& hit, const SurfaceShape& shape, const Imath::M44d& indexToWorld) {
+  V3d first;
+  indexToWorld.multDirMatrix(firstDirection(shape), first);
+  // With inside and outside exchanged, both directions change places.
+  if (hit.isFlipped) first = hit.normal.cross(first);
+  hit.curvature.direction1 = asLine(first.normalized());
+}
+
+void addVolumeDirection(Hit& hit, const SurfaceShape& shape, const Imath::M44d& worldToIndex) {
+  addDirection(hit, worldShape(shape, worldToIndex), Imath::M44d());
 }
 
 }  // namespace render

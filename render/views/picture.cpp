@@ -8,6 +8,7 @@
 #include "levelset/error.h"
 #include "levelset/vdb.h"
 #include "render/scene/field_expression.h"
+#include "render/shading/curvature_lines.h"
 
 namespace render {
 namespace {
@@ -30,8 +31,11 @@ PictureLayers::PictureLayers(Image& image, const Scene& scene, const RenderOptio
     p[i] = image.addChannel(fmt::format("P.{}", axes[i])).data();
   }
   const char* kinds[4] = {"mean", "gauss", "k1", "k2"};
-  for (int i = 0; options.curvature && i < 4; ++i)
+  for (int i = 0; options.hasCurvature() && i < 4; ++i)
     curvature[i] = image.addChannel(fmt::format("curvature.{}", kinds[i])).data();
+  for (int k = 0; options.hasDirections() && k < 2; ++k)
+    for (int i = 0; i < 3; ++i)
+      direction[k][i] = image.addChannel(fmt::format("direction{}.{}", k + 1, axes[i])).data();
   if (options.thickness) thickness = image.addChannel("thickness").data();
   const char* lights[4] = {"R", "G", "B", "A"};
   for (int c = 0; scene.volumePart && options.volumeLight && c < 4; ++c)
@@ -61,9 +65,14 @@ void PictureLayers::addWarnings(Image& image, const Scene& scene) const {
       scene.morph ? "morph" : "soft expression");
 }
 
-void PictureLayers::setCurvature(std::size_t i, const CurvatureSample& sample) const {
+void PictureLayers::setCurvature(std::size_t i, const Hit& hit) const {
+  const CurvatureSample& sample = hit.curvature;
   const double values[4] = {sample.mean, sample.gauss, sample.k1, sample.k2};
-  for (int k = 0; k < 4; ++k) curvature[k][i] = static_cast<float>(values[k]);
+  for (int k = 0; curvature[0] && k < 4; ++k) curvature[k][i] = static_cast<float>(values[k]);
+  if (!direction[0][0]) return;
+  const V3d lines[2] = {sample.direction1, asLine(hit.normal.cross(sample.direction1))};
+  for (int k = 0; k < 2; ++k)
+    for (int axis = 0; axis < 3; ++axis) direction[k][axis][i] = static_cast<float>(lines[k][axis]);
 }
 
 void PictureLayers::setVolume(std::size_t i, const VolumeLight& light) const {
@@ -126,6 +135,17 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
                     "range of 0 or more, and a width from 0 to 1000 pixels",
                     style.curvatureRange, style.lineWidth));
   }
+  if (style.style == Style::CurvatureLines) {
+    if (!scene.isOpaque() || scene.volumePart)
+      throw levelset::UsageError(
+          "the style curvature-lines shows the first surface along each ray, and does not support "
+          "transparent parts and volumes with a transfer function; draw them without it");
+    if (style.lineWidth > kWidestStreak)
+      throw levelset::UsageError(fmt::format(
+          "a line width of {} pixels is too large for the style curvature-lines; give at "
+          "most {} pixels",
+          style.lineWidth, kWidestStreak));
+  }
   if (style.style == Style::Matcap && !style.matcap)
     throw levelset::UsageError("the style matcap needs a picture of a shaded ball; give a PNG");
   if (options.fromNanoVdb && options.filter != Filter::Trilinear)
@@ -180,7 +200,8 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
         filterName(options.filter), solid.band.halfWidth()));
   }
   const double pixels = static_cast<double>(scene.camera.width) * scene.camera.height;
-  const double channels = 12 + (options.curvature ? 4 : 0) + (options.thickness ? 1 : 0) +
+  const double channels = 12 + (options.hasCurvature() ? 4 : 0) +
+                          (options.hasDirections() ? 6 : 0) + (options.thickness ? 1 : 0) +
                           (scene.volumePart && options.volumeLight ? 4 : 0);
   levelset::requireMemory(pixels * 4 * channels, options.maxBytes);
 }
@@ -194,7 +215,7 @@ std::map<std::string, std::string> sceneAttributes(const Scene& scene,
   const Filter filter = options.filter;
   std::string grids, voxelSizes, bits;
   for (const Solid& solid : scene.solids) {
-    if (solid.isEmpty()) continue;
+    if (solid.isEmpty(filter)) continue;
     const char* comma = grids.empty() ? "" : ", ";
     if (solid.volume)
       grids += fmt::format("{}volume {:016x} at {}", comma, solid.volume->volume().contentHash(),
@@ -231,6 +252,12 @@ std::map<std::string, std::string> sceneAttributes(const Scene& scene,
   if (scene.softness > 0) attributes["ls:soft"] = fmt::format("{}", scene.softness);
   if (scene.morph) attributes["ls:morph"] = fmt::format("{}", *scene.morph);
   return attributes;
+}
+
+void finishColours(Image& image, const Scene& scene, const RenderOptions& options,
+                   double diagonal) {
+  if (options.style.style != Style::CurvatureLines) return;
+  drawCurvatureLines(image, scene.camera, options.style, curvatureRangeOf(options.style, diagonal));
 }
 
 void addViewAttributes(Image& image, const Scene& scene, double extent) {

@@ -38,6 +38,7 @@ struct PictureLayers {
   float *r, *g, *b, *a, *z;
   float *n[3], *p[3];
   float* curvature[4] = {};
+  float* direction[2][3] = {};  ///< first and second principal direction
   float* thickness = nullptr;
   float* volume[4] = {};  ///< light of the volume in front of the first surface, and its opacity
   std::uint32_t* id;
@@ -47,7 +48,9 @@ struct PictureLayers {
   PictureLayers(Image& image, const Scene& scene, const RenderOptions& options);
   /// Writes depth, normal, position and id of pixel `i`. @pre the normals of the hit are set
   void setHit(std::size_t i, const Camera& camera, const Hit& hit) const;
-  void setCurvature(std::size_t i, const CurvatureSample& sample) const;
+  /// Writes the curvatures and the principal directions of pixel `i`, of the layers that the
+  /// picture has. @pre the normals of the hit are set
+  void setCurvature(std::size_t i, const Hit& hit) const;
   /// @pre the picture has the layers of a volume
   void setVolume(std::size_t i, const VolumeLight& light) const;
   /// Adds the header attribute ls:warning if pixels show a blended surface outside the band of a
@@ -82,6 +85,10 @@ void requireLight(const Scene& scene);
 /// the options that determine the layers.
 [[nodiscard]] std::map<std::string, std::string> sceneAttributes(const Scene& scene,
                                                                  const RenderOptions& options);
+
+/// Completes the colours of a picture after all pixels are painted: draws Style::CurvatureLines.
+/// Other styles do not change. @param diagonal  of the bounding box of the surfaces, world units
+void finishColours(Image& image, const Scene& scene, const RenderOptions& options, double diagonal);
 
 /// Adds header attributes of the view: software, camera matrices, depths (ls:near and ls:far, if
 /// set), the meaning of Z, and ls:extent.

@@ -68,6 +68,10 @@ bool VolumeSurface::isEmpty() const {
              : !(volume_->lowest() < isovalue_ && volume_->highest() >= isovalue_);
 }
 
+bool VolumeSurface::isEmpty(Filter filter) const {
+  return isEmpty() && (filter == Filter::Trilinear || blocks(filter).empty());
+}
+
 std::vector<V3i> VolumeSurface::blocks(Filter filter) const {
   if (filter == Filter::Trilinear)
     return ranges_->crossed(isovalue_, inside_ == VolumeInside::Below);

@@ -59,6 +59,9 @@ class VolumeSurface {
   [[nodiscard]] double voxelSize() const;
   /// Returns true when no grid point or every grid point is inside, or the grid has no cells.
   [[nodiscard]] bool isEmpty() const;
+  /// Returns true when the surface of a filter is certainly empty. Unlike the trilinear
+  /// interpolant, other filters also have values beyond those of the grid points. @see blocks()
+  [[nodiscard]] bool isEmpty(Filter filter) const;
   /// Blocks of 8³ cells that may hold a crossed cell, by their lowest grid points, ordered by x, y,
   /// z.
   [[nodiscard]] std::vector<Imath::V3i> blocks(Filter filter) const;

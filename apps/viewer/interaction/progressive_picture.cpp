@@ -230,6 +230,7 @@ struct ProgressivePicture::Worker {
       paintTiles(painter, *drawn, progress, isStale);
     }
     if (isStale) return nullptr;
+    render::finishColours(*drawn, scene, options, surfaces->bounds().size().length());
     return drawn;
   }
 

@@ -12,10 +12,11 @@ struct Taps {
   int count = 0;
   int before = 0;  ///< number of samples below the cell
   std::array<std::array<double, FilterWeights::kMost>, 3> weight{};
+  std::array<std::array<double, FilterWeights::kMost>, 3> uncorrected{};  ///< as FilterWeights
 };
 
 Taps linearTaps(double a) {
-  return {2, 0, {{{1 - a, a}, {-1, 1}, {0, 0}}}};
+  return {2, 0, {{{1 - a, a}, {-1, 1}, {0, 0}}}, {}};
 }
 
 Taps catmullRomTaps(double a) {
@@ -41,9 +42,10 @@ Taps bsplineTaps(double a) {
 /// B-spline of the coefficients (8 f_i − f_{i−1} − f_{i+1}) / 6.
 Taps quasiInterpolantTaps(double a) {
   const Taps spline = bsplineTaps(a);
-  Taps taps{6, 2, {}};
+  Taps taps{6, 2, {}, {}};
   for (std::size_t order = 0; order < 3; ++order)
     for (std::size_t n = 0; n < 4; ++n) {
+      taps.uncorrected[order][n + 1] = spline.weight[order][n];
       const double w = spline.weight[order][n] / 6;
       taps.weight[order][n] -= w;
       taps.weight[order][n + 1] += 8 * w;
@@ -118,15 +120,11 @@ Taps tapsOf(VolumeFilter filter, double a) {
 
 }  // namespace
 
-bool isTensorProduct(VolumeFilter filter) {
-  return filter <= VolumeFilter::WindowedSinc;
-}
-
 FilterWeights filterWeights(VolumeFilter filter, double position, int size, GridExtension border) {
   FilterWeights result;
   if (filter == VolumeFilter::Box || size == 1) {
     result.first = std::min(static_cast<int>(std::floor(position + 0.5)), size - 1);
-    result.weight[0][0] = 1;
+    result.weight[0][0] = result.uncorrected[0][0] = 1;
     return result;
   }
   const int cell = std::min(static_cast<int>(position), size - 2);
@@ -139,10 +137,13 @@ FilterWeights filterWeights(VolumeFilter filter, double position, int size, Grid
   for (int n = first; n <= last; ++n) {
     const ExtensionWeights stand = extensionWeights(n, size, border);
     for (std::size_t order = 0; order < 3; ++order)
-      for (std::size_t e = 0; e < static_cast<std::size_t>(stand.count); ++e)
-        result.weight[order][static_cast<std::size_t>(stand.index[e] - result.first)] +=
-            static_cast<double>(stand.weight[e]) *
-            taps.weight[order][static_cast<std::size_t>(n - first)];
+      for (std::size_t e = 0; e < static_cast<std::size_t>(stand.count); ++e) {
+        const auto to = static_cast<std::size_t>(stand.index[e] - result.first),
+                   from = static_cast<std::size_t>(n - first);
+        const auto share = static_cast<double>(stand.weight[e]);
+        result.weight[order][to] += share * taps.weight[order][from];
+        result.uncorrected[order][to] += share * taps.uncorrected[order][from];
+      }
   }
   return result;
 }

@@ -17,8 +17,8 @@ using Imath::V3d;
 constexpr std::size_t kMost = FilterWeights::kMost;
 
 /// Sums the samples with the weights of three axes, derivatives up to an order. The sums run along
-/// x, then y, then z.
-template <int Order>
+/// x, then y, then z. @tparam IsCorrected  of BSplineQi: products with one corrected factor
+template <int Order, bool IsCorrected>
 VolumeDerivatives tensorProduct(const Volume& volume, VolumeFilter filter, const V3d& index,
                                 GridExtension border) {
   const Imath::V3i size = volume.size();
@@ -31,7 +31,7 @@ VolumeDerivatives tensorProduct(const Volume& volume, VolumeFilter filter, const
   const auto countX = static_cast<std::size_t>(x.count), countY = static_cast<std::size_t>(y.count),
              countZ = static_cast<std::size_t>(z.count);
   for (std::size_t c = 0; c < countZ; ++c) {
-    double plane[3][3] = {};
+    double plane[3][3] = {}, uncorrected[3][3] = {};
     for (std::size_t b = 0; b < countY; ++b) {
       volume.storedRun(
           volume.index(x.first, y.first + static_cast<int>(b), z.first + static_cast<int>(c)),
@@ -39,13 +39,24 @@ VolumeDerivatives tensorProduct(const Volume& volume, VolumeFilter filter, const
       for (std::size_t p = 0; p <= Order; ++p) {
         double row = 0;
         for (std::size_t a = 0; a < countX; ++a) row += x.weight[p][a] * run[a];
-        for (std::size_t q = 0; p + q <= Order; ++q) plane[p][q] += y.weight[q][b] * row;
+        if constexpr (!IsCorrected) {
+          for (std::size_t q = 0; p + q <= Order; ++q) plane[p][q] += y.weight[q][b] * row;
+        } else {
+          double plain = 0;
+          for (std::size_t a = 0; a < countX; ++a) plain += x.uncorrected[p][a] * run[a];
+          for (std::size_t q = 0; p + q <= Order; ++q) {
+            plane[p][q] += y.uncorrected[q][b] * (row - 2 * plain) + y.weight[q][b] * plain;
+            uncorrected[p][q] += y.uncorrected[q][b] * plain;
+          }
+        }
       }
     }
     for (std::size_t p = 0; p <= Order; ++p)
       for (std::size_t q = 0; p + q <= Order; ++q)
         for (std::size_t r = 0; p + q + r <= Order; ++r)
-          sums[p][q][r] += z.weight[r][c] * plane[p][q];
+          sums[p][q][r] +=
+              IsCorrected ? z.uncorrected[r][c] * plane[p][q] + z.weight[r][c] * uncorrected[p][q]
+                          : z.weight[r][c] * plane[p][q];
   }
   VolumeDerivatives found;
   found.value = volume.scale()(sums[0][0][0]);
@@ -95,8 +106,10 @@ VolumeDerivatives filtered(const Volume& volume, VolumeFilter filter, V3d index,
       return onTetrahedra<CubicC1Spline, Order>(volume, index, border);
     case VolumeFilter::BccQuadratic:
       return onTetrahedra<BccQuadraticSpline<2>, Order>(volume, index, border);
+    case VolumeFilter::BSplineQi:
+      return tensorProduct<Order, true>(volume, filter, index, border);
     default:
-      return tensorProduct<Order>(volume, filter, index, border);
+      return tensorProduct<Order, false>(volume, filter, index, border);
   }
 }
 

@@ -8,11 +8,11 @@ namespace levelset {
 
 /// Reconstruction filter: the function between the grid points of a volume.
 enum class VolumeFilter {
-  Box,             ///< value of the nearest grid point
-  Trilinear,       ///< trilinear interpolation in each cell of eight grid points
-  Tricubic,        ///< cubic convolution, also called Catmull-Rom spline, along each axis [Keys81]
-  BSpline,         ///< cubic B-spline with the samples as coefficients [Sigg05]
-  BSplineQi,       ///< cubic B-spline, coefficients by a quasi-interpolant: (−1, 8, −1) / 6
+  Box,        ///< value of the nearest grid point
+  Trilinear,  ///< trilinear interpolation in each cell of eight grid points
+  Tricubic,   ///< cubic convolution, also called Catmull-Rom spline, along each axis [Keys81]
+  BSpline,    ///< cubic B-spline with the samples as coefficients [Sigg05]
+  BSplineQi,  ///< cubic B-spline with the coefficients f − ∇²f/6 [Sigg05], ∇² by seven samples
   WindowedSinc,    ///< sinc under a raised cosine of radius 3 [MarschnerLobb94], weights of sum one
   SuperQuadratic,  ///< quadratic super spline on the type-6 partition [Kalbe11]
   CubicC1,         ///< cubic C¹ spline on the type-6 partition [Kalbe11]

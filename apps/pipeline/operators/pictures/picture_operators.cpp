@@ -65,11 +65,16 @@ void validateDraw(const Invocation& in) {
                          ? "render: --matcap applies only to --style matcap; leave it out, or give "
                            "--style matcap"
                          : "render: --style matcap needs --matcap with a PNG of a shaded ball");
-  if (in.flag("thickness") && render::imageFormat(in.text("file"), in.text("format")) != "exr")
-    throw UsageError("render: a PNG has no layers, so --thickness is lost; name an .exr");
-  if (in.given("line") && style != "tone" && style != "ink")
+  for (const char* layer : {"thickness", "directions"})
+    if (in.flag(layer) && render::imageFormat(in.text("file"), in.text("format")) != "exr")
+      throw UsageError(
+          fmt::format("render: a PNG has no layers, so --{} is lost; name an .exr", layer));
+  if (in.given("along") && !render::showsDirections(styleNamed(style)))
     throw UsageError(
-        fmt::format("render: --style {} draws no silhouette lines; leave --line out", style));
+        fmt::format("render: --style {} shows no principal direction; leave --along out", style));
+  if (in.given("line") && style != "tone" && style != "ink" && style != "curvature-lines")
+    throw UsageError(fmt::format(
+        "render: --style {} draws no silhouette lines and no streaks; leave --line out", style));
   if (in.text("tables") == "nanovdb") {
     const std::string renderer = in.text("renderer");
     if (renderer != "gpu" && renderer != "both")
@@ -177,18 +182,13 @@ std::vector<std::string> pictureFilterNames() {
   return names;
 }
 
-render::Filter filterOf(const Invocation& in) {
-  for (const render::Filter filter : render::kFilters)
-    if (in.text("filter") == render::filterName(filter)) return filter;
-  return render::Filter::Trilinear;
-}
-
 render::StyleOptions styleOf(const Invocation& in) {
   render::StyleOptions options;
   options.style = styleNamed(in.text("style"));
   if (in.given("curvature-range")) options.curvatureRange = in.number("curvature-range");
   options.lineWidth = in.number("line");
   options.reflectionLines = in.integerAs<int>("reflection-lines");
+  options.direction = in.text("along") == "k2" ? 2 : 1;
   if (in.given("matcap"))
     options.matcap = std::make_shared<const render::ColourImage>(
         render::readColourPng(in.text("matcap"), in.maxMemory));
@@ -236,14 +236,17 @@ Value draw(Invocation& in) {
         fmt::format("render: --renderer {} does not draw mapped textures; give --renderer cpu or "
                     "gpu, or map the texture without --instances",
                     renderer));
-  render::RenderOptions options{.samples = in.integerAs<int>("samples"),
-                                .lightSpacing = in.integerAs<int>("light-spacing"),
-                                .filter = filterOf(in),
-                                .fromNanoVdb = in.text("tables") == "nanovdb",
-                                .style = styleOf(in),
-                                .thickness = in.flag("thickness"),
-                                .maxBytes = in.maxMemory,
-                                .progress = in.progress};
+  render::RenderOptions options{
+      .samples = in.integerAs<int>("samples"),
+      .lightSpacing = in.integerAs<int>("light-spacing"),
+      .filter = filterOf(in),
+      .fromNanoVdb = in.text("tables") == "nanovdb",
+      .style = styleOf(in),
+      .thickness = in.flag("thickness"),
+      .directions = in.flag("directions") ||
+                    (isBoth && render::showsDirections(styleNamed(in.text("style")))),
+      .maxBytes = in.maxMemory,
+      .progress = in.progress};
   const bool isExr = render::imageFormat(in.text("file"), in.text("format")) != "png";
   options.layers = isBoth || scene.isBlended() || isExr;
   options.volumeLight = isBoth || isExr;
@@ -455,7 +458,8 @@ Operator renderOperator() {
             .choices = {"32", "16", "8"}},
            {.name = "style",
             .type = ParamType::Choice,
-            .doc = "style of the colours; mean, gauss and principal show curvatures",
+            .doc = "style of the colours; mean, gauss and principal show curvatures, directions "
+                   "and curvature-lines a principal direction",
             .fallback = "lit",
             .choices = styleNames()},
            {.name = "matcap",
@@ -464,13 +468,16 @@ Operator renderOperator() {
                    "normal"},
            {.name = "curvature-range",
             .type = ParamType::Number,
-            .doc = "curvature, per world unit, that has the colour half way to the end of the "
-                   "colour scale, and at which --style ink begins to draw ridges and valleys; "
-                   "default: 40 / diagonal of the bounding box",
+            .doc =
+                "curvature, per world unit, that has the colour half way to the end of the "
+                "colour scale, and at which --style ink begins to draw ridges and valleys; "
+                "principal directions fade where both curvatures differ by less than a twentieth; "
+                "default: 40 / diagonal of the bounding box",
             .range = Range::Positive},
            {.name = "line",
             .type = ParamType::Number,
-            .doc = "with --style tone or ink: width of the silhouette lines, in pixels",
+            .doc = "with --style tone or ink: width of the silhouette lines, in pixels; with "
+                   "--style curvature-lines: width of the streaks, at most 16",
             .fallback = "2",
             .range = Range::NonNegative},
            {.name = "reflection-lines",
@@ -479,6 +486,17 @@ Operator renderOperator() {
                    "vertical axis of the picture",
             .fallback = "32",
             .range = Range::Positive},
+           {.name = "along",
+            .type = ParamType::Choice,
+            .doc = "with --style directions or curvature-lines: principal direction that is shown; "
+                   "k1, that of the "
+                   "largest normal curvature, or k2, that of the least",
+            .fallback = "k1",
+            .choices = {"k1", "k2"}},
+           {.name = "directions",
+            .type = ParamType::Flag,
+            .doc = "add layers to the EXR with both principal directions: direction1.X .Y .Z, "
+                   "along which the normal curvature is k1, and direction2.X .Y .Z"},
            {.name = "thickness",
             .type = ParamType::Flag,
             .doc = "add a layer to the EXR with the length of each pixel's ray inside the solids, "

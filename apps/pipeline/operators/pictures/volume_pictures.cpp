@@ -43,6 +43,12 @@ void requireVolumeOptions(const Invocation& in) {
       throw UsageError(fmt::format("render: --{} is for volumes; leave it out", name));
 }
 
+render::Filter filterOf(const Invocation& in) {
+  for (const render::Filter filter : render::kFilters)
+    if (in.text("filter") == render::filterName(filter)) return filter;
+  return render::Filter::Trilinear;
+}
+
 render::ViewedScene volumeScene(Invocation& in) {
   const levelset::Volume volume = volumeIn(in);
   const bool hasIsovalue = in.given("isovalue");
@@ -55,11 +61,17 @@ render::ViewedScene volumeScene(Invocation& in) {
         "render: the picture is empty, because the volume has a single layer of grid points, and "
         "no "
         "cells between them");
-  else if (hasIsovalue && surface->isEmpty())
+  else if (hasIsovalue && surface->isEmpty(filterOf(in)))
     in.notes.warnings.push_back(
         fmt::format("render: the picture is empty, because no surface of the volume has the "
                     "isovalue {}; its values lie between {:.6g} and {:.6g}",
                     in.text("isovalue"), surface->volume().lowest(), surface->volume().highest()));
+  else if (hasIsovalue && surface->isEmpty())
+    in.notes.warnings.push_back(fmt::format(
+        "render: the isovalue {} lies outside the samples of the volume, from {:.6g} to "
+        "{:.6g}; the picture shows only where the filter {} goes beyond them",
+        in.text("isovalue"), surface->volume().lowest(), surface->volume().highest(),
+        in.text("filter")));
   render::ViewedScene viewed;
   if (hasIsovalue) viewed.scene.solids.push_back({.band = {}, .volume = surface});
   if (in.given("transfer")) {

@@ -4,6 +4,7 @@
 
 #include "apps/pipeline/registry/invocation.h"
 #include "apps/pipeline/registry/operator.h"
+#include "render/filter.h"
 #include "render/images/image.h"
 #include "render/scene/scene.h"
 #include "render/shading/render_options.h"
@@ -29,6 +30,9 @@ void validateVolumePicture(const Invocation& in);
 /// Refuses volumes without --isovalue or --transfer, and options for volumes with other operands.
 /// @throws UsageError
 void requireVolumeOptions(const Invocation& in);
+
+/// Returns the filter that --filter of 'render' names.
+[[nodiscard]] render::Filter filterOf(const Invocation& in);
 
 /// Scene with the isosurface of --isovalue, and the volume with the transfer function of
 /// --transfer.

@@ -62,6 +62,31 @@ TEST_F(Pictures, OfVolumesAreProvenWithAllFilters) {
   }
 }
 
+TEST_F(Pictures, ShowPrincipalDirections) {
+  const std::string torus = "torus --radius 1 --tube 0.4 --voxel 0.1 ! render ",
+                    small = " --size 48x48 ";
+  for (const char* style : {"directions", "curvature-lines --line 3", "directions --along k2"})
+    EXPECT_EQ(levelsmith(torus + "d.exr --renderer both --style " + style + small).code, 0)
+        << style;
+  // The styles show the layers that --directions adds to any picture.
+  EXPECT_EQ(levelsmith(torus + "l.exr --directions" + small).code, 0);
+  EXPECT_EQ(levelsmith(torus + "c.exr --directions --style curvature-lines" + small).code, 0);
+  const Outcome same = levelsmith("compare-images l.exr c.exr --json");
+  EXPECT_EQ(same.code, 0) << same.err;
+  EXPECT_NE(same.out.find("direction2"), std::string::npos);
+  EXPECT_EQ(Json::parse(same.out)["only_one"], Json::array());
+  EXPECT_EQ(levelsmith(torus + "p.exr" + small).code, 0);
+  EXPECT_EQ(levelsmith("compare-images p.exr l.exr --json").out.find("radians times"),
+            std::string::npos);
+  EXPECT_REFUSED(levelsmith(torus + "a.png --directions"), 2, "--directions is lost");
+  EXPECT_REFUSED(levelsmith(torus + "a.png --along k2"), 2, "leave --along out");
+  EXPECT_REFUSED(levelsmith(torus + "a.png --line 3"), 2, "leave --line out");
+  EXPECT_REFUSED(levelsmith(torus + "a.png --style curvature-lines --line 17"), 2, "at most 16");
+  EXPECT_REFUSED(levelsmith("volume sphere ! render a.png --isovalue 0 --transfer auto --style "
+                            "curvature-lines"),
+                 2, "transfer function");
+}
+
 TEST_F(Pictures, OfVolumesNeedAnIsovalue) {
   const std::string chain = "volume sphere --size 12 ! render v.exr --size 16x12 ";
   EXPECT_EQ(levelsmith(chain).code, 2);

@@ -25,6 +25,7 @@ using levelset::FilteredVolume;
 using levelset::isosurface;
 using levelset::IsosurfaceResult;
 using levelset::UsageError;
+using levelset::ValueRange;
 using levelset::Volume;
 using levelset::VolumeFilter;
 using levelset::VolumeGrid;
@@ -74,6 +75,89 @@ TEST(FilteredIsosurface, ConvergesToASphere) {
     EXPECT_GT(std::log2(errors[0] / errors[1]), measuredOrder(expected.order));
     EXPECT_LT(errors[1], measured(expected.error));
   }
+}
+
+/// Kernel of the tricubic filter along an axis, of a sample at 0.
+double catmullRom(double x) {
+  const double a = std::abs(x);
+  if (a >= 2) return 0;
+  return a < 1 ? 1 + a * a * (1.5 * a - 2.5) : 2 + a * (-4 + a * (2.5 - 0.5 * a));
+}
+
+/// Value 1 at some grid points, and 0 at the others.
+Volume bright(int size, const std::function<bool(const V3i&)>& is) {
+  return sampled({V3i(size), {}}, [&](const V3d& p) { return is(V3i(p)) ? 1.0 : 0.0; });
+}
+
+/// Position between low and high at which a function changes its sign.
+double rootOf(const std::function<double(double)>& f, double low, double high) {
+  const bool isPositive = f(low) > 0;
+  for (int n = 0; n < 60; ++n) {
+    const double middle = (low + high) / 2;
+    ((f(middle) > 0) == isPositive ? low : high) = middle;
+  }
+  return low;
+}
+
+TEST(FilteredIsosurface, LiesBeyondTheSamplesWhereTheFilterDoes) {
+  // Between two bright samples the tricubic filter has values up to 9/8.
+  const Volume pair = bright(13, [](const V3i& p) { return p == V3i(6) || p == V3i(7, 6, 6); });
+  const auto above =
+      isosurface(pair, {.low = 1.05}, {.filter = VolumeFilter::Tricubic, .voxelSize = 0.1});
+  const Imath::Box3d box = above.band.zeroSetBounds();
+  const double x =
+      rootOf([](double t) { return catmullRom(t) + catmullRom(t - 1) - 1.05; }, 0.5, 1);
+  const double y = rootOf([](double t) { return 9.0 / 8 * catmullRom(t) - 1.05; }, 0, 0.5);
+  // The surface bends along x, so linear interpolation of the distances is less exact there.
+  EXPECT_NEAR(box.max.x, 6 + x, measured(1.4e-4));
+  EXPECT_NEAR(box.min.x, 7 - x, measured(1.4e-4));
+  EXPECT_NEAR(box.max.y, 6 + y, measured(1.4e-9));
+  EXPECT_EQ(above.report.closedArea, 0);
+  // Around a single bright sample there are six regions below 0, down to −2/27.
+  const Volume single = bright(13, [](const V3i& p) { return p == V3i(6); });
+  const auto below =
+      isosurface(single, {.high = -0.05}, {.filter = VolumeFilter::Tricubic, .voxelSize = 0.1});
+  const double far = rootOf([](double t) { return catmullRom(t) + 0.05; }, 4.0 / 3, 2);
+  EXPECT_NEAR(below.band.zeroSetBounds().max.z, 6 + far, measured(1.4e-9));
+  EXPECT_NEAR(below.band.zeroSetBounds().min.y, 6 - far, measured(1.4e-9));
+  EXPECT_EQ(below.report.closedArea, 0);
+}
+
+TEST(FilteredIsosurface, HasTheSidesOfTheFilterBeyondTheSamples) {
+  const Volume single = bright(7, [](const V3i& p) { return p == V3i(3); });
+  for (const VolumeFilter filter : {VolumeFilter::BSplineQi, VolumeFilter::Tricubic}) {
+    const auto made =
+        isosurface(single, {.high = -0.005}, {.filter = filter, .voxelSize = 0.6, .halfWidth = 2});
+    const FilteredVolume f(single, filter);
+    std::size_t inside = 0;
+    for (auto it = levelset::vdb(made.band).cbeginValueOn(); it; ++it) {
+      const V3d p = V3d(it.getCoord().x(), it.getCoord().y(), it.getCoord().z()) * 0.6;
+      if (std::max({p.x, p.y, p.z}) > 6 || std::min({p.x, p.y, p.z}) < 0) continue;
+      inside += *it < 0;
+      ASSERT_EQ(*it < 0, f.value(p) < -0.005) << factsOf(filter).name << p;
+    }
+    EXPECT_GT(inside, 20u) << factsOf(filter).name;
+  }
+}
+
+TEST(FilteredIsosurface, RefusesIsovaluesThatTheFilterDoesNotReach) {
+  // The largest value of the B-spline is 8/27 of a single bright sample.
+  const Volume single = bright(9, [](const V3i& p) { return p == V3i(4); });
+  const Volume dark = bright(9, [](const V3i& p) { return p != V3i(4); });
+  const auto refused = [](const Volume& volume, VolumeFilter filter, double isovalue) {
+    return refusal<levelset::NoSurface>(
+        [&] { (void)isosurface(volume, {.low = isovalue}, {.filter = filter}); });
+  };
+  EXPECT_SAYS(refused(single, VolumeFilter::BSpline, 0.3),
+              "no value of the volume with the filter bspline");
+  EXPECT_SAYS(refused(dark, VolumeFilter::BSpline, 0.7),
+              "every value of the volume with the filter bspline");
+  EXPECT_NO_THROW((void)isosurface(single, {.low = 0.29},
+                                   {.filter = VolumeFilter::BSpline, .voxelSize = 0.05}));
+  EXPECT_SAYS(refused(single, VolumeFilter::Tricubic, 1.001), "no value");
+  EXPECT_SAYS(refused(single, VolumeFilter::Tricubic, -0.075), "every value");
+  EXPECT_SAYS(refused(single, VolumeFilter::Tricubic, 9), "no value");
+  EXPECT_SAYS(refused(single, VolumeFilter::Trilinear, -0.01), "every value of the volume belongs");
 }
 
 /// Distances of the band against those to dense points of the surface, which are never nearer.

@@ -287,9 +287,6 @@ TEST(VolumeSurface, IsTheIsosurfaceOfTheFilteredVolume) {
   const auto all = support::volumeSurfaces();
   for (const std::size_t n : {0u, 2u})
     for (const Filter filter : kFilters) {
-      // The coefficients of a picture are f − ∇²f/6, those of a FilteredVolume a product along the
-      // axes.
-      if (filter == Filter::BSplineQi) continue;
       const VolumeSurface& surface = all[n].second;
       const levelset::FilteredVolume interpolant(
           surface.volume(), levelset::volumeFilterNamed(filterName(filter)).value());
@@ -361,6 +358,43 @@ TEST(VolumeSurface, WithAnIsovalueOutsideTheRangeIsEmpty) {
        {renderCpu(scene), renderGpu(scene), renderEmbree(scene, optionsOf(Filter::Trilinear))})
     for (const float z : image.channels.at("Z")) EXPECT_TRUE(std::isinf(z));
   EXPECT_FALSE(surface.withIsovalue(0).isEmpty());
+}
+
+TEST(VolumeSurface, LiesBeyondTheSamplesWhereTheFilterDoes) {
+  // Between two bright samples the tricubic filter has values up to 9/8.
+  const auto kernel = [](double x) {
+    const double a = std::abs(x);
+    if (a >= 2) return 0.0;
+    return a < 1 ? 1 + a * a * (1.5 * a - 2.5) : 2 + a * (-4 + a * (2.5 - 0.5 * a));
+  };
+  const Volume pair = sampled(
+      {V3i(13), M44d()}, [](const V3d& p) { return p == V3d(6) || p == V3d(7, 6, 6) ? 1.0 : 0.0; });
+  for (const auto& [isovalue, inside] :
+       {std::pair(1.05, VolumeInside::Above), std::pair(-0.05, VolumeInside::Below)}) {
+    const VolumeSurface surface(pair, isovalue, inside);
+    EXPECT_TRUE(surface.isEmpty());
+    EXPECT_TRUE(surface.isEmpty(Filter::Trilinear));
+    EXPECT_TRUE(surface.isEmpty(Filter::CubicC1));
+    EXPECT_FALSE(surface.isEmpty(Filter::Tricubic));
+    Scene scene = sceneOf(surface, 96, 72);
+    scene.camera.to = V3d(6.5, 6, 6);
+    scene.camera.from = V3d(11, 14, 20);
+    scene.camera.orthoHeight = inside == VolumeInside::Above ? 1.5 : 5;
+    const Image image = renderCpu(scene, optionsOf(Filter::Tricubic));
+    double most = 0;
+    for (std::size_t i = 0; i < image.pixelCount(); ++i) {
+      if (!std::isfinite(image.channels.at("Z")[i])) continue;
+      const V3d p(image.channels.at("P.X")[i], image.channels.at("P.Y")[i],
+                  image.channels.at("P.Z")[i]);
+      const double value = (kernel(p.x - 6) + kernel(p.x - 7)) * kernel(p.y - 6) * kernel(p.z - 6);
+      most = std::max(most, std::abs(value - isovalue));
+    }
+    EXPECT_LE(most, measured(6.84e-7)) << isovalue;
+    expectJudged(image, scene, Filter::Tricubic, "beyond the samples");
+    EXPECT_EQ(compareImages(image, renderGpu(scene, optionsOf(Filter::Tricubic)), {.exact = true})
+                  .differentBits,
+              0u);
+  }
 }
 
 TEST(VolumeSurface, RefusesWhatHasNoSurface) {
