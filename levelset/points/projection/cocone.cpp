@@ -139,7 +139,9 @@ void Cocone::chooseOnHull(const std::vector<V3d>& hull, std::vector<V3d>& direct
     if (lean(direction[p]) <= kLean) continue;
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread);
     const Eigen::Vector3d normal = solver.eigenvectors().col(0);
-    direction[p] = V3d(normal.x(), normal.y(), normal.z());
+    const V3d plane(normal.x(), normal.y(), normal.z());
+    // At a sharp edge, all directions lean alike.
+    if (lean(plane) < 0.5 * lean(direction[p])) direction[p] = plane;
   }
 }
 
