@@ -30,8 +30,13 @@ using Clock = std::chrono::steady_clock;
 
 /// Longest edges by default, median spacings.
 constexpr double kLongestSpacings = 8;
-/// Scales of the edge lengths for the tries of a part whose front fails.
-constexpr double kFrontScales[] = {1, 0.8, 0.6};
+/// Scale of the edge lengths, and number of the start. Each is a try of a part whose front failed.
+struct FrontTry {
+  double scale;
+  std::size_t start;
+};
+constexpr FrontTry kFrontTries[] = {{1, 0},   {1, 2},   {1, 5},   {0.9, 0},
+                                    {0.9, 3}, {0.8, 1}, {0.7, 4}, {0.6, 0}};
 /// Positions nearer to a border than this lie on it, edge lengths. Avoids thin strips there.
 constexpr double kBorderSnap = 0.4;
 
@@ -211,7 +216,7 @@ PartMesh meshPart(const PointSurface& surface, const BorderPoints& borders, cons
                   const Progress& progress) {
   PartMesh best;
   best.missed = part.points.size() + 1;
-  for (const double scale : kFrontScales) {
+  for (const auto& [scale, first] : kFrontTries) {
     const PartFront front(surface, borders, lengths, number, scale);
     FrontOptions options;
     options.shortest = scale * part.shortest;
@@ -219,7 +224,8 @@ PartMesh meshPart(const PointSurface& surface, const BorderPoints& borders, cons
     options.expectedTriangles = static_cast<std::size_t>(part.expected / (scale * scale)) + 1;
     options.progress = progress;
     PartMesh found;
-    for (const std::uint32_t start : part.starts) {
+    for (std::size_t k = 0; k < part.starts.size(); ++k) {
+      const std::uint32_t start = part.starts[(first + k) % part.starts.size()];
       found.front = advanceFront(front, surface.positions()[start], options);
       if (!found.front.triangles.empty()) break;
     }
