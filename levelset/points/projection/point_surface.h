@@ -98,7 +98,7 @@ class PointSurface {
   /// Directions without neighbours at a point, counter-clockwise between two neighbours.
   struct Sector {
     std::uint32_t from, to;
-    double radius;  ///< of the circle through the three points; infinite for an outer border
+    double radius;  ///< radius of the circle through the three points; infinite for an outer border
   };
 
   void computeSpacings();
@@ -121,7 +121,7 @@ class PointSurface {
   std::vector<HeightPolynomial> fits_;  ///< degree 0: none
   std::vector<std::uint32_t> sectorsFirst_;
   std::vector<Sector> sectors_;
-  double reach_ = 0;  ///< of the polynomial of a point, spacings
+  double reach_ = 0;  ///< radius in which the polynomial of a point is used, spacings
   Timing timing_;
   std::size_t guessedParts_ = 0, partCount_ = 0;
   std::vector<std::uint32_t> parts_;
