@@ -158,18 +158,18 @@ class PartFront : public FrontSurface {
 };
 
 /// Points of one part.
-struct Part {
+struct SurfacePart {
   std::vector<std::uint32_t> points;
   std::vector<std::uint32_t> starts;  ///< some with large edge lengths, the largest first
   double shortest = INFINITY, longest = 0;
   double expected = 0;  ///< number of triangles
 };
 
-std::vector<Part> partsOf(const PointSurface& surface, const std::vector<double>& lengths) {
-  std::vector<Part> parts(surface.partCount());
+std::vector<SurfacePart> partsOf(const PointSurface& surface, const std::vector<double>& lengths) {
+  std::vector<SurfacePart> parts(surface.partCount());
   for (std::uint32_t i = 0; i < surface.size(); ++i) {
     if (surface.part(i) == PointSurface::kNone) continue;
-    Part& part = parts[surface.part(i)];
+    SurfacePart& part = parts[surface.part(i)];
     part.points.push_back(i);
     part.shortest = std::min(part.shortest, lengths[i]);
     part.longest = std::max(part.longest, lengths[i]);
@@ -177,7 +177,7 @@ std::vector<Part> partsOf(const PointSurface& surface, const std::vector<double>
     const double ratio = surface.spacing(i) / lengths[i];
     part.expected += 2 * ratio * ratio;
   }
-  for (Part& part : parts) {
+  for (SurfacePart& part : parts) {
     constexpr std::size_t kStarts = 8;
     std::vector<std::uint32_t> large;
     for (const bool mayBeBorder : {false, true}) {
@@ -199,8 +199,8 @@ struct PartMesh {
   [[nodiscard]] bool isComplete() const { return front.isClosed && missed == 0; }
 };
 
-std::size_t countMissed(const FrontMesh& front, const PointSurface& surface, const Part& part,
-                        const std::vector<double>& lengths, double scale) {
+std::size_t countMissed(const FrontMesh& front, const PointSurface& surface,
+                        const SurfacePart& part, const std::vector<double>& lengths, double scale) {
   if (front.triangles.empty()) return part.points.size();
   const points::PointSearch search = points::makePointSearch(front.positions);
   std::size_t missed = 0;
@@ -211,7 +211,7 @@ std::size_t countMissed(const FrontMesh& front, const PointSurface& surface, con
   return missed;
 }
 
-PartMesh meshPart(const PointSurface& surface, const BorderPoints& borders, const Part& part,
+PartMesh meshPart(const PointSurface& surface, const BorderPoints& borders, const SurfacePart& part,
                   const std::vector<double>& lengths, std::uint32_t number,
                   const Progress& progress) {
   PartMesh best;
@@ -336,7 +336,7 @@ PointsToMeshResult pointsToMesh(const PointCloud& cloud, const PointsToMeshOptio
   const double longest = options.edgeLength > 0 ? options.edgeLength * normalisation.scale
                                                 : kLongestSpacings * spacing;
   const std::vector<double> lengths = lengthsAtPoints(surface, longest, options.angle);
-  const std::vector<Part> parts = partsOf(surface, lengths);
+  const std::vector<SurfacePart> parts = partsOf(surface, lengths);
   const BorderPoints borders(surface);
 
   // === Fronts
