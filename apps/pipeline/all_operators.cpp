@@ -44,6 +44,7 @@ std::vector<Operator> allOperators() {
       sampleOperator(),
       normalsOperator(),
       outliersOperator(),
+      meshPointsOperator(),
       thinOperator(),
       levelSetOperator<levelset::UnionOperator>(),
       levelSetOperator<levelset::IntersectionOperator>(),

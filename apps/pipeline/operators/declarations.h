@@ -44,6 +44,7 @@ namespace pipeline {
 [[nodiscard]] Operator sampleOperator();
 [[nodiscard]] Operator normalsOperator();
 [[nodiscard]] Operator outliersOperator();
+[[nodiscard]] Operator meshPointsOperator();
 [[nodiscard]] Operator thinOperator();
 [[nodiscard]] Operator conversionOperator();
 [[nodiscard]] Operator transformOperator();

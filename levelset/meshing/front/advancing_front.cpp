@@ -41,6 +41,9 @@ constexpr double kOpenWedge = 2.6;
 // lengths.
 constexpr double kOtherSheet = 0.8;
 
+// Least height of a triangle over an edge along a border, edge lengths. Lower ones lie beyond it.
+constexpr double kBorderHeight = 0.3;
+
 // Longest side of a triangle, in the longest edge length.
 constexpr double kLongestFrontSide = 2;
 
@@ -82,6 +85,7 @@ struct Candidate {
   std::uint32_t visit = 0;  ///< edge of the front that begins at the vertex
   V3d point, normal;
   double angle = 0;  ///< angle of the triangle at the vertex, radians
+  bool isBorder = false;
 };
 
 class AdvancingFront {
@@ -98,6 +102,7 @@ class AdvancingFront {
  private:
   bool begin(const V3d& start);
   bool giveTriangle(std::uint32_t edge);
+  [[nodiscard]] bool isAlongBorder(std::uint32_t edge, const std::optional<Foot>& foot) const;
   void retryNearby();
   void findCandidates(std::uint32_t edge, const Try& limits);
   [[nodiscard]] double wedgeAtStart(std::uint32_t edge) const;
@@ -107,11 +112,12 @@ class AdvancingFront {
   [[nodiscard]] bool isFree(std::uint32_t edge, const Candidate& third) const;
   [[nodiscard]] bool isClear(const Candidate& third, std::uint32_t edge, const Try& limits) const;
   void addTriangle(std::uint32_t edge, const Candidate& third);
-  [[nodiscard]] std::vector<std::vector<std::uint32_t>> loops() const;
+  [[nodiscard]] std::vector<std::vector<std::uint32_t>> holes() const;
 
-  std::uint32_t addVertex(const V3d& point, const V3d& normal) {
+  std::uint32_t addVertex(const V3d& point, const V3d& normal, bool isBorder) {
     mesh_.positions.push_back(point);
     mesh_.normals.push_back(normal);
+    isBorder_.push_back(isBorder);
     const auto vertex = static_cast<std::uint32_t>(mesh_.positions.size() - 1);
     vertices_.add(vertex, point);
     return vertex;
@@ -141,6 +147,7 @@ class AdvancingFront {
   const FrontOptions& options_;
   double cell_;  ///< length of the longest edges
   FrontMesh mesh_;
+  std::vector<bool> isBorder_;  ///< for each vertex
   FrontEdges edges_;
   ItemGrid vertices_;
   using Entry = std::tuple<int, double, std::uint32_t>;  ///< tries, squared length, edge
@@ -156,17 +163,17 @@ bool AdvancingFront::begin(const V3d& start) {
   if (!first) return false;
   const double length = surface_.edgeLength(first->point);
   const V3d along = tangents(first->normal)[1];
-  const auto second = surface_.project(first->point + along * length);
+  const auto second = surface_.projectBeside(first->point + along * length, first->normal);
   if (!second) return false;
   const V3d across = first->normal.cross(along);
-  const auto third =
-      surface_.project(first->point + along * (0.5 * length) + across * (std::sqrt(0.75) * length));
+  const auto third = surface_.projectBeside(
+      first->point + along * (0.5 * length) + across * (std::sqrt(0.75) * length), first->normal);
   if (!third) return false;
   const V3d normal = (second->point - first->point).cross(third->point - first->point).normalized();
   for (const Foot* foot : {&*first, &*second, &*third}) {
     if (!(normal.dot(foot->normal) > kTries[1].leastNormal)) return false;
     if ((foot->point - first->point).length() > cell_) return false;
-    addVertex(foot->point, foot->normal);
+    addVertex(foot->point, foot->normal, foot->isBorder);
   }
   useTriangle(0, 1, 2);
   const std::uint32_t loop[] = {addEdge(1, 0), addEdge(0, 2), addEdge(2, 1)};
@@ -183,6 +190,15 @@ double AdvancingFront::wedgeAtStart(std::uint32_t edge) const {
 
 double AdvancingFront::wedgeAtEnd(std::uint32_t edge) const {
   return wedgeAtStart(edges_[edge].next);
+}
+
+/// Returns true if an edge lies along a border of the surface: a new vertex would lie beside it.
+bool AdvancingFront::isAlongBorder(std::uint32_t edge, const std::optional<Foot>& foot) const {
+  const FrontEdge& e = edges_[edge];
+  if (!isBorder_[e.a] || !isBorder_[e.b] || !foot || !foot->isBorder) return false;
+  const V3d along = at(e.b) - at(e.a);
+  const double height = along.cross(foot->point - at(e.a)).length() / along.length();
+  return height < kBorderHeight * length_;
 }
 
 /// Finds the candidates for an edge, best ones first.
@@ -210,7 +226,11 @@ void AdvancingFront::findCandidates(std::uint32_t edge, const Try& limits) {
   near_.clear();
   edges_.near(middle, (limits.reach + 1.5) * length_, near_);
   candidates_.clear();
-  const auto foot = surface_.project(predicted);
+  const auto foot = surface_.projectBeside(predicted, normal);
+  if (isAlongBorder(edge, foot)) {
+    edges_.setFinal(edge);
+    return;
+  }
   const V3d centre = foot ? foot->point : predicted;
   const auto angleAt = [&](const V3d& p) { return angleBetween(a - p, b - p); };
   for (const std::uint32_t other : near_) {
@@ -220,10 +240,11 @@ void AdvancingFront::findCandidates(std::uint32_t edge, const Try& limits) {
     const bool isBeside = other == e.prev || f.prev == e.next;
     if (!isBeside && (p - centre).length() > limits.reach * length_) continue;
     if (normalAt(f.a).dot(normal) < 0.1) continue;
-    candidates_.push_back({f.a, other, p, normalAt(f.a), angleAt(p)});
+    candidates_.push_back({f.a, other, p, normalAt(f.a), angleAt(p), isBorder_[f.a]});
   }
   if (foot && normal.dot(foot->normal) > 0.1)
-    candidates_.push_back({kNewVertex, 0, foot->point, foot->normal, angleAt(foot->point)});
+    candidates_.push_back(
+        {kNewVertex, 0, foot->point, foot->normal, angleAt(foot->point), foot->isBorder});
   const auto rank = [](const Candidate& c) {
     return c.angle + (c.vertex == kNewVertex ? 0 : kPreference);
   };
@@ -318,6 +339,9 @@ bool AdvancingFront::isValid(std::uint32_t edge, const Candidate& third, const T
   if (!(least >= limits.leastAngle)) return false;
   // The search for edges nearby relies on it.
   if (std::max((c - a).length2(), (c - b).length2()) > cell_ * cell_) return false;
+  // Three points of a border may lie on a line, beyond which the surface ends.
+  if (third.isBorder && isBorder_[e.a] && isBorder_[e.b] && least < kTries[1].leastAngle)
+    return false;
   const V3d normal = (b - a).cross(c - a).normalized();
   for (const V3d* n : {&normalAt(e.a), &normalAt(e.b), &third.normal})
     if (!(normal.dot(*n) >= limits.leastNormal)) return false;
@@ -336,7 +360,8 @@ bool AdvancingFront::isValid(std::uint32_t edge, const Candidate& third, const T
 void AdvancingFront::addTriangle(std::uint32_t edge, const Candidate& third) {
   const FrontEdge e = edges_[edge];
   const bool isNew = third.vertex == kNewVertex;
-  const std::uint32_t c = isNew ? addVertex(third.point, third.normal) : third.vertex;
+  const std::uint32_t c =
+      isNew ? addVertex(third.point, third.normal, third.isBorder) : third.vertex;
   const bool isPrevious = !isNew && third.visit == e.prev,
              isNext = !isNew && follows(edge, third.visit);
   useTriangle(e.a, e.b, c);
@@ -385,17 +410,32 @@ void AdvancingFront::retryNearby() {
   }
 }
 
-/// Returns the vertices of the loops that are left.
-std::vector<std::vector<std::uint32_t>> AdvancingFront::loops() const {
+/// Returns the vertices around the holes that are left. Edges along a border bound no hole: the
+/// other edges between two of them make a hole with the line between its ends.
+std::vector<std::vector<std::uint32_t>> AdvancingFront::holes() const {
   std::vector<std::vector<std::uint32_t>> all;
   std::vector<bool> isSeen(edges_.count());
   for (std::uint32_t edge = 0; edge < edges_.count(); ++edge) {
     if (!edges_[edge].isActive || isSeen[edge]) continue;
-    auto& loop = all.emplace_back();
-    for (std::uint32_t f = edge; !isSeen[f]; f = edges_[f].next) {
+    std::uint32_t start = edge;
+    do {
+      if (edges_[start].isFinal) break;
+      start = edges_[start].next;
+    } while (start != edge);
+    std::vector<std::uint32_t> hole;
+    for (std::uint32_t f = start; !isSeen[f]; f = edges_[f].next) {
       isSeen[f] = true;
-      loop.push_back(edges_[f].a);
+      hole.push_back(edges_[f].a);
+      if (!edges_[f].isFinal) continue;
+      if (hole.size() > 2) all.push_back(hole);
+      hole.clear();
     }
+    if (!edges_[start].isFinal || hole.empty()) {
+      if (hole.size() > 2) all.push_back(hole);
+      continue;
+    }
+    hole.push_back(edges_[start].a);
+    if (hole.size() > 2) all.push_back(hole);
   }
   return all;
 }
@@ -411,10 +451,13 @@ FrontMesh AdvancingFront::run(const V3d& start) {
     if (++tries % 1024 == 0)
       report(options_.progress, std::min(0.99, static_cast<double>(mesh_.triangles.size()) /
                                                    static_cast<double>(most)));
+    if (edges_[edge].isFinal) continue;
     if (giveTriangle(edge)) {
       // A front that winds about itself does not end.
       if (mesh_.triangles.size() > most) return std::move(mesh_);
       retryNearby();
+    } else if (edges_[edge].isFinal) {
+      continue;
     } else if (level + 1 < static_cast<int>(kTries.size())) {
       edges_.setLevel(edge, level + 1);
       push(edge);
@@ -422,7 +465,7 @@ FrontMesh AdvancingFront::run(const V3d& start) {
       edges_.setStuck(edge, true);
     }
   }
-  fillHoles(surface_, loops(), mesh_);
+  fillHoles(surface_, holes(), mesh_);
   return std::move(mesh_);
 }
 

@@ -18,7 +18,7 @@ struct FrontMesh {
   std::vector<Imath::V3d> normals;  ///< unit normals of the surface
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::size_t filled = 0;  ///< triangles that fill holes the front left
-  bool isClosed = false;   ///< no front is left
+  bool isClosed = false;   ///< no front is left, but for the borders of the surface
 };
 
 struct FrontOptions {
@@ -27,11 +27,12 @@ struct FrontOptions {
   Progress progress = {};
 };
 
-/// Meshes one component of a closed surface by an advancing front [Schreiner06]. The front starts
+/// Meshes one component of a surface by an advancing front [Schreiner06]. The front starts
 /// at a triangle. An edge of the front gets a triangle whose third vertex is a vertex of the front
 /// nearby, or a new one: a predicted position that is projected onto the surface. A vertex on
-/// another part of the front splits the front or merges two fronts. Each edge has one triangle on
-/// each side, also if the front gets stuck.
+/// another part of the front splits the front or merges two fronts. Edges along a border of the
+/// surface get no triangle. Each other edge has one triangle on each side, also if the front gets
+/// stuck.
 /// @param start  position near the surface
 /// @throws Cancelled
 [[nodiscard]] FrontMesh advanceFront(const FrontSurface& surface, const Imath::V3d& start,

@@ -169,7 +169,6 @@ void fillHoles(const FrontSurface& surface, const std::vector<Loop>& loops, Fron
   for (const Loop* loop : hard) {
     if (filler.widenAndFill(*loop)) continue;
     mesh.isClosed = false;
-    break;
   }
   filler.finish();
 }

@@ -20,6 +20,7 @@ struct FrontEdge {
   bool isActive = false;
   int level = 0;         ///< number of failed tries
   bool isStuck = false;  ///< all tries failed
+  bool isFinal = false;  ///< on a border of the surface
 };
 
 /// The loops of a front, and a grid for the edges near a position. Deterministic.
@@ -33,6 +34,7 @@ class FrontEdges {
   [[nodiscard]] std::size_t activeCount() const { return active_; }
 
   void setLevel(std::uint32_t edge, int level) { edges_[edge].level = level; }
+  void setFinal(std::uint32_t edge) { edges_[edge].isFinal = true; }
   void setStuck(std::uint32_t edge, bool isStuck) { edges_[edge].isStuck = isStuck; }
 
   /// Adds an edge that is not linked yet.

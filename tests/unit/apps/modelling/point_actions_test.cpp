@@ -78,6 +78,29 @@ TEST_F(PointActions, ActionsWorkOnClouds) {
   EXPECT_EQ(mirrored["attributes"], "normals");
 }
 
+TEST_F(PointActions, MeshPointsMakesAClosedMesh) {
+  const std::string made = std::string(kSampled) + "mesh-points --edge 0.2 ! ";
+  const Json mesh = json(made + "measure --json");
+  EXPECT_EQ(mesh["euler"], 2);
+  EXPECT_EQ(mesh["closed_manifold"], true);
+  const support::Outcome outcome = levelsmith(made + "write m.ply");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("in 1 parts, 0 borders"), std::string::npos) << outcome.err;
+  std::string plane;
+  for (int i = 0; i < 20; ++i)
+    for (int j = 0; j < 20; ++j) plane += std::to_string(i) + " " + std::to_string(j) + " 0\n";
+  writeFile("plane.xyz", plane);
+  const support::Outcome open = levelsmith("read plane.xyz ! mesh-points ! write n.ply");
+  EXPECT_EQ(open.code, 0) << open.err;
+  EXPECT_NE(open.err.find("is a guess"), std::string::npos) << open.err;
+  EXPECT_NE(open.err.find("1 borders"), std::string::npos) << open.err;
+  writeFile("line.xyz", "0 0 0\n1 0 0\n2 0 0\n");
+  expectRefusal("read line.xyz ! mesh-points", 3, "lie on a line");
+  expectRefusal("read line.xyz ! mesh-points --angle 60", 2, "at most 57 degrees");
+  expectRefusal("read line.xyz ! mesh-points --gap 5", 2, "between 1.5 and 4");
+  expectRefusal("read line.xyz ! mesh-points --smoothing 0.5", 2, "between 1 and 10");
+}
+
 TEST_F(PointActions, NormalsWarnOfAGuess) {
   std::string plane;
   for (int i = 0; i < 20; ++i)
