@@ -28,13 +28,16 @@ constexpr double kBytesPerBandLeaf = 2300;
 
 /// Refuses a range that no value, or every value, lies in.
 [[noreturn]] void refuseRange(const Volume& volume, VolumeFilter filter, bool isInside) {
-  const std::string made = filter == VolumeFilter::Trilinear
-                               ? ""
-                               : fmt::format(" with the filter {}", factsOf(filter).name);
+  if (filter != VolumeFilter::Trilinear)
+    throw NoSurface(fmt::format(
+        "the filter {} has no surface here: {} value belongs to the solid; it smooths or exceeds "
+        "the samples, which go from {:.6g} to {:.6g}; choose an isovalue further between them, or "
+        "another filter",
+        factsOf(filter).name, isInside ? "every" : "no", volume.lowest(), volume.highest()));
   throw NoSurface(fmt::format(
-      "{} value of the volume{} belongs to the solid: its samples go from {:.6g} to {:.6g}; choose "
+      "{} value of the volume belongs to the solid: its samples go from {:.6g} to {:.6g}; choose "
       "an isovalue between them ('histogram' suggests some)",
-      isInside ? "every" : "no", made, volume.lowest(), volume.highest()));
+      isInside ? "every" : "no", volume.lowest(), volume.highest()));
 }
 
 void checkIsosurface(const Volume& volume, const ValueRange& range,
@@ -62,8 +65,10 @@ void checkIsosurface(const Volume& volume, const ValueRange& range,
         size.x, size.y, size.z));
   double low = volume.lowest(), high = volume.highest();
   if (options.filter != VolumeFilter::Trilinear && high > low) {
-    // Between grid points, a filter may have values beyond those of the grid points.
-    const double beyond = (boundsOf(options.filter).value - 1) * (high - low) / 2;
+    // A filter may have values beyond those of the grid points: between them, and more so where it
+    // extends the volume at its border. The sum of the magnitudes of its weights is at most this.
+    constexpr double kMostWeight = 20;
+    const double beyond = kMostWeight * (high - low);
     low -= beyond;
     high += beyond;
   }

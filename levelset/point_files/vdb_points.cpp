@@ -507,6 +507,8 @@ class CloudReader {
                              "are vec3s and vec3d; export it again",
                              attribute.type, attribute.codec, entry_.name));
       error = std::max(error, format.error);
+      if (grid_.offsets(leaf).back() != leaf.arrays[n].size)
+        bytes_.fail("a leaf has another number of points than its voxels");
       count += leaf.arrays[n].size;
     }
     builder_.reserve(count, presentAttributes());
@@ -516,7 +518,9 @@ class CloudReader {
     if (error > kWorthANote)
       builder_.note(fmt::format(
           "{} stores positions as short numbers; they are rounded by up to {:.2g} along each axis",
-          builder_.name(), error * entry_.transform->voxelSize()[0]));
+          builder_.name(),
+          error * std::max({entry_.transform->voxelSize()[0], entry_.transform->voxelSize()[1],
+                            entry_.transform->voxelSize()[2]})));
   }
 
   /// Returns a cloud with an entry in each list that the points may fill.
@@ -539,8 +543,6 @@ class CloudReader {
     const NumberFormat format = formatOf(leaf.descriptor->attributes[n], true);
     const auto ends = grid_.offsets(leaf);
     const Array& array = leaf.arrays[n];
-    if (ends.back() != array.size)
-      bytes_.fail("a leaf has another number of points than its voxels");
     const auto [values, step] = grid_.values(n, array, 3 * format.bytes);
     std::uint32_t point = 0;
     for (Index voxel = 0; voxel < kLeafVoxels; ++voxel) {

@@ -26,7 +26,7 @@ constexpr double kCoarseVoxels = 20;
 // Largest voxel size of the coarser grid, as a multiple of the base's voxel size.
 constexpr double kCoarsest = 4;
 // Least number of voxels of the coarser grid across the shortest side of the base's bounding box.
-constexpr double kThinnest = 12;
+constexpr double kVoxelsAcross = 12;
 // Largest |φ| of the coarser grid at the border of the patch, in voxels of that grid.
 constexpr double kFaithful = 0.25;
 
@@ -44,7 +44,7 @@ double coarsestFactor(const NarrowBand& base, double height) {
   const V3d extent = base.zeroSetBounds().size();
   const double thickness = std::min({extent.x, extent.y, extent.z}) / base.voxelSize();
   return std::max(1.0, std::floor(std::min({kCoarsest, height / (kCoarseVoxels * base.voxelSize()),
-                                            thickness / kThinnest})));
+                                            thickness / kVoxelsAcross})));
 }
 
 /// Resamples the base to a coarser grid; empty if no point of the coarser grid lies inside the

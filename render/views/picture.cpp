@@ -203,7 +203,9 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
   const double channels = 12 + (options.hasCurvature() ? 4 : 0) +
                           (options.hasDirections() ? 6 : 0) + (options.thickness ? 1 : 0) +
                           (scene.volumePart && options.volumeLight ? 4 : 0);
-  levelset::requireMemory(pixels * 4 * channels, options.maxBytes);
+  // The line field, and the noise while it is made.
+  const double streaks = options.style.style == Style::CurvatureLines ? 30 : 0;
+  levelset::requireMemory(pixels * (4 * channels + streaks), options.maxBytes);
 }
 
 void refuseEmptyScene() {

@@ -47,6 +47,18 @@ class ItemGrid {
   bool anyNear(const Imath::V3d& position, double radius, const Visit& visit) const {
     const GridCell low = cellOf(position - Imath::V3d(radius)),
                    high = cellOf(position + Imath::V3d(radius));
+    // A large radius would visit more cells than there are.
+    const GridCell size = high - low + GridCell(1);
+    const double count =
+        static_cast<double>(size.x) * static_cast<double>(size.y) * static_cast<double>(size.z);
+    if (count > static_cast<double>(cells_.size())) {
+      for (const auto& [at, items] : cells_)
+        if (at.x >= low.x && at.x <= high.x && at.y >= low.y && at.y <= high.y && at.z >= low.z &&
+            at.z <= high.z)
+          for (const std::uint32_t item : items)
+            if (visit(item)) return true;
+      return false;
+    }
     GridCell c;
     for (c.x = low.x; c.x <= high.x; ++c.x)
       for (c.y = low.y; c.y <= high.y; ++c.y)

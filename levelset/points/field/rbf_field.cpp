@@ -1,5 +1,6 @@
 #include "levelset/points/field/rbf_field.h"
 
+#include <fmt/core.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -8,6 +9,8 @@
 #include <limits>
 #include <memory>
 
+#include "levelset/error.h"
+#include "levelset/memory_limit.h"
 #include "levelset/rbf/rbf_function.h"
 #include "levelset/rbf/rbf_taylor.h"
 
@@ -80,7 +83,9 @@ constexpr double kLeafReach = 2;
 /// polynomial, which its octants inherit.
 class CubeTree {
  public:
-  CubeTree(const RbfFunction& function, const OrientedPoints& points)
+  /// @throws ResourceLimit, Cancelled
+  CubeTree(const RbfFunction& function, const OrientedPoints& points, std::size_t maxMemory,
+           const Progress& progress)
       : cubes_(function, V3d(1), std::numeric_limits<double>::infinity()),
         origin_(function.origin()),
         leafHalf_(kLeafEdge * points.medianSpacing / 2) {
@@ -90,7 +95,10 @@ class CubeTree {
     const double half = 0.5 * std::max({size.x, size.y, size.z}) +
                         kMargin * *std::max_element(points.spacings.begin(), points.spacings.end());
     nodes_.push_back({cubes_.root(points.box.center() - origin_, half), {}});
-    for (std::size_t begin = 0; begin < nodes_.size();) begin = splitLevel(begin, points);
+    for (std::size_t begin = 0; begin < nodes_.size();) {
+      begin = splitLevel(begin, points, maxMemory);
+      report(progress, 1);
+    }
   }
 
   [[nodiscard]] double value(const V3d& at) const {
@@ -119,8 +127,15 @@ class CubeTree {
   }
   /// Splits the nodes from a number on.
   /// @return number of nodes before
-  std::size_t splitLevel(std::size_t begin, const OrientedPoints& points) {
+  std::size_t splitLevel(std::size_t begin, const OrientedPoints& points, std::size_t maxMemory) {
     const std::size_t end = nodes_.size();
+    // The octants of each node are made from its near particles, and the nodes are copied once.
+    double bytes = 2.0 * sizeof(Node) * static_cast<double>(end);
+    for (std::size_t n = begin; n < end; ++n)
+      if (isSplit(nodes_[n].cube, points))
+        bytes += 8 * (3.0 * sizeof(Node) +
+                      sizeof(std::uint32_t) * static_cast<double>(nodes_[n].cube.near.size()));
+    requireMemory(bytes, memoryLeft(memoryLimit(maxMemory)));
     std::vector<std::vector<RbfCube>> octants(end - begin);
     tbb::parallel_for(begin, end, [&](std::size_t n) {
       RbfCube& cube = nodes_[n].cube;
@@ -178,6 +193,19 @@ std::size_t addCentres(const OrientedPoints& points, const std::vector<double>& 
   return count;
 }
 
+/// Fits the function. The messages of the solver are those of texture maps.
+RbfFunction solve(const Particles& particles, const std::vector<char>& near,
+                  const rbf::RbfOptions& options) {
+  try {
+    return RbfFunction(particles.positions, particles.values, near, options);
+  } catch (const NumericalError& error) {
+    throw NumericalError(
+        fmt::format("the radial function of {} points has no solution ({}); raise --fit-error or "
+                    "--lambda, thin the points, or use --method mls",
+                    particles.positions.size() / 3, error.what()));
+  }
+}
+
 }  // namespace
 
 PointField rbfField(const OrientedPoints& points, const RbfFieldOptions& options) {
@@ -200,8 +228,9 @@ PointField rbfField(const OrientedPoints& points, const RbfFieldOptions& options
     fit.solveTolerance = std::clamp(kSolveShare * aim / particles.extent(), 1e-9, 1e-2);
     fit.progress = subProgress(options.progress, done, 0.5 + done / 2);
     const std::vector<char> near(particles.positions.size(), 1);
-    const RbfFunction function(particles.positions, particles.values, near, fit);
-    const auto tree = std::make_shared<const CubeTree>(function, points);
+    const RbfFunction function = solve(particles, near, fit);
+    const auto tree =
+        std::make_shared<const CubeTree>(function, points, options.maxMemory, fit.progress);
     const std::vector<double> residuals = residualsOf(points, *tree);
     const std::size_t added = addCentres(points, residuals, options.tolerance, isCentre);
     if (added > 0)

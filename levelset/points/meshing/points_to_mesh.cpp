@@ -121,12 +121,26 @@ class BorderPoints {
   PointSearch search_;
 };
 
+/// Points of one part.
+struct SurfacePart {
+  std::vector<std::uint32_t> points;
+  std::vector<std::uint32_t> starts;  ///< some with large edge lengths, the largest first
+  double shortest = INFINITY, longest = 0;
+  double expected = 0;  ///< number of triangles
+};
+
 /// One part of the surface through points.
 class PartFront : public FrontSurface {
  public:
   PartFront(const PointSurface& surface, const BorderPoints& borders,
-            const std::vector<double>& lengths, std::uint32_t part, double scale)
-      : surface_(surface), borders_(borders), lengths_(lengths), part_(part), scale_(scale) {}
+            const std::vector<double>& lengths, std::uint32_t number, const SurfacePart& part,
+            double scale)
+      : surface_(surface),
+        borders_(borders),
+        lengths_(lengths),
+        part_(number),
+        longest_(part.longest),
+        scale_(scale) {}
 
   [[nodiscard]] std::optional<Foot> project(const V3d& position) const override {
     return projectBeside(position, V3d(0));
@@ -146,7 +160,7 @@ class PartFront : public FrontSurface {
   }
   [[nodiscard]] double edgeLength(const V3d& point) const override {
     const std::uint32_t nearest = surface_.nearest(point, V3d(0), part_);
-    return scale_ * lengths_[nearest == PointSurface::kNone ? 0 : nearest];
+    return scale_ * (nearest == PointSurface::kNone ? longest_ : lengths_[nearest]);
   }
 
  private:
@@ -154,15 +168,8 @@ class PartFront : public FrontSurface {
   const BorderPoints& borders_;
   const std::vector<double>& lengths_;
   std::uint32_t part_;
+  double longest_;  ///< edge length of the part
   double scale_;
-};
-
-/// Points of one part.
-struct SurfacePart {
-  std::vector<std::uint32_t> points;
-  std::vector<std::uint32_t> starts;  ///< some with large edge lengths, the largest first
-  double shortest = INFINITY, longest = 0;
-  double expected = 0;  ///< number of triangles
 };
 
 std::vector<SurfacePart> partsOf(const PointSurface& surface, const std::vector<double>& lengths) {
@@ -196,6 +203,7 @@ std::vector<SurfacePart> partsOf(const PointSurface& surface, const std::vector<
 struct PartMesh {
   FrontMesh front;
   std::size_t missed = 0;
+  double scale = 1;  ///< of the edge lengths
   [[nodiscard]] bool isComplete() const { return front.isClosed && missed == 0; }
 };
 
@@ -217,13 +225,14 @@ PartMesh meshPart(const PointSurface& surface, const BorderPoints& borders, cons
   PartMesh best;
   best.missed = part.points.size() + 1;
   for (const auto& [scale, first] : kFrontTries) {
-    const PartFront front(surface, borders, lengths, number, scale);
+    const PartFront front(surface, borders, lengths, number, part, scale);
     FrontOptions options;
     options.shortest = scale * part.shortest;
     options.longest = scale * part.longest;
     options.expectedTriangles = static_cast<std::size_t>(part.expected / (scale * scale)) + 1;
     options.progress = progress;
     PartMesh found;
+    found.scale = scale;
     for (std::size_t k = 0; k < part.starts.size(); ++k) {
       const std::uint32_t start = part.starts[(first + k) % part.starts.size()];
       found.front = advanceFront(front, surface.positions()[start], options);
@@ -326,6 +335,7 @@ PointsToMeshResult pointsToMesh(const PointCloud& cloud, const PointsToMeshOptio
   const PointSurface surface(normalised(cloud, normalisation),
                              {.smoothing = options.smoothing,
                               .gap = options.gap,
+                              .maxMemory = memoryLimit(options.maxMemory),
                               .progress = subProgress(options.progress, 0, 0.6)});
   const auto start = Clock::now();
   const double spacing = medianSpacing(surface);
@@ -337,6 +347,16 @@ PointsToMeshResult pointsToMesh(const PointCloud& cloud, const PointsToMeshOptio
                                                 : kLongestSpacings * spacing;
   const std::vector<double> lengths = lengthsAtPoints(surface, longest, options.angle);
   const std::vector<SurfacePart> parts = partsOf(surface, lengths);
+  double triangles = 0;
+  for (const SurfacePart& part : parts) triangles += part.expected;
+  constexpr double kBytesPerTriangle = 400, kSmallestScale = 0.6;
+  triangles /= kSmallestScale * kSmallestScale;
+  withContext(
+      fmt::format("a mesh of about {:.2g} triangles; raise the edge length", triangles), [&] {
+        requireMemory(
+            kBytesPerPoint * static_cast<double>(cloud.size()) + kBytesPerTriangle * triangles,
+            memoryLimit(options.maxMemory));
+      });
   const BorderPoints borders(surface);
 
   // === Fronts
@@ -370,6 +390,7 @@ PointsToMeshResult pointsToMesh(const PointCloud& cloud, const PointsToMeshOptio
     figures.incomplete += !mesh.isComplete();
     figures.missedPoints += mesh.missed;
     figures.filled += mesh.front.filled;
+    figures.smallestScale = std::min(figures.smallestScale, mesh.scale);
     appendFront(mesh.front, normalisation, result.mesh);
   }
   if (figures.incomplete > 0 && !options.acceptHoles)

@@ -17,7 +17,7 @@ struct PointsToMeshOptions {
   double angle = 20 * std::numbers::pi / 180;
   /// Width of the weight of a fit, in point spacings, from 1 to 10. Larger values smooth noise.
   /// With 1 the fit follows points without noise most closely.
-  double smoothing = 1.5;
+  double smoothing = 2;
   /// Radius of the largest disc without points that the surface covers, in point spacings, from 1.5
   /// to 4. Larger holes get a border.
   double gap = 2.5;
@@ -33,6 +33,7 @@ struct PointsToMeshReport {
   std::size_t borders = 0;       ///< loops of edges with one triangle
   double borderLength = 0;       ///< world units
   std::size_t filled = 0;        ///< triangles that fill holes the fronts left
+  double smallestScale = 1;      ///< of edge lengths; below 1 where the front needed shorter edges
   std::size_t unusedPoints = 0;  ///< points that belong to no surface
   std::size_t missedPoints = 0;  ///< points without a triangle nearby
   std::size_t guessed = 0;       ///< parts whose outside is a guess

@@ -153,7 +153,7 @@ bool Cocone::meetsCocone(std::uint32_t point, const V3d& normal, const VoronoiEn
     return length > 0 ? d.dot(normal) / length : 0;
   };
   const double a = sine(from), b = sine(to);
-  // The sine is monotonic along the edge if both have the same sign.
+  // If both have the same sign, the least sine along the edge is at one of its ends.
   return a * b <= 0 || std::min(std::abs(a), std::abs(b)) <= kCoconeSine;
 }
 
@@ -275,7 +275,8 @@ CoconeGraph withoutSteepEdges(CoconeGraph graph, std::span<const V3d> positions)
 
 }  // namespace
 
-CoconeGraph coconeGraph(std::span<const V3d> positions) {
+CoconeGraph coconeGraph(std::span<const V3d> positions, std::size_t maxMemory,
+                        const Progress& progress) {
   const Plane plane = planeThrough(positions);
   if (plane.isLine)
     throw InvalidInput(
@@ -287,7 +288,7 @@ CoconeGraph coconeGraph(std::span<const V3d> positions) {
   constexpr double kFlat = 1e-10;
   if (plane.deviation <= kFlat * extent)
     return graphOf(planarEdges(positions, plane), std::vector<V3d>(positions.size(), plane.normal));
-  const Tetrahedra tetrahedra = delaunayTetrahedra(positions);
+  const Tetrahedra tetrahedra = delaunayTetrahedra(positions, maxMemory, progress);
   const Cocone cocone(positions, tetrahedra);
   std::vector<V3d> normals = cocone.poles();
   std::vector<Edge> edges = cocone.edges(normals);

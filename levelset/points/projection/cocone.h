@@ -8,6 +8,8 @@
 #include <span>
 #include <vector>
 
+#include "levelset/progress.h"
+
 namespace levelset::points {
 
 /// Connectivity of points on a surface.
@@ -30,6 +32,8 @@ struct CoconeGraph {
 /// @param positions  finite and different, at least three
 /// @throws InvalidInput if all points lie on a line
 /// @throws UsageError if this build has no Delaunay triangulation
-[[nodiscard]] CoconeGraph coconeGraph(std::span<const Imath::V3d> positions);
+[[nodiscard]] CoconeGraph coconeGraph(std::span<const Imath::V3d> positions,
+                                      std::size_t maxMemory = kNoMemoryLimit,
+                                      const Progress& progress = {});
 
 }  // namespace levelset::points

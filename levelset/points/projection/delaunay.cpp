@@ -8,8 +8,11 @@
 #ifdef LEVELSMITH_HAS_CGAL
 #include <CGAL/Delaunay_triangulation_3.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Spatial_sort_traits_adapter_3.h>
 #include <CGAL/Triangulation_cell_base_with_info_3.h>
 #include <CGAL/Triangulation_vertex_base_with_info_3.h>
+#include <CGAL/property_map.h>
+#include <CGAL/spatial_sort.h>
 
 #include <utility>
 #endif
@@ -33,12 +36,30 @@ bool hasDelaunay() {
   return true;
 }
 
-Tetrahedra delaunayTetrahedra(std::span<const Imath::V3d> positions) {
-  std::vector<std::pair<Kernel::Point_3, Number>> points;
+Tetrahedra delaunayTetrahedra(std::span<const Imath::V3d> positions, std::size_t maxMemory,
+                              const Progress& progress) {
+  using Item = std::pair<Kernel::Point_3, Number>;
+  std::vector<Item> points;
   points.reserve(positions.size());
   for (Number i = 0; i < positions.size(); ++i)
     points.emplace_back(Kernel::Point_3(positions[i].x, positions[i].y, positions[i].z), i);
-  Triangulation triangulation(points.begin(), points.end());
+  CGAL::spatial_sort(
+      points.begin(), points.end(),
+      CGAL::Spatial_sort_traits_adapter_3<Kernel, CGAL::First_of_pair_property_map<Item>>());
+  Triangulation triangulation;
+  Triangulation::Vertex_handle last;
+  std::size_t done = 0;
+  for (const auto& [point, number] : points) {
+    last = last == Triangulation::Vertex_handle() ? triangulation.insert(point)
+                                                  : triangulation.insert(point, last);
+    last->info() = number;
+    // Points on curves may have a number of tetrahedra that grows with the square of theirs.
+    constexpr std::size_t kBlock = 16384;
+    constexpr double kBytesPerCell = 200;  // the triangulation, and the result
+    if (++done % kBlock != 0) continue;
+    requireMemory(kBytesPerCell * static_cast<double>(triangulation.number_of_cells()), maxMemory);
+    report(progress, static_cast<double>(done) / static_cast<double>(points.size()));
+  }
   Tetrahedra result;
   if (triangulation.dimension() < 3) return result;
   const std::size_t count = triangulation.number_of_finite_cells();
@@ -65,7 +86,7 @@ bool hasDelaunay() {
   return false;
 }
 
-Tetrahedra delaunayTetrahedra(std::span<const Imath::V3d>) {
+Tetrahedra delaunayTetrahedra(std::span<const Imath::V3d>, std::size_t, const Progress&) {
   throw UsageError(
       "this build has no Delaunay triangulation, since CGAL was not found; install CGAL (Debian: "
       "libcgal-dev) and build again, or use 'level-set' and 'mesh'");

@@ -9,6 +9,8 @@
 #include <span>
 #include <vector>
 
+#include "levelset/progress.h"
+
 namespace levelset::points {
 
 /// Delaunay tetrahedra of a set of points.
@@ -27,6 +29,9 @@ struct Tetrahedra {
 /// in a plane.
 /// @param positions  finite and different, fewer than 2²⁹
 /// @throws UsageError if this build has no triangulation
-[[nodiscard]] Tetrahedra delaunayTetrahedra(std::span<const Imath::V3d> positions);
+/// @throws ResourceLimit, Cancelled
+[[nodiscard]] Tetrahedra delaunayTetrahedra(std::span<const Imath::V3d> positions,
+                                            std::size_t maxMemory = kNoMemoryLimit,
+                                            const Progress& progress = {});
 
 }  // namespace levelset::points

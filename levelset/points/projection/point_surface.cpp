@@ -90,7 +90,7 @@ PointSurface::PointSurface(const PointCloud& cloud, const PointSurfaceOptions& o
   // The largest disc without points, and a little more. Farther off, no polynomial is of use.
   constexpr double kMostReach = 3;
   reach_ = std::min(options.gap + 0.5, kMostReach);
-  graph_ = coconeGraph(positions_);
+  graph_ = coconeGraph(positions_, options.maxMemory, subProgress(options.progress, 0.02, 0.15));
   computeSpacings();
   timing_.connectivity = secondsSince(start);
   report(options.progress, 0.2);
@@ -220,9 +220,22 @@ void PointSurface::orient(const PointCloud& cloud, const std::vector<std::uint32
       });
       edges.set(static_cast<std::uint32_t>(i), found);
     }
-    guessedParts_ = orientNormals(own, edges, progress).guessed;
+    const std::size_t guessed = orientNormals(own, edges, progress).guessed;
+    const auto ownSide = [&](std::size_t i) -> signed char {
+      return normals_[i].dot(V3d(own.normals[i])) < 0 ? -1 : 1;
+    };
+    // The given normals of a part decide on its side, so points without one follow them.
+    std::vector<double> votes(partCount_, 0);
     for (std::size_t i = 0; i < n; ++i)
-      if (side[i] == 0) side[i] = normals_[i].dot(V3d(own.normals[i])) < 0 ? -1 : 1;
+      if (side[i] != 0 && parts_[i] != kNone) votes[parts_[i]] += side[i] * ownSide(i);
+    const auto undecided = static_cast<std::size_t>(std::count(votes.begin(), votes.end(), 0.0));
+    guessedParts_ = std::min(guessed, undecided);
+    for (std::size_t i = 0; i < n; ++i)
+      if (side[i] == 0) {
+        side[i] = ownSide(i);
+        if (parts_[i] != kNone && votes[parts_[i]] < 0)
+          side[i] = static_cast<signed char>(-side[i]);
+      }
   }
   for (std::size_t i = 0; i < n; ++i)
     if (side[i] < 0) normals_[i] = -normals_[i];

@@ -22,6 +22,7 @@ struct PointSurfaceOptions {
   double smoothing = 1;
   /// Radius of the largest disc without points that the surface covers, in local spacings.
   double gap = 2.5;
+  std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
 

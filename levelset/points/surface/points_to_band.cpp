@@ -31,6 +31,8 @@ void checkOptions(const OrientedPoints& points, double voxelSize,
   if (options.neighbours != 0 && (options.neighbours < kFewest || options.neighbours > kMost))
     throw UsageError(fmt::format("the number of neighbours is {}; give {} to {}",
                                  options.neighbours, kFewest, kMost));
+  if (options.neighbours != 0 && options.method == PointMethod::RadialBasis)
+    throw UsageError("a radial basis function has no number of neighbours; leave it out");
   if (!std::isfinite(options.halfWidth) || options.halfWidth < 1)
     throw UsageError(
         fmt::format("the half width is {} voxels; give at least 1", options.halfWidth));
@@ -68,7 +70,7 @@ PointField fieldOf(const OrientedPoints& points, const PointsToBandOptions& opti
       return points::rbfField(points, {.tolerance = options.tolerance * points.medianSpacing,
                                        .lambda = options.lambda,
                                        .maxMemory = options.maxMemory,
-                                       .progress = subProgress(options.progress, 0.1, 0.5)});
+                                       .progress = subProgress(options.progress, 0.1, 0.3)});
   }
   return {};
 }

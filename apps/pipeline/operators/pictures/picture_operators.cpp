@@ -227,8 +227,13 @@ Value draw(Invocation& in) {
   coarsen(in, scene);
   if (in.flag("ground") && scene.volumePart)
     throw UsageError("render: a volume with a transfer function has no shadow; leave --ground out");
-  if (in.flag("ground") && !scene.bounds().isEmpty())
-    scene.ground = render::groundOf(scene, scene.camera.up);
+  if (in.flag("ground")) {
+    if (scene.bounds().isEmpty())
+      in.notes.warnings.push_back(
+          "render: the scene has no surface between its samples, so no ground is drawn");
+    else
+      scene.ground = render::groundOf(scene, scene.camera.up);
+  }
   const std::string renderer = in.text("renderer");
   const bool isBoth = renderer == "both";
   if (!scene.mapped.empty() && (isBoth || renderer == "embree"))

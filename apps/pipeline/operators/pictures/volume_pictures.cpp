@@ -107,7 +107,7 @@ void validateTransfer(const Invocation& in) {
 
 void validateVolumePicture(const Invocation& in) {
   validateTransfer(in);
-  for (const char* name : {"filter", "inside"})
+  for (const char* name : {"filter", "inside", "directions", "along"})
     if (in.given("transfer") && !in.given("isovalue") && in.given(name))
       throw UsageError(
           fmt::format("render: --{} concerns the isosurface, and --transfer alone draws none; "

@@ -36,6 +36,7 @@ Value runMeshPoints(Invocation& in) {
                               {"borders", found.borders},
                               {"border_length", found.borderLength},
                               {"filled_share", static_cast<double>(found.filled) / triangles},
+                              {"smallest_scale", found.smallestScale},
                               {"unused_points", found.unusedPoints},
                               {"missed_points", found.missedPoints},
                               {"guessed_parts", found.guessed},
@@ -57,6 +58,11 @@ Value runMeshPoints(Invocation& in) {
     in.notes.warnings.push_back(fmt::format(
         "mesh-points: the mesh of {} of {} parts has holes or misses points ({} points)",
         found.incomplete, found.components, found.missedPoints));
+  if (found.smallestScale < 1)
+    in.notes.warnings.push_back(fmt::format(
+        "mesh-points: some edges are {:.2g} times as long as asked for, since the front "
+        "did not close with longer ones",
+        found.smallestScale));
   if (found.guessed > 0)
     in.notes.warnings.push_back(fmt::format(
         "mesh-points: the outside of {} of {} parts is a guess, since they enclose nothing",
@@ -109,7 +115,7 @@ Operator meshPointsOperator() {
                  {.name = "smoothing",
                   .type = ParamType::Number,
                   .doc = "width of the weight of a fit, in point spacings, 1 to 10",
-                  .fallback = "1.5",
+                  .fallback = "2",
                   .range = Range::Positive},
                  {.name = "gap",
                   .type = ParamType::Number,

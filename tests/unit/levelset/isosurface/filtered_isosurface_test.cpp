@@ -123,6 +123,18 @@ TEST(FilteredIsosurface, LiesBeyondTheSamplesWhereTheFilterDoes) {
   EXPECT_EQ(below.report.closedArea, 0);
 }
 
+TEST(FilteredIsosurface, FindsValuesBeyondTheSamplesAtTheBorder) {
+  // The quadratic extension by −3 makes the B-spline −1/3 on the face x = 0.
+  const Volume layer = bright(7, [](const V3i& p) { return p.x == 1; });
+  const FilteredVolume f(layer, VolumeFilter::BSpline);
+  EXPECT_NEAR(f.value(V3d(0, 3, 3)), -1.0 / 3, 1e-12);
+  const auto made =
+      isosurface(layer, {.low = -0.2}, {.filter = VolumeFilter::BSpline, .voxelSize = 0.05});
+  const double x = rootOf([&](double t) { return f.value(V3d(t, 3, 3)) + 0.2; }, 0, 0.5);
+  EXPECT_GT(x, 0.05);
+  EXPECT_NEAR(made.band.zeroSetBounds().min.x, x, measured(1e-6));
+}
+
 TEST(FilteredIsosurface, HasTheSidesOfTheFilterBeyondTheSamples) {
   const Volume single = bright(7, [](const V3i& p) { return p == V3i(3); });
   for (const VolumeFilter filter : {VolumeFilter::BSplineQi, VolumeFilter::Tricubic}) {
@@ -149,9 +161,9 @@ TEST(FilteredIsosurface, RefusesIsovaluesThatTheFilterDoesNotReach) {
         [&] { (void)isosurface(volume, {.low = isovalue}, {.filter = filter}); });
   };
   EXPECT_SAYS(refused(single, VolumeFilter::BSpline, 0.3),
-              "no value of the volume with the filter bspline");
+              "the filter bspline has no surface here: no value");
   EXPECT_SAYS(refused(dark, VolumeFilter::BSpline, 0.7),
-              "every value of the volume with the filter bspline");
+              "the filter bspline has no surface here: every value");
   EXPECT_NO_THROW((void)isosurface(single, {.low = 0.29},
                                    {.filter = VolumeFilter::BSpline, .voxelSize = 0.05}));
   EXPECT_SAYS(refused(single, VolumeFilter::Tricubic, 1.001), "no value");
