@@ -15,11 +15,11 @@ namespace levelset {
 
 /// Number of components of a value type. The file may store each component as a half float.
 template <typename T>
-constexpr std::size_t kComponents = 1;
+inline constexpr std::size_t kComponents = 1;
 template <>
-constexpr std::size_t kComponents<openvdb::Vec3s> = 3;
+inline constexpr std::size_t kComponents<openvdb::Vec3s> = 3;
 template <>
-constexpr std::size_t kComponents<openvdb::Vec3d> = 3;
+inline constexpr std::size_t kComponents<openvdb::Vec3d> = 3;
 
 template <typename T>
 T fromHalves(const openvdb::math::half* halves) {

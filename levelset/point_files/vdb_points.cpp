@@ -388,7 +388,7 @@ class PointGridReader {
   Storage<std::uint32_t> storage_{};
   std::vector<Leaf> leaves_;
   std::vector<std::unique_ptr<Descriptor>> descriptors_;
-  std::vector<std::vector<Page>> pages_;  ///< of each attribute
+  std::vector<std::vector<Page>> pages_;  ///< pages of each attribute
   const Page* loaded_ = nullptr;
   std::vector<char> values_;
 };
@@ -397,7 +397,7 @@ class PointGridReader {
 
 /// Format of the numbers of an attribute in a file.
 struct NumberFormat {
-  std::size_t bytes = 0;  ///< of a number; 0: unsupported
+  std::size_t bytes = 0;  ///< size of a number; 0: unsupported
   double (*decode)(const char*) = nullptr;
   bool isUnitVector = false;
   double error = 0;  ///< largest error of a position, voxels

@@ -23,7 +23,7 @@ template <typename Number>
 struct OverlapNode {
   static constexpr std::uint32_t kLeaf = 3, kSameLeaf = 4;
 
-  std::array<ItemBox<Number>, 2> boxes;  ///< of the children
+  std::array<ItemBox<Number>, 2> boxes;  ///< boxes of the children
   /// Axis of the split, or kLeaf or kSameLeaf; above its three bits the number of items of a leaf.
   std::uint32_t kindAndCount = kLeaf;
   /// Inner node: number of nodes from here to the second child; the first child comes next.

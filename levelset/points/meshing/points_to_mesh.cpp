@@ -203,7 +203,7 @@ std::vector<SurfacePart> partsOf(const PointSurface& surface, const std::vector<
 struct PartMesh {
   FrontMesh front;
   std::size_t missed = 0;
-  double scale = 1;  ///< of the edge lengths
+  double scale = 1;  ///< factor on the edge lengths
   [[nodiscard]] bool isComplete() const { return front.isClosed && missed == 0; }
 };
 

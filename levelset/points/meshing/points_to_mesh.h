@@ -28,12 +28,13 @@ struct PointsToMeshOptions {
 
 /// Figures of pointsToMesh().
 struct PointsToMeshReport {
-  std::size_t components = 0;    ///< connected parts of the surface
-  std::size_t incomplete = 0;    ///< parts whose mesh misses points or has holes
-  std::size_t borders = 0;       ///< loops of edges with one triangle
-  double borderLength = 0;       ///< world units
-  std::size_t filled = 0;        ///< triangles that fill holes the fronts left
-  double smallestScale = 1;      ///< of edge lengths; below 1 where the front needed shorter edges
+  std::size_t components = 0;  ///< connected parts of the surface
+  std::size_t incomplete = 0;  ///< parts whose mesh misses points or has holes
+  std::size_t borders = 0;     ///< loops of edges with one triangle
+  double borderLength = 0;     ///< world units
+  std::size_t filled = 0;      ///< triangles that fill holes the fronts left
+  /// Smallest factor on the edge lengths; below 1 where the front needed shorter edges.
+  double smallestScale = 1;
   std::size_t unusedPoints = 0;  ///< points that belong to no surface
   std::size_t missedPoints = 0;  ///< points without a triangle nearby
   std::size_t guessed = 0;       ///< parts whose outside is a guess

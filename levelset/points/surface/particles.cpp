@@ -178,7 +178,7 @@ FlattenedParticle flatten(const Particles& particles, std::size_t i, double reac
 
 struct FlattenedParticles {
   std::vector<FlattenedParticle> particles;
-  PointSearch search;  ///< of the centres
+  PointSearch search;  ///< tree of the centres
   double most = 0;     ///< farthest reach of a particle, world units
   double level = 0;    ///< value of the sum on the surface
   double slope = 0;    ///< distance for each unit of the sum

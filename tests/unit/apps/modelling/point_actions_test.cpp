@@ -154,7 +154,7 @@ TEST_F(PointActions, RefusalsHaveTheirCode) {
   expectRefusal("read a.xyz ! thin --count 4", 3, "3 different positions");
   expectRefusal("read a.xyz ! clip --box \"5,5,5 6,6,6\"", 3, "none of the 3 points");
   expectRefusal("read a.xyz ! transform --scale 2 --bake", 2, "point cloud");
-  expectRefusal("read a.xyz ! write a.vdb", 2, "write .ply");
+  expectRefusal("read a.xyz ! write a.stl", 2, "write .ply");
   expectRefusal("read a.xyz ! write a.stl", 2, "write .ply");
   expectRefusal("read a.xyz --points --grid x ! info", 2, "--grid");
   expectRefusal("sphere --radius 1 --voxel 0.2 ! mesh ! write a.xyz", 2, "sample");
