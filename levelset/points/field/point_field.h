@@ -18,6 +18,7 @@ struct PointField {
   std::size_t neighbours;  ///< number of closest points that `value` takes
   /// Distance from the points up to which the field is good, in units of about a spacing.
   double reach = 1;
+  std::size_t centres = 0;  ///< of rbfField(): points that the function interpolates
 };
 
 /// Weight of a point at a squared distance, in fractions of the squared cut-off [Sigg06, 4.10].

@@ -130,16 +130,19 @@ class CubeTree {
   std::size_t splitLevel(std::size_t begin, const OrientedPoints& points, std::size_t maxMemory) {
     const std::size_t end = nodes_.size();
     // The octants of each node are made from its near particles, and the nodes are copied once.
+    std::vector<char> divides(end - begin);
+    tbb::parallel_for(begin, end,
+                      [&](std::size_t n) { divides[n - begin] = isSplit(nodes_[n].cube, points); });
     double bytes = 2.0 * sizeof(Node) * static_cast<double>(end);
     for (std::size_t n = begin; n < end; ++n)
-      if (isSplit(nodes_[n].cube, points))
+      if (divides[n - begin])
         bytes += 8 * (3.0 * sizeof(Node) +
                       sizeof(std::uint32_t) * static_cast<double>(nodes_[n].cube.near.size()));
     requireMemory(bytes, memoryLeft(memoryLimit(maxMemory)));
     std::vector<std::vector<RbfCube>> octants(end - begin);
     tbb::parallel_for(begin, end, [&](std::size_t n) {
+      if (!divides[n - begin]) return;
       RbfCube& cube = nodes_[n].cube;
-      if (!isSplit(cube, points)) return;
       for (int bits = 0; bits < 8; ++bits) octants[n - begin].push_back(cubes_.octant(cube, bits));
       cube.near = {};
     });
@@ -194,15 +197,15 @@ std::size_t addCentres(const OrientedPoints& points, const std::vector<double>& 
 }
 
 /// Fits the function. The messages of the solver are those of texture maps.
-RbfFunction solve(const Particles& particles, const std::vector<char>& near,
-                  const rbf::RbfOptions& options) {
+RbfFunction solve(const Particles& particles, std::size_t centres, const rbf::RbfOptions& options) {
+  const std::vector<char> near(particles.positions.size(), 1);
   try {
     return RbfFunction(particles.positions, particles.values, near, options);
   } catch (const NumericalError& error) {
     throw NumericalError(
         fmt::format("the radial function of {} points has no solution ({}); raise --fit-error or "
                     "--lambda, thin the points, or use --method mls",
-                    particles.positions.size() / 3, error.what()));
+                    centres, error.what()));
   }
 }
 
@@ -227,8 +230,9 @@ PointField rbfField(const OrientedPoints& points, const RbfFieldOptions& options
     const Particles particles = particlesOf(points, isCentre);
     fit.solveTolerance = std::clamp(kSolveShare * aim / particles.extent(), 1e-9, 1e-2);
     fit.progress = subProgress(options.progress, done, 0.5 + done / 2);
-    const std::vector<char> near(particles.positions.size(), 1);
-    const RbfFunction function = solve(particles, near, fit);
+    const auto centres =
+        static_cast<std::size_t>(std::count(isCentre.begin(), isCentre.end(), true));
+    const RbfFunction function = solve(particles, centres, fit);
     const auto tree =
         std::make_shared<const CubeTree>(function, points, options.maxMemory, fit.progress);
     const std::vector<double> residuals = residualsOf(points, *tree);
@@ -243,7 +247,7 @@ PointField rbfField(const OrientedPoints& points, const RbfFieldOptions& options
       return {[tree](const V3d& at, const std::vector<FoundItem>& /*found*/) {
                 return tree->value(at);
               },
-              1, kReach};
+              1, kReach, centres};
   }
 }
 

@@ -208,7 +208,9 @@ PointsToBandResult pointsToBand(const PointCloud& cloud, double voxelSize,
         "noisy, or accept them with --accept-sign",
         100 * opposedShare));
   report(options.progress, 0.1);
-  const points::SignedField field(points, fieldOf(points, options));
+  PointField near = fieldOf(points, options);
+  const std::size_t centres = near.centres;
+  const points::SignedField field(points, std::move(near));
   points::SampleFrame frame{points.centre, points.box, voxelSize};
   constexpr double kMargin = 0.1;  // of the diagonal
   const V3d margin(kMargin * points.box.size().length() + 4 * voxelSize);
@@ -228,6 +230,7 @@ PointsToBandResult pointsToBand(const PointCloud& cloud, double voxelSize,
   NarrowBand band = makeBand(eikonal::distanceTransform(std::move(samples), request));
 
   SupportCertificate certificate{.points = points.size(),
+                                 .centres = centres,
                                  .medianSpacing = points.medianSpacing,
                                  .droppedParts = droppedParts,
                                  .opposedShare = opposedShare};

@@ -38,6 +38,7 @@ enum class PointMethod {
 /// normal opposes that of the surface do not count.
 struct SupportCertificate {
   std::size_t points = 0;      ///< number of different positions
+  std::size_t centres = 0;     ///< for RadialBasis: number of them that are centres
   double medianSpacing = 0;    ///< distance between neighbouring points, world units
   double area = 0;             ///< area of the surface, world units²
   double unsupportedArea = 0;  ///< area of the part that is a guess, world units²

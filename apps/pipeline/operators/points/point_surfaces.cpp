@@ -32,6 +32,7 @@ PointMethod methodOf(const Invocation& in) {
 
 std::string certificateJson(const SupportCertificate& c) {
   return Json{{"points", c.points},
+              {"centres", c.centres},
               {"spacing", c.medianSpacing},
               {"area", c.area},
               {"unsupported_share", c.unsupportedShare()},

@@ -139,6 +139,11 @@ TEST(PointsToBand, RadialBasisTakesAsManyCentresAsItsToleranceNeeds) {
   const SampledShape shape = ring(6000);
   const PointsToBandResult result =
       pointsToBand(shape.cloud, 0.05, {.method = PointMethod::RadialBasis, .tolerance = 0.02});
+  const PointsToBandResult finer =
+      pointsToBand(shape.cloud, 0.05, {.method = PointMethod::RadialBasis, .tolerance = 0.002});
+  EXPECT_GE(result.certificate.centres, 1500u);
+  EXPECT_LT(result.certificate.centres, finer.certificate.centres);
+  EXPECT_LE(finer.certificate.centres, shape.cloud.size());
   const auto [inside, outside] = largestErrors(result, shape);
   EXPECT_LT(std::max(inside, outside) / shape.spacing, measured(0.008));
 }
