@@ -63,17 +63,12 @@ void checkIsosurface(const Volume& volume, const ValueRange& range,
         "the volume has {} x {} x {} grid points, but a solid needs two along each axis; use a "
         "volume, not a slice",
         size.x, size.y, size.z));
-  double low = volume.lowest(), high = volume.highest();
-  if (options.filter != VolumeFilter::Trilinear && high > low) {
-    // A filter may have values beyond those of the grid points: between them, and more so where it
-    // extends the volume at its border. The sum of the magnitudes of its weights is at most this.
-    constexpr double kMostWeight = 20;
-    const double beyond = kMostWeight * (high - low);
-    low -= beyond;
-    high += beyond;
-  }
-  const bool hasInside = (!range.low || high > *range.low) && (!range.high || low < *range.high);
-  const bool hasOutside = (range.low && low <= *range.low) || (range.high && high >= *range.high);
+  // Other filters have values beyond those of the samples. The search for pieces decides there.
+  if (options.filter != VolumeFilter::Trilinear) return;
+  const bool hasInside = (!range.low || volume.highest() > *range.low) &&
+                         (!range.high || volume.lowest() < *range.high);
+  const bool hasOutside = (range.low && volume.lowest() <= *range.low) ||
+                          (range.high && volume.highest() >= *range.high);
   if (!hasInside || !hasOutside) refuseRange(volume, options.filter, hasInside);
 }
 

@@ -51,8 +51,6 @@ class RbfFunction {
   /// Jacobian of the function. At a particle the particle's own term adds nothing; for φ(r) = r it
   /// has no derivative there.
   [[nodiscard]] Imath::M33d jacobian(const Imath::V3d& x) const;
-  /// Values at many positions, by sums over all particles.
-  [[nodiscard]] std::vector<Imath::V3d> valuesAt(std::span<const Imath::V3d> points) const;
 
   /// Largest |Φ(p_i) − t_i| over the particles.
   [[nodiscard]] double maxResidual() const { return maxResidual_; }
@@ -80,6 +78,8 @@ class RbfFunction {
   [[nodiscard]] Imath::V3d affine(const Imath::V3d& local) const;
 
  private:
+  /// Values at many positions, by sums over all particles.
+  [[nodiscard]] std::vector<Imath::V3d> valuesAt(std::span<const Imath::V3d> points) const;
   void measureResidual(std::span<const Imath::V3d> points, std::span<const Imath::V3d> targets);
 
   RbfKernel kernel_;

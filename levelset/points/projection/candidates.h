@@ -39,8 +39,8 @@ struct FitCandidate {
 /// Finds the points for a fit by breadth-first search over the graph [Kalbe11]. Paths do not leave
 /// the ball of `reach` local units. They end where the normal, kept consistent along the path, has
 /// turned by more than 107 degrees: on the other side of a thin part. [Kalbe11] leaves out points
-/// whose projection lies in the convex hull of those before them. At sharp edges, that rule leaves
-/// one side out, so that the fits of the two sides do not agree.
+/// whose projection lies in the convex hull of those before them. At sharp edges, that rule may
+/// leave one side out, so that the fits of the two sides do not agree.
 class CandidateSearch {
  public:
   CandidateSearch(std::span<const Imath::V3d> positions, const CoconeGraph& graph)
