@@ -20,8 +20,8 @@ struct CurvatureSample {
   double mean = 0, gauss = 0, k1 = 0, k2 = 0;
   /// First principal direction: unit tangent vector along which the normal curvature is k1, with a
   /// sign from asLine(). Any tangent vector where k1 = k2. 0 on meshes, where the gradient
-  /// vanishes, and, on level sets, in pictures that show no directions. The second principal direction is
-  /// normal × direction1, with a sign from asLine().
+  /// vanishes, and, on level sets, in pictures that show no directions. The second principal
+  /// direction is normal × direction1, with a sign from asLine().
   Imath::V3d direction1{0};
 };
 

@@ -29,7 +29,8 @@
 /// VDB: attributes `P`, `N`, `Cd`, `Alpha`, `pscale` (radius) and `weight`. When read, `radius` and
 /// `confidence` are known, too. Positions are stored relative to voxels, of type float,
 /// uncompressed. They come back with an error of at most 2⁻²⁶ voxel, and exactly where they are of
-/// type float and above 2⁻¹²⁶ voxel. The voxels have about eight points. Points come back in the order of the grid.
+/// type float and above 2⁻¹²⁶ voxel. The voxels have about eight points. Points come back in the
+/// order of the grid.
 namespace levelset {
 
 struct ReadPointsOptions {

@@ -40,10 +40,10 @@
 #include "levelset/mesh_files/mesh_file.h"
 #include "levelset/meshing/band_to_mesh.h"
 #include "levelset/points/field/oriented_points.h"
-#include "levelset/points/surface/points_to_band.h"
 #include "levelset/points/processing/normals.h"
 #include "levelset/points/processing/point_spacing.h"
 #include "levelset/points/processing/sample_mesh.h"
+#include "levelset/points/surface/points_to_band.h"
 #include "levelset/shapes/shapes.h"
 
 namespace {

@@ -7,10 +7,10 @@
 #include "apps/regress/recorder.h"
 #include "apps/regress/truth/exact_band.h"
 #include "levelset/meshing/band_to_mesh.h"
-#include "levelset/points/surface/particles.h"
-#include "levelset/points/surface/points_to_band.h"
 #include "levelset/points/processing/normals.h"
 #include "levelset/points/processing/sample_mesh.h"
+#include "levelset/points/surface/particles.h"
+#include "levelset/points/surface/points_to_band.h"
 
 namespace regress {
 

@@ -9,8 +9,8 @@
 #include "apps/pipeline/registry/invocation.h"
 #include "mapping/distortion/distortion.h"
 #include "mapping/distortion/fold_certificate.h"
-#include "mapping/rbf/rbf_map.h"
 #include "mapping/patches/patch.h"
+#include "mapping/rbf/rbf_map.h"
 
 // Options that untangle, relax and certify patches, for actions that map onto patches.
 namespace pipeline {
