@@ -11,7 +11,7 @@
 #include "levelset/error.h"
 #include "levelset/files/values_vdb.h"
 #include "levelset/point_files/cloud_builder.h"
-#include "levelset/point_files/vdb_point_grid.h"
+#include "levelset/point_files/point_grid_vdb.h"
 
 namespace levelset::point_files {
 namespace {

@@ -1,25 +1,31 @@
 // Measures the ray caster on isosurfaces of volumes: the ranges of blocks, which are made once; the
 // blocks and tables of another isovalue; and primary rays of the default view at 1024x768, for each
-// filter. Reports CPU seconds of one thread, and the blocks and cells that the tables hold.
+// filter. Reports CPU seconds of one thread, and the blocks and cells that the tables hold. With
+// `gpu`, also the rays a second of the compute shader, and the rays with other hits than the
+// processor's.
 //
-//   volume_bench sphere|marschner-lobb SIZE    a table on standard output: NAME VALUE
-//   volume_bench FILE ISOVALUE                 the same of a volume from a file
+//   volume_bench sphere|marschner-lobb SIZE [gpu]    a table on standard output: NAME VALUE
+//   volume_bench FILE ISOVALUE [gpu]                 the same of a volume from a file
 
 #include <fmt/core.h>
 #include <tbb/global_control.h>
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <ctime>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "levelset/error.h"
 #include "levelset/volume_files/volume_file.h"
 #include "levelset/volumes/synthetic.h"
 #include "render/cpu/cpu_tracer.h"
+#include "render/gpu/gl_context.h"
+#include "render/gpu/gpu_tracer.h"
 #include "render/kernel/kernel_scene.h"
 #include "render/volumes/volume_surface.h"
 
@@ -49,28 +55,58 @@ void tell(const std::string& name, double value) {
   fmt::print("{} {:.4g}\n", name, value);
 }
 
+constexpr std::size_t kRays = std::size_t{kWidth} * kHeight;
+constexpr std::size_t kFew = 1u << 12;  // few enough for the processor's cache
+
 /// All pixels of the picture, as squares of neighbouring pixels.
-std::vector<PixelBlock> allPixels() {
-  constexpr std::size_t kAtOnce = 1u << 12;  // few enough for the cache
-  std::vector<PixelBlock> all(std::size_t{kWidth} * kHeight / kAtOnce, PixelBlock(kAtOnce));
+/// @param atOnce  pixels of a block; divides kRays
+std::vector<PixelBlock> allPixels(std::size_t atOnce) {
+  std::vector<PixelBlock> all(kRays / atOnce, PixelBlock(atOnce));
   std::size_t n = 0;
   for (int top = 0; top < kHeight; top += kSquare)
     for (int left = 0; left < kWidth; left += kSquare)
       for (int y = top; y < top + kSquare; ++y)
         for (int x = left; x < left + kSquare; ++x, ++n) {
-          all[n / kAtOnce].x[n % kAtOnce] = static_cast<float>(x + 0.5 - 0.5 * kWidth);
-          all[n / kAtOnce].y[n % kAtOnce] = static_cast<float>(y + 0.5 - 0.5 * kHeight);
+          all[n / atOnce].x[n % atOnce] = static_cast<float>(x + 0.5 - 0.5 * kWidth);
+          all[n / atOnce].y[n % atOnce] = static_cast<float>(y + 0.5 - 0.5 * kHeight);
         }
   return all;
 }
 
-void benchmark(const levelset::Volume& volume, double isovalue) {
+/// Reports the compute shader's rays a second, alone and with the transfers of a picture, and the
+/// rays whose solid or depth differs from the processor's.
+void benchmarkGpu(const GlContext& context, const KernelScene& surfaces, const std::string& name) {
+  const PixelBlock pixels = allPixels(kRays)[0];
+  const GpuTracer tracer(context, surfaces);
+  (void)surfaces.castPixels(tracer, pixels);  // compiles the shader
+  double shader = HUGE_VAL, wall = HUGE_VAL;
+  PixelHits hits;
+  for (int run = 0; run < 3; ++run) {
+    const double shaderStart = tracer.shaderSeconds();
+    const auto start = std::chrono::steady_clock::now();
+    hits = surfaces.castPixels(tracer, pixels);
+    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+    shader = std::min(shader, tracer.shaderSeconds() - shaderStart);
+    wall = std::min(wall, taken.count());
+  }
+  tell(name + "_gpu_mrays_per_s_of_shader", 1e-6 * kRays / shader);
+  tell(name + "_gpu_mrays_per_s_with_transfers", 1e-6 * kRays / wall);
+  const PixelHits expected = surfaces.castPixels(CpuTracer(), pixels);
+  std::size_t different = 0;
+  for (std::size_t n = 0; n < kRays; ++n)
+    different += hits.solid[n] != expected.solid[n] ||
+                 (hits.solid[n] >= 0 && hits.depth[n] != expected.depth[n]);
+  tell(name + "_gpu_different", static_cast<double>(different));
+}
+
+/// @param context  the compute shader is measured if it is given
+void benchmark(const levelset::Volume& volume, double isovalue, const GlContext* context) {
   const double start = cpuSeconds();
   const VolumeSurface surface(volume, isovalue + 1e-3 * (volume.highest() - volume.lowest()));
   tell("ranges_s", cpuSeconds() - start);
   Scene scene;
   scene.solids.push_back({.band = {}});
-  const std::vector<PixelBlock> pixels = allPixels();
+  const std::vector<PixelBlock> pixels = allPixels(kFew);
   for (const Filter filter : kFilters) {
     const std::string name = filterName(filter);
     const auto other = std::make_shared<const VolumeSurface>(surface.withIsovalue(isovalue));
@@ -97,25 +133,33 @@ void benchmark(const levelset::Volume& volume, double isovalue) {
       }
     });
     tell(name + "_hits", static_cast<double>(found));
-    tell(name + "_mrays_per_s", 1e-6 * kWidth * kHeight / seconds);
+    tell(name + "_mrays_per_s", 1e-6 * kRays / seconds);
+    if (context != nullptr) benchmarkGpu(*context, surfaces, name);
   }
 }
 
 }  // namespace
 
 int main(int argc, char** argv) try {
-  if (argc != 3) {
-    fmt::print(stderr, "usage: volume_bench sphere|marschner-lobb SIZE, or FILE ISOVALUE\n");
+  const bool hasGpu = argc == 4 && argv[3] == std::string("gpu");
+  if (argc != 3 && !hasGpu) {
+    fmt::print(stderr,
+               "usage: volume_bench sphere|marschner-lobb SIZE [gpu], or FILE ISOVALUE [gpu]\n");
     return 2;
   }
   const tbb::global_control oneThread(tbb::global_control::max_allowed_parallelism, 1);
+  std::unique_ptr<const GlContext> context;
+  if (hasGpu) {
+    context = std::make_unique<const GlContext>();
+    fmt::print("gpu {}\n", context->description());
+  }
   const std::string form = argv[1];
   if (form == "sphere")
-    benchmark(levelset::sphereVolume(std::stoi(argv[2]), 0.8), 0);
+    benchmark(levelset::sphereVolume(std::stoi(argv[2]), 0.8), 0, context.get());
   else if (form == "marschner-lobb")
-    benchmark(levelset::marschnerLobb(std::stoi(argv[2])), 0.5);
+    benchmark(levelset::marschnerLobb(std::stoi(argv[2])), 0.5, context.get());
   else
-    benchmark(levelset::readVolume(form), std::stod(argv[2]));
+    benchmark(levelset::readVolume(form), std::stod(argv[2]), context.get());
   return 0;
 } catch (const levelset::Error& error) {
   fmt::print(stderr, "volume_bench: {}\n", error.what());
