@@ -74,6 +74,7 @@ struct LightKernel : TransferKernel {
   [[nodiscard]] double worldToIndex(int n) const {
     return constants[static_cast<std::size_t>(kWorldToIndex + n)];
   }
+  [[nodiscard]] static double rootOf(double a) { return std::sqrt(a); }
   [[nodiscard]] bool blockHasExtinction(int n) const {
     return tables.hasExtinction[static_cast<std::size_t>(n)] != 0;
   }

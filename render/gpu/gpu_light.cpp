@@ -59,6 +59,29 @@ double ofFloat(uint bits) {
   return (bits & 0x80000000u) == 0u ? result : -result;
 }
 
+// The upper half of the bits of a.
+double upperHalf(double a) {
+  VAR scaled = 134217729.0 * a;  // 2²⁷ + 1
+  VAR rest = scaled - a;
+  VAR upper = scaled - rest;
+  return upper;
+}
+
+// Square root, rounded as IEEE 754 requires. NVIDIA's driver 580 rounds a third of the roots of
+// doubles to a neighbour. One Newton step with the exact remainder corrects it. The remainder needs
+// numbers whose products neither overflow nor underflow; others keep the root of the driver.
+double rootOf(double a) {
+  VAR root = sqrt(a);
+  if (!(a > 1e-250lf && a < 1e250lf)) return root;
+  VAR square = root * root;
+  VAR high = upperHalf(root);
+  VAR low = root - high;
+  VAR lost = (high * high - square) + 2.0 * high * low + low * low;
+  VAR remainder = (a - square) - lost;
+  VAR corrected = root + remainder / (2.0 * root);
+  return corrected;
+}
+
 double numberAt(int x, int y, int z) {
   int n = (z * pointsY + y) * pointsX + x;
   uint word = texelFetch(values, n >> kWordShift).x;

@@ -173,7 +173,7 @@ double brightnessIn(int x, int y, int z, double a, double b, double c) {
   VAR gy = worldToIndex(3) * sx + worldToIndex(4) * sy + worldToIndex(5) * sz;
   VAR gz = worldToIndex(6) * sx + worldToIndex(7) * sy + worldToIndex(8) * sz;
   VAR square = gx * gx + gy * gy + gz * gz;
-  VAR size = sqrt(square);
+  VAR size = rootOf(square);
   double divisor = size > 0.0 ? size : 1.0;
   // The outside has smaller values. A weak gradient is no surface and gets the full light.
   VAR towards = 0.0 - (gx * toLightX + gy * toLightY + gz * toLightZ) / divisor;

@@ -7,7 +7,7 @@
 // NOISE    standard deviation of each coordinate, in fractions of the diagonal of the bounding box
 // NORMALS  given, estimated (by `normals`), or flipped (half of them, then estimated)
 // VARIANT  blue (noise), uneven (uniform random), hole (a cap is removed)
-// METHOD   mls, mpu, meshless, poisson, front, pcl-poisson; default: all
+// METHOD   mls, mpu, rbf, meshless, poisson, front, pcl-poisson; default: all
 //
 // Prints a line of CSV for each method: mean and largest distance in point spacings from the result
 // to the true surface and back, the mean angle between normals in degrees, the error of the volume,
@@ -250,15 +250,23 @@ int main(int argc, char** argv) try {
     normalSeconds = seconds() - start;
   }
   const double spacing = levelset::points::orient(cloud).medianSpacing;
+  // docs/points.md recommends these for noise of 0.2 spacings, and for scans.
+  const double lambda = deviation < 0.1 ? 0 : 30;
+  const double rbfTolerance = count == 0 ? 0.1 : 0.02;
   const auto ours = [&](levelset::PointMethod method) {
-    return bandToMesh(
-        pointsToBand(cloud, spacing / 2,
-                     {.method = method, .neighbours = neighbours, .acceptUnsupported = true})
-            .band);
+    const bool isRbf = method == levelset::PointMethod::RadialBasis;
+    return bandToMesh(pointsToBand(cloud, spacing / 2,
+                                   {.method = method,
+                                    .neighbours = neighbours,
+                                    .tolerance = isRbf ? rbfTolerance : 0.02,
+                                    .lambda = lambda,
+                                    .acceptUnsupported = true})
+                          .band);
   };
   std::vector<std::pair<std::string, std::function<TriMesh()>>> methods{
       {"mls", [&] { return ours(levelset::PointMethod::MovingLeastSquares); }},
       {"mpu", [&] { return ours(levelset::PointMethod::MultilevelPartition); }},
+      {"rbf", [&] { return ours(levelset::PointMethod::RadialBasis); }},
       {"meshless", [&] { return ours(levelset::PointMethod::Meshless); }},
       {"poisson", [&] { return poisson(cloud, spacing); }},
       {"front", [&] { return advancingFront(cloud); }},

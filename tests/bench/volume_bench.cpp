@@ -80,7 +80,7 @@ void benchmarkGpu(const GlContext& context, const KernelScene& surfaces, const s
   const GpuTracer tracer(context, surfaces);
   (void)surfaces.castPixels(tracer, pixels);  // compiles the shader
   double shader = HUGE_VAL, wall = HUGE_VAL;
-  PixelHits hits;
+  PixelHits hits(0);
   for (int run = 0; run < 3; ++run) {
     const double shaderStart = tracer.shaderSeconds();
     const auto start = std::chrono::steady_clock::now();

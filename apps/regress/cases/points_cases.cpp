@@ -58,8 +58,11 @@ std::vector<PointShape> shapes(const V3d& shift) {
 struct NamedMethod {
   const char* name;
   PointMethod method;
+  double noiseLambda = 0;  ///< relaxation λ where the points have noise
 };
 constexpr NamedMethod kPointMethods[] = {{"mls", PointMethod::MovingLeastSquares},
+                                         {"mpu", PointMethod::MultilevelPartition},
+                                         {"rbf", PointMethod::RadialBasis, 30},
                                          {"meshless", PointMethod::Meshless}};
 
 void cleanPoints(Recorder& out) {
@@ -87,7 +90,9 @@ void noisyPoints(Recorder& out) {
       for (const NamedMethod& method : kPointMethods)
         out.measure({std::string(shape.name) + ", " + method.name, at, shape.truth}, kOurs, [&] {
           return pointsToBand(cloud, at.voxelSize,
-                              {.method = method.method, .neighbours = kNeighbours})
+                              {.method = method.method,
+                               .neighbours = kNeighbours,
+                               .lambda = method.noiseLambda})
               .band;
         });
     }
@@ -178,7 +183,7 @@ void addPointCases(std::vector<Case>& all) {
                  .definition =
                      "Points with exact normals, two voxels apart, on a sphere of radius 0.4, a "
                      "torus of radii 0.35 and 0.15, and a cube of edge 0.7. Solids by 'level-set "
-                     "--method mls' and 'meshless'.",
+                     "--method mls', 'mpu', 'rbf' and 'meshless'.",
                  .citation = "closed form",
                  .quick = {16, 32},
                  .full = {32, 64},
@@ -190,7 +195,7 @@ void addPointCases(std::vector<Case>& all) {
                  .definition =
                      "The points of 'points-clean', with a noise whose standard deviation is a "
                      "fifth of their spacing. Normals come from 40 neighbours, and so do the "
-                     "surfaces.",
+                     "surfaces. 'rbf' has '--lambda 30'.",
                  .citation = "closed form",
                  .quick = {24},
                  .full = {32},
