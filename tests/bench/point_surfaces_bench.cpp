@@ -131,7 +131,8 @@ TriMesh advancingFront(const PointCloud& cloud) {
   std::vector<std::array<std::size_t, 3>> facets;
   CGAL::advancing_front_surface_reconstruction(points.begin(), points.end(),
                                                std::back_inserter(facets));
-  TriMesh mesh{.positions = cloud.positions};
+  TriMesh mesh;
+  mesh.positions = cloud.positions;
   for (const auto& f : facets)
     mesh.triangles.push_back({static_cast<std::uint32_t>(f[0]), static_cast<std::uint32_t>(f[1]),
                               static_cast<std::uint32_t>(f[2])});
@@ -257,9 +258,9 @@ int main(int argc, char** argv) try {
     const bool isRbf = method == levelset::PointMethod::RadialBasis;
     return bandToMesh(pointsToBand(cloud, spacing / 2,
                                    {.method = method,
-                                    .neighbours = neighbours,
+                                    .neighbours = isRbf ? 0 : neighbours,
                                     .tolerance = isRbf ? rbfTolerance : 0.02,
-                                    .lambda = lambda,
+                                    .lambda = isRbf ? lambda : 0,
                                     .acceptUnsupported = true})
                           .band);
   };

@@ -1,13 +1,20 @@
+#include <fmt/core.h>
+
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "apps/regress/recorder.h"
 #include "apps/regress/truth/exact_band.h"
+#include "levelset/inspect/measure.h"
 #include "levelset/meshing/band_to_mesh.h"
 #include "levelset/points/processing/normals.h"
+#include "levelset/points/processing/point_spacing.h"
 #include "levelset/points/processing/sample_mesh.h"
 #include "levelset/points/surface/particles.h"
 #include "levelset/points/surface/points_to_band.h"
@@ -47,54 +54,152 @@ PointCloud pointsOn(const Truth& truth, double voxelSize) {
 struct PointShape {
   const char* name;
   Truth truth;
+  long euler;            ///< Euler characteristic of the surface
+  std::size_t surfaces;  ///< connected parts of the surface
 };
 
 std::vector<PointShape> shapes(const V3d& shift) {
-  return {{"sphere", ball(shift, 0.4)},
-          {"torus", torus(shift, V3d(1, 2, 3), 0.35, 0.15)},
-          {"cube", box(shift, V3d(0.7))}};
+  return {{"sphere", ball(shift, 0.4), 2, 1},
+          {"torus", torus(shift, V3d(1, 2, 3), 0.35, 0.15), 0, 1},
+          {"cube", box(shift, V3d(0.7)), 2, 1}};
 }
 
 struct NamedMethod {
   const char* name;
   PointMethod method;
-  double noiseLambda = 0;  ///< relaxation λ where the points have noise
 };
 constexpr NamedMethod kPointMethods[] = {{"mls", PointMethod::MovingLeastSquares},
                                          {"mpu", PointMethod::MultilevelPartition},
-                                         {"rbf", PointMethod::RadialBasis, 30},
+                                         {"rbf", PointMethod::RadialBasis},
                                          {"meshless", PointMethod::Meshless}};
+
+/// Measures the solids of a cloud by all methods.
+/// @param noise  standard deviation of the points' distance from the surface, in their spacings
+void measureSolids(Recorder& out, const Sample& at, const PointShape& shape,
+                   const PointCloud& cloud, double noise = 0) {
+  constexpr std::size_t kNoisyNeighbours = 40;
+  constexpr double kNoisyLambda = 30;
+  for (const NamedMethod& method : kPointMethods) {
+    levelset::PointsToBandOptions options{.method = method.method, .acceptUnsupported = true};
+    const bool isRadial = method.method == PointMethod::RadialBasis;
+    if (noise > 0 && isRadial) options.lambda = kNoisyLambda;
+    if (noise > 0 && !isRadial) options.neighbours = kNoisyNeighbours;
+    out.measure({std::string(shape.name) + ", " + method.name, at, shape.truth}, kOurs,
+                [&] { return pointsToBand(cloud, at.voxelSize, options).band; });
+  }
+}
+
+/// States that the surface of each method has the topology of the shape.
+void expectTopology(Recorder& out, const Sample& at, const PointShape& shape,
+                    const PointCloud& cloud) {
+  if (at.phase != kQuickPhase) return;
+  for (const NamedMethod& method : kPointMethods)
+    out.expect(
+        fmt::format("{}, {} at resolution {}", shape.name, method.name, at.resolution),
+        fmt::format("Euler characteristic {}, surfaces: {}", shape.euler, shape.surfaces), [&] {
+          const auto found =
+              measure(bandToMesh(pointsToBand(cloud, at.voxelSize,
+                                              {.method = method.method, .acceptUnsupported = true})
+                                     .band));
+          return std::pair(
+              found.euler == shape.euler && found.surfaces == shape.surfaces,
+              fmt::format("Euler characteristic {}, surfaces: {}", found.euler, found.surfaces));
+        });
+}
 
 void cleanPoints(Recorder& out) {
   for (const Sample& at : out.samples())
     for (const PointShape& shape : shapes(at.shift)) {
       const PointCloud cloud = pointsOn(shape.truth, at.voxelSize);
-      for (const NamedMethod& method : kPointMethods)
-        out.measure({std::string(shape.name) + ", " + method.name, at, shape.truth}, kOurs, [&] {
-          return pointsToBand(cloud, at.voxelSize, {.method = method.method}).band;
-        });
+      measureSolids(out, at, shape, cloud);
+      expectTopology(out, at, shape, cloud);
     }
 }
 
 /// Points with a noise of a fifth of their spacing, and normals that are computed from them.
 void noisyPoints(Recorder& out) {
-  constexpr std::size_t kNeighbours = 40;
+  constexpr int kNeighbours = 40;
+  constexpr double kNoise = 0.2;
   for (const Sample& at : out.samples())
     for (const PointShape& shape : shapes(at.shift)) {
       PointCloud cloud = pointsOn(shape.truth, at.voxelSize);
       std::mt19937_64 random(1);
-      std::normal_distribution<double> noise(0, 0.2 * 2 * at.voxelSize);
+      std::normal_distribution<double> noise(0, kNoise * 2 * at.voxelSize);
       for (V3d& p : cloud.positions)
         for (int axis = 0; axis < 3; ++axis) p[axis] += noise(random);
       cloud = levelset::estimateNormals(std::move(cloud), {.neighbours = kNeighbours}).cloud;
-      for (const NamedMethod& method : kPointMethods)
-        out.measure({std::string(shape.name) + ", " + method.name, at, shape.truth}, kOurs, [&] {
-          return pointsToBand(cloud, at.voxelSize,
-                              {.method = method.method,
-                               .neighbours = kNeighbours,
-                               .lambda = method.noiseLambda})
-              .band;
-        });
+      measureSolids(out, at, shape, cloud, kNoise);
+    }
+}
+
+/// Keeps a point with a probability that falls from one at the highest x to a ninth at the lowest,
+/// so that the spacing there is three times as large.
+void unevenPoints(Recorder& out) {
+  for (const Sample& at : out.samples())
+    for (const PointShape& shape : shapes(at.shift)) {
+      const PointCloud cloud = pointsOn(shape.truth, at.voxelSize);
+      std::mt19937_64 random(1);
+      std::uniform_real_distribution<double> chance(0, 1);
+      std::vector<std::uint32_t> kept;
+      for (std::uint32_t i = 0; i < cloud.size(); ++i) {
+        const double along = 0.5 + (cloud.positions[i].x - at.shift.x) / 1.0;
+        if (chance(random) < std::pow(9.0, std::min(along, 1.0) - 1)) kept.push_back(i);
+      }
+      measureSolids(out, at, shape, selectPoints(cloud, kept));
+    }
+}
+
+/// A tenth of the height of a ball has no points.
+void pointsWithHole(Recorder& out) {
+  for (const Sample& at : out.samples()) {
+    const PointShape shape{"sphere", ball(at.shift, 0.4), 2, 1};
+    const PointCloud cloud = pointsOn(shape.truth, at.voxelSize);
+    std::vector<std::uint32_t> kept;
+    for (std::uint32_t i = 0; i < cloud.size(); ++i)
+      if (cloud.positions[i].z - at.shift.z < 0.32) kept.push_back(i);
+    const PointCloud open = selectPoints(cloud, kept);
+    measureSolids(out, at, shape, open);
+    expectTopology(out, at, shape, open);
+  }
+}
+
+/// Ball with a ball-shaped cavity: two sheets at a distance of three spacings.
+PointShape hollowBall(const Sample& at) {
+  const double outer = 0.4, inner = outer - 3 * 2 * at.voxelSize;
+  const V3d centre = at.shift;
+  return {"hollow ball",
+          {.distance =
+               [=](const V3d& p) {
+                 const double radius = (p - centre).length();
+                 return std::max(radius - outer, inner - radius);
+               },
+           .centre = centre,
+           .reach = outer},
+          4,
+          2};
+}
+
+void sheetsOfPoints(Recorder& out) {
+  for (const Sample& at : out.samples()) {
+    const PointShape shape = hollowBall(at);
+    const PointCloud cloud = pointsOn(shape.truth, at.voxelSize);
+    measureSolids(out, at, shape, cloud);
+    expectTopology(out, at, shape, cloud);
+  }
+}
+
+/// Half of the normals are flipped, then `normals` computes them.
+void flippedPoints(Recorder& out) {
+  for (const Sample& at : out.samples())
+    for (const PointShape& shape : shapes(at.shift)) {
+      PointCloud cloud = pointsOn(shape.truth, at.voxelSize);
+      for (std::size_t i = 0; i < cloud.size(); i += 2) cloud.normals[i] = -cloud.normals[i];
+      if (at.phase == kQuickPhase)
+        out.expectRefusal(fmt::format("{} at resolution {}", shape.name, at.resolution),
+                          levelset::ExitCode::Input,
+                          [&] { (void)pointsToBand(cloud, at.voxelSize); });
+      cloud = levelset::estimateNormals(std::move(cloud), {}).cloud;
+      measureSolids(out, at, shape, cloud);
     }
 }
 
@@ -119,6 +224,14 @@ Bounds cleanPointBounds() {
       .measured("cube, mls", "surface_l1_vx", {{16, 0.0961}, {32, 0.0587}, {64, 0.0282}})
       .measured("cube, mls", "surface_linf_vx", {{16, 0.599}, {32, 0.639}, {64, 0.881}})
       .measured("cube, mls", "missed_hits", {{16, 0.0976}, {32, 0.0471}, {64, 0.0246}})
+      .measured(
+          "cube, mpu", "surface_l1_vx",
+          {{16, 0.0261}, {32, 0.0092, Budget::Quick}, {32, 0.0148, Budget::Full}, {64, 0.00677}})
+      .measured("cube, mpu", "surface_linf_vx", {{16, 0.19}, {32, 0.255}, {64, 0.249}})
+      .measured("cube, mpu", "missed_hits", {{16, 0.0488}, {32, 0.0229}, {64, 0.00935}})
+      .measured("cube, rbf", "surface_l1_vx", {{16, 0.0949}, {32, 0.0541}, {64, 0.0289}})
+      .measured("cube, rbf", "surface_linf_vx", {{16, 0.733}, {32, 0.594}, {64, 0.581}})
+      .measured("cube, rbf", "missed_hits", {{16, 0.0738}, {32, 0.0394}, {64, 0.0197}})
       .measured("sphere, meshless", "surface_l1_vx", {{16, 0.0266}, {32, 0.0125}, {64, 0.00635}})
       .measured("sphere, meshless", "surface_linf_vx", {{16, 0.156}, {32, 0.0888}, {64, 0.0465}})
       .measured("sphere, meshless", "missed_hits",
@@ -130,6 +243,12 @@ Bounds cleanPointBounds() {
       .measured("sphere, mls", "surface_linf_vx", {{16, 0.0215}, {32, 0.00274}, {64, 0.000373}})
       .measured("sphere, mls", "missed_hits",
                 {{16, 0.00209}, {32, 0.000684, Budget::Quick}, {32, 0.000344, Budget::Full}})
+      .measured("sphere, mpu", "surface_l1_vx", {{16, 0.00342}, {32, 0.00127}, {64, 0.0415}})
+      .measured("sphere, mpu", "surface_linf_vx", {{16, 0.0215}, {32, 0.00898}, {64, 0.0753}})
+      .measured("sphere, mpu", "missed_hits", {{16, 0.00105}, {32, 0.000687}, {64, 0.00294}})
+      .measured("sphere, rbf", "surface_l1_vx", {{16, 0.00949}, {32, 0.00497}, {64, 0.00256}})
+      .measured("sphere, rbf", "surface_linf_vx", {{16, 0.0152}, {32, 0.0105}, {64, 0.00588}})
+      .measured("sphere, rbf", "missed_hits", {{16, 0.00628}, {32, 0.00137}, {64, 0.000134}})
       .measured("torus, meshless", "surface_l1_vx", {{16, 0.0435}, {32, 0.02}, {64, 0.00985}})
       .measured("torus, meshless", "surface_linf_vx", {{16, 0.373}, {32, 0.173}, {64, 0.0933}})
       .measured(
@@ -138,29 +257,165 @@ Bounds cleanPointBounds() {
       .measured("torus, mls", "surface_l1_vx", {{16, 0.0717}, {32, 0.0095}, {64, 0.00111}})
       .measured("torus, mls", "surface_linf_vx", {{16, 0.211}, {32, 0.0294}, {64, 0.00409}})
       .measured("torus, mls", "missed_hits",
-                {{16, 0.0361}, {32, 0.00574, Budget::Quick}, {32, 0.00333, Budget::Full}});
+                {{16, 0.0361}, {32, 0.00574, Budget::Quick}, {32, 0.00333, Budget::Full}})
+      .measured("torus, mpu", "surface_l1_vx", {{16, 0.0287}, {32, 0.0106}, {64, 0.0101}})
+      .measured("torus, mpu", "surface_linf_vx", {{16, 0.138}, {32, 0.0758}, {64, 0.145}})
+      .measured("torus, mpu", "missed_hits", {{16, 0.012}, {32, 0.00287}, {64, 0.000964}})
+      .measured("torus, rbf", "surface_l1_vx", {{16, 0.00874}, {32, 0.00205}, {64, 0.00115}})
+      .measured("torus, rbf", "surface_linf_vx", {{16, 0.0993}, {32, 0.0162}, {64, 0.0109}})
+      .measured("torus, rbf", "missed_hits", {{16, 0.00134}, {32, 0.000953, Budget::Full}});
 }
 
 Bounds noisyPointBounds() {
   return Bounds()
       .measured("cube, meshless", "surface_l1_vx", {{24, 0.251}, {32, 0.224}})
-      .measured("cube, meshless", "surface_linf_vx", {{24, 2.07}, {32, 1.11}})
+      .measured("cube, meshless", "surface_linf_vx", {{24, 2.07}, {32, 1.1}})
       .measured("cube, meshless", "missed_hits", {{24, 0.0893}, {32, 0.0787}})
       .measured("cube, mls", "surface_l1_vx", {{24, 0.254}, {32, 0.217}})
       .measured("cube, mls", "surface_linf_vx", {{24, 1.18}, {32, 1.14}})
       .measured("cube, mls", "missed_hits", {{24, 0.11}, {32, 0.0922}})
+      .measured("cube, mpu", "surface_l1_vx", {{24, 0.232}, {32, 0.241}})
+      .measured("cube, mpu", "surface_linf_vx", {{24, 1.44}, {32, 1.44}})
+      .measured("cube, mpu", "missed_hits", {{24, 0.118}, {32, 0.116}})
+      .measured("cube, rbf", "surface_l1_vx", {{24, 0.286}, {32, 0.235}})
+      .measured("cube, rbf", "surface_linf_vx", {{24, 1.23}, {32, 1.21}})
+      .measured("cube, rbf", "missed_hits", {{24, 0.121}, {32, 0.102}})
       .measured("sphere, meshless", "surface_l1_vx", {{24, 0.166}, {32, 0.172}})
       .measured("sphere, meshless", "surface_linf_vx", {{24, 0.946}, {32, 0.8}})
       .measured("sphere, meshless", "missed_hits", {{24, 0.0442}, {32, 0.0271}})
       .measured("sphere, mls", "surface_l1_vx", {{24, 0.103}, {32, 0.109}})
       .measured("sphere, mls", "surface_linf_vx", {{24, 0.422}, {32, 0.465}})
       .measured("sphere, mls", "missed_hits", {{24, 0.0354}, {32, 0.0165}})
+      .measured("sphere, mpu", "surface_l1_vx", {{24, 0.111}, {32, 0.0971}})
+      .measured("sphere, mpu", "surface_linf_vx", {{24, 0.372}, {32, 0.34}})
+      .measured("sphere, mpu", "missed_hits", {{24, 0.0298}, {32, 0.0158}})
+      .measured("sphere, rbf", "surface_l1_vx", {{24, 0.103}, {32, 0.0989}})
+      .measured("sphere, rbf", "surface_linf_vx", {{24, 0.384}, {32, 0.408}})
+      .measured("sphere, rbf", "missed_hits", {{24, 0.0314}, {32, 0.0148}})
       .measured("torus, meshless", "surface_l1_vx", {{24, 0.197}, {32, 0.187}})
       .measured("torus, meshless", "surface_linf_vx", {{24, 0.842}, {32, 0.903}})
       .measured("torus, meshless", "missed_hits", {{24, 0.06}, {32, 0.0441}})
-      .measured("torus, mls", "surface_l1_vx", {{24, 0.156}, {32, 0.145}})
+      .measured("torus, mls", "surface_l1_vx", {{24, 0.155}, {32, 0.145}})
       .measured("torus, mls", "surface_linf_vx", {{24, 0.602}, {32, 0.641}})
-      .measured("torus, mls", "missed_hits", {{24, 0.0382}, {32, 0.0329}});
+      .measured("torus, mls", "missed_hits", {{24, 0.0382}, {32, 0.0331}})
+      .measured("torus, mpu", "surface_l1_vx", {{24, 0.188}, {32, 0.13}})
+      .measured("torus, mpu", "surface_linf_vx", {{24, 0.596}, {32, 0.521}})
+      .measured("torus, mpu", "missed_hits", {{24, 0.048}, {32, 0.0322}})
+      .measured("torus, rbf", "surface_l1_vx", {{24, 0.175}, {32, 0.131}})
+      .measured("torus, rbf", "surface_linf_vx", {{24, 0.726}, {32, 0.47}})
+      .measured("torus, rbf", "missed_hits", {{24, 0.0425}, {32, 0.031}});
+}
+
+Bounds unevenPointBounds() {
+  return Bounds()
+      .measured("cube, meshless", "surface_l1_vx", {{24, 0.44}, {48, 0.362}})
+      .measured("cube, meshless", "surface_linf_vx", {{24, 5.6}, {48, 6.67}})
+      .measured("cube, meshless", "missed_hits", {{24, 0.128}, {48, 0.0817}})
+      .measured("cube, mls", "surface_l1_vx", {{24, 0.303}, {48, 0.208}})
+      .measured("cube, mls", "surface_linf_vx", {{24, 4.01}, {48, 5.39}})
+      .measured("cube, mls", "missed_hits", {{24, 0.167}, {48, 0.0918}})
+      .measured("cube, mpu", "surface_l1_vx", {{24, 0.0172}, {48, 0.0549}})
+      .measured("cube, mpu", "surface_linf_vx", {{24, 0.34}, {48, 3.27}})
+      .measured("cube, mpu", "missed_hits", {{24, 0.0166}, {48, 0.0177}})
+      .measured("cube, rbf", "surface_l1_vx", {{24, 0.237}, {48, 0.197}})
+      .measured("cube, rbf", "surface_linf_vx", {{24, 1.93}, {48, 2.19}})
+      .measured("cube, rbf", "missed_hits", {{24, 0.0987}, {48, 0.0488}})
+      .measured("sphere, meshless", "surface_l1_vx", {{24, 0.197}, {48, 0.101}})
+      .measured("sphere, meshless", "surface_linf_vx", {{24, 1.54}, {48, 1.31}})
+      .measured("sphere, meshless", "missed_hits", {{24, 0.0611}, {48, 0.0143}})
+      .measured("sphere, mls", "surface_l1_vx", {{24, 0.0399}, {48, 0.00672}})
+      .measured("sphere, mls", "surface_linf_vx", {{24, 0.392}, {48, 0.113}})
+      .measured("sphere, mls", "missed_hits", {{24, 0.0105}, {48, 0.00176}})
+      .measured("sphere, mpu", "surface_l1_vx", {{24, 0.0228}, {48, 0.00652}})
+      .measured("sphere, mpu", "surface_linf_vx", {{24, 0.209}, {48, 0.185}})
+      .measured("sphere, mpu", "missed_hits", {{24, 0.00402}, {48, 0.00102}})
+      .measured("sphere, rbf", "surface_l1_vx", {{24, 0.0175}, {48, 0.0128}})
+      .measured("sphere, rbf", "surface_linf_vx", {{24, 0.0972}, {48, 0.038}})
+      .measured("sphere, rbf", "missed_hits", {{24, 0.00483}, {48, 0.00102}})
+      .measured("torus, meshless", "surface_l1_vx", {{24, 0.388}, {48, 0.157}})
+      .measured("torus, meshless", "surface_linf_vx", {{24, 3.14}, {48, 3}})
+      .measured("torus, meshless", "missed_hits", {{24, 0.136}, {48, 0.0301}})
+      .measured("torus, mls", "surface_l1_vx", {{24, 0.257}, {48, 0.0611}})
+      .measured("torus, mls", "surface_linf_vx", {{24, 2.65}, {48, 1.1}})
+      .measured("torus, mls", "missed_hits", {{24, 0.0774}, {48, 0.00975}})
+      .measured("torus, mpu", "surface_l1_vx", {{24, 0.314}, {48, 0.0406}})
+      .measured("torus, mpu", "surface_linf_vx", {{24, 4.42}, {48, 0.629}})
+      .measured("torus, mpu", "missed_hits", {{24, 0.0823}, {48, 0.00581}})
+      .measured("torus, rbf", "surface_l1_vx", {{24, 0.0735}, {48, 0.0138}})
+      .measured("torus, rbf", "surface_linf_vx", {{24, 0.641}, {48, 0.209}})
+      .measured("torus, rbf", "missed_hits", {{24, 0.0207}, {48, 0.00166}});
+}
+
+Bounds holeBounds() {
+  return Bounds()
+      .measured("sphere, meshless", "surface_l1_vx", {{24, 0.068}, {48, 0.128}})
+      .measured("sphere, meshless", "surface_linf_vx", {{24, 1.72}, {48, 3.33}})
+      .measured("sphere, meshless", "missed_hits", {{24, 0.0241}, {48, 0.0117}})
+      .measured("sphere, mls", "surface_l1_vx", {{24, 0.0404}, {48, 0.119}})
+      .measured("sphere, mls", "surface_linf_vx", {{24, 1.73}, {48, 3.33}})
+      .measured("sphere, mls", "missed_hits", {{24, 0.00563}, {48, 0.00893}})
+      .measured("sphere, mpu", "surface_l1_vx", {{24, 0.0322}, {48, 0.122}})
+      .measured("sphere, mpu", "surface_linf_vx", {{24, 1.72}, {48, 3.33}})
+      .measured("sphere, mpu", "missed_hits", {{24, 0.00724}, {48, 0.0114}})
+      .measured("sphere, rbf", "surface_l1_vx", {{24, 0.0107}, {48, 0.0419}})
+      .measured("sphere, rbf", "surface_linf_vx", {{24, 0.132}, {48, 3.37}})
+      .measured("sphere, rbf", "missed_hits", {{24, 0.000805}, {48, 0.006}});
+}
+
+Bounds sheetBounds() {
+  return Bounds()
+      .measured("hollow ball, meshless", "surface_l1_vx", {{24, 0.0221}, {48, 0.00952}})
+      .measured("hollow ball, meshless", "surface_linf_vx", {{24, 0.28}, {48, 0.113}})
+      .measured("hollow ball, meshless", "missed_hits", {{24, 0.012}, {48, 0.00159}})
+      .measured("hollow ball, mls", "surface_l1_vx", {{24, 0.0156}, {48, 0.000599}})
+      .measured("hollow ball, mls", "surface_linf_vx", {{24, 0.177}, {48, 0.00291}})
+      .measured("hollow ball, mls", "missed_hits", {{24, 0.0106}})
+      .measured("hollow ball, mpu", "surface_l1_vx", {{24, 0.0372}, {48, 0.00245}})
+      .measured("hollow ball, mpu", "surface_linf_vx", {{24, 0.234}, {48, 0.0149}})
+      .measured("hollow ball, mpu", "missed_hits", {{24, 0.0155}, {48, 0.000298}})
+      .measured("hollow ball, rbf", "surface_l1_vx", {{24, 0.0126}, {48, 0.0204}})
+      .measured("hollow ball, rbf", "surface_linf_vx", {{24, 0.0698}, {48, 0.066}})
+      .measured("hollow ball, rbf", "missed_hits", {{24, 0.00423}, {48, 0.00318}});
+}
+
+Bounds flippedBounds() {
+  return Bounds()
+      .measured("cube, meshless", "surface_l1_vx", {{24, 0.0742}, {48, 0.0412}})
+      .measured("cube, meshless", "surface_linf_vx", {{24, 0.688}, {48, 0.679}})
+      .measured("cube, meshless", "missed_hits", {{24, 0.0488}, {48, 0.0311}})
+      .measured("cube, mls", "surface_l1_vx", {{24, 0.116}, {48, 0.0612}})
+      .measured("cube, mls", "surface_linf_vx", {{24, 0.704}, {48, 0.86}})
+      .measured("cube, mls", "missed_hits", {{24, 0.0727}, {48, 0.0457}})
+      .measured("cube, mpu", "surface_l1_vx", {{24, 0.123}, {48, 0.0672}})
+      .measured("cube, mpu", "surface_linf_vx", {{24, 0.879}, {48, 0.955}})
+      .measured("cube, mpu", "missed_hits", {{24, 0.0831}, {48, 0.0485}})
+      .measured("cube, rbf", "surface_l1_vx", {{24, 0.0647}, {48, 0.0371}})
+      .measured("cube, rbf", "surface_linf_vx", {{24, 0.533}, {48, 0.759}})
+      .measured("cube, rbf", "missed_hits", {{24, 0.0498}, {48, 0.0325}})
+      .measured("sphere, meshless", "surface_l1_vx", {{24, 0.0175}, {48, 0.00858}})
+      .measured("sphere, meshless", "surface_linf_vx", {{24, 0.119}, {48, 0.0671}})
+      .measured("sphere, meshless", "missed_hits", {{24, 0.00724}, {48, 0.00176}})
+      .measured("sphere, mls", "surface_l1_vx", {{24, 0.00294}, {48, 0.000353}})
+      .measured("sphere, mls", "surface_linf_vx", {{24, 0.00614}, {48, 0.000891}})
+      .measured("sphere, mls", "missed_hits", {{24, 0.000805}})
+      .measured("sphere, mpu", "surface_l1_vx", {{24, 0.00155}, {48, 0.0012}})
+      .measured("sphere, mpu", "surface_linf_vx", {{24, 0.011}, {48, 0.0123}})
+      .measured("sphere, mpu", "missed_hits", {{24, 0.000805}, {48, 0.000146}})
+      .measured("sphere, rbf", "surface_l1_vx", {{24, 0.00638}, {48, 0.00326}})
+      .measured("sphere, rbf", "surface_linf_vx", {{24, 0.0118}, {48, 0.00743}})
+      .measured("sphere, rbf", "missed_hits", {{24, 0.000805}})
+      .measured("torus, meshless", "surface_l1_vx", {{24, 0.0279}, {48, 0.0131}})
+      .measured("torus, meshless", "surface_linf_vx", {{24, 0.203}, {48, 0.129}})
+      .measured("torus, meshless", "missed_hits", {{24, 0.00654}, {48, 0.00249}})
+      .measured("torus, mls", "surface_l1_vx", {{24, 0.0238}, {48, 0.00275}})
+      .measured("torus, mls", "surface_linf_vx", {{24, 0.086}, {48, 0.0171}})
+      .measured("torus, mls", "missed_hits", {{24, 0.00327}, {48, 0.000208}})
+      .measured("torus, mpu", "surface_l1_vx", {{24, 0.0247}, {48, 0.0055}})
+      .measured("torus, mpu", "surface_linf_vx", {{24, 0.103}, {48, 0.0674}})
+      .measured("torus, mpu", "missed_hits", {{24, 0.00545}, {48, 0.00083}})
+      .measured("torus, rbf", "surface_l1_vx", {{24, 0.00338}, {48, 0.00131}})
+      .measured("torus, rbf", "surface_linf_vx", {{24, 0.035}, {48, 0.00894}})
+      .measured("torus, rbf", "missed_hits", {{24, 0.00109}, {48, 0.000623}});
 }
 
 Bounds particleBounds() {
@@ -201,6 +456,50 @@ void addPointCases(std::vector<Case>& all) {
                  .full = {32},
                  .bounds = noisyPointBounds(),
                  .run = noisyPoints});
+  all.push_back({.name = "points-uneven",
+                 .group = "uneven points",
+                 .title = "surfaces of unevenly spaced points",
+                 .definition =
+                     "A part of the points of 'points-clean'. The spacing grows from two voxels to "
+                     "six along the x axis.",
+                 .citation = "closed form",
+                 .quick = {24},
+                 .full = {48},
+                 .bounds = unevenPointBounds(),
+                 .run = unevenPoints});
+  all.push_back({.name = "points-hole",
+                 .group = "points with a hole",
+                 .title = "surfaces of points with a hole",
+                 .definition =
+                     "Points on a sphere of radius 0.4 without those in its highest tenth. The "
+                     "result is compared with the whole ball, so the error is largest in the hole.",
+                 .citation = "closed form",
+                 .quick = {24},
+                 .full = {48},
+                 .bounds = holeBounds(),
+                 .run = pointsWithHole});
+  all.push_back({.name = "points-sheets",
+                 .group = "points on two sheets",
+                 .title = "surfaces of points on two sheets",
+                 .definition =
+                     "Points on a sphere of radius 0.4 and on the wall of its cavity, three "
+                     "spacings away.",
+                 .citation = "closed form",
+                 .quick = {24},
+                 .full = {48},
+                 .bounds = sheetBounds(),
+                 .run = sheetsOfPoints});
+  all.push_back({.name = "points-flipped",
+                 .group = "points with flipped normals",
+                 .title = "surfaces of points of which half the normals were flipped",
+                 .definition =
+                     "The points of 'points-clean' with every second normal flipped, which "
+                     "'level-set' refuses. Then 'normals' computes them from the positions.",
+                 .citation = "closed form",
+                 .quick = {24},
+                 .full = {48},
+                 .bounds = flippedBounds(),
+                 .run = flippedPoints});
   all.push_back({.name = "points-particles",
                  .group = "particles",
                  .title = "union of the balls of particles",
