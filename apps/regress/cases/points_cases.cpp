@@ -145,7 +145,9 @@ void unevenPoints(Recorder& out) {
         const double along = 0.5 + (cloud.positions[i].x - at.shift.x) / 1.0;
         if (chance(random) < std::pow(9.0, std::min(along, 1.0) - 1)) kept.push_back(i);
       }
-      measureSolids(out, at, shape, selectPoints(cloud, kept));
+      const PointCloud uneven = selectPoints(cloud, kept);
+      measureSolids(out, at, shape, uneven);
+      expectTopology(out, at, shape, uneven);
     }
 }
 
@@ -200,6 +202,7 @@ void flippedPoints(Recorder& out) {
                           [&] { (void)pointsToBand(cloud, at.voxelSize); });
       cloud = levelset::estimateNormals(std::move(cloud), {}).cloud;
       measureSolids(out, at, shape, cloud);
+      expectTopology(out, at, shape, cloud);
     }
 }
 

@@ -195,17 +195,23 @@ void addDisks(const PointCloud& cloud, const NeighbourGraph& graph, const Part& 
   }
 }
 
+constexpr double kNearStep = 0.25;
+/// Noise moves points by a spacing at most, where normals can be computed.
+constexpr double kStepBeyondNoise = 1.5;
+
 /// Winding numbers on the surface at some points of a part: the mean of those on both sides, 0.5
 /// for a closed surface that faces outwards.
+/// @param steps  distance of both places from the point, in spacings about it
 std::vector<double> windingsOn(const PointCloud& cloud, const NeighbourGraph& graph,
-                               const Part& part, const convert::WindingField& field) {
+                               const Part& part, const convert::WindingField& field,
+                               double steps = kNearStep) {
   constexpr double kTolerance = 0.02;
   const std::size_t tests = std::min(part.size(), kMostTests);
   std::vector<double> windings(tests);
   tbb::parallel_for(std::size_t{0}, tests, [&](std::size_t k) {
     const std::uint32_t i = part.begin[k * part.size() / tests];
     // The triangles near the point contribute equal amounts of opposite sign on its two sides.
-    const V3d step = 0.25 * std::sqrt(graph.area(i)) * V3d(cloud.normals[i]);
+    const V3d step = steps * std::sqrt(graph.area(i)) * V3d(cloud.normals[i]);
     windings[k] = (field.within(kTolerance, cloud.positions[i] + step) +
                    field.within(kTolerance, cloud.positions[i] - step)) /
                   2;
@@ -314,9 +320,15 @@ Orientation orientNormals(PointCloud& cloud, const NeighbourGraph& graph,
   std::size_t tested = 0, doubtful = 0;
   for (std::size_t p = 0; p < parts.size(); ++p) {
     if (own[p] == 0) continue;  // the outside is a guess
-    for (const double winding : windingsOn(cloud, graph, parts[p], field)) {
+    // In noise, both near places may lie on one side of the surface. In a thin sheet, the far ones
+    // may lie outside.
+    const std::vector<double> near = windingsOn(cloud, graph, parts[p], field),
+                              far = windingsOn(cloud, graph, parts[p], field, kStepBeyondNoise);
+    for (std::size_t k = 0; k < near.size(); ++k) {
       ++tested;
-      doubtful += std::abs(winding - 0.5) > kMostDifference ? 1 : 0;
+      doubtful +=
+          std::abs(near[k] - 0.5) > kMostDifference && std::abs(far[k] - 0.5) > kMostDifference ? 1
+                                                                                                : 0;
     }
   }
   if (tested > 0) result.doubtful = static_cast<double>(doubtful) / static_cast<double>(tested);

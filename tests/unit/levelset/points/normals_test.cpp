@@ -284,6 +284,7 @@ TEST(PointNormals, HaveTheRightSideInNoise) {
     for (std::size_t i = 0; i < truth.size(); ++i)
       if (truth.normals[i].dot(result.cloud.normals[i]) < 0) ++wrong;
     EXPECT_LE(wrong, 8) << neighbours;
+    EXPECT_LE(result.report.doubtful, 0.03) << neighbours;  // measured: 0.01
   }
 }
 
