@@ -59,7 +59,8 @@ struct PointsToMeshResult {
 /// @throws UsageError if an option is outside its range, or this build has no Delaunay
 ///         triangulation
 /// @throws InvalidInput if the points lie on a line or are fewer than 3, if they form no surface,
-///         and unless `acceptHoles`, if the mesh would miss points or have holes
+///         if over 10 % of the normals oppose those of their neighbours, and unless `acceptHoles`,
+///         if the mesh would miss points or have holes
 /// @throws ResourceLimit, Cancelled
 [[nodiscard]] PointsToMeshResult pointsToMesh(const PointCloud& cloud,
                                               const PointsToMeshOptions& options = {});

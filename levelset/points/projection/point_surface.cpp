@@ -1,5 +1,6 @@
 #include "levelset/points/projection/point_surface.h"
 
+#include <fmt/core.h>
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
@@ -239,6 +240,26 @@ void PointSurface::orient(const PointCloud& cloud, const std::vector<std::uint32
   }
   for (std::size_t i = 0; i < n; ++i)
     if (side[i] < 0) normals_[i] = -normals_[i];
+  if (!cloud.normals.empty()) requireAgreement();
+}
+
+/// Refuses normals whose side changes from point to point.
+void PointSurface::requireAgreement() const {
+  std::size_t fitted = 0, opposed = 0;
+  for (std::size_t i = 0; i < positions_.size(); ++i) {
+    if (!hasFit(i)) continue;
+    V3d mean(0);
+    for (const std::uint32_t j : graph_.neighbours(i)) mean += normals_[j];
+    ++fitted;
+    opposed += mean.dot(normals_[i]) < 0;
+  }
+  constexpr double kMostOpposed = 0.1;
+  const double share = static_cast<double>(opposed) / static_cast<double>(std::max(fitted, 1UL));
+  if (share > kMostOpposed)
+    throw InvalidInput(
+        fmt::format("the normals of {:.2g} % of the points oppose those of their neighbours, so "
+                    "they do not tell inside from outside; compute them with `normals`",
+                    100 * share));
 }
 
 void PointSurface::findBorders(double gap) {

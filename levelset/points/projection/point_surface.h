@@ -52,7 +52,8 @@ class PointSurface {
   /// Connects the points, fits the polynomials and turns their normals outwards; normals of the
   /// cloud give the side if there are any.
   /// @param cloud  finite positions of moderate size; points at equal positions count once
-  /// @throws InvalidInput if all points lie on a line, or fewer than 3 positions differ
+  /// @throws InvalidInput if all points lie on a line, if fewer than 3 positions differ, or if over
+  ///         10 % of the given normals oppose those of their neighbours
   /// @throws UsageError if this build has no Delaunay triangulation
   PointSurface(const PointCloud& cloud, const PointSurfaceOptions& options);
 
@@ -106,6 +107,7 @@ class PointSurface {
   void fit(const PointSurfaceOptions& options);
   void orient(const PointCloud& cloud, const std::vector<std::uint32_t>& numbers,
               const Progress& progress);
+  void requireAgreement() const;
   void pruneGraph(double gap);
   void findParts();
   void findBorders(double gap);

@@ -249,6 +249,21 @@ TEST(PointsToMesh, RefusesWhatIsNoSurface) {
   says(cloud, "form no surface");
 }
 
+TEST(PointsToMesh, RefusesNormalsThatOpposeEachOther) {
+  PointCloud cloud = projected_points::sphere(800);
+  for (const V3d& p : cloud.positions) cloud.normals.emplace_back(p.normalized());
+  // One wrong normal in forty does not matter, every second one does.
+  const auto flipped = [&](std::size_t step) {
+    PointCloud other = cloud;
+    for (std::size_t i = 0; i < other.size(); i += step) other.normals[i] = -other.normals[i];
+    return other;
+  };
+  EXPECT_NO_THROW(static_cast<void>(pointsToMesh(flipped(40))));
+  const std::string message =
+      refusal<InvalidInput>([&] { static_cast<void>(pointsToMesh(flipped(2))); });
+  EXPECT_NE(message.find("oppose those of their neighbours"), std::string::npos) << message;
+}
+
 TEST(PointsToMesh, RefusesOptionsOutsideTheirRange) {
   const PointCloud cloud = projected_points::sphere(100);
   const auto says = [&](const levelset::PointsToMeshOptions& options, const char* text) {
