@@ -25,6 +25,8 @@ struct TransferKernel {
   TransferKernel(const std::vector<double>& numbers, int count)
       : pieces(numbers.data()), pieceCount(count) {}
   [[nodiscard]] double pieceNumber(int n) const { return pieces[n]; }
+  static double nextAbove(double a) { return std::nextafter(a, HUGE_VAL); }
+  static double nextBelow(double a) { return std::nextafter(a, 0.0); }
 
 #include "render/shaders/transfer.glsl"
 };

@@ -59,27 +59,18 @@ double ofFloat(uint bits) {
   return (bits & 0x80000000u) == 0u ? result : -result;
 }
 
-// The upper half of the bits of a.
-double upperHalf(double a) {
-  VAR scaled = 134217729.0 * a;  // 2²⁷ + 1
-  VAR rest = scaled - a;
-  VAR upper = scaled - rest;
-  return upper;
+// The next larger and the next smaller number of a positive one.
+double nextAbove(double a) {
+  uvec2 bits = unpackDouble2x32(a);
+  bits.x += 1u;
+  bits.y += bits.x == 0u ? 1u : 0u;
+  return packDouble2x32(bits);
 }
-
-// Square root, rounded as IEEE 754 requires. NVIDIA's driver 580 rounds a third of the roots of
-// doubles to a neighbour. One Newton step with the exact remainder corrects it. The remainder needs
-// numbers whose products neither overflow nor underflow; others keep the root of the driver.
-double rootOf(double a) {
-  VAR root = sqrt(a);
-  if (!(a > 1e-250lf && a < 1e250lf)) return root;
-  VAR square = root * root;
-  VAR high = upperHalf(root);
-  VAR low = root - high;
-  VAR lost = (high * high - square) + 2.0 * high * low + low * low;
-  VAR remainder = (a - square) - lost;
-  VAR corrected = root + remainder / (2.0 * root);
-  return corrected;
+double nextBelow(double a) {
+  uvec2 bits = unpackDouble2x32(a);
+  bits.y -= bits.x == 0u ? 1u : 0u;
+  bits.x -= 1u;
+  return packDouble2x32(bits);
 }
 
 double numberAt(int x, int y, int z) {
@@ -87,6 +78,15 @@ double numberAt(int x, int y, int z) {
   uint word = texelFetch(values, n >> kWordShift).x;
   int low = (n & ((1 << kWordShift) - 1)) * kNumberBits;
   return NUMBER(word, low);
+}
+)GLSL";
+
+constexpr const char* kLightRoot = R"GLSL(
+// Square root, rounded as IEEE 754 requires. NVIDIA's driver 580 rounds a third of the roots of
+// doubles to a neighbour. Where products would overflow or underflow, the driver's root stays.
+double rootOf(double a) {
+  VAR root = sqrt(a);
+  return a > 1e-250lf && a < 1e250lf ? roundedRoot(a, root) : root;
 }
 )GLSL";
 
@@ -170,7 +170,7 @@ std::string lightShaderText(VolumeType type) {
              : bytesOf(type) == 2 ? 1
                                   : 0,
              8 * bytesOf(type), number) +
-         kLightDialect + kTransferKernel + kDirectKernel + kLightMain;
+         kLightDialect + kTransferKernel + kLightRoot + kDirectKernel + kLightMain;
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ namespace render {
 
 /// A volume in an OpenGL context, and the shader that integrates its light. The bits are those of
 /// DirectVolume::light(), if the driver rounds sums, products and quotients of doubles as IEEE 754
-/// requires, and square roots to a neighbour at least.
+/// requires, and errs by at most one unit in the last place of square roots.
 class GpuLight {
  public:
   /// Largest number of points of a transfer function.

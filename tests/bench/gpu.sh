@@ -34,16 +34,19 @@ for file in "$folder"/sphere*.vdb "$folder"/dragon*.vdb; do
     }' "$folder/rays"
 done
 
-# wall NAME COMMAND…: wall seconds, the least of two runs
+# wall COMMAND…: wall seconds, the least of two runs
 wall() {
+  : >"$folder/seconds"
   for run in 1 2; do
-    /usr/bin/env bash -c 'TIMEFORMAT=%R; time "$@" >/dev/null 2>&1' wall "$@" 2>&1
-  done | sort -n | head -1
+    /usr/bin/env bash -c 'TIMEFORMAT=%R; time "$@" >/dev/null 2>&1' wall "$@" 2>>"$folder/seconds" || return 1
+  done
+  sort -n "$folder/seconds" | head -1
 }
 
 echo "== lit pictures of the default view, four samples: wall seconds with start-up and reading"
 for file in "$folder/sphere400.vdb" "$folder/dragon$1.vdb"; do
   for size in 1024x1024 4096x4096; do
+    rm -f "$folder/gpu.exr" "$folder/cpu.exr"
     for renderer in gpu cpu; do
       seconds=$(wall "$levelsmith" -q read "$file" ! render "$folder/$renderer.exr" --renderer $renderer --size $size --samples 4)
       echo "$(basename "$file" .vdb) $size $renderer, $(nproc) threads on the processor: $seconds"

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Runs the GPU tests of volumes and styles on the present device, then measures rays of all filters and pictures beside the
-# processor. Exits 1 if a test fails or a picture differs.
+# processor. Exits 1 if a test fails, or a ray or a picture differs.
 #   gpu_volumes.sh LEVELSMITH VOLUME_BENCH RENDER_TESTS HEAD.nii.gz [SIZE…]     SIZE: samples along an edge; 256 512
 set -eu
 [ $# -ge 4 ] || { sed -n '2,4s/^# *//p' "$0"; exit 2; }
@@ -29,6 +29,7 @@ rays() {
         printf "%-16s %-16s shader %8.1f  with transfers %7.1f  cpu, one thread %6.2f  other hits %d  (%s)\n", name, f,
           value[f "_gpu_mrays_per_s_of_shader"], value[f "_gpu_mrays_per_s_with_transfers"], value[f "_mrays_per_s"],
           value[f "_gpu_different"], gpu
+        if (!((f "_gpu_different") in value)) { print f ": no figures"; different = 1 }
         different += value[f "_gpu_different"]
       }
       exit different > 0
@@ -40,11 +41,13 @@ for size in "$@"; do
 done
 rays head "$head" 92.5
 
-# wall NAME COMMAND…: wall seconds, the least of two runs
+# wall COMMAND…: wall seconds, the least of two runs
 wall() {
+  : >"$folder/seconds"
   for run in 1 2; do
-    /usr/bin/env bash -c 'TIMEFORMAT=%R; time "$@" >/dev/null 2>&1' wall "$@" 2>&1
-  done | sort -n | head -1
+    /usr/bin/env bash -c 'TIMEFORMAT=%R; time "$@" >/dev/null 2>&1' wall "$@" 2>>"$folder/seconds" || return 1
+  done
+  sort -n "$folder/seconds" | head -1
 }
 
 echo "== pictures of a head: wall seconds with start-up and reading"
@@ -53,6 +56,7 @@ pictures() {
   name=$1
   shift
   for size in 1024x1024 2048x2048; do
+    rm -f "$folder/gpu.exr" "$folder/cpu.exr"
     for renderer in gpu cpu; do
       seconds=$(wall "$levelsmith" -q read "$head" ! render "$folder/$renderer.exr" --renderer $renderer --size $size --up 0,0,1 "$@")
       echo "$name $size $renderer, $(nproc) threads on the processor: $seconds"

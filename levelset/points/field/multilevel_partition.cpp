@@ -15,9 +15,9 @@ namespace {
 
 using Imath::V3d;
 
-// Parameters of [Ohtake03]: radius of a cell's support in its diagonals, its growth while it holds
-// too few points, the cosine of normals on two sides of an edge, and that of a corner's third side.
-constexpr double kSupport = 0.75, kGrowth = 1.15, kEdgeCosine = 0.8, kCornerSine = 0.7;
+// Parameters of [Ohtake03]: radius of a cell's support in its diagonals, the cosine of normals on
+// two sides of an edge, and that of a corner's third side.
+constexpr double kSupport = 0.75, kEdgeCosine = 0.8, kCornerSine = 0.7;
 constexpr int kMostLevels = 20;
 
 enum class Joint { None, Convex, Concave };
@@ -71,7 +71,9 @@ class CellFitter {
     const bool isSmall = found.size() <= 2 * fewest_ || isLast;
     if (found.size() < fewest_) {
       points_.search.closest(cell.centre, fewest_, found);
-      cell.support = std::max(cell.support, kGrowth * std::sqrt(found.back().squared));
+      // No further: the function would be extrapolated to points that it was not fitted to. On a
+      // sphere, cells in the middle would have weight on half of the surface.
+      cell.support = std::max(cell.support, std::sqrt(found.back().squared));
     }
     surface = smooth(cell, found);
     double error = errorOf(surface, found);

@@ -196,22 +196,22 @@ void addDisks(const PointCloud& cloud, const NeighbourGraph& graph, const Part& 
 }
 
 constexpr double kNearStep = 0.25;
-/// Noise moves points by a spacing at most, where normals can be computed.
+/// Larger than the noise of most points: two standard deviations of half a spacing are one spacing.
 constexpr double kStepBeyondNoise = 1.5;
 
 /// Winding numbers on the surface at some points of a part: the mean of those on both sides, 0.5
 /// for a closed surface that faces outwards.
-/// @param steps  distance of both places from the point, in spacings about it
+/// @param distance  of both places from the point, in local spacings
 std::vector<double> windingsOn(const PointCloud& cloud, const NeighbourGraph& graph,
                                const Part& part, const convert::WindingField& field,
-                               double steps = kNearStep) {
+                               double distance = kNearStep) {
   constexpr double kTolerance = 0.02;
   const std::size_t tests = std::min(part.size(), kMostTests);
   std::vector<double> windings(tests);
   tbb::parallel_for(std::size_t{0}, tests, [&](std::size_t k) {
     const std::uint32_t i = part.begin[k * part.size() / tests];
     // The triangles near the point contribute equal amounts of opposite sign on its two sides.
-    const V3d step = steps * std::sqrt(graph.area(i)) * V3d(cloud.normals[i]);
+    const V3d step = distance * std::sqrt(graph.area(i)) * V3d(cloud.normals[i]);
     windings[k] = (field.within(kTolerance, cloud.positions[i] + step) +
                    field.within(kTolerance, cloud.positions[i] - step)) /
                   2;

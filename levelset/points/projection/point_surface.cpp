@@ -257,8 +257,9 @@ void PointSurface::requireAgreement() const {
   const double share = static_cast<double>(opposed) / static_cast<double>(std::max(fitted, 1UL));
   if (share > kMostOpposed)
     throw InvalidInput(
-        fmt::format("the normals of {:.2g} % of the points oppose those of their neighbours, so "
-                    "they do not tell inside from outside; compute them with `normals`",
+        fmt::format("the normals of {:.0f} % of the points oppose those of their neighbours, so "
+                    "they do not tell inside from outside; compute them with `normals`, with more "
+                    "neighbours if the points are noisy, or give points without normals",
                     100 * share));
 }
 

@@ -202,7 +202,7 @@ PointsToBandResult pointsToBand(const PointCloud& cloud, double voxelSize,
       static_cast<double>(points.opposed) / static_cast<double>(points.size());
   if (opposedShare > kOpposedLimit && !options.acceptUnsupported)
     throw InvalidInput(fmt::format(
-        "the normals of {:.2g} % of the points oppose those of their neighbours, so they do not "
+        "the normals of {:.0f} % of the points oppose those of their neighbours, so they do not "
         "tell inside from outside; compute them with `normals`, with more neighbours if the points "
         "are "
         "noisy, or accept them with --accept-sign",

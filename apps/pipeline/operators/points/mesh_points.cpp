@@ -96,9 +96,9 @@ Operator meshPointsOperator() {
           "front covers their blend with nearly equilateral triangles. Borders stay open. Edges "
           "are "
           "shorter where the surface bends more, but not below the spacing of the points. Normals "
-          "are not needed; given ones decide on the side. Raise --smoothing for noise. A mesh that "
-          "misses points or has holes is an error without --accept-holes. The action needs a build "
-          "with CGAL.",
+          "are not needed. Given ones decide on the side; it is an error if more than 10 % of them "
+          "oppose their neighbours. Raise --smoothing for noise. A mesh that misses points or has "
+          "holes is an error without --accept-holes. The action needs a build with CGAL.",
       .example =
           "levelsmith sphere --radius 1 --voxel 0.05 ! mesh ! sample --count 2000 ! mesh-points ! "
           "write ball.ply",

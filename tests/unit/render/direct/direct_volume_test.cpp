@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <random>
 
 #include "levelset/error.h"
@@ -87,6 +88,26 @@ void alongRun(const TransferFunction& transfer, double from, double to, const Vi
     const TransferKernel::Part part = kernel.nextPart(from, to, n, at);
     isLast = part.isLast;
     visit(part);
+  }
+}
+
+TEST(TransferKernel, RoundsSquareRootsCorrectly) {
+  TransferKernel kernel({}, 0);
+  std::vector<double> numbers;
+  // Next to powers of four, the middle between two neighbours is a tie in double precision.
+  for (const int exponent : {-800, -52, -2, 0, 2, 4, 700})
+    for (const double ulps : {-2.0, -1.0, 0.0, 1.0, 2.0})
+      numbers.push_back(std::ldexp(1 + ulps * std::numeric_limits<double>::epsilon(), exponent));
+  for (const int exponent : {-2, 0, 2}) numbers.push_back(std::ldexp(1 - 0x1p-53, exponent));
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> mantissa(1, 2);
+  std::uniform_int_distribution<int> exponents(-800, 800);
+  for (int n = 0; n < 100000; ++n)
+    numbers.push_back(std::ldexp(mantissa(random), exponents(random)));
+  for (const double a : numbers) {
+    const double root = std::sqrt(a);
+    for (const double near : {std::nextafter(root, 0.0), root, std::nextafter(root, HUGE_VAL)})
+      ASSERT_EQ(kernel.roundedRoot(a, near), root) << a;
   }
 }
 

@@ -128,7 +128,9 @@ TEST(GpuLight, HasTheBitsOfTheProcessor) {
       {"waves far away", sampled({V3i(30), farMap}, [&](const V3d& p) { return wave(p - far); })},
       {"three spacings", sampled({V3i(70, 9, 2), M44d().setScale(V3d(0.1, 0.4, 1))}, wave)},
       {"signal of Marschner and Lobb", levelset::marschnerLobb(41)},
-      {"noise", support::noisyBytes(24)}};
+      {"noise", support::noisyBytes(24)},
+      // Squares of gradients are one, up to rounding.
+      {"ramp", sampled({V3i(30), M44d()}, [](const V3d& p) { return 0.6 * p.x + 0.8 * p.y; })}};
   for (const auto& [what, volume] : volumes)
     expectEqualBits(what, device.light,
                     {VolumeSurface(volume, 0), busy(volume.lowest(), volume.highest())});
