@@ -119,6 +119,15 @@ TEST(PointsToBand, MeetsTheTolerance) {
   EXPECT_LT(before / shape.spacing, measured(0.0222));
 }
 
+TEST(PointsToBand, MultilevelPartitionIsNotBentByCellsWithoutPoints) {
+  // Cells in the middle of a ball have few points, all on one side of it.
+  const SampledShape shape = ball(16000);
+  const auto [inside, outside] = largestErrors(
+      pointsToBand(shape.cloud, shape.spacing, {.method = PointMethod::MultilevelPartition}),
+      shape);
+  EXPECT_LT(std::max(inside, outside) / shape.spacing, measured(0.0085));
+}
+
 TEST(PointsToBand, RadialBasisConverges) {
   // All points are centres, because none meets the tolerance.
   const auto worst = [](std::size_t count) {
