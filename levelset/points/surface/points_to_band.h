@@ -24,8 +24,8 @@ enum class PointMethod {
   /// edges and corners.
   MultilevelPartition,
   /// A radial basis function φ(r) = r through the points and places beside them [Carr01]. As few of
-  /// the points as its tolerance needs are its centres. The most accurate method on smooth shapes
-  /// without noise, and the slowest.
+  /// the points as its tolerance needs are its centres. Bridges gaps of several spacings. The
+  /// most accurate method on smooth shapes with few points, and the slowest.
   RadialBasis
 };
 

@@ -184,9 +184,10 @@ TEST(TransferFunction, ReadsWhatItWrites) {
 TEST(TransferFunction, SuggestsOneForAnyHistogram) {
   for (const auto& [low, high] :
        {std::pair(0.0, 254.0), {10000.0, 10010.0}, {-1e-6, 2e-6}, {5.0, 5.0}}) {
-    const Volume volume = sampled({V3i(12), M44d()}, [&](const V3d& p) {
-      return low + (high - low) * std::clamp((p.x - 3) / 6, 0.0, 1.0);
-    });
+    const Volume volume =
+        sampled({V3i(12), M44d()}, [first = low, size = high - low](const V3d& p) {
+          return first + size * std::clamp((p.x - 3) / 6, 0.0, 1.0);
+        });
     const auto points = suggestedTransfer(levelset::histogram(volume));
     const TransferFunction transfer(points, 1);
     for (std::size_t n = 1; n < points.size(); ++n) EXPECT_LT(points[n - 1].value, points[n].value);
