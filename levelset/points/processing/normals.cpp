@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "levelset/error.h"
@@ -115,6 +117,7 @@ HeightFit fitHeights(const Neighbourhood& near, const Matrix3d& frame) {
 struct PointFit {
   Vector3d normal = Vector3d::Zero();  ///< zero: the neighbours lie on a line
   bool isQuadratic = false;
+  double error = std::numeric_limits<double>::infinity();  ///< as HeightFit
 };
 
 PointFit fitPoint(const Neighbourhood& near, FitDegree degree) {
@@ -133,9 +136,124 @@ PointFit fitPoint(const Neighbourhood& near, FitDegree degree) {
     const HeightFit& chosen = result.isQuadratic ? quadratic : linear;
     if (!std::isfinite(chosen.error)) break;  // too few points: the plane through them remains
     result.normal = chosen.normal;
+    result.error = chosen.error;
   }
   return result;
 }
+
+/// Sets `near` to the neighbours of a position, which are sorted by distance.
+void setNeighbourhood(const PointCloud& cloud, const V3d& centre,
+                      const std::vector<points::Neighbour>& found, Neighbourhood& near) {
+  const double reach = std::sqrt(found.back().squared);
+  near.offsets.clear();
+  near.weights.clear();
+  for (const points::Neighbour& other : found) {
+    const V3d d = (cloud.positions[other.index] - centre) / reach;
+    near.offsets.emplace_back(d.x, d.y, d.z);
+    constexpr double kReach = 1.2;  // the weight vanishes a little beyond the last neighbour
+    const double share = d.length2() / (kReach * kReach);
+    near.weights.push_back((1 - share) * (1 - share));
+  }
+}
+
+Vector3d normalAt(const PointCloud& cloud, std::uint32_t point) {
+  const Imath::V3f& n = cloud.normals[point];
+  return Vector3d(static_cast<double>(n.x), static_cast<double>(n.y), static_cast<double>(n.z));
+}
+
+/// Normals beside sharp edges: where the fit at a neighbour is much better, the part of the
+/// neighbours that lies on its side of the edge is fitted.
+class OneSidedFits {
+ public:
+  OneSidedFits(PointCloud& cloud, const points::PointNeighbours& tree, std::size_t neighbours,
+               FitDegree degree, std::vector<float>& errors)
+      : cloud_(cloud), tree_(tree), neighbours_(neighbours), degree_(degree), errors_(errors) {}
+
+  /// Replaces normals until none changes, a few times at most: a point beside a corner may need
+  /// the new normals of others.
+  void replaceNormals(const Progress& progress) {
+    for (std::size_t at = 0; at < tree_.size(); ++at)
+      if (const std::uint32_t i = tree_.at(at);
+          std::isfinite(errors_[i]) && errors_[i] > kLeastError)
+        candidates_.push_back(static_cast<std::uint32_t>(at));
+    constexpr int kMostPasses = 4;
+    for (int pass = 0; pass < kMostPasses && !candidates_.empty(); ++pass) {
+      const bool hasChanged = replaceOnce(subProgress(
+          progress, pass / static_cast<double>(kMostPasses), (pass + 1.0) / kMostPasses));
+      if (!hasChanged) break;
+    }
+  }
+
+ private:
+  static constexpr float kLeastError = 4e-4f;  ///< the square of 0.02 of the neighbourhood's radius
+  static constexpr float kGain = 16;           ///< least ratio of the squared errors of two fits
+  /// Points of a side. Fewer fit a quadratic by chance, which spoils noisy scans.
+  static constexpr std::size_t kFewest = 9;
+  static constexpr std::size_t kMostTries = 6;
+
+  bool replaceOnce(const Progress& progress) {
+    std::vector<PointFit> fits(candidates_.size());
+    ProgressGate gate(progress, candidates_.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, candidates_.size(), 256),
+                      [&](const auto& range) {
+                        std::vector<points::Neighbour> found;
+                        Neighbourhood near, side;
+                        for (std::size_t n = range.begin(); n < range.end(); ++n)
+                          fits[n] = fitSide(candidates_[n], found, near, side);
+                        gate.advance(range.size());
+                      });
+    std::vector<std::uint32_t> left;
+    for (std::size_t n = 0; n < fits.size(); ++n) {
+      if (!std::isfinite(fits[n].error)) {
+        left.push_back(candidates_[n]);
+        continue;
+      }
+      const std::uint32_t i = tree_.at(candidates_[n]);
+      const Vector3d& normal = fits[n].normal;
+      cloud_.normals[i] = Imath::V3f(V3d(normal.x(), normal.y(), normal.z()));
+      errors_[i] = static_cast<float>(fits[n].error);
+    }
+    const bool hasChanged = left.size() < candidates_.size();
+    candidates_ = std::move(left);
+    return hasChanged;
+  }
+
+  /// Returns a fit of infinite error if no side fits much better than all neighbours.
+  PointFit fitSide(std::uint32_t at, std::vector<points::Neighbour>& found, Neighbourhood& near,
+                   Neighbourhood& side) const {
+    const std::uint32_t index = tree_.at(at);
+    const float most = errors_[index] / kGain;
+    const V3d& centre = tree_.positionAt(at);
+    tree_.nearest(centre, neighbours_ + 1, found);
+    setNeighbourhood(cloud_, centre, found, near);
+    PointFit best;
+    std::size_t tries = 0;
+    for (const points::Neighbour& other : found) {
+      if (!(errors_[other.index] <= most)) continue;
+      if (++tries > kMostTries) break;
+      const Vector3d normal = normalAt(cloud_, other.index);
+      side.offsets.clear();
+      side.weights.clear();
+      for (std::size_t k = 0; k < near.offsets.size(); ++k) {
+        constexpr double kMostSlope = 0.1;
+        if (std::abs(near.offsets[k].dot(normal)) > kMostSlope * near.offsets[k].norm()) continue;
+        side.offsets.push_back(near.offsets[k]);
+        side.weights.push_back(near.weights[k]);
+      }
+      if (side.offsets.size() < kFewest) continue;
+      const PointFit fit = fitPoint(side, degree_);
+      if (fit.error <= static_cast<double>(most) && fit.error < best.error) best = fit;
+    }
+    return best;
+  }
+
+  PointCloud& cloud_;
+  const points::PointNeighbours& tree_;
+  std::size_t neighbours_;
+  FitDegree degree_;
+  std::vector<float>& errors_;  ///< squared errors of the fits, by the number of the point
+  std::vector<std::uint32_t> candidates_ = {};
+};
 
 }  // namespace
 
@@ -153,7 +271,8 @@ NormalsResult estimateNormals(PointCloud cloud, const NormalsOptions& options) {
   cloud.normals.assign(cloud.size(), Imath::V3f(0));
   points::NeighbourGraph graph(cloud.size());
   std::atomic<std::size_t> missing = 0, quadratic = 0;
-  const Progress fitting = subProgress(options.progress, 0, options.isOriented ? 0.6 : 1);
+  std::vector<float> errors(cloud.size(), std::numeric_limits<float>::infinity());
+  const Progress fitting = subProgress(options.progress, 0, options.isOriented ? 0.5 : 0.8);
   ProgressGate gate(fitting, tree.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tree.size(), 1024), [&](const auto& range) {
     std::vector<points::Neighbour> found;
@@ -162,19 +281,11 @@ NormalsResult estimateNormals(PointCloud cloud, const NormalsOptions& options) {
       const std::uint32_t index = tree.at(at);
       const V3d& centre = tree.positionAt(at);
       tree.nearest(centre, wanted + 1, found);
-      const double reach = std::sqrt(found.back().squared);
-      near.offsets.clear();
-      near.weights.clear();
-      for (const points::Neighbour& other : found) {
-        const V3d d = (cloud.positions[other.index] - centre) / reach;
-        near.offsets.emplace_back(d.x, d.y, d.z);
-        constexpr double kReach = 1.2;  // the weight vanishes a little beyond the last neighbour
-        const double share = d.length2() / (kReach * kReach);
-        near.weights.push_back((1 - share) * (1 - share));
-      }
+      setNeighbourhood(cloud, centre, found, near);
       PointFit fit;
       if (found.size() >= 3) fit = fitPoint(near, options.degree);
       cloud.normals[index] = Imath::V3f(V3d(fit.normal.x(), fit.normal.y(), fit.normal.z()));
+      errors[index] = static_cast<float>(fit.error);
       if (fit.normal.isZero()) ++missing;
       if (fit.isQuadratic) ++quadratic;
       if (options.isOriented) graph.set(index, found);
@@ -189,6 +300,9 @@ NormalsResult estimateNormals(PointCloud cloud, const NormalsOptions& options) {
     throw InvalidInput(
         "all points lie on a line within rounding, so no surface passes through them; check the "
         "units and the columns of the file");
+  OneSidedFits(cloud, tree, wanted, options.degree, errors)
+      .replaceNormals(subProgress(options.progress, options.isOriented ? 0.5 : 0.8,
+                                  options.isOriented ? 0.6 : 1));
   result.report.missing = missing;
   result.report.quadratic = quadratic;
   if (options.isOriented) {

@@ -36,10 +36,10 @@ struct NormalsResult {
 };
 
 /// Computes unit normals by a weighted least-squares fit of a height function to the neighbours of
-/// each point. Orients them along a minimum spanning tree of the neighbourhood graph [Hoppe92],
-/// then turns each connected part outwards by its winding number [Barill18]. A part inside an odd
-/// number of others is a cavity, whose normals point into it. Replaces present normals. Points at
-/// equal positions share a normal.
+/// each point. Beside a sharp edge, those on one side are fitted. Orients them along a minimum
+/// spanning tree of the neighbourhood graph [Hoppe92], then turns each connected part outwards by
+/// its winding number [Barill18]. A part inside an odd number of others is a cavity, whose normals
+/// point into it. Replaces present normals. Points at equal positions share a normal.
 /// @throws UsageError for fewer than 3 or more than 1000 neighbours
 /// @throws InvalidInput for a cloud of fewer than 3 positions, and when all points lie on a line
 /// @throws ResourceLimit, Cancelled

@@ -223,9 +223,10 @@ Operator normalsOperator() {
       .summary = "compute the normals of a point cloud, and turn them outwards",
       .details =
           "A height function is fitted to the neighbours of each point by least squares, of degree "
-          "1 or 2. The normals are made consistent along a minimum spanning tree. Then each "
-          "connected part is turned outwards by its winding number; a part inside another one is "
-          "a cavity. Present normals are replaced.",
+          "1 or 2. Beside a sharp edge, only the points on one side of it are fitted. The normals "
+          "are made consistent along a minimum spanning tree. Then each connected part is turned "
+          "outwards by its winding number; a part inside another one is a cavity. Present normals "
+          "are replaced.",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! mesh ! sample --count 2000 ! normals",
       .params = {neighboursParam("number of nearest points that are fitted, from 3 to 1000", "20"),
                  {.name = "degree",
