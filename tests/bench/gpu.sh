@@ -34,14 +34,7 @@ for file in "$folder"/sphere*.vdb "$folder"/dragon*.vdb; do
     }' "$folder/rays"
 done
 
-# wall COMMAND…: wall seconds, the least of two runs
-wall() {
-  : >"$folder/seconds"
-  for run in 1 2; do
-    /usr/bin/env bash -c 'TIMEFORMAT=%R; time "$@" >/dev/null 2>&1' wall "$@" 2>>"$folder/seconds" || return 1
-  done
-  sort -n "$folder/seconds" | head -1
-}
+. "$(dirname "$0")/wall.sh"
 
 echo "== lit pictures of the default view, four samples: wall seconds with start-up and reading"
 for file in "$folder/sphere400.vdb" "$folder/dragon$1.vdb"; do

@@ -41,14 +41,7 @@ for size in "$@"; do
 done
 rays head "$head" 92.5
 
-# wall COMMAND…: wall seconds, the least of two runs
-wall() {
-  : >"$folder/seconds"
-  for run in 1 2; do
-    /usr/bin/env bash -c 'TIMEFORMAT=%R; time "$@" >/dev/null 2>&1' wall "$@" 2>>"$folder/seconds" || return 1
-  done
-  sort -n "$folder/seconds" | head -1
-}
+. "$(dirname "$0")/wall.sh"
 
 echo "== pictures of a head: wall seconds with start-up and reading"
 # pictures NAME OPTION… : both renderers, and their bits

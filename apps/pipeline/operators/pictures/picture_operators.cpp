@@ -288,8 +288,6 @@ Plan planDraw(Invocation& in) {
   return in.operands[0].plan();
 }
 
-/// Reads --tolerance: "LAYER=USUAL,WORST", several separated by blanks. USUAL limits the difference
-/// at 99.9 % of the pixels, WORST at all pixels.
 }  // namespace
 
 Operator renderOperator() {

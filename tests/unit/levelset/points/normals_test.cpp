@@ -298,7 +298,7 @@ TEST(PointNormals, HaveTheRightSideInNoise) {
 }
 
 TEST(PointNormals, KeepSharpEdges) {
-  // A box, with and without noise of a thirtieth of the spacing.
+  // A box, with and without noise of a fortieth of the spacing.
   for (const double noise : {0.0, 0.002}) {
     const PointCloud truth =
         sampleMesh(support::boxMesh(V3d(-1), V3d(1)), {.count = 4000, .noise = noise});
