@@ -272,7 +272,8 @@ NormalsResult estimateNormals(PointCloud cloud, const NormalsOptions& options) {
   points::NeighbourGraph graph(cloud.size());
   std::atomic<std::size_t> missing = 0, quadratic = 0;
   std::vector<float> errors(cloud.size(), std::numeric_limits<float>::infinity());
-  const Progress fitting = subProgress(options.progress, 0, options.isOriented ? 0.5 : 0.8);
+  const double fitted = options.isOriented ? 0.6 : 1, begun = 0.8 * fitted;
+  const Progress fitting = subProgress(options.progress, 0, begun);
   ProgressGate gate(fitting, tree.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tree.size(), 1024), [&](const auto& range) {
     std::vector<points::Neighbour> found;
@@ -301,13 +302,12 @@ NormalsResult estimateNormals(PointCloud cloud, const NormalsOptions& options) {
         "all points lie on a line within rounding, so no surface passes through them; check the "
         "units and the columns of the file");
   OneSidedFits(cloud, tree, wanted, options.degree, errors)
-      .replaceNormals(subProgress(options.progress, options.isOriented ? 0.5 : 0.8,
-                                  options.isOriented ? 0.6 : 1));
+      .replaceNormals(subProgress(options.progress, begun, fitted));
   result.report.missing = missing;
   result.report.quadratic = quadratic;
   if (options.isOriented) {
     const points::Orientation found =
-        points::orientNormals(cloud, graph, subProgress(options.progress, 0.6, 1));
+        points::orientNormals(cloud, graph, subProgress(options.progress, fitted, 1));
     result.report.components = found.components;
     result.report.guessed = found.guessed;
     result.report.doubtful = found.doubtful;

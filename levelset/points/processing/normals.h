@@ -19,6 +19,10 @@ struct NormalsOptions {
   Progress progress = {};
 };
 
+/// Largest share of the normals that may oppose those of their neighbours. Solids and meshes refuse
+/// points above it. A thin sheet has opposed normals too.
+inline constexpr double kOpposedLimit = 0.1;
+
 /// Figures of the normals that estimateNormals() computes.
 struct NormalsReport {
   std::size_t missing = 0;     ///< points without a normal: their neighbours lie on a line

@@ -322,14 +322,15 @@ Orientation orientNormals(PointCloud& cloud, const NeighbourGraph& graph,
     if (own[p] == 0) continue;  // the outside is a guess
     // In noise, both near places may lie on one side of the surface. In a thin sheet, the far ones
     // may lie outside.
-    const std::vector<double> near = windingsOn(cloud, graph, parts[p], field),
-                              far = windingsOn(cloud, graph, parts[p], field, kStepBeyondNoise);
-    for (std::size_t k = 0; k < near.size(); ++k) {
-      ++tested;
-      doubtful +=
-          std::abs(near[k] - 0.5) > kMostDifference && std::abs(far[k] - 0.5) > kMostDifference ? 1
-                                                                                                : 0;
-    }
+    const auto contradicts = [](double winding) {
+      return std::abs(winding - 0.5) > kMostDifference;
+    };
+    const std::vector<double> near = windingsOn(cloud, graph, parts[p], field);
+    tested += near.size();
+    if (std::none_of(near.begin(), near.end(), contradicts)) continue;
+    const std::vector<double> far = windingsOn(cloud, graph, parts[p], field, kStepBeyondNoise);
+    for (std::size_t k = 0; k < near.size(); ++k)
+      doubtful += contradicts(near[k]) && contradicts(far[k]) ? 1 : 0;
   }
   if (tested > 0) result.doubtful = static_cast<double>(doubtful) / static_cast<double>(tested);
   report(progress, 1);

@@ -13,6 +13,7 @@
 
 #include "levelset/error.h"
 #include "levelset/geometry/disjoint_sets.h"
+#include "levelset/points/processing/normals.h"
 #include "levelset/points/processing/orientation.h"
 #include "levelset/points/processing/point_neighbours.h"
 #include "levelset/progress_gate.h"
@@ -253,9 +254,8 @@ void PointSurface::requireAgreement() const {
     ++fitted;
     opposed += mean.dot(normals_[i]) < 0;
   }
-  constexpr double kMostOpposed = 0.1;
   const double share = static_cast<double>(opposed) / static_cast<double>(std::max(fitted, 1UL));
-  if (share > kMostOpposed)
+  if (share > kOpposedLimit)
     throw InvalidInput(
         fmt::format("the normals of {:.0f} % of the points oppose those of their neighbours, so "
                     "they do not tell inside from outside; compute them with `normals`, with more "

@@ -7,6 +7,7 @@
 #include "levelset/fields/grid.h"
 #include "levelset/narrow_band.h"
 #include "levelset/points/point_cloud.h"
+#include "levelset/points/processing/normals.h"
 #include "levelset/progress.h"
 
 /// Solids from point clouds without connectivity.
@@ -65,9 +66,6 @@ inline constexpr double kSupportRadius = 2;
 /// Limit of SupportCertificate::unsupportedShare(). Above it pointsToBand() refuses the cloud,
 /// unless the option acceptUnsupported is set.
 inline constexpr double kUnsupportedLimit = 0.01;
-
-/// Limit of SupportCertificate::opposedShare, as above. A thin sheet has opposed normals too.
-inline constexpr double kOpposedLimit = 0.1;
 
 struct PointsToBandOptions {
   PointMethod method = PointMethod::MovingLeastSquares;
