@@ -53,12 +53,12 @@ Pseudonormals::Pseudonormals(const LocalMesh& mesh)
     }
     const std::size_t faces = end - i;
     edge.normal = directionOf(edge.normal);
-    edge.onBorder = faces == 1;
+    const bool isOriented = faces == 1 || (faces == 2 && sides[i].rises != sides[i + 1].rises);
+    edge.onBorder = faces == 1 || !isOriented;
     edges_.push_back(edge);
-    borderEdges_ += edge.onBorder;
+    borderEdges_ += faces == 1;
     if (edge.onBorder) vertices_[sides[i].low].onBorder = vertices_[sides[i].high].onBorder = true;
-    const bool isSound = faces == 1 || (faces == 2 && sides[i].rises != sides[i + 1].rises);
-    if (!isSound && !unorientedEdge_)
+    if (!isOriented && !unorientedEdge_)
       unorientedEdge_ =
           UnorientedEdge{mesh.points[sides[i].low], mesh.points[sides[i].high], faces};
   }

@@ -33,7 +33,9 @@ class Pseudonormals {
 
   struct Direction {
     Imath::V3d normal{0};   ///< unit length; zero if all adjacent faces are degenerate
-    bool onBorder = false;  ///< true at an edge with one face and at the ends of such an edge
+    /// True at an edge with one face, at an unoriented edge, and at the ends of such edges: the
+    /// normal does not tell the sides apart there.
+    bool onBorder = false;
   };
   /// Returns the pseudonormal of a part of a triangle. 0 to 2: corner; 3 to 5: edge from corner
   /// part − 3 to the next; 6: face.

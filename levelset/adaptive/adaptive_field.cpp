@@ -1,0 +1,151 @@
+#include "levelset/adaptive/adaptive_field.h"
+
+#include <xxhash.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "levelset/adaptive/adaptive_tree.h"
+
+namespace levelset {
+
+using Imath::V3d;
+using Imath::V3i;
+
+double AdaptiveField::tolerance() const {
+  return tree_ ? tree_->tolerance : 0;
+}
+double AdaptiveField::halfWidth() const {
+  return tree_ ? tree_->halfWidth : 0;
+}
+
+Imath::Box3d AdaptiveField::box() const {
+  if (!tree_) return {};
+  return {tree_->origin, tree_->toWorld(V3i(1 << tree_->octree.depth()))};
+}
+
+double AdaptiveField::smallestCell() const {
+  if (!tree_) return 0;
+  int level = tree_->octree.depth();
+  for (std::uint32_t b = 0; b < tree_->octree.blockCount(); ++b)
+    level = std::min(level, tree_->octree.parent(b).level - 1);
+  return std::ldexp(tree_->unit, level);
+}
+
+std::size_t AdaptiveField::leafCount() const {
+  return tree_ ? tree_->octree.leafCount() : 0;
+}
+
+std::vector<std::size_t> AdaptiveField::leavesByDepth() const {
+  if (!tree_) return {};
+  const int depth = tree_->octree.depth();
+  std::vector<std::size_t> counts(static_cast<std::size_t>(depth) + 1, 0);
+  counts[0] = 1;
+  for (std::uint32_t b = 0; b < tree_->octree.blockCount(); ++b) {
+    const auto at = static_cast<std::size_t>(depth - tree_->octree.parent(b).level);
+    counts[at] -= 1;
+    counts[at + 1] += 8;
+  }
+  while (counts.back() == 0) counts.pop_back();
+  return counts;
+}
+
+std::size_t AdaptiveField::memoryUse() const {
+  if (!tree_) return 0;
+  return sizeof(AdaptiveTree) + tree_->octree.memoryUse() +
+         tree_->values.capacity() * sizeof(BlockValues);
+}
+
+Imath::Box3d AdaptiveField::zeroSetBounds() const {
+  Imath::Box3d box;
+  if (!tree_) return box;
+  const HashedOctree& octree = tree_->octree;
+  for (std::uint32_t b = 0; b < octree.blockCount(); ++b) {
+    const CellKey parent = octree.parent(b);
+    for (int octant = 0; octant < 8; ++octant) {
+      const CellKey leaf = parent.child(octant);
+      if (octree.isSplit(leaf)) continue;
+      for (int c = 0; c < 8; ++c)
+        for (int axis = 0; axis < 3; ++axis) {
+          if (c >> axis & 1) continue;
+          const double v = tree_->corner(b, octant, c), w = tree_->corner(b, octant, c | 1 << axis);
+          if ((v < 0) == (w < 0)) continue;
+          V3d at = V3d(leaf.low()) + V3d(c & 1, c >> 1 & 1, c >> 2) * leaf.edge();
+          at[axis] += leaf.edge() * (v / (v - w));
+          box.extendBy(tree_->origin + at * tree_->unit);
+        }
+    }
+  }
+  return box;
+}
+
+std::uint64_t AdaptiveField::contentHash() const {
+  if (!tree_) return 0;
+  const HashedOctree& octree = tree_->octree;
+  std::vector<std::uint64_t> words;
+  words.reserve(octree.blockCount() + 1);
+  for (std::uint32_t b = 0; b < octree.blockCount(); ++b)
+    words.push_back(octree.parent(b).packed());
+  const double place[] = {tree_->origin.x,  tree_->origin.y,  tree_->origin.z,       tree_->unit,
+                          tree_->tolerance, tree_->halfWidth, double(octree.depth())};
+  std::uint64_t hash = XXH3_64bits(place, sizeof place);
+  hash = XXH3_64bits_withSeed(words.data(), words.size() * sizeof(words[0]), hash);
+  return XXH3_64bits_withSeed(tree_->values.data(), tree_->values.size() * sizeof(BlockValues),
+                              hash);
+}
+
+struct AdaptiveSampler::Impl {
+  std::shared_ptr<const AdaptiveTree> tree;
+  CachedOctree octree;
+
+  explicit Impl(std::shared_ptr<const AdaptiveTree> shared)
+      : tree(std::move(shared)), octree(tree->octree) {}
+
+  struct Local {
+    HashedOctree::Place place;
+    V3d at;         ///< in the leaf, from 0 to 1
+    V3d clamped;    ///< position in the root, cells of level 0
+    double beyond;  ///< distance from the root, world units
+  };
+  [[nodiscard]] Local locate(const V3d& world) const {
+    const int side = 1 << tree->octree.depth();
+    const V3d p = (world - tree->origin) / tree->unit;
+    Local local{};
+    V3i cell;
+    for (int axis = 0; axis < 3; ++axis) {
+      local.clamped[axis] = std::clamp(p[axis], 0.0, double(side));
+      cell[axis] = std::min(static_cast<int>(local.clamped[axis]), side - 1);
+    }
+    local.beyond = (p - local.clamped).length() * tree->unit;
+    local.place = octree.findLeaf(cell);
+    local.at = (local.clamped - V3d(local.place.leaf.low())) / local.place.leaf.edge();
+    return local;
+  }
+};
+
+AdaptiveSampler::AdaptiveSampler(const AdaptiveField& field)
+    : impl_(std::make_unique<Impl>(field.shared())) {}
+AdaptiveSampler::~AdaptiveSampler() = default;
+AdaptiveSampler::AdaptiveSampler(AdaptiveSampler&&) noexcept = default;
+AdaptiveSampler& AdaptiveSampler::operator=(AdaptiveSampler&&) noexcept = default;
+
+double AdaptiveSampler::value(const V3d& world) const {
+  const Impl::Local local = impl_->locate(world);
+  const double value = impl_->tree->interpolate(local.place, local.at);
+  return value < 0 ? value - local.beyond : value + local.beyond;
+}
+
+V3d AdaptiveSampler::gradient(const V3d& world) const {
+  const Impl::Local local = impl_->locate(world);
+  V3d result;
+  for (int axis = 0; axis < 3; ++axis) {
+    V3d low = local.at, high = local.at;
+    low[axis] = 0;
+    high[axis] = 1;
+    result[axis] =
+        impl_->tree->interpolate(local.place, high) - impl_->tree->interpolate(local.place, low);
+  }
+  return result / (local.place.leaf.edge() * impl_->tree->unit);
+}
+
+}  // namespace levelset

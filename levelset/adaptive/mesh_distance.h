@@ -1,0 +1,51 @@
+#pragma once
+
+// Internal header of levelset: public headers must not include it.
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "levelset/adaptive/build_adaptive.h"
+#include "levelset/convert/mesh_to_band.h"
+#include "levelset/convert/pseudonormals.h"
+#include "levelset/geometry/search/triangle_search.h"
+#include "levelset/mesh_sign/local_mesh.h"
+#include "levelset/mesh_sign/winding.h"
+
+namespace levelset {
+
+/// Exact signed distance of the solid that a mesh describes, at any position. The sign is that of
+/// meshToBand(), but where it is ambiguous. Holes are spanned by the surface of winding number 1/2.
+class MeshDistance final : public SignedDistance {
+ public:
+  /// @param voxel  resolution of the surface that spans holes, world units
+  /// @throws as meshToBand(), but for the share of ambiguous signs; InvalidInput if neighbouring
+  ///         triangles have opposite orientations
+  MeshDistance(const TriMesh& mesh, double voxel, const MeshToBandOptions& options);
+
+  [[nodiscard]] double at(const Imath::V3d& position, const Known& known) const override;
+  /// Certificate of the mesh. Its ambiguous share is that of points beside the triangles.
+  [[nodiscard]] const SignCertificate& certificate() const { return certificate_; }
+
+ private:
+  void orientComponents();
+  void orientSpan(std::size_t first);
+  void findSeparating();
+  void measureAmbiguity(std::size_t given);
+  [[nodiscard]] bool isInside(const Imath::V3d& local, std::uint32_t triangle) const;
+
+  double voxel_;
+  Imath::V3d origin_;  ///< voxels
+  convert::LocalMesh mesh_;
+  SignCertificate certificate_;
+  double flip_ = 1;
+  TriangleSearch search_;
+  std::optional<convert::Pseudonormals> normals_;  ///< refer to mesh_
+  convert::WindingField winding_;                  ///< refers to mesh_
+  /// True for each triangle with the outside in front and the inside behind; empty: all.
+  std::vector<bool> separates_;
+};
+
+}  // namespace levelset
