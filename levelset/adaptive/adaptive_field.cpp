@@ -130,12 +130,14 @@ AdaptiveSampler::AdaptiveSampler(AdaptiveSampler&&) noexcept = default;
 AdaptiveSampler& AdaptiveSampler::operator=(AdaptiveSampler&&) noexcept = default;
 
 double AdaptiveSampler::value(const V3d& world) const {
+  if (!std::isfinite(world.length())) return NAN;
   const Impl::Local local = impl_->locate(world);
   const double value = impl_->tree->interpolate(local.place, local.at);
   return value < 0 ? value - local.beyond : value + local.beyond;
 }
 
 V3d AdaptiveSampler::gradient(const V3d& world) const {
+  if (!std::isfinite(world.length())) return V3d(NAN);
   const Impl::Local local = impl_->locate(world);
   V3d result;
   for (int axis = 0; axis < 3; ++axis) {

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 namespace levelset {
@@ -26,8 +27,8 @@ class AdaptiveField {
   [[nodiscard]] bool isEmpty() const { return !tree_; }
   /// Largest error that was asked for, world units.
   [[nodiscard]] double tolerance() const;
-  /// Distance from the surface up to which the tolerance holds, world units. Farther away only the
-  /// signs are right.
+  /// Distance from the surface up to which the tolerance holds in box(), world units. Farther away
+  /// the values are coarse.
   [[nodiscard]] double halfWidth() const;
   /// Cube that the root covers, world units. Beyond it the distance to the cube is added.
   [[nodiscard]] Imath::Box3d box() const;
@@ -60,8 +61,10 @@ class AdaptiveSampler {
   AdaptiveSampler(AdaptiveSampler&&) noexcept;
   AdaptiveSampler& operator=(AdaptiveSampler&&) noexcept;
 
+  /// Interpolated value. NaN for a position that is not finite.
   [[nodiscard]] double value(const Imath::V3d& world) const;
-  /// Gradient of the interpolant in the leaf of the position. It jumps between leaves.
+  /// Gradient of the interpolant in the leaf of the position. It jumps between leaves. Beyond the
+  /// root, that of the nearest position in it. NaN for a position that is not finite.
   [[nodiscard]] Imath::V3d gradient(const Imath::V3d& world) const;
 
  private:

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -20,8 +21,8 @@ namespace {
 using Imath::V3d;
 using Imath::V3i;
 
-// Vertices keep this distance from the ends of their edge, edges: vertices at one corner would
-// coincide.
+// Least distance of a vertex from the ends of its edge, a share of its length: vertices at one
+// corner would coincide.
 constexpr double kEndMargin = 1e-4;
 
 /// Names a vertex: an undivided edge by its lower end and axis, or a loop in a leaf.
@@ -324,6 +325,16 @@ TriMesh adaptiveToMesh(const AdaptiveField& field, const AdaptiveToMeshOptions& 
   const AdaptiveTree& tree = *field.shared();
   constexpr std::uint32_t kBlocks = 1024;
   const auto blocks = static_cast<std::uint32_t>(tree.octree.blockCount());
+  // A crossing leaf has about five triangles and shared vertices.
+  std::atomic<std::size_t> crossing = 0;
+  tbb::parallel_for(std::uint32_t{0}, blocks, [&](std::uint32_t block) {
+    const auto [low, high] =
+        std::minmax_element(tree.values[block].begin(), tree.values[block].end());
+    if (*low < 0 && *high >= 0) crossing += 8;
+  });
+  constexpr double kBytesPerLeaf = 500;
+  requireMemory(kBytesPerLeaf * double(crossing), memoryLimit(options.maxMemory));
+  report(options.progress, 0.1);
   std::vector<Piece> pieces((blocks + kBlocks - 1) / kBlocks);
   tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t n) {
     LeafMesher mesher(tree, pieces[n]);
@@ -339,8 +350,6 @@ TriMesh adaptiveToMesh(const AdaptiveField& field, const AdaptiveToMeshOptions& 
     vertexCount += piece.vertices.size();
     triangleCount += piece.triangles.size();
   }
-  requireMemory(double(vertexCount * 2 * sizeof(Vertex) + triangleCount * 2 * 24),
-                memoryLimit(options.maxMemory));
   std::vector<Vertex> vertices;
   vertices.reserve(vertexCount);
   for (Piece& piece : pieces) {

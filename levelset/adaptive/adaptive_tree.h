@@ -38,8 +38,7 @@ struct AdaptiveTree {
     return static_cast<std::size_t>(x + 3 * y + 9 * z);
   }
   /// Interpolates the values of a leaf.
-  /// @param block  block that holds the leaf
-  /// @param at     position in the leaf, each coordinate in [0, 1]
+  /// @param at  position in the leaf, each coordinate in [0, 1]
   [[nodiscard]] double interpolate(const HashedOctree::Place& place, const Imath::V3d& at) const;
 };
 
@@ -52,12 +51,17 @@ inline double trilinear(const std::array<double, 8>& v, const Imath::V3d& at) {
   return mix(low, high, at.z);
 }
 
+/// Interpolates the values of a child of a block.
+inline double interpolate(const BlockValues& values, int octant, const Imath::V3d& at) {
+  std::array<double, 8> v;
+  for (int c = 0; c < 8; ++c)
+    v[static_cast<std::size_t>(c)] = values[AdaptiveTree::latticeIndex(octant, c)];
+  return trilinear(v, at);
+}
+
 inline double AdaptiveTree::interpolate(const HashedOctree::Place& place,
                                         const Imath::V3d& at) const {
-  const int octant = place.leaf.octant();
-  std::array<double, 8> v;
-  for (int c = 0; c < 8; ++c) v[c] = corner(place.block, octant, c);
-  return trilinear(v, at);
+  return levelset::interpolate(values[place.block], place.leaf.octant(), at);
 }
 
 }  // namespace levelset

@@ -7,8 +7,8 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
-#include <compare>
 #include <cstdint>
 #include <memory>
 #include <utility>
@@ -26,8 +26,8 @@ namespace {
 using Imath::V3d;
 using Imath::V3i;
 
-// An error between the tested points can be twice the one at them, and the corners of a leaf beside
-// a larger one take over its error.
+// Shares of the tolerance: half of it for the interpolation in a leaf, half for corners that take
+// over the value of a larger leaf.
 constexpr double kTestedShare = 0.5;
 
 /// Values of a block and of the points half way between them: a lattice of 5³ points, x fastest.
@@ -55,12 +55,24 @@ class FineLattice {
       const V3i corner(at.x & ~1, at.y & ~1, at.z & ~1);
       const SignedDistance::Known known{values_[index(corner)],
                                         V3d(at - corner).length() * steps_ * halfUnit_};
-      // Blocks that share a point compute the same bits of its position.
-      const V3d position = origin_ + V3d(low_ + at * steps_) * halfUnit_;
-      value = static_cast<float>(distance_.at(position, known));
+      value = static_cast<float>(distance_.at(position(at), known));
       ++evaluations_;
     }
     return value;
+  }
+  /// Values of a child's lattice of 3³ points.
+  [[nodiscard]] BlockValues childValues(const V3i& low) {
+    BlockValues values;
+    for (int z = 0; z < 3; ++z)
+      for (int y = 0; y < 3; ++y)
+        for (int x = 0; x < 3; ++x)
+          values[static_cast<std::size_t>(x + 3 * y + 9 * z)] =
+              static_cast<float>(value(low + V3i(x, y, z)));
+    return values;
+  }
+  /// World position of a point.
+  [[nodiscard]] V3d position(const V3i& at) const {
+    return origin_ + V3d(low_ + at * steps_) * halfUnit_;  // the same bits in all blocks
   }
   [[nodiscard]] std::size_t evaluations() const { return evaluations_; }
   /// Edge of a child, world units.
@@ -79,9 +91,14 @@ class FineLattice {
   std::size_t evaluations_ = 0;
 };
 
+/// Lowest point of a child in the lattice of its block.
+V3i lowOf(int octant) {
+  return {2 * (octant & 1), 2 * (octant >> 1 & 1), 2 * (octant >> 2)};
+}
+
 /// Decisions on the children of a block.
 struct Decisions {
-  int split = 0, tested = 0;  ///< bits by octant; tested: leaves within the tolerance
+  int split = 0, tested = 0;  ///< bits by octant; tested: leaves within the half width
   std::array<BlockValues, 8> values;
   double testedError = 0;  ///< of children that stay leaves
   std::size_t evaluations = 0;
@@ -96,23 +113,20 @@ class Builder {
         maxMemory_(memoryLimit(options.maxMemory)) {}
 
   void makeRoot();
-  /// Divides the leaves within the half width of the surface.
-  void divide(const Progress& progress);
-  /// Divides leaves beyond the half width that give values to smaller ones within it.
-  void divideBeside(const Progress& progress);
+  /// Divides leaves in the blocks from a number on, and in the new blocks.
+  void divide(std::uint32_t first, const Progress& progress);
+  /// Makes the field continuous. Divides leaves that give wrong values to smaller ones.
+  void connect(const Progress& progress);
   [[nodiscard]] const AdaptiveReport& figures() const { return figures_; }
 
  private:
-  /// Child of a block.
-  struct Leaf {
-    std::uint32_t block;
-    int octant;
-    auto operator<=>(const Leaf&) const = default;
-  };
-  void decide(std::uint32_t block, int octants, bool everywhere, Decisions& decisions) const;
+  void decide(std::uint32_t block, Decisions& decisions) const;
   void apply(std::uint32_t block, const Decisions& decisions);
-  void requireMemory() const;
+  [[nodiscard]] std::vector<CellKey> leavesToDivide(const std::vector<BlockValues>& values);
+  void requireMemory(std::size_t newBlocks) const;
   [[nodiscard]] double errorOf(FineLattice& lattice, const V3i& low, double limit) const;
+  [[nodiscard]] double errorOnSurface(const FineLattice& lattice, const V3i& low,
+                                      const std::array<double, 8>& corners, double limit) const;
 
   const SignedDistance& distance_;
   AdaptiveTree& tree_;
@@ -151,32 +165,39 @@ double Builder::errorOf(FineLattice& lattice, const V3i& low, double limit) cons
           largest = std::max(largest, std::abs(expected - lattice.value(low + V3i(x, y, z))));
           if (largest > limit) return largest;
         }
+  return std::max(largest, errorOnSurface(lattice, low, corners, limit));
+}
+
+/// Largest interpolated value at the visited points of the surface in a child.
+double Builder::errorOnSurface(const FineLattice& lattice, const V3i& low,
+                               const std::array<double, 8>& corners, double limit) const {
+  const Imath::Box3d box(lattice.position(low), lattice.position(low + V3i(2)));
+  double largest = 0;
+  distance_.visitSurface(box, [&](const V3d& p) {
+    V3d at;
+    for (int axis = 0; axis < 3; ++axis)
+      at[axis] = std::clamp((p[axis] - box.min[axis]) / (box.max[axis] - box.min[axis]), 0.0, 1.0);
+    largest = std::max(largest, std::abs(trilinear(corners, at)));
+    return largest <= limit;
+  });
   return largest;
 }
 
-/// @param octants     bits of the children to decide on
-/// @param everywhere  also those beyond the half width
-void Builder::decide(std::uint32_t block, int octants, bool everywhere,
-                     Decisions& decisions) const {
+void Builder::decide(std::uint32_t block, Decisions& decisions) const {
   FineLattice lattice(tree_, distance_, block);
   const int level = tree_.octree.parent(block).level - 1;
   const double radius = 0.5 * std::sqrt(3.0) * lattice.childEdge();
   for (int octant = 0; octant < 8; ++octant) {
-    if (!(octants >> octant & 1)) continue;
-    const V3i low(2 * (octant & 1), 2 * (octant >> 1 & 1), 2 * (octant >> 2));
-    if (!everywhere && std::abs(lattice.value(low + V3i(1))) > tree_.halfWidth + radius) continue;
+    const V3i low = lowOf(octant);
+    if (std::abs(lattice.value(low + V3i(1))) > tree_.halfWidth + radius) continue;
+    decisions.tested |= 1 << octant;
     const double error = errorOf(lattice, low, level == 0 ? INFINITY : limit_);
     if (error <= limit_ || level == 0) {
-      decisions.tested |= 1 << octant;
       decisions.testedError = std::max(decisions.testedError, error);
       continue;
     }
     decisions.split |= 1 << octant;
-    BlockValues& values = decisions.values[static_cast<std::size_t>(octant)];
-    for (int z = 0; z < 3; ++z)
-      for (int y = 0; y < 3; ++y)
-        for (int x = 0; x < 3; ++x)
-          values[x + 3 * y + 9 * z] = static_cast<float>(lattice.value(low + V3i(x, y, z)));
+    decisions.values[static_cast<std::size_t>(octant)] = lattice.childValues(low);
   }
   decisions.evaluations = lattice.evaluations();
 }
@@ -194,85 +215,105 @@ void Builder::apply(std::uint32_t block, const Decisions& decisions) {
   }
 }
 
-void Builder::requireMemory() const {
-  levelset::requireMemory(
-      double(tree_.octree.memoryUse() + tree_.values.capacity() * sizeof(BlockValues)), maxMemory_);
+/// Compares the estimated memory after new blocks were added with the limit. Vectors hold their
+/// values twice while they grow, and connect() makes a copy.
+void Builder::requireMemory(std::size_t newBlocks) const {
+  constexpr double kBytesPerBlock = 2 * sizeof(BlockValues) + 40;
+  levelset::requireMemory(kBytesPerBlock * double(tree_.octree.blockCount() + newBlocks),
+                          maxMemory_);
 }
 
-void Builder::divide(const Progress& progress) {
-  constexpr int kAll = 0xff;
-  const int depth = tree_.octree.depth();
-  std::uint32_t first = 0;
-  for (int level = depth; level > 0; --level) {
+void Builder::divide(std::uint32_t first, const Progress& progress) {
+  // Blocks are decided on in parallel, then applied in their order.
+  constexpr std::uint32_t kBatch = 1u << 13;
+  std::vector<Decisions> decisions;
+  std::size_t round = 0;
+  while (first < tree_.octree.blockCount()) {
     const auto end = static_cast<std::uint32_t>(tree_.octree.blockCount());
-    // Blocks of a level are decided on in parallel, then applied in their order.
-    constexpr std::uint32_t kBatch = 1u << 14;
-    std::vector<Decisions> decisions(std::min(kBatch, end - first));
+    ++round;
     for (std::uint32_t start = first; start < end; start += kBatch) {
       const std::uint32_t count = std::min(kBatch, end - start);
+      decisions.resize(std::max<std::size_t>(decisions.size(), count));
       tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, count, 8),
                         [&](const tbb::blocked_range<std::uint32_t>& range) {
                           for (std::uint32_t k = range.begin(); k < range.end(); ++k) {
                             decisions[k] = {};
-                            decide(start + k, kAll, false, decisions[k]);
+                            decide(start + k, decisions[k]);
                           }
                         });
+      std::size_t added = 0;
+      for (std::uint32_t k = 0; k < count; ++k)
+        added += static_cast<std::size_t>(std::popcount(static_cast<unsigned>(decisions[k].split)));
+      requireMemory(added);
       for (std::uint32_t k = 0; k < count; ++k) apply(start + k, decisions[k]);
-      requireMemory();
       const double share = double(start + count - first) / double(end - first);
-      report(progress, (double(depth - level) + share) / double(depth));
+      report(progress, std::min(1.0, (double(round - 1) + share) / double(tree_.octree.depth())));
     }
     first = end;
   }
 }
 
-void Builder::divideBeside(const Progress& progress) {
-  std::vector<Leaf> asking;
-  for (std::uint32_t block = 0; block < tested_.size(); ++block)
-    for (int octant = 0; octant < 8; ++octant)
-      if (tested_[block] >> octant & 1) asking.push_back({block, octant});
-  while (!asking.empty()) {
-    report(progress, 0);
-    // === Larger leaves without a test that give a value to a tested leaf
-    using Pair = std::pair<Leaf, Leaf>;  // giving, asking
-    tbb::enumerable_thread_specific<std::vector<Pair>> found;
-    tbb::parallel_for(std::size_t{0}, asking.size(), [&](std::size_t n) {
-      const CellKey leaf = tree_.octree.parent(asking[n].block).child(asking[n].octant);
+/// Finds the leaves whose values change the corners of smaller leaves within the half width by more
+/// than the limit.
+std::vector<CellKey> Builder::leavesToDivide(const std::vector<BlockValues>& values) {
+  tbb::enumerable_thread_specific<std::vector<std::uint64_t>> found;
+  tbb::enumerable_thread_specific<double> largest(0.0);
+  tbb::parallel_for(std::size_t{0}, values.size(), [&](std::size_t n) {
+    if (tested_[n] == 0) return;
+    const auto block = static_cast<std::uint32_t>(n);
+    const CellKey parent = tree_.octree.parent(block);
+    for (int octant = 0; octant < 8; ++octant) {
+      if (!(tested_[n] >> octant & 1)) continue;
+      const CellKey leaf = parent.child(octant);
       for (int corner = 0; corner < 8; ++corner) {
-        const V3i at =
-            leaf.low() + V3i(corner & 1, corner >> 1 & 1, corner >> 2) * int(leaf.edge());
-        const auto larger = tree_.octree.leafWithout(at);
-        if (!larger) continue;
-        const Leaf giving{tree_.octree.block(larger->parent()), larger->octant()};
-        if (!(tested_[giving.block] >> giving.octant & 1))
-          found.local().emplace_back(giving, asking[n]);
+        const std::size_t i = AdaptiveTree::latticeIndex(octant, corner);
+        const double change = std::abs(double(values[n][i]) - double(tree_.values[n][i]));
+        if (change <= limit_) {
+          largest.local() = std::max(largest.local(), change);
+          continue;
+        }
+        if (tree_.octree.isSplit(leaf)) break;
+        const auto larger =
+            tree_.octree.leafWithout(leaf.low() + V3i(corner & 1, corner >> 1 & 1, corner >> 2) *
+                                                      static_cast<int>(leaf.edge()));
+        if (larger) found.local().push_back(larger->packed());
       }
-    });
-    std::vector<Pair> pairs;
-    for (const std::vector<Pair>& some : found) pairs.insert(pairs.end(), some.begin(), some.end());
-    std::sort(pairs.begin(), pairs.end());
-    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-    std::vector<Leaf> giving;
-    for (const Pair& pair : pairs)
-      if (giving.empty() || giving.back() != pair.first) giving.push_back(pair.first);
-
-    // === Tests. A leaf that fails is divided, and its children may give values.
-    std::vector<Decisions> decisions(giving.size());
-    tbb::parallel_for(std::size_t{0}, giving.size(), [&](std::size_t n) {
-      decide(giving[n].block, 1 << giving[n].octant, true, decisions[n]);
-    });
-    std::vector<Leaf> next;
-    for (std::size_t n = 0, p = 0; n < giving.size(); ++n) {
-      apply(giving[n].block, decisions[n]);
-      const bool isSplit = decisions[n].split != 0;
-      if (!isSplit) next.push_back(giving[n]);
-      for (; p < pairs.size() && pairs[p].first == giving[n]; ++p)
-        if (isSplit) next.push_back(pairs[p].second);
     }
-    requireMemory();
-    std::sort(next.begin(), next.end());
-    next.erase(std::unique(next.begin(), next.end()), next.end());
-    asking = std::move(next);
+  });
+  figures_.hangingError = 0;
+  for (const double one : largest) figures_.hangingError = std::max(figures_.hangingError, one);
+  std::vector<std::uint64_t> keys;
+  for (const std::vector<std::uint64_t>& some : found)
+    keys.insert(keys.end(), some.begin(), some.end());
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  std::vector<CellKey> leaves;
+  for (const std::uint64_t key : keys) leaves.push_back(CellKey::unpacked(key));
+  return leaves;
+}
+
+void Builder::connect(const Progress& progress) {
+  while (true) {
+    report(progress, 0);
+    std::vector<BlockValues> values = continuousValues(tree_);
+    const std::vector<CellKey> leaves = leavesToDivide(values);
+    if (leaves.empty()) {
+      tree_.values = std::move(values);
+      return;
+    }
+    requireMemory(leaves.size());
+    std::vector<BlockValues> added(leaves.size());
+    tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t n) {
+      FineLattice lattice(tree_, distance_, tree_.octree.block(leaves[n].parent()));
+      added[n] = lattice.childValues(lowOf(leaves[n].octant()));
+    });
+    const auto first = static_cast<std::uint32_t>(tree_.octree.blockCount());
+    for (std::size_t n = 0; n < leaves.size(); ++n) {
+      tree_.octree.split(leaves[n]);
+      tree_.values.push_back(added[n]);
+      tested_.push_back(0);
+    }
+    divide(first, {});
   }
 }
 
@@ -298,14 +339,15 @@ AdaptiveTree emptyTree(const Imath::Box3d& box, const AdaptiveOptions& options) 
         "move the surface to the origin or raise the tolerance",
         reach, options.tolerance));
   // Beyond the margin all values at corners of the root are positive.
-  const double margin =
-      std::min(std::isfinite(halfWidth) ? halfWidth : 0.1 * longest, 0.1 * longest);
+  const double margin = halfWidth <= longest ? halfWidth : 0.1 * longest;
   const double side = longest + 2 * std::max(margin, 2 * options.tolerance);
-  const int depth = std::max(2, static_cast<int>(std::ceil(std::log2(side / options.tolerance))));
+  // The interpolant of a distance is off by at most 0.87 edges.
+  const int depth =
+      std::max(2, static_cast<int>(std::ceil(std::log2(2 * side / options.tolerance))));
   if (depth > kMaxOctreeDepth)
     throw UsageError(
-        fmt::format("a tolerance of {} is below 2^-{} of the size {:.3g}; give at least {:.3g}",
-                    options.tolerance, kMaxOctreeDepth, side, std::ldexp(side, -kMaxOctreeDepth)));
+        fmt::format("a tolerance of {} is too small for the size {:.3g}; give at least {:.3g}",
+                    options.tolerance, side, std::ldexp(2 * side, -kMaxOctreeDepth)));
   return {HashedOctree(depth),
           {},
           box.min + size * 0.5 - V3d(0.5 * side),
@@ -322,10 +364,8 @@ AdaptiveField buildAdaptive(const SignedDistance& distance, const Imath::Box3d& 
   levelset::report(options.progress, 0);
   Builder builder(distance, *tree, options);
   builder.makeRoot();
-  builder.divide(subProgress(options.progress, 0, 0.8));
-  builder.divideBeside(subProgress(options.progress, 0.8, 0.9));
-  levelset::report(options.progress, 0.9);
-  constrainHangingNodes(*tree);
+  builder.divide(0, subProgress(options.progress, 0, 0.9));
+  builder.connect(subProgress(options.progress, 0.9, 0.9));
   tree->values.shrink_to_fit();
   levelset::report(options.progress, 1);
   if (report) *report = builder.figures();

@@ -4,6 +4,7 @@
 #include <Imath/ImathVec.h>
 
 #include <cstddef>
+#include <functional>
 
 #include "levelset/adaptive/adaptive_field.h"
 #include "levelset/progress.h"
@@ -23,8 +24,14 @@ class SignedDistance {
     double value = 0;   ///< world units
     double apart = -1;  ///< distance between the positions, world units; negative: no value
   };
-  /// Returns the distance of a position, negative inside. Called from several threads at once.
+  /// Returns the distance of a position, negative inside. `known` does not change the result.
+  /// Called from several threads at once.
   [[nodiscard]] virtual double at(const Imath::V3d& position, const Known& known) const = 0;
+  /// Visits points of the surface in a box, until `visit` returns false: the points where it may
+  /// leave its course between the points of a lattice. Without them, a large cell can miss a part
+  /// that is small beside it. None by default.
+  virtual void visitSurface(const Imath::Box3d& /*box*/,
+                            const std::function<bool(const Imath::V3d&)>& /*visit*/) const {}
 };
 
 struct AdaptiveOptions {
@@ -41,18 +48,22 @@ struct AdaptiveOptions {
 /// Figures of buildAdaptive().
 struct AdaptiveReport {
   std::size_t evaluations = 0;  ///< of the distance
-  /// Largest error at the points where leaves were tested, world units: their centres and the
-  /// middles of their faces and edges. Errors between these points are at most about twice as
-  /// large.
+  /// Largest error of the leaves at the points where they were tested, before their corners took
+  /// over values of larger leaves, world units.
   double testedError = 0;
+  /// Largest change of a corner by the value of a larger leaf, world units.
+  double hangingError = 0;
 };
 
-/// Samples a signed distance on an octree. Splits a leaf while its interpolant is off by more than
-/// half of the tolerance at its centre, or in the middle of a face or edge. The smallest cells have
-/// an edge of at most the tolerance; a distance cannot be off by more in them.
+/// Samples a signed distance on an octree. Divides a leaf within the half width while its
+/// interpolant is off by more than half of the tolerance: at its centre, in the middle of a face or
+/// an edge, or at a visited point of the surface. Divides a leaf too that would change a corner of
+/// a smaller one by more than that. The error at these points is then at most the tolerance;
+/// elsewhere this is an experience. The smallest cells have an edge of at most half of the
+/// tolerance.
 /// @param box  bounds of the surface, world units; the root is a cube around it
-/// @throws UsageError for a tolerance that is not positive, or below the side of the root by
-///         2^−kMaxOctreeDepth
+/// @throws UsageError for a tolerance that is not positive, or below the side of the root times
+///         2^(1 − kMaxOctreeDepth)
 /// @throws InvalidInput for an empty or infinite box, and if the spacing of representable
 ///         coordinates exceeds an eighth of the tolerance
 /// @throws ResourceLimit, Cancelled

@@ -5,9 +5,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <optional>
-#include <vector>
-
-#include "levelset/adaptive/adaptive_tree.h"
 
 namespace levelset {
 namespace {
@@ -15,13 +12,18 @@ namespace {
 using Imath::V3d;
 using Imath::V3i;
 
-/// Finds the largest leaf that touches a point of a block's lattice and is no child of a cell of
-/// the size of the block's parent. The point is no corner of the parent.
+/// Source of the value at a point of a block's lattice.
+struct Source {
+  std::optional<HashedOctree::Place> larger;  ///< largest leaf that touches the point
+  std::uint32_t block;  ///< first one of the blocks of this size that have the point
+};
+
+/// Finds the source of a point that is no corner of the block's parent.
 /// @param at  0 to 2 along each axis, with a 1
-std::optional<HashedOctree::Place> largerLeaf(const HashedOctree& octree, const CellKey& parent,
-                                              const V3i& at) {
+Source sourceOf(const HashedOctree& octree, std::uint32_t block, const V3i& at) {
+  const CellKey parent = octree.parent(block);
   const int side = 1 << octree.depth(), edge = static_cast<int>(parent.edge());
-  std::optional<HashedOctree::Place> largest;
+  Source source{{}, block};
   // Neighbours of the parent that touch the point: steps along the axes on which it lies at an end.
   for (int steps = 1; steps < 8; ++steps) {
     V3i low = parent.low();
@@ -33,17 +35,21 @@ std::optional<HashedOctree::Place> largerLeaf(const HashedOctree& octree, const 
       if (low[axis] < 0 || low[axis] >= side) isBeside = false;
     }
     if (!isBeside) continue;
-    const CellKey beside{std::uint32_t(low.x), std::uint32_t(low.y), std::uint32_t(low.z),
-                         parent.level};
-    if (octree.isSplit(beside)) continue;
+    const std::uint32_t other =
+        octree.block({static_cast<std::uint32_t>(low.x), static_cast<std::uint32_t>(low.y),
+                      static_cast<std::uint32_t>(low.z), parent.level});
+    if (other != HashedOctree::kNone) {
+      source.block = std::min(source.block, other);
+      continue;
+    }
     const HashedOctree::Place place =
         octree.findLeaf(low, [&](const CellKey& key) { return octree.block(key); });
-    if (!largest || place.leaf.level > largest->leaf.level) largest = place;
+    if (!source.larger || place.leaf.level > source.larger->leaf.level) source.larger = place;
   }
-  return largest;
+  return source;
 }
 
-void constrainBlock(AdaptiveTree& tree, std::uint32_t block) {
+void fill(const AdaptiveTree& tree, std::uint32_t block, std::vector<BlockValues>& values) {
   const HashedOctree& octree = tree.octree;
   const CellKey parent = octree.parent(block);
   const std::uint32_t outer =
@@ -53,30 +59,41 @@ void constrainBlock(AdaptiveTree& tree, std::uint32_t block) {
     for (int y = 0; y < 3; ++y)
       for (int x = 0; x < 3; ++x) {
         const V3i at(x, y, z);
-        float& value = tree.values[block][static_cast<std::size_t>(x + 3 * y + 9 * z)];
+        const auto i = static_cast<std::size_t>(x + 3 * y + 9 * z);
         if (x != 1 && y != 1 && z != 1) {
           // A corner of the parent has its value in the block of the parent already.
-          if (outer != HashedOctree::kNone)
-            value = tree.corner(outer, parent.octant(), x / 2 | y / 2 << 1 | z / 2 << 2);
+          values[block][i] = outer == HashedOctree::kNone
+                                 ? tree.values[block][i]
+                                 : values[outer][AdaptiveTree::latticeIndex(
+                                       parent.octant(), x / 2 | y / 2 << 1 | z / 2 << 2)];
           continue;
         }
-        const auto place = largerLeaf(octree, parent, at);
-        if (!place) continue;
-        const V3d local = V3d(parent.low() + at * half - place->leaf.low()) / place->leaf.edge();
-        value = static_cast<float>(tree.interpolate(*place, local));
+        const Source source = sourceOf(octree, block, at);
+        if (source.larger) {
+          const CellKey& leaf = source.larger->leaf;
+          const V3d local = V3d(parent.low() + at * half - leaf.low()) / leaf.edge();
+          values[block][i] =
+              static_cast<float>(interpolate(values[source.larger->block], leaf.octant(), local));
+        } else {
+          const V3i p = (parent.low() + at * half - octree.parent(source.block).low()) / half;
+          values[block][i] =
+              tree.values[source.block][static_cast<std::size_t>(p.x + 3 * p.y + 9 * p.z)];
+        }
       }
 }
 
 }  // namespace
 
-void constrainHangingNodes(AdaptiveTree& tree) {
+std::vector<BlockValues> continuousValues(const AdaptiveTree& tree) {
+  std::vector<BlockValues> values(tree.values.size());
   // Large cells first: a leaf must have its own values before smaller ones take them over.
   std::vector<std::vector<std::uint32_t>> levels(static_cast<std::size_t>(tree.octree.depth()) + 1);
   for (std::uint32_t block = 0; block < tree.octree.blockCount(); ++block)
     levels[static_cast<std::size_t>(tree.octree.parent(block).level)].push_back(block);
   for (auto blocks = levels.rbegin(); blocks != levels.rend(); ++blocks)
     tbb::parallel_for(std::size_t{0}, blocks->size(),
-                      [&](std::size_t k) { constrainBlock(tree, (*blocks)[k]); });
+                      [&](std::size_t k) { fill(tree, (*blocks)[k], values); });
+  return values;
 }
 
 }  // namespace levelset

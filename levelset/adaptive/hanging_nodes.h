@@ -2,12 +2,15 @@
 
 // Internal header of levelset: public headers must not include it.
 
+#include <vector>
+
+#include "levelset/adaptive/adaptive_tree.h"
+
 namespace levelset {
 
-struct AdaptiveTree;
-
-/// Makes the field of a tree continuous. A corner that lies on a face or an edge of a larger leaf
-/// gets the interpolated value of that leaf [Sigg06, 3.4.1].
-void constrainHangingNodes(AdaptiveTree& tree);
+/// Returns values that make the field of a tree continuous. A corner that lies on a face or an edge
+/// of a larger leaf gets the interpolated value of that leaf [Sigg06, 3.4.1]. Blocks that share a
+/// corner get the same bits.
+[[nodiscard]] std::vector<BlockValues> continuousValues(const AdaptiveTree& tree);
 
 }  // namespace levelset

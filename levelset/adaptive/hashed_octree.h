@@ -14,7 +14,8 @@ namespace levelset {
 
 /// Octree without pointers: a hash table finds cells by their keys [Sigg06, chapter 3]. The eight
 /// children of a cell form a block, and the table holds the cells that have children. So a cell
-/// costs about 3 bytes, and 25 with one entry for each cell. Access costs one search for any depth.
+/// takes 3 to 4 bytes. The thesis stores one entry for each cell and needs 25 bytes. Access costs
+/// one search at any depth.
 class HashedOctree {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;

@@ -1,17 +1,20 @@
 #include "levelset/adaptive/mesh_distance.h"
 
+#include <fmt/core.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <map>
+#include <tuple>
 #include <utility>
 #include <vector>
 
-#include "levelset/convert/mesh_to_band_input.h"
 #include "levelset/convert/solid_surface.h"
 #include "levelset/error.h"
 #include "levelset/geometry/disjoint_sets.h"
-#include "levelset/geometry/surface_components.h"
 #include "levelset/memory_limit.h"
 #include "levelset/mesh_sign/self_intersections.h"
 
@@ -25,6 +28,14 @@ void flip(convert::Triangle& triangle) {
   std::swap(triangle[1], triangle[2]);
 }
 
+V3d areaVector(const LocalMesh& mesh, std::size_t t) {
+  return (mesh.corner(t, 1) - mesh.corner(t, 0)).cross(mesh.corner(t, 2) - mesh.corner(t, 0)) / 2;
+}
+
+V3d centroid(const LocalMesh& mesh, std::size_t t) {
+  return (mesh.corner(t, 0) + mesh.corner(t, 1) + mesh.corner(t, 2)) / 3;
+}
+
 TriangleSearch searchOf(const LocalMesh& mesh) {
   std::vector<TriangleItem> items;
   items.reserve(mesh.triangles.size());
@@ -33,74 +44,187 @@ TriangleSearch searchOf(const LocalMesh& mesh) {
   return TriangleSearch(std::move(items));
 }
 
+/// Side of a triangle: an edge of the mesh.
+struct Side {
+  std::uint32_t low, high, triangle;
+  bool rises;  ///< runs from low to high
+  [[nodiscard]] bool isBeside(const Side& other) const {
+    return low == other.low && high == other.high;
+  }
+};
+
+/// Sides of all triangles; those of an edge follow each other.
+std::vector<Side> sidesOf(const LocalMesh& mesh) {
+  std::vector<Side> sides;
+  sides.reserve(3 * mesh.triangles.size());
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t from = mesh.triangles[t][k], to = mesh.triangles[t][(k + 1) % 3];
+      sides.push_back({std::min(from, to), std::max(from, to), t, from < to});
+    }
+  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
+  });
+  return sides;
+}
+
+/// Patches of a mesh: triangles connected by edges that only two share, in opposite directions.
+/// @param belongs  triangles that may be in a patch with others
+DisjointSets patchesOf(const LocalMesh& mesh, const std::vector<bool>& belongs) {
+  DisjointSets patches(mesh.triangles.size());
+  const std::vector<Side> sides = sidesOf(mesh);
+  for (std::size_t i = 0, end = 0; i < sides.size(); i = end) {
+    for (end = i + 1; end < sides.size() && sides[end].isBeside(sides[i]);) ++end;
+    const Side &a = sides[i], &b = sides[end - 1];
+    if (end == i + 2 && a.rises != b.rises && belongs[a.triangle] && belongs[b.triangle])
+      patches.join(a.triangle, b.triangle);
+  }
+  return patches;
+}
+
+/// The largest triangle of each patch, at the number of the patch.
+std::vector<std::uint32_t> largestOf(const LocalMesh& mesh, DisjointSets& patches) {
+  std::vector<std::uint32_t> largest(mesh.triangles.size());
+  std::vector<double> area(mesh.triangles.size(), -1);
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    const std::uint32_t patch = patches.find(t);
+    const double own = areaVector(mesh, t).length();
+    if (own <= area[patch]) continue;
+    area[patch] = own;
+    largest[patch] = t;
+  }
+  return largest;
+}
+
+/// Step from the centroid of a triangle to a point just in front of it.
+V3d stepInFront(const LocalMesh& mesh, std::size_t t) {
+  constexpr double kStep = 1e-4;
+  const V3d normal = areaVector(mesh, t);
+  const double area = normal.length();
+  return area > 0 ? normal * (kStep / std::sqrt(area)) : V3d(0);
+}
+
+/// Merges the vertices at equal positions from a number on.
+void weld(LocalMesh& mesh, std::size_t firstTriangle) {
+  std::map<std::tuple<double, double, double>, std::uint32_t> numbers;
+  for (std::size_t t = firstTriangle; t < mesh.triangles.size(); ++t)
+    for (std::uint32_t& v : mesh.triangles[t]) {
+      const V3d& p = mesh.points[v];
+      v = numbers.try_emplace({p.x, p.y, p.z}, v).first->second;
+    }
+}
+
+/// Passes progress on that never decreases.
+Progress rising(const Progress& progress) {
+  if (!progress) return {};
+  return [progress, high = 0.0](double fraction) mutable {
+    high = std::max(high, fraction);
+    return progress(high);
+  };
+}
+
 }  // namespace
 
 MeshDistance::MeshDistance(const TriMesh& mesh, double voxel, const MeshToBandOptions& options)
     : voxel_(voxel) {
-  convert::checkMeshInput(mesh, voxel, options);
+  const Progress progress = rising(options.progress);
   convert::SolidSurface surface =
-      convert::solidSurface(mesh, voxel, options, subProgress(options.progress, 0, 0.8));
+      convert::solidSurface(mesh, voxel, options, subProgress(progress, 0, 0.6));
   certificate_ = surface.certificate;
   origin_ = V3d(surface.origin);
   const std::size_t given = surface.mesh.triangles.size();
   const bool isOpen = surface.field.isOpen();
-  if (isOpen)
+  LocalMesh before;
+  if (isOpen) {
+    before = surface.mesh;
     convert::addOpenSurface(surface, options.halfWidth, memoryLimit(options.maxMemory),
-                            subProgress(options.progress, 0.8, 1));
+                            subProgress(progress, 0.6, 0.7));
+  }
   mesh_ = std::move(surface.mesh);
+  requireOrientation();
   if (certificate_.method == SignMode::Closed && options.nesting == Nesting::Parity)
     orientComponents();
   else if (surface.field.isFlipped())
     flip_ = -1;
-  if (isOpen) orientSpan(given);
+  report(progress, 0.75);
+  if (isOpen) {
+    const convert::WindingField field(before);
+    weld(mesh_, given);
+    orientSpan(given, field);
+    measureAmbiguity(field);
+  }
+  report(progress, 0.8);
   search_ = searchOf(mesh_);
   normals_.emplace(mesh_);
   winding_ = convert::WindingField(mesh_);
-  if (certificate_.method == SignMode::Winding) {
-    findSeparating();
-    measureAmbiguity(given);
+  report(progress, 0.9);
+  if (certificate_.method == SignMode::Winding) findSeparating();
+  report(progress, 1);
+}
+
+/// Refuses a closed mesh in which triangles that share an edge run along it in the same direction.
+void MeshDistance::requireOrientation() const {
+  if (certificate_.method != SignMode::Closed) return;
+  const std::vector<Side> sides = sidesOf(mesh_);
+  std::size_t wrong = 0;
+  for (std::size_t i = 0, end = 0; i < sides.size(); i = end) {
+    long balance = 0;
+    for (end = i; end < sides.size() && sides[end].isBeside(sides[i]); ++end)
+      balance += sides[end].rises ? 1 : -1;
+    wrong += balance != 0;
   }
+  if (wrong > 0)
+    throw InvalidInput(
+        fmt::format("at {} edges neighbouring triangles have opposite orientations; orient them "
+                    "alike, or convert the mesh to a narrow band",
+                    wrong));
 }
 
 /// Makes each component face away from the solid: outwards in an even depth of nesting, else
 /// inwards. The winding number is then 1 inside and 0 outside.
 void MeshDistance::orientComponents() {
-  const SurfaceComponents parts = findSurfaceComponents(mesh_.points, mesh_.triangles);
-  const auto partOf = [&](const convert::Triangle& t) { return parts.componentOfVertex[t[0]]; };
-  for (convert::Triangle& t : mesh_.triangles)
-    if (parts.figures[partOf(t)].volume < 0) flip(t);
-  if (parts.figures.size() == 1) return;
-  // All components face outwards now: the winding number counts the components around a point. At
-  // a corner of a component, the component itself adds a fraction.
-  std::vector<V3d> corners(parts.figures.size());
-  for (const convert::Triangle& t : mesh_.triangles) corners[partOf(t)] = mesh_.points[t[0]];
-  std::vector<bool> isInner(corners.size());
+  DisjointSets parts = patchesOf(mesh_, std::vector<bool>(mesh_.triangles.size(), true));
+  std::vector<double> volume(mesh_.triangles.size(), 0);
+  for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+    const std::uint32_t part = parts.find(t);
+    // Relative to a corner of the part, so that distant parts keep their digits.
+    volume[part] += areaVector(mesh_, t).dot(mesh_.corner(t, 0) - mesh_.corner(part, 0));
+  }
+  bool isOne = true;
+  for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+    isOne = isOne && parts.find(t) == 0;
+    if (volume[parts.find(t)] < 0) flip(mesh_.triangles[t]);
+  }
+  if (isOne) return;
+  // All components face outwards now: the winding number in front of a component counts those
+  // around it.
+  const std::vector<std::uint32_t> largest = largestOf(mesh_, parts);
+  std::vector<bool> isInner(mesh_.triangles.size());
   {
     const convert::WindingField field(mesh_);
-    for (std::size_t k = 0; k < corners.size(); ++k) {
-      constexpr double kRounding = 1e-3;
-      const double depth = std::floor(field.within(kRounding / 2, corners[k]) + kRounding);
-      isInner[k] = std::fmod(depth, 2) == 1;
+    for (std::uint32_t part = 0; part < mesh_.triangles.size(); ++part) {
+      if (parts.find(part) != part) continue;
+      constexpr double kTolerance = 0.02;
+      const std::uint32_t t = largest[part];
+      const double depth = field.within(kTolerance, centroid(mesh_, t) + stepInFront(mesh_, t));
+      isInner[part] = std::lround(depth) % 2 != 0;
     }
   }
-  for (convert::Triangle& t : mesh_.triangles)
-    if (isInner[partOf(t)]) flip(t);
+  for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
+    if (isInner[parts.find(t)]) flip(mesh_.triangles[t]);
 }
 
-/// Orients the triangles that span holes: the winding number of the others is smaller in front.
-void MeshDistance::orientSpan(std::size_t first) {
-  LocalMesh given = mesh_;
-  given.triangles.resize(first);
-  const convert::WindingField field(given);
-  for (std::size_t t = first; t < mesh_.triangles.size(); ++t) {
-    const V3d &a = mesh_.corner(t, 0), &b = mesh_.corner(t, 1), &c = mesh_.corner(t, 2);
-    const V3d normal = (b - a).cross(c - a);
-    if (normal.length2() == 0) continue;
-    const V3d centre = (a + b + c) / 3, step = normal.normalized() * 0.25;
-    if (flip_ * (field.exact(centre + step) - field.exact(centre - step)) > 0)
-      flip(mesh_.triangles[t]);
-    if (flip_ < 0) flip(mesh_.triangles[t]);
-  }
+/// Orients the triangles that span holes: the winding number of the given ones is smaller in front.
+void MeshDistance::orientSpan(std::size_t first, const convert::WindingField& given) {
+  constexpr double kStep = 0.25, kTolerance = 0.01;
+  tbb::parallel_for(first, mesh_.triangles.size(), [&](std::size_t t) {
+    const V3d normal = areaVector(mesh_, t);
+    if (normal.length2() == 0) return;
+    const V3d centre = centroid(mesh_, t), step = normal.normalized() * kStep;
+    const double rise =
+        given.within(kTolerance, centre + step) - given.within(kTolerance, centre - step);
+    if (rise > 0) flip(mesh_.triangles[t]);
+  });
 }
 
 /// Finds the triangles whose normals tell inside from outside. Inner sheets have the inside on both
@@ -111,68 +235,72 @@ void MeshDistance::findSeparating() {
   separates_.assign(count, true);
   for (const auto& [a, b] : convert::findSelfIntersections(mesh_.triangles, mesh_.points, {}))
     separates_[a] = separates_[b] = false;
-  // Patches: triangles that share an edge with one other triangle, in opposite directions.
-  DisjointSets patches(count);
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> sides;
-  sides.reserve(3 * count);
-  for (std::uint32_t t = 0; t < count; ++t)
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint64_t from = mesh_.triangles[t][k], to = mesh_.triangles[t][(k + 1) % 3];
-      sides.emplace_back(std::min(from, to) << 32 | std::max(from, to), t);
-    }
-  std::sort(sides.begin(), sides.end());
-  for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
-    const auto [edge, a] = sides[i];
-    const auto [next, b] = sides[i + 1];
-    const bool isShared = edge == next && (i == 0 || sides[i - 1].first != edge) &&
-                          (i + 2 == sides.size() || sides[i + 2].first != edge);
-    if (isShared && separates_[a] && separates_[b]) patches.join(a, b);
-  }
+  DisjointSets patches = patchesOf(mesh_, separates_);
   // The largest triangle of a patch decides.
-  const auto areaOf = [&](std::uint32_t t) {
-    return (mesh_.corner(t, 1) - mesh_.corner(t, 0)).cross(mesh_.corner(t, 2) - mesh_.corner(t, 0));
-  };
-  std::vector<std::uint32_t> largest(count);
-  std::vector<double> area(count, -1);
-  for (std::uint32_t t = 0; t < count; ++t) {
-    const std::uint32_t patch = patches.find(t);
-    const double own = areaOf(t).length();
-    if (own > area[patch]) {
-      area[patch] = own;
-      largest[patch] = t;
-    }
-  }
+  const std::vector<std::uint32_t> largest = largestOf(mesh_, patches);
   std::vector<bool> isOuter(count);
   for (std::uint32_t patch = 0; patch < count; ++patch) {
-    if (patches.find(patch) != patch || !separates_[patch] || !(area[patch] > 0)) continue;
-    const std::uint32_t t = largest[patch];
-    const V3d centre = (mesh_.corner(t, 0) + mesh_.corner(t, 1) + mesh_.corner(t, 2)) / 3;
-    constexpr double kStep = 1e-4, kTolerance = 0.02;
-    const V3d step = flip_ * areaOf(t).normalized() * (kStep * std::sqrt(area[patch]));
-    isOuter[patch] = flip_ * winding_.within(kTolerance, centre + step) < 0.5 &&
-                     flip_ * winding_.within(kTolerance, centre - step) > 0.5;
+    if (patches.find(patch) != patch || !separates_[patch]) continue;
+    const V3d centre = centroid(mesh_, largest[patch]),
+              step = flip_ * stepInFront(mesh_, largest[patch]);
+    constexpr double kTolerance = 0.02, kOutside = 0.3, kInside = 0.7;
+    isOuter[patch] = flip_ * winding_.within(kTolerance, centre + step) < kOutside &&
+                     flip_ * winding_.within(kTolerance, centre - step) > kInside;
   }
   for (std::uint32_t t = 0; t < count; ++t)
     separates_[t] = separates_[t] && isOuter[patches.find(t)];
 }
 
-/// Counts the points beside triangles that are neither clearly inside nor clearly outside.
-void MeshDistance::measureAmbiguity(std::size_t given) {
-  constexpr std::size_t kMost = 4000;
-  constexpr double kStep = 0.25, kTolerance = 0.02, kDoubt = 0.25;
-  const std::size_t stride = given / kMost + 1;
-  std::size_t points = 0, ambiguous = 0;
-  for (std::size_t t = 0; t < given; t += stride) {
-    const V3d &a = mesh_.corner(t, 0), &b = mesh_.corner(t, 1), &c = mesh_.corner(t, 2);
-    const V3d normal = (b - a).cross(c - a);
-    if (normal.length2() == 0) continue;
-    const V3d centre = (a + b + c) / 3, step = normal.normalized() * kStep;
-    for (const V3d& p : {centre + step, centre - step}) {
-      ++points;
-      ambiguous += std::abs(flip_ * winding_.within(kTolerance, p) - 0.5) < kDoubt;
-    }
+/// Measures the share of the area beside which points are neither clearly inside nor clearly
+/// outside of the given triangles.
+void MeshDistance::measureAmbiguity(const convert::WindingField& given) {
+  constexpr std::size_t kMost = 8000;
+  constexpr double kStep = 0.5, kTolerance = 0.02, kDoubt = 0.25;
+  const std::size_t stride = mesh_.triangles.size() / kMost + 1;
+  double area = 0, ambiguous = 0;
+  for (std::size_t t = 0; t < mesh_.triangles.size(); t += stride) {
+    const V3d normal = areaVector(mesh_, t);
+    const double own = normal.length();
+    if (own == 0) continue;
+    const V3d centre = centroid(mesh_, t), step = normal * (kStep / own);
+    area += own;
+    for (const V3d& p : {centre + step, centre - step})
+      if (std::abs(flip_ * given.within(kTolerance, p) - 0.5) < kDoubt) ambiguous += own / 2;
   }
-  certificate_.ambiguousShare = points > 0 ? double(ambiguous) / double(points) : 1;
+  certificate_.ambiguousShare = area > 0 ? ambiguous / area : 1;
+}
+
+void MeshDistance::visitSurface(const Imath::Box3d& box,
+                                const std::function<bool(const V3d&)>& visit) const {
+  const Imath::Box3d local(box.min / voxel_ - origin_, box.max / voxel_ - origin_);
+  const V3d centre = (local.min + local.max) * 0.5;
+  const double reach = (local.max - centre).length2();
+  bool goesOn = true;
+  const auto pass = [&](const V3d& p) { goesOn = goesOn && visit((p + origin_) * voxel_); };
+  search_.visit(centre, reach, [&](const TriangleItem& item) {
+    for (std::size_t k = 0; k < 3 && goesOn; ++k) {
+      const V3d &a = item.corners[k], &b = item.corners[(k + 1) % 3];
+      // The part of the edge in the box.
+      double from = 0, to = 1;
+      for (int axis = 0; axis < 3; ++axis) {
+        const double along = b[axis] - a[axis];
+        double enters = (local.min[axis] - a[axis]) / along,
+               leaves = (local.max[axis] - a[axis]) / along;
+        if (along < 0) std::swap(enters, leaves);
+        if (along == 0) {
+          const bool isBetween = a[axis] >= local.min[axis] && a[axis] <= local.max[axis];
+          enters = isBetween ? 0 : 1;
+          leaves = isBetween ? 1 : 0;
+        }
+        from = std::max(from, enters);
+        to = std::min(to, leaves);
+      }
+      if (from > to) continue;
+      pass(a + (b - a) * from);
+      pass(a + (b - a) * (0.5 * (from + to)));
+      pass(a + (b - a) * to);
+    }
+  });
 }
 
 bool MeshDistance::isInside(const V3d& local, std::uint32_t triangle) const {

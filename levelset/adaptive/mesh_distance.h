@@ -21,19 +21,24 @@ namespace levelset {
 class MeshDistance final : public SignedDistance {
  public:
   /// @param voxel  resolution of the surface that spans holes, world units
-  /// @throws as meshToBand(), but for the share of ambiguous signs; InvalidInput if neighbouring
-  ///         triangles have opposite orientations
+  /// @throws InvalidInput for a mesh without area, and if triangles that share an edge have
+  ///         opposite orientations
+  /// @throws as the method of signs demands, see meshToBand()
   MeshDistance(const TriMesh& mesh, double voxel, const MeshToBandOptions& options);
 
   [[nodiscard]] double at(const Imath::V3d& position, const Known& known) const override;
-  /// Certificate of the mesh. Its ambiguous share is that of points beside the triangles.
+  /// Visits the vertices in the box, and the ends and the middle of each edge in it.
+  void visitSurface(const Imath::Box3d& box,
+                    const std::function<bool(const Imath::V3d&)>& visit) const override;
+  /// Certificate of the mesh. Its ambiguous share is a share of the area.
   [[nodiscard]] const SignCertificate& certificate() const { return certificate_; }
 
  private:
   void orientComponents();
-  void orientSpan(std::size_t first);
+  void requireOrientation() const;
+  void orientSpan(std::size_t first, const convert::WindingField& given);
   void findSeparating();
-  void measureAmbiguity(std::size_t given);
+  void measureAmbiguity(const convert::WindingField& given);
   [[nodiscard]] bool isInside(const Imath::V3d& local, std::uint32_t triangle) const;
 
   double voxel_;

@@ -36,22 +36,6 @@ void checkCall(double voxelSize, const MeshToBandOptions& options) {
         fmt::format("the half width is {} voxels; give at least 1", options.halfWidth));
 }
 
-void checkElements(const TriMesh& mesh) {
-  if (mesh.isEmpty())
-    throw InvalidInput("the mesh has no triangles; there is no surface to convert");
-  for (std::size_t v = 0; v < mesh.positions.size(); ++v)
-    if (!isFinite(mesh.positions[v]))
-      throw InvalidInput(
-          fmt::format("vertex {} has the coordinates {}, which are not finite; repair the mesh", v,
-                      text(mesh.positions[v])));
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
-    for (const std::uint32_t v : mesh.triangles[t])
-      if (v >= mesh.positions.size())
-        throw InvalidInput(fmt::format(
-            "triangle {} refers to vertex {}, but there are only {} vertices; repair the mesh", t,
-            v, mesh.positions.size()));
-}
-
 std::uint32_t outermostVertex(const TriMesh& mesh) {
   std::uint32_t result = mesh.triangles[0][0];
   for (const Triangle& t : mesh.triangles)
@@ -113,6 +97,22 @@ void checkPrecision(const TriMesh& mesh, double voxelSize, std::uint32_t outermo
 }
 
 }  // namespace
+
+void checkElements(const TriMesh& mesh) {
+  if (mesh.isEmpty())
+    throw InvalidInput("the mesh has no triangles; there is no surface to convert");
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v)
+    if (!isFinite(mesh.positions[v]))
+      throw InvalidInput(
+          fmt::format("vertex {} has the coordinates {}, which are not finite; repair the mesh", v,
+                      text(mesh.positions[v])));
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    for (const std::uint32_t v : mesh.triangles[t])
+      if (v >= mesh.positions.size())
+        throw InvalidInput(fmt::format(
+            "triangle {} refers to vertex {}, but there are only {} vertices; repair the mesh", t,
+            v, mesh.positions.size()));
+}
 
 void checkMeshInput(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options) {
   checkCall(voxelSize, options);

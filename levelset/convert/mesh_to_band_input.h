@@ -7,6 +7,10 @@
 
 namespace levelset::convert {
 
+/// Checks that a mesh has triangles, and that its coordinates are finite and its indices in range.
+/// @throws InvalidInput
+void checkElements(const TriMesh& mesh);
+
 /// Checks the input of meshToBand, in this order: the voxel size and half width, the vertices and
 /// triangles, the voxel size against the size of the mesh, the index range, the memory, the
 /// precision of the coordinates.

@@ -8,6 +8,7 @@
 
 #include "levelset/eikonal/upwind.h"
 #include "levelset/geometry/search/point_search.h"
+#include "levelset/vdb.h"
 
 namespace levelset::eikonal {
 

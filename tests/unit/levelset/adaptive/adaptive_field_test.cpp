@@ -166,8 +166,8 @@ TEST(AdaptiveField, MovesWithTheMesh) {
   // Far from the origin the same cells have the same errors.
   const TriMesh mesh = support::torusMesh(1, 0.3);
   const TriMesh far = support::transformed(mesh, [](const V3d& p) { return p + V3d(1e6); });
-  const AdaptiveField near = meshToAdaptive(mesh, {.tolerance = 0.004}).field,
-                      there = meshToAdaptive(far, {.tolerance = 0.004}).field;
+  const AdaptiveField near = meshToAdaptive(mesh, {.tolerance = 0.01}).field,
+                      there = meshToAdaptive(far, {.tolerance = 0.01}).field;
   EXPECT_NEAR(double(there.leafCount()), double(near.leafCount()), 0.01 * double(near.leafCount()));
   const MeshDistance truth(far, 0.01, {});
   EXPECT_LE(errorsOf(there, truth, 50000).largest, 1);
@@ -177,28 +177,39 @@ TEST(AdaptiveField, SamplesBeyondItsRoot) {
   const AdaptiveField field = buildAdaptive(kBall, kBallBox, {.tolerance = 0.01});
   const AdaptiveSampler sampler(field);
   EXPECT_NEAR(sampler.value(V3d(10, 0, 0)), 9, 0.05);
-  EXPECT_GT(sampler.value(V3d(-100, 50, 3)), 90);
+  EXPECT_NEAR(sampler.value(V3d(-100, 50, 3)), V3d(-100, 50, 3).length() - 1, 1);
+  EXPECT_TRUE(std::isnan(sampler.value(V3d(NAN, 0, 0))));
+  EXPECT_TRUE(std::isnan(sampler.gradient(V3d(0, INFINITY, 0)).x));
   const V3d slope = sampler.gradient(V3d(0.6, 0.6, 0.6));
   EXPECT_NEAR((slope - V3d(1).normalized()).length(), 0, 0.15);  // measured 0.06
 }
 
-TEST(AdaptiveField, SpendsItsCellsOnDetail) {
-  // A box of 1 with a step of 1/1000: the cells beside the step are a thousandth of the others.
-  const TriMesh mesh =
-      support::joined(support::boxMesh(V3d(0), V3d(1)),
-                      support::boxMesh(V3d(1.001, 0.5, 0.5), V3d(1.002, 0.501, 0.501)));
-  const AdaptiveField field = meshToAdaptive(mesh, {.tolerance = 2e-4, .halfWidth = 1e-3}).field;
-  const MeshDistance truth(mesh, 0.01, {});
-  const AdaptiveSampler sampler(field);
+TEST(AdaptiveField, FindsDetailOnAFlatFace) {
+  // A part of a thousandth of the box, at places that no lattice of a large cell hits.
   std::mt19937 random(2);
   std::uniform_real_distribution<double> unit(0, 1);
-  double largest = 0;
-  for (int k = 0; k < 20000; ++k) {
-    const V3d p = V3d(1, 0.499, 0.499) + V3d(unit(random), unit(random), unit(random)) * 0.003;
-    largest = std::max(largest, std::abs(sampler.value(p) - truth.at(p, {})));
+  for (int place = 0; place < 2; ++place) {
+    const double y = 0.1 + 0.8 * unit(random), z = 0.1 + 0.8 * unit(random);
+    const TriMesh mesh =
+        support::joined(support::boxMesh(V3d(0), V3d(1)),
+                        support::boxMesh(V3d(1.001, y, z), V3d(1.002, y + 0.001, z + 0.001)));
+    const AdaptiveField field = meshToAdaptive(mesh, {.tolerance = 4e-4, .halfWidth = 2e-3}).field;
+    const MeshDistance truth(mesh, 0.01, {});
+    const AdaptiveSampler sampler(field);
+    double largest = 0;
+    for (int k = 0; k < 20000; ++k) {
+      // Beside the detail, and in the column above it.
+      const V3d p = V3d(1, y - 0.002, z - 0.002) +
+                    V3d(0.003 * unit(random), 0.005 * unit(random), 0.005 * unit(random));
+      const double distance = truth.at(p, {});
+      if (std::abs(distance) < field.halfWidth())
+        largest = std::max(largest, std::abs(sampler.value(p) - distance));
+    }
+    EXPECT_LE(largest, field.tolerance());
+    EXPECT_LT(sampler.value(V3d(1.0015, y + 5e-4, z + 5e-4)), 0);
+    // A grid of the size of the smallest cells along one face alone has 16 million cells.
+    EXPECT_LT(field.leafCount(), 900000u);  // measured 604,598
   }
-  EXPECT_LE(largest, 2e-4);
-  EXPECT_LT(sampler.value(V3d(1.0015, 0.5005, 0.5005)), 0);
 }
 
 TEST(AdaptiveField, RefusesBadOptions) {
@@ -221,6 +232,14 @@ TEST(AdaptiveField, RefusesBadOptions) {
   EXPECT_THROW((void)buildAdaptive(kBall, kBallBox, {.tolerance = 1e-3, .progress = cancel}),
                Cancelled);
   EXPECT_THROW((void)meshToAdaptive(TriMesh(), {.tolerance = 1}), InvalidInput);
+  TriMesh mesh = support::boxMesh(V3d(0), V3d(1));
+  mesh.triangles[0][1] = 77;
+  EXPECT_THROW((void)meshToAdaptive(mesh, {.tolerance = 0.1}), InvalidInput);
+  mesh = support::boxMesh(V3d(0), V3d(1));
+  mesh.positions[2].y = INFINITY;
+  EXPECT_THROW((void)meshToAdaptive(mesh, {.tolerance = 0.1}), InvalidInput);
+  EXPECT_THROW((void)meshToAdaptive(support::boxMesh(V3d(3), V3d(3)), {.tolerance = 0.1}),
+               InvalidInput);
 }
 
 /// Union of random balls.
@@ -362,7 +381,20 @@ TEST(MeshDistance, SpansHoles) {
   EXPECT_EQ(measure(mesh).euler, 2);
 }
 
+TEST(MeshDistance, RefusesTrianglesOfOppositeOrientations) {
+  TriMesh box = support::boxMesh(V3d(0), V3d(1));
+  std::swap(box.triangles[3][0], box.triangles[3][1]);
+  EXPECT_THROW((void)meshToAdaptive(box, {.tolerance = 0.01}), InvalidInput);
+}
+
 TEST(MeshDistance, RefusesAmbiguousSigns) {
+  // A bowl: half of its span is a guess.
+  const TriMesh bowl = support::sphereMesh(1, V3d(0), 16, 0.5);
+  EXPECT_THROW((void)meshToAdaptive(bowl, {.tolerance = 0.02}), InvalidInput);
+  const TriMesh mesh =
+      adaptiveToMesh(meshToAdaptive(bowl, {.tolerance = 0.04, .acceptSign = true}).field);
+  EXPECT_TRUE(manifoldness(mesh).isClosedManifold());
+
   TriMesh sheet;
   sheet.positions = {V3d(0), V3d(1, 0, 0), V3d(0, 1, 0)};
   sheet.triangles = {{0, 1, 2}};

@@ -178,13 +178,17 @@ TEST_F(HashedOctreeTest, TellsNodesAndHangingOnes) {
   EXPECT_GT(hanging, 100);
 }
 
-TEST(HashedOctree, TakesThreeBytesForACell) {
+TEST(HashedOctree, TakesThreeToFourBytesForACell) {
   HashedOctree octree(kMaxOctreeDepth);
   octree.split(octree.root());
-  for (std::uint32_t block = 0; octree.blockCount() < 100000; ++block)
+  double largest = 0;
+  for (std::uint32_t block = 0; octree.blockCount() < 300000; ++block) {
     for (int octant = 0; octant < 8; octant += 3) octree.split(octree.parent(block).child(octant));
-  // 8 bytes for the parent of a block, and 12 in a table that is two to four fifths full.
-  EXPECT_LT(double(octree.memoryUse()) / double(octree.cellCount()), 3.6);
+    if (octree.blockCount() > 1000)
+      largest = std::max(largest, double(octree.memoryUse()) / double(octree.cellCount()));
+  }
+  // 8 to 16 bytes for the parent of a block, and 12 in a table that is two thirds full or fuller.
+  EXPECT_LT(largest, 4.3);
 }
 
 }  // namespace hashed_octree_test
