@@ -4,6 +4,7 @@
 #include <functional>
 #include <string>
 
+#include "levelset/convert/distance_method.h"
 #include "levelset/mesh.h"
 #include "levelset/mesh_sign/mesh_queries.h"
 #include "levelset/narrow_band.h"
@@ -43,7 +44,8 @@ struct SignCertificate {
 struct MeshToBandOptions {
   double halfWidth = 3;  ///< half width of the band, voxels, at least 1
   SignMode sign = SignMode::Auto;
-  Nesting nesting = Nesting::Parity;    ///< used with SignMode::Closed only
+  Nesting nesting = Nesting::Parity;  ///< used with SignMode::Closed only
+  DistanceMethod method = DistanceMethod::Blocks;
   bool acceptSign = false;              ///< accept an ambiguous sign, or a mesh without an inside
   bool searchSelfIntersections = true;  ///< false: Auto assumes no self-intersections
   /// Region of interest. Distances outside it are not computed, unless the mesh has holes: then the
