@@ -45,9 +45,9 @@ struct MeshToBandOptions {
   double halfWidth = 3;  ///< half width of the band, voxels, at least 1
   SignMode sign = SignMode::Auto;
   Nesting nesting = Nesting::Parity;  ///< used with SignMode::Closed only
-  DistanceMethod method = DistanceMethod::Blocks;
   bool acceptSign = false;              ///< accept an ambiguous sign, or a mesh without an inside
   bool searchSelfIntersections = true;  ///< false: Auto assumes no self-intersections
+  DistanceMethod method = DistanceMethod::Blocks;
   /// Region of interest. Distances outside it are not computed, unless the mesh has holes: then the
   /// region is ignored. The certificate describes the complete mesh, except for ambiguousShare.
   RegionOfInterest roi = {};

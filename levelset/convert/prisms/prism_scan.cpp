@@ -183,7 +183,7 @@ bool PrismScan::measure(const LocalMesh& mesh, std::span<const std::uint32_t> ca
   bool anyWithin = false;
   for (std::size_t i = 0; i < kBlockVoxels; ++i) {
     distances_[i] = std::sqrt(distances_[i]);
-    anyWithin = anyWithin || nearest_[i] != kNoTriangle;
+    anyWithin = anyWithin || distances_[i] < reach;
   }
   return anyWithin;
 }
