@@ -73,7 +73,7 @@ inline TriMesh seaShell(unsigned along, unsigned around, double turns = 3) {
     mesh.positions.push_back(centre / around);
     for (unsigned j = 0; j < around; ++j) {
       const std::uint32_t a = first + j, b = first + (j + 1) % around;
-      mesh.triangles.push_back(isStart ? std::array{at, b, a} : std::array{at, a, b});
+      mesh.triangles.push_back(isStart ? std::array{at, a, b} : std::array{at, b, a});
     }
   };
   close(0, true);
