@@ -91,16 +91,6 @@ class LeafCollector {
   tbb::enumerable_thread_specific<std::vector<std::unique_ptr<LeafNode>>> leaves_;
 };
 
-/// Returns the test whether the prism of a triangle touches a cell.
-CellTest prismTest(const LocalMesh& mesh, const PrismCovering& prisms) {
-  return [&](std::uint32_t t, const V3d& centre, double halfEdge) {
-    return PrismPlanes(
-               {mesh.corner(t, 0) - centre, mesh.corner(t, 1) - centre, mesh.corner(t, 2) - centre},
-               prisms.prism(t), prisms.reach())
-        .mayTouch(V3d(0), halfEdge);
-  };
-}
-
 using Region = std::optional<openvdb::CoordBBox>;
 
 /// Computes the signs of the tiles of a node. The grid points of a tile lie at least a voxel from

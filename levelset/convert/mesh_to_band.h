@@ -44,7 +44,7 @@ struct SignCertificate {
 struct MeshToBandOptions {
   double halfWidth = 3;  ///< half width of the band, voxels, at least 1
   SignMode sign = SignMode::Auto;
-  Nesting nesting = Nesting::Parity;  ///< used with SignMode::Closed only
+  Nesting nesting = Nesting::Parity;    ///< used with SignMode::Closed only
   bool acceptSign = false;              ///< accept an ambiguous sign, or a mesh without an inside
   bool searchSelfIntersections = true;  ///< false: Auto assumes no self-intersections
   DistanceMethod method = DistanceMethod::Blocks;
@@ -104,6 +104,7 @@ struct LevelSetOperator {
     Nesting nesting = Nesting::Parity;
     bool acceptsSign = false;
     bool skipsIntersectionTest = false;
+    DistanceMethod method = DistanceMethod::Blocks;
 
     template <class Visitor>
     static void describe(Visitor& visit) {
@@ -124,6 +125,11 @@ struct LevelSetOperator {
       visit("skip-intersection-test", &Options::skipsIntersectionTest,
             {.help = "with --sign auto: assume that the mesh has no self-intersections",
              .formerName = "trust-mesh"});
+      visit("method", &Options::method,
+            {{"blocks", DistanceMethod::Blocks}, {"prism", DistanceMethod::Prisms}},
+            {.help = "algorithm of the distances: blocks, which excludes triangles by spheres for "
+                     "each block of grid points; prism, which scans a prism around each triangle. "
+                     "The distances are the same"});
     }
   };
 

@@ -162,6 +162,15 @@ class BlockTraversal {
 
 }  // namespace
 
+CellTest prismTest(const LocalMesh& mesh, const PrismCovering& prisms) {
+  return [&](std::uint32_t t, const V3d& centre, double halfEdge) {
+    return PrismPlanes(
+               {mesh.corner(t, 0) - centre, mesh.corner(t, 1) - centre, mesh.corner(t, 2) - centre},
+               prisms.prism(t), prisms.reach())
+        .mayTouch(V3d(0), halfEdge);
+  };
+}
+
 void forEachBlock(const LocalMesh& mesh, double reach, const BlockVisitor& visit,
                   const Progress& progress, const std::optional<Imath::Box3i>& region,
                   const CellTest& isNeeded) {

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "levelset/convert/prisms/prism_covering.h"
 #include "levelset/mesh_sign/local_mesh.h"
 #include "levelset/progress.h"
 
@@ -23,6 +24,9 @@ using BlockVisitor =
 /// centre and half edge. Called from several threads at once.
 using CellTest =
     std::function<bool(std::uint32_t triangle, const Imath::V3d& centre, double halfEdge)>;
+
+/// Returns the test whether the prism of a triangle may touch a cell.
+[[nodiscard]] CellTest prismTest(const LocalMesh& mesh, const PrismCovering& prisms);
 
 /// Visits all 8³ blocks of grid points that may lie within `reach` voxels of the mesh. Descends an
 /// octree from one root cell to the blocks. Each cell passes to a child the triangles that may lie
