@@ -75,7 +75,9 @@ LeafPair makeLeaves(const LocalMesh& mesh, const PrismScan& scan, const V3i& blo
 ClosestTriangles closestTriangles(const TriMesh& mesh, double voxelSize,
                                   const ClosestTrianglesOptions& options) {
   convert::checkMeshInput(mesh, voxelSize,
-                          {.halfWidth = options.halfWidth, .maxMemory = options.maxMemory});
+                          {.halfWidth = options.halfWidth,
+                           .method = DistanceMethod::Prisms,
+                           .maxMemory = options.maxMemory});
   constexpr std::size_t kMostTriangles = std::size_t{1} << 24;
   if (mesh.triangles.size() > kMostTriangles)
     throw ResourceLimit(
@@ -160,7 +162,7 @@ ValuePlan ClosestTriangleOperator::plan(const Options& options, Plans operands,
 std::optional<Cost> ClosestTriangleOperator::cost(const Options&, const OperatorPlans& plans) {
   const double triangles = plans.operands[0].triangles, voxels = plans.result.activeVoxels();
   if (triangles == 0) return {};
-  return Cost{1e-9 * (3000 * triangles + 250 * voxels), 250 * triangles + 20 * voxels};
+  return Cost{1e-9 * (3000 * triangles + 250 * voxels), 530 * triangles + 20 * voxels};
 }
 
 }  // namespace levelset

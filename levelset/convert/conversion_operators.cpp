@@ -91,9 +91,11 @@ ValuePlan LevelSetOperator::plan(const Options& options, Plans operands, const O
   return plan;
 }
 
-std::optional<Cost> LevelSetOperator::cost(const Options&, const OperatorPlans& plans) {
+std::optional<Cost> LevelSetOperator::cost(const Options& options, const OperatorPlans& plans) {
   const double triangles = plans.operands[0].triangles, voxels = plans.result.activeVoxels();
   if (triangles == 0) return {};
+  if (options.method == DistanceMethod::Prisms)
+    return Cost{1e-9 * (4000 * triangles + 130 * voxels), 340 * triangles + 4 * voxels};
   return Cost{1e-9 * (2800 * triangles + 500 * voxels), 60 * triangles + 4 * voxels};
 }
 

@@ -68,7 +68,7 @@ struct Errors {
   std::size_t wrongSigns = 0;
 };
 
-/// Compares a field with the exact band.
+/// Compares a field with the exact band. That of prisms has the bits of that of blocks.
 template <typename At>
 Errors errorsOf(const NarrowBand& exact, const At& at) {
   Errors errors;
@@ -107,7 +107,7 @@ void convertBy(const std::string& method, const TriMesh& mesh, double voxel, dou
         levelset::convert::toLocal(mesh, levelset::convert::findTopology(mesh), voxel, origin);
     const characteristics::DenseBand band(local, halfWidth);
     stop();
-    errors = errorsOf(exact(DistanceMethod::Blocks), [&](const openvdb::Coord& c) {
+    errors = errorsOf(exact(DistanceMethod::Prisms), [&](const openvdb::Coord& c) {
       return static_cast<double>(band.at(V3i(c.x(), c.y(), c.z()) - origin));
     });
   } else {
@@ -120,7 +120,7 @@ void convertBy(const std::string& method, const TriMesh& mesh, double voxel, dou
         static_cast<float>(halfWidth));
     stop();
     auto accessor = grid->getConstAccessor();
-    errors = errorsOf(exact(DistanceMethod::Blocks), [&](const openvdb::Coord& c) {
+    errors = errorsOf(exact(DistanceMethod::Prisms), [&](const openvdb::Coord& c) {
       return static_cast<double>(accessor.getValue(c)) / voxel;
     });
   }
