@@ -46,8 +46,8 @@ LocalMesh mergedMesh(const TriMesh& mesh, double voxelSize, const V3i& origin) {
   return local;
 }
 
-LeafPair makeLeaves(const LocalMesh& mesh, const PrismScan& scan, const V3i& block,
-                    const V3i& origin, double voxelSize) {
+LeafPair makeLeafPair(const LocalMesh& mesh, const PrismScan& scan, const V3i& block,
+                      const V3i& origin, double voxelSize) {
   const V3i low = block + origin;
   const openvdb::Coord at(low.x, low.y, low.z);
   LeafPair leaves{std::make_unique<IndexLeaf>(at, ClosestTriangles::kNoTriangle, false),
@@ -97,7 +97,7 @@ ClosestTriangles closestTriangles(const TriMesh& mesh, double voxelSize,
       [&](const V3i& block, std::span<const std::uint32_t> candidates) {
         PrismScan& scan = scans.local();
         if (scan.measure(local, candidates, V3d(block)))
-          parts.local().push_back(makeLeaves(local, scan, block, origin, voxelSize));
+          parts.local().push_back(makeLeafPair(local, scan, block, origin, voxelSize));
       },
       subProgress(options.progress, 0.2, 1), {}, convert::prismTest(local, prisms));
   std::vector<LeafPair> leaves;

@@ -16,24 +16,24 @@ using Imath::V2d;
 using Imath::V3d;
 using Imath::V3f;
 
-constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
+constexpr std::uint32_t kNoFace = std::numeric_limits<std::uint32_t>::max();
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 /// Height of a triangle, relative to its longest edge, below which its normal is not reliable.
-constexpr double kThin = 1e-5;
+constexpr double kThinFace = 1e-5;
 /// Length of the sum of two unit normals below which the faces are folded onto each other.
 constexpr double kFolded = 0.1;
 /// Sine of the angle between a direction and a face below which the direction counts as parallel.
-constexpr double kSteep = 0.05;
+constexpr double kSteepRay = 0.05;
 /// Slope above which a plane is moved outwards by the reach instead.
 constexpr double kLargestSlope = 1.5;
 /// Tolerance of the comparisons of unit vectors.
 constexpr double kUnitError = 1e-9;
 /// Generous bounds of the rounding error of planes whose vectors are `float`: a length in voxels,
 /// and a part of the reach and of the longest edge.
-constexpr double kMargin = 1e-4, kRelativeMargin = 1e-6;
+constexpr double kPlaneMargin = 1e-4, kRelativeMargin = 1e-6;
 /// Number of faces at a vertex above which the vertex counts as irregular: the time of its cone
 /// grows with the square of this number.
-constexpr std::size_t kMostFaces = 256;
+constexpr std::size_t kMostRingFaces = 256;
 
 /// Normal of a triangle and outward directions at its edges, all of unit length.
 struct FaceFrame {
@@ -42,7 +42,7 @@ struct FaceFrame {
   bool isThin = true;
 };
 
-FaceFrame frameOf(const std::array<V3d, 3>& corner) {
+FaceFrame faceFrameOf(const std::array<V3d, 3>& corner) {
   FaceFrame frame;
   const V3d cross = (corner[1] - corner[0]).cross(corner[2] - corner[0]);
   std::size_t longest = 0;
@@ -52,7 +52,7 @@ FaceFrame frameOf(const std::array<V3d, 3>& corner) {
     if (squared[k] > squared[longest]) longest = k;
   }
   const double area = cross.length();
-  frame.isThin = !(area > kThin * squared[longest]);
+  frame.isThin = !(area > kThinFace * squared[longest]);
   if (frame.isThin) {
     const V3d along = corner[(longest + 1) % 3] - corner[longest];
     frame.normal =
@@ -122,7 +122,7 @@ class CoveringBuilder {
         shares_(mesh.triangles.size()) {
     collectCorners();
     forTriangles([&](std::uint32_t t) {
-      frames_[t] = frameOf({mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2)});
+      frames_[t] = faceFrameOf({mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2)});
     });
     forTriangles([&](std::uint32_t t) {
       for (std::uint32_t k = 0; k < 3; ++k) neighbours_[t][k] = neighbourAcross(t, k);
@@ -143,8 +143,8 @@ class CoveringBuilder {
       isWhole = isWhole || share.side == CornerShare::Side::Whole;
     std::array<double, 3> front{}, back{};  // slopes
     if (isWhole) {
-      front.fill(kInfinite);
-      back.fill(kInfinite);
+      front.fill(kUnbounded);
+      back.fill(kUnbounded);
     } else {
       for (std::size_t k = 0; k < 3; ++k) addEdge(t, k, front, back);
       for (std::size_t corner = 0; corner < 3; ++corner) {
@@ -168,8 +168,8 @@ class CoveringBuilder {
       prism.outward[k] = V3f(frame.outward[k]);
       longest = std::max(longest, (mesh_.corner(t, (k + 1) % 3) - mesh_.corner(t, k)).length());
     }
-    const double relative = frame.isThin ? kThin : kRelativeMargin;
-    prism.margin = static_cast<float>(kMargin + kRelativeMargin * reach + relative * longest);
+    const double relative = frame.isThin ? kThinFace : kRelativeMargin;
+    prism.margin = static_cast<float>(kPlaneMargin + kRelativeMargin * reach + relative * longest);
     return isWhole;
   }
 
@@ -218,7 +218,7 @@ class CoveringBuilder {
     const std::uint32_t from = mesh_.triangles[t][k], to = mesh_.triangles[t][(k + 1) % 3];
     const auto count = [&](std::uint32_t v) { return first_[v + 1] - first_[v]; };
     const std::uint32_t at = count(from) <= count(to) ? from : to, other = at == from ? to : from;
-    std::uint32_t result = kNone;
+    std::uint32_t result = kNoFace;
     for (std::size_t i = first_[at]; i < first_[at + 1]; ++i) {
       const std::uint32_t face = corners_[i] / 3, corner = corners_[i] % 3;
       if (face == t) continue;
@@ -227,7 +227,7 @@ class CoveringBuilder {
                  isLast = vertices[(corner + 2) % 3] == other;
       if (!isNext && !isLast) continue;
       const bool isOpposite = at == to ? isNext : isLast;
-      if (result != kNone || !isOpposite) return kNone;
+      if (result != kNoFace || !isOpposite) return kNoFace;
       result = face;
     }
     return result;
@@ -238,12 +238,12 @@ class CoveringBuilder {
                std::array<double, 3>& back) const {
     const FaceFrame& frame = frames_[t];
     const std::uint32_t other = neighbours_[t][k];
-    if (other != kNone && frames_[other].isThin) return;  // the neighbour covers the whole wedge
-    const V3d bisector = other == kNone ? V3d(0) : frame.normal + frames_[other].normal;
+    if (other != kNoFace && frames_[other].isThin) return;  // the neighbour covers the whole wedge
+    const V3d bisector = other == kNoFace ? V3d(0) : frame.normal + frames_[other].normal;
     if (bisector.length() < kFolded) {
       for (std::size_t j = 0; j < 3; ++j)
         if (j == k || frame.outward[k].dot(frame.outward[j]) > kUnitError)
-          front[j] = back[j] = kInfinite;
+          front[j] = back[j] = kUnbounded;
       return;
     }
     const double height = bisector.dot(frame.normal), across = bisector.dot(frame.outward[k]);
@@ -262,7 +262,7 @@ class CoveringBuilder {
     ring.corners.clear();
     ring.spokes.clear();
     const std::size_t count = first_[vertex + 1] - first_[vertex];
-    if (count < 3 || count > kMostFaces) return false;
+    if (count < 3 || count > kMostRingFaces) return false;
     const std::uint32_t start = corners_[first_[vertex]] / 3;
     std::uint32_t face = start, corner = corners_[first_[vertex]] % 3;
     do {
@@ -272,7 +272,7 @@ class CoveringBuilder {
       const V3d spoke = mesh_.corner(face, (corner + 1) % 3) - mesh_.points[vertex];
       ring.spokes.push_back(spoke / spoke.length());
       face = neighbours_[face][(corner + 2) % 3];
-      if (face == kNone) return false;
+      if (face == kNoFace) return false;
       corner = 0;
       while (mesh_.triangles[face][corner] != vertex) ++corner;
     } while (face != start);
@@ -337,8 +337,8 @@ class CoveringBuilder {
       if (height < -kUnitError) share.side = CornerShare::Side::Whole;
       for (std::size_t k = 0; k < 3; ++k) {
         const double across = ray.dot(frame.outward[k]);
-        double ratio = height > kSteep ? across / height : 0;
-        if (height <= kSteep && across > kUnitError) ratio = kInfinite;
+        double ratio = height > kSteepRay ? across / height : 0;
+        if (height <= kSteepRay && across > kUnitError) ratio = kUnbounded;
         share.ratio[k] = std::max(share.ratio[k], static_cast<float>(ratio));
       }
     }
@@ -357,7 +357,7 @@ class CoveringBuilder {
   std::vector<std::size_t> first_;  // of each vertex in corners_
   std::vector<std::uint32_t> corners_;
   std::vector<FaceFrame> frames_;
-  std::vector<std::array<std::uint32_t, 3>> neighbours_;  // across each edge; kNone: irregular
+  std::vector<std::array<std::uint32_t, 3>> neighbours_;  // across each edge; kNoFace: irregular
   std::vector<std::array<CornerShare, 3>> shares_;
 };
 

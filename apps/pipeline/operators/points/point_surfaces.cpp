@@ -96,14 +96,14 @@ Value surfaceOfPoints(Invocation& in) {
 }
 
 /// Values of --method for point clouds. The others are for meshes.
-constexpr std::array kPointMethods = {"mls", "mpu", "meshless", "rbf", "particles"};
+constexpr std::array kCloudMethods = {"mls", "mpu", "meshless", "rbf", "particles"};
 
 /// Refuses a method of the other kind of operand.
 void checkMethod(const Invocation& in) {
   if (!in.given("method") || in.operands.empty()) return;
   const std::string word = in.text("method");
   const bool isOfPoints =
-      std::find(kPointMethods.begin(), kPointMethods.end(), word) != kPointMethods.end();
+      std::find(kCloudMethods.begin(), kCloudMethods.end(), word) != kCloudMethods.end();
   if (isOfPoints == takesPoints(in)) return;
   throw UsageError(
       fmt::format("level-set: --method {} is for {}, but the operand is a {}; {}", word,
@@ -162,7 +162,7 @@ Operator conversionOperator() {
           "with a mesh: algorithm of the distances, which are the same; blocks excludes triangles "
           "for each block of grid points, prism scans a prism around each triangle. With a point "
           "cloud: surface through the points, by default mls";
-      param.choices.insert(param.choices.end(), kPointMethods.begin(), kPointMethods.end());
+      param.choices.insert(param.choices.end(), kCloudMethods.begin(), kCloudMethods.end());
     }
   op.params.push_back({.name = "neighbours",
                        .type = ParamType::Integer,
