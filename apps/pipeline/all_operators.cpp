@@ -5,6 +5,7 @@
 #include "apps/pipeline/registry/operator.h"
 #include "levelset/advection/advect.h"
 #include "levelset/components/components.h"
+#include "levelset/convert/closest_triangles.h"
 #include "levelset/convert/surface_band.h"
 #include "levelset/csg/blend.h"
 #include "levelset/csg/csg.h"
@@ -34,6 +35,7 @@ std::vector<Operator> allOperators() {
       levelSetOperator<levelset::CapsuleOperator>(),
       conversionOperator(),
       levelSetOperator<levelset::SurfaceBandOperator>(),
+      levelSetOperator<levelset::ClosestTriangleOperator>(),
       meshOperator(),
       volumeOperator(),
       blurOperator(),

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <memory>
 
+#include "levelset/convert/prisms/prism_scan.h"
 #include "levelset/convert/surface_blocks.h"
 #include "levelset/mesh_sign/triangle_distance.h"
 
@@ -41,14 +42,12 @@ V3i toV3i(const Coord& p) {
 class LeafCollector {
  public:
   LeafCollector(double reach, double voxelSize, std::size_t maxMemory)
-      : voxelSize_(voxelSize),
-        background_(backgroundOf(reach, voxelSize)),
-        maxMemory_(maxMemory),
-        scratch_([reach] { return BlockDistance(reach); }) {}
+      : voxelSize_(voxelSize), background_(backgroundOf(reach, voxelSize)), maxMemory_(maxMemory) {}
 
-  void add(const LocalMesh& surface, const SignField& field, const V3i& block,
+  /// @param distance  measures the grid points of a block, BlockDistance or PrismScan
+  template <typename Distance>
+  void add(Distance& distance, const LocalMesh& surface, const SignField& field, const V3i& block,
            std::span<const std::uint32_t> candidates, const V3i& origin, double reach) {
-    BlockDistance& distance = scratch_.local();
     if (!distance.measure(surface, candidates, V3d(block))) return;
     SignField::BlockWinding winding;
     field.winding(block, winding);
@@ -89,7 +88,6 @@ class LeafCollector {
   float background_;
   std::size_t maxMemory_;
   std::atomic<std::size_t> count_{0};
-  tbb::enumerable_thread_specific<BlockDistance> scratch_;
   tbb::enumerable_thread_specific<std::vector<std::unique_ptr<LeafNode>>> leaves_;
 };
 
@@ -175,17 +173,28 @@ void signRootTilesIn(const openvdb::CoordBBox& region, FloatTree& tree, const Si
 
 openvdb::FloatGrid::Ptr assembleBand(const LocalMesh& surface, const SignField& field,
                                      const V3i& origin, double voxelSize, double halfWidth,
+                                     DistanceMethod method,
                                      const std::optional<openvdb::CoordBBox>& region,
                                      std::size_t maxMemory, const Progress& progress) {
   std::optional<Imath::Box3i> visited;
   if (region) visited = {toV3i(region->min()) - origin, toV3i(region->max()) - origin};
   LeafCollector collector(halfWidth, voxelSize, maxMemory);
-  forEachBlock(
-      surface, halfWidth,
-      [&](const V3i& block, std::span<const std::uint32_t> candidates) {
-        collector.add(surface, field, block, candidates, origin, halfWidth);
-      },
-      progress, visited);
+  // Each thread measures with a copy of `distance`.
+  const auto collect = [&](const auto& distance, const CellTest& isNeeded) {
+    tbb::enumerable_thread_specific<std::decay_t<decltype(distance)>> scratch(distance);
+    forEachBlock(
+        surface, halfWidth,
+        [&](const V3i& block, std::span<const std::uint32_t> candidates) {
+          collector.add(scratch.local(), surface, field, block, candidates, origin, halfWidth);
+        },
+        progress, visited, isNeeded);
+  };
+  if (method == DistanceMethod::Prisms) {
+    const PrismCovering prisms(surface, halfWidth);
+    collect(PrismScan(prisms), prismTest(surface, prisms));
+  } else {
+    collect(BlockDistance(halfWidth), {});
+  }
   openvdb::FloatGrid::Ptr grid = collector.finish(halfWidth);
   const float background = grid->background();
   signTilesOfAll<Lower>(grid->tree(), field, origin, background, region);

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <optional>
 
+#include "levelset/convert/distance_method.h"
 #include "levelset/mesh_sign/sign_field.h"
 #include "levelset/vdb.h"
 
@@ -10,6 +11,7 @@ namespace levelset::convert {
 
 /// Computes distances and signs in all blocks within `halfWidth` voxels of the surface and
 /// assembles them into a tree.
+/// @param method   algorithm of the distances; both give the same values
 /// @param region   index box of the blocks to compute; empty: all blocks. Tiles that do not
 ///                 intersect it are set to outside
 /// @param surface  mesh, with the surfaces that span its holes, in voxels relative to `origin`
@@ -19,7 +21,7 @@ namespace levelset::convert {
 ///         elsewhere
 [[nodiscard]] openvdb::FloatGrid::Ptr assembleBand(const LocalMesh& surface, const SignField& field,
                                                    const Imath::V3i& origin, double voxelSize,
-                                                   double halfWidth,
+                                                   double halfWidth, DistanceMethod method,
                                                    const std::optional<openvdb::CoordBBox>& region,
                                                    std::size_t maxMemory, const Progress& progress);
 

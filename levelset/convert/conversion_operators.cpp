@@ -38,7 +38,7 @@ const OperatorText LevelSetOperator::text{
         "found, otherwise 'winding' (inside where the generalised winding number exceeds one "
         "half). The sign certificate in the report lists the properties of the mesh. A mesh whose "
         "sign would be a guess is an error "
-        "without --accept-sign.",
+        "without --accept-sign. --method prism is faster for wide bands.",
     .example = "levelsmith read dragon.ply ! level-set --resolution 512 ! write dragon.vdb"};
 
 double LevelSetOperator::longestSide(const Options&, Plans operands) {
@@ -51,6 +51,7 @@ NarrowBand LevelSetOperator::run(const TriMesh& mesh, const Options& options, Op
                                    .nesting = options.nesting,
                                    .acceptSign = options.acceptsSign,
                                    .searchSelfIntersections = !options.skipsIntersectionTest,
+                                   .method = options.method,
                                    .roi = run.roi,
                                    .maxMemory = run.maxMemory,
                                    .progress = run.progress,
@@ -90,9 +91,11 @@ ValuePlan LevelSetOperator::plan(const Options& options, Plans operands, const O
   return plan;
 }
 
-std::optional<Cost> LevelSetOperator::cost(const Options&, const OperatorPlans& plans) {
+std::optional<Cost> LevelSetOperator::cost(const Options& options, const OperatorPlans& plans) {
   const double triangles = plans.operands[0].triangles, voxels = plans.result.activeVoxels();
   if (triangles == 0) return {};
+  if (options.method == DistanceMethod::Prisms)
+    return Cost{1e-9 * (4000 * triangles + 130 * voxels), 340 * triangles + 4 * voxels};
   return Cost{1e-9 * (2800 * triangles + 500 * voxels), 60 * triangles + 4 * voxels};
 }
 

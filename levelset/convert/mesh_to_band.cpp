@@ -103,8 +103,9 @@ MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
           "does");
     region = blocksOf(reached, *uniformTransform(voxelSize));
   }
-  const auto grid = convert::assembleBand(local, field, origin, voxelSize, halfWidth, region,
-                                          maxMemory, subProgress(progress, 0.6, 1));
+  const auto grid =
+      convert::assembleBand(local, field, origin, voxelSize, halfWidth, options.method, region,
+                            maxMemory, subProgress(progress, 0.6, 1));
   certificate.ambiguousShare = convert::ambiguousShare(*grid, field, origin);
   if (options.onCertificate) options.onCertificate(certificate);
   checkResult(*grid, certificate, options);

@@ -4,6 +4,7 @@
 #include <functional>
 #include <string>
 
+#include "levelset/convert/distance_method.h"
 #include "levelset/mesh.h"
 #include "levelset/mesh_sign/mesh_queries.h"
 #include "levelset/narrow_band.h"
@@ -46,6 +47,7 @@ struct MeshToBandOptions {
   Nesting nesting = Nesting::Parity;    ///< used with SignMode::Closed only
   bool acceptSign = false;              ///< accept an ambiguous sign, or a mesh without an inside
   bool searchSelfIntersections = true;  ///< false: Auto assumes no self-intersections
+  DistanceMethod method = DistanceMethod::Blocks;
   /// Region of interest. Distances outside it are not computed, unless the mesh has holes: then the
   /// region is ignored. The certificate describes the complete mesh, except for ambiguousShare.
   RegionOfInterest roi = {};
@@ -102,6 +104,7 @@ struct LevelSetOperator {
     Nesting nesting = Nesting::Parity;
     bool acceptsSign = false;
     bool skipsIntersectionTest = false;
+    DistanceMethod method = DistanceMethod::Blocks;
 
     template <class Visitor>
     static void describe(Visitor& visit) {
@@ -122,6 +125,11 @@ struct LevelSetOperator {
       visit("skip-intersection-test", &Options::skipsIntersectionTest,
             {.help = "with --sign auto: assume that the mesh has no self-intersections",
              .formerName = "trust-mesh"});
+      visit("method", &Options::method,
+            {{"blocks", DistanceMethod::Blocks}, {"prism", DistanceMethod::Prisms}},
+            {.help = "algorithm of the distances: blocks, which excludes triangles by spheres for "
+                     "each block of grid points; prism, which scans a prism around each triangle. "
+                     "The distances are the same"});
     }
   };
 

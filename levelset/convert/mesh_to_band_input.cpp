@@ -66,14 +66,15 @@ double areaWithin(const Imath::Box3d& box, const TriMesh& mesh) {
 }
 
 /// Estimates the memory in bytes: 12 for each voxel of the band, and 250 for each triangle (its
-/// local copy, bounding box and index lists).
+/// local copy, bounding box and index lists), with prisms 530.
 double estimateMemory(const TriMesh& mesh, double voxelSize, const MeshToBandOptions& options) {
   const double halfWidth = std::min(options.halfWidth, options.roi.halfWidth);
   Imath::Box3d box = options.roi.region;
   box.min -= V3d(halfWidth * voxelSize);
   box.max += V3d(halfWidth * voxelSize);
   const double area = areaWithin(box, mesh) / voxelSize / voxelSize;
-  return 24 * halfWidth * area + 250.0 * static_cast<double>(mesh.triangles.size());
+  const double perTriangle = options.method == DistanceMethod::Prisms ? 530 : 250;
+  return 24 * halfWidth * area + perTriangle * static_cast<double>(mesh.triangles.size());
 }
 
 void checkPrecision(const TriMesh& mesh, double voxelSize, std::uint32_t outermost) {

@@ -29,7 +29,7 @@ using SurfaceLeaf = openvdb::FloatTree::LeafNodeType;
 
 // Voxels by which the band extends the surface beyond its border. Tricubic interpolation reads two
 // voxels along each axis, about 3.5 along the diagonal.
-constexpr double kBeyond = 3.5;
+constexpr double kBeyondBorder = 3.5;
 // Distance below which a grid point counts as on the surface, voxels.
 constexpr double kTouching = 1e-6;
 
@@ -65,7 +65,9 @@ class SideOfSurface {
 
   /// Radius of the search for triangles, voxels. It covers the extension of the surface beyond its
   /// border.
-  [[nodiscard]] double search() const { return std::sqrt(reach_ * reach_ + kBeyond * kBeyond); }
+  [[nodiscard]] double search() const {
+    return std::sqrt(reach_ * reach_ + kBeyondBorder * kBeyondBorder);
+  }
 
   /// Computes the signed distance of a grid point.
   /// @param p           position of the grid point in the frame of the mesh, voxels
@@ -99,7 +101,8 @@ class SideOfSurface {
     // through this point, perpendicular to the border's pseudonormal there. It continues the
     // distance smoothly beyond the border.
     const double beyond = (offset - direction.normal * ahead).length();
-    const bool isOn = direction.normal != V3d(0) && beyond <= kBeyond && std::abs(ahead) < reach_;
+    const bool isOn =
+        direction.normal != V3d(0) && beyond <= kBeyondBorder && std::abs(ahead) < reach_;
     return {std::abs(ahead) < kTouching ? 0 : ahead, isOn, beyond};
   }
 

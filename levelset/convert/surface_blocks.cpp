@@ -26,8 +26,14 @@ struct Cell {
 class BlockTraversal {
  public:
   BlockTraversal(const LocalMesh& mesh, double reach, const BlockVisitor& visit,
-                 const Progress& progress, const std::optional<Imath::Box3i>& region)
-      : mesh_(mesh), reach_(reach), visit_(visit), gate_(progress, kShare), region_(region) {
+                 const Progress& progress, const std::optional<Imath::Box3i>& region,
+                 const CellTest& isNeeded)
+      : mesh_(mesh),
+        reach_(reach),
+        visit_(visit),
+        isNeeded_(isNeeded),
+        gate_(progress, kShare),
+        region_(region) {
     double half = kBlockDim;
     for (const Imath::V3d& point : mesh.points)
       for (int axis = 0; axis < 3; ++axis) half = std::max(half, std::abs(point[axis]) + reach);
@@ -86,7 +92,13 @@ class BlockTraversal {
       const auto i = static_cast<std::size_t>(axis);
       if (box.low[i] * unit_ > from + last || box.high[i] * unit_ < from) return false;
     }
-    if (box.extent * unit_ <= static_cast<double>(cell.size)) return true;
+    const double extent = box.extent * unit_;
+    if (isNeeded_) {
+      // In a cell larger than the box, the test would hardly exclude the triangle.
+      const bool isLarge = static_cast<double>(cell.size) > extent + 2 * reach_;
+      return isLarge || isNeeded_(t, low + V3d(last / 2), last / 2);
+    }
+    if (extent <= static_cast<double>(cell.size)) return true;
     const TriangleFrame frame(mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2));
     const double range = reach_ + last * 0.8660255 + 1e-6;
     return frame.squaredDistance(low + V3d(last / 2)) <= range * range;
@@ -139,6 +151,7 @@ class BlockTraversal {
   const LocalMesh& mesh_;
   double reach_;
   const BlockVisitor& visit_;
+  const CellTest& isNeeded_;
   ProgressGate gate_;
   std::optional<Imath::Box3i> region_;
   std::int64_t root_ = 0;  // half the edge of the root cell, grid points
@@ -149,9 +162,20 @@ class BlockTraversal {
 
 }  // namespace
 
+CellTest prismTest(const LocalMesh& mesh, const PrismCovering& prisms) {
+  return [&](std::uint32_t t, const V3d& centre, double halfEdge) {
+    return PrismPlanes(
+               {mesh.corner(t, 0) - centre, mesh.corner(t, 1) - centre, mesh.corner(t, 2) - centre},
+               prisms.prism(t), prisms.reach())
+        .mayTouch(V3d(0), halfEdge);
+  };
+}
+
 void forEachBlock(const LocalMesh& mesh, double reach, const BlockVisitor& visit,
-                  const Progress& progress, const std::optional<Imath::Box3i>& region) {
-  if (!mesh.triangles.empty()) BlockTraversal(mesh, reach, visit, progress, region).run();
+                  const Progress& progress, const std::optional<Imath::Box3i>& region,
+                  const CellTest& isNeeded) {
+  if (mesh.triangles.empty()) return;
+  BlockTraversal(mesh, reach, visit, progress, region, isNeeded).run();
 }
 
 }  // namespace levelset::convert

@@ -72,7 +72,9 @@ double TriangleFrame::squaredDistance(const V3d& point) const {
   const V3d d = point - a_;
   const double x = d.dot(u_), y = d.dot(v_), height = d.dot(n_);
   double plane = 0;
-  if (y <= 0) {  // AB is the longest edge, so the angles at A and B are acute and AB is nearest
+  // AB is the longest edge, so the angles at A and B are acute and AB is nearest if y ≤ 0. A point
+  // has no other edges.
+  if (y <= 0 || length_ == 0) {
     const double dx = x < 0 ? -x : (x > length_ ? x - length_ : 0);
     plane = dx * dx + y * y;
   } else {

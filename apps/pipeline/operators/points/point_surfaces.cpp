@@ -1,5 +1,8 @@
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <array>
+
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/json_output.h"
@@ -92,6 +95,22 @@ Value surfaceOfPoints(Invocation& in) {
   return Value(std::move(result.band));
 }
 
+/// Values of --method for point clouds. The others are for meshes.
+constexpr std::array kCloudMethods = {"mls", "mpu", "meshless", "rbf", "particles"};
+
+/// Refuses a method of the other kind of operand.
+void checkMethod(const Invocation& in) {
+  if (!in.given("method") || in.operands.empty()) return;
+  const std::string word = in.text("method");
+  const bool isOfPoints =
+      std::find(kCloudMethods.begin(), kCloudMethods.end(), word) != kCloudMethods.end();
+  if (isOfPoints == takesPoints(in)) return;
+  throw UsageError(
+      fmt::format("level-set: --method {} is for {}, but the operand is a {}; {}", word,
+                  isOfPoints ? "point clouds" : "meshes", isOfPoints ? "mesh" : "point cloud",
+                  isOfPoints ? "choose blocks or prism" : "choose mls or another one"));
+}
+
 /// Options that the other kind of operand has.
 void refuseOptions(const Invocation& in, std::initializer_list<const char*> names, const char* have,
                    const char* operand) {
@@ -137,11 +156,14 @@ Operator conversionOperator() {
       param.doc =
           "accept a mesh whose inside is ambiguous, or that has no inside, or points whose surface "
           "is a guess in large parts";
-  op.params.push_back({.name = "method",
-                       .type = ParamType::Choice,
-                       .doc = "surface through a point cloud",
-                       .fallback = "mls",
-                       .choices = {"mls", "mpu", "meshless", "rbf", "particles"}});
+  for (Param& param : op.params)
+    if (param.name == "method") {
+      param.doc =
+          "with a mesh: algorithm of the distances, which are the same; blocks excludes triangles "
+          "for each block of grid points, prism scans a prism around each triangle. With a point "
+          "cloud: surface through the points, by default mls";
+      param.choices.insert(param.choices.end(), kCloudMethods.begin(), kCloudMethods.end());
+    }
   op.params.push_back({.name = "neighbours",
                        .type = ParamType::Integer,
                        .doc =
@@ -199,6 +221,7 @@ Operator conversionOperator() {
   };
   op.validate = [ofMeshes](const Invocation& in) {
     ofMeshes.validate(in);
+    checkMethod(in);
     if (takesPoints(in)) {
       refuseOptions(in, {"sign", "nested", "skip-intersection-test"}, "meshes", "point cloud");
       for (const char* name : {"kernel", "radius", "reach"})
@@ -219,10 +242,9 @@ Operator conversionOperator() {
         throw UsageError(fmt::format("level-set: --support writes .vdb files only, not '{}'",
                                      in.text("support")));
     } else if (!in.operands.empty()) {
-      refuseOptions(
-          in,
-          {"method", "neighbours", "fit-error", "lambda", "support", "kernel", "radius", "reach"},
-          "point clouds", "mesh");
+      refuseOptions(in,
+                    {"neighbours", "fit-error", "lambda", "support", "kernel", "radius", "reach"},
+                    "point clouds", "mesh");
     }
   };
   return op;

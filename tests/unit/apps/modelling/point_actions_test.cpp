@@ -196,6 +196,7 @@ TEST_F(PointActions, ALevelSetOfPointsRefusesAGuess) {
                 "6 to 1000");
   expectRefusal("sphere --radius 1 --voxel 0.2 ! mesh ! level-set --voxel 0.2 --method mls", 2,
                 "point clouds");
+  expectRefusal(std::string(kSampled) + "level-set --voxel 0.1 --method prism ! info", 2, "meshes");
 }
 
 TEST_F(PointActions, ALevelSetOfParticlesNeedsNoNormals) {

@@ -100,4 +100,15 @@ TEST(TriangleDistance, OfATriangleWithoutAreaIsThatOfItsLongestEdge) {
   }
 }
 
+TEST(TriangleDistance, OfATriangleWithoutExtentIsThatOfThePoint) {
+  const V3d at(1, 2, -0.5);
+  const TriangleFrame frame(at, at, at);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> place(-4, 4);
+  for (int n = 0; n < 100; ++n) {
+    const V3d point(place(random), place(random), place(random));
+    EXPECT_NEAR(std::sqrt(frame.squaredDistance(point)), (point - at).length(), 1e-14);
+  }
+}
+
 }  // namespace triangle_distance_test
