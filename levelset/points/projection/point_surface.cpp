@@ -97,7 +97,7 @@ PointSurface::PointSurface(const PointCloud& cloud, const PointSurfaceOptions& o
   timing_.connectivity = secondsSince(start);
   report(options.progress, 0.2);
   start = Clock::now();
-  fit(options);
+  fit(options.smoothing, {}, subProgress(options.progress, 0.2, 0.8));
   pruneGraph(options.gap);
   findParts();
   orient(cloud, numbers, subProgress(options.progress, 0.8, 0.95));
@@ -131,10 +131,11 @@ void PointSurface::computeSpacings() {
   });
 }
 
-void PointSurface::fit(const PointSurfaceOptions& options) {
+/// @param isLeftOut  points that keep their fits; empty: none
+void PointSurface::fit(double smoothing, const std::vector<bool>& isLeftOut,
+                       const Progress& progress) {
   fits_.resize(positions_.size());
-  const Progress fitting = subProgress(options.progress, 0.2, 0.8);
-  ProgressGate gate(fitting, positions_.size());
+  ProgressGate gate(progress, positions_.size());
   struct Scratch {
     CandidateSearch search;
     std::vector<HeightSample> samples;
@@ -146,11 +147,45 @@ void PointSurface::fit(const PointSurfaceOptions& options) {
                     [&](const auto& range) {
                       Scratch& scratch = scratches.local();
                       for (std::size_t i = range.begin(); i < range.end(); ++i)
-                        if (frames_[i].scale > 0)
+                        if (frames_[i].scale > 0 && (isLeftOut.empty() || !isLeftOut[i]))
                           fits_[i] = fitPoint(static_cast<std::uint32_t>(i), frames_[i],
-                                              scratch.search, options.smoothing, scratch.samples);
+                                              scratch.search, smoothing, scratch.samples);
                       gate.advance(range.size());
                     });
+}
+
+void PointSurface::divide(std::span<const std::uint32_t> pieces, std::size_t count,
+                          std::span<const V3d> normals, double smoothing) {
+  std::vector<std::uint32_t> first(partCount_, kNone);
+  std::vector<bool> isDivided(partCount_, false), isLeftOut(size(), true);
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (parts_[i] == kNone) continue;
+    if (first[parts_[i]] == kNone) first[parts_[i]] = pieces[i];
+    if (first[parts_[i]] != pieces[i]) isDivided[parts_[i]] = true;
+  }
+  CoconeGraph cut;
+  cut.normals = std::move(graph_.normals);
+  cut.first.assign(size() + 1, 0);
+  for (std::size_t i = 0; i < size(); ++i) {
+    for (const std::uint32_t j : graph_.neighbours(i))
+      if (pieces[i] == pieces[j]) cut.ends.push_back(j);
+    cut.first[i + 1] = cut.ends.size();
+    if (parts_[i] == kNone || !isDivided[parts_[i]]) continue;
+    isLeftOut[i] = false;
+    cut.normals[i] = normals[i];
+    frames_[i].setNormal(normals[i]);
+  }
+  graph_ = std::move(cut);
+  fit(smoothing, isLeftOut, {});
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (isLeftOut[i]) continue;
+    normals_[i] = normals[i];
+    if (!hasFit(i)) continue;
+    const V3d normal = normalOfFit(static_cast<std::uint32_t>(i), positions_[i]);
+    normals_[i] = normal.dot(normals[i]) < 0 ? -normal : normal;
+  }
+  parts_.assign(pieces.begin(), pieces.end());
+  partCount_ = count;
 }
 
 /// Removes the edges across gaps, and those of points without a fit.

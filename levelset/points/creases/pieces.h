@@ -1,0 +1,38 @@
+#pragma once
+
+// Internal header of levelset: public headers must not include it.
+
+#include <cstdint>
+#include <vector>
+
+#include "levelset/points/projection/point_surface.h"
+
+namespace levelset::points {
+
+/// Smooth pieces of a surface through points, between sharp edges.
+struct Pieces {
+  std::size_t count = 0;
+  std::vector<std::uint32_t> pieces;  ///< piece of each point; kNone for points without a part
+  std::vector<Imath::V3d> normals;    ///< unit normals on the side of the piece, outwards
+  std::vector<std::uint32_t> parts;   ///< part of each piece
+  double noise = 0;                   ///< error of the fits away from sharp edges, spacings
+
+  /// Joins pieces, and numbers the others anew.
+  /// @param pairs  numbers of two pieces each
+  void join(const std::vector<std::array<std::uint32_t, 2>>& pairs);
+};
+
+/// Divides the parts of a surface where normals of neighbours differ by more than an angle. Each
+/// point gets a normal of its own side: beside a sharp edge, the plane through the point that passes
+/// near most of its neighbours. Connected points with consistent normals make a piece. Others, and
+/// those of tiny pieces, join the piece whose tangent planes pass nearest to them. The two sides of
+/// a sharp edge that fades out belong to one piece.
+/// @param angle  radians
+[[nodiscard]] Pieces findPieces(const PointSurface& surface, double angle);
+
+/// Counts the edges of the graph within a piece whose ends have normals that differ by more than an
+/// angle: sharp edges that are rounded.
+[[nodiscard]] std::size_t countRoundedEdges(const PointSurface& surface, const Pieces& pieces,
+                                            double angle);
+
+}  // namespace levelset::points

@@ -1,0 +1,70 @@
+#pragma once
+
+// Internal header of levelset: public headers must not include it.
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "levelset/points/creases/crease_network.h"
+#include "levelset/points/meshing/part_front.h"
+
+namespace levelset::points {
+
+/// Sharp edges of a surface through points.
+struct SharpSurface {
+  Pieces pieces;
+  PointSurface divided;
+  CreaseNetwork network;
+};
+
+/// Divides a surface at its sharp edges. Pieces whose common curve is not found as a whole are
+/// joined again, so that their edge is rounded.
+/// @param angle  radians
+/// @return nullopt if no part has two pieces
+[[nodiscard]] std::optional<SharpSurface> divideSurface(const PointSurface& whole, double angle,
+                                                        double smoothing, const Progress& progress);
+
+/// Meshes the pieces of a divided part by fronts that start at its sharp edges. The pieces share
+/// the vertices of these edges.
+class SharpFronts {
+ public:
+  SharpFronts(const PointSurface& whole, const SharpSurface& sharp, const PointEdgeLimits& limits);
+
+  [[nodiscard]] bool isDivided(std::uint32_t part) const { return pieces_[part].size() > 1; }
+  /// Number of triangles of all divided parts, about.
+  [[nodiscard]] double expectedTriangles() const;
+  /// @return a mesh that is not complete if a front fails with all edge lengths
+  [[nodiscard]] PartMesh mesh(std::uint32_t part, const Progress& progress) const;
+
+ private:
+  /// Vertices along the curves of a part.
+  struct Outline;
+  /// Loops around a piece.
+  struct PieceLoops {
+    FrontLoops start;
+    std::vector<std::uint32_t> numbers;  ///< vertices of the outline, then those of the mesh
+    double longest = 0;                  ///< edge
+  };
+
+  [[nodiscard]] std::vector<double> capsAtCreases() const;
+  [[nodiscard]] double lengthAt(const CreaseCurve& curve, std::size_t position) const;
+  [[nodiscard]] Outline outlineOf(std::uint32_t part, double scale) const;
+  void addCurve(std::uint32_t curve, double scale, Outline& outline) const;
+  [[nodiscard]] PieceLoops loopsOf(std::uint32_t piece, const Outline& outline) const;
+  [[nodiscard]] PartMesh meshPiece(std::uint32_t piece, const PieceLoops& loops, double scale,
+                                   const Progress& progress) const;
+  [[nodiscard]] bool join(const std::vector<PartMesh>& fronts, std::vector<PieceLoops>& loops,
+                          const Outline& outline, FrontMesh& mesh) const;
+
+  const PointSurface& surface_;
+  const SharpSurface& sharp_;
+  PointEdgeLimits limits_;
+  std::vector<double> lengths_;
+  BorderPoints borders_;
+  std::vector<SurfacePart> parts_;                  ///< of each piece
+  std::vector<std::vector<std::uint32_t>> pieces_;  ///< of each part
+  std::vector<std::vector<std::uint32_t>> curves_;  ///< of each part
+};
+
+}  // namespace levelset::points
