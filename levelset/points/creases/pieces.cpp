@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <queue>
 #include <tuple>
 
@@ -261,6 +262,7 @@ Pieces PieceFinder::find() {
     V3d normal = fits_[i].normal;
     if (normal.dot(surface_.normal(i)) < 0) normal = -normal;
     result.normals.push_back(normal);
+    result.isClear.push_back(fits_[i].isReliable);
     fits_[i].normal = normal;
   }
   joinReliable(result);
@@ -292,12 +294,54 @@ Pieces findPieces(const PointSurface& surface, double angle) {
   return PieceFinder(surface, angle).find();
 }
 
-std::size_t countRoundedEdges(const PointSurface& surface, const Pieces& pieces, double angle) {
+std::size_t reassign(const PointSurface& whole, const PointSurface& divided, Pieces& pieces) {
+  constexpr double kBetter = 0.5;  // height above the new piece, share of that above the old one
+  std::vector<std::uint32_t> moved = pieces.pieces;
+  std::vector<V3d> normals = pieces.normals;
+  tbb::parallel_for(std::size_t{0}, whole.size(), [&](std::size_t i) {
+    const std::uint32_t own = pieces.pieces[i];
+    const auto neighbours = whole.graph().neighbours(i);
+    const auto isOther = [&](std::uint32_t j) { return pieces.pieces[j] != own; };
+    if (own == kNone || std::none_of(neighbours.begin(), neighbours.end(), isOther)) return;
+    // Nearest neighbour of each piece.
+    std::map<std::uint32_t, std::pair<double, std::uint32_t>> nearest;
+    for (const std::uint32_t j : neighbours) {
+      if (pieces.pieces[j] == kNone || !divided.hasFit(j)) continue;
+      const std::pair found{(whole.positions()[j] - whole.positions()[i]).length2(), j};
+      const auto [at, isNew] = nearest.emplace(pieces.pieces[j], found);
+      if (!isNew) at->second = std::min(at->second, found);
+    }
+    const auto heightOver = [&](std::uint32_t j) {
+      return std::abs(divided.heightOverFit(j, whole.positions()[i]));
+    };
+    const auto at = nearest.find(own);
+    double least = at == nearest.end() ? INFINITY : kBetter * heightOver(at->second.second);
+    constexpr double kExact = 1e-9;  // spacings
+    if (least < kExact * whole.spacing(i)) return;
+    for (const auto& [piece, found] : nearest) {
+      if (piece == own) continue;
+      const double height = heightOver(found.second);
+      if (!(height < least)) continue;
+      least = height;
+      moved[i] = piece;
+      normals[i] = divided.normal(found.second);
+    }
+  });
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < moved.size(); ++i) count += moved[i] != pieces.pieces[i];
+  pieces.pieces = std::move(moved);
+  pieces.normals = std::move(normals);
+  return count;
+}
+
+std::size_t countRoundedPairs(const PointSurface& surface, const Pieces& pieces, double angle,
+                              const std::vector<bool>& isRounded) {
   const double leastCosine = std::cos(angle);
   std::size_t count = 0;
   for (std::uint32_t i = 0; i < surface.size(); ++i)
     for (const std::uint32_t j : surface.graph().neighbours(i))
-      count += i < j && pieces.pieces[i] == pieces.pieces[j] &&
+      count += i < j && pieces.isClear[i] && pieces.isClear[j] &&
+               (pieces.pieces[i] == pieces.pieces[j] || isRounded[surface.part(i)]) &&
                pieces.normals[i].dot(pieces.normals[j]) < leastCosine;
   return count;
 }

@@ -2,6 +2,7 @@
 
 // Internal header of levelset: public headers must not include it.
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -14,6 +15,7 @@ struct Pieces {
   std::size_t count = 0;
   std::vector<std::uint32_t> pieces;  ///< piece of each point; kNone for points without a part
   std::vector<Imath::V3d> normals;    ///< unit normals on the side of the piece, outwards
+  std::vector<bool> isClear;          ///< the points around give a clear normal
   std::vector<std::uint32_t> parts;   ///< part of each piece
   double noise = 0;                   ///< error of the fits away from sharp edges, spacings
 
@@ -30,9 +32,17 @@ struct Pieces {
 /// @param angle  radians
 [[nodiscard]] Pieces findPieces(const PointSurface& surface, double angle);
 
-/// Counts the edges of the graph within a piece whose ends have normals that differ by more than an
+/// Moves points beside sharp edges to the piece whose polynomials pass nearest to them.
+/// @param whole    surface before PointSurface::divide()
+/// @param divided  surface after it
+/// @return the number of points that moved
+std::size_t reassign(const PointSurface& whole, const PointSurface& divided, Pieces& pieces);
+
+/// Counts the edges of the graph within a piece across which the normals differ by more than an
 /// angle: sharp edges that are rounded.
-[[nodiscard]] std::size_t countRoundedEdges(const PointSurface& surface, const Pieces& pieces,
-                                            double angle);
+/// @param surface    before PointSurface::divide()
+/// @param isRounded  for each part: all of its sharp edges are rounded
+[[nodiscard]] std::size_t countRoundedPairs(const PointSurface& surface, const Pieces& pieces,
+                                            double angle, const std::vector<bool>& isRounded);
 
 }  // namespace levelset::points

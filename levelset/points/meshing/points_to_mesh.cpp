@@ -90,8 +90,13 @@ void measureBorders(const TriMesh& mesh, PointsToMeshReport& report) {
 }
 
 /// Counts the sharp edges of the parts that keep them.
-void measureSharpEdges(const SharpSurface& sharp, const std::vector<char>& isSharp, double scale,
+void measureSharpEdges(const PointSurface& surface, const SharpSurface& sharp,
+                       const std::vector<char>& isSharp, double angle, double scale,
                        PointsToMeshReport& report) {
+  std::vector<bool> isRounded;
+  for (const char one : isSharp) isRounded.push_back(one == 0);
+  report.roundedPairs = points::countRoundedPairs(surface, sharp.pieces, angle, isRounded);
+  if (!sharp.divided) return;
   const auto keeps = [&](std::uint32_t piece) { return isSharp[sharp.pieces.parts[piece]] != 0; };
   for (std::uint32_t i = 0; i < sharp.pieces.count; ++i) report.pieces += keeps(i);
   std::set<std::uint32_t> corners;
@@ -184,7 +189,7 @@ PointsToMeshResult pointsToMesh(const PointCloud& cloud, const PointsToMeshOptio
   if (options.sharpAngle > 0)
     sharp = points::divideSurface(surface, options.sharpAngle, options.smoothing,
                                   subProgress(options.progress, 0.6, 0.7));
-  if (sharp) sharpFronts.emplace(surface, *sharp, limits);
+  if (sharp && sharp->divided) sharpFronts.emplace(surface, *sharp, limits);
   double triangles = sharpFronts ? sharpFronts->expectedTriangles() : 0;
   for (const SurfacePart& part : parts) triangles += part.expected;
   constexpr double kBytesPerTriangle = 400, kSmallestScale = 0.6;
@@ -244,7 +249,7 @@ PointsToMeshResult pointsToMesh(const PointCloud& cloud, const PointsToMeshOptio
         "--accept-holes",
         figures.incomplete, figures.components, figures.missedPoints, surface.size()));
   measureBorders(result.mesh, figures);
-  if (sharp) measureSharpEdges(*sharp, isSharp, normalisation.scale, figures);
+  if (sharp) measureSharpEdges(surface, *sharp, isSharp, options.sharpAngle, normalisation.scale, figures);
   figures.connectivitySeconds = surface.timing().connectivity;
   figures.reconstructionSeconds = surface.timing().reconstruction;
   figures.triangulationSeconds = std::chrono::duration<double>(Clock::now() - start).count();

@@ -38,20 +38,32 @@ std::vector<std::array<std::uint32_t, 2>> wholeParts(
 
 }  // namespace
 
-std::optional<SharpSurface> divideSurface(const PointSurface& whole, double angle, double smoothing,
-                                          const Progress& progress) {
-  constexpr int kMostRounds = 4;
-  Pieces pieces = findPieces(whole, angle);
+SharpSurface divideSurface(const PointSurface& whole, double angle, double smoothing,
+                           const Progress& progress) {
+  constexpr int kMostRounds = 4, kMostMoves = 3;
+  SharpSurface result;
+  Pieces& pieces = result.pieces;
+  pieces = findPieces(whole, angle);
   for (int round = 0; pieces.count > whole.partCount(); ++round) {
     report(progress, std::min(0.9, 0.1 + 0.15 * round));
-    PointSurface divided = whole;
-    divided.divide(pieces.pieces, pieces.count, pieces.normals, smoothing);
-    CreaseNetwork network = traceCreases(whole, divided, pieces);
-    if (network.conflicts.empty())
-      return SharpSurface{std::move(pieces), std::move(divided), std::move(network)};
-    pieces.join(round < kMostRounds ? network.conflicts : wholeParts(pieces, network.conflicts));
+    const auto divide = [&] {
+      PointSurface divided = whole;
+      divided.divide(pieces.pieces, pieces.count, pieces.normals, smoothing);
+      return divided;
+    };
+    PointSurface divided = divide();
+    for (int move = 0; move < kMostMoves && reassign(whole, divided, pieces) > 0; ++move)
+      divided = divide();
+    result.network = traceCreases(whole, divided, pieces);
+    if (result.network.conflicts.empty()) {
+      result.divided = std::move(divided);
+      return result;
+    }
+    const auto conflicts = std::move(result.network.conflicts);
+    result.network = {};
+    pieces.join(round < kMostRounds ? conflicts : wholeParts(pieces, conflicts));
   }
-  return std::nullopt;
+  return result;
 }
 
 struct SharpFronts::Outline {
@@ -63,12 +75,12 @@ struct SharpFronts::Outline {
 
 SharpFronts::SharpFronts(const PointSurface& whole, const SharpSurface& sharp,
                          const PointEdgeLimits& limits)
-    : surface_(sharp.divided),
+    : surface_(*sharp.divided),
       sharp_(sharp),
       limits_(limits),
-      lengths_(lengthsAtPoints(sharp.divided, whole.graph(), limits, capsAtCreases())),
-      borders_(sharp.divided),
-      parts_(partsOf(sharp.divided, lengths_)),
+      lengths_(lengthsAtPoints(*sharp.divided, whole.graph(), limits, capsAtCreases())),
+      borders_(*sharp.divided),
+      parts_(partsOf(*sharp.divided, lengths_)),
       pieces_(whole.partCount()),
       curves_(whole.partCount()) {
   for (std::uint32_t i = 0; i < sharp.pieces.count; ++i) pieces_[sharp.pieces.parts[i]].push_back(i);

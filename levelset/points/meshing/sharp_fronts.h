@@ -11,24 +11,24 @@
 
 namespace levelset::points {
 
-/// Sharp edges of a surface through points.
+/// Surface through points, divided at its sharp edges.
 struct SharpSurface {
   Pieces pieces;
-  PointSurface divided;
+  std::optional<PointSurface> divided;  ///< empty: no part has two pieces
   CreaseNetwork network;
 };
 
 /// Divides a surface at its sharp edges. Pieces whose common curve is not found as a whole are
 /// joined again, so that their edge is rounded.
 /// @param angle  radians
-/// @return nullopt if no part has two pieces
-[[nodiscard]] std::optional<SharpSurface> divideSurface(const PointSurface& whole, double angle,
-                                                        double smoothing, const Progress& progress);
+[[nodiscard]] SharpSurface divideSurface(const PointSurface& whole, double angle, double smoothing,
+                                         const Progress& progress);
 
 /// Meshes the pieces of a divided part by fronts that start at its sharp edges. The pieces share
 /// the vertices of these edges.
 class SharpFronts {
  public:
+  /// @param sharp  with a divided surface
   SharpFronts(const PointSurface& whole, const SharpSurface& sharp, const PointEdgeLimits& limits);
 
   [[nodiscard]] bool isDivided(std::uint32_t part) const { return pieces_[part].size() > 1; }

@@ -54,15 +54,16 @@ double medianDistance(std::span<const V3d> positions, const CoconeGraph& graph, 
 
 /// Fits the height function of one point. Turns the frame until its normal is about that of the
 /// fit.
+template <class Fit>
 HeightPolynomial fitPoint(std::uint32_t point, LocalFrame& frame, CandidateSearch& search,
-                          double width, std::vector<HeightSample>& samples) {
+                          double width, std::vector<HeightSample>& samples, const Fit& fit) {
   HeightPolynomial best;
   for (int turn = 0; turn <= kMostTurns; ++turn) {
     samples.clear();
     for (const FitCandidate& one : search.find(point, frame, kReach * width))
       samples.push_back({one.local.x, one.local.y, one.local.z,
                          std::exp(-one.local.length2() / (width * width))});
-    const auto found = fitHeights(samples, kMostDegree, kCondition);
+    const auto found = fit(samples, kMostDegree, kCondition);
     if (!found) return best;
     best = *found;
     const V3d local = V3d(-found->coefficients[1], -found->coefficients[2], 1).normalized();
@@ -97,7 +98,7 @@ PointSurface::PointSurface(const PointCloud& cloud, const PointSurfaceOptions& o
   timing_.connectivity = secondsSince(start);
   report(options.progress, 0.2);
   start = Clock::now();
-  fit(options.smoothing, {}, subProgress(options.progress, 0.2, 0.8));
+  fitPoints(options.smoothing, {}, fitHeights, subProgress(options.progress, 0.2, 0.8));
   pruneGraph(options.gap);
   findParts();
   orient(cloud, numbers, subProgress(options.progress, 0.8, 0.95));
@@ -132,8 +133,10 @@ void PointSurface::computeSpacings() {
 }
 
 /// @param isLeftOut  points that keep their fits; empty: none
-void PointSurface::fit(double smoothing, const std::vector<bool>& isLeftOut,
-                       const Progress& progress) {
+/// @param fit        fitHeights() or fitHeightsByPrediction()
+template <class Fit>
+void PointSurface::fitPoints(double smoothing, const std::vector<bool>& isLeftOut, const Fit& fit,
+                             const Progress& progress) {
   fits_.resize(positions_.size());
   ProgressGate gate(progress, positions_.size());
   struct Scratch {
@@ -149,7 +152,7 @@ void PointSurface::fit(double smoothing, const std::vector<bool>& isLeftOut,
                       for (std::size_t i = range.begin(); i < range.end(); ++i)
                         if (frames_[i].scale > 0 && (isLeftOut.empty() || !isLeftOut[i]))
                           fits_[i] = fitPoint(static_cast<std::uint32_t>(i), frames_[i],
-                                              scratch.search, smoothing, scratch.samples);
+                                              scratch.search, smoothing, scratch.samples, fit);
                       gate.advance(range.size());
                     });
 }
@@ -176,7 +179,8 @@ void PointSurface::divide(std::span<const std::uint32_t> pieces, std::size_t cou
     frames_[i].setNormal(normals[i]);
   }
   graph_ = std::move(cut);
-  fit(smoothing, isLeftOut, {});
+  // Beyond the points, polynomials of high degree would swing with the noise.
+  fitPoints(smoothing, isLeftOut, fitHeightsByPrediction, {});
   for (std::size_t i = 0; i < size(); ++i) {
     if (isLeftOut[i]) continue;
     normals_[i] = normals[i];

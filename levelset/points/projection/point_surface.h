@@ -74,6 +74,11 @@ class PointSurface {
   [[nodiscard]] bool hasFit(std::size_t point) const { return fits_[point].degree > 0; }
   [[nodiscard]] int degree(std::size_t point) const { return fits_[point].degree; }
   [[nodiscard]] const Imath::V3d& normal(std::size_t point) const { return normals_[point]; }
+  /// Height of a position above the polynomial of a point, along its frame.
+  [[nodiscard]] double heightOverFit(std::size_t point, const Imath::V3d& position) const {
+    const Imath::V3d local = frames_[point].toLocal(position);
+    return (local.z - fits_[point].value(local.x, local.y)) / frames_[point].scale;
+  }
   /// Largest absolute curvature at a point, per world unit.
   [[nodiscard]] double curvature(std::size_t point) const;
   [[nodiscard]] bool isBorder(std::size_t point) const {
@@ -112,7 +117,9 @@ class PointSurface {
   };
 
   void computeSpacings();
-  void fit(double smoothing, const std::vector<bool>& isLeftOut, const Progress& progress);
+  template <class Fit>
+  void fitPoints(double smoothing, const std::vector<bool>& isLeftOut, const Fit& fit,
+                 const Progress& progress);
   void orient(const PointCloud& cloud, const std::vector<std::uint32_t>& numbers,
               const Progress& progress);
   void requireAgreement() const;
