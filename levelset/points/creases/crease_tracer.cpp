@@ -58,16 +58,19 @@ double CreaseTracer::cornerDistance(const V3d& position) const {
   return least;
 }
 
-std::optional<CreaseTracer::Place> CreaseTracer::next(const Place& from, double step) const {
-  constexpr int kHalvings = 4;
-  for (int k = 0; k < kHalvings; ++k, step *= 0.5) {
+/// Takes a step along the curve. A shorter one follows a bend, and a longer one leaves a place where
+/// the blended surfaces jump.
+std::optional<CreaseTracer::Place> CreaseTracer::next(const Place& from, double spacing) const {
+  for (const double length : {kStep, kStep / 2, kStep / 4, 1.5 * kStep, 2 * kStep}) {
+    const double step = length * spacing;
     const auto at = meet(surface_, pair_.pieces, from.normals, from.position + from.tangent * step,
-                         step, 0.7 * step);
+                         spacing, std::max(0.7 * step, 0.3 * spacing));
     if (!at) continue;
     Place place{at->position, {at->normals[0], at->normals[1]}, V3d(0)};
     place.tangent = place.normals[0].cross(place.normals[1]).normalized();
     if (place.tangent.dot(from.tangent) < 0) place.tangent = -place.tangent;
-    if (place.tangent.dot(from.tangent) > 0.5) return place;
+    const V3d along = place.position - from.position;
+    if (place.tangent.dot(from.tangent) > 0.5 && along.dot(from.tangent) > 0.3 * step) return place;
   }
   return std::nullopt;
 }
@@ -94,7 +97,7 @@ CreaseTracer::Walk CreaseTracer::walk(const Place& seed) const {
     const FoundItem near = search_.closest(last.position, INFINITY);
     const double spacing = pair_.samples[near.index].spacing;
     if (near.squared > kLost * kLost * spacing * spacing) return walk;
-    const auto place = next(last, kStep * spacing);
+    const auto place = next(last, spacing);
     if (!place) {
       // Beside a corner, the surfaces may not be continued far enough.
       walk.corner = cornerBetween(last.position, last.position + last.tangent * kStep * spacing,
@@ -141,7 +144,12 @@ std::optional<CreaseCurve> CreaseTracer::curveFrom(std::uint32_t sample) const {
   curve.pieces = pair_.pieces;
   Walk forward = walk(seed);
   std::vector<Place> places;
-  if (forward.end == End::Lost) return std::nullopt;
+  if (forward.end == End::Lost) {
+    Place back = seed;
+    back.tangent = -seed.tangent;
+    forward = walk(back);
+    if (forward.end != End::Closed) return std::nullopt;
+  }
   if (forward.end == End::Closed) {
     const double left = (forward.places.back().position - seed.position).length();
     if (left < 0.3 * kStep * from.spacing) forward.places.pop_back();
@@ -201,10 +209,18 @@ bool CreaseTracer::orient(CreaseCurve& curve) const {
 
 void CreaseTracer::cover(const CreaseCurve& curve) {
   const PointSearch near = makePointSearch(curve.positions);
-  for (std::size_t s = 0; s < isCovered_.size(); ++s)
-    if (!isCovered_[s] &&
-        isNear(near, pair_.samples[s].position, kCovered * pair_.samples[s].spacing))
+  const std::size_t n = curve.positions.size();
+  for (std::size_t s = 0; s < isCovered_.size(); ++s) {
+    const V3d& position = pair_.samples[s].position;
+    const std::size_t at = near.closest(position, INFINITY).index;
+    const double reach = kCovered * pair_.samples[s].spacing;
+    const auto isBeside = [&](std::size_t other) {
+      return distanceToSpan(position, curve.positions[at], curve.positions[other]) < reach;
+    };
+    if (isBeside(at > 0 || !curve.isClosed() ? (at > 0 ? at - 1 : at + 1) : n - 1) ||
+        isBeside(at + 1 < n ? at + 1 : curve.isClosed() ? 0 : at - 1))
       isCovered_[s] = true;
+  }
 }
 
 bool CreaseTracer::trace(std::vector<CreaseCurve>& curves) {

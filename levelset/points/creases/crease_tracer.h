@@ -34,7 +34,7 @@ class CreaseTracer {
   };
 
   [[nodiscard]] double spacingAt(const Imath::V3d& position) const;
-  [[nodiscard]] std::optional<Place> next(const Place& from, double step) const;
+  [[nodiscard]] std::optional<Place> next(const Place& from, double spacing) const;
   [[nodiscard]] std::uint32_t cornerBetween(const Imath::V3d& from, const Imath::V3d& to,
                                             double spacing) const;
   [[nodiscard]] Walk walk(const Place& seed) const;

@@ -13,7 +13,7 @@ std::optional<Meeting> meet(const PointSurface& surface, std::span<const std::ui
                             double reach) {
   constexpr int kMostSteps = 24;
   // Blends jump a little from one nearest point to the next. Four or more surfaces need not meet.
-  const double accepted = (pieces.size() > 3 ? 0.25 : 0.02) * spacing, exact = 1e-12 * spacing;
+  const double accepted = (pieces.size() > 3 ? 0.25 : 0.1) * spacing, exact = 1e-12 * spacing;
   // Directions in which the surfaces do not fix the position: they are nearly parallel.
   constexpr double kParallel = 0.05;
   const auto rows = static_cast<Eigen::Index>(pieces.size());

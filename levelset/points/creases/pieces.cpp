@@ -82,6 +82,7 @@ class PieceFinder {
   void setNoise();
   void joinReliable(Pieces& result) const;
   void grow(Pieces& result) const;
+  void joinSmooth(Pieces& result) const;
 
   const PointSurface& surface_;
   double leastCosine_;
@@ -245,6 +246,26 @@ void PieceFinder::grow(Pieces& result) const {
   }
 }
 
+/// Joins pieces without a sharp edge between them: noise parted them.
+void PieceFinder::joinSmooth(Pieces& result) const {
+  struct Pairs {
+    std::size_t all = 0, sharp = 0;
+  };
+  std::map<std::array<std::uint32_t, 2>, Pairs> found;
+  for (std::uint32_t i = 0; i < surface_.size(); ++i)
+    for (const std::uint32_t j : surface_.graph().neighbours(i)) {
+      const std::uint32_t a = result.pieces[i], b = result.pieces[j];
+      if (a == kNone || b == kNone || a >= b) continue;
+      Pairs& pairs = found[{a, b}];
+      ++pairs.all;
+      pairs.sharp += result.normals[i].dot(result.normals[j]) < leastCosine_;
+    }
+  std::vector<std::array<std::uint32_t, 2>> smooth;
+  for (const auto& [pieces, pairs] : found)
+    if (2 * pairs.sharp < pairs.all) smooth.push_back(pieces);
+  result.join(smooth);
+}
+
 Pieces PieceFinder::find() {
   forEachPoint([&](std::uint32_t i, Scratch& scratch) { fitAround(i, scratch); });
   setNoise();
@@ -267,6 +288,7 @@ Pieces PieceFinder::find() {
   }
   joinReliable(result);
   grow(result);
+  joinSmooth(result);
   return result;
 }
 
