@@ -18,8 +18,13 @@ namespace {
 using Imath::V3d;
 constexpr std::uint32_t kNone = PointSurface::kNone;
 
-/// Radius of the neighbourhoods that tell sharp edges, spacings.
-constexpr double kRadius = 2.6;
+/// Radius of the neighbourhoods that tell sharp edges, spacings. With noise it grows up to the
+/// greatest one.
+constexpr double kLeastRadius = 2.6, kMostRadius = 4;
+/// Noise above which the radius grows, spacings.
+constexpr double kQuiet = 0.05;
+/// Greatest growth of the errors with the radius.
+constexpr double kMostGrowth = 1.25;
 /// Points of a piece, at least.
 constexpr std::size_t kLeastPiece = 10;
 
@@ -30,8 +35,8 @@ struct SideFit {
   bool isReliable = false;
 };
 
-double weightAt(const V3d& local) {
-  const double share = local.length2() / (1.44 * kRadius * kRadius);
+double weightAt(const V3d& local, double radius) {
+  const double share = local.length2() / (1.44 * radius * radius);
   return share < 1 ? (1 - share) * (1 - share) : 0;
 }
 
@@ -86,9 +91,8 @@ class PieceFinder {
 
   const PointSurface& surface_;
   double leastCosine_;
-  double noise_ = 0;
+  double radius_ = kLeastRadius, noise_ = 0;
   std::vector<SideFit> fits_;
-  std::vector<bool> isPlain_ = {};  ///< the fit of all neighbours is good
 };
 
 template <class Work>
@@ -108,8 +112,8 @@ void PieceFinder::fitAround(std::uint32_t point, Scratch& scratch) {
   LocalFrame frame = surface_.frame(point);
   frame.setNormal(surface_.normal(point));
   scratch.samples.clear();
-  for (const FitCandidate& one : scratch.search.find(point, frame, kRadius))
-    scratch.samples.push_back({one.local.x, one.local.y, one.local.z, weightAt(one.local)});
+  for (const FitCandidate& one : scratch.search.find(point, frame, radius_))
+    scratch.samples.push_back({one.local.x, one.local.y, one.local.z, weightAt(one.local, radius_)});
   fits_[point] = fitSide(scratch.samples, frame);
   if (!(fits_[point].normal.length2() > 0)) fits_[point].normal = surface_.normal(point);
 }
@@ -133,7 +137,7 @@ V3d PieceFinder::planeOfMost(const std::vector<FitCandidate>& around) const {
       for (const FitCandidate& one : around) {
         const double miss = std::abs(one.local.dot(normal));
         const double share = miss / (tolerance + kSlope * one.local.length());
-        if (share < 1) sum += weightAt(one.local) * (1 - share * share);
+        if (share < 1) sum += weightAt(one.local, radius_) * (1 - share * share);
       }
       if (sum <= most) continue;
       most = sum;
@@ -147,7 +151,7 @@ void PieceFinder::fitOneSide(std::uint32_t point, Scratch& scratch) {
   SideFit& all = fits_[point];
   LocalFrame frame = surface_.frame(point);
   frame.setNormal(surface_.normal(point));
-  scratch.around = scratch.search.find(point, frame, kRadius);
+  scratch.around = scratch.search.find(point, frame, radius_);
   std::sort(scratch.around.begin() + 1, scratch.around.end(),
             [](const FitCandidate& a, const FitCandidate& b) {
               const double p = a.local.length2(), q = b.local.length2();
@@ -166,7 +170,7 @@ void PieceFinder::fitOneSide(std::uint32_t point, Scratch& scratch) {
     for (const FitCandidate& one : scratch.around) {
       const V3d local = frame.toLocal(surface_.positions()[one.point]);
       if (std::abs(local.z) <= 2 * noise_ + 1e-6 + kMostSlope * local.length())
-        scratch.samples.push_back({local.x, local.y, local.z, weightAt(local)});
+        scratch.samples.push_back({local.x, local.y, local.z, weightAt(local, radius_)});
     }
     if (scratch.samples.size() < kFewest) return;
     best = fitSide(scratch.samples, frame);
@@ -178,16 +182,17 @@ void PieceFinder::fitOneSide(std::uint32_t point, Scratch& scratch) {
   all.isReliable = true;
 }
 
-/// Sets the noise to the lower quartile of the errors: most points of a solid with narrow faces lie
-/// beside sharp edges.
+/// Estimates the noise from the lowest tenth of the errors: most points of a solid with narrow faces
+/// lie beside sharp edges.
 void PieceFinder::setNoise() {
   std::vector<double> errors;
   for (std::size_t i = 0; i < surface_.size(); ++i)
     if (surface_.part(i) != kNone && std::isfinite(fits_[i].error)) errors.push_back(fits_[i].error);
   if (errors.empty()) return;
-  const auto quartile = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 4);
-  std::nth_element(errors.begin(), quartile, errors.end());
-  noise_ = *quartile;
+  const auto tenth = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 10);
+  std::nth_element(errors.begin(), tenth, errors.end());
+  constexpr double kMedian = 1.25;  // of the errors of one noise, over their tenth
+  noise_ = kMedian * *tenth;
 }
 
 void PieceFinder::joinReliable(Pieces& result) const {
@@ -267,8 +272,21 @@ void PieceFinder::joinSmooth(Pieces& result) const {
 }
 
 Pieces PieceFinder::find() {
-  forEachPoint([&](std::uint32_t i, Scratch& scratch) { fitAround(i, scratch); });
-  setNoise();
+  const auto fitAll = [&] {
+    forEachPoint([&](std::uint32_t i, Scratch& scratch) { fitAround(i, scratch); });
+    setNoise();
+  };
+  fitAll();
+  if (noise_ > kQuiet) {
+    const double quiet = noise_;
+    radius_ = std::min(kMostRadius, kLeastRadius * std::sqrt(noise_ / kQuiet));
+    fitAll();
+    // Between near sharp edges, hardly any neighbourhood of this radius has none.
+    if (noise_ > kMostGrowth * quiet) {
+      radius_ = kLeastRadius;
+      fitAll();
+    }
+  }
   constexpr double kPlain = 1.6, kLeastError = 0.02;
   forEachPoint([&](std::uint32_t i, Scratch& scratch) {
     if (fits_[i].error <= kPlain * noise_ + kLeastError)
