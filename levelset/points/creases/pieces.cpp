@@ -30,7 +30,8 @@ constexpr std::size_t kLeastPiece = 10;
 
 /// Fit of the points around a point.
 struct SideFit {
-  V3d normal = V3d(0);  ///< outwards
+  V3d normal = V3d(0);    ///< outwards
+  V3d position = V3d(0);  ///< on the fit
   double error = INFINITY;  ///< spacings
   bool isReliable = false;
 };
@@ -59,6 +60,7 @@ SideFit fitSide(const std::vector<HeightSample>& samples, const LocalFrame& fram
     const double error = std::sqrt(squares / weights) / (1 - unknowns / count);
     if (!(error < best.error)) continue;
     best.error = error;
+    best.position = frame.toWorld(V3d(0, 0, fit->coefficients[0]));
     best.normal =
         frame.directionToWorld(V3d(-fit->coefficients[1], -fit->coefficients[2], 1)).normalized();
   }
@@ -68,7 +70,10 @@ SideFit fitSide(const std::vector<HeightSample>& samples, const LocalFrame& fram
 class PieceFinder {
  public:
   PieceFinder(const PointSurface& surface, double angle)
-      : surface_(surface), leastCosine_(std::cos(angle)), fits_(surface.size()) {}
+      : surface_(surface),
+        leastCosine_(std::cos(angle)),
+        mostTilt_(0.7 * std::sin(angle / 2)),
+        fits_(surface.size()) {}
 
   Pieces find();
 
@@ -85,12 +90,14 @@ class PieceFinder {
   void fitOneSide(std::uint32_t point, Scratch& scratch);
   [[nodiscard]] V3d planeOfMost(const std::vector<FitCandidate>& around) const;
   void setNoise();
+  [[nodiscard]] bool isSmooth(std::uint32_t i, std::uint32_t j) const;
   void joinReliable(Pieces& result) const;
   void grow(Pieces& result) const;
   void joinSmooth(Pieces& result) const;
 
   const PointSurface& surface_;
   double leastCosine_;
+  double mostTilt_;  ///< of the chord between neighbours, as isSmooth() measures it
   double radius_ = kLeastRadius, noise_ = 0;
   std::vector<SideFit> fits_;
 };
@@ -195,14 +202,21 @@ void PieceFinder::setNoise() {
   noise_ = kMedian * *tenth;
 }
 
+/// Returns true if the surface bends evenly from one point to another. Then the chord leans alike to
+/// both normals. A normal that is a mean of both sides of a sharp edge does not pass.
+bool PieceFinder::isSmooth(std::uint32_t i, std::uint32_t j) const {
+  const SideFit &a = fits_[i], &b = fits_[j];
+  if (!a.isReliable || !b.isReliable || !(a.normal.dot(b.normal) >= leastCosine_)) return false;
+  const V3d along = b.position - a.position;
+  return std::abs(along.dot(a.normal + b.normal)) <= (mostTilt_ + 2 * noise_) * along.length();
+}
+
 void PieceFinder::joinReliable(Pieces& result) const {
   const auto n = static_cast<std::uint32_t>(surface_.size());
   DisjointSets sets(n);
   for (std::uint32_t i = 0; i < n; ++i)
     for (const std::uint32_t j : surface_.graph().neighbours(i))
-      if (fits_[i].isReliable && fits_[j].isReliable &&
-          fits_[i].normal.dot(fits_[j].normal) >= leastCosine_)
-        sets.join(i, j);
+      if (isSmooth(i, j)) sets.join(i, j);
   std::vector<std::size_t> sizes(n, 0);
   for (std::uint32_t i = 0; i < n; ++i) ++sizes[sets.find(i)];
   // Parts without a piece of enough points stay whole.
@@ -315,8 +329,12 @@ Pieces PieceFinder::find() {
 void Pieces::join(const std::vector<std::array<std::uint32_t, 2>>& pairs) {
   DisjointSets sets(count);
   for (const auto& [a, b] : pairs) sets.join(a, b);
+  std::vector<bool> hasPoint(count, false);
+  for (const std::uint32_t piece : pieces)
+    if (piece != kNone) hasPoint[piece] = true;
   std::vector<std::uint32_t> numbers(count, kNone), kept;
   for (std::uint32_t i = 0; i < count; ++i) {
+    if (!hasPoint[i]) continue;
     const std::uint32_t root = sets.find(i);
     if (numbers[root] == kNone) {
       numbers[root] = static_cast<std::uint32_t>(kept.size());
@@ -371,6 +389,7 @@ std::size_t reassign(const PointSurface& whole, const PointSurface& divided, Pie
   for (std::size_t i = 0; i < moved.size(); ++i) count += moved[i] != pieces.pieces[i];
   pieces.pieces = std::move(moved);
   pieces.normals = std::move(normals);
+  pieces.join({});
   return count;
 }
 

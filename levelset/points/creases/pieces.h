@@ -19,7 +19,7 @@ struct Pieces {
   std::vector<std::uint32_t> parts;   ///< part of each piece
   double noise = 0;                   ///< error of the fits away from sharp edges, spacings
 
-  /// Joins pieces, and numbers the others anew.
+  /// Joins pieces, drops those without points, and numbers the others anew.
   /// @param pairs  numbers of two pieces each
   void join(const std::vector<std::array<std::uint32_t, 2>>& pairs);
 };
