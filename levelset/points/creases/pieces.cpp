@@ -30,8 +30,7 @@ constexpr std::size_t kLeastPiece = 10;
 
 /// Fit of the points around a point.
 struct SideFit {
-  V3d normal = V3d(0);    ///< outwards
-  V3d position = V3d(0);  ///< on the fit
+  V3d normal = V3d(0);  ///< outwards
   double error = INFINITY;  ///< spacings
   bool isReliable = false;
 };
@@ -60,7 +59,6 @@ SideFit fitSide(const std::vector<HeightSample>& samples, const LocalFrame& fram
     const double error = std::sqrt(squares / weights) / (1 - unknowns / count);
     if (!(error < best.error)) continue;
     best.error = error;
-    best.position = frame.toWorld(V3d(0, 0, fit->coefficients[0]));
     best.normal =
         frame.directionToWorld(V3d(-fit->coefficients[1], -fit->coefficients[2], 1)).normalized();
   }
@@ -207,8 +205,9 @@ void PieceFinder::setNoise() {
 bool PieceFinder::isSmooth(std::uint32_t i, std::uint32_t j) const {
   const SideFit &a = fits_[i], &b = fits_[j];
   if (!a.isReliable || !b.isReliable || !(a.normal.dot(b.normal) >= leastCosine_)) return false;
-  const V3d along = b.position - a.position;
-  return std::abs(along.dot(a.normal + b.normal)) <= (mostTilt_ + 2 * noise_) * along.length();
+  const V3d along = surface_.positions()[j] - surface_.positions()[i];
+  constexpr double kNoise = 5;  // the noise of both points counts for both normals
+  return std::abs(along.dot(a.normal + b.normal)) <= (mostTilt_ + kNoise * noise_) * along.length();
 }
 
 void PieceFinder::joinReliable(Pieces& result) const {
@@ -259,8 +258,7 @@ void PieceFinder::grow(Pieces& result) const {
     queue.pop();
     if (result.pieces[to] != kNone) continue;
     result.pieces[to] = result.pieces[from];
-    if (!(result.normals[to].dot(result.normals[from]) >= leastCosine_))
-      result.normals[to] = result.normals[from];
+    if (!isSmooth(from, to)) result.normals[to] = result.normals[from];
     offer(to);
   }
 }
