@@ -394,12 +394,20 @@ std::size_t reassign(const PointSurface& whole, const PointSurface& divided, Pie
 std::size_t countRoundedPairs(const PointSurface& surface, const Pieces& pieces, double angle,
                               const std::vector<bool>& isRounded) {
   const double leastCosine = std::cos(angle);
+  // Some normals beside the edges that are kept are wrong.
+  const auto isBesideKept = [&](std::uint32_t i) {
+    const auto near = surface.graph().neighbours(i);
+    return !isRounded[surface.part(i)] && std::any_of(near.begin(), near.end(), [&](auto j) {
+      return pieces.pieces[j] != pieces.pieces[i];
+    });
+  };
   std::size_t count = 0;
-  for (std::uint32_t i = 0; i < surface.size(); ++i)
+  for (std::uint32_t i = 0; i < surface.size(); ++i) {
+    if (surface.part(i) == kNone || !pieces.isClear[i] || isBesideKept(i)) continue;
     for (const std::uint32_t j : surface.graph().neighbours(i))
-      count += i < j && pieces.isClear[i] && pieces.isClear[j] &&
-               (pieces.pieces[i] == pieces.pieces[j] || isRounded[surface.part(i)]) &&
+      count += i < j && pieces.isClear[j] && !isBesideKept(j) &&
                pieces.normals[i].dot(pieces.normals[j]) < leastCosine;
+  }
   return count;
 }
 

@@ -164,7 +164,8 @@ PointsToMeshResult pointsToMesh(const PointCloud& cloud, const PointsToMeshOptio
   requireOptions(options);
   requirePoints(cloud);
   if (cloud.isEmpty()) throw InvalidInput("the point cloud has no points; read another file");
-  constexpr double kBytesPerPoint = 1800;
+  // Sharp edges need a second set of polynomials.
+  const double kBytesPerPoint = options.sharpAngle > 0 ? 3600 : 1800;
   requireMemory(kBytesPerPoint * static_cast<double>(cloud.size()), memoryLimit(options.maxMemory));
   report(options.progress, 0);
   const Normalisation normalisation(cloud);

@@ -40,7 +40,7 @@ std::vector<std::array<std::uint32_t, 2>> wholeParts(
 
 SharpSurface divideSurface(const PointSurface& whole, double angle, double smoothing,
                            const Progress& progress) {
-  constexpr int kMostRounds = 4, kMostMoves = 3;
+  constexpr int kMostRounds = 4, kMostMoves = 4;
   SharpSurface result;
   Pieces& pieces = result.pieces;
   pieces = findPieces(whole, angle);
