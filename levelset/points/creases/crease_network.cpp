@@ -11,8 +11,6 @@
 namespace levelset::points {
 namespace {
 
-constexpr std::uint32_t kNone = PointSurface::kNone;
-
 /// Adds the pieces of a corner to the conflicts.
 void addConflicts(const CreaseCorner& corner, CreaseNetwork& network) {
   for (std::size_t k = 1; k < corner.pieces.size(); ++k)

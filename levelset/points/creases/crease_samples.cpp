@@ -12,7 +12,6 @@ namespace levelset::points {
 namespace {
 
 using Imath::V3d;
-constexpr std::uint32_t kNone = PointSurface::kNone;
 
 /// Three pieces near a point, with a normal of each.
 struct Triple {
@@ -27,7 +26,7 @@ std::vector<Triple> findTriples(const PointSurface& whole, const PointSurface& d
   std::vector<Triple> triples;
   std::map<std::uint32_t, std::pair<double, std::uint32_t>> nearest;  // point of each piece
   const auto visit = [&](std::uint32_t from, std::uint32_t point) {
-    if (pieces.pieces[point] == kNone || !divided.hasFit(point)) return;
+    if (pieces.pieces[point] == kNoPiece || !divided.hasFit(point)) return;
     const std::pair found{(whole.positions()[point] - whole.positions()[from]).length2(), point};
     const auto [at, isNew] = nearest.emplace(pieces.pieces[point], found);
     if (!isNew) at->second = std::min(at->second, found);
@@ -43,14 +42,13 @@ std::vector<Triple> findTriples(const PointSurface& whole, const PointSurface& d
       visit(i, j);
       for (const std::uint32_t k : whole.graph().neighbours(j)) visit(i, k);
     }
-    constexpr std::size_t kMost = 8;
-    if (nearest.size() < 3 || nearest.size() > kMost) continue;
+    constexpr std::size_t kMostPieces = 8;
+    if (nearest.size() < 3 || nearest.size() > kMostPieces) continue;
     for (auto a = nearest.begin(); a != nearest.end(); ++a)
       for (auto b = std::next(a); b != nearest.end(); ++b)
         for (auto c = std::next(b); c != nearest.end(); ++c) {
           const auto normal = [&](const auto& one) { return divided.normal(one->second.second); };
-          triples.push_back(
-              {i, {a->first, b->first, c->first}, {normal(a), normal(b), normal(c)}});
+          triples.push_back({i, {a->first, b->first, c->first}, {normal(a), normal(b), normal(c)}});
         }
   }
   return triples;
@@ -87,18 +85,18 @@ std::vector<PairSamples> sampleCreases(const PointSurface& whole, const PointSur
   for (std::uint32_t i = 0; i < whole.size(); ++i)
     for (const std::uint32_t j : whole.graph().neighbours(i)) {
       const std::uint32_t a = pieces.pieces[i], b = pieces.pieces[j];
-      if (a < b && a != kNone && b != kNone && divided.hasFit(i) && divided.hasFit(j))
+      if (a < b && a != kNoPiece && b != kNoPiece && divided.hasFit(i) && divided.hasFit(j))
         edges.push_back({{a, b}, {i, j}});
     }
   std::vector<std::optional<CreaseSample>> found(edges.size());
   tbb::parallel_for(std::size_t{0}, edges.size(), [&](std::size_t e) {
     const auto [i, j] = edges[e].points;
     const double spacing = 0.5 * (whole.spacing(i) + whole.spacing(j));
-    constexpr double kReach = 2;
+    constexpr double kSampleReach = 2;  // spacings
     const V3d sides[] = {divided.normal(i), divided.normal(j)};
-    const auto at = meet(divided, edges[e].pieces, sides,
-                         (whole.positions()[i] + whole.positions()[j]) * 0.5, spacing,
-                         kReach * spacing);
+    const auto at =
+        meet(divided, edges[e].pieces, sides, (whole.positions()[i] + whole.positions()[j]) * 0.5,
+             spacing, kSampleReach * spacing);
     if (at) found[e] = {at->position, {at->normals[0], at->normals[1]}, spacing};
   });
   std::map<std::array<std::uint32_t, 2>, PairSamples> pairs;
@@ -118,13 +116,13 @@ std::vector<PairSamples> sampleCreases(const PointSurface& whole, const PointSur
 std::vector<CreaseCorner> findCorners(const PointSurface& whole, const PointSurface& divided,
                                       const Pieces& pieces) {
   const std::vector<Triple> triples = findTriples(whole, divided, pieces);
-  constexpr double kReach = 2.5, kSame = 0.5;  // spacings
+  constexpr double kTripleReach = 2.5, kSame = 0.5;  // spacings
   std::vector<std::optional<FoundCorner>> found(triples.size());
   tbb::parallel_for(std::size_t{0}, triples.size(), [&](std::size_t t) {
     const Triple& one = triples[t];
     const double spacing = whole.spacing(one.point);
     const auto at = meet(divided, one.pieces, one.normals, whole.positions()[one.point], spacing,
-                         kReach * spacing);
+                         kTripleReach * spacing);
     if (!at) return;
     found[t] = FoundCorner{at->position,
                            {one.pieces.begin(), one.pieces.end()},

@@ -10,14 +10,13 @@ namespace levelset::points {
 namespace {
 
 using Imath::V3d;
-constexpr std::uint32_t kNone = PointSurface::kNone;
 
 // Lengths in spacings.
 constexpr double kStep = 0.5;
-constexpr double kLost = 2.5;        ///< distance from the samples at which a curve is lost
+constexpr double kLost = 2.5;          ///< distance from the samples at which a curve is lost
 constexpr double kCornerReach = 0.35;  ///< distance from a corner at which a curve ends there
-constexpr double kCovered = 0.8;     ///< distance of samples from a curve
-constexpr double kCornerArea = 1.8;  ///< distance of samples from a corner, where some are false
+constexpr double kCovered = 0.8;       ///< distance of samples from a curve
+constexpr double kCornerArea = 1.8;    ///< distance of samples from a corner, where some are false
 
 double distanceToSpan(const V3d& p, const V3d& a, const V3d& b) {
   const V3d along = b - a;
@@ -58,8 +57,8 @@ double CreaseTracer::cornerDistance(const V3d& position) const {
   return least;
 }
 
-/// Takes a step along the curve. A shorter one follows a bend, and a longer one leaves a place where
-/// the blended surfaces jump.
+/// Takes a step along the curve. A shorter one follows a bend, and a longer one leaves a place
+/// where the blended surfaces jump.
 std::optional<CreaseTracer::Place> CreaseTracer::next(const Place& from, double spacing) const {
   for (const double length : {kStep, kStep / 2, kStep / 4, 1.5 * kStep, 2 * kStep}) {
     const double step = length * spacing;
@@ -75,9 +74,9 @@ std::optional<CreaseTracer::Place> CreaseTracer::next(const Place& from, double 
   return std::nullopt;
 }
 
-/// Returns the corner that a step passes, or kNone.
+/// Returns the corner that a step passes, or kNoPiece.
 std::uint32_t CreaseTracer::cornerBetween(const V3d& from, const V3d& to, double spacing) const {
-  std::uint32_t best = kNone;
+  std::uint32_t best = kNoPiece;
   double least = kCornerReach * spacing;
   for (const std::uint32_t c : ends_) {
     const double distance = distanceToSpan(corners_[c].position, from, to);
@@ -100,13 +99,13 @@ CreaseTracer::Walk CreaseTracer::walk(const Place& seed) const {
     const auto place = next(last, spacing);
     if (!place) {
       // Beside a corner, the surfaces may not be continued far enough.
-      walk.corner = cornerBetween(last.position, last.position + last.tangent * kStep * spacing,
-                                  spacing);
-      if (walk.corner != kNone) walk.end = End::Corner;
+      walk.corner =
+          cornerBetween(last.position, last.position + last.tangent * kStep * spacing, spacing);
+      if (walk.corner != kNoPiece) walk.end = End::Corner;
       return walk;
     }
     walk.corner = cornerBetween(last.position, place->position, spacing);
-    if (walk.corner != kNone) {
+    if (walk.corner != kNoPiece) {
       walk.end = End::Corner;
       return walk;
     }
@@ -129,8 +128,7 @@ void CreaseTracer::endAt(std::uint32_t corner, std::vector<Place>& places) const
     if (const auto foot = surface_.project(end.position, end.normals[k], pair_.pieces[k]))
       end.normals[k] = foot->normal;
   const double spacing = spacingAt(end.position);
-  if (places.size() > 1 &&
-      (places.back().position - end.position).length() < 0.3 * kStep * spacing)
+  if (places.size() > 1 && (places.back().position - end.position).length() < 0.3 * kStep * spacing)
     places.pop_back();
   places.push_back(end);
 }
@@ -180,13 +178,17 @@ bool CreaseTracer::orient(CreaseCurve& curve) const {
   const std::size_t n = curve.positions.size();
   const std::size_t step = std::max<std::size_t>(1, n / 64);
   for (std::size_t i = 0; i < n; i += step) {
-    const std::size_t before = i > 0 ? i - 1 : curve.isClosed() ? n - 1 : 0,
-                      after = i + 1 < n ? i + 1 : curve.isClosed() ? 0 : n - 1;
+    const std::size_t before = i > 0              ? i - 1
+                               : curve.isClosed() ? n - 1
+                                                  : 0,
+                      after = i + 1 < n          ? i + 1
+                              : curve.isClosed() ? 0
+                                                 : n - 1;
     const V3d along = (curve.positions[after] - curve.positions[before]).normalized();
     for (std::size_t k = 0; k < 2; ++k) {
       const V3d& p = curve.positions[i];
       const std::uint32_t near = surface_.nearest(p, curve.normals[i][k], curve.pieces[k]);
-      if (near == kNone) continue;
+      if (near == kNoPiece) continue;
       const V3d left = curve.normals[i][k].cross(along);
       const auto add = [&](std::uint32_t j) {
         const double offset = (surface_.positions()[j] - p).dot(left) / surface_.spacing(j);
@@ -218,7 +220,9 @@ void CreaseTracer::cover(const CreaseCurve& curve) {
       return distanceToSpan(position, curve.positions[at], curve.positions[other]) < reach;
     };
     if (isBeside(at > 0 || !curve.isClosed() ? (at > 0 ? at - 1 : at + 1) : n - 1) ||
-        isBeside(at + 1 < n ? at + 1 : curve.isClosed() ? 0 : at - 1))
+        isBeside(at + 1 < n         ? at + 1
+                 : curve.isClosed() ? 0
+                                    : at - 1))
       isCovered_[s] = true;
   }
 }

@@ -11,7 +11,7 @@ using Imath::V3d;
 std::optional<Meeting> meet(const PointSurface& surface, std::span<const std::uint32_t> pieces,
                             std::span<const V3d> sides, const V3d& start, double spacing,
                             double reach) {
-  constexpr int kMostSteps = 24;
+  constexpr int kMostNewton = 24;
   // Blends jump a little from one nearest point to the next. Four or more surfaces need not meet.
   const double accepted = (pieces.size() > 3 ? 0.25 : 0.1) * spacing, exact = 1e-12 * spacing;
   // Directions in which the surfaces do not fix the position: they are nearly parallel.
@@ -22,7 +22,7 @@ std::optional<Meeting> meet(const PointSurface& surface, std::span<const std::ui
   Meeting best;
   double least = INFINITY;
   V3d at = start;
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (int step = 0; step < kMostNewton; ++step) {
     std::vector<V3d> found;
     for (std::size_t k = 0; k < pieces.size(); ++k) {
       const auto foot = surface.project(at, sides[k], pieces[k]);

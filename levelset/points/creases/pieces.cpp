@@ -16,7 +16,6 @@ namespace levelset::points {
 namespace {
 
 using Imath::V3d;
-constexpr std::uint32_t kNone = PointSurface::kNone;
 
 /// Radius of the neighbourhoods that tell sharp edges, spacings. With noise it grows up to the
 /// greatest one.
@@ -30,7 +29,7 @@ constexpr std::size_t kLeastPiece = 10;
 
 /// Fit of the points around a point.
 struct SideFit {
-  V3d normal = V3d(0);  ///< outwards
+  V3d normal = V3d(0);      ///< outwards
   double error = INFINITY;  ///< spacings
   bool isReliable = false;
 };
@@ -47,8 +46,8 @@ SideFit fitSide(const std::vector<HeightSample>& samples, const LocalFrame& fram
     const auto unknowns = static_cast<double>((degree + 1) * (degree + 2) / 2);
     const auto count = static_cast<double>(samples.size());
     if (count < unknowns + 2) continue;
-    constexpr double kCondition = 1e5;
-    const auto fit = fitHeights(samples, degree, kCondition);
+    constexpr double kSideCondition = 1e5;
+    const auto fit = fitHeights(samples, degree, kSideCondition);
     if (!fit || fit->degree < degree) continue;
     double squares = 0, weights = 0;
     for (const HeightSample& s : samples) {
@@ -109,7 +108,8 @@ void PieceFinder::forEachPoint(const Work& work) {
                     [&](const auto& range) {
                       Scratch& scratch = scratches.local();
                       for (std::size_t i = range.begin(); i < range.end(); ++i)
-                        if (surface_.part(i) != kNone) work(static_cast<std::uint32_t>(i), scratch);
+                        if (surface_.part(i) != kNoPiece)
+                          work(static_cast<std::uint32_t>(i), scratch);
                     });
 }
 
@@ -118,7 +118,8 @@ void PieceFinder::fitAround(std::uint32_t point, Scratch& scratch) {
   frame.setNormal(surface_.normal(point));
   scratch.samples.clear();
   for (const FitCandidate& one : scratch.search.find(point, frame, radius_))
-    scratch.samples.push_back({one.local.x, one.local.y, one.local.z, weightAt(one.local, radius_)});
+    scratch.samples.push_back(
+        {one.local.x, one.local.y, one.local.z, weightAt(one.local, radius_)});
   fits_[point] = fitSide(scratch.samples, frame);
   if (!(fits_[point].normal.length2() > 0)) fits_[point].normal = surface_.normal(point);
 }
@@ -127,7 +128,7 @@ void PieceFinder::fitAround(std::uint32_t point, Scratch& scratch) {
 /// coordinates of its frame; zero if there is none.
 V3d PieceFinder::planeOfMost(const std::vector<FitCandidate>& around) const {
   constexpr std::size_t kTried = 14;  // nearest neighbours that span planes
-  constexpr double kSlope = 0.1, kLeastSine = 0.3;
+  constexpr double kSlope = 0.1, kLeastSpread = 0.3;
   const double tolerance = 2 * noise_ + 1e-6;
   V3d best(0);
   double most = 0;
@@ -136,7 +137,7 @@ V3d PieceFinder::planeOfMost(const std::vector<FitCandidate>& around) const {
     for (std::size_t k = j + 1; k < tried; ++k) {
       const V3d across = around[j].local.cross(around[k].local);
       const double length = across.length();
-      if (!(length > kLeastSine * around[j].local.length() * around[k].local.length())) continue;
+      if (!(length > kLeastSpread * around[j].local.length() * around[k].local.length())) continue;
       const V3d normal = across / length;
       double sum = 0;
       for (const FitCandidate& one : around) {
@@ -187,12 +188,13 @@ void PieceFinder::fitOneSide(std::uint32_t point, Scratch& scratch) {
   all.isReliable = true;
 }
 
-/// Estimates the noise from the lowest tenth of the errors: most points of a solid with narrow faces
-/// lie beside sharp edges.
+/// Estimates the noise from the lowest tenth of the errors: most points of a solid with narrow
+/// faces lie beside sharp edges.
 void PieceFinder::setNoise() {
   std::vector<double> errors;
   for (std::size_t i = 0; i < surface_.size(); ++i)
-    if (surface_.part(i) != kNone && std::isfinite(fits_[i].error)) errors.push_back(fits_[i].error);
+    if (surface_.part(i) != kNoPiece && std::isfinite(fits_[i].error))
+      errors.push_back(fits_[i].error);
   if (errors.empty()) return;
   const auto tenth = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 10);
   std::nth_element(errors.begin(), tenth, errors.end());
@@ -200,8 +202,8 @@ void PieceFinder::setNoise() {
   noise_ = kMedian * *tenth;
 }
 
-/// Returns true if the surface bends evenly from one point to another. Then the chord leans alike to
-/// both normals. A normal that is a mean of both sides of a sharp edge does not pass.
+/// Returns true if the surface bends evenly from one point to another. Then the chord leans alike
+/// to both normals. A normal that is a mean of both sides of a sharp edge does not pass.
 bool PieceFinder::isSmooth(std::uint32_t i, std::uint32_t j) const {
   const SideFit &a = fits_[i], &b = fits_[j];
   if (!a.isReliable || !b.isReliable || !(a.normal.dot(b.normal) >= leastCosine_)) return false;
@@ -219,18 +221,18 @@ void PieceFinder::joinReliable(Pieces& result) const {
   std::vector<std::size_t> sizes(n, 0);
   for (std::uint32_t i = 0; i < n; ++i) ++sizes[sets.find(i)];
   // Parts without a piece of enough points stay whole.
-  std::vector<std::uint32_t> numbers(n, kNone), whole(surface_.partCount(), kNone);
+  std::vector<std::uint32_t> numbers(n, kNoPiece), whole(surface_.partCount(), kNoPiece);
   std::vector<bool> hasPiece(surface_.partCount(), false);
   for (std::uint32_t i = 0; i < n; ++i)
-    if (surface_.part(i) != kNone && sizes[sets.find(i)] >= kLeastPiece)
+    if (surface_.part(i) != kNoPiece && sizes[sets.find(i)] >= kLeastPiece)
       hasPiece[surface_.part(i)] = true;
-  result.pieces.assign(n, kNone);
+  result.pieces.assign(n, kNoPiece);
   for (std::uint32_t i = 0; i < n; ++i) {
     const std::uint32_t part = surface_.part(i);
-    if (part == kNone) continue;
+    if (part == kNoPiece) continue;
     std::uint32_t& number = hasPiece[part] ? numbers[sets.find(i)] : whole[part];
     if (hasPiece[part] && sizes[sets.find(i)] < kLeastPiece) continue;
-    if (number == kNone) {
+    if (number == kNoPiece) {
       number = static_cast<std::uint32_t>(result.count++);
       result.parts.push_back(part);
     }
@@ -245,18 +247,18 @@ void PieceFinder::grow(Pieces& result) const {
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
   const auto offer = [&](std::uint32_t from) {
     for (const std::uint32_t to : surface_.graph().neighbours(from)) {
-      if (result.pieces[to] != kNone || surface_.part(to) == kNone) continue;
+      if (result.pieces[to] != kNoPiece || surface_.part(to) == kNoPiece) continue;
       const V3d along = surface_.positions()[to] - surface_.positions()[from];
       queue.emplace(std::abs(along.dot(result.normals[from])) / surface_.spacing(to), to, from);
     }
   };
   const auto n = static_cast<std::uint32_t>(surface_.size());
   for (std::uint32_t i = 0; i < n; ++i)
-    if (result.pieces[i] != kNone) offer(i);
+    if (result.pieces[i] != kNoPiece) offer(i);
   while (!queue.empty()) {
     const auto [cost, to, from] = queue.top();
     queue.pop();
-    if (result.pieces[to] != kNone) continue;
+    if (result.pieces[to] != kNoPiece) continue;
     result.pieces[to] = result.pieces[from];
     if (!isSmooth(from, to)) result.normals[to] = result.normals[from];
     offer(to);
@@ -272,7 +274,7 @@ void PieceFinder::joinSmooth(Pieces& result) const {
   for (std::uint32_t i = 0; i < surface_.size(); ++i)
     for (const std::uint32_t j : surface_.graph().neighbours(i)) {
       const std::uint32_t a = result.pieces[i], b = result.pieces[j];
-      if (a == kNone || b == kNone || a >= b) continue;
+      if (a == kNoPiece || b == kNoPiece || a >= b) continue;
       Pairs& pairs = found[{a, b}];
       ++pairs.all;
       pairs.sharp += result.normals[i].dot(result.normals[j]) < leastCosine_;
@@ -329,19 +331,19 @@ void Pieces::join(const std::vector<std::array<std::uint32_t, 2>>& pairs) {
   for (const auto& [a, b] : pairs) sets.join(a, b);
   std::vector<bool> hasPoint(count, false);
   for (const std::uint32_t piece : pieces)
-    if (piece != kNone) hasPoint[piece] = true;
-  std::vector<std::uint32_t> numbers(count, kNone), kept;
+    if (piece != kNoPiece) hasPoint[piece] = true;
+  std::vector<std::uint32_t> numbers(count, kNoPiece), kept;
   for (std::uint32_t i = 0; i < count; ++i) {
     if (!hasPoint[i]) continue;
     const std::uint32_t root = sets.find(i);
-    if (numbers[root] == kNone) {
+    if (numbers[root] == kNoPiece) {
       numbers[root] = static_cast<std::uint32_t>(kept.size());
       kept.push_back(parts[i]);
     }
     numbers[i] = numbers[root];
   }
   for (std::uint32_t& piece : pieces)
-    if (piece != kNone) piece = numbers[piece];
+    if (piece != kNoPiece) piece = numbers[piece];
   parts = std::move(kept);
   count = parts.size();
 }
@@ -358,27 +360,23 @@ std::size_t reassign(const PointSurface& whole, const PointSurface& divided, Pie
     const std::uint32_t own = pieces.pieces[i];
     const auto neighbours = whole.graph().neighbours(i);
     const auto isOther = [&](std::uint32_t j) { return pieces.pieces[j] != own; };
-    if (own == kNone || std::none_of(neighbours.begin(), neighbours.end(), isOther)) return;
-    // Nearest neighbour of each piece.
-    std::map<std::uint32_t, std::pair<double, std::uint32_t>> nearest;
+    if (own == kNoPiece || std::none_of(neighbours.begin(), neighbours.end(), isOther)) return;
+    // Least height above the polynomials of each piece, and the point of that polynomial. Some
+    // polynomials are spoilt by points of another piece.
+    std::map<std::uint32_t, std::pair<double, std::uint32_t>> heights;
     for (const std::uint32_t j : neighbours) {
-      if (pieces.pieces[j] == kNone || !divided.hasFit(j)) continue;
-      const std::pair found{(whole.positions()[j] - whole.positions()[i]).length2(), j};
-      const auto [at, isNew] = nearest.emplace(pieces.pieces[j], found);
+      if (pieces.pieces[j] == kNoPiece || !divided.hasFit(j)) continue;
+      const std::pair found{std::abs(divided.heightOverFit(j, whole.positions()[i])), j};
+      const auto [at, isNew] = heights.emplace(pieces.pieces[j], found);
       if (!isNew) at->second = std::min(at->second, found);
     }
-    const auto heightOver = [&](std::uint32_t j) {
-      return std::abs(divided.heightOverFit(j, whole.positions()[i]));
-    };
-    const auto at = nearest.find(own);
-    double least = at == nearest.end() ? INFINITY : kBetter * heightOver(at->second.second);
+    const auto at = heights.find(own);
+    double least = at == heights.end() ? INFINITY : kBetter * at->second.first;
     constexpr double kExact = 1e-9;  // spacings
     if (least < kExact * whole.spacing(i)) return;
-    for (const auto& [piece, found] : nearest) {
-      if (piece == own) continue;
-      const double height = heightOver(found.second);
-      if (!(height < least)) continue;
-      least = height;
+    for (const auto& [piece, found] : heights) {
+      if (piece == own || !(found.first < least)) continue;
+      least = found.first;
       moved[i] = piece;
       normals[i] = divided.normal(found.second);
     }
@@ -403,7 +401,7 @@ std::size_t countRoundedPairs(const PointSurface& surface, const Pieces& pieces,
   };
   std::size_t count = 0;
   for (std::uint32_t i = 0; i < surface.size(); ++i) {
-    if (surface.part(i) == kNone || !pieces.isClear[i] || isBesideKept(i)) continue;
+    if (surface.part(i) == kNoPiece || !pieces.isClear[i] || isBesideKept(i)) continue;
     for (const std::uint32_t j : surface.graph().neighbours(i))
       count += i < j && pieces.isClear[j] && !isBesideKept(j) &&
                pieces.normals[i].dot(pieces.normals[j]) < leastCosine;

@@ -10,10 +10,12 @@
 
 namespace levelset::points {
 
+inline constexpr std::uint32_t kNoPiece = PointSurface::kNone;
+
 /// Smooth pieces of a surface through points, between sharp edges.
 struct Pieces {
   std::size_t count = 0;
-  std::vector<std::uint32_t> pieces;  ///< piece of each point; kNone for points without a part
+  std::vector<std::uint32_t> pieces;  ///< piece of each point; kNoPiece for points without a part
   std::vector<Imath::V3d> normals;    ///< unit normals on the side of the piece, outwards
   std::vector<bool> isClear;          ///< the points around give a clear normal
   std::vector<std::uint32_t> parts;   ///< part of each piece
@@ -25,10 +27,10 @@ struct Pieces {
 };
 
 /// Divides the parts of a surface where normals of neighbours differ by more than an angle. Each
-/// point gets a normal of its own side: beside a sharp edge, the plane through the point that passes
-/// near most of its neighbours. Connected points with consistent normals make a piece. Others, and
-/// those of tiny pieces, join the piece whose tangent planes pass nearest to them. The two sides of
-/// a sharp edge that fades out belong to one piece.
+/// point gets a normal of its own side: beside a sharp edge, the plane through the point that
+/// passes near most of its neighbours. Connected points with consistent normals make a piece.
+/// Others, and those of tiny pieces, join the piece whose tangent planes pass nearest to them. The
+/// two sides of a sharp edge that fades out belong to one piece.
 /// @param angle  radians
 [[nodiscard]] Pieces findPieces(const PointSurface& surface, double angle);
 

@@ -250,7 +250,8 @@ PointsToMeshResult pointsToMesh(const PointCloud& cloud, const PointsToMeshOptio
         "--accept-holes",
         figures.incomplete, figures.components, figures.missedPoints, surface.size()));
   measureBorders(result.mesh, figures);
-  if (sharp) measureSharpEdges(surface, *sharp, isSharp, options.sharpAngle, normalisation.scale, figures);
+  if (sharp)
+    measureSharpEdges(surface, *sharp, isSharp, options.sharpAngle, normalisation.scale, figures);
   figures.connectivitySeconds = surface.timing().connectivity;
   figures.reconstructionSeconds = surface.timing().reconstruction;
   figures.triangulationSeconds = std::chrono::duration<double>(Clock::now() - start).count();

@@ -17,8 +17,6 @@ using Imath::V3d;
 
 namespace {
 
-constexpr std::uint32_t kNone = PointSurface::kNone;
-
 /// Factors on the edge lengths of sharp edges, and on those between them, for tries.
 constexpr double kOutlineScales[] = {1, 0.8, 0.6};
 constexpr double kInnerScales[] = {1, 0.9, 0.8, 0.7};
@@ -68,7 +66,7 @@ SharpSurface divideSurface(const PointSurface& whole, double angle, double smoot
 
 struct SharpFronts::Outline {
   std::vector<V3d> positions;
-  std::vector<std::uint32_t> cornerVertices;  ///< of each corner of the network, or kNone
+  std::vector<std::uint32_t> cornerVertices;  ///< of each corner of the network, or kNoPiece
   std::map<std::uint32_t, std::vector<std::uint32_t>> vertices;  ///< of each curve, with both ends
   std::map<std::uint32_t, std::vector<std::array<V3d, 2>>> normals;  ///< the same
 };
@@ -83,7 +81,8 @@ SharpFronts::SharpFronts(const PointSurface& whole, const SharpSurface& sharp,
       parts_(partsOf(*sharp.divided, lengths_)),
       pieces_(whole.partCount()),
       curves_(whole.partCount()) {
-  for (std::uint32_t i = 0; i < sharp.pieces.count; ++i) pieces_[sharp.pieces.parts[i]].push_back(i);
+  for (std::uint32_t i = 0; i < sharp.pieces.count; ++i)
+    pieces_[sharp.pieces.parts[i]].push_back(i);
   for (std::uint32_t c = 0; c < sharp.network.curves.size(); ++c)
     curves_[sharp.pieces.parts[sharp.network.curves[c].pieces[0]]].push_back(c);
 }
@@ -124,7 +123,7 @@ std::vector<double> SharpFronts::capsAtCreases() const {
       for (std::size_t k = 0; k < 2; ++k) {
         const std::uint32_t near =
             surface_.nearest(curve.positions[i], curve.normals[i][k], curve.pieces[k]);
-        if (near != kNone) caps[near] = std::min(caps[near], cap);
+        if (near != kNoPiece) caps[near] = std::min(caps[near], cap);
       }
     }
   }
@@ -134,9 +133,9 @@ std::vector<double> SharpFronts::capsAtCreases() const {
 double SharpFronts::lengthAt(const CreaseCurve& curve, std::size_t position) const {
   double length = limits_.longest;
   for (std::size_t k = 0; k < 2; ++k) {
-    const std::uint32_t near = surface_.nearest(curve.positions[position],
-                                                curve.normals[position][k], curve.pieces[k]);
-    if (near != kNone) length = std::min(length, lengths_[near]);
+    const std::uint32_t near =
+        surface_.nearest(curve.positions[position], curve.normals[position][k], curve.pieces[k]);
+    if (near != kNoPiece) length = std::min(length, lengths_[near]);
   }
   return length;
 }
@@ -160,16 +159,15 @@ void SharpFronts::addCurve(std::uint32_t number, double scale, Outline& outline)
     return c != number && std::minmax(other[0], other[1]) == ends;
   };
   const auto& all = curves_[sharp_.pieces.parts[curve.pieces[0]]];
-  const std::size_t least = curve.isClosed()                               ? 3
+  const std::size_t least = curve.isClosed()                                ? 3
                             : std::any_of(all.begin(), all.end(), isBeside) ? 2
                                                                             : 1;
-  const std::size_t count =
-      std::max(least, static_cast<std::size_t>(std::lround(edges.back())));
+  const std::size_t count = std::max(least, static_cast<std::size_t>(std::lround(edges.back())));
   auto& vertices = outline.vertices[number];
   auto& normals = outline.normals[number];
   const auto addCorner = [&](std::size_t end, std::size_t position) {
     std::uint32_t& vertex = outline.cornerVertices[curve.corners[end]];
-    if (vertex == kNone) {
+    if (vertex == kNoPiece) {
       vertex = static_cast<std::uint32_t>(outline.positions.size());
       outline.positions.push_back(curve.positions[position]);
     }
@@ -200,7 +198,7 @@ void SharpFronts::addCurve(std::uint32_t number, double scale, Outline& outline)
 
 SharpFronts::Outline SharpFronts::outlineOf(std::uint32_t part, double scale) const {
   Outline outline;
-  outline.cornerVertices.assign(sharp_.network.corners.size(), kNone);
+  outline.cornerVertices.assign(sharp_.network.corners.size(), kNoPiece);
   for (const std::uint32_t c : curves_[part]) addCurve(c, scale, outline);
   return outline;
 }

@@ -21,16 +21,15 @@ Kind makesMeshOfPoints(const Invocation&) {
 
 Value runMeshPoints(Invocation& in) {
   levelset::PointsToMeshResult result = levelset::pointsToMesh(
-      in.operands[0].cloud(), {.edgeLength = in.given("edge") ? in.length("edge") : 0,
-                               .angle = in.number("angle") * std::numbers::pi / 180,
-                               .smoothing = in.number("smoothing"),
-                               .gap = in.number("gap"),
-                               .sharpAngle = in.given("sharp")
-                                                 ? in.number("sharp") * std::numbers::pi / 180
-                                                 : 0,
-                               .acceptHoles = in.flag("accept-holes"),
-                               .maxMemory = in.maxMemory,
-                               .progress = in.progress});
+      in.operands[0].cloud(),
+      {.edgeLength = in.given("edge") ? in.length("edge") : 0,
+       .angle = in.number("angle") * std::numbers::pi / 180,
+       .smoothing = in.number("smoothing"),
+       .gap = in.number("gap"),
+       .sharpAngle = in.given("sharp") ? in.number("sharp") * std::numbers::pi / 180 : 0,
+       .acceptHoles = in.flag("accept-holes"),
+       .maxMemory = in.maxMemory,
+       .progress = in.progress});
   const levelset::PointsToMeshReport& found = result.report;
   const double triangles =
       static_cast<double>(std::max<std::size_t>(1, result.mesh.triangles.size()));
@@ -116,10 +115,13 @@ Operator meshPointsOperator() {
           "are "
           "shorter where the surface bends more, but not below the spacing of the points. Normals "
           "are not needed. Given ones decide on the side; it is an error if more than 10 % of them "
-          "oppose their neighbours. Raise --smoothing for noise. Sharp edges are rounded over about "
-          "a spacing. With --sharp they are kept, and so are corners. Polynomials then are fitted on "
+          "oppose their neighbours. Raise --smoothing for noise. Sharp edges are rounded over "
+          "about "
+          "a spacing. With --sharp they are kept, and so are corners. Polynomials then are fitted "
+          "on "
           "each side of a sharp edge, and a front starts from the edges around each smooth piece. "
-          "An edge that fades out, meets a border or lies in noise above a tenth of the spacing may "
+          "An edge that fades out, meets a border or lies in noise above a tenth of the spacing "
+          "may "
           "be rounded. A mesh that misses points or has "
           "holes is an error without --accept-holes. The action needs a build with CGAL.",
       .example =

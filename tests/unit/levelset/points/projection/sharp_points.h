@@ -30,7 +30,9 @@ inline TriMesh prism(const std::vector<Imath::V2d>& polygon, double height) {
   return mesh;
 }
 
-inline TriMesh cubeMesh() { return prism({{0, 0}, {1, 0}, {1, 1}, {0, 1}}, 1); }
+inline TriMesh cubeMesh() {
+  return prism({{0, 0}, {1, 0}, {1, 1}, {0, 1}}, 1);
+}
 
 /// Profile of a bracket, with one concave edge. Its volume is 2.31 times the height.
 inline TriMesh bracketMesh(double height = 1) {

@@ -118,8 +118,7 @@ TEST(SharpPoints, OfAGridOnACubeHaveItsEdges) {
 }
 
 TEST(SharpPoints, OfARotatedBoxFarFromTheOriginHaveItsEdges) {
-  PointCloud cloud =
-      pointsOf(sharp_points::prism({{0, 0}, {1.5, 0}, {1.5, 1}, {0, 1}}, 0.6), 3000);
+  PointCloud cloud = pointsOf(sharp_points::prism({{0, 0}, {1.5, 0}, {1.5, 1}, {0, 1}}, 0.6), 3000);
   const V3d u = V3d(1, 2, 2) / 3, v = V3d(2, 1, -2) / 3, w = u.cross(v);
   for (V3d& p : cloud.positions) p = u * p.x + v * p.y + w * p.z + V3d(1e6, -1e6, 1e6);
   const PointsToMeshResult result = pointsToMesh(cloud, {.sharpAngle = kAngle});
@@ -265,8 +264,8 @@ TEST(SharpPoints, HaveTheSameBitsForAnyNumberOfThreads) {
 TEST(SharpPoints, RefuseAnglesOutsideTheirRange) {
   const PointCloud cloud = projected_points::sphere(100);
   for (const double angle : {0.1, 1.6, -0.5}) {
-    const std::string message = refusal<UsageError>(
-        [&] { static_cast<void>(pointsToMesh(cloud, {.sharpAngle = angle})); });
+    const std::string message =
+        refusal<UsageError>([&] { static_cast<void>(pointsToMesh(cloud, {.sharpAngle = angle})); });
     EXPECT_NE(message.find("10 to 90 degrees"), std::string::npos) << message;
   }
 }
