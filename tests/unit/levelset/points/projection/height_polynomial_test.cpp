@@ -11,6 +11,7 @@
 namespace height_polynomial_test {
 
 using levelset::points::fitHeights;
+using levelset::points::fitHeightsByPrediction;
 using levelset::points::HeightJet;
 using levelset::points::HeightPolynomial;
 using levelset::points::HeightSample;
@@ -78,6 +79,27 @@ TEST(HeightPolynomial, LowersTheDegreeNearAnAlgebraicCurve) {
   for (int i = 0; i < 40; ++i) line.push_back({0.1 * i, 0.2 * i, 1, 1});
   EXPECT_FALSE(fitHeights(line, 5, kCondition));
   EXPECT_FALSE(fitHeights(std::vector<HeightSample>{{0, 0, 0, 1}}, 5, kCondition));
+}
+
+TEST(HeightPolynomial, ByPredictionHasALowDegreeForNoise) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise(0, 0.1);
+  const auto noisy =
+      samplesOf([&](double x, double y) { return 2 - x + 3 * y + noise(random); }, 2);
+  const auto chosen = fitHeightsByPrediction(noisy, 5, kCondition),
+             greatest = fitHeights(noisy, 5, kCondition);
+  ASSERT_TRUE(chosen && greatest);
+  EXPECT_LE(chosen->degree, 2);
+  EXPECT_GE(greatest->degree, 4);
+  // Two spacings off, a polynomial of high degree swings.
+  const auto error = [](const HeightPolynomial& fit) {
+    return std::abs(fit.value(2, -2) - (2 - 2 - 6));
+  };
+  EXPECT_LT(error(*chosen), 0.5 * error(*greatest));
+  const auto exact = fitHeightsByPrediction(samplesOf(cubic), 5, kCondition);
+  ASSERT_TRUE(exact);
+  EXPECT_GE(exact->degree, 3);
+  EXPECT_NEAR(exact->value(0.4, -0.3), cubic(0.4, -0.3), doubleRounding(100));
 }
 
 }  // namespace height_polynomial_test
