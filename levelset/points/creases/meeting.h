@@ -13,7 +13,7 @@ namespace levelset::points {
 
 /// Position where the surfaces of pieces meet, and their normals there.
 struct Meeting {
-  Imath::V3d position;
+  Imath::V3d position = Imath::V3d(0);
   std::vector<Imath::V3d> normals;
 };
 

@@ -66,8 +66,9 @@ SideFit fitSide(const std::vector<HeightSample>& samples, const LocalFrame& fram
 
 class PieceFinder {
  public:
-  PieceFinder(const PointSurface& surface, double angle)
+  PieceFinder(const PointSurface& surface, double angle, std::span<const V3d> sides)
       : surface_(surface),
+        sides_(sides),
         leastCosine_(std::cos(angle)),
         mostTilt_(0.7 * std::sin(angle / 2)),
         fits_(surface.size()) {}
@@ -93,6 +94,7 @@ class PieceFinder {
   void joinSmooth(Pieces& result) const;
 
   const PointSurface& surface_;
+  std::span<const V3d> sides_;
   double leastCosine_;
   double mostTilt_;  ///< of the chord between neighbours, as isSmooth() measures it
   double radius_ = kLeastRadius, noise_ = 0;
@@ -166,7 +168,7 @@ void PieceFinder::fitOneSide(std::uint32_t point, Scratch& scratch) {
   const V3d plane = planeOfMost(scratch.around);
   if (!(plane.length2() > 0)) return;
   V3d normal = frame.directionToWorld(plane);
-  if (normal.dot(surface_.normal(point)) < 0) normal = -normal;
+  if (normal.dot(sides_[point]) < 0) normal = -normal;
   constexpr double kMostSlope = 0.15, kGain = 0.4;
   constexpr std::size_t kFewest = 6;
   SideFit best;
@@ -313,7 +315,7 @@ Pieces PieceFinder::find() {
   result.normals.reserve(surface_.size());
   for (std::size_t i = 0; i < surface_.size(); ++i) {
     V3d normal = fits_[i].normal;
-    if (normal.dot(surface_.normal(i)) < 0) normal = -normal;
+    if (normal.dot(sides_[i]) < 0) normal = -normal;
     result.normals.push_back(normal);
     result.isClear.push_back(fits_[i].isReliable);
     fits_[i].normal = normal;
@@ -348,8 +350,8 @@ void Pieces::join(const std::vector<std::array<std::uint32_t, 2>>& pairs) {
   count = parts.size();
 }
 
-Pieces findPieces(const PointSurface& surface, double angle) {
-  return PieceFinder(surface, angle).find();
+Pieces findPieces(const PointSurface& surface, double angle, std::span<const V3d> sides) {
+  return PieceFinder(surface, angle, sides).find();
 }
 
 std::size_t reassign(const PointSurface& whole, const PointSurface& divided, Pieces& pieces) {

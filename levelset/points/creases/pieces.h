@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "levelset/points/projection/point_surface.h"
@@ -32,7 +33,9 @@ struct Pieces {
 /// Others, and those of tiny pieces, join the piece whose tangent planes pass nearest to them. The
 /// two sides of a sharp edge that fades out belong to one piece.
 /// @param angle  radians
-[[nodiscard]] Pieces findPieces(const PointSurface& surface, double angle);
+/// @param sides  vectors to the outside, about, at each point
+[[nodiscard]] Pieces findPieces(const PointSurface& surface, double angle,
+                                std::span<const Imath::V3d> sides);
 
 /// Moves points beside sharp edges to the piece whose polynomials pass nearest to them.
 /// @param whole    surface before PointSurface::divide()

@@ -189,7 +189,7 @@ PointsToMeshResult pointsToMesh(const PointCloud& cloud, const PointsToMeshOptio
   std::optional<SharpFronts> sharpFronts;
   if (options.sharpAngle > 0)
     sharp = points::divideSurface(surface, options.sharpAngle, options.smoothing,
-                                  subProgress(options.progress, 0.6, 0.7));
+                                  !cloud.normals.empty(), subProgress(options.progress, 0.6, 0.7));
   if (sharp && sharp->divided) sharpFronts.emplace(surface, *sharp, limits);
   double triangles = sharpFronts ? sharpFronts->expectedTriangles() : 0;
   for (const SurfacePart& part : parts) triangles += part.expected;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "levelset/points/creases/meeting.h"
+#include "levelset/points/processing/normals.h"
 
 namespace levelset::points {
 
@@ -34,14 +35,29 @@ std::vector<std::array<std::uint32_t, 2>> wholeParts(
   return pairs;
 }
 
+/// Returns vectors to the outside.
+std::vector<V3d> sidesOf(const PointSurface& whole, bool hasSides, const Progress& progress) {
+  std::vector<V3d> sides(whole.size());
+  PointCloud cloud;
+  if (!hasSides) {
+    cloud.positions.assign(whole.positions().begin(), whole.positions().end());
+    cloud = estimateNormals(std::move(cloud), {.progress = progress}).cloud;
+  }
+  for (std::size_t i = 0; i < sides.size(); ++i) {
+    if (!hasSides) sides[i] = V3d(cloud.normals[i]);
+    if (!(sides[i].length2() > 0)) sides[i] = whole.normal(i);
+  }
+  return sides;
+}
+
 }  // namespace
 
-SharpSurface divideSurface(const PointSurface& whole, double angle, double smoothing,
+SharpSurface divideSurface(const PointSurface& whole, double angle, double smoothing, bool hasSides,
                            const Progress& progress) {
   constexpr int kMostRounds = 4, kMostMoves = 4;
   SharpSurface result;
   Pieces& pieces = result.pieces;
-  pieces = findPieces(whole, angle);
+  pieces = findPieces(whole, angle, sidesOf(whole, hasSides, subProgress(progress, 0, 0.1)));
   for (int round = 0; pieces.count > whole.partCount(); ++round) {
     report(progress, std::min(0.9, 0.1 + 0.15 * round));
     const auto divide = [&] {

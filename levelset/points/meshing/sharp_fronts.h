@@ -21,8 +21,10 @@ struct SharpSurface {
 /// Divides a surface at its sharp edges. Pieces whose common curve is not found as a whole are
 /// joined again, so that their edge is rounded.
 /// @param angle  radians
+/// @param hasSides  the normals of the cloud gave the sides of the surface. Else those of sharp
+///        wedges may be wrong, and normals that keep sharp edges are computed.
 [[nodiscard]] SharpSurface divideSurface(const PointSurface& whole, double angle, double smoothing,
-                                         const Progress& progress);
+                                         bool hasSides, const Progress& progress);
 
 /// Meshes the pieces of a divided part by fronts that start at its sharp edges. The pieces share
 /// the vertices of these edges.
