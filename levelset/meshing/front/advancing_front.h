@@ -40,7 +40,7 @@ struct FrontOptions {
 
 /// Closed loops of edges from which a front starts.
 struct FrontLoops {
-  std::vector<Imath::V3d> positions, normals;     ///< of the vertices; unit normals of the surface
+  std::vector<Imath::V3d> positions, normals;     ///< vertices, and unit normals there
   std::vector<std::vector<std::uint32_t>> loops;  ///< the surface lies to the left of each edge
 };
 

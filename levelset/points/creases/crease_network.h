@@ -21,7 +21,7 @@ struct CreaseCorner {
 struct CreaseCurve {
   std::array<std::uint32_t, 2> pieces;  ///< left and right of the curve, seen from outside
   std::vector<Imath::V3d> positions;    ///< a closed curve does not repeat its first one
-  std::vector<std::array<Imath::V3d, 2>> normals;  ///< of the pieces, at each position
+  std::vector<std::array<Imath::V3d, 2>> normals;  ///< both pieces, at each position
   std::array<std::uint32_t, 2> corners = {PointSurface::kNone, PointSurface::kNone};  ///< ends
 
   [[nodiscard]] bool isClosed() const { return corners[0] == PointSurface::kNone; }

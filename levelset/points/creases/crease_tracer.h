@@ -48,7 +48,7 @@ class CreaseTracer {
   const std::vector<CreaseCorner>& corners_;
   const PairSamples& pair_;
   std::vector<std::uint32_t> ends_;  ///< corners of the pair
-  PointSearch search_;               ///< of the samples
+  PointSearch search_;               ///< finds samples
   std::vector<bool> isCovered_;
 };
 

@@ -96,7 +96,7 @@ class PieceFinder {
   const PointSurface& surface_;
   std::span<const V3d> sides_;
   double leastCosine_;
-  double mostTilt_;  ///< of the chord between neighbours, as isSmooth() measures it
+  double mostTilt_;  ///< limit of isSmooth() without noise
   double radius_ = kLeastRadius, noise_ = 0;
   std::vector<SideFit> fits_;
 };

@@ -82,8 +82,9 @@ SharpSurface divideSurface(const PointSurface& whole, double angle, double smoot
 
 struct SharpFronts::Outline {
   std::vector<V3d> positions;
-  std::vector<std::uint32_t> cornerVertices;  ///< of each corner of the network, or kNoPiece
-  std::map<std::uint32_t, std::vector<std::uint32_t>> vertices;  ///< of each curve, with both ends
+  std::vector<std::uint32_t> cornerVertices;  ///< for each corner of the network, or kNoPiece
+  std::map<std::uint32_t, std::vector<std::uint32_t>>
+      vertices;  ///< along each curve, with both ends
   std::map<std::uint32_t, std::vector<std::array<V3d, 2>>> normals;  ///< the same
 };
 

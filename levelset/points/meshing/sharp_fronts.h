@@ -64,9 +64,9 @@ class SharpFronts {
   PointEdgeLimits limits_;
   std::vector<double> lengths_;
   BorderPoints borders_;
-  std::vector<SurfacePart> parts_;                  ///< of each piece
-  std::vector<std::vector<std::uint32_t>> pieces_;  ///< of each part
-  std::vector<std::vector<std::uint32_t>> curves_;  ///< of each part
+  std::vector<SurfacePart> parts_;                  ///< for each piece
+  std::vector<std::vector<std::uint32_t>> pieces_;  ///< for each part
+  std::vector<std::vector<std::uint32_t>> curves_;  ///< for each part
 };
 
 }  // namespace levelset::points

@@ -57,8 +57,7 @@ void expectWithin(const FrontMesh& mesh, const FrontLoops& start) {
   EXPECT_TRUE(mesh.isClosed);
   std::set<std::array<std::uint32_t, 2>> sides, border;
   for (const auto& t : mesh.triangles)
-    for (std::size_t i = 0; i < 3; ++i)
-      EXPECT_TRUE(sides.insert({t[i], t[(i + 1) % 3]}).second);
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_TRUE(sides.insert({t[i], t[(i + 1) % 3]}).second);
   for (const auto& [a, b] : sides)
     if (!sides.contains({b, a})) border.insert({a, b});
   std::set<std::array<std::uint32_t, 2>> given;
