@@ -68,19 +68,21 @@ CreaseNetwork traceCreases(const PointSurface& whole, const PointSurface& divide
   network.corners = findCorners(whole, divided, pieces);
   const std::vector<PairSamples> pairs = sampleCreases(whole, divided, pieces);
   std::vector<std::vector<CreaseCurve>> curves(pairs.size());
-  std::vector<char> isComplete(pairs.size(), 0);
+  std::vector<char> isComplete(pairs.size(), 0), isOpposed(pairs.size(), 0);
   tbb::parallel_for(std::size_t{0}, pairs.size(), [&](std::size_t p) {
     const PairSamples& pair = pairs[p];
     constexpr double kMostLost = 0.3;
     const auto all = static_cast<double>(pair.samples.size() + pair.lost);
-    isComplete[p] = CreaseTracer(divided, network.corners, pair).trace(curves[p]) &&
-                    static_cast<double>(pair.lost) <= kMostLost * all;
+    CreaseTracer tracer(divided, network.corners, pair);
+    isComplete[p] = tracer.trace(curves[p]) && static_cast<double>(pair.lost) <= kMostLost * all;
+    isOpposed[p] = tracer.isOpposed();
   });
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     if (!isComplete[p]) network.conflicts.push_back(pairs[p].pieces);
+    if (isOpposed[p]) network.opposed.push_back(pairs[p].pieces);
     for (CreaseCurve& curve : curves[p]) network.curves.push_back(std::move(curve));
   }
-  if (network.conflicts.empty()) linkLoops(network, pieces.count);
+  if (network.conflicts.empty() && network.opposed.empty()) linkLoops(network, pieces.count);
   return network;
 }
 

@@ -41,6 +41,8 @@ struct CreaseNetwork {
   std::vector<std::vector<std::vector<PieceSide>>> loops;
   /// Pieces whose common curve was not found as a whole, or does not end in a corner.
   std::vector<std::array<std::uint32_t, 2>> conflicts;
+  /// Pieces of which one has normals that point inwards.
+  std::vector<std::array<std::uint32_t, 2>> opposed;
 };
 
 /// Finds the curves where pieces meet. Corners first: positions on three pieces or more. Then a

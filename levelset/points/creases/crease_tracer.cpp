@@ -172,8 +172,8 @@ std::optional<CreaseCurve> CreaseTracer::curveFrom(std::uint32_t sample) const {
   return curve;
 }
 
-/// Puts the piece on the left of the curve first. Returns false if the sides are not clear.
-bool CreaseTracer::orient(CreaseCurve& curve) const {
+/// Puts the piece on the left of the curve first.
+CreaseTracer::Sides CreaseTracer::orient(CreaseCurve& curve) const {
   std::array<double, 2> sums{}, sizes{};
   const std::size_t n = curve.positions.size();
   const std::size_t step = std::max<std::size_t>(1, n / 64);
@@ -201,12 +201,12 @@ bool CreaseTracer::orient(CreaseCurve& curve) const {
   }
   constexpr double kClear = 0.4;
   for (std::size_t k = 0; k < 2; ++k)
-    if (!(std::abs(sums[k]) > kClear * sizes[k])) return false;
-  if ((sums[0] > 0) == (sums[1] > 0)) return false;
-  if (sums[0] > 0) return true;
+    if (!(std::abs(sums[k]) > kClear * sizes[k])) return Sides::Unclear;
+  if ((sums[0] > 0) == (sums[1] > 0)) return Sides::Opposed;
+  if (sums[0] > 0) return Sides::Agreed;
   std::swap(curve.pieces[0], curve.pieces[1]);
   for (auto& normals : curve.normals) std::swap(normals[0], normals[1]);
-  return true;
+  return Sides::Agreed;
 }
 
 void CreaseTracer::cover(const CreaseCurve& curve) {
@@ -237,13 +237,17 @@ bool CreaseTracer::trace(std::vector<CreaseCurve>& curves) {
           (cornerDistance(sample.position) < kCornerArea * sample.spacing) != isBesideCorner)
         continue;
       auto curve = curveFrom(s);
-      if (!curve || !orient(*curve)) {
+      const Sides sides = curve ? orient(*curve) : Sides::Unclear;
+      if (sides == Sides::Unclear) {
         isComplete = isComplete && isBesideCorner;
         continue;
       }
       cover(*curve);
       isCovered_[s] = true;
-      curves.push_back(std::move(*curve));
+      if (sides == Sides::Opposed)
+        isOpposed_ = true;
+      else
+        curves.push_back(std::move(*curve));
     }
   return isComplete;
 }

@@ -19,6 +19,8 @@ class CreaseTracer {
   /// Appends the curves of the pair.
   /// @return false if some samples lie near no curve and no corner
   bool trace(std::vector<CreaseCurve>& curves);
+  /// Returns true if the normals of one of the pieces point inwards.
+  [[nodiscard]] bool isOpposed() const { return isOpposed_; }
 
  private:
   struct Place {
@@ -40,7 +42,8 @@ class CreaseTracer {
   [[nodiscard]] Walk walk(const Place& seed) const;
   [[nodiscard]] std::optional<CreaseCurve> curveFrom(std::uint32_t sample) const;
   void endAt(std::uint32_t corner, std::vector<Place>& places) const;
-  [[nodiscard]] bool orient(CreaseCurve& curve) const;
+  enum class Sides { Unclear, Agreed, Opposed };
+  [[nodiscard]] Sides orient(CreaseCurve& curve) const;
   void cover(const CreaseCurve& curve);
   [[nodiscard]] double cornerDistance(const Imath::V3d& position) const;
 
@@ -50,6 +53,7 @@ class CreaseTracer {
   std::vector<std::uint32_t> ends_;  ///< corners of the pair
   PointSearch search_;               ///< finds samples
   std::vector<bool> isCovered_;
+  bool isOpposed_ = false;
 };
 
 }  // namespace levelset::points

@@ -50,6 +50,47 @@ std::vector<V3d> sidesOf(const PointSurface& whole, bool hasSides, const Progres
   return sides;
 }
 
+/// Turns the normals of pieces over, so that they agree across the curves. The larger part of the
+/// points of connected pieces keeps its sides.
+void turnPieces(const CreaseNetwork& network, Pieces& pieces) {
+  struct Link {
+    std::uint32_t to;
+    bool isOpposed;
+  };
+  std::vector<std::vector<Link>> links(pieces.count);
+  const auto link = [&](const std::array<std::uint32_t, 2>& pair, bool isOpposed) {
+    links[pair[0]].push_back({pair[1], isOpposed});
+    links[pair[1]].push_back({pair[0], isOpposed});
+  };
+  for (const CreaseCurve& curve : network.curves) link(curve.pieces, false);
+  for (const auto& pair : network.opposed) link(pair, true);
+  std::vector<std::size_t> sizes(pieces.count, 0);
+  for (const std::uint32_t piece : pieces.pieces)
+    if (piece != kNoPiece) ++sizes[piece];
+  std::vector<char> isTurned(pieces.count, 0), isSeen(pieces.count, 0);
+  for (std::uint32_t start = 0; start < pieces.count; ++start) {
+    if (isSeen[start]) continue;
+    std::vector<std::uint32_t> connected = {start};
+    isSeen[start] = 1;
+    std::array<std::size_t, 2> points{};
+    for (std::size_t k = 0; k < connected.size(); ++k) {
+      const std::uint32_t at = connected[k];
+      points[static_cast<std::size_t>(isTurned[at])] += sizes[at];
+      for (const Link& one : links[at]) {
+        if (isSeen[one.to]) continue;
+        isSeen[one.to] = 1;
+        isTurned[one.to] = static_cast<char>((isTurned[at] != 0) != one.isOpposed);
+        connected.push_back(one.to);
+      }
+    }
+    if (points[1] > points[0])
+      for (const std::uint32_t at : connected) isTurned[at] = isTurned[at] == 0;
+  }
+  for (std::size_t i = 0; i < pieces.pieces.size(); ++i)
+    if (pieces.pieces[i] != kNoPiece && isTurned[pieces.pieces[i]] != 0)
+      pieces.normals[i] = -pieces.normals[i];
+}
+
 }  // namespace
 
 SharpSurface divideSurface(const PointSurface& whole, double angle, double smoothing, bool hasSides,
@@ -69,12 +110,18 @@ SharpSurface divideSurface(const PointSurface& whole, double angle, double smoot
     for (int move = 0; move < kMostMoves && reassign(whole, divided, pieces) > 0; ++move)
       divided = divide();
     result.network = traceCreases(whole, divided, pieces);
-    if (result.network.conflicts.empty()) {
+    if (result.network.conflicts.empty() && result.network.opposed.empty()) {
       result.divided = std::move(divided);
       return result;
     }
-    const auto conflicts = std::move(result.network.conflicts);
+    const CreaseNetwork network = std::move(result.network);
     result.network = {};
+    if (round == 0 && !network.opposed.empty()) {
+      turnPieces(network, pieces);
+      continue;
+    }
+    auto conflicts = network.conflicts;
+    conflicts.insert(conflicts.end(), network.opposed.begin(), network.opposed.end());
     pieces.join(round < kMostRounds ? conflicts : wholeParts(pieces, conflicts));
   }
   return result;
