@@ -151,6 +151,19 @@ TEST(SharpPoints, OfAnOctahedronHaveCornersOfFourFaces) {
     EXPECT_LT(nearestVertex(result.mesh, corner), doubleRounding(8));
 }
 
+TEST(SharpPoints, OfATetrahedronHaveEdgesOfSharpWedges) {
+  // Without the option, the rounded surface of wedges of 71 degrees is wrong.
+  TriMesh mesh;
+  mesh.positions = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
+  mesh.triangles = {{0, 1, 2}, {0, 3, 1}, {0, 2, 3}, {1, 3, 2}};
+  const PointsToMeshResult result = pointsToMesh(pointsOf(mesh, 1500), {.sharpAngle = kAngle});
+  expectClosedMesh(result, 2);
+  expectSharp(result.report, 4, 6, 4);
+  EXPECT_NEAR(signedVolume(result.mesh) / (8.0 / 3), 1, doubleRounding(20));
+  for (const V3d& corner : mesh.positions)
+    EXPECT_LT(nearestVertex(result.mesh, corner), doubleRounding(20));
+}
+
 TEST(SharpPoints, OfTwoCubesHaveTheEdgesOfBoth) {
   TriMesh mesh = sharp_points::cubeMesh(), cavity = mesh;
   for (V3d& p : cavity.positions) p = p * 0.5 + V3d(0.25);
@@ -163,8 +176,7 @@ TEST(SharpPoints, OfTwoCubesHaveTheEdgesOfBoth) {
   EXPECT_NEAR(signedVolume(result.mesh), 0.875, doubleRounding(20));
 }
 
-/// Largest distance of the vertices from a cylinder of radius 1 and height 1.5, and the largest
-/// distance of its rims from the sharp edges of the mesh.
+/// Largest distance of the vertices from a cylinder of radius 1 and height 1.5.
 double cylinderError(const PointsToMeshResult& result) {
   double worst = 0;
   for (const V3d& p : result.mesh.positions) {
