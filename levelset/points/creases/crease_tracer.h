@@ -17,7 +17,7 @@ class CreaseTracer {
                const PairSamples& pair);
 
   /// Appends the curves of the pair.
-  /// @return false if some samples lie near no curve and no corner
+  /// @return false if more than single samples lie near no curve and no corner
   bool trace(std::vector<CreaseCurve>& curves);
   /// Returns true if the normals of one of the pieces point inwards.
   [[nodiscard]] bool isOpposed() const { return isOpposed_; }

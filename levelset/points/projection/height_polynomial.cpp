@@ -123,27 +123,29 @@ std::optional<HeightPolynomial> fitHeights(std::span<const HeightSample> samples
 std::optional<HeightPolynomial> fitHeightsByPrediction(std::span<const HeightSample> samples,
                                                        int most, double condition) {
   const NormalEquations equations(samples, most);
-  double weights = 0, squares = 0;
-  for (const HeightSample& sample : samples) {
-    weights += sample.weight;
-    squares += sample.weight * sample.weight;
-  }
-  const double count = weights * weights / squares;  // of samples of equal weight
+  constexpr double kLeastShare = 1e-3;
+  Coefficients values;
   std::optional<HeightPolynomial> best;
   double least = std::numeric_limits<double>::infinity();
   for (int degree = 1; degree <= equations.most; ++degree) {
-    const double left = 1 - static_cast<double>(coefficientCount(degree)) / count;
-    if (best && !(left > 0)) break;
     const auto fit = equations.fit(degree, condition);
     if (!fit) break;
-    double sum = 0;
+    const auto unknowns = static_cast<Eigen::Index>(coefficientCount(degree));
+    const Eigen::MatrixXd block = equations.matrix.topLeftCorner(unknowns, unknowns);
+    const Eigen::MatrixXd inverse = block.selfadjointView<Eigen::Lower>().ldlt().solve(
+        Eigen::MatrixXd::Identity(unknowns, unknowns));
+    // Error at each sample of the fit to all others.
+    double error = 0;
     for (const HeightSample& sample : samples) {
-      const double miss = sample.height - fit->value(sample.x, sample.y);
-      sum += sample.weight * miss * miss;
+      monomials(sample.x, sample.y, degree, values);
+      const Eigen::Map<const Eigen::VectorXd> row(values.data(), unknowns);
+      const double share = sample.weight * row.dot(inverse * row);
+      const double miss = (sample.height - fit->value(sample.x, sample.y)) /
+                          std::max(1 - share, kLeastShare);
+      error += sample.weight * miss * miss;
     }
-    const double error = sum / (left * left);
     if (best && !(error < least)) continue;
-    least = left > 0 ? error : std::numeric_limits<double>::infinity();
+    least = error;
     best = fit;
   }
   return best;
