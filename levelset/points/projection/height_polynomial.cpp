@@ -140,8 +140,8 @@ std::optional<HeightPolynomial> fitHeightsByPrediction(std::span<const HeightSam
       monomials(sample.x, sample.y, degree, values);
       const Eigen::Map<const Eigen::VectorXd> row(values.data(), unknowns);
       const double share = sample.weight * row.dot(inverse * row);
-      const double miss = (sample.height - fit->value(sample.x, sample.y)) /
-                          std::max(1 - share, kLeastShare);
+      const double miss =
+          (sample.height - fit->value(sample.x, sample.y)) / std::max(1 - share, kLeastShare);
       error += sample.weight * miss * miss;
     }
     if (best && !(error < least)) continue;
