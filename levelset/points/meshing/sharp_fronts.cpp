@@ -37,7 +37,7 @@ std::vector<std::array<std::uint32_t, 2>> wholeParts(
 
 /// Returns vectors to the outside.
 std::vector<V3d> sidesOf(const PointSurface& whole, bool hasSides, const Progress& progress) {
-  std::vector<V3d> sides(whole.size());
+  std::vector<V3d> sides(whole.size(), V3d(0));
   PointCloud cloud;
   if (!hasSides) {
     cloud.positions.assign(whole.positions().begin(), whole.positions().end());

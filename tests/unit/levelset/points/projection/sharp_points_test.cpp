@@ -138,6 +138,15 @@ TEST(SharpPoints, OfABracketHaveItsConcaveEdge) {
   EXPECT_LT(nearestVertex(result.mesh, V3d(0.7, 0.7, 0)), doubleRounding(8));
 }
 
+TEST(SharpPoints, WithNormalsHaveTheSameEdges) {
+  const PointCloud cloud = sampleMesh(sharp_points::bracketMesh(), {.count = 2000});
+  ASSERT_FALSE(cloud.normals.empty());
+  const PointsToMeshResult result = pointsToMesh(cloud, {.sharpAngle = kAngle});
+  expectClosedMesh(result, 2);
+  expectSharp(result.report, 8, 18, 12);
+  EXPECT_NEAR(signedVolume(result.mesh) / 2.31, 1, doubleRounding(20));
+}
+
 TEST(SharpPoints, OfAnOctahedronHaveCornersOfFourFaces) {
   TriMesh mesh;
   mesh.positions = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
