@@ -97,10 +97,11 @@ class AdvancingFront {
         edges_(cell_),
         vertices_(4 * options.shortest) {}
 
-  FrontMesh run(const V3d& start);
+  bool begin(const V3d& start);
+  void begin(const FrontLoops& start);
+  FrontMesh run();
 
  private:
-  bool begin(const V3d& start);
   bool giveTriangle(std::uint32_t edge);
   [[nodiscard]] bool isAlongBorder(std::uint32_t edge, const std::optional<Foot>& foot) const;
   void retryNearby();
@@ -179,6 +180,21 @@ bool AdvancingFront::begin(const V3d& start) {
   const std::uint32_t loop[] = {addEdge(1, 0), addEdge(0, 2), addEdge(2, 1)};
   for (std::size_t i = 0; i < 3; ++i) edges_.link(loop[i], loop[(i + 1) % 3]);
   return true;
+}
+
+void AdvancingFront::begin(const FrontLoops& start) {
+  for (std::size_t v = 0; v < start.positions.size(); ++v)
+    addVertex(start.positions[v], start.normals[v], false);
+  for (const std::vector<std::uint32_t>& loop : start.loops) {
+    std::vector<std::uint32_t> added;
+    for (std::size_t i = 0; i < loop.size(); ++i) {
+      const std::uint32_t a = loop[i], b = loop[(i + 1) % loop.size()];
+      added.push_back(addEdge(a, b));
+      edges_.use(b, a);
+    }
+    for (std::size_t i = 0; i < added.size(); ++i)
+      edges_.link(added[i], added[(i + 1) % added.size()]);
+  }
 }
 
 double AdvancingFront::wedgeAtStart(std::uint32_t edge) const {
@@ -440,8 +456,7 @@ std::vector<std::vector<std::uint32_t>> AdvancingFront::holes() const {
   return all;
 }
 
-FrontMesh AdvancingFront::run(const V3d& start) {
-  if (!begin(start)) return std::move(mesh_);
+FrontMesh AdvancingFront::run() {
   const std::size_t most = 3 * options_.expectedTriangles / 2 + 1000;
   std::size_t tries = 0;
   while (!queue_.empty()) {
@@ -472,7 +487,16 @@ FrontMesh AdvancingFront::run(const V3d& start) {
 }  // namespace
 
 FrontMesh advanceFront(const FrontSurface& surface, const V3d& start, const FrontOptions& options) {
-  return AdvancingFront(surface, options).run(start);
+  AdvancingFront front(surface, options);
+  if (!front.begin(start)) return {};
+  return front.run();
+}
+
+FrontMesh advanceFront(const FrontSurface& surface, const FrontLoops& start,
+                       const FrontOptions& options) {
+  AdvancingFront front(surface, options);
+  front.begin(start);
+  return front.run();
 }
 
 }  // namespace levelset

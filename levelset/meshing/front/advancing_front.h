@@ -22,7 +22,7 @@ struct FrontMesh {
 };
 
 struct FrontOptions {
-  double shortest = 0, longest = 0;   ///< limits of FrontSurface::edgeLength()
+  double shortest = 0, longest = 0;   ///< limits of FrontSurface::edgeLength() and of given edges
   std::size_t expectedTriangles = 0;  ///< about; a front with many more stops open
   Progress progress = {};
 };
@@ -36,6 +36,18 @@ struct FrontOptions {
 /// @param start  position near the surface
 /// @throws Cancelled
 [[nodiscard]] FrontMesh advanceFront(const FrontSurface& surface, const Imath::V3d& start,
+                                     const FrontOptions& options);
+
+/// Closed loops of edges from which a front starts.
+struct FrontLoops {
+  std::vector<Imath::V3d> positions, normals;     ///< vertices, and unit normals there
+  std::vector<std::vector<std::uint32_t>> loops;  ///< the surface lies to the left of each edge
+};
+
+/// Meshes the part of a surface within loops. The vertices of the loops are the first of the mesh.
+/// The edges of the loops get one triangle.
+/// @throws Cancelled
+[[nodiscard]] FrontMesh advanceFront(const FrontSurface& surface, const FrontLoops& start,
                                      const FrontOptions& options);
 
 }  // namespace levelset

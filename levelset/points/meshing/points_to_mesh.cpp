@@ -16,8 +16,8 @@
 
 #include "levelset/error.h"
 #include "levelset/memory_limit.h"
-#include "levelset/meshing/front/advancing_front.h"
-#include "levelset/meshing/front/edge_lengths.h"
+#include "levelset/points/meshing/part_front.h"
+#include "levelset/points/meshing/sharp_fronts.h"
 #include "levelset/points/projection/delaunay.h"
 #include "levelset/points/projection/point_surface.h"
 
@@ -25,21 +25,15 @@ namespace levelset {
 namespace {
 
 using Imath::V3d;
+using points::PartMesh;
 using points::PointSurface;
+using points::SharpFronts;
+using points::SharpSurface;
+using points::SurfacePart;
 using Clock = std::chrono::steady_clock;
 
 /// Longest edges by default, median spacings.
 constexpr double kLongestSpacings = 8;
-/// Scale of the edge lengths, and number of the start. Each is a try of a part whose front failed.
-struct FrontTry {
-  double scale;
-  std::size_t start;
-};
-constexpr FrontTry kFrontTries[] = {{1, 0},   {1, 2},   {1, 5},   {0.9, 0},
-                                    {0.9, 3}, {0.8, 1}, {0.7, 4}, {0.6, 0}};
-/// Positions nearer to a border than this lie on it, edge lengths. Avoids thin strips there.
-constexpr double kBorderSnap = 0.4;
-
 /// Moves positions to coordinates of magnitude one. Powers of two keep the bits of the digits.
 struct Normalisation {
   V3d centre;
@@ -55,195 +49,6 @@ struct Normalisation {
   [[nodiscard]] V3d to(const V3d& world) const { return (world - centre) * scale; }
   [[nodiscard]] V3d back(const V3d& p) const { return p / scale + centre; }
 };
-
-/// Edge length at each point: the chord of the angle on a circle of the largest curvature, within
-/// limits. Lengths change by at most kGradation per unit of length along the graph.
-std::vector<double> lengthsAtPoints(const PointSurface& surface, double longest, double angle) {
-  const double chord = 2 * std::sin(angle / 2);
-  std::vector<double> lengths(surface.size(), longest);
-  tbb::parallel_for(std::size_t{0}, surface.size(), [&](std::size_t i) {
-    if (!surface.hasFit(i)) return;
-    const double curvature = surface.curvature(i);
-    const double shortest = std::min(surface.spacing(i), longest);
-    if (curvature > 0) lengths[i] = std::clamp(chord / curvature, shortest, longest);
-    // A hole keeps its shape with about twelve edges, and none of them reaches across.
-    lengths[i] = std::min(lengths[i], std::max(shortest, 0.5 * surface.holeRadius(i)));
-  });
-  using Entry = std::pair<double, std::uint32_t>;
-  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
-  for (std::uint32_t i = 0; i < lengths.size(); ++i) queue.emplace(lengths[i], i);
-  while (!queue.empty()) {
-    const auto [length, i] = queue.top();
-    queue.pop();
-    if (length > lengths[i]) continue;
-    for (const std::uint32_t j : surface.graph().neighbours(i)) {
-      const double limit =
-          length + kGradation * (surface.positions()[i] - surface.positions()[j]).length();
-      if (limit >= lengths[j]) continue;
-      lengths[j] = limit;
-      queue.emplace(limit, j);
-    }
-  }
-  return lengths;
-}
-
-/// Points of a border, for searches.
-class BorderPoints {
- public:
-  explicit BorderPoints(const PointSurface& surface) : surface_(surface) {
-    for (std::uint32_t i = 0; i < surface.size(); ++i)
-      if (surface.part(i) != PointSurface::kNone && surface.isBorder(i)) numbers_.push_back(i);
-    std::vector<V3d> positions;
-    positions.reserve(numbers_.size());
-    for (const std::uint32_t i : numbers_) positions.push_back(surface.positions()[i]);
-    if (!positions.empty()) search_ = makePointSearch(positions);
-  }
-  [[nodiscard]] bool isEmpty() const { return numbers_.empty(); }
-  /// Finds the nearest position of the borders of a part, with a normal not against `side`.
-  [[nodiscard]] std::optional<PointSurface::BorderEnd> nearest(const V3d& position, const V3d& side,
-                                                               std::uint32_t part) const {
-    constexpr std::size_t kTried = 6;
-    thread_local std::vector<FoundItem> found;
-    search_.closest(position, kTried, found);
-    std::optional<PointSurface::BorderEnd> best;
-    for (const FoundItem& one : found) {
-      const std::uint32_t i = numbers_[one.index];
-      if (surface_.part(i) != part || surface_.normal(i).dot(side) < 0.1) continue;
-      const PointSurface::BorderEnd end = surface_.borderEnd(position, i);
-      if (!best || end.distance < best->distance) best = end;
-    }
-    return best;
-  }
-
- private:
-  const PointSurface& surface_;
-  std::vector<std::uint32_t> numbers_;
-  PointSearch search_;
-};
-
-/// Points of one part.
-struct SurfacePart {
-  std::vector<std::uint32_t> points;
-  std::vector<std::uint32_t> starts;  ///< some with large edge lengths, the largest first
-  double shortest = INFINITY, longest = 0;
-  double expected = 0;  ///< number of triangles
-};
-
-/// One part of the surface through points.
-class PartFront : public FrontSurface {
- public:
-  PartFront(const PointSurface& surface, const BorderPoints& borders,
-            const std::vector<double>& lengths, std::uint32_t number, const SurfacePart& part,
-            double scale)
-      : surface_(surface),
-        borders_(borders),
-        lengths_(lengths),
-        part_(number),
-        longest_(part.longest),
-        scale_(scale) {}
-
-  [[nodiscard]] std::optional<Foot> project(const V3d& position) const override {
-    return projectBeside(position, V3d(0));
-  }
-  [[nodiscard]] std::optional<Foot> projectBeside(const V3d& position,
-                                                  const V3d& normal) const override {
-    const auto foot = surface_.project(position, normal, part_);
-    if (!foot) return {};
-    const Foot found{foot->point, foot->normal, false};
-    if (borders_.isEmpty()) return found;
-    const auto end = borders_.nearest(foot->point, foot->normal, part_);
-    const double length = scale_ * lengths_[foot->nearest];
-    if (!end || !(foot->isBeyondBorder || end->distance < kBorderSnap * length)) return found;
-    const auto onBorder = surface_.project(end->point, foot->normal, part_);
-    if (!onBorder) return {};
-    return Foot{onBorder->point, onBorder->normal, true};
-  }
-  [[nodiscard]] double edgeLength(const V3d& point) const override {
-    const std::uint32_t nearest = surface_.nearest(point, V3d(0), part_);
-    return scale_ * (nearest == PointSurface::kNone ? longest_ : lengths_[nearest]);
-  }
-
- private:
-  const PointSurface& surface_;
-  const BorderPoints& borders_;
-  const std::vector<double>& lengths_;
-  std::uint32_t part_;
-  double longest_;  ///< edge length of the part
-  double scale_;
-};
-
-std::vector<SurfacePart> partsOf(const PointSurface& surface, const std::vector<double>& lengths) {
-  std::vector<SurfacePart> parts(surface.partCount());
-  for (std::uint32_t i = 0; i < surface.size(); ++i) {
-    if (surface.part(i) == PointSurface::kNone) continue;
-    SurfacePart& part = parts[surface.part(i)];
-    part.points.push_back(i);
-    part.shortest = std::min(part.shortest, lengths[i]);
-    part.longest = std::max(part.longest, lengths[i]);
-    // Areas of a hexagonal lattice and of an equilateral triangle.
-    const double ratio = surface.spacing(i) / lengths[i];
-    part.expected += 2 * ratio * ratio;
-  }
-  for (SurfacePart& part : parts) {
-    constexpr std::size_t kStarts = 8;
-    std::vector<std::uint32_t> large;
-    for (const bool mayBeBorder : {false, true}) {
-      for (const std::uint32_t i : part.points)
-        if (lengths[i] >= 0.8 * part.longest && (mayBeBorder || !surface.isBorder(i)))
-          large.push_back(i);
-      if (!large.empty()) break;
-    }
-    for (std::size_t k = 0; k < kStarts; ++k)
-      part.starts.push_back(large[k * large.size() / kStarts]);
-  }
-  return parts;
-}
-
-/// Mesh of a part, with the number of points that it misses.
-struct PartMesh {
-  FrontMesh front;
-  std::size_t missed = 0;
-  double scale = 1;  ///< factor on the edge lengths
-  [[nodiscard]] bool isComplete() const { return front.isClosed && missed == 0; }
-};
-
-std::size_t countMissed(const FrontMesh& front, const PointSurface& surface,
-                        const SurfacePart& part, const std::vector<double>& lengths, double scale) {
-  if (front.triangles.empty()) return part.points.size();
-  const PointSearch search = makePointSearch(front.positions);
-  std::size_t missed = 0;
-  for (const std::uint32_t i : part.points) {
-    const double reach = 2 * scale * lengths[i] + surface.spacing(i);
-    missed += !search.closest(surface.positions()[i], reach * reach).isValid();
-  }
-  return missed;
-}
-
-PartMesh meshPart(const PointSurface& surface, const BorderPoints& borders, const SurfacePart& part,
-                  const std::vector<double>& lengths, std::uint32_t number,
-                  const Progress& progress) {
-  PartMesh best;
-  best.missed = part.points.size() + 1;
-  for (const auto& [scale, first] : kFrontTries) {
-    const PartFront front(surface, borders, lengths, number, part, scale);
-    FrontOptions options;
-    options.shortest = scale * part.shortest;
-    options.longest = scale * part.longest;
-    options.expectedTriangles = static_cast<std::size_t>(part.expected / (scale * scale)) + 1;
-    options.progress = progress;
-    PartMesh found;
-    found.scale = scale;
-    for (std::size_t k = 0; k < part.starts.size(); ++k) {
-      const std::uint32_t start = part.starts[(first + k) % part.starts.size()];
-      found.front = advanceFront(front, surface.positions()[start], options);
-      if (!found.front.triangles.empty()) break;
-    }
-    found.missed = countMissed(found.front, surface, part, lengths, scale);
-    if (found.isComplete()) return found;
-    if (found.missed < best.missed) best = std::move(found);
-  }
-  return best;
-}
 
 /// Appends the triangles of a front with the vertices that they use.
 void appendFront(const FrontMesh& front, const Normalisation& normalisation, TriMesh& mesh) {
@@ -284,6 +89,30 @@ void measureBorders(const TriMesh& mesh, PointsToMeshReport& report) {
   }
 }
 
+/// Counts the sharp edges of the parts that keep them.
+void measureSharpEdges(const PointSurface& surface, const SharpSurface& sharp,
+                       const std::vector<char>& isSharp, double angle, double scale,
+                       PointsToMeshReport& report) {
+  std::vector<bool> isRounded;
+  for (const char one : isSharp) isRounded.push_back(one == 0);
+  report.roundedPairs = points::countRoundedPairs(surface, sharp.pieces, angle, isRounded);
+  if (!sharp.divided) return;
+  const auto keeps = [&](std::uint32_t piece) { return isSharp[sharp.pieces.parts[piece]] != 0; };
+  for (std::uint32_t i = 0; i < sharp.pieces.count; ++i) report.pieces += keeps(i);
+  std::set<std::uint32_t> corners;
+  for (const points::CreaseCurve& curve : sharp.network.curves) {
+    if (!keeps(curve.pieces[0])) continue;
+    ++report.sharpCurves;
+    for (const std::uint32_t c : curve.corners)
+      if (c != PointSurface::kNone) corners.insert(c);
+    for (std::size_t i = curve.isClosed() ? 0 : 1; i < curve.positions.size(); ++i) {
+      const std::size_t before = i > 0 ? i - 1 : curve.positions.size() - 1;
+      report.sharpLength += (curve.positions[i] - curve.positions[before]).length() / scale;
+    }
+  }
+  report.sharpCorners = corners.size();
+}
+
 void requireOptions(const PointsToMeshOptions& options) {
   if (!(options.angle > 0 && options.angle <= 1))
     throw UsageError(fmt::format(
@@ -292,6 +121,13 @@ void requireOptions(const PointsToMeshOptions& options) {
   if (!(options.edgeLength >= 0) || !std::isfinite(options.edgeLength))
     throw UsageError(
         fmt::format("the edge length {} is not positive; give a positive one", options.edgeLength));
+  constexpr double kLeastSharp = std::numbers::pi / 18, kMostSharp = std::numbers::pi / 2;
+  constexpr double kRounding = 1e-9;  // degrees come as radians
+  if (options.sharpAngle != 0 && !(options.sharpAngle >= kLeastSharp - kRounding &&
+                                   options.sharpAngle <= kMostSharp + kRounding))
+    throw UsageError(fmt::format(
+        "a sharp edge of {} radians is outside the range from 0.175 to 1.571 (10 to 90 degrees)",
+        options.sharpAngle));
   if (!(options.smoothing >= 1 && options.smoothing <= 10))
     throw UsageError(fmt::format(
         "a smoothing of {} point spacings is outside the range from 1 to 10", options.smoothing));
@@ -328,7 +164,8 @@ PointsToMeshResult pointsToMesh(const PointCloud& cloud, const PointsToMeshOptio
   requireOptions(options);
   requirePoints(cloud);
   if (cloud.isEmpty()) throw InvalidInput("the point cloud has no points; read another file");
-  constexpr double kBytesPerPoint = 1800;
+  // Sharp edges need a second set of polynomials.
+  const double kBytesPerPoint = options.sharpAngle > 0 ? 3600 : 1800;
   requireMemory(kBytesPerPoint * static_cast<double>(cloud.size()), memoryLimit(options.maxMemory));
   report(options.progress, 0);
   const Normalisation normalisation(cloud);
@@ -345,9 +182,16 @@ PointsToMeshResult pointsToMesh(const PointCloud& cloud, const PointsToMeshOptio
         "or use 'level-set --method particles'");
   const double longest = options.edgeLength > 0 ? options.edgeLength * normalisation.scale
                                                 : kLongestSpacings * spacing;
-  const std::vector<double> lengths = lengthsAtPoints(surface, longest, options.angle);
+  const points::PointEdgeLimits limits{longest, options.angle};
+  const std::vector<double> lengths = lengthsAtPoints(surface, surface.graph(), limits);
   const std::vector<SurfacePart> parts = partsOf(surface, lengths);
-  double triangles = 0;
+  std::optional<SharpSurface> sharp;
+  std::optional<SharpFronts> sharpFronts;
+  if (options.sharpAngle > 0)
+    sharp = points::divideSurface(surface, options.sharpAngle, options.smoothing,
+                                  !cloud.normals.empty(), subProgress(options.progress, 0.6, 0.7));
+  if (sharp && sharp->divided) sharpFronts.emplace(surface, *sharp, limits);
+  double triangles = sharpFronts ? sharpFronts->expectedTriangles() : 0;
   for (const SurfacePart& part : parts) triangles += part.expected;
   constexpr double kBytesPerTriangle = 400, kSmallestScale = 0.6;
   triangles /= kSmallestScale * kSmallestScale;
@@ -357,25 +201,31 @@ PointsToMeshResult pointsToMesh(const PointCloud& cloud, const PointsToMeshOptio
             kBytesPerPoint * static_cast<double>(cloud.size()) + kBytesPerTriangle * triangles,
             memoryLimit(options.maxMemory));
       });
-  const BorderPoints borders(surface);
+  const points::BorderPoints borders(surface);
 
   // === Fronts
   std::vector<PartMesh> meshes(parts.size());
+  std::vector<char> isSharp(parts.size(), 0);
   std::mutex mutex;
-  double least = 0.6;
+  double least = 0.7;
   const auto progressOf = [&](double share) -> Progress {
     if (!options.progress) return {};
     return [&, share](double fraction) {
       const std::lock_guard lock(mutex);
-      least = std::max(least, 0.6 + 0.35 * share * fraction);
+      least = std::max(least, 0.7 + 0.25 * share * fraction);
       return options.progress(least);
     };
   };
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
     const double share =
         static_cast<double>(parts[i].points.size()) / static_cast<double>(surface.size());
-    meshes[i] = meshPart(surface, borders, parts[i], lengths, static_cast<std::uint32_t>(i),
-                         progressOf(share));
+    const auto number = static_cast<std::uint32_t>(i);
+    if (sharpFronts && sharpFronts->isDivided(number)) {
+      meshes[i] = sharpFronts->mesh(number, progressOf(share));
+      isSharp[i] = meshes[i].isComplete();
+      if (isSharp[i]) return;
+    }
+    meshes[i] = meshPart(surface, borders, parts[i], lengths, number, progressOf(share));
   });
 
   // === Result
@@ -400,6 +250,8 @@ PointsToMeshResult pointsToMesh(const PointCloud& cloud, const PointsToMeshOptio
         "--accept-holes",
         figures.incomplete, figures.components, figures.missedPoints, surface.size()));
   measureBorders(result.mesh, figures);
+  if (sharp)
+    measureSharpEdges(surface, *sharp, isSharp, options.sharpAngle, normalisation.scale, figures);
   figures.connectivitySeconds = surface.timing().connectivity;
   figures.reconstructionSeconds = surface.timing().reconstruction;
   figures.triangulationSeconds = std::chrono::duration<double>(Clock::now() - start).count();

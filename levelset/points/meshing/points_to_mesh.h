@@ -21,6 +21,9 @@ struct PointsToMeshOptions {
   /// Radius of the largest disc without points that the surface covers, in point spacings, from 1.5
   /// to 4. Larger holes get a border.
   double gap = 2.5;
+  /// Least angle between the normals on both sides of an edge that is kept sharp, radians, from
+  /// 10 to 90 degrees; 0: sharp edges are rounded over about a spacing.
+  double sharpAngle = 0;
   bool acceptHoles = false;  ///< return a mesh that misses points or has holes
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
@@ -38,7 +41,14 @@ struct PointsToMeshReport {
   std::size_t unusedPoints = 0;  ///< points that belong to no surface
   std::size_t missedPoints = 0;  ///< points without a triangle nearby
   std::size_t guessed = 0;       ///< parts whose outside is a guess
-  double spacing = 0;            ///< median, world units
+  std::size_t pieces = 0;        ///< smooth pieces between sharp edges
+  std::size_t sharpCurves = 0;   ///< sharp edges that are kept, between corners or closed
+  std::size_t sharpCorners = 0;  ///< corners where sharp edges meet
+  double sharpLength = 0;        ///< length of the sharp edges, world units
+  /// Pairs of neighbouring points across a sharp edge that is rounded: it fades out, meets a
+  /// border, or its curve was not found.
+  std::size_t roundedPairs = 0;
+  double spacing = 0;  ///< median, world units
   // Wall seconds.
   double connectivitySeconds = 0, reconstructionSeconds = 0, triangulationSeconds = 0;
 };

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <limits>
 
 namespace levelset::points {
 namespace {
@@ -79,28 +80,75 @@ HeightJet HeightPolynomial::jet(double x, double y) const {
   return jet;
 }
 
+namespace {
+
+/// Normal equations of a fit.
+struct NormalEquations {
+  int most;  ///< degree
+  Eigen::MatrixXd matrix;
+  Eigen::VectorXd right;
+
+  NormalEquations(std::span<const HeightSample> samples, int wanted) : most(wanted) {
+    while (most > 1 && samples.size() < coefficientCount(most)) --most;
+    const auto unknowns = static_cast<Eigen::Index>(coefficientCount(most));
+    matrix = Eigen::MatrixXd::Zero(unknowns, unknowns);
+    right = Eigen::VectorXd::Zero(unknowns);
+    Coefficients values;
+    for (const HeightSample& sample : samples) {
+      monomials(sample.x, sample.y, most, values);
+      const Eigen::Map<const Eigen::VectorXd> row(values.data(), unknowns);
+      matrix.selfadjointView<Eigen::Lower>().rankUpdate(row, sample.weight);
+      right += sample.weight * sample.height * row;
+    }
+  }
+  [[nodiscard]] std::optional<HeightPolynomial> fit(int degree, double condition) const {
+    return degree == 5   ? solve<21>(matrix, right, degree, condition)
+           : degree == 4 ? solve<15>(matrix, right, degree, condition)
+           : degree == 3 ? solve<10>(matrix, right, degree, condition)
+           : degree == 2 ? solve<6>(matrix, right, degree, condition)
+                         : solve<3>(matrix, right, degree, condition);
+  }
+};
+
+}  // namespace
+
 std::optional<HeightPolynomial> fitHeights(std::span<const HeightSample> samples, int most,
                                            double condition) {
-  while (most > 1 && samples.size() < coefficientCount(most)) --most;
-  const auto unknowns = static_cast<Eigen::Index>(coefficientCount(most));
-  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(unknowns, unknowns);
-  Eigen::VectorXd right = Eigen::VectorXd::Zero(unknowns);
-  Coefficients values;
-  for (const HeightSample& sample : samples) {
-    monomials(sample.x, sample.y, most, values);
-    const Eigen::Map<const Eigen::VectorXd> row(values.data(), unknowns);
-    matrix.selfadjointView<Eigen::Lower>().rankUpdate(row, sample.weight);
-    right += sample.weight * sample.height * row;
-  }
-  for (int degree = most; degree >= 1; --degree) {
-    const auto fit = degree == 5   ? solve<21>(matrix, right, degree, condition)
-                     : degree == 4 ? solve<15>(matrix, right, degree, condition)
-                     : degree == 3 ? solve<10>(matrix, right, degree, condition)
-                     : degree == 2 ? solve<6>(matrix, right, degree, condition)
-                                   : solve<3>(matrix, right, degree, condition);
-    if (fit) return fit;
-  }
+  const NormalEquations equations(samples, most);
+  for (int degree = equations.most; degree >= 1; --degree)
+    if (const auto fit = equations.fit(degree, condition)) return fit;
   return std::nullopt;
+}
+
+std::optional<HeightPolynomial> fitHeightsByPrediction(std::span<const HeightSample> samples,
+                                                       int most, double condition) {
+  const NormalEquations equations(samples, most);
+  constexpr double kLeastShare = 1e-3;
+  Coefficients values;
+  std::optional<HeightPolynomial> best;
+  double least = std::numeric_limits<double>::infinity();
+  for (int degree = 1; degree <= equations.most; ++degree) {
+    const auto fit = equations.fit(degree, condition);
+    if (!fit) break;
+    const auto unknowns = static_cast<Eigen::Index>(coefficientCount(degree));
+    const Eigen::MatrixXd block = equations.matrix.topLeftCorner(unknowns, unknowns);
+    const Eigen::MatrixXd inverse = block.selfadjointView<Eigen::Lower>().ldlt().solve(
+        Eigen::MatrixXd::Identity(unknowns, unknowns));
+    // Error at each sample of the fit to all others.
+    double error = 0;
+    for (const HeightSample& sample : samples) {
+      monomials(sample.x, sample.y, degree, values);
+      const Eigen::Map<const Eigen::VectorXd> row(values.data(), unknowns);
+      const double share = sample.weight * row.dot(inverse * row);
+      const double miss =
+          (sample.height - fit->value(sample.x, sample.y)) / std::max(1 - share, kLeastShare);
+      error += sample.weight * miss * miss;
+    }
+    if (best && !(error < least)) continue;
+    least = error;
+    best = fit;
+  }
+  return best;
 }
 
 }  // namespace levelset::points

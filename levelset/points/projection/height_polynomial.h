@@ -41,4 +41,9 @@ struct HeightSample {
 [[nodiscard]] std::optional<HeightPolynomial> fitHeights(std::span<const HeightSample> samples,
                                                          int most, double condition);
 
+/// Fits a polynomial as above, of the degree with the least error of prediction (leave-one-out
+/// cross-validation) among those allowed. Noise gets a low degree.
+[[nodiscard]] std::optional<HeightPolynomial> fitHeightsByPrediction(
+    std::span<const HeightSample> samples, int most, double condition);
+
 }  // namespace levelset::points

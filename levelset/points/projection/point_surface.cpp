@@ -54,15 +54,16 @@ double medianDistance(std::span<const V3d> positions, const CoconeGraph& graph, 
 
 /// Fits the height function of one point. Turns the frame until its normal is about that of the
 /// fit.
+template <class Fit>
 HeightPolynomial fitPoint(std::uint32_t point, LocalFrame& frame, CandidateSearch& search,
-                          double width, std::vector<HeightSample>& samples) {
+                          double width, std::vector<HeightSample>& samples, const Fit& fit) {
   HeightPolynomial best;
   for (int turn = 0; turn <= kMostTurns; ++turn) {
     samples.clear();
     for (const FitCandidate& one : search.find(point, frame, kReach * width))
       samples.push_back({one.local.x, one.local.y, one.local.z,
                          std::exp(-one.local.length2() / (width * width))});
-    const auto found = fitHeights(samples, kMostDegree, kCondition);
+    const auto found = fit(samples, kMostDegree, kCondition);
     if (!found) return best;
     best = *found;
     const V3d local = V3d(-found->coefficients[1], -found->coefficients[2], 1).normalized();
@@ -97,7 +98,7 @@ PointSurface::PointSurface(const PointCloud& cloud, const PointSurfaceOptions& o
   timing_.connectivity = secondsSince(start);
   report(options.progress, 0.2);
   start = Clock::now();
-  fit(options);
+  fitPoints(options.smoothing, {}, fitHeights, subProgress(options.progress, 0.2, 0.8));
   pruneGraph(options.gap);
   findParts();
   orient(cloud, numbers, subProgress(options.progress, 0.8, 0.95));
@@ -131,10 +132,13 @@ void PointSurface::computeSpacings() {
   });
 }
 
-void PointSurface::fit(const PointSurfaceOptions& options) {
+/// @param isLeftOut  points that keep their fits; empty: none
+/// @param fit        fitHeights() or fitHeightsByPrediction()
+template <class Fit>
+void PointSurface::fitPoints(double smoothing, const std::vector<bool>& isLeftOut, const Fit& fit,
+                             const Progress& progress) {
   fits_.resize(positions_.size());
-  const Progress fitting = subProgress(options.progress, 0.2, 0.8);
-  ProgressGate gate(fitting, positions_.size());
+  ProgressGate gate(progress, positions_.size());
   struct Scratch {
     CandidateSearch search;
     std::vector<HeightSample> samples;
@@ -146,11 +150,46 @@ void PointSurface::fit(const PointSurfaceOptions& options) {
                     [&](const auto& range) {
                       Scratch& scratch = scratches.local();
                       for (std::size_t i = range.begin(); i < range.end(); ++i)
-                        if (frames_[i].scale > 0)
+                        if (frames_[i].scale > 0 && (isLeftOut.empty() || !isLeftOut[i]))
                           fits_[i] = fitPoint(static_cast<std::uint32_t>(i), frames_[i],
-                                              scratch.search, options.smoothing, scratch.samples);
+                                              scratch.search, smoothing, scratch.samples, fit);
                       gate.advance(range.size());
                     });
+}
+
+void PointSurface::divide(std::span<const std::uint32_t> pieces, std::size_t count,
+                          std::span<const V3d> normals, double smoothing) {
+  std::vector<std::uint32_t> first(partCount_, kNone);
+  std::vector<bool> isDivided(partCount_, false), isLeftOut(size(), true);
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (parts_[i] == kNone) continue;
+    if (first[parts_[i]] == kNone) first[parts_[i]] = pieces[i];
+    if (first[parts_[i]] != pieces[i]) isDivided[parts_[i]] = true;
+  }
+  CoconeGraph cut;
+  cut.normals = std::move(graph_.normals);
+  cut.first.assign(size() + 1, 0);
+  for (std::size_t i = 0; i < size(); ++i) {
+    for (const std::uint32_t j : graph_.neighbours(i))
+      if (pieces[i] == pieces[j]) cut.ends.push_back(j);
+    cut.first[i + 1] = cut.ends.size();
+    if (parts_[i] == kNone || !isDivided[parts_[i]]) continue;
+    isLeftOut[i] = false;
+    cut.normals[i] = normals[i];
+    frames_[i].setNormal(normals[i]);
+  }
+  graph_ = std::move(cut);
+  // Beyond the points, polynomials of high degree would swing with the noise.
+  fitPoints(smoothing, isLeftOut, fitHeightsByPrediction, {});
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (isLeftOut[i]) continue;
+    normals_[i] = normals[i];
+    if (!hasFit(i)) continue;
+    const V3d normal = normalOfFit(static_cast<std::uint32_t>(i), positions_[i]);
+    normals_[i] = normal.dot(normals[i]) < 0 ? -normal : normal;
+  }
+  parts_.assign(pieces.begin(), pieces.end());
+  partCount_ = count;
 }
 
 /// Removes the edges across gaps, and those of points without a fit.

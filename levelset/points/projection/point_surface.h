@@ -57,15 +57,28 @@ class PointSurface {
   /// @throws UsageError if this build has no Delaunay triangulation
   PointSurface(const PointCloud& cloud, const PointSurfaceOptions& options);
 
+  /// Divides parts into pieces that do not join smoothly. part() then is the piece. Points of
+  /// divided parts get a polynomial that is fitted to points of their own piece. Borders stay.
+  /// @param pieces   number of the piece of each point; kNone for points without a part
+  /// @param normals  outwards, on the side of the piece
+  void divide(std::span<const std::uint32_t> pieces, std::size_t count,
+              std::span<const Imath::V3d> normals, double smoothing);
+
   /// Points at different positions, in the order of a search tree.
   [[nodiscard]] std::size_t size() const { return search_.size(); }
   [[nodiscard]] std::span<const Imath::V3d> positions() const { return positions_; }
   /// Neighbours along the surface, without those beyond gaps.
   [[nodiscard]] const CoconeGraph& graph() const { return graph_; }
+  [[nodiscard]] const LocalFrame& frame(std::size_t point) const { return frames_[point]; }
   [[nodiscard]] double spacing(std::size_t point) const { return 1 / frames_[point].scale; }
   [[nodiscard]] bool hasFit(std::size_t point) const { return fits_[point].degree > 0; }
   [[nodiscard]] int degree(std::size_t point) const { return fits_[point].degree; }
   [[nodiscard]] const Imath::V3d& normal(std::size_t point) const { return normals_[point]; }
+  /// Height of a position above the polynomial of a point, along its frame.
+  [[nodiscard]] double heightOverFit(std::size_t point, const Imath::V3d& position) const {
+    const Imath::V3d local = frames_[point].toLocal(position);
+    return (local.z - fits_[point].value(local.x, local.y)) / frames_[point].scale;
+  }
   /// Largest absolute curvature at a point, per world unit.
   [[nodiscard]] double curvature(std::size_t point) const;
   [[nodiscard]] bool isBorder(std::size_t point) const {
@@ -104,7 +117,9 @@ class PointSurface {
   };
 
   void computeSpacings();
-  void fit(const PointSurfaceOptions& options);
+  template <class Fit>
+  void fitPoints(double smoothing, const std::vector<bool>& isLeftOut, const Fit& fit,
+                 const Progress& progress);
   void orient(const PointCloud& cloud, const std::vector<std::uint32_t>& numbers,
               const Progress& progress);
   void requireAgreement() const;

@@ -21,13 +21,15 @@ Kind makesMeshOfPoints(const Invocation&) {
 
 Value runMeshPoints(Invocation& in) {
   levelset::PointsToMeshResult result = levelset::pointsToMesh(
-      in.operands[0].cloud(), {.edgeLength = in.given("edge") ? in.length("edge") : 0,
-                               .angle = in.number("angle") * std::numbers::pi / 180,
-                               .smoothing = in.number("smoothing"),
-                               .gap = in.number("gap"),
-                               .acceptHoles = in.flag("accept-holes"),
-                               .maxMemory = in.maxMemory,
-                               .progress = in.progress});
+      in.operands[0].cloud(),
+      {.edgeLength = in.given("edge") ? in.length("edge") : 0,
+       .angle = in.number("angle") * std::numbers::pi / 180,
+       .smoothing = in.number("smoothing"),
+       .gap = in.number("gap"),
+       .sharpAngle = in.given("sharp") ? in.number("sharp") * std::numbers::pi / 180 : 0,
+       .acceptHoles = in.flag("accept-holes"),
+       .maxMemory = in.maxMemory,
+       .progress = in.progress});
   const levelset::PointsToMeshReport& found = result.report;
   const double triangles =
       static_cast<double>(std::max<std::size_t>(1, result.mesh.triangles.size()));
@@ -40,6 +42,11 @@ Value runMeshPoints(Invocation& in) {
                               {"unused_points", found.unusedPoints},
                               {"missed_points", found.missedPoints},
                               {"guessed_parts", found.guessed},
+                              {"pieces", found.pieces},
+                              {"sharp_curves", found.sharpCurves},
+                              {"sharp_corners", found.sharpCorners},
+                              {"sharp_length", found.sharpLength},
+                              {"rounded_pairs", found.roundedPairs},
                               {"spacing", found.spacing},
                               {"connectivity_seconds", found.connectivitySeconds},
                               {"reconstruction_seconds", found.reconstructionSeconds},
@@ -50,6 +57,15 @@ Value runMeshPoints(Invocation& in) {
                   "the triangles fill holes of the front",
                   result.mesh.triangles.size(), found.components, found.borders, found.borderLength,
                   100 * static_cast<double>(found.filled) / triangles));
+  if (in.given("sharp"))
+    in.notes.notes.push_back(fmt::format(
+        "mesh-points: {} sharp edges of length {:.6g} and {} corners between {} smooth pieces",
+        found.sharpCurves, found.sharpLength, found.sharpCorners, found.pieces));
+  if (found.roundedPairs > 0)
+    in.notes.notes.push_back(
+        fmt::format("mesh-points: {} pairs of neighbouring points lie across a sharp edge that is "
+                    "rounded, since it fades out, meets a border, or was not found as a whole",
+                    found.roundedPairs));
   if (found.unusedPoints > 0)
     in.notes.warnings.push_back(fmt::format(
         "mesh-points: {} points belong to no surface, since too few others lie beside them",
@@ -81,7 +97,9 @@ Plan planMeshPoints(Invocation& in) {
 std::optional<Cost> costOfMeshPoints(Invocation& in) {
   const double points = in.operands[0].plan().points;
   if (!(points > 0)) return std::nullopt;
-  return Cost{3e-4 * points, 1800 * points};
+  // A second set of polynomials, on each side of sharp edges.
+  const double passes = in.given("sharp") ? 2 : 1;
+  return Cost{passes * 3e-4 * points, passes * 1800 * points};
 }
 
 }  // namespace
@@ -97,7 +115,14 @@ Operator meshPointsOperator() {
           "are "
           "shorter where the surface bends more, but not below the spacing of the points. Normals "
           "are not needed. Given ones decide on the side; it is an error if more than 10 % of them "
-          "oppose their neighbours. Raise --smoothing for noise. A mesh that misses points or has "
+          "oppose their neighbours. Raise --smoothing for noise. Sharp edges are rounded over "
+          "about "
+          "a spacing. With --sharp they are kept, and so are corners. Polynomials then are fitted "
+          "on "
+          "each side of a sharp edge, and a front starts from the edges around each smooth piece. "
+          "An edge that fades out, meets a border or lies in noise above a tenth of the spacing "
+          "may "
+          "be rounded. A mesh that misses points or has "
           "holes is an error without --accept-holes. The action needs a build with CGAL.",
       .example =
           "levelsmith sphere --radius 1 --voxel 0.05 ! mesh ! sample --count 2000 ! mesh-points ! "
@@ -123,6 +148,11 @@ Operator meshPointsOperator() {
                          "point spacings, 1.5 to 4; larger holes get a border",
                   .fallback = "2.5",
                   .range = Range::Positive},
+                 {.name = "sharp",
+                  .type = ParamType::Number,
+                  .doc = "least angle between the normals on both sides of an edge that is kept "
+                         "sharp, degrees, 10 to 90, such as 30; default: edges are rounded",
+                  .range = Range::Positive},
                  {.name = "accept-holes",
                   .type = ParamType::Flag,
                   .doc = "accept a mesh that misses points or has holes"}},
@@ -139,6 +169,8 @@ Operator meshPointsOperator() {
               throw UsageError("mesh-points: --smoothing must lie between 1 and 10");
             if (!(in.number("gap") >= 1.5 && in.number("gap") <= 4))
               throw UsageError("mesh-points: --gap must lie between 1.5 and 4");
+            if (in.given("sharp") && !(in.number("sharp") >= 10 && in.number("sharp") <= 90))
+              throw UsageError("mesh-points: --sharp must lie between 10 and 90 degrees");
             if (!levelset::canMeshPoints())
               throw UsageError(
                   "mesh-points: this build has no Delaunay triangulation, since CGAL was not "

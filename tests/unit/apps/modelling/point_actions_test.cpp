@@ -98,7 +98,23 @@ TEST_F(PointActions, MeshPointsMakesAClosedMesh) {
   expectRefusal("read line.xyz ! mesh-points", 3, "lie on a line");
   expectRefusal("read line.xyz ! mesh-points --angle 60", 2, "at most 57 degrees");
   expectRefusal("read line.xyz ! mesh-points --gap 5", 2, "between 1.5 and 4");
+  expectRefusal("read line.xyz ! mesh-points --sharp 5", 2, "between 10 and 90 degrees");
   expectRefusal("read line.xyz ! mesh-points --smoothing 0.5", 2, "between 1 and 10");
+}
+
+TEST_F(PointActions, MeshPointsKeepsSharpEdges) {
+  const std::string made =
+      "box --size 2,1,1 --voxel 0.1 ! mesh --sharp ! sample --count 1500 ! mesh-points --sharp 30 "
+      "! ";
+  const Json mesh = json(made + "measure --json");
+  EXPECT_EQ(mesh["euler"], 2);
+  EXPECT_EQ(mesh["closed_manifold"], true);
+  EXPECT_NEAR(mesh["volume"].get<double>(), 2, 0.002);
+  const support::Outcome outcome = levelsmith(made + "write m.ply");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("12 sharp edges"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("8 corners between 6 smooth pieces"), std::string::npos)
+      << outcome.err;
 }
 
 TEST_F(PointActions, NormalsWarnOfAGuess) {

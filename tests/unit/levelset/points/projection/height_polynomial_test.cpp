@@ -11,6 +11,7 @@
 namespace height_polynomial_test {
 
 using levelset::points::fitHeights;
+using levelset::points::fitHeightsByPrediction;
 using levelset::points::HeightJet;
 using levelset::points::HeightPolynomial;
 using levelset::points::HeightSample;
@@ -78,6 +79,33 @@ TEST(HeightPolynomial, LowersTheDegreeNearAnAlgebraicCurve) {
   for (int i = 0; i < 40; ++i) line.push_back({0.1 * i, 0.2 * i, 1, 1});
   EXPECT_FALSE(fitHeights(line, 5, kCondition));
   EXPECT_FALSE(fitHeights(std::vector<HeightSample>{{0, 0, 0, 1}}, 5, kCondition));
+}
+
+TEST(HeightPolynomial, ByPredictionHasALowDegreeForNoise) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise(0, 0.1);
+  // Three spacings off, a polynomial of high degree swings.
+  const auto squaredError = [](const HeightPolynomial& fit) {
+    const double miss = fit.value(3, 0) - (2 - 3);
+    return miss * miss;
+  };
+  constexpr int kClouds = 100;
+  double ofChosen = 0, ofGreatest = 0, degrees = 0;
+  for (int cloud = 0; cloud < kClouds; ++cloud) {
+    const auto noisy = samplesOf([&](double x, double y) { return 2 - x + 3 * y + noise(random); });
+    const auto chosen = fitHeightsByPrediction(noisy, 5, kCondition),
+               greatest = fitHeights(noisy, 5, kCondition);
+    ASSERT_TRUE(chosen && greatest);
+    degrees += static_cast<double>(chosen->degree) / kClouds;
+    ofChosen += squaredError(*chosen);
+    ofGreatest += squaredError(*greatest);
+  }
+  EXPECT_LT(degrees, support::measured(1.93));
+  EXPECT_LT(ofChosen / ofGreatest, support::measured(0.484));
+  const auto exact = fitHeightsByPrediction(samplesOf(cubic), 5, kCondition);
+  ASSERT_TRUE(exact);
+  EXPECT_GE(exact->degree, 3);
+  EXPECT_NEAR(exact->value(0.4, -0.3), cubic(0.4, -0.3), doubleRounding(100));
 }
 
 }  // namespace height_polynomial_test
