@@ -53,7 +53,7 @@ std::vector<std::size_t> AdaptiveField::leavesByDepth() const {
 std::size_t AdaptiveField::memoryUse() const {
   if (!tree_) return 0;
   return sizeof(AdaptiveTree) + tree_->octree.memoryUse() +
-         tree_->values.capacity() * sizeof(BlockValues);
+         tree_->values.capacity() * sizeof(CornerValues);
 }
 
 Imath::Box3d AdaptiveField::zeroSetBounds() const {
@@ -90,7 +90,7 @@ std::uint64_t AdaptiveField::contentHash() const {
                           tree_->tolerance, tree_->halfWidth, double(octree.depth())};
   std::uint64_t hash = XXH3_64bits(place, sizeof place);
   hash = XXH3_64bits_withSeed(words.data(), words.size() * sizeof(words[0]), hash);
-  return XXH3_64bits_withSeed(tree_->values.data(), tree_->values.size() * sizeof(BlockValues),
+  return XXH3_64bits_withSeed(tree_->values.data(), tree_->values.size() * sizeof(CornerValues),
                               hash);
 }
 

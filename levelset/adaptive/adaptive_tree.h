@@ -13,15 +13,15 @@
 namespace levelset {
 
 /// Values at the corners of the eight children of a cell: a lattice of 3³ points, x fastest.
-using BlockValues = std::array<float, 27>;
+using CornerValues = std::array<float, 27>;
 
 /// Octree with the values of a block beside each block. A corner that several blocks share has the
 /// same value in each.
 struct AdaptiveTree {
   HashedOctree octree;
-  std::vector<BlockValues> values;  ///< by number of block; the root has one
-  Imath::V3d origin;                ///< lowest corner of the root, world units
-  double unit = 0;                  ///< edge of a cell of level 0, world units
+  std::vector<CornerValues> values;  ///< by number of block; the root has one
+  Imath::V3d origin;                 ///< lowest corner of the root, world units
+  double unit = 0;                   ///< edge of a cell of level 0, world units
   double tolerance = 0, halfWidth = 0;
 
   [[nodiscard]] Imath::V3d toWorld(const Imath::V3i& corner) const {
@@ -52,7 +52,7 @@ inline double trilinear(const std::array<double, 8>& v, const Imath::V3d& at) {
 }
 
 /// Interpolates the values of a child of a block.
-inline double interpolate(const BlockValues& values, int octant, const Imath::V3d& at) {
+inline double interpolate(const CornerValues& values, int octant, const Imath::V3d& at) {
   std::array<double, 8> v;
   for (int c = 0; c < 8; ++c)
     v[static_cast<std::size_t>(c)] = values[AdaptiveTree::latticeIndex(octant, c)];

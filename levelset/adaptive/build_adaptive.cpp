@@ -61,8 +61,8 @@ class FineLattice {
     return value;
   }
   /// Values of a child's lattice of 3³ points.
-  [[nodiscard]] BlockValues childValues(const V3i& low) {
-    BlockValues values;
+  [[nodiscard]] CornerValues childValues(const V3i& low) {
+    CornerValues values;
     for (int z = 0; z < 3; ++z)
       for (int y = 0; y < 3; ++y)
         for (int x = 0; x < 3; ++x)
@@ -99,7 +99,7 @@ V3i lowOf(int octant) {
 /// Decisions on the children of a block.
 struct Decisions {
   int split = 0, tested = 0;  ///< bits by octant; tested: leaves within the half width
-  std::array<BlockValues, 8> values;
+  std::array<CornerValues, 8> values;
   double testedError = 0;  ///< of children that stay leaves
   std::size_t evaluations = 0;
 };
@@ -122,7 +122,7 @@ class Builder {
  private:
   void decide(std::uint32_t block, Decisions& decisions) const;
   void apply(std::uint32_t block, const Decisions& decisions);
-  [[nodiscard]] std::vector<CellKey> leavesToDivide(const std::vector<BlockValues>& values);
+  [[nodiscard]] std::vector<CellKey> leavesToDivide(const std::vector<CornerValues>& values);
   void requireMemory(std::size_t newBlocks) const;
   [[nodiscard]] double errorOf(FineLattice& lattice, const V3i& low, double limit) const;
   [[nodiscard]] double errorOnSurface(const FineLattice& lattice, const V3i& low,
@@ -140,7 +140,7 @@ void Builder::makeRoot() {
   tree_.octree.split(tree_.octree.root());
   tested_.push_back(0);
   figures_.evaluations = 27;
-  BlockValues& values = tree_.values.emplace_back();
+  CornerValues& values = tree_.values.emplace_back();
   const int half = 1 << (tree_.octree.depth() - 1);
   for (int z = 0; z < 3; ++z)
     for (int y = 0; y < 3; ++y)
@@ -218,7 +218,7 @@ void Builder::apply(std::uint32_t block, const Decisions& decisions) {
 /// Compares the estimated memory after new blocks were added with the limit. Vectors hold their
 /// values twice while they grow, and connect() makes a copy.
 void Builder::requireMemory(std::size_t newBlocks) const {
-  constexpr double kBytesPerBlock = 2 * sizeof(BlockValues) + 40;
+  constexpr double kBytesPerBlock = 2 * sizeof(CornerValues) + 40;
   levelset::requireMemory(kBytesPerBlock * double(tree_.octree.blockCount() + newBlocks),
                           maxMemory_);
 }
@@ -255,7 +255,7 @@ void Builder::divide(std::uint32_t first, const Progress& progress) {
 
 /// Finds the leaves whose values change the corners of smaller leaves within the half width by more
 /// than the limit.
-std::vector<CellKey> Builder::leavesToDivide(const std::vector<BlockValues>& values) {
+std::vector<CellKey> Builder::leavesToDivide(const std::vector<CornerValues>& values) {
   tbb::enumerable_thread_specific<std::vector<std::uint64_t>> found;
   tbb::enumerable_thread_specific<double> largest(0.0);
   tbb::parallel_for(std::size_t{0}, values.size(), [&](std::size_t n) {
@@ -295,14 +295,14 @@ std::vector<CellKey> Builder::leavesToDivide(const std::vector<BlockValues>& val
 void Builder::connect(const Progress& progress) {
   while (true) {
     report(progress, 0);
-    std::vector<BlockValues> values = continuousValues(tree_);
+    std::vector<CornerValues> values = continuousValues(tree_);
     const std::vector<CellKey> leaves = leavesToDivide(values);
     if (leaves.empty()) {
       tree_.values = std::move(values);
       return;
     }
     requireMemory(leaves.size());
-    std::vector<BlockValues> added(leaves.size());
+    std::vector<CornerValues> added(leaves.size());
     tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t n) {
       FineLattice lattice(tree_, distance_, tree_.octree.block(leaves[n].parent()));
       added[n] = lattice.childValues(lowOf(leaves[n].octant()));

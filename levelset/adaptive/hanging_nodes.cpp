@@ -49,7 +49,7 @@ Source sourceOf(const HashedOctree& octree, std::uint32_t block, const V3i& at) 
   return source;
 }
 
-void fill(const AdaptiveTree& tree, std::uint32_t block, std::vector<BlockValues>& values) {
+void fill(const AdaptiveTree& tree, std::uint32_t block, std::vector<CornerValues>& values) {
   const HashedOctree& octree = tree.octree;
   const CellKey parent = octree.parent(block);
   const std::uint32_t outer =
@@ -84,8 +84,8 @@ void fill(const AdaptiveTree& tree, std::uint32_t block, std::vector<BlockValues
 
 }  // namespace
 
-std::vector<BlockValues> continuousValues(const AdaptiveTree& tree) {
-  std::vector<BlockValues> values(tree.values.size());
+std::vector<CornerValues> continuousValues(const AdaptiveTree& tree) {
+  std::vector<CornerValues> values(tree.values.size());
   // Large cells first: a leaf must have its own values before smaller ones take them over.
   std::vector<std::vector<std::uint32_t>> levels(static_cast<std::size_t>(tree.octree.depth()) + 1);
   for (std::uint32_t block = 0; block < tree.octree.blockCount(); ++block)

@@ -11,6 +11,6 @@ namespace levelset {
 /// Returns values that make the field of a tree continuous. A corner that lies on a face or an edge
 /// of a larger leaf gets the interpolated value of that leaf [Sigg06, 3.4.1]. Blocks that share a
 /// corner get the same bits.
-[[nodiscard]] std::vector<BlockValues> continuousValues(const AdaptiveTree& tree);
+[[nodiscard]] std::vector<CornerValues> continuousValues(const AdaptiveTree& tree);
 
 }  // namespace levelset

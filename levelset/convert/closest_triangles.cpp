@@ -4,6 +4,7 @@
 #include <tbb/enumerable_thread_specific.h>
 
 #include <algorithm>
+#include <atomic>
 #include <memory>
 
 #include "levelset/convert/mesh_to_band.h"
@@ -89,6 +90,10 @@ ClosestTriangles closestTriangles(const TriMesh& mesh, double voxelSize,
   const convert::PrismCovering prisms(local, options.halfWidth);
   report(options.progress, 0.2);
 
+  // Each leaf holds an index and a vector for all of its points.
+  constexpr std::size_t kLeafBytes = sizeof(IndexLeaf) + sizeof(VectorLeaf) + 512 * 16;
+  constexpr std::size_t kCheckedLeaves = 4096;
+  std::atomic<std::size_t> leafCount = 0;
   const PrismScan prototype(prisms);
   tbb::enumerable_thread_specific<PrismScan> scans(prototype);
   tbb::enumerable_thread_specific<std::vector<LeafPair>> parts;
@@ -96,8 +101,10 @@ ClosestTriangles closestTriangles(const TriMesh& mesh, double voxelSize,
       local, options.halfWidth,
       [&](const V3i& block, std::span<const std::uint32_t> candidates) {
         PrismScan& scan = scans.local();
-        if (scan.measure(local, candidates, V3d(block)))
-          parts.local().push_back(makeLeafPair(local, scan, block, origin, voxelSize));
+        if (!scan.measure(local, candidates, V3d(block))) return;
+        if (const std::size_t count = ++leafCount; count % kCheckedLeaves == 0)
+          requireMemory(static_cast<double>(count * kLeafBytes), memoryLimit(options.maxMemory));
+        parts.local().push_back(makeLeafPair(local, scan, block, origin, voxelSize));
       },
       subProgress(options.progress, 0.2, 1), {}, convert::prismTest(local, prisms));
   std::vector<LeafPair> leaves;
@@ -162,7 +169,7 @@ ValuePlan ClosestTriangleOperator::plan(const Options& options, Plans operands,
 std::optional<Cost> ClosestTriangleOperator::cost(const Options&, const OperatorPlans& plans) {
   const double triangles = plans.operands[0].triangles, voxels = plans.result.activeVoxels();
   if (triangles == 0) return {};
-  return Cost{1e-9 * (3000 * triangles + 250 * voxels), 530 * triangles + 20 * voxels};
+  return Cost{1e-9 * (3000 * triangles + 250 * voxels), 530 * triangles + 48 * voxels};
 }
 
 }  // namespace levelset

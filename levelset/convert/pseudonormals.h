@@ -32,7 +32,7 @@ class Pseudonormals {
   [[nodiscard]] std::size_t borderEdges() const { return borderEdges_; }
 
   struct Direction {
-    Imath::V3d normal{0};   ///< unit length; zero if all adjacent faces are degenerate
+    Imath::V3d normal{0};  ///< unit length; zero if all adjacent faces are degenerate
     /// True at an edge with one face, at an unoriented edge, and at the ends of such edges: the
     /// normal does not tell the sides apart there.
     bool onBorder = false;

@@ -21,9 +21,10 @@ struct BlockDistances {
 
 /// Computes the signed distances from a closed, consistently oriented mesh in a compute shader, by
 /// scan conversion of prisms [Sigg06, 4.2]. The processor lists the prisms that touch each block.
-/// The sign is that of the pseudonormal at the closest point [Baerentzen05]. The shader computes in
-/// double precision. Where levelset::meshToBand() is not 0, its signs are the same, and distances
-/// differ by at most 2 units in the last place.
+/// The sign is that of the pseudonormal at the closest point [Baerentzen05]: negative behind the
+/// triangles, whatever the nesting. The shader computes in double precision. Distances differ from
+/// those of levelset::meshToBand() by at most 2 units in the last place. So do the signed ones of a
+/// mesh that faces outwards and has no part inside another.
 /// @param voxelSize  world units, positive; grid points lie at its integer multiples
 /// @param halfWidth  largest distance, voxels, at least 1
 /// @throws levelset::InvalidInput for a mesh with a border, an edge of three faces, or faces of

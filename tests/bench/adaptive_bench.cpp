@@ -50,7 +50,7 @@ TriMesh shapeOf(const std::string& name) {
   if (name == "sphere") return support::sphereMesh(1, V3d(0), 256);
   if (name == "detail")
     return support::joined(support::boxMesh(V3d(0), V3d(1)),
-                           support::boxMesh(V3d(1.001, 0.5, 0.5), V3d(1.002, 0.501, 0.501)));
+                           support::boxMesh(V3d(1.001, 0.371, 0.713), V3d(1.002, 0.372, 0.714)));
   return readMesh(name);
 }
 

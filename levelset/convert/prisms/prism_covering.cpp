@@ -80,7 +80,7 @@ class Arc {
  public:
   /// Leaves the directions u with g · u ≤ 0.
   void clip(const V2d& g) {
-    if (isEmpty_ || g.length2() == 0) return;
+    if (isEmpty_ || g.length2() < kUnitError * kUnitError) return;  // equal directions
     const V2d from(-g.y, g.x), to(g.y, -g.x);  // where g · u turns negative, and positive again
     if (isWhole_) {
       low_ = from, high_ = to, middle_ = -g;

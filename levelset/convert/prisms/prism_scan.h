@@ -16,8 +16,7 @@ namespace levelset::convert {
 /// Distances, in voxels, from the 8³ grid points of a block to the nearest triangle, by scan
 /// conversion of prisms: each triangle is measured only from the grid points in its prism. If many
 /// triangles touch a block, bounding spheres exclude those that cannot be nearest in a cell of 4³
-/// points. The distances are exact up to the reach of the prisms. The result does not depend on the
-/// order of the triangles.
+/// points. The distances are exact up to the reach of the prisms.
 class PrismScan {
  public:
   static constexpr std::uint32_t kNoTriangle = ~std::uint32_t{0};
@@ -32,8 +31,8 @@ class PrismScan {
 
   /// Distances in voxels, x slowest, z fastest; the reach for points that are further away.
   [[nodiscard]] const std::array<double, kBlockVoxels>& distances() const { return distances_; }
-  /// The triangle that is nearest to each point: the one with the lowest index among those at the
-  /// same distance. kNoTriangle beyond the reach.
+  /// The triangle that is nearest to each point: among those at the same distance, the one with the
+  /// lowest index of those whose prism contains the point. kNoTriangle beyond the reach.
   [[nodiscard]] const std::array<std::uint32_t, kBlockVoxels>& nearest() const { return nearest_; }
   /// Number of distances that all calls of measure() computed.
   [[nodiscard]] std::size_t measuredCount() const { return measured_; }

@@ -90,7 +90,8 @@ std::uint32_t CreaseTracer::cornerBetween(const V3d& from, const V3d& to, double
 CreaseTracer::Walk CreaseTracer::walk(const Place& seed) const {
   Walk walk;
   walk.places.push_back(seed);
-  const std::size_t most = 40 * (pair_.samples.size() + 10);
+  // A walk takes about two steps for each spacing, where samples lie too.
+  const std::size_t most = 8 * (pair_.samples.size() + 10);
   while (walk.places.size() < most) {
     const Place& last = walk.places.back();
     const FoundItem near = search_.closest(last.position, INFINITY);

@@ -125,9 +125,11 @@ void requireOptions(const PointsToMeshOptions& options) {
   constexpr double kRounding = 1e-9;  // degrees come as radians
   if (options.sharpAngle != 0 && !(options.sharpAngle >= kLeastSharp - kRounding &&
                                    options.sharpAngle <= kMostSharp + kRounding))
-    throw UsageError(fmt::format(
-        "a sharp edge of {} radians is outside the range from 0.175 to 1.571 (10 to 90 degrees)",
-        options.sharpAngle));
+    throw UsageError(
+        fmt::format("an angle of {} radians between sharp faces is outside the range from 0.175 to "
+                    "1.571 (10 to 90 "
+                    "degrees)",
+                    options.sharpAngle));
   if (!(options.smoothing >= 1 && options.smoothing <= 10))
     throw UsageError(fmt::format(
         "a smoothing of {} point spacings is outside the range from 1 to 10", options.smoothing));

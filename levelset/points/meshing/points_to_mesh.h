@@ -44,7 +44,7 @@ struct PointsToMeshReport {
   std::size_t pieces = 0;        ///< smooth pieces between sharp edges
   std::size_t sharpCurves = 0;   ///< sharp edges that are kept, between corners or closed
   std::size_t sharpCorners = 0;  ///< corners where sharp edges meet
-  double sharpLength = 0;        ///< length of the sharp edges, world units
+  double sharpLength = 0;        ///< length of the curves along sharp edges, world units
   /// Pairs of neighbouring points across a sharp edge that is rounded: it fades out, meets a
   /// border, or its curve was not found.
   std::size_t roundedPairs = 0;

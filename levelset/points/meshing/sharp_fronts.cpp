@@ -116,7 +116,7 @@ SharpSurface divideSurface(const PointSurface& whole, double angle, double smoot
     }
     const CreaseNetwork network = std::move(result.network);
     result.network = {};
-    if (round == 0 && !network.opposed.empty()) {
+    if (round == 0 && !hasSides && !network.opposed.empty()) {
       turnPieces(network, pieces);
       continue;
     }
@@ -223,7 +223,7 @@ void SharpFronts::addCurve(std::uint32_t number, double scale, Outline& outline)
     return c != number && std::minmax(other[0], other[1]) == ends;
   };
   const auto& all = curves_[sharp_.pieces.parts[curve.pieces[0]]];
-  const std::size_t least = curve.isClosed()                                ? 3
+  const std::size_t least = curve.isClosed() || ends.first == ends.second   ? 3
                             : std::any_of(all.begin(), all.end(), isBeside) ? 2
                                                                             : 1;
   const std::size_t count = std::max(least, static_cast<std::size_t>(std::lround(edges.back())));

@@ -57,10 +57,13 @@ Value runMeshPoints(Invocation& in) {
                   "the triangles fill holes of the front",
                   result.mesh.triangles.size(), found.components, found.borders, found.borderLength,
                   100 * static_cast<double>(found.filled) / triangles));
-  if (in.given("sharp"))
-    in.notes.notes.push_back(fmt::format(
-        "mesh-points: {} sharp edges of length {:.6g} and {} corners between {} smooth pieces",
-        found.sharpCurves, found.sharpLength, found.sharpCorners, found.pieces));
+  if (in.given("sharp") && found.sharpCurves == 0)
+    in.notes.notes.push_back("mesh-points: no sharp edge was found");
+  else if (in.given("sharp"))
+    in.notes.notes.push_back(
+        fmt::format("mesh-points: {} sharp edges along curves of length {:.6g}, and {} corners, "
+                    "between {} smooth pieces",
+                    found.sharpCurves, found.sharpLength, found.sharpCorners, found.pieces));
   if (found.roundedPairs > 0)
     in.notes.notes.push_back(
         fmt::format("mesh-points: {} pairs of neighbouring points lie across a sharp edge that is "

@@ -56,7 +56,7 @@ TEST(BisectorPrisms, HaveGapsOnlyAtSaddles) {
   EXPECT_LT(consecutive, gaps);
 }
 
-TEST(BisectorPrisms, HaveThePublishedGapsOfSmoothSurfaces) {
+TEST(BisectorPrisms, HaveGapsAtSaddlesOnly) {
   const auto on = [](const support::TriMesh& mesh) {
     const LocalMesh local{mesh.positions, mesh.triangles};
     return BisectorPrisms(local, 0.1, BisectorPrisms::Gaps::Keep);

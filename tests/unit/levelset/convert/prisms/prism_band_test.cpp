@@ -80,7 +80,7 @@ TEST(PrismBand, HasTheSameBitsOnAnyNumberOfThreads) {
   const auto on = [&](std::size_t threads) {
     return onThreads(threads, [&] { return meshToBand(mesh, 0.08, byPrisms(6)).band; });
   };
-  expectSame(on(1), on(4), "threads");
+  EXPECT_EQ(on(1).contentHash(), on(4).contentHash());
 }
 
 TEST(PrismBand, StopsWhenCancelled) {
@@ -92,7 +92,7 @@ TEST(PrismBand, StopsWhenCancelled) {
 TEST(PrismBand, HasTheBitsOfBlocksOnScan) {
   const std::filesystem::path file =
       std::filesystem::path(LEVELSMITH_DATA_DIR) / "models/bunny.obj";
-  if (!std::filesystem::exists(file)) return;
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << "the bunny is missing; run data/fetch";
   expectSameByBlocks(readMesh(file), 0.02, byPrisms(8), "bunny");
 }
 
