@@ -1,11 +1,11 @@
 #include "levelset/adaptive/adaptive_field.h"
 
-#include <xxhash.h>
-
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "levelset/adaptive/adaptive_tree.h"
+#include "levelset/tree_hash_vdb.h"
 
 namespace levelset {
 
@@ -82,16 +82,12 @@ Imath::Box3d AdaptiveField::zeroSetBounds() const {
 std::uint64_t AdaptiveField::contentHash() const {
   if (!tree_) return 0;
   const HashedOctree& octree = tree_->octree;
-  std::vector<std::uint64_t> words;
-  words.reserve(octree.blockCount() + 1);
-  for (std::uint32_t b = 0; b < octree.blockCount(); ++b)
-    words.push_back(octree.parent(b).packed());
   const double place[] = {tree_->origin.x,  tree_->origin.y,  tree_->origin.z,       tree_->unit,
                           tree_->tolerance, tree_->halfWidth, double(octree.depth())};
-  std::uint64_t hash = XXH3_64bits(place, sizeof place);
-  hash = XXH3_64bits_withSeed(words.data(), words.size() * sizeof(words[0]), hash);
-  return XXH3_64bits_withSeed(tree_->values.data(), tree_->values.size() * sizeof(CornerValues),
-                              hash);
+  std::uint64_t hash = mixBytes(0, place, std::size(place));
+  for (std::uint32_t b = 0; b < octree.blockCount(); ++b)
+    hash = mixHash(hash, octree.parent(b).packed());
+  return mixBytes(hash, tree_->values.data(), tree_->values.size());
 }
 
 struct AdaptiveSampler::Impl {
