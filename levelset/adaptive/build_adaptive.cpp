@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -122,7 +123,15 @@ class Builder {
  private:
   void decide(std::uint32_t block, Decisions& decisions) const;
   void apply(std::uint32_t block, const Decisions& decisions);
-  [[nodiscard]] std::vector<CellKey> leavesToDivide(const std::vector<CornerValues>& values);
+  /// Corner of a leaf with its exact value.
+  struct Corner {
+    V3i at;
+    float value;
+  };
+  [[nodiscard]] std::vector<Corner> wrongCorners(const std::vector<CornerValues>& values);
+  [[nodiscard]] std::vector<CellKey> leavesWithout(std::vector<Corner>& corners,
+                                                   bool isWrong) const;
+  void splitAll(const std::vector<CellKey>& leaves);
   void requireMemory(std::size_t newBlocks) const;
   [[nodiscard]] double errorOf(FineLattice& lattice, const V3i& low, double limit) const;
   [[nodiscard]] double errorOnSurface(const FineLattice& lattice, const V3i& low,
@@ -185,9 +194,11 @@ double Builder::errorOnSurface(const FineLattice& lattice, const V3i& low,
 
 void Builder::decide(std::uint32_t block, Decisions& decisions) const {
   FineLattice lattice(tree_, distance_, block);
-  const int level = tree_.octree.parent(block).level - 1;
+  const CellKey parent = tree_.octree.parent(block);
+  const int level = parent.level - 1;
   const double radius = 0.5 * std::sqrt(3.0) * lattice.childEdge();
   for (int octant = 0; octant < 8; ++octant) {
+    if (tree_.octree.isSplit(parent.child(octant))) continue;  // by connect()
     const V3i low = lowOf(octant);
     if (std::abs(lattice.value(low + V3i(1))) > tree_.halfWidth + radius) continue;
     decisions.tested |= 1 << octant;
@@ -253,18 +264,16 @@ void Builder::divide(std::uint32_t first, const Progress& progress) {
   }
 }
 
-/// Finds the leaves whose values change the corners of smaller leaves within the half width by more
-/// than the limit.
-std::vector<CellKey> Builder::leavesToDivide(const std::vector<CornerValues>& values) {
-  tbb::enumerable_thread_specific<std::vector<std::uint64_t>> found;
+/// Finds the corners of leaves within the half width that larger leaves change by more than the
+/// limit.
+std::vector<Builder::Corner> Builder::wrongCorners(const std::vector<CornerValues>& values) {
+  using Found = std::pair<std::uint64_t, Corner>;
+  tbb::enumerable_thread_specific<std::vector<Found>> found;
   tbb::enumerable_thread_specific<double> largest(0.0);
   tbb::parallel_for(std::size_t{0}, values.size(), [&](std::size_t n) {
-    if (tested_[n] == 0) return;
-    const auto block = static_cast<std::uint32_t>(n);
-    const CellKey parent = tree_.octree.parent(block);
+    const CellKey parent = tree_.octree.parent(static_cast<std::uint32_t>(n));
     for (int octant = 0; octant < 8; ++octant) {
       if (!(tested_[n] >> octant & 1)) continue;
-      const CellKey leaf = parent.child(octant);
       for (int corner = 0; corner < 8; ++corner) {
         const std::size_t i = AdaptiveTree::latticeIndex(octant, corner);
         const double change = std::abs(double(values[n][i]) - double(tree_.values[n][i]));
@@ -272,47 +281,86 @@ std::vector<CellKey> Builder::leavesToDivide(const std::vector<CornerValues>& va
           largest.local() = std::max(largest.local(), change);
           continue;
         }
-        if (tree_.octree.isSplit(leaf)) break;
-        const auto larger =
-            tree_.octree.leafWithout(leaf.low() + V3i(corner & 1, corner >> 1 & 1, corner >> 2) *
-                                                      static_cast<int>(leaf.edge()));
-        if (larger) found.local().push_back(larger->packed());
+        const CellKey leaf = parent.child(octant);
+        const V3i at = leaf.low() + V3i(corner & 1, corner >> 1 & 1, corner >> 2) *
+                                        static_cast<int>(leaf.edge());
+        const std::uint64_t key = static_cast<std::uint64_t>(at.x) |
+                                  static_cast<std::uint64_t>(at.y) << 20 |
+                                  static_cast<std::uint64_t>(at.z) << 40;
+        found.local().emplace_back(key, Corner{at, tree_.values[n][i]});
       }
     }
   });
   figures_.hangingError = 0;
   for (const double one : largest) figures_.hangingError = std::max(figures_.hangingError, one);
-  std::vector<std::uint64_t> keys;
-  for (const std::vector<std::uint64_t>& some : found)
-    keys.insert(keys.end(), some.begin(), some.end());
+  std::vector<Found> all;
+  for (const std::vector<Found>& some : found) all.insert(all.end(), some.begin(), some.end());
+  std::sort(all.begin(), all.end(),
+            [](const Found& a, const Found& b) { return a.first < b.first; });
+  std::vector<Corner> corners;
+  for (std::size_t n = 0; n < all.size(); ++n)
+    if (n == 0 || all[n].first != all[n - 1].first) corners.push_back(all[n].second);
+  return corners;
+}
+
+/// Finds the largest leaves that touch corners without having them. Removes the corners without
+/// such a leaf.
+/// @param isWrong  false: also the corners for which the leaf interpolates the value
+std::vector<CellKey> Builder::leavesWithout(std::vector<Corner>& corners, bool isWrong) const {
+  constexpr std::uint64_t kNone = ~std::uint64_t{0};
+  std::vector<std::uint64_t> keys(corners.size(), kNone);
+  tbb::parallel_for(std::size_t{0}, corners.size(), [&](std::size_t n) {
+    const auto leaf = tree_.octree.leafWithout(corners[n].at);
+    if (!leaf) return;
+    if (!isWrong) {
+      const V3d local = V3d(corners[n].at - leaf->low()) / leaf->edge();
+      const double value = tree_.interpolate({*leaf, tree_.octree.block(leaf->parent())}, local);
+      if (std::abs(value - double(corners[n].value)) <= limit_) return;
+    }
+    keys[n] = leaf->packed();
+  });
+  std::size_t kept = 0;
+  for (std::size_t n = 0; n < corners.size(); ++n)
+    if (keys[n] != kNone) corners[kept++] = corners[n];
+  corners.resize(kept);
   std::sort(keys.begin(), keys.end());
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   std::vector<CellKey> leaves;
-  for (const std::uint64_t key : keys) leaves.push_back(CellKey::unpacked(key));
+  for (const std::uint64_t key : keys)
+    if (key != kNone) leaves.push_back(CellKey::unpacked(key));
   return leaves;
+}
+
+void Builder::splitAll(const std::vector<CellKey>& leaves) {
+  requireMemory(leaves.size());
+  std::vector<CornerValues> added(leaves.size());
+  std::atomic<std::size_t> evaluations = 0;
+  tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t n) {
+    FineLattice lattice(tree_, distance_, tree_.octree.block(leaves[n].parent()));
+    added[n] = lattice.childValues(lowOf(leaves[n].octant()));
+    evaluations += lattice.evaluations();
+  });
+  figures_.evaluations += evaluations;
+  for (std::size_t n = 0; n < leaves.size(); ++n) {
+    tree_.octree.split(leaves[n]);
+    tree_.values.push_back(added[n]);
+    tested_.push_back(0);
+  }
 }
 
 void Builder::connect(const Progress& progress) {
   while (true) {
     report(progress, 0);
     std::vector<CornerValues> values = continuousValues(tree_);
-    const std::vector<CellKey> leaves = leavesToDivide(values);
-    if (leaves.empty()) {
+    std::vector<Corner> corners = wrongCorners(values);
+    if (corners.empty()) {
       tree_.values = std::move(values);
       return;
     }
-    requireMemory(leaves.size());
-    std::vector<CornerValues> added(leaves.size());
-    tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t n) {
-      FineLattice lattice(tree_, distance_, tree_.octree.block(leaves[n].parent()));
-      added[n] = lattice.childValues(lowOf(leaves[n].octant()));
-    });
     const auto first = static_cast<std::uint32_t>(tree_.octree.blockCount());
-    for (std::size_t n = 0; n < leaves.size(); ++n) {
-      tree_.octree.split(leaves[n]);
-      tree_.values.push_back(added[n]);
-      tested_.push_back(0);
-    }
+    // Divide each leaf at least once, then until the leaf at the corner interpolates its value.
+    for (bool isWrong = true; !corners.empty(); isWrong = false)
+      splitAll(leavesWithout(corners, isWrong));
     divide(first, {});
   }
 }

@@ -113,7 +113,7 @@ TEST_F(PointActions, MeshPointsKeepsSharpEdges) {
   const support::Outcome outcome = levelsmith(made + "write m.ply");
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_NE(outcome.err.find("12 sharp edges"), std::string::npos) << outcome.err;
-  EXPECT_NE(outcome.err.find("8 corners between 6 smooth pieces"), std::string::npos)
+  EXPECT_NE(outcome.err.find("8 corners, between 6 smooth pieces"), std::string::npos)
       << outcome.err;
 }
 
