@@ -84,7 +84,7 @@ class FineLattice {
     return static_cast<std::size_t>(at.x + 5 * at.y + 25 * at.z);
   }
   const SignedDistance& distance_;
-  V3d origin_;       ///< of the root
+  V3d origin_;       ///< lowest corner of the root, world units
   double halfUnit_;  ///< half of the edge of a cell of level 0, world units
   V3i low_;          ///< lowest point, half units
   int steps_;        ///< distance of the points, half units
@@ -101,7 +101,7 @@ V3i lowOf(int octant) {
 struct Decisions {
   int split = 0, tested = 0;  ///< bits by octant; tested: leaves within the half width
   std::array<CornerValues, 8> values;
-  double testedError = 0;  ///< of children that stay leaves
+  double testedError = 0;  ///< largest one of the children that stay leaves
   std::size_t evaluations = 0;
 };
 

@@ -47,7 +47,7 @@ struct AdaptiveOptions {
 
 /// Figures of buildAdaptive().
 struct AdaptiveReport {
-  std::size_t evaluations = 0;  ///< of the distance
+  std::size_t evaluations = 0;  ///< number of calls of SignedDistance::at()
   /// Largest error of the leaves at the points where they were tested, before their corners took
   /// over values of larger leaves, world units.
   double testedError = 0;

@@ -14,7 +14,7 @@ namespace levelset::convert {
 
 /// Surface of the solid that a mesh describes, and the rule for its inside.
 struct SolidSurface {
-  Imath::V3i origin;  ///< of the local frame, in voxels
+  Imath::V3i origin;  ///< origin of the local frame, voxels
   /// Triangles between inside and outside, but for the surface that spans holes. With crossing
   /// parity, all triangles, as they are oriented in the input.
   LocalMesh mesh;

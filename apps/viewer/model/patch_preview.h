@@ -28,7 +28,7 @@ struct PatchPreview {
   /// True: computed on the grid of the base, as the actions in `command` do. False: on coarse
   /// voxels.
   bool isFine = false;
-  double height = 0;      ///< of the patch, world units
+  double height = 0;      ///< height of the patch, world units
   std::string patchText;  ///< the `patch` action; empty for fewer than four corners
   std::string chainText;  ///< the actions from the base to the textured solid; empty without one,
                           ///< and for scenes

@@ -23,7 +23,7 @@ struct OrientedPoints {
   /// Number of points whose normal opposes the mean normal of their neighbours.
   std::size_t opposed = 0;
   PointSearch search;
-  Imath::Box3d box;  ///< of the positions
+  Imath::Box3d box;  ///< bounds of the positions
 
   [[nodiscard]] std::size_t size() const { return positions.size(); }
 };
