@@ -25,7 +25,8 @@ struct RowPositions {
 
   constexpr RowPositions() {
     for (std::size_t i = 0; i < kCount; ++i) {
-      x[i] = static_cast<float>(i / kDim) - static_cast<float>(kDim - 1) / 2;
+      const std::size_t row = i / kDim;
+      x[i] = static_cast<float>(row) - static_cast<float>(kDim - 1) / 2;
       y[i] = static_cast<float>(i % kDim) - static_cast<float>(kDim - 1) / 2;
     }
   }
@@ -168,7 +169,7 @@ bool PrismScan::measure(const LocalMesh& mesh, std::span<const std::uint32_t> ca
                          static_cast<float>(middle.length()) * kSphereSlack + kSphereMargin;
     all_.push_back({V3f(middle), radius, static_cast<std::uint32_t>(i)});
   }
-  constexpr auto radiusOf = [](int dim) { return static_cast<float>(dim - 1) * 0.8660255f; };
+  const auto radiusOf = [](int dim) { return static_cast<float>(dim - 1) * 0.8660255f; };
   keepNear(all_, V3f(0), radiusOf(kBlockDim), block_);
   constexpr int kCellDim = kBlockDim / 2;
   if (block_.size() <= kManyTriangles) {
