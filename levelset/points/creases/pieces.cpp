@@ -43,7 +43,7 @@ double weightAt(const V3d& local, double radius) {
 SideFit fitSide(const std::vector<HeightSample>& samples, const LocalFrame& frame) {
   SideFit best;
   for (const int degree : {1, 2}) {
-    const auto unknowns = static_cast<double>((degree + 1) * (degree + 2) / 2);
+    const double unknowns = degree == 1 ? 3 : 6;
     const auto count = static_cast<double>(samples.size());
     if (count < unknowns + 2) continue;
     constexpr double kSideCondition = 1e5;

@@ -75,7 +75,7 @@ void turnPieces(const CreaseNetwork& network, Pieces& pieces) {
     std::array<std::size_t, 2> points{};
     for (std::size_t k = 0; k < connected.size(); ++k) {
       const std::uint32_t at = connected[k];
-      points[static_cast<std::size_t>(isTurned[at])] += sizes[at];
+      points[isTurned[at] != 0 ? 1 : 0] += sizes[at];
       for (const Link& one : links[at]) {
         if (isSeen[one.to]) continue;
         isSeen[one.to] = 1;
