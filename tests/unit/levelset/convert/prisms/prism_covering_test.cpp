@@ -16,6 +16,7 @@
 namespace prism_covering_test {
 
 using Imath::V3d;
+using Imath::V3i;
 using levelset::TriMesh;
 using levelset::convert::LocalMesh;
 using levelset::convert::PrismCovering;
@@ -289,7 +290,7 @@ TEST(PrismCovering, TestsCubesOfGridPoints) {
       if (planes.mayTouch(centre, half)) continue;
       ++excluded;
       for (int k = 0; k < 27; ++k)
-        missed += planes.contains(centre + V3d(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1) * half);
+        missed += planes.contains(centre + V3d(V3i(k / 9, k / 3 % 3, k % 3) - V3i(1)) * half);
     }
   }
   EXPECT_EQ(missed, 0u);
