@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+
 #include "levelset/error.h"
 
 namespace levelset {
@@ -13,6 +15,14 @@ void report(const Progress& progress, double fraction) {
 Progress subProgress(const Progress& whole, double from, double to) {
   if (!whole) return {};
   return [=](double fraction) { return whole(from + (to - from) * fraction); };
+}
+
+Progress monotonicProgress(const Progress& progress) {
+  if (!progress) return {};
+  return [progress, high = 0.0](double fraction) mutable {
+    high = std::max(high, fraction);
+    return progress(high);
+  };
 }
 
 void requireMemory(double estimatedBytes, std::size_t maxBytes) {

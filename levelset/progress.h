@@ -20,6 +20,10 @@ void report(const Progress& progress, double fraction);
 /// [from, to] of the complete task.
 [[nodiscard]] Progress subProgress(const Progress& whole, double from, double to);
 
+/// Returns a callback that passes the largest fraction so far on, for tasks whose parts report
+/// overlapping intervals.
+[[nodiscard]] Progress monotonicProgress(const Progress& progress);
+
 /// Value of a `maxMemory` option that means "no limit". Options of that name limit the bytes that
 /// an operator may use. Operators estimate their memory and throw ResourceLimit before they
 /// allocate.

@@ -24,30 +24,8 @@ Imath::Box3d AdaptiveField::box() const {
   return {tree_->origin, tree_->toWorld(V3i(1 << tree_->octree.depth()))};
 }
 
-double AdaptiveField::smallestCell() const {
-  if (!tree_) return 0;
-  int level = tree_->octree.depth();
-  for (std::uint32_t b = 0; b < tree_->octree.blockCount(); ++b)
-    level = std::min(level, tree_->octree.parent(b).level - 1);
-  return std::ldexp(tree_->unit, level);
-}
-
 std::size_t AdaptiveField::leafCount() const {
   return tree_ ? tree_->octree.leafCount() : 0;
-}
-
-std::vector<std::size_t> AdaptiveField::leavesByDepth() const {
-  if (!tree_) return {};
-  const int depth = tree_->octree.depth();
-  std::vector<std::size_t> counts(static_cast<std::size_t>(depth) + 1, 0);
-  counts[0] = 1;
-  for (std::uint32_t b = 0; b < tree_->octree.blockCount(); ++b) {
-    const auto at = static_cast<std::size_t>(depth - tree_->octree.parent(b).level);
-    counts[at] -= 1;
-    counts[at + 1] += 8;
-  }
-  while (counts.back() == 0) counts.pop_back();
-  return counts;
 }
 
 std::size_t AdaptiveField::memoryUse() const {

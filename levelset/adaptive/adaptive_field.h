@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <memory>
 #include <utility>
-#include <vector>
 
 namespace levelset {
 
@@ -32,11 +31,7 @@ class AdaptiveField {
   [[nodiscard]] double halfWidth() const;
   /// Cube that the root covers, world units. Beyond it the distance to the cube is added.
   [[nodiscard]] Imath::Box3d box() const;
-  /// Edge of the smallest leaf, world units.
-  [[nodiscard]] double smallestCell() const;
   [[nodiscard]] std::size_t leafCount() const;
-  /// Number of leaves of each size: the first entry counts the root, the next one its children.
-  [[nodiscard]] std::vector<std::size_t> leavesByDepth() const;
   [[nodiscard]] std::size_t memoryUse() const;  ///< bytes
   /// Bounds of the zero set, world units: corners of cells where it crosses the edges of leaves.
   /// Empty when there is none.

@@ -111,7 +111,6 @@ class CachedOctree {
   [[nodiscard]] HashedOctree::Place findLeaf(const Imath::V3i& cell) const {
     return tree_.findLeaf(cell, [this](const CellKey& key) { return block(key); });
   }
-  [[nodiscard]] const HashedOctree& tree() const { return tree_; }
   /// Share of the searches that the cache answered.
   [[nodiscard]] double hitRate() const {
     return searches_ > 0 ? double(hits_) / double(searches_) : 0;

@@ -7,14 +7,14 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <map>
-#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "levelset/convert/solid_surface.h"
 #include "levelset/error.h"
 #include "levelset/geometry/disjoint_sets.h"
+#include "levelset/geometry/mesh_sides.h"
+#include "levelset/geometry/position_table.h"
 #include "levelset/memory_limit.h"
 #include "levelset/mesh_sign/self_intersections.h"
 
@@ -44,44 +44,6 @@ TriangleSearch searchOf(const LocalMesh& mesh) {
   return TriangleSearch(std::move(items));
 }
 
-/// Side of a triangle: an edge of the mesh.
-struct Side {
-  std::uint32_t low, high, triangle;
-  bool rises;  ///< runs from low to high
-  [[nodiscard]] bool isBeside(const Side& other) const {
-    return low == other.low && high == other.high;
-  }
-};
-
-/// Sides of all triangles; those of an edge follow each other.
-std::vector<Side> sidesOf(const LocalMesh& mesh) {
-  std::vector<Side> sides;
-  sides.reserve(3 * mesh.triangles.size());
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint32_t from = mesh.triangles[t][k], to = mesh.triangles[t][(k + 1) % 3];
-      sides.push_back({std::min(from, to), std::max(from, to), t, from < to});
-    }
-  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
-    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
-  });
-  return sides;
-}
-
-/// Patches of a mesh: triangles connected by edges that only two share, in opposite directions.
-/// @param belongs  triangles that may be in a patch with others
-DisjointSets patchesOf(const LocalMesh& mesh, const std::vector<bool>& belongs) {
-  DisjointSets patches(mesh.triangles.size());
-  const std::vector<Side> sides = sidesOf(mesh);
-  for (std::size_t i = 0, end = 0; i < sides.size(); i = end) {
-    for (end = i + 1; end < sides.size() && sides[end].isBeside(sides[i]);) ++end;
-    const Side &a = sides[i], &b = sides[end - 1];
-    if (end == i + 2 && a.rises != b.rises && belongs[a.triangle] && belongs[b.triangle])
-      patches.join(a.triangle, b.triangle);
-  }
-  return patches;
-}
-
 /// The largest triangle of each patch, at the number of the patch.
 std::vector<std::uint32_t> largestOf(const LocalMesh& mesh, DisjointSets& patches) {
   std::vector<std::uint32_t> largest(mesh.triangles.size());
@@ -104,30 +66,18 @@ V3d stepInFront(const LocalMesh& mesh, std::size_t t) {
   return area > 0 ? normal * (kStep / std::sqrt(area)) : V3d(0);
 }
 
-/// Merges the vertices at equal positions from a number on.
-void weld(LocalMesh& mesh, std::size_t firstTriangle) {
-  std::map<std::tuple<double, double, double>, std::uint32_t> numbers;
-  for (std::size_t t = firstTriangle; t < mesh.triangles.size(); ++t)
-    for (std::uint32_t& v : mesh.triangles[t]) {
-      const V3d& p = mesh.points[v];
-      v = numbers.try_emplace({p.x, p.y, p.z}, v).first->second;
-    }
-}
-
-/// Passes progress on that never decreases.
-Progress rising(const Progress& progress) {
-  if (!progress) return {};
-  return [progress, high = 0.0](double fraction) mutable {
-    high = std::max(high, fraction);
-    return progress(high);
-  };
+/// Merges the vertices at equal positions of the triangles from a number on.
+void weld(LocalMesh& mesh, std::size_t first) {
+  convert::PositionTable table(mesh.points, 3 * (mesh.triangles.size() - first));
+  for (std::size_t t = first; t < mesh.triangles.size(); ++t)
+    for (std::uint32_t& v : mesh.triangles[t]) v = table.findOrInsert(mesh.points[v], v);
 }
 
 }  // namespace
 
 MeshDistance::MeshDistance(const TriMesh& mesh, double voxel, const MeshToBandOptions& options)
     : voxel_(voxel) {
-  const Progress progress = rising(options.progress);
+  const Progress progress = monotonicProgress(options.progress);
   convert::SolidSurface surface =
       convert::solidSurface(mesh, voxel, options, subProgress(progress, 0, 0.6));
   certificate_ = surface.certificate;
@@ -165,14 +115,12 @@ MeshDistance::MeshDistance(const TriMesh& mesh, double voxel, const MeshToBandOp
 /// Refuses a closed mesh in which triangles that share an edge run along it in the same direction.
 void MeshDistance::requireOrientation() const {
   if (certificate_.method != SignMode::Closed) return;
-  const std::vector<Side> sides = sidesOf(mesh_);
+  const std::vector<MeshSide> sides = sortedSides(mesh_.triangles);
   std::size_t wrong = 0;
-  for (std::size_t i = 0, end = 0; i < sides.size(); i = end) {
-    long balance = 0;
-    for (end = i; end < sides.size() && sides[end].isBeside(sides[i]); ++end)
-      balance += sides[end].rises ? 1 : -1;
-    wrong += balance != 0;
-  }
+  forEachEdge(sides, [&](auto first, auto end) {
+    const auto rising = std::count_if(first, end, [](const MeshSide& s) { return s.rises; });
+    wrong += 2 * rising != end - first;
+  });
   if (wrong > 0)
     throw InvalidInput(
         fmt::format("at {} edges neighbouring triangles have opposite orientations; orient them "
@@ -183,7 +131,7 @@ void MeshDistance::requireOrientation() const {
 /// Makes each component face away from the solid: outwards in an even depth of nesting, else
 /// inwards. The winding number is then 1 inside and 0 outside.
 void MeshDistance::orientComponents() {
-  DisjointSets parts = patchesOf(mesh_, std::vector<bool>(mesh_.triangles.size(), true));
+  DisjointSets parts = connectedPatches(mesh_.triangles, [](std::uint32_t) { return true; });
   std::vector<double> volume(mesh_.triangles.size(), 0);
   for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
     const std::uint32_t part = parts.find(t);
@@ -235,7 +183,8 @@ void MeshDistance::findSeparating() {
   separates_.assign(count, true);
   for (const auto& [a, b] : convert::findSelfIntersections(mesh_.triangles, mesh_.points, {}))
     separates_[a] = separates_[b] = false;
-  DisjointSets patches = patchesOf(mesh_, separates_);
+  DisjointSets patches =
+      connectedPatches(mesh_.triangles, [this](std::uint32_t t) { return separates_[t]; });
   // The largest triangle of a patch decides.
   const std::vector<std::uint32_t> largest = largestOf(mesh_, patches);
   std::vector<bool> isOuter(count);

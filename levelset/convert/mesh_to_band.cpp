@@ -18,16 +18,6 @@ using convert::SignField;
 using Imath::V3d;
 using Imath::V3i;
 
-/// Wraps a progress callback so that the fraction never decreases. Two stages of meshToBand report
-/// overlapping intervals.
-Progress monotonic(const Progress& progress) {
-  if (!progress) return {};
-  return [&progress, high = 0.0](double fraction) mutable {
-    high = std::max(high, fraction);
-    return progress(high);
-  };
-}
-
 void checkResult(const openvdb::FloatGrid& grid, const SignCertificate& certificate,
                  const MeshToBandOptions& options) {
   bool anyInside = false;
@@ -70,7 +60,7 @@ std::string describe(const SignCertificate& c) {
 MeshToBandResult meshToBand(const TriMesh& mesh, double voxelSize,
                             const MeshToBandOptions& options) {
   convert::checkMeshInput(mesh, voxelSize, options);
-  const Progress progress = monotonic(options.progress);
+  const Progress progress = monotonicProgress(options.progress);
   const std::size_t maxMemory = memoryLimit(options.maxMemory);
   report(progress, 0);
 

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
+#include <cstdint>
+
+#include "levelset/geometry/mesh_sides.h"
 
 namespace levelset::convert {
 namespace {
@@ -24,44 +26,32 @@ Pseudonormals::Pseudonormals(const LocalMesh& mesh)
     : mesh_(mesh), vertices_(mesh.points.size()), edgeOf_(mesh.triangles.size()) {
   const std::size_t count = mesh.triangles.size();
   faces_.reserve(count);
-  struct Side {
-    std::uint32_t low, high, triangle, corner;
-    bool rises;
-  };
-  std::vector<Side> sides;
-  sides.reserve(3 * count);
   for (std::uint32_t t = 0; t < count; ++t) {
     const V3d &a = mesh.corner(t, 0), &b = mesh.corner(t, 1), &c = mesh.corner(t, 2);
     faces_.push_back(directionOf((b - a).cross(c - a)));
     for (std::uint32_t k = 0; k < 3; ++k) {
       const std::uint32_t from = mesh.triangles[t][k], to = mesh.triangles[t][(k + 1) % 3];
-      sides.push_back({std::min(from, to), std::max(from, to), t, k, from < to});
       const V3d &at = mesh.points[from], &last = mesh.corner(t, (k + 2) % 3);
       vertices_[from].normal += faces_[t] * angleBetween(mesh.points[to] - at, last - at);
     }
   }
-  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
-    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
-  });
-  for (std::size_t i = 0, end = 0; i < sides.size(); i = end) {
+  const std::vector<MeshSide> sides = sortedSides(mesh.triangles);
+  forEachEdge(sides, [&](auto first, auto end) {
     Direction edge;
-    for (end = i;
-         end < sides.size() && sides[end].low == sides[i].low && sides[end].high == sides[i].high;
-         ++end) {
-      edge.normal += faces_[sides[end].triangle];
-      edgeOf_[sides[end].triangle][sides[end].corner] = static_cast<std::uint32_t>(edges_.size());
+    for (auto side = first; side != end; ++side) {
+      edge.normal += faces_[side->triangle];
+      edgeOf_[side->triangle][side->corner] = static_cast<std::uint32_t>(edges_.size());
     }
-    const std::size_t faces = end - i;
+    const auto faces = static_cast<std::size_t>(end - first);
     edge.normal = directionOf(edge.normal);
-    const bool isOriented = faces == 1 || (faces == 2 && sides[i].rises != sides[i + 1].rises);
+    const bool isOriented = faces == 1 || (faces == 2 && first[0].rises != first[1].rises);
     edge.onBorder = faces == 1 || !isOriented;
     edges_.push_back(edge);
     borderEdges_ += faces == 1;
-    if (edge.onBorder) vertices_[sides[i].low].onBorder = vertices_[sides[i].high].onBorder = true;
+    if (edge.onBorder) vertices_[first->low].onBorder = vertices_[first->high].onBorder = true;
     if (!isOriented && !unorientedEdge_)
-      unorientedEdge_ =
-          UnorientedEdge{mesh.points[sides[i].low], mesh.points[sides[i].high], faces};
-  }
+      unorientedEdge_ = UnorientedEdge{mesh.points[first->low], mesh.points[first->high], faces};
+  });
   for (Direction& vertex : vertices_) vertex.normal = directionOf(vertex.normal);
 }
 

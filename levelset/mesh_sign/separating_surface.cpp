@@ -11,6 +11,7 @@
 
 #include "levelset/geometry/disjoint_sets.h"
 #include "levelset/geometry/exact_predicates.h"
+#include "levelset/geometry/mesh_sides.h"
 #include "levelset/mesh_sign/near_surface.h"
 #include "levelset/mesh_sign/winding.h"
 #include "levelset/progress_gate.h"
@@ -34,18 +35,6 @@ constexpr double kOnPlane = 1e-12;
 /// Voxels. Sheets inside the solid that lie within this distance of the separating surface stay in
 /// the mesh. The grid cannot resolve the gap, and the distances then still refer to the given mesh.
 constexpr double kShallow = 0.25;
-
-/// Directed edge of a triangle, used to find the edges that exactly two triangles share. `rising`:
-/// the triangle runs from `low` to `high`.
-struct HalfEdge {
-  std::uint32_t low, high, triangle;
-  bool rising;
-  bool operator<(const HalfEdge& other) const {
-    if (low != other.low) return low < other.low;
-    if (high != other.high) return high < other.high;
-    return triangle < other.triangle;
-  }
-};
 
 V3d areaVector(std::span<const V3d> polygon) {
   V3d sum(0);
@@ -174,24 +163,7 @@ class SeparatingSurface {
   /// Joins triangles that no other triangle crosses into patches, over edges that exactly two of
   /// them share. The winding number on each side of such a patch is constant.
   void findPatches() {
-    std::vector<HalfEdge> edges;
-    edges.reserve(3 * mesh_.triangles.size());
-    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
-      for (std::size_t k = 0; k < 3; ++k) {
-        const std::uint32_t from = mesh_.triangles[t][k], to = mesh_.triangles[t][(k + 1) % 3];
-        edges.push_back({std::min(from, to), std::max(from, to), t, from < to});
-      }
-    std::sort(edges.begin(), edges.end());
-    for (std::size_t i = 0; i < edges.size();) {
-      std::size_t end = i + 1;
-      while (end < edges.size() && edges[end].low == edges[i].low &&
-             edges[end].high == edges[i].high)
-        ++end;
-      if (end - i == 2 && edges[i].rising != edges[i + 1].rising && !isCrossed(edges[i].triangle) &&
-          !isCrossed(edges[i + 1].triangle))
-        groups_.join(edges[i].triangle, edges[i + 1].triangle);
-      i = end;
-    }
+    groups_ = connectedPatches(mesh_.triangles, [this](std::uint32_t t) { return !isCrossed(t); });
     largest_.assign(mesh_.triangles.size(), kNone);
     std::vector<double> area(mesh_.triangles.size(), -1);
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {

@@ -294,7 +294,8 @@ void requireClosed(const levelset::convert::MeshTopology& topology) {
 BlockDistances prismDistances(const GlContext& context, const levelset::TriMesh& mesh,
                               double voxelSize, double halfWidth) {
   using namespace levelset::convert;
-  checkMeshInput(mesh, voxelSize, {.halfWidth = halfWidth});
+  checkMeshInput(mesh, voxelSize,
+                 {.halfWidth = halfWidth, .method = levelset::DistanceMethod::Prisms});
   const MeshTopology topology = findTopology(mesh);
   requireClosed(topology);
   const V3i origin = localOrigin(mesh, voxelSize);

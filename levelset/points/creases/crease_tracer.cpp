@@ -160,11 +160,9 @@ std::optional<CreaseCurve> CreaseTracer::curveFrom(std::uint32_t sample) const {
     endAt(backward.corner, backward.places);
     endAt(forward.corner, forward.places);
     places.assign(backward.places.rbegin(), backward.places.rend());
-    // The seed is the first place of both, unless a corner took its place.
-    if (places.back().position == forward.places.front().position) places.pop_back();
+    places.pop_back();  // the seed is the first place of both
     places.insert(places.end(), forward.places.begin(), forward.places.end());
     curve.corners = {backward.corner, forward.corner};
-    if (places.size() < 3 && backward.corner == forward.corner) return std::nullopt;
   }
   for (const Place& place : places) {
     curve.positions.push_back(place.position);
@@ -250,8 +248,8 @@ bool CreaseTracer::trace(std::vector<CreaseCurve>& curves) {
       else
         curves.push_back(std::move(*curve));
     }
-  // Single points that belong to another piece give false samples. The loops of curves around the
-  // pieces show whether a curve is missing.
+  // Single points that belong to another piece give false samples. If a curve is missing, the loops
+  // of curves around a piece do not close, or its front leaves a hole.
   constexpr std::size_t kFalse = 2, kFalseShare = 10;
   return lost <= std::max(kFalse, isCovered_.size() / kFalseShare);
 }

@@ -320,6 +320,7 @@ Pieces PieceFinder::find() {
     result.isClear.push_back(fits_[i].isReliable);
     fits_[i].normal = normal;
   }
+  result.ownNormals = result.normals;
   joinReliable(result);
   grow(result);
   joinSmooth(result);
@@ -406,7 +407,7 @@ std::size_t countRoundedPairs(const PointSurface& surface, const Pieces& pieces,
     if (surface.part(i) == kNoPiece || !pieces.isClear[i] || isBesideKept(i)) continue;
     for (const std::uint32_t j : surface.graph().neighbours(i))
       count += i < j && pieces.isClear[j] && !isBesideKept(j) &&
-               pieces.normals[i].dot(pieces.normals[j]) < leastCosine;
+               pieces.ownNormals[i].dot(pieces.ownNormals[j]) < leastCosine;
   }
   return count;
 }

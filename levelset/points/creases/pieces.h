@@ -18,9 +18,11 @@ struct Pieces {
   std::size_t count = 0;
   std::vector<std::uint32_t> pieces;  ///< piece of each point; kNoPiece for points without a part
   std::vector<Imath::V3d> normals;    ///< unit normals on the side of the piece, outwards
-  std::vector<bool> isClear;          ///< the points around give a clear normal
-  std::vector<std::uint32_t> parts;   ///< part of each piece
-  double noise = 0;                   ///< error of the fits away from sharp edges, spacings
+  /// Normals by the points around alone. Points of tiny pieces keep them.
+  std::vector<Imath::V3d> ownNormals;
+  std::vector<bool> isClear;         ///< the points around give a clear normal
+  std::vector<std::uint32_t> parts;  ///< part of each piece
+  double noise = 0;                  ///< error of the fits away from sharp edges, spacings
 
   /// Joins pieces, drops those without points, and numbers the others anew.
   /// @param pairs  numbers of two pieces each

@@ -190,8 +190,11 @@ PointsToMeshResult pointsToMesh(const PointCloud& cloud, const PointsToMeshOptio
   std::optional<SharpSurface> sharp;
   std::optional<SharpFronts> sharpFronts;
   if (options.sharpAngle > 0)
-    sharp = points::divideSurface(surface, options.sharpAngle, options.smoothing,
-                                  !cloud.normals.empty(), subProgress(options.progress, 0.6, 0.7));
+    sharp = points::divideSurface(surface, {.angle = options.sharpAngle,
+                                            .smoothing = options.smoothing,
+                                            .hasSides = !cloud.normals.empty(),
+                                            .maxMemory = memoryLimit(options.maxMemory),
+                                            .progress = subProgress(options.progress, 0.6, 0.7)});
   if (sharp && sharp->divided) sharpFronts.emplace(surface, *sharp, limits);
   double triangles = sharpFronts ? sharpFronts->expectedTriangles() : 0;
   for (const SurfacePart& part : parts) triangles += part.expected;
@@ -234,7 +237,7 @@ PointsToMeshResult pointsToMesh(const PointCloud& cloud, const PointsToMeshOptio
   PointsToMeshResult result;
   PointsToMeshReport& figures = result.report;
   figures.components = parts.size();
-  figures.guessed = surface.guessedParts();
+  figures.guessed = sharp ? sharp->guessed : surface.guessedParts();
   figures.spacing = spacing / normalisation.scale;
   for (std::size_t i = 0; i < surface.size(); ++i)
     figures.unusedPoints += surface.part(i) == PointSurface::kNone;

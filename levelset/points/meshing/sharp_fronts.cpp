@@ -35,18 +35,26 @@ std::vector<std::array<std::uint32_t, 2>> wholeParts(
   return pairs;
 }
 
-/// Returns vectors to the outside.
-std::vector<V3d> sidesOf(const PointSurface& whole, bool hasSides, const Progress& progress) {
-  std::vector<V3d> sides(whole.size(), V3d(0));
+/// Vectors to the outside.
+struct Sides {
+  std::vector<V3d> vectors;
+  std::size_t guessed = 0;  ///< parts whose outside is a guess
+};
+
+/// Returns the sides of the surface, or those of normals that keep sharp edges.
+Sides sidesOf(const PointSurface& whole, const SharpOptions& options) {
+  Sides sides;
+  for (std::size_t i = 0; i < whole.size(); ++i) sides.vectors.push_back(whole.normal(i));
+  sides.guessed = whole.guessedParts();
+  if (options.hasSides) return sides;
   PointCloud cloud;
-  if (!hasSides) {
-    cloud.positions.assign(whole.positions().begin(), whole.positions().end());
-    cloud = estimateNormals(std::move(cloud), {.progress = progress}).cloud;
-  }
-  for (std::size_t i = 0; i < sides.size(); ++i) {
-    if (!hasSides) sides[i] = V3d(cloud.normals[i]);
-    if (!(sides[i].length2() > 0)) sides[i] = whole.normal(i);
-  }
+  cloud.positions.assign(whole.positions().begin(), whole.positions().end());
+  const NormalsResult found = estimateNormals(
+      std::move(cloud),
+      {.maxMemory = options.maxMemory, .progress = subProgress(options.progress, 0, 0.1)});
+  for (std::size_t i = 0; i < whole.size(); ++i)
+    if (found.cloud.normals[i].length2() > 0) sides.vectors[i] = V3d(found.cloud.normals[i]);
+  sides.guessed = found.report.guessed;
   return sides;
 }
 
@@ -93,17 +101,22 @@ void turnPieces(const CreaseNetwork& network, Pieces& pieces) {
 
 }  // namespace
 
-SharpSurface divideSurface(const PointSurface& whole, double angle, double smoothing, bool hasSides,
-                           const Progress& progress) {
+SharpSurface divideSurface(const PointSurface& whole, const SharpOptions& options) {
   constexpr int kMostRounds = 4, kMostMoves = 4;
   SharpSurface result;
   Pieces& pieces = result.pieces;
-  pieces = findPieces(whole, angle, sidesOf(whole, hasSides, subProgress(progress, 0, 0.1)));
+  const Sides sides = sidesOf(whole, options);
+  result.guessed = sides.guessed;
+  pieces = findPieces(whole, options.angle, sides.vectors);
   for (int round = 0; pieces.count > whole.partCount(); ++round) {
-    report(progress, std::min(0.9, 0.1 + 0.15 * round));
+    const double done = std::min(0.9, 0.1 + 0.15 * round);
+    int fits = 0;
     const auto divide = [&] {
       PointSurface divided = whole;
-      divided.divide(pieces.pieces, pieces.count, pieces.normals, smoothing);
+      const double from = done + 0.1 * fits / (kMostMoves + 1);
+      ++fits;
+      divided.divide(pieces.pieces, pieces.count, pieces.normals, options.smoothing,
+                     subProgress(options.progress, from, from + 0.1 / (kMostMoves + 1)));
       return divided;
     };
     PointSurface divided = divide();
@@ -116,7 +129,7 @@ SharpSurface divideSurface(const PointSurface& whole, double angle, double smoot
     }
     const CreaseNetwork network = std::move(result.network);
     result.network = {};
-    if (round == 0 && !hasSides && !network.opposed.empty()) {
+    if (round == 0 && !options.hasSides && !network.opposed.empty()) {
       turnPieces(network, pieces);
       continue;
     }
@@ -313,7 +326,9 @@ PartMesh SharpFronts::meshPiece(std::uint32_t piece, const PieceLoops& loops, do
     options.longest = std::max(options.longest, loops.longest);
     found.front = advanceFront(front, loops.start, options);
     found.missed = countMissed(found.front, surface_, part, lengths_, found.scale);
-    if (found.isComplete()) return found;
+    // A hole is filled where a curve of the piece was not found, too.
+    if (found.isComplete() && found.front.filled == 0) return found;
+    found.missed += found.front.filled;
     if (found.missed < best.missed) best = std::move(found);
   }
   return best;
@@ -337,7 +352,6 @@ bool SharpFronts::join(const std::vector<PartMesh>& fronts, std::vector<PieceLoo
       for (std::size_t k = 0; k < 3; ++k)
         if (!sides.insert({own[k], own[(k + 1) % 3]}).second) return false;
     }
-    mesh.filled += front.filled;
   }
   for (const auto& [curve, vertices] : outline.vertices)
     for (std::size_t k = 0; k < vertices.size(); ++k) {

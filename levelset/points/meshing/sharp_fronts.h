@@ -16,15 +16,23 @@ struct SharpSurface {
   Pieces pieces;
   std::optional<PointSurface> divided;  ///< empty: no part has two pieces
   CreaseNetwork network;
+  std::size_t guessed = 0;  ///< parts whose outside is a guess
+};
+
+struct SharpOptions {
+  double angle;      ///< least angle between the normals at a sharp edge, radians
+  double smoothing;  ///< width of the weight of a fit, point spacings
+  /// The normals of the cloud gave the sides of the surface. Else those of sharp wedges may be
+  /// wrong, and normals that keep sharp edges are computed.
+  bool hasSides = false;
+  std::size_t maxMemory = kNoMemoryLimit;
+  Progress progress = {};
 };
 
 /// Divides a surface at its sharp edges. Pieces whose common curve is not found as a whole are
 /// joined again, so that their edge is rounded.
-/// @param angle  radians
-/// @param hasSides  the normals of the cloud gave the sides of the surface. Else those of sharp
-///        wedges may be wrong, and normals that keep sharp edges are computed.
-[[nodiscard]] SharpSurface divideSurface(const PointSurface& whole, double angle, double smoothing,
-                                         bool hasSides, const Progress& progress);
+/// @throws ResourceLimit, Cancelled
+[[nodiscard]] SharpSurface divideSurface(const PointSurface& whole, const SharpOptions& options);
 
 /// Meshes the pieces of a divided part by fronts that start at its sharp edges. The pieces share
 /// the vertices of these edges.

@@ -158,7 +158,8 @@ void PointSurface::fitPoints(double smoothing, const std::vector<bool>& isLeftOu
 }
 
 void PointSurface::divide(std::span<const std::uint32_t> pieces, std::size_t count,
-                          std::span<const V3d> normals, double smoothing) {
+                          std::span<const V3d> normals, double smoothing,
+                          const Progress& progress) {
   std::vector<std::uint32_t> first(partCount_, kNone);
   std::vector<bool> isDivided(partCount_, false), isLeftOut(size(), true);
   for (std::size_t i = 0; i < size(); ++i) {
@@ -180,7 +181,7 @@ void PointSurface::divide(std::span<const std::uint32_t> pieces, std::size_t cou
   }
   graph_ = std::move(cut);
   // Beyond the points, polynomials of high degree would swing with the noise.
-  fitPoints(smoothing, isLeftOut, fitHeightsByPrediction, {});
+  fitPoints(smoothing, isLeftOut, fitHeightsByPrediction, progress);
   for (std::size_t i = 0; i < size(); ++i) {
     if (isLeftOut[i]) continue;
     normals_[i] = normals[i];

@@ -61,8 +61,9 @@ class PointSurface {
   /// divided parts get a polynomial that is fitted to points of their own piece. Borders stay.
   /// @param pieces   number of the piece of each point; kNone for points without a part
   /// @param normals  outwards, on the side of the piece
+  /// @throws Cancelled
   void divide(std::span<const std::uint32_t> pieces, std::size_t count,
-              std::span<const Imath::V3d> normals, double smoothing);
+              std::span<const Imath::V3d> normals, double smoothing, const Progress& progress = {});
 
   /// Points at different positions, in the order of a search tree.
   [[nodiscard]] std::size_t size() const { return search_.size(); }

@@ -131,7 +131,9 @@ TEST_F(Docs, PipelinesRun) {
   EXPECT_EQ(holes.code, 0) << holes.err;
   for (const char* file : {"holes.vdb", "holes.ply", "holes.png"})
     EXPECT_TRUE(exists(file)) << file;
-  const auto m = nlohmann::json::parse(levelsmith("read holes.vdb ! measure --json").out);
+  const auto measured = levelsmith("read holes.vdb ! measure --json");
+  ASSERT_EQ(measured.code, 0) << measured.err;
+  const auto m = nlohmann::json::parse(measured.out);
   EXPECT_EQ(m["euler"], 2 - 2 * 10);  // ten holes
 
   std::filesystem::copy_file(folder_ / "holes.ply", folder_ / "other.ply");

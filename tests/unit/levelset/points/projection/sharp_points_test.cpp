@@ -271,15 +271,27 @@ TEST(SharpPoints, KeepABorderBesideASharpEdge) {
 }
 
 TEST(SharpPoints, HaveTheSameBitsForAnyNumberOfThreads) {
-  PointCloud cloud = sharp_points::cylinder(1500);
-  projected_points::addNoise(cloud, 0.005);
-  const auto run = [&](std::size_t threads) {
-    return support::onThreads(threads,
-                              [&] { return pointsToMesh(cloud, {.sharpAngle = kAngle}).mesh; });
+  PointCloud cylinder = sharp_points::cylinder(1500);
+  projected_points::addNoise(cylinder, 0.005);
+  PointCloud cubes = pointsOf(sharp_points::cubeMesh(), 1500);
+  projected_points::addNoise(cubes, 0.002);
+  for (std::size_t i = 0, count = cubes.size(); i < count; ++i)
+    cubes.positions.push_back(cubes.positions[i] + V3d(3, 0, 0));
+  const auto expectSame = [](const PointCloud& cloud, std::size_t pieces, std::size_t curves,
+                             std::size_t corners) {
+    const auto run = [&](std::size_t threads) {
+      return support::onThreads(threads,
+                                [&] { return pointsToMesh(cloud, {.sharpAngle = kAngle}); });
+    };
+    const PointsToMeshResult one = run(1), four = run(4);
+    expectSharp(one.report, pieces, curves, corners);
+    EXPECT_EQ(one.mesh.positions, four.mesh.positions);
+    EXPECT_EQ(one.mesh.triangles, four.mesh.triangles);
+    EXPECT_EQ(one.report.sharpLength, four.report.sharpLength);
+    EXPECT_EQ(one.report.roundedPairs, four.report.roundedPairs);
   };
-  const TriMesh one = run(1), four = run(4);
-  EXPECT_EQ(one.positions, four.positions);
-  EXPECT_EQ(one.triangles, four.triangles);
+  expectSame(cylinder, 3, 2, 0);
+  expectSame(cubes, 12, 24, 16);
 }
 
 TEST(SharpPoints, RefuseAnglesOutsideTheirRange) {
