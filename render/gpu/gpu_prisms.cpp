@@ -253,8 +253,7 @@ class PrismRun {
     if (bytes > static_cast<std::size_t>(most))
       throw levelset::ResourceLimit(
           fmt::format("a table of {} MB does not fit into a storage block of {} MB, the limit of "
-                      "{}; use larger "
-                      "voxels, or convert the mesh on the processor",
+                      "{}; use larger voxels, or convert the mesh on the processor",
                       bytes >> 20, most >> 20, context_.description()));
     gl.CreateBuffers(1, &buffers_[binding]);
     gl.NamedBufferData(buffers_[binding], static_cast<GLsizeiptr>(bytes), data, GL_STATIC_DRAW);
@@ -275,9 +274,8 @@ void requireSmall(const PrismTables& tables) {
                 tables.blocks.size() / 5 * BlockDistances::kPoints}) < kMost)
     return;
   throw levelset::ResourceLimit(
-      "the mesh or its band is too large for the graphics driver; use larger voxels, or convert "
-      "the "
-      "mesh on the processor");
+      "the mesh or its band has more than 2^31 numbers; use larger voxels, or convert the mesh on "
+      "the processor");
 }
 
 void requireClosed(const levelset::convert::MeshTopology& topology) {

@@ -113,20 +113,16 @@ Operator meshPointsOperator() {
       .group = "Points",
       .summary = "turn the points of a surface into a triangle mesh, without a level set",
       .details =
-          "Polynomials are fitted to the neighbours of each point along the surface. An advancing "
-          "front covers their blend with nearly equilateral triangles. Borders stay open. Edges "
-          "are "
-          "shorter where the surface bends more, but not below the spacing of the points. Normals "
-          "are not needed. Given ones decide on the side; it is an error if more than 10 % of them "
-          "oppose their neighbours. Raise --smoothing for noise. Sharp edges are rounded over "
-          "about "
-          "a spacing. With --sharp they are kept, and so are corners. Polynomials then are fitted "
-          "on "
-          "each side of a sharp edge, and a front starts from the edges around each smooth piece. "
-          "An edge that fades out, meets a border or lies in noise above a tenth of the spacing "
-          "may "
-          "be rounded. A mesh that misses points or has "
-          "holes is an error without --accept-holes. The action needs a build with CGAL.",
+          "Polynomials are fitted to the neighbours of each point along the surface. An "
+          "advancing front covers their blend with nearly equilateral triangles. Borders stay "
+          "open. Edges are shorter where the surface bends more, but not below the spacing of "
+          "the points. Normals are not needed. Given ones decide on the side; it is an error if "
+          "more than 10 % of them oppose their neighbours. Raise --smoothing for noise. Sharp "
+          "edges are rounded over about a spacing. With --sharp they are kept, and so are "
+          "corners. Polynomials then are fitted on each side of a sharp edge, and a front starts "
+          "from the edges around each smooth piece. An edge that fades out, meets a border or "
+          "lies in noise above a tenth of the spacing may be rounded. A mesh that misses points "
+          "or has holes is an error without --accept-holes. The action needs a build with CGAL.",
       .example =
           "levelsmith sphere --radius 1 --voxel 0.05 ! mesh ! sample --count 2000 ! mesh-points ! "
           "write ball.ply",
