@@ -32,6 +32,7 @@ function(levelsmith_module name)
   cmake_parse_arguments(ARG "" "" "HEADERS;PUBLIC;PRIVATE" ${ARGN})
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
   add_library(${name} STATIC ${sources})
+  levelsmith_unity_groups(${name})
   add_library(Levelsmith::${name} ALIAS ${name})
   target_compile_features(${name} PUBLIC cxx_std_20)
   set_target_properties(${name} PROPERTIES

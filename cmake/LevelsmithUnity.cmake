@@ -1,0 +1,31 @@
+# levelsmith_unity_groups(TARGET)
+#
+# Groups the sources of a unity build by folder. With batches of a fixed size, a new source moves
+# all sources after it to other batches, and everything is compiled again. A group ends where the
+# folder changes, once it has 10 sources, so a new source changes one or two groups.
+function(levelsmith_unity_groups target)
+  if(NOT CMAKE_UNITY_BUILD)
+    return()
+  endif()
+  set(least 10)
+  set(most 18)
+  get_target_property(sources ${target} SOURCES)
+  list(FILTER sources INCLUDE REGEX "\\.cpp$")
+  list(SORT sources)
+  set(count 0)
+  set(folder "")
+  foreach(source IN LISTS sources)
+    get_filename_component(own "${source}" DIRECTORY)
+    if((count GREATER_EQUAL least AND NOT own STREQUAL folder) OR count GREATER_EQUAL most)
+      set(count 0)
+    endif()
+    if(count EQUAL 0)
+      # Named by the first source, so that the names of later groups do not change.
+      get_filename_component(first "${source}" NAME_WE)
+    endif()
+    math(EXPR count "${count} + 1")
+    set(folder "${own}")
+    set_source_files_properties("${source}" TARGET_DIRECTORY ${target} PROPERTIES UNITY_GROUP "${first}")
+  endforeach()
+  set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
+endfunction()
