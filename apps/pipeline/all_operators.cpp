@@ -1,6 +1,7 @@
 #include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/flow/morph_action.h"
 #include "apps/pipeline/operators/level_set_operator.h"
+#include "apps/pipeline/operators/solids/adaptive_actions.h"
 #include "apps/pipeline/operators/solids/mesh_action.h"
 #include "apps/pipeline/registry/operator.h"
 #include "levelset/advection/advect.h"
@@ -8,7 +9,6 @@
 #include "levelset/convert/closest_triangles.h"
 #include "levelset/convert/surface_band.h"
 #include "levelset/csg/blend.h"
-#include "levelset/csg/csg.h"
 #include "levelset/csg/smooth_csg.h"
 #include "levelset/curvature_flow/curvature_flow.h"
 #include "levelset/curvature_flow/smooth.h"
@@ -19,7 +19,6 @@
 #include "levelset/evolve/evolve.h"
 #include "levelset/hamilton_jacobi/pde_redistance.h"
 #include "levelset/offset/morphology.h"
-#include "levelset/offset/offset.h"
 #include "levelset/shapes/shapes.h"
 
 namespace pipeline {
@@ -34,6 +33,7 @@ std::vector<Operator> allOperators() {
       levelSetOperator<levelset::CylinderOperator>(),
       levelSetOperator<levelset::CapsuleOperator>(),
       conversionOperator(),
+      toBandOperator(),
       levelSetOperator<levelset::SurfaceBandOperator>(),
       levelSetOperator<levelset::ClosestTriangleOperator>(),
       meshOperator(),
@@ -48,14 +48,14 @@ std::vector<Operator> allOperators() {
       outliersOperator(),
       meshPointsOperator(),
       thinOperator(),
-      levelSetOperator<levelset::UnionOperator>(),
-      levelSetOperator<levelset::IntersectionOperator>(),
-      levelSetOperator<levelset::DifferenceOperator>(),
+      unionOperator(),
+      intersectionOperator(),
+      differenceOperator(),
       levelSetOperator<levelset::BlendOperator>(),
       levelSetOperator<levelset::SmoothUnionOperator>(),
       levelSetOperator<levelset::SmoothIntersectionOperator>(),
       levelSetOperator<levelset::SmoothDifferenceOperator>(),
-      levelSetOperator<levelset::OffsetOperator>(),
+      offsetOperator(),
       levelSetOperator<levelset::OpenOperator>(),
       levelSetOperator<levelset::CloseOperator>(),
       levelSetOperator<levelset::ShellOperator>(),

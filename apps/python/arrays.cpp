@@ -34,6 +34,18 @@ void requireRows(const py::array& array, const char* name, const char* kinds,
                                  shapeText(array), expected));
 }
 
+/// Positions or directions as doubles.
+py::array_t<double, py::array::c_style | py::array::forcecast> floatRows(const py::array& array,
+                                                                         const char* caller,
+                                                                         const char* name) {
+  const bool isFloat = array.dtype().kind() == 'f';
+  if (!isFloat || array.ndim() != 2 || array.shape(1) != 3)
+    throw InvalidInput(
+        fmt::format("{}: the array {} has shape {}; give shape (n, 3) of float32 or float64",
+                    caller, name, shapeText(array)));
+  return array;
+}
+
 /// Read-only numpy view of rows of numbers. The view keeps `owner` alive, which holds the rows.
 template <typename Row, typename T, std::size_t columns>
 py::object rowsView(const py::object& owner, const std::vector<Row>& rows) {
@@ -105,28 +117,33 @@ py::object cloudArray(const py::object& owner, const levelset::PointCloud& cloud
 }
 
 levelset::PointCloud cloudFromArrays(const py::array& positions, const py::object& normals) {
-  const auto rows = [](const py::array& array, const char* name) {
-    const bool isFloat = array.dtype().kind() == 'f';
-    if (!isFloat || array.ndim() != 2 || array.shape(1) != 3)
-      throw InvalidInput(fmt::format(
-          "PointCloud: the array {} has shape {}; give shape (n, 3) of float32 or float64", name,
-          shapeText(array)));
-    return py::array_t<double, py::array::c_style | py::array::forcecast>(array);
-  };
-  const auto places = rows(positions, "positions");
+  const auto places = floatRows(positions, "PointCloud", "positions");
   levelset::PointCloud cloud;
   if (positions.itemsize() < 8) cloud.precision = levelset::CoordinatePrecision::Float;
   const double* p = places.data();
   for (py::ssize_t i = 0; i < places.shape(0); ++i, p += 3)
     cloud.positions.emplace_back(p[0], p[1], p[2]);
   if (!normals.is_none()) {
-    const auto directions = rows(py::array(normals), "normals");
+    const auto directions = floatRows(py::array(normals), "PointCloud", "normals");
     const double* n = directions.data();
     for (py::ssize_t i = 0; i < directions.shape(0); ++i, n += 3)
       cloud.normals.emplace_back(Imath::V3d(n[0], n[1], n[2]));
   }
   levelset::withContext("PointCloud", [&] { levelset::requirePoints(cloud); });
   return cloud;
+}
+
+py::array_t<double> distancesAt(const levelset::AdaptiveField& field, const py::array& points) {
+  const auto places = floatRows(points, "distances", "points");
+  const py::ssize_t count = places.shape(0);
+  py::array_t<double> result(count);
+  const double* p = places.data();
+  double* distance = result.mutable_data();
+  const py::gil_scoped_release release;
+  const levelset::AdaptiveSampler sampler(field);
+  for (py::ssize_t i = 0; i < count; ++i, p += 3)
+    distance[i] = sampler.value(V3d(p[0], p[1], p[2]));
+  return result;
 }
 
 DenseBand bandArray(const levelset::NarrowBand& band, const std::optional<Imath::Box3d>& box,

@@ -41,6 +41,13 @@ namespace python {
                                           const levelset::PointCloud& cloud,
                                           const std::string& list);
 
+/// Samples an adaptive field.
+/// @param points  n × 3 floats, world units
+/// @return n distances, float64; NaN for points that are not finite
+/// @throws levelset::InvalidInput for other shapes and types
+[[nodiscard]] pybind11::array_t<double> distancesAt(const levelset::AdaptiveField& field,
+                                                    const pybind11::array& points);
+
 /// Signed distances at the grid points of a box.
 struct DenseBand {
   pybind11::array_t<float> values;

@@ -48,6 +48,8 @@ const char* className(Kind kind) {
       return "Scan";
     case Kind::Points:
       return "PointCloud";
+    case Kind::Adaptive:
+      return "AdaptiveField";
   }
   return "";
 }
@@ -384,6 +386,16 @@ PYBIND11_MODULE(_core, module) {
                delete static_cast<pipeline::Value*>(held);
              });
              return python::cloudArray(owner, value.cloud(), list);
+           })
+      .def("adaptive_figures",
+           [](const Handle& node) {
+             const pipeline::Value value = valueOf(node);
+             return py::make_tuple(value.adaptive().tolerance(), value.adaptive().leafCount());
+           })
+      .def("distances",
+           [](const Handle& node, const py::array& points) {
+             const pipeline::Value value = valueOf(node);
+             return python::distancesAt(value.adaptive(), points);
            })
       .def("band_array", [](const Handle& node, const py::object& box) {
         const pipeline::Value value = valueOf(node);

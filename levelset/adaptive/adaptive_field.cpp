@@ -124,4 +124,8 @@ V3d AdaptiveSampler::gradient(const V3d& world) const {
   return result / (local.place.leaf.edge() * impl_->tree->unit);
 }
 
+double AdaptiveSampler::leafRadius(const V3d& world) const {
+  return 0.5 * std::sqrt(3.0) * impl_->locate(world).place.leaf.edge() * impl_->tree->unit;
+}
+
 }  // namespace levelset

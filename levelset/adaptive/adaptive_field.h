@@ -61,6 +61,9 @@ class AdaptiveSampler {
   /// Gradient of the interpolant in the leaf of the position. It jumps between leaves. Beyond the
   /// root, that of the nearest position in it. NaN for a position that is not finite.
   [[nodiscard]] Imath::V3d gradient(const Imath::V3d& world) const;
+  /// Half of the diagonal of the leaf of a position, world units; beyond the root, that of the
+  /// nearest position in it.
+  [[nodiscard]] double leafRadius(const Imath::V3d& world) const;
 
  private:
   struct Impl;

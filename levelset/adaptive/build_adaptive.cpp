@@ -12,6 +12,7 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -128,7 +129,11 @@ class Builder {
     V3i at;
     float value;
   };
-  [[nodiscard]] std::vector<Corner> wrongCorners(const std::vector<CornerValues>& values);
+  [[nodiscard]] Corner cornerOf(std::uint32_t block, int octant, int corner) const;
+  [[nodiscard]] std::vector<Corner> testedCorners(std::uint32_t first) const;
+  [[nodiscard]] std::vector<Corner> wrongCorners(const std::vector<CornerValues>& values,
+                                                 const std::vector<std::uint32_t>& blocks) const;
+  void measureHanging(const std::vector<CornerValues>& values);
   [[nodiscard]] std::vector<CellKey> leavesWithout(std::vector<Corner>& corners,
                                                    bool isWrong) const;
   void splitAll(const std::vector<CellKey>& leaves);
@@ -177,16 +182,16 @@ double Builder::errorOf(FineLattice& lattice, const V3i& low, double limit) cons
   return std::max(largest, errorOnSurface(lattice, low, corners, limit));
 }
 
-/// Largest interpolated value at the visited points of the surface in a child.
+/// Largest error of the interpolant at the visited points of the surface in a child.
 double Builder::errorOnSurface(const FineLattice& lattice, const V3i& low,
                                const std::array<double, 8>& corners, double limit) const {
   const Imath::Box3d box(lattice.position(low), lattice.position(low + V3i(2)));
   double largest = 0;
-  distance_.visitSurface(box, [&](const V3d& p) {
+  distance_.visitSurface(box, [&](const V3d& p, double value) {
     V3d at;
     for (int axis = 0; axis < 3; ++axis)
       at[axis] = std::clamp((p[axis] - box.min[axis]) / (box.max[axis] - box.min[axis]), 0.0, 1.0);
-    largest = std::max(largest, std::abs(trilinear(corners, at)));
+    largest = std::max(largest, std::abs(trilinear(corners, at) - value));
     return largest <= limit;
   });
   return largest;
@@ -264,35 +269,27 @@ void Builder::divide(std::uint32_t first, const Progress& progress) {
   }
 }
 
-/// Finds the corners of leaves within the half width that larger leaves change by more than the
+/// Finds the corners of tested leaves in some blocks that larger leaves change by more than the
 /// limit.
-std::vector<Builder::Corner> Builder::wrongCorners(const std::vector<CornerValues>& values) {
+std::vector<Builder::Corner> Builder::wrongCorners(const std::vector<CornerValues>& values,
+                                                   const std::vector<std::uint32_t>& blocks) const {
   using Found = std::pair<std::uint64_t, Corner>;
   tbb::enumerable_thread_specific<std::vector<Found>> found;
-  tbb::enumerable_thread_specific<double> largest(0.0);
-  tbb::parallel_for(std::size_t{0}, values.size(), [&](std::size_t n) {
-    const CellKey parent = tree_.octree.parent(static_cast<std::uint32_t>(n));
+  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t k) {
+    const std::uint32_t n = blocks[k];
     for (int octant = 0; octant < 8; ++octant) {
       if (!(tested_[n] >> octant & 1)) continue;
       for (int corner = 0; corner < 8; ++corner) {
         const std::size_t i = AdaptiveTree::latticeIndex(octant, corner);
-        const double change = std::abs(double(values[n][i]) - double(tree_.values[n][i]));
-        if (change <= limit_) {
-          largest.local() = std::max(largest.local(), change);
-          continue;
-        }
-        const CellKey leaf = parent.child(octant);
-        const V3i at = leaf.low() + V3i(corner & 1, corner >> 1 & 1, corner >> 2) *
-                                        static_cast<int>(leaf.edge());
-        const std::uint64_t key = static_cast<std::uint64_t>(at.x) |
-                                  static_cast<std::uint64_t>(at.y) << 20 |
-                                  static_cast<std::uint64_t>(at.z) << 40;
-        found.local().emplace_back(key, Corner{at, tree_.values[n][i]});
+        if (std::abs(double(values[n][i]) - double(tree_.values[n][i])) <= limit_) continue;
+        const Corner wrong = cornerOf(n, octant, corner);
+        found.local().emplace_back(static_cast<std::uint64_t>(wrong.at.x) |
+                                       static_cast<std::uint64_t>(wrong.at.y) << 20 |
+                                       static_cast<std::uint64_t>(wrong.at.z) << 40,
+                                   wrong);
       }
     }
   });
-  figures_.hangingError = 0;
-  for (const double one : largest) figures_.hangingError = std::max(figures_.hangingError, one);
   std::vector<Found> all;
   for (const std::vector<Found>& some : found) all.insert(all.end(), some.begin(), some.end());
   std::sort(all.begin(), all.end(),
@@ -349,20 +346,58 @@ void Builder::splitAll(const std::vector<CellKey>& leaves) {
 }
 
 void Builder::connect(const Progress& progress) {
+  std::vector<CornerValues> values = continuousValues(tree_);
+  std::vector<std::uint32_t> blocks(values.size());
+  std::iota(blocks.begin(), blocks.end(), 0u);
   while (true) {
     report(progress, 0);
-    std::vector<CornerValues> values = continuousValues(tree_);
-    std::vector<Corner> corners = wrongCorners(values);
-    if (corners.empty()) {
-      tree_.values = std::move(values);
-      return;
+    std::vector<Corner> corners = wrongCorners(values, blocks);
+    if (corners.empty()) break;
+    const auto before = static_cast<std::uint32_t>(tree_.octree.blockCount());
+    // Divide each leaf at least once, then until the leaf at the corner interpolates its value. The
+    // new leaves have new corners on larger leaves.
+    for (bool isWrong = true; !corners.empty();) {
+      const auto first = static_cast<std::uint32_t>(tree_.octree.blockCount());
+      for (; !corners.empty(); isWrong = false) splitAll(leavesWithout(corners, isWrong));
+      divide(first, {});
+      corners = testedCorners(first);
     }
-    const auto first = static_cast<std::uint32_t>(tree_.octree.blockCount());
-    // Divide each leaf at least once, then until the leaf at the corner interpolates its value.
-    for (bool isWrong = true; !corners.empty(); isWrong = false)
-      splitAll(leavesWithout(corners, isWrong));
-    divide(first, {});
+    blocks = updateValues(tree_, before, values);
   }
+  measureHanging(values);
+  tree_.values = std::move(values);
+}
+
+/// Finds the largest change of a corner of a tested leaf.
+void Builder::measureHanging(const std::vector<CornerValues>& values) {
+  figures_.hangingError = 0;
+  for (std::size_t n = 0; n < values.size(); ++n)
+    for (int octant = 0; octant < 8; ++octant)
+      if (tested_[n] >> octant & 1)
+        for (int corner = 0; corner < 8; ++corner) {
+          const std::size_t i = AdaptiveTree::latticeIndex(octant, corner);
+          figures_.hangingError = std::max(
+              figures_.hangingError, std::abs(double(values[n][i]) - double(tree_.values[n][i])));
+        }
+}
+
+/// Returns the corners of the tested leaves in the blocks from a number on, with exact values. A
+/// corner may come several times.
+std::vector<Builder::Corner> Builder::testedCorners(std::uint32_t first) const {
+  std::vector<Corner> corners;
+  for (std::size_t n = first; n < tree_.octree.blockCount(); ++n)
+    for (int octant = 0; octant < 8; ++octant)
+      if (tested_[n] >> octant & 1)
+        for (int corner = 0; corner < 8; ++corner)
+          corners.push_back(cornerOf(static_cast<std::uint32_t>(n), octant, corner));
+  return corners;
+}
+
+Builder::Corner Builder::cornerOf(std::uint32_t block, int octant, int corner) const {
+  const CellKey leaf = tree_.octree.parent(block).child(octant);
+  return {
+      leaf.low() + V3i(corner & 1, corner >> 1 & 1, corner >> 2) * static_cast<int>(leaf.edge()),
+      tree_.corner(block, octant, corner)};
 }
 
 /// Checks the options and places the root.

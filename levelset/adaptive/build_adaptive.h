@@ -27,11 +27,12 @@ class SignedDistance {
   /// Returns the distance of a position, negative inside. `known` does not change the result.
   /// Called from several threads at once.
   [[nodiscard]] virtual double at(const Imath::V3d& position, const Known& known) const = 0;
-  /// Visits points of the surface in a box, until `visit` returns false: the points where it may
-  /// leave its course between the points of a lattice. Without them, a large cell can miss a part
-  /// that is small beside it. None by default.
-  virtual void visitSurface(const Imath::Box3d& /*box*/,
-                            const std::function<bool(const Imath::V3d&)>& /*visit*/) const {}
+  /// Receives a point and its distance. Returns false to end a visit.
+  using Visit = std::function<bool(const Imath::V3d& point, double value)>;
+  /// Visits points on or near the surface in a box, where it may leave its course between the
+  /// points of a lattice. Without them, a large cell can miss a part that is small beside it. None
+  /// by default.
+  virtual void visitSurface(const Imath::Box3d& /*box*/, const Visit& /*visit*/) const {}
 };
 
 struct AdaptiveOptions {

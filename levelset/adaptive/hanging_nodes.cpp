@@ -82,7 +82,77 @@ void fill(const AdaptiveTree& tree, std::uint32_t block, std::vector<CornerValue
       }
 }
 
+/// Collects the blocks up to a level whose parents touch a cell.
+class Touching {
+ public:
+  Touching(const HashedOctree& octree, const CellKey& cell, int level,
+           std::vector<std::uint32_t>& blocks)
+      : octree_(octree),
+        low_(cell.low()),
+        high_(cell.low() + V3i(static_cast<int>(cell.edge()))),
+        level_(level),
+        blocks_(blocks) {
+    collect(octree.root());
+  }
+
+ private:
+  void collect(const CellKey& cell) {
+    const V3i low = cell.low(), high = low + V3i(static_cast<int>(cell.edge()));
+    for (int axis = 0; axis < 3; ++axis)
+      if (low[axis] > high_[axis] || high[axis] < low_[axis]) return;
+    const std::uint32_t block = octree_.block(cell);
+    if (block == HashedOctree::kNone) return;
+    if (cell.level <= level_) blocks_.push_back(block);
+    if (cell.level > 1)
+      for (int octant = 0; octant < 8; ++octant) collect(cell.child(octant));
+  }
+
+  const HashedOctree& octree_;
+  V3i low_, high_;
+  int level_;
+  std::vector<std::uint32_t>& blocks_;
+};
+
+void sortUnique(std::vector<std::uint32_t>& blocks) {
+  std::sort(blocks.begin(), blocks.end());
+  blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
+}
+
 }  // namespace
+
+std::vector<std::uint32_t> updateValues(const AdaptiveTree& tree, std::uint32_t first,
+                                        std::vector<CornerValues>& values) {
+  const HashedOctree& octree = tree.octree;
+  const auto count = static_cast<std::uint32_t>(octree.blockCount());
+  values.resize(count);
+  // Blocks to compute, by the level of their parent. A block depends on larger leaves only, and on
+  // the block of its parent.
+  std::vector<std::vector<std::uint32_t>> levels(static_cast<std::size_t>(octree.depth()) + 1);
+  const auto add = [&](const CellKey& cell, int level) {
+    std::vector<std::uint32_t> blocks;
+    Touching(octree, cell, level, blocks);
+    for (const std::uint32_t block : blocks)
+      levels[static_cast<std::size_t>(octree.parent(block).level)].push_back(block);
+  };
+  for (std::uint32_t block = first; block < count; ++block)
+    add(octree.parent(block), octree.parent(block).level);
+  std::vector<std::uint32_t> computed;
+  for (std::size_t level = levels.size(); level-- > 0;) {
+    std::vector<std::uint32_t>& blocks = levels[level];
+    sortUnique(blocks);
+    std::vector<char> isChanged(blocks.size(), 0);
+    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t k) {
+      const CornerValues before = values[blocks[k]];
+      fill(tree, blocks[k], values);
+      isChanged[k] = before != values[blocks[k]];
+    });
+    for (std::size_t k = 0; k < blocks.size(); ++k)
+      if (isChanged[k] && level > 0) add(octree.parent(blocks[k]), static_cast<int>(level) - 1);
+    computed.insert(computed.end(), blocks.begin(), blocks.end());
+  }
+  sortUnique(computed);
+  return computed;
+}
 
 std::vector<CornerValues> continuousValues(const AdaptiveTree& tree) {
   std::vector<CornerValues> values(tree.values.size());

@@ -2,6 +2,7 @@
 
 // Internal header of levelset: public headers must not include it.
 
+#include <cstdint>
 #include <vector>
 
 #include "levelset/adaptive/adaptive_tree.h"
@@ -12,5 +13,12 @@ namespace levelset {
 /// of a larger leaf gets the interpolated value of that leaf [Sigg06, 3.4.1]. Blocks that share a
 /// corner get the same bits.
 [[nodiscard]] std::vector<CornerValues> continuousValues(const AdaptiveTree& tree);
+
+/// Updates these values after leaves of the tree were split.
+/// @param first  number of the first new block
+/// @param values  values of the tree before; gets those of the new blocks too
+/// @return the blocks whose values may have changed, ascending
+std::vector<std::uint32_t> updateValues(const AdaptiveTree& tree, std::uint32_t first,
+                                        std::vector<CornerValues>& values);
 
 }  // namespace levelset

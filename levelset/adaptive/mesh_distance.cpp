@@ -219,13 +219,12 @@ void MeshDistance::measureAmbiguity(const convert::WindingField& given) {
   certificate_.ambiguousShare = area > 0 ? ambiguous / area : 1;
 }
 
-void MeshDistance::visitSurface(const Imath::Box3d& box,
-                                const std::function<bool(const V3d&)>& visit) const {
+void MeshDistance::visitSurface(const Imath::Box3d& box, const Visit& visit) const {
   const Imath::Box3d local(box.min / voxel_ - origin_, box.max / voxel_ - origin_);
   const V3d centre = (local.min + local.max) * 0.5;
   const double reach = (local.max - centre).length2();
   bool goesOn = true;
-  const auto pass = [&](const V3d& p) { goesOn = goesOn && visit((p + origin_) * voxel_); };
+  const auto pass = [&](const V3d& p) { goesOn = goesOn && visit((p + origin_) * voxel_, 0); };
   search_.visit(centre, reach, [&](const TriangleItem& item) {
     for (std::size_t k = 0; k < 3 && goesOn; ++k) {
       const V3d &a = item.corners[k], &b = item.corners[(k + 1) % 3];

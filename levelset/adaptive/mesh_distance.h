@@ -28,8 +28,7 @@ class MeshDistance final : public SignedDistance {
 
   [[nodiscard]] double at(const Imath::V3d& position, const Known& known) const override;
   /// Visits the vertices in the box, and the ends and the middle of each edge in it.
-  void visitSurface(const Imath::Box3d& box,
-                    const std::function<bool(const Imath::V3d&)>& visit) const override;
+  void visitSurface(const Imath::Box3d& box, const Visit& visit) const override;
   /// Certificate of the mesh. Its ambiguous share is a share of the area.
   [[nodiscard]] const SignCertificate& certificate() const { return certificate_; }
 

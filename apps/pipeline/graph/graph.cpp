@@ -23,6 +23,10 @@ std::string mismatch(const Operator& op, std::size_t index, Kind found,
     remedy = "; put 'mesh' before it";
   if (found == Kind::Surface)
     remedy = "; it has no inside, so only patches and 'texture --alone' can use it";
+  if (found == Kind::Adaptive)
+    remedy = std::find(allowed.begin(), allowed.end(), Kind::Band) != allowed.end()
+                 ? "; put 'to-band' before it"
+                 : "; put 'mesh' or 'to-band' before it";
   if (found == Kind::Patch) remedy = "; 'texture' builds a level set from it";
   if (found == Kind::Scene) remedy = "; 'render' draws it, 'write' saves it as .json";
   std::string kinds;

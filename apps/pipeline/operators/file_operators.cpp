@@ -186,14 +186,15 @@ void validateWrite(const Invocation& in) {
   if (held != kind && !isCloud && !(held == Kind::Field && kind == Kind::Band)) {
     throw UsageError(
         fmt::format("write: a {} cannot be written as '{}'; {}", kindName(held), formatName(in),
-                    held == Kind::Band     ? "put 'mesh' before it, or write .vdb"
-                    : held == Kind::Field  ? "write .vdb"
-                    : held == Kind::Patch  ? "write .patch, or put 'mesh' before it"
-                    : held == Kind::Scene  ? "write .json"
-                    : held == Kind::Volume ? "put 'isosurface' before it"
-                    : held == Kind::Points ? "write .ply, .obj, .xyz, .csv, .pts or .vdb"
-                    : kind == Kind::Points ? "put 'sample' before it, or write .ply"
-                                           : "put 'level-set' before it, or write .ply"));
+                    held == Kind::Band       ? "put 'mesh' before it, or write .vdb"
+                    : held == Kind::Field    ? "write .vdb"
+                    : held == Kind::Patch    ? "write .patch, or put 'mesh' before it"
+                    : held == Kind::Scene    ? "write .json"
+                    : held == Kind::Volume   ? "put 'isosurface' before it"
+                    : held == Kind::Adaptive ? "put 'mesh' or 'to-band' before it"
+                    : held == Kind::Points   ? "write .ply, .obj, .xyz, .csv, .pts or .vdb"
+                    : kind == Kind::Points   ? "put 'sample' before it, or write .ply"
+                                             : "put 'level-set' before it, or write .ply"));
   }
   if (!levelset::isBandFormat(formatName(in)) && in.given("name"))
     throw UsageError(fmt::format(
@@ -335,7 +336,8 @@ Operator writeOperator() {
                 "name of the grid in a .vdb or .nvdb; a field keeps its own name by default, and "
                 "points get the name 'points'",
             .fallback = "surface"}},
-      .operands = {{Kind::Mesh, Kind::Band, Kind::Field, Kind::Patch, Kind::Scene, Kind::Points}},
+      .operands = {{Kind::Mesh, Kind::Band, Kind::Field, Kind::Patch, Kind::Scene, Kind::Points,
+                    Kind::Adaptive}},
       .flow = Flow::PassesThrough,
       .run = write,
       .cost = costPerVoxel(50, 0, 20),

@@ -7,8 +7,11 @@
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/json_output.h"
+#include "apps/pipeline/operators/solids/adaptive_actions.h"
 #include "apps/pipeline/operators/volume_params.h"
 #include "apps/pipeline/registry/invocation.h"
+#include "levelset/adaptive/adaptive_to_mesh.h"
+#include "levelset/adaptive/compare_adaptive.h"
 #include "levelset/error.h"
 #include "levelset/files/band_file.h"
 #include "levelset/inspect/check.h"
@@ -37,9 +40,17 @@ std::string coordinates(const Imath::V3d& v) {
 
 Value measure(Invocation& in) {
   const Value& value = in.operands[0];
-  const levelset::Measurement m = value.kind() == Kind::Band
-                                      ? levelset::measure(value.band(), in.progress)
-                                      : levelset::measure(value.mesh(), in.progress);
+  levelset::Measurement m;
+  if (value.kind() == Kind::Band)
+    m = levelset::measure(value.band(), in.progress);
+  else if (value.kind() == Kind::Mesh)
+    m = levelset::measure(value.mesh(), in.progress);
+  else
+    m = levelset::measure(
+        levelset::adaptiveToMesh(
+            value.adaptive(),
+            {.maxMemory = in.maxMemory, .progress = levelset::subProgress(in.progress, 0, 0.5)}),
+        levelset::subProgress(in.progress, 0.5, 1));
   Json json;
   json["volume"] = m.volume;
   json["area"] = m.area;
@@ -57,6 +68,10 @@ Value measure(Invocation& in) {
     json["inertia"].push_back(
         toJson(Imath::V3d(m.inertia[i][0], m.inertia[i][1], m.inertia[i][2])));
   json["mean_curvature"] = m.meanCurvature;
+  if (value.kind() == Kind::Adaptive) {
+    json["cells"] = value.adaptive().leafCount();
+    json["tolerance"] = value.adaptive().tolerance();
+  }
   if (value.kind() == Kind::Mesh) {
     const levelset::Manifoldness manifold = levelset::manifoldness(value.mesh());
     json["closed_manifold"] = manifold.isClosedManifold();
@@ -93,8 +108,11 @@ Value measure(Invocation& in) {
 }
 
 Value compare(Invocation& in) {
+  const levelset::CompareOptions options{.progress = in.progress};
   const levelset::Comparison c =
-      levelset::compare(in.band(0), in.band(1), {.progress = in.progress});
+      in.operands[0].kind() == Kind::Adaptive
+          ? levelset::compare(in.operands[0].adaptive(), in.operands[1].adaptive(), options)
+          : levelset::compare(in.band(0), in.band(1), options);
   Json json;
   json["hausdorff"] = c.hausdorff();
   json["hausdorff_a_to_b"] = c.hausdorffAtoB;
@@ -265,6 +283,13 @@ Json valueInfo(const Value& value, Invocation& in) {
     json["bytes"] = volume.memoryUse();
     json["mapped"] = volume.isMapped();
     json["hash"] = fmt::format("{:016x}", volume.contentHash());
+  } else if (value.kind() == Kind::Adaptive) {
+    const levelset::AdaptiveField& field = value.adaptive();
+    json["tolerance"] = field.tolerance();
+    json["width"] = field.halfWidth();
+    json["cells"] = field.leafCount();
+    json["bytes"] = field.memoryUse();
+    json["hash"] = fmt::format("{:016x}", field.contentHash());
   } else if (value.kind() == Kind::Points) {
     addCloud(json, value.cloud(), in);
   } else if (value.kind() == Kind::Scene) {
@@ -339,6 +364,11 @@ Value info(Invocation& in) {
   return in.operands.empty() ? Value(Plan{}) : in.operands[0];
 }
 
+std::optional<Cost> costOfCompare(Invocation& in) {
+  if (in.operands[0].kind() == Kind::Adaptive) return {};
+  return costPerVoxel(1500, 60)(in);
+}
+
 }  // namespace
 
 Operator measureOperator() {
@@ -355,7 +385,7 @@ Operator measureOperator() {
           "the circumscribed circle, and valence_six the share of vertices with six triangles.",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! measure --json",
       .params = {jsonParam()},
-      .operands = {{Kind::Band, Kind::Mesh}},
+      .operands = {{Kind::Band, Kind::Mesh, Kind::Adaptive}},
       .flow = Flow::PassesThrough,
       .run = measure,
       .cost = costPerVoxel(720, 130, 520),
@@ -372,7 +402,8 @@ Operator compareOperator() {
       .details =
           "Both solids stay on the stack. hausdorff is the larger of the two directed distances, "
           "chamfer the sum of the two means, symmetric_difference the volume inside exactly one of "
-          "the solids. The grids may differ.",
+          "the solids. The grids may differ. Two adaptive fields are compared by their meshes. An "
+          "adaptive field is compared with a level set after 'to-band'.",
       .example =
           "levelsmith sphere --radius 1 --voxel 0.05 ! sphere --radius 1 --center 0.1,0,0 "
           "--voxel 0.05 ! compare --tolerance 0.11",
@@ -382,10 +413,11 @@ Operator compareOperator() {
                       "largest accepted Hausdorff distance; if it is exceeded, the exit code is 5",
                   .range = Range::NonNegative},
                  jsonParam()},
-      .operands = {{Kind::Band}, {Kind::Band}},
+      .operands = {{Kind::Band, Kind::Adaptive}, {Kind::Band, Kind::Adaptive}},
       .flow = Flow::PassesThrough,
       .run = compare,
-      .cost = costPerVoxel(1500, 60),
+      .cost = costOfCompare,
+      .validate = requireOneKind,
       .usesStandardOutput = asksJson,
   };
 }
@@ -424,7 +456,7 @@ Operator infoOperator() {
                   .doc = "format of the file; default: by its extension"},
                  jsonParam()},
       .operands = {{Kind::Band, Kind::Mesh, Kind::Patch, Kind::Field, Kind::Surface, Kind::Scene,
-                    Kind::Volume, Kind::Points}},
+                    Kind::Volume, Kind::Points, Kind::Adaptive}},
       .operandsOptional = true,
       .flow = Flow::PassesThrough,
       .run = info,

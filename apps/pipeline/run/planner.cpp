@@ -64,7 +64,8 @@ double bytesOf(const std::optional<Plan>& plan, const RegionOfInterest& roi) {
   if (!plan) return 0;
   if (plan->kind == Kind::Mesh || plan->kind == Kind::Points) return plan->bytes();
   const bool isTold = (plan->kind == Kind::Band && plan->voxelSize > 0) ||
-                      plan->kind == Kind::Field || plan->kind == Kind::Volume;
+                      plan->kind == Kind::Field || plan->kind == Kind::Volume ||
+                      plan->kind == Kind::Adaptive;
   return isTold ? restricted(*plan, roi).bytes() : 0;
 }
 

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 
+#include "levelset/adaptive/adaptive_to_mesh.h"
 #include "levelset/error.h"
+#include "levelset/geometry/vertex_normals.h"
 
 namespace pipeline {
 
@@ -29,6 +31,8 @@ const char* kindName(Kind kind) {
       return "volume";
     case Kind::Points:
       return "point cloud";
+    case Kind::Adaptive:
+      return "adaptive field";
   }
   return "";
 }
@@ -56,7 +60,7 @@ double Plan::activeVoxels() const {
 }
 
 double Plan::bytes() const {
-  if (kind == Kind::Field || kind == Kind::Volume) return fieldBytes;
+  if (kind == Kind::Field || kind == Kind::Volume || kind == Kind::Adaptive) return fieldBytes;
   if (kind == Kind::Points) return points * pointBytes;
   // Three vertex indices for each triangle, and one position for every two triangles.
   if (kind == Kind::Mesh) return (3 * sizeof(std::uint32_t) + sizeof(Imath::V3d) / 2.0) * triangles;
@@ -91,6 +95,7 @@ Value::Value(levelset::Volume volume)
     : data_(std::make_shared<const levelset::Volume>(std::move(volume))) {}
 Value::Value(levelset::PointCloud cloud)
     : data_(std::make_shared<const levelset::PointCloud>(std::move(cloud))) {}
+Value::Value(levelset::AdaptiveField field) : data_(std::move(field)) {}
 Value::Value(Plan plan) : plan_(plan) {}
 
 Kind Value::kind() const {
@@ -109,6 +114,8 @@ Kind Value::kind() const {
       return Kind::Volume;
     case 7:
       return Kind::Points;
+    case 8:
+      return Kind::Adaptive;
     default:
       return plan_->kind;
   }
@@ -148,6 +155,10 @@ const levelset::PointCloud& Value::cloud() const {
   return *as<std::shared_ptr<const levelset::PointCloud>>(Kind::Points);
 }
 
+const levelset::AdaptiveField& Value::adaptive() const {
+  return as<levelset::AdaptiveField>(Kind::Adaptive);
+}
+
 const Plan& Value::plan() const {
   if (plan_) return *plan_;
   Plan plan;
@@ -184,6 +195,10 @@ const Plan& Value::plan() const {
       plan.points = static_cast<double>(cloud().size());
       plan.pointBytes = bytesPerPoint(cloud());
       break;
+    case Kind::Adaptive:
+      plan.bounds = adaptive().zeroSetBounds();
+      plan.fieldBytes = static_cast<double>(adaptive().memoryUse());
+      break;
     case Kind::Scene:
       plan.bounds = scene().scene.bounds();
       plan.bounds.extendBy(scene().scene.volumeBounds());
@@ -200,6 +215,17 @@ const Plan& Value::plan() const {
   return *plan_;
 }
 
+namespace {
+
+/// Adds normals, so that facets are not seen. Creases stay sharp.
+std::shared_ptr<const TriMesh> smoothMesh(TriMesh mesh) {
+  constexpr double kCreaseAngle = 0.5;
+  mesh.attributes.normals = levelset::vertexNormals(mesh, kCreaseAngle);
+  return std::make_shared<const TriMesh>(std::move(mesh));
+}
+
+}  // namespace
+
 render::ViewedScene sceneOf(const Value& drawn) {
   render::ViewedScene viewed;
   if (drawn.kind() == Kind::Scene)
@@ -207,6 +233,8 @@ render::ViewedScene sceneOf(const Value& drawn) {
   else if (drawn.kind() == Kind::Mesh)  // the scene shares the mesh with the value
     viewed.scene.meshes.push_back(
         {std::shared_ptr<const TriMesh>(std::shared_ptr<const void>(), &drawn.mesh())});
+  else if (drawn.kind() == Kind::Adaptive)
+    viewed.scene.meshes.push_back({smoothMesh(levelset::adaptiveToMesh(drawn.adaptive()))});
   else
     viewed.scene.solids.push_back({.band = drawn.band()});
   return viewed;

@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "levelset/adaptive/adaptive_field.h"
 #include "levelset/fields/grid.h"
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
@@ -29,8 +30,9 @@ enum class Kind {
   Field,
   Surface,  ///< a band around an open surface: a base for patches
   Scene,
-  Volume,  ///< numbers on a regular grid, from a scanner or a simulation
-  Points   ///< points without connectivity, from a scanner or a simulation
+  Volume,   ///< numbers on a regular grid, from a scanner or a simulation
+  Points,   ///< points without connectivity, from a scanner or a simulation
+  Adaptive  ///< a solid as distances on an octree
 };
 [[nodiscard]] const char* kindName(Kind kind);
 
@@ -42,7 +44,7 @@ struct Plan {
   double area = 0;           ///< surface area, world units²
   double voxelSize = 0;      ///< voxel size, world units; 0: the value has no voxels
   double halfWidth = 0;      ///< half width, voxels; bands and scenes only
-  double fieldBytes = 0;     ///< memory of a field or volume, bytes; only those
+  double fieldBytes = 0;     ///< memory, bytes; fields, volumes and adaptive fields only
   double triangles = 0;      ///< number of triangles; meshes only; 0: unknown
   double points = 0;         ///< number of points of a point cloud; 0: unknown
   double pointBytes = 0;     ///< memory of a point, bytes; point clouds only
@@ -106,11 +108,12 @@ class Value {
   explicit Value(render::ViewedScene scene);
   explicit Value(levelset::Volume volume);
   explicit Value(levelset::PointCloud cloud);
+  explicit Value(levelset::AdaptiveField field);
   explicit Value(Plan plan);
 
   [[nodiscard]] Kind kind() const;
-  // mesh(), band(), patch(), field(), scene(), volume() and cloud() return the value as that kind.
-  // A file may contain another kind than its name suggests.
+  // mesh(), band(), patch(), field(), scene(), volume(), cloud() and adaptive() return the value as
+  // that kind. A file may contain another kind than its name suggests.
   // @throws levelset::UsageError if the value is of another kind
   [[nodiscard]] const levelset::TriMesh& mesh() const;
   [[nodiscard]] const levelset::NarrowBand& band() const;
@@ -119,6 +122,7 @@ class Value {
   [[nodiscard]] const render::ViewedScene& scene() const;
   [[nodiscard]] const levelset::Volume& volume() const;
   [[nodiscard]] const levelset::PointCloud& cloud() const;
+  [[nodiscard]] const levelset::AdaptiveField& adaptive() const;
 
   /// Returns the plan of the value: its kind, bounds, area and grid, which estimates need. Computes
   /// it from the value on the first call.
@@ -135,12 +139,13 @@ class Value {
   std::variant<std::monostate, std::shared_ptr<const levelset::TriMesh>, levelset::NarrowBand,
                std::shared_ptr<const PatchValue>, levelset::FieldGrid,
                std::shared_ptr<const render::ViewedScene>, std::shared_ptr<const levelset::Volume>,
-               std::shared_ptr<const levelset::PointCloud>>
+               std::shared_ptr<const levelset::PointCloud>, levelset::AdaptiveField>
       data_;
   mutable std::optional<Plan> plan_;
 };
 
-/// Builds a scene that shows a level set, a mesh or a scene. The value must outlive the result.
+/// Builds a scene that shows a level set, a mesh, an adaptive field or a scene. The value must
+/// outlive the result. Of an adaptive field it makes the mesh.
 [[nodiscard]] render::ViewedScene sceneOf(const Value& drawn);
 
 }  // namespace pipeline

@@ -22,6 +22,7 @@ from ._core import (
     version as __version__,
 )
 from ._values import (
+    AdaptiveField,
     Field,
     Mesh,
     Patch,
@@ -48,7 +49,8 @@ _operators.install(globals())
 
 __all__ = [
     "Cancelled", "Error", "FileError", "InputError", "NumericalError", "ResourceError", "UsageError",
-    "Field", "Mesh", "Patch", "PointCloud", "Scan", "Scene", "Solid", "Surface", "Value", "Volume", "Warning",
+    "AdaptiveField", "Field", "Mesh", "Patch", "PointCloud", "Scan", "Scene", "Solid", "Surface", "Value",
+    "Volume", "Warning",
     "compute", "graph", "last_report", "map", "set_cache", "set_max_memory", "set_threads",
     "from_array", "from_function",
     *_operators.names,

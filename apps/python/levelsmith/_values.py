@@ -322,6 +322,35 @@ class Scene(_Drawn):
     __slots__ = ()
 
 
+class AdaptiveField(_Drawn):
+    """A solid as signed distances on an octree, within a tolerance, negative inside.
+
+    a | b, a & b and a - b are union, intersection and difference.
+    """
+
+    __slots__ = ()
+
+    __or__, __and__, __sub__ = Solid.__or__, Solid.__and__, Solid.__sub__
+
+    @property
+    def tolerance(self):
+        """Largest error that was asked for, world units. Computes the value."""
+        return self._known().adaptive_figures()[0]
+
+    @property
+    def cells(self):
+        """Number of cells of the octree. Computes the value."""
+        return self._known().adaptive_figures()[1]
+
+    def distances(self, points):
+        """Signed distances at points: (n, 3) floats, world units. Returns n float64.
+
+        They are within the tolerance up to the width of the field from the surface, and coarse
+        farther away. NaN for a point that is not finite.
+        """
+        return self._known().distances(numpy.asarray(points))
+
+
 class Scan(Value):
     """Numbers on a regular grid, from a scanner or a simulation."""
 
@@ -363,4 +392,7 @@ class PointCloud(Value):
         return self._known().cloud_array("weights")
 
 
-classes = {c.__name__: c for c in (Solid, Surface, Mesh, Patch, Field, Scene, Scan, PointCloud)}
+classes = {
+    c.__name__: c
+    for c in (Solid, Surface, Mesh, Patch, Field, Scene, Scan, PointCloud, AdaptiveField)
+}

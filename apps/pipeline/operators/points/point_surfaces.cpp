@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/json_output.h"
 #include "apps/pipeline/operators/level_set_operator.h"
+#include "apps/pipeline/operators/solids/adaptive_actions.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/convert/mesh_to_band.h"
 #include "levelset/error.h"
@@ -247,7 +249,7 @@ Operator conversionOperator() {
                     "point clouds", "mesh");
     }
   };
-  return op;
+  return withAdaptiveResult(std::move(op));
 }
 
 }  // namespace pipeline

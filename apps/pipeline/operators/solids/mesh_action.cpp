@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include "apps/pipeline/operators/level_set_operator.h"
+#include "levelset/adaptive/adaptive_to_mesh.h"
 #include "levelset/error.h"
 #include "levelset/meshing/band_to_mesh.h"
 #include "mapping/patches/patch_mesh.h"
@@ -10,6 +11,9 @@
 namespace pipeline {
 namespace {
 
+bool isAdaptive(const Invocation& in) {
+  return in.operands[0].kind() == Kind::Adaptive;
+}
 bool isPatch(const Invocation& in) {
   return in.operands[0].kind() == Kind::Patch;
 }
@@ -24,9 +28,10 @@ levelset::TriMesh meshOfPatches(const std::vector<mapping::Patch>& patches,
 
 void validateMesh(const Invocation& in) {
   for (const char* option : {"adaptivity", "sharp", "method", "original", "edge-length", "angle"})
-    if (isPatch(in) && in.given(option))
+    if ((isPatch(in) || isAdaptive(in)) && in.given(option))
       throw levelset::UsageError(
-          fmt::format("mesh: --{} applies to a level set, not to a patch; leave it out", option));
+          fmt::format("mesh: --{} applies to a level set, not to {}; leave it out", option,
+                      isPatch(in) ? "a patch" : "an adaptive field"));
   if (in.given("original") && in.text("method") != "extended")
     throw levelset::UsageError(
         "mesh: --original is for --method extended; give that method, or leave it out");
@@ -52,8 +57,11 @@ Operator meshOperator() {
                           "one closed surface"}},
        .validate = validateMesh,
        .prepare = setOriginal});
-  op.operands = {{Kind::Band, Kind::Patch}};
+  op.operands = {{Kind::Band, Kind::Patch, Kind::Adaptive}};
   op.run = [ofBand = op.run](Invocation& in) {
+    if (isAdaptive(in))
+      return Value(levelset::adaptiveToMesh(in.operands[0].adaptive(),
+                                            {.maxMemory = in.maxMemory, .progress = in.progress}));
     if (!isPatch(in)) return ofBand(in);
     return Value(meshOfPatches(
         in.operands[0].patch().patches,

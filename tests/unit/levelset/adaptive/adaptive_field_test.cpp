@@ -5,8 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <random>
 #include <utility>
 #include <vector>
@@ -14,6 +16,7 @@
 #include "levelset/adaptive/adaptive_to_mesh.h"
 #include "levelset/adaptive/adaptive_tree.h"
 #include "levelset/adaptive/build_adaptive.h"
+#include "levelset/adaptive/hanging_nodes.h"
 #include "levelset/adaptive/mesh_distance.h"
 #include "levelset/adaptive/mesh_to_adaptive.h"
 #include "levelset/error.h"
@@ -149,6 +152,44 @@ TEST(AdaptiveField, IsContinuousAcrossHangingNodes) {
     }
   EXPECT_GT(changes, 1000);
   EXPECT_LE(largest, 3e-7);  // rounding of values below 2 to float; measured 1.2e-7
+}
+
+TEST(AdaptiveField, UpdatesTheValuesAroundNewLeaves) {
+  // Values that no interpolant has, so that each hanging node takes one over.
+  std::mt19937 random(21);
+  AdaptiveTree tree{HashedOctree(6), {}, V3d(0), 1, 1, 1};
+  std::map<std::array<int, 3>, float> known;
+  const auto split = [&](const CellKey& leaf) {
+    tree.octree.split(leaf);
+    CornerValues& values = tree.values.emplace_back();
+    const int half = static_cast<int>(leaf.edge() / 2);
+    for (int z = 0; z < 3; ++z)
+      for (int y = 0; y < 3; ++y)
+        for (int x = 0; x < 3; ++x) {
+          const V3i p = leaf.low() + V3i(x, y, z) * half;
+          const auto [it, isNew] = known.try_emplace({p.x, p.y, p.z}, 0.0f);
+          if (isNew) it->second = static_cast<float>(random() % 1000);
+          values[static_cast<std::size_t>(x + 3 * y + 9 * z)] = it->second;
+        }
+  };
+  const auto randomLeaf = [&] {
+    const auto at = [&] { return static_cast<int>(random() % 64); };
+    return tree.octree.leafAt(V3i(at(), at(), at()));
+  };
+  split(tree.octree.root());
+  std::vector<CornerValues> values = continuousValues(tree);
+  for (int round = 0; round < 100; ++round) {
+    const auto first = static_cast<std::uint32_t>(tree.octree.blockCount());
+    for (int k = 0; k < 1 + round % 3; ++k)
+      if (const CellKey leaf = randomLeaf(); leaf.level > 0) split(leaf);
+    const std::vector<CornerValues> before = values;
+    const std::vector<std::uint32_t> computed = updateValues(tree, first, values);
+    ASSERT_EQ(values, continuousValues(tree)) << "round " << round;
+    for (std::uint32_t block = 0; block < before.size(); ++block)
+      if (values[block] != before[block]) {
+        EXPECT_TRUE(std::binary_search(computed.begin(), computed.end(), block));
+      }
+  }
 }
 
 TEST(AdaptiveField, HasTheSameBitsOnAllThreads) {

@@ -1,0 +1,116 @@
+// Adaptive fields on the command line: level-set --adaptive, to-band, and the actions that take
+// them.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "tests/support/command_line.h"
+#include "tests/support/files.h"
+
+namespace adaptive_actions_test {
+
+using Json = nlohmann::json;
+
+class AdaptiveActions : public support::ShellTest {
+ protected:
+  void SetUp() override {
+    support::ShellTest::SetUp();
+    // A cube with corners at 0 and 10, and one that begins at 5.
+    ASSERT_EQ(
+        levelsmith("box --size 10,10,10 --center 5,5,5 --voxel 0.5 ! mesh --sharp ! write cube.ply")
+            .code,
+        0);
+    ASSERT_EQ(levelsmith("read cube.ply ! transform --translate 5,5,5 ! write moved.ply").code, 0);
+  }
+  Json json(const std::string& arguments) {
+    const support::Outcome outcome = levelsmith(arguments);
+    EXPECT_EQ(outcome.code, 0) << arguments << "\n" << outcome.err;
+    return outcome.code == 0 ? Json::parse(outcome.out) : Json();
+  }
+  void expectRefusal(const std::string& arguments, int code, const std::string& part) {
+    const support::Outcome outcome = levelsmith(arguments);
+    EXPECT_EQ(outcome.code, code) << arguments << "\n" << outcome.err;
+    EXPECT_NE(outcome.err.find(part), std::string::npos) << outcome.err;
+  }
+};
+
+constexpr const char* kCube = "read cube.ply ! level-set --adaptive --tolerance 0.05 ";
+constexpr const char* kMoved = "read moved.ply ! level-set --adaptive --tolerance 0.05 ";
+
+TEST_F(AdaptiveActions, MakeMeasureMeshAndConvert) {
+  const std::string cube = kCube;
+  const Json info = json(cube + "! info --json");
+  EXPECT_EQ(info["kind"], "adaptive field");
+  EXPECT_EQ(info["tolerance"], 0.05);
+  EXPECT_NEAR(info["width"].get<double>(), 0.02 * 10 * std::sqrt(3.0), 1e-9);
+  const Json measured = json(cube + "! measure --json");
+  EXPECT_NEAR(measured["volume"].get<double>(), 1000, 0.3);
+  EXPECT_EQ(measured["euler"], 2);
+  const Json mesh = json(cube + "! mesh ! measure --json");
+  EXPECT_EQ(mesh["closed_manifold"], true);
+  EXPECT_EQ(mesh["volume"], measured["volume"]);
+  const Json band = json(cube + "! to-band --voxel 0.25 ! measure --json");
+  EXPECT_NEAR(band["volume"].get<double>(), 1000, 0.6);
+  EXPECT_EQ(levelsmith(cube + "! to-band --voxel 0.25 ! check").code, 0);
+  // From a level set, and relative to the size.
+  const Json ofBand = json(
+      "box --size 10,10,10 --voxel 0.5 ! level-set --adaptive --tolerance 1% ! measure --json");
+  EXPECT_NEAR(ofBand["volume"].get<double>(), 1000, 6);
+}
+
+TEST_F(AdaptiveActions, CombineAndOffset) {
+  const std::string both = std::string(kCube) + "! " + kMoved + "! ";
+  EXPECT_NEAR(json(both + "union ! measure --json")["volume"].get<double>(), 1875, 1);
+  EXPECT_NEAR(json(both + "intersection ! measure --json")["volume"].get<double>(), 125, 1);
+  EXPECT_NEAR(json(both + "difference ! measure --json")["volume"].get<double>(), 875, 1);
+  // The rounded box of an outward offset, and the smaller cube of an inward one.
+  constexpr double kPi = std::numbers::pi, kD = 0.25;
+  const double grown = 1000 + 600 * kD + 30 * kPi * kD * kD + 4 * kPi / 3 * kD * kD * kD;
+  EXPECT_NEAR(json(std::string(kCube) + "! offset 0.25 ! measure --json")["volume"].get<double>(),
+              grown, 2);
+  EXPECT_NEAR(json(std::string(kCube) + "! offset -0.25 ! measure --json")["volume"].get<double>(),
+              9.5 * 9.5 * 9.5, 2);
+  const Json difference = json(both + "compare --json");
+  EXPECT_NEAR(difference["hausdorff"].get<double>(), 5 * std::sqrt(3.0), 0.1);
+  EXPECT_NEAR(difference["symmetric_difference"].get<double>(), 1750, 2);
+  const Json same = json(std::string(kCube) + "! " + kCube + "! compare --json");
+  EXPECT_LT(same["hausdorff"].get<double>(), 1e-9);
+}
+
+TEST_F(AdaptiveActions, AreDrawnAsTheirMesh) {
+  ASSERT_EQ(levelsmith(std::string(kCube) +
+                       "! render a.png --size 64x48 ! mesh ! render b.png --size 64x48")
+                .code,
+            0);
+  EXPECT_EQ(levelsmith("compare-images a.png b.png --exact").code, 0);
+}
+
+TEST_F(AdaptiveActions, RefuseWhatDoesNotApply) {
+  const std::string cube = kCube;
+  expectRefusal("read cube.ply ! level-set --adaptive", 2, "--adaptive needs --tolerance");
+  expectRefusal("read cube.ply ! level-set --voxel 1 --tolerance 1", 2,
+                "--tolerance needs --adaptive");
+  expectRefusal(cube + "--voxel 1", 2, "--voxel does not apply to --adaptive");
+  expectRefusal(cube + "--half-width 4", 2, "--half-width does not apply");
+  expectRefusal("read cube.ply ! sample --count 100 ! level-set --adaptive --tolerance 1", 2,
+                "point cloud");
+  expectRefusal(
+      "sphere --radius 1 --voxel 0.1 ! level-set --adaptive --tolerance 0.1 --sign closed", 2,
+      "--sign is for meshes");
+  expectRefusal(cube + "! write a.vdb", 2, "'to-band' before it");
+  expectRefusal(cube + "! smooth --sigma 1", 2, "put 'to-band' before it");
+  expectRefusal(cube + "! offset 3", 2, "put 'to-band' before the offset");
+  expectRefusal(cube + "! offset 0.1 --half-width 3", 2, "does not apply to an adaptive field");
+  expectRefusal(cube + "! mesh --sharp", 2, "not to an adaptive field");
+  expectRefusal(cube + "! sphere --radius 1 --voxel 0.1 ! union", 2, "operand 2 is a level set");
+  expectRefusal("sphere --radius 1 --voxel 0.1 ! " + cube + "! compare", 2,
+                "operand 2 is an adaptive field");
+  expectRefusal(cube + "! to-band", 2, "--voxel");
+  expectRefusal(cube + "! to-band --voxel 100", 3, "larger than the object");
+  expectRefusal("read cube.ply ! level-set --adaptive --tolerance 1e-7", 2, "tolerance");
+}
+
+}  // namespace adaptive_actions_test
