@@ -28,8 +28,8 @@ inline constexpr RegionLabel kVoid = 0;
 /// stores the distances to the interfaces between a and the other regions there. The signed
 /// distance to region a is minus the smallest of them; that to another region b is the one to the
 /// interface between a and b. So each interface is interpolated between distances to itself, and
-/// stays as accurate at a junction as elsewhere [ours; the distance to the nearest interface alone
-/// shifts interfaces near junctions].
+/// stays as accurate near a junction as elsewhere. The distances to the nearest interface alone, as
+/// published, would shift it there.
 ///
 /// The class has value semantics. Copies share the data, which does not change. The transform to
 /// world space is a rotation, a uniform scale and a translation.
