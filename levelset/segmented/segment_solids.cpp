@@ -203,7 +203,8 @@ class SolidsPartition {
         continue;
       }
       tiles.setValueOff(block.block, static_cast<std::int32_t>(kept));
-      blocks_[kept++] = std::move(block);
+      if (&blocks_[kept] != &block) blocks_[kept] = std::move(block);
+      ++kept;
     }
     blocks_.resize(kept);
   }
