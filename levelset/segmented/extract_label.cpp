@@ -1,65 +1,54 @@
 #include "levelset/segmented/extract_label.h"
 
 #include <fmt/core.h>
-#include <tbb/parallel_for.h>
+#include <openvdb/tree/LeafManager.h>
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
+#include <limits>
 #include <vector>
 
-#include "levelset/distance/redistance.h"
+#include "levelset/convert/mesh_to_band.h"
 #include "levelset/error.h"
 #include "levelset/grids/grid_queries_vdb.h"
 #include "levelset/segmented/segmented_data_vdb.h"
+#include "levelset/segmented/segmented_to_mesh.h"
 #include "levelset/vdb.h"
 
 namespace levelset {
 namespace {
 
-using openvdb::Coord;
-using openvdb::FloatGrid;
 using RegionLeaf = openvdb::FloatTree::LeafNodeType;
 
-/// Signed distances to a region on a block of the field.
-std::unique_ptr<RegionLeaf> regionLeaf(const SegmentedData& data, const SegmentedBlock& block,
-                                       RegionLabel region) {
-  auto leaf = std::make_unique<RegionLeaf>(block.origin, data.background, false);
-  SegmentedReader reader(data);
-  for (std::uint32_t n = 0; n < SegmentedData::kVoxels; ++n) {
-    const Coord at = block.origin + SegmentedData::localOf(n);
-    const SegmentedReader::Nearest near = reader.nearest(at);
-    const float value = near.label == region ? -near.distance : reader.distanceTo(at, near, region);
-    if (std::abs(value) < data.background)
-      leaf->setValueOn(n, value);
-    else
-      leaf->setValueOff(n, value);
-  }
-  return leaf;
-}
-
-/// Signed distances to a region, as far as the field stores them.
-FloatGrid::Ptr regionGrid(const SegmentedData& data, RegionLabel region) {
-  const FloatGrid::Ptr grid = emptyLevelSet(data.transform->copy(), data.halfWidth);
-  auto tile = data.blockTree->cbeginValueAll();
-  for (; tile; ++tile) {
-    if (*tile != SegmentedData::tile(region)) continue;
-    const openvdb::CoordBBox box = tile.getBoundingBox();
-    const Coord low(box.min()[0] << 3, box.min()[1] << 3, box.min()[2] << 3),
-        high((box.max()[0] << 3) + 7, (box.max()[1] << 3) + 7, (box.max()[2] << 3) + 7);
-    grid->tree().sparseFill({low, high}, -data.background, false);
-  }
-  std::vector<std::unique_ptr<RegionLeaf>> leaves(data.blockCount());
-  tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t b) {
-    const SegmentedBlock &block = data.blocks[b], &next = data.blocks[b + 1];
-    const auto first = data.palettes.begin() + block.palette,
-               last = data.palettes.begin() + next.palette;
-    if (std::find(first, last, region) != last) leaves[b] = regionLeaf(data, block, region);
+/// Scales a band on voxels of size 1 to the grid of the field, and takes the signs from the labels.
+NarrowBand onGridOf(const SegmentedData& data, RegionLabel region, NarrowBand band,
+                    double halfWidth) {
+  openvdb::FloatGrid& grid = editVdb(band);
+  const float background = backgroundOf(halfWidth, data.voxelSize);
+  requireBackground(background, data.voxelSize);
+  openvdb::tree::LeafManager<openvdb::FloatTree> leaves(grid.tree());
+  leaves.foreach ([&](RegionLeaf& leaf, std::size_t) {
+    SegmentedReader reader(data);
+    for (openvdb::Index n = 0; n < RegionLeaf::SIZE; ++n) {
+      const bool isInside = reader.label(leaf.offsetToGlobalCoord(n)) == region;
+      const auto distance =
+          static_cast<float>(std::abs(static_cast<double>(leaf.getValue(n))) * data.voxelSize);
+      if (leaf.isValueOn(n) && distance < background) {
+        // A grid point on an interface belongs to one of its sides.
+        leaf.setValueOnly(
+            n, isInside ? -std::max(distance, std::numeric_limits<float>::min()) : distance);
+      } else {
+        leaf.setValueOff(n, isInside ? -background : background);
+      }
+    }
   });
-  for (std::unique_ptr<RegionLeaf>& leaf : leaves)
-    if (leaf) grid->tree().addLeaf(leaf.release());
-  pruneOneSided(grid->tree());
-  return grid;
+  auto tile = grid.tree().beginValueOff();
+  tile.setMaxDepth(openvdb::FloatTree::DEPTH - 2);
+  for (; tile; ++tile) tile.setValue(std::copysign(background, *tile));
+  grid.tree().root().setBackground(background, /*updateChildNodes=*/false);
+  pruneOneSided(grid.tree());
+  grid.setTransform(data.transform->copy());
+  return band;
 }
 
 }  // namespace
@@ -72,14 +61,23 @@ NarrowBand extractLabel(const SegmentedField& field, RegionLabel region,
     throw UsageError(
         fmt::format("the half width is {} voxels; give at least 1", options.halfWidth));
   const std::vector<RegionLabel> labels = field.labels();
-  if (!std::binary_search(labels.begin(), labels.end(), region))
+  if (field.isEmpty() || !std::binary_search(labels.begin(), labels.end(), region)) {
     throw NoSurface(
         fmt::format("no grid point has the label {}; give a label of the field", region));
-  report(options.progress, 0);
-  NarrowBand signs = makeBand(regionGrid(*field.shared(), region));
-  return redistance(std::move(signs), {.halfWidth = options.halfWidth,
-                                       .maxMemory = options.maxMemory,
-                                       .progress = subProgress(options.progress, 0.2, 1)});
+  }
+  const SegmentedData& data = *field.shared();
+  const SegmentedMesh mesh = segmentedToMesh(
+      field, {.maxMemory = options.maxMemory, .progress = subProgress(options.progress, 0, 0.3)});
+  TriMesh surface = regionSurface(mesh, region);
+  for (Imath::V3d& p : surface.positions) p = toImath(data.transform->worldToIndex(toVdb(p)));
+  // Regions may touch themselves along edges.
+  MeshToBandOptions toBand;
+  toBand.halfWidth = options.halfWidth;
+  toBand.searchSelfIntersections = false;
+  toBand.acceptSign = true;
+  toBand.maxMemory = options.maxMemory;
+  toBand.progress = subProgress(options.progress, 0.3, 1);
+  return onGridOf(data, region, meshToBand(surface, 1, toBand).band, options.halfWidth);
 }
 
 }  // namespace levelset

@@ -11,12 +11,14 @@ using Imath::V3d;
 using openvdb::Coord;
 
 constexpr std::size_t kTerms = InterfaceFit::kTerms;
-constexpr double kFlattest = 0.01;   // least squared slope of a distance
-constexpr double kSpread = 1.4;      // voxels: standard deviation of the weights of samples
-constexpr double kLargest = 1.75;    // voxels: largest distance that is used
-constexpr double kFlatness = 1e-3;   // prefers planes where samples do not determine curvature
-constexpr double kDamping = 1e-3;    // of steps along the curve, where the point is free
-constexpr double kParallel = 0.02;   // least area of the parallelogram of two normals, squared
+constexpr double kFlattest = 0.01;  // least squared slope of a distance
+constexpr double kSpread = 1.4;     // voxels: standard deviation of the weights of samples
+constexpr double kLargest = 1.75;   // voxels: largest distance that is used
+constexpr double kFlatness = 1e-3;  // prefers planes where samples do not determine curvature
+constexpr double kDamping = 1e-3;   // of steps along the curve, where the point is free
+constexpr double kParallel = 0.02;  // least area of the parallelogram of two normals, squared
+constexpr double kDoubt =
+    0.01;  // weight of distances to other than the nearest interface, at first
 constexpr double kAgreement = 0.05;  // voxels: residual that halves the weight of a sample
 constexpr double kFarthest = 1.5;    // voxels: largest move of a point
 constexpr std::size_t kFewest = 5;   // samples
@@ -99,8 +101,10 @@ std::optional<InterfaceFit> JunctionFit::fit(RegionLabel a, RegionLabel b, const
   struct Known {
     std::array<double, kTerms> terms;
     double value, weight;
+    bool isNearest;
   };
   std::vector<Known> known;
+  std::size_t count = 0;
   std::array<int, 3> centre{};
   for (int axis = 0; axis < 3; ++axis)
     centre[static_cast<std::size_t>(axis)] =
@@ -111,27 +115,29 @@ std::optional<InterfaceFit> JunctionFit::fit(RegionLabel a, RegionLabel b, const
         const Sample& sample = samples_[index(x, y, z)];
         if (sample.label == sample.neighbour || (sample.label != a && sample.label != b)) continue;
         const RegionLabel other = sample.label == a ? b : a;
-        if (sample.isPure && sample.neighbour != other) continue;
+        const bool isNearest = sample.neighbour == other;
+        if (!isNearest) continue;
         const double distance =
-            sample.neighbour == other
-                ? static_cast<double>(sample.distance)
-                : static_cast<double>(reader_.distanceTo(origin_.offsetBy(x, y, z), other)) /
-                      voxelSize_;
+            isNearest ? static_cast<double>(sample.distance)
+                      : static_cast<double>(reader_.distanceTo(origin_.offsetBy(x, y, z), other)) /
+                            voxelSize_;
         if (distance > kLargest) continue;
         const V3d p = V3d(x, y, z) - about;
         const double weight = std::exp(-p.length2() / (2 * kSpread * kSpread));
-        known.push_back({termsAt(p), sample.label == a ? distance : -distance,
-                         sample.isPure ? weight : weight / 2});
+        known.push_back({termsAt(p), sample.label == a ? distance : -distance, weight, isNearest});
+        count += isNearest;
       }
-  if (known.size() < kFewest) return std::nullopt;
+  if (count < kFewest) return std::nullopt;
   InterfaceFit result{position, {}};
-  constexpr int kRounds = 3;
+  constexpr int kRounds = 4;
   for (int round = 0; round < kRounds; ++round) {
     std::array<std::array<double, kTerms>, kTerms> matrix{};
     std::array<double, kTerms> right{};
     for (const Known& sample : known) {
       double weight = sample.weight;
-      if (round > 0) {
+      if (round == 0) {
+        if (!sample.isNearest) weight *= kDoubt;
+      } else {
         const double residual = (dot(result.c, sample.terms) - sample.value) / kAgreement;
         weight /= 1 + residual * residual;
       }

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <span>
 #include <tuple>
 
 #include "levelset/csg/csg_vdb.h"
@@ -107,6 +108,10 @@ class SolidsPartition {
     return rank == 0 ? kVoid : labels_[rank - 1u];
   }
   [[nodiscard]] const FloatTree& tree(Rank rank) const { return vdb(solids_[rank - 1u]).tree(); }
+
+  [[nodiscard]] static Coord originOf(const SolidBlock& block) {
+    return {block.block[0] << 3, block.block[1] << 3, block.block[2] << 3};
+  }
 
   void gatherLeaves() {
     for (std::size_t i = 0; i < solids_.size(); ++i)
@@ -211,7 +216,7 @@ class SolidsPartition {
 
   /// Ranks of a block and of the voxels around it.
   struct Around {
-    static constexpr int kPad = 2, kSide = 8 + 2 * kPad;
+    static constexpr int kPad = 3, kSide = 8 + 2 * kPad;
     std::array<Rank, kSide * kSide * kSide> ranks;
     /// @param at  from −kPad to 7 + kPad
     [[nodiscard]] static std::size_t index(int x, int y, int z) {
@@ -270,19 +275,24 @@ class SolidsPartition {
     return nullptr;
   }
   /// Distance of a voxel of region `own` from its interface with region `other`. It lies on the
-  /// surface of the one with the higher rank.
+  /// surface of the one with the higher rank. Where the other one is below and farther away, it
+  /// only touches the own solid there, at the distance of its own surface.
   [[nodiscard]] float distanceTo(const SolidBlock& block, std::uint32_t voxel, Rank own,
                                  Rank other) const {
-    const float* values = valuesOf(block, std::max(own, other));
-    if (!values) return far_;
-    return std::max(0.0f, other > own ? values[voxel] : -values[voxel]);
+    const auto phi = [&](Rank rank, float beyond) {
+      const float* values = valuesOf(block, rank);
+      return values ? values[voxel] : rank == block.top ? -far_ : beyond;
+    };
+    if (other > own) return std::max(0.0f, phi(other, far_));
+    const float depth = std::max(0.0f, -phi(own, -far_));
+    return other == 0 ? depth : std::max(depth, phi(other, depth));
   }
 
   [[nodiscard]] PackedBlock evaluateBlock(std::size_t number) {
     const SolidBlock& block = blocks_[number];
     const Neighbours neighbours = neighboursOf(block.block);
     SegmentedBlockValues values;
-    values.origin = Coord(block.block[0] << 3, block.block[1] << 3, block.block[2] << 3);
+    values.origin = originOf(block);
     const auto rankAt = [&](std::uint32_t n) {
       return block.ranks[block.ranks.size() == 1 ? 0 : n];
     };
@@ -302,94 +312,167 @@ class SolidsPartition {
         values.neighbours[n] = labelOf(isHigh ? low : high);
       }
     } else {
-      for (std::uint32_t n = 0; n < kVoxels; ++n)
-        evaluateVoxel(block, n, rankAt(n), around ? &*around : nullptr, values);
+      Others others;
+      for (std::uint32_t n = 0; n < kVoxels; ++n) {
+        if (neighbours.palette.size() > 1)
+          evaluateVoxel(block, n, rankAt(n), *around, others, values);
+        else
+          setNearest(block, n, rankAt(n), values);
+      }
     }
     if (block.last - block.first > 1) findLost(block, *around, lost_[number]);
     return packBlock(values, background_);
   }
 
-  void evaluateVoxel(const SolidBlock& block, std::uint32_t n, Rank own, const Around* around,
-                     SegmentedBlockValues& values) const {
-    values.neighbours[n] = values.labels[n];
-    values.distances[n] = far_;
+  /// Regions up to two voxels away from a voxel, ascending, and the distances of the voxel from the
+  /// interfaces with them.
+  struct Others {
+    std::vector<Rank> ranks;
+    std::vector<float> distances;
+    std::vector<Rank> adjacent;  ///< those up to one voxel away
+
+    [[nodiscard]] std::size_t nearest() const {
+      return static_cast<std::size_t>(std::min_element(distances.begin(), distances.end()) -
+                                      distances.begin());
+    }
+  };
+  void findOthers(const SolidBlock& block, std::uint32_t n, Rank own, const Around& around,
+                  Others& others) const {
     const Coord at = SegmentedData::localOf(n);
-    std::array<Rank, 27> others;
-    std::size_t count = 0;
-    if (around)
-      for (int x = -1; x <= 1; ++x)
-        for (int y = -1; y <= 1; ++y)
-          for (int z = -1; z <= 1; ++z) {
-            const Rank rank = around->at(at[0] + x, at[1] + y, at[2] + z);
-            if (rank == own) continue;
-            if (std::find(others.begin(), others.begin() + count, rank) == others.begin() + count)
-              others[count++] = rank;
+    const auto find = [&](int reach, std::vector<Rank>& ranks) {
+      ranks.clear();
+      for (int x = at[0] - reach; x <= at[0] + reach; ++x)
+        for (int y = at[1] - reach; y <= at[1] + reach; ++y)
+          for (int z = at[2] - reach; z <= at[2] + reach; ++z) {
+            const Rank rank = around.at(x, y, z);
+            if (rank != own && std::find(ranks.begin(), ranks.end(), rank) == ranks.end())
+              ranks.push_back(rank);
           }
-    if (count == 0) {
-      setNearest(block, n, own, around, values);
-      return;
-    }
-    std::sort(others.begin(), others.begin() + count);
-    // The nearest one is the neighbour; of equally near ones, the last.
-    std::size_t nearest = 0;
-    std::array<float, 27> distances;
-    for (std::size_t i = 0; i < count; ++i) {
-      distances[i] = distanceTo(block, n, own, others[i]);
-      if (distances[i] <= distances[nearest]) nearest = i;
-    }
+      std::sort(ranks.begin(), ranks.end());
+    };
+    find(1, others.adjacent);
+    find(2, others.ranks);
+    others.distances.clear();
+    for (const Rank rank : others.ranks)
+      others.distances.push_back(distanceTo(block, n, own, rank));
+  }
+
+  /// Sets the distances of a voxel in a block near several regions.
+  /// @param others  memory to work in
+  void evaluateVoxel(const SolidBlock& block, std::uint32_t n, Rank own, const Around& around,
+                     Others& others, SegmentedBlockValues& values) const {
+    setNearest(block, n, own, values);
+    findOthers(block, n, own, around, others);
+    if (others.ranks.empty()) return;
+    if (others.adjacent.empty() && values.distances[n] >= background_) return;
+    const std::size_t chosen = neighbourAmong(block, n, own, others, around);
+    values.neighbours[n] = labelOf(others.ranks[chosen]);
+    if (others.adjacent.empty()) return;
     // Cells with several labels need a distance in all corners.
     const float largest = std::nextafter(background_, 0.0f);
-    values.distances[n] = std::min(distances[nearest], largest);
-    values.neighbours[n] = labelOf(others[nearest]);
+    values.distances[n] = std::min(others.distances[others.nearest()], largest);
     const std::size_t begin = values.extras.size();
-    for (std::size_t i = 0; i < count; ++i)
-      if (i != nearest)
-        values.extras.push_back({static_cast<std::uint16_t>(n), labelOf(others[i]),
-                                 std::min(distances[i], background_)});
+    for (std::size_t i = 0; i < others.ranks.size(); ++i)
+      if (i != chosen &&
+          std::binary_search(others.adjacent.begin(), others.adjacent.end(), others.ranks[i]))
+        values.extras.push_back({static_cast<std::uint16_t>(n), labelOf(others.ranks[i]),
+                                 std::min(others.distances[i], background_)});
     std::sort(values.extras.begin() + static_cast<std::ptrdiff_t>(begin), values.extras.end(),
               [](const auto& a, const auto& b) { return a.label < b.label; });
   }
 
-  /// Sets distance and neighbour of a voxel among voxels of its own region.
-  void setNearest(const SolidBlock& block, std::uint32_t n, Rank own, const Around* around,
-                  SegmentedBlockValues& values) const {
-    float distance = far_;
-    Rank neighbour = own;
-    for (std::size_t e = block.last; e-- > block.first;) {
-      const RankedLeaf& leaf = leaves_[e];
-      if (leaf.rank < own) break;
-      const float phi = leaf.rank == own ? -leaf.values[n] : leaf.values[n];
-      if (phi < distance) {
-        distance = phi;
-        neighbour = leaf.rank;
-      }
+  /// Chooses the region across the nearest interface. Several regions may lie beyond the surface of
+  /// the own solid; then the distances to them are equal. Of these, a solid whose own surface is
+  /// that near touches the own solid there.
+  /// @return index in `others`
+  [[nodiscard]] std::size_t neighbourAmong(const SolidBlock& block, std::uint32_t n, Rank own,
+                                           const Others& others, const Around& around) const {
+    constexpr float kTie = 0.02f;
+    const auto tolerance = kTie * static_cast<float>(voxelSize_);
+    const std::size_t nearest = others.nearest(), count = others.ranks.size();
+    const float distance = others.distances[nearest];
+    std::vector<std::size_t> tied, touching;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (others.distances[i] > distance + tolerance) continue;
+      tied.push_back(i);
+      const float* values = valuesOf(block, others.ranks[i]);
+      if (values && values[n] > distance - tolerance) touching.push_back(i);
     }
-    values.distances[n] = std::max(0.0f, distance);
-    if (neighbour == own) neighbour = around ? nearestBelow(*around, n, own) : Rank{0};
-    values.neighbours[n] = labelOf(neighbour);
-  }
-
-  /// Rank of the nearest voxel, up to two voxels away, of a solid below `own`.
-  [[nodiscard]] static Rank nearestBelow(const Around& around, std::uint32_t n, Rank own) {
+    const std::vector<std::size_t>& candidates = touching.empty() ? tied : touching;
+    if (candidates.size() == 1) return candidates[0];
+    const Rank beyond = rankBeyond(block, n, own, distance, around);
+    for (const std::size_t i : candidates)
+      if (others.ranks[i] == beyond) return i;
+    // Takes the region of the nearest grid point.
     const Coord at = SegmentedData::localOf(n);
     int least = 13;
-    Rank best = 0;
+    std::size_t best = candidates[0];
     for (int x = -2; x <= 2; ++x)
       for (int y = -2; y <= 2; ++y)
         for (int z = -2; z <= 2; ++z) {
           const int squared = x * x + y * y + z * z;
           if (squared >= least) continue;
           const Rank rank = around.at(at[0] + x, at[1] + y, at[2] + z);
-          if (rank >= own) continue;
-          least = squared;
-          best = rank;
+          for (const std::size_t i : candidates) {
+            if (others.ranks[i] != rank) continue;
+            least = squared;
+            best = i;
+          }
         }
     return best;
   }
 
+  /// Rank of the grid point that lies beyond the point of the own solid's surface that is closest
+  /// to a voxel. The own rank where the slope does not tell the direction.
+  /// @param depth  distance of the voxel from that surface
+  [[nodiscard]] Rank rankBeyond(const SolidBlock& block, std::uint32_t n, Rank own, float depth,
+                                const Around& around) const {
+    constexpr double kLeastSlope = 0.8, kBeyond = 0.75;
+    const float* values = valuesOf(block, own);
+    if (!values) return own;
+    const Coord at = SegmentedData::localOf(n);
+    const auto phi = [&](const Coord& p) {
+      const bool isInBlock = ((p[0] | p[1] | p[2]) & ~7) == 0;
+      return static_cast<double>(isInBlock ? values[SegmentedData::offsetOf(p)]
+                                           : tree(own).getValue(originOf(block) + p));
+    };
+    Imath::V3d slope;
+    for (int axis = 0; axis < 3; ++axis) {
+      Coord low = at, high = at;
+      low[axis] -= 1;
+      high[axis] += 1;
+      slope[axis] = (phi(high) - phi(low)) / (2 * voxelSize_);
+    }
+    const double length = slope.length();
+    if (!(length > kLeastSlope)) return own;
+    const Imath::V3d move = slope * ((static_cast<double>(depth) / voxelSize_ + kBeyond) / length);
+    const auto coordinate = [&](int axis) {
+      return std::clamp(at[axis] + static_cast<int>(std::lround(move[axis])), -Around::kPad,
+                        7 + Around::kPad);
+    };
+    return around.at(coordinate(0), coordinate(1), coordinate(2));
+  }
+
+  /// Sets distance and neighbour of a voxel among voxels of its own region.
+  void setNearest(const SolidBlock& block, std::uint32_t n, Rank own,
+                  SegmentedBlockValues& values) const {
+    float distance = far_;
+    Rank neighbour = 0;
+    for (std::size_t e = block.last; e-- > block.first;) {
+      const RankedLeaf& leaf = leaves_[e];
+      if (leaf.rank < own) break;
+      const float phi = leaf.rank == own ? -leaf.values[n] : leaf.values[n];
+      if (phi >= distance) continue;
+      distance = phi;
+      neighbour = leaf.rank == own ? Rank{0} : leaf.rank;
+    }
+    values.distances[n] = std::max(0.0f, distance);
+    values.neighbours[n] = labelOf(neighbour);
+  }
+
   /// Finds parts between two neighbouring grid points that own neither of them.
   void findLost(const SolidBlock& block, const Around& around, ThinTally& tally) const {
-    const Coord origin(block.block[0] << 3, block.block[1] << 3, block.block[2] << 3);
+    const Coord origin = originOf(block);
     for (std::uint32_t n = 0; n < kVoxels; ++n) {
       const Coord at = SegmentedData::localOf(n);
       const Rank a = around.at(at[0], at[1], at[2]);

@@ -95,11 +95,12 @@ class SegmentedMesher {
     if (vertices > 0xffffffffu)
       throw ResourceLimit("the interfaces have more than 2^32 vertices; use larger voxels");
     result_.mesh.positions.resize(vertices);
+    isDoubtful_.resize(vertices);
     forEachBlock(0.2, 0.4, [&](MeshBlock& block) { placeVertices(block); });
     forEachBlock(0.4, 0.7, [&](MeshBlock& block) { cutCells(block); });
     collect();
     if (options_.sharpensJunctions)
-      sharpenJunctions(data_, result_, subProgress(options_.progress, 0.7, 1));
+      sharpenJunctions(data_, isDoubtful_, result_, subProgress(options_.progress, 0.7, 1));
     tbb::parallel_for(std::size_t{0}, vertices, [&](std::size_t v) {
       V3d& p = result_.mesh.positions[v];
       p = toImath(data_.transform->indexToWorld(toVdb(p)));
@@ -165,8 +166,11 @@ class SegmentedMesher {
   }
 
   /// Point where the interface crosses the edge between two grid points, index coordinates.
-  static V3d crossing(SegmentedReader& reader, const Coord& a, const Coord& b) {
+  /// @param isDoubtful  becomes true when another interface is nearer to one of the grid points
+  static V3d crossing(SegmentedReader& reader, const Coord& a, const Coord& b,
+                      bool* isDoubtful = nullptr) {
     const SegmentedReader::Nearest u = reader.nearest(a), v = reader.nearest(b);
+    if (isDoubtful) *isDoubtful = u.neighbour != v.label || v.neighbour != u.label;
     const double du = static_cast<double>(reader.distanceTo(a, u, v.label)),
                  dv = static_cast<double>(reader.distanceTo(b, v, u.label));
     const double t = du + dv > 0 ? std::clamp(du / (du + dv), kEndGap, 1 - kEndGap) : 0.5;
@@ -182,7 +186,9 @@ class SegmentedMesher {
       const Coord low = origin + SegmentedData::localOf(voxel);
       V3d& p = result_.mesh.positions[block.firstVertex + i];
       if (slot < 7) {
-        p = crossing(reader, low, low + cornerOffset(slot + 1));
+        bool isDoubtful = false;
+        p = crossing(reader, low, low + cornerOffset(slot + 1), &isDoubtful);
+        isDoubtful_[block.firstVertex + i] = isDoubtful;
       } else if (slot < 19) {
         const kuhn::FaceSteps& face = kuhn::kFaces[slot - 7];
         p = centre<3>(reader, low, {0, face.middle, face.upper});
@@ -376,6 +382,7 @@ class SegmentedMesher {
   const SegmentedData& data_;
   const SegmentedMeshOptions& options_;
   std::vector<MeshBlock> blocks_;  ///< by x, y, z
+  std::vector<char> isDoubtful_;   ///< by vertex; not bool, which threads could not set
   SegmentedMesh result_;
 };
 

@@ -21,7 +21,8 @@ constexpr int kRelaxations = 5;
 /// Vertices at and beside junctions, with the interfaces that they lie on.
 class JunctionStrip {
  public:
-  JunctionStrip(const SegmentedData& data, SegmentedMesh& mesh) : data_(data), mesh_(mesh) {}
+  JunctionStrip(const SegmentedData& data, const std::vector<char>& isDoubtful, SegmentedMesh& mesh)
+      : data_(data), isDoubtful_(isDoubtful), mesh_(mesh) {}
 
   void run(const Progress& progress) {
     findVertices();
@@ -68,10 +69,10 @@ class JunctionStrip {
     const std::size_t junctions = strip_.size();
     for (std::size_t t = 0; t < mesh_.sides.size(); ++t) {
       const auto& triangle = mesh_.mesh.triangles[t];
-      if (std::none_of(triangle.begin(), triangle.end(),
-                       [&](std::uint32_t v) { return slots_[v] < junctions; }))
-        continue;
+      const bool isBeside = std::any_of(triangle.begin(), triangle.end(),
+                                        [&](std::uint32_t v) { return slots_[v] < junctions; });
       for (const std::uint32_t v : triangle) {
+        if (!isBeside && !isDoubtful_[v]) continue;
         StripVertex& vertex = touch(v);
         addLabel(vertex, mesh_.sides[t].behind);
         addLabel(vertex, mesh_.sides[t].front);
@@ -152,6 +153,7 @@ class JunctionStrip {
   }
 
   const SegmentedData& data_;
+  const std::vector<char>& isDoubtful_;
   SegmentedMesh& mesh_;
   std::vector<std::uint32_t> slots_;  ///< place in the strip, by vertex
   std::vector<StripVertex> strip_;    ///< junctions first
@@ -159,9 +161,10 @@ class JunctionStrip {
 
 }  // namespace
 
-void sharpenJunctions(const SegmentedData& data, SegmentedMesh& mesh, const Progress& progress) {
+void sharpenJunctions(const SegmentedData& data, const std::vector<char>& isDoubtful,
+                      SegmentedMesh& mesh, const Progress& progress) {
   if (mesh.junctions.empty()) return;
-  JunctionStrip(data, mesh).run(progress);
+  JunctionStrip(data, isDoubtful, mesh).run(progress);
 }
 
 }  // namespace levelset
