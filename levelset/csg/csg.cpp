@@ -67,39 +67,6 @@ void requireSolids(std::span<const NarrowBand> solids, const CsgOptions& options
   requireMemory(2 * bytes, options.maxMemory);
 }
 
-/// Resamples all solids to the grid of the finest one, and narrows all bands to the smallest half
-/// width.
-void bringToOneGrid(std::vector<NarrowBand>& solids, const CsgOptions& options,
-                    std::vector<std::string>& notes) {
-  const auto finest = std::min_element(
-      solids.begin(), solids.end(),
-      [](const auto& a, const auto& b) { return a.voxelSize() < b.voxelSize() * (1 - 1e-9); });
-  double halfWidth = finest->halfWidth();
-  for (const NarrowBand& solid : solids) halfWidth = std::min(halfWidth, solid.halfWidth());
-  for (std::size_t i = 0; i < solids.size(); ++i) {
-    if (shareTransform(vdb(*finest), vdb(solids[i]))) {
-      // Half widths that differ only by rounding need no note.
-      if (halfWidth < solids[i].halfWidth() * (1 - 1e-5))
-        notes.push_back(fmt::format("operand {} was narrowed to a half width of {:.6g} voxels",
-                                    i + 1, halfWidth));
-      solids[i] = narrowed(std::move(solids[i]), halfWidth);
-      continue;
-    }
-    notes.push_back(fmt::format(
-        "operand {} was resampled from voxels of {} to the grid of operand {} "
-        "with voxels of {}",
-        i + 1, solids[i].voxelSize(), finest - solids.begin() + 1, finest->voxelSize()));
-    solids[i] = resampleTo(solids[i], finest->indexToWorld(),
-                           {.halfWidth = halfWidth, .maxMemory = options.maxMemory});
-  }
-  // Voxel sizes may differ in the last bits. Equal half widths then give different backgrounds, so
-  // all bands are shortened to the smallest background.
-  float background = vdb(solids.front()).background();
-  for (const NarrowBand& solid : solids) background = std::min(background, vdb(solid).background());
-  for (NarrowBand& solid : solids)
-    if (vdb(solid).background() != background) endBandAt(editVdb(solid), background);
-}
-
 using Leaf = FloatTree::LeafNodeType;
 
 /// Restores the old values of a redistanced leaf where old and new value differ by at most 0.05
@@ -162,6 +129,37 @@ void redistanceAbout(const std::vector<openvdb::Coord>& faces, FloatGrid& grid) 
 }
 
 }  // namespace
+
+void bringToOneGrid(std::vector<NarrowBand>& solids, std::size_t maxMemory,
+                    std::vector<std::string>& notes) {
+  const auto finest = std::min_element(
+      solids.begin(), solids.end(),
+      [](const auto& a, const auto& b) { return a.voxelSize() < b.voxelSize() * (1 - 1e-9); });
+  double halfWidth = finest->halfWidth();
+  for (const NarrowBand& solid : solids) halfWidth = std::min(halfWidth, solid.halfWidth());
+  for (std::size_t i = 0; i < solids.size(); ++i) {
+    if (shareTransform(vdb(*finest), vdb(solids[i]))) {
+      // Half widths that differ only by rounding need no note.
+      if (halfWidth < solids[i].halfWidth() * (1 - 1e-5))
+        notes.push_back(fmt::format("operand {} was narrowed to a half width of {:.6g} voxels",
+                                    i + 1, halfWidth));
+      solids[i] = narrowed(std::move(solids[i]), halfWidth);
+      continue;
+    }
+    notes.push_back(fmt::format(
+        "operand {} was resampled from voxels of {} to the grid of operand {} "
+        "with voxels of {}",
+        i + 1, solids[i].voxelSize(), finest - solids.begin() + 1, finest->voxelSize()));
+    solids[i] = resampleTo(solids[i], finest->indexToWorld(),
+                           {.halfWidth = halfWidth, .maxMemory = maxMemory});
+  }
+  // Voxel sizes may differ in the last bits. Equal half widths then give different backgrounds, so
+  // all bands are shortened to the smallest background.
+  float background = vdb(solids.front()).background();
+  for (const NarrowBand& solid : solids) background = std::min(background, vdb(solid).background());
+  for (NarrowBand& solid : solids)
+    if (vdb(solid).background() != background) endBandAt(editVdb(solid), background);
+}
 
 CsgSigns csgSigns(CsgOperation operation) {
   switch (operation) {
@@ -239,7 +237,7 @@ CsgResult combineMoved(CsgOperation operation, std::vector<NarrowBand> operands,
                        const CsgOptions& options) {
   requireSolids(operands, options);
   CsgResult result;
-  bringToOneGrid(operands, options, result.notes);
+  bringToOneGrid(operands, options.maxMemory, result.notes);
   if (operation == CsgOperation::Union) {
     result.band = uniteAll(std::move(operands), options);
     report(options.progress, 1);

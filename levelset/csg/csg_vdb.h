@@ -2,6 +2,8 @@
 
 // Steps of constructive solid geometry on grids. Includes OpenVDB: for .cpp files only.
 
+#include <cstddef>
+#include <string>
 #include <vector>
 
 #include "levelset/csg/csg.h"
@@ -16,6 +18,11 @@ struct CsgSigns {
   float first, second, result;
 };
 [[nodiscard]] CsgSigns csgSigns(CsgOperation operation);
+
+/// Resamples all solids to the grid of the finest one, and narrows all bands to the smallest half
+/// width. Adds a note for each solid that changes.
+void bringToOneGrid(std::vector<NarrowBand>& solids, std::size_t maxMemory,
+                    std::vector<std::string>& notes);
 
 /// Combines two bands with equal transforms and backgrounds. Corrects the distances where the
 /// minimum or maximum is not a distance. The result may have no inside. Moves the leaf nodes of a

@@ -1,0 +1,188 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "levelset/segmented/junction_fit_vdb.h"
+
+namespace levelset {
+namespace {
+
+using Imath::V3d;
+using openvdb::Coord;
+
+constexpr std::size_t kTerms = InterfaceFit::kTerms;
+constexpr double kFlattest = 0.01;  // least squared slope of a distance
+constexpr double kSpread = 1.4;     // voxels: standard deviation of the weights of samples
+constexpr double kLargest = 1.75;   // voxels: largest distance that is used
+constexpr double kFlatness = 1e-3;  // prefers planes where samples do not determine curvature
+constexpr double kDamping = 1e-3;   // of steps along the curve, where the point is free
+constexpr double kParallel = 0.02;  // least area of the parallelogram of two normals, squared
+constexpr double kDoubt =
+    0.01;  // weight of distances to other than the nearest interface, at first
+constexpr double kAgreement = 0.05;  // voxels: residual that halves the weight of a sample
+constexpr double kFarthest = 1.5;    // voxels: largest move of a point
+constexpr std::size_t kFewest = 5;   // samples
+
+std::array<double, kTerms> termsAt(const V3d& p) {
+  return {1, p.x, p.y, p.z, p.x * p.x, p.y * p.y, p.z * p.z, p.y * p.z, p.z * p.x, p.x * p.y};
+}
+
+double dot(const std::array<double, kTerms>& a, const std::array<double, kTerms>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < kTerms; ++i) sum += a[i] * b[i];
+  return sum;
+}
+
+/// Solves a symmetric positive definite system in place by Cholesky's method. Only the lower
+/// triangle is read.
+/// @return false when the matrix is singular
+template <std::size_t n>
+bool solveCholesky(std::array<std::array<double, n>, n>& a, std::array<double, n>& b) {
+  for (std::size_t j = 0; j < n; ++j) {
+    for (std::size_t k = 0; k < j; ++k)
+      for (std::size_t i = j; i < n; ++i) a[i][j] -= a[i][k] * a[j][k];
+    if (!(a[j][j] > 1e-14)) return false;
+    const double root = std::sqrt(a[j][j]);
+    for (std::size_t i = j; i < n; ++i) a[i][j] /= root;
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t k = 0; k < i; ++k) b[i] -= a[i][k] * b[k];
+    b[i] /= a[i][i];
+  }
+  for (std::size_t i = n; i-- > 0;) {
+    for (std::size_t k = i + 1; k < n; ++k) b[i] -= a[k][i] * b[k];
+    b[i] /= a[i][i];
+  }
+  return true;
+}
+
+}  // namespace
+
+double InterfaceFit::value(const V3d& p) const {
+  return dot(c, termsAt(p - about));
+}
+
+V3d InterfaceFit::gradient(const V3d& p) const {
+  const V3d q = p - about;
+  return {c[1] + 2 * c[4] * q.x + c[8] * q.z + c[9] * q.y,
+          c[2] + 2 * c[5] * q.y + c[7] * q.z + c[9] * q.x,
+          c[3] + 2 * c[6] * q.z + c[7] * q.y + c[8] * q.x};
+}
+
+JunctionFit::JunctionFit(const SegmentedData& data, const Coord& origin)
+    : reader_(data),
+      voxelSize_(data.voxelSize),
+      origin_(origin),
+      samples_(static_cast<std::size_t>(kSide) * kSide * kSide) {
+  const auto perVoxel = static_cast<float>(1 / voxelSize_);
+  for (int x = -kPad; x <= 8 + kPad; ++x)
+    for (int y = -kPad; y <= 8 + kPad; ++y)
+      for (int z = -kPad; z <= 8 + kPad; ++z) {
+        const SegmentedReader::Nearest near = reader_.nearest(origin.offsetBy(x, y, z));
+        samples_[index(x, y, z)] = {near.distance * perVoxel, near.label, near.neighbour, false};
+      }
+  for (int x = -kReach; x <= 8 + kReach; ++x)
+    for (int y = -kReach; y <= 8 + kReach; ++y)
+      for (int z = -kReach; z <= 8 + kReach; ++z) {
+        Sample& sample = samples_[index(x, y, z)];
+        bool isPure = true;
+        for (int i = -1; i <= 1 && isPure; ++i)
+          for (int j = -1; j <= 1 && isPure; ++j)
+            for (int k = -1; k <= 1 && isPure; ++k) {
+              const RegionLabel label = samples_[index(x + i, y + j, z + k)].label;
+              isPure = label == sample.label || label == sample.neighbour;
+            }
+        sample.isPure = isPure;
+      }
+}
+
+std::optional<InterfaceFit> JunctionFit::fit(RegionLabel a, RegionLabel b, const V3d& position) {
+  const V3d about = position - V3d(origin_[0], origin_[1], origin_[2]);
+  struct Known {
+    std::array<double, kTerms> terms;
+    double value, weight;
+    bool isNearest;
+  };
+  std::vector<Known> known;
+  std::size_t count = 0;
+  std::array<int, 3> centre{};
+  for (int axis = 0; axis < 3; ++axis)
+    centre[static_cast<std::size_t>(axis)] =
+        std::clamp(static_cast<int>(std::lround(about[axis])), 0, 8);
+  for (int x = centre[0] - kReach; x <= centre[0] + kReach; ++x)
+    for (int y = centre[1] - kReach; y <= centre[1] + kReach; ++y)
+      for (int z = centre[2] - kReach; z <= centre[2] + kReach; ++z) {
+        const Sample& sample = samples_[index(x, y, z)];
+        if (sample.label == sample.neighbour || (sample.label != a && sample.label != b)) continue;
+        const RegionLabel other = sample.label == a ? b : a;
+        const bool isNearest = sample.neighbour == other;
+        if (!isNearest) continue;
+        const double distance =
+            isNearest ? static_cast<double>(sample.distance)
+                      : static_cast<double>(reader_.distanceTo(origin_.offsetBy(x, y, z), other)) /
+                            voxelSize_;
+        if (distance > kLargest) continue;
+        const V3d p = V3d(x, y, z) - about;
+        const double weight = std::exp(-p.length2() / (2 * kSpread * kSpread));
+        known.push_back({termsAt(p), sample.label == a ? distance : -distance, weight, isNearest});
+        count += isNearest;
+      }
+  if (count < kFewest) return std::nullopt;
+  InterfaceFit result{position, {}};
+  constexpr int kRounds = 4;
+  for (int round = 0; round < kRounds; ++round) {
+    std::array<std::array<double, kTerms>, kTerms> matrix{};
+    std::array<double, kTerms> right{};
+    for (const Known& sample : known) {
+      double weight = sample.weight;
+      if (round == 0) {
+        if (!sample.isNearest) weight *= kDoubt;
+      } else {
+        const double residual = (dot(result.c, sample.terms) - sample.value) / kAgreement;
+        weight /= 1 + residual * residual;
+      }
+      for (std::size_t i = 0; i < kTerms; ++i) {
+        const double scaled = weight * sample.terms[i];
+        for (std::size_t j = 0; j <= i; ++j) matrix[i][j] += scaled * sample.terms[j];
+        right[i] += scaled * sample.value;
+      }
+    }
+    for (std::size_t i = 0; i < kTerms; ++i) matrix[i][i] += i < 4 ? 1e-9 : kFlatness;
+    if (!solveCholesky(matrix, right)) return std::nullopt;
+    result.c = right;
+  }
+  return result;
+}
+
+std::optional<V3d> meet(std::span<const InterfaceFit> interfaces, const V3d& start) {
+  V3d at = start;
+  constexpr int kSteps = 4;
+  for (int step = 0; step < kSteps; ++step) {
+    std::array<std::array<double, 3>, 3> matrix{};
+    std::array<double, 3> right{};
+    for (const InterfaceFit& interface : interfaces) {
+      const double value = interface.value(at);
+      const V3d gradient = interface.gradient(at);
+      const double length2 = gradient.length2();
+      if (!(length2 > kFlattest)) return std::nullopt;
+      for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j)
+          matrix[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] +=
+              gradient[i] * gradient[j] / length2;
+        right[static_cast<std::size_t>(i)] -= gradient[i] * value / length2;
+      }
+    }
+    // Sum of the principal minors of second order: zero if all normals are parallel.
+    const double minors = matrix[0][0] * matrix[1][1] - matrix[0][1] * matrix[1][0] +
+                          matrix[1][1] * matrix[2][2] - matrix[1][2] * matrix[2][1] +
+                          matrix[2][2] * matrix[0][0] - matrix[2][0] * matrix[0][2];
+    if (interfaces.size() > 1 && minors < kParallel) return std::nullopt;
+    for (std::size_t i = 0; i < 3; ++i) matrix[i][i] += kDamping;
+    if (!solveCholesky(matrix, right)) return std::nullopt;
+    at += V3d(right[0], right[1], right[2]);
+    if (!((at - interfaces.front().about).length() <= kFarthest)) return std::nullopt;
+  }
+  return at;
+}
+
+}  // namespace levelset
