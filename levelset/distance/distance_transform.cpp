@@ -297,9 +297,18 @@ FloatGrid::Ptr DistanceSweep::run() {
     pointBlocks_[NearestPoints::slabOf(search_->origin(i))].push_back(i);
   CoordBBox surface = search_->bounds();
   for (const Vec3d& feature : search_->features()) surface.expand(Coord::floor(feature));
-  const int beyond = slabsWithin(std::max(reach_.inside, reach_.outside) + 2) + 1;
-  int first = NearestPoints::slabOf(surface.min()) - beyond;
-  last_ = NearestPoints::slabOf(surface.max()) + beyond;
+  // Grid points inside lie in nodes or tiles of the root; the background is outside. An inward
+  // offset by far more than the size of the solid would visit many empty slabs.
+  CoordBBox nodes = surface;
+  nodes.expand(field_.tree().root().getMinIndex());
+  nodes.expand(field_.tree().root().getMaxIndex());
+  const auto beyond = [](double reach) { return slabsWithin(reach + 2) + 1; };
+  const int low = NearestPoints::slabOf(surface.min()), high = NearestPoints::slabOf(surface.max());
+  int first =
+      std::min(low - beyond(reach_.outside),
+               std::max(low - beyond(reach_.inside), NearestPoints::slabOf(nodes.min()) - 1));
+  last_ = std::max(high + beyond(reach_.outside),
+                   std::min(high + beyond(reach_.inside), NearestPoints::slabOf(nodes.max()) + 1));
   if (!inputLeaves_.empty()) {
     first = std::min(first, inputLeaves_.begin()->first);
     last_ = std::max(last_, inputLeaves_.rbegin()->first);
@@ -307,7 +316,7 @@ FloatGrid::Ptr DistanceSweep::run() {
   found_ = made_ = searched_ = resolved_ = first - 1;
 
   // === Steps
-  nearest_->beginAt(first);
+  nearest_->beginAt(first, last_);
   if (request_.region) findAllPoints();
   const double steps = last_ - first + 1.0, end = meeting_ ? 0.8 : 1;
   for (int g = first >> 1; nearest_->lastFinal() < last_; ++g) {

@@ -474,7 +474,7 @@ void NearestPoints::releaseUpTo(int slab) {
 void NearestPoints::run(const Progress& progress) {
   if (slabs_.empty()) return;
   const int first = firstSlab() - reachInSlabs_;
-  beginAt(first);
+  beginAt(first, lastSlab() + reachInSlabs_);
   for (int g = first >> 1; final_ < lastSlab(); ++g) {
     advance(g);
     const double range = std::max(1, lastSlab() - first + 1);

@@ -2,6 +2,7 @@
 
 // Internal header of levelset: public headers must not include it.
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <map>
@@ -108,8 +109,11 @@ class NearestPoints {
   // states as in rounds over all blocks, and gets the same bits.
 
   [[nodiscard]] static int slabOf(const openvdb::Coord& gridPoint) { return gridPoint.x() >> 3; }
-  /// Sets the first slab that can get a block.
-  void beginAt(int slab) { final_ = slab - 1; }
+  /// Sets the first and the last slab that can get a block.
+  void beginAt(int slab, int last) {
+    final_ = slab - 1;
+    reachInSlabs_ = std::min(reachInSlabs_, last - slab + 1);
+  }
   /// Runs one round of each slab up to 2g. Slabs up to 2g + 1 must be seeded.
   void advance(int g);
   /// Last slab whose blocks do not change any more. A slab is final when neither it nor the slabs
