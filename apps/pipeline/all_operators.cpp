@@ -3,6 +3,7 @@
 #include "apps/pipeline/operators/level_set_operator.h"
 #include "apps/pipeline/operators/solids/adaptive_actions.h"
 #include "apps/pipeline/operators/solids/mesh_action.h"
+#include "apps/pipeline/operators/solids/segment_actions.h"
 #include "apps/pipeline/registry/operator.h"
 #include "levelset/advection/advect.h"
 #include "levelset/components/components.h"
@@ -51,6 +52,8 @@ std::vector<Operator> allOperators() {
       unionOperator(),
       intersectionOperator(),
       differenceOperator(),
+      segmentOperator(),
+      extractOperator(),
       levelSetOperator<levelset::BlendOperator>(),
       levelSetOperator<levelset::SmoothUnionOperator>(),
       levelSetOperator<levelset::SmoothIntersectionOperator>(),

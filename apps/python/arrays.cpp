@@ -146,6 +146,19 @@ py::array_t<double> distancesAt(const levelset::AdaptiveField& field, const py::
   return result;
 }
 
+py::array_t<std::uint16_t> labelsAt(const levelset::SegmentedField& field,
+                                    const py::array& points) {
+  const auto places = floatRows(points, "labels_at", "points");
+  const py::ssize_t count = places.shape(0);
+  py::array_t<std::uint16_t> result(count);
+  const double* p = places.data();
+  std::uint16_t* label = result.mutable_data();
+  const py::gil_scoped_release release;
+  const levelset::SegmentedSampler sampler(field);
+  for (py::ssize_t i = 0; i < count; ++i, p += 3) label[i] = sampler.label(V3d(p[0], p[1], p[2]));
+  return result;
+}
+
 DenseBand bandArray(const levelset::NarrowBand& band, const std::optional<Imath::Box3d>& box,
                     std::size_t maxMemory) {
   const openvdb::FloatGrid& grid = levelset::vdb(band);

@@ -48,6 +48,13 @@ namespace python {
 [[nodiscard]] pybind11::array_t<double> distancesAt(const levelset::AdaptiveField& field,
                                                     const pybind11::array& points);
 
+/// Finds the regions of a segmentation at points.
+/// @param points  n × 3 floats, world units
+/// @return n labels; 0 for the void
+/// @throws levelset::InvalidInput for other shapes and types
+[[nodiscard]] pybind11::array_t<std::uint16_t> labelsAt(const levelset::SegmentedField& field,
+                                                        const pybind11::array& points);
+
 /// Signed distances at the grid points of a box.
 struct DenseBand {
   pybind11::array_t<float> values;

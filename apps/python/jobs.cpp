@@ -105,9 +105,9 @@ std::string bytesOf(const Value& value) {
   if (value.kind() == Kind::Points) return pipeline::bytesOf(value.cloud());
   if (value.kind() != Kind::Band && value.kind() != Kind::Field)
     throw UsageError(fmt::format(
-        "pickle: a {} cannot be sent to another process; send the values computed from it, "
+        "pickle: {} cannot be sent to another process; send the values computed from it, "
         "or its inputs",
-        kindName(value.kind())));
+        kindPhrase(value.kind())));
   const TemporaryFolder folder;
   if (value.kind() == Kind::Band)
     levelset::writeBand(folder.file(), value.band(), {.name = value.band().name()});

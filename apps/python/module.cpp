@@ -50,6 +50,8 @@ const char* className(Kind kind) {
       return "PointCloud";
     case Kind::Adaptive:
       return "AdaptiveField";
+    case Kind::Segmentation:
+      return "Segmentation";
   }
   return "";
 }
@@ -396,6 +398,21 @@ PYBIND11_MODULE(_core, module) {
            [](const Handle& node, const py::array& points) {
              const pipeline::Value value = valueOf(node);
              return python::distancesAt(value.adaptive(), points);
+           })
+      .def("region_labels",
+           [](const Handle& node) {
+             const pipeline::Value value = valueOf(node);
+             return value.segmentation().labels();
+           })
+      .def("region_voxel",
+           [](const Handle& node) {
+             const pipeline::Value value = valueOf(node);
+             return value.segmentation().voxelSize();
+           })
+      .def("labels_at",
+           [](const Handle& node, const py::array& points) {
+             const pipeline::Value value = valueOf(node);
+             return python::labelsAt(value.segmentation(), points);
            })
       .def("band_array", [](const Handle& node, const py::object& box) {
         const pipeline::Value value = valueOf(node);

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "levelset/adaptive/adaptive_tree.h"
+#include "levelset/adaptive/octree/adaptive_tree.h"
 #include "levelset/tree_hash_vdb.h"
 
 namespace levelset {

@@ -10,7 +10,7 @@
 
 namespace levelset {
 
-struct AdaptiveTree;  // defined in levelset/adaptive/adaptive_tree.h, for the .cpp files
+struct AdaptiveTree;  // defined in levelset/adaptive/octree/adaptive_tree.h, for the .cpp files
 
 /// A solid as a signed distance field on an octree [Frisken00, Sigg06]. Cells are small where the
 /// distance is far from linear. Values are `float` in world units, negative inside. The field is

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "levelset/adaptive/adaptive_tree.h"
+#include "levelset/adaptive/octree/adaptive_tree.h"
 #include "levelset/memory_limit.h"
 
 namespace levelset {

@@ -16,8 +16,8 @@
 #include <utility>
 #include <vector>
 
-#include "levelset/adaptive/adaptive_tree.h"
-#include "levelset/adaptive/hanging_nodes.h"
+#include "levelset/adaptive/octree/adaptive_tree.h"
+#include "levelset/adaptive/octree/hanging_nodes.h"
 #include "levelset/error.h"
 #include "levelset/memory_limit.h"
 #include "levelset/mesh.h"

@@ -24,7 +24,7 @@
 #include <string>
 #include <vector>
 
-#include "levelset/adaptive/hashed_octree.h"
+#include "levelset/adaptive/octree/hashed_octree.h"
 #include "levelset/adaptive/mesh_distance.h"
 #include "levelset/adaptive/mesh_to_adaptive.h"
 #include "levelset/convert/mesh_to_band.h"

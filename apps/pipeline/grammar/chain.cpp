@@ -240,12 +240,23 @@ class ChainBuilder {
     if (named.size() >= wanted) return named;
     const std::size_t missing = wanted - named.size();
     if (stack_.size() < missing && action.op->operandsOptional) return named;
-    const std::size_t taken = std::min(missing, stack_.size());
+    const std::size_t taken = named.empty() && action.op->takesStack
+                                  ? std::max(std::min(missing, stack_.size()), fitting(*action.op))
+                                  : std::min(missing, stack_.size());
     std::vector<std::size_t> operands(stack_.end() - static_cast<std::ptrdiff_t>(taken),
                                       stack_.end());
     if (action.op->flow == Flow::Makes) stack_.resize(stack_.size() - taken);
     operands.insert(operands.end(), named.begin(), named.end());
     return operands;
+  }
+
+  /// Number of values on top of the stack that fit the last operand of an action.
+  [[nodiscard]] std::size_t fitting(const Operator& op) const {
+    const std::vector<Kind>& kinds = op.operands.back();
+    const auto end = std::find_if(stack_.rbegin(), stack_.rend(), [&](std::size_t node) {
+      return std::find(kinds.begin(), kinds.end(), nodes_[node].kind) == kinds.end();
+    });
+    return static_cast<std::size_t>(end - stack_.rbegin());
   }
 
   std::vector<Node>& nodes_;

@@ -17,27 +17,28 @@ using levelset::UsageError;
 std::string mismatch(const Operator& op, std::size_t index, Kind found,
                      const std::vector<Kind>& allowed) {
   const char* remedy = "";
-  if (found == Kind::Mesh && allowed == std::vector{Kind::Band})
-    remedy = "; put 'level-set' before it";
+  const auto takes = [&](Kind kind) {
+    return std::find(allowed.begin(), allowed.end(), kind) != allowed.end();
+  };
+  if (found == Kind::Mesh && takes(Kind::Band)) remedy = "; put 'level-set' before it";
   if (found == Kind::Band && !allowed.empty() && allowed[0] == Kind::Mesh)
     remedy = "; put 'mesh' before it";
   if (found == Kind::Surface)
     remedy = "; it has no inside, so only patches and 'texture --alone' can use it";
   if (found == Kind::Adaptive)
-    remedy = std::find(allowed.begin(), allowed.end(), Kind::Band) != allowed.end()
-                 ? "; put 'to-band' before it"
-                 : "; put 'mesh' or 'to-band' before it";
+    remedy = takes(Kind::Band) ? "; put 'to-band' before it" : "; put 'mesh' before it";
+  if (found == Kind::Segmentation) remedy = "; put 'extract LABEL' before it";
   if (found == Kind::Patch) remedy = "; 'texture' builds a level set from it";
   if (found == Kind::Scene) remedy = "; 'render' draws it, 'write' saves it as .json";
   std::string kinds;
   for (std::size_t i = 0; i < allowed.size(); ++i)
-    kinds += fmt::format("{}a {}",
+    kinds += fmt::format("{}{}",
                          i == 0                    ? ""
                          : i + 1 == allowed.size() ? " or "
                                                    : ", ",
-                         kindName(allowed[i]));
-  return fmt::format("{}: operand {} is a {}, but {} is needed{}", op.name, index + 1,
-                     kindName(found), kinds, remedy);
+                         kindPhrase(allowed[i]));
+  return fmt::format("{}: operand {} is {}, but {} is needed{}", op.name, index + 1,
+                     kindPhrase(found), kinds, remedy);
 }
 
 void checkOperands(const Node& node, const std::vector<Node>& before) {
@@ -70,8 +71,8 @@ void checkNamed(const Node& node, const std::vector<Node>& before) {
     if (isMesh ? value.kind == Kind::Mesh
                : value.kind == Kind::Field || (isScalar && value.kind == Kind::Band))
       continue;
-    throw UsageError(fmt::format("{}: --{}: '@{}' is a {}, but a {} is needed", node.op->name,
-                                 option, value.name, kindName(value.kind),
+    throw UsageError(fmt::format("{}: --{}: '@{}' is {}, but a {} is needed", node.op->name, option,
+                                 value.name, kindPhrase(value.kind),
                                  isMesh     ? "mesh"
                                  : isScalar ? "field or a level set"
                                             : "field"));

@@ -11,6 +11,7 @@
 #include "levelset/files/band_file.h"
 #include "levelset/mesh_files/mesh_file.h"
 #include "levelset/point_files/point_file.h"
+#include "levelset/segmented/segmented_mesh_file.h"
 #include "levelset/volume_files/volume_file.h"
 #include "mapping/patches/patch_file.h"
 
@@ -182,19 +183,21 @@ void validateRead(const Invocation& in) {
 
 void validateWrite(const Invocation& in) {
   const Kind kind = fileKind(in), held = in.operands[0].kind();
+  const bool isLabelled = held == Kind::Segmentation && levelset::holdsRegionLabels(formatName(in));
   const bool isCloud = held == Kind::Points && levelset::holdsPoints(formatName(in));
-  if (held != kind && !isCloud && !(held == Kind::Field && kind == Kind::Band)) {
-    throw UsageError(
-        fmt::format("write: a {} cannot be written as '{}'; {}", kindName(held), formatName(in),
-                    held == Kind::Band       ? "put 'mesh' before it, or write .vdb"
-                    : held == Kind::Field    ? "write .vdb"
-                    : held == Kind::Patch    ? "write .patch, or put 'mesh' before it"
-                    : held == Kind::Scene    ? "write .json"
-                    : held == Kind::Volume   ? "put 'isosurface' before it"
-                    : held == Kind::Adaptive ? "put 'mesh' or 'to-band' before it"
-                    : held == Kind::Points   ? "write .ply, .obj, .xyz, .csv, .pts or .vdb"
-                    : kind == Kind::Points   ? "put 'sample' before it, or write .ply"
-                                             : "put 'level-set' before it, or write .ply"));
+  if (held != kind && !isCloud && !isLabelled && !(held == Kind::Field && kind == Kind::Band)) {
+    throw UsageError(fmt::format(
+        "write: {} cannot be written as '{}'; {}", kindPhrase(held), formatName(in),
+        held == Kind::Band           ? "put 'mesh' before it, or write .vdb"
+        : held == Kind::Field        ? "write .vdb"
+        : held == Kind::Patch        ? "write .patch, or put 'mesh' before it"
+        : held == Kind::Scene        ? "write .json"
+        : held == Kind::Volume       ? "put 'isosurface' before it"
+        : held == Kind::Adaptive     ? "put 'mesh' or 'to-band' before it"
+        : held == Kind::Segmentation ? "write .ply or .obj, or put 'extract LABEL' before it"
+        : held == Kind::Points       ? "write .ply, .obj, .xyz, .csv, .pts or .vdb"
+        : kind == Kind::Points       ? "put 'sample' before it, or write .ply"
+                                     : "put 'level-set' before it, or write .ply"));
   }
   if (!levelset::isBandFormat(formatName(in)) && in.given("name"))
     throw UsageError(fmt::format(
@@ -222,6 +225,13 @@ Value write(Invocation& in) {
                          {.name = in.given("name") ? in.text("name") : value.field().name(),
                           .format = in.text("format"),
                           .progress = in.progress});
+  } else if (value.kind() == Kind::Segmentation) {
+    levelset::writeSegmentedMesh(
+        file,
+        levelset::segmentedToMesh(
+            value.segmentation(),
+            {.maxMemory = in.maxMemory, .progress = levelset::subProgress(in.progress, 0, 0.8)}),
+        {.format = in.text("format"), .progress = levelset::subProgress(in.progress, 0.8, 1)});
   } else if (value.kind() == Kind::Points) {
     levelset::writePoints(file, value.cloud(),
                           {.format = in.text("format"),
@@ -310,7 +320,9 @@ Operator writeOperator() {
       .group = "Files",
       .summary =
           "write a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb, nvdb), points "
-          "(ply, obj, xyz, csv, pts, also .gz, vdb), patches (patch), a scene (json)",
+          "(ply, obj, xyz, csv, pts, also .gz, vdb), patches (patch), a scene (json), a "
+          "segmentation "
+          "(ply, obj, with the labels on both sides of each face)",
       .details =
           "Data is written to a temporary file in the same folder, which replaces an existing file "
           "only when it is complete. The level sets and meshes of a scene go to .vdb and .ply "
@@ -337,7 +349,7 @@ Operator writeOperator() {
                 "points get the name 'points'",
             .fallback = "surface"}},
       .operands = {{Kind::Mesh, Kind::Band, Kind::Field, Kind::Patch, Kind::Scene, Kind::Points,
-                    Kind::Adaptive}},
+                    Kind::Adaptive, Kind::Segmentation}},
       .flow = Flow::PassesThrough,
       .run = write,
       .cost = costPerVoxel(50, 0, 20),

@@ -90,7 +90,10 @@ struct Operator {
   std::string formerName = {};  ///< former name of the action, still accepted; empty: none
   std::vector<Param> params = {};
   std::vector<std::vector<Kind>> operands = {};  ///< for each operand, the kinds that it may have
-  bool takesMore = false;         ///< more operands may follow, of the kinds of the last one
+  bool takesMore = false;  ///< more operands may follow, of the kinds of the last one
+  /// Without named operands, the action takes all values on top of the stack that are of the kinds
+  /// of its last operand.
+  bool takesStack = false;
   bool operandsOptional = false;  ///< may run without any operand (`info FILE`)
   bool readsNames = false;   ///< the result depends on the names that --as gave to the operands
   bool isRepeatable = true;  ///< the same operands, options and files give the same result

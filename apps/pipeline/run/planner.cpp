@@ -65,7 +65,7 @@ double bytesOf(const std::optional<Plan>& plan, const RegionOfInterest& roi) {
   if (plan->kind == Kind::Mesh || plan->kind == Kind::Points) return plan->bytes();
   const bool isTold = (plan->kind == Kind::Band && plan->voxelSize > 0) ||
                       plan->kind == Kind::Field || plan->kind == Kind::Volume ||
-                      plan->kind == Kind::Adaptive;
+                      plan->kind == Kind::Adaptive || plan->kind == Kind::Segmentation;
   return isTold ? restricted(*plan, roi).bytes() : 0;
 }
 

@@ -3,10 +3,14 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
+#include <map>
+#include <string>
 
 #include "levelset/adaptive/adaptive_to_mesh.h"
 #include "levelset/error.h"
 #include "levelset/geometry/vertex_normals.h"
+#include "levelset/segmented/segmented_to_mesh.h"
 
 namespace pipeline {
 
@@ -33,8 +37,14 @@ const char* kindName(Kind kind) {
       return "point cloud";
     case Kind::Adaptive:
       return "adaptive field";
+    case Kind::Segmentation:
+      return "segmentation";
   }
   return "";
+}
+
+std::string kindPhrase(Kind kind) {
+  return fmt::format("{} {}", kind == Kind::Adaptive ? "an" : "a", kindName(kind));
 }
 
 levelset::ValuePlan Plan::estimate() const {
@@ -60,7 +70,9 @@ double Plan::activeVoxels() const {
 }
 
 double Plan::bytes() const {
-  if (kind == Kind::Field || kind == Kind::Volume || kind == Kind::Adaptive) return fieldBytes;
+  if (kind == Kind::Field || kind == Kind::Volume || kind == Kind::Adaptive ||
+      kind == Kind::Segmentation)
+    return fieldBytes;
   if (kind == Kind::Points) return points * pointBytes;
   // Three vertex indices for each triangle, and one position for every two triangles.
   if (kind == Kind::Mesh) return (3 * sizeof(std::uint32_t) + sizeof(Imath::V3d) / 2.0) * triangles;
@@ -96,6 +108,7 @@ Value::Value(levelset::Volume volume)
 Value::Value(levelset::PointCloud cloud)
     : data_(std::make_shared<const levelset::PointCloud>(std::move(cloud))) {}
 Value::Value(levelset::AdaptiveField field) : data_(std::move(field)) {}
+Value::Value(levelset::SegmentedField field) : data_(std::move(field)) {}
 Value::Value(Plan plan) : plan_(plan) {}
 
 Kind Value::kind() const {
@@ -116,6 +129,8 @@ Kind Value::kind() const {
       return Kind::Points;
     case 8:
       return Kind::Adaptive;
+    case 9:
+      return Kind::Segmentation;
     default:
       return plan_->kind;
   }
@@ -125,9 +140,9 @@ template <typename T>
 const T& Value::as(Kind wanted) const {
   if (const T* value = std::get_if<T>(&data_)) return *value;
   throw levelset::UsageError(
-      fmt::format("the value is a {}, but a {} is needed; choose "
+      fmt::format("the value is {}, but {} is needed; choose "
                   "another operand, or another grid of the file",
-                  kindName(kind()), kindName(wanted)));
+                  kindPhrase(kind()), kindPhrase(wanted)));
 }
 
 const TriMesh& Value::mesh() const {
@@ -157,6 +172,10 @@ const levelset::PointCloud& Value::cloud() const {
 
 const levelset::AdaptiveField& Value::adaptive() const {
   return as<levelset::AdaptiveField>(Kind::Adaptive);
+}
+
+const levelset::SegmentedField& Value::segmentation() const {
+  return as<levelset::SegmentedField>(Kind::Segmentation);
 }
 
 const Plan& Value::plan() const {
@@ -199,6 +218,14 @@ const Plan& Value::plan() const {
       plan.bounds = adaptive().zeroSetBounds();
       plan.fieldBytes = static_cast<double>(adaptive().memoryUse());
       break;
+    case Kind::Segmentation:
+      plan.bounds = segmentation().interfaceBounds();
+      plan.voxelSize = segmentation().voxelSize();
+      plan.halfWidth = segmentation().halfWidth();
+      plan.area = static_cast<double>(segmentation().activeVoxelCount()) * plan.voxelSize *
+                  plan.voxelSize / (2 * plan.halfWidth);
+      plan.fieldBytes = static_cast<double>(segmentation().memoryUse());
+      break;
     case Kind::Scene:
       plan.bounds = scene().scene.bounds();
       plan.bounds.extendBy(scene().scene.volumeBounds());
@@ -224,6 +251,32 @@ std::shared_ptr<const TriMesh> smoothMesh(TriMesh mesh) {
   return std::make_shared<const TriMesh>(std::move(mesh));
 }
 
+/// Makes a mesh of each region: the interfaces with void and regions of smaller labels.
+std::vector<render::MeshPart> partsOf(const levelset::SegmentedField& field) {
+  const levelset::SegmentedMesh all = levelset::segmentedToMesh(field);
+  std::map<levelset::RegionLabel, TriMesh> regions;
+  for (std::size_t t = 0; t < all.sides.size(); ++t)
+    regions[all.sides[t].behind].triangles.push_back(all.mesh.triangles[t]);
+  // The colours of Okabe and Ito, which people with colour blindness can tell apart.
+  constexpr std::array<std::array<float, 3>, 7> kColours = {{{0.90f, 0.62f, 0.00f},
+                                                             {0.34f, 0.71f, 0.91f},
+                                                             {0.00f, 0.62f, 0.45f},
+                                                             {0.94f, 0.89f, 0.26f},
+                                                             {0.00f, 0.45f, 0.70f},
+                                                             {0.84f, 0.37f, 0.00f},
+                                                             {0.80f, 0.47f, 0.65f}}};
+  std::vector<render::MeshPart> parts;
+  for (auto& [label, region] : regions) {
+    region.positions = all.mesh.positions;
+    const auto& c = kColours[(label + kColours.size() - 1) % kColours.size()];
+    parts.push_back({.mesh = smoothMesh(std::move(region)),
+                     .colour = Imath::C3f(c[0], c[1], c[2]),
+                     .id = label,
+                     .name = "region " + std::to_string(label)});
+  }
+  return parts;
+}
+
 }  // namespace
 
 render::ViewedScene sceneOf(const Value& drawn) {
@@ -235,6 +288,8 @@ render::ViewedScene sceneOf(const Value& drawn) {
         {std::shared_ptr<const TriMesh>(std::shared_ptr<const void>(), &drawn.mesh())});
   else if (drawn.kind() == Kind::Adaptive)
     viewed.scene.meshes.push_back({smoothMesh(levelset::adaptiveToMesh(drawn.adaptive()))});
+  else if (drawn.kind() == Kind::Segmentation)
+    viewed.scene.meshes = partsOf(drawn.segmentation());
   else
     viewed.scene.solids.push_back({.band = drawn.band()});
   return viewed;

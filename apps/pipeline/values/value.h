@@ -16,6 +16,7 @@
 #include "levelset/narrow_band.h"
 #include "levelset/operator/plan.h"
 #include "levelset/points/point_cloud.h"
+#include "levelset/segmented/segmented_field.h"
 #include "levelset/volumes/volume.h"
 #include "mapping/animation/animation.h"
 #include "mapping/patches/patch.h"
@@ -30,11 +31,14 @@ enum class Kind {
   Field,
   Surface,  ///< a band around an open surface: a base for patches
   Scene,
-  Volume,   ///< numbers on a regular grid, from a scanner or a simulation
-  Points,   ///< points without connectivity, from a scanner or a simulation
-  Adaptive  ///< a solid as distances on an octree
+  Volume,       ///< numbers on a regular grid, from a scanner or a simulation
+  Points,       ///< points without connectivity, from a scanner or a simulation
+  Adaptive,     ///< a solid as distances on an octree
+  Segmentation  ///< a partition of space into regions with labels
 };
 [[nodiscard]] const char* kindName(Kind kind);
+/// Returns the name with its article: "a mesh", "an adaptive field".
+[[nodiscard]] std::string kindPhrase(Kind kind);
 
 /// Predicted properties of a value, known before it is computed. They suffice to resolve lengths
 /// and to estimate cost.
@@ -44,10 +48,11 @@ struct Plan {
   double area = 0;           ///< surface area, world units²
   double voxelSize = 0;      ///< voxel size, world units; 0: the value has no voxels
   double halfWidth = 0;      ///< half width, voxels; bands and scenes only
-  double fieldBytes = 0;     ///< memory, bytes; fields, volumes and adaptive fields only
-  double triangles = 0;      ///< number of triangles; meshes only; 0: unknown
-  double points = 0;         ///< number of points of a point cloud; 0: unknown
-  double pointBytes = 0;     ///< memory of a point, bytes; point clouds only
+  /// Memory, bytes; fields, volumes, adaptive fields and segmentations only.
+  double fieldBytes = 0;
+  double triangles = 0;   ///< number of triangles; meshes only; 0: unknown
+  double points = 0;      ///< number of points of a point cloud; 0: unknown
+  double pointBytes = 0;  ///< memory of a point, bytes; point clouds only
   /// Patches only: size along u, size along v and height, world units. Height 0: the texture that
   /// is mapped will determine it.
   Imath::V3d patchSize = Imath::V3d(0);
@@ -109,11 +114,12 @@ class Value {
   explicit Value(levelset::Volume volume);
   explicit Value(levelset::PointCloud cloud);
   explicit Value(levelset::AdaptiveField field);
+  explicit Value(levelset::SegmentedField field);
   explicit Value(Plan plan);
 
   [[nodiscard]] Kind kind() const;
-  // mesh(), band(), patch(), field(), scene(), volume(), cloud() and adaptive() return the value as
-  // that kind. A file may contain another kind than its name suggests.
+  // mesh(), band() and so on return the value as that kind. A file may contain another kind than
+  // its name suggests.
   // @throws levelset::UsageError if the value is of another kind
   [[nodiscard]] const levelset::TriMesh& mesh() const;
   [[nodiscard]] const levelset::NarrowBand& band() const;
@@ -123,6 +129,7 @@ class Value {
   [[nodiscard]] const levelset::Volume& volume() const;
   [[nodiscard]] const levelset::PointCloud& cloud() const;
   [[nodiscard]] const levelset::AdaptiveField& adaptive() const;
+  [[nodiscard]] const levelset::SegmentedField& segmentation() const;
 
   /// Returns the plan of the value: its kind, bounds, area and grid, which estimates need. Computes
   /// it from the value on the first call.
@@ -139,13 +146,14 @@ class Value {
   std::variant<std::monostate, std::shared_ptr<const levelset::TriMesh>, levelset::NarrowBand,
                std::shared_ptr<const PatchValue>, levelset::FieldGrid,
                std::shared_ptr<const render::ViewedScene>, std::shared_ptr<const levelset::Volume>,
-               std::shared_ptr<const levelset::PointCloud>, levelset::AdaptiveField>
+               std::shared_ptr<const levelset::PointCloud>, levelset::AdaptiveField,
+               levelset::SegmentedField>
       data_;
   mutable std::optional<Plan> plan_;
 };
 
-/// Builds a scene that shows a level set, a mesh, an adaptive field or a scene. The value must
-/// outlive the result. Of an adaptive field it makes the mesh.
+/// Builds a scene that shows a level set, a mesh, an adaptive field, a segmentation or a scene. The
+/// value must outlive the result. Of adaptive fields and segmentations it makes meshes.
 [[nodiscard]] render::ViewedScene sceneOf(const Value& drawn);
 
 }  // namespace pipeline

@@ -351,6 +351,26 @@ class AdaptiveField(_Drawn):
         return self._known().distances(numpy.asarray(points))
 
 
+class Segmentation(_Drawn):
+    """A partition of space into regions with labels: 0 is the void around them."""
+
+    __slots__ = ()
+
+    @property
+    def labels(self):
+        """Labels of the regions, ascending, without the void. Computes the value."""
+        return self._known().region_labels()
+
+    @property
+    def voxel(self):
+        """Voxel size, world units. Computes the value."""
+        return self._known().region_voxel()
+
+    def labels_at(self, points):
+        """Labels at points: (n, 3) floats, world units. Returns n uint16; 0 for the void."""
+        return self._known().labels_at(numpy.asarray(points))
+
+
 class Scan(Value):
     """Numbers on a regular grid, from a scanner or a simulation."""
 
@@ -394,5 +414,7 @@ class PointCloud(Value):
 
 classes = {
     c.__name__: c
-    for c in (Solid, Surface, Mesh, Patch, Field, Scene, Scan, PointCloud, AdaptiveField)
+    for c in (
+        Solid, Surface, Mesh, Patch, Field, Scene, Scan, PointCloud, AdaptiveField, Segmentation
+    )  # fmt: skip
 }

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include "apps/pipeline/operators/level_set_operator.h"
+#include "apps/pipeline/operators/solids/segment_actions.h"
 #include "levelset/adaptive/adaptive_to_mesh.h"
 #include "levelset/error.h"
 #include "levelset/meshing/band_to_mesh.h"
@@ -11,6 +12,9 @@
 namespace pipeline {
 namespace {
 
+bool isSegmentation(const Invocation& in) {
+  return in.operands[0].kind() == Kind::Segmentation;
+}
 bool isAdaptive(const Invocation& in) {
   return in.operands[0].kind() == Kind::Adaptive;
 }
@@ -28,10 +32,14 @@ levelset::TriMesh meshOfPatches(const std::vector<mapping::Patch>& patches,
 
 void validateMesh(const Invocation& in) {
   for (const char* option : {"adaptivity", "sharp", "method", "original", "edge-length", "angle"})
-    if ((isPatch(in) || isAdaptive(in)) && in.given(option))
+    if (in.operands[0].kind() != Kind::Band && in.given(option))
       throw levelset::UsageError(
           fmt::format("mesh: --{} applies to a level set, not to {}; leave it out", option,
-                      isPatch(in) ? "a patch" : "an adaptive field"));
+                      isPatch(in)      ? "a patch"
+                      : isAdaptive(in) ? "an adaptive field"
+                                       : "a segmentation"));
+  if (in.given("label") && !isSegmentation(in))
+    throw levelset::UsageError("mesh: --label is for a segmentation; leave it out");
   if (in.given("original") && in.text("method") != "extended")
     throw levelset::UsageError(
         "mesh: --original is for --method extended; give that method, or leave it out");
@@ -54,14 +62,20 @@ Operator meshOperator() {
                   {.name = "sheets",
                    .type = ParamType::Flag,
                    .doc = "for patches: make an open mesh of each layer of particles, in place of "
-                          "one closed surface"}},
+                          "one closed surface"},
+                  {.name = "label",
+                   .type = ParamType::Integer,
+                   .doc = "for segmentations: make the closed surface of the region with this "
+                          "label, in place of all interfaces",
+                   .range = Range::Positive}},
        .validate = validateMesh,
        .prepare = setOriginal});
-  op.operands = {{Kind::Band, Kind::Patch, Kind::Adaptive}};
+  op.operands = {{Kind::Band, Kind::Patch, Kind::Adaptive, Kind::Segmentation}};
   op.run = [ofBand = op.run](Invocation& in) {
     if (isAdaptive(in))
       return Value(levelset::adaptiveToMesh(in.operands[0].adaptive(),
                                             {.maxMemory = in.maxMemory, .progress = in.progress}));
+    if (isSegmentation(in)) return meshOfSegmentation(in);
     if (!isPatch(in)) return ofBand(in);
     return Value(meshOfPatches(
         in.operands[0].patch().patches,

@@ -1,6 +1,6 @@
 // Hashed octree against a tree that is searched from the root.
 
-#include "levelset/adaptive/hashed_octree.h"
+#include "levelset/adaptive/octree/hashed_octree.h"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "levelset/adaptive/cell_key.h"
+#include "levelset/adaptive/octree/cell_key.h"
 
 namespace levelset {
 

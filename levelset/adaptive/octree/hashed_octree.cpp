@@ -1,4 +1,4 @@
-#include "levelset/adaptive/hashed_octree.h"
+#include "levelset/adaptive/octree/hashed_octree.h"
 
 #include <algorithm>
 #include <bit>

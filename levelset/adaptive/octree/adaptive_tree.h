@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "levelset/adaptive/hashed_octree.h"
+#include "levelset/adaptive/octree/hashed_octree.h"
 
 namespace levelset {
 

@@ -1,4 +1,4 @@
-#include "levelset/adaptive/hanging_nodes.h"
+#include "levelset/adaptive/octree/hanging_nodes.h"
 
 #include <tbb/parallel_for.h>
 

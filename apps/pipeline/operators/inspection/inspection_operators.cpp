@@ -8,6 +8,7 @@
 #include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/json_output.h"
 #include "apps/pipeline/operators/solids/adaptive_actions.h"
+#include "apps/pipeline/operators/solids/segment_actions.h"
 #include "apps/pipeline/operators/volume_params.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/adaptive/adaptive_to_mesh.h"
@@ -34,12 +35,40 @@ Json toJson(const Imath::Box3d& box) {
   return {{"min", toJson(box.min)}, {"max", toJson(box.max)}};
 }
 
+std::string figureText(const Json& figure) {
+  return figure.is_number_float() ? fmt::format("{:.9g}", figure.get<double>()) : figure.dump();
+}
+
 std::string coordinates(const Imath::V3d& v) {
   return fmt::format("{:.6g},{:.6g},{:.6g}", v.x, v.y, v.z);
 }
 
+/// Text of the figures of a segmentation: one line for each region and interface.
+std::string regionsText(const Json& json) {
+  std::string text;
+  for (const auto& [key, entry] : json.items())
+    if (!entry.is_array()) text += fmt::format("{:<22}{}\n", key, figureText(entry));
+  for (const Json& material : json["materials"])
+    text += fmt::format("material {:<13}volume {:.9g}, area {:.9g}\n", material["label"].get<int>(),
+                        material["volume"].get<double>(), material["area"].get<double>());
+  for (const Json& side : json["interfaces"])
+    text += fmt::format(
+        "interface {:<12}area {:.9g}\n",
+        fmt::format("{}|{}", side["labels"][0].get<int>(), side["labels"][1].get<int>()),
+        side["area"].get<double>());
+  return text;
+}
+
+Value measureRegions(Invocation& in) {
+  const Json json = measuresOf(in.operands[0].segmentation(), in);
+  in.notes.detailsJson = json.dump();
+  in.output = asksJson(in) ? printed(json) : regionsText(json);
+  return in.operands[0];
+}
+
 Value measure(Invocation& in) {
   const Value& value = in.operands[0];
+  if (value.kind() == Kind::Segmentation) return measureRegions(in);
   levelset::Measurement m;
   if (value.kind() == Kind::Band)
     m = levelset::measure(value.band(), in.progress);
@@ -100,9 +129,7 @@ Value measure(Invocation& in) {
       in.output += fmt::format("{:<22}{} to {}\n", key, coordinates(m.bounds.min),
                                coordinates(m.bounds.max));
     else
-      in.output += fmt::format(
-          "{:<22}{}\n", key,
-          entry.is_number_float() ? fmt::format("{:.9g}", entry.get<double>()) : entry.dump());
+      in.output += fmt::format("{:<22}{}\n", key, figureText(entry));
   }
   return value;
 }
@@ -290,6 +317,14 @@ Json valueInfo(const Value& value, Invocation& in) {
     json["cells"] = field.leafCount();
     json["bytes"] = field.memoryUse();
     json["hash"] = fmt::format("{:016x}", field.contentHash());
+  } else if (value.kind() == Kind::Segmentation) {
+    const levelset::SegmentedField& field = value.segmentation();
+    json["labels"] = field.labels();
+    json["voxel_size"] = field.voxelSize();
+    json["half_width"] = field.halfWidth();
+    json["active_voxels"] = field.activeVoxelCount();
+    json["bytes"] = field.memoryUse();
+    json["hash"] = fmt::format("{:016x}", field.contentHash());
   } else if (value.kind() == Kind::Points) {
     addCloud(json, value.cloud(), in);
   } else if (value.kind() == Kind::Scene) {
@@ -382,10 +417,14 @@ Operator measureOperator() {
           "(k1 + k2) / 2 over the surface; euler is V - E + F of the surface. For a mesh, "
           "radius_ratio is the mean of 2 r / R of its triangles, with the radii of the inscribed "
           "and "
-          "the circumscribed circle, and valence_six the share of vertices with six triangles.",
+          "the circumscribed circle, and valence_six the share of vertices with six triangles. For "
+          "a "
+          "segmentation, materials has the volume and the area of each region, interfaces the area "
+          "between each pair of regions, and junction_length the length of the curves where three "
+          "regions meet.",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! measure --json",
       .params = {jsonParam()},
-      .operands = {{Kind::Band, Kind::Mesh, Kind::Adaptive}},
+      .operands = {{Kind::Band, Kind::Mesh, Kind::Adaptive, Kind::Segmentation}},
       .flow = Flow::PassesThrough,
       .run = measure,
       .cost = costPerVoxel(720, 130, 520),
@@ -456,7 +495,7 @@ Operator infoOperator() {
                   .doc = "format of the file; default: by its extension"},
                  jsonParam()},
       .operands = {{Kind::Band, Kind::Mesh, Kind::Patch, Kind::Field, Kind::Surface, Kind::Scene,
-                    Kind::Volume, Kind::Points, Kind::Adaptive}},
+                    Kind::Volume, Kind::Points, Kind::Adaptive, Kind::Segmentation}},
       .operandsOptional = true,
       .flow = Flow::PassesThrough,
       .run = info,

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "levelset/adaptive/adaptive_tree.h"
+#include "levelset/adaptive/octree/adaptive_tree.h"
 
 namespace levelset {
 

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "levelset/progress.h"
+#include "levelset/segmented/segmented_to_mesh.h"
+
+namespace levelset {
+
+struct WriteSegmentedMeshOptions {
+  std::string format = {};  ///< "ply" or "obj", with ".gz" appended if compressed; empty: by name
+  Progress progress = {};
+};
+
+/// Writes the interfaces of a partition with the labels on both sides of each triangle. PLY has
+/// them as the properties `front` and `behind` of the faces; the normals point to `front`. OBJ has
+/// one group for each pair of labels, "interface_FRONT_BEHIND".
+/// @throws UsageError for another format; IoError; Cancelled
+void writeSegmentedMesh(const std::filesystem::path& path, const SegmentedMesh& mesh,
+                        const WriteSegmentedMeshOptions& options = {});
+
+/// Returns true for a file name or format that writeSegmentedMesh supports.
+[[nodiscard]] bool holdsRegionLabels(const std::filesystem::path& nameOrFormat);
+
+}  // namespace levelset

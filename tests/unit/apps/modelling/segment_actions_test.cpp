@@ -1,0 +1,140 @@
+// Segmentations on the command line: segment, extract, and the actions that take them.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <string>
+
+#include "tests/support/command_line.h"
+#include "tests/support/files.h"
+
+namespace segment_actions_test {
+
+using Json = nlohmann::json;
+
+class SegmentActions : public support::ShellTest {
+ protected:
+  Json json(const std::string& arguments) {
+    const support::Outcome outcome = levelsmith(arguments);
+    EXPECT_EQ(outcome.code, 0) << arguments << "\n" << outcome.err;
+    return outcome.code == 0 ? Json::parse(outcome.out) : Json();
+  }
+  void expectRefusal(const std::string& arguments, int code, const std::string& part) {
+    const support::Outcome outcome = levelsmith(arguments);
+    EXPECT_EQ(outcome.code, code) << arguments << "\n" << outcome.err;
+    EXPECT_NE(outcome.err.find(part), std::string::npos) << outcome.err;
+  }
+};
+
+// A ball of radius 1 in a box, and one that covers a part of it.
+constexpr const char* kThree =
+    "box --size 4,4,4 --voxel 0.1 ! sphere --radius 1 --voxel 0.1 ! sphere --radius 1 --center "
+    "1,0,0 "
+    "--voxel 0.1 ! segment ";
+constexpr double kBall = 4 * std::numbers::pi / 3;
+/// Volume of the intersection of the two balls.
+constexpr double kLens = 5 * std::numbers::pi / 12;
+
+TEST_F(SegmentActions, LaterSolidsWin) {
+  const Json m = json(std::string(kThree) + "! measure --json");
+  ASSERT_EQ(m["materials"].size(), 3u);
+  const double expected[3] = {64 - 2 * kBall + kLens, kBall - kLens, kBall};
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_EQ(m["materials"][k]["label"], k + 1);
+    EXPECT_NEAR(m["materials"][k]["volume"].get<double>(), expected[k], 0.03) << k;
+  }
+  EXPECT_NEAR(m["volume"].get<double>(), 64, 0.03);
+  // The box against the void and both balls, and the balls against each other.
+  ASSERT_EQ(m["interfaces"].size(), 4u);
+  EXPECT_EQ(m["interfaces"][0]["labels"], Json::array({0, 1}));
+  EXPECT_NEAR(m["interfaces"][0]["area"].get<double>(), 96, 0.1);
+  EXPECT_EQ(m["interfaces"][3]["labels"], Json::array({2, 3}));
+  // A cap of height 1/2.
+  EXPECT_NEAR(m["interfaces"][3]["area"].get<double>(), std::numbers::pi, 0.03);
+  // A circle of radius √3 / 2.
+  EXPECT_NEAR(m["junction_length"].get<double>(), std::numbers::pi * std::sqrt(3.0), 0.05);
+  const Json text = json(std::string(kThree) + "--labels 7,300,65535 ! info --json");
+  EXPECT_EQ(text["kind"], "segmentation");
+  EXPECT_EQ(text["labels"], Json::array({7, 300, 65535}));
+}
+
+TEST_F(SegmentActions, NamedOperandsHaveTheirOwnOrder) {
+  const std::string named =
+      "sphere --radius 1 --voxel 0.1 --as a ! sphere --radius 1 --center 1,0,0 "
+      "--voxel 0.1 --as b ! ";
+  const Json ab = json(named + "segment @a @b ! measure --json"),
+             ba = json(named + "segment @b @a ! measure --json");
+  EXPECT_NEAR(ab["materials"][1]["volume"].get<double>(), kBall, 0.02);
+  EXPECT_NEAR(ba["materials"][1]["volume"].get<double>(), kBall, 0.02);
+  EXPECT_NEAR(ab["materials"][0]["volume"].get<double>(), kBall - kLens, 0.02);
+  // Another kind of value ends what is taken from the stack.
+  EXPECT_EQ(json("sphere --radius 1 --voxel 0.1 ! mesh ! sphere --radius 1 --voxel 0.1 ! segment ! "
+                 "info --json")["labels"],
+            Json::array({1}));
+}
+
+TEST_F(SegmentActions, ExtractsSolids) {
+  const Json band = json(std::string(kThree) + "! extract 2 ! measure --json");
+  EXPECT_NEAR(band["volume"].get<double>(), kBall - kLens, 0.02);
+  EXPECT_EQ(band["half_width"], 3);
+  EXPECT_EQ(levelsmith(std::string(kThree) + "! extract 1 ! check").code, 0);
+  const Json mesh = json(std::string(kThree) + "! mesh --label 2 ! measure --json");
+  EXPECT_EQ(mesh["closed_manifold"], true);
+  EXPECT_NEAR(mesh["volume"].get<double>(), kBall - kLens, 0.02);
+  const Json all = json(std::string(kThree) + "! mesh ! measure --json");
+  EXPECT_EQ(all["boundary_edges"], 0);
+  EXPECT_GT(all["non_manifold_edges"].get<int>(), 10);
+}
+
+TEST_F(SegmentActions, WriteTheLabelsOfBothSides) {
+  const Json all =
+      json(std::string(kThree) + "! write a.ply ! write a.obj ! write a.ply.gz ! measure --json");
+  for (const char* name : {"a.ply", "a.obj", "a.ply.gz"}) {
+    const Json read = json("read " + std::string(name) + " ! info --json");
+    EXPECT_EQ(read["kind"], "mesh");
+    EXPECT_EQ(read["triangles"], all["triangles"]) << name;
+  }
+  const support::Outcome groups = shell("grep ^g a.obj");
+  EXPECT_EQ(groups.out, "g interface_0_1\ng interface_1_2\ng interface_1_3\ng interface_2_3\n");
+  const support::Outcome header = shell("head -c 500 a.ply | grep -a -c 'property ushort'");
+  EXPECT_EQ(header.out, "2\n");
+  expectRefusal(std::string(kThree) + "! write a.stl", 2, "write .ply or .obj");
+}
+
+TEST_F(SegmentActions, AreDrawn) {
+  EXPECT_EQ(levelsmith(std::string(kThree) + "! render a.png --size 64x48").code, 0);
+  EXPECT_TRUE(exists("a.png"));
+}
+
+TEST_F(SegmentActions, ReportRegionsThatVanish) {
+  const support::Outcome outcome = levelsmith(
+      "sphere --radius 0.5 --voxel 0.1 ! sphere --radius 1 --voxel 0.1 ! segment ! info");
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_NE(outcome.err.find("region 1 is empty: later solids cover it"), std::string::npos)
+      << outcome.err;
+  // A plate of half a voxel remains of the box.
+  const support::Outcome thin = levelsmith(
+      "box --size 2,2,2 --voxel 0.1 ! box --size 2,2,2 --center 0,0,0.05 --voxel 0.1 ! segment ! "
+      "info");
+  EXPECT_EQ(thin.code, 0);
+  EXPECT_NE(thin.err.find("region 1 is thinner than a voxel"), std::string::npos) << thin.err;
+}
+
+TEST_F(SegmentActions, RefuseWhatDoesNotApply) {
+  expectRefusal("segment", 2, "operand");
+  expectRefusal("sphere --radius 1 --voxel 0.1 ! segment --labels 1,2", 2, "2 labels for 1");
+  expectRefusal("sphere --radius 1 --voxel 0.1 ! segment --labels 0", 2, "not a label");
+  expectRefusal("sphere --radius 1 --voxel 0.1 ! segment --smooth 1", 2,
+                "--smooth is for a volume");
+  expectRefusal(std::string(kThree) + "! extract 9", 3, "has no region 9; its labels are 1, 2, 3");
+  expectRefusal(std::string(kThree) + "! extract", 2, "label");
+  expectRefusal(std::string(kThree) + "! write a.vdb", 2, "write .ply or .obj");
+  expectRefusal(std::string(kThree) + "! offset 1", 2, "put 'extract LABEL' before it");
+  expectRefusal(std::string(kThree) + "! mesh --sharp", 2, "not to a segmentation");
+  expectRefusal("sphere --radius 1 --voxel 0.1 ! mesh --label 1", 2,
+                "--label is for a segmentation");
+}
+
+}  // namespace segment_actions_test
