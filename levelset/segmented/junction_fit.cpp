@@ -15,13 +15,15 @@ constexpr double kFlattest = 0.01;  // least squared slope of a distance
 constexpr double kSpread = 1.4;     // voxels: standard deviation of the weights of samples
 constexpr double kLargest = 1.75;   // voxels: largest distance that is used
 constexpr double kFlatness = 1e-3;  // prefers planes where samples do not determine curvature
+constexpr double kFirstFlatness = 0.1;
 constexpr double kDamping = 1e-3;   // of steps along the curve, where the point is free
 constexpr double kParallel = 0.02;  // least area of the parallelogram of two normals, squared
 constexpr double kDoubt =
     0.01;  // weight of distances to other than the nearest interface, at first
-constexpr double kAgreement = 0.05;  // voxels: residual that halves the weight of a sample
-constexpr double kFarthest = 1.5;    // voxels: largest move of a point
-constexpr std::size_t kFewest = 5;   // samples
+constexpr double kAgreement = 0.05;      // voxels: residual that halves the weight of a sample
+constexpr double kLeastAgreement = 0.5;  // of the weights of a fit
+constexpr double kFarthest = 1.5;        // voxels: largest move of a point
+constexpr std::size_t kFewest = 5;       // samples
 
 std::array<double, kTerms> termsAt(const V3d& p) {
   return {1, p.x, p.y, p.z, p.x * p.x, p.y * p.y, p.z * p.z, p.y * p.z, p.z * p.x, p.x * p.y};
@@ -133,13 +135,16 @@ std::optional<InterfaceFit> JunctionFit::fit(RegionLabel a, RegionLabel b, const
   for (int round = 0; round < kRounds; ++round) {
     std::array<std::array<double, kTerms>, kTerms> matrix{};
     std::array<double, kTerms> right{};
+    double all = 0, agreeing = 0;
     for (const Known& sample : known) {
       double weight = sample.weight;
       if (round == 0) {
-        if (!sample.isNearest) weight *= kDoubt;
+        weight *= weight * weight;  // only those nearby, which hardly lie beyond a crease
       } else {
         const double residual = (dot(result.c, sample.terms) - sample.value) / kAgreement;
         weight /= 1 + residual * residual;
+        all += sample.weight;
+        agreeing += weight;
       }
       for (std::size_t i = 0; i < kTerms; ++i) {
         const double scaled = weight * sample.terms[i];
@@ -147,7 +152,9 @@ std::optional<InterfaceFit> JunctionFit::fit(RegionLabel a, RegionLabel b, const
         right[i] += scaled * sample.value;
       }
     }
-    for (std::size_t i = 0; i < kTerms; ++i) matrix[i][i] += i < 4 ? 1e-9 : kFlatness;
+    if (round + 1 == kRounds && agreeing < kLeastAgreement * all) return std::nullopt;
+    for (std::size_t i = 0; i < kTerms; ++i)
+      matrix[i][i] += i < 4 ? 1e-9 : round == 0 ? kFirstFlatness : kFlatness;
     if (!solveCholesky(matrix, right)) return std::nullopt;
     result.c = right;
   }

@@ -93,12 +93,12 @@ class SolidsPartition {
       if (*it < 0) it.setValue(SegmentedData::tile(labelOf(rankOfTile(*it))));
     return std::move(tiles_);
   }
-  [[nodiscard]] ThinTally lostParts() const {
-    ThinTally all;
-    for (const ThinTally& block : lost_) all.add(block);
+  [[nodiscard]] std::vector<LostPlace> lostPlaces() const {
+    std::vector<LostPlace> all;
+    for (const std::vector<LostPlace>& block : lost_)
+      all.insert(all.end(), block.begin(), block.end());
     return all;
   }
-  [[nodiscard]] std::size_t leafCount() const { return leaves_.size(); }
 
  private:
   [[nodiscard]] static Rank rankOfTile(std::int32_t value) {
@@ -471,7 +471,8 @@ class SolidsPartition {
   }
 
   /// Finds parts between two neighbouring grid points that own neither of them.
-  void findLost(const SolidBlock& block, const Around& around, ThinTally& tally) const {
+  void findLost(const SolidBlock& block, const Around& around,
+                std::vector<LostPlace>& places) const {
     const Coord origin = originOf(block);
     for (std::uint32_t n = 0; n < kVoxels; ++n) {
       const Coord at = SegmentedData::localOf(n);
@@ -480,13 +481,13 @@ class SolidsPartition {
         Coord next = at;
         next[axis] += 1;
         const Rank b = around.at(next[0], next[1], next[2]);
-        if (a != b) findLostOnEdge(block, origin, n, axis, {a, b}, tally);
+        if (a != b) findLostOnEdge(block, origin, n, axis, {a, b}, places);
       }
     }
   }
 
   void findLostOnEdge(const SolidBlock& block, const Coord& origin, std::uint32_t n, int axis,
-                      const std::array<Rank, 2>& ends, ThinTally& tally) const {
+                      const std::array<Rank, 2>& ends, std::vector<LostPlace>& places) const {
     constexpr int kSteps = 8;
     constexpr std::array<std::uint32_t, 3> kStrides = {64, 8, 1};
     const Coord local = SegmentedData::localOf(n);
@@ -518,8 +519,7 @@ class SolidsPartition {
       while (end + 1 < kSteps && owners[end + 1] == owner) ++end;
       openvdb::Vec3d p = (origin + local).asVec3d();
       p[axis] += static_cast<double>(i + end) / (2.0 * kSteps);
-      tally.add(labelOf(owner), {1, true, static_cast<double>(end - i + 1) / kSteps * voxelSize_,
-                                 toImath(vdb(solids_.front()).indexToWorld(p))});
+      places.push_back({labelOf(owner), static_cast<double>(end - i + 1) / kSteps, toImath(p)});
       i = end;
     }
   }
@@ -534,7 +534,7 @@ class SolidsPartition {
   std::vector<SolidBlock> blocks_;
   Int32Tree::Ptr tiles_ =
       std::make_shared<Int32Tree>(SegmentedData::tile(kVoid));  ///< ranks, or numbers of blocks
-  std::vector<ThinTally> lost_;                                 ///< by block
+  std::vector<std::vector<LostPlace>> lost_;                    ///< by block
 };
 
 std::vector<RegionLabel> checkedLabels(std::size_t count, const SegmentSolidsOptions& options) {
@@ -612,9 +612,7 @@ SegmentSolidsResult segmentSolids(std::span<const NarrowBand> solids,
   std::sort(labels.begin(), labels.end());
   std::set_difference(labels.begin(), labels.end(), owners.begin(), owners.end(),
                       std::back_inserter(result.vanished));
-  ThinTally tally = thinParts(result.field);
-  tally.add(partition.lostParts());
-  result.thinParts = tally.list();
+  result.thinParts = thinParts(result.field, partition.lostPlaces());
   report(options.progress, 1);
   return result;
 }

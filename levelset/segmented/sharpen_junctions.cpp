@@ -137,8 +137,6 @@ class JunctionStrip {
     tbb::parallel_for(std::size_t{0}, strip_.size(), [&](std::size_t n) {
       const StripVertex& vertex = strip_[n];
       const V3d& old = mesh_.mesh.positions[vertex.vertex];
-      moved[n] = old;
-      if (vertex.interfaces.empty()) return;
       V3d target = old;
       // Ends of curves, and points where curves meet, have no direction to move in.
       if (!isFirst && (!vertex.isJunction || vertex.neighbours.size() == 2)) {
@@ -146,7 +144,9 @@ class JunctionStrip {
         for (const std::uint32_t v : vertex.neighbours) target += mesh_.mesh.positions[v];
         target /= static_cast<double>(vertex.neighbours.size());
       }
-      moved[n] = meet(vertex.interfaces, target).value_or(old);
+      // Beside creases, where no interface fits, the vertex only follows its neighbours.
+      moved[n] =
+          vertex.interfaces.empty() ? target : meet(vertex.interfaces, target).value_or(target);
     });
     for (std::size_t n = 0; n < strip_.size(); ++n)
       mesh_.mesh.positions[strip_[n].vertex] = moved[n];
