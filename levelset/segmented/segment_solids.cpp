@@ -16,6 +16,7 @@
 #include "levelset/distance/redistance.h"
 #include "levelset/error.h"
 #include "levelset/progress_gate.h"
+#include "levelset/segmented/block_surroundings.h"
 #include "levelset/segmented/segmented_data_vdb.h"
 #include "levelset/segmented/thin_parts.h"
 #include "levelset/vdb.h"
@@ -214,59 +215,25 @@ class SolidsPartition {
     blocks_.resize(kept);
   }
 
-  /// Ranks of a block and of the voxels around it.
-  struct Around {
-    static constexpr int kPad = 3, kSide = 8 + 2 * kPad;
-    std::array<Rank, kSide * kSide * kSide> ranks;
-    /// @param at  from −kPad to 7 + kPad
-    [[nodiscard]] static std::size_t index(int x, int y, int z) {
-      return static_cast<std::size_t>(((x + kPad) * kSide + y + kPad) * kSide + z + kPad);
-    }
-    [[nodiscard]] Rank at(int x, int y, int z) const { return ranks[index(x, y, z)]; }
-  };
-
-  /// The 27 blocks around a block: their numbers or tiles, and their ranks.
-  struct Neighbours {
-    std::array<std::int32_t, 27> values;
-    std::vector<Rank> palette;
-  };
-  [[nodiscard]] Neighbours neighboursOf(const Coord& block) const {
+  void fillSurroundings(const Coord& block, BlockSurroundings& around) const {
     openvdb::tree::ValueAccessor<const Int32Tree> tiles(*tiles_);
-    Neighbours result;
-    const auto add = [&](Rank rank) {
-      if (std::find(result.palette.begin(), result.palette.end(), rank) == result.palette.end())
-        result.palette.push_back(rank);
-    };
+    std::array<std::int32_t, 27> values{};
     std::size_t n = 0;
     for (int x = -1; x <= 1; ++x)
       for (int y = -1; y <= 1; ++y)
-        for (int z = -1; z <= 1; ++z, ++n) {
-          const std::int32_t value = tiles.getValue(block.offsetBy(x, y, z));
-          result.values[n] = value;
-          if (value < 0)
-            add(rankOfTile(value));
-          else
-            for (const Rank rank : blocks_[static_cast<std::size_t>(value)].palette) add(rank);
-        }
-    std::sort(result.palette.begin(), result.palette.end());
-    return result;
-  }
-  void fillAround(const Neighbours& neighbours, Around& around) const {
-    const auto blockIndex = [](int x) { return x < 0 ? 0 : x < 8 ? 1 : 2; };
-    for (int x = -Around::kPad; x < 8 + Around::kPad; ++x)
-      for (int y = -Around::kPad; y < 8 + Around::kPad; ++y)
-        for (int z = -Around::kPad; z < 8 + Around::kPad; ++z) {
-          const std::int32_t value = neighbours.values[static_cast<std::size_t>(
-              (blockIndex(x) * 3 + blockIndex(y)) * 3 + blockIndex(z))];
-          Rank rank;
-          if (value < 0) {
-            rank = rankOfTile(value);
-          } else {
-            const std::vector<Rank>& ranks = blocks_[static_cast<std::size_t>(value)].ranks;
-            rank = ranks.size() == 1 ? ranks[0] : ranks[SegmentedData::offsetOf(Coord(x, y, z))];
-          }
-          around.ranks[Around::index(x, y, z)] = rank;
-        }
+        for (int z = -1; z <= 1; ++z) values[n++] = tiles.getValue(block.offsetBy(x, y, z));
+    around.fill([&](int i, int j, int k, int x, int y, Rank* row) {
+      const std::int32_t value = values[static_cast<std::size_t>(i * 9 + j * 3 + k + 13)];
+      if (value < 0) {
+        std::fill_n(row, 8, rankOfTile(value));
+        return;
+      }
+      const std::vector<Rank>& ranks = blocks_[static_cast<std::size_t>(value)].ranks;
+      if (ranks.size() == 1)
+        std::fill_n(row, 8, ranks[0]);
+      else
+        std::copy_n(ranks.begin() + (x * 64 + y * 8), 8, row);
+    });
   }
 
   [[nodiscard]] const float* valuesOf(const SolidBlock& block, Rank rank) const {
@@ -290,37 +257,33 @@ class SolidsPartition {
 
   [[nodiscard]] PackedBlock evaluateBlock(std::size_t number) {
     const SolidBlock& block = blocks_[number];
-    const Neighbours neighbours = neighboursOf(block.block);
+    BlockSurroundings around;
+    fillSurroundings(block.block, around);
+    const std::vector<Rank>& palette = around.palette();
     SegmentedBlockValues values;
     values.origin = originOf(block);
     const auto rankAt = [&](std::uint32_t n) {
       return block.ranks[block.ranks.size() == 1 ? 0 : n];
     };
     for (std::uint32_t n = 0; n < kVoxels; ++n) values.labels[n] = labelOf(rankAt(n));
-    std::optional<Around> around;
-    if (neighbours.palette.size() > 2 || block.last - block.first > 1) {
-      around.emplace();
-      fillAround(neighbours, *around);
-    }
-    if (neighbours.palette.size() == 2) {
+    if (palette.size() == 2) {
       // No junction is near, and the neighbour is the other region.
-      const Rank low = neighbours.palette[0], high = neighbours.palette[1];
+      const Rank low = palette[0], high = palette[1];
       const float* phi = valuesOf(block, high);
       for (std::uint32_t n = 0; n < kVoxels; ++n) {
         const bool isHigh = rankAt(n) == high;
         values.distances[n] = phi ? std::max(0.0f, isHigh ? -phi[n] : phi[n]) : far_;
         values.neighbours[n] = labelOf(isHigh ? low : high);
       }
+    } else if (palette.size() == 1) {
+      for (std::uint32_t n = 0; n < kVoxels; ++n) setNearest(block, n, rankAt(n), values);
     } else {
+      around.findNeighbours();
       Others others;
-      for (std::uint32_t n = 0; n < kVoxels; ++n) {
-        if (neighbours.palette.size() > 1)
-          evaluateVoxel(block, n, rankAt(n), *around, others, values);
-        else
-          setNearest(block, n, rankAt(n), values);
-      }
+      for (std::uint32_t n = 0; n < kVoxels; ++n)
+        evaluateVoxel(block, n, rankAt(n), around, others, values);
     }
-    if (block.last - block.first > 1) findLost(block, *around, lost_[number]);
+    if (block.last - block.first > 1 && palette.size() > 1) findLost(block, around, lost_[number]);
     return packBlock(values, background_);
   }
 
@@ -336,35 +299,20 @@ class SolidsPartition {
                                       distances.begin());
     }
   };
-  void findOthers(const SolidBlock& block, std::uint32_t n, Rank own, const Around& around,
-                  Others& others) const {
-    const Coord at = SegmentedData::localOf(n);
-    const auto find = [&](int reach, std::vector<Rank>& ranks) {
-      ranks.clear();
-      for (int x = at[0] - reach; x <= at[0] + reach; ++x)
-        for (int y = at[1] - reach; y <= at[1] + reach; ++y)
-          for (int z = at[2] - reach; z <= at[2] + reach; ++z) {
-            const Rank rank = around.at(x, y, z);
-            if (rank != own && std::find(ranks.begin(), ranks.end(), rank) == ranks.end())
-              ranks.push_back(rank);
-          }
-      std::sort(ranks.begin(), ranks.end());
-    };
-    find(1, others.adjacent);
-    find(2, others.ranks);
-    others.distances.clear();
-    for (const Rank rank : others.ranks)
-      others.distances.push_back(distanceTo(block, n, own, rank));
-  }
 
   /// Sets the distances of a voxel in a block near several regions.
   /// @param others  memory to work in
-  void evaluateVoxel(const SolidBlock& block, std::uint32_t n, Rank own, const Around& around,
-                     Others& others, SegmentedBlockValues& values) const {
+  void evaluateVoxel(const SolidBlock& block, std::uint32_t n, Rank own,
+                     const BlockSurroundings& around, Others& others,
+                     SegmentedBlockValues& values) const {
     setNearest(block, n, own, values);
-    findOthers(block, n, own, around, others);
+    around.others(n, own, 2, others.ranks);
     if (others.ranks.empty()) return;
+    around.others(n, own, 1, others.adjacent);
     if (others.adjacent.empty() && values.distances[n] >= background_) return;
+    others.distances.clear();
+    for (const Rank rank : others.ranks)
+      others.distances.push_back(distanceTo(block, n, own, rank));
     const std::size_t chosen = neighbourAmong(block, n, own, others, around);
     values.neighbours[n] = labelOf(others.ranks[chosen]);
     if (others.adjacent.empty()) return;
@@ -386,7 +334,8 @@ class SolidsPartition {
   /// that near touches the own solid there.
   /// @return index in `others`
   [[nodiscard]] std::size_t neighbourAmong(const SolidBlock& block, std::uint32_t n, Rank own,
-                                           const Others& others, const Around& around) const {
+                                           const Others& others,
+                                           const BlockSurroundings& around) const {
     constexpr float kTie = 0.02f;
     const auto tolerance = kTie * static_cast<float>(voxelSize_);
     const std::size_t nearest = others.nearest(), count = others.ranks.size();
@@ -426,7 +375,7 @@ class SolidsPartition {
   /// to a voxel. The own rank where the slope does not tell the direction.
   /// @param depth  distance of the voxel from that surface
   [[nodiscard]] Rank rankBeyond(const SolidBlock& block, std::uint32_t n, Rank own, float depth,
-                                const Around& around) const {
+                                const BlockSurroundings& around) const {
     constexpr double kLeastSlope = 0.8, kBeyond = 0.75;
     const float* values = valuesOf(block, own);
     if (!values) return own;
@@ -447,8 +396,8 @@ class SolidsPartition {
     if (!(length > kLeastSlope)) return own;
     const Imath::V3d move = slope * ((static_cast<double>(depth) / voxelSize_ + kBeyond) / length);
     const auto coordinate = [&](int axis) {
-      return std::clamp(at[axis] + static_cast<int>(std::lround(move[axis])), -Around::kPad,
-                        7 + Around::kPad);
+      return std::clamp(at[axis] + static_cast<int>(std::lround(move[axis])),
+                        -BlockSurroundings::kPad, 7 + BlockSurroundings::kPad);
     };
     return around.at(coordinate(0), coordinate(1), coordinate(2));
   }
@@ -470,8 +419,10 @@ class SolidsPartition {
     values.neighbours[n] = labelOf(neighbour);
   }
 
+  static constexpr std::array<std::uint32_t, 3> kStrides = {64, 8, 1};
+
   /// Finds parts between two neighbouring grid points that own neither of them.
-  void findLost(const SolidBlock& block, const Around& around,
+  void findLost(const SolidBlock& block, const BlockSurroundings& around,
                 std::vector<LostPlace>& places) const {
     const Coord origin = originOf(block);
     for (std::uint32_t n = 0; n < kVoxels; ++n) {
@@ -481,15 +432,30 @@ class SolidsPartition {
         Coord next = at;
         next[axis] += 1;
         const Rank b = around.at(next[0], next[1], next[2]);
-        if (a != b) findLostOnEdge(block, origin, n, axis, {a, b}, places);
+        if (a != b && crossings(block, n, axis) > 1)
+          findLostOnEdge(block, origin, n, axis, {a, b}, places);
       }
     }
+  }
+
+  /// Counts the surfaces that cross an edge of the grid.
+  [[nodiscard]] int crossings(const SolidBlock& block, std::uint32_t n, int axis) const {
+    const Coord local = SegmentedData::localOf(n);
+    int count = 0;
+    for (std::size_t e = block.first; e < block.last; ++e) {
+      const RankedLeaf& leaf = leaves_[e];
+      Coord next = originOf(block) + local;
+      next[axis] += 1;
+      const float v = local[axis] < 7 ? leaf.values[n + kStrides[static_cast<std::size_t>(axis)]]
+                                      : tree(leaf.rank).getValue(next);
+      count += (leaf.values[n] < 0) != (v < 0);
+    }
+    return count;
   }
 
   void findLostOnEdge(const SolidBlock& block, const Coord& origin, std::uint32_t n, int axis,
                       const std::array<Rank, 2>& ends, std::vector<LostPlace>& places) const {
     constexpr int kSteps = 8;
-    constexpr std::array<std::uint32_t, 3> kStrides = {64, 8, 1};
     const Coord local = SegmentedData::localOf(n);
     const bool isInside = local[axis] < 7;
     std::array<Rank, kSteps> owners;  // at t = i / kSteps
@@ -517,9 +483,12 @@ class SolidsPartition {
       if (owner == 0 && least[i] + second[i] <= 2 * gap_) continue;
       std::size_t end = i;
       while (end + 1 < kSteps && owners[end + 1] == owner) ++end;
+      const std::size_t steps = end - i + 1;
       openvdb::Vec3d p = (origin + local).asVec3d();
       p[axis] += static_cast<double>(i + end) / (2.0 * kSteps);
-      places.push_back({labelOf(owner), static_cast<double>(end - i + 1) / kSteps, toImath(p)});
+      // Convex edges lose an eighth of a voxel by interpolation.
+      if (steps > 1)
+        places.push_back({labelOf(owner), static_cast<double>(steps) / kSteps, toImath(p)});
       i = end;
     }
   }

@@ -72,24 +72,32 @@ PackedBlock packBlock(const SegmentedBlockValues& values, float background) {
   // A palette of two implies that the neighbour is the other label.
   if (palette.size() == 1) palette.push_back(palette[0]);
   std::sort(palette.begin(), palette.end());
+  RegionLabel known = palette[0];
+  std::uint64_t code = 0;
   const auto codeOf = [&](RegionLabel label) {
-    return static_cast<std::uint64_t>(std::lower_bound(palette.begin(), palette.end(), label) -
-                                      palette.begin());
+    if (label != known) {
+      known = label;
+      code = static_cast<std::uint64_t>(std::lower_bound(palette.begin(), palette.end(), label) -
+                                        palette.begin());
+    }
+    return code;
   };
   const std::uint16_t bits = bitsOfPalette(palette.size());
+  constexpr std::uint32_t kLabels = SegmentedData::kLabelWord;
   packed.block.bits = bits;
   packed.block.paletteSize = static_cast<std::uint16_t>(palette.size());
   const std::size_t neighbourWords = palette.size() > 2 ? (active * bits + 63u) / 64u : 0;
-  packed.words.assign(8 + 8u * bits + neighbourWords, 0);
+  packed.words.assign(kLabels + 8u * bits + neighbourWords, 0);
   packed.distances.reserve(active);
   std::uint32_t rank = 0;
   for (std::uint32_t n = 0; n < SegmentedData::kVoxels; ++n) {
-    putCode(&packed.words[8], n, bits, codeOf(values.labels[n]));
+    if (n % 64 == 0 && n > 0) packed.words[8] |= std::uint64_t{rank} << (9 * (n / 64 - 1));
+    putCode(&packed.words[kLabels], n, bits, codeOf(values.labels[n]));
     if (values.distances[n] >= background) continue;
     packed.words[n >> 6] |= std::uint64_t{1} << (n & 63);
     packed.distances.push_back(values.distances[n]);
     if (palette.size() > 2)
-      putCode(&packed.words[8 + 8u * bits], rank, bits, codeOf(values.neighbours[n]));
+      putCode(&packed.words[kLabels + 8u * bits], rank, bits, codeOf(values.neighbours[n]));
     ++rank;
   }
   packed.extras = values.extras;

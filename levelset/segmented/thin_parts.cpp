@@ -51,8 +51,8 @@ void findThin(const SegmentedData& data, const SegmentedBlock& block,
       Coord low = at, high = at;
       low[axis] -= 1;
       high[axis] += 1;
+      if (reader.label(low) == near.label || reader.label(high) == near.label) continue;
       const SegmentedReader::Nearest below = reader.nearest(low), above = reader.nearest(high);
-      if (below.label == near.label || above.label == near.label) continue;
       const double down = crossingOf(reader, at, near, low, below),
                    up = crossingOf(reader, at, near, high, above);
       if (down + up >= 1 || !isThinAround(data, reader, at, near.label)) continue;
