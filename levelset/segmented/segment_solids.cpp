@@ -168,9 +168,14 @@ class SolidsPartition {
     if (block.top == 0 && block.last - block.first > 1) closeGaps(block, ranks);
     const bool isActive =
         std::any_of(distance.begin(), distance.end(), [&](float d) { return d < background_; });
-    for (const Rank rank : ranks)
+    Rank last = ranks[0];
+    block.palette.push_back(last);
+    for (const Rank rank : ranks) {
+      if (rank == last) continue;
+      last = rank;
       if (std::find(block.palette.begin(), block.palette.end(), rank) == block.palette.end())
         block.palette.push_back(rank);
+    }
     if (block.palette.size() > 1)
       block.ranks.assign(ranks.begin(), ranks.end());
     else
@@ -215,13 +220,19 @@ class SolidsPartition {
     blocks_.resize(kept);
   }
 
-  void fillSurroundings(const Coord& block, BlockSurroundings& around) const {
+  /// Numbers or tiles of the 27 blocks around a block.
+  [[nodiscard]] std::array<std::int32_t, 27> valuesAround(const Coord& block) const {
     openvdb::tree::ValueAccessor<const Int32Tree> tiles(*tiles_);
     std::array<std::int32_t, 27> values{};
     std::size_t n = 0;
     for (int x = -1; x <= 1; ++x)
       for (int y = -1; y <= 1; ++y)
         for (int z = -1; z <= 1; ++z) values[n++] = tiles.getValue(block.offsetBy(x, y, z));
+    return values;
+  }
+
+  void fillSurroundings(const std::array<std::int32_t, 27>& values,
+                        BlockSurroundings& around) const {
     around.fill([&](int i, int j, int k, int x, int y, Rank* row) {
       const std::int32_t value = values[static_cast<std::size_t>(i * 9 + j * 3 + k + 13)];
       if (value < 0) {
@@ -255,36 +266,64 @@ class SolidsPartition {
     return other == 0 ? depth : std::max(depth, phi(other, depth));
   }
 
+  /// Ranks in the 27 blocks around a block; at most three of them.
+  [[nodiscard]] std::vector<Rank> ranksAround(const std::array<std::int32_t, 27>& values) const {
+    std::vector<Rank> ranks;
+    const auto add = [&](Rank rank) {
+      if (std::find(ranks.begin(), ranks.end(), rank) == ranks.end()) ranks.push_back(rank);
+    };
+    for (const std::int32_t value : values) {
+      if (value < 0)
+        add(rankOfTile(value));
+      else
+        for (const Rank rank : blocks_[static_cast<std::size_t>(value)].palette) add(rank);
+      if (ranks.size() > 2) break;
+    }
+    std::sort(ranks.begin(), ranks.end());
+    return ranks;
+  }
+
   [[nodiscard]] PackedBlock evaluateBlock(std::size_t number) {
     const SolidBlock& block = blocks_[number];
+    const bool isOfOne = block.last - block.first == 1;
+    const std::array<std::int32_t, 27> blocksAround = valuesAround(block.block);
+    std::vector<Rank> palette = ranksAround(blocksAround);
     BlockSurroundings around;
-    fillSurroundings(block.block, around);
-    const std::vector<Rank>& palette = around.palette();
+    if (palette.size() > 2 || !isOfOne) {
+      fillSurroundings(blocksAround, around);
+      palette = around.palette();
+    }
+    if (!isOfOne && palette.size() > 1) findLost(block, around, lost_[number]);
+    if (palette.size() == 2) {
+      // No junction is near, and the neighbour is the other region. Only where a gap was closed, a
+      // voxel may not have the owner that the sign tells.
+      const Rank low = palette[0], high = palette[1];
+      if (const float* phi = valuesOf(block, high); phi && hasSigns(block, high, phi))
+        return packTwoRegions(originOf(block), phi, labelOf(high), labelOf(low), background_);
+    }
     SegmentedBlockValues values;
     values.origin = originOf(block);
     const auto rankAt = [&](std::uint32_t n) {
       return block.ranks[block.ranks.size() == 1 ? 0 : n];
     };
     for (std::uint32_t n = 0; n < kVoxels; ++n) values.labels[n] = labelOf(rankAt(n));
-    if (palette.size() == 2) {
-      // No junction is near, and the neighbour is the other region.
-      const Rank low = palette[0], high = palette[1];
-      const float* phi = valuesOf(block, high);
-      for (std::uint32_t n = 0; n < kVoxels; ++n) {
-        const bool isHigh = rankAt(n) == high;
-        values.distances[n] = phi ? std::max(0.0f, isHigh ? -phi[n] : phi[n]) : far_;
-        values.neighbours[n] = labelOf(isHigh ? low : high);
-      }
-    } else if (palette.size() == 1) {
+    if (palette.size() == 1) {
       for (std::uint32_t n = 0; n < kVoxels; ++n) setNearest(block, n, rankAt(n), values);
     } else {
+      if (isOfOne && palette.size() == 2) fillSurroundings(blocksAround, around);
       around.findNeighbours();
       Others others;
       for (std::uint32_t n = 0; n < kVoxels; ++n)
         evaluateVoxel(block, n, rankAt(n), around, others, values);
     }
-    if (block.last - block.first > 1 && palette.size() > 1) findLost(block, around, lost_[number]);
     return packBlock(values, background_);
+  }
+
+  /// Returns true when the sign of a solid's distance tells in all voxels if the solid owns them.
+  static bool hasSigns(const SolidBlock& block, Rank rank, const float* phi) {
+    for (std::uint32_t n = 0; n < kVoxels; ++n)
+      if ((block.ranks[block.ranks.size() == 1 ? 0 : n] == rank) != (phi[n] < 0)) return false;
+    return true;
   }
 
   /// Regions up to two voxels away from a voxel, ascending, and the distances of the voxel from the

@@ -193,7 +193,12 @@ struct PackedBlock {
   std::vector<float> distances;
   std::vector<SegmentedExtra> extras;
   std::vector<RegionLabel> palette;
+  std::vector<RegionLabel> owners;  ///< labels of its voxels
 };
+/// Packs a block near one interface only.
+/// @param phi  signed distance to it, negative in the region `inside`
+[[nodiscard]] PackedBlock packTwoRegions(const openvdb::Coord& origin, const float* phi,
+                                         RegionLabel inside, RegionLabel outside, float background);
 [[nodiscard]] PackedBlock packBlock(const SegmentedBlockValues& values, float background);
 
 /// Puts blocks together to a field.

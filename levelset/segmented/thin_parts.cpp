@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include <array>
 #include <cmath>
 #include <map>
 
@@ -39,20 +40,25 @@ bool isThinAround(const SegmentedData& data, SegmentedReader& reader, const Coor
 void findThin(const SegmentedData& data, const SegmentedBlock& block,
               std::vector<LostPlace>& places) {
   SegmentedReader reader(data);
+  std::array<RegionLabel, SegmentedData::kVoxels> labels;
+  for (std::uint32_t n = 0; n < SegmentedData::kVoxels; ++n) labels[n] = data.labelAt(block, n);
+  constexpr std::array<std::uint32_t, 3> kStrides = {64, 8, 1};
+  const float* distances = &data.distances[block.distances];
   for (std::uint32_t n = 0; n < SegmentedData::kVoxels; ++n) {
-    const std::int64_t index = data.distanceIndex(block, n);
-    if (index < 0) continue;
+    if (!(data.words[block.words + (n >> 6)] >> (n & 63) & 1)) continue;
     // Of two crossings less than a voxel apart, one is within half a voxel.
-    if (static_cast<double>(data.distances[static_cast<std::size_t>(index)]) > data.voxelSize / 2)
-      continue;
-    const Coord at = block.origin + SegmentedData::localOf(n);
-    const SegmentedReader::Nearest near = reader.nearest(at);
+    if (static_cast<double>(*distances++) > data.voxelSize / 2) continue;
+    const Coord local = SegmentedData::localOf(n), at = block.origin + local;
     for (int axis = 0; axis < 3; ++axis) {
+      const std::uint32_t stride = kStrides[static_cast<std::size_t>(axis)];
+      if (local[axis] > 0 && labels[n - stride] == labels[n]) continue;
+      if (local[axis] < 7 && labels[n + stride] == labels[n]) continue;
       Coord low = at, high = at;
       low[axis] -= 1;
       high[axis] += 1;
-      if (reader.label(low) == near.label || reader.label(high) == near.label) continue;
-      const SegmentedReader::Nearest below = reader.nearest(low), above = reader.nearest(high);
+      const SegmentedReader::Nearest near = reader.nearest(at), below = reader.nearest(low),
+                                     above = reader.nearest(high);
+      if (below.label == near.label || above.label == near.label) continue;
       const double down = crossingOf(reader, at, near, low, below),
                    up = crossingOf(reader, at, near, high, above);
       if (down + up >= 1 || !isThinAround(data, reader, at, near.label)) continue;
