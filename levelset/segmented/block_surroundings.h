@@ -19,6 +19,9 @@ class BlockSurroundings {
   /// @param x, y, z  in the block, from −kPad to 7 + kPad
   [[nodiscard]] Owner at(int x, int y, int z) const { return owners_[index(x, y, z)]; }
 
+  /// Owners of the grid points (x, y, 0…).
+  [[nodiscard]] const Owner* row(int x, int y) const { return &owners_[index(x, y, 0)]; }
+
   /// Fills the surroundings.
   /// @tparam RowOf  void(int i, int j, int k, int x, int y, Owner* row): writes the owners of the
   ///         row (x, y, 0…7) of the block at the offset (i, j, k), each −1, 0 or 1

@@ -459,44 +459,54 @@ class SolidsPartition {
   }
 
   static constexpr std::array<std::uint32_t, 3> kStrides = {64, 8, 1};
+  static constexpr int kSteps = 8;  // in which the edges of the grid are searched
 
   /// Finds parts between two neighbouring grid points that own neither of them.
   void findLost(const SolidBlock& block, const BlockSurroundings& around,
                 std::vector<LostPlace>& places) const {
     const Coord origin = originOf(block);
-    for (std::uint32_t n = 0; n < kVoxels; ++n) {
-      const Coord at = SegmentedData::localOf(n);
-      const Rank a = around.at(at[0], at[1], at[2]);
-      for (int axis = 0; axis < 3; ++axis) {
-        Coord next = at;
-        next[axis] += 1;
-        const Rank b = around.at(next[0], next[1], next[2]);
-        if (a != b && crossings(block, n, axis) > 1)
-          findLostOnEdge(block, origin, n, axis, {a, b}, places);
+    std::uint32_t n = 0;
+    for (int x = 0; x < 8; ++x)
+      for (int y = 0; y < 8; ++y) {
+        const Rank* row = around.row(x, y);
+        const std::array<const Rank*, 3> next = {around.row(x + 1, y), around.row(x, y + 1),
+                                                 row + 1};
+        for (int z = 0; z < 8; ++z, ++n)
+          for (std::size_t axis = 0; axis < 3; ++axis) {
+            const Rank a = row[z], b = next[axis][z];
+            if (a != b && mayHoldPart(block, origin, n, static_cast<int>(axis)))
+              findLostOnEdge(block, origin, n, static_cast<int>(axis), {a, b}, places);
+          }
       }
-    }
   }
 
-  /// Counts the surfaces that cross an edge of the grid.
-  [[nodiscard]] int crossings(const SolidBlock& block, std::uint32_t n, int axis) const {
+  /// Returns true when the outermost crossings of surfaces with an edge of the grid are so far
+  /// apart that a part between them counts.
+  [[nodiscard]] bool mayHoldPart(const SolidBlock& block, const Coord& origin, std::uint32_t n,
+                                 int axis) const {
+    float first = 1, last = 0;
     const Coord local = SegmentedData::localOf(n);
-    int count = 0;
     for (std::size_t e = block.first; e < block.last; ++e) {
       const RankedLeaf& leaf = leaves_[e];
-      Coord next = originOf(block) + local;
-      next[axis] += 1;
-      const float v = local[axis] < 7 ? leaf.values[n + kStrides[static_cast<std::size_t>(axis)]]
-                                      : tree(leaf.rank).getValue(next);
-      count += (leaf.values[n] < 0) != (v < 0);
+      const float u = leaf.values[n], v = nextValue(leaf, origin, local, n, axis);
+      if ((u < 0) == (v < 0)) continue;
+      first = std::min(first, u / (u - v));
+      last = std::max(last, u / (u - v));
     }
-    return count;
+    return last - first > 1.0f / kSteps;
+  }
+  /// Value of a leaf at the next grid point along an axis.
+  [[nodiscard]] float nextValue(const RankedLeaf& leaf, const Coord& origin, const Coord& local,
+                                std::uint32_t n, int axis) const {
+    if (local[axis] < 7) return leaf.values[n + kStrides[static_cast<std::size_t>(axis)]];
+    Coord next = origin + local;
+    next[axis] += 1;
+    return tree(leaf.rank).getValue(next);
   }
 
   void findLostOnEdge(const SolidBlock& block, const Coord& origin, std::uint32_t n, int axis,
                       const std::array<Rank, 2>& ends, std::vector<LostPlace>& places) const {
-    constexpr int kSteps = 8;
     const Coord local = SegmentedData::localOf(n);
-    const bool isInside = local[axis] < 7;
     std::array<Rank, kSteps> owners;  // at t = i / kSteps
     owners.fill(block.top);
     std::array<float, kSteps> least, second;
@@ -504,11 +514,7 @@ class SolidsPartition {
     second.fill(far_);
     for (std::size_t e = block.first; e < block.last; ++e) {
       const RankedLeaf& leaf = leaves_[e];
-      Coord next = origin + local;
-      next[axis] += 1;
-      const float u = leaf.values[n],
-                  v = isInside ? leaf.values[n + kStrides[static_cast<std::size_t>(axis)]]
-                               : tree(leaf.rank).getValue(next);
+      const float u = leaf.values[n], v = nextValue(leaf, origin, local, n, axis);
       for (std::size_t i = 1; i < kSteps; ++i) {
         const float phi = u + (v - u) * (static_cast<float>(i) / kSteps);
         if (phi < 0) owners[i] = leaf.rank;
