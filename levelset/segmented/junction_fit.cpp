@@ -16,11 +16,12 @@ constexpr double kSpread = 1.4;     // voxels: standard deviation of the weights
 constexpr double kLargest = 1.75;   // voxels: largest distance that is used
 constexpr double kFlatness = 1e-3;  // prefers planes where samples do not determine curvature
 constexpr double kFirstFlatness = 0.1;
-constexpr double kDamping = 1e-3;   // of steps along the curve, where the point is free
-constexpr double kParallel = 0.02;  // least area of the parallelogram of two normals, squared
-constexpr double kDoubt =
-    0.01;  // weight of distances to other than the nearest interface, at first
-constexpr double kAgreement = 0.05;      // voxels: residual that halves the weight of a sample
+constexpr double kDamping = 1e-3;    // of steps along the curve, where the point is free
+constexpr double kParallel = 0.02;   // least area of the parallelogram of two normals, squared
+constexpr double kAgreement = 0.05;  // voxels: residual that halves the weight of a sample
+constexpr double kMiss =
+    0.1;  // voxels: largest distance of a point from interfaces that meet there
+constexpr double kLooseAgreement = 0.25, kMedians = 1.5;
 constexpr double kLeastAgreement = 0.5;  // of the weights of a fit
 constexpr double kFarthest = 1.5;        // voxels: largest move of a point
 constexpr std::size_t kFewest = 5;       // samples
@@ -58,6 +59,23 @@ bool solveCholesky(std::array<std::array<double, n>, n>& a, std::array<double, n
   return true;
 }
 
+/// Distance of a grid point from an interface.
+struct KnownDistance {
+  std::array<double, kTerms> terms;
+  double value, weight;
+};
+
+/// Residual that halves the weight of a sample: a multiple of the median, so that noise of labels
+/// does not spoil a fit, within limits.
+double agreementOf(const std::vector<KnownDistance>& known, const InterfaceFit& fit) {
+  std::vector<double> residuals;
+  for (const KnownDistance& sample : known)
+    residuals.push_back(std::abs(dot(fit.c, sample.terms) - sample.value));
+  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
+  std::nth_element(residuals.begin(), middle, residuals.end());
+  return std::clamp(kMedians * *middle, kAgreement, kLooseAgreement);
+}
+
 }  // namespace
 
 double InterfaceFit::value(const V3d& p) const {
@@ -72,41 +90,20 @@ V3d InterfaceFit::gradient(const V3d& p) const {
 }
 
 JunctionFit::JunctionFit(const SegmentedData& data, const Coord& origin)
-    : reader_(data),
-      voxelSize_(data.voxelSize),
-      origin_(origin),
-      samples_(static_cast<std::size_t>(kSide) * kSide * kSide) {
-  const auto perVoxel = static_cast<float>(1 / voxelSize_);
+    : origin_(origin), samples_(static_cast<std::size_t>(kSide) * kSide * kSide) {
+  SegmentedReader reader(data);
+  const auto perVoxel = static_cast<float>(1 / data.voxelSize);
   for (int x = -kPad; x <= 8 + kPad; ++x)
     for (int y = -kPad; y <= 8 + kPad; ++y)
       for (int z = -kPad; z <= 8 + kPad; ++z) {
-        const SegmentedReader::Nearest near = reader_.nearest(origin.offsetBy(x, y, z));
-        samples_[index(x, y, z)] = {near.distance * perVoxel, near.label, near.neighbour, false};
-      }
-  for (int x = -kReach; x <= 8 + kReach; ++x)
-    for (int y = -kReach; y <= 8 + kReach; ++y)
-      for (int z = -kReach; z <= 8 + kReach; ++z) {
-        Sample& sample = samples_[index(x, y, z)];
-        bool isPure = true;
-        for (int i = -1; i <= 1 && isPure; ++i)
-          for (int j = -1; j <= 1 && isPure; ++j)
-            for (int k = -1; k <= 1 && isPure; ++k) {
-              const RegionLabel label = samples_[index(x + i, y + j, z + k)].label;
-              isPure = label == sample.label || label == sample.neighbour;
-            }
-        sample.isPure = isPure;
+        const SegmentedReader::Nearest near = reader.nearest(origin.offsetBy(x, y, z));
+        samples_[index(x, y, z)] = {near.distance * perVoxel, near.label, near.neighbour};
       }
 }
 
 std::optional<InterfaceFit> JunctionFit::fit(RegionLabel a, RegionLabel b, const V3d& position) {
   const V3d about = position - V3d(origin_[0], origin_[1], origin_[2]);
-  struct Known {
-    std::array<double, kTerms> terms;
-    double value, weight;
-    bool isNearest;
-  };
-  std::vector<Known> known;
-  std::size_t count = 0;
+  std::vector<KnownDistance> known;
   std::array<int, 3> centre{};
   for (int axis = 0; axis < 3; ++axis)
     centre[static_cast<std::size_t>(axis)] =
@@ -117,31 +114,27 @@ std::optional<InterfaceFit> JunctionFit::fit(RegionLabel a, RegionLabel b, const
         const Sample& sample = samples_[index(x, y, z)];
         if (sample.label == sample.neighbour || (sample.label != a && sample.label != b)) continue;
         const RegionLabel other = sample.label == a ? b : a;
-        const bool isNearest = sample.neighbour == other;
-        if (!isNearest) continue;
-        const double distance =
-            isNearest ? static_cast<double>(sample.distance)
-                      : static_cast<double>(reader_.distanceTo(origin_.offsetBy(x, y, z), other)) /
-                            voxelSize_;
+        if (sample.neighbour != other) continue;
+        const auto distance = static_cast<double>(sample.distance);
         if (distance > kLargest) continue;
         const V3d p = V3d(x, y, z) - about;
         const double weight = std::exp(-p.length2() / (2 * kSpread * kSpread));
-        known.push_back({termsAt(p), sample.label == a ? distance : -distance, weight, isNearest});
-        count += isNearest;
+        known.push_back({termsAt(p), sample.label == a ? distance : -distance, weight});
       }
-  if (count < kFewest) return std::nullopt;
+  if (known.size() < kFewest) return std::nullopt;
   InterfaceFit result{position, {}};
   constexpr int kRounds = 4;
   for (int round = 0; round < kRounds; ++round) {
     std::array<std::array<double, kTerms>, kTerms> matrix{};
     std::array<double, kTerms> right{};
+    const double agreement = round == 0 ? kAgreement : agreementOf(known, result);
     double all = 0, agreeing = 0;
-    for (const Known& sample : known) {
+    for (const KnownDistance& sample : known) {
       double weight = sample.weight;
       if (round == 0) {
         weight *= weight * weight;  // only those nearby, which hardly lie beyond a crease
       } else {
-        const double residual = (dot(result.c, sample.terms) - sample.value) / kAgreement;
+        const double residual = (dot(result.c, sample.terms) - sample.value) / agreement;
         weight /= 1 + residual * residual;
         all += sample.weight;
         agreeing += weight;
@@ -189,6 +182,10 @@ std::optional<V3d> meet(std::span<const InterfaceFit> interfaces, const V3d& sta
     at += V3d(right[0], right[1], right[2]);
     if (!((at - interfaces.front().about).length() <= kFarthest)) return std::nullopt;
   }
+  // Interfaces that bend sharply, as those of smoothed labels do, are not known where they meet.
+  for (const InterfaceFit& interface : interfaces)
+    if (std::abs(interface.value(at)) > kMiss * interface.gradient(at).length())
+      return std::nullopt;
   return at;
 }
 

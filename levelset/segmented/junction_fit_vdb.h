@@ -25,8 +25,9 @@ struct InterfaceFit {
 };
 
 /// Fits the interfaces near a block. They are extended smoothly up to a junction, also those that
-/// end there. Grid points beside a third region may be closest to the end of the interface; their
-/// distances count only as far as they agree with the others.
+/// end there. Only the grid points to which an interface is the nearest one determine its fit. Some
+/// of them may be closest to the end of the interface, or beyond a crease; their distances count as
+/// far as they agree with the others.
 class JunctionFit {
  public:
   /// @param origin  of the block, index coordinates
@@ -39,8 +40,8 @@ class JunctionFit {
                                                 const Imath::V3d& about);
 
  private:
-  static constexpr int kReach = 3;         // of the samples of a fit, voxels
-  static constexpr int kPad = kReach + 1;  // plus the neighbours that decide if a sample is pure
+  static constexpr int kReach = 3;  // of the samples of a fit, voxels
+  static constexpr int kPad = kReach;
   static constexpr int kSide = 8 + 1 + 2 * kPad;
   [[nodiscard]] static std::size_t index(int x, int y, int z) {
     return static_cast<std::size_t>(((x + kPad) * kSide + y + kPad) * kSide + z + kPad);
@@ -48,11 +49,8 @@ class JunctionFit {
   struct Sample {
     float distance;  ///< voxels
     RegionLabel label, neighbour;
-    bool isPure;  ///< no third region beside it
   };
 
-  SegmentedReader reader_;
-  double voxelSize_;
   openvdb::Coord origin_;
   std::vector<Sample> samples_;
 };

@@ -17,6 +17,7 @@ using Imath::V3d;
 using openvdb::Coord;
 
 constexpr int kRelaxations = 5;
+constexpr double kZigzag = 0.1;  // voxels: distance from the middle of both neighbours
 
 /// Vertices at and beside junctions, with the interfaces that they lie on.
 class JunctionStrip {
@@ -30,6 +31,7 @@ class JunctionStrip {
     fitInterfaces(subProgress(progress, 0, 0.9));
     // The points first, then the curves between them, then the interfaces.
     for (int n = 0; n <= kRelaxations; ++n) relax(n == 0);
+    for (int n = 0; n < kRelaxations; ++n) straighten();
     report(progress, 1);
   }
 
@@ -147,6 +149,24 @@ class JunctionStrip {
       // Beside creases, where no interface fits, the vertex only follows its neighbours.
       moved[n] =
           vertex.interfaces.empty() ? target : meet(vertex.interfaces, target).value_or(target);
+    });
+    for (std::size_t n = 0; n < strip_.size(); ++n)
+      mesh_.mesh.positions[strip_[n].vertex] = moved[n];
+  }
+
+  /// Moves vertices of curves that zigzag towards their neighbours. Smooth curves stay. Fits to
+  /// volumes of labels have noise, which differs from vertex to vertex.
+  void straighten() {
+    std::vector<V3d> moved(strip_.size());
+    tbb::parallel_for(std::size_t{0}, strip_.size(), [&](std::size_t n) {
+      const StripVertex& vertex = strip_[n];
+      const V3d& old = mesh_.mesh.positions[vertex.vertex];
+      moved[n] = old;
+      if (!vertex.isJunction || vertex.neighbours.size() != 2) return;
+      const V3d middle = (mesh_.mesh.positions[vertex.neighbours[0]] +
+                          mesh_.mesh.positions[vertex.neighbours[1]]) /
+                         2;
+      if ((middle - old).length() > kZigzag) moved[n] = (old + middle) / 2;
     });
     for (std::size_t n = 0; n < strip_.size(); ++n)
       mesh_.mesh.positions[strip_[n].vertex] = moved[n];
