@@ -15,7 +15,7 @@
 #include "levelset/error.h"
 #include "levelset/memory_limit.h"
 #include "levelset/progress_gate.h"
-#include "levelset/segmented/block_surroundings.h"
+#include "levelset/segmented/local/block_surroundings.h"
 #include "levelset/segmented/segmented_data_vdb.h"
 #include "levelset/transform/resample_vdb.h"
 

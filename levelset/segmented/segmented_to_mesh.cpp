@@ -9,7 +9,7 @@
 #include "levelset/error.h"
 #include "levelset/memory_limit.h"
 #include "levelset/progress_gate.h"
-#include "levelset/segmented/kuhn_cell.h"
+#include "levelset/segmented/local/kuhn_cell.h"
 #include "levelset/segmented/segmented_data_vdb.h"
 #include "levelset/segmented/sharpen_junctions.h"
 

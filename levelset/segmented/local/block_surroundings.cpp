@@ -1,4 +1,4 @@
-#include "levelset/segmented/block_surroundings.h"
+#include "levelset/segmented/local/block_surroundings.h"
 
 namespace levelset {
 

@@ -1,19 +1,18 @@
+#include "levelset/segmented/local/interface_fit.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
-
-#include "levelset/segmented/junction_fit_vdb.h"
+#include <vector>
 
 namespace levelset {
 namespace {
 
 using Imath::V3d;
-using openvdb::Coord;
 
 constexpr std::size_t kTerms = InterfaceFit::kTerms;
 constexpr double kFlattest = 0.01;  // least squared slope of a distance
 constexpr double kSpread = 1.4;     // voxels: standard deviation of the weights of samples
-constexpr double kLargest = 1.75;   // voxels: largest distance that is used
 constexpr double kFlatness = 1e-3;  // prefers planes where samples do not determine curvature
 constexpr double kFirstFlatness = 0.1;
 constexpr double kDamping = 1e-3;    // of steps along the curve, where the point is free
@@ -89,40 +88,16 @@ V3d InterfaceFit::gradient(const V3d& p) const {
           c[3] + 2 * c[6] * q.z + c[7] * q.y + c[8] * q.x};
 }
 
-JunctionFit::JunctionFit(const SegmentedData& data, const Coord& origin)
-    : origin_(origin), samples_(static_cast<std::size_t>(kSide) * kSide * kSide) {
-  SegmentedReader reader(data);
-  const auto perVoxel = static_cast<float>(1 / data.voxelSize);
-  for (int x = -kPad; x <= 8 + kPad; ++x)
-    for (int y = -kPad; y <= 8 + kPad; ++y)
-      for (int z = -kPad; z <= 8 + kPad; ++z) {
-        const SegmentedReader::Nearest near = reader.nearest(origin.offsetBy(x, y, z));
-        samples_[index(x, y, z)] = {near.distance * perVoxel, near.label, near.neighbour};
-      }
-}
-
-std::optional<InterfaceFit> JunctionFit::fit(RegionLabel a, RegionLabel b, const V3d& position) {
-  const V3d about = position - V3d(origin_[0], origin_[1], origin_[2]);
+std::optional<InterfaceFit> fitInterface(const V3d& about,
+                                         std::span<const InterfaceSample> samples) {
+  if (samples.size() < kFewest) return std::nullopt;
   std::vector<KnownDistance> known;
-  std::array<int, 3> centre{};
-  for (int axis = 0; axis < 3; ++axis)
-    centre[static_cast<std::size_t>(axis)] =
-        std::clamp(static_cast<int>(std::lround(about[axis])), 0, 8);
-  for (int x = centre[0] - kReach; x <= centre[0] + kReach; ++x)
-    for (int y = centre[1] - kReach; y <= centre[1] + kReach; ++y)
-      for (int z = centre[2] - kReach; z <= centre[2] + kReach; ++z) {
-        const Sample& sample = samples_[index(x, y, z)];
-        if (sample.label == sample.neighbour || (sample.label != a && sample.label != b)) continue;
-        const RegionLabel other = sample.label == a ? b : a;
-        if (sample.neighbour != other) continue;
-        const auto distance = static_cast<double>(sample.distance);
-        if (distance > kLargest) continue;
-        const V3d p = V3d(x, y, z) - about;
-        const double weight = std::exp(-p.length2() / (2 * kSpread * kSpread));
-        known.push_back({termsAt(p), sample.label == a ? distance : -distance, weight});
-      }
-  if (known.size() < kFewest) return std::nullopt;
-  InterfaceFit result{position, {}};
+  for (const InterfaceSample& sample : samples) {
+    const V3d p = sample.position - about;
+    known.push_back(
+        {termsAt(p), sample.distance, std::exp(-p.length2() / (2 * kSpread * kSpread))});
+  }
+  InterfaceFit result{about, {}};
   constexpr int kRounds = 4;
   for (int round = 0; round < kRounds; ++round) {
     std::array<std::array<double, kTerms>, kTerms> matrix{};
