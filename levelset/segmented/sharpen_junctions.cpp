@@ -205,8 +205,9 @@ class JunctionStrip {
         target /= static_cast<double>(vertex.neighbours.size());
       }
       // Beside creases, where no interface fits, the vertex only follows its neighbours.
-      moved[n] =
-          vertex.interfaces.empty() ? target : meet(vertex.interfaces, target).value_or(target);
+      moved[n] = vertex.interfaces.empty()
+                     ? target
+                     : meetingPoint(vertex.interfaces, target).value_or(target);
     });
     for (std::size_t n = 0; n < strip_.size(); ++n)
       mesh_.mesh.positions[strip_[n].vertex] = moved[n];

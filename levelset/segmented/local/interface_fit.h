@@ -37,7 +37,7 @@ struct InterfaceSample {
 /// Finds the point on all of the interfaces that is closest to `start`.
 /// @return empty when two or more interfaces are nearly parallel or do not meet, or the point is
 ///         more than 1.5 voxels from where they were fitted
-[[nodiscard]] std::optional<Imath::V3d> meet(std::span<const InterfaceFit> interfaces,
-                                             const Imath::V3d& start);
+[[nodiscard]] std::optional<Imath::V3d> meetingPoint(std::span<const InterfaceFit> interfaces,
+                                                     const Imath::V3d& start);
 
 }  // namespace levelset
