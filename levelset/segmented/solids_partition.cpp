@@ -23,6 +23,8 @@ using openvdb::Int32Tree;
 using Rank = std::uint16_t;
 constexpr std::uint32_t kVoxels = SegmentedData::kVoxels;
 
+constexpr float kTie = 1e-4f;  // voxels: difference of distances that are equal but for rounding
+
 /// Leaf of an operand.
 struct RankedLeaf {
   Coord block;
@@ -347,7 +349,7 @@ class SolidsPartition {
     if (others.adjacent.empty()) return;
     // Cells with several labels need a distance in all corners.
     const float largest = std::nextafter(background_, 0.0f);
-    values.distances[n] = std::min(others.distances[others.nearest()], largest);
+    values.distances[n] = std::min(others.distances[chosen], largest);
     const std::size_t begin = values.extras.size();
     for (std::size_t i = 0; i < others.ranks.size(); ++i)
       if (i != chosen &&
@@ -365,8 +367,7 @@ class SolidsPartition {
   [[nodiscard]] std::size_t neighbourAmong(const SolidBlock& block, std::uint32_t n, Rank own,
                                            const Others& others,
                                            const BlockSurroundings& around) const {
-    constexpr float kTie = 0.02f;
-    const auto tolerance = kTie * static_cast<float>(voxelSize_);
+    const float tolerance = std::max(gap_, kTie * static_cast<float>(voxelSize_));
     const std::size_t nearest = others.nearest(), count = others.ranks.size();
     const float distance = others.distances[nearest];
     std::vector<std::size_t> tied, touching;
