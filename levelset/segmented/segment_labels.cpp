@@ -120,7 +120,7 @@ void forEachBlockOf(const LabelArray& labels, const Progress& progress, const Wo
   });
 }
 
-/// Inverse of the error function [Giles10]. The relative error is below 1e-6.
+/// Inverse of the error function [Giles11]. The relative error is below 1e-6.
 double inverseErf(double x) {
   double w = -std::log((1 - x) * (1 + x)), p = 0;
   if (w < 5) {
