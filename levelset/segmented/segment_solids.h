@@ -18,7 +18,7 @@ struct SegmentSolidsOptions {
   /// Labels of the solids, different from each other and from the void. Empty: 1, 2, 3, …
   std::vector<RegionLabel> labels = {};
   /// Largest gap between two solids that counts as contact, voxels. Faces that should coincide
-  /// differ by rounding and resampling.
+  /// differ by rounding and resampling. Distances of which the smallest is stored may differ by it.
   double gap = 0.01;
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};

@@ -1,6 +1,7 @@
 #include <openvdb/tools/Prune.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "levelset/error.h"
@@ -51,6 +52,38 @@ float SegmentedReader::extraAt(const Coord& at, RegionLabel other) {
   return found != last && keyOf(*found) == key ? found->distance : data_.background;
 }
 
+PackedBlock packTwoRegions(const openvdb::Coord& origin, const float* phi, RegionLabel inside,
+                           RegionLabel outside, float background) {
+  PackedBlock packed;
+  packed.block.origin = origin;
+  packed.block.paletteSize = 2;
+  packed.palette = {std::min(inside, outside), std::max(inside, outside)};
+  packed.words.assign(SegmentedData::kLabelWord + 8, 0);
+  packed.distances.resize(SegmentedData::kVoxels);
+  std::size_t rank = 0;
+  bool isInside = false, isOutside = false;
+  for (std::uint32_t w = 0; w < 8; ++w) {
+    std::uint64_t active = 0, negative = 0;
+    if (w > 0) packed.words[8] |= std::uint64_t{rank} << (9 * (w - 1));
+    for (std::uint32_t b = 0; b < 64; ++b) {
+      const float value = phi[64 * w + b], distance = std::abs(value);
+      negative |= std::uint64_t{value < 0} << b;
+      active |= std::uint64_t{distance < background} << b;
+      packed.distances[rank] = distance;
+      rank += distance < background;
+    }
+    packed.words[w] = active;
+    packed.words[SegmentedData::kLabelWord + w] = inside < outside ? ~negative : negative;
+    isInside = isInside || negative != 0;
+    isOutside = isOutside || ~negative != 0;
+  }
+  packed.distances.resize(rank);
+  packed.distances.shrink_to_fit();
+  if (isInside) packed.owners.push_back(inside);
+  if (isOutside) packed.owners.push_back(outside);
+  return packed;
+}
+
 PackedBlock packBlock(const SegmentedBlockValues& values, float background) {
   PackedBlock packed;
   packed.block.origin = values.origin;
@@ -63,8 +96,9 @@ PackedBlock packBlock(const SegmentedBlockValues& values, float background) {
     last = label;
     if (std::find(palette.begin(), palette.end(), label) == palette.end()) palette.push_back(label);
   };
+  for (const RegionLabel label : values.labels) addLabel(label);
+  packed.owners = palette;
   for (std::uint32_t n = 0; n < SegmentedData::kVoxels; ++n) {
-    addLabel(values.labels[n]);
     if (values.distances[n] >= background) continue;
     ++active;
     addLabel(values.neighbours[n]);
@@ -72,24 +106,32 @@ PackedBlock packBlock(const SegmentedBlockValues& values, float background) {
   // A palette of two implies that the neighbour is the other label.
   if (palette.size() == 1) palette.push_back(palette[0]);
   std::sort(palette.begin(), palette.end());
+  RegionLabel known = palette[0];
+  std::uint64_t code = 0;
   const auto codeOf = [&](RegionLabel label) {
-    return static_cast<std::uint64_t>(std::lower_bound(palette.begin(), palette.end(), label) -
-                                      palette.begin());
+    if (label != known) {
+      known = label;
+      code = static_cast<std::uint64_t>(std::lower_bound(palette.begin(), palette.end(), label) -
+                                        palette.begin());
+    }
+    return code;
   };
   const std::uint16_t bits = bitsOfPalette(palette.size());
+  constexpr std::uint32_t kLabels = SegmentedData::kLabelWord;
   packed.block.bits = bits;
   packed.block.paletteSize = static_cast<std::uint16_t>(palette.size());
   const std::size_t neighbourWords = palette.size() > 2 ? (active * bits + 63u) / 64u : 0;
-  packed.words.assign(8 + 8u * bits + neighbourWords, 0);
+  packed.words.assign(kLabels + 8u * bits + neighbourWords, 0);
   packed.distances.reserve(active);
   std::uint32_t rank = 0;
   for (std::uint32_t n = 0; n < SegmentedData::kVoxels; ++n) {
-    putCode(&packed.words[8], n, bits, codeOf(values.labels[n]));
+    if (n % 64 == 0 && n > 0) packed.words[8] |= std::uint64_t{rank} << (9 * (n / 64 - 1));
+    putCode(&packed.words[kLabels], n, bits, codeOf(values.labels[n]));
     if (values.distances[n] >= background) continue;
     packed.words[n >> 6] |= std::uint64_t{1} << (n & 63);
     packed.distances.push_back(values.distances[n]);
     if (palette.size() > 2)
-      putCode(&packed.words[8 + 8u * bits], rank, bits, codeOf(values.neighbours[n]));
+      putCode(&packed.words[kLabels + 8u * bits], rank, bits, codeOf(values.neighbours[n]));
     ++rank;
   }
   packed.extras = values.extras;
@@ -130,15 +172,8 @@ SegmentedField assembleSegmented(openvdb::math::Transform::Ptr transform, double
     data->distances.insert(data->distances.end(), packed.distances.begin(), packed.distances.end());
     data->extras.insert(data->extras.end(), packed.extras.begin(), packed.extras.end());
     data->palettes.insert(data->palettes.end(), packed.palette.begin(), packed.palette.end());
-    // Deletes the block now, so that the blocks are not twice in memory.
-    packed = PackedBlock();
-    std::uint32_t seen = 0;  // label of the voxel before
-    for (std::uint32_t n = 0; n < SegmentedData::kVoxels; ++n) {
-      const RegionLabel label = data->labelAt(block, n);
-      if (n > 0 && label == seen) continue;
-      seen = label;
-      owns[label] = true;
-    }
+    for (const RegionLabel label : packed.owners) owns[label] = true;
+    packed = PackedBlock();  // lest the blocks are in memory twice
   }
   data->blocks.push_back(end);
   openvdb::tools::prune(*tiles);

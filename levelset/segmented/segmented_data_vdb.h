@@ -5,7 +5,6 @@
 #include <openvdb/tree/ValueAccessor.h>
 
 #include <array>
-#include <bit>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -26,8 +25,9 @@ struct SegmentedExtra {
 /// SegmentedData.
 struct SegmentedBlock {
   openvdb::Coord origin;
-  /// First of the words: 8 of the mask of active voxels; 8 × bits of the codes of labels; for
-  /// palettes of more than two labels the codes of neighbours, by active voxel.
+  /// First of the words: 8 of the mask of active voxels; one with the counts of active voxels
+  /// before these words, 9 bits each; 8 × bits of the codes of labels; for palettes of more than
+  /// two labels the codes of neighbours, by active voxel.
   std::uint32_t words = 0;
   std::uint32_t distances = 0;  ///< first distance, by active voxel
   std::uint32_t extras = 0;     ///< first extra, by voxel and label
@@ -42,6 +42,7 @@ struct SegmentedBlock {
 struct SegmentedData {
   static constexpr int kBlock = 8;
   static constexpr std::uint32_t kVoxels = 512;
+  static constexpr std::uint32_t kLabelWord = 9;  ///< first word of the labels of a block
 
   openvdb::math::Transform::Ptr transform;
   double voxelSize = 0, halfWidth = 0;  ///< half width in voxels
@@ -70,6 +71,13 @@ struct SegmentedData {
     return {static_cast<int>(offset >> 6), static_cast<int>(offset >> 3 & 7),
             static_cast<int>(offset & 7)};
   }
+  /// As std::popcount(), which calls a function where the machine may lack the instruction.
+  [[nodiscard]] static std::uint64_t countBits(std::uint64_t x) {
+    x -= x >> 1 & 0x5555555555555555u;
+    x = (x & 0x3333333333333333u) + (x >> 2 & 0x3333333333333333u);
+    x = (x + (x >> 4)) & 0x0f0f0f0f0f0f0f0fu;
+    return x * 0x0101010101010101u >> 56;
+  }
   [[nodiscard]] std::size_t blockCount() const { return blocks.empty() ? 0 : blocks.size() - 1; }
   [[nodiscard]] std::size_t memoryUse() const;
 
@@ -78,20 +86,22 @@ struct SegmentedData {
     const std::uint64_t* mask = &words[block.words];
     const std::uint32_t word = voxel >> 6, bit = voxel & 63;
     if (!(mask[word] >> bit & 1)) return -1;
-    int rank = std::popcount(mask[word] & ((std::uint64_t{1} << bit) - 1));
-    for (std::uint32_t w = 0; w < word; ++w) rank += std::popcount(mask[w]);
+    const std::uint64_t before = word == 0 ? 0 : mask[8] >> (9 * (word - 1)) & 511;
+    const auto rank =
+        static_cast<std::int64_t>(before + countBits(mask[word] & ((std::uint64_t{1} << bit) - 1)));
     return std::int64_t{block.distances} + rank;
   }
   [[nodiscard]] RegionLabel labelAt(const SegmentedBlock& block, std::uint32_t voxel) const {
-    return palettes[block.palette + codeAt(block, 8, voxel)];
+    return palettes[block.palette + codeAt(block, kLabelWord, voxel)];
   }
   /// Region across the nearest interface of an active voxel.
   /// @param distance  distanceIndex() of the voxel
   [[nodiscard]] RegionLabel neighbourAt(const SegmentedBlock& block, std::uint32_t voxel,
                                         std::int64_t distance) const {
-    if (block.paletteSize == 2) return palettes[block.palette + 1 - codeAt(block, 8, voxel)];
+    if (block.paletteSize == 2)
+      return palettes[block.palette + 1 - codeAt(block, kLabelWord, voxel)];
     const auto rank = static_cast<std::uint32_t>(distance - block.distances);
-    return palettes[block.palette + codeAt(block, 8 + 8u * block.bits, rank)];
+    return palettes[block.palette + codeAt(block, kLabelWord + 8u * block.bits, rank)];
   }
 
  private:
@@ -183,7 +193,12 @@ struct PackedBlock {
   std::vector<float> distances;
   std::vector<SegmentedExtra> extras;
   std::vector<RegionLabel> palette;
+  std::vector<RegionLabel> owners;  ///< labels of its voxels
 };
+/// Packs a block near one interface only.
+/// @param phi  signed distance to it, negative in the region `inside`
+[[nodiscard]] PackedBlock packTwoRegions(const openvdb::Coord& origin, const float* phi,
+                                         RegionLabel inside, RegionLabel outside, float background);
 [[nodiscard]] PackedBlock packBlock(const SegmentedBlockValues& values, float background);
 
 /// Puts blocks together to a field.

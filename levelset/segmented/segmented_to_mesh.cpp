@@ -9,7 +9,7 @@
 #include "levelset/error.h"
 #include "levelset/memory_limit.h"
 #include "levelset/progress_gate.h"
-#include "levelset/segmented/kuhn_cell.h"
+#include "levelset/segmented/local/kuhn_cell.h"
 #include "levelset/segmented/segmented_data_vdb.h"
 #include "levelset/segmented/sharpen_junctions.h"
 
@@ -18,14 +18,13 @@ namespace {
 
 using Imath::V3d;
 using Imath::V3i;
-using kuhn::Corner;
 using openvdb::Coord;
 
 // Least distance of a vertex from the ends of its edge, voxels. Where an interface passes through a
 // grid point, it keeps triangles from collapsing to the point.
 constexpr double kEndGap = 1e-5;
 
-Coord cornerOffset(Corner corner) {
+Coord cornerOffset(kuhn::Corner corner) {
   return SegmentedCell::cornerOffset(static_cast<int>(corner));
 }
 
@@ -59,7 +58,7 @@ struct CellLabels {
   bool cell(std::uint32_t voxel, std::array<RegionLabel, 8>& corners) const {
     const Coord at = SegmentedData::localOf(voxel);
     bool isMixed = false;
-    for (Corner c = 0; c < 8; ++c) {
+    for (kuhn::Corner c = 0; c < 8; ++c) {
       const Coord p = at + cornerOffset(c);
       corners[c] = labels[static_cast<std::size_t>((p[0] * kSide + p[1]) * kSide + p[2])];
       isMixed = isMixed || corners[c] != corners[0];
@@ -125,7 +124,7 @@ class SegmentedMesher {
     std::vector<Coord> coords;
     for (std::size_t b = 0; b < data_.blockCount(); ++b) {
       const Coord at = SegmentedData::blockCoord(data_.blocks[b].origin);
-      for (Corner c = 0; c < 8; ++c) coords.push_back(at - cornerOffset(c));
+      for (kuhn::Corner c = 0; c < 8; ++c) coords.push_back(at - cornerOffset(c));
     }
     std::sort(coords.begin(), coords.end());
     coords.erase(std::unique(coords.begin(), coords.end()), coords.end());
@@ -149,7 +148,7 @@ class SegmentedMesher {
       const auto add = [&](std::uint32_t slot) {
         block.keys.push_back(static_cast<std::uint16_t>(voxel * 32 + slot));
       };
-      for (Corner step = 1; step < 8; ++step)
+      for (kuhn::Corner step = 1; step < 8; ++step)
         if (l[0] != l[step]) add(kuhn::edgeSlot(step));
       for (const kuhn::FaceSteps& face : kuhn::kFaces)
         if (allDiffer(l[0], l[face.middle], l[face.upper]))
@@ -201,7 +200,7 @@ class SegmentedMesher {
   /// Mean of the crossings on the edges of a simplex.
   template <std::size_t n>
   static V3d centre(SegmentedReader& reader, const Coord& low,
-                    const std::array<Corner, n>& corners) {
+                    const std::array<kuhn::Corner, n>& corners) {
     V3d sum(0);
     for (std::size_t i = 0; i < n; ++i)
       for (std::size_t j = i + 1; j < n; ++j)
@@ -222,10 +221,10 @@ class SegmentedMesher {
     Coord local;                             ///< of the lowest corner
     std::size_t tetrahedron;
 
-    [[nodiscard]] const std::array<Corner, 4>& corners() const {
+    [[nodiscard]] const std::array<kuhn::Corner, 4>& corners() const {
       return kuhn::kTetrahedra[tetrahedron];
     }
-    [[nodiscard]] std::uint32_t vertex(Corner low, std::uint32_t slot) const {
+    [[nodiscard]] std::uint32_t vertex(kuhn::Corner low, std::uint32_t slot) const {
       const Coord at = local + cornerOffset(low);
       const MeshBlock& owner =
           *around[static_cast<std::size_t>((at[0] >> 3) * 4 + (at[1] >> 3) * 2 + (at[2] >> 3))];
@@ -240,13 +239,13 @@ class SegmentedMesher {
     }
     [[nodiscard]] Node edge(std::size_t i, std::size_t j) const {
       const auto [low, high] = std::minmax(i, j);
-      const Corner from = corners()[low];
+      const kuhn::Corner from = corners()[low];
       return {vertex(from, kuhn::edgeSlot(corners()[high] ^ from)), (place(i) + place(j)) / 2};
     }
     [[nodiscard]] Node face(std::size_t i, std::size_t j, std::size_t k) const {
       std::array<std::size_t, 3> order = {i, j, k};
       std::sort(order.begin(), order.end());
-      const Corner from = corners()[order[0]];
+      const kuhn::Corner from = corners()[order[0]];
       return {vertex(from, kuhn::faceSlot(corners()[order[1]] ^ from, corners()[order[2]] ^ from)),
               (place(i) + place(j) + place(k)) / 3};
     }
@@ -260,7 +259,7 @@ class SegmentedMesher {
     SegmentedReader reader(data_);
     const CellLabels labels(reader, originOf(block));
     Cut cut{block, {}, {}, 0};
-    for (Corner c = 0; c < 8; ++c) cut.around[c] = find(block.block + cornerOffset(c));
+    for (kuhn::Corner c = 0; c < 8; ++c) cut.around[c] = find(block.block + cornerOffset(c));
     std::array<RegionLabel, 8> l;
     for (std::uint32_t voxel = 0; voxel < SegmentedData::kVoxels; ++voxel) {
       if (!labels.cell(voxel, l)) continue;

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <tuple>
 
 #include "levelset/progress_gate.h"
-#include "levelset/segmented/junction_fit_vdb.h"
+#include "levelset/segmented/local/interface_fit.h"
+#include "levelset/segmented/segmented_data_vdb.h"
 
 namespace levelset {
 namespace {
@@ -16,7 +18,64 @@ namespace {
 using Imath::V3d;
 using openvdb::Coord;
 
+constexpr double kLargestDistance = 1.75;  // voxels: of the samples of a fit
 constexpr int kRelaxations = 5;
+constexpr double kZigzag = 0.1;  // voxels: distance from the middle of both neighbours
+
+/// Distances to the nearest interfaces in and around a block.
+class JunctionSamples {
+ public:
+  /// @param origin  of the block, index coordinates
+  JunctionSamples(const SegmentedData& data, const Coord& origin)
+      : origin_(origin), samples_(static_cast<std::size_t>(kSide) * kSide * kSide) {
+    SegmentedReader reader(data);
+    for (int x = -kReach; x <= 8 + kReach; ++x)
+      for (int y = -kReach; y <= 8 + kReach; ++y)
+        for (int z = -kReach; z <= 8 + kReach; ++z) {
+          const SegmentedReader::Nearest near = reader.nearest(origin.offsetBy(x, y, z));
+          samples_[index(x, y, z)] = {static_cast<double>(near.distance) / data.voxelSize,
+                                      near.label, near.neighbour};
+        }
+  }
+
+  /// Fits the interface between two regions. Only the grid points to which it is the nearest
+  /// interface determine it, so it is extended smoothly up to a junction where it ends.
+  /// @param position  in the block
+  [[nodiscard]] std::optional<InterfaceFit> fit(RegionLabel a, RegionLabel b,
+                                                const V3d& position) const {
+    const V3d about = position - V3d(origin_[0], origin_[1], origin_[2]);
+    std::array<int, 3> centre{};
+    for (int axis = 0; axis < 3; ++axis)
+      centre[static_cast<std::size_t>(axis)] =
+          std::clamp(static_cast<int>(std::lround(about[axis])), 0, 8);
+    std::vector<InterfaceSample> found;
+    for (int x = centre[0] - kReach; x <= centre[0] + kReach; ++x)
+      for (int y = centre[1] - kReach; y <= centre[1] + kReach; ++y)
+        for (int z = centre[2] - kReach; z <= centre[2] + kReach; ++z) {
+          const Sample& sample = samples_[index(x, y, z)];
+          const bool isA = sample.label == a && sample.neighbour == b,
+                     isB = sample.label == b && sample.neighbour == a;
+          if ((!isA && !isB) || sample.distance > kLargestDistance) continue;
+          found.push_back({V3d(origin_[0] + x, origin_[1] + y, origin_[2] + z),
+                           isA ? sample.distance : -sample.distance});
+        }
+    return fitInterface(position, found);
+  }
+
+ private:
+  static constexpr int kReach = 3;  // voxels
+  static constexpr int kSide = 8 + 1 + 2 * kReach;
+  [[nodiscard]] static std::size_t index(int x, int y, int z) {
+    return static_cast<std::size_t>(((x + kReach) * kSide + y + kReach) * kSide + z + kReach);
+  }
+  struct Sample {
+    double distance;  ///< voxels
+    RegionLabel label, neighbour;
+  };
+
+  Coord origin_;
+  std::vector<Sample> samples_;
+};
 
 /// Vertices at and beside junctions, with the interfaces that they lie on.
 class JunctionStrip {
@@ -30,6 +89,7 @@ class JunctionStrip {
     fitInterfaces(subProgress(progress, 0, 0.9));
     // The points first, then the curves between them, then the interfaces.
     for (int n = 0; n <= kRelaxations; ++n) relax(n == 0);
+    for (int n = 0; n < kRelaxations; ++n) straighten();
     report(progress, 1);
   }
 
@@ -114,19 +174,19 @@ class JunctionStrip {
     ProgressGate gate(progress, firsts.size());
     tbb::parallel_for(std::size_t{0}, firsts.size() - 1, [&](std::size_t b) {
       const Coord block = order[firsts[b]].first;
-      JunctionFit fit(data_, {block[0] << 3, block[1] << 3, block[2] << 3});
+      const JunctionSamples samples(data_, {block[0] << 3, block[1] << 3, block[2] << 3});
       for (std::size_t i = firsts[b]; i < firsts[b + 1]; ++i)
-        fitInterfacesAt(strip_[order[i].second], fit);
+        fitInterfacesAt(strip_[order[i].second], samples);
       gate.advance(1);
     });
   }
 
-  void fitInterfacesAt(StripVertex& vertex, JunctionFit& fit) const {
+  void fitInterfacesAt(StripVertex& vertex, const JunctionSamples& samples) const {
     const V3d& about = mesh_.mesh.positions[vertex.vertex];
     const std::vector<RegionLabel>& labels = vertex.labels;
     for (std::size_t i = 0; i < labels.size(); ++i)
       for (std::size_t j = i + 1; j < labels.size(); ++j)
-        if (const auto found = fit.fit(labels[i], labels[j], about))
+        if (const auto found = samples.fit(labels[i], labels[j], about))
           vertex.interfaces.push_back(*found);
     // One interface less than labels meets in the curve or point.
     if (vertex.interfaces.size() + 1 < labels.size()) vertex.interfaces.clear();
@@ -137,8 +197,6 @@ class JunctionStrip {
     tbb::parallel_for(std::size_t{0}, strip_.size(), [&](std::size_t n) {
       const StripVertex& vertex = strip_[n];
       const V3d& old = mesh_.mesh.positions[vertex.vertex];
-      moved[n] = old;
-      if (vertex.interfaces.empty()) return;
       V3d target = old;
       // Ends of curves, and points where curves meet, have no direction to move in.
       if (!isFirst && (!vertex.isJunction || vertex.neighbours.size() == 2)) {
@@ -146,7 +204,28 @@ class JunctionStrip {
         for (const std::uint32_t v : vertex.neighbours) target += mesh_.mesh.positions[v];
         target /= static_cast<double>(vertex.neighbours.size());
       }
-      moved[n] = meet(vertex.interfaces, target).value_or(old);
+      // Beside creases, where no interface fits, the vertex only follows its neighbours.
+      moved[n] = vertex.interfaces.empty()
+                     ? target
+                     : meetingPoint(vertex.interfaces, target).value_or(target);
+    });
+    for (std::size_t n = 0; n < strip_.size(); ++n)
+      mesh_.mesh.positions[strip_[n].vertex] = moved[n];
+  }
+
+  /// Moves vertices of curves that zigzag towards their neighbours. Smooth curves stay. Fits to
+  /// volumes of labels have noise, which differs from vertex to vertex.
+  void straighten() {
+    std::vector<V3d> moved(strip_.size());
+    tbb::parallel_for(std::size_t{0}, strip_.size(), [&](std::size_t n) {
+      const StripVertex& vertex = strip_[n];
+      const V3d& old = mesh_.mesh.positions[vertex.vertex];
+      moved[n] = old;
+      if (!vertex.isJunction || vertex.neighbours.size() != 2) return;
+      const V3d middle = (mesh_.mesh.positions[vertex.neighbours[0]] +
+                          mesh_.mesh.positions[vertex.neighbours[1]]) /
+                         2;
+      if ((middle - old).length() > kZigzag) moved[n] = (old + middle) / 2;
     });
     for (std::size_t n = 0; n < strip_.size(); ++n)
       mesh_.mesh.positions[strip_[n].vertex] = moved[n];

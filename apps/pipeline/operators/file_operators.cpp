@@ -11,7 +11,7 @@
 #include "levelset/files/band_file.h"
 #include "levelset/mesh_files/mesh_file.h"
 #include "levelset/point_files/point_file.h"
-#include "levelset/segmented/segmented_mesh_file.h"
+#include "levelset/segmented/files/segmented_mesh_file.h"
 #include "levelset/volume_files/volume_file.h"
 #include "mapping/patches/patch_file.h"
 

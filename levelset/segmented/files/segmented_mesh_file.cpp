@@ -1,4 +1,4 @@
-#include "levelset/segmented/segmented_mesh_file.h"
+#include "levelset/segmented/files/segmented_mesh_file.h"
 
 #include <fmt/core.h>
 

@@ -1,0 +1,438 @@
+#include "levelset/segmented/sources/segment_mesh.h"
+
+#include <fmt/core.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "levelset/convert/closest_triangles.h"
+#include "levelset/convert/mesh_to_band_input.h"
+#include "levelset/error.h"
+#include "levelset/fields/grid_vdb.h"
+#include "levelset/geometry/closest_on_triangle.h"
+#include "levelset/geometry/exact_predicates.h"
+#include "levelset/geometry/mesh_sides.h"
+#include "levelset/memory_limit.h"
+#include "levelset/mesh_sign/mesh_topology.h"
+#include "levelset/segmented/local/block_surroundings.h"
+#include "levelset/segmented/segmented_data_vdb.h"
+
+namespace levelset {
+namespace {
+
+using Imath::V3d;
+using openvdb::Coord;
+
+/// Returns true if a line between two points meets a triangle, its border included.
+bool meetsTriangle(const V3d& p, const V3d& q, const std::array<V3d, 3>& t) {
+  const int before = convert::orient3d(t[0], t[1], t[2], p),
+            after = convert::orient3d(t[0], t[1], t[2], q);
+  if (before * after > 0) return false;
+  const int a = convert::orient3d(p, q, t[0], t[1]), b = convert::orient3d(p, q, t[1], t[2]),
+            c = convert::orient3d(p, q, t[2], t[0]);
+  return (a >= 0 && b >= 0 && c >= 0) || (a <= 0 && b <= 0 && c <= 0);
+}
+
+/// Removes all but the first of triangles with the same corners: the walls of parts that were
+/// meshed one by one are there twice, with opposite orientations.
+std::vector<std::array<std::uint32_t, 3>> withoutDoubles(
+    std::vector<std::array<std::uint32_t, 3>> triangles) {
+  std::vector<std::pair<std::array<std::uint32_t, 3>, std::size_t>> corners;
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    corners.emplace_back(triangles[t], t);
+    std::sort(corners.back().first.begin(), corners.back().first.end());
+  }
+  std::sort(corners.begin(), corners.end());
+  std::vector<bool> isDouble(triangles.size());
+  for (std::size_t n = 1; n < corners.size(); ++n)
+    if (corners[n].first == corners[n - 1].first) isDouble[corners[n].second] = true;
+  std::size_t kept = 0;
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+    if (!isDouble[t]) triangles[kept++] = triangles[t];
+  triangles.resize(kept);
+  return triangles;
+}
+
+/// Regions of the grid points around a mesh.
+class MeshRegions {
+ public:
+  MeshRegions(const TriMesh& mesh, double voxelSize, const SegmentMeshOptions& options)
+      : mesh_(mesh), voxelSize_(voxelSize), options_(options), sets_(0) {}
+
+  SegmentMeshResult run() {
+    findPatches();
+    findClosest();
+    collectBlocks();
+    listTriangles();
+    report(options_.progress, 0.5);
+    joinGridPoints();
+    joinPatchSides();
+    report(options_.progress, 0.7);
+    numberRegions();
+    SegmentMeshResult result;
+    result.field = makeField();
+    result.patches = patchCount_;
+    report(options_.progress, 1);
+    return result;
+  }
+
+ private:
+  [[nodiscard]] std::array<V3d, 3> corners(std::uint32_t triangle) const {
+    const auto& t = mesh_.triangles[triangle];
+    return {points_[t[0]], points_[t[1]], points_[t[2]]};
+  }
+
+  void findPatches() {
+    points_.reserve(mesh_.positions.size());
+    for (const V3d& p : mesh_.positions) points_.push_back(p / voxelSize_);
+    DisjointSets patches = connectedPatches(mesh_.triangles, [](std::uint32_t) { return true; });
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+      patchOf_.push_back(patches.find(t));
+      patchCount_ += patchOf_.back() == t;
+    }
+  }
+
+  void findClosest() {
+    const ClosestTriangles closest =
+        closestTriangles(mesh_, voxelSize_,
+                         {.halfWidth = options_.halfWidth + 1,
+                          .maxMemory = options_.maxMemory,
+                          .progress = subProgress(options_.progress, 0, 0.4)});
+    index_ = closest.triangle.shared()->scalar;
+    vector_ = closest.vector.shared()->vector;
+  }
+
+  /// Numbers the blocks with distances, and the box of all blocks with a margin of one.
+  void collectBlocks() {
+    openvdb::CoordBBox box;
+    for (auto leaf = index_->tree().cbeginLeaf(); leaf; ++leaf) {
+      leaves_.push_back(leaf.getLeaf());
+      box.expand(SegmentedData::blockCoord(leaf->origin()));
+    }
+    box.expand(1);
+    low_ = box.min();
+    size_ = box.dim();
+    const double count = static_cast<double>(size_[0]) * size_[1] * size_[2];
+    requireMemory(count * 12 + static_cast<double>(leaves_.size()) * 512 * 12,
+                  memoryLeft(options_.maxMemory));
+    if (count + static_cast<double>(leaves_.size()) * 512 + 2.0 * double(mesh_.triangles.size()) >
+        4e9)
+      throw ResourceLimit("the grid around the mesh is too large; use larger voxels");
+    numbers_.assign(static_cast<std::size_t>(count), -1);
+    for (std::size_t n = 0; n < leaves_.size(); ++n)
+      numbers_[blockIndex(SegmentedData::blockCoord(leaves_[n]->origin()))] =
+          static_cast<std::int32_t>(n);
+  }
+  [[nodiscard]] std::size_t blockIndex(const Coord& block) const {
+    const Coord at = block - low_;
+    return (static_cast<std::size_t>(at[0]) * static_cast<std::size_t>(size_[1]) +
+            static_cast<std::size_t>(at[1])) *
+               static_cast<std::size_t>(size_[2]) +
+           static_cast<std::size_t>(at[2]);
+  }
+  [[nodiscard]] bool isInBox(const Coord& block) const {
+    for (int axis = 0; axis < 3; ++axis)
+      if (block[axis] < low_[axis] || block[axis] >= low_[axis] + size_[axis]) return false;
+    return true;
+  }
+
+  // === Sets: grid points of blocks with distances, other blocks as a whole, sides of patches
+  [[nodiscard]] std::uint32_t setOf(const Coord& at) const {
+    const std::size_t block = blockIndex(SegmentedData::blockCoord(at));
+    if (numbers_[block] < 0) return static_cast<std::uint32_t>(leaves_.size() * 512 + block);
+    return static_cast<std::uint32_t>(static_cast<std::size_t>(numbers_[block]) * 512 +
+                                      SegmentedData::offsetOf(at));
+  }
+  [[nodiscard]] std::uint32_t setOfSide(std::uint32_t triangle, bool isFront) const {
+    return static_cast<std::uint32_t>(leaves_.size() * 512 + numbers_.size()) +
+           2 * patchOf_[triangle] + isFront;
+  }
+
+  /// Lists the triangles near each grid point: those that may meet the cube around it.
+  void listTriangles() {
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+      const std::array<V3d, 3> c = corners(t);
+      V3d normal = (c[1] - c[0]).cross(c[2] - c[0]);
+      normal = normal.length() > 0 ? normal.normalized() : V3d(0);
+      Coord low, high;
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto [least, most] = std::minmax({c[0][axis], c[1][axis], c[2][axis]});
+        low[axis] = static_cast<int>(std::floor(least + 0.5 - 1e-6));
+        high[axis] = static_cast<int>(std::floor(most + 0.5 + 1e-6));
+      }
+      constexpr double kHalfDiagonal = 0.8661;
+      for (int x = low[0]; x <= high[0]; ++x)
+        for (int y = low[1]; y <= high[1]; ++y)
+          for (int z = low[2]; z <= high[2]; ++z)
+            if (std::abs((V3d(x, y, z) - c[0]) ^ normal) <= kHalfDiagonal)
+              near_.push_back({Coord(x, y, z), t});
+    }
+    tbb::parallel_sort(near_.begin(), near_.end());
+  }
+  [[nodiscard]] std::span<const std::pair<Coord, std::uint32_t>> trianglesAt(
+      const Coord& at) const {
+    const auto first = std::lower_bound(near_.begin(), near_.end(), std::pair(at, 0u));
+    auto last = first;
+    while (last != near_.end() && last->first == at) ++last;
+    return {first, last};
+  }
+
+  [[nodiscard]] bool isBlocked(const Coord& a, const Coord& b) const {
+    const V3d p(a[0], a[1], a[2]), q(b[0], b[1], b[2]);
+    for (const Coord& end : {a, b})
+      for (const auto& entry : trianglesAt(end))
+        if (meetsTriangle(p, q, corners(entry.second))) return true;
+    return false;
+  }
+
+  void joinGridPoints() {
+    sets_ = DisjointSets(leaves_.size() * 512 + numbers_.size() + 2 * mesh_.triangles.size());
+    // Tests the edges of the grid in parallel, then joins in order.
+    std::vector<std::array<std::uint8_t, 512>> blocked(leaves_.size());
+    tbb::parallel_for(std::size_t{0}, leaves_.size(), [&](std::size_t n) {
+      openvdb::Vec3SGrid::ConstAccessor vectors = vector_->getConstAccessor();
+      for (std::uint32_t v = 0; v < 512; ++v) {
+        blocked[n][v] = 0;
+        const Coord at = leaves_[n]->offsetToGlobalCoord(v);
+        if (!leaves_[n]->isValueOn(v)) continue;
+        const double distance = lengthOf(vectors.getValue(at));
+        for (int axis = 0; axis < 3; ++axis) {
+          Coord next = at;
+          next[axis] += 1;
+          openvdb::Vec3s other;
+          if (!vectors.probeValue(next, other)) continue;
+          // A point on the line between them is as far from both as the surface is, or farther.
+          if (distance + lengthOf(other) > 1.001) continue;
+          if (isBlocked(at, next)) blocked[n][v] |= static_cast<std::uint8_t>(1 << axis);
+        }
+      }
+    });
+    for (std::size_t n = 0; n < leaves_.size(); ++n)
+      for (std::uint32_t v = 0; v < 512; ++v) {
+        const Coord at = leaves_[n]->offsetToGlobalCoord(v);
+        for (int axis = 0; axis < 3; ++axis) {
+          Coord next = at;
+          next[axis] += 1;
+          if (!(blocked[n][v] >> axis & 1)) sets_.join(setOf(at), setOf(next));
+          // The lower neighbour may be a block without distances.
+          next[axis] -= 2;
+          if (at[axis] % 8 == 0 && numbers_[blockIndex(SegmentedData::blockCoord(next))] < 0)
+            sets_.join(setOf(at), setOf(next));
+        }
+      }
+    for (std::size_t b = 0; b < numbers_.size(); ++b) {
+      if (numbers_[b] >= 0) continue;
+      const Coord block = blockAt(b);
+      for (int axis = 0; axis < 3; ++axis) {
+        Coord next = block;
+        next[axis] += 1;
+        if (!isInBox(next) || numbers_[blockIndex(next)] >= 0) continue;
+        sets_.join(static_cast<std::uint32_t>(leaves_.size() * 512 + b),
+                   static_cast<std::uint32_t>(leaves_.size() * 512 + blockIndex(next)));
+      }
+    }
+  }
+  [[nodiscard]] Coord blockAt(std::size_t index) const {
+    const auto sizeZ = static_cast<std::size_t>(size_[2]),
+               sizeY = static_cast<std::size_t>(size_[1]);
+    return low_ + Coord(static_cast<int>(index / sizeZ / sizeY),
+                        static_cast<int>(index / sizeZ % sizeY), static_cast<int>(index % sizeZ));
+  }
+  [[nodiscard]] double lengthOf(const openvdb::Vec3s& vector) const {
+    return openvdb::Vec3d(vector).length() / voxelSize_;
+  }
+
+  [[nodiscard]] std::uint32_t triangleAt(const openvdb::FloatTree::LeafNodeType& leaf,
+                                         std::uint32_t voxel) const {
+    return static_cast<std::uint32_t>(leaf.getValue(voxel));
+  }
+  /// Returns true for grid points in front of a triangle, or in its plane.
+  [[nodiscard]] bool isInFront(std::uint32_t triangle, const Coord& at) const {
+    const std::array<V3d, 3> c = corners(triangle);
+    return convert::orient3d(c[0], c[1], c[2], V3d(at[0], at[1], at[2])) >= 0;
+  }
+
+  /// Joins the grid points whose closest point is inside a triangle with that side of its patch.
+  void joinPatchSides() {
+    for (const auto* leaf : leaves_)
+      for (std::uint32_t v = 0; v < 512; ++v) {
+        if (!leaf->isValueOn(v)) continue;
+        const std::uint32_t t = triangleAt(*leaf, v);
+        const Coord at = leaf->offsetToGlobalCoord(v);
+        const std::array<V3d, 3> c = corners(t);
+        if (closestOnTriangle(V3d(at[0], at[1], at[2]), c[0], c[1], c[2]).part == 6)
+          sets_.join(setOf(at), setOfSide(t, isInFront(t, at)));
+      }
+    // Grid points on the mesh are cut off from all others.
+    std::vector<bool> hasSide(sets_.size());
+    hasSide[sets_.find(setOf(Coord(low_[0] << 3, low_[1] << 3, low_[2] << 3)))] = true;
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
+      for (const bool isFront : {false, true}) hasSide[sets_.find(setOfSide(t, isFront))] = true;
+    for (const auto* leaf : leaves_)
+      for (std::uint32_t v = 0; v < 512; ++v) {
+        if (!leaf->isValueOn(v)) continue;
+        const Coord at = leaf->offsetToGlobalCoord(v);
+        if (hasSide[sets_.find(setOf(at))]) continue;
+        const std::uint32_t t = triangleAt(*leaf, v), side = setOfSide(t, isInFront(t, at));
+        sets_.join(setOf(at), side);
+        hasSide[sets_.find(side)] = true;
+      }
+  }
+
+  void numberRegions() {
+    const std::uint32_t outside =
+        sets_.find(setOf(Coord(low_[0] << 3, low_[1] << 3, low_[2] << 3)));
+    std::vector<std::uint64_t> volumes(sets_.size());
+    for (std::uint32_t n = 0; n < leaves_.size() * 512; ++n) ++volumes[sets_.find(n)];
+    for (std::size_t b = 0; b < numbers_.size(); ++b)
+      if (numbers_[b] < 0)
+        volumes[sets_.find(static_cast<std::uint32_t>(leaves_.size() * 512 + b))] += 512;
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> regions;
+    for (std::uint32_t n = 0; n < sets_.size(); ++n)
+      if (sets_.find(n) == n && n != outside && volumes[n] > 0) regions.emplace_back(volumes[n], n);
+    std::sort(regions.begin(), regions.end(), [](const auto& a, const auto& b) {
+      return a.first != b.first ? a.first > b.first : a.second < b.second;
+    });
+    if (regions.size() > std::numeric_limits<RegionLabel>::max()) {
+      throw ResourceLimit(fmt::format(
+          "the mesh separates {} regions, but there are 65535 labels only", regions.size()));
+    }
+    labels_.assign(sets_.size(), kVoid);
+    for (std::size_t n = 0; n < regions.size(); ++n)
+      labels_[regions[n].second] = static_cast<RegionLabel>(n + 1);
+    for (std::uint32_t n = 0; n < sets_.size(); ++n) labels_[n] = labels_[sets_.find(n)];
+    checkSides();
+  }
+
+  void checkSides() {
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+      const std::uint32_t behind = sets_.find(setOfSide(t, false)),
+                          front = sets_.find(setOfSide(t, true));
+      if (behind != front) continue;
+      const V3d p = mesh_.positions[mesh_.triangles[t][0]];
+      throw InvalidInput(fmt::format(
+          "the mesh has the same region on both sides at {:.6g},{:.6g},{:.6g}; close holes and "
+          "borders, let parts that meet share their edges, or use smaller voxels",
+          p.x, p.y, p.z));
+    }
+  }
+
+  [[nodiscard]] RegionLabel labelAt(const Coord& at) const {
+    return isInBox(SegmentedData::blockCoord(at)) ? labels_[setOf(at)] : kVoid;
+  }
+
+  SegmentedField makeField() {
+    const float background = backgroundOf(options_.halfWidth, voxelSize_);
+    const auto tiles = std::make_shared<openvdb::Int32Tree>(SegmentedData::tile(kVoid));
+    for (std::size_t b = 0; b < numbers_.size(); ++b) {
+      const RegionLabel label = labels_[leaves_.size() * 512 + b];
+      if (numbers_[b] < 0 && label != kVoid)
+        tiles->setValueOff(blockAt(b), SegmentedData::tile(label));
+    }
+    std::vector<PackedBlock> blocks(leaves_.size());
+    tbb::parallel_for(std::size_t{0}, leaves_.size(),
+                      [&](std::size_t n) { blocks[n] = makeBlock(*leaves_[n], background); });
+    std::sort(blocks.begin(), blocks.end(),
+              [](const auto& a, const auto& b) { return a.block.origin < b.block.origin; });
+    return assembleSegmented(index_->transform().copy(), options_.halfWidth, tiles,
+                             std::move(blocks));
+  }
+
+  [[nodiscard]] PackedBlock makeBlock(const openvdb::FloatTree::LeafNodeType& leaf,
+                                      float background) const {
+    SegmentedBlockValues values;
+    values.origin = leaf.origin();
+    BlockSurroundings around;
+    around.fill([&](int i, int j, int k, int x, int y, RegionLabel* row) {
+      for (int z = 0; z < 8; ++z)
+        row[z] = labelAt(leaf.origin() + Coord(8 * i + x, 8 * j + y, 8 * k + z));
+    });
+    around.findNeighbours();
+    const auto* vectors = vector_->tree().probeConstLeaf(leaf.origin());
+    std::vector<RegionLabel> others;
+    for (std::uint32_t n = 0; n < 512; ++n) {
+      const Coord local = SegmentedData::localOf(n);
+      const RegionLabel own = around.at(local[0], local[1], local[2]);
+      values.labels[n] = values.neighbours[n] = own;
+      values.distances[n] = background;
+      if (!leaf.isValueOn(n)) continue;
+      const auto distance = static_cast<float>(lengthOf(vectors->getValue(n)) * voxelSize_);
+      if (around.palette().size() > 1) around.others(n, own, 1, others);
+      const std::uint32_t t = triangleAt(leaf, n);
+      const RegionLabel behind = labelOfSide(t, false), front = labelOfSide(t, true);
+      RegionLabel neighbour = behind == own ? front : behind;
+      // At a junction the closest triangle may belong to any of the interfaces.
+      if (behind != own && front != own && !others.empty()) neighbour = others[0];
+      values.neighbours[n] = neighbour;
+      values.distances[n] =
+          others.empty() ? distance : std::min(distance, std::nextafter(background, 0.0f));
+      for (const RegionLabel other : others)
+        if (other != neighbour)
+          values.extras.push_back(
+              {static_cast<std::uint16_t>(n), other,
+               std::min(background, distanceTo(leaf.origin() + local, own, other))});
+    }
+    return packBlock(values, background);
+  }
+  [[nodiscard]] RegionLabel labelOfSide(std::uint32_t triangle, bool isFront) const {
+    return labels_[setOfSide(triangle, isFront)];
+  }
+
+  /// Distance of a grid point to the triangles between two regions, world units.
+  [[nodiscard]] float distanceTo(const Coord& at, RegionLabel own, RegionLabel other) const {
+    constexpr int kReach = 2;
+    const V3d p(at[0], at[1], at[2]);
+    double least = std::numeric_limits<double>::infinity();
+    for (int x = -kReach; x <= kReach; ++x)
+      for (int y = -kReach; y <= kReach; ++y)
+        for (int z = -kReach; z <= kReach; ++z)
+          for (const auto& entry : trianglesAt(at.offsetBy(x, y, z))) {
+            const RegionLabel behind = labelOfSide(entry.second, false),
+                              front = labelOfSide(entry.second, true);
+            if (std::minmax(behind, front) != std::minmax(own, other)) continue;
+            const std::array<V3d, 3> c = corners(entry.second);
+            least = std::min(least, (closestOnTriangle(p, c[0], c[1], c[2]).point - p).length());
+          }
+    return static_cast<float>(least * voxelSize_);
+  }
+
+  const TriMesh& mesh_;
+  double voxelSize_;
+  const SegmentMeshOptions& options_;
+  std::vector<V3d> points_;             ///< voxels
+  std::vector<std::uint32_t> patchOf_;  ///< by triangle: the first one of its patch
+  std::size_t patchCount_ = 0;
+  openvdb::FloatGrid::ConstPtr index_;
+  openvdb::Vec3SGrid::ConstPtr vector_;
+  std::vector<const openvdb::FloatTree::LeafNodeType*> leaves_;
+  Coord low_, size_;  ///< box of blocks
+  std::vector<std::int32_t> numbers_;
+  std::vector<std::pair<Coord, std::uint32_t>> near_;
+  DisjointSets sets_;
+  std::vector<RegionLabel> labels_;
+};
+
+}  // namespace
+
+SegmentMeshResult segmentMesh(const TriMesh& mesh, double voxelSize,
+                              const SegmentMeshOptions& options) {
+  if (!(options.halfWidth >= 2 && options.halfWidth <= 8)) {
+    throw UsageError(fmt::format("the half width is {} voxels; give 2 to 8", options.halfWidth));
+  }
+  convert::checkElements(mesh);
+  TriMesh welded;
+  welded.positions = mesh.positions;
+  welded.triangles = withoutDoubles(convert::findTopology(mesh).triangles);
+  if (welded.isEmpty()) throw InvalidInput("the mesh has no triangle with an area");
+  return MeshRegions(welded, voxelSize, options).run();
+}
+
+}  // namespace levelset
