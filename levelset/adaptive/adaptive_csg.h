@@ -10,8 +10,8 @@
 namespace levelset {
 
 struct AdaptiveCsgOptions {
-  double tolerance = 0;  ///< of the result, world units; 0: the largest one of the operands
-  double halfWidth = 0;  ///< of the result, world units; 0: the smallest one of the operands
+  double tolerance = 0;  ///< error of the result, world units; 0: the largest one of the operands
+  double halfWidth = 0;  ///< half width of the result, world units; 0: the smallest one
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };

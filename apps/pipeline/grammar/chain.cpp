@@ -241,7 +241,7 @@ class ChainBuilder {
     const std::size_t missing = wanted - named.size();
     if (stack_.size() < missing && action.op->operandsOptional) return named;
     const std::size_t taken = named.empty() && action.op->takesStack
-                                  ? std::max(std::min(missing, stack_.size()), fitting(*action.op))
+                                  ? std::max(std::min(missing, stack_.size()), alikeOnTop())
                                   : std::min(missing, stack_.size());
     std::vector<std::size_t> operands(stack_.end() - static_cast<std::ptrdiff_t>(taken),
                                       stack_.end());
@@ -250,11 +250,10 @@ class ChainBuilder {
     return operands;
   }
 
-  /// Number of values on top of the stack that fit the last operand of an action.
-  [[nodiscard]] std::size_t fitting(const Operator& op) const {
-    const std::vector<Kind>& kinds = op.operands.back();
+  /// Number of values on top of the stack that are of one kind.
+  [[nodiscard]] std::size_t alikeOnTop() const {
     const auto end = std::find_if(stack_.rbegin(), stack_.rend(), [&](std::size_t node) {
-      return std::find(kinds.begin(), kinds.end(), nodes_[node].kind) == kinds.end();
+      return nodes_[node].kind != nodes_[stack_.back()].kind;
     });
     return static_cast<std::size_t>(end - stack_.rbegin());
   }

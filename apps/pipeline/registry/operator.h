@@ -91,8 +91,8 @@ struct Operator {
   std::vector<Param> params = {};
   std::vector<std::vector<Kind>> operands = {};  ///< for each operand, the kinds that it may have
   bool takesMore = false;  ///< more operands may follow, of the kinds of the last one
-  /// Without named operands, the action takes all values on top of the stack that are of the kinds
-  /// of its last operand.
+  /// Without named operands, the action takes the newest value and all values of the same kind
+  /// directly below it on the stack.
   bool takesStack = false;
   bool operandsOptional = false;  ///< may run without any operand (`info FILE`)
   bool readsNames = false;   ///< the result depends on the names that --as gave to the operands

@@ -93,7 +93,8 @@ bool holdsRegionLabels(const std::filesystem::path& nameOrFormat) {
 
 void writeSegmentedMesh(const std::filesystem::path& path, const SegmentedMesh& mesh,
                         const WriteSegmentedMeshOptions& options) {
-  const std::filesystem::path name = options.format.empty() ? path : options.format;
+  const std::filesystem::path name =
+      options.format.empty() ? path : std::filesystem::path(options.format);
   if (!holdsRegionLabels(name))
     throw UsageError(fmt::format(
         "'{}' names no format that holds labels of regions; use ply or obj", name.string()));

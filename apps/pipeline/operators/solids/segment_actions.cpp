@@ -16,6 +16,7 @@
 #include "levelset/segmented/segment_labels.h"
 #include "levelset/segmented/segment_solids.h"
 #include "levelset/segmented/segmented_to_mesh.h"
+#include "levelset/segmented/sources/segment_mesh.h"
 
 namespace pipeline {
 namespace {
@@ -24,8 +25,8 @@ using levelset::RegionLabel;
 using levelset::SegmentedField;
 using levelset::UsageError;
 
-bool isLabelVolume(const Invocation& in) {
-  return !in.operands.empty() && in.operands[0].kind() == Kind::Volume;
+Kind kindOfParts(const Invocation& in) {
+  return in.operands.empty() ? Kind::Band : in.operands[0].kind();
 }
 
 RegionLabel labelFrom(double number, const Invocation& in, const char* param) {
@@ -61,14 +62,24 @@ void reportRegions(const levelset::SegmentSolidsResult& result, Invocation& in) 
   in.notes.notes.insert(in.notes.notes.end(), result.notes.begin(), result.notes.end());
 }
 
+Value segmentByMesh(Invocation& in) {
+  const levelset::SegmentMeshResult result = levelset::segmentMesh(
+      in.mesh(), in.voxelSize(in.operands[0].plan().estimate().longestSide()),
+      {.halfWidth = in.number("half-width"), .maxMemory = in.maxMemory, .progress = in.progress});
+  in.notes.notes.push_back(
+      fmt::format("the mesh has {} patches between its junctions, and encloses "
+                  "{} regions",
+                  result.patches, result.field.labels().size()));
+  return Value(result.field);
+}
+
 Value segment(Invocation& in) {
-  if (isLabelVolume(in)) {
-    const levelset::Volume& volume = in.operands[0].volume();
-    return Value(
-        levelset::segmentLabels(volume, {.smooth = in.given("smooth") ? in.number("smooth") : 0,
-                                         .maxMemory = in.maxMemory,
-                                         .progress = in.progress}));
-  }
+  if (kindOfParts(in) == Kind::Volume)
+    return Value(levelset::segmentLabels(in.operands[0].volume(),
+                                         {.smooth = in.given("smooth") ? in.number("smooth") : 0,
+                                          .maxMemory = in.maxMemory,
+                                          .progress = in.progress}));
+  if (kindOfParts(in) == Kind::Mesh) return segmentByMesh(in);
   levelset::SegmentSolidsOptions options{
       .halfWidth = in.number("half-width"), .maxMemory = in.maxMemory, .progress = in.progress};
   if (in.given("labels"))
@@ -81,29 +92,39 @@ Value segment(Invocation& in) {
   return Value(result.field);
 }
 
+/// Refuses an option that the operands do not have.
+void refuseFor(const Invocation& in, const char* option, const char* have) {
+  if (in.given(option))
+    throw UsageError(fmt::format("segment: --{} is for {}, but the operand is {}; leave it out",
+                                 option, have, kindPhrase(kindOfParts(in))));
+}
+
 void validateSegment(const Invocation& in) {
+  const Kind kind = kindOfParts(in);
   for (const Value& operand : in.operands)
-    if (isLabelVolume(in) && in.operands.size() > 1)
-      throw UsageError(fmt::format(
-          "segment: takes level sets, or one volume of labels, not {} values with a {}; name the "
-          "operands with '@'",
-          in.operands.size(), kindName(operand.kind())));
-  if (isLabelVolume(in))
-    for (const char* name : {"labels", "half-width"})
-      if (in.given(name))
-        throw UsageError(fmt::format(
-            "segment: --{} is for level sets, but the operand is a volume; leave it out", name));
-  if (!isLabelVolume(in) && in.given("smooth"))
-    throw UsageError(
-        "segment: --smooth is for a volume of labels, but the operand is a level set; leave it "
-        "out");
-  if (in.given("labels")) {
-    const std::size_t count = in.numbers("labels").size();
-    if (!in.operands.empty() && count != in.operands.size())
+    if (operand.kind() != kind)
       throw UsageError(
-          fmt::format("segment: --labels has {} labels for {} level sets; give one "
-                      "for each",
-                      count, in.operands.size()));
+          fmt::format("segment: the operands are {} and {}; give level sets, or one volume of "
+                      "labels, or one mesh",
+                      kindPhrase(kind), kindPhrase(operand.kind())));
+  if (kind != Kind::Band && in.operands.size() > 1)
+    throw UsageError(fmt::format("segment: takes one {}, not {}; name it with '@'", kindName(kind),
+                                 in.operands.size()));
+  if (kind != Kind::Volume) refuseFor(in, "smooth", "a volume of labels");
+  if (kind != Kind::Band) refuseFor(in, "labels", "level sets");
+  if (kind == Kind::Volume) refuseFor(in, "half-width", "level sets and meshes");
+  if (kind == Kind::Mesh) {
+    in.requireVoxelSize();
+  } else {
+    refuseFor(in, "voxel", "a mesh");
+    refuseFor(in, "resolution", "a mesh");
+  }
+  if (in.given("labels") && !in.operands.empty()) {
+    const std::size_t count = in.numbers("labels").size();
+    if (count != in.operands.size())
+      throw UsageError(
+          fmt::format("segment: --labels has {} labels for {} level set{}; give one for each",
+                      count, in.operands.size(), in.operands.size() == 1 ? "" : "s"));
   }
 }
 
@@ -116,7 +137,9 @@ Plan planSegment(Invocation& in) {
     if (operand.plan().voxelSize > 0)
       plan.voxelSize = std::min(plan.voxelSize, operand.plan().voxelSize);
   }
-  plan.halfWidth = isLabelVolume(in) ? 2 : in.number("half-width");
+  if (kindOfParts(in) == Kind::Mesh) plan.voxelSize = in.voxelSize(plan.estimate().longestSide());
+  plan.triangles = 0;
+  plan.halfWidth = in.number("half-width");
   plan.kind = Kind::Band;  // as large as a band of this half width
   plan.fieldBytes = plan.bytes();
   plan.kind = Kind::Segmentation;
@@ -200,8 +223,11 @@ Operator segmentOperator() {
           "are taken. Interfaces and the curves where three regions meet are as exact as the "
           "surfaces of the solids. The certificate in the report names regions that are covered by "
           "others or thinner than a voxel. A volume of labels holds one integer for each grid "
-          "point, as an atlas does; its interfaces lie half way between different labels. "
-          "'extract' turns a region into a level set again.",
+          "point, as an atlas does; its interfaces lie half way between different labels. A mesh "
+          "in "
+          "which three or more triangles share edges, as a box with walls, separates regions, "
+          "which "
+          "are numbered by decreasing volume. 'extract' turns a region into a level set again.",
       .example =
           "levelsmith box --size 4,4,2 --voxel 0.1 ! sphere --radius 1.2 --voxel 0.1 ! segment ! "
           "measure --json",
@@ -216,11 +242,13 @@ Operator segmentOperator() {
                   .range = Range::NonNegative},
                  {.name = "half-width",
                   .type = ParamType::Number,
-                  .doc = "for solids: largest stored distance from an interface, in voxels, at "
-                         "least 2",
+                  .doc = "for solids and meshes: largest stored distance from an interface, in "
+                         "voxels, at least 2",
                   .fallback = "2",
-                  .range = Range::Positive}},
-      .operands = {{Kind::Band, Kind::Volume}},
+                  .range = Range::Positive},
+                 voxelParam("for a mesh: voxel size, edge length of a voxel"),
+                 resolutionParam()},
+      .operands = {{Kind::Band, Kind::Volume, Kind::Mesh}},
       .takesMore = true,
       .takesStack = true,
       .resultKind = [](const Invocation&) { return Kind::Segmentation; },

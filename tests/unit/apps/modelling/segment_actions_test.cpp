@@ -108,6 +108,38 @@ TEST_F(SegmentActions, AreDrawn) {
   EXPECT_TRUE(exists("a.png"));
 }
 
+TEST_F(SegmentActions, ReadVolumesOfLabels) {
+  // A cube of 4³ samples with label 1, and a layer of label 2 on it.
+  std::string text =
+      "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 8 8 8\nencoding: raw\nspace: RAS\n"
+      "space directions: (1,0,0) (0,1,0) (0,0,1)\n\n";
+  for (int z = 0; z < 8; ++z)
+    for (int y = 0; y < 8; ++y)
+      for (int x = 0; x < 8; ++x) {
+        const bool isIn = x >= 2 && x < 6 && y >= 2 && y < 6;
+        text += static_cast<char>(isIn && z >= 2 && z < 6 ? (z < 5 ? 1 : 2) : 0);
+      }
+  writeFile("atlas.nrrd", text);
+  const Json m = json("read atlas.nrrd ! segment ! measure --json");
+  ASSERT_EQ(m["materials"].size(), 2u);
+  EXPECT_NEAR(m["materials"][0]["volume"].get<double>(), 48, 1.5);
+  EXPECT_NEAR(m["materials"][1]["volume"].get<double>(), 16, 1.5);
+  expectRefusal("read atlas.nrrd ! segment --labels 1", 2, "--labels is for level sets");
+}
+
+TEST_F(SegmentActions, ReadMeshesWithWalls) {
+  const Json all = json(std::string(kThree) + "! write a.ply ! measure --json");
+  const Json again = json("read a.ply ! segment --voxel 0.1 ! measure --json");
+  ASSERT_EQ(again["materials"].size(), 3u);  // by decreasing volume: the box, a ball, the other
+  const std::size_t order[3] = {0, 2, 1};
+  for (std::size_t k = 0; k < 3; ++k)
+    EXPECT_NEAR(again["materials"][k]["volume"].get<double>(),
+                all["materials"][order[k]]["volume"].get<double>(), 0.05)
+        << k;
+  expectRefusal("read a.ply ! segment", 2, "--voxel");
+  expectRefusal("sphere --radius 1 --voxel 0.1 ! segment --voxel 0.1", 2, "--voxel is for a mesh");
+}
+
 TEST_F(SegmentActions, ReportRegionsThatVanish) {
   const support::Outcome outcome = levelsmith(
       "sphere --radius 0.5 --voxel 0.1 ! sphere --radius 1 --voxel 0.1 ! segment ! info");
