@@ -230,3 +230,36 @@ def test_point_clouds_are_read_from_files(ls, tmp_path):
     assert isinstance(cloud, ls.PointCloud)
     assert cloud.colors.tolist() == [[1, 0, 0, 1]]
     assert cloud.radii.tolist() == [0.5] and cloud.weights.tolist() == [0.25]
+
+
+def test_adaptive_fields_are_sampled(ls):
+    ball = ls.sphere(radius=1, voxel=0.05).mesh()
+    field = ball.level_set(adaptive=True, tolerance=0.01)
+    assert isinstance(field, ls.AdaptiveField)
+    assert field.tolerance == 0.01 and field.cells > 1000
+    points = numpy.array([[0.98, 0, 0], [0, 1.02, 0], [0, 0, 5.0], [numpy.nan, 0, 0]])
+    distances = field.distances(points)
+    assert abs(distances[0] + 0.02) < 0.011 and abs(distances[1] - 0.02) < 0.011
+    assert distances[2] > 3 and numpy.isnan(distances[3])
+    moved = ball.transform(translate=(0.5, 0, 0)).level_set(adaptive=True, tolerance=0.01)
+    assert isinstance(field | moved, ls.AdaptiveField)
+    assert (field - moved).measure()["volume"] < field.measure()["volume"]
+    assert isinstance(field.to_band(voxel=0.1), ls.Solid)
+    for bad in (numpy.zeros(3), numpy.zeros((2, 2)), numpy.zeros((2, 3), int)):
+        with pytest.raises(ls.InputError, match="distances: the array points has shape"):
+            field.distances(bad)
+
+
+def test_segmentations_have_labels(ls):
+    box = ls.box(size=(4, 4, 4), voxel=0.2)
+    ball = ls.sphere(radius=1, voxel=0.2)
+    parts = ls.segment(box, ball)
+    assert isinstance(parts, ls.Segmentation)
+    assert parts.labels == [1, 2] and parts.voxel == 0.2
+    points = numpy.array([[0.0, 0, 0], [1.5, 0, 0], [3.0, 0, 0]])
+    labels = parts.labels_at(points)
+    assert labels.dtype == numpy.uint16 and labels.tolist() == [2, 1, 0]
+    assert isinstance(parts.extract(1), ls.Solid)
+    assert [m["label"] for m in parts.measure()["materials"]] == [1, 2]
+    with pytest.raises(ls.InputError, match="labels_at: the array points has shape"):
+        parts.labels_at(numpy.zeros(3))
