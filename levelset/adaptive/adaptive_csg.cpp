@@ -143,7 +143,7 @@ AdaptiveField withDistances(const CsgBound& bound, const Box3d& box, double tole
       {.maxMemory = options.maxMemory, .progress = subProgress(options.progress, 0.3, 0.4)});
   if (mesh.isEmpty())
     throw InvalidInput("the result is empty: no point lies inside; check sizes and positions");
-  constexpr double kAcceptedShare = 1.0 / 8;
+  constexpr double kAcceptedShare = 1.0 / 4;
   const RepairedDistance distance(bound, mesh, tolerance, kAcceptedShare * tolerance, options);
   return buildAdaptive(distance, box,
                        {.tolerance = tolerance,

@@ -24,9 +24,9 @@
 #include <string>
 #include <vector>
 
-#include "levelset/adaptive/octree/hashed_octree.h"
 #include "levelset/adaptive/mesh_distance.h"
 #include "levelset/adaptive/mesh_to_adaptive.h"
+#include "levelset/adaptive/octree/hashed_octree.h"
 #include "levelset/convert/mesh_to_band.h"
 #include "levelset/error.h"
 #include "levelset/grids/sample.h"

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -34,6 +36,28 @@ RegionLabel labelFrom(double number, const Invocation& in, const char* param) {
     throw UsageError(fmt::format("{}: {} is not a label; give an integer from 1 to 65535",
                                  in.where(param), number));
   return static_cast<RegionLabel>(number);
+}
+
+/// Labels of --labels, separated by commas or blanks.
+std::vector<RegionLabel> labelsFrom(const Invocation& in) {
+  std::string text = in.text("labels");
+  std::replace(text.begin(), text.end(), ',', ' ');
+  std::istringstream words(text);
+  std::vector<RegionLabel> labels;
+  for (std::string word; words >> word;) {
+    std::size_t end = 0;
+    double number = 0;
+    try {
+      number = std::stod(word, &end);
+    } catch (const std::exception&) {
+      end = 0;
+    }
+    if (end != word.size())
+      throw UsageError(fmt::format("{}: '{}' is not a label; give integers from 1 to 65535",
+                                   in.where("labels"), word));
+    labels.push_back(labelFrom(number, in, "labels"));
+  }
+  return labels;
 }
 
 std::string placeText(const Imath::V3d& p) {
@@ -82,9 +106,7 @@ Value segment(Invocation& in) {
   if (kindOfParts(in) == Kind::Mesh) return segmentByMesh(in);
   levelset::SegmentSolidsOptions options{
       .halfWidth = in.number("half-width"), .maxMemory = in.maxMemory, .progress = in.progress};
-  if (in.given("labels"))
-    for (const double number : in.numbers("labels"))
-      options.labels.push_back(labelFrom(number, in, "labels"));
+  if (in.given("labels")) options.labels = labelsFrom(in);
   std::vector<levelset::NarrowBand> solids;
   for (const Value& operand : in.operands) solids.push_back(operand.band());
   const levelset::SegmentSolidsResult result = levelset::segmentSolids(solids, options);
@@ -120,7 +142,7 @@ void validateSegment(const Invocation& in) {
     refuseFor(in, "resolution", "a mesh");
   }
   if (in.given("labels") && !in.operands.empty()) {
-    const std::size_t count = in.numbers("labels").size();
+    const std::size_t count = labelsFrom(in).size();
     if (count != in.operands.size())
       throw UsageError(
           fmt::format("segment: --labels has {} labels for {} level set{}; give one for each",
@@ -232,8 +254,9 @@ Operator segmentOperator() {
           "levelsmith box --size 4,4,2 --voxel 0.1 ! sphere --radius 1.2 --voxel 0.1 ! segment ! "
           "measure --json",
       .params = {{.name = "labels",
-                  .type = ParamType::Numbers,
-                  .doc = "labels of the solids, integers from 1 to 65535; default: 1,2,3,…"},
+                  .type = ParamType::Text,
+                  .doc = "labels of the solids, integers from 1 to 65535, separated by commas; "
+                         "default: 1,2,3,…"},
                  {.name = "smooth",
                   .type = ParamType::Number,
                   .doc = "for a volume of labels: standard deviation in voxels, up to 3, by which "

