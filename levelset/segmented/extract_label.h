@@ -9,7 +9,7 @@
 namespace levelset {
 
 struct ExtractLabelOptions {
-  double halfWidth = 3;  ///< of the band, voxels, at least 1
+  double halfWidth = 3;  ///< half width of the band, voxels, at least 1
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };

@@ -14,7 +14,7 @@
 namespace levelset {
 
 struct SegmentSolidsOptions {
-  double halfWidth = 2;  ///< of the field, voxels, at least 2
+  double halfWidth = 2;  ///< half width of the field, voxels, at least 2
   /// Labels of the solids, different from each other and from the void. Empty: 1, 2, 3, …
   std::vector<RegionLabel> labels = {};
   /// Largest gap between two solids that counts as contact, voxels. Faces that should coincide
@@ -31,7 +31,7 @@ struct ThinPart {
   std::size_t places = 0;  ///< lines between grid points that cross such a part
   bool isLost = false;     ///< some of these places hold no grid point of the region, so it is cut
   double thickness = 0;    ///< least thickness along a grid line, world units
-  Imath::V3d position = Imath::V3d(0);  ///< of the thinnest place, world units
+  Imath::V3d position = Imath::V3d(0);  ///< thinnest place, world units
 };
 
 struct SegmentSolidsResult {

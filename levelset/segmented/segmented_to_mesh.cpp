@@ -31,7 +31,7 @@ Coord cornerOffset(kuhn::Corner corner) {
 /// Block of cells, with the vertices of their lowest corners.
 struct MeshBlock {
   Coord block;
-  std::vector<std::uint16_t> keys;  ///< of the vertices: voxel × 32 + slot, ascending
+  std::vector<std::uint16_t> keys;  ///< one for each vertex: voxel × 32 + slot, ascending
   std::size_t firstVertex = 0, firstTriangle = 0, firstJunction = 0;
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<TriangleSides> sides;
@@ -218,7 +218,7 @@ class SegmentedMesher {
   struct Cut {
     MeshBlock& block;
     std::array<const MeshBlock*, 8> around;  ///< blocks at the offsets of the corners
-    Coord local;                             ///< of the lowest corner
+    Coord local;                             ///< place of the lowest corner
     std::size_t tetrahedron;
 
     [[nodiscard]] const std::array<kuhn::Corner, 4>& corners() const {

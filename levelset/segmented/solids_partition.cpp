@@ -37,7 +37,7 @@ struct SolidBlock {
   Coord block;
   std::size_t first, last;  ///< leaves of the operands, by rank, that no solid covers
   Rank top;                 ///< rank of the solid that fills the block below them
-  std::vector<Rank> ranks;  ///< of the voxels; a single one if they are equal
+  std::vector<Rank> ranks;  ///< ranks of the voxels; a single one if they are equal
   std::vector<Rank> palette;
 };
 
@@ -542,7 +542,7 @@ class SolidsPartition {
   std::vector<RegionLabel> labels_;
   double voxelSize_;
   float far_;         ///< background of the solids
-  float background_;  ///< of the field
+  float background_;  ///< background of the field
   float gap_;         ///< world units
   std::vector<RankedLeaf> leaves_;
   std::vector<SolidBlock> blocks_;

@@ -76,7 +76,7 @@ void addIfThin(const SegmentedData& data, SegmentedReader& reader, const Coord& 
   low[axis] -= 1;
   high[axis] += 1;
   const SegmentedReader::Nearest near = reader.nearest(at);
-  // Of two crossings less than a voxel apart, one is within half a voxel.
+  // If two crossings are less than a voxel apart, one of them is within half a voxel.
   if (static_cast<double>(near.distance) > data.voxelSize / 2) return;
   const SegmentedReader::Nearest below = reader.nearest(low), above = reader.nearest(high);
   if (below.label == near.label || above.label == near.label) return;

@@ -18,10 +18,11 @@ namespace support {
 
 /// Defects of a mesh of interfaces; all zero for a proper one.
 struct InterfaceDefects {
-  std::size_t openEdges = 0;   ///< of the surface of a region: not traversed equally in both ways
-  std::size_t duplicates = 0;  ///< triangles with the same three vertices
-  std::size_t collapsed = 0;   ///< triangles with a vertex twice
-  std::size_t misnamed = 0;    ///< triangles whose labels are equal or in the wrong order
+  std::size_t openEdges =
+      0;  ///< edges of the surface of a region that are not traversed equally in both ways
+  std::size_t duplicates = 0;      ///< triangles with the same three vertices
+  std::size_t collapsed = 0;       ///< triangles with a vertex twice
+  std::size_t misnamed = 0;        ///< triangles whose labels are equal or in the wrong order
   std::size_t looseJunctions = 0;  ///< edges with three triangles or more that are no junction
   std::size_t unused = 0;          ///< vertices
 

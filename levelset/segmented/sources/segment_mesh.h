@@ -9,7 +9,7 @@
 namespace levelset {
 
 struct SegmentMeshOptions {
-  double halfWidth = 2;  ///< of the field, voxels, from 2 to 8
+  double halfWidth = 2;  ///< half width of the field, voxels, from 2 to 8
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
