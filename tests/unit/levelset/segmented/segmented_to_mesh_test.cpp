@@ -232,6 +232,20 @@ TEST(SegmentedToMesh, MeshesLayers) {
   EXPECT_NEAR(m.regions[2].volume, 4 * pi / 3 * (0.512 - 0.125), measured(1.6e-3));
 }
 
+TEST(SegmentedToMesh, MeshesOneRegionAlone) {
+  const support::Frame frame = support::turnedFrame(V3d(0.017, -0.023, 0.031), 0.7);
+  std::vector<NarrowBand> solids = support::ballSectors(frame, 1, 0.05);
+  solids.push_back(makeSphere(0.3, V3d(0.5, 0.4, 0.3), 0.05));
+  const SegmentedField field = segmentSolids(solids).field;
+  const SegmentedMesh mesh = segmentedToMesh(field);
+  for (RegionLabel region = 0; region < 5; ++region) {
+    const TriMesh one = regionSurface(field, region), other = regionSurface(mesh, region);
+    EXPECT_EQ(one.triangles, other.triangles);
+    EXPECT_EQ(one.positions, other.positions);
+    EXPECT_EQ(manifoldness(one).boundaryEdges, 0u);
+  }
+}
+
 TEST(SegmentedToMesh, IsEmptyForAnEmptyField) {
   EXPECT_TRUE(segmentedToMesh(SegmentedField()).mesh.isEmpty());
   const SegmentedMeasurement m = measureSegmented(SegmentedField());
