@@ -66,9 +66,9 @@ NarrowBand extractLabel(const SegmentedField& field, RegionLabel region,
         fmt::format("no grid point has the label {}; give a label of the field", region));
   }
   const SegmentedData& data = *field.shared();
-  const SegmentedMesh mesh = segmentedToMesh(
-      field, {.maxMemory = options.maxMemory, .progress = subProgress(options.progress, 0, 0.3)});
-  TriMesh surface = regionSurface(mesh, region);
+  TriMesh surface = regionSurface(
+      field, region,
+      {.maxMemory = options.maxMemory, .progress = subProgress(options.progress, 0, 0.3)});
   for (Imath::V3d& p : surface.positions) p = toImath(data.transform->worldToIndex(toVdb(p)));
   // Regions may touch themselves along edges.
   MeshToBandOptions toBand;

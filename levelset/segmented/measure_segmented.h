@@ -14,7 +14,7 @@ struct RegionMeasure {
   double volume = 0;  ///< world units³; 0 for the void, which has no bounds
   double area = 0;    ///< area of its boundary, world units²
   std::size_t triangles = 0;
-  Imath::Box3d bounds = {};  ///< bounds of its boundary
+  Imath::Box3d bounds = {};  ///< box of its boundary
 };
 
 struct InterfaceMeasure {
@@ -26,8 +26,8 @@ struct InterfaceMeasure {
 struct SegmentedMeasurement {
   std::vector<RegionMeasure> regions;        ///< by label; the void first
   std::vector<InterfaceMeasure> interfaces;  ///< by front, then behind
-  double volume = 0;                         ///< volume of all regions without the void
-  double area = 0;                           ///< area of all interfaces, each counted once
+  double volume = 0;                         ///< sum over all regions without the void
+  double area = 0;                           ///< sum over all interfaces
   double junctionLength = 0;                 ///< length of all junction curves, world units
   std::size_t junctionPoints = 0, triangles = 0;
 };

@@ -31,7 +31,7 @@ struct ThinPart {
   std::size_t places = 0;  ///< lines between grid points that cross such a part
   bool isLost = false;     ///< some of these places hold no grid point of the region, so it is cut
   double thickness = 0;    ///< least thickness along a grid line, world units
-  Imath::V3d position = Imath::V3d(0);  ///< position of the thinnest place, world units
+  Imath::V3d position = Imath::V3d(0);  ///< thinnest place, world units
 };
 
 struct SegmentSolidsResult {

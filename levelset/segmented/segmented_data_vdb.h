@@ -33,7 +33,7 @@ struct SegmentedBlock {
   std::uint32_t extras = 0;     ///< first extra, by voxel and label
   std::uint32_t palette = 0;    ///< first label of the palette
   std::uint16_t paletteSize = 0;
-  std::uint16_t bits = 1;  ///< of a code, its index in the palette: 1, 2, 4, 8 or 16
+  std::uint16_t bits = 1;  ///< bits of a code, which is an index in the palette: 1, 2, 4, 8 or 16
 };
 
 /// Compact blocks below a coarse tree. Distances of active voxels follow each other without holes;
@@ -136,7 +136,7 @@ class SegmentedReader {
 
   struct Nearest {
     float distance;         ///< to the nearest interface, world units; the background far from it
-    RegionLabel label;      ///< of the grid point
+    RegionLabel label;      ///< label of the grid point
     RegionLabel neighbour;  ///< across that interface; the same label far from it
   };
   [[nodiscard]] Nearest nearest(const openvdb::Coord& at) {

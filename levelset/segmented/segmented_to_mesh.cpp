@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "levelset/error.h"
 #include "levelset/memory_limit.h"
@@ -31,7 +32,8 @@ Coord cornerOffset(kuhn::Corner corner) {
 /// Block of cells, with the vertices of their lowest corners.
 struct MeshBlock {
   Coord block;
-  std::vector<std::uint16_t> keys;  ///< of the vertices: voxel × 32 + slot, ascending
+  bool isCut = true;                ///< false: only owns vertices of other blocks
+  std::vector<std::uint16_t> keys;  ///< one for each vertex: voxel × 32 + slot, ascending
   std::size_t firstVertex = 0, firstTriangle = 0, firstJunction = 0;
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<TriangleSides> sides;
@@ -76,8 +78,10 @@ bool allDiffer(const std::array<RegionLabel, 4>& l) {
 
 class SegmentedMesher {
  public:
-  SegmentedMesher(const SegmentedData& data, const SegmentedMeshOptions& options)
-      : data_(data), options_(options) {}
+  /// @param region  empty: all regions; else only blocks near this one are cut
+  SegmentedMesher(const SegmentedData& data, const SegmentedMeshOptions& options,
+                  std::optional<RegionLabel> region = {})
+      : data_(data), options_(options), region_(region) {}
 
   SegmentedMesh run() {
     gatherBlocks();
@@ -119,19 +123,38 @@ class SegmentedMesher {
     });
   }
 
-  /// Collects the stored blocks and the ones below them, whose cells reach into them.
+  /// Collects the stored blocks and the ones below them, whose cells reach into them. For one
+  /// region adds the blocks above, which own vertices of these cells.
   void gatherBlocks() {
     std::vector<Coord> coords;
     for (std::size_t b = 0; b < data_.blockCount(); ++b) {
+      if (region_ && !holds(b, *region_)) continue;
       const Coord at = SegmentedData::blockCoord(data_.blocks[b].origin);
       for (kuhn::Corner c = 0; c < 8; ++c) coords.push_back(at - cornerOffset(c));
     }
-    std::sort(coords.begin(), coords.end());
-    coords.erase(std::unique(coords.begin(), coords.end()), coords.end());
-    for (const Coord& coord : coords) {
+    sortUnique(coords);
+    std::vector<Coord> owners = coords;
+    if (region_) {
+      for (const Coord& coord : coords)
+        for (kuhn::Corner c = 1; c < 8; ++c) owners.push_back(coord + cornerOffset(c));
+      sortUnique(owners);
+    }
+    for (const Coord& coord : owners) {
       blocks_.emplace_back();
       blocks_.back().block = coord;
+      blocks_.back().isCut = std::binary_search(coords.begin(), coords.end(), coord);
     }
+  }
+  static void sortUnique(std::vector<Coord>& coords) {
+    std::sort(coords.begin(), coords.end());
+    coords.erase(std::unique(coords.begin(), coords.end()), coords.end());
+  }
+
+  /// Returns true if voxels of a block, or beside it, belong to a region.
+  [[nodiscard]] bool holds(std::size_t block, RegionLabel region) const {
+    const auto first = data_.palettes.begin() + data_.blocks[block].palette,
+               last = data_.palettes.begin() + data_.blocks[block + 1].palette;
+    return std::find(first, last, region) != last;
   }
 
   static Coord originOf(const MeshBlock& block) {
@@ -205,7 +228,8 @@ class SegmentedMesher {
     for (std::size_t i = 0; i < n; ++i)
       for (std::size_t j = i + 1; j < n; ++j)
         sum += crossing(reader, low + cornerOffset(corners[i]), low + cornerOffset(corners[j]));
-    return sum / (n * (n - 1) / 2);
+    constexpr std::size_t kEdges = n * (n - 1) / 2;
+    return sum / static_cast<double>(kEdges);
   }
 
   /// Vertex as the cut of a tetrahedron names it: the corners of its simplex.
@@ -218,7 +242,7 @@ class SegmentedMesher {
   struct Cut {
     MeshBlock& block;
     std::array<const MeshBlock*, 8> around;  ///< blocks at the offsets of the corners
-    Coord local;                             ///< of the lowest corner
+    Coord local;                             ///< place of the lowest corner
     std::size_t tetrahedron;
 
     [[nodiscard]] const std::array<kuhn::Corner, 4>& corners() const {
@@ -256,6 +280,7 @@ class SegmentedMesher {
   };
 
   void cutCells(MeshBlock& block) {
+    if (!block.isCut) return;
     SegmentedReader reader(data_);
     const CellLabels labels(reader, originOf(block));
     Cut cut{block, {}, {}, 0};
@@ -380,6 +405,7 @@ class SegmentedMesher {
 
   const SegmentedData& data_;
   const SegmentedMeshOptions& options_;
+  std::optional<RegionLabel> region_;
   std::vector<MeshBlock> blocks_;  ///< by x, y, z
   std::vector<char> isDoubtful_;   ///< by vertex; not bool, which threads could not set
   SegmentedMesh result_;
@@ -390,6 +416,12 @@ class SegmentedMesher {
 SegmentedMesh segmentedToMesh(const SegmentedField& field, const SegmentedMeshOptions& options) {
   if (field.isEmpty()) return {};
   return SegmentedMesher(*field.shared(), options).run();
+}
+
+TriMesh regionSurface(const SegmentedField& field, RegionLabel region,
+                      const SegmentedMeshOptions& options) {
+  if (field.isEmpty()) return {};
+  return regionSurface(SegmentedMesher(*field.shared(), options, region).run(), region);
 }
 
 TriMesh regionSurface(const SegmentedMesh& mesh, RegionLabel region) {

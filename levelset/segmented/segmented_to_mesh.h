@@ -51,5 +51,9 @@ struct SegmentedMesh {
 
 /// Returns the closed surface of a region, facing outwards, without unused vertices.
 [[nodiscard]] TriMesh regionSurface(const SegmentedMesh& mesh, RegionLabel region);
+/// Computes the same surface without the rest of the mesh.
+/// @throws as segmentedToMesh()
+[[nodiscard]] TriMesh regionSurface(const SegmentedField& field, RegionLabel region,
+                                    const SegmentedMeshOptions& options = {});
 
 }  // namespace levelset

@@ -37,7 +37,7 @@ struct SolidBlock {
   Coord block;
   std::size_t first, last;  ///< leaves of the operands, by rank, that no solid covers
   Rank top;                 ///< rank of the solid that fills the block below them
-  std::vector<Rank> ranks;  ///< of the voxels; a single one if they are equal
+  std::vector<Rank> ranks;  ///< ranks of the voxels; a single one if they are equal
   std::vector<Rank> palette;
 };
 
@@ -313,9 +313,15 @@ class SolidsPartition {
 
   /// Returns true when the sign of a solid's distance tells in all voxels if the solid owns them.
   static bool hasSigns(const SolidBlock& block, Rank rank, const float* phi) {
-    for (std::uint32_t n = 0; n < kVoxels; ++n)
-      if ((block.ranks[block.ranks.size() == 1 ? 0 : n] == rank) != (phi[n] < 0)) return false;
-    return true;
+    int wrong = 0;  // without branches, so that the loops vectorise
+    if (block.ranks.size() == 1) {
+      const bool isOwner = block.ranks[0] == rank;
+      for (std::uint32_t n = 0; n < kVoxels; ++n) wrong += isOwner != (phi[n] < 0);
+    } else {
+      const Rank* ranks = block.ranks.data();
+      for (std::uint32_t n = 0; n < kVoxels; ++n) wrong += (ranks[n] == rank) != (phi[n] < 0);
+    }
+    return wrong == 0;
   }
 
   /// Regions up to two voxels away from a voxel, ascending, and the distances of the voxel from the
@@ -324,6 +330,8 @@ class SolidsPartition {
     std::vector<Rank> ranks;
     std::vector<float> distances;
     std::vector<Rank> adjacent;  ///< those up to one voxel away
+    // Memory of neighbourAmong().
+    std::vector<std::size_t> tied = {}, touching = {};
 
     [[nodiscard]] std::size_t nearest() const {
       return static_cast<std::size_t>(std::min_element(distances.begin(), distances.end()) -
@@ -365,12 +373,13 @@ class SolidsPartition {
   /// that near touches the own solid there.
   /// @return index in `others`
   [[nodiscard]] std::size_t neighbourAmong(const SolidBlock& block, std::uint32_t n, Rank own,
-                                           const Others& others,
-                                           const BlockSurroundings& around) const {
+                                           Others& others, const BlockSurroundings& around) const {
     const float tolerance = std::max(gap_, kTie * static_cast<float>(voxelSize_));
     const std::size_t nearest = others.nearest(), count = others.ranks.size();
     const float distance = others.distances[nearest];
-    std::vector<std::size_t> tied, touching;
+    std::vector<std::size_t>&tied = others.tied, &touching = others.touching;
+    tied.clear();
+    touching.clear();
     for (std::size_t i = 0; i < count; ++i) {
       if (others.distances[i] > distance + tolerance) continue;
       tied.push_back(i);
@@ -533,7 +542,7 @@ class SolidsPartition {
   std::vector<RegionLabel> labels_;
   double voxelSize_;
   float far_;         ///< background of the solids
-  float background_;  ///< of the field
+  float background_;  ///< background of the field
   float gap_;         ///< world units
   std::vector<RankedLeaf> leaves_;
   std::vector<SolidBlock> blocks_;

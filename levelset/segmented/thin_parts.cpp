@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <array>
+#include <bit>
 #include <cmath>
 #include <map>
 
@@ -36,36 +37,74 @@ bool isThinAround(const SegmentedData& data, SegmentedReader& reader, const Coor
   return true;
 }
 
+/// Voxels of a row of 64 whose region may end on both sides along an axis, a bit for each. Voxels
+/// at the faces of the block count as if it ended beyond.
+using EndMasks = std::array<std::uint64_t, 3>;
+
+/// @param isEqual  bool(voxel, voxel): have the same label
+template <typename IsEqual>
+EndMasks endMasks(std::uint32_t row, const IsEqual& isEqual) {
+  EndMasks masks{};
+  for (std::uint32_t b = 0; b < 64; ++b) {
+    const std::uint32_t n = 64 * row + b;
+    const auto put = [&](std::size_t axis, std::uint32_t at, std::uint32_t stride) {
+      const bool ends =
+          (at == 0 || !isEqual(n, n - stride)) && (at == 7 || !isEqual(n, n + stride));
+      masks[axis] |= std::uint64_t{ends} << b;
+    };
+    put(0, row, 64);
+    put(1, b >> 3, 8);
+    put(2, b & 7, 1);
+  }
+  return masks;
+}
+/// The same for blocks of two labels, from the bits of their labels.
+EndMasks endMasksOfBits(const std::uint64_t* bits, std::uint32_t row) {
+  constexpr std::uint64_t kFirstY = 0xff, kLastY = kFirstY << 56, kFirstZ = 0x0101010101010101u,
+                          kLastZ = kFirstZ << 7;
+  const std::uint64_t own = bits[row], below = row > 0 ? bits[row - 1] : ~own,
+                      above = row < 7 ? bits[row + 1] : ~own;
+  return {(own ^ below) & (own ^ above),
+          ((own ^ (own << 8)) | kFirstY) & ((own ^ (own >> 8)) | kLastY),
+          ((own ^ (own << 1)) | kFirstZ) & ((own ^ (own >> 1)) | kLastZ)};
+}
+
+/// Adds the place of a grid point, if its region is thin along an axis there.
+void addIfThin(const SegmentedData& data, SegmentedReader& reader, const Coord& at, int axis,
+               std::vector<LostPlace>& places) {
+  Coord low = at, high = at;
+  low[axis] -= 1;
+  high[axis] += 1;
+  const SegmentedReader::Nearest near = reader.nearest(at);
+  // If two crossings are less than a voxel apart, one of them is within half a voxel.
+  if (static_cast<double>(near.distance) > data.voxelSize / 2) return;
+  const SegmentedReader::Nearest below = reader.nearest(low), above = reader.nearest(high);
+  if (below.label == near.label || above.label == near.label) return;
+  const double down = crossingOf(reader, at, near, low, below),
+               up = crossingOf(reader, at, near, high, above);
+  if (down + up >= 1 || !isThinAround(data, reader, at, near.label)) return;
+  V3d p(at[0], at[1], at[2]);
+  p[axis] += (up - down) / 2;
+  places.push_back({near.label, down + up, p});
+}
+
 /// Adds the thin places at the grid points of a block.
 void findThin(const SegmentedData& data, const SegmentedBlock& block,
               std::vector<LostPlace>& places) {
   SegmentedReader reader(data);
-  std::array<RegionLabel, SegmentedData::kVoxels> labels;
-  for (std::uint32_t n = 0; n < SegmentedData::kVoxels; ++n) labels[n] = data.labelAt(block, n);
-  constexpr std::array<std::uint32_t, 3> kStrides = {64, 8, 1};
-  const float* distances = &data.distances[block.distances];
-  for (std::uint32_t n = 0; n < SegmentedData::kVoxels; ++n) {
-    if (!(data.words[block.words + (n >> 6)] >> (n & 63) & 1)) continue;
-    // Of two crossings less than a voxel apart, one is within half a voxel.
-    if (static_cast<double>(*distances++) > data.voxelSize / 2) continue;
-    const Coord local = SegmentedData::localOf(n), at = block.origin + local;
-    for (int axis = 0; axis < 3; ++axis) {
-      const std::uint32_t stride = kStrides[static_cast<std::size_t>(axis)];
-      if (local[axis] > 0 && labels[n - stride] == labels[n]) continue;
-      if (local[axis] < 7 && labels[n + stride] == labels[n]) continue;
-      Coord low = at, high = at;
-      low[axis] -= 1;
-      high[axis] += 1;
-      const SegmentedReader::Nearest near = reader.nearest(at), below = reader.nearest(low),
-                                     above = reader.nearest(high);
-      if (below.label == near.label || above.label == near.label) continue;
-      const double down = crossingOf(reader, at, near, low, below),
-                   up = crossingOf(reader, at, near, high, above);
-      if (down + up >= 1 || !isThinAround(data, reader, at, near.label)) continue;
-      V3d p(at[0], at[1], at[2]);
-      p[axis] += (up - down) / 2;
-      places.push_back({near.label, down + up, p});
-    }
+  const std::uint64_t* words = &data.words[block.words];
+  for (std::uint32_t row = 0; row < 8; ++row) {
+    const EndMasks masks = block.bits == 1
+                               ? endMasksOfBits(words + SegmentedData::kLabelWord, row)
+                               : endMasks(row, [&](std::uint32_t a, std::uint32_t b) {
+                                   return data.labelAt(block, a) == data.labelAt(block, b);
+                                 });
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      for (std::uint64_t mask = masks[axis] & words[row]; mask; mask &= mask - 1) {
+        const auto n = 64 * row + static_cast<std::uint32_t>(std::countr_zero(mask));
+        addIfThin(data, reader, block.origin + SegmentedData::localOf(n), static_cast<int>(axis),
+                  places);
+      }
   }
 }
 

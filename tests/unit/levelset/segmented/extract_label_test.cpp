@@ -53,8 +53,8 @@ TEST(ExtractLabel, GivesExactDistancesWithSecondOrder) {
       errors.back() = std::max(errors.back(), std::abs(value - crescentDistance(p)));
     });
   }
-  EXPECT_LT(errors[2], measured(4.1e-4));  // 0.016 voxels
-  EXPECT_GT(std::log2(errors[0] / errors[2]) / 2, measuredOrder(1.57));
+  EXPECT_LT(errors[2], measured(2.3e-4));  // 0.009 voxels
+  EXPECT_GT(std::log2(errors[0] / errors[2]) / 2, measuredOrder(1.97));
 }
 
 TEST(ExtractLabel, KeepsGridAndSigns) {
