@@ -99,14 +99,21 @@ class RepairedDistance final : public SignedDistance {
     // A point of the zero set at this distance shows that the lower bound is the distance.
     V3d foot = position;
     double left = value;
-    for (int step = 0; step < 2; ++step) {
+    constexpr int kSteps = 5;
+    for (int step = 0; step < kSteps; ++step) {
       const V3d slope = bound_.gradient(foot);
-      if (!(slope.length2() > 0.25)) return mesh_.at(position, known);
+      if (!(slope.length2() > 0.25)) break;
       foot -= slope * (left / slope.length2());
       left = bound_.at(foot, {});
+      const double gap = (foot - position).length() + std::abs(left) - std::abs(value);
+      if (gap <= accepted_) return value;
+      if (step == 0) continue;
+      // Along the surface to the perpendicular. Half of the way converges beside curved surfaces.
+      const V3d normal = bound_.gradient(foot).normalized(), back = position - foot;
+      foot += (back - normal * back.dot(normal)) * 0.5;
+      left = bound_.at(foot, {});
     }
-    const double gap = (foot - position).length() + std::abs(left) - std::abs(value);
-    return gap <= accepted_ ? value : mesh_.at(position, known);
+    return mesh_.at(position, known);
   }
   void visitSurface(const Box3d& box, const Visit& visit) const override {
     bound_.visitSurface(box, [&](const V3d& point, double) { return visit(point, at(point, {})); });
