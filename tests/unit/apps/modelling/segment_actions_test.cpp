@@ -32,7 +32,7 @@ class SegmentActions : public support::ShellTest {
 // A ball of radius 1 in a box, and one that covers a part of it.
 constexpr const char* kThree =
     "box --size 4,4,4 --voxel 0.1 ! sphere --radius 1 --voxel 0.1 ! sphere --radius 1 --center "
-    "1,0,0 "
+    "0.8,0,0 "
     "--voxel 0.1 ! segment ";
 constexpr double kBall = 4 * std::numbers::pi / 3;
 /// Volume of the intersection of the two balls.
