@@ -11,6 +11,7 @@
 #include "levelset/adaptive/field_distance.h"
 #include "levelset/adaptive/mesh_distance.h"
 #include "levelset/error.h"
+#include "levelset/geometry/disjoint_sets.h"
 #include "levelset/geometry/search/point_search.h"
 
 namespace levelset {
@@ -43,6 +44,8 @@ class CsgBound final : public SignedDistance {
     const Active found = active(position);
     return solids_[found.solid].gradient(position) * found.sign;
   }
+  /// Number of the solid that determines the value.
+  [[nodiscard]] std::size_t solidAt(const V3d& position) const { return active(position).solid; }
   /// Visits the vertices of the meshes of the solids, moved by the shift.
   void visitSurface(const Box3d& box, const Visit& visit) const override {
     const V3d centre = (box.min + box.max) * 0.5;
@@ -83,8 +86,10 @@ class CsgBound final : public SignedDistance {
 /// the distance to the mesh of the zero set, which has facets.
 class RepairedDistance final : public SignedDistance {
  public:
-  /// @param mesh  of the zero set
-  /// @param accepted  error of a value of the bound that is accepted as the distance, world units
+  /// @param mesh  mesh of the zero set
+  /// @param accepted  error of a value of the bound that is accepted as the distance, world units.
+  ///        Within four times this value of the zero set, the mesh decides: the bound has spurious
+  ///        signs there.
   RepairedDistance(const CsgBound& bound, const TriMesh& mesh, double voxel, double accepted,
                    const AdaptiveCsgOptions& options)
       : bound_(bound),
@@ -96,6 +101,8 @@ class RepairedDistance final : public SignedDistance {
 
   [[nodiscard]] double at(const V3d& position, const Known& known) const override {
     const double value = bound_.at(position, {});
+    if (std::abs(value) < 4 * accepted_) return mesh_.at(position, known);
+    const std::size_t solid = bound_.solidAt(position);
     // A point of the zero set at this distance shows that the lower bound is the distance.
     V3d foot = position;
     double left = value;
@@ -105,6 +112,7 @@ class RepairedDistance final : public SignedDistance {
       if (!(slope.length2() > 0.25)) break;
       foot -= slope * (left / slope.length2());
       left = bound_.at(foot, {});
+      if (bound_.solidAt(foot) != solid) break;  // beyond a rim the bound is far below the distance
       const double gap = (foot - position).length() + std::abs(left) - std::abs(value);
       if (gap <= accepted_) return value;
       if (step == 0) continue;
@@ -136,20 +144,50 @@ void requireLength(double length, const char* name) {
     throw UsageError(fmt::format("the {} {} is not positive; give a positive one", name, length));
 }
 
+/// Removes shells that are smaller than the tolerance, unless no other would be left.
+TriMesh withoutCrumbs(const TriMesh& mesh, double tolerance) {
+  DisjointSets shells(mesh.positions.size());
+  for (const auto& t : mesh.triangles) {
+    shells.join(t[0], t[1]);
+    shells.join(t[0], t[2]);
+  }
+  std::vector<Box3d> boxes(mesh.positions.size());
+  for (std::uint32_t v = 0; v < mesh.positions.size(); ++v)
+    boxes[shells.find(v)].extendBy(mesh.positions[v]);
+  TriMesh kept;
+  kept.positions = mesh.positions;
+  for (const auto& t : mesh.triangles)
+    if (boxes[shells.find(t[0])].size().length() >= tolerance) kept.triangles.push_back(t);
+  return kept.isEmpty() ? mesh : kept;
+}
+
+/// Samples a bound near its zero set. Half of the tolerance is for the surface, where the octree is
+/// deep enough for it.
+AdaptiveField surfaceOf(const CsgBound& bound, const Box3d& box, double tolerance,
+                        const AdaptiveCsgOptions& options) {
+  AdaptiveOptions how{.tolerance = tolerance / 2,
+                      .halfWidth = tolerance / 2,
+                      .maxMemory = options.maxMemory,
+                      .progress = subProgress(options.progress, 0, 0.3)};
+  try {
+    return buildAdaptive(bound, box, how);
+  } catch (const UsageError&) {
+    how.tolerance = tolerance;
+    return buildAdaptive(bound, box, how);
+  }
+}
+
 /// Samples the distance of the zero set of a bound.
 /// @param tolerance,halfWidth  of the result
 AdaptiveField withDistances(const CsgBound& bound, const Box3d& box, double tolerance,
                             double halfWidth, const AdaptiveCsgOptions& options) {
-  const AdaptiveField surface = buildAdaptive(bound, box,
-                                              {.tolerance = tolerance / 2,
-                                               .halfWidth = tolerance / 2,
-                                               .maxMemory = options.maxMemory,
-                                               .progress = subProgress(options.progress, 0, 0.3)});
-  const TriMesh mesh = adaptiveToMesh(
-      surface,
-      {.maxMemory = options.maxMemory, .progress = subProgress(options.progress, 0.3, 0.4)});
+  const TriMesh mesh = withoutCrumbs(
+      adaptiveToMesh(
+          surfaceOf(bound, box, tolerance, options),
+          {.maxMemory = options.maxMemory, .progress = subProgress(options.progress, 0.3, 0.4)}),
+      tolerance);
   if (mesh.isEmpty())
-    throw InvalidInput("the result is empty: no point lies inside; check sizes and positions");
+    throw NoSurface("the result is empty: no point lies inside; check sizes and positions");
   constexpr double kAcceptedShare = 1.0 / 4;
   const RepairedDistance distance(bound, mesh, tolerance, kAcceptedShare * tolerance, options);
   return buildAdaptive(distance, box,
@@ -183,7 +221,7 @@ AdaptiveField combineAdaptive(CsgOperation operation, std::span<const AdaptiveFi
     }
   }
   if (box.isEmpty())
-    throw InvalidInput("the result is empty: the solids are apart; check sizes and positions");
+    throw NoSurface("the result is empty: the solids are apart; check sizes and positions");
   return withDistances(CsgBound(operation, solids, 0, options), box,
                        options.tolerance > 0 ? options.tolerance : tolerance,
                        options.halfWidth > 0 ? options.halfWidth : halfWidth, options);

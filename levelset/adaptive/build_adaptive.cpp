@@ -421,9 +421,8 @@ AdaptiveTree emptyTree(const Imath::Box3d& box, const AdaptiveOptions& options) 
         "the coordinates reach {:.3g}, where double precision is coarser than the tolerance {}; "
         "move the surface to the origin or raise the tolerance",
         reach, options.tolerance));
-  // Beyond the margin all values at corners of the root are positive.
-  const double margin = halfWidth <= longest ? halfWidth : 0.1 * longest;
-  const double side = longest + 2 * std::max(margin, 2 * options.tolerance);
+  // The tolerance holds up to the half width, and all values at corners of the root are positive.
+  const double side = longest + 2 * std::max(halfWidth, 2 * options.tolerance);
   // The interpolant of a distance is off by at most 0.87 edges.
   const int depth =
       std::max(2, static_cast<int>(std::ceil(std::log2(2 * side / options.tolerance))));

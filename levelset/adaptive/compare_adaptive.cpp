@@ -73,7 +73,7 @@ double volumeOfBoth(const AdaptiveField& a, const AdaptiveField& b, const Progre
     return signedVolume(adaptiveToMesh(combineAdaptive(
         CsgOperation::Intersection, both,
         {.tolerance = std::min(a.tolerance(), b.tolerance()), .progress = progress})));
-  } catch (const InvalidInput&) {  // both have a surface, so their intersection is empty
+  } catch (const NoSurface&) {
     return 0;
   }
 }

@@ -1,5 +1,6 @@
 #include "levelset/geometry/vertex_normals.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -11,9 +12,13 @@ using Imath::V3d;
 
 std::vector<V3d> vertexNormals(const TriMesh& mesh, double creaseAngle) {
   std::vector<V3d> normals(mesh.positions.size(), V3d(0));
+  // Zero for slivers, whose normals are mostly rounding.
   const auto across = [&](const std::array<std::uint32_t, 3>& t) {
     const V3d &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
-    return (b - a).cross(c - a).normalized();
+    const double longest = std::max({(b - a).length2(), (c - b).length2(), (a - c).length2()});
+    const V3d normal = (b - a).cross(c - a);
+    constexpr double kSliver = 1e-3;
+    return normal.length() < kSliver * longest ? V3d(0) : normal.normalized();
   };
   for (const auto& t : mesh.triangles) {
     const V3d normal = across(t);

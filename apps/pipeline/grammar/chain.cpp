@@ -206,7 +206,7 @@ class ChainBuilder {
     for (const auto& [option, text] : action.options)
       if (const Param* param = action.op->find(option); param && namesValue(*param, text))
         node.named.emplace(option, nodeOf(text.substr(1), *action.op));
-    if (voxelsFollow_) leaveVoxelOpen(node);
+    if (voxelsFollow_) leaveVoxelOpen(node, nodes_);
     node.kind = checkNode(node, nodes_);
     if (node.makes()) {
       stack_.push_back(nodes_.size());
@@ -241,7 +241,7 @@ class ChainBuilder {
     const std::size_t missing = wanted - named.size();
     if (stack_.size() < missing && action.op->operandsOptional) return named;
     const std::size_t taken = named.empty() && action.op->takesStack
-                                  ? std::max(std::min(missing, stack_.size()), alikeOnTop())
+                                  ? std::max(std::min(missing, stack_.size()), bandsOnTop())
                                   : std::min(missing, stack_.size());
     std::vector<std::size_t> operands(stack_.end() - static_cast<std::ptrdiff_t>(taken),
                                       stack_.end());
@@ -250,10 +250,10 @@ class ChainBuilder {
     return operands;
   }
 
-  /// Number of values on top of the stack that are of one kind.
-  [[nodiscard]] std::size_t alikeOnTop() const {
+  /// Number of level sets on top of the stack.
+  [[nodiscard]] std::size_t bandsOnTop() const {
     const auto end = std::find_if(stack_.rbegin(), stack_.rend(), [&](std::size_t node) {
-      return nodes_[node].kind != nodes_[stack_.back()].kind;
+      return nodes_[node].kind != Kind::Band;
     });
     return static_cast<std::size_t>(end - stack_.rbegin());
   }

@@ -27,7 +27,8 @@ std::string mismatch(const Operator& op, std::size_t index, Kind found,
     remedy = "; it has no inside, so only patches and 'texture --alone' can use it";
   if (found == Kind::Adaptive)
     remedy = takes(Kind::Band) ? "; put 'to-band' before it" : "; put 'mesh' before it";
-  if (found == Kind::Segmentation) remedy = "; put 'extract LABEL' before it";
+  if (found == Kind::Segmentation)
+    remedy = takes(Kind::Band) ? "; put 'extract LABEL' before it" : "; put 'mesh' before it";
   if (found == Kind::Patch) remedy = "; 'texture' builds a level set from it";
   if (found == Kind::Scene) remedy = "; 'render' draws it, 'write' saves it as .json";
   std::string kinds;
@@ -164,8 +165,23 @@ void Graph::addRenamed(const std::string& written, const std::string& name) {
     renamed.push_back(sentence);
 }
 
-void leaveVoxelOpen(Node& node) {
-  const bool canBeTold = node.op->find("voxel") && node.op->find("resolution");
+namespace {
+
+/// An action with the kinds of its operands, before anything runs.
+Invocation probeOf(const Node& node, const std::vector<Node>& before) {
+  Invocation probe(*node.op, node.options);
+  probe.voxelFollows = node.voxelFollows;
+  for (const std::size_t input : node.inputs)
+    probe.operands.emplace_back(Plan{.kind = before[input].kind});
+  return probe;
+}
+
+}  // namespace
+
+void leaveVoxelOpen(Node& node, const std::vector<Node>& before) {
+  const bool canBeTold =
+      node.op->find("voxel") && node.op->find("resolution") &&
+      (!node.op->takesVoxelSize || node.op->takesVoxelSize(probeOf(node, before)));
   node.voxelFollows =
       canBeTold && !node.options.contains("voxel") && !node.options.contains("resolution");
 }
@@ -174,10 +190,7 @@ Kind checkNode(const Node& node, const std::vector<Node>& before) {
   const Operator& op = *node.op;
   checkOperands(node, before);
   checkNamed(node, before);
-  Invocation probe(op, node.options);
-  probe.voxelFollows = node.voxelFollows;
-  for (const std::size_t input : node.inputs)
-    probe.operands.emplace_back(Plan{.kind = before[input].kind});
+  const Invocation probe = probeOf(node, before);
   if (op.validate) {
     try {
       op.validate(probe);

@@ -55,8 +55,8 @@ struct Graph {
 [[nodiscard]] Kind checkNode(const Node& node, const std::vector<Node>& before);
 
 /// Marks the voxel size of a node as chosen by --tolerance, if its action has the options --voxel
-/// and --resolution and neither is given. Call this before checkNode().
-void leaveVoxelOpen(Node& node);
+/// and --resolution, they apply, and neither is given. Call this before checkNode().
+void leaveVoxelOpen(Node& node, const std::vector<Node>& before);
 
 /// Finds the needed nodes: the requested results, the nodes that write, draw, print or check, and
 /// all nodes that these depend on. If there are neither results nor such nodes, all nodes are

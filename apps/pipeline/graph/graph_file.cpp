@@ -85,7 +85,7 @@ class GraphReader {
       if (param.required && !node.options.contains(param.name))
         throw UsageError(fmt::format("{}: needs {} {}", op, param.name, valueForm(param)));
     if (json.contains("as")) setName(textOf(json, "as"), node);
-    if (graph_.globals.contains(kTolerance)) leaveVoxelOpen(node);
+    if (graph_.globals.contains(kTolerance)) leaveVoxelOpen(node, graph_.nodes);
     node.kind = checkNode(node, graph_.nodes);
     graph_.nodes.push_back(std::move(node));
   }

@@ -91,11 +91,14 @@ struct Operator {
   std::vector<Param> params = {};
   std::vector<std::vector<Kind>> operands = {};  ///< for each operand, the kinds that it may have
   bool takesMore = false;  ///< more operands may follow, of the kinds of the last one
-  /// Without named operands, the action takes the newest value and all values of the same kind
-  /// directly below it on the stack.
+  /// Without named operands, the action takes the newest value, and if that is a level set, all
+  /// level sets directly below it on the stack.
   bool takesStack = false;
   bool operandsOptional = false;  ///< may run without any operand (`info FILE`)
-  bool readsNames = false;   ///< the result depends on the names that --as gave to the operands
+  bool readsNames = false;  ///< the result depends on the names that --as gave to the operands
+  /// Returns false if --voxel does not apply to the options and operands, although the action has
+  /// it. Empty: it applies.
+  std::function<bool(const Invocation&)> takesVoxelSize = {};
   bool isRepeatable = true;  ///< the same operands, options and files give the same result
   Flow flow = Flow::Makes;
   /// Returns the kind of the result before anything runs.

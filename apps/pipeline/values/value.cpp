@@ -6,6 +6,8 @@
 #include <array>
 #include <map>
 #include <string>
+#include <unordered_map>
+#include <vector>
 
 #include "levelset/adaptive/adaptive_to_mesh.h"
 #include "levelset/error.h"
@@ -254,9 +256,8 @@ std::shared_ptr<const TriMesh> smoothMesh(TriMesh mesh) {
 /// Makes a mesh of each region: the interfaces with void and regions of smaller labels.
 std::vector<render::MeshPart> partsOf(const levelset::SegmentedField& field) {
   const levelset::SegmentedMesh all = levelset::segmentedToMesh(field);
-  std::map<levelset::RegionLabel, TriMesh> regions;
-  for (std::size_t t = 0; t < all.sides.size(); ++t)
-    regions[all.sides[t].behind].triangles.push_back(all.mesh.triangles[t]);
+  std::map<levelset::RegionLabel, std::vector<std::size_t>> regions;
+  for (std::size_t t = 0; t < all.sides.size(); ++t) regions[all.sides[t].behind].push_back(t);
   // The colours of Okabe and Ito, which people with colour blindness can tell apart.
   constexpr std::array<std::array<float, 3>, 7> kColours = {{{0.90f, 0.62f, 0.00f},
                                                              {0.34f, 0.71f, 0.91f},
@@ -266,8 +267,18 @@ std::vector<render::MeshPart> partsOf(const levelset::SegmentedField& field) {
                                                              {0.84f, 0.37f, 0.00f},
                                                              {0.80f, 0.47f, 0.65f}}};
   std::vector<render::MeshPart> parts;
-  for (auto& [label, region] : regions) {
-    region.positions = all.mesh.positions;
+  for (const auto& [label, triangles] : regions) {
+    TriMesh region;
+    std::unordered_map<std::uint32_t, std::uint32_t> numbers;
+    for (const std::size_t t : triangles) {
+      auto& corners = region.triangles.emplace_back(all.mesh.triangles[t]);
+      for (std::uint32_t& corner : corners) {
+        const auto next = static_cast<std::uint32_t>(region.positions.size());
+        const auto [number, isNew] = numbers.try_emplace(corner, next);
+        if (isNew) region.positions.push_back(all.mesh.positions[corner]);
+        corner = number->second;
+      }
+    }
     const auto& c = kColours[(label + kColours.size() - 1) % kColours.size()];
     parts.push_back({.mesh = smoothMesh(std::move(region)),
                      .colour = Imath::C3f(c[0], c[1], c[2]),

@@ -47,7 +47,8 @@ std::string coordinates(const Imath::V3d& v) {
 std::string regionsText(const Json& json) {
   std::string text;
   for (const auto& [key, entry] : json.items())
-    if (!entry.is_array()) text += fmt::format("{:<22}{}\n", key, figureText(entry));
+    if (!entry.is_array() && !entry.is_object())
+      text += fmt::format("{:<22}{}\n", key, figureText(entry));
   for (const Json& material : json["materials"])
     text += fmt::format("material {:<13}volume {:.9g}, area {:.9g}\n", material["label"].get<int>(),
                         material["volume"].get<double>(), material["area"].get<double>());

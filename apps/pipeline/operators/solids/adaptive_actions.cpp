@@ -163,8 +163,9 @@ Operator withAdaptiveResult(Operator levelSet) {
   op.operands[0].push_back(Kind::Band);
   op.details +=
       " --adaptive makes an adaptive field in place of a level set: distances on an octree, whose "
-      "cells are small where the distance bends. It takes a mesh or a level set. It saves memory "
-      "where detail is small beside the whole, and takes longer. 'to-band' makes a level set of "
+      "cells are small where the distance bends. It takes a mesh, or the mesh of a level set, as "
+      "'mesh' makes it. It saves memory where detail is small beside the whole, and takes longer. "
+      "'to-band' makes a level set of "
       "it.";
   op.params.push_back({.name = "adaptive",
                        .type = ParamType::Flag,
@@ -193,6 +194,7 @@ Operator withAdaptiveResult(Operator levelSet) {
   op.cost = [levelSet](Invocation& in) {
     return in.flag("adaptive") ? std::optional<Cost>() : levelSet.cost(in);
   };
+  op.takesVoxelSize = [](const Invocation& in) { return !in.flag("adaptive"); };
   op.validate = [levelSet](const Invocation& in) {
     if (in.flag("adaptive")) return checkAdaptiveOptions(in);
     if (!in.operands.empty() && in.operands[0].kind() == Kind::Band)
@@ -244,6 +246,9 @@ Operator alsoOfAdaptive(Operator op, std::vector<std::string> names,
             fmt::format("{}: --{} does not apply to an adaptive field; put 'to-band' before it, or "
                         "leave it out",
                         in.op().name, param.name));
+    for (const std::string& name : names)
+      if (!in.given(name))
+        throw UsageError(fmt::format("{}: --{} is missing; give it", in.op().name, name));
   };
   return op;
 }
@@ -261,8 +266,6 @@ Operator differenceOperator() {
 Operator offsetOperator() {
   return alsoOfAdaptive(
       levelSetOperator<levelset::OffsetOperator>(), {"distance"}, [](Invocation& in) {
-        if (!in.given("distance"))
-          throw UsageError("offset: the distance is missing; give it, for example 'offset 1'");
         return Value(offsetAdaptive(in.operands[0].adaptive(), in.length("distance"),
                                     {.maxMemory = in.maxMemory, .progress = in.progress}));
       });
@@ -277,8 +280,9 @@ Operator toBandOperator() {
           "The surface is that of the adaptive field, so it is off by at most the tolerance of "
           "the field. The level set may be wider than the field.",
       .example =
-          "levelsmith box --size 4,4,4 --voxel 0.2 ! level-set --adaptive --tolerance 0.01 ! "
-          "to-band --voxel 0.1 ! write part.vdb",
+          "levelsmith box --size 4,4,4 --voxel 0.2 ! mesh --sharp ! level-set --adaptive "
+          "--tolerance "
+          "0.01 ! to-band --voxel 0.1 ! write part.vdb",
       .params = {voxelParam(), resolutionParam(), halfWidthParam()},
       .operands = {{Kind::Adaptive}},
       .resultKind = [](const Invocation&) { return Kind::Band; },

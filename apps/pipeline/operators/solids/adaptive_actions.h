@@ -14,7 +14,7 @@ void requireOneKind(const Invocation& in);
 [[nodiscard]] Operator withAdaptiveResult(Operator levelSet);
 
 /// Lets an action on level sets take adaptive fields too. The result is then an adaptive field.
-/// @param names  options that apply to adaptive fields; others are refused
+/// @param names  options that adaptive fields need; others are refused
 [[nodiscard]] Operator alsoOfAdaptive(Operator op, std::vector<std::string> names,
                                       std::function<Value(Invocation&)> run);
 

@@ -44,7 +44,9 @@ void validateMesh(const Invocation& in) {
     throw levelset::UsageError(
         "mesh: --original is for --method extended; give that method, or leave it out");
   if (!isPatch(in) && in.flag("sheets"))
-    throw levelset::UsageError("mesh: --sheets is for a patch, not for a level set; leave it out");
+    throw levelset::UsageError(
+        fmt::format("mesh: --sheets is for a patch, not for {}; leave it out",
+                    kindPhrase(in.operands[0].kind())));
 }
 
 void setOriginal(levelset::MeshOperator::Options& options, Invocation& in) {

@@ -13,6 +13,7 @@
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
+#include "levelset/inspect/measure.h"
 #include "levelset/segmented/extract_label.h"
 #include "levelset/segmented/measure_segmented.h"
 #include "levelset/segmented/segment_labels.h"
@@ -74,9 +75,9 @@ void reportRegions(const levelset::SegmentSolidsResult& result, Invocation& in) 
                     {"thickness", part.thickness},
                     {"position", {part.position.x, part.position.y, part.position.z}}});
     in.notes.warnings.push_back(fmt::format(
-        "region {} is thinner than a voxel at {} places, {:.3g} at {}{}; use a smaller --voxel",
-        part.label, part.places, part.thickness, placeText(part.position),
-        part.isLost ? ", and has holes there" : ""));
+        "region {} is thinner than a voxel at {} place{}, {:.3g} at {}{}; use a smaller --voxel",
+        part.label, part.places, part.places == 1 ? "" : "s", part.thickness,
+        placeText(part.position), part.isLost ? ", and has holes there" : ""));
   }
   for (const RegionLabel label : result.vanished)
     in.notes.warnings.push_back(fmt::format(
@@ -196,20 +197,48 @@ Plan planExtract(Invocation& in) {
 
 }  // namespace
 
+namespace {
+
+Json boxJson(const Imath::Box3d& box) {
+  if (box.isEmpty()) return nullptr;
+  return {{"min", {box.min.x, box.min.y, box.min.z}}, {"max", {box.max.x, box.max.y, box.max.z}}};
+}
+
+}  // namespace
+
 Json measuresOf(const SegmentedField& field, const Invocation& in) {
-  const levelset::SegmentedMeasurement m =
-      levelset::measureSegmented(field, {.maxMemory = in.maxMemory, .progress = in.progress});
+  const levelset::SegmentedMesh mesh =
+      levelset::segmentedToMesh(field, {.maxMemory = in.maxMemory, .progress = in.progress});
+  const levelset::SegmentedMeasurement m = levelset::measureSegmented(mesh);
   Json json;
+  // Topology of the surface of all regions together.
+  levelset::TriMesh outer;
+  outer.positions = mesh.mesh.positions;
+  Imath::Box3d bounds;
+  for (std::size_t t = 0; t < mesh.sides.size(); ++t)
+    if (mesh.sides[t].front == levelset::kVoid) {
+      outer.triangles.push_back(mesh.mesh.triangles[t]);
+      for (const std::uint32_t corner : mesh.mesh.triangles[t])
+        bounds.extendBy(mesh.mesh.positions[corner]);
+    }
+  const levelset::Measurement all = levelset::measure(outer);
   json["volume"] = m.volume;
   json["area"] = m.area;
+  json["bounds"] = boxJson(bounds);
+  json["components"] = all.components;
+  json["shells"] = all.surfaces;
+  json["cavities"] = all.cavities;
+  json["euler"] = all.euler;
   json["voxel_size"] = field.voxelSize();
   json["half_width"] = field.halfWidth();
   json["active_voxels"] = field.activeVoxelCount();
   json["materials"] = Json::array();
   for (const levelset::RegionMeasure& region : m.regions)
     if (region.label != levelset::kVoid)
-      json["materials"].push_back(
-          {{"label", region.label}, {"volume", region.volume}, {"area", region.area}});
+      json["materials"].push_back({{"label", region.label},
+                                   {"volume", region.volume},
+                                   {"area", region.area},
+                                   {"bounds", boxJson(region.bounds)}});
   json["interfaces"] = Json::array();
   for (const levelset::InterfaceMeasure& interface : m.interfaces)
     json["interfaces"].push_back(
@@ -259,7 +288,7 @@ Operator segmentOperator() {
                          "default: 1,2,3,…"},
                  {.name = "smooth",
                   .type = ParamType::Number,
-                  .doc = "for a volume of labels: standard deviation in voxels, up to 3, by which "
+                  .doc = "for a volume of labels: standard deviation in voxels, 0.5 to 3, by which "
                          "the interfaces are smoothed; default: they follow the faces between the "
                          "grid points",
                   .range = Range::NonNegative},
@@ -274,6 +303,7 @@ Operator segmentOperator() {
       .operands = {{Kind::Band, Kind::Volume, Kind::Mesh}},
       .takesMore = true,
       .takesStack = true,
+      .takesVoxelSize = [](const Invocation& in) { return kindOfParts(in) == Kind::Mesh; },
       .resultKind = [](const Invocation&) { return Kind::Segmentation; },
       .run = segment,
       .plan = planSegment,

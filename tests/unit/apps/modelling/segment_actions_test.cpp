@@ -41,6 +41,10 @@ constexpr double kLens = 0.576 * std::numbers::pi;
 TEST_F(SegmentActions, LaterSolidsWin) {
   const Json m = json(std::string(kThree) + "! measure --json");
   ASSERT_EQ(m["materials"].size(), 3u);
+  EXPECT_EQ(m["components"], 1);
+  EXPECT_EQ(m["euler"], 2);
+  EXPECT_NEAR(m["bounds"]["max"][0].get<double>(), 2, 0.01);
+  EXPECT_NEAR(m["materials"][2]["bounds"]["max"][0].get<double>(), 1.8, 0.01);
   const double expected[3] = {64 - 2 * kBall + kLens, kBall - kLens, kBall};
   for (std::size_t k = 0; k < 3; ++k) {
     EXPECT_EQ(m["materials"][k]["label"], k + 1);

@@ -15,9 +15,11 @@
 #include "levelset/adaptive/adaptive_to_mesh.h"
 #include "levelset/adaptive/build_adaptive.h"
 #include "levelset/adaptive/compare_adaptive.h"
+#include "levelset/adaptive/mesh_to_adaptive.h"
 #include "levelset/error.h"
 #include "levelset/inspect/check.h"
 #include "levelset/inspect/measure.h"
+#include "tests/support/meshes.h"
 #include "tests/support/threads.h"
 
 namespace adaptive_csg_test {
@@ -126,8 +128,30 @@ TEST(AdaptiveCsg, OffsetsABall) {
     const AdaptiveField moved = offsetAdaptive(unit, distance);
     EXPECT_LE(largestError(moved, [&](const V3d& p) { return p.length() - 1 - distance; }), 1.5);
   }
+  // Farther than the size of the solid.
+  const AdaptiveField wide =
+      buildAdaptive(Ball(V3d(0), 1), Box3d(V3d(-1), V3d(1)), {.tolerance = 0.1, .halfWidth = 3});
+  EXPECT_NEAR(signedVolume(adaptiveToMesh(offsetAdaptive(wide, 2))), 36 * kPi, 3);
   EXPECT_THROW((void)offsetAdaptive(unit, 0.145), UsageError);
   EXPECT_THROW((void)offsetAdaptive(unit, NAN), UsageError);
+}
+
+TEST(AdaptiveCsg, HasTheTopologyOfTheResult) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> unit(-5, 5);
+  const auto cube = [](const V3d& low) {
+    return meshToAdaptive(support::boxMesh(low, low + V3d(10)), {.tolerance = 0.3}).field;
+  };
+  const AdaptiveField first = cube(V3d(0));
+  for (int pair = 0; pair < 4; ++pair) {
+    const std::array both{first, cube(V3d(unit(random), unit(random), unit(random)))};
+    for (const CsgOperation operation :
+         {CsgOperation::Union, CsgOperation::Intersection, CsgOperation::Difference}) {
+      const Measurement m = measure(adaptiveToMesh(combineAdaptive(operation, both)));
+      EXPECT_EQ(m.surfaces, 1u) << pair;
+      EXPECT_EQ(m.euler, 2) << pair;
+    }
+  }
 }
 
 TEST(AdaptiveCsg, RefusesEmptySolids) {

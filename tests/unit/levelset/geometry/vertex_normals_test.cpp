@@ -40,6 +40,10 @@ TEST(VertexNormals, AreZeroOnCreases) {
   EXPECT_EQ(sharp[1], V3d(0, 0, 1));
   EXPECT_EQ(sharp[5], V3d(1, 0, 0));
   EXPECT_EQ(sharp[6], V3d(0));
+  mesh.positions.push_back({0.5, 1e-5, 1e-5});
+  mesh.triangles.push_back({0, 7, 1});  // a sliver that faces another way
+  EXPECT_EQ(vertexNormals(mesh, 0.5)[1], V3d(0, 0, 1));
+  mesh.triangles.pop_back();
   const std::vector<V3d> smooth = vertexNormals(mesh, 1);
   EXPECT_NEAR((smooth[0] - V3d(1, 0, 1).normalized()).length(), 0, 1e-15);
 }
