@@ -1,12 +1,8 @@
 #!/bin/sh
-# Error against memory of adaptive fields and narrow bands: adaptive.sh BUILD. Writes docs/figures/adaptive.csv and
-# docs/plots/adaptive.png. Takes about 10 minutes on two cores.
+# Error against memory of adaptive fields and narrow bands: adaptive.sh ADAPTIVE_BENCH. Writes docs/figures/adaptive.csv
+# and docs/plots/adaptive.png. Takes about 3 minutes.
 set -eu
-build=$(cd "$1" && pwd)
+bench=$1
 cd "$(dirname "$0")/../.."
-models=data/models
-{
-  echo "shape,structure,setting,bytes,cpu_s,largest,mean"
-  "$build/tests/adaptive_bench" fields sphere $models/bunny.obj $models/dragon_vrip_res2.ply.gz detail
-} | tee docs/figures/adaptive.csv
-tests/bench/adaptive_plot.py docs/figures/adaptive.csv docs/plots/adaptive.png
+"$bench" fields sphere data/models/bunny.obj detail | tee docs/figures/adaptive.csv
+/usr/bin/python3 tests/bench/adaptive_plot.py docs/figures/adaptive.csv docs/plots/adaptive.png

@@ -16,7 +16,7 @@ STRUCTURES = {
     "band": ("narrow band, trilinear", "#1b6ca8", "s--"),
     "band-tricubic": ("narrow band, tricubic", "#3a7d44", "^--"),
 }
-NAMES = {"detail": "box with a part of 1/1000", "dragon_vrip": "dragon"}
+NAMES = {"detail": "box with a part of 1/1000"}
 
 
 def main(table, picture):
@@ -30,13 +30,13 @@ def main(table, picture):
             for structure, (label, colour, line) in STRUCTURES.items():
                 chosen = sorted((row for row in rows if row["shape"] == shape and row["structure"] == structure),
                                 key=lambda row: int(row["bytes"]))
-                axes.loglog([int(row["bytes"]) / 1e6 for row in chosen], [float(row[error]) for row in chosen],
+                axes.loglog([int(row["bytes"]) / 1e6 for row in chosen], [float(row[f"{error}_error"]) for row in chosen],
                             line, color=colour, label=label, markersize=4)
             axes.grid(True, which="major", alpha=0.3)
         panels[0, column].set_title(NAMES.get(shape, shape), fontsize=10)
         panels[1, column].set_xlabel("memory, MB")
     for axes, error in zip(panels[:, 0], ("largest", "mean")):
-        axes.set_ylabel(f"{error} error, 1/1000 of the diagonal")
+        axes.set_ylabel(f"{error} error, 1/1000 of the diagonal", fontsize=8)
     panels[0, 0].legend(fontsize=7, frameon=False)
     figure.savefig(picture, dpi=110)
 
