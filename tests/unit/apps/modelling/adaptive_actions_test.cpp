@@ -7,33 +7,23 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "tests/support/command_line.h"
+#include "tests/support/action_test.h"
 #include "tests/support/files.h"
 
 namespace adaptive_actions_test {
 
 using Json = nlohmann::json;
 
-class AdaptiveActions : public support::ShellTest {
+class AdaptiveActions : public support::ActionTest {
  protected:
   void SetUp() override {
-    support::ShellTest::SetUp();
+    support::ActionTest::SetUp();
     // A cube with corners at 0 and 10, and one that begins at 5.
     ASSERT_EQ(
         levelsmith("box --size 10,10,10 --center 5,5,5 --voxel 0.5 ! mesh --sharp ! write cube.ply")
             .code,
         0);
     ASSERT_EQ(levelsmith("read cube.ply ! transform --translate 5,5,5 ! write moved.ply").code, 0);
-  }
-  Json json(const std::string& arguments) {
-    const support::Outcome outcome = levelsmith(arguments);
-    EXPECT_EQ(outcome.code, 0) << arguments << "\n" << outcome.err;
-    return outcome.code == 0 ? Json::parse(outcome.out) : Json();
-  }
-  void expectRefusal(const std::string& arguments, int code, const std::string& part) {
-    const support::Outcome outcome = levelsmith(arguments);
-    EXPECT_EQ(outcome.code, code) << arguments << "\n" << outcome.err;
-    EXPECT_NE(outcome.err.find(part), std::string::npos) << outcome.err;
   }
 };
 

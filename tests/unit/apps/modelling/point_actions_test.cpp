@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tests/support/action_test.h"
 #include "tests/support/command_line.h"
 #include "tests/support/files.h"
 #include "tests/support/measured.h"
@@ -11,19 +12,7 @@ namespace point_actions_test {
 using Json = nlohmann::json;
 using support::measured;
 
-class PointActions : public support::ShellTest {
- protected:
-  Json json(const std::string& arguments) {
-    const support::Outcome outcome = levelsmith(arguments);
-    EXPECT_EQ(outcome.code, 0) << outcome.err;
-    return outcome.code == 0 ? Json::parse(outcome.out) : Json();
-  }
-  void expectRefusal(const std::string& arguments, int code, const std::string& part) {
-    const support::Outcome outcome = levelsmith(arguments);
-    EXPECT_EQ(outcome.code, code) << arguments << "\n" << outcome.err;
-    EXPECT_NE(outcome.err.find(part), std::string::npos) << outcome.err;
-  }
-};
+class PointActions : public support::ActionTest {};
 
 constexpr const char* kSampled = "sphere --radius 1 --voxel 0.05 ! mesh ! sample --count 2000 ! ";
 

@@ -8,26 +8,14 @@
 #include <numbers>
 #include <string>
 
-#include "tests/support/command_line.h"
+#include "tests/support/action_test.h"
 #include "tests/support/files.h"
 
 namespace segment_actions_test {
 
 using Json = nlohmann::json;
 
-class SegmentActions : public support::ShellTest {
- protected:
-  Json json(const std::string& arguments) {
-    const support::Outcome outcome = levelsmith(arguments);
-    EXPECT_EQ(outcome.code, 0) << arguments << "\n" << outcome.err;
-    return outcome.code == 0 ? Json::parse(outcome.out) : Json();
-  }
-  void expectRefusal(const std::string& arguments, int code, const std::string& part) {
-    const support::Outcome outcome = levelsmith(arguments);
-    EXPECT_EQ(outcome.code, code) << arguments << "\n" << outcome.err;
-    EXPECT_NE(outcome.err.find(part), std::string::npos) << outcome.err;
-  }
-};
+class SegmentActions : public support::ActionTest {};
 
 // A ball of radius 1 in a box, and one that covers a part of it.
 constexpr const char* kThree =
