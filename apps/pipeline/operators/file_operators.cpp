@@ -183,7 +183,7 @@ void validateRead(const Invocation& in) {
 
 void validateWrite(const Invocation& in) {
   const Kind kind = fileKind(in), held = in.operands[0].kind();
-  const bool isLabelled = held == Kind::Segmentation && levelset::holdsRegionLabels(formatName(in));
+  const bool isLabelled = held == Kind::Segmentation && levelset::holdsAttributes(formatName(in));
   const bool isCloud = held == Kind::Points && levelset::holdsPoints(formatName(in));
   if (held != kind && !isCloud && !isLabelled && !(held == Kind::Field && kind == Kind::Band)) {
     throw UsageError(fmt::format(

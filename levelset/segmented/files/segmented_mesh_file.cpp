@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "levelset/error.h"
+#include "levelset/mesh_files/mesh_file.h"
 #include "levelset/mesh_files/mesh_parts.h"
 
 namespace levelset {
@@ -86,16 +87,11 @@ void writeSegmentedObj(ByteWriter& out, const SegmentedMesh& mesh, const Progres
 
 }  // namespace
 
-bool holdsRegionLabels(const std::filesystem::path& nameOrFormat) {
-  const std::string extension = segmentedFormat(nameOrFormat).extension;
-  return extension == "ply" || extension == "obj";
-}
-
 void writeSegmentedMesh(const std::filesystem::path& path, const SegmentedMesh& mesh,
                         const WriteSegmentedMeshOptions& options) {
   const std::filesystem::path name =
       options.format.empty() ? path : std::filesystem::path(options.format);
-  if (!holdsRegionLabels(name))
+  if (!holdsAttributes(name))
     throw UsageError(fmt::format(
         "'{}' names no format that holds labels of regions; use ply or obj", name.string()));
   const SegmentedFormat format = segmentedFormat(name);

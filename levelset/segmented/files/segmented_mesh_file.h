@@ -15,12 +15,10 @@ struct WriteSegmentedMeshOptions {
 
 /// Writes the interfaces of a partition with the labels on both sides of each triangle. PLY has
 /// them as the properties `front` and `behind` of the faces; the normals point to `front`. OBJ has
-/// one group for each pair of labels, "interface_FRONT_BEHIND".
+/// one group for each pair of labels, "interface_FRONT_BEHIND". These are the formats that hold
+/// attributes, see holdsAttributes().
 /// @throws UsageError for another format; IoError; Cancelled
 void writeSegmentedMesh(const std::filesystem::path& path, const SegmentedMesh& mesh,
                         const WriteSegmentedMeshOptions& options = {});
-
-/// Returns true for a file name or format that writeSegmentedMesh supports.
-[[nodiscard]] bool holdsRegionLabels(const std::filesystem::path& nameOrFormat);
 
 }  // namespace levelset
