@@ -250,11 +250,11 @@ Json measuresOf(const SegmentedField& field, const Invocation& in) {
 }
 
 Value meshOfSegmentation(const Invocation& in) {
-  levelset::SegmentedMesh all = levelset::segmentedToMesh(
-      in.operands[0].segmentation(), {.maxMemory = in.maxMemory, .progress = in.progress});
-  if (!in.given("label")) return Value(std::move(all.mesh));
+  const SegmentedField& field = in.operands[0].segmentation();
+  const levelset::SegmentedMeshOptions options{.maxMemory = in.maxMemory, .progress = in.progress};
+  if (!in.given("label")) return Value(levelset::segmentedToMesh(field, options).mesh);
   const RegionLabel label = labelFrom(static_cast<double>(in.integer("label")), in, "label");
-  levelset::TriMesh surface = regionSurface(all, label);
+  levelset::TriMesh surface = levelset::regionSurface(field, label, options);
   if (surface.isEmpty())
     throw levelset::InvalidInput(
         fmt::format("the segmentation has no region {}; 'info' lists its labels", label));
