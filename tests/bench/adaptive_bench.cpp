@@ -2,6 +2,8 @@
 //
 //   adaptive_bench fields SHAPE…   SHAPE: sphere, detail (a box with a part of a thousandth of its
 //                                  size), or a mesh file
+//   adaptive_bench tolerance SHAPE…  largest error at a million random points, on both sides, in
+//                                  tolerances
 //   adaptive_bench octree          random access to cells by their keys: a hashed octree beside a
 //                                  linked one [Sigg06, table 3.1]
 //
@@ -60,7 +62,8 @@ struct Probe {
   double distance;
 };
 
-std::vector<Probe> probesOf(const TriMesh& mesh, const SignedDistance& distance, double reach) {
+std::vector<Probe> probesOf(const TriMesh& mesh, const SignedDistance& distance, double reach,
+                            std::size_t count) {
   std::vector<double> areas;
   double sum = 0;
   for (const auto& t : mesh.triangles) {
@@ -70,8 +73,7 @@ std::vector<Probe> probesOf(const TriMesh& mesh, const SignedDistance& distance,
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> unit(0, 1);
   std::vector<Probe> probes;
-  constexpr std::size_t kProbes = 100000;
-  while (probes.size() < kProbes) {
+  while (probes.size() < count) {
     const auto found = std::lower_bound(areas.begin(), areas.end(), unit(random) * sum);
     // Every fourth point near a random triangle, whatever its size, so that small parts count.
     const std::size_t n = probes.size() % 4 == 0
@@ -109,7 +111,7 @@ void compareFields(const std::string& shape) {
   const double diagonal = (box.max - box.min).length(), unit = diagonal / 1000,
                halfWidth = diagonal / 100;
   const MeshDistance distance(mesh, unit, {.acceptSign = true});
-  const std::vector<Probe> probes = probesOf(mesh, distance, 0.8 * halfWidth);
+  const std::vector<Probe> probes = probesOf(mesh, distance, 0.8 * halfWidth, 100000);
   std::string name = shape.substr(shape.find_last_of('/') + 1);
   name = name.substr(0, name.find('.'));
   for (const double tolerance : {3.0, 1.0, 0.3}) {
@@ -141,6 +143,34 @@ void compareFields(const std::string& shape) {
       row(name, interpolation == Interpolation::Trilinear ? "band" : "band-tricubic", voxel,
           band.memoryUse(), seconds, probes, unit, [&](const V3d& p) { return sampler.value(p); });
     }
+  }
+}
+
+/// Largest error of fields at random points within their half width, on each side.
+void testTolerance(const std::string& shape) {
+  const TriMesh mesh = shapeOf(shape);
+  const Imath::Box3d box = bounds(mesh);
+  const double unit = (box.max - box.min).length() / 1000, halfWidth = 10 * unit;
+  const MeshDistance distance(mesh, unit, {.acceptSign = true});
+  const std::vector<Probe> probes = probesOf(mesh, distance, halfWidth, 1000000);
+  for (const double tolerance : {3.0, 1.0, 0.3}) {
+    const AdaptiveField field =
+        meshToAdaptive(mesh,
+                       {.tolerance = tolerance * unit, .halfWidth = halfWidth, .acceptSign = true})
+            .field;
+    const AdaptiveSampler sampler(field);
+    std::array<double, 2> largest{};
+    std::array<std::size_t, 2> counts{};
+    for (const Probe& probe : probes) {
+      const std::size_t side = probe.distance < 0 ? 0 : 1;
+      ++counts[side];
+      largest[side] =
+          std::max(largest[side],
+                   std::abs(sampler.value(probe.position) - probe.distance) / field.tolerance());
+    }
+    fmt::print("{}: tolerance {:.4g}: {:.3f} inside ({} points), {:.3f} outside ({} points)\n",
+               shape, tolerance, largest[0], counts[0], largest[1], counts[1]);
+    std::fflush(stdout);
   }
 }
 
@@ -246,9 +276,13 @@ int main(int argc, char** argv) try {
     compareOctrees();
     return 0;
   }
-  if (what != "fields" || argc < 3) {
-    fmt::print(stderr, "adaptive_bench fields SHAPE… | adaptive_bench octree\n");
+  if ((what != "fields" && what != "tolerance") || argc < 3) {
+    fmt::print(stderr, "adaptive_bench fields|tolerance SHAPE… | adaptive_bench octree\n");
     return 2;
+  }
+  if (what == "tolerance") {
+    for (int k = 2; k < argc; ++k) testTolerance(argv[k]);
+    return 0;
   }
   fmt::print("shape,structure,setting,bytes,seconds,largest_error,mean_error\n");
   for (int k = 2; k < argc; ++k) compareFields(argv[k]);
