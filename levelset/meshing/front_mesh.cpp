@@ -275,7 +275,6 @@ BandFrontMesh bandToFrontMesh(const NarrowBand& band, const FrontMeshOptions& op
     for (const double scale : kScales) {
       const ZeroSetFront surface(band, vertices, scale);
       FrontOptions front;
-      front.shortest = limits.shortest;
       front.longest = surface.longest();
       front.expectedTriangles = static_cast<std::size_t>(component.expected / (scale * scale)) + 1;
       front.progress = progressOf(share);

@@ -95,7 +95,7 @@ class AdvancingFront {
         options_(options),
         cell_(kLongestFrontSide * options.longest),
         edges_(cell_),
-        vertices_(4 * options.shortest) {}
+        vertices_(cell_) {}
 
   bool begin(const V3d& start);
   void begin(const FrontLoops& start);
@@ -115,12 +115,13 @@ class AdvancingFront {
   void addTriangle(std::uint32_t edge, const Candidate& third);
   [[nodiscard]] std::vector<std::vector<std::uint32_t>> holes() const;
 
-  std::uint32_t addVertex(const V3d& point, const V3d& normal, bool isBorder) {
+  /// @param spacing  about the distance to the next vertices
+  std::uint32_t addVertex(const V3d& point, const V3d& normal, bool isBorder, double spacing) {
     mesh_.positions.push_back(point);
     mesh_.normals.push_back(normal);
     isBorder_.push_back(isBorder);
     const auto vertex = static_cast<std::uint32_t>(mesh_.positions.size() - 1);
-    vertices_.add(vertex, point);
+    vertices_.add(vertex, point, spacing);
     return vertex;
   }
   void push(std::uint32_t edge) {
@@ -150,7 +151,7 @@ class AdvancingFront {
   FrontMesh mesh_;
   std::vector<bool> isBorder_;  ///< for each vertex
   FrontEdges edges_;
-  ItemGrid vertices_;
+  ItemOctree vertices_;
   using Entry = std::tuple<int, double, std::uint32_t>;  ///< tries, squared length, edge
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue_;
   // State for the present edge.
@@ -174,7 +175,7 @@ bool AdvancingFront::begin(const V3d& start) {
   for (const Foot* foot : {&*first, &*second, &*third}) {
     if (!(normal.dot(foot->normal) > kTries[1].leastNormal)) return false;
     if ((foot->point - first->point).length() > cell_) return false;
-    addVertex(foot->point, foot->normal, foot->isBorder);
+    addVertex(foot->point, foot->normal, foot->isBorder, length);
   }
   useTriangle(0, 1, 2);
   const std::uint32_t loop[] = {addEdge(1, 0), addEdge(0, 2), addEdge(2, 1)};
@@ -184,7 +185,7 @@ bool AdvancingFront::begin(const V3d& start) {
 
 void AdvancingFront::begin(const FrontLoops& start) {
   for (std::size_t v = 0; v < start.positions.size(); ++v)
-    addVertex(start.positions[v], start.normals[v], false);
+    addVertex(start.positions[v], start.normals[v], false, surface_.edgeLength(start.positions[v]));
   for (const std::vector<std::uint32_t>& loop : start.loops) {
     std::vector<std::uint32_t> added;
     for (std::size_t i = 0; i < loop.size(); ++i) {
@@ -239,8 +240,11 @@ void AdvancingFront::findCandidates(std::uint32_t edge, const Try& limits) {
             fromEnd = b + (across * std::sin(atEnd) - along * std::cos(atEnd)) * length_;
   const V3d predicted = middle + ((fromStart + fromEnd) * 0.5 - middle) * limits.height;
 
+  // The edges before and after this one may be longer than the reach of the try.
+  const double beside =
+      std::max((at(edges_[e.prev].a) - middle).length(), (at(edges_[e.next].b) - middle).length());
   near_.clear();
-  edges_.near(middle, (limits.reach + 1.5) * length_, near_);
+  edges_.near(middle, std::max((limits.reach + 1.5) * length_, beside), near_);
   candidates_.clear();
   const auto foot = surface_.projectBeside(predicted, normal);
   if (isAlongBorder(edge, foot)) {
@@ -339,7 +343,7 @@ bool AdvancingFront::isClear(const Candidate& third, std::uint32_t edge, const T
     if (distanceToSegment(third.point, at(f.a), at(f.b)) < least) return false;
   }
   // The front must not come back over triangles behind it.
-  return !vertices_.anyNear(third.point, least, [&](std::uint32_t vertex) {
+  return !vertices_.anyNear(third.point, least, 0, [&](std::uint32_t vertex) {
     if (normalAt(vertex).dot(third.normal) < 0.1) return false;
     const V3d to = at(vertex) - third.point;
     const double height = to.dot(third.normal);
@@ -377,7 +381,7 @@ void AdvancingFront::addTriangle(std::uint32_t edge, const Candidate& third) {
   const FrontEdge e = edges_[edge];
   const bool isNew = third.vertex == kNewVertex;
   const std::uint32_t c =
-      isNew ? addVertex(third.point, third.normal, third.isBorder) : third.vertex;
+      isNew ? addVertex(third.point, third.normal, third.isBorder, length_) : third.vertex;
   const bool isPrevious = !isNew && third.visit == e.prev,
              isNext = !isNew && follows(edge, third.visit);
   useTriangle(e.a, e.b, c);

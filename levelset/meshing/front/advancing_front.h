@@ -22,7 +22,7 @@ struct FrontMesh {
 };
 
 struct FrontOptions {
-  double shortest = 0, longest = 0;   ///< limits of FrontSurface::edgeLength() and of given edges
+  double longest = 0;                 ///< limit of FrontSurface::edgeLength() and of given edges
   std::size_t expectedTriangles = 0;  ///< about; a front with many more stops open
   Progress progress = {};
 };

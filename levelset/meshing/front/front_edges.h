@@ -8,7 +8,7 @@
 #include <unordered_set>
 #include <vector>
 
-#include "levelset/meshing/front/item_grid.h"
+#include "levelset/meshing/front/item_octree.h"
 
 namespace levelset {
 
@@ -23,11 +23,11 @@ struct FrontEdge {
   bool isFinal = false;  ///< on a border of the surface
 };
 
-/// The loops of a front, and a grid for the edges near a position. Deterministic.
+/// The loops of a front, and an octree for the edges near a position. Deterministic.
 class FrontEdges {
  public:
-  /// @param cell  edge of the cells of the grid; at least the length of the longest edges
-  explicit FrontEdges(double cell) : cell_(cell), grid_(cell) {}
+  /// @param longest  at least the length of the longest edges
+  explicit FrontEdges(double longest) : tree_(longest) {}
 
   [[nodiscard]] const FrontEdge& operator[](std::uint32_t edge) const { return edges_[edge]; }
   [[nodiscard]] std::size_t count() const { return edges_.size(); }
@@ -45,7 +45,7 @@ class FrontEdges {
   }
   void remove(std::uint32_t edge);
 
-  /// Appends the edges of the cells around a position, at least those that come within `radius`.
+  /// Appends the edges near a position, at least those that come within `radius`.
   void near(const Imath::V3d& position, double radius, std::vector<std::uint32_t>& found) const;
 
   /// Marks a directed edge as the side of a triangle.
@@ -59,10 +59,15 @@ class FrontEdges {
     return static_cast<std::uint64_t>(a) << 32 | b;
   }
 
-  double cell_;
+  /// Middle and length of an edge.
+  struct Place {
+    Imath::V3d middle;
+    double length;
+  };
+
   std::vector<FrontEdge> edges_;
-  std::vector<GridCell> cells_;  ///< cell of the middle of each edge
-  ItemGrid grid_;                ///< edges by these cells
+  std::vector<Place> places_;
+  ItemOctree tree_;  ///< edges by middle and length
   std::unordered_set<std::uint64_t> used_;
   std::size_t active_ = 0;
 };

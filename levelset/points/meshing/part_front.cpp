@@ -104,7 +104,6 @@ double PartFront::edgeLength(const V3d& point) const {
 
 FrontOptions frontOptions(const SurfacePart& part, double scale, const Progress& progress) {
   FrontOptions options;
-  options.shortest = scale * part.shortest;
   options.longest = scale * part.longest;
   options.expectedTriangles = static_cast<std::size_t>(part.expected / (scale * scale)) + 1;
   options.progress = progress;
@@ -117,7 +116,6 @@ std::vector<SurfacePart> partsOf(const PointSurface& surface, const std::vector<
     if (surface.part(i) == PointSurface::kNone) continue;
     SurfacePart& part = parts[surface.part(i)];
     part.points.push_back(i);
-    part.shortest = std::min(part.shortest, lengths[i]);
     part.longest = std::max(part.longest, lengths[i]);
     // Areas of a hexagonal lattice and of an equilateral triangle.
     const double ratio = surface.spacing(i) / lengths[i];

@@ -3,7 +3,6 @@
 // Internal header of levelset: public headers must not include it.
 
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <vector>
 
@@ -49,7 +48,7 @@ class BorderPoints {
 struct SurfacePart {
   std::vector<std::uint32_t> points;
   std::vector<std::uint32_t> starts;  ///< some with large edge lengths, the largest first
-  double shortest = std::numeric_limits<double>::infinity(), longest = 0;
+  double longest = 0;   ///< edge length
   double expected = 0;  ///< number of triangles
 };
 

@@ -70,8 +70,7 @@ void expectWithin(const FrontMesh& mesh, const FrontLoops& start) {
 }
 
 levelset::FrontOptions optionsFor(double area) {
-  return {.shortest = kLength,
-          .longest = kLength,
+  return {.longest = kLength,
           .expectedTriangles = static_cast<std::size_t>(area / (0.433 * kLength * kLength))};
 }
 
