@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "levelset/adaptive/adaptive_to_mesh.h"
 #include "levelset/adaptive/field_distance.h"
 #include "levelset/adaptive/mesh_distance.h"
+#include "levelset/adaptive/trilinear_surface.h"
 #include "levelset/error.h"
 #include "levelset/geometry/disjoint_sets.h"
 #include "levelset/geometry/search/point_search.h"
@@ -100,8 +102,26 @@ class RepairedDistance final : public SignedDistance {
         accepted_(accepted) {}
 
   [[nodiscard]] double at(const V3d& position, const Known& known) const override {
+    const auto foot = footOf(position);
+    return foot ? foot->value : mesh_.at(position, known);
+  }
+  [[nodiscard]] V3d gradient(const V3d& position, double value, double step) const override {
+    const auto foot = footOf(position);
+    return foot ? foot->gradient : mesh_.gradient(position, value, step);
+  }
+  void visitSurface(const Box3d& box, const Visit& visit) const override {
+    bound_.visitSurface(box, [&](const V3d& point, double) { return visit(point, at(point, {})); });
+  }
+
+ private:
+  /// Figures of a position at which the bound is the distance.
+  struct Exact {
+    double value;
+    V3d gradient;
+  };
+  [[nodiscard]] std::optional<Exact> footOf(const V3d& position) const {
     const double value = bound_.at(position, {});
-    if (std::abs(value) < 4 * accepted_) return mesh_.at(position, known);
+    if (std::abs(value) < 4 * accepted_) return {};
     const std::size_t solid = bound_.solidAt(position);
     // A point of the zero set at this distance shows that the lower bound is the distance.
     V3d foot = position;
@@ -114,20 +134,16 @@ class RepairedDistance final : public SignedDistance {
       left = bound_.at(foot, {});
       if (bound_.solidAt(foot) != solid) break;  // beyond a rim the bound is far below the distance
       const double gap = (foot - position).length() + std::abs(left) - std::abs(value);
-      if (gap <= accepted_) return value;
+      if (gap <= accepted_) return Exact{value, bound_.gradient(position).normalized()};
       if (step == 0) continue;
       // Along the surface to the perpendicular. Half of the way converges beside curved surfaces.
       const V3d normal = bound_.gradient(foot).normalized(), back = position - foot;
       foot += (back - normal * back.dot(normal)) * 0.5;
       left = bound_.at(foot, {});
     }
-    return mesh_.at(position, known);
-  }
-  void visitSurface(const Box3d& box, const Visit& visit) const override {
-    bound_.visitSurface(box, [&](const V3d& point, double) { return visit(point, at(point, {})); });
+    return {};
   }
 
- private:
   const CsgBound& bound_;
   MeshDistance mesh_;
   double accepted_;
@@ -165,22 +181,20 @@ TriMesh withoutCrumbs(const TriMesh& mesh, double tolerance) {
 /// deep enough for it.
 AdaptiveField surfaceOf(const CsgBound& bound, const Box3d& box, double tolerance,
                         const AdaptiveCsgOptions& options) {
-  AdaptiveOptions how{.tolerance = tolerance / 2,
-                      .halfWidth = tolerance / 2,
-                      .maxMemory = options.maxMemory,
-                      .progress = subProgress(options.progress, 0, 0.3)};
-  try {
-    return buildAdaptive(bound, box, how);
-  } catch (const UsageError&) {
-    how.tolerance = tolerance;
-    return buildAdaptive(bound, box, how);
-  }
+  return withFinerTolerance(tolerance, [&](double finer) {
+    return buildAdaptive(bound, box,
+                         {.tolerance = finer,
+                          .halfWidth = tolerance / 2,
+                          .maxMemory = options.maxMemory,
+                          .progress = subProgress(options.progress, 0, 0.3)});
+  });
 }
 
 /// Samples the distance of the zero set of a bound.
-/// @param tolerance,halfWidth  of the result
-AdaptiveField withDistances(const CsgBound& bound, const Box3d& box, double tolerance,
-                            double halfWidth, const AdaptiveCsgOptions& options) {
+/// @param how  tolerance, half width and interpolation of the result
+AdaptiveField withDistances(const CsgBound& bound, const Box3d& box, AdaptiveOptions how,
+                            const AdaptiveCsgOptions& options) {
+  const double tolerance = how.tolerance;
   const TriMesh mesh = withoutCrumbs(
       adaptiveToMesh(
           surfaceOf(bound, box, tolerance, options),
@@ -190,11 +204,9 @@ AdaptiveField withDistances(const CsgBound& bound, const Box3d& box, double tole
     throw NoSurface("the result is empty: no point lies inside; check sizes and positions");
   constexpr double kAcceptedShare = 1.0 / 4;
   const RepairedDistance distance(bound, mesh, tolerance, kAcceptedShare * tolerance, options);
-  return buildAdaptive(distance, box,
-                       {.tolerance = tolerance,
-                        .halfWidth = halfWidth,
-                        .maxMemory = options.maxMemory,
-                        .progress = subProgress(options.progress, 0.4, 1)});
+  how.maxMemory = options.maxMemory;
+  how.progress = subProgress(options.progress, 0.4, 1);
+  return buildAdaptive(distance, box, how);
 }
 
 }  // namespace
@@ -205,11 +217,13 @@ AdaptiveField combineAdaptive(CsgOperation operation, std::span<const AdaptiveFi
   requireLength(options.tolerance, "tolerance");
   requireLength(options.halfWidth, "half width");
   double tolerance = 0, halfWidth = INFINITY;
+  bool isTricubic = true;
   Box3d box;
   for (std::size_t i = 0; i < solids.size(); ++i) {
     requireAdaptive(solids[i], i + 1);
     tolerance = std::max(tolerance, solids[i].tolerance());
     halfWidth = std::min(halfWidth, solids[i].halfWidth());
+    isTricubic = isTricubic && solids[i].isTricubic();
     const Box3d own = solids[i].zeroSetBounds();
     if (i == 0 || operation == CsgOperation::Union) {
       box.extendBy(own);
@@ -223,8 +237,10 @@ AdaptiveField combineAdaptive(CsgOperation operation, std::span<const AdaptiveFi
   if (box.isEmpty())
     throw NoSurface("the result is empty: the solids are apart; check sizes and positions");
   return withDistances(CsgBound(operation, solids, 0, options), box,
-                       options.tolerance > 0 ? options.tolerance : tolerance,
-                       options.halfWidth > 0 ? options.halfWidth : halfWidth, options);
+                       {.tolerance = options.tolerance > 0 ? options.tolerance : tolerance,
+                        .halfWidth = options.halfWidth > 0 ? options.halfWidth : halfWidth,
+                        .isTricubic = isTricubic},
+                       options);
 }
 
 AdaptiveField offsetAdaptive(const AdaptiveField& solid, double distance,
@@ -241,8 +257,10 @@ AdaptiveField offsetAdaptive(const AdaptiveField& solid, double distance,
   box.min -= V3d(std::max(distance, 0.0));
   box.max += V3d(std::max(distance, 0.0));
   return withDistances(CsgBound(CsgOperation::Union, {&solid, 1}, distance, options), box,
-                       options.tolerance > 0 ? options.tolerance : solid.tolerance(),
-                       options.halfWidth > 0 ? options.halfWidth : solid.halfWidth(), options);
+                       {.tolerance = options.tolerance > 0 ? options.tolerance : solid.tolerance(),
+                        .halfWidth = options.halfWidth > 0 ? options.halfWidth : solid.halfWidth(),
+                        .isTricubic = solid.isTricubic()},
+                       options);
 }
 
 }  // namespace levelset

@@ -19,7 +19,7 @@ struct AdaptiveCsgOptions {
 /// Combines solids from left to right; Difference subtracts all others from the first. The minimum
 /// or maximum of the distances gives the surface of the result. It is only a bound of the distance
 /// away from it, so the distances are computed again from the mesh of that surface. The tolerance
-/// holds beside those of the operands.
+/// holds beside those of the operands. The result is tricubic if all operands are.
 /// @throws UsageError for fewer than two solids, a negative tolerance or half width
 /// @throws InvalidInput if a solid or the result is empty
 /// @throws ResourceLimit, Cancelled

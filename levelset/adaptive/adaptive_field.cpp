@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "levelset/adaptive/octree/adaptive_tree.h"
+#include "levelset/adaptive/octree/edge_crossings.h"
 #include "levelset/tree_hash_vdb.h"
 
 namespace levelset {
@@ -24,6 +25,10 @@ Imath::Box3d AdaptiveField::box() const {
   return {tree_->origin, tree_->toWorld(V3i(1 << tree_->octree.depth()))};
 }
 
+bool AdaptiveField::isTricubic() const {
+  return tree_ && tree_->data.isTricubic();
+}
+
 std::size_t AdaptiveField::leafCount() const {
   return tree_ ? tree_->octree.leafCount() : 0;
 }
@@ -31,29 +36,14 @@ std::size_t AdaptiveField::leafCount() const {
 std::size_t AdaptiveField::memoryUse() const {
   if (!tree_) return 0;
   return sizeof(AdaptiveTree) + tree_->octree.memoryUse() +
-         tree_->values.capacity() * sizeof(CornerValues);
+         tree_->data.values.capacity() * sizeof(CornerValues) +
+         tree_->data.gradients.capacity() * sizeof(CornerGradients);
 }
 
 Imath::Box3d AdaptiveField::zeroSetBounds() const {
   Imath::Box3d box;
   if (!tree_) return box;
-  const HashedOctree& octree = tree_->octree;
-  for (std::uint32_t b = 0; b < octree.blockCount(); ++b) {
-    const CellKey parent = octree.parent(b);
-    for (int octant = 0; octant < 8; ++octant) {
-      const CellKey leaf = parent.child(octant);
-      if (octree.isSplit(leaf)) continue;
-      for (int c = 0; c < 8; ++c)
-        for (int axis = 0; axis < 3; ++axis) {
-          if (c >> axis & 1) continue;
-          const double v = tree_->corner(b, octant, c), w = tree_->corner(b, octant, c | 1 << axis);
-          if ((v < 0) == (w < 0)) continue;
-          V3d at = V3d(leaf.low()) + V3d(c & 1, c >> 1 & 1, c >> 2) * leaf.edge();
-          at[axis] += leaf.edge() * (v / (v - w));
-          box.extendBy(tree_->origin + at * tree_->unit);
-        }
-    }
-  }
+  forEachEdgeCrossing(*tree_, [&](const V3d& world) { box.extendBy(world); });
   return box;
 }
 
@@ -65,7 +55,9 @@ std::uint64_t AdaptiveField::contentHash() const {
   std::uint64_t hash = mixBytes(0, place, std::size(place));
   for (std::uint32_t b = 0; b < octree.blockCount(); ++b)
     hash = mixHash(hash, octree.parent(b).packed());
-  return mixBytes(hash, tree_->values.data(), tree_->values.size());
+  const CornerData& data = tree_->data;
+  hash = mixBytes(hash, data.values.data(), data.values.size());
+  return data.isTricubic() ? mixBytes(hash, data.gradients.data(), data.gradients.size()) : hash;
 }
 
 struct AdaptiveSampler::Impl {
@@ -113,15 +105,8 @@ double AdaptiveSampler::value(const V3d& world) const {
 V3d AdaptiveSampler::gradient(const V3d& world) const {
   if (!std::isfinite(world.length())) return V3d(NAN);
   const Impl::Local local = impl_->locate(world);
-  V3d result;
-  for (int axis = 0; axis < 3; ++axis) {
-    V3d low = local.at, high = local.at;
-    low[axis] = 0;
-    high[axis] = 1;
-    result[axis] =
-        impl_->tree->interpolate(local.place, high) - impl_->tree->interpolate(local.place, low);
-  }
-  return result / (local.place.leaf.edge() * impl_->tree->unit);
+  return impl_->tree->interpolant(local.place).slope(local.at) /
+         (local.place.leaf.edge() * impl_->tree->unit);
 }
 
 double AdaptiveSampler::leafRadius(const V3d& world) const {

@@ -13,9 +13,10 @@ namespace levelset {
 struct AdaptiveTree;  // defined in levelset/adaptive/octree/adaptive_tree.h, for the .cpp files
 
 /// A solid as a signed distance field on an octree [Frisken00, Sigg06]. Cells are small where the
-/// distance is far from linear. Values are `float` in world units, negative inside. The field is
-/// interpolated trilinearly in each leaf, and continuous: a corner of a leaf that lies on the face
-/// or edge of a larger leaf has the interpolated value of that leaf.
+/// distance is far from its interpolant. Values are `float` in world units, negative inside. The
+/// field is interpolated trilinearly in each leaf, or tricubically from values and gradients. It is
+/// continuous: a corner of a leaf that lies on the face or edge of a larger leaf has the
+/// interpolated figures of that leaf.
 ///
 /// The class has value semantics. Copies share one tree, which does not change.
 class AdaptiveField {
@@ -31,10 +32,12 @@ class AdaptiveField {
   [[nodiscard]] double halfWidth() const;
   /// Cube that the root covers, world units. Beyond it the distance to the cube is added.
   [[nodiscard]] Imath::Box3d box() const;
+  /// Returns true for tricubic interpolation.
+  [[nodiscard]] bool isTricubic() const;
   [[nodiscard]] std::size_t leafCount() const;
   [[nodiscard]] std::size_t memoryUse() const;  ///< bytes
-  /// Bounds of the zero set, world units: corners of cells where it crosses the edges of leaves.
-  /// Empty when there is none.
+  /// Bounds of the zero set, world units: where it crosses the edges of leaves, by linear
+  /// interpolation. Empty when it crosses none.
   [[nodiscard]] Imath::Box3d zeroSetBounds() const;
   /// Hash of tree and values.
   [[nodiscard]] std::uint64_t contentHash() const;

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "levelset/adaptive/octree/adaptive_tree.h"
+#include "levelset/adaptive/trilinear_surface.h"
 #include "levelset/memory_limit.h"
 
 namespace levelset {
@@ -116,7 +117,7 @@ Node LeafMesher::node(const V3i& at) const {
     if (block == HashedOctree::kNone) continue;
     const V3i index = (at - parent.low()) / (1 << level);
     const double value =
-        tree_.values[block][static_cast<std::size_t>(index.x + 3 * index.y + 9 * index.z)];
+        tree_.data.values[block][static_cast<std::size_t>(index.x + 3 * index.y + 9 * index.z)];
     return {at, value < 0, value};
   }
   return {at, false, 0};  // no cell has this corner
@@ -234,17 +235,12 @@ V3d LeafMesher::centreOf(const std::vector<std::size_t>& loop) const {
   for (const std::size_t v : loop) sum += vertices_[v].position;
   const double edge = leaf_.edge();
   V3d at = (sum / double(loop.size()) - V3d(leaf_.low())) / edge;
+  const LeafInterpolant leaf = tree_.interpolant(place_);
   constexpr int kSteps = 4;
   for (int step = 0; step < kSteps; ++step) {
-    V3d slope;
-    for (int axis = 0; axis < 3; ++axis) {
-      V3d low = at, high = at;
-      low[axis] = 0;
-      high[axis] = 1;
-      slope[axis] = tree_.interpolate(place_, high) - tree_.interpolate(place_, low);
-    }
+    const V3d slope = leaf.slope(at);
     if (!(slope.length2() > 0)) break;
-    at -= slope * (tree_.interpolate(place_, at) / slope.length2());
+    at -= slope * (leaf.value(at) / slope.length2());
     constexpr double kMargin = 0.02;  // a vertex in a face could coincide with one of the neighbour
     for (int axis = 0; axis < 3; ++axis) at[axis] = std::clamp(at[axis], kMargin, 1 - kMargin);
   }
@@ -322,6 +318,10 @@ TriMesh adaptiveToMesh(const AdaptiveField& field, const AdaptiveToMeshOptions& 
   TriMesh mesh;
   report(options.progress, 0);
   if (field.isEmpty()) return mesh;
+  if (field.isTricubic())
+    return adaptiveToMesh(
+        trilinearSurface(field, options.maxMemory, subProgress(options.progress, 0, 0.5)),
+        {.maxMemory = options.maxMemory, .progress = subProgress(options.progress, 0.5, 1)});
   const AdaptiveTree& tree = *field.shared();
   constexpr std::uint32_t kBlocks = 1024;
   const auto blocks = static_cast<std::uint32_t>(tree.octree.blockCount());
@@ -329,7 +329,7 @@ TriMesh adaptiveToMesh(const AdaptiveField& field, const AdaptiveToMeshOptions& 
   std::atomic<std::size_t> crossing = 0;
   tbb::parallel_for(std::uint32_t{0}, blocks, [&](std::uint32_t block) {
     const auto [low, high] =
-        std::minmax_element(tree.values[block].begin(), tree.values[block].end());
+        std::minmax_element(tree.data.values[block].begin(), tree.data.values[block].end());
     if (*low < 0 && *high >= 0) crossing += 8;
   });
   constexpr double kBytesPerLeaf = 500;

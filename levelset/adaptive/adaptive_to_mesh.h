@@ -16,7 +16,8 @@ struct AdaptiveToMeshOptions {
 /// Converts the zero set of an adaptive field to a mesh without cracks. Each leaf is cut along the
 /// curves in which the zero set crosses its faces. A face beside smaller leaves is divided like
 /// theirs, so both sides have the same curves [Ho05]. The mesh is closed, two triangles share each
-/// edge, and each vertex has one fan of triangles, unless the zero set leaves the root.
+/// edge, and each vertex has one fan of triangles, unless the zero set leaves the root. The mesh of
+/// a tricubic field is that of a trilinear one with half of its tolerance.
 /// @return triangles that face outwards; vertices in world units
 /// @throws ResourceLimit, Cancelled
 [[nodiscard]] TriMesh adaptiveToMesh(const AdaptiveField& field,

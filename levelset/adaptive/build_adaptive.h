@@ -27,6 +27,11 @@ class SignedDistance {
   /// Returns the distance of a position, negative inside. `known` does not change the result.
   /// Called from several threads at once.
   [[nodiscard]] virtual double at(const Imath::V3d& position, const Known& known) const = 0;
+  /// Returns the gradient at a position with a value. At a kink, that of one side. By default from
+  /// central differences over two steps.
+  /// @param step  world units; small beside the cell that has the position as a corner
+  [[nodiscard]] virtual Imath::V3d gradient(const Imath::V3d& position, double value,
+                                            double step) const;
   /// Receives a point and its distance. Returns false to end a visit.
   using Visit = std::function<bool(const Imath::V3d& point, double value)>;
   /// Visits points on or near the surface in a box, where it may leave its course between the
@@ -42,6 +47,9 @@ struct AdaptiveOptions {
   /// of the box. Kinks of the distance half way between two parts of the surface need many small
   /// cells.
   double halfWidth = 0;
+  /// Interpolates from gradients too. Smooth surfaces need far fewer cells, each with four times
+  /// the numbers.
+  bool isTricubic = false;
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
@@ -52,14 +60,14 @@ struct AdaptiveReport {
   /// Largest error of the leaves at the points where they were tested, before their corners took
   /// over values of larger leaves, world units.
   double testedError = 0;
-  /// Largest change of a corner by the value of a larger leaf, world units.
+  /// Largest change of a leaf by corners that took over figures of larger leaves, world units.
   double hangingError = 0;
 };
 
 /// Samples a signed distance on an octree. Divides a leaf within the half width while its
 /// interpolant is off by more than half of the tolerance: at its centre, in the middle of a face or
-/// an edge, or at a visited point of the surface. Divides a leaf too that would change a corner of
-/// a smaller one by more than that. The error at these points is then at most the tolerance;
+/// an edge, or at a visited point of the surface. Divides a leaf too that would change a smaller
+/// one by more than that at a corner. The error at these points is then at most the tolerance;
 /// elsewhere this is an experience. The smallest cells have an edge of at most half of the
 /// tolerance.
 /// @param box  bounds of the surface, world units; the root is a cube around it

@@ -67,12 +67,15 @@ OneSided distances(const TriMesh& from, const TriangleSurface& to, double spacin
 }
 
 /// Volume inside both solids; 0 for solids that are apart.
-double volumeOfBoth(const AdaptiveField& a, const AdaptiveField& b, const Progress& progress) {
+double volumeOfBoth(const AdaptiveField& a, const AdaptiveField& b, std::size_t maxMemory,
+                    const Progress& progress) {
   const std::array both{a, b};
   try {
-    return signedVolume(adaptiveToMesh(combineAdaptive(
-        CsgOperation::Intersection, both,
-        {.tolerance = std::min(a.tolerance(), b.tolerance()), .progress = progress})));
+    return signedVolume(
+        adaptiveToMesh(combineAdaptive(CsgOperation::Intersection, both,
+                                       {.tolerance = std::min(a.tolerance(), b.tolerance()),
+                                        .maxMemory = maxMemory,
+                                        .progress = progress})));
   } catch (const NoSurface&) {
     return 0;
   }
@@ -82,8 +85,10 @@ double volumeOfBoth(const AdaptiveField& a, const AdaptiveField& b, const Progre
 
 Comparison compare(const AdaptiveField& a, const AdaptiveField& b, const CompareOptions& options) {
   const Progress& progress = options.progress;
-  TriMesh ofA = adaptiveToMesh(a, {.progress = subProgress(progress, 0, 0.1)});
-  TriMesh ofB = adaptiveToMesh(b, {.progress = subProgress(progress, 0.1, 0.2)});
+  TriMesh ofA = adaptiveToMesh(
+      a, {.maxMemory = options.maxMemory, .progress = subProgress(progress, 0, 0.1)});
+  TriMesh ofB = adaptiveToMesh(
+      b, {.maxMemory = options.maxMemory, .progress = subProgress(progress, 0.1, 0.2)});
   if (ofA.isEmpty() || ofB.isEmpty())
     throw InvalidInput("an operand has no surface; there is nothing to compare");
   const TriangleSurface surfaceA(ofA), surfaceB(ofB);
@@ -98,7 +103,7 @@ Comparison compare(const AdaptiveField& a, const AdaptiveField& b, const Compare
   result.hausdorffBtoA = back.largest;
   result.meanAtoB = there.mean;
   result.meanBtoA = back.mean;
-  const double both = volumeOfBoth(a, b, subProgress(progress, 0.6, 1));
+  const double both = volumeOfBoth(a, b, options.maxMemory, subProgress(progress, 0.6, 1));
   result.symmetricDifference = std::max(0.0, signedVolume(ofA) + signedVolume(ofB) - 2 * both);
   return result;
 }

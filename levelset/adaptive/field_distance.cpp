@@ -18,9 +18,10 @@ double FieldDistance::at(const Imath::V3d& position, const Known& /*known*/) con
   const double width = field_.halfWidth();
   if (std::abs(value) > width) {
     // A distance changes by at most the length of a step, so the interpolant is off by at most the
-    // radius of the leaf, where the corners are exact. Corners on a larger leaf are less exact.
-    constexpr double kRadii = 3;
-    value = std::copysign(std::max(width, std::abs(value) - kRadii * sampler.leafRadius(inside)),
+    // radius of the leaf, where the corners are exact. Corners on a larger leaf are less exact. The
+    // cubic bumps of a tricubic leaf add about one radius.
+    const double radii = field_.isTricubic() ? 4 : 3;
+    value = std::copysign(std::max(width, std::abs(value) - radii * sampler.leafRadius(inside)),
                           value);
   }
   // The surface lies in the root, and the nearest point of a cube sees it at a right angle or less.

@@ -25,6 +25,10 @@ class FieldDistance final : public SignedDistance {
   [[nodiscard]] Imath::V3d gradient(const Imath::V3d& position) const {
     return samplers_.local().gradient(position);
   }
+  [[nodiscard]] Imath::V3d gradient(const Imath::V3d& position, double /*value*/,
+                                    double /*step*/) const override {
+    return gradient(position);
+  }
 
  private:
   AdaptiveField field_;

@@ -264,6 +264,20 @@ bool MeshDistance::isInside(const V3d& local, std::uint32_t triangle) const {
   return flip_ * winding_.within(kTolerance, local) > 0.5;
 }
 
+V3d MeshDistance::gradient(const V3d& position, double value, double /*step*/) const {
+  const V3d local = position / voxel_ - origin_;
+  constexpr double kRounding = 1e-6, kOnSurface = 1e-5;  // voxels
+  const double limit = (1 + kRounding) * std::abs(value) / voxel_ + kOnSurface;
+  FoundItem found = search_.closest(local, limit * limit);
+  if (!found.isValid()) found = search_.closest(local, std::numeric_limits<double>::infinity());
+  const std::uint32_t triangle = found.index;
+  const auto foot = closestOnTriangle(local, mesh_.corner(triangle, 0), mesh_.corner(triangle, 1),
+                                      mesh_.corner(triangle, 2));
+  const V3d away = local - foot.point;
+  if (away.length() > kOnSurface) return away.normalized() * std::copysign(1.0, value);
+  return flip_ * normals_->at(triangle, foot.part).normal.normalized();
+}
+
 double MeshDistance::at(const V3d& position, const Known& known) const {
   const V3d local = position / voxel_ - origin_;
   constexpr double kRounding = 1e-6;

@@ -27,6 +27,9 @@ class MeshDistance final : public SignedDistance {
   MeshDistance(const TriMesh& mesh, double voxel, const MeshToBandOptions& options);
 
   [[nodiscard]] double at(const Imath::V3d& position, const Known& known) const override;
+  /// Points away from the closest point of the surface. On the surface, the normal there.
+  [[nodiscard]] Imath::V3d gradient(const Imath::V3d& position, double value,
+                                    double step) const override;
   /// Visits the vertices in the box, and the ends and the middle of each edge in it.
   void visitSurface(const Imath::Box3d& box, const Visit& visit) const override;
   /// Certificate of the mesh. Its ambiguous share is a share of the area.

@@ -50,6 +50,7 @@ MeshToAdaptiveResult meshToAdaptive(const TriMesh& mesh, const MeshToAdaptiveOpt
   result.field = buildAdaptive(distance, box,
                                {.tolerance = options.tolerance,
                                 .halfWidth = options.halfWidth,
+                                .isTricubic = options.isTricubic,
                                 .maxMemory = options.maxMemory,
                                 .progress = subProgress(options.progress, 0.2, 1)},
                                &result.report);

@@ -11,6 +11,7 @@ struct MeshToAdaptiveOptions {
   /// Distance from the surface up to which the tolerance holds, world units; 0: 2 % of the diagonal
   /// of the bounding box.
   double halfWidth = 0;
+  bool isTricubic = false;  ///< as in AdaptiveOptions
   SignMode sign = SignMode::Auto;
   Nesting nesting = Nesting::Parity;    ///< used with SignMode::Closed only
   bool acceptSign = false;              ///< accept an ambiguous sign

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <cstddef>
+
 #include "levelset/narrow_band.h"
 #include "levelset/progress.h"
 
 namespace levelset {
 
 struct CompareOptions {
+  std::size_t maxMemory = kNoMemoryLimit;  ///< for the meshes of adaptive fields
   Progress progress = {};
 };
 

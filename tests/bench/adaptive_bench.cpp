@@ -114,17 +114,19 @@ void compareFields(const std::string& shape) {
   const std::vector<Probe> probes = probesOf(mesh, distance, 0.8 * halfWidth, 100000);
   std::string name = shape.substr(shape.find_last_of('/') + 1);
   name = name.substr(0, name.find('.'));
-  for (const double tolerance : {3.0, 1.0, 0.3}) {
-    const double start = cpuSeconds();
-    const AdaptiveField field =
-        meshToAdaptive(mesh,
-                       {.tolerance = tolerance * unit, .halfWidth = halfWidth, .acceptSign = true})
-            .field;
-    const double seconds = cpuSeconds() - start;
-    const AdaptiveSampler sampler(field);
-    row(name, "adaptive", tolerance, field.memoryUse(), seconds, probes, unit,
-        [&](const V3d& p) { return sampler.value(p); });
-  }
+  for (const bool isTricubic : {false, true})
+    for (const double tolerance : {3.0, 1.0, 0.3}) {
+      const double start = cpuSeconds();
+      const AdaptiveField field = meshToAdaptive(mesh, {.tolerance = tolerance * unit,
+                                                        .halfWidth = halfWidth,
+                                                        .isTricubic = isTricubic,
+                                                        .acceptSign = true})
+                                      .field;
+      const double seconds = cpuSeconds() - start;
+      const AdaptiveSampler sampler(field);
+      row(name, isTricubic ? "adaptive-tricubic" : "adaptive", tolerance, field.memoryUse(),
+          seconds, probes, unit, [&](const V3d& p) { return sampler.value(p); });
+    }
   for (const double voxel : {8.0, 4.0, 2.0, 1.0}) {
     const double start = cpuSeconds();
     NarrowBand band;
@@ -153,11 +155,14 @@ void testTolerance(const std::string& shape) {
   const double unit = (box.max - box.min).length() / 1000, halfWidth = 10 * unit;
   const MeshDistance distance(mesh, unit, {.acceptSign = true});
   const std::vector<Probe> probes = probesOf(mesh, distance, halfWidth, 1000000);
-  for (const double tolerance : {3.0, 1.0, 0.3}) {
-    const AdaptiveField field =
-        meshToAdaptive(mesh,
-                       {.tolerance = tolerance * unit, .halfWidth = halfWidth, .acceptSign = true})
-            .field;
+  for (const auto& [isTricubic, tolerance] :
+       {std::pair(false, 3.0), std::pair(false, 1.0), std::pair(false, 0.3), std::pair(true, 3.0),
+        std::pair(true, 1.0), std::pair(true, 0.3)}) {
+    const AdaptiveField field = meshToAdaptive(mesh, {.tolerance = tolerance * unit,
+                                                      .halfWidth = halfWidth,
+                                                      .isTricubic = isTricubic,
+                                                      .acceptSign = true})
+                                    .field;
     const AdaptiveSampler sampler(field);
     std::array<double, 2> largest{};
     std::array<std::size_t, 2> counts{};
@@ -168,8 +173,9 @@ void testTolerance(const std::string& shape) {
           std::max(largest[side],
                    std::abs(sampler.value(probe.position) - probe.distance) / field.tolerance());
     }
-    fmt::print("{}: tolerance {:.4g}: {:.3f} inside ({} points), {:.3f} outside ({} points)\n",
-               shape, tolerance, largest[0], counts[0], largest[1], counts[1]);
+    fmt::print("{}: {}, tolerance {:.4g}: {:.3f} inside ({} points), {:.3f} outside ({} points)\n",
+               shape, isTricubic ? "tricubic" : "trilinear", tolerance, largest[0], counts[0],
+               largest[1], counts[1]);
     std::fflush(stdout);
   }
 }

@@ -12,7 +12,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 STRUCTURES = {
-    "adaptive": ("adaptive field", "#c1440e", "o-"),
+    "adaptive": ("adaptive field, trilinear", "#c1440e", "o-"),
+    "adaptive-tricubic": ("adaptive field, tricubic", "#8b3fa0", "D-"),
     "band": ("narrow band, trilinear", "#1b6ca8", "s--"),
     "band-tricubic": ("narrow band, tricubic", "#3a7d44", "^--"),
 }

@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <optional>
 
@@ -12,18 +13,27 @@ namespace {
 using Imath::V3d;
 using Imath::V3i;
 
-/// Source of the value at a point of a block's lattice.
+using Leaf = std::optional<HashedOctree::Place>;
+
+/// Sources of the figures at a point of a block's lattice.
 struct Source {
-  std::optional<HashedOctree::Place> larger;  ///< largest leaf that touches the point
+  Leaf larger;  ///< largest leaf that touches the point
+  /// For each axis the largest one of those that touch the block along that axis. Its derivative
+  /// along the axis is that of the common face or edge. Across an edge, derivatives of leaves jump.
+  std::array<Leaf, 3> along;
   std::uint32_t block;  ///< first one of the blocks of this size that have the point
 };
 
-/// Finds the source of a point that is no corner of the block's parent.
+void keepLarger(const HashedOctree::Place& place, Leaf& leaf) {
+  if (!leaf || place.leaf.level > leaf->leaf.level) leaf = place;
+}
+
+/// Finds the sources of a point that is no corner of the block's parent.
 /// @param at  0 to 2 along each axis, with a 1
 Source sourceOf(const HashedOctree& octree, std::uint32_t block, const V3i& at) {
   const CellKey parent = octree.parent(block);
   const int side = 1 << octree.depth(), edge = static_cast<int>(parent.edge());
-  Source source{{}, block};
+  Source source{{}, {}, block};
   // Neighbours of the parent that touch the point: steps along the axes on which it lies at an end.
   for (int steps = 1; steps < 8; ++steps) {
     V3i low = parent.low();
@@ -44,12 +54,37 @@ Source sourceOf(const HashedOctree& octree, std::uint32_t block, const V3i& at) 
     }
     const HashedOctree::Place place =
         octree.findLeaf(low, [&](const CellKey& key) { return octree.block(key); });
-    if (!source.larger || place.leaf.level > source.larger->leaf.level) source.larger = place;
+    keepLarger(place, source.larger);
+    for (int axis = 0; axis < 3; ++axis)
+      if (!(steps >> axis & 1)) keepLarger(place, source.along[static_cast<std::size_t>(axis)]);
   }
   return source;
 }
 
-void fill(const AdaptiveTree& tree, std::uint32_t block, std::vector<CornerValues>& values) {
+/// Copies the figures at a point of one block to a point of another.
+void copyPoint(const CornerData& from, std::uint32_t block, std::size_t index, CornerData& to,
+               std::uint32_t toBlock, std::size_t toIndex) {
+  to.values[toBlock][toIndex] = from.values[block][index];
+  if (!from.isTricubic()) return;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    to.gradients[toBlock][axis][toIndex] = from.gradients[block][axis][index];
+}
+
+void resize(CornerData& data, std::size_t blocks, bool isTricubic) {
+  data.values.resize(blocks);
+  if (isTricubic) data.gradients.resize(blocks);
+}
+
+LeafInterpolant interpolantIn(const CornerData& data, const HashedOctree::Place& place,
+                              double unit) {
+  return interpolantOf(data, place.block, place.leaf.octant(), unit * place.leaf.edge());
+}
+/// Position of a point in a leaf, each coordinate in [0, 1].
+V3d localIn(const HashedOctree::Place& place, const V3i& point) {
+  return V3d(point - place.leaf.low()) / place.leaf.edge();
+}
+
+void fill(const AdaptiveTree& tree, std::uint32_t block, CornerData& data) {
   const HashedOctree& octree = tree.octree;
   const CellKey parent = octree.parent(block);
   const std::uint32_t outer =
@@ -62,22 +97,29 @@ void fill(const AdaptiveTree& tree, std::uint32_t block, std::vector<CornerValue
         const auto i = static_cast<std::size_t>(x + 3 * y + 9 * z);
         if (x != 1 && y != 1 && z != 1) {
           // A corner of the parent has its value in the block of the parent already.
-          values[block][i] = outer == HashedOctree::kNone
-                                 ? tree.values[block][i]
-                                 : values[outer][AdaptiveTree::latticeIndex(
-                                       parent.octant(), x / 2 | y / 2 << 1 | z / 2 << 2)];
+          if (outer == HashedOctree::kNone)
+            copyPoint(tree.data, block, i, data, block, i);
+          else
+            copyPoint(data, outer,
+                      AdaptiveTree::latticeIndex(parent.octant(), x / 2 | y / 2 << 1 | z / 2 << 2),
+                      data, block, i);
           continue;
         }
         const Source source = sourceOf(octree, block, at);
-        if (source.larger) {
-          const CellKey& leaf = source.larger->leaf;
-          const V3d local = V3d(parent.low() + at * half - leaf.low()) / leaf.edge();
-          values[block][i] =
-              static_cast<float>(interpolate(values[source.larger->block], leaf.octant(), local));
-        } else {
-          const V3i p = (parent.low() + at * half - octree.parent(source.block).low()) / half;
-          values[block][i] =
-              tree.values[source.block][static_cast<std::size_t>(p.x + 3 * p.y + 9 * p.z)];
+        const V3i p = (parent.low() + at * half - octree.parent(source.block).low()) / half;
+        copyPoint(tree.data, source.block, static_cast<std::size_t>(p.x + 3 * p.y + 9 * p.z), data,
+                  block, i);
+        if (!source.larger) continue;
+        const V3i point = parent.low() + at * half;
+        data.values[block][i] = static_cast<float>(
+            interpolantIn(data, *source.larger, tree.unit).value(localIn(*source.larger, point)));
+        for (int axis = 0; axis < 3 && tree.data.isTricubic(); ++axis) {
+          const auto along = static_cast<std::size_t>(axis);
+          const Leaf& leaf = source.along[along];
+          if (!leaf) continue;
+          const V3d slope = interpolantIn(data, *leaf, tree.unit).slope(localIn(*leaf, point));
+          data.gradients[block][along][i] =
+              static_cast<float>(slope[axis] / (tree.unit * leaf->leaf.edge()));
         }
       }
 }
@@ -120,11 +162,11 @@ void sortUnique(std::vector<std::uint32_t>& blocks) {
 
 }  // namespace
 
-std::vector<std::uint32_t> updateValues(const AdaptiveTree& tree, std::uint32_t first,
-                                        std::vector<CornerValues>& values) {
+std::vector<std::uint32_t> updateData(const AdaptiveTree& tree, std::uint32_t first,
+                                      CornerData& data) {
   const HashedOctree& octree = tree.octree;
   const auto count = static_cast<std::uint32_t>(octree.blockCount());
-  values.resize(count);
+  resize(data, count, tree.data.isTricubic());
   // Blocks to compute, by the level of their parent. A block depends on larger leaves only, and on
   // the block of its parent.
   std::vector<std::vector<std::uint32_t>> levels(static_cast<std::size_t>(octree.depth()) + 1);
@@ -142,9 +184,12 @@ std::vector<std::uint32_t> updateValues(const AdaptiveTree& tree, std::uint32_t 
     sortUnique(blocks);
     std::vector<char> isChanged(blocks.size(), 0);
     tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t k) {
-      const CornerValues before = values[blocks[k]];
-      fill(tree, blocks[k], values);
-      isChanged[k] = before != values[blocks[k]];
+      const std::uint32_t block = blocks[k];
+      const CornerValues before = data.values[block];
+      const CornerGradients slopes = data.isTricubic() ? data.gradients[block] : CornerGradients{};
+      fill(tree, block, data);
+      isChanged[k] =
+          before != data.values[block] || (data.isTricubic() && slopes != data.gradients[block]);
     });
     for (std::size_t k = 0; k < blocks.size(); ++k)
       if (isChanged[k] && level > 0) add(octree.parent(blocks[k]), static_cast<int>(level) - 1);
@@ -154,16 +199,17 @@ std::vector<std::uint32_t> updateValues(const AdaptiveTree& tree, std::uint32_t 
   return computed;
 }
 
-std::vector<CornerValues> continuousValues(const AdaptiveTree& tree) {
-  std::vector<CornerValues> values(tree.values.size());
+CornerData continuousData(const AdaptiveTree& tree) {
+  CornerData data;
+  resize(data, tree.octree.blockCount(), tree.data.isTricubic());
   // Large cells first: a leaf must have its own values before smaller ones take them over.
   std::vector<std::vector<std::uint32_t>> levels(static_cast<std::size_t>(tree.octree.depth()) + 1);
   for (std::uint32_t block = 0; block < tree.octree.blockCount(); ++block)
     levels[static_cast<std::size_t>(tree.octree.parent(block).level)].push_back(block);
   for (auto blocks = levels.rbegin(); blocks != levels.rend(); ++blocks)
     tbb::parallel_for(std::size_t{0}, blocks->size(),
-                      [&](std::size_t k) { fill(tree, (*blocks)[k], values); });
-  return values;
+                      [&](std::size_t k) { fill(tree, (*blocks)[k], data); });
+  return data;
 }
 
 }  // namespace levelset

@@ -136,7 +136,7 @@ Value measure(Invocation& in) {
 }
 
 Value compare(Invocation& in) {
-  const levelset::CompareOptions options{.progress = in.progress};
+  const levelset::CompareOptions options{.maxMemory = in.maxMemory, .progress = in.progress};
   const levelset::Comparison c =
       in.operands[0].kind() == Kind::Adaptive
           ? levelset::compare(in.operands[0].adaptive(), in.operands[1].adaptive(), options)
@@ -315,6 +315,7 @@ Json valueInfo(const Value& value, Invocation& in) {
     const levelset::AdaptiveField& field = value.adaptive();
     json["tolerance"] = field.tolerance();
     json["width"] = field.halfWidth();
+    json["interpolation"] = field.isTricubic() ? "tricubic" : "trilinear";
     json["cells"] = field.leafCount();
     json["bytes"] = field.memoryUse();
     json["hash"] = fmt::format("{:016x}", field.contentHash());

@@ -56,6 +56,23 @@ TEST_F(AdaptiveActions, MakeMeasureMeshAndConvert) {
               0.1 * 100 * std::numbers::pi);
 }
 
+TEST_F(AdaptiveActions, InterpolateTricubically) {
+  const std::string ball =
+                        "sphere --radius 5 --voxel 0.25 ! level-set --adaptive --tolerance 0.03 ",
+                    tricubic = ball + "--interpolation tricubic ";
+  const Json linear = json(ball + "! info --json"), cubic = json(tricubic + "! info --json");
+  EXPECT_EQ(linear["interpolation"], "trilinear");
+  EXPECT_EQ(cubic["interpolation"], "tricubic");
+  EXPECT_LT(cubic["bytes"].get<double>(), linear["bytes"].get<double>() / 6);  // measured 1/12.6
+  // The facets of the level set's mesh cut off 2.
+  EXPECT_NEAR(json(tricubic + "! measure --json")["volume"].get<double>(),
+              500 * std::numbers::pi / 3, 6);
+  EXPECT_EQ(json(tricubic + "! mesh ! measure --json")["closed_manifold"], true);
+  const Json joined = json(std::string(kCube) + "--interpolation tricubic ! " + kMoved +
+                           "--interpolation tricubic ! union ! info --json");
+  EXPECT_EQ(joined["interpolation"], "tricubic");
+}
+
 TEST_F(AdaptiveActions, CombineAndOffset) {
   const std::string both = std::string(kCube) + "! " + kMoved + "! ";
   EXPECT_NEAR(json(both + "union ! measure --json")["volume"].get<double>(), 1875, kVolumeBound);
@@ -101,6 +118,8 @@ TEST_F(AdaptiveActions, RefuseWhatDoesNotApply) {
   expectRefusal("read cube.ply ! level-set --adaptive", 2, "--adaptive needs --tolerance");
   expectRefusal("read cube.ply ! level-set --voxel 1 --tolerance 1", 2,
                 "--tolerance needs --adaptive");
+  expectRefusal("read cube.ply ! level-set --voxel 1 --interpolation tricubic", 2,
+                "--interpolation needs --adaptive");
   expectRefusal(cube + "--voxel 1", 2, "--voxel does not apply to --adaptive");
   expectRefusal(cube + "--half-width 4", 2, "--half-width does not apply");
   expectRefusal("read cube.ply ! sample --count 100 ! level-set --adaptive --tolerance 1", 2,

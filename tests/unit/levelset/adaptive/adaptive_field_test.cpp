@@ -21,6 +21,7 @@
 #include "levelset/adaptive/octree/hanging_nodes.h"
 #include "levelset/error.h"
 #include "levelset/inspect/measure.h"
+#include "tests/support/adaptive.h"
 #include "tests/support/meshes.h"
 #include "tests/support/threads.h"
 
@@ -31,44 +32,12 @@ using Imath::Box3d;
 using Imath::V3d;
 using Imath::V3i;
 
-/// Distance from a formula.
-class Formula final : public SignedDistance {
- public:
-  explicit Formula(std::function<double(const V3d&)> phi) : phi_(std::move(phi)) {}
-  [[nodiscard]] double at(const V3d& position, const Known&) const override {
-    return phi_(position);
-  }
-
- private:
-  std::function<double(const V3d&)> phi_;
-};
+using Formula = support::FormulaDistance;
+using Errors = support::AdaptiveErrors;
+using support::errorsOf;
 
 const Formula kBall([](const V3d& p) { return p.length() - 1; });
 const Box3d kBallBox(V3d(-1), V3d(1));
-
-/// Largest error at random points, in tolerances.
-struct Errors {
-  double largest = 0;
-  std::size_t inside = 0, outside = 0, wrongSigns = 0;
-};
-Errors errorsOf(const AdaptiveField& field, const SignedDistance& truth, int count) {
-  const AdaptiveSampler sampler(field);
-  const Box3d box = field.box();
-  std::mt19937_64 random(11);
-  std::uniform_real_distribution<double> unit(0, 1);
-  Errors errors;
-  for (int k = 0; k < count; ++k) {
-    V3d p;
-    for (int axis = 0; axis < 3; ++axis)
-      p[axis] = box.min[axis] + unit(random) * (box.max[axis] - box.min[axis]);
-    const double expected = truth.at(p, {}), found = sampler.value(p);
-    if (std::abs(expected) > field.tolerance()) errors.wrongSigns += (expected < 0) != (found < 0);
-    if (std::abs(expected) > field.halfWidth()) continue;
-    errors.largest = std::max(errors.largest, std::abs(found - expected) / field.tolerance());
-    ++(expected < 0 ? errors.inside : errors.outside);
-  }
-  return errors;
-}
 
 TEST(AdaptiveField, MeetsItsToleranceAroundABall) {
   std::vector<std::size_t> leaves;
@@ -126,50 +95,33 @@ TEST(AdaptiveField, FindsPartsThinnerThanItsTolerance) {
 TEST(AdaptiveField, IsContinuousAcrossHangingNodes) {
   const TriMesh mesh = support::boxMesh(V3d(-1, -0.6, -0.4), V3d(0.8, 0.6, 0.5));
   const AdaptiveField field = meshToAdaptive(mesh, {.tolerance = 0.004, .halfWidth = 0.2}).field;
-  const AdaptiveTree& tree = *field.shared();
-  std::mt19937 random(3);
-  std::uniform_real_distribution<double> unit(0, 1);
-  double largest = 0;
-  int changes = 0;
-  for (std::uint32_t block = 0; block < tree.octree.blockCount(); ++block)
-    for (int octant = 0; octant < 8; ++octant) {
-      const CellKey leaf = tree.octree.parent(block).child(octant);
-      if (tree.octree.isSplit(leaf)) continue;
-      for (int axis = 0; axis < 3; ++axis)
-        for (const int side : {-1, 1}) {
-          const auto beside = tree.octree.neighbour(leaf, axis, side);
-          if (!beside || tree.octree.isSplit(*beside)) continue;
-          changes += beside->level > leaf.level;
-          V3d at(unit(random), unit(random), unit(random));
-          at[axis] = side > 0 ? 1 : 0;
-          const V3d p = V3d(leaf.low()) + at * leaf.edge();
-          const V3d there = (p - V3d(beside->low())) / beside->edge();
-          const double own = tree.interpolate({leaf, block}, at),
-                       other =
-                           tree.interpolate({*beside, tree.octree.block(beside->parent())}, there);
-          largest = std::max(largest, std::abs(own - other));
-        }
-    }
-  EXPECT_GT(changes, 1000);
-  EXPECT_LE(largest, 3e-7);  // rounding of values below 2 to float; measured 1.2e-7
+  const support::FaceJumps jumps = support::faceJumps(*field.shared());
+  EXPECT_GT(jumps.changes, 1000);
+  EXPECT_LE(jumps.largest, 3e-7);  // rounding of values below 2 to float; measured 1.2e-7
 }
 
-TEST(AdaptiveField, UpdatesTheValuesAroundNewLeaves) {
+/// Splits random leaves and updates the data of the tree around them.
+void expectUpdates(bool isTricubic) {
   // Values that no interpolant has, so that each hanging node takes one over.
   std::mt19937 random(21);
   AdaptiveTree tree{HashedOctree(6), {}, V3d(0), 1, 1, 1};
-  std::map<std::array<int, 3>, float> known;
+  std::map<std::array<int, 3>, std::array<float, 4>> known;
   const auto split = [&](const CellKey& leaf) {
     tree.octree.split(leaf);
-    CornerValues& values = tree.values.emplace_back();
+    CornerValues& values = tree.data.values.emplace_back();
+    if (isTricubic) tree.data.gradients.emplace_back();
     const int half = static_cast<int>(leaf.edge() / 2);
     for (int z = 0; z < 3; ++z)
       for (int y = 0; y < 3; ++y)
         for (int x = 0; x < 3; ++x) {
           const V3i p = leaf.low() + V3i(x, y, z) * half;
-          const auto [it, isNew] = known.try_emplace({p.x, p.y, p.z}, 0.0f);
-          if (isNew) it->second = static_cast<float>(random() % 1000);
-          values[static_cast<std::size_t>(x + 3 * y + 9 * z)] = it->second;
+          const auto [it, isNew] = known.try_emplace({p.x, p.y, p.z});
+          if (isNew)
+            for (float& number : it->second) number = static_cast<float>(random() % 1000);
+          const auto i = static_cast<std::size_t>(x + 3 * y + 9 * z);
+          values[i] = it->second[3];
+          for (std::size_t axis = 0; axis < 3 && isTricubic; ++axis)
+            tree.data.gradients.back()[axis][i] = it->second[axis];
         }
   };
   const auto randomLeaf = [&] {
@@ -177,19 +129,25 @@ TEST(AdaptiveField, UpdatesTheValuesAroundNewLeaves) {
     return tree.octree.leafAt(V3i(at(), at(), at()));
   };
   split(tree.octree.root());
-  std::vector<CornerValues> values = continuousValues(tree);
+  CornerData data = continuousData(tree);
   for (int round = 0; round < 100; ++round) {
     const auto first = static_cast<std::uint32_t>(tree.octree.blockCount());
     for (int k = 0; k < 1 + round % 3; ++k)
       if (const CellKey leaf = randomLeaf(); leaf.level > 0) split(leaf);
-    const std::vector<CornerValues> before = values;
-    const std::vector<std::uint32_t> computed = updateValues(tree, first, values);
-    ASSERT_EQ(values, continuousValues(tree)) << "round " << round;
-    for (std::uint32_t block = 0; block < before.size(); ++block)
-      if (values[block] != before[block]) {
+    const CornerData before = data;
+    const std::vector<std::uint32_t> computed = updateData(tree, first, data);
+    ASSERT_EQ(data, continuousData(tree)) << "round " << round;
+    for (std::uint32_t block = 0; block < before.values.size(); ++block)
+      if (data.values[block] != before.values[block] ||
+          (isTricubic && data.gradients[block] != before.gradients[block])) {
         EXPECT_TRUE(std::binary_search(computed.begin(), computed.end(), block));
       }
   }
+}
+
+TEST(AdaptiveField, UpdatesTheValuesAroundNewLeaves) {
+  expectUpdates(false);
+  expectUpdates(true);
 }
 
 TEST(AdaptiveField, HasTheSameBitsOnAllThreads) {
