@@ -35,8 +35,13 @@ SegmentedMeasurement measureSegmented(const SegmentedMesh& segmented) {
       const V3d centre = region.bounds.center();
       region.volume += sign * ((a - centre).cross(b - centre) ^ (c - centre)) / 6;
     };
-    add(behind, 1);
-    add(front, -1);
+    if (behind == front) {
+      regions[front].sheetArea += area;
+      ++regions[front].triangles;
+    } else {
+      add(behind, 1);
+      add(front, -1);
+    }
     InterfaceMeasure& interface = interfaces[{front, behind}];
     interface.sides = segmented.sides[t];
     interface.area += area;
@@ -53,6 +58,8 @@ SegmentedMeasurement measureSegmented(const SegmentedMesh& segmented) {
   for (const JunctionEdge& edge : segmented.junctions)
     result.junctionLength +=
         (mesh.positions[edge.vertices[0]] - mesh.positions[edge.vertices[1]]).length();
+  for (const auto& [a, b] : segmented.rims)
+    result.rimLength += (mesh.positions[a] - mesh.positions[b]).length();
   return result;
 }
 

@@ -1,0 +1,295 @@
+#include "levelset/segmented/sources/sheet_builder.h"
+
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <tuple>
+#include <utility>
+
+#include "levelset/segmented/local/cut_tetrahedron.h"
+#include "levelset/segmented/local/kuhn_cell.h"
+
+namespace levelset {
+namespace {
+
+using Imath::V3d;
+using Imath::V3i;
+using SimplexKey = GridSimplices::Key;
+
+bool isBelow(const V3i& a, const V3i& b) {
+  return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
+}
+
+V3i blockOriginOf(const V3i& at) {
+  return {at.x & ~7, at.y & ~7, at.z & ~7};
+}
+
+std::uint32_t voxelOf(const V3i& at) {
+  return static_cast<std::uint32_t>((at.x & 7) << 6 | (at.y & 7) << 3 | (at.z & 7));
+}
+
+/// Place of an entry in a block.
+struct PlacedKey {
+  std::uint32_t block;
+  std::uint16_t key;
+  std::uint32_t index;
+
+  friend bool operator<(const PlacedKey& a, const PlacedKey& b) {
+    return std::tie(a.block, a.key) < std::tie(b.block, b.key);
+  }
+};
+
+/// Sorts entries by block, and writes the first one of each block.
+template <class Entry>
+std::vector<PlacedKey> sortByBlock(const std::vector<Entry>& entries,
+                                   const GridSimplices& simplices, const std::vector<V3i>& origins,
+                                   std::vector<std::uint32_t>& first) {
+  std::vector<PlacedKey> sorted;
+  for (std::uint32_t n = 0; n < entries.size(); ++n) {
+    const V3i at = simplices.pointOf(entries[n].key), origin = blockOriginOf(at);
+    const auto found = std::lower_bound(origins.begin(), origins.end(), origin, isBelow);
+    if (found == origins.end() || *found != origin) continue;
+    sorted.push_back({static_cast<std::uint32_t>(found - origins.begin()),
+                      SheetData::key(voxelOf(at), GridSimplices::slotOf(entries[n].key)), n});
+  }
+  std::sort(sorted.begin(), sorted.end());
+  first.assign(origins.size() + 1, 0);
+  for (const PlacedKey& entry : sorted) ++first[entry.block + 1];
+  for (std::size_t b = 0; b < origins.size(); ++b) first[b + 1] += first[b];
+  return sorted;
+}
+
+}  // namespace
+
+SheetBuilder::SheetBuilder(const std::vector<V3d>& points,
+                           const std::vector<std::array<std::uint32_t, 3>>& triangles,
+                           const GridSimplices& simplices,
+                           const std::vector<GridCrossing>& crossings,
+                           const SheetFeatures& features, LabelAt labelAt)
+    : points_(points),
+      triangles_(triangles),
+      simplices_(simplices),
+      crossings_(crossings),
+      features_(features),
+      labelAt_(std::move(labelAt)) {}
+
+std::shared_ptr<const SheetData> SheetBuilder::run(const std::vector<V3i>& origins) {
+  chooseEdges();
+  placeEdges();
+  placeFaces();
+  placeInside();
+  const auto data = std::make_shared<SheetData>();
+  for (const PlacedKey& entry : sortByBlock(edges_, simplices_, origins, data->firstEdge)) {
+    data->edges.push_back(entry.key);
+    data->positions.push_back(static_cast<float>(edges_[entry.index].position));
+  }
+  for (const PlacedKey& entry : sortByBlock(placed_, simplices_, origins, data->firstPoint)) {
+    data->pointKeys.push_back(entry.key);
+    data->points.emplace_back(placed_[entry.index].offset);
+  }
+  std::sort(owners_.begin(), owners_.end());
+  owners_.erase(std::unique(owners_.begin(), owners_.end()), owners_.end());
+  data->owners = owners_;
+  return data;
+}
+
+bool SheetBuilder::isBlocked(const V3i& at, std::uint32_t step) const {
+  const SimplexKey key = simplices_.key(at, kuhn::edgeSlot(step));
+  const auto found =
+      std::lower_bound(crossings_.begin(), crossings_.end(), key,
+                       [](const GridCrossing& a, SimplexKey b) { return a.edge < b; });
+  return found != crossings_.end() && found->edge == key;
+}
+
+bool SheetBuilder::areConnectedNearby(const V3i& at, std::uint32_t step) const {
+  // Grid points up to one beyond the cell of the edge.
+  constexpr int kSide = 4;
+  const V3i low = at - V3i(1);
+  const auto indexOf = [&](const V3i& p) {
+    const V3i q = p - low;
+    return static_cast<std::size_t>((q.x * kSide + q.y) * kSide + q.z);
+  };
+  const auto isNear = [&](const V3i& p) {
+    const V3i q = p - low;
+    return std::min({q.x, q.y, q.z}) >= 0 && std::max({q.x, q.y, q.z}) < kSide;
+  };
+  std::array<bool, kSide * kSide * kSide> isReached{};
+  std::vector<V3i> reached = {at};
+  isReached[indexOf(at)] = true;
+  const std::size_t target = indexOf(at + offsetOfCorner(step));
+  for (std::size_t n = 0; n < reached.size() && !isReached[target]; ++n)
+    for (std::uint32_t s = 1; s < 8; ++s)
+      for (const int sign : {1, -1}) {
+        const V3i from = reached[n], to = from + offsetOfCorner(s) * sign;
+        if (!isNear(to) || isReached[indexOf(to)] || isBlocked(sign > 0 ? from : to, s)) continue;
+        isReached[indexOf(to)] = true;
+        reached.push_back(to);
+      }
+  return isReached[target];
+}
+
+void SheetBuilder::chooseEdges() {
+  std::vector<std::size_t> firsts;
+  for (std::size_t n = 0; n < crossings_.size(); ++n)
+    if (n == 0 || crossings_[n].edge != crossings_[n - 1].edge) firsts.push_back(n);
+  firsts.push_back(crossings_.size());
+  const std::size_t count = firsts.size() - 1;
+  std::vector<char> isCrossed(count), isInside(count);
+  std::vector<std::uint16_t> labels(count);
+  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t e) {
+    const SimplexKey key = crossings_[firsts[e]].edge;
+    const V3i at = simplices_.pointOf(key);
+    const std::uint32_t step = GridSimplices::slotOf(key) + 1;
+    labels[e] = labelAt_(at);
+    isInside[e] = labels[e] == labelAt_(at + offsetOfCorner(step));
+    // A line that enters a solid beside its edge and leaves it again separates nothing.
+    const bool isEven = (firsts[e + 1] - firsts[e]) % 2 == 0;
+    isCrossed[e] = !(isInside[e] && isEven && areConnectedNearby(at, step));
+  });
+  for (std::size_t e = 0; e < count; ++e) {
+    if (!isCrossed[e]) continue;
+    const GridCrossing &first = crossings_[firsts[e]], &last = crossings_[firsts[e + 1] - 1];
+    edges_.push_back({first.edge, (first.position + last.position) / 2, firsts[e + 1] - firsts[e] > 1});
+    if (isInside[e]) owners_.push_back(labels[e]);
+  }
+}
+
+const SheetBuilder::CrossedEdge* SheetBuilder::find(const V3i& at, std::uint32_t step) const {
+  const SimplexKey key = simplices_.key(at, kuhn::edgeSlot(step));
+  const auto found = std::lower_bound(edges_.begin(), edges_.end(), key,
+                                      [](const CrossedEdge& a, SimplexKey b) { return a.key < b; });
+  return found != edges_.end() && found->key == key ? &*found : nullptr;
+}
+
+void SheetBuilder::placeEdges() {
+  for (const CrossedEdge& edge : edges_) {
+    if (!edge.isMultiple) continue;
+    const V3d low(simplices_.pointOf(edge.key)),
+        along(offsetOfCorner(GridSimplices::slotOf(edge.key) + 1));
+    const auto point = features_.closest(SheetFeatures::Kind::Junction, low + along * edge.position);
+    if (point) placed_.push_back({edge.key, *point - low});
+  }
+}
+
+void SheetBuilder::placeFaces() {
+  // Faces with a crossed edge: as their lower, upper or longest edge.
+  std::vector<SimplexKey> faces;
+  for (const CrossedEdge& edge : edges_) {
+    const V3i at = simplices_.pointOf(edge.key);
+    const std::uint32_t step = GridSimplices::slotOf(edge.key) + 1;
+    for (const kuhn::FaceSteps& face : kuhn::kFaces) {
+      const std::uint32_t slot = kuhn::faceSlot(face.middle, face.upper);
+      if (face.middle == step || face.upper == step) faces.push_back(simplices_.key(at, slot));
+      if ((face.middle ^ face.upper) == step)
+        faces.push_back(simplices_.key(at - offsetOfCorner(face.middle), slot));
+    }
+  }
+  tbb::parallel_sort(faces.begin(), faces.end());
+  faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
+  std::vector<std::optional<V3d>> found(faces.size());
+  tbb::parallel_for(std::size_t{0}, faces.size(), [&](std::size_t n) {
+    const V3i at = simplices_.pointOf(faces[n]);
+    const kuhn::FaceSteps& face = kuhn::kFaces[GridSimplices::slotOf(faces[n]) - 7];
+    const V3i middle = at + offsetOfCorner(face.middle);
+    const std::array<const CrossedEdge*, 3> edges = {
+        find(at, face.middle), find(at, face.upper), find(middle, face.middle ^ face.upper)};
+    std::uint32_t count = 0;
+    V3d mean(0);
+    for (const CrossedEdge* edge : edges) {
+      if (!edge) continue;
+      ++count;
+      mean += V3d(simplices_.pointOf(edge->key)) +
+              V3d(offsetOfCorner(GridSimplices::slotOf(edge->key) + 1)) * edge->position;
+    }
+    if (!holdsFaceNode(count)) return;
+    found[n] = features_.onFace(
+        count == 1 ? SheetFeatures::Kind::Rim : SheetFeatures::Kind::Junction,
+        {V3d(at), V3d(middle), V3d(at + offsetOfCorner(face.upper))}, mean / count);
+  });
+  for (std::size_t n = 0; n < faces.size(); ++n)
+    if (found[n]) placed_.push_back({faces[n], *found[n] - V3d(simplices_.pointOf(faces[n]))});
+}
+
+void SheetBuilder::placeInside() {
+  const auto place = [&](const V3d& p) {
+    V3i cell;
+    std::array<std::pair<double, int>, 3> order;
+    for (int axis = 0; axis < 3; ++axis) {
+      // The grid is moved by an infinitesimal distance, so a point on it lies below.
+      cell[axis] = static_cast<int>(std::ceil(p[axis])) - 1;
+      order[static_cast<std::size_t>(axis)] = {cell[axis] - p[axis], -axis};
+    }
+    std::sort(order.begin(), order.end());
+    std::array<std::uint32_t, 4> chain{};
+    for (std::size_t n = 0; n < 3; ++n) chain[n + 1] = chain[n] | 4u >> -order[n].second;
+    const auto found = std::find(kuhn::kTetrahedra.begin(), kuhn::kTetrahedra.end(), chain);
+    placed_.push_back({simplices_.key(cell, kuhn::tetrahedronSlot(static_cast<std::size_t>(
+                                                found - kuhn::kTetrahedra.begin()))),
+                       p - V3d(cell)});
+  };
+  const std::size_t first = placed_.size();
+  for (const V3d& p : features_.ends()) place(p);
+  for (const V3d& p : features_.corners()) place(p);
+  const auto from = placed_.begin() + static_cast<std::ptrdiff_t>(first);
+  std::stable_sort(from, placed_.end(), [](const auto& a, const auto& b) { return a.key < b.key; });
+  placed_.erase(std::unique(from, placed_.end(),
+                            [](const auto& a, const auto& b) { return a.key == b.key; }),
+                placed_.end());
+}
+
+std::vector<NarrowGap> SheetBuilder::narrowGaps() const {
+  constexpr double kLeastSlope = 0.5;     // of a surface to the line
+  constexpr double kLeastParallel = 0.9;  // cosine of the angle of both surfaces
+  struct OnLine {
+    int axis;
+    V3i line;  ///< coordinates across, with 0 along the axis
+    double at;
+    SimplexKey edge;
+    std::uint32_t triangle;
+  };
+  std::vector<OnLine> all;
+  for (const GridCrossing& crossing : crossings_) {
+    const std::uint32_t step = GridSimplices::slotOf(crossing.edge) + 1;
+    if (step != 1 && step != 2 && step != 4) continue;
+    const int axis = step == 4 ? 0 : step == 2 ? 1 : 2;
+    V3i line = simplices_.pointOf(crossing.edge);
+    const double at = line[axis] + crossing.position;
+    line[axis] = 0;
+    all.push_back({axis, line, at, crossing.edge, crossing.triangle});
+  }
+  std::sort(all.begin(), all.end(), [](const OnLine& a, const OnLine& b) {
+    return std::tie(a.axis, a.line.x, a.line.y, a.line.z, a.at, a.triangle) <
+           std::tie(b.axis, b.line.x, b.line.y, b.line.z, b.at, b.triangle);
+  });
+  const auto normalOf = [&](std::uint32_t t) {
+    const V3d &a = points_[triangles_[t][0]], &b = points_[triangles_[t][1]],
+              &c = points_[triangles_[t][2]];
+    return (b - a).cross(c - a).normalized();
+  };
+  std::vector<NarrowGap> gaps;
+  for (std::size_t n = 1; n < all.size(); ++n) {
+    const OnLine &a = all[n - 1], &b = all[n];
+    if (a.axis != b.axis || a.line != b.line || b.at - a.at >= 2) continue;
+    const V3d u = normalOf(a.triangle), v = normalOf(b.triangle);
+    const double slope = std::min(std::abs(u[a.axis]), std::abs(v[a.axis]));
+    if (slope < kLeastSlope || std::abs(u ^ v) < kLeastParallel) continue;
+    NarrowGap gap;
+    gap.thickness = (b.at - a.at) * slope;
+    if (gap.thickness >= 1) continue;
+    gap.isLost = a.edge == b.edge;
+    // The upper end of the first edge lies between them, if a grid point does.
+    V3i between = simplices_.pointOf(a.edge);
+    if (!gap.isLost) between[a.axis] += 1;
+    gap.label = labelAt_(between);
+    gap.position = V3d(a.line);
+    gap.position[a.axis] = (a.at + b.at) / 2;
+    gaps.push_back(gap);
+  }
+  return gaps;
+}
+
+}  // namespace levelset
