@@ -36,7 +36,8 @@ struct SegmentedMeasurement {
 };
 
 /// Measures the regions and interfaces of a partition on its mesh, exactly for the flat triangles.
-/// Volumes and areas converge with second order. Sums run in a fixed order.
+/// Volumes and areas converge with second order. Sums run in a fixed order. Strips without width
+/// have no area, and the junction curves on both sides of a strip count once.
 [[nodiscard]] SegmentedMeasurement measureSegmented(const SegmentedMesh& mesh);
 [[nodiscard]] SegmentedMeasurement measureSegmented(const SegmentedField& field,
                                                     const SegmentedMeshOptions& options = {});

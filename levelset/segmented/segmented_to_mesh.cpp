@@ -41,6 +41,7 @@ struct MeshBlock {
   std::vector<TriangleSides> sides;
   std::vector<JunctionEdge> junctions;
   std::vector<std::array<std::uint32_t, 2>> rims;
+  std::vector<std::uint32_t> strips;  ///< by triangle of the block
   std::vector<std::uint32_t> points;
 };
 
@@ -575,11 +576,12 @@ class SegmentedMesher {
       std::array<RegionLabel, 8> l;
       for (kuhn::Corner c = 0; c < 8; ++c) l[c] = reader.label(origin + cut.local + cornerOffset(c));
       for (cut.tetrahedron = 0; cut.tetrahedron < 6; ++cut.tetrahedron)
-        addSurfaces(cut, crossings.cut(cut.local, cut.tetrahedron), labelsOf(cut.tetrahedron, l));
+        addSurfaces(reader, cut, crossings.cut(cut.local, cut.tetrahedron),
+                    labelsOf(cut.tetrahedron, l));
     }
   }
 
-  void addSurfaces(const Cut& cut, const CutTetrahedron& surfaces,
+  void addSurfaces(SegmentedReader& reader, const Cut& cut, const CutTetrahedron& surfaces,
                    const std::array<RegionLabel, 4>& l) const {
     const auto vertexOf = [&](CutTetrahedron::Node node) {
       if (node == CutTetrahedron::kInside) return cut.inside().vertex;
@@ -594,7 +596,11 @@ class SegmentedMesher {
       const RegionLabel from = l[polygon.from], to = l[polygon.to];
       // Odd tetrahedra are mirrored; normals point to the smaller label.
       if ((cut.tetrahedron % 2 == 1) != (from < to)) std::reverse(vertices.begin(), vertices.end());
+      const auto first = static_cast<std::uint32_t>(cut.block.triangles.size());
       addPolygon(cut.block, vertices, {std::max(from, to), std::min(from, to)});
+      if (!isStrip(reader, cut, polygon)) continue;
+      for (std::uint32_t t = first; t < cut.block.triangles.size(); ++t)
+        cut.block.strips.push_back(t);
     }
     for (const auto& rim : surfaces.rims)
       cut.block.rims.push_back({vertexOf(rim[0]), vertexOf(rim[1])});
@@ -608,6 +614,19 @@ class SegmentedMesher {
           {{vertexOf(junction.nodes[0]), vertexOf(junction.nodes[1])}, labels});
     }
     if (surfaces.isJunctionPoint) cut.block.points.push_back(cut.inside().vertex);
+  }
+
+  /// Returns true if all edges that a polygon crosses have their crossing on a junction.
+  bool isStrip(SegmentedReader& reader, const Cut& cut,
+               const CutTetrahedron::Polygon& polygon) const {
+    return std::all_of(polygon.nodes.begin(), polygon.nodes.end(), [&](CutTetrahedron::Node node) {
+      if (node >= CutTetrahedron::kFirstFace) return true;
+      const auto [i, j] = CutTetrahedron::kEdges[node];
+      const kuhn::Corner low = cut.corners()[i], high = cut.corners()[j];
+      return storedPoint(reader, originOf(cut.block) + cut.local + cornerOffset(low),
+                         kuhn::edgeSlot(low ^ high))
+          .has_value();
+    });
   }
 
   /// Adds a polygon as a fan from the vertex with the shortest diagonals.
@@ -654,6 +673,9 @@ class SegmentedMesher {
       from = {};
     };
     for (MeshBlock& block : blocks_) {
+      for (std::uint32_t& triangle : block.strips)
+        triangle += static_cast<std::uint32_t>(result_.mesh.triangles.size());
+      move(block.strips, result_.strips);
       move(block.triangles, result_.mesh.triangles);
       move(block.sides, result_.sides);
       move(block.junctions, result_.junctions);

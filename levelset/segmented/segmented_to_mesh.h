@@ -39,6 +39,9 @@ struct SegmentedMesh {
   std::vector<TriangleSides> sides;
   std::vector<JunctionEdge> junctions;  ///< junction curves
   std::vector<std::array<std::uint32_t, 2>> rims;  ///< edges where a sheet ends: of one triangle
+  /// Triangles of strips without width, ascending. Where more than three sheets meet in a line, as
+  /// the pages of a book, strips along that line join junction curves of three sheets each.
+  std::vector<std::uint32_t> strips;
   /// Vertices where four regions meet, and the ends of junction curves are joined.
   std::vector<std::uint32_t> junctionPoints;
 };

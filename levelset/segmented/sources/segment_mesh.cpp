@@ -10,6 +10,7 @@
 #include <limits>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <span>
 #include <tuple>
 #include <utility>
@@ -385,8 +386,14 @@ class MeshRegions {
     listPairsWithSheets(simplices, crossings, isCrossing);
     findClosestInterfaces();
     const SheetFeatures features(points_, mesh_.triangles, pairs);
-    SheetBuilder builder(points_, mesh_.triangles, simplices, crossings, features,
-                         [&](const V3i& at) { return labelAt(Coord(at.x, at.y, at.z)); });
+    SheetBuilder builder(
+        points_, mesh_.triangles, simplices, crossings, features,
+        [&](const V3i& at) { return labelAt(Coord(at.x, at.y, at.z)); },
+        [&](std::uint32_t t, int side) -> std::optional<RegionLabel> {
+          const std::uint32_t set = setOfSide(t, side > 0);
+          if (isCrossing[t] || !holdsPoints_[set]) return std::nullopt;
+          return labels_[set];
+        });
     std::vector<V3i> origins;
     for (const auto* leaf : leaves_)
       origins.emplace_back(leaf->origin()[0], leaf->origin()[1], leaf->origin()[2]);
@@ -476,13 +483,16 @@ class MeshRegions {
                            const std::vector<GridCrossing>& crossings,
                            const std::vector<bool>& isCrossing) {
     using Entry = std::pair<std::uint32_t, std::pair<RegionLabel, RegionLabel>>;
-    std::vector<char> holdsPoints(sets_.size());
-    for (std::uint32_t n = 0; n < leaves_.size() * 512; ++n) holdsPoints[sets_.find(n)] = true;
+    // For all numbers, so that threads only read.
+    std::vector<char> holds(sets_.size());
+    for (std::uint32_t n = 0; n < leaves_.size() * 512; ++n) holds[sets_.find(n)] = true;
+    holdsPoints_.resize(sets_.size());
+    for (std::uint32_t n = 0; n < sets_.size(); ++n) holdsPoints_[n] = holds[sets_.find(n)];
     std::vector<Entry> entries;
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
       const std::uint32_t behind = setOfSide(t, false), front = setOfSide(t, true);
-      if (!isCrossing[t] && labels_[behind] != labels_[front] && holdsPoints[sets_.find(behind)] &&
-          holdsPoints[sets_.find(front)])
+      if (!isCrossing[t] && labels_[behind] != labels_[front] && holdsPoints_[behind] &&
+          holdsPoints_[front])
         entries.push_back({t, std::minmax(labels_[behind], labels_[front])});
     }
     for (std::size_t n = 0; n < crossings.size(); ++n) {
@@ -659,6 +669,7 @@ class MeshRegions {
   std::vector<std::pair<Coord, std::uint32_t>> near_;
   DisjointSets sets_;
   std::vector<RegionLabel> labels_;
+  std::vector<char> holdsPoints_;  ///< by number: grid points belong to its set
 };
 
 }  // namespace

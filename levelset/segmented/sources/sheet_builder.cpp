@@ -20,6 +20,8 @@ using Imath::V3d;
 using Imath::V3i;
 using SimplexKey = GridSimplices::Key;
 
+constexpr double kEndReach = 1.5;  // voxels: of ends and corners from the middle of a tetrahedron
+
 bool isBelow(const V3i& a, const V3i& b) {
   return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
 }
@@ -69,19 +71,23 @@ SheetBuilder::SheetBuilder(const std::vector<V3d>& points,
                            const std::vector<std::array<std::uint32_t, 3>>& triangles,
                            const GridSimplices& simplices,
                            const std::vector<GridCrossing>& crossings,
-                           const SheetFeatures& features, LabelAt labelAt)
+                           const SheetFeatures& features, LabelAt labelAt,
+                           LabelOfSide labelOfSide)
     : points_(points),
       triangles_(triangles),
       simplices_(simplices),
       crossings_(crossings),
       features_(features),
-      labelAt_(std::move(labelAt)) {}
+      labelAt_(std::move(labelAt)),
+      labelOfSide_(std::move(labelOfSide)) {}
 
 std::shared_ptr<const SheetData> SheetBuilder::run(const std::vector<V3i>& origins) {
   chooseEdges();
   placeEdges();
   placeFaces();
-  placeInside();
+  placeEnds();
+  placeCorners();
+  placed_.insert(placed_.end(), faces_.begin(), faces_.end());
   const auto data = std::make_shared<SheetData>();
   for (const PlacedKey& entry : sortByBlock(edges_, simplices_, origins, data->firstEdge)) {
     data->edges.push_back(entry.key);
@@ -132,6 +138,19 @@ bool SheetBuilder::areConnectedNearby(const V3i& at, std::uint32_t step) const {
   return isReached[target];
 }
 
+/// Returns true if a line stays in one region between its crossings, or in places without grid
+/// points: it crosses sheets, or parts that are thinner than a voxel.
+bool SheetBuilder::isBetweenSheets(std::size_t first, std::size_t last, std::uint16_t label) const {
+  for (std::size_t n = first; n < last; ++n) {
+    const auto& t = triangles_[crossings_[n].triangle];
+    const int side = perturbedSide({points_[t[0]], points_[t[1]], points_[t[2]]},
+                                   simplices_.pointOf(crossings_[n].edge));
+    const auto beyond = labelOfSide_(crossings_[n].triangle, -side);
+    if (beyond && *beyond != label) return false;
+  }
+  return true;
+}
+
 void SheetBuilder::chooseEdges() {
   std::vector<std::size_t> firsts;
   for (std::size_t n = 0; n < crossings_.size(); ++n)
@@ -147,14 +166,16 @@ void SheetBuilder::chooseEdges() {
     labels[e] = labelAt_(at);
     isInside[e] = labels[e] == labelAt_(at + offsetOfCorner(step));
     // A line that enters a solid beside its edge and leaves it again separates nothing.
-    const bool isEven = (firsts[e + 1] - firsts[e]) % 2 == 0;
-    isCrossed[e] = !(isInside[e] && isEven && areConnectedNearby(at, step));
+    isCrossed[e] = !isInside[e] || firsts[e + 1] - firsts[e] == 1 ||
+                   isBetweenSheets(firsts[e], firsts[e + 1] - 1, labels[e]) ||
+                   !areConnectedNearby(at, step);
   });
   for (std::size_t e = 0; e < count; ++e) {
     if (!isCrossed[e]) continue;
     const GridCrossing &first = crossings_[firsts[e]], &last = crossings_[firsts[e + 1] - 1];
-    edges_.push_back({first.edge, (first.position + last.position) / 2, firsts[e + 1] - firsts[e] > 1});
-    if (isInside[e]) owners_.push_back(labels[e]);
+    const bool isMultiple = firsts[e + 1] - firsts[e] > 1;
+    edges_.push_back({first.edge, (first.position + last.position) / 2, isMultiple});
+    if (isInside[e] && !isMultiple) owners_.push_back(labels[e]);
   }
 }
 
@@ -171,7 +192,13 @@ void SheetBuilder::placeEdges() {
     const V3d low(simplices_.pointOf(edge.key)),
         along(offsetOfCorner(GridSimplices::slotOf(edge.key) + 1));
     const auto point = features_.closest(SheetFeatures::Kind::Junction, low + along * edge.position);
-    if (point) placed_.push_back({edge.key, *point - low});
+    if (point) {
+      placed_.push_back({edge.key, *point - low});
+    } else if (const std::uint16_t label = labelAt_(simplices_.pointOf(edge.key));
+               label == labelAt_(simplices_.pointOf(edge.key) +
+                                 offsetOfCorner(GridSimplices::slotOf(edge.key) + 1))) {
+      owners_.push_back(label);
+    }
   }
 }
 
@@ -191,6 +218,7 @@ void SheetBuilder::placeFaces() {
   tbb::parallel_sort(faces.begin(), faces.end());
   faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
   std::vector<std::optional<V3d>> found(faces.size());
+  std::vector<char> isJunction(faces.size());
   tbb::parallel_for(std::size_t{0}, faces.size(), [&](std::size_t n) {
     const V3i at = simplices_.pointOf(faces[n]);
     const kuhn::FaceSteps& face = kuhn::kFaces[GridSimplices::slotOf(faces[n]) - 7];
@@ -206,39 +234,116 @@ void SheetBuilder::placeFaces() {
               V3d(offsetOfCorner(GridSimplices::slotOf(edge->key) + 1)) * edge->position;
     }
     if (!holdsFaceNode(count)) return;
+    isJunction[n] = count == 3;
     found[n] = features_.onFace(
         count == 1 ? SheetFeatures::Kind::Rim : SheetFeatures::Kind::Junction,
         {V3d(at), V3d(middle), V3d(at + offsetOfCorner(face.upper))}, mean / count);
   });
-  for (std::size_t n = 0; n < faces.size(); ++n)
-    if (found[n]) placed_.push_back({faces[n], *found[n] - V3d(simplices_.pointOf(faces[n]))});
+  for (std::size_t n = 0; n < faces.size(); ++n) {
+    if (found[n]) faces_.push_back({faces[n], *found[n] - V3d(simplices_.pointOf(faces[n]))});
+    if (isJunction[n]) junctionFaces_.push_back(faces[n]);
+  }
 }
 
-void SheetBuilder::placeInside() {
-  const auto place = [&](const V3d& p) {
-    V3i cell;
-    std::array<std::pair<double, int>, 3> order;
-    for (int axis = 0; axis < 3; ++axis) {
-      // The grid is moved by an infinitesimal distance, so a point on it lies below.
-      cell[axis] = static_cast<int>(std::ceil(p[axis])) - 1;
-      order[static_cast<std::size_t>(axis)] = {cell[axis] - p[axis], -axis};
+std::uint32_t SheetBuilder::crossedEdges(const V3i& cell, std::size_t tetrahedron) const {
+  std::uint32_t crossed = 0;
+  for (std::size_t e = 0; e < CutTetrahedron::kEdges.size(); ++e) {
+    const auto [i, j] = CutTetrahedron::kEdges[e];
+    const kuhn::Corner low = kuhn::kTetrahedra[tetrahedron][i],
+                       high = kuhn::kTetrahedra[tetrahedron][j];
+    if (find(cell + offsetOfCorner(low), low ^ high)) crossed |= 1u << e;
+  }
+  return crossed;
+}
+
+/// Mean of the points on the faces of a tetrahedron, if there are any.
+std::optional<V3d> SheetBuilder::meanOfFaces(const V3i& cell, std::size_t tetrahedron) const {
+  V3d sum(0);
+  int count = 0;
+  for (std::size_t opposite = 0; opposite < 4; ++opposite) {
+    std::array<kuhn::Corner, 3> chain{};
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < 4; ++i)
+      if (i != opposite) chain[n++] = kuhn::kTetrahedra[tetrahedron][i];
+    const SimplexKey key =
+        simplices_.key(cell + offsetOfCorner(chain[0]),
+                       kuhn::faceSlot(chain[1] ^ chain[0], chain[2] ^ chain[0]));
+    const auto face =
+        std::lower_bound(faces_.begin(), faces_.end(), key,
+                         [](const PlacedPoint& a, SimplexKey b) { return a.key < b; });
+    if (face == faces_.end() || face->key != key) continue;
+    sum += V3d(simplices_.pointOf(key)) + face->offset;
+    ++count;
+  }
+  return count > 0 ? std::optional(sum / count) : std::nullopt;
+}
+
+void SheetBuilder::placeEnds() {
+  std::vector<SimplexKey> tetrahedra;
+  for (const SimplexKey face : junctionFaces_) {
+    const kuhn::FaceSteps& steps = kuhn::kFaces[GridSimplices::slotOf(face) - 7];
+    for (kuhn::Corner low = 0; low < 8; ++low) {
+      if (low & steps.upper) continue;
+      for (std::size_t t = 0; t < 6; ++t) {
+        const auto& chain = kuhn::kTetrahedra[t];
+        const auto holds = [&](kuhn::Corner corner) {
+          return std::find(chain.begin(), chain.end(), corner) != chain.end();
+        };
+        if (holds(low) && holds(low | steps.middle) && holds(low | steps.upper))
+          tetrahedra.push_back(simplices_.key(simplices_.pointOf(face) - offsetOfCorner(low),
+                                              kuhn::tetrahedronSlot(t)));
+      }
     }
-    std::sort(order.begin(), order.end());
-    std::array<std::uint32_t, 4> chain{};
-    for (std::size_t n = 0; n < 3; ++n) chain[n + 1] = chain[n] | 4u >> -order[n].second;
-    const auto found = std::find(kuhn::kTetrahedra.begin(), kuhn::kTetrahedra.end(), chain);
-    placed_.push_back({simplices_.key(cell, kuhn::tetrahedronSlot(static_cast<std::size_t>(
-                                                found - kuhn::kTetrahedra.begin()))),
-                       p - V3d(cell)});
-  };
-  const std::size_t first = placed_.size();
-  for (const V3d& p : features_.ends()) place(p);
-  for (const V3d& p : features_.corners()) place(p);
-  const auto from = placed_.begin() + static_cast<std::ptrdiff_t>(first);
-  std::stable_sort(from, placed_.end(), [](const auto& a, const auto& b) { return a.key < b.key; });
-  placed_.erase(std::unique(from, placed_.end(),
-                            [](const auto& a, const auto& b) { return a.key == b.key; }),
-                placed_.end());
+  }
+  std::sort(tetrahedra.begin(), tetrahedra.end());
+  tetrahedra.erase(std::unique(tetrahedra.begin(), tetrahedra.end()), tetrahedra.end());
+  for (const SimplexKey key : tetrahedra) {
+    const V3i cell = simplices_.pointOf(key);
+    const std::size_t t = GridSimplices::slotOf(key) - kuhn::tetrahedronSlot(0);
+    if (!cutTetrahedron(crossedEdges(cell, t), false).hasInside) continue;
+    const auto mean = meanOfFaces(cell, t);
+    if (!mean) continue;
+    std::optional<V3d> best;
+    double least = kEndReach;
+    for (const V3d& end : features_.ends()) {
+      if ((end - *mean).length() >= least) continue;
+      least = (end - *mean).length();
+      best = end;
+    }
+    if (!best) best = features_.closest(SheetFeatures::Kind::Junction, *mean);
+    if (best) placed_.push_back({key, *best - V3d(cell)});
+  }
+}
+
+void SheetBuilder::placeCorners() {
+  std::vector<SimplexKey> taken;
+  for (const V3d& p : features_.corners()) {
+    // The sheet may end at the corner without crossing an edge of its tetrahedron. The nearest
+    // tetrahedron with a rim takes it then.
+    V3i centre;
+    for (int axis = 0; axis < 3; ++axis) centre[axis] = static_cast<int>(std::floor(p[axis]));
+    std::optional<SimplexKey> best;
+    double least = kEndReach;
+    V3i cell;
+    for (cell.x = centre.x - 1; cell.x <= centre.x + 1; ++cell.x)
+      for (cell.y = centre.y - 1; cell.y <= centre.y + 1; ++cell.y)
+        for (cell.z = centre.z - 1; cell.z <= centre.z + 1; ++cell.z)
+          for (std::size_t t = 0; t < 6; ++t) {
+            const std::uint32_t crossed = crossedEdges(cell, t);
+            if (crossed == 0) continue;
+            const CutTetrahedron& cut = cutTetrahedron(crossed, false);
+            if (cut.hasInside || cut.rims.size() != 1) continue;
+            const auto mean = meanOfFaces(cell, t);
+            if (!mean || (*mean - p).length() >= least) continue;
+            const SimplexKey key = simplices_.key(cell, kuhn::tetrahedronSlot(t));
+            if (std::find(taken.begin(), taken.end(), key) != taken.end()) continue;
+            least = (*mean - p).length();
+            best = key;
+          }
+    if (!best) continue;
+    taken.push_back(*best);
+    placed_.push_back({*best, p - V3d(simplices_.pointOf(*best))});
+  }
 }
 
 std::vector<NarrowGap> SheetBuilder::narrowGaps() const {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "levelset/segmented/local/sheet_data.h"
@@ -27,13 +28,15 @@ struct NarrowGap {
 class SheetBuilder {
  public:
   using LabelAt = std::function<std::uint16_t(const Imath::V3i&)>;
+  /// Label of a side of a triangle: 1 in front, −1 behind. Empty if no grid point lies there.
+  using LabelOfSide = std::function<std::optional<std::uint16_t>(std::uint32_t triangle, int side)>;
 
   /// @param points  vertices, voxels
   /// @param crossings  as from findGridCrossings(), all of the mesh
   SheetBuilder(const std::vector<Imath::V3d>& points,
                const std::vector<std::array<std::uint32_t, 3>>& triangles,
                const GridSimplices& simplices, const std::vector<GridCrossing>& crossings,
-               const SheetFeatures& features, LabelAt labelAt);
+               const SheetFeatures& features, LabelAt labelAt, LabelOfSide labelOfSide);
 
   /// @param origins  of all blocks of the field, by x, y, z
   [[nodiscard]] std::shared_ptr<const SheetData> run(const std::vector<Imath::V3i>& origins);
@@ -52,12 +55,18 @@ class SheetBuilder {
   };
 
   void chooseEdges();
+  [[nodiscard]] bool isBetweenSheets(std::size_t first, std::size_t last,
+                                     std::uint16_t label) const;
   [[nodiscard]] bool isBlocked(const Imath::V3i& at, std::uint32_t step) const;
   [[nodiscard]] bool areConnectedNearby(const Imath::V3i& at, std::uint32_t step) const;
   [[nodiscard]] const CrossedEdge* find(const Imath::V3i& at, std::uint32_t step) const;
   void placeEdges();
   void placeFaces();
-  void placeInside();
+  void placeEnds();
+  void placeCorners();
+  [[nodiscard]] std::uint32_t crossedEdges(const Imath::V3i& cell, std::size_t tetrahedron) const;
+  [[nodiscard]] std::optional<Imath::V3d> meanOfFaces(const Imath::V3i& cell,
+                                                      std::size_t tetrahedron) const;
 
   const std::vector<Imath::V3d>& points_;
   const std::vector<std::array<std::uint32_t, 3>>& triangles_;
@@ -65,7 +74,10 @@ class SheetBuilder {
   const std::vector<GridCrossing>& crossings_;
   const SheetFeatures& features_;
   LabelAt labelAt_;
+  LabelOfSide labelOfSide_;
   std::vector<CrossedEdge> edges_;
+  std::vector<GridSimplices::Key> junctionFaces_;  ///< with three crossed edges
+  std::vector<PlacedPoint> faces_;                 ///< points on faces, ascending
   std::vector<PlacedPoint> placed_;
   std::vector<std::uint16_t> owners_;
 };
