@@ -29,8 +29,8 @@ double lengthOfJunctions(const SegmentedMesh& segmented) {
   std::vector<Edge> borders;
   for (const std::uint32_t t : segmented.strips)
     for (std::size_t k = 0; k < 3; ++k)
-      borders.push_back(std::minmax(segmented.mesh.triangles[t][k],
-                                    segmented.mesh.triangles[t][(k + 1) % 3]));
+      borders.push_back(
+          std::minmax(segmented.mesh.triangles[t][k], segmented.mesh.triangles[t][(k + 1) % 3]));
   std::sort(borders.begin(), borders.end());
   for (auto first = borders.begin(), last = first; first != borders.end(); first = last) {
     last = std::find_if(first, borders.end(), [&](const Edge& edge) { return edge != *first; });

@@ -11,8 +11,8 @@ namespace levelset {
 
 struct RegionMeasure {
   RegionLabel label = kVoid;
-  double volume = 0;  ///< world units³; 0 for the void, which has no bounds
-  double area = 0;    ///< area of its boundary to other regions, world units²
+  double volume = 0;     ///< world units³; 0 for the void, which has no bounds
+  double area = 0;       ///< area of its boundary to other regions, world units²
   double sheetArea = 0;  ///< area of the sheets inside, of one side each, world units²
   std::size_t triangles = 0;
   Imath::Box3d bounds = {};  ///< box of its boundary and sheets
@@ -25,13 +25,13 @@ struct InterfaceMeasure {
 };
 
 struct SegmentedMeasurement {
-  std::vector<RegionMeasure> regions;        ///< by label; the void first
+  std::vector<RegionMeasure> regions;  ///< by label; the void first
   /// By front, then behind. Sheets have the same label on both sides.
   std::vector<InterfaceMeasure> interfaces;
-  double volume = 0;                         ///< sum over all regions without the void
-  double area = 0;                           ///< sum over all interfaces and sheets
-  double junctionLength = 0;                 ///< length of all junction curves, world units
-  double rimLength = 0;                      ///< length of the rims of all sheets, world units
+  double volume = 0;          ///< sum over all regions without the void
+  double area = 0;            ///< sum over all interfaces and sheets
+  double junctionLength = 0;  ///< length of all junction curves, world units
+  double rimLength = 0;       ///< length of the rims of all sheets, world units
   std::size_t junctionPoints = 0, triangles = 0;
 };
 

@@ -63,8 +63,7 @@ Imath::Box3d boundsOfCrossings(const SegmentedData& data) {
   const SheetData& sheets = *data.sheets;
   for (std::size_t b = 0; b < data.blockCount(); ++b) {
     const auto add = [&](std::uint16_t key, const V3d& offset) {
-      const Coord at =
-          data.blocks[b].origin + SegmentedData::localOf(key / SheetData::kSlots);
+      const Coord at = data.blocks[b].origin + SegmentedData::localOf(key / SheetData::kSlots);
       box.extendBy(toImath(data.transform->indexToWorld(at.asVec3d() + toVdb(offset))));
     };
     for (std::size_t n = sheets.firstEdge[b]; n < sheets.firstEdge[b + 1]; ++n) {

@@ -59,8 +59,8 @@ class SegmentedField {
   /// Distances to further regions, stored near junctions.
   [[nodiscard]] std::size_t extraCount() const;
   [[nodiscard]] std::size_t memoryUse() const;  ///< bytes
-  /// Bounds of the interfaces and sheets, world units: box of all their crossings with edges between
-  /// neighbouring grid points. Empty when there are none.
+  /// Bounds of the interfaces and sheets, world units: box of all their crossings with edges
+  /// between neighbouring grid points. Empty when there are none.
   [[nodiscard]] Imath::Box3d interfaceBounds() const;
   /// Hash of transform, labels and distances.
   [[nodiscard]] std::uint64_t contentHash() const;

@@ -80,8 +80,8 @@ class CellCrossings {
       : sheets_(*data.sheets) {
     for (kuhn::Corner c = 0; c < 8; ++c) {
       const Coord offset = cornerOffset(c);
-      const std::int32_t block = reader.blockOf(
-          origin.offsetBy(8 * offset[0], 8 * offset[1], 8 * offset[2]));
+      const std::int32_t block =
+          reader.blockOf(origin.offsetBy(8 * offset[0], 8 * offset[1], 8 * offset[2]));
       if (c == 0) block_ = block;
       if (block < 0) continue;
       for (const std::uint16_t key : sheets_.edgesOf(static_cast<std::size_t>(block))) {
@@ -472,7 +472,9 @@ class SegmentedMesher {
     for (std::uint32_t voxel = 0; voxel < SegmentedData::kVoxels; ++voxel) {
       const Coord cell = SegmentedData::localOf(voxel);
       if (!crossings.hasCrossings(cell)) continue;
-      const auto add = [&](std::uint32_t slot) { block.keys.push_back(SheetData::key(voxel, slot)); };
+      const auto add = [&](std::uint32_t slot) {
+        block.keys.push_back(SheetData::key(voxel, slot));
+      };
       for (kuhn::Corner step = 1; step < 8; ++step)
         if (crossings.isCrossed(cell, 0, step)) add(kuhn::edgeSlot(step));
       for (const kuhn::FaceSteps& face : kuhn::kFaces)
@@ -502,9 +504,8 @@ class SegmentedMesher {
                                  std::uint32_t slot) const {
     const std::int32_t block = reader.blockOf(at);
     if (block < 0) return std::nullopt;
-    const Imath::V3f* point =
-        data_.sheets->pointOf(static_cast<std::size_t>(block),
-                              SheetData::key(SegmentedData::offsetOf(at), slot));
+    const Imath::V3f* point = data_.sheets->pointOf(
+        static_cast<std::size_t>(block), SheetData::key(SegmentedData::offsetOf(at), slot));
     return point ? std::optional(V3d(at[0], at[1], at[2]) + V3d(*point)) : std::nullopt;
   }
 
@@ -527,8 +528,8 @@ class SegmentedMesher {
     for (const auto& [low, high] : {std::pair(0u, face.middle), std::pair(0u, face.upper),
                                     std::pair(face.middle, face.upper)}) {
       if (!crossings.isCrossed(cell, low, high)) continue;
-      sum += placeOf(reader, crossings, origin, cell + cornerOffset(low),
-                     kuhn::edgeSlot(low ^ high));
+      sum +=
+          placeOf(reader, crossings, origin, cell + cornerOffset(low), kuhn::edgeSlot(low ^ high));
       ++count;
     }
     return sum / count;
@@ -574,7 +575,8 @@ class SegmentedMesher {
       cut.local = SegmentedData::localOf(voxel);
       if (!crossings.hasCrossings(cut.local)) continue;
       std::array<RegionLabel, 8> l;
-      for (kuhn::Corner c = 0; c < 8; ++c) l[c] = reader.label(origin + cut.local + cornerOffset(c));
+      for (kuhn::Corner c = 0; c < 8; ++c)
+        l[c] = reader.label(origin + cut.local + cornerOffset(c));
       for (cut.tetrahedron = 0; cut.tetrahedron < 6; ++cut.tetrahedron)
         addSurfaces(reader, cut, crossings.cut(cut.local, cut.tetrahedron),
                     labelsOf(cut.tetrahedron, l));
@@ -646,8 +648,8 @@ class SegmentedMesher {
       best = first;
     }
     for (std::size_t n = 1; n + 1 < count; ++n) {
-      block.triangles.push_back({vertices[best], vertices[(best + n) % count],
-                                 vertices[(best + n + 1) % count]});
+      block.triangles.push_back(
+          {vertices[best], vertices[(best + n) % count], vertices[(best + n + 1) % count]});
       block.sides.push_back(sides);
     }
   }

@@ -37,7 +37,7 @@ struct SegmentedMesh {
   /// For each triangle: front < behind, so solids face the void. Equal labels: the triangle belongs
   /// to a sheet. Triangles of a sheet that can be oriented face the same way.
   std::vector<TriangleSides> sides;
-  std::vector<JunctionEdge> junctions;  ///< junction curves
+  std::vector<JunctionEdge> junctions;             ///< junction curves
   std::vector<std::array<std::uint32_t, 2>> rims;  ///< edges where a sheet ends: of one triangle
   /// Triangles of strips without width, ascending. Where more than three sheets meet in a line, as
   /// the pages of a book, strips along that line join junction curves of three sheets each.

@@ -46,8 +46,7 @@ inline Frame tiltedFrame(const V3d& centre, double degrees) {
 /// @param u  around it, 0 to 1
 /// @param v  across it, −1 to 1
 inline V3d moebiusPoint(double width, double u, double v) {
-  const double a = 2 * std::numbers::pi * u,
-               r = 1 + width / 2 * v * std::cos(a / 2);
+  const double a = 2 * std::numbers::pi * u, r = 1 + width / 2 * v * std::cos(a / 2);
   return {r * std::cos(a), r * std::sin(a), width / 2 * v * std::sin(a / 2)};
 }
 inline TriMesh moebiusMesh(double width, const Frame& frame, unsigned around = 96,
@@ -111,7 +110,7 @@ struct SheetShape {
   std::size_t tornRims = 0;     ///< vertices with an odd number of them
   std::size_t components = 0;
   std::size_t wrongRims = 0;  ///< edges that are a border or in the list of rims, but not both
-  long euler = 0;             ///< of the whole mesh
+  long euler = 0;             ///< V − E + F of the whole mesh
   bool isOrientable = true;   ///< across edges of two triangles
 };
 

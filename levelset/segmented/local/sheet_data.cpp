@@ -30,7 +30,8 @@ const Imath::V3f* SheetData::pointOf(std::size_t block, std::uint16_t key) const
 }
 
 std::size_t SheetData::memoryUse() const {
-  return sizeof(SheetData) + (firstEdge.capacity() + firstPoint.capacity()) * sizeof(std::uint32_t) +
+  return sizeof(SheetData) +
+         (firstEdge.capacity() + firstPoint.capacity()) * sizeof(std::uint32_t) +
          (edges.capacity() + pointKeys.capacity() + owners.capacity()) * sizeof(std::uint16_t) +
          positions.capacity() * sizeof(float) + points.capacity() * sizeof(Imath::V3f);
 }

@@ -24,7 +24,7 @@ struct SheetData {
   /// Keys of simplices that hold a point of a rim or a junction, ascending in each block. An edge
   /// among them is crossed by several surfaces, which meet at that point or near it.
   std::vector<std::uint16_t> pointKeys;
-  std::vector<Imath::V3f> points;    ///< these points, voxels from the grid point
+  std::vector<Imath::V3f> points;     ///< these points, voxels from the grid point
   std::vector<std::uint16_t> owners;  ///< labels of the regions that have sheets inside, ascending
 
   [[nodiscard]] static std::uint16_t key(std::uint32_t voxel, std::uint32_t slot) {

@@ -105,12 +105,11 @@ std::vector<GridCrossing> findGridCrossings(
       V3i at;
       for (at[u] = low[u]; at[u] <= high[u]; ++at[u])
         for (at[v] = low[v]; at[v] <= high[v]; ++at[v]) {
-          const double height = c[0][along] - ((at[u] - c[0][u]) * normal[u] +
-                                               (at[v] - c[0][v]) * normal[v]) /
-                                                  normal[along];
-          const int first = std::max(
-                        low[along],
-                        static_cast<int>(std::ceil(height - 1 - slope - kMargin))),
+          const double height =
+              c[0][along] -
+              ((at[u] - c[0][u]) * normal[u] + (at[v] - c[0][v]) * normal[v]) / normal[along];
+          const int first = std::max(low[along],
+                                     static_cast<int>(std::ceil(height - 1 - slope - kMargin))),
                     last = std::min(high[along],
                                     static_cast<int>(std::floor(height + slope + kMargin)));
           for (at[along] = first; at[along] <= last; ++at[along]) {
@@ -133,11 +132,10 @@ std::vector<GridCrossing> findGridCrossings(
   std::vector<GridCrossing> crossings;
   crossings.reserve(count);
   for (const auto& part : found) crossings.insert(crossings.end(), part.begin(), part.end());
-  tbb::parallel_sort(crossings.begin(), crossings.end(),
-                     [](const GridCrossing& a, const GridCrossing& b) {
-                       return std::tie(a.edge, a.position, a.triangle) <
-                              std::tie(b.edge, b.position, b.triangle);
-                     });
+  tbb::parallel_sort(
+      crossings.begin(), crossings.end(), [](const GridCrossing& a, const GridCrossing& b) {
+        return std::tie(a.edge, a.position, a.triangle) < std::tie(b.edge, b.position, b.triangle);
+      });
   return crossings;
 }
 

@@ -477,8 +477,8 @@ class MeshRegions {
     return true;
   }
 
-  /// Lists the pairs of regions that each triangle separates. Where triangles cross each other, only
-  /// edges of the grid tell.
+  /// Lists the pairs of regions that each triangle separates. Where triangles cross each other,
+  /// only edges of the grid tell.
   void listPairsWithSheets(const GridSimplices& simplices,
                            const std::vector<GridCrossing>& crossings,
                            const std::vector<bool>& isCrossing) {
@@ -538,9 +538,9 @@ class MeshRegions {
 
   void addThinParts(const std::vector<NarrowGap>& gaps, std::vector<ThinPart>& parts) const {
     for (const NarrowGap& gap : gaps) {
-      auto part = std::lower_bound(
-          parts.begin(), parts.end(), gap.label,
-          [](const ThinPart& p, RegionLabel label) { return p.label < label; });
+      auto part =
+          std::lower_bound(parts.begin(), parts.end(), gap.label,
+                           [](const ThinPart& p, RegionLabel label) { return p.label < label; });
       if (part == parts.end() || part->label != gap.label) {
         part = parts.insert(part, ThinPart());
         part->label = gap.label;

@@ -23,7 +23,7 @@ struct SegmentMeshResult {
   SegmentedField field;
   std::size_t patches = 0;  ///< parts of the mesh between junction edges
   // With SegmentMeshOptions::keepsSheets:
-  std::size_t rimEdges = 0;  ///< edges of the mesh with one triangle
+  std::size_t rimEdges = 0;           ///< edges of the mesh with one triangle
   std::size_t crossingTriangles = 0;  ///< triangles that cross others without sharing an edge
   /// Parts of regions between surfaces that are nearly parallel and less than a voxel apart, by
   /// label. Where no grid point lies between them (isLost), they become one sheet or interface.

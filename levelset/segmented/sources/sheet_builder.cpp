@@ -22,7 +22,7 @@ using SimplexKey = GridSimplices::Key;
 
 constexpr double kEndReach = 1.5;  // voxels: of ends and corners from the middle of a tetrahedron
 
-bool isBelow(const V3i& a, const V3i& b) {
+bool isLowerPoint(const V3i& a, const V3i& b) {
   return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
 }
 
@@ -53,7 +53,7 @@ std::vector<PlacedKey> sortByBlock(const std::vector<Entry>& entries,
   std::vector<PlacedKey> sorted;
   for (std::uint32_t n = 0; n < entries.size(); ++n) {
     const V3i at = simplices.pointOf(entries[n].key), origin = blockOriginOf(at);
-    const auto found = std::lower_bound(origins.begin(), origins.end(), origin, isBelow);
+    const auto found = std::lower_bound(origins.begin(), origins.end(), origin, isLowerPoint);
     if (found == origins.end() || *found != origin) continue;
     sorted.push_back({static_cast<std::uint32_t>(found - origins.begin()),
                       SheetData::key(voxelOf(at), GridSimplices::slotOf(entries[n].key)), n});
@@ -71,8 +71,7 @@ SheetBuilder::SheetBuilder(const std::vector<V3d>& points,
                            const std::vector<std::array<std::uint32_t, 3>>& triangles,
                            const GridSimplices& simplices,
                            const std::vector<GridCrossing>& crossings,
-                           const SheetFeatures& features, LabelAt labelAt,
-                           LabelOfSide labelOfSide)
+                           const SheetFeatures& features, LabelAt labelAt, LabelOfSide labelOfSide)
     : points_(points),
       triangles_(triangles),
       simplices_(simplices),
@@ -191,7 +190,8 @@ void SheetBuilder::placeEdges() {
     if (!edge.isMultiple) continue;
     const V3d low(simplices_.pointOf(edge.key)),
         along(offsetOfCorner(GridSimplices::slotOf(edge.key) + 1));
-    const auto point = features_.closest(SheetFeatures::Kind::Junction, low + along * edge.position);
+    const auto point =
+        features_.closest(SheetFeatures::Kind::Junction, low + along * edge.position);
     if (point) {
       placed_.push_back({edge.key, *point - low});
     } else if (const std::uint16_t label = labelAt_(simplices_.pointOf(edge.key));
@@ -223,8 +223,8 @@ void SheetBuilder::placeFaces() {
     const V3i at = simplices_.pointOf(faces[n]);
     const kuhn::FaceSteps& face = kuhn::kFaces[GridSimplices::slotOf(faces[n]) - 7];
     const V3i middle = at + offsetOfCorner(face.middle);
-    const std::array<const CrossedEdge*, 3> edges = {
-        find(at, face.middle), find(at, face.upper), find(middle, face.middle ^ face.upper)};
+    const std::array<const CrossedEdge*, 3> edges = {find(at, face.middle), find(at, face.upper),
+                                                     find(middle, face.middle ^ face.upper)};
     std::uint32_t count = 0;
     V3d mean(0);
     for (const CrossedEdge* edge : edges) {
@@ -265,9 +265,8 @@ std::optional<V3d> SheetBuilder::meanOfFaces(const V3i& cell, std::size_t tetrah
     std::size_t n = 0;
     for (std::size_t i = 0; i < 4; ++i)
       if (i != opposite) chain[n++] = kuhn::kTetrahedra[tetrahedron][i];
-    const SimplexKey key =
-        simplices_.key(cell + offsetOfCorner(chain[0]),
-                       kuhn::faceSlot(chain[1] ^ chain[0], chain[2] ^ chain[0]));
+    const SimplexKey key = simplices_.key(cell + offsetOfCorner(chain[0]),
+                                          kuhn::faceSlot(chain[1] ^ chain[0], chain[2] ^ chain[0]));
     const auto face =
         std::lower_bound(faces_.begin(), faces_.end(), key,
                          [](const PlacedPoint& a, SimplexKey b) { return a.key < b; });

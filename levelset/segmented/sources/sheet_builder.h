@@ -18,9 +18,9 @@ namespace levelset {
 
 /// Two surfaces less than a voxel apart, along a line of the grid.
 struct NarrowGap {
-  std::uint16_t label = 0;   ///< region between them, or of one side where no grid point lies there
-  bool isLost = false;       ///< no grid point lies between them, so they became one surface
-  double thickness = 0;      ///< voxels, along the normal of one of them
+  std::uint16_t label = 0;  ///< region between them, or of one side where no grid point lies there
+  bool isLost = false;      ///< no grid point lies between them, so they became one surface
+  double thickness = 0;     ///< voxels, along the normal of one of them
   Imath::V3d position = Imath::V3d(0);  ///< voxels
 };
 

@@ -13,11 +13,11 @@ namespace {
 using Imath::V3d;
 using Imath::V3i;
 
-constexpr double kFeatureReach = 1;       // voxels: of closest points
+constexpr double kSheetReach = 1;         // voxels: of closest points
 constexpr double kFaceTolerance = 1e-6;   // voxels: of points on the border of a face
 constexpr double kStraightCosine = 0.95;  // of the angle of a rim that does not bend
 
-bool isBefore(const V3i& a, const V3i& b) {
+bool isLowerCell(const V3i& a, const V3i& b) {
   return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
 }
 
@@ -126,7 +126,7 @@ void SheetFeatures::sortPieces() {
         for (cell.z = low.z; cell.z <= high.z; ++cell.z) cells_.emplace_back(cell, n);
   }
   std::sort(cells_.begin(), cells_.end(), [](const auto& a, const auto& b) {
-    return a.first != b.first ? isBefore(a.first, b.first) : a.second < b.second;
+    return a.first != b.first ? isLowerCell(a.first, b.first) : a.second < b.second;
   });
 }
 
@@ -138,9 +138,9 @@ void SheetFeatures::forEachPiece(const V3d& low, const V3d& high, Kind kind,
   for (cell.x = down(low.x); cell.x <= down(high.x); ++cell.x)
     for (cell.y = down(low.y); cell.y <= down(high.y); ++cell.y)
       for (cell.z = down(low.z); cell.z <= down(high.z); ++cell.z) {
-        auto entry = std::lower_bound(
-            cells_.begin(), cells_.end(), cell,
-            [](const auto& a, const V3i& b) { return isBefore(a.first, b); });
+        auto entry =
+            std::lower_bound(cells_.begin(), cells_.end(), cell,
+                             [](const auto& a, const V3i& b) { return isLowerCell(a.first, b); });
         for (; entry != cells_.end() && entry->first == cell; ++entry)
           if (pieces_[entry->second].kind == kind) visit(pieces_[entry->second]);
       }
@@ -168,8 +168,8 @@ std::optional<V3d> SheetFeatures::onFace(Kind kind, const std::array<V3d, 3>& fa
 
 std::optional<V3d> SheetFeatures::closest(Kind kind, const V3d& to) const {
   std::optional<V3d> best;
-  double least = kFeatureReach;
-  forEachPiece(to - V3d(kFeatureReach), to + V3d(kFeatureReach), kind, [&](const Piece& piece) {
+  double least = kSheetReach;
+  forEachPiece(to - V3d(kSheetReach), to + V3d(kSheetReach), kind, [&](const Piece& piece) {
     const V3d p = closestOnPiece(piece.from, piece.to, to);
     if ((p - to).length() >= least) return;
     least = (p - to).length();

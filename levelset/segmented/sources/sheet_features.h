@@ -28,8 +28,7 @@ class SheetFeatures {
   /// Finds the point where a rim or junction passes through a face of the grid; if none does, its
   /// closest point up to a voxel away.
   /// @param near  of several points the one closest to this one is returned
-  [[nodiscard]] std::optional<Imath::V3d> onFace(Kind kind,
-                                                 const std::array<Imath::V3d, 3>& face,
+  [[nodiscard]] std::optional<Imath::V3d> onFace(Kind kind, const std::array<Imath::V3d, 3>& face,
                                                  const Imath::V3d& near) const;
   /// Finds the closest point of a rim or junction, up to a voxel away.
   [[nodiscard]] std::optional<Imath::V3d> closest(Kind kind, const Imath::V3d& to) const;

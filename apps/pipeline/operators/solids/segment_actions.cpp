@@ -89,12 +89,12 @@ void reportRegions(const levelset::SegmentSolidsResult& result, Invocation& in) 
 }
 
 Value segmentByMesh(Invocation& in) {
-  const levelset::SegmentMeshResult result = levelset::segmentMesh(
-      in.mesh(), in.voxelSize(in.operands[0].plan().estimate().longestSide()),
-      {.halfWidth = in.number("half-width"),
-       .keepsSheets = in.flag("sheets"),
-       .maxMemory = in.maxMemory,
-       .progress = in.progress});
+  const levelset::SegmentMeshResult result =
+      levelset::segmentMesh(in.mesh(), in.voxelSize(in.operands[0].plan().estimate().longestSide()),
+                            {.halfWidth = in.number("half-width"),
+                             .keepsSheets = in.flag("sheets"),
+                             .maxMemory = in.maxMemory,
+                             .progress = in.progress});
   in.notes.notes.push_back(
       fmt::format("the mesh has {} patches between its junctions, and encloses "
                   "{} regions",
@@ -288,7 +288,8 @@ Operator segmentOperator() {
           "in "
           "which three or more triangles share edges, as a box with walls, separates regions, "
           "which "
-          "are numbered by decreasing volume. A mesh with borders is refused, unless --sheets keeps "
+          "are numbered by decreasing volume. A mesh with borders is refused, unless --sheets "
+          "keeps "
           "them. 'extract' turns a region into a level set again.",
       .example =
           "levelsmith box --size 4,4,2 --voxel 0.1 ! sphere --radius 1.2 --voxel 0.1 ! segment ! "

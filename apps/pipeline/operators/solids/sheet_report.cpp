@@ -13,10 +13,9 @@ using levelset::RegionLabel;
 void reportSheets(const levelset::SegmentMeshResult& result, Invocation& in) {
   const std::vector<RegionLabel> owners = result.field.sheetLabels();
   in.notes.notes.push_back(
-      owners.empty()
-          ? std::string("the mesh has no sheets: each triangle separates two regions")
-          : fmt::format("sheets lie inside region{} {}; 0 is the void",
-                        owners.size() == 1 ? "" : "s", fmt::join(owners, ", ")));
+      owners.empty() ? std::string("the mesh has no sheets: each triangle separates two regions")
+                     : fmt::format("sheets lie inside region{} {}; 0 is the void",
+                                   owners.size() == 1 ? "" : "s", fmt::join(owners, ", ")));
   if (result.crossingTriangles > 0)
     in.notes.notes.push_back(
         fmt::format("{} triangles cross others without sharing edges; the lines where they meet "
@@ -36,12 +35,12 @@ void reportSheets(const levelset::SegmentMeshResult& result, Invocation& in) {
         part.label, part.places, part.places == 1 ? "" : "s", part.thickness, p.x, p.y, p.z,
         part.isLost ? ", and became one surface where no grid point lies between them" : ""));
   }
-  in.notes.certificateJson = Json{{"labels", result.field.labels()},
-                                  {"sheets", owners},
-                                  {"rim_edges", result.rimEdges},
-                                  {"crossing_triangles", result.crossingTriangles},
-                                  {"thin", thin}}
-                                 .dump();
+  in.notes.certificateJson = Json{
+      {"labels", result.field.labels()},
+      {"sheets", owners},
+      {"rim_edges", result.rimEdges},
+      {"crossing_triangles", result.crossingTriangles},
+      {"thin", thin}}.dump();
 }
 
 void noteLostSheets(const levelset::SegmentedField& field, RegionLabel label, const char* action,

@@ -81,8 +81,10 @@ TEST(CutTetrahedron, HasTheSurfacesOfLabels) {
     const CutTetrahedron& cut = cutTetrahedron(crossed, false);
     EXPECT_TRUE(cut.rims.empty());
     const int regions = std::popcount(seen);
-    EXPECT_EQ(cut.polygons.size(), std::array<std::size_t, 5>({0, 0, 1, 3, 12})[std::size_t(regions)]);
-    EXPECT_EQ(cut.junctions.size(), std::array<std::size_t, 5>({0, 0, 0, 1, 4})[std::size_t(regions)]);
+    EXPECT_EQ(cut.polygons.size(),
+              std::array<std::size_t, 5>({0, 0, 1, 3, 12})[std::size_t(regions)]);
+    EXPECT_EQ(cut.junctions.size(),
+              std::array<std::size_t, 5>({0, 0, 0, 1, 4})[std::size_t(regions)]);
     EXPECT_EQ(cut.isJunctionPoint, regions == 4);
     for (const CutTetrahedron::Polygon& polygon : cut.polygons)
       EXPECT_NE(l[polygon.from], l[polygon.to]);
@@ -100,7 +102,8 @@ TEST(CutTetrahedron, FacesTheCornerOnTheFarSide) {
         p[axis] = (corners[i][axis] + corners[j][axis]) / 2.0;
       } else {
         for (std::size_t c = 0; c < 4; ++c)
-          if (c != node - std::size_t{CutTetrahedron::kFirstFace}) p[axis] += corners[c][axis] / 3.0;
+          if (c != node - std::size_t{CutTetrahedron::kFirstFace})
+            p[axis] += corners[c][axis] / 3.0;
       }
     }
     return p;
@@ -110,7 +113,8 @@ TEST(CutTetrahedron, FacesTheCornerOnTheFarSide) {
     ASSERT_EQ(cut.polygons.size(), 1u);
     const CutTetrahedron::Polygon& polygon = cut.polygons[0];
     ASSERT_EQ(polygon.nodes.size(), 3u);
-    const auto a = place(polygon.nodes[0]), b = place(polygon.nodes[1]), c = place(polygon.nodes[2]);
+    const auto a = place(polygon.nodes[0]), b = place(polygon.nodes[1]),
+               c = place(polygon.nodes[2]);
     double volume = 0;
     for (std::size_t x = 0; x < 3; ++x) {
       const std::size_t y = (x + 1) % 3, z = (x + 2) % 3;

@@ -244,7 +244,8 @@ TEST(SegmentSheets, JoinThePagesOfABook) {
   }
 }
 
-/// Prism with six sides about the z axis of a frame, with three walls at 120° that meet in the axis.
+/// Prism with six sides about the z axis of a frame, with three walls at 120° that meet in the
+/// axis.
 TriMesh prismWithWalls(double radius, double height, const Frame& frame) {
   TriMesh mesh;
   for (const double z : {-height / 2, height / 2}) {
@@ -267,42 +268,53 @@ TriMesh prismWithWalls(double radius, double height, const Frame& frame) {
 }
 
 TEST(SegmentSheets, SeparateThreeHalfPlanesInRandomPoses) {
+  // A thousand prisms in one mesh, a few voxels large.
+  constexpr int kSide = 10;
+  constexpr double kRadius = 3, kHeight = 4, kSpacing = 9;
   std::mt19937 random(7);
   std::uniform_real_distribution<double> unit(0, 1);
   std::normal_distribution<double> normal;
-  std::size_t wrong = 0, mixed = 0;
-  constexpr int kPoses = 100;
-  for (int n = 0; n < kPoses; ++n) {
+  std::vector<Frame> frames;
+  TriMesh mesh;
+  for (int n = 0; n < kSide * kSide * kSide; ++n) {
     Frame frame;
-    frame.centre = V3d(unit(random), unit(random), unit(random));
+    frame.centre = V3d(n / kSide / kSide, n / kSide % kSide, n % kSide) * kSpacing +
+                   V3d(unit(random), unit(random), unit(random));
     frame.x = V3d(normal(random), normal(random), normal(random)).normalized();
     frame.y = frame.x.cross(V3d(normal(random), normal(random), normal(random))).normalized();
     frame.z = frame.x.cross(frame.y);
-    const SegmentedField field = segmentSheets(prismWithWalls(4, 5, frame), 1).field;
-    if (field.labels().size() != 3) {
-      ++wrong;
-      continue;
-    }
-    const SegmentedSampler sampler(field);
+    frames.push_back(frame);
+    const TriMesh prism = prismWithWalls(kRadius, kHeight, frame);
+    const auto offset = static_cast<std::uint32_t>(mesh.positions.size());
+    mesh.positions.insert(mesh.positions.end(), prism.positions.begin(), prism.positions.end());
+    for (const auto& t : prism.triangles)
+      mesh.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
+  }
+  const SegmentedField field = segmentSheets(mesh, 1).field;
+  EXPECT_EQ(field.labels().size(), 3 * frames.size());
+  EXPECT_TRUE(field.sheetLabels().empty());
+  const SegmentedSampler sampler(field);
+  std::size_t mixed = 0, tested = 0;
+  for (const Frame& frame : frames) {
     std::array<RegionLabel, 3> labels{};
-    for (int sector = 0; sector < 3; ++sector) {
-      const double middle = (sector * 120 + 60) * pi / 180;
-      for (int m = 0; m < 60; ++m) {
-        const double a = middle + (unit(random) - 0.5) * 2.0, r = 3 * std::sqrt(unit(random)),
-                     wall = std::min(std::abs(std::sin(a - middle + pi / 3)),
-                                     std::abs(std::sin(a - middle - pi / 3)));
-        if (r * wall < 0.5) continue;
+    for (int sector = 0; sector < 3; ++sector)
+      for (int m = 0; m < 30; ++m) {
+        const double a = (unit(random) - 0.5) * 2 * pi / 3,
+                     r = 0.8 * kRadius * std::sqrt(unit(random)), z = (unit(random) - 0.5) * 0.6,
+                     around = a + (sector * 120 + 60) * pi / 180;
+        // Half a voxel from the walls.
+        if (r * std::sin(pi / 3 - std::abs(a)) < 0.5) continue;
+        ++tested;
         const RegionLabel label =
-            sampler.label(frame.centre + frame.x * (r * std::cos(a)) + frame.y * (r * std::sin(a)) +
-                          frame.z * (3 * (unit(random) - 0.5)));
+            sampler.label(frame.centre + frame.x * (r * std::cos(around)) +
+                          frame.y * (r * std::sin(around)) + frame.z * (kHeight * z));
         RegionLabel& known = labels[static_cast<std::size_t>(sector)];
         if (known == kVoid) known = label;
         mixed += label != known || label == kVoid;
       }
-    }
     mixed += labels[0] == labels[1] || labels[1] == labels[2] || labels[2] == labels[0];
   }
-  EXPECT_EQ(wrong, 0u);
+  EXPECT_GT(tested, 40000u);
   EXPECT_EQ(mixed, 0u);
 }
 
@@ -312,8 +324,8 @@ TriMesh sphereWithHoledDiaphragm(const V3d& centre, double hole, unsigned rings)
   TriMesh mesh = support::sphereMesh(1, centre, rings);
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
   for (unsigned j = 0; j < sides; ++j)
-    mesh.positions.push_back(centre +
-                             V3d(std::cos(2 * pi * j / sides), std::sin(2 * pi * j / sides), 0) * hole);
+    mesh.positions.push_back(
+        centre + V3d(std::cos(2 * pi * j / sides), std::sin(2 * pi * j / sides), 0) * hole);
   for (unsigned j = 0; j < sides; ++j) {
     const std::uint32_t a = 1 + (rings / 2 - 1) * sides + j,
                         b = 1 + (rings / 2 - 1) * sides + (j + 1) % sides, c = first + j,
@@ -350,8 +362,8 @@ TEST(SegmentSheets, HoldADiaphragmWithAHole) {
     // The solid does not know the diaphragm.
     const TriMesh solid = regionSurface(result.field, 1);
     EXPECT_NEAR(signedVolume(solid), m.regions[1].volume, 1e-12);
-    const auto edges = support::sheetShape({solid, std::vector<TriangleSides>(
-                                                       solid.triangles.size()), {}, {}, {}, {}});
+    const auto edges = support::sheetShape(
+        {solid, std::vector<TriangleSides>(solid.triangles.size()), {}, {}, {}, {}});
     EXPECT_EQ(edges.borderEdges, 0u);
     EXPECT_EQ(edges.euler, 2);
   }
@@ -531,9 +543,9 @@ TEST(SegmentSheets, Refuse) {
   EXPECT_THROW((void)segmentSheets(TriMesh(), 0.1), InvalidInput);
   EXPECT_THROW((void)segmentMesh(disk, 0.1, {.keepsSheets = true, .maxMemory = 1000}),
                ResourceLimit);
-  EXPECT_THROW((void)segmentMesh(disk, 0.1,
-                                 {.keepsSheets = true, .progress = [](double) { return false; }}),
-               Cancelled);
+  EXPECT_THROW(
+      (void)segmentMesh(disk, 0.1, {.keepsSheets = true, .progress = [](double) { return false; }}),
+      Cancelled);
   const SegmentedField field = segmentSheets(disk, 0.1).field;
   EXPECT_THROW((void)extractLabel(field, kVoid), UsageError);
   EXPECT_THROW((void)extractLabel(field, 1), NoSurface);
