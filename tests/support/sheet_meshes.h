@@ -105,7 +105,7 @@ inline TriMesh bookMesh(const std::vector<double>& degrees, double width, double
 
 /// Shape of the sheets of a mesh, found from its triangles only.
 struct SheetShape {
-  std::size_t borderEdges = 0;  ///< of one triangle
+  std::size_t borderEdges = 0;  ///< edges with one triangle
   std::size_t rimLoops = 0;     ///< closed curves of them
   std::size_t tornRims = 0;     ///< vertices with an odd number of them
   std::size_t components = 0;

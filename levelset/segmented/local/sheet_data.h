@@ -20,7 +20,7 @@ struct SheetData {
 
   std::vector<std::uint32_t> firstEdge, firstPoint;  ///< by block, and one more for the ends
   std::vector<std::uint16_t> edges;  ///< keys of crossed edges, ascending in each block
-  std::vector<float> positions;      ///< of these crossings, from 0 to 1 along the edge
+  std::vector<float> positions;      ///< along these edges, from 0 to 1
   /// Keys of simplices that hold a point of a rim or a junction, ascending in each block. An edge
   /// among them is crossed by several surfaces, which meet at that point or near it.
   std::vector<std::uint16_t> pointKeys;

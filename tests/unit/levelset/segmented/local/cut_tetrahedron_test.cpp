@@ -69,6 +69,7 @@ TEST(CutTetrahedron, JoinsTheLinesOnItsFacesWithoutGaps) {
 }
 
 TEST(CutTetrahedron, HasTheSurfacesOfLabels) {
+  constexpr std::array<std::size_t, 5> kPolygons = {0, 0, 1, 3, 12}, kJunctions = {0, 0, 0, 1, 4};
   // Labels of four corners: crossed are the edges between different ones. No rims, and as many
   // junctions as regions allow.
   for (int code = 0; code < 256; ++code) {
@@ -80,11 +81,9 @@ TEST(CutTetrahedron, HasTheSurfacesOfLabels) {
     for (const int label : l) seen |= 1u << label;
     const CutTetrahedron& cut = cutTetrahedron(crossed, false);
     EXPECT_TRUE(cut.rims.empty());
-    const int regions = std::popcount(seen);
-    EXPECT_EQ(cut.polygons.size(),
-              std::array<std::size_t, 5>({0, 0, 1, 3, 12})[std::size_t(regions)]);
-    EXPECT_EQ(cut.junctions.size(),
-              std::array<std::size_t, 5>({0, 0, 0, 1, 4})[std::size_t(regions)]);
+    const auto regions = static_cast<std::size_t>(std::popcount(seen));
+    EXPECT_EQ(cut.polygons.size(), kPolygons[regions]);
+    EXPECT_EQ(cut.junctions.size(), kJunctions[regions]);
     EXPECT_EQ(cut.isJunctionPoint, regions == 4);
     for (const CutTetrahedron::Polygon& polygon : cut.polygons)
       EXPECT_NE(l[polygon.from], l[polygon.to]);
