@@ -374,6 +374,8 @@ class MeshRegions {
     const GridSimplices simplices(V3i(low_[0], low_[1], low_[2]) * 8 - V3i(kMargin));
     const std::vector<GridCrossing> crossings =
         findGridCrossings(points_, mesh_.triangles, simplices);
+    // The edges and faces that they make, and the field.
+    requireMemory(static_cast<double>(crossings.size()) * 96, memoryLeft(options_.maxMemory));
     const std::vector<convert::TrianglePair> pairs = convert::findSelfIntersections(
         mesh_.triangles, points_, subProgress(options_.progress, 0.5, 0.6));
     std::vector<bool> isCrossing(mesh_.triangles.size());

