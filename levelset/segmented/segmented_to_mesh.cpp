@@ -615,7 +615,10 @@ class SegmentedMesher {
       cut.block.junctions.push_back(
           {{vertexOf(junction.nodes[0]), vertexOf(junction.nodes[1])}, labels});
     }
-    if (surfaces.isJunctionPoint) cut.block.points.push_back(cut.inside().vertex);
+    // Without a stored point it is a branch of the strips along one line.
+    if (surfaces.isJunctionPoint && storedPoint(reader, originOf(cut.block) + cut.local,
+                                                kuhn::tetrahedronSlot(cut.tetrahedron)))
+      cut.block.points.push_back(cut.inside().vertex);
   }
 
   /// Returns true if all edges that a polygon crosses have their crossing on a junction.

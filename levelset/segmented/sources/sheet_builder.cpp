@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <tuple>
 #include <utility>
@@ -263,10 +264,9 @@ std::uint32_t SheetBuilder::crossedEdges(const V3i& cell, std::size_t tetrahedro
   return crossed;
 }
 
-/// Mean of the points on the faces of a tetrahedron, if there are any.
-std::optional<V3d> SheetBuilder::meanOfFaces(const V3i& cell, std::size_t tetrahedron) const {
-  V3d sum(0);
-  int count = 0;
+/// Points on the faces of a tetrahedron.
+std::vector<V3d> SheetBuilder::pointsOfFaces(const V3i& cell, std::size_t tetrahedron) const {
+  std::vector<V3d> points;
   for (std::size_t opposite = 0; opposite < 4; ++opposite) {
     std::array<kuhn::Corner, 3> chain{};
     std::size_t n = 0;
@@ -277,11 +277,10 @@ std::optional<V3d> SheetBuilder::meanOfFaces(const V3i& cell, std::size_t tetrah
     const auto face =
         std::lower_bound(faces_.begin(), faces_.end(), key,
                          [](const PlacedPoint& a, SimplexKey b) { return a.key < b; });
-    if (face == faces_.end() || face->key != key) continue;
-    sum += V3d(simplices_.pointOf(key)) + face->offset;
-    ++count;
+    if (face != faces_.end() && face->key == key)
+      points.push_back(V3d(simplices_.pointOf(key)) + face->offset);
   }
-  return count > 0 ? std::optional(sum / count) : std::nullopt;
+  return points;
 }
 
 void SheetBuilder::placeEnds() {
@@ -306,22 +305,30 @@ void SheetBuilder::placeEnds() {
   for (const SimplexKey key : tetrahedra) {
     const V3i cell = simplices_.pointOf(key);
     const std::size_t t = GridSimplices::slotOf(key) - kuhn::tetrahedronSlot(0);
-    if (!cutTetrahedron(crossedEdges(cell, t), false).hasInside) continue;
-    const auto mean = meanOfFaces(cell, t);
-    if (!mean) continue;
-    std::optional<V3d> best;
-    double least = kEndReach;
+    const CutTetrahedron& cut = cutTetrahedron(crossedEdges(cell, t), false);
+    const std::vector<V3d> points = pointsOfFaces(cell, t);
+    if (!cut.hasInside || points.empty()) continue;
+    const V3d mean =
+        std::accumulate(points.begin(), points.end(), V3d(0)) / static_cast<double>(points.size());
+    const V3d* best = nullptr;
+    // Junctions also branch where more than three sheets meet in a line, away from its ends.
+    double least = cut.isJunctionPoint ? kEndReach / 2 : kEndReach;
     for (const V3d& end : features_.ends()) {
-      if ((end - *mean).length() >= least) continue;
-      least = (end - *mean).length();
-      best = end;
+      if ((end - mean).length() >= least) continue;
+      least = (end - mean).length();
+      best = &end;
     }
-    if (!best) best = features_.closest(SheetFeatures::Kind::Junction, *mean);
-    if (best) placed_.push_back({key, *best - V3d(cell)});
+    if (best) {
+      placed_.push_back({key, *best - V3d(cell)});
+    } else if (!cut.isJunctionPoint) {
+      const auto point = features_.closest(SheetFeatures::Kind::Junction, mean);
+      if (point) placed_.push_back({key, *point - V3d(cell)});
+    }
   }
 }
 
 void SheetBuilder::placeCorners() {
+  constexpr double kOneSide = 0.9;  // cosine, seen from the corner
   std::vector<SimplexKey> taken;
   for (const V3d& p : features_.corners()) {
     // The sheet may end at the corner without crossing an edge of its tetrahedron. The nearest
@@ -339,11 +346,16 @@ void SheetBuilder::placeCorners() {
             if (crossed == 0) continue;
             const CutTetrahedron& cut = cutTetrahedron(crossed, false);
             if (cut.hasInside || cut.rims.size() != 1) continue;
-            const auto mean = meanOfFaces(cell, t);
-            if (!mean || (*mean - p).length() >= least) continue;
+            const std::vector<V3d> points = pointsOfFaces(cell, t);
+            if (points.size() != 2) continue;
+            // The rim enters on one side of the corner and leaves on the other one.
+            const V3d a = points[0] - p, b = points[1] - p;
+            if ((a ^ b) > kOneSide * a.length() * b.length()) continue;
+            const double distance = ((a + b) / 2).length();
+            if (distance >= least) continue;
             const SimplexKey key = simplices_.key(cell, kuhn::tetrahedronSlot(t));
             if (std::find(taken.begin(), taken.end(), key) != taken.end()) continue;
-            least = (*mean - p).length();
+            least = distance;
             best = key;
           }
     if (!best) continue;

@@ -65,7 +65,7 @@ class SheetBuilder {
   void placeEnds();
   void placeCorners();
   [[nodiscard]] std::uint32_t crossedEdges(const Imath::V3i& cell, std::size_t tetrahedron) const;
-  [[nodiscard]] std::optional<Imath::V3d> meanOfFaces(const Imath::V3i& cell,
+  [[nodiscard]] std::vector<Imath::V3d> pointsOfFaces(const Imath::V3i& cell,
                                                       std::size_t tetrahedron) const;
 
   const std::vector<Imath::V3d>& points_;
