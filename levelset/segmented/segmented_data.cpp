@@ -36,7 +36,8 @@ std::size_t SegmentedData::memoryUse() const {
   return sizeof(SegmentedData) + blockTree->memUsage() +
          blocks.capacity() * sizeof(SegmentedBlock) + words.capacity() * sizeof(std::uint64_t) +
          distances.capacity() * sizeof(float) + extras.capacity() * sizeof(SegmentedExtra) +
-         (palettes.capacity() + labels.capacity()) * sizeof(RegionLabel);
+         (palettes.capacity() + labels.capacity()) * sizeof(RegionLabel) +
+         (sheets ? sheets->memoryUse() : 0);
 }
 
 float SegmentedReader::extraAt(const Coord& at, RegionLabel other) {
@@ -139,7 +140,8 @@ PackedBlock packBlock(const SegmentedBlockValues& values, float background) {
 }
 
 SegmentedField assembleSegmented(openvdb::math::Transform::Ptr transform, double halfWidth,
-                                 openvdb::Int32Tree::Ptr tiles, std::vector<PackedBlock> blocks) {
+                                 openvdb::Int32Tree::Ptr tiles, std::vector<PackedBlock> blocks,
+                                 std::shared_ptr<const SheetData> sheets) {
   const auto data = std::make_shared<SegmentedData>();
   data->voxelSize = transform->voxelSize()[0];
   data->halfWidth = halfWidth;
@@ -182,6 +184,7 @@ SegmentedField assembleSegmented(openvdb::math::Transform::Ptr transform, double
   for (std::size_t label = 1; label < owns.size(); ++label)
     if (owns[label]) data->labels.push_back(static_cast<RegionLabel>(label));
   data->blockTree = std::move(tiles);
+  data->sheets = std::move(sheets);
   return SegmentedField(data);
 }
 

@@ -9,6 +9,7 @@
 #include <memory>
 #include <vector>
 
+#include "levelset/segmented/local/sheet_data.h"
 #include "levelset/segmented/segmented_field.h"
 #include "levelset/vdb.h"
 
@@ -56,6 +57,8 @@ struct SegmentedData {
   std::vector<SegmentedExtra> extras;
   std::vector<RegionLabel> palettes;
   std::vector<RegionLabel> labels;  ///< that own a grid point, ascending, without the void
+  /// Crossings of all surfaces of a field with sheets; else null.
+  std::shared_ptr<const SheetData> sheets;
 
   [[nodiscard]] static std::int32_t tile(RegionLabel label) { return -1 - std::int32_t{label}; }
   [[nodiscard]] static RegionLabel labelOfTile(std::int32_t value) {
@@ -206,10 +209,12 @@ struct PackedBlock {
 /// @param tiles   SegmentedData::tile() of the label by block coordinate; values at the blocks are
 ///                ignored
 /// @param halfWidth  voxels
+/// @param sheets   for the same blocks; null for a field without sheets
 /// @throws ResourceLimit when a count exceeds 32 bits
 [[nodiscard]] SegmentedField assembleSegmented(openvdb::math::Transform::Ptr transform,
                                                double halfWidth, openvdb::Int32Tree::Ptr tiles,
-                                               std::vector<PackedBlock> blocks);
+                                               std::vector<PackedBlock> blocks,
+                                               std::shared_ptr<const SheetData> sheets = nullptr);
 
 /// Distances of the 8 corners of a grid cell, to interpolate them.
 class SegmentedCell {

@@ -16,7 +16,7 @@ using Imath::V3d;
 using openvdb::Coord;
 
 bool SegmentedField::isEmpty() const {
-  return !data_ || data_->distances.empty();
+  return !data_ || (data_->distances.empty() && (!data_->sheets || data_->sheets->edges.empty()));
 }
 double SegmentedField::voxelSize() const {
   return data_ ? data_->voxelSize : 0;
@@ -26,6 +26,9 @@ double SegmentedField::halfWidth() const {
 }
 std::vector<RegionLabel> SegmentedField::labels() const {
   return data_ ? data_->labels : std::vector<RegionLabel>();
+}
+std::vector<RegionLabel> SegmentedField::sheetLabels() const {
+  return data_ && data_->sheets ? data_->sheets->owners : std::vector<RegionLabel>();
 }
 std::size_t SegmentedField::activeVoxelCount() const {
   return data_ ? data_->distances.size() : 0;
@@ -52,9 +55,33 @@ Imath::M44d SegmentedField::indexToWorld() const {
   return result;
 }
 
+namespace {
+
+/// Box of the crossings of a field with sheets.
+Imath::Box3d boundsOfCrossings(const SegmentedData& data) {
+  Imath::Box3d box;
+  const SheetData& sheets = *data.sheets;
+  for (std::size_t b = 0; b < data.blockCount(); ++b) {
+    const auto add = [&](std::uint16_t key, const V3d& offset) {
+      const Coord at = data.blocks[b].origin + SegmentedData::localOf(key / SheetData::kSlots);
+      box.extendBy(toImath(data.transform->indexToWorld(at.asVec3d() + toVdb(offset))));
+    };
+    for (std::size_t n = sheets.firstEdge[b]; n < sheets.firstEdge[b + 1]; ++n) {
+      const Coord step = SegmentedCell::cornerOffset(sheets.edges[n] % SheetData::kSlots + 1);
+      add(sheets.edges[n], V3d(step[0], step[1], step[2]) * double{sheets.positions[n]});
+    }
+    for (std::size_t n = sheets.firstPoint[b]; n < sheets.firstPoint[b + 1]; ++n)
+      add(sheets.pointKeys[n], V3d(sheets.points[n]));
+  }
+  return box;
+}
+
+}  // namespace
+
 Imath::Box3d SegmentedField::interfaceBounds() const {
   if (isEmpty()) return {};
   const SegmentedData& data = *data_;
+  if (data.sheets) return boundsOfCrossings(data);
   const auto addBlock = [&](SegmentedReader& reader, const SegmentedBlock& block,
                             Imath::Box3d& box) {
     for (std::uint32_t n = 0; n < SegmentedData::kVoxels; ++n) {
@@ -111,6 +138,7 @@ std::uint64_t SegmentedField::contentHash() const {
     hash = mixBytes(hash, box.min().data(), 3);
     hash = mixHash(hash, static_cast<std::uint32_t>(*tile));
   }
+  if (data_->sheets) hash = mixHash(hash, data_->sheets->contentHash());
   return hash;
 }
 

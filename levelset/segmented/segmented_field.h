@@ -31,6 +31,10 @@ inline constexpr RegionLabel kVoid = 0;
 /// stays as accurate near a junction as elsewhere. The distances to the nearest interface alone, as
 /// published, would shift it there.
 ///
+/// A field made with sheets also stores where the edges of the grid cross surfaces. A sheet is a
+/// surface with the same region on both sides, such as a wall with a door. Regions, and the
+/// distances of the sampler, do not depend on sheets; meshes and measures hold them.
+///
 /// The class has value semantics. Copies share the data, which does not change. The transform to
 /// world space is a rotation, a uniform scale and a translation.
 class SegmentedField {
@@ -38,7 +42,7 @@ class SegmentedField {
   SegmentedField() = default;
   explicit SegmentedField(std::shared_ptr<const SegmentedData> data) : data_(std::move(data)) {}
 
-  /// Returns true when there is no interface.
+  /// Returns true when there is no interface and no sheet.
   [[nodiscard]] bool isEmpty() const;
   /// Edge length of a voxel, world units.
   [[nodiscard]] double voxelSize() const;
@@ -46,6 +50,8 @@ class SegmentedField {
   [[nodiscard]] double halfWidth() const;
   /// Labels of the regions that own a grid point, ascending, without the void.
   [[nodiscard]] std::vector<RegionLabel> labels() const;
+  /// Labels of the regions that have sheets inside, ascending, the void among them.
+  [[nodiscard]] std::vector<RegionLabel> sheetLabels() const;
   /// Transform from index to world space. Imath multiplies row vectors: `world = index * matrix`.
   [[nodiscard]] Imath::M44d indexToWorld() const;
   /// Grid points with a stored distance.
@@ -53,8 +59,8 @@ class SegmentedField {
   /// Distances to further regions, stored near junctions.
   [[nodiscard]] std::size_t extraCount() const;
   [[nodiscard]] std::size_t memoryUse() const;  ///< bytes
-  /// Bounds of the interfaces, world units: box of all crossings between neighbouring grid points
-  /// of different labels. Empty when there are none.
+  /// Bounds of the interfaces and sheets, world units: box of all their crossings with edges
+  /// between neighbouring grid points. Empty when there are none.
   [[nodiscard]] Imath::Box3d interfaceBounds() const;
   /// Hash of transform, labels and distances.
   [[nodiscard]] std::uint64_t contentHash() const;

@@ -10,7 +10,9 @@
 #include "levelset/error.h"
 #include "levelset/memory_limit.h"
 #include "levelset/progress_gate.h"
+#include "levelset/segmented/local/cut_tetrahedron.h"
 #include "levelset/segmented/local/kuhn_cell.h"
+#include "levelset/segmented/local/orient_sheets.h"
 #include "levelset/segmented/segmented_data_vdb.h"
 #include "levelset/segmented/sharpen_junctions.h"
 
@@ -38,6 +40,8 @@ struct MeshBlock {
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<TriangleSides> sides;
   std::vector<JunctionEdge> junctions;
+  std::vector<std::array<std::uint32_t, 2>> rims;
+  std::vector<std::uint32_t> strips;  ///< by triangle of the block
   std::vector<std::uint32_t> points;
 };
 
@@ -69,6 +73,75 @@ struct CellLabels {
   }
 };
 
+/// Crossed edges of the cells of a block, for fields with sheets.
+class CellCrossings {
+ public:
+  CellCrossings(const SegmentedData& data, SegmentedReader& reader, const Coord& origin)
+      : sheets_(*data.sheets) {
+    for (kuhn::Corner c = 0; c < 8; ++c) {
+      const Coord offset = cornerOffset(c);
+      const std::int32_t block =
+          reader.blockOf(origin.offsetBy(8 * offset[0], 8 * offset[1], 8 * offset[2]));
+      if (c == 0) block_ = block;
+      if (block < 0) continue;
+      for (const std::uint16_t key : sheets_.edgesOf(static_cast<std::size_t>(block))) {
+        const Coord at = SegmentedData::localOf(key / SheetData::kSlots);
+        Coord place;
+        bool isBeyond = false;
+        for (int axis = 0; axis < 3; ++axis) {
+          place[axis] = at[axis] + 8 * offset[axis];
+          isBeyond = isBeyond || place[axis] > 8;
+        }
+        if (isBeyond) continue;
+        masks_[indexOf(place)] |= static_cast<std::uint8_t>(1u << (key % SheetData::kSlots));
+        isEmpty_ = false;
+      }
+    }
+  }
+
+  [[nodiscard]] bool isEmpty() const { return isEmpty_; }
+  /// @param low, high  corners of a cell; the bits of `high` contain those of `low`
+  [[nodiscard]] bool isCrossed(const Coord& cell, kuhn::Corner low, kuhn::Corner high) const {
+    return masks_[indexOf(cell + cornerOffset(low))] >> kuhn::edgeSlot(low ^ high) & 1;
+  }
+  /// @return false if no edge of a cell is crossed
+  [[nodiscard]] bool hasCrossings(const Coord& cell) const {
+    for (kuhn::Corner c = 0; c < 8; ++c)
+      if (masks_[indexOf(cell + cornerOffset(c))]) return true;
+    return false;
+  }
+  [[nodiscard]] std::uint32_t edgesOfFace(const Coord& cell, const kuhn::FaceSteps& face) const {
+    return std::uint32_t{isCrossed(cell, 0, face.middle)} + isCrossed(cell, 0, face.upper) +
+           isCrossed(cell, face.middle, face.upper);
+  }
+  /// @param cell  in this block
+  [[nodiscard]] const CutTetrahedron& cut(const Coord& cell, std::size_t tetrahedron) const {
+    const auto& corners = kuhn::kTetrahedra[tetrahedron];
+    std::uint32_t crossed = 0;
+    for (std::size_t e = 0; e < CutTetrahedron::kEdges.size(); ++e) {
+      const auto [i, j] = CutTetrahedron::kEdges[e];
+      crossed |= std::uint32_t{isCrossed(cell, corners[i], corners[j])} << e;
+    }
+    const bool hasCorner =
+        crossed != 0 && block_ >= 0 &&
+        sheets_.pointOf(static_cast<std::size_t>(block_),
+                        SheetData::key(SegmentedData::offsetOf(cell),
+                                       kuhn::tetrahedronSlot(tetrahedron))) != nullptr;
+    return cutTetrahedron(crossed, hasCorner);
+  }
+
+ private:
+  static constexpr int kSide = 9;
+  [[nodiscard]] static std::size_t indexOf(const Coord& at) {
+    return static_cast<std::size_t>((at[0] * kSide + at[1]) * kSide + at[2]);
+  }
+
+  const SheetData& sheets_;
+  std::array<std::uint8_t, kSide * kSide * kSide> masks_{};
+  std::int32_t block_ = -1;
+  bool isEmpty_ = true;
+};
+
 bool allDiffer(RegionLabel a, RegionLabel b, RegionLabel c) {
   return a != b && b != c && c != a;
 }
@@ -85,7 +158,9 @@ class SegmentedMesher {
 
   SegmentedMesh run() {
     gatherBlocks();
-    forEachBlock(0, 0.2, [&](MeshBlock& block) { findVertices(block); });
+    forEachBlock(0, 0.2, [&](MeshBlock& block) {
+      data_.sheets ? findCrossings(block) : findVertices(block);
+    });
     std::erase_if(blocks_, [](const MeshBlock& block) { return block.keys.empty(); });
     std::size_t vertices = 0;
     for (MeshBlock& block : blocks_) {
@@ -99,10 +174,17 @@ class SegmentedMesher {
       throw ResourceLimit("the interfaces have more than 2^32 vertices; use larger voxels");
     result_.mesh.positions.resize(vertices);
     isDoubtful_.resize(vertices);
-    forEachBlock(0.2, 0.4, [&](MeshBlock& block) { placeVertices(block); });
-    forEachBlock(0.4, 0.7, [&](MeshBlock& block) { cutCells(block); });
+    forEachBlock(0.2, 0.4, [&](MeshBlock& block) {
+      data_.sheets ? placeCrossings(block) : placeVertices(block);
+    });
+    forEachBlock(0.4, 0.7, [&](MeshBlock& block) {
+      data_.sheets ? cutCrossedCells(block) : cutCells(block);
+    });
     collect();
-    if (options_.sharpensJunctions)
+    // The points of junctions of a field with sheets are exact.
+    if (data_.sheets)
+      orient();
+    else if (options_.sharpensJunctions)
       sharpenJunctions(data_, isDoubtful_, result_, subProgress(options_.progress, 0.7, 1));
     tbb::parallel_for(std::size_t{0}, vertices, [&](std::size_t v) {
       V3d& p = result_.mesh.positions[v];
@@ -382,6 +464,206 @@ class SegmentedMesher {
     }
   }
 
+  // === Fields with sheets
+  void findCrossings(MeshBlock& block) const {
+    SegmentedReader reader(data_);
+    const CellCrossings crossings(data_, reader, originOf(block));
+    if (crossings.isEmpty()) return;
+    for (std::uint32_t voxel = 0; voxel < SegmentedData::kVoxels; ++voxel) {
+      const Coord cell = SegmentedData::localOf(voxel);
+      if (!crossings.hasCrossings(cell)) continue;
+      const auto add = [&](std::uint32_t slot) {
+        block.keys.push_back(SheetData::key(voxel, slot));
+      };
+      for (kuhn::Corner step = 1; step < 8; ++step)
+        if (crossings.isCrossed(cell, 0, step)) add(kuhn::edgeSlot(step));
+      for (const kuhn::FaceSteps& face : kuhn::kFaces)
+        if (holdsFaceNode(crossings.edgesOfFace(cell, face)))
+          add(kuhn::faceSlot(face.middle, face.upper));
+      for (std::size_t t = 0; t < 6; ++t)
+        if (crossings.cut(cell, t).hasInside) add(kuhn::tetrahedronSlot(t));
+    }
+  }
+
+  void placeCrossings(MeshBlock& block) {
+    SegmentedReader reader(data_);
+    const Coord origin = originOf(block);
+    const CellCrossings crossings(data_, reader, origin);
+    for (std::size_t i = 0; i < block.keys.size(); ++i) {
+      const std::uint32_t voxel = block.keys[i] / SheetData::kSlots,
+                          slot = block.keys[i] % SheetData::kSlots;
+      const Coord cell = SegmentedData::localOf(voxel);
+      result_.mesh.positions[block.firstVertex + i] =
+          slot < 19 ? placeOf(reader, crossings, origin, cell, slot)
+                    : placeInside(reader, crossings, origin, cell, slot - 19);
+    }
+  }
+
+  /// Stored point of a rim or junction in a simplex.
+  std::optional<V3d> storedPoint(SegmentedReader& reader, const Coord& at,
+                                 std::uint32_t slot) const {
+    const std::int32_t block = reader.blockOf(at);
+    if (block < 0) return std::nullopt;
+    const Imath::V3f* point = data_.sheets->pointOf(
+        static_cast<std::size_t>(block), SheetData::key(SegmentedData::offsetOf(at), slot));
+    return point ? std::optional(V3d(at[0], at[1], at[2]) + V3d(*point)) : std::nullopt;
+  }
+
+  /// Position of a vertex on an edge or a face of a cell.
+  V3d placeOf(SegmentedReader& reader, const CellCrossings& crossings, const Coord& origin,
+              const Coord& cell, std::uint32_t slot) const {
+    const Coord at = origin + cell;
+    if (const auto point = storedPoint(reader, at, slot)) return *point;
+    if (slot < 7) {
+      const std::int32_t block = reader.blockOf(at);
+      const Coord step = cornerOffset(slot + 1);
+      const auto t = static_cast<double>(data_.sheets->positionOf(
+          static_cast<std::size_t>(block), SheetData::key(SegmentedData::offsetOf(at), slot)));
+      return V3d(at[0], at[1], at[2]) +
+             V3d(step[0], step[1], step[2]) * std::clamp(t, kEndGap, 1 - kEndGap);
+    }
+    const kuhn::FaceSteps& face = kuhn::kFaces[slot - 7];
+    V3d sum(0);
+    double count = 0;
+    for (const auto& [low, high] : {std::pair(0u, face.middle), std::pair(0u, face.upper),
+                                    std::pair(face.middle, face.upper)}) {
+      if (!crossings.isCrossed(cell, low, high)) continue;
+      sum +=
+          placeOf(reader, crossings, origin, cell + cornerOffset(low), kuhn::edgeSlot(low ^ high));
+      ++count;
+    }
+    return sum / count;
+  }
+
+  /// Position of a vertex inside a tetrahedron: the end of a junction, or the mean of the vertices
+  /// on its faces.
+  V3d placeInside(SegmentedReader& reader, const CellCrossings& crossings, const Coord& origin,
+                  const Coord& cell, std::size_t tetrahedron) const {
+    const auto point = storedPoint(reader, origin + cell, kuhn::tetrahedronSlot(tetrahedron));
+    if (point) return *point;
+    const CutTetrahedron& cut = crossings.cut(cell, tetrahedron);
+    V3d sum(0);
+    double count = 0;
+    for (std::size_t opposite = 0; opposite < 4; ++opposite) {
+      if (!cut.hasFaceNode[opposite]) continue;
+      const auto [low, slot] = faceOf(tetrahedron, opposite);
+      sum += placeOf(reader, crossings, origin, cell + cornerOffset(low), slot);
+      ++count;
+    }
+    return sum / count;
+  }
+
+  /// Lowest corner and slot of the face of a tetrahedron opposite to a corner.
+  static std::pair<kuhn::Corner, std::uint32_t> faceOf(std::size_t tetrahedron,
+                                                       std::size_t opposite) {
+    std::array<kuhn::Corner, 3> chain{};
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < 4; ++i)
+      if (i != opposite) chain[n++] = kuhn::kTetrahedra[tetrahedron][i];
+    return {chain[0], kuhn::faceSlot(chain[1] ^ chain[0], chain[2] ^ chain[0])};
+  }
+
+  void cutCrossedCells(MeshBlock& block) {
+    if (!block.isCut) return;
+    SegmentedReader reader(data_);
+    const Coord origin = originOf(block);
+    const CellCrossings crossings(data_, reader, origin);
+    if (crossings.isEmpty()) return;
+    Cut cut{block, {}, {}, 0};
+    for (kuhn::Corner c = 0; c < 8; ++c) cut.around[c] = find(block.block + cornerOffset(c));
+    for (std::uint32_t voxel = 0; voxel < SegmentedData::kVoxels; ++voxel) {
+      cut.local = SegmentedData::localOf(voxel);
+      if (!crossings.hasCrossings(cut.local)) continue;
+      std::array<RegionLabel, 8> l;
+      for (kuhn::Corner c = 0; c < 8; ++c)
+        l[c] = reader.label(origin + cut.local + cornerOffset(c));
+      for (cut.tetrahedron = 0; cut.tetrahedron < 6; ++cut.tetrahedron)
+        addSurfaces(reader, cut, crossings.cut(cut.local, cut.tetrahedron),
+                    labelsOf(cut.tetrahedron, l));
+    }
+  }
+
+  void addSurfaces(SegmentedReader& reader, const Cut& cut, const CutTetrahedron& surfaces,
+                   const std::array<RegionLabel, 4>& l) const {
+    const auto vertexOf = [&](CutTetrahedron::Node node) {
+      if (node == CutTetrahedron::kInside) return cut.inside().vertex;
+      if (node < CutTetrahedron::kFirstFace)
+        return cut.edge(CutTetrahedron::kEdges[node][0], CutTetrahedron::kEdges[node][1]).vertex;
+      const std::size_t opposite = node - CutTetrahedron::kFirstFace;
+      return cut.face(opposite == 0 ? 1 : 0, opposite <= 1 ? 2 : 1, opposite == 3 ? 2 : 3).vertex;
+    };
+    for (const CutTetrahedron::Polygon& polygon : surfaces.polygons) {
+      std::vector<std::uint32_t> vertices;
+      for (const CutTetrahedron::Node node : polygon.nodes) vertices.push_back(vertexOf(node));
+      const RegionLabel from = l[polygon.from], to = l[polygon.to];
+      // Odd tetrahedra are mirrored; normals point to the smaller label.
+      if ((cut.tetrahedron % 2 == 1) != (from < to)) std::reverse(vertices.begin(), vertices.end());
+      const auto first = static_cast<std::uint32_t>(cut.block.triangles.size());
+      addPolygon(cut.block, vertices, {std::max(from, to), std::min(from, to)});
+      if (!isStrip(reader, cut, polygon)) continue;
+      for (std::uint32_t t = first; t < cut.block.triangles.size(); ++t)
+        cut.block.strips.push_back(t);
+    }
+    for (const auto& rim : surfaces.rims)
+      cut.block.rims.push_back({vertexOf(rim[0]), vertexOf(rim[1])});
+    for (const CutTetrahedron::Junction& junction : surfaces.junctions) {
+      std::array<RegionLabel, 3> labels{};
+      std::size_t n = 0;
+      for (std::size_t corner = 0; corner < 4; ++corner)
+        if (corner != junction.face) labels[n++] = l[corner];
+      std::sort(labels.begin(), labels.end());
+      cut.block.junctions.push_back(
+          {{vertexOf(junction.nodes[0]), vertexOf(junction.nodes[1])}, labels});
+    }
+    // Without a stored point it is a branch of the strips along one line.
+    if (surfaces.isJunctionPoint && storedPoint(reader, originOf(cut.block) + cut.local,
+                                                kuhn::tetrahedronSlot(cut.tetrahedron)))
+      cut.block.points.push_back(cut.inside().vertex);
+  }
+
+  /// Returns true if all edges that a polygon crosses have their crossing on a junction.
+  bool isStrip(SegmentedReader& reader, const Cut& cut,
+               const CutTetrahedron::Polygon& polygon) const {
+    return std::all_of(polygon.nodes.begin(), polygon.nodes.end(), [&](CutTetrahedron::Node node) {
+      if (node >= CutTetrahedron::kFirstFace) return true;
+      const auto [i, j] = CutTetrahedron::kEdges[node];
+      const kuhn::Corner low = cut.corners()[i], high = cut.corners()[j];
+      return storedPoint(reader, originOf(cut.block) + cut.local + cornerOffset(low),
+                         kuhn::edgeSlot(low ^ high))
+          .has_value();
+    });
+  }
+
+  /// Adds a polygon as a fan from the vertex with the shortest diagonals.
+  void addPolygon(MeshBlock& block, const std::vector<std::uint32_t>& vertices,
+                  const TriangleSides& sides) const {
+    const std::size_t count = vertices.size();
+    std::size_t best = 0;
+    double least = INFINITY;
+    for (std::size_t first = 0; first < count; ++first) {
+      double sum = 0;
+      for (std::size_t n = 2; n + 1 < count; ++n)
+        sum += (result_.mesh.positions[vertices[first]] -
+                result_.mesh.positions[vertices[(first + n) % count]])
+                   .length2();
+      if (sum >= least) continue;
+      least = sum;
+      best = first;
+    }
+    for (std::size_t n = 1; n + 1 < count; ++n) {
+      block.triangles.push_back(
+          {vertices[best], vertices[(best + n) % count], vertices[(best + n + 1) % count]});
+      block.sides.push_back(sides);
+    }
+  }
+
+  void orient() {
+    std::vector<char> isSheet(result_.sides.size());
+    for (std::size_t t = 0; t < isSheet.size(); ++t)
+      isSheet[t] = result_.sides[t].behind == result_.sides[t].front;
+    orientSheets(result_.mesh.triangles, isSheet);
+  }
+
   void collect() {
     std::size_t triangles = 0, junctions = 0;
     for (const MeshBlock& block : blocks_) {
@@ -396,9 +678,13 @@ class SegmentedMesher {
       from = {};
     };
     for (MeshBlock& block : blocks_) {
+      for (std::uint32_t& triangle : block.strips)
+        triangle += static_cast<std::uint32_t>(result_.mesh.triangles.size());
+      move(block.strips, result_.strips);
       move(block.triangles, result_.mesh.triangles);
       move(block.sides, result_.sides);
       move(block.junctions, result_.junctions);
+      move(block.rims, result_.rims);
       move(block.points, result_.junctionPoints);
     }
   }
@@ -429,7 +715,7 @@ TriMesh regionSurface(const SegmentedMesh& mesh, RegionLabel region) {
   constexpr std::uint32_t kUnused = 0xffffffffu;
   std::vector<std::uint32_t> vertices(mesh.mesh.positions.size(), kUnused);
   for (std::size_t t = 0; t < mesh.sides.size(); ++t) {
-    if (mesh.sides[t].behind != region && mesh.sides[t].front != region) continue;
+    if ((mesh.sides[t].behind == region) == (mesh.sides[t].front == region)) continue;
     std::array<std::uint32_t, 3> triangle{};
     for (std::size_t k = 0; k < 3; ++k) {
       std::uint32_t& vertex = vertices[mesh.mesh.triangles[t][k]];

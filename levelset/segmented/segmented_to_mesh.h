@@ -31,11 +31,17 @@ struct JunctionEdge {
   std::array<RegionLabel, 3> labels;  ///< ascending
 };
 
-/// Interfaces of a partition as one non-manifold mesh.
+/// Interfaces and sheets of a partition as one non-manifold mesh.
 struct SegmentedMesh {
-  TriMesh mesh;                      ///< each vertex is shared by all regions that meet there
-  std::vector<TriangleSides> sides;  ///< for each triangle; front < behind, so solids face the void
-  std::vector<JunctionEdge> junctions;  ///< junction curves
+  TriMesh mesh;  ///< each vertex is shared by all regions that meet there
+  /// For each triangle: front < behind, so solids face the void. Equal labels: the triangle belongs
+  /// to a sheet. Triangles of a sheet that can be oriented face the same way.
+  std::vector<TriangleSides> sides;
+  std::vector<JunctionEdge> junctions;             ///< junction curves
+  std::vector<std::array<std::uint32_t, 2>> rims;  ///< edges where a sheet ends: of one triangle
+  /// Triangles of strips without width, ascending. Where more than three sheets meet in a line, as
+  /// the pages of a book, strips along that line join junction curves of three sheets each.
+  std::vector<std::uint32_t> strips;
   /// Vertices where four regions meet, and the ends of junction curves are joined.
   std::vector<std::uint32_t> junctionPoints;
 };
@@ -45,11 +51,16 @@ struct SegmentedMesh {
 /// crosses an edge where the distances to it balance; three regions meet at a point of a face, four
 /// inside a tetrahedron. The surface of each region is closed. A region that owns no grid point
 /// does not appear. Positions are second order in the voxel size, also at junctions.
+///
+/// A field with sheets stores the crossings of the edges of the tetrahedra. There a face with one
+/// crossed edge holds a point of a rim, and one with three a point of a junction. Vertices on rims
+/// and junctions lie on those of the mesh from which the field was made.
 /// @throws ResourceLimit, Cancelled
 [[nodiscard]] SegmentedMesh segmentedToMesh(const SegmentedField& field,
                                             const SegmentedMeshOptions& options = {});
 
-/// Returns the closed surface of a region, facing outwards, without unused vertices.
+/// Returns the closed surface of a region, facing outwards, without unused vertices. Sheets inside
+/// the region have no volume, and are left out.
 [[nodiscard]] TriMesh regionSurface(const SegmentedMesh& mesh, RegionLabel region);
 /// Computes the same surface without the rest of the mesh.
 /// @throws as segmentedToMesh()

@@ -9,7 +9,10 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <numeric>
+#include <optional>
 #include <span>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -22,13 +25,19 @@
 #include "levelset/geometry/mesh_sides.h"
 #include "levelset/memory_limit.h"
 #include "levelset/mesh_sign/mesh_topology.h"
+#include "levelset/mesh_sign/self_intersections.h"
 #include "levelset/segmented/local/block_surroundings.h"
+#include "levelset/segmented/local/kuhn_cell.h"
 #include "levelset/segmented/segmented_data_vdb.h"
+#include "levelset/segmented/sources/grid_crossings.h"
+#include "levelset/segmented/sources/sheet_builder.h"
+#include "levelset/segmented/sources/sheet_features.h"
 
 namespace levelset {
 namespace {
 
 using Imath::V3d;
+using Imath::V3i;
 using openvdb::Coord;
 
 /// Returns true if a line between two points meets a triangle, its border included.
@@ -73,13 +82,19 @@ class MeshRegions {
     collectBlocks();
     listTriangles();
     report(options_.progress, 0.5);
-    joinGridPoints();
-    joinPatchSides();
-    report(options_.progress, 0.7);
-    numberRegions();
     SegmentMeshResult result;
-    result.field = makeField();
     result.patches = patchCount_;
+    if (options_.keepsSheets) {
+      runWithSheets(result);
+    } else {
+      joinGridPoints();
+      joinPatchSides();
+      report(options_.progress, 0.7);
+      numberRegions();
+      checkSides();
+      listPairs();
+      result.field = makeField(nullptr);
+    }
     report(options_.progress, 1);
     return result;
   }
@@ -98,6 +113,8 @@ class MeshRegions {
       patchOf_.push_back(patches.find(t));
       patchCount_ += patchOf_.back() == t;
     }
+    // With sheets, sides of single triangles are joined where this is safe.
+    if (options_.keepsSheets) std::iota(patchOf_.begin(), patchOf_.end(), 0u);
   }
 
   void findClosest() {
@@ -106,8 +123,8 @@ class MeshRegions {
                          {.halfWidth = options_.halfWidth + 1,
                           .maxMemory = options_.maxMemory,
                           .progress = subProgress(options_.progress, 0, 0.4)});
-    index_ = closest.triangle.shared()->scalar;
-    vector_ = closest.vector.shared()->vector;
+    index_ = nearIndex_ = closest.triangle.shared()->scalar;
+    vector_ = nearVector_ = closest.vector.shared()->vector;
   }
 
   /// Numbers the blocks with distances, and the box of all blocks with a margin of one.
@@ -228,6 +245,25 @@ class MeshRegions {
             sets_.join(setOf(at), setOf(next));
         }
       }
+    joinBlocks();
+  }
+
+  /// Joins blocks without distances with each other and with the grid points above them.
+  void joinOtherBlocks() {
+    for (std::uint32_t n = 0; n < leaves_.size() * 512; ++n) {
+      const Coord at = leaves_[n / 512]->offsetToGlobalCoord(n % 512);
+      for (int axis = 0; axis < 3; ++axis) {
+        Coord next = at;
+        next[axis] -= 1;
+        if (at[axis] % 8 == 0 && numbers_[blockIndex(SegmentedData::blockCoord(next))] < 0)
+          sets_.join(n, setOf(next));
+      }
+    }
+    joinBlocks();
+  }
+
+  /// Joins neighbouring blocks without distances.
+  void joinBlocks() {
     for (std::size_t b = 0; b < numbers_.size(); ++b) {
       if (numbers_[b] >= 0) continue;
       const Coord block = blockAt(b);
@@ -309,7 +345,6 @@ class MeshRegions {
     for (std::size_t n = 0; n < regions.size(); ++n)
       labels_[regions[n].second] = static_cast<RegionLabel>(n + 1);
     for (std::uint32_t n = 0; n < sets_.size(); ++n) labels_[n] = labels_[sets_.find(n)];
-    checkSides();
   }
 
   void checkSides() {
@@ -320,7 +355,8 @@ class MeshRegions {
       const V3d p = mesh_.positions[mesh_.triangles[t][0]];
       throw InvalidInput(fmt::format(
           "the mesh has the same region on both sides at {:.6g},{:.6g},{:.6g}; close holes and "
-          "borders, let parts that meet share their edges, or use smaller voxels",
+          "borders, let parts that meet share their edges, use smaller voxels, or keep such sheets "
+          "with --sheets",
           p.x, p.y, p.z));
     }
   }
@@ -329,7 +365,206 @@ class MeshRegions {
     return isInBox(SegmentedData::blockCoord(at)) ? labels_[setOf(at)] : kVoid;
   }
 
-  SegmentedField makeField() {
+  // === Meshes with sheets
+  void runWithSheets(SegmentMeshResult& result) {
+    constexpr int kMargin = 8;
+    const Coord size = size_ + Coord(4);
+    if (std::max({size[0], size[1], size[2]}) > 1 << 16)
+      throw ResourceLimit("the grid around the mesh is too large; use larger voxels");
+    const GridSimplices simplices(V3i(low_[0], low_[1], low_[2]) * 8 - V3i(kMargin));
+    const std::vector<GridCrossing> crossings =
+        findGridCrossings(points_, mesh_.triangles, simplices);
+    // The edges and faces that they make, and the field.
+    requireMemory(static_cast<double>(crossings.size()) * 96, memoryLeft(options_.maxMemory));
+    const std::vector<convert::TrianglePair> pairs = convert::findSelfIntersections(
+        mesh_.triangles, points_, subProgress(options_.progress, 0.5, 0.6));
+    std::vector<bool> isCrossing(mesh_.triangles.size());
+    for (const auto& [s, t] : pairs) isCrossing[s] = isCrossing[t] = true;
+    joinUncrossed(simplices, crossings);
+    joinSides(isCrossing);
+    joinEnclosed();
+    report(options_.progress, 0.7);
+    numberRegions();
+    listPairsWithSheets(simplices, crossings, isCrossing);
+    findClosestInterfaces();
+    const SheetFeatures features(points_, mesh_.triangles, pairs);
+    SheetBuilder builder(
+        points_, mesh_.triangles, simplices, crossings, features,
+        [&](const V3i& at) { return labelAt(Coord(at.x, at.y, at.z)); },
+        [&](std::uint32_t t, int side) -> std::optional<RegionLabel> {
+          const std::uint32_t set = setOfSide(t, side > 0);
+          if (isCrossing[t] || !holdsPoints_[set]) return std::nullopt;
+          return labels_[set];
+        });
+    std::vector<V3i> origins;
+    for (const auto* leaf : leaves_)
+      origins.emplace_back(leaf->origin()[0], leaf->origin()[1], leaf->origin()[2]);
+    std::sort(origins.begin(), origins.end(), [](const V3i& a, const V3i& b) {
+      return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
+    });
+    result.field = makeField(builder.run(origins));
+    result.rimEdges = features.rimCount();
+    result.crossingTriangles =
+        static_cast<std::size_t>(std::count(isCrossing.begin(), isCrossing.end(), true));
+    addThinParts(builder.narrowGaps(), result.thinParts);
+  }
+
+  /// Joins the ends of all edges of the tetrahedra of the grid that the mesh does not cross.
+  void joinUncrossed(const GridSimplices& simplices, const std::vector<GridCrossing>& crossings) {
+    sets_ = DisjointSets(leaves_.size() * 512 + numbers_.size() + 2 * mesh_.triangles.size());
+    std::vector<std::uint8_t> crossed(leaves_.size() * 512);
+    for (const GridCrossing& crossing : crossings) {
+      const V3i at = simplices.pointOf(crossing.edge);
+      const std::uint32_t set = setOf(Coord(at.x, at.y, at.z));
+      if (set < crossed.size())
+        crossed[set] |= static_cast<std::uint8_t>(1u << GridSimplices::slotOf(crossing.edge));
+    }
+    for (std::uint32_t n = 0; n < crossed.size(); ++n) {
+      const Coord at = leaves_[n / 512]->offsetToGlobalCoord(n % 512);
+      for (std::uint32_t step = 1; step < 8; ++step)
+        if (!(crossed[n] >> kuhn::edgeSlot(step) & 1))
+          sets_.join(n, setOf(at + SegmentedCell::cornerOffset(static_cast<int>(step))));
+    }
+    joinOtherBlocks();
+  }
+
+  /// Joins the sides of neighbouring triangles, and grid points with the side to which they are
+  /// closest. Leaves out triangles that cross others, whose sides lie in several regions.
+  void joinSides(const std::vector<bool>& isCrossing) {
+    forEachEdge(sortedSides(mesh_.triangles), [&](auto first, auto end) {
+      const MeshSide &a = *first, &b = *(end - 1);
+      if (end - first != 2 || isCrossing[a.triangle] || isCrossing[b.triangle]) return;
+      for (const bool isFront : {false, true})
+        sets_.join(setOfSide(a.triangle, isFront),
+                   setOfSide(b.triangle, isFront == (a.rises != b.rises)));
+    });
+    for (const auto* leaf : leaves_)
+      for (std::uint32_t v = 0; v < 512; ++v) {
+        if (!leaf->isValueOn(v)) continue;
+        const std::uint32_t t = triangleAt(*leaf, v);
+        if (isCrossing[t]) continue;
+        const Coord at = leaf->offsetToGlobalCoord(v);
+        const std::array<V3d, 3> c = corners(t);
+        if (closestOnTriangle(V3d(at[0], at[1], at[2]), c[0], c[1], c[2]).part == 6)
+          sets_.join(setOf(at), setOfSide(t, perturbedSide(c, {at[0], at[1], at[2]}) > 0));
+      }
+  }
+
+  /// Joins small sets of grid points, which surfaces around them cut off from their neighbours,
+  /// with grid points that they see up to two voxels away. Such sets lie in narrow wedges.
+  void joinEnclosed() {
+    constexpr std::uint32_t kFew = 8;
+    constexpr int kReach = 2;
+    std::vector<std::uint32_t> sizes(sets_.size());
+    for (std::uint32_t n = 0; n < leaves_.size() * 512; ++n) ++sizes[sets_.find(n)];
+    for (std::uint32_t n = 0; n < leaves_.size() * 512; ++n) {
+      if (sizes[sets_.find(n)] > kFew) continue;
+      const Coord at = leaves_[n / 512]->offsetToGlobalCoord(n % 512);
+      for (int x = -kReach; x <= kReach; ++x)
+        for (int y = -kReach; y <= kReach; ++y)
+          for (int z = -kReach; z <= kReach; ++z) {
+            const Coord to = at.offsetBy(x, y, z);
+            if (sets_.find(n) != sets_.find(setOf(to)) && sees(at, to)) sets_.join(n, setOf(to));
+          }
+    }
+  }
+  [[nodiscard]] bool sees(const Coord& from, const Coord& to) const {
+    const V3d p(from[0], from[1], from[2]), q(to[0], to[1], to[2]);
+    Coord at;
+    for (at[0] = std::min(from[0], to[0]); at[0] <= std::max(from[0], to[0]); ++at[0])
+      for (at[1] = std::min(from[1], to[1]); at[1] <= std::max(from[1], to[1]); ++at[1])
+        for (at[2] = std::min(from[2], to[2]); at[2] <= std::max(from[2], to[2]); ++at[2])
+          for (const auto& entry : trianglesAt(at))
+            if (meetsTriangle(p, q, corners(entry.second))) return false;
+    return true;
+  }
+
+  /// Lists the pairs of regions that each triangle separates. Where triangles cross each other,
+  /// only edges of the grid tell.
+  void listPairsWithSheets(const GridSimplices& simplices,
+                           const std::vector<GridCrossing>& crossings,
+                           const std::vector<bool>& isCrossing) {
+    using Entry = std::pair<std::uint32_t, std::pair<RegionLabel, RegionLabel>>;
+    // For all numbers, so that threads only read.
+    std::vector<char> holds(sets_.size());
+    for (std::uint32_t n = 0; n < leaves_.size() * 512; ++n) holds[sets_.find(n)] = true;
+    holdsPoints_.resize(sets_.size());
+    for (std::uint32_t n = 0; n < sets_.size(); ++n) holdsPoints_[n] = holds[sets_.find(n)];
+    std::vector<Entry> entries;
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+      const std::uint32_t behind = setOfSide(t, false), front = setOfSide(t, true);
+      if (!isCrossing[t] && labels_[behind] != labels_[front] && holdsPoints_[behind] &&
+          holdsPoints_[front])
+        entries.push_back({t, std::minmax(labels_[behind], labels_[front])});
+    }
+    for (std::size_t n = 0; n < crossings.size(); ++n) {
+      const GridSimplices::Key edge = crossings[n].edge;
+      if ((n > 0 && crossings[n - 1].edge == edge) ||
+          (n + 1 < crossings.size() && crossings[n + 1].edge == edge))
+        continue;
+      const V3i at = simplices.pointOf(edge),
+                to = at + offsetOfCorner(GridSimplices::slotOf(edge) + 1);
+      const RegionLabel a = labelAt(Coord(at.x, at.y, at.z)), b = labelAt(Coord(to.x, to.y, to.z));
+      if (a != b) entries.push_back({crossings[n].triangle, std::minmax(a, b)});
+    }
+    std::sort(entries.begin(), entries.end());
+    entries.erase(std::unique(entries.begin(), entries.end()), entries.end());
+    firstPair_.assign(mesh_.triangles.size() + 1, 0);
+    for (const Entry& entry : entries) {
+      ++firstPair_[entry.first + 1];
+      pairs_.push_back({entry.second.first, entry.second.second});
+    }
+    for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) firstPair_[t + 1] += firstPair_[t];
+  }
+
+  /// Computes the distances to the triangles that separate regions, without those of sheets.
+  void findClosestInterfaces() {
+    TriMesh interfaces;
+    interfaces.positions = mesh_.positions;
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+      if (firstPair_[t] == firstPair_[t + 1]) continue;
+      interfaces.triangles.push_back(mesh_.triangles[t]);
+      originals_.push_back(t);
+    }
+    nearIndex_ = nullptr;
+    nearVector_ = nullptr;
+    if (interfaces.triangles.empty()) return;
+    const ClosestTriangles closest =
+        closestTriangles(interfaces, voxelSize_,
+                         {.halfWidth = options_.halfWidth + 1,
+                          .maxMemory = options_.maxMemory,
+                          .progress = subProgress(options_.progress, 0.7, 0.8)});
+    nearIndex_ = closest.triangle.shared()->scalar;
+    nearVector_ = closest.vector.shared()->vector;
+  }
+
+  void addThinParts(const std::vector<NarrowGap>& gaps, std::vector<ThinPart>& parts) const {
+    for (const NarrowGap& gap : gaps) {
+      auto part =
+          std::lower_bound(parts.begin(), parts.end(), gap.label,
+                           [](const ThinPart& p, RegionLabel label) { return p.label < label; });
+      if (part == parts.end() || part->label != gap.label) {
+        part = parts.insert(part, ThinPart());
+        part->label = gap.label;
+        part->thickness = std::numeric_limits<double>::infinity();
+      }
+      ++part->places;
+      part->isLost = part->isLost || gap.isLost;
+      if (gap.thickness * voxelSize_ >= part->thickness) continue;
+      part->thickness = gap.thickness * voxelSize_;
+      part->position = gap.position * voxelSize_;
+    }
+  }
+
+  /// Lists the pair of regions of each triangle of a mesh without sheets.
+  void listPairs() {
+    firstPair_.resize(mesh_.triangles.size() + 1);
+    std::iota(firstPair_.begin(), firstPair_.end(), 0u);
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
+      pairs_.push_back({labelOfSide(t, false), labelOfSide(t, true)});
+  }
+
+  SegmentedField makeField(std::shared_ptr<const SheetData> sheets) {
     const float background = backgroundOf(options_.halfWidth, voxelSize_);
     const auto tiles = std::make_shared<openvdb::Int32Tree>(SegmentedData::tile(kVoid));
     for (std::size_t b = 0; b < numbers_.size(); ++b) {
@@ -343,7 +578,7 @@ class MeshRegions {
     std::sort(blocks.begin(), blocks.end(),
               [](const auto& a, const auto& b) { return a.block.origin < b.block.origin; });
     return assembleSegmented(index_->transform().copy(), options_.halfWidth, tiles,
-                             std::move(blocks));
+                             std::move(blocks), std::move(sheets));
   }
 
   [[nodiscard]] PackedBlock makeBlock(const openvdb::FloatTree::LeafNodeType& leaf,
@@ -356,21 +591,20 @@ class MeshRegions {
         row[z] = labelAt(leaf.origin() + Coord(8 * i + x, 8 * j + y, 8 * k + z));
     });
     around.findNeighbours();
-    const auto* vectors = vector_->tree().probeConstLeaf(leaf.origin());
+    const auto* near = nearIndex_ ? nearIndex_->tree().probeConstLeaf(leaf.origin()) : nullptr;
+    const auto* vectors = near ? nearVector_->tree().probeConstLeaf(leaf.origin()) : nullptr;
     std::vector<RegionLabel> others;
     for (std::uint32_t n = 0; n < 512; ++n) {
       const Coord local = SegmentedData::localOf(n);
       const RegionLabel own = around.at(local[0], local[1], local[2]);
       values.labels[n] = values.neighbours[n] = own;
       values.distances[n] = background;
-      if (!leaf.isValueOn(n)) continue;
+      if (!near || !near->isValueOn(n)) continue;
       const auto distance = static_cast<float>(lengthOf(vectors->getValue(n)) * voxelSize_);
       if (around.palette().size() > 1) around.others(n, own, 1, others);
-      const std::uint32_t t = triangleAt(leaf, n);
-      const RegionLabel behind = labelOfSide(t, false), front = labelOfSide(t, true);
-      RegionLabel neighbour = behind == own ? front : behind;
-      // At a junction the closest triangle may belong to any of the interfaces.
-      if (behind != own && front != own && !others.empty()) neighbour = others[0];
+      const std::uint32_t t = triangleAt(*near, n);
+      const RegionLabel neighbour =
+          neighbourAcross(originals_.empty() ? t : originals_[t], own, others);
       values.neighbours[n] = neighbour;
       values.distances[n] =
           others.empty() ? distance : std::min(distance, std::nextafter(background, 0.0f));
@@ -386,6 +620,21 @@ class MeshRegions {
     return labels_[setOfSide(triangle, isFront)];
   }
 
+  /// Region on the other side of a triangle.
+  [[nodiscard]] RegionLabel neighbourAcross(std::uint32_t triangle, RegionLabel own,
+                                            const std::vector<RegionLabel>& others) const {
+    for (std::uint32_t n = firstPair_[triangle]; n < firstPair_[triangle + 1]; ++n)
+      for (std::size_t side = 0; side < 2; ++side)
+        if (pairs_[n][side] == own) return pairs_[n][1 - side];
+    // At a junction the closest triangle may belong to any of the interfaces.
+    return others.empty() ? pairs_[firstPair_[triangle]][0] : others[0];
+  }
+  [[nodiscard]] bool separates(std::uint32_t triangle, RegionLabel a, RegionLabel b) const {
+    for (std::uint32_t n = firstPair_[triangle]; n < firstPair_[triangle + 1]; ++n)
+      if (std::minmax(pairs_[n][0], pairs_[n][1]) == std::minmax(a, b)) return true;
+    return false;
+  }
+
   /// Distance of a grid point to the triangles between two regions, world units.
   [[nodiscard]] float distanceTo(const Coord& at, RegionLabel own, RegionLabel other) const {
     constexpr int kReach = 2;
@@ -395,9 +644,7 @@ class MeshRegions {
       for (int y = -kReach; y <= kReach; ++y)
         for (int z = -kReach; z <= kReach; ++z)
           for (const auto& entry : trianglesAt(at.offsetBy(x, y, z))) {
-            const RegionLabel behind = labelOfSide(entry.second, false),
-                              front = labelOfSide(entry.second, true);
-            if (std::minmax(behind, front) != std::minmax(own, other)) continue;
+            if (!separates(entry.second, own, other)) continue;
             const std::array<V3d, 3> c = corners(entry.second);
             least = std::min(least, (closestOnTriangle(p, c[0], c[1], c[2]).point - p).length());
           }
@@ -412,12 +659,19 @@ class MeshRegions {
   std::size_t patchCount_ = 0;
   openvdb::FloatGrid::ConstPtr index_;
   openvdb::Vec3SGrid::ConstPtr vector_;
+  // The same for triangles that separate regions.
+  openvdb::FloatGrid::ConstPtr nearIndex_;
+  openvdb::Vec3SGrid::ConstPtr nearVector_;
+  std::vector<std::uint32_t> originals_;  ///< numbers of these triangles; empty: all of the mesh
+  std::vector<std::uint32_t> firstPair_;  ///< by triangle, and one more for the end
+  std::vector<std::array<RegionLabel, 2>> pairs_;  ///< regions that triangles separate
   std::vector<const openvdb::FloatTree::LeafNodeType*> leaves_;
   Coord low_, size_;  ///< box of blocks
   std::vector<std::int32_t> numbers_;
   std::vector<std::pair<Coord, std::uint32_t>> near_;
   DisjointSets sets_;
   std::vector<RegionLabel> labels_;
+  std::vector<char> holdsPoints_;  ///< by number: grid points belong to its set
 };
 
 }  // namespace

@@ -322,6 +322,7 @@ Json valueInfo(const Value& value, Invocation& in) {
   } else if (value.kind() == Kind::Segmentation) {
     const levelset::SegmentedField& field = value.segmentation();
     json["labels"] = field.labels();
+    if (!field.sheetLabels().empty()) json["sheets"] = field.sheetLabels();
     json["voxel_size"] = field.voxelSize();
     json["half_width"] = field.halfWidth();
     json["active_voxels"] = field.activeVoxelCount();
@@ -423,7 +424,8 @@ Operator measureOperator() {
           "a "
           "segmentation, materials has the volume and the area of each region, interfaces the area "
           "between each pair of regions, and junction_length the length of the curves where three "
-          "regions meet.",
+          "regions meet. Sheets have the same label on both sides; sheet_area is their area and "
+          "rim_length the length of their borders.",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! measure --json",
       .params = {jsonParam()},
       .operands = {{Kind::Band, Kind::Mesh, Kind::Adaptive, Kind::Segmentation}},

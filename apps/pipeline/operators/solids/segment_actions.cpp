@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/solids/sheet_report.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
 #include "levelset/inspect/measure.h"
@@ -88,13 +89,17 @@ void reportRegions(const levelset::SegmentSolidsResult& result, Invocation& in) 
 }
 
 Value segmentByMesh(Invocation& in) {
-  const levelset::SegmentMeshResult result = levelset::segmentMesh(
-      in.mesh(), in.voxelSize(in.operands[0].plan().estimate().longestSide()),
-      {.halfWidth = in.number("half-width"), .maxMemory = in.maxMemory, .progress = in.progress});
+  const levelset::SegmentMeshResult result =
+      levelset::segmentMesh(in.mesh(), in.voxelSize(in.operands[0].plan().estimate().longestSide()),
+                            {.halfWidth = in.number("half-width"),
+                             .keepsSheets = in.flag("sheets"),
+                             .maxMemory = in.maxMemory,
+                             .progress = in.progress});
   in.notes.notes.push_back(
       fmt::format("the mesh has {} patches between its junctions, and encloses "
                   "{} regions",
                   result.patches, result.field.labels().size()));
+  if (in.flag("sheets")) reportSheets(result, in);
   return Value(result.field);
 }
 
@@ -139,6 +144,7 @@ void validateSegment(const Invocation& in) {
   if (kind == Kind::Mesh) {
     in.requireVoxelSize();
   } else {
+    refuseFor(in, "sheets", "a mesh");
     refuseFor(in, "voxel", "a mesh");
     refuseFor(in, "resolution", "a mesh");
   }
@@ -182,6 +188,7 @@ Value extract(Invocation& in) {
         fmt::format("the segmentation has no region {}; its labels are {}{}", label, known,
                     labels.size() > kMost ? ", …" : ""));
   }
+  noteLostSheets(field, label, "a level set", in.notes);
   return Value(levelset::extractLabel(
       field, label,
       {.halfWidth = in.number("half-width"), .maxMemory = in.maxMemory, .progress = in.progress}));
@@ -217,7 +224,8 @@ Json measuresOf(const SegmentedField& field, const Invocation& in) {
   Imath::Box3d bounds;
   for (std::size_t t = 0; t < mesh.sides.size(); ++t)
     if (mesh.sides[t].front == levelset::kVoid) {
-      outer.triangles.push_back(mesh.mesh.triangles[t]);
+      if (mesh.sides[t].behind != levelset::kVoid)
+        outer.triangles.push_back(mesh.mesh.triangles[t]);
       for (const std::uint32_t corner : mesh.mesh.triangles[t])
         bounds.extendBy(mesh.mesh.positions[corner]);
     }
@@ -246,10 +254,11 @@ Json measuresOf(const SegmentedField& field, const Invocation& in) {
   json["junction_length"] = m.junctionLength;
   json["junction_points"] = m.junctionPoints;
   json["triangles"] = m.triangles;
+  addSheetFigures(field, m, json);
   return json;
 }
 
-Value meshOfSegmentation(const Invocation& in) {
+Value meshOfSegmentation(Invocation& in) {
   const SegmentedField& field = in.operands[0].segmentation();
   const levelset::SegmentedMeshOptions options{.maxMemory = in.maxMemory, .progress = in.progress};
   if (!in.given("label")) return Value(levelset::segmentedToMesh(field, options).mesh);
@@ -258,6 +267,7 @@ Value meshOfSegmentation(const Invocation& in) {
   if (surface.isEmpty())
     throw levelset::InvalidInput(
         fmt::format("the segmentation has no region {}; 'info' lists its labels", label));
+  noteLostSheets(field, label, "its closed surface", in.notes);
   return Value(std::move(surface));
 }
 
@@ -278,7 +288,9 @@ Operator segmentOperator() {
           "in "
           "which three or more triangles share edges, as a box with walls, separates regions, "
           "which "
-          "are numbered by decreasing volume. 'extract' turns a region into a level set again.",
+          "are numbered by decreasing volume. A mesh with borders is refused, unless --sheets "
+          "keeps "
+          "them. 'extract' turns a region into a level set again.",
       .example =
           "levelsmith box --size 4,4,2 --voxel 0.1 ! sphere --radius 1.2 --voxel 0.1 ! segment ! "
           "measure --json",
@@ -298,6 +310,10 @@ Operator segmentOperator() {
                          "voxels, at least 2",
                   .fallback = "2",
                   .range = Range::Positive},
+                 {.name = "sheets",
+                  .type = ParamType::Flag,
+                  .doc = "for a mesh: keep sheets, which have the same region on both sides, as a "
+                         "wall with a door; the mesh may have borders and cross itself"},
                  voxelParam("for a mesh: voxel size, edge length of a voxel"),
                  resolutionParam()},
       .operands = {{Kind::Band, Kind::Volume, Kind::Mesh}},

@@ -12,6 +12,6 @@ namespace pipeline {
 /// Figures of a segmentation for `measure`: the materials, their interfaces and junctions.
 [[nodiscard]] Json measuresOf(const levelset::SegmentedField& field, const Invocation& in);
 /// Makes the mesh of all interfaces, or with --label of one region.
-[[nodiscard]] Value meshOfSegmentation(const Invocation& in);
+[[nodiscard]] Value meshOfSegmentation(Invocation& in);
 
 }  // namespace pipeline
