@@ -27,7 +27,8 @@ SegmentedField edit(const SegmentedField& field, const NarrowBand& solid, Region
     throw UsageError(fmt::format("the gap is {} voxels; give 0 to 0.5", options.gap));
   if (field.isEmpty())
     throw InvalidInput("the segmentation has no interface; give one with a region");
-  EditedSpace space{.tree = nullptr, .label = label};
+  EditedSpace space;
+  space.label = label;
   if (options.over) {
     requireLabels(field, *options.over);
     space.over = *options.over;

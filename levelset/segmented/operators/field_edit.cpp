@@ -21,7 +21,7 @@ using openvdb::Coord;
 using openvdb::FloatTree;
 using openvdb::Int32Tree;
 
-constexpr std::uint32_t kVoxels = SegmentedData::kVoxels;
+constexpr std::uint32_t kEditVoxels = SegmentedData::kVoxels;
 
 /// Calls visit(block) for all blocks of an index box.
 template <typename Visit>
@@ -42,9 +42,9 @@ class SpaceEdit {
     editTiles(*tiles);
     gatherBlocks();
     tbb::parallel_for(std::size_t{0}, blocks_.size(), [&](std::size_t b) { setOwners(b); });
-    const auto distances = [&](std::size_t b, std::uint32_t n, RegionLabel own,
+    const auto distances = [&](std::size_t b, std::uint32_t n, RegionLabel,
                                const std::vector<RegionLabel>& others, std::vector<float>& result) {
-      distancesOf(b, n, own, others, result);
+      distancesOf(b, n, others, result);
     };
     SegmentedField result = packPartition(data_.transform->copy(), data_.halfWidth, tiles,
                                           std::move(blocks_), distances, progress);
@@ -105,6 +105,7 @@ class SpaceEdit {
     for (const auto& [block, number] : found) {
       blocks_.push_back({.block = block, .owners = {}});
       numbers_.push_back(number);
+      origins_.push_back(blocks_.back().origin());
       spaces_.push_back(spaceIn(block));
     }
   }
@@ -112,16 +113,16 @@ class SpaceEdit {
   void setOwners(std::size_t b) {
     OwnedBlock& block = blocks_[b];
     SegmentedReader reader(data_);
-    block.owners.resize(kVoxels);
+    block.owners.resize(kEditVoxels);
     const BlockValues& space = spaces_[b];
-    if (!space.values && valueIn(space, 0) > 0) {
-      for (std::uint32_t n = 0; n < kVoxels; ++n)
+    if ((!space.values && valueIn(space, 0) > 0) || (numbers_[b] != kNone && !losesSpace(b))) {
+      for (std::uint32_t n = 0; n < kEditVoxels; ++n)
         block.owners[n] = reader.label(block.origin() + SegmentedData::localOf(n));
       block.shorten();
       if (numbers_[b] != kNone) block.kept = packedBlockOf(data_, numbers_[b]);
       return;
     }
-    for (std::uint32_t n = 0; n < kVoxels; ++n) {
+    for (std::uint32_t n = 0; n < kEditVoxels; ++n) {
       const SegmentedReader::Nearest near =
           reader.nearest(block.origin() + SegmentedData::localOf(n));
       const float value = valueIn(space, n);
@@ -132,10 +133,17 @@ class SpaceEdit {
     block.shorten();
   }
 
-  void distancesOf(std::size_t b, std::uint32_t n, RegionLabel own,
-                   const std::vector<RegionLabel>& others, std::vector<float>& result) const {
+  /// Returns true if the space takes from a region near a block of the field.
+  [[nodiscard]] bool losesSpace(std::size_t b) const {
+    const auto first = data_.palettes.begin() + data_.blocks[numbers_[b]].palette,
+               last = data_.palettes.begin() + data_.blocks[numbers_[b] + 1].palette;
+    return std::any_of(first, last, [&](RegionLabel label) { return space_.takes(label); });
+  }
+
+  void distancesOf(std::size_t b, std::uint32_t n, const std::vector<RegionLabel>& others,
+                   std::vector<float>& result) const {
     SegmentedReader reader(data_);
-    const Coord at = blocks_[b].origin() + SegmentedData::localOf(n);
+    const Coord at = origins_[b] + SegmentedData::localOf(n);
     const SegmentedReader::Nearest near = reader.nearest(at);
     const float space = valueIn(spaces_[b], n);
     result.clear();
@@ -171,6 +179,7 @@ class SpaceEdit {
   const EditedSpace& space_;
   std::vector<OwnedBlock> blocks_;
   std::vector<std::size_t> numbers_;  ///< of the blocks in the field
+  std::vector<Coord> origins_;        ///< of the blocks
   std::vector<BlockValues> spaces_;   ///< signed distances to the space, without its sign
 };
 

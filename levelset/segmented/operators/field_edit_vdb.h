@@ -16,11 +16,11 @@ namespace levelset {
 
 /// Space that changes its region: the inside of a band, or with `sign` −1 its outside.
 struct EditedSpace {
-  const openvdb::FloatTree* tree;
+  const openvdb::FloatTree* tree = nullptr;
   float sign = 1;
   RegionLabel label = kVoid;  ///< new label
   /// Labels of the regions that it takes from, ascending. Not `label`.
-  std::vector<RegionLabel> over;
+  std::vector<RegionLabel> over = {};
   float gap = 0;  ///< largest distance over which it takes void up to another region, world units
 
   [[nodiscard]] bool takes(RegionLabel from) const {

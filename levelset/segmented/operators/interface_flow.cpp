@@ -23,7 +23,7 @@ using openvdb::Coord;
 using openvdb::FloatTree;
 using Leaf = FloatTree::LeafNodeType;
 
-constexpr std::uint32_t kVoxels = SegmentedData::kVoxels;
+constexpr std::uint32_t kLeafVoxels = SegmentedData::kVoxels;
 constexpr double kRaceHalfWidth = 3;  // voxels: of the bands before they are redistanced
 // Voxels between the end of a band and the points that a step may give to another region.
 constexpr double kFarMargin = 2;
@@ -63,7 +63,7 @@ class LeafConvolution {
         alongY_(count(side_, 8, 8)) {}
 
   template <typename Accessor>
-  void run(const Accessor& accessor, const Coord& origin, std::array<float, kVoxels>& out) {
+  void run(const Accessor& accessor, const Coord& origin, std::array<float, kLeafVoxels>& out) {
     copyPaddedLeaf(accessor, origin, radius_, radius_, padded_.data());
     convolve(padded_.data(), count(side_, side_, 1), static_cast<std::size_t>(side_), 1,
              alongZ_.data());
@@ -97,7 +97,7 @@ class LeafConvolution {
 /// Partition in the middle of a step: convolved distances, which compete for each grid point.
 class Race {
  public:
-  using Values = std::array<float, kVoxels>;
+  using Values = std::array<float, kLeafVoxels>;
 
   Race(const RegionBands& bands, const std::vector<char>& isFixed)
       : bands_(bands),
@@ -119,7 +119,7 @@ class Race {
       for (std::size_t e = firsts_[b]; e < firsts_[b + 1]; ++e) {
         const LabelledLeaf& entry = leaves_[e];
         if (isFixed_[entry.region] || kernel.empty()) {
-          std::copy_n(entry.leaf->buffer().data(), kVoxels, values_[e].begin());
+          std::copy_n(entry.leaf->buffer().data(), kLeafVoxels, values_[e].begin());
         } else {
           const auto accessor = vdb(bands_.bands[entry.region]).getConstUnsafeAccessor();
           convolution.run(accessor, entry.leaf->origin(), values_[e]);
@@ -137,7 +137,7 @@ class Race {
     const std::size_t first = firsts_[block], count = firsts_[block + 1] - first;
     results.resize(count);
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
-    for (std::uint32_t n = 0; n < kVoxels; ++n) {
+    for (std::uint32_t n = 0; n < kLeafVoxels; ++n) {
       // The two least values of the regions that move, and the least of the fixed ones.
       float least = kInfinity, second = kInfinity, wall = kInfinity;
       std::size_t winner = count;
@@ -183,7 +183,7 @@ class Race {
     for (const LabelledLeaf& entry : leaves_)
       targets.push_back(result.trees[entry.region]->probeLeaf(entry.leaf->origin()));
     tbb::parallel_for(std::size_t{0}, targets.size(), [&](std::size_t e) {
-      for (std::uint32_t n = 0; n < kVoxels; ++n)
+      for (std::uint32_t n = 0; n < kLeafVoxels; ++n)
         targets[e]->setValueOnly(n, valueOf(e, n, constants));
     });
     return result;
@@ -237,7 +237,7 @@ class Race {
     run(block, constants, values);
     std::vector<double> shares(count);
     const double fade = kFade * voxelSize_;
-    for (std::uint32_t n = 0; n < kVoxels; ++n) {
+    for (std::uint32_t n = 0; n < kLeafVoxels; ++n) {
       double sum = 0;
       std::size_t least = 0, second = count;
       for (std::size_t i = 0; i < count; ++i) {
@@ -289,13 +289,13 @@ class Race {
 void findConstants(const Race& race, const std::vector<double>& volumes,
                    const std::vector<char>& isHeld, double voxelSize,
                    std::vector<double>& constants) {
-  constexpr int kIterations = 8;
+  constexpr int kVolumeIterations = 8;
   constexpr double kEnough = 1e-6;  // relative
   std::vector<Eigen::Index> free;
   for (std::size_t r = 0; r < volumes.size(); ++r)
     if (!isHeld[r]) free.push_back(static_cast<Eigen::Index>(r));
   if (free.empty()) return;
-  for (int n = 0; n < kIterations; ++n) {
+  for (int n = 0; n < kVolumeIterations; ++n) {
     const Race::Volumes now = race.volumes(constants);
     Eigen::VectorXd missing(free.size());
     double worst = 0;
@@ -316,7 +316,7 @@ void findConstants(const Race& race, const std::vector<double>& volumes,
 
 /// Writes the values of a region into a copy of its band, which gets a half width of
 /// kRaceHalfWidth.
-void setBackground(FloatTree& tree, float background) {
+void endTilesAt(FloatTree& tree, float background) {
   auto tile = tree.beginValueOff();
   tile.setMaxDepth(FloatTree::DEPTH - 2);
   for (; tile; ++tile) tile.setValue(std::copysign(background, *tile));
@@ -324,7 +324,7 @@ void setBackground(FloatTree& tree, float background) {
 }
 
 void writeLeaf(const Race::Values& values, float sign, float background, Leaf& leaf) {
-  for (std::uint32_t n = 0; n < kVoxels; ++n) {
+  for (std::uint32_t n = 0; n < kLeafVoxels; ++n) {
     const float value = sign * values[n];
     if (std::abs(value) < background)
       leaf.setValueOn(n, value);
@@ -358,7 +358,7 @@ void correctJunctions(RegionBands& bands, const CompetingFields& fields, double 
     JunctionDistances junctions(fields);
     std::vector<std::size_t> near, regions;
     std::vector<double> distances;
-    for (std::uint32_t n = 0; n < kVoxels; ++n) {
+    for (std::uint32_t n = 0; n < kLeafVoxels; ++n) {
       near.clear();
       regions.clear();
       for (std::size_t e = first; e < first + count; ++e)
@@ -444,7 +444,7 @@ std::vector<RegionLabel> InterfaceFlow::advance(const Progress& progress) {
   for (std::size_t r = 0; r < grids.size(); ++r) {
     NarrowBand band = bands_.bands[r];
     if (grids[r]) {
-      setBackground(grids[r]->tree(), background);
+      endTilesAt(grids[r]->tree(), background);
       if (!hasInside(*grids[r])) {
         vanished.push_back(bands_.labels[r]);
         if (grids.size() > 2) fields.trees[r] = nullptr;

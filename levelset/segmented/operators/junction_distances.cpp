@@ -11,11 +11,11 @@ namespace {
 
 using Imath::V3d;
 
-constexpr int kIterations = 8;
-constexpr double kConverged = 1e-4;  // voxels
-constexpr double kLongestStep = 2;   // voxels
+constexpr int kMeetingIterations = 8;
+constexpr double kMeetingConverged = 1e-4;  // voxels
+constexpr double kLongestMove = 2;   // voxels
 // Excess, in voxels, over the least value from which on a point belongs to another region.
-constexpr double kTie = 1e-3;
+constexpr double kOwnerTie = 1e-3;
 // Largest value on an interface, voxels. Near junctions all functions are positive.
 constexpr double kLargestValue = 3;
 constexpr std::size_t kMostMeeting = 4;
@@ -49,7 +49,7 @@ std::optional<V3d> JunctionDistances::closest(const V3d& from, const V3d& start,
                                               std::span<const std::size_t> meeting) const {
   const auto count = static_cast<Eigen::Index>(meeting.size() - 1);
   V3d p = start;
-  for (int n = 0; n < kIterations; ++n) {
+  for (int n = 0; n < kMeetingIterations; ++n) {
     Eigen::MatrixXd slopes(count, 3);
     Eigen::VectorXd values(count);
     for (Eigen::Index i = 0; i < count; ++i) {
@@ -64,9 +64,9 @@ std::optional<V3d> JunctionDistances::closest(const V3d& from, const V3d& start,
     const Eigen::Vector3d away(from.x - p.x, from.y - p.y, from.z - p.z);
     const Eigen::Vector3d move =
         away - slopes.transpose() * square.inverse() * (slopes * away + values);
-    const double length = move.norm(), part = std::min(1.0, kLongestStep / length);
+    const double length = move.norm(), part = std::min(1.0, kLongestMove / length);
     p += V3d(move[0], move[1], move[2]) * (length > 0 ? part : 0);
-    if (length < kConverged) return p;
+    if (length < kMeetingConverged) return p;
   }
   return {};
 }
@@ -79,7 +79,7 @@ std::optional<std::size_t> JunctionDistances::intruder(const V3d& p,
   for (const std::size_t region : meeting)
     if (!fields_.isFixed[region]) own = std::min(own, value(region, p));
   std::optional<std::size_t> found;
-  double most = kTie;
+  double most = kOwnerTie;
   for (const std::size_t region : regions) {
     if (std::find(meeting.begin(), meeting.end(), region) != meeting.end()) continue;
     const double other = value(region, p), excess = fields_.isFixed[region] ? -other : own - other;
