@@ -4,6 +4,7 @@
 #include "apps/pipeline/operators/solids/adaptive_actions.h"
 #include "apps/pipeline/operators/solids/mesh_action.h"
 #include "apps/pipeline/operators/solids/segment_actions.h"
+#include "apps/pipeline/operators/solids/segment_edit_actions.h"
 #include "apps/pipeline/registry/operator.h"
 #include "levelset/advection/advect.h"
 #include "levelset/components/components.h"
@@ -49,16 +50,17 @@ std::vector<Operator> allOperators() {
       outliersOperator(),
       meshPointsOperator(),
       thinOperator(),
-      unionOperator(),
+      unionWithSegmentations(unionOperator()),
       intersectionOperator(),
-      differenceOperator(),
+      differenceWithSegmentations(differenceOperator()),
       segmentOperator(),
       extractOperator(),
+      relabelOperator(),
       levelSetOperator<levelset::BlendOperator>(),
       levelSetOperator<levelset::SmoothUnionOperator>(),
       levelSetOperator<levelset::SmoothIntersectionOperator>(),
       levelSetOperator<levelset::SmoothDifferenceOperator>(),
-      offsetOperator(),
+      offsetWithSegmentations(offsetOperator()),
       levelSetOperator<levelset::OpenOperator>(),
       levelSetOperator<levelset::CloseOperator>(),
       levelSetOperator<levelset::ShellOperator>(),
@@ -72,9 +74,9 @@ std::vector<Operator> allOperators() {
       levelSetOperator<levelset::FastMarchingOperator>(),
       levelSetOperator<levelset::FastSweepingOperator>(),
       levelSetOperator<levelset::ClosestPointOperator>(),
-      levelSetOperator<levelset::CurvatureFlowOperator>(),
+      flowWithSegmentations(levelSetOperator<levelset::CurvatureFlowOperator>()),
       levelSetOperator<levelset::SmoothOperator>(),
-      morphOperator(),
+      morphWithSegmentations(morphOperator()),
       transformOperator(),
       resampleOperator(),
       clipOperator(),

@@ -1,0 +1,481 @@
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "levelset/distance/redistance.h"
+#include "levelset/grids/grid_queries_vdb.h"
+#include "levelset/grids/padded_leaf_vdb.h"
+#include "levelset/progress_gate.h"
+#include "levelset/segmented/operators/interface_flow_vdb.h"
+#include "levelset/segmented/operators/junction_distances_vdb.h"
+#include "levelset/vdb.h"
+
+namespace levelset {
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatTree;
+using Leaf = FloatTree::LeafNodeType;
+
+constexpr std::uint32_t kLeafVoxels = SegmentedData::kVoxels;
+constexpr double kRaceHalfWidth = 3;  // voxels: of the bands before they are redistanced
+// Voxels between the end of a band and the points that a step may give to another region.
+constexpr double kFarMargin = 2;
+// Half of the width over which a volume fades out at an interface, voxels.
+constexpr double kFade = 1.5;
+// A sampled Gaussian of less variance differs from the continuous one.
+constexpr double kLeastVariance = 0.7;  // voxels²
+
+/// Half of a kernel with a given variance, in voxels²: a sampled Gaussian, or for small variances a
+/// mean of it and the identity.
+std::vector<float> halfKernel(double variance) {
+  const double wide = std::max(variance, kLeastVariance);
+  const int radius = static_cast<int>(std::ceil(4 * std::sqrt(wide)));
+  std::vector<double> weights;
+  double sum = 0, second = 0;
+  for (int d = 0; d <= radius; ++d) {
+    weights.push_back(std::exp(-d * d / (2 * wide)));
+    sum += (d == 0 ? 1 : 2) * weights.back();
+    second += 2 * d * d * weights.back();
+  }
+  const double share = variance * sum / second;
+  std::vector<float> kernel;
+  for (std::size_t d = 0; d < weights.size(); ++d)
+    kernel.push_back(static_cast<float>(share * weights[d] / sum + (d == 0 ? 1 - share : 0)));
+  return kernel;
+}
+
+/// Convolves the values of a leaf with a kernel along all axes.
+class LeafConvolution {
+ public:
+  explicit LeafConvolution(const std::vector<float>& kernel)
+      : kernel_(kernel),
+        radius_(static_cast<int>(kernel.size()) - 1),
+        side_(8 + 2 * radius_),
+        padded_(count(side_, side_, side_)),
+        alongZ_(count(side_, side_, 8)),
+        alongY_(count(side_, 8, 8)) {}
+
+  template <typename Accessor>
+  void run(const Accessor& accessor, const Coord& origin, std::array<float, kLeafVoxels>& out) {
+    copyPaddedLeaf(accessor, origin, radius_, radius_, padded_.data());
+    convolve(padded_.data(), count(side_, side_, 1), static_cast<std::size_t>(side_), 1,
+             alongZ_.data());
+    convolve(alongZ_.data(), static_cast<std::size_t>(side_), count(side_, 8, 1), 8,
+             alongY_.data());
+    convolve(alongY_.data(), 1, count(side_, 8, 8), 64, out.data());
+  }
+
+ private:
+  static std::size_t count(int x, int y, int z) { return static_cast<std::size_t>(x * y * z); }
+
+  /// Convolves lines of which each value is a row of `width` floats.
+  void convolve(const float* in, std::size_t lines, std::size_t lineLength, std::size_t width,
+                float* out) const {
+    const auto radius = static_cast<std::size_t>(radius_);
+    for (std::size_t line = 0; line < lines; ++line, in += lineLength, out += 8 * width)
+      for (std::size_t i = 0; i < 8 * width; ++i) {
+        const float* centre = in + i + radius * width;
+        float sum = kernel_[0] * *centre;
+        for (std::size_t d = 1; d <= radius; ++d)
+          sum += kernel_[d] * (*(centre - d * width) + centre[d * width]);
+        out[i] = sum;
+      }
+  }
+
+  const std::vector<float>& kernel_;
+  int radius_, side_;
+  std::vector<float> padded_, alongZ_, alongY_;
+};
+
+/// Partition in the middle of a step: convolved distances, which compete for each grid point.
+class Race {
+ public:
+  using Values = std::array<float, kLeafVoxels>;
+
+  Race(const RegionBands& bands, const std::vector<char>& isFixed)
+      : bands_(bands),
+        isFixed_(isFixed),
+        leaves_(labelledLeaves(bands)),
+        firsts_(firstLeaves(leaves_)),
+        voxelSize_(vdb(bands.bands.front()).voxelSize()[0]),
+        far_(vdb(bands.bands.front()).background() - static_cast<float>(kFarMargin * voxelSize_)) {}
+
+  [[nodiscard]] std::size_t blockCount() const { return firsts_.size() - 1; }
+  [[nodiscard]] const std::vector<LabelledLeaf>& leaves() const { return leaves_; }
+
+  /// Convolves the distances. Those to fixed regions, or without a kernel all, stay.
+  void convolve(const std::vector<float>& kernel, const Progress& progress) {
+    values_.resize(leaves_.size());
+    ProgressGate gate(progress, blockCount());
+    tbb::parallel_for(std::size_t{0}, blockCount(), [&](std::size_t b) {
+      LeafConvolution convolution(kernel);
+      for (std::size_t e = firsts_[b]; e < firsts_[b + 1]; ++e) {
+        const LabelledLeaf& entry = leaves_[e];
+        if (isFixed_[entry.region] || kernel.empty()) {
+          std::copy_n(entry.leaf->buffer().data(), kLeafVoxels, values_[e].begin());
+        } else {
+          const auto accessor = vdb(bands_.bands[entry.region]).getConstUnsafeAccessor();
+          convolution.run(accessor, entry.leaf->origin(), values_[e]);
+        }
+        for (float& value : values_[e]) value *= bands_.sign(entry.region);
+      }
+    });
+  }
+
+  /// Computes, for each leaf of a block, a function that is negative in the new region: half of the
+  /// difference to the least value of the others.
+  /// @param results  one for each leaf
+  void run(std::size_t block, const std::vector<double>& constants,
+           std::vector<Values>& results) const {
+    const std::size_t first = firsts_[block], count = firsts_[block + 1] - first;
+    results.resize(count);
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    for (std::uint32_t n = 0; n < kLeafVoxels; ++n) {
+      // The two least values of the regions that move, and the least of the fixed ones.
+      float least = kInfinity, second = kInfinity, wall = kInfinity;
+      std::size_t winner = count;
+      for (std::size_t i = 0; i < count; ++i) {
+        const float value = valueOf(first + i, n, constants);
+        if (isFixed_[leaves_[first + i].region]) {
+          wall = std::min(wall, value);
+        } else if (value < least) {
+          second = least;
+          least = value;
+          winner = i;
+        } else {
+          second = std::min(second, value);
+        }
+      }
+      for (std::size_t i = 0; i < count; ++i) {
+        const std::size_t e = first + i;
+        const std::size_t region = leaves_[e].region;
+        const float old = bands_.sign(region) * leaves_[e].leaf->getValue(n);
+        if (std::abs(old) >= far_ || isFixed_[region]) {
+          results[i][n] = old;
+          continue;
+        }
+        const float rival = i == winner ? second : least;
+        const float value = (valueOf(e, n, constants) - rival) / 2;
+        results[i][n] = std::max(value, -wall);
+      }
+    }
+  }
+
+  /// Makes trees of the functions that compete.
+  [[nodiscard]] CompetingFields fields(const std::vector<double>& constants) const {
+    CompetingFields result{{}, isFixed_, voxelSize_};
+    for (std::size_t r = 0; r < bands_.bands.size(); ++r) {
+      result.trees.push_back(std::make_shared<FloatTree>(vdb(bands_.bands[r]).tree()));
+      if (bands_.sign(r) > 0) continue;
+      auto tile = result.trees[r]->beginValueOff();
+      tile.setMaxDepth(FloatTree::DEPTH - 2);
+      for (; tile; ++tile) tile.setValue(-*tile);
+      result.trees[r]->root().setBackground(-result.trees[r]->background(), false);
+    }
+    std::vector<Leaf*> targets;
+    for (const LabelledLeaf& entry : leaves_)
+      targets.push_back(result.trees[entry.region]->probeLeaf(entry.leaf->origin()));
+    tbb::parallel_for(std::size_t{0}, targets.size(), [&](std::size_t e) {
+      for (std::uint32_t n = 0; n < kLeafVoxels; ++n)
+        targets[e]->setValueOnly(n, valueOf(e, n, constants));
+    });
+    return result;
+  }
+
+  /// Volumes of the regions, voxels, and their derivatives by the constants.
+  struct Volumes {
+    Eigen::VectorXd volumes;
+    Eigen::MatrixXd derivatives;
+  };
+  [[nodiscard]] Volumes volumes(const std::vector<double>& constants) const {
+    const auto regions = static_cast<Eigen::Index>(bands_.bands.size());
+    std::vector<BlockVolumes> parts(blockCount());
+    tbb::parallel_for(std::size_t{0}, blockCount(),
+                      [&](std::size_t b) { parts[b] = volumesOf(b, constants); });
+    Volumes sum{Eigen::VectorXd::Zero(regions), Eigen::MatrixXd::Zero(regions, regions)};
+    for (Eigen::Index r = 0; r < regions; ++r)
+      sum.volumes[r] = tileVolume(static_cast<std::size_t>(r));
+    for (std::size_t b = 0; b < blockCount(); ++b) {
+      const std::size_t first = firsts_[b], count = firsts_[b + 1] - first;
+      for (std::size_t i = 0; i < count; ++i) {
+        const auto r = static_cast<Eigen::Index>(leaves_[first + i].region);
+        sum.volumes[r] += parts[b].volumes[i];
+        for (std::size_t j = 0; j < count; ++j) {
+          const double area = parts[b].areas[i * count + j];
+          const auto s = static_cast<Eigen::Index>(leaves_[first + j].region);
+          sum.derivatives(r, r) -= area;
+          sum.derivatives(r, s) += area;
+        }
+      }
+    }
+    return sum;
+  }
+
+ private:
+  [[nodiscard]] float valueOf(std::size_t leaf, std::uint32_t n,
+                              const std::vector<double>& constants) const {
+    return values_[leaf][n] + static_cast<float>(constants[leaves_[leaf].region]);
+  }
+
+  struct BlockVolumes {
+    std::vector<double> volumes, areas;  ///< by leaf; by leaf and leaf, per world unit of constant
+  };
+  /// Sums the shares of the regions in each voxel. A share fades out over an interface, and all
+  /// shares of a voxel add up to one.
+  [[nodiscard]] BlockVolumes volumesOf(std::size_t block,
+                                       const std::vector<double>& constants) const {
+    const std::size_t count = firsts_[block + 1] - firsts_[block];
+    BlockVolumes result{std::vector<double>(count), std::vector<double>(count * count)};
+    std::vector<Values> values;
+    run(block, constants, values);
+    std::vector<double> shares(count);
+    const double fade = kFade * voxelSize_;
+    for (std::uint32_t n = 0; n < kLeafVoxels; ++n) {
+      double sum = 0;
+      std::size_t least = 0, second = count;
+      for (std::size_t i = 0; i < count; ++i) {
+        shares[i] = std::clamp(0.5 - static_cast<double>(values[i][n]) / (2 * fade), 0.0, 1.0);
+        sum += shares[i];
+        if (i == 0) continue;
+        if (values[i][n] < values[least][n]) {
+          second = least;
+          least = i;
+        } else if (second == count || values[i][n] < values[second][n]) {
+          second = i;
+        }
+      }
+      if (!(sum > 0)) continue;
+      for (std::size_t i = 0; i < count; ++i) result.volumes[i] += shares[i] / sum;
+      const auto isNear = [&](std::size_t i) {
+        return i < count && std::abs(static_cast<double>(values[i][n])) < fade &&
+               !isFixed_[leaves_[firsts_[block] + i].region];
+      };
+      if (!isNear(least) || !isNear(second)) continue;
+      result.areas[least * count + second] += 1 / (4 * fade);
+      result.areas[second * count + least] += 1 / (4 * fade);
+    }
+    return result;
+  }
+
+  /// Volume of the tiles inside a region, voxels. That of the void counts as none.
+  [[nodiscard]] double tileVolume(std::size_t region) const {
+    if (bands_.labels[region] == kVoid) return 0;
+    double sum = 0;
+    auto it = vdb(bands_.bands[region]).tree().cbeginValueAll();
+    it.setMaxDepth(FloatTree::DEPTH - 2);  // tiles only
+    for (; it; ++it)
+      if (*it < 0) sum += static_cast<double>(it.getBoundingBox().volume());
+    return sum;
+  }
+
+  const RegionBands& bands_;
+  const std::vector<char>& isFixed_;
+  std::vector<LabelledLeaf> leaves_;
+  std::vector<std::size_t> firsts_;
+  std::vector<Values> values_;  ///< by leaf; negative inside, for the void too
+  double voxelSize_;
+  float far_;
+};
+
+/// Finds the constants that give the regions their volumes, by Newton's method.
+/// @param constants  start, and result; that of the void and of fixed regions stays
+void findConstants(const Race& race, const std::vector<double>& volumes,
+                   const std::vector<char>& isHeld, double voxelSize,
+                   std::vector<double>& constants) {
+  constexpr int kVolumeIterations = 8;
+  constexpr double kEnough = 1e-6;  // relative
+  std::vector<Eigen::Index> free;
+  for (std::size_t r = 0; r < volumes.size(); ++r)
+    if (!isHeld[r]) free.push_back(static_cast<Eigen::Index>(r));
+  if (free.empty()) return;
+  for (int n = 0; n < kVolumeIterations; ++n) {
+    const Race::Volumes now = race.volumes(constants);
+    Eigen::VectorXd missing(free.size());
+    double worst = 0;
+    for (std::size_t i = 0; i < free.size(); ++i) {
+      const double wanted = volumes[static_cast<std::size_t>(free[i])];
+      missing[static_cast<Eigen::Index>(i)] = wanted - now.volumes[free[i]];
+      worst = std::max(worst, std::abs(wanted - now.volumes[free[i]]) / std::max(wanted, 1.0));
+    }
+    if (worst < kEnough) return;
+    const Eigen::MatrixXd matrix = now.derivatives(free, free);
+    // Between fixed walls the sum of all volumes does not change, and the matrix is singular.
+    const Eigen::VectorXd change = matrix.completeOrthogonalDecomposition().solve(missing);
+    for (std::size_t i = 0; i < free.size(); ++i)
+      constants[static_cast<std::size_t>(free[i])] +=
+          std::clamp(change[static_cast<Eigen::Index>(i)], -voxelSize, voxelSize);
+  }
+}
+
+/// Writes the values of a region into a copy of its band, which gets a half width of
+/// kRaceHalfWidth.
+void endTilesAt(FloatTree& tree, float background) {
+  auto tile = tree.beginValueOff();
+  tile.setMaxDepth(FloatTree::DEPTH - 2);
+  for (; tile; ++tile) tile.setValue(std::copysign(background, *tile));
+  tree.root().setBackground(background, /*updateChildNodes=*/false);
+}
+
+void writeLeaf(const Race::Values& values, float sign, float background, Leaf& leaf) {
+  for (std::uint32_t n = 0; n < kLeafVoxels; ++n) {
+    const float value = sign * values[n];
+    if (std::abs(value) < background)
+      leaf.setValueOn(n, value);
+    else
+      leaf.setValueOff(n, std::copysign(background, value));
+  }
+}
+
+/// Replaces the distances near junctions. Creases of surfaces, at which distances are less exact,
+/// end there.
+/// @param bands   distances to the new regions
+/// @param fields  functions that competed for them
+/// @param radius  distance from junctions, voxels
+void correctJunctions(RegionBands& bands, const CompetingFields& fields, double radius) {
+  constexpr double kLargestChange = 1;  // voxels
+  const double voxelSize = fields.voxelSize;
+  const std::vector<LabelledLeaf> leaves = labelledLeaves(bands);
+  const std::vector<std::size_t> firsts = firstLeaves(leaves);
+  std::vector<Leaf*> targets(leaves.size());
+  {
+    std::vector<openvdb::FloatGrid*> grids;
+    for (std::size_t r = 0; r < bands.bands.size(); ++r)
+      grids.push_back(fields.isFixed[r] ? nullptr : &editVdb(bands.bands[r]));
+    for (std::size_t e = 0; e < leaves.size(); ++e)
+      if (grids[leaves[e].region])
+        targets[e] = grids[leaves[e].region]->tree().probeLeaf(leaves[e].leaf->origin());
+  }
+  tbb::parallel_for(std::size_t{0}, firsts.size() - 1, [&](std::size_t b) {
+    const std::size_t first = firsts[b], count = firsts[b + 1] - first;
+    if (count < 3) return;
+    JunctionDistances junctions(fields);
+    std::vector<std::size_t> near, regions;
+    std::vector<double> distances;
+    for (std::uint32_t n = 0; n < kLeafVoxels; ++n) {
+      near.clear();
+      regions.clear();
+      for (std::size_t e = first; e < first + count; ++e)
+        if (std::abs(static_cast<double>(leaves[e].leaf->getValue(n))) < radius * voxelSize) {
+          near.push_back(e);
+          regions.push_back(leaves[e].region);
+        }
+      if (near.size() < 3) continue;
+      junctions.find(leaves[first].leaf->offsetToGlobalCoord(n), regions, distances);
+      for (std::size_t i = 0; i < near.size(); ++i) {
+        if (!targets[near[i]] || distances[i] < 0) continue;
+        const float old = targets[near[i]]->getValue(n);
+        const auto distance = static_cast<float>(distances[i] * voxelSize);
+        if (std::abs(distance - std::abs(old)) < kLargestChange * voxelSize)
+          targets[near[i]]->setValueOnly(n, std::copysign(distance, old));
+      }
+    }
+  });
+}
+
+}  // namespace
+
+InterfaceFlow::InterfaceFlow(RegionBands bands, std::vector<char> isFixed, double step,
+                             bool keepsVolumes, std::size_t maxMemory)
+    : bands_(std::move(bands)),
+      isFixed_(std::move(isFixed)),
+      constants_(bands_.bands.size(), 0),
+      kernelVariance_(2 * step),
+      kernel_(halfKernel(kernelVariance_)),
+      maxMemory_(maxMemory) {
+  if (!keepsVolumes) return;
+  Race race(bands_, isFixed_);
+  race.convolve({}, {});
+  const Eigen::VectorXd volumes = race.volumes(constants_).volumes;
+  volumes_.assign(volumes.begin(), volumes.end());
+}
+
+double InterfaceFlow::halfWidthFor(double step) {
+  constexpr double kLeast = 6;
+  return std::max(kLeast, std::ceil(kFarMargin + 4 * std::sqrt(2 * step)));
+}
+
+std::vector<RegionLabel> InterfaceFlow::advance(const Progress& progress) {
+  const double voxelSize = vdb(bands_.bands.front()).voxelSize()[0],
+               halfWidth = bands_.bands.front().halfWidth();
+  const float background = backgroundOf(kRaceHalfWidth, voxelSize);
+  Race race(bands_, isFixed_);
+  race.convolve(kernel_, subProgress(progress, 0, 0.3));
+  if (!volumes_.empty()) {
+    std::vector<char> isHeld = isFixed_;
+    isHeld[0] = 1;  // the void
+    findConstants(race, volumes_, isHeld, voxelSize, constants_);
+  }
+
+  // === New regions
+  std::vector<openvdb::FloatGrid::Ptr> grids(bands_.bands.size());
+  for (std::size_t r = 0; r < grids.size(); ++r)
+    if (!isFixed_[r]) grids[r] = vdb(bands_.bands[r]).deepCopy();
+  std::vector<Leaf*> targets(race.leaves().size());
+  for (std::size_t e = 0; e < targets.size(); ++e) {
+    const LabelledLeaf& entry = race.leaves()[e];
+    if (grids[entry.region])
+      targets[e] = grids[entry.region]->tree().probeLeaf(entry.leaf->origin());
+  }
+  std::vector<std::size_t> firsts = firstLeaves(race.leaves());
+  tbb::parallel_for(std::size_t{0}, race.blockCount(), [&](std::size_t b) {
+    std::vector<Race::Values> values;
+    race.run(b, constants_, values);
+    for (std::size_t e = firsts[b]; e < firsts[b + 1]; ++e)
+      if (targets[e])
+        writeLeaf(values[e - firsts[b]], bands_.sign(race.leaves()[e].region), background,
+                  *targets[e]);
+  });
+
+  // === Distances
+  CompetingFields fields;
+  if (grids.size() > 2) fields = race.fields(constants_);
+  std::vector<RegionLabel> vanished;
+  RegionBands next;
+  std::vector<char> isFixed;
+  std::vector<double> volumes, constants;
+  const bool hasTwo = grids.size() == 2 && grids[0] && grids[1];
+  for (std::size_t r = 0; r < grids.size(); ++r) {
+    NarrowBand band = bands_.bands[r];
+    if (grids[r]) {
+      endTilesAt(grids[r]->tree(), background);
+      if (!hasInside(*grids[r])) {
+        vanished.push_back(bands_.labels[r]);
+        if (grids.size() > 2) fields.trees[r] = nullptr;
+        continue;
+      }
+      const double done = static_cast<double>(r) / static_cast<double>(grids.size());
+      // Between two regions there is one interface.
+      band = hasTwo && r == 1 && !next.bands.empty()
+                 ? next.bands[0]
+                 : redistance(makeBand(std::move(grids[r])),
+                              {.halfWidth = halfWidth,
+                               .maxMemory = maxMemory_,
+                               .progress = subProgress(progress, 0.4 + 0.6 * done, 1)});
+    }
+    next.labels.push_back(bands_.labels[r]);
+    next.bands.push_back(std::move(band));
+    isFixed.push_back(isFixed_[r]);
+    constants.push_back(constants_[r]);
+    if (!volumes_.empty()) volumes.push_back(volumes_[r]);
+  }
+  if (grids.size() > 2) {
+    std::erase(fields.trees, nullptr);
+    fields.isFixed = isFixed;
+    const double deviation = std::sqrt(kernelVariance_);
+    correctJunctions(next, fields, std::min(halfWidth - 0.5, 1 + 4 * deviation));
+  }
+  bands_ = std::move(next);
+  isFixed_ = std::move(isFixed);
+  constants_ = std::move(constants);
+  volumes_ = std::move(volumes);
+  return vanished;
+}
+
+}  // namespace levelset

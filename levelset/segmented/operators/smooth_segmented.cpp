@@ -1,0 +1,78 @@
+#include "levelset/segmented/operators/smooth_segmented.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "levelset/error.h"
+#include "levelset/segmented/operators/interface_flow_vdb.h"
+#include "levelset/segmented/operators/region_bands_vdb.h"
+
+namespace levelset {
+namespace {
+
+constexpr double kDefaultStep = 1;        // voxels²
+constexpr double kLongestFlowStep = 4;     // voxels²
+constexpr double kBandsDone = 0.1;  // progress
+
+void checkSmooth(const SegmentedField& field, double time, const SmoothSegmentedOptions& options) {
+  if (!(time >= 0) || !std::isfinite(time))
+    throw UsageError(fmt::format("the time is {}; give a number of at least 0", time));
+  if (options.steps && *options.steps == 0)
+    throw UsageError("the number of steps is 0; give at least 1");
+  if (field.isEmpty())
+    throw InvalidInput("the segmentation has no interface; give one with a region");
+  const std::vector<RegionLabel> labels = field.labels();
+  for (const RegionLabel label : options.fixed)
+    if (label != kVoid && !std::binary_search(labels.begin(), labels.end(), label))
+      throw UsageError(
+          fmt::format("region {} is to be fixed, but the segmentation has no such region; give "
+                      "labels that it has",
+                      label));
+}
+
+}  // namespace
+
+SmoothSegmentedResult smoothSegmented(const SegmentedField& field, double time,
+                                      const SmoothSegmentedOptions& options) {
+  checkSmooth(field, time, options);
+  SmoothSegmentedResult result;
+  if (time == 0) {
+    result.field = field;
+    return result;
+  }
+  const double inVoxels = time / (field.voxelSize() * field.voxelSize());
+  result.steps =
+      options.steps.value_or(static_cast<std::size_t>(std::max(1.0, std::ceil(inVoxels / kDefaultStep))));
+  const double step = inVoxels / static_cast<double>(result.steps);
+  if (step > kLongestFlowStep)
+    throw UsageError(fmt::format(
+        "a step of {:.4g} is longer than {:.4g}, four voxels squared; give at least {:.0f} steps",
+        time / static_cast<double>(result.steps), kLongestFlowStep * field.voxelSize() * field.voxelSize(),
+        std::ceil(inVoxels / kLongestFlowStep)));
+
+  RegionBands bands = regionBands(field, InterfaceFlow::halfWidthFor(step), options.maxMemory,
+                                  subProgress(options.progress, 0, kBandsDone));
+  std::vector<char> isFixed;
+  for (const RegionLabel label : bands.labels)
+    isFixed.push_back(std::find(options.fixed.begin(), options.fixed.end(), label) !=
+                      options.fixed.end());
+  InterfaceFlow flow(std::move(bands), std::move(isFixed), step, options.keepsVolumes,
+                     options.maxMemory);
+  const double count = static_cast<double>(result.steps);
+  for (std::size_t n = 0; n < result.steps; ++n) {
+    const double done = static_cast<double>(n) / count, next = static_cast<double>(n + 1) / count;
+    const std::vector<RegionLabel> vanished =
+        flow.advance(subProgress(options.progress, kBandsDone + 0.8 * done, kBandsDone + 0.8 * next));
+    for (const RegionLabel label : vanished) result.vanished.push_back({label, next * time});
+    if (flow.bands().bands.size() < 2)
+      throw InvalidInput(fmt::format(
+          "all regions vanish before the time {:.4g}; give a shorter time", next * time));
+  }
+  result.field = fieldOfBands(flow.bands(), field.halfWidth(),
+                              subProgress(options.progress, kBandsDone + 0.8, 1));
+  return result;
+}
+
+}  // namespace levelset

@@ -1,0 +1,278 @@
+// Motion of the interfaces of a partition by mean curvature: speed, angles, volumes.
+
+#include "levelset/segmented/operators/smooth_segmented.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <vector>
+
+#include "levelset/curvature_flow/curvature_flow.h"
+#include "levelset/error.h"
+#include "levelset/inspect/compare.h"
+#include "levelset/segmented/extract_label.h"
+#include "levelset/segmented/measure_segmented.h"
+#include "levelset/segmented/segment_solids.h"
+#include "levelset/shapes/shapes.h"
+#include "tests/support/measured.h"
+#include "tests/support/segmented.h"
+#include "tests/support/threads.h"
+
+namespace smooth_segmented_test {
+
+using namespace levelset;
+using Imath::V3d;
+using std::numbers::pi;
+using support::interfaceDefects;
+using support::InterfaceDefects;
+using support::measured;
+using support::measuredOrder;
+
+const V3d kCentre(0.013, 0.021, 0.037);
+
+SegmentedField ball(double radius, double voxel) {
+  return segmentSolids(std::vector<NarrowBand>{makeSphere(radius, kCentre, voxel)}).field;
+}
+
+TEST(SmoothSegmented, ShrinksBallsWithSecondOrder) {
+  constexpr double kTime = 0.1;
+  const double exact = std::sqrt(1 - 4 * kTime);
+  std::vector<double> errors;
+  for (const double voxel : {0.2, 0.1 * std::numbers::sqrt2, 0.1}) {
+    const SmoothSegmentedResult result = smoothSegmented(ball(1, voxel), kTime);
+    const SegmentedMesh mesh = segmentedToMesh(result.field);
+    double sum = 0;
+    for (const V3d& p : mesh.mesh.positions) sum += (p - kCentre).length() - exact;
+    errors.push_back(std::abs(sum) / static_cast<double>(mesh.mesh.positions.size()));
+  }
+  EXPECT_LT(errors[0], measured(0.0163));
+  EXPECT_LT(errors[2], measured(0.0044));
+  EXPECT_GT(std::log2(errors[0] / errors[2]), measuredOrder(1.89));
+}
+
+TEST(SmoothSegmented, AgreesWithCurvatureFlow) {
+  constexpr double kTime = 0.05, kVoxel = 0.1;
+  // A peanut: its waist moves outwards, its ends move inwards.
+  const NarrowBand solid = support::sampleBand(
+      [](const V3d& p) {
+        const double a = (p - V3d(0.5, 0, 0)).length() - 0.8,
+                     b = (p + V3d(0.5, 0, 0)).length() - 0.8;
+        return -std::log(std::exp(-4 * a) + std::exp(-4 * b)) / 4;
+      },
+      {V3d(-1.5), V3d(1.5)}, kVoxel, 4);
+  const NarrowBand smooth = curvatureFlow(solid, kTime).band;
+  const SegmentedField field =
+      smoothSegmented(segmentSolids(std::vector<NarrowBand>{solid}).field, kTime).field;
+  const Comparison difference = compare(extractLabel(field, 1), smooth);
+  EXPECT_LT(difference.hausdorff() / kVoxel, measured(0.001));  // voxels
+  // The surface has moved by more than a voxel.
+  EXPECT_GT(compare(solid, smooth).hausdorff() / kVoxel, 1);
+}
+
+/// Point in a plane across a junction.
+struct PlanePoint {
+  double x, y;
+};
+
+/// Direction in which an interface leaves a junction, radians. Fits a parabola to its vertices from
+/// 2 to 6 voxels off the junction.
+/// @param place  position of a point in the plane; empty: the point does not count
+template <typename Place>
+double directionOf(const SegmentedMesh& mesh, TriangleSides sides, const PlanePoint& junction,
+                   double voxel, const Place& place) {
+  std::vector<std::uint32_t> vertices;
+  for (std::size_t t = 0; t < mesh.sides.size(); ++t)
+    if (mesh.sides[t] == sides)
+      vertices.insert(vertices.end(), mesh.mesh.triangles[t].begin(), mesh.mesh.triangles[t].end());
+  std::sort(vertices.begin(), vertices.end());
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  // Unit vectors from the junction are linear in the distance, along a parabola.
+  double n = 0, s1 = 0, s2 = 0, x0 = 0, x1 = 0, y0 = 0, y1 = 0;
+  for (const std::uint32_t v : vertices) {
+    const std::optional<PlanePoint> p = place(mesh.mesh.positions[v]);
+    if (!p) continue;
+    const double x = p->x - junction.x, y = p->y - junction.y, s = std::hypot(x, y);
+    if (s < 2 * voxel || s > 6 * voxel) continue;
+    n += 1;
+    s1 += s;
+    s2 += s * s;
+    x0 += x / s;
+    x1 += x;
+    y0 += y / s;
+    y1 += y;
+  }
+  return std::atan2(y0 * s2 - y1 * s1, x0 * s2 - x1 * s1);
+}
+
+/// Largest difference of the three angles at a junction from 120°, degrees.
+/// @param labels  of the regions that meet there, ascending
+template <typename Place>
+double angleError(const SegmentedMesh& mesh, const std::array<RegionLabel, 3>& labels, double voxel,
+                  const Place& place) {
+  PlanePoint junction{0, 0};
+  double count = 0;
+  for (const JunctionEdge& edge : mesh.junctions) {
+    if (edge.labels != labels) continue;
+    const std::optional<PlanePoint> p = place(mesh.mesh.positions[edge.vertices[0]]);
+    if (!p) continue;
+    junction.x += p->x;
+    junction.y += p->y;
+    ++count;
+  }
+  junction.x /= count;
+  junction.y /= count;
+  std::array<double, 3> directions = {
+      directionOf(mesh, {labels[1], labels[0]}, junction, voxel, place),
+      directionOf(mesh, {labels[2], labels[0]}, junction, voxel, place),
+      directionOf(mesh, {labels[2], labels[1]}, junction, voxel, place)};
+  std::sort(directions.begin(), directions.end());
+  double worst = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double next = k < 2 ? directions[k + 1] : directions[0] + 2 * pi;
+    worst = std::max(worst, std::abs(next - directions[k] - 2 * pi / 3) * 180 / pi);
+  }
+  return worst;
+}
+
+/// Prism over a triangle with equal sides, cut by three half-planes that meet at right and straight
+/// angles. Three straight interfaces at 120° that end on the sides are at rest.
+constexpr double kInradius = 0.8, kHalfHeight = 0.25;
+SegmentedField junctionInAPrism(double voxel) {
+  const auto prism = [](const V3d& p) {
+    double d = std::abs(p.z) - kHalfHeight;
+    for (int k = 0; k < 3; ++k) {
+      const double angle = pi + 2 * pi / 3 * k;
+      d = std::max(d, p.x * std::cos(angle) + p.y * std::sin(angle) - kInradius);
+    }
+    return d;
+  };
+  const auto part = [&](double sign) {
+    return support::sampleBand(
+        [&, sign](const V3d& p) {
+          return std::max({prism(p), 0.013 - p.x, sign * (p.y - 0.021)});
+        },
+        {V3d(-kInradius, -2, -kHalfHeight), V3d(2 * kInradius, 2, kHalfHeight)}, voxel);
+  };
+  const NarrowBand whole = support::sampleBand(
+      prism, {V3d(-kInradius, -2, -kHalfHeight), V3d(2 * kInradius, 2, kHalfHeight)}, voxel);
+  return segmentSolids(std::vector<NarrowBand>{whole, part(1), part(-1)}).field;
+}
+std::optional<PlanePoint> inThePrism(const V3d& p) {
+  if (std::abs(p.z) > kHalfHeight / 2) return {};
+  return PlanePoint{p.x, p.y};
+}
+
+TEST(SmoothSegmented, RelaxesAStraightJunctionTo120Degrees) {
+  constexpr double kVoxel = 0.1;
+  const SegmentedField field = junctionInAPrism(kVoxel);
+  const std::array<RegionLabel, 3> labels = {1, 2, 3};
+  // 180° in place of 120°.
+  EXPECT_GT(angleError(segmentedToMesh(field), labels, kVoxel, inThePrism), 50);
+  const SmoothSegmentedResult result = smoothSegmented(field, 0.8, {.steps = 20, .fixed = {kVoid}});
+  const SegmentedMesh mesh = segmentedToMesh(result.field);
+  EXPECT_LT(angleError(mesh, labels, kVoxel, inThePrism), measured(0.01, 1));
+  EXPECT_EQ(interfaceDefects(mesh), InterfaceDefects());
+  // The walls do not move.
+  const SegmentedMeasurement before = measureSegmented(field), after = measureSegmented(mesh);
+  EXPECT_NEAR(after.volume / before.volume, 1, measured(1e-5));
+}
+
+/// Ball cut into two equal halves.
+SegmentedField halves(double voxel, const V3d& axis) {
+  std::vector<NarrowBand> solids;
+  for (const double sign : {1.0, -1.0})
+    solids.push_back(support::sampleBand(
+        [&](const V3d& p) {
+          return std::max(sign * (p - kCentre).dot(axis), (p - kCentre).length() - 1);
+        },
+        {kCentre - V3d(1), kCentre + V3d(1)}, voxel));
+  return segmentSolids(solids).field;
+}
+
+TEST(SmoothSegmented, MakesTheStandardDoubleBubble) {
+  constexpr double kVoxel = 0.1;
+  const V3d axis(0.6, 0.48, 0.64);
+  const SmoothSegmentedResult result =
+      smoothSegmented(halves(kVoxel, axis), 0.4, {.steps = 20, .keepsVolumes = true});
+  const SegmentedMesh mesh = segmentedToMesh(result.field);
+  EXPECT_EQ(interfaceDefects(mesh), InterfaceDefects());
+  const SegmentedMeasurement m = measureSegmented(mesh);
+  // Caps of radius r, which meet a flat disc at 120°. Each bubble has the volume 9 π r³ / 8.
+  const double volume = 2 * pi / 3, r = std::cbrt(16.0 / 27);
+  ASSERT_EQ(m.interfaces.size(), 3u);
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_NEAR(m.regions[k + 1].volume / volume, 1, measured(1e-5, 1e-3));
+    EXPECT_NEAR(m.interfaces[k].area / (3 * pi * r * r), 1, measured(1e-5, 5e-3));
+  }
+  EXPECT_NEAR(m.interfaces[2].area / (0.75 * pi * r * r), 1, measured(1e-5, 5e-3));
+  EXPECT_NEAR(m.junctionLength / (std::sqrt(3.0) * pi * r), 1, measured(1e-5));
+  const auto meridian = [&](const V3d& world) -> std::optional<PlanePoint> {
+    const V3d p = world - kCentre;
+    const double along = p.dot(axis);
+    return PlanePoint{along, (p - axis * along).length()};
+  };
+  EXPECT_LT(angleError(mesh, {0, 1, 2}, kVoxel, meridian), measured(0.01, 1));
+}
+
+TEST(SmoothSegmented, KeepsTheVolumesOfATripleBubble) {
+  constexpr double kVoxel = 0.1;
+  const support::Frame frame = support::turnedFrame(kCentre, 0.7);
+  const SegmentedField field = segmentSolids(support::ballSectors(frame, 1, kVoxel)).field;
+  const SmoothSegmentedResult result =
+      smoothSegmented(field, 0.2, {.steps = 10, .keepsVolumes = true});
+  const SegmentedMesh mesh = segmentedToMesh(result.field);
+  EXPECT_EQ(interfaceDefects(mesh), InterfaceDefects());
+  EXPECT_EQ(mesh.junctionPoints.size(), 2u);
+  const SegmentedMeasurement m = measureSegmented(mesh);
+  for (std::size_t k = 1; k < 4; ++k)
+    EXPECT_NEAR(m.regions[k].volume / (4 * pi / 9), 1, measured(1e-5));
+  // Less area than before.
+  EXPECT_LT(m.area, measureSegmented(field).area);
+}
+
+TEST(SmoothSegmented, ReportsRegionsThatVanish) {
+  // Of two balls apart, the smaller one vanishes at R² / 4.
+  const SegmentedField field =
+      segmentSolids(
+          std::vector<NarrowBand>{makeSphere(0.4, V3d(2, 0, 0), 0.1), makeSphere(1, V3d(0), 0.1)},
+          {.labels = {7, 9}})
+          .field;
+  const SmoothSegmentedResult result = smoothSegmented(field, 0.06);
+  ASSERT_EQ(result.vanished.size(), 1u);
+  EXPECT_EQ(result.vanished[0].label, 7);
+  EXPECT_NEAR(result.vanished[0].time, 0.04, measured(0.01));
+  EXPECT_EQ(result.field.labels(), (std::vector<RegionLabel>{9}));
+  EXPECT_THROW((void)smoothSegmented(ball(0.4, 0.1), 0.1), InvalidInput);
+}
+
+TEST(SmoothSegmented, HasTheSameBitsWithAnyNumberOfThreads) {
+  const SegmentedField field = halves(0.2, V3d(0.6, 0.48, 0.64));
+  const auto run = [&](std::size_t threads) {
+    return support::onThreads(threads, [&] {
+      return smoothSegmented(field, 0.1, {.keepsVolumes = true}).field.contentHash();
+    });
+  };
+  EXPECT_EQ(run(1), run(2));
+}
+
+TEST(SmoothSegmented, Refuses) {
+  const SegmentedField field = ball(1, 0.2);
+  const auto refuse = [&](double time, const SmoothSegmentedOptions& options) {
+    (void)smoothSegmented(field, time, options);
+  };
+  EXPECT_EQ(smoothSegmented(field, 0).field.contentHash(), field.contentHash());
+  EXPECT_THROW(refuse(-1, {}), UsageError);
+  EXPECT_THROW(refuse(NAN, {}), UsageError);
+  EXPECT_THROW(refuse(0.1, {.steps = 0}), UsageError);
+  EXPECT_THROW(refuse(0.2, {.steps = 1}), UsageError);
+  EXPECT_THROW(refuse(0.1, {.fixed = {3}}), UsageError);
+  EXPECT_THROW(refuse(0.1, {.maxMemory = 1000}), ResourceLimit);
+  EXPECT_THROW(refuse(0.1, {.progress = [](double) { return false; }}), Cancelled);
+  EXPECT_THROW((void)smoothSegmented(SegmentedField(), 0.1), InvalidInput);
+}
+
+}  // namespace smooth_segmented_test
