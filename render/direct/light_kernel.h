@@ -1,7 +1,7 @@
 #pragma once
 
-// Private to direct volume rendering: render/shaders/grid_walk.glsl, transfer.glsl and direct.glsl as
-// C++ classes.
+// Private to direct volume rendering: render/shaders/grid_walk.glsl, transfer.glsl and direct.glsl
+// as C++ classes.
 
 #include <cmath>
 #include <cstddef>

@@ -459,8 +459,7 @@ std::vector<double> KernelScene::transmittances(const KernelTracer& tracer,
       asked.push_back({rays[i].origin, rays[i].direction, 0, rays[i].maxDistance});
       numbers.push_back(i);
     }
-    const std::vector<InterfaceHit> hits =
-        tracer.interfaceHits(segmented_->caster, asked, false);
+    const std::vector<InterfaceHit> hits = tracer.interfaceHits(segmented_->caster, asked, false);
     for (std::size_t n = 0; n < numbers.size(); ++n)
       if (hits[n].found) light[numbers[n]] = 0;
   }

@@ -106,12 +106,13 @@ class KernelScene {
 
   [[nodiscard]] const std::vector<KernelSolid>& solids() const { return solids_; }
   /// World-space box of the meshes, the shells of mapped textures, the interfaces of a segmented
-  /// field and the grid cells that the solids' surfaces cross; empty when there are none. For a blended scene: Scene::bounds(). If a
-  /// volume has no surface and nothing else is drawn: Scene::volumeBounds().
+  /// field and the grid cells that the solids' surfaces cross; empty when there are none. For a
+  /// blended scene: Scene::bounds(). If a volume has no surface and nothing else is drawn:
+  /// Scene::volumeBounds().
   [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }
   /// World-space box of the meshes, the shells of mapped textures, the interfaces of a segmented
-  /// field and the blocks that the solids' surfaces cross. For a blended scene: Scene::bounds(). Its size determines the absolute error
-  /// of single-precision positions.
+  /// field and the blocks that the solids' surfaces cross. For a blended scene: Scene::bounds().
+  /// Its size determines the absolute error of single-precision positions.
   [[nodiscard]] const Imath::Box3d& tableBounds() const { return tableBounds_; }
   [[nodiscard]] const MeshRays& meshes() const { return meshes_; }
   [[nodiscard]] const MappedRays& mapped() const { return mapped_; }
@@ -119,7 +120,9 @@ class KernelScene {
   /// solids() is empty, and castPixels() and thickness() find nothing.
   [[nodiscard]] const FieldTraversal* fields() const { return fields_ ? &*fields_ : nullptr; }
   /// Segmented field of the scene; null without one.
-  [[nodiscard]] const SegmentedPart* segmented() const { return segmented_ ? &*segmented_ : nullptr; }
+  [[nodiscard]] const SegmentedPart* segmented() const {
+    return segmented_ ? &*segmented_ : nullptr;
+  }
   [[nodiscard]] std::size_t bytes() const;
   /// Numbers of blocks of all solids, by their use in the brick tables.
   struct Counts {

@@ -344,9 +344,8 @@ void KernelPainter::addVolume(const KernelTracer& tracer, const std::vector<Hit>
 
 std::vector<std::size_t> KernelPainter::addSeen(
     const KernelTracer& tracer, const std::vector<Pixel>& pixels, int sample, const PixelHits& hits,
-    const FirstHits& first, const LightLattice& lattice,
-    const std::vector<char>& contradicts, std::vector<SampleRay>& sampleRays,
-    std::vector<ColourSum>& sums) const {
+    const FirstHits& first, const LightLattice& lattice, const std::vector<char>& contradicts,
+    std::vector<SampleRay>& sampleRays, std::vector<ColourSum>& sums) const {
   struct Lit {
     std::size_t pixel;
     Hit hit;
@@ -434,6 +433,11 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
     image.attributes["ls:read"] =
         fmt::format("{} blocks of 8x8x8 cells where a field is not constant, {:.1f} MB",
                     surfaces.fields()->blockCount(), static_cast<double>(surfaces.bytes()) * 1e-6);
+  } else if (surfaces.segmented() && surfaces.solids().empty()) {
+    const InterfaceCaster& caster = surfaces.segmented()->caster;
+    image.attributes["ls:read"] =
+        fmt::format("{} cells with corners of several regions, {:.1f} MB", caster.mixedCellCount(),
+                    static_cast<double>(surfaces.bytes()) * 1e-6);
   } else {
     const KernelScene::Counts& counts = surfaces.counts();
     image.attributes["ls:read"] = fmt::format(

@@ -76,8 +76,8 @@ class KernelPainter {
   /// @return indices of the rays that continue through a transparent solid (not through a
   /// transparent mesh)
   std::vector<std::size_t> addSeen(const KernelTracer& tracer, const std::vector<Pixel>& pixels,
-                                   int sample, const PixelHits& hits,
-                                   const FirstHits& first, const LightLattice& lattice,
+                                   int sample, const PixelHits& hits, const FirstHits& first,
+                                   const LightLattice& lattice,
                                    const std::vector<char>& contradicts,
                                    std::vector<SampleRay>& sampleRays,
                                    std::vector<ColourSum>& sums) const;

@@ -14,7 +14,7 @@ using levelset::RegionLabel;
 
 namespace {
 
-V3d unitOr(const V3d& v, const V3d& otherwise) {
+V3d unitNormal(const V3d& v, const V3d& otherwise) {
   const double length = v.length();
   return length > 0 && std::isfinite(length) ? v / length : otherwise;
 }
@@ -24,8 +24,8 @@ V3d unitOr(const V3d& v, const V3d& otherwise) {
 InterfaceCaster::InterfaceCaster(const levelset::SegmentedField& field,
                                  const std::vector<RegionLabel>& hidden, std::size_t maxBytes)
     : field_(field),
-      tables_(std::make_shared<const InterfaceTables>(
-          makeInterfaceTables(field, hidden, maxBytes))) {
+      tables_(
+          std::make_shared<const InterfaceTables>(makeInterfaceTables(field, hidden, maxBytes))) {
   const std::vector<double> e = extents(
       {V3d(1, 0, 0), V3d(0, 1, 0), V3d(0, 0, 1), V3d(-1, 0, 0), V3d(0, -1, 0), V3d(0, 0, -1)});
   if (std::isfinite(e[0])) bounds_ = {V3d(-e[3], -e[4], -e[5]), V3d(e[0], e[1], e[2])};
@@ -89,8 +89,8 @@ InterfaceHit InterfaceCaster::hitOf(const InterfaceRay& ray, double distance, in
                m[1][0] * g.x + m[1][1] * g.y + m[1][2] * g.z,
                m[2][0] * g.x + m[2][1] * g.y + m[2][2] * g.z);
   };
-  hit.facetNormal = unitOr(toWorld(facet), -ray.direction);
-  hit.normal = unitOr(toWorld(smooth), hit.facetNormal);
+  hit.facetNormal = unitNormal(toWorld(facet), -ray.direction);
+  hit.normal = unitNormal(toWorld(smooth), hit.facetNormal);
   return hit;
 }
 

@@ -27,9 +27,9 @@ struct InterfaceRay {
 /// Crossing of a ray with the interface between two regions.
 struct InterfaceHit {
   bool found = false;
-  double distance = 0;                                  ///< along the ray, world units
-  levelset::RegionLabel front = levelset::kVoid,        ///< region that the ray leaves
-      behind = levelset::kVoid;                         ///< region that it enters
+  double distance = 0;                            ///< along the ray, world units
+  levelset::RegionLabel front = levelset::kVoid,  ///< region that the ray leaves
+      behind = levelset::kVoid;                   ///< region that it enters
   /// Unit normals, towards `front`: of the interface as drawn, and of the smooth interface that the
   /// grid samples.
   Imath::V3d facetNormal{0}, normal{0};
@@ -43,8 +43,8 @@ struct InterfaceHit {
 /// The kernel (render/shaders/interfaces.glsl) steps through the cells whose corners have several
 /// labels. There the distances are cubics along the ray. It isolates the first zero of each
 /// difference by the Bernstein coefficients, in double precision. So a hit is certainly the first,
-/// and exact to a few roundings of double precision. It reads the compact blocks of the field, and a
-/// table that finds them; blocks and groups of 8³ blocks of one label are skipped.
+/// and exact to a few roundings of double precision. It reads the compact blocks of the field, and
+/// a table that finds them; blocks and groups of 8³ blocks of one label are skipped.
 ///
 /// The class has value semantics. Copies share the data. All methods may run concurrently.
 class InterfaceCaster {

@@ -77,10 +77,9 @@ class MixedCell {
     for (int c = 0; c < 8; ++c) {
       const SegmentedReader::Nearest& near = cell_.corner(c);
       values[static_cast<std::size_t>(c)] =
-          near.label == label
-              ? 0.0
-              : static_cast<double>(
-                    reader.distanceTo(low_ + SegmentedCell::cornerOffset(c), near, label));
+          near.label == label ? 0.0
+                              : static_cast<double>(reader.distanceTo(
+                                    low_ + SegmentedCell::cornerOffset(c), near, label));
     }
     return values;
   }
@@ -131,13 +130,13 @@ class MixedCell {
     const double middle = 0.5 * (low + high), half = 0.5 * (high - low);
     const Corners weights = weightsAt(line.at(middle), low_);
     const auto& labels = cell_.labels();
-    const auto number = static_cast<std::size_t>(
-        std::find(labels.begin(), labels.end(), present) - labels.begin());
+    const auto number =
+        static_cast<std::size_t>(std::find(labels.begin(), labels.end(), present) - labels.begin());
     const double own = sum(weights, excess_[number]);
     bool isSafe = true;
     for (std::size_t n = 0; n < labels.size() && isSafe; ++n)
-      isSafe = n == number || sum(weights, excess_[n]) - own >=
-                                  steepest(line, excess_[n], excess_[number]) * half;
+      isSafe = n == number ||
+               sum(weights, excess_[n]) - own >= steepest(line, excess_[n], excess_[number]) * half;
     if (isSafe) return std::nullopt;
     if (half <= kFinest * std::max(1.0, std::abs(middle))) {
       if (labelAt(line.at(high), present) != present) return high;
@@ -245,7 +244,7 @@ Gradients gradientsAt(SegmentedReader& reader, const Coord& low, const V3d& p, R
 }
 
 /// Part of the line within a box around all blocks.
-std::optional<std::pair<double, double>> clipped(const Line& line, const SegmentedData& data,
+std::optional<std::pair<double, double>> rangeInBlocks(const Line& line, const SegmentedData& data,
                                                  double near, double far) {
   openvdb::CoordBBox box;
   for (std::size_t b = 0; b < data.blockCount(); ++b) box.expand(data.blocks[b].origin);
@@ -273,10 +272,10 @@ InterfaceHit InterfaceJudge::firstHit(const InterfaceRay& ray) const {
   const SegmentedData& data = *caster_.field().shared();
   const openvdb::math::Transform& map = *data.transform;
   const V3d from = levelset::toImath(map.worldToIndex(levelset::toVdb(ray.origin)));
-  const V3d to = levelset::toImath(
-      map.baseMap()->applyInverseJacobian(levelset::toVdb(ray.direction)));
+  const V3d to =
+      levelset::toImath(map.baseMap()->applyInverseJacobian(levelset::toVdb(ray.direction)));
   March march{SegmentedReader(data), caster_, {from, to}};
-  const auto range = clipped(march.line, data, ray.near, ray.far);
+  const auto range = rangeInBlocks(march.line, data, ray.near, ray.far);
   if (!range) return {};
   if (ray.label && range->first == ray.near) march.label = ray.label;
   const std::vector<double> blocks = planesBetween(march.line, range->first, range->second, 8);

@@ -38,8 +38,7 @@ struct InterfaceKernel {
   template <typename Number>
   [[nodiscard]] static Number loaded(const FieldArray& array, int n) {
     Number number;
-    std::memcpy(&number, array.data + sizeof(Number) * static_cast<std::size_t>(n),
-                sizeof(Number));
+    std::memcpy(&number, array.data + sizeof(Number) * static_cast<std::size_t>(n), sizeof(Number));
     return number;
   }
   [[nodiscard]] int groupEntry(int n) const {

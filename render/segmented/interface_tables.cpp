@@ -53,7 +53,7 @@ std::vector<Coord> blocksAround(const SegmentedData& data) {
 }
 
 /// Cells of a block whose corners have several labels.
-Mask mixedCells(SegmentedReader& reader, const Coord& block) {
+Mask mixedMask(SegmentedReader& reader, const Coord& block) {
   constexpr int kPoints = 9;
   std::array<RegionLabel, kPoints * kPoints * kPoints> labels;
   const Coord low(block[0] << 3, block[1] << 3, block[2] << 3);
@@ -93,7 +93,7 @@ std::size_t numberOf(const V3i& at, const V3i& size) {
 }
 
 /// Places the tables around the blocks of a field, with a margin of a block.
-void place(InterfaceTables& tables, const SegmentedData& data) {
+void placeAround(InterfaceTables& tables, const SegmentedData& data) {
   openvdb::CoordBBox box;
   for (std::size_t b = 0; b < data.blockCount(); ++b)
     box.expand(SegmentedData::blockCoord(data.blocks[b].origin));
@@ -123,7 +123,7 @@ InterfaceTables makeInterfaceTables(const levelset::SegmentedField& field,
   const auto hide = [&](RegionLabel label) { tables.shown[label >> 5] &= ~(1u << (label & 31)); };
   hide(levelset::kVoid);
   for (const RegionLabel label : hidden) hide(label);
-  place(tables, data);
+  placeAround(tables, data);
   tables.worldToIndex =
       field.indexToWorld().inverse() * Imath::M44d().setTranslation(-V3d(tables.origin));
 
@@ -137,7 +137,7 @@ InterfaceTables makeInterfaceTables(const levelset::SegmentedField& field,
                     [&](const tbb::blocked_range<std::size_t>& range) {
                       SegmentedReader reader(data);
                       for (std::size_t n = range.begin(); n < range.end(); ++n)
-                        masks[n] = mixedCells(reader, around[n]);
+                        masks[n] = mixedMask(reader, around[n]);
                     });
 
   const auto groupOf = [&](const Coord& block) {
@@ -167,8 +167,8 @@ InterfaceTables makeInterfaceTables(const levelset::SegmentedField& field,
         tables.groupEntries.push_back(static_cast<std::int32_t>(tables.table.size()));
         for (std::size_t b = 0; b < kGroupBlocks; ++b) {
           const Coord local = SegmentedData::localOf(static_cast<std::uint32_t>(b));
-          tables.table.push_back(reader.blockOf(low + Coord(local[0] << 3, local[1] << 3,
-                                                            local[2] << 3)));
+          tables.table.push_back(
+              reader.blockOf(low + Coord(local[0] << 3, local[1] << 3, local[2] << 3)));
           tables.table.push_back(-1);
         }
       }

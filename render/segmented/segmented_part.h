@@ -16,8 +16,8 @@ namespace render {
 [[nodiscard]] Imath::C3f regionColour(levelset::RegionLabel label);
 
 /// A segmented field in a scene. Its surfaces are opaque. An interface has the colour of the region
-/// behind it, as the ray goes, or of the region in front if the other is hidden. So the two sides of
-/// an interface differ.
+/// behind it, as the ray goes, or of the region in front if the other is hidden. So the two sides
+/// of an interface differ.
 struct SegmentedPart {
   InterfaceCaster caster;
   std::string name = {};

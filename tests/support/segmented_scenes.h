@@ -28,8 +28,8 @@ inline levelset::SegmentedField fieldOf(const std::vector<levelset::NarrowBand>&
 
 /// A ball within a ball, labels 1 (outer) and 2 (inner), both around the origin.
 inline levelset::SegmentedField nestedBalls(double outer, double inner, double voxel) {
-  return fieldOf({levelset::makeSphere(outer, V3d(0), voxel),
-                  levelset::makeSphere(inner, V3d(0), voxel)});
+  return fieldOf(
+      {levelset::makeSphere(outer, V3d(0), voxel), levelset::makeSphere(inner, V3d(0), voxel)});
 }
 
 /// Three balls that overlap, labels 1 to 3.
@@ -52,8 +52,7 @@ inline levelset::Volume turnedLabels(int n, const std::function<double(const V3d
   std::vector<float> values;
   for (int k = 0; k < n; ++k)
     for (int j = 0; j < n; ++j)
-      for (int i = 0; i < n; ++i)
-        values.push_back(static_cast<float>(label(V3d(i, j, k) * map)));
+      for (int i = 0; i < n; ++i) values.push_back(static_cast<float>(label(V3d(i, j, k) * map)));
   return {grid, values};
 }
 
@@ -65,8 +64,8 @@ inline double tissueAt(const V3d& p) {
   return angle < -1 ? 7 : angle < 1.2 ? 300 : 9;
 }
 
-/// Six scenes. Voxels are about 1/12 of the radius. With junctions, thin shells, faceted interfaces,
-/// smoothed ones on a turned grid, and slabs in contact.
+/// Six scenes. Voxels are about 1/12 of the radius. With junctions, thin shells, faceted
+/// interfaces, smoothed ones on a turned grid, and slabs in contact.
 inline std::vector<SegmentedScene> segmentedScenes() {
   const double voxel = 0.083;
   std::vector<SegmentedScene> scenes;
@@ -84,8 +83,8 @@ inline std::vector<SegmentedScene> segmentedScenes() {
   return scenes;
 }
 
-/// Views from outside in perspective, along the grid in parallel, from inside, and with a near depth
-/// that cuts the regions open.
+/// Views from outside in perspective, along the grid in parallel, from inside, and with a near
+/// depth that cuts the regions open.
 inline std::vector<render::Camera> segmentedViews(int width, int height) {
   render::Camera far{.from = {2.6, 1.7, 3.1}, .to = {0, 0, 0}, .width = width, .height = height};
   render::Camera along = far;

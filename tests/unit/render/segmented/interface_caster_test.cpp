@@ -22,6 +22,7 @@ namespace interface_caster_test {
 using Imath::V3d;
 using levelset::RegionLabel;
 using levelset::SegmentedField;
+using support::doubleRounding;
 using support::measured;
 using support::measuredOrder;
 using namespace render;
@@ -48,19 +49,18 @@ void compare(const InterfaceHit& a, const InterfaceHit& b, Agreement& all) {
 TEST(InterfaceCaster, AgreesWithTheJudge) {
   for (const support::SegmentedScene& scene : support::segmentedScenes())
     for (const bool hides : {false, true}) {
-      const InterfaceCaster caster(scene.field,
-                                   hides ? scene.hidden : std::vector<RegionLabel>());
+      const InterfaceCaster caster(scene.field, hides ? scene.hidden : std::vector<RegionLabel>());
       const InterfaceJudge judge(caster);
       Agreement all;
-      for (const Camera& camera : support::segmentedViews(40, 30))
+      for (const Camera& camera : support::segmentedViews(32, 24))
         for (const InterfaceRay& ray : support::raysOf(camera))
           compare(caster.firstHit(ray), judge.firstHit(ray), all);
       EXPECT_GT(all.hits, 500u) << scene.name;
       EXPECT_EQ(all.unlike, 0u) << scene.name << hides;
       EXPECT_EQ(all.relabelled, 0u) << scene.name << hides;
-      EXPECT_LT(all.distance, 1e-9) << scene.name << hides;
-      EXPECT_LT(all.facet, 1e-6) << scene.name << hides;
-      EXPECT_LT(all.normal, 1e-6) << scene.name << hides;
+      EXPECT_LT(all.distance, doubleRounding(600)) << scene.name << hides;
+      EXPECT_LT(all.facet, doubleRounding(6000)) << scene.name << hides;
+      EXPECT_LT(all.normal, doubleRounding(15000)) << scene.name << hides;
     }
 }
 
@@ -72,7 +72,9 @@ TEST(InterfaceCaster, StopsWhereTheLabelOfTheFieldFirstChanges) {
     for (const Camera& camera : support::segmentedViews(16, 12))
       for (const InterfaceRay& ray : support::raysOf(camera)) {
         const InterfaceHit hit = caster.firstHit(ray);
-        const auto labelAt = [&](double t) { return sampler.label(ray.origin + ray.direction * t); };
+        const auto labelAt = [&](double t) {
+          return sampler.label(ray.origin + ray.direction * t);
+        };
         const double end = hit.found ? hit.distance : ray.near + 5;
         const RegionLabel first = labelAt(ray.near);
         constexpr int kSteps = 200;
@@ -107,11 +109,11 @@ TEST(InterfaceCaster, FindsAllCrossingsInOrderFromBothSides) {
   const std::vector<InterfaceHit> there = crossings(direction), back = crossings(-direction);
   ASSERT_EQ(there.size(), 4u);
   ASSERT_EQ(back.size(), 4u);
-  const double distances[] = {2, 2.38, 3.62, 4};
+  const double distances[] = {2, 2.38, 3.62, 4}, errors[] = {1.8e-4, 8.1e-4, 8.1e-4, 1.8e-4};
   const RegionLabel labels[] = {0, 1, 2, 1, 0};
   for (std::size_t n = 0; n < 4; ++n) {
     // An interpolant lies up to h²/(4R) inside a ball.
-    EXPECT_NEAR(there[n].distance, distances[n], measured(1.1e-3)) << n;
+    EXPECT_NEAR(there[n].distance, distances[n], measured(errors[n])) << n;
     EXPECT_EQ(there[n].front, labels[n]);
     EXPECT_EQ(there[n].behind, labels[n + 1]);
     EXPECT_GT(-there[n].normal.dot(direction), 0.99);
@@ -144,13 +146,14 @@ TEST(InterfaceCaster, ConvergesToBallsBehindHiddenRegions) {
   };
   const Errors coarse = errorsAt(0.1), middle = errorsAt(0.05), fine = errorsAt(0.025);
   const auto order = [](double a, double b) { return std::log2(a / b); };
-  EXPECT_LT(coarse.distance, measured(3.9e-3));
-  EXPECT_GT(order(coarse.distance, middle.distance), measuredOrder(1.9));
-  EXPECT_GT(order(middle.distance, fine.distance), measuredOrder(1.9));
-  EXPECT_LT(coarse.normal, measured(0.02));
-  EXPECT_GT(order(coarse.normal, middle.normal), measuredOrder(1.5));
-  EXPECT_GT(order(middle.normal, fine.normal), measuredOrder(1.5));
-  EXPECT_GT(order(middle.facet, fine.facet), measuredOrder(0.8));
+  EXPECT_LT(coarse.distance, measured(4.03e-3));
+  EXPECT_GT(order(coarse.distance, middle.distance), measuredOrder(2.02));
+  EXPECT_GT(order(middle.distance, fine.distance), measuredOrder(1.99));
+  EXPECT_LT(coarse.normal, measured(5.11e-3));
+  EXPECT_GT(order(coarse.normal, middle.normal), measuredOrder(2.0));
+  EXPECT_GT(order(middle.normal, fine.normal), measuredOrder(2.05));
+  EXPECT_LT(coarse.facet, measured(0.105));
+  EXPECT_GT(order(middle.facet, fine.facet), measuredOrder(1.08));
 }
 
 TEST(InterfaceCaster, SeesNothingOfHiddenRegions) {
@@ -232,8 +235,7 @@ TEST(InterfaceCaster, HasTheDepthsAndSidesOfTheMesh) {
         double toJunction = 1e9;
         for (const levelset::JunctionEdge& edge : mesh.junctions)
           for (const std::uint32_t v : edge.vertices)
-            toJunction =
-                std::min(toJunction, (mesh.mesh.positions[v] - other.position).length());
+            toJunction = std::min(toJunction, (mesh.mesh.positions[v] - other.position).length());
         const double slant = std::abs(ray.direction.dot(other.facetNormal));
         if (toJunction < 2 * voxel || slant < 0.3) continue;
         relabelled += sides[other.solid] != std::set<RegionLabel>{hit.front, hit.behind};
@@ -242,9 +244,12 @@ TEST(InterfaceCaster, HasTheDepthsAndSidesOfTheMesh) {
     ASSERT_GT(differences.size(), 500u) << scene.name;
     std::sort(differences.begin(), differences.end());
     EXPECT_EQ(relabelled, 0u) << scene.name;
-    EXPECT_LE(one, 12u) << scene.name;  // of 4800 pixels, at silhouettes
-    EXPECT_LT(differences[differences.size() * 99 / 100], measured(0.05)) << scene.name;
-    EXPECT_LT(differences.back(), measured(0.2)) << scene.name;
+    EXPECT_LE(one, 4u) << scene.name;  // of 4800 pixels, at silhouettes
+    // At the edges of boxes the interpolant and the facets round differently.
+    const bool hasEdges = scene.name == "slabs";
+    EXPECT_LT(differences[differences.size() * 99 / 100], measured(hasEdges ? 0.115 : 0.019))
+        << scene.name;
+    EXPECT_LT(differences.back(), measured(hasEdges ? 0.295 : 0.029)) << scene.name;
   }
 }
 
