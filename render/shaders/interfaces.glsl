@@ -187,16 +187,20 @@ double cornerExcess(IN(RegionCell) cell, int corner, int label, INOUT(int) steps
   return extraDistance(cell.block[corner], cell.voxel[corner], label, steps);
 }
 
+// In loops, not once for each corner, because drivers take long to compile long shaders.
 CellCorners excessOf(IN(RegionCell) cell, int label, INOUT(int) steps) {
+  double value[8];
+  for (int c = 0; c < 8; ++c) value[c] = cornerExcess(cell, c, label, steps);
+  steps += 8;
   CellCorners f;
-  f.f0 = cornerExcess(cell, 0, label, steps);
-  f.f1 = cornerExcess(cell, 1, label, steps);
-  f.f2 = cornerExcess(cell, 2, label, steps);
-  f.f3 = cornerExcess(cell, 3, label, steps);
-  f.f4 = cornerExcess(cell, 4, label, steps);
-  f.f5 = cornerExcess(cell, 5, label, steps);
-  f.f6 = cornerExcess(cell, 6, label, steps);
-  f.f7 = cornerExcess(cell, 7, label, steps);
+  f.f0 = value[0];
+  f.f1 = value[1];
+  f.f2 = value[2];
+  f.f3 = value[3];
+  f.f4 = value[4];
+  f.f5 = value[5];
+  f.f6 = value[6];
+  f.f7 = value[7];
   return f;
 }
 
@@ -329,20 +333,21 @@ double quotientOf(double low, double middle, double high, int hasLow, int hasHig
 // Adds the gradient at one corner of the cell, by central differences, or one-sided ones beside a
 // third region.
 void addSmooth(INOUT(CrossingRay) ray, int x, int y, int z, double weight, INOUT(int) steps) {
-  int own = 0;
-  int low = 0;
-  int high = 0;
-  double middle = differenceAt(x, y, z, ray.front, ray.behind, own, steps);
-  if (own == 0) return;
-  double below = differenceAt(x - 1, y, z, ray.front, ray.behind, low, steps);
-  double above = differenceAt(x + 1, y, z, ray.front, ray.behind, high, steps);
-  VAR sumX = ray.smoothX + weight * quotientOf(below, middle, above, low, high);
-  below = differenceAt(x, y - 1, z, ray.front, ray.behind, low, steps);
-  above = differenceAt(x, y + 1, z, ray.front, ray.behind, high, steps);
-  VAR sumY = ray.smoothY + weight * quotientOf(below, middle, above, low, high);
-  below = differenceAt(x, y, z - 1, ray.front, ray.behind, low, steps);
-  above = differenceAt(x, y, z + 1, ray.front, ray.behind, high, steps);
-  VAR sumZ = ray.smoothZ + weight * quotientOf(below, middle, above, low, high);
+  double value[7];  // of the corner, and of its neighbours before and behind it on each axis
+  int sides[7];
+  for (int n = 0; n < 7; ++n) {
+    int axis = (n - 1) >> 1;
+    int move = n == 0 ? 0 : ((n & 1) == 1 ? -1 : 1);
+    int own = 0;
+    value[n] = differenceAt(x + (axis == 0 ? move : 0), y + (axis == 1 ? move : 0),
+                            z + (axis == 2 ? move : 0), ray.front, ray.behind, own, steps);
+    sides[n] = own;
+  }
+  steps += 8;
+  if (sides[0] == 0) return;
+  VAR sumX = ray.smoothX + weight * quotientOf(value[1], value[0], value[2], sides[1], sides[2]);
+  VAR sumY = ray.smoothY + weight * quotientOf(value[3], value[0], value[4], sides[3], sides[4]);
+  VAR sumZ = ray.smoothZ + weight * quotientOf(value[5], value[0], value[6], sides[5], sides[6]);
   ray.smoothX = sumX;
   ray.smoothY = sumY;
   ray.smoothZ = sumZ;
@@ -379,7 +384,7 @@ void addGradients(INOUT(CrossingRay) ray, INOUT(int) steps) {
 }
 
 // Ends a ray at a crossing if a surface is there. @return true if it does
-bool meet(INOUT(CrossingRay) ray, int label, double t, INOUT(int) steps) {
+bool meet(INOUT(CrossingRay) ray, int label, double t) {
   int front = ray.label;
   ray.label = label;
   if (front == kUnknown || !isSurface(front, label)) return false;
@@ -387,7 +392,6 @@ bool meet(INOUT(CrossingRay) ray, int label, double t, INOUT(int) steps) {
   ray.t = t;
   ray.front = front;
   ray.behind = label;
-  if (wantsGradients) addGradients(ray, steps);
   return true;
 }
 
@@ -420,7 +424,7 @@ void searchCell(INOUT(CrossingRay) ray, double exit, INOUT(int) steps) {
   bool isKept = present >= 0 && (ray.checks == 0 || excess[present].b0 == excess[least].b0);
   if (!isKept) {
     present = least;
-    if (meet(ray, cell.found[least], ray.t, steps)) return;
+    if (meet(ray, cell.found[least], ray.t)) return;
   }
   double from = 0.0;
   for (int change = 0; change < kMostChanges && from < 1.0; ++change) {
@@ -452,7 +456,7 @@ void searchCell(INOUT(CrossingRay) ray, double exit, INOUT(int) steps) {
     VAR t = ray.t + (exit - ray.t) * share;
     present = next;
     from = share;
-    if (meet(ray, cell.found[next], t, steps)) return;
+    if (meet(ray, cell.found[next], t)) return;
   }
 }
 
@@ -488,7 +492,7 @@ void followInterfaces(INOUT(CrossingRay) ray, int mostSteps) {
       searchCell(ray, exit, steps);
     else if (ray.checks != 0) {
       int label = labelAt(ray.x, ray.y, ray.z);
-      if (label != ray.label) meet(ray, label, ray.t, steps);
+      if (label != ray.label) meet(ray, label, ray.t);
     }
     if (ray.state == kGoing) {
       // Two cells of one label each have the same one, so it is asked after a mixed cell only.
@@ -505,4 +509,5 @@ void followInterfaces(INOUT(CrossingRay) ray, int mostSteps) {
       ray.state = isOut || !(exit < ray.end) ? kEnded : kGoing;
     }
   }
+  if (ray.state == kCrossed && wantsGradients) addGradients(ray, steps);
 }

@@ -31,7 +31,7 @@ Scene sceneOf(const levelset::SegmentedField& field, const std::vector<RegionLab
   return scene;
 }
 
-constexpr RenderOptions kPlain{.samples = 1, .ambientSamples = 0, .shadowSamples = 0};
+const RenderOptions kPlain{.samples = 1, .ambientSamples = 0, .shadowSamples = 0};
 
 std::set<std::uint32_t> idsOf(const Image& image) {
   const std::vector<std::uint32_t>& ids = image.ids.at("id");
