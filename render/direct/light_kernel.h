@@ -1,6 +1,7 @@
 #pragma once
 
-// Private to direct volume rendering: render/shaders/transfer.glsl and direct.glsl as C++ classes.
+// Private to direct volume rendering: render/shaders/grid_walk.glsl, transfer.glsl and direct.glsl
+// as C++ classes.
 
 #include <cmath>
 #include <cstddef>
@@ -28,6 +29,7 @@ struct TransferKernel {
   static double nextAbove(double a) { return std::nextafter(a, HUGE_VAL); }
   static double nextBelow(double a) { return std::nextafter(a, 0.0); }
 
+#include "render/shaders/grid_walk.glsl"
 #include "render/shaders/transfer.glsl"
 };
 

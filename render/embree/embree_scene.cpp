@@ -16,6 +16,8 @@
 #include "render/embree/volume_tree_vdb.h"
 #include "render/meshes/embree_space.h"
 #include "render/meshes/mesh_rays.h"
+#include "render/segmented/interface_judge.h"
+#include "render/segmented/segmented_part.h"
 #include "render/shading/principal_direction.h"
 #include "render/shading/surface_shape.h"
 
@@ -184,8 +186,12 @@ struct EmbreeScene::Impl {
   CsgExpression csg;  // uses indices of `solids`
   MeshRays meshes;
   std::optional<FieldMarch> fields;  // set for a blended scene; then `solids` is empty
+  // Set for a scene with a segmented field.
+  std::optional<SegmentedPart> segmented;
+  std::optional<InterfaceJudge> judge;
+  std::size_t interfaceSolid = 0;  // Hit::solid of its hits
   bool isOpaque;
-  Box3d allBounds;  // world-space box of the solids and meshes
+  Box3d allBounds;  // world-space box of the solids, meshes and interfaces
   Box3d bounds;     // world-space box of the grid cells that the solids' surfaces cross
   EmbreeSpace view;
   EmbreeTree tree;
@@ -206,12 +212,20 @@ struct EmbreeScene::Impl {
   /// @pre the direction is finite and not zero
   [[nodiscard]] Hit intersectSolids(const V3d& origin, const V3d& direction, double near,
                                     double far) const;
+  /// First hit with a segmented field.
+  [[nodiscard]] Hit intersectInterfaces(const V3d& origin, const V3d& direction, double near,
+                                        double far) const;
   void complete(Hit& hit, const RayQuery& query, const RaySolid& solid, double moved,
                 double t) const;
 };
 
 EmbreeScene::Impl::Impl(const Scene& source, Filter filter)
     : meshes(source), isOpaque(source.isOpaque()) {
+  if (source.segmented) {
+    segmented = source.segmented;
+    judge.emplace(source.segmented->caster);
+    interfaceSolid = source.solids.size() + source.mapped.size();
+  }
   if (source.isBlended()) {
     fields.emplace(source);
     allBounds = source.bounds();
@@ -220,6 +234,7 @@ EmbreeScene::Impl::Impl(const Scene& source, Filter filter)
   gather(source, filter);
   allBounds = bounds;
   allBounds.extendBy(meshes.bounds());
+  if (segmented) allBounds.extendBy(segmented->caster.bounds());
   if (allBounds.isEmpty()) allBounds = source.volumeBounds();
   if (bounds.isEmpty()) return;
   build();
@@ -350,6 +365,14 @@ EmbreeScene::EmbreeScene(const Scene& scene, Filter filter)
 EmbreeScene::~EmbreeScene() = default;
 EmbreeScene::EmbreeScene(EmbreeScene&&) noexcept = default;
 
+Hit EmbreeScene::Impl::intersectInterfaces(const V3d& origin, const V3d& direction, double near,
+                                           double far) const {
+  if (!judge) return {};
+  requireRay(origin, direction);
+  const InterfaceRay ray{origin, direction, near, far};
+  return segmented->hitOf(ray, judge->firstHit(ray), interfaceSolid);
+}
+
 Hit EmbreeScene::Impl::intersectSolids(const V3d& origin, const V3d& direction, double near,
                                        double far) const {
   if (fields) {
@@ -376,11 +399,14 @@ Hit EmbreeScene::Impl::intersectSolids(const V3d& origin, const V3d& direction, 
 }
 
 Hit EmbreeScene::intersect(const V3d& origin, const V3d& direction, double near, double far) const {
-  const Hit onSolid = impl_->intersectSolids(origin, direction, near, far);
-  if (impl_->meshes.isEmpty()) return onSolid;
-  const double end = onSolid.found ? onSolid.distance : far;
-  const Hit onMesh = impl_->meshes.intersect(origin, direction, near, end);
-  return onMesh.found ? onMesh : onSolid;
+  Hit nearest = impl_->intersectSolids(origin, direction, near, far);
+  const auto end = [&] { return nearest.found ? nearest.distance : far; };
+  if (!impl_->meshes.isEmpty()) {
+    const Hit onMesh = impl_->meshes.intersect(origin, direction, near, end());
+    if (onMesh.found) nearest = onMesh;
+  }
+  const Hit onInterface = impl_->intersectInterfaces(origin, direction, near, end());
+  return onInterface.found ? onInterface : nearest;
 }
 
 std::vector<Hit> EmbreeScene::intersectVisible(const V3d& origin, const V3d& direction, double near,
@@ -391,6 +417,9 @@ std::vector<Hit> EmbreeScene::intersectVisible(const V3d& origin, const V3d& dir
     if (hit.found) hits.push_back(hit);
     return hits;
   }
+  // Interfaces are opaque.
+  const Hit onInterface = impl_->intersectInterfaces(origin, direction, near, far);
+  if (onInterface.found) far = onInterface.distance;
   double share = 1;
   // Adds the mesh hits up to the distance `end` along the ray. Returns true when a surface behind
   // these meshes is visible.
@@ -423,7 +452,7 @@ std::vector<Hit> EmbreeScene::intersectVisible(const V3d& origin, const V3d& dir
       return share >= kLeastTransmittance;
     });
   }
-  addMeshes(far);
+  if (addMeshes(far) && onInterface.found) hits.push_back(onInterface);
   return hits;
 }
 
@@ -437,6 +466,7 @@ double EmbreeScene::transmittance(const V3d& origin, const V3d& direction, doubl
 bool EmbreeScene::isOccluded(const V3d& origin, const V3d& direction, double near,
                              double far) const {
   if (impl_->meshes.isOccluded(origin + direction * near, direction, far - near)) return true;
+  if (impl_->intersectInterfaces(origin, direction, near, far).found) return true;
   if (impl_->fields) {
     requireRay(origin, direction);
     return impl_->fields->isOccluded(origin, direction, near, far);

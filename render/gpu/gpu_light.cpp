@@ -170,7 +170,8 @@ std::string lightShaderText(VolumeType type) {
              : bytesOf(type) == 2 ? 1
                                   : 0,
              8 * bytesOf(type), number) +
-         kLightDialect + kTransferKernel + kLightRoot + kDirectKernel + kLightMain;
+         kLightDialect + kGridWalkKernel + kTransferKernel + kLightRoot + kDirectKernel +
+         kLightMain;
 }
 
 }  // namespace

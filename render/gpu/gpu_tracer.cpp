@@ -14,6 +14,7 @@
 #include "levelset/error.h"
 #include "render/gpu/gl_objects.h"
 #include "render/gpu/gpu_fields.h"
+#include "render/gpu/gpu_interfaces.h"
 #include "render/gpu/gpu_light.h"
 #include "render/gpu/nano_grid.h"
 #include "render/kernel/trace_glsl.h"
@@ -238,13 +239,15 @@ struct GpuTracer::Impl {
   std::map<Variant, GLuint> programs;
   std::optional<GpuFields> fields;
   GpuLight light;
+  GpuInterfaces interfaces;
   double shaderSeconds = 0;
 
   Impl(const GlContext& context_, std::size_t largestTable_)
       : context(context_),
         gl(context_.gl()),
         largestTable(largestTable_ > 0 ? largestTable_ : context_.largestTable()),
-        light(context_, largestTable) {
+        light(context_, largestTable),
+        interfaces(context_, largestTable) {
     shift = static_cast<int>(std::bit_width(largestTable / sizeof(float))) - 1;
     shift = std::min(shift, 30);  // indices of values fit into a signed 32-bit integer
   }
@@ -258,6 +261,7 @@ struct GpuTracer::Impl {
     for (const auto& [variant, program] : programs) gl.DeleteProgram(program);
     if (fields) fields->release();
     light.release();
+    interfaces.release();
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
@@ -476,6 +480,12 @@ std::vector<VolumeLight> GpuTracer::volumeLight(const DirectVolume& volume,
                                                 const std::vector<VolumeSegment>& segments,
                                                 const VolumeShading* shading) const {
   return impl_->light.light(volume, segments, shading);
+}
+
+std::vector<InterfaceHit> GpuTracer::interfaceHits(const InterfaceCaster& caster,
+                                                   const std::vector<InterfaceRay>& rays,
+                                                   bool wantsNormals) const {
+  return impl_->interfaces.firstHits(caster, rays, wantsNormals);
 }
 
 double GpuTracer::shaderSeconds() const {

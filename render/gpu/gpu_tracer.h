@@ -35,6 +35,10 @@ class GpuTracer : public KernelTracer {
   [[nodiscard]] std::vector<VolumeLight> volumeLight(const DirectVolume& volume,
                                                      const std::vector<VolumeSegment>& segments,
                                                      const VolumeShading* shading) const override;
+  /// @throws levelset::ResourceLimit for the reasons of GpuInterfaces::firstHits()
+  [[nodiscard]] std::vector<InterfaceHit> interfaceHits(const InterfaceCaster& caster,
+                                                        const std::vector<InterfaceRay>& rays,
+                                                        bool wantsNormals) const override;
 
   /// Returns the wall time, seconds, of the shaders of all trace() calls so far. The time of
   /// transfers is not included.

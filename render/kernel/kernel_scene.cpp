@@ -158,13 +158,25 @@ std::vector<VolumeLight> KernelTracer::volumeLight(const DirectVolume& volume,
   return light;
 }
 
+std::vector<InterfaceHit> KernelTracer::interfaceHits(const InterfaceCaster& caster,
+                                                      const std::vector<InterfaceRay>& rays,
+                                                      bool wantsNormals) const {
+  std::vector<InterfaceHit> hits(rays.size());
+  for (std::size_t n = 0; n < rays.size(); ++n)
+    if (wantsNormals)
+      hits[n] = caster.firstHit(rays[n]);
+    else
+      hits[n].found = caster.isOccluded(rays[n]);
+  return hits;
+}
+
 KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter)
-    : meshes_(scene), mapped_(scene) {
+    : meshes_(scene), mapped_(scene), segmented_(scene.segmented) {
   makeTables(scene, {.filter = filter, .maxBytes = maxBytes}, false);
 }
 
 KernelScene::KernelScene(const Scene& scene, const RenderOptions& options)
-    : meshes_(scene), mapped_(scene) {
+    : meshes_(scene), mapped_(scene), segmented_(scene.segmented) {
   makeTables(scene, options, true);
 }
 
@@ -179,6 +191,7 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
   double leaves = 0;
   Imath::Box3d box = meshes_.bounds();
   box.extendBy(mapped_.bounds());
+  if (segmented_) box.extendBy(segmented_->caster.bounds());
   for (const Solid& solid : scene.solids) {
     if (solid.isEmpty(options.filter)) continue;
     if (solid.volume) {
@@ -252,6 +265,7 @@ void KernelScene::updateView(const Scene& scene) {
   far_ = scene.camera.farthest();
   bounds_ = meshes_.bounds();
   bounds_.extendBy(mapped_.bounds());
+  if (segmented_) bounds_.extendBy(segmented_->caster.bounds());
   tableBounds_ = bounds_;
   for (const Extent& extent : extents_) {
     const M44d toWorld = scene.solids[extent.index].indexToWorld();
@@ -272,6 +286,7 @@ void KernelScene::updateView(const Scene& scene) {
 std::size_t KernelScene::bytes() const {
   std::size_t sum = fields_ ? fields_->bytes() : 0;
   for (const KernelSolid& solid : solids_) sum += solid.pool.bytes();
+  if (segmented_) sum += segmented_->caster.field().memoryUse() + segmented_->caster.bytes();
   return sum + mapped_.bytes();
 }
 
@@ -436,6 +451,18 @@ std::vector<double> KernelScene::transmittances(const KernelTracer& tracer,
     if (light[i] >= kLeastTransmittance &&
         mapped_.isOccluded(rays[i].origin, rays[i].direction, rays[i].maxDistance))
       light[i] = 0;
+  if (segmented_) {
+    std::vector<InterfaceRay> asked;
+    std::vector<std::size_t> numbers;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      if (light[i] < kLeastTransmittance) continue;
+      asked.push_back({rays[i].origin, rays[i].direction, 0, rays[i].maxDistance});
+      numbers.push_back(i);
+    }
+    const std::vector<InterfaceHit> hits = tracer.interfaceHits(segmented_->caster, asked, false);
+    for (std::size_t n = 0; n < numbers.size(); ++n)
+      if (hits[n].found) light[numbers[n]] = 0;
+  }
   return light;
 }
 

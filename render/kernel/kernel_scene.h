@@ -50,6 +50,12 @@ class KernelTracer : public FieldTracer {
   [[nodiscard]] virtual std::vector<VolumeLight> volumeLight(
       const DirectVolume& volume, const std::vector<VolumeSegment>& segments,
       const VolumeShading* shading) const;
+  /// First hits of rays with the interfaces of a segmented field. The default casts on the calling
+  /// thread.
+  /// @param wantsNormals  false: only InterfaceHit::found is set
+  [[nodiscard]] virtual std::vector<InterfaceHit> interfaceHits(
+      const InterfaceCaster& caster, const std::vector<InterfaceRay>& rays,
+      bool wantsNormals) const;
 };
 
 /// Hits of the rays through a block of pixels with solids, at most one for each ray.
@@ -99,19 +105,24 @@ class KernelScene {
   void updateView(const Scene& scene);
 
   [[nodiscard]] const std::vector<KernelSolid>& solids() const { return solids_; }
-  /// World-space box of the meshes, the shells of mapped textures and the grid cells that the
-  /// solids' surfaces cross; empty when there are none. For a blended scene: Scene::bounds(). If a
-  /// volume has no surface and nothing else is drawn: Scene::volumeBounds().
+  /// World-space box of the meshes, the shells of mapped textures, the interfaces of a segmented
+  /// field and the grid cells that the solids' surfaces cross; empty when there are none. For a
+  /// blended scene: Scene::bounds(). If a volume has no surface and nothing else is drawn:
+  /// Scene::volumeBounds().
   [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }
-  /// World-space box of the meshes, the shells of mapped textures and the blocks that the solids'
-  /// surfaces cross. For a blended scene: Scene::bounds(). Its size determines the absolute error
-  /// of single-precision positions.
+  /// World-space box of the meshes, the shells of mapped textures, the interfaces of a segmented
+  /// field and the blocks that the solids' surfaces cross. For a blended scene: Scene::bounds().
+  /// Its size determines the absolute error of single-precision positions.
   [[nodiscard]] const Imath::Box3d& tableBounds() const { return tableBounds_; }
   [[nodiscard]] const MeshRays& meshes() const { return meshes_; }
   [[nodiscard]] const MappedRays& mapped() const { return mapped_; }
   /// Traversal of the fields of a blended scene; null for any other scene. For a blended scene
   /// solids() is empty, and castPixels() and thickness() find nothing.
   [[nodiscard]] const FieldTraversal* fields() const { return fields_ ? &*fields_ : nullptr; }
+  /// Segmented field of the scene; null without one.
+  [[nodiscard]] const SegmentedPart* segmented() const {
+    return segmented_ ? &*segmented_ : nullptr;
+  }
   [[nodiscard]] std::size_t bytes() const;
   /// Numbers of blocks of all solids, by their use in the brick tables.
   struct Counts {
@@ -123,8 +134,8 @@ class KernelScene {
   };
   [[nodiscard]] const Counts& counts() const { return counts_; }
 
-  /// First hits of the rays through pixels with the solids. Meshes and mapped textures are not
-  /// included: the caller intersects meshes() and mapped().
+  /// First hits of the rays through pixels with the solids. Meshes, mapped textures and segmented
+  /// fields are not included: the caller intersects meshes(), mapped() and segmented().
   [[nodiscard]] PixelHits castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const;
   [[nodiscard]] PixelTraversal startTraversal(const PixelBlock& pixels) const;
   /// Next hits of the rays that CsgTraversal::resume() has released, or first hits in the first
@@ -166,6 +177,7 @@ class KernelScene {
   CsgExpression csg_;                // uses indices of solids_
   MeshRays meshes_;
   MappedRays mapped_;
+  std::optional<SegmentedPart> segmented_;
   std::optional<FieldTraversal> fields_;
   Imath::Box3d bounds_, tableBounds_;
   double near_ = 0, far_ = Camera::kNoDepth;  // visible depth range of the camera, world units

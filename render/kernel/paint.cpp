@@ -77,12 +77,12 @@ LightLattice KernelPainter::latticeOf(const KernelTracer& tracer, const PixelBox
     views.push_back(camera_.at(points[i].x, points[i].y));
   }
   const PixelHits hits = surfaces_.castPixels(tracer, at);
-  const std::vector<Hit> onFields = hitsOnFields(tracer, views);
+  const FirstHits first = firstHits(tracer, views);
   std::vector<LightLattice::Node> nodes(points.size());
   std::vector<LightRay> rays;
   std::vector<LightRays> ranges(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    nodes[i].hit = hitOf(views[i], views[i].near, hits, onFields, i);
+    nodes[i].hit = hitOf(views[i], views[i].near, hits, first, i);
     if (!nodes[i].hit.found) nodes[i].hit = shader_.groundHit(views[i]);
     if (!nodes[i].hit.found) continue;
     const auto x = static_cast<int>(points[i].x), y = static_cast<int>(points[i].y);
@@ -134,17 +134,29 @@ std::size_t KernelPainter::numberOf(const Pixel& pixel) const {
          static_cast<std::size_t>(pixel.x);
 }
 
-std::vector<Hit> KernelPainter::hitsOnFields(const KernelTracer& tracer,
-                                             const std::vector<Camera::Ray>& rays) const {
-  if (!surfaces_.fields()) return {};
-  return surfaces_.fields()->intersect(tracer, fieldRays(rays));
+KernelPainter::FirstHits KernelPainter::firstHits(const KernelTracer& tracer,
+                                                  const std::vector<Camera::Ray>& rays) const {
+  FirstHits first;
+  if (surfaces_.fields()) first.onFields = surfaces_.fields()->intersect(tracer, fieldRays(rays));
+  if (const SegmentedPart* segmented = surfaces_.segmented()) {
+    std::vector<InterfaceRay> asked;
+    asked.reserve(rays.size());
+    for (const Camera::Ray& ray : rays)
+      asked.push_back({ray.origin, ray.direction, ray.near, ray.far});
+    const std::vector<InterfaceHit> hits = tracer.interfaceHits(segmented->caster, asked, true);
+    first.onInterfaces.reserve(rays.size());
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      first.onInterfaces.push_back(
+          segmented->hitOf(asked[i], hits[i], scene_.solids.size() + scene_.mapped.size()));
+  }
+  return first;
 }
 
 Hit KernelPainter::hitOf(const Camera::Ray& ray, double meshNear, const PixelHits& hits,
-                         const std::vector<Hit>& onFields, std::size_t i) const {
+                         const FirstHits& first, std::size_t i) const {
   Hit onSolid;
-  if (!onFields.empty())
-    onSolid = onFields[i];
+  if (!first.onFields.empty())
+    onSolid = first.onFields[i];
   else if (hits.solid[i] >= 0)
     onSolid = hitOnSolid(ray, hits, i);
   Hit nearest = onSolid;
@@ -158,6 +170,11 @@ Hit KernelPainter::hitOf(const Camera::Ray& ray, double meshNear, const PixelHit
     const Hit onTexture =
         surfaces_.mapped().intersect(ray.origin, ray.direction, ray.near, farthest());
     if (onTexture.found) nearest = onTexture;
+  }
+  if (!first.onInterfaces.empty()) {
+    const Hit& onInterface = first.onInterfaces[i];
+    if (onInterface.found && (!nearest.found || onInterface.distance < nearest.distance))
+      nearest = onInterface;
   }
   return nearest;
 }
@@ -216,13 +233,13 @@ std::vector<char> KernelPainter::paintData(const KernelTracer& tracer,
   std::vector<Probe> probes;
   std::vector<LightRay> shadowRays;
   const PixelHits hits = surfaces_.castPixels(tracer, at);
-  const std::vector<Hit> onFields = hitsOnFields(tracer, views);
+  const FirstHits first = firstHits(tracer, views);
   std::vector<VolumeSegment> inVolume;  // from the camera to the first surfaces
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     const auto& [x, y] = pixels[i];
     const std::size_t number = numberOf(pixels[i]);
     const Camera::Ray& ray = views[i];
-    Hit hit = hitOf(ray, ray.near, hits, onFields, i);
+    Hit hit = hitOf(ray, ray.near, hits, first, i);
     if (layers_.volume[0])
       inVolume.push_back({ray.origin, ray.direction, ray.near, hit.found ? hit.distance : ray.far});
     if (hit.found) {
@@ -274,9 +291,9 @@ void KernelPainter::paintColours(const KernelTracer& tracer, const std::vector<P
       sampleRays.push_back({.ray = ray, .x = x, .y = y, .meshNear = ray.near, .lit = ray.near});
       views.push_back(ray);
     }
-    const std::vector<Hit> onFields = hitsOnFields(tracer, views);
+    const FirstHits first = firstHits(tracer, views);
     if (scene_.isOpaque()) {
-      addSeen(tracer, pixels, s, surfaces_.castPixels(tracer, at), onFields, lattice, contradicts,
+      addSeen(tracer, pixels, s, surfaces_.castPixels(tracer, at), first, lattice, contradicts,
               sampleRays, sums);
       continue;
     }
@@ -284,7 +301,7 @@ void KernelPainter::paintColours(const KernelTracer& tracer, const std::vector<P
     for (bool seesMore = true; seesMore;) {
       const PixelHits hits = surfaces_.castNext(tracer, walk);
       for (const std::size_t i :
-           addSeen(tracer, pixels, s, hits, onFields, lattice, contradicts, sampleRays, sums))
+           addSeen(tracer, pixels, s, hits, first, lattice, contradicts, sampleRays, sums))
         walk.solids.resume(i);
       seesMore = std::any_of(sampleRays.begin(), sampleRays.end(), [](const SampleRay& sampleRay) {
         return sampleRay.left >= kLeastTransmittance;
@@ -327,9 +344,8 @@ void KernelPainter::addVolume(const KernelTracer& tracer, const std::vector<Hit>
 
 std::vector<std::size_t> KernelPainter::addSeen(
     const KernelTracer& tracer, const std::vector<Pixel>& pixels, int sample, const PixelHits& hits,
-    const std::vector<Hit>& onFields, const LightLattice& lattice,
-    const std::vector<char>& contradicts, std::vector<SampleRay>& sampleRays,
-    std::vector<ColourSum>& sums) const {
+    const FirstHits& first, const LightLattice& lattice, const std::vector<char>& contradicts,
+    std::vector<SampleRay>& sampleRays, std::vector<ColourSum>& sums) const {
   struct Lit {
     std::size_t pixel;
     Hit hit;
@@ -361,14 +377,14 @@ std::vector<std::size_t> KernelPainter::addSeen(
     behindVolume.resize(pixels.size());
     for (std::size_t i = 0; i < pixels.size(); ++i)
       if (sampleRays[i].left >= kLeastTransmittance)
-        behindVolume[i] = hitOf(sampleRays[i].ray, sampleRays[i].meshNear, hits, onFields, i);
+        behindVolume[i] = hitOf(sampleRays[i].ray, sampleRays[i].meshNear, hits, first, i);
     addVolume(tracer, behindVolume, sampleRays, sums);
   }
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     auto& [ray, x, y, meshNear, left, lit] = sampleRays[i];
     if (left < kLeastTransmittance) continue;
     if (rays.size() > kMostLightRays) addColours();
-    Hit hit = scene_.volumePart ? behindVolume[i] : hitOf(ray, meshNear, hits, onFields, i);
+    Hit hit = scene_.volumePart ? behindVolume[i] : hitOf(ray, meshNear, hits, first, i);
     if (!hit.found) hit = shader_.groundHit(ray);
     if (!hit.found) {
       left = 0;
@@ -417,6 +433,11 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
     image.attributes["ls:read"] =
         fmt::format("{} blocks of 8x8x8 cells where a field is not constant, {:.1f} MB",
                     surfaces.fields()->blockCount(), static_cast<double>(surfaces.bytes()) * 1e-6);
+  } else if (surfaces.segmented() && surfaces.solids().empty()) {
+    const InterfaceCaster& caster = surfaces.segmented()->caster;
+    image.attributes["ls:read"] =
+        fmt::format("{} cells with corners of several regions, {:.1f} MB", caster.mixedCellCount(),
+                    static_cast<double>(surfaces.bytes()) * 1e-6);
   } else {
     const KernelScene::Counts& counts = surfaces.counts();
     image.attributes["ls:read"] = fmt::format(

@@ -31,14 +31,18 @@ class KernelPainter {
   /// traced together.
   [[nodiscard]] static std::vector<Pixel> pixelsOf(const PixelBox& box);
   [[nodiscard]] std::size_t numberOf(const Pixel& pixel) const;
-  /// First hits of the rays with the surface of a blended scene; empty for any other scene.
-  [[nodiscard]] std::vector<Hit> hitsOnFields(const KernelTracer& tracer,
-                                              const std::vector<Camera::Ray>& rays) const;
-  /// First hit, on a solid or a mesh, of the ray with index i in `hits` and `onFields`.
+  /// First hits of rays with the surface of a blended scene, and with a segmented field; empty for
+  /// scenes without.
+  struct FirstHits {
+    std::vector<Hit> onFields, onInterfaces;
+  };
+  [[nodiscard]] FirstHits firstHits(const KernelTracer& tracer,
+                                    const std::vector<Camera::Ray>& rays) const;
+  /// First hit, on a solid or a mesh, of the ray with index i in `hits` and `first`.
   /// @param meshNear  mesh hits nearer than this distance are ignored, world units
-  /// @param onFields  from hitsOnFields()
+  /// @param first  from firstHits()
   [[nodiscard]] Hit hitOf(const Camera::Ray& ray, double meshNear, const PixelHits& hits,
-                          const std::vector<Hit>& onFields, std::size_t i) const;
+                          const FirstHits& first, std::size_t i) const;
   [[nodiscard]] Hit hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const;
   /// Paints the layers other than the colours (depth, normal, position, id, curvature, thickness)
   /// from the rays through the pixels' centres.
@@ -72,8 +76,8 @@ class KernelPainter {
   /// @return indices of the rays that continue through a transparent solid (not through a
   /// transparent mesh)
   std::vector<std::size_t> addSeen(const KernelTracer& tracer, const std::vector<Pixel>& pixels,
-                                   int sample, const PixelHits& hits,
-                                   const std::vector<Hit>& onFields, const LightLattice& lattice,
+                                   int sample, const PixelHits& hits, const FirstHits& first,
+                                   const LightLattice& lattice,
                                    const std::vector<char>& contradicts,
                                    std::vector<SampleRay>& sampleRays,
                                    std::vector<ColourSum>& sums) const;

@@ -55,6 +55,7 @@ Imath::Box3d Scene::bounds() const {
   if (!csg.isEmpty()) all = csg.bounds(boxes, kMostGrowth * softness);
   for (const MeshPart& part : meshes) all.extendBy(levelset::bounds(*part.mesh));
   forEachNode(mapped, [&](const Imath::V3d& p) { all.extendBy(p); });
+  if (segmented) all.extendBy(segmented->caster.bounds());
   return all;
 }
 
@@ -72,6 +73,7 @@ std::vector<double> Scene::extents(const std::vector<Imath::V3d>& directions) co
     Scene withoutOthers = *this;
     withoutOthers.meshes.clear();
     withoutOthers.mapped.clear();
+    withoutOthers.segmented.reset();
     const Imath::Box3d box = withoutOthers.bounds();
     for (std::size_t d = 0; d < directions.size(); ++d) {
       const double extent =
@@ -87,6 +89,7 @@ std::vector<double> Scene::extents(const std::vector<Imath::V3d>& directions) co
     for (std::size_t d = 0; d < directions.size(); ++d)
       ofSolids[d] = std::max(ofSolids[d], p.dot(directions[d]));
   });
+  if (segmented) extend(ofSolids, segmented->caster.extents(directions));
   return ofSolids;
 }
 

@@ -17,6 +17,7 @@
 #include "render/images/value_bits.h"
 #include "render/scene/csg_expression.h"
 #include "render/scene/mapped_texture.h"
+#include "render/segmented/segmented_part.h"
 #include "render/volumes/volume_surface.h"
 
 namespace render {
@@ -95,6 +96,8 @@ struct Scene {
   std::vector<MeshPart> meshes = {};
   /// Textures drawn through maps, beside the solids. renderEmbree() does not draw them.
   std::vector<MappedTexture> mapped = {};
+  /// Drawn beside the solids. Not in a blended scene.
+  std::optional<SegmentedPart> segmented = {};
   /// Not with a ground, on which the volume would have no shadow.
   std::optional<VolumePart> volumePart = {};
   CsgExpression csg = {};  ///< expression over the solids; empty: each solid is drawn

@@ -1,5 +1,5 @@
-// Transfer function of direct volume rendering. The code is valid GLSL and C++, in double precision.
-// C++ includes it into a class (render/direct/light_kernel.h).
+// Transfer function of direct volume rendering. The code is valid GLSL and C++, in double precision,
+// and follows grid_walk.glsl. C++ includes it into a class (render/direct/light_kernel.h).
 //
 // Extinction and colour are linear between the points of the function, and constant beyond them. So
 // each piece has a first value, a width, the extinction and its slope, the colour, and the
@@ -13,11 +13,6 @@ CONST_INT kExtinction = 2;
 CONST_INT kSlope = 3;
 CONST_INT kColour = 4;
 CONST_INT kTurn = 7;
-
-double lesser(double a, double b) { return b < a ? b : a; }
-double greater(double a, double b) { return a < b ? b : a; }
-double held(double a, double low, double high) { return a < low ? low : (high < a ? high : a); }
-double magnitude(double a) { return a < 0.0 ? 0.0 - a : a; }
 
 // The upper half of the bits of a number [Dekker71].
 double upperHalf(double a) {

@@ -165,6 +165,14 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
     throw levelset::UsageError(
         "soft expressions and morphs cannot be drawn from NanoVDB grids; draw from "
         "bricks");
+  if (scene.segmented && scene.isBlended())
+    throw levelset::UsageError(
+        "a segmentation cannot be drawn beside a soft expression or a morph; draw it alone");
+  if (scene.segmented && options.filter != Filter::Trilinear)
+    throw levelset::UsageError(fmt::format(
+        "segmentations support only the trilinear filter, not {}; omit the filter, or make a mesh "
+        "or a level set of the segmentation first",
+        filterName(options.filter)));
   if (!scene.mapped.empty() && options.filter != Filter::Trilinear)
     throw levelset::UsageError(
         fmt::format("mapped textures support only the trilinear filter, not {}; omit the filter",
@@ -244,6 +252,9 @@ std::map<std::string, std::string> sceneAttributes(const Scene& scene,
     mapped += fmt::format("{}{:016x} in {} shells", mapped.empty() ? "" : ", ",
                           texture.band.contentHash(), texture.shells ? texture.shells->size() : 0);
   if (!mapped.empty()) attributes["ls:mapped"] = mapped;
+  if (scene.segmented)
+    attributes["ls:segmentation"] =
+        fmt::format("segmentation {:016x}", scene.segmented->caster.field().contentHash());
   if (scene.volumePart) {
     const DirectVolume& volume = scene.volumePart->volume;
     attributes["ls:volume"] = fmt::format("volume {:016x}", volume.volume().contentHash());

@@ -258,14 +258,6 @@ std::vector<render::MeshPart> partsOf(const levelset::SegmentedField& field) {
   const levelset::SegmentedMesh all = levelset::segmentedToMesh(field);
   std::map<levelset::RegionLabel, std::vector<std::size_t>> regions;
   for (std::size_t t = 0; t < all.sides.size(); ++t) regions[all.sides[t].behind].push_back(t);
-  // The colours of Okabe and Ito, which people with colour blindness can tell apart.
-  constexpr std::array<std::array<float, 3>, 7> kColours = {{{0.90f, 0.62f, 0.00f},
-                                                             {0.34f, 0.71f, 0.91f},
-                                                             {0.00f, 0.62f, 0.45f},
-                                                             {0.94f, 0.89f, 0.26f},
-                                                             {0.00f, 0.45f, 0.70f},
-                                                             {0.84f, 0.37f, 0.00f},
-                                                             {0.80f, 0.47f, 0.65f}}};
   std::vector<render::MeshPart> parts;
   for (const auto& [label, triangles] : regions) {
     TriMesh region;
@@ -279,9 +271,8 @@ std::vector<render::MeshPart> partsOf(const levelset::SegmentedField& field) {
         corner = number->second;
       }
     }
-    const auto& c = kColours[(label + kColours.size() - 1) % kColours.size()];
     parts.push_back({.mesh = smoothMesh(std::move(region)),
-                     .colour = Imath::C3f(c[0], c[1], c[2]),
+                     .colour = render::regionColour(label),
                      .id = label,
                      .name = "region " + std::to_string(label)});
   }

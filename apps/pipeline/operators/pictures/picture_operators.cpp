@@ -10,6 +10,7 @@
 #include "apps/pipeline/operators/json_output.h"
 #include "apps/pipeline/operators/pictures/camera_options.h"
 #include "apps/pipeline/operators/pictures/comparison_json.h"
+#include "apps/pipeline/operators/pictures/segmented_pictures.h"
 #include "apps/pipeline/operators/pictures/volume_pictures.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
@@ -33,7 +34,9 @@ using levelset::UsageError;
 render::Scene sceneOf(Invocation& in) {
   const Value& drawn = in.operands[0];
   requireVolumeOptions(in);
-  render::ViewedScene viewed = isVolumeKind(drawn.kind()) ? volumeScene(in) : sceneOf(drawn);
+  render::ViewedScene viewed = isVolumeKind(drawn.kind())           ? volumeScene(in)
+                               : drawn.kind() == Kind::Segmentation ? segmentedScene(in)
+                                                                    : sceneOf(drawn);
   viewed.scene.camera = cameraOf(in, drawn.plan().bounds,
                                  viewed.hasCamera ? &viewed.scene.camera : nullptr, &viewed.scene);
   return viewed.scene;
@@ -95,6 +98,7 @@ void validateDraw(const Invocation& in) {
   if (in.flag("ground") && !render::usesLights(styleNamed(style)))
     throw UsageError(fmt::format("render: --style {} has no shadows; leave --ground out", style));
   validateVolumePicture(in);
+  validateHide(in);
   if (in.given("reflection-lines") && style != "reflection-lines")
     throw UsageError(fmt::format(
         "render: --style {} shows no reflections; leave --reflection-lines out", style));
@@ -222,7 +226,8 @@ Value draw(Invocation& in) {
                         : isBoth            ? drawByKernel(in, scene, options)
                                             : render::renderEmbree(scene, options);
   const auto read = image.attributes.find("ls:read");
-  if (read != image.attributes.end() && (!scene.solids.empty() || !scene.meshes.empty()))
+  if (read != image.attributes.end() &&
+      (!scene.solids.empty() || !scene.meshes.empty() || scene.segmented))
     in.notes.notes.push_back(fmt::format("render: {}", read->second));
   if (const auto told = image.attributes.find("ls:warning"); told != image.attributes.end())
     in.notes.warnings.push_back(fmt::format("render: {}", told->second));
@@ -295,8 +300,8 @@ Operator renderOperator() {
       .name = "render",
       .group = "Pictures",
       .summary =
-          "draw a level set, an isosurface of a volume, a mesh or a scene to an EXR with all "
-          "layers, or a PNG",
+          "draw a level set, an isosurface of a volume, a mesh, a segmentation or a scene to an "
+          "EXR with all layers, or a PNG",
       .details =
           "Layers of the EXR: R G B A, Z (along the view axis, +inf for a miss), N.X N.Y N.Z, P.X "
           "P.Y P.Z, curvature.mean .gauss .k1 .k2, id. Without --from, the view is the scene's "
@@ -420,10 +425,11 @@ Operator renderOperator() {
                    (in.given("png") && levelset::isStandardOutput(in.text("png")));
           },
   };
-  const std::vector<Param> ofVolumes = volumePictureParams();
+  std::vector<Param> ofKinds = volumePictureParams();
+  ofKinds.push_back(hideParam());
   const auto filter = std::find_if(picture.params.begin(), picture.params.end(),
                                    [](const Param& param) { return param.name == "filter"; });
-  picture.params.insert(std::next(filter), ofVolumes.begin(), ofVolumes.end());
+  picture.params.insert(std::next(filter), ofKinds.begin(), ofKinds.end());
   addCameraParams(picture.params);
   return picture;
 }

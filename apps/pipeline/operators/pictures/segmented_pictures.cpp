@@ -1,0 +1,77 @@
+#include "apps/pipeline/operators/pictures/segmented_pictures.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <charconv>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "levelset/error.h"
+#include "render/segmented/segmented_part.h"
+
+namespace pipeline {
+namespace {
+
+using levelset::RegionLabel;
+using levelset::UsageError;
+
+/// Labels of --hide, separated by commas or blanks.
+std::vector<RegionLabel> hiddenLabels(const Invocation& in) {
+  std::vector<RegionLabel> labels;
+  if (!in.given("hide")) return labels;
+  std::string text = in.text("hide");
+  std::replace(text.begin(), text.end(), ',', ' ');
+  std::istringstream words(text);
+  for (std::string word; words >> word;) {
+    RegionLabel label = 0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), label);
+    if (error != std::errc() || end != word.data() + word.size() || label == levelset::kVoid)
+      throw UsageError(fmt::format("{}: '{}' is not a label; give integers from 1 to 65535",
+                                   in.where("hide"), word));
+    labels.push_back(label);
+  }
+  if (labels.empty())
+    throw UsageError(
+        fmt::format("{}: no label is given; give integers from 1 to 65535, or leave "
+                    "--hide out",
+                    in.where("hide")));
+  return labels;
+}
+
+}  // namespace
+
+Param hideParam() {
+  return {.name = "hide",
+          .type = ParamType::Text,
+          .doc =
+              "for a segmentation: labels of regions that are not drawn, separated by commas, so "
+              "that interfaces inside them show"};
+}
+
+void validateHide(const Invocation& in) {
+  if (!in.given("hide")) return;
+  (void)hiddenLabels(in);
+  if (!in.operands.empty() && in.operands[0].kind() != Kind::Segmentation)
+    throw UsageError("render: --hide is for segmentations; leave it out");
+}
+
+render::ViewedScene segmentedScene(Invocation& in) {
+  const levelset::SegmentedField& field = in.operands[0].segmentation();
+  if (field.isEmpty())
+    throw levelset::InvalidInput("the segmentation has no interface, so nothing can be drawn");
+  const std::vector<RegionLabel> hidden = hiddenLabels(in), known = field.labels();
+  for (const RegionLabel label : hidden)
+    if (!std::binary_search(known.begin(), known.end(), label))
+      throw levelset::InvalidInput(
+          fmt::format("the segmentation has no region {} to hide; 'info' lists its labels", label));
+  render::InterfaceCaster caster(field, hidden, in.maxMemory);
+  if (caster.bounds().isEmpty())
+    throw levelset::InvalidInput("--hide names all regions, so nothing is drawn; leave one out");
+  render::ViewedScene viewed;
+  viewed.scene.segmented = render::SegmentedPart{caster};
+  return viewed;
+}
+
+}  // namespace pipeline
