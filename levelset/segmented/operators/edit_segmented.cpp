@@ -27,6 +27,7 @@ SegmentedField edit(const SegmentedField& field, const NarrowBand& solid, Region
     throw UsageError(fmt::format("the gap is {} voxels; give 0 to 0.5", options.gap));
   if (field.isEmpty())
     throw InvalidInput("the segmentation has no interface; give one with a region");
+  requireNoSheets(field);
   EditedSpace space;
   space.label = label;
   if (options.over) {
@@ -177,6 +178,7 @@ SegmentedField relabel(const SegmentedField& field,
   }
   requireLabels(field, old);
   if (field.isEmpty()) return field;
+  requireNoSheets(field);
   requireMemory(3 * static_cast<double>(field.memoryUse()), memoryLeft(options.maxMemory));
   Relabelling relabelling(field, labels);
   relabelling.measure(field, options.maxMemory);

@@ -202,6 +202,13 @@ void requireRegion(const SegmentedField& field) {
   if (field.isEmpty()) throw NoSurface("no region is left; leave at least one");
 }
 
+void requireNoSheets(const SegmentedField& field) {
+  if (!field.sheetLabels().empty())
+    throw InvalidInput(
+        "the segmentation has sheets inside its regions, which would be lost; segment a mesh "
+        "without sheets, or extract a region first");
+}
+
 void requireLabels(const SegmentedField& field, const std::vector<RegionLabel>& labels) {
   const std::vector<RegionLabel> known = field.labels();
   for (const RegionLabel label : labels)

@@ -52,6 +52,9 @@ struct EditedSpace {
 /// @throws NoSurface if a field has no regions
 void requireRegion(const SegmentedField& field);
 
+/// @throws InvalidInput for a field with sheets, which operators of regions would lose
+void requireNoSheets(const SegmentedField& field);
+
 /// Checks labels against those of a field; the void counts as one.
 /// @param what  subject of the message, for example "the offset"
 /// @throws UsageError for a label that the field does not have

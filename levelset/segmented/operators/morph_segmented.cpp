@@ -208,6 +208,7 @@ SegmentedField morphSegmented(const SegmentedField& from, const SegmentedField& 
   if (from.isEmpty() || to.isEmpty())
     throw InvalidInput(fmt::format("the {} segmentation has no interface; give two with regions",
                                    from.isEmpty() ? "first" : "second"));
+  for (const SegmentedField* field : {&from, &to}) requireNoSheets(*field);
   if (fraction == 0) return from;
   const Imath::M44d matrix = from.indexToWorld();
   const double voxelSize = from.voxelSize();

@@ -247,6 +247,7 @@ SegmentedField offsetRegion(const SegmentedField& field, RegionLabel label, doub
   if (label == kVoid)
     throw UsageError("label 0 is the void, which has no bounds; give a label from 1 to 65535");
   requireLabels(field, {label});
+  requireNoSheets(field);
   if (!std::isfinite(distance))
     throw UsageError(fmt::format("the distance is {}; give a finite one", distance));
   if (distance == 0) return field;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "levelset/error.h"
+#include "levelset/segmented/operators/field_edit_vdb.h"
 #include "levelset/segmented/operators/interface_flow_vdb.h"
 #include "levelset/segmented/operators/region_bands_vdb.h"
 
@@ -23,6 +24,7 @@ void checkSmooth(const SegmentedField& field, double time, const SmoothSegmented
     throw UsageError("the number of steps is 0; give at least 1");
   if (field.isEmpty())
     throw InvalidInput("the segmentation has no interface; give one with a region");
+  requireNoSheets(field);
   const std::vector<RegionLabel> labels = field.labels();
   for (const RegionLabel label : options.fixed)
     if (label != kVoid && !std::binary_search(labels.begin(), labels.end(), label))
