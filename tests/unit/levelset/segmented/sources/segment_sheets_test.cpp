@@ -271,7 +271,7 @@ TriMesh prismWithWalls(double radius, double height, const Frame& frame) {
   return mesh;
 }
 
-TEST(SegmentSheets, SeparateThreeHalfPlanesInRandomPoses) {
+TEST(SlowSegmentSheets, SeparatesThreeHalfPlanesInRandomPoses) {
   // A thousand prisms in one mesh, a few voxels large.
   constexpr int kSide = 10;
   constexpr double kRadius = 3, kHeight = 4, kSpacing = 9;
