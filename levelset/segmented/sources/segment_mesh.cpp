@@ -10,7 +10,6 @@
 #include <limits>
 #include <memory>
 #include <numeric>
-#include <optional>
 #include <span>
 #include <tuple>
 #include <utility>
@@ -391,10 +390,12 @@ class MeshRegions {
     SheetBuilder builder(
         points_, mesh_.triangles, simplices, crossings, features,
         [&](const V3i& at) { return labelAt(Coord(at.x, at.y, at.z)); },
-        [&](std::uint32_t t, int side) -> std::optional<RegionLabel> {
-          const std::uint32_t set = setOfSide(t, side > 0);
-          if (isCrossing[t] || !holdsPoints_[set]) return std::nullopt;
-          return labels_[set];
+        [&](std::uint32_t t, RegionLabel label) {
+          const auto holdsOther = [&](std::uint32_t set) {
+            return holdsPoints_[set] && labels_[set] != label;
+          };
+          return !isCrossing[t] && !holdsOther(setOfSide(t, false)) &&
+                 !holdsOther(setOfSide(t, true));
         });
     std::vector<V3i> origins;
     for (const auto* leaf : leaves_)

@@ -71,14 +71,14 @@ SheetBuilder::SheetBuilder(const std::vector<V3d>& points,
                            const std::vector<std::array<std::uint32_t, 3>>& triangles,
                            const GridSimplices& simplices,
                            const std::vector<GridCrossing>& crossings,
-                           const SheetFeatures& features, LabelAt labelAt, LabelOfSide labelOfSide)
+                           const SheetFeatures& features, LabelAt labelAt, IsInside isInside)
     : points_(points),
       triangles_(triangles),
       simplices_(simplices),
       crossings_(crossings),
       features_(features),
       labelAt_(std::move(labelAt)),
-      labelOfSide_(std::move(labelOfSide)) {}
+      isInside_(std::move(isInside)) {}
 
 std::shared_ptr<const SheetData> SheetBuilder::run(const std::vector<V3i>& origins) {
   chooseEdges();
@@ -137,15 +137,18 @@ bool SheetBuilder::areConnectedNearby(const V3i& at, std::uint32_t step) const {
   return isReached[target];
 }
 
-/// Returns true if a line stays in one region between its crossings, or in places without grid
-/// points: it crosses sheets, or parts that are thinner than a voxel.
+/// Returns true if all surfaces that a line crosses lie inside one region: they are sheets, or
+/// parts that are thinner than a voxel. Does not need the order of the crossings, which rounding
+/// may change where they coincide.
 bool SheetBuilder::isBetweenSheets(std::size_t first, std::size_t last, std::uint16_t label) const {
-  for (std::size_t n = first; n < last; ++n) {
-    const auto& t = triangles_[crossings_[n].triangle];
-    const int side = perturbedSide({points_[t[0]], points_[t[1]], points_[t[2]]},
-                                   simplices_.pointOf(crossings_[n].edge));
-    const auto beyond = labelOfSide_(crossings_[n].triangle, -side);
-    if (beyond && *beyond != label) return false;
+  constexpr double kLeastSlope = 1e-6;  // a line in a plane may cross its triangles back and forth
+  for (std::size_t n = first; n <= last; ++n) {
+    const std::uint32_t triangle = crossings_[n].triangle;
+    if (!isInside_(triangle, label)) return false;
+    const auto& t = triangles_[triangle];
+    const V3d normal = (points_[t[1]] - points_[t[0]]).cross(points_[t[2]] - points_[t[0]]),
+              along(offsetOfCorner(GridSimplices::slotOf(crossings_[n].edge) + 1));
+    if (std::abs(normal ^ along) < kLeastSlope * normal.length()) return false;
   }
   return true;
 }

@@ -28,15 +28,16 @@ struct NarrowGap {
 class SheetBuilder {
  public:
   using LabelAt = std::function<std::uint16_t(const Imath::V3i&)>;
-  /// Label of a side of a triangle: 1 in front, −1 behind. Empty if no grid point lies there.
-  using LabelOfSide = std::function<std::optional<std::uint16_t>(std::uint32_t triangle, int side)>;
+  /// Returns true if grid points on both sides of a triangle belong to this region, or none lie
+  /// there; false if the triangle crosses others.
+  using IsInside = std::function<bool(std::uint32_t triangle, std::uint16_t label)>;
 
   /// @param points  vertices, voxels
   /// @param crossings  as from findGridCrossings(), all of the mesh
   SheetBuilder(const std::vector<Imath::V3d>& points,
                const std::vector<std::array<std::uint32_t, 3>>& triangles,
                const GridSimplices& simplices, const std::vector<GridCrossing>& crossings,
-               const SheetFeatures& features, LabelAt labelAt, LabelOfSide labelOfSide);
+               const SheetFeatures& features, LabelAt labelAt, IsInside isInside);
 
   /// @param origins  of all blocks of the field, by x, y, z
   [[nodiscard]] std::shared_ptr<const SheetData> run(const std::vector<Imath::V3i>& origins);
@@ -74,7 +75,7 @@ class SheetBuilder {
   const std::vector<GridCrossing>& crossings_;
   const SheetFeatures& features_;
   LabelAt labelAt_;
-  LabelOfSide labelOfSide_;
+  IsInside isInside_;
   std::vector<CrossedEdge> edges_;
   std::vector<GridSimplices::Key> junctionFaces_;  ///< with three crossed edges
   std::vector<PlacedPoint> faces_;                 ///< points on faces, ascending
