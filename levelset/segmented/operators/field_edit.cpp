@@ -43,9 +43,8 @@ class SpaceEdit {
     gatherBlocks();
     tbb::parallel_for(std::size_t{0}, blocks_.size(), [&](std::size_t b) { setOwners(b); });
     const auto distances = [&](std::size_t b, std::uint32_t n, RegionLabel,
-                               const std::vector<RegionLabel>& others, std::vector<float>& result) {
-      distancesOf(b, n, others, result);
-    };
+                               const std::vector<RegionLabel>& others,
+                               std::vector<float>& result) { distancesOf(b, n, others, result); };
     SegmentedField result = packPartition(data_.transform->copy(), data_.halfWidth, tiles,
                                           std::move(blocks_), distances, progress);
     requireRegion(result);
