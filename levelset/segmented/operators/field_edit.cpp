@@ -177,8 +177,8 @@ class SpaceEdit {
   const SegmentedData& data_;
   const EditedSpace& space_;
   std::vector<OwnedBlock> blocks_;
-  std::vector<std::size_t> numbers_;  ///< of the blocks in the field
-  std::vector<Coord> origins_;        ///< of the blocks
+  std::vector<std::size_t> numbers_;  ///< numbers in the field, by block
+  std::vector<Coord> origins_;        ///< by block
   std::vector<BlockValues> spaces_;   ///< signed distances to the space, without its sign
 };
 

@@ -12,7 +12,7 @@
 namespace levelset {
 namespace {
 
-constexpr double kDefaultStep = 0.5;      // voxels²
+constexpr double kDefaultStep = 0.5;    // voxels²
 constexpr double kLongestFlowStep = 4;  // voxels²
 constexpr double kBandsDone = 0.1;      // progress
 

@@ -278,7 +278,7 @@ TEST(SmoothSegmented, KeepsTheVolumesOfATripleBubble) {
 }
 
 TEST(SmoothSegmented, ReportsRegionsThatVanish) {
-  // Of two balls apart, the smaller one vanishes at R² / 4.
+  // The smaller ball vanishes at R² / 4.
   const SegmentedField field =
       segmentSolids(
           std::vector<NarrowBand>{makeSphere(0.4, V3d(2, 0, 0), 0.1), makeSphere(1, V3d(0), 0.1)},
