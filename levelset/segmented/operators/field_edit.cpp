@@ -43,9 +43,8 @@ class SpaceEdit {
     gatherBlocks();
     tbb::parallel_for(std::size_t{0}, blocks_.size(), [&](std::size_t b) { setOwners(b); });
     const auto distances = [&](std::size_t b, std::uint32_t n, RegionLabel,
-                               const std::vector<RegionLabel>& others, std::vector<float>& result) {
-      distancesOf(b, n, others, result);
-    };
+                               const std::vector<RegionLabel>& others,
+                               std::vector<float>& result) { distancesOf(b, n, others, result); };
     SegmentedField result = packPartition(data_.transform->copy(), data_.halfWidth, tiles,
                                           std::move(blocks_), distances, progress);
     requireRegion(result);
@@ -178,8 +177,8 @@ class SpaceEdit {
   const SegmentedData& data_;
   const EditedSpace& space_;
   std::vector<OwnedBlock> blocks_;
-  std::vector<std::size_t> numbers_;  ///< of the blocks in the field
-  std::vector<Coord> origins_;        ///< of the blocks
+  std::vector<std::size_t> numbers_;  ///< numbers in the field, by block
+  std::vector<Coord> origins_;        ///< by block
   std::vector<BlockValues> spaces_;   ///< signed distances to the space, without its sign
 };
 

@@ -27,6 +27,8 @@ constexpr std::uint32_t kLeafVoxels = SegmentedData::kVoxels;
 constexpr double kRaceHalfWidth = 3;  // voxels: of the bands before they are redistanced
 // Voxels between the end of a band and the points that a step may give to another region.
 constexpr double kFarMargin = 2;
+// Distance from junctions within which distances are corrected, voxels.
+constexpr double kJunctionRadius = 3;
 // Half of the width over which a volume fades out at an interface, voxels.
 constexpr double kFade = 1.5;
 // A sampled Gaussian of less variance differs from the continuous one.
@@ -126,6 +128,7 @@ class Race {
         }
         for (float& value : values_[e]) value *= bands_.sign(entry.region);
       }
+      gate.advance(1);
     });
   }
 
@@ -386,8 +389,7 @@ InterfaceFlow::InterfaceFlow(RegionBands bands, std::vector<char> isFixed, doubl
     : bands_(std::move(bands)),
       isFixed_(std::move(isFixed)),
       constants_(bands_.bands.size(), 0),
-      kernelVariance_(2 * step),
-      kernel_(halfKernel(kernelVariance_)),
+      kernel_(halfKernel(2 * step)),
       maxMemory_(maxMemory) {
   if (!keepsVolumes) return;
   Race race(bands_, isFixed_);
@@ -468,8 +470,7 @@ std::vector<RegionLabel> InterfaceFlow::advance(const Progress& progress) {
   if (grids.size() > 2) {
     std::erase(fields.trees, nullptr);
     fields.isFixed = isFixed;
-    const double deviation = std::sqrt(kernelVariance_);
-    correctJunctions(next, fields, std::min(halfWidth - 0.5, 1 + 4 * deviation));
+    correctJunctions(next, fields, kJunctionRadius);
   }
   bands_ = std::move(next);
   isFixed_ = std::move(isFixed);

@@ -32,7 +32,6 @@ class InterfaceFlow {
   std::vector<char> isFixed_;
   std::vector<double> volumes_;    ///< to keep, voxels; empty: none
   std::vector<double> constants_;  ///< added to the distances, world units
-  double kernelVariance_;          ///< voxels²
   std::vector<float> kernel_;      ///< half of it, from the centre
   std::size_t maxMemory_;
 };

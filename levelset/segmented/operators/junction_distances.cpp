@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "levelset/grids/interpolate_vdb.h"
 #include "levelset/segmented/operators/junction_distances_vdb.h"
@@ -12,8 +13,8 @@ namespace {
 using Imath::V3d;
 
 constexpr int kMeetingIterations = 8;
-constexpr double kMeetingConverged = 1e-4;  // voxels
-constexpr double kLongestMove = 2;   // voxels
+constexpr double kMeetingConverged = 1e-3;  // voxels: the error is then about its square
+constexpr double kLongestMove = 2;          // voxels
 // Excess, in voxels, over the least value from which on a point belongs to another region.
 constexpr double kOwnerTie = 1e-3;
 // Largest value on an interface, voxels. Near junctions all functions are positive.
@@ -50,8 +51,9 @@ std::optional<V3d> JunctionDistances::closest(const V3d& from, const V3d& start,
   const auto count = static_cast<Eigen::Index>(meeting.size() - 1);
   V3d p = start;
   for (int n = 0; n < kMeetingIterations; ++n) {
-    Eigen::MatrixXd slopes(count, 3);
-    Eigen::VectorXd values(count);
+    // At most three functions, so that no memory is allocated.
+    Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 3, 3> slopes(count, 3);
+    Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1> values(count);
     for (Eigen::Index i = 0; i < count; ++i) {
       const Sample f = interface(meeting[0], meeting[static_cast<std::size_t>(i) + 1], p);
       if (!(f.gradient.length2() > 0.01)) return {};
@@ -59,7 +61,8 @@ std::optional<V3d> JunctionDistances::closest(const V3d& from, const V3d& start,
       for (int k = 0; k < 3; ++k) slopes(i, k) = f.gradient[k];
     }
     // Onto the linear functions, along the directions that they leave free towards `from`.
-    const Eigen::MatrixXd square = slopes * slopes.transpose();
+    const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3> square =
+        slopes * slopes.transpose();
     if (!(std::abs(square.determinant()) > 1e-4)) return {};
     const Eigen::Vector3d away(from.x - p.x, from.y - p.y, from.z - p.z);
     const Eigen::Vector3d move =

@@ -195,7 +195,7 @@ class MorphPair {
   float fraction_;
   double voxelSize_;
   float far_;
-  std::vector<RegionLabel> labels_;  ///< of both, ascending
+  std::vector<RegionLabel> labels_;  ///< all labels, ascending
   std::vector<Coord> blocks_;        ///< in which a band has a leaf, ascending
 };
 

@@ -213,7 +213,7 @@ class FreedSpace {
 };
 
 SegmentedField growRegion(const SegmentedField& field, RegionLabel label, double distance,
-                    const NarrowBand& band, const OffsetRegionOptions& options) {
+                          const NarrowBand& band, const OffsetRegionOptions& options) {
   const NarrowBand space = offset(band, distance, {.maxMemory = options.maxMemory});
   EditedSpace edited{.tree = &vdb(space).tree(), .label = label, .over = {kVoid}};
   edited.gap = static_cast<float>(kOffsetGap * field.voxelSize());
@@ -224,7 +224,7 @@ SegmentedField growRegion(const SegmentedField& field, RegionLabel label, double
 }
 
 SegmentedField shrinkRegion(const SegmentedField& field, RegionLabel label, double distance,
-                      const NarrowBand& band, const OffsetRegionOptions& options) {
+                            const NarrowBand& band, const OffsetRegionOptions& options) {
   NarrowBand kept;
   try {
     kept = offset(band, -distance, {.maxMemory = options.maxMemory});

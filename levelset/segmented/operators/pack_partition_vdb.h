@@ -14,8 +14,8 @@ namespace levelset {
 /// Block of a partition whose distances are not known yet.
 struct OwnedBlock {
   openvdb::Coord block;  ///< index coordinates / 8
-  std::vector<RegionLabel>
-      owners;             ///< of the 512 voxels, z fastest; a single one if they are equal
+  /// Labels of the 512 voxels, z fastest; a single one if they are equal.
+  std::vector<RegionLabel> owners;
   PackedBlock kept = {};  ///< with words: the block stays as it is
 
   [[nodiscard]] RegionLabel ownerAt(std::uint32_t voxel) const {

@@ -13,9 +13,9 @@
 namespace levelset {
 namespace {
 
-constexpr double kDefaultStep = 1;        // voxels²
-constexpr double kLongestFlowStep = 4;     // voxels²
-constexpr double kBandsDone = 0.1;  // progress
+constexpr double kDefaultStep = 0.5;    // voxels²
+constexpr double kLongestFlowStep = 4;  // voxels²
+constexpr double kBandsDone = 0.1;      // progress
 
 void checkSmooth(const SegmentedField& field, double time, const SmoothSegmentedOptions& options) {
   if (!(time >= 0) || !std::isfinite(time))
@@ -45,13 +45,14 @@ SmoothSegmentedResult smoothSegmented(const SegmentedField& field, double time,
     return result;
   }
   const double inVoxels = time / (field.voxelSize() * field.voxelSize());
-  result.steps =
-      options.steps.value_or(static_cast<std::size_t>(std::max(1.0, std::ceil(inVoxels / kDefaultStep))));
+  result.steps = options.steps.value_or(
+      static_cast<std::size_t>(std::max(1.0, std::ceil(inVoxels / kDefaultStep))));
   const double step = inVoxels / static_cast<double>(result.steps);
   if (step > kLongestFlowStep)
     throw UsageError(fmt::format(
         "a step of {:.4g} is longer than {:.4g}, four voxels squared; give at least {:.0f} steps",
-        time / static_cast<double>(result.steps), kLongestFlowStep * field.voxelSize() * field.voxelSize(),
+        time / static_cast<double>(result.steps),
+        kLongestFlowStep * field.voxelSize() * field.voxelSize(),
         std::ceil(inVoxels / kLongestFlowStep)));
 
   RegionBands bands = regionBands(field, InterfaceFlow::halfWidthFor(step), options.maxMemory,
@@ -65,8 +66,8 @@ SmoothSegmentedResult smoothSegmented(const SegmentedField& field, double time,
   const double count = static_cast<double>(result.steps);
   for (std::size_t n = 0; n < result.steps; ++n) {
     const double done = static_cast<double>(n) / count, next = static_cast<double>(n + 1) / count;
-    const std::vector<RegionLabel> vanished =
-        flow.advance(subProgress(options.progress, kBandsDone + 0.8 * done, kBandsDone + 0.8 * next));
+    const std::vector<RegionLabel> vanished = flow.advance(
+        subProgress(options.progress, kBandsDone + 0.8 * done, kBandsDone + 0.8 * next));
     for (const RegionLabel label : vanished) result.vanished.push_back({label, next * time});
     if (flow.bands().bands.size() < 2)
       throw InvalidInput(fmt::format(

@@ -10,7 +10,7 @@
 namespace levelset {
 
 struct SmoothSegmentedOptions {
-  /// Number of equal time steps. Empty: as many as a step of one voxel² needs.
+  /// Number of equal time steps. Empty: as many as steps of half a voxel² need.
   std::optional<std::size_t> steps = {};
   /// Keeps the volume of each region, by a pressure in it. The void takes no part.
   bool keepsVolumes = false;

@@ -63,7 +63,7 @@ std::vector<RegionLabel> labelsOf(const Invocation& in, const char* param) {
   return labels;
 }
 
-/// What an action does with segmentations.
+/// Behaviour of an action on segmentations.
 struct SegmentedAction {
   std::string details;              ///< for the help
   std::vector<Param> params = {};   ///< that only segmentations have

