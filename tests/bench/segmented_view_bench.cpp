@@ -51,11 +51,11 @@ double secondsOf(const std::function<void()>& work) {
   return least;
 }
 
-/// Samples of a field on n³ points of its own grid around the origin.
+/// Samples of a field on n³ points of its own grid around the origin. One thread, one sampler.
 PackedDistances packedOf(const SegmentedField& field, int n) {
   const double voxel = field.voxelSize();
+  const SegmentedSampler sampler(field);
   return packDistances(V3i(n), V3d(-(n / 2) * voxel), voxel, field.halfWidth(), [&](const V3d& p) {
-    const SegmentedSampler sampler(field);
     return RegionSample{sampler.label(p), sampler.distance(p)};
   });
 }
