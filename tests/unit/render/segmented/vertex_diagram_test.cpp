@@ -152,9 +152,10 @@ TEST(SlabRenderer, ShowsAFilmThatDoesNotExistWithLinearFetchOnly) {
   EXPECT_EQ(aware.films, 0u);
   EXPECT_GT(linear.films, 300u);  // 449 of 936
   EXPECT_EQ(aware.missed, 0u);
-  EXPECT_LT(aware.median, measured(0.02));
-  EXPECT_LT(aware.largest, measured(0.1));
-  EXPECT_GT(nearest.median, 5 * aware.median);
+  EXPECT_LT(aware.median, measured(0.0133));
+  EXPECT_LT(aware.largest, measured(0.054));
+  EXPECT_LT(nearest.median, measured(0.213, 0.5));
+  EXPECT_GT(nearest.median, 10 * aware.median);
 }
 
 TEST(SlabRenderer, EndsASheetAtItsRim) {
@@ -214,8 +215,8 @@ TEST(SlabRenderer, SeesTheFieldAsTheExactRaysDo) {
   EXPECT_GT(hits, 700u);
   EXPECT_LE(unlike, 20u);
   EXPECT_EQ(relabelled, 0u);
-  EXPECT_LT(errors[errors.size() / 2], measured(0.02));
-  EXPECT_LT(errors.back(), measured(0.1));
+  EXPECT_LT(errors[errors.size() / 2], measured(0.0042));
+  EXPECT_LT(errors.back(), measured(0.0225));
 }
 
 TEST(SlabRenderer, RefusesASingleSlice) {
