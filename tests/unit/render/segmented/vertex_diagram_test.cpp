@@ -213,7 +213,7 @@ TEST(SlabRenderer, SeesTheFieldAsTheExactRaysDo) {
   }
   std::sort(errors.begin(), errors.end());
   EXPECT_GT(hits, 700u);
-  EXPECT_LE(unlike, 20u);
+  EXPECT_EQ(unlike, 0u);
   EXPECT_EQ(relabelled, 0u);
   EXPECT_LT(errors[errors.size() / 2], measured(0.0042));
   EXPECT_LT(errors.back(), measured(0.0225));
