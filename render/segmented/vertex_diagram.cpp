@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 
 #include "levelset/error.h"
 
@@ -34,7 +35,8 @@ PackedDistances packDistances(const V3i& size, const V3d& origin, double spacing
   packed.levelsPerLength = PackedDistances::kFarthest / (farthestVoxels * spacing);
   packed.values.resize(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) *
                        static_cast<std::size_t>(size.z));
-  std::atomic<int> wrong = -1;
+  constexpr int kNone = std::numeric_limits<int>::min();
+  std::atomic<int> wrong = kNone;
   tbb::parallel_for(0, size.z, [&](int z) {
     std::size_t n = static_cast<std::size_t>(z) * static_cast<std::size_t>(size.x) *
                     static_cast<std::size_t>(size.y);
@@ -48,7 +50,7 @@ PackedDistances packDistances(const V3i& size, const V3d& origin, double spacing
                                                        PackedDistances::kBand * (found.region & 3));
       }
   });
-  if (wrong >= 0)
+  if (wrong != kNone)
     throw levelset::InvalidInput(fmt::format(
         "region {} does not fit into a byte, which holds {} regions; give fewer regions",
         wrong.load(), PackedDistances::kMostRegions));

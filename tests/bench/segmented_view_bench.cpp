@@ -51,11 +51,11 @@ double secondsOf(const std::function<void()>& work) {
   return least;
 }
 
-/// Samples of a field on n³ points of its own grid around the origin.
+/// Samples of a field on n³ points of its own grid around the origin. One thread, one sampler.
 PackedDistances packedOf(const SegmentedField& field, int n) {
   const double voxel = field.voxelSize();
+  const SegmentedSampler sampler(field);
   return packDistances(V3i(n), V3d(-(n / 2) * voxel), voxel, field.halfWidth(), [&](const V3d& p) {
-    const SegmentedSampler sampler(field);
     return RegionSample{sampler.label(p), sampler.distance(p)};
   });
 }
@@ -160,6 +160,7 @@ void printArtefacts() {
     for (const Way& way :
          {Way{"nearest", {.slices = slices}}, Way{"nearest", {.slices = slices, .width = far}},
           Way{"linear", {.slices = slices, .fetch = SlabFetch::Linear}},
+          Way{"linear", {.slices = slices, .fetch = SlabFetch::Linear, .width = far}},
           Way{"label-aware", {.slices = slices, .fetch = SlabFetch::LabelAware}}}) {
       const SlabPicture picture = renderSlabs(packed, camera, way.options);
       std::size_t hits = 0, missed = 0, extra = 0, films = 0, others = 0;
@@ -224,9 +225,8 @@ void drawPicture(const std::string& file) {
   for (const char* name : {"R", "G", "B", "A"}) (void)image.addChannel(name);
   int left = 0;
   for (const SlabFetch fetch : {SlabFetch::Nearest, SlabFetch::Linear}) {
-    const SlabPicture slabs = renderSlabs(
-        packed, camera,
-        {.slices = 110, .fetch = fetch, .width = fetch == SlabFetch::Nearest ? 2.73 : 1});
+    const SlabPicture slabs =
+        renderSlabs(packed, camera, {.slices = 110, .fetch = fetch, .width = 1 + std::sqrt(3.0)});
     drawPanel(image, left, camera, slabs.distance, {slabs.behind.begin(), slabs.behind.end()});
     left += kPixels;
   }

@@ -44,12 +44,13 @@ TEST(GpuInterfaces, HasTheBitsOfTheProcessor) {
   for (const support::SegmentedScene& scene : support::segmentedScenes()) {
     const InterfaceCaster caster(scene.field, scene.hidden);
     std::vector<InterfaceRay> rays;
-    for (const Camera& camera : support::segmentedViews(40, 30)) {
+    for (const Camera& camera : support::segmentedViews(24, 18)) {
       const std::vector<InterfaceRay> more = support::raysOf(camera);
       rays.insert(rays.end(), more.begin(), more.end());
     }
     // Rays behind the first crossings, which know their regions.
-    for (std::size_t n = 0; n < 4800; ++n) {
+    const std::size_t count = rays.size();
+    for (std::size_t n = 0; n < count; ++n) {
       const InterfaceHit hit = caster.firstHit(rays[n]);
       if (hit.found) rays.push_back(InterfaceCaster::behind(rays[n], hit));
     }
@@ -67,7 +68,7 @@ TEST(GpuInterfaces, HasTheBitsOfTheProcessor) {
                 !haveSameBits(hits[n].normal, expected.normal) ||
                 !haveSameBits(hits[n].facetNormal, expected.facetNormal);
     }
-    EXPECT_GT(found, 1500u) << scene.name;
+    EXPECT_GT(found, 400u) << scene.name;
     EXPECT_EQ(unlike, 0u) << scene.name;
   }
 }

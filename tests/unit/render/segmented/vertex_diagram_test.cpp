@@ -58,7 +58,7 @@ TEST(VertexDiagram, NeverTakesClampedDistances) {
 TEST(VertexDiagram, KeepsPlanesAcrossTheLineOfTheSamples) {
   // Share of the planes that the published test loses by quantisation, for distances up to 2, 4 and
   // 8 voxels.
-  const double lost[] = {0.484, 0.750, 0.874};
+  const double lost[] = {0.492, 0.746, 0.873};
   int number = 0;
   for (const int voxels : {2, 4, 8}) {
     const double width = 63.0 / voxels;
@@ -72,7 +72,7 @@ TEST(VertexDiagram, KeepsPlanesAcrossTheLineOfTheSamples) {
       losses += !published.at(u, 64 + v).isSurface;
       left += !corrected.at(u, 64 + v).isSurface;
     }
-    EXPECT_NEAR(losses / static_cast<double>(kPlanes), lost[number++], 0.003) << voxels;
+    EXPECT_NEAR(losses / static_cast<double>(kPlanes), lost[number++], 0.001) << voxels;
     EXPECT_EQ(left, 0) << voxels;
   }
 }
@@ -150,11 +150,12 @@ TEST(SlabRenderer, ShowsAFilmThatDoesNotExistWithLinearFetchOnly) {
   EXPECT_GT(nearest.hits, 800u);
   EXPECT_EQ(nearest.films, 0u);
   EXPECT_EQ(aware.films, 0u);
-  EXPECT_GT(linear.films, nearest.hits / 2);
+  EXPECT_GT(linear.films, 300u);  // 449 of 936
   EXPECT_EQ(aware.missed, 0u);
-  EXPECT_LT(aware.median, measured(0.02));
-  EXPECT_LT(aware.largest, measured(0.1));
-  EXPECT_GT(nearest.median, 5 * aware.median);
+  EXPECT_LT(aware.median, measured(0.0133));
+  EXPECT_LT(aware.largest, measured(0.054));
+  EXPECT_LT(nearest.median, measured(0.213, 0.5));
+  EXPECT_GT(nearest.median, 10 * aware.median);
 }
 
 TEST(SlabRenderer, EndsASheetAtItsRim) {
@@ -212,10 +213,10 @@ TEST(SlabRenderer, SeesTheFieldAsTheExactRaysDo) {
   }
   std::sort(errors.begin(), errors.end());
   EXPECT_GT(hits, 700u);
-  EXPECT_LE(unlike, 20u);
+  EXPECT_EQ(unlike, 0u);
   EXPECT_EQ(relabelled, 0u);
-  EXPECT_LT(errors[errors.size() / 2], measured(0.02));
-  EXPECT_LT(errors.back(), measured(0.1));
+  EXPECT_LT(errors[errors.size() / 2], measured(0.0042));
+  EXPECT_LT(errors.back(), measured(0.0225));
 }
 
 TEST(SlabRenderer, RefusesASingleSlice) {
