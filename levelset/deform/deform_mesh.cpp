@@ -113,7 +113,7 @@ class TriangleDivision {
     const std::uint32_t bc = middle(c[1], c[2]);
     if (number == 2) {
       mesh_.triangles[t] = {ab, c[1], bc};
-      // Of the two diagonals of the rest, the shorter one.
+      // The rest is divided by its shorter diagonal.
       const double one = (mesh_.positions[c[0]] - mesh_.positions[bc]).length2(),
                    other = (mesh_.positions[ab] - mesh_.positions[c[2]]).length2();
       if (one < other) {

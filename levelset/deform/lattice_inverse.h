@@ -37,7 +37,7 @@ class LatticeInverse {
 
   ControlLattice lattice_;
   BezierPieces pieces_;
-  std::vector<Imath::Box3d> bounds_;  ///< of the control points of each piece
+  std::vector<Imath::Box3d> bounds_;  ///< boxes of the control points, by piece
   double tolerance_ = 0;              ///< largest residual of a result, world units
   double boxSize_ = 0;                ///< diagonal of the box
 };
