@@ -69,8 +69,8 @@ TEST(DeformBand, ABentCylinderIsAPieceOfATorus) {
   double last = 0;
   int level = 0;
   for (const double voxelSize : {0.08, 0.04, 0.02}) {
-    const SideErrors errors =
-        errorsOf(shape.band(voxelSize), [&](const V3d& p) { return shape.distance(p); });
+    const NarrowBand band = shape.band(voxelSize);
+    const SideErrors errors = errorsOf(band, [&](const V3d& p) { return shape.distance(p); });
     const double figure = figures[level++];
     EXPECT_GT(errors.count, 3000);
     EXPECT_LT(errors.inside, measured(figure));
@@ -79,9 +79,10 @@ TEST(DeformBand, ABentCylinderIsAPieceOfATorus) {
       EXPECT_GT(std::log2(last / (errors.beside * voxelSize)), measuredOrder(2.5, 2));
     }
     last = errors.beside * voxelSize;
+    if (level == 2) {  // the circular edges are rounded
+      EXPECT_NEAR(measure(band).volume / std::numbers::pi, 1, measured(0.0016));
+    }
   }
-  // The circular edges are rounded.
-  EXPECT_NEAR(measure(shape.band(0.04)).volume / std::numbers::pi, 1, measured(0.0016));
 }
 
 /// Distance of an ellipsoid of revolution about z with half axes a, a, c, by Newton's method on the
