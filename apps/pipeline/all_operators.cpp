@@ -2,6 +2,7 @@
 #include "apps/pipeline/operators/flow/morph_action.h"
 #include "apps/pipeline/operators/level_set_operator.h"
 #include "apps/pipeline/operators/solids/adaptive_actions.h"
+#include "apps/pipeline/operators/solids/deform_action.h"
 #include "apps/pipeline/operators/solids/mesh_action.h"
 #include "apps/pipeline/operators/solids/segment_actions.h"
 #include "apps/pipeline/operators/solids/segment_edit_actions.h"
@@ -78,6 +79,7 @@ std::vector<Operator> allOperators() {
       levelSetOperator<levelset::SmoothOperator>(),
       morphWithSegmentations(morphOperator()),
       transformOperator(),
+      deformOperator(),
       resampleOperator(),
       clipOperator(),
       patchOperator(),

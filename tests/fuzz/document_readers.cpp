@@ -3,6 +3,7 @@
 #include "apps/pipeline/cache/cache.h"
 #include "apps/pipeline/values/digest.h"
 #include "apps/pipeline/values/mesh_bytes.h"
+#include "levelset/deform/lattice_file.h"
 #include "levelset/files/band_file.h"
 #include "levelset/mesh_files/mesh_file.h"
 #include "levelset/shapes/shapes.h"
@@ -18,6 +19,14 @@ void readPatch(std::string_view bytes) {
   accepts([&] {
     for (const mapping::Patch& patch : mapping::readPatches(file, kMaxMemory))
       require(patch.layers.size() >= 2, "a patch has levels");
+  });
+}
+
+void readLattice(std::string_view bytes) {
+  const std::filesystem::path file = scratchFile("lattice.json", bytes);
+  accepts([&] {
+    const levelset::ControlLattice lattice = levelset::readLattice(file, kMaxMemory);
+    require(lattice.data().points.size() >= 8, "a lattice has eight control points");
   });
 }
 
@@ -63,7 +72,8 @@ void readCache(std::string_view bytes) {
 }  // namespace
 
 std::vector<Reader> documentReaders() {
-  return {{"patch", readPatch}, {"scene", readScene}, {"cache", readCache}};
+  return {
+      {"patch", readPatch}, {"lattice", readLattice}, {"scene", readScene}, {"cache", readCache}};
 }
 
 }  // namespace fuzz

@@ -1,0 +1,276 @@
+#include "apps/pipeline/operators/solids/deform_action.h"
+
+#include <fmt/core.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/json_output.h"
+#include "apps/pipeline/registry/invocation.h"
+#include "levelset/deform/deform_band.h"
+#include "levelset/deform/deform_mesh.h"
+#include "levelset/deform/lattice_file.h"
+#include "levelset/deform/ready_lattices.h"
+#include "levelset/error.h"
+
+namespace pipeline {
+namespace {
+
+using Imath::V3d;
+using levelset::OrientedBox;
+using levelset::ReadyLattice;
+using levelset::UsageError;
+
+/// Options of which each deformation has exactly one.
+const std::vector<std::string> kDeformations = {"bend", "twist", "taper", "stretch", "lattice"};
+/// Tolerance of bent and twisted lattices, and default of --tolerance, over the diagonal of the
+/// box.
+constexpr double kClosedFormTolerance = 1e-8, kMeshTolerance = 1e-4;
+/// Width of the box around a level set beyond its surface, voxels.
+constexpr double kBandMargin = 2;
+
+std::string deformationOf(const Invocation& in) {
+  std::string given;
+  for (const std::string& name : kDeformations) {
+    if (!in.given(name)) continue;
+    if (!given.empty())
+      throw UsageError(fmt::format(
+          "deform: --{} and --{} exclude each other; use one, and a second 'deform' for the other",
+          given, name));
+    given = name;
+  }
+  if (given.empty())
+    throw UsageError(
+        "deform: the deformation is missing; give --bend, --twist, --taper, --stretch or "
+        "--lattice");
+  return given;
+}
+
+/// Corners of the box around the operand along the axes of the deformation, or points of the
+/// operand: all that the box must contain.
+std::vector<V3d> extentOf(const Invocation& in, const std::array<V3d, 3>& directions) {
+  const Value& operand = in.operands[0];
+  if (operand.kind() == Kind::Mesh && !in.mesh().positions.empty()) return in.mesh().positions;
+  if (operand.kind() == Kind::Points) return operand.cloud().positions;
+  std::vector<V3d> all;
+  for (const V3d& d : directions) {
+    all.push_back(d);
+    all.push_back(-d);
+  }
+  const std::vector<double> extents = in.band().zeroSetExtents(all);
+  std::vector<V3d> corners;
+  for (unsigned corner = 0; corner < 8 && extents[0] > -extents[1]; ++corner) {
+    V3d p(0);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      p += directions[axis] *
+           ((corner >> axis & 1) != 0 ? extents[2 * axis] : -extents[2 * axis + 1]);
+    corners.push_back(p);
+  }
+  return corners;
+}
+
+std::vector<V3d> cornersOf(const Imath::Box3d& box) {
+  std::vector<V3d> corners;
+  for (int corner = 0; corner < 8 && !box.isEmpty(); ++corner)
+    corners.emplace_back((corner & 1) ? box.max.x : box.min.x, (corner & 2) ? box.max.y : box.min.y,
+                         (corner & 4) ? box.max.z : box.min.z);
+  return corners;
+}
+
+/// Builds the lattice of the options around points, or reads it.
+ReadyLattice latticeFor(Invocation& in, bool isPlan) {
+  const std::string kind = deformationOf(in);
+  if (kind == "lattice") return {levelset::readLattice(in.text("lattice"), in.maxMemory), 0};
+  const auto directions = levelset::directionsAlong(
+      in.point("axis"), in.given("towards") ? in.point("towards") : V3d(0));
+  const double margin =
+      in.operands[0].kind() == Kind::Band ? kBandMargin * in.operands[0].plan().voxelSize : 0;
+  const OrientedBox box = levelset::boxAround(
+      isPlan ? cornersOf(in.operands[0].plan().bounds) : extentOf(in, directions), directions,
+      margin);
+  const double tolerance = kClosedFormTolerance * 2 * box.halfSize.length();
+  if (kind == "bend") return levelset::bendLattice(box, in.radians("bend"), tolerance);
+  if (kind == "twist") return levelset::twistLattice(box, in.radians("twist"), tolerance);
+  if (kind == "taper") return levelset::taperLattice(box, in.number("taper"));
+  return levelset::stretchLattice(box, in.number("stretch"));
+}
+
+Json certificateJson(const levelset::LatticeCertificate& certificate) {
+  return {{"verdict", levelset::latticeVerdictName(certificate.verdict)},
+          {"least_jacobian_low", certificate.leastLow},
+          {"least_jacobian_high", certificate.leastHigh},
+          {"least_jacobian_at", {certificate.place.x, certificate.place.y, certificate.place.z}},
+          {"pieces", certificate.pieces},
+          {"boxes", certificate.boxes},
+          {"overlaps", certificate.overlaps}};
+}
+
+Value runDeform(Invocation& in) {
+  const ReadyLattice ready = latticeFor(in, /*isPlan=*/false);
+  Json details = {{"lattice_error", ready.error},
+                  {"control_points", ready.lattice.data().points.size()}};
+  if (ready.error > 0)
+    in.notes.errors.push_back(
+        {"distance of the lattice from the closed form", ready.error, "world units"});
+  const auto finish = [&](const levelset::LatticeCertificate& certificate, Value value) {
+    details["certificate"] = certificateJson(certificate);
+    in.notes.notes.push_back(levelset::describe(certificate));
+    in.notes.detailsJson = details.dump();
+    return value;
+  };
+  switch (in.operands[0].kind()) {
+    case Kind::Points: {
+      levelset::DeformPointsResult result =
+          levelset::deformPoints(in.operands[0].cloud(), ready.lattice, in.progress);
+      return finish(result.certificate, Value(std::move(result.cloud)));
+    }
+    case Kind::Mesh: {
+      const double diagonal = ready.lattice.bounds().size().length();
+      levelset::DeformMeshResult result = levelset::deformMesh(
+          in.mesh(), ready.lattice,
+          {.tolerance = in.given("tolerance") ? in.length("tolerance") : kMeshTolerance * diagonal,
+           .maxMemory = in.maxMemory,
+           .progress = in.progress});
+      details["halved_edges"] = result.halvedEdges;
+      details["bend"] = result.bend;
+      in.notes.errors.push_back(
+          {"largest distance of edges from their deformed curves", result.bend, "world units"});
+      return finish(result.certificate, Value(std::move(result.mesh)));
+    }
+    default: {
+      levelset::DeformBandOptions options{.maxMemory = in.maxMemory, .progress = in.progress};
+      if (in.given("voxel")) options.voxelSize = in.length("voxel");
+      if (in.given("half-width")) options.halfWidth = in.number("half-width");
+      levelset::DeformBandResult result = levelset::deformBand(in.band(), ready.lattice, options);
+      return finish(result.certificate, Value(std::move(result.band)));
+    }
+  }
+}
+
+double areaOf(const Imath::Box3d& box) {
+  const V3d size = box.size();
+  return size.x * size.y + size.y * size.z + size.z * size.x;
+}
+
+Plan planDeform(Invocation& in) {
+  Plan plan = in.operands[0].plan();
+  if (plan.bounds.isEmpty()) return plan;
+  const ReadyLattice ready = latticeFor(in, /*isPlan=*/true);
+  const double before = areaOf(plan.bounds);
+  plan.bounds = ready.lattice.bounds();
+  if (plan.kind == Kind::Band) {
+    if (in.given("voxel")) plan.voxelSize = in.length("voxel");
+    if (in.given("half-width")) plan.halfWidth = in.number("half-width");
+  }
+  // Bends and twists keep the area within some percent; the others scale it about as their box.
+  if (!in.given("bend") && !in.given("twist") && before > 0)
+    plan.area *= areaOf(plan.bounds) / before;
+  if (plan.kind == Kind::Mesh) {
+    if (in.given("tolerance")) (void)in.length("tolerance");
+    plan.triangles = 0;  // unknown until the triangles are divided
+  }
+  return plan;
+}
+
+void validateDeform(const Invocation& in) {
+  const std::string kind = deformationOf(in);
+  if (kind == "lattice")
+    for (const char* name : {"axis", "towards"})
+      if (in.given(name))
+        throw UsageError(fmt::format(
+            "deform: --{} does not apply to --lattice, whose file has a box; leave it out", name));
+  if (in.given("towards") && kind != "bend")
+    throw UsageError(
+        fmt::format("deform: --towards is for --bend, but --{} is given; leave it out", kind));
+  (void)levelset::directionsAlong(in.point("axis"),
+                                  in.given("towards") ? in.point("towards") : V3d(0));
+  if (in.operands.empty()) return;
+  const Kind operand = in.operands[0].kind();
+  for (const char* name : {"voxel", "half-width"})
+    if (in.given(name) && operand != Kind::Band)
+      throw UsageError(
+          fmt::format("deform: --{} is for level sets, but the operand is a {}; leave "
+                      "it out",
+                      name, kindName(operand)));
+  if (in.given("tolerance") && operand != Kind::Mesh)
+    throw UsageError(
+        fmt::format("deform: --tolerance is for meshes, but the operand is a {}; leave it out",
+                    kindName(operand)));
+}
+
+}  // namespace
+
+Operator deformOperator() {
+  return {
+      .name = "deform",
+      .group = "Placement",
+      .summary = "bend, twist, taper or stretch a solid, a mesh or a point cloud",
+      .details =
+          "The deformation is a lattice of control points around the operand: a trivariate Bézier "
+          "or B-spline volume. --lattice reads one, of any degree up to 20, from a JSON file. A "
+          "lattice that folds, or whose deformed box overlaps itself, is refused; the report has "
+          "the least Jacobian. A level set gets exact distances again. Triangles are divided where "
+          "the deformation bends them. The middle of the operand stays in its place; --taper "
+          "leaves the cross-section at the begin of the axis as it is.",
+      .example =
+          "levelsmith box --size 1,1,4 --voxel 0.05 ! deform --twist 90 ! deform --bend 60 "
+          "--towards 1,0,0 ! measure",
+      .params =
+          {{.name = "bend",
+            .type = ParamType::Degrees,
+            .doc = "angle between the ends of the axis, which becomes an arc"},
+           {.name = "twist",
+            .type = ParamType::Degrees,
+            .doc = "angle about the axis from one end to the other"},
+           {.name = "taper",
+            .type = ParamType::Number,
+            .doc = "scale factor of the cross-section at the end of the axis; 1 at its begin",
+            .range = Range::Positive},
+           {.name = "stretch",
+            .type = ParamType::Number,
+            .doc = "scale factor along the axis",
+            .range = Range::Positive},
+           {.name = "lattice", .type = ParamType::Path, .doc = "JSON file of a lattice"},
+           {.name = "axis",
+            .type = ParamType::Point,
+            .doc = "direction of the axis; it passes through the middle of the operand",
+            .fallback = "0,0,1"},
+           {.name = "towards",
+            .type = ParamType::Point,
+            .doc = "direction towards which --bend moves the ends of the axis; default: any across "
+                   "the axis"},
+           {.name = "tolerance",
+            .type = ParamType::Length,
+            .doc = "for meshes: largest distance of an edge from its deformed curve; default: 1e-4 "
+                   "of the diagonal; 0: divide no triangle",
+            .range = Range::NonNegative,
+            .allowsVoxels = false},
+           {.name = "voxel",
+            .type = ParamType::Length,
+            .doc = "for level sets: voxel size of the result; default: that of the operand",
+            .range = Range::Positive,
+            .allowsVoxels = false},
+           {.name = "half-width",
+            .type = ParamType::Number,
+            .doc = "for level sets: half width of the result, in voxels; default: that of the "
+                   "operand",
+            .range = Range::Positive}},
+      .operands = {{Kind::Band, Kind::Mesh, Kind::Points}},
+      .resultKind =
+          [](const Invocation& in) {
+            return in.operands.empty() ? Kind::Band : in.operands[0].kind();
+          },
+      .run = runDeform,
+      .plan = planDeform,
+      .slope = levelset::Slope::One,
+      .validate = validateDeform,
+  };
+}
+
+}  // namespace pipeline

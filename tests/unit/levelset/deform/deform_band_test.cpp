@@ -1,0 +1,218 @@
+#include "levelset/deform/deform_band.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "levelset/deform/ready_lattices.h"
+#include "levelset/error.h"
+#include "levelset/inspect/measure.h"
+#include "levelset/shapes/shapes.h"
+#include "tests/support/bands.h"
+#include "tests/support/measured.h"
+#include "tests/support/threads.h"
+
+namespace deform_band_test {
+
+using namespace levelset;
+using Imath::V3d;
+using support::measured;
+using support::measuredOrder;
+
+const auto kAlongZ = directionsAlong(V3d(0, 0, 1), V3d(1, 0, 0));
+
+/// Largest error of the distances, voxels, on each side. `exact` returns NaN where a point does not
+/// count.
+struct SideErrors {
+  double inside = 0, outside = 0, beside = 0;  ///< `beside`: within one voxel of the surface
+  int count = 0;
+};
+SideErrors errorsOf(const NarrowBand& band, const std::function<double(const V3d&)>& exact) {
+  SideErrors errors;
+  support::forEachActive(band, [&](const V3d& p, double phi) {
+    const double truth = exact(p);
+    if (std::isnan(truth)) return;
+    const double off = std::abs(phi - truth) / band.voxelSize();
+    double& side = truth < 0 ? errors.inside : errors.outside;
+    side = std::max(side, off);
+    if (std::abs(truth) < band.voxelSize()) errors.beside = std::max(errors.beside, off);
+    ++errors.count;
+  });
+  return errors;
+}
+
+/// A cylinder about z, bent by a quarter turn: a piece of a torus with flat ends.
+struct BentCylinder {
+  OrientedBox box{V3d(0), kAlongZ, V3d(1, 1, 2.5)};
+  double angle = 1.5, radius = 0.5, length = 4;
+
+  [[nodiscard]] NarrowBand band(double voxelSize) const {
+    const NarrowBand straight = makeCylinder(radius, length, V3d(0), V3d(0, 0, 1), voxelSize);
+    return deformBand(straight, bendLattice(box, angle, 1e-9).lattice).band;
+  }
+  /// Distance from the torus, where it is that of the solid.
+  [[nodiscard]] double distance(const V3d& p) const {
+    const double ring = 2 * box.halfSize.z / angle;
+    const V3d from = p - V3d(ring, 0, 0);
+    const double turn = std::atan2(from.z, -from.x);
+    if (std::abs(turn) > 0.5 * length / ring - 0.4) return NAN;
+    return std::hypot(std::hypot(from.x, from.z) - ring, p.y) - radius;
+  }
+};
+
+TEST(DeformBand, ABentCylinderIsAPieceOfATorus) {
+  const BentCylinder shape;
+  const double figures[] = {0.00132, 4.6e-4, 1.2e-4};  // voxels, on both sides; promised: 0.02
+  double last = 0;
+  int level = 0;
+  for (const double voxelSize : {0.08, 0.04, 0.02}) {
+    const NarrowBand band = shape.band(voxelSize);
+    const SideErrors errors = errorsOf(band, [&](const V3d& p) { return shape.distance(p); });
+    const double figure = figures[level++];
+    EXPECT_GT(errors.count, 3000);
+    EXPECT_LT(errors.inside, measured(figure));
+    EXPECT_LT(errors.outside, measured(figure));
+    if (last > 0) {
+      EXPECT_GT(std::log2(last / (errors.beside * voxelSize)), measuredOrder(2.5, 2));
+    }
+    last = errors.beside * voxelSize;
+    if (level == 2) {  // the circular edges are rounded
+      EXPECT_NEAR(measure(band).volume / std::numbers::pi, 1, measured(0.0016));
+    }
+  }
+}
+
+/// Distance of an ellipsoid of revolution about z with half axes a, a, c, by Newton's method on the
+/// nearest point (a cos t, c sin t) of its section.
+double ellipsoidDistance(const V3d& p, double a, double c) {
+  const double r = std::hypot(p.x, p.y), z = std::abs(p.z);
+  double t = std::atan2(a * z, c * r);
+  for (int step = 0; step < 60; ++step) {
+    const double s = std::sin(t), k = std::cos(t);
+    const double f = (a * k - r) * -a * s + (c * s - z) * c * k;
+    const double slope = a * a * s * s - (a * k - r) * a * k + c * c * k * k - (c * s - z) * c * s;
+    t = std::clamp(t - f / slope, 0.0, std::numbers::pi / 2);
+  }
+  const double distance = std::hypot(a * std::cos(t) - r, c * std::sin(t) - z);
+  return r * r / (a * a) + z * z / (c * c) < 1 ? -distance : distance;
+}
+
+TEST(DeformBand, AStretchedBallIsAnEllipsoid) {
+  const double figures[] = {5.8e-4, 1.6e-4, 4.8e-5};  // voxels, on both sides; promised: 0.02
+  double last = 0;
+  int level = 0;
+  for (const double voxelSize : {0.1, 0.05, 0.025}) {
+    const NarrowBand ball = makeSphere(1, V3d(0), voxelSize);
+    const OrientedBox box{V3d(0), kAlongZ, V3d(1.5)};
+    const DeformBandResult result = deformBand(ball, stretchLattice(box, 1.6).lattice);
+    const SideErrors errors =
+        errorsOf(result.band, [](const V3d& p) { return ellipsoidDistance(p, 1, 1.6); });
+    const double figure = figures[level++];
+    EXPECT_LT(errors.inside, measured(figure));
+    EXPECT_LT(errors.outside, measured(figure));
+    if (last > 0) {
+      EXPECT_GT(std::log2(last / (errors.beside * voxelSize)), measuredOrder(2.75, 2));
+    }
+    last = errors.beside * voxelSize;
+    if (level == 1) {
+      const double exact = 4 / 3.0 * std::numbers::pi * 1.6;
+      EXPECT_NEAR(measure(result.band).volume / exact, 1, measured(4.4e-6, 1e-4));
+    }
+  }
+}
+
+/// The faces of a twisted box, by the inverse in closed form. The distance from a face is at most
+/// the distance before the twist times the stretch.
+TEST(DeformBand, ATwistedBoxHasTwistedFaces) {
+  const OrientedBox box{V3d(0), kAlongZ, V3d(1.2, 1.2, 2.4)};
+  const double angle = 1.2;
+  const double figures[] = {1.7e-4, 1.6e-5, 7.4e-6};  // voxels; promised: 0.02
+  double last = 0;
+  int level = 0;
+  for (const double voxelSize : {0.1, 0.05, 0.025}) {
+    const NarrowBand bar = makeBox(V3d(1.5, 1.5, 4), V3d(0), voxelSize);
+    const NarrowBand band = deformBand(bar, twistLattice(box, angle, 1e-9).lattice).band;
+    double worst = 0;
+    int count = 0;
+    support::forEachActive(band, [&](const V3d& p, double phi) {
+      if (std::abs(phi) > voxelSize) return;
+      const V3d before = twisted(box, -angle, p);
+      V3d beyond(std::abs(before.x) - 0.75, std::abs(before.y) - 0.75, std::abs(before.z) - 2);
+      if (beyond.y > beyond.x) std::swap(beyond.x, beyond.y);
+      if (beyond.y > -0.3 || beyond.z > -0.3) return;  // beside an edge
+      // Gradient of the face before the twist, to first order in the distance.
+      const double turn = angle / 4.8;
+      const bool isX = std::abs(before.x) > std::abs(before.y);
+      const double along = isX ? before.y : before.x;
+      const double slope = std::sqrt(1 + turn * turn * along * along);
+      worst = std::max(worst, std::abs(phi - beyond.x / slope) / voxelSize);
+      ++count;
+    });
+    EXPECT_GT(count, 2000);
+    EXPECT_LT(worst, measured(figures[level++]));
+    if (last > 0) {
+      EXPECT_GT(std::log2(last / (worst * voxelSize)), measuredOrder(2, 2));
+    }
+    last = worst * voxelSize;
+    if (level == 1) {  // the edges are rounded
+      EXPECT_NEAR(measure(band).volume / 9, 1, measured(0.0098));
+    }
+  }
+}
+
+/// A bend moves as much volume outwards as inwards, so a bent capsule keeps its volume.
+TEST(DeformBand, VolumeIsTheIntegralOfTheJacobian) {
+  const OrientedBox box{V3d(0), kAlongZ, V3d(1, 1, 2.5)};
+  const double exact = std::numbers::pi * (0.25 * 3 + 4 / 3.0 * 0.125);
+  for (const double voxelSize : {0.08, 0.04}) {
+    const NarrowBand capsule = makeCapsule(V3d(0, 0, -1.5), V3d(0, 0, 1.5), 0.5, voxelSize);
+    const NarrowBand bent = deformBand(capsule, bendLattice(box, 1.5, 1e-9).lattice).band;
+    const NarrowBand twisted = deformBand(capsule, twistLattice(box, 1.5, 1e-9).lattice).band;
+    EXPECT_NEAR(measure(bent).volume / exact, 1,
+                measured(voxelSize > 0.05 ? 1.8e-5 : 3.8e-6, 1e-4));
+    EXPECT_NEAR(measure(twisted).volume / exact, 1,
+                measured(voxelSize > 0.05 ? 1.6e-5 : 3.8e-6, 1e-4));
+  }
+}
+
+TEST(DeformBand, TheIdentityKeepsTheBits) {
+  const NarrowBand ball = makeSphere(1, V3d(0.1, 0.2, 0.3), 0.1);
+  const ControlLattice lattice = identityLattice(
+      {uniformAxis(3, 5), uniformAxis(2, 4), uniformAxis(1, 2)}, frameOf({V3d(-2), V3d(2)}));
+  const DeformBandResult result = deformBand(ball, lattice);
+  EXPECT_EQ(result.band.contentHash(), ball.contentHash());
+  EXPECT_NEAR(result.certificate.leastLow, 1, 1e-9);
+}
+
+TEST(DeformBand, IsTheSameForAnyNumberOfThreads) {
+  const BentCylinder shape;
+  const auto hash = [&] { return shape.band(0.1).contentHash(); };
+  EXPECT_EQ(support::onThreads(1, hash), support::onThreads(4, hash));
+}
+
+TEST(DeformBand, RefusesWhatItCannotDeform) {
+  const NarrowBand ball = makeSphere(1, V3d(0), 0.1);
+  const auto refusal = [&](const ControlLattice& lattice) -> std::string {
+    try {
+      (void)deformBand(ball, lattice);
+    } catch (const InvalidInput& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_NE(refusal(stretchLattice({V3d(0), kAlongZ, V3d(0.9)}, 2).lattice).find("outside the box"),
+            std::string::npos);
+  EXPECT_NE(refusal(bendLattice({V3d(0), kAlongZ, V3d(2)}, 3, 1e-6).lattice).find("folds"),
+            std::string::npos);
+  const ControlLattice lattice = stretchLattice({V3d(0), kAlongZ, V3d(2)}, 2).lattice;
+  EXPECT_THROW((void)deformBand(NarrowBand(), lattice), InvalidInput);
+  EXPECT_THROW((void)deformBand(ball, lattice, {.voxelSize = 0}), UsageError);
+  EXPECT_THROW((void)deformBand(ball, lattice, {.halfWidth = 0.5}), UsageError);
+  EXPECT_THROW((void)deformBand(ball, lattice, {.voxelSize = 10}), InvalidInput);
+  EXPECT_THROW((void)deformBand(ball, lattice, {.maxMemory = 100000}), ResourceLimit);
+}
+
+}  // namespace deform_band_test
