@@ -11,7 +11,7 @@
 #include "levelset/adaptive/adaptive_to_mesh.h"
 #include "levelset/adaptive/field_distance.h"
 #include "levelset/adaptive/mesh_distance.h"
-#include "levelset/adaptive/trilinear_surface.h"
+#include "levelset/adaptive/tricubic_to_trilinear.h"
 #include "levelset/error.h"
 #include "levelset/geometry/disjoint_sets.h"
 #include "levelset/geometry/search/point_search.h"

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "levelset/adaptive/octree/adaptive_tree.h"
-#include "levelset/adaptive/trilinear_surface.h"
+#include "levelset/adaptive/tricubic_to_trilinear.h"
 #include "levelset/memory_limit.h"
 
 namespace levelset {

@@ -185,7 +185,7 @@ class Builder {
     V3i at;
     float value;
     V3d gradient;  ///< 0 for trilinear interpolation
-    double edge;   ///< of the leaf, world units
+    double edge;   ///< edge of the leaf, world units
   };
   [[nodiscard]] Corner cornerOf(std::uint32_t block, int octant, int corner) const;
   [[nodiscard]] std::vector<Corner> testedCorners(std::uint32_t first) const;
@@ -378,7 +378,7 @@ std::vector<Builder::Corner> Builder::wrongCorners(const CornerData& data,
   });
   std::vector<Found> all;
   for (const std::vector<Found>& some : found) all.insert(all.end(), some.begin(), some.end());
-  // Of the leaves with a corner, the largest one changes most.
+  // The largest one of the leaves with a corner changes most.
   std::sort(all.begin(), all.end(), [](const Found& a, const Found& b) {
     return a.first != b.first ? a.first < b.first : a.second.edge > b.second.edge;
   });

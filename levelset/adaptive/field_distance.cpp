@@ -21,8 +21,8 @@ double FieldDistance::at(const Imath::V3d& position, const Known& /*known*/) con
     // radius of the leaf, where the corners are exact. Corners on a larger leaf are less exact. The
     // cubic bumps of a tricubic leaf add about one radius.
     const double radii = field_.isTricubic() ? 4 : 3;
-    value = std::copysign(std::max(width, std::abs(value) - radii * sampler.leafRadius(inside)),
-                          value);
+    value =
+        std::copysign(std::max(width, std::abs(value) - radii * sampler.leafRadius(inside)), value);
   }
   // The surface lies in the root, and the nearest point of a cube sees it at a right angle or less.
   return std::copysign(std::hypot(value, (position - inside).length()), value);

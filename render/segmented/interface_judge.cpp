@@ -245,7 +245,7 @@ Gradients gradientsAt(SegmentedReader& reader, const Coord& low, const V3d& p, R
 
 /// Part of the line within a box around all blocks.
 std::optional<std::pair<double, double>> rangeInBlocks(const Line& line, const SegmentedData& data,
-                                                 double near, double far) {
+                                                       double near, double far) {
   openvdb::CoordBBox box;
   for (std::size_t b = 0; b < data.blockCount(); ++b) box.expand(data.blocks[b].origin);
   V3d low, high;

@@ -20,7 +20,7 @@ struct PackedDistances {
 
   Imath::V3i size{0};                     ///< grid points along each axis
   Imath::V3d origin{0};                   ///< position of the grid point (0, 0, 0), world units
-  double spacing = 1;                     ///< of the grid points, world units
+  double spacing = 1;                     ///< distance of grid points, world units
   double levelsPerLength = 1;             ///< levels for each world unit of distance
   std::vector<std::uint8_t> values = {};  ///< x fastest
 

@@ -13,7 +13,7 @@ status=0
 for model in "$@"; do
   case $model in
     bunny) file=bunny.obj options='--smoothing 2 --edge 0.0211' published='32 428 115 24802 49421' ;;
-    dragon) file=dragon_vrip.ply.gz options='--smoothing 2 --edge 0.00085 --accept-holes' published='446 5092 1080 198157 389709' ;;
+    dragon) file=dragon_vrip.ply.gz options='--smoothing 2 --accept-holes' published='446 5092 1080 198157 389709' ;;
     *) echo "unknown model $model" >&2; exit 2 ;;
   esac
   # shellcheck disable=SC2086  # the options are words

@@ -48,8 +48,8 @@ class BorderPoints {
 struct SurfacePart {
   std::vector<std::uint32_t> points;
   std::vector<std::uint32_t> starts;  ///< some with large edge lengths, the largest first
-  double longest = 0;   ///< edge length
-  double expected = 0;  ///< number of triangles
+  double longest = 0;                 ///< edge length
+  double expected = 0;                ///< number of triangles
 };
 
 [[nodiscard]] std::vector<SurfacePart> partsOf(const PointSurface& surface,

@@ -64,8 +64,7 @@ render::ViewedScene segmentedScene(Invocation& in) {
   const std::vector<RegionLabel> hidden = hiddenLabels(in), known = field.labels();
   if (!field.sheetLabels().empty()) {  // rays see regions, not sheets; the mesh has both
     if (!hidden.empty())
-      throw UsageError(
-          "render: --hide does not apply to a segmentation with sheets; leave it out");
+      throw UsageError("render: --hide does not apply to a segmentation with sheets; leave it out");
     return sceneOf(in.operands[0]);
   }
   for (const RegionLabel label : hidden)

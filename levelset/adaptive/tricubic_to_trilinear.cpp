@@ -1,4 +1,4 @@
-#include "levelset/adaptive/trilinear_surface.h"
+#include "levelset/adaptive/tricubic_to_trilinear.h"
 
 #include <vector>
 
