@@ -23,6 +23,13 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Imath::V3d;
 
+/// Eigen divides products of matrices into blocks by the sizes of the caches. Fixed sizes give the
+/// same bits on all processors.
+[[maybe_unused]] const bool kHasFixedBlocks = [] {
+  Eigen::setCpuCacheSizes(48 << 10, 2 << 20, 32 << 20);
+  return true;
+}();
+
 // Systems of at most this many particles are always solved directly.
 constexpr std::size_t kAlwaysDense = 500;
 constexpr std::size_t kChunk = 512;

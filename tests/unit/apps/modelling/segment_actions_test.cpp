@@ -155,7 +155,7 @@ TEST_F(SegmentActions, RefuseWhatDoesNotApply) {
   expectRefusal(std::string(kThree) + "! extract 9", 3, "has no region 9; its labels are 1, 2, 3");
   expectRefusal(std::string(kThree) + "! extract", 2, "label");
   expectRefusal(std::string(kThree) + "! write a.vdb", 2, "write .ply or .obj");
-  expectRefusal(std::string(kThree) + "! offset 1", 2, "put 'extract LABEL' before it");
+  expectRefusal(std::string(kThree) + "! smooth --sigma 1", 2, "put 'extract LABEL' before it");
   expectRefusal(std::string(kThree) + "! mesh --sharp", 2, "not to a segmentation");
   expectRefusal("sphere --radius 1 --voxel 0.1 ! mesh --label 1", 2,
                 "--label is for a segmentation");
