@@ -123,7 +123,8 @@ TEST(Chain, ChecksOperandsAndTheirKinds) {
   EXPECT_REFUSAL("sphere --radius 1 --voxel 0.1 ! write p.patch", "cannot be written as 'p.patch'");
   EXPECT_REFUSAL(
       "sphere --radius 1 --voxel 0.1 ! patch --at 0,0,1 --size 1,1 --height 1 ! offset 1",
-      "is a patch, but a level set or an adaptive field is needed; 'texture' builds");
+      "is a patch, but a level set, an adaptive field or a segmentation is needed; 'texture' "
+      "builds");
   const std::string onto =
       "sphere --radius 3 --voxel 0.2 --as b ! patch @b --at 0,0,3 --size 2,2 --height 1 --as p ! ";
   EXPECT_REFUSAL(onto + "read a.ply --as t ! texture @b @t @p", "with `level-set`, or move its");
