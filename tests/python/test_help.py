@@ -29,7 +29,7 @@ def test_help_of_offset(ls):
     text = pydoc.plain(pydoc.render_doc(ls.offset))
     assert (
         "offset(solid, /, distance=None, *, by=None, half_width=None, mask=None, mask_min=0, "
-        "mask_max=1, mask_invert=False)" in text
+        "mask_max=1, mask_invert=False, label=None, cost='neighbours')" in text
     )
     assert "Move the surface along its normal; positive grows the solid." in text
     assert "half_width: half width of the result, in voxels; default: that of the operand (number)" in text
@@ -40,7 +40,7 @@ def test_signatures(ls):
     assert str(inspect.signature(ls.sphere)) == (
         "(*, radius, center=(0, 0, 0), voxel=None, resolution=None, half_width=3)"
     )
-    assert str(inspect.signature(ls.union)) == "(solid_1, solid_2, /, *more_solids)"
+    assert str(inspect.signature(ls.union)) == "(solid_1, solid_2, /, *more_solids, label=None, over=None)"
     assert "from_" in inspect.signature(ls.capsule).parameters
     rod = ls.capsule(from_=(0, 0, 0), to=(1, 0, 0), radius=0.2, voxel=0.1)
     assert rod.measure()["components"] == 1
