@@ -16,14 +16,16 @@ namespace levelset {
 [[nodiscard]] AdaptiveField trilinearSurface(const AdaptiveField& field, std::size_t maxMemory,
                                              const Progress& progress);
 
-/// Calls make(tolerance / 2), or make(tolerance) if the octree is not deep enough for that.
+/// Calls make(tolerance / 2), or make(tolerance) if the octree or the precision of the coordinates
+/// does not suffice for that.
 template <class Make>
 [[nodiscard]] AdaptiveField withFinerTolerance(double tolerance, const Make& make) {
   try {
     return make(tolerance / 2);
   } catch (const UsageError&) {
-    return make(tolerance);
+  } catch (const InvalidInput&) {
   }
+  return make(tolerance);
 }
 
 }  // namespace levelset

@@ -56,7 +56,6 @@ void requireRegion(const SegmentedField& field);
 void requireNoSheets(const SegmentedField& field);
 
 /// Checks labels against those of a field; the void counts as one.
-/// @param what  subject of the message, for example "the offset"
 /// @throws UsageError for a label that the field does not have
 void requireLabels(const SegmentedField& field, const std::vector<RegionLabel>& labels);
 

@@ -289,25 +289,27 @@ class Race {
 
 /// Finds the constants that give the regions their volumes, by Newton's method.
 /// @param constants  start, and result; that of the void and of fixed regions stays
-void findConstants(const Race& race, const std::vector<double>& volumes,
-                   const std::vector<char>& isHeld, double voxelSize,
-                   std::vector<double>& constants) {
+/// @return largest relative error of a volume before the last change
+double findConstants(const Race& race, const std::vector<double>& volumes,
+                     const std::vector<char>& isHeld, double voxelSize,
+                     std::vector<double>& constants) {
   constexpr int kVolumeIterations = 8;
   constexpr double kEnough = 1e-6;  // relative
   std::vector<Eigen::Index> free;
   for (std::size_t r = 0; r < volumes.size(); ++r)
     if (!isHeld[r]) free.push_back(static_cast<Eigen::Index>(r));
-  if (free.empty()) return;
+  double worst = 0;
+  if (free.empty()) return worst;
   for (int n = 0; n < kVolumeIterations; ++n) {
     const Race::Volumes now = race.volumes(constants);
     Eigen::VectorXd missing(free.size());
-    double worst = 0;
+    worst = 0;
     for (std::size_t i = 0; i < free.size(); ++i) {
       const double wanted = volumes[static_cast<std::size_t>(free[i])];
       missing[static_cast<Eigen::Index>(i)] = wanted - now.volumes[free[i]];
       worst = std::max(worst, std::abs(wanted - now.volumes[free[i]]) / std::max(wanted, 1.0));
     }
-    if (worst < kEnough) return;
+    if (worst < kEnough) break;
     const Eigen::MatrixXd matrix = now.derivatives(free, free);
     // Between fixed walls the sum of all volumes does not change, and the matrix is singular.
     const Eigen::VectorXd change = matrix.completeOrthogonalDecomposition().solve(missing);
@@ -315,10 +317,10 @@ void findConstants(const Race& race, const std::vector<double>& volumes,
       constants[static_cast<std::size_t>(free[i])] +=
           std::clamp(change[static_cast<Eigen::Index>(i)], -voxelSize, voxelSize);
   }
+  return worst;
 }
 
-/// Writes the values of a region into a copy of its band, which gets a half width of
-/// kRaceHalfWidth.
+/// Gives a tree another background.
 void endTilesAt(FloatTree& tree, float background) {
   auto tile = tree.beginValueOff();
   tile.setMaxDepth(FloatTree::DEPTH - 2);
@@ -412,7 +414,8 @@ std::vector<RegionLabel> InterfaceFlow::advance(const Progress& progress) {
   if (!volumes_.empty()) {
     std::vector<char> isHeld = isFixed_;
     isHeld[0] = 1;  // the void
-    findConstants(race, volumes_, isHeld, voxelSize, constants_);
+    volumeError_ =
+        std::max(volumeError_, findConstants(race, volumes_, isHeld, voxelSize, constants_));
   }
 
   // === New regions

@@ -26,6 +26,9 @@ class InterfaceFlow {
   std::vector<RegionLabel> advance(const Progress& progress);
 
   [[nodiscard]] const RegionBands& bands() const { return bands_; }
+  /// Largest relative error of a volume that was to be kept, over all steps. It does not count the
+  /// errors of redistancing.
+  [[nodiscard]] double volumeError() const { return volumeError_; }
 
  private:
   RegionBands bands_;
@@ -34,6 +37,7 @@ class InterfaceFlow {
   std::vector<double> constants_;  ///< added to the distances, world units
   std::vector<float> kernel_;      ///< half of it, from the centre
   std::size_t maxMemory_;
+  double volumeError_ = 0;
 };
 
 }  // namespace levelset

@@ -31,12 +31,13 @@ constexpr double kOffsetGap = 0.01;   // voxels
 /// Distributes the space that a region frees among its neighbours.
 class FreedSpace {
  public:
-  /// @param kept  rest of the region; empty if nothing is left
-  FreedSpace(const SegmentedField& field, RegionLabel label, const NarrowBand& kept,
-             double distance, std::size_t maxMemory)
+  /// @param kept   rest of the region; empty if nothing is left
+  /// @param depth  largest depth of a freed point in the region, world units
+  FreedSpace(const SegmentedField& field, RegionLabel label, const NarrowBand& kept, double depth,
+             std::size_t maxMemory)
       : data_(*field.shared()), label_(label), kept_(kept), maxMemory_(maxMemory) {
     findNeighbours();
-    const double halfWidth = distance / data_.voxelSize + kEditHalfWidth;
+    const double halfWidth = depth / data_.voxelSize + kEditHalfWidth;
     for (const RegionLabel neighbour : neighbours_)
       old_.push_back(redistance(storedBand(field, neighbour),
                                 {.halfWidth = halfWidth, .maxMemory = maxMemory}));
@@ -228,9 +229,12 @@ SegmentedField shrinkRegion(const SegmentedField& field, RegionLabel label, doub
   NarrowBand kept;
   try {
     kept = offset(band, -distance, {.maxMemory = options.maxMemory});
-  } catch (const InvalidInput&) {
+  } catch (const NoSurface&) {
     // Nothing is left.
   }
+  // No point of the region is deeper than half of its shortest side.
+  const Imath::V3d size = band.zeroSetBounds().size();
+  distance = std::min(distance, std::min({size.x, size.y, size.z}) / 2);
   if (options.cost == OffsetCost::Neighbours)
     return FreedSpace(field, label, kept, distance, options.maxMemory).run(options.progress);
   if (kept.isEmpty())

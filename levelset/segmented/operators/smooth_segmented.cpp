@@ -44,7 +44,21 @@ SmoothSegmentedResult smoothSegmented(const SegmentedField& field, double time,
     result.field = field;
     return result;
   }
+  std::vector<RegionLabel> all = field.labels();
+  all.push_back(kVoid);
+  const auto isHeld = [&](RegionLabel label) {
+    return std::find(options.fixed.begin(), options.fixed.end(), label) != options.fixed.end();
+  };
+  if (std::all_of(all.begin(), all.end(), isHeld)) {
+    result.field = field;
+    return result;
+  }
   const double inVoxels = time / (field.voxelSize() * field.voxelSize());
+  constexpr double kMostSteps = 1e9;
+  if (!options.steps && inVoxels / kDefaultStep > kMostSteps)
+    throw UsageError(
+        fmt::format("a time of {:.4g} takes {:.2g} steps; give a shorter time or use larger voxels",
+                    time, inVoxels / kDefaultStep));
   result.steps = options.steps.value_or(
       static_cast<std::size_t>(std::max(1.0, std::ceil(inVoxels / kDefaultStep))));
   const double step = inVoxels / static_cast<double>(result.steps);
@@ -58,9 +72,7 @@ SmoothSegmentedResult smoothSegmented(const SegmentedField& field, double time,
   RegionBands bands = regionBands(field, InterfaceFlow::halfWidthFor(step), options.maxMemory,
                                   subProgress(options.progress, 0, kBandsDone));
   std::vector<char> isFixed;
-  for (const RegionLabel label : bands.labels)
-    isFixed.push_back(std::find(options.fixed.begin(), options.fixed.end(), label) !=
-                      options.fixed.end());
+  for (const RegionLabel label : bands.labels) isFixed.push_back(isHeld(label));
   InterfaceFlow flow(std::move(bands), std::move(isFixed), step, options.keepsVolumes,
                      options.maxMemory);
   const double count = static_cast<double>(result.steps);
@@ -73,6 +85,7 @@ SmoothSegmentedResult smoothSegmented(const SegmentedField& field, double time,
       throw InvalidInput(fmt::format(
           "all regions vanish before the time {:.4g}; give a shorter time", next * time));
   }
+  result.volumeError = flow.volumeError();
   result.field = fieldOfBands(flow.bands(), field.halfWidth(),
                               subProgress(options.progress, kBandsDone + 0.8, 1));
   return result;

@@ -30,6 +30,8 @@ struct SmoothSegmentedResult {
   SegmentedField field;
   std::size_t steps = 0;
   std::vector<VanishedRegion> vanished;  ///< by time, then label
+  /// With `keepsVolumes`: largest relative error of a volume for which no constant was found.
+  double volumeError = 0;
 };
 
 /// Moves all interfaces with the speed of their mean curvature κ = k1 + k2 for a `time` in world
@@ -43,8 +45,8 @@ struct SmoothSegmentedResult {
 /// of a voxel. Indicator functions in place of distances would not move over less than a voxel.
 /// With `keepsVolumes` a constant for each region is added to its distances. Newton's method finds
 /// the constants that keep the volumes.
-/// @throws UsageError for a time that is negative or not finite; for no steps; for a step of more
-///         than 4 voxels²; for a fixed label that the field does not have
+/// @throws UsageError for a time that is negative, not finite, or needs more than 1e9 steps; for no
+///         steps; for a step of more than 4 voxels²; for a fixed label that the field does not have
 /// @throws InvalidInput for a field without interfaces, or when all regions vanish
 /// @throws ResourceLimit, Cancelled
 [[nodiscard]] SmoothSegmentedResult smoothSegmented(const SegmentedField& field, double time,

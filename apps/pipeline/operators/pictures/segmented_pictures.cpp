@@ -3,11 +3,9 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <charconv>
-#include <sstream>
-#include <string>
 #include <vector>
 
+#include "apps/pipeline/operators/label_params.h"
 #include "levelset/error.h"
 #include "render/segmented/segmented_part.h"
 
@@ -17,27 +15,9 @@ namespace {
 using levelset::RegionLabel;
 using levelset::UsageError;
 
-/// Labels of --hide, separated by commas or blanks.
 std::vector<RegionLabel> hiddenLabels(const Invocation& in) {
-  std::vector<RegionLabel> labels;
-  if (!in.given("hide")) return labels;
-  std::string text = in.text("hide");
-  std::replace(text.begin(), text.end(), ',', ' ');
-  std::istringstream words(text);
-  for (std::string word; words >> word;) {
-    RegionLabel label = 0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), label);
-    if (error != std::errc() || end != word.data() + word.size() || label == levelset::kVoid)
-      throw UsageError(fmt::format("{}: '{}' is not a label; give integers from 1 to 65535",
-                                   in.where("hide"), word));
-    labels.push_back(label);
-  }
-  if (labels.empty())
-    throw UsageError(
-        fmt::format("{}: no label is given; give integers from 1 to 65535, or leave "
-                    "--hide out",
-                    in.where("hide")));
-  return labels;
+  if (!in.given("hide")) return {};
+  return regionLabels(in, "hide", VoidLabel::IsNone);
 }
 
 }  // namespace

@@ -3,9 +3,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cmath>
-#include <exception>
-#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,35 +28,6 @@ using levelset::UsageError;
 
 Kind kindOfParts(const Invocation& in) {
   return in.operands.empty() ? Kind::Band : in.operands[0].kind();
-}
-
-RegionLabel labelFrom(double number, const Invocation& in, const char* param) {
-  if (!(number >= 1) || number > 65535 || number != std::floor(number))
-    throw UsageError(fmt::format("{}: {} is not a label; give an integer from 1 to 65535",
-                                 in.where(param), number));
-  return static_cast<RegionLabel>(number);
-}
-
-/// Labels of --labels, separated by commas or blanks.
-std::vector<RegionLabel> labelsFrom(const Invocation& in) {
-  std::string text = in.text("labels");
-  std::replace(text.begin(), text.end(), ',', ' ');
-  std::istringstream words(text);
-  std::vector<RegionLabel> labels;
-  for (std::string word; words >> word;) {
-    std::size_t end = 0;
-    double number = 0;
-    try {
-      number = std::stod(word, &end);
-    } catch (const std::exception&) {
-      end = 0;
-    }
-    if (end != word.size())
-      throw UsageError(fmt::format("{}: '{}' is not a label; give integers from 1 to 65535",
-                                   in.where("labels"), word));
-    labels.push_back(labelFrom(number, in, "labels"));
-  }
-  return labels;
 }
 
 std::string placeText(const Imath::V3d& p) {
@@ -112,7 +80,7 @@ Value segment(Invocation& in) {
   if (kindOfParts(in) == Kind::Mesh) return segmentByMesh(in);
   levelset::SegmentSolidsOptions options{
       .halfWidth = in.number("half-width"), .maxMemory = in.maxMemory, .progress = in.progress};
-  if (in.given("labels")) options.labels = labelsFrom(in);
+  if (in.given("labels")) options.labels = regionLabels(in, "labels", VoidLabel::IsNone);
   std::vector<levelset::NarrowBand> solids;
   for (const Value& operand : in.operands) solids.push_back(operand.band());
   const levelset::SegmentSolidsResult result = levelset::segmentSolids(solids, options);
@@ -149,7 +117,7 @@ void validateSegment(const Invocation& in) {
     refuseFor(in, "resolution", "a mesh");
   }
   if (in.given("labels") && !in.operands.empty()) {
-    const std::size_t count = labelsFrom(in).size();
+    const std::size_t count = regionLabels(in, "labels", VoidLabel::IsNone).size();
     if (count != in.operands.size())
       throw UsageError(
           fmt::format("segment: --labels has {} labels for {} level set{}; give one for each",
@@ -176,7 +144,8 @@ Plan planSegment(Invocation& in) {
 }
 
 Value extract(Invocation& in) {
-  const RegionLabel label = labelFrom(static_cast<double>(in.integer("label")), in, "label");
+  const RegionLabel label =
+      regionLabel(std::to_string(in.integer("label")), VoidLabel::IsNone, in, "label");
   const SegmentedField& field = in.operands[0].segmentation();
   const std::vector<RegionLabel> labels = field.labels();
   if (!std::binary_search(labels.begin(), labels.end(), label)) {
@@ -262,7 +231,8 @@ Value meshOfSegmentation(Invocation& in) {
   const SegmentedField& field = in.operands[0].segmentation();
   const levelset::SegmentedMeshOptions options{.maxMemory = in.maxMemory, .progress = in.progress};
   if (!in.given("label")) return Value(levelset::segmentedToMesh(field, options).mesh);
-  const RegionLabel label = labelFrom(static_cast<double>(in.integer("label")), in, "label");
+  const RegionLabel label =
+      regionLabel(std::to_string(in.integer("label")), VoidLabel::IsNone, in, "label");
   levelset::TriMesh surface = levelset::regionSurface(field, label, options);
   if (surface.isEmpty())
     throw levelset::InvalidInput(

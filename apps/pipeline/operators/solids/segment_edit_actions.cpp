@@ -3,17 +3,16 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cmath>
 #include <exception>
 #include <functional>
 #include <map>
-#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/json_output.h"
+#include "apps/pipeline/operators/label_params.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
 #include "levelset/segmented/operators/edit_segmented.h"
@@ -29,38 +28,6 @@ using levelset::UsageError;
 
 bool isSegmented(const Invocation& in) {
   return !in.operands.empty() && in.operands[0].kind() == Kind::Segmentation;
-}
-
-/// @param least  smallest accepted label: 0 where the void counts
-RegionLabel regionLabelOf(const std::string& text, int least, const Invocation& in,
-                          const char* param) {
-  std::size_t end = 0;
-  long number = -1;
-  try {
-    number = std::stol(text, &end);
-  } catch (const std::exception&) {
-    end = 0;
-  }
-  if (text.empty() || end != text.size() || number < least || number > 65535)
-    throw UsageError(fmt::format("{}: '{}' is not a label; give an integer from {} to 65535",
-                                 in.where(param), text, least));
-  return static_cast<RegionLabel>(number);
-}
-
-std::vector<std::string> labelWords(const Invocation& in, const char* param) {
-  std::string text = in.text(param);
-  std::replace(text.begin(), text.end(), ',', ' ');
-  std::istringstream stream(text);
-  std::vector<std::string> words;
-  for (std::string word; stream >> word;) words.push_back(word);
-  return words;
-}
-/// Labels, separated by commas or blanks. The void counts, also as the word `void`.
-std::vector<RegionLabel> labelsOf(const Invocation& in, const char* param) {
-  std::vector<RegionLabel> labels;
-  for (const std::string& word : labelWords(in, param))
-    labels.push_back(word == "void" ? levelset::kVoid : regionLabelOf(word, 0, in, param));
-  return labels;
 }
 
 /// Behaviour of an action on segmentations.
@@ -150,11 +117,12 @@ Param overParam(const char* doc) {
   return {.name = "over", .type = ParamType::Text, .doc = doc};
 }
 RegionLabel givenLabel(const Invocation& in) {
-  return regionLabelOf(in.text("label"), 1, in, "label");
+  return regionLabel(in.text("label"), VoidLabel::IsNone, in, "label");
 }
 levelset::EditSegmentedOptions editOptions(const Invocation& in) {
   levelset::EditSegmentedOptions options{.maxMemory = in.maxMemory, .progress = in.progress};
-  if (in.given("over") && in.text("over") != "all") options.over = labelsOf(in, "over");
+  if (in.given("over") && in.text("over") != "all")
+    options.over = regionLabels(in, "over", VoidLabel::Counts);
   return options;
 }
 void checkOver(const Invocation& in) {
@@ -186,7 +154,7 @@ Value flowRegions(Invocation& in) {
   levelset::SmoothSegmentedOptions options{.keepsVolumes = in.flag("volume-preserving"),
                                            .maxMemory = in.maxMemory,
                                            .progress = in.progress};
-  if (in.given("fixed")) options.fixed = labelsOf(in, "fixed");
+  if (in.given("fixed")) options.fixed = regionLabels(in, "fixed", VoidLabel::Counts);
   const levelset::SmoothSegmentedResult result =
       smoothSegmented(in.operands[0].segmentation(), in.number("time"), options);
   Json vanished = Json::array();
@@ -195,7 +163,17 @@ Value flowRegions(Invocation& in) {
     in.notes.warnings.push_back(
         fmt::format("region {} has vanished at the time {:.4g}", region.label, region.time));
   }
-  in.notes.detailsJson = Json{{"steps", result.steps}, {"vanished", vanished}}.dump();
+  Json details{{"steps", result.steps}, {"vanished", vanished}};
+  if (options.keepsVolumes) {
+    details["volume_error"] = result.volumeError;
+    constexpr double kWarned = 1e-3;
+    if (result.volumeError > kWarned)
+      in.notes.warnings.push_back(
+          fmt::format("a volume changes by {:.2g} of its size, because the pressures that keep "
+                      "the volumes were not found; use smaller voxels",
+                      result.volumeError));
+  }
+  in.notes.detailsJson = details.dump();
   return Value(result.field);
 }
 
@@ -229,10 +207,8 @@ std::map<RegionLabel, RegionLabel> newLabels(const Invocation& in) {
     if (sign == std::string::npos)
       throw UsageError(fmt::format("{}: '{}' is not OLD=NEW; give pairs of labels, as in 1=3,2=0",
                                    in.where("labels"), word));
-    const std::string target = word.substr(sign + 1);
-    const RegionLabel old = regionLabelOf(word.substr(0, sign), 1, in, "labels"),
-                      next = target == "void" ? levelset::kVoid
-                                              : regionLabelOf(target, 0, in, "labels");
+    const RegionLabel old = regionLabel(word.substr(0, sign), VoidLabel::IsNone, in, "labels"),
+                      next = regionLabel(word.substr(sign + 1), VoidLabel::Counts, in, "labels");
     if (!labels.emplace(old, next).second)
       throw UsageError(
           fmt::format("{}: label {} has two new labels; give one", in.where("labels"), old));
@@ -308,7 +284,7 @@ Operator flowWithSegmentations(Operator op) {
        .needed = {},
        .validate =
            [](const Invocation& in) {
-             if (in.given("fixed")) (void)labelsOf(in, "fixed");
+             if (in.given("fixed")) (void)regionLabels(in, "fixed", VoidLabel::Counts);
            },
        .run = flowRegions});
 }
