@@ -10,9 +10,11 @@
 #include "levelset/error.h"
 #include "levelset/memory_limit.h"
 #include "levelset/progress_gate.h"
+#include "levelset/segmented/local/cell_crossings_vdb.h"
 #include "levelset/segmented/local/cut_tetrahedron.h"
 #include "levelset/segmented/local/kuhn_cell.h"
 #include "levelset/segmented/local/orient_sheets.h"
+#include "levelset/segmented/local/sheet_places_vdb.h"
 #include "levelset/segmented/segmented_data_vdb.h"
 #include "levelset/segmented/sharpen_junctions.h"
 
@@ -22,14 +24,6 @@ namespace {
 using Imath::V3d;
 using Imath::V3i;
 using openvdb::Coord;
-
-// Least distance of a vertex from the ends of its edge, voxels. Where an interface passes through a
-// grid point, it keeps triangles from collapsing to the point.
-constexpr double kEndGap = 1e-5;
-
-Coord cornerOffset(kuhn::Corner corner) {
-  return SegmentedCell::cornerOffset(static_cast<int>(corner));
-}
 
 /// Block of cells, with the vertices of their lowest corners.
 struct MeshBlock {
@@ -71,75 +65,6 @@ struct CellLabels {
     }
     return isMixed;
   }
-};
-
-/// Crossed edges of the cells of a block, for fields with sheets.
-class CellCrossings {
- public:
-  CellCrossings(const SegmentedData& data, SegmentedReader& reader, const Coord& origin)
-      : sheets_(*data.sheets) {
-    for (kuhn::Corner c = 0; c < 8; ++c) {
-      const Coord offset = cornerOffset(c);
-      const std::int32_t block =
-          reader.blockOf(origin.offsetBy(8 * offset[0], 8 * offset[1], 8 * offset[2]));
-      if (c == 0) block_ = block;
-      if (block < 0) continue;
-      for (const std::uint16_t key : sheets_.edgesOf(static_cast<std::size_t>(block))) {
-        const Coord at = SegmentedData::localOf(key / SheetData::kSlots);
-        Coord place;
-        bool isBeyond = false;
-        for (int axis = 0; axis < 3; ++axis) {
-          place[axis] = at[axis] + 8 * offset[axis];
-          isBeyond = isBeyond || place[axis] > 8;
-        }
-        if (isBeyond) continue;
-        masks_[indexOf(place)] |= static_cast<std::uint8_t>(1u << (key % SheetData::kSlots));
-        isEmpty_ = false;
-      }
-    }
-  }
-
-  [[nodiscard]] bool isEmpty() const { return isEmpty_; }
-  /// @param low, high  corners of a cell; the bits of `high` contain those of `low`
-  [[nodiscard]] bool isCrossed(const Coord& cell, kuhn::Corner low, kuhn::Corner high) const {
-    return masks_[indexOf(cell + cornerOffset(low))] >> kuhn::edgeSlot(low ^ high) & 1;
-  }
-  /// @return false if no edge of a cell is crossed
-  [[nodiscard]] bool hasCrossings(const Coord& cell) const {
-    for (kuhn::Corner c = 0; c < 8; ++c)
-      if (masks_[indexOf(cell + cornerOffset(c))]) return true;
-    return false;
-  }
-  [[nodiscard]] std::uint32_t edgesOfFace(const Coord& cell, const kuhn::FaceSteps& face) const {
-    return std::uint32_t{isCrossed(cell, 0, face.middle)} + isCrossed(cell, 0, face.upper) +
-           isCrossed(cell, face.middle, face.upper);
-  }
-  /// @param cell  in this block
-  [[nodiscard]] const CutTetrahedron& cut(const Coord& cell, std::size_t tetrahedron) const {
-    const auto& corners = kuhn::kTetrahedra[tetrahedron];
-    std::uint32_t crossed = 0;
-    for (std::size_t e = 0; e < CutTetrahedron::kEdges.size(); ++e) {
-      const auto [i, j] = CutTetrahedron::kEdges[e];
-      crossed |= std::uint32_t{isCrossed(cell, corners[i], corners[j])} << e;
-    }
-    const bool hasCorner =
-        crossed != 0 && block_ >= 0 &&
-        sheets_.pointOf(static_cast<std::size_t>(block_),
-                        SheetData::key(SegmentedData::offsetOf(cell),
-                                       kuhn::tetrahedronSlot(tetrahedron))) != nullptr;
-    return cutTetrahedron(crossed, hasCorner);
-  }
-
- private:
-  static constexpr int kSide = 9;
-  [[nodiscard]] static std::size_t indexOf(const Coord& at) {
-    return static_cast<std::size_t>((at[0] * kSide + at[1]) * kSide + at[2]);
-  }
-
-  const SheetData& sheets_;
-  std::array<std::uint8_t, kSide * kSide * kSide> masks_{};
-  std::int32_t block_ = -1;
-  bool isEmpty_ = true;
 };
 
 bool allDiffer(RegionLabel a, RegionLabel b, RegionLabel c) {
@@ -277,7 +202,8 @@ class SegmentedMesher {
     if (isDoubtful) *isDoubtful = u.neighbour != v.label || v.neighbour != u.label;
     const double du = static_cast<double>(reader.distanceTo(a, u, v.label)),
                  dv = static_cast<double>(reader.distanceTo(b, v, u.label));
-    const double t = du + dv > 0 ? std::clamp(du / (du + dv), kEndGap, 1 - kEndGap) : 0.5;
+    const double t =
+        du + dv > 0 ? std::clamp(du / (du + dv), kuhn::kEndGap, 1 - kuhn::kEndGap) : 0.5;
     return V3d(a[0], a[1], a[2]) * (1 - t) + V3d(b[0], b[1], b[2]) * t;
   }
 
@@ -466,8 +392,7 @@ class SegmentedMesher {
 
   // === Fields with sheets
   void findCrossings(MeshBlock& block) const {
-    SegmentedReader reader(data_);
-    const CellCrossings crossings(data_, reader, originOf(block));
+    const CellCrossings crossings(data_, originOf(block));
     if (crossings.isEmpty()) return;
     for (std::uint32_t voxel = 0; voxel < SegmentedData::kVoxels; ++voxel) {
       const Coord cell = SegmentedData::localOf(voxel);
@@ -486,104 +411,32 @@ class SegmentedMesher {
   }
 
   void placeCrossings(MeshBlock& block) {
-    SegmentedReader reader(data_);
-    const Coord origin = originOf(block);
-    const CellCrossings crossings(data_, reader, origin);
-    for (std::size_t i = 0; i < block.keys.size(); ++i) {
-      const std::uint32_t voxel = block.keys[i] / SheetData::kSlots,
-                          slot = block.keys[i] % SheetData::kSlots;
-      const Coord cell = SegmentedData::localOf(voxel);
-      result_.mesh.positions[block.firstVertex + i] =
-          slot < 19 ? placeOf(reader, crossings, origin, cell, slot)
-                    : placeInside(reader, crossings, origin, cell, slot - 19);
-    }
-  }
-
-  /// Stored point of a rim or junction in a simplex.
-  std::optional<V3d> storedPoint(SegmentedReader& reader, const Coord& at,
-                                 std::uint32_t slot) const {
-    const std::int32_t block = reader.blockOf(at);
-    if (block < 0) return std::nullopt;
-    const Imath::V3f* point = data_.sheets->pointOf(
-        static_cast<std::size_t>(block), SheetData::key(SegmentedData::offsetOf(at), slot));
-    return point ? std::optional(V3d(at[0], at[1], at[2]) + V3d(*point)) : std::nullopt;
-  }
-
-  /// Position of a vertex on an edge or a face of a cell.
-  V3d placeOf(SegmentedReader& reader, const CellCrossings& crossings, const Coord& origin,
-              const Coord& cell, std::uint32_t slot) const {
-    const Coord at = origin + cell;
-    if (const auto point = storedPoint(reader, at, slot)) return *point;
-    if (slot < 7) {
-      const std::int32_t block = reader.blockOf(at);
-      const Coord step = cornerOffset(slot + 1);
-      const auto t = static_cast<double>(data_.sheets->positionOf(
-          static_cast<std::size_t>(block), SheetData::key(SegmentedData::offsetOf(at), slot)));
-      return V3d(at[0], at[1], at[2]) +
-             V3d(step[0], step[1], step[2]) * std::clamp(t, kEndGap, 1 - kEndGap);
-    }
-    const kuhn::FaceSteps& face = kuhn::kFaces[slot - 7];
-    V3d sum(0);
-    double count = 0;
-    for (const auto& [low, high] : {std::pair(0u, face.middle), std::pair(0u, face.upper),
-                                    std::pair(face.middle, face.upper)}) {
-      if (!crossings.isCrossed(cell, low, high)) continue;
-      sum +=
-          placeOf(reader, crossings, origin, cell + cornerOffset(low), kuhn::edgeSlot(low ^ high));
-      ++count;
-    }
-    return sum / count;
-  }
-
-  /// Position of a vertex inside a tetrahedron: the end of a junction, or the mean of the vertices
-  /// on its faces.
-  V3d placeInside(SegmentedReader& reader, const CellCrossings& crossings, const Coord& origin,
-                  const Coord& cell, std::size_t tetrahedron) const {
-    const auto point = storedPoint(reader, origin + cell, kuhn::tetrahedronSlot(tetrahedron));
-    if (point) return *point;
-    const CutTetrahedron& cut = crossings.cut(cell, tetrahedron);
-    V3d sum(0);
-    double count = 0;
-    for (std::size_t opposite = 0; opposite < 4; ++opposite) {
-      if (!cut.hasFaceNode[opposite]) continue;
-      const auto [low, slot] = faceOf(tetrahedron, opposite);
-      sum += placeOf(reader, crossings, origin, cell + cornerOffset(low), slot);
-      ++count;
-    }
-    return sum / count;
-  }
-
-  /// Lowest corner and slot of the face of a tetrahedron opposite to a corner.
-  static std::pair<kuhn::Corner, std::uint32_t> faceOf(std::size_t tetrahedron,
-                                                       std::size_t opposite) {
-    std::array<kuhn::Corner, 3> chain{};
-    std::size_t n = 0;
-    for (std::size_t i = 0; i < 4; ++i)
-      if (i != opposite) chain[n++] = kuhn::kTetrahedra[tetrahedron][i];
-    return {chain[0], kuhn::faceSlot(chain[1] ^ chain[0], chain[2] ^ chain[0])};
+    const SheetPlaces places(data_, originOf(block));
+    for (std::size_t i = 0; i < block.keys.size(); ++i)
+      result_.mesh.positions[block.firstVertex + i] = places.place(block.keys[i]);
   }
 
   void cutCrossedCells(MeshBlock& block) {
     if (!block.isCut) return;
     SegmentedReader reader(data_);
     const Coord origin = originOf(block);
-    const CellCrossings crossings(data_, reader, origin);
-    if (crossings.isEmpty()) return;
+    const SheetPlaces places(data_, origin);
+    if (places.crossings().isEmpty()) return;
     Cut cut{block, {}, {}, 0};
     for (kuhn::Corner c = 0; c < 8; ++c) cut.around[c] = find(block.block + cornerOffset(c));
     for (std::uint32_t voxel = 0; voxel < SegmentedData::kVoxels; ++voxel) {
       cut.local = SegmentedData::localOf(voxel);
-      if (!crossings.hasCrossings(cut.local)) continue;
+      if (!places.crossings().hasCrossings(cut.local)) continue;
       std::array<RegionLabel, 8> l;
       for (kuhn::Corner c = 0; c < 8; ++c)
         l[c] = reader.label(origin + cut.local + cornerOffset(c));
       for (cut.tetrahedron = 0; cut.tetrahedron < 6; ++cut.tetrahedron)
-        addSurfaces(reader, cut, crossings.cut(cut.local, cut.tetrahedron),
+        addSurfaces(places, cut, places.crossings().cut(cut.local, cut.tetrahedron),
                     labelsOf(cut.tetrahedron, l));
     }
   }
 
-  void addSurfaces(SegmentedReader& reader, const Cut& cut, const CutTetrahedron& surfaces,
+  void addSurfaces(const SheetPlaces& places, const Cut& cut, const CutTetrahedron& surfaces,
                    const std::array<RegionLabel, 4>& l) const {
     const auto vertexOf = [&](CutTetrahedron::Node node) {
       if (node == CutTetrahedron::kInside) return cut.inside().vertex;
@@ -600,7 +453,7 @@ class SegmentedMesher {
       if ((cut.tetrahedron % 2 == 1) != (from < to)) std::reverse(vertices.begin(), vertices.end());
       const auto first = static_cast<std::uint32_t>(cut.block.triangles.size());
       addPolygon(cut.block, vertices, {std::max(from, to), std::min(from, to)});
-      if (!isStrip(reader, cut, polygon)) continue;
+      if (!isStrip(places, cut, polygon)) continue;
       for (std::uint32_t t = first; t < cut.block.triangles.size(); ++t)
         cut.block.strips.push_back(t);
     }
@@ -616,20 +469,21 @@ class SegmentedMesher {
           {{vertexOf(junction.nodes[0]), vertexOf(junction.nodes[1])}, labels});
     }
     // Without a stored point it is a branch of the strips along one line.
-    if (surfaces.isJunctionPoint && storedPoint(reader, originOf(cut.block) + cut.local,
-                                                kuhn::tetrahedronSlot(cut.tetrahedron)))
+    if (surfaces.isJunctionPoint &&
+        places.storedPoint(originOf(cut.block) + cut.local, kuhn::tetrahedronSlot(cut.tetrahedron)))
       cut.block.points.push_back(cut.inside().vertex);
   }
 
   /// Returns true if all edges that a polygon crosses have their crossing on a junction.
-  bool isStrip(SegmentedReader& reader, const Cut& cut,
-               const CutTetrahedron::Polygon& polygon) const {
+  static bool isStrip(const SheetPlaces& places, const Cut& cut,
+                      const CutTetrahedron::Polygon& polygon) {
     return std::all_of(polygon.nodes.begin(), polygon.nodes.end(), [&](CutTetrahedron::Node node) {
       if (node >= CutTetrahedron::kFirstFace) return true;
       const auto [i, j] = CutTetrahedron::kEdges[node];
       const kuhn::Corner low = cut.corners()[i], high = cut.corners()[j];
-      return storedPoint(reader, originOf(cut.block) + cut.local + cornerOffset(low),
-                         kuhn::edgeSlot(low ^ high))
+      return places
+          .storedPoint(originOf(cut.block) + cut.local + cornerOffset(low),
+                       kuhn::edgeSlot(low ^ high))
           .has_value();
     });
   }

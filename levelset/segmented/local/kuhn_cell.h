@@ -51,4 +51,8 @@ inline constexpr std::array<FaceSteps, 12> kFaces = {{{1, 3},
   return 19 + static_cast<std::uint32_t>(tetrahedron);
 }
 
+/// Least distance of a vertex from the ends of its edge, voxels. Where an interface passes through
+/// a grid point, it keeps triangles from collapsing to the point.
+inline constexpr double kEndGap = 1e-5;
+
 }  // namespace levelset::kuhn

@@ -2,7 +2,6 @@
 
 #include <fmt/core.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <array>
@@ -10,7 +9,6 @@
 #include <limits>
 #include <memory>
 #include <numeric>
-#include <span>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -28,7 +26,9 @@
 #include "levelset/segmented/local/block_surroundings.h"
 #include "levelset/segmented/local/kuhn_cell.h"
 #include "levelset/segmented/segmented_data_vdb.h"
+#include "levelset/segmented/sources/double_triangles.h"
 #include "levelset/segmented/sources/grid_crossings.h"
+#include "levelset/segmented/sources/near_triangles_vdb.h"
 #include "levelset/segmented/sources/sheet_builder.h"
 #include "levelset/segmented/sources/sheet_features.h"
 
@@ -38,36 +38,6 @@ namespace {
 using Imath::V3d;
 using Imath::V3i;
 using openvdb::Coord;
-
-/// Returns true if a line between two points meets a triangle, its border included.
-bool meetsTriangle(const V3d& p, const V3d& q, const std::array<V3d, 3>& t) {
-  const int before = convert::orient3d(t[0], t[1], t[2], p),
-            after = convert::orient3d(t[0], t[1], t[2], q);
-  if (before * after > 0) return false;
-  const int a = convert::orient3d(p, q, t[0], t[1]), b = convert::orient3d(p, q, t[1], t[2]),
-            c = convert::orient3d(p, q, t[2], t[0]);
-  return (a >= 0 && b >= 0 && c >= 0) || (a <= 0 && b <= 0 && c <= 0);
-}
-
-/// Removes all but the first of triangles with the same corners: the walls of parts that were
-/// meshed one by one are there twice, with opposite orientations.
-std::vector<std::array<std::uint32_t, 3>> withoutDoubles(
-    std::vector<std::array<std::uint32_t, 3>> triangles) {
-  std::vector<std::pair<std::array<std::uint32_t, 3>, std::size_t>> corners;
-  for (std::size_t t = 0; t < triangles.size(); ++t) {
-    corners.emplace_back(triangles[t], t);
-    std::sort(corners.back().first.begin(), corners.back().first.end());
-  }
-  std::sort(corners.begin(), corners.end());
-  std::vector<bool> isDouble(triangles.size());
-  for (std::size_t n = 1; n < corners.size(); ++n)
-    if (corners[n].first == corners[n - 1].first) isDouble[corners[n].second] = true;
-  std::size_t kept = 0;
-  for (std::size_t t = 0; t < triangles.size(); ++t)
-    if (!isDouble[t]) triangles[kept++] = triangles[t];
-  triangles.resize(kept);
-  return triangles;
-}
 
 /// Regions of the grid points around a mesh.
 class MeshRegions {
@@ -79,7 +49,7 @@ class MeshRegions {
     findPatches();
     findClosest();
     collectBlocks();
-    listTriangles();
+    near_ = NearTriangles(mesh_.triangles, points_);
     report(options_.progress, 0.5);
     SegmentMeshResult result;
     result.patches = patchCount_;
@@ -172,43 +142,6 @@ class MeshRegions {
            2 * patchOf_[triangle] + isFront;
   }
 
-  /// Lists the triangles near each grid point: those that may meet the cube around it.
-  void listTriangles() {
-    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
-      const std::array<V3d, 3> c = corners(t);
-      V3d normal = (c[1] - c[0]).cross(c[2] - c[0]);
-      normal = normal.length() > 0 ? normal.normalized() : V3d(0);
-      Coord low, high;
-      for (int axis = 0; axis < 3; ++axis) {
-        const auto [least, most] = std::minmax({c[0][axis], c[1][axis], c[2][axis]});
-        low[axis] = static_cast<int>(std::floor(least + 0.5 - 1e-6));
-        high[axis] = static_cast<int>(std::floor(most + 0.5 + 1e-6));
-      }
-      constexpr double kHalfDiagonal = 0.8661;
-      for (int x = low[0]; x <= high[0]; ++x)
-        for (int y = low[1]; y <= high[1]; ++y)
-          for (int z = low[2]; z <= high[2]; ++z)
-            if (std::abs((V3d(x, y, z) - c[0]) ^ normal) <= kHalfDiagonal)
-              near_.push_back({Coord(x, y, z), t});
-    }
-    tbb::parallel_sort(near_.begin(), near_.end());
-  }
-  [[nodiscard]] std::span<const std::pair<Coord, std::uint32_t>> trianglesAt(
-      const Coord& at) const {
-    const auto first = std::lower_bound(near_.begin(), near_.end(), std::pair(at, 0u));
-    auto last = first;
-    while (last != near_.end() && last->first == at) ++last;
-    return {first, last};
-  }
-
-  [[nodiscard]] bool isBlocked(const Coord& a, const Coord& b) const {
-    const V3d p(a[0], a[1], a[2]), q(b[0], b[1], b[2]);
-    for (const Coord& end : {a, b})
-      for (const auto& entry : trianglesAt(end))
-        if (meetsTriangle(p, q, corners(entry.second))) return true;
-    return false;
-  }
-
   void joinGridPoints() {
     sets_ = DisjointSets(leaves_.size() * 512 + numbers_.size() + 2 * mesh_.triangles.size());
     // Tests the edges of the grid in parallel, then joins in order.
@@ -227,7 +160,7 @@ class MeshRegions {
           if (!vectors.probeValue(next, other)) continue;
           // A point on the line between them is as far from both as the surface is, or farther.
           if (distance + lengthOf(other) > 1.001) continue;
-          if (isBlocked(at, next)) blocked[n][v] |= static_cast<std::uint8_t>(1 << axis);
+          if (near_.separate(at, next)) blocked[n][v] |= static_cast<std::uint8_t>(1 << axis);
         }
       }
     });
@@ -407,7 +340,7 @@ class MeshRegions {
     result.rimEdges = features.rimCount();
     result.crossingTriangles =
         static_cast<std::size_t>(std::count(isCrossing.begin(), isCrossing.end(), true));
-    addThinParts(builder.narrowGaps(), result.thinParts);
+    result.thinParts = thinPartsOf(builder.narrowGaps(), voxelSize_);
   }
 
   /// Joins the ends of all edges of the tetrahedra of the grid that the mesh does not cross.
@@ -465,19 +398,10 @@ class MeshRegions {
         for (int y = -kReach; y <= kReach; ++y)
           for (int z = -kReach; z <= kReach; ++z) {
             const Coord to = at.offsetBy(x, y, z);
-            if (sets_.find(n) != sets_.find(setOf(to)) && sees(at, to)) sets_.join(n, setOf(to));
+            if (sets_.find(n) != sets_.find(setOf(to)) && near_.sees(at, to))
+              sets_.join(n, setOf(to));
           }
     }
-  }
-  [[nodiscard]] bool sees(const Coord& from, const Coord& to) const {
-    const V3d p(from[0], from[1], from[2]), q(to[0], to[1], to[2]);
-    Coord at;
-    for (at[0] = std::min(from[0], to[0]); at[0] <= std::max(from[0], to[0]); ++at[0])
-      for (at[1] = std::min(from[1], to[1]); at[1] <= std::max(from[1], to[1]); ++at[1])
-        for (at[2] = std::min(from[2], to[2]); at[2] <= std::max(from[2], to[2]); ++at[2])
-          for (const auto& entry : trianglesAt(at))
-            if (meetsTriangle(p, q, corners(entry.second))) return false;
-    return true;
   }
 
   /// Lists the pairs of regions that each triangle separates. Where triangles cross each other,
@@ -537,24 +461,6 @@ class MeshRegions {
                           .progress = subProgress(options_.progress, 0.7, 0.8)});
     nearIndex_ = closest.triangle.shared()->scalar;
     nearVector_ = closest.vector.shared()->vector;
-  }
-
-  void addThinParts(const std::vector<NarrowGap>& gaps, std::vector<ThinPart>& parts) const {
-    for (const NarrowGap& gap : gaps) {
-      auto part =
-          std::lower_bound(parts.begin(), parts.end(), gap.label,
-                           [](const ThinPart& p, RegionLabel label) { return p.label < label; });
-      if (part == parts.end() || part->label != gap.label) {
-        part = parts.insert(part, ThinPart());
-        part->label = gap.label;
-        part->thickness = std::numeric_limits<double>::infinity();
-      }
-      ++part->places;
-      part->isLost = part->isLost || gap.isLost;
-      if (gap.thickness * voxelSize_ >= part->thickness) continue;
-      part->thickness = gap.thickness * voxelSize_;
-      part->position = gap.position * voxelSize_;
-    }
   }
 
   /// Lists the pair of regions of each triangle of a mesh without sheets.
@@ -644,7 +550,7 @@ class MeshRegions {
     for (int x = -kReach; x <= kReach; ++x)
       for (int y = -kReach; y <= kReach; ++y)
         for (int z = -kReach; z <= kReach; ++z)
-          for (const auto& entry : trianglesAt(at.offsetBy(x, y, z))) {
+          for (const auto& entry : near_.at(at.offsetBy(x, y, z))) {
             if (!separates(entry.second, own, other)) continue;
             const std::array<V3d, 3> c = corners(entry.second);
             least = std::min(least, (closestOnTriangle(p, c[0], c[1], c[2]).point - p).length());
@@ -669,7 +575,7 @@ class MeshRegions {
   std::vector<const openvdb::FloatTree::LeafNodeType*> leaves_;
   Coord low_, size_;  ///< box of blocks
   std::vector<std::int32_t> numbers_;
-  std::vector<std::pair<Coord, std::uint32_t>> near_;
+  NearTriangles near_;
   DisjointSets sets_;
   std::vector<RegionLabel> labels_;
   std::vector<char> holdsPoints_;  ///< by number: grid points belong to its set

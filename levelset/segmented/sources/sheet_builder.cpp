@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <optional>
 #include <tuple>
@@ -416,6 +417,26 @@ std::vector<NarrowGap> SheetBuilder::narrowGaps() const {
     gaps.push_back(gap);
   }
   return gaps;
+}
+
+std::vector<ThinPart> thinPartsOf(const std::vector<NarrowGap>& gaps, double voxelSize) {
+  std::vector<ThinPart> parts;
+  for (const NarrowGap& gap : gaps) {
+    auto part =
+        std::lower_bound(parts.begin(), parts.end(), gap.label,
+                         [](const ThinPart& p, RegionLabel label) { return p.label < label; });
+    if (part == parts.end() || part->label != gap.label) {
+      part = parts.insert(part, ThinPart());
+      part->label = gap.label;
+      part->thickness = std::numeric_limits<double>::infinity();
+    }
+    ++part->places;
+    part->isLost = part->isLost || gap.isLost;
+    if (gap.thickness * voxelSize >= part->thickness) continue;
+    part->thickness = gap.thickness * voxelSize;
+    part->position = gap.position * voxelSize;
+  }
+  return parts;
 }
 
 }  // namespace levelset

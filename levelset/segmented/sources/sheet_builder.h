@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "levelset/segmented/local/sheet_data.h"
+#include "levelset/segmented/segment_solids.h"
 #include "levelset/segmented/sources/grid_crossings.h"
 #include "levelset/segmented/sources/sheet_features.h"
 
@@ -23,6 +24,11 @@ struct NarrowGap {
   double thickness = 0;     ///< voxels, along the normal of one of them
   Imath::V3d position = Imath::V3d(0);  ///< voxels
 };
+
+/// Collects narrow gaps by label.
+/// @param voxelSize  world units
+[[nodiscard]] std::vector<ThinPart> thinPartsOf(const std::vector<NarrowGap>& gaps,
+                                                double voxelSize);
 
 /// Chooses the edges of the grid that count as crossed, and places rims and junctions on faces.
 class SheetBuilder {
