@@ -10,6 +10,7 @@
 
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/json_output.h"
+#include "apps/pipeline/operators/kind_variant.h"
 #include "apps/pipeline/operators/level_set_operator.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/adaptive/adaptive_csg.h"
@@ -26,10 +27,6 @@ namespace {
 
 using levelset::AdaptiveField;
 using levelset::UsageError;
-
-bool isAdaptiveOperand(const Invocation& in) {
-  return !in.operands.empty() && in.operands[0].kind() == Kind::Adaptive;
-}
 
 /// Options of `level-set` that apply with --adaptive.
 const std::vector<std::string> kAdaptiveOptions = {
@@ -221,34 +218,8 @@ Operator withAdaptiveResult(Operator levelSet) {
 
 Operator alsoOfAdaptive(Operator op, std::vector<std::string> names,
                         std::function<Value(Invocation&)> run) {
-  const Operator ofBands = op;
   for (std::vector<Kind>& kinds : op.operands) kinds.push_back(Kind::Adaptive);
-  op.resultKind = [ofBands](const Invocation& in) {
-    return isAdaptiveOperand(in) ? Kind::Adaptive : ofBands.resultKind(in);
-  };
-  op.run = [ofBands, run = std::move(run)](Invocation& in) {
-    return isAdaptiveOperand(in) ? run(in) : ofBands.run(in);
-  };
-  op.plan = [ofBands](Invocation& in) {
-    if (!isAdaptiveOperand(in)) return ofBands.plan(in);
-    Plan plan = in.operands[0].plan();
-    for (const Value& operand : in.operands) plan.bounds.extendBy(operand.plan().bounds);
-    plan.fieldBytes = 0;  // unknown until the field is made
-    return plan;
-  };
-  if (ofBands.cost)
-    op.cost = [ofBands](Invocation& in) {
-      return isAdaptiveOperand(in) ? std::optional<Cost>() : ofBands.cost(in);
-    };
-  if (ofBands.regionOfInterest)
-    op.regionOfInterest = [ofBands](Invocation& in, std::size_t operand,
-                                    const levelset::RegionOfInterest& of) {
-      return isAdaptiveOperand(in) ? levelset::RegionOfInterest{}
-                                   : ofBands.regionOfInterest(in, operand, of);
-    };
-  op.validate = [ofBands, names = std::move(names)](const Invocation& in) {
-    requireOneKind(in);
-    if (!isAdaptiveOperand(in)) return ofBands.validate(in);
+  const auto validate = [names = std::move(names)](const Invocation& in) {
     for (const Param& param : in.op().params)
       if (in.given(param.name) && std::find(names.begin(), names.end(), param.name) == names.end())
         throw UsageError(
@@ -259,7 +230,10 @@ Operator alsoOfAdaptive(Operator op, std::vector<std::string> names,
       if (!in.given(name))
         throw UsageError(fmt::format("{}: --{} is missing; give it", in.op().name, name));
   };
-  return op;
+  return withVariant(std::move(op), {.kind = Kind::Adaptive,
+                                     .run = std::move(run),
+                                     .validate = validate,
+                                     .validateAny = requireOneKind});
 }
 
 Operator unionOperator() {

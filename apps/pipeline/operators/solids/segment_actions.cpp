@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/label_params.h"
 #include "apps/pipeline/operators/solids/sheet_report.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"

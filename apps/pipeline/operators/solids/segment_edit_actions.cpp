@@ -12,6 +12,7 @@
 
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/json_output.h"
+#include "apps/pipeline/operators/kind_variant.h"
 #include "apps/pipeline/operators/label_params.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
@@ -25,10 +26,6 @@ namespace {
 
 using levelset::RegionLabel;
 using levelset::UsageError;
-
-bool isSegmented(const Invocation& in) {
-  return !in.operands.empty() && in.operands[0].kind() == Kind::Segmentation;
-}
 
 /// Behaviour of an action on segmentations.
 struct SegmentedAction {
@@ -65,49 +62,31 @@ void checkSegmented(const SegmentedAction& action, const Invocation& in) {
   if (action.validate) action.validate(in);
 }
 
+/// Refuses the options of segmentations with other operands.
+void refuseForOthers(const std::vector<Param>& own, const Invocation& in) {
+  if (in.operands.empty() || isFirstOperand(Kind::Segmentation, in)) return;
+  for (const Param& param : own)
+    if (in.given(param.name))
+      throw UsageError(
+          fmt::format("{}: --{} is for a segmentation, but the operand is {}; leave it out",
+                      in.op().name, param.name, kindPhrase(in.operands[0].kind())));
+}
+
 /// Lets an action on level sets take segmentations too.
 Operator alsoOfSegmentations(Operator op, SegmentedAction action) {
-  const Operator ofOthers = op;
   op.operands[0].push_back(Kind::Segmentation);
   if (!action.takesSolids)
     for (std::size_t i = 1; i < op.operands.size(); ++i)
       op.operands[i].push_back(Kind::Segmentation);
   op.details += (op.details.empty() ? "" : " ") + action.details;
   op.params.insert(op.params.end(), action.params.begin(), action.params.end());
-  op.resultKind = [ofOthers](const Invocation& in) {
-    return isSegmented(in) ? Kind::Segmentation : ofOthers.resultKind(in);
-  };
-  op.run = [ofOthers, run = action.run](Invocation& in) {
-    return isSegmented(in) ? run(in) : ofOthers.run(in);
-  };
-  op.plan = [ofOthers](Invocation& in) {
-    if (!isSegmented(in)) return ofOthers.plan(in);
-    Plan plan = in.operands[0].plan();
-    for (const Value& operand : in.operands) plan.bounds.extendBy(operand.plan().bounds);
-    return plan;
-  };
-  if (ofOthers.cost)
-    op.cost = [ofOthers](Invocation& in) {
-      return isSegmented(in) ? std::optional<Cost>() : ofOthers.cost(in);
-    };
-  if (ofOthers.regionOfInterest)
-    op.regionOfInterest = [ofOthers](Invocation& in, std::size_t operand,
-                                     const levelset::RegionOfInterest& of) {
-      return isSegmented(in) ? levelset::RegionOfInterest{}
-                             : ofOthers.regionOfInterest(in, operand, of);
-    };
-  op.validate = [ofOthers, action = std::move(action)](const Invocation& in) {
-    if (isSegmented(in)) return checkSegmented(action, in);
-    for (const Param& param : action.params) {
-      if (!in.given(param.name)) continue;
-      if (in.operands.empty()) return;  // the kind of the operand is not known yet
-      throw UsageError(
-          fmt::format("{}: --{} is for a segmentation, but the operand is {}; leave it out",
-                      in.op().name, param.name, kindPhrase(in.operands[0].kind())));
-    }
-    ofOthers.validate(in);
-  };
-  return op;
+  return withVariant(
+      std::move(op),
+      {.kind = Kind::Segmentation,
+       .run = action.run,
+       .validate = [action](const Invocation& in) { checkSegmented(action, in); },
+       .validateAny = [own = action.params](const Invocation& in) { refuseForOthers(own, in); },
+       .keepsSize = true});
 }
 
 Param labelParam(const char* doc) {
