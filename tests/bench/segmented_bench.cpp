@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "levelset/csg/csg.h"
-#include "levelset/segmented/measure_segmented.h"
+#include "levelset/segmented/meshing/measure_segmented.h"
 #include "levelset/segmented/segment_solids.h"
 #include "levelset/shapes/shapes.h"
 

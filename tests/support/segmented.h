@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "levelset/segmented/segmented_to_mesh.h"
+#include "levelset/segmented/meshing/segmented_to_mesh.h"
 #include "tests/support/bands.h"
 #include "tests/support/meshes.h"
 

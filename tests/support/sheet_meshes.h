@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "levelset/segmented/segmented_to_mesh.h"
+#include "levelset/segmented/meshing/segmented_to_mesh.h"
 #include "tests/support/meshes.h"
 #include "tests/support/segmented.h"
 

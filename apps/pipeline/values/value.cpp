@@ -12,7 +12,7 @@
 #include "levelset/adaptive/adaptive_to_mesh.h"
 #include "levelset/error.h"
 #include "levelset/geometry/vertex_normals.h"
-#include "levelset/segmented/segmented_to_mesh.h"
+#include "levelset/segmented/meshing/segmented_to_mesh.h"
 
 namespace pipeline {
 

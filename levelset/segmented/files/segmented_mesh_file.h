@@ -4,7 +4,7 @@
 #include <string>
 
 #include "levelset/progress.h"
-#include "levelset/segmented/segmented_to_mesh.h"
+#include "levelset/segmented/meshing/segmented_to_mesh.h"
 
 namespace levelset {
 

@@ -13,11 +13,11 @@
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
 #include "levelset/inspect/measure.h"
-#include "levelset/segmented/extract_label.h"
-#include "levelset/segmented/measure_segmented.h"
+#include "levelset/segmented/meshing/extract_label.h"
+#include "levelset/segmented/meshing/measure_segmented.h"
+#include "levelset/segmented/meshing/segmented_to_mesh.h"
 #include "levelset/segmented/segment_labels.h"
 #include "levelset/segmented/segment_solids.h"
-#include "levelset/segmented/segmented_to_mesh.h"
 #include "levelset/segmented/sources/segment_mesh.h"
 
 namespace pipeline {

@@ -2,7 +2,7 @@
 
 #include "apps/pipeline/operators/json_output.h"
 #include "apps/pipeline/registry/invocation.h"
-#include "levelset/segmented/measure_segmented.h"
+#include "levelset/segmented/meshing/measure_segmented.h"
 #include "levelset/segmented/sources/segment_mesh.h"
 
 /// Reports on segmentations with sheets: surfaces with one region on both sides.

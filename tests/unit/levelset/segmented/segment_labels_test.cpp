@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "levelset/error.h"
-#include "levelset/segmented/measure_segmented.h"
+#include "levelset/segmented/meshing/measure_segmented.h"
 #include "tests/support/measured.h"
 #include "tests/support/segmented.h"
 #include "tests/support/threads.h"

@@ -12,7 +12,7 @@
 
 #include "levelset/csg/csg.h"
 #include "levelset/error.h"
-#include "levelset/segmented/measure_segmented.h"
+#include "levelset/segmented/meshing/measure_segmented.h"
 #include "levelset/shapes/shapes.h"
 #include "levelset/transform/transform.h"
 #include "tests/support/measured.h"

@@ -10,7 +10,7 @@
 #include <set>
 #include <vector>
 
-#include "levelset/segmented/segmented_to_mesh.h"
+#include "levelset/segmented/meshing/segmented_to_mesh.h"
 #include "render/meshes/mesh_rays.h"
 #include "render/segmented/interface_judge.h"
 #include "render/segmented/interface_kernel.h"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "levelset/error.h"
-#include "levelset/segmented/measure_segmented.h"
+#include "levelset/segmented/meshing/measure_segmented.h"
 #include "levelset/segmented/operators/offset_region.h"
 #include "levelset/segmented/segment_solids.h"
 #include "levelset/shapes/shapes.h"

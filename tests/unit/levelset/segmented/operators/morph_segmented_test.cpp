@@ -12,7 +12,7 @@
 #include "levelset/csg/csg.h"
 #include "levelset/error.h"
 #include "levelset/inspect/measure.h"
-#include "levelset/segmented/measure_segmented.h"
+#include "levelset/segmented/meshing/measure_segmented.h"
 #include "levelset/segmented/segment_solids.h"
 #include "levelset/shapes/shapes.h"
 #include "tests/support/measured.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "levelset/error.h"
-#include "levelset/segmented/measure_segmented.h"
+#include "levelset/segmented/meshing/measure_segmented.h"
 #include "levelset/segmented/segment_solids.h"
 #include "tests/support/measured.h"
 #include "tests/support/segmented.h"

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "levelset/error.h"
-#include "levelset/segmented/extract_label.h"
-#include "levelset/segmented/measure_segmented.h"
+#include "levelset/segmented/meshing/extract_label.h"
+#include "levelset/segmented/meshing/measure_segmented.h"
 #include "levelset/segmented/sources/segment_mesh.h"
 #include "tests/support/measured.h"
 #include "tests/support/sheet_meshes.h"

@@ -1,4 +1,4 @@
-#include "levelset/segmented/sharpen_junctions.h"
+#include "levelset/segmented/meshing/sharpen_junctions.h"
 
 #include <tbb/parallel_for.h>
 

@@ -1,6 +1,6 @@
 // Regions of segmented fields as solids.
 
-#include "levelset/segmented/extract_label.h"
+#include "levelset/segmented/meshing/extract_label.h"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 
 // Internal header of levelset: public headers must not include it.
 
-#include "levelset/segmented/segmented_to_mesh.h"
+#include "levelset/segmented/meshing/segmented_to_mesh.h"
 
 namespace levelset {
 

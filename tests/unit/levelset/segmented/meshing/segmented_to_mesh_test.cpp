@@ -1,6 +1,6 @@
 // Meshes of segmented fields: closed surfaces, sharp junctions, measures.
 
-#include "levelset/segmented/segmented_to_mesh.h"
+#include "levelset/segmented/meshing/segmented_to_mesh.h"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@
 
 #include "levelset/csg/csg.h"
 #include "levelset/inspect/measure.h"
-#include "levelset/segmented/measure_segmented.h"
+#include "levelset/segmented/meshing/measure_segmented.h"
 #include "levelset/segmented/segment_solids.h"
 #include "levelset/shapes/shapes.h"
 #include "tests/support/measured.h"

@@ -9,7 +9,7 @@
 #include <optional>
 #include <utility>
 
-#include "levelset/segmented/local/cell_crossings_vdb.h"
+#include "levelset/segmented/meshing/cell_crossings_vdb.h"
 
 namespace levelset {
 

@@ -1,4 +1,4 @@
-#include "levelset/segmented/local/cell_crossings_vdb.h"
+#include "levelset/segmented/meshing/cell_crossings_vdb.h"
 
 namespace levelset {
 

@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include "levelset/segmented/local/sheet_places_vdb.h"
+#include "levelset/segmented/meshing/sheet_places_vdb.h"
 
 namespace levelset {
 

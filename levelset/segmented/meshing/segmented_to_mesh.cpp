@@ -1,4 +1,4 @@
-#include "levelset/segmented/segmented_to_mesh.h"
+#include "levelset/segmented/meshing/segmented_to_mesh.h"
 
 #include <tbb/parallel_for.h>
 
@@ -10,13 +10,13 @@
 #include "levelset/error.h"
 #include "levelset/memory_limit.h"
 #include "levelset/progress_gate.h"
-#include "levelset/segmented/local/cell_crossings_vdb.h"
 #include "levelset/segmented/local/cut_tetrahedron.h"
 #include "levelset/segmented/local/kuhn_cell.h"
 #include "levelset/segmented/local/orient_sheets.h"
-#include "levelset/segmented/local/sheet_places_vdb.h"
+#include "levelset/segmented/meshing/cell_crossings_vdb.h"
+#include "levelset/segmented/meshing/sharpen_junctions.h"
+#include "levelset/segmented/meshing/sheet_places_vdb.h"
 #include "levelset/segmented/segmented_data_vdb.h"
-#include "levelset/segmented/sharpen_junctions.h"
 
 namespace levelset {
 namespace {

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "levelset/segmented/segmented_to_mesh.h"
+#include "levelset/segmented/meshing/segmented_to_mesh.h"
 
 namespace levelset {
 

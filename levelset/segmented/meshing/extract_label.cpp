@@ -1,4 +1,4 @@
-#include "levelset/segmented/extract_label.h"
+#include "levelset/segmented/meshing/extract_label.h"
 
 #include <fmt/core.h>
 #include <openvdb/tree/LeafManager.h>
@@ -11,8 +11,8 @@
 #include "levelset/convert/mesh_to_band.h"
 #include "levelset/error.h"
 #include "levelset/grids/grid_queries_vdb.h"
+#include "levelset/segmented/meshing/segmented_to_mesh.h"
 #include "levelset/segmented/segmented_data_vdb.h"
-#include "levelset/segmented/segmented_to_mesh.h"
 #include "levelset/vdb.h"
 
 namespace levelset {

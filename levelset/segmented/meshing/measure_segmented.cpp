@@ -1,4 +1,4 @@
-#include "levelset/segmented/measure_segmented.h"
+#include "levelset/segmented/meshing/measure_segmented.h"
 
 #include <algorithm>
 #include <map>
