@@ -34,8 +34,7 @@ std::vector<std::string> labelWords(const Invocation& in, const char* param) {
   for (std::string word; stream >> word;) words.push_back(word);
   if (words.empty())
     throw UsageError(
-        fmt::format("{}: no label is given; give integers up to 65535, or leave --{} out",
-                    in.where(param), param));
+        fmt::format("{}: no label is given; give integers up to 65535", in.where(param)));
   return words;
 }
 
