@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -89,20 +90,31 @@ Value runMeshPoints(Invocation& in) {
   return Value(std::move(result.mesh));
 }
 
+// The bunny's 34,835 points get 22,000 triangles. Shorter edges than those cover its area with
+// more.
+double expectedTriangles(Invocation& in, const Plan& cloud) {
+  const double fromPoints = 0.7 * cloud.points;
+  if (!in.given("edge")) return fromPoints;
+  const double edge = in.length("edge");
+  return std::max(fromPoints, cloud.area / (std::sqrt(3.0) / 4 * edge * edge));
+}
+
 Plan planMeshPoints(Invocation& in) {
   Plan plan = in.operands[0].plan();
   plan.kind = Kind::Mesh;
-  // The bunny's 34,835 points get 22,000 triangles.
-  plan.triangles = 0.7 * plan.points;
+  plan.triangles = expectedTriangles(in, plan);
   return plan;
 }
 
 std::optional<Cost> costOfMeshPoints(Invocation& in) {
-  const double points = in.operands[0].plan().points;
-  if (!(points > 0)) return std::nullopt;
+  const Plan cloud = in.operands[0].plan();
+  if (!(cloud.points > 0)) return std::nullopt;
   // A second set of polynomials, on each side of sharp edges.
   const double passes = in.given("sharp") ? 2 : 1;
-  return Cost{passes * 3e-4 * points, passes * 1800 * points};
+  // A ball of 5,000 points takes 17 microseconds and 340 bytes for each of 74,000 triangles.
+  const double further = expectedTriangles(in, cloud) - 0.7 * cloud.points;
+  return Cost{passes * 3e-4 * cloud.points + 1.7e-5 * further,
+              passes * 1800 * cloud.points + 340 * further};
 }
 
 }  // namespace

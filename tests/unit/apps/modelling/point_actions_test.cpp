@@ -91,6 +91,19 @@ TEST_F(PointActions, MeshPointsMakesAClosedMesh) {
   expectRefusal("read line.xyz ! mesh-points --smoothing 0.5", 2, "between 1 and 10");
 }
 
+TEST_F(PointActions, MeshPointsExpectsTheTrianglesOfShortEdges) {
+  const std::string made = std::string(kSampled) + "mesh-points --edge 0.05 ! ";
+  const double triangles = json(made + "measure --json")["triangles"];
+  const support::Outcome plan = levelsmith("--explain " + made + "measure");
+  const std::string text = plan.out + plan.err;
+  const std::size_t line = text.find("\nmesh-points");
+  ASSERT_NE(line, std::string::npos) << text;
+  const std::size_t about = text.find("about ", line);
+  ASSERT_NE(about, std::string::npos) << text;
+  // 11,928 triangles; the area over that of an equilateral triangle is 11,608.
+  EXPECT_NEAR(std::stod(text.substr(about + 6)), triangles, 0.08 * triangles) << text;
+}
+
 TEST_F(PointActions, MeshPointsKeepsSharpEdges) {
   const std::string made =
       "box --size 2,1,1 --voxel 0.1 ! mesh --sharp ! sample --count 1500 ! mesh-points --sharp 30 "
