@@ -36,9 +36,8 @@ using DeformLeaf = FloatTree::LeafNodeType;
 
 /// Grid points on each side of the surface that get a value: those that redistance() reads.
 constexpr int kSampledLayers = 4;
-/// Width of the certified domain beside the surface, voxels of the result, and the least stretch
-/// that widens it.
-constexpr double kDomainLayers = kSampledLayers + 1, kLeastDomainStretch = 0.25;
+/// Width of the certified domain beside the surface, voxels of the result, where nothing shrinks.
+constexpr double kDomainLayers = kSampledLayers + 1;
 /// Voxels that thicken() adds to a band on each side when called twice.
 constexpr double kThickenedTwice = 4;
 
@@ -219,7 +218,8 @@ DeformBandResult deformBand(const NarrowBand& solid, const Deformation& deformat
   const DeformedSurface surface = deformSurface(solid, deformation, voxelSize);
   const CertifiedDeformation certified = deformation.certify(
       {surface.before.positions, surface.before.triangles,
-       kDomainLayers * voxelSize / std::clamp(surface.leastStretch, kLeastDomainStretch, 1.0)},
+       voxelSize * std::min(kDomainLayers / std::clamp(surface.leastStretch, 1e-3, 1.0),
+                            kWidestDeformationDomain)},
       subProgress(options.progress, 0, 0.2));
   result.certificate = certified.certificate;
   requireInjective(result.certificate);

@@ -9,6 +9,9 @@
 
 namespace levelset {
 
+/// Largest width of the certified domain beside the surface, voxels of the result.
+inline constexpr double kWidestDeformationDomain = 10;
+
 struct DeformBandOptions {
   std::optional<double> voxelSize = {};  ///< voxel size of the result; empty: that of the operand
   std::optional<double> halfWidth = {};  ///< half width of the result, voxels; empty: as above

@@ -42,7 +42,7 @@ void requireInjective(const FoldCertificate& certificate) {
   if (certificate.verdict == FoldVerdict::Undecided && certificate.isNearCage)
     throw InvalidInput(fmt::format(
         "the surface comes too close to the cage or leaves it near {}, so a fold is not excluded; "
-        "use a larger cage",
+        "use a larger cage, or smaller voxels",
         foldPlace(certificate.place)));
   if (certificate.verdict == FoldVerdict::Undecided)
     throw InvalidInput(fmt::format(

@@ -76,6 +76,7 @@ CageFoot cageFootOf(const std::vector<CageTriangle>& parts, const V3d& x, double
     if (!(std::abs(part.normal.dot(part.corners[0] - x)) <= within)) continue;
     const auto closest = closestOnTriangle(x, part.corners[0], part.corners[1], part.corners[2]);
     if (!((closest.point - x).length() <= within)) continue;
+    foot.isOnSurface = true;
     V3d shares;
     for (int n = 0; n < 3; ++n)
       shares[n] = 1 - part.slopes[static_cast<std::size_t>(n)].dot(
@@ -84,7 +85,7 @@ CageFoot cageFootOf(const std::vector<CageTriangle>& parts, const V3d& x, double
     for (std::size_t n = 0; n < 3; ++n)  // distance from the edge: share / |slope|
       isOnEdge = isOnEdge || shares[static_cast<int>(n)] <= within * part.slopes[n].length();
     if (!isOnEdge) continue;
-    if (!foot.isOnEdge) foot = {true, t, shares, V3d(0)};
+    if (!foot.isOnEdge) foot = {true, true, t, shares, V3d(0)};
     foot.inwards -= part.normal;
   }
   return foot;
@@ -262,7 +263,7 @@ void CageDeformation::requireDefined(const std::vector<V3d>& points, const char*
   if (shared_->kind == CageCoordinates::MeanValue) return;
   for (std::size_t n = 0; n < points.size(); ++n)
     if (!contains(points[n]) &&
-        !cageFootOf(shared_->parts, points[n], kOnEdge * shared_->size).isOnEdge)
+        !cageFootOf(shared_->parts, points[n], kOnEdge * shared_->size).isOnSurface)
       throw InvalidInput(fmt::format(
           "{} {} at {} is outside the cage, where Green coordinates are not defined; use a larger "
           "cage, or mean-value coordinates",

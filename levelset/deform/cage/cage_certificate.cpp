@@ -9,7 +9,9 @@
 
 #include "levelset/deform/cage/cage.h"
 #include "levelset/deform/cage/cage_bounds.h"
+#include "levelset/deform/cage/cage_kernels.h"
 #include "levelset/deform/cage/domain_cells.h"
+#include "levelset/geometry/closest_on_triangle.h"
 #include "levelset/mesh_sign/self_intersections.h"
 
 namespace levelset {
@@ -23,7 +25,7 @@ using Imath::V3d;
 constexpr double kBracket = 0.25;
 /// Limits of the halvings and of the boxes that are bounded.
 constexpr int kMostCageLevels = DomainCells::kLevels + 6;
-constexpr std::size_t kMostCageBoxes = 1'000'000;
+constexpr std::size_t kMostCageBoxes = 300'000;
 /// Level from which a box that reaches the cage is too close to it.
 constexpr int kNearCageLevel = DomainCells::kLevels + 3;
 /// Largest distance between the image of a result and the position, over the diagonal of the cage.
@@ -137,6 +139,31 @@ void testOverlaps(const CageDeformation& cage, const DeformationDomain& domain,
   }
 }
 
+/// Finds a point whose distance from the cage is at most the margin of the domain, or that lies on
+/// the other side of the cage than the first one.
+std::optional<V3d> pointNearCage(const CageDeformation& cage, const DeformationDomain& domain) {
+  if (domain.points.empty()) return {};
+  const bool isInside = cage.contains(domain.points[domain.triangles[0][0]]);
+  std::vector<std::uint8_t> isNear(domain.points.size(), 0);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, isNear.size(), 64), [&](const auto& range) {
+    for (std::size_t n = range.begin(); n != range.end(); ++n) {
+      const V3d& p = domain.points[n];
+      bool isTooNear = cage.contains(p) != isInside;
+      for (const cage::CageTriangle& part : cage.parts()) {
+        if (isTooNear) break;
+        const V3d foot =
+            closestOnTriangle(p, part.corners[0], part.corners[1], part.corners[2]).point;
+        isTooNear = !((foot - p).length() > domain.margin);
+      }
+      isNear[n] = isTooNear;
+    }
+  });
+  for (const auto& t : domain.triangles)
+    for (const std::uint32_t n : t)
+      if (isNear[n]) return domain.points[n];
+  return {};
+}
+
 /// The Jacobian at points, of a cloud, which has no surface.
 FoldCertificate certifyPoints(const CageDeformation& cage, const std::vector<V3d>& points) {
   FoldCertificate certificate{.verdict = FoldVerdict::Certified,
@@ -169,6 +196,13 @@ CertifiedDeformation CageDeformation::certify(const DeformationDomain& domain,
   FoldCertificate certificate{.pieces = triangles().size(), .subject = "cage"};
   certificate.leastHigh = std::numeric_limits<double>::infinity();
   certificate.leastLow = std::numeric_limits<double>::infinity();
+  if (const auto near = pointNearCage(*this, domain)) {
+    certificate.place = *near;
+    certificate.isNearCage = true;
+    certificate.leastHigh = jet(*near).determinant();
+    certificate.leastLow = -std::numeric_limits<double>::infinity();
+    return {certificate};
+  }
   const bool isGreen = coordinates() == CageCoordinates::Green;
   DomainCells cells(domain);
   std::vector<CageLeaf> leaves;

@@ -23,6 +23,8 @@ constexpr double kFarRatio = 40;
 constexpr std::size_t kQuadraturePoints = 8;
 constexpr double kQuadratureRatio = 0.4;
 constexpr int kMostQuarterings = 40;
+/// Height over the diameter within which a point lies in the plane of a triangle.
+constexpr double kOnPlane = 1e-13;
 
 /// Abscissae and weights of Gauss and Legendre on [0, 1].
 struct GaussRule {
@@ -190,7 +192,8 @@ GreenWeights greenWeights(const CageTriangle& triangle, const V3d& x) {
   double volume = d[0].dot(d[1].cross(d[2]));
   const double base =
       r[0] * r[1] * r[2] + d[0].dot(d[1]) * r[2] + d[1].dot(d[2]) * r[0] + d[2].dot(d[0]) * r[1];
-  if (volume == 0) volume = 0.0;  // −0 would put a point of the triangle outside
+  // Rounding errors must not put a point of the triangle outside.
+  if (std::abs(height) <= kOnPlane * triangle.diameter) volume = std::abs(volume);
   const double solid = 2 * std::atan2(volume, base);
   V3d solidSlope(0), flow(0);  // gradient of the solid angle; Σ ν L over the edges
   double potential = -height * solid;

@@ -28,7 +28,7 @@ namespace cage {
 
 /// A point on the surface of a cage.
 struct CageFoot {
-  bool isOnEdge = false;  ///< on an edge or a vertex, within rounding errors
+  bool isOnSurface = false, isOnEdge = false;  ///< within rounding errors; an edge or a vertex
   std::size_t triangle = 0;
   Imath::V3d shares{0};  ///< barycentric coordinates
   Imath::V3d inwards{0};

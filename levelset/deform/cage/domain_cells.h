@@ -37,6 +37,8 @@ class DomainCells {
   [[nodiscard]] static std::size_t indexOf(std::uint32_t i, std::uint32_t j, std::uint32_t k) {
     return (static_cast<std::size_t>(i) * kSide + j) * kSide + k;
   }
+  /// Marks all cells whose centres are within a distance of that of a marked one.
+  void widen(double cells);
   void floodOutside();
 
   Imath::V3d low_;

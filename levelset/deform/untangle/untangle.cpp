@@ -126,6 +126,23 @@ class ControlledLattice final : public ControlledMap {
     return points;
   }
 
+  /// The place and a grid around it, since the determinant is a polynomial of high degree.
+  [[nodiscard]] std::vector<V3d> testPointsAround(const V3d& place) const override {
+    const V3d u = lattice_.parameterOf(place);
+    std::vector<V3d> points;
+    for (int n = 0; n < 27; ++n) {
+      V3d at(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+      for (int axis = 0; axis < 3; ++axis) {
+        const LatticeAxis& of = lattice_.data().axes[static_cast<std::size_t>(axis)];
+        const double step =
+            0.25 / (static_cast<double>(spanCount(of)) * static_cast<double>(of.degree + 1));
+        at[axis] = std::clamp(u[axis] + at[axis] * step, 0.0, 1.0);
+      }
+      points.push_back(lattice_.worldOf(at));
+    }
+    return points;
+  }
+
  private:
   static constexpr double kBasisStep = 1e-5;
   ControlLattice lattice_;
@@ -174,6 +191,10 @@ class ControlledCage final : public ControlledMap {
     for (std::size_t n = 0; n < domain_.points.size(); n += stride)
       points.push_back(domain_.points[n]);
     return points;
+  }
+
+  [[nodiscard]] std::vector<V3d> testPointsAround(const V3d& place) const override {
+    return {place};
   }
 
  private:

@@ -15,7 +15,7 @@ using Imath::V3d;
 
 /// Certificates before the search gives up, steps of the sequence of quadratic programs in each,
 /// and sweeps over the constraints of one program.
-constexpr std::size_t kUntangleRounds = 16;
+constexpr std::size_t kUntangleRounds = 12;
 constexpr int kUntangleSteps = 60, kUntangleSweeps = 200;
 /// Constraints are active below this multiple of the least Jacobian.
 constexpr double kActive = 3;
@@ -106,11 +106,9 @@ UntangleReport removeFolds(ControlledMap& map, const UntangleOptions& options) {
   };
   FoldCertificate certificate = certify();
   if (certificate.isInjective()) return report;
-  const auto refuseOthers = [&] {
-    // Neither moves with folds: the surface leaves the cage, or distant parts penetrate.
-    if (certificate.isNearCage || certificate.overlaps) requireInjective(certificate);
-  };
-  refuseOthers();
+  // Neither goes away with folds: the surface leaves the cage, or distant parts penetrate.
+  if (certificate.isNearCage || certificate.verdict == FoldVerdict::Certified)
+    requireInjective(certificate);
   std::vector<V3d> points = map.testPoints();
   double scale = 0;
   {
@@ -121,11 +119,11 @@ UntangleReport removeFolds(ControlledMap& map, const UntangleOptions& options) {
   double least = options.leastShare * std::max(scale, 1e-6);
   bool isDone = false;
   while (!isDone && report.rounds < kUntangleRounds) {
-    points.push_back(certificate.place);
+    for (const V3d& p : map.testPointsAround(certificate.place)) points.push_back(p);
     approach(map, points, least, wanted, spacing);
     certificate = certify();
     isDone = certificate.isInjective();
-    if (certificate.overlaps || certificate.isNearCage) break;
+    if (certificate.verdict == FoldVerdict::Certified || certificate.isNearCage) break;
     if (certificate.verdict == FoldVerdict::Undecided) least *= 1.3;
   }
   if (!isDone) {
@@ -141,7 +139,6 @@ UntangleReport removeFolds(ControlledMap& map, const UntangleOptions& options) {
       const double middle = 0.5 * (low + high);
       moveBy(middle);
       certificate = certify();
-      refuseOthers();
       (certificate.isInjective() ? low : high) = middle;
     }
     moveBy(low);

@@ -29,6 +29,8 @@ class ControlledMap {
   [[nodiscard]] virtual FoldCertificate certificate(const Progress& progress) const = 0;
   /// Points where the determinant is tested first.
   [[nodiscard]] virtual std::vector<Imath::V3d> testPoints() const = 0;
+  /// Further test points where a certificate failed.
+  [[nodiscard]] virtual std::vector<Imath::V3d> testPointsAround(const Imath::V3d& place) const = 0;
 };
 
 /// Moves the control points until the certificate proves that the map is injective.
