@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "levelset/deform/creases/restore_creases.h"
 #include "levelset/distance/redistance.h"
 #include "levelset/distance/surface/surface_points.h"
 #include "levelset/error.h"
@@ -22,6 +23,7 @@
 #include "levelset/grids/grid_queries_vdb.h"
 #include "levelset/grids/interpolate_vdb.h"
 #include "levelset/meshing/band_to_mesh.h"
+#include "levelset/meshing/extended_mesh.h"
 #include "levelset/transform/resample_vdb.h"
 #include "levelset/vdb.h"
 
@@ -38,6 +40,8 @@ using DeformLeaf = FloatTree::LeafNodeType;
 constexpr int kSampledLayers = 4;
 /// Width of the certified domain beside the surface, voxels of the result, where nothing shrinks.
 constexpr double kDomainLayers = kSampledLayers + 1;
+/// Angle between triangles of the sharp mesh from which their edge is a crease.
+constexpr double kCreaseDegrees = 30;
 /// Voxels that thicken() adds to a band on each side when called twice.
 constexpr double kThickenedTwice = 4;
 
@@ -203,6 +207,26 @@ void finishSigns(FloatGrid& target) {
   });
 }
 
+/// Edges between curved faces, which redistance() rounds, from the deformed mesh with sharp edges.
+NarrowBand withSharpEdges(NarrowBand band, const NarrowBand& solid, const Deformation& deformation,
+                          const DeformBandOptions& options) {
+  ExtendedMesh extended = bandToExtendedMesh(solid);
+  // Small triangles of a smooth surface may turn by any angle.
+  if (extended.edgeVertices + extended.cornerVertices == 0) return band;
+  TriMesh& mesh = extended.mesh;
+  const auto creases = creaseEdges(mesh, kCreaseDegrees);
+  if (creases.empty()) return band;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.positions.size(), 256),
+                    [&](const auto& range) {
+                      for (std::size_t n = range.begin(); n != range.end(); ++n)
+                        mesh.positions[n] = deformation.at(mesh.positions[n]);
+                    });
+  mesh.spacing = coordinateSpacing(mesh);
+  return restoreCreases(
+      band, mesh, creases,
+      {.maxMemory = options.maxMemory, .progress = subProgress(options.progress, 0.8, 1)});
+}
+
 }  // namespace
 
 DeformBandResult deformBand(const NarrowBand& solid, const Deformation& deformation,
@@ -246,9 +270,11 @@ DeformBandResult deformBand(const NarrowBand& solid, const Deformation& deformat
         "no grid point lies inside the deformed solid, because voxels of {} are too large; use "
         "smaller voxels",
         voxelSize));
-  result.band = redistance(makeBand(target), {.halfWidth = halfWidth,
-                                              .maxMemory = options.maxMemory,
-                                              .progress = subProgress(options.progress, 0.6, 1)});
+  NarrowBand smooth =
+      redistance(makeBand(target), {.halfWidth = halfWidth,
+                                    .maxMemory = options.maxMemory,
+                                    .progress = subProgress(options.progress, 0.6, 0.8)});
+  result.band = withSharpEdges(std::move(smooth), solid, deformation, options);
   return result;
 }
 
