@@ -40,8 +40,9 @@ using DeformLeaf = FloatTree::LeafNodeType;
 constexpr int kSampledLayers = 4;
 /// Width of the certified domain beside the surface, voxels of the result, where nothing shrinks.
 constexpr double kDomainLayers = kSampledLayers + 1;
-/// Angle between triangles of the sharp mesh from which their edge is a crease.
-constexpr double kCreaseDegrees = 30;
+/// Angle by which the surface turns at a crease. A smooth one turns by less than that over 2.5
+/// voxels if its radius of curvature is at least 3.6 voxels.
+constexpr double kCreaseDegrees = 40;
 /// Voxels that thicken() adds to a band on each side when called twice.
 constexpr double kThickenedTwice = 4;
 
@@ -211,10 +212,9 @@ void finishSigns(FloatGrid& target) {
 NarrowBand withSharpEdges(NarrowBand band, const NarrowBand& solid, const Deformation& deformation,
                           const DeformBandOptions& options) {
   ExtendedMesh extended = bandToExtendedMesh(solid);
-  // Small triangles of a smooth surface may turn by any angle.
   if (extended.edgeVertices + extended.cornerVertices == 0) return band;
   TriMesh& mesh = extended.mesh;
-  const auto creases = creaseEdges(mesh, kCreaseDegrees);
+  const auto creases = creaseEdges(solid, mesh, kCreaseDegrees);
   if (creases.empty()) return band;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.positions.size(), 256),
                     [&](const auto& range) {

@@ -1,5 +1,6 @@
 #include "levelset/deform/creases/restore_creases.h"
 
+#include <openvdb/tools/Interpolation.h>
 #include <openvdb/tree/LeafManager.h>
 
 #include <cmath>
@@ -18,6 +19,9 @@ using Imath::V3d;
 using openvdb::Coord;
 using openvdb::FloatGrid;
 using openvdb::FloatTree;
+
+/// Distance from an edge at which gradients are compared, voxels.
+constexpr double kBesideEdge = 1.25;
 
 V3d areaNormal(const TriMesh& mesh, std::uint32_t triangle) {
   const auto& [a, b, c] = mesh.triangles[triangle];
@@ -49,13 +53,40 @@ class CreaseRegion {
 
 }  // namespace
 
-std::vector<std::array<std::uint32_t, 2>> creaseEdges(const TriMesh& mesh, double angleDegrees) {
+std::vector<std::array<std::uint32_t, 2>> creaseEdges(const NarrowBand& band, const TriMesh& mesh,
+                                                      double angleDegrees) {
   const double least = std::cos(angleDegrees * std::numbers::pi / 180);
+  const FloatGrid& grid = vdb(band);
+  const auto accessor = grid.getConstAccessor();
+  const double voxelSize = band.voxelSize();
+  const auto gradientAt = [&](const V3d& world) {
+    V3d gradient;
+    for (int axis = 0; axis < 3; ++axis) {
+      openvdb::Vec3d p(world.x / voxelSize, world.y / voxelSize, world.z / voxelSize);
+      p[axis] += 0.5;
+      gradient[axis] = static_cast<double>(openvdb::tools::BoxSampler::sample(accessor, p));
+      p[axis] -= 1;
+      gradient[axis] -= static_cast<double>(openvdb::tools::BoxSampler::sample(accessor, p));
+    }
+    return gradient;
+  };
+  const auto turns = [&](const V3d& a, const V3d& b) {
+    return a.dot(b) < least * a.length() * b.length();
+  };
   std::vector<std::array<std::uint32_t, 2>> edges;
   forEachEdge(sortedSides(mesh.triangles), [&](auto first, auto end) {
     if (end - first != 2) return;
     const V3d a = areaNormal(mesh, first[0].triangle), b = areaNormal(mesh, first[1].triangle);
-    if (a.dot(b) < least * a.length() * b.length()) edges.push_back({first->low, first->high});
+    if (!turns(a, b)) return;
+    const V3d from = mesh.positions[first->low], along = mesh.positions[first->high] - from;
+    // In the planes of the triangles, away from the edge.
+    const V3d middle = from + along * 0.5;
+    const double sign = first[0].rises ? 1 : -1;
+    const V3d left = a.cross(along).normalized() * sign,
+              right = b.cross(along).normalized() * -sign;
+    const double step = kBesideEdge * voxelSize;
+    if (turns(gradientAt(middle + left * step), gradientAt(middle + right * step)))
+      edges.push_back({first->low, first->high});
   });
   return edges;
 }
