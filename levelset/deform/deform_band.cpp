@@ -15,8 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "levelset/deform/deform_mesh.h"
-#include "levelset/deform/lattice_inverse.h"
+#include "levelset/deform/creases/restore_creases.h"
 #include "levelset/distance/redistance.h"
 #include "levelset/distance/surface/surface_points.h"
 #include "levelset/error.h"
@@ -24,6 +23,7 @@
 #include "levelset/grids/grid_queries_vdb.h"
 #include "levelset/grids/interpolate_vdb.h"
 #include "levelset/meshing/band_to_mesh.h"
+#include "levelset/meshing/extended_mesh.h"
 #include "levelset/transform/resample_vdb.h"
 #include "levelset/vdb.h"
 
@@ -38,6 +38,11 @@ using DeformLeaf = FloatTree::LeafNodeType;
 
 /// Grid points on each side of the surface that get a value: those that redistance() reads.
 constexpr int kSampledLayers = 4;
+/// Width of the certified domain beside the surface, voxels of the result, where nothing shrinks.
+constexpr double kDomainLayers = kSampledLayers + 1;
+/// Angle by which the surface turns at a crease. A smooth one turns by less than that over 2.5
+/// voxels if its radius of curvature is at least 3.6 voxels.
+constexpr double kCreaseDegrees = 40;
 /// Voxels that thicken() adds to a band on each side when called twice.
 constexpr double kThickenedTwice = 4;
 
@@ -49,16 +54,16 @@ struct DeformedSurface {
   double leastStretch = 1;  ///< least singular value of the Jacobian at the vertices
 };
 
-DeformedSurface deformSurface(const NarrowBand& solid, const ControlLattice& lattice,
+DeformedSurface deformSurface(const NarrowBand& solid, const Deformation& deformation,
                               double voxelSize) {
   DeformedSurface surface{bandToMesh(solid), {}, std::numeric_limits<double>::infinity()};
   const std::size_t count = surface.before.positions.size();
   surface.after.resize(count);
   std::vector<double> stretches(count);
-  requireInside(lattice, surface.before.positions, "the surface point");
+  deformation.requireDefined(surface.before.positions, "the surface point");
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 256), [&](const auto& range) {
     for (std::size_t n = range.begin(); n != range.end(); ++n) {
-      const DeformationJet jet = lattice.jet(surface.before.positions[n]);
+      const DeformationJet jet = deformation.jet(surface.before.positions[n]);
       surface.after[n] = jet.position / voxelSize;
       Eigen::Matrix3d jacobian;
       for (int axis = 0; axis < 3; ++axis)
@@ -168,9 +173,8 @@ class SolidSampler {
 };
 
 void fillValues(FloatGrid& target, const SampledPart& part, const DeformedSurface& surface,
-                const ControlLattice& lattice, const SolidSampler& sampler,
+                const DeformationInverse& inverse, const SolidSampler& sampler,
                 const Progress& progress) {
-  const LatticeInverse inverse(lattice);
   const double voxelSize = target.voxelSize()[0];
   const float background = target.background();
   openvdb::tree::LeafManager<FloatTree> leaves(target.tree());
@@ -204,9 +208,28 @@ void finishSigns(FloatGrid& target) {
   });
 }
 
+/// Edges between curved faces, which redistance() rounds, from the deformed mesh with sharp edges.
+NarrowBand withSharpEdges(NarrowBand band, const NarrowBand& solid, const Deformation& deformation,
+                          const DeformBandOptions& options) {
+  ExtendedMesh extended = bandToExtendedMesh(solid);
+  if (extended.edgeVertices + extended.cornerVertices == 0) return band;
+  TriMesh& mesh = extended.mesh;
+  const auto creases = creaseEdges(solid, mesh, kCreaseDegrees);
+  if (creases.empty()) return band;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.positions.size(), 256),
+                    [&](const auto& range) {
+                      for (std::size_t n = range.begin(); n != range.end(); ++n)
+                        mesh.positions[n] = deformation.at(mesh.positions[n]);
+                    });
+  mesh.spacing = coordinateSpacing(mesh);
+  return restoreCreases(
+      band, mesh, creases,
+      {.maxMemory = options.maxMemory, .progress = subProgress(options.progress, 0.8, 1)});
+}
+
 }  // namespace
 
-DeformBandResult deformBand(const NarrowBand& solid, const ControlLattice& lattice,
+DeformBandResult deformBand(const NarrowBand& solid, const Deformation& deformation,
                             const DeformBandOptions& options) {
   requireSolid(solid);
   if (solid.isEmpty()) throw InvalidInput("the solid is empty; give a solid with a surface");
@@ -216,14 +239,19 @@ DeformBandResult deformBand(const NarrowBand& solid, const ControlLattice& latti
   if (!(halfWidth >= 1) || !std::isfinite(halfWidth))
     throw UsageError(fmt::format("the half width is {} voxels; give at least 1", halfWidth));
   DeformBandResult result;
-  result.certificate = certifyLattice(lattice, {.progress = subProgress(options.progress, 0, 0.1)});
+  const DeformedSurface surface = deformSurface(solid, deformation, voxelSize);
+  const CertifiedDeformation certified = deformation.certify(
+      {surface.before.positions, surface.before.triangles,
+       voxelSize * std::min(kDomainLayers / std::clamp(surface.leastStretch, 1e-3, 1.0),
+                            kWidestDeformationDomain)},
+      subProgress(options.progress, 0, 0.2));
+  result.certificate = certified.certificate;
   requireInjective(result.certificate);
-  if (lattice.isIdentity() && voxelSize == solid.voxelSize() && halfWidth == solid.halfWidth()) {
-    requireInside(lattice, bandToMesh(solid).positions, "the surface point");
+  if (deformation.isIdentity() && voxelSize == solid.voxelSize() &&
+      halfWidth == solid.halfWidth()) {
     result.band = solid;
     return result;
   }
-  const DeformedSurface surface = deformSurface(solid, lattice, voxelSize);
   requireSmallerThanResult(surface, voxelSize);
   report(options.progress, 0.2);
   const SampledPart part = sampledPart(surface, options.maxMemory);
@@ -234,16 +262,19 @@ DeformBandResult deformBand(const NarrowBand& solid, const ControlLattice& latti
   const FloatGrid::Ptr target =
       emptyLevelSet(transformOf(axisAligned(voxelSize)), std::max(halfWidth, 1.0 * kSampledLayers));
   target->tree().topologyUnion(part.mask);
-  fillValues(*target, part, surface, lattice, sampler, subProgress(options.progress, 0.4, 0.6));
+  fillValues(*target, part, surface, *certified.inverse, sampler,
+             subProgress(options.progress, 0.4, 0.6));
   finishSigns(*target);
   if (!hasInside(*target))
     throw InvalidInput(fmt::format(
         "no grid point lies inside the deformed solid, because voxels of {} are too large; use "
         "smaller voxels",
         voxelSize));
-  result.band = redistance(makeBand(target), {.halfWidth = halfWidth,
-                                              .maxMemory = options.maxMemory,
-                                              .progress = subProgress(options.progress, 0.6, 1)});
+  NarrowBand smooth =
+      redistance(makeBand(target), {.halfWidth = halfWidth,
+                                    .maxMemory = options.maxMemory,
+                                    .progress = subProgress(options.progress, 0.6, 0.8)});
+  result.band = withSharpEdges(std::move(smooth), solid, deformation, options);
   return result;
 }
 

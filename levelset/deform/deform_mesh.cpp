@@ -34,12 +34,12 @@ bool isBeforePosition(const V3d& a, const V3d& b) {
 }
 
 /// Largest distance between a deformed edge and the straight edge between its deformed ends.
-double bendOf(const ControlLattice& lattice, V3d a, V3d b) {
+double bendOf(const Deformation& deformation, V3d a, V3d b) {
   if (isBeforePosition(b, a)) std::swap(a, b);
-  const V3d begin = lattice.at(a), end = lattice.at(b);
+  const V3d begin = deformation.at(a), end = deformation.at(b);
   double worst = 0;
   for (const double t : {0.25, 0.5, 0.75}) {
-    const V3d off = lattice.at(a + (b - a) * t) - (begin + (end - begin) * t);
+    const V3d off = deformation.at(a + (b - a) * t) - (begin + (end - begin) * t);
     worst = std::max(worst, off.length());
   }
   return worst;
@@ -65,8 +65,8 @@ std::uint32_t addMiddle(TriMesh& mesh, std::uint32_t a, std::uint32_t b) {
 /// Divides triangles at the middles of their halved edges into two, three or four.
 class TriangleDivision {
  public:
-  TriangleDivision(TriMesh& mesh, const ControlLattice& lattice, double tolerance)
-      : mesh_(mesh), lattice_(lattice), tolerance_(tolerance) {}
+  TriangleDivision(TriMesh& mesh, const Deformation& deformation, double tolerance)
+      : mesh_(mesh), deformation_(deformation), tolerance_(tolerance) {}
 
   /// Halves all edges beyond the tolerance. Returns their number.
   std::size_t round() {
@@ -76,7 +76,7 @@ class TriangleDivision {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 256), [&](const auto& range) {
       for (std::size_t t = range.begin(); t != range.end(); ++t)
         for (std::size_t n = 0; n < 3; ++n)
-          if (bendOf(lattice_, mesh_.positions[mesh_.triangles[t][n]],
+          if (bendOf(deformation_, mesh_.positions[mesh_.triangles[t][n]],
                      mesh_.positions[mesh_.triangles[t][(n + 1) % 3]]) > tolerance_)
             halved[t] = static_cast<std::uint8_t>(halved[t] | (1u << n));
     });
@@ -133,17 +133,17 @@ class TriangleDivision {
   }
 
   TriMesh& mesh_;
-  const ControlLattice& lattice_;
+  const Deformation& deformation_;
   double tolerance_;
   std::unordered_map<std::uint64_t, std::uint32_t> middles_;
 };
 
-double largestBend(const TriMesh& mesh, const ControlLattice& lattice) {
+double largestBend(const TriMesh& mesh, const Deformation& deformation) {
   std::vector<double> bends(mesh.triangles.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bends.size(), 256), [&](const auto& range) {
     for (std::size_t t = range.begin(); t != range.end(); ++t)
       for (std::size_t n = 0; n < 3; ++n)
-        bends[t] = std::max(bends[t], bendOf(lattice, mesh.positions[mesh.triangles[t][n]],
+        bends[t] = std::max(bends[t], bendOf(deformation, mesh.positions[mesh.triangles[t][n]],
                                              mesh.positions[mesh.triangles[t][(n + 1) % 3]]));
   });
   return bends.empty() ? 0 : *std::max_element(bends.begin(), bends.end());
@@ -151,34 +151,23 @@ double largestBend(const TriMesh& mesh, const ControlLattice& lattice) {
 
 }  // namespace
 
-void requireInside(const ControlLattice& lattice, const std::vector<V3d>& points,
-                   const char* what) {
-  for (std::size_t n = 0; n < points.size(); ++n) {
-    const V3d& p = points[n];
-    if (lattice.contains(p)) continue;
-    const V3d u = lattice.parameterOf(p);
-    throw InvalidInput(fmt::format(
-        "{} {} at ({:.6g}, {:.6g}, {:.6g}) is outside the box of the lattice: its parameters are "
-        "({:.4g}, {:.4g}, {:.4g}), but must be in [0, 1]; use a larger box",
-        what, n, p.x, p.y, p.z, u.x, u.y, u.z));
-  }
-}
-
-DeformMeshResult deformMesh(const TriMesh& mesh, const ControlLattice& lattice,
+DeformMeshResult deformMesh(const TriMesh& mesh, const Deformation& deformation,
                             const DeformMeshOptions& options) {
   if (!(options.tolerance >= 0) || !std::isfinite(options.tolerance))
     throw UsageError(fmt::format("the tolerance is {}; give a length, or 0 to divide no triangle",
                                  options.tolerance));
   requireAttributes(mesh);
   DeformMeshResult result;
-  result.certificate = certifyLattice(lattice, {.progress = subProgress(options.progress, 0, 0.3)});
+  result.certificate =
+      deformation.certify({mesh.positions, mesh.triangles}, subProgress(options.progress, 0, 0.3))
+          .certificate;
   requireInjective(result.certificate);
-  requireInside(lattice, mesh.positions, "vertex");
+  deformation.requireDefined(mesh.positions, "vertex");
   result.mesh = mesh;
-  if (lattice.isIdentity()) return result;
+  if (deformation.isIdentity()) return result;
   TriMesh& moved = result.mesh;
   if (options.tolerance > 0) {
-    TriangleDivision division(moved, lattice, options.tolerance);
+    TriangleDivision division(moved, deformation, options.tolerance);
     for (int round = 0; round < kMostDivisionRounds; ++round) {
       report(options.progress, 0.3 + 0.5 * round / kMostDivisionRounds);
       const std::size_t before = moved.positions.size();
@@ -192,7 +181,7 @@ DeformMeshResult deformMesh(const TriMesh& mesh, const ControlLattice& lattice,
         throw ResourceLimit("the divided mesh has over 1e9 vertices; use a larger tolerance");
     }
   }
-  result.bend = largestBend(moved, lattice);
+  result.bend = largestBend(moved, deformation);
   report(options.progress, 0.9);
   double stretch = 1;
   std::vector<double> stretches(moved.positions.size());
@@ -200,7 +189,7 @@ DeformMeshResult deformMesh(const TriMesh& mesh, const ControlLattice& lattice,
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, moved.positions.size(), 256),
                     [&](const auto& range) {
                       for (std::size_t n = range.begin(); n != range.end(); ++n) {
-                        const DeformationJet jet = lattice.jet(moved.positions[n]);
+                        const DeformationJet jet = deformation.jet(moved.positions[n]);
                         moved.positions[n] = jet.position;
                         for (const V3d& slope : jet.slopes)
                           stretches[n] = std::max(stretches[n], slope.length());
@@ -216,18 +205,19 @@ DeformMeshResult deformMesh(const TriMesh& mesh, const ControlLattice& lattice,
   return result;
 }
 
-DeformPointsResult deformPoints(PointCloud cloud, const ControlLattice& lattice,
+DeformPointsResult deformPoints(PointCloud cloud, const Deformation& deformation,
                                 const Progress& progress) {
   requirePoints(cloud);
   DeformPointsResult result;
-  result.certificate = certifyLattice(lattice, {.progress = subProgress(progress, 0, 0.5)});
+  result.certificate =
+      deformation.certify({cloud.positions, {}}, subProgress(progress, 0, 0.5)).certificate;
   requireInjective(result.certificate);
-  requireInside(lattice, cloud.positions, "point");
-  if (!lattice.isIdentity()) {
+  deformation.requireDefined(cloud.positions, "point");
+  if (!deformation.isIdentity()) {
     tbb::parallel_for(
         tbb::blocked_range<std::size_t>(0, cloud.positions.size(), 256), [&](const auto& range) {
           for (std::size_t n = range.begin(); n != range.end(); ++n) {
-            const DeformationJet jet = lattice.jet(cloud.positions[n]);
+            const DeformationJet jet = deformation.jet(cloud.positions[n]);
             cloud.positions[n] = jet.position;
             if (!cloud.normals.empty())
               cloud.normals[n] =

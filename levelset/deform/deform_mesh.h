@@ -1,10 +1,9 @@
 #pragma once
 
 #include <cstddef>
-#include <vector>
+#include <utility>
 
-#include "levelset/deform/control_lattice.h"
-#include "levelset/deform/lattice_certificate.h"
+#include "levelset/deform/deformation.h"
 #include "levelset/mesh.h"
 #include "levelset/points/point_cloud.h"
 #include "levelset/progress.h"
@@ -21,7 +20,7 @@ struct DeformMeshOptions {
 
 struct DeformMeshResult {
   TriMesh mesh;
-  LatticeCertificate certificate;
+  FoldCertificate certificate;
   std::size_t halvedEdges = 0;
   /// Largest distance, at a quarter, the middle and three quarters of the edges of the result,
   /// between the edge and the deformed undeformed edge, world units. Inside a triangle it is at
@@ -32,30 +31,33 @@ struct DeformMeshResult {
 /// Deforms a mesh. Triangles are divided where the map bends their edges by more than the
 /// tolerance. The decision for an edge depends on the positions of its ends alone, so triangles on
 /// both sides are divided alike, also along seams: there are no cracks. Normals transform by the
-/// inverse transpose of the Jacobian; other attributes are interpolated. An identity lattice
+/// inverse transpose of the Jacobian; other attributes are interpolated. An identity
 /// returns the mesh itself.
-/// @throws InvalidInput for a lattice that is not proven to be injective, a vertex outside its box,
-///         or attributes that do not fit
+/// @throws InvalidInput for a map that is not proven to be injective, a vertex where it is not
+///         defined, or attributes that do not fit
 /// @throws UsageError for a tolerance that is negative or not finite
 /// @throws ResourceLimit if the divided mesh exceeds the memory
-[[nodiscard]] DeformMeshResult deformMesh(const TriMesh& mesh, const ControlLattice& lattice,
+[[nodiscard]] DeformMeshResult deformMesh(const TriMesh& mesh, const Deformation& deformation,
                                           const DeformMeshOptions& options = {});
+[[nodiscard]] inline DeformMeshResult deformMesh(const TriMesh& mesh, const ControlLattice& lattice,
+                                                 const DeformMeshOptions& options = {}) {
+  return deformMesh(mesh, LatticeDeformation(lattice), options);
+}
 
 struct DeformPointsResult {
   PointCloud cloud;
-  LatticeCertificate certificate;
+  FoldCertificate certificate;
 };
 
 /// Deforms a point cloud. Normals transform by the inverse transpose of the Jacobian, radii by the
 /// cube root of its determinant; colours and weights stay.
 /// @throws InvalidInput as deformMesh()
-[[nodiscard]] DeformPointsResult deformPoints(PointCloud cloud, const ControlLattice& lattice,
+[[nodiscard]] DeformPointsResult deformPoints(PointCloud cloud, const Deformation& deformation,
                                               const Progress& progress = {});
-
-/// Refuses points outside the box of a lattice.
-/// @param what  a point in words: "vertex"
-/// @throws InvalidInput
-void requireInside(const ControlLattice& lattice, const std::vector<Imath::V3d>& points,
-                   const char* what);
+[[nodiscard]] inline DeformPointsResult deformPoints(PointCloud cloud,
+                                                     const ControlLattice& lattice,
+                                                     const Progress& progress = {}) {
+  return deformPoints(std::move(cloud), LatticeDeformation(lattice), progress);
+}
 
 }  // namespace levelset

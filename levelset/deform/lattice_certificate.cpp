@@ -1,6 +1,5 @@
 #include "levelset/deform/lattice_certificate.h"
 
-#include <fmt/core.h>
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Dense>
@@ -15,7 +14,6 @@
 #include <utility>
 #include <vector>
 
-#include "levelset/error.h"
 #include "levelset/mesh_sign/self_intersections.h"
 
 namespace levelset {
@@ -295,7 +293,7 @@ std::array<int, 3> faceSegments(const ControlLattice& lattice) {
   return segments;
 }
 
-void testFaces(const ControlLattice& lattice, LatticeCertificate& certificate,
+void testFaces(const ControlLattice& lattice, FoldCertificate& certificate,
                const Progress& progress) {
   const std::array<int, 3> n = faceSegments(lattice);
   std::vector<V3d> positions;
@@ -337,26 +335,10 @@ void testFaces(const ControlLattice& lattice, LatticeCertificate& certificate,
   certificate.overlapPlace = (positions[first[0]] + positions[first[1]] + positions[first[2]]) / 3;
 }
 
-std::string placeText(const V3d& p) {
-  return fmt::format("({:.4g}, {:.4g}, {:.4g})", p.x, p.y, p.z);
-}
-
 }  // namespace
 
-const char* latticeVerdictName(LatticeVerdict verdict) {
-  switch (verdict) {
-    case LatticeVerdict::Certified:
-      return "certified";
-    case LatticeVerdict::Folds:
-      return "folds";
-    case LatticeVerdict::Undecided:
-      break;
-  }
-  return "undecided";
-}
-
-LatticeCertificate certifyLattice(const ControlLattice& lattice,
-                                  const LatticeCertificateOptions& options) {
+FoldCertificate certifyLattice(const ControlLattice& lattice,
+                               const LatticeCertificateOptions& options) {
   const JacobianBounds bounds(lattice);
   report(options.progress, 0);
   // Quick bounds of all pieces decide most of them. With weights there are none.
@@ -385,7 +367,7 @@ LatticeCertificate certifyLattice(const ControlLattice& lattice,
   std::vector<std::size_t> open;
   for (std::size_t n = 0; n < all.size(); ++n)
     if (!hasCoarse || !(all[n].low > 0) || !goal(all[n].low, reference)) open.push_back(n);
-  LatticeCertificate certificate{.pieces = all.size(), .boxes = all.size()};
+  FoldCertificate certificate{.pieces = all.size(), .boxes = all.size()};
   if (bounds.isAffordable()) {
     inParallel(open.size(), [&](std::size_t n) {
       all[open[n]] = JacobianBounds::boundsOf(bounds.partOf(open[n]));
@@ -431,36 +413,12 @@ LatticeCertificate certifyLattice(const ControlLattice& lattice,
   certificate.leastLow = std::min(settled, queue.empty() ? settled : queue.top().bounds.low);
   certificate.leastHigh = best.high;
   certificate.place = lattice.worldOf(best.place);
-  certificate.verdict = best.high <= 0             ? LatticeVerdict::Folds
-                        : certificate.leastLow > 0 ? LatticeVerdict::Certified
-                                                   : LatticeVerdict::Undecided;
+  certificate.verdict = best.high <= 0             ? FoldVerdict::Folds
+                        : certificate.leastLow > 0 ? FoldVerdict::Certified
+                                                   : FoldVerdict::Undecided;
   testFaces(lattice, certificate, subProgress(options.progress, 0.8, 1));
   report(options.progress, 1);
   return certificate;
-}
-
-std::string describe(const LatticeCertificate& certificate) {
-  return fmt::format("least Jacobian {:.4g} to {:.4g} at {}: {}{}", certificate.leastLow,
-                     certificate.leastHigh, placeText(certificate.place),
-                     latticeVerdictName(certificate.verdict),
-                     certificate.overlaps ? ", but the deformed box overlaps itself" : "");
-}
-
-void requireInjective(const LatticeCertificate& certificate) {
-  if (certificate.verdict == LatticeVerdict::Folds)
-    throw InvalidInput(fmt::format(
-        "the lattice folds: its Jacobian is {:.3g} at {}; deform less, or use a smaller box",
-        certificate.leastHigh, placeText(certificate.place)));
-  if (certificate.verdict == LatticeVerdict::Undecided)
-    throw InvalidInput(fmt::format(
-        "the least Jacobian of the lattice is between {:.3g} and {:.3g}, near {}, so a fold is not "
-        "excluded; deform less, or use lower degrees",
-        certificate.leastLow, certificate.leastHigh, placeText(certificate.place)));
-  if (certificate.overlaps)
-    throw InvalidInput(
-        fmt::format("the deformed box of the lattice overlaps itself near {}; deform less, or use "
-                    "a smaller box",
-                    placeText(certificate.overlapPlace)));
 }
 
 }  // namespace levelset

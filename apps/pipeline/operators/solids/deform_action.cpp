@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -13,11 +14,15 @@
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/json_output.h"
 #include "apps/pipeline/registry/invocation.h"
+#include "levelset/deform/cage/cage.h"
 #include "levelset/deform/deform_band.h"
 #include "levelset/deform/deform_mesh.h"
 #include "levelset/deform/lattice_file.h"
 #include "levelset/deform/ready_lattices.h"
+#include "levelset/deform/untangle/untangle.h"
 #include "levelset/error.h"
+#include "levelset/mesh_files/mesh_file.h"
+#include "levelset/meshing/band_to_mesh.h"
 
 namespace pipeline {
 namespace {
@@ -28,7 +33,8 @@ using levelset::ReadyLattice;
 using levelset::UsageError;
 
 /// Options of which each deformation has exactly one.
-const std::vector<std::string> kDeformations = {"bend", "twist", "taper", "stretch", "lattice"};
+const std::vector<std::string> kDeformations = {"bend",    "twist",   "taper",
+                                                "stretch", "lattice", "cage"};
 /// Tolerance of bent and twisted lattices, and default of --tolerance, over the diagonal of the
 /// box.
 constexpr double kClosedFormTolerance = 1e-8, kMeshTolerance = 1e-4;
@@ -47,8 +53,8 @@ std::string deformationOf(const Invocation& in) {
   }
   if (given.empty())
     throw UsageError(
-        "deform: the deformation is missing; give --bend, --twist, --taper, --stretch or "
-        "--lattice");
+        "deform: the deformation is missing; give --bend, --twist, --taper, --stretch, --lattice "
+        "or --cage");
   return given;
 }
 
@@ -83,6 +89,14 @@ std::vector<V3d> cornersOf(const Imath::Box3d& box) {
   return corners;
 }
 
+/// A deformation of the options, and its largest distance from a closed form.
+struct ChosenDeformation {
+  std::shared_ptr<const levelset::Deformation> map;
+  double error = 0;
+  std::size_t controlPoints = 0;
+  std::optional<levelset::UntangleReport> untangled = {};
+};
+
 /// Builds the lattice of the options around points, or reads it.
 ReadyLattice latticeFor(Invocation& in, bool isPlan) {
   const std::string kind = deformationOf(in);
@@ -101,8 +115,55 @@ ReadyLattice latticeFor(Invocation& in, bool isPlan) {
   return levelset::stretchLattice(box, in.number("stretch"));
 }
 
-Json certificateJson(const levelset::LatticeCertificate& certificate) {
-  return {{"verdict", levelset::latticeVerdictName(certificate.verdict)},
+/// Reads a cage mesh, without attributes, so that vertices are not doubled along seams.
+levelset::TriMesh cageMesh(const Invocation& in, const char* option) {
+  return levelset::readMesh(in.text(option), {.attributes = false, .maxMemory = in.maxMemory});
+}
+
+/// Removes the folds of a cage in the operand.
+levelset::UntangledCage untangledCage(const levelset::CageDeformation& cage, Invocation& in) {
+  const levelset::UntangleOptions options{.progress = levelset::subProgress(in.progress, 0, 0.4)};
+  if (in.operands[0].kind() == Kind::Mesh)
+    return levelset::untangled(cage, {in.mesh().positions, in.mesh().triangles}, options);
+  const levelset::TriMesh surface = levelset::bandToMesh(in.band());
+  const double voxelSize = in.given("voxel") ? in.length("voxel") : in.band().voxelSize();
+  return levelset::untangled(
+      cage, {surface.positions, surface.triangles, levelset::kWidestDeformationDomain * voxelSize},
+      options);
+}
+
+ChosenDeformation deformationFor(Invocation& in, bool isPlan) {
+  const bool isUntangled = in.flag("untangle") && !isPlan;
+  ChosenDeformation chosen;
+  if (in.given("cage")) {
+    const auto coordinates = in.text("coordinates") == "green"
+                                 ? levelset::CageCoordinates::Green
+                                 : levelset::CageCoordinates::MeanValue;
+    levelset::CageDeformation cage(cageMesh(in, "cage"), cageMesh(in, "to"), coordinates);
+    chosen.controlPoints = cage.rest().size();
+    if (isUntangled) {
+      levelset::UntangledCage result = untangledCage(cage, in);
+      cage = result.cage;
+      chosen.untangled = result.report;
+    }
+    chosen.map = std::make_shared<levelset::CageDeformation>(std::move(cage));
+    return chosen;
+  }
+  ReadyLattice ready = latticeFor(in, isPlan);
+  chosen.controlPoints = ready.lattice.data().points.size();
+  chosen.error = ready.error;
+  if (isUntangled) {
+    levelset::UntangledLattice result = levelset::untangled(
+        ready.lattice, {.progress = levelset::subProgress(in.progress, 0, 0.4)});
+    ready.lattice = result.lattice;
+    chosen.untangled = result.report;
+  }
+  chosen.map = std::make_shared<levelset::LatticeDeformation>(std::move(ready.lattice));
+  return chosen;
+}
+
+Json certificateJson(const levelset::FoldCertificate& certificate) {
+  return {{"verdict", levelset::foldVerdictName(certificate.verdict)},
           {"least_jacobian_low", certificate.leastLow},
           {"least_jacobian_high", certificate.leastHigh},
           {"least_jacobian_at", {certificate.place.x, certificate.place.y, certificate.place.z}},
@@ -112,13 +173,26 @@ Json certificateJson(const levelset::LatticeCertificate& certificate) {
 }
 
 Value runDeform(Invocation& in) {
-  const ReadyLattice ready = latticeFor(in, /*isPlan=*/false);
-  Json details = {{"lattice_error", ready.error},
-                  {"control_points", ready.lattice.data().points.size()}};
-  if (ready.error > 0)
+  const ChosenDeformation chosen = deformationFor(in, /*isPlan=*/false);
+  const levelset::Deformation& map = *chosen.map;
+  Json details = {{"control_points", chosen.controlPoints}};
+  if (!in.given("cage")) details["lattice_error"] = chosen.error;
+  if (chosen.error > 0)
     in.notes.errors.push_back(
-        {"distance of the lattice from the closed form", ready.error, "world units"});
-  const auto finish = [&](const levelset::LatticeCertificate& certificate, Value value) {
+        {"distance of the lattice from the closed form", chosen.error, "world units"});
+  if (chosen.untangled) {
+    const levelset::UntangleReport& report = *chosen.untangled;
+    details["untangle"] = {{"moved_points", report.movedPoints},
+                           {"largest_move", report.largestMove},
+                           {"root_mean_square_move", report.rootMeanSquareMove},
+                           {"certificates", report.rounds}};
+    in.notes.notes.push_back(
+        fmt::format("untangling moved {} of {} control points, by at most {:.4g}",
+                    report.movedPoints, chosen.controlPoints, report.largestMove));
+  }
+  const levelset::Progress progress =
+      chosen.untangled ? levelset::subProgress(in.progress, 0.4, 1) : in.progress;
+  const auto finish = [&](const levelset::FoldCertificate& certificate, Value value) {
     details["certificate"] = certificateJson(certificate);
     in.notes.notes.push_back(levelset::describe(certificate));
     in.notes.detailsJson = details.dump();
@@ -127,16 +201,16 @@ Value runDeform(Invocation& in) {
   switch (in.operands[0].kind()) {
     case Kind::Points: {
       levelset::DeformPointsResult result =
-          levelset::deformPoints(in.operands[0].cloud(), ready.lattice, in.progress);
+          levelset::deformPoints(in.operands[0].cloud(), map, progress);
       return finish(result.certificate, Value(std::move(result.cloud)));
     }
     case Kind::Mesh: {
-      const double diagonal = ready.lattice.bounds().size().length();
+      const double diagonal = map.bounds().size().length();
       levelset::DeformMeshResult result = levelset::deformMesh(
-          in.mesh(), ready.lattice,
+          in.mesh(), map,
           {.tolerance = in.given("tolerance") ? in.length("tolerance") : kMeshTolerance * diagonal,
            .maxMemory = in.maxMemory,
-           .progress = in.progress});
+           .progress = progress});
       details["halved_edges"] = result.halvedEdges;
       details["bend"] = result.bend;
       in.notes.errors.push_back(
@@ -144,10 +218,10 @@ Value runDeform(Invocation& in) {
       return finish(result.certificate, Value(std::move(result.mesh)));
     }
     default: {
-      levelset::DeformBandOptions options{.maxMemory = in.maxMemory, .progress = in.progress};
+      levelset::DeformBandOptions options{.maxMemory = in.maxMemory, .progress = progress};
       if (in.given("voxel")) options.voxelSize = in.length("voxel");
       if (in.given("half-width")) options.halfWidth = in.number("half-width");
-      levelset::DeformBandResult result = levelset::deformBand(in.band(), ready.lattice, options);
+      levelset::DeformBandResult result = levelset::deformBand(in.band(), map, options);
       return finish(result.certificate, Value(std::move(result.band)));
     }
   }
@@ -161,9 +235,9 @@ double areaOf(const Imath::Box3d& box) {
 Plan planDeform(Invocation& in) {
   Plan plan = in.operands[0].plan();
   if (plan.bounds.isEmpty()) return plan;
-  const ReadyLattice ready = latticeFor(in, /*isPlan=*/true);
+  const ChosenDeformation chosen = deformationFor(in, /*isPlan=*/true);
   const double before = areaOf(plan.bounds);
-  plan.bounds = ready.lattice.bounds();
+  plan.bounds = chosen.map->bounds();
   if (plan.kind == Kind::Band) {
     if (in.given("voxel")) plan.voxelSize = in.length("voxel");
     if (in.given("half-width")) plan.halfWidth = in.number("half-width");
@@ -180,14 +254,26 @@ Plan planDeform(Invocation& in) {
 
 void validateDeform(const Invocation& in) {
   const std::string kind = deformationOf(in);
-  if (kind == "lattice")
+  if (kind == "lattice" || kind == "cage")
     for (const char* name : {"axis", "towards"})
       if (in.given(name))
-        throw UsageError(fmt::format(
-            "deform: --{} does not apply to --lattice, whose file has a box; leave it out", name));
+        throw UsageError(
+            fmt::format("deform: --{} does not apply to --{}, whose file has a place; leave it out",
+                        name, kind));
+  if (kind == "cage" && !in.given("to"))
+    throw UsageError("deform: --to is missing; give the mesh file of the moved cage");
+  for (const char* name : {"to", "coordinates"})
+    if (in.given(name) && kind != "cage")
+      throw UsageError(
+          fmt::format("deform: --{} is for --cage, but --{} is given; leave it out", name, kind));
   if (in.given("towards") && kind != "bend")
     throw UsageError(
         fmt::format("deform: --towards is for --bend, but --{} is given; leave it out", kind));
+  if (in.given("untangle") && kind == "cage" && !in.operands.empty() &&
+      in.operands[0].kind() == Kind::Points)
+    throw UsageError(
+        "deform: --untangle of a cage needs a surface, but the operand is a point cloud; leave it "
+        "out");
   (void)levelset::directionsAlong(in.point("axis"),
                                   in.given("towards") ? in.point("towards") : V3d(0));
   if (in.operands.empty()) return;
@@ -210,12 +296,17 @@ Operator deformOperator() {
   return {
       .name = "deform",
       .group = "Placement",
-      .summary = "bend, twist, taper or stretch a solid, a mesh or a point cloud",
+      .summary =
+          "bend, twist, taper or stretch a solid, a mesh or a point cloud, or move it by a cage",
       .details =
           "The deformation is a lattice of control points around the operand: a trivariate Bézier "
           "or B-spline volume. --lattice reads one, of any degree up to 20, from a JSON file. A "
           "lattice that folds, or whose deformed box overlaps itself, is refused; the report has "
-          "the least Jacobian. A level set gets exact distances again. Triangles are divided where "
+          "the least Jacobian. --cage and --to read a closed mesh around the operand, at rest and "
+          "with moved vertices. A cage that folds somewhere in the operand is refused too. "
+          "--untangle removes folds, and the report has the distances of the control points. A "
+          "level "
+          "set gets exact distances again. Triangles are divided where "
           "the deformation bends them. The middle of the operand stays in its place; --taper "
           "leaves the cross-section at the begin of the axis as it is.",
       .example =
@@ -237,6 +328,22 @@ Operator deformOperator() {
             .doc = "scale factor along the axis",
             .range = Range::Positive},
            {.name = "lattice", .type = ParamType::Path, .doc = "JSON file of a lattice"},
+           {.name = "cage",
+            .type = ParamType::Path,
+            .doc = "mesh file of a closed cage around the operand, at rest"},
+           {.name = "to",
+            .type = ParamType::Path,
+            .doc = "mesh file of the moved cage, with the same triangles"},
+           {.name = "coordinates",
+            .type = ParamType::Choice,
+            .doc = "coordinates of a cage: mean-value follows its faces and keeps affine maps; "
+                   "green also turns with them, and distorts less",
+            .fallback = "mean-value",
+            .choices = {"mean-value", "green"}},
+           {.name = "untangle",
+            .type = ParamType::Flag,
+            .doc = "move the control points of a deformation that folds by little, until it does "
+                   "not"},
            {.name = "axis",
             .type = ParamType::Point,
             .doc = "direction of the axis; it passes through the middle of the operand",

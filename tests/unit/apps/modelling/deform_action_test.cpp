@@ -88,6 +88,52 @@ TEST_F(DeformAction, ReadsLatticeFiles) {
   expectRefusal("sphere --radius 1 --voxel 0.1 ! deform --lattice none.json", 6, "none.json");
 }
 
+TEST_F(DeformAction, MovesByCages) {
+  const auto writeCage = [&](const std::string& name, double scale) {
+    std::string text = "OFF\n8 12 0\n";
+    for (const double z : {-3.0, 3.0})
+      for (const double y : {-3.0, 3.0})
+        for (const double x : {-3.0, 3.0})
+          text +=
+              std::to_string(x) + " " + std::to_string(y) + " " + std::to_string(scale * z) + "\n";
+    for (const char* t : {"0 2 1", "1 2 3", "4 5 6", "5 7 6", "0 1 4", "1 5 4", "2 6 3", "3 6 7",
+                          "0 4 2", "2 4 6", "1 3 5", "3 7 5"})
+      text += std::string("3 ") + t + "\n";
+    writeFile(name, text);
+  };
+  writeCage("rest.off", 1);
+  writeCage("long.off", 1.5);
+  writeCage("turned.off", -0.5);
+  const std::string ball = "sphere --radius 1 --voxel 0.1 ! ";
+  const Json bounds =
+      json(ball + "deform --cage rest.off --to long.off ! measure --json")["bounds"]["max"];
+  EXPECT_NEAR(bounds[2].get<double>(), 1.5, 0.01);
+  EXPECT_NEAR(bounds[0].get<double>(), 1, 0.01);
+  const Json mesh = json(
+      ball + "mesh ! deform --cage rest.off --to long.off --coordinates green ! measure --json");
+  EXPECT_GT(mesh["bounds"]["max"][2].get<double>(), 1.2);
+  expectRefusal(ball + "deform --cage rest.off --to turned.off", 3, "the cage folds");
+  expectRefusal(ball + "deform --cage rest.off", 2, "--to is missing");
+  expectRefusal(ball + "deform --bend 10 --to long.off", 2, "--to is for --cage");
+  expectRefusal(ball + "deform --bend 10 --coordinates green", 2, "--coordinates is for --cage");
+  expectRefusal("sphere --radius 3.2 --voxel 0.2 ! deform --cage rest.off --to long.off", 3,
+                "leaves it near");
+}
+
+TEST_F(DeformAction, Untangles) {
+  const std::string chain = "sphere --radius 1 --voxel 0.1 ! deform --bend 170";
+  expectRefusal(chain, 3, "folds");
+  const support::Outcome run =
+      levelsmith("--report report.json " + chain + " --untangle ! measure");
+  ASSERT_EQ(run.code, 0) << run.err;
+  const Json report = Json::parse(support::readText(folder_ / "report.json"));
+  Json details;
+  for (const Json& step : report["steps"])
+    if (step["action"] == "deform") details = step["details"];
+  EXPECT_EQ(details["certificate"]["verdict"], "certified");
+  EXPECT_GT(details["untangle"]["largest_move"].get<double>(), 0);
+}
+
 TEST_F(DeformAction, PlansAndReports) {
   const support::Outcome plan =
       levelsmith("--dry-run " + std::string(kCapsule) + "deform --bend 80 ! measure");
@@ -111,7 +157,7 @@ TEST_F(DeformAction, RefusesFoldsAndOptionsThatExcludeEachOther) {
   const std::string ball = "sphere --radius 1 --voxel 0.1 ! ";
   expectRefusal(ball + "deform --bend 170", 3, "folds");
   expectRefusal("box --size 0.5,0.5,10 --voxel 0.1 ! deform --bend 400", 3, "overlaps itself");
-  expectRefusal(ball + "deform", 2, "--bend, --twist, --taper, --stretch or --lattice");
+  expectRefusal(ball + "deform", 2, "--bend, --twist, --taper, --stretch, --lattice or --cage");
   expectRefusal(ball + "deform --bend 10 --twist 10", 2, "exclude each other");
   expectRefusal(ball + "deform --twist 10 --towards 1,0,0", 2, "--towards is for --bend");
   expectRefusal(ball + "deform --bend 10 --towards 0,0,1", 2, "parallel to the axis");

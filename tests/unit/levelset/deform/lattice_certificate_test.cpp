@@ -43,9 +43,9 @@ double leastSample(const ControlLattice& lattice, int count) {
 TEST(LatticeCertificate, BracketsTheJacobianOfABend) {
   const OrientedBox box{V3d(0), directionsAlong(V3d(0, 0, 1), V3d(1, 0, 0)), V3d(0.5, 0.3, 2)};
   for (const double angle : {0.5, 1.5, 3.0}) {
-    const LatticeCertificate found = certifyLattice(bendLattice(box, angle, 1e-9).lattice);
+    const FoldCertificate found = certifyLattice(bendLattice(box, angle, 1e-9).lattice);
     const double least = 1 - angle * 0.5 / 4;
-    EXPECT_EQ(found.verdict, LatticeVerdict::Certified);
+    EXPECT_EQ(found.verdict, FoldVerdict::Certified);
     EXPECT_FALSE(found.overlaps);
     EXPECT_LT(found.leastLow, least + 1e-6);
     EXPECT_NEAR(found.leastHigh, least, 1e-6);
@@ -62,14 +62,14 @@ TEST(LatticeCertificate, BracketsHoldForShakenLattices) {
     for (const double by : {0.02, 0.1, 0.2}) {
       const ControlLattice lattice =
           shaken({uniformAxis(2, 4), uniformAxis(3, 4), uniformAxis(1, 3)}, by, hasWeights);
-      const LatticeCertificate found = certifyLattice(lattice);
+      const FoldCertificate found = certifyLattice(lattice);
       const double sampled = leastSample(lattice, 24);
       EXPECT_LE(found.leastLow, sampled) << by;
       EXPECT_LE(found.leastHigh, sampled + 0.01 * std::abs(sampled)) << by;
       EXPECT_LE(found.leastLow, found.leastHigh);
       EXPECT_GT(found.leastLow, found.leastHigh - 0.011 * std::max(std::abs(found.leastHigh), 1.0));
-      EXPECT_NE(found.verdict, LatticeVerdict::Undecided);
-      EXPECT_EQ(found.verdict == LatticeVerdict::Folds, found.leastHigh <= 0);
+      EXPECT_NE(found.verdict, FoldVerdict::Undecided);
+      EXPECT_EQ(found.verdict == FoldVerdict::Folds, found.leastHigh <= 0);
       EXPECT_NEAR(lattice.jet(found.place).determinant(), found.leastHigh, 1e-9);
     }
 }
@@ -83,16 +83,16 @@ TEST(LatticeCertificate, FindsFoldsBetweenSamples) {
   // 1/2.
   const double x[4] = {0, 1, -0.001, 0.999};
   for (std::size_t n = 0; n < 16; ++n) data.points[n].x = x[n / 4];
-  const LatticeCertificate found = certifyLattice(ControlLattice(data));
-  EXPECT_EQ(found.verdict, LatticeVerdict::Folds);
+  const FoldCertificate found = certifyLattice(ControlLattice(data));
+  EXPECT_EQ(found.verdict, FoldVerdict::Folds);
   EXPECT_LT(found.leastHigh, 0);
   EXPECT_NEAR(found.place.x, 0, 0.05);
   EXPECT_THROW(requireInjective(found), InvalidInput);
   // With −0.99 it is just positive.
   const double y[4] = {0, 1, 0.01, 1.01};
   for (std::size_t n = 0; n < 16; ++n) data.points[n].x = y[n / 4];
-  const LatticeCertificate positive = certifyLattice(ControlLattice(data));
-  EXPECT_EQ(positive.verdict, LatticeVerdict::Certified);
+  const FoldCertificate positive = certifyLattice(ControlLattice(data));
+  EXPECT_EQ(positive.verdict, FoldVerdict::Certified);
   EXPECT_NEAR(positive.leastHigh, 1.5 * 0.01 / 2, 0.001);
 }
 
@@ -101,16 +101,16 @@ TEST(LatticeCertificate, ACollapsedLatticeFolds) {
       identityLattice({uniformAxis(2, 3), uniformAxis(2, 3), uniformAxis(2, 3)}, frameOf(kBox))
           .data();
   for (V3d& p : data.points) p.z = 0;
-  EXPECT_EQ(certifyLattice(ControlLattice(data)).verdict, LatticeVerdict::Folds);
+  EXPECT_EQ(certifyLattice(ControlLattice(data)).verdict, FoldVerdict::Folds);
 }
 
 TEST(LatticeCertificate, FindsOverlapsThatDoNotFold) {
   // A bar bent by more than a full turn penetrates itself, and its Jacobian is positive.
   const OrientedBox box{V3d(0), directionsAlong(V3d(0, 0, 1), V3d(1, 0, 0)), V3d(0.3, 0.3, 5)};
-  const LatticeCertificate open = certifyLattice(bendLattice(box, 6, 1e-6).lattice);
+  const FoldCertificate open = certifyLattice(bendLattice(box, 6, 1e-6).lattice);
   EXPECT_TRUE(open.isInjective());
-  const LatticeCertificate closed = certifyLattice(bendLattice(box, 7, 1e-6).lattice);
-  EXPECT_EQ(closed.verdict, LatticeVerdict::Certified);
+  const FoldCertificate closed = certifyLattice(bendLattice(box, 7, 1e-6).lattice);
+  EXPECT_EQ(closed.verdict, FoldVerdict::Certified);
   EXPECT_TRUE(closed.overlaps);
   EXPECT_THROW(requireInjective(closed), InvalidInput);
 }
@@ -119,7 +119,7 @@ TEST(LatticeCertificate, IsTheSameForAnyNumberOfThreads) {
   const ControlLattice lattice =
       shaken({uniformAxis(3, 8), uniformAxis(3, 8), uniformAxis(2, 8)}, 0.02, false);
   const auto figures = [&] {
-    const LatticeCertificate c = certifyLattice(lattice);
+    const FoldCertificate c = certifyLattice(lattice);
     return std::tuple(c.leastLow, c.leastHigh, c.place.x, c.boxes);
   };
   EXPECT_EQ(support::onThreads(1, figures), support::onThreads(4, figures));
@@ -129,11 +129,11 @@ TEST(LatticeCertificate, CertifiesHighDegreesAndManyPieces) {
   EXPECT_EQ(certifyLattice(
                 shaken({uniformAxis(20, 21), uniformAxis(2, 3), uniformAxis(2, 3)}, 0.01, false))
                 .verdict,
-            LatticeVerdict::Certified);
-  const LatticeCertificate many = certifyLattice(
+            FoldVerdict::Certified);
+  const FoldCertificate many = certifyLattice(
       identityLattice({uniformAxis(3, 40), uniformAxis(3, 40), uniformAxis(3, 40)}, frameOf(kBox)));
   EXPECT_EQ(many.pieces, 37u * 37u * 37u);
-  EXPECT_EQ(many.verdict, LatticeVerdict::Certified);
+  EXPECT_EQ(many.verdict, FoldVerdict::Certified);
 }
 
 }  // namespace lattice_certificate_test

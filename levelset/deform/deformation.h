@@ -1,0 +1,84 @@
+#pragma once
+
+#include <Imath/ImathBox.h>
+#include <Imath/ImathVec.h>
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "levelset/deform/control_lattice.h"
+#include "levelset/deform/fold_certificate.h"
+#include "levelset/progress.h"
+
+namespace levelset {
+
+/// The part of space for which a deformation is certified: all points within `margin` of a surface,
+/// and all points that the surface encloses. Without triangles: the points alone.
+struct DeformationDomain {
+  const std::vector<Imath::V3d>& points;
+  const std::vector<std::array<std::uint32_t, 3>>& triangles;
+  double margin = 0;  ///< world units
+};
+
+/// Inverse of a deformation that is injective in its domain. Read-only, so threads may share it.
+class DeformationInverse {
+ public:
+  virtual ~DeformationInverse() = default;
+  /// Finds the point of the domain that is moved to a position.
+  /// @param guess  a point whose image is near the position
+  /// @return nullopt: no point of the domain is moved there. A lattice may return a point outside
+  ///         its box, where it continues linearly.
+  [[nodiscard]] virtual std::optional<Imath::V3d> near(const Imath::V3d& position,
+                                                       const Imath::V3d& guess) const = 0;
+};
+
+/// Result of the certification of a deformation.
+struct CertifiedDeformation {
+  FoldCertificate certificate;
+  /// Null unless the certificate proves that the map is injective.
+  std::shared_ptr<const DeformationInverse> inverse = {};
+};
+
+/// A map of space that moves solids, meshes and points. Immutable.
+class Deformation {
+ public:
+  virtual ~Deformation() = default;
+  [[nodiscard]] virtual DeformationJet jet(const Imath::V3d& world) const = 0;
+  [[nodiscard]] Imath::V3d at(const Imath::V3d& world) const { return jet(world).position; }
+  /// Returns true if the map leaves every point in its place.
+  [[nodiscard]] virtual bool isIdentity() const = 0;
+  /// Bounds of the deformed control points.
+  [[nodiscard]] virtual Imath::Box3d bounds() const = 0;
+  /// Refuses points where the map is not defined.
+  /// @param what  a point in words: "vertex"
+  /// @throws InvalidInput
+  virtual void requireDefined(const std::vector<Imath::V3d>& points, const char* what) const = 0;
+  /// Bounds the Jacobian over a domain. It does not refuse folds, see requireInjective().
+  /// @throws Cancelled
+  [[nodiscard]] virtual CertifiedDeformation certify(const DeformationDomain& domain,
+                                                     const Progress& progress = {}) const = 0;
+};
+
+/// A lattice as a deformation. Its certificate covers the entire box.
+class LatticeDeformation final : public Deformation {
+ public:
+  explicit LatticeDeformation(ControlLattice lattice) : lattice_(std::move(lattice)) {}
+
+  [[nodiscard]] const ControlLattice& lattice() const { return lattice_; }
+  [[nodiscard]] DeformationJet jet(const Imath::V3d& world) const override {
+    return lattice_.jet(world);
+  }
+  [[nodiscard]] bool isIdentity() const override { return lattice_.isIdentity(); }
+  [[nodiscard]] Imath::Box3d bounds() const override { return lattice_.bounds(); }
+  void requireDefined(const std::vector<Imath::V3d>& points, const char* what) const override;
+  [[nodiscard]] CertifiedDeformation certify(const DeformationDomain& domain,
+                                             const Progress& progress = {}) const override;
+
+ private:
+  ControlLattice lattice_;
+};
+
+}  // namespace levelset
