@@ -23,7 +23,7 @@ using Imath::V3d;
 constexpr double kFaceTolerance = 1e-9;
 // Newton's method has converged when its step is below this share of the edge: the next step, of
 // second order, is below rounding.
-constexpr double kLastStep = 1e-9;
+constexpr double kLastStep = 1e-8;
 constexpr int kMostSteps = 24;
 // Roots of one patch closer than this in its parameters are one. Newton's method gives the same
 // root to 1e-12.
@@ -121,7 +121,9 @@ template <int N>
 class TreeWalk {
  public:
   TreeWalk(const TreeContext& context, RayGroup& rays, TreeCounts& counts)
-      : context_(context), rays_(rays), counts_(counts), levels_(kDeepestLevel + 1) {}
+      : context_(context), rays_(rays), counts_(counts), levels_(ownLevels()) {
+    if (levels_.empty()) levels_.resize(kDeepestLevel + 1);
+  }
 
   void visit(const TreeNode& node, const std::vector<std::uint32_t>& asked, std::size_t depth) {
     std::vector<std::uint32_t>& rest = levels_[depth].rest;
@@ -180,6 +182,11 @@ class TreeWalk {
     std::array<TreeNode, 8> children;
     std::vector<std::uint32_t> rest;  ///< rays that the node at this depth has not decided
   };
+  /// Memory that the walks of a thread use one after the other.
+  static std::vector<Level>& ownLevels() {
+    thread_local std::vector<Level> levels;
+    return levels;
+  }
 
   /// Keeps the rays whose position is in the boxes of a node, and that may have a nearer root.
   void overlap(const TreeNode& node, const std::vector<std::uint32_t>& asked,
@@ -370,12 +377,11 @@ class TreeWalk {
   const TreeContext& context_;
   RayGroup& rays_;
   TreeCounts& counts_;
-  std::vector<Level> levels_;
+  std::vector<Level>& levels_;
   std::vector<double> scratch_;
 };
 
-/// Nodes that are split in advance, so that tiles share them.
-constexpr int kMostSharedLevels = 8;
+/// Number of nodes that are split in advance at most.
 constexpr std::size_t kMostSharedNodes = 200'000;
 
 std::size_t bytesOf(const TreeNode& node) {
@@ -383,8 +389,9 @@ std::size_t bytesOf(const TreeNode& node) {
 }
 
 /// True for a node that must be split before it is given to tiles.
-bool isLarge(const TreeNode& node, const V2d& extent) {
-  if (node.level >= kMostSharedLevels || node.isUnique) return false;
+bool isLarge(const TreeNode& node, const V2d& extent, const TreeOptions& options) {
+  if (node.level < options.uniformLevels) return true;
+  if (node.level >= options.sharedLevels || node.isUnique) return false;
   return node.crossesEye || node.right - node.left > extent.x || node.bottom - node.top > extent.y;
 }
 
@@ -439,7 +446,7 @@ class SharedTree::Data {
     while (!open.empty()) {
       std::vector<TreeNode> large;
       for (TreeNode& node : open)
-        (frame.x > 0 && isLarge(node, extent) ? large : nodes_).push_back(std::move(node));
+        (frame.x > 0 && isLarge(node, extent, options) ? large : nodes_).push_back(std::move(node));
       if (large.empty()) break;
       if (large.size() + nodes_.size() > kMostSharedNodes) {
         std::move(large.begin(), large.end(), std::back_inserter(nodes_));

@@ -54,6 +54,10 @@ struct TreeOptions {
   bool measureTime = false;
   /// Nodes are shared by the rays of one tile of this edge, in pixels.
   int tile = 32;
+  /// Levels that are split before the tiles begin, where nodes are larger than a tile. With 0, and
+  /// a tile of one pixel, each ray has its own tree: the basic scheme of [Liu14].
+  int sharedLevels = 8;
+  int uniformLevels = 0;  ///< levels that are split everywhere, as in pre-subdivision [Liu14]
   std::size_t maxBytes = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};
 };
@@ -61,7 +65,7 @@ struct TreeOptions {
 /// A ray gives up after this number of undecided nodes, as when it lies in the surface.
 inline constexpr std::size_t kMostVisits = 20'000;
 
-/// The shared tree of a volume for one view. Methods may run concurrently.
+/// The shared tree of a volume for one view. It refers to the volume. Methods may run concurrently.
 class SharedTree {
  public:
   /// Splits the patches until they are no larger than a tile or have at most one root for each ray.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 namespace render {
@@ -86,6 +87,64 @@ struct NodeRange {
     high = std::max(high, value);
   }
 };
+
+/// Four components as a vector of the processor, and the fifth one.
+template <int N>
+struct Lanes {
+  using Four = double __attribute__((vector_size(32)));
+  Four four = {};
+  double fifth = 0;
+
+  /// Adds factor times the components at `from`.
+  void add(double factor, const double* from) {
+    Four loaded;
+    std::memcpy(&loaded, from, sizeof(loaded));
+    four += factor * loaded;
+    if constexpr (N == 5) fifth += factor * from[4];
+  }
+  void add(double factor, const Lanes& from) {
+    four += factor * from.four;
+    if constexpr (N == 5) fifth += factor * from.fifth;
+  }
+  void store(std::array<double, N>& to) const {
+    std::memcpy(to.data(), &four, sizeof(four));
+    if constexpr (N == 5) to[4] = fifth;
+  }
+};
+
+/// As TreeNodes::jet(). @tparam Order  degree + 1 along v and w, 0 if it is known at run time only
+template <int N, int Order>
+NodeJet<N> jetOf(const TreeNode& node, const std::array<double, 3>& u) {
+  const BernsteinRow bu(node.degree[0], u[0]), bv(node.degree[1], u[1]), bw(node.degree[2], u[2]);
+  const auto orderU = static_cast<std::size_t>(node.degree[0] + 1),
+             orderV = static_cast<std::size_t>(Order ? Order : node.degree[1] + 1),
+             orderW = static_cast<std::size_t>(Order ? Order : node.degree[2] + 1);
+  const double* c = node.points.data();
+  Lanes<N> value, slopeU, slopeV, slopeW;
+  for (std::size_t i = 0; i < orderU; ++i) {
+    Lanes<N> plane, planeV, planeW;
+    for (std::size_t j = 0; j < orderV; ++j) {
+      Lanes<N> row, rowW;
+      for (std::size_t k = 0; k < orderW; ++k, c += N) {
+        row.add(bw.value[k], c);
+        rowW.add(bw.slope[k], c);
+      }
+      plane.add(bv.value[j], row);
+      planeV.add(bv.slope[j], row);
+      planeW.add(bv.value[j], rowW);
+    }
+    value.add(bu.value[i], plane);
+    slopeU.add(bu.slope[i], plane);
+    slopeV.add(bu.value[i], planeV);
+    slopeW.add(bu.value[i], planeW);
+  }
+  NodeJet<N> result;
+  value.store(result.value);
+  slopeU.store(result.slope[0]);
+  slopeV.store(result.slope[1]);
+  slopeW.store(result.slope[2]);
+  return result;
+}
 
 template <int N>
 constexpr int weightComponent(const BezierView& view) {
@@ -181,35 +240,21 @@ double TreeNode::edge() const {
 
 template <int N>
 NodeJet<N> TreeNodes<N>::jet(const TreeNode& node, const std::array<double, 3>& u) {
-  const BernsteinRow bu(node.degree[0], u[0]), bv(node.degree[1], u[1]), bw(node.degree[2], u[2]);
-  const auto orderU = static_cast<std::size_t>(node.degree[0] + 1),
-             orderV = static_cast<std::size_t>(node.degree[1] + 1),
-             orderW = static_cast<std::size_t>(node.degree[2] + 1);
-  const double* c = node.points.data();
-  NodeJet<N> result{};
-  for (std::size_t i = 0; i < orderU; ++i) {
-    double plane[3][N] = {};
-    for (std::size_t j = 0; j < orderV; ++j) {
-      double row[2][N] = {};
-      for (std::size_t k = 0; k < orderW; ++k, c += N)
-        for (int n = 0; n < N; ++n) {
-          row[0][n] += bw.value[k] * c[n];
-          row[1][n] += bw.slope[k] * c[n];
-        }
-      for (int n = 0; n < N; ++n) {
-        plane[0][n] += bv.value[j] * row[0][n];
-        plane[1][n] += bv.slope[j] * row[0][n];
-        plane[2][n] += bv.value[j] * row[1][n];
-      }
-    }
-    for (std::size_t n = 0; n < N; ++n) {
-      result.value[n] += bu.value[i] * plane[0][n];
-      result.slope[0][n] += bu.slope[i] * plane[0][n];
-      result.slope[1][n] += bu.value[i] * plane[1][n];
-      result.slope[2][n] += bu.value[i] * plane[2][n];
+  if (node.degree[1] == node.degree[2]) {  // loops of a known length are faster, with equal bits
+    switch (node.degree[2]) {
+      case 2:
+        return jetOf<N, 3>(node, u);
+      case 3:
+        return jetOf<N, 4>(node, u);
+      case 4:
+        return jetOf<N, 5>(node, u);
+      case 5:
+        return jetOf<N, 6>(node, u);
+      default:
+        break;
     }
   }
-  return result;
+  return jetOf<N, 0>(node, u);
 }
 
 template <int N>
