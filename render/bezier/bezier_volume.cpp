@@ -153,6 +153,33 @@ double attributeAt(const BezierPatch& patch, std::size_t attribute, const V3d& p
   return levelset::valueAt(value, u) / (patch.weights.empty() ? 1 : levelset::valueAt(weight, u));
 }
 
+std::vector<char> insideAt(const BezierPatch& patch, double isovalue, const V3d& parameter) {
+  // Products of the Bernstein polynomials and the weight are common to all attributes.
+  std::array<std::vector<double>, 3> rows;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::vector<double>& row = rows[axis];
+    const double t = parameter[static_cast<int>(axis)];
+    row.assign(1, 1.0);
+    for (int order = 1; order <= patch.degree[axis]; ++order) {
+      row.push_back(0);
+      for (std::size_t i = row.size() - 1; i > 0; --i) row[i] = (1 - t) * row[i] + t * row[i - 1];
+      row[0] *= 1 - t;
+    }
+  }
+  std::vector<double> factors;
+  factors.reserve(patch.points.size());
+  for (const double a : rows[0])
+    for (const double b : rows[1])
+      for (const double c : rows[2]) factors.push_back(a * b * c * weightAt(patch, factors.size()));
+  std::vector<char> inside;
+  for (const std::vector<double>& attribute : patch.attributes) {
+    double sum = 0;
+    for (std::size_t n = 0; n < factors.size(); ++n) sum += factors[n] * (attribute[n] - isovalue);
+    inside.push_back(sum < 0 ? 1 : 0);
+  }
+  return inside;
+}
+
 BezierPatch elevated(const BezierPatch& patch, int axis) {
   if (patch.degree[static_cast<std::size_t>(axis)] >= levelset::kMostDegree)
     throw InvalidInput(

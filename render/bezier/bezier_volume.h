@@ -43,6 +43,10 @@ struct BezierPatch {
 [[nodiscard]] double attributeAt(const BezierPatch& patch, std::size_t attribute,
                                  const Imath::V3d& parameter);
 
+/// For each attribute of a patch at a parameter: 1 where it is below the isovalue, else 0.
+[[nodiscard]] std::vector<char> insideAt(const BezierPatch& patch, double isovalue,
+                                         const Imath::V3d& parameter);
+
 /// Raises the degree along one axis by one. Positions and attributes stay the same.
 /// @throws levelset::InvalidInput at the largest degree
 [[nodiscard]] BezierPatch elevated(const BezierPatch& patch, int axis);

@@ -3,8 +3,8 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
+#include <ctime>
 #include <mutex>
 #include <optional>
 #include <utility>
@@ -33,22 +33,27 @@ constexpr double kSameSingularRoot = 1e-5;
 // Roots of neighbouring patches on their common face are one, at this share of the depth.
 constexpr double kSameDepth = 1e-10;
 
-/// Adds the time of its life to a sum.
+/// CPU seconds of this thread.
+double threadSeconds() {
+  std::timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+/// Adds the CPU time of its life to a sum.
 class StageClock {
  public:
-  StageClock(bool isOn, double& sum) : sum_(isOn ? &sum : nullptr) {
-    if (sum_) start_ = std::chrono::steady_clock::now();
-  }
+  StageClock(bool isOn, double& sum)
+      : sum_(isOn ? &sum : nullptr), start_(isOn ? threadSeconds() : 0) {}
   ~StageClock() {
-    if (sum_)
-      *sum_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    if (sum_) *sum_ += threadSeconds() - start_;
   }
   StageClock(const StageClock&) = delete;
   StageClock& operator=(const StageClock&) = delete;
 
  private:
   double* sum_;
-  std::chrono::steady_clock::time_point start_;
+  double start_;
 };
 
 /// What the nodes of a tree share.
@@ -367,11 +372,8 @@ class TreeWalk {
   /// Evaluates the expression at the parameter of a root.
   [[nodiscard]] SurfaceSide sideOf(const BezierRoot& root) const {
     const BezierVolume& volume = *context_.volume;
-    std::vector<char> inside(volume.attributeCount());
-    for (std::size_t a = 0; a < inside.size(); ++a)
-      if (a != root.attribute)
-        inside[a] = attributeAt(volume.patches[root.patch], a, root.parameter) < volume.isovalue;
-    return render::sideOf(volume.expression, root.attribute, std::move(inside));
+    return render::sideOf(volume.expression, root.attribute,
+                          insideAt(volume.patches[root.patch], volume.isovalue, root.parameter));
   }
 
   const TreeContext& context_;

@@ -19,19 +19,21 @@ constexpr double kLeastDeterminant = 1e-11;
 constexpr std::size_t kMostOrder = levelset::kMostDegree + 1;
 
 /// Bernstein polynomials of one degree and their derivatives at a parameter.
+/// @tparam Order  degree + 1, or 0 if it is known at run time only
+template <int Order>
 struct BernsteinRow {
-  std::array<double, kMostOrder> value, slope;
+  std::array<double, Order ? Order : kMostOrder> value, slope;
 
   BernsteinRow(int degree, double t) {
-    const auto p = static_cast<std::size_t>(degree);
+    const auto p = static_cast<std::size_t>(Order ? Order - 1 : degree);
     value[0] = 1;
     for (std::size_t order = 1; order < p; ++order) raise(order, t);
     double before = 0;
     for (std::size_t i = 0; i < p; ++i) {
-      slope[i] = degree * (before - value[i]);
+      slope[i] = static_cast<double>(p) * (before - value[i]);
       before = value[i];
     }
-    slope[p] = degree * before;
+    slope[p] = static_cast<double>(p) * before;
     raise(p, t);
   }
 
@@ -88,35 +90,41 @@ struct NodeRange {
   }
 };
 
-/// Four components as a vector of the processor, and the fifth one.
+/// Four components as two vectors of the processor, and the fifth one.
 template <int N>
 struct Lanes {
-  using Four = double __attribute__((vector_size(32)));
-  Four four = {};
+  using Two = double __attribute__((vector_size(16)));
+  Two first = {}, second = {};
   double fifth = 0;
 
   /// Adds factor times the components at `from`.
   void add(double factor, const double* from) {
-    Four loaded;
-    std::memcpy(&loaded, from, sizeof(loaded));
-    four += factor * loaded;
+    Two a, b;
+    std::memcpy(&a, from, sizeof(a));
+    std::memcpy(&b, from + 2, sizeof(b));
+    first += factor * a;
+    second += factor * b;
     if constexpr (N == 5) fifth += factor * from[4];
   }
   void add(double factor, const Lanes& from) {
-    four += factor * from.four;
+    first += factor * from.first;
+    second += factor * from.second;
     if constexpr (N == 5) fifth += factor * from.fifth;
   }
   void store(std::array<double, N>& to) const {
-    std::memcpy(to.data(), &four, sizeof(four));
+    std::memcpy(to.data(), &first, sizeof(first));
+    std::memcpy(to.data() + 2, &second, sizeof(second));
     if constexpr (N == 5) to[4] = fifth;
   }
 };
 
-/// As TreeNodes::jet(). @tparam Order  degree + 1 along v and w, 0 if it is known at run time only
+/// As TreeNodes::jet(). @tparam Order  degree + 1 along each axis, 0 if it is known at run time
+/// only
 template <int N, int Order>
 NodeJet<N> jetOf(const TreeNode& node, const std::array<double, 3>& u) {
-  const BernsteinRow bu(node.degree[0], u[0]), bv(node.degree[1], u[1]), bw(node.degree[2], u[2]);
-  const auto orderU = static_cast<std::size_t>(node.degree[0] + 1),
+  const BernsteinRow<Order> bu(node.degree[0], u[0]), bv(node.degree[1], u[1]),
+      bw(node.degree[2], u[2]);
+  const auto orderU = static_cast<std::size_t>(Order ? Order : node.degree[0] + 1),
              orderV = static_cast<std::size_t>(Order ? Order : node.degree[1] + 1),
              orderW = static_cast<std::size_t>(Order ? Order : node.degree[2] + 1);
   const double* c = node.points.data();
@@ -240,7 +248,8 @@ double TreeNode::edge() const {
 
 template <int N>
 NodeJet<N> TreeNodes<N>::jet(const TreeNode& node, const std::array<double, 3>& u) {
-  if (node.degree[1] == node.degree[2]) {  // loops of a known length are faster, with equal bits
+  if (node.degree[0] == node.degree[2] &&
+      node.degree[1] == node.degree[2]) {  // loops of a known length are faster, with equal bits
     switch (node.degree[2]) {
       case 2:
         return jetOf<N, 3>(node, u);

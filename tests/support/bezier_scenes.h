@@ -265,6 +265,31 @@ inline BezierVolume dice(const std::function<V3d(const V3d&)>& move = {}) {
   return volume;
 }
 
+/// A bent block with 20 round holes, as one cubic map: 23 attributes.
+inline BezierVolume cheese() {
+  const V3d low(-1.2, -1.2, -0.8), high(1.2, 1.2, 0.8);
+  BezierPatch patch = boxPatch({3, 3, 3}, low, high);
+  BezierVolume volume;
+  addAttribute(patch, {{{-1, 0, 1}, {1}, {1}}}, low, high);
+  addAttribute(patch, {{{1}, {-1, 0, 1}, {1}}}, low, high);
+  addAttribute(patch, {{{1}, {1}, {-0.36, 0, 1}}}, low, high);
+  volume.expression = {0, 1, -2, 2, -2};
+  std::uint64_t state = 7;
+  const auto next = [&] {
+    state = state * 6364136223846793005ULL + 1442695040888963407ULL;
+    return static_cast<double>(state >> 11) * 0x1p-52 - 1;
+  };
+  for (int n = 0; n < 20; ++n) {
+    const V3d centre(next(), next(), 0.6 * next());
+    addAttribute(patch, ballTerms(centre, 0.2 + 0.08 * next()), low, high);
+    volume.expression.push_back(static_cast<int>(patch.attributes.size()) - 1);
+    volume.expression.push_back(-3);
+  }
+  deform(patch, [](const V3d& p) { return V3d(p.x, p.y, p.z + 0.3 * p.x * p.x - 0.2 * p.y); });
+  volume.patches = {patch};
+  return volume;
+}
+
 /// Numbers of a linear congruential generator, in [−1, 1).
 class Numbers {
  public:
