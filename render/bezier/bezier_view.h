@@ -11,12 +11,14 @@ namespace render {
 /// otherwise an offset in world units. A point p of depth d = (p − eye)·axis is seen at
 /// ((p − eye)·right / d, (p − eye)·down / d) in perspective, otherwise without the divisions.
 struct BezierView {
-  Imath::V3d eye, right, down, axis;
+  Imath::V3d eye{0}, right{1, 0, 0}, down{0, 1, 0}, axis{0, 0, 1};
   bool isPerspective = false;
-  double near = 0, far = Camera::kNoDepth;  ///< visible depths
-  Imath::V2d step{1, 1};                    ///< screen distance of neighbouring pixels
-  Imath::V2d middle{0, 0};                  ///< image position of the centre, pixels
+  double near = -Camera::kNoDepth, far = Camera::kNoDepth;  ///< visible depths
+  Imath::V2d step{1, 1};    ///< screen distance of neighbouring pixels
+  Imath::V2d middle{0, 0};  ///< image position of the centre, pixels
 
+  /// World space: along z, with all depths.
+  BezierView() = default;
   explicit BezierView(const Camera& camera);
   /// View along one ray, whose screen position is (0, 0). Depths are distances along the ray.
   explicit BezierView(const Camera::Ray& ray);

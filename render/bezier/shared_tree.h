@@ -72,8 +72,6 @@ class SharedTree {
   /// @pre requireBezierVolume() accepts the volume, validate() the camera
   /// @throws levelset::ResourceLimit if the nodes exceed TreeOptions::maxBytes
   SharedTree(const BezierVolume& volume, const Camera& camera, const TreeOptions& options = {});
-  /// For one ray, at the image position (0, 0).
-  SharedTree(const BezierVolume& volume, const Camera::Ray& ray, const TreeOptions& options = {});
   ~SharedTree();
   SharedTree(SharedTree&&) noexcept;
   SharedTree& operator=(SharedTree&&) noexcept;
@@ -87,6 +85,8 @@ class SharedTree {
   /// Finds the roots of the rays through image positions, in pixels. It is fastest when neighbours
   /// are in one call.
   [[nodiscard]] Roots rootsAt(const std::vector<Imath::V2d>& positions, TreeCounts* counts) const;
+  /// Finds the roots of rays of the camera.
+  [[nodiscard]] Roots rootsOf(const std::vector<Camera::Ray>& rays) const;
   /// Work of the constructor.
   [[nodiscard]] const TreeCounts& counts() const;
 

@@ -346,6 +346,34 @@ bool TreeNodes<N>::root(const BezierVolume& volume, std::uint32_t number, std::u
 }
 
 template <int N>
+bool TreeNodes<N>::turned(const TreeNode& world, const ComponentScale& worldScale,
+                          const BezierView& view, TreeNode& node,
+                          ComponentScale& scale) requires(N == 5) {
+  node.degree = world.degree;
+  node.patch = world.patch;
+  node.attribute = world.attribute;
+  node.level = world.level;
+  node.cell = world.cell;
+  node.points.resize(world.points.size());
+  for (std::size_t n = 0; n < world.points.size(); n += N) {
+    const double* from = world.points.data() + n;
+    double* to = node.points.data() + n;
+    const double weight = from[kWeight];
+    const V3d p(from[0] - view.eye.x * weight, from[1] - view.eye.y * weight,
+                from[2] - view.eye.z * weight);
+    to[kAcross] = p.dot(view.right);
+    to[kDown] = p.dot(view.down);
+    to[kDepth] = p.dot(view.axis);
+    to[kValue] = from[kValue];
+    to[kWeight] = weight;
+  }
+  const double most = worldScale.most[0] + worldScale.most[1] + worldScale.most[2] +
+                      view.eye.length() * worldScale.most[kWeight];
+  scale.most = {most, most, most, worldScale.most[kValue], worldScale.most[kWeight]};
+  return analyse(node, view, scale);
+}
+
+template <int N>
 std::size_t TreeNodes<N>::split(const TreeNode& node, const BezierView& view,
                                 const ComponentScale& scale, TreeNode* children,
                                 std::vector<double>& scratch) {

@@ -74,6 +74,11 @@ struct TreeNodes {
   /// @return false if no visible part of the surface can be in the patch
   static bool root(const BezierVolume& volume, std::uint32_t patch, std::uint32_t attribute,
                    const BezierView& view, TreeNode& node, ComponentScale& scale);
+  /// Views a node of world space, from a BezierView(), along a ray. @param worldScale  of that node
+  /// @return as root()
+  static bool turned(const TreeNode& world, const ComponentScale& worldScale,
+                     const BezierView& view, TreeNode& node,
+                     ComponentScale& scale) requires(N == 5);
   /// Sets the bounds of a node.
   /// @return false if no visible part of the surface can be in the node
   static bool analyse(TreeNode& node, const BezierView& view, const ComponentScale& scale);

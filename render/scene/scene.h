@@ -11,6 +11,7 @@
 
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
+#include "render/bezier/bezier_part.h"
 #include "render/camera.h"
 #include "render/direct/direct_volume.h"
 #include "render/hit.h"
@@ -98,6 +99,8 @@ struct Scene {
   std::vector<MappedTexture> mapped = {};
   /// Drawn beside the solids. Not in a blended scene.
   std::optional<SegmentedPart> segmented = {};
+  /// Surfaces in Bézier volumes, drawn beside the solids. Not in a blended scene.
+  std::vector<BezierPart> beziers = {};
   /// Not with a ground, on which the volume would have no shadow.
   std::optional<VolumePart> volumePart = {};
   CsgExpression csg = {};  ///< expression over the solids; empty: each solid is drawn
