@@ -24,7 +24,7 @@ inline constexpr double kFaceTolerance = 1e-9;
 // Newton's method has converged when its step is below this share of the edge: the next step, of
 // second order, is below rounding.
 inline constexpr double kLastStep = 1e-8;
-inline constexpr int kMostSteps = 24;
+inline constexpr int kMostNewtonSteps = 24;
 // Roots of one patch closer than this in its parameters are one. Newton's method gives the same
 // root to 1e-12.
 inline constexpr double kSameRoot = 1e-10;
@@ -266,7 +266,7 @@ class TreeWalk {
       // Roots lie in the cube, so a start in it is nearer than one beyond.
       u[r] = std::clamp(0.5 - node.middle[r] + s * node.weight, 0.0, 1.0);
     }
-    for (int step = 0; step < kMostSteps; ++step) {
+    for (int step = 0; step < kMostNewtonSteps; ++step) {
       ++counts_.steps;
       const NodeJet<N> jet = TreeNodes<N>::jet(node, u);
       if (!Constraints(jet, screen, w).step(change)) return false;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <string>
 #include <vector>
 
 #include "render/bezier/bezier_judge.h"
@@ -72,17 +71,13 @@ Agreement compare(const BezierScene& scene) {
 void expectAgreement(std::size_t cameras, int size) {
   for (const BezierScene& scene : bezier_scenes::scenes(cameras, size)) {
     const Agreement found = compare(scene);
-    std::printf(
-        "%-20s rays %zu hits %zu roots %zu only tree %zu only judge %zu other count %zu depth %.2g "
-        "normal %.2g singular %zu undecided %zu overruns %zu\n",
-        scene.name.c_str(), found.rays, found.hits, found.roots, found.onlyTree, found.onlyJudge,
-        found.otherCount, found.depth, found.normal, found.singular, found.undecided,
-        found.overruns);
     EXPECT_GT(found.hits, found.rays / 20) << scene.name;
     EXPECT_EQ(found.onlyTree, 0U) << scene.name;
     EXPECT_EQ(found.onlyJudge, 0U) << scene.name;
     EXPECT_EQ(found.otherCount, 0U) << scene.name;
-    EXPECT_LE(found.depth, 1e-5) << scene.name;
+    // A double root is known to the root of the rounding error only. Measured: 3.7e-8; others 7.8e-14, normals 1.6e-8.
+    EXPECT_LE(found.depth, scene.name == "double root" ? 1.1e-7 : 2.3e-13) << scene.name;
+    EXPECT_LE(found.normal, 2e-8) << scene.name;
     EXPECT_EQ(found.overruns, 0U) << scene.name;
   }
 }
