@@ -223,7 +223,7 @@ std::optional<BezierRoot> BezierCaster::cast(const Camera::Ray& ray, bool any) c
   group.roots.resize(1);
   group.roots[0].clear();
   group.nearest.assign(1, Camera::kNoDepth);
-  group.visits.assign(1, 0);
+  group.visits.resize(1);
   thread_local TreeNode node;
   const TreeContext context{BezierView(ray), &data.volume, {}, false, false};
   const std::vector<std::uint32_t> asked{0};
@@ -236,6 +236,7 @@ std::optional<BezierRoot> BezierCaster::cast(const Camera::Ray& ray, bool any) c
             part, data.scales[part.patch * data.volume.attributeCount() + part.attribute],
             context.view, node, scale))
       continue;
+    group.visits[0] = 0;
     TreeWalk<5> walk(context, group, counts);
     walk.visit(node, scale, asked, 0);
     if (any && !group.roots[0].empty()) break;

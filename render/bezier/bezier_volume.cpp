@@ -190,6 +190,20 @@ BezierPatch elevated(const BezierPatch& patch, int axis) {
   return fromHomogeneous(forms, !patch.weights.empty());
 }
 
+BezierPatch surfacePatch(int degreeU, int degreeV, const std::vector<V3d>& points,
+                         const std::vector<double>& weights, double isovalue) {
+  BezierPatch patch;
+  patch.degree = {degreeU, degreeV, 1};
+  patch.attributes.resize(1);
+  for (std::size_t n = 0; n < points.size(); ++n)
+    for (const double w : {0.0, 1.0}) {
+      patch.points.push_back(points[n]);
+      patch.attributes[0].push_back(isovalue + w - 1.0 / 3);
+      if (!weights.empty()) patch.weights.push_back(weights[n]);
+    }
+  return patch;
+}
+
 std::vector<BezierPatch> bezierPatches(const SplineVolume& volume) {
   for (const std::vector<double>& attribute : volume.attributes)
     if (attribute.size() != volume.points.size())

@@ -51,6 +51,15 @@ struct BezierPatch {
 /// @throws levelset::InvalidInput at the largest degree
 [[nodiscard]] BezierPatch elevated(const BezierPatch& patch, int axis);
 
+/// Parametric surface as a patch: both layers along w are the control points of the surface, and
+/// the attribute is the isovalue at w = 1/3. Halvings never meet this w, so each node has one child
+/// with the surface. Normals are ∂p/∂u × ∂p/∂v.
+/// @param points  (degreeU + 1)(degreeV + 1) control points, v fastest
+[[nodiscard]] BezierPatch surfacePatch(int degreeU, int degreeV,
+                                       const std::vector<Imath::V3d>& points,
+                                       const std::vector<double>& weights = {},
+                                       double isovalue = 0);
+
 /// B-spline volume with positions and attributes; its members are those of BezierPatch.
 struct SplineVolume {
   std::array<levelset::LatticeAxis, 3> axes = {};

@@ -142,6 +142,7 @@ class SharedTree::Data {
         continue;
       if (asked.empty())
         for (std::uint32_t n = 0; n < count; ++n) asked.push_back(n);
+      std::fill(rays.visits.begin(), rays.visits.end(), 0);
       walk.visit(node, context_.scaleOf(node), asked, 0);
     }
     Roots result;

@@ -38,7 +38,8 @@ struct TreeCounts {
   std::size_t solutions = 0;  ///< pairs to which Newton's method was applied
   std::size_t steps = 0;      ///< steps of Newton's method
   std::size_t singular = 0;   ///< roots with isSingular
-  /// Rays with more than kMostVisits undecided nodes. They keep the roots found before.
+  /// Number of times that a ray had kMostVisits undecided nodes below one shared node. It keeps the
+  /// roots found before.
   std::size_t overruns = 0;
   std::size_t peakBytes = 0;  ///< memory of shared nodes, plus the largest one of a tile
   /// CPU seconds: overlap tests, Newton's method, splits with bounds, and the first level with the
@@ -62,7 +63,8 @@ struct TreeOptions {
   levelset::Progress progress = {};
 };
 
-/// A ray gives up after this number of undecided nodes, as when it lies in the surface.
+/// A ray gives up a shared node after this number of undecided nodes below it, as when it lies in
+/// the surface.
 inline constexpr std::size_t kMostVisits = 20'000;
 
 /// The shared tree of a volume for one view. It refers to the volume. Methods may run concurrently.

@@ -28,8 +28,9 @@ inline constexpr int kMostNewtonSteps = 24;
 // Roots of one patch closer than this in its parameters are one. Newton's method gives the same
 // root to 1e-12.
 inline constexpr double kSameRoot = 1e-10;
-// Roots of the deepest level are nodes that touch a singular root.
-inline constexpr double kSameSingularRoot = 1e-5;
+// Singular roots are nodes of the deepest level that touch one root, or a line of parameters that
+// collapses to one point. They are one at this share of the depth.
+inline constexpr double kSameSingularRoot = 1e-6;
 // Roots of neighbouring patches on their common face are one, at this share of the depth.
 inline constexpr double kSameDepth = 1e-10;
 
@@ -87,19 +88,19 @@ inline bool isBefore(const BezierRoot& a, const BezierRoot& b) {
 
 inline bool isSameRoot(const BezierRoot& a, const BezierRoot& b) {
   if (a.attribute != b.attribute) return false;
+  const double apart = std::abs(a.depth - b.depth), size = std::abs(a.depth) + std::abs(b.depth);
+  if (a.isSingular && b.isSingular) return apart <= kSameSingularRoot * size;
   if (a.patch != b.patch) {
     const auto isOnFace = [](const Imath::V3d& u) {
       for (int c = 0; c < 3; ++c)
         if (u[c] < kSameRoot || u[c] > 1 - kSameRoot) return true;
       return false;
     };
-    return a.isEntry == b.isEntry &&
-           std::abs(a.depth - b.depth) <= kSameDepth * (std::abs(a.depth) + std::abs(b.depth)) &&
-           isOnFace(a.parameter) && isOnFace(b.parameter);
+    return a.isEntry == b.isEntry && apart <= kSameDepth * size && isOnFace(a.parameter) &&
+           isOnFace(b.parameter);
   }
-  const double limit = a.isSingular && b.isSingular ? kSameSingularRoot : kSameRoot;
   for (int c = 0; c < 3; ++c)
-    if (!(std::abs(a.parameter[c] - b.parameter[c]) <= limit)) return false;
+    if (!(std::abs(a.parameter[c] - b.parameter[c]) <= kSameRoot)) return false;
   return true;
 }
 

@@ -62,13 +62,16 @@ class BezierReader {
     return result;
   }
 
-  /// Three integers from 1 to `most`.
-  [[nodiscard]] static std::array<int, 3> integers(const BezierJson& json, const char* name,
-                                                   int most) {
+  /// Integers from 1 to `most`, one for each of two or three axes. @param axes  0: either
+  [[nodiscard]] static std::vector<int> integers(const BezierJson& json, const char* name, int most,
+                                                 std::size_t axes) {
     const std::vector<double> given = numbers(member(json, name), name);
-    if (given.size() != 3) refuse(fmt::format("has a \"{}\" without three numbers", name));
-    std::array<int, 3> result{};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (axes == 0 && given.size() != 2 && given.size() != 3)
+      refuse(fmt::format("has a \"{}\" without two or three numbers", name));
+    if (axes != 0 && given.size() != axes)
+      refuse(fmt::format("has {} numbers in \"{}\", not {}", given.size(), name, axes));
+    std::vector<int> result(given.size());
+    for (std::size_t axis = 0; axis < given.size(); ++axis) {
       if (!(given[axis] >= 1) || given[axis] > most || given[axis] != std::floor(given[axis]))
         refuse(
             fmt::format("has {} in \"{}\", not an integer from 1 to {}", given[axis], name, most));
@@ -81,12 +84,21 @@ class BezierReader {
 /// Adds the patches of one entry of the list.
 void addPatches(const BezierJson& json, std::size_t attributes, BezierVolume& volume) {
   BezierReader::requireKnown(json, {"degree", "count", "points", "weights", "knots"});
-  const std::array<int, 3> degree = BezierReader::integers(json, "degree", levelset::kMostDegree);
-  std::array<int, 3> count{degree[0] + 1, degree[1] + 1, degree[2] + 1};
-  if (json.contains("count")) count = BezierReader::integers(json, "count", 1'000'000);
+  std::vector<int> degree = BezierReader::integers(json, "degree", levelset::kMostDegree, 0);
+  const bool isSurface = degree.size() == 2;
+  std::vector<int> count;
+  for (const int of : degree) count.push_back(of + 1);
+  if (json.contains("count"))
+    count = BezierReader::integers(json, "count", 1'000'000, degree.size());
+  if (isSurface && attributes != 1) BezierReader::refuse("has a surface beside several attributes");
+  const std::size_t numbers = isSurface ? 3 : 3 + attributes;
+  if (isSurface) {  // two equal layers
+    degree.push_back(1);
+    count.push_back(2);
+  }
   const BezierJson& points = BezierReader::member(json, "points");
   // Before any list of that length is built.
-  const double listed = 1.0 * count[0] * count[1] * count[2];
+  const double listed = 1.0 * count[0] * count[1] * (isSurface ? 1 : count[2]);
   if (!points.is_array() || static_cast<double>(points.size()) != listed)
     BezierReader::refuse(
         fmt::format("has {} control points, but its \"count\" or \"degree\" needs {}",
@@ -96,9 +108,10 @@ void addPatches(const BezierJson& json, std::size_t attributes, BezierVolume& vo
     spline.axes[axis] = levelset::uniformAxis(degree[axis], static_cast<std::size_t>(count[axis]));
   if (json.contains("knots")) {
     const BezierJson& knots = json.at("knots");
-    if (!knots.is_array() || knots.size() != 3)
-      BezierReader::refuse("has \"knots\" that are not three lists");
-    for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::size_t axes = isSurface ? 2 : 3;
+    if (!knots.is_array() || knots.size() != axes)
+      BezierReader::refuse(fmt::format("has \"knots\" that are not {} lists", axes));
+    for (std::size_t axis = 0; axis < axes; ++axis) {
       std::vector<double> list = BezierReader::numbers(knots[axis], "knots");
       const std::size_t wanted = spline.axes[axis].knots.size();
       if (list.size() != wanted)
@@ -110,13 +123,13 @@ void addPatches(const BezierJson& json, std::size_t attributes, BezierVolume& vo
   spline.attributes.resize(attributes);
   for (const BezierJson& entry : points) {
     const std::vector<double> row = BezierReader::numbers(entry, "points");
-    if (row.size() != 3 + attributes)
+    if (row.size() != numbers)
       BezierReader::refuse(
           fmt::format("has a point of {} numbers, not {}: three coordinates and "
                       "{} attribute{}",
-                      row.size(), 3 + attributes, attributes, attributes == 1 ? "" : "s"));
+                      row.size(), numbers, numbers - 3, numbers == 4 ? "" : "s"));
     spline.points.emplace_back(row[0], row[1], row[2]);
-    for (std::size_t a = 0; a < attributes; ++a) spline.attributes[a].push_back(row[3 + a]);
+    for (std::size_t a = 0; a + 3 < numbers; ++a) spline.attributes[a].push_back(row[3 + a]);
   }
   if (json.contains("weights")) {
     spline.weights = BezierReader::numbers(json.at("weights"), "weights");
@@ -124,10 +137,19 @@ void addPatches(const BezierJson& json, std::size_t attributes, BezierVolume& vo
       BezierReader::refuse(fmt::format("has {} weights for {} control points",
                                        spline.weights.size(), spline.points.size()));
   }
+  if (isSurface) {
+    BezierPatch layers =
+        surfacePatch(count[0] - 1, count[1] - 1, spline.points, spline.weights, volume.isovalue);
+    spline.points = std::move(layers.points);
+    spline.attributes = std::move(layers.attributes);
+    spline.weights = std::move(layers.weights);
+  }
   const bool isOnePatch =
       count[0] == degree[0] + 1 && count[1] == degree[1] + 1 && count[2] == degree[2] + 1;
   if (isOnePatch && !json.contains("knots")) {  // the numbers themselves, without rounding
-    volume.patches.push_back({degree, std::move(spline.points), std::move(spline.attributes),
+    volume.patches.push_back({{degree[0], degree[1], degree[2]},
+                              std::move(spline.points),
+                              std::move(spline.attributes),
                               std::move(spline.weights)});
     return;
   }

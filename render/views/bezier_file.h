@@ -14,6 +14,9 @@
 ///  "patches": [{"degree": [2, 2, 2], "count": [3, 3, 3], "points": [[x, y, z, a], …],
 ///               "weights": [1, …], "knots": [[0, 0, 0, 1, 1, 1], …]}, …]}
 ///
+/// With two numbers in "degree" and "count", an entry is a surface in space: its points have three
+/// coordinates and no attribute.
+///
 /// A point has three coordinates and a number for each attribute. The last index of the points is
 /// the fastest. "isovalue" is 0 if it is left out, and "attributes" is one. "expression" joins
 /// several attributes as in CsgExpression. With "count", an entry is a B-spline volume, whose knots

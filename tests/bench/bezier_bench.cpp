@@ -5,6 +5,8 @@
 #include <array>
 #include <cstdlib>
 #include <ctime>
+#include <fstream>
+#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,6 +21,46 @@ using render::BezierPicture;
 using render::BezierVolume;
 using render::Camera;
 using render::TreeOptions;
+
+/// The 32 patches of the teapot in data/models; none if the file is missing.
+BezierVolume teapot() {
+  std::ifstream stream(LEVELSMITH_DATA_DIR "/models/TeapotBufferGeometry.js");
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  const auto numbersAfter = [&](const char* name) {
+    std::vector<double> numbers;
+    const std::size_t begin = text.find(name);
+    if (begin == std::string::npos) return numbers;
+    const std::size_t end = text.find("];", begin);
+    std::string list = text.substr(text.find('[', begin) + 1, end - text.find('[', begin) - 1);
+    for (std::size_t at = list.find("/*"); at != std::string::npos; at = list.find("/*"))
+      list.erase(at, list.find("*/", at) + 2 - at);
+    std::size_t at = 0;
+    while (at < list.size()) {
+      const char* start = list.c_str() + at;
+      char* stop = nullptr;
+      const double value = std::strtod(start, &stop);
+      if (stop == start) {
+        ++at;
+        continue;
+      }
+      numbers.push_back(value);
+      at += static_cast<std::size_t>(stop - start);
+    }
+    return numbers;
+  };
+  const std::vector<double> patches = numbersAfter("teapotPatches"),
+                            vertices = numbersAfter("teapotVertices");
+  BezierVolume volume;
+  for (std::size_t first = 0; first + 16 <= patches.size(); first += 16) {
+    std::vector<V3d> points;
+    for (std::size_t n = 0; n < 16; ++n) {
+      const auto v = static_cast<std::size_t>(patches[first + n]);
+      points.emplace_back(vertices[3 * v], vertices[3 * v + 1], vertices[3 * v + 2]);
+    }
+    volume.patches.push_back(render::surfacePatch(3, 3, points));
+  }
+  return volume;
+}
 
 struct Timed {
   double seconds;
@@ -77,10 +119,12 @@ void table(int width, int height) {
     BezierVolume volume;
     double share, published;
   };
-  const std::vector<Case> cases = {{"teardrop", bezier_scenes::teardrop(), 0.389, 41.6},
-                                   {"cylinder", bezier_scenes::bentCylinder(), 0.681, 11.4},
-                                   {"dice", bezier_scenes::dice(), 0.325, 11.03},
-                                   {"cheese", bezier_scenes::cheese(), 0.325, 9.56}};
+  std::vector<Case> cases = {{"teardrop", bezier_scenes::teardrop(), 0.389, 41.6},
+                             {"cylinder", bezier_scenes::bentCylinder(), 0.681, 11.4},
+                             {"dice", bezier_scenes::dice(), 0.325, 11.03},
+                             {"cheese", bezier_scenes::cheese(), 0.325, 9.56}};
+  if (BezierVolume surfaces = teapot(); !surfaces.patches.empty())
+    cases.push_back({"teapot", std::move(surfaces), 0.682, 12.9});
   fmt::print("{}x{}\n{:<12} {:>7} {:>10} {:>10} {:>7} {:>10} {:>9}\n", width, height, "data",
              "cover %", "shared s", "basic s", "ratio", "published", "peak MB");
   for (const Case& c : cases) {

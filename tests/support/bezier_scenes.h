@@ -303,6 +303,29 @@ class Numbers {
   std::uint64_t state_;
 };
 
+/// The unit sphere as eight rational surfaces of degree 2. Each collapses to a pole along an edge.
+inline BezierVolume sphereSurfaces() {
+  const double diagonal = std::sqrt(0.5);
+  BezierVolume volume;
+  for (int quarter = 0; quarter < 4; ++quarter)
+    for (const double side : {1.0, -1.0}) {
+      std::vector<V3d> points;
+      std::vector<double> weights;
+      for (int i = 0; i < 3; ++i)      // from the equator to a pole
+        for (int j = 0; j < 3; ++j) {  // along the equator
+          const double radius = i < 2 ? 1 : 0;
+          const int along = side > 0 ? j : 2 - j;  // normals point outwards
+          const double x = along < 2 ? 1 : 0, y = along > 0 ? 1 : 0;
+          V3d p(radius * x, radius * y, i > 0 ? side : 0);
+          for (int turn = 0; turn < quarter; ++turn) p = V3d(-p.y, p.x, p.z);
+          points.push_back(p);
+          weights.push_back((i == 1 ? diagonal : 1) * (j == 1 ? diagonal : 1));
+        }
+      volume.patches.push_back(render::surfacePatch(2, 2, points, weights));
+    }
+  return volume;
+}
+
 /// A scene with its cameras.
 struct BezierScene {
   std::string name;

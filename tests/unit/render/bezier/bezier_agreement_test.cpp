@@ -75,7 +75,8 @@ void expectAgreement(std::size_t cameras, int size) {
     EXPECT_EQ(found.onlyTree, 0U) << scene.name;
     EXPECT_EQ(found.onlyJudge, 0U) << scene.name;
     EXPECT_EQ(found.otherCount, 0U) << scene.name;
-    // A double root is known to the root of the rounding error only. Measured: 3.7e-8; others 7.8e-14, normals 1.6e-8.
+    // A double root is known to the root of the rounding error only. Measured: 3.7e-8;
+    // others 7.8e-14, normals 1.6e-8.
     EXPECT_LE(found.depth, scene.name == "double root" ? 1.1e-7 : 2.3e-13) << scene.name;
     EXPECT_LE(found.normal, 2e-8) << scene.name;
     EXPECT_EQ(found.overruns, 0U) << scene.name;

@@ -77,6 +77,33 @@ TEST(SharedTree, FindsBothSidesOfTheExactSphere) {
   EXPECT_LE(normal, 1.8e-8);     // measured 6.2e-9
 }
 
+TEST(SharedTree, FindsParametricSurfaces) {
+  // Eight rational patches make the exact sphere. Their common edges give each root once.
+  const BezierVolume volume = bezier_scenes::sphereSurfaces();
+  requireBezierVolume(volume);
+  double distance = 0, normal = 0;
+  for (const V3d& from : {V3d(2, -3, 1.5), V3d(0, 0, 4), V3d(4, 0, 0)}) {
+    const Camera camera = cameraAt(from, 33);
+    const BezierPicture all = castBezier(volume, camera, {.allRoots = true});
+    std::size_t pixel = 0;
+    for (int y = 0; y < 33; ++y)
+      for (int x = 0; x < 33; ++x, ++pixel) {
+        const Camera::Ray ray = camera.ray(x + 0.5, y + 0.5);
+        const std::vector<double> exact = ofSphere(ray);
+        ASSERT_EQ(all.nearest(pixel) == nullptr, exact.empty()) << x << " " << y;
+        const std::size_t count = all.first[pixel + 1] - all.first[pixel];
+        EXPECT_EQ(count, exact.size()) << x << " " << y;
+        if (exact.empty()) continue;
+        const BezierRoot& root = *all.nearest(pixel);
+        distance = std::max(distance, std::abs(root.distance - exact[0]));
+        const V3d outside = ray.origin + ray.direction * exact[0];
+        if (!root.isSingular) normal = std::max(normal, root.normal.cross(outside).length());
+      }
+  }
+  EXPECT_LE(distance, 4e-14);  // measured 1.2e-14
+  EXPECT_LE(normal, 1.4e-8);  // measured 4.8e-9
+}
+
 TEST(SharedTree, HasTheSameBitsForAnyNumberOfThreads) {
   for (const BezierVolume& volume : {bezier_scenes::bentCylinder(), bezier_scenes::dice()}) {
     const Camera camera = cameraAt(V3d(3, -4, 2), 70);

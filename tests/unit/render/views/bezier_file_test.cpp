@@ -86,6 +86,23 @@ TEST(BezierFile, ReadsSplines) {
   EXPECT_EQ(knots.patches.size(), 3U);
 }
 
+TEST(BezierFile, ReadsSurfaces) {
+  const std::string square = R"({"degree": [1, 1], "points": [[0,0,0],[0,1,0],[1,0,0],[1,1,2]])";
+  const BezierVolume surface = parseBezierVolume(document(square + "}"), "x.json");
+  ASSERT_EQ(surface.patches.size(), 1U);
+  EXPECT_EQ(positionAt(surface.patches[0], V3d(1, 0.5, 1.0 / 3)), V3d(1, 0.5, 1));
+  EXPECT_NEAR(attributeAt(surface.patches[0], 0, V3d(0, 0, 1.0 / 3)), 0, 1e-16);
+  EXPECT_NE(refusal(document(square + "}", R"("attributes": ["a", "b"], "expression": "a", )")),
+            "");
+  // A spline surface of two patches.
+  const BezierVolume spline =
+      parseBezierVolume(document(R"({"degree": [1, 1], "count": [3, 2], )"
+                                 R"("points": [[0,0,0],[0,1,0],[1,0,0],[1,1,0],[2,0,0],[2,1,0]]})"),
+                        "x.json");
+  ASSERT_EQ(spline.patches.size(), 2U);
+  EXPECT_EQ(positionAt(spline.patches[1], V3d(0.5, 0.5, 0)), V3d(1.5, 0.5, 0));
+}
+
 TEST(BezierFile, RefusesWithASentence) {
   EXPECT_EQ(refusal(document(kCube + "}")), "");
   EXPECT_EQ(refusal(document(kCube + R"(, "weights": [1,1,0,1,1,1,1,1]})")),
