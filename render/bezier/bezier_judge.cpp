@@ -372,12 +372,11 @@ class BezierJudge::Search {
       slopes[j] = (at[3][j + 1] - at[3][0] / w * at[4][j + 1]) / w;
     }
     const double volume = tangents[0].dot(tangents[1].cross(tangents[2]));
-    if (volume != 0)
-      root.normal = ((tangents[1].cross(tangents[2]) * slopes[0] +
-                      tangents[2].cross(tangents[0]) * slopes[1] +
-                      tangents[0].cross(tangents[1]) * slopes[2]) /
-                     volume)
-                        .normalized();
+    root.normal = tangents[1].cross(tangents[2]) * slopes[0] +
+                  tangents[2].cross(tangents[0]) * slopes[1] +
+                  tangents[0].cross(tangents[1]) * slopes[2];
+    root.normal.normalize();
+    if (volume < 0) root.normal = -root.normal;
     if (attributes_ > 1) {
       std::vector<char> inside(attributes_);
       for (std::size_t a = 0; a < attributes_; ++a)

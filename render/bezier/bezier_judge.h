@@ -17,7 +17,7 @@ struct JudgedRoot {
   double distance = 0;                     ///< along the ray, world units
   std::uint32_t patch = 0, attribute = 0;  ///< indices in the volume
   Imath::V3d parameter{0};
-  Imath::V3d normal{0};  ///< unit normal to the outside; 0 where the map is singular
+  Imath::V3d normal{0};  ///< unit normal to the outside; 0 where it has no direction
   /// True for a box at the deepest level of the search, in which a root is neither proven nor
   /// excluded.
   bool isUndecided = false;

@@ -348,7 +348,7 @@ inline render::Camera randomCamera(const BezierVolume& volume, Numbers& numbers,
   return camera;
 }
 
-/// Twelve scenes, each with `count` cameras.
+/// Thirteen scenes, each with `count` cameras.
 inline std::vector<BezierScene> scenes(std::size_t count, int size) {
   std::vector<BezierScene> result;
   const auto add = [&](const char* name, BezierVolume volume) -> BezierScene& {
@@ -383,6 +383,7 @@ inline std::vector<BezierScene> scenes(std::size_t count, int size) {
     camera.orthoHeight = {};
   }
   add("dice", dice());
+  add("rational surfaces", sphereSurfaces());
   return result;
 }
 
