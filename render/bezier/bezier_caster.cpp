@@ -13,6 +13,14 @@
 #include "render/bezier/tree_walk.h"
 
 namespace render {
+
+/// Node of a binary tree of boxes.
+struct BezierBoxNode {
+  Imath::Box3d box;
+  std::uint32_t first = 0;  ///< first part of a leaf; index of the second child of an inner node
+  std::uint32_t count = 0;  ///< number of parts; 0: inner node, whose first child follows it
+};
+
 namespace {
 
 using Imath::Box3d;
@@ -21,13 +29,6 @@ using Imath::V3d;
 constexpr int kMostPartLevels = 6;
 constexpr double kPartSize = 1.0 / 12;  // of the diagonal of the volume
 constexpr std::size_t kMostParts = 200'000;
-
-/// Node of a binary tree of boxes.
-struct BoxNode {
-  Box3d box;
-  std::uint32_t first = 0;  ///< first part of a leaf; index of the second child of an inner node
-  std::uint32_t count = 0;  ///< number of parts; 0: inner node, whose first child follows it
-};
 
 Box3d boxOf(const TreeNode& part) {
   return {V3d(part.left, part.top, part.depthMin), V3d(part.right, part.bottom, part.depthMax)};
@@ -59,7 +60,7 @@ struct BezierCaster::Data {
   BezierVolume volume;
   std::vector<ComponentScale> scales;  ///< of each patch, by attribute
   std::vector<TreeNode> parts;         ///< in world space
-  std::vector<BoxNode> boxes;
+  std::vector<BezierBoxNode> boxes;
   Box3d bounds;
   double margin = 0;  ///< rounding errors of distances to boxes
 
@@ -177,7 +178,7 @@ std::vector<double> BezierCaster::extents(const std::vector<V3d>& directions) co
 }
 
 std::size_t BezierCaster::bytes() const {
-  std::size_t sum = data_->volume.bytes() + data_->boxes.size() * sizeof(BoxNode);
+  std::size_t sum = data_->volume.bytes() + data_->boxes.size() * sizeof(BezierBoxNode);
   for (const TreeNode& part : data_->parts)
     sum += sizeof(TreeNode) + sizeof(double) * part.points.capacity();
   return sum;
@@ -205,7 +206,7 @@ std::optional<BezierRoot> BezierCaster::cast(const Camera::Ray& ray, bool any) c
   while (!stack.empty()) {
     const std::uint32_t number = stack.back();
     stack.pop_back();
-    const BoxNode& node = data.boxes[number];
+    const BezierBoxNode& node = data.boxes[number];
     if (!meets(node.box, ray, inverse, margin, entry)) continue;
     if (node.count == 0) {
       stack.push_back(node.first);

@@ -7,12 +7,28 @@
 #include <utility>
 
 namespace render {
+
+// Homogeneous coordinates: w x, w y, w z, w (attribute − isovalue), w.
+inline constexpr std::size_t kJudgedParts = 5;
+/// Coefficients of the parts as polynomials in t ∈ [−1, 1]³, which covers a box; part fastest.
+using TaylorForm = std::vector<double>;
+
+/// A patch with one attribute.
+struct JudgedPatch {
+  std::array<int, 3> degree{};
+  std::vector<double> control;  ///< parts of the control points
+  std::array<double, kJudgedParts> most{};
+  std::unordered_map<std::uint64_t, TaylorForm> kept = {};  ///< empty form: no sign change
+
+  [[nodiscard]] std::size_t order(std::size_t axis) const {
+    return static_cast<std::size_t>(degree[axis] + 1);
+  }
+};
+
 namespace {
 
 using Imath::V3d;
 
-// Homogeneous coordinates: w x, w y, w z, w (attribute − isovalue), w.
-constexpr std::size_t kParts = 5;
 constexpr int kJudgedLevels = 24;
 // Taylor forms up to this level are kept: their indices fit into a key.
 constexpr int kKeptLevels = 8;
@@ -29,9 +45,6 @@ struct ParameterBox {
   int level = 0;
   std::array<std::uint32_t, 3> cell = {};
 };
-
-/// Coefficients of the parts as polynomials in t ∈ [−1, 1]³, which covers a box; part fastest.
-using TaylorForm = std::vector<double>;
 
 /// Powers of t of the Bernstein polynomials of one degree at centre + radius t:
 /// entry [a * (degree + 1) + i] is the factor of t^i in the polynomial a.
@@ -55,17 +68,6 @@ std::vector<double> taylorMatrix(int degree, double centre, double radius) {
   return rows;
 }
 
-struct JudgedPatch {
-  std::array<int, 3> degree{};
-  std::vector<double> control;  ///< parts of the control points
-  std::array<double, kParts> most{};
-  std::unordered_map<std::uint64_t, TaylorForm> kept = {};  ///< empty form: no sign change
-
-  [[nodiscard]] std::size_t order(std::size_t axis) const {
-    return static_cast<std::size_t>(degree[axis] + 1);
-  }
-};
-
 double centreOf(const ParameterBox& box, std::size_t axis) {
   return std::ldexp(static_cast<double>(box.cell[axis]) + 0.5, -box.level);
 }
@@ -80,15 +82,16 @@ TaylorForm taylorForm(const JudgedPatch& patch, const ParameterBox& box) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::vector<double> matrix =
         taylorMatrix(patch.degree[axis], centreOf(box, axis), radiusOf(box));
-    const std::size_t order = patch.order(axis), rest = from.size() / kParts / order;
+    const std::size_t order = patch.order(axis), rest = from.size() / kJudgedParts / order;
     std::vector<double> to(from.size(), 0.0);
     for (std::size_t a = 0; a < order; ++a)
       for (std::size_t n = 0; n < rest; ++n)
         for (std::size_t i = 0; i < order; ++i) {
           const double factor = matrix[a * order + i];
-          const double* source = from.data() + (a * rest + n) * kParts;
-          double* target = to.data() + (n * order + i) * kParts;
-          for (std::size_t part = 0; part < kParts; ++part) target[part] += factor * source[part];
+          const double* source = from.data() + (a * rest + n) * kJudgedParts;
+          double* target = to.data() + (n * order + i) * kJudgedParts;
+          for (std::size_t part = 0; part < kJudgedParts; ++part)
+            target[part] += factor * source[part];
         }
     from = std::move(to);
   }
@@ -121,10 +124,10 @@ class BezierJudge::Search {
       for (std::size_t n = 0; n < patch.points.size(); ++n) {
         const double w = patch.weights.empty() ? 1 : patch.weights[n];
         const V3d& p = patch.points[n];
-        const double parts[kParts] = {
+        const double parts[kJudgedParts] = {
             w * p.x, w * p.y, w * p.z,
             w * (patch.attributes[number % attributes][n] - volume.isovalue), w};
-        for (std::size_t part = 0; part < kParts; ++part) {
+        for (std::size_t part = 0; part < kJudgedParts; ++part) {
           judged.control.push_back(parts[part]);
           judged.most[part] = std::max(judged.most[part], std::abs(parts[part]));
         }
@@ -164,7 +167,8 @@ class BezierJudge::Search {
         return known->second.empty() ? nullptr : &known->second;
     own = taylorForm(patch, box);
     double spread = kTaylorRounding * patch.most[3];
-    for (std::size_t n = kParts; n < own.size(); n += kParts) spread += std::abs(own[n + 3]);
+    for (std::size_t n = kJudgedParts; n < own.size(); n += kJudgedParts)
+      spread += std::abs(own[n + 3]);
     const bool hasZero = std::abs(own[3]) <= spread;
     if (!isKept) return hasZero ? &own : nullptr;
     keptBytes_ += sizeof(double) * (hasZero ? own.size() : 0) + 64;
@@ -175,9 +179,9 @@ class BezierJudge::Search {
   TaylorLine line(const JudgedPatch& patch, const TaylorForm& form, const V3d& plane,
                   double offset) const {
     TaylorLine result;
-    result.c.resize(form.size() / kParts);
+    result.c.resize(form.size() / kJudgedParts);
     for (std::size_t n = 0; n < result.c.size(); ++n) {
-      const double* part = form.data() + n * kParts;
+      const double* part = form.data() + n * kJudgedParts;
       result.c[n] = plane.x * part[0] + plane.y * part[1] + plane.z * part[2] - offset * part[4];
     }
     result.noise = kTaylorRounding * (patch.most[0] + patch.most[1] + patch.most[2] +
@@ -205,7 +209,8 @@ class BezierJudge::Search {
       if (!depth.mayVanish() && (depth.c[0] < 0) != isFar) return;
     }
     lines[2].c.resize(lines[0].c.size());
-    for (std::size_t n = 0; n < lines[2].c.size(); ++n) lines[2].c[n] = (*form)[n * kParts + 3];
+    for (std::size_t n = 0; n < lines[2].c.size(); ++n)
+      lines[2].c[n] = (*form)[n * kJudgedParts + 3];
     lines[2].noise = kTaylorRounding * patch.most[3];
     const Verdict verdict = krawczyk(patch, lines);
     if (verdict == Verdict::None) return;
@@ -355,9 +360,9 @@ class BezierJudge::Search {
       if (!isUndecided && (u < -kOutside || u > 1 + kOutside)) return;
       root.parameter[c] = u;
     }
-    std::array<std::array<double, 4>, kParts> at{};
-    for (std::size_t part = 0; part < kParts; ++part)
-      at[part] = valueOf(patch, form.data() + part, kParts, t);
+    std::array<std::array<double, 4>, kJudgedParts> at{};
+    for (std::size_t part = 0; part < kJudgedParts; ++part)
+      at[part] = valueOf(patch, form.data() + part, kJudgedParts, t);
     const double w = at[4][0];
     const V3d position(at[0][0] / w, at[1][0] / w, at[2][0] / w);
     root.distance = (position - ray_.origin).dot(ray_.direction);
@@ -403,7 +408,7 @@ class BezierJudge::Search {
     const double* c = patch.control.data() + 3;
     for (std::size_t i = 0; i < patch.order(0); ++i)
       for (std::size_t j = 0; j < patch.order(1); ++j)
-        for (std::size_t k = 0; k < patch.order(2); ++k, c += kParts)
+        for (std::size_t k = 0; k < patch.order(2); ++k, c += kJudgedParts)
           sum += *c * rows[0][i * patch.order(0)] * rows[1][j * patch.order(1)] *
                  rows[2][k * patch.order(2)];
     return sum;
