@@ -58,7 +58,7 @@ bool meets(const Box3d& box, const Camera::Ray& ray, const V3d& inverse, double 
 
 struct BezierCaster::Data {
   BezierVolume volume;
-  std::vector<ComponentScale> scales;  ///< of each patch, by attribute
+  std::vector<ComponentScale> scales;  ///< for each patch, by attribute
   std::vector<TreeNode> parts;         ///< in world space
   std::vector<BezierBoxNode> boxes;
   Box3d bounds;

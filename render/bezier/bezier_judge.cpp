@@ -416,7 +416,7 @@ class BezierJudge::Search {
 
   std::size_t attributes_;
   std::vector<int> expression_;
-  std::vector<JudgedPatch> patches_;  ///< of each patch one for each attribute
+  std::vector<JudgedPatch> patches_;  ///< for each patch, by attribute
   std::size_t keptBytes_ = 0, boxes_ = 0;
   Camera::Ray ray_;
   V3d planes_[2];

@@ -57,11 +57,11 @@ class StageClock {
   double start_;
 };
 
-/// What the nodes of a tree share.
+/// Data that all nodes of a tree share.
 struct TreeContext {
   BezierView view;
   const BezierVolume* volume;
-  std::vector<ComponentScale> scales = {};  ///< of each patch, by attribute
+  std::vector<ComponentScale> scales = {};  ///< for each patch, by attribute
   bool allRoots, measureTime;
 
   [[nodiscard]] const ComponentScale& scaleOf(const TreeNode& node) const {
