@@ -75,7 +75,10 @@ class SharedTree::Data {
                                      static_cast<std::uint32_t>(n % attributes), context_.view,
                                      roots[n], context_.scales[n]) &&
                   isSeen(roots[n]);
-      if (!isKept[n]) roots[n] = {};
+      if (isKept[n])
+        proveNode<N>(roots[n], context_.scales[n]);
+      else
+        roots[n] = {};
     });
     std::vector<TreeNode> open;
     for (std::size_t n = 0; n < patches; ++n)
@@ -98,6 +101,7 @@ class SharedTree::Data {
         children[n].resize(TreeNodes<N>::split(large[n], context_.view, context_.scaleOf(large[n]),
                                                children[n].data(), scratch));
         std::erase_if(children[n], [&](const TreeNode& node) { return !isSeen(node); });
+        for (TreeNode& node : children[n]) proveNode<N>(node, context_.scaleOf(node));
       });
       counts_.splits += large.size();
       counts_.nodes += 8 * large.size();
@@ -116,6 +120,12 @@ class SharedTree::Data {
       return a.cell < b.cell;
     });
     for (const TreeNode& node : nodes_) counts_.peakBytes += bytesOf(node);
+  }
+
+  template <int N>
+  void proveNode(TreeNode& node, const ComponentScale& scale) const {
+    TreeNodes<N>::addFrame(node, context_.view, scale);
+    TreeNodes<N>::prove(node, context_.view);
   }
 
   template <int N>
@@ -143,7 +153,7 @@ class SharedTree::Data {
       if (asked.empty())
         for (std::uint32_t n = 0; n < count; ++n) asked.push_back(n);
       std::fill(rays.visits.begin(), rays.visits.end(), 0);
-      walk.visit(node, context_.scaleOf(node), asked, 0);
+      walk.visitProven(node, context_.scaleOf(node), asked);
     }
     Roots result;
     result.first.push_back(0);

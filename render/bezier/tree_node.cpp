@@ -159,86 +159,32 @@ constexpr int weightComponent(const BezierView& view) {
   return view.isPerspective ? kDepth : kWeight;
 }
 
-/// Sets the oriented box of a node, and finds out if it has at most one root.
+/// Control points of G at the centre of a node's frame, and their weights W. They are in memory
+/// that the calls of a thread use one after the other.
 template <int N>
-void addFrame(TreeNode& node, const BezierView& view, const ComponentScale& scale) {
-  const int w = weightComponent<N>(view);
-  const auto at = [](int component) { return static_cast<std::size_t>(component); };
-  const NodeJet<N> jet = TreeNodes<N>::jet(node, {0.5, 0.5, 0.5});
-  const double weight = jet.value[at(w)];
-  node.weight = weight;
-  node.centre = {jet.value[kAcross] / weight, jet.value[kDown] / weight};
-  const double bx = node.centre.x, by = node.centre.y;
-  double rows[3][3];
-  for (int j = 0; j < 3; ++j) {
-    rows[0][j] = jet.slope[j][kAcross] - bx * jet.slope[j][at(w)];
-    rows[1][j] = jet.slope[j][kDown] - by * jet.slope[j][at(w)];
-    rows[2][j] = jet.slope[j][kValue];
-  }
-  node.hasFrame = invert(rows, node.inverse);
-  node.isUnique = false;
-  if (!node.hasFrame) return;
+struct Combined {
+  std::size_t count;
+  std::array<double*, 3> rows;
+  double* weights;
 
-  const std::size_t count = node.points.size() / N;
-  thread_local std::vector<double> combined;
-  combined.resize(4 * count);
-  double* g[3] = {combined.data(), combined.data() + count, combined.data() + 2 * count};
-  double* weights = combined.data() + 3 * count;
-  double leastWeight = kInfinity;
-  for (std::size_t n = 0; n < count; ++n) {
-    weights[n] = node.points[n * N + at(w)];
-    leastWeight = std::min(leastWeight, weights[n]);
-  }
-  for (int r = 0; r < 3; ++r) {
-    const double* m = node.inverse[r];
-    NodeRange range;
-    for (std::size_t n = 0; n < count; ++n) {
-      const double* c = node.points.data() + n * N;
-      g[r][n] = m[0] * (c[kAcross] - bx * weights[n]) + m[1] * (c[kDown] - by * weights[n]) +
-                m[2] * c[kValue];
-      range.add(g[r][n] / weights[n]);
-    }
-    const double noise =
-        kNodeRounding / leastWeight *
-        (std::abs(m[0]) * (scale.most[kAcross] + std::abs(bx) * scale.most[at(w)]) +
-         std::abs(m[1]) * (scale.most[kDown] + std::abs(by) * scale.most[at(w)]) +
-         std::abs(m[2]) * scale.most[kValue]);
-    node.low[r] = range.low - noise;
-    node.high[r] = range.high + noise;
-    node.middle[r] = m[2] * jet.value[kValue];
-  }
-
-  // Rows of the derivative, for all s between low and high; linear in s, so its ends are bounds.
-  const std::size_t stride[3] = {
-      static_cast<std::size_t>(node.degree[1] + 1) * static_cast<std::size_t>(node.degree[2] + 1),
-      static_cast<std::size_t>(node.degree[2] + 1), 1};
-  for (int r = 0; r < 3; ++r) {
-    const double low = node.low[r], high = node.high[r];
-    for (std::size_t j = 0; j < 3; ++j) {
-      const double degree = node.degree[j];
-      const std::size_t block = stride[j] * static_cast<std::size_t>(node.degree[j] + 1);
-      NodeRange range;
-      for (std::size_t o = 0; o < count; o += block)
-        for (std::size_t n = o; n < o + block - stride[j]; ++n) {
-          const double change = g[r][n + stride[j]] - g[r][n],
-                       other = weights[n + stride[j]] - weights[n];
-          range.add(change - low * other);
-          range.add(change - high * other);
-        }
-      if (static_cast<int>(j) == r) {
-        node.least[r] = degree * range.low;
-        node.across[r][j] = 0;
-      } else {
-        node.across[r][j] = degree * std::max(range.high, -range.low);
-      }
+  Combined(const TreeNode& node, int weight) : count(node.points.size() / N) {
+    thread_local std::vector<double> memory;
+    memory.resize(4 * count);
+    weights = memory.data() + 3 * count;
+    const double* c = node.points.data();
+    for (std::size_t n = 0; n < count; ++n)
+      weights[n] = c[n * N + static_cast<std::size_t>(weight)];
+    for (std::size_t r = 0; r < 3; ++r) {
+      rows[r] = memory.data() + r * count;
+      const double* m = node.inverse[r];
+      // Σ m F = m0 X + m1 Y + m2 A − (m0 x + m1 y) W
+      const double offset = m[0] * node.centre.x + m[1] * node.centre.y;
+      for (std::size_t n = 0; n < count; ++n)
+        rows[r][n] = m[0] * c[n * N + kAcross] + m[1] * c[n * N + kDown] +
+                     m[2] * c[n * N + kValue] - offset * weights[n];
     }
   }
-  node.isUnique = true;
-  constexpr double kMargin = 1e-6;  // for roots beyond a face by a rounding error
-  for (int r = 0; r < 3; ++r)
-    if (!(node.least[r] > kMargin + node.across[r][0] + node.across[r][1] + node.across[r][2]))
-      node.isUnique = false;
-}
+};
 
 }  // namespace
 
@@ -267,8 +213,84 @@ NodeJet<N> TreeNodes<N>::jet(const TreeNode& node, const std::array<double, 3>& 
 }
 
 template <int N>
-bool TreeNodes<N>::analyse(TreeNode& node, const BezierView& view, const ComponentScale& scale) {
+void TreeNodes<N>::addFrame(TreeNode& node, const BezierView& view, const ComponentScale& scale) {
+  node.hasFrame = node.isUnique = false;
+  if (node.crossesEye) return;
+  const int w = weightComponent<N>(view);
+  const auto at = [](int component) { return static_cast<std::size_t>(component); };
+  const NodeJet<N> jet = TreeNodes<N>::jet(node, {0.5, 0.5, 0.5});
+  const double weight = jet.value[at(w)];
+  node.weight = weight;
+  node.centre = {jet.value[kAcross] / weight, jet.value[kDown] / weight};
+  const double bx = node.centre.x, by = node.centre.y;
+  double rows[3][3];
+  for (int j = 0; j < 3; ++j) {
+    rows[0][j] = jet.slope[j][kAcross] - bx * jet.slope[j][at(w)];
+    rows[1][j] = jet.slope[j][kDown] - by * jet.slope[j][at(w)];
+    rows[2][j] = jet.slope[j][kValue];
+  }
+  node.hasFrame = invert(rows, node.inverse);
+  if (!node.hasFrame) return;
+
+  const Combined<N> g(node, w);
+  double leastWeight = kInfinity;
+  for (std::size_t n = 0; n < g.count; ++n) leastWeight = std::min(leastWeight, g.weights[n]);
+  for (int r = 0; r < 3; ++r) {
+    const double* m = node.inverse[r];
+    NodeRange range;
+    for (std::size_t n = 0; n < g.count; ++n) range.add(g.rows[r][n] / g.weights[n]);
+    const double noise =
+        kNodeRounding / leastWeight *
+        (std::abs(m[0]) * (scale.most[kAcross] + std::abs(bx) * scale.most[at(w)]) +
+         std::abs(m[1]) * (scale.most[kDown] + std::abs(by) * scale.most[at(w)]) +
+         std::abs(m[2]) * scale.most[kValue]);
+    node.low[r] = range.low - noise;
+    node.high[r] = range.high + noise;
+    node.middle[r] = m[2] * jet.value[kValue];
+  }
+}
+
+template <int N>
+void TreeNodes<N>::prove(TreeNode& node, const BezierView& view) {
+  node.isUnique = false;
+  if (!node.hasFrame) return;
+  const Combined<N> g(node, weightComponent<N>(view));
+  // Rows of the derivative for all s between low and high; linear in s, so its ends are bounds.
+  const std::size_t stride[3] = {
+      static_cast<std::size_t>(node.degree[1] + 1) * static_cast<std::size_t>(node.degree[2] + 1),
+      static_cast<std::size_t>(node.degree[2] + 1), 1};
+  for (int r = 0; r < 3; ++r) {
+    const double low = node.low[r], high = node.high[r];
+    for (std::size_t j = 0; j < 3; ++j) {
+      const double degree = node.degree[j];
+      const std::size_t block = stride[j] * static_cast<std::size_t>(node.degree[j] + 1);
+      NodeRange range;
+      for (std::size_t o = 0; o < g.count; o += block)
+        for (std::size_t n = o; n < o + block - stride[j]; ++n) {
+          const double change = g.rows[r][n + stride[j]] - g.rows[r][n],
+                       other = g.weights[n + stride[j]] - g.weights[n];
+          range.add(change - low * other);
+          range.add(change - high * other);
+        }
+      if (static_cast<int>(j) == r) {
+        node.least[r] = degree * range.low;
+        node.across[r][j] = 0;
+      } else {
+        node.across[r][j] = degree * std::max(range.high, -range.low);
+      }
+    }
+  }
+  node.isUnique = true;
+  constexpr double kMargin = 1e-6;  // for roots beyond a face by a rounding error
+  for (int r = 0; r < 3; ++r)
+    if (!(node.least[r] > kMargin + node.across[r][0] + node.across[r][1] + node.across[r][2]))
+      node.isUnique = false;
+}
+
+template <int N>
+bool TreeNodes<N>::bound(TreeNode& node, const BezierView& view, const ComponentScale& scale) {
   const std::size_t count = node.points.size() / N;
+  node.hasFrame = node.isUnique = false;
   NodeRange value, depth, weighted;
   for (std::size_t n = 0; n < count; ++n) {
     const double* c = node.points.data() + n * N;
@@ -285,10 +307,7 @@ bool TreeNodes<N>::analyse(TreeNode& node, const BezierView& view, const Compone
   if (view.isPerspective) {
     if (!(weighted.high > 0)) return false;
     node.crossesEye = !(weighted.low > 1e-9 * weighted.high);
-    if (node.crossesEye) {
-      node.hasFrame = node.isUnique = false;
-      return true;
-    }
+    if (node.crossesEye) return true;
   } else {
     node.crossesEye = false;
   }
@@ -306,7 +325,6 @@ bool TreeNodes<N>::analyse(TreeNode& node, const BezierView& view, const Compone
   node.right = x.high + noise * scale.most[kAcross];
   node.top = y.low - noise * scale.most[kDown];
   node.bottom = y.high + noise * scale.most[kDown];
-  addFrame<N>(node, view, scale);
   return true;
 }
 
@@ -342,7 +360,7 @@ bool TreeNodes<N>::root(const BezierVolume& volume, std::uint32_t number, std::u
       largest = std::max(largest, length);
     }
   }
-  return analyse(node, view, scale);
+  return bound(node, view, scale);
 }
 
 template <int N>
@@ -370,7 +388,7 @@ bool TreeNodes<N>::turned(const TreeNode& world, const ComponentScale& worldScal
   const double most = worldScale.most[0] + worldScale.most[1] + worldScale.most[2] +
                       view.eye.length() * worldScale.most[kWeight];
   scale.most = {most, most, most, worldScale.most[kValue], worldScale.most[kWeight]};
-  return analyse(node, view, scale);
+  return bound(node, view, scale);
 }
 
 template <int N>
@@ -415,7 +433,7 @@ std::size_t TreeNodes<N>::split(const TreeNode& node, const BezierView& view,
         child.level = node.level + 1;
         child.cell = {2 * node.cell[0] + i, 2 * node.cell[1] + j, 2 * node.cell[2] + k};
       }
-      const bool hasLow = analyse(low, view, scale), hasHigh = analyse(high, view, scale);
+      const bool hasLow = bound(low, view, scale), hasHigh = bound(high, view, scale);
       if (!hasLow && hasHigh) std::swap(low, high);
       count += static_cast<std::size_t>(hasLow) + static_cast<std::size_t>(hasHigh);
     }

@@ -79,10 +79,14 @@ struct TreeNodes {
   static bool turned(const TreeNode& world, const ComponentScale& worldScale,
                      const BezierView& view, TreeNode& node,
                      ComponentScale& scale) requires(N == 5);
-  /// Sets the bounds of a node.
+  /// Sets the ranges of depths and screen positions.
   /// @return false if no visible part of the surface can be in the node
-  static bool analyse(TreeNode& node, const BezierView& view, const ComponentScale& scale);
-  /// Splits a node into eight, and analyses those that may have a part of the surface.
+  static bool bound(TreeNode& node, const BezierView& view, const ComponentScale& scale);
+  /// Sets the oriented box. @pre bound() has returned true
+  static void addFrame(TreeNode& node, const BezierView& view, const ComponentScale& scale);
+  /// Sets TreeNode::isUnique and the bounds of the derivatives. @pre addFrame()
+  static void prove(TreeNode& node, const BezierView& view);
+  /// Splits a node into eight, and bounds those that may have a part of the surface.
   /// @param children  at least eight nodes, whose memory is used again
   /// @return number of children
   static std::size_t split(const TreeNode& node, const BezierView& view,

@@ -131,46 +131,41 @@ class TreeWalk {
     if (levels_.empty()) levels_.resize(kDeepestLevel + 1);
   }
 
-  /// @param scale  of the patch of the node
-  void visit(const TreeNode& node, const ComponentScale& scale,
-             const std::vector<std::uint32_t>& asked, std::size_t depth) {
+  /// Starts in a node. @param scale  of the patch of the node
+  void visit(TreeNode& node, const ComponentScale& scale, const std::vector<std::uint32_t>& asked,
+             std::size_t depth) {
     std::vector<std::uint32_t>& rest = levels_[depth].rest;
     {
       const StageClock clock(context_.measureTime, counts_.overlapSeconds);
       overlap(node, asked, rest);
     }
     if (rest.empty()) return;
-    if (node.isUnique) {
-      const StageClock clock(context_.measureTime, counts_.solutionSeconds);
-      std::erase_if(rest, [&](std::uint32_t ray) { return solve(node, ray); });
+    {  // most nodes end before they need this
+      const StageClock clock(context_.measureTime, counts_.splitSeconds);
+      TreeNodes<N>::addFrame(node, context_.view, scale);
+    }
+    {
+      const StageClock clock(context_.measureTime, counts_.overlapSeconds);
+      overlapFrame(node, rest);
     }
     if (rest.empty()) return;
-    if (node.level >= kDeepestLevel) {
-      for (const std::uint32_t ray : rest) addCentre(node, ray);
-      return;
-    }
-    std::erase_if(rest, [&](std::uint32_t ray) {
-      const std::size_t visits = ++rays_.visits[ray];
-      if (visits == kMostVisits) ++counts_.overruns;
-      return visits >= kMostVisits;
-    });
-    if (rest.empty()) return;
-    Level& level = levels_[depth];
-    std::size_t count = 0;
     {
       const StageClock clock(context_.measureTime, counts_.splitSeconds);
-      count = TreeNodes<N>::split(node, context_.view, scale, level.children.data(), scratch_);
-      ++counts_.splits;
-      counts_.nodes += 8;
+      TreeNodes<N>::prove(node, context_.view);
     }
-    std::array<const TreeNode*, 8> order{};
-    for (std::size_t n = 0; n < count; ++n) order[n] = &level.children[n];
-    std::sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count),
-              [](const TreeNode* a, const TreeNode* b) {
-                if (a->depthMin != b->depthMin) return a->depthMin < b->depthMin;
-                return a->cell < b->cell;
-              });
-    for (std::size_t n = 0; n < count; ++n) visit(*order[n], scale, rest, depth + 1);
+    decide(node, scale, rest, depth);
+  }
+
+  /// Starts in a node that has its frame, and is proven if it can be.
+  void visitProven(const TreeNode& node, const ComponentScale& scale,
+                   const std::vector<std::uint32_t>& asked) {
+    std::vector<std::uint32_t>& rest = levels_[0].rest;
+    {
+      const StageClock clock(context_.measureTime, counts_.overlapSeconds);
+      overlap(node, asked, rest);
+      overlapFrame(node, rest);
+    }
+    decide(node, scale, rest, 0);
   }
 
   /// Memory of the nodes, bytes.
@@ -195,7 +190,45 @@ class TreeWalk {
     return levels;
   }
 
-  /// Keeps the rays whose position is in the boxes of a node, and that may have a nearer root.
+  /// Solves or splits a node for the rays that may meet it.
+  void decide(const TreeNode& node, const ComponentScale& scale, std::vector<std::uint32_t>& rest,
+              std::size_t depth) {
+    if (rest.empty()) return;
+    if (node.isUnique) {
+      const StageClock clock(context_.measureTime, counts_.solutionSeconds);
+      std::erase_if(rest, [&](std::uint32_t ray) { return solve(node, ray); });
+    }
+    if (rest.empty()) return;
+    if (node.level >= kDeepestLevel) {
+      for (const std::uint32_t ray : rest) addCentre(node, ray);
+      return;
+    }
+    std::erase_if(rest, [&](std::uint32_t ray) {
+      const std::size_t visits = ++rays_.visits[ray];
+      if (visits == kMostVisits) ++counts_.overruns;
+      return visits >= kMostVisits;
+    });
+    if (rest.empty()) return;
+    Level& level = levels_[depth];
+    std::size_t count = 0;
+    {
+      const StageClock clock(context_.measureTime, counts_.splitSeconds);
+      count = TreeNodes<N>::split(node, context_.view, scale, level.children.data(), scratch_);
+      ++counts_.splits;
+      counts_.nodes += 8;
+    }
+    std::array<TreeNode*, 8> order{};
+    for (std::size_t n = 0; n < count; ++n) order[n] = &level.children[n];
+    std::sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count),
+              [](const TreeNode* a, const TreeNode* b) {
+                if (a->depthMin != b->depthMin) return a->depthMin < b->depthMin;
+                return a->cell < b->cell;
+              });
+    for (std::size_t n = 0; n < count; ++n) visit(*order[n], scale, rest, depth + 1);
+  }
+
+  /// Keeps the rays whose position is in the box of a node on the screen, and that may have a
+  /// nearer root.
   void overlap(const TreeNode& node, const std::vector<std::uint32_t>& asked,
                std::vector<std::uint32_t>& rest) {
     rest.clear();
@@ -210,17 +243,23 @@ class TreeWalk {
       if (screen.x < node.left || screen.x > node.right || screen.y < node.top ||
           screen.y > node.bottom)
         continue;
-      if (node.hasFrame) {
-        const double x = screen.x - node.centre.x, y = screen.y - node.centre.y;
-        bool isInside = true;
-        for (int r = 0; r < 3; ++r) {
-          const double s = node.inverse[r][0] * x + node.inverse[r][1] * y;
-          isInside = isInside && s >= node.low[r] && s <= node.high[r];
-        }
-        if (!isInside) continue;
-      }
       rest.push_back(ray);
     }
+  }
+
+  /// Removes the rays outside the oriented box of a node.
+  void overlapFrame(const TreeNode& node, std::vector<std::uint32_t>& rest) const {
+    if (!node.hasFrame) return;
+    std::erase_if(rest, [&](std::uint32_t ray) {
+      const double x = rays_.screens[ray].x - node.centre.x,
+                   y = rays_.screens[ray].y - node.centre.y;
+      bool isInside = true;
+      for (int r = 0; r < 3; ++r) {
+        const double s = node.inverse[r][0] * x + node.inverse[r][1] * y;
+        isInside = isInside && s >= node.low[r] && s <= node.high[r];
+      }
+      return !isInside;
+    });
   }
 
   /// Constraints of a screen position at a point of a node, and their Jacobian.

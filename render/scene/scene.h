@@ -99,8 +99,6 @@ struct Scene {
   std::vector<MappedTexture> mapped = {};
   /// Drawn beside the solids. Not in a blended scene.
   std::optional<SegmentedPart> segmented = {};
-  /// Surfaces in Bézier volumes, drawn beside the solids. Not in a blended scene.
-  std::vector<BezierPart> beziers = {};
   /// Not with a ground, on which the volume would have no shadow.
   std::optional<VolumePart> volumePart = {};
   CsgExpression csg = {};  ///< expression over the solids; empty: each solid is drawn
@@ -109,6 +107,8 @@ struct Scene {
   std::optional<double> morph =
       {};  ///< fraction of the morph from the first solid to the second, [0, 1]; unset: no morph
   std::optional<Ground> ground = {};
+  /// Surfaces in Bézier volumes, drawn beside the solids. Not in a blended scene.
+  std::vector<BezierPart> beziers = {};
   /// True when the scene is drawn as the zero set of one function of all solids' fields: a soft
   /// expression or a morph (render/scene/field_expression.h).
   [[nodiscard]] bool isBlended() const { return softness > 0 || morph; }
