@@ -17,7 +17,8 @@ text = open(source).read()
 
 def numbers(name):
     body = re.search(name + r'\s*=\s*\[(.*?)\];', text, re.S).group(1)
-    return [float(n) for n in re.findall(r'-?\d+\.?\d*(?:e-?\d+)?', re.sub(r'/\*.*?\*/', '', body, flags=re.S))]
+    body = re.sub(r'/\*.*?\*/', '', body, flags=re.S).replace('- ', '-')
+    return [float(n) for n in re.findall(r'-?\d+\.?\d*(?:e-?\d+)?', body)]
 
 def write(name, patches):
     json.dump({"format": "levelsmith bezier volume", "version": 1, "patches": patches}, open(f'{folder}/{name}.json', 'w'))
@@ -52,5 +53,5 @@ json.dump({"format": "levelsmith scene", "version": 1,
                        {"name": "cylinder", "file": "cylinder.json", "colour": [0.62, 0.52, 0.68], "id": 5}]},
           open(f'{folder}/scene.json', 'w'))
 PYTHON
-"$levelsmith" --quiet read "$folder/scene.json" ! render "$out/bezier.png" --size 900x420 --from 3,-13,4.5 --to 0.6,-0.9,-0.2 \
-  --up 0,0,1 --fov 24 --ground --samples 16
+"$levelsmith" --quiet read "$folder/scene.json" ! render "$out/bezier.png" --size 720x336 --from 2,-12,5.5 --to 0.7,-0.9,-0.35 \
+  --up 0,0,1 --fov 31 --ground --samples 4

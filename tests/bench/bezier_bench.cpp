@@ -1,5 +1,6 @@
 // Shared subdivision trees beside the basic scheme, in the published workloads [Liu14]. CPU time of
-// the process, so other load of the machine matters little. Usage: bezier_bench [SIZE]
+// the process, so other load of the machine matters little. Usage: bezier_bench [SIZE [NAME]];
+// with NAME, only that row of the first two tables.
 #include <fmt/core.h>
 
 #include <array>
@@ -34,6 +35,8 @@ BezierVolume teapot() {
     std::string list = text.substr(text.find('[', begin) + 1, end - text.find('[', begin) - 1);
     for (std::size_t at = list.find("/*"); at != std::string::npos; at = list.find("/*"))
       list.erase(at, list.find("*/", at) + 2 - at);
+    for (std::size_t at = list.find("- "); at != std::string::npos; at = list.find("- "))
+      list.erase(at + 1, 1);
     std::size_t at = 0;
     while (at < list.size()) {
       const char* start = list.c_str() + at;
@@ -113,7 +116,7 @@ bool isSame(const BezierPicture& a, const BezierPicture& b) {
   return true;
 }
 
-void table(int width, int height) {
+void table(int width, int height, const std::string& only) {
   struct Case {
     const char* name;
     BezierVolume volume;
@@ -128,6 +131,7 @@ void table(int width, int height) {
   fmt::print("{}x{}\n{:<12} {:>7} {:>10} {:>10} {:>7} {:>10} {:>9}\n", width, height, "data",
              "cover %", "shared s", "basic s", "ratio", "published", "peak MB");
   for (const Case& c : cases) {
+    if (!only.empty() && c.name != only) continue;
     const Camera camera = fittedCamera(c.volume, width, height, c.share);
     const Timed shared = timed(c.volume, camera, kShared), basic = timed(c.volume, camera, kBasic);
     fmt::print("{:<12} {:>7.1f} {:>10.3f} {:>10.3f} {:>7.1f} {:>10.1f} {:>9.2f}{}\n", c.name,
@@ -211,8 +215,10 @@ void stages(int size) {
 
 int main(int argc, char** argv) {
   const int size = argc > 1 ? std::atoi(argv[1]) : 512;
-  table(size, size);
-  table(2 * size, 3 * size / 2);
+  const std::string only = argc > 2 ? argv[2] : "";
+  table(size, size, only);
+  table(2 * size, 3 * size / 2, only);
+  if (!only.empty()) return 0;
   degrees(size);
   resolutions(4 * size);
   preSubdivision(size / 2);
