@@ -101,7 +101,7 @@ TEST(SharedTree, FindsParametricSurfaces) {
       }
   }
   EXPECT_LE(distance, 4e-14);  // measured 1.2e-14
-  EXPECT_LE(normal, 1.4e-8);  // measured 4.8e-9
+  EXPECT_LE(normal, 1.4e-8);   // measured 4.8e-9
 }
 
 TEST(SharedTree, HasTheSameBitsForAnyNumberOfThreads) {
