@@ -221,8 +221,7 @@ std::optional<BezierRoot> BezierCaster::cast(const Camera::Ray& ray, bool any) c
 
   thread_local RayGroup group;
   group.screens.assign(1, Imath::V2d(0));
-  group.roots.resize(1);
-  group.roots[0].clear();
+  group.closest.resize(1);
   group.nearest.assign(1, Camera::kNoDepth);
   group.visits.resize(1);
   thread_local TreeNode node;
@@ -240,10 +239,10 @@ std::optional<BezierRoot> BezierCaster::cast(const Camera::Ray& ray, bool any) c
     group.visits[0] = 0;
     TreeWalk<5> walk(context, group, counts);
     walk.visit(node, scale, asked, 0);
-    if (any && !group.roots[0].empty()) break;
+    if (any && group.nearest[0] < Camera::kNoDepth) break;
   }
-  if (group.roots[0].empty()) return {};
-  return group.roots[0].front();
+  if (!(group.nearest[0] < Camera::kNoDepth)) return {};
+  return group.closest[0];
 }
 
 }  // namespace render

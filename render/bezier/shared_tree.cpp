@@ -141,7 +141,10 @@ class SharedTree::Data {
     }
     const std::size_t count = screens.size();
     rays.screens = std::move(screens);
-    rays.roots.resize(count);
+    if (context_.allRoots)
+      rays.roots.resize(count);
+    else
+      rays.closest.resize(count);
     rays.nearest.assign(count, Camera::kNoDepth);
     rays.visits.assign(count, 0);
     TreeWalk<N> walk(context_, rays, counts);
@@ -157,9 +160,13 @@ class SharedTree::Data {
     }
     Roots result;
     result.first.push_back(0);
-    for (std::vector<BezierRoot>& roots : rays.roots) {
-      finishRoots(roots, context_.allRoots);
-      result.roots.insert(result.roots.end(), roots.begin(), roots.end());
+    for (std::size_t n = 0; n < count; ++n) {
+      if (context_.allRoots) {
+        finishRoots(rays.roots[n]);
+        result.roots.insert(result.roots.end(), rays.roots[n].begin(), rays.roots[n].end());
+      } else if (rays.nearest[n] < Camera::kNoDepth) {
+        result.roots.push_back(rays.closest[n]);
+      }
       result.first.push_back(result.roots.size());
     }
     counts.peakBytes = walk.bytes();

@@ -73,7 +73,8 @@ struct TreeContext {
 struct RayGroup {
   std::vector<Imath::V2d> screens;
   std::vector<std::vector<BezierRoot>> roots;
-  std::vector<double> nearest;  ///< depth of the nearest root so far
+  std::vector<double> nearest;      ///< depth of the nearest root so far
+  std::vector<BezierRoot> closest;  ///< that root, if only the nearest one is asked for
   std::vector<std::size_t> visits;
 };
 
@@ -105,12 +106,8 @@ inline bool isSameRoot(const BezierRoot& a, const BezierRoot& b) {
 }
 
 /// Sorts roots by depth and removes those that several nodes have found.
-inline void finishRoots(std::vector<BezierRoot>& roots, bool all) {
+inline void finishRoots(std::vector<BezierRoot>& roots) {
   std::sort(roots.begin(), roots.end(), isBefore);
-  if (!all) {
-    if (roots.size() > 1) roots.resize(1);
-    return;
-  }
   std::vector<BezierRoot> kept;
   for (const BezierRoot& root : roots) {
     const bool isKnown = std::any_of(kept.rbegin(), kept.rend(), [&](const BezierRoot& other) {
@@ -403,8 +400,8 @@ class TreeWalk {
     root.isEntry = root.normal.dot(along) < 0;
     if (isSingular) ++counts_.singular;
     if (!context_.allRoots) {
-      if (!rays_.roots[ray].empty() && !isBefore(root, rays_.roots[ray].front())) return;
-      rays_.roots[ray].assign(1, root);
+      if (rays_.nearest[ray] < Camera::kNoDepth && !isBefore(root, rays_.closest[ray])) return;
+      rays_.closest[ray] = root;
       rays_.nearest[ray] = root.depth;
     } else {
       rays_.roots[ray].push_back(root);

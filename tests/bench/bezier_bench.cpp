@@ -1,6 +1,7 @@
 // Shared subdivision trees beside the basic scheme, in the published workloads [Liu14]. CPU time of
 // the process, so other load of the machine matters little. Usage: bezier_bench [SIZE [NAME]];
-// with NAME, only that row of the first two tables.
+// with NAME, only that row of the first two tables; with the name growth, only the growth with the
+// resolution.
 #include <fmt/core.h>
 
 #include <array>
@@ -216,6 +217,10 @@ void stages(int size) {
 int main(int argc, char** argv) {
   const int size = argc > 1 ? std::atoi(argv[1]) : 512;
   const std::string only = argc > 2 ? argv[2] : "";
+  if (only == "growth") {
+    resolutions(4 * size);
+    return 0;
+  }
   table(size, size, only);
   table(2 * size, 3 * size / 2, only);
   if (!only.empty()) return 0;
