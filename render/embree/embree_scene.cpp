@@ -1,12 +1,15 @@
 #include <Imath/ImathBoxAlgo.h>
 #include <embree3/rtcore.h>
 #include <fmt/core.h>
+#include <tbb/enumerable_thread_specific.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "levelset/error.h"
+#include "render/bezier/bezier_judge.h"
+#include "render/bezier/bezier_part.h"
 #include "render/embree/bcc_cell_vdb.h"
 #include "render/embree/embree_renderer.h"
 #include "render/embree/field_march.h"
@@ -190,6 +193,10 @@ struct EmbreeScene::Impl {
   std::optional<SegmentedPart> segmented;
   std::optional<InterfaceJudge> judge;
   std::size_t interfaceSolid = 0;  // Hit::solid of its hits
+  // Surfaces in Bézier volumes, with judges for each thread.
+  std::vector<BezierPart> beziers;
+  std::size_t bezierSolid = 0;  // Hit::solid of the first of them
+  mutable tbb::enumerable_thread_specific<std::vector<BezierJudge>> bezierJudges;
   bool isOpaque;
   Box3d allBounds;  // world-space box of the solids, meshes and interfaces
   Box3d bounds;     // world-space box of the grid cells that the solids' surfaces cross
@@ -212,9 +219,9 @@ struct EmbreeScene::Impl {
   /// @pre the direction is finite and not zero
   [[nodiscard]] Hit intersectSolids(const V3d& origin, const V3d& direction, double near,
                                     double far) const;
-  /// First hit with a segmented field.
-  [[nodiscard]] Hit intersectInterfaces(const V3d& origin, const V3d& direction, double near,
-                                        double far) const;
+  /// First hit with a segmented field or a Bézier volume, which are opaque.
+  [[nodiscard]] Hit intersectOpaque(const V3d& origin, const V3d& direction, double near,
+                                    double far) const;
   void complete(Hit& hit, const RayQuery& query, const RaySolid& solid, double moved,
                 double t) const;
 };
@@ -226,6 +233,8 @@ EmbreeScene::Impl::Impl(const Scene& source, Filter filter)
     judge.emplace(source.segmented->caster);
     interfaceSolid = source.solids.size() + source.mapped.size();
   }
+  beziers = source.beziers;
+  bezierSolid = source.solids.size() + source.mapped.size() + (segmented ? 1 : 0);
   if (source.isBlended()) {
     fields.emplace(source);
     allBounds = source.bounds();
@@ -235,6 +244,7 @@ EmbreeScene::Impl::Impl(const Scene& source, Filter filter)
   allBounds = bounds;
   allBounds.extendBy(meshes.bounds());
   if (segmented) allBounds.extendBy(segmented->caster.bounds());
+  for (const BezierPart& part : beziers) allBounds.extendBy(part.caster.bounds());
   if (allBounds.isEmpty()) allBounds = source.volumeBounds();
   if (bounds.isEmpty()) return;
   build();
@@ -365,12 +375,26 @@ EmbreeScene::EmbreeScene(const Scene& scene, Filter filter)
 EmbreeScene::~EmbreeScene() = default;
 EmbreeScene::EmbreeScene(EmbreeScene&&) noexcept = default;
 
-Hit EmbreeScene::Impl::intersectInterfaces(const V3d& origin, const V3d& direction, double near,
-                                           double far) const {
-  if (!judge) return {};
+Hit EmbreeScene::Impl::intersectOpaque(const V3d& origin, const V3d& direction, double near,
+                                       double far) const {
+  Hit nearest;
+  if (!judge && beziers.empty()) return nearest;
   requireRay(origin, direction);
-  const InterfaceRay ray{origin, direction, near, far};
-  return segmented->hitOf(ray, judge->firstHit(ray), interfaceSolid);
+  if (judge) {
+    const InterfaceRay ray{origin, direction, near, far};
+    nearest = segmented->hitOf(ray, judge->firstHit(ray), interfaceSolid);
+  }
+  if (beziers.empty()) return nearest;
+  std::vector<BezierJudge>& judges = bezierJudges.local();
+  if (judges.empty())
+    for (const BezierPart& part : beziers) judges.emplace_back(part.caster.volume());
+  for (std::size_t n = 0; n < beziers.size(); ++n) {
+    const Camera::Ray ray{origin, direction, near, nearest.found ? nearest.distance : far};
+    const std::vector<JudgedRoot> roots = judges[n].roots(ray);
+    if (!roots.empty())
+      nearest = beziers[n].hitOf(ray, roots[0].distance, roots[0].normal, bezierSolid + n);
+  }
+  return nearest;
 }
 
 Hit EmbreeScene::Impl::intersectSolids(const V3d& origin, const V3d& direction, double near,
@@ -405,8 +429,8 @@ Hit EmbreeScene::intersect(const V3d& origin, const V3d& direction, double near,
     const Hit onMesh = impl_->meshes.intersect(origin, direction, near, end());
     if (onMesh.found) nearest = onMesh;
   }
-  const Hit onInterface = impl_->intersectInterfaces(origin, direction, near, end());
-  return onInterface.found ? onInterface : nearest;
+  const Hit onOpaque = impl_->intersectOpaque(origin, direction, near, end());
+  return onOpaque.found ? onOpaque : nearest;
 }
 
 std::vector<Hit> EmbreeScene::intersectVisible(const V3d& origin, const V3d& direction, double near,
@@ -417,9 +441,8 @@ std::vector<Hit> EmbreeScene::intersectVisible(const V3d& origin, const V3d& dir
     if (hit.found) hits.push_back(hit);
     return hits;
   }
-  // Interfaces are opaque.
-  const Hit onInterface = impl_->intersectInterfaces(origin, direction, near, far);
-  if (onInterface.found) far = onInterface.distance;
+  const Hit onOpaque = impl_->intersectOpaque(origin, direction, near, far);
+  if (onOpaque.found) far = onOpaque.distance;
   double share = 1;
   // Adds the mesh hits up to the distance `end` along the ray. Returns true when a surface behind
   // these meshes is visible.
@@ -452,7 +475,7 @@ std::vector<Hit> EmbreeScene::intersectVisible(const V3d& origin, const V3d& dir
       return share >= kLeastTransmittance;
     });
   }
-  if (addMeshes(far) && onInterface.found) hits.push_back(onInterface);
+  if (addMeshes(far) && onOpaque.found) hits.push_back(onOpaque);
   return hits;
 }
 
@@ -466,7 +489,7 @@ double EmbreeScene::transmittance(const V3d& origin, const V3d& direction, doubl
 bool EmbreeScene::isOccluded(const V3d& origin, const V3d& direction, double near,
                              double far) const {
   if (impl_->meshes.isOccluded(origin + direction * near, direction, far - near)) return true;
-  if (impl_->intersectInterfaces(origin, direction, near, far).found) return true;
+  if (impl_->intersectOpaque(origin, direction, near, far).found) return true;
   if (impl_->fields) {
     requireRay(origin, direction);
     return impl_->fields->isOccluded(origin, direction, near, far);

@@ -171,12 +171,12 @@ std::vector<InterfaceHit> KernelTracer::interfaceHits(const InterfaceCaster& cas
 }
 
 KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter)
-    : meshes_(scene), mapped_(scene), segmented_(scene.segmented) {
+    : meshes_(scene), mapped_(scene), segmented_(scene.segmented), beziers_(scene.beziers) {
   makeTables(scene, {.filter = filter, .maxBytes = maxBytes}, false);
 }
 
 KernelScene::KernelScene(const Scene& scene, const RenderOptions& options)
-    : meshes_(scene), mapped_(scene), segmented_(scene.segmented) {
+    : meshes_(scene), mapped_(scene), segmented_(scene.segmented), beziers_(scene.beziers) {
   makeTables(scene, options, true);
 }
 
@@ -208,10 +208,12 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
       2 * 4 * (std::max(BrickPool::kCubeValues, 4 * BrickPool::kSites) + BrickPool::kMaskWords) +
       kCopies;
   levelset::requireMemory(leaves * kBytesOfBlock, options.maxBytes);
-  // Culling knows how far light rays start from solids and meshes, but not from mapped textures.
-  const FrustumCulling culling = isPicture && !box.isEmpty() && mapped_.isEmpty()
-                                     ? FrustumCulling(scene, options, box)
-                                     : FrustumCulling();
+  // Culling knows how far light rays start from solids and meshes, but not from mapped textures and
+  // Bézier volumes.
+  const FrustumCulling culling =
+      isPicture && !box.isEmpty() && mapped_.isEmpty() && beziers_.empty()
+          ? FrustumCulling(scene, options, box)
+          : FrustumCulling();
   for (std::size_t i = 0; i < scene.solids.size(); ++i) {
     const Solid& source = scene.solids[i];
     if (source.isEmpty(options.filter) || (!scene.csg.isEmpty() && !scene.csg.uses(i))) continue;
@@ -266,6 +268,11 @@ void KernelScene::updateView(const Scene& scene) {
   bounds_ = meshes_.bounds();
   bounds_.extendBy(mapped_.bounds());
   if (segmented_) bounds_.extendBy(segmented_->caster.bounds());
+  for (const BezierPart& part : beziers_) bounds_.extendBy(part.caster.bounds());
+  trees_.clear();
+  for (const BezierPart& part : beziers_)
+    trees_.push_back(std::make_shared<const SharedTree>(part.caster.volume(), scene.camera));
+  bezierSolid_ = scene.solids.size() + scene.mapped.size() + (segmented_ ? 1 : 0);
   tableBounds_ = bounds_;
   for (const Extent& extent : extents_) {
     const M44d toWorld = scene.solids[extent.index].indexToWorld();
@@ -287,7 +294,23 @@ std::size_t KernelScene::bytes() const {
   std::size_t sum = fields_ ? fields_->bytes() : 0;
   for (const KernelSolid& solid : solids_) sum += solid.pool.bytes();
   if (segmented_) sum += segmented_->caster.field().memoryUse() + segmented_->caster.bytes();
+  for (const BezierPart& part : beziers_) sum += part.caster.bytes();
+  for (const auto& tree : trees_) sum += tree->counts().peakBytes;
   return sum + mapped_.bytes();
+}
+
+std::vector<Hit> KernelScene::castBeziers(const std::vector<Camera::Ray>& rays) const {
+  std::vector<Hit> hits(beziers_.empty() ? 0 : rays.size());
+  for (std::size_t part = 0; part < beziers_.size(); ++part) {
+    const SharedTree::Roots found = trees_[part]->rootsOf(rays);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      if (found.first[i] == found.first[i + 1]) continue;
+      const BezierRoot& root = found.roots[found.first[i]];
+      if (hits[i].found && hits[i].distance <= root.distance) continue;
+      hits[i] = beziers_[part].hitOf(rays[i], root.distance, root.normal, bezierSolid_ + part);
+    }
+  }
+  return hits;
 }
 
 PixelHits KernelScene::castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const {
@@ -463,6 +486,11 @@ std::vector<double> KernelScene::transmittances(const KernelTracer& tracer,
     for (std::size_t n = 0; n < numbers.size(); ++n)
       if (hits[n].found) light[numbers[n]] = 0;
   }
+  for (const BezierPart& part : beziers_)
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      if (light[i] >= kLeastTransmittance &&
+          part.caster.isOccluded({rays[i].origin, rays[i].direction, 0, rays[i].maxDistance}))
+        light[i] = 0;
   return light;
 }
 

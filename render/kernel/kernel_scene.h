@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -98,21 +99,21 @@ class KernelScene {
   /// picture are culled. @pre the camera is valid
   KernelScene(const Scene& scene, const RenderOptions& options);
 
-  /// Copies the camera of the scene, and the transforms and opacities of its solids. Brick tables
-  /// and meshes are not changed.
+  /// Copies the camera of the scene, for which it splits Bézier volumes, and the transforms and
+  /// opacities of its solids. Brick tables and meshes are not changed.
   /// @pre this object was built for any camera, not for one picture; the camera is valid; the scene
   /// has the solids and the expression that this object was built from
   void updateView(const Scene& scene);
 
   [[nodiscard]] const std::vector<KernelSolid>& solids() const { return solids_; }
-  /// World-space box of the meshes, the shells of mapped textures, the interfaces of a segmented
-  /// field and the grid cells that the solids' surfaces cross; empty when there are none. For a
-  /// blended scene: Scene::bounds(). If a volume has no surface and nothing else is drawn:
-  /// Scene::volumeBounds().
+  /// World-space box of the meshes, the shells of mapped textures, the Bézier volumes, the
+  /// interfaces of a segmented field and the grid cells that the solids' surfaces cross; empty when
+  /// there are none. For a blended scene: Scene::bounds(). If a volume has no surface and nothing
+  /// else is drawn: Scene::volumeBounds().
   [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }
-  /// World-space box of the meshes, the shells of mapped textures, the interfaces of a segmented
-  /// field and the blocks that the solids' surfaces cross. For a blended scene: Scene::bounds().
-  /// Its size determines the absolute error of single-precision positions.
+  /// World-space box of the meshes, the shells of mapped textures, the Bézier volumes, the
+  /// interfaces of a segmented field and the blocks that the solids' surfaces cross. For a blended
+  /// scene: Scene::bounds(). Its size determines the absolute error of single-precision positions.
   [[nodiscard]] const Imath::Box3d& tableBounds() const { return tableBounds_; }
   [[nodiscard]] const MeshRays& meshes() const { return meshes_; }
   [[nodiscard]] const MappedRays& mapped() const { return mapped_; }
@@ -123,6 +124,10 @@ class KernelScene {
   [[nodiscard]] const SegmentedPart* segmented() const {
     return segmented_ ? &*segmented_ : nullptr;
   }
+  /// Surfaces in Bézier volumes.
+  [[nodiscard]] const std::vector<BezierPart>& beziers() const { return beziers_; }
+  /// First hits of rays of the camera with the surfaces in Bézier volumes; empty without any.
+  [[nodiscard]] std::vector<Hit> castBeziers(const std::vector<Camera::Ray>& rays) const;
   [[nodiscard]] std::size_t bytes() const;
   /// Numbers of blocks of all solids, by their use in the brick tables.
   struct Counts {
@@ -178,6 +183,9 @@ class KernelScene {
   MeshRays meshes_;
   MappedRays mapped_;
   std::optional<SegmentedPart> segmented_;
+  std::vector<BezierPart> beziers_;
+  std::vector<std::shared_ptr<const SharedTree>> trees_;  // of beziers_, for the camera
+  std::size_t bezierSolid_ = 0;                           // Hit::solid of the first of beziers_
   std::optional<FieldTraversal> fields_;
   Imath::Box3d bounds_, tableBounds_;
   double near_ = 0, far_ = Camera::kNoDepth;  // visible depth range of the camera, world units

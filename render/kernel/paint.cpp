@@ -149,6 +149,7 @@ KernelPainter::FirstHits KernelPainter::firstHits(const KernelTracer& tracer,
       first.onInterfaces.push_back(
           segmented->hitOf(asked[i], hits[i], scene_.solids.size() + scene_.mapped.size()));
   }
+  first.onBeziers = surfaces_.castBeziers(rays);
   return first;
 }
 
@@ -175,6 +176,11 @@ Hit KernelPainter::hitOf(const Camera::Ray& ray, double meshNear, const PixelHit
     const Hit& onInterface = first.onInterfaces[i];
     if (onInterface.found && (!nearest.found || onInterface.distance < nearest.distance))
       nearest = onInterface;
+  }
+  if (!first.onBeziers.empty()) {
+    const Hit& onBezier = first.onBeziers[i];
+    if (onBezier.found && (!nearest.found || onBezier.distance < nearest.distance))
+      nearest = onBezier;
   }
   return nearest;
 }
@@ -438,6 +444,11 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
     image.attributes["ls:read"] =
         fmt::format("{} cells with corners of several regions, {:.1f} MB", caster.mixedCellCount(),
                     static_cast<double>(surfaces.bytes()) * 1e-6);
+  } else if (!surfaces.beziers().empty() && surfaces.solids().empty()) {
+    std::size_t parts = 0;
+    for (const BezierPart& part : surfaces.beziers()) parts += part.caster.partCount();
+    image.attributes["ls:read"] = fmt::format("{} parts of Bézier patches, {:.1f} MB", parts,
+                                              static_cast<double>(surfaces.bytes()) * 1e-6);
   } else {
     const KernelScene::Counts& counts = surfaces.counts();
     image.attributes["ls:read"] = fmt::format(

@@ -56,6 +56,7 @@ Imath::Box3d Scene::bounds() const {
   for (const MeshPart& part : meshes) all.extendBy(levelset::bounds(*part.mesh));
   forEachNode(mapped, [&](const Imath::V3d& p) { all.extendBy(p); });
   if (segmented) all.extendBy(segmented->caster.bounds());
+  for (const BezierPart& part : beziers) all.extendBy(part.caster.bounds());
   return all;
 }
 
@@ -74,6 +75,7 @@ std::vector<double> Scene::extents(const std::vector<Imath::V3d>& directions) co
     withoutOthers.meshes.clear();
     withoutOthers.mapped.clear();
     withoutOthers.segmented.reset();
+    withoutOthers.beziers.clear();
     const Imath::Box3d box = withoutOthers.bounds();
     for (std::size_t d = 0; d < directions.size(); ++d) {
       const double extent =
@@ -90,6 +92,7 @@ std::vector<double> Scene::extents(const std::vector<Imath::V3d>& directions) co
       ofSolids[d] = std::max(ofSolids[d], p.dot(directions[d]));
   });
   if (segmented) extend(ofSolids, segmented->caster.extents(directions));
+  for (const BezierPart& part : beziers) extend(ofSolids, part.caster.extents(directions));
   return ofSolids;
 }
 

@@ -11,6 +11,7 @@
 
 #include "levelset/mesh.h"
 #include "levelset/narrow_band.h"
+#include "render/bezier/bezier_part.h"
 #include "render/camera.h"
 #include "render/direct/direct_volume.h"
 #include "render/hit.h"
@@ -106,6 +107,8 @@ struct Scene {
   std::optional<double> morph =
       {};  ///< fraction of the morph from the first solid to the second, [0, 1]; unset: no morph
   std::optional<Ground> ground = {};
+  /// Surfaces in Bézier volumes, drawn beside the solids. Not in a blended scene.
+  std::vector<BezierPart> beziers = {};
   /// True when the scene is drawn as the zero set of one function of all solids' fields: a soft
   /// expression or a morph (render/scene/field_expression.h).
   [[nodiscard]] bool isBlended() const { return softness > 0 || morph; }

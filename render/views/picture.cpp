@@ -168,6 +168,12 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
   if (scene.segmented && scene.isBlended())
     throw levelset::UsageError(
         "a segmentation cannot be drawn beside a soft expression or a morph; draw it alone");
+  if (!scene.beziers.empty() && scene.isBlended())
+    throw levelset::UsageError(
+        "a Bézier volume cannot be drawn beside a soft expression or a morph; draw it alone");
+  if (!scene.beziers.empty() && options.thickness)
+    throw levelset::UsageError(
+        "the thickness of Bézier volumes cannot be measured; omit --thickness");
   if (scene.segmented && options.filter != Filter::Trilinear)
     throw levelset::UsageError(fmt::format(
         "segmentations support only the trilinear filter, not {}; omit the filter, or make a mesh "
@@ -255,6 +261,11 @@ std::map<std::string, std::string> sceneAttributes(const Scene& scene,
   if (scene.segmented)
     attributes["ls:segmentation"] =
         fmt::format("segmentation {:016x}", scene.segmented->caster.field().contentHash());
+  std::string beziers;
+  for (const BezierPart& part : scene.beziers)
+    beziers += fmt::format("{}{} patches", beziers.empty() ? "" : ", ",
+                           part.caster.volume().patches.size());
+  if (!beziers.empty()) attributes["ls:bezier"] = beziers;
   if (scene.volumePart) {
     const DirectVolume& volume = scene.volumePart->volume;
     attributes["ls:volume"] = fmt::format("volume {:016x}", volume.volume().contentHash());

@@ -20,6 +20,7 @@
 #include "levelset/transform/transform.h"
 #include "levelset/volume_files/volume_file.h"
 #include "render/scene/field_expression.h"
+#include "render/views/bezier_file.h"
 #include "render/views/picture.h"
 
 namespace render {
@@ -66,6 +67,7 @@ std::vector<std::string> solidNames(const Scene& scene) {
 void requireNames(const Scene& scene) {
   std::vector<std::string> names = solidNames(scene);
   for (const MeshPart& part : scene.meshes) names.push_back(part.name);
+  for (const BezierPart& part : scene.beziers) names.push_back(part.name);
   if (scene.volumePart) names.push_back(scene.volumePart->name);
   requireSceneNames(names);
 }
@@ -328,6 +330,23 @@ void readMeshPart(const Reader& reader, const Json& json, const std::filesystem:
   scene.meshes.push_back(std::move(part));
 }
 
+void readBezierPart(const Reader& reader, const Json& json, const std::filesystem::path& file,
+                    const ReadSceneOptions& options, Scene& scene) {
+  const std::string where = fmt::format("Bézier volume {}", scene.beziers.size() + 1);
+  reader.requireKnown(json, {"name", "file", "colour", "id"}, where);
+  struct {  // as a solid
+    std::string name;
+    std::uint32_t id = 0;
+    Imath::C3f colour{0.66f, 0.62f, 0.56f};
+    double opacity = 1;
+  } part;
+  reader.readPart(json, scene.solids.size() + scene.meshes.size() + scene.beziers.size() + 1, where,
+                  part);
+  BezierCaster caster(readBezierVolume(reader.partFile(json, file, where), options.maxMemory),
+                      options.maxMemory);
+  scene.beziers.push_back({std::move(caster), part.colour, part.id, part.name});
+}
+
 /// The volume with its grid placed in the world by a transform.
 levelset::Volume placedBy(const Imath::M44d& transform, const levelset::Volume& volume,
                           const levelset::Progress& progress) {
@@ -439,6 +458,11 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
   json["solids"] = Json::array();
   for (const Solid& solid : scene.solids) json["solids"].push_back(entryOf(solid, ".vdb"));
   for (const MeshPart& part : scene.meshes) json["meshes"].push_back(entryOf(part, ".ply"));
+  for (const BezierPart& part : scene.beziers)
+    json["beziers"].push_back({{"name", part.name},
+                               {"file", fileBeside(file, part.name, ".json").filename().string()},
+                               {"colour", colourJson(part.colour)},
+                               {"id", part.id}});
   if (!scene.csg.isEmpty()) json["csg"] = scene.csg.text();
   if (scene.softness > 0) json["soft"] = scene.softness;
   if (scene.morph) json["morph"] = *scene.morph;
@@ -452,6 +476,8 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
   for (const MeshPart& part : scene.meshes)
     levelset::writeMesh(fileBeside(file, part.name, ".ply"), *part.mesh,
                         {.progress = parts.next()});
+  for (const BezierPart& part : scene.beziers)
+    writeBezierVolume(fileBeside(file, part.name, ".json"), part.caster.volume());
   {
     std::ofstream stream(target.path(), std::ios::binary);
     stream << text << '\n';
@@ -464,6 +490,13 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
 }
 
 ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions& options) {
+  if (isBezierFile(file)) {
+    const std::size_t most = levelset::memoryLimit(options.maxMemory);
+    ViewedScene alone;
+    alone.scene.beziers.push_back(
+        {.caster = BezierCaster(readBezierVolume(file, most), most), .name = "volume"});
+    return alone;
+  }
   const Reader reader(file);
   const Json json = documentOf(file);
   const std::string whole = "the file";
@@ -473,7 +506,7 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
     reader.refuse(whole, fmt::format("is not of version {}", kVersion));
   reader.requireKnown(json,
                       {"format", "version", "camera", "light", "ambient", "solids", "meshes",
-                       "volumes", "csg", "soft", "morph"},
+                       "beziers", "volumes", "csg", "soft", "morph"},
                       whole);
   ViewedScene viewed;
   Scene& scene = viewed.scene;
@@ -489,8 +522,9 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
   const Json& solids = json.contains("solids") ? json.at("solids") : none;
   const Json& meshes = json.contains("meshes") ? json.at("meshes") : none;
   const Json& volumes = json.contains("volumes") ? json.at("volumes") : none;
-  if (!solids.is_array() || !meshes.is_array() || !volumes.is_array() ||
-      (solids.empty() && meshes.empty() && volumes.empty()))
+  const Json& beziers = json.contains("beziers") ? json.at("beziers") : none;
+  if (!solids.is_array() || !meshes.is_array() || !volumes.is_array() || !beziers.is_array() ||
+      (solids.empty() && meshes.empty() && volumes.empty() && beziers.empty()))
     reader.refuse(whole, "has no solids, no meshes and no volumes");
   if (volumes.size() > 1) reader.refuse(whole, "has several \"volumes\", but a scene can have one");
   Parts parts(options.progress, solids.size() + meshes.size() + volumes.size());
@@ -508,12 +542,17 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
     readMeshPart(reader, entry, file, rest, parts.next(), scene);
     spend(bytesOf(*scene.meshes.back().mesh));
   }
+  for (const Json& entry : beziers) {
+    readBezierPart(reader, entry, file, rest, scene);
+    spend(scene.beziers.back().caster.bytes());
+  }
   for (const Json& entry : volumes) readVolumePart(reader, entry, file, rest, parts.next(), scene);
   reader.withContext(whole, [&] { requireNames(scene); });
   std::set<std::uint32_t> ids;
   const auto isNew = [&](const auto& part) { return ids.insert(part.id).second; };
   if (!std::all_of(scene.solids.begin(), scene.solids.end(), isNew) ||
-      !std::all_of(scene.meshes.begin(), scene.meshes.end(), isNew))
+      !std::all_of(scene.meshes.begin(), scene.meshes.end(), isNew) ||
+      !std::all_of(scene.beziers.begin(), scene.beziers.end(), isNew))
     reader.refuse(whole, "gives the same \"id\" to two solids or meshes");
   if (json.contains("csg"))
     scene.csg = CsgExpression(reader.text(json, "csg", whole), solidNames(scene));

@@ -279,6 +279,7 @@ Operator readOperator() {
           "of "
           "points are read. Volumes keep their spacing and orientation; a .raw needs --size and "
           "--type. "
+          "The json file of a Bézier volume is a scene, too. "
           "'-' is standard input and needs --format.",
       .example = "levelsmith read dragon.ply.gz ! info",
       .params = {{.name = "file",

@@ -341,6 +341,11 @@ Json valueInfo(const Value& value, Invocation& in) {
     for (const render::MeshPart& part : scene.meshes)
       json["meshes"].push_back(
           {{"name", part.name}, {"id", part.id}, {"triangles", part.mesh->triangles.size()}});
+    for (const render::BezierPart& part : scene.beziers)
+      json["beziers"].push_back({{"name", part.name},
+                                 {"id", part.id},
+                                 {"patches", part.caster.volume().patches.size()},
+                                 {"attributes", part.caster.volume().attributeCount()}});
     for (const render::MappedTexture& texture : scene.mapped)
       json["mapped"].push_back({{"name", texture.name},
                                 {"id", texture.id},

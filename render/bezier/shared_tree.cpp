@@ -1,0 +1,301 @@
+#include "render/bezier/shared_tree.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+#include "levelset/error.h"
+#include "render/bezier/tree_node.h"
+#include "render/bezier/tree_walk.h"
+
+namespace render {
+namespace {
+
+using Imath::V2d;
+using Imath::V3d;
+
+/// Number of nodes that are split in advance at most.
+constexpr std::size_t kMostSharedNodes = 200'000;
+
+std::size_t bytesOf(const TreeNode& node) {
+  return sizeof(TreeNode) + sizeof(double) * node.points.capacity();
+}
+
+/// True for a node that must be split before it is given to tiles.
+bool isLarge(const TreeNode& node, const V2d& extent, const TreeOptions& options) {
+  if (node.level < options.uniformLevels) return true;
+  if (node.level >= options.sharedLevels || node.isUnique) return false;
+  return node.crossesEye || node.right - node.left > extent.x || node.bottom - node.top > extent.y;
+}
+
+}  // namespace
+
+class SharedTree::Data {
+ public:
+  Data(const BezierVolume& volume, const BezierView& view, const V2d& frame,
+       const TreeOptions& options)
+      : context_{view, &volume, {}, options.allRoots, options.measureTime},
+        isPolynomial_(view.isPerspective &&
+                      std::all_of(volume.patches.begin(), volume.patches.end(),
+                                  [](const BezierPatch& p) { return p.weights.empty(); })) {
+    if (isPolynomial_)
+      build<4>(volume, frame, options);
+    else
+      build<5>(volume, frame, options);
+  }
+
+  [[nodiscard]] Roots rootsOf(std::vector<V2d> screens, TreeCounts* counts) const {
+    return isPolynomial_ ? find<4>(std::move(screens), counts)
+                         : find<5>(std::move(screens), counts);
+  }
+  [[nodiscard]] const BezierView& view() const { return context_.view; }
+  [[nodiscard]] const TreeCounts& counts() const { return counts_; }
+
+ private:
+  /// Transforms the patches and splits large ones. @param frame  half extents of the picture on
+  /// the screen; 0 for a single ray
+  template <int N>
+  void build(const BezierVolume& volume, const V2d& frame, const TreeOptions& options) {
+    const StageClock clock(options.measureTime, counts_.groupSeconds);
+    const std::size_t attributes = volume.attributeCount(),
+                      patches = volume.patches.size() * attributes;
+    context_.scales.resize(patches);
+    std::vector<TreeNode> roots(patches);
+    std::vector<char> isKept(patches);
+    const auto isSeen = [&](const TreeNode& node) {
+      return node.crossesEye || (node.right >= -frame.x && node.left <= frame.x &&
+                                 node.bottom >= -frame.y && node.top <= frame.y);
+    };
+    tbb::parallel_for(std::size_t{0}, patches, [&](std::size_t n) {
+      isKept[n] = TreeNodes<N>::root(volume, static_cast<std::uint32_t>(n / attributes),
+                                     static_cast<std::uint32_t>(n % attributes), context_.view,
+                                     roots[n], context_.scales[n]) &&
+                  isSeen(roots[n]);
+      if (isKept[n])
+        proveNode<N>(roots[n], context_.scales[n]);
+      else
+        roots[n] = {};
+    });
+    std::vector<TreeNode> open;
+    for (std::size_t n = 0; n < patches; ++n)
+      if (isKept[n]) open.push_back(std::move(roots[n]));
+    counts_.nodes += patches;
+    const V2d extent = context_.view.step * static_cast<double>(options.tile);
+    while (!open.empty()) {
+      std::vector<TreeNode> large;
+      for (TreeNode& node : open)
+        (isLarge(node, extent, options) ? large : nodes_).push_back(std::move(node));
+      if (large.empty()) break;
+      if (large.size() + nodes_.size() > kMostSharedNodes) {
+        std::move(large.begin(), large.end(), std::back_inserter(nodes_));
+        break;
+      }
+      std::vector<std::vector<TreeNode>> children(large.size());
+      tbb::parallel_for(std::size_t{0}, large.size(), [&](std::size_t n) {
+        std::vector<double> scratch;
+        children[n].resize(8);
+        children[n].resize(TreeNodes<N>::split(large[n], context_.view, context_.scaleOf(large[n]),
+                                               children[n].data(), scratch));
+        std::erase_if(children[n], [&](const TreeNode& node) { return !isSeen(node); });
+        for (TreeNode& node : children[n]) proveNode<N>(node, context_.scaleOf(node));
+      });
+      counts_.splits += large.size();
+      counts_.nodes += 8 * large.size();
+      open.clear();
+      for (std::vector<TreeNode>& list : children)
+        std::move(list.begin(), list.end(), std::back_inserter(open));
+      double bytes = 0;
+      for (const TreeNode& node : open) bytes += static_cast<double>(bytesOf(node));
+      levelset::requireMemory(bytes, options.maxBytes);
+    }
+    std::sort(nodes_.begin(), nodes_.end(), [](const TreeNode& a, const TreeNode& b) {
+      if (a.depthMin != b.depthMin) return a.depthMin < b.depthMin;
+      if (a.patch != b.patch) return a.patch < b.patch;
+      if (a.attribute != b.attribute) return a.attribute < b.attribute;
+      if (a.level != b.level) return a.level < b.level;
+      return a.cell < b.cell;
+    });
+    for (const TreeNode& node : nodes_) counts_.peakBytes += bytesOf(node);
+  }
+
+  template <int N>
+  void proveNode(TreeNode& node, const ComponentScale& scale) const {
+    TreeNodes<N>::addFrame(node, context_.view, scale);
+    TreeNodes<N>::prove(node, context_.view);
+  }
+
+  template <int N>
+  [[nodiscard]] Roots find(std::vector<V2d> screens, TreeCounts* sums) const {
+    RayGroup rays;
+    TreeCounts counts;
+    double left = 1e300, right = -1e300, top = 1e300, bottom = -1e300;
+    for (const V2d& screen : screens) {
+      left = std::min(left, screen.x);
+      right = std::max(right, screen.x);
+      top = std::min(top, screen.y);
+      bottom = std::max(bottom, screen.y);
+    }
+    const std::size_t count = screens.size();
+    rays.screens = std::move(screens);
+    if (context_.allRoots)
+      rays.roots.resize(count);
+    else
+      rays.closest.resize(count);
+    rays.nearest.assign(count, Camera::kNoDepth);
+    rays.visits.assign(count, 0);
+    TreeWalk<N> walk(context_, rays, counts);
+    std::vector<std::uint32_t> asked;
+    for (const TreeNode& node : nodes_) {
+      if (!node.crossesEye &&
+          (node.left > right || node.right < left || node.top > bottom || node.bottom < top))
+        continue;
+      if (asked.empty())
+        for (std::uint32_t n = 0; n < count; ++n) asked.push_back(n);
+      std::fill(rays.visits.begin(), rays.visits.end(), 0);
+      walk.visitProven(node, context_.scaleOf(node), asked);
+    }
+    Roots result;
+    result.first.push_back(0);
+    for (std::size_t n = 0; n < count; ++n) {
+      if (context_.allRoots) {
+        finishRoots(rays.roots[n]);
+        result.roots.insert(result.roots.end(), rays.roots[n].begin(), rays.roots[n].end());
+      } else if (rays.nearest[n] < Camera::kNoDepth) {
+        result.roots.push_back(rays.closest[n]);
+      }
+      result.first.push_back(result.roots.size());
+    }
+    counts.peakBytes = walk.bytes();
+    if (sums) sums->add(counts);
+    return result;
+  }
+
+  TreeContext context_;
+  bool isPolynomial_;
+  std::vector<TreeNode> nodes_;  ///< from front to back
+  TreeCounts counts_;
+};
+
+void TreeCounts::add(const TreeCounts& other) {
+  nodes += other.nodes;
+  splits += other.splits;
+  tests += other.tests;
+  solutions += other.solutions;
+  steps += other.steps;
+  singular += other.singular;
+  overruns += other.overruns;
+  peakBytes = std::max(peakBytes, other.peakBytes);
+  overlapSeconds += other.overlapSeconds;
+  solutionSeconds += other.solutionSeconds;
+  splitSeconds += other.splitSeconds;
+  groupSeconds += other.groupSeconds;
+}
+
+SharedTree::SharedTree(const BezierVolume& volume, const Camera& camera,
+                       const TreeOptions& options) {
+  const BezierView view(camera);
+  data_ = std::make_unique<const Data>(
+      volume, view, V2d(view.step.x * view.middle.x, view.step.y * view.middle.y), options);
+}
+SharedTree::~SharedTree() = default;
+SharedTree::SharedTree(SharedTree&&) noexcept = default;
+SharedTree& SharedTree::operator=(SharedTree&&) noexcept = default;
+
+SharedTree::Roots SharedTree::rootsOf(const std::vector<Camera::Ray>& rays) const {
+  const BezierView& view = data_->view();
+  std::vector<V2d> screens;
+  screens.reserve(rays.size());
+  for (const Camera::Ray& ray : rays) {
+    if (view.isPerspective) {
+      const double depth = ray.direction.dot(view.axis);
+      screens.emplace_back(ray.direction.dot(view.right) / depth,
+                           ray.direction.dot(view.down) / depth);
+    } else {
+      const Imath::V3d offset = ray.origin - view.eye;
+      screens.emplace_back(offset.dot(view.right), offset.dot(view.down));
+    }
+  }
+  return data_->rootsOf(std::move(screens), nullptr);
+}
+
+SharedTree::Roots SharedTree::rootsAt(const std::vector<V2d>& positions, TreeCounts* counts) const {
+  std::vector<V2d> screens;
+  screens.reserve(positions.size());
+  for (const V2d& position : positions) screens.push_back(data_->view().at(position.x, position.y));
+  return data_->rootsOf(std::move(screens), counts);
+}
+const TreeCounts& SharedTree::counts() const {
+  return data_->counts();
+}
+
+BezierPicture castBezier(const BezierVolume& volume, const Camera& camera,
+                         const TreeOptions& options) {
+  requireBezierVolume(volume);
+  validate(camera);
+  levelset::report(options.progress, 0);
+  const SharedTree tree(volume, camera, options);
+  BezierPicture picture;
+  picture.width = camera.width;
+  picture.height = camera.height;
+  const int edge = options.tile;
+  const int across = (camera.width + edge - 1) / edge, down = (camera.height + edge - 1) / edge;
+  const auto tiles = static_cast<std::size_t>(across) * static_cast<std::size_t>(down);
+  std::vector<SharedTree::Roots> found(tiles);
+  std::vector<TreeCounts> counts(tiles);
+  std::mutex reporting;
+  std::size_t done = 0;
+  const auto cornerOf = [&](std::size_t tile) {
+    return Imath::V2i(static_cast<int>(tile % static_cast<std::size_t>(across)) * edge,
+                      static_cast<int>(tile / static_cast<std::size_t>(across)) * edge);
+  };
+  tbb::parallel_for(std::size_t{0}, tiles, [&](std::size_t tile) {
+    const Imath::V2i corner = cornerOf(tile);
+    std::vector<V2d> positions;
+    for (int y = corner.y; y < std::min(corner.y + edge, camera.height); ++y)
+      for (int x = corner.x; x < std::min(corner.x + edge, camera.width); ++x)
+        positions.emplace_back(x + 0.5, y + 0.5);
+    found[tile] = tree.rootsAt(positions, &counts[tile]);
+    const std::scoped_lock lock(reporting);
+    levelset::report(options.progress, static_cast<double>(++done) / static_cast<double>(tiles));
+  });
+  // Row by row. The first pass counts, the second one copies.
+  const std::size_t pixels =
+      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  picture.first.assign(pixels + 1, 0);
+  const auto forEachPixel = [&](const auto& use) {
+    for (std::size_t tile = 0; tile < tiles; ++tile) {
+      const Imath::V2i corner = cornerOf(tile);
+      std::size_t n = 0;
+      for (int y = corner.y; y < std::min(corner.y + edge, camera.height); ++y)
+        for (int x = corner.x; x < std::min(corner.x + edge, camera.width); ++x)
+          use(static_cast<std::size_t>(y) * static_cast<std::size_t>(camera.width) +
+                  static_cast<std::size_t>(x),
+              found[tile], n++);
+    }
+  };
+  forEachPixel([&](std::size_t pixel, const SharedTree::Roots& roots, std::size_t n) {
+    picture.first[pixel + 1] = roots.first[n + 1] - roots.first[n];
+  });
+  for (std::size_t pixel = 0; pixel < pixels; ++pixel)
+    picture.first[pixel + 1] += picture.first[pixel];
+  picture.roots.resize(picture.first.back());
+  forEachPixel([&](std::size_t pixel, const SharedTree::Roots& roots, std::size_t n) {
+    std::copy(roots.roots.begin() + static_cast<std::ptrdiff_t>(roots.first[n]),
+              roots.roots.begin() + static_cast<std::ptrdiff_t>(roots.first[n + 1]),
+              picture.roots.begin() + static_cast<std::ptrdiff_t>(picture.first[pixel]));
+  });
+  TreeCounts sums;
+  for (const TreeCounts& of : counts) sums.add(of);
+  const std::size_t shared = tree.counts().peakBytes;
+  const std::size_t largest = sums.peakBytes;
+  sums.add(tree.counts());
+  picture.counts = sums;
+  picture.counts.peakBytes = shared + largest;
+  return picture;
+}
+
+}  // namespace render

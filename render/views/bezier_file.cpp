@@ -1,0 +1,282 @@
+#include "render/views/bezier_file.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <utility>
+#include <vector>
+
+#include "levelset/error.h"
+#include "levelset/file_target.h"
+#include "levelset/files/json_depth.h"
+#include "render/scene/csg_expression.h"
+
+namespace render {
+namespace {
+
+using levelset::InvalidInput;
+using BezierJson = nlohmann::ordered_json;
+
+constexpr const char* kBezierFormat = "levelsmith bezier volume";
+constexpr int kBezierVersion = 1;
+/// Bytes of memory per character of a file: the character itself, and its share of a JSON node.
+constexpr double kBezierBytesPerLetter = 20;
+constexpr std::size_t kMostAttributes = 64;
+
+/// Reads the members of a document.
+class BezierReader {
+ public:
+  [[noreturn]] static void refuse(const std::string& what) {
+    throw InvalidInput(
+        fmt::format("the file {}; docs/bezier.md describes the format of Bézier volumes", what));
+  }
+
+  [[nodiscard]] static const BezierJson& member(const BezierJson& json, const char* name) {
+    if (!json.is_object() || !json.contains(name)) refuse(fmt::format("has no \"{}\"", name));
+    return json.at(name);
+  }
+
+  static void requireKnown(const BezierJson& json, const std::vector<std::string>& known) {
+    if (!json.is_object()) refuse("has a patch that is not an object");
+    for (const auto& [name, value] : json.items())
+      if (std::find(known.begin(), known.end(), name) == known.end())
+        refuse(fmt::format("has an unknown \"{}\"", name));
+  }
+
+  [[nodiscard]] static double number(const BezierJson& value, const char* where) {
+    if (!value.is_number() || !std::isfinite(value.get<double>()))
+      refuse(fmt::format("has a number in \"{}\" that is not finite", where));
+    return value.get<double>();
+  }
+
+  [[nodiscard]] static std::vector<double> numbers(const BezierJson& list, const char* where) {
+    if (!list.is_array()) refuse(fmt::format("has a \"{}\" that is not a list", where));
+    std::vector<double> result;
+    result.reserve(list.size());
+    for (const BezierJson& entry : list) result.push_back(number(entry, where));
+    return result;
+  }
+
+  /// Integers from 1 to `most`, one for each of two or three axes. @param axes  0: either
+  [[nodiscard]] static std::vector<int> integers(const BezierJson& json, const char* name, int most,
+                                                 std::size_t axes) {
+    const std::vector<double> given = numbers(member(json, name), name);
+    if (axes == 0 && given.size() != 2 && given.size() != 3)
+      refuse(fmt::format("has a \"{}\" without two or three numbers", name));
+    if (axes != 0 && given.size() != axes)
+      refuse(fmt::format("has {} numbers in \"{}\", not {}", given.size(), name, axes));
+    std::vector<int> result(given.size());
+    for (std::size_t axis = 0; axis < given.size(); ++axis) {
+      if (!(given[axis] >= 1) || given[axis] > most || given[axis] != std::floor(given[axis]))
+        refuse(
+            fmt::format("has {} in \"{}\", not an integer from 1 to {}", given[axis], name, most));
+      result[axis] = static_cast<int>(given[axis]);
+    }
+    return result;
+  }
+};
+
+/// Adds the patches of one entry of the list.
+void addPatches(const BezierJson& json, std::size_t attributes, BezierVolume& volume) {
+  BezierReader::requireKnown(json, {"degree", "count", "points", "weights", "knots"});
+  std::vector<int> degree = BezierReader::integers(json, "degree", levelset::kMostDegree, 0);
+  const bool isSurface = degree.size() == 2;
+  std::vector<int> count;
+  for (const int of : degree) count.push_back(of + 1);
+  if (json.contains("count"))
+    count = BezierReader::integers(json, "count", 1'000'000, degree.size());
+  if (isSurface && attributes != 1) BezierReader::refuse("has a surface beside several attributes");
+  const std::size_t numbers = isSurface ? 3 : 3 + attributes;
+  if (isSurface) {  // two equal layers
+    degree.push_back(1);
+    count.push_back(2);
+  }
+  const BezierJson& points = BezierReader::member(json, "points");
+  // Before any list of that length is built.
+  const double listed = 1.0 * count[0] * count[1] * (isSurface ? 1 : count[2]);
+  if (!points.is_array() || static_cast<double>(points.size()) != listed)
+    BezierReader::refuse(
+        fmt::format("has {} control points, but its \"count\" or \"degree\" needs {}",
+                    points.is_array() ? points.size() : 0, listed));
+  SplineVolume spline;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    spline.axes[axis] = levelset::uniformAxis(degree[axis], static_cast<std::size_t>(count[axis]));
+  if (json.contains("knots")) {
+    const BezierJson& knots = json.at("knots");
+    const std::size_t axes = isSurface ? 2 : 3;
+    if (!knots.is_array() || knots.size() != axes)
+      BezierReader::refuse(fmt::format("has \"knots\" that are not {} lists", axes));
+    for (std::size_t axis = 0; axis < axes; ++axis) {
+      std::vector<double> list = BezierReader::numbers(knots[axis], "knots");
+      const std::size_t wanted = spline.axes[axis].knots.size();
+      if (list.size() != wanted)
+        BezierReader::refuse(fmt::format("has {} knots instead of {} in list {} of \"knots\"",
+                                         list.size(), wanted, axis));
+      spline.axes[axis].knots = std::move(list);
+    }
+  }
+  spline.attributes.resize(attributes);
+  for (const BezierJson& entry : points) {
+    const std::vector<double> row = BezierReader::numbers(entry, "points");
+    if (row.size() != numbers)
+      BezierReader::refuse(
+          fmt::format("has a point of {} numbers, not {}: three coordinates and "
+                      "{} attribute{}",
+                      row.size(), numbers, numbers - 3, numbers == 4 ? "" : "s"));
+    spline.points.emplace_back(row[0], row[1], row[2]);
+    for (std::size_t a = 0; a + 3 < numbers; ++a) spline.attributes[a].push_back(row[3 + a]);
+  }
+  if (json.contains("weights")) {
+    spline.weights = BezierReader::numbers(json.at("weights"), "weights");
+    if (spline.weights.size() != spline.points.size())
+      BezierReader::refuse(fmt::format("has {} weights for {} control points",
+                                       spline.weights.size(), spline.points.size()));
+  }
+  if (isSurface) {
+    BezierPatch layers =
+        surfacePatch(count[0] - 1, count[1] - 1, spline.points, spline.weights, volume.isovalue);
+    spline.points = std::move(layers.points);
+    spline.attributes = std::move(layers.attributes);
+    spline.weights = std::move(layers.weights);
+  }
+  const bool isOnePatch =
+      count[0] == degree[0] + 1 && count[1] == degree[1] + 1 && count[2] == degree[2] + 1;
+  if (isOnePatch && !json.contains("knots")) {  // the numbers themselves, without rounding
+    volume.patches.push_back({{degree[0], degree[1], degree[2]},
+                              std::move(spline.points),
+                              std::move(spline.attributes),
+                              std::move(spline.weights)});
+    return;
+  }
+  for (BezierPatch& patch : bezierPatches(spline)) volume.patches.push_back(std::move(patch));
+}
+
+BezierVolume volumeOfText(const std::string& text) {
+  if (levelset::isJsonTooDeep(text)) BezierReader::refuse("has too deeply nested lists");
+  const BezierJson json = BezierJson::parse(text, nullptr, /*allow_exceptions=*/false);
+  if (json.is_discarded()) BezierReader::refuse("is not a JSON document, or is truncated");
+  if (BezierReader::member(json, "format") != kBezierFormat)
+    BezierReader::refuse("is not a Bézier volume");
+  if (BezierReader::number(BezierReader::member(json, "version"), "version") != kBezierVersion)
+    BezierReader::refuse(fmt::format("does not have version {}", kBezierVersion));
+  BezierReader::requireKnown(
+      json, {"format", "version", "isovalue", "attributes", "expression", "patches"});
+  BezierVolume volume;
+  if (json.contains("isovalue"))
+    volume.isovalue = BezierReader::number(json.at("isovalue"), "isovalue");
+  std::vector<std::string> names{"a"};
+  if (json.contains("attributes")) {
+    const BezierJson& list = json.at("attributes");
+    if (!list.is_array() || list.empty() || list.size() > kMostAttributes)
+      BezierReader::refuse(
+          fmt::format("has \"attributes\" that are not a list of 1 to {} names", kMostAttributes));
+    names.clear();
+    for (const BezierJson& name : list) {
+      if (!name.is_string()) BezierReader::refuse("has a name in \"attributes\" that is no text");
+      names.push_back(name.get<std::string>());
+    }
+  }
+  if (json.contains("expression")) {
+    const BezierJson& expression = json.at("expression");
+    if (!expression.is_string()) BezierReader::refuse("has an \"expression\" that is no text");
+    volume.expression = CsgExpression(expression.get<std::string>(), names).postfix();
+  }
+  const BezierJson& patches = BezierReader::member(json, "patches");
+  if (!patches.is_array()) BezierReader::refuse("has \"patches\" that are not a list");
+  for (std::size_t n = 0; n < patches.size(); ++n)
+    levelset::withContext(fmt::format("entry {} of \"patches\"", n),
+                          [&] { addPatches(patches[n], names.size(), volume); });
+  requireBezierVolume(volume);
+  return volume;
+}
+
+/// Text of an expression in postfix notation, with the attributes a0, a1 and so on.
+std::string textOf(const std::vector<int>& expression) {
+  std::vector<std::string> stack;
+  for (const int step : expression) {
+    if (step >= 0) {
+      stack.push_back(fmt::format("a{}", step));
+      continue;
+    }
+    const std::string right = std::move(stack.back());
+    stack.pop_back();
+    stack.back() = fmt::format("({} {} {})", stack.back(),
+                               step == CsgExpression::Union          ? "|"
+                               : step == CsgExpression::Intersection ? "&"
+                                                                     : "-",
+                               right);
+  }
+  return stack.back();
+}
+
+}  // namespace
+
+bool isBezierFile(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::string beginning(256, ' ');
+  stream.read(beginning.data(), static_cast<std::streamsize>(beginning.size()));
+  return beginning.find(kBezierFormat) != std::string::npos;
+}
+
+BezierVolume parseBezierVolume(const std::string& text, const std::string& name) {
+  return levelset::withContext(name, [&] { return volumeOfText(text); });
+}
+
+BezierVolume readBezierVolume(const std::filesystem::path& file, std::size_t maxMemory) {
+  std::error_code failed;
+  if (std::filesystem::is_directory(file, failed))
+    throw levelset::IoError(
+        fmt::format("{} is a folder; give the file of a Bézier volume", file.string()));
+  const auto size = std::filesystem::file_size(file, failed);
+  if (!failed)
+    levelset::requireMemory(kBezierBytesPerLetter * static_cast<double>(size), maxMemory);
+  std::ifstream stream(file, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  if (!stream)
+    throw levelset::IoError(
+        fmt::format("{} cannot be read; check its name and permissions", file.string()));
+  return parseBezierVolume(text, file.string());
+}
+
+void writeBezierVolume(const std::filesystem::path& file, const BezierVolume& volume) {
+  BezierJson json;
+  json["format"] = kBezierFormat;
+  json["version"] = kBezierVersion;
+  json["isovalue"] = volume.isovalue;
+  json["attributes"] = BezierJson::array();
+  for (std::size_t a = 0; a < volume.attributeCount(); ++a)
+    json["attributes"].push_back(fmt::format("a{}", a));
+  if (!volume.expression.empty()) json["expression"] = textOf(volume.expression);
+  json["patches"] = BezierJson::array();
+  for (const BezierPatch& patch : volume.patches) {
+    BezierJson entry;
+    entry["degree"] = patch.degree;
+    BezierJson points = BezierJson::array();
+    for (std::size_t n = 0; n < patch.points.size(); ++n) {
+      const Imath::V3d& p = patch.points[n];
+      BezierJson row = {p.x, p.y, p.z};
+      for (const std::vector<double>& attribute : patch.attributes) row.push_back(attribute[n]);
+      points.push_back(std::move(row));
+    }
+    entry["points"] = std::move(points);
+    if (!patch.weights.empty()) entry["weights"] = patch.weights;
+    json["patches"].push_back(std::move(entry));
+  }
+  levelset::FileTarget target(file);
+  {
+    std::ofstream stream(target.path(), std::ios::binary);
+    stream << json.dump() << '\n';
+    stream.flush();
+    if (!stream)
+      throw levelset::IoError(
+          fmt::format("{} cannot be written; check the free disk space", file.string()));
+  }
+  target.commit();
+}
+
+}  // namespace render

@@ -1,0 +1,231 @@
+// Shared subdivision trees beside the basic scheme, in the published workloads [Liu14]. CPU time of
+// the process, so other load of the machine matters little. Usage: bezier_bench [SIZE [NAME]];
+// with NAME, only that row of the first two tables; with the name growth, only the growth with the
+// resolution.
+#include <fmt/core.h>
+
+#include <array>
+#include <cstdlib>
+#include <ctime>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "render/bezier/shared_tree.h"
+#include "tests/support/bezier_scenes.h"
+
+namespace {
+
+using bezier_scenes::V3d;
+using render::BezierPicture;
+using render::BezierVolume;
+using render::Camera;
+using render::TreeOptions;
+
+/// The 32 patches of the teapot in data/models; none if the file is missing.
+BezierVolume teapot() {
+  std::ifstream stream(LEVELSMITH_DATA_DIR "/models/TeapotBufferGeometry.js");
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  const auto numbersAfter = [&](const char* name) {
+    std::vector<double> numbers;
+    const std::size_t begin = text.find(name);
+    if (begin == std::string::npos) return numbers;
+    const std::size_t end = text.find("];", begin);
+    std::string list = text.substr(text.find('[', begin) + 1, end - text.find('[', begin) - 1);
+    for (std::size_t at = list.find("/*"); at != std::string::npos; at = list.find("/*"))
+      list.erase(at, list.find("*/", at) + 2 - at);
+    for (std::size_t at = list.find("- "); at != std::string::npos; at = list.find("- "))
+      list.erase(at + 1, 1);
+    std::size_t at = 0;
+    while (at < list.size()) {
+      const char* start = list.c_str() + at;
+      char* stop = nullptr;
+      const double value = std::strtod(start, &stop);
+      if (stop == start) {
+        ++at;
+        continue;
+      }
+      numbers.push_back(value);
+      at += static_cast<std::size_t>(stop - start);
+    }
+    return numbers;
+  };
+  const std::vector<double> patches = numbersAfter("teapotPatches"),
+                            vertices = numbersAfter("teapotVertices");
+  BezierVolume volume;
+  for (std::size_t first = 0; first + 16 <= patches.size(); first += 16) {
+    std::vector<V3d> points;
+    for (std::size_t n = 0; n < 16; ++n) {
+      const auto v = static_cast<std::size_t>(patches[first + n]);
+      points.emplace_back(vertices[3 * v], vertices[3 * v + 1], vertices[3 * v + 2]);
+    }
+    volume.patches.push_back(render::surfacePatch(3, 3, points));
+  }
+  return volume;
+}
+
+struct Timed {
+  double seconds;
+  BezierPicture picture;
+};
+
+Timed timed(const BezierVolume& volume, const Camera& camera, const TreeOptions& options) {
+  const std::clock_t start = std::clock();
+  BezierPicture picture = castBezier(volume, camera, options);
+  return {static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC, std::move(picture)};
+}
+
+// A tree for each ray, and one tree for all.
+const TreeOptions kBasic{.tile = 1, .sharedLevels = 0};
+const TreeOptions kShared{};
+
+Camera cameraOf(const BezierVolume& volume, int width, int height, double distance) {
+  Camera camera;
+  const Imath::Box3d box = volume.bounds();
+  camera.to = box.center();
+  camera.from = camera.to + V3d(1, -1.6, 0.9).normalized() * box.size().length() * distance;
+  camera.up = V3d(0, 0, 1);
+  camera.width = width;
+  camera.height = height;
+  return camera;
+}
+
+/// Camera that shows the surface on about the published share of the picture.
+Camera fittedCamera(const BezierVolume& volume, int width, int height, double share) {
+  double low = 0.1, high = 3;
+  for (int step = 0; step < 12; ++step) {
+    const double middle = 0.5 * (low + high);
+    const BezierPicture picture = castBezier(volume, cameraOf(volume, 64, 64, middle));
+    const double covered = static_cast<double>(picture.roots.size()) / 4096;
+    (covered > share ? low : high) = middle;
+  }
+  return cameraOf(volume, width, height, high);
+}
+
+double coverOf(const BezierPicture& picture) {
+  return 100.0 * static_cast<double>(picture.roots.size()) /
+         (static_cast<double>(picture.width) * picture.height);
+}
+
+bool isSame(const BezierPicture& a, const BezierPicture& b) {
+  if (a.first != b.first) return false;
+  for (std::size_t n = 0; n < a.roots.size(); ++n)
+    if (!(std::abs(a.roots[n].depth - b.roots[n].depth) <= 1e-9 * std::abs(a.roots[n].depth)))
+      return false;
+  return true;
+}
+
+void table(int width, int height, const std::string& only) {
+  struct Case {
+    const char* name;
+    BezierVolume volume;
+    double share, published;
+  };
+  std::vector<Case> cases = {{"teardrop", bezier_scenes::teardrop(), 0.389, 41.6},
+                             {"cylinder", bezier_scenes::bentCylinder(), 0.681, 11.4},
+                             {"dice", bezier_scenes::dice(), 0.325, 11.03},
+                             {"cheese", bezier_scenes::cheese(), 0.325, 9.56}};
+  if (BezierVolume surfaces = teapot(); !surfaces.patches.empty())
+    cases.push_back({"teapot", std::move(surfaces), 0.682, 12.9});
+  fmt::print("{}x{}\n{:<12} {:>7} {:>10} {:>10} {:>7} {:>10} {:>9}\n", width, height, "data",
+             "cover %", "shared s", "basic s", "ratio", "published", "peak MB");
+  for (const Case& c : cases) {
+    if (!only.empty() && c.name != only) continue;
+    const Camera camera = fittedCamera(c.volume, width, height, c.share);
+    const Timed shared = timed(c.volume, camera, kShared), basic = timed(c.volume, camera, kBasic);
+    fmt::print("{:<12} {:>7.1f} {:>10.3f} {:>10.3f} {:>7.1f} {:>10.1f} {:>9.2f}{}\n", c.name,
+               coverOf(shared.picture), shared.seconds, basic.seconds,
+               basic.seconds / shared.seconds, c.published,
+               static_cast<double>(shared.picture.counts.peakBytes) / 1e6,
+               isSame(shared.picture, basic.picture) ? "" : "  the pictures differ");
+  }
+}
+
+void degrees(int size) {
+  fmt::print("\nsphere, {}x{}\n{:<8} {:>10} {:>10} {:>7}\n", size, size, "degree", "shared s",
+             "basic s", "ratio");
+  for (int degree = 2; degree <= 5; ++degree) {
+    const BezierVolume volume = bezier_scenes::sphere(degree);
+    const Camera camera = fittedCamera(volume, size, size, 0.4);
+    const double shared = timed(volume, camera, kShared).seconds,
+                 basic = timed(volume, camera, kBasic).seconds;
+    fmt::print("{:<8} {:>10.3f} {:>10.3f} {:>7.1f}\n", degree, shared, basic, basic / shared);
+  }
+}
+
+void resolutions(int most) {
+  fmt::print("\n{:<12} {:>6} {:>10} {:>9} {:>9} {:>9}\n", "data", "size", "shared s", "growth",
+             "nodes MB", "growth");
+  for (const auto& [name, volume] :
+       {std::pair<const char*, BezierVolume>{"teardrop", bezier_scenes::teardrop()},
+        {"cylinder", bezier_scenes::bentCylinder()},
+        {"dice", bezier_scenes::dice()}}) {
+    double seconds = 0, bytes = 0;
+    for (int size = most / 8; size <= most; size *= 2) {
+      const Timed run = timed(volume, cameraOf(volume, size, size, 1.2), kShared);
+      const auto memory = static_cast<double>(run.picture.counts.peakBytes);
+      fmt::print("{:<12} {:>6} {:>10.3f} {:>9.2f} {:>9.2f} {:>9.2f}\n", name, size, run.seconds,
+                 seconds > 0 ? run.seconds / seconds : 0, memory / 1e6,
+                 bytes > 0 ? memory / bytes : 0);
+      seconds = run.seconds;
+      bytes = memory;
+    }
+  }
+}
+
+void preSubdivision(int size) {
+  fmt::print("\nbasic scheme after uniform splits, {}x{}\n{:<12} {:>7} {:>10} {:>16}\n", size, size,
+             "data", "levels", "basic s", "time / shared");
+  for (const auto& [name, volume] :
+       {std::pair<const char*, BezierVolume>{"teardrop", bezier_scenes::teardrop()},
+        {"cylinder", bezier_scenes::bentCylinder()}}) {
+    const Camera camera = cameraOf(volume, size, size, 1.2);
+    const double shared = timed(volume, camera, kShared).seconds;
+    for (int levels = 0; levels <= 4; ++levels) {
+      TreeOptions options = kBasic;
+      options.uniformLevels = levels;
+      const double seconds = timed(volume, camera, options).seconds;
+      fmt::print("{:<12} {:>7} {:>10.3f} {:>16.1f}\n", name, levels, seconds, seconds / shared);
+    }
+  }
+}
+
+void stages(int size) {
+  fmt::print("\nshares of the stages, {}x{}\n{:<12} {:>9} {:>9} {:>9} {:>9}\n", size, size, "data",
+             "overlap %", "split %", "newton %", "group %");
+  fmt::print("{:<12} {:>9} {:>9} {:>9} {:>9}\n", "published", 50.7, 31.4, 10.0, "7.9 (*)");
+  for (const auto& [name, volume] :
+       {std::pair<const char*, BezierVolume>{"teardrop", bezier_scenes::teardrop()},
+        {"cylinder", bezier_scenes::bentCylinder()},
+        {"dice", bezier_scenes::dice()}}) {
+    TreeOptions options = kShared;
+    options.measureTime = true;
+    const render::TreeCounts c =
+        timed(volume, cameraOf(volume, size, size, 1.2), options).picture.counts;
+    const double all =
+        (c.overlapSeconds + c.splitSeconds + c.solutionSeconds + c.groupSeconds) / 100;
+    fmt::print("{:<12} {:>9.1f} {:>9.1f} {:>9.1f} {:>9.1f}\n", name, c.overlapSeconds / all,
+               c.splitSeconds / all, c.solutionSeconds / all, c.groupSeconds / all);
+  }
+  fmt::print("(*) published: compaction, which this implementation does with the overlap test\n");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const int size = argc > 1 ? std::atoi(argv[1]) : 512;
+  const std::string only = argc > 2 ? argv[2] : "";
+  if (only == "growth") {
+    resolutions(4 * size);
+    return 0;
+  }
+  table(size, size, only);
+  table(2 * size, 3 * size / 2, only);
+  if (!only.empty()) return 0;
+  degrees(size);
+  resolutions(4 * size);
+  preSubdivision(size / 2);
+  stages(size);
+}

@@ -1,0 +1,130 @@
+// Pictures of Bézier volumes: both renderers, shadows, other parts in the scene, and scene files.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <set>
+#include <vector>
+
+#include "levelset/error.h"
+#include "levelset/shapes/shapes.h"
+#include "render/cpu/cpu_renderer.h"
+#include "render/cpu/cpu_tracer.h"
+#include "render/embree/embree_renderer.h"
+#include "render/images/compare_images.h"
+#include "render/kernel/kernel_scene.h"
+#include "render/views/scene_file.h"
+#include "tests/support/bezier_scenes.h"
+#include "tests/support/files.h"
+
+namespace bezier_scene_test {
+
+using Imath::V3d;
+using namespace render;
+
+const RenderOptions kPlain{.samples = 1, .ambientSamples = 0, .shadowSamples = 0};
+
+Scene sceneOf(const BezierVolume& volume) {
+  Scene scene;
+  scene.beziers.push_back({.caster = BezierCaster(volume), .id = 5, .name = "bezier"});
+  scene.camera = {.from = {0.4, 1.5, 4.5}, .to = {0.2, 0, 0}, .width = 32, .height = 24};
+  return scene;
+}
+
+std::set<std::uint32_t> idsOf(const Image& image) {
+  const std::vector<std::uint32_t>& ids = image.ids.at("id");
+  return {ids.begin(), ids.end()};
+}
+
+TEST(BezierScene, HasThePictureOfTheJudge) {
+  for (const BezierVolume& volume :
+       {bezier_scenes::sphere(3), bezier_scenes::folded(), bezier_scenes::dice()}) {
+    const Scene scene = sceneOf(volume);
+    const Image image = renderCpu(scene, kPlain);
+    const ImageComparison found = compareImages(image, renderEmbree(scene, kPlain));
+    EXPECT_TRUE(found.agrees()) << found.reason();
+    EXPECT_GT(found.bothHit, 20U);
+    EXPECT_EQ(idsOf(image), (std::set<std::uint32_t>{0, 5}));
+  }
+}
+
+TEST(BezierScene, StandsBesideSolids) {
+  Scene scene = sceneOf(bezier_scenes::sphere(2));
+  scene.solids.push_back({.band = levelset::makeSphere(0.6, V3d(1, 0, 0), 0.1), .id = 8});
+  const Image image = renderCpu(scene, kPlain);
+  EXPECT_EQ(idsOf(image), (std::set<std::uint32_t>{0, 5, 8}));
+  const ImageComparison found = compareImages(image, renderEmbree(scene, kPlain));
+  EXPECT_TRUE(found.agrees()) << found.reason();
+  // The nearer of the two balls is seen.
+  const auto toBall = [](const Camera::Ray& ray, const V3d& centre, double radius) {
+    const V3d from = ray.origin - centre;
+    const double b = from.dot(ray.direction), d = b * b - from.length2() + radius * radius;
+    return d > 0 ? -b - std::sqrt(d) : 1e9;
+  };
+  std::size_t pixel = 0;
+  for (int y = 0; y < 24; ++y)
+    for (int x = 0; x < 32; ++x, ++pixel) {
+      const Camera::Ray ray = scene.camera.ray(x + 0.5, y + 0.5);
+      const double a = toBall(ray, V3d(0), 1), b = toBall(ray, V3d(1, 0, 0), 0.6);
+      if (std::abs(a - b) > 0.02) {
+        EXPECT_EQ(image.ids.at("id")[pixel], a < b ? 5U : 8U);
+      }
+    }
+}
+
+TEST(BezierScene, BlocksLight) {
+  const Scene scene = sceneOf(bezier_scenes::sphere(4));
+  const KernelScene surfaces(scene, RenderOptions{});
+  bezier_scenes::Numbers numbers(3);
+  std::vector<LightRay> rays;
+  std::vector<bool> blocked;
+  while (rays.size() < 300) {
+    const V3d from(2 * numbers(), 2 * numbers(), 2 * numbers()),
+        along(numbers(), numbers(), numbers());
+    const double length = 2 + numbers();
+    const V3d unit = along.normalized();
+    const double b = from.dot(unit), c = from.length2() - 1, d = b * b - c;
+    const auto isOn = [&](double t) { return t > 0 && t < length; };
+    rays.push_back({from, unit, length, 1});
+    blocked.push_back(d > 0 && (isOn(-b - std::sqrt(d)) || isOn(-b + std::sqrt(d))));
+  }
+  const std::vector<double> light = surfaces.transmittances(CpuTracer(), rays);
+  const EmbreeScene judge(scene);
+  for (std::size_t n = 0; n < rays.size(); ++n) {
+    EXPECT_EQ(light[n], blocked[n] ? 0 : 1);
+    EXPECT_EQ(judge.isOccluded(rays[n].origin, rays[n].direction, 0, rays[n].maxDistance),
+              blocked[n]);
+  }
+  EXPECT_GT(std::count(blocked.begin(), blocked.end(), true), 30);
+}
+
+TEST(BezierScene, IsReadAndWritten) {
+  const support::TemporaryFolder folder;
+  Scene scene = sceneOf(bezier_scenes::dice());
+  scene.solids.push_back(
+      {.band = levelset::makeSphere(0.6, V3d(2, 0, 0), 0.1), .id = 8, .name = "ball"});
+  const std::filesystem::path file = folder.path() / "scene.json";
+  writeScene(file, {scene, true});
+  const ViewedScene again = readScene(file);
+  ASSERT_EQ(again.scene.beziers.size(), 1U);
+  EXPECT_EQ(again.scene.beziers[0].name, "bezier");
+  EXPECT_EQ(again.scene.beziers[0].id, 5U);
+  const Image before = renderCpu(scene, kPlain), after = renderCpu(again.scene, kPlain);
+  EXPECT_EQ(before.channels.at("Z"), after.channels.at("Z"));
+  EXPECT_EQ(before.ids, after.ids);
+}
+
+TEST(BezierScene, RefusesWhatIsNotDrawn) {
+  const Scene scene = sceneOf(bezier_scenes::sphere(2));
+  RenderOptions options = kPlain;
+  options.thickness = true;
+  EXPECT_THROW((void)renderCpu(scene, options), levelset::UsageError);
+  EXPECT_THROW((void)renderEmbree(scene, options), levelset::UsageError);
+  BezierVolume none = bezier_scenes::sphere(2);
+  none.isovalue = 100;
+  EXPECT_THROW((void)renderCpu(sceneOf(none), kPlain), levelset::InvalidInput);
+}
+
+}  // namespace bezier_scene_test
