@@ -6,6 +6,7 @@
 #include "levelset/curvature_flow/curvature_flow.h"
 #include "levelset/curvature_flow/smooth.h"
 #include "levelset/distance/redistance.h"
+#include "levelset/distance/sweep_width.h"
 
 namespace levelset {
 
@@ -98,8 +99,13 @@ std::optional<Cost> SmoothOperator::cost(const Options& options, const OperatorP
   const double taps = options.kind == SmoothKind::Median
                           ? 8 * 4.2 * std::pow(std::max(1.0, sigma), 3)
                           : 3 * (8 * sigma + 1) * (options.kind == SmoothKind::Taubin ? 2 : 1);
-  cost += {0.5e-9 * taps * 2 * width * layer, layer * (300 + 25 * 2 * width)};
-  return cost += costOfDistances(layer, own);
+  cost += {0.5e-9 * taps * 2 * width * layer, layer * (20 + 18 * 2 * width)};
+  // A distance transform sweeps the grid along x.
+  Cost last = costOfDistances(layer, own);
+  const double extent = plans.result.bounds.size().x / plans.result.voxelSize;
+  if (extent > kSweepWidth) last.bytes *= kSweepWidth / extent;
+  last.bytes += 100 * layer;
+  return cost += last;
 }
 
 }  // namespace levelset

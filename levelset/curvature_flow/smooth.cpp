@@ -37,7 +37,8 @@ constexpr double kWideEnough = 1.0001;
 // Smallest σ of a Gaussian filter, voxels, that rounds all edges. Slightly below 1: σ in voxels is
 // a quotient of two lengths.
 constexpr double kLeastRounding = 1 - 1e-6;
-// Number of fields, each with one float for each grid point of the leaf blocks, in memory at once.
+// Memory of the filter and of the distance transform, as a number of fields with one float for each
+// grid point of the leaf blocks.
 constexpr double kFieldsAlive = 5;
 // Largest number of values that a median may read, for all grid points together. Reading as many
 // takes some thousand CPU seconds.
@@ -124,12 +125,13 @@ class BlockFilter {
 
   [[nodiscard]] const BandBlocks& blocks() const { return blocks_; }
 
-  [[nodiscard]] Field convolve(const Field& field, const std::vector<float>& weights) const {
-    Field a(blocks_.size()), b(blocks_.size());
-    alongAxis<0>(field, weights, a);
-    alongAxis<1>(a, weights, b);
-    alongAxis<2>(b, weights, a);
-    return a;
+  /// Reuses the memory of `field`.
+  [[nodiscard]] Field convolve(Field field, const std::vector<float>& weights) const {
+    Field result(blocks_.size());
+    alongAxis<0>(field, weights, result);
+    alongAxis<1>(result, weights, field);
+    alongAxis<2>(field, weights, result);
+    return result;
   }
 
   [[nodiscard]] Field median(const Field& field, double radius) const {
@@ -267,22 +269,22 @@ class BlockFilter {
   Progress progress_;
 };
 
-Field filtered(const BlockFilter& filter, const Field& field, SmoothKind kind, double sigma) {
+Field filtered(const BlockFilter& filter, Field field, SmoothKind kind, double sigma) {
   switch (kind) {
     case SmoothKind::Mean:
-      return filter.convolve(field, boxWeights(sigma));
+      return filter.convolve(std::move(field), boxWeights(sigma));
     case SmoothKind::Median:
       return filter.median(field, sigma);
     case SmoothKind::Taubin: {
       const std::vector<float> weights = gaussianWeights(sigma);
-      Field once = filter.convolve(field, weights);
+      Field once = filter.convolve(std::move(field), weights);
       const Field twice = filter.convolve(once, weights);
       for (std::size_t i = 0; i < once.size(); ++i)
         for (std::size_t n = 0; n < 512; ++n) once[i][n] += once[i][n] - twice[i][n];
       return once;
     }
     default:
-      return filter.convolve(field, gaussianWeights(sigma));
+      return filter.convolve(std::move(field), gaussianWeights(sigma));
   }
 }
 
@@ -365,12 +367,31 @@ struct Filtering {
   }
 };
 
+/// Filters the values of a field.
+/// @return the index bounds of the grid points that change, if `isBoxed`; else an empty box
+CoordBBox filterValues(openvdb::FloatGrid& field, const Filtering& filtering, bool isBoxed,
+                       const SmoothOptions& options) {
+  requireMemory(static_cast<double>(field.tree().leafCount()) * sizeof(Values) * kFieldsAlive,
+                options.maxMemory);
+  if (filtering.kind == SmoothKind::Median) requireMedian(field, filtering.width);
+  const BlockFilter filter(field, filtering.kind == SmoothKind::Median ? 1 : 3 * filtering.passes(),
+                           subProgress(options.progress, kWidened, kFiltered));
+  const double voxel = field.voxelSize()[0];
+  Field before = filter.blocks().read(field.tree(), voxel);
+  const bool isKept = isBoxed || options.mask;
+  Field after = isKept ? filtered(filter, before, filtering.kind, filtering.width)
+                       : filtered(filter, std::move(before), filtering.kind, filtering.width);
+  if (options.mask) applyMask(*options.mask, field, filter.blocks(), before, after);
+  filter.blocks().write(after, voxel, field.tree());
+  return isBoxed ? differing(filter.blocks(), before, after) : CoordBBox();
+}
+
 /// Smooths the solid in an index box of grid points, or everywhere if `box` is empty. Returns
 /// nullopt if the filtered field has no zero crossing. With a box, also returns nullopt if too
 /// little of the surface lies near it to compute the distances in it.
 std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, NarrowBand solid,
                                      const Filtering& filtering, const SmoothOptions& options) {
-  const double voxel = solid.voxelSize();
+  const double halfWidth = solid.halfWidth();
   eikonal::DistanceRequest request;
   request.maxMemory = options.maxMemory;
   const auto around = [&](double voxels) {
@@ -381,47 +402,39 @@ std::optional<NarrowBand> smoothedIn(const std::optional<CoordBBox>& box, Narrow
 
   // === Distances for the filter
   // The final redistancing reads the surface up to twice the half width of the solid away.
-  const double trusted = filtering.known(), own = 2 * solid.halfWidth() + 2;
+  const double trusted = filtering.known(), own = 2 * halfWidth + 2;
   const double needed = trusted + std::max(filtering.reach(), own) + 2 * kStencil;
   openvdb::FloatGrid::Ptr field;
-  if (filtering.known() > solid.halfWidth() * kWideEnough) {
+  if (filtering.known() > halfWidth * kWideEnough) {
     request.halfWidth = filtering.known() + kStencil;
     if (box) request.region = around(needed);
     request.progress = subProgress(options.progress, 0, kWidened);
-    field = eikonal::distanceTransform(vdb(solid), request);
+    openvdb::FloatGrid::Ptr unshared = box ? nullptr : takeUnshared(solid);
+    field = unshared ? eikonal::distanceTransform(std::move(unshared), request)
+                     : eikonal::distanceTransform(vdb(solid), request);
   } else if (box) {
     field = vdb(solid).deepCopy();
     field->tree().clip(around(needed));
   } else {
     (void)editVdb(solid);  // copies the grid if another band shares it
-    field = solid.shared()->grid;
+    field = takeUnshared(solid);
   }
 
   // === Filter
-  requireMemory(static_cast<double>(field->tree().leafCount()) * sizeof(Values) * kFieldsAlive,
-                options.maxMemory);
-  if (filtering.kind == SmoothKind::Median) requireMedian(*field, filtering.width);
-  const BlockFilter filter(*field,
-                           filtering.kind == SmoothKind::Median ? 1 : 3 * filtering.passes(),
-                           subProgress(options.progress, kWidened, kFiltered));
-  const Field before = filter.blocks().read(field->tree(), voxel);
-  Field after = filtered(filter, before, filtering.kind, filtering.width);
-  if (options.mask) applyMask(*options.mask, *field, filter.blocks(), before, after);
-  const CoordBBox moved = box ? differing(filter.blocks(), before, after) : CoordBBox();
+  const CoordBBox moved = filterValues(*field, filtering, box.has_value(), options);
   if (box && moved.empty()) return solid;
   // Values that change farther than `trusted` voxels from the box would need a larger `field`.
   if (box && !around(trusted).isInside(moved)) return std::nullopt;
-  filter.blocks().write(after, voxel, field->tree());
   if (!eikonal::hasZeroCrossing(field->tree())) return std::nullopt;
 
   // === Redistancing
-  request.halfWidth = solid.halfWidth();
+  request.halfWidth = halfWidth;
   request.mayHaveEdges = options.mask || filtering.mayLeaveEdges();
   request.progress = subProgress(options.progress, kFiltered, 1);
   request.region.reset();
-  if (!box) return makeBand(eikonal::distanceTransform(*field, request));
+  if (!box) return makeBand(eikonal::distanceTransform(std::move(field), request));
   request.region = moved;
-  request.region->expand(static_cast<int>(std::ceil(solid.halfWidth() + 1)));
+  request.region->expand(static_cast<int>(std::ceil(halfWidth + 1)));
   openvdb::FloatGrid::Ptr changed;
   try {
     changed = eikonal::distanceTransform(*field, request);

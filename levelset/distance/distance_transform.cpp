@@ -1,6 +1,7 @@
 #include "levelset/distance/distance_transform.h"
 
 #include <fmt/core.h>
+#include <malloc.h>
 #include <openvdb/tools/Prune.h>
 
 #include <algorithm>
@@ -67,6 +68,11 @@ int slabsWithin(double voxels) {
   return static_cast<int>(std::min(1e6, std::ceil(voxels / 8)));
 }
 
+/// Returns the last slab all of whose grid points have a lower x than given.
+int lastSlabBelow(double x) {
+  return static_cast<int>(std::floor(std::max(-1e9, x) / 8)) - 1;
+}
+
 /// Computes a distance transform slab by slab, in ascending order of x. A slab is a layer of leaf
 /// blocks. Each step follows the step before it at the distance that it needs, so only the slabs
 /// between the first step and the last one are in memory.
@@ -84,6 +90,7 @@ class DistanceSweep {
   void copySignsOf(int slab);
   void follow(int final);
   void release();
+  void releaseSurface();
 
   // Number of slabs that are resolved together, see MeetingParts::resolve(). The slabs beside them
   // are read again each time.
@@ -106,6 +113,14 @@ class DistanceSweep {
   int last_ = 0;                                            ///< last slab of the result
   int found_ = 0, made_ = 0, searched_ = 0, resolved_ = 0;  ///< last slab of each step
 };
+
+/// Returns free memory to the system. The allocator keeps the memory of large arrays, and the
+/// memory of other steps comes on top of it.
+void returnFreeMemory() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
+}
 
 NearestPoints::Reach reachOf(const DistanceRequest& request) {
   return {std::max(0.0, request.halfWidth - request.shift),
@@ -210,7 +225,8 @@ void DistanceSweep::follow(int final) {
   while (made_ < make) makeLeaves(++made_);
   if (!meeting_) return;
   const int search =
-      isEnd ? last_ : std::min(make - 1, final - MeetingParts::slabsOfSearch(request_));
+      isEnd ? last_
+            : std::min(make - 1, final - slabsWithin(MeetingParts::reachOfSearch(request_)));
   while (searched_ < search) {
     const auto blocks = nearest_->blocksOf(++searched_);
     meeting_->search(searched_, {blocks.begin(), blocks.end()});
@@ -230,9 +246,10 @@ void DistanceSweep::release() {
   const double reach = std::max(reach_.inside, reach_.outside) + 2;
   int blocks = made_ - 1, field = blocks - slabsWithin(reach + 8 + 7 + DenseBlock::kPad);
   if (meeting_) {
-    const int from = resolved_ - CreaseDistances::kSlabsAround;
-    blocks = std::min(blocks, from - MeetingParts::slabsOfSearch(request_));
-    field = std::min(field, from - MeetingParts::fieldSlabsOfSearch(request_));
+    // Searches start again from grid points within kCreaseReach of the slabs that are not resolved.
+    const double from = 8.0 * (resolved_ + 1) - kCreaseReach;
+    blocks = std::min(blocks, lastSlabBelow(from - MeetingParts::reachOfSearch(request_)));
+    field = std::min(field, lastSlabBelow(from - MeetingParts::fieldReachOfSearch(request_)));
   }
   const int points = blocks - slabsWithin(reach);
   field = std::min(field, points);
@@ -267,7 +284,18 @@ void DistanceSweep::release() {
   if (thickened_) thickened_->clearAllAccessors();
 }
 
+/// Releases everything that the last step, MeetingParts::finish(), does not read.
+void DistanceSweep::releaseSurface() {
+  nearest_.reset();
+  search_.reset();
+  surface_.patches.clear();
+  surface_.points = {};
+  pointBlocks_.clear();
+  returnFreeMemory();
+}
+
 FloatGrid::Ptr DistanceSweep::run() {
+  if (!surface_.patches.isEmpty()) returnFreeMemory();
   search_.emplace(*surface_.interpolated, within_, surface_.patches);
   if (!search_->thin().empty()) {
     thickened_ = thicken(field_.tree(), search_->thin());
@@ -328,7 +356,10 @@ FloatGrid::Ptr DistanceSweep::run() {
     report(request_.progress,
            0.1 + (end - 0.1) * std::clamp((nearest_->lastFinal() - first + 1) / steps, 0.0, 1.0));
   }
-  if (meeting_) meeting_->finish();
+  if (meeting_) {
+    releaseSurface();
+    meeting_->finish();
+  }
   openvdb::tools::pruneTiles(result_->tree());
   result_->setName(field_.getName());
   result_->setGridClass(openvdb::GRID_LEVEL_SET);

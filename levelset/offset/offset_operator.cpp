@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "levelset/distance/redistance.h"
+#include "levelset/distance/sweep_width.h"
 #include "levelset/error.h"
 #include "levelset/offset/offset.h"
 
@@ -79,10 +80,10 @@ std::optional<Cost> OffsetOperator::cost(const Options& options, const OperatorP
   const double distance = options.distance ? *options.distance / solid.voxelSize : 0;
   const double before = solid.layer();
   Cost cost = costOfOffset(before, plans.result.layer(), distance, plans.result.halfWidth);
-  // A distance transform sweeps the grid along x. About this many voxels are in memory at once.
-  constexpr double kSweep = 176;
   const double extent = plans.result.bounds.size().x / plans.result.voxelSize;
-  if (extent > kSweep) cost.bytes *= kSweep / extent;
+  if (extent > kSweepWidth) cost.bytes *= kSweepWidth / extent;
+  // Triangles near edges, and grid points to be measured at the end, are held for the whole grid.
+  cost.bytes += 100 * before;
   // A variable distance is first evaluated at the points of the surface, which takes a further
   // distance transform.
   if (options.by || options.mask) {

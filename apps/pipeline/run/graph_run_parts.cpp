@@ -3,14 +3,17 @@
 #include <malloc.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <optional>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "apps/pipeline/run/graph_run.h"
 #include "apps/pipeline/run/planner.h"
 #include "apps/pipeline/run/surface_spread.h"
+#include "levelset/distance/sweep_width.h"
 #include "levelset/error.h"
 #include "levelset/files/band_parts_writer.h"
 #include "levelset/memory_limit.h"
@@ -29,8 +32,9 @@ using levelset::kPartCell;
 constexpr int kFarCell = 1 << 30;
 
 /// Share of the available memory that a part may use, by the estimate before it is computed. The
-/// rest is for the mesh, for the result's blocks and for the error of the estimate.
-constexpr double kPartShare = 0.4;
+/// estimate holds for surfaces with edges everywhere. kLeastRatio is the least ratio of the memory
+/// of a part to its estimate that counts for the parts after it; kRatioMargin is its error.
+constexpr double kPartShare = 0.75, kLeastRatio = 0.5, kRatioMargin = 1.3;
 /// Share of the available memory at which a part is given up, to be divided.
 constexpr double kLargestShare = 0.9;
 
@@ -49,17 +53,14 @@ Box3i within(const Box3i& cells, const Box3i& around) {
   return result;
 }
 
-/// Halves a box of cells across its longest side. `around` bounds the band.
-/// @return false if the box has a single cell
-bool halve(const Box3i& cells, const Box3i& around, Box3i& low, Box3i& high) {
+/// Halves a box of cells across an axis. `around` bounds the band.
+/// @return false if the box has a single cell along the axis
+bool halve(const Box3i& cells, const Box3i& around, int axis, Box3i& low, Box3i& high) {
   const Box3i inner = within(cells, around);
-  const V3i size = (inner.max - inner.min + V3i(1)) / kPartCell;
-  int axis = 0;
-  for (int other = 1; other < 3; ++other)
-    if (size[other] > size[axis]) axis = other;
-  if (size[axis] < 2) return false;
+  const int size = (inner.max[axis] - inner.min[axis] + 1) / kPartCell;
+  if (size < 2) return false;
   low = high = cells;
-  high.min[axis] = inner.min[axis] + size[axis] / 2 * kPartCell;
+  high.min[axis] = inner.min[axis] + size / 2 * kPartCell;
   low.max[axis] = high.min[axis] - 1;
   return true;
 }
@@ -78,15 +79,90 @@ Box3i cellsAround(const Plan& plan) {
   return cells;
 }
 
-/// Returns plans with bounds as narrow along x as those of parts. The estimates of operators that
-/// sweep the grid along x depend on that extent.
-std::vector<std::optional<Plan>> narrowPlans(std::vector<std::optional<Plan>> plans) {
-  for (std::optional<Plan>& plan : plans)
-    if (plan && plan->voxelSize > 0 && !plan->bounds.isEmpty())
-      plan->bounds.max.x =
-          std::min(plan->bounds.max.x, plan->bounds.min.x + kPartCell * plan->voxelSize);
+/// Returns plans of bands that hold a share of the surface, in bounds of at most `extent` voxels
+/// along x. The estimates of operators that sweep the grid along x depend on that extent.
+std::vector<std::optional<Plan>> plansOfPart(std::vector<std::optional<Plan>> plans, double share,
+                                             double extent) {
+  for (std::optional<Plan>& plan : plans) {
+    if (!plan || plan->kind != Kind::Band || !(plan->voxelSize > 0) || plan->bounds.isEmpty())
+      continue;
+    plan->area *= share;
+    plan->bounds.max.x =
+        std::min(plan->bounds.max.x, plan->bounds.min.x + extent * plan->voxelSize);
+  }
   return plans;
 }
+
+/// Part of the result.
+struct Part {
+  Box3i cells;          ///< grid points
+  double estimate = 0;  ///< peak memory while it is computed, bytes
+};
+
+/// Estimates the peak memory of parts, and divides them. Memory is in proportion to the surface in
+/// a part, but for distance transforms. These sweep along x, and have working memory in proportion
+/// to the surface in a slab.
+class PartEstimate {
+ public:
+  /// Keeps references to the first three parameters.
+  /// @param first   first node that makes a band
+  /// @param result  node of the result
+  PartEstimate(const Graph& graph, const std::vector<char>& runs,
+               const std::vector<std::optional<Plan>>& plans, std::size_t first, std::size_t result)
+      : graph_(graph),
+        runs_(runs),
+        plans_(plans),
+        first_(first),
+        voxelSize_(plans[result]->voxelSize),
+        around_(cellsAround(*plans[result])),
+        shares_(surfaceShares(graph, first, *plans[first])),
+        complete_(regionsOfInterest(graph, runs, plans)) {}
+
+  [[nodiscard]] double operator()(const Box3i& cells) const {
+    const Box3d box = worldBox(within(cells, around_), voxelSize_);
+    const Box3d read = regionsOfInterest(graph_, runs_, plans_, 1, box)[first_].region;
+    const double width = levelset::kSweepWidth * plans_[first_]->voxelSize;
+    const double share = shares_.inBox(read), inSlab = shares_.inDensestSlab(read, width);
+    // An evenly spread surface of this extent has as much surface in a slab.
+    const double extent = levelset::kSweepWidth * (inSlab > 0 ? share / inSlab : 1);
+    return estimatePeak(graph_, runs_, plansOfPart(plans_, share, extent), complete_);
+  }
+
+  /// Returns false for a single cell.
+  [[nodiscard]] bool canHalve(const Part& part) const {
+    Box3i low, high;
+    return halve(part.cells, around_, 0, low, high) || halve(part.cells, around_, 1, low, high) ||
+           halve(part.cells, around_, 2, low, high);
+  }
+
+  /// Halves a part across the axis for which the larger of the two estimates is the least.
+  /// @pre canHalve()
+  [[nodiscard]] std::pair<Part, Part> halves(const Part& part) const {
+    std::pair<Part, Part> best;
+    double least = INFINITY;
+    for (int axis = 0; axis < 3; ++axis) {
+      Part low, high;
+      if (!halve(part.cells, around_, axis, low.cells, high.cells)) continue;
+      low.estimate = (*this)(low.cells);
+      high.estimate = (*this)(high.cells);
+      const double larger = std::max(low.estimate, high.estimate);
+      if (larger >= least) continue;
+      least = larger;
+      best = {low, high};
+    }
+    return best;
+  }
+
+ private:
+  const Graph& graph_;
+  const std::vector<char>& runs_;
+  const std::vector<std::optional<Plan>>& plans_;
+  std::size_t first_;
+  double voxelSize_;
+  Box3i around_;
+  SurfaceShares shares_;
+  std::vector<RegionOfInterest> complete_;
+};
 
 /// Checks that the grid of a band is world = voxelSize × index. Parts are boxes of this grid.
 void requirePlainGrid(const levelset::NarrowBand& band) {
@@ -119,13 +195,12 @@ void GraphRun::runInParts(std::size_t write) {
   const std::vector<char> runs = neededNodes(graph);
   const auto available = static_cast<double>(levelset::memoryLeft(settings_.maxMemory));
   const std::size_t inUse = levelset::residentBytes();
-  // Memory is in proportion to the surface in a part.
-  double budget = kPartShare * available;
-  const double whole =
-      estimatePeak(graph, runs, narrowPlans(plans_), regionsOfInterest(graph, runs, plans_));
+  // The memory for the blocks that are written grows to its share while the parts are computed.
+  const double full = kPartShare * (available - bytesForWriting(plan));
+  double budget = full, limit = INFINITY, ratio = 0;
   std::size_t first = 0;
   while (graph.nodes[first].kind != Kind::Band || !runs[first]) ++first;
-  const ShareOfBox share = shareOfBox(graph, first, *plans_[first]);
+  const PartEstimate estimateOf(graph, runs, plans_, first, result);
 
   Invocation writing(*node.op, node.options);
   levelset::WriteBandOptions options{.name = writing.text("name"),
@@ -156,46 +231,57 @@ void GraphRun::runInParts(std::size_t write) {
   // Gives up a part that takes more than its estimate, before the limit ends the process.
   bool canSplit = false;
   const double most = static_cast<double>(inUse) + kLargestShare * available;
+  const bool isLimitOfProcess = inUse < settings_.maxMemory;
+  std::atomic<std::size_t> highest = 0;  // memory of the process while a part is computed
   settings.shouldContinue = [&] {
-    if (canSplit &&
-        inUse<settings_.maxMemory&& static_cast<double>(levelset::residentBytes())> most)
+    const std::size_t now = levelset::residentBytes();
+    std::size_t last = highest;
+    while (last < now && !highest.compare_exchange_weak(last, now)) continue;
+    if (canSplit && isLimitOfProcess && static_cast<double>(now) > most)
       throw levelset::ResourceLimit("the part does not fit into memory");
     return !settings_.shouldContinue || settings_.shouldContinue();
   };
 
-  const Box3i around = cellsAround(plan);
-  std::vector<Box3i> parts{{V3i(-kFarCell), V3i(kFarCell - 1)}};
+  std::vector<Part> parts{{{V3i(-kFarCell), V3i(kFarCell - 1)}}};
+  parts.back().estimate = estimateOf(parts.back().cells);
   std::size_t count = 0;
   std::exception_ptr nothing;
   while (!parts.empty()) {
-    const Box3i part = parts.back();
+    const Part part = parts.back();
     parts.pop_back();
-    Box3i low, high;
-    canSplit = halve(part, around, low, high);
-    const auto split = [&] { parts.insert(parts.end(), {high, low}); };
-    const std::vector<RegionOfInterest> regions =
-        regionsOfInterest(graph, runs, plans_, 1, worldBox(within(part, around), plan.voxelSize));
-    const double estimate = whole * share(regions[first].region);
-    if (canSplit && estimate > budget) {
+    canSplit = estimateOf.canHalve(part);
+    const auto split = [&] {
+      const auto [low, high] = estimateOf.halves(part);
+      parts.insert(parts.end(), {high, low});
+    };
+    if (canSplit && part.estimate > budget) {
       split();
       continue;
     }
-    settings.part = worldBox(part, plan.voxelSize);
+    settings.part = worldBox(part.cells, plan.voxelSize);
     RunReport report;
+    const std::size_t before = levelset::residentBytes();
+    highest = before;
     try {
       const Value value = GraphRun(graph, settings, report).runPart(result);
       levelset::withContext(name, [&] {
         requirePlainGrid(value.band());
-        file->add(value.band(), part);
+        file->add(value.band(), part.cells);
       });
       ++count;
     } catch (const levelset::NoSurface&) {
       nothing = std::current_exception();  // the band does not reach this part
     } catch (const levelset::ResourceLimit&) {
       if (!canSplit) throw;
-      budget = std::min(budget, estimate / 2);
+      limit = std::min(limit, part.estimate / 2);
       split();
     }
+    // Parts of the same surface are alike. Small parts do not tell.
+    if (part.estimate > budget / 4) {
+      ratio = std::max(ratio, kRatioMargin * static_cast<double>(highest - before) / part.estimate);
+      budget = full / std::clamp(ratio, kLeastRatio, 1.0);
+    }
+    budget = std::min(budget, limit);
     malloc_trim(0);
     addSteps(report);
   }

@@ -15,10 +15,6 @@
 namespace pipeline {
 namespace {
 
-/// Memory of a result that is written in parts for each of its active voxels, bytes: 200 for a
-/// block, which has about 170 active voxels.
-constexpr double kBytesPerWrittenVoxel = 1.2;
-
 /// Name of an action, with its --as name.
 std::string labelOf(const Node& node) {
   return node.op->name + (node.name.empty() ? "" : " @" + node.name);
@@ -244,6 +240,11 @@ bool readsPartsOnly(const Graph& graph, std::size_t write,
 
 }  // namespace
 
+double bytesForWriting(const Plan& plan) {
+  // 200 bytes for a block, which has about 170 active voxels.
+  return 1.2 * plan.activeVoxels();
+}
+
 std::optional<std::size_t> findPartedWrite(const Graph& graph, const std::vector<char>& runs,
                                            const std::vector<std::optional<Plan>>& plans,
                                            const std::vector<RegionOfInterest>& regions,
@@ -262,7 +263,7 @@ std::optional<std::size_t> findPartedWrite(const Graph& graph, const std::vector
       if (node.op->name != "write" || write.text("file") == "-" || !isBand(inputs[0])) return {};
       if (!levelset::isVdbFormat(write.text(write.given("format") ? "format" : "file"))) return {};
       const std::optional<Plan>& result = plans[inputs[0]];
-      if (!result || result->activeVoxels() * kBytesPerWrittenVoxel > limit / 2) return {};
+      if (!result || bytesForWriting(*result) > limit / 2) return {};
       last = i;
     } else if (isBand(i)) {
       const auto bands = std::count_if(inputs.begin(), inputs.end(), isBand);

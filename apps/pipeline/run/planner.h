@@ -46,6 +46,9 @@ void checkMemoryFor(const Graph& graph, const std::vector<char>& runs,
                                   const std::vector<std::optional<Plan>>& plans,
                                   const std::vector<RegionOfInterest>& regions);
 
+/// Estimates the memory that the blocks of a band take while it is written in parts, bytes.
+[[nodiscard]] double bytesForWriting(const Plan& plan);
+
 /// Finds the action that writes the only result of a graph, if the estimated memory exceeds the
 /// limit and the result can be computed in parts: a chain of actions on single bands that pass on a
 /// region of interest, then `write` to a `.vdb` file.

@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <vector>
 
+#include "apps/pipeline/registry/invocation.h"
+#include "apps/pipeline/registry/operator.h"
 #include "apps/pipeline/values/value.h"
 #include "levelset/files/band_file.h"
 
@@ -31,6 +34,17 @@ double shareByPlan(const Plan& plan, const Box3d& box) {
   }
   const double faces = inner.x * inner.y + inner.y * inner.z + inner.z * inner.x;
   return std::min(1.0, std::max(volume, plan.area > 0 ? faces / plan.area : 0.0));
+}
+
+/// Share of a cell in a box, in [0, 1].
+double shareOfCell(const V3i& cell, double size, const Box3d& box) {
+  double share = 1;
+  for (int axis = 0; axis < 3 && share > 0; ++axis) {
+    const double low = std::max(box.min[axis] / size, static_cast<double>(cell[axis])),
+                 high = std::min(box.max[axis] / size, static_cast<double>(cell[axis]) + 1);
+    share *= std::max(0.0, high - low);
+  }
+  return share;
 }
 
 }  // namespace
@@ -78,19 +92,39 @@ void SurfaceSpread::add(const levelset::TriMesh& mesh) {
 double SurfaceSpread::within(const Box3d& box) const {
   if (total_ <= 0) return 0;
   double sum = 0;
-  for (const auto& [cell, amount] : amounts_) {
-    double share = 1;
-    for (int axis = 0; axis < 3 && share > 0; ++axis) {
-      const double low = std::max(box.min[axis] / cellSize_, static_cast<double>(cell[axis])),
-                   high = std::min(box.max[axis] / cellSize_, static_cast<double>(cell[axis]) + 1);
-      share *= std::max(0.0, high - low);
-    }
-    sum += share * amount;
-  }
+  for (const auto& [cell, amount] : amounts_) sum += amount * shareOfCell(cell, cellSize_, box);
   return std::min(1.0, sum / total_);
 }
 
-ShareOfBox shareOfBox(const Graph& graph, std::size_t node, const Plan& plan) {
+double SurfaceSpread::inDensestSlab(const Box3d& box, double width) const {
+  std::map<int, double> amounts;  // by the position of the cells along x
+  for (const auto& [cell, amount] : amounts_)
+    if (const double part = amount * shareOfCell(cell, cellSize_, box); part > 0)
+      amounts[cell.x] += part;
+  if (amounts.empty()) return 0;
+  // Amount below each face between cells, from the first face to the last one.
+  const int first = amounts.begin()->first;
+  std::vector<double> below = {0};
+  for (const auto& [x, amount] : amounts) {
+    below.resize(static_cast<std::size_t>(x - first) + 1, below.back());
+    below.push_back(below.back() + amount);
+  }
+  const auto amountBelow = [&](double x) {
+    const double at = std::clamp(x, 0.0, static_cast<double>(below.size() - 1));
+    const auto i = std::min(static_cast<std::size_t>(at), below.size() - 2);
+    return below[i] + (at - static_cast<double>(i)) * (below[i + 1] - below[i]);
+  };
+  // The amount below a position is piecewise linear, so the densest slab begins or ends at a face.
+  double most = 0;
+  for (std::size_t i = 0; i < below.size(); ++i) {
+    const double after = amountBelow(static_cast<double>(i) + width / cellSize_) - below[i];
+    const double before = below[i] - amountBelow(static_cast<double>(i) - width / cellSize_);
+    most = std::max({most, after, before});
+  }
+  return std::min(1.0, most / total_);
+}
+
+SurfaceShares surfaceShares(const Graph& graph, std::size_t node, const Plan& plan) {
   const Node& maker = graph.nodes[node];
   const auto spread = std::make_shared<SurfaceSpread>(kCellVoxels * plan.voxelSize);
   const auto operand = maker.inputs.empty() ? graph.given.end() : graph.given.find(maker.inputs[0]);
@@ -101,9 +135,16 @@ ShareOfBox shareOfBox(const Graph& graph, std::size_t node, const Plan& plan) {
     levelset::visitBlocks(reading.text("file"), {.grid = reading.text("grid")},
                           [&](const V3d& centre) { spread->add(centre, 1); });
   } else {
-    return [plan](const Box3d& box) { return shareByPlan(plan, box); };
+    return {[plan](const Box3d& box) { return shareByPlan(plan, box); },
+            [plan](const Box3d& box, double width) {
+              Box3d slab = box;
+              slab.min.x = std::max(box.min.x, plan.bounds.min.x);
+              slab.max.x = std::min(box.max.x, slab.min.x + width);
+              return shareByPlan(plan, slab);
+            }};
   }
-  return [spread](const Box3d& box) { return spread->within(box); };
+  return {[spread](const Box3d& box) { return spread->within(box); },
+          [spread](const Box3d& box, double width) { return spread->inDensestSlab(box, width); }};
 }
 
 }  // namespace pipeline

@@ -23,6 +23,9 @@ class SurfaceSpread {
 
   /// Share of the surface in a box, in [0, 1]. A cell counts by its share in the box.
   [[nodiscard]] double within(const Imath::Box3d& box) const;
+  /// Largest share of the surface in a slab of the box, in [0, 1].
+  /// @param width  extent of the slab along x, world units
+  [[nodiscard]] double inDensestSlab(const Imath::Box3d& box, double width) const;
 
  private:
   struct CellHash {
@@ -32,12 +35,16 @@ class SurfaceSpread {
   std::unordered_map<Imath::V3i, double, CellHash> amounts_;
 };
 
-/// Estimates which share of a surface is in a box, in [0, 1], world units.
-using ShareOfBox = std::function<double(const Imath::Box3d&)>;
+/// Estimates of the share of a surface in a box, in [0, 1]. Lengths are in world units.
+struct SurfaceShares {
+  std::function<double(const Imath::Box3d& box)> inBox;
+  /// Largest share in a slab of the box; `width` is its extent along x.
+  std::function<double(const Imath::Box3d& box, double width)> inDensestSlab;
+};
 
-/// Returns an estimate for the band that a node makes from a mesh or a file. For other bands it is
+/// Returns estimates for the band that a node makes from a mesh or a file. For other bands they are
 /// the share of a solid's surface that a box can contain at most, unless the surface has folds.
 /// @param node  its operands are in graph.given
-[[nodiscard]] ShareOfBox shareOfBox(const Graph& graph, std::size_t node, const Plan& plan);
+[[nodiscard]] SurfaceShares surfaceShares(const Graph& graph, std::size_t node, const Plan& plan);
 
 }  // namespace pipeline

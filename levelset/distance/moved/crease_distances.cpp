@@ -3,13 +3,16 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 
 #include "levelset/distance/moved/leaf_distances.h"
 #include "levelset/distance/nearest/point_distance.h"
 #include "levelset/grids/box_mask_vdb.h"
+#include "levelset/grids/padded_leaf_vdb.h"
 
 namespace levelset::eikonal {
 namespace {
@@ -48,31 +51,105 @@ constexpr double kFlatBend = 3e-4;
 // nearest, or an edge may affect it.
 constexpr double kMargin = 2;
 
-/// Returns true if the field around a grid point has values of flat faces. Looks at every second
-/// grid point.
-bool isBesideFlatFace(const FloatGrid::ConstAccessor& field, const Coord& at, double voxelSize) {
-  const auto limit = static_cast<float>(kFlatBend * voxelSize);
-  const auto isFlat = [&](const Coord& c) {
-    float value = 0;
-    if (!field.probeValue(c, value)) return false;
-    for (int axis = 0; axis < 3; ++axis) {
-      Coord before = c, after = c;
-      --before[axis];
-      ++after[axis];
-      float low = 0, high = 0;
-      if (!field.probeValue(before, low) || !field.probeValue(after, high) ||
-          std::abs(low + high - 2 * value) > limit)
-        return false;
-    }
+/// Values of a leaf block of a field and of the grid points around it, to find flat faces.
+class FlatFaces {
+ public:
+  FlatFaces(const FloatGrid::ConstAccessor& field, const Coord& origin) : origin_(origin) {
+    std::array<float, LeafNode::SIZE> values;
+    values_.fill([&](const Coord& step) {
+      const LeafNode* leaf =
+          field.probeConstLeaf(origin.offsetBy(8 * step.x(), 8 * step.y(), 8 * step.z()));
+      if (!leaf) return BlockValues{nullptr, kNone};
+      for (openvdb::Index n = 0; n < LeafNode::SIZE; ++n)
+        values[n] = leaf->isValueOn(n) ? leaf->getValue(n) : kNone;
+      return BlockValues{values.data(), 0};
+    });
+  }
+
+  /// Returns true if the field around a grid point of the block has values of flat faces. Looks at
+  /// every second grid point.
+  [[nodiscard]] bool isBeside(const Coord& at, double voxelSize) const {
+    const auto limit = static_cast<float>(kFlatBend * voxelSize);
+    const Coord c = at - origin_;
+    int flat = 0;
+    for (int x = -kFlatReach; x <= kFlatReach; x += 2)
+      for (int y = -kFlatReach; y <= kFlatReach; y += 2)
+        for (int z = -kFlatReach; z <= kFlatReach; z += 2)
+          if (isFlat(values_.at(c.x() + x, c.y() + y, c.z() + z), limit) && ++flat == kLeastFlat)
+            return true;
+    return false;
+  }
+
+ private:
+  using Values = PaddedLeaf<kFlatReach + 1>;
+  static constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+
+  /// Returns true if a value and its neighbours are distances with small second differences.
+  /// Comparisons with NaN are false.
+  [[nodiscard]] static bool isFlat(const float* value, float limit) {
+    for (const int step : {Values::kStepX, Values::kStepY, 1})
+      if (!(std::abs(value[-step] + value[step] - 2 * *value) <= limit)) return false;
     return true;
+  }
+
+  Coord origin_;
+  Values values_;  ///< NaN at inactive grid points
+};
+
+/// Zero crossings of a field on the grid edges within kCrossings voxels of a leaf block.
+class CrossingsAround {
+ public:
+  CrossingsAround(const FloatGrid::ConstAccessor& field, const Coord& origin) {
+    // A grid edge leads to the next grid point.
+    constexpr int kBefore = kCrossings, kAfter = kCrossings + 1, kSide = 8 + kBefore + kAfter;
+    std::array<float, std::size_t{kSide} * kSide * kSide> values;
+    copyPaddedLeaf(field, origin, kBefore, kAfter, values.data());
+    constexpr std::array<std::size_t, 3> kSteps = {std::size_t{kSide} * kSide, kSide, 1};
+    for (int x = 0; x < kSide - 1; ++x)
+      for (int y = 0; y < kSide - 1; ++y)
+        for (int z = 0; z < kSide - 1; ++z) {
+          const float* at = &values[static_cast<std::size_t>((x * kSide + y) * kSide + z)];
+          for (int axis = 0; axis < 3; ++axis) {
+            const float next = at[kSteps[static_cast<std::size_t>(axis)]];
+            if ((*at < 0) == (next < 0)) continue;
+            const double here = *at, there = next;
+            const Coord c = origin.offsetBy(x - kBefore, y - kBefore, z - kBefore);
+            Vec3d position = c.asVec3d();
+            position[axis] += here / (here - there);
+            crossings_.push_back({c, position});
+          }
+        }
+  }
+
+  /// Returns up to kStarts crossings on the edges around a grid point of the block in the order of
+  /// their distances from it, at least kApart from each other.
+  [[nodiscard]] std::vector<Vec3d> nearest(const Coord& from) const {
+    // Squared distance and number; of equal distances the first comes first.
+    std::vector<std::pair<double, std::size_t>> near;
+    const CoordBBox around(from.offsetBy(-kCrossings), from.offsetBy(kCrossings));
+    for (std::size_t i = 0; i < crossings_.size(); ++i)
+      if (around.isInside(crossings_[i].gridPoint))
+        near.emplace_back((crossings_[i].position - from.asVec3d()).lengthSqr(), i);
+    std::make_heap(near.begin(), near.end(), std::greater<>());
+    std::vector<Vec3d> starts;
+    for (auto end = near.end(); end != near.begin() && starts.size() < kStarts; --end) {
+      const Vec3d& crossing = crossings_[near.front().second].position;
+      const bool isKnown = std::any_of(starts.begin(), starts.end(), [&](const Vec3d& other) {
+        return (other - crossing).lengthSqr() < kApart * kApart;
+      });
+      if (!isKnown) starts.push_back(crossing);
+      std::pop_heap(near.begin(), end, std::greater<>());
+    }
+    return starts;
+  }
+
+ private:
+  struct Crossing {
+    Coord gridPoint;
+    Vec3d position;
   };
-  int flat = 0;
-  for (int x = -kFlatReach; x <= kFlatReach; x += 2)
-    for (int y = -kFlatReach; y <= kFlatReach; y += 2)
-      for (int z = -kFlatReach; z <= kFlatReach; z += 2)
-        if (isFlat(at.offsetBy(x, y, z)) && ++flat == kLeastFlat) return true;
-  return false;
-}
+  std::vector<Crossing> crossings_;
+};
 
 }  // namespace
 
@@ -211,9 +288,10 @@ void CreaseDistances::searchAgain(Leaves& leaves, int first, int last, const Flo
   tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
     if (!isOwn(leaves[i])) return;
     const Block& block = *leaves[i].block;
-    const FloatGrid::ConstAccessor accessor(field.tree());
+    std::optional<CrossingsAround> crossings;
     for (Point& point : leaves[i].points) {
       if (!point.hasFailed) continue;
+      if (!crossings) crossings.emplace(FloatGrid::ConstAccessor(field.tree()), block.origin);
       MovedSurface& search = searches_.local();
       const Coord c = leaves[i].gridPoint(point);
       const auto take = [&](std::optional<MovedSurface::Result> found) {
@@ -224,7 +302,7 @@ void CreaseDistances::searchAgain(Leaves& leaves, int first, int last, const Flo
         take(search.distanceFrom(block, point.n, *start));
         point.bound = std::min(point.bound, (start->point - c.asVec3d()).length());
       }
-      for (const Vec3d& crossing : nearestCrossings(accessor, c))
+      for (const Vec3d& crossing : crossings->nearest(c))
         take(search.distanceNear(block, point.n, crossing));
     }
   });
@@ -267,14 +345,23 @@ void CreaseDistances::writeTrusted(int last, FloatGrid& field) {
 
 CreaseDistances::Missing CreaseDistances::finish(FloatGrid& field) {
   writeTrusted(std::numeric_limits<int>::max(), field);
-  Missing missing;
-  const FloatGrid::ConstAccessor accessor(field.tree());
-  for (const ResolvedLeaf& leaf : missing_)
+  std::vector<std::vector<char>> mayHaveEdge(missing_.size());
+  tbb::parallel_for(std::size_t{0}, missing_.size(), [&](std::size_t i) {
+    const ResolvedLeaf& leaf = missing_[i];
+    std::optional<FlatFaces> faces;
     for (const Resolved& point : leaf.others) {
-      const Coord c = leaf.origin + LeafNode::offsetToLocalCoord(point.n);
-      const bool mayHaveEdge =
-          point.meetsPatches || isBesideFlatFace(accessor, c, field.voxelSize()[0]);
-      add(c, point, mayHaveEdge, missing);
+      const auto isBesideFlatFace = [&] {
+        if (!faces) faces.emplace(FloatGrid::ConstAccessor(field.tree()), leaf.origin);
+        return faces->isBeside(leaf.gridPoint(point), field.voxelSize()[0]);
+      };
+      mayHaveEdge[i].push_back(point.meetsPatches || isBesideFlatFace());
+    }
+  });
+  Missing missing;
+  for (std::size_t i = 0; i < missing_.size(); ++i)
+    for (std::size_t k = 0; k < missing_[i].others.size(); ++k) {
+      const Resolved& point = missing_[i].others[k];
+      add(missing_[i].gridPoint(point), point, mayHaveEdge[i][k], missing);
     }
   return missing;
 }
@@ -285,7 +372,7 @@ void CreaseDistances::improveMeasured(FloatGrid& field) const {
   for (const ResolvedLeaf& leaf : missing_) {
     LeafDistances values;
     for (const Resolved& point : leaf.others) {
-      const Coord c = leaf.origin + LeafNode::offsetToLocalCoord(point.n);
+      const Coord c = leaf.gridPoint(point);
       double distance = std::abs(static_cast<double>(accessor.getValue(c))) / voxelSize;
       if (point.found < distance || (point.isBesideCrease && point.found < distance + kMeasured))
         distance = point.found;
@@ -343,37 +430,6 @@ std::vector<const MovedSurface::CreasePoint*> CreaseDistances::nearestCreases(co
       return (other->point - crease->point).lengthSqr() < kApart * kApart;
     });
     if (!isKnown) starts.push_back(crease);
-    if (starts.size() == kStarts) break;
-  }
-  return starts;
-}
-
-/// Returns up to kStarts zero crossings of the field on grid edges in the order of their
-/// distances from a grid point, at least kApart from each other.
-std::vector<Vec3d> CreaseDistances::nearestCrossings(const FloatGrid::ConstAccessor& field,
-                                                     const Coord& from) {
-  std::vector<std::pair<double, Vec3d>> near;
-  for (const Coord& c : CoordBBox(from.offsetBy(-kCrossings), from.offsetBy(kCrossings))) {
-    const auto here = static_cast<double>(field.getValue(c));
-    for (int axis = 0; axis < 3; ++axis) {
-      Coord next = c;
-      ++next[axis];
-      const auto there = static_cast<double>(field.getValue(next));
-      if ((here < 0) == (there < 0)) continue;
-      Vec3d crossing = c.asVec3d();
-      crossing[axis] += here / (here - there);
-      near.emplace_back((crossing - from.asVec3d()).lengthSqr(), crossing);
-    }
-  }
-  std::stable_sort(near.begin(), near.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
-  std::vector<Vec3d> starts;
-  for (const auto& one : near) {
-    const Vec3d& crossing = one.second;
-    const bool isKnown = std::any_of(starts.begin(), starts.end(), [&](const Vec3d& other) {
-      return (other - crossing).lengthSqr() < kApart * kApart;
-    });
-    if (!isKnown) starts.push_back(crossing);
     if (starts.size() == kStarts) break;
   }
   return starts;

@@ -91,6 +91,9 @@ class CreaseDistances {
     openvdb::Coord origin;
     std::vector<std::pair<openvdb::Index, double>> trusted;  ///< as LeafDistances
     std::vector<Resolved> others;
+    [[nodiscard]] openvdb::Coord gridPoint(const Resolved& point) const {
+      return origin + openvdb::FloatTree::LeafNodeType::offsetToLocalCoord(point.n);
+    }
   };
 
   [[nodiscard]] static bool isTrusted(const Point& point);
@@ -111,8 +114,6 @@ class CreaseDistances {
   [[nodiscard]] static Cells creasesByCell(const Leaves& leaves, const openvdb::MaskTree& within);
   [[nodiscard]] static std::vector<const MovedSurface::CreasePoint*> nearestCreases(
       const Cells& cells, const openvdb::Coord& x);
-  [[nodiscard]] static std::vector<openvdb::Vec3d> nearestCrossings(
-      const openvdb::FloatGrid::ConstAccessor& field, const openvdb::Coord& from);
 
   const DistanceRequest& request_;
   Polishers& polishers_;

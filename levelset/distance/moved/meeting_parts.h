@@ -2,7 +2,6 @@
 
 // Internal header of levelset: public headers must not include it.
 
-#include <cmath>
 #include <vector>
 
 #include "levelset/distance/moved/crease_distances.h"
@@ -27,14 +26,13 @@ class MeetingParts {
                openvdb::FloatGrid& field)
       : request_(request), field_(field), distances_(surface, polishers, request) {}
 
-  /// Number of slabs on each side of a slab that a search reads.
-  [[nodiscard]] static int slabsOfSearch(const DistanceRequest& request) {
-    return static_cast<int>(std::ceil(MovedSurface::reach(request.shift, request.halfWidth) / 8));
+  /// Distance along each axis, voxels, within which a search reads nearest surface points.
+  [[nodiscard]] static double reachOfSearch(const DistanceRequest& request) {
+    return MovedSurface::reach(request.shift, request.halfWidth);
   }
   /// As above, for the field before the shift.
-  [[nodiscard]] static int fieldSlabsOfSearch(const DistanceRequest& request) {
-    return static_cast<int>(
-        std::ceil(MovedSurface::fieldReach(request.shift, request.halfWidth) / 8));
+  [[nodiscard]] static double fieldReachOfSearch(const DistanceRequest& request) {
+    return MovedSurface::fieldReach(request.shift, request.halfWidth);
   }
 
   /// Searches the wrong values of a slab. Slabs must come in ascending order.

@@ -21,9 +21,6 @@ using Block = NearestPoints::Block;
 // grid points may lie half a voxel apart along the surface.
 constexpr double kBlockMargin = 0.5;
 
-// Number of rounds that a slab runs before it can be final.
-constexpr int kLeastRounds = 2;
-
 int directionIndex(const Coord& d) {
   return (d.x() + 1) * 9 + (d.y() + 1) * 3 + d.z() + 1;
 }
@@ -443,7 +440,8 @@ void NearestPoints::advance(int g) {
     runRound(even);
     if (even - 1 > final_) runRound(even - 1);
   }
-  while (final_ + 1 + reachInSlabs_ <= 2 * (g - kLeastRounds)) {
+  // All slabs up to 2g have run a round.
+  while (final_ + 1 + reachInSlabs_ <= 2 * g) {
     for (int slab = final_ + 1; slab <= final_ + 1 + reachInSlabs_; ++slab)
       if (!isQuiet(slab)) return;
     ++final_;

@@ -31,6 +31,12 @@ class SharpPatches {
   };
 
   [[nodiscard]] bool isEmpty() const { return surface_.isEmpty(); }
+  void clear() {
+    features_ = {};
+    surface_ = {};
+    zone_.clear();
+    border_.clear();
+  }
   /// Returns true when the patches replace the interpolant in the cell whose lowest corner is
   /// `cell`.
   [[nodiscard]] bool covers(const openvdb::Coord& cell) const {

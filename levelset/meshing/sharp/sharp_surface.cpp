@@ -107,6 +107,7 @@ class DualMesher {
       vertices_[i].sheets = isBeside[i] ? mesh.sheets[i] : VertexSheets();
     }
     report(progress_, 0.7);
+    mesh = {};  // releases its memory before the next mesh is made
     mesh = assemble();
     insertFeatures(mesh, mesh.sheets, subProgress(progress_, 0.75, 1));
     return mesh;
