@@ -9,6 +9,7 @@
 
 #include "levelset/error.h"
 #include "levelset/progress.h"
+#include "levelset/segmented/meshing/segmented_distance.h"
 #include "levelset/vdb.h"
 
 namespace py = pybind11;
@@ -156,6 +157,26 @@ py::array_t<std::uint16_t> labelsAt(const levelset::SegmentedField& field,
   const py::gil_scoped_release release;
   const levelset::SegmentedSampler sampler(field);
   for (py::ssize_t i = 0; i < count; ++i, p += 3) label[i] = sampler.label(V3d(p[0], p[1], p[2]));
+  return result;
+}
+
+py::array_t<double> segmentedDistances(const levelset::SegmentedField& field,
+                                       const py::array& points,
+                                       std::optional<levelset::RegionLabel> region, bool onlySheets,
+                                       std::size_t maxMemory) {
+  const char* name = onlySheets ? "sheet_distances" : "distances";
+  const auto places = floatRows(points, name, "points");
+  const py::ssize_t count = places.shape(0);
+  py::array_t<double> result(count);
+  const double* p = places.data();
+  double* distance = result.mutable_data();
+  const py::gil_scoped_release release;
+  levelset::withContext(name, [&] {
+    const levelset::SegmentedDistance distances(
+        field, {.region = region, .onlySheets = onlySheets, .maxMemory = maxMemory});
+    for (py::ssize_t i = 0; i < count; ++i, p += 3)
+      distance[i] = distances.value(V3d(p[0], p[1], p[2]));
+  });
   return result;
 }
 

@@ -55,6 +55,18 @@ namespace python {
 [[nodiscard]] pybind11::array_t<std::uint16_t> labelsAt(const levelset::SegmentedField& field,
                                                         const pybind11::array& points);
 
+/// Computes distances from the interfaces and sheets of a segmentation.
+/// @param points  n × 3 floats, world units
+/// @param region  its boundary counts, and distances inside it are negative; empty: all surfaces
+/// @param onlySheets  sheets count, interfaces do not
+/// @return n distances, float64; NaN for points that are not finite, infinite without a surface
+/// @throws levelset::InvalidInput for other shapes and types
+/// @throws levelset::UsageError for a region that the segmentation does not have
+/// @throws levelset::ResourceLimit
+[[nodiscard]] pybind11::array_t<double> segmentedDistances(
+    const levelset::SegmentedField& field, const pybind11::array& points,
+    std::optional<levelset::RegionLabel> region, bool onlySheets, std::size_t maxMemory);
+
 /// Signed distances at the grid points of a box.
 struct DenseBand {
   pybind11::array_t<float> values;

@@ -414,6 +414,18 @@ PYBIND11_MODULE(_core, module) {
              const pipeline::Value value = valueOf(node);
              return python::labelsAt(value.segmentation(), points);
            })
+      .def("sheet_labels",
+           [](const Handle& node) {
+             const pipeline::Value value = valueOf(node);
+             return value.segmentation().sheetLabels();
+           })
+      .def("segmented_distances",
+           [](const Handle& node, const py::array& points,
+              std::optional<levelset::RegionLabel> region, bool onlySheets) {
+             const pipeline::Value value = valueOf(node);
+             return python::segmentedDistances(value.segmentation(), points, region, onlySheets,
+                                               python::memoryLimit());
+           })
       .def("band_array", [](const Handle& node, const py::object& box) {
         const pipeline::Value value = valueOf(node);
         const python::DenseBand dense =

@@ -345,6 +345,16 @@ class SolidsPartition {
                      const BlockSurroundings& around, Others& others,
                      SegmentedBlockValues& values) const {
     setNearest(block, n, own, values);
+    const BlockSurroundings::Near near = around.near(n, own);
+    if (near.count == 0) return;
+    if (near.count == 1) {
+      if (!near.isAdjacent && values.distances[n] >= background_) return;
+      values.neighbours[n] = labelOf(near.other);
+      if (near.isAdjacent)
+        values.distances[n] =
+            std::min(distanceTo(block, n, own, near.other), std::nextafter(background_, 0.0f));
+      return;
+    }
     around.others(n, own, 2, others.ranks);
     if (others.ranks.empty()) return;
     around.others(n, own, 1, others.adjacent);

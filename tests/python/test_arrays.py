@@ -263,3 +263,21 @@ def test_segmentations_have_labels(ls):
     assert [m["label"] for m in parts.measure()["materials"]] == [1, 2]
     with pytest.raises(ls.InputError, match="labels_at: the array points has shape"):
         parts.labels_at(numpy.zeros(3))
+    # The ball reaches from -1 to 1, the box from -2 to 2.
+    assert numpy.allclose(parts.distances(points), [1, 0.5, 1], atol=0.02)
+    assert numpy.allclose(parts.distances(points, region=1), [1, -0.5, 1], atol=0.02)
+    assert numpy.isinf(parts.sheet_distances(points)).all() and parts.sheet_labels == []
+    with pytest.raises(ls.UsageError, match="distances: the segmentation has no region 3"):
+        parts.distances(points, region=3)
+
+
+def test_sheets_have_distances(ls):
+    wall = ls.Mesh([[-1.0, -1, 0.03], [1, -1, 0.03], [1, 1, 0.03], [-1, 1, 0.03]], [[0, 1, 2], [0, 2, 3]])
+    field = wall.segment(sheets=True, voxel=0.1)
+    assert field.labels == [] and field.sheet_labels == [0]
+    points = numpy.array([[0.0, 0, 0.23], [0, 0, 3.03], [0, 0, -0.97], [2, 0, 0.03], [numpy.nan, 0, 0]])
+    assert field.labels_at(points).tolist() == [0, 0, 0, 0, 0]
+    for distances in (field.distances(points), field.sheet_distances(points)):
+        assert numpy.allclose(distances[:4], [0.2, 3, 1, 1], atol=1e-5) and numpy.isnan(distances[4])
+    with pytest.raises(ls.InputError, match="sheet_distances: the array points has shape"):
+        field.sheet_distances(numpy.zeros(3))

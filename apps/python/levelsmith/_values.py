@@ -367,8 +367,28 @@ class Segmentation(_Drawn):
         return self._known().region_voxel()
 
     def labels_at(self, points):
-        """Labels at points: (n, 3) floats, world units. Returns n uint16; 0 for the void."""
+        """Labels at points: (n, 3) floats, world units. Returns n uint16; 0 for the void.
+
+        Sheets have one region on both sides, so they do not change labels.
+        """
         return self._known().labels_at(numpy.asarray(points))
+
+    @property
+    def sheet_labels(self):
+        """Labels of the regions with sheets inside, ascending, 0 for the void. Computes the value."""
+        return self._known().sheet_labels()
+
+    def distances(self, points, region=None):
+        """Distances at points: (n, 3) floats, world units. Returns n float64.
+
+        They are distances from the nearest interface or sheet. With the label of a region: from its
+        boundary without sheets, negative inside. NaN for a point that is not finite.
+        """
+        return self._known().segmented_distances(numpy.asarray(points), region, False)
+
+    def sheet_distances(self, points):
+        """Distances from the nearest sheet at points, as `distances`. Infinite without a sheet."""
+        return self._known().segmented_distances(numpy.asarray(points), None, True)
 
 
 class Scan(Value):

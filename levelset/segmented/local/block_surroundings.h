@@ -53,6 +53,25 @@ class BlockSurroundings {
   /// @param n  offset in the block, z fastest
   void others(std::uint32_t n, Owner own, int reach, std::vector<Owner>& result) const;
 
+  /// Owners around a grid point where there are few of them.
+  struct Near {
+    int count;  ///< others up to two grid points away: 0, 1, or 2 for several or unknown ones
+    Owner other = 0;
+    bool isAdjacent = false;  ///< up to one grid point away
+  };
+  /// Finds the only other owner. Most grid points have one at most, and need no lists.
+  [[nodiscard]] Near near(std::uint32_t n, Owner own) const {
+    if (palette_.size() > kBits) return {2};
+    std::size_t code = 0;
+    while (palette_[code] != own) ++code;
+    const std::uint32_t mask = masks_[1][n] & ~(1u << code);
+    if (mask == 0) return {0};
+    if ((mask & (mask - 1)) != 0) return {2};
+    std::size_t other = 0;
+    while (!(mask >> other & 1)) ++other;
+    return {1, palette_[other], (masks_[0][n] & mask) != 0};
+  }
+
  private:
   static constexpr int kSide = 8 + 2 * kPad;
   // More owners than bits are looked up one by one.

@@ -37,8 +37,7 @@ struct SegmentedMeasurement {
 
 /// Measures the regions and interfaces of a partition on its mesh, exactly for the flat triangles.
 /// Volumes and areas converge with second order. Sums run in a fixed order. Strips without width
-/// have no area, and the junction curves on both sides of a strip count once; where strips fold
-/// back along a curve, its length is too large.
+/// have no area. Junction curves on both sides of a strip count once, also where they fold back.
 [[nodiscard]] SegmentedMeasurement measureSegmented(const SegmentedMesh& mesh);
 [[nodiscard]] SegmentedMeasurement measureSegmented(const SegmentedField& field,
                                                     const SegmentedMeshOptions& options = {});

@@ -12,6 +12,7 @@
 #include "levelset/error.h"
 #include "levelset/memory_limit.h"
 #include "levelset/segmented/operators/field_edit_vdb.h"
+#include "levelset/segmented/operators/hidden_distances_vdb.h"
 #include "levelset/segmented/operators/pack_partition_vdb.h"
 #include "levelset/segmented/operators/region_bands_vdb.h"
 #include "levelset/vdb.h"
@@ -43,6 +44,7 @@ SegmentedField edit(const SegmentedField& field, const NarrowBand& solid, Region
   requireMemory(2 * static_cast<double>(field.memoryUse() + band.memoryUse()),
                 memoryLeft(options.maxMemory));
   space.tree = &vdb(band).tree();
+  space.maxMemory = options.maxMemory;
   if (label != kVoid) space.gap = static_cast<float>(options.gap * field.voxelSize());
   return editSpace(field, space, options.progress);
 }
@@ -136,27 +138,9 @@ class Relabelling {
     if (least < data_.background || merged == merged_.end()) return;
     // The interface with a former neighbour hid the next one.
     const float depth = std::abs(vdb(merged->second).tree().getValue(at));
-    if (depth < data_.background) result[nearestOwner(at, others)] = depth;
-  }
-
-  /// Index of the region with the nearest grid point.
-  [[nodiscard]] std::size_t nearestOwner(const Coord& at,
-                                         const std::vector<RegionLabel>& others) const {
-    SegmentedReader reader(data_);
-    std::size_t best = 0;
-    int least = 13;  // above that of the corners
-    for (int x = -2; x <= 2; ++x)
-      for (int y = -2; y <= 2; ++y)
-        for (int z = -2; z <= 2; ++z) {
-          const int squared = x * x + y * y + z * z;
-          if (squared >= least) continue;
-          const RegionLabel label = newLabel(reader.label(at.offsetBy(x, y, z)));
-          const auto found = std::lower_bound(others.begin(), others.end(), label);
-          if (found == others.end() || *found != label) continue;
-          least = squared;
-          best = static_cast<std::size_t>(found - others.begin());
-        }
-    return best;
+    if (depth < data_.background)
+      result[nearestOwner(at, others, [&](const Coord& p) { return newLabel(reader.label(p)); })] =
+          depth;
   }
 
   const SegmentedData& data_;

@@ -10,6 +10,7 @@
 #include "levelset/error.h"
 #include "levelset/grids/padded_leaf_vdb.h"
 #include "levelset/segmented/operators/field_edit_vdb.h"
+#include "levelset/segmented/operators/hidden_distances_vdb.h"
 #include "levelset/segmented/operators/pack_partition_vdb.h"
 #include "levelset/transform/resample_vdb.h"
 #include "levelset/vdb.h"
@@ -42,13 +43,19 @@ class SpaceEdit {
     editTiles(*tiles);
     gatherBlocks();
     tbb::parallel_for(std::size_t{0}, blocks_.size(), [&](std::size_t b) { setOwners(b); });
-    const auto distances = [&](std::size_t b, std::uint32_t n, RegionLabel,
-                               const std::vector<RegionLabel>& others,
-                               std::vector<float>& result) { distancesOf(b, n, others, result); };
+    const auto distances = [&](std::size_t b, std::uint32_t n, RegionLabel own,
+                               const std::vector<RegionLabel>& others, std::vector<float>& result) {
+      distancesOf(b, n, own, others, result);
+    };
+    hasHidden_.assign(blocks_.size(), 0);
     SegmentedField result = packPartition(data_.transform->copy(), data_.halfWidth, tiles,
                                           std::move(blocks_), distances, progress);
     requireRegion(result);
-    return result;
+    std::vector<Coord> hidden;
+    for (std::size_t b = 0; b < hasHidden_.size(); ++b)
+      if (hasHidden_[b]) hidden.push_back(SegmentedData::blockCoord(origins_[b]));
+    if (hidden.empty()) return result;
+    return withHiddenDistances(result, space_.label, hidden, space_.maxMemory);
   }
 
  private:
@@ -139,13 +146,14 @@ class SpaceEdit {
     return std::any_of(first, last, [&](RegionLabel label) { return space_.takes(label); });
   }
 
-  void distancesOf(std::size_t b, std::uint32_t n, const std::vector<RegionLabel>& others,
-                   std::vector<float>& result) const {
+  void distancesOf(std::size_t b, std::uint32_t n, RegionLabel own,
+                   const std::vector<RegionLabel>& others, std::vector<float>& result) {
     SegmentedReader reader(data_);
     const Coord at = origins_[b] + SegmentedData::localOf(n);
     const SegmentedReader::Nearest near = reader.nearest(at);
     const float space = valueIn(spaces_[b], n);
     result.clear();
+    bool isKnown = false;
     for (const RegionLabel other : others) {
       float distance = storedDistance(reader, at, near, other);
       if (other == space_.label)
@@ -153,7 +161,17 @@ class SpaceEdit {
       else if (space_.takes(other))
         distance = std::max(distance, -space);
       result.push_back(std::max(0.0f, distance));
+      isKnown = isKnown || distance < data_.background;
     }
+    // The interface between two regions that are one now hid the next one.
+    if (!isKnown && own == space_.label && near.label != near.neighbour && belongs(near.label) &&
+        belongs(near.neighbour))
+      hasHidden_[b] = 1;
+  }
+
+  /// Returns true for the label of the space, and those that it takes from.
+  [[nodiscard]] bool belongs(RegionLabel label) const {
+    return label == space_.label || space_.takes(label);
   }
 
   /// Signed distance to the regions that the space takes from, together with its own region.
@@ -161,7 +179,6 @@ class SpaceEdit {
   [[nodiscard]] float sourceDistance(SegmentedReader& reader, const Coord& at,
                                      const SegmentedReader::Nearest& near,
                                      const std::vector<RegionLabel>& others) const {
-    const auto belongs = [&](RegionLabel l) { return l == space_.label || space_.takes(l); };
     float distance = data_.background;
     if (belongs(near.label)) {
       for (const RegionLabel other : others)
@@ -180,6 +197,7 @@ class SpaceEdit {
   std::vector<std::size_t> numbers_;  ///< numbers in the field, by block
   std::vector<Coord> origins_;        ///< by block
   std::vector<BlockValues> spaces_;   ///< signed distances to the space, without its sign
+  std::vector<char> hasHidden_;       ///< by block: some distances are not known any more
 };
 
 }  // namespace

@@ -22,6 +22,7 @@ struct EditedSpace {
   /// Labels of the regions that it takes from, ascending. Not `label`.
   std::vector<RegionLabel> over = {};
   float gap = 0;  ///< largest distance over which it takes void up to another region, world units
+  std::size_t maxMemory = kNoMemoryLimit;
 
   [[nodiscard]] bool takes(RegionLabel from) const {
     return std::binary_search(over.begin(), over.end(), from);

@@ -29,70 +29,123 @@ constexpr double kRaceHalfWidth = 3;  // voxels: of the bands before they are re
 constexpr double kFarMargin = 2;
 // Distance from junctions within which distances are corrected, voxels.
 constexpr double kJunctionRadius = 3;
-// Half of the width over which a volume fades out at an interface, voxels.
-constexpr double kFade = 1.5;
+// Half of the widths over which a volume fades out at an interface, voxels. Sums over grid planes
+// are exact for whole widths.
+constexpr double kFade = 1.5, kNarrowFade = 1;
 // A sampled Gaussian of less variance differs from the continuous one.
 constexpr double kLeastVariance = 0.7;  // voxels²
+constexpr double kDeviations = 4;       // radius of a sampled Gaussian
 
-/// Half of a kernel with a given variance, in voxels²: a sampled Gaussian, or for small variances a
-/// mean of it and the identity.
-std::vector<float> halfKernel(double variance) {
-  const double wide = std::max(variance, kLeastVariance);
-  const int radius = static_cast<int>(std::ceil(4 * std::sqrt(wide)));
+// Variances, as multiples of the first, and weights of Gaussians whose sum keeps curved interfaces
+// that meet at 120°, to first order in the curvature. A single Gaussian turns them by 0.2 times its
+// deviation times the curvature, since it averages distances over corners as well.
+constexpr std::array<std::pair<double, double>, 3> kJunctionGaussians = {
+    {{1, 1.90272}, {2, -1.03412}, {4, 0.1314}}};
+constexpr double kJunctionVariance = 0.36008;   // of the sum, as a multiple of the first
+constexpr double kLeastJunctionVariance = 0.7;  // voxels², of the first
+// Largest variance of the sum, voxels²: the widest Gaussian then reaches 13 voxels.
+constexpr double kLargestJunctionVariance = 1;
+
+/// Kernel of a convolution along all axes.
+struct FlowKernel {
+  double weight;
+  std::vector<float> half;  ///< from the centre
+  [[nodiscard]] int radius() const { return static_cast<int>(half.size()) - 1; }
+};
+
+/// Half of a sampled Gaussian, from the centre.
+std::vector<float> halfGaussian(double variance) {
+  const int radius = static_cast<int>(std::ceil(kDeviations * std::sqrt(variance)));
   std::vector<double> weights;
-  double sum = 0, second = 0;
+  double sum = 0;
   for (int d = 0; d <= radius; ++d) {
-    weights.push_back(std::exp(-d * d / (2 * wide)));
+    weights.push_back(std::exp(-d * d / (2 * variance)));
     sum += (d == 0 ? 1 : 2) * weights.back();
-    second += 2 * d * d * weights.back();
   }
-  const double share = variance * sum / second;
-  std::vector<float> kernel;
-  for (std::size_t d = 0; d < weights.size(); ++d)
-    kernel.push_back(static_cast<float>(share * weights[d] / sum + (d == 0 ? 1 - share : 0)));
-  return kernel;
+  std::vector<float> half;
+  for (const double weight : weights) half.push_back(static_cast<float>(weight / sum));
+  return half;
 }
 
-/// Convolves the values of a leaf with a kernel along all axes.
+/// Gaussians of an interface flow, by variance and weight.
+std::vector<std::pair<double, double>> gaussiansFor(double variance, bool hasJunctions) {
+  if (!hasJunctions || variance > kLargestJunctionVariance * (1 + 1e-9))
+    return {{std::max(variance, kLeastVariance), 1}};
+  const double first = std::max(variance / kJunctionVariance, kLeastJunctionVariance);
+  std::vector<std::pair<double, double>> result;
+  for (const auto& [ratio, weight] : kJunctionGaussians) result.emplace_back(ratio * first, weight);
+  return result;
+}
+
+/// Kernels of a step: Gaussians, and for short steps a mean of them and the identity.
+/// @param variance  of the sum, voxels²
+std::vector<FlowKernel> flowKernels(double variance, bool hasJunctions) {
+  std::vector<FlowKernel> kernels;
+  double second = 0;
+  for (const auto& [wide, weight] : gaussiansFor(variance, hasJunctions)) {
+    kernels.push_back({weight, halfGaussian(wide)});
+    for (std::size_t d = 1; d < kernels.back().half.size(); ++d)
+      second +=
+          weight * 2 * static_cast<double>(d * d) * static_cast<double>(kernels.back().half[d]);
+  }
+  const double share = variance / second;
+  for (FlowKernel& kernel : kernels) kernel.weight *= share;
+  kernels.push_back({1 - share, {1}});
+  return kernels;
+}
+
+/// Convolves the values of a leaf with kernels along all axes, and adds the results.
 class LeafConvolution {
  public:
-  explicit LeafConvolution(const std::vector<float>& kernel)
-      : kernel_(kernel),
-        radius_(static_cast<int>(kernel.size()) - 1),
-        side_(8 + 2 * radius_),
-        padded_(count(side_, side_, side_)),
-        alongZ_(count(side_, side_, 8)),
-        alongY_(count(side_, 8, 8)) {}
+  explicit LeafConvolution(const std::vector<FlowKernel>& kernels) : kernels_(kernels) {
+    for (const FlowKernel& kernel : kernels) radius_ = std::max(radius_, kernel.radius());
+    side_ = 8 + 2 * radius_;
+    padded_.resize(count(side_, side_, side_));
+    alongZ_.resize(count(side_, side_, 8));
+    alongY_.resize(count(side_, 8, 8));
+  }
 
   template <typename Accessor>
   void run(const Accessor& accessor, const Coord& origin, std::array<float, kLeafVoxels>& out) {
     copyPaddedLeaf(accessor, origin, radius_, radius_, padded_.data());
-    convolve(padded_.data(), count(side_, side_, 1), static_cast<std::size_t>(side_), 1,
-             alongZ_.data());
-    convolve(alongZ_.data(), static_cast<std::size_t>(side_), count(side_, 8, 1), 8,
-             alongY_.data());
-    convolve(alongY_.data(), 1, count(side_, 8, 8), 64, out.data());
+    out.fill(0);
+    for (const FlowKernel& kernel : kernels_) add(kernel, out);
   }
 
  private:
   static std::size_t count(int x, int y, int z) { return static_cast<std::size_t>(x * y * z); }
 
-  /// Convolves lines of which each value is a row of `width` floats.
-  void convolve(const float* in, std::size_t lines, std::size_t lineLength, std::size_t width,
-                float* out) const {
-    const auto radius = static_cast<std::size_t>(radius_);
-    for (std::size_t line = 0; line < lines; ++line, in += lineLength, out += 8 * width)
-      for (std::size_t i = 0; i < 8 * width; ++i) {
-        const float* centre = in + i + radius * width;
-        float sum = kernel_[0] * *centre;
-        for (std::size_t d = 1; d <= radius; ++d)
-          sum += kernel_[d] * (*(centre - d * width) + centre[d * width]);
-        out[i] = sum;
-      }
+  void add(const FlowKernel& kernel, std::array<float, kLeafVoxels>& out) {
+    const int radius = kernel.radius(), side = 8 + 2 * radius, skip = radius_ - radius;
+    for (int x = 0; x < side; ++x)
+      for (int y = 0; y < side; ++y)
+        convolve(kernel.half,
+                 padded_.data() + count(x + skip, side_, side_) + count(y + skip, side_, 1) +
+                     static_cast<std::size_t>(skip),
+                 1, alongZ_.data() + count(x, side, 8) + count(y, 8, 1));
+    for (int x = 0; x < side; ++x)
+      convolve(kernel.half, alongZ_.data() + count(x, side, 8), 8, alongY_.data() + count(x, 8, 8));
+    std::array<float, kLeafVoxels> sum;
+    convolve(kernel.half, alongY_.data(), 64, sum.data());
+    const auto weight = static_cast<float>(kernel.weight);
+    for (std::size_t n = 0; n < kLeafVoxels; ++n) out[n] += weight * sum[n];
   }
 
-  const std::vector<float>& kernel_;
-  int radius_, side_;
+  /// Convolves a line of which each value is a row of `width` floats.
+  static void convolve(const std::vector<float>& kernel, const float* in, std::size_t width,
+                       float* out) {
+    const std::size_t radius = kernel.size() - 1;
+    for (std::size_t i = 0; i < 8 * width; ++i) {
+      const float* centre = in + i + radius * width;
+      float sum = kernel[0] * *centre;
+      for (std::size_t d = 1; d <= radius; ++d)
+        sum += kernel[d] * (*(centre - d * width) + centre[d * width]);
+      out[i] = sum;
+    }
+  }
+
+  const std::vector<FlowKernel>& kernels_;
+  int radius_ = 0, side_ = 8;
   std::vector<float> padded_, alongZ_, alongY_;
 };
 
@@ -113,14 +166,14 @@ class Race {
   [[nodiscard]] const std::vector<LabelledLeaf>& leaves() const { return leaves_; }
 
   /// Convolves the distances. Those to fixed regions, or without a kernel all, stay.
-  void convolve(const std::vector<float>& kernel, const Progress& progress) {
+  void convolve(const std::vector<FlowKernel>& kernels, const Progress& progress) {
     values_.resize(leaves_.size());
     ProgressGate gate(progress, blockCount());
     tbb::parallel_for(std::size_t{0}, blockCount(), [&](std::size_t b) {
-      LeafConvolution convolution(kernel);
+      LeafConvolution convolution(kernels);
       for (std::size_t e = firsts_[b]; e < firsts_[b + 1]; ++e) {
         const LabelledLeaf& entry = leaves_[e];
-        if (isFixed_[entry.region] || kernel.empty()) {
+        if (isFixed_[entry.region] || kernels.empty()) {
           std::copy_n(entry.leaf->buffer().data(), kLeafVoxels, values_[e].begin());
         } else {
           const auto accessor = vdb(bands_.bands[entry.region]).getConstUnsafeAccessor();
@@ -231,22 +284,21 @@ class Race {
     std::vector<double> volumes, areas;  ///< by leaf; by leaf and leaf, per world unit of constant
   };
   /// Sums the shares of the regions in each voxel. A share fades out over an interface, and all
-  /// shares of a voxel add up to one.
+  /// shares of a voxel add up to one. The error is of second order in the width over which they
+  /// fade, also at junctions, so two widths cancel it.
   [[nodiscard]] BlockVolumes volumesOf(std::size_t block,
                                        const std::vector<double>& constants) const {
     const std::size_t count = firsts_[block + 1] - firsts_[block];
     BlockVolumes result{std::vector<double>(count), std::vector<double>(count * count)};
     std::vector<Values> values;
     run(block, constants, values);
-    std::vector<double> shares(count);
+    constexpr double kNarrowSquare = kNarrowFade * kNarrowFade, kWideSquare = kFade * kFade,
+                     kNarrowWeight = kWideSquare / (kWideSquare - kNarrowSquare);
     const double fade = kFade * voxelSize_;
+    std::vector<double> shares(count);
     for (std::uint32_t n = 0; n < kLeafVoxels; ++n) {
-      double sum = 0;
       std::size_t least = 0, second = count;
-      for (std::size_t i = 0; i < count; ++i) {
-        shares[i] = std::clamp(0.5 - static_cast<double>(values[i][n]) / (2 * fade), 0.0, 1.0);
-        sum += shares[i];
-        if (i == 0) continue;
+      for (std::size_t i = 1; i < count; ++i) {
         if (values[i][n] < values[least][n]) {
           second = least;
           least = i;
@@ -254,8 +306,16 @@ class Race {
           second = i;
         }
       }
-      if (!(sum > 0)) continue;
-      for (std::size_t i = 0; i < count; ++i) result.volumes[i] += shares[i] / sum;
+      for (const auto& [width, weight] : {std::pair(kNarrowFade * voxelSize_, kNarrowWeight),
+                                          std::pair(fade, 1 - kNarrowWeight)}) {
+        double sum = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+          shares[i] = std::clamp(0.5 - static_cast<double>(values[i][n]) / (2 * width), 0.0, 1.0);
+          sum += shares[i];
+        }
+        if (!(sum > 0)) continue;
+        for (std::size_t i = 0; i < count; ++i) result.volumes[i] += weight * shares[i] / sum;
+      }
       const auto isNear = [&](std::size_t i) {
         return i < count && std::abs(static_cast<double>(values[i][n])) < fade &&
                !isFixed_[leaves_[firsts_[block] + i].region];
@@ -289,10 +349,11 @@ class Race {
 
 /// Finds the constants that give the regions their volumes, by Newton's method.
 /// @param constants  start, and result; that of the void and of fixed regions stays
+/// @param reached    result: volumes before the last change
 /// @return largest relative error of a volume before the last change
 double findConstants(const Race& race, const std::vector<double>& volumes,
                      const std::vector<char>& isHeld, double voxelSize,
-                     std::vector<double>& constants) {
+                     std::vector<double>& constants, std::vector<double>& reached) {
   constexpr int kVolumeIterations = 8;
   constexpr double kEnough = 1e-6;  // relative
   std::vector<Eigen::Index> free;
@@ -302,6 +363,7 @@ double findConstants(const Race& race, const std::vector<double>& volumes,
   if (free.empty()) return worst;
   for (int n = 0; n < kVolumeIterations; ++n) {
     const Race::Volumes now = race.volumes(constants);
+    reached.assign(now.volumes.begin(), now.volumes.end());
     Eigen::VectorXd missing(free.size());
     worst = 0;
     for (std::size_t i = 0; i < free.size(); ++i) {
@@ -391,18 +453,32 @@ InterfaceFlow::InterfaceFlow(RegionBands bands, std::vector<char> isFixed, doubl
     : bands_(std::move(bands)),
       isFixed_(std::move(isFixed)),
       constants_(bands_.bands.size(), 0),
-      kernel_(halfKernel(2 * step)),
+      step_(step),
       maxMemory_(maxMemory) {
-  if (!keepsVolumes) return;
-  Race race(bands_, isFixed_);
-  race.convolve({}, {});
-  const Eigen::VectorXd volumes = race.volumes(constants_).volumes;
-  volumes_.assign(volumes.begin(), volumes.end());
+  if (keepsVolumes) volumes_ = volumes();
 }
 
-double InterfaceFlow::halfWidthFor(double step) {
+double InterfaceFlow::halfWidthFor(double step, std::size_t regions) {
   constexpr double kLeast = 6;
-  return std::max(kLeast, std::ceil(kFarMargin + 4 * std::sqrt(2 * step)));
+  double widest = 0;
+  for (const auto& [variance, weight] : gaussiansFor(2 * step, regions > 2))
+    widest = std::max(widest, variance);
+  return std::max(kLeast, std::ceil(kFarMargin + kDeviations * std::sqrt(widest)));
+}
+
+std::vector<double> InterfaceFlow::volumes() const {
+  Race race(bands_, isFixed_);
+  race.convolve({}, {});
+  const Eigen::VectorXd now = race.volumes(std::vector<double>(bands_.bands.size())).volumes;
+  return {now.begin(), now.end()};
+}
+
+void InterfaceFlow::addVolumes(const std::map<RegionLabel, double>& missing) {
+  if (volumes_.empty()) return;
+  volumes_ = volumes();
+  for (std::size_t r = 0; r < volumes_.size(); ++r)
+    if (const auto found = missing.find(bands_.labels[r]); found != missing.end())
+      volumes_[r] += found->second;
 }
 
 std::vector<RegionLabel> InterfaceFlow::advance(const Progress& progress) {
@@ -410,12 +486,21 @@ std::vector<RegionLabel> InterfaceFlow::advance(const Progress& progress) {
                halfWidth = bands_.bands.front().halfWidth();
   const float background = backgroundOf(kRaceHalfWidth, voxelSize);
   Race race(bands_, isFixed_);
-  race.convolve(kernel_, subProgress(progress, 0, 0.3));
+  std::vector<double> wanted = volumes_;
+  if (!reached_.empty()) {
+    // Volumes of convolved distances differ from those of the redistanced regions. The difference
+    // of the last step is made up for.
+    race.convolve({}, {});
+    const Eigen::VectorXd now = race.volumes(std::vector<double>(wanted.size())).volumes;
+    for (std::size_t r = 0; r < wanted.size(); ++r)
+      wanted[r] += reached_[r] - now[static_cast<Eigen::Index>(r)];
+  }
+  race.convolve(flowKernels(2 * step_, bands_.bands.size() > 2), subProgress(progress, 0, 0.3));
   if (!volumes_.empty()) {
     std::vector<char> isHeld = isFixed_;
     isHeld[0] = 1;  // the void
-    volumeError_ =
-        std::max(volumeError_, findConstants(race, volumes_, isHeld, voxelSize, constants_));
+    volumeError_ = std::max(volumeError_,
+                            findConstants(race, wanted, isHeld, voxelSize, constants_, reached_));
   }
 
   // === New regions
@@ -444,7 +529,7 @@ std::vector<RegionLabel> InterfaceFlow::advance(const Progress& progress) {
   std::vector<RegionLabel> vanished;
   RegionBands next;
   std::vector<char> isFixed;
-  std::vector<double> volumes, constants;
+  std::vector<double> volumes, constants, reached;
   const bool hasTwo = grids.size() == 2 && grids[0] && grids[1];
   for (std::size_t r = 0; r < grids.size(); ++r) {
     NarrowBand band = bands_.bands[r];
@@ -469,6 +554,7 @@ std::vector<RegionLabel> InterfaceFlow::advance(const Progress& progress) {
     isFixed.push_back(isFixed_[r]);
     constants.push_back(constants_[r]);
     if (!volumes_.empty()) volumes.push_back(volumes_[r]);
+    if (!reached_.empty()) reached.push_back(reached_[r]);
   }
   if (grids.size() > 2) {
     std::erase(fields.trees, nullptr);
@@ -479,6 +565,7 @@ std::vector<RegionLabel> InterfaceFlow::advance(const Progress& progress) {
   isFixed_ = std::move(isFixed);
   constants_ = std::move(constants);
   volumes_ = std::move(volumes);
+  reached_ = std::move(reached);
   return vanished;
 }
 

@@ -3,6 +3,7 @@
 // Steps of the motion of interfaces by mean curvature. Includes OpenVDB: for .cpp files only.
 
 #include <cstddef>
+#include <map>
 #include <vector>
 
 #include "levelset/progress.h"
@@ -19,23 +20,32 @@ class InterfaceFlow {
                 std::size_t maxMemory);
 
   /// Half width of the bands that steps of this length need, voxels.
-  [[nodiscard]] static double halfWidthFor(double step);
+  /// @param regions  number of regions, with the void
+  [[nodiscard]] static double halfWidthFor(double step, std::size_t regions);
 
   /// Takes a step.
   /// @return labels of the regions that have vanished, ascending
   std::vector<RegionLabel> advance(const Progress& progress);
 
+  /// Makes the next steps keep the volumes of the present regions and what is missing of them.
+  /// @param missing  by label, voxels
+  void addVolumes(const std::map<RegionLabel, double>& missing);
+
   [[nodiscard]] const RegionBands& bands() const { return bands_; }
   /// Largest relative error of a volume that was to be kept, over all steps. It does not count the
-  /// errors of redistancing.
+  /// errors of redistancing, for which the next step makes up.
   [[nodiscard]] double volumeError() const { return volumeError_; }
 
  private:
+  /// Volumes of the present regions, voxels.
+  [[nodiscard]] std::vector<double> volumes() const;
+
   RegionBands bands_;
   std::vector<char> isFixed_;
   std::vector<double> volumes_;    ///< to keep, voxels; empty: none
+  std::vector<double> reached_;    ///< by the last step before its redistancing, voxels
   std::vector<double> constants_;  ///< added to the distances, world units
-  std::vector<float> kernel_;      ///< half of it, from the centre
+  double step_;                    ///< voxels²
   std::size_t maxMemory_;
   double volumeError_ = 0;
 };

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "levelset/error.h"
+#include "levelset/segmented/meshing/measure_segmented.h"
 #include "levelset/segmented/operators/field_edit_vdb.h"
 #include "levelset/segmented/operators/interface_flow_vdb.h"
 #include "levelset/segmented/operators/region_bands_vdb.h"
@@ -14,6 +16,7 @@ namespace levelset {
 namespace {
 
 constexpr double kDefaultStep = 0.5;    // voxels²
+constexpr double kJunctionStep = 0.25;  // voxels², of more than two regions
 constexpr double kLongestFlowStep = 4;  // voxels²
 constexpr double kBandsDone = 0.1;      // progress
 
@@ -32,6 +35,28 @@ void checkSmooth(const SegmentedField& field, double time, const SmoothSegmented
           fmt::format("region {} is to be fixed, but the segmentation has no such region; give "
                       "labels that it has",
                       label));
+}
+
+/// Volumes of the regions of a mesh, world units³.
+std::map<RegionLabel, double> volumesOfMesh(const SegmentedField& field) {
+  std::map<RegionLabel, double> volumes;
+  for (const RegionMeasure& region : measureSegmented(field).regions)
+    if (region.label != kVoid) volumes[region.label] = region.volume;
+  return volumes;
+}
+
+/// Makes up for the volumes that the first step has changed. Redistancing rounds the edges of the
+/// given regions, so their volumes are known from their mesh only. Later steps have the edges of
+/// the flow, which are exact. The errors of both meshes cancel, since the interfaces have hardly
+/// moved.
+void restoreVolumes(const SegmentedField& field, InterfaceFlow& flow) {
+  std::map<RegionLabel, double> missing = volumesOfMesh(field);
+  const double voxel = std::pow(field.voxelSize(), 3);
+  for (const auto& [label, volume] :
+       volumesOfMesh(fieldOfBands(flow.bands(), field.halfWidth(), {})))
+    missing[label] -= volume;
+  for (auto& [label, volume] : missing) volume /= voxel;
+  flow.addVolumes(missing);
 }
 
 }  // namespace
@@ -55,12 +80,13 @@ SmoothSegmentedResult smoothSegmented(const SegmentedField& field, double time,
   }
   const double inVoxels = time / (field.voxelSize() * field.voxelSize());
   constexpr double kMostSteps = 1e9;
-  if (!options.steps && inVoxels / kDefaultStep > kMostSteps)
+  const double defaultSteps = inVoxels / (all.size() > 2 ? kJunctionStep : kDefaultStep);
+  if (!options.steps && defaultSteps > kMostSteps)
     throw UsageError(
         fmt::format("a time of {:.4g} takes {:.2g} steps; give a shorter time or use larger voxels",
-                    time, inVoxels / kDefaultStep));
-  result.steps = options.steps.value_or(
-      static_cast<std::size_t>(std::max(1.0, std::ceil(inVoxels / kDefaultStep))));
+                    time, defaultSteps));
+  result.steps =
+      options.steps.value_or(static_cast<std::size_t>(std::max(1.0, std::ceil(defaultSteps))));
   const double step = inVoxels / static_cast<double>(result.steps);
   if (step > kLongestFlowStep)
     throw UsageError(fmt::format(
@@ -69,8 +95,8 @@ SmoothSegmentedResult smoothSegmented(const SegmentedField& field, double time,
         kLongestFlowStep * field.voxelSize() * field.voxelSize(),
         std::ceil(inVoxels / kLongestFlowStep)));
 
-  RegionBands bands = regionBands(field, InterfaceFlow::halfWidthFor(step), options.maxMemory,
-                                  subProgress(options.progress, 0, kBandsDone));
+  RegionBands bands = regionBands(field, InterfaceFlow::halfWidthFor(step, all.size()),
+                                  options.maxMemory, subProgress(options.progress, 0, kBandsDone));
   std::vector<char> isFixed;
   for (const RegionLabel label : bands.labels) isFixed.push_back(isHeld(label));
   InterfaceFlow flow(std::move(bands), std::move(isFixed), step, options.keepsVolumes,
@@ -80,6 +106,7 @@ SmoothSegmentedResult smoothSegmented(const SegmentedField& field, double time,
     const double done = static_cast<double>(n) / count, next = static_cast<double>(n + 1) / count;
     const std::vector<RegionLabel> vanished = flow.advance(
         subProgress(options.progress, kBandsDone + 0.8 * done, kBandsDone + 0.8 * next));
+    if (n == 0 && options.keepsVolumes && result.steps > 1) restoreVolumes(field, flow);
     for (const RegionLabel label : vanished) result.vanished.push_back({label, next * time});
     if (flow.bands().bands.size() < 2)
       throw InvalidInput(fmt::format(
