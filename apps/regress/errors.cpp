@@ -38,38 +38,46 @@ struct Tally {
   [[nodiscard]] double mean() const { return count > 0 ? sum / count : 0; }
 };
 
-struct Sides {
+struct BandErrors {
   Tally inside, outside;
+  GapCount gaps;
 };
 
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
 /// Collects the errors of the active voxels of a leaf, and of inactive voxels whose exact distance
-/// lies within the band. Grid points without a leaf are counted by missingShare().
-Sides leafErrors(const Leaf& leaf, const openvdb::FloatGrid& grid, const Truth& truth) {
-  Sides sides;
+/// lies within the band. Counts the gaps in the leaf, since the exact distances can take long.
+BandErrors leafErrors(const Leaf& leaf, const openvdb::FloatGrid& grid, const Truth& truth,
+                      const Region& region) {
+  BandErrors errors;
   const double background = static_cast<double>(grid.background());
   for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
     const V3d p = levelset::toImath(grid.indexToWorld(leaf.offsetToGlobalCoord(i)));
     if (truth.compared && !truth.compared(p)) continue;
     const double exact = truth.distance(p);
+    if (exact > region.low && exact < region.high)
+      errors.gaps.add({.wanted = 1, .missing = leaf.isValueOn(i) ? 0.0 : 1.0});
     if (!leaf.isValueOn(i) && std::abs(exact) >= background) continue;
-    (exact < 0 ? sides.inside : sides.outside).add(static_cast<double>(leaf.getValue(i)) - exact);
+    (exact < 0 ? errors.inside : errors.outside).add(static_cast<double>(leaf.getValue(i)) - exact);
   }
-  return sides;
+  return errors;
 }
 
-Sides bandErrors(const openvdb::FloatGrid& grid, const Truth& truth) {
+BandErrors bandErrors(const NarrowBand& band, const Truth& truth) {
+  const openvdb::FloatGrid& grid = levelset::vdb(band);
+  const Region region = bandRegion(truth, band.halfWidth(), band.voxelSize());
   std::vector<const Leaf*> leaves;
   grid.tree().getNodes(leaves);
-  std::vector<Sides> parts(leaves.size());
+  std::vector<BandErrors> parts(leaves.size());
   tbb::parallel_for(std::size_t{0}, leaves.size(),
-                    [&](std::size_t i) { parts[i] = leafErrors(*leaves[i], grid, truth); });
-  Sides all;
-  for (const Sides& part : parts) {
+                    [&](std::size_t i) { parts[i] = leafErrors(*leaves[i], grid, truth, region); });
+  BandErrors all;
+  for (const BandErrors& part : parts) {
     all.inside.add(part.inside);
     all.outside.add(part.outside);
+    all.gaps.add(part.gaps);
   }
+  all.gaps.add(countWithoutLeaf(region, grid));
   return all;
 }
 
@@ -111,11 +119,10 @@ void addErrors(const NarrowBand& result, const Truth& truth, Mesher mesher, Figu
   const double h = result.voxelSize();
   figures["voxel_size"] = h;
   figures["active_voxels"] = static_cast<double>(result.activeVoxelCount());
-  const Sides sides = bandErrors(levelset::vdb(result), truth);
-  addTally("band_in", sides.inside, h, figures);
-  addTally("band_out", sides.outside, h, figures);
-  figures["missing_band"] =
-      missingShare(bandRegion(truth, result.halfWidth(), h), levelset::vdb(result));
+  const BandErrors band = bandErrors(result, truth);
+  addTally("band_in", band.inside, h, figures);
+  addTally("band_out", band.outside, h, figures);
+  figures["missing_band"] = band.gaps.share();
 
   const RayHits hits = shootRays(result, truth, rays);
   Tally surface;

@@ -58,7 +58,7 @@ def kill_one_that_works(client, killed, is_over):
     pids = client.run(os.getpid)
     while not is_over.is_set():
         before = client.run(running)
-        time.sleep(0.3)
+        time.sleep(0.1)
         after = client.run(running)
         for address in pids:
             if before.get(address) and before[address] == after.get(address):
@@ -258,7 +258,7 @@ def test_the_job_of_a_killed_worker_is_run_again(ls, client, tmp_path):
         import levelsmith as ls
 
         (marks / f"begun-{i}-{os.getpid()}").touch()
-        solid = ls.box(size=(2, 2, 2 + 0.5 * i), voxel=0.05).curvature_flow(time=0.1)
+        solid = ls.box(size=(2, 2, 2 + 0.5 * i), voxel=0.06).curvature_flow(time=0.1)
         solid.save(marks / f"solid-{i}.vdb")
         (marks / f"done-{i}-{os.getpid()}").touch()
         return solid
@@ -290,7 +290,7 @@ def test_a_job_that_kills_every_worker_is_abandoned(ls, client):
 
 def test_pipelines_survive_a_killed_worker(ls, client, tmp_path, monkeypatch):
     text = """
-box --size 2,2,${length} --voxel 0.05
+box --size 2,2,${length} --voxel 0.06
 curvature-flow 0.1
 write flown_${length}.vdb
 measure

@@ -7,6 +7,7 @@
 #include "apps/regress/recorder.h"
 #include "apps/regress/truth/exact_band.h"
 #include "apps/regress/truth/gaps.h"
+#include "apps/regress/truth/golden_section.h"
 #include "levelset/distance/closest_points.h"
 #include "levelset/eikonal/arrival.h"
 #include "levelset/fields/grid_vdb.h"
@@ -118,17 +119,13 @@ void fromPointWithGradient(Recorder& out) {
 /// plane sends a head wave back below it.
 double quickest(double away, double z, double depth, double speed) {
   const auto shortest = [&](const auto& cost) {
-    constexpr double kGolden = 0.6180339887498949;
-    double low = 0, high = away;
-    for (int i = 0; i < 60; ++i) {
-      const double a = high - kGolden * (high - low), b = low + kGolden * (high - low);
-      (cost(a) < cost(b) ? high : low) = cost(a) < cost(b) ? b : a;
-    }
-    return cost(0.5 * (low + high));
+    constexpr int kSteps = 40;
+    return cost(goldenSectionMinimum(cost, 0, away, kSteps));
   };
   if (z > 0)
-    return shortest(
-        [&](double x) { return std::hypot(x, depth) + std::hypot(away - x, z) / speed; });
+    return shortest([&](double x) {
+      return std::sqrt(x * x + depth * depth) + std::sqrt((away - x) * (away - x) + z * z) / speed;
+    });
   const double direct = std::hypot(away, z + depth);
   if (speed <= 1) return direct;
   // The head wave meets the plane at the critical angle, follows the plane, and leaves it downwards

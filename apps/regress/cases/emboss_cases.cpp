@@ -3,6 +3,7 @@
 
 #include "apps/regress/recorder.h"
 #include "apps/regress/truth/exact_band.h"
+#include "apps/regress/truth/golden_section.h"
 #include "levelset/emboss/emboss.h"
 
 namespace regress {
@@ -33,17 +34,7 @@ Truth embossedBall(const V3d& centre, const V3d& axis, double height) {
       return x * x + y * y;
     };
     constexpr int kIntervals = 24;
-    int best = 0;
-    for (int i = 1; i <= kIntervals; ++i)
-      if (squared(most * i / kIntervals) < squared(most * best / kIntervals)) best = i;
-    double low = most * std::max(best - 1, 0) / kIntervals,
-           high = most * std::min(best + 1, kIntervals) / kIntervals;
-    constexpr double kGolden = 0.6180339887498949;
-    for (int i = 0; i < 40; ++i) {
-      const double left = high - kGolden * (high - low), right = low + kGolden * (high - low);
-      (squared(left) < squared(right) ? high : low) = squared(left) < squared(right) ? right : left;
-    }
-    double least = std::sqrt(squared((low + high) / 2));
+    double least = std::sqrt(squared(minimumBySections(squared, 0, most, kIntervals)));
     const double angle = std::atan2(out, along), length = std::hypot(out, along);
     if (angle >= most) least = std::min(least, std::abs(length - 1));
     return length < radiusAt(angle) ? -least : least;

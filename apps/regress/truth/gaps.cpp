@@ -15,10 +15,6 @@ namespace {
 
 constexpr int kEdge = 8;  // edge of a leaf, in grid points
 
-struct Count {
-  double wanted = 0, missing = 0;
-};
-
 /// Returns the origins of the leaf blocks that can contain grid points of a region.
 std::vector<Coord> blocksOf(const Region& region, const openvdb::math::Transform& transform) {
   const double h = transform.voxelSize()[0];
@@ -42,11 +38,11 @@ std::vector<Coord> blocksOf(const Region& region, const openvdb::math::Transform
 }
 
 template <typename Grid>
-Count countBlock(const Region& region, const Grid& grid, const Coord& origin) {
+GapCount countBlock(const Region& region, const Grid& grid, const Coord& origin) {
   using GridLeaf = typename Grid::TreeType::LeafNodeType;
   const GridLeaf* leaf = grid.tree().probeConstLeaf(origin);
   const bool isTileOn = !leaf && grid.tree().isValueOn(origin);
-  Count count;
+  GapCount count;
   for (openvdb::Index i = 0; i < GridLeaf::SIZE; ++i) {
     const Coord c = origin + GridLeaf::offsetToLocalCoord(i);
     const V3d p = levelset::toImath(grid.indexToWorld(c));
@@ -60,28 +56,33 @@ Count countBlock(const Region& region, const Grid& grid, const Coord& origin) {
 }
 
 template <typename Grid>
-double shareOf(const Region& region, const Grid& grid) {
-  const std::vector<Coord> blocks = blocksOf(region, grid.transform());
-  std::vector<Count> counts(blocks.size());
+GapCount countBlocks(const Region& region, const Grid& grid, const std::vector<Coord>& blocks) {
+  std::vector<GapCount> counts(blocks.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(),
                     [&](std::size_t i) { counts[i] = countBlock(region, grid, blocks[i]); });
-  Count all;
-  for (const Count& count : counts) {
-    all.wanted += count.wanted;
-    all.missing += count.missing;
-  }
-  // NaN misses every bound. With 0, a region without grid points would hide all gaps.
-  return all.wanted > 0 ? all.missing / all.wanted : std::nan("");
+  GapCount all;
+  for (const GapCount& count : counts) all.add(count);
+  return all;
 }
 
 }  // namespace
 
+double GapCount::share() const {
+  return wanted > 0 ? missing / wanted : std::nan("");
+}
+
+GapCount countWithoutLeaf(const Region& region, const openvdb::FloatGrid& grid) {
+  std::vector<Coord> blocks = blocksOf(region, grid.transform());
+  std::erase_if(blocks, [&](const Coord& origin) { return grid.tree().probeConstLeaf(origin); });
+  return countBlocks(region, grid, blocks);
+}
+
 double missingShare(const Region& region, const openvdb::FloatGrid& grid) {
-  return shareOf(region, grid);
+  return countBlocks(region, grid, blocksOf(region, grid.transform())).share();
 }
 
 double missingShare(const Region& region, const openvdb::Vec3SGrid& grid) {
-  return shareOf(region, grid);
+  return countBlocks(region, grid, blocksOf(region, grid.transform())).share();
 }
 
 Region bandRegion(const Truth& truth, double halfWidth, double voxelSize) {

@@ -18,6 +18,22 @@ struct Region {
       {};  ///< true at points that count; empty: all points count
 };
 
+/// Number of grid points of a region, and of those that are not active in a grid.
+struct GapCount {
+  double wanted = 0, missing = 0;
+
+  void add(const GapCount& other) {
+    wanted += other.wanted;
+    missing += other.missing;
+  }
+  /// Returns the share of the missing grid points. NaN, which misses every bound, if the region
+  /// contains no grid point: 0 would hide all gaps.
+  [[nodiscard]] double share() const;
+};
+
+/// Counts the grid points of the region in blocks for which the grid has no leaf.
+[[nodiscard]] GapCount countWithoutLeaf(const Region& region, const openvdb::FloatGrid& grid);
+
 /// Returns the share of the region's grid points that are not active in the grid. Grid points
 /// without a leaf add nothing to the columns of errors, so the share has its own bound. NaN if the
 /// region contains no grid point.

@@ -487,9 +487,9 @@ Operator patchGridOperator() {
           "runs along the axis between the planes through the two points. A texture continues in "
           "the next tile where it reaches the border of its box, see --texture-box.",
       .example =
-          "levelsmith cylinder --radius 5 --height 20 --voxel 0.2 --as grip ! patch-grid "
-          "@grip --count 12,6 --around \"0,0,-6 0,0,6\" --height 0.8 --as p "
-          "! box --size 1,1,1 --voxel 0.1 --as stud ! texture @grip @stud @p "
+          "levelsmith cylinder --radius 5 --height 20 --voxel 0.4 --as grip ! patch-grid "
+          "@grip --count 8,4 --around \"0,0,-6 0,0,6\" --height 0.8 --as p "
+          "! box --size 1,1,1 --voxel 0.2 --as stud ! texture @grip @stud @p "
           "--texture-box \"-1,-1,-0.5 1,1,0.5\" ! mesh ! write grip.ply",
       .params = joinParams(
           joinParams({{.name = "count",

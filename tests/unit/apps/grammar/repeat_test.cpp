@@ -1,5 +1,5 @@
-// Equal bits with 1, 2 and 4 threads, each action ten times. Several actions share a process,
-// because start-up takes longer than most of them.
+// Equal bits with one thread and, twice, with three. Several actions share a process, because
+// start-up takes longer than most of them.
 
 #include <gtest/gtest.h>
 
@@ -34,8 +34,8 @@ TEST_P(Repeat, GivesTheSameBits) {
                 .code,
             0);
   std::vector<std::string> first;
-  for (int i = 0; i < 10; ++i) {
-    const int threads = 1 << (i % 3);
+  for (int i = 0; i < 3; ++i) {
+    const int threads = i == 0 ? 1 : 3;
     const auto outcome =
         levelsmith("--quiet --threads " + std::to_string(threads) + " " + c.chain, 100);
     ASSERT_EQ(outcome.code, 0) << outcome.err;

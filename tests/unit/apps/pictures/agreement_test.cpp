@@ -44,7 +44,7 @@ NarrowBand model(const char* name, double resolution) {
 }
 
 /// A cylinder with a knurl around it.
-NarrowBand knurledCylinder() {
+NarrowBand knurledCylinder(double voxelSize) {
   const NarrowBand base = levelset::makeCylinder(1, 3.05, V3d(0), V3d(0, 0, 1), 0.05);
   const mapping::Knurl knurl{.depth = 0.2, .flankAngle = 2, .base = 0.3, .tiling = {2, 1, 0.15}};
   const mapping::PatchGridResult grid = mapping::makePatchGridAround(
@@ -53,7 +53,7 @@ NarrowBand knurledCylinder() {
   return mapping::mapTexture(base, mapping::makeKnurl(knurl, V3d(0), 0.04), grid.patches,
                              {.embedDepth = 0.05,
                               .textureBox = mapping::knurlBox(knurl, V3d(0)).tile,
-                              .voxelSize = 0.02})
+                              .voxelSize = voxelSize})
       .band;
 }
 
@@ -106,7 +106,7 @@ bool isOffOutlines(const Image& image, const Scene& scene, int x, int y) {
   return -normal.dot(scene.camera.ray(x + 0.5, y + 0.5).direction) > kSteep;
 }
 
-/// Tests the required agreement at 1024x768.
+/// Tests the required agreement of a picture.
 void expectAgreement(const Scene& scene, const std::string& what) {
   const Image ours = renderCpu(scene, kData), judge = renderEmbree(scene, kData);
   const ImageComparison found = compareImages(ours, judge);
@@ -154,28 +154,55 @@ Scene resized(Scene scene, int width, int height) {
   return scene;
 }
 
-void expectProven(const Scene& scene, const std::string& what) {
-  expectAgreement(resized(scene, 1024, 768), what);
-  expectSameBits(resized(scene, 320, 240), what);
+/// Tests a scene.
+/// @param size  1: agreement at 1024x768 pixels, equal bits at 320x240
+void expectProven(const Scene& scene, const std::string& what, double size) {
+  const auto pixels = [&](int most) { return static_cast<int>(most * size); };
+  expectAgreement(resized(scene, pixels(1024), pixels(768)), what);
+  expectSameBits(resized(scene, pixels(320), pixels(240)), what);
+}
+
+constexpr double kQuickSize = 0.5;
+
+void proveBallsAndTheSolidsOfCsg(double size) {
+  expectProven(support::sceneOf(levelset::makeSphere(100, V3d(0.3, 0.2, 0.1), 1)), "ball", size);
+  expectProven(csgScene(1024, 768), "csg", size);
 }
 
 TEST(Agreement, OfBallsAndTheSolidsOfCsg) {
-  expectProven(support::sceneOf(levelset::makeSphere(100, V3d(0.3, 0.2, 0.1), 1)), "ball");
-  expectProven(csgScene(1024, 768), "csg");
+  proveBallsAndTheSolidsOfCsg(kQuickSize);
+}
+
+TEST(SlowAgreement, OfBallsAndTheSolidsOfCsg) {
+  proveBallsAndTheSolidsOfCsg(1);
+}
+
+void proveExpressionsAlongTheRays(double size) {
+  for (const char* csg : {"(a | b) - c", "a & b | c - a"})
+    expectProven(sceneAlongRays(csg), csg, size);
 }
 
 TEST(Agreement, OfAnExpressionAlongTheRays) {
-  for (const char* csg : {"(a | b) - c", "a & b | c - a"}) expectProven(sceneAlongRays(csg), csg);
+  proveExpressionsAlongTheRays(kQuickSize);
+}
+
+TEST(SlowAgreement, OfAnExpressionAlongTheRays) {
+  proveExpressionsAlongTheRays(1);
 }
 
 TEST(Agreement, OfATexturedSolid) {
-  expectProven(support::sceneOf(knurledCylinder()), "knurled cylinder");
+  expectProven(support::sceneOf(knurledCylinder(0.03)), "knurled cylinder", kQuickSize);
 }
 
-TEST(Agreement, OfTheBunny) {
+TEST(SlowAgreement, OfATexturedSolid) {
+  expectProven(support::sceneOf(knurledCylinder(0.02)), "knurled cylinder", 1);
+}
+
+/// @param resolution  voxels along the longest side
+void proveBunny(double resolution, double size) {
   if (!std::filesystem::exists(modelPath("bunny.obj"))) GTEST_SKIP() << "no models";
-  const NarrowBand bunny = model("bunny.obj", 256);
-  expectProven(support::sceneOf(bunny), "bunny");
+  const NarrowBand bunny = model("bunny.obj", resolution);
+  expectProven(support::sceneOf(bunny), "bunny", size);
   // From inside, with an ear in front of the eye.
   Scene scene = support::sceneOf(bunny, 320, 240);
   const Imath::Box3d box = bunny.zeroSetBounds();
@@ -184,11 +211,28 @@ TEST(Agreement, OfTheBunny) {
   expectSameBits(scene, "from within the bunny");
 }
 
-TEST(Agreement, OfTheDragon) {
-  if (!std::filesystem::exists(modelPath("dragon_vrip_res2.ply.gz"))) GTEST_SKIP() << "no models";
-  const NarrowBand dragon = model("dragon_vrip_res2.ply.gz", 512);
-  expectProven(support::sceneOf(dragon), "dragon");
+TEST(Agreement, OfTheBunny) {
+  proveBunny(128, kQuickSize);
+}
+
+TEST(SlowAgreement, OfTheBunny) {
+  proveBunny(256, 1);
+}
+
+/// @param resolution  voxels along the longest side
+void proveDragon(const char* file, double resolution, double size) {
+  if (!std::filesystem::exists(modelPath(file))) GTEST_SKIP() << "no models";
+  const NarrowBand dragon = model(file, resolution);
+  expectProven(support::sceneOf(dragon), "dragon", size);
   expectSameBits(support::seenFromFar(dragon), "dragon from 1e5 away");
+}
+
+TEST(Agreement, OfTheDragon) {
+  proveDragon("dragon_vrip_res3.ply.gz", 160, kQuickSize);
+}
+
+TEST(SlowAgreement, OfTheDragon) {
+  proveDragon("dragon_vrip_res2.ply.gz", 512, 1);
 }
 
 /// Pictures of a scene from positions all around it, some of them inside.
@@ -226,19 +270,27 @@ class ManyPlaces {
   std::size_t positions_ = 0, pixels_ = 0, hit_ = 0, atOutline_ = 0;
 };
 
-TEST(Agreement, From200PositionsNothingLeaks) {
+void expectNoLeakFromPositions(int count) {
   Scene scene = support::sceneOf(support::rings(), 96, 72);
   scene.solids.push_back(
       {.band = levelset::makeBox(V3d(70, 40, 0.7), V3d(0.1, 0.2, -13), 1), .id = 2});
   ManyPlaces places;
-  for (int n = 0; n < 200; ++n) places.look(scene, [](Camera&, double) {});
+  for (int n = 0; n < count; ++n) places.look(scene, [](Camera&, double) {});
   places.expectNoLeak();
+}
+
+TEST(Agreement, From80PositionsNothingLeaks) {
+  expectNoLeakFromPositions(80);
+}
+
+TEST(SlowAgreement, From200PositionsNothingLeaks) {
+  expectNoLeakFromPositions(200);
 }
 
 TEST(Agreement, OfAnExpressionBetweenTwoPlanesNothingLeaks) {
   Scene scene = resized(sceneAlongRays("(a - b) & c | b - a"), 96, 72);
   ManyPlaces places;
-  for (int n = 0; n < 60; ++n)
+  for (int n = 0; n < 40; ++n)
     places.look(scene, [](Camera& camera, double share) {
       const double away = (camera.to - camera.from).length();
       camera.near = std::max(0.0, away + 30 * (share - 0.7));

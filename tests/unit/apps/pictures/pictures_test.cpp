@@ -55,7 +55,7 @@ TEST_F(Pictures, OfVolumesAreProvenWithAllFilters) {
   for (const char* filter : {"trilinear", "tricubic", "bspline", "bspline-qi", "super-quadratic",
                              "cubic-c1", "bcc-quadratic"}) {
     const Outcome drawn = levelsmith(
-        std::string("volume marschner-lobb ! render v.exr --isovalue 0.5 --size 96x72 --samples 1 "
+        std::string("volume marschner-lobb ! render v.exr --isovalue 0.5 --size 64x48 --samples 1 "
                     "--renderer both --filter ") +
         filter);
     EXPECT_EQ(drawn.code, 0) << filter << drawn.err;

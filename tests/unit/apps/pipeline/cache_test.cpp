@@ -68,8 +68,8 @@ class CacheRun : public ShellTest {
  protected:
   /// Chain with level sets, a mesh, a field and printed values.
   static std::string chain(const std::string& size = "1,1,3") {
-    return "sphere --radius 1 --voxel 0.05 --as a ! box --size " + size +
-           " --voxel 0.05 ! difference @a ! write o.vdb ! render o.exr --size 64x48 --samples 1 "
+    return "sphere --radius 1 --voxel 0.1 --as a ! box --size " + size +
+           " --voxel 0.1 ! difference @a ! write o.vdb ! render o.exr --size 32x24 --samples 1 "
            "--renderer cpu ! mesh ! write o.ply ! measure --json";
   }
   /// All output of a run.
@@ -201,10 +201,10 @@ TEST_F(CacheRun, SurvivesBeingKilledAtAnyTime) {
   const std::string expected = left(levelsmith(chain()));
   std::mt19937 random(11);
   int killed = 0;
-  for (int i = 0; i < 50; ++i) {
+  for (int i = 0; i < 25; ++i) {
     if (i % 5 == 0) fs::remove_all(folder_ / "c");
     clear();
-    const double moment = 0.005 + 0.2 * static_cast<double>(random() % 1000) / 1000;
+    const double moment = 0.005 + 0.12 * static_cast<double>(random() % 1000) / 1000;
     killed += shell("timeout -s KILL " + std::to_string(moment) + " " + command() + " --cache c " +
                     chain())
                   .code == 137;
@@ -212,7 +212,7 @@ TEST_F(CacheRun, SurvivesBeingKilledAtAnyTime) {
     ASSERT_EQ(next.code, 0) << next.err;
     ASSERT_TRUE(left(next) == expected) << "killed after " << moment << " s";
   }
-  EXPECT_GT(killed, 10);
+  EXPECT_GT(killed, 5);
 }
 
 TEST_F(CacheRun, IsSharedByConcurrentRuns) {
@@ -235,9 +235,9 @@ TEST_F(CacheRun, CanBeListedAndReduced) {
   ASSERT_EQ(levelsmith("--cache c " + chain()).code, 0);
   const Json all = Json::parse(levelsmith("cache list c --json").out);
   EXPECT_EQ(all["entries"], 8);
-  EXPECT_GT(all["bytes"], 100000);
-  const Json less = Json::parse(levelsmith("cache gc c --max-size 60K --json").out);
-  EXPECT_LE(less["bytes"], 60 * 1024);
+  EXPECT_GT(all["bytes"], 30000);
+  const Json less = Json::parse(levelsmith("cache gc c --max-size 20K --json").out);
+  EXPECT_LE(less["bytes"], 20 * 1024);
   EXPECT_EQ(less["removed"].get<int>() + less["entries"].get<int>(), 8);
   EXPECT_EQ(levelsmith("--cache c " + chain()).code, 0);
   EXPECT_EQ(levelsmith("cache gc c").code, 2);

@@ -27,7 +27,7 @@ MeshToBandResult closed(const TriMesh& mesh, double h, Nesting nesting = Nesting
 
 TEST(MeshToBand, MeasuresExactlyAroundTorus) {
   const TriMesh mesh = torusMesh(1, 0.4, 32, 16, V3d(0.013, -0.021, 0.007));
-  const auto result = closed(mesh, 0.09);
+  const auto result = closed(mesh, 0.13);
   expectExact(result, mesh, byWinding(mesh));
   EXPECT_TRUE(result.certificate.closed);
   EXPECT_EQ(result.certificate.method, SignMode::Closed);
@@ -52,7 +52,7 @@ TEST(MeshToBand, MatchesWindingNumberOfNestedComponents) {
   const TriMesh outer = sphereMesh(1, V3d(0.01, 0.02, 0.03), 12);
   const TriMesh same = joined(outer, sphereMesh(0.5, V3d(0), 10));
   const TriMesh cavity = joined(outer, reversed(sphereMesh(0.5, V3d(0), 10)));
-  const double h = 0.12;
+  const double h = 0.16;
   const auto winding = [&](const TriMesh& mesh) {
     return meshToBand(mesh, h, {.sign = SignMode::Winding});
   };
@@ -198,9 +198,9 @@ TEST(MeshToBand, GivesTheSameBitsForAnyThreadCount) {
   const TriMesh whole = torusMesh(1, 0.4, 64, 32);
   const TriMesh open = sphereMesh(1, V3d(0.01), 10, 0.7);
   std::vector<std::uint64_t> hashes;
-  for (const std::size_t threads : {1u, 2u, 4u}) {
+  for (const std::size_t threads : {1u, 3u}) {
     support::onThreads(threads, [&] {
-      hashes.push_back(meshToBand(whole, 0.03).band.contentHash());
+      hashes.push_back(meshToBand(whole, 0.04).band.contentHash());
       hashes.push_back(meshToBand(open, 0.08, {.acceptSign = true}).band.contentHash());
     });
   }
@@ -267,7 +267,7 @@ TEST(SelfIntersections, HandlesFlatFansAroundACorner) {
   // A disc of triangles around one vertex is flat. A triangle that is turned over lies on another
   // one.
   TriMesh fan{{V3d(0)}, {}};
-  constexpr std::uint32_t kSides = 4000;
+  constexpr std::uint32_t kSides = 1500;
   for (std::uint32_t i = 0; i < kSides; ++i) {
     const double angle = 2 * std::numbers::pi * i / kSides;
     fan.positions.emplace_back(turned(V3d(std::cos(angle), std::sin(angle), 0), 0.3));

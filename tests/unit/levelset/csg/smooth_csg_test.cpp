@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
 #include <vector>
 
 #include "levelset/error.h"
@@ -110,7 +112,9 @@ void expectMeasured(double found, double measured) {
   EXPECT_GE(found, measured / 2);
 }
 
-TEST(SmoothCsg, BlendsTwoBallsLikeTheFormulaWithSecondOrder) {
+/// Compares blends of two balls with the formula.
+/// @param resolutions  of each operation, coarsest first; with three the order is tested
+void expectBlendsOfBalls(const std::array<std::size_t, 3>& resolutions) {
   const V3d centreA(0.013, 0.029, 0.017), centreB = centreA + V3d(0.9, 0.3, 0.2);
   const std::vector<std::vector<Measured>> measured = {
       {{0.08, 0.00267, 0.00309}, {0.04, 0.0014, 0.00148}, {0.02, 0.000731, 0.000705}},
@@ -120,7 +124,7 @@ TEST(SmoothCsg, BlendsTwoBallsLikeTheFormulaWithSecondOrder) {
     const CsgOperation operation = kOperations[i];
     const Distance exact = smoothResult(operation, ball(centreA, 1), ball(centreB, 0.8), 0.4);
     std::vector<double> errors;
-    for (const Measured& at : measured[i]) {
+    for (const Measured& at : std::span(measured[i]).first(resolutions[i])) {
       SCOPED_TRACE("operation " + std::to_string(i) + ", voxel " + std::to_string(at.voxelSize));
       const NarrowBand a = makeSphere(1, centreA, at.voxelSize),
                        b = makeSphere(0.8, centreB, at.voxelSize);
@@ -131,11 +135,23 @@ TEST(SmoothCsg, BlendsTwoBallsLikeTheFormulaWithSecondOrder) {
       errors.push_back(found.largest() * at.voxelSize);
       EXPECT_TRUE(check(made).passed());
     }
-    EXPECT_GT(std::log2(errors[1] / errors[2]), 1.9);  // measured 2.0 to 2.1
+    if (errors.size() == 3) {
+      EXPECT_GT(std::log2(errors[1] / errors[2]), 1.9);  // measured 2.0 to 2.1
+    }
   }
 }
 
-TEST(SmoothCsg, BlendsTwoPlanesLikeTheFormulaWithSecondOrder) {
+TEST(SmoothCsg, BlendsTwoBallsLikeTheFormulaWithSecondOrder) {
+  expectBlendsOfBalls({2, 3, 2});
+}
+
+TEST(SlowSmoothCsg, BlendsTwoBallsLikeTheFormulaWithSecondOrder) {
+  expectBlendsOfBalls({3, 1, 3});
+}
+
+/// Compares blends of two planes with the formula.
+/// @param resolutions  of union and intersection, coarsest first; with three the order is tested
+void expectBlendsOfPlanes(const std::array<std::size_t, 2>& resolutions) {
   const V3d corner(0.011, 0.023, 0.007);
   const Imath::Box3d box(V3d(-0.7), V3d(0.7));
   const double half = 0.785;
@@ -147,7 +163,7 @@ TEST(SmoothCsg, BlendsTwoPlanesLikeTheFormulaWithSecondOrder) {
   for (std::size_t i = 0; i < measured.size(); ++i) {
     const Distance exact = smoothResult(kOperations[i], a, b, 0.3);
     std::vector<double> errors;
-    for (const Measured& at : measured[i]) {
+    for (const Measured& at : std::span(measured[i]).first(resolutions[i])) {
       SCOPED_TRACE("operation " + std::to_string(i) + ", voxel " + std::to_string(at.voxelSize));
       const NarrowBand made =
           smoothCombine(kOperations[i], support::sampleBand(a.value, box, at.voxelSize),
@@ -159,8 +175,18 @@ TEST(SmoothCsg, BlendsTwoPlanesLikeTheFormulaWithSecondOrder) {
       expectMeasured(found.outside, at.outside);
       errors.push_back(found.largest() * at.voxelSize);
     }
-    EXPECT_GT(std::log2(errors[0] / errors[2]) / 2, 1.9);  // measured 2.1 to 2.2
+    if (errors.size() == 3) {
+      EXPECT_GT(std::log2(errors[0] / errors[2]) / 2, 1.9);  // measured 2.1 to 2.2
+    }
   }
+}
+
+TEST(SmoothCsg, BlendsTwoPlanesLikeTheFormulaWithSecondOrder) {
+  expectBlendsOfPlanes({3, 2});
+}
+
+TEST(SlowSmoothCsg, BlendsTwoPlanesLikeTheFormulaWithSecondOrder) {
+  expectBlendsOfPlanes({1, 3});
 }
 
 TEST(SmoothCsg, IsPlainCsgWithoutARadius) {
@@ -199,7 +225,8 @@ TEST(SmoothCsg, IsSymmetric) {
 TEST(SmoothCsg, BridgesGapsBelowHalfTheRadiusOnly) {
   for (const bool joins : {true, false}) {
     const double gap = joins ? 0.12 : 0.18, radius = 0.3;
-    const NarrowBand a = makeSphere(1, V3d(0), 0.02), b = makeSphere(1, V3d(2 + gap, 0, 0), 0.02);
+    const NarrowBand a = makeSphere(0.5, V3d(0), 0.02),
+                     b = makeSphere(0.5, V3d(1 + gap, 0, 0), 0.02);
     const NarrowBand made = smoothCombine(CsgOperation::Union, a, b, radiusOf(radius)).band;
     EXPECT_EQ(measure(made).components, joins ? 1u : 2u);
   }
