@@ -28,8 +28,8 @@ struct DeformBandResult {
 /// to it, by Newton's method, and takes the value of the solid there from a tricubic
 /// interpolant. The distances to the zero set of these values are then computed exactly, as
 /// redistance() does. The surface is accurate to second order in the voxel size, and to fourth
-/// order where the interpolants are smooth; edges that turn by 40 degrees or more stay sharp. An identity
-/// returns the operand, unless another grid is asked for.
+/// order where the interpolants are smooth; edges that turn by 40 degrees or more stay sharp. An
+/// identity returns the operand, unless another grid is asked for.
 /// @throws InvalidInput for an empty solid, an open surface, a map that is not proven to be
 ///         injective, a surface that leaves its domain, or voxels that are too large for the result
 /// @throws UsageError for a voxel size or half width out of range

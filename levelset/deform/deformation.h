@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "levelset/deform/control_lattice.h"
-#include "levelset/deform/fold_certificate.h"
+#include "levelset/deform/deformation_certificate.h"
 #include "levelset/progress.h"
 
 namespace levelset {

@@ -3,7 +3,7 @@
 #include <cstddef>
 
 #include "levelset/deform/control_lattice.h"
-#include "levelset/deform/fold_certificate.h"
+#include "levelset/deform/deformation_certificate.h"
 #include "levelset/progress.h"
 
 /// Proof that a lattice folds nowhere in its box.

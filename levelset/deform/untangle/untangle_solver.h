@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "levelset/deform/fold_certificate.h"
-#include "levelset/deform/untangle/untangle.h"
+#include "levelset/deform/deformation_certificate.h"
+#include "levelset/deform/untangle/untangle_deformation.h"
 
 namespace levelset::untangle {
 

@@ -19,7 +19,7 @@
 #include "levelset/deform/deform_mesh.h"
 #include "levelset/deform/lattice_file.h"
 #include "levelset/deform/ready_lattices.h"
-#include "levelset/deform/untangle/untangle.h"
+#include "levelset/deform/untangle/untangle_deformation.h"
 #include "levelset/error.h"
 #include "levelset/mesh_files/mesh_file.h"
 #include "levelset/meshing/band_to_mesh.h"

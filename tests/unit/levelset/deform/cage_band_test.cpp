@@ -60,7 +60,7 @@ double ellipsoidDistance(const V3d& p, double c) {
   return r * r + z * z / (c * c) < 1 ? -distance : distance;
 }
 
-TEST(CageBand, AnAffineCageMakesAnEllipsoidOfABall) {
+TEST(SlowCageBand, AnAffineCageMakesAnEllipsoidOfABall) {
   const double figures[] = {1.64e-3, 4.2e-4, 1.05e-4};  // voxels, on both sides
   double last = 0;
   int level = 0;
@@ -85,7 +85,7 @@ TEST(CageBand, AnAffineCageMakesAnEllipsoidOfABall) {
 
 /// The volume of a solid after a smooth deformation is the integral of the Jacobian, here by sums
 /// over the grid of the ball.
-TEST(CageBand, VolumeIsTheIntegralOfTheJacobian) {
+TEST(SlowCageBand, VolumeIsTheIntegralOfTheJacobian) {
   for (const CageCoordinates kind : {CageCoordinates::MeanValue, CageCoordinates::Green}) {
     const CageDeformation cage = shaken(1, 0.08, kind);
     double exact = 0;
@@ -108,7 +108,7 @@ TEST(CageBand, VolumeIsTheIntegralOfTheJacobian) {
   }
 }
 
-TEST(CageBand, TheIdentityKeepsTheBits) {
+TEST(SlowCageBand, TheIdentityKeepsTheBits) {
   const NarrowBand ball = makeSphere(1, V3d(0.1, 0.2, 0.3), 0.1);
   const TriMesh rest = support::boxCage(V3d(-2.5), V3d(2.5), 1);
   const CageDeformation cage(rest, rest, CageCoordinates::Green);
@@ -117,7 +117,7 @@ TEST(CageBand, TheIdentityKeepsTheBits) {
   EXPECT_EQ(result.certificate.leastHigh, 1);
 }
 
-TEST(CageBand, IsTheSameForAnyNumberOfThreads) {
+TEST(SlowCageBand, IsTheSameForAnyNumberOfThreads) {
   const auto run = [] {
     const CageDeformation cage = shaken(1, 0.1, CageCoordinates::Green);
     const DeformBandResult result = deformBand(makeSphere(0.6, V3d(0), 0.1), cage);

@@ -1,4 +1,4 @@
-#include "levelset/deform/fold_certificate.h"
+#include "levelset/deform/deformation_certificate.h"
 
 #include <fmt/core.h>
 

@@ -1,4 +1,4 @@
-#include "levelset/deform/untangle/untangle.h"
+#include "levelset/deform/untangle/untangle_deformation.h"
 
 #include <gtest/gtest.h>
 
