@@ -2,6 +2,7 @@
 #include <tbb/parallel_for.h>
 
 #include <array>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <utility>
@@ -161,7 +162,7 @@ class SpaceEdit {
       else if (space_.takes(other))
         distance = std::max(distance, -space);
       result.push_back(std::max(0.0f, distance));
-      isKnown = isKnown || distance < data_.background;
+      isKnown = isKnown || distance < std::nextafter(data_.background, 0.0f);
     }
     // The interface between two regions that are one now hid the next one.
     if (!isKnown && own == space_.label && near.label != near.neighbour && belongs(near.label) &&

@@ -53,7 +53,8 @@ SegmentedField withHiddenDistances(const SegmentedField& field, RegionLabel regi
       result.push_back(std::max(0.0f, storedDistance(reader, at, near, other)));
       least = std::min(least, result.back());
     }
-    if (own != region || least < data.background) return;
+    // Just below the background: not known, see packPartition().
+    if (own != region || least < std::nextafter(data.background, 0.0f)) return;
     const float depth = std::abs(vdb(band).tree().getValue(at));
     if (depth < data.background)
       result[nearestOwner(at, others, [&](const Coord& p) { return reader.label(p); })] = depth;

@@ -1,0 +1,152 @@
+// Atlas of 20 regions: labels, junctions, areas and volumes beside closed forms.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <set>
+#include <vector>
+
+#include "levelset/segmented/meshing/measure_segmented.h"
+#include "levelset/segmented/segment_solids.h"
+#include "tests/support/measured.h"
+#include "tests/support/power_atlas.h"
+#include "tests/support/segmented.h"
+
+namespace segmented_atlas_test {
+
+using namespace levelset;
+using Imath::V3d;
+using std::numbers::pi;
+using support::interfaceDefects;
+using support::InterfaceDefects;
+using support::measured;
+using support::measuredOrder;
+using support::PowerAtlas;
+
+constexpr double kLeastArea = 1e-9;  // of a face, above rounding
+
+/// Closed forms of all cells and faces.
+struct AtlasTruth {
+  std::vector<double> volumes, spheres;                         ///< by cell
+  std::map<std::pair<std::size_t, std::size_t>, double> areas;  ///< by labels, front first
+  double length = 0, area = 0;
+};
+AtlasTruth truthOf(const PowerAtlas& atlas) {
+  AtlasTruth truth;
+  for (std::size_t i = 0; i < PowerAtlas::kCells; ++i) {
+    truth.volumes.push_back(atlas.volume(i));
+    const double sphere = atlas.sphereArea(i);
+    if (sphere > 0) truth.areas[{0, i + 1}] = sphere;
+    truth.area += sphere;
+    for (std::size_t j = i + 1; j < PowerAtlas::kCells; ++j) {
+      const PowerAtlas::Face face = atlas.face(i, j);
+      if (!(face.area > kLeastArea)) continue;
+      truth.areas[{i + 1, j + 1}] = face.area;
+      truth.area += face.area;
+      truth.length += face.inner / 3 + face.sphere;  // three faces meet in an edge
+    }
+  }
+  return truth;
+}
+
+/// Largest errors of an atlas.
+struct AtlasErrors {
+  double junction = 0, meanJunction = 0, point = 0;  // voxels
+  double length = 0, area = 0, face = 0, volume = 0, cell = 0;
+};
+AtlasErrors atlasErrors(const PowerAtlas& atlas, const AtlasTruth& truth, double voxel) {
+  const SegmentSolidsResult result = segmentSolids(atlas.solids(voxel));
+  EXPECT_EQ(result.field.labels().size(), PowerAtlas::kCells);
+  EXPECT_TRUE(result.vanished.empty());
+  // Labels are exact away from interfaces.
+  const SegmentedSampler sampler(result.field);
+  std::size_t wrong = 0, points = 0;
+  for (double x = -1.05; x < 1.05; x += 0.071)
+    for (double y = -1.05; y < 1.05; y += 0.073)
+      for (double z = -1.05; z < 1.05; z += 0.067) {
+        const auto [label, depth] = atlas.labelAt(V3d(x, y, z));
+        if (depth < 0.5 * voxel) continue;
+        ++points;
+        wrong += sampler.label(V3d(x, y, z)) != label;
+      }
+  EXPECT_GT(points, 20000u);
+  EXPECT_EQ(wrong, 0u);
+
+  const SegmentedMesh mesh = segmentedToMesh(result.field);
+  EXPECT_EQ(interfaceDefects(mesh), InterfaceDefects());
+  AtlasErrors errors;
+  std::map<std::uint32_t, std::set<std::size_t>> labels;
+  for (const JunctionEdge& edge : mesh.junctions)
+    for (const std::uint32_t v : edge.vertices)
+      labels[v].insert(edge.labels.begin(), edge.labels.end());
+  double sum = 0;
+  for (const auto& [vertex, around] : labels) {
+    EXPECT_LE(around.size(), 4u);
+    const double error =
+        atlas.distanceFromJunction(mesh.mesh.positions[vertex],
+                                   std::vector<std::size_t>(around.begin(), around.end())) /
+        voxel;
+    double& worst = around.size() == 3 ? errors.junction : errors.point;
+    worst = std::max(worst, error);
+    sum += error;
+  }
+  errors.meanJunction = sum / static_cast<double>(labels.size());
+
+  const SegmentedMeasurement m = measureSegmented(mesh);
+  errors.length = std::abs(m.junctionLength - truth.length);
+  errors.area = std::abs(m.area - truth.area);
+  errors.volume = std::abs(m.volume - 4 * pi / 3);
+  for (std::size_t i = 0; i < PowerAtlas::kCells; ++i)
+    errors.cell = std::max(errors.cell, std::abs(m.regions[i + 1].volume - truth.volumes[i]));
+  EXPECT_EQ(m.interfaces.size(), truth.areas.size());
+  for (const InterfaceMeasure& interface : m.interfaces) {
+    const auto exact = truth.areas.find({interface.sides.front, interface.sides.behind});
+    if (exact == truth.areas.end()) {
+      ADD_FAILURE() << interface.sides.front << " touches " << interface.sides.behind;
+      continue;
+    }
+    errors.face = std::max(errors.face, std::abs(interface.area - exact->second));
+  }
+  return errors;
+}
+
+TEST(SegmentedAtlas, ClosedFormsAddUp) {
+  const PowerAtlas atlas;
+  const AtlasTruth truth = truthOf(atlas);
+  double volume = 0, sphere = 0;
+  for (std::size_t i = 0; i < PowerAtlas::kCells; ++i) {
+    volume += truth.volumes[i];
+    sphere += atlas.sphereArea(i);
+    EXPECT_GT(truth.volumes[i], 0.01);
+  }
+  EXPECT_NEAR(volume, 4 * pi / 3, measured(1e-6));
+  EXPECT_NEAR(sphere, 4 * pi, measured(1e-6));
+}
+
+TEST(SegmentedAtlas, AgreesWithClosedForms) {
+  const PowerAtlas atlas;
+  const AtlasErrors errors = atlasErrors(atlas, truthOf(atlas), 0.05);
+  EXPECT_LT(errors.meanJunction, measured(2.4e-3));
+  // A few vertices are not within the 0.1 voxels of the others.
+  EXPECT_LT(errors.junction, measured(0.544));
+  EXPECT_LT(errors.face, measured(2.92e-3));
+  EXPECT_LT(errors.volume, measured(4.54e-3));
+  EXPECT_LT(errors.cell, measured(5.29e-4));
+}
+
+TEST(SlowSegmentedAtlas, ConvergesToClosedForms) {
+  const PowerAtlas atlas;
+  const AtlasTruth truth = truthOf(atlas);
+  std::vector<AtlasErrors> errors;
+  for (const double voxel : {0.05, 0.05 / std::numbers::sqrt2, 0.025}) {
+    errors.push_back(atlasErrors(atlas, truth, voxel));
+    EXPECT_LT(errors.back().meanJunction, measured(3.8e-3));
+  }
+  EXPECT_GT(std::log2(errors[0].volume / errors[2].volume), measuredOrder(1.89));
+  EXPECT_GT(std::log2(errors[0].cell / errors[2].cell), measuredOrder(1.87));
+}
+
+}  // namespace segmented_atlas_test
