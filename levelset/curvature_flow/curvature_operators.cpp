@@ -99,7 +99,9 @@ std::optional<Cost> SmoothOperator::cost(const Options& options, const OperatorP
   const double taps = options.kind == SmoothKind::Median
                           ? 8 * 4.2 * std::pow(std::max(1.0, sigma), 3)
                           : 3 * (8 * sigma + 1) * (options.kind == SmoothKind::Taubin ? 2 : 1);
-  cost += {0.5e-9 * taps * 2 * width * layer, layer * (20 + 18 * 2 * width)};
+  // The grid and two arrays; Taubin smoothing and blending with a mask hold a third.
+  const double arrays = options.kind == SmoothKind::Taubin || options.mask ? 24 : 18;
+  cost += {0.5e-9 * taps * 2 * width * layer, layer * (20 + arrays * 2 * width)};
   // A distance transform sweeps the grid along x.
   Cost last = costOfDistances(layer, own);
   const double extent = plans.result.bounds.size().x / plans.result.voxelSize;

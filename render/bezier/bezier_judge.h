@@ -26,8 +26,8 @@ struct JudgedRoot {
 /// Independent ray casting of Bézier volumes, to check SharedTree: interval arithmetic along one
 /// ray in double precision. A ray is two planes in world space. Boxes of parameters are bounded by
 /// Taylor forms about their centres. The operator of Krawczyk proves that a box has no root or one
-/// root [Krawczyk69]. It shares no code with the tree: no projection, no de Casteljau, no test of
-/// diagonal dominance.
+/// root [Krawczyk69]. It shares the expressions of attributes with the tree, and no geometry: no
+/// projection, no de Casteljau, no test of diagonal dominance.
 ///
 /// Taylor forms of large boxes are kept between rays, so an object is for one thread.
 class BezierJudge {

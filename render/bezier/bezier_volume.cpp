@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -17,7 +18,7 @@ using levelset::TensorBernstein;
 // Products of four numbers of this magnitude are finite.
 constexpr double kLargestCoordinate = 1e30;
 // A ratio of weights that double precision resolves.
-constexpr double kLeastWeight = 1e-6, kLargestWeight = 1e6;
+constexpr double kLeastWeight = 1e-6, kLargestWeight = 1e6, kLargestRatio = 1e6;
 
 double weightAt(const BezierPatch& patch, std::size_t n) {
   return patch.weights.empty() ? 1 : patch.weights[n];
@@ -88,6 +89,13 @@ void requireBezierPatch(const BezierPatch& patch) {
       throw InvalidInput(fmt::format("weight {} is {}; give positive weights from {} to {}", n, w,
                                      kLeastWeight, kLargestWeight));
   }
+  if (patch.weights.empty()) return;
+  const auto [least, largest] = std::minmax_element(patch.weights.begin(), patch.weights.end());
+  if (*largest / *least > kLargestRatio)
+    throw InvalidInput(fmt::format(
+        "the weights range from {} to {}; give weights whose ratio is at most {:g}, or divide the "
+        "patch",
+        *least, *largest, kLargestRatio));
 }
 
 /// Operators of an expression.

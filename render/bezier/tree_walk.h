@@ -310,7 +310,7 @@ class TreeWalk {
       double length = 0, outside = 0;
       for (std::size_t c = 0; c < 3; ++c) {
         u[c] += change[c];
-        length = std::max(length, std::abs(change[c]));
+        length = std::isfinite(change[c]) ? std::max(length, std::abs(change[c])) : INFINITY;
         outside = std::max(outside, std::abs(u[c] - 0.5) - 0.5);
       }
       if (!(length < 1e3) || outside > 1) return isExcluded(node, screen, u);

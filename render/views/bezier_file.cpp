@@ -14,6 +14,8 @@
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 #include "levelset/files/json_depth.h"
+#include "levelset/memory_limit.h"
+#include "levelset/progress.h"
 #include "render/scene/csg_expression.h"
 
 namespace render {
@@ -82,7 +84,8 @@ class BezierReader {
 };
 
 /// Adds the patches of one entry of the list.
-void addPatches(const BezierJson& json, std::size_t attributes, BezierVolume& volume) {
+void addPatches(const BezierJson& json, std::size_t attributes, std::size_t maxMemory,
+                BezierVolume& volume) {
   BezierReader::requireKnown(json, {"degree", "count", "points", "weights", "knots"});
   std::vector<int> degree = BezierReader::integers(json, "degree", levelset::kMostDegree, 0);
   const bool isSurface = degree.size() == 2;
@@ -153,10 +156,14 @@ void addPatches(const BezierJson& json, std::size_t attributes, BezierVolume& vo
                               std::move(spline.weights)});
     return;
   }
+  double numbers = 4 + static_cast<double>(spline.attributes.size());
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    numbers *= (degree[axis] + 1.0) * static_cast<double>(count[axis] - degree[axis]);
+  levelset::requireMemory(2 * sizeof(double) * numbers, levelset::memoryLeft(maxMemory));
   for (BezierPatch& patch : bezierPatches(spline)) volume.patches.push_back(std::move(patch));
 }
 
-BezierVolume volumeOfText(const std::string& text) {
+BezierVolume volumeOfText(const std::string& text, std::size_t maxMemory) {
   if (levelset::isJsonTooDeep(text)) BezierReader::refuse("has too deeply nested lists");
   const BezierJson json = BezierJson::parse(text, nullptr, /*allow_exceptions=*/false);
   if (json.is_discarded()) BezierReader::refuse("is not a JSON document, or is truncated");
@@ -190,7 +197,7 @@ BezierVolume volumeOfText(const std::string& text) {
   if (!patches.is_array()) BezierReader::refuse("has \"patches\" that are not a list");
   for (std::size_t n = 0; n < patches.size(); ++n)
     levelset::withContext(fmt::format("entry {} of \"patches\"", n),
-                          [&] { addPatches(patches[n], names.size(), volume); });
+                          [&] { addPatches(patches[n], names.size(), maxMemory, volume); });
   requireBezierVolume(volume);
   return volume;
 }
@@ -224,7 +231,7 @@ bool isBezierFile(const std::filesystem::path& file) {
 }
 
 BezierVolume parseBezierVolume(const std::string& text, const std::string& name) {
-  return levelset::withContext(name, [&] { return volumeOfText(text); });
+  return levelset::withContext(name, [&] { return volumeOfText(text, levelset::kNoMemoryLimit); });
 }
 
 BezierVolume readBezierVolume(const std::filesystem::path& file, std::size_t maxMemory) {
@@ -240,7 +247,7 @@ BezierVolume readBezierVolume(const std::filesystem::path& file, std::size_t max
   if (!stream)
     throw levelset::IoError(
         fmt::format("{} cannot be read; check its name and permissions", file.string()));
-  return parseBezierVolume(text, file.string());
+  return levelset::withContext(file.string(), [&] { return volumeOfText(text, maxMemory); });
 }
 
 void writeBezierVolume(const std::filesystem::path& file, const BezierVolume& volume) {

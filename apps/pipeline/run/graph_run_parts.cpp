@@ -32,9 +32,10 @@ using levelset::kPartCell;
 constexpr int kFarCell = 1 << 30;
 
 /// Share of the available memory that a part may use, by the estimate before it is computed. The
-/// estimate holds for surfaces with edges everywhere. kLeastRatio is the least ratio of the memory
+/// estimate holds for surfaces with edges everywhere. kLeastPartShare holds where the blocks that
+/// are written take most of the memory. kLeastRatio is the least ratio of the memory
 /// of a part to its estimate that counts for the parts after it; kRatioMargin is its error.
-constexpr double kPartShare = 0.75, kLeastRatio = 0.5, kRatioMargin = 1.3;
+constexpr double kPartShare = 0.75, kLeastPartShare = 0.2, kLeastRatio = 0.5, kRatioMargin = 1.3;
 /// Share of the available memory at which a part is given up, to be divided.
 constexpr double kLargestShare = 0.9;
 
@@ -196,7 +197,8 @@ void GraphRun::runInParts(std::size_t write) {
   const auto available = static_cast<double>(levelset::memoryLeft(settings_.maxMemory));
   const std::size_t inUse = levelset::residentBytes();
   // The memory for the blocks that are written grows to its share while the parts are computed.
-  const double full = kPartShare * (available - bytesForWriting(plan));
+  const double full =
+      std::max(kPartShare * (available - bytesForWriting(plan)), kLeastPartShare * available);
   double budget = full, limit = INFINITY, ratio = 0;
   std::size_t first = 0;
   while (graph.nodes[first].kind != Kind::Band || !runs[first]) ++first;
@@ -262,12 +264,15 @@ void GraphRun::runInParts(std::size_t write) {
     RunReport report;
     const std::size_t before = levelset::residentBytes();
     highest = before;
+    bool isWritten = false;
     try {
       const Value value = GraphRun(graph, settings, report).runPart(result);
       levelset::withContext(name, [&] {
         requirePlainGrid(value.band());
         file->add(value.band(), part.cells);
       });
+      highest = std::max(highest.load(), levelset::residentBytes());
+      isWritten = true;
       ++count;
     } catch (const levelset::NoSurface&) {
       nothing = std::current_exception();  // the band does not reach this part
@@ -276,10 +281,10 @@ void GraphRun::runInParts(std::size_t write) {
       limit = std::min(limit, part.estimate / 2);
       split();
     }
-    // Parts of the same surface are alike. Small parts do not tell.
-    if (part.estimate > budget / 4) {
+    // Parts of the same surface are alike. Small parts and empty ones do not tell.
+    if (isWritten && part.estimate > budget / 4) {
       ratio = std::max(ratio, kRatioMargin * static_cast<double>(highest - before) / part.estimate);
-      budget = full / std::clamp(ratio, kLeastRatio, 1.0);
+      budget = full / std::max(ratio, kLeastRatio);
     }
     budget = std::min(budget, limit);
     malloc_trim(0);
@@ -295,8 +300,8 @@ void GraphRun::runInParts(std::size_t write) {
   for (std::size_t i = 0; i <= write; ++i)
     if (steps_[i] && !pendingOutput_[i]) queueOutput(i, "");
   reportInOrder();
-  settings_.note(
-      fmt::format("the result was computed in {} parts to stay within --max-memory", count));
+  settings_.note(fmt::format("the result was computed in {} part{} to stay within --max-memory",
+                             count, count == 1 ? "" : "s"));
 }
 
 /// Adds the steps of the run of a part to the steps of the complete run. Costs add up.

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 #include "levelset/deform/cage/cage_shared.h"
@@ -66,6 +68,29 @@ void requireClosed(const TriMesh& mesh) {
           "triangles {} and {} of the cage, at {}, face opposite sides; turn one of them around",
           first[0].triangle, first[1].triangle, cagePlace(place)));
   });
+}
+
+/// Parts that face opposite sides have no common inside, and their mean-value weights may cancel.
+void requireOneOrientation(const TriMesh& mesh) {
+  std::vector<std::uint32_t> part(mesh.positions.size());
+  std::iota(part.begin(), part.end(), 0u);
+  const auto root = [&](std::uint32_t v) {
+    while (part[v] != v) v = part[v] = part[part[v]];
+    return v;
+  };
+  for (const auto& [a, b, c] : mesh.triangles) {
+    part[root(b)] = root(a);
+    part[root(c)] = root(a);
+  }
+  std::map<std::uint32_t, double> volumes;
+  for (const auto& [a, b, c] : mesh.triangles)
+    volumes[root(a)] += mesh.positions[a].dot(mesh.positions[b].cross(mesh.positions[c]));
+  for (const auto& [first, volume] : volumes)
+    if ((volume > 0) != (volumes.begin()->second > 0))
+      throw InvalidInput(fmt::format(
+          "the part of the cage at {} faces inwards where the part at {} faces outwards, or the "
+          "reverse; turn its triangles around, and remove parts within another part",
+          cagePlace(mesh.positions[first]), cagePlace(mesh.positions[volumes.begin()->first])));
 }
 
 /// Finds if a point lies on an edge or a vertex, and where.
@@ -195,6 +220,7 @@ CageDeformation::CageDeformation(const TriMesh& rest, const TriMesh& moved,
         fmt::format("the cage intersects itself: triangles {} and {}, at {}; move them apart",
                     crossing[0].first, crossing[0].second,
                     cagePlace(rest.positions[rest.triangles[crossing[0].first][0]])));
+  requireOneOrientation(rest);
   auto shared = std::make_shared<Shared>();
   shared->kind = coordinates;
   shared->triangles = rest.triangles;

@@ -54,7 +54,7 @@ BallBounds ballBounds(const CageDeformation& cage, const V3d& centre, double rad
   thread_local std::vector<double> distances;
   feet.resize(count);
   distances.resize(count);
-  const auto parts = cage.parts();
+  const auto& parts = cage.parts();
   double nearest = std::numeric_limits<double>::infinity();
   for (std::size_t t = 0; t < count; ++t) {
     const CageTriangle& part = parts[t];

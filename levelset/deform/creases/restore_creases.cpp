@@ -59,10 +59,11 @@ std::vector<std::array<std::uint32_t, 2>> creaseEdges(const NarrowBand& band, co
   const FloatGrid& grid = vdb(band);
   const auto accessor = grid.getConstAccessor();
   const double voxelSize = band.voxelSize();
+  // Along the axes of the grid, which may be rotated. Only angles between gradients are compared.
   const auto gradientAt = [&](const V3d& world) {
     V3d gradient;
     for (int axis = 0; axis < 3; ++axis) {
-      openvdb::Vec3d p(world.x / voxelSize, world.y / voxelSize, world.z / voxelSize);
+      openvdb::Vec3d p = grid.worldToIndex(openvdb::Vec3d(world.x, world.y, world.z));
       p[axis] += 0.5;
       gradient[axis] = static_cast<double>(openvdb::tools::BoxSampler::sample(accessor, p));
       p[axis] -= 1;

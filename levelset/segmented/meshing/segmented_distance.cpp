@@ -9,6 +9,8 @@
 
 #include "levelset/error.h"
 #include "levelset/geometry/search/triangle_search.h"
+#include "levelset/memory_limit.h"
+#include "levelset/progress.h"
 #include "levelset/segmented/meshing/segmented_to_mesh.h"
 
 namespace levelset {
@@ -41,6 +43,10 @@ SegmentedDistance::SegmentedDistance(const SegmentedField& field,
     }
     triangles.positions = std::move(mesh.mesh.positions);
   }
+  // Nine doubles for the corners, a node and an index.
+  constexpr double kBytesPerTriangle = 160;
+  requireMemory(kBytesPerTriangle * static_cast<double>(triangles.triangles.size()),
+                memoryLeft(options.maxMemory));
   impl_ = std::make_unique<Impl>(Impl{field, options.region, makeTriangleSearch(triangles)});
 }
 SegmentedDistance::~SegmentedDistance() = default;

@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "levelset/distance/redistance.h"
+#include "levelset/memory_limit.h"
+#include "levelset/progress.h"
 #include "levelset/segmented/operators/field_edit_vdb.h"
 #include "levelset/segmented/operators/hidden_distances_vdb.h"
 #include "levelset/segmented/operators/pack_partition_vdb.h"
@@ -21,6 +23,10 @@ SegmentedField withHiddenDistances(const SegmentedField& field, RegionLabel regi
                                    const std::vector<Coord>& blocks, std::size_t maxMemory) {
   const SegmentedData& data = *field.shared();
   const std::set<Coord> wanted(blocks.begin(), blocks.end());
+  // A copy of the field, the packed result and the owner of each voxel.
+  requireMemory(2 * static_cast<double>(field.memoryUse()) +
+                    sizeof(RegionLabel) * SegmentedData::kVoxels * data.blockCount(),
+                memoryLeft(maxMemory));
   Imath::Box3d box;
   for (const Coord& block : wanted)
     for (int corner = 0; corner < 8; ++corner) {

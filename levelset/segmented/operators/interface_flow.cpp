@@ -43,7 +43,7 @@ constexpr std::array<std::pair<double, double>, 3> kJunctionGaussians = {
     {{1, 1.90272}, {2, -1.03412}, {4, 0.1314}}};
 constexpr double kJunctionVariance = 0.36008;   // of the sum, as a multiple of the first
 constexpr double kLeastJunctionVariance = 0.7;  // voxels², of the first
-// Largest variance of the sum, voxels²: the widest Gaussian then reaches 13 voxels.
+// Largest variance of the sum, voxels²: the widest Gaussian then reaches 14 voxels.
 constexpr double kLargestJunctionVariance = 1;
 
 /// Kernel of a convolution along all axes.

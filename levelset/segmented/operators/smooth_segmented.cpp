@@ -7,6 +7,7 @@
 #include <map>
 
 #include "levelset/error.h"
+#include "levelset/progress.h"
 #include "levelset/segmented/meshing/measure_segmented.h"
 #include "levelset/segmented/operators/field_edit_vdb.h"
 #include "levelset/segmented/operators/interface_flow_vdb.h"
@@ -38,9 +39,10 @@ void checkSmooth(const SegmentedField& field, double time, const SmoothSegmented
 }
 
 /// Volumes of the regions of a mesh, world units³.
-std::map<RegionLabel, double> volumesOfMesh(const SegmentedField& field) {
+std::map<RegionLabel, double> volumesOfMesh(const SegmentedField& field,
+                                            const SegmentedMeshOptions& mesh) {
   std::map<RegionLabel, double> volumes;
-  for (const RegionMeasure& region : measureSegmented(field).regions)
+  for (const RegionMeasure& region : measureSegmented(field, mesh).regions)
     if (region.label != kVoid) volumes[region.label] = region.volume;
   return volumes;
 }
@@ -49,11 +51,12 @@ std::map<RegionLabel, double> volumesOfMesh(const SegmentedField& field) {
 /// given regions, so their volumes are known from their mesh only. Later steps have the edges of
 /// the flow, which are exact. The errors of both meshes cancel, since the interfaces have hardly
 /// moved.
-void restoreVolumes(const SegmentedField& field, InterfaceFlow& flow) {
-  std::map<RegionLabel, double> missing = volumesOfMesh(field);
+void restoreVolumes(const SegmentedField& field, InterfaceFlow& flow,
+                    const SegmentedMeshOptions& mesh) {
+  std::map<RegionLabel, double> missing = volumesOfMesh(field, mesh);
   const double voxel = std::pow(field.voxelSize(), 3);
   for (const auto& [label, volume] :
-       volumesOfMesh(fieldOfBands(flow.bands(), field.halfWidth(), {})))
+       volumesOfMesh(fieldOfBands(flow.bands(), field.halfWidth(), mesh.progress), mesh))
     missing[label] -= volume;
   for (auto& [label, volume] : missing) volume /= voxel;
   flow.addVolumes(missing);
@@ -106,11 +109,16 @@ SmoothSegmentedResult smoothSegmented(const SegmentedField& field, double time,
     const double done = static_cast<double>(n) / count, next = static_cast<double>(n + 1) / count;
     const std::vector<RegionLabel> vanished = flow.advance(
         subProgress(options.progress, kBandsDone + 0.8 * done, kBandsDone + 0.8 * next));
-    if (n == 0 && options.keepsVolumes && result.steps > 1) restoreVolumes(field, flow);
     for (const RegionLabel label : vanished) result.vanished.push_back({label, next * time});
     if (flow.bands().bands.size() < 2)
       throw InvalidInput(fmt::format(
           "all regions vanish before the time {:.4g}; give a shorter time", next * time));
+    if (n == 0 && options.keepsVolumes && result.steps > 1) {
+      const double at = kBandsDone + 0.8 * next;
+      restoreVolumes(
+          field, flow,
+          {.maxMemory = options.maxMemory, .progress = subProgress(options.progress, at, at)});
+    }
   }
   result.volumeError = flow.volumeError();
   result.field = fieldOfBands(flow.bands(), field.halfWidth(),
