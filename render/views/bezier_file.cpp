@@ -156,10 +156,10 @@ void addPatches(const BezierJson& json, std::size_t attributes, std::size_t maxM
                               std::move(spline.weights)});
     return;
   }
-  double numbers = 4 + static_cast<double>(spline.attributes.size());
+  double converted = 4 + static_cast<double>(spline.attributes.size());
   for (std::size_t axis = 0; axis < 3; ++axis)
-    numbers *= (degree[axis] + 1.0) * static_cast<double>(count[axis] - degree[axis]);
-  levelset::requireMemory(2 * sizeof(double) * numbers, levelset::memoryLeft(maxMemory));
+    converted *= (degree[axis] + 1.0) * (1.0 * count[axis] - degree[axis]);
+  levelset::requireMemory(2 * sizeof(double) * converted, levelset::memoryLeft(maxMemory));
   for (BezierPatch& patch : bezierPatches(spline)) volume.patches.push_back(std::move(patch));
 }
 

@@ -24,9 +24,10 @@ SegmentedField withHiddenDistances(const SegmentedField& field, RegionLabel regi
   const SegmentedData& data = *field.shared();
   const std::set<Coord> wanted(blocks.begin(), blocks.end());
   // A copy of the field, the packed result and the owner of each voxel.
-  requireMemory(2 * static_cast<double>(field.memoryUse()) +
-                    sizeof(RegionLabel) * SegmentedData::kVoxels * data.blockCount(),
-                memoryLeft(maxMemory));
+  requireMemory(
+      2 * static_cast<double>(field.memoryUse()) +
+          static_cast<double>(sizeof(RegionLabel) * SegmentedData::kVoxels * data.blockCount()),
+      memoryLeft(maxMemory));
   Imath::Box3d box;
   for (const Coord& block : wanted)
     for (int corner = 0; corner < 8; ++corner) {
