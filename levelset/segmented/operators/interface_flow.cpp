@@ -449,19 +449,20 @@ void correctJunctions(RegionBands& bands, const CompetingFields& fields, double 
 }  // namespace
 
 InterfaceFlow::InterfaceFlow(RegionBands bands, std::vector<char> isFixed, double step,
-                             bool keepsVolumes, std::size_t maxMemory)
+                             bool hasJunctions, bool keepsVolumes, std::size_t maxMemory)
     : bands_(std::move(bands)),
       isFixed_(std::move(isFixed)),
       constants_(bands_.bands.size(), 0),
       step_(step),
+      hasJunctions_(hasJunctions),
       maxMemory_(maxMemory) {
   if (keepsVolumes) volumes_ = volumes();
 }
 
-double InterfaceFlow::halfWidthFor(double step, std::size_t regions) {
+double InterfaceFlow::halfWidthFor(double step, bool hasJunctions) {
   constexpr double kLeast = 6;
   double widest = 0;
-  for (const auto& [variance, weight] : gaussiansFor(2 * step, regions > 2))
+  for (const auto& [variance, weight] : gaussiansFor(2 * step, hasJunctions))
     widest = std::max(widest, variance);
   return std::max(kLeast, std::ceil(kFarMargin + kDeviations * std::sqrt(widest)));
 }
@@ -495,7 +496,7 @@ std::vector<RegionLabel> InterfaceFlow::advance(const Progress& progress) {
     for (std::size_t r = 0; r < wanted.size(); ++r)
       wanted[r] += reached_[r] - now[static_cast<Eigen::Index>(r)];
   }
-  race.convolve(flowKernels(2 * step_, bands_.bands.size() > 2), subProgress(progress, 0, 0.3));
+  race.convolve(flowKernels(2 * step_, hasJunctions_), subProgress(progress, 0, 0.3));
   if (!volumes_.empty()) {
     std::vector<char> isHeld = isFixed_;
     isHeld[0] = 1;  // the void

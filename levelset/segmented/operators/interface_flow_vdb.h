@@ -16,12 +16,12 @@ class InterfaceFlow {
  public:
   /// @param isFixed  for each region: it does not move
   /// @param step     duration of a step, voxels²
-  InterfaceFlow(RegionBands bands, std::vector<char> isFixed, double step, bool keepsVolumes,
-                std::size_t maxMemory);
+  /// @param hasJunctions  three regions meet: takes the kernel that keeps angles of 120°
+  InterfaceFlow(RegionBands bands, std::vector<char> isFixed, double step, bool hasJunctions,
+                bool keepsVolumes, std::size_t maxMemory);
 
   /// Half width of the bands that steps of this length need, voxels.
-  /// @param regions  number of regions, with the void
-  [[nodiscard]] static double halfWidthFor(double step, std::size_t regions);
+  [[nodiscard]] static double halfWidthFor(double step, bool hasJunctions);
 
   /// Takes a step.
   /// @return labels of the regions that have vanished, ascending
@@ -46,6 +46,7 @@ class InterfaceFlow {
   std::vector<double> reached_;    ///< by the last step before its redistancing, voxels
   std::vector<double> constants_;  ///< added to the distances, world units
   double step_;                    ///< voxels²
+  bool hasJunctions_;
   std::size_t maxMemory_;
   double volumeError_ = 0;
 };

@@ -17,7 +17,7 @@ namespace levelset {
 namespace {
 
 constexpr double kDefaultStep = 0.5;    // voxels²
-constexpr double kJunctionStep = 0.25;  // voxels², of more than two regions
+constexpr double kJunctionStep = 0.25;  // voxels², where regions meet
 constexpr double kLongestFlowStep = 4;  // voxels²
 constexpr double kBandsDone = 0.1;      // progress
 
@@ -83,7 +83,10 @@ SmoothSegmentedResult smoothSegmented(const SegmentedField& field, double time,
   }
   const double inVoxels = time / (field.voxelSize() * field.voxelSize());
   constexpr double kMostSteps = 1e9;
-  const double defaultSteps = inVoxels / (all.size() > 2 ? kJunctionStep : kDefaultStep);
+  // Grid points beside two other regions. Without them the wider kernel gains nothing, and takes
+  // balls of a few voxels for smaller ones.
+  const bool hasJunctions = !field.shared()->extras.empty();
+  const double defaultSteps = inVoxels / (hasJunctions ? kJunctionStep : kDefaultStep);
   if (!options.steps && defaultSteps > kMostSteps)
     throw UsageError(
         fmt::format("a time of {:.4g} takes {:.2g} steps; give a shorter time or use larger voxels",
@@ -98,11 +101,11 @@ SmoothSegmentedResult smoothSegmented(const SegmentedField& field, double time,
         kLongestFlowStep * field.voxelSize() * field.voxelSize(),
         std::ceil(inVoxels / kLongestFlowStep)));
 
-  RegionBands bands = regionBands(field, InterfaceFlow::halfWidthFor(step, all.size()),
+  RegionBands bands = regionBands(field, InterfaceFlow::halfWidthFor(step, hasJunctions),
                                   options.maxMemory, subProgress(options.progress, 0, kBandsDone));
   std::vector<char> isFixed;
   for (const RegionLabel label : bands.labels) isFixed.push_back(isHeld(label));
-  InterfaceFlow flow(std::move(bands), std::move(isFixed), step, options.keepsVolumes,
+  InterfaceFlow flow(std::move(bands), std::move(isFixed), step, hasJunctions, options.keepsVolumes,
                      options.maxMemory);
   const double count = static_cast<double>(result.steps);
   for (std::size_t n = 0; n < result.steps; ++n) {
