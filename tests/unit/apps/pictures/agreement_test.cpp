@@ -164,30 +164,30 @@ void expectProven(const Scene& scene, const std::string& what, double size) {
 
 constexpr double kQuickSize = 0.5;
 
-void proveBallsAndTheSolidsOfCsg(double size) {
+void expectBallsAndCsgProven(double size) {
   expectProven(support::sceneOf(levelset::makeSphere(100, V3d(0.3, 0.2, 0.1), 1)), "ball", size);
   expectProven(csgScene(1024, 768), "csg", size);
 }
 
 TEST(Agreement, OfBallsAndTheSolidsOfCsg) {
-  proveBallsAndTheSolidsOfCsg(kQuickSize);
+  expectBallsAndCsgProven(kQuickSize);
 }
 
 TEST(SlowAgreement, OfBallsAndTheSolidsOfCsg) {
-  proveBallsAndTheSolidsOfCsg(1);
+  expectBallsAndCsgProven(1);
 }
 
-void proveExpressionsAlongTheRays(double size) {
+void expectExpressionsProven(double size) {
   for (const char* csg : {"(a | b) - c", "a & b | c - a"})
     expectProven(sceneAlongRays(csg), csg, size);
 }
 
 TEST(Agreement, OfAnExpressionAlongTheRays) {
-  proveExpressionsAlongTheRays(kQuickSize);
+  expectExpressionsProven(kQuickSize);
 }
 
 TEST(SlowAgreement, OfAnExpressionAlongTheRays) {
-  proveExpressionsAlongTheRays(1);
+  expectExpressionsProven(1);
 }
 
 TEST(Agreement, OfATexturedSolid) {
@@ -199,7 +199,7 @@ TEST(SlowAgreement, OfATexturedSolid) {
 }
 
 /// @param resolution  voxels along the longest side
-void proveBunny(double resolution, double size) {
+void expectBunnyProven(double resolution, double size) {
   if (!std::filesystem::exists(modelPath("bunny.obj"))) GTEST_SKIP() << "no models";
   const NarrowBand bunny = model("bunny.obj", resolution);
   expectProven(support::sceneOf(bunny), "bunny", size);
@@ -212,15 +212,15 @@ void proveBunny(double resolution, double size) {
 }
 
 TEST(Agreement, OfTheBunny) {
-  proveBunny(128, kQuickSize);
+  expectBunnyProven(128, kQuickSize);
 }
 
 TEST(SlowAgreement, OfTheBunny) {
-  proveBunny(256, 1);
+  expectBunnyProven(256, 1);
 }
 
 /// @param resolution  voxels along the longest side
-void proveDragon(const char* file, double resolution, double size) {
+void expectDragonProven(const char* file, double resolution, double size) {
   if (!std::filesystem::exists(modelPath(file))) GTEST_SKIP() << "no models";
   const NarrowBand dragon = model(file, resolution);
   expectProven(support::sceneOf(dragon), "dragon", size);
@@ -228,11 +228,11 @@ void proveDragon(const char* file, double resolution, double size) {
 }
 
 TEST(Agreement, OfTheDragon) {
-  proveDragon("dragon_vrip_res3.ply.gz", 160, kQuickSize);
+  expectDragonProven("dragon_vrip_res3.ply.gz", 160, kQuickSize);
 }
 
 TEST(SlowAgreement, OfTheDragon) {
-  proveDragon("dragon_vrip_res2.ply.gz", 512, 1);
+  expectDragonProven("dragon_vrip_res2.ply.gz", 512, 1);
 }
 
 /// Pictures of a scene from positions all around it, some of them inside.
