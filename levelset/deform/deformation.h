@@ -4,6 +4,7 @@
 #include <Imath/ImathVec.h>
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -61,6 +62,59 @@ class Deformation {
   [[nodiscard]] virtual CertifiedDeformation certify(const DeformationDomain& domain,
                                                      const Progress& progress = {}) const = 0;
 };
+
+/// Limits of a Newton iteration, world units.
+struct NewtonInverse {
+  double tolerance = 0;    ///< largest residual of a result
+  double enough = 0;       ///< residual at which the iteration ends, at most `tolerance`
+  double longestMove = 0;  ///< of a step
+
+  /// Finds a point that a map moves to a position. Each step is halved until the residual falls.
+  /// @param jet  position and derivatives of the map at a point
+  /// @return nullopt: the iteration ends at another point, or where the Jacobian is not positive
+  template <typename Jet>
+  [[nodiscard]] std::optional<Imath::V3d> find(const Jet& jet, const Imath::V3d& position,
+                                               Imath::V3d guess) const;
+};
+
+/// Returns the step of Newton's method that moves the image by `off`, by Cramer's rule. The slopes
+/// of a jet are the columns of the Jacobian.
+[[nodiscard]] inline Imath::V3d newtonMove(const DeformationJet& jet, const Imath::V3d& off) {
+  return Imath::V3d(off.dot(jet.slopes[1].cross(jet.slopes[2])),
+                    off.dot(jet.slopes[2].cross(jet.slopes[0])),
+                    off.dot(jet.slopes[0].cross(jet.slopes[1]))) /
+         jet.determinant();
+}
+
+template <typename Jet>
+std::optional<Imath::V3d> NewtonInverse::find(const Jet& jet, const Imath::V3d& position,
+                                              Imath::V3d guess) const {
+  constexpr int kSteps = 40, kHalvings = 8;
+  DeformationJet here = jet(guess);
+  Imath::V3d off = position - here.position;
+  for (int step = 0; step < kSteps; ++step) {
+    if (!(here.determinant() > 0)) return {};
+    Imath::V3d move = newtonMove(here, off);
+    const double length = move.length();
+    if (!std::isfinite(length)) return {};
+    if (length > longestMove) move *= longestMove / length;
+    bool isNearer = false;
+    for (int halving = 0; halving < kHalvings; ++halving, move *= 0.5) {
+      const DeformationJet next = jet(guess + move);
+      const Imath::V3d left = position - next.position;
+      if (!(left.length2() < off.length2())) continue;
+      isNearer = true;
+      guess += move;
+      here = next;
+      off = left;
+      break;
+    }
+    // Without a nearer point, the residual is at its rounding error, or there is no root.
+    if (!isNearer || off.length() <= enough) break;
+  }
+  if (off.length() <= tolerance) return guess;
+  return {};
+}
 
 /// A lattice as a deformation. Its certificate covers the entire box.
 class LatticeDeformation final : public Deformation {

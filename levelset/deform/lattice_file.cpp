@@ -4,14 +4,13 @@
 
 #include <cmath>
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <utility>
 #include <vector>
 
 #include "levelset/error.h"
 #include "levelset/file_target.h"
-#include "levelset/files/json_depth.h"
+#include "levelset/files/json_text.h"
 
 namespace levelset {
 namespace {
@@ -21,8 +20,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kLatticeFormat = "levelsmith lattice";
 constexpr int kLatticeVersion = 1;
-/// Bytes of memory per character of a file: the character itself, and its share of a JSON node.
-constexpr double kLatticeBytesPerLetter = 20;
 
 Json jsonOf(const V3d& p) {
   return {p.x, p.y, p.z};
@@ -175,16 +172,7 @@ ControlLattice parseLattice(const std::string& text, const std::string& name) {
 }
 
 ControlLattice readLattice(const std::filesystem::path& file, std::size_t maxMemory) {
-  std::error_code failed;
-  if (std::filesystem::is_directory(file, failed))
-    throw IoError(fmt::format("{} is a folder; give a lattice file", file.string()));
-  const auto size = std::filesystem::file_size(file, failed);
-  if (!failed) requireMemory(kLatticeBytesPerLetter * static_cast<double>(size), maxMemory);
-  std::ifstream stream(file, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  if (!stream)
-    throw IoError(fmt::format("{} cannot be read; check its name and permissions", file.string()));
-  return parseLattice(text, file.string());
+  return parseLattice(readJsonText(file, "a lattice file", maxMemory), file.string());
 }
 
 }  // namespace levelset

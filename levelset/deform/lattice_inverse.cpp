@@ -15,7 +15,6 @@ using Imath::V3d;
 /// Largest accepted distance between the image of a result and the position, over the diagonal of
 /// the deformed box, and over the rounding error of its coordinates.
 constexpr double kInverseTolerance = 1e-11, kRoundings = 16;
-constexpr int kInverseSteps = 40;
 constexpr int kMostPieceHalvings = 90;  // 30 for each parameter
 
 /// Bounds of the control points. With positive weights the image of a piece lies inside.
@@ -74,36 +73,9 @@ LatticeInverse::LatticeInverse(const ControlLattice& lattice)
   boxSize_ = box.size().length();
 }
 
-std::optional<V3d> LatticeInverse::newton(const V3d& position, V3d p) const {
-  DeformationJet jet = lattice_.jet(p);
-  V3d off = position - jet.position;
-  for (int step = 0; step < kInverseSteps; ++step) {
-    const double determinant = jet.determinant();
-    if (!(determinant > 0)) return {};
-    // Cramer's rule: `jet.slopes` are the columns of the Jacobian.
-    V3d move(off.dot(jet.slopes[1].cross(jet.slopes[2])),
-             off.dot(jet.slopes[2].cross(jet.slopes[0])),
-             off.dot(jet.slopes[0].cross(jet.slopes[1])));
-    move /= determinant;
-    const double length = move.length();
-    if (!std::isfinite(length)) return {};
-    if (length > 0.5 * boxSize_) move *= 0.5 * boxSize_ / length;
-    bool isNearer = false;
-    for (int halving = 0; halving < 8 && !isNearer; ++halving, move *= 0.5) {
-      const DeformationJet next = lattice_.jet(p + move);
-      const V3d left = position - next.position;
-      if (!(left.length2() < off.length2())) continue;
-      isNearer = true;
-      p += move;
-      jet = next;
-      off = left;
-      break;
-    }
-    // Without a nearer point, the residual is at its rounding error, or there is no root.
-    if (!isNearer || off.length() <= 1e-3 * tolerance_) break;
-  }
-  if (off.length() <= tolerance_) return p;
-  return {};
+std::optional<V3d> LatticeInverse::newton(const V3d& position, const V3d& guess) const {
+  return NewtonInverse{tolerance_, 1e-3 * tolerance_, 0.5 * boxSize_}.find(
+      [&](const V3d& p) { return lattice_.jet(p); }, position, guess);
 }
 
 std::optional<V3d> LatticeInverse::near(const V3d& position, const V3d& guess) const {

@@ -8,12 +8,13 @@
 #include <vector>
 
 #include "levelset/deform/control_lattice.h"
+#include "levelset/deform/deformation.h"
 
 namespace levelset {
 
 /// Inverse of a lattice that is injective in its box, see certifyLattice(). Read-only after
 /// construction, so threads may share it.
-class LatticeInverse {
+class LatticeInverse final : public DeformationInverse {
  public:
   explicit LatticeInverse(const ControlLattice& lattice);
 
@@ -24,7 +25,7 @@ class LatticeInverse {
   ///         continues linearly. nullopt: no point of the box maps there, and no guess led to a
   ///         point outside
   [[nodiscard]] std::optional<Imath::V3d> near(const Imath::V3d& position,
-                                               const Imath::V3d& guess) const;
+                                               const Imath::V3d& guess) const override;
 
   /// Finds the point of the box that the lattice maps to a position. The control points of a piece
   /// bound its image. Pieces whose bounds contain the position are halved until Newton's method
@@ -33,7 +34,8 @@ class LatticeInverse {
   [[nodiscard]] std::optional<Imath::V3d> at(const Imath::V3d& position) const;
 
  private:
-  [[nodiscard]] std::optional<Imath::V3d> newton(const Imath::V3d& position, Imath::V3d p) const;
+  [[nodiscard]] std::optional<Imath::V3d> newton(const Imath::V3d& position,
+                                                 const Imath::V3d& guess) const;
 
   ControlLattice lattice_;
   BezierPieces pieces_;

@@ -7,13 +7,13 @@
 #include <cmath>
 #include <fstream>
 #include <iostream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
 
 #include "levelset/error.h"
 #include "levelset/file_target.h"
-#include "levelset/files/json_depth.h"
+#include "levelset/files/json_text.h"
+#include "levelset/progress.h"
 
 namespace mapping {
 namespace {
@@ -25,9 +25,6 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kFormat = "levelsmith patches";
 constexpr int kVersion = 1;
 constexpr std::array<const char*, 3> kSchemeNames = {"reduced", "conforming", "spline"};
-// Bytes of memory per character of a file: the character itself, and its share of a JSON node with
-// its list entry, which takes at least two characters.
-constexpr double kBytesPerLetter = 20;
 
 Json toJson(const V3d& p) {
   if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
@@ -187,29 +184,14 @@ class Reader {
 };
 
 std::string textOf(const std::filesystem::path& file, std::size_t maxMemory) {
-  std::string text;
-  if (file == "-") {
-    std::string part(std::size_t{1} << 20, '\0');
-    while (std::cin.read(part.data(), static_cast<std::streamsize>(part.size())) ||
-           std::cin.gcount() > 0) {
-      text.append(part, 0, static_cast<std::size_t>(std::cin.gcount()));
-      levelset::requireMemory(kBytesPerLetter * static_cast<double>(text.size()), maxMemory);
-    }
-  } else {
-    std::error_code failed;
-    if (std::filesystem::is_directory(file, failed)) {
-      throw levelset::IoError(fmt::format("{} is a folder; give a patch file", file.string()));
-    }
-    const auto size = std::filesystem::file_size(file, failed);
-    if (!failed) levelset::requireMemory(kBytesPerLetter * static_cast<double>(size), maxMemory);
-    std::ifstream stream(file, std::ios::binary);
-    text.assign(std::istreambuf_iterator<char>(stream), {});
-    if (!stream) {
-      throw levelset::IoError(
-          fmt::format("{} cannot be read; check its name and permissions", file.string()));
-    }
+  if (file != "-") return levelset::readJsonText(file, "a patch file", maxMemory);
+  std::string text, part(std::size_t{1} << 20, '\0');
+  while (std::cin.read(part.data(), static_cast<std::streamsize>(part.size())) ||
+         std::cin.gcount() > 0) {
+    text.append(part, 0, static_cast<std::size_t>(std::cin.gcount()));
+    levelset::requireMemory(levelset::kJsonBytesPerCharacter * static_cast<double>(text.size()),
+                            maxMemory);
   }
-  levelset::requireMemory(kBytesPerLetter * static_cast<double>(text.size()), maxMemory);
   return text;
 }
 

@@ -6,14 +6,13 @@
 #include <array>
 #include <cmath>
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <utility>
 #include <vector>
 
 #include "levelset/error.h"
 #include "levelset/file_target.h"
-#include "levelset/files/json_depth.h"
+#include "levelset/files/json_text.h"
 #include "levelset/memory_limit.h"
 #include "levelset/progress.h"
 #include "render/scene/csg_expression.h"
@@ -26,8 +25,6 @@ using BezierJson = nlohmann::ordered_json;
 
 constexpr const char* kBezierFormat = "levelsmith bezier volume";
 constexpr int kBezierVersion = 1;
-/// Bytes of memory per character of a file: the character itself, and its share of a JSON node.
-constexpr double kBezierBytesPerLetter = 20;
 constexpr std::size_t kMostAttributes = 64;
 
 /// Reads the members of a document.
@@ -235,18 +232,7 @@ BezierVolume parseBezierVolume(const std::string& text, const std::string& name)
 }
 
 BezierVolume readBezierVolume(const std::filesystem::path& file, std::size_t maxMemory) {
-  std::error_code failed;
-  if (std::filesystem::is_directory(file, failed))
-    throw levelset::IoError(
-        fmt::format("{} is a folder; give the file of a Bézier volume", file.string()));
-  const auto size = std::filesystem::file_size(file, failed);
-  if (!failed)
-    levelset::requireMemory(kBezierBytesPerLetter * static_cast<double>(size), maxMemory);
-  std::ifstream stream(file, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  if (!stream)
-    throw levelset::IoError(
-        fmt::format("{} cannot be read; check its name and permissions", file.string()));
+  const std::string text = levelset::readJsonText(file, "the file of a Bézier volume", maxMemory);
   return levelset::withContext(file.string(), [&] { return volumeOfText(text, maxMemory); });
 }
 

@@ -6,7 +6,6 @@
 #include <cctype>
 #include <cmath>
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <set>
@@ -15,7 +14,7 @@
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 #include "levelset/files/band_file.h"
-#include "levelset/files/json_depth.h"
+#include "levelset/files/json_text.h"
 #include "levelset/mesh_files/mesh_file.h"
 #include "levelset/transform/transform.h"
 #include "levelset/volume_files/volume_file.h"
@@ -241,17 +240,11 @@ class Reader {
 
 Json documentOf(const std::filesystem::path& file) {
   std::error_code failed;
-  if (std::filesystem::is_directory(file, failed))
-    throw levelset::IoError(fmt::format("{} is a folder; give the file of a scene", file.string()));
   const auto size = std::filesystem::file_size(file, failed);
   if (!failed && static_cast<double>(size) > kMostBytes)
     throw InvalidInput(fmt::format(
         "{} is larger than 16 MB, the limit for a scene file; give a scene file", file.string()));
-  std::ifstream stream(file, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
-  if (!stream)
-    throw levelset::IoError(
-        fmt::format("{} cannot be read; check its name and permissions", file.string()));
+  const std::string text = levelset::readJsonText(file, "the file of a scene");
   if (levelset::isJsonTooDeep(text)) return Json(Json::value_t::discarded);
   return Json::parse(text, nullptr, /*allow_exceptions=*/false);
 }

@@ -8,7 +8,7 @@
 
 #include "apps/pipeline/values/text_file.h"
 #include "levelset/error.h"
-#include "levelset/files/json_depth.h"
+#include "levelset/files/json_text.h"
 
 namespace pipeline {
 namespace {

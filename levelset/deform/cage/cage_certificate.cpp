@@ -30,7 +30,6 @@ constexpr std::size_t kMostCageBoxes = 300'000;
 constexpr int kNearCageLevel = DomainCells::kLevels + 3;
 /// Largest distance between the image of a result and the position, over the diagonal of the cage.
 constexpr double kCageResidual = 1e-11;
-constexpr int kCageSteps = 30;
 // Steps shrink by a factor of up to 0.85 in boxes where the map stretches one direction most.
 constexpr int kLeafSteps = 300;
 
@@ -40,13 +39,6 @@ struct CageLeaf {
   double edge = 0;
   double reach = 0;  ///< radius of a ball around `image` that contains the image of the box
 };
-
-V3d newtonMove(const DeformationJet& jet, const V3d& off) {
-  return V3d(off.dot(jet.slopes[1].cross(jet.slopes[2])),
-             off.dot(jet.slopes[2].cross(jet.slopes[0])),
-             off.dot(jet.slopes[0].cross(jet.slopes[1]))) /
-         jet.determinant();
-}
 
 class CageInverse final : public DeformationInverse {
  public:
@@ -60,43 +52,19 @@ class CageInverse final : public DeformationInverse {
   }
 
   [[nodiscard]] std::optional<V3d> near(const V3d& position, const V3d& guess) const override {
-    if (const auto found = newton(position, guess); found && cells_.contains(*found)) return found;
+    const auto found = NewtonInverse{tolerance_, tolerance_, 0.1 * size_}.find(
+        [&](const V3d& p) { return cage_.jet(p); }, position, guess);
+    if (found && cells_.contains(*found)) return found;
     // All boxes whose images may contain the position. In such a box the Jacobian differs from that
     // at the centre by less than its least stretch, so the iteration converges if there is a point.
     for (const CageLeaf& leaf : leaves_) {
       if (!((position - leaf.image).length2() <= leaf.reach * leaf.reach)) continue;
-      if (const auto found = inLeaf(leaf, position)) return found;
+      if (const auto inside = inLeaf(leaf, position)) return inside;
     }
     return {};
   }
 
  private:
-  [[nodiscard]] std::optional<V3d> newton(const V3d& position, V3d p) const {
-    DeformationJet jet = cage_.jet(p);
-    V3d off = position - jet.position;
-    for (int step = 0; step < kCageSteps; ++step) {
-      if (off.length() <= tolerance_) return p;
-      if (!(jet.determinant() > 0)) return {};
-      V3d move = newtonMove(jet, off);
-      const double length = move.length();
-      if (!std::isfinite(length)) return {};
-      if (length > 0.1 * size_) move *= 0.1 * size_ / length;
-      bool isNearer = false;
-      for (int halving = 0; halving < 6; ++halving, move *= 0.5) {
-        const DeformationJet next = cage_.jet(p + move);
-        const V3d left = position - next.position;
-        if (!(left.length2() < off.length2())) continue;
-        isNearer = true;
-        p += move;
-        jet = next;
-        off = left;
-        break;
-      }
-      if (!isNearer) return {};
-    }
-    return {};
-  }
-
   /// Newton's method with the Jacobian at the centre of the box.
   [[nodiscard]] std::optional<V3d> inLeaf(const CageLeaf& leaf, const V3d& position) const {
     const DeformationJet centre = cage_.jet(leaf.centre);

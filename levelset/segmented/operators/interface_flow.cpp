@@ -6,12 +6,14 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <set>
+#include <span>
 #include <utility>
 
 #include "levelset/distance/redistance.h"
 #include "levelset/grids/grid_queries_vdb.h"
-#include "levelset/grids/padded_leaf_vdb.h"
 #include "levelset/progress_gate.h"
+#include "levelset/segmented/flow/flow_convolution_vdb.h"
 #include "levelset/segmented/operators/interface_flow_vdb.h"
 #include "levelset/segmented/operators/junction_distances_vdb.h"
 #include "levelset/vdb.h"
@@ -32,123 +34,6 @@ constexpr double kJunctionRadius = 3;
 // Half of the widths over which a volume fades out at an interface, voxels. Sums over grid planes
 // are exact for whole widths.
 constexpr double kFade = 1.5, kNarrowFade = 1;
-// A sampled Gaussian of less variance differs from the continuous one.
-constexpr double kLeastVariance = 0.7;  // voxels²
-constexpr double kDeviations = 4;       // radius of a sampled Gaussian
-
-// Variances, as multiples of the first, and weights of Gaussians whose sum keeps curved interfaces
-// that meet at 120°, to first order in the curvature. A single Gaussian turns them by 0.2 times its
-// deviation times the curvature, since it averages distances over corners as well.
-constexpr std::array<std::pair<double, double>, 3> kJunctionGaussians = {
-    {{1, 1.90272}, {2, -1.03412}, {4, 0.1314}}};
-constexpr double kJunctionVariance = 0.36008;   // of the sum, as a multiple of the first
-constexpr double kLeastJunctionVariance = 0.7;  // voxels², of the first
-// Largest variance of the sum, voxels²: the widest Gaussian then reaches 14 voxels.
-constexpr double kLargestJunctionVariance = 1;
-
-/// Kernel of a convolution along all axes.
-struct FlowKernel {
-  double weight;
-  std::vector<float> half;  ///< from the centre
-  [[nodiscard]] int radius() const { return static_cast<int>(half.size()) - 1; }
-};
-
-/// Half of a sampled Gaussian, from the centre.
-std::vector<float> halfGaussian(double variance) {
-  const int radius = static_cast<int>(std::ceil(kDeviations * std::sqrt(variance)));
-  std::vector<double> weights;
-  double sum = 0;
-  for (int d = 0; d <= radius; ++d) {
-    weights.push_back(std::exp(-d * d / (2 * variance)));
-    sum += (d == 0 ? 1 : 2) * weights.back();
-  }
-  std::vector<float> half;
-  for (const double weight : weights) half.push_back(static_cast<float>(weight / sum));
-  return half;
-}
-
-/// Gaussians of an interface flow, by variance and weight.
-std::vector<std::pair<double, double>> gaussiansFor(double variance, bool hasJunctions) {
-  if (!hasJunctions || variance > kLargestJunctionVariance * (1 + 1e-9))
-    return {{std::max(variance, kLeastVariance), 1}};
-  const double first = std::max(variance / kJunctionVariance, kLeastJunctionVariance);
-  std::vector<std::pair<double, double>> result;
-  for (const auto& [ratio, weight] : kJunctionGaussians) result.emplace_back(ratio * first, weight);
-  return result;
-}
-
-/// Kernels of a step: Gaussians, and for short steps a mean of them and the identity.
-/// @param variance  of the sum, voxels²
-std::vector<FlowKernel> flowKernels(double variance, bool hasJunctions) {
-  std::vector<FlowKernel> kernels;
-  double second = 0;
-  for (const auto& [wide, weight] : gaussiansFor(variance, hasJunctions)) {
-    kernels.push_back({weight, halfGaussian(wide)});
-    for (std::size_t d = 1; d < kernels.back().half.size(); ++d)
-      second +=
-          weight * 2 * static_cast<double>(d * d) * static_cast<double>(kernels.back().half[d]);
-  }
-  const double share = variance / second;
-  for (FlowKernel& kernel : kernels) kernel.weight *= share;
-  kernels.push_back({1 - share, {1}});
-  return kernels;
-}
-
-/// Convolves the values of a leaf with kernels along all axes, and adds the results.
-class LeafConvolution {
- public:
-  explicit LeafConvolution(const std::vector<FlowKernel>& kernels) : kernels_(kernels) {
-    for (const FlowKernel& kernel : kernels) radius_ = std::max(radius_, kernel.radius());
-    side_ = 8 + 2 * radius_;
-    padded_.resize(count(side_, side_, side_));
-    alongZ_.resize(count(side_, side_, 8));
-    alongY_.resize(count(side_, 8, 8));
-  }
-
-  template <typename Accessor>
-  void run(const Accessor& accessor, const Coord& origin, std::array<float, kLeafVoxels>& out) {
-    copyPaddedLeaf(accessor, origin, radius_, radius_, padded_.data());
-    out.fill(0);
-    for (const FlowKernel& kernel : kernels_) add(kernel, out);
-  }
-
- private:
-  static std::size_t count(int x, int y, int z) { return static_cast<std::size_t>(x * y * z); }
-
-  void add(const FlowKernel& kernel, std::array<float, kLeafVoxels>& out) {
-    const int radius = kernel.radius(), side = 8 + 2 * radius, skip = radius_ - radius;
-    for (int x = 0; x < side; ++x)
-      for (int y = 0; y < side; ++y)
-        convolve(kernel.half,
-                 padded_.data() + count(x + skip, side_, side_) + count(y + skip, side_, 1) +
-                     static_cast<std::size_t>(skip),
-                 1, alongZ_.data() + count(x, side, 8) + count(y, 8, 1));
-    for (int x = 0; x < side; ++x)
-      convolve(kernel.half, alongZ_.data() + count(x, side, 8), 8, alongY_.data() + count(x, 8, 8));
-    std::array<float, kLeafVoxels> sum;
-    convolve(kernel.half, alongY_.data(), 64, sum.data());
-    const auto weight = static_cast<float>(kernel.weight);
-    for (std::size_t n = 0; n < kLeafVoxels; ++n) out[n] += weight * sum[n];
-  }
-
-  /// Convolves a line of which each value is a row of `width` floats.
-  static void convolve(const std::vector<float>& kernel, const float* in, std::size_t width,
-                       float* out) {
-    const std::size_t radius = kernel.size() - 1;
-    for (std::size_t i = 0; i < 8 * width; ++i) {
-      const float* centre = in + i + radius * width;
-      float sum = kernel[0] * *centre;
-      for (std::size_t d = 1; d <= radius; ++d)
-        sum += kernel[d] * (*(centre - d * width) + centre[d * width]);
-      out[i] = sum;
-    }
-  }
-
-  const std::vector<FlowKernel>& kernels_;
-  int radius_ = 0, side_ = 8;
-  std::vector<float> padded_, alongZ_, alongY_;
-};
-
 /// Partition in the middle of a step: convolved distances, which compete for each grid point.
 class Race {
  public:
@@ -165,11 +50,14 @@ class Race {
   [[nodiscard]] std::size_t blockCount() const { return firsts_.size() - 1; }
   [[nodiscard]] const std::vector<LabelledLeaf>& leaves() const { return leaves_; }
 
-  /// Convolves the distances. Those to fixed regions, or without a kernel all, stay.
-  void convolve(const std::vector<FlowKernel>& kernels, const Progress& progress) {
+  /// Convolves distances to regions that move.
+  void convolve(const StepKernels& step, const Progress& progress) {
     values_.resize(leaves_.size());
+    const std::set<Coord> near = step.junction.empty() ? std::set<Coord>() : blocksNearJunctions();
     ProgressGate gate(progress, blockCount());
     tbb::parallel_for(std::size_t{0}, blockCount(), [&](std::size_t b) {
+      const std::vector<FlowKernel>& kernels =
+          near.contains(leaves_[firsts_[b]].block) ? step.junction : step.smooth;
       LeafConvolution convolution(kernels);
       for (std::size_t e = firsts_[b]; e < firsts_[b + 1]; ++e) {
         const LabelledLeaf& entry = leaves_[e];
@@ -275,6 +163,26 @@ class Race {
   }
 
  private:
+  /// Finds the blocks of junctions and those beside them. Elsewhere the wide kernel gains nothing,
+  /// and would average over regions of a few voxels.
+  [[nodiscard]] std::set<Coord> blocksNearJunctions() const {
+    constexpr double kTouch = 2;  // voxels: grid points as near to three regions
+    std::set<Coord> result;
+    for (std::size_t b = 0; b < blockCount(); ++b) {
+      const std::span here(leaves_.data() + firsts_[b], firsts_[b + 1] - firsts_[b]);
+      for (std::uint32_t n = 0; n < kLeafVoxels; ++n) {
+        const auto near = std::ranges::count_if(here, [&](const LabelledLeaf& entry) {
+          return std::abs(static_cast<double>(entry.leaf->getValue(n))) < kTouch * voxelSize_;
+        });
+        if (near < 3) continue;
+        for (int i = 0; i < 27; ++i)
+          result.insert(here[0].block + Coord(i / 9 - 1, i / 3 % 3 - 1, i % 3 - 1));
+        break;
+      }
+    }
+    return result;
+  }
+
   [[nodiscard]] float valueOf(std::size_t leaf, std::uint32_t n,
                               const std::vector<double>& constants) const {
     return values_[leaf][n] + static_cast<float>(constants[leaves_[leaf].region]);
@@ -496,7 +404,9 @@ std::vector<RegionLabel> InterfaceFlow::advance(const Progress& progress) {
     for (std::size_t r = 0; r < wanted.size(); ++r)
       wanted[r] += reached_[r] - now[static_cast<Eigen::Index>(r)];
   }
-  race.convolve(flowKernels(2 * step_, hasJunctions_), subProgress(progress, 0, 0.3));
+  StepKernels kernels{flowKernels(2 * step_, false), {}};
+  if (hasJunctions_) kernels.junction = flowKernels(2 * step_, true);
+  race.convolve(kernels, subProgress(progress, 0, 0.3));
   if (!volumes_.empty()) {
     std::vector<char> isHeld = isFixed_;
     isHeld[0] = 1;  // the void

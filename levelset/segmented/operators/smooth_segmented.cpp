@@ -83,8 +83,7 @@ SmoothSegmentedResult smoothSegmented(const SegmentedField& field, double time,
   }
   const double inVoxels = time / (field.voxelSize() * field.voxelSize());
   constexpr double kMostSteps = 1e9;
-  // Grid points beside two other regions. Without them the wider kernel gains nothing, and takes
-  // balls of a few voxels for smaller ones.
+  // Grid points beside two other regions.
   const bool hasJunctions = !field.shared()->extras.empty();
   const double defaultSteps = inVoxels / (hasJunctions ? kJunctionStep : kDefaultStep);
   if (!options.steps && defaultSteps > kMostSteps)

@@ -29,6 +29,14 @@ class DeformAction : public support::ActionTest {
         for (const double z : {-2.0, 2.0}) json["points"].push_back({scale * x, y, z});
     writeFile(name, json.dump());
   }
+
+  /// Details of the step `deform` in report.json.
+  [[nodiscard]] Json reportedDetails() const {
+    Json details;
+    for (const Json& step : Json::parse(support::readText(folder_ / "report.json"))["steps"])
+      if (step["action"] == "deform") details = step["details"];
+    return details;
+  }
 };
 
 constexpr const char* kCapsule = "capsule --from 0,0,-1.5 --to 0,0,1.5 --radius 0.5 --voxel 0.1 ! ";
@@ -126,10 +134,7 @@ TEST_F(DeformAction, Untangles) {
   const support::Outcome run =
       levelsmith("--report report.json " + chain + " --untangle ! measure");
   ASSERT_EQ(run.code, 0) << run.err;
-  const Json report = Json::parse(support::readText(folder_ / "report.json"));
-  Json details;
-  for (const Json& step : report["steps"])
-    if (step["action"] == "deform") details = step["details"];
+  const Json details = reportedDetails();
   EXPECT_EQ(details["certificate"]["verdict"], "certified");
   EXPECT_GT(details["untangle"]["largest_move"].get<double>(), 0);
 }
@@ -142,10 +147,7 @@ TEST_F(DeformAction, PlansAndReports) {
   const support::Outcome run =
       levelsmith("--report report.json " + std::string(kCapsule) + "deform --twist 90 ! measure");
   ASSERT_EQ(run.code, 0) << run.err;
-  const Json report = Json::parse(support::readText(folder_ / "report.json"));
-  Json details;
-  for (const Json& step : report["steps"])
-    if (step["action"] == "deform") details = step["details"];
+  const Json details = reportedDetails();
   EXPECT_EQ(details["certificate"]["verdict"], "certified");
   EXPECT_FALSE(details["certificate"]["overlaps"].get<bool>());
   EXPECT_NEAR(details["certificate"]["least_jacobian_high"].get<double>(), 1, 1e-6);

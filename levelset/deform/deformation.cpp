@@ -1,27 +1,12 @@
+#include "levelset/deform/deformation.h"
+
 #include <fmt/core.h>
 
-#include "levelset/deform/deformation.h"
 #include "levelset/deform/lattice_certificate.h"
 #include "levelset/deform/lattice_inverse.h"
 #include "levelset/error.h"
 
 namespace levelset {
-namespace {
-
-class InverseOfLattice final : public DeformationInverse {
- public:
-  explicit InverseOfLattice(const ControlLattice& lattice) : inverse_(lattice) {}
-  [[nodiscard]] std::optional<Imath::V3d> near(const Imath::V3d& position,
-                                               const Imath::V3d& guess) const override {
-    return inverse_.near(position, guess);
-  }
-
- private:
-  LatticeInverse inverse_;
-};
-
-}  // namespace
-
 void LatticeDeformation::requireDefined(const std::vector<Imath::V3d>& points,
                                         const char* what) const {
   for (std::size_t n = 0; n < points.size(); ++n) {
@@ -38,8 +23,7 @@ void LatticeDeformation::requireDefined(const std::vector<Imath::V3d>& points,
 CertifiedDeformation LatticeDeformation::certify(const DeformationDomain&,
                                                  const Progress& progress) const {
   CertifiedDeformation result{certifyLattice(lattice_, {.progress = progress})};
-  if (result.certificate.isInjective())
-    result.inverse = std::make_shared<InverseOfLattice>(lattice_);
+  if (result.certificate.isInjective()) result.inverse = std::make_shared<LatticeInverse>(lattice_);
   return result;
 }
 

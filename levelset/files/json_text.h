@@ -1,7 +1,11 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
+#include <string>
 #include <string_view>
+
+#include "levelset/memory_limit.h"
 
 namespace levelset {
 
@@ -30,5 +34,16 @@ inline constexpr std::size_t kMaxJsonDepth = 64;
   }
   return false;
 }
+
+/// Memory for each character of a JSON text, bytes: the character itself, and its share of a node
+/// with its list entry, which takes at least two characters.
+inline constexpr double kJsonBytesPerCharacter = 20;
+
+/// Reads the text of a JSON file.
+/// @param wanted  for messages: "a lattice file"
+/// @throws IoError        if the file is a folder or cannot be read
+/// @throws ResourceLimit  if the parsed document would exceed `maxMemory`, bytes
+[[nodiscard]] std::string readJsonText(const std::filesystem::path& file, const char* wanted,
+                                       std::size_t maxMemory = kNoMemoryLimit);
 
 }  // namespace levelset
