@@ -222,9 +222,16 @@ std::string textOf(const std::vector<int>& expression) {
 
 bool isBezierFile(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
-  std::string beginning(256, ' ');
-  stream.read(beginning.data(), static_cast<std::streamsize>(beginning.size()));
-  return beginning.find(kBezierFormat) != std::string::npos;
+  bool isFormat = false, result = false;
+  const auto visit = [&](int depth, BezierJson::parse_event_t event, BezierJson& parsed) {
+    if (depth == 1 && event == BezierJson::parse_event_t::key)
+      isFormat = parsed == "format";
+    else if (depth == 1 && event == BezierJson::parse_event_t::value && isFormat)
+      result = parsed == kBezierFormat;
+    return depth < 2;  // keeps no nested list
+  };
+  (void)BezierJson::parse(stream, visit, /*allow_exceptions=*/false);
+  return result;
 }
 
 BezierVolume parseBezierVolume(const std::string& text, const std::string& name) {

@@ -23,7 +23,7 @@
 /// are uniform unless "knots" gives them; without, it has one Bézier patch.
 namespace render {
 
-/// Returns true if the beginning of a file names the format of Bézier volumes.
+/// Returns true if a file is a JSON document whose member "format" names Bézier volumes.
 [[nodiscard]] bool isBezierFile(const std::filesystem::path& file);
 
 /// Reads a Bézier volume. Errors name the file and the member.

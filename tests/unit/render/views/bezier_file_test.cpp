@@ -20,11 +20,6 @@ using bezier_scenes::V3d;
 using render::BezierVolume;
 using render::parseBezierVolume;
 
-std::string textOfFile(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
-
 /// A linear patch whose attribute is x − 0.5, with replaceable members.
 std::string document(const std::string& patch, const std::string& more = "") {
   return R"({"format": "levelsmith bezier volume", "version": 1, )" + more + R"("patches": [)" +
@@ -65,6 +60,22 @@ TEST(BezierFile, ReadsWhatItWrote) {
     ASSERT_EQ(scene.scene.beziers.size(), 1U);
     EXPECT_FALSE(scene.scene.bounds().isEmpty());
   }
+}
+
+TEST(BezierFile, IsKnownByItsFormatWhereverThatStands) {
+  const support::TemporaryFolder folder;
+  const std::filesystem::path file = folder.path() / "x.json";
+  const auto isBezier = [&](const std::string& text) {
+    std::ofstream(file, std::ios::binary) << text;
+    return render::isBezierFile(file);
+  };
+  EXPECT_TRUE(isBezier(R"({"patches": [)" + kCube +
+                       R"(}], "version": 1, "format": "levelsmith bezier volume"})"));
+  EXPECT_FALSE(isBezier(R"({"solids": [{"name": "levelsmith bezier volume"}]})"));
+  EXPECT_FALSE(isBezier(R"({"solids": [{"format": "levelsmith bezier volume"}]})"));
+  EXPECT_FALSE(isBezier("levelsmith bezier volume"));
+  EXPECT_FALSE(render::isBezierFile(folder.path()));
+  EXPECT_FALSE(render::isBezierFile(folder.path() / "missing.json"));
 }
 
 TEST(BezierFile, ReadsSplines) {
@@ -130,7 +141,7 @@ TEST(BezierFile, RefusesWithASentence) {
 TEST(BezierFile, SurvivesMutations) {
   const support::TemporaryFolder folder;
   writeBezierVolume(folder.path() / "volume.json", bezier_scenes::collapsedEdge());
-  const std::string text = textOfFile(folder.path() / "volume.json");
+  const std::string text = support::readText(folder.path() / "volume.json");
   std::uint64_t state = 1;
   const auto next = [&](std::size_t limit) {
     state = state * 6364136223846793005ULL + 1442695040888963407ULL;

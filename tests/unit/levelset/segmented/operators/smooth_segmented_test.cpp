@@ -54,6 +54,21 @@ TEST(SmoothSegmented, ShrinksBallsWithSecondOrder) {
   EXPECT_GT(std::log2(errors[0] / errors[2]), measuredOrder(2.06));
 }
 
+/// The kernel at junctions averages over ten voxels. A ball of six voxels elsewhere must not be
+/// affected.
+TEST(SmoothSegmented, MovesSmallBallsAwayFromJunctionsAtTheirSpeed) {
+  constexpr double kTime = 0.05, kVoxel = 0.1, kRadius = 0.6;
+  const std::vector<NarrowBand> solids{makeSphere(1, V3d(0), kVoxel),
+                                       makeSphere(1, V3d(1.2, 0, 0), kVoxel),
+                                       makeSphere(kRadius, V3d(-3, 0, 0), kVoxel)};
+  const SegmentedField field = segmentSolids(solids).field;
+  ASSERT_GT(measureSegmented(field).junctionLength, 1);
+  const double volume = measureSegmented(smoothSegmented(field, kTime).field).regions[3].volume,
+               radius = std::cbrt(volume / (4 * pi / 3)),
+               exact = std::sqrt(kRadius * kRadius - 4 * kTime);
+  EXPECT_LT(std::abs(radius - exact), measured(0.01));
+}
+
 TEST(SmoothSegmented, AgreesWithCurvatureFlow) {
   constexpr double kTime = 0.05, kVoxel = 0.1;
   // A peanut: its waist moves outwards, its ends move inwards.
