@@ -67,7 +67,7 @@ class Deformation {
 struct NewtonInverse {
   double tolerance = 0;    ///< largest residual of a result
   double enough = 0;       ///< residual at which the iteration ends, at most `tolerance`
-  double longestMove = 0;  ///< of a step
+  double longestMove = 0;  ///< limit of a step
 
   /// Finds a point that a map moves to a position. Each step is halved until the residual falls.
   /// @param jet  position and derivatives of the map at a point

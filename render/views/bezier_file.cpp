@@ -7,6 +7,7 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -221,6 +222,7 @@ std::string textOf(const std::vector<int>& expression) {
 }  // namespace
 
 bool isBezierFile(const std::filesystem::path& file) {
+  if (!std::filesystem::is_regular_file(file)) return false;
   std::ifstream stream(file, std::ios::binary);
   bool isFormat = false, result = false;
   const auto visit = [&](int depth, BezierJson::parse_event_t event, BezierJson& parsed) {
@@ -230,7 +232,7 @@ bool isBezierFile(const std::filesystem::path& file) {
       result = parsed == kBezierFormat;
     return depth < 2;  // keeps no nested list
   };
-  (void)BezierJson::parse(stream, visit, /*allow_exceptions=*/false);
+  std::ignore = BezierJson::parse(stream, visit, /*allow_exceptions=*/false);
   return result;
 }
 

@@ -10,7 +10,7 @@
 
 namespace pipeline {
 
-/// Whether the label 0, or the word `void`, counts as a label.
+/// Treatment of the label 0, which the word `void` names.
 enum class VoidLabel { Counts, IsNone };
 
 /// @throws UsageError for a text that is no label

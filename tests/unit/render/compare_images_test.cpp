@@ -83,7 +83,7 @@ TEST(CompareImages, AcceptsNoLeakAndNoFalseHit) {
 }
 
 TEST(CompareImages, ToleratesRoundingAtTheOutline) {
-  // Of the 4096 pixels, ⌈1e-5 × 4096⌉ = 1 may differ: the outermost pixel of the row.
+  // One of the 4096 pixels may differ, ⌈1e-5 × 4096⌉: the outermost pixel of the row.
   Image other = disc();
   auto& depth = other.channels["Z"];
   int first = 0;

@@ -32,8 +32,9 @@ class DeformAction : public support::ActionTest {
 
   /// Details of the step `deform` in report.json.
   [[nodiscard]] Json reportedDetails() const {
+    const Json report = Json::parse(support::readText(folder_ / "report.json"));
     Json details;
-    for (const Json& step : Json::parse(support::readText(folder_ / "report.json"))["steps"])
+    for (const Json& step : report["steps"])
       if (step["action"] == "deform") details = step["details"];
     return details;
   }
