@@ -274,7 +274,7 @@ BandFrontMesh bandToFrontMesh(const NarrowBand& band, const FrontMeshOptions& op
                          static_cast<double>(uniform.triangles.size());
     for (const double scale : kScales) {
       const ZeroSetFront surface(band, vertices, scale);
-      FrontOptions front;
+      AdvancingFrontOptions front;
       front.longest = surface.longest();
       front.expectedTriangles = static_cast<std::size_t>(component.expected / (scale * scale)) + 1;
       front.progress = progressOf(share);

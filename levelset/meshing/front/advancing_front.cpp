@@ -90,7 +90,7 @@ struct Candidate {
 
 class AdvancingFront {
  public:
-  AdvancingFront(const FrontSurface& surface, const FrontOptions& options)
+  AdvancingFront(const FrontSurface& surface, const AdvancingFrontOptions& options)
       : surface_(surface),
         options_(options),
         cell_(kLongestFrontSide * options.longest),
@@ -146,7 +146,7 @@ class AdvancingFront {
   }
 
   const FrontSurface& surface_;
-  const FrontOptions& options_;
+  const AdvancingFrontOptions& options_;
   double cell_;  ///< length of the longest edges
   FrontMesh mesh_;
   std::vector<bool> isBorder_;  ///< for each vertex
@@ -490,14 +490,15 @@ FrontMesh AdvancingFront::run() {
 
 }  // namespace
 
-FrontMesh advanceFront(const FrontSurface& surface, const V3d& start, const FrontOptions& options) {
+FrontMesh advanceFront(const FrontSurface& surface, const V3d& start,
+                       const AdvancingFrontOptions& options) {
   AdvancingFront front(surface, options);
   if (!front.begin(start)) return {};
   return front.run();
 }
 
 FrontMesh advanceFront(const FrontSurface& surface, const FrontLoops& start,
-                       const FrontOptions& options) {
+                       const AdvancingFrontOptions& options) {
   AdvancingFront front(surface, options);
   front.begin(start);
   return front.run();

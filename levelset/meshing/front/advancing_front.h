@@ -21,7 +21,7 @@ struct FrontMesh {
   bool isClosed = false;   ///< no front is left, but for the borders of the surface
 };
 
-struct FrontOptions {
+struct AdvancingFrontOptions {
   double longest = 0;                 ///< limit of FrontSurface::edgeLength() and of given edges
   std::size_t expectedTriangles = 0;  ///< about; a front with many more stops open
   Progress progress = {};
@@ -36,7 +36,7 @@ struct FrontOptions {
 /// @param start  position near the surface
 /// @throws Cancelled
 [[nodiscard]] FrontMesh advanceFront(const FrontSurface& surface, const Imath::V3d& start,
-                                     const FrontOptions& options);
+                                     const AdvancingFrontOptions& options);
 
 /// Closed loops of edges from which a front starts.
 struct FrontLoops {
@@ -48,6 +48,6 @@ struct FrontLoops {
 /// The edges of the loops get one triangle.
 /// @throws Cancelled
 [[nodiscard]] FrontMesh advanceFront(const FrontSurface& surface, const FrontLoops& start,
-                                     const FrontOptions& options);
+                                     const AdvancingFrontOptions& options);
 
 }  // namespace levelset

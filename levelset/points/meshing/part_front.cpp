@@ -102,8 +102,9 @@ double PartFront::edgeLength(const V3d& point) const {
   return scale_ * (nearest == PointSurface::kNone ? longest_ : lengths_[nearest]);
 }
 
-FrontOptions frontOptions(const SurfacePart& part, double scale, const Progress& progress) {
-  FrontOptions options;
+AdvancingFrontOptions advancingFrontOptions(const SurfacePart& part, double scale,
+                                            const Progress& progress) {
+  AdvancingFrontOptions options;
   options.longest = scale * part.longest;
   options.expectedTriangles = static_cast<std::size_t>(part.expected / (scale * scale)) + 1;
   options.progress = progress;
@@ -155,7 +156,7 @@ PartMesh meshPart(const PointSurface& surface, const BorderPoints& borders, cons
   best.missed = part.points.size() + 1;
   for (const auto& [scale, first] : kFrontTries) {
     const PartFront front(surface, borders, lengths, number, part, scale);
-    const FrontOptions options = frontOptions(part, scale, progress);
+    const AdvancingFrontOptions options = advancingFrontOptions(part, scale, progress);
     PartMesh found;
     found.scale = scale;
     for (std::size_t k = 0; k < part.starts.size(); ++k) {

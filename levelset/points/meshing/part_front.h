@@ -85,8 +85,8 @@ class PartFront : public FrontSurface {
 };
 
 /// Returns the options of a front with edge lengths times a factor.
-[[nodiscard]] FrontOptions frontOptions(const SurfacePart& part, double scale,
-                                        const Progress& progress);
+[[nodiscard]] AdvancingFrontOptions advancingFrontOptions(const SurfacePart& part, double scale,
+                                                          const Progress& progress);
 
 /// Mesh of a part, with the number of points that it misses.
 struct PartMesh {

@@ -322,7 +322,7 @@ PartMesh SharpFronts::meshPiece(std::uint32_t piece, const PieceLoops& loops, do
     PartMesh found;
     found.scale = scale * inner;
     const PartFront front(surface_, borders_, lengths_, piece, part, found.scale);
-    FrontOptions options = frontOptions(part, found.scale, progress);
+    AdvancingFrontOptions options = advancingFrontOptions(part, found.scale, progress);
     options.longest = std::max(options.longest, loops.longest);
     found.front = advanceFront(front, loops.start, options);
     found.missed = countMissed(found.front, surface_, part, lengths_, found.scale);

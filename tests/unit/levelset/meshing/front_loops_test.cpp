@@ -69,7 +69,7 @@ void expectWithin(const FrontMesh& mesh, const FrontLoops& start) {
     EXPECT_EQ(mesh.positions[v], start.positions[v]);
 }
 
-levelset::FrontOptions optionsFor(double area) {
+levelset::AdvancingFrontOptions optionsFor(double area) {
   return {.longest = kLength,
           .expectedTriangles = static_cast<std::size_t>(area / (0.433 * kLength * kLength))};
 }
