@@ -119,26 +119,32 @@ class SheetTable {
   std::vector<Sheet> sheets_;
 };
 
+SharpMesh meshNearEdges(const FloatGrid& field, const BlockSelection& within,
+                        const Progress& progress) {
+  const openvdb::MaskTree cells = cellsNearEdges(field, within);
+  if (cells.empty()) return {};
+  return sharpSurface(CellSurface(field, &cells), field, progress);
+}
+
 }  // namespace
 
 SharpPatches::SharpPatches(const FloatGrid& field, const BlockSelection& within,
                            const Progress& progress) {
-  const openvdb::MaskTree cells = cellsNearEdges(field, within);
-  if (cells.empty()) return;
-  const CellSurface surface(field, &cells);
-  const SharpMesh mesh = sharpSurface(surface, field, progress);
+  // The mesh takes more memory than the triangles, and is freed before they are sorted.
+  surface_ = TriangleSearch(findTriangles(field, within, progress));
+}
+
+std::vector<TriangleItem> SharpPatches::findTriangles(const FloatGrid& field,
+                                                      const BlockSelection& within,
+                                                      const Progress& progress) {
+  const SharpMesh mesh = meshNearEdges(field, within, progress);
 
   // === Confirmed edges
   const bool hasFeatures = std::any_of(mesh.sheets.begin(), mesh.sheets.end(),
                                        [](const VertexSheets& s) { return s.count > 1; });
-  if (!hasFeatures) return;
-  const SheetTable table(mesh);
-  for (std::size_t v = 0; v < mesh.sheets.size(); ++v) {
-    if (mesh.sheets[v].count < 2 || table.isThinAt(mesh.positions[v], mesh.sheets[v])) continue;
-    features_.push_back(mesh.positions[v]);
-    zone_.setValueOn(Coord::floor(mesh.positions[v]));
-  }
-  if (zone_.empty()) return;
+  if (!hasFeatures) return {};
+  confirmFeatures(mesh);
+  if (zone_.empty()) return {};
   openvdb::tools::dilateActiveValues(zone_, kZone, openvdb::tools::NN_FACE_EDGE_VERTEX,
                                      openvdb::tools::IGNORE_TILES);
 
@@ -153,15 +159,31 @@ SharpPatches::SharpPatches(const FloatGrid& field, const BlockSelection& within,
   openvdb::tools::dilateActiveValues(around, 1, openvdb::tools::NN_FACE_EDGE_VERTEX,
                                      openvdb::tools::IGNORE_TILES);
   const openvdb::tree::ValueAccessor<const openvdb::MaskTree> used(around);
+  const auto isUsed = [&](const std::array<std::uint32_t, 3>& triangle) {
+    return std::any_of(triangle.begin(), triangle.end(), [&](std::uint32_t v) {
+      return used.isValueOn(Coord::floor(mesh.positions[v]));
+    });
+  };
   std::vector<TriangleItem> triangles;
-  for (const auto& [a, b, c] : mesh.triangles) {
-    const std::array<Vec3d, 3> t{mesh.positions[a], mesh.positions[b], mesh.positions[c]};
-    if (std::any_of(t.begin(), t.end(),
-                    [&](const Vec3d& p) { return used.isValueOn(Coord::floor(p)); }))
-      triangles.push_back({{toImath(t[0]), toImath(t[1]), toImath(t[2])},
-                           static_cast<std::uint32_t>(triangles.size())});
+  triangles.reserve(static_cast<std::size_t>(
+      std::count_if(mesh.triangles.begin(), mesh.triangles.end(), isUsed)));
+  for (const auto& triangle : mesh.triangles) {
+    if (!isUsed(triangle)) continue;
+    const auto [a, b, c] = triangle;
+    triangles.push_back(
+        {{toImath(mesh.positions[a]), toImath(mesh.positions[b]), toImath(mesh.positions[c])},
+         static_cast<std::uint32_t>(triangles.size())});
   }
-  surface_ = TriangleSearch(std::move(triangles));
+  return triangles;
+}
+
+void SharpPatches::confirmFeatures(const SharpMesh& mesh) {
+  const SheetTable table(mesh);
+  for (std::size_t v = 0; v < mesh.sheets.size(); ++v) {
+    if (mesh.sheets[v].count < 2 || table.isThinAt(mesh.positions[v], mesh.sheets[v])) continue;
+    features_.push_back(mesh.positions[v]);
+    zone_.setValueOn(Coord::floor(mesh.positions[v]));
+  }
 }
 
 SharpPatches::Hit SharpPatches::nearest(const Vec3d& from, double limit) const {

@@ -8,6 +8,10 @@
 #include "levelset/geometry/search/triangle_search.h"
 #include "levelset/progress.h"
 
+namespace levelset {
+struct SharpMesh;
+}
+
 namespace levelset::eikonal {
 
 /// Zero set near the edges and corners of a solid, as triangles in index space. Tricubic
@@ -55,6 +59,12 @@ class SharpPatches {
   [[nodiscard]] Hit nearest(const openvdb::Vec3d& from, double limit) const;
 
  private:
+  /// Sets all members but the tree.
+  [[nodiscard]] std::vector<TriangleItem> findTriangles(const openvdb::FloatGrid& field,
+                                                        const BlockSelection& within,
+                                                        const Progress& progress);
+  void confirmFeatures(const SharpMesh& mesh);
+
   std::vector<openvdb::Vec3d> features_;
   TriangleSearch surface_;
   openvdb::MaskTree zone_, border_;

@@ -109,6 +109,7 @@ class DualMesher {
     report(progress_, 0.7);
     mesh = {};  // releases its memory before the next mesh is made
     mesh = assemble();
+    release();
     insertFeatures(mesh, mesh.sheets, subProgress(progress_, 0.75, 1));
     return mesh;
   }
@@ -253,6 +254,13 @@ class DualMesher {
       const bool lowInside = block.value(x * 64 + y * 8 + z) < 0;
       visit(number, block.origin.offsetBy(x, y, z), axis, lowInside);
     });
+  }
+
+  void release() {
+    std::vector<DualVertex>().swap(vertices_);
+    std::vector<std::uint8_t>().swap(twice_);
+    std::vector<std::array<std::uint32_t, 4>>().swap(cells_);
+    std::vector<FaceSegment>().swap(segments_);
   }
 
   void collectSegments() {
