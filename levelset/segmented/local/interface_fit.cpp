@@ -18,11 +18,8 @@ constexpr double kFitFirstFlatness = 0.1;
 constexpr double kFitDamping = 1e-3;    // of steps along the curve, where the point is free
 constexpr double kFitParallel = 0.02;   // least area of the parallelogram of two normals, squared
 constexpr double kFitAgreement = 0.05;  // voxels: residual that halves the weight of a sample
-constexpr double kFitMiss =
-    0.1;  // voxels: largest distance of a point from interfaces that meet there
 constexpr double kFitLooseAgreement = 0.25, kFitMedians = 1.5;
 constexpr double kFitLeastAgreement = 0.5;  // of the weights of a fit
-constexpr double kFitFarthest = 1.5;        // voxels: largest move of a point
 constexpr std::size_t kFitFewest = 5;       // samples
 
 std::array<double, kFitTerms> fitTermsAt(const V3d& p) {
@@ -129,7 +126,8 @@ std::optional<InterfaceFit> fitInterface(const V3d& about,
   return result;
 }
 
-std::optional<V3d> meetingPoint(std::span<const InterfaceFit> interfaces, const V3d& start) {
+std::optional<V3d> meetingPoint(std::span<const InterfaceFit> interfaces, const V3d& start,
+                                const MeetingLimits& limits) {
   V3d at = start;
   constexpr int kSteps = 4;
   for (int step = 0; step < kSteps; ++step) {
@@ -155,11 +153,11 @@ std::optional<V3d> meetingPoint(std::span<const InterfaceFit> interfaces, const 
     for (std::size_t i = 0; i < 3; ++i) matrix[i][i] += kFitDamping;
     if (!solveFit(matrix, right)) return std::nullopt;
     at += V3d(right[0], right[1], right[2]);
-    if (!((at - interfaces.front().about).length() <= kFitFarthest)) return std::nullopt;
+    if (!((at - interfaces.front().about).length() <= limits.farthest)) return std::nullopt;
   }
   // Interfaces that bend sharply, as those of smoothed labels do, are not known where they meet.
   for (const InterfaceFit& interface : interfaces)
-    if (std::abs(interface.value(at)) > kFitMiss * interface.gradient(at).length())
+    if (std::abs(interface.value(at)) > limits.miss * interface.gradient(at).length())
       return std::nullopt;
   return at;
 }

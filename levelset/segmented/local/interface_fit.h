@@ -34,10 +34,17 @@ struct InterfaceSample {
 [[nodiscard]] std::optional<InterfaceFit> fitInterface(const Imath::V3d& about,
                                                        std::span<const InterfaceSample> samples);
 
+/// Limits of a point in which interfaces meet, voxels.
+struct MeetingLimits {
+  double farthest = 1.5;  ///< from where the interfaces were fitted
+  double miss = 0.1;      ///< from each interface
+};
+
 /// Finds the point on all of the interfaces that is closest to `start`.
-/// @return empty when two or more interfaces are nearly parallel or do not meet, or the point is
-///         more than 1.5 voxels from where they were fitted
+/// @return empty when two or more interfaces are nearly parallel or do not meet, or the point
+///         exceeds the limits
 [[nodiscard]] std::optional<Imath::V3d> meetingPoint(std::span<const InterfaceFit> interfaces,
-                                                     const Imath::V3d& start);
+                                                     const Imath::V3d& start,
+                                                     const MeetingLimits& limits = {});
 
 }  // namespace levelset

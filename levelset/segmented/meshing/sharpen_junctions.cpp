@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
+#include <span>
 #include <tuple>
 
 #include "levelset/progress_gate.h"
@@ -19,62 +21,117 @@ using Imath::V3d;
 using openvdb::Coord;
 
 constexpr double kLargestDistance = 1.75;  // voxels: of the samples of a fit
+constexpr std::size_t kFewSamples = 5;     // without other ones there would be no fit
+constexpr int kReach = 3;                  // voxels: of the samples of a fit, along each axis
+/// Limits of a first guess, after which the interfaces are fitted again there. Where they meet at
+/// small angles, the mesh of the labels has its junction this far beside it.
+constexpr MeetingLimits kGuess = {.farthest = 3, .miss = 0.3};
 constexpr int kRelaxations = 5;
+constexpr double kFar = 0.5;     // voxels: move of a vertex beside which curves may be folded
+constexpr int kUnfoldings = 30;  // relaxations of curves with ends that moved far
+constexpr int kFoldedEdges = 6;  // of a curve, on each side of a vertex that moved far
 constexpr double kZigzag = 0.1;  // voxels: distance from the middle of both neighbours
+
+/// Nearest interface of a grid point.
+struct NearestInterface {
+  double distance;  ///< voxels
+  RegionLabel label, neighbour;
+};
+NearestInterface sampleAt(SegmentedReader& reader, const SegmentedData& data, const Coord& c) {
+  const SegmentedReader::Nearest near = reader.nearest(c);
+  return {static_cast<double>(near.distance) / data.voxelSize, near.label, near.neighbour};
+}
+
+/// Calls visit(c) for the grid points around one.
+template <class Visit>
+void forEachAround(const Coord& centre, const Visit& visit) {
+  for (int x = centre[0] - kReach; x <= centre[0] + kReach; ++x)
+    for (int y = centre[1] - kReach; y <= centre[1] + kReach; ++y)
+      for (int z = centre[2] - kReach; z <= centre[2] + kReach; ++z) visit(Coord(x, y, z));
+}
+
+/// Signed distances of grid points from the interface between two regions. Only the grid points to
+/// which it is the nearest interface count, so its fit is extended smoothly up to a junction where
+/// it ends.
+/// @param centre    grid point at the middle
+/// @param sampleOf  nearest interface of a grid point
+template <class SampleOf>
+std::vector<InterfaceSample> samplesBetween(RegionLabel a, RegionLabel b, const Coord& centre,
+                                            const SampleOf& sampleOf) {
+  std::vector<InterfaceSample> found;
+  forEachAround(centre, [&](const Coord& c) {
+    const NearestInterface& sample = sampleOf(c);
+    const bool isA = sample.label == a && sample.neighbour == b,
+               isB = sample.label == b && sample.neighbour == a;
+    if ((!isA && !isB) || sample.distance > kLargestDistance) return;
+    found.push_back({V3d(c[0], c[1], c[2]), isA ? sample.distance : -sample.distance});
+  });
+  return found;
+}
+
+/// Adds the grid points that have another nearest interface, where one of a narrow interface would
+/// be lost otherwise. Their distances are too large beyond the rim of the interface; fits allow it.
+void addFarther(const SegmentedData& data, RegionLabel a, RegionLabel b, const Coord& centre,
+                std::vector<InterfaceSample>& samples) {
+  SegmentedReader reader(data);
+  forEachAround(centre, [&](const Coord& c) {
+    const SegmentedReader::Nearest near = reader.nearest(c);
+    if (near.label != a && near.label != b) return;
+    const RegionLabel other = near.label == a ? b : a;
+    if (near.neighbour == other) return;
+    const double distance = static_cast<double>(reader.distanceTo(c, near, other)) / data.voxelSize;
+    if (distance <= kLargestDistance)
+      samples.push_back({V3d(c[0], c[1], c[2]), near.label == a ? distance : -distance});
+  });
+}
+
+/// Fits an interface between two regions.
+template <class SampleOf>
+std::optional<InterfaceFit> fitBetween(const SegmentedData& data, RegionLabel a, RegionLabel b,
+                                       const V3d& position, const Coord& centre,
+                                       const SampleOf& sampleOf) {
+  std::vector<InterfaceSample> found = samplesBetween(a, b, centre, sampleOf);
+  if (!found.empty() && found.size() < kFewSamples) addFarther(data, a, b, centre, found);
+  return fitInterface(position, found);
+}
 
 /// Distances to the nearest interfaces in and around a block.
 class JunctionSamples {
  public:
   /// @param origin  of the block, index coordinates
   JunctionSamples(const SegmentedData& data, const Coord& origin)
-      : origin_(origin), samples_(static_cast<std::size_t>(kSide) * kSide * kSide) {
+      : data_(data), origin_(origin), samples_(static_cast<std::size_t>(kSide) * kSide * kSide) {
     SegmentedReader reader(data);
     for (int x = -kReach; x <= 8 + kReach; ++x)
       for (int y = -kReach; y <= 8 + kReach; ++y)
         for (int z = -kReach; z <= 8 + kReach; ++z) {
-          const SegmentedReader::Nearest near = reader.nearest(origin.offsetBy(x, y, z));
-          samples_[index(x, y, z)] = {static_cast<double>(near.distance) / data.voxelSize,
-                                      near.label, near.neighbour};
+          samples_[index(x, y, z)] = sampleAt(reader, data, origin.offsetBy(x, y, z));
         }
   }
 
-  /// Fits the interface between two regions. Only the grid points to which it is the nearest
-  /// interface determine it, so it is extended smoothly up to a junction where it ends.
+  /// Fits the interface between two regions, see fitBetween().
   /// @param position  in the block
   [[nodiscard]] std::optional<InterfaceFit> fit(RegionLabel a, RegionLabel b,
                                                 const V3d& position) const {
     const V3d about = position - V3d(origin_[0], origin_[1], origin_[2]);
-    std::array<int, 3> centre{};
+    Coord centre = origin_;
     for (int axis = 0; axis < 3; ++axis)
-      centre[static_cast<std::size_t>(axis)] =
-          std::clamp(static_cast<int>(std::lround(about[axis])), 0, 8);
-    std::vector<InterfaceSample> found;
-    for (int x = centre[0] - kReach; x <= centre[0] + kReach; ++x)
-      for (int y = centre[1] - kReach; y <= centre[1] + kReach; ++y)
-        for (int z = centre[2] - kReach; z <= centre[2] + kReach; ++z) {
-          const Sample& sample = samples_[index(x, y, z)];
-          const bool isA = sample.label == a && sample.neighbour == b,
-                     isB = sample.label == b && sample.neighbour == a;
-          if ((!isA && !isB) || sample.distance > kLargestDistance) continue;
-          found.push_back({V3d(origin_[0] + x, origin_[1] + y, origin_[2] + z),
-                           isA ? sample.distance : -sample.distance});
-        }
-    return fitInterface(position, found);
+      centre[axis] += std::clamp(static_cast<int>(std::lround(about[axis])), 0, 8);
+    return fitBetween(
+        data_, a, b, position, centre, [this](const Coord& c) -> const NearestInterface& {
+          return samples_[index(c[0] - origin_[0], c[1] - origin_[1], c[2] - origin_[2])];
+        });
   }
 
  private:
-  static constexpr int kReach = 3;  // voxels
   static constexpr int kSide = 8 + 1 + 2 * kReach;
   [[nodiscard]] static std::size_t index(int x, int y, int z) {
     return static_cast<std::size_t>(((x + kReach) * kSide + y + kReach) * kSide + z + kReach);
   }
-  struct Sample {
-    double distance;  ///< voxels
-    RegionLabel label, neighbour;
-  };
 
+  const SegmentedData& data_;
   Coord origin_;
-  std::vector<Sample> samples_;
+  std::vector<NearestInterface> samples_;
 };
 
 /// Vertices at and beside junctions, with the interfaces that they lie on.
@@ -86,9 +143,16 @@ class JunctionStrip {
   void run(const Progress& progress) {
     findVertices();
     findNeighbours();
+    std::vector<std::uint32_t> all(strip_.size());
+    std::iota(all.begin(), all.end(), 0u);
+    for (StripVertex& vertex : strip_) vertex.start = mesh_.mesh.positions[vertex.vertex];
     fitInterfaces(subProgress(progress, 0, 0.9));
     // The points first, then the curves between them, then the interfaces.
-    for (int n = 0; n <= kRelaxations; ++n) relax(n == 0);
+    relax(all, Round::First);
+    const std::vector<std::uint32_t> folded = foldedCurves();
+    for (int n = 0; n < kUnfoldings; ++n) relax(folded, Round::Unfold);
+    for (int n = 1; n < kRelaxations; ++n) relax(all, Round::Middle);
+    relax(all, Round::Last);
     for (int n = 0; n < kRelaxations; ++n) straighten();
     report(progress, 1);
   }
@@ -99,6 +163,7 @@ class JunctionStrip {
   struct StripVertex {
     std::uint32_t vertex;
     bool isJunction = false;
+    V3d start = V3d(0);                          ///< position in the mesh of the labels
     std::vector<RegionLabel> labels = {};        ///< that meet here, ascending
     std::vector<std::uint32_t> neighbours = {};  ///< along the curve, or on the interface
     std::vector<InterfaceFit> interfaces = {};   ///< empty: the vertex stays
@@ -181,36 +246,122 @@ class JunctionStrip {
     });
   }
 
-  void fitInterfacesAt(StripVertex& vertex, const JunctionSamples& samples) const {
-    const V3d& about = mesh_.mesh.positions[vertex.vertex];
-    const std::vector<RegionLabel>& labels = vertex.labels;
-    for (std::size_t i = 0; i < labels.size(); ++i)
-      for (std::size_t j = i + 1; j < labels.size(); ++j)
-        if (const auto found = samples.fit(labels[i], labels[j], about))
-          vertex.interfaces.push_back(*found);
-    // One interface less than labels meets in the curve or point.
-    if (vertex.interfaces.size() + 1 < labels.size()) vertex.interfaces.clear();
+  void fitInterfacesAt(StripVertex& vertex, const JunctionSamples& samples) {
+    V3d& position = mesh_.mesh.positions[vertex.vertex];
+    vertex.interfaces = interfacesAt(vertex.labels, position, samples);
+    if (!vertex.isJunction || vertex.interfaces.empty()) return;
+    if (meetingPoint(vertex.interfaces, position)) return;
+    const std::optional<V3d> guess = meetingAt(vertex, vertex.interfaces, position, kGuess);
+    if (!guess) return;
+    std::vector<InterfaceFit> there =
+        interfacesAt(vertex.labels, *guess, FarSamples{data_, SegmentedReader(data_)});
+    if (there.empty() || !meetingPoint(there, *guess)) return;
+    position = *guess;
+    vertex.interfaces = std::move(there);
   }
 
-  void relax(bool isFirst) {
-    std::vector<V3d> moved(strip_.size());
-    tbb::parallel_for(std::size_t{0}, strip_.size(), [&](std::size_t n) {
-      const StripVertex& vertex = strip_[n];
+  /// Point near a position in which interfaces meet. Those that do not meet exactly would carry a
+  /// vertex along its curve, so it only moves across.
+  [[nodiscard]] static std::optional<V3d> meetingAt(const StripVertex& vertex,
+                                                    std::span<const InterfaceFit> interfaces,
+                                                    const V3d& position,
+                                                    const MeetingLimits& limits = {}) {
+    std::optional<V3d> meeting = meetingPoint(interfaces, position, limits);
+    if (!meeting || !vertex.isJunction || vertex.neighbours.size() != 2) return meeting;
+    // Along the curve: orthogonal to the two normals that differ most.
+    V3d along(0);
+    for (std::size_t i = 0; i < interfaces.size(); ++i)
+      for (std::size_t j = i + 1; j < interfaces.size(); ++j) {
+        const V3d cross = interfaces[i].gradient(*meeting).normalized().cross(
+            interfaces[j].gradient(*meeting).normalized());
+        if (cross.length2() > along.length2()) along = cross;
+      }
+    along.normalize();
+    return *meeting - along * along.dot(*meeting - position);
+  }
+
+  /// Point near a position in which regions meet, by interfaces that are fitted there.
+  [[nodiscard]] std::optional<V3d> meetingFittedAt(const StripVertex& vertex,
+                                                   const V3d& position) const {
+    const std::vector<InterfaceFit> there =
+        interfacesAt(vertex.labels, position, FarSamples{data_, SegmentedReader(data_)});
+    return there.empty() ? std::nullopt : meetingAt(vertex, there, position);
+  }
+
+  /// Samples anywhere, read one by one.
+  struct FarSamples {
+    const SegmentedData& data;
+    mutable SegmentedReader reader;
+    [[nodiscard]] std::optional<InterfaceFit> fit(RegionLabel a, RegionLabel b,
+                                                  const V3d& position) const {
+      Coord centre;
+      for (int axis = 0; axis < 3; ++axis)
+        centre[axis] = static_cast<int>(std::lround(position[axis]));
+      return fitBetween(data, a, b, position, centre,
+                        [this](const Coord& c) { return sampleAt(reader, data, c); });
+    }
+  };
+
+  /// Fits the interfaces between the regions near a position.
+  /// @return empty when too few are found to meet in a curve or point
+  template <class Samples>
+  [[nodiscard]] static std::vector<InterfaceFit> interfacesAt(
+      const std::vector<RegionLabel>& labels, const V3d& position, const Samples& samples) {
+    std::vector<InterfaceFit> interfaces;
+    for (std::size_t i = 0; i < labels.size(); ++i)
+      for (std::size_t j = i + 1; j < labels.size(); ++j)
+        if (const auto found = samples.fit(labels[i], labels[j], position))
+          interfaces.push_back(*found);
+    // One interface less than labels meets in the curve or point.
+    if (interfaces.size() + 1 < labels.size()) interfaces.clear();
+    return interfaces;
+  }
+
+  /// Vertices of junctions near those that moved far. A curve may pass its end and return there.
+  [[nodiscard]] std::vector<std::uint32_t> foldedCurves() const {
+    std::vector<std::uint32_t> found;
+    std::vector<char> isFound(strip_.size(), 0);
+    const auto add = [&](std::uint32_t slot) {
+      if (slot == kNone || isFound[slot] || !strip_[slot].isJunction) return;
+      isFound[slot] = 1;
+      found.push_back(slot);
+    };
+    for (std::uint32_t n = 0; n < strip_.size(); ++n)
+      if ((mesh_.mesh.positions[strip_[n].vertex] - strip_[n].start).length() > kFar) add(n);
+    std::size_t first = 0;
+    for (int edges = 0; edges < kFoldedEdges; ++edges) {
+      const std::size_t last = found.size();
+      for (; first < last; ++first)
+        for (const std::uint32_t v : strip_[found[first]].neighbours) add(slots_[v]);
+    }
+    return found;
+  }
+
+  enum class Round { First, Unfold, Middle, Last };
+  void relax(const std::vector<std::uint32_t>& which, Round round) {
+    std::vector<V3d> moved(which.size());
+    tbb::parallel_for(std::size_t{0}, which.size(), [&](std::size_t n) {
+      const StripVertex& vertex = strip_[which[n]];
       const V3d& old = mesh_.mesh.positions[vertex.vertex];
       V3d target = old;
       // Ends of curves, and points where curves meet, have no direction to move in.
-      if (!isFirst && (!vertex.isJunction || vertex.neighbours.size() == 2)) {
+      if (round != Round::First && (!vertex.isJunction || vertex.neighbours.size() == 2)) {
         target = V3d(0);
         for (const std::uint32_t v : vertex.neighbours) target += mesh_.mesh.positions[v];
         target /= static_cast<double>(vertex.neighbours.size());
+        // Repeated steps to the middle would keep a zigzag.
+        if (round == Round::Unfold) target = (target + old) / 2;
       }
       // Beside creases, where no interface fits, the vertex only follows its neighbours.
-      moved[n] = vertex.interfaces.empty()
-                     ? target
-                     : meetingPoint(vertex.interfaces, target).value_or(target);
+      std::optional<V3d> meeting;
+      if (!vertex.interfaces.empty()) meeting = meetingAt(vertex, vertex.interfaces, target);
+      if (!meeting && (round == Round::Unfold || round == Round::Last) && vertex.isJunction)
+        meeting = meetingFittedAt(vertex, target);
+      // A corner of a curve would be cut off if it followed its neighbours often.
+      moved[n] = meeting.value_or(round == Round::Unfold ? old : target);
     });
-    for (std::size_t n = 0; n < strip_.size(); ++n)
-      mesh_.mesh.positions[strip_[n].vertex] = moved[n];
+    for (std::size_t n = 0; n < which.size(); ++n)
+      mesh_.mesh.positions[strip_[which[n]].vertex] = moved[n];
   }
 
   /// Moves vertices of curves that zigzag towards their neighbours. Smooth curves stay. Fits to

@@ -129,12 +129,14 @@ TEST(SegmentedAtlas, ClosedFormsAddUp) {
 TEST(SegmentedAtlas, AgreesWithClosedForms) {
   const PowerAtlas atlas;
   const AtlasErrors errors = atlasErrors(atlas, truthOf(atlas), 0.05);
-  EXPECT_LT(errors.meanJunction, measured(2.4e-3));
-  // A few vertices are not within the 0.1 voxels of the others.
-  EXPECT_LT(errors.junction, measured(0.544));
-  EXPECT_LT(errors.face, measured(2.92e-3));
-  EXPECT_LT(errors.volume, measured(4.54e-3));
-  EXPECT_LT(errors.cell, measured(5.29e-4));
+  EXPECT_LT(errors.meanJunction, measured(5.7e-4));
+  EXPECT_LT(errors.junction, measured(0.0352));
+  EXPECT_LT(errors.point, measured(4.2e-3));
+  EXPECT_LT(errors.length, measured(7.8e-3));
+  EXPECT_LT(errors.area, measured(2.3e-3));
+  EXPECT_LT(errors.face, measured(8.5e-4));
+  EXPECT_LT(errors.volume, measured(4.48e-3));
+  EXPECT_LT(errors.cell, measured(5.28e-4));
 }
 
 TEST(SlowSegmentedAtlas, ConvergesToClosedForms) {
@@ -143,8 +145,14 @@ TEST(SlowSegmentedAtlas, ConvergesToClosedForms) {
   std::vector<AtlasErrors> errors;
   for (const double voxel : {0.05, 0.05 / std::numbers::sqrt2, 0.025}) {
     errors.push_back(atlasErrors(atlas, truth, voxel));
-    EXPECT_LT(errors.back().meanJunction, measured(3.8e-3));
+    EXPECT_LT(errors.back().meanJunction, measured(5.7e-4));
+    EXPECT_LT(errors.back().junction, measured(0.0352));
+    EXPECT_LT(errors.back().point, measured(0.0185));
+    EXPECT_LT(errors.back().length, measured(0.0329));
+    EXPECT_LT(errors.back().area, measured(3.1e-3));
   }
+  // Junctions are in voxels, so their order in world units is larger by one.
+  EXPECT_GT(1 + std::log2(errors[0].meanJunction / errors[2].meanJunction), measuredOrder(3.01));
   EXPECT_GT(std::log2(errors[0].volume / errors[2].volume), measuredOrder(1.89));
   EXPECT_GT(std::log2(errors[0].cell / errors[2].cell), measuredOrder(1.87));
 }

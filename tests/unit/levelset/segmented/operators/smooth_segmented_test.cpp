@@ -66,7 +66,7 @@ TEST(SmoothSegmented, MovesSmallBallsAwayFromJunctionsAtTheirSpeed) {
   const double volume = measureSegmented(smoothSegmented(field, kTime).field).regions[3].volume,
                radius = std::cbrt(volume / (4 * pi / 3)),
                exact = std::sqrt(kRadius * kRadius - 4 * kTime);
-  EXPECT_LT(std::abs(radius - exact), measured(0.01));
+  EXPECT_LT(std::abs(radius - exact), measured(6.2e-3));
 }
 
 TEST(SmoothSegmented, AgreesWithCurvatureFlow) {
@@ -193,7 +193,7 @@ TEST(SmoothSegmented, RelaxesAStraightJunctionTo120Degrees) {
   EXPECT_EQ(interfaceDefects(mesh), InterfaceDefects());
   // The walls do not move.
   const SegmentedMeasurement before = measureSegmented(field), after = measureSegmented(mesh);
-  EXPECT_NEAR(after.volume / before.volume, 1, measured(2.9e-3));
+  EXPECT_NEAR(after.volume / before.volume, 1, measured(2.2e-3));
 }
 
 /// Ball cut into two equal halves.
@@ -256,10 +256,10 @@ TEST(SmoothSegmented, RelaxesToTheStandardDoubleBubble) {
                      after = bubbleErrors(
                          smoothSegmented(halves(kVoxel, axis), 1.8, {.keepsVolumes = true}).field,
                          kVoxel, axis);
-  EXPECT_LT(after.volume, measured(3.75e-3));
-  EXPECT_LT(after.cap, measured(3.9e-3));
-  EXPECT_LT(after.disc, measured(3.3e-3, 0.01));  // a radius within 0.5 %
-  EXPECT_LT(after.angle, measured(0.70, 1));
+  EXPECT_LT(after.volume, measured(2.9e-3));
+  EXPECT_LT(after.cap, measured(2.5e-3));
+  EXPECT_LT(after.disc, measured(2.6e-4));
+  EXPECT_LT(after.angle, measured(0.466, 1));
   EXPECT_GT(before.disc, 0.8);
   EXPECT_GT(before.angle, 50);
 }
@@ -284,9 +284,9 @@ TEST(SlowSmoothSegmented, KeepsTheStandardDoubleBubbleAtThreeResolutions) {
         bubbleErrors(smoothSegmented(doubleBubble(voxel, axis), 0.05, {.keepsVolumes = true}).field,
                      voxel, axis));
   const BubbleErrors figures[] = {
-      {.volume = 8.7e-5, .cap = 1.43e-3, .disc = 5e-4, .angle = 0.87},
-      {.volume = 2.9e-5, .cap = 1.6e-4, .disc = 4.1e-4, .angle = 0.57},
-      {.volume = 2.7e-5, .cap = 4.8e-4, .disc = 2.35e-3, .angle = 0.07}};
+      {.volume = 5.6e-5, .cap = 4.1e-4, .disc = 1.65e-3, .angle = 0.92},
+      {.volume = 2.3e-5, .cap = 1.4e-4, .disc = 3.5e-4, .angle = 0.58},
+      {.volume = 2.9e-5, .cap = 4.7e-4, .disc = 2.3e-3, .angle = 0.051}};
   for (std::size_t n = 0; n < 3; ++n) {
     EXPECT_LT(errors[n].cap, measured(figures[n].cap));
     EXPECT_LT(errors[n].disc, measured(figures[n].disc));
@@ -365,14 +365,14 @@ TEST(SlowSmoothSegmented, KeepsTheStandardTripleBubble) {
     errors.push_back(
         tripleErrors(smoothSegmented(field, 0.025, {.keepsVolumes = true}).field, frame, voxel));
     const TripleErrors& e = errors.back();
-    EXPECT_LT(e.volume, measured(4.63e-4));
+    EXPECT_LT(e.volume, measured(3.2e-4));
     EXPECT_LT(e.cap, measured(7.44e-4));
     EXPECT_LT(e.axisAngle, measured(0.146));
   }
-  EXPECT_LT(errors[0].wall, measured(5.6e-3));
+  EXPECT_LT(errors[0].wall, measured(6.9e-3));
   EXPECT_LT(errors[0].rimAngle, measured(1.27));
   EXPECT_LT(errors[2].rimAngle, measured(0.654, 1));
-  EXPECT_GT(std::log2(errors[0].wall / errors[2].wall), measuredOrder(1.72));
+  EXPECT_GT(std::log2(errors[0].wall / errors[2].wall), measuredOrder(2.03));
 }
 
 TEST(SmoothSegmented, KeepsTheVolumesOfATripleBubble) {
