@@ -501,9 +501,10 @@ AdaptiveTree emptyTree(const Imath::Box3d& box, const AdaptiveOptions& options) 
   if (!(options.tolerance > 0) || !std::isfinite(options.tolerance))
     throw UsageError(
         fmt::format("the tolerance {} is not positive; give a positive one", options.tolerance));
-  if (!(options.halfWidth >= 0))
+  if (!(options.halfWidth >= 0 && std::isfinite(options.halfWidth)))
     throw UsageError(
-        fmt::format("the half width {} is negative; give 0 or more", options.halfWidth));
+        fmt::format("the half width {} is not finite or negative; give a number of 0 or more",
+                    options.halfWidth));
   const double halfWidth = options.halfWidth > 0 ? options.halfWidth : 0.02 * diagonal;
   double reach = 0;
   for (int axis = 0; axis < 3; ++axis)

@@ -58,21 +58,42 @@ TEST(AdaptiveField, MeetsItsToleranceAroundABall) {
   EXPECT_NEAR(order, 1.5, 0.3);
 }
 
-TEST(AdaptiveField, MeetsItsToleranceEverywhere) {
-  // The distance of a box has kinks on both sides: inside on the medial axis, outside none but at
-  // infinity. A hollow box has them on both.
+/// The distance of a box has kinks on both sides: inside on the medial axis, outside none but at
+/// infinity. A hollow box has them on both.
+void expectToleranceEverywhere(const std::vector<double>& tolerances, int points) {
   const Formula hollow([](const V3d& p) {
     const V3d q(std::abs(p.x) - 1, std::abs(p.y) - 0.7, std::abs(p.z) - 0.5);
     const V3d beyond(std::max(q.x, 0.0), std::max(q.y, 0.0), std::max(q.z, 0.0));
     return std::abs(beyond.length() + std::min(0.0, std::max({q.x, q.y, q.z}))) - 0.05;
   });
-  for (const double tolerance : {0.04, 0.02, 0.01}) {
+  for (const double tolerance : tolerances) {
     const AdaptiveField field =
         buildAdaptive(hollow, {V3d(-1.05, -0.75, -0.55), V3d(1.05, 0.75, 0.55)},
-                      {.tolerance = tolerance, .halfWidth = INFINITY});
-    const Errors errors = errorsOf(field, hollow, 50000);
+                      {.tolerance = tolerance, .halfWidth = 0.5});
+    const Errors errors = errorsOf(field, hollow, points);
     EXPECT_LE(errors.largest, 1);
     EXPECT_EQ(errors.wrongSigns, 0u);
+    EXPECT_GT(errors.inside, 100u);
+    EXPECT_GT(errors.outside, 1000u);
+  }
+}
+
+TEST(AdaptiveField, MeetsItsToleranceEverywhere) {
+  expectToleranceEverywhere({0.04, 0.02, 0.01}, 50000);
+}
+
+TEST(SlowAdaptiveField, MeetsItsToleranceAtAMillionPoints) {
+  expectToleranceEverywhere({0.02}, 1000000);
+  for (const bool isTricubic : {false, true}) {
+    const TriMesh torus = support::torusMesh(1, 0.3);
+    const AdaptiveField field =
+        meshToAdaptive(torus, {.tolerance = 0.004, .halfWidth = 0.1, .isTricubic = isTricubic})
+            .field;
+    const Errors errors = errorsOf(field, MeshDistance(torus, 0.01, {}), 1000000);
+    EXPECT_LE(errors.largest, 1) << isTricubic;
+    EXPECT_EQ(errors.wrongSigns, 0u) << isTricubic;
+    EXPECT_GT(errors.inside, 10000u);
+    EXPECT_GT(errors.outside, 10000u);
   }
 }
 
@@ -229,6 +250,7 @@ TEST(AdaptiveField, RefusesBadOptions) {
   EXPECT_THROW((void)build(1e-7, 0), UsageError);
   EXPECT_THROW((void)build(0.1, -1), UsageError);
   EXPECT_THROW((void)build(0.1, NAN), UsageError);
+  EXPECT_THROW((void)build(0.1, INFINITY), UsageError);
   EXPECT_THROW((void)buildAdaptive(kBall, Box3d(), {.tolerance = 0.1}), InvalidInput);
   EXPECT_THROW((void)buildAdaptive(kBall, {V3d(1e15), V3d(1e15 + 1)}, {.tolerance = 0.01}),
                InvalidInput);

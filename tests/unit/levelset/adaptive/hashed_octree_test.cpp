@@ -75,6 +75,9 @@ class HashedOctreeTest : public testing::Test {
       reference.split(leaf);
     }
   }
+  void expectLeavesOfRandomPoints(int count);
+  void expectKnownCells(int count);
+  void expectNodes(int count);
   int within(int count) { return static_cast<int>(random() % static_cast<unsigned>(count)); }
 
   std::mt19937 random{5};
@@ -97,9 +100,9 @@ TEST_F(HashedOctreeTest, KeysKeepTheirMembers) {
   }
 }
 
-TEST_F(HashedOctreeTest, FindsTheLeavesOfRandomPoints) {
+void HashedOctreeTest::expectLeavesOfRandomPoints(int count) {
   const CachedOctree cached(octree);
-  for (int k = 0; k < 100000; ++k) {
+  for (int k = 0; k < count; ++k) {
     const V3i p(within(1 << kDepth), within(1 << kDepth), within(1 << kDepth));
     const CellKey expected = reference.leafAt(p, octree.root());
     ASSERT_EQ(octree.leafAt(p), expected);
@@ -110,8 +113,12 @@ TEST_F(HashedOctreeTest, FindsTheLeavesOfRandomPoints) {
   EXPECT_GT(cached.hitRate(), 0.4);  // measured 0.62
 }
 
-TEST_F(HashedOctreeTest, KnowsItsCells) {
-  for (int k = 0; k < 100000; ++k) {
+TEST_F(HashedOctreeTest, FindsTheLeavesOfRandomPoints) {
+  expectLeavesOfRandomPoints(100000);
+}
+
+void HashedOctreeTest::expectKnownCells(int count) {
+  for (int k = 0; k < count; ++k) {
     const CellKey cell =
         CellKey{std::uint32_t(within(1 << kDepth)), std::uint32_t(within(1 << kDepth)),
                 std::uint32_t(within(1 << kDepth)), 0}
@@ -121,6 +128,10 @@ TEST_F(HashedOctreeTest, KnowsItsCells) {
   }
   EXPECT_EQ(octree.leafCount(), reference.leaves().size());
   EXPECT_EQ(octree.cellCount(), 8 * octree.blockCount() + 1);
+}
+
+TEST_F(HashedOctreeTest, KnowsItsCells) {
+  expectKnownCells(100000);
 }
 
 TEST_F(HashedOctreeTest, FindsNeighboursAcrossFaces) {
@@ -144,7 +155,7 @@ TEST_F(HashedOctreeTest, FindsNeighboursAcrossFaces) {
       }
 }
 
-TEST_F(HashedOctreeTest, TellsNodesAndHangingOnes) {
+void HashedOctreeTest::expectNodes(int count) {
   const std::vector<CellKey> leaves = reference.leaves();
   std::set<std::array<int, 3>> nodes;
   for (const CellKey& leaf : leaves)
@@ -153,7 +164,7 @@ TEST_F(HashedOctreeTest, TellsNodesAndHangingOnes) {
       nodes.insert({p.x, p.y, p.z});
     }
   int hanging = 0;
-  for (int k = 0; k < 20000; ++k) {
+  for (int k = 0; k < count; ++k) {
     // Every second point is a node.
     V3i p(within((1 << kDepth) + 1), within((1 << kDepth) + 1), within((1 << kDepth) + 1));
     if (k % 2) {
@@ -176,6 +187,18 @@ TEST_F(HashedOctreeTest, TellsNodesAndHangingOnes) {
     hanging += largest >= 0 && octree.hasNode(p);
   }
   EXPECT_GT(hanging, 100);
+}
+
+TEST_F(HashedOctreeTest, TellsNodesAndHangingOnes) {
+  expectNodes(20000);
+}
+
+using SlowHashedOctreeTest = HashedOctreeTest;
+
+TEST_F(SlowHashedOctreeTest, AnswersAMillionQueries) {
+  expectLeavesOfRandomPoints(1000000);
+  expectKnownCells(1000000);
+  expectNodes(1000000);
 }
 
 TEST(HashedOctree, TakesThreeToFourBytesForACell) {

@@ -89,11 +89,20 @@ TEST(PrismBand, StopsWhenCancelled) {
   EXPECT_THROW((void)meshToBand(subdividedSphere(4), 0.03, options), Cancelled);
 }
 
+/// @param voxels  along the diagonal of the scan
+void expectScanHasTheBitsOfBlocks(const char* name, double voxels, MeshToBandOptions options) {
+  const std::filesystem::path file = std::filesystem::path(LEVELSMITH_DATA_DIR) / "models" / name;
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is missing: run data/fetch";
+  const TriMesh mesh = readMesh(file);
+  expectSameByBlocks(mesh, bounds(mesh).size().length() / voxels, options, name);
+}
+
 TEST(PrismBand, HasTheBitsOfBlocksOnScan) {
-  const std::filesystem::path file =
-      std::filesystem::path(LEVELSMITH_DATA_DIR) / "models/bunny.obj";
-  if (!std::filesystem::exists(file)) GTEST_SKIP() << "the bunny is missing; run data/fetch";
-  expectSameByBlocks(readMesh(file), 0.02, byPrisms(8), "bunny");
+  expectScanHasTheBitsOfBlocks("bunny.obj", 160, byPrisms(8));
+}
+
+TEST(SlowPrismBand, HasTheBitsOfBlocksOnTheDragon) {
+  expectScanHasTheBitsOfBlocks("dragon_vrip.ply.gz", 600, byPrisms(3, SignMode::Winding));
 }
 
 }  // namespace prism_band_test

@@ -257,11 +257,20 @@ TEST(PrismCovering, CoversIrregularVertices) {
   EXPECT_GT(between.points, 200u);
 }
 
+/// @param reach  share of the size of the scan
+void expectScanIsCovered(const char* name, double reach, std::size_t points) {
+  const std::filesystem::path file = std::filesystem::path(LEVELSMITH_DATA_DIR) / "models" / name;
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is missing: run data/fetch";
+  const TriMesh mesh = levelset::readMesh(file);
+  expectCovered(local(mesh), reach * levelset::bounds(mesh).size().length(), points, name);
+}
+
 TEST(PrismCovering, CoversScan) {
-  const std::filesystem::path file =
-      std::filesystem::path(LEVELSMITH_DATA_DIR) / "models/bunny.obj";
-  if (!std::filesystem::exists(file)) GTEST_SKIP() << "the bunny is missing; run data/fetch";
-  expectCovered(local(levelset::readMesh(file)), 0.1, 300, "bunny");
+  expectScanIsCovered("bunny.obj", 0.03, 300);
+}
+
+TEST(SlowPrismCovering, CoversTheDragon) {
+  expectScanIsCovered("dragon_vrip.ply.gz", 0.03, 300);
 }
 
 TEST(PrismCovering, OverlapsLittleOnSmoothSurfaces) {
