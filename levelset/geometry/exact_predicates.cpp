@@ -67,6 +67,13 @@ bool isExact(double a, double b, double difference) {
 
 int orient2dExact(const V2d& a, const V2d& b, const V2d& c) {
   Expansion det;
+  const V2d u = a - c, v = b - c;
+  if (isExact(a.x, c.x, u.x) && isExact(a.y, c.y, u.y) && isExact(b.x, c.x, v.x) &&
+      isExact(b.y, c.y, v.y)) {
+    det.addProduct(u.x, v.y);
+    det.addProduct(-u.y, v.x);
+    return det.sign();
+  }
   det.addProduct(a.x, b.y);
   det.addProduct(-a.x, c.y);
   det.addProduct(-c.x, b.y);
@@ -109,8 +116,10 @@ int orient3dExact(const V3d& a, const V3d& b, const V3d& c, const V3d& d) {
 }  // namespace
 
 int orient2d(const V2d& a, const V2d& b, const V2d& c) {
-  const double left = (a.x - c.x) * (b.y - c.y);
-  const double right = (a.y - c.y) * (b.x - c.x);
+  const V2d u = a - c, v = b - c;
+  // Exact, since differences are 0 for equal numbers only. Usual on faces along the axes.
+  if ((u.x == 0 || v.y == 0) && (u.y == 0 || v.x == 0)) return 0;
+  const double left = u.x * v.y, right = u.y * v.x;
   const double det = left - right;
   if (std::abs(det) > kOrient2dBound * (std::abs(left) + std::abs(right))) return signOf(det);
   return orient2dExact(a, b, c);
@@ -118,6 +127,8 @@ int orient2d(const V2d& a, const V2d& b, const V2d& c) {
 
 int orient3d(const V3d& a, const V3d& b, const V3d& c, const V3d& d) {
   const V3d u = b - a, v = c - a, w = d - a;
+  for (int axis = 0; axis < 3; ++axis)  // exact, as in orient2d()
+    if (u[axis] == 0 && v[axis] == 0 && w[axis] == 0) return 0;
   const double yz = u.y * v.z, zy = u.z * v.y;
   const double zx = u.z * v.x, xz = u.x * v.z;
   const double xy = u.x * v.y, yx = u.y * v.x;
