@@ -28,9 +28,10 @@ namespace {
 using Imath::V3d;
 using Imath::V3i;
 
-// Shares of the tolerance: half of it for the interpolation in a leaf, half for corners that take
-// over the figures of a larger leaf.
-constexpr double kTestedShare = 0.5;
+// Shares of the tolerance for the interpolation in a leaf, and again for corners that take over the
+// figures of a larger leaf. Cubics vary more between the tested points, so a tenth is left for
+// them.
+constexpr double kTestedShare = 0.5, kTestedShareOfCubics = 0.45;
 /// Step of numerical gradients, in edges of the cell.
 constexpr double kGradientStep = 1e-3;
 /// Largest value of a cubic on [0, 1] with a slope of 1 at one end, and values and slope 0 else.
@@ -166,7 +167,7 @@ class Builder {
   Builder(const SignedDistance& distance, AdaptiveTree& tree, const AdaptiveOptions& options)
       : distance_(distance),
         tree_(tree),
-        limit_(kTestedShare * options.tolerance),
+        limit_((options.isTricubic ? kTestedShareOfCubics : kTestedShare) * options.tolerance),
         isTricubic_(options.isTricubic),
         maxMemory_(memoryLimit(options.maxMemory)) {}
 
@@ -503,7 +504,7 @@ AdaptiveTree emptyTree(const Imath::Box3d& box, const AdaptiveOptions& options) 
         fmt::format("the tolerance {} is not positive; give a positive one", options.tolerance));
   if (!(options.halfWidth >= 0 && std::isfinite(options.halfWidth)))
     throw UsageError(
-        fmt::format("the half width {} is not finite or negative; give a number of 0 or more",
+        fmt::format("the half width {} is negative or infinite; give a finite number of 0 or more",
                     options.halfWidth));
   const double halfWidth = options.halfWidth > 0 ? options.halfWidth : 0.02 * diagonal;
   double reach = 0;

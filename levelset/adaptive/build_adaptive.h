@@ -43,9 +43,9 @@ class SignedDistance {
 struct AdaptiveOptions {
   /// Largest error of the field, world units.
   double tolerance = 0;
-  /// Distance from the surface up to which the tolerance holds, world units; 0: 2 % of the diagonal
-  /// of the box. Kinks of the distance half way between two parts of the surface need many small
-  /// cells.
+  /// Distance from the surface up to which the tolerance holds, world units, finite; 0: 2 % of the
+  /// diagonal of the box. Kinks of the distance half way between two parts of the surface need many
+  /// small cells.
   double halfWidth = 0;
   /// Interpolates from gradients too. Smooth surfaces need far fewer cells, each with four times
   /// the numbers.
@@ -65,14 +65,14 @@ struct AdaptiveReport {
 };
 
 /// Samples a signed distance on an octree. Divides a leaf within the half width while its
-/// interpolant is off by more than half of the tolerance: at its centre, in the middle of a face or
-/// an edge, or at a visited point of the surface. Divides a leaf too that would change a smaller
-/// one by more than that at a corner. The error at these points is then at most the tolerance;
-/// elsewhere this is an experience. The smallest cells have an edge of at most half of the
-/// tolerance.
+/// interpolant is off by more than half of the tolerance (0.45 of it if tricubic): at its centre,
+/// in the middle of a face or an edge, or at a visited point of the surface. Divides a leaf too
+/// that would change a smaller one by more than that at a corner. The error at these points is then
+/// at most the tolerance; elsewhere this is an experience. The smallest cells have an edge of at
+/// most half of the tolerance.
 /// @param box  bounds of the surface, world units; the root is a cube around it
 /// @throws UsageError for a tolerance that is not positive, or below the side of the root times
-///         2^(1 − kMaxOctreeDepth)
+///         2^(1 − kMaxOctreeDepth), and for a half width that is negative or infinite
 /// @throws InvalidInput for an empty or infinite box, and if the spacing of representable
 ///         coordinates exceeds an eighth of the tolerance
 /// @throws ResourceLimit, Cancelled

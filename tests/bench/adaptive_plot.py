@@ -17,7 +17,7 @@ STRUCTURES = {
     "band": ("narrow band, trilinear", "#1b6ca8", "s--"),
     "band-tricubic": ("narrow band, tricubic", "#3a7d44", "^--"),
 }
-NAMES = {"detail": "box with a part of 1/1000"}
+NAMES = {"detail": "box with a part of 1/1000", "dragon_vrip": "dragon"}
 
 
 def main(table, picture):

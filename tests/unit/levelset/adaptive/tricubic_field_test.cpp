@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <random>
 #include <vector>
 
@@ -17,6 +18,7 @@
 #include "levelset/adaptive/octree/leaf_interpolant.h"
 #include "levelset/error.h"
 #include "levelset/inspect/measure.h"
+#include "levelset/mesh_files/mesh_file.h"
 #include "tests/support/adaptive.h"
 #include "tests/support/meshes.h"
 #include "tests/support/threads.h"
@@ -172,6 +174,30 @@ TEST(TricubicField, MeetsItsToleranceForMeshes) {
     EXPECT_GT(jumps.changes, 1000);
     EXPECT_LE(jumps.largest, 5e-7);  // rounding to float
   }
+}
+
+TEST(SlowTricubicField, MeetsItsToleranceOnTheDragon) {
+  const std::filesystem::path file =
+      std::filesystem::path(LEVELSMITH_DATA_DIR) / "models/dragon_vrip.ply.gz";
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is missing: run data/fetch";
+  const TriMesh mesh = readMesh(file);
+  const double diagonal = bounds(mesh).size().length(), halfWidth = diagonal / 100;
+  const AdaptiveField field = meshToAdaptive(mesh, {.tolerance = 3e-3 * diagonal,
+                                                    .halfWidth = halfWidth,
+                                                    .isTricubic = true,
+                                                    .acceptSign = true})
+                                  .field;
+  const MeshDistance truth(mesh, diagonal / 1000, {.acceptSign = true});
+  const AdaptiveSampler sampler(field);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> offset(-0.5 * halfWidth, 0.5 * halfWidth);
+  double largest = 0;
+  for (std::size_t n = 0; n < 200000; ++n) {
+    const V3d p = mesh.positions[random() % mesh.positions.size()] +
+                  V3d(offset(random), offset(random), offset(random));
+    largest = std::max(largest, std::abs(sampler.value(p) - truth.at(p, {})));
+  }
+  EXPECT_LE(largest / field.tolerance(), 1);  // measured 0.7
 }
 
 TEST(TricubicField, SamplesGradients) {
