@@ -13,47 +13,12 @@ constexpr const char* kCsgDetails =
     "Operands on different grids are resampled to the finest grid, and the report says so. Without "
     "named operands the action takes the two newest values of the stack, the older one first.";
 
-/// Returns the fraction of the volume of `box` that also lies in `other`; 1 if `box` has no volume.
-double shareWithin(const Imath::Box3d& box, const Imath::Box3d& other) {
-  double share = 1;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double side = box.max[axis] - box.min[axis];
-    if (!(side > 0)) return 1;
-    const double common =
-        std::min(box.max[axis], other.max[axis]) - std::max(box.min[axis], other.min[axis]);
-    share *= std::clamp(common / side, 0.0, 1.0);
-  }
-  return share;
-}
-
 NarrowBand bandAndNotes(CsgResult result, OperatorRun& run) {
   run.notes = std::move(result.notes);
   return std::move(result.band);
 }
 
 }  // namespace
-
-ValuePlan planCombined(CsgOperation operation, Plans operands) {
-  ValuePlan plan = operands[0];
-  for (const ValuePlan& other : operands.subspan(1)) {
-    plan.voxelSize = std::min(plan.voxelSize, other.voxelSize);
-    plan.halfWidth = std::min(plan.halfWidth, other.halfWidth);
-    if (operation == CsgOperation::Union) {
-      plan.area += other.area;
-      plan.bounds.extendBy(other.bounds);
-      continue;
-    }
-    const double within = other.area * shareWithin(other.bounds, plan.bounds);
-    if (operation == CsgOperation::Difference) {
-      plan.area += within;
-      continue;
-    }
-    plan.area = plan.area * shareWithin(plan.bounds, other.bounds) + within;
-    // Both boxes are estimates, so their intersection may be too small.
-    plan.bounds.extendBy(other.bounds);
-  }
-  return plan;
-}
 
 template <CsgOperation operation>
 NarrowBand CsgOperator<operation>::run(std::vector<NarrowBand> operands, const Options&,
