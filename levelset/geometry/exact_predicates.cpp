@@ -117,7 +117,8 @@ int orient3dExact(const V3d& a, const V3d& b, const V3d& c, const V3d& d) {
 
 int orient2d(const V2d& a, const V2d& b, const V2d& c) {
   const V2d u = a - c, v = b - c;
-  // Exact, since differences are 0 for equal numbers only. Usual on faces along the axes.
+  // Exact, since differences are 0 for equal numbers only. Faces along the axes often have such
+  // differences.
   if ((u.x == 0 || v.y == 0) && (u.y == 0 || v.x == 0)) return 0;
   const double left = u.x * v.y, right = u.y * v.x;
   const double det = left - right;

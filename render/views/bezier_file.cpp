@@ -7,6 +7,7 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <system_error>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -222,7 +223,8 @@ std::string textOf(const std::vector<int>& expression) {
 }  // namespace
 
 bool isBezierFile(const std::filesystem::path& file) {
-  if (!std::filesystem::is_regular_file(file)) return false;
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) return false;
   std::ifstream stream(file, std::ios::binary);
   bool isFormat = false, result = false;
   const auto visit = [&](int depth, BezierJson::parse_event_t event, BezierJson& parsed) {

@@ -143,7 +143,7 @@ std::vector<TriangleItem> SharpPatches::findTriangles(const FloatGrid& field,
   const bool hasFeatures = std::any_of(mesh.sheets.begin(), mesh.sheets.end(),
                                        [](const VertexSheets& s) { return s.count > 1; });
   if (!hasFeatures) return {};
-  confirmFeatures(mesh);
+  keepThickFeatures(mesh);
   if (zone_.empty()) return {};
   openvdb::tools::dilateActiveValues(zone_, kZone, openvdb::tools::NN_FACE_EDGE_VERTEX,
                                      openvdb::tools::IGNORE_TILES);
@@ -177,7 +177,7 @@ std::vector<TriangleItem> SharpPatches::findTriangles(const FloatGrid& field,
   return triangles;
 }
 
-void SharpPatches::confirmFeatures(const SharpMesh& mesh) {
+void SharpPatches::keepThickFeatures(const SharpMesh& mesh) {
   const SheetTable table(mesh);
   for (std::size_t v = 0; v < mesh.sheets.size(); ++v) {
     if (mesh.sheets[v].count < 2 || table.isThinAt(mesh.positions[v], mesh.sheets[v])) continue;

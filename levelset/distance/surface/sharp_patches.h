@@ -59,11 +59,11 @@ class SharpPatches {
   [[nodiscard]] Hit nearest(const openvdb::Vec3d& from, double limit) const;
 
  private:
-  /// Sets all members but the tree.
+  /// Returns the triangles of the patches. Sets all members but surface_.
   [[nodiscard]] std::vector<TriangleItem> findTriangles(const openvdb::FloatGrid& field,
                                                         const BlockSelection& within,
                                                         const Progress& progress);
-  void confirmFeatures(const SharpMesh& mesh);
+  void keepThickFeatures(const SharpMesh& mesh);
 
   std::vector<openvdb::Vec3d> features_;
   TriangleSearch surface_;

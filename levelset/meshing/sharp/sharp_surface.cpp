@@ -256,6 +256,7 @@ class DualMesher {
     });
   }
 
+  /// Frees what insertFeatures() does not need.
   void release() {
     std::vector<DualVertex>().swap(vertices_);
     std::vector<std::uint8_t>().swap(twice_);

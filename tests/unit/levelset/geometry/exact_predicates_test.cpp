@@ -39,7 +39,8 @@ int exactOrient3d(const V3d& a, const V3d& b, const V3d& c, const V3d& d) {
                         (m[0][0] * m[1][1] - m[0][1] * m[1][0]) * m[2][2]));
 }
 
-/// Whole numbers up to 2^bits. Beside small ones, their differences are not exact for 53 bits.
+/// Whole numbers below 2^4, or for one in four below 2^53. The difference of two large ones may be
+/// inexact.
 class Numbers {
  public:
   double operator()() {
