@@ -1,7 +1,7 @@
 #!/bin/sh
 # Five materials from five meshes: a partition by `segment` beside vdb_tool, which makes five level sets in two ways:
-# `separate`, each material minus the later ones, and `stack`, unions of each material with all earlier ones, as simulators
-# of layers hold them. CPU seconds and peak memory of the processes, in one run. Exits 1 when ours takes more than half of
+# `separate`, each material minus the later ones, and `stack`, unions of each material with all earlier ones.
+# CPU seconds and peak memory of the processes, in one run. Exits 1 when ours takes more than half of
 # a peer's time. The memory of the results alone is in segmented_bench.
 #   segmented.sh LEVELSMITH [VOXELS…]     VOXELS: grid points along the scene, by default 128 256
 # Environment: RUNS, 2

@@ -20,7 +20,6 @@ constexpr double kFitParallel = 0.02;   // least area of the parallelogram of tw
 constexpr double kFitAgreement = 0.05;  // voxels: residual that halves the weight of a sample
 constexpr double kFitLooseAgreement = 0.25, kFitMedians = 1.5;
 constexpr double kFitLeastAgreement = 0.5;  // of the weights of a fit
-constexpr std::size_t kFitFewest = 5;       // samples
 
 std::array<double, kFitTerms> fitTermsAt(const V3d& p) {
   return {1, p.x, p.y, p.z, p.x * p.x, p.y * p.y, p.z * p.z, p.y * p.z, p.z * p.x, p.x * p.y};
@@ -87,7 +86,7 @@ V3d InterfaceFit::gradient(const V3d& p) const {
 
 std::optional<InterfaceFit> fitInterface(const V3d& about,
                                          std::span<const InterfaceSample> samples) {
-  if (samples.size() < kFitFewest) return std::nullopt;
+  if (samples.size() < kFewestSamples) return std::nullopt;
   std::vector<KnownDistance> known;
   for (const InterfaceSample& sample : samples) {
     const V3d p = sample.position - about;

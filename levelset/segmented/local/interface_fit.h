@@ -28,9 +28,12 @@ struct InterfaceSample {
   double distance;
 };
 
+/// Fewest samples of a fit.
+inline constexpr std::size_t kFewestSamples = 5;
+
 /// Fits a polynomial to distances near a point. Samples that disagree with most of the others count
 /// little: they may be closest to the end of the interface, or lie beyond a crease.
-/// @return empty for fewer than five samples, or when most of them disagree
+/// @return empty for fewer than kFewestSamples, or when most of them disagree
 [[nodiscard]] std::optional<InterfaceFit> fitInterface(const Imath::V3d& about,
                                                        std::span<const InterfaceSample> samples);
 

@@ -21,14 +21,14 @@ using Imath::V3d;
 using openvdb::Coord;
 
 constexpr double kLargestDistance = 1.75;  // voxels: of the samples of a fit
-constexpr std::size_t kFewSamples = 5;     // without other ones there would be no fit
 constexpr int kReach = 3;                  // voxels: of the samples of a fit, along each axis
-/// Limits of a first guess, after which the interfaces are fitted again there. Where they meet at
-/// small angles, the mesh of the labels has its junction this far beside it.
+/// Limits of a first guess. The interfaces are then fitted again at the guess. Where interfaces
+/// meet at small angles, the mesh of the labels has its junction up to three voxels beside the
+/// guess.
 constexpr MeetingLimits kGuess = {.farthest = 3, .miss = 0.3};
 constexpr int kRelaxations = 5;
 constexpr double kFar = 0.5;     // voxels: move of a vertex beside which curves may be folded
-constexpr int kUnfoldings = 30;  // relaxations of curves with ends that moved far
+constexpr int kUnfoldings = 60;  // relaxations of curves with ends that moved far
 constexpr int kFoldedEdges = 6;  // of a curve, on each side of a vertex that moved far
 constexpr double kZigzag = 0.1;  // voxels: distance from the middle of both neighbours
 
@@ -69,8 +69,8 @@ std::vector<InterfaceSample> samplesBetween(RegionLabel a, RegionLabel b, const 
   return found;
 }
 
-/// Adds the grid points that have another nearest interface, where one of a narrow interface would
-/// be lost otherwise. Their distances are too large beyond the rim of the interface; fits allow it.
+/// Adds grid points whose nearest interface is another one. A narrow interface has too few of its
+/// own. Beyond its rim their distances are too large; the fit gives these little weight.
 void addFarther(const SegmentedData& data, RegionLabel a, RegionLabel b, const Coord& centre,
                 std::vector<InterfaceSample>& samples) {
   SegmentedReader reader(data);
@@ -91,7 +91,7 @@ std::optional<InterfaceFit> fitBetween(const SegmentedData& data, RegionLabel a,
                                        const V3d& position, const Coord& centre,
                                        const SampleOf& sampleOf) {
   std::vector<InterfaceSample> found = samplesBetween(a, b, centre, sampleOf);
-  if (!found.empty() && found.size() < kFewSamples) addFarther(data, a, b, centre, found);
+  if (!found.empty() && found.size() < kFewestSamples) addFarther(data, a, b, centre, found);
   return fitInterface(position, found);
 }
 
@@ -147,10 +147,12 @@ class JunctionStrip {
     std::iota(all.begin(), all.end(), 0u);
     for (StripVertex& vertex : strip_) vertex.start = mesh_.mesh.positions[vertex.vertex];
     fitInterfaces(subProgress(progress, 0, 0.9));
-    // The points first, then the curves between them, then the interfaces.
     relax(all, Round::First);
-    const std::vector<std::uint32_t> folded = foldedCurves();
-    for (int n = 0; n < kUnfoldings; ++n) relax(folded, Round::Unfold);
+    const std::vector<std::uint32_t> folded = verticesToUnfold();
+    for (int n = 0; n < kUnfoldings; ++n) {
+      relax(folded, Round::Unfold);
+      report(progress, 0.9 + 0.05 * (n + 1) / kUnfoldings);
+    }
     for (int n = 1; n < kRelaxations; ++n) relax(all, Round::Middle);
     relax(all, Round::Last);
     for (int n = 0; n < kRelaxations; ++n) straighten();
@@ -166,7 +168,7 @@ class JunctionStrip {
     V3d start = V3d(0);                          ///< position in the mesh of the labels
     std::vector<RegionLabel> labels = {};        ///< that meet here, ascending
     std::vector<std::uint32_t> neighbours = {};  ///< along the curve, or on the interface
-    std::vector<InterfaceFit> interfaces = {};   ///< empty: the vertex stays
+    std::vector<InterfaceFit> interfaces = {};   ///< empty: none was fitted here
   };
 
   void addLabel(StripVertex& vertex, RegionLabel label) {
@@ -254,7 +256,7 @@ class JunctionStrip {
     const std::optional<V3d> guess = meetingAt(vertex, vertex.interfaces, position, kGuess);
     if (!guess) return;
     std::vector<InterfaceFit> there =
-        interfacesAt(vertex.labels, *guess, FarSamples{data_, SegmentedReader(data_)});
+        interfacesAt(vertex.labels, *guess, DirectSamples{data_, SegmentedReader(data_)});
     if (there.empty() || !meetingPoint(there, *guess)) return;
     position = *guess;
     vertex.interfaces = std::move(there);
@@ -277,19 +279,23 @@ class JunctionStrip {
         if (cross.length2() > along.length2()) along = cross;
       }
     along.normalize();
-    return *meeting - along * along.dot(*meeting - position);
+    *meeting -= along * along.dot(*meeting - position);
+    const bool isOnAll = std::all_of(interfaces.begin(), interfaces.end(), [&](const auto& one) {
+      return std::abs(one.value(*meeting)) <= limits.miss * one.gradient(*meeting).length();
+    });
+    return isOnAll ? meeting : std::nullopt;
   }
 
   /// Point near a position in which regions meet, by interfaces that are fitted there.
-  [[nodiscard]] std::optional<V3d> meetingFittedAt(const StripVertex& vertex,
+  [[nodiscard]] std::optional<V3d> refittedMeeting(const StripVertex& vertex,
                                                    const V3d& position) const {
     const std::vector<InterfaceFit> there =
-        interfacesAt(vertex.labels, position, FarSamples{data_, SegmentedReader(data_)});
+        interfacesAt(vertex.labels, position, DirectSamples{data_, SegmentedReader(data_)});
     return there.empty() ? std::nullopt : meetingAt(vertex, there, position);
   }
 
-  /// Samples anywhere, read one by one.
-  struct FarSamples {
+  /// Samples that are read one by one.
+  struct DirectSamples {
     const SegmentedData& data;
     mutable SegmentedReader reader;
     [[nodiscard]] std::optional<InterfaceFit> fit(RegionLabel a, RegionLabel b,
@@ -318,7 +324,7 @@ class JunctionStrip {
   }
 
   /// Vertices of junctions near those that moved far. A curve may pass its end and return there.
-  [[nodiscard]] std::vector<std::uint32_t> foldedCurves() const {
+  [[nodiscard]] std::vector<std::uint32_t> verticesToUnfold() const {
     std::vector<std::uint32_t> found;
     std::vector<char> isFound(strip_.size(), 0);
     const auto add = [&](std::uint32_t slot) {
@@ -337,11 +343,13 @@ class JunctionStrip {
     return found;
   }
 
+  /// The first round moves vertices to where interfaces meet, the others also between their
+  /// neighbours. The last one fits again where the interfaces of a vertex do not meet.
   enum class Round { First, Unfold, Middle, Last };
-  void relax(const std::vector<std::uint32_t>& which, Round round) {
-    std::vector<V3d> moved(which.size());
-    tbb::parallel_for(std::size_t{0}, which.size(), [&](std::size_t n) {
-      const StripVertex& vertex = strip_[which[n]];
+  void relax(const std::vector<std::uint32_t>& slots, Round round) {
+    std::vector<V3d> moved(slots.size());
+    tbb::parallel_for(std::size_t{0}, slots.size(), [&](std::size_t n) {
+      const StripVertex& vertex = strip_[slots[n]];
       const V3d& old = mesh_.mesh.positions[vertex.vertex];
       V3d target = old;
       // Ends of curves, and points where curves meet, have no direction to move in.
@@ -355,13 +363,13 @@ class JunctionStrip {
       // Beside creases, where no interface fits, the vertex only follows its neighbours.
       std::optional<V3d> meeting;
       if (!vertex.interfaces.empty()) meeting = meetingAt(vertex, vertex.interfaces, target);
-      if (!meeting && (round == Round::Unfold || round == Round::Last) && vertex.isJunction)
-        meeting = meetingFittedAt(vertex, target);
-      // A corner of a curve would be cut off if it followed its neighbours often.
+      if (!meeting && round == Round::Last && (vertex.isJunction || !vertex.interfaces.empty()))
+        meeting = refittedMeeting(vertex, target);
+      // Many rounds would cut off corners of curves, so a vertex without a meeting stays.
       moved[n] = meeting.value_or(round == Round::Unfold ? old : target);
     });
-    for (std::size_t n = 0; n < which.size(); ++n)
-      mesh_.mesh.positions[strip_[which[n]].vertex] = moved[n];
+    for (std::size_t n = 0; n < slots.size(); ++n)
+      mesh_.mesh.positions[strip_[slots[n]].vertex] = moved[n];
   }
 
   /// Moves vertices of curves that zigzag towards their neighbours. Smooth curves stay. Fits to

@@ -56,7 +56,31 @@ AtlasTruth truthOf(const PowerAtlas& atlas) {
 struct AtlasErrors {
   double junction = 0, meanJunction = 0, point = 0;  // voxels
   double length = 0, area = 0, face = 0, volume = 0, cell = 0;
+  double folds = 0;    // vertices at which a junction turns by more than 90°
+  double flipped = 0;  // share of the triangles, against the normals of the closed forms
 };
+
+void countFolds(const PowerAtlas& atlas, const SegmentedMesh& mesh, AtlasErrors& errors) {
+  const std::vector<V3d>& positions = mesh.mesh.positions;
+  std::map<std::uint32_t, std::vector<std::uint32_t>> neighbours;
+  for (const JunctionEdge& edge : mesh.junctions)
+    for (std::size_t end = 0; end < 2; ++end)
+      neighbours[edge.vertices[end]].push_back(edge.vertices[1 - end]);
+  for (const auto& [vertex, list] : neighbours)
+    if (list.size() == 2)
+      errors.folds +=
+          (positions[vertex] - positions[list[0]]).dot(positions[list[1]] - positions[vertex]) < 0;
+  for (std::size_t t = 0; t < mesh.sides.size(); ++t) {
+    const auto& [a, b, c] = mesh.mesh.triangles[t];
+    const RegionLabel front = mesh.sides[t].front, behind = mesh.sides[t].behind;
+    const V3d outwards = front == kVoid
+                             ? positions[a]
+                             : atlas.plane(behind - 1u, front - 1u).normal;  // towards the front
+    errors.flipped +=
+        outwards.dot((positions[b] - positions[a]).cross(positions[c] - positions[a])) < 0;
+  }
+  errors.flipped /= static_cast<double>(mesh.sides.size());
+}
 AtlasErrors atlasErrors(const PowerAtlas& atlas, const AtlasTruth& truth, double voxel) {
   const SegmentSolidsResult result = segmentSolids(atlas.solids(voxel));
   EXPECT_EQ(result.field.labels().size(), PowerAtlas::kCells);
@@ -78,6 +102,7 @@ AtlasErrors atlasErrors(const PowerAtlas& atlas, const AtlasTruth& truth, double
   const SegmentedMesh mesh = segmentedToMesh(result.field);
   EXPECT_EQ(interfaceDefects(mesh), InterfaceDefects());
   AtlasErrors errors;
+  countFolds(atlas, mesh, errors);
   std::map<std::uint32_t, std::set<std::size_t>> labels;
   for (const JunctionEdge& edge : mesh.junctions)
     for (const std::uint32_t v : edge.vertices)
@@ -130,13 +155,15 @@ TEST(SegmentedAtlas, AgreesWithClosedForms) {
   const PowerAtlas atlas;
   const AtlasErrors errors = atlasErrors(atlas, truthOf(atlas), 0.05);
   EXPECT_LT(errors.meanJunction, measured(5.7e-4));
-  EXPECT_LT(errors.junction, measured(0.0352));
+  EXPECT_LT(errors.junction, measured(0.0342));
   EXPECT_LT(errors.point, measured(4.2e-3));
-  EXPECT_LT(errors.length, measured(7.8e-3));
-  EXPECT_LT(errors.area, measured(2.3e-3));
-  EXPECT_LT(errors.face, measured(8.5e-4));
+  EXPECT_LT(errors.length, measured(6.8e-3));
+  EXPECT_LT(errors.area, measured(2.1e-3));
+  EXPECT_LT(errors.face, measured(9.3e-4));
   EXPECT_LT(errors.volume, measured(4.48e-3));
   EXPECT_LT(errors.cell, measured(5.28e-4));
+  EXPECT_LT(errors.folds, measured(3));
+  EXPECT_LT(errors.flipped, measured(7.4e-4));
 }
 
 TEST(SlowSegmentedAtlas, ConvergesToClosedForms) {
@@ -146,10 +173,12 @@ TEST(SlowSegmentedAtlas, ConvergesToClosedForms) {
   for (const double voxel : {0.05, 0.05 / std::numbers::sqrt2, 0.025}) {
     errors.push_back(atlasErrors(atlas, truth, voxel));
     EXPECT_LT(errors.back().meanJunction, measured(5.7e-4));
-    EXPECT_LT(errors.back().junction, measured(0.0352));
+    EXPECT_LT(errors.back().junction, measured(0.0342));
     EXPECT_LT(errors.back().point, measured(0.0185));
-    EXPECT_LT(errors.back().length, measured(0.0329));
-    EXPECT_LT(errors.back().area, measured(3.1e-3));
+    EXPECT_LT(errors.back().length, measured(0.0415));
+    EXPECT_LT(errors.back().area, measured(3.7e-3));
+    EXPECT_LT(errors.back().folds, measured(29));
+    EXPECT_LT(errors.back().flipped, measured(2.6e-3));
   }
   // Junctions are in voxels, so their order in world units is larger by one.
   EXPECT_GT(1 + std::log2(errors[0].meanJunction / errors[2].meanJunction), measuredOrder(3.01));
