@@ -42,7 +42,7 @@ Rational basisByFactorials(const std::array<int, Vertices>& exponents,
 }
 
 template <int Vertices, int Degree>
-void checkForm() {
+void expectForm() {
   SCOPED_TRACE(testing::Message() << Vertices << " vertices, degree " << Degree);
   const auto form = randomForm<Vertices, Degree>(1);
   const auto p = support::randomWeights<Rational, Vertices>(2, 1);
@@ -146,27 +146,27 @@ void checkForm() {
 }
 
 TEST(Bernstein, HoldsOnLines) {
-  checkForm<2, 0>();
-  checkForm<2, 1>();
-  checkForm<2, 2>();
-  checkForm<2, 3>();
-  checkForm<2, 5>();
+  expectForm<2, 0>();
+  expectForm<2, 1>();
+  expectForm<2, 2>();
+  expectForm<2, 3>();
+  expectForm<2, 5>();
 }
 
 TEST(Bernstein, HoldsOnTriangles) {
-  checkForm<3, 0>();
-  checkForm<3, 1>();
-  checkForm<3, 2>();
-  checkForm<3, 3>();
-  checkForm<3, 4>();
+  expectForm<3, 0>();
+  expectForm<3, 1>();
+  expectForm<3, 2>();
+  expectForm<3, 3>();
+  expectForm<3, 4>();
 }
 
 TEST(Bernstein, HoldsOnTetrahedra) {
-  checkForm<4, 0>();
-  checkForm<4, 1>();
-  checkForm<4, 2>();
-  checkForm<4, 3>();
-  checkForm<4, 4>();
+  expectForm<4, 0>();
+  expectForm<4, 1>();
+  expectForm<4, 2>();
+  expectForm<4, 3>();
+  expectForm<4, 4>();
 }
 
 TEST(Bernstein, CountsAndOrdersCoefficients) {

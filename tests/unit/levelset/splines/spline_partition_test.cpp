@@ -87,7 +87,7 @@ TEST(SplinePartition, FillsTheTruncatedOctahedron) {
 /// Points whose barycentric coordinates must all be at least zero in the tetrahedron found. Among
 /// them are points on faces, edges and vertices.
 template <class Partition>
-void checkLocation() {
+void expectLocation() {
   for (int n = 0; n < 3000; ++n) {
     // Multiples of 1/8 often lie on faces and edges; multiples of 1/77 seldom do.
     const int denominator = n % 2 == 0 ? 8 : 77;
@@ -109,11 +109,11 @@ void checkLocation() {
 }
 
 TEST(SplinePartition, LocatesPointsInType6) {
-  checkLocation<Type6Partition>();
+  expectLocation<Type6Partition>();
 }
 
 TEST(SplinePartition, LocatesPointsInBccCells) {
-  checkLocation<BccPartition>();
+  expectLocation<BccPartition>();
 }
 
 TEST(SplinePartition, FindsTheClosestBccSite) {

@@ -50,7 +50,7 @@ auto weightsOf(const PartitionTetrahedron& t) {
 /// Checks a few tetrahedra of a cell.
 /// @param norm  the largest sum of the magnitudes of the weights of a coefficient
 template <class Spline>
-void checkWeights(const Offset& cell, int data, const Rational& norm) {
+void expectWeights(const Offset& cell, int data, const Rational& norm) {
   for (int index = 0; index < Spline::kTetrahedra; index += Spline::kTetrahedra / 24 * 5 + 1) {
     const auto weights = weightsOf<Spline>({cell, index});
     EXPECT_EQ(static_cast<int>(weights.size()), data) << "tetrahedron " << index;
@@ -70,12 +70,12 @@ void checkWeights(const Offset& cell, int data, const Rational& norm) {
 
 TEST(SplineProperties, HaveWeightsThatSumToOneOverTheirStencils) {
   // The coefficient b1100 of the quadratic super spline has the weights −1/64 at four data.
-  checkWeights<QuadraticSuperSpline>({1, -2, 3}, 27, Rational(9) / 8);
-  checkWeights<CubicC1Spline>({1, -2, 3}, 23, 1);
-  checkWeights<BccQuadraticSpline<2>>({1, -1, 3}, 28, Rational(5) / 4);
+  expectWeights<QuadraticSuperSpline>({1, -2, 3}, 27, Rational(9) / 8);
+  expectWeights<CubicC1Spline>({1, -2, 3}, 23, 1);
+  expectWeights<BccQuadraticSpline<2>>({1, -1, 3}, 28, Rational(5) / 4);
   // The factor k − 3 or k − 1 of some weights is zero for k = 3 and k = 1.
-  checkWeights<BccQuadraticSpline<3>>({1, -1, 3}, 24, 1);
-  checkWeights<BccQuadraticSpline<5>>({2, 4, -2}, 28, 1);
+  expectWeights<BccQuadraticSpline<3>>({1, -1, 3}, 24, 1);
+  expectWeights<BccQuadraticSpline<5>>({2, 4, -2}, 28, 1);
 }
 
 TEST(SplineProperties, BoundValuesByTheLargestDatum) {

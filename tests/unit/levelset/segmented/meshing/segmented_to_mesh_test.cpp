@@ -82,7 +82,7 @@ void expectJunctionsOfThreeSectors(double angle) {
   EXPECT_LT(junction[0], measured(0.0090));  // voxels
   EXPECT_LT(junction[1], measured(0.0027));
   EXPECT_LT(junction[2], measured(0.0014));
-  EXPECT_LT(length[2], measured(4.9e-5));
+  EXPECT_LT(length[2], measured(3.9e-5));
   EXPECT_LT(inner[2], measured(5.3e-5));
   EXPECT_LT(volume[2], measured(4.6e-4));
   EXPECT_LT(area[2], measured(7.3e-4));

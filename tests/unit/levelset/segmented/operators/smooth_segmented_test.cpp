@@ -369,7 +369,7 @@ TEST(SlowSmoothSegmented, KeepsTheStandardTripleBubble) {
     EXPECT_LT(e.cap, measured(7.44e-4));
     EXPECT_LT(e.axisAngle, measured(0.146));
   }
-  EXPECT_LT(errors[0].wall, measured(6.9e-3));
+  EXPECT_LT(errors[0].wall, measured(5.6e-3));
   EXPECT_LT(errors[0].rimAngle, measured(1.27));
   EXPECT_LT(errors[2].rimAngle, measured(0.654, 1));
   EXPECT_GT(std::log2(errors[0].wall / errors[2].wall), measuredOrder(2.03));
