@@ -1,0 +1,433 @@
+#include "levelset/molecules/ball_union.h"
+
+#include <fmt/core.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <utility>
+
+#include "levelset/error.h"
+#include "levelset/molecules/ball_arcs.h"
+#include "levelset/progress_gate.h"
+
+namespace levelset {
+
+/// BallCell of the octree. The candidates of a leaf are all balls and arcs that may be the closest
+/// ones to a point of the cell.
+struct BallCell {
+  std::uint32_t child = 0;  ///< index of the first of eight children; 0: a leaf
+  std::uint32_t balls = 0, ballCount = 0, arcs = 0, arcCount = 0;  ///< of a leaf
+  bool isDeep = false;  ///< all points of the cell are deeper than the depth of the union
+};
+
+struct BallOctree {
+  std::vector<BallCell> cells;
+  std::vector<std::uint32_t> balls, arcs;
+
+  [[nodiscard]] std::size_t bytes() const {
+    return sizeof(BallCell) * cells.capacity() +
+           sizeof(std::uint32_t) * (balls.capacity() + arcs.capacity());
+  }
+};
+
+namespace {
+
+using Imath::Box3d;
+using Imath::V3d;
+
+constexpr double kSqrt3 = 1.7320508075688772;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// A cell with fewer candidates is not split.
+constexpr std::size_t kFewBalls = 6, kFewArcs = 6;
+constexpr int kMostLevels = 20;
+// The cells of this level are built as independent tasks.
+constexpr int kTaskLevel = 2;
+
+double depthIn(const Ball& ball, const V3d& point) {
+  return ball.radius - (point - ball.centre).length();
+}
+
+V3d childCentre(const V3d& centre, double half, int child) {
+  return centre +
+         V3d(child & 1 ? half : -half, child & 2 ? half : -half, child & 4 ? half : -half) / 2;
+}
+
+}  // namespace
+
+V3d ExposedArc::closest(const V3d& point) const {
+  const V3d from = point - centre;
+  double x = from.dot(u), y = from.dot(v);
+  const double length = std::sqrt(x * x + y * y);
+  if (length > 0 ? x >= cosHalf * length : true) {
+    if (length > 0) {
+      x /= length;
+      y /= length;
+    } else {  // on the axis all points are equally close
+      x = 1;
+    }
+  } else {
+    x = cosHalf;
+    y = std::copysign(sinHalf, y);
+  }
+  return centre + (u * x + v * y) * radius;
+}
+
+double ExposedArc::distance(const V3d& point) const {
+  const V3d from = point - centre;
+  const double x = from.dot(u), y = from.dot(v), z = from.dot(w);
+  const double length = std::sqrt(x * x + y * y);
+  if (x >= cosHalf * length) return std::sqrt((length - radius) * (length - radius) + z * z);
+  const double dx = x - radius * cosHalf, dy = std::abs(y) - radius * sinHalf;
+  return std::sqrt(dx * dx + dy * dy + z * z);
+}
+
+struct BallUnion::Data {
+  V3d origin{0};
+  std::vector<Ball> balls;  ///< relative to the origin
+  std::vector<char> isHidden;
+  BallLists overlaps;
+  std::vector<ExposedArc> arcs;
+  Box3d bounds;  ///< relative to the origin
+  double depth = 0;
+  V3d centre{0};  ///< of the octree
+  double half = 0;
+  double leaf = 0;  ///< edge of the smallest cells
+  BallOctree tree;
+
+  void build(std::size_t maxBytes, const Progress& progress);
+  /// Builds the cells below a cell.
+  void descend(BallOctree& out, std::uint32_t cell, const V3d& at, double cellHalf, int level,
+               const std::vector<std::uint32_t>& ballsOf,
+               const std::vector<std::uint32_t>& arcsOf) const;
+
+  /// Closest point among candidates.
+  template <class Balls, class Arcs>
+  [[nodiscard]] Foot closestAmong(const V3d& point, const Balls& ballsOf,
+                                  const Arcs& arcsOf) const {
+    Foot foot;
+    double most = -kInfinity;
+    for (const std::uint32_t n : ballsOf) {
+      const double deep = depthIn(balls[n], point);
+      if (deep > most) {
+        most = deep;
+        foot.feature = n;
+      }
+    }
+    const Ball& ball = balls[foot.feature];
+    const V3d from = point - ball.centre;
+    const double length = from.length();
+    foot.point =
+        ball.centre + (length > 0 ? from * (ball.radius / length) : V3d(0, 0, ball.radius));
+    foot.distance = -most;
+    foot.isExact = true;
+    if (most <= 0 || !isCovered(balls, overlaps, foot.feature, foot.point)) return foot;
+    double least = kInfinity;
+    for (const std::uint32_t n : arcsOf) {
+      const double distance = arcs[n].distance(point);
+      if (distance < least) {
+        least = distance;
+        foot.feature = n;
+      }
+    }
+    foot.isOnArc = true;
+    foot.isExact = least <= depth;
+    foot.distance = foot.isExact ? -least : -std::max(depth, most);
+    if (foot.isExact) foot.point = arcs[foot.feature].closest(point);
+    return foot;
+  }
+};
+
+namespace {
+
+/// Range of indices.
+struct Range {
+  const std::uint32_t *first, *last;
+  [[nodiscard]] const std::uint32_t* begin() const { return first; }
+  [[nodiscard]] const std::uint32_t* end() const { return last; }
+};
+
+}  // namespace
+
+void BallUnion::Data::build(std::size_t maxBytes, const Progress& progress) {
+  const V3d size = bounds.size();
+  std::vector<double> radii;
+  for (std::size_t n = 0; n < balls.size(); ++n)
+    if (!isHidden[n]) radii.push_back(balls[n].radius);
+  std::nth_element(radii.begin(), radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2),
+                   radii.end());
+  leaf = 0.35 * radii[radii.size() / 2];
+  centre = bounds.center();
+  half = std::max({size.x, size.y, size.z}) / 2 + depth;
+  std::vector<std::uint32_t> allBalls, allArcs(arcs.size());
+  for (std::uint32_t n = 0; n < balls.size(); ++n)
+    if (!isHidden[n]) allBalls.push_back(n);
+  for (std::uint32_t n = 0; n < arcs.size(); ++n) allArcs[n] = n;
+
+  // The cells of two levels are split one after the other, and those below them in parallel.
+  struct Task {
+    std::uint32_t cell;
+    V3d at;
+    double half;
+    int level;
+    std::vector<std::uint32_t> balls, arcs;
+    BallOctree tree;
+  };
+  std::vector<Task> open, tasks;
+  tree.cells.resize(1);
+  open.push_back({0, centre, half, 0, std::move(allBalls), std::move(allArcs), {}});
+  while (!open.empty()) {
+    Task task = std::move(open.back());
+    open.pop_back();
+    if (task.level == kTaskLevel) {
+      tasks.push_back(std::move(task));
+      continue;
+    }
+    const auto child = static_cast<std::uint32_t>(tree.cells.size());
+    tree.cells[task.cell].child = child;
+    tree.cells.resize(tree.cells.size() + 8);
+    for (int n = 0; n < 8; ++n)
+      open.push_back({child + static_cast<std::uint32_t>(n),
+                      childCentre(task.at, task.half, n),
+                      task.half / 2,
+                      task.level + 1,
+                      task.balls,
+                      task.arcs,
+                      {}});
+  }
+  ProgressGate gate(progress, tasks.size());
+  tbb::parallel_for(std::size_t{0}, tasks.size(), [&](std::size_t n) {
+    Task& task = tasks[n];
+    task.tree.cells.resize(1);
+    descend(task.tree, 0, task.at, task.half, task.level, task.balls, task.arcs);
+    requireMemory(2.0 * static_cast<double>(task.tree.bytes()), maxBytes);
+    gate.advance(1);
+  });
+  double bytes = 0;
+  for (const Task& task : tasks) bytes += 2.0 * static_cast<double>(task.tree.bytes());
+  requireMemory(bytes, maxBytes);
+  for (Task& task : tasks) {
+    // BallCell 0 of the task is the cell in the tree. Its other cells follow at the end.
+    const auto cellsBefore = static_cast<std::uint32_t>(tree.cells.size()) - 1;
+    const auto ballsBefore = static_cast<std::uint32_t>(tree.balls.size()),
+               arcsBefore = static_cast<std::uint32_t>(tree.arcs.size());
+    for (std::size_t n = 0; n < task.tree.cells.size(); ++n) {
+      BallCell cell = task.tree.cells[n];
+      if (cell.child) cell.child += cellsBefore;
+      cell.balls += ballsBefore;
+      cell.arcs += arcsBefore;
+      if (n == 0)
+        tree.cells[task.cell] = cell;
+      else
+        tree.cells.push_back(cell);
+    }
+    tree.balls.insert(tree.balls.end(), task.tree.balls.begin(), task.tree.balls.end());
+    tree.arcs.insert(tree.arcs.end(), task.tree.arcs.begin(), task.tree.arcs.end());
+    task.tree = {};
+  }
+}
+
+void BallUnion::Data::descend(BallOctree& out, std::uint32_t cell, const V3d& at, double cellHalf,
+                              int level, const std::vector<std::uint32_t>& ballsOf,
+                              const std::vector<std::uint32_t>& arcsOf) const {
+  // Distances change by at most `reach` between the centre and a point of the cell.
+  const double reach = cellHalf * kSqrt3 * (1 + 1e-12) + 1e-12 * half;
+  const Foot foot = closestAmong(at, ballsOf, arcsOf);
+  double most = -kInfinity;
+  for (const std::uint32_t n : ballsOf) most = std::max(most, depthIn(balls[n], at));
+  std::vector<std::uint32_t> nearBalls, nearArcs;
+  const bool isDeep = foot.distance < 0 && (!foot.isExact || -foot.distance - reach > depth) &&
+                      most + reach > 0 && -foot.distance - reach > depth;
+  if (!isDeep) {
+    for (const std::uint32_t n : ballsOf)
+      if (depthIn(balls[n], at) >= most - 2 * reach) nearBalls.push_back(n);
+    if (most + reach > 0) {
+      const double boundary = foot.isExact ? std::abs(foot.distance) : depth + 2 * reach;
+      const double limit = std::min(depth, boundary + reach) + reach;
+      for (const std::uint32_t n : arcsOf)
+        if (arcs[n].distance(at) <= limit) nearArcs.push_back(n);
+    }
+  }
+  const bool isFine = 2 * cellHalf <= leaf || level >= kMostLevels ||
+                      (nearBalls.size() <= kFewBalls && nearArcs.size() <= kFewArcs) ||
+                      (most + reach < -depth && 2 * cellHalf <= 8 * leaf);
+  if (isDeep || isFine) {
+    BallCell& leafCell = out.cells[cell];
+    leafCell.isDeep = isDeep;
+    leafCell.balls = static_cast<std::uint32_t>(out.balls.size());
+    leafCell.ballCount = static_cast<std::uint32_t>(nearBalls.size());
+    leafCell.arcs = static_cast<std::uint32_t>(out.arcs.size());
+    leafCell.arcCount = static_cast<std::uint32_t>(nearArcs.size());
+    out.balls.insert(out.balls.end(), nearBalls.begin(), nearBalls.end());
+    out.arcs.insert(out.arcs.end(), nearArcs.begin(), nearArcs.end());
+    return;
+  }
+  const auto child = static_cast<std::uint32_t>(out.cells.size());
+  out.cells[cell].child = child;
+  out.cells.resize(out.cells.size() + 8);
+  for (int n = 0; n < 8; ++n)
+    descend(out, child + static_cast<std::uint32_t>(n), childCentre(at, cellHalf, n), cellHalf / 2,
+            level + 1, nearBalls, nearArcs);
+}
+
+BallUnion::BallUnion(std::vector<Ball> balls, double depth, std::size_t maxBytes,
+                     const Progress& progress) {
+  if (balls.empty()) throw InvalidInput("there is no ball; give at least one");
+  if (balls.size() >= (std::size_t{1} << 31)) throw InvalidInput("there are 2^31 balls or more");
+  auto data = std::make_shared<Data>();
+  Box3d bounds;
+  for (std::size_t n = 0; n < balls.size(); ++n) {
+    const Ball& ball = balls[n];
+    const V3d& c = ball.centre;
+    if (!std::isfinite(c.x) || !std::isfinite(c.y) || !std::isfinite(c.z) || !(ball.radius > 0) ||
+        !std::isfinite(ball.radius))
+      throw InvalidInput(fmt::format(
+          "ball {} has the centre {},{},{} and the radius {}; give finite numbers and a "
+          "positive radius",
+          n, c.x, c.y, c.z, ball.radius));
+    bounds.extendBy(c - V3d(ball.radius));
+    bounds.extendBy(c + V3d(ball.radius));
+  }
+  // Far from the origin, differences of coordinates keep their precision.
+  data->origin = bounds.center();
+  data->bounds = Box3d(bounds.min - data->origin, bounds.max - data->origin);
+  for (Ball& ball : balls) ball.centre -= data->origin;
+  data->balls = std::move(balls);
+  data->depth = depth;
+  report(progress, 0);
+  data->overlaps = overlapsOf(data->balls, data->isHidden, maxBytes);
+  report(progress, 0.1);
+  data->arcs = exposedArcs(data->balls, data->overlaps, maxBytes, subProgress(progress, 0.1, 0.5));
+  data->build(maxBytes, subProgress(progress, 0.5, 1));
+  data_ = std::move(data);
+}
+
+BallUnion::Foot BallUnion::closest(const V3d& point) const {
+  const Data& data = *data_;
+  const V3d from = point - data.origin;
+  V3d at = data.centre;
+  double half = data.half;
+  Foot foot;
+  const V3d away = from - at;
+  if (std::max({std::abs(away.x), std::abs(away.y), std::abs(away.z)}) > half) {
+    // Outside the octree, and so outside the union.
+    double most = -kInfinity;
+    for (std::uint32_t n = 0; n < data.balls.size(); ++n) {
+      const double deep = depthIn(data.balls[n], from);
+      if (deep > most) {
+        most = deep;
+        foot.feature = n;
+      }
+    }
+    const Ball& ball = data.balls[foot.feature];
+    foot.distance = -most;
+    foot.isExact = true;
+    foot.point = ball.centre + (from - ball.centre).normalized() * ball.radius;
+  } else {
+    const BallCell* cell = data.tree.cells.data();
+    while (cell->child) {
+      const int n = (from.x > at.x ? 1 : 0) | (from.y > at.y ? 2 : 0) | (from.z > at.z ? 4 : 0);
+      at = childCentre(at, half, n);
+      half /= 2;
+      cell = &data.tree.cells[cell->child + static_cast<std::uint32_t>(n)];
+    }
+    if (cell->isDeep) {
+      foot.distance = -data.depth;
+      return foot;
+    }
+    const std::uint32_t *balls = data.tree.balls.data() + cell->balls,
+                        *arcs = data.tree.arcs.data() + cell->arcs;
+    foot = data.closestAmong(from, Range{balls, balls + cell->ballCount},
+                             Range{arcs, arcs + cell->arcCount});
+  }
+  foot.point += data.origin;
+  return foot;
+}
+
+double BallUnion::distance(const V3d& point) const {
+  return closest(point).distance;
+}
+
+bool BallUnion::footOn(const Foot& feature, const V3d& point, Foot& foot) const {
+  const Data& data = *data_;
+  const V3d at = point - data.origin;
+  foot = feature;
+  foot.isExact = true;
+  if (feature.isOnArc) {
+    const ExposedArc& arc = data.arcs[feature.feature];
+    foot.point = arc.closest(at) + data.origin;
+    foot.distance = -arc.distance(at);
+    return true;
+  }
+  const Ball& ball = data.balls[feature.feature];
+  const V3d from = at - ball.centre;
+  const double length = from.length();
+  if (!(length > 0)) return false;
+  const V3d on = ball.centre + from * (ball.radius / length);
+  foot.point = on + data.origin;
+  foot.distance = length - ball.radius;
+  return !isCovered(data.balls, data.overlaps, feature.feature, on);
+}
+
+const V3d& BallUnion::origin() const {
+  return data_->origin;
+}
+Ball BallUnion::ball(std::size_t index) const {
+  const Ball& ball = data_->balls[index];
+  return {ball.centre + data_->origin, ball.radius};
+}
+const std::vector<ExposedArc>& BallUnion::arcs() const {
+  return data_->arcs;
+}
+Box3d BallUnion::bounds() const {
+  return {data_->bounds.min + data_->origin, data_->bounds.max + data_->origin};
+}
+
+namespace {
+
+/// The exposed parts of all balls.
+std::vector<ExposedPart> exposedParts(const std::vector<Ball>& balls,
+                                      const std::vector<char>& isHidden, const BallLists& overlaps,
+                                      const std::vector<ExposedArc>& arcs) {
+  std::vector<std::vector<const ExposedArc*>> arcsOf(balls.size());
+  for (const ExposedArc& arc : arcs) {
+    arcsOf[arc.first].push_back(&arc);
+    arcsOf[arc.second].push_back(&arc);
+  }
+  std::vector<ExposedPart> parts(balls.size());
+  tbb::parallel_for(std::size_t{0}, balls.size(), [&](std::size_t n) {
+    if (!isHidden[n])
+      parts[n] = exposedPart(balls, overlaps, static_cast<std::uint32_t>(n), arcsOf[n]);
+  });
+  return parts;
+}
+
+}  // namespace
+
+std::vector<double> BallUnion::exposedAreas() const {
+  std::vector<double> areas;
+  for (const ExposedPart& part :
+       exposedParts(data_->balls, data_->isHidden, data_->overlaps, data_->arcs))
+    areas.push_back(part.area);
+  return areas;
+}
+
+double BallUnion::volume() const {
+  const std::vector<ExposedPart> parts =
+      exposedParts(data_->balls, data_->isHidden, data_->overlaps, data_->arcs);
+  double sum = 0;
+  for (std::size_t n = 0; n < parts.size(); ++n)
+    sum += data_->balls[n].radius * parts[n].area + data_->balls[n].centre.dot(parts[n].normal);
+  return sum / 3;
+}
+
+std::size_t BallUnion::bytes() const {
+  return data_->tree.bytes() + sizeof(ExposedArc) * data_->arcs.capacity() +
+         sizeof(Ball) * data_->balls.capacity() +
+         sizeof(std::uint32_t) * data_->overlaps.items.capacity();
+}
+
+}  // namespace levelset

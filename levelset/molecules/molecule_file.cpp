@@ -1,0 +1,189 @@
+#include "levelset/molecules/molecule_file.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <new>
+#include <optional>
+
+#include "levelset/error.h"
+#include "levelset/files/byte_io.h"
+#include "levelset/mesh_files/mesh_parts.h"
+#include "levelset/molecules/molecule_builder.h"
+
+namespace levelset {
+namespace molecules {
+namespace {
+
+constexpr double kLargestCoordinate = 1e8;
+constexpr std::array<std::string_view, 6> kWater = {"HOH", "WAT", "DOD", "H2O", "SOL", "TIP3"};
+
+bool isWater(std::string_view residue) {
+  return std::find(kWater.begin(), kWater.end(), residue) != kWater.end();
+}
+
+}  // namespace
+
+std::string_view trimmed(std::string_view text) {
+  const auto isBlank = [](char c) { return static_cast<unsigned char>(c) <= ' '; };
+  while (!text.empty() && isBlank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && isBlank(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+MoleculeBuilder::MoleculeBuilder(std::string file, const ReadMoleculeOptions& options)
+    : file_(std::move(file)), options_(options), model_(options.model) {}
+
+bool MoleculeBuilder::beginModel(int number) {
+  if (model_ == 0) model_ = number;
+  hasModel_ = hasModel_ || number == model_;
+  return number == model_;
+}
+
+void MoleculeBuilder::fail(std::size_t line, const std::string& what) const {
+  failAt(file_, {"line", line}, what + "; repair the line or download the file again");
+}
+
+double MoleculeBuilder::number(std::string_view text, const char* what, std::size_t line) const {
+  text = trimmed(text);
+  const char* begin = text.data();
+  const char* end = begin + text.size();
+  if (begin != end && *begin == '+') ++begin;
+  double value = 0;
+  const auto [next, error] = std::from_chars(begin, end, value);
+  if (error != std::errc() || next != end || !(std::abs(value) <= kLargestCoordinate))
+    fail(line, fmt::format("'{}' is no {}", text, what));
+  return value;
+}
+
+int MoleculeBuilder::integer(std::string_view text, const char* what, std::size_t line) const {
+  text = trimmed(text);
+  int value = 0;
+  const auto [next, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || next != text.data() + text.size())
+    fail(line, fmt::format("'{}' is no {}", text, what));
+  return value;
+}
+
+void MoleculeBuilder::add(const AtomRecord& record, std::size_t line) {
+  if (!options_.solvent && isWater(record.residue)) {
+    ++water_;
+    return;
+  }
+  Atom atom;
+  atom.element = static_cast<std::uint8_t>(atomicNumber(record.element));
+  if (!options_.hydrogens && atom.element == 1) {
+    ++hydrogens_;
+    return;
+  }
+  const auto chain = chains_.try_emplace(std::string(record.chain),
+                                         static_cast<std::uint32_t>(molecule_.chains.size()));
+  if (chain.second) molecule_.chains.emplace_back(record.chain);
+  const std::string key = fmt::format("{}\n{}\n{}\n{}", chain.first->second, record.number,
+                                      record.insertion, record.residue);
+  const auto residue =
+      residues_.try_emplace(key, static_cast<std::uint32_t>(molecule_.residues.size()));
+  if (residue.second)
+    molecule_.residues.push_back({std::string(record.residue), record.number,
+                                  std::string(record.insertion), chain.first->second});
+  atom.residue = residue.first->second;
+  atom.name = record.name;
+  atom.position = record.position;
+  atom.occupancy = static_cast<float>(record.occupancy);
+  atom.bFactor = static_cast<float>(record.bFactor);
+  atom.isHetero = record.isHetero;
+  if (!record.alternate.empty()) {
+    const auto known = alternates_.try_emplace(fmt::format("{}\n{}", atom.residue, atom.name),
+                                               molecule_.atoms.size());
+    if (!known.second) {
+      ++dropped_;
+      Atom& other = molecule_.atoms[known.first->second];
+      if (atom.occupancy > other.occupancy) other = atom;
+      return;
+    }
+  }
+  if (atom.element == 0) ++unknown_;
+  if (molecule_.atoms.size() >= (std::size_t{1} << 31))
+    fail(line, "the file has more than 2^31 atoms");
+  if (molecule_.atoms.size() == molecule_.atoms.capacity())
+    requireMemory(3.0 * static_cast<double>(molecule_.bytes()), options_.maxMemory);
+  molecule_.atoms.push_back(std::move(atom));
+}
+
+Molecule MoleculeBuilder::finish() {
+  if (options_.model != 0 && !hasModel_)
+    failFile(file_, fmt::format("has no model {}; choose one of its models", options_.model));
+  if (molecule_.atoms.empty()) {
+    failFile(file_, water_ + hydrogens_ > 0
+                        ? "has no atoms but water and hydrogen that were left out; keep them"
+                        : "has no atoms; check that it is a molecule");
+  }
+  if (options_.notes) {
+    const auto note = [&](std::size_t count, const char* what) {
+      if (count > 0) options_.notes->push_back(fmt::format(fmt::runtime(what), count));
+    };
+    note(water_, "{} atoms of water were left out");
+    note(hydrogens_, "{} hydrogen atoms were left out");
+    note(dropped_, "{} alternate locations of atoms were left out");
+    note(unknown_, "{} atoms have no known element and count as carbon");
+  }
+  return std::move(molecule_);
+}
+
+}  // namespace molecules
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct MoleculeFormat {
+  const char* extension;
+  void (*read)(std::string_view, molecules::MoleculeBuilder&);
+};
+constexpr MoleculeFormat kMoleculeFormats[] = {{"pdb", molecules::readPdb},
+                                               {"ent", molecules::readPdb},
+                                               {"cif", molecules::readCif},
+                                               {"mmcif", molecules::readCif}};
+
+const MoleculeFormat* findMoleculeFormat(const fs::path& nameOrFormat) {
+  std::string text = nameOrFormat.filename().string();
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c | 0x20);
+  if (text.ends_with(".gz")) text.resize(text.size() - 3);
+  const std::string extension = text.substr(text.rfind('.') + 1);
+  for (const MoleculeFormat& format : kMoleculeFormats)
+    if (extension == format.extension) return &format;
+  return nullptr;
+}
+
+}  // namespace
+
+Molecule readMolecule(const fs::path& path, const ReadMoleculeOptions& options) {
+  const fs::path name = options.format.empty() ? path : fs::path(options.format);
+  const MoleculeFormat* format = findMoleculeFormat(name);
+  if (!format)
+    throw UsageError(
+        fmt::format("'{}' names no format of molecules; use pdb or cif, with .gz "
+                    "appended if compressed",
+                    name.string()));
+  report(options.progress, 0);
+  try {
+    const Bytes bytes = readBytes(path, options.maxMemory);
+    molecules::MoleculeBuilder builder(inputName(path), options);
+    format->read(bytes.view(), builder);
+    Molecule molecule = builder.finish();
+    report(options.progress, 1);
+    return molecule;
+  } catch (const std::bad_alloc&) {
+    throw ResourceLimit(fmt::format("{} does not fit into memory; free memory", inputName(path)));
+  }
+}
+
+bool holdsMolecule(const fs::path& nameOrFormat) {
+  return findMoleculeFormat(nameOrFormat);
+}
+
+}  // namespace levelset

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "levelset/molecules/molecule.h"
+#include "levelset/narrow_band.h"
+#include "levelset/progress.h"
+
+/// Solids of molecules, with exact distances to their surfaces.
+namespace levelset {
+
+enum class MoleculeSurface {
+  VanDerWaals,  ///< union of the balls of the atoms
+  Accessible,   ///< the same with radii larger by that of the probe: where its centre cannot be
+  Excluded      ///< all that the ball of the probe cannot reach [Connolly83]
+};
+
+struct MoleculeSurfaceOptions {
+  MoleculeSurface kind = MoleculeSurface::Excluded;
+  double probe = 1.4;    ///< radius of the probe, Å, positive; van der Waals surfaces ignore it
+  double halfWidth = 3;  ///< half width of the band, voxels, at least 1
+  std::size_t maxMemory = kNoMemoryLimit;
+  Progress progress = {};
+};
+
+struct MoleculeSurfaceResult {
+  NarrowBand band;
+  /// Exact area of the sphere of each atom outside all other ones, Å²: of the accessible surface,
+  /// or of the van der Waals surface if that was asked for.
+  std::vector<double> areas;
+  /// Exact volume of the union of those spheres' balls, Å³.
+  double volume = 0;
+};
+
+/// Makes the solid of a molecule. Radii are vanDerWaalsRadius().
+/// @param voxelSize  Å; grid points lie at its integer multiples
+/// @throws UsageError for options out of range
+/// @throws InvalidInput for a molecule without atoms, or when the voxel is larger than it
+/// @throws ResourceLimit, Cancelled
+[[nodiscard]] MoleculeSurfaceResult moleculeSurface(const Molecule& molecule, double voxelSize,
+                                                    const MoleculeSurfaceOptions& options = {});
+
+/// Sums of the areas of atoms over their residues. @param areas  one for each atom
+[[nodiscard]] std::vector<double> residueAreas(const Molecule& molecule,
+                                               const std::vector<double>& areas);
+
+}  // namespace levelset

@@ -1,0 +1,96 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cctype>
+
+#include "levelset/molecules/molecule_builder.h"
+
+namespace levelset::molecules {
+namespace {
+
+/// Columns of a line, numbered from 1 as the format does; shorter lines end with blanks.
+std::string_view columns(std::string_view line, std::size_t first, std::size_t last) {
+  if (line.size() < first) return {};
+  return line.substr(first - 1, last - first + 1);
+}
+
+/// Element of an atom without one in its columns. The name begins at column 14 for symbols of one
+/// letter, and at column 13 for those of two. @param name  columns 13 to 16
+std::string_view elementOfName(std::string_view name) {
+  const auto isLetter = [&](std::size_t n) {
+    return n < name.size() && std::isalpha(static_cast<unsigned char>(name[n]));
+  };
+  // Names of hydrogen atoms with four letters begin at column 13.
+  if (isLetter(0) && name[0] == 'H' && trimmed(name).size() == 4) return name.substr(0, 1);
+  if (isLetter(0) && isLetter(1) && atomicNumber(name.substr(0, 2))) return name.substr(0, 2);
+  for (std::size_t n = 0; n < name.size(); ++n)
+    if (isLetter(n)) return name.substr(n, 1);
+  return {};
+}
+
+bool isBlank(std::string_view text) {
+  return trimmed(text).empty();
+}
+
+}  // namespace
+
+void readPdb(std::string_view text, MoleculeBuilder& builder) {
+  std::size_t number = 0;
+  bool isWanted = true, isInModel = false, hasAtom = false;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    std::string_view line = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    ++number;
+    if (line.find('\0') != std::string_view::npos)
+      builder.fail(number, "the line has a byte 0, so this is no text file");
+    const std::string_view record = trimmed(columns(line, 1, 6));
+    if (record == "MODEL") {
+      isWanted =
+          builder.beginModel(builder.integer(columns(line, 7, 20), "number of a model", number));
+      isInModel = true;
+      continue;
+    }
+    if (record == "ENDMDL") {
+      isWanted = false;
+      continue;
+    }
+    if (record == "END") break;
+    if (record != "ATOM" && record != "HETATM") continue;
+    if (!isInModel && !hasAtom) isWanted = builder.beginModel(1);
+    hasAtom = true;
+    if (!isWanted) continue;
+    if (line.size() < 54)
+      builder.fail(
+          number,
+          fmt::format("the atom has {} columns, and its position ends at column 54", line.size()));
+    AtomRecord atom;
+    atom.isHetero = record == "HETATM";
+    atom.name = trimmed(columns(line, 13, 16));
+    atom.alternate = trimmed(columns(line, 17, 17));
+    atom.residue = trimmed(columns(line, 18, 20));
+    // Some programs write residue names of four letters.
+    if (!isBlank(columns(line, 21, 21))) atom.residue = trimmed(columns(line, 18, 21));
+    atom.chain = trimmed(columns(line, 22, 22));
+    atom.number = isBlank(columns(line, 23, 26))
+                      ? 0
+                      : builder.integer(columns(line, 23, 26), "number of a residue", number);
+    atom.insertion = trimmed(columns(line, 27, 27));
+    atom.position = {
+        builder.number(columns(line, 31, 38), "coordinate (columns 31 to 38)", number),
+        builder.number(columns(line, 39, 46), "coordinate (columns 39 to 46)", number),
+        builder.number(columns(line, 47, 54), "coordinate (columns 47 to 54)", number)};
+    if (!isBlank(columns(line, 55, 60)))
+      atom.occupancy =
+          builder.number(columns(line, 55, 60), "occupancy (columns 55 to 60)", number);
+    if (!isBlank(columns(line, 61, 66)))
+      atom.bFactor =
+          builder.number(columns(line, 61, 66), "temperature factor (columns 61 to 66)", number);
+    atom.element = trimmed(columns(line, 77, 78));
+    if (!atomicNumber(atom.element)) atom.element = elementOfName(columns(line, 13, 16));
+    builder.add(atom, number);
+  }
+}
+
+}  // namespace levelset::molecules

@@ -1,0 +1,177 @@
+#include "levelset/molecules/molecule_file.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <random>
+#include <string>
+
+#include "levelset/error.h"
+#include "tests/support/files.h"
+
+namespace molecule_file_test {
+
+using Imath::V3d;
+using levelset::InvalidInput;
+using levelset::Molecule;
+using levelset::readMolecule;
+using levelset::ReadMoleculeOptions;
+using support::refusal;
+using support::TemporaryFolder;
+
+constexpr const char* kPdb =
+    "HEADER    TEST\n"
+    "ATOM      1  N   ALA A   1      11.104   6.134  -6.504  1.00 10.00           N  \n"
+    "ATOM      2  CA AALA A   1      11.639   6.071  -5.147  0.40 11.50           C  \n"
+    "ATOM      3  CA BALA A   1      11.700   6.100  -5.200  0.60 12.50           C  \n"
+    "ATOM      4  HB1 ALA A   1      12.000   7.000  -5.000  1.00 10.00\n"
+    "ATOM      5  N   GLY A   2A     13.559   6.000  -4.000\r\n"
+    "TER\n"
+    "HETATM    6 CA    CA B 101       1.000   2.000   3.000  1.00 20.00          CA2+\n"
+    "HETATM    7  O   HOH B 201       4.000   5.000   6.000  1.00 30.00           O  \n"
+    "END\n"
+    "ATOM      8  N   ALA A   9      broken\n";
+
+constexpr const char* kCif =
+    "data_TEST\n"
+    "# a comment with 'a quote\n"
+    "_entry.id TEST\n"
+    "loop_\n_entity.id\n_entity.details\n1 'it''s one' 2\n;text\nloop_\n;\n"
+    "loop_\n"
+    "_atom_site.group_PDB\n_atom_site.type_symbol\n_atom_site.label_atom_id\n"
+    "_atom_site.label_alt_id\n_atom_site.label_comp_id\n_atom_site.label_asym_id\n"
+    "_atom_site.auth_asym_id\n_atom_site.auth_seq_id\n_atom_site.pdbx_PDB_ins_code\n"
+    "_atom_site.Cartn_x\n_atom_site.Cartn_y\n_atom_site.Cartn_z\n_atom_site.occupancy\n"
+    "_atom_site.B_iso_or_equiv\n_atom_site.pdbx_PDB_model_num\n"
+    "ATOM N N . ALA A A 1 ? 11.104 6.134 -6.504 1.0 10.0 1\n"
+    "ATOM C CA A ALA A A 1 ? 11.639 6.071 -5.147 0.4 11.5 1\n"
+    "ATOM C CA B ALA A A 1 ? 11.700 6.100 -5.200 0.6 12.5 1\n"
+    "ATOM H \"HB1\" . ALA A A 1 ? 12.0 7.0 -5.0 1 10 1\n"
+    "ATOM N N . GLY A A 2 A 13.559 6 -4 . . 1\n"
+    "HETATM CA CA . CA B B 101 ? 1 2 3 1 20 1\n"
+    "HETATM O O . HOH C B 201 ? 4 5 6 1 30 1\n"
+    "ATOM N N . ALA A A 1 ? 0 0 0 1 10 2\n"
+    "_other.item 5\n";
+
+/// Reads a text as a file of a format.
+Molecule molecule(const std::string& text, const std::string& extension,
+                  ReadMoleculeOptions options = {}) {
+  const TemporaryFolder folder;
+  const auto path = folder / ("molecule." + extension);
+  std::ofstream(path, std::ios::binary) << text;
+  return readMolecule(path, options);
+}
+
+void expectTheTest(const Molecule& read) {
+  ASSERT_EQ(read.atoms.size(), 5u);
+  ASSERT_EQ(read.residues.size(), 3u);
+  EXPECT_EQ(read.chains, (std::vector<std::string>{"A", "B"}));
+  EXPECT_EQ(read.residueName(0), "A/ALA 1");
+  EXPECT_EQ(read.residueName(1), "A/GLY 2A");
+  EXPECT_EQ(read.residueName(2), "B/CA 101");
+  EXPECT_EQ(read.atoms[0].position, V3d(11.104, 6.134, -6.504));
+  EXPECT_EQ(read.atoms[1].position, V3d(11.7, 6.1, -5.2));  // the larger occupancy
+  EXPECT_EQ(read.atoms[1].bFactor, 12.5f);
+  const int elements[] = {7, 6, 1, 7, 20};
+  for (std::size_t n = 0; n < 5; ++n) EXPECT_EQ(read.atoms[n].element, elements[n]) << n;
+  EXPECT_EQ(read.atoms[4].name, "CA");
+  EXPECT_TRUE(read.atoms[4].isHetero);
+  EXPECT_EQ(read.atoms[3].occupancy, 1.0f);
+}
+
+TEST(MoleculeFile, ReadsPdbAndCif) {
+  std::vector<std::string> notes;
+  expectTheTest(molecule(kPdb, "pdb", {.notes = &notes}));
+  EXPECT_EQ(notes.size(), 2u);
+  expectTheTest(molecule(kCif, "cif"));
+  EXPECT_EQ(molecule(kPdb, "ent", {.solvent = true}).atoms.size(), 6u);
+  EXPECT_EQ(molecule(kCif, "mmcif", {.hydrogens = false}).atoms.size(), 4u);
+}
+
+TEST(MoleculeFile, ReadsOneModel) {
+  EXPECT_EQ(molecule(kCif, "cif", {.model = 2}).atoms.size(), 1u);
+  const std::string models =
+      "MODEL        3\n"
+      "ATOM      1  C   UNK A   1       1.000   0.000   0.000\nENDMDL\n"
+      "MODEL        4\n"
+      "ATOM      1  C   UNK A   1       2.000   0.000   0.000\n"
+      "ATOM      2  C2  UNK A   1       3.000   0.000   0.000\nENDMDL\nEND\n";
+  EXPECT_EQ(molecule(models, "pdb").atoms.size(), 1u);
+  EXPECT_EQ(molecule(models, "pdb", {.model = 4}).atoms.size(), 2u);
+  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)molecule(models, "pdb", {.model = 1}); }),
+              "no model 1");
+}
+
+TEST(MoleculeFile, FindsElementsByTheirColumns) {
+  const auto element = [](const std::string& name) {
+    return int{molecule("ATOM      1 " + name + " UNK A   1       1.000   0.000   0.000\n", "pdb")
+                   .atoms[0]
+                   .element};
+  };
+  EXPECT_EQ(element(" CA "), 6);
+  EXPECT_EQ(element("CA  "), 20);
+  EXPECT_EQ(element("FE  "), 26);
+  EXPECT_EQ(element("1HB "), 1);
+  EXPECT_EQ(element("HE21"), 1);
+  EXPECT_EQ(element(" OXT"), 8);
+}
+
+TEST(MoleculeFile, RefusesDamage) {
+  const auto says = [](const std::string& text, const char* extension = "pdb") {
+    return refusal<InvalidInput>([&] { (void)molecule(text, extension); });
+  };
+  EXPECT_SAYS(says("nothing\n"), "no atoms");
+  EXPECT_SAYS(says("ATOM      1  N   ALA A   1      11.104   6.134"), "column 54");
+  EXPECT_SAYS(says("ATOM      1  N   ALA A   1      11.1o4   6.134  -6.504\n"), "columns 31 to 38");
+  EXPECT_SAYS(says("ATOM      1  N   ALA A   1         nan   6.134  -6.504\n"), "line 1");
+  EXPECT_SAYS(says("\nATOM      1  N   ALA A   x      11.104   6.134  -6.504\n"), "line 2");
+  EXPECT_SAYS(says("HETATM    7  O   HOH B 201       4.000   5.000   6.000\n"), "water");
+  EXPECT_SAYS(says(std::string("ATOM\0x\n", 7)), "byte 0");
+  const std::string cif = kCif;
+  EXPECT_SAYS(says(cif.substr(0, cif.find("GLY")), "cif"), "truncated");
+  EXPECT_SAYS(says("data_x\nloop_\n_atom_site.Cartn_x\n1 2\n", "cif"), "coordinate");
+  EXPECT_SAYS(says("data_x\nloop_\n_entity.id\n'open\n", "cif"), "quote");
+  EXPECT_SAYS(says("data_x\n;open\n", "cif"), "does not end");
+  EXPECT_SAYS(says("data_x\nloop_\n_a.b\n", "cif"), "no atoms");
+  EXPECT_FALSE(refusal<levelset::UsageError>([] { (void)molecule(kPdb, "xyz"); }).empty());
+}
+
+TEST(MoleculeFile, SurvivesThreeHundredMutations) {
+  std::mt19937 random(1);
+  int read = 0, refused = 0;
+  for (int n = 0; n < 300; ++n) {
+    const bool isCif = n % 2;
+    std::string text = isCif ? kCif : kPdb;
+    for (unsigned change = random() % 2 + 1; change > 0; --change) {
+      const std::size_t at = random() % text.size();
+      switch (random() % 4) {
+        case 0:
+          text[at] = static_cast<char>(random());
+          break;
+        case 1:
+          text.erase(at, random() % 20);
+          break;
+        case 2:
+          text.insert(at, text.substr(random() % text.size(), random() % 80));
+          break;
+        default:
+          text.resize(at + 1);
+      }
+    }
+    try {
+      const Molecule result = molecule(text, isCif ? "cif" : "pdb");
+      for (const levelset::Atom& atom : result.atoms) {
+        EXPECT_LT(atom.residue, result.residues.size());
+        EXPECT_LE(std::abs(atom.position.x), 1e8);
+      }
+      ++read;
+    } catch (const levelset::Error&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(read, 50);
+  EXPECT_GT(refused, 50);
+}
+
+}  // namespace molecule_file_test
