@@ -50,6 +50,7 @@ std::vector<Operator> allOperators() {
       normalsOperator(),
       outliersOperator(),
       meshPointsOperator(),
+      moleculeSurfaceOperator(),
       thinOperator(),
       unionWithSegmentations(unionOperator()),
       intersectionOperator(),

@@ -52,6 +52,8 @@ const char* className(Kind kind) {
       return "AdaptiveField";
     case Kind::Segmentation:
       return "Segmentation";
+    case Kind::Molecule:
+      return "Molecule";
   }
   return "";
 }

@@ -45,6 +45,7 @@ namespace pipeline {
 [[nodiscard]] Operator normalsOperator();
 [[nodiscard]] Operator outliersOperator();
 [[nodiscard]] Operator meshPointsOperator();
+[[nodiscard]] Operator moleculeSurfaceOperator();
 [[nodiscard]] Operator thinOperator();
 [[nodiscard]] Operator conversionOperator();
 [[nodiscard]] Operator transformOperator();

@@ -10,6 +10,7 @@
 #include "levelset/file_target.h"
 #include "levelset/files/band_file.h"
 #include "levelset/mesh_files/mesh_file.h"
+#include "levelset/molecules/molecule_file.h"
 #include "levelset/point_files/point_file.h"
 #include "levelset/segmented/files/segmented_mesh_file.h"
 #include "levelset/volume_files/volume_file.h"
@@ -44,11 +45,12 @@ Kind fileKind(const Invocation& in) {
   if (mapping::isPatchFormat(name)) return Kind::Patch;
   if (render::isSceneFormat(name)) return Kind::Scene;
   if (isRead && levelset::isVolumeFormat(name)) return Kind::Volume;
+  if (isRead && levelset::holdsMolecule(name)) return Kind::Molecule;
   throw UsageError(
       fmt::format("{}: '{}' is of no known format; use ply, obj, stl, off, xyz, csv or pts (also "
                   ".gz), vdb{}, patch or "
                   "json",
-                  in.op().name, name, isRead ? ", nii, mha, nrrd, mrc, raw" : ", nvdb"));
+                  in.op().name, name, isRead ? ", nii, mha, nrrd, mrc, raw, pdb, cif" : ", nvdb"));
 }
 
 /// Returns the kind of the value that `read` makes. The grid that --grid names may be a field; the
@@ -93,6 +95,15 @@ Value read(Invocation& in) {
     options.notes = &in.notes.notes;
     return Value(levelset::readVolume(file, options));
   }
+  if (fileKind(in) == Kind::Molecule)
+    return Value(
+        levelset::readMolecule(file, {.format = in.text("format"),
+                                      .model = in.given("model") ? in.integerAs<int>("model") : 0,
+                                      .solvent = in.flag("solvent"),
+                                      .hydrogens = !in.flag("no-hydrogens"),
+                                      .maxMemory = in.maxMemory,
+                                      .notes = &in.notes.notes,
+                                      .progress = in.progress}));
   if (fileKind(in) == Kind::Scene) {
     const auto warn = [&](const levelset::BandRepairs& repairs, const auto& source) {
       for (const std::string& told : sentencesOf(repairs, source))
@@ -172,6 +183,10 @@ void validateRead(const Invocation& in) {
     throw UsageError(
         fmt::format("read: --points is for meshes and .vdb files, and this is a {}; leave it out",
                     kindName(kind)));
+  for (const char* name : {"model", "solvent", "no-hydrogens"})
+    if (kind != Kind::Molecule && in.given(name))
+      throw UsageError(fmt::format("read: --{} is for molecules, and this is a {}; leave it out",
+                                   name, kindName(kind)));
   if (!levelset::isBandFormat(formatName(in)) && in.given("grid"))
     throw UsageError(fmt::format(
         "read: --grid picks a grid of a .vdb, and this is a {}; leave it out", kindName(kind)));
@@ -195,6 +210,7 @@ void validateWrite(const Invocation& in) {
         : held == Kind::Volume       ? "put 'isosurface' before it"
         : held == Kind::Adaptive     ? "put 'mesh' or 'to-band' before it"
         : held == Kind::Segmentation ? "write .ply or .obj, or put 'extract LABEL' before it"
+        : held == Kind::Molecule     ? "put 'molecule-surface' before it"
         : held == Kind::Points       ? "write .ply, .obj, .xyz, .csv, .pts or .vdb"
         : kind == Kind::Points       ? "put 'sample' before it, or write .ply"
                                      : "put 'level-set' before it, or write .ply"));
@@ -267,7 +283,8 @@ Operator readOperator() {
       .summary =
           "read a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb), a volume (nii, "
           "hdr, mha, mhd, nrrd, nhdr, mrc, map, raw), points (xyz, csv, pts, ply or obj without "
-          "faces, vdb with a grid of points), patches (patch), a scene (json)",
+          "faces, vdb with a grid of points), patches (patch), a scene (json), a molecule (pdb, "
+          "cif)",
       .details =
           "A .vdb with more than one level set needs --grid. A grid that is not a level set needs "
           "--grid, too; it becomes a field of numbers or of vectors, which may be staggered. "
@@ -280,6 +297,9 @@ Operator readOperator() {
           "points are read. Volumes keep their spacing and orientation; a .raw needs --size and "
           "--type. "
           "The json file of a Bézier volume is a scene, too. "
+          "Of a molecule, the first model is read, without water. Of alternate locations of an "
+          "atom "
+          "the one with the largest occupancy counts. "
           "'-' is standard input and needs --format.",
       .example = "levelsmith read dragon.ply.gz ! info",
       .params = {{.name = "file",
@@ -290,7 +310,7 @@ Operator readOperator() {
                  {.name = "format",
                   .type = ParamType::Text,
                   .doc = "format of the file: ply, obj, stl, off, xyz, csv, pts, vdb, nii, mha, "
-                         "nrrd, mrc, raw, patch or json; default: by its extension"},
+                         "nrrd, mrc, raw, patch, json, pdb or cif; default: by its extension"},
                  {.name = "grid",
                   .type = ParamType::Text,
                   .doc = "name of the grid to read from a .vdb"},
@@ -302,7 +322,15 @@ Operator readOperator() {
                  {.name = "points",
                   .type = ParamType::Flag,
                   .doc = "read the vertices of a mesh, or the grid of points of a .vdb that also "
-                         "has a level set, as a point cloud"}},
+                         "has a level set, as a point cloud"},
+                 {.name = "model",
+                  .type = ParamType::Integer,
+                  .doc = "for molecules: number of the model to read; default: the first one",
+                  .range = Range::Positive},
+                 {.name = "solvent", .type = ParamType::Flag, .doc = "for molecules: keep water"},
+                 {.name = "no-hydrogens",
+                  .type = ParamType::Flag,
+                  .doc = "for molecules: leave hydrogen atoms out"}},
       .resultKind = readKind,
       .run = read,
       .plan = planRead,
@@ -350,7 +378,7 @@ Operator writeOperator() {
                 "points get the name 'points'",
             .fallback = "surface"}},
       .operands = {{Kind::Mesh, Kind::Band, Kind::Field, Kind::Patch, Kind::Scene, Kind::Points,
-                    Kind::Adaptive, Kind::Segmentation}},
+                    Kind::Adaptive, Kind::Segmentation, Kind::Molecule}},
       .flow = Flow::PassesThrough,
       .run = write,
       .cost = costPerVoxel(50, 0, 20),

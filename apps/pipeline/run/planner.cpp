@@ -58,7 +58,8 @@ std::string roiText(const RegionOfInterest& roi, const Plan& plan) {
 /// Estimated bytes of a value within its region of interest; 0 if unknown.
 double bytesOf(const std::optional<Plan>& plan, const RegionOfInterest& roi) {
   if (!plan) return 0;
-  if (plan->kind == Kind::Mesh || plan->kind == Kind::Points) return plan->bytes();
+  if (plan->kind == Kind::Mesh || plan->kind == Kind::Points || plan->kind == Kind::Molecule)
+    return plan->bytes();
   const bool isTold = (plan->kind == Kind::Band && plan->voxelSize > 0) ||
                       plan->kind == Kind::Field || plan->kind == Kind::Volume ||
                       plan->kind == Kind::Adaptive || plan->kind == Kind::Segmentation;

@@ -41,6 +41,8 @@ const char* kindName(Kind kind) {
       return "adaptive field";
     case Kind::Segmentation:
       return "segmentation";
+    case Kind::Molecule:
+      return "molecule";
   }
   return "";
 }
@@ -75,7 +77,7 @@ double Plan::bytes() const {
   if (kind == Kind::Field || kind == Kind::Volume || kind == Kind::Adaptive ||
       kind == Kind::Segmentation)
     return fieldBytes;
-  if (kind == Kind::Points) return points * pointBytes;
+  if (kind == Kind::Points || kind == Kind::Molecule) return points * pointBytes;
   // Three vertex indices for each triangle, and one position for every two triangles.
   if (kind == Kind::Mesh) return (3 * sizeof(std::uint32_t) + sizeof(Imath::V3d) / 2.0) * triangles;
   return levelset::kBytesPerVoxel * activeVoxels();
@@ -111,6 +113,8 @@ Value::Value(levelset::PointCloud cloud)
     : data_(std::make_shared<const levelset::PointCloud>(std::move(cloud))) {}
 Value::Value(levelset::AdaptiveField field) : data_(std::move(field)) {}
 Value::Value(levelset::SegmentedField field) : data_(std::move(field)) {}
+Value::Value(levelset::Molecule molecule)
+    : data_(std::make_shared<const levelset::Molecule>(std::move(molecule))) {}
 Value::Value(Plan plan) : plan_(plan) {}
 
 Kind Value::kind() const {
@@ -133,6 +137,8 @@ Kind Value::kind() const {
       return Kind::Adaptive;
     case 9:
       return Kind::Segmentation;
+    case 10:
+      return Kind::Molecule;
     default:
       return plan_->kind;
   }
@@ -178,6 +184,10 @@ const levelset::AdaptiveField& Value::adaptive() const {
 
 const levelset::SegmentedField& Value::segmentation() const {
   return as<levelset::SegmentedField>(Kind::Segmentation);
+}
+
+const levelset::Molecule& Value::molecule() const {
+  return *as<std::shared_ptr<const levelset::Molecule>>(Kind::Molecule);
 }
 
 const Plan& Value::plan() const {
@@ -227,6 +237,11 @@ const Plan& Value::plan() const {
       plan.area = static_cast<double>(segmentation().activeVoxelCount()) * plan.voxelSize *
                   plan.voxelSize / (2 * plan.halfWidth);
       plan.fieldBytes = static_cast<double>(segmentation().memoryUse());
+      break;
+    case Kind::Molecule:
+      plan.bounds = molecule().bounds();
+      plan.points = static_cast<double>(molecule().atoms.size());
+      plan.pointBytes = sizeof(levelset::Atom);
       break;
     case Kind::Scene:
       plan.bounds = scene().scene.bounds();

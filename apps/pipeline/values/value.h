@@ -13,6 +13,7 @@
 #include "levelset/adaptive/adaptive_field.h"
 #include "levelset/fields/grid.h"
 #include "levelset/mesh.h"
+#include "levelset/molecules/molecule.h"
 #include "levelset/narrow_band.h"
 #include "levelset/operator/plan.h"
 #include "levelset/points/point_cloud.h"
@@ -31,10 +32,11 @@ enum class Kind {
   Field,
   Surface,  ///< a band around an open surface: a base for patches
   Scene,
-  Volume,       ///< numbers on a regular grid, from a scanner or a simulation
-  Points,       ///< points without connectivity, from a scanner or a simulation
-  Adaptive,     ///< a solid as distances on an octree
-  Segmentation  ///< a partition of space into regions with labels
+  Volume,        ///< numbers on a regular grid, from a scanner or a simulation
+  Points,        ///< points without connectivity, from a scanner or a simulation
+  Adaptive,      ///< a solid as distances on an octree
+  Segmentation,  ///< a partition of space into regions with labels
+  Molecule       ///< atoms in residues and chains
 };
 [[nodiscard]] const char* kindName(Kind kind);
 /// Returns the name with its article: "a mesh", "an adaptive field".
@@ -51,8 +53,8 @@ struct Plan {
   /// Memory, bytes; fields, volumes, adaptive fields and segmentations only.
   double fieldBytes = 0;
   double triangles = 0;   ///< number of triangles; meshes only; 0: unknown
-  double points = 0;      ///< number of points of a point cloud; 0: unknown
-  double pointBytes = 0;  ///< memory of a point, bytes; point clouds only
+  double points = 0;      ///< number of points of a point cloud, or atoms of a molecule; 0: unknown
+  double pointBytes = 0;  ///< memory of a point or an atom, bytes
   /// Patches only: size along u, size along v and height, world units. Height 0: the texture that
   /// is mapped will determine it.
   Imath::V3d patchSize = Imath::V3d(0);
@@ -115,6 +117,7 @@ class Value {
   explicit Value(levelset::PointCloud cloud);
   explicit Value(levelset::AdaptiveField field);
   explicit Value(levelset::SegmentedField field);
+  explicit Value(levelset::Molecule molecule);
   explicit Value(Plan plan);
 
   [[nodiscard]] Kind kind() const;
@@ -130,6 +133,7 @@ class Value {
   [[nodiscard]] const levelset::PointCloud& cloud() const;
   [[nodiscard]] const levelset::AdaptiveField& adaptive() const;
   [[nodiscard]] const levelset::SegmentedField& segmentation() const;
+  [[nodiscard]] const levelset::Molecule& molecule() const;
 
   /// Returns the plan of the value: its kind, bounds, area and grid, which estimates need. Computes
   /// it from the value on the first call.
@@ -147,7 +151,7 @@ class Value {
                std::shared_ptr<const PatchValue>, levelset::FieldGrid,
                std::shared_ptr<const render::ViewedScene>, std::shared_ptr<const levelset::Volume>,
                std::shared_ptr<const levelset::PointCloud>, levelset::AdaptiveField,
-               levelset::SegmentedField>
+               levelset::SegmentedField, std::shared_ptr<const levelset::Molecule>>
       data_;
   mutable std::optional<Plan> plan_;
 };

@@ -25,6 +25,7 @@ from ._values import (
     AdaptiveField,
     Field,
     Mesh,
+    Molecule,
     Patch,
     PointCloud,
     Scan,
@@ -50,8 +51,8 @@ _operators.install(globals())
 
 __all__ = [
     "Cancelled", "Error", "FileError", "InputError", "NumericalError", "ResourceError", "UsageError",
-    "AdaptiveField", "Field", "Mesh", "Patch", "PointCloud", "Scan", "Scene", "Segmentation", "Solid", "Surface",
-    "Value", "Volume", "Warning",
+    "AdaptiveField", "Field", "Mesh", "Molecule", "Patch", "PointCloud", "Scan", "Scene", "Segmentation", "Solid",
+    "Surface", "Value", "Volume", "Warning",
     "compute", "graph", "last_report", "map", "set_cache", "set_max_memory", "set_threads",
     "from_array", "from_function",
     *_operators.names,

@@ -432,9 +432,16 @@ class PointCloud(Value):
         return self._known().cloud_array("weights")
 
 
+class Molecule(Value):
+    """Atoms in residues and chains, in ångström."""
+
+    __slots__ = ()
+
+
 classes = {
     c.__name__: c
     for c in (
-        Solid, Surface, Mesh, Patch, Field, Scene, Scan, PointCloud, AdaptiveField, Segmentation
+        Solid, Surface, Mesh, Patch, Field, Scene, Scan, PointCloud, AdaptiveField, Segmentation,
+        Molecule,
     )  # fmt: skip
 }

@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 
+#include <map>
 #include <numbers>
 
 #include <cmath>
@@ -20,6 +21,7 @@
 #include "levelset/inspect/measure.h"
 #include "levelset/inspect/mesh_quality.h"
 #include "levelset/mesh_files/mesh_file.h"
+#include "levelset/molecules/molecule_file.h"
 #include "levelset/point_files/point_file.h"
 #include "levelset/points/processing/point_spacing.h"
 #include "levelset/volume_files/volume_file.h"
@@ -205,16 +207,28 @@ Json countOrNull(std::uint64_t count) {
   return count > 0 ? Json(count) : Json(nullptr);
 }
 
+void addMolecule(Json& json, const levelset::Molecule& molecule) {
+  json["atoms"] = molecule.atoms.size();
+  json["residues"] = molecule.residues.size();
+  json["chains"] = molecule.chains;
+  std::map<int, std::size_t> counts;
+  for (const levelset::Atom& atom : molecule.atoms) ++counts[atom.element];
+  Json& elements = json["elements"] = Json::object();
+  for (const auto& [element, count] : counts)
+    elements[element ? std::string(levelset::elementSymbol(element)) : "unknown"] = count;
+}
+
 void validateInfo(const Invocation& in) {
   if (!in.given("file")) return;
   const std::string name = formatName(in);
   if (levelset::isMeshFormat(name) || levelset::isPointFormat(name)) return;
   if (levelset::isBandFormat(name) && !name.ends_with("nvdb")) return;
   if (levelset::isVolumeFormat(name) && !levelset::isRawFormat(name)) return;
+  if (levelset::holdsMolecule(name)) return;
   throw levelset::UsageError(
       fmt::format("info: '{}' is of no known format; info reads ply, obj, stl, off, xyz, csv, pts "
                   "(also .gz), vdb, "
-                  "nii, mha, nrrd and mrc",
+                  "nii, mha, nrrd, mrc, pdb and cif",
                   name));
 }
 
@@ -222,6 +236,10 @@ Json fileInfo(const std::string& file, const std::string& format) {
   Json json;
   json["file"] = file;
   const std::string name = format.empty() ? file : format;
+  if (levelset::holdsMolecule(name)) {
+    addMolecule(json, levelset::readMolecule(file, {.format = format, .solvent = true}));
+    return json;
+  }
   if (levelset::isPointFormat(name) || levelset::lacksFaces(file, format)) {
     const levelset::PointFileInfo info = levelset::pointFileInfo(file, format);
     json["format"] = info.format;
@@ -328,6 +346,8 @@ Json valueInfo(const Value& value, Invocation& in) {
     json["active_voxels"] = field.activeVoxelCount();
     json["bytes"] = field.memoryUse();
     json["hash"] = fmt::format("{:016x}", field.contentHash());
+  } else if (value.kind() == Kind::Molecule) {
+    addMolecule(json, value.molecule());
   } else if (value.kind() == Kind::Points) {
     addCloud(json, value.cloud(), in);
   } else if (value.kind() == Kind::Scene) {
@@ -495,16 +515,19 @@ Operator infoOperator() {
           "For a point cloud, spacing describes the distances from each point to its nearest "
           "neighbour at another position; duplicates are points at the position of an earlier one.",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! info",
-      .params = {{.name = "file",
-                  .type = ParamType::Path,
-                  .doc = "mesh, volume, point or .vdb file to describe; default: the newest value",
-                  .position = 0},
-                 {.name = "format",
-                  .type = ParamType::Text,
-                  .doc = "format of the file; default: by its extension"},
-                 jsonParam()},
+      .params =
+          {{.name = "file",
+            .type = ParamType::Path,
+            .doc =
+                "mesh, volume, point, molecule or .vdb file to describe; default: the newest value",
+            .position = 0},
+           {.name = "format",
+            .type = ParamType::Text,
+            .doc = "format of the file; default: by its extension"},
+           jsonParam()},
       .operands = {{Kind::Band, Kind::Mesh, Kind::Patch, Kind::Field, Kind::Surface, Kind::Scene,
-                    Kind::Volume, Kind::Points, Kind::Adaptive, Kind::Segmentation}},
+                    Kind::Volume, Kind::Points, Kind::Adaptive, Kind::Segmentation,
+                    Kind::Molecule}},
       .operandsOptional = true,
       .flow = Flow::PassesThrough,
       .run = info,

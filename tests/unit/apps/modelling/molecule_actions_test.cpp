@@ -1,0 +1,104 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <sstream>
+
+#include "tests/support/action_test.h"
+#include "tests/support/files.h"
+#include "tests/support/measured.h"
+
+namespace molecule_actions_test {
+
+using Json = nlohmann::json;
+using support::measured;
+
+// Two carbon atoms 3 Å apart, a chlorine atom far away, and water.
+constexpr const char* kAtoms =
+    "ATOM      1  CA  GLY A   7      -1.500   0.000   0.000  1.00  5.00           C\n"
+    "ATOM      2  CB  GLY A   7       1.500   0.000   0.000  1.00  5.00           C\n"
+    "HETATM    3 CL    CL B   8      20.000   0.000   0.000  1.00  5.00          CL\n"
+    "HETATM    4  O   HOH B   9       0.000  10.000   0.000  1.00  5.00           O\n"
+    "END\n";
+
+class MoleculeActions : public support::ActionTest {
+ protected:
+  void SetUp() override {
+    ActionTest::SetUp();
+    writeFile("a.pdb", kAtoms);
+  }
+};
+
+TEST_F(MoleculeActions, ReadDescribesAMolecule) {
+  const Json info = json("read a.pdb ! info --json");
+  EXPECT_EQ(info["kind"], "molecule");
+  EXPECT_EQ(info["atoms"], 3);
+  EXPECT_EQ(info["residues"], 2);
+  EXPECT_EQ(info["chains"], (Json{"A", "B"}));
+  EXPECT_EQ(info["elements"], (Json{{"C", 2}, {"Cl", 1}}));
+  EXPECT_EQ(json("read a.pdb --solvent ! info --json")["atoms"], 4);
+  EXPECT_EQ(json("info a.pdb --json")["atoms"], 4);  // with water
+  EXPECT_EQ(json("read - --format pdb <a.pdb ! info --json")["atoms"], 3);
+}
+
+TEST_F(MoleculeActions, MoleculeSurfaceMakesASolid) {
+  const double pi = std::numbers::pi;
+  // Balls of 1.7 Å that meet in a circle at 1.5 Å, and one of 1.75 Å.
+  const double cap = 0.2, lens = 2 * pi * cap * cap * (3 * 1.7 - cap) / 3;
+  const double volume = 4 * pi / 3 * (2 * std::pow(1.7, 3) + std::pow(1.75, 3)) - lens;
+  const Json vdw =
+      json("--report r.json read a.pdb ! molecule-surface --kind vdw --voxel 0.1 ! measure --json");
+  EXPECT_NEAR(vdw["volume"].get<double>() / volume, 1, measured(7e-4));
+  EXPECT_EQ(vdw["components"], 2);
+  const Json report = Json::parse(support::readText(folder_ / "r.json"));
+  const Json& details = report["steps"][1]["details"];
+  EXPECT_NEAR(details["vdw_volume"].get<double>(), volume, 1e-9);
+  EXPECT_EQ(details["cavities"], 0);
+  // The probe does not enter the neck, so its volume is larger. A chlorine ion stays a ball.
+  const Json excluded = json("read a.pdb ! molecule-surface --voxel 0.1 ! measure --json");
+  EXPECT_GT(excluded["volume"].get<double>(), volume + 1);
+  const Json grown =
+      json("read a.pdb ! molecule-surface --kind accessible --voxel 0.2 ! measure --json");
+  EXPECT_GT(grown["volume"].get<double>(), 300);
+}
+
+TEST_F(MoleculeActions, AreasAreWrittenByAtomAndResidue) {
+  ASSERT_EQ(
+      levelsmith("read a.pdb ! molecule-surface --voxel 0.5 --areas a.csv --residue-areas r.csv")
+          .code,
+      0);
+  const double pi = std::numbers::pi;
+  std::istringstream atoms(support::readText(folder_ / "a.csv"));
+  std::string line;
+  std::getline(atoms, line);
+  EXPECT_EQ(line, "chain,residue,number,atom,element,x,y,z,area");
+  std::getline(atoms, line);
+  EXPECT_EQ(line.substr(0, 24), "A,GLY,7,CA,C,-1.5,0,0,89") << line;
+  // A sphere of 3.1 Å without a cap of the height 1.6.
+  EXPECT_NEAR(std::stod(line.substr(line.rfind(',') + 1)), 2 * pi * 3.1 * (6.2 - 1.6), 1e-3);
+  std::istringstream residues(support::readText(folder_ / "r.csv"));
+  std::getline(residues, line);
+  EXPECT_EQ(line, "chain,residue,number,area");
+  std::getline(residues, line);
+  EXPECT_NEAR(std::stod(line.substr(line.rfind(',') + 1)), 4 * pi * 3.1 * (6.2 - 1.6), 1e-3);
+  std::getline(residues, line);
+  EXPECT_NEAR(std::stod(line.substr(line.rfind(',') + 1)), 4 * pi * 3.15 * 3.15, 1e-3);
+}
+
+TEST_F(MoleculeActions, OtherActionsRefuseMolecules) {
+  expectRefusal("read a.pdb ! measure", 2, "molecule");
+  expectRefusal("read a.pdb ! write b.ply", 2, "molecule-surface");
+  expectRefusal("read a.pdb ! molecule-surface", 2, "voxel");
+  expectRefusal("read a.pdb ! molecule-surface --voxel 0.5 --probe 0", 2, "probe");
+  expectRefusal("read a.pdb ! molecule-surface --kind vdw --probe 1 --voxel 0.5", 2, "--probe");
+  expectRefusal("read a.pdb --points ! info", 2, "--points");
+  expectRefusal("read a.pdb --model 2 ! info", 3, "model 2");
+  writeFile("b.pdb", "ATOM      1  CA  GLY A   7      -1.5x0   0.000   0.000\n");
+  expectRefusal("read b.pdb ! info", 3, "line 1");
+  writeFile("c.ply", "ply\n");
+  expectRefusal("read c.ply --solvent ! info", 2, "--solvent");
+}
+
+}  // namespace molecule_actions_test
