@@ -10,6 +10,7 @@
 #include <cstdio>
 
 #include "apps/viewer/screenshot.h"
+#include "levelset/deform/lattice_file.h"
 #include "levelset/error.h"
 
 namespace viewer {
@@ -95,9 +96,14 @@ void Viewer::show(std::shared_ptr<const Model> model, bool keepView) {
         clip_.offset = model_->solidBounds.center()[static_cast<int>(clip_.across)];
     }
   }
-  restartPatchEditor(keepView);
+  restartEditors(keepView);
   window_.setTitle(namesOf(model_->files) + " – Levelsmith");
   showMessage(fmt::format("{}: {}.", namesOf(model_->files), model_->description));
+}
+
+void Viewer::openChosen(const std::filesystem::path& file) {
+  if (levelset::isLatticeFile(file)) return openDeformation(file);
+  open(filesWith(model_ ? model_->files : std::vector<std::filesystem::path>{}, file));
 }
 
 bool Viewer::isPanelShown() const {
@@ -126,11 +132,10 @@ void Viewer::showFailure(const std::exception_ptr& failure, const std::string& i
 
 void Viewer::update() {
   takeModel();
-  takePreview();
+  takePreviews();
   takeFrame();
   takeKeys();
-  for (const std::filesystem::path& file : window_.takeDrops())
-    open(filesWith(model_ ? model_->files : std::vector<std::filesystem::path>{}, file));
+  for (const std::filesystem::path& file : window_.takeDrops()) openChosen(file);
   watchFiles();
 }
 
@@ -180,7 +185,8 @@ void Viewer::reload() {
 bool Viewer::isBusy() const {
   // The newest frame and preview must also have been taken.
   return loader_.isLoading() || pendingPick_ || picture_.isBusy() || picture_.frame() != frame_ ||
-         (worker_ && (worker_->isBusy() || worker_->preview() != preview_));
+         (patchWorker_ && (patchWorker_->isBusy() || patchWorker_->preview() != patchPreview_)) ||
+         (deformWorker_ && (deformWorker_->isBusy() || deformWorker_->preview() != deformPreview_));
 }
 
 // === Keys
@@ -203,6 +209,7 @@ void Viewer::takeKeys() {
 }
 
 void Viewer::press(unsigned character) {
+  if (pressForEditor(character)) return;
   const auto stepLayer = [&](std::size_t by) {
     const auto at = static_cast<std::size_t>(display_.layer);
     display_.layer = kLayers[(at + by) % kLayers.size()];
@@ -244,6 +251,9 @@ void Viewer::press(unsigned character) {
     case 'e':
       togglePatchEditor();
       break;
+    case 'd':
+      toggleDeformEditor();
+      break;
     case 'p':
       asksScreenshot_ = true;
       break;
@@ -265,13 +275,13 @@ void Viewer::press(unsigned character) {
 }
 
 void Viewer::pressSpecial(const KeyPress& key) {
+  if (pressForEditor(key)) return;
   if (key.withControl && key.key == GLFW_KEY_O)
     fileList_.show(model_ && !model_->files.empty() ? model_->files.front() : ".");
-  if (key.withControl && key.key == GLFW_KEY_C) editor_ ? copyPatch(false) : copyPicks();
-  if (key.withControl && key.key == GLFW_KEY_K) copyPatch(true);
-  if (key.withControl && key.key == GLFW_KEY_S && editor_) asksResult_ = true;
+  if (key.withControl && key.key == GLFW_KEY_C) isEditing() ? copyCommand(false) : copyPicks();
+  if (key.withControl && key.key == GLFW_KEY_K) copyCommand(true);
+  if (key.withControl && key.key == GLFW_KEY_S && isEditing()) asksResult_ = true;
   if (key.withControl && key.key == GLFW_KEY_Q) window_.close();
-  if (key.key == GLFW_KEY_BACKSPACE && editor_ && editor_->removeSelected()) requestPreview();
   if (key.key == GLFW_KEY_LEFT) camera_.orbit(-kTurnPerKey, 0);
   if (key.key == GLFW_KEY_RIGHT) camera_.orbit(kTurnPerKey, 0);
   if (key.key == GLFW_KEY_UP) camera_.orbit(0, kTurnPerKey);
@@ -300,29 +310,23 @@ void Viewer::useMouse(int width, int height) {
                    height);
     const bool isLeft = io.MouseClicked[0], isOther = io.MouseClicked[1] || io.MouseClicked[2];
     if (drag_ == Drag::None && (isLeft || isOther)) {
-      if (isOther || io.KeyShift)
-        drag_ = Drag::Pan;
+      if (isLeft && pressEditor(place, camera_.camera(width, height), io.KeyShift))
+        drag_ = Drag::Points;
       else
-        drag_ = editor_ && editor_->press(place, camera_.camera(width, height)) ? Drag::Patch
-                                                                                : Drag::Orbit;
-      if (drag_ == Drag::Patch) requestPreview();
+        drag_ = isOther || io.KeyShift ? Drag::Pan : Drag::Orbit;
       dragStart_ = dragLast_ = place;
       dragDepth_ = depth;
       hasDragged_ = false;
     }
   }
   if (drag_ == Drag::None) return;
-  if (drag_ == Drag::Patch) {
-    if (editor_ && editor_->moveTo(place, camera_.camera(width, height))) requestPreview();
-  } else {
+  if (drag_ == Drag::Points)
+    moveEditor(place, camera_.camera(width, height));
+  else
     dragTo(place, width, height);
-  }
   if (io.MouseDown[0] || io.MouseDown[1] || io.MouseDown[2]) return;
-  if (!hasDragged_ && drag_ == Drag::Orbit && !editor_) pickAt(place, false);
-  if (drag_ == Drag::Patch && editor_) {
-    editor_->release();
-    requestPreview();
-  }
+  if (!hasDragged_ && drag_ == Drag::Orbit && !isEditing()) pickAt(place, false);
+  if (drag_ == Drag::Points) releaseEditor();
   drag_ = Drag::None;
 }
 
@@ -389,7 +393,7 @@ void Viewer::requestPicture(int width, int height) {
   View view{
       shownModel(), camera_.camera(width, height),      std::nullopt, style_, arguments_.matcap,
       opacity_,     display_.layer == Layer::Thickness, isosurface_,  light_};
-  if (isClipped_ && model_->canCut()) view.clip = clip_;
+  if (isClipped_ && view.model->canCut()) view.clip = clip_;
   picture_.request(view, display_);
 }
 
@@ -428,15 +432,14 @@ void Viewer::writeInterfaceShot() {
 
 void Viewer::drawInterface(int width, int height) {
   useMouse(width, height);
-  drawPatchLines(width, height);
+  drawControls(width, height);
   drawMarks(width, height);
   drawPanel();
   drawStatus();
   drawScreenshotDialog();
   drawKeysDialog();
   drawResultDialog();
-  if (const auto chosen = fileList_.draw(isEscaped_))
-    open(filesWith(model_ ? model_->files : std::vector<std::filesystem::path>{}, *chosen));
+  if (const auto chosen = fileList_.draw(isEscaped_)) openChosen(*chosen);
   isEntered_ = isEscaped_ = false;
 }
 

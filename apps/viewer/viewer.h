@@ -9,14 +9,16 @@
 #include <string>
 #include <vector>
 
+#include "apps/viewer/editing/deform_editor.h"
+#include "apps/viewer/editing/deform_preview.h"
+#include "apps/viewer/editing/patch_editor.h"
+#include "apps/viewer/editing/patch_preview.h"
 #include "apps/viewer/interaction/orbit_camera.h"
-#include "apps/viewer/interaction/patch_editor.h"
 #include "apps/viewer/interaction/pick.h"
 #include "apps/viewer/interaction/progressive_picture.h"
 #include "apps/viewer/model/file_list.h"
 #include "apps/viewer/model/file_watch.h"
 #include "apps/viewer/model/loader.h"
-#include "apps/viewer/model/patch_preview.h"
 #include "apps/viewer/viewer_arguments.h"
 #include "apps/viewer/volume/transfer_editor.h"
 #include "apps/viewer/window.h"
@@ -48,6 +50,8 @@ class Viewer {
   void requestPicture(int width, int height);
   [[nodiscard]] const ProgressivePicture& picture() const { return picture_; }
   [[nodiscard]] bool isBusy() const;
+  /// Opens a file as if the user had chosen it. A lattice file deforms the solid that is shown.
+  void openChosen(const std::filesystem::path& file);
   /// Adds a picked point to the list of points in the panel, as a click on the surface does.
   void addPick(const Picked& picked);
 
@@ -67,17 +71,42 @@ class Viewer {
 
   void useMouse(int width, int height);
   void dragTo(const Imath::V2d& place, int width, int height);
+  // === What the patch and the deformation share, viewer_editing.cpp
+  [[nodiscard]] bool isEditing() const { return patchEditor_ || deformEditor_; }
+  /// Adapts the editors to a new model. @param keepsDesign  false: they are put away
+  void restartEditors(bool keepsDesign);
+  [[nodiscard]] bool pressEditor(const Imath::V2d& place, const render::Camera& camera,
+                                 bool isAdding);
+  void moveEditor(const Imath::V2d& place, const render::Camera& camera);
+  void releaseEditor();
+  /// @return true if the key belongs to an editor
+  [[nodiscard]] bool pressForEditor(unsigned character);
+  [[nodiscard]] bool pressForEditor(const KeyPress& key);
+  void takePreviews();
+  void copyCommand(bool isChain);
+  void saveResult();
+  void drawControls(int width, int height);
+  void drawMarksOf(const std::vector<PictureStroke>& strokes, const std::vector<PictureMark>& marks,
+                   bool isWrong, int width, int height);
+  void drawResultDialog();
   // === Making a patch, viewer_patch.cpp
   void togglePatchEditor();
-  /// Adapts the patch to a new model. @param keepsDesign  false: the patch is put away
-  void restartPatchEditor(bool keepsDesign);
-  void requestPreview();
-  void takePreview();
+  void requestPatchPreview();
+  void takePatchPreview();
   void copyPatch(bool isChain);
-  void saveResult();
+  void savePatch(const std::filesystem::path& name);
   void drawPatchEditorPart();
-  void drawPatchLines(int width, int height);
-  void drawResultDialog();
+  // === Deforming the solid, viewer_deform.cpp
+  void toggleDeformEditor();
+  void startDeformation(const DeformDesign& design);
+  void openDeformation(const std::filesystem::path& lattice);
+  void startGivenDeformation();
+  void requestDeformPreview();
+  void takeDeformPreview();
+  void copyDeformation(bool isChain);
+  void saveDeformation(const std::filesystem::path& name);
+  void drawDeformPart();
+  void drawDeformControls();
 
   void pickAt(const Imath::V2d& place, bool isForTarget);
   void finishPick();
@@ -126,7 +155,7 @@ class Viewer {
   std::shared_ptr<const Frame> frame_;  // frame that the window shows
   int pictureWidth_ = 1, pictureHeight_ = 1;
 
-  enum class Drag { None, Orbit, Pan, Patch };
+  enum class Drag { None, Orbit, Pan, Points };
   Drag drag_ = Drag::None;
   Imath::V2d dragStart_, dragLast_;
   double dragDepth_ = 1;
@@ -135,10 +164,19 @@ class Viewer {
   bool isPickForTarget_ = false;
   std::vector<Picked> picks_;
 
-  // The patch that the user makes; both null outside the mode in which a patch is made.
-  std::unique_ptr<PatchEditor> editor_;
-  std::unique_ptr<PatchWorker> worker_;
-  std::shared_ptr<const PatchPreview> preview_;
+  // The patch that the user makes; null outside the mode in which a patch is made.
+  std::unique_ptr<PatchEditor> patchEditor_;
+  std::unique_ptr<PatchWorker> patchWorker_;
+  std::shared_ptr<const PatchPreview> patchPreview_;
+  // The deformation that the user edits; null outside the mode in which the solid is deformed.
+  std::unique_ptr<DeformEditor> deformEditor_;
+  std::unique_ptr<DeformWorker> deformWorker_;
+  std::shared_ptr<const DeformPreview> deformPreview_;
+  BoxLattice boxLattice_;
+  // File of the last saved deformation, and its control points; the name of the next one.
+  std::filesystem::path deformFile_ = "lattice.json";
+  std::vector<Imath::V3d> savedPoints_;
+  bool isGivenDeformation_ = false;  // the deformation of the arguments was started
   bool asksResult_ = false;
   std::array<char, 512> resultName_{};
 

@@ -42,6 +42,10 @@ and patches (.patch) with it.
   --transfer POINTS   of a volume: direct volume rendering, as in 'render', or auto
   --slices i=N,j=N,k=N  of a volume: slices across axes of its grid, by index
   --grey LOW,HIGH     of a volume: values that slices show as black and as white [all but 1 % of the values]
+  --lattice FILE      deforms the solid by a lattice, which can be edited
+  --cage FILE         deforms the solid by a cage, a closed mesh around it, which can be edited
+  --moved FILE        with --cage: a mesh with the same triangles and moved vertices
+  --coordinates NAME  with --cage: mean-value or green                  [mean-value]
   --patches LINES     lines of the patches: none, outline, base or all  [all]
   --resolution N      voxels along the longest side of a mesh           [256]
   --renderer NAME     auto, cpu or gpu                                  [auto]
@@ -109,6 +113,14 @@ void setInside(Arguments& to, const std::string& text) {
     throw UsageError(
         fmt::format("levelsmith-view: --inside '{}' is unknown; give above or below", text));
   to.inside = text == "below" ? render::VolumeInside::Below : render::VolumeInside::Above;
+}
+
+void setCoordinates(Arguments& to, const std::string& text) {
+  if (text != "mean-value" && text != "green")
+    throw UsageError(fmt::format(
+        "levelsmith-view: --coordinates '{}' is unknown; give mean-value or green", text));
+  to.cageCoordinates =
+      text == "green" ? levelset::CageCoordinates::Green : levelset::CageCoordinates::MeanValue;
 }
 
 std::array<double, 2> parseGrey(const std::string& text) {
@@ -197,6 +209,10 @@ const std::map<std::string, Setter>& setters() {
        }},
       {"--slices", [](Arguments& to, const std::string& text) { to.slices = parseSlices(text); }},
       {"--grey", [](Arguments& to, const std::string& text) { to.grey = parseGrey(text); }},
+      {"--lattice", [](Arguments& to, const std::string& text) { to.lattice = text; }},
+      {"--cage", [](Arguments& to, const std::string& text) { to.cage = text; }},
+      {"--moved", [](Arguments& to, const std::string& text) { to.movedCage = text; }},
+      {"--coordinates", setCoordinates},
       {"--patches",
        [](Arguments& to, const std::string& text) { to.display.patches = patchLinesNamed(text); }},
       {"--resolution",
@@ -246,6 +262,11 @@ void requireSense(const Arguments& arguments) {
   if (arguments.isScript() && arguments.files.empty())
     throw UsageError(
         "levelsmith-view: --screenshot, --pick and --play need a file to show; give its name");
+  if (!arguments.lattice.empty() && !arguments.cage.empty())
+    throw UsageError("levelsmith-view: --lattice and --cage exclude each other; give one of them");
+  if (arguments.cage.empty() && (!arguments.movedCage.empty() ||
+                                 arguments.cageCoordinates != levelset::CageCoordinates::MeanValue))
+    throw UsageError("levelsmith-view: --moved and --coordinates require --cage; add --cage");
   if (arguments.matcap && arguments.style != render::Style::Matcap)
     throw UsageError(
         "levelsmith-view: --matcap applies only to --style matcap; add --style matcap");

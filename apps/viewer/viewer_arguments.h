@@ -12,6 +12,7 @@
 #include "apps/viewer/interaction/clip_plane.h"
 #include "apps/viewer/interaction/progressive_picture.h"
 #include "apps/viewer/model/model.h"
+#include "levelset/deform/cage/cage.h"
 
 namespace viewer {
 
@@ -37,6 +38,12 @@ struct Arguments {
   std::array<std::optional<double>, 3> slices = {};  ///< positions across i, j and k, grid indices
   std::optional<std::array<double, 2>> grey = {};    ///< values shown as black and as white
 
+  // === A deformation of the solid
+  std::filesystem::path lattice = {};    ///< lattice file; empty: none
+  std::filesystem::path cage = {};       ///< mesh file of a cage at rest; empty: none
+  std::filesystem::path movedCage = {};  ///< mesh file of the moved cage; empty: at rest
+  levelset::CageCoordinates cageCoordinates = levelset::CageCoordinates::MeanValue;
+
   double opacity = 1;     ///< factor of the opacities of all solids and meshes
   long resolution = 256;  ///< voxels along the longest side of a mesh
   Renderer renderer = Renderer::Auto;
@@ -51,6 +58,8 @@ struct Arguments {
     return isovalue || hidesIsosurface || inside || filter || grey || !transfer.empty() ||
            slices[0] || slices[1] || slices[2];
   }
+  /// True when a lattice or a cage is given.
+  [[nodiscard]] bool givesDeformation() const { return !lattice.empty() || !cage.empty(); }
   /// True when the viewer runs without an open window: to write a screenshot, to print a picked
   /// point, or to play simulated input.
   [[nodiscard]] bool isScript() const { return screenshot || pick || play; }

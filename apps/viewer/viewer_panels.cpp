@@ -34,7 +34,8 @@ void Viewer::drawPanel() {
   drawVolumePart();
   if (!model_ || !model_->volume) {
     drawClipPart();
-    drawPatchEditorPart();
+    if (!deformEditor_) drawPatchEditorPart();
+    drawDeformPart();
   }
   drawPatchPart();
   drawPointPart();
@@ -222,7 +223,7 @@ void Viewer::drawKeysDialog() {
   if (asksKeys_) ImGui::OpenPopup(kTitle);
   asksKeys_ = false;
   if (!ImGui::BeginPopupModal(kTitle, nullptr, ImGuiWindowFlags_AlwaysAutoResize)) return;
-  constexpr std::array<std::array<const char*, 2>, 17> kKeys = {{
+  constexpr std::array<std::array<const char*, 2>, 20> kKeys = {{
       {"left button", "turn; with shift: move"},
       {"middle, right", "move"},
       {"wheel", "zoom in and out at the pointer"},
@@ -236,10 +237,13 @@ void Viewer::drawKeysDialog() {
       {"c", "clip plane"},
       {"e", "make a patch: press on the surface, drag corners and sides"},
       {"backspace", "remove the point of the patch that was moved last"},
+      {"d", "deform: drag control points, with shift several; x, y or z while dragging: axis"},
+      {"a", "select all control points, or none"},
+      {"Ctrl+Z, Y", "of a deformation: undo, redo"},
       {"p", "write a picture"},
       {"r", "read the files again"},
       {"Ctrl+O, C, Q", "open a file, copy all points, quit"},
-      {"Ctrl+C, K, S", "of a patch: copy the action, copy the chain, write it"},
+      {"Ctrl+C, K, S", "of a patch or deformation: copy the action, copy the chain, write it"},
   }};
   for (const auto& [key, what] : kKeys) {
     textOf(key);

@@ -80,7 +80,9 @@ class Player {
         break;
       case InputStep::Kind::Press:
       case InputStep::Kind::Release:
-        mouse_.isDown[static_cast<std::size_t>(step.button)] = step.kind == InputStep::Kind::Press;
+        (step.button == InputStep::kShift ? mouse_.hasShift
+                                          : mouse_.isDown[static_cast<std::size_t>(step.button)]) =
+            step.kind == InputStep::Kind::Press;
         break;
       case InputStep::Kind::Key:
         window_.simulateKey(keyNamed(step.text));
@@ -155,6 +157,12 @@ void runScript(const Arguments& arguments) {
   Viewer viewer(arguments, window);
   viewer.requestPicture(camera.width, camera.height);
   viewer.show(model, false);
+  // The picture shows the finished solid.
+  while (arguments.givesDeformation() && !arguments.play && viewer.isBusy()) {
+    window.wait(0.02);
+    viewer.update();
+    viewer.requestPicture(width, height);
+  }
   if (arguments.play) Player(window, viewer, width, height).play(steps);
   if (!arguments.screenshot && !arguments.pick) return;
   const std::shared_ptr<const Frame> frame =

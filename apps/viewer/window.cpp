@@ -207,6 +207,7 @@ void Window::drawFrame(int width, int height, bool isInMemory,
   if (simulated_) {
     io.MousePos = {simulated_->x, simulated_->y};
     std::copy(simulated_->isDown.begin(), simulated_->isDown.end(), io.MouseDown);
+    io.KeyShift = simulated_->hasShift;
   }
   ImGui::NewFrame();
   ImDrawList& behind = *ImGui::GetBackgroundDrawList();

@@ -64,6 +64,7 @@ class Window {
   struct Mouse {
     float x = 0, y = 0;               ///< position, pixels
     std::array<bool, 3> isDown = {};  ///< left, right and middle button
+    bool hasShift = false;            ///< the shift key is held
   };
   /// From now on the interface sees this mouse instead of the user's.
   void simulateMouse(const Mouse& mouse) { simulated_ = mouse; }

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <system_error>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -138,6 +140,22 @@ ControlLattice latticeOfText(const std::string& text) {
 }
 
 }  // namespace
+
+bool isLatticeFile(const std::filesystem::path& file) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) return false;
+  std::ifstream stream(file, std::ios::binary);
+  bool isFormat = false, result = false;
+  const auto visit = [&](int depth, Json::parse_event_t event, Json& parsed) {
+    if (depth == 1 && event == Json::parse_event_t::key)
+      isFormat = parsed == "format";
+    else if (depth == 1 && event == Json::parse_event_t::value && isFormat)
+      result = parsed == kLatticeFormat;
+    return depth < 2;  // keeps no nested list
+  };
+  std::ignore = Json::parse(stream, visit, /*allow_exceptions=*/false);
+  return result;
+}
 
 void writeLattice(const std::filesystem::path& file, const ControlLattice& lattice) {
   const LatticeData& data = lattice.data();

@@ -16,6 +16,9 @@
 /// "weights" and "knots" may be left out: all weights are then 1, and the knots are uniform.
 namespace levelset {
 
+/// Returns true if a file is a JSON document whose member "format" names lattices.
+[[nodiscard]] bool isLatticeFile(const std::filesystem::path& file);
+
 /// Writes a lattice to a file.
 /// @throws IoError if the file cannot be written
 void writeLattice(const std::filesystem::path& file, const ControlLattice& lattice);

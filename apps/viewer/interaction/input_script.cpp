@@ -28,8 +28,9 @@ int buttonOf(const std::string& word, const std::string& where) {
   if (word == "left") return 0;
   if (word == "right") return 1;
   if (word == "middle") return 2;
+  if (word == "shift") return InputStep::kShift;
   throw levelset::UsageError(
-      fmt::format("{}: '{}' is not a button; give left, right or middle", where, word));
+      fmt::format("{}: '{}' is not a button; give left, right, middle or shift", where, word));
 }
 
 void addDrag(const Words& words, const std::string& where, std::vector<InputStep>& steps) {

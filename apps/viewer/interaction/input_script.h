@@ -21,12 +21,13 @@ struct InputStep {
   };
   Kind kind = Kind::Wait;
   Imath::V2d place{0, 0};  ///< pixels; 0,0 is the upper left corner
-  int button = 0;          ///< 0: left, 1: right, 2: middle
+  int button = 0;          ///< 0: left, 1: right, 2: middle, or kShift
+  static constexpr int kShift = 3;
   std::string text = {};
 };
 
 /// Reads a script of simulated input, one command a line; `#` starts a comment:
-/// - `move X,Y`, `press BUTTON`, `release BUTTON` (left, right or middle)
+/// - `move X,Y`, `press BUTTON`, `release BUTTON` (left, right, middle, or the key shift)
 /// - `click X,Y`: moves there, presses and releases the left button
 /// - `drag X,Y X,Y …`: presses the left button at the first position and releases it at the last.
 ///   Between two positions the pointer takes eight steps.

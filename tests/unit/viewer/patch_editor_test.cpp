@@ -9,10 +9,10 @@
 #include <thread>
 
 #include "apps/pipeline/values/units.h"
+#include "apps/viewer/editing/patch_editor.h"
+#include "apps/viewer/editing/patch_preview.h"
 #include "apps/viewer/interaction/input_script.h"
-#include "apps/viewer/interaction/patch_editor.h"
 #include "apps/viewer/interaction/surface_ray.h"
-#include "apps/viewer/model/patch_preview.h"
 #include "apps/viewer/text/point_text.h"
 #include "levelset/csg/csg.h"
 #include "levelset/error.h"
@@ -204,11 +204,11 @@ TEST(PatchEditor, DoesNotHoldPointsOnTheOtherSide) {
   placeCorners(editor);
   render::Camera behind = camera();
   behind.from.z = -6;
-  for (const PatchEditor::Mark& mark : editor.marks(behind)) {
+  for (const PictureMark& mark : editor.marks(behind)) {
     EXPECT_TRUE(mark.isBehind);
     EXPECT_FALSE(editor.press(mark.place, behind));
   }
-  for (const PatchEditor::Mark& mark : editor.marks(camera())) EXPECT_FALSE(mark.isBehind);
+  for (const PictureMark& mark : editor.marks(camera())) EXPECT_FALSE(mark.isBehind);
 }
 
 TEST(PatchPreview, DrawsGreatCirclesOnABall) {
@@ -330,9 +330,9 @@ std::vector<InputStep> stepsOf(const std::string& text) {
 TEST(InputScript, ReadsAllCommands) {
   const std::vector<InputStep> steps = stepsOf(
       "# a comment\n\nclick 10,20  # places a corner\ndrag 0,0 8,16 8,0\nkey ctrl+c\n"
-      "press right\nrelease middle\nmove 1.5,2\nwait\ncopied\npicture a.png\n");
+      "press right\nrelease middle\npress shift\nmove 1.5,2\nwait\ncopied\npicture a.png\n");
   using Kind = InputStep::Kind;
-  ASSERT_EQ(steps.size(), 3u + 19 + 7);
+  ASSERT_EQ(steps.size(), 3u + 19 + 8);
   EXPECT_EQ(steps[0].place, V2d(10, 20));
   EXPECT_EQ(steps[1].kind, Kind::Press);
   EXPECT_EQ(steps[2].kind, Kind::Release);
@@ -343,8 +343,9 @@ TEST(InputScript, ReadsAllCommands) {
   EXPECT_EQ(steps[22].text, "ctrl+c");
   EXPECT_EQ(steps[23].button, 1);
   EXPECT_EQ(steps[24].button, 2);
-  EXPECT_EQ(steps[25].place, V2d(1.5, 2));
-  EXPECT_EQ(steps[28].text, "a.png");
+  EXPECT_EQ(steps[25].button, InputStep::kShift);
+  EXPECT_EQ(steps[26].place, V2d(1.5, 2));
+  EXPECT_EQ(steps[29].text, "a.png");
 }
 
 TEST(InputScript, NamesTheLineOfAnError) {

@@ -1,5 +1,7 @@
 // Runs the viewer from the command line, in a window of a virtual display.
 
+#include <Imath/ImathVec.h>
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 #include <png.h>
 
@@ -12,6 +14,8 @@
 #include <string>
 #include <vector>
 
+#include "levelset/deform/lattice_file.h"
+#include "render/camera.h"
 #include "tests/support/command_line.h"
 
 namespace viewer_command_test {
@@ -279,6 +283,79 @@ TEST_F(ViewerCommand, MakesAPatchWithTheMouseAndWritesItsCommand) {
   ASSERT_EQ(made.code, 0) << made.err;
   const Outcome same = shell("cmp viewer.vdb textured.vdb");
   EXPECT_EQ(same.code, 0) << same.out << same.err;
+}
+
+/// Position in the picture of a point, as a script has it.
+std::string pixelOf(const render::Camera& camera, const Imath::V3d& point,
+                    const Imath::V2d& way = {0, 0}) {
+  const Imath::V3d at = point * camera.worldToNdc();
+  return fmt::format("{:.2f},{:.2f}", at.x * camera.width + way.x, at.y * camera.height + way.y);
+}
+
+TEST_F(ViewerCommand, DeformsByALatticeWithTheMouse) {
+  makeBall();
+  render::Camera camera;
+  camera.from = {1, 1.5, 5};
+  camera.to = {-0.5, 0, 0};
+  camera.width = 640;
+  camera.height = 400;
+  const std::string view = " --from 1,1.5,5 --to -0.5,0,0 --size 640x400 --renderer cpu";
+  // Control points of 4 x 4 x 4 around the ball: the box is two voxels wider.
+  const double half = 1.1;
+  const Imath::V3d corner(half), below(half, half / 3, half), inner(half / 3, half, half);
+  writeFile("lattice.play",
+            "key d\nwait\n"
+            "drag " +
+                pixelOf(camera, corner) + " " + pixelOf(camera, corner, {60, -40}) +
+                "\nkey ctrl+c\ncopied\n"
+                // Two points along y.
+                "click " +
+                pixelOf(camera, below) + "\npress shift\nclick " + pixelOf(camera, inner) +
+                "\nrelease shift\nmove " + pixelOf(camera, inner) + "\npress left\nkey y\nmove " +
+                pixelOf(camera, inner, {5, -20}) + "\nmove " + pixelOf(camera, inner, {5, -40}) +
+                "\nrelease left\nwait\n"
+                // A fold, without the axis, which is undone.
+                "move " +
+                pixelOf(camera, Imath::V3d(half, -half, half)) + "\npress left\nkey y\nmove " +
+                pixelOf(camera, Imath::V3d(-half * 3, -half, half)) + "\nrelease left" +
+                "\nwait\npicture fold.png\nkey ctrl+z\nwait\npicture lattice.png\n"
+                "key ctrl+z\nkey ctrl+y\nkey ctrl+s\nkey enter\nwait\nkey ctrl+k\ncopied\n");
+  const Outcome seen =
+      onDisplay("view ball.vdb" + view + " --play lattice.play --screenshot seen.png");
+  ASSERT_EQ(seen.code, 0) << seen.err;
+  const std::vector<std::string> lines = linesOf(seen.out);
+  ASSERT_EQ(lines.size(), 2u) << seen.out;
+  EXPECT_EQ(lines[0], "deform --lattice 'lattice.json'");
+  EXPECT_EQ(lines[1],
+            "levelsmith read 'ball.vdb' ! deform --lattice 'lattice.json' ! write deformed.vdb");
+  EXPECT_NE(png("fold.png").bytes, png("lattice.png").bytes);
+
+  const levelset::LatticeData data = levelset::readLattice(folder_ / "lattice.json").data();
+  const auto pointAt = [&](std::size_t i, std::size_t j, std::size_t k) {
+    return data.points[(i * 4 + j) * 4 + k];
+  };
+  const Imath::V3d atNdc = pointAt(3, 3, 3) * camera.worldToNdc(),
+                   before = corner * camera.worldToNdc();
+  // Positions in the script are rounded to hundredths of a pixel.
+  EXPECT_NEAR((atNdc.x - before.x) * 640, 60, 0.02);
+  EXPECT_NEAR((atNdc.y - before.y) * 400, -40, 0.02);
+  const Imath::V3d first = pointAt(3, 2, 3) - below, second = pointAt(1 + 1, 3, 3) - inner;
+  EXPECT_GT(first.y, 0.1);
+  EXPECT_LT((first - second).length(), 1e-14);
+  EXPECT_LT(std::abs(first.x) + std::abs(first.z), 1e-14);
+  EXPECT_LT((pointAt(3, 0, 3) - Imath::V3d(half, -half, half)).length(), 1e-14);
+
+  // The actions make the solid that the viewer shows.
+  const Outcome made =
+      levelsmith(lines[1].substr(std::string("levelsmith ").size()) + " ! render made.png" + view);
+  ASSERT_EQ(made.code, 0) << made.err;
+  EXPECT_EQ(png("seen.png").bytes, png("made.png").bytes);
+  const Outcome again = onDisplay("view ball.vdb --lattice lattice.json" + view +
+                                  " --screenshot again.png; view ball.vdb --lattice ball.vdb "
+                                  "--pick 1,1; echo $?; view ball.vdb --lattice lattice.json "
+                                  "--cage x.ply --pick 1,1; echo $?");
+  EXPECT_EQ(png("again.png").bytes, png("made.png").bytes);
+  EXPECT_EQ(again.out, "3\n2\n") << again.err;
 }
 
 TEST_F(ViewerCommand, RefusesInputScriptsThatItDoesNotKnow) {

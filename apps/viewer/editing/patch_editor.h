@@ -7,8 +7,9 @@
 #include <optional>
 #include <vector>
 
+#include "apps/viewer/editing/patch_design.h"
+#include "apps/viewer/editing/picture_marks.h"
 #include "apps/viewer/model/model.h"
-#include "apps/viewer/model/patch_design.h"
 #include "render/camera.h"
 
 namespace viewer {
@@ -41,19 +42,10 @@ class PatchEditor {
   /// Changes texture, columns and relief. @param changed  its corners and sides are ignored
   void setTexture(const PatchDesign& changed);
 
-  /// A line of a side in the picture. A line behind the surface lies on a part that faces away.
-  struct Stroke {
-    Imath::V2d from, to;
-    bool isBehind = false;
-  };
-  [[nodiscard]] std::vector<Stroke> strokes(const render::Camera& camera) const;
-
-  /// A corner or a point of a side in the picture.
-  struct Mark {
-    Imath::V2d place;
-    bool isCorner = true, isSelected = false, isBehind = false;
-  };
-  [[nodiscard]] std::vector<Mark> marks(const render::Camera& camera) const;
+  /// Lines of the sides. A line behind the surface lies on a part that faces away.
+  [[nodiscard]] std::vector<PictureStroke> strokes(const render::Camera& camera) const;
+  /// Corners, and points of the sides.
+  [[nodiscard]] std::vector<PictureMark> marks(const render::Camera& camera) const;
 
  private:
   /// A corner, or a point of a side.

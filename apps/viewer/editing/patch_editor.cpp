@@ -1,4 +1,4 @@
-#include "apps/viewer/interaction/patch_editor.h"
+#include "apps/viewer/editing/patch_editor.h"
 
 #include <algorithm>
 #include <cmath>
@@ -15,15 +15,8 @@ namespace {
 using Imath::V2d;
 using Imath::V3d;
 
-constexpr double kReach = 9;      // distance from a point within which a press holds it, pixels
-constexpr double kLineReach = 6;  // the same for a side, pixels
-
-/// Position of a point in the picture; empty behind the eye.
-std::optional<V2d> seenAt(const V3d& point, const render::Camera& camera) {
-  if (!camera.orthoHeight && !((point * camera.worldToCamera()).z > 0)) return std::nullopt;
-  const V3d at = point * camera.worldToNdc();
-  return V2d(at.x * camera.width, at.y * camera.height);
-}
+// Distance from a side within which a press adds a point to it, pixels.
+constexpr double kLineReach = 6;
 
 /// Distance of a picture position from a line, pixels.
 double distanceTo(const V2d& from, const V2d& to, const V2d& place) {
@@ -75,7 +68,7 @@ std::optional<V3d> PatchEditor::surfaceAt(const V2d& place, const render::Camera
 std::optional<PatchEditor::Handle> PatchEditor::handleAt(const V2d& place,
                                                          const render::Camera& camera) const {
   std::optional<Handle> found;
-  double least = kReach;
+  double least = kPointReach;
   for (const Handle& handle : handles()) {
     const std::optional<V2d> at = seenAt(pointOf(handle), camera);
     if (!at || (*at - place).length() > least || facesAway(pointOf(handle), camera)) continue;
@@ -171,8 +164,8 @@ void PatchEditor::setTexture(const PatchDesign& changed) {
   design_.relief = changed.relief;
 }
 
-std::vector<PatchEditor::Stroke> PatchEditor::strokes(const render::Camera& camera) const {
-  std::vector<Stroke> all;
+std::vector<PictureStroke> PatchEditor::strokes(const render::Camera& camera) const {
+  std::vector<PictureStroke> all;
   for (const std::vector<V3d>& side : sides_)
     for (std::size_t i = 0; i + 1 < side.size(); ++i) {
       const std::optional<V2d> from = seenAt(side[i], camera), to = seenAt(side[i + 1], camera);
@@ -181,8 +174,8 @@ std::vector<PatchEditor::Stroke> PatchEditor::strokes(const render::Camera& came
   return all;
 }
 
-std::vector<PatchEditor::Mark> PatchEditor::marks(const render::Camera& camera) const {
-  std::vector<Mark> all;
+std::vector<PictureMark> PatchEditor::marks(const render::Camera& camera) const {
+  std::vector<PictureMark> all;
   for (const Handle& handle : handles())
     if (const std::optional<V2d> at = seenAt(pointOf(handle), camera))
       all.push_back({*at, !handle.side, selected_ == handle, facesAway(pointOf(handle), camera)});

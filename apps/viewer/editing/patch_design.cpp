@@ -1,4 +1,4 @@
-#include "apps/viewer/model/patch_design.h"
+#include "apps/viewer/editing/patch_design.h"
 
 #include <fmt/core.h>
 

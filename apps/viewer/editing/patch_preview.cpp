@@ -1,4 +1,4 @@
-#include "apps/viewer/model/patch_preview.h"
+#include "apps/viewer/editing/patch_preview.h"
 
 #include <fmt/core.h>
 
@@ -6,9 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "apps/viewer/editing/solid_model.h"
 #include "levelset/error.h"
-#include "levelset/files/band_file.h"
-#include "levelset/mesh_files/mesh_file.h"
 #include "levelset/transform/resample.h"
 #include "mapping/placement/make_patch.h"
 #include "mapping/surface/geodesic.h"
@@ -21,11 +20,6 @@ namespace {
 using Imath::V3d;
 using levelset::NarrowBand;
 
-double longestSideOf(const Imath::Box3d& box) {
-  const V3d size = box.size();
-  return std::max({size.x, size.y, size.z});
-}
-
 /// Geodesics between successive points; empty where the surface does not connect them.
 std::vector<V3d> pathThrough(const mapping::SurfaceField& field, const std::vector<V3d>& points) {
   std::vector<V3d> path;
@@ -35,30 +29,6 @@ std::vector<V3d> pathThrough(const mapping::SurfaceField& field, const std::vect
     path.insert(path.end(), part.begin() + (path.empty() ? 0 : 1), part.end());
   }
   return path;
-}
-
-/// Quotes a text for the shell.
-std::string quoted(const std::string& text) {
-  std::string result = "'";
-  for (const char c : text) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return result + "'";
-}
-
-/// Actions that make the solid of the model from its file; empty if no file has this solid alone.
-std::string baseActions(const Model& base, double voxelSize) {
-  if (base.files.empty()) return "";
-  const std::string read = "read " + quoted(base.files.front().string());
-  if (levelset::isBandFormat(base.files.front())) return read;
-  if (!levelset::isMeshFormat(base.files.front())) return "";
-  return read + fmt::format(" ! level-set --voxel {}", voxelSize);
-}
-
-std::shared_ptr<const Model> modelWith(const Model& base, NarrowBand textured) {
-  auto model = std::make_shared<Model>(base);
-  model->scene.solids.front().band = std::move(textured);
-  model->patches.clear();
-  model->solidBounds = model->bounds = model->scene.bounds();
-  return model;
 }
 
 void makePreview(const Model& base, const NarrowBand& surface, const levelset::Progress& progress,
@@ -97,17 +67,9 @@ void makePreview(const Model& base, const NarrowBand& surface, const levelset::P
 }  // namespace
 
 std::string whyNoPatch(const Model& model) {
-  if (!model.volume && model.scene.solids.size() == 1 && model.scene.meshes.empty() &&
-      !model.scene.isBlended() && !model.solidBounds.isEmpty() &&
-      !model.scene.solids.front().band.isOpenSurface())
-    return "";
-  return "A patch needs a model with exactly one solid; open a level set or a mesh.";
-}
-
-double previewVoxel(const Model& base) {
-  constexpr double kVoxels = 96;
-  return std::max(base.scene.solids.front().band.voxelSize(),
-                  longestSideOf(base.solidBounds) / kVoxels);
+  return hasOneSolid(model)
+             ? ""
+             : "A patch needs a model with exactly one solid; open a level set or a mesh.";
 }
 
 PatchPaths sidesOf(const NarrowBand& base, const PatchDesign& design) {
@@ -146,54 +108,21 @@ PatchPreview previewPatch(const Model& base, const NarrowBand& surface, const Pa
 // === PatchWorker
 
 PatchWorker::PatchWorker(std::shared_ptr<const Model> base, std::function<void()> wake)
-    : base_(std::move(base)), wake_(std::move(wake)), thread_([this] { run(); }) {}
-
-PatchWorker::~PatchWorker() {
-  {
-    const std::scoped_lock lock(mutex_);
-    isEnding_ = true;
-    isNewer_ = true;
-  }
-  changed_.notify_all();
-  thread_.join();
-}
-
-void PatchWorker::request(const PatchDesign& design, bool isDragging) {
-  {
-    const std::scoped_lock lock(mutex_);
-    pending_ = Request{design, isDragging};
-    isNewer_ = true;
-  }
-  changed_.notify_all();
-}
-
-std::shared_ptr<const PatchPreview> PatchWorker::preview() const {
-  const std::scoped_lock lock(mutex_);
-  return preview_;
-}
-
-bool PatchWorker::isBusy() const {
-  const std::scoped_lock lock(mutex_);
-  return isWorking_ || pending_;
-}
-
-void PatchWorker::publish(PatchPreview preview) {
-  {
-    const std::scoped_lock lock(mutex_);
-    preview_ = std::make_shared<const PatchPreview>(std::move(preview));
-  }
-  if (wake_) wake_();
-}
+    : base_(std::move(base)),
+      work_([this](const Request& request, Work&) { work(request); },
+            [](const Request& request, const std::string& message) {
+              PatchPreview failed;
+              failed.design = request.design;
+              failed.failure = message;
+              return failed;
+            },
+            std::move(wake)) {}
 
 void PatchWorker::work(const Request& request) {
   const NarrowBand& fine = base_->scene.solids.front().band;
   const double voxel = previewVoxel(*base_);
   const bool isCoarser = voxel > fine.voxelSize() * 1.01;
-  const auto isEnding = [this] {
-    const std::scoped_lock lock(mutex_);
-    return isEnding_;
-  };
-  const auto goOn = [&](double) { return !isEnding(); };
+  const auto goOn = [&](double) { return !work_.isEnding(); };
   if (isCoarser && coarse_.isEmpty()) coarse_ = levelset::resample(fine, voxel, {.progress = goOn});
   if (isCoarser || request.isDragging) {
     const NarrowBand& surface = isCoarser ? coarse_ : fine;
@@ -203,37 +132,12 @@ void PatchWorker::work(const Request& request) {
     // Until the new texture is there, the previous one stays.
     if (const auto previous = preview(); previous && request.design.isWhole())
       sides.model = previous->model;
-    publish(std::move(sides));
-    publish(previewPatch(*base_, surface, request.design, PreviewQuality::Coarse, goOn));
+    work_.publish(std::move(sides));
+    work_.publish(previewPatch(*base_, surface, request.design, PreviewQuality::Coarse, goOn));
   }
-  if (request.isDragging || isNewer_) return;
-  publish(previewPatch(*base_, fine, request.design, PreviewQuality::Fine,
-                       [this](double) { return !isNewer_; }));
-}
-
-void PatchWorker::run() {
-  for (;;) {
-    Request request;
-    {
-      std::unique_lock lock(mutex_);
-      isWorking_ = false;
-      changed_.wait(lock, [&] { return isEnding_ || pending_; });
-      if (isEnding_) return;
-      request = *std::exchange(pending_, std::nullopt);
-      isWorking_ = true;
-      isNewer_ = false;
-    }
-    try {
-      work(request);
-    } catch (const levelset::Cancelled&) {
-      // A newer request follows, or the end.
-    } catch (const std::exception& error) {
-      PatchPreview failed;
-      failed.design = request.design;
-      failed.failure = error.what();
-      publish(std::move(failed));
-    }
-  }
+  if (request.isDragging || work_.isObsolete()) return;
+  work_.publish(previewPatch(*base_, fine, request.design, PreviewQuality::Fine,
+                             [this](double) { return !work_.isObsolete(); }));
 }
 
 }  // namespace viewer

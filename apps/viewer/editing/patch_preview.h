@@ -1,17 +1,14 @@
 #pragma once
 
-#include <atomic>
-#include <condition_variable>
-#include <exception>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 
+#include "apps/viewer/editing/background_work.h"
+#include "apps/viewer/editing/patch_design.h"
+#include "apps/viewer/editing/solid_model.h"
 #include "apps/viewer/model/model.h"
-#include "apps/viewer/model/patch_design.h"
 #include "levelset/progress.h"
 #include "mapping/patches/patch.h"
 
@@ -38,10 +35,6 @@ struct PatchPreview {
 /// Reason why no patch can be made on a model; empty if one can: the model needs one solid and
 /// nothing else.
 [[nodiscard]] std::string whyNoPatch(const Model& model);
-
-/// Voxel size of the preview while the user drags, world units: the longest side of the base has
-/// about 96 voxels, or fewer on a coarser base.
-[[nodiscard]] double previewVoxel(const Model& base);
 
 /// Computes the sides of a design: the geodesics between its corners through its side points.
 /// @return for each side the path, empty where the surface does not connect the points
@@ -70,35 +63,24 @@ class PatchWorker {
  public:
   /// @param wake  called from the working thread when a result is available
   PatchWorker(std::shared_ptr<const Model> base, std::function<void()> wake);
-  ~PatchWorker();
-  PatchWorker(const PatchWorker&) = delete;
-  PatchWorker& operator=(const PatchWorker&) = delete;
 
   /// @param isDragging  true: stops after the coarse result
-  void request(const PatchDesign& design, bool isDragging);
+  void request(const PatchDesign& design, bool isDragging) { work_.request({design, isDragging}); }
   /// Newest result; null before the first one.
-  [[nodiscard]] std::shared_ptr<const PatchPreview> preview() const;
-  [[nodiscard]] bool isBusy() const;
+  [[nodiscard]] std::shared_ptr<const PatchPreview> preview() const { return work_.result(); }
+  [[nodiscard]] bool isBusy() const { return work_.isBusy(); }
 
  private:
   struct Request {
     PatchDesign design;
-    bool isDragging;
+    bool isDragging = false;
   };
-  void run();
+  using Work = BackgroundWork<Request, PatchPreview>;
   void work(const Request& request);
-  void publish(PatchPreview preview);
 
   std::shared_ptr<const Model> base_;
   levelset::NarrowBand coarse_;  // the base on the grid of the preview
-  std::function<void()> wake_;
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  std::optional<Request> pending_;
-  std::shared_ptr<const PatchPreview> preview_;
-  bool isWorking_ = false, isEnding_ = false;
-  std::atomic<bool> isNewer_ = false;  // a newer request, or the end, makes fine work obsolete
-  std::thread thread_;
+  Work work_;                    // last: it ends before the members that it reads
 };
 
 }  // namespace viewer
