@@ -167,6 +167,7 @@ py::list describeOperators() {
     result["example"] = op.example;
     result["takes_more"] = op.takesMore;
     result["operands_optional"] = op.operandsOptional;
+    result["first_alone"] = !op.aloneWith.empty();
     result["result"] = resultClasses(op);
     py::list operands, params;
     for (const std::vector<Kind>& kinds : op.operands) {

@@ -236,7 +236,7 @@ class ChainBuilder {
   std::vector<std::size_t> takeOperands(const Action& action) {
     std::vector<std::size_t> named;
     for (const std::string& name : action.operandNames) named.push_back(nodeOf(name, *action.op));
-    const std::size_t wanted = action.op->operands.size();
+    const std::size_t wanted = action.op->operandCount(action.options);
     if (named.size() >= wanted) return named;
     const std::size_t missing = wanted - named.size();
     if (stack_.size() < missing && action.op->operandsOptional) return named;

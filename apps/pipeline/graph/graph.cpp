@@ -44,8 +44,8 @@ std::string mismatch(const Operator& op, std::size_t index, Kind found,
 
 void checkOperands(const Node& node, const std::vector<Node>& before) {
   const Operator& op = *node.op;
-  const std::size_t wanted = op.operands.size(), found = node.inputs.size();
-  if (found > wanted && !op.takesMore) {
+  const std::size_t wanted = op.operandCount(node.options), found = node.inputs.size();
+  if (found > wanted && (!op.takesMore || op.isAlone(node.options))) {
     throw UsageError(fmt::format("{}: takes {} operand{}, not {}", op.name, wanted,
                                  wanted == 1 ? "" : "s", found));
   }
@@ -57,7 +57,7 @@ void checkOperands(const Node& node, const std::vector<Node>& before) {
                     wanted - found == 1 ? "one" : "them", wanted - found == 1 ? "it" : "them"));
   }
   for (std::size_t i = 0; i < found; ++i) {
-    const std::vector<Kind>& allowed = op.operands[std::min(i, wanted - 1)];
+    const std::vector<Kind>& allowed = op.operands[std::min(i, op.operands.size() - 1)];
     const Kind kind = before[node.inputs[i]].kind;
     if (std::find(allowed.begin(), allowed.end(), kind) == allowed.end())
       throw UsageError(mismatch(op, i, kind, allowed));

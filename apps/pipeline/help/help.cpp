@@ -69,6 +69,8 @@ std::string operandText(const Operator& op) {
       text += (i ? " or " : "") + std::string(kindName(kinds[i]));
   }
   if (op.takesMore) text += ", …";
+  for (std::size_t i = 0; i < op.aloneWith.size(); ++i)
+    text += (i == 0 ? "; the first alone with --" : " or --") + op.aloneWith[i];
   return text;
 }
 
@@ -127,6 +129,7 @@ std::string helpJson(const Operator& op) {
     json["operands"].push_back(names);
   }
   json["takes_more"] = op.takesMore;
+  if (!op.aloneWith.empty()) json["alone_with"] = op.aloneWith;
   json["passes_through"] = op.flow == Flow::PassesThrough;
   json["parameters"] = nlohmann::ordered_json::array();
   for (const Param& param : op.params) {

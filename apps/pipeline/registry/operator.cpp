@@ -210,6 +210,11 @@ void checkText(const Param& param, const std::string& text, const std::string& w
   }
 }
 
+bool Operator::isAlone(const std::map<std::string, std::string>& options) const {
+  return std::any_of(aloneWith.begin(), aloneWith.end(),
+                     [&](const std::string& option) { return options.contains(option); });
+}
+
 const Param* Operator::find(const std::string& param) const {
   const auto it =
       std::find_if(params.begin(), params.end(), [&](const Param& p) { return p.name == param; });

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -95,6 +97,8 @@ struct Operator {
   /// level sets directly below it on the stack.
   bool takesStack = false;
   bool operandsOptional = false;  ///< may run without any operand (`info FILE`)
+  /// Options with which the action takes its first operand alone.
+  std::vector<std::string> aloneWith = {};
   bool readsNames = false;  ///< the result depends on the names that --as gave to the operands
   /// Returns false if --voxel does not apply to the options and operands, although the action has
   /// it. Empty: it applies.
@@ -141,6 +145,12 @@ struct Operator {
   std::function<bool(const Invocation&)> usesStandardInput = {};
 
   [[nodiscard]] const Param* find(const std::string& param) const;
+  /// Returns true if an option of `aloneWith` is given. @param options  values by name
+  [[nodiscard]] bool isAlone(const std::map<std::string, std::string>& options) const;
+  /// Number of operands that the action takes without takesMore and operandsOptional.
+  [[nodiscard]] std::size_t operandCount(const std::map<std::string, std::string>& options) const {
+    return isAlone(options) ? 1 : operands.size();
+  }
 };
 
 [[nodiscard]] const std::vector<Operator>& operators();

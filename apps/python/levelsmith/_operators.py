@@ -48,8 +48,9 @@ def operand_names(operator):
 def signature_of(operator):
     Parameter = inspect.Parameter
     params = []
-    for name in operand_names(operator):
-        default = None if operator["operands_optional"] else Parameter.empty
+    for number, name in enumerate(operand_names(operator)):
+        is_optional = operator["operands_optional"] or (number > 0 and operator["first_alone"])
+        default = None if is_optional else Parameter.empty
         params.append(Parameter(name, Parameter.POSITIONAL_ONLY, default=default))
     if operator["takes_more"]:
         kind = operator["operands"][-1][0].lower()

@@ -13,6 +13,8 @@
 #include "apps/pipeline/grammar/file_sequence.h"
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/declarations.h"
+#include "apps/pipeline/operators/mapping/deform_animation.h"
+#include "apps/pipeline/operators/mapping/key_frames.h"
 #include "apps/pipeline/operators/mapping/patch_quality_options.h"
 #include "apps/pipeline/operators/mapping/texture_options.h"
 #include "apps/pipeline/registry/invocation.h"
@@ -32,12 +34,6 @@ namespace {
 using levelset::NarrowBand;
 using levelset::UsageError;
 using mapping::Patch;
-
-constexpr long kMostFrames = 100000;
-
-std::size_t framesOf(const Invocation& in) {
-  return static_cast<std::size_t>(in.integer("frames"));
-}
 
 std::size_t keyCount(const Invocation& in) {
   return in.operands.size() - 2;
@@ -120,45 +116,13 @@ void requireApart(const Invocation& in, const char* sequence, const char* first)
 
 // === Keys
 
-/// Returns the frame of each key patch: --key-frames, or evenly distributed frames.
 std::vector<std::size_t> keyFrames(const Invocation& in) {
-  const std::size_t count = keyCount(in), frames = framesOf(in);
-  std::vector<std::size_t> keys;
-  if (in.given("key-frames")) {
-    const std::string text = in.text("key-frames");
-    for (std::size_t begin = 0; begin <= text.size();) {
-      const std::size_t end = std::min(text.find(',', begin), text.size());
-      const long frame = parseInteger(text.substr(begin, end - begin), in.where("key-frames"));
-      if (frame < 0)
-        throw UsageError(fmt::format("{}: frame {} is negative; frames count from 0",
-                                     in.where("key-frames"), frame));
-      keys.push_back(static_cast<std::size_t>(frame));
-      begin = end + 1;
-    }
-    if (keys.size() != count)
-      throw UsageError(fmt::format(
-          "{}: {} frames are given for {} patches; give one frame for each patch, 0 first",
-          in.where("key-frames"), keys.size(), count));
-  } else {
-    for (std::size_t k = 0; k < count; ++k)
-      keys.push_back(count > 1 ? (2 * k * (frames - 1) + count - 1) / (2 * (count - 1)) : 0);
-  }
-  for (std::size_t k = 0; k < keys.size(); ++k) {
-    if (keys[k] < frames && (k == 0 ? keys[k] == 0 : keys[k] > keys[k - 1])) continue;
-    throw UsageError(
-        fmt::format("animate: {} patches do not fit {} frames: patch {} would be at frame {}; the "
-                    "first patch must be at frame 0, each further patch at a later frame than its "
-                    "predecessor, and the last at frame {} at most",
-                    count, frames, k + 1, keys[k], frames - 1));
-  }
-  return keys;
+  return keyFrames(in, keyCount(in), "patch", "patches");
 }
 
 void validateAnimate(const Invocation& in) {
   validateTextureOptions(in);
-  if (in.integer("frames") > kMostFrames)
-    throw UsageError(fmt::format("animate: --frames {} is too large; give at most {}",
-                                 in.integer("frames"), kMostFrames));
+  (void)framesOf(in);
   (void)outSequence(in);
   if (in.given("base-frames")) (void)baseSequence(in);
   if (in.given("texture-frames")) (void)textureSequence(in);
@@ -495,7 +459,8 @@ std::vector<Param> animateParams() {
        .required = true},
       {.name = "out",
        .type = ParamType::Path,
-       .doc = "files of the frames to write, .vdb or meshes; # in the name stands for the number "
+       .doc = "files of the frames to write, .vdb or meshes, and pictures of moved control points; "
+              "# in the name stands for the number "
               "of the frame, as in frame_###.vdb",
        .required = true},
       {.name = "base-frames",
@@ -516,8 +481,8 @@ std::vector<Param> animateParams() {
        .fallback = "1"},
       {.name = "key-frames",
        .type = ParamType::Text,
-       .doc =
-           "frame of each patch operand, as 0,12,30; default: evenly distributed over all frames"},
+       .doc = "frame of each patch operand, lattice or Bézier volume, as 0,12,30; default: evenly "
+              "distributed over all frames"},
       {.name = "carry",
        .type = ParamType::Choice,
        .doc = "motion of a patch with the base: corners, each corner goes to the nearest point of "
@@ -538,17 +503,23 @@ std::vector<Param> animateParams() {
 }  // namespace
 
 Operator animateOperator() {
-  return {
+  return withControlPoints({
       .name = "animate",
       .group = "Texture mapping",
-      .summary = "animate a texture: on a moving base, from patch to patch, or by a moving texture",
+      .summary = "animate a texture on a moving base, from patch to patch, or a moving texture; or "
+                 "move a solid, mesh, point cloud or Bézier volume by key-framed control points",
       .details =
           "The operands are base, texture and patch, as for `texture`, and further patches as key "
           "frames. Base, texture and first patch belong to frame 0; each further patch lies on the "
           "base of its own frame. Between two key patches the first is carried forwards and the "
           "second backwards along the bases, and the frames interpolate evenly between them. "
           "Frames in between use the options of the first patch. Each frame is written when it is "
-          "done; the result is the last frame. Unchanged parts are not computed again.",
+          "done; the result is the last frame. Unchanged parts are not computed again. With "
+          "--lattices, the only operand is deformed by lattices, whose control points are "
+          "interpolated between key frames. All frames are certified before the first one is "
+          "written; a fold is an error that names the frame. With --beziers, the only operand is a "
+          "scene, and the control points of its Bézier volume are interpolated. Then --out may "
+          "also name pictures, as frame_###.png.",
       .example =
           "levelsmith sphere --radius 10 --voxel 0.8 --as ball ! torus --radius 4 --tube 1.5 "
           "--voxel 0.8 --as ring ! patch @ball --at 0,0,10 --size 8,8 --height 3 --layers 2 "
@@ -563,7 +534,7 @@ Operator animateOperator() {
       .plan = planTexture,
       .validate = validateAnimate,
       .targets = outFiles,
-  };
+  });
 }
 
 }  // namespace pipeline

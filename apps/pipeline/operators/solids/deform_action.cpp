@@ -162,16 +162,6 @@ ChosenDeformation deformationFor(Invocation& in, bool isPlan) {
   return chosen;
 }
 
-Json certificateJson(const levelset::FoldCertificate& certificate) {
-  return {{"verdict", levelset::foldVerdictName(certificate.verdict)},
-          {"least_jacobian_low", certificate.leastLow},
-          {"least_jacobian_high", certificate.leastHigh},
-          {"least_jacobian_at", {certificate.place.x, certificate.place.y, certificate.place.z}},
-          {"pieces", certificate.pieces},
-          {"boxes", certificate.boxes},
-          {"overlaps", certificate.overlaps}};
-}
-
 Value runDeform(Invocation& in) {
   const ChosenDeformation chosen = deformationFor(in, /*isPlan=*/false);
   const levelset::Deformation& map = *chosen.map;
@@ -192,39 +182,21 @@ Value runDeform(Invocation& in) {
   }
   const levelset::Progress progress =
       chosen.untangled ? levelset::subProgress(in.progress, 0.4, 1) : in.progress;
-  const auto finish = [&](const levelset::FoldCertificate& certificate, Value value) {
-    details["certificate"] = certificateJson(certificate);
-    in.notes.notes.push_back(levelset::describe(certificate));
-    in.notes.detailsJson = details.dump();
-    return value;
-  };
-  switch (in.operands[0].kind()) {
-    case Kind::Points: {
-      levelset::DeformPointsResult result =
-          levelset::deformPoints(in.operands[0].cloud(), map, progress);
-      return finish(result.certificate, Value(std::move(result.cloud)));
-    }
-    case Kind::Mesh: {
-      const double diagonal = map.bounds().size().length();
-      levelset::DeformMeshResult result = levelset::deformMesh(
-          in.mesh(), map,
-          {.tolerance = in.given("tolerance") ? in.length("tolerance") : kMeshTolerance * diagonal,
-           .maxMemory = in.maxMemory,
-           .progress = progress});
-      details["halved_edges"] = result.halvedEdges;
-      details["bend"] = result.bend;
-      in.notes.errors.push_back(
-          {"largest distance of edges from their deformed curves", result.bend, "world units"});
-      return finish(result.certificate, Value(std::move(result.mesh)));
-    }
-    default: {
-      levelset::DeformBandOptions options{.maxMemory = in.maxMemory, .progress = progress};
-      if (in.given("voxel")) options.voxelSize = in.length("voxel");
-      if (in.given("half-width")) options.halfWidth = in.number("half-width");
-      levelset::DeformBandResult result = levelset::deformBand(in.band(), map, options);
-      return finish(result.certificate, Value(std::move(result.band)));
-    }
+  DeformValueOptions options{.maxMemory = in.maxMemory, .progress = progress};
+  if (in.given("voxel")) options.voxelSize = in.length("voxel");
+  if (in.given("half-width")) options.halfWidth = in.number("half-width");
+  if (in.given("tolerance")) options.tolerance = in.length("tolerance");
+  DeformedValue result = deformed(in.operands[0], map, options);
+  if (result.value.kind() == Kind::Mesh) {
+    details["halved_edges"] = result.halvedEdges;
+    details["bend"] = result.bend;
+    in.notes.errors.push_back(
+        {"largest distance of edges from their deformed curves", result.bend, "world units"});
   }
+  details["certificate"] = foldCertificateJson(result.certificate);
+  in.notes.notes.push_back(levelset::describe(result.certificate));
+  in.notes.detailsJson = details.dump();
+  return std::move(result.value);
 }
 
 double areaOf(const Imath::Box3d& box) {
@@ -291,6 +263,40 @@ void validateDeform(const Invocation& in) {
 }
 
 }  // namespace
+
+nlohmann::ordered_json foldCertificateJson(const levelset::FoldCertificate& certificate) {
+  return {{"verdict", levelset::foldVerdictName(certificate.verdict)},
+          {"least_jacobian_low", certificate.leastLow},
+          {"least_jacobian_high", certificate.leastHigh},
+          {"least_jacobian_at", {certificate.place.x, certificate.place.y, certificate.place.z}},
+          {"pieces", certificate.pieces},
+          {"boxes", certificate.boxes},
+          {"overlaps", certificate.overlaps}};
+}
+
+DeformedValue deformed(const Value& operand, const levelset::Deformation& map,
+                       const DeformValueOptions& options) {
+  if (operand.kind() == Kind::Points) {
+    levelset::DeformPointsResult result =
+        levelset::deformPoints(operand.cloud(), map, options.progress);
+    return {Value(std::move(result.cloud)), result.certificate};
+  }
+  if (operand.kind() == Kind::Mesh) {
+    const double diagonal = map.bounds().size().length();
+    levelset::DeformMeshResult result =
+        levelset::deformMesh(operand.mesh(), map,
+                             {.tolerance = options.tolerance.value_or(kMeshTolerance * diagonal),
+                              .maxMemory = options.maxMemory,
+                              .progress = options.progress});
+    return {Value(std::move(result.mesh)), result.certificate, result.halvedEdges, result.bend};
+  }
+  levelset::DeformBandResult result = levelset::deformBand(operand.band(), map,
+                                                           {.voxelSize = options.voxelSize,
+                                                            .halfWidth = options.halfWidth,
+                                                            .maxMemory = options.maxMemory,
+                                                            .progress = options.progress});
+  return {Value(std::move(result.band)), result.certificate};
+}
 
 Operator deformOperator() {
   return {
