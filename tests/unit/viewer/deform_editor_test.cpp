@@ -303,6 +303,28 @@ TEST(DeformWorker, ShowsFoldsAndRefusesThem) {
   EXPECT_EQ(whyNoDeformation(*ballOf()), "");
 }
 
+TEST(DeformWorker, DeformsByCages) {
+  const support::TemporaryFolder folder;
+  levelset::writeMesh(folder / "rest.ply", support::boxCage(V3d(-2), V3d(2), 1));
+  const DeformDesign rest =
+      readCageDesign(folder / "rest.ply", "", levelset::CageCoordinates::MeanValue);
+  std::vector<V3d> points = rest.points();
+  for (V3d& p : points)
+    if (p.x > 0) p.x += 1;
+  const DeformDesign design = rest.withPoints(points);
+  const auto model = ballOf(0.1);
+  DeformWorker worker(model, {});
+  worker.request(design, false);
+  const auto preview = settled(worker);
+  ASSERT_TRUE(preview->isFine) << preview->failure;
+  EXPECT_TRUE(preview->certificate->isInjective());
+  const levelset::DeformBandResult made =
+      levelset::deformBand(model->scene.solids.front().band, *design.deformation());
+  EXPECT_EQ(preview->model->scene.solids.front().band.contentHash(), made.band.contentHash());
+  // The cage stretches by 5/4.
+  EXPECT_NEAR(preview->model->bounds.size().x, 2.5, 8e-5);
+}
+
 TEST(DeformedMesh, TransformsNormalsAlsoOfMirrors) {
   const levelset::NarrowBand ball = levelset::makeSphere(1, V3d(0), 0.1);
   const levelset::TriMesh mesh = previewMesh(ball, 0.2);
