@@ -22,8 +22,10 @@
 #include "levelset/grids/crease_limiter.h"
 #include "levelset/grids/grid_queries_vdb.h"
 #include "levelset/grids/interpolate_vdb.h"
+#include "levelset/inspect/crease_patches.h"
 #include "levelset/meshing/band_to_mesh.h"
-#include "levelset/meshing/extended_mesh.h"
+#include "levelset/meshing/extended/extended_surface.h"
+#include "levelset/meshing/world_mesh.h"
 #include "levelset/transform/resample_vdb.h"
 #include "levelset/vdb.h"
 
@@ -211,9 +213,12 @@ void finishSigns(FloatGrid& target) {
 /// Edges between curved faces, which redistance() rounds, from the deformed mesh with sharp edges.
 NarrowBand withSharpEdges(NarrowBand band, const NarrowBand& solid, const Deformation& deformation,
                           const DeformBandOptions& options) {
-  ExtendedMesh extended = bandToExtendedMesh(solid);
-  if (extended.edgeVertices + extended.cornerVertices == 0) return band;
-  TriMesh& mesh = extended.mesh;
+  const FloatGrid& grid = vdb(solid);
+  const CellSurface cells(grid);
+  const EdgeCrossings crossings = crossingsOfField(cells, grid);
+  ExtendedSurface surface = extendedSurface(cells, crossings, {}, /*listsCrossings=*/true);
+  if (surface.edgeVertices + surface.cornerVertices == 0) return band;
+  TriMesh mesh = toWorld(CreasePatches(surface, crossings, grid).divided(), solid);
   const auto creases = creaseEdges(solid, mesh, kCreaseDegrees);
   if (creases.empty()) return band;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.positions.size(), 256),
@@ -244,7 +249,7 @@ DeformBandResult deformBand(const NarrowBand& solid, const Deformation& deformat
       {surface.before.positions, surface.before.triangles,
        voxelSize * std::min(kDomainLayers / std::clamp(surface.leastStretch, 1e-3, 1.0),
                             kWidestDeformationDomain)},
-      subProgress(options.progress, 0, 0.2));
+      {.maxMemory = options.maxMemory, .progress = subProgress(options.progress, 0, 0.2)});
   result.certificate = certified.certificate;
   requireInjective(result.certificate);
   if (deformation.isIdentity() && voxelSize == solid.voxelSize() &&

@@ -87,6 +87,26 @@ SurfaceMoments flatTriangleMoments(const Vec3d& a, const Vec3d& b, const Vec3d& 
   return sum;
 }
 
+SurfaceMoments quadraticPatchMoments(const std::array<Vec3d, 3>& corner,
+                                     const std::array<Vec3d, 3>& bend,
+                                     const std::array<Vec3d, 3>& normal) {
+  SurfaceMoments sum;
+  const Vec3d nu = normal[1] - normal[0], nv = normal[2] - normal[0];
+  for (const QuadratureNode& q : kRule) {
+    const double a = 1 - q.u - q.v, b = q.u, c = q.v;
+    const Vec3d p = corner[0] * a + corner[1] * b + corner[2] * c + bend[0] * (a * b) +
+                    bend[1] * (b * c) + bend[2] * (c * a);
+    const Vec3d su = corner[1] - corner[0] + bend[0] * (a - b) + (bend[1] - bend[2]) * c,
+                sv = corner[2] - corner[0] + bend[2] * (a - c) + (bend[1] - bend[0]) * b;
+    addPiece(sum, p, su.cross(sv) * (0.5 * q.weight));
+    const Vec3d mixed = normal[0] * a + normal[1] * b + normal[2] * c;
+    if (const double length = mixed.length(); length > 0.1)
+      sum.meanCurvature +=
+          q.weight * mixed.dot(nu.cross(sv) + su.cross(nv)) / (4 * length * length);
+  }
+  return sum;
+}
+
 CurvedSurface::CurvedSurface(const IndexMesh& mesh, const openvdb::FloatGrid& grid)
     : mesh_(mesh), field_(grid.constTreePtr()) {
   const double halfWidth = static_cast<double>(grid.background()) / grid.voxelSize()[0];

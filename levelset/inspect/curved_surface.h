@@ -29,6 +29,14 @@ struct SurfaceMoments {
 [[nodiscard]] SurfaceMoments flatTriangleMoments(const openvdb::Vec3d& a, const openvdb::Vec3d& b,
                                                  const openvdb::Vec3d& c);
 
+/// Moments of a quadratic patch about the origin of its coordinates: the flat triangle, and for
+/// each pair of barycentric coordinates λ_i λ_j times the bend of their side.
+/// @param bend  of the side from each corner to the next one
+/// @param normal  unit normals of the surface at the corners, which give its mean curvature
+[[nodiscard]] SurfaceMoments quadraticPatchMoments(const std::array<openvdb::Vec3d, 3>& corner,
+                                                   const std::array<openvdb::Vec3d, 3>& bend,
+                                                   const std::array<openvdb::Vec3d, 3>& normal);
+
 /// The triangles of the uniform mesh, bent onto the zero set of the tricubic interpolant. A point
 /// of a triangle moves along a normal interpolated between the vertices. Neighbours therefore share
 /// their sides, and the triangles cover the surface exactly once. A triangle stays flat where the

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "levelset/geometry/surface_components.h"
+#include "levelset/inspect/crease_patches.h"
 #include "levelset/inspect/curved_surface.h"
 #include "levelset/memory_limit.h"
 #include "levelset/meshing/cells/cell_surface.h"
@@ -156,6 +157,14 @@ double edgeCurvature(const TriMesh& mesh) {
   return sum;
 }
 
+Measurement figuresOf(const NarrowBand& solid) {
+  Measurement result;
+  result.voxelSize = solid.voxelSize();
+  result.halfWidth = solid.halfWidth();
+  result.activeVoxels = solid.activeVoxelCount();
+  return result;
+}
+
 /// Returns the mesh with closed seams if it has attributes whose seams double vertices; else
 /// nullopt.
 std::optional<TriMesh> withoutItsSeams(const TriMesh& mesh) {
@@ -170,10 +179,7 @@ std::optional<TriMesh> withoutItsSeams(const TriMesh& mesh) {
 Measurement measure(const NarrowBand& solid, const Progress& progress) {
   requireSolid(solid);
   report(progress, 0);
-  Measurement result;
-  result.voxelSize = solid.voxelSize();
-  result.halfWidth = solid.halfWidth();
-  result.activeVoxels = solid.activeVoxelCount();
+  Measurement result = figuresOf(solid);
   if (solid.isEmpty()) return result;
   const IndexMesh mesh = marchCells(CellSurface(vdb(solid)));
   report(progress, 0.2);
@@ -190,6 +196,37 @@ Measurement measure(const NarrowBand& solid, const Progress& progress) {
       });
   const Imath::M44d matrix = solid.indexToWorld();
   describeComponents(components, sums, anchors, matrix, result.voxelSize, result);
+  for (const Vec3d& p : mesh.positions) result.bounds.extendBy(toImath(p) * matrix);
+  return result;
+}
+
+Measurement measureSharp(const NarrowBand& solid, const Progress& progress) {
+  requireSolid(solid);
+  report(progress, 0);
+  Measurement result = figuresOf(solid);
+  if (solid.isEmpty()) return result;
+  const openvdb::FloatGrid& grid = vdb(solid);
+  const CellSurface cells(grid);
+  const EdgeCrossings crossings = crossingsOfField(cells, grid);
+  ExtendedSurface mesh =
+      extendedSurface(cells, crossings, subProgress(progress, 0.1, 0.3), /*listsCrossings=*/true);
+  if (mesh.edgeVertices + mesh.cornerVertices == 0)
+    return measure(solid, subProgress(progress, 0.3, 1));
+  const CreasePatches patches(mesh, crossings, grid);
+  const SurfaceComponents components = findSurfaceComponents(mesh.positions, mesh.triangles);
+  const std::vector<Vec3d> anchors = componentAnchors(components, mesh.positions);
+  const CurvedSurface surface(mesh, grid);
+  report(progress, 0.5);
+  const Progress last = subProgress(progress, 0.5, 1);
+  const std::vector<SurfaceMoments> sums = sumComponents(
+      componentsOfTriangles(components, mesh.triangles), anchors, last,
+      [&] { return surface.makeCache(); },
+      [&](std::size_t i, const Vec3d& anchor, CurvedSurface::Cache& cache) {
+        return patches.contains(i) ? patches.moments(i, anchor) : surface.moments(i, anchor, cache);
+      });
+  const Imath::M44d matrix = solid.indexToWorld();
+  describeComponents(components, sums, anchors, matrix, result.voxelSize, result);
+  result.meanCurvature += patches.edgeCurvature() * result.voxelSize;
   for (const Vec3d& p : mesh.positions) result.bounds.extendBy(toImath(p) * matrix);
   return result;
 }

@@ -118,8 +118,11 @@ class FeatureFinder {
 class ExtendedMesher {
  public:
   ExtendedMesher(const CellSurface& surface, const EdgeCrossings& crossings,
-                 const Progress& progress)
-      : surface_(surface), crossings_(crossings), progress_(progress) {}
+                 const Progress& progress, bool listsCrossings)
+      : surface_(surface),
+        crossings_(crossings),
+        progress_(progress),
+        listsCrossings_(listsCrossings) {}
 
   ExtendedSurface run() {
     findFeatures();
@@ -129,6 +132,7 @@ class ExtendedMesher {
     report(progress_, 0.7);
     flipEdges();
     report(progress_, 0.8);
+    if (listsCrossings_) listCrossings();
     if (firstFeature_.back() > 0) unfold();
     return std::move(mesh_);
   }
@@ -280,6 +284,11 @@ class ExtendedMesher {
     dropUnused();
   }
 
+  void listCrossings() {
+    for (std::uint32_t v = 0; v < mesh_.positions.size(); ++v)
+      mesh_.crossing.push_back(isFeature(v) ? ExtendedSurface::kFeature : v);
+  }
+
   void dropUnused() {
     constexpr std::uint32_t kUnused = 0xffffffffu;
     std::vector<std::uint32_t> number(mesh_.positions.size(), kUnused);
@@ -289,9 +298,11 @@ class ExtendedMesher {
     for (std::size_t v = 0; v < number.size(); ++v) {
       if (number[v] == kUnused) continue;
       mesh_.positions[kept] = mesh_.positions[v];
+      if (listsCrossings_) mesh_.crossing[kept] = mesh_.crossing[v];
       number[v] = kept++;
     }
     mesh_.positions.resize(kept);
+    if (listsCrossings_) mesh_.crossing.resize(kept);
     for (MeshTriangle& t : mesh_.triangles)
       for (std::uint32_t& v : t) v = number[v];
   }
@@ -299,6 +310,7 @@ class ExtendedMesher {
   const CellSurface& surface_;
   const EdgeCrossings& crossings_;
   const Progress& progress_;
+  bool listsCrossings_;
   std::vector<std::optional<Feature>> features_;  ///< one for each polygon
   /// [block]: number of its first feature among the vertices, and of its first triangle.
   std::vector<std::size_t> firstFeature_, firstTriangle_;
@@ -308,8 +320,8 @@ class ExtendedMesher {
 }  // namespace
 
 ExtendedSurface extendedSurface(const CellSurface& surface, const EdgeCrossings& crossings,
-                                const Progress& progress) {
-  return ExtendedMesher(surface, crossings, progress).run();
+                                const Progress& progress, bool listsCrossings) {
+  return ExtendedMesher(surface, crossings, progress, listsCrossings).run();
 }
 
 }  // namespace levelset

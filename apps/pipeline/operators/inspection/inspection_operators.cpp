@@ -74,7 +74,8 @@ Value measure(Invocation& in) {
   if (value.kind() == Kind::Segmentation) return measureRegions(in);
   levelset::Measurement m;
   if (value.kind() == Kind::Band)
-    m = levelset::measure(value.band(), in.progress);
+    m = in.flag("sharp") ? levelset::measureSharp(value.band(), in.progress)
+                         : levelset::measure(value.band(), in.progress);
   else if (value.kind() == Kind::Mesh)
     m = levelset::measure(value.mesh(), in.progress);
   else
@@ -427,6 +428,18 @@ Value info(Invocation& in) {
   return in.operands.empty() ? Value(Plan{}) : in.operands[0];
 }
 
+std::optional<Cost> costOfMeasure(Invocation& in) {
+  // With --sharp, the extended mesh and its crossings come on top.
+  return in.flag("sharp") ? costPerVoxel(1000, 160, 800)(in) : costPerVoxel(720, 130, 520)(in);
+}
+
+void validateMeasure(const Invocation& in) {
+  if (!in.flag("sharp") || in.operands.empty() || in.operands[0].kind() == Kind::Band) return;
+  throw levelset::UsageError(
+      fmt::format("measure: --sharp is for level sets, but the operand is a {}; leave it out",
+                  kindName(in.operands[0].kind())));
+}
+
 std::optional<Cost> costOfCompare(Invocation& in) {
   if (in.operands[0].kind() == Kind::Adaptive) return {};
   return costPerVoxel(1500, 60)(in);
@@ -450,13 +463,21 @@ Operator measureOperator() {
           "segmentation, materials has the volume and the area of each region, interfaces the area "
           "between each pair of regions, and junction_length the length of the curves where three "
           "regions meet. Sheets have the same label on both sides; sheet_area is their area and "
-          "rim_length the length of their borders.",
+          "rim_length the length of their borders. A level set rounds sharp edges by half a voxel² "
+          "of the cross-section; --sharp measures the solid with the edges that its distances "
+          "imply.",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! measure --json",
-      .params = {jsonParam()},
+      .params = {{.name = "sharp",
+                  .type = ParamType::Flag,
+                  .doc =
+                      "reconstruct the sharp edges and corners that the distances of a level set "
+                      "imply"},
+                 jsonParam()},
       .operands = {{Kind::Band, Kind::Mesh, Kind::Adaptive, Kind::Segmentation}},
       .flow = Flow::PassesThrough,
       .run = measure,
-      .cost = costPerVoxel(720, 130, 520),
+      .cost = costOfMeasure,
+      .validate = validateMeasure,
       .usesStandardOutput = asksJson,
   };
 }
