@@ -158,9 +158,11 @@ DeformMeshResult deformMesh(const TriMesh& mesh, const Deformation& deformation,
                                  options.tolerance));
   requireAttributes(mesh);
   DeformMeshResult result;
-  result.certificate =
-      deformation.certify({mesh.positions, mesh.triangles}, subProgress(options.progress, 0, 0.3))
-          .certificate;
+  result.certificate = deformation
+                           .certify({mesh.positions, mesh.triangles},
+                                    {.maxMemory = options.maxMemory,
+                                     .progress = subProgress(options.progress, 0, 0.3)})
+                           .certificate;
   requireInjective(result.certificate);
   deformation.requireDefined(mesh.positions, "vertex");
   result.mesh = mesh;
@@ -206,11 +208,15 @@ DeformMeshResult deformMesh(const TriMesh& mesh, const Deformation& deformation,
 }
 
 DeformPointsResult deformPoints(PointCloud cloud, const Deformation& deformation,
-                                const Progress& progress) {
+                                const CertifyOptions& options) {
+  const Progress& progress = options.progress;
   requirePoints(cloud);
   DeformPointsResult result;
   result.certificate =
-      deformation.certify({cloud.positions, {}}, subProgress(progress, 0, 0.5)).certificate;
+      deformation
+          .certify({cloud.positions, {}},
+                   {.maxMemory = options.maxMemory, .progress = subProgress(progress, 0, 0.5)})
+          .certificate;
   requireInjective(result.certificate);
   deformation.requireDefined(cloud.positions, "point");
   if (!deformation.isIdentity()) {

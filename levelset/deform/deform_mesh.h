@@ -53,11 +53,11 @@ struct DeformPointsResult {
 /// cube root of its determinant; colours and weights stay.
 /// @throws InvalidInput as deformMesh()
 [[nodiscard]] DeformPointsResult deformPoints(PointCloud cloud, const Deformation& deformation,
-                                              const Progress& progress = {});
+                                              const CertifyOptions& options = {});
 [[nodiscard]] inline DeformPointsResult deformPoints(PointCloud cloud,
                                                      const ControlLattice& lattice,
-                                                     const Progress& progress = {}) {
-  return deformPoints(std::move(cloud), LatticeDeformation(lattice), progress);
+                                                     const CertifyOptions& options = {}) {
+  return deformPoints(std::move(cloud), LatticeDeformation(lattice), options);
 }
 
 }  // namespace levelset

@@ -21,8 +21,9 @@ void LatticeDeformation::requireDefined(const std::vector<Imath::V3d>& points,
 }
 
 CertifiedDeformation LatticeDeformation::certify(const DeformationDomain&,
-                                                 const Progress& progress) const {
-  CertifiedDeformation result{certifyLattice(lattice_, {.progress = progress})};
+                                                 const CertifyOptions& options) const {
+  CertifiedDeformation result{
+      certifyLattice(lattice_, {.maxMemory = options.maxMemory, .progress = options.progress})};
   if (result.certificate.isInjective()) result.inverse = std::make_shared<LatticeInverse>(lattice_);
   return result;
 }

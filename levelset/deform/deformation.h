@@ -24,6 +24,11 @@ struct DeformationDomain {
   double margin = 0;  ///< world units
 };
 
+struct CertifyOptions {
+  std::size_t maxMemory = kNoMemoryLimit;
+  Progress progress = {};
+};
+
 /// Inverse of a deformation that is injective in its domain. Read-only, so threads may share it.
 class DeformationInverse {
  public:
@@ -58,9 +63,9 @@ class Deformation {
   /// @throws InvalidInput
   virtual void requireDefined(const std::vector<Imath::V3d>& points, const char* what) const = 0;
   /// Bounds the Jacobian over a domain. It does not refuse folds, see requireInjective().
-  /// @throws Cancelled
+  /// @throws ResourceLimit, Cancelled
   [[nodiscard]] virtual CertifiedDeformation certify(const DeformationDomain& domain,
-                                                     const Progress& progress = {}) const = 0;
+                                                     const CertifyOptions& options = {}) const = 0;
 };
 
 /// Limits of a Newton iteration, world units.
@@ -129,7 +134,7 @@ class LatticeDeformation final : public Deformation {
   [[nodiscard]] Imath::Box3d bounds() const override { return lattice_.bounds(); }
   void requireDefined(const std::vector<Imath::V3d>& points, const char* what) const override;
   [[nodiscard]] CertifiedDeformation certify(const DeformationDomain& domain,
-                                             const Progress& progress = {}) const override;
+                                             const CertifyOptions& options = {}) const override;
 
  private:
   ControlLattice lattice_;

@@ -282,6 +282,11 @@ struct QueuedPart {
   }
 };
 
+double bytesOf(const JacobianPart& part) {
+  return static_cast<double>(
+      sizeof(double) * (part.numerator.coefficients.size() + part.weight.coefficients.size()));
+}
+
 /// Number of segments along each parameter of the triangles on the faces of the box.
 std::array<int, 3> faceSegments(const ControlLattice& lattice) {
   std::array<int, 3> segments{};
@@ -394,6 +399,7 @@ FoldCertificate certifyLattice(const ControlLattice& lattice,
   }
   for (std::size_t n = 0; n < all.size(); ++n)
     if (!isOpen[n]) settled = std::min(settled, all[n].low);
+  double bytes = 0;  // of the polynomials in the queue
   while (!queue.empty() && bounds.isAffordable() &&
          certificate.boxes < options.mostBoxes + all.size()) {
     const double low = queue.top().bounds.low;
@@ -401,13 +407,26 @@ FoldCertificate certifyLattice(const ControlLattice& lattice,
     if (low >= settled) break;
     QueuedPart top = queue.top();
     queue.pop();
-    if (!top.part) top.part = bounds.partOf(top.piece);
+    if (top.part)
+      bytes -= bytesOf(*top.part);
+    else
+      top.part = bounds.partOf(top.piece);
     for (JacobianPart& half : JacobianBounds::split(*top.part)) {
       QueuedPart next{JacobianBounds::boundsOf(half), top.piece, std::move(half)};
-      offer(next.bounds);
-      queue.push(std::move(next));
       ++certificate.boxes;
+      // The least value is not above best.high, so this part is never halved.
+      if (next.bounds.low >= best.high) {
+        settled = std::min(settled, next.bounds.low);
+        continue;
+      }
+      offer(next.bounds);
+      bytes += bytesOf(*next.part);
+      queue.push(std::move(next));
     }
+    requireMemory(bytes, options.maxMemory);
+    if (certificate.boxes % 64 == 0)
+      report(options.progress, 0.6 + 0.2 * static_cast<double>(certificate.boxes - all.size()) /
+                                         static_cast<double>(options.mostBoxes));
   }
   report(options.progress, 0.8);
   certificate.leastLow = std::min(settled, queue.empty() ? settled : queue.top().bounds.low);

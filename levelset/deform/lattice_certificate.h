@@ -12,6 +12,8 @@ namespace levelset {
 struct LatticeCertificateOptions {
   double tolerance = 0.01;        ///< width of the bracket over the least Jacobian
   std::size_t mostBoxes = 20000;  ///< limit of the boxes that are halved
+  /// Memory of the boxes that are not decided yet, bytes.
+  std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
 
@@ -24,7 +26,7 @@ struct LatticeCertificateOptions {
 /// A positive Jacobian proves that the map is injective near each point, not that it is injective.
 /// It is if the map of the faces is injective as well. The faces are tested as triangles between
 /// samples, by exact predicates: this finds overlaps larger than the triangles' chord errors.
-/// @throws Cancelled
+/// @throws ResourceLimit, Cancelled
 [[nodiscard]] FoldCertificate certifyLattice(const ControlLattice& lattice,
                                              const LatticeCertificateOptions& options = {});
 

@@ -61,7 +61,7 @@ class CageDeformation final : public Deformation {
   /// bound is an integral over the cage of how far it is from the affine map at c. A box that
   /// reaches the cage has no bound, so the domain must keep a small distance from the cage.
   [[nodiscard]] CertifiedDeformation certify(const DeformationDomain& domain,
-                                             const Progress& progress = {}) const override;
+                                             const CertifyOptions& options = {}) const override;
 
   /// Returns true for a point inside the cage at rest; a point on a face may be either.
   [[nodiscard]] bool contains(const Imath::V3d& world) const;

@@ -26,6 +26,8 @@ constexpr double kBracket = 0.25;
 /// Limits of the halvings and of the boxes that are bounded.
 constexpr int kMostCageLevels = DomainCells::kLevels + 6;
 constexpr std::size_t kMostCageBoxes = 300'000;
+/// Memory of a box and of the eight that it becomes.
+constexpr std::size_t kBytesOfHalved = 9 * sizeof(DomainCells::Cube);
 /// Level from which a box that reaches the cage is too close to it.
 constexpr int kNearCageLevel = DomainCells::kLevels + 3;
 /// Largest distance between the image of a result and the position, over the diagonal of the cage.
@@ -156,7 +158,8 @@ FoldCertificate certifyPoints(const CageDeformation& cage, const std::vector<V3d
 }  // namespace
 
 CertifiedDeformation CageDeformation::certify(const DeformationDomain& domain,
-                                              const Progress& progress) const {
+                                              const CertifyOptions& options) const {
+  const Progress& progress = options.progress;
   if (domain.triangles.empty()) {
     CertifiedDeformation result;
     result.certificate = certifyPoints(*this, domain.points);
@@ -183,6 +186,9 @@ CertifiedDeformation CageDeformation::certify(const DeformationDomain& domain,
   for (int level = 0; !open.empty(); ++level) {
     const bool isLast =
         level == kMostCageLevels || certificate.boxes + 8 * open.size() > kMostCageBoxes;
+    requireMemory(static_cast<double>(leaves.size() * sizeof(CageLeaf)) +
+                      static_cast<double>(open.size() * (sizeof(BallBounds) + kBytesOfHalved)),
+                  options.maxMemory);
     std::vector<BallBounds> bounds(open.size());
     std::vector<std::uint8_t> isBeyond(open.size(), 0);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, open.size(), 8), [&](const auto& range) {

@@ -49,8 +49,14 @@ class ControlledLattice final : public ControlledMap {
     data.points = controls;
     lattice_ = ControlLattice(std::move(data));
   }
-  [[nodiscard]] FoldCertificate certificate(const Progress& progress) const override {
-    return certifyLattice(lattice_, {.progress = progress});
+  [[nodiscard]] FoldCertificate certificate(const CertifyOptions& options) const override {
+    return certifyLattice(lattice_, {.maxMemory = options.maxMemory, .progress = options.progress});
+  }
+  [[nodiscard]] std::size_t slopesPerPoint() const override {
+    std::size_t count = 1;
+    for (const LatticeAxis& axis : lattice_.data().axes)
+      count *= static_cast<std::size_t>(axis.degree + 1);
+    return count;
   }
 
   [[nodiscard]] DeterminantSlope determinantAt(const V3d& world) const override {
@@ -157,9 +163,10 @@ class ControlledCage final : public ControlledMap {
   [[nodiscard]] std::vector<V3d> controls() const override { return cage_.moved(); }
   [[nodiscard]] std::vector<V3d> identity() const override { return cage_.rest(); }
   void move(const std::vector<V3d>& controls) override { cage_ = cage_.withMoved(controls); }
-  [[nodiscard]] FoldCertificate certificate(const Progress& progress) const override {
-    return cage_.certify(domain_, progress).certificate;
+  [[nodiscard]] FoldCertificate certificate(const CertifyOptions& options) const override {
+    return cage_.certify(domain_, options).certificate;
   }
+  [[nodiscard]] std::size_t slopesPerPoint() const override { return cage_.rest().size(); }
 
   [[nodiscard]] DeterminantSlope determinantAt(const V3d& world) const override {
     const DeformationJet jet = cage_.jet(world);

@@ -13,6 +13,8 @@ namespace levelset {
 struct UntangleOptions {
   /// Least Jacobian to reach, over the mean stretch of volume. In (0, 1).
   double leastShare = 0.05;
+  /// Memory of the gradients at the test points, and of each certificate, bytes.
+  std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
 
@@ -41,7 +43,7 @@ struct UntangledCage {
 /// does not fold is returned as it is.
 /// @throws UsageError for a share out of range
 /// @throws InvalidInput if the lattice overlaps itself without a fold, which is not repaired
-/// @throws Cancelled
+/// @throws ResourceLimit, Cancelled
 [[nodiscard]] UntangledLattice untangled(const ControlLattice& lattice,
                                          const UntangleOptions& options = {});
 

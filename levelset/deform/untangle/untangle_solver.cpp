@@ -32,7 +32,13 @@ double controlDiagonal(const std::vector<V3d>& points) {
 }
 
 std::vector<DeterminantSlope> determinantsAt(const ControlledMap& map,
-                                             const std::vector<V3d>& points) {
+                                             const std::vector<V3d>& points,
+                                             std::size_t maxMemory) {
+  // Lists grow by doubling.
+  requireMemory(2.0 * static_cast<double>(points.size()) *
+                    static_cast<double>(map.slopesPerPoint()) *
+                    sizeof(std::pair<std::uint32_t, V3d>),
+                maxMemory);
   std::vector<DeterminantSlope> all(points.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, all.size(), 4), [&](const auto& range) {
     for (std::size_t n = range.begin(); n != range.end(); ++n)
@@ -69,10 +75,11 @@ std::vector<V3d> leastChange(const std::vector<DeterminantSlope>& constraints, d
 
 /// Minimises the squared distance from `wanted` subject to the least Jacobian at the points.
 void approach(ControlledMap& map, const std::vector<V3d>& points, double least,
-              const std::vector<V3d>& wanted, double spacing) {
+              const std::vector<V3d>& wanted, double spacing, const CertifyOptions& options) {
   std::vector<V3d> at = map.controls();
   for (int step = 0; step < kUntangleSteps; ++step) {
-    std::vector<DeterminantSlope> constraints = determinantsAt(map, points);
+    report(options.progress, 0);  // may cancel
+    std::vector<DeterminantSlope> constraints = determinantsAt(map, points, options.maxMemory);
     double lowest = kActive * least;
     for (const DeterminantSlope& c : constraints) lowest = std::min(lowest, c.value);
     std::erase_if(constraints,
@@ -99,10 +106,14 @@ UntangleReport removeFolds(ControlledMap& map, const UntangleOptions& options) {
   const double size = controlDiagonal(identity);
   const double spacing =
       size / std::cbrt(static_cast<double>(std::max<std::size_t>(wanted.size(), 1)));
+  const auto progressOf = [&](std::size_t round) {
+    return 1 - 1 / (1 + 0.2 * static_cast<double>(round));
+  };
   const auto certify = [&] {
     ++report.rounds;
-    levelset::report(options.progress, 1 - 1 / (1 + 0.2 * static_cast<double>(report.rounds)));
-    return map.certificate({});
+    return map.certificate({.maxMemory = options.maxMemory,
+                            .progress = subProgress(options.progress, progressOf(report.rounds - 1),
+                                                    progressOf(report.rounds))});
   };
   FoldCertificate certificate = certify();
   if (certificate.isInjective()) return report;
@@ -112,7 +123,7 @@ UntangleReport removeFolds(ControlledMap& map, const UntangleOptions& options) {
   std::vector<V3d> points = map.testPoints();
   double scale = 0;
   {
-    const std::vector<DeterminantSlope> all = determinantsAt(map, points);
+    const std::vector<DeterminantSlope> all = determinantsAt(map, points, options.maxMemory);
     for (const DeterminantSlope& one : all) scale += std::abs(one.value);
     scale /= static_cast<double>(std::max<std::size_t>(all.size(), 1));
   }
@@ -120,7 +131,10 @@ UntangleReport removeFolds(ControlledMap& map, const UntangleOptions& options) {
   bool isDone = false;
   while (!isDone && report.rounds < kUntangleRounds) {
     for (const V3d& p : map.testPointsAround(certificate.place)) points.push_back(p);
-    approach(map, points, least, wanted, spacing);
+    approach(map, points, least, wanted, spacing,
+             {.maxMemory = options.maxMemory,
+              .progress = subProgress(options.progress, progressOf(report.rounds),
+                                      progressOf(report.rounds))});
     certificate = certify();
     isDone = certificate.isInjective();
     if (certificate.verdict == FoldVerdict::Certified || certificate.isNearCage) break;

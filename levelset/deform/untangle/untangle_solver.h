@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "levelset/deform/deformation_certificate.h"
+#include "levelset/deform/deformation.h"
 #include "levelset/deform/untangle/untangle_deformation.h"
 
 namespace levelset::untangle {
@@ -26,7 +26,9 @@ class ControlledMap {
   [[nodiscard]] virtual std::vector<Imath::V3d> identity() const = 0;
   virtual void move(const std::vector<Imath::V3d>& controls) = 0;
   [[nodiscard]] virtual DeterminantSlope determinantAt(const Imath::V3d& world) const = 0;
-  [[nodiscard]] virtual FoldCertificate certificate(const Progress& progress) const = 0;
+  [[nodiscard]] virtual FoldCertificate certificate(const CertifyOptions& options) const = 0;
+  /// Number of control points that move a point, at most.
+  [[nodiscard]] virtual std::size_t slopesPerPoint() const = 0;
   /// Points where the determinant is tested first.
   [[nodiscard]] virtual std::vector<Imath::V3d> testPoints() const = 0;
   /// Further test points where a certificate failed.
@@ -35,6 +37,7 @@ class ControlledMap {
 
 /// Moves the control points until the certificate proves that the map is injective.
 /// @throws InvalidInput if it overlaps itself without a fold
+/// @throws ResourceLimit, Cancelled
 [[nodiscard]] UntangleReport removeFolds(ControlledMap& map, const UntangleOptions& options);
 
 }  // namespace levelset::untangle

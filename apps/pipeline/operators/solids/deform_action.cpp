@@ -122,7 +122,8 @@ levelset::TriMesh cageMesh(const Invocation& in, const char* option) {
 
 /// Removes the folds of a cage in the operand.
 levelset::UntangledCage untangledCage(const levelset::CageDeformation& cage, Invocation& in) {
-  const levelset::UntangleOptions options{.progress = levelset::subProgress(in.progress, 0, 0.4)};
+  const levelset::UntangleOptions options{.maxMemory = in.maxMemory,
+                                          .progress = levelset::subProgress(in.progress, 0, 0.4)};
   if (in.operands[0].kind() == Kind::Mesh)
     return levelset::untangled(cage, {in.mesh().positions, in.mesh().triangles}, options);
   const levelset::TriMesh surface = levelset::bandToMesh(in.band());
@@ -154,7 +155,8 @@ ChosenDeformation deformationFor(Invocation& in, bool isPlan) {
   chosen.error = ready.error;
   if (isUntangled) {
     levelset::UntangledLattice result = levelset::untangled(
-        ready.lattice, {.progress = levelset::subProgress(in.progress, 0, 0.4)});
+        ready.lattice,
+        {.maxMemory = in.maxMemory, .progress = levelset::subProgress(in.progress, 0, 0.4)});
     ready.lattice = result.lattice;
     chosen.untangled = result.report;
   }
@@ -277,8 +279,8 @@ nlohmann::ordered_json foldCertificateJson(const levelset::FoldCertificate& cert
 DeformedValue deformed(const Value& operand, const levelset::Deformation& map,
                        const DeformValueOptions& options) {
   if (operand.kind() == Kind::Points) {
-    levelset::DeformPointsResult result =
-        levelset::deformPoints(operand.cloud(), map, options.progress);
+    levelset::DeformPointsResult result = levelset::deformPoints(
+        operand.cloud(), map, {.maxMemory = options.maxMemory, .progress = options.progress});
     return {Value(std::move(result.cloud)), result.certificate};
   }
   if (operand.kind() == Kind::Mesh) {
