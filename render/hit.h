@@ -63,6 +63,9 @@ struct Hit {
   /// The field of a solid contributes to this hit on a blended surface, but the solid's band does
   /// not extend to this point.
   bool isBeyondBand = false;
+  /// A double root of a Bézier volume, or a point where its map is singular:
+  /// BezierRoot::isSingular.
+  bool isSingular = false;
   /// Distance along the ray, world units, at which it continues behind a mesh surface: far enough
   /// not to hit the same triangle again.
   [[nodiscard]] double beyond() const { return distance + 2 * surfaceError; }

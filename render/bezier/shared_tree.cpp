@@ -205,7 +205,8 @@ SharedTree::~SharedTree() = default;
 SharedTree::SharedTree(SharedTree&&) noexcept = default;
 SharedTree& SharedTree::operator=(SharedTree&&) noexcept = default;
 
-SharedTree::Roots SharedTree::rootsOf(const std::vector<Camera::Ray>& rays) const {
+SharedTree::Roots SharedTree::rootsOf(const std::vector<Camera::Ray>& rays,
+                                      TreeCounts* counts) const {
   const BezierView& view = data_->view();
   std::vector<V2d> screens;
   screens.reserve(rays.size());
@@ -219,7 +220,7 @@ SharedTree::Roots SharedTree::rootsOf(const std::vector<Camera::Ray>& rays) cons
       screens.emplace_back(offset.dot(view.right), offset.dot(view.down));
     }
   }
-  return data_->rootsOf(std::move(screens), nullptr);
+  return data_->rootsOf(std::move(screens), counts);
 }
 
 SharedTree::Roots SharedTree::rootsAt(const std::vector<V2d>& positions, TreeCounts* counts) const {

@@ -88,7 +88,8 @@ class SharedTree {
   /// are in one call.
   [[nodiscard]] Roots rootsAt(const std::vector<Imath::V2d>& positions, TreeCounts* counts) const;
   /// Finds the roots of rays of the camera.
-  [[nodiscard]] Roots rootsOf(const std::vector<Camera::Ray>& rays) const;
+  [[nodiscard]] Roots rootsOf(const std::vector<Camera::Ray>& rays,
+                              TreeCounts* counts = nullptr) const;
   /// Work of the constructor.
   [[nodiscard]] const TreeCounts& counts() const;
 

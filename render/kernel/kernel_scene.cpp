@@ -299,15 +299,17 @@ std::size_t KernelScene::bytes() const {
   return sum + mapped_.bytes();
 }
 
-std::vector<Hit> KernelScene::castBeziers(const std::vector<Camera::Ray>& rays) const {
+std::vector<Hit> KernelScene::castBeziers(const std::vector<Camera::Ray>& rays,
+                                          TreeCounts* counts) const {
   std::vector<Hit> hits(beziers_.empty() ? 0 : rays.size());
   for (std::size_t part = 0; part < beziers_.size(); ++part) {
-    const SharedTree::Roots found = trees_[part]->rootsOf(rays);
+    const SharedTree::Roots found = trees_[part]->rootsOf(rays, counts);
     for (std::size_t i = 0; i < rays.size(); ++i) {
       if (found.first[i] == found.first[i + 1]) continue;
       const BezierRoot& root = found.roots[found.first[i]];
       if (hits[i].found && hits[i].distance <= root.distance) continue;
       hits[i] = beziers_[part].hitOf(rays[i], root.distance, root.normal, bezierSolid_ + part);
+      hits[i].isSingular = root.isSingular;
     }
   }
   return hits;

@@ -127,7 +127,8 @@ class KernelScene {
   /// Surfaces in Bézier volumes.
   [[nodiscard]] const std::vector<BezierPart>& beziers() const { return beziers_; }
   /// First hits of rays of the camera with the surfaces in Bézier volumes; empty without any.
-  [[nodiscard]] std::vector<Hit> castBeziers(const std::vector<Camera::Ray>& rays) const;
+  [[nodiscard]] std::vector<Hit> castBeziers(const std::vector<Camera::Ray>& rays,
+                                             TreeCounts* counts = nullptr) const;
   [[nodiscard]] std::size_t bytes() const;
   /// Numbers of blocks of all solids, by their use in the brick tables.
   struct Counts {

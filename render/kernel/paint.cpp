@@ -149,7 +149,9 @@ KernelPainter::FirstHits KernelPainter::firstHits(const KernelTracer& tracer,
       first.onInterfaces.push_back(
           segmented->hitOf(asked[i], hits[i], scene_.solids.size() + scene_.mapped.size()));
   }
-  first.onBeziers = surfaces_.castBeziers(rays);
+  TreeCounts counts;
+  first.onBeziers = surfaces_.castBeziers(rays, &counts);
+  if (counts.overruns > 0) layers_.overruns += counts.overruns;
   return first;
 }
 

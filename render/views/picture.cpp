@@ -53,9 +53,20 @@ void PictureLayers::setHit(std::size_t i, const Camera& camera, const Hit& hit) 
   }
   id[i] = hit.id;
   if (hit.isBeyondBand) ++beyondBand;
+  if (hit.isSingular) ++singular;
 }
 
 void PictureLayers::addWarnings(Image& image, const Scene& scene) const {
+  if (const std::size_t count = singular; count > 0)
+    image.attributes["ls:bezierSingular"] = fmt::format("{}", count);
+  if (const std::size_t count = overruns; count > 0) {
+    image.attributes["ls:bezierOverruns"] = fmt::format("{}", count);
+    image.attributes["ls:warning"] = fmt::format(
+        "rays gave up {} time{} after {} undecided parts of a Bézier volume, so pixels may miss "
+        "its "
+        "surface; move the camera so that no ray lies in the surface",
+        count, count == 1 ? "" : "s", kMostVisits);
+  }
   const std::size_t count = beyondBand;
   if (count == 0) return;
   image.attributes["ls:warning"] = fmt::format(

@@ -231,6 +231,12 @@ Value draw(Invocation& in) {
     in.notes.notes.push_back(fmt::format("render: {}", read->second));
   if (const auto told = image.attributes.find("ls:warning"); told != image.attributes.end())
     in.notes.warnings.push_back(fmt::format("render: {}", told->second));
+  if (const auto count = image.attributes.find("ls:bezierSingular");
+      count != image.attributes.end())
+    in.notes.notes.push_back(
+        fmt::format("render: pixels that show a double root of a Bézier volume, or a point where "
+                    "its map is singular: {}",
+                    count->second));
   render::writeImage(in.text("file"), image, in.text("format"));
   if (in.given("png")) render::writeImage(in.text("png"), image, "png");
   if (isBoth) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <set>
+#include <string>
 #include <vector>
 
 #include "levelset/error.h"
@@ -114,6 +115,32 @@ TEST(BezierScene, IsReadAndWritten) {
   const Image before = renderCpu(scene, kPlain), after = renderCpu(again.scene, kPlain);
   EXPECT_EQ(before.channels.at("Z"), after.channels.at("Z"));
   EXPECT_EQ(before.ids, after.ids);
+}
+
+TEST(BezierScene, ReportsSingularPixels) {
+  // The ray in the middle meets the point where two balls touch, and no other ray does.
+  Scene scene = sceneOf(bezier_scenes::touchingBalls());
+  scene.camera = {.from = {0, -6, 0}, .up = {0, 0, 1}, .width = 5, .height = 5};
+  const Image image = renderCpu(scene, kPlain);
+  EXPECT_EQ(image.attributes.at("ls:bezierSingular"), "1");
+  EXPECT_FALSE(image.attributes.contains("ls:warning"));
+  EXPECT_FALSE(renderCpu(sceneOf(bezier_scenes::sphere(2)), kPlain)
+                   .attributes.contains("ls:bezierSingular"));
+}
+
+TEST(BezierScene, WarnsOfRaysThatGiveUp) {
+  // The expression leaves nothing of the plane z = 0, in which the rays of the middle row lie.
+  BezierVolume volume{{bezier_scenes::boxPatch({2, 2, 2}, V3d(-1), V3d(1))}};
+  bezier_scenes::addAttribute(volume.patches[0], {{{1}, {1}, {0, 1}}}, V3d(-1), V3d(1));
+  bezier_scenes::addAttribute(volume.patches[0], {{{0, 0.1}, {1}, {-1}}}, V3d(-1), V3d(1));
+  volume.expression = {0, 1, -3};
+  Scene scene = sceneOf(volume);
+  scene.camera = {.from = {0, -6, 0}, .up = {0, 0, 1}, .width = 3, .height = 3};
+  const Image image = renderCpu(scene, kPlain);
+  ASSERT_TRUE(image.attributes.contains("ls:bezierOverruns"));
+  const std::string& warning = image.attributes.at("ls:warning");
+  EXPECT_NE(warning.find("rays gave up"), std::string::npos) << warning;
+  EXPECT_NE(warning.find("20000 undecided parts"), std::string::npos) << warning;
 }
 
 TEST(BezierScene, RefusesWhatIsNotDrawn) {
