@@ -94,7 +94,10 @@ ControlLattice latticeOfText(const std::string& text) {
   const LatticeReader reader;
   if (isJsonTooDeep(text)) reader.refuse("has too deeply nested lists");
   const Json json = Json::parse(text, nullptr, /*allow_exceptions=*/false);
-  if (json.is_discarded()) reader.refuse("is not a JSON document, or is truncated");
+  if (json.is_discarded())
+    reader.refuse("is not a JSON document, is truncated, or has a number that is not finite");
+  if (const auto key = repeatedKey(text))
+    reader.refuse(fmt::format("lists \"{}\" twice in one object", *key));
   if (reader.member(json, "format") != kLatticeFormat) reader.refuse("is not a lattice file");
   if (reader.number(reader.member(json, "version"), "\"version\"") != kLatticeVersion)
     reader.refuse(fmt::format("does not have version {}", kLatticeVersion));

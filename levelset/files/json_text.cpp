@@ -4,12 +4,59 @@
 
 #include <fstream>
 #include <iterator>
+#include <nlohmann/json.hpp>
+#include <set>
 #include <system_error>
+#include <tuple>
+#include <vector>
 
 #include "levelset/error.h"
 #include "levelset/progress.h"
 
 namespace levelset {
+namespace {
+
+/// Visits the parts of a JSON text without keeping them. Stops at a repeated key.
+class KeyVisitor : public nlohmann::json_sax<nlohmann::json> {
+ public:
+  std::optional<std::string> repeated;
+
+  bool null() override { return true; }
+  bool boolean(bool) override { return true; }
+  bool number_integer(number_integer_t) override { return true; }
+  bool number_unsigned(number_unsigned_t) override { return true; }
+  bool number_float(number_float_t, const string_t&) override { return true; }
+  bool string(string_t&) override { return true; }
+  bool binary(binary_t&) override { return true; }
+  bool start_array(std::size_t) override { return true; }
+  bool end_array() override { return true; }
+  bool start_object(std::size_t) override {
+    open_.emplace_back();
+    return true;
+  }
+  bool end_object() override {
+    open_.pop_back();
+    return true;
+  }
+  bool key(string_t& name) override {
+    if (!open_.back().insert(name).second) repeated = name;
+    return !repeated;
+  }
+  bool parse_error(std::size_t, const std::string&, const nlohmann::detail::exception&) override {
+    return false;
+  }
+
+ private:
+  std::vector<std::set<std::string>> open_;  ///< keys of the objects that are not closed
+};
+
+}  // namespace
+
+std::optional<std::string> repeatedKey(const std::string& text) {
+  KeyVisitor visitor;
+  std::ignore = nlohmann::json::sax_parse(text, &visitor);
+  return visitor.repeated;
+}
 
 std::string readJsonText(const std::filesystem::path& file, const char* wanted,
                          std::size_t maxMemory) {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -34,6 +35,10 @@ inline constexpr std::size_t kMaxJsonDepth = 64;
   }
   return false;
 }
+
+/// Finds a key that an object of a JSON text lists twice: readers of JSON would keep the last entry.
+/// @return the key; nullopt if there is none before the first syntax error
+[[nodiscard]] std::optional<std::string> repeatedKey(const std::string& text);
 
 /// Memory for each character of a JSON text, bytes: the character itself, and its share of a node
 /// with its list entry, which takes at least two characters.

@@ -165,7 +165,11 @@ void addPatches(const BezierJson& json, std::size_t attributes, std::size_t maxM
 BezierVolume volumeOfText(const std::string& text, std::size_t maxMemory) {
   if (levelset::isJsonTooDeep(text)) BezierReader::refuse("has too deeply nested lists");
   const BezierJson json = BezierJson::parse(text, nullptr, /*allow_exceptions=*/false);
-  if (json.is_discarded()) BezierReader::refuse("is not a JSON document, or is truncated");
+  if (json.is_discarded())
+    BezierReader::refuse(
+        "is not a JSON document, is truncated, or has a number that is not finite");
+  if (const auto key = levelset::repeatedKey(text))
+    BezierReader::refuse(fmt::format("lists \"{}\" twice in one object", *key));
   if (BezierReader::member(json, "format") != kBezierFormat)
     BezierReader::refuse("is not a Bézier volume");
   if (BezierReader::number(BezierReader::member(json, "version"), "version") != kBezierVersion)

@@ -8,6 +8,7 @@
 #include "levelset/mesh_files/mesh_file.h"
 #include "levelset/shapes/shapes.h"
 #include "mapping/patches/patch_file.h"
+#include "render/views/bezier_file.h"
 #include "render/views/scene_file.h"
 #include "tests/fuzz/readers.h"
 
@@ -27,6 +28,18 @@ void readLattice(std::string_view bytes) {
   accepts([&] {
     const levelset::ControlLattice lattice = levelset::readLattice(file, kMaxMemory);
     require(lattice.data().points.size() >= 8, "a lattice has eight control points");
+  });
+}
+
+void readBezier(std::string_view bytes) {
+  const std::filesystem::path file = scratchFile("bezier.json", bytes);
+  accepts([&] {
+    const render::BezierVolume volume = render::readBezierVolume(file, kMaxMemory);
+    require(!volume.patches.empty(), "a Bézier volume has a patch");
+    require(!volume.bounds().isEmpty(), "a Bézier volume has bounds");
+    writeBezierVolume(file, volume);
+    require(render::readBezierVolume(file).bytes() == volume.bytes(),
+            "a Bézier volume is read as it was written");
   });
 }
 
@@ -72,8 +85,11 @@ void readCache(std::string_view bytes) {
 }  // namespace
 
 std::vector<Reader> documentReaders() {
-  return {
-      {"patch", readPatch}, {"lattice", readLattice}, {"scene", readScene}, {"cache", readCache}};
+  return {{"patch", readPatch},
+          {"lattice", readLattice},
+          {"bezier", readBezier},
+          {"scene", readScene},
+          {"cache", readCache}};
 }
 
 }  // namespace fuzz

@@ -76,6 +76,8 @@ TEST(FuzzDepth, NestedListsAreRefusedBeforeStackOverflow) {
       {"graph", R"({"format": )" + lists + "}"},
       {"patch", R"({"format": "levelsmith patches", "version": 1, "patches": )" + lists + "}"},
       {"lattice", R"({"format": "levelsmith lattice", "version": 1, "points": )" + lists + "}"},
+      {"bezier",
+       R"({"format": "levelsmith bezier volume", "version": 1, "patches": )" + lists + "}"},
       {"scene", R"({"format": "levelsmith scene", "version": 1, "solids": )" + lists + "}"},
       {"cache", R"({"version": 1, "action": )" + lists + "}"}};
   for (const auto& [name, text] : documents)

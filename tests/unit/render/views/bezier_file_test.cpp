@@ -2,13 +2,14 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdint>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <random>
 #include <string>
-#include <string_view>
 
 #include "levelset/error.h"
+#include "render/bezier/shared_tree.h"
 #include "render/views/scene_file.h"
 #include "tests/support/bezier_scenes.h"
 #include "tests/support/files.h"
@@ -135,30 +136,76 @@ TEST(BezierFile, RefusesWithASentence) {
   EXPECT_NE(refusal(document(kCube + "}", R"("isovalue": 1e999, )")), "");
   EXPECT_NE(refusal("{}"), "");
   EXPECT_NE(refusal(""), "");
+  const auto expectRefusal = [](const std::string& text, const std::string& part) {
+    EXPECT_NE(refusal(text).find(part), std::string::npos) << refusal(text);
+  };
+  const auto withPoint = [](const std::string& point) {
+    std::string text = kCube + "}";
+    return document(text.replace(text.find("[1,0,0,0.5]"), 11, point));
+  };
+  EXPECT_EQ(refusal(withPoint("[1,0,0,0.5]")), "");
+  for (const char* number : {"NaN", "Infinity", "1e999", "-1e999"})
+    expectRefusal(withPoint(std::string("[1,0,0,") + number + "]"), "a number that is not finite");
+  expectRefusal(withPoint("[1,0,0,1e31]"), "is 1e+31; give a finite number up to 1e+30");
+  expectRefusal(withPoint("[1e31,0,0,1]"), "give finite coordinates up to 1e+30");
+  expectRefusal(withPoint("[1,0,0]"), "a point of 3 numbers, not 4");
+  expectRefusal(withPoint("[1,0,0,null]"), "\"points\" that is not finite");
+  expectRefusal(withPoint("7"), "\"points\" that is not a list");
+  expectRefusal(document(kCube + R"(, "count": [65536, 65536, 2]})"), "needs 8589934592");
+  expectRefusal(document(kCube + R"(, "count": [1000000, 1000000, 1000000]})"), "needs 1e+18");
+  expectRefusal(document(kCube + R"(, "count": [18446744073709551618, 2, 2]})"), "in \"count\"");
+  expectRefusal(document(kCube + R"(, "count": [0, 2, 2]})"), "has 0 in \"count\"");
+  expectRefusal(document(kCube + R"(, "degree": [1, 1, 1]})"), "lists \"degree\" twice");
+  expectRefusal(document(kCube + "}", R"("version": 1, )"), "lists \"version\" twice");
+  expectRefusal(document(kCube + "}", R"("attributes": 3, )"), "\"attributes\"");
+  expectRefusal(document(kCube + R"(, "weights": {}})"), "\"weights\" that is not a list");
+  expectRefusal(document(kCube + R"(, "knots": [[0,0,1,1],[0,0,1,1],[0,0,NaN,1]]})"), "not finite");
+  expectRefusal(document(std::string(100'000, '[')), "too deeply nested");
 }
 
-TEST(BezierFile, SurvivesMutations) {
+/// Mutated files are refused with a sentence, or are volumes that are drawn. The mutants of the
+/// first one move points in space, those of the second one also change the expression.
+TEST(BezierFile, TwoHundredMutatedFilesAreRefusedOrDrawn) {
   const support::TemporaryFolder folder;
-  writeBezierVolume(folder.path() / "volume.json", bezier_scenes::collapsedEdge());
-  const std::string text = support::readText(folder.path() / "volume.json");
-  std::uint64_t state = 1;
-  const auto next = [&](std::size_t limit) {
-    state = state * 6364136223846793005ULL + 1442695040888963407ULL;
-    return static_cast<std::size_t>(state >> 33) % limit;
-  };
-  constexpr std::string_view kLetters = "0123456789.-eE[]{},:\"";
-  std::size_t refused = 0;
-  for (int mutant = 0; mutant < 200; ++mutant) {
-    std::string spoilt = text;
-    for (int n = 0; n < 3; ++n) spoilt[next(spoilt.size())] = kLetters[next(kLetters.size())];
-    if (mutant % 4 == 0) spoilt.resize(next(spoilt.size()));
-    try {
-      (void)parseBezierVolume(spoilt, "x.json");
-    } catch (const levelset::Error&) {
-      ++refused;
+  BezierVolume two = bezier_scenes::sphere(2);
+  bezier_scenes::addAttribute(two.patches[0], {{{0.3, 1}, {1}, {1}}}, V3d(-1.25), V3d(1.25));
+  two.expression = {0, 1, -3};
+  std::mt19937 random(1);
+  std::size_t refused = 0, drawn = 0, hits = 0;
+  for (const BezierVolume& volume : {bezier_scenes::collapsedEdge(), two}) {
+    writeBezierVolume(folder.path() / "volume.json", volume);
+    const std::string text = support::readText(folder.path() / "volume.json");
+    for (int mutant = 0; mutant < 100; ++mutant) {
+      SCOPED_TRACE(mutant);
+      const std::string spoilt = support::mutated(text, random);
+      BezierVolume read;
+      try {
+        read = parseBezierVolume(spoilt, "x.json");
+      } catch (const levelset::Error& error) {
+        ++refused;
+        EXPECT_EQ(std::string(error.what()).find("x.json: "), 0u) << error.what();
+        EXPECT_GT(std::string(error.what()).size(), 40u) << error.what();
+        continue;
+      }
+      render::Camera camera;
+      camera.to = volume.bounds().center();
+      camera.from = camera.to + V3d(1, -1.6, 0.9) * 2;
+      camera.up = V3d(0, 0, 1);
+      camera.width = camera.height = 8;
+      const render::BezierPicture picture =
+          castBezier(read, camera, {.maxBytes = std::size_t{200} << 20});
+      ++drawn;
+      hits += picture.roots.size();
+      for (const render::BezierRoot& root : picture.roots) {
+        EXPECT_TRUE(std::isfinite(root.depth));
+        EXPECT_NEAR(root.normal.length(), 1, 1e-9);
+      }
     }
   }
-  EXPECT_GT(refused, 100U);
+  EXPECT_EQ(refused + drawn, 200U);
+  EXPECT_GT(refused, 80U);
+  EXPECT_GT(drawn, 30U);
+  EXPECT_GT(hits, 300U);
 }
 
 }  // namespace
