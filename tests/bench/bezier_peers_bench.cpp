@@ -100,11 +100,11 @@ BezierVolume blade(const std::array<int, 3>& count) {
                5 * s);
   };
   const auto speed = [](double s, double c, double t) {
-    const V3d v(1 + 0.6 * std::sin(3 * c) * (0.5 + s), 0.3 * std::cos(7 * s) * (t - 0.5),
+    const double layer = 1.2 - (2 * t - 1) * (2 * t - 1);  // slower at both faces
+    const V3d v(layer * (1 + 0.3 * std::sin(3 * c) * (0.5 + s)), 0.3 * std::cos(7 * s) * (t - 0.5),
                 0.2 * std::sin(9 * s + 4 * c));
     return v.length();
   };
-  volume.isovalue = 1.45;
   for (int i = 0; i < count[0]; ++i)
     for (int j = 0; j < count[1]; ++j)
       for (int k = 0; k < count[2]; ++k) {
@@ -205,20 +205,22 @@ Triangles tessellate(const BezierVolume& volume, const Camera& camera, double pi
   return result;
 }
 
-/// Triangles of the isosurface in volumes by marching tetrahedra in the parameters: each edge of a
-/// grid of n³ cells has a crossing, by the rule of false position on the exact attribute.
-Triangles extract(const BezierVolume& volume, int n, const V3d& origin) {
+/// Triangles of the isosurface in volumes by marching tetrahedra in the parameters. The crossings
+/// of the edges of a grid are those of the exact attribute, by the rule of false position.
+/// @param cells  of each patch along its parameters
+Triangles extract(const BezierVolume& volume, const std::array<int, 3>& cells, const V3d& origin) {
   constexpr std::array<std::array<int, 4>, 6> kTetrahedra = {
       {{0, 1, 3, 7}, {0, 1, 5, 7}, {0, 2, 3, 7}, {0, 2, 6, 7}, {0, 4, 5, 7}, {0, 4, 6, 7}}};
   Triangles result;
   result.origin = origin;
-  const int side = n + 1;
+  const int sideV = cells[1] + 1, sideW = cells[2] + 1, nodes = (cells[0] + 1) * sideV * sideW;
   for (const BezierPatch& patch : volume.patches) {
     const auto parameter = [&](int node) {
-      return V3d(node / (side * side), node / side % side, node % side) / n;
+      return V3d(node / (sideV * sideW), node / sideW % sideV, node % sideW) /
+             V3d(cells[0], cells[1], cells[2]);
     };
-    std::vector<double> values(static_cast<std::size_t>(side * side * side));
-    for (int node = 0; node < side * side * side; ++node)
+    std::vector<double> values(static_cast<std::size_t>(nodes));
+    for (int node = 0; node < nodes; ++node)
       values[static_cast<std::size_t>(node)] =
           attributeAt(patch, 0, parameter(node)) - volume.isovalue;
     std::map<std::pair<int, int>, std::uint32_t> crossings;
@@ -238,13 +240,13 @@ Triangles extract(const BezierVolume& volume, int n, const V3d& origin) {
       entry->second = result.add(positionAt(patch, from + (to - from) * t));
       return entry->second;
     };
-    for (int i = 0; i < n; ++i)
-      for (int j = 0; j < n; ++j)
-        for (int k = 0; k < n; ++k)
+    for (int i = 0; i < cells[0]; ++i)
+      for (int j = 0; j < cells[1]; ++j)
+        for (int k = 0; k < cells[2]; ++k)
           for (const auto& tetrahedron : kTetrahedra) {
             std::vector<int> in, out;
             for (const int c : tetrahedron) {
-              const int node = ((i + (c & 1)) * side + j + (c >> 1 & 1)) * side + k + (c >> 2);
+              const int node = ((i + (c & 1)) * sideV + j + (c >> 1 & 1)) * sideW + k + (c >> 2);
               (values[static_cast<std::size_t>(node)] < 0 ? in : out).push_back(node);
             }
             if (in.empty() || out.empty()) continue;
@@ -381,12 +383,15 @@ void embree(int size) {
     if (c.isSurface) {
       triangles = tessellate(c.volume, camera, kPixels);
     } else {
-      // The sagitta of the circle, and of the bend, in cells of this size.
-      const double tolerance =
-          kPixels * pixelAt(camera, (c.volume.bounds().center() - camera.from).length() - 1.5);
-      const int cells =
-          static_cast<int>(std::ceil(0.4 * std::sqrt(2.0) / std::sqrt(8 * 0.8 * tolerance)));
-      triangles = extract(c.volume, cells, c.volume.bounds().center());
+      // Half of the tolerance for the sagitta of the section of radius 0.8, whose spans are 0.4
+      // wide, and half for that of the bend of radius 2.8, whose spans are 1.2 radians long.
+      const double nearest = (c.volume.bounds().center() - camera.from).length() - 1.5,
+                   tolerance = 0.5 * kPixels * pixelAt(camera, nearest);
+      const auto cellsOf = [&](double span, double radius) {
+        return static_cast<int>(std::ceil(span / std::sqrt(8 * radius * tolerance)));
+      };
+      const int across = cellsOf(0.4 * std::sqrt(2.0), 0.8), along = cellsOf(1.2 * 2.8, 2.8);
+      triangles = extract(c.volume, {across, across, along}, c.volume.bounds().center());
     }
     const double made = cpuSeconds();
     embreeBytes = 0;
@@ -450,8 +455,9 @@ void largeSet(int size) {
              "points MB", "4 floats MB", "peak MB", "cover %", "shared s", "nodes MB");
   for (const std::array<int, 3>& count : {std::array<int, 3>{50, 50, 5}, {200, 200, 20}}) {
     BezierVolume volume = blade(count);
-    const Camera camera = cameraOf(volume, size, size, 0.3);
-    for (const double isovalue : {1.3, 1.45, 1.6}) {
+    Camera camera = cameraOf(volume, size, size, 1);
+    camera.from = camera.to + V3d(0.9, -1.6, 0.3);
+    for (const double isovalue : {0.6, 0.9, 1.2}) {
       volume.isovalue = isovalue;
       const Timed run = timed(volume, camera, kShared);
       fmt::print("{:>9} {:>9} {:>9.0f} {:>11.0f} {:>9.0f} {:>9.1f} {:>9.2f} {:>9.1f}\n",

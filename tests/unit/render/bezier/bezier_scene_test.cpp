@@ -132,7 +132,7 @@ TEST(BezierScene, WarnsOfRaysThatGiveUp) {
   // The expression leaves nothing of the plane z = 0, in which the rays of the middle row lie.
   BezierVolume volume{{bezier_scenes::boxPatch({2, 2, 2}, V3d(-1), V3d(1))}};
   bezier_scenes::addAttribute(volume.patches[0], {{{1}, {1}, {0, 1}}}, V3d(-1), V3d(1));
-  bezier_scenes::addAttribute(volume.patches[0], {{{0, 0.1}, {1}, {-1}}}, V3d(-1), V3d(1));
+  bezier_scenes::addAttribute(volume.patches[0], {{{-1}, {1}, {1}}}, V3d(-1), V3d(1));
   volume.expression = {0, 1, -3};
   Scene scene = sceneOf(volume);
   scene.camera = {.from = {0, -6, 0}, .up = {0, 0, 1}, .width = 3, .height = 3};
