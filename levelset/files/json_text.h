@@ -36,7 +36,8 @@ inline constexpr std::size_t kMaxJsonDepth = 64;
   return false;
 }
 
-/// Finds a key that an object of a JSON text lists twice: readers of JSON would keep the last entry.
+/// Finds a key that an object of a JSON text lists twice: readers of JSON would keep the last
+/// entry.
 /// @return the key; nullopt if there is none before the first syntax error
 [[nodiscard]] std::optional<std::string> repeatedKey(const std::string& text);
 

@@ -125,6 +125,18 @@ TEST(LatticeCertificate, IsTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(support::onThreads(1, figures), support::onThreads(4, figures));
 }
 
+TEST(LatticeCertificate, ObeysItsMemoryAndCanBeInterrupted) {
+  // The Jacobian of this lattice of degree 6 has 18³ coefficients, 47 kB, in each box.
+  const ControlLattice lattice =
+      shaken({uniformAxis(6, 7), uniformAxis(6, 7), uniformAxis(6, 7)}, 0.1, false);
+  const FoldCertificate found = certifyLattice(lattice, {.maxMemory = 100'000'000});
+  EXPECT_GT(found.boxes, 20u);
+  EXPECT_THROW((void)certifyLattice(lattice, {.maxMemory = 90'000}), ResourceLimit);
+  int reports = 0;
+  EXPECT_THROW((void)certifyLattice(lattice, {.progress = [&](double) { return ++reports < 5; }}),
+               Cancelled);
+}
+
 TEST(LatticeCertificate, CertifiesHighDegreesAndManyPieces) {
   EXPECT_EQ(certifyLattice(
                 shaken({uniformAxis(20, 21), uniformAxis(2, 3), uniformAxis(2, 3)}, 0.01, false))

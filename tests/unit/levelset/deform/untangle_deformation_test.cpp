@@ -64,6 +64,20 @@ TEST(Untangle, LatticesAreCertifiedAfterwards) {
     }
 }
 
+TEST(Untangle, ObeysItsMemoryAndCanBeInterrupted) {
+  const ControlLattice folded = shakenLattice(2, 4, 0.7, false);
+  EXPECT_THROW((void)untangled(folded, {.maxMemory = 100'000}), ResourceLimit);
+  double last = 0;
+  int reports = 0;
+  EXPECT_THROW((void)untangled(folded, {.progress =
+                                            [&](double share) {
+                                              EXPECT_GE(share, last);
+                                              last = share;
+                                              return ++reports < 12;
+                                            }}),
+               Cancelled);
+}
+
 TEST(Untangle, LeavesLatticesWithoutFoldsAsTheyAre) {
   const ControlLattice good = shakenLattice(2, 5, 0.1, false);
   const UntangledLattice result = untangled(good);
