@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "levelset/error.h"
-#include "levelset/progress.h"
 
 namespace levelset {
 namespace {

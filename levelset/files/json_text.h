@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "levelset/memory_limit.h"
+#include "levelset/progress.h"
 
 namespace levelset {
 

@@ -15,6 +15,7 @@
 #include "levelset/file_target.h"
 #include "levelset/files/band_file.h"
 #include "levelset/files/json_text.h"
+#include "levelset/memory_limit.h"
 #include "levelset/mesh_files/mesh_file.h"
 #include "levelset/transform/transform.h"
 #include "levelset/volume_files/volume_file.h"
