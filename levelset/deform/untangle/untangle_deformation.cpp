@@ -137,7 +137,8 @@ class ControlledLattice final : public ControlledMap {
     const V3d u = lattice_.parameterOf(place);
     std::vector<V3d> points;
     for (int n = 0; n < 27; ++n) {
-      V3d at(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+      const int row = n / 3, layer = n / 9;
+      V3d at(n % 3 - 1, row % 3 - 1, layer - 1);
       for (int axis = 0; axis < 3; ++axis) {
         const LatticeAxis& of = lattice_.data().axes[static_cast<std::size_t>(axis)];
         const double step =
@@ -156,8 +157,8 @@ class ControlledLattice final : public ControlledMap {
 
 class ControlledCage final : public ControlledMap {
  public:
-  ControlledCage(CageDeformation cage, const DeformationDomain& domain)
-      : cage_(std::move(cage)), domain_(domain) {}
+  ControlledCage(const CageDeformation& cage, const DeformationDomain& domain)
+      : cage_(cage), domain_(domain) {}
 
   [[nodiscard]] const CageDeformation& cage() const { return cage_; }
   [[nodiscard]] std::vector<V3d> controls() const override { return cage_.moved(); }
