@@ -16,7 +16,7 @@ namespace {
 constexpr int kInterfaceGroup = 64;  // invocations of a work group
 // Rays of a dispatch, few enough to finish within the time limits of drivers in double precision.
 constexpr std::size_t kInterfaceRun = 1u << 16;
-constexpr std::size_t kInterfaceNumbers = 13;  // numbers of a ray
+constexpr std::size_t kInterfaceNumbers = 14;  // numbers of a ray
 constexpr std::size_t kInterfaceAnswers = 10;  // state, distance, labels, two gradients
 // Iterations of loops in one call of the shader. Mesa's llvmpipe ends loops without notice after
 // 65535 iterations of all loops of up to 16 rays.
@@ -30,6 +30,7 @@ constexpr const char* kInterfaceDialect = R"GLSL(
 #define IN(Type) Type
 #define INOUT(Type) inout Type
 #define CONST_INT const int
+#define CONST_DOUBLE const double
 uniform int firstRay, rayCount, pointsX, pointsY, pointsZ, groupsY, groupsZ, gradients;
 uniform float backgroundValue;
 layout(binding = 0) uniform usamplerBuffer blocks;
@@ -68,6 +69,30 @@ bool isShown(int label) { return ((texelFetch(shown, label >> 5).x >> uint(label
 int bitsIn(uint x) { return bitCount(x); }
 )GLSL";
 
+constexpr const char* kSheetDialect = R"GLSL(
+const bool hasSheets = true;
+layout(binding = 9) uniform usamplerBuffer sheetCells;
+layout(binding = 10) uniform isamplerBuffer sheetLists;
+layout(binding = 11) uniform isamplerBuffer sheetTriangles;
+layout(binding = 12) uniform usamplerBuffer sheetVertices;
+layout(binding = 13) uniform usamplerBuffer sheetNormals;
+uint sheetCellWord(int n) { return texelFetch(sheetCells, n).x; }
+int sheetEntry(int n) { return texelFetch(sheetLists, n).x; }
+int sheetCorner(int n) { return texelFetch(sheetTriangles, n).x; }
+double sheetVertex(int n) { return packDouble2x32(texelFetch(sheetVertices, n).xy); }
+double sheetNormal(int n) { return ofFloat(texelFetch(sheetNormals, n).x); }
+)GLSL";
+
+// Compilers remove the code for sheets then.
+constexpr const char* kNoSheetsDialect = R"GLSL(
+const bool hasSheets = false;
+uint sheetCellWord(int n) { return 0u; }
+int sheetEntry(int n) { return 0; }
+int sheetCorner(int n) { return 0; }
+double sheetVertex(int n) { return 0.0; }
+double sheetNormal(int n) { return 0.0; }
+)GLSL";
+
 constexpr const char* kInterfaceMain = R"GLSL(
 void main() {
   int n = firstRay + int(gl_GlobalInvocationID.x);
@@ -91,7 +116,13 @@ void main() {
   ray.z = int(rays[at + 10]);
   ray.label = int(rays[at + 11]);
   ray.checks = int(rays[at + 12]);
+  ray.begin = rays[at + 13];
   ray.state = kGoing;
+  ray.sheet.triangle = -1;
+  ray.sheet.t = 0.0;
+  ray.sheet.shareA = 0.0;
+  ray.sheet.shareB = 0.0;
+  ray.sheet.shareC = 0.0;
   ray.front = 0;
   ray.behind = 0;
   ray.facetX = 0.0;
@@ -123,12 +154,13 @@ void main() {
 }
 )GLSL";
 
-std::string interfaceShaderText() {
+std::string interfaceShaderText(bool hasSheets) {
   return fmt::format(
              "#version 450 core\nlayout(local_size_x = {}) in;\n"
              "const int kRayNumbers = {}, kAnswers = {}, kMostSteps = {};\n",
              kInterfaceGroup, kInterfaceNumbers, kInterfaceAnswers, kMostInterfaceSteps) +
-         kInterfaceDialect + kGridWalkKernel + kInterfacesKernel + kInterfaceMain;
+         kInterfaceDialect + (hasSheets ? kSheetDialect : kNoSheetsDialect) + kGridWalkKernel +
+         kSheetsKernel + kInterfacesKernel + kInterfaceMain;
 }
 
 }  // namespace
@@ -139,8 +171,10 @@ void GpuInterfaces::release() {
     texels = {};
   }
   for (GrowingBuffer* buffer : {&rays_, &found_, &fetched_}) buffer->release(context_);
-  if (program_ != 0) context_.gl().DeleteProgram(program_);
-  program_ = 0;
+  for (GLuint& program : programs_) {
+    if (program != 0) context_.gl().DeleteProgram(program);
+    program = 0;
+  }
   uploaded_ = nullptr;
 }
 
@@ -173,6 +207,13 @@ void GpuInterfaces::upload(const InterfaceCaster& caster) {
   addVector(tables.table, GL_R32I);
   addVector(tables.masks, GL_R32UI);
   addVector(tables.shown, GL_R32UI);
+  if (tables.sheets) {
+    addVector(tables.sheetCells, GL_R32UI);
+    addVector(tables.sheetLists, GL_R32I);
+    addVector(tables.sheetTriangles, GL_R32I);
+    add(tables.sheetVertices.data(), tables.sheetVertices.size() * 8, GL_RG32UI, 8);
+    addVector(tables.sheetNormals, GL_R32UI);
+  }
   context_.check("uploading the segmentation");
   uploaded_ = caster.tables();
 }
@@ -190,7 +231,8 @@ std::vector<InterfaceHit> GpuInterfaces::firstHits(const InterfaceCaster& caster
     for (const Imath::V3d& v : {start.from, start.step}) input.insert(input.end(), {v.x, v.y, v.z});
     input.insert(input.end(), {start.t, start.end});
     for (int axis = 0; axis < 3; ++axis) input.push_back(start.cell[axis]);
-    input.insert(input.end(), {static_cast<double>(start.label), start.label < 0 ? 1.0 : 0.0});
+    input.insert(input.end(),
+                 {static_cast<double>(start.label), start.label < 0 ? 1.0 : 0.0, start.begin});
   }
   if (inside.empty()) return hits;
   std::vector<double> answers(kInterfaceAnswers * inside.size());
@@ -213,8 +255,10 @@ void GpuInterfaces::run(const std::vector<double>& input, bool wantsNormals,
                         std::vector<double>& answers) {
   const GlFunctions& gl = context_.gl();
   const InterfaceTables& tables = *uploaded_;
-  if (program_ == 0) program_ = compileCompute(context_, interfaceShaderText());
-  gl.UseProgram(program_);
+  const bool hasSheets = tables.sheets != nullptr;
+  GLuint& program = programs_[hasSheets ? 1 : 0];
+  if (program == 0) program = compileCompute(context_, interfaceShaderText(hasSheets));
+  gl.UseProgram(program);
   const std::size_t rays = answers.size() / kInterfaceAnswers;
   std::fill(answers.begin(), answers.end(), 0.0);  // not done
   rays_.upload(context_, input);
@@ -223,10 +267,10 @@ void GpuInterfaces::run(const std::vector<double>& input, bool wantsNormals,
   fetched_.reserve(context_, answerBytes);
   gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, kRaysOfField, rays_.name());
   gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, kInterfacesFound, found_.name());
-  for (std::size_t n = 0; n < kTextures; ++n)
+  for (std::size_t n = 0; n < (hasSheets ? kTextures : kFieldTextures); ++n)
     gl.BindTextureUnit(static_cast<GLuint>(n), textures_[n].texture);
   const auto set = [&](const char* name, auto value) {
-    gl.Uniform1i(gl.GetUniformLocation(program_, name), static_cast<GLint>(value));
+    gl.Uniform1i(gl.GetUniformLocation(program, name), static_cast<GLint>(value));
   };
   set("pointsX", tables.points.x);
   set("pointsY", tables.points.y);
@@ -236,7 +280,7 @@ void GpuInterfaces::run(const std::vector<double>& input, bool wantsNormals,
   set("gradients", wantsNormals ? 1 : 0);
   set("rayCount", rays);
   const auto background = static_cast<GLfloat>(tables.background);
-  gl.Uniform1fv(gl.GetUniformLocation(program_, "backgroundValue"), 1, &background);
+  gl.Uniform1fv(gl.GetUniformLocation(program, "backgroundValue"), 1, &background);
   for (bool isDone = false; !isDone;) {
     for (std::size_t first = 0; first < rays; first += kInterfaceRun) {
       set("firstRay", first);

@@ -35,7 +35,8 @@ class GpuInterfaces {
                                                     bool wantsNormals);
 
  private:
-  static constexpr std::size_t kTextures = 9;
+  static constexpr std::size_t kTextures = 14;
+  static constexpr std::size_t kFieldTextures = 9;  ///< those of a field without sheets
 
   // These run in jobs of GlContext::run().
   void upload(const InterfaceCaster& caster);
@@ -47,7 +48,7 @@ class GpuInterfaces {
   std::array<Texels, kTextures> textures_{};
   GrowingBuffer rays_{GrowingBuffer::Use::Upload}, found_{GrowingBuffer::Use::Upload},
       fetched_{GrowingBuffer::Use::Fetch};
-  GLuint program_ = 0;
+  std::array<GLuint, 2> programs_{};  ///< for fields without sheets and with them
 };
 
 }  // namespace render

@@ -443,9 +443,13 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
                     surfaces.fields()->blockCount(), static_cast<double>(surfaces.bytes()) * 1e-6);
   } else if (surfaces.segmented() && surfaces.solids().empty()) {
     const InterfaceCaster& caster = surfaces.segmented()->caster;
+    const std::string sheets =
+        caster.sheetTriangleCount() > 0
+            ? fmt::format("{} triangles of sheets, ", caster.sheetTriangleCount())
+            : "";
     image.attributes["ls:read"] =
-        fmt::format("{} cells with corners of several regions, {:.1f} MB", caster.mixedCellCount(),
-                    static_cast<double>(surfaces.bytes()) * 1e-6);
+        fmt::format("{} cells with corners of several regions, {}{:.1f} MB",
+                    caster.mixedCellCount(), sheets, static_cast<double>(surfaces.bytes()) * 1e-6);
   } else if (!surfaces.beziers().empty() && surfaces.solids().empty()) {
     std::size_t parts = 0;
     for (const BezierPart& part : surfaces.beziers()) parts += part.caster.partCount();

@@ -6,6 +6,7 @@
 
 #include "render/segmented/interface_kernel.h"
 #include "render/segmented/interface_tables.h"
+#include "render/segmented/sheet_surface.h"
 
 namespace render {
 
@@ -13,6 +14,10 @@ using Imath::V3d;
 using levelset::RegionLabel;
 
 namespace {
+
+// A ray behind a sheet does not meet it again, in spite of rounding: it sees no sheet within this
+// distance, voxels.
+constexpr double kBehindSheet = 1e-7;
 
 V3d unitNormal(const V3d& v, const V3d& otherwise) {
   const double length = v.length();
@@ -47,12 +52,17 @@ std::size_t InterfaceCaster::mixedCellCount() const {
   return tables_->mixedCells;
 }
 
+std::size_t InterfaceCaster::sheetTriangleCount() const {
+  return tables_->sheets ? tables_->sheets->meshTriangles : 0;
+}
+
 InterfaceStart InterfaceCaster::start(const InterfaceRay& ray) const {
   InterfaceStart start;
   tables_->worldToIndex.multVecMatrix(ray.origin, start.from);
   tables_->worldToIndex.multDirMatrix(ray.direction, start.step);
   start.t = ray.near;
   start.end = ray.far;
+  start.begin = ray.label ? ray.near + kBehindSheet * field_.voxelSize() : ray.near;
   // The kernel reads one grid point before a cell and two behind it.
   for (int axis = 0; axis < 3; ++axis) {
     const double low = 1, high = tables_->points[axis] - 2, from = start.from[axis],

@@ -24,14 +24,14 @@ struct InterfaceRay {
   std::optional<levelset::RegionLabel> label = {};
 };
 
-/// Crossing of a ray with the interface between two regions.
+/// Crossing of a ray with the interface between two regions, or with a sheet.
 struct InterfaceHit {
   bool found = false;
   double distance = 0;                            ///< along the ray, world units
   levelset::RegionLabel front = levelset::kVoid,  ///< region that the ray leaves
-      behind = levelset::kVoid;                   ///< region that it enters
+      behind = levelset::kVoid;                   ///< region that it enters; the same at a sheet
   /// Unit normals, towards `front`: of the interface as drawn, and of the smooth interface that the
-  /// grid samples.
+  /// grid samples. At a sheet: of the triangle, and of the smooth sheet.
   Imath::V3d facetNormal{0}, normal{0};
 };
 
@@ -46,6 +46,12 @@ struct InterfaceHit {
 /// and exact to a few roundings of double precision. It reads the compact blocks of the field, and
 /// a table that finds them; blocks and groups of 8³ blocks of one label are skipped.
 ///
+/// Sheets are seen in all regions, hidden or not. They are the triangles of
+/// levelset::segmentedToMesh(), which the kernel tests in lists by cell. A ray sees a sheet only
+/// where it is in the region of the sheet, so no sheet sticks out of its region, and a border
+/// continues each sheet up to the interpolated interface (render/segmented/sheet_surface.h). A
+/// field without sheets has no such lists.
+///
 /// The class has value semantics. Copies share the data. All methods may run concurrently.
 class InterfaceCaster {
  public:
@@ -58,15 +64,18 @@ class InterfaceCaster {
 
   [[nodiscard]] const levelset::SegmentedField& field() const { return field_; }
   [[nodiscard]] bool isShown(levelset::RegionLabel label) const;
-  /// Bounds of the drawn interfaces, world units; empty when there are none.
+  /// Bounds of the drawn interfaces and sheets, world units; empty when there are none.
   [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }
-  /// Extents of the drawn interfaces: for each direction the largest p·direction over the crossings
-  /// p of edges of the grid, world units; −∞ without any.
+  /// Extents of the drawn interfaces and sheets: for each direction the largest p·direction over
+  /// the crossings p of edges of the grid and the vertices p of sheets, world units; −∞ without
+  /// any.
   [[nodiscard]] std::vector<double> extents(const std::vector<Imath::V3d>& directions) const;
   /// Memory of the tables beside the field, bytes.
   [[nodiscard]] std::size_t bytes() const;
-  /// Number of cells whose corners have several labels. The kernel searches no others.
+  /// Number of cells whose corners have several labels. The kernel searches no others but those
+  /// with sheets.
   [[nodiscard]] std::size_t mixedCellCount() const;
+  [[nodiscard]] std::size_t sheetTriangleCount() const;
 
   /// First crossing of a ray with a surface.
   [[nodiscard]] InterfaceHit firstHit(const InterfaceRay& ray) const;

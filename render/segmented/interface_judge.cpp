@@ -8,6 +8,8 @@
 
 #include "levelset/segmented/segmented_data_vdb.h"
 #include "levelset/vdb.h"
+#include "render/segmented/interface_tables.h"
+#include "render/segmented/sheet_judge.h"
 
 namespace render {
 namespace {
@@ -23,6 +25,8 @@ using openvdb::Coord;
 constexpr double kFinest = 1e-14;
 // Intervals that are examined in a cell. Only a ray within an interface needs more.
 constexpr int kMostIntervals = 100000;
+// Distance behind a crossing within which no sheet is seen, voxels.
+constexpr double kNoSheet = 1e-7;
 
 using Corners = std::array<double, 8>;
 
@@ -160,9 +164,24 @@ struct March {
   std::optional<double> crossing = {};
   RegionLabel front = levelset::kVoid;
   Coord cell = {};
+  std::vector<JudgedSheet> sheets = {};  ///< that the ray meets, by distance
+  std::size_t nextSheet = 0;
+  std::optional<JudgedSheet> sheet = {};  ///< at the crossing
 
+  /// Goes on in the present region. @return true if a sheet of it is met
+  bool stay(double t) {
+    for (; nextSheet < sheets.size() && sheets[nextSheet].t <= t; ++nextSheet) {
+      if (label != sheets[nextSheet].label) continue;
+      sheet = sheets[nextSheet];
+      crossing = sheet->t;
+      front = sheet->label;
+      return true;
+    }
+    return false;
+  }
   /// Enters a region. @return true if a surface is crossed
   bool enter(RegionLabel next, double t, const Coord& low) {
+    if (stay(t)) return true;
     const std::optional<RegionLabel> before = label;
     label = next;
     if (!before || *before == next || (!caster.isShown(*before) && !caster.isShown(next)))
@@ -268,6 +287,12 @@ std::optional<std::pair<double, double>> rangeInBlocks(const Line& line, const S
 
 }  // namespace
 
+InterfaceJudge::InterfaceJudge(const InterfaceCaster& caster) : caster_(caster) {
+  if (caster.tables()->sheets)
+    sheets_ =
+        std::make_shared<const SheetJudge>(caster.tables()->sheets, caster.field().voxelSize());
+}
+
 InterfaceHit InterfaceJudge::firstHit(const InterfaceRay& ray) const {
   const SegmentedData& data = *caster_.field().shared();
   const openvdb::math::Transform& map = *data.transform;
@@ -278,6 +303,10 @@ InterfaceHit InterfaceJudge::firstHit(const InterfaceRay& ray) const {
   const auto range = rangeInBlocks(march.line, data, ray.near, ray.far);
   if (!range) return {};
   if (ray.label && range->first == ray.near) march.label = ray.label;
+  if (sheets_)
+    march.sheets = sheets_->along(
+        ray.origin, ray.direction,
+        ray.near + (ray.label ? kNoSheet * caster_.field().voxelSize() : 0), range->second);
   const std::vector<double> blocks = planesBetween(march.line, range->first, range->second, 8);
   for (std::size_t b = 1; b < blocks.size() && !march.crossing; ++b) {
     const double low = blocks[b - 1], high = blocks[b];
@@ -285,13 +314,19 @@ InterfaceHit InterfaceJudge::firstHit(const InterfaceRay& ray) const {
     const Coord middle = floorOf(march.line.at(0.5 * (low + high)));
     if (!march.mayChange(SegmentedData::blockCoord(middle))) {
       march.enter(march.reader.label(middle), low, middle);
-      continue;
+      continue;  // without sheets
     }
     const std::vector<double> cells = planesBetween(march.line, low, high, 1);
     for (std::size_t n = 1; n < cells.size() && !march.crossing; ++n)
       if (cells[n - 1] < cells[n]) march.pass(cells[n - 1], cells[n]);
   }
+  if (!march.crossing) march.stay(range->second);
   if (!march.crossing) return {};
+  if (march.sheet) {
+    const SheetJudge::Normals normals = sheets_->normalsAt(
+        march.sheet->triangle, ray.origin + ray.direction * march.sheet->t, ray.direction);
+    return {true, march.sheet->t, march.front, march.front, normals.facet, normals.smooth};
+  }
   const Gradients gradients = gradientsAt(march.reader, march.cell, march.line.at(*march.crossing),
                                           march.front, *march.label);
   InterfaceHit hit;

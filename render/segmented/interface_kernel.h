@@ -15,6 +15,7 @@ namespace render {
 #define IN(Type) const Type&
 #define INOUT(Type) Type&
 #define CONST_INT static constexpr int
+#define CONST_DOUBLE static constexpr double
 
 struct InterfaceKernel {
   using uint = std::uint32_t;
@@ -22,7 +23,7 @@ struct InterfaceKernel {
   const InterfaceTables& tables;
   double background;
   int pointsX, pointsY, pointsZ, groupsY, groupsZ;
-  bool wantsGradients;
+  bool wantsGradients, hasSheets;
 
   InterfaceKernel(const InterfaceTables& tables_, bool wantsGradients_)
       : tables(tables_),
@@ -32,7 +33,8 @@ struct InterfaceKernel {
         pointsZ(tables_.points.z),
         groupsY(tables_.groups.y),
         groupsZ(tables_.groups.z),
-        wantsGradients(wantsGradients_) {}
+        wantsGradients(wantsGradients_),
+        hasSheets(tables_.sheets != nullptr) {}
 
   /// Number n of an array. @pre the array has it
   template <typename Number>
@@ -59,6 +61,21 @@ struct InterfaceKernel {
     return static_cast<double>(loaded<float>(tables.extras, 2 * n + 1));
   }
   [[nodiscard]] bool isShown(int label) const { return tables.isShown(label); }
+  [[nodiscard]] uint sheetCellWord(int n) const {
+    return tables.sheetCells[static_cast<std::size_t>(n)];
+  }
+  [[nodiscard]] int sheetEntry(int n) const {
+    return tables.sheetLists[static_cast<std::size_t>(n)];
+  }
+  [[nodiscard]] int sheetCorner(int n) const {
+    return tables.sheetTriangles[static_cast<std::size_t>(n)];
+  }
+  [[nodiscard]] double sheetVertex(int n) const {
+    return tables.sheetVertices[static_cast<std::size_t>(n)];
+  }
+  [[nodiscard]] double sheetNormal(int n) const {
+    return static_cast<double>(tables.sheetNormals[static_cast<std::size_t>(n)]);
+  }
   [[nodiscard]] static int bitsIn(uint x) {
     x -= x >> 1 & 0x55555555u;
     x = (x & 0x33333333u) + (x >> 2 & 0x33333333u);
@@ -68,6 +85,8 @@ struct InterfaceKernel {
   [[nodiscard]] static double floor(double a) { return std::floor(a); }
 
 #include "render/shaders/grid_walk.glsl"
+#include "render/shaders/sheets.glsl"
+// follows sheets.glsl
 #include "render/shaders/interfaces.glsl"
 
   [[nodiscard]] static CrossingRay rayOf(const InterfaceStart& start) {
@@ -86,6 +105,8 @@ struct InterfaceKernel {
     ray.label = start.label;
     ray.checks = start.label < 0 ? 1 : 0;
     ray.state = kGoing;
+    ray.begin = start.begin;
+    ray.sheet.triangle = -1;
     return ray;
   }
 };
@@ -94,5 +115,6 @@ struct InterfaceKernel {
 #undef IN
 #undef INOUT
 #undef CONST_INT
+#undef CONST_DOUBLE
 
 }  // namespace render

@@ -13,6 +13,8 @@
 #include "levelset/progress.h"
 #include "levelset/segmented/segmented_data_vdb.h"
 #include "levelset/vdb.h"
+#include "render/segmented/sheet_cells.h"
+#include "render/segmented/sheet_surface.h"
 
 namespace render {
 namespace {
@@ -50,6 +52,17 @@ std::vector<Coord> blocksAround(const SegmentedData& data) {
   std::sort(all.begin(), all.end());
   all.erase(std::unique(all.begin(), all.end()), all.end());
   return all;
+}
+
+/// Adds the blocks of sheets, which are in the order of x, y and z.
+void addBlocksOf(const std::vector<SheetEntry>& sheets, const V3i& origin,
+                 std::vector<Coord>& blocks) {
+  for (std::size_t n = 0; n < sheets.size(); ++n)
+    if (n == 0 || sheets[n].block != sheets[n - 1].block)
+      blocks.emplace_back((origin.x >> 3) + sheets[n].block.x, (origin.y >> 3) + sheets[n].block.y,
+                          (origin.z >> 3) + sheets[n].block.z);
+  std::sort(blocks.begin(), blocks.end());
+  blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
 }
 
 /// Cells of a block whose corners have several labels.
@@ -127,7 +140,14 @@ InterfaceTables makeInterfaceTables(const levelset::SegmentedField& field,
   tables.worldToIndex =
       field.indexToWorld().inverse() * Imath::M44d().setTranslation(-V3d(tables.origin));
 
-  const std::vector<Coord> around = blocksAround(data);
+  std::vector<Coord> around = blocksAround(data);
+  std::vector<SheetEntry> sheets;
+  tables.sheets = sheetSurface(field, maxBytes);
+  if (tables.sheets) {
+    sheets = addSheetTriangles(tables, maxBytes);
+    addBlocksOf(sheets, tables.origin, around);
+  }
+  const Coord lowBlock(tables.origin.x >> 3, tables.origin.y >> 3, tables.origin.z >> 3);
   const double groupCount =
       static_cast<double>(tables.groups.x) * tables.groups.y * tables.groups.z;
   levelset::requireMemory(4 * groupCount + static_cast<double>(around.size()) * (sizeof(Mask) + 24),
@@ -172,25 +192,37 @@ InterfaceTables makeInterfaceTables(const levelset::SegmentedField& field,
           tables.table.push_back(-1);
         }
       }
+  std::size_t sheet = 0;
   for (std::size_t n = 0; n < around.size(); ++n) {
     std::size_t cells = 0;
     for (const std::uint32_t word : masks[n]) cells += SegmentedData::countBits(word);
-    if (cells == 0) continue;
-    tables.mixedCells += cells;
     const Coord& block = around[n];
-    const std::size_t local =
+    const std::size_t firstSheet = sheet;
+    const Coord local = block - lowBlock;
+    while (sheet < sheets.size() && sheets[sheet].block == V3i(local[0], local[1], local[2]))
+      ++sheet;
+    if (cells == 0 && sheet == firstSheet) continue;
+    tables.mixedCells += cells;
+    if (tables.sheets)
+      addSheetBlock(tables, sheets.data() + firstSheet, sheets.data() + sheet, masks[n].data());
+    const std::size_t place =
         SegmentedData::offsetOf(Coord(block[0] & 7, block[1] & 7, block[2] & 7));
     const auto first = static_cast<std::size_t>(tables.groupEntries[groupOf(block)]);
-    tables.table[first + 2 * local + 1] = static_cast<std::int32_t>(tables.masks.size() / 16);
+    tables.table[first + 2 * place + 1] = static_cast<std::int32_t>(tables.masks.size() / 16);
     tables.masks.insert(tables.masks.end(), masks[n].begin(), masks[n].end());
   }
+  if (tables.sheets) finishSheetLists(tables);
   return tables;
 }
 
 std::vector<double> interfaceExtents(const InterfaceTables& tables,
                                      const std::vector<V3d>& directions) {
   const SegmentedData& data = *tables.field;
-  const std::vector<double> none(directions.size(), -std::numeric_limits<double>::infinity());
+  std::vector<double> none(directions.size(), -std::numeric_limits<double>::infinity());
+  if (tables.sheets)
+    for (std::size_t v = 0; v < tables.sheets->meshVertices; ++v)
+      for (std::size_t d = 0; d < directions.size(); ++d)
+        none[d] = std::max(none[d], tables.sheets->positions[v].dot(directions[d]));
   const auto addBlock = [&](SegmentedReader& reader, const SegmentedBlock& block,
                             std::vector<double>& all) {
     for (std::uint32_t n = 0; n < SegmentedData::kVoxels; ++n) {

@@ -12,12 +12,12 @@
 namespace render {
 
 /// Colours of regions: those of Okabe and Ito, which people with colour blindness can tell apart.
-/// Linear light. @param label  not the void
+/// Linear light. The void has a colour for the sheets in it.
 [[nodiscard]] Imath::C3f regionColour(levelset::RegionLabel label);
 
 /// A segmented field in a scene. Its surfaces are opaque. An interface has the colour of the region
 /// behind it, as the ray goes, or of the region in front if the other is hidden. So the two sides
-/// of an interface differ.
+/// of an interface differ. A sheet has the colour of the region around it.
 struct SegmentedPart {
   InterfaceCaster caster;
   std::string name = {};

@@ -7,6 +7,9 @@
 // ray each excess is a cubic in a cell, and the label changes where the difference of two becomes
 // negative. Labels may also change at the face of a cell, where a region ends that owns no corner of
 // the next cell. All code reads the compact blocks of levelset::SegmentedData.
+//
+// Sheets have one region on both sides. A ray meets a triangle of a sheet where its label is that of
+// the sheet's region. So a sheet ends exactly where the label changes.
 
 CONST_INT kUnknown = -1;  // label of a ray that has not started
 CONST_INT kGoing = 0;
@@ -19,6 +22,7 @@ CONST_INT kMaskWords = 16;  // words of the mask of a block: cells whose corners
 CONST_INT kMostHalvings = 24;
 CONST_INT kMostChanges = 16;  // of the label in a cell
 CONST_INT kMostRefinements = 60;
+CONST_DOUBLE kSliverSquare = 1e-12;  // SheetSurface::kSliver², voxels⁴
 
 // A ray, and its crossing with an interface. Distances are in world units.
 struct CrossingRay {
@@ -29,7 +33,9 @@ struct CrossingRay {
   int label;                   // region at t
   int checks;                  // 1: the next cell is asked for the label at its face
   int state;
-  int front, behind;  // labels on both sides of the crossing
+  int front, behind;  // labels on both sides of the crossing; equal at a sheet
+  double begin;       // distance beyond which sheets are seen
+  SheetHit sheet;     // at the crossing; its triangle is negative at an interface
   // Gradients of the excess of `behind` less that of `front`, by the grid: of the interpolant, and
   // of the interpolated central differences. Both point to the front.
   double facetX, facetY, facetZ, smoothX, smoothY, smoothZ;
@@ -353,8 +359,39 @@ void addSmooth(INOUT(CrossingRay) ray, int x, int y, int z, double weight, INOUT
   ray.smoothZ = sumZ;
 }
 
+// Takes the normals of a sheet as gradients, on the side from which the ray comes. On a sliver, whose
+// own normal rounding decides on, the normal of the smooth sheet replaces it.
+void addSheetNormals(INOUT(CrossingRay) ray) {
+  double x = sheetFacet(ray.sheet.triangle, 0);
+  double y = sheetFacet(ray.sheet.triangle, 1);
+  double z = sheetFacet(ray.sheet.triangle, 2);
+  double u = sheetSmooth(ray.sheet, 0);
+  double v = sheetSmooth(ray.sheet, 1);
+  double w = sheetSmooth(ray.sheet, 2);
+  VAR square = x * x + y * y + z * z;
+  bool isSliver = square < kSliverSquare;
+  double facetX = isSliver ? u : x;
+  double facetY = isSliver ? v : y;
+  double facetZ = isSliver ? w : z;
+  VAR product = facetX * ray.stepX + facetY * ray.stepY + facetZ * ray.stepZ;
+  double facetSide = product > 0.0 ? -1.0 : 1.0;
+  // The smooth normal lies on the same side of the sheet.
+  VAR match = facetX * u + facetY * v + facetZ * w;
+  double smoothSide = match < 0.0 ? 0.0 - facetSide : facetSide;
+  ray.facetX = facetSide * facetX;
+  ray.facetY = facetSide * facetY;
+  ray.facetZ = facetSide * facetZ;
+  ray.smoothX = smoothSide * u;
+  ray.smoothY = smoothSide * v;
+  ray.smoothZ = smoothSide * w;
+}
+
 // Computes the gradients at the crossing.
 void addGradients(INOUT(CrossingRay) ray, INOUT(int) steps) {
+  if (hasSheets && ray.sheet.triangle >= 0) {
+    addSheetNormals(ray);
+    return;
+  }
   RegionCell cell = regionCell(ray.x, ray.y, ray.z, steps);
   CellCorners a = excessOf(cell, ray.behind, steps);
   CellCorners b = excessOf(cell, ray.front, steps);
@@ -395,8 +432,21 @@ bool meet(INOUT(CrossingRay) ray, int label, double t) {
   return true;
 }
 
-// Searches the part of a ray in a cell whose corners have several labels, from ray.t to `exit`.
-void searchCell(INOUT(CrossingRay) ray, double exit, INOUT(int) steps) {
+// Ends a ray at the first sheet of its region between two distances. @return true if there is one
+bool meetSheet(INOUT(CrossingRay) ray, int list, double low, double high, INOUT(int) steps) {
+  ray.sheet = firstSheet(ray.fromX, ray.fromY, ray.fromZ, ray.stepX, ray.stepY, ray.stepZ, list,
+                         ray.label, low, high, ray.begin, steps);
+  if (ray.sheet.triangle < 0) return false;
+  ray.state = kCrossed;
+  ray.t = ray.sheet.t;
+  ray.front = ray.label;
+  ray.behind = ray.label;
+  return true;
+}
+
+// Searches the part of a ray in a cell, from ray.t to `exit`. The corners have several labels, or the
+// cell has sheets. @param list  of the sheets in the cell; negative: none
+void searchCell(INOUT(CrossingRay) ray, double exit, int list, INOUT(int) steps) {
   RegionCell cell = regionCell(ray.x, ray.y, ray.z, steps);
   double x0 = inCell(ray.fromX, ray.stepX, ray.t, ray.x);
   double y0 = inCell(ray.fromY, ray.stepY, ray.t, ray.y);
@@ -427,6 +477,7 @@ void searchCell(INOUT(CrossingRay) ray, double exit, INOUT(int) steps) {
     if (meet(ray, cell.found[least], ray.t)) return;
   }
   double from = 0.0;
+  double reached = ray.t;
   for (int change = 0; change < kMostChanges && from < 1.0; ++change) {
     double first = 2.0;
     int next = present;
@@ -451,9 +502,11 @@ void searchCell(INOUT(CrossingRay) ray, double exit, INOUT(int) steps) {
       }
     }
     steps += cell.count + 1;
-    if (first > 1.0) break;
     VAR share = from + (1.0 - from) * first;
     VAR t = ray.t + (exit - ray.t) * share;
+    if (list >= 0 && meetSheet(ray, list, reached, first > 1.0 ? exit : t, steps)) return;
+    if (first > 1.0) break;
+    reached = t;
     present = next;
     from = share;
     if (meet(ray, cell.found[next], t)) return;
@@ -489,7 +542,7 @@ void followInterfaces(INOUT(CrossingRay) ray, int mostSteps) {
     exit = lesser(exit, exitZ);
     exit = greater(exit, ray.t);
     if (isMixed)
-      searchCell(ray, exit, steps);
+      searchCell(ray, exit, hasSheets ? sheetListOf(mask, voxel) : -1, steps);
     else if (ray.checks != 0) {
       int label = labelAt(ray.x, ray.y, ray.z);
       if (label != ray.label) meet(ray, label, ray.t);

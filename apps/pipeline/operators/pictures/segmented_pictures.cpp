@@ -42,11 +42,6 @@ render::ViewedScene segmentedScene(Invocation& in) {
   if (field.isEmpty())
     throw levelset::InvalidInput("the segmentation has no interface, so nothing can be drawn");
   const std::vector<RegionLabel> hidden = hiddenLabels(in), known = field.labels();
-  if (!field.sheetLabels().empty()) {  // rays see regions, not sheets; the mesh has both
-    if (!hidden.empty())
-      throw UsageError("render: --hide does not apply to a segmentation with sheets; leave it out");
-    return sceneOf(in.operands[0]);
-  }
   for (const RegionLabel label : hidden)
     if (!std::binary_search(known.begin(), known.end(), label))
       throw levelset::InvalidInput(

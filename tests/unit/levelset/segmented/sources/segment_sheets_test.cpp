@@ -322,28 +322,10 @@ TEST(SlowSegmentSheets, SeparatesThreeHalfPlanesInRandomPoses) {
   EXPECT_EQ(mixed, 0u);
 }
 
-/// Sphere with a diaphragm in its equator that has a round hole.
-TriMesh sphereWithHoledDiaphragm(const V3d& centre, double hole, unsigned rings) {
-  const unsigned sides = 2 * rings;
-  TriMesh mesh = support::sphereMesh(1, centre, rings);
-  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
-  for (unsigned j = 0; j < sides; ++j)
-    mesh.positions.push_back(
-        centre + V3d(std::cos(2 * pi * j / sides), std::sin(2 * pi * j / sides), 0) * hole);
-  for (unsigned j = 0; j < sides; ++j) {
-    const std::uint32_t a = 1 + (rings / 2 - 1) * sides + j,
-                        b = 1 + (rings / 2 - 1) * sides + (j + 1) % sides, c = first + j,
-                        d = first + (j + 1) % sides;
-    mesh.triangles.push_back({a, b, d});
-    mesh.triangles.push_back({a, d, c});
-  }
-  return mesh;
-}
-
 TEST(SegmentSheets, MeasureTheCircleOfFourSheets) {
   constexpr unsigned kRings = 48, kSides = 2 * kRings;
   // A ring around the equator, where the sphere and its diaphragm already meet.
-  TriMesh mesh = sphereWithHoledDiaphragm(kOffGrid, 0.4, kRings);
+  TriMesh mesh = support::sphereWithHoledDiaphragm(kOffGrid, 0.4, kRings);
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
   for (unsigned j = 0; j < kSides; ++j)
     mesh.positions.push_back(
@@ -371,7 +353,7 @@ TEST(SegmentSheets, HoldADiaphragmWithAHole) {
   std::vector<double> junctions, rims, areas;
   for (const double voxel : {0.2, 0.1, 0.05}) {
     const SegmentMeshResult result =
-        segmentSheets(sphereWithHoledDiaphragm(kOffGrid, kHole, kRings), voxel);
+        segmentSheets(support::sphereWithHoledDiaphragm(kOffGrid, kHole, kRings), voxel);
     EXPECT_EQ(result.field.labels(), std::vector<RegionLabel>{1});
     EXPECT_EQ(result.field.sheetLabels(), std::vector<RegionLabel>{1});
     const SegmentedMesh mesh = segmentedToMesh(result.field);
@@ -403,43 +385,9 @@ TEST(SegmentSheets, HoldADiaphragmWithAHole) {
   EXPECT_GT(std::log2(rims[0] / rims[2]) / 2, measuredOrder(1.55));
 }
 
-/// Box from 0 to (3, 2, 2) with a wall at x = 1 that has a door from the floor.
-TriMesh boxWithDoor(const V3d& origin) {
-  TriMesh mesh;
-  const auto add = [&](double x, double y, double z) {
-    mesh.positions.push_back(origin + V3d(x, y, z));
-    return static_cast<std::uint32_t>(mesh.positions.size() - 1);
-  };
-  // Lines of the grid of faces: the outer walls are divided where the inner one meets them.
-  const std::vector<double> xs = {0, 1, 3}, ys = {0, 0.7, 1.3, 2}, zs = {0, 1.4, 2};
-  const auto addFace = [&](int axis, double height, const std::vector<double>& us,
-                           const std::vector<double>& vs, bool hasDoor) {
-    for (std::size_t i = 0; i + 1 < us.size(); ++i)
-      for (std::size_t j = 0; j + 1 < vs.size(); ++j) {
-        if (hasDoor && i == 1 && j == 0) continue;
-        const auto corner = [&](std::size_t u, std::size_t v) {
-          std::array<double, 3> p{};
-          p[static_cast<std::size_t>(axis)] = height;
-          p[static_cast<std::size_t>((axis + 1) % 3)] = us[u];
-          p[static_cast<std::size_t>((axis + 2) % 3)] = vs[v];
-          return add(p[0], p[1], p[2]);
-        };
-        const std::uint32_t a = corner(i, j), b = corner(i + 1, j), c = corner(i + 1, j + 1),
-                            d = corner(i, j + 1);
-        mesh.triangles.push_back({a, b, c});
-        mesh.triangles.push_back({a, c, d});
-      }
-  };
-  for (const double x : {0.0, 3.0}) addFace(0, x, ys, zs, false);
-  for (const double y : {0.0, 2.0}) addFace(1, y, zs, xs, false);
-  for (const double z : {0.0, 2.0}) addFace(2, z, xs, ys, false);
-  addFace(0, 1, ys, zs, true);
-  return mesh;
-}
-
 TEST(SegmentSheets, HoldAWallWithADoor) {
   for (const V3d& origin : {V3d(0), kOffGrid}) {
-    const SegmentMeshResult result = segmentSheets(boxWithDoor(origin), 0.1);
+    const SegmentMeshResult result = segmentSheets(support::boxWithDoor(origin), 0.1);
     EXPECT_EQ(result.field.labels(), std::vector<RegionLabel>{1});
     EXPECT_EQ(result.field.sheetLabels(), std::vector<RegionLabel>{1});
     const SegmentedMesh mesh = segmentedToMesh(result.field);
@@ -465,7 +413,7 @@ TEST(SegmentSheets, HoldAWallWithADoor) {
 }
 
 TEST(SegmentSheets, AreTheSameForAnyOrientation) {
-  TriMesh mesh = sphereWithHoledDiaphragm(kOffGrid, 0.4, 12);
+  TriMesh mesh = support::sphereWithHoledDiaphragm(kOffGrid, 0.4, 12);
   const SegmentedField field = segmentSheets(mesh, 0.1).field;
   const SegmentedMesh given = segmentedToMesh(field);
   std::mt19937 random(1);
@@ -547,7 +495,7 @@ TEST(SegmentSheets, HaveNoneInClosedMeshes) {
 }
 
 TEST(SegmentSheets, HaveTheSameBitsWithAnyNumberOfThreads) {
-  const TriMesh mesh = support::joined(sphereWithHoledDiaphragm(V3d(0.01), 0.4, 12),
+  const TriMesh mesh = support::joined(support::sphereWithHoledDiaphragm(V3d(0.01), 0.4, 12),
                                        support::kleinMesh(0.4, tiltedFrame(V3d(0, 0, 3), 10)));
   const auto run = [&](std::size_t threads) {
     return support::onThreads(threads, [&] {
