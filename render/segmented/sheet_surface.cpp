@@ -3,12 +3,14 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "levelset/geometry/perpendicular.h"
 #include "levelset/segmented/segmented_data_vdb.h"
 
 namespace render {
@@ -103,41 +105,97 @@ class SheetFinder {
     surface_.meshTriangles = surface_.triangles.size();
   }
 
-  /// Sets the normal of each corner: the sum over the triangles there that make one smooth sheet,
-  /// weighted by area. A sheet may have no orientation, so each triangle turns the others to its
-  /// side.
+  /// Sets the normal of each corner, from the triangles there that make one smooth sheet. A sheet
+  /// may have no orientation, so each triangle turns the others to its side.
   void setNormals() {
-    std::vector<V3d> areas;
     for (std::size_t t = 0; t < sheets_.size(); ++t)
-      areas.push_back(isStrip(sheets_[t]) ? V3d(0) : areaOf(surface_.triangles[t].corners));
+      areas_.push_back(isStrip(sheets_[t]) ? V3d(0) : areaOf(surface_.triangles[t].corners));
     findTriangles();
     tbb::parallel_for(std::size_t{0}, sheets_.size(), [&](std::size_t t) {
       if (isStrip(sheets_[t])) return;
       SheetSurface::Triangle& triangle = surface_.triangles[t];
-      for (std::size_t k = 0; k < 3; ++k) {
-        const std::uint32_t v = triangle.corners[k];
-        const V3d own = guideOf(t, areas);
-        V3d sum(0);
-        for (std::uint32_t n = firstAt_[v]; n < firstAt_[v + 1]; ++n) {
-          const V3d& other = areas[trianglesAt_[n]];
-          const double product = own ^ other;
-          if (std::abs(product) < kLeastSmooth * own.length() * other.length()) continue;
-          sum += product < 0 ? -other : other;
-        }
-        triangle.normals[k] = V3f(sum.normalized());
-      }
+      const V3d guide = guideOf(t);
+      for (std::size_t k = 0; k < 3; ++k)
+        triangle.normals[k] = V3f(normalAt(triangle.corners[k], guide));
     });
+  }
+
+  /// Normal of the smooth sheet at a vertex: that of a quadratic polynomial through it, fitted to
+  /// the vertices of the triangles around it and of those beside them. Cells cut triangles
+  /// irregularly, so that a mean of their normals is hardly better than the normal of one.
+  /// @param guide  normal that tells which triangles belong to the sheet
+  [[nodiscard]] V3d normalAt(std::uint32_t vertex, const V3d& guide) const {
+    V3d mean(0);
+    std::vector<std::uint32_t> around;
+    forEachAligned(vertex, guide, [&](std::uint32_t t, double side) {
+      mean += areas_[t] * side;
+      around.insert(around.end(), surface_.triangles[t].corners.begin(),
+                    surface_.triangles[t].corners.end());
+    });
+    mean.normalize();
+    sortUnique(around);
+    for (const std::uint32_t near : std::vector<std::uint32_t>(around))
+      forEachAligned(near, guide, [&](std::uint32_t t, double) {
+        around.insert(around.end(), surface_.triangles[t].corners.begin(),
+                      surface_.triangles[t].corners.end());
+      });
+    sortUnique(around);
+    const auto [x, y] = levelset::tangents(mean);
+    // Normal equations, with the right-hand side in the last column.
+    std::array<std::array<double, 6>, 5> rows{};
+    for (const std::uint32_t near : around) {
+      const V3d p = (surface_.positions[near] - surface_.positions[vertex]) / field_.voxelSize();
+      const double u = p ^ x, v = p ^ y;
+      const std::array<double, 6> terms = {u, v, u * u, u * v, v * v, p ^ mean};
+      for (std::size_t i = 0; i < 5; ++i)
+        for (std::size_t j = 0; j < 6; ++j) rows[i][j] += terms[i] * terms[j];
+    }
+    const auto slopes = solved(rows);
+    return slopes ? (mean - x * (*slopes)[0] - y * (*slopes)[1]).normalized() : mean;
+  }
+
+  /// First two unknowns of five equations, by elimination from the last unknown on; none where the
+  /// equations are nearly dependent.
+  static std::optional<std::array<double, 2>> solved(std::array<std::array<double, 6>, 5> rows) {
+    constexpr double kLeastPivot = 1e-3;  // voxels² and voxels⁴, summed over the vertices
+    for (std::size_t n = 5; n-- > 0;) {
+      if (!(rows[n][n] > kLeastPivot)) return std::nullopt;
+      for (std::size_t i = 0; i < n; ++i) {
+        const double factor = rows[i][n] / rows[n][n];
+        for (std::size_t j = 0; j < 6; ++j) rows[i][j] -= factor * rows[n][j];
+      }
+    }
+    const double first = rows[0][5] / rows[0][0];
+    return std::array{first, (rows[1][5] - rows[1][0] * first) / rows[1][1]};
+  }
+
+  static void sortUnique(std::vector<std::uint32_t>& numbers) {
+    std::sort(numbers.begin(), numbers.end());
+    numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
+  }
+
+  /// Calls add(triangle, side) for the triangles at a vertex that continue a sheet; `side` is −1
+  /// for those that face the other way.
+  template <typename Add>
+  void forEachAligned(std::uint32_t vertex, const V3d& guide, const Add& add) const {
+    for (std::uint32_t n = firstAt_[vertex]; n < firstAt_[vertex + 1]; ++n) {
+      const V3d& area = areas_[trianglesAt_[n]];
+      const double product = guide ^ area;
+      if (std::abs(product) > kLeastSmooth * guide.length() * area.length())
+        add(trianglesAt_[n], product < 0 ? -1.0 : 1.0);
+    }
   }
 
   /// Normal that tells which triangles continue a triangle: its own, or for a sliver, where
   /// rounding decides on that, the normal of the largest triangle beside it.
-  [[nodiscard]] V3d guideOf(std::size_t t, const std::vector<V3d>& areas) const {
+  [[nodiscard]] V3d guideOf(std::size_t t) const {
     const double voxel = field_.voxelSize();
-    if (areas[t].length() >= kSliver * voxel * voxel) return areas[t];
-    V3d largest = areas[t];
+    if (areas_[t].length() >= kSliver * voxel * voxel) return areas_[t];
+    V3d largest = areas_[t];
     for (const std::uint32_t v : surface_.triangles[t].corners)
       for (std::uint32_t n = firstAt_[v]; n < firstAt_[v + 1]; ++n)
-        if (areas[trianglesAt_[n]].length2() > largest.length2()) largest = areas[trianglesAt_[n]];
+        if (areas_[trianglesAt_[n]].length2() > largest.length2())
+          largest = areas_[trianglesAt_[n]];
     return largest;
   }
 
@@ -235,6 +293,7 @@ class SheetFinder {
   std::vector<std::size_t> sheets_;     ///< triangles of the mesh
   std::vector<std::uint32_t> numbers_;  ///< by vertex of the mesh
   SheetSurface surface_;
+  std::vector<V3d> areas_;  ///< by triangle: normals as long as twice the area; 0 for strips
   std::vector<std::uint32_t> firstAt_, trianglesAt_;  ///< by vertex of the surface
   mutable std::optional<levelset::SegmentedSampler> sampler_;
 };

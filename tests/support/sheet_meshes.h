@@ -122,6 +122,22 @@ inline TriMesh sphereWithHoledDiaphragm(const V3d& centre, double hole, unsigned
   return mesh;
 }
 
+/// Adds a flat ring around the equator of a sphere, from radius 1 to `outer`. It shares the
+/// vertices of the equator. @param mesh  begins with sphereMesh(1, centre, rings)
+inline void addEquatorRing(TriMesh& mesh, const V3d& centre, double outer, unsigned rings) {
+  const unsigned sides = 2 * rings, equator = 1 + (rings / 2 - 1) * sides;
+  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+  for (unsigned j = 0; j < sides; ++j) {
+    const double a = 2 * std::numbers::pi * j / sides;
+    mesh.positions.push_back(centre + V3d(std::cos(a), std::sin(a), 0) * outer);
+  }
+  for (unsigned j = 0; j < sides; ++j) {
+    const unsigned next = (j + 1) % sides;
+    mesh.triangles.push_back({equator + j, first + j, first + next});
+    mesh.triangles.push_back({equator + j, first + next, equator + next});
+  }
+}
+
 /// Box from 0 to (3, 2, 2) with a wall at x = 1 that has a door from the floor.
 inline TriMesh boxWithDoor(const V3d& origin) {
   TriMesh mesh;

@@ -27,7 +27,7 @@ Param hideParam() {
           .type = ParamType::Text,
           .doc =
               "for a segmentation: labels of regions that are not drawn, separated by commas, so "
-              "that interfaces inside them show"};
+              "that interfaces and sheets inside them show"};
 }
 
 void validateHide(const Invocation& in) {

@@ -52,13 +52,29 @@ TEST_F(SegmentSheetsActions, MeasureSheets) {
   EXPECT_EQ(json(std::string(kRoom) + "! info --json")["sheets"], Json::array({1}));
 }
 
-TEST_F(SegmentSheetsActions, WriteAndDrawSheets) {
+TEST_F(SegmentSheetsActions, WriteSheets) {
   const Json mesh =
       json(std::string(kRoom) + "! write a.ply ! write a.obj ! mesh ! measure --json");
   EXPECT_GT(mesh["boundary_edges"].get<int>(), 20);
   EXPECT_EQ(shell("grep ^g a.obj").out, "g interface_0_1\ng interface_1_1\n");
-  EXPECT_EQ(levelsmith(std::string(kRoom) + "! render a.png --size 64x48").code, 0);
-  EXPECT_EQ(levelsmith(std::string(kSquare) + "! render b.png --size 64x48").code, 0);
+}
+
+TEST_F(SegmentSheetsActions, AreSeenByRays) {
+  const std::string view = "! render a.exr --size 64x48 --samples 1 --renderer both";
+  for (const char* scene : {kRoom, kSquare}) {
+    const support::Outcome drawn = levelsmith(std::string(scene) + view);
+    EXPECT_EQ(drawn.code, 0) << drawn.err;
+    EXPECT_NE(drawn.err.find(" triangles of sheets, "), std::string::npos) << drawn.err;
+  }
+  // The wall remains of a room that is hidden.
+  const support::Outcome wall = levelsmith(std::string(kRoom) + view + " --hide 1");
+  EXPECT_EQ(wall.code, 0) << wall.err;
+  expectRefusal(std::string(kRoom) + "! render a.png --hide 2", 3, "has no region 2 to hide");
+  // Other fields do not mention sheets.
+  const support::Outcome ball =
+      levelsmith("sphere --radius 1 --voxel 0.1 ! segment ! render a.png --size 16x12");
+  EXPECT_EQ(ball.code, 0);
+  EXPECT_EQ(ball.err.find("sheets"), std::string::npos) << ball.err;
 }
 
 TEST_F(SegmentSheetsActions, LeaveSheetsOutOfSolids) {

@@ -88,7 +88,7 @@ TEST(SheetCaster, AgreesWithTheJudge) {
       // Some rays along the grid are in the plane x = y, in which faces of tetrahedra lie.
       EXPECT_LE(all.neighbours, 4u) << scene.name << hides;
       EXPECT_LT(all.facet, measured(2.62e-7)) << scene.name << hides;
-      EXPECT_LT(all.normal, measured(1.36e-8)) << scene.name << hides;
+      EXPECT_LT(all.normal, measured(2.48e-8)) << scene.name << hides;
     }
 }
 
@@ -235,9 +235,9 @@ TEST(SheetCaster, ConvergesToCurvedSheets) {
   EXPECT_LT(coarse.distance, measured(0.0117));
   EXPECT_GT(order(coarse.distance, middle.distance), measuredOrder(1.73));
   EXPECT_GT(order(middle.distance, fine.distance), measuredOrder(2.24));
-  EXPECT_LT(coarse.normal, measured(0.128));
-  EXPECT_GT(order(coarse.normal, middle.normal), measuredOrder(1.03));
-  EXPECT_GT(order(middle.normal, fine.normal), measuredOrder(0.98));
+  EXPECT_LT(coarse.normal, measured(0.0449));
+  EXPECT_LT(middle.normal, measured(7.4e-4));
+  EXPECT_LT(fine.normal, measured(1.88e-3));  // of the triangles of the given mesh
   EXPECT_LT(coarse.facet, measured(0.141));
   EXPECT_GT(order(middle.facet, fine.facet), measuredOrder(1.08));
 }
@@ -328,41 +328,51 @@ TEST(SheetCaster, FindsAllSheetsInOrderFromBothSides) {
 }
 
 TEST(SheetCaster, EndsExactlyAtInterfaces) {
-  // Rays inside a ball to points on its diaphragm beside the ball. None passes between them, and
-  // from outside nothing of the diaphragm is seen.
-  for (const double voxel : {0.2, 0.1, 0.05}) {
-    constexpr double kHole = 0.4;
-    const InterfaceCaster caster(support::sheetField(
-        support::sphereWithHoledDiaphragm(support::kSheetPlace, kHole, 48), voxel));
-    const InterfaceJudge judge(caster);
-    std::mt19937 random(7);
-    std::uniform_real_distribution<double> unit(0, 1);
-    std::size_t between = 0, onSheet = 0, outside = 0;
-    for (int n = 0; n < 20000; ++n) {
-      const double a = 2 * std::numbers::pi * unit(random),
-                   r = n % 2 ? 1 - 0.2 * voxel * unit(random) : 1 - 0.5 * unit(random);
-      const double side = n % 4 < 2 ? 1 : -1;
-      const V3d target = support::kSheetPlace + V3d(r * std::cos(a), r * std::sin(a), 0),
-                inner =
-                    support::kSheetPlace + V3d(0.7 * unit(random) - 0.35, 0.7 * unit(random) - 0.35,
-                                               side * (0.1 + 0.4 * unit(random)));
-      const V3d direction = (target - inner).normalized();
-      const InterfaceRay ray{inner, direction, 0, 10};
-      const InterfaceHit hit = caster.firstHit(ray);
-      ASSERT_TRUE(hit.found);
-      onSheet += isOnSheet(hit);
-      const double z = (inner + direction * hit.distance - support::kSheetPlace).z * side;
-      between += z < -1e-6;
-      // The same from outside: the ball hides all of it.
-      const V3d outer = support::kSheetPlace + (target - support::kSheetPlace).normalized() * 3 +
-                        V3d(unit(random) - 0.5, unit(random) - 0.5, unit(random) - 0.5) * 2;
-      const InterfaceRay back{outer, (target - outer).normalized(), 0, 10};
-      outside += isOnSheet(caster.firstHit(back));
+  // Rays to points on a ball's diaphragm, and on a ring around the ball, beside the ball. None
+  // passes between, to more than 0.15 voxels behind the plane; beside the ball the sheet itself is
+  // up to 0.1 voxels off. From outside nothing of the diaphragm is seen. The interpolated interface
+  // lies inside that of the mesh, so it would cut the diaphragm, and leave a gap at the ring.
+  constexpr unsigned kRings = 48;
+  const V3d centre = support::kSheetPlace;
+  levelset::TriMesh ringed = support::sphereMesh(1, centre, kRings);
+  support::addEquatorRing(ringed, centre, 1.4, kRings);
+  const levelset::TriMesh ball = support::sphereWithHoledDiaphragm(centre, 0.4, kRings);
+  for (const double voxel : {0.2, 0.1, 0.05})
+    for (const bool isRing : {false, true}) {
+      // At five voxels a radius the mesh of the field has gaps at the ring, too.
+      if (isRing && voxel == 0.2) continue;
+      const InterfaceCaster caster(support::sheetField(isRing ? ringed : ball, voxel));
+      const InterfaceJudge judge(caster);
+      std::mt19937 random(7);
+      std::uniform_real_distribution<double> unit(0, 1);
+      std::size_t missed = 0, between = 0, onSheet = 0, outside = 0, unlike = 0;
+      for (int n = 0; n < 10000; ++n) {
+        const double a = 2 * std::numbers::pi * unit(random), side = n % 4 < 2 ? 1 : -1;
+        const double depth = n % 2 ? 0.1 * voxel * unit(random) : 0.3 * unit(random);
+        const V3d outwards(std::cos(a), std::sin(a), 0), up(0, 0, side);
+        const V3d target = centre + outwards * (isRing ? 0.99 + depth : 1 - depth);
+        const V3d aside = V3d(unit(random) - 0.5, unit(random) - 0.5, 0) * 0.7;
+        const V3d from = (isRing ? target + outwards * unit(random) : centre) + aside +
+                         up * (0.1 + 0.4 * unit(random));
+        if (isRing && (from - centre).length() < 1.02) continue;  // in the ball
+        const InterfaceRay ray{from, (target - from).normalized(), 0, 10};
+        const InterfaceHit hit = caster.firstHit(ray);
+        missed += !hit.found;
+        if (!hit.found) continue;
+        onSheet += isOnSheet(hit);
+        between += ((from + ray.direction * hit.distance - centre) ^ up) < -0.15 * voxel;
+        if (n % 10 == 0) unlike += judge.firstHit(ray).front != hit.front;
+        if (isRing) continue;
+        // The same from outside: the ball hides all of it.
+        const V3d outer = centre + outwards * 3 + aside * 2 + up * unit(random);
+        outside += isOnSheet(caster.firstHit({outer, (target - outer).normalized(), 0, 10}));
+      }
+      EXPECT_GT(onSheet, 4500u) << voxel << isRing;
+      EXPECT_EQ(missed, 0u) << voxel << isRing;
+      EXPECT_EQ(between, 0u) << voxel << isRing;
+      EXPECT_EQ(outside, 0u) << voxel << isRing;
+      EXPECT_EQ(unlike, 0u) << voxel << isRing;
     }
-    EXPECT_GT(onSheet, 10000u);
-    EXPECT_EQ(between, 0u) << voxel;
-    EXPECT_EQ(outside, 0u) << voxel;
-  }
 }
 
 TEST(SheetCaster, HasTheDepthsAndSidesOfTheMesh) {

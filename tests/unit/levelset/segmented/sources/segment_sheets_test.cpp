@@ -326,15 +326,7 @@ TEST(SegmentSheets, MeasureTheCircleOfFourSheets) {
   constexpr unsigned kRings = 48, kSides = 2 * kRings;
   // A ring around the equator, where the sphere and its diaphragm already meet.
   TriMesh mesh = support::sphereWithHoledDiaphragm(kOffGrid, 0.4, kRings);
-  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
-  for (unsigned j = 0; j < kSides; ++j)
-    mesh.positions.push_back(
-        kOffGrid + V3d(std::cos(2 * pi * j / kSides), std::sin(2 * pi * j / kSides), 0) * 1.4);
-  for (unsigned j = 0; j < kSides; ++j) {
-    const std::uint32_t equator = 1 + (kRings / 2 - 1) * kSides, next = (j + 1) % kSides;
-    mesh.triangles.push_back({equator + j, first + j, first + next});
-    mesh.triangles.push_back({equator + j, first + next, equator + next});
-  }
+  support::addEquatorRing(mesh, kOffGrid, 1.4, kRings);
   std::vector<double> errors;
   for (const double voxel : {0.2, 0.1, 0.05}) {
     const SegmentedMesh result = segmentedToMesh(segmentSheets(mesh, voxel).field);
