@@ -60,7 +60,7 @@ TEST_F(SegmentSheetsActions, WriteSheets) {
 }
 
 TEST_F(SegmentSheetsActions, AreSeenByRays) {
-  const std::string view = "! render a.exr --size 64x48 --samples 1 --renderer both";
+  const std::string view = "! render a.exr --size 24x18 --samples 1 --renderer both";
   for (const char* scene : {kRoom, kSquare}) {
     const support::Outcome drawn = levelsmith(std::string(scene) + view);
     EXPECT_EQ(drawn.code, 0) << drawn.err;
