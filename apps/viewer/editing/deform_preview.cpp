@@ -108,9 +108,9 @@ void DeformWorker::work(const Request& request) {
     return !work_.isEnding() &&
            (!work_.isObsolete() || std::chrono::steady_clock::now() - begin < kAnyway);
   };
-  preview.certificate =
-      map->certify({.points = coarse_.positions, .triangles = coarse_.triangles}, isWanted)
-          .certificate;
+  preview.certificate = map->certify({.points = coarse_.positions, .triangles = coarse_.triangles},
+                                     {.progress = isWanted})
+                            .certificate;
   work_.publish(preview);
   if (request.isDragging || work_.isObsolete()) return;
   // Refuses maps that fold, and surfaces that leave the box, in the words of the action.

@@ -267,7 +267,8 @@ Value animateLattices(Invocation& in) {
     const levelset::FoldCertificate certificate = levelset::withContext(frameText(in, f), [&] {
       const auto found =
           levelset::certifyLattice(levelset::latticeBetween(keys, weights[f]),
-                                   {.progress = levelset::subProgress(
+                                   {.maxMemory = in.maxMemory,
+                                    .progress = levelset::subProgress(
                                         in.progress, kCertifying * static_cast<double>(f) / frames,
                                         kCertifying * static_cast<double>(f + 1) / frames)});
       levelset::requireInjective(found);
