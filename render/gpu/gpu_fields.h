@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "render/gpu/gl_context.h"
-#include "render/gpu/gl_objects.h"
+#include "render/gpu/device/gl_context.h"
+#include "render/gpu/device/gl_objects.h"
 #include "render/kernel/field_traversal.h"
 
 namespace render {

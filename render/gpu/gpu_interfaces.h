@@ -7,8 +7,8 @@
 #include <memory>
 #include <vector>
 
-#include "render/gpu/gl_context.h"
-#include "render/gpu/gl_objects.h"
+#include "render/gpu/device/gl_context.h"
+#include "render/gpu/device/gl_objects.h"
 #include "render/segmented/interface_caster.h"
 
 namespace render {

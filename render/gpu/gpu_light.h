@@ -10,8 +10,8 @@
 
 #include "levelset/volumes/volume.h"
 #include "render/direct/direct_volume.h"
-#include "render/gpu/gl_context.h"
-#include "render/gpu/gl_objects.h"
+#include "render/gpu/device/gl_context.h"
+#include "render/gpu/device/gl_objects.h"
 
 namespace render {
 

@@ -16,7 +16,7 @@
 #include "levelset/convert/pseudonormals.h"
 #include "levelset/convert/surface_blocks.h"
 #include "levelset/error.h"
-#include "render/gpu/gl_objects.h"
+#include "render/gpu/device/gl_objects.h"
 
 namespace render {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "levelset/mesh.h"
-#include "render/gpu/gl_context.h"
+#include "render/gpu/device/gl_context.h"
 
 namespace render {
 

@@ -1,6 +1,6 @@
 #include "render/gpu/gpu_renderer.h"
 
-#include "render/gpu/gl_context.h"
+#include "render/gpu/device/gl_context.h"
 #include "render/gpu/gpu_tracer.h"
 #include "render/kernel/paint.h"
 #include "render/views/picture.h"

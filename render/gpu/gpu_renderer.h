@@ -1,16 +1,11 @@
 #pragma once
 
-#include "levelset/error.h"
+#include "render/gpu/device/no_opengl.h"
 #include "render/images/image.h"
 #include "render/scene/scene.h"
 #include "render/shading/render_options.h"
 
 namespace render {
-
-/// Error: OpenGL 4.5 without a display is not available.
-struct NoOpenGl : levelset::ResourceLimit {
-  using ResourceLimit::ResourceLimit;
-};
 
 /// Draws the scene with the kernel as an OpenGL 4.5 compute shader, without a display. If the
 /// driver rounds as IEEE 754 requires, as Mesa's llvmpipe does, pixels have the same bits as those

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "levelset/error.h"
-#include "render/gpu/gl_objects.h"
+#include "render/gpu/device/gl_objects.h"
 #include "render/gpu/gpu_fields.h"
 #include "render/gpu/gpu_interfaces.h"
 #include "render/gpu/gpu_light.h"

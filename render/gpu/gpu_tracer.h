@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "render/gpu/gl_context.h"
+#include "render/gpu/device/gl_context.h"
 #include "render/kernel/kernel_scene.h"
 
 namespace render {

@@ -23,7 +23,7 @@
 #include "render/cpu/cpu_renderer.h"
 #include "render/cpu/cpu_tracer.h"
 #include "render/embree/embree_renderer.h"
-#include "render/gpu/gl_context.h"
+#include "render/gpu/device/gl_context.h"
 #include "render/gpu/gpu_tracer.h"
 #include "render/kernel/kernel_scene.h"
 

@@ -24,7 +24,7 @@
 #include "levelset/volume_files/volume_file.h"
 #include "levelset/volumes/synthetic.h"
 #include "render/cpu/cpu_tracer.h"
-#include "render/gpu/gl_context.h"
+#include "render/gpu/device/gl_context.h"
 #include "render/gpu/gpu_tracer.h"
 #include "render/kernel/kernel_scene.h"
 #include "render/volumes/volume_surface.h"

@@ -12,7 +12,7 @@
 #include "apps/viewer/volume/volume_slices.h"
 #include "levelset/memory_limit.h"
 #include "render/cpu/cpu_tracer.h"
-#include "render/gpu/gl_context.h"
+#include "render/gpu/device/gl_context.h"
 #include "render/gpu/gpu_tracer.h"
 #include "render/kernel/kernel_scene.h"
 #include "render/kernel/paint.h"

@@ -15,7 +15,7 @@
 #include "levelset/transform/transform.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/cpu/cpu_tracer.h"
-#include "render/gpu/gl_context.h"
+#include "render/gpu/device/gl_context.h"
 #include "render/gpu/gpu_renderer.h"
 #include "render/gpu/gpu_tracer.h"
 #include "render/images/compare_images.h"

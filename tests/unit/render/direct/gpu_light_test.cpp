@@ -14,7 +14,7 @@
 
 #include "levelset/error.h"
 #include "levelset/volumes/synthetic.h"
-#include "render/gpu/gl_context.h"
+#include "render/gpu/device/gl_context.h"
 #include "tests/support/volume_scenes.h"
 
 namespace gpu_light_test {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "levelset/error.h"
-#include "render/gpu/gl_context.h"
+#include "render/gpu/device/gl_context.h"
 #include "tests/support/segmented_scenes.h"
 
 namespace gpu_interfaces_test {

@@ -1,4 +1,4 @@
-#include "render/gpu/gl_objects.h"
+#include "render/gpu/device/gl_objects.h"
 
 #include <fmt/core.h>
 

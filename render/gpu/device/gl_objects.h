@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-#include "render/gpu/gl_context.h"
+#include "render/gpu/device/gl_context.h"
 
 namespace render {
 
@@ -44,6 +44,8 @@ class GrowingBuffer {
   void upload(const GlContext& context, std::span<const double> numbers);
   void release(const GlContext& context);
   [[nodiscard]] GLuint name() const { return name_; }
+  /// Size of the memory, bytes.
+  [[nodiscard]] std::size_t capacity() const { return capacity_; }
   /// Address of the contents. @pre the buffer is for Use::Fetch
   [[nodiscard]] const void* mapped() const { return mapped_; }
 

@@ -15,7 +15,7 @@
 #include <string>
 #include <thread>
 
-#include "render/gpu/gpu_renderer.h"
+#include "render/gpu/device/no_opengl.h"
 
 namespace render {
 

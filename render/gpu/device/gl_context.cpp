@@ -1,4 +1,4 @@
-#include "render/gpu/gl_context.h"
+#include "render/gpu/device/gl_context.h"
 
 #define EGL_NO_X11
 #include <EGL/egl.h>
