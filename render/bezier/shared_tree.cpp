@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "levelset/error.h"
+#include "render/bezier/shared_tree_data.h"
 #include "render/bezier/tree_node.h"
 #include "render/bezier/tree_walk.h"
 
@@ -34,151 +35,136 @@ bool isLarge(const TreeNode& node, const V2d& extent, const TreeOptions& options
 
 }  // namespace
 
-class SharedTree::Data {
- public:
-  Data(const BezierVolume& volume, const BezierView& view, const V2d& frame,
-       const TreeOptions& options)
-      : context_{view, &volume, {}, options.allRoots, options.measureTime},
-        isPolynomial_(view.isPerspective &&
-                      std::all_of(volume.patches.begin(), volume.patches.end(),
-                                  [](const BezierPatch& p) { return p.weights.empty(); })) {
-    if (isPolynomial_)
-      build<4>(volume, frame, options);
+SharedTree::Data::Data(const BezierVolume& volume, const BezierView& view, const V2d& frame,
+                       const TreeOptions& options)
+    : context{view, &volume, {}, options.allRoots, options.measureTime},
+      isPolynomial(view.isPerspective &&
+                   std::all_of(volume.patches.begin(), volume.patches.end(),
+                               [](const BezierPatch& p) { return p.weights.empty(); })) {
+  if (isPolynomial)
+    build<4>(volume, frame, options);
+  else
+    build<5>(volume, frame, options);
+}
+
+SharedTree::Roots SharedTree::Data::rootsOf(std::vector<V2d> screens, TreeCounts* sums) const {
+  return isPolynomial ? find<4>(std::move(screens), sums) : find<5>(std::move(screens), sums);
+}
+
+template <int N>
+void SharedTree::Data::build(const BezierVolume& volume, const V2d& frame,
+                             const TreeOptions& options) {
+  const StageClock clock(options.measureTime, counts.groupSeconds);
+  const std::size_t attributes = volume.attributeCount(),
+                    patches = volume.patches.size() * attributes;
+  context.scales.resize(patches);
+  std::vector<TreeNode> roots(patches);
+  std::vector<char> isKept(patches);
+  const auto isSeen = [&](const TreeNode& node) {
+    return node.crossesEye || (node.right >= -frame.x && node.left <= frame.x &&
+                               node.bottom >= -frame.y && node.top <= frame.y);
+  };
+  tbb::parallel_for(std::size_t{0}, patches, [&](std::size_t n) {
+    isKept[n] = TreeNodes<N>::root(volume, static_cast<std::uint32_t>(n / attributes),
+                                   static_cast<std::uint32_t>(n % attributes), context.view,
+                                   roots[n], context.scales[n]) &&
+                isSeen(roots[n]);
+    if (isKept[n])
+      proveNode<N>(roots[n], context.scales[n]);
     else
-      build<5>(volume, frame, options);
-  }
-
-  [[nodiscard]] Roots rootsOf(std::vector<V2d> screens, TreeCounts* counts) const {
-    return isPolynomial_ ? find<4>(std::move(screens), counts)
-                         : find<5>(std::move(screens), counts);
-  }
-  [[nodiscard]] const BezierView& view() const { return context_.view; }
-  [[nodiscard]] const TreeCounts& counts() const { return counts_; }
-
- private:
-  /// Transforms the patches and splits large ones. @param frame  half extents of the picture on
-  /// the screen; 0 for a single ray
-  template <int N>
-  void build(const BezierVolume& volume, const V2d& frame, const TreeOptions& options) {
-    const StageClock clock(options.measureTime, counts_.groupSeconds);
-    const std::size_t attributes = volume.attributeCount(),
-                      patches = volume.patches.size() * attributes;
-    context_.scales.resize(patches);
-    std::vector<TreeNode> roots(patches);
-    std::vector<char> isKept(patches);
-    const auto isSeen = [&](const TreeNode& node) {
-      return node.crossesEye || (node.right >= -frame.x && node.left <= frame.x &&
-                                 node.bottom >= -frame.y && node.top <= frame.y);
-    };
-    tbb::parallel_for(std::size_t{0}, patches, [&](std::size_t n) {
-      isKept[n] = TreeNodes<N>::root(volume, static_cast<std::uint32_t>(n / attributes),
-                                     static_cast<std::uint32_t>(n % attributes), context_.view,
-                                     roots[n], context_.scales[n]) &&
-                  isSeen(roots[n]);
-      if (isKept[n])
-        proveNode<N>(roots[n], context_.scales[n]);
-      else
-        roots[n] = {};
+      roots[n] = {};
+  });
+  std::vector<TreeNode> open;
+  for (std::size_t n = 0; n < patches; ++n)
+    if (isKept[n]) open.push_back(std::move(roots[n]));
+  counts.nodes += patches;
+  const V2d extent = context.view.step * static_cast<double>(options.tile);
+  while (!open.empty()) {
+    std::vector<TreeNode> large;
+    for (TreeNode& node : open)
+      (isLarge(node, extent, options) ? large : nodes).push_back(std::move(node));
+    if (large.empty()) break;
+    if (large.size() + nodes.size() > kMostSharedNodes) {
+      std::move(large.begin(), large.end(), std::back_inserter(nodes));
+      break;
+    }
+    std::vector<std::vector<TreeNode>> children(large.size());
+    tbb::parallel_for(std::size_t{0}, large.size(), [&](std::size_t n) {
+      std::vector<double> scratch;
+      children[n].resize(8);
+      children[n].resize(TreeNodes<N>::split(large[n], context.view, context.scaleOf(large[n]),
+                                             children[n].data(), scratch));
+      std::erase_if(children[n], [&](const TreeNode& node) { return !isSeen(node); });
+      for (TreeNode& node : children[n]) proveNode<N>(node, context.scaleOf(node));
     });
-    std::vector<TreeNode> open;
-    for (std::size_t n = 0; n < patches; ++n)
-      if (isKept[n]) open.push_back(std::move(roots[n]));
-    counts_.nodes += patches;
-    const V2d extent = context_.view.step * static_cast<double>(options.tile);
-    while (!open.empty()) {
-      std::vector<TreeNode> large;
-      for (TreeNode& node : open)
-        (isLarge(node, extent, options) ? large : nodes_).push_back(std::move(node));
-      if (large.empty()) break;
-      if (large.size() + nodes_.size() > kMostSharedNodes) {
-        std::move(large.begin(), large.end(), std::back_inserter(nodes_));
-        break;
-      }
-      std::vector<std::vector<TreeNode>> children(large.size());
-      tbb::parallel_for(std::size_t{0}, large.size(), [&](std::size_t n) {
-        std::vector<double> scratch;
-        children[n].resize(8);
-        children[n].resize(TreeNodes<N>::split(large[n], context_.view, context_.scaleOf(large[n]),
-                                               children[n].data(), scratch));
-        std::erase_if(children[n], [&](const TreeNode& node) { return !isSeen(node); });
-        for (TreeNode& node : children[n]) proveNode<N>(node, context_.scaleOf(node));
-      });
-      counts_.splits += large.size();
-      counts_.nodes += 8 * large.size();
-      open.clear();
-      for (std::vector<TreeNode>& list : children)
-        std::move(list.begin(), list.end(), std::back_inserter(open));
-      double bytes = 0;
-      for (const TreeNode& node : open) bytes += static_cast<double>(bytesOf(node));
-      levelset::requireMemory(bytes, options.maxBytes);
-    }
-    std::sort(nodes_.begin(), nodes_.end(), [](const TreeNode& a, const TreeNode& b) {
-      if (a.depthMin != b.depthMin) return a.depthMin < b.depthMin;
-      if (a.patch != b.patch) return a.patch < b.patch;
-      if (a.attribute != b.attribute) return a.attribute < b.attribute;
-      if (a.level != b.level) return a.level < b.level;
-      return a.cell < b.cell;
-    });
-    for (const TreeNode& node : nodes_) counts_.peakBytes += bytesOf(node);
+    counts.splits += large.size();
+    counts.nodes += 8 * large.size();
+    open.clear();
+    for (std::vector<TreeNode>& list : children)
+      std::move(list.begin(), list.end(), std::back_inserter(open));
+    double bytes = 0;
+    for (const TreeNode& node : open) bytes += static_cast<double>(bytesOf(node));
+    levelset::requireMemory(bytes, options.maxBytes);
   }
+  std::sort(nodes.begin(), nodes.end(), [](const TreeNode& a, const TreeNode& b) {
+    if (a.depthMin != b.depthMin) return a.depthMin < b.depthMin;
+    if (a.patch != b.patch) return a.patch < b.patch;
+    if (a.attribute != b.attribute) return a.attribute < b.attribute;
+    if (a.level != b.level) return a.level < b.level;
+    return a.cell < b.cell;
+  });
+  for (const TreeNode& node : nodes) counts.peakBytes += bytesOf(node);
+}
 
-  template <int N>
-  void proveNode(TreeNode& node, const ComponentScale& scale) const {
-    TreeNodes<N>::addFrame(node, context_.view, scale);
-    TreeNodes<N>::prove(node, context_.view);
+template <int N>
+void SharedTree::Data::proveNode(TreeNode& node, const ComponentScale& scale) const {
+  TreeNodes<N>::addFrame(node, context.view, scale);
+  TreeNodes<N>::prove(node, context.view);
+}
+
+template <int N>
+SharedTree::Roots SharedTree::Data::find(std::vector<V2d> screens, TreeCounts* sums) const {
+  RayGroup rays;
+  TreeCounts work;
+  double left = 1e300, right = -1e300, top = 1e300, bottom = -1e300;
+  for (const V2d& screen : screens) {
+    left = std::min(left, screen.x);
+    right = std::max(right, screen.x);
+    top = std::min(top, screen.y);
+    bottom = std::max(bottom, screen.y);
   }
-
-  template <int N>
-  [[nodiscard]] Roots find(std::vector<V2d> screens, TreeCounts* sums) const {
-    RayGroup rays;
-    TreeCounts counts;
-    double left = 1e300, right = -1e300, top = 1e300, bottom = -1e300;
-    for (const V2d& screen : screens) {
-      left = std::min(left, screen.x);
-      right = std::max(right, screen.x);
-      top = std::min(top, screen.y);
-      bottom = std::max(bottom, screen.y);
-    }
-    const std::size_t count = screens.size();
-    rays.screens = std::move(screens);
-    if (context_.allRoots)
-      rays.roots.resize(count);
-    else
-      rays.closest.resize(count);
-    rays.nearest.assign(count, Camera::kNoDepth);
-    rays.visits.assign(count, 0);
-    TreeWalk<N> walk(context_, rays, counts);
-    std::vector<std::uint32_t> asked;
-    for (const TreeNode& node : nodes_) {
-      if (!node.crossesEye &&
-          (node.left > right || node.right < left || node.top > bottom || node.bottom < top))
-        continue;
-      if (asked.empty())
-        for (std::uint32_t n = 0; n < count; ++n) asked.push_back(n);
-      std::fill(rays.visits.begin(), rays.visits.end(), 0);
-      walk.visitProven(node, context_.scaleOf(node), asked);
-    }
-    Roots result;
-    result.first.push_back(0);
-    for (std::size_t n = 0; n < count; ++n) {
-      if (context_.allRoots) {
-        finishRoots(rays.roots[n]);
-        result.roots.insert(result.roots.end(), rays.roots[n].begin(), rays.roots[n].end());
-      } else if (rays.nearest[n] < Camera::kNoDepth) {
-        result.roots.push_back(rays.closest[n]);
-      }
-      result.first.push_back(result.roots.size());
-    }
-    counts.peakBytes = walk.bytes();
-    if (sums) sums->add(counts);
-    return result;
+  const std::size_t count = screens.size();
+  rays.start(std::move(screens), context.allRoots);
+  TreeWalk<N> walk(context, rays, work);
+  std::vector<std::uint32_t> asked;
+  for (const TreeNode& node : nodes) {
+    if (!node.crossesEye &&
+        (node.left > right || node.right < left || node.top > bottom || node.bottom < top))
+      continue;
+    if (asked.empty())
+      for (std::uint32_t n = 0; n < count; ++n) asked.push_back(n);
+    std::fill(rays.visits.begin(), rays.visits.end(), 0);
+    walk.visitProven(node, context.scaleOf(node), asked);
   }
+  work.peakBytes = walk.bytes();
+  if (sums) sums->add(work);
+  return finished(rays);
+}
 
-  TreeContext context_;
-  bool isPolynomial_;
-  std::vector<TreeNode> nodes_;  ///< from front to back
-  TreeCounts counts_;
-};
+SharedTree::Roots SharedTree::Data::finished(RayGroup& rays) const {
+  Roots result;
+  result.first.push_back(0);
+  for (std::size_t n = 0; n < rays.screens.size(); ++n) {
+    if (context.allRoots) {
+      finishRoots(rays.roots[n]);
+      result.roots.insert(result.roots.end(), rays.roots[n].begin(), rays.roots[n].end());
+    } else if (rays.nearest[n] < Camera::kNoDepth) {
+      result.roots.push_back(rays.closest[n]);
+    }
+    result.first.push_back(result.roots.size());
+  }
+  return result;
+}
 
 void TreeCounts::add(const TreeCounts& other) {
   nodes += other.nodes;
@@ -205,9 +191,8 @@ SharedTree::~SharedTree() = default;
 SharedTree::SharedTree(SharedTree&&) noexcept = default;
 SharedTree& SharedTree::operator=(SharedTree&&) noexcept = default;
 
-SharedTree::Roots SharedTree::rootsOf(const std::vector<Camera::Ray>& rays,
-                                      TreeCounts* counts) const {
-  const BezierView& view = data_->view();
+std::vector<V2d> SharedTree::screensOf(const std::vector<Camera::Ray>& rays) const {
+  const BezierView& view = data_->context.view;
   std::vector<V2d> screens;
   screens.reserve(rays.size());
   for (const Camera::Ray& ray : rays) {
@@ -220,17 +205,27 @@ SharedTree::Roots SharedTree::rootsOf(const std::vector<Camera::Ray>& rays,
       screens.emplace_back(offset.dot(view.right), offset.dot(view.down));
     }
   }
-  return data_->rootsOf(std::move(screens), counts);
+  return screens;
+}
+
+SharedTree::Roots SharedTree::rootsOf(const std::vector<Camera::Ray>& rays,
+                                      TreeCounts* counts) const {
+  return data_->rootsOf(screensOf(rays), counts);
+}
+
+SharedTree::Roots SharedTree::rootsOn(std::vector<V2d> screens) const {
+  return data_->rootsOf(std::move(screens), nullptr);
 }
 
 SharedTree::Roots SharedTree::rootsAt(const std::vector<V2d>& positions, TreeCounts* counts) const {
   std::vector<V2d> screens;
   screens.reserve(positions.size());
-  for (const V2d& position : positions) screens.push_back(data_->view().at(position.x, position.y));
+  for (const V2d& position : positions)
+    screens.push_back(data_->context.view.at(position.x, position.y));
   return data_->rootsOf(std::move(screens), counts);
 }
 const TreeCounts& SharedTree::counts() const {
-  return data_->counts();
+  return data_->counts;
 }
 
 BezierPicture castBezier(const BezierVolume& volume, const Camera& camera,

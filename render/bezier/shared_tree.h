@@ -90,11 +90,17 @@ class SharedTree {
   /// Finds the roots of rays of the camera.
   [[nodiscard]] Roots rootsOf(const std::vector<Camera::Ray>& rays,
                               TreeCounts* counts = nullptr) const;
+  /// Screen positions of rays of the camera, as BezierView defines them.
+  [[nodiscard]] std::vector<Imath::V2d> screensOf(const std::vector<Camera::Ray>& rays) const;
+  /// Finds the roots of rays through screen positions.
+  [[nodiscard]] Roots rootsOn(std::vector<Imath::V2d> screens) const;
   /// Work of the constructor.
   [[nodiscard]] const TreeCounts& counts() const;
 
+  struct Data;  ///< private to the ray casters
+  [[nodiscard]] const Data& data() const { return *data_; }
+
  private:
-  class Data;
   std::unique_ptr<const Data> data_;
 };
 

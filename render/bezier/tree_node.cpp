@@ -15,6 +15,12 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNodeRounding = 2e-15;
 // Below this ratio of the determinant to the lengths of its rows the Jacobian counts as singular.
 constexpr double kLeastDeterminant = 1e-11;
+// Roots lie outside the hull of the control points by this share of the range of depths at most:
+// degree 20, three axes, and a last step of Newton's method of 1e-8 of the edge. The second number
+// is the rounding error, as a share of the largest depth.
+constexpr double kRootReach = 2e-6, kDepthRounding = 2e-13;
+// Above this ratio of the weights of a node there is no such bound.
+constexpr double kMostDepthRatio = 1e5;
 
 constexpr std::size_t kMostOrder = levelset::kMostDegree + 1;
 
@@ -188,7 +194,7 @@ struct Combined {
 
 }  // namespace
 
-double TreeNode::edge() const {
+double NodePlace::edge() const {
   return std::ldexp(1.0, -level);
 }
 
@@ -291,9 +297,10 @@ template <int N>
 bool TreeNodes<N>::bound(TreeNode& node, const BezierView& view, const ComponentScale& scale) {
   const std::size_t count = node.points.size() / N;
   node.hasFrame = node.isUnique = false;
-  NodeRange value, depth, weighted;
+  NodeRange value, depth, weighted, weights;
   for (std::size_t n = 0; n < count; ++n) {
     const double* c = node.points.data() + n * N;
+    if constexpr (N == 5) weights.add(c[N - 1]);
     value.add(c[kValue]);
     weighted.add(c[kDepth]);
     depth.add(N == 5 ? c[kDepth] / c[N - 1] : c[kDepth]);
@@ -303,6 +310,12 @@ bool TreeNodes<N>::bound(TreeNode& node, const BezierView& view, const Component
   const double thick = kNodeRounding * scale.most[kDepth];
   node.depthMin = depth.low;
   node.depthMax = depth.high;
+  const double ratio = N == 5 ? weights.high / weights.low : 1;
+  node.leastDepth =
+      ratio < kMostDepthRatio
+          ? depth.low - ratio * (kRootReach * (depth.high - depth.low) +
+                                 kDepthRounding * std::max(std::abs(depth.low), depth.high))
+          : -kInfinity;
   if (depth.high + thick < view.near || depth.low - thick > view.far) return false;
   if (view.isPerspective) {
     if (!(weighted.high > 0)) return false;

@@ -24,15 +24,25 @@ struct NodeJet {
   std::array<double, N> value, slope[3];
 };
 
-/// A part of a patch, as the map of a unit cube of local parameters.
-struct TreeNode {
-  std::array<int, 3> degree{};
-  std::vector<double> points = {};  ///< N components for each control point
+/// Position of a node.
+struct NodePlace {
   std::uint32_t patch = 0, attribute = 0;
   int level = 0;                           ///< number of halvings
   std::array<std::uint32_t, 3> cell = {};  ///< position in the patch, in edges of this level
 
+  [[nodiscard]] double edge() const;  ///< edge length in the parameters of the patch
+};
+
+/// A part of a patch, as the map of a unit cube of local parameters.
+struct TreeNode : NodePlace {
+  std::array<int, 3> degree{};
+  std::vector<double> points = {};  ///< N components for each control point
+
   double depthMin = 0, depthMax = 0;  ///< range of depths
+  /// Lower bound of the depths of roots that Newton's method finds in the node and below it. It is
+  /// less than depthMin by rounding errors and by the tolerance of faces. So the nearest root does
+  /// not depend on the order in which nodes are visited.
+  double leastDepth = 0;
   /// True if the hull of the control points crosses the plane of the eye, where projections have
   /// no bounds. Then only the members above are set.
   bool crossesEye = false;
@@ -53,8 +63,6 @@ struct TreeNode {
   bool isUnique = false;
   double least[3] = {};      ///< lower bounds of ∂G_r/∂u_r
   double across[3][3] = {};  ///< bounds of |∂G_r/∂u_c|, r ≠ c
-
-  [[nodiscard]] double edge() const;  ///< edge length in the parameters of the patch
 };
 
 /// Largest magnitudes of the components of a whole patch. Rounding errors of nodes are relative to

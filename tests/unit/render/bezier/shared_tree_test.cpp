@@ -134,6 +134,23 @@ TEST(SharedTree, SharingChangesNoBit) {
   }
 }
 
+TEST(SharedTree, TheNearestRootIsTheFirstOfAll) {
+  // So it does not depend on the order in which nodes are visited.
+  for (const bezier_scenes::BezierScene& scene : bezier_scenes::scenes(2, 24))
+    for (const Camera& camera : scene.cameras) {
+      const BezierPicture all = castBezier(scene.volume, camera, {.allRoots = true}),
+                          nearest = castBezier(scene.volume, camera);
+      BezierPicture first;
+      first.first.push_back(0);
+      for (std::size_t pixel = 0; pixel + 1 < all.first.size(); ++pixel) {
+        if (all.nearest(pixel)) first.roots.push_back(*all.nearest(pixel));
+        first.first.push_back(first.roots.size());
+      }
+      EXPECT_GT(first.roots.size(), 20U) << scene.name;
+      EXPECT_TRUE(isSame(nearest, first)) << scene.name;
+    }
+}
+
 TEST(SharedTree, TurnedPatchesGiveTheSameSurface) {
   // A patch whose first parameter runs backwards has a negative Jacobian everywhere.
   BezierVolume volume = bezier_scenes::sphere(2), turned = volume;
