@@ -213,8 +213,8 @@ SharedTree::Roots SharedTree::rootsOf(const std::vector<Camera::Ray>& rays,
   return data_->rootsOf(screensOf(rays), counts);
 }
 
-SharedTree::Roots SharedTree::rootsOn(std::vector<V2d> screens) const {
-  return data_->rootsOf(std::move(screens), nullptr);
+SharedTree::Roots SharedTree::rootsOn(std::vector<V2d> screens, TreeCounts* counts) const {
+  return data_->rootsOf(std::move(screens), counts);
 }
 
 SharedTree::Roots SharedTree::rootsAt(const std::vector<V2d>& positions, TreeCounts* counts) const {

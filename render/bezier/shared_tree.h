@@ -93,7 +93,7 @@ class SharedTree {
   /// Screen positions of rays of the camera, as BezierView defines them.
   [[nodiscard]] std::vector<Imath::V2d> screensOf(const std::vector<Camera::Ray>& rays) const;
   /// Finds the roots of rays through screen positions.
-  [[nodiscard]] Roots rootsOn(std::vector<Imath::V2d> screens) const;
+  [[nodiscard]] Roots rootsOn(std::vector<Imath::V2d> screens, TreeCounts* counts = nullptr) const;
   /// Work of the constructor.
   [[nodiscard]] const TreeCounts& counts() const;
 

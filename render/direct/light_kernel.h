@@ -30,6 +30,7 @@ struct TransferKernel {
   static double nextBelow(double a) { return std::nextafter(a, 0.0); }
 
 #include "render/shaders/grid_walk.glsl"
+#include "render/shaders/rounded_root.glsl"
 #include "render/shaders/transfer.glsl"
 };
 

@@ -9,6 +9,7 @@
 
 #include "levelset/error.h"
 #include "render/direct/light_tables.h"
+#include "render/gpu/device/double_root.h"
 #include "render/kernel/trace_glsl.h"
 
 namespace render {
@@ -59,34 +60,11 @@ double ofFloat(uint bits) {
   return (bits & 0x80000000u) == 0u ? result : -result;
 }
 
-// The next larger and the next smaller number of a positive one.
-double nextAbove(double a) {
-  uvec2 bits = unpackDouble2x32(a);
-  bits.x += 1u;
-  bits.y += bits.x == 0u ? 1u : 0u;
-  return packDouble2x32(bits);
-}
-double nextBelow(double a) {
-  uvec2 bits = unpackDouble2x32(a);
-  bits.y -= bits.x == 0u ? 1u : 0u;
-  bits.x -= 1u;
-  return packDouble2x32(bits);
-}
-
 double numberAt(int x, int y, int z) {
   int n = (z * pointsY + y) * pointsX + x;
   uint word = texelFetch(values, n >> kWordShift).x;
   int low = (n & ((1 << kWordShift) - 1)) * kNumberBits;
   return NUMBER(word, low);
-}
-)GLSL";
-
-constexpr const char* kLightRoot = R"GLSL(
-// Square root, rounded as IEEE 754 requires. NVIDIA's driver 580 rounds a third of the roots of
-// doubles to a neighbour. Where products would overflow or underflow, the driver's root stays.
-double rootOf(double a) {
-  VAR root = sqrt(a);
-  return a > 1e-250lf && a < 1e250lf ? roundedRoot(a, root) : root;
 }
 )GLSL";
 
@@ -170,7 +148,7 @@ std::string lightShaderText(VolumeType type) {
              : bytesOf(type) == 2 ? 1
                                   : 0,
              8 * bytesOf(type), number) +
-         kLightDialect + kGridWalkKernel + kTransferKernel + kLightRoot + kDirectKernel +
+         kLightDialect + doubleRootText() + kGridWalkKernel + kTransferKernel + kDirectKernel +
          kLightMain;
 }
 

@@ -1,5 +1,7 @@
 #include "render/gpu/gpu_renderer.h"
 
+#include <fmt/core.h>
+
 #include "render/gpu/device/gl_context.h"
 #include "render/gpu/gpu_tracer.h"
 #include "render/kernel/paint.h"
@@ -22,7 +24,14 @@ Image renderGpu(const Scene& scene, const RenderOptions& options) {
   const GpuTracer tracer(context, surfaces, 0, options.fromNanoVdb ? &scene : nullptr);
   // Edge of a tile, pixels. Each dispatch waits for the device, so a tile has many rays.
   constexpr int kGpuTile = 256;
-  return paintPicture(scene, surfaces, tracer, kGpuTile, "gpu " + context.description(), options);
+  Image image =
+      paintPicture(scene, surfaces, tracer, kGpuTile, "gpu " + context.description(), options);
+  if (const std::size_t rays = tracer.bezierCounts().onProcessor; rays > 0)
+    image.attributes["ls:onProcessor"] = fmt::format(
+        "the processor cast {} rays through Bézier volumes, which gave up, or whose parts did not "
+        "fit into the memory of the shader",
+        rays);
+  return image;
 }
 
 }  // namespace render

@@ -240,6 +240,7 @@ struct GpuTracer::Impl {
   std::optional<GpuFields> fields;
   GpuLight light;
   GpuInterfaces interfaces;
+  GpuBeziers beziers;
   double shaderSeconds = 0;
 
   Impl(const GlContext& context_, std::size_t largestTable_)
@@ -247,7 +248,8 @@ struct GpuTracer::Impl {
         gl(context_.gl()),
         largestTable(largestTable_ > 0 ? largestTable_ : context_.largestTable()),
         light(context_, largestTable),
-        interfaces(context_, largestTable) {
+        interfaces(context_, largestTable),
+        beziers(context_) {
     shift = static_cast<int>(std::bit_width(largestTable / sizeof(float))) - 1;
     shift = std::min(shift, 30);  // indices of values fit into a signed 32-bit integer
   }
@@ -262,6 +264,7 @@ struct GpuTracer::Impl {
     if (fields) fields->release();
     light.release();
     interfaces.release();
+    beziers.release();
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
@@ -486,6 +489,18 @@ std::vector<InterfaceHit> GpuTracer::interfaceHits(const InterfaceCaster& caster
                                                    const std::vector<InterfaceRay>& rays,
                                                    bool wantsNormals) const {
   return impl_->interfaces.firstHits(caster, rays, wantsNormals);
+}
+
+SharedTree::Roots GpuTracer::bezierRoots(const SharedTree& tree,
+                                         const std::vector<Camera::Ray>& rays,
+                                         TreeCounts* counts) const {
+  return impl_->beziers.rootsOn(tree, tree.screensOf(rays), counts);
+}
+
+GpuBezierCounts GpuTracer::bezierCounts() const {
+  GpuBezierCounts counts;
+  impl_->context.run([&] { counts = impl_->beziers.counts(); });
+  return counts;
 }
 
 double GpuTracer::shaderSeconds() const {

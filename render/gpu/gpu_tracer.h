@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "render/gpu/bezier/gpu_beziers.h"
 #include "render/gpu/device/gl_context.h"
 #include "render/kernel/kernel_scene.h"
 
@@ -39,7 +40,13 @@ class GpuTracer : public KernelTracer {
   [[nodiscard]] std::vector<InterfaceHit> interfaceHits(const InterfaceCaster& caster,
                                                         const std::vector<InterfaceRay>& rays,
                                                         bool wantsNormals) const override;
+  /// @throws levelset::ResourceLimit for the reasons of GpuBeziers::rootsOn()
+  [[nodiscard]] SharedTree::Roots bezierRoots(const SharedTree& tree,
+                                              const std::vector<Camera::Ray>& rays,
+                                              TreeCounts* counts) const override;
 
+  /// Work of all calls of bezierRoots() so far.
+  [[nodiscard]] GpuBezierCounts bezierCounts() const;
   /// Returns the wall time, seconds, of the shaders of all trace() calls so far. The time of
   /// transfers is not included.
   [[nodiscard]] double shaderSeconds() const;

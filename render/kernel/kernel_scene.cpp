@@ -158,6 +158,12 @@ std::vector<VolumeLight> KernelTracer::volumeLight(const DirectVolume& volume,
   return light;
 }
 
+SharedTree::Roots KernelTracer::bezierRoots(const SharedTree& tree,
+                                            const std::vector<Camera::Ray>& rays,
+                                            TreeCounts* counts) const {
+  return tree.rootsOf(rays, counts);
+}
+
 std::vector<InterfaceHit> KernelTracer::interfaceHits(const InterfaceCaster& caster,
                                                       const std::vector<InterfaceRay>& rays,
                                                       bool wantsNormals) const {
@@ -299,11 +305,12 @@ std::size_t KernelScene::bytes() const {
   return sum + mapped_.bytes();
 }
 
-std::vector<Hit> KernelScene::castBeziers(const std::vector<Camera::Ray>& rays,
+std::vector<Hit> KernelScene::castBeziers(const KernelTracer& tracer,
+                                          const std::vector<Camera::Ray>& rays,
                                           TreeCounts* counts) const {
   std::vector<Hit> hits(beziers_.empty() ? 0 : rays.size());
   for (std::size_t part = 0; part < beziers_.size(); ++part) {
-    const SharedTree::Roots found = trees_[part]->rootsOf(rays, counts);
+    const SharedTree::Roots found = tracer.bezierRoots(*trees_[part], rays, counts);
     for (std::size_t i = 0; i < rays.size(); ++i) {
       if (found.first[i] == found.first[i + 1]) continue;
       const BezierRoot& root = found.roots[found.first[i]];

@@ -57,6 +57,11 @@ class KernelTracer : public FieldTracer {
   [[nodiscard]] virtual std::vector<InterfaceHit> interfaceHits(
       const InterfaceCaster& caster, const std::vector<InterfaceRay>& rays,
       bool wantsNormals) const;
+  /// Roots of rays of the camera in a Bézier volume. The default casts on the calling thread.
+  /// @param counts  receives the work of the processor; may be null
+  [[nodiscard]] virtual SharedTree::Roots bezierRoots(const SharedTree& tree,
+                                                      const std::vector<Camera::Ray>& rays,
+                                                      TreeCounts* counts) const;
 };
 
 /// Hits of the rays through a block of pixels with solids, at most one for each ray.
@@ -127,7 +132,8 @@ class KernelScene {
   /// Surfaces in Bézier volumes.
   [[nodiscard]] const std::vector<BezierPart>& beziers() const { return beziers_; }
   /// First hits of rays of the camera with the surfaces in Bézier volumes; empty without any.
-  [[nodiscard]] std::vector<Hit> castBeziers(const std::vector<Camera::Ray>& rays,
+  [[nodiscard]] std::vector<Hit> castBeziers(const KernelTracer& tracer,
+                                             const std::vector<Camera::Ray>& rays,
                                              TreeCounts* counts = nullptr) const;
   [[nodiscard]] std::size_t bytes() const;
   /// Numbers of blocks of all solids, by their use in the brick tables.

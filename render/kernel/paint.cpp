@@ -150,7 +150,7 @@ KernelPainter::FirstHits KernelPainter::firstHits(const KernelTracer& tracer,
           segmented->hitOf(asked[i], hits[i], scene_.solids.size() + scene_.mapped.size()));
   }
   TreeCounts counts;
-  first.onBeziers = surfaces_.castBeziers(rays, &counts);
+  first.onBeziers = surfaces_.castBeziers(tracer, rays, &counts);
   if (counts.overruns > 0) layers_.overruns += counts.overruns;
   return first;
 }

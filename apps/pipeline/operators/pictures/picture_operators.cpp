@@ -229,6 +229,8 @@ Value draw(Invocation& in) {
   if (read != image.attributes.end() &&
       (!scene.solids.empty() || !scene.meshes.empty() || scene.segmented))
     in.notes.notes.push_back(fmt::format("render: {}", read->second));
+  if (const auto cast = image.attributes.find("ls:onProcessor"); cast != image.attributes.end())
+    in.notes.notes.push_back(fmt::format("render: {}", cast->second));
   if (const auto told = image.attributes.find("ls:warning"); told != image.attributes.end())
     in.notes.warnings.push_back(fmt::format("render: {}", told->second));
   if (const auto count = image.attributes.find("ls:bezierSingular");
