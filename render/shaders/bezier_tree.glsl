@@ -63,7 +63,7 @@ void run(int n) { prove(int(lists[kCounters + nodeCount + n / 3]), n % 3); }
 
 #elif defined(KERNEL_SOLVE)
 // Solves pairs of a ray and a node, as TreeWalk::solve(), isExcluded() and addCentre(). One jet is
-// computed in each iteration. What `mostJets` do not finish goes on in the next call.
+// computed in each iteration. Pairs that need more than `mostJets` go on in the next call.
 const int kStart = 0, kNewton = 1, kExclude = 2, kAtCentre = 3, kDone = 4, kOpen = 5;
 
 void addRoot(int node, uint ray, Three u, Three change, bool isSingular) {

@@ -1,16 +1,20 @@
 // Shared subdivision trees beside the basic scheme, in the published workloads [Liu14]. CPU time of
 // the process, so other load of the machine matters little. Usage: bezier_bench [SIZE [NAME]];
 // with NAME, only that row of the first two tables; with the name growth, only the growth with the
-// resolution.
+// resolution; with the name gpu, only the wall time of the processor and of the compute shaders.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "render/gpu/bezier/gpu_beziers.h"
+#include "render/gpu/device/gl_context.h"
 #include "tests/bench/bezier_workloads.h"
 
 namespace {
@@ -49,6 +53,50 @@ void table(int width, int height, const std::string& only) {
                static_cast<double>(shared.picture.counts.peakBytes) / 1e6,
                isSame(shared.picture, basic.picture) ? "" : "  the pictures differ");
   }
+}
+
+/// Wall seconds of a call, the least of three.
+template <typename Call>
+double wallSeconds(const Call& call) {
+  double least = 1e300;
+  for (int run = 0; run < 3; ++run) {
+    const auto start = std::chrono::steady_clock::now();
+    call();
+    least = std::min(
+        least, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  }
+  return least;
+}
+
+/// Roots of all pixels by all threads of the processor, and by the compute shaders.
+void onGpu(int size) {
+  const render::GlContext context;
+  render::GpuBeziers beziers(context);
+  fmt::print("{}, {}x{}\n{:<12} {:>12} {:>12} {:>7} {:>10}\n", context.description(), size, size,
+             "data", "processor s", "shaders s", "ratio", "peak MB");
+  for (const auto& [name, volume] :
+       {std::pair<const char*, BezierVolume>{"teardrop", bezier_scenes::teardrop()},
+        {"cylinder", bezier_scenes::bentCylinder()},
+        {"dice", bezier_scenes::dice()},
+        {"teapot", bezier_scenes::teapot()}}) {
+    if (volume.patches.empty()) continue;
+    const Camera camera = cameraOf(volume, size, size, 1.2);
+    std::vector<Camera::Ray> rays;  // in squares, as in pictures
+    constexpr int kSquare = 16;
+    for (int top = 0; top < size; top += kSquare)
+      for (int left = 0; left < size; left += kSquare)
+        for (int y = top; y < std::min(top + kSquare, size); ++y)
+          for (int x = left; x < std::min(left + kSquare, size); ++x)
+            rays.push_back(camera.ray(x + 0.5, y + 0.5));
+    const double processor = wallSeconds([&] { (void)castBezier(volume, camera, kShared); });
+    const double shaders = wallSeconds([&] {
+      const render::SharedTree tree(volume, camera, kShared);
+      (void)beziers.rootsOn(tree, tree.screensOf(rays));
+    });
+    fmt::print("{:<12} {:>12.3f} {:>12.3f} {:>7.1f} {:>10.1f}\n", name, processor, shaders,
+               shaders / processor, static_cast<double>(beziers.counts().peakBytes) / 1e6);
+  }
+  context.run([&] { beziers.release(); });
 }
 
 void degrees(int size) {
@@ -127,6 +175,10 @@ int main(int argc, char** argv) {
   const std::string only = argc > 2 ? argv[2] : "";
   if (only == "growth") {
     resolutions(4 * size);
+    return 0;
+  }
+  if (only == "gpu") {
+    onGpu(size);
     return 0;
   }
   table(size, size, only);

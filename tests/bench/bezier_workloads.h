@@ -2,7 +2,6 @@
 
 // Workloads and cameras of the benchmarks of Bézier volumes.
 
-#include <cstdlib>
 #include <ctime>
 #include <string>
 #include <utility>

@@ -314,8 +314,10 @@ Operator renderOperator() {
           "Layers of the EXR: R G B A, Z (along the view axis, +inf for a miss), N.X N.Y N.Z, P.X "
           "P.Y P.Z, curvature.mean .gauss .k1 .k2, id. Without --from, the view is the scene's "
           "own, or a three-quarter view that frames the solid. 'gpu' and 'cpu' run one kernel in "
-          "single precision, with the same bits; 'embree' finds hits by independent code in double "
-          "precision. 'both' draws with the kernel, writes that picture, compares the layers with "
+          "single precision, with the same bits; they cast rays through Bézier volumes in double "
+          "precision, and light rays through these on the processor. 'embree' finds hits by "
+          "independent code in double precision. 'both' draws with the kernel, writes that "
+          "picture, compares the layers with "
           "those of embree, and ends with exit code 5 where they differ by more than two correct "
           "renderers may.",
       .example =

@@ -217,6 +217,19 @@ TEST(GpuBeziers, DrawPicturesWithTheBitsOfTheProcessor) {
   EXPECT_FALSE(gpu.attributes.contains("ls:onProcessor"));
 }
 
+TEST(GpuBeziers, PicturesTellOfRaysOnTheProcessor) {
+  BezierVolume ball = bezier_scenes::sphere(2);
+  for (double& value : ball.patches[0].attributes[0]) value *= 1e-40;
+  Scene scene;
+  scene.beziers.push_back({.caster = BezierCaster(ball), .id = 5});
+  scene.camera = cameraAt(V3d(0, -4, 0), 8);
+  const RenderOptions options{.samples = 1, .ambientSamples = 0, .shadowSamples = 0};
+  const Image gpu = renderGpu(scene, options);
+  EXPECT_EQ(gpu.channels, renderCpu(scene, options).channels);
+  ASSERT_TRUE(gpu.attributes.contains("ls:onProcessor"));
+  EXPECT_NE(gpu.attributes.at("ls:onProcessor").find("the processor cast"), std::string::npos);
+}
+
 TEST(GpuBeziers, AreUsedByTheTracer) {
   Scene scene;
   scene.beziers.push_back({.caster = BezierCaster(bezier_scenes::sphere(2)), .id = 5});
