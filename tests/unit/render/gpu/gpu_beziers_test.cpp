@@ -111,7 +111,7 @@ TEST(GpuBeziers, DrawsTheTeapotWithTheBitsOfTheProcessor) {
   expectSameBits(device, "teapot", teapot, bezier_scenes::randomCamera(teapot, numbers, 24));
 }
 
-TEST(GpuBeziers, TakesAnyDegree) {
+TEST(SlowGpuBeziers, TakesAnyDegree) {
   // Newton's method goes on over several calls of the shader at degree 20. The patches differ in
   // their degrees.
   BezierVolume volume = bezier_scenes::sphere(3);
