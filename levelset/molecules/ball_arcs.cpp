@@ -1,5 +1,6 @@
 #include "levelset/molecules/ball_arcs.h"
 
+#include <fmt/core.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -7,9 +8,12 @@
 #include <atomic>
 #include <cmath>
 #include <numbers>
+#include <numeric>
+#include <tuple>
 #include <unordered_map>
 #include <utility>
 
+#include "levelset/error.h"
 #include "levelset/progress_gate.h"
 
 namespace levelset {
@@ -74,6 +78,25 @@ double planeOf(const Ball& a, const Ball& b, double apart) {
   return (apart * apart + (a.radius - b.radius) * (a.radius + b.radius)) / (2 * apart);
 }
 
+/// Square of the radius of the circle in which two spheres meet. Rounding may leave none for balls
+/// that nearly touch.
+double circleSquared(const Ball& a, double plane) {
+  return (a.radius - plane) * (a.radius + plane);
+}
+
+/// Marks balls at the place of a larger one, or of an equal one before them. There may be many.
+void hideCoincident(const std::vector<Ball>& balls, std::vector<char>& isHidden) {
+  std::vector<std::uint32_t> order(balls.size());
+  std::iota(order.begin(), order.end(), 0U);
+  const auto key = [&](std::uint32_t n) {
+    const Ball& ball = balls[n];
+    return std::tuple(ball.centre.x, ball.centre.y, ball.centre.z, -ball.radius, n);
+  };
+  std::sort(order.begin(), order.end(), [&](auto a, auto b) { return key(a) < key(b); });
+  for (std::size_t n = 1; n < order.size(); ++n)
+    isHidden[order[n]] = balls[order[n]].centre == balls[order[n - 1]].centre;
+}
+
 BallLists listsOf(std::vector<std::vector<std::uint32_t>>& lists) {
   BallLists result;
   result.first.assign(1, 0);
@@ -122,8 +145,7 @@ void addArcs(const std::vector<Ball>& balls, const BallLists& overlaps, std::uin
   const Ball &a = balls[first], &b = balls[second];
   const V3d between = b.centre - a.centre;
   const double apart = between.length(), plane = planeOf(a, b, apart);
-  const double squared = (a.radius - plane) * (a.radius + plane);
-  if (!(squared > 0)) return;
+  const double squared = circleSquared(a, plane);
   ExposedArc arc;
   arc.first = first;
   arc.second = second;
@@ -174,18 +196,23 @@ void addArcs(const std::vector<Ball>& balls, const BallLists& overlaps, std::uin
 }  // namespace
 
 BallLists overlapsOf(const std::vector<Ball>& balls, std::vector<char>& isHidden,
-                     std::size_t maxBytes) {
+                     std::size_t maxBytes, const Progress& progress) {
+  isHidden.assign(balls.size(), 0);
+  hideCoincident(balls, isHidden);
   // Grids by the power of two of the radius. A ball looks in its own grid and those of larger
   // balls.
   std::unordered_map<int, BallGrid> grids;
   for (std::uint32_t n = 0; n < balls.size(); ++n) {
+    if (isHidden[n]) continue;
     const int level = std::ilogb(balls[n].radius);
     grids.try_emplace(level, balls, level).first->second.add(n);
   }
   std::vector<std::vector<std::uint32_t>> lists(balls.size());
-  isHidden.assign(balls.size(), 0);
+  std::vector<char> isInside(balls.size(), 0);
   std::atomic<std::size_t> count = 0;
+  ProgressGate gate(progress, balls.size());
   tbb::parallel_for(std::size_t{0}, balls.size(), [&](std::size_t n) {
+    if (isHidden[n]) return;
     const Ball& ball = balls[n];
     const int own = std::ilogb(ball.radius);
     for (const auto& [level, grid] : grids) {
@@ -196,13 +223,20 @@ BallLists overlapsOf(const std::vector<Ball>& balls, std::vector<char>& isHidden
         const double apart = (b.centre - ball.centre).length();
         if (apart >= ball.radius + b.radius) return;
         if (apart + ball.radius <= b.radius && (b.radius > ball.radius || other < n))
-          isHidden[n] = 1;
+          isInside[n] = 1;
         lists[n].push_back(other);
       });
     }
     count += lists[n].size();
-    requireMemory(16.0 * static_cast<double>(count), maxBytes);
+    const double bytes = 16.0 * static_cast<double>(count);
+    if (bytes > static_cast<double>(maxBytes))
+      throw ResourceLimit(
+          fmt::format("the pairs of balls that meet need over {:.3g} GB; many of the {} balls lie "
+                      "in one place, so remove some",
+                      1e-9 * bytes, balls.size()));
+    gate.advance(1);
   });
+  for (std::size_t n = 0; n < balls.size(); ++n) isHidden[n] = isHidden[n] || isInside[n];
   // Smaller balls have found larger ones, but not the other way round.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> reverse;
   for (std::uint32_t n = 0; n < lists.size(); ++n)
@@ -218,11 +252,18 @@ BallLists overlapsOf(const std::vector<Ball>& balls, std::vector<char>& isHidden
     list.erase(std::unique(list.begin(), list.end()), list.end());
     // The cosine of the covered cap, smallest first.
     std::vector<std::pair<double, std::uint32_t>> order;
-    for (const std::uint32_t other : list)
-      order.emplace_back(
-          planeOf(balls[n], balls[other], (balls[other].centre - balls[n].centre).length()), other);
+    for (const std::uint32_t other : list) {
+      // Both balls get the same answer, since the lower index comes first.
+      const std::size_t first = std::min<std::size_t>(n, other);
+      const std::size_t second = std::max<std::size_t>(n, other);
+      const double apart = (balls[second].centre - balls[first].centre).length();
+      const double common = planeOf(balls[first], balls[second], apart);
+      if (!(circleSquared(balls[first], common) > 0)) continue;
+      order.emplace_back(first == n ? common : apart - common, other);
+    }
     std::sort(order.begin(), order.end());
-    for (std::size_t k = 0; k < list.size(); ++k) list[k] = order[k].second;
+    list.clear();
+    for (const auto& [plane, other] : order) list.push_back(other);
   });
   return listsOf(lists);
 }
@@ -287,8 +328,10 @@ ExposedPart exposedPart(const std::vector<Ball>& balls, const BallLists& overlap
         const V3d radial = arc->u * std::cos(t) + arc->v * std::sin(t);
         const V3d at = arc->centre - own.centre + radial * arc->radius;
         const V3d step = arc->w.cross(radial) * (arc->radius * scale);
-        sum += (at.dot(across) * step.dot(other) - at.dot(other) * step.dot(across)) /
-               (own.radius + at.dot(pole));
+        const double x = at.dot(across), y = at.dot(other), z = at.dot(pole);
+        // Beside a tiny cap, radius + z cancels.
+        const double below = z < 0 ? (x * x + y * y) / (own.radius - z) : own.radius + z;
+        sum += (x * step.dot(other) - y * step.dot(across)) / below;
         normal += at.cross(step) * 0.5;
       }
     }

@@ -24,11 +24,11 @@ struct BallLists {
 };
 
 /// Finds the balls whose spheres a ball's sphere meets, those that cover most of it first. Balls
-/// inside another ball have an empty list and are in no other one.
+/// inside another ball have an empty list and are in no other one. Balls that touch do not meet.
 /// @param isHidden  receives 1 for balls inside another ball
 /// @throws ResourceLimit if the lists exceed `maxBytes`
 [[nodiscard]] BallLists overlapsOf(const std::vector<Ball>& balls, std::vector<char>& isHidden,
-                                   std::size_t maxBytes);
+                                   std::size_t maxBytes, const Progress& progress);
 
 /// Finds the arcs of the circles in which two spheres meet that lie inside no other ball.
 /// @param overlaps  from overlapsOf()

@@ -5,12 +5,14 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <iterator>
 #include <limits>
 #include <utility>
 
 #include "levelset/error.h"
+#include "levelset/memory_limit.h"
 #include "levelset/molecules/ball_arcs.h"
 #include "levelset/progress_gate.h"
 
@@ -22,6 +24,7 @@ struct BallCell {
   std::uint32_t child = 0;  ///< index of the first of eight children; 0: a leaf
   std::uint32_t balls = 0, ballCount = 0, arcs = 0, arcCount = 0;  ///< of a leaf
   bool isDeep = false;  ///< all points of the cell are deeper than the depth of the union
+  bool isFar = false;   ///< all points of the cell are farther outside than that depth
 };
 
 struct BallOctree {
@@ -34,6 +37,15 @@ struct BallOctree {
   }
 };
 
+/// Node of a tree of balls, for points far from the union.
+struct BallGroup {
+  Imath::Box3d centres;
+  double radius = 0;         ///< largest radius
+  std::uint32_t first = 0;   ///< first ball of a leaf, in the order of the tree
+  std::uint32_t count = 0;   ///< number of balls of a leaf; 0: an inner node
+  std::uint32_t second = 0;  ///< index of the second child; the first one follows its parent
+};
+
 namespace {
 
 using Imath::Box3d;
@@ -43,7 +55,7 @@ constexpr double kSqrt3 = 1.7320508075688772;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // A cell with fewer candidates is not split.
 constexpr std::size_t kFewBalls = 6, kFewArcs = 6;
-constexpr int kMostLevels = 20;
+constexpr int kMostLevels = 40;
 // The cells of this level are built as independent tasks.
 constexpr int kTaskLevel = 2;
 
@@ -93,16 +105,42 @@ struct BallUnion::Data {
   std::vector<ExposedArc> arcs;
   Box3d bounds;  ///< relative to the origin
   double depth = 0;
-  V3d centre{0};  ///< of the octree
+  V3d centre{0};  ///< centre of the octree
   double half = 0;
   double leaf = 0;  ///< edge of the smallest cells
   BallOctree tree;
+  std::vector<BallGroup> groups;
+  std::vector<std::uint32_t> grouped;  ///< balls in the order of the groups
 
+  /// Work of the tasks that build the octree.
+  struct Build {
+    ProgressGate gate;
+    std::size_t maxBytes;
+    std::atomic<std::size_t> bytes = 0;
+    /// @throws ResourceLimit, Cancelled
+    void add(std::size_t more) {
+      requireMemory(2.0 * static_cast<double>(bytes += more), maxBytes);
+      gate.advance(0);
+    }
+  };
   void build(std::size_t maxBytes, const Progress& progress);
+  void group(std::uint32_t begin, std::uint32_t end);
+  /// Ball whose sphere is the closest one to a point outside all balls.
+  [[nodiscard]] std::uint32_t closestBall(const V3d& point) const;
+  /// Closest point of the boundary to a point outside.
+  [[nodiscard]] Foot footFrom(const V3d& point) const {
+    Foot foot;
+    foot.feature = closestBall(point);
+    const Ball& ball = balls[foot.feature];
+    foot.distance = -depthIn(ball, point);
+    foot.isExact = true;
+    foot.point = ball.centre + (point - ball.centre).normalized() * ball.radius;
+    return foot;
+  }
   /// Builds the cells below a cell.
   void descend(BallOctree& out, std::uint32_t cell, const V3d& at, double cellHalf, int level,
-               const std::vector<std::uint32_t>& ballsOf,
-               const std::vector<std::uint32_t>& arcsOf) const;
+               const std::vector<std::uint32_t>& ballsOf, const std::vector<std::uint32_t>& arcsOf,
+               Build& work) const;
 
   /// Closest point among candidates.
   template <class Balls, class Arcs>
@@ -166,6 +204,8 @@ void BallUnion::Data::build(std::size_t maxBytes, const Progress& progress) {
   for (std::uint32_t n = 0; n < balls.size(); ++n)
     if (!isHidden[n]) allBalls.push_back(n);
   for (std::uint32_t n = 0; n < arcs.size(); ++n) allArcs[n] = n;
+  grouped = allBalls;
+  group(0, static_cast<std::uint32_t>(grouped.size()));
 
   // The cells of two levels are split one after the other, and those below them in parallel.
   struct Task {
@@ -198,17 +238,13 @@ void BallUnion::Data::build(std::size_t maxBytes, const Progress& progress) {
                       task.arcs,
                       {}});
   }
-  ProgressGate gate(progress, tasks.size());
+  Build work{ProgressGate(progress, tasks.size()), maxBytes};
   tbb::parallel_for(std::size_t{0}, tasks.size(), [&](std::size_t n) {
     Task& task = tasks[n];
     task.tree.cells.resize(1);
-    descend(task.tree, 0, task.at, task.half, task.level, task.balls, task.arcs);
-    requireMemory(2.0 * static_cast<double>(task.tree.bytes()), maxBytes);
-    gate.advance(1);
+    descend(task.tree, 0, task.at, task.half, task.level, task.balls, task.arcs, work);
+    work.gate.advance(1);
   });
-  double bytes = 0;
-  for (const Task& task : tasks) bytes += 2.0 * static_cast<double>(task.tree.bytes());
-  requireMemory(bytes, maxBytes);
   for (Task& task : tasks) {
     // BallCell 0 of the task is the cell in the tree. Its other cells follow at the end.
     const auto cellsBefore = static_cast<std::uint32_t>(tree.cells.size()) - 1;
@@ -232,16 +268,15 @@ void BallUnion::Data::build(std::size_t maxBytes, const Progress& progress) {
 
 void BallUnion::Data::descend(BallOctree& out, std::uint32_t cell, const V3d& at, double cellHalf,
                               int level, const std::vector<std::uint32_t>& ballsOf,
-                              const std::vector<std::uint32_t>& arcsOf) const {
+                              const std::vector<std::uint32_t>& arcsOf, Build& work) const {
   // Distances change by at most `reach` between the centre and a point of the cell.
   const double reach = cellHalf * kSqrt3 * (1 + 1e-12) + 1e-12 * half;
   const Foot foot = closestAmong(at, ballsOf, arcsOf);
   double most = -kInfinity;
   for (const std::uint32_t n : ballsOf) most = std::max(most, depthIn(balls[n], at));
   std::vector<std::uint32_t> nearBalls, nearArcs;
-  const bool isDeep = foot.distance < 0 && (!foot.isExact || -foot.distance - reach > depth) &&
-                      most + reach > 0 && -foot.distance - reach > depth;
-  if (!isDeep) {
+  const bool isDeep = -foot.distance - reach > depth, isFar = most + reach < -depth;
+  if (!isDeep && !isFar) {
     for (const std::uint32_t n : ballsOf)
       if (depthIn(balls[n], at) >= most - 2 * reach) nearBalls.push_back(n);
     if (most + reach > 0) {
@@ -252,11 +287,11 @@ void BallUnion::Data::descend(BallOctree& out, std::uint32_t cell, const V3d& at
     }
   }
   const bool isFine = 2 * cellHalf <= leaf || level >= kMostLevels ||
-                      (nearBalls.size() <= kFewBalls && nearArcs.size() <= kFewArcs) ||
-                      (most + reach < -depth && 2 * cellHalf <= 8 * leaf);
-  if (isDeep || isFine) {
+                      (nearBalls.size() <= kFewBalls && nearArcs.size() <= kFewArcs);
+  if (isDeep || isFar || isFine) {
     BallCell& leafCell = out.cells[cell];
     leafCell.isDeep = isDeep;
+    leafCell.isFar = isFar;
     leafCell.balls = static_cast<std::uint32_t>(out.balls.size());
     leafCell.ballCount = static_cast<std::uint32_t>(nearBalls.size());
     leafCell.arcs = static_cast<std::uint32_t>(out.arcs.size());
@@ -268,14 +303,83 @@ void BallUnion::Data::descend(BallOctree& out, std::uint32_t cell, const V3d& at
   const auto child = static_cast<std::uint32_t>(out.cells.size());
   out.cells[cell].child = child;
   out.cells.resize(out.cells.size() + 8);
+  work.add(8 * sizeof(BallCell) + 4 * (nearBalls.size() + nearArcs.size()));
   for (int n = 0; n < 8; ++n)
     descend(out, child + static_cast<std::uint32_t>(n), childCentre(at, cellHalf, n), cellHalf / 2,
-            level + 1, nearBalls, nearArcs);
+            level + 1, nearBalls, nearArcs, work);
+}
+
+void BallUnion::Data::group(std::uint32_t begin, std::uint32_t end) {
+  const std::size_t number = groups.size();
+  groups.emplace_back();
+  BallGroup group;
+  for (std::uint32_t n = begin; n < end; ++n) {
+    group.centres.extendBy(balls[grouped[n]].centre);
+    group.radius = std::max(group.radius, balls[grouped[n]].radius);
+  }
+  if (end - begin <= kFewBalls) {
+    group.first = begin;
+    group.count = end - begin;
+    groups[number] = group;
+    return;
+  }
+  const V3d size = group.centres.size();
+  const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+  const std::uint32_t middle = begin + (end - begin) / 2;
+  std::nth_element(grouped.begin() + begin, grouped.begin() + middle, grouped.begin() + end,
+                   [&](std::uint32_t a, std::uint32_t b) {
+                     const double x = balls[a].centre[axis], y = balls[b].centre[axis];
+                     return x != y ? x < y : a < b;
+                   });
+  this->group(begin, middle);
+  group.second = static_cast<std::uint32_t>(groups.size());
+  groups[number] = group;
+  this->group(middle, end);
+}
+
+std::uint32_t BallUnion::Data::closestBall(const V3d& point) const {
+  // No sphere of a group is nearer than its box less the largest radius.
+  const auto bound = [&](std::uint32_t number) {
+    const BallGroup& of = groups[number];
+    double squared = 0;
+    for (int c = 0; c < 3; ++c) {
+      const double out =
+          std::max({of.centres.min[c] - point[c], point[c] - of.centres.max[c], 0.0});
+      squared += out * out;
+    }
+    return std::sqrt(squared) - of.radius;
+  };
+  double least = kInfinity;
+  std::uint32_t closest = 0;
+  std::array<std::pair<double, std::uint32_t>, 80> stack;  // the tree has at most 32 levels
+  std::size_t open = 0;
+  stack[open++] = {bound(0), 0};
+  while (open > 0) {
+    const auto [nearest, number] = stack[--open];
+    if (nearest > least) continue;
+    const BallGroup& of = groups[number];
+    for (std::uint32_t n = of.first; n < of.first + of.count; ++n) {
+      const double distance = -depthIn(balls[grouped[n]], point);
+      if (distance < least || (distance == least && grouped[n] < closest)) {
+        least = distance;
+        closest = grouped[n];
+      }
+    }
+    if (of.count > 0) continue;
+    std::pair<double, std::uint32_t> near{bound(number + 1), number + 1},
+        far{bound(of.second), of.second};
+    if (far.first < near.first) std::swap(near, far);
+    stack[open++] = far;
+    stack[open++] = near;
+  }
+  return closest;
 }
 
 BallUnion::BallUnion(std::vector<Ball> balls, double depth, std::size_t maxBytes,
                      const Progress& progress) {
   if (balls.empty()) throw InvalidInput("there is no ball; give at least one");
+  if (!(depth >= 0) || !std::isfinite(depth))
+    throw InvalidInput(fmt::format("the depth is {}; give a finite length of at least 0", depth));
   if (balls.size() >= (std::size_t{1} << 31)) throw InvalidInput("there are 2^31 balls or more");
   auto data = std::make_shared<Data>();
   Box3d bounds;
@@ -297,9 +401,8 @@ BallUnion::BallUnion(std::vector<Ball> balls, double depth, std::size_t maxBytes
   for (Ball& ball : balls) ball.centre -= data->origin;
   data->balls = std::move(balls);
   data->depth = depth;
-  report(progress, 0);
-  data->overlaps = overlapsOf(data->balls, data->isHidden, maxBytes);
-  report(progress, 0.1);
+  maxBytes = memoryLimit(maxBytes);
+  data->overlaps = overlapsOf(data->balls, data->isHidden, maxBytes, subProgress(progress, 0, 0.1));
   data->arcs = exposedArcs(data->balls, data->overlaps, maxBytes, subProgress(progress, 0.1, 0.5));
   data->build(maxBytes, subProgress(progress, 0.5, 1));
   data_ = std::move(data);
@@ -313,19 +416,7 @@ BallUnion::Foot BallUnion::closest(const V3d& point) const {
   Foot foot;
   const V3d away = from - at;
   if (std::max({std::abs(away.x), std::abs(away.y), std::abs(away.z)}) > half) {
-    // Outside the octree, and so outside the union.
-    double most = -kInfinity;
-    for (std::uint32_t n = 0; n < data.balls.size(); ++n) {
-      const double deep = depthIn(data.balls[n], from);
-      if (deep > most) {
-        most = deep;
-        foot.feature = n;
-      }
-    }
-    const Ball& ball = data.balls[foot.feature];
-    foot.distance = -most;
-    foot.isExact = true;
-    foot.point = ball.centre + (from - ball.centre).normalized() * ball.radius;
+    foot = data.footFrom(from);  // outside the octree, and so outside the union
   } else {
     const BallCell* cell = data.tree.cells.data();
     while (cell->child) {
@@ -336,6 +427,11 @@ BallUnion::Foot BallUnion::closest(const V3d& point) const {
     }
     if (cell->isDeep) {
       foot.distance = -data.depth;
+      return foot;
+    }
+    if (cell->isFar) {
+      foot = data.footFrom(from);
+      foot.point += data.origin;
       return foot;
     }
     const std::uint32_t *balls = data.tree.balls.data() + cell->balls,
@@ -407,26 +503,22 @@ std::vector<ExposedPart> exposedParts(const std::vector<Ball>& balls,
 
 }  // namespace
 
-std::vector<double> BallUnion::exposedAreas() const {
-  std::vector<double> areas;
-  for (const ExposedPart& part :
-       exposedParts(data_->balls, data_->isHidden, data_->overlaps, data_->arcs))
-    areas.push_back(part.area);
-  return areas;
-}
-
-double BallUnion::volume() const {
+BallUnion::Exposure BallUnion::exposure() const {
   const std::vector<ExposedPart> parts =
       exposedParts(data_->balls, data_->isHidden, data_->overlaps, data_->arcs);
+  Exposure exposure;
   double sum = 0;
-  for (std::size_t n = 0; n < parts.size(); ++n)
+  for (std::size_t n = 0; n < parts.size(); ++n) {
+    exposure.areas.push_back(parts[n].area);
     sum += data_->balls[n].radius * parts[n].area + data_->balls[n].centre.dot(parts[n].normal);
-  return sum / 3;
+  }
+  exposure.volume = sum / 3;
+  return exposure;
 }
 
 std::size_t BallUnion::bytes() const {
-  return data_->tree.bytes() + sizeof(ExposedArc) * data_->arcs.capacity() +
-         sizeof(Ball) * data_->balls.capacity() +
+  return data_->tree.bytes() + sizeof(BallGroup) * data_->groups.capacity() +
+         sizeof(ExposedArc) * data_->arcs.capacity() + sizeof(Ball) * data_->balls.capacity() +
          sizeof(std::uint32_t) * data_->overlaps.items.capacity();
 }
 

@@ -21,12 +21,12 @@ struct Ball {
 /// A piece of a circle in which the spheres of two balls meet, and which lies inside no other ball.
 /// Coordinates are relative to BallUnion::origin().
 struct ExposedArc {
-  Imath::V3d centre;  ///< of the circle
+  Imath::V3d centre;  ///< centre of the circle
   /// Orthonormal axes. `u` points to the middle of the arc, `w` from `first` to `second`.
   Imath::V3d u, v, w;
-  double radius = 0;                    ///< of the circle, world units
+  double radius = 0;                    ///< radius of the circle, world units
   double half = 0;                      ///< half of the angle, up to π
-  double cosHalf = 0, sinHalf = 0;      ///< of `half`
+  double cosHalf = 0, sinHalf = 0;      ///< cosine and sine of `half`
   std::uint32_t first = 0, second = 0;  ///< indices of the balls
 
   /// Closest point of the arc.
@@ -45,8 +45,8 @@ class BallUnion {
  public:
   /// @param balls  finite centres, positive finite radii; at least one
   /// @param depth  distances inside are exact up to this depth, world units; deeper ones are lower
-  ///        bounds above it
-  /// @throws InvalidInput for other balls
+  ///        bounds above it. Finite, at least 0
+  /// @throws InvalidInput for other balls or depths
   /// @throws ResourceLimit if the arcs or the octree exceed `maxBytes`
   BallUnion(std::vector<Ball> balls, double depth, std::size_t maxBytes = kNoMemoryLimit,
             const Progress& progress = {});
@@ -72,11 +72,13 @@ class BallUnion {
   [[nodiscard]] const std::vector<ExposedArc>& arcs() const;
   /// Bounds of the union, world units.
   [[nodiscard]] Imath::Box3d bounds() const;
-  /// Area of each given ball's sphere outside all other balls, world units². Of equal balls the
-  /// first one has it.
-  [[nodiscard]] std::vector<double> exposedAreas() const;
-  /// Volume of the union, world units³.
-  [[nodiscard]] double volume() const;
+  struct Exposure {
+    /// Area of each given ball's sphere outside all other balls, world units². Of equal balls the
+    /// first one has it.
+    std::vector<double> areas = {};
+    double volume = 0;  ///< volume of the union, world units³
+  };
+  [[nodiscard]] Exposure exposure() const;
   /// Memory, bytes.
   [[nodiscard]] std::size_t bytes() const;
 

@@ -155,20 +155,34 @@ void addRow(const std::array<std::string_view, kItems>& row, std::size_t line,
 void readCif(std::string_view text, MoleculeBuilder& builder) {
   Words words(text, builder);
   bool hasWord = words.next();
+  std::array<std::string_view, kItems> single{};  // an atom without a loop
+  std::size_t singleLine = 0;
   while (hasWord) {
     if (words.isQuoted() || !isWord(words.word(), "loop_")) {
+      const auto* const found =
+          words.isName() ? std::find_if(kItemNames.begin(), kItemNames.end(),
+                                        [&](auto name) { return isWord(words.word(), name); })
+                         : kItemNames.end();
+      hasWord = words.next();
+      if (found == kItemNames.end() || !hasWord) continue;
+      single[static_cast<std::size_t>(found - kItemNames.begin())] = words.value();
+      singleLine = words.line();
       hasWord = words.next();
       continue;
     }
     const std::size_t start = words.line();
     std::vector<std::size_t> items;  // for each column its Item, or kItems
     bool isAtoms = false;
+    bool isFractional = false;
     while ((hasWord = words.next()) && words.isName()) {
+      isFractional = isFractional || isWord(words.word(), "_atom_site_fract_x");
       const auto* const found = std::find_if(kItemNames.begin(), kItemNames.end(),
                                              [&](auto name) { return isWord(words.word(), name); });
       items.push_back(static_cast<std::size_t>(found - kItemNames.begin()));
       isAtoms = isAtoms || isWord(words.word().substr(0, 11), "_atom_site.");
     }
+    if (isFractional)
+      builder.fail(start, "the atoms have fractional coordinates; convert them to ångström first");
     if (!isAtoms) continue;
     for (const Item needed : {kX, kY, kZ})
       if (std::find(items.begin(), items.end(), needed) == items.end())
@@ -191,6 +205,7 @@ void readCif(std::string_view text, MoleculeBuilder& builder) {
                                column, items.size()));
     return;
   }
+  if (singleLine > 0) addRow(single, singleLine, builder);
 }
 
 }  // namespace levelset::molecules

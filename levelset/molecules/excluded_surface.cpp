@@ -111,11 +111,11 @@ double ExcludedSurface::distanceToEdge(const V3d& point, const BallUnion::Foot& 
   double least = probe_ + first.distance;
   for (int step = 0; step < kMostSteps; ++step) {
     const ClosestOutside closest(probes, probe_, point);
-    if (!closest.isFound()) break;
+    if (!closest.isFound()) break;  // rounding
     const V3d& at = closest.point();
     least = std::max(least, (at - point).length());
     const BallUnion::Foot found = accessible_.closest(at);
-    if (-found.distance >= probe_ * (1 - kTolerance)) break;
+    if (-found.distance >= probe_ * (1 - kTolerance)) return least;
     if (probes.size() >= kMostProbes) {
       const auto farthest = std::max_element(probes.begin(), probes.end(), [&](auto& a, auto& b) {
         return (a - at).length2() < (b - at).length2();
@@ -125,6 +125,7 @@ double ExcludedSurface::distanceToEdge(const V3d& point, const BallUnion::Foot& 
     // A probe outside the larger balls covers the point, too.
     probes.push_back(found.distance > 0 ? at : found.point);
   }
+  ++*unfinished_;
   return least;
 }
 

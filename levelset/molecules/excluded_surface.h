@@ -2,6 +2,10 @@
 
 #include <Imath/ImathVec.h>
 
+#include <atomic>
+#include <cstddef>
+#include <memory>
+
 #include "levelset/molecules/ball_union.h"
 
 namespace levelset {
@@ -25,6 +29,9 @@ class ExcludedSurface {
   /// of the union less the probe.
   [[nodiscard]] double distance(const Imath::V3d& point) const;
   [[nodiscard]] const BallUnion& accessible() const { return accessible_; }
+  /// Number of distances so far that are lower bounds: outside, beside edges where more probes meet
+  /// than are tried.
+  [[nodiscard]] std::size_t unfinished() const { return *unfinished_; }
 
  private:
   [[nodiscard]] double distanceToEdge(const Imath::V3d& point, const BallUnion::Foot& first,
@@ -32,6 +39,8 @@ class ExcludedSurface {
 
   BallUnion accessible_;
   double probe_;
+  std::shared_ptr<std::atomic<std::size_t>> unfinished_ =
+      std::make_shared<std::atomic<std::size_t>>(0);
 };
 
 }  // namespace levelset

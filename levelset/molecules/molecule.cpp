@@ -39,7 +39,11 @@ char lower(char c) {
 
 Imath::Box3d Molecule::bounds() const {
   Imath::Box3d box;
-  for (const Atom& atom : atoms) box.extendBy(atom.position);
+  for (const Atom& atom : atoms) {
+    const Imath::V3d radius(vanDerWaalsRadius(atom.element));
+    box.extendBy(atom.position - radius);
+    box.extendBy(atom.position + radius);
+  }
   return box;
 }
 

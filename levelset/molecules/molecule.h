@@ -17,7 +17,7 @@ struct Atom {
   Imath::V3d position{0};    ///< ångström
   std::string name = {};     ///< such as CA
   std::uint8_t element = 0;  ///< atomic number; 0: unknown
-  bool isHetero = false;     ///< of a ligand, an ion or a solvent
+  bool isHetero = false;     ///< true in a ligand, an ion or a solvent
   float occupancy = 1;
   float bFactor = 0;  ///< temperature factor, Å²
   std::uint32_t residue = 0;
@@ -35,7 +35,8 @@ struct Molecule {
   std::vector<Residue> residues = {};
   std::vector<std::string> chains = {};
 
-  [[nodiscard]] Imath::Box3d bounds() const;  ///< of the centres of the atoms, Å
+  /// Box of the van der Waals balls of the atoms, Å.
+  [[nodiscard]] Imath::Box3d bounds() const;
   [[nodiscard]] std::size_t bytes() const;
   /// Name of a residue with its chain: "A/ALA 17".
   [[nodiscard]] std::string residueName(std::size_t residue) const;

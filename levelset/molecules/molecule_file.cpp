@@ -82,14 +82,25 @@ void MoleculeBuilder::add(const AtomRecord& record, std::size_t line) {
   const auto chain = chains_.try_emplace(std::string(record.chain),
                                          static_cast<std::uint32_t>(molecule_.chains.size()));
   if (chain.second) molecule_.chains.emplace_back(record.chain);
-  const std::string key = fmt::format("{}\n{}\n{}\n{}", chain.first->second, record.number,
-                                      record.insertion, record.residue);
-  const auto residue =
-      residues_.try_emplace(key, static_cast<std::uint32_t>(molecule_.residues.size()));
-  if (residue.second)
+  const std::string place =
+      fmt::format("{}\n{}\n{}", chain.first->second, record.number, record.insertion);
+  std::string key = fmt::format("{}\n{}", place, record.residue);
+  auto residue = residues_.find(key);
+  // Alternate locations of a residue may follow each other in turns. Any other atom continues the
+  // residue of the last one, or begins a new one.
+  if (residue == residues_.end() || (key != last_ && record.alternate.empty())) {
+    const auto next = static_cast<std::uint32_t>(molecule_.residues.size());
+    residue = residues_.insert_or_assign(key, next).first;
     molecule_.residues.push_back({std::string(record.residue), record.number,
                                   std::string(record.insertion), chain.first->second});
-  atom.residue = residue.first->second;
+  }
+  last_ = std::move(key);
+  atom.residue = residue->second;
+  if (!record.alternate.empty()) {
+    std::vector<std::uint32_t>& alternatives = places_[place];
+    if (std::find(alternatives.begin(), alternatives.end(), atom.residue) == alternatives.end())
+      alternatives.push_back(atom.residue);
+  }
   atom.name = record.name;
   atom.position = record.position;
   atom.occupancy = static_cast<float>(record.occupancy);
@@ -105,7 +116,10 @@ void MoleculeBuilder::add(const AtomRecord& record, std::size_t line) {
       return;
     }
   }
-  if (atom.element == 0) ++unknown_;
+  if (atom.element == 0)
+    ++unknown_;
+  else if (record.isElementGuessed)
+    ++guessed_;
   if (molecule_.atoms.size() >= (std::size_t{1} << 31))
     fail(line, "the file has more than 2^31 atoms");
   if (molecule_.atoms.size() == molecule_.atoms.capacity())
@@ -113,7 +127,41 @@ void MoleculeBuilder::add(const AtomRecord& record, std::size_t line) {
   molecule_.atoms.push_back(std::move(atom));
 }
 
+void MoleculeBuilder::endChain() {
+  last_.clear();
+  residues_.clear();
+}
+
+void MoleculeBuilder::chooseResidues() {
+  std::vector<char> isLeftOut(molecule_.residues.size(), 0);
+  bool isAny = false;
+  for (const auto& [place, alternatives] : places_) {
+    if (alternatives.size() < 2) continue;
+    std::vector<float> occupancy(alternatives.size(), 0);
+    for (const auto& [key, atom] : alternates_)
+      for (std::size_t n = 0; n < alternatives.size(); ++n)
+        if (molecule_.atoms[atom].residue == alternatives[n])
+          occupancy[n] = std::max(occupancy[n], molecule_.atoms[atom].occupancy);
+    const auto best = std::max_element(occupancy.begin(), occupancy.end()) - occupancy.begin();
+    for (std::size_t n = 0; n < alternatives.size(); ++n)
+      isLeftOut[alternatives[n]] = static_cast<std::ptrdiff_t>(n) != best;
+    isAny = true;
+  }
+  if (!isAny) return;
+  dropped_ += static_cast<std::size_t>(std::erase_if(
+      molecule_.atoms, [&](const Atom& atom) { return isLeftOut[atom.residue] != 0; }));
+  std::vector<std::uint32_t> numbers;
+  std::vector<Residue> kept;
+  for (std::size_t n = 0; n < molecule_.residues.size(); ++n) {
+    numbers.push_back(static_cast<std::uint32_t>(kept.size()));
+    if (!isLeftOut[n]) kept.push_back(std::move(molecule_.residues[n]));
+  }
+  molecule_.residues = std::move(kept);
+  for (Atom& atom : molecule_.atoms) atom.residue = numbers[atom.residue];
+}
+
 Molecule MoleculeBuilder::finish() {
+  chooseResidues();
   if (options_.model != 0 && !hasModel_)
     failFile(file_, fmt::format("has no model {}; choose one of its models", options_.model));
   if (molecule_.atoms.empty()) {
@@ -128,6 +176,7 @@ Molecule MoleculeBuilder::finish() {
     note(water_, "{} atoms of water were left out");
     note(hydrogens_, "{} hydrogen atoms were left out");
     note(dropped_, "{} alternate locations of atoms were left out");
+    note(guessed_, "the elements of {} atoms follow from their names");
     note(unknown_, "{} atoms have no known element and count as carbon");
   }
   return std::move(molecule_);

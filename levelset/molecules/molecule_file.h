@@ -11,7 +11,7 @@
 /// Reads molecules from PDB files (`.pdb`, `.ent`) and mmCIF files (`.cif`, `.mmcif`), each also
 /// compressed as `.gz`.
 ///
-/// Of alternate locations of an atom, that with the largest occupancy is kept, and of equal ones
+/// An atom with alternate locations has that with the largest occupancy, and among equal ones
 /// the first. PDB: records ATOM and HETATM of 54 columns or more; a missing element follows from
 /// the name. mmCIF: the loop `_atom_site` of the first data block that has one. Author names of
 /// chains and residues are preferred.

@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -37,21 +38,25 @@ MoleculeSurfaceResult moleculeSurface(const Molecule& molecule, double voxelSize
     extent.bounds.extendBy(atom.position - Imath::V3d(shown));
     extent.bounds.extendBy(atom.position + Imath::V3d(shown));
   }
-  const ShapeOptions shape{.halfWidth = options.halfWidth,
-                           .maxMemory = options.maxMemory,
-                           .progress = subProgress(options.progress, 0.4, 1)};
+  ShapeOptions shape{.halfWidth = options.halfWidth,
+                     .maxMemory = options.maxMemory,
+                     .progress = subProgress(options.progress, 0.4, 1)};
   checkShape(extent, voxelSize, shape);
   const double reach = (options.halfWidth + kBlockVoxels) * voxelSize;
   const BallUnion all(std::move(balls), isExcluded ? options.probe + reach : reach,
                       options.maxMemory, subProgress(options.progress, 0, 0.4));
   MoleculeSurfaceResult result;
-  result.areas = all.exposedAreas();
-  result.volume = all.volume();
+  BallUnion::Exposure exposure = all.exposure();
+  result.areas = std::move(exposure.areas);
+  result.volume = exposure.volume;
   for (const double area : result.areas) extent.area += area;
+  if (options.maxMemory != kNoMemoryLimit)
+    shape.maxMemory = options.maxMemory - std::min(options.maxMemory, all.bytes());
   if (isExcluded) {
     const ExcludedSurface surface(all, options.probe);
     result.band = makeShape(extent, voxelSize, shape,
                             [&](const Imath::V3d& p) { return surface.distance(p); });
+    result.unfinished = surface.unfinished();
   } else {
     result.band =
         makeShape(extent, voxelSize, shape, [&](const Imath::V3d& p) { return all.distance(p); });

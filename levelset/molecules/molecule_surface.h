@@ -31,6 +31,9 @@ struct MoleculeSurfaceResult {
   std::vector<double> areas;
   /// Exact volume of the union of those spheres' balls, Å³.
   double volume = 0;
+  /// Number of distances beside edges of an excluded surface that are lower bounds, since many
+  /// probes meet there.
+  std::size_t unfinished = 0;
 };
 
 /// Makes the solid of a molecule. Radii are vanDerWaalsRadius().

@@ -28,6 +28,24 @@ std::string_view elementOfName(std::string_view name) {
   return {};
 }
 
+/// Number of a residue. Above 9999, files have numbers in base 36: A000 is 10,000 and a000
+/// 1,223,056.
+int residueNumber(std::string_view text, const MoleculeBuilder& builder, std::size_t line) {
+  const std::string_view digits = trimmed(text);
+  if (digits.size() != 4 || !std::isalpha(static_cast<unsigned char>(digits[0])))
+    return builder.integer(text, "number of a residue", line);
+  const bool isLower = digits[0] >= 'a';
+  int value = 0;
+  for (const char c : digits) {
+    const bool isLetter = isLower ? c >= 'a' && c <= 'z' : c >= 'A' && c <= 'Z';
+    if (!isLetter && !(c >= '0' && c <= '9'))
+      return builder.integer(text, "number of a residue", line);
+    value = 36 * value + (isLetter ? c - (isLower ? 'a' : 'A') + 10 : c - '0');
+  }
+  constexpr int kCube = 36 * 36 * 36;
+  return value - 10 * kCube + 10'000 + (isLower ? 26 * kCube : 0);
+}
+
 bool isBlank(std::string_view text) {
   return trimmed(text).empty();
 }
@@ -57,6 +75,7 @@ void readPdb(std::string_view text, MoleculeBuilder& builder) {
       continue;
     }
     if (record == "END") break;
+    if (record == "TER") builder.endChain();
     if (record != "ATOM" && record != "HETATM") continue;
     if (!isInModel && !hasAtom) isWanted = builder.beginModel(1);
     hasAtom = true;
@@ -73,9 +92,8 @@ void readPdb(std::string_view text, MoleculeBuilder& builder) {
     // Some programs write residue names of four letters.
     if (!isBlank(columns(line, 21, 21))) atom.residue = trimmed(columns(line, 18, 21));
     atom.chain = trimmed(columns(line, 22, 22));
-    atom.number = isBlank(columns(line, 23, 26))
-                      ? 0
-                      : builder.integer(columns(line, 23, 26), "number of a residue", number);
+    atom.number =
+        isBlank(columns(line, 23, 26)) ? 0 : residueNumber(columns(line, 23, 26), builder, number);
     atom.insertion = trimmed(columns(line, 27, 27));
     atom.position = {
         builder.number(columns(line, 31, 38), "coordinate (columns 31 to 38)", number),
@@ -88,7 +106,12 @@ void readPdb(std::string_view text, MoleculeBuilder& builder) {
       atom.bFactor =
           builder.number(columns(line, 61, 66), "temperature factor (columns 61 to 66)", number);
     atom.element = trimmed(columns(line, 77, 78));
-    if (!atomicNumber(atom.element)) atom.element = elementOfName(columns(line, 13, 16));
+    if (!atomicNumber(atom.element)) {
+      // In a polymer, CA at the left is not calcium but the alpha carbon.
+      atom.element =
+          !atom.isHetero && atom.name == "CA" ? "C" : elementOfName(columns(line, 13, 16));
+      atom.isElementGuessed = true;
+    }
     builder.add(atom, number);
   }
 }

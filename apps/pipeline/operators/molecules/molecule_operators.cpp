@@ -64,9 +64,20 @@ std::string residueTable(const Molecule& molecule, const std::vector<double>& ar
   return text;
 }
 
+/// Bounds of the solid, Å.
+Imath::Box3d boundsOf(Invocation& in) {
+  return grown(in.operands[0].plan().bounds,
+               surfaceKindOf(in) == MoleculeSurface::Accessible ? in.length("probe") : 0);
+}
+
+double voxelSizeOf(Invocation& in) {
+  const Imath::V3d size = boundsOf(in).size();
+  return in.voxelSize(std::max({size.x, size.y, size.z}));
+}
+
 Value runMoleculeSurface(Invocation& in) {
   const Molecule& molecule = in.operands[0].molecule();
-  const double voxelSize = in.voxelSize(in.operands[0].plan().estimate().longestSide());
+  const double voxelSize = voxelSizeOf(in);
   const MoleculeSurface kind = surfaceKindOf(in);
   const levelset::MoleculeSurfaceResult result =
       levelset::moleculeSurface(molecule, voxelSize,
@@ -96,6 +107,11 @@ Value runMoleculeSurface(Invocation& in) {
       "volume {:.6g} Å³; {} cavities",
       exposed, molecule.atoms.size(), isOfAtoms ? "van der Waals" : "accessible", area,
       result.volume, found.cavities));
+  if (result.unfinished > 0)
+    in.notes.warnings.push_back(
+        fmt::format("molecule-surface: {} distances outside, beside edges where many probes meet, "
+                    "are lower bounds",
+                    result.unfinished));
   if (in.given("areas"))
     writeText(in.text("areas"), atomTable(molecule, result.areas), "molecule-surface: --areas");
   if (in.given("residue-areas"))
@@ -104,18 +120,16 @@ Value runMoleculeSurface(Invocation& in) {
   return Value(result.band);
 }
 
-/// Area of the surface of a globular molecule, Å². A protein of 5,000 atoms has about 4 Å² for each
-/// atom.
 Plan planMoleculeSurface(Invocation& in) {
-  const Plan molecule = in.operands[0].plan();
+  const double atoms = in.operands[0].plan().points;
   Plan plan{.kind = Kind::Band};
-  // Van der Waals radii are about 1.7 Å.
-  plan.bounds =
-      grown(molecule.bounds,
-            1.7 + (surfaceKindOf(in) == MoleculeSurface::Accessible ? in.length("probe") : 0));
-  plan.voxelSize = in.voxelSize(molecule.estimate().longestSide());
+  plan.bounds = boundsOf(in);
+  plan.voxelSize = voxelSizeOf(in);
   plan.halfWidth = in.number("half-width");
-  plan.area = 10 * molecule.points;
+  // Å². A protein of 4,334 atoms with hydrogen has 7.6 for each atom on the van der Waals surface,
+  // and 3.5 on the others. One atom has 120 on the accessible surface.
+  plan.area = surfaceKindOf(in) == MoleculeSurface::VanDerWaals ? 10 * atoms + 30
+                                                                : 120 * std::pow(atoms, 2.0 / 3);
   return plan;
 }
 

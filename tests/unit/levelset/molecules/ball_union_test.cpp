@@ -123,8 +123,8 @@ double areaByLatitudes(const std::vector<Ball>& balls, std::size_t own) {
 TEST(BallUnion, MeasuresTwoBalls) {
   const double apart = 1.2, cap = 1 - apart / 2;
   const BallUnion both({{V3d(0), 1}, {V3d(apart, 0, 0), 1}}, 1);
-  for (const double area : both.exposedAreas()) EXPECT_NEAR(area, 4 * kPi - 2 * kPi * cap, 1e-14);
-  EXPECT_NEAR(both.volume(), 8 * kPi / 3 - 2 * kPi * cap * cap * (3 - cap) / 3, 1e-14);
+  for (const double area : both.exposure().areas) EXPECT_NEAR(area, 4 * kPi - 2 * kPi * cap, 1e-14);
+  EXPECT_NEAR(both.exposure().volume, 8 * kPi / 3 - 2 * kPi * cap * cap * (3 - cap) / 3, 1e-14);
   EXPECT_NEAR(both.distance(V3d(0.6, 0.3, 0)), -0.5, 1e-15);
   EXPECT_NEAR(both.distance(V3d(-0.5, 0, 0)), -0.5, 1e-15);
   EXPECT_NEAR(both.distance(V3d(0.6, 2, 0)), std::hypot(0.6, 2) - 1, 1e-15);
@@ -163,14 +163,14 @@ TEST(BallUnion, HasTheAreasOfRandomBalls) {
   double worst = 0;
   for (const unsigned seed : {1U, 2U, 3U}) {
     const std::vector<Ball> balls = randomBalls(seed, 25, 5);
-    const std::vector<double> areas = BallUnion(balls, 1).exposedAreas();
+    const std::vector<double> areas = BallUnion(balls, 1).exposure().areas;
     for (std::size_t n = 0; n < balls.size(); ++n)
       worst = std::max(worst, std::abs(areas[n] - areaByLatitudes(balls, n)));
   }
   EXPECT_LT(worst, measured(3.8e-4));  // that of the latitudes
 }
 
-TEST(BallUnion, HasTheVolumeOfItsDistances) {
+TEST(BallUnion, GrowsByItsArea) {
   // The volume changes with a common growth of the radii by the area.
   const std::vector<Ball> balls = randomBalls(4, 30, 5);
   const auto grown = [&](double by) {
@@ -179,21 +179,23 @@ TEST(BallUnion, HasTheVolumeOfItsDistances) {
     return BallUnion(larger, 1);
   };
   double area = 0;
-  for (const double part : grown(0).exposedAreas()) area += part;
-  const double step = 1e-3, slope = (grown(step).volume() - grown(-step).volume()) / (2 * step);
+  for (const double part : grown(0).exposure().areas) area += part;
+  const double step = 1e-3,
+               slope =
+                   (grown(step).exposure().volume - grown(-step).exposure().volume) / (2 * step);
   EXPECT_NEAR(slope / area, 1, measured(1e-6));
 }
 
 TEST(BallUnion, TakesDegenerateBalls) {
   // Equal balls, a ball inside another one, balls that touch, and a lattice with corners of four
   // balls.
-  EXPECT_NEAR(BallUnion({{V3d(1), 1}, {V3d(1), 1}}, 1).volume(), 4 * kPi / 3, 1e-14);
+  EXPECT_NEAR(BallUnion({{V3d(1), 1}, {V3d(1), 1}}, 1).exposure().volume, 4 * kPi / 3, 1e-14);
   const BallUnion nested({{V3d(0), 2}, {V3d(0.5, 0, 0), 1}, {V3d(1, 0, 0), 1}}, 3);
-  EXPECT_NEAR(nested.volume(), 32 * kPi / 3, 1e-13);
-  EXPECT_EQ(nested.exposedAreas()[1], 0);
-  EXPECT_EQ(nested.exposedAreas()[2], 0);
+  EXPECT_NEAR(nested.exposure().volume, 32 * kPi / 3, 1e-13);
+  EXPECT_EQ(nested.exposure().areas[1], 0);
+  EXPECT_EQ(nested.exposure().areas[2], 0);
   const BallUnion touching({{V3d(0), 1}, {V3d(2, 0, 0), 1}}, 3);
-  EXPECT_NEAR(touching.volume(), 8 * kPi / 3, 1e-14);
+  EXPECT_NEAR(touching.exposure().volume, 8 * kPi / 3, 1e-14);
   EXPECT_NEAR(touching.distance(V3d(1, 0, 0)), 0, 1e-15);
 
   std::vector<Ball> lattice;
@@ -207,7 +209,7 @@ TEST(BallUnion, TakesDegenerateBalls) {
   }
   EXPECT_LT(worst, 1e-13);
   for (std::size_t n = 0; n < lattice.size(); ++n)
-    EXPECT_NEAR(all.exposedAreas()[n], areaByLatitudes(lattice, n), measured(2e-4));
+    EXPECT_NEAR(all.exposure().areas[n], areaByLatitudes(lattice, n), measured(2e-4));
 }
 
 TEST(BallUnion, TakesBallsOfVeryDifferentSizes) {
@@ -227,12 +229,55 @@ TEST(BallUnion, TakesBallsOfVeryDifferentSizes) {
   EXPECT_LT(worst, 1e-12);
 }
 
+TEST(BallUnion, HoldsClustersFarApartInLittleMemory) {
+  std::vector<Ball> balls = randomBalls(11, 200, 10);
+  const std::size_t alone = BallUnion(balls, 3).bytes();
+  const std::vector<Ball> others = randomBalls(12, 200, 10, V3d(1e5, 2e5, -1e5));
+  balls.insert(balls.end(), others.begin(), others.end());
+  const BallUnion all(balls, 3);
+  EXPECT_LT(all.bytes(), 4 * alone);
+  for (const V3d& p : {V3d(5e4, 0, 0), V3d(1e5, 2e5, -1e5) + V3d(30, 0, 0), V3d(1e7, 1e7, 0)}) {
+    const double truth = distanceByAll(balls, p);
+    EXPECT_NEAR(all.distance(p) / truth, 1, 1e-12);
+  }
+}
+
+TEST(BallUnion, TakesManyBallsInOnePlace) {
+  std::vector<Ball> balls(100'000, Ball{V3d(1, 2, 3), 1});
+  balls.push_back({V3d(1, 2, 3), 2});
+  const BallUnion all(balls, 1);
+  EXPECT_NEAR(all.exposure().volume, 32 * kPi / 3, 1e-12);
+  EXPECT_NEAR(all.distance(V3d(1, 2, 8)), 3, 1e-14);
+}
+
+TEST(BallUnion, KeepsBallsThatTouchWithinRounding) {
+  int overlaps = 0;
+  for (int n = 0; n < 2000; ++n) {
+    const double a = 1.2 + 0.001 * n, b = 1.7, apart = std::nextafter(a + b, 0);
+    const V3d axis = V3d(std::cos(n), std::sin(n), 0.3).normalized();
+    const BallUnion both({{V3d(0), a}, {axis * apart, b}}, 1);
+    overlaps += (axis * apart).length() < a + b;
+    EXPECT_NEAR(both.exposure().areas[0] / (4 * kPi * a * a), 1, 1e-6);
+    EXPECT_NEAR(both.exposure().areas[1] / (4 * kPi * b * b), 1, 1e-6);
+  }
+  EXPECT_GT(overlaps, 500);
+}
+
+TEST(BallUnion, CanBeCancelled) {
+  const std::vector<Ball> balls = randomBalls(13, 500, 15);
+  for (const double at : {0.05, 0.3, 0.6})
+    EXPECT_FALSE(refusal<levelset::Cancelled>([&] {
+                   BallUnion(balls, 3, levelset::kNoMemoryLimit,
+                             [&](double share) { return share < at; });
+                 }).empty());
+}
+
 TEST(BallUnion, HasTheSameBitsOnAnyNumberOfThreads) {
   const std::vector<Ball> balls = randomBalls(10, 300, 20);
   const auto figures = [&] {
     const BallUnion all(balls, 3);
-    std::vector<double> values = all.exposedAreas();
-    values.push_back(all.volume());
+    std::vector<double> values = all.exposure().areas;
+    values.push_back(all.exposure().volume);
     for (int n = 0; n < 1000; ++n)
       values.push_back(all.distance(V3d(n % 10, n / 10 % 10, n / 100) * 4 - V3d(20)));
     return values;
@@ -242,6 +287,7 @@ TEST(BallUnion, HasTheSameBitsOnAnyNumberOfThreads) {
 
 TEST(BallUnion, RefusesOtherBalls) {
   EXPECT_SAYS(refusal<InvalidInput>([] { BallUnion({}, 1); }), "no ball");
+  EXPECT_SAYS(refusal<InvalidInput>([] { BallUnion({{V3d(0), 1}}, NAN); }), "depth");
   EXPECT_SAYS(refusal<InvalidInput>([] { BallUnion({{V3d(0), 0}}, 1); }), "ball 0");
   EXPECT_SAYS(refusal<InvalidInput>([] {
                 BallUnion({{V3d(0), 1}, {V3d(0, NAN, 0), 1}}, 1);

@@ -103,7 +103,7 @@ TEST(ExcludedSurface, HasNoPointOfTheSolidNearer) {
     const std::vector<V3d> points = pointsOf(surface, seed, 200'000);
     double above = 0, below = 0;
     int tested = 0;
-    while (tested < 400) {
+    for (int n = 0; n < 100'000 && tested < 400; ++n) {
       const V3d p(place(random), place(random), place(random));
       const double depth = -surface.accessible().distance(p);
       if (!(depth > 0 && depth < kProbe)) continue;

@@ -83,7 +83,7 @@ void expectTheTest(const Molecule& read) {
 TEST(MoleculeFile, ReadsPdbAndCif) {
   std::vector<std::string> notes;
   expectTheTest(molecule(kPdb, "pdb", {.notes = &notes}));
-  EXPECT_EQ(notes.size(), 2u);
+  EXPECT_EQ(notes.size(), 3u);
   expectTheTest(molecule(kCif, "cif"));
   EXPECT_EQ(molecule(kPdb, "ent", {.solvent = true}).atoms.size(), 6u);
   EXPECT_EQ(molecule(kCif, "mmcif", {.hydrogens = false}).atoms.size(), 4u);
@@ -103,6 +103,43 @@ TEST(MoleculeFile, ReadsOneModel) {
               "no model 1");
 }
 
+TEST(MoleculeFile, ChoosesOneOfTheResiduesAtAPlace) {
+  // Alternate locations in turns, as of residue 22 of crambin.
+  const std::string text =
+      "ATOM      1  N  APRO A  22       0.000   0.000   0.000  0.60  5.00           N\n"
+      "ATOM      2  N  BSER A  22       0.100   0.000   0.000  0.40  5.00           N\n"
+      "ATOM      3  CA APRO A  22       1.500   0.000   0.000  0.60  5.00           C\n"
+      "ATOM      4  CA BSER A  22       1.600   0.000   0.000  0.40  5.00           C\n"
+      "ATOM      5  OG BSER A  22       2.600   0.000   0.000  0.40  5.00           O\n"
+      "ATOM      6  N   GLU A  23       4.000   0.000   0.000  1.00  5.00           N\n";
+  const Molecule read = molecule(text, "pdb");
+  ASSERT_EQ(read.atoms.size(), 3u);
+  ASSERT_EQ(read.residues.size(), 2u);
+  EXPECT_EQ(read.residueName(0), "A/PRO 22");
+  EXPECT_EQ(read.residueName(read.atoms[2].residue), "A/GLU 23");
+}
+
+TEST(MoleculeFile, KeepsResiduesApartWhoseNumbersReturn) {
+  const auto line = [](const char* number) {
+    return "ATOM      1  O   SOD A" + std::string(number) + "       1.000   0.000   0.000\n";
+  };
+  const Molecule read = molecule(line("9999") + line("   0") + line("9999") + "TER\n" +
+                                     line("9999") + line("A000") + line("a001"),
+                                 "pdb");
+  ASSERT_EQ(read.residues.size(), 6u);
+  EXPECT_EQ(read.residues[4].number, 10'000);
+  EXPECT_EQ(read.residues[5].number, 1'223'057);
+}
+
+TEST(MoleculeFile, ReadsOneAtomWithoutALoop) {
+  const Molecule read = molecule(
+      "data_x\n_atom_site.type_symbol Cl\n_atom_site.Cartn_x 1\n_atom_site.Cartn_y 2\n"
+      "_atom_site.Cartn_z 3\n",
+      "cif");
+  ASSERT_EQ(read.atoms.size(), 1u);
+  EXPECT_EQ(read.atoms[0].position, V3d(1, 2, 3));
+}
+
 TEST(MoleculeFile, FindsElementsByTheirColumns) {
   const auto element = [](const std::string& name) {
     return int{molecule("ATOM      1 " + name + " UNK A   1       1.000   0.000   0.000\n", "pdb")
@@ -110,7 +147,8 @@ TEST(MoleculeFile, FindsElementsByTheirColumns) {
                    .element};
   };
   EXPECT_EQ(element(" CA "), 6);
-  EXPECT_EQ(element("CA  "), 20);
+  EXPECT_EQ(element("CA  "), 6);
+  EXPECT_EQ(element("ZN  "), 30);
   EXPECT_EQ(element("FE  "), 26);
   EXPECT_EQ(element("1HB "), 1);
   EXPECT_EQ(element("HE21"), 1);
@@ -134,6 +172,8 @@ TEST(MoleculeFile, RefusesDamage) {
   EXPECT_SAYS(says("data_x\nloop_\n_entity.id\n'open\n", "cif"), "quote");
   EXPECT_SAYS(says("data_x\n;open\n", "cif"), "does not end");
   EXPECT_SAYS(says("data_x\nloop_\n_a.b\n", "cif"), "no atoms");
+  EXPECT_SAYS(says("data_x\nloop_\n_atom_site_label\n_atom_site_fract_x\nC 0.1\n", "cif"),
+              "fractional");
   EXPECT_FALSE(refusal<levelset::UsageError>([] { (void)molecule(kPdb, "xyz"); }).empty());
 }
 
