@@ -104,6 +104,14 @@ class GpuBeziers::Device {
       for (GrowingBuffer* buffer : level->buffers()) buffer->release(context);
     levels.clear();
   }
+  /// Frees the levels from a depth on, and the lists of pairs. @pre they are not in use
+  void releaseFrom(std::size_t depth) {
+    for (std::size_t n = depth; n < levels.size(); ++n) {
+      for (GrowingBuffer* buffer : levels[n]->buffers()) buffer->release(context);
+      levels[n]->nodes = 0;
+    }
+    for (GrowingBuffer& list : pairs) list.release(context);
+  }
   void release() {
     releaseLevels();
     for (GrowingBuffer* buffer : common()) buffer->release(context);

@@ -73,6 +73,7 @@ class GpuBeziers::Device::Run {
     gl.GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &most);
     device_.blockBytes = std::min(static_cast<std::size_t>(most), std::size_t{1} << 30);
     const std::size_t slice = device_.slice(N);
+    if (device_.free() < device_.mostBytes / 2) device_.releaseFrom(0);
     fitBuffer(device_.context, device_.fetched, device_.fetchBytes());
     fitBuffer(device_.context, device_.roots, slice * 8 * bezierRootNumbers(N));
     fitBuffer(device_.context, device_.states, slice * 8 * kBezierStates);
@@ -400,6 +401,7 @@ class GpuBeziers::Device::Run {
     device_.download<std::uint32_t>(level.lists, kListCounters + 2 * nodes, open);
     device_.download<std::uint32_t>(level.marks, 0, marks);
     std::sort(open.begin(), open.end());
+    bool hasReleased = false;
     for (std::size_t at = 0; at < open.size();) {
       BezierLevel& below = device_.level(depth + 1);
       const std::size_t mostNodes = device_.mostNodes(depth + 1),
@@ -413,6 +415,12 @@ class GpuBeziers::Device::Run {
         parents.push_back(static_cast<std::int32_t>(open[at]));
         pairsBelow += more;
       }
+      if (parents.empty() && !hasReleased) {  // other parts may have left large lists
+        device_.releaseFrom(depth + 1);
+        hasReleased = true;
+        continue;
+      }
+      hasReleased = false;
       if (parents.empty()) {  // the processor answers for its rays
         giveUpNode(level, open[at], pairs);
         ++at;
