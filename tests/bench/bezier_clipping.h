@@ -125,7 +125,7 @@ class Clipping {
  private:
   using Plane = std::array<double, 2>;  ///< distances from the two planes of a ray
 
-  static constexpr double kLastEdge = 1e-8;  ///< of a root, in the parameters
+  static constexpr double kLastEdge = 1e-8;  ///< edge of a root, in the parameters
   static constexpr double kLeastCut = 0.2;   ///< share that a clip must remove
   static constexpr int kMostDepth = 60;
 

@@ -38,17 +38,27 @@ def error_at(points, seconds):
 
 
 def wins(rows, shape):
-    """Prints the worst ratio of our error to that of a peer, at the times of the peer. Returns whether it is below 1."""
-    ours = [curve(rows, shape, method) for method in OURS]
-    first = min(points[0][0] for points in ours if points)
-    worst = 0, "", 0
+    """Prints the worst ratio of our error to that of a peer, at the times of the peer. Returns whether it is below 1.
+
+    Results of a peer that come before our first one have no equal time of ours. They are listed."""
+    ours = [points for points in (curve(rows, shape, method) for method in OURS) if points]
+    if not ours:
+        print(f"{shape}: no rows of ours")
+        return False
+    first = min(points[0][0] for points in ours)
+    compared, earlier = [], []
     for peer in PEERS:
         for seconds, error in curve(rows, shape, peer):
-            # A peer that is faster than our coarsest result is compared with that result.
             best = min(error_at(points, max(seconds, first)) for points in ours)
-            worst = max(worst, (best / error, peer, seconds))
-    print(f"{shape}: at most {worst[0]:.2f} times the error of a peer ({worst[1]}, {worst[2]:.2f} s)")
-    return worst[0] < 1
+            (compared if seconds >= first else earlier).append((best / error, peer, seconds))
+    for ratio, peer, seconds in earlier:
+        print(f"{shape}: {peer} takes {seconds:.2f} s, our first result {first:.2f} s with {ratio:.2f} times its error")
+    if not compared:
+        print(f"{shape}: no rows of a peer at our times")
+        return False
+    worst, peer, seconds = max(compared)
+    print(f"{shape}: at most {worst:.2f} times the error of a peer at equal time ({peer}, {seconds:.2f} s)")
+    return worst < 1
 
 
 def main(table, picture):
