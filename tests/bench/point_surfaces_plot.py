@@ -79,8 +79,10 @@ def main(table, picture):
         axes.set_title(shape.split(".")[0].split("_")[0], fontsize=10)
         axes.set_xlabel("CPU seconds")
     panels[0, 0].set_ylabel("mean error, fraction of the diagonal", fontsize=8)
-    panels[0, 0].legend(fontsize=7, frameon=False)
-    figure.savefig(picture, dpi=110)
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="upper center", ncol=len(labels), bbox_to_anchor=(0.5, 1.08), fontsize=8,
+                  frameon=False)
+    figure.savefig(picture, dpi=110, bbox_inches="tight")
     won = [shape for shape in shapes if wins(rows, shape)]
     return 0 if len(won) >= min(4, len(shapes)) else 1
 
