@@ -166,8 +166,10 @@ void Viewer::drawDeformControls() {
   if (ImGui::Button("Redo")) isChanged = editor.redo();
   ImGui::EndDisabled();
   ImGui::SameLine();
+  ImGui::BeginDisabled(!editor.design().hasRestPoints());
   if (ImGui::Button(editor.selectedCount() > 0 ? "Reset selected" : "Reset all"))
     isChanged = editor.reset() || isChanged;
+  ImGui::EndDisabled();
   if (isChanged) requestDeformPreview();
   if (deformPreview_ && deformPreview_->certificate) {
     const ImVec4 colour =

@@ -85,6 +85,8 @@ bool Viewer::pressForEditor(const KeyPress& key) {
     return true;
   }
   if (!deformEditor_) return false;
+  if (key.key == GLFW_KEY_BACKSPACE && !deformEditor_->design().hasRestPoints())
+    showMessage("A lattice with weights has no control points at rest; undo moves them back.");
   const bool isUndo = key.withControl && key.key == GLFW_KEY_Z,
              isRedo = key.withControl && key.key == GLFW_KEY_Y;
   if (key.key == GLFW_KEY_BACKSPACE ? deformEditor_->reset()
@@ -105,6 +107,7 @@ void Viewer::copyCommand(bool isChain) {
 }
 
 void Viewer::saveResult() {
+  if (!isEditing()) return;
   const std::filesystem::path name(resultName_.data());
   try {
     patchEditor_ ? savePatch(name) : saveDeformation(name);
@@ -169,6 +172,11 @@ void Viewer::drawResultDialog() {
   if (asksResult_) ImGui::OpenPopup(kTitle);
   asksResult_ = false;
   if (!ImGui::BeginPopupModal(kTitle, nullptr, ImGuiWindowFlags_AlwaysAutoResize)) return;
+  // A file that was dropped, or has changed, ends the mode while the dialog is open.
+  if (!isEditing()) {
+    ImGui::CloseCurrentPopup();
+    return ImGui::EndPopup();
+  }
   if (ImGui::IsWindowAppearing()) ImGui::SetKeyboardFocusHere();
   ImGui::InputText(patchEditor_ ? "name (.vdb, .patch)" : "name (.json, .ply, .vdb)",
                    resultName_.data(), resultName_.size());

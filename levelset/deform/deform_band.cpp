@@ -212,11 +212,12 @@ void finishSigns(FloatGrid& target) {
 
 /// Edges between curved faces, which redistance() rounds, from the deformed mesh with sharp edges.
 NarrowBand withSharpEdges(NarrowBand band, const NarrowBand& solid, const Deformation& deformation,
-                          const DeformBandOptions& options) {
+                          std::size_t maxMemory, const Progress& progress) {
   const FloatGrid& grid = vdb(solid);
   const CellSurface cells(grid);
   const EdgeCrossings crossings = crossingsOfField(cells, grid);
-  ExtendedSurface surface = extendedSurface(cells, crossings, {}, /*listsCrossings=*/true);
+  ExtendedSurface surface =
+      extendedSurface(cells, crossings, subProgress(progress, 0, 0.2), /*listsCrossings=*/true);
   if (surface.edgeVertices + surface.cornerVertices == 0) return band;
   TriMesh mesh = toWorld(CreasePatches(surface, crossings, grid).divided(), solid);
   const auto creases = creaseEdges(solid, mesh, kCreaseDegrees);
@@ -227,9 +228,8 @@ NarrowBand withSharpEdges(NarrowBand band, const NarrowBand& solid, const Deform
                         mesh.positions[n] = deformation.at(mesh.positions[n]);
                     });
   mesh.spacing = coordinateSpacing(mesh);
-  return restoreCreases(
-      band, mesh, creases,
-      {.maxMemory = options.maxMemory, .progress = subProgress(options.progress, 0.8, 1)});
+  return restoreCreases(band, mesh, creases,
+                        {.maxMemory = maxMemory, .progress = subProgress(progress, 0.2, 1)});
 }
 
 }  // namespace
@@ -279,7 +279,8 @@ DeformBandResult deformBand(const NarrowBand& solid, const Deformation& deformat
       redistance(makeBand(target), {.halfWidth = halfWidth,
                                     .maxMemory = options.maxMemory,
                                     .progress = subProgress(options.progress, 0.6, 0.8)});
-  result.band = withSharpEdges(std::move(smooth), solid, deformation, options);
+  result.band = withSharpEdges(std::move(smooth), solid, deformation, options.maxMemory,
+                               subProgress(options.progress, 0.8, 1));
   return result;
 }
 

@@ -400,6 +400,7 @@ FoldCertificate certifyLattice(const ControlLattice& lattice,
   for (std::size_t n = 0; n < all.size(); ++n)
     if (!isOpen[n]) settled = std::min(settled, all[n].low);
   double bytes = 0;  // of the polynomials in the queue
+  std::size_t passes = 0;
   while (!queue.empty() && bounds.isAffordable() &&
          certificate.boxes < options.mostBoxes + all.size()) {
     const double low = queue.top().bounds.low;
@@ -424,9 +425,10 @@ FoldCertificate certifyLattice(const ControlLattice& lattice,
       queue.push(std::move(next));
     }
     requireMemory(bytes, options.maxMemory);
-    if (certificate.boxes % 64 == 0)
-      report(options.progress, 0.6 + 0.2 * static_cast<double>(certificate.boxes - all.size()) /
-                                         static_cast<double>(options.mostBoxes));
+    constexpr std::size_t kReported = 8;
+    if (++passes % kReported == 0)
+      report(options.progress, 0.6 + 0.2 * (2 * static_cast<double>(passes)) /
+                                         (static_cast<double>(options.mostBoxes) + 1));
   }
   report(options.progress, 0.8);
   certificate.leastLow = std::min(settled, queue.empty() ? settled : queue.top().bounds.low);

@@ -8,7 +8,7 @@ namespace render {
 
 /// A triangle of a sheet in a cell.
 struct SheetEntry {
-  Imath::V3i block;  ///< of 8³ cells, kernel's coordinates
+  Imath::V3i block;  ///< block of 8³ cells, kernel's coordinates
   std::uint16_t voxel;
   std::uint32_t triangle;
 };

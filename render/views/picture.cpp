@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <string>
 
 #include "levelset/error.h"
 #include "levelset/vdb.h"
@@ -57,23 +58,26 @@ void PictureLayers::setHit(std::size_t i, const Camera& camera, const Hit& hit) 
 }
 
 void PictureLayers::addWarnings(Image& image, const Scene& scene) const {
+  const auto warn = [&image](const std::string& text) {
+    std::string& all = image.attributes["ls:warning"];
+    all += all.empty() ? text : ". " + text;
+  };
   if (const std::size_t count = singular; count > 0)
     image.attributes["ls:bezierSingular"] = fmt::format("{}", count);
   if (const std::size_t count = overruns; count > 0) {
     image.attributes["ls:bezierOverruns"] = fmt::format("{}", count);
-    image.attributes["ls:warning"] = fmt::format(
+    warn(fmt::format(
         "rays gave up {} time{} after {} undecided parts of a Bézier volume, so pixels may miss "
-        "its "
-        "surface; move the camera so that no ray lies in the surface",
-        count, count == 1 ? "" : "s", kMostVisits);
+        "its surface; move the camera so that no ray lies in the surface",
+        count, count == 1 ? "" : "s", kMostVisits));
   }
   const std::size_t count = beyondBand;
   if (count == 0) return;
-  image.attributes["ls:warning"] = fmt::format(
+  warn(fmt::format(
       "{} pixel{} show{} the {} outside a band, where the distance is unknown and the shape is "
       "wrong; widen the bands with rebuild-band",
       count, count == 1 ? "" : "s", count == 1 ? "s" : "",
-      scene.morph ? "morph" : "soft expression");
+      scene.morph ? "morph" : "soft expression"));
 }
 
 void PictureLayers::setCurvature(std::size_t i, const Hit& hit) const {

@@ -56,8 +56,8 @@ struct PictureLayers {
   void setCurvature(std::size_t i, const Hit& hit) const;
   /// @pre the picture has the layers of a volume
   void setVolume(std::size_t i, const VolumeLight& light) const;
-  /// Adds the header attribute ls:warning if pixels show a blended surface outside the band of a
-  /// solid that contributes to it.
+  /// Adds the header attribute ls:warning if rays gave up in a Bézier volume, and if pixels show a
+  /// blended surface outside the band of a solid that contributes to it. It contains both warnings.
   void addWarnings(Image& image, const Scene& scene) const;
   /// Writes the colour of pixel `i` from the sum over `samples` rays.
   void setColour(std::size_t i, const ColourSum& sum, int samples) const;

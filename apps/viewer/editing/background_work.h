@@ -93,8 +93,17 @@ class BackgroundWork {
       } catch (const levelset::Cancelled&) {
         // A newer request follows, or the end.
       } catch (const std::exception& error) {
-        publish(failed_(request, error.what()));
+        tellOf(request, error);
       }
+    }
+  }
+
+  /// Publishes the result that tells of an error.
+  void tellOf(const Request& request, const std::exception& error) noexcept {
+    try {
+      publish(failed_(request, error.what()));
+    } catch (...) {
+      // Memory may have run out. The next request may succeed, so the thread goes on.
     }
   }
 

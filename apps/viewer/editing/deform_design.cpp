@@ -35,8 +35,8 @@ DeformDesign DeformDesign::withPoints(std::vector<V3d> points) const {
 }
 
 std::vector<V3d> DeformDesign::restPoints() const {
+  if (!hasRestPoints()) return points();
   if (!isLattice()) return cage().rest();
-  if (lattice().isRational()) return points();
   const levelset::LatticeData& data = lattice().data();
   return levelset::identityLattice(data.axes, data.boxToWorld).data().points;
 }

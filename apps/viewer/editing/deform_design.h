@@ -37,8 +37,10 @@ class DeformDesign {
   /// The same design with other control points.
   /// @throws levelset::InvalidInput for points that are not finite
   [[nodiscard]] DeformDesign withPoints(std::vector<Imath::V3d> points) const;
-  /// Control points of the map that moves nothing. @return the points themselves for a lattice with
-  /// weights, which may have no such points
+  /// False for a lattice with weights: it may have no control points that move nothing.
+  [[nodiscard]] bool hasRestPoints() const { return !isLattice() || !lattice().isRational(); }
+  /// Control points of the map that moves nothing. @return the points themselves without
+  /// hasRestPoints()
   [[nodiscard]] std::vector<Imath::V3d> restPoints() const;
   /// Pairs of neighbouring control points.
   [[nodiscard]] std::vector<std::array<std::size_t, 2>> net() const;

@@ -87,8 +87,9 @@ DeformWorker::DeformWorker(std::shared_ptr<const Model> base, std::function<void
       work_([this](const Request& request, Work&) { work(request); },
             [this](const Request& request, const std::string& message) {
               DeformPreview failed{.design = *request.design};
-              // The mesh and the certificate were made before.
-              if (const auto last = work_.result()) failed = *last;
+              // The mesh and the certificate of this design may have been made before.
+              const auto last = work_.result();
+              if (last && last->design.points() == request.design->points()) failed = *last;
               failed.failure = message;
               return failed;
             },

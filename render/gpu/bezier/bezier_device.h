@@ -71,7 +71,7 @@ class GpuBeziers::Device {
       view{GrowingBuffer::Use::Upload}, roots{GrowingBuffer::Use::Device},
       states{GrowingBuffer::Use::Device}, fetched{GrowingBuffer::Use::Fetch};
   std::vector<std::unique_ptr<BezierLevel>> levels;
-  std::size_t pointBytes = 0;  ///< of a node in `levels`
+  std::size_t pointBytes = 0;  ///< size of a node in `levels`
 
   [[nodiscard]] std::array<GrowingBuffer*, 8> common() {
     return {&pairs[0], &pairs[1], &rays, &visits, &view, &roots, &states, &fetched};

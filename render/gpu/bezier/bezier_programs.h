@@ -19,7 +19,7 @@ enum BezierBlock : GLuint { kPointBlock = 0, kHeadBlock = 1, kListBlock = 6 };
 
 /// Properties of nodes that select a shader.
 struct BezierVariant {
-  int components = 4;  ///< of a control point
+  int components = 4;  ///< number in a control point
   int weight = 2;      ///< number of the component that is the weight of projected points
   bool isPerspective = true;
   int mostOrder = 6;  ///< largest degree + 1 of arrays

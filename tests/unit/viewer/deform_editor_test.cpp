@@ -5,8 +5,11 @@
 
 #include <chrono>
 #include <cmath>
+#include <new>
+#include <string>
 #include <thread>
 
+#include "apps/viewer/editing/background_work.h"
 #include "apps/viewer/editing/deform_editor.h"
 #include "apps/viewer/editing/deform_preview.h"
 #include "apps/viewer/editing/solid_model.h"
@@ -258,6 +261,38 @@ DeformDesign movedBy(const V3d& way) {
   std::vector<V3d> points = box().points();
   for (const std::size_t n : {42u, 43u, 46u, 47u, 58u, 59u, 62u, 63u}) points[n] += way;
   return box().withPoints(points);
+}
+
+TEST(DeformEditor, ResetsNoLatticeWithWeights) {
+  EXPECT_TRUE(box().hasRestPoints());
+  levelset::LatticeData data = box().lattice().data();
+  data.weights.assign(data.points.size(), 1);
+  data.weights[3] = 2;
+  const DeformDesign weighted{levelset::ControlLattice(data)};
+  EXPECT_FALSE(weighted.hasRestPoints());
+  data.points[0].x -= 0.5;
+  DeformEditor editor(weighted.withPoints(data.points));
+  EXPECT_FALSE(editor.reset());
+  EXPECT_EQ(editor.design().points(), data.points);
+}
+
+TEST(BackgroundWork, GoesOnAfterAnErrorThatCannotBeTold) {
+  using Work = BackgroundWork<int, int>;
+  Work work(
+      [](int request, Work& own) {
+        if (request < 0) throw levelset::InvalidInput("negative");
+        own.publish(request);
+      },
+      [](int, const std::string&) -> int { throw std::bad_alloc(); }, {});
+  const auto finish = [&](int request) {
+    work.request(request);
+    while (work.isBusy()) std::this_thread::yield();
+  };
+  finish(-1);
+  EXPECT_EQ(work.result(), nullptr);
+  finish(7);
+  ASSERT_NE(work.result(), nullptr);
+  EXPECT_EQ(*work.result(), 7);
 }
 
 TEST(DeformWorker, ShowsAMeshWhileDraggingAndThenTheSolidOfTheAction) {

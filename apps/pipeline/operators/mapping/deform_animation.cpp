@@ -24,6 +24,7 @@
 #include "levelset/deform/lattice_certificate.h"
 #include "levelset/deform/lattice_file.h"
 #include "levelset/error.h"
+#include "levelset/file_target.h"
 #include "levelset/mesh_files/mesh_file.h"
 #include "levelset/meshing/band_to_mesh.h"
 #include "render/bezier/bezier_keys.h"
@@ -142,6 +143,19 @@ void requireTextureOptions(const Invocation& in) {
                                in.operands[0].kind() == Kind::Scene ? "--beziers" : "--lattices"));
 }
 
+/// Refuses frames that would write over the file of a key.
+void requireApartFromKeys(const Invocation& in) {
+  std::set<std::filesystem::path> read;
+  for (const std::string& name : keyNames(in))
+    if (name != kRest) read.insert(levelset::canonicalFile(name));
+  for (const std::string& file : frameFiles(in)) {
+    const std::filesystem::path written = levelset::canonicalFile(file);
+    if (written.empty() || !read.contains(written)) continue;
+    throw UsageError(fmt::format("animate: --out would write over '{}' of --{}; use other names",
+                                 file, keyOption(in)));
+  }
+}
+
 void validateControlPoints(const Invocation& in) {
   requireOwnOptions(in);
   const bool isScene = in.operands[0].kind() == Kind::Scene;
@@ -161,6 +175,7 @@ void validateControlPoints(const Invocation& in) {
     throw UsageError(fmt::format(
         "{}: '{}' is not a sequence of files; write # for the number, as in frame_###.{}",
         in.where("out"), sequence.pattern(), isScene ? "png" : "vdb"));
+  requireApartFromKeys(in);
   Invocation writer = writerOf(in, sequence.file(0).string());
   writer.operands = {
       Value(Plan{.kind = writesMeshOfBand(in) ? Kind::Mesh : in.operands[0].kind()})};
@@ -219,7 +234,7 @@ std::string frameText(const Invocation& in, std::size_t frame) {
                      *next);
 }
 
-/// Reads the file of each key; `rest` is made of the first file. Each file is read once.
+/// Reads the file of each key; a key `rest` is made of any file. Each file is read once.
 template <class Key>
 std::vector<Key> readKeys(const Invocation& in,
                           const std::function<Key(const std::string& file)>& read,
@@ -228,9 +243,9 @@ std::vector<Key> readKeys(const Invocation& in,
   std::map<std::string, Key> files;
   for (const std::string& name : names)
     if (name != kRest && !files.contains(name)) files.emplace(name, read(name));
-  const Key rest = atRest(files.begin()->second);
   std::vector<Key> keys;
-  for (const std::string& name : names) keys.push_back(name == kRest ? rest : files.at(name));
+  for (const std::string& name : names)
+    keys.push_back(name == kRest ? atRest(files.begin()->second) : files.at(name));
   return keys;
 }
 
@@ -254,6 +269,10 @@ Value animateLattices(Invocation& in) {
   const std::vector<ControlLattice> keys = readKeys<ControlLattice>(
       in, [&](const std::string& file) { return levelset::readLattice(file, in.maxMemory); },
       [](const ControlLattice& any) {
+        if (any.isRational())
+          throw levelset::InvalidInput(
+              "'rest' needs lattices without weights, but a lattice has weights; give a "
+              "file for each key");
         return levelset::identityLattice(any.data().axes, any.data().boxToWorld);
       });
   levelset::requireSameLattices(keys);

@@ -134,6 +134,41 @@ TEST_F(AnimateControlPoints, MovesBezierVolumes) {
   expectSame("s.png", "half.png");
 }
 
+TEST_F(AnimateControlPoints, RefusesToWriteOverItsKeys) {
+  writeVolume("rest.json", 0);
+  writeVolume("v_1.json", 0.5);
+  const std::string before = bytes("v_1.json");
+  const std::string keys = "read rest.json ! animate --beziers 'rest v_1.json' --frames ";
+  expectRefusal(keys + "2 --out v_#.json", 2,
+                "--out would write over 'v_1.json' of --beziers; use other names");
+  expectRefusal(keys + "2 --out ./v_#.json", 2, "would write over");
+  EXPECT_EQ(bytes("v_1.json"), before);
+  EXPECT_TRUE(bytes("v_0.json").empty());
+  // With one frame alone, no frame has the name of the key.
+  run("read rest.json ! animate --beziers v_1.json --frames 1 --out v_#.json");
+  EXPECT_FALSE(bytes("v_0.json").empty());
+  // The name of a lattice may be that of a picture's frame, whatever the file contains.
+  writeLattice("p_2.png", 1.5);
+  expectRefusal(kBall + "animate --lattices 'rest p_2.png' --frames 3 --out p_#.png" + kView, 2,
+                "--out would write over 'p_2.png' of --lattices");
+}
+
+TEST_F(AnimateControlPoints, RestNeedsLatticesWithoutWeights) {
+  writeLattice("wide.json", 1.5);
+  Json weighted = Json::parse(bytes("wide.json"));
+  weighted["weights"] = std::vector<double>(8, 2.0);
+  writeFile("weighted.json", weighted.dump());
+  expectRefusal(kBall + "animate --lattices 'rest weighted.json' --frames 2 --out f_#.vdb", 3,
+                "'rest' needs lattices without weights");
+  expectRefusal(kBall + "animate --lattices 'wide.json weighted.json' --frames 2 --out f_#.vdb", 3,
+                "differ in weights");
+  run(kBall + "mesh ! animate --lattices weighted.json --frames 1 --out w_#.ply");
+  run(kBall + "mesh ! animate --lattices wide.json --frames 1 --out f_#.ply");
+  // Equal weights change nothing.
+  EXPECT_NEAR(json("read w_0.ply ! measure --json")["volume"].get<double>(),
+              json("read f_0.ply ! measure --json")["volume"].get<double>(), 1e-6);
+}
+
 TEST_F(AnimateControlPoints, RefusesWhatDoesNotFit) {
   writeLattice("wide.json", 1.5);
   writeLattice("other.json", 1, 1, 3);

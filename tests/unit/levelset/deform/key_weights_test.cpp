@@ -70,7 +70,7 @@ TEST(KeyWeights, SmoothOnesHaveTheVelocityOfAParabola) {
                  after = k + 1 < kTimes.size() ? (at(t + kStep) - at(t)) / kStep : 0;
     double slope = 0;
     if (k > 0 && k + 1 < kTimes.size()) {
-      // Of the parabola: the slopes of both sides, weighted by the opposite lengths.
+      // The parabola: slopes of both sides, weighted by the opposite lengths.
       const double h = t - kTimes[k - 1], g = kTimes[k + 1] - t;
       slope =
           (g * (value(t) - value(kTimes[k - 1])) / h + h * (value(kTimes[k + 1]) - value(t)) / g) /

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <tuple>
+#include <vector>
 
 #include "levelset/deform/ready_lattices.h"
 #include "levelset/error.h"
@@ -125,16 +127,49 @@ TEST(LatticeCertificate, IsTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(support::onThreads(1, figures), support::onThreads(4, figures));
 }
 
-TEST(LatticeCertificate, ObeysItsMemoryAndCanBeInterrupted) {
+TEST(LatticeCertificate, ObeysItsMemory) {
   // The Jacobian of this lattice of degree 6 has 18³ coefficients, 47 kB, in each box.
   const ControlLattice lattice =
       shaken({uniformAxis(6, 7), uniformAxis(6, 7), uniformAxis(6, 7)}, 0.1, false);
   const FoldCertificate found = certifyLattice(lattice, {.maxMemory = 100'000'000});
   EXPECT_GT(found.boxes, 20u);
   EXPECT_THROW((void)certifyLattice(lattice, {.maxMemory = 90'000}), ResourceLimit);
-  int reports = 0;
-  EXPECT_THROW((void)certifyLattice(lattice, {.progress = [&](double) { return ++reports < 5; }}),
-               Cancelled);
+}
+
+TEST(LatticeCertificate, CanBeInterruptedWhileBoxesAreHalved) {
+  // The share of the progress is 0.6 before the first box is halved, and 0.8 after the last one.
+  const auto isHalving = [](double share) { return share > 0.6 && share < 0.8; };
+  for (const std::size_t pieces : {1u, 2u}) {
+    const ControlLattice lattice =
+        shaken({uniformAxis(6, 6 + pieces), uniformAxis(6, 7), uniformAxis(6, 7)}, 0.1, false);
+    std::vector<double> shares;
+    const auto note = [&](double share) {
+      shares.push_back(share);
+      return true;
+    };
+    // Without a tolerance, boxes are halved up to their limit.
+    const FoldCertificate found =
+        certifyLattice(lattice, {.tolerance = 0, .mostBoxes = 100, .progress = note});
+    EXPECT_EQ(found.pieces, pieces);
+    EXPECT_EQ(found.boxes, pieces + 100);
+    EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end())) << pieces;
+    EXPECT_GE(std::count_if(shares.begin(), shares.end(), isHalving), 3) << pieces;
+    // The first report in the loop ends the work.
+    double last = 0;
+    const auto goOn = [&](double share) {
+      last = share;
+      return !isHalving(share);
+    };
+    EXPECT_THROW(
+        (void)certifyLattice(lattice, {.tolerance = 0, .mostBoxes = 100, .progress = goOn}),
+        Cancelled)
+        << pieces;
+    EXPECT_PRED1(isHalving, last) << pieces;
+    // Shares do not decrease at the limit of the boxes either.
+    shares.clear();
+    (void)certifyLattice(lattice, {.tolerance = 0, .mostBoxes = 15, .progress = note});
+    EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end())) << pieces;
+  }
 }
 
 TEST(LatticeCertificate, CertifiesHighDegreesAndManyPieces) {

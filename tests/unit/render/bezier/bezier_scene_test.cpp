@@ -16,6 +16,7 @@
 #include "render/embree/embree_renderer.h"
 #include "render/images/compare_images.h"
 #include "render/kernel/kernel_scene.h"
+#include "render/views/picture.h"
 #include "render/views/scene_file.h"
 #include "tests/support/bezier_scenes.h"
 #include "tests/support/files.h"
@@ -141,6 +142,20 @@ TEST(BezierScene, WarnsOfRaysThatGiveUp) {
   const std::string& warning = image.attributes.at("ls:warning");
   EXPECT_NE(warning.find("rays gave up"), std::string::npos) << warning;
   EXPECT_NE(warning.find("20000 undecided parts"), std::string::npos) << warning;
+}
+
+TEST(BezierScene, WarnsOfRaysThatGiveUpAndOfBandsInOneText) {
+  Scene scene = sceneOf(bezier_scenes::sphere(2));
+  Image image(scene.camera.width, scene.camera.height);
+  const PictureLayers layers(image, scene, kPlain);
+  layers.overruns = 2;
+  layers.beyondBand = 3;
+  layers.addWarnings(image, scene);
+  const std::string& warning = image.attributes.at("ls:warning");
+  EXPECT_NE(warning.find("rays gave up 2 times"), std::string::npos) << warning;
+  EXPECT_NE(warning.find("surface. 3 pixels show the soft expression outside a band"),
+            std::string::npos)
+      << warning;
 }
 
 TEST(BezierScene, RefusesWhatIsNotDrawn) {

@@ -419,7 +419,7 @@ TEST(SheetCaster, HasTheDepthsAndSidesOfTheMesh) {
           worst = std::max(worst, std::abs(hit.distance - other.distance));
       }
     EXPECT_GT(both, 500u) << scene.name;
-    // Of 4800 pixels, where the mesh ends a sheet at its own interface. Around the circle in which
+    // Number of 4800 pixels, where the mesh ends a sheet at its own interface. Around the circle in which
     // the bottle crosses itself, interpolation rounds the interface.
     EXPECT_LE(one, scene.name == "bottle" ? 63u : 7u) << scene.name;
     EXPECT_EQ(relabelled, 0u) << scene.name;
