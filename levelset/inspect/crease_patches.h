@@ -38,8 +38,8 @@ class CreasePatches {
  private:
   static constexpr std::uint32_t kElsewhere = 0xffffffffu;
   struct Patch {
-    std::array<openvdb::Vec3d, 3> normal;  ///< of the face, at the vertices
-    std::array<openvdb::Vec3d, 3> bend;    ///< of the side that begins at each vertex
+    std::array<openvdb::Vec3d, 3> normal;  ///< normals of the face, at the vertices
+    std::array<openvdb::Vec3d, 3> bend;    ///< bends of the side that begins at each vertex
   };
 
   struct SideMiddle {
@@ -59,8 +59,8 @@ class CreasePatches {
   std::vector<std::uint32_t> slots_;  ///< index of the patch of each triangle
   std::vector<std::uint32_t> near_;   ///< triangles with a patch
   std::vector<Patch> patches_;
-  std::vector<SideMiddle> middles_;      ///< of the sides of patches, in ascending order
-  std::vector<openvdb::Vec3d> normals_;  ///< of vertices on faces
+  std::vector<SideMiddle> middles_;      ///< middles of the sides of patches, in ascending order
+  std::vector<openvdb::Vec3d> normals_;  ///< normals of vertices on faces
   double edgeCurvature_ = 0;
 };
 

@@ -22,7 +22,7 @@ namespace levelset {
 /// ones to a point of the cell.
 struct BallCell {
   std::uint32_t child = 0;  ///< index of the first of eight children; 0: a leaf
-  std::uint32_t balls = 0, ballCount = 0, arcs = 0, arcCount = 0;  ///< of a leaf
+  std::uint32_t balls = 0, ballCount = 0, arcs = 0, arcCount = 0;  ///< ranges of a leaf
   bool isDeep = false;  ///< all points of the cell are deeper than the depth of the union
   bool isFar = false;   ///< all points of the cell are farther outside than that depth
 };

@@ -44,7 +44,8 @@ struct PictureLayers {
   std::uint32_t* id;
   mutable std::atomic<std::size_t> beyondBand =
       0;  ///< number of pixels whose hit has Hit::isBeyondBand
-  mutable std::atomic<std::size_t> singular = 0;  ///< of pixels whose hit has Hit::isSingular
+  mutable std::atomic<std::size_t> singular =
+      0;  ///< number of pixels whose hit has Hit::isSingular
   /// TreeCounts::overruns of all rays of the camera in Bézier volumes.
   mutable std::atomic<std::size_t> overruns = 0;
 

@@ -419,8 +419,8 @@ TEST(SheetCaster, HasTheDepthsAndSidesOfTheMesh) {
           worst = std::max(worst, std::abs(hit.distance - other.distance));
       }
     EXPECT_GT(both, 500u) << scene.name;
-    // Number of 4800 pixels, where the mesh ends a sheet at its own interface. Around the circle in which
-    // the bottle crosses itself, interpolation rounds the interface.
+    // Number of 4800 pixels, where the mesh ends a sheet at its own interface. Around the circle in
+    // which the bottle crosses itself, interpolation rounds the interface.
     EXPECT_LE(one, scene.name == "bottle" ? 63u : 7u) << scene.name;
     EXPECT_EQ(relabelled, 0u) << scene.name;
     EXPECT_LT(worst / voxel, measured(6.5e-10)) << scene.name;
