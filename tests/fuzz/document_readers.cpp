@@ -6,6 +6,7 @@
 #include "levelset/deform/lattice_file.h"
 #include "levelset/files/band_file.h"
 #include "levelset/mesh_files/mesh_file.h"
+#include "levelset/molecules/molecule_file.h"
 #include "levelset/shapes/shapes.h"
 #include "mapping/patches/patch_file.h"
 #include "render/views/bezier_file.h"
@@ -41,6 +42,27 @@ void readBezier(std::string_view bytes) {
     require(render::readBezierVolume(file).bytes() == volume.bytes(),
             "a Bézier volume is read as it was written");
   });
+}
+
+void readMolecule(std::string_view bytes, const char* format) {
+  const std::filesystem::path file = scratchFile("molecule", bytes);
+  accepts([&] {
+    const levelset::Molecule molecule =
+        levelset::readMolecule(file, {.format = format, .maxMemory = kMaxMemory});
+    require(!molecule.atoms.empty(), "a molecule has an atom");
+    for (const levelset::Atom& atom : molecule.atoms)
+      require(atom.residue < molecule.residues.size() &&
+                  molecule.residues[atom.residue].chain < molecule.chains.size(),
+              "an atom is in a residue, and that in a chain");
+  });
+}
+
+void readPdb(std::string_view bytes) {
+  readMolecule(bytes, "pdb");
+}
+
+void readCif(std::string_view bytes) {
+  readMolecule(bytes, "cif");
 }
 
 /// Writes the level set, the mesh and the volume that the scenes of the corpus name.
@@ -85,11 +107,8 @@ void readCache(std::string_view bytes) {
 }  // namespace
 
 std::vector<Reader> documentReaders() {
-  return {{"patch", readPatch},
-          {"lattice", readLattice},
-          {"bezier", readBezier},
-          {"scene", readScene},
-          {"cache", readCache}};
+  return {{"patch", readPatch}, {"lattice", readLattice}, {"bezier", readBezier}, {"pdb", readPdb},
+          {"cif", readCif},     {"scene", readScene},     {"cache", readCache}};
 }
 
 }  // namespace fuzz
