@@ -112,6 +112,7 @@ bool needsModel(const std::string& example) {
 
 // The README test runs the examples that the README shows.
 TEST_F(Help, ExamplesRun) {
+  writeFile("protein.pdb", "ATOM      1  CA  GLY A   1       0.000   0.000   0.000\n");
   std::size_t count = 0;
   for (const auto& op : pipeline::operators()) {
     ASSERT_TRUE(op.example.starts_with("levelsmith ")) << op.name;
