@@ -93,28 +93,31 @@ class Words {
   bool isQuoted_ = false;
 };
 
-enum Item : std::size_t {
-  kGroup,
-  kSymbol,
-  kAtom,
-  kLabelAtom,
-  kAlternate,
-  kResidue,
-  kLabelResidue,
-  kChain,
-  kLabelChain,
-  kNumber,
-  kLabelNumber,
-  kInsertion,
-  kX,
-  kY,
-  kZ,
-  kOccupancy,
-  kBFactor,
-  kModel,
-  kItems
+/// Columns of the loop of atoms that are read.
+struct Item {
+  enum Value : std::size_t {
+    Group,
+    Symbol,
+    Atom,
+    LabelAtom,
+    Alternate,
+    Residue,
+    LabelResidue,
+    Chain,
+    LabelChain,
+    Number,
+    LabelNumber,
+    Insertion,
+    X,
+    Y,
+    Z,
+    Occupancy,
+    BFactor,
+    Model,
+    Count
+  };
 };
-constexpr std::array<std::string_view, kItems> kItemNames = {
+constexpr std::array<std::string_view, Item::Count> kItemNames = {
     "_atom_site.group_pdb",     "_atom_site.type_symbol",    "_atom_site.auth_atom_id",
     "_atom_site.label_atom_id", "_atom_site.label_alt_id",   "_atom_site.auth_comp_id",
     "_atom_site.label_comp_id", "_atom_site.auth_asym_id",   "_atom_site.label_asym_id",
@@ -123,30 +126,32 @@ constexpr std::array<std::string_view, kItems> kItemNames = {
     "_atom_site.occupancy",     "_atom_site.b_iso_or_equiv", "_atom_site.pdbx_pdb_model_num"};
 
 /// A row of the loop of atoms.
-void addRow(const std::array<std::string_view, kItems>& row, std::size_t line,
+void addRow(const std::array<std::string_view, Item::Count>& row, std::size_t line,
             MoleculeBuilder& builder) {
-  const auto either = [&](Item first, Item second) {
+  const auto either = [&](Item::Value first, Item::Value second) {
     return row[first].empty() ? row[second] : row[first];
   };
-  if (!builder.beginModel(
-          row[kModel].empty() ? 1 : builder.integer(row[kModel], "number of a model", line)))
+  if (!builder.beginModel(row[Item::Model].empty()
+                              ? 1
+                              : builder.integer(row[Item::Model], "number of a model", line)))
     return;
   AtomRecord atom;
-  atom.isHetero = row[kGroup] == "HETATM";
-  atom.name = either(kAtom, kLabelAtom);
-  atom.alternate = row[kAlternate];
-  atom.residue = either(kResidue, kLabelResidue);
-  atom.chain = either(kChain, kLabelChain);
-  const std::string_view number = either(kNumber, kLabelNumber);
+  atom.isHetero = row[Item::Group] == "HETATM";
+  atom.name = either(Item::Atom, Item::LabelAtom);
+  atom.alternate = row[Item::Alternate];
+  atom.residue = either(Item::Residue, Item::LabelResidue);
+  atom.chain = either(Item::Chain, Item::LabelChain);
+  const std::string_view number = either(Item::Number, Item::LabelNumber);
   atom.number = number.empty() ? 0 : builder.integer(number, "number of a residue", line);
-  atom.insertion = row[kInsertion];
-  atom.element = row[kSymbol];
-  atom.position = {builder.number(row[kX], "coordinate (Cartn_x)", line),
-                   builder.number(row[kY], "coordinate (Cartn_y)", line),
-                   builder.number(row[kZ], "coordinate (Cartn_z)", line)};
-  if (!row[kOccupancy].empty()) atom.occupancy = builder.number(row[kOccupancy], "occupancy", line);
-  if (!row[kBFactor].empty())
-    atom.bFactor = builder.number(row[kBFactor], "temperature factor", line);
+  atom.insertion = row[Item::Insertion];
+  atom.element = row[Item::Symbol];
+  atom.position = {builder.number(row[Item::X], "coordinate (Cartn_x)", line),
+                   builder.number(row[Item::Y], "coordinate (Cartn_y)", line),
+                   builder.number(row[Item::Z], "coordinate (Cartn_z)", line)};
+  if (!row[Item::Occupancy].empty())
+    atom.occupancy = builder.number(row[Item::Occupancy], "occupancy", line);
+  if (!row[Item::BFactor].empty())
+    atom.bFactor = builder.number(row[Item::BFactor], "temperature factor", line);
   builder.add(atom, line);
 }
 
@@ -155,7 +160,7 @@ void addRow(const std::array<std::string_view, kItems>& row, std::size_t line,
 void readCif(std::string_view text, MoleculeBuilder& builder) {
   Words words(text, builder);
   bool hasWord = words.next();
-  std::array<std::string_view, kItems> single{};  // an atom without a loop
+  std::array<std::string_view, Item::Count> single{};  // an atom without a loop
   std::size_t singleLine = 0;
   while (hasWord) {
     if (words.isQuoted() || !isWord(words.word(), "loop_")) {
@@ -171,7 +176,7 @@ void readCif(std::string_view text, MoleculeBuilder& builder) {
       continue;
     }
     const std::size_t start = words.line();
-    std::vector<std::size_t> items;  // for each column its Item, or kItems
+    std::vector<std::size_t> items;  // for each column its item, or Item::Count
     bool isAtoms = false;
     bool isFractional = false;
     while ((hasWord = words.next()) && words.isName()) {
@@ -184,14 +189,14 @@ void readCif(std::string_view text, MoleculeBuilder& builder) {
     if (isFractional)
       builder.fail(start, "the atoms have fractional coordinates; convert them to ångström first");
     if (!isAtoms) continue;
-    for (const Item needed : {kX, kY, kZ})
+    for (const Item::Value needed : {Item::X, Item::Y, Item::Z})
       if (std::find(items.begin(), items.end(), needed) == items.end())
         builder.fail(start, "the loop of atoms lacks a coordinate (_atom_site.Cartn_x, _y or _z)");
-    std::array<std::string_view, kItems> row{};
+    std::array<std::string_view, Item::Count> row{};
     std::size_t column = 0, line = words.line();
     while (hasWord && !words.isName() && !words.isKeyword()) {
       if (column == 0) line = words.line();
-      if (items[column] < kItems) row[items[column]] = words.value();
+      if (items[column] < Item::Count) row[items[column]] = words.value();
       if (++column == items.size()) {
         addRow(row, line, builder);
         column = 0;

@@ -15,7 +15,7 @@ namespace render {
 enum class BezierKernel { Halve, Bound, Box, Frame, InFrame, Prove, Solve, Keep };
 
 /// Bindings of storage blocks that all kernels share; kPrivateBlock and above differ.
-enum BezierBlock : GLuint { kPointBlock = 0, kHeadBlock = 1, kListBlock = 6 };
+inline constexpr GLuint kPointBlock = 0, kHeadBlock = 1, kListBlock = 6;
 
 /// Properties of nodes that select a shader.
 struct BezierVariant {

@@ -26,17 +26,19 @@ constexpr std::size_t kRayGroup = 64;  // rays whose box is compared with that o
 constexpr double kStopped = -1e301;    // nearest depth of a ray that needs no further roots
 
 /// Counters of bezier_tree.glsl.
-enum Counter : std::size_t {
-  kPairsOfBox,
-  kNodesOfBox,
-  kPairsOfFrame,
-  kNodesOfFrame,
-  kOpenPairs,
-  kRootsFound,
-  kKeptPairs,
-  kSplitNodes,
-  kOverruns,
-  kUnfinished
+struct Counter {
+  enum Value : std::size_t {
+    PairsOfBox,
+    NodesOfBox,
+    PairsOfFrame,
+    NodesOfFrame,
+    OpenPairs,
+    RootsFound,
+    KeptPairs,
+    SplitNodes,
+    Overruns,
+    Unfinished
+  };
 };
 using Counters = std::array<std::uint32_t, kListCounters>;
 
@@ -304,32 +306,33 @@ class GpuBeziers::Device::Run {
     const Uniform nodes{"nodeCount", level.used};
     dispatch(BezierKernel::Box, pairs * children, {nodes, {"childCount", children}});
     Counters counters = countersOf(level);
-    if (counters[kPairsOfBox] == 0) return;
-    if (depth > 0) dispatch(BezierKernel::Frame, counters[kNodesOfBox], {nodes});
+    if (counters[Counter::PairsOfBox] == 0) return;
+    if (depth > 0) dispatch(BezierKernel::Frame, counters[Counter::NodesOfBox], {nodes});
     bindPairs(device_.pairs[0], device_.pairs[1]);
-    dispatch(BezierKernel::InFrame, counters[kPairsOfBox], {nodes});
+    dispatch(BezierKernel::InFrame, counters[Counter::PairsOfBox], {nodes});
     counters = countersOf(level);
-    if (counters[kPairsOfFrame] == 0) return;
-    if (depth > 0) dispatch(BezierKernel::Prove, 3 * counters[kNodesOfFrame], {nodes});
-    solve(level, counters[kPairsOfFrame]);
+    if (counters[Counter::PairsOfFrame] == 0) return;
+    if (depth > 0) dispatch(BezierKernel::Prove, 3 * counters[Counter::NodesOfFrame], {nodes});
+    solve(level, counters[Counter::PairsOfFrame]);
     uploadNearest();
     counters = countersOf(level);
-    if (counters[kOpenPairs] == 0) return;
-    fitBuffer(device_.context, level.rest, counters[kOpenPairs] * kPairBytes);
+    if (counters[Counter::OpenPairs] == 0) return;
+    fitBuffer(device_.context, level.rest, counters[Counter::OpenPairs] * kPairBytes);
     device_.notePeak();
     bind(2, level.marks);
     bindPairs(device_.pairs[0], level.rest);
     bind(5, device_.visits);
-    dispatch(BezierKernel::Keep, counters[kOpenPairs], {nodes, {"mostVisits", kMostVisits}});
+    dispatch(BezierKernel::Keep, counters[Counter::OpenPairs],
+             {nodes, {"mostVisits", kMostVisits}});
     counters = countersOf(level);
-    if (counters[kOverruns] > 0) {
+    if (counters[Counter::Overruns] > 0) {
       std::vector<std::uint32_t> overruns(count_);
       device_.download<std::uint32_t>(device_.visits, origins_, overruns);
       for (std::uint32_t ray = 0; ray < count_; ++ray)
         if (overruns[ray] != 0) giveUp(ray);
       uploadNearest();
     }
-    if (counters[kKeptPairs] > 0) split(depth, level, counters);
+    if (counters[Counter::KeptPairs] > 0) split(depth, level, counters);
   }
 
   /// Solves pairs. The open ones are in the first list of pairs afterwards.
@@ -346,14 +349,14 @@ class GpuBeziers::Device::Run {
     for (std::size_t first = 0; first < pairs; first += slice) {
       for (std::size_t unfinished = 1, round = 0; unfinished > 0; ++round) {
         const std::array<std::uint32_t, 1> none{0};
-        device_.upload<std::uint32_t>(level.lists, none, kRootsFound);
-        device_.upload<std::uint32_t>(level.lists, none, kUnfinished);
+        device_.upload<std::uint32_t>(level.lists, none, Counter::RootsFound);
+        device_.upload<std::uint32_t>(level.lists, none, Counter::Unfinished);
         dispatch(
             BezierKernel::Solve, std::min(slice, pairs - first),
             {{"firstPair", first}, {"mostJets", mostJets}, {"isResumed", round > 0 ? 1u : 0u}});
         const Counters counters = countersOf(level);
-        unfinished = counters[kUnfinished];
-        takeRoots(counters[kRootsFound]);
+        unfinished = counters[Counter::Unfinished];
+        takeRoots(counters[Counter::RootsFound]);
       }
     }
   }
@@ -396,8 +399,8 @@ class GpuBeziers::Device::Run {
 
   /// Splits the nodes of a level that have undecided pairs, and visits their children.
   void split(std::size_t depth, BezierLevel& level, const Counters& counters) {
-    const std::size_t nodes = level.used, pairs = counters[kKeptPairs];
-    std::vector<std::uint32_t> open(counters[kSplitNodes]), marks(2 * nodes);
+    const std::size_t nodes = level.used, pairs = counters[Counter::KeptPairs];
+    std::vector<std::uint32_t> open(counters[Counter::SplitNodes]), marks(2 * nodes);
     device_.download<std::uint32_t>(level.lists, kListCounters + 2 * nodes, open);
     device_.download<std::uint32_t>(level.marks, 0, marks);
     std::sort(open.begin(), open.end());

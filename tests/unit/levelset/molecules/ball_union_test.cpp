@@ -34,6 +34,12 @@ std::vector<Ball> randomBalls(unsigned seed, int count, double size, const V3d& 
   return balls;
 }
 
+/// Point n of a cubic lattice with `edge` points along each edge.
+V3d latticePoint(int n, int edge) {
+  const int y = n / edge % edge, z = n / (edge * edge);
+  return {static_cast<double>(n % edge), static_cast<double>(y), static_cast<double>(z)};
+}
+
 bool isInside(const std::vector<Ball>& balls, const V3d& p, double margin) {
   return std::any_of(balls.begin(), balls.end(), [&](const Ball& ball) {
     return (p - ball.centre).length() < ball.radius - margin;
@@ -199,11 +205,11 @@ TEST(BallUnion, TakesDegenerateBalls) {
   EXPECT_NEAR(touching.distance(V3d(1, 0, 0)), 0, 1e-15);
 
   std::vector<Ball> lattice;
-  for (int n = 0; n < 27; ++n) lattice.push_back({V3d(n % 3, n / 3 % 3, n / 9), 0.75});
+  for (int n = 0; n < 27; ++n) lattice.push_back({latticePoint(n, 3), 0.75});
   const BallUnion all(lattice, 2);
   double worst = 0;
   for (int n = 0; n < 1000; ++n) {
-    const V3d p(n % 10 * 0.25, n / 10 % 10 * 0.25, n / 100 * 0.25);
+    const V3d p = latticePoint(n, 10) * 0.25;
     const double truth = distanceByAll(lattice, p);
     worst = std::max(worst, std::abs(all.distance(p) - std::max(truth, -2.0)));
   }
@@ -279,7 +285,7 @@ TEST(BallUnion, HasTheSameBitsOnAnyNumberOfThreads) {
     std::vector<double> values = all.exposure().areas;
     values.push_back(all.exposure().volume);
     for (int n = 0; n < 1000; ++n)
-      values.push_back(all.distance(V3d(n % 10, n / 10 % 10, n / 100) * 4 - V3d(20)));
+      values.push_back(all.distance(latticePoint(n, 10) * 4 - V3d(20)));
     return values;
   };
   EXPECT_EQ(support::onThreads(1, figures), support::onThreads(7, figures));
