@@ -14,6 +14,8 @@
 #include <utility>
 
 #include "levelset/error.h"
+#include "levelset/geometry/gauss_rule.h"
+#include "levelset/geometry/perpendicular.h"
 #include "levelset/progress_gate.h"
 
 namespace levelset {
@@ -23,6 +25,7 @@ using Imath::V3d;
 
 // Shorter arcs are left out, radians. They change distances by less than rounding errors.
 constexpr double kLeastArc = 1e-10;
+constexpr std::size_t kNodes = 16;  // nodes of the quadrature along a piece of an arc
 // A point this far inside another ball, as a share of its radius, counts as on the sphere.
 constexpr double kOnSphere = 1e-11;
 
@@ -108,36 +111,6 @@ BallLists listsOf(std::vector<std::vector<std::uint32_t>>& lists) {
   return result;
 }
 
-/// Nodes and weights of Gauss-Legendre quadrature on [−1, 1].
-template <std::size_t N>
-std::array<std::pair<double, double>, N> gaussLegendre() {
-  std::array<std::pair<double, double>, N> rule;
-  for (std::size_t n = 0; n < N; ++n) {
-    double x = std::cos(std::numbers::pi * (static_cast<double>(n) + 0.75) / (N + 0.5)), slope = 0;
-    for (int step = 0; step < 100; ++step) {
-      double before = 1, value = x;
-      for (std::size_t k = 2; k <= N; ++k) {
-        const auto degree = static_cast<double>(k);
-        before =
-            std::exchange(value, ((2 * degree - 1) * x * value - (degree - 1) * before) / degree);
-      }
-      slope = N * (x * value - before) / (x * x - 1);
-      const double change = value / slope;
-      x -= change;
-      if (std::abs(change) < 1e-16) break;
-    }
-    rule[n] = {x, 2 / ((1 - x * x) * slope * slope)};
-  }
-  return rule;
-}
-
-V3d perpendicularTo(const V3d& unit) {
-  const int axis = std::abs(unit.x) < 0.6 ? 0 : std::abs(unit.y) < 0.6 ? 1 : 2;
-  V3d other(0);
-  other[axis] = 1;
-  return (other - unit * unit.dot(other)).normalized();
-}
-
 /// Arcs of the circle in which two balls meet that no third ball covers.
 void addArcs(const std::vector<Ball>& balls, const BallLists& overlaps, std::uint32_t first,
              std::uint32_t second, std::vector<ExposedArc>& arcs,
@@ -152,7 +125,7 @@ void addArcs(const std::vector<Ball>& balls, const BallLists& overlaps, std::uin
   arc.radius = std::sqrt(squared);
   arc.w = between / apart;
   arc.centre = a.centre + arc.w * plane;
-  const V3d u = perpendicularTo(arc.w), v = arc.w.cross(u);
+  const V3d u = anyPerpendicular(arc.w), v = arc.w.cross(u);
   covered.clear();
   // A ball that covers a part of the circle meets both balls.
   for (const std::uint32_t* n = overlaps.begin(first); n != overlaps.end(first); ++n) {
@@ -312,8 +285,8 @@ ExposedPart exposedPart(const std::vector<Ball>& balls, const BallLists& overlap
   // Area of a region of the unit sphere: the integral of (x dy − y dx) / (1 + z) along its border,
   // if −z is outside the region. The centre of the largest cap is.
   const V3d pole = (own.centre - balls[*overlaps.begin(ball)].centre).normalized();
-  const V3d across = perpendicularTo(pole), other = pole.cross(across);
-  static const auto kRule = gaussLegendre<16>();
+  const V3d across = anyPerpendicular(pole), other = pole.cross(across);
+  static const GaussRule<kNodes> rule;
   double sum = 0;
   V3d normal(0);
   for (const ExposedArc* arc : arcs) {
@@ -323,8 +296,9 @@ ExposedPart exposedPart(const std::vector<Ball>& balls, const BallLists& overlap
     const double width = arc->half / pieces;
     for (int n = 0; n < pieces; ++n) {
       const double middle = (2 * n + 1) * width - arc->half;
-      for (const auto& [node, weight] : kRule) {
-        const double t = middle + width * node, scale = sense * width * weight;
+      for (std::size_t k = 0; k < kNodes; ++k) {
+        const double t = middle + width * (2 * rule.at[k] - 1);
+        const double scale = 2 * sense * width * rule.weight[k];
         const V3d radial = arc->u * std::cos(t) + arc->v * std::sin(t);
         const V3d at = arc->centre - own.centre + radial * arc->radius;
         const V3d step = arc->w.cross(radial) * (arc->radius * scale);

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "levelset/geometry/closest_on_triangle.h"
+#include "levelset/geometry/gauss_rule.h"
 
 namespace levelset::cage {
 namespace {
@@ -25,35 +26,6 @@ constexpr double kQuadratureRatio = 0.4;
 constexpr int kMostQuarterings = 40;
 /// Height over the diameter within which a point lies in the plane of a triangle.
 constexpr double kOnPlane = 1e-13;
-
-/// Abscissae and weights of Gauss and Legendre on [0, 1].
-struct GaussRule {
-  std::array<double, kQuadraturePoints> at, weight;
-
-  GaussRule() {
-    for (std::size_t n = 0; n < kQuadraturePoints; ++n) {
-      double x =
-          std::cos(std::numbers::pi * (static_cast<double>(n) + 0.75) / (kQuadraturePoints + 0.5));
-      double slope = 1;
-      for (int step = 0; step < 100; ++step) {
-        double last = 1, value = x;
-        for (std::size_t k = 2; k <= kQuadraturePoints; ++k) {
-          const double next =
-              (static_cast<double>(2 * k - 1) * x * value - static_cast<double>(k - 1) * last) /
-              static_cast<double>(k);
-          last = value;
-          value = next;
-        }
-        slope = kQuadraturePoints * (x * value - last) / (x * x - 1);
-        const double move = value / slope;
-        x -= move;
-        if (std::abs(move) < 1e-16) break;
-      }
-      at[n] = 0.5 * (1 - x);
-      weight[n] = 1 / ((1 - x * x) * slope * slope);
-    }
-  }
-};
 
 /// Adds the integrals over a part of a triangle. `corners` and `hats` are the corners of the part
 /// and the values of the three linear functions there.
@@ -75,7 +47,7 @@ void addQuadrature(const CageTriangle& triangle, const V3d& x, const std::array<
     addQuadrature(triangle, x, middles, halves, depth + 1, sums);
     return;
   }
-  static const GaussRule rule;
+  static const GaussRule<kQuadraturePoints> rule;
   const V3d e1 = corners[1] - corners[0], e2 = corners[2] - corners[0];
   const double area = e1.cross(e2).length();
   const double height = triangle.normal.dot(triangle.corners[0] - x);
