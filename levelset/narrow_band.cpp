@@ -12,7 +12,7 @@
 #include <string>
 
 #include "levelset/error.h"
-#include "levelset/tree_hash_vdb.h"
+#include "levelset/grid_tools_vdb.h"
 #include "levelset/vdb.h"
 
 namespace levelset {
@@ -33,8 +33,12 @@ std::array<openvdb::Vec3d, 3> linearPart(const openvdb::math::Transform& transfo
           map.applyJacobian(openvdb::Vec3d(0, 0, 1))};
 }
 
-/// Returns true if the transform is a rotation, uniform scale and translation, within a relative
-/// tolerance of 1e-6.
+std::string coordText(const Coord& c) {
+  return fmt::format("[{}, {}, {}]", c.x(), c.y(), c.z());
+}
+
+}  // namespace
+
 bool isSimilarity(const openvdb::math::Transform& transform) {
   if (!transform.isLinear()) return false;
   const std::array<openvdb::Vec3d, 3> rows = linearPart(transform);
@@ -47,12 +51,6 @@ bool isSimilarity(const openvdb::math::Transform& transform) {
   }
   return rows[0].cross(rows[1]).dot(rows[2]) > 0;
 }
-
-std::string coordText(const Coord& c) {
-  return fmt::format("[{}, {}, {}]", c.x(), c.y(), c.z());
-}
-
-}  // namespace
 
 bool NarrowBand::isEmpty() const {
   return !grid_ || grid_->grid->tree().empty() || !activeVoxelCount();

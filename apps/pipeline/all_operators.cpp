@@ -79,7 +79,7 @@ std::vector<Operator> allOperators() {
       flowWithSegmentations(levelSetOperator<levelset::CurvatureFlowOperator>()),
       levelSetOperator<levelset::SmoothOperator>(),
       morphWithSegmentations(morphOperator()),
-      transformOperator(),
+      transformWithSegmentations(transformOperator()),
       deformOperator(),
       resampleOperator(),
       clipOperator(),

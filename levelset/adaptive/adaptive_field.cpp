@@ -6,7 +6,7 @@
 
 #include "levelset/adaptive/octree/adaptive_tree.h"
 #include "levelset/adaptive/octree/edge_crossings.h"
-#include "levelset/tree_hash_vdb.h"
+#include "levelset/grid_tools_vdb.h"
 
 namespace levelset {
 

@@ -8,8 +8,8 @@
 
 #include "levelset/error.h"
 #include "levelset/fields/grid_vdb.h"
+#include "levelset/grid_tools_vdb.h"
 #include "levelset/grids/interpolate_vdb.h"
-#include "levelset/tree_hash_vdb.h"
 
 namespace levelset {
 namespace {

@@ -18,7 +18,7 @@
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 #include "levelset/files/vdb_writer.h"
-#include "levelset/tree_hash_vdb.h"
+#include "levelset/grid_tools_vdb.h"
 
 namespace levelset {
 

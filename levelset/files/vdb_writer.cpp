@@ -53,14 +53,18 @@ struct StreamArchive : openvdb::io::Archive {
     Archive::write(out, openvdb::GridCPtrVec{grid}, true, openvdb::MetaMap());
   }
 
-  /// The steps of Archive::write() for one grid.
-  void writeInSteps(std::ostream& out, const openvdb::GridBase& grid) const {
+  /// The steps of Archive::write(), without the statistics in the metadata.
+  /// @param write  calls writeInSteps() for each grid
+  void writeFile(std::ostream& out, std::int32_t count, const std::function<void()>& write) const {
     auto metadata = std::make_shared<openvdb::io::StreamMetadata>();
     openvdb::io::setStreamMetadataPtr(out, metadata, true);
     writeHeader(out, true);
     openvdb::MetaMap().writeMeta(out);
-    const std::int32_t count = 1;
     out.write(reinterpret_cast<const char*>(&count), sizeof count);
+    write();
+  }
+
+  void writeInSteps(std::ostream& out, const openvdb::GridBase& grid) const {
     openvdb::io::GridDescriptor descriptor(grid.getName(), grid.type(), grid.saveFloatAsHalf());
     descriptor.writeHeader(out);
     const std::streampos offsets = out.tellp();
@@ -100,7 +104,20 @@ void writeGrid(std::ostream& out, const openvdb::GridBase::ConstPtr& grid) {
 }
 
 void writeGridWithItsMetadata(std::ostream& out, const openvdb::GridBase& grid) {
-  StreamArchive().writeInSteps(out, grid);
+  const StreamArchive archive;
+  archive.writeFile(out, 1, [&] { archive.writeInSteps(out, grid); });
+}
+
+void writeGridsInTurn(std::ostream& out, std::int32_t count,
+                      const std::function<openvdb::GridBase::Ptr(std::int32_t)>& make) {
+  const StreamArchive archive;
+  archive.writeFile(out, count, [&] {
+    for (std::int32_t n = 0; n < count; ++n) {
+      const openvdb::GridBase::Ptr grid = make(n);
+      grid->addStatsMetadata();
+      archive.writeInSteps(out, *grid);
+    }
+  });
 }
 
 std::uint32_t vdbCompression() {

@@ -24,6 +24,11 @@ void writeGrid(std::ostream& out, const openvdb::GridBase::ConstPtr& grid);
 /// the caller. OpenVDB's writer computes them from the values, which need not be in memory.
 void writeGridWithItsMetadata(std::ostream& out, const openvdb::GridBase& grid);
 
+/// Writes a .vdb file of several grids with different names. `make` returns the grid of a number,
+/// which is released before the next one is made.
+void writeGridsInTurn(std::ostream& out, std::int32_t count,
+                      const std::function<openvdb::GridBase::Ptr(std::int32_t)>& make);
+
 /// Compression of the leaves in the files of writeGrid().
 [[nodiscard]] std::uint32_t vdbCompression();
 

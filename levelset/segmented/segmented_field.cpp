@@ -7,8 +7,8 @@
 #include <bit>
 #include <cmath>
 
+#include "levelset/grid_tools_vdb.h"
 #include "levelset/segmented/segmented_data_vdb.h"
-#include "levelset/tree_hash_vdb.h"
 
 namespace levelset {
 

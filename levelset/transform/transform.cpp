@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "levelset/error.h"
+#include "levelset/transform/moved_grid_vdb.h"
 #include "levelset/transform/resample_vdb.h"
 #include "levelset/vdb.h"
 
@@ -89,28 +90,41 @@ void scaleDistances(openvdb::FloatGrid& grid, double scale, float background) {
 
 }  // namespace
 
-NarrowBand transform(NarrowBand solid, const Imath::M44d& matrix) {
+MovedGrid movedGrid(const Imath::M44d& indexToWorld, double voxelSize, double halfWidth,
+                    const Imath::M44d& matrix, const char* advice) {
   requireAffine(matrix);
   const Stretch stretch = stretchOf(matrix);
   requireStretch(stretch);
-  if (stretch.greatest > stretch.least * (1 + 1e-7) || !(Imath::M44d(matrix).determinant() > 0)) {
+  const double determinant = Imath::M44d(matrix).determinant();
+  if (stretch.greatest > stretch.least * (1 + 1e-7) || !(determinant > 0)) {
     throw InvalidInput(
-        "the matrix shears, mirrors or scales unevenly, which a grid "
-        "transform cannot represent; resample the solid with --bake");
+        fmt::format("the matrix shears, mirrors or scales unevenly, which a grid transform cannot "
+                    "represent; {}",
+                    advice));
   }
-  if (!solid.shared()) throw InvalidInput("the solid is empty; give a solid with a surface");
-  const Imath::M44d moved = solid.indexToWorld() * matrix;
-  const double voxelSize = solid.voxelSize() * stretch.greatest, halfWidth = solid.halfWidth();
-  const float background = backgroundOf(halfWidth, voxelSize);
-  requireBackground(background, voxelSize);
-  requirePrecision(moved, voxelSize);
-  const openvdb::math::Transform::Ptr transform = transformOf(moved);
+  const Imath::M44d moved = indexToWorld * matrix;
+  const double size = voxelSize * stretch.greatest;
+  MovedGrid grid;
+  grid.background = backgroundOf(halfWidth, size);
+  requireBackground(grid.background, size);
+  requirePrecision(moved, size);
+  grid.transform = transformOf(moved);
+  // The determinant of a rotation is one up to rounding.
+  const double scale = std::cbrt(determinant);
+  if (std::abs(scale - 1) > 1e-9) grid.scale = scale;
+  return grid;
+}
+
+NarrowBand transform(NarrowBand solid, const Imath::M44d& matrix) {
+  if (!solid.shared()) {
+    requireAffine(matrix);
+    throw InvalidInput("the solid is empty; give a solid with a surface");
+  }
+  const MovedGrid moved = movedGrid(solid.indexToWorld(), solid.voxelSize(), solid.halfWidth(),
+                                    matrix, "resample the solid with --bake");
   openvdb::FloatGrid& grid = editVdb(solid);
-  grid.setTransform(transform);
-  const double scale = std::cbrt(Imath::M44d(matrix).determinant());
-  // The determinant of a rotation is one up to rounding; a rotation keeps the bits of the
-  // distances.
-  if (std::abs(scale - 1) > 1e-9) scaleDistances(grid, scale, background);
+  grid.setTransform(moved.transform);
+  if (moved.scale != 1) scaleDistances(grid, moved.scale, moved.background);
   return solid;
 }
 

@@ -1,4 +1,6 @@
 #include "levelset/files/band_file.h"
+#include "levelset/segmented/files/segmented_file.h"
+#include "levelset/segmented/meshing/segmented_to_mesh.h"
 #include "tests/fuzz/readers.h"
 
 namespace fuzz {
@@ -22,7 +24,13 @@ void readGrids(const std::filesystem::path& file) {
 }
 
 void readVdb(std::string_view bytes) {
-  readGrids(scratchFile("grid.vdb", bytes));
+  const std::filesystem::path file = scratchFile("grid.vdb", bytes);
+  readGrids(file);
+  if (!levelset::holdsSegmented(file)) return;
+  accepts([&] {
+    static_cast<void>(
+        levelset::segmentedToMesh(levelset::readSegmented(file, {.maxMemory = kMaxMemory})));
+  });
 }
 
 /// A file for renderers is refused by its name, and under another name by its content.

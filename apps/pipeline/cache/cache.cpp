@@ -19,6 +19,7 @@
 #include "apps/pipeline/values/mesh_bytes.h"
 #include "levelset/error.h"
 #include "levelset/files/band_file.h"
+#include "levelset/segmented/files/segmented_file.h"
 
 namespace pipeline {
 namespace {
@@ -110,6 +111,7 @@ void touch(const fs::path& file) {
 std::uint64_t hashOf(const Value& value) {
   if (value.kind() == Kind::Band) return value.band().contentHash();
   if (value.kind() == Kind::Field) return value.field().contentHash();
+  if (value.kind() == Kind::Segmentation) return value.segmentation().contentHash();
   return 0;  // mesh or point cloud: the stored bytes contain a digest
 }
 
@@ -142,7 +144,8 @@ Cache::Cache(fs::path folder) : folder_(std::move(folder)) {
 }
 
 bool Cache::canHold(Kind kind) {
-  return kind == Kind::Band || kind == Kind::Field || kind == Kind::Mesh || kind == Kind::Points;
+  return kind == Kind::Band || kind == Kind::Field || kind == Kind::Mesh || kind == Kind::Points ||
+         kind == Kind::Segmentation;
 }
 
 fs::path Cache::entryPath(const std::string& key, const char* extension) const {
@@ -191,6 +194,12 @@ std::optional<Value> Cache::value(const std::string& key, std::size_t maxMemory)
       if (!readCloudBytes(contentsOf(entryPath(key, kMesh)), cloud)) return {};
       return Value(std::move(cloud));
     }
+    if (kind == kindName(Kind::Segmentation)) {
+      const levelset::SegmentedField field =
+          levelset::readSegmented(entryPath(key, kGrid), {.maxMemory = maxMemory});
+      if (field.contentHash() != json.at("hash").get<std::uint64_t>()) return {};
+      return Value(field);
+    }
     const levelset::ReadBandOptions options{.grid = json.at("grid").get<std::string>(),
                                             .maxMemory = maxMemory};
     Value value = kind == kindName(Kind::Field)
@@ -232,6 +241,8 @@ std::string Cache::put(const std::string& key, const CachedStep& step, const Val
             value->kind() == Kind::Mesh ? bytesOf(value->mesh()) : bytesOf(value->cloud());
         out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
         if (!out.flush()) throw levelset::IoError("a write failed; check the free disk space");
+      } else if (value->kind() == Kind::Segmentation) {
+        levelset::writeSegmented(whole, value->segmentation());
       } else if (value->kind() == Kind::Field) {
         json["grid"] = value->field().name();
         levelset::writeField(whole, value->field(),

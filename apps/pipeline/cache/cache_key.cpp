@@ -12,6 +12,7 @@
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 #include "levelset/files/band_file.h"
+#include "levelset/segmented/files/segmented_file.h"
 
 namespace pipeline {
 namespace {
@@ -72,8 +73,9 @@ std::optional<std::string> CacheKeys::contentOf(const std::filesystem::path& fil
   // Not cached: the file is no regular file, or is a .json, which refers to further files.
   if (!stamp || extension == ".json") return {};
   std::string about = stampText(*stamp);
-  const bool isGrid = extension == ".vdb";
   const auto grid = node.options.find("grid");
+  const bool isGrid =
+      extension == ".vdb" && (grid != node.options.end() || !levelset::holdsSegmented(file));
   if (isGrid && grid != node.options.end()) about += " " + grid->second;
   const std::string name = digestOf(about);
   if (auto known = cache_.memo(name)) return known;

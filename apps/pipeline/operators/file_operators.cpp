@@ -12,6 +12,7 @@
 #include "levelset/mesh_files/mesh_file.h"
 #include "levelset/molecules/molecule_file.h"
 #include "levelset/point_files/point_file.h"
+#include "levelset/segmented/files/segmented_file.h"
 #include "levelset/segmented/files/segmented_mesh_file.h"
 #include "levelset/volume_files/volume_file.h"
 #include "mapping/patches/patch_file.h"
@@ -31,17 +32,25 @@ bool readsPoints(const Invocation& in) {
   return in.flag("points") || levelset::lacksFaces(in.text("file"), in.text("format"));
 }
 
+/// Kind of the value of a .vdb or .nvdb file. The headers of its grids decide. --grid names a level
+/// set or field.
+Kind gridFileKind(const Invocation& in, const std::string& name) {
+  if (in.op().name != "read") return Kind::Band;
+  if (levelset::holdsPoints(name) &&
+      (in.flag("points") ||
+       levelset::holdsPointGrid(in.text("file"), in.text("grid"), in.text("format"))))
+    return Kind::Points;
+  const bool mayBeSegmented = levelset::isVdbFormat(name) && !in.given("grid");
+  return mayBeSegmented && levelset::holdsSegmented(in.text("file")) ? Kind::Segmentation
+                                                                     : Kind::Band;
+}
+
 Kind fileKind(const Invocation& in) {
   const std::string name = formatName(in);
   const bool isRead = in.op().name == "read";
   if (levelset::isPointFormat(name)) return Kind::Points;
   if (levelset::isMeshFormat(name)) return isRead && readsPoints(in) ? Kind::Points : Kind::Mesh;
-  if (levelset::isBandFormat(name))
-    return isRead && levelset::holdsPoints(name) &&
-                   (in.flag("points") ||
-                    levelset::holdsPointGrid(in.text("file"), in.text("grid"), in.text("format")))
-               ? Kind::Points
-               : Kind::Band;
+  if (levelset::isBandFormat(name)) return gridFileKind(in, name);
   if (mapping::isPatchFormat(name)) return Kind::Patch;
   if (render::isSceneFormat(name)) return Kind::Scene;
   if (isRead && levelset::isVolumeFormat(name)) return Kind::Volume;
@@ -95,6 +104,9 @@ Value read(Invocation& in) {
     options.notes = &in.notes.notes;
     return Value(levelset::readVolume(file, options));
   }
+  if (fileKind(in) == Kind::Segmentation)
+    return Value(
+        levelset::readSegmented(file, {.maxMemory = in.maxMemory, .progress = in.progress}));
   if (fileKind(in) == Kind::Molecule)
     return Value(
         levelset::readMolecule(file, {.format = in.text("format"),
@@ -148,6 +160,18 @@ Plan planRead(Invocation& in) {
         levelset::volumeFileInfo(in.text("file"), volumeOptions(in));
     return planOf(info.grid, info.type);
   }
+  if (fileKind(in) == Kind::Segmentation) {
+    const levelset::SegmentedFileInfo info = levelset::segmentedFileInfo(in.text("file"));
+    Plan plan{.kind = Kind::Band,  // as large as a band of this half width
+              .bounds = info.worldBounds,
+              .voxelSize = info.voxelSize,
+              .halfWidth = info.halfWidth};
+    plan.area = static_cast<double>(info.activeVoxels) * info.voxelSize * info.voxelSize /
+                (2 * info.halfWidth);
+    plan.fieldBytes = plan.bytes();
+    plan.kind = Kind::Segmentation;
+    return plan;
+  }
   if (fileKind(in) != Kind::Band) return read(in).plan();
   for (const levelset::GridInfo& grid : levelset::bandFileInfo(in.text("file"))) {
     if (in.given("grid") ? grid.name != in.text("grid") : !grid.isLevelSet) continue;
@@ -198,7 +222,9 @@ void validateRead(const Invocation& in) {
 
 void validateWrite(const Invocation& in) {
   const Kind kind = fileKind(in), held = in.operands[0].kind();
-  const bool isLabelled = held == Kind::Segmentation && levelset::holdsAttributes(formatName(in));
+  const bool isLabelled =
+      held == Kind::Segmentation &&
+      (levelset::holdsAttributes(formatName(in)) || levelset::isVdbFormat(formatName(in)));
   const bool isCloud = held == Kind::Points && levelset::holdsPoints(formatName(in));
   if (held != kind && !isCloud && !isLabelled && !(held == Kind::Field && kind == Kind::Band)) {
     throw UsageError(fmt::format(
@@ -209,12 +235,16 @@ void validateWrite(const Invocation& in) {
         : held == Kind::Scene        ? "write .json"
         : held == Kind::Volume       ? "put 'isosurface' before it"
         : held == Kind::Adaptive     ? "put 'mesh' or 'to-band' before it"
-        : held == Kind::Segmentation ? "write .ply or .obj, or put 'extract LABEL' before it"
+        : held == Kind::Segmentation ? "write .vdb, .ply or .obj, or put 'extract LABEL' before it"
         : held == Kind::Molecule     ? "put 'molecule-surface' before it"
         : held == Kind::Points       ? "write .ply, .obj, .xyz, .csv, .pts or .vdb"
         : kind == Kind::Points       ? "put 'sample' before it, or write .ply"
                                      : "put 'level-set' before it, or write .ply"));
   }
+  if (held == Kind::Segmentation && in.given("name"))
+    throw UsageError(
+        "write: --name is the name of the grid of a level set, but the grids of a segmentation "
+        "have names of their own; leave it out");
   if (!levelset::isBandFormat(formatName(in)) && in.given("name"))
     throw UsageError(fmt::format(
         "write: --name is the name of a grid in a .vdb, and this file is a {}; leave it out",
@@ -241,6 +271,8 @@ Value write(Invocation& in) {
                          {.name = in.given("name") ? in.text("name") : value.field().name(),
                           .format = in.text("format"),
                           .progress = in.progress});
+  } else if (value.kind() == Kind::Segmentation && levelset::isVdbFormat(formatName(in))) {
+    levelset::writeSegmented(file, value.segmentation(), {.progress = in.progress});
   } else if (value.kind() == Kind::Segmentation) {
     levelset::writeSegmentedMesh(
         file,
@@ -281,7 +313,8 @@ Operator readOperator() {
       .name = "read",
       .group = "Files",
       .summary =
-          "read a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb), a volume (nii, "
+          "read a mesh (ply, obj, stl, off, also .gz), a level set, field or segmentation (vdb), a "
+          "volume (nii, "
           "hdr, mha, mhd, nrrd, nhdr, mrc, map, raw), points (xyz, csv, pts, ply or obj without "
           "faces, vdb with a grid of points), patches (patch), a scene (json), a molecule (pdb, "
           "cif)",
@@ -351,7 +384,7 @@ Operator writeOperator() {
           "write a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb, nvdb), points "
           "(ply, obj, xyz, csv, pts, also .gz, vdb), patches (patch), a scene (json), a "
           "segmentation "
-          "(ply, obj, with the labels on both sides of each face)",
+          "(vdb; ply, obj, with the labels on both sides of each face)",
       .details =
           "Data is written to a temporary file in the same folder, which replaces an existing file "
           "only when it is complete. The level sets and meshes of a scene go to .vdb and .ply "

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "levelset/tree_hash_vdb.h"
+#include "levelset/grid_tools_vdb.h"
 
 namespace levelset {
 namespace {

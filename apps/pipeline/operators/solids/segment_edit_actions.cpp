@@ -14,12 +14,15 @@
 #include "apps/pipeline/operators/json_output.h"
 #include "apps/pipeline/operators/kind_variant.h"
 #include "apps/pipeline/operators/label_params.h"
+#include "apps/pipeline/operators/level_set_operator.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
 #include "levelset/segmented/operators/edit_segmented.h"
 #include "levelset/segmented/operators/morph_segmented.h"
 #include "levelset/segmented/operators/offset_region.h"
 #include "levelset/segmented/operators/smooth_segmented.h"
+#include "levelset/segmented/place_segmented.h"
+#include "levelset/transform/transform.h"
 
 namespace pipeline {
 namespace {
@@ -195,7 +198,31 @@ std::map<RegionLabel, RegionLabel> newLabels(const Invocation& in) {
   return labels;
 }
 
+Value placeRegions(Invocation& in) {
+  using Transform = levelset::TransformOperator;
+  return Value(
+      placeSegmented(in.operands[0].segmentation(),
+                     Transform::matrixOf(readOptions<Transform::Options>(in, OptionStage::Run))));
+}
+void checkPlacement(const Invocation& in) {
+  using Transform = levelset::TransformOperator;
+  Invocation probe = in;
+  Transform::check(readOptions<Transform::Options>(probe, OptionStage::Syntax),
+                   {[&in](std::string_view name) { return in.given(std::string(name)); }, true});
+}
+
 }  // namespace
+
+Operator transformWithSegmentations(Operator op) {
+  op.summary = "move, turn, scale or mirror a solid, a mesh, a point cloud or a segmentation";
+  return alsoOfSegmentations(
+      std::move(op),
+      {.details = "A segmentation moves exactly, too, and cannot be mirrored, sheared or scaled "
+                  "unevenly.",
+       .shared = {"matrix", "translate", "rotate", "axis", "scale", "mirror", "about"},
+       .validate = checkPlacement,
+       .run = placeRegions});
+}
 
 Operator unionWithSegmentations(Operator op) {
   return alsoOfSegmentations(

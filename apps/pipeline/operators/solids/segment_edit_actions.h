@@ -12,6 +12,7 @@ namespace pipeline {
 [[nodiscard]] Operator differenceWithSegmentations(Operator op);
 [[nodiscard]] Operator offsetWithSegmentations(Operator op);
 [[nodiscard]] Operator flowWithSegmentations(Operator op);
+[[nodiscard]] Operator transformWithSegmentations(Operator op);
 [[nodiscard]] Operator morphWithSegmentations(Operator op);
 
 }  // namespace pipeline

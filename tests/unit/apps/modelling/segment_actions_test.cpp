@@ -52,6 +52,34 @@ TEST_F(SegmentActions, LaterSolidsWin) {
   EXPECT_EQ(text["labels"], Json::array({7, 300, 65535}));
 }
 
+TEST_F(SegmentActions, WritesAndReadsFilesOfGrids) {
+  const Json made = json(std::string(kThree) +
+                         "--labels 7,300,65535 ! write parts.vdb ! info "
+                         "--json"),
+             read = json("read parts.vdb ! info --json");
+  EXPECT_EQ(read["kind"], "segmentation");
+  EXPECT_EQ(read["hash"], made["hash"]);
+  EXPECT_EQ(json("read parts.vdb --grid distance ! info --json")["kind"], "field");
+  expectRefusal(std::string(kThree) + "! write parts.vdb --name parts", 2,
+                "the grids of a segmentation have names of their own");
+  expectRefusal(std::string(kThree) + "! write parts.nvdb", 2, "write .vdb, .ply or .obj");
+}
+
+TEST_F(SegmentActions, TransformMovesAndScalesRegions) {
+  const Json before = json(std::string(kThree) + "! measure --json"),
+             after = json(std::string(kThree) +
+                          "! transform --scale 2 --rotate 30 --translate 1,0,0 ! measure --json");
+  for (std::size_t k = 0; k < 3; ++k)
+    EXPECT_NEAR(after["materials"][k]["volume"].get<double>(),
+                8 * before["materials"][k]["volume"].get<double>(), 1e-3);
+  EXPECT_NEAR(after["junction_length"].get<double>(), 2 * before["junction_length"].get<double>(),
+              1e-4);
+  expectRefusal(std::string(kThree) + "! transform --mirror x", 3,
+                "transform the parts before 'segment'");
+  expectRefusal(std::string(kThree) + "! transform --scale 2 --bake", 2,
+                "--bake does not apply to a segmentation");
+}
+
 TEST_F(SegmentActions, NamedOperandsHaveTheirOwnOrder) {
   const std::string named =
       "sphere --radius 1 --voxel 0.1 --as a ! sphere --radius 1 --center 0.8,0,0 "

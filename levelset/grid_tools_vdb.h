@@ -1,6 +1,7 @@
 #pragma once
 
-// Hashes of the contents of grids. Includes OpenVDB, so include it from .cpp files only.
+// Hashes of the contents of grids, and a check of their transforms. Includes OpenVDB, so include it
+// from .cpp files only.
 
 #include <algorithm>
 #include <cstdint>
@@ -9,6 +10,10 @@
 #include "levelset/vdb.h"
 
 namespace levelset {
+
+/// Returns true if a transform is a rotation, uniform scale and translation, within a relative
+/// tolerance of 1e-6.
+[[nodiscard]] bool isSimilarity(const openvdb::math::Transform& transform);
 
 [[nodiscard]] inline std::uint64_t mixHash(std::uint64_t hash, std::uint64_t word) {
   hash ^= word + 0x9e3779b97f4a7c15ull + (hash << 6) + (hash >> 2);
