@@ -115,7 +115,7 @@ struct TaylorLine {
 class BezierJudge::Search {
  public:
   explicit Search(const BezierVolume& volume)
-      : attributes_(volume.attributeCount()), expression_(volume.expression) {
+      : volume_(volume), attributes_(volume.attributeCount()), expression_(volume.expression) {
     const std::size_t attributes = volume.attributeCount();
     for (std::size_t number = 0; number < volume.patches.size() * attributes; ++number) {
       const BezierPatch& patch = volume.patches[number / attributes];
@@ -360,6 +360,9 @@ class BezierJudge::Search {
       if (!isUndecided && (u < -kOutside || u > 1 + kOutside)) return;
       root.parameter[c] = u;
     }
+    if (const PatchTrim* trim = volume_.patches[root.patch].trim.get();
+        trim && !judgedContains(trim->region->loops(), trim->pointAt(root.parameter)))
+      return;
     std::array<std::array<double, 4>, kJudgedParts> at{};
     for (std::size_t part = 0; part < kJudgedParts; ++part)
       at[part] = valueOf(patch, form.data() + part, kJudgedParts, t);
@@ -414,6 +417,7 @@ class BezierJudge::Search {
     return sum;
   }
 
+  const BezierVolume& volume_;
   std::size_t attributes_;
   std::vector<int> expression_;
   std::vector<JudgedPatch> patches_;  ///< for each patch, by attribute

@@ -27,12 +27,13 @@ struct JudgedRoot {
 /// ray in double precision. A ray is two planes in world space. Boxes of parameters are bounded by
 /// Taylor forms about their centres. The operator of Krawczyk proves that a box has no root or one
 /// root [Krawczyk69]. It shares the expressions of attributes with the tree, and no geometry: no
-/// projection, no de Casteljau, no test of diagonal dominance.
+/// projection, no de Casteljau, no test of diagonal dominance. Trimming loops are judged by winding
+/// angles (judgedContains).
 ///
 /// Taylor forms of large boxes are kept between rays, so an object is for one thread.
 class BezierJudge {
  public:
-  /// @pre requireBezierVolume() accepts the volume
+  /// Refers to the volume. @pre requireBezierVolume() accepts the volume
   explicit BezierJudge(const BezierVolume& volume);
   ~BezierJudge();
   BezierJudge(BezierJudge&&) noexcept;

@@ -9,6 +9,12 @@
 namespace render {
 namespace {
 
+bool haveSameTrims(const BezierPatch& a, const BezierPatch& b) {
+  if (!a.trim || !b.trim) return !a.trim && !b.trim;
+  return a.trim->box == b.trim->box &&
+         (a.trim->region == b.trim->region || a.trim->region->loops() == b.trim->region->loops());
+}
+
 /// Part in which two volumes differ, in words; null: none.
 const char* differenceOf(const BezierVolume& a, const BezierVolume& b) {
   if (a.isovalue != b.isovalue) return "the isovalue";
@@ -19,6 +25,7 @@ const char* differenceOf(const BezierVolume& a, const BezierVolume& b) {
     if (p.degree != q.degree) return "the degree of a patch";
     if (p.attributes.size() != q.attributes.size()) return "the number of attributes";
     if (p.weights.empty() != q.weights.empty()) return "weights";
+    if (!haveSameTrims(p, q)) return "trimming loops";
   }
   return nullptr;
 }

@@ -195,7 +195,9 @@ BezierPatch elevated(const BezierPatch& patch, int axis) {
                     levelset::kMostDegree));
   std::vector<TensorBernstein> forms = homogeneous(patch);
   for (TensorBernstein& form : forms) form = levelset::elevated(form, axis);
-  return fromHomogeneous(forms, !patch.weights.empty());
+  BezierPatch result = fromHomogeneous(forms, !patch.weights.empty());
+  result.trim = patch.trim;
+  return result;
 }
 
 BezierPatch surfacePatch(int degreeU, int degreeV, const std::vector<V3d>& points,
@@ -241,6 +243,22 @@ std::vector<BezierPatch> bezierPatches(const SplineVolume& volume) {
   return result;
 }
 
+void trimPatches(const SplineVolume& volume, const std::shared_ptr<const TrimRegion>& region,
+                 std::vector<BezierPatch>& patches) {
+  std::array<std::vector<Imath::V2d>, 3> spans;  // ends of the spans of each axis
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::vector<double>& knots = volume.axes[axis].knots;
+    for (std::size_t n = 0; n + 1 < knots.size(); ++n)
+      if (knots[n + 1] > knots[n]) spans[axis].emplace_back(knots[n], knots[n + 1]);
+  }
+  std::size_t number = 0;
+  for (const Imath::V2d& u : spans[0])
+    for (const Imath::V2d& v : spans[1])
+      for (std::size_t n = 0; n < spans[2].size(); ++n)
+        patches[number++].trim = std::make_shared<const PatchTrim>(
+            PatchTrim{region, {Imath::V2d(u[0], v[0]), Imath::V2d(u[1], v[1])}});
+}
+
 Imath::Box3d BezierVolume::bounds() const {
   Imath::Box3d box;
   for (const BezierPatch& patch : patches)
@@ -250,9 +268,13 @@ Imath::Box3d BezierVolume::bounds() const {
 
 std::size_t BezierVolume::bytes() const {
   std::size_t sum = 0;
-  for (const BezierPatch& patch : patches)
+  const TrimRegion* last = nullptr;  // patches of one surface follow each other
+  for (const BezierPatch& patch : patches) {
+    if (patch.trim && patch.trim->region.get() != last) sum += patch.trim->region->bytes();
+    if (patch.trim) last = patch.trim->region.get();
     sum += sizeof(V3d) * patch.points.size() +
            sizeof(double) * (patch.attributes.size() * patch.points.size() + patch.weights.size());
+  }
   return sum;
 }
 

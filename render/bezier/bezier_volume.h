@@ -5,16 +5,34 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "levelset/deform/control_lattice.h"
+#include "render/bezier/trims/trim_region.h"
 
 /// Implicit surfaces in trivariate Bézier and B-spline volumes [Liu14]. A volume maps the unit cube
 /// of its parameters to positions and to a number, the attribute. The surface consists of the
 /// positions of all parameters whose attribute is the isovalue. Maps may fold, and edges or faces
 /// of the cube may collapse.
 namespace render {
+
+/// Region of the plane (u, v) to which patches of one surface are cut, and the box of a patch in
+/// it.
+struct PatchTrim {
+  std::shared_ptr<const TrimRegion> region;
+  Imath::Box2d box{Imath::V2d(0), Imath::V2d(1)};
+
+  /// Point of the plane. @param parameter  in the unit cube of the patch
+  [[nodiscard]] Imath::V2d pointAt(const Imath::V3d& parameter) const {
+    const Imath::V2d size = box.size();
+    return {box.min.x + size.x * parameter.x, box.min.y + size.y * parameter.y};
+  }
+  [[nodiscard]] bool keeps(const Imath::V3d& parameter) const {
+    return region->contains(pointAt(parameter));
+  }
+};
 
 /// Rational trivariate Bézier patch with positions and attributes. Control points are ordered as
 /// in levelset::TensorBernstein: the third index is the fastest.
@@ -23,7 +41,8 @@ struct BezierPatch {
   std::vector<Imath::V3d> points = {};    ///< positions of the control points, world units
   /// Numbers of the control points, for each attribute.
   std::vector<std::vector<double>> attributes = {};
-  std::vector<double> weights = {};  ///< positive; empty: all are 1
+  std::vector<double> weights = {};            ///< positive; empty: all are 1
+  std::shared_ptr<const PatchTrim> trim = {};  ///< null: all of the surface is kept
 
   [[nodiscard]] std::size_t controlPointCount() const {
     return static_cast<std::size_t>(degree[0] + 1) * static_cast<std::size_t>(degree[1] + 1) *
@@ -72,6 +91,9 @@ struct SplineVolume {
 /// @throws levelset::InvalidInput as levelset::ControlLattice, and if the counts of points and
 ///         numbers of an attribute differ
 [[nodiscard]] std::vector<BezierPatch> bezierPatches(const SplineVolume& volume);
+/// Cuts patches of one spline surface. @param patches  those of bezierPatches(), in their order
+void trimPatches(const SplineVolume& volume, const std::shared_ptr<const TrimRegion>& region,
+                 std::vector<BezierPatch>& patches);
 
 /// Patches that together are one object. A point is inside an attribute where the attribute is
 /// below the isovalue. The object is the inside of the only attribute, or an expression of several.

@@ -143,6 +143,8 @@ std::optional<BezierRoot> rootOf(const TreeContext& context, const NodePlace& no
     root.parameter[c] =
         std::clamp((static_cast<double>(node.cell[axis]) + u[axis]) * edge, 0.0, 1.0);
   }
+  const BezierPatch& patch = volume.patches[root.patch];
+  if (patch.trim && !patch.trim->keeps(root.parameter)) return {};
   // Derivatives of position and attribute, up to the positive factor of the weight.
   Imath::V3d tangent[3];
   double slope[3];
@@ -163,8 +165,7 @@ std::optional<BezierRoot> rootOf(const TreeContext& context, const NodePlace& no
   if (isSingular && determinant == 0 && root.normal.dot(along) > 0) root.normal = -root.normal;
   if (!volume.expression.empty()) {
     const SurfaceSide side =
-        sideOf(volume.expression, root.attribute,
-               insideAt(volume.patches[root.patch], volume.isovalue, root.parameter));
+        sideOf(volume.expression, root.attribute, insideAt(patch, volume.isovalue, root.parameter));
     if (side == SurfaceSide::None) return {};
     if (side == SurfaceSide::Flipped) root.normal = -root.normal;
   }

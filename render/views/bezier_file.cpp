@@ -82,10 +82,103 @@ class BezierReader {
   }
 };
 
+/// Points of a trimming curve.
+std::vector<Imath::V2d> trimPoints(const BezierJson& list) {
+  if (!list.is_array()) BezierReader::refuse("has a trimming curve whose points are not a list");
+  std::vector<Imath::V2d> points;
+  for (const BezierJson& entry : list) {
+    const std::vector<double> row = BezierReader::numbers(entry, "trims");
+    if (row.size() != 2)
+      BezierReader::refuse(
+          fmt::format("has a point of {} numbers in \"trims\", not two parameters", row.size()));
+    points.emplace_back(row[0], row[1]);
+  }
+  return points;
+}
+
+/// Loop of trimming curves: {"polyline": points}, or {"curves": [{"points", "weights"}, …]}.
+TrimLoop trimLoop(const BezierJson& json) {
+  BezierReader::requireKnown(json, {"polyline", "curves"});
+  if (json.contains("polyline") == json.contains("curves"))
+    BezierReader::refuse("has a trimming loop without one of \"polyline\" and \"curves\"");
+  if (json.contains("polyline")) {
+    const std::vector<Imath::V2d> points = trimPoints(json.at("polyline"));
+    if (points.size() < 3) BezierReader::refuse("has a \"polyline\" of fewer than three points");
+    return polylineLoop(points);
+  }
+  if (!json.at("curves").is_array()) BezierReader::refuse("has \"curves\" that are not a list");
+  TrimLoop loop;
+  for (const BezierJson& entry : json.at("curves")) {
+    BezierReader::requireKnown(entry, {"points", "weights"});
+    loop.push_back({trimPoints(BezierReader::member(entry, "points")), {}});
+    if (entry.contains("weights"))
+      loop.back().weights = BezierReader::numbers(entry.at("weights"), "weights");
+  }
+  return loop;
+}
+
+/// Cuts the patches of an entry by its "trims".
+void addTrims(const BezierJson& json, bool isSurface, const SplineVolume& spline,
+              std::vector<BezierPatch>& patches) {
+  if (!json.contains("trims")) {
+    if (json.contains("domain")) BezierReader::refuse("has a \"domain\" without \"trims\"");
+    return;
+  }
+  // A surface that was written has two layers, and the box of its parameters.
+  if (!isSurface && !json.contains("domain"))
+    BezierReader::refuse("has \"trims\" of a volume; give them to a surface");
+  const BezierJson& list = json.at("trims");
+  if (!list.is_array() || list.empty())
+    BezierReader::refuse("has \"trims\" that are not a list of loops");
+  std::vector<TrimLoop> loops;
+  for (const BezierJson& loop : list) loops.push_back(trimLoop(loop));
+  const auto region = std::make_shared<const TrimRegion>(std::move(loops));
+  std::vector<double> domain{0, 0, 1, 1};
+  if (json.contains("domain")) {
+    domain = BezierReader::numbers(json.at("domain"), "domain");
+    if (domain.size() != 4 || !(domain[0] < domain[2]) || !(domain[1] < domain[3]))
+      BezierReader::refuse("has a \"domain\" that is not [u0, v0, u1, v1] with u0 < u1, v0 < v1");
+  }
+  const auto placed = [&](const Imath::V2d& p) {
+    return Imath::V2d(domain[0] * (1 - p.x) + domain[2] * p.x,
+                      domain[1] * (1 - p.y) + domain[3] * p.y);
+  };
+  trimPatches(spline, region, patches);
+  for (BezierPatch& patch : patches) {
+    const Imath::Box2d box = patch.trim->box;
+    patch.trim =
+        std::make_shared<const PatchTrim>(PatchTrim{region, {placed(box.min), placed(box.max)}});
+  }
+}
+
+BezierJson trimsJson(const TrimRegion& region) {
+  const auto pair = [](const Imath::V2d& p) { return BezierJson{p.x, p.y}; };
+  BezierJson list = BezierJson::array();
+  for (const TrimLoop& loop : region.loops()) {
+    const bool isPolyline = std::all_of(loop.begin(), loop.end(), [](const TrimCurve& curve) {
+      return curve.points.size() == 2 && curve.weights.empty();
+    });
+    BezierJson members = BezierJson::array();
+    for (const TrimCurve& curve : loop) {
+      if (isPolyline && loop.size() > 2) {
+        members.push_back(pair(curve.points[0]));
+        continue;
+      }
+      BezierJson entry;
+      for (const Imath::V2d& p : curve.points) entry["points"].push_back(pair(p));
+      if (!curve.weights.empty()) entry["weights"] = curve.weights;
+      members.push_back(std::move(entry));
+    }
+    list.push_back({{isPolyline && loop.size() > 2 ? "polyline" : "curves", std::move(members)}});
+  }
+  return list;
+}
+
 /// Adds the patches of one entry of the list.
 void addPatches(const BezierJson& json, std::size_t attributes, std::size_t maxMemory,
                 BezierVolume& volume) {
-  BezierReader::requireKnown(json, {"degree", "count", "points", "weights", "knots"});
+  BezierReader::requireKnown(json,
+                             {"degree", "count", "points", "weights", "knots", "trims", "domain"});
   std::vector<int> degree = BezierReader::integers(json, "degree", levelset::kMostDegree, 0);
   const bool isSurface = degree.size() == 2;
   std::vector<int> count;
@@ -149,17 +242,21 @@ void addPatches(const BezierJson& json, std::size_t attributes, std::size_t maxM
   const bool isOnePatch =
       count[0] == degree[0] + 1 && count[1] == degree[1] + 1 && count[2] == degree[2] + 1;
   if (isOnePatch && !json.contains("knots")) {  // the numbers themselves, without rounding
-    volume.patches.push_back({{degree[0], degree[1], degree[2]},
-                              std::move(spline.points),
-                              std::move(spline.attributes),
-                              std::move(spline.weights)});
+    std::vector<BezierPatch> patch{{{degree[0], degree[1], degree[2]},
+                                    std::move(spline.points),
+                                    std::move(spline.attributes),
+                                    std::move(spline.weights)}};
+    addTrims(json, isSurface, spline, patch);
+    volume.patches.push_back(std::move(patch[0]));
     return;
   }
   double converted = 4 + static_cast<double>(spline.attributes.size());
   for (std::size_t axis = 0; axis < 3; ++axis)
     converted *= (degree[axis] + 1.0) * (1.0 * count[axis] - degree[axis]);
   levelset::requireMemory(2 * sizeof(double) * converted, levelset::memoryLeft(maxMemory));
-  for (BezierPatch& patch : bezierPatches(spline)) volume.patches.push_back(std::move(patch));
+  std::vector<BezierPatch> patches = bezierPatches(spline);
+  addTrims(json, isSurface, spline, patches);
+  for (BezierPatch& patch : patches) volume.patches.push_back(std::move(patch));
 }
 
 BezierVolume volumeOfText(const std::string& text, std::size_t maxMemory) {
@@ -273,6 +370,11 @@ void writeBezierVolume(const std::filesystem::path& file, const BezierVolume& vo
     }
     entry["points"] = std::move(points);
     if (!patch.weights.empty()) entry["weights"] = patch.weights;
+    if (patch.trim) {
+      const Imath::Box2d& box = patch.trim->box;
+      entry["trims"] = trimsJson(*patch.trim->region);
+      entry["domain"] = {box.min.x, box.min.y, box.max.x, box.max.y};
+    }
     json["patches"].push_back(std::move(entry));
   }
   levelset::FileTarget target(file);

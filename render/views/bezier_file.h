@@ -15,7 +15,11 @@
 ///               "weights": [1, …], "knots": [[0, 0, 0, 1, 1, 1], …]}, …]}
 ///
 /// With two numbers in "degree" and "count", an entry is a surface in space: its points have three
-/// coordinates and no attribute.
+/// coordinates and no attribute. "trims", a list of loops, cuts a surface to the part of (u, v)
+/// that the loops enclose by the even-odd rule. A loop is {"polyline": [[u, v], …]} or
+/// {"curves": [{"points": [[u, v], …], "weights": [1, …]}, …]}, rational Bézier curves end to end.
+/// "domain", [u0, v0, u1, v1], is the box of (u, v) that the entry covers, [0, 0, 1, 1] if it is
+/// left out.
 ///
 /// A point has three coordinates and a number for each attribute. The last index of the points is
 /// the fastest. "isovalue" is 0 if it is left out, and "attributes" is one. "expression" joins

@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <numbers>
 #include <string>
 #include <utility>
@@ -326,6 +327,54 @@ inline BezierVolume sphereSurfaces() {
   return volume;
 }
 
+/// Circle of four rational arcs. @param turns  true: clockwise
+inline render::TrimLoop trimCircle(const Imath::V2d& centre, double radius, bool turns = false) {
+  using Imath::V2d;
+  render::TrimLoop loop;
+  const V2d axes[] = {V2d(1, 0), V2d(0, 1), V2d(-1, 0), V2d(0, -1)};
+  for (int n = 0; n < 4; ++n) {
+    const int k = turns ? 3 - n : n;
+    const V2d a = axes[k] * radius, b = axes[(k + 1) % 4] * radius;
+    render::TrimCurve arc{{centre + a, centre + a + b, centre + b},
+                          {1, std::numbers::sqrt2 / 2, 1}};
+    if (turns) std::swap(arc.points.front(), arc.points.back());
+    loop.push_back(std::move(arc));
+  }
+  return loop;
+}
+
+/// A wavy B-spline surface of nine cubic patches, cut to a disc without a star and a leaf, and with
+/// a smaller disc in the star.
+inline BezierVolume trimmedSurface() {
+  using Imath::V2d;
+  render::SplineVolume spline;
+  spline.axes = {levelset::uniformAxis(3, 6), levelset::uniformAxis(3, 6),
+                 levelset::uniformAxis(1, 2)};
+  spline.attributes.resize(1);
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j)
+      for (const double w : {0.0, 1.0}) {
+        spline.points.emplace_back(-1 + 0.4 * i, -1 + 0.4 * j,
+                                   0.5 * std::sin(1.3 * i) * std::cos(1.7 * j));
+        spline.attributes[0].push_back(w - 1.0 / 3);
+      }
+  std::vector<V2d> star;
+  for (int n = 0; n < 10; ++n) {
+    const double radius = n % 2 == 0 ? 0.22 : 0.1, angle = 0.2 * std::numbers::pi * n + 0.05;
+    star.push_back(V2d(0.42, 0.45) + V2d(std::cos(angle), std::sin(angle)) * radius);
+  }
+  const render::TrimLoop leaf{
+      {{V2d(0.6, 0.7), V2d(0.75, 0.55), V2d(0.95, 0.85), V2d(0.75, 0.8)}, {}},
+      {{V2d(0.75, 0.8), V2d(0.5, 0.95), V2d(0.6, 0.7)}, {1, 0.4, 1}}};
+  const auto region = std::make_shared<const render::TrimRegion>(
+      std::vector<render::TrimLoop>{trimCircle(V2d(0.5), 0.47), render::polylineLoop(star), leaf,
+                                    trimCircle(V2d(0.42, 0.45), 0.06, true)});
+  BezierVolume volume;
+  volume.patches = bezierPatches(spline);
+  trimPatches(spline, region, volume.patches);
+  return volume;
+}
+
 /// A scene with its cameras.
 struct BezierScene {
   std::string name;
@@ -348,7 +397,7 @@ inline render::Camera randomCamera(const BezierVolume& volume, Numbers& numbers,
   return camera;
 }
 
-/// Thirteen scenes, each with `count` cameras.
+/// Fourteen scenes, each with `count` cameras.
 inline std::vector<BezierScene> scenes(std::size_t count, int size) {
   std::vector<BezierScene> result;
   const auto add = [&](const char* name, BezierVolume volume) -> BezierScene& {
@@ -384,6 +433,7 @@ inline std::vector<BezierScene> scenes(std::size_t count, int size) {
   }
   add("dice", dice());
   add("rational surfaces", sphereSurfaces());
+  add("trimmed surface", trimmedSurface());
   return result;
 }
 

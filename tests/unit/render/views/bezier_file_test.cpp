@@ -41,8 +41,8 @@ std::string refusal(const std::string& text) {
 
 TEST(BezierFile, ReadsWhatItWrote) {
   const support::TemporaryFolder folder;
-  for (const BezierVolume& volume :
-       {bezier_scenes::teardrop(), bezier_scenes::collapsedEdge(), bezier_scenes::dice()}) {
+  for (const BezierVolume& volume : {bezier_scenes::teardrop(), bezier_scenes::collapsedEdge(),
+                                     bezier_scenes::dice(), bezier_scenes::trimmedSurface()}) {
     const std::filesystem::path file = folder.path() / "volume.json";
     writeBezierVolume(file, volume);
     EXPECT_TRUE(render::isBezierFile(file));
@@ -55,6 +55,10 @@ TEST(BezierFile, ReadsWhatItWrote) {
       EXPECT_EQ(again.patches[n].points, volume.patches[n].points);
       EXPECT_EQ(again.patches[n].attributes, volume.patches[n].attributes);
       EXPECT_EQ(again.patches[n].weights, volume.patches[n].weights);
+      ASSERT_EQ(again.patches[n].trim != nullptr, volume.patches[n].trim != nullptr);
+      if (!volume.patches[n].trim) continue;
+      EXPECT_EQ(again.patches[n].trim->region->loops(), volume.patches[n].trim->region->loops());
+      EXPECT_EQ(again.patches[n].trim->box, volume.patches[n].trim->box);
     }
     const render::ViewedScene scene = render::readScene(file);
     ASSERT_EQ(scene.scene.beziers.size(), 1U);
@@ -112,6 +116,37 @@ TEST(BezierFile, ReadsSurfaces) {
                         "x.json");
   ASSERT_EQ(spline.patches.size(), 2U);
   EXPECT_EQ(positionAt(spline.patches[1], V3d(0.5, 0.5, 0)), V3d(1.5, 0.5, 0));
+}
+
+TEST(BezierFile, ReadsTrimmingLoops) {
+  const std::string square = R"({"degree": [1, 1], "points": [[0,0,0],[0,1,0],[1,0,0],[1,1,2]])";
+  const auto withTrims = [&](const std::string& trims) {
+    return document(square + R"(, "trims": )" + trims + "}");
+  };
+  const std::string triangle = R"({"polyline": [[0.1,0.1],[0.9,0.1],[0.1,0.9]]})",
+                    drop = R"({"curves": [{"points": [[0.2,0.2],[0.3,0.2],[0.2,0.3],[0.2,0.2]]}]})";
+  const BezierVolume cut =
+      parseBezierVolume(withTrims("[" + triangle + "," + drop + "]"), "x.json");
+  ASSERT_TRUE(cut.patches[0].trim);
+  const render::TrimRegion& region = *cut.patches[0].trim->region;
+  EXPECT_EQ(region.loops().size(), 2U);
+  EXPECT_TRUE(region.contains({0.4, 0.4}));
+  EXPECT_FALSE(region.contains({0.6, 0.6}));
+  EXPECT_FALSE(region.contains({0.22, 0.22}));
+  const auto expectRefusal = [&](const std::string& text, const std::string& part) {
+    EXPECT_NE(refusal(text).find(part), std::string::npos) << refusal(text);
+  };
+  expectRefusal(withTrims("[]"), "not a list of loops");
+  expectRefusal(withTrims("[{}]"), "without one of \"polyline\" and \"curves\"");
+  expectRefusal(withTrims(R"([{"polyline": [[0,0],[1,1]]}])"), "fewer than three points");
+  expectRefusal(withTrims(R"([{"polyline": [[0,0],[1,1],[1]]}])"), "a point of 1 numbers");
+  expectRefusal(withTrims(R"([{"curves": [{"points": [[0,0],[1,1]]}]}])"), "is not closed");
+  expectRefusal(withTrims(R"([{"curves": []}])"), "has no curves");
+  expectRefusal(withTrims(R"([{"spline": []}])"), "unknown \"spline\"");
+  expectRefusal(document(kCube + R"(, "trims": [)" + triangle + "]}"), "\"trims\" of a volume");
+  expectRefusal(document(square + R"(, "domain": [0,0,1,1]})"), "\"domain\" without \"trims\"");
+  expectRefusal(document(square + R"(, "domain": [1,0,0,1], "trims": [)" + triangle + "]}"),
+                "u0 < u1");
 }
 
 TEST(BezierFile, RefusesWithASentence) {
