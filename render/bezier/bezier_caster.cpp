@@ -185,16 +185,37 @@ std::size_t BezierCaster::bytes() const {
 }
 
 std::optional<BezierRoot> BezierCaster::firstHit(const Camera::Ray& ray) const {
-  return cast(ray, false);
+  return nearest(ray, Wanted::Nearest);
 }
 
 bool BezierCaster::isOccluded(const Camera::Ray& ray) const {
-  return cast(ray, true).has_value();
+  return nearest(ray, Wanted::Any).has_value();
 }
 
-std::optional<BezierRoot> BezierCaster::cast(const Camera::Ray& ray, bool any) const {
+std::vector<BezierRoot> BezierCaster::roots(const Camera::Ray& ray) const {
+  thread_local RayGroup group;
+  group.start({Imath::V2d(0)}, true);
+  cast(ray, Wanted::All, group);
+  std::vector<BezierRoot> roots = std::move(group.roots[0]);
+  group.roots[0].clear();
+  finishRoots(roots);
+  return roots;
+}
+
+std::optional<BezierRoot> BezierCaster::nearest(const Camera::Ray& ray, Wanted wanted) const {
+  thread_local RayGroup group;
+  group.screens.assign(1, Imath::V2d(0));
+  group.closest.resize(1);
+  group.nearest.assign(1, Camera::kNoDepth);
+  group.visits.resize(1);
+  cast(ray, wanted, group);
+  if (!(group.nearest[0] < Camera::kNoDepth)) return {};
+  return group.closest[0];
+}
+
+void BezierCaster::cast(const Camera::Ray& ray, Wanted wanted, RayGroup& group) const {
   const Data& data = *data_;
-  if (data.boxes.empty()) return {};
+  if (data.boxes.empty()) return;
   const V3d inverse(1 / ray.direction.x, 1 / ray.direction.y, 1 / ray.direction.z);
   const double margin = data.margin + 1e-14 * ray.origin.length();
   // Parts that the ray meets, from front to back.
@@ -216,20 +237,15 @@ std::optional<BezierRoot> BezierCaster::cast(const Camera::Ray& ray, bool any) c
     for (std::uint32_t n = node.first; n < node.first + node.count; ++n)
       if (meets(boxOf(data.parts[n]), ray, inverse, margin, entry)) met.emplace_back(entry, n);
   }
-  if (met.empty()) return {};
+  if (met.empty()) return;
   std::sort(met.begin(), met.end());
 
-  thread_local RayGroup group;
-  group.screens.assign(1, Imath::V2d(0));
-  group.closest.resize(1);
-  group.nearest.assign(1, Camera::kNoDepth);
-  group.visits.resize(1);
   thread_local TreeNode node;
-  const TreeContext context{BezierView(ray), &data.volume, {}, false, false};
+  const TreeContext context{BezierView(ray), &data.volume, {}, wanted == Wanted::All, false};
   const std::vector<std::uint32_t> asked{0};
   TreeCounts counts;
   for (const auto& [distance, number] : met) {
-    if (distance > group.nearest[0] + margin) break;
+    if (wanted != Wanted::All && distance > group.nearest[0] + margin) break;
     const TreeNode& part = data.parts[number];
     ComponentScale scale;
     if (!TreeNodes<5>::turned(
@@ -239,10 +255,8 @@ std::optional<BezierRoot> BezierCaster::cast(const Camera::Ray& ray, bool any) c
     group.visits[0] = 0;
     TreeWalk<5> walk(context, group, counts);
     walk.visit(node, scale, asked, 0);
-    if (any && group.nearest[0] < Camera::kNoDepth) break;
+    if (wanted == Wanted::Any && group.nearest[0] < Camera::kNoDepth) break;
   }
-  if (!(group.nearest[0] < Camera::kNoDepth)) return {};
-  return group.closest[0];
 }
 
 }  // namespace render

@@ -13,6 +13,8 @@
 
 namespace render {
 
+struct RayGroup;  // private to the ray casters
+
 /// A Bézier volume prepared for rays of any direction, as shadow rays, which share no view. Patches
 /// are split once into small parts, and a tree of boxes finds those that a ray meets. Each part is
 /// then viewed along the ray. The rays of a camera are faster in a SharedTree.
@@ -39,10 +41,15 @@ class BezierCaster {
   [[nodiscard]] std::optional<BezierRoot> firstHit(const Camera::Ray& ray) const;
   /// Returns true if a ray intersects the surface between its ends. Cheaper than firstHit().
   [[nodiscard]] bool isOccluded(const Camera::Ray& ray) const;
+  /// All intersections of a ray between its ends, in order of their distance.
+  [[nodiscard]] std::vector<BezierRoot> roots(const Camera::Ray& ray) const;
 
  private:
   struct Data;
-  [[nodiscard]] std::optional<BezierRoot> cast(const Camera::Ray& ray, bool any) const;
+  enum class Wanted { Any, Nearest, All };
+  /// Adds the roots of the only ray of a group.
+  void cast(const Camera::Ray& ray, Wanted wanted, RayGroup& group) const;
+  [[nodiscard]] std::optional<BezierRoot> nearest(const Camera::Ray& ray, Wanted wanted) const;
   std::shared_ptr<const Data> data_;
 };
 

@@ -12,6 +12,7 @@ Hit BezierPart::hitOf(const Camera::Ray& ray, double distance, const Imath::V3d&
   hit.normal = hit.facetNormal = normal;
   hit.surfaceError = kHitError * caster.bounds().size().length();
   hit.colour = colour;
+  hit.opacity = opacity;
   hit.id = id;
   hit.solid = solid;
   return hit;

@@ -11,13 +11,14 @@
 
 namespace render {
 
-/// The surface of a Bézier volume in a scene. It is opaque. It is lit, casts shadows and hides
+/// The surface of a Bézier volume in a scene. It is lit, casts shadows and hides
 /// other parts by depth, but cannot be used in the CSG expression of the scene.
 struct BezierPart {
   BezierCaster caster;
   Imath::C3f colour{0.66f, 0.62f, 0.56f};
   std::uint32_t id = 1;
   std::string name = {};
+  double opacity = 1;  ///< opacity of the surface, for each crossing of a ray, (0, 1]
 
   /// Hit for shading. @param solid  Hit::solid
   [[nodiscard]] Hit hitOf(const Camera::Ray& ray, double distance, const Imath::V3d& normal,

@@ -27,6 +27,9 @@
 namespace render {
 namespace {
 
+/// Hits of two Bézier patches on their common face are one, at this share of the diagonal.
+constexpr double kSameBezierHit = 1e-9;
+
 using Imath::Box3d;
 using Imath::V3d;
 
@@ -219,9 +222,16 @@ struct EmbreeScene::Impl {
   /// @pre the direction is finite and not zero
   [[nodiscard]] Hit intersectSolids(const V3d& origin, const V3d& direction, double near,
                                     double far) const;
-  /// First hit with a segmented field or a Bézier volume, which are opaque.
+  /// First hit with a segmented field or a Bézier volume.
+  /// @param onlyHiding  true: without transparent volumes
   [[nodiscard]] Hit intersectOpaque(const V3d& origin, const V3d& direction, double near,
-                                    double far) const;
+                                    double far, bool onlyHiding = false) const;
+  /// Hits with a Bézier volume, in order of their distance. @param n  its index
+  [[nodiscard]] std::vector<Hit> bezierHits(std::size_t n, const V3d& origin, const V3d& direction,
+                                            double near, double far) const;
+  /// Hits with all Bézier volumes that are transparent, in order of their distance.
+  [[nodiscard]] std::vector<Hit> transparentBezierHits(const V3d& origin, const V3d& direction,
+                                                       double near, double far) const;
   void complete(Hit& hit, const RayQuery& query, const RaySolid& solid, double moved,
                 double t) const;
 };
@@ -376,7 +386,7 @@ EmbreeScene::~EmbreeScene() = default;
 EmbreeScene::EmbreeScene(EmbreeScene&&) noexcept = default;
 
 Hit EmbreeScene::Impl::intersectOpaque(const V3d& origin, const V3d& direction, double near,
-                                       double far) const {
+                                       double far, bool onlyHiding) const {
   Hit nearest;
   if (!judge && beziers.empty()) return nearest;
   requireRay(origin, direction);
@@ -384,17 +394,48 @@ Hit EmbreeScene::Impl::intersectOpaque(const V3d& origin, const V3d& direction, 
     const InterfaceRay ray{origin, direction, near, far};
     nearest = segmented->hitOf(ray, judge->firstHit(ray), interfaceSolid);
   }
-  if (beziers.empty()) return nearest;
+  for (std::size_t n = 0; n < beziers.size(); ++n) {
+    if (onlyHiding && beziers[n].opacity < 1) continue;
+    const std::vector<Hit> hits =
+        bezierHits(n, origin, direction, near, nearest.found ? nearest.distance : far);
+    if (!hits.empty()) nearest = hits[0];
+  }
+  return nearest;
+}
+
+std::vector<Hit> EmbreeScene::Impl::bezierHits(std::size_t n, const V3d& origin,
+                                               const V3d& direction, double near,
+                                               double far) const {
   std::vector<BezierJudge>& judges = bezierJudges.local();
   if (judges.empty())
     for (const BezierPart& part : beziers) judges.emplace_back(part.caster.volume());
-  for (std::size_t n = 0; n < beziers.size(); ++n) {
-    const Camera::Ray ray{origin, direction, near, nearest.found ? nearest.distance : far};
-    const std::vector<JudgedRoot> roots = judges[n].roots(ray);
-    if (!roots.empty())
-      nearest = beziers[n].hitOf(ray, roots[0].distance, roots[0].normal, bezierSolid + n);
+  const Camera::Ray ray{origin, direction, near, far};
+  const double same = kSameBezierHit * beziers[n].caster.bounds().size().length();
+  std::vector<Hit> hits;
+  const JudgedRoot* last = nullptr;
+  const std::vector<JudgedRoot> roots = judges[n].roots(ray);
+  for (const JudgedRoot& root : roots) {
+    // Both sides of a common face of two patches have its roots.
+    const bool isKnown = last && last->patch != root.patch && last->attribute == root.attribute &&
+                         root.distance - last->distance < same;
+    last = &root;
+    if (!isKnown)
+      hits.push_back(beziers[n].hitOf(ray, root.distance, root.normal, bezierSolid + n));
   }
-  return nearest;
+  return hits;
+}
+
+std::vector<Hit> EmbreeScene::Impl::transparentBezierHits(const V3d& origin, const V3d& direction,
+                                                          double near, double far) const {
+  std::vector<Hit> all;
+  for (std::size_t n = 0; n < beziers.size(); ++n) {
+    if (beziers[n].opacity == 1) continue;
+    const std::vector<Hit> hits = bezierHits(n, origin, direction, near, far);
+    all.insert(all.end(), hits.begin(), hits.end());
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Hit& a, const Hit& b) { return a.distance < b.distance; });
+  return all;
 }
 
 Hit EmbreeScene::Impl::intersectSolids(const V3d& origin, const V3d& direction, double near,
@@ -441,18 +482,23 @@ std::vector<Hit> EmbreeScene::intersectVisible(const V3d& origin, const V3d& dir
     if (hit.found) hits.push_back(hit);
     return hits;
   }
-  const Hit onOpaque = impl_->intersectOpaque(origin, direction, near, far);
+  const Hit onOpaque = impl_->intersectOpaque(origin, direction, near, far, /*onlyHiding=*/true);
   if (onOpaque.found) far = onOpaque.distance;
+  const std::vector<Hit> onBeziers = impl_->transparentBezierHits(origin, direction, near, far);
+  auto nextBezier = onBeziers.begin();
   double share = 1;
-  // Adds the mesh hits up to the distance `end` along the ray. Returns true when a surface behind
-  // these meshes is visible.
+  // Adds the hits with meshes and transparent Bézier volumes up to the distance `end` along the
+  // ray. Returns true when a surface behind them is visible.
   const auto addMeshes = [&](double end) {
     while (share >= kLeastTransmittance) {
-      const Hit hit = impl_->meshes.intersect(origin, direction, near, end);
-      if (!hit.found) break;
+      const bool isBezier = nextBezier != onBeziers.end() && nextBezier->distance < end;
+      const Hit onMesh =
+          impl_->meshes.intersect(origin, direction, near, isBezier ? nextBezier->distance : end);
+      if (!onMesh.found && !isBezier) break;
+      const Hit& hit = onMesh.found ? onMesh : *nextBezier++;
       hits.push_back(hit);
       share *= 1 - hit.opacity;
-      near = hit.beyond();
+      if (onMesh.found) near = onMesh.beyond();
     }
     return share >= kLeastTransmittance;
   };

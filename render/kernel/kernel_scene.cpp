@@ -277,7 +277,8 @@ void KernelScene::updateView(const Scene& scene) {
   for (const BezierPart& part : beziers_) bounds_.extendBy(part.caster.bounds());
   trees_.clear();
   for (const BezierPart& part : beziers_)
-    trees_.push_back(std::make_shared<const SharedTree>(part.caster.volume(), scene.camera));
+    trees_.push_back(std::make_shared<const SharedTree>(part.caster.volume(), scene.camera,
+                                                        TreeOptions{.allRoots = part.opacity < 1}));
   bezierSolid_ = scene.solids.size() + scene.mapped.size() + (segmented_ ? 1 : 0);
   tableBounds_ = bounds_;
   for (const Extent& extent : extents_) {
@@ -305,21 +306,32 @@ std::size_t KernelScene::bytes() const {
   return sum + mapped_.bytes();
 }
 
-std::vector<Hit> KernelScene::castBeziers(const KernelTracer& tracer,
-                                          const std::vector<Camera::Ray>& rays,
-                                          TreeCounts* counts) const {
-  std::vector<Hit> hits(beziers_.empty() ? 0 : rays.size());
-  for (std::size_t part = 0; part < beziers_.size(); ++part) {
-    const SharedTree::Roots found = tracer.bezierRoots(*trees_[part], rays, counts);
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-      if (found.first[i] == found.first[i + 1]) continue;
-      const BezierRoot& root = found.roots[found.first[i]];
-      if (hits[i].found && hits[i].distance <= root.distance) continue;
-      hits[i] = beziers_[part].hitOf(rays[i], root.distance, root.normal, bezierSolid_ + part);
-      hits[i].isSingular = root.isSingular;
+BezierHits KernelScene::castBeziers(const KernelTracer& tracer,
+                                    const std::vector<Camera::Ray>& rays,
+                                    TreeCounts* counts) const {
+  BezierHits result;
+  if (beziers_.empty()) return result;
+  std::vector<SharedTree::Roots> found;
+  for (const auto& tree : trees_) found.push_back(tracer.bezierRoots(*tree, rays, counts));
+  result.first.push_back(0);
+  std::vector<std::pair<const BezierRoot*, std::size_t>> roots;  // of a ray, with their parts
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    roots.clear();
+    for (std::size_t part = 0; part < found.size(); ++part)
+      for (std::size_t n = found[part].first[i]; n < found[part].first[i + 1]; ++n)
+        roots.emplace_back(&found[part].roots[n], part);
+    std::stable_sort(roots.begin(), roots.end(), [](const auto& a, const auto& b) {
+      return a.first->distance < b.first->distance;
+    });
+    for (const auto& [root, part] : roots) {
+      result.hits.push_back(
+          beziers_[part].hitOf(rays[i], root->distance, root->normal, bezierSolid_ + part));
+      result.hits.back().isSingular = root->isSingular;
+      if (beziers_[part].opacity == 1) break;
     }
+    result.first.push_back(result.hits.size());
   }
-  return hits;
+  return result;
 }
 
 PixelHits KernelScene::castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const {
@@ -496,10 +508,14 @@ std::vector<double> KernelScene::transmittances(const KernelTracer& tracer,
       if (hits[n].found) light[numbers[n]] = 0;
   }
   for (const BezierPart& part : beziers_)
-    for (std::size_t i = 0; i < rays.size(); ++i)
-      if (light[i] >= kLeastTransmittance &&
-          part.caster.isOccluded({rays[i].origin, rays[i].direction, 0, rays[i].maxDistance}))
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      if (light[i] < kLeastTransmittance) continue;
+      const Camera::Ray ray{rays[i].origin, rays[i].direction, 0, rays[i].maxDistance};
+      if (part.opacity < 1)
+        light[i] *= std::pow(1 - part.opacity, static_cast<double>(part.caster.roots(ray).size()));
+      else if (part.caster.isOccluded(ray))
         light[i] = 0;
+    }
   return light;
 }
 

@@ -36,6 +36,12 @@ struct KernelSolid {
   Imath::M44d tableToWorld, worldToTable;
 };
 
+/// Hits of several rays with the surfaces in Bézier volumes, in order of their distance.
+struct BezierHits {
+  std::vector<std::size_t> first = {};  ///< hits of ray n: from first[n] to before first[n + 1]
+  std::vector<Hit> hits = {};
+};
+
 /// Interface of the kernel's back ends, on the processor and on the GPU. All of them return the
 /// same bits. Fields of a blended scene are searched by FieldTracer::search().
 class KernelTracer : public FieldTracer {
@@ -131,10 +137,16 @@ class KernelScene {
   }
   /// Surfaces in Bézier volumes.
   [[nodiscard]] const std::vector<BezierPart>& beziers() const { return beziers_; }
-  /// First hits of rays of the camera with the surfaces in Bézier volumes; empty without any.
-  [[nodiscard]] std::vector<Hit> castBeziers(const KernelTracer& tracer,
-                                             const std::vector<Camera::Ray>& rays,
-                                             TreeCounts* counts = nullptr) const;
+  /// Hits of rays of the camera with the surfaces in Bézier volumes, up to the first opaque one;
+  /// empty without any.
+  [[nodiscard]] BezierHits castBeziers(const KernelTracer& tracer,
+                                       const std::vector<Camera::Ray>& rays,
+                                       TreeCounts* counts = nullptr) const;
+  /// Returns true for a hit from castBeziers().
+  [[nodiscard]] bool isOnBezier(const Hit& hit) const {
+    return !hit.isOnMesh && !hit.isOnGround && hit.solid >= bezierSolid_ &&
+           hit.solid < bezierSolid_ + beziers_.size();
+  }
   [[nodiscard]] std::size_t bytes() const;
   /// Numbers of blocks of all solids, by their use in the brick tables.
   struct Counts {

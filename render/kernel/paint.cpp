@@ -156,7 +156,7 @@ KernelPainter::FirstHits KernelPainter::firstHits(const KernelTracer& tracer,
 }
 
 Hit KernelPainter::hitOf(const Camera::Ray& ray, double meshNear, const PixelHits& hits,
-                         const FirstHits& first, std::size_t i) const {
+                         const FirstHits& first, std::size_t i, std::size_t passed) const {
   Hit onSolid;
   if (!first.onFields.empty())
     onSolid = first.onFields[i];
@@ -179,10 +179,10 @@ Hit KernelPainter::hitOf(const Camera::Ray& ray, double meshNear, const PixelHit
     if (onInterface.found && (!nearest.found || onInterface.distance < nearest.distance))
       nearest = onInterface;
   }
-  if (!first.onBeziers.empty()) {
-    const Hit& onBezier = first.onBeziers[i];
-    if (onBezier.found && (!nearest.found || onBezier.distance < nearest.distance))
-      nearest = onBezier;
+  if (const BezierHits& on = first.onBeziers; !on.hits.empty()) {
+    const std::size_t next = on.first[i] + passed;
+    if (next < on.first[i + 1] && (!nearest.found || on.hits[next].distance < nearest.distance))
+      nearest = on.hits[next];
   }
   return nearest;
 }
@@ -385,14 +385,15 @@ std::vector<std::size_t> KernelPainter::addSeen(
     behindVolume.resize(pixels.size());
     for (std::size_t i = 0; i < pixels.size(); ++i)
       if (sampleRays[i].left >= kLeastTransmittance)
-        behindVolume[i] = hitOf(sampleRays[i].ray, sampleRays[i].meshNear, hits, first, i);
+        behindVolume[i] =
+            hitOf(sampleRays[i].ray, sampleRays[i].meshNear, hits, first, i, sampleRays[i].passed);
     addVolume(tracer, behindVolume, sampleRays, sums);
   }
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    auto& [ray, x, y, meshNear, left, lit] = sampleRays[i];
+    auto& [ray, x, y, meshNear, left, lit, passed] = sampleRays[i];
     if (left < kLeastTransmittance) continue;
     if (rays.size() > kMostLightRays) addColours();
-    Hit hit = scene_.volumePart ? behindVolume[i] : hitOf(ray, meshNear, hits, first, i);
+    Hit hit = scene_.volumePart ? behindVolume[i] : hitOf(ray, meshNear, hits, first, i, passed);
     if (!hit.found) hit = shader_.groundHit(ray);
     if (!hit.found) {
       left = 0;
@@ -411,6 +412,8 @@ std::vector<std::size_t> KernelPainter::addSeen(
     left = hit.isOnGround ? 0 : left * (1 - hit.opacity);
     if (hit.isOnMesh)
       meshNear = hit.beyond();
+    else if (surfaces_.isOnBezier(hit))
+      ++passed;
     else if (left >= kLeastTransmittance)
       throughSolids.push_back(i);
   }

@@ -31,18 +31,20 @@ class KernelPainter {
   /// traced together.
   [[nodiscard]] static std::vector<Pixel> pixelsOf(const PixelBox& box);
   [[nodiscard]] std::size_t numberOf(const Pixel& pixel) const;
-  /// First hits of rays with the surface of a blended scene, with a segmented field, and with
-  /// Bézier volumes; empty for scenes without.
+  /// First hits of rays with the surface of a blended scene and with a segmented field, and all
+  /// visible ones with Bézier volumes; empty for scenes without.
   struct FirstHits {
-    std::vector<Hit> onFields, onInterfaces, onBeziers;
+    std::vector<Hit> onFields, onInterfaces;
+    BezierHits onBeziers;
   };
   [[nodiscard]] FirstHits firstHits(const KernelTracer& tracer,
                                     const std::vector<Camera::Ray>& rays) const;
   /// First hit, on a solid or a mesh, of the ray with index i in `hits` and `first`.
   /// @param meshNear  mesh hits nearer than this distance are ignored, world units
   /// @param first  from firstHits()
+  /// @param passed  number of hits with Bézier volumes through which the ray has passed
   [[nodiscard]] Hit hitOf(const Camera::Ray& ray, double meshNear, const PixelHits& hits,
-                          const FirstHits& first, std::size_t i) const;
+                          const FirstHits& first, std::size_t i, std::size_t passed = 0) const;
   [[nodiscard]] Hit hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const;
   /// Paints the layers other than the colours (depth, normal, position, id, curvature, thickness)
   /// from the rays through the pixels' centres.
@@ -62,8 +64,9 @@ class KernelPainter {
     /// Mesh hits before this distance are ignored, world units. Initially the camera's near
     /// distance, then just behind the last mesh surface that the ray hit.
     double meshNear;
-    double left = 1;  ///< transmittance of all surfaces and volumes so far; 0: the ray ends
-    double lit;       ///< distance up to which the light of the volume is in the sums
+    double left = 1;         ///< transmittance of all surfaces and volumes so far; 0: the ray ends
+    double lit;              ///< distance up to which the light of the volume is in the sums
+    std::size_t passed = 0;  ///< number of hits with transparent Bézier volumes so far
   };
   /// Light of the scene's volume on parts of rays. @pre the scene has a volume
   [[nodiscard]] std::vector<VolumeLight> lightOfVolume(

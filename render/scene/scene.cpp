@@ -21,7 +21,8 @@ void forEachNode(const std::vector<MappedTexture>& mapped, const Visit& visit) {
 bool Scene::isOpaque() const {
   const auto hidesAll = [](const auto& part) { return part.opacity == 1; };
   return std::all_of(solids.begin(), solids.end(), hidesAll) &&
-         std::all_of(meshes.begin(), meshes.end(), hidesAll);
+         std::all_of(meshes.begin(), meshes.end(), hidesAll) &&
+         std::all_of(beziers.begin(), beziers.end(), hidesAll);
 }
 
 Imath::Box3d Solid::bounds() const {

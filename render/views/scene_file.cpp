@@ -327,7 +327,7 @@ void readMeshPart(const Reader& reader, const Json& json, const std::filesystem:
 void readBezierPart(const Reader& reader, const Json& json, const std::filesystem::path& file,
                     const ReadSceneOptions& options, Scene& scene) {
   const std::string where = fmt::format("Bézier volume {}", scene.beziers.size() + 1);
-  reader.requireKnown(json, {"name", "file", "colour", "id"}, where);
+  reader.requireKnown(json, {"name", "file", "colour", "opacity", "id"}, where);
   struct {  // as a solid
     std::string name;
     std::uint32_t id = 0;
@@ -338,7 +338,7 @@ void readBezierPart(const Reader& reader, const Json& json, const std::filesyste
                   part);
   BezierCaster caster(readBezierVolume(reader.partFile(json, file, where), options.maxMemory),
                       options.maxMemory);
-  scene.beziers.push_back({std::move(caster), part.colour, part.id, part.name});
+  scene.beziers.push_back({std::move(caster), part.colour, part.id, part.name, part.opacity});
 }
 
 /// The volume with its grid placed in the world by a transform.
@@ -452,11 +452,7 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
   json["solids"] = Json::array();
   for (const Solid& solid : scene.solids) json["solids"].push_back(entryOf(solid, ".vdb"));
   for (const MeshPart& part : scene.meshes) json["meshes"].push_back(entryOf(part, ".ply"));
-  for (const BezierPart& part : scene.beziers)
-    json["beziers"].push_back({{"name", part.name},
-                               {"file", fileBeside(file, part.name, ".json").filename().string()},
-                               {"colour", colourJson(part.colour)},
-                               {"id", part.id}});
+  for (const BezierPart& part : scene.beziers) json["beziers"].push_back(entryOf(part, ".json"));
   if (!scene.csg.isEmpty()) json["csg"] = scene.csg.text();
   if (scene.softness > 0) json["soft"] = scene.softness;
   if (scene.morph) json["morph"] = *scene.morph;

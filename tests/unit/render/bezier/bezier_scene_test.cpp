@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
@@ -102,9 +103,86 @@ TEST(BezierScene, BlocksLight) {
   EXPECT_GT(std::count(blocked.begin(), blocked.end(), true), 30);
 }
 
+/// A ball of opacity 0.3 has two surfaces along a ray, and a point in it is lit through one.
+TEST(BezierScene, TransparentBallsLetLightThroughEachSurface) {
+  Scene scene = sceneOf(bezier_scenes::sphere(3));
+  scene.beziers[0].opacity = 0.3;
+  EXPECT_FALSE(scene.isOpaque());
+  for (const Image& image : {renderCpu(scene, kPlain), renderEmbree(scene, kPlain)}) {
+    const std::vector<float>& alpha = image.channels.at("A");
+    std::size_t full = 0;
+    for (const float a : alpha) {
+      if (a == 0) continue;
+      EXPECT_NEAR(a, 1 - 0.7 * 0.7, 1e-6);
+      ++full;
+    }
+    EXPECT_GT(full, 50U);
+  }
+  const KernelScene surfaces(scene, RenderOptions{});
+  const EmbreeScene judge(scene);
+  const V3d along = V3d(1, 2, 3).normalized();
+  const std::vector<LightRay> rays{{V3d(0), along, 10, 1},
+                                   {V3d(0), along, 0.5, 1},
+                                   {along * -3, along, 10, 1},
+                                   {along * 3, along, 10, 1}};
+  const std::vector<double> light = surfaces.transmittances(CpuTracer(), rays);
+  const double exact[] = {0.7, 1, 0.49, 1};
+  for (std::size_t n = 0; n < rays.size(); ++n) {
+    EXPECT_NEAR(light[n], exact[n], 1e-15);
+    EXPECT_NEAR(judge.transmittance(rays[n].origin, rays[n].direction, rays[n].maxDistance),
+                exact[n], 1e-15);
+  }
+}
+
+/// Transparent parts of all kinds behind and in each other have the colours of the judge.
+TEST(BezierScene, TransparentPartsMixInTheOrderOfTheirDepths) {
+  Scene scene = sceneOf(bezier_scenes::dice());
+  scene.beziers[0].opacity = 0.4;
+  scene.beziers.push_back({.caster = BezierCaster(bezier_scenes::sphere(2)),
+                           .colour = {0.1f, 0.5f, 0.2f},
+                           .id = 6,
+                           .opacity = 0.2});
+  scene.beziers.push_back({.caster = BezierCaster(bezier_scenes::trimmedSurface()),
+                           .colour = {0.8f, 0.1f, 0.1f},
+                           .id = 7});
+  scene.solids.push_back({.band = levelset::makeSphere(0.6, V3d(1, 0, 0), 0.1),
+                          .colour = {0.2f, 0.2f, 0.9f},
+                          .id = 8,
+                          .opacity = 0.5});
+  levelset::TriMesh sheet;
+  sheet.positions = {{-1, -1, 0.7}, {1.5, -1, 0.7}, {1.5, 1, 0.9}, {-1, 1, 0.9}};
+  sheet.triangles = {{0, 1, 2}, {0, 2, 3}};
+  scene.meshes.push_back({.mesh = std::make_shared<const levelset::TriMesh>(std::move(sheet)),
+                          .id = 9,
+                          .opacity = 0.25});
+  const Image image = renderCpu(scene, kPlain), judged = renderEmbree(scene, kPlain);
+  for (const char* channel : {"R", "G", "B", "A"}) {
+    const std::vector<float>&a = image.channels.at(channel), &b = judged.channels.at(channel);
+    float most = 0;
+    for (std::size_t n = 0; n < a.size(); ++n) most = std::max(most, std::abs(a[n] - b[n]));
+    EXPECT_LT(most, 2e-5f) << channel;
+  }
+  const ImageComparison found = compareImages(image, judged);
+  EXPECT_TRUE(found.agrees()) << found.reason();
+  // Several transparent surfaces add up: opacities between those of one surface and 1.
+  EXPECT_GT(std::count_if(image.channels.at("A").begin(), image.channels.at("A").end(),
+                          [](float a) { return a > 0.7f && a < 0.99f; }),
+            20);
+}
+
+TEST(BezierScene, TrimmedSurfacesHaveThePictureOfTheJudge) {
+  Scene scene = sceneOf(bezier_scenes::trimmedSurface());
+  scene.camera.from = {0.5, 1.5, 2.5};
+  const Image image = renderCpu(scene, kPlain);
+  const ImageComparison found = compareImages(image, renderEmbree(scene, kPlain));
+  EXPECT_TRUE(found.agrees()) << found.reason();
+  EXPECT_GT(found.bothHit, 50U);
+}
+
 TEST(BezierScene, IsReadAndWritten) {
   const support::TemporaryFolder folder;
   Scene scene = sceneOf(bezier_scenes::dice());
+  scene.beziers[0].opacity = 0.75;
   scene.solids.push_back(
       {.band = levelset::makeSphere(0.6, V3d(2, 0, 0), 0.1), .id = 8, .name = "ball"});
   const std::filesystem::path file = folder.path() / "scene.json";
@@ -113,6 +191,7 @@ TEST(BezierScene, IsReadAndWritten) {
   ASSERT_EQ(again.scene.beziers.size(), 1U);
   EXPECT_EQ(again.scene.beziers[0].name, "bezier");
   EXPECT_EQ(again.scene.beziers[0].id, 5U);
+  EXPECT_EQ(again.scene.beziers[0].opacity, 0.75);
   const Image before = renderCpu(scene, kPlain), after = renderCpu(again.scene, kPlain);
   EXPECT_EQ(before.channels.at("Z"), after.channels.at("Z"));
   EXPECT_EQ(before.ids, after.ids);

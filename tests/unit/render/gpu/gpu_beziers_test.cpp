@@ -217,6 +217,20 @@ TEST(GpuBeziers, DrawPicturesWithTheBitsOfTheProcessor) {
   EXPECT_FALSE(gpu.attributes.contains("ls:onProcessor"));
 }
 
+TEST(GpuBeziers, DrawTransparentAndTrimmedPartsWithTheBitsOfTheProcessor) {
+  Scene scene;
+  scene.beziers.push_back({.caster = BezierCaster(bezier_scenes::dice()), .id = 5, .opacity = 0.3});
+  scene.beziers.push_back(
+      {.caster = BezierCaster(bezier_scenes::trimmedSurface()), .id = 6, .opacity = 0.6});
+  scene.solids.push_back(
+      {.band = levelset::makeSphere(0.6, V3d(-1, 0, 1), 0.1), .id = 8, .opacity = 0.5});
+  scene.camera = {.from = {0.4, 1.5, 6}, .to = {0.2, 0, 0}, .width = 32, .height = 24};
+  const RenderOptions options{.samples = 2, .ambientSamples = 0, .shadowSamples = 1};
+  const Image cpu = renderCpu(scene, options), gpu = renderGpu(scene, options);
+  EXPECT_EQ(gpu.channels, cpu.channels);
+  EXPECT_EQ(gpu.ids, cpu.ids);
+}
+
 TEST(GpuBeziers, PicturesTellOfRaysOnTheProcessor) {
   BezierVolume ball = bezier_scenes::sphere(2);
   for (double& value : ball.patches[0].attributes[0]) value *= 1e-40;
@@ -236,8 +250,9 @@ TEST(GpuBeziers, AreUsedByTheTracer) {
   scene.camera = cameraAt(V3d(0, -4, 0), 16);
   const KernelScene surfaces(scene);
   const GpuTracer tracer(context(), surfaces);
-  const std::vector<Hit> hits = surfaces.castBeziers(tracer, raysOf(scene.camera));
-  EXPECT_TRUE(hits[8 * 16 + 8].found);
+  const BezierHits found = surfaces.castBeziers(tracer, raysOf(scene.camera));
+  ASSERT_GT(found.first[8 * 16 + 9], found.first[8 * 16 + 8]);
+  EXPECT_TRUE(found.hits[found.first[8 * 16 + 8]].found);
   EXPECT_GT(tracer.bezierCounts().solutions, 100u);
   EXPECT_EQ(tracer.bezierCounts().onProcessor, 0u);
 }
