@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <mutex>
 #include <optional>
 #include <utility>
@@ -58,25 +59,30 @@ void SharedTree::Data::build(const BezierVolume& volume, const V2d& frame,
   const std::size_t attributes = volume.attributeCount(),
                     patches = volume.patches.size() * attributes;
   context.scales.resize(patches);
-  std::vector<TreeNode> roots(patches);
-  std::vector<char> isKept(patches);
   const auto isSeen = [&](const TreeNode& node) {
     return node.crossesEye || (node.right >= -frame.x && node.left <= frame.x &&
                                node.bottom >= -frame.y && node.top <= frame.y);
   };
-  tbb::parallel_for(std::size_t{0}, patches, [&](std::size_t n) {
-    isKept[n] = TreeNodes<N>::root(volume, static_cast<std::uint32_t>(n / attributes),
-                                   static_cast<std::uint32_t>(n % attributes), context.view,
-                                   roots[n], context.scales[n]) &&
-                isSeen(roots[n]);
-    if (isKept[n])
-      proveNode<N>(roots[n], context.scales[n]);
-    else
-      roots[n] = {};
+  // In blocks, since most of the patches of a large volume have no visible surface.
+  constexpr std::size_t kBlock = 256;
+  std::vector<std::vector<TreeNode>> roots((patches + kBlock - 1) / kBlock);
+  tbb::parallel_for(std::size_t{0}, roots.size(), [&](std::size_t block) {
+    for (std::size_t n = block * kBlock; n < std::min(patches, (block + 1) * kBlock); ++n) {
+      TreeNode node;
+      if (!TreeNodes<N>::root(volume, static_cast<std::uint32_t>(n / attributes),
+                              static_cast<std::uint32_t>(n % attributes), context.view, node,
+                              context.scales[n]) ||
+          !isSeen(node))
+        continue;
+      proveNode<N>(node, context.scales[n]);
+      roots[block].push_back(std::move(node));
+    }
   });
   std::vector<TreeNode> open;
-  for (std::size_t n = 0; n < patches; ++n)
-    if (isKept[n]) open.push_back(std::move(roots[n]));
+  for (std::vector<TreeNode>& block : roots) {
+    std::move(block.begin(), block.end(), std::back_inserter(open));
+    block = {};
+  }
   counts.nodes += patches;
   const V2d extent = context.view.step * static_cast<double>(options.tile);
   while (!open.empty()) {
