@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "levelset/deform/creases/fit_creases.h"
 #include "levelset/deform/creases/restore_creases.h"
 #include "levelset/distance/redistance.h"
 #include "levelset/distance/surface/surface_points.h"
@@ -219,9 +220,17 @@ NarrowBand withSharpEdges(NarrowBand band, const NarrowBand& solid, const Deform
   ExtendedSurface surface =
       extendedSurface(cells, crossings, subProgress(progress, 0, 0.2), /*listsCrossings=*/true);
   if (surface.edgeVertices + surface.cornerVertices == 0) return band;
-  TriMesh mesh = toWorld(CreasePatches(surface, crossings, grid).divided(), solid);
-  const auto creases = creaseEdges(solid, mesh, kCreaseDegrees);
-  if (creases.empty()) return band;
+  const CreasePatches patches(surface, crossings, grid);
+  CreasedMesh creased{patches.divided(), {}};
+  creased.creases = creaseEdges(solid, toWorld(creased, solid), kCreaseDegrees);
+  // Slivers beside a crease turn by any angle.
+  std::erase_if(creased.creases, [isFeature = patches.features()](const auto& edge) {
+    return !isFeature[edge[0]] || !isFeature[edge[1]];
+  });
+  if (creased.creases.empty()) return band;
+  creased = fitCreases(std::move(creased), grid, subProgress(progress, 0.2, 0.4));
+  const auto creases = std::move(creased.creases);
+  TriMesh mesh = toWorld(std::move(creased), solid);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.positions.size(), 256),
                     [&](const auto& range) {
                       for (std::size_t n = range.begin(); n != range.end(); ++n)
@@ -229,7 +238,7 @@ NarrowBand withSharpEdges(NarrowBand band, const NarrowBand& solid, const Deform
                     });
   mesh.spacing = coordinateSpacing(mesh);
   return restoreCreases(band, mesh, creases,
-                        {.maxMemory = maxMemory, .progress = subProgress(progress, 0.2, 1)});
+                        {.maxMemory = maxMemory, .progress = subProgress(progress, 0.4, 1)});
 }
 
 }  // namespace

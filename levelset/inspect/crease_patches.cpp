@@ -230,53 +230,14 @@ void CreasePatches::bendSides() {
 }
 
 IndexMesh CreasePatches::divided() const {
-  IndexMesh result{mesh_.positions, {}};
-  result.triangles.reserve(mesh_.triangles.size() + 3 * near_.size());
-  std::vector<bool> isBeside(mesh_.positions.size(), false);
-  for (const SideMiddle& middle : middles_) {
-    result.positions.push_back(middle.position);
-    isBeside[middle.low] = isBeside[middle.high] = true;
-  }
-  const auto middleOf = [&](std::uint32_t a, std::uint32_t b) {
-    const std::pair<std::uint32_t, std::uint32_t> side = std::minmax(a, b);
-    const auto found = std::lower_bound(middles_.begin(), middles_.end(), side,
-                                        [](const SideMiddle& middle, const auto& of) {
-                                          return std::pair(middle.low, middle.high) < of;
-                                        });
-    const bool isKnown =
-        found != middles_.end() && found->low == side.first && found->high == side.second;
-    return isKnown ? static_cast<std::uint32_t>(mesh_.positions.size()) +
-                         static_cast<std::uint32_t>(found - middles_.begin())
-                   : kElsewhere;
-  };
-  for (const auto& t : mesh_.triangles) {
-    if (std::none_of(t.begin(), t.end(), [&](std::uint32_t v) { return isBeside[v]; })) {
-      result.triangles.push_back(t);
-      continue;
-    }
-    // The corners and the middles, in their order around the triangle.
-    std::vector<std::uint32_t> ring;
-    std::array<std::uint32_t, 3> middle{};
-    for (std::size_t k = 0; k < 3; ++k) middle[k] = middleOf(t[k], t[(k + 1) % 3]);
-    const auto count = 3 - std::count(middle.begin(), middle.end(), kElsewhere);
-    if (count == 3) {
-      result.triangles.push_back(middle);
-      for (std::size_t k = 0; k < 3; ++k)
-        result.triangles.push_back({t[k], middle[k], middle[(k + 2) % 3]});
-      continue;
-    }
-    // A fan about the first middle, which no side of the ring passes.
-    std::size_t first = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      ring.push_back(t[k]);
-      if (middle[k] == kElsewhere) continue;
-      first = ring.size();
-      ring.push_back(middle[k]);
-    }
-    std::rotate(ring.begin(), ring.begin() + static_cast<std::ptrdiff_t>(first), ring.end());
-    for (std::size_t n = 1; n + 1 < ring.size(); ++n)
-      result.triangles.push_back({ring[0], ring[n], ring[n + 1]});
-  }
+  return divideSides(mesh_, middles_);
+}
+
+std::vector<bool> CreasePatches::features() const {
+  std::vector<bool> result;
+  for (std::uint32_t v = 0; v < mesh_.positions.size(); ++v) result.push_back(isFeature(v));
+  for (const SideMiddle& middle : middles_)
+    result.push_back(isFeature(middle.low) && isFeature(middle.high));
   return result;
 }
 

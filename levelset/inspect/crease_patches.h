@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "levelset/inspect/curved_surface.h"
+#include "levelset/meshing/cells/divide_sides.h"
 #include "levelset/meshing/extended/extended_surface.h"
 
 namespace levelset {
@@ -34,17 +35,15 @@ class CreasePatches {
   /// Returns the mesh with each patch as four triangles, whose vertices lie on the patch. Its
   /// neighbours are halved at common sides.
   [[nodiscard]] IndexMesh divided() const;
+  /// For each vertex of divided(): true if it lies on an edge or a corner of the solid, or between
+  /// two of those that do.
+  [[nodiscard]] std::vector<bool> features() const;
 
  private:
   static constexpr std::uint32_t kElsewhere = 0xffffffffu;
   struct Patch {
     std::array<openvdb::Vec3d, 3> normal;  ///< normals of the face, at the vertices
     std::array<openvdb::Vec3d, 3> bend;    ///< bends of the side that begins at each vertex
-  };
-
-  struct SideMiddle {
-    std::uint32_t low, high;
-    openvdb::Vec3d position;
   };
 
   [[nodiscard]] bool isFeature(std::uint32_t vertex) const {

@@ -86,9 +86,10 @@ TEST(DeformBand, ABentCylinderIsAPieceOfATorus) {
 TEST(DeformBand, EdgesBetweenCurvedFacesStaySharp) {
   const BentCylinder shape;
   const double ring = 2 * shape.box.halfSize.z / shape.angle, half = 0.5 * shape.length / ring;
-  const double figures[] = {0.044, 0.069};  // voxels; 0.39 and 0.56 by redistance() alone
+  // Voxels; promised: 0.02. By redistance() alone 0.39 and 0.56.
+  const double figures[] = {0.0065, 0.014, 0.0072};
   int level = 0;
-  for (const double voxelSize : {0.08, 0.04}) {
+  for (const double voxelSize : {0.08, 0.04, 0.02}) {
     double worst = 0;
     int count = 0;
     support::forEachActive(shape.band(voxelSize), [&](const V3d& p, double phi) {
@@ -104,7 +105,7 @@ TEST(DeformBand, EdgesBetweenCurvedFacesStaySharp) {
       ++count;
     });
     EXPECT_GT(count, 2000);
-    EXPECT_LT(worst, measured(figures[level++]));
+    EXPECT_LT(worst, measured(figures[level++], 0.02));
   }
 }
 
