@@ -26,7 +26,7 @@ using Imath::V3d;
 constexpr double kMostProducts = 4e9;
 
 /// Derivatives of a piece by its three parameters, each with three components.
-using Partials = std::array<std::array<TensorBernstein, 3>, 3>;
+using Partials = std::array<TensorVector, 3>;
 
 Partials partialsOf(const std::array<TensorBernstein, 3>& map) {
   Partials result;
@@ -39,29 +39,6 @@ Partials partialsOf(const std::array<TensorBernstein, 3>& map) {
 double largestCoefficient(const TensorBernstein& form) {
   const CoefficientRange range = rangeOf(form);
   return std::max(std::abs(range.least), std::abs(range.most));
-}
-
-/// a b − c d
-TensorBernstein difference2x2(const TensorBernstein& a, const TensorBernstein& b,
-                              const TensorBernstein& c, const TensorBernstein& d) {
-  TensorBernstein result = product(a, b);
-  addTo(result, product(c, d), -1);
-  return result;
-}
-
-/// Determinant of the derivatives of a polynomial map, in Bernstein form.
-TensorBernstein determinantOf(const Partials& p) {
-  TensorBernstein result;
-  for (std::size_t c = 0; c < 3; ++c) {
-    const std::size_t d = (c + 1) % 3, e = (c + 2) % 3;
-    const TensorBernstein term =
-        product(p[0][c], difference2x2(p[1][d], p[2][e], p[1][e], p[2][d]));
-    if (c == 0)
-      result = term;
-    else
-      addTo(result, term, 1);
-  }
-  return result;
 }
 
 /// Numerator of the Jacobian of a rational map: the determinant of the four homogeneous coordinates
@@ -204,7 +181,7 @@ class JacobianBounds {
       }
     } else {
       const Partials partials = partialsOf(piece.numerator);
-      part.numerator = determinantOf(partials);
+      part.numerator = determinantOf(partials[0], partials[1], partials[2]);
       for (const auto& column : partials) {
         double largest = 0;
         for (const TensorBernstein& form : column)

@@ -136,6 +136,26 @@ double productCost(const std::array<int, 3>& a, const std::array<int, 3>& b) {
   return cost;
 }
 
+TensorBernstein difference2x2(const TensorBernstein& a, const TensorBernstein& b,
+                              const TensorBernstein& c, const TensorBernstein& d) {
+  TensorBernstein result = product(a, b);
+  addTo(result, product(c, d), -1);
+  return result;
+}
+
+TensorBernstein determinantOf(const TensorVector& a, const TensorVector& b, const TensorVector& c) {
+  TensorBernstein result;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
+    const TensorBernstein term = product(a[i], difference2x2(b[j], c[k], b[k], c[j]));
+    if (i == 0)
+      result = term;
+    else
+      addTo(result, term, 1);
+  }
+  return result;
+}
+
 std::pair<TensorBernstein, TensorBernstein> halves(const TensorBernstein& form, int axis) {
   std::pair<TensorBernstein, TensorBernstein> result{form, form};
   const CoefficientRows rows(form.degree, axis);

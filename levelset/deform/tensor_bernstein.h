@@ -51,6 +51,16 @@ void addTo(TensorBernstein& form, const TensorBernstein& other, double factor);
 /// Number of multiplications of product().
 [[nodiscard]] double productCost(const std::array<int, 3>& a, const std::array<int, 3>& b);
 
+/// Returns a b − c d.
+[[nodiscard]] TensorBernstein difference2x2(const TensorBernstein& a, const TensorBernstein& b,
+                                            const TensorBernstein& c, const TensorBernstein& d);
+
+/// Three polynomials, as the components of a vector.
+using TensorVector = std::array<TensorBernstein, 3>;
+/// Determinant of three columns. The components of each have the same degrees.
+[[nodiscard]] TensorBernstein determinantOf(const TensorVector& a, const TensorVector& b,
+                                            const TensorVector& c);
+
 /// Splits at the middle of one parameter by the de Casteljau algorithm. Each half is a polynomial
 /// on the unit cube.
 [[nodiscard]] std::pair<TensorBernstein, TensorBernstein> halves(const TensorBernstein& form,

@@ -44,4 +44,23 @@ std::vector<KeyWeight> keyWeights(std::span<const double> times, double time,
   return all;
 }
 
+std::vector<std::vector<KeyWeight>> motionWeights(std::span<const double> times,
+                                                  std::size_t interval,
+                                                  KeyInterpolation interpolation) {
+  const std::size_t next = interval + 1;
+  if (interpolation == KeyInterpolation::Linear) return {{{interval, 1}}, {{next, 1}}};
+  // The inner control values of a cubic lie a third of the interval along its end velocities.
+  const double third = (times[next] - times[interval]) / 3;
+  const auto along = [&](std::size_t key, double length) {
+    std::vector<KeyWeight> weights{{key, 1}};
+    if (key == 0 || key + 1 == times.size()) return weights;  // no velocity
+    const std::array<double, 3> slope = slopeWeights(times, key);
+    weights[0].weight += length * slope[1];
+    weights.push_back({key - 1, length * slope[0]});
+    weights.push_back({key + 1, length * slope[2]});
+    return weights;
+  };
+  return {{{interval, 1}}, along(interval, third), along(next, -third), {{next, 1}}};
+}
+
 }  // namespace levelset

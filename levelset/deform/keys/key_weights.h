@@ -27,6 +27,13 @@ struct KeyWeight {
 [[nodiscard]] std::vector<KeyWeight> keyWeights(std::span<const double> times, double time,
                                                 KeyInterpolation interpolation);
 
+/// The motion from one key to the next as a Bézier curve in time: the weights of the keys in each
+/// of its control values, two for linear motion, else four.
+/// @param interval  number of the key at which it begins; not that of the last key
+[[nodiscard]] std::vector<std::vector<KeyWeight>> motionWeights(std::span<const double> times,
+                                                                std::size_t interval,
+                                                                KeyInterpolation interpolation);
+
 /// Interpolates a value that each key has. A value that is the same for all keys keeps its bits,
 /// and so does that of a single key.
 /// @param valueOf  value of the key with a number; a number or a vector

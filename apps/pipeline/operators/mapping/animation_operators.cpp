@@ -517,7 +517,9 @@ Operator animateOperator() {
           "done; the result is the last frame. Unchanged parts are not computed again. With "
           "--lattices, the only operand is deformed by lattices, whose control points are "
           "interpolated between key frames. All frames are certified before the first one is "
-          "written; a fold is an error that names the frame. With --beziers, the only operand is a "
+          "written; a fold is an error that names the frame. A fold between frames is a warning. "
+          "With --cages and --cage, cages move the operand. Each of their frames is certified "
+          "before it is written. With --beziers, the only operand is a "
           "scene, and the control points of its Bézier volume are interpolated. Then --out may "
           "also name pictures, as frame_###.png.",
       .example =

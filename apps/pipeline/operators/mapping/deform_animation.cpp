@@ -3,9 +3,11 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -20,7 +22,9 @@
 #include "apps/pipeline/operators/pictures/camera_options.h"
 #include "apps/pipeline/operators/solids/deform_action.h"
 #include "apps/pipeline/registry/invocation.h"
+#include "levelset/deform/cage/cage.h"
 #include "levelset/deform/keys/lattice_keys.h"
+#include "levelset/deform/keys/motion_certificate.h"
 #include "levelset/deform/lattice_certificate.h"
 #include "levelset/deform/lattice_file.h"
 #include "levelset/error.h"
@@ -55,11 +59,11 @@ std::set<std::string> cameraOptions() {
 }
 
 const char* keyOption(const Invocation& in) {
-  return in.given("lattices") ? "lattices" : "beziers";
+  return in.given("lattices") ? "lattices" : in.given("cages") ? "cages" : "beziers";
 }
 
 bool isAlone(const Invocation& in) {
-  return in.given("lattices") || in.given("beziers");
+  return in.given("lattices") || in.given("cages") || in.given("beziers");
 }
 
 bool isPictureOption(const std::string& name) {
@@ -75,9 +79,10 @@ std::vector<std::string> keyNames(const Invocation& in) {
 }
 
 std::vector<std::size_t> framesOfKeys(const Invocation& in) {
-  return in.given("lattices")
-             ? keyFrames(in, keyNames(in).size(), "lattice", "lattices")
-             : keyFrames(in, keyNames(in).size(), "Bézier volume", "Bézier volumes");
+  const std::size_t count = keyNames(in).size();
+  if (in.given("lattices")) return keyFrames(in, count, "lattice", "lattices");
+  if (in.given("cages")) return keyFrames(in, count, "cage", "cages");
+  return keyFrames(in, count, "Bézier volume", "Bézier volumes");
 }
 
 bool writesPictures(const Invocation& in) {
@@ -107,9 +112,15 @@ std::vector<std::string> frameFiles(const Invocation& in) {
 // === Checks
 
 void requireOwnOptions(const Invocation& in) {
-  const bool movesLattices = in.given("lattices");
-  if (movesLattices && in.given("beziers"))
-    throw UsageError("animate: --lattices and --beziers exclude each other; give one of them");
+  const bool movesOperand = !in.given("beziers");
+  if (int{in.given("lattices")} + int{in.given("cages")} + int{in.given("beziers")} > 1)
+    throw UsageError(
+        "animate: --lattices, --cages and --beziers exclude each other; give one of them");
+  if (in.given("cages") && !in.given("cage"))
+    throw UsageError("animate: --cage is missing; give the mesh file of the cage at rest");
+  for (const char* name : {"cage", "coordinates"})
+    if (in.given(name) && !in.given("cages"))
+      throw UsageError(fmt::format("animate: --{} is for --cages; leave it out", name));
   for (const Param& param : in.op().params) {
     if (!in.given(param.name)) continue;
     const bool isForPictures = isPictureOption(param.name);
@@ -118,14 +129,15 @@ void requireOwnOptions(const Invocation& in) {
           "animate: --{} is for pictures, but --out names no .png or .exr; leave it out",
           param.name));
     const bool isOwn = isForPictures || kCommonOptions.contains(param.name) ||
-                       param.name == keyOption(in) || param.name == "interpolation";
+                       param.name == keyOption(in) || param.name == "interpolation" ||
+                       param.name == "cage" || param.name == "coordinates";
     if (!isOwn)
       throw UsageError(
           fmt::format("animate: --{} is for textures, but --{} moves control points; leave it out",
                       param.name, keyOption(in)));
   }
   for (const char* name : {"voxel", "half-width"})
-    if (in.given(name) && (!movesLattices || in.operands[0].kind() != Kind::Band))
+    if (in.given(name) && (!movesOperand || in.operands[0].kind() != Kind::Band))
       throw UsageError(fmt::format("animate: --{} is for level sets; leave it out", name));
 }
 
@@ -133,9 +145,10 @@ void requireOwnOptions(const Invocation& in) {
 void requireTextureOptions(const Invocation& in) {
   if (in.operands.empty() || in.operands[0].kind() == Kind::Band) {
     for (const Param& param : in.op().params)
-      if (in.given(param.name) && (isPictureOption(param.name) || param.name == "interpolation"))
-        throw UsageError(
-            fmt::format("animate: --{} is for --lattices and --beziers; leave it out", param.name));
+      if (in.given(param.name) && (isPictureOption(param.name) || param.name == "interpolation" ||
+                                   param.name == "cage" || param.name == "coordinates"))
+        throw UsageError(fmt::format(
+            "animate: --{} is for --lattices, --cages and --beziers; leave it out", param.name));
     return;
   }
   throw UsageError(fmt::format("animate: a {} is moved by control points; give {}",
@@ -148,6 +161,7 @@ void requireApartFromKeys(const Invocation& in) {
   std::set<std::filesystem::path> read;
   for (const std::string& name : keyNames(in))
     if (name != kRest) read.insert(levelset::canonicalFile(name));
+  if (in.given("cage")) read.insert(levelset::canonicalFile(in.text("cage")));
   for (const std::string& file : frameFiles(in)) {
     const std::filesystem::path written = levelset::canonicalFile(file);
     if (written.empty() || !read.contains(written)) continue;
@@ -159,10 +173,11 @@ void requireApartFromKeys(const Invocation& in) {
 void validateControlPoints(const Invocation& in) {
   requireOwnOptions(in);
   const bool isScene = in.operands[0].kind() == Kind::Scene;
-  if (isScene == in.given("lattices"))
+  if (isScene != in.given("beziers"))
     throw UsageError(
-        isScene ? "animate: --lattices moves level sets, meshes and point clouds, but the operand "
-                  "is a scene; give --beziers"
+        isScene ? fmt::format("animate: --{} moves level sets, meshes and point clouds, but the "
+                              "operand is a scene; give --beziers",
+                              keyOption(in))
                 : "animate: --beziers needs a scene with a Bézier volume, as 'read volume.json' "
                   "makes it; give --lattices to move the operand");
   const std::vector<std::string> names = keyNames(in);
@@ -263,6 +278,87 @@ bool isSameKey(const std::vector<KeyWeight>& a, const std::vector<KeyWeight>& b)
   return a.size() == 1 && b.size() == 1 && a.front().key == b.front().key;
 }
 
+/// Proves that lattices do not fold between the frames either, from key to key. A fold there is a
+/// warning: no frame shows it.
+Json motionJson(Invocation& in, const std::vector<ControlLattice>& keys,
+                const levelset::Progress& progress) {
+  std::vector<double> times;
+  for (const std::size_t frame : framesOfKeys(in)) times.push_back(static_cast<double>(frame));
+  Json list = Json::array();
+  for (std::size_t k = 0; k + 1 < keys.size(); ++k) {
+    levelset::MotionCertificate found;
+    std::vector<ControlLattice> control;
+    // Weights of control values may be negative, which rational lattices refuse.
+    if (!keys[k].isRational())
+      for (const auto& weights : levelset::motionWeights(times, k, interpolationOf(in)))
+        control.push_back(levelset::latticeBetween(keys, weights));
+    if (!control.empty())
+      found = levelset::certifyMotion(
+          control, {.maxMemory = in.maxMemory,
+                    .progress = levelset::subProgress(
+                        progress, static_cast<double>(k) / static_cast<double>(keys.size() - 1),
+                        static_cast<double>(k + 1) / static_cast<double>(keys.size() - 1))});
+    const double time = times[k] + found.time * (times[k + 1] - times[k]);
+    Json entry = {{"from", times[k]},
+                  {"to", times[k + 1]},
+                  {"verdict", levelset::foldVerdictName(found.verdict)},
+                  {"boxes", found.boxes}};
+    if (std::isfinite(found.leastLow)) entry["least_jacobian_low"] = found.leastLow;
+    if (std::isfinite(found.leastHigh) && found.boxes > 0) {
+      entry["least_jacobian_high"] = found.leastHigh;
+      entry["least_jacobian_frame"] = time;
+    }
+    list.push_back(std::move(entry));
+    if (found.verdict == levelset::FoldVerdict::Folds)
+      in.notes.warnings.push_back(fmt::format(
+          "animate: the motion folds at frame {:.4g}, between two frames; no frame shows it",
+          time));
+    else if (found.verdict == levelset::FoldVerdict::Undecided)
+      in.notes.warnings.push_back(fmt::format(
+          "animate: the motion between the frames {} and {} is not proven to fold nowhere; the "
+          "frames are",
+          times[k], times[k + 1]));
+  }
+  return list;
+}
+
+/// Deforms the operand by the map of each frame, and writes the results.
+/// @param begin  progress so far
+Value writeDeformed(
+    Invocation& in, const std::vector<std::vector<KeyWeight>>& weights, double begin,
+    const std::function<std::unique_ptr<levelset::Deformation>(std::size_t frame)>& mapOf,
+    Json& details) {
+  const auto frames = static_cast<double>(weights.size());
+  FrameWriter writer(in);
+  std::optional<Value> value;
+  std::size_t reused = 0;
+  Json certificate;
+  for (std::size_t f = 0; f < weights.size(); ++f) {
+    const auto share = [&](double of) {
+      return begin + (1 - begin) * (static_cast<double>(f) + of) / frames;
+    };
+    constexpr double kDeforming = 0.7;
+    if (value && isSameKey(weights[f], weights[f - 1])) {
+      ++reused;
+    } else {
+      DeformValueOptions options{
+          .maxMemory = in.maxMemory,
+          .progress = levelset::subProgress(in.progress, share(0), share(kDeforming))};
+      if (in.given("voxel")) options.voxelSize = in.length("voxel");
+      if (in.given("half-width")) options.halfWidth = in.number("half-width");
+      DeformedValue result = levelset::withContext(
+          frameText(in, f), [&] { return deformed(in.operands[0], *mapOf(f), options); });
+      value = std::move(result.value);
+      certificate = foldCertificateJson(result.certificate);
+    }
+    if (!details["frame"][f].contains("certificate"))
+      details["frame"][f]["certificate"] = certificate;
+    writer.write(f, *value, levelset::subProgress(in.progress, share(kDeforming), share(1)));
+  }
+  details["reused"] = reused;
+  return std::move(*value);
+}
+
 constexpr double kCertifying = 0.1;  // share of the certificates in the progress
 
 Value animateLattices(Invocation& in) {
@@ -280,16 +376,16 @@ Value animateLattices(Invocation& in) {
   const auto frames = static_cast<double>(weights.size());
   Json details = {{"frames", weights.size()}, {"frame", framesJson(weights)}};
   // All frames are certified before the first one is written.
-  std::size_t worst = 0, reused = 0;
+  std::size_t worst = 0;
   double least = 0;
   for (std::size_t f = 0; f < weights.size(); ++f) {
     const levelset::FoldCertificate certificate = levelset::withContext(frameText(in, f), [&] {
-      const auto found =
-          levelset::certifyLattice(levelset::latticeBetween(keys, weights[f]),
-                                   {.maxMemory = in.maxMemory,
-                                    .progress = levelset::subProgress(
-                                        in.progress, kCertifying * static_cast<double>(f) / frames,
-                                        kCertifying * static_cast<double>(f + 1) / frames)});
+      const auto found = levelset::certifyLattice(
+          levelset::latticeBetween(keys, weights[f]),
+          {.maxMemory = in.maxMemory,
+           .progress = levelset::subProgress(
+               in.progress, 0.5 * kCertifying * static_cast<double>(f) / frames,
+               0.5 * kCertifying * static_cast<double>(f + 1) / frames)});
       levelset::requireInjective(found);
       return found;
     });
@@ -298,36 +394,52 @@ Value animateLattices(Invocation& in) {
     least = certificate.leastLow;
     worst = f;
   }
-  FrameWriter writer(in);
-  std::optional<Value> value;
-  for (std::size_t f = 0; f < weights.size(); ++f) {
-    const auto share = [&](double of) {
-      return kCertifying + (1 - kCertifying) * (static_cast<double>(f) + of) / frames;
-    };
-    constexpr double kDeforming = 0.7;
-    if (value && isSameKey(weights[f], weights[f - 1])) {
-      ++reused;
-    } else {
-      DeformValueOptions options{
-          .maxMemory = in.maxMemory,
-          .progress = levelset::subProgress(in.progress, share(0), share(kDeforming))};
-      if (in.given("voxel")) options.voxelSize = in.length("voxel");
-      if (in.given("half-width")) options.halfWidth = in.number("half-width");
-      value = levelset::withContext(frameText(in, f), [&] {
-        return deformed(in.operands[0],
-                        levelset::LatticeDeformation(levelset::latticeBetween(keys, weights[f])),
-                        options)
-            .value;
-      });
-    }
-    writer.write(f, *value, levelset::subProgress(in.progress, share(kDeforming), share(1)));
-  }
-  details["reused"] = reused;
+  details["motion"] =
+      motionJson(in, keys, levelset::subProgress(in.progress, 0.5 * kCertifying, kCertifying));
+  Value value = writeDeformed(
+      in, weights, kCertifying,
+      [&](std::size_t f) {
+        return std::make_unique<levelset::LatticeDeformation>(
+            levelset::latticeBetween(keys, weights[f]));
+      },
+      details);
   in.notes.detailsJson = details.dump();
   in.notes.notes.push_back(
       fmt::format("{} frames; the Jacobian is least in frame {}: {:.4g} or more", weights.size(),
                   worst, least));
-  return std::move(*value);
+  return value;
+}
+
+Value animateCages(Invocation& in) {
+  const levelset::TriMesh rest =
+      levelset::readMesh(in.text("cage"), {.attributes = false, .maxMemory = in.maxMemory});
+  const std::vector<levelset::TriMesh> keys = readKeys<levelset::TriMesh>(
+      in,
+      [&](const std::string& file) {
+        return levelset::readMesh(file, {.attributes = false, .maxMemory = in.maxMemory});
+      },
+      [&](const levelset::TriMesh&) { return rest; });
+  const auto coordinates = in.text("coordinates") == "green" ? levelset::CageCoordinates::Green
+                                                             : levelset::CageCoordinates::MeanValue;
+  // Checks the triangles of all keys.
+  std::optional<levelset::CageDeformation> cage;
+  for (std::size_t k = 0; k < keys.size(); ++k)
+    levelset::withContext(fmt::format("cage {}", k + 1),
+                          [&] { cage.emplace(rest, keys[k], coordinates); });
+  const std::vector<std::vector<KeyWeight>> weights = weightsOf(in);
+  Json details = {{"frames", weights.size()}, {"frame", framesJson(weights)}};
+  Value value = writeDeformed(
+      in, weights, 0,
+      [&](std::size_t f) {
+        std::vector<Imath::V3d> moved;
+        for (std::size_t v = 0; v < rest.positions.size(); ++v)
+          moved.push_back(levelset::blendOf(
+              weights[f], [&](std::size_t key) { return keys[key].positions[v]; }));
+        return std::make_unique<levelset::CageDeformation>(cage->withMoved(std::move(moved)));
+      },
+      details);
+  in.notes.detailsJson = details.dump();
+  return value;
 }
 
 Value animateBeziers(Invocation& in) {
@@ -373,13 +485,26 @@ std::vector<Param> pictureParams() {
 
 Operator withControlPoints(Operator animate) {
   const Operator textures = animate;
-  animate.aloneWith = {"lattices", "beziers"};
+  animate.aloneWith = {"lattices", "cages", "beziers"};
   animate.operands[0] = {Kind::Band, Kind::Mesh, Kind::Points, Kind::Scene};
   animate.params.push_back(
       {.name = "lattices",
        .type = ParamType::Path,
        .doc = "lattice files of the key frames, separated by blanks; 'rest' moves nothing. They "
               "differ in their control points only, which are interpolated in the frames between"});
+  animate.params.push_back(
+      {.name = "cages",
+       .type = ParamType::Path,
+       .doc = "mesh files of moved cages, separated by blanks, as --lattices; 'rest' is the cage "
+              "at rest"});
+  animate.params.push_back({.name = "cage",
+                            .type = ParamType::Path,
+                            .doc = "for --cages: mesh file of the closed cage at rest"});
+  animate.params.push_back({.name = "coordinates",
+                            .type = ParamType::Choice,
+                            .doc = "for --cages: coordinates of a cage, as of deform",
+                            .fallback = "mean-value",
+                            .choices = {"mean-value", "green"}});
   animate.params.push_back(
       {.name = "beziers",
        .type = ParamType::Path,
@@ -398,7 +523,9 @@ Operator withControlPoints(Operator animate) {
   };
   animate.run = [textures](Invocation& in) {
     if (!isAlone(in)) return textures.run(in);
-    return in.given("lattices") ? animateLattices(in) : animateBeziers(in);
+    return in.given("lattices") ? animateLattices(in)
+           : in.given("cages")  ? animateCages(in)
+                                : animateBeziers(in);
   };
   animate.plan = [textures](Invocation& in) {
     return isAlone(in) ? in.operands[0].plan() : textures.plan(in);

@@ -117,6 +117,56 @@ TEST_F(AnimateControlPoints, RefusesAFoldBetweenKeysBeforeAnyFrame) {
                 "frame 0: the lattice folds");
 }
 
+TEST_F(AnimateControlPoints, ProvesTheMotionBetweenFrames) {
+  writeLattice("turned.json", -1, -1);
+  writeLattice("wide.json", 1.5);
+  // No frame lies in the middle of the half turn, where the ball is flat.
+  const auto turned = levelsmith("--report run.json " + kBall +
+                                 "animate --lattices 'rest turned.json' --frames 4 --out f_#.vdb");
+  EXPECT_EQ(turned.code, 0) << turned.err;
+  EXPECT_NE(turned.err.find("the motion folds at frame 1.5"), std::string::npos) << turned.err;
+  EXPECT_EQ(details()["motion"][0]["verdict"], "folds");
+  run(kBall +
+      "animate --lattices 'rest wide.json rest' --frames 3 --interpolation smooth --out g_#.vdb");
+  ASSERT_EQ(details()["motion"].size(), 2u);
+  for (const Json& interval : details()["motion"]) {
+    EXPECT_EQ(interval["verdict"], "certified");
+    EXPECT_NEAR(interval["least_jacobian_high"].get<double>(), 1, 1e-9);
+  }
+}
+
+TEST_F(AnimateControlPoints, MovesCages) {
+  const auto writeCage = [&](const std::string& name, double x) {
+    std::string text;
+    for (const double a : {-2 * x, 2 * x})
+      for (const double b : {-2.0, 2.0})
+        for (const double c : {-2.0, 2.0})
+          text +=
+              "v " + std::to_string(a) + " " + std::to_string(b) + " " + std::to_string(c) + "\n";
+    for (const char* face : {"1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "2 6 8 4"})
+      text += std::string("f ") + face + "\n";
+    writeFile(name, text);
+  };
+  writeCage("rest.obj", 1);
+  writeCage("wide.obj", 1.5);
+  writeCage("half.obj", 1.25);
+  const std::string motion = "animate --cages 'rest wide.obj' --frames 3 --out ";
+  run(kBall + "mesh ! write ball.ply ! deform --cage rest.obj --to half.obj ! write half.ply");
+  run(kBall + "mesh ! " + motion + "c_#.ply --cage rest.obj");
+  expectSame("c_0.ply", "ball.ply");
+  expectSame("c_1.ply", "half.ply");
+  EXPECT_NEAR(details()["frame"][2]["certificate"]["least_jacobian_high"].get<double>(), 1.5, 1e-6);
+  expectRefusal(kBall + motion + "c_#.vdb", 2, "--cage is missing");
+  expectRefusal(kBall + "animate --lattices a.json --cage rest.obj --frames 2 --out c_#.vdb", 2,
+                "--cage is for --cages");
+  expectRefusal(kBall + motion + "c_#.vdb --cage rest.obj --lattices a.json", 2,
+                "exclude each other");
+  writeFile("other.obj",
+            "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+  expectRefusal(kBall + "animate --cages 'rest other.obj' --cage rest.obj --frames 2 --out c_#.vdb",
+                3, "cage 2");
+}
+
 TEST_F(AnimateControlPoints, MovesBezierVolumes) {
   writeVolume("rest.json", 0);
   writeVolume("bent.json", 0.5);

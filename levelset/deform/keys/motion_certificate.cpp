@@ -1,0 +1,253 @@
+#include "levelset/deform/keys/motion_certificate.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <queue>
+#include <tuple>
+#include <utility>
+
+#include "levelset/deform/tensor_bernstein.h"
+
+namespace levelset {
+namespace {
+
+using Imath::V3d;
+
+/// Largest number of multiplications for the determinants of all pieces. Beyond it, the motion
+/// stays undecided.
+constexpr double kMostProducts = 2e10;
+
+/// Determinant on a box of parameters and time: Bernstein coefficients in time, each a polynomial
+/// in the parameters.
+struct MotionPart {
+  V3d low, high;
+  double begin = 0, end = 1;
+  std::vector<TensorBernstein> coefficients = {};
+};
+
+struct MotionBracket {
+  double low = 0, high = std::numeric_limits<double>::infinity();
+  V3d place{0};  ///< parameters of `high`
+  double time = 0;
+};
+
+/// Entry of the queue. Parts that are whole pieces are made again when they are halved.
+struct QueuedMotion {
+  MotionBracket bounds;
+  std::size_t piece = 0;
+  std::optional<MotionPart> part = {};
+
+  bool operator<(const QueuedMotion& other) const {  // the least bound is on top
+    return bounds.low != other.bounds.low ? bounds.low > other.bounds.low : piece > other.piece;
+  }
+};
+
+std::vector<double> binomials(std::size_t n) {
+  std::vector<double> row{1};
+  for (std::size_t k = 1; k <= n; ++k)
+    row.push_back(row.back() * static_cast<double>(n + 1 - k) / static_cast<double>(k));
+  return row;
+}
+
+class MotionBounds {
+ public:
+  explicit MotionBounds(const std::vector<ControlLattice>& control) {
+    for (const ControlLattice& lattice : control) pieces_.emplace_back(lattice);
+    const LatticeData& data = control.front().data();
+    const Imath::M44d& m = data.boxToWorld;
+    volume_ = V3d(m[0][0], m[0][1], m[0][2])
+                  .dot(V3d(m[1][0], m[1][1], m[1][2]).cross(V3d(m[2][0], m[2][1], m[2][2])));
+    const std::array<int, 3> degree = {data.axes[0].degree, data.axes[1].degree,
+                                       data.axes[2].degree},
+                             twice = {2 * degree[0], 2 * degree[1], 2 * degree[2]};
+    const auto count = static_cast<double>(control.size());
+    products_ = static_cast<double>(size()) * count * count * count *
+                (6 * productCost(degree, degree) + 3 * productCost(degree, twice));
+    rounding_ = 16 * (degree[0] + degree[1] + degree[2]) * std::numeric_limits<double>::epsilon();
+  }
+
+  [[nodiscard]] std::size_t size() const { return pieces_.front().size(); }
+  [[nodiscard]] bool isAffordable() const { return products_ <= kMostProducts; }
+
+  /// The determinant of a whole piece over the whole interval.
+  [[nodiscard]] MotionPart partOf(std::size_t index) const {
+    const std::size_t degree = pieces_.size() - 1;
+    std::vector<std::array<TensorVector, 3>> partials;  // by the parameters, for each lattice
+    MotionPart part;
+    std::array<double, 3> largest{};
+    for (const BezierPieces& pieces : pieces_) {
+      const BezierPiece piece = pieces.piece(index);
+      part.low = piece.low;
+      part.high = piece.high;
+      std::array<TensorVector, 3>& of = partials.emplace_back();
+      for (int axis = 0; axis < 3; ++axis)
+        for (std::size_t c = 0; c < 3; ++c) {
+          const auto a = static_cast<std::size_t>(axis);
+          of[a][c] = derivative(piece.numerator[c], axis);
+          const CoefficientRange range = rangeOf(of[a][c]);
+          largest[a] = std::max({largest[a], std::abs(range.least), std::abs(range.most)});
+        }
+    }
+    const std::vector<double> one = binomials(degree), three = binomials(3 * degree);
+    part.coefficients.resize(3 * degree + 1);
+    for (std::size_t a = 0; a <= degree; ++a)
+      for (std::size_t b = 0; b <= degree; ++b)
+        for (std::size_t c = 0; c <= degree; ++c) {
+          const std::size_t s = a + b + c;
+          const TensorBernstein term =
+              determinantOf(partials[a][0], partials[b][1], partials[c][2]);
+          TensorBernstein& sum = part.coefficients[s];
+          if (sum.coefficients.empty()) sum = TensorBernstein(term.degree);
+          addTo(sum, term, one[a] * one[b] * one[c] / three[s]);
+        }
+    const V3d size = part.high - part.low;
+    const double scale = volume_ * size.x * size.y * size.z;
+    const double error = 6 * rounding_ * largest[0] * largest[1] * largest[2];
+    // The rounding error is part of the lower bound.
+    for (TensorBernstein& form : part.coefficients)
+      for (double& value : form.coefficients) value = value / scale - error / std::abs(scale);
+    return part;
+  }
+
+  /// Bounds of the determinant on a part. The values at its corners are coefficients.
+  [[nodiscard]] static MotionBracket boundsOf(const MotionPart& part) {
+    MotionBracket bounds{std::numeric_limits<double>::infinity()};
+    for (const TensorBernstein& form : part.coefficients)
+      bounds.low = std::min(bounds.low, rangeOf(form).least);
+    for (const bool isEnd : {false, true}) {
+      const TensorBernstein& form = isEnd ? part.coefficients.back() : part.coefficients.front();
+      for (int corner = 0; corner < 8; ++corner) {
+        const std::array<int, 3> side = {corner & 1, (corner >> 1) & 1, corner >> 2};
+        const double value =
+            form.at(side[0] * form.degree[0], side[1] * form.degree[1], side[2] * form.degree[2]);
+        if (!(value < bounds.high)) continue;
+        bounds.high = value;
+        bounds.place = part.low + (part.high - part.low) * V3d(side[0], side[1], side[2]);
+        bounds.time = isEnd ? part.end : part.begin;
+      }
+    }
+    return bounds;
+  }
+
+  /// Halves a part along the parameter, or time, by which its determinant changes most.
+  [[nodiscard]] static std::array<MotionPart, 2> split(MotionPart part) {
+    int axis = 3;
+    double most = 0;
+    for (std::size_t s = 0; s + 1 < part.coefficients.size(); ++s)
+      for (std::size_t n = 0; n < part.coefficients[s].coefficients.size(); ++n)
+        most = std::max(most, std::abs(part.coefficients[s + 1].coefficients[n] -
+                                       part.coefficients[s].coefficients[n]));
+    most *= static_cast<double>(part.coefficients.size() - 1);
+    for (int a = 0; a < 3; ++a)
+      for (const TensorBernstein& form : part.coefficients) {
+        const CoefficientRange range = rangeOf(derivative(form, a));
+        const double change = std::max(std::abs(range.least), std::abs(range.most));
+        if (change > most) most = change, axis = a;
+      }
+    return axis == 3 ? halvesInTime(std::move(part)) : halvesAlong(part, axis);
+  }
+
+ private:
+  [[nodiscard]] static std::array<MotionPart, 2> halvesAlong(const MotionPart& part, int axis) {
+    std::array<MotionPart, 2> result = {part, part};
+    for (std::size_t s = 0; s < part.coefficients.size(); ++s)
+      std::tie(result[0].coefficients[s], result[1].coefficients[s]) =
+          halves(part.coefficients[s], axis);
+    const double middle = 0.5 * (part.low[axis] + part.high[axis]);
+    result[0].high[axis] = result[1].low[axis] = middle;
+    return result;
+  }
+
+  [[nodiscard]] static std::array<MotionPart, 2> halvesInTime(MotionPart part) {
+    std::array<MotionPart, 2> result = {part, part};
+    result[0].end = result[1].begin = 0.5 * (part.begin + part.end);
+    const std::size_t count = part.coefficients.size();
+    std::vector<TensorBernstein>& row = part.coefficients;
+    for (std::size_t n = 0; n < count; ++n) {
+      result[0].coefficients[n] = row.front();
+      result[1].coefficients[count - 1 - n] = row.back();
+      for (std::size_t k = 0; k + 1 < row.size(); ++k)
+        for (std::size_t i = 0; i < row[k].coefficients.size(); ++i)
+          row[k].coefficients[i] = 0.5 * (row[k].coefficients[i] + row[k + 1].coefficients[i]);
+      row.pop_back();
+    }
+    return result;
+  }
+
+  std::vector<BezierPieces> pieces_;
+  double volume_ = 0, products_ = 0, rounding_ = 0;
+};
+
+double bytesOf(const MotionPart& part) {
+  double sum = 0;
+  for (const TensorBernstein& form : part.coefficients)
+    sum += static_cast<double>(sizeof(double) * form.coefficients.size());
+  return sum;
+}
+
+}  // namespace
+
+MotionCertificate certifyMotion(const std::vector<ControlLattice>& control,
+                                const MotionCertificateOptions& options) {
+  report(options.progress, 0);
+  const ControlLattice& lattice = control.front();
+  MotionCertificate certificate;
+  certificate.leastLow = -std::numeric_limits<double>::infinity();
+  certificate.leastHigh = std::numeric_limits<double>::infinity();
+  if (lattice.isRational()) return certificate;
+  const MotionBounds bounds(control);
+  if (!bounds.isAffordable()) return certificate;
+  MotionBracket best{0};
+  std::priority_queue<QueuedMotion> queue;
+  const auto offer = [&best](const MotionBracket& one) {
+    if (one.high < best.high) best = one;
+  };
+  for (std::size_t n = 0; n < bounds.size(); ++n) {
+    const MotionBracket one = MotionBounds::boundsOf(bounds.partOf(n));
+    offer(one);
+    queue.push({one, n});
+    report(options.progress, 0.6 * static_cast<double>(n) / static_cast<double>(bounds.size()));
+  }
+  certificate.boxes = bounds.size();
+  double settled = std::numeric_limits<double>::infinity(), bytes = 0;
+  while (!queue.empty() && certificate.boxes < options.mostBoxes + bounds.size()) {
+    const double low = queue.top().bounds.low;
+    if (best.high <= 0 || low >= settled) break;
+    if (low > 0 && best.high - low <= options.tolerance * best.high) break;
+    QueuedMotion top = queue.top();
+    queue.pop();
+    if (top.part)
+      bytes -= bytesOf(*top.part);
+    else
+      top.part = bounds.partOf(top.piece);
+    for (MotionPart& half : MotionBounds::split(std::move(*top.part))) {
+      QueuedMotion next{MotionBounds::boundsOf(half), top.piece, std::move(half)};
+      ++certificate.boxes;
+      offer(next.bounds);
+      // The least value is not above best.high, so this part is never halved.
+      if (next.bounds.low >= best.high) {
+        settled = std::min(settled, next.bounds.low);
+        continue;
+      }
+      bytes += bytesOf(*next.part);
+      queue.push(std::move(next));
+    }
+    requireMemory(bytes, options.maxMemory);
+    report(options.progress, 0.6 + 0.4 * static_cast<double>(certificate.boxes - bounds.size()) /
+                                       static_cast<double>(options.mostBoxes + 2));
+  }
+  certificate.leastLow = std::min(settled, queue.empty() ? settled : queue.top().bounds.low);
+  certificate.leastHigh = best.high;
+  certificate.place = lattice.worldOf(best.place);
+  certificate.time = best.time;
+  certificate.verdict = best.high <= 0             ? FoldVerdict::Folds
+                        : certificate.leastLow > 0 ? FoldVerdict::Certified
+                                                   : FoldVerdict::Undecided;
+  report(options.progress, 1);
+  return certificate;
+}
+
+}  // namespace levelset
