@@ -10,6 +10,7 @@
 #include "levelset/deform/deform_band.h"
 #include "levelset/error.h"
 #include "levelset/grids/sample.h"
+#include "levelset/memory_limit.h"
 #include "levelset/meshing/band_to_mesh.h"
 #include "levelset/transform/resample.h"
 
@@ -109,14 +110,16 @@ void DeformWorker::work(const Request& request) {
     return !work_.isEnding() &&
            (!work_.isObsolete() || std::chrono::steady_clock::now() - begin < kAnyway);
   };
+  const std::size_t limit = levelset::memoryLeft(levelset::memoryLimit(levelset::kNoMemoryLimit));
   preview.certificate = map->certify({.points = coarse_.positions, .triangles = coarse_.triangles},
-                                     {.progress = isWanted})
+                                     {.maxMemory = limit, .progress = isWanted})
                             .certificate;
   work_.publish(preview);
   if (request.isDragging || work_.isObsolete()) return;
   // Refuses maps that fold, and surfaces that leave the box, in the words of the action.
   NarrowBand solid =
-      levelset::deformBand(fine, *map, {.progress = [&](double) { return !work_.isObsolete(); }})
+      levelset::deformBand(
+          fine, *map, {.maxMemory = limit, .progress = [&](double) { return !work_.isObsolete(); }})
           .band;
   preview.model = modelWith(*base_, std::move(solid));
   preview.isFine = true;
