@@ -59,7 +59,7 @@ struct CreasedVertex {
 struct FitCandidate {
   std::uint32_t vertex = 0;
   double squared = 0;                  ///< squared distance from the vertex on the crease
-  std::uint32_t slot = 0, sector = 0;  ///< of the fit
+  std::uint32_t slot = 0, sector = 0;  ///< place of the fit
 };
 
 class CreaseFitter {
@@ -115,7 +115,7 @@ class CreaseFitter {
   std::vector<std::array<std::uint32_t, 3>> neighbours_;  ///< across the side, none across creases
   std::vector<std::uint32_t> slots_;                      ///< index in vertices_, or kNone
   std::vector<CreasedVertex> vertices_;
-  std::vector<std::size_t> firstSample_;  ///< of each triangle
+  std::vector<std::size_t> firstSample_;  ///< number of the first one of each triangle
   std::vector<FaceSample> samples_;       ///< by triangle
   std::vector<FitCandidate> chosen_;      ///< by vertex
 };
