@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "levelset/molecules/molecule_builder.h"
@@ -125,23 +126,24 @@ constexpr std::array<std::string_view, Item::Count> kItemNames = {
     "_atom_site.cartn_x",       "_atom_site.cartn_y",        "_atom_site.cartn_z",
     "_atom_site.occupancy",     "_atom_site.b_iso_or_equiv", "_atom_site.pdbx_pdb_model_num"};
 
-/// A row of the loop of atoms.
-void addRow(const std::array<std::string_view, Item::Count>& row, std::size_t line,
-            MoleculeBuilder& builder) {
-  const auto either = [&](Item::Value first, Item::Value second) {
-    return row[first].empty() ? row[second] : row[first];
-  };
+using Row = std::vector<std::string_view>;  ///< a value for each item of a category
+
+std::string_view either(const Row& row, std::size_t first, std::size_t second) {
+  return row[first].empty() ? row[second] : row[first];
+}
+
+void addAtom(const Row& row, std::size_t line, MoleculeBuilder& builder) {
   if (!builder.beginModel(row[Item::Model].empty()
                               ? 1
                               : builder.integer(row[Item::Model], "number of a model", line)))
     return;
   AtomRecord atom;
   atom.isHetero = row[Item::Group] == "HETATM";
-  atom.name = either(Item::Atom, Item::LabelAtom);
+  atom.name = either(row, Item::Atom, Item::LabelAtom);
   atom.alternate = row[Item::Alternate];
-  atom.residue = either(Item::Residue, Item::LabelResidue);
-  atom.chain = either(Item::Chain, Item::LabelChain);
-  const std::string_view number = either(Item::Number, Item::LabelNumber);
+  atom.residue = either(row, Item::Residue, Item::LabelResidue);
+  atom.chain = either(row, Item::Chain, Item::LabelChain);
+  const std::string_view number = either(row, Item::Number, Item::LabelNumber);
   atom.number = number.empty() ? 0 : builder.integer(number, "number of a residue", line);
   atom.insertion = row[Item::Insertion];
   atom.element = row[Item::Symbol];
@@ -155,62 +157,213 @@ void addRow(const std::array<std::string_view, Item::Count>& row, std::size_t li
   builder.add(atom, line);
 }
 
+/// Columns of the loop of bonds between residues, for each of both ends. The type follows.
+struct EndItem {
+  enum Value : std::size_t {
+    Chain,
+    LabelChain,
+    Number,
+    LabelNumber,
+    Insertion,
+    Residue,
+    LabelResidue,
+    Atom,
+    Alternate,
+    Symmetry,
+    Count
+  };
+};
+constexpr std::array<std::string_view, 2 * EndItem::Count + 1> kConnectionNames = {
+    "_struct_conn.ptnr1_auth_asym_id",
+    "_struct_conn.ptnr1_label_asym_id",
+    "_struct_conn.ptnr1_auth_seq_id",
+    "_struct_conn.ptnr1_label_seq_id",
+    "_struct_conn.pdbx_ptnr1_pdb_ins_code",
+    "_struct_conn.ptnr1_auth_comp_id",
+    "_struct_conn.ptnr1_label_comp_id",
+    "_struct_conn.ptnr1_label_atom_id",
+    "_struct_conn.pdbx_ptnr1_label_alt_id",
+    "_struct_conn.ptnr1_symmetry",
+    "_struct_conn.ptnr2_auth_asym_id",
+    "_struct_conn.ptnr2_label_asym_id",
+    "_struct_conn.ptnr2_auth_seq_id",
+    "_struct_conn.ptnr2_label_seq_id",
+    "_struct_conn.pdbx_ptnr2_pdb_ins_code",
+    "_struct_conn.ptnr2_auth_comp_id",
+    "_struct_conn.ptnr2_label_comp_id",
+    "_struct_conn.ptnr2_label_atom_id",
+    "_struct_conn.pdbx_ptnr2_label_alt_id",
+    "_struct_conn.ptnr2_symmetry",
+    "_struct_conn.conn_type_id"};
+
+AtomPlace placeOf(const Row& row, std::size_t end, std::size_t line,
+                  const MoleculeBuilder& builder) {
+  const std::size_t at = end * EndItem::Count;
+  AtomPlace place;
+  place.chain = either(row, at + EndItem::Chain, at + EndItem::LabelChain);
+  place.residue = either(row, at + EndItem::Residue, at + EndItem::LabelResidue);
+  place.insertion = row[at + EndItem::Insertion];
+  place.atom = row[at + EndItem::Atom];
+  place.alternate = row[at + EndItem::Alternate];
+  const std::string_view number = either(row, at + EndItem::Number, at + EndItem::LabelNumber);
+  place.number = number.empty() ? 0 : builder.integer(number, "number of a residue", line);
+  return place;
+}
+
+/// Adds a bond, unless it is a hydrogen bond or leads to a copy of the molecule in the crystal.
+void addConnection(const Row& row, std::size_t line, MoleculeBuilder& builder) {
+  const std::string_view type = row[2 * EndItem::Count];
+  const bool isBond = isWord(type, "disulf") || isWord(type, "metalc") ||
+                      isWord(type.substr(0, 6), "covale") || type.empty();
+  if (isBond && row[EndItem::Symmetry] == row[EndItem::Count + EndItem::Symmetry])
+    builder.addBond(placeOf(row, 0, line, builder), placeOf(row, 1, line, builder));
+}
+
+constexpr std::array<std::string_view, 3> kComponentNames = {
+    "_chem_comp_bond.comp_id", "_chem_comp_bond.atom_id_1", "_chem_comp_bond.atom_id_2"};
+
+void addComponentBond(const Row& row, std::size_t, MoleculeBuilder& builder) {
+  builder.addResidueBond(row[0], row[1], row[2]);
+}
+
+/// A part of a file that is read: rows of values.
+struct Category {
+  std::string_view prefix;
+  std::span<const std::string_view> items;
+  void (*add)(const Row& row, std::size_t line, MoleculeBuilder& builder);
+};
+constexpr std::array<Category, 3> kCategories = {
+    {{"_atom_site.", kItemNames, addAtom},
+     {"_struct_conn.", kConnectionNames, addConnection},
+     {"_chem_comp_bond.", kComponentNames, addComponentBond}}};
+constexpr std::size_t kAtoms = 0;  // index of the category of atoms
+
+/// Index of the category of a name; kCategories.size(): none that is read.
+std::size_t categoryOf(std::string_view name) {
+  for (std::size_t n = 0; n < kCategories.size(); ++n)
+    if (isWord(name.substr(0, kCategories[n].prefix.size()), kCategories[n].prefix)) return n;
+  return kCategories.size();
+}
+
+/// Index of an item in its category.
+std::size_t itemOf(const Category& category, std::string_view name) {
+  return static_cast<std::size_t>(std::find_if(category.items.begin(), category.items.end(),
+                                               [&](auto item) { return isWord(name, item); }) -
+                                  category.items.begin());
+}
+
+/// Reads the atoms and bonds of the first data block that has atoms.
+class CifReader {
+ public:
+  CifReader(std::string_view text, MoleculeBuilder& builder)
+      : words_(text, builder), builder_(builder) {}
+
+  void read() {
+    hasWord_ = words_.next();
+    while (hasWord_) {
+      if (!words_.isQuoted() && isWord(words_.word(), "loop_")) {
+        readLoop();
+      } else if (words_.isName()) {
+        readItem();
+      } else {
+        if (!words_.isQuoted() && isWord(words_.word().substr(0, 5), "data_")) {
+          endBlock();
+          if (hasAtoms_) return;
+          builder_.removeBonds();
+        }
+        hasWord_ = words_.next();
+      }
+    }
+    endBlock();
+  }
+
+ private:
+  /// Rows whose items stand alone, without a loop.
+  struct Single {
+    Row row;
+    std::size_t line = 0;
+  };
+
+  void readItem() {
+    const std::size_t number = categoryOf(words_.word());
+    const std::string_view name = words_.word();
+    hasWord_ = words_.next();
+    if (number == kCategories.size() || !hasWord_) return;
+    const Category& category = kCategories[number];
+    const std::size_t item = itemOf(category, name);
+    if (item == category.items.size()) return;
+    Single& single = singles_[number];
+    single.row.resize(category.items.size());
+    single.row[item] = words_.value();
+    single.line = words_.line();
+    hasWord_ = words_.next();
+  }
+
+  /// Adds the rows without a loop. Those of a category with a loop do not count.
+  void endBlock() {
+    for (std::size_t n = 0; n < kCategories.size(); ++n) {
+      Single& single = singles_[n];
+      if (single.line == 0 || (n == kAtoms && hasAtoms_)) continue;
+      kCategories[n].add(single.row, single.line, builder_);
+      hasAtoms_ = hasAtoms_ || n == kAtoms;
+      single = {};
+    }
+  }
+
+  void readLoop() {
+    const std::size_t start = words_.line();
+    std::vector<std::string_view> names;
+    std::size_t number = kCategories.size();
+    while ((hasWord_ = words_.next()) && words_.isName()) {
+      if (isWord(words_.word(), "_atom_site_fract_x") && !hasAtoms_)
+        builder_.fail(start,
+                      "the atoms have fractional coordinates; convert them to ångström first");
+      names.push_back(words_.word());
+      number = std::min(number, categoryOf(words_.word()));
+    }
+    if (number == kCategories.size() || (number == kAtoms && hasAtoms_)) return;
+    const Category& category = kCategories[number];
+    std::vector<std::size_t> items;  // for each column its item
+    items.reserve(names.size());
+    for (const std::string_view name : names) items.push_back(itemOf(category, name));
+    if (number == kAtoms) {
+      for (const Item::Value needed : {Item::X, Item::Y, Item::Z})
+        if (std::find(items.begin(), items.end(), needed) == items.end())
+          builder_.fail(start,
+                        "the loop of atoms lacks a coordinate (_atom_site.Cartn_x, _y or _z)");
+      hasAtoms_ = true;
+    }
+    readRows(category, items);
+  }
+
+  void readRows(const Category& category, const std::vector<std::size_t>& items) {
+    Row row(category.items.size());
+    std::size_t column = 0, line = words_.line();
+    while (hasWord_ && !words_.isName() && !words_.isKeyword()) {
+      if (column == 0) line = words_.line();
+      if (items[column] < row.size()) row[items[column]] = words_.value();
+      if (++column == items.size()) {
+        category.add(row, line, builder_);
+        column = 0;
+      }
+      hasWord_ = words_.next();
+    }
+    if (column != 0)
+      builder_.fail(line, fmt::format("the last row has {} values, and the loop {} columns; the "
+                                      "file may be truncated",
+                                      column, items.size()));
+  }
+
+  Words words_;
+  MoleculeBuilder& builder_;
+  bool hasWord_ = false, hasAtoms_ = false;
+  std::array<Single, kCategories.size()> singles_;
+};
+
 }  // namespace
 
 void readCif(std::string_view text, MoleculeBuilder& builder) {
-  Words words(text, builder);
-  bool hasWord = words.next();
-  std::array<std::string_view, Item::Count> single{};  // an atom without a loop
-  std::size_t singleLine = 0;
-  while (hasWord) {
-    if (words.isQuoted() || !isWord(words.word(), "loop_")) {
-      const auto* const found =
-          words.isName() ? std::find_if(kItemNames.begin(), kItemNames.end(),
-                                        [&](auto name) { return isWord(words.word(), name); })
-                         : kItemNames.end();
-      hasWord = words.next();
-      if (found == kItemNames.end() || !hasWord) continue;
-      single[static_cast<std::size_t>(found - kItemNames.begin())] = words.value();
-      singleLine = words.line();
-      hasWord = words.next();
-      continue;
-    }
-    const std::size_t start = words.line();
-    std::vector<std::size_t> items;  // for each column its item, or Item::Count
-    bool isAtoms = false;
-    bool isFractional = false;
-    while ((hasWord = words.next()) && words.isName()) {
-      isFractional = isFractional || isWord(words.word(), "_atom_site_fract_x");
-      const auto* const found = std::find_if(kItemNames.begin(), kItemNames.end(),
-                                             [&](auto name) { return isWord(words.word(), name); });
-      items.push_back(static_cast<std::size_t>(found - kItemNames.begin()));
-      isAtoms = isAtoms || isWord(words.word().substr(0, 11), "_atom_site.");
-    }
-    if (isFractional)
-      builder.fail(start, "the atoms have fractional coordinates; convert them to ångström first");
-    if (!isAtoms) continue;
-    for (const Item::Value needed : {Item::X, Item::Y, Item::Z})
-      if (std::find(items.begin(), items.end(), needed) == items.end())
-        builder.fail(start, "the loop of atoms lacks a coordinate (_atom_site.Cartn_x, _y or _z)");
-    std::array<std::string_view, Item::Count> row{};
-    std::size_t column = 0, line = words.line();
-    while (hasWord && !words.isName() && !words.isKeyword()) {
-      if (column == 0) line = words.line();
-      if (items[column] < Item::Count) row[items[column]] = words.value();
-      if (++column == items.size()) {
-        addRow(row, line, builder);
-        column = 0;
-      }
-      hasWord = words.next();
-    }
-    if (column != 0)
-      builder.fail(line,
-                   fmt::format("the last atom has {} values, and the loop {} columns; the file "
-                               "may be truncated",
-                               column, items.size()));
-    return;
-  }
-  if (singleLine > 0) addRow(single, singleLine, builder);
+  CifReader(text, builder).read();
 }
 
 }  // namespace levelset::molecules

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <new>
@@ -36,6 +37,22 @@ std::string_view trimmed(std::string_view text) {
 
 MoleculeBuilder::MoleculeBuilder(std::string file, const ReadMoleculeOptions& options)
     : file_(std::move(file)), options_(options), model_(options.model) {}
+
+std::optional<std::int64_t> hybridNumber(std::string_view text, std::size_t width) {
+  if (text.size() != width || !std::isalpha(static_cast<unsigned char>(text[0]))) return {};
+  const bool isLower = text[0] >= 'a';
+  std::int64_t value = 0, highest = 1, decimal = 10;
+  for (std::size_t n = 1; n < width; ++n) {
+    highest *= 36;
+    decimal *= 10;
+  }
+  for (const char c : text) {
+    const bool isLetter = isLower ? c >= 'a' && c <= 'z' : c >= 'A' && c <= 'Z';
+    if (!isLetter && !(c >= '0' && c <= '9')) return {};
+    value = 36 * value + (isLetter ? c - (isLower ? 'a' : 'A') + 10 : c - '0');
+  }
+  return value - 10 * highest + decimal + (isLower ? 26 * highest : 0);
+}
 
 bool MoleculeBuilder::beginModel(int number) {
   if (model_ == 0) model_ = number;
@@ -107,12 +124,16 @@ void MoleculeBuilder::add(const AtomRecord& record, std::size_t line) {
   atom.bFactor = static_cast<float>(record.bFactor);
   atom.isHetero = record.isHetero;
   if (!record.alternate.empty()) {
+    atom.alternate = record.alternate[0];
     const auto known = alternates_.try_emplace(fmt::format("{}\n{}", atom.residue, atom.name),
                                                molecule_.atoms.size());
     if (!known.second) {
       ++dropped_;
       Atom& other = molecule_.atoms[known.first->second];
-      if (atom.occupancy > other.occupancy) other = atom;
+      if (atom.occupancy > other.occupancy) {
+        other = atom;
+        serials_[known.first->second] = record.serial;
+      }
       return;
     }
   }
@@ -125,6 +146,7 @@ void MoleculeBuilder::add(const AtomRecord& record, std::size_t line) {
   if (molecule_.atoms.size() == molecule_.atoms.capacity())
     requireMemory(3.0 * static_cast<double>(molecule_.bytes()), options_.maxMemory);
   molecule_.atoms.push_back(std::move(atom));
+  serials_.push_back(record.serial);
 }
 
 void MoleculeBuilder::endChain() {
@@ -148,8 +170,15 @@ void MoleculeBuilder::chooseResidues() {
     isAny = true;
   }
   if (!isAny) return;
-  dropped_ += static_cast<std::size_t>(std::erase_if(
-      molecule_.atoms, [&](const Atom& atom) { return isLeftOut[atom.residue] != 0; }));
+  std::size_t keptAtoms = 0;
+  for (std::size_t n = 0; n < molecule_.atoms.size(); ++n) {
+    if (isLeftOut[molecule_.atoms[n].residue]) continue;
+    if (keptAtoms != n) molecule_.atoms[keptAtoms] = std::move(molecule_.atoms[n]);
+    serials_[keptAtoms++] = serials_[n];
+  }
+  dropped_ += molecule_.atoms.size() - keptAtoms;
+  molecule_.atoms.resize(keptAtoms);
+  serials_.resize(keptAtoms);
   std::vector<std::uint32_t> numbers;
   std::vector<Residue> kept;
   for (std::size_t n = 0; n < molecule_.residues.size(); ++n) {
@@ -160,8 +189,105 @@ void MoleculeBuilder::chooseResidues() {
   for (Atom& atom : molecule_.atoms) atom.residue = numbers[atom.residue];
 }
 
+void MoleculeBuilder::removeBonds() {
+  serialBonds_.clear();
+  placeBonds_.clear();
+  residueBonds_.clear();
+}
+
+void MoleculeBuilder::keepBond(std::size_t first, std::size_t second) {
+  const char a = molecule_.atoms[first].alternate, b = molecule_.atoms[second].alternate;
+  if (first == second || (a && b && a != b)) {
+    ++lostBonds_;
+    return;
+  }
+  molecule_.bonds.push_back({static_cast<std::uint32_t>(std::min(first, second)),
+                             static_cast<std::uint32_t>(std::max(first, second))});
+}
+
+void MoleculeBuilder::resolveSerialBonds() {
+  if (serialBonds_.empty()) return;
+  constexpr std::size_t kSeveral = ~std::size_t{0};
+  std::unordered_map<std::int64_t, std::size_t> atoms;
+  for (std::size_t n = 0; n < serials_.size(); ++n) {
+    const auto known = atoms.try_emplace(serials_[n], n);
+    if (!known.second) known.first->second = kSeveral;
+  }
+  for (const auto& [first, second] : serialBonds_) {
+    const auto a = atoms.find(first), b = atoms.find(second);
+    if (first < 0 || second < 0 || a == atoms.end() || b == atoms.end() || a->second == kSeveral ||
+        b->second == kSeveral)
+      ++lostBonds_;
+    else
+      keepBond(a->second, b->second);
+  }
+}
+
+void MoleculeBuilder::resolvePlaceBonds() {
+  // The ends of the bonds by residue. Few residues have one.
+  constexpr std::size_t kNone = ~std::size_t{0};
+  std::unordered_map<std::string, std::vector<std::size_t>> ends;
+  const auto place = [&](std::size_t end) -> const AtomPlace& {
+    return placeBonds_[end / 2][end % 2];
+  };
+  for (std::size_t n = 0; n < 2 * placeBonds_.size(); ++n)
+    ends[fmt::format("{}/{} {}{}", place(n).chain, place(n).residue, place(n).number,
+                     place(n).insertion)]
+        .push_back(n);
+  if (ends.empty()) return;
+  std::vector<const std::vector<std::size_t>*> ofResidue(molecule_.residues.size(), nullptr);
+  for (std::size_t n = 0; n < ofResidue.size(); ++n)
+    if (const auto found = ends.find(molecule_.residueName(n)); found != ends.end())
+      ofResidue[n] = &found->second;
+  std::vector<std::size_t> atoms(2 * placeBonds_.size(), kNone);
+  for (std::size_t n = 0; n < molecule_.atoms.size(); ++n) {
+    const Atom& atom = molecule_.atoms[n];
+    if (!ofResidue[atom.residue]) continue;
+    for (const std::size_t end : *ofResidue[atom.residue]) {
+      const bool isOther = !place(end).alternate.empty() && atom.alternate != 0 &&
+                           place(end).alternate[0] != atom.alternate;
+      if (place(end).atom == atom.name && !isOther && atoms[end] == kNone) atoms[end] = n;
+    }
+  }
+  for (std::size_t n = 0; n < atoms.size(); n += 2) {
+    if (atoms[n] == kNone || atoms[n + 1] == kNone)
+      ++lostBonds_;
+    else
+      keepBond(atoms[n], atoms[n + 1]);
+  }
+}
+
+void MoleculeBuilder::resolveResidueBonds() {
+  if (residueBonds_.empty()) return;
+  std::vector<std::vector<std::size_t>> atoms(molecule_.residues.size());
+  for (std::size_t n = 0; n < molecule_.atoms.size(); ++n)
+    atoms[molecule_.atoms[n].residue].push_back(n);
+  for (std::size_t n = 0; n < atoms.size(); ++n) {
+    const auto found = residueBonds_.find(molecule_.residues[n].name);
+    if (found == residueBonds_.end()) continue;
+    const auto find = [&](std::string_view name) {
+      return std::find_if(atoms[n].begin(), atoms[n].end(),
+                          [&](std::size_t atom) { return molecule_.atoms[atom].name == name; });
+    };
+    for (const auto& [first, second] : found->second) {
+      const auto a = find(first), b = find(second);
+      if (a != atoms[n].end() && b != atoms[n].end()) keepBond(*a, *b);
+    }
+  }
+}
+
+void MoleculeBuilder::resolveBonds() {
+  resolveSerialBonds();
+  resolvePlaceBonds();
+  resolveResidueBonds();
+  std::vector<Bond>& bonds = molecule_.bonds;
+  std::sort(bonds.begin(), bonds.end());
+  bonds.erase(std::unique(bonds.begin(), bonds.end()), bonds.end());
+}
+
 Molecule MoleculeBuilder::finish() {
   chooseResidues();
+  resolveBonds();
   if (options_.model != 0 && !hasModel_)
     failFile(file_, fmt::format("has no model {}; choose one of its models", options_.model));
   if (molecule_.atoms.empty()) {
@@ -177,6 +303,7 @@ Molecule MoleculeBuilder::finish() {
     note(hydrogens_, "{} hydrogen atoms were left out");
     note(dropped_, "{} alternate locations of atoms were left out");
     note(guessed_, "the elements of {} atoms follow from their names");
+    note(lostBonds_, "{} records of bonds have an end that is missing, ambiguous or left out");
     note(unknown_, "{} atoms have no known element and count as carbon");
   }
   return std::move(molecule_);

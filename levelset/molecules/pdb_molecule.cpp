@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
 
 #include "levelset/molecules/molecule_builder.h"
 
@@ -28,22 +29,27 @@ std::string_view elementOfName(std::string_view name) {
   return {};
 }
 
-/// Number of a residue. Above 9999, files have numbers in base 36: A000 is 10,000 and a000
-/// 1,223,056.
 int residueNumber(std::string_view text, const MoleculeBuilder& builder, std::size_t line) {
-  const std::string_view digits = trimmed(text);
-  if (digits.size() != 4 || !std::isalpha(static_cast<unsigned char>(digits[0])))
-    return builder.integer(text, "number of a residue", line);
-  const bool isLower = digits[0] >= 'a';
-  int value = 0;
-  for (const char c : digits) {
-    const bool isLetter = isLower ? c >= 'a' && c <= 'z' : c >= 'A' && c <= 'Z';
-    if (!isLetter && !(c >= '0' && c <= '9'))
-      return builder.integer(text, "number of a residue", line);
-    value = 36 * value + (isLetter ? c - (isLower ? 'a' : 'A') + 10 : c - '0');
+  if (const auto hybrid = hybridNumber(trimmed(text), 4)) return static_cast<int>(*hybrid);
+  return builder.integer(text, "number of a residue", line);
+}
+
+/// Serial number of an atom. -1 for stars and other texts, which programs write above 99,999.
+std::int64_t serialNumber(std::string_view text) {
+  text = trimmed(text);
+  if (const auto hybrid = hybridNumber(text, 5)) return *hybrid;
+  std::int64_t value = -1;
+  const auto [next, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && next == text.data() + text.size() ? value : -1;
+}
+
+/// Adds the bonds of a record CONECT, which has a bond of a higher order several times.
+void addBondsOf(std::string_view line, MoleculeBuilder& builder) {
+  const std::int64_t first = serialNumber(columns(line, 7, 11));
+  for (std::size_t at = 12; at <= 27; at += 5) {
+    const std::string_view other = columns(line, at, at + 4);
+    if (!trimmed(other).empty()) builder.addBond(first, serialNumber(other));
   }
-  constexpr int kCube = 36 * 36 * 36;
-  return value - 10 * kCube + 10'000 + (isLower ? 26 * kCube : 0);
 }
 
 bool isBlank(std::string_view text) {
@@ -76,6 +82,7 @@ void readPdb(std::string_view text, MoleculeBuilder& builder) {
     }
     if (record == "END") break;
     if (record == "TER") builder.endChain();
+    if (record == "CONECT") addBondsOf(line, builder);
     if (record != "ATOM" && record != "HETATM") continue;
     if (!isInModel && !hasAtom) isWanted = builder.beginModel(1);
     hasAtom = true;
@@ -85,6 +92,7 @@ void readPdb(std::string_view text, MoleculeBuilder& builder) {
           number,
           fmt::format("the atom has {} columns, and its position ends at column 54", line.size()));
     AtomRecord atom;
+    atom.serial = serialNumber(columns(line, 7, 12));  // six digits reach one column farther
     atom.isHetero = record == "HETATM";
     atom.name = trimmed(columns(line, 13, 16));
     atom.alternate = trimmed(columns(line, 17, 17));

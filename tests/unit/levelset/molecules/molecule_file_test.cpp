@@ -8,6 +8,7 @@
 #include <string>
 
 #include "levelset/error.h"
+#include "levelset/molecules/molecule_model.h"
 #include "tests/support/files.h"
 
 namespace molecule_file_test {
@@ -175,6 +176,81 @@ TEST(MoleculeFile, RefusesDamage) {
   EXPECT_SAYS(says("data_x\nloop_\n_atom_site_label\n_atom_site_fract_x\nC 0.1\n", "cif"),
               "fractional");
   EXPECT_FALSE(refusal<levelset::UsageError>([] { (void)molecule(kPdb, "xyz"); }).empty());
+}
+
+// Bonds, for mutations.
+constexpr const char* kPdbBonds =
+    "CONECT    1    2    4    5\nCONECT    2    1\nCONECT    6A0000    7*****\nEND\n";
+constexpr const char* kCifBonds =
+    "loop_\n_struct_conn.conn_type_id\n_struct_conn.ptnr1_auth_asym_id\n"
+    "_struct_conn.ptnr1_auth_comp_id\n_struct_conn.ptnr1_auth_seq_id\n"
+    "_struct_conn.ptnr1_label_atom_id\n_struct_conn.ptnr2_auth_asym_id\n"
+    "_struct_conn.ptnr2_auth_comp_id\n_struct_conn.ptnr2_auth_seq_id\n"
+    "_struct_conn.ptnr2_label_atom_id\ncovale A ALA 1 N B CA 101 CA\n"
+    "loop_\n_chem_comp_bond.comp_id\n_chem_comp_bond.atom_id_1\n_chem_comp_bond.atom_id_2\n"
+    "ALA N CA\nALA CA HB1\n";
+
+/// Changes a text in one or two places.
+void mutate(std::string& text, std::mt19937& random) {
+  for (unsigned change = random() % 2 + 1; change > 0; --change) {
+    const std::size_t at = random() % text.size();
+    switch (random() % 6) {
+      case 0:
+        text[at] = static_cast<char>(random());
+        break;
+      case 1:
+        text.erase(at, random() % 20);
+        break;
+      case 2:
+        text.insert(at, text.substr(random() % text.size(), random() % 80));
+        break;
+      case 3:  // columns move
+        text.insert(at, random() % 3 + 1, ' ');
+        break;
+      case 4: {  // no atoms
+        for (const char* word : {"ATOM", "HETATM"})
+          for (std::size_t n = 0; (n = text.find(word, n)) != std::string::npos; ++n)
+            text[n] = random() % 4 ? 'X' : text[n];
+        break;
+      }
+      default:
+        text.resize(at + 1);
+    }
+  }
+}
+
+TEST(MoleculeFile, SurvivesThreeHundredMutationsWithBonds) {
+  std::mt19937 random(2);
+  int read = 0, refused = 0;
+  for (int n = 0; n < 300; ++n) {
+    const bool isCif = n % 2;
+    std::string text = kPdb;
+    text = isCif ? std::string(kCif) + kCifBonds : text.substr(0, text.find("END\n")) + kPdbBonds;
+    mutate(text, random);
+    try {
+      const Molecule result = molecule(text, isCif ? "cif" : "pdb");
+      ASSERT_FALSE(result.atoms.empty());
+      for (const levelset::Atom& atom : result.atoms) {
+        ASSERT_LT(atom.residue, result.residues.size());
+        ASSERT_LT(result.residues[atom.residue].chain, result.chains.size());
+        EXPECT_TRUE(std::isfinite(atom.position.length()));
+      }
+      for (const auto& [first, second] : result.bonds) {
+        EXPECT_LT(first, second);
+        ASSERT_LT(second, result.atoms.size());
+      }
+      const levelset::MoleculeModel model = levelset::moleculeModel(result);
+      EXPECT_EQ(model.balls.size(), result.atoms.size());
+      EXPECT_GE(model.sticks.size(), 2 * result.bonds.size());
+      ++read;
+    } catch (const levelset::Error& error) {
+      // A sentence that names the file.
+      EXPECT_NE(std::string(error.what()).find("molecule."), std::string::npos) << error.what();
+      ++refused;
+    }
+  }
+  EXPECT_GT(read, 100);
+  EXPECT_GT(refused, 60);
 }
 
 TEST(MoleculeFile, SurvivesThreeHundredMutations) {
