@@ -273,6 +273,33 @@ bool isCovered(const std::vector<Ball>& balls, const BallLists& overlaps, std::u
   return false;
 }
 
+void addArc(const Ball& own, std::uint32_t ball, const ExposedArc& arc, const V3d& pole,
+            double& sum, V3d& normal) {
+  // Area of a region of the unit sphere: the integral of (x dy − y dx) / (1 + z) along its border,
+  // if −z is outside the region.
+  const V3d across = anyPerpendicular(pole), other = pole.cross(across);
+  static const GaussRule<kNodes> rule;
+  // The exposed part is on the left of the border: beyond the circle, as seen from this ball.
+  const double sense = arc.first == ball ? -1 : 1;
+  const auto pieces = static_cast<int>(std::ceil(arc.half / 0.5));
+  const double width = arc.half / pieces;
+  for (int n = 0; n < pieces; ++n) {
+    const double middle = (2 * n + 1) * width - arc.half;
+    for (std::size_t k = 0; k < kNodes; ++k) {
+      const double t = middle + width * (2 * rule.at[k] - 1);
+      const double scale = 2 * sense * width * rule.weight[k];
+      const V3d radial = arc.u * std::cos(t) + arc.v * std::sin(t);
+      const V3d at = arc.centre - own.centre + radial * arc.radius;
+      const V3d step = arc.w.cross(radial) * (arc.radius * scale);
+      const double x = at.dot(across), y = at.dot(other), z = at.dot(pole);
+      // Beside a tiny cap, radius + z cancels.
+      const double below = z < 0 ? (x * x + y * y) / (own.radius - z) : own.radius + z;
+      sum += (x * step.dot(other) - y * step.dot(across)) / below;
+      normal += at.cross(step) * 0.5;
+    }
+  }
+}
+
 ExposedPart exposedPart(const std::vector<Ball>& balls, const BallLists& overlaps,
                         std::uint32_t ball, const std::vector<const ExposedArc*>& arcs) {
   const Ball& own = balls[ball];
@@ -282,34 +309,11 @@ ExposedPart exposedPart(const std::vector<Ball>& balls, const BallLists& overlap
       part.area = 4 * std::numbers::pi * own.radius * own.radius;
     return part;
   }
-  // Area of a region of the unit sphere: the integral of (x dy − y dx) / (1 + z) along its border,
-  // if −z is outside the region. The centre of the largest cap is.
+  // The centre of the largest cap is not exposed.
   const V3d pole = (own.centre - balls[*overlaps.begin(ball)].centre).normalized();
-  const V3d across = anyPerpendicular(pole), other = pole.cross(across);
-  static const GaussRule<kNodes> rule;
   double sum = 0;
   V3d normal(0);
-  for (const ExposedArc* arc : arcs) {
-    // The exposed part is on the left of the border: beyond the circle, as seen from this ball.
-    const double sense = arc->first == ball ? -1 : 1;
-    const auto pieces = static_cast<int>(std::ceil(arc->half / 0.5));
-    const double width = arc->half / pieces;
-    for (int n = 0; n < pieces; ++n) {
-      const double middle = (2 * n + 1) * width - arc->half;
-      for (std::size_t k = 0; k < kNodes; ++k) {
-        const double t = middle + width * (2 * rule.at[k] - 1);
-        const double scale = 2 * sense * width * rule.weight[k];
-        const V3d radial = arc->u * std::cos(t) + arc->v * std::sin(t);
-        const V3d at = arc->centre - own.centre + radial * arc->radius;
-        const V3d step = arc->w.cross(radial) * (arc->radius * scale);
-        const double x = at.dot(across), y = at.dot(other), z = at.dot(pole);
-        // Beside a tiny cap, radius + z cancels.
-        const double below = z < 0 ? (x * x + y * y) / (own.radius - z) : own.radius + z;
-        sum += (x * step.dot(other) - y * step.dot(across)) / below;
-        normal += at.cross(step) * 0.5;
-      }
-    }
-  }
+  for (const ExposedArc* arc : arcs) addArc(own, ball, *arc, pole, sum, normal);
   part.area = std::clamp(sum * own.radius, 0.0, 4 * std::numbers::pi * own.radius * own.radius);
   part.normal = normal;
   return part;

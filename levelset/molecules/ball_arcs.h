@@ -52,4 +52,21 @@ struct ExposedPart {
                                       std::uint32_t ball,
                                       const std::vector<const ExposedArc*>& arcs);
 
+/// Adds the integrals along an arc that give the exposed part of the sphere of a ball.
+/// @param pole  unit vector. −pole, seen from the centre, is outside the part
+void addArc(const Ball& own, std::uint32_t ball, const ExposedArc& arc, const Imath::V3d& pole,
+            double& sum, Imath::V3d& normal);
+
+/// Volume of each ball within its cell of the power diagram, world units³. The cells divide the
+/// union.
+[[nodiscard]] std::vector<double> powerVolumes(const std::vector<Ball>& balls,
+                                               const BallLists& overlaps,
+                                               const std::vector<double>& areas);
+
+/// Finds the connected pieces of the boundary of a union.
+[[nodiscard]] std::vector<BallUnion::Boundary> boundariesOf(const std::vector<Ball>& balls,
+                                                            const std::vector<char>& isHidden,
+                                                            const BallLists& overlaps,
+                                                            const std::vector<ExposedArc>& arcs);
+
 }  // namespace levelset

@@ -516,6 +516,14 @@ BallUnion::Exposure BallUnion::exposure() const {
   return exposure;
 }
 
+std::vector<double> BallUnion::volumes() const {
+  return powerVolumes(data_->balls, data_->overlaps, exposure().areas);
+}
+
+std::vector<BallUnion::Boundary> BallUnion::boundaries() const {
+  return boundariesOf(data_->balls, data_->isHidden, data_->overlaps, data_->arcs);
+}
+
 std::size_t BallUnion::bytes() const {
   return data_->tree.bytes() + sizeof(BallGroup) * data_->groups.capacity() +
          sizeof(ExposedArc) * data_->arcs.capacity() + sizeof(Ball) * data_->balls.capacity() +

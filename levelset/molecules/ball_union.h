@@ -79,6 +79,20 @@ class BallUnion {
     double volume = 0;  ///< volume of the union, world units³
   };
   [[nodiscard]] Exposure exposure() const;
+  /// Volume of each given ball within its cell of the power diagram of the balls, world units³. The
+  /// cells divide the union, so the sum is its volume. Balls inside another ball have none.
+  [[nodiscard]] std::vector<double> volumes() const;
+  /// A connected piece of the boundary.
+  struct Boundary {
+    double area = 0;  ///< world units²
+    /// Volume that the piece encloses, world units³: positive for an outer boundary, negative for
+    /// that of a cavity. Balls that float in a cavity have boundaries of their own.
+    double volume = 0;
+    std::vector<std::uint32_t> balls = {};  ///< balls whose spheres form the piece, sorted
+  };
+  /// Connected pieces of the boundary, in the order of their first arcs; spheres without arcs
+  /// follow. The volumes add up to that of the union.
+  [[nodiscard]] std::vector<Boundary> boundaries() const;
   /// Memory, bytes.
   [[nodiscard]] std::size_t bytes() const;
 

@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <set>
 #include <utility>
 
 #include "levelset/error.h"
+#include "levelset/geometry/surface_components.h"
+#include "levelset/meshing/band_to_mesh.h"
 #include "levelset/molecules/ball_union.h"
 #include "levelset/molecules/excluded_surface.h"
 #include "levelset/shapes/shape_band_vdb.h"
@@ -18,6 +21,41 @@ namespace {
 // Blocks of 8³ voxels are left out if their centre is farther from the surface than the half width
 // and half of their diagonal. So distances must be known up to there.
 constexpr double kBlockVoxels = 7;
+
+/// Cavities of a union of balls.
+std::vector<MoleculeCavity> cavitiesOf(const BallUnion& all) {
+  std::vector<MoleculeCavity> cavities;
+  for (BallUnion::Boundary& boundary : all.boundaries())
+    if (boundary.volume < 0)
+      cavities.push_back({-boundary.volume, boundary.area, std::move(boundary.balls)});
+  return cavities;
+}
+
+/// Cavities of an excluded solid, by its mesh. The atoms are those whose spheres or arcs are
+/// closest.
+std::vector<MoleculeCavity> cavitiesOf(const NarrowBand& band, const BallUnion& accessible) {
+  const TriMesh mesh = bandToMesh(band);
+  const SurfaceComponents pieces = findSurfaceComponents(mesh.positions, mesh.triangles);
+  std::vector<std::set<std::uint32_t>> atoms(pieces.figures.size());
+  for (std::size_t n = 0; n < mesh.positions.size(); ++n) {
+    const std::uint32_t piece = pieces.componentOfVertex[n];
+    if (piece == SurfaceComponents::kNoComponent || pieces.figures[piece].volume >= 0) continue;
+    const BallUnion::Foot foot = accessible.closest(mesh.positions[n]);
+    if (!foot.isExact) continue;
+    if (foot.isOnArc) {
+      atoms[piece].insert(accessible.arcs()[foot.feature].first);
+      atoms[piece].insert(accessible.arcs()[foot.feature].second);
+    } else {
+      atoms[piece].insert(foot.feature);
+    }
+  }
+  std::vector<MoleculeCavity> cavities;
+  for (std::size_t n = 0; n < atoms.size(); ++n)
+    if (pieces.figures[n].volume < 0)
+      cavities.push_back(
+          {-pieces.figures[n].volume, pieces.figures[n].area, {atoms[n].begin(), atoms[n].end()}});
+  return cavities;
+}
 
 }  // namespace
 
@@ -60,6 +98,12 @@ MoleculeSurfaceResult moleculeSurface(const Molecule& molecule, double voxelSize
   } else {
     result.band =
         makeShape(extent, voxelSize, shape, [&](const Imath::V3d& p) { return all.distance(p); });
+  }
+  if (options.volumes) result.volumes = all.volumes();
+  if (options.cavities) {
+    result.cavities = isExcluded ? cavitiesOf(result.band, all) : cavitiesOf(all);
+    std::stable_sort(result.cavities.begin(), result.cavities.end(),
+                     [](const auto& a, const auto& b) { return a.volume > b.volume; });
   }
   return result;
 }

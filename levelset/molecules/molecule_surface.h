@@ -18,10 +18,20 @@ enum class MoleculeSurface {
 
 struct MoleculeSurfaceOptions {
   MoleculeSurface kind = MoleculeSurface::Excluded;
-  double probe = 1.4;    ///< radius of the probe, Å, positive; van der Waals surfaces ignore it
-  double halfWidth = 3;  ///< half width of the band, voxels, at least 1
+  double probe = 1.4;     ///< radius of the probe, Å, positive; van der Waals surfaces ignore it
+  double halfWidth = 3;   ///< half width of the band, voxels, at least 1
+  bool volumes = false;   ///< true: divides the volume among the atoms
+  bool cavities = false;  ///< true: lists the cavities
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
+};
+
+/// A void inside a molecule that its surface encloses.
+struct MoleculeCavity {
+  /// Å³ and Å². Exact for the van der Waals and the accessible surface; those of the mesh of the
+  /// band for the excluded one. Atoms that float in the cavity are not subtracted.
+  double volume = 0, area = 0;
+  std::vector<std::uint32_t> atoms = {};  ///< atoms that bound it, sorted
 };
 
 struct MoleculeSurfaceResult {
@@ -31,6 +41,9 @@ struct MoleculeSurfaceResult {
   std::vector<double> areas;
   /// Exact volume of the union of those spheres' balls, Å³.
   double volume = 0;
+  /// The part of that volume for each atom: its ball within its cell of the power diagram, Å³.
+  std::vector<double> volumes = {};
+  std::vector<MoleculeCavity> cavities = {};  ///< the largest first
   /// Number of distances beside edges of an excluded surface that are lower bounds, since many
   /// probes meet there.
   std::size_t unfinished = 0;
@@ -44,7 +57,7 @@ struct MoleculeSurfaceResult {
 [[nodiscard]] MoleculeSurfaceResult moleculeSurface(const Molecule& molecule, double voxelSize,
                                                     const MoleculeSurfaceOptions& options = {});
 
-/// Sums of the areas of atoms over their residues. @param areas  one for each atom
+/// Sums of areas or volumes of atoms over their residues. @param areas  one for each atom
 [[nodiscard]] std::vector<double> residueAreas(const Molecule& molecule,
                                                const std::vector<double>& areas);
 

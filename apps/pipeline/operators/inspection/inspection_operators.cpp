@@ -212,6 +212,7 @@ void addMolecule(Json& json, const levelset::Molecule& molecule) {
   json["atoms"] = molecule.atoms.size();
   json["residues"] = molecule.residues.size();
   json["chains"] = molecule.chains;
+  json["file_bonds"] = molecule.bonds.size();
   std::map<int, std::size_t> counts;
   for (const levelset::Atom& atom : molecule.atoms) ++counts[atom.element];
   Json& elements = json["elements"] = Json::object();

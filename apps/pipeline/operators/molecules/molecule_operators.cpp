@@ -45,8 +45,10 @@ std::string residueFields(const Molecule& molecule, std::size_t residue) {
                      of.number, areaField(of.insertion));
 }
 
-std::string atomTable(const Molecule& molecule, const std::vector<double>& areas) {
-  std::string text = "chain,residue,number,atom,element,x,y,z,area\n";
+/// Table of a quantity for each atom. @param name  its name, the heading of the last column
+std::string atomTable(const Molecule& molecule, const std::vector<double>& areas,
+                      const char* name) {
+  std::string text = fmt::format("chain,residue,number,atom,element,x,y,z,{}\n", name);
   for (std::size_t n = 0; n < areas.size(); ++n) {
     const levelset::Atom& atom = molecule.atoms[n];
     text += fmt::format("{},{},{},{},{},{},{:.6g}\n", residueFields(molecule, atom.residue),
@@ -56,12 +58,52 @@ std::string atomTable(const Molecule& molecule, const std::vector<double>& areas
   return text;
 }
 
-std::string residueTable(const Molecule& molecule, const std::vector<double>& areas) {
-  std::string text = "chain,residue,number,area\n";
+std::string residueTable(const Molecule& molecule, const std::vector<double>& areas,
+                         const char* name) {
+  std::string text = fmt::format("chain,residue,number,{}\n", name);
   const std::vector<double> sums = residueAreas(molecule, areas);
   for (std::size_t n = 0; n < sums.size(); ++n)
     text += fmt::format("{},{:.6g}\n", residueFields(molecule, n), sums[n]);
   return text;
+}
+
+/// Table of the cavities, with the atoms that bound them.
+std::string cavityTable(const Molecule& molecule,
+                        const std::vector<levelset::MoleculeCavity>& cavities) {
+  std::string text = "cavity,volume,area,atoms\n";
+  for (std::size_t n = 0; n < cavities.size(); ++n) {
+    std::string atoms;
+    for (const std::uint32_t index : cavities[n].atoms) {
+      const levelset::Atom& atom = molecule.atoms[index];
+      atoms += fmt::format("{}{} {}", atoms.empty() ? "" : "; ", molecule.residueName(atom.residue),
+                           atom.name);
+    }
+    text += fmt::format("{},{:.6g},{:.6g},{}\n", n + 1, cavities[n].volume, cavities[n].area,
+                        areaField(atoms));
+  }
+  return text;
+}
+
+Json cavityList(const std::vector<levelset::MoleculeCavity>& cavities) {
+  Json list = Json::array();
+  for (const levelset::MoleculeCavity& cavity : cavities)
+    list.push_back(
+        {{"volume", cavity.volume}, {"area", cavity.area}, {"atoms", cavity.atoms.size()}});
+  return list;
+}
+
+/// Writes the tables that the options ask for.
+void writeTables(Invocation& in, const Molecule& molecule,
+                 const levelset::MoleculeSurfaceResult& result) {
+  const auto write = [&](const char* option, const auto& text) {
+    if (in.given(option))
+      writeText(in.text(option), text(), fmt::format("molecule-surface: --{}", option));
+  };
+  write("areas", [&] { return atomTable(molecule, result.areas, "area"); });
+  write("residue-areas", [&] { return residueTable(molecule, result.areas, "area"); });
+  write("volumes", [&] { return atomTable(molecule, result.volumes, "volume"); });
+  write("residue-volumes", [&] { return residueTable(molecule, result.volumes, "volume"); });
+  write("cavities", [&] { return cavityTable(molecule, result.cavities); });
 }
 
 /// Bounds of the solid, Å.
@@ -84,6 +126,8 @@ Value runMoleculeSurface(Invocation& in) {
                                 {.kind = kind,
                                  .probe = in.length("probe"),
                                  .halfWidth = in.number("half-width"),
+                                 .volumes = in.given("volumes") || in.given("residue-volumes"),
+                                 .cavities = in.given("cavities"),
                                  .maxMemory = in.maxMemory,
                                  .progress = in.progress});
   double area = 0;
@@ -94,14 +138,14 @@ Value runMoleculeSurface(Invocation& in) {
   }
   const levelset::Topology found = levelset::topology(result.band);
   const bool isOfAtoms = kind == MoleculeSurface::VanDerWaals;
-  in.notes.detailsJson = Json{
-      {"atoms", molecule.atoms.size()},
-      {"exposed_atoms", exposed},
-      {isOfAtoms ? "vdw_area" : "accessible_area", area},
-      {isOfAtoms ? "vdw_volume" : "accessible_volume", result.volume},
-      {"components", found.components},
-      {"cavities",
-       found.cavities}}.dump();
+  Json details{{"atoms", molecule.atoms.size()},
+               {"exposed_atoms", exposed},
+               {isOfAtoms ? "vdw_area" : "accessible_area", area},
+               {isOfAtoms ? "vdw_volume" : "accessible_volume", result.volume},
+               {"components", found.components},
+               {"cavities", found.cavities}};
+  if (in.given("cavities")) details["cavity_list"] = cavityList(result.cavities);
+  in.notes.detailsJson = details.dump();
   in.notes.notes.push_back(fmt::format(
       "molecule-surface: {} of {} atoms reach the {} surface, whose exact area is {:.6g} Å² and "
       "volume {:.6g} Å³; {} cavities",
@@ -112,11 +156,7 @@ Value runMoleculeSurface(Invocation& in) {
         fmt::format("molecule-surface: {} distances outside, beside edges where many probes meet, "
                     "are lower bounds",
                     result.unfinished));
-  if (in.given("areas"))
-    writeText(in.text("areas"), atomTable(molecule, result.areas), "molecule-surface: --areas");
-  if (in.given("residue-areas"))
-    writeText(in.text("residue-areas"), residueTable(molecule, result.areas),
-              "molecule-surface: --residue-areas");
+  writeTables(in, molecule, result);
   return Value(result.band);
 }
 
@@ -148,7 +188,7 @@ void validateMoleculeSurface(const Invocation& in) {
 
 std::vector<std::string> areaFilesOf(const Invocation& in) {
   std::vector<std::string> targets;
-  for (const char* name : {"areas", "residue-areas"})
+  for (const char* name : {"areas", "residue-areas", "volumes", "residue-volumes", "cavities"})
     if (in.given(name)) targets.push_back(in.text(name));
   return targets;
 }
@@ -192,7 +232,19 @@ Operator moleculeSurfaceOperator() {
                       "CSV file"},
                  {.name = "residue-areas",
                   .type = ParamType::Path,
-                  .doc = "write the sums of these areas over residues to this CSV file"}},
+                  .doc = "write the sums of these areas over residues to this CSV file"},
+                 {.name = "volumes",
+                  .type = ParamType::Path,
+                  .doc =
+                      "write the exact volume of the ball of each atom, within its cell of the "
+                      "power diagram, to this CSV file; they add up to the volume of the report"},
+                 {.name = "residue-volumes",
+                  .type = ParamType::Path,
+                  .doc = "write the sums of these volumes over residues to this CSV file"},
+                 {.name = "cavities",
+                  .type = ParamType::Path,
+                  .doc = "write volume, area and atoms of each cavity to this CSV file; exact for "
+                         "vdw and accessible, those of the mesh for excluded"}},
       .operands = {{Kind::Molecule}},
       .resultKind = [](const Invocation&) { return Kind::Band; },
       .run = runMoleculeSurface,

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <random>
 
+#include "levelset/components/components.h"
 #include "levelset/error.h"
 #include "levelset/inspect/measure.h"
 #include "levelset/meshing/band_to_mesh.h"
@@ -136,6 +137,53 @@ TEST(MoleculeSurface, AddsTheAreasOfResidues) {
   ASSERT_EQ(sums.size(), 2u);
   EXPECT_GT(sums[0], 0);
   EXPECT_NEAR(sums[0] + sums[1], all, 1e-10);
+}
+
+TEST(MoleculeSurface, DividesItsVolumeAmongTheAtoms) {
+  const Molecule molecule = chain(60);
+  for (const auto kind : {MoleculeSurface::VanDerWaals, MoleculeSurface::Excluded}) {
+    const MoleculeSurfaceResult result =
+        moleculeSurface(molecule, 0.5, {.kind = kind, .volumes = true});
+    double sum = 0;
+    for (const double volume : result.volumes) {
+      EXPECT_GE(volume, 0);
+      sum += volume;
+    }
+    EXPECT_NEAR(sum / result.volume, 1, 1e-10);
+    const std::vector<double> residues = residueAreas(molecule, result.volumes);
+    EXPECT_NEAR((residues[0] + residues[1]) / sum, 1, 1e-12);
+  }
+}
+
+/// Carbon atoms on a sphere of 6 Å.
+Molecule hollowMolecule() {
+  Molecule molecule{.residues = {{"UNK", 1, "", 0}}, .chains = {"A"}};
+  constexpr int kCount = 120;
+  for (int n = 0; n < kCount; ++n) {
+    const double z = (2 * n + 1.0) / kCount - 1, ring = std::sqrt(1 - z * z), angle = 2.399963 * n;
+    molecule.atoms.push_back(
+        {.position = V3d(ring * std::cos(angle), ring * std::sin(angle), z) * 6, .element = 6});
+  }
+  return molecule;
+}
+
+TEST(MoleculeSurface, ListsItsCavities) {
+  const Molecule molecule = hollowMolecule();
+  for (const auto kind :
+       {MoleculeSurface::VanDerWaals, MoleculeSurface::Accessible, MoleculeSurface::Excluded}) {
+    const MoleculeSurfaceResult result =
+        moleculeSurface(molecule, 0.2, {.kind = kind, .cavities = true});
+    ASSERT_EQ(result.cavities.size(), 1u);
+    EXPECT_EQ(result.cavities[0].atoms.size(), 120u);
+    // The mesh of the band without and with the cavity.
+    const auto hollow = measure(bandToMesh(result.band)),
+               filled = measure(bandToMesh(fillCavities(result.band)));
+    EXPECT_NEAR((filled.volume - hollow.volume) / result.cavities[0].volume, 1, measured(6e-3));
+    EXPECT_NEAR((hollow.area - filled.area) / result.cavities[0].area, 1, measured(1e-2));
+    EXPECT_GT(result.cavities[0].volume, kind == MoleculeSurface::Accessible ? 90 : 250);
+  }
+  EXPECT_TRUE(moleculeSurface(molecule, 0.5, {}).cavities.empty());
+  EXPECT_TRUE(moleculeSurface(chain(20), 0.5, {.cavities = true}).cavities.empty());
 }
 
 TEST(MoleculeSurface, Refuses) {
