@@ -23,6 +23,7 @@
 #include "levelset/hamilton_jacobi/pde_redistance.h"
 #include "levelset/offset/morphology.h"
 #include "levelset/shapes/shapes.h"
+#include "levelset/shapes/superquadric.h"
 
 namespace pipeline {
 
@@ -35,6 +36,8 @@ std::vector<Operator> allOperators() {
       levelSetOperator<levelset::TorusOperator>(),
       levelSetOperator<levelset::CylinderOperator>(),
       levelSetOperator<levelset::CapsuleOperator>(),
+      levelSetOperator<levelset::SuperquadricOperator>(),
+      levelSetOperator<levelset::SupershapeOperator>(),
       conversionOperator(),
       toBandOperator(),
       levelSetOperator<levelset::SurfaceBandOperator>(),
@@ -51,6 +54,7 @@ std::vector<Operator> allOperators() {
       outliersOperator(),
       meshPointsOperator(),
       moleculeSurfaceOperator(),
+      moleculeModelOperator(),
       thinOperator(),
       unionWithSegmentations(unionOperator()),
       intersectionOperator(),

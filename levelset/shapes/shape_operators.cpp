@@ -4,6 +4,7 @@
 
 #include "levelset/error.h"
 #include "levelset/shapes/shapes.h"
+#include "levelset/shapes/superquadric.h"
 
 namespace levelset {
 namespace {
@@ -61,6 +62,8 @@ template struct ShapeOperator<BoxShape>;
 template struct ShapeOperator<TorusShape>;
 template struct ShapeOperator<CylinderShape>;
 template struct ShapeOperator<CapsuleShape>;
+template struct ShapeOperator<SuperquadricShape>;
+template struct ShapeOperator<SupershapeShape>;
 
 ShapeExtent SphereShape::extent() const {
   return sphereExtent(radius, center);

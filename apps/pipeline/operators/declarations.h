@@ -46,6 +46,7 @@ namespace pipeline {
 [[nodiscard]] Operator outliersOperator();
 [[nodiscard]] Operator meshPointsOperator();
 [[nodiscard]] Operator moleculeSurfaceOperator();
+[[nodiscard]] Operator moleculeModelOperator();
 [[nodiscard]] Operator thinOperator();
 [[nodiscard]] Operator conversionOperator();
 [[nodiscard]] Operator transformOperator();

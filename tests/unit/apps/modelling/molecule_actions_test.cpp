@@ -87,6 +87,53 @@ TEST_F(MoleculeActions, AreasAreWrittenByAtomAndResidue) {
   EXPECT_NEAR(std::stod(line.substr(line.rfind(',') + 1)), 4 * pi * 3.15 * 3.15, 1e-3);
 }
 
+TEST_F(MoleculeActions, VolumesAndCavitiesAreWritten) {
+  ASSERT_EQ(levelsmith("--report r.json read a.pdb ! molecule-surface --kind vdw --voxel 0.4 "
+                       "--volumes v.csv --residue-volumes rv.csv --cavities c.csv")
+                .code,
+            0);
+  const Json report = Json::parse(support::readText(folder_ / "r.json"));
+  double sum = 0;
+  std::istringstream atoms(support::readText(folder_ / "v.csv"));
+  std::string line;
+  std::getline(atoms, line);
+  EXPECT_EQ(line, "chain,residue,number,atom,element,x,y,z,volume");
+  while (std::getline(atoms, line)) sum += std::stod(line.substr(line.rfind(',') + 1));
+  EXPECT_NEAR(sum, report["steps"][1]["details"]["vdw_volume"].get<double>(), 3e-4);
+  EXPECT_EQ(report["steps"][1]["details"]["cavity_list"], Json::array());
+  EXPECT_EQ(support::readText(folder_ / "c.csv"), "cavity,volume,area,atoms\n");
+  std::istringstream residues(support::readText(folder_ / "rv.csv"));
+  std::getline(residues, line);
+  EXPECT_EQ(line, "chain,residue,number,volume");
+}
+
+TEST_F(MoleculeActions, MoleculeModelMakesBallsAndSticks) {
+  writeFile("b.pdb",
+            "ATOM      1  C1  LIG A   1       0.000   0.000   0.000  1.00  5.00           C\n"
+            "ATOM      2  C2  LIG A   1       1.500   0.000   0.000  1.00  5.00           C\n"
+            "ATOM      3  C3  LIG A   1       5.500   0.000   0.000  1.00  5.00           C\n"
+            "CONECT    2    3\n");
+  const auto components = [&](const std::string& options) {
+    const std::string voxel = options.find("voxel") == std::string::npos ? " --voxel 0.05 " : " ";
+    return json("read b.pdb ! molecule-model" + voxel + options +
+                " ! measure --json")["components"];
+  };
+  EXPECT_EQ(components(""), 1);
+  EXPECT_EQ(components("--file-bonds"), 2);
+  EXPECT_EQ(components("--style balls"), 3);
+  EXPECT_EQ(components("--style van-der-waals --voxel 0.2"), 2);
+  EXPECT_EQ(json("read b.pdb ! info --json")["file_bonds"], 1);
+  ASSERT_EQ(
+      levelsmith("--report r.json read b.pdb ! molecule-model --style sticks --voxel 0.05").code,
+      0);
+  const Json details = Json::parse(support::readText(folder_ / "r.json"))["steps"][1]["details"];
+  EXPECT_EQ(details, (Json{{"balls", 3}, {"bonds", 2}}));
+  expectRefusal("read b.pdb ! molecule-model", 2, "voxel");
+  expectRefusal("read b.pdb ! molecule-model --voxel 0.1 --ball-scale 2", 2, "scale");
+  expectRefusal("read b.pdb ! molecule-model --voxel 0.1 --style balls --stick-radius 1", 2,
+                "--stick-radius");
+}
+
 TEST_F(MoleculeActions, OtherActionsRefuseMolecules) {
   expectRefusal("read a.pdb ! measure", 2, "molecule");
   expectRefusal("read a.pdb ! write b.ply", 2, "molecule-surface");

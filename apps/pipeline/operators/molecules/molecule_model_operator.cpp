@@ -1,0 +1,139 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <string>
+
+#include "apps/pipeline/operators/common.h"
+#include "apps/pipeline/operators/declarations.h"
+#include "apps/pipeline/operators/json_output.h"
+#include "apps/pipeline/registry/invocation.h"
+#include "levelset/error.h"
+#include "levelset/molecules/solids/molecule_solid.h"
+
+namespace pipeline {
+namespace {
+
+using levelset::MoleculeModelOptions;
+using levelset::MoleculeStyle;
+using levelset::UsageError;
+
+MoleculeStyle modelStyleOf(const Invocation& in) {
+  const std::string word = in.text("style");
+  if (word == "balls") return MoleculeStyle::Balls;
+  if (word == "sticks") return MoleculeStyle::Sticks;
+  return word == "van-der-waals" ? MoleculeStyle::VanDerWaals : MoleculeStyle::BallAndStick;
+}
+
+MoleculeModelOptions modelOptionsOf(Invocation& in) {
+  return {.style = modelStyleOf(in),
+          .ballScale = in.number("ball-scale"),
+          .stickRadius = in.length("stick-radius"),
+          .bonds = {.isByDistance = !in.flag("file-bonds")},
+          .maxMemory = in.maxMemory};
+}
+
+/// Bounds of the solid, Å, or larger ones. Small balls reach less far than those that a molecule
+/// has.
+Imath::Box3d modelBoundsOf(Invocation& in) {
+  return in.operands[0].plan().bounds;
+}
+
+double modelVoxelOf(Invocation& in) {
+  const Imath::V3d size = modelBoundsOf(in).size();
+  return in.voxelSize(std::max({size.x, size.y, size.z}));
+}
+
+Value runMoleculeModel(Invocation& in) {
+  const levelset::Molecule& molecule = in.operands[0].molecule();
+  const levelset::MoleculeSolidResult result = levelset::moleculeSolid(
+      molecule, modelVoxelOf(in), modelOptionsOf(in),
+      {.halfWidth = in.number("half-width"), .maxMemory = in.maxMemory, .progress = in.progress});
+  Json details{{"balls", result.balls}, {"bonds", result.bonds}};
+  if (!levelset::hasMoleculeSticks(modelStyleOf(in))) details["volume"] = result.volume;
+  in.notes.detailsJson = details.dump();
+  in.notes.notes.push_back(
+      fmt::format("molecule-model: {} balls and {} bonds", result.balls, result.bonds));
+  return Value(result.band);
+}
+
+Plan planMoleculeModel(Invocation& in) {
+  const double atoms = in.operands[0].plan().points;
+  Plan plan{.kind = Kind::Band};
+  plan.bounds = modelBoundsOf(in);
+  plan.voxelSize = modelVoxelOf(in);
+  plan.halfWidth = in.number("half-width");
+  // Å². Balls of a quarter of the van der Waals radius have about 2, and a stick for each atom 1.
+  plan.area = (modelStyleOf(in) == MoleculeStyle::VanDerWaals ? 10 : 3) * atoms + 30;
+  return plan;
+}
+
+std::optional<Cost> costOfMoleculeModel(Invocation& in) {
+  const double atoms = in.operands[0].plan().points;
+  if (!(atoms > 0) || !in.planned) return std::nullopt;
+  const double samples = 14 * in.planned->estimate().layer();
+  return Cost{2e-4 * atoms + 2e-6 * samples, 20'000 * atoms + 20 * samples};
+}
+
+void validateMoleculeModel(const Invocation& in) {
+  requireVoxelSize(in);
+  const MoleculeStyle style = modelStyleOf(in);
+  const auto refuse = [&](const char* option, bool isUsed) {
+    if (in.given(option) && !isUsed)
+      throw UsageError(
+          fmt::format("molecule-model: --{} does not apply to --style {}; leave it out", option,
+                      in.text("style")));
+  };
+  refuse("ball-scale", style == MoleculeStyle::Balls || style == MoleculeStyle::BallAndStick);
+  refuse("stick-radius", levelset::hasMoleculeSticks(style));
+}
+
+}  // namespace
+
+Operator moleculeModelOperator() {
+  return {
+      .name = "molecule-model",
+      .group = "Molecules",
+      .summary = "turn a molecule into a solid of balls and sticks",
+      .details =
+          "--style balls has a small ball for each atom, sticks a stick for each bond, "
+          "ball-and-stick both, and van-der-waals a ball of the van der Waals radius for each "
+          "atom. "
+          "Bonds are those that the file gives and those by distance: two atoms are bonded if they "
+          "are at most 0.45 Å farther apart than the sum of their covalent radii. Lengths are in "
+          "ångström. The distances are exact on both sides. Scale the result for a print.",
+      .example =
+          "levelsmith read protein.pdb ! molecule-model --voxel 0.05 ! mesh ! write model.stl",
+      .params = {{.name = "style",
+                  .type = ParamType::Choice,
+                  .doc = "parts of the solid",
+                  .fallback = "ball-and-stick",
+                  .choices = {"balls", "sticks", "ball-and-stick", "van-der-waals"}},
+                 {.name = "ball-scale",
+                  .type = ParamType::Number,
+                  .doc =
+                      "radius of small balls, as a share of the van der Waals radius, at most 1; "
+                      "no ball is thinner than a stick",
+                  .fallback = "0.25",
+                  .range = Range::Positive},
+                 {.name = "stick-radius",
+                  .type = ParamType::Length,
+                  .doc = "radius of the sticks",
+                  .fallback = "0.15",
+                  .range = Range::Positive,
+                  .allowsVoxels = false},
+                 {.name = "file-bonds",
+                  .type = ParamType::Flag,
+                  .doc = "take only the bonds that the file gives"},
+                 voxelParam(),
+                 resolutionParam(),
+                 halfWidthParam()},
+      .operands = {{Kind::Molecule}},
+      .resultKind = [](const Invocation&) { return Kind::Band; },
+      .run = runMoleculeModel,
+      .plan = planMoleculeModel,
+      .cost = costOfMoleculeModel,
+      .validate = validateMoleculeModel,
+  };
+}
+
+}  // namespace pipeline
