@@ -155,7 +155,7 @@ TEST(Superquadric, OfExponentsTwoIsAnOctahedron) {
   EXPECT_NEAR(surface.distance(V3d(-1.3, 0, 0), 1), 0.3, 1e-9);
 }
 
-TEST(Superquadric, HasTheVolumeOfTheBetaFunctions) {
+TEST(SlowSuperquadric, HasTheVolumeOfTheBetaFunctions) {
   EXPECT_NEAR(levelset::superquadricVolume(V3d(2, 4, 6), 1, 1), 8 * kPi, 1e-12);
   EXPECT_NEAR(levelset::superquadricVolume(V3d(2), 2, 2), 4.0 / 3, 1e-12);
   // Orders at three resolutions.
@@ -218,7 +218,7 @@ TEST(Supershape, OfSymmetryZeroIsABall) {
   EXPECT_NEAR(measure(band).volume / (4 * kPi / 3), 1, measured(1e-3));
 }
 
-TEST(Supershape, HasTheDistancesOfFineSamples) {
+TEST(SlowSuperquadric, OfCurvesHasTheDistancesOfFineSamples) {
   double worst = 0;
   const Superformula curves[] = {{0, V3d(2)},
                                  {5, V3d(2, 3, 3)},
@@ -234,7 +234,7 @@ TEST(Supershape, HasTheDistancesOfFineSamples) {
   RecordProperty("worst", std::to_string(worst));
 }
 
-TEST(Supershape, HasTheVolumeOfItsCurves) {
+TEST(SlowSuperquadric, OfCurvesHasTheirVolume) {
   // V = (∫ r₁² dθ)(∫ r₂³ cos φ dφ) / 3, by the change of variables.
   const Superformula around{5, V3d(2, 3, 3)}, upright{2, V3d(1.5, 2, 2)};
   double first = 0, second = 0;
