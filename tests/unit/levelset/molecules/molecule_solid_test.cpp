@@ -109,7 +109,7 @@ class SampledBoundary {
   std::vector<V3d> points_;
 };
 
-TEST(RodUnion, HasTheDistancesOfFineSamples) {
+TEST(SlowRodUnion, HasTheDistancesOfFineSamples) {
   // Balls as thick as the rods, small ones and large ones. Rods that meet at a ball, and some that
   // cross.
   for (const double ballRadius : {0.3, 0.36, 0.7}) {

@@ -111,7 +111,7 @@ double worstError(const SphericalProduct& surface, double size, int count) {
   return worst;
 }
 
-TEST(Superquadric, HasTheDistancesOfFineSamples) {
+TEST(SlowSuperquadric, HasTheDistancesOfFineSamples) {
   double worst = 0;
   for (const double vertical : {0.1, 0.6, 1.0, 1.7, 2.0, 4.0})
     for (const double horizontal : {0.1, 1.3, 3.0}) {
