@@ -4,17 +4,9 @@ namespace render {
 
 Hit BezierPart::hitOf(const Camera::Ray& ray, double distance, const Imath::V3d& normal,
                       std::size_t solid) const {
-  constexpr double kHitError = 1e-10;  // of a root that is not singular, as a share of the diagonal
-  Hit hit;
-  hit.found = true;
-  hit.distance = distance;
-  hit.position = ray.origin + ray.direction * distance;
-  hit.normal = hit.facetNormal = normal;
-  hit.surfaceError = kHitError * caster.bounds().size().length();
-  hit.colour = colour;
+  Hit hit = opaqueHit(ray.origin + ray.direction * distance, distance, normal,
+                      caster.bounds().size().length(), colour, id, solid);
   hit.opacity = opacity;
-  hit.id = id;
-  hit.solid = solid;
   return hit;
 }
 

@@ -10,6 +10,7 @@
 #include "levelset/error.h"
 #include "render/bezier/bezier_judge.h"
 #include "render/bezier/bezier_part.h"
+#include "render/embree/quadrics/quadric_judge.h"
 #include "render/embree/bcc_cell_vdb.h"
 #include "render/embree/embree_renderer.h"
 #include "render/embree/field_march.h"
@@ -199,6 +200,8 @@ struct EmbreeScene::Impl {
   // Surfaces in Bézier volumes, with judges for each thread.
   std::vector<BezierPart> beziers;
   std::size_t bezierSolid = 0;  // Hit::solid of the first of them
+  std::vector<QuadricPart> quadrics;
+  std::vector<QuadricJudge> quadricJudges;
   mutable tbb::enumerable_thread_specific<std::vector<BezierJudge>> bezierJudges;
   bool isOpaque;
   Box3d allBounds;  // world-space box of the solids, meshes and interfaces
@@ -245,6 +248,8 @@ EmbreeScene::Impl::Impl(const Scene& source, Filter filter)
   }
   beziers = source.beziers;
   bezierSolid = source.solids.size() + source.mapped.size() + (segmented ? 1 : 0);
+  quadrics = source.quadrics;
+  for (const QuadricPart& part : quadrics) quadricJudges.emplace_back(part.caster.model());
   if (source.isBlended()) {
     fields.emplace(source);
     allBounds = source.bounds();
@@ -255,6 +260,7 @@ EmbreeScene::Impl::Impl(const Scene& source, Filter filter)
   allBounds.extendBy(meshes.bounds());
   if (segmented) allBounds.extendBy(segmented->caster.bounds());
   for (const BezierPart& part : beziers) allBounds.extendBy(part.caster.bounds());
+  for (const QuadricPart& part : quadrics) allBounds.extendBy(part.caster.bounds());
   if (allBounds.isEmpty()) allBounds = source.volumeBounds();
   if (bounds.isEmpty()) return;
   build();
@@ -388,7 +394,7 @@ EmbreeScene::EmbreeScene(EmbreeScene&&) noexcept = default;
 Hit EmbreeScene::Impl::intersectOpaque(const V3d& origin, const V3d& direction, double near,
                                        double far, bool onlyHiding) const {
   Hit nearest;
-  if (!judge && beziers.empty()) return nearest;
+  if (!judge && beziers.empty() && quadrics.empty()) return nearest;
   requireRay(origin, direction);
   if (judge) {
     const InterfaceRay ray{origin, direction, near, far};
@@ -399,6 +405,13 @@ Hit EmbreeScene::Impl::intersectOpaque(const V3d& origin, const V3d& direction, 
     const std::vector<Hit> hits =
         bezierHits(n, origin, direction, near, nearest.found ? nearest.distance : far);
     if (!hits.empty()) nearest = hits[0];
+  }
+  for (std::size_t n = 0; n < quadrics.size(); ++n) {
+    const Camera::Ray ray{origin, direction, near, nearest.found ? nearest.distance : far};
+    const JudgedQuadric found = quadricJudges[n].firstHit(ray);
+    if (found.found)
+      nearest = quadrics[n].hitOf(ray, found.distance, found.normal, found.colour,
+                                  bezierSolid + beziers.size() + n);
   }
   return nearest;
 }

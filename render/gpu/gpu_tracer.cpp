@@ -17,6 +17,7 @@
 #include "render/gpu/gpu_interfaces.h"
 #include "render/gpu/gpu_light.h"
 #include "render/gpu/nano_grid.h"
+#include "render/gpu/quadrics/gpu_quadrics.h"
 #include "render/kernel/trace_glsl.h"
 
 namespace render {
@@ -241,6 +242,7 @@ struct GpuTracer::Impl {
   GpuLight light;
   GpuInterfaces interfaces;
   GpuBeziers beziers;
+  GpuQuadrics quadrics;
   double shaderSeconds = 0;
 
   Impl(const GlContext& context_, std::size_t largestTable_)
@@ -249,7 +251,8 @@ struct GpuTracer::Impl {
         largestTable(largestTable_ > 0 ? largestTable_ : context_.largestTable()),
         light(context_, largestTable),
         interfaces(context_, largestTable),
-        beziers(context_) {
+        beziers(context_),
+        quadrics(context_, largestTable) {
     shift = static_cast<int>(std::bit_width(largestTable / sizeof(float))) - 1;
     shift = std::min(shift, 30);  // indices of values fit into a signed 32-bit integer
   }
@@ -265,6 +268,7 @@ struct GpuTracer::Impl {
     light.release();
     interfaces.release();
     beziers.release();
+    quadrics.release();
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
@@ -495,6 +499,11 @@ SharedTree::Roots GpuTracer::bezierRoots(const SharedTree& tree,
                                          const std::vector<Camera::Ray>& rays,
                                          TreeCounts* counts) const {
   return impl_->beziers.rootsOn(tree, tree.screensOf(rays), counts);
+}
+
+std::vector<QuadricHit> GpuTracer::quadricHits(const QuadricCaster& caster,
+                                               const std::vector<Camera::Ray>& rays) const {
+  return impl_->quadrics.firstHits(caster, rays);
 }
 
 GpuBezierCounts GpuTracer::bezierCounts() const {

@@ -44,6 +44,9 @@ class GpuTracer : public KernelTracer {
   [[nodiscard]] SharedTree::Roots bezierRoots(const SharedTree& tree,
                                               const std::vector<Camera::Ray>& rays,
                                               TreeCounts* counts) const override;
+  /// @throws levelset::ResourceLimit for the reasons of GpuQuadrics::firstHits()
+  [[nodiscard]] std::vector<QuadricHit> quadricHits(
+      const QuadricCaster& caster, const std::vector<Camera::Ray>& rays) const override;
 
   /// Work of all calls of bezierRoots() so far.
   [[nodiscard]] GpuBezierCounts bezierCounts() const;

@@ -164,6 +164,14 @@ SharedTree::Roots KernelTracer::bezierRoots(const SharedTree& tree,
   return tree.rootsOf(rays, counts);
 }
 
+std::vector<QuadricHit> KernelTracer::quadricHits(const QuadricCaster& caster,
+                                                  const std::vector<Camera::Ray>& rays) const {
+  std::vector<QuadricHit> hits;
+  hits.reserve(rays.size());
+  for (const Camera::Ray& ray : rays) hits.push_back(caster.firstHit(ray));
+  return hits;
+}
+
 std::vector<InterfaceHit> KernelTracer::interfaceHits(const InterfaceCaster& caster,
                                                       const std::vector<InterfaceRay>& rays,
                                                       bool wantsNormals) const {
@@ -177,12 +185,20 @@ std::vector<InterfaceHit> KernelTracer::interfaceHits(const InterfaceCaster& cas
 }
 
 KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter)
-    : meshes_(scene), mapped_(scene), segmented_(scene.segmented), beziers_(scene.beziers) {
+    : meshes_(scene),
+      mapped_(scene),
+      segmented_(scene.segmented),
+      beziers_(scene.beziers),
+      quadrics_(scene.quadrics) {
   makeTables(scene, {.filter = filter, .maxBytes = maxBytes}, false);
 }
 
 KernelScene::KernelScene(const Scene& scene, const RenderOptions& options)
-    : meshes_(scene), mapped_(scene), segmented_(scene.segmented), beziers_(scene.beziers) {
+    : meshes_(scene),
+      mapped_(scene),
+      segmented_(scene.segmented),
+      beziers_(scene.beziers),
+      quadrics_(scene.quadrics) {
   makeTables(scene, options, true);
 }
 
@@ -214,10 +230,10 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
       2 * 4 * (std::max(BrickPool::kCubeValues, 4 * BrickPool::kSites) + BrickPool::kMaskWords) +
       kCopies;
   levelset::requireMemory(leaves * kBytesOfBlock, options.maxBytes);
-  // Culling knows how far light rays start from solids and meshes, but not from mapped textures and
-  // Bézier volumes.
+  // Culling knows how far light rays start from solids and meshes, but not from mapped textures,
+  // Bézier volumes and quadrics.
   const FrustumCulling culling =
-      isPicture && !box.isEmpty() && mapped_.isEmpty() && beziers_.empty()
+      isPicture && !box.isEmpty() && mapped_.isEmpty() && beziers_.empty() && quadrics_.empty()
           ? FrustumCulling(scene, options, box)
           : FrustumCulling();
   for (std::size_t i = 0; i < scene.solids.size(); ++i) {
@@ -275,6 +291,7 @@ void KernelScene::updateView(const Scene& scene) {
   bounds_.extendBy(mapped_.bounds());
   if (segmented_) bounds_.extendBy(segmented_->caster.bounds());
   for (const BezierPart& part : beziers_) bounds_.extendBy(part.caster.bounds());
+  for (const QuadricPart& part : quadrics_) bounds_.extendBy(part.caster.bounds());
   trees_.clear();
   for (const BezierPart& part : beziers_)
     trees_.push_back(std::make_shared<const SharedTree>(part.caster.volume(), scene.camera,
@@ -302,6 +319,7 @@ std::size_t KernelScene::bytes() const {
   for (const KernelSolid& solid : solids_) sum += solid.pool.bytes();
   if (segmented_) sum += segmented_->caster.field().memoryUse() + segmented_->caster.bytes();
   for (const BezierPart& part : beziers_) sum += part.caster.bytes();
+  for (const QuadricPart& part : quadrics_) sum += part.caster.bytes();
   for (const auto& tree : trees_) sum += tree->counts().peakBytes;
   return sum + mapped_.bytes();
 }
@@ -332,6 +350,22 @@ BezierHits KernelScene::castBeziers(const KernelTracer& tracer,
     result.first.push_back(result.hits.size());
   }
   return result;
+}
+
+std::vector<Hit> KernelScene::castQuadrics(const KernelTracer& tracer,
+                                           const std::vector<Camera::Ray>& rays) const {
+  std::vector<Hit> hits(quadrics_.empty() ? 0 : rays.size());
+  for (std::size_t part = 0; part < quadrics_.size(); ++part) {
+    const QuadricCaster& caster = quadrics_[part].caster;
+    const std::vector<QuadricHit> found = tracer.quadricHits(caster, rays);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      if (!found[i].found || (hits[i].found && hits[i].distance <= found[i].distance)) continue;
+      hits[i] =
+          quadrics_[part].hitOf(rays[i], found[i].distance, found[i].normal,
+                                caster.colourOf(found[i]), bezierSolid_ + beziers_.size() + part);
+    }
+  }
+  return hits;
 }
 
 PixelHits KernelScene::castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const {
@@ -516,6 +550,11 @@ std::vector<double> KernelScene::transmittances(const KernelTracer& tracer,
       else if (part.caster.isOccluded(ray))
         light[i] = 0;
     }
+  for (const QuadricPart& part : quadrics_)
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      if (light[i] >= kLeastTransmittance &&
+          part.caster.isOccluded({rays[i].origin, rays[i].direction, 0, rays[i].maxDistance}))
+        light[i] = 0;
   return light;
 }
 

@@ -68,6 +68,9 @@ class KernelTracer : public FieldTracer {
   [[nodiscard]] virtual SharedTree::Roots bezierRoots(const SharedTree& tree,
                                                       const std::vector<Camera::Ray>& rays,
                                                       TreeCounts* counts) const;
+  /// First hits of rays of the camera with quadrics. The default casts on the calling thread.
+  [[nodiscard]] virtual std::vector<QuadricHit> quadricHits(
+      const QuadricCaster& caster, const std::vector<Camera::Ray>& rays) const;
 };
 
 /// Hits of the rays through a block of pixels with solids, at most one for each ray.
@@ -118,12 +121,12 @@ class KernelScene {
 
   [[nodiscard]] const std::vector<KernelSolid>& solids() const { return solids_; }
   /// World-space box of the meshes, the shells of mapped textures, the Bézier volumes, the
-  /// interfaces of a segmented field and the grid cells that the solids' surfaces cross; empty when
+  /// quadrics, the interfaces of a segmented field and the grid cells that the solids' surfaces cross; empty when
   /// there are none. For a blended scene: Scene::bounds(). If a volume has no surface and nothing
   /// else is drawn: Scene::volumeBounds().
   [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }
   /// World-space box of the meshes, the shells of mapped textures, the Bézier volumes, the
-  /// interfaces of a segmented field and the blocks that the solids' surfaces cross. For a blended
+  /// quadrics, the interfaces of a segmented field and the blocks that the solids' surfaces cross. For a blended
   /// scene: Scene::bounds(). Its size determines the absolute error of single-precision positions.
   [[nodiscard]] const Imath::Box3d& tableBounds() const { return tableBounds_; }
   [[nodiscard]] const MeshRays& meshes() const { return meshes_; }
@@ -147,6 +150,11 @@ class KernelScene {
     return !hit.isOnMesh && !hit.isOnGround && hit.solid >= bezierSolid_ &&
            hit.solid < bezierSolid_ + beziers_.size();
   }
+  /// Quadrics of the scene.
+  [[nodiscard]] const std::vector<QuadricPart>& quadrics() const { return quadrics_; }
+  /// First hits of rays of the camera with the quadrics; empty without any.
+  [[nodiscard]] std::vector<Hit> castQuadrics(const KernelTracer& tracer,
+                                              const std::vector<Camera::Ray>& rays) const;
   [[nodiscard]] std::size_t bytes() const;
   /// Numbers of blocks of all solids, by their use in the brick tables.
   struct Counts {
@@ -205,6 +213,7 @@ class KernelScene {
   std::vector<BezierPart> beziers_;
   std::vector<std::shared_ptr<const SharedTree>> trees_;  // of beziers_, for the camera
   std::size_t bezierSolid_ = 0;                           // Hit::solid of the first of beziers_
+  std::vector<QuadricPart> quadrics_;
   std::optional<FieldTraversal> fields_;
   Imath::Box3d bounds_, tableBounds_;
   double near_ = 0, far_ = Camera::kNoDepth;  // visible depth range of the camera, world units

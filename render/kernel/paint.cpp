@@ -152,6 +152,7 @@ KernelPainter::FirstHits KernelPainter::firstHits(const KernelTracer& tracer,
   TreeCounts counts;
   first.onBeziers = surfaces_.castBeziers(tracer, rays, &counts);
   if (counts.overruns > 0) layers_.overruns += counts.overruns;
+  first.onQuadrics = surfaces_.castQuadrics(tracer, rays);
   return first;
 }
 
@@ -174,10 +175,10 @@ Hit KernelPainter::hitOf(const Camera::Ray& ray, double meshNear, const PixelHit
         surfaces_.mapped().intersect(ray.origin, ray.direction, ray.near, farthest());
     if (onTexture.found) nearest = onTexture;
   }
-  if (!first.onInterfaces.empty()) {
-    const Hit& onInterface = first.onInterfaces[i];
-    if (onInterface.found && (!nearest.found || onInterface.distance < nearest.distance))
-      nearest = onInterface;
+  for (const std::vector<Hit>* others : {&first.onInterfaces, &first.onQuadrics}) {
+    if (others->empty()) continue;
+    const Hit& other = (*others)[i];
+    if (other.found && (!nearest.found || other.distance < nearest.distance)) nearest = other;
   }
   if (const BezierHits& on = first.onBeziers; !on.hits.empty()) {
     const std::size_t next = on.first[i] + passed;
@@ -453,6 +454,11 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
     image.attributes["ls:read"] =
         fmt::format("{} cells with corners of several regions, {}{:.1f} MB",
                     caster.mixedCellCount(), sheets, static_cast<double>(surfaces.bytes()) * 1e-6);
+  } else if (!surfaces.quadrics().empty() && surfaces.solids().empty()) {
+    std::size_t count = 0;
+    for (const QuadricPart& part : surfaces.quadrics()) count += part.caster.count();
+    image.attributes["ls:read"] =
+        fmt::format("{} quadrics, {:.1f} MB", count, static_cast<double>(surfaces.bytes()) * 1e-6);
   } else if (!surfaces.beziers().empty() && surfaces.solids().empty()) {
     std::size_t parts = 0;
     for (const BezierPart& part : surfaces.beziers()) parts += part.caster.partCount();

@@ -31,10 +31,10 @@ class KernelPainter {
   /// traced together.
   [[nodiscard]] static std::vector<Pixel> pixelsOf(const PixelBox& box);
   [[nodiscard]] std::size_t numberOf(const Pixel& pixel) const;
-  /// First hits of rays with the surface of a blended scene and with a segmented field, and all
-  /// visible ones with Bézier volumes; empty for scenes without.
+  /// First hits of rays with the surface of a blended scene, with a segmented field and with
+  /// quadrics, and all visible ones with Bézier volumes; empty for scenes without.
   struct FirstHits {
-    std::vector<Hit> onFields, onInterfaces;
+    std::vector<Hit> onFields, onInterfaces, onQuadrics;
     BezierHits onBeziers;
   };
   [[nodiscard]] FirstHits firstHits(const KernelTracer& tracer,

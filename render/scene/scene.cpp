@@ -58,6 +58,7 @@ Imath::Box3d Scene::bounds() const {
   forEachNode(mapped, [&](const Imath::V3d& p) { all.extendBy(p); });
   if (segmented) all.extendBy(segmented->caster.bounds());
   for (const BezierPart& part : beziers) all.extendBy(part.caster.bounds());
+  for (const QuadricPart& part : quadrics) all.extendBy(part.caster.bounds());
   return all;
 }
 
@@ -77,6 +78,7 @@ std::vector<double> Scene::extents(const std::vector<Imath::V3d>& directions) co
     withoutOthers.mapped.clear();
     withoutOthers.segmented.reset();
     withoutOthers.beziers.clear();
+    withoutOthers.quadrics.clear();
     const Imath::Box3d box = withoutOthers.bounds();
     for (std::size_t d = 0; d < directions.size(); ++d) {
       const double extent =
@@ -94,6 +96,7 @@ std::vector<double> Scene::extents(const std::vector<Imath::V3d>& directions) co
   });
   if (segmented) extend(ofSolids, segmented->caster.extents(directions));
   for (const BezierPart& part : beziers) extend(ofSolids, part.caster.extents(directions));
+  for (const QuadricPart& part : quadrics) extend(ofSolids, part.caster.extents(directions));
   return ofSolids;
 }
 

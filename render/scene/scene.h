@@ -16,6 +16,7 @@
 #include "render/direct/direct_volume.h"
 #include "render/hit.h"
 #include "render/images/value_bits.h"
+#include "render/quadrics/quadric_part.h"
 #include "render/scene/csg_expression.h"
 #include "render/scene/mapped_texture.h"
 #include "render/segmented/segmented_part.h"
@@ -109,6 +110,8 @@ struct Scene {
   std::optional<Ground> ground = {};
   /// Surfaces in Bézier volumes, drawn beside the solids. Not in a blended scene.
   std::vector<BezierPart> beziers = {};
+  /// Drawn beside the solids. Not in a blended scene.
+  std::vector<QuadricPart> quadrics = {};
   /// True when the scene is drawn as the zero set of one function of all solids' fields: a soft
   /// expression or a morph (render/scene/field_expression.h).
   [[nodiscard]] bool isBlended() const { return softness > 0 || morph; }

@@ -189,6 +189,11 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
   if (!scene.beziers.empty() && options.thickness)
     throw levelset::UsageError(
         "the thickness of Bézier volumes cannot be measured; omit --thickness");
+  if (!scene.quadrics.empty() && scene.isBlended())
+    throw levelset::UsageError(
+        "quadrics cannot be drawn beside a soft expression or a morph; draw them alone");
+  if (!scene.quadrics.empty() && options.thickness)
+    throw levelset::UsageError("the thickness of quadrics cannot be measured; omit --thickness");
   if (scene.segmented && options.filter != Filter::Trilinear)
     throw levelset::UsageError(fmt::format(
         "segmentations support only the trilinear filter, not {}; omit the filter, or make a mesh "
@@ -281,6 +286,10 @@ std::map<std::string, std::string> sceneAttributes(const Scene& scene,
     beziers += fmt::format("{}{} patches", beziers.empty() ? "" : ", ",
                            part.caster.volume().patches.size());
   if (!beziers.empty()) attributes["ls:bezier"] = beziers;
+  std::string quadrics;
+  for (const QuadricPart& part : scene.quadrics)
+    quadrics += fmt::format("{}{} quadrics", quadrics.empty() ? "" : ", ", part.caster.count());
+  if (!quadrics.empty()) attributes["ls:quadrics"] = quadrics;
   if (scene.volumePart) {
     const DirectVolume& volume = scene.volumePart->volume;
     attributes["ls:volume"] = fmt::format("volume {:016x}", volume.volume().contentHash());

@@ -22,6 +22,7 @@
 #include "render/scene/field_expression.h"
 #include "render/views/bezier_file.h"
 #include "render/views/picture.h"
+#include "render/views/quadric_file.h"
 
 namespace render {
 namespace {
@@ -68,6 +69,7 @@ void requireNames(const Scene& scene) {
   std::vector<std::string> names = solidNames(scene);
   for (const MeshPart& part : scene.meshes) names.push_back(part.name);
   for (const BezierPart& part : scene.beziers) names.push_back(part.name);
+  for (const QuadricPart& part : scene.quadrics) names.push_back(part.name);
   if (scene.volumePart) names.push_back(scene.volumePart->name);
   requireSceneNames(names);
 }
@@ -324,21 +326,42 @@ void readMeshPart(const Reader& reader, const Json& json, const std::filesystem:
   scene.meshes.push_back(std::move(part));
 }
 
+/// Members of a part of a scene that has no transform.
+struct PlainMembers {
+  std::string name;
+  std::uint32_t id = 0;
+  Imath::C3f colour{0.66f, 0.62f, 0.56f};
+  double opacity = 1;
+};
+
+PlainMembers readPlainMembers(const Reader& reader, const Json& json, const std::string& where,
+                              const Scene& scene) {
+  PlainMembers part;
+  reader.readPart(
+      json,
+      scene.solids.size() + scene.meshes.size() + scene.beziers.size() + scene.quadrics.size() + 1,
+      where, part);
+  return part;
+}
+
 void readBezierPart(const Reader& reader, const Json& json, const std::filesystem::path& file,
                     const ReadSceneOptions& options, Scene& scene) {
   const std::string where = fmt::format("Bézier volume {}", scene.beziers.size() + 1);
   reader.requireKnown(json, {"name", "file", "colour", "opacity", "id"}, where);
-  struct {  // as a solid
-    std::string name;
-    std::uint32_t id = 0;
-    Imath::C3f colour{0.66f, 0.62f, 0.56f};
-    double opacity = 1;
-  } part;
-  reader.readPart(json, scene.solids.size() + scene.meshes.size() + scene.beziers.size() + 1, where,
-                  part);
+  const PlainMembers part = readPlainMembers(reader, json, where, scene);
   BezierCaster caster(readBezierVolume(reader.partFile(json, file, where), options.maxMemory),
                       options.maxMemory);
   scene.beziers.push_back({std::move(caster), part.colour, part.id, part.name, part.opacity});
+}
+
+void readQuadricPart(const Reader& reader, const Json& json, const std::filesystem::path& file,
+                     const ReadSceneOptions& options, Scene& scene) {
+  const std::string where = fmt::format("quadrics {}", scene.quadrics.size() + 1);
+  reader.requireKnown(json, {"name", "file", "id"}, where);
+  const PlainMembers part = readPlainMembers(reader, json, where, scene);
+  QuadricCaster caster(readQuadrics(reader.partFile(json, file, where), options.maxMemory),
+                       options.maxMemory);
+  scene.quadrics.push_back({std::move(caster), part.id, part.name});
 }
 
 /// The volume with its grid placed in the world by a transform.
@@ -453,6 +476,10 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
   for (const Solid& solid : scene.solids) json["solids"].push_back(entryOf(solid, ".vdb"));
   for (const MeshPart& part : scene.meshes) json["meshes"].push_back(entryOf(part, ".ply"));
   for (const BezierPart& part : scene.beziers) json["beziers"].push_back(entryOf(part, ".json"));
+  for (const QuadricPart& part : scene.quadrics)
+    json["quadrics"].push_back({{"name", part.name},
+                                {"file", fileBeside(file, part.name, ".json").filename().string()},
+                                {"id", part.id}});
   if (!scene.csg.isEmpty()) json["csg"] = scene.csg.text();
   if (scene.softness > 0) json["soft"] = scene.softness;
   if (scene.morph) json["morph"] = *scene.morph;
@@ -468,6 +495,8 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
                         {.progress = parts.next()});
   for (const BezierPart& part : scene.beziers)
     writeBezierVolume(fileBeside(file, part.name, ".json"), part.caster.volume());
+  for (const QuadricPart& part : scene.quadrics)
+    writeQuadrics(fileBeside(file, part.name, ".json"), part.caster.model());
   {
     std::ofstream stream(target.path(), std::ios::binary);
     stream << text << '\n';
@@ -487,6 +516,13 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
         {.caster = BezierCaster(readBezierVolume(file, most), most), .name = "volume"});
     return alone;
   }
+  if (isQuadricFile(file)) {
+    const std::size_t most = levelset::memoryLimit(options.maxMemory);
+    ViewedScene alone;
+    alone.scene.quadrics.push_back(
+        {.caster = QuadricCaster(readQuadrics(file, most), most), .name = "quadrics"});
+    return alone;
+  }
   const Reader reader(file);
   const Json json = documentOf(file);
   const std::string whole = "the file";
@@ -496,7 +532,7 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
     reader.refuse(whole, fmt::format("is not of version {}", kVersion));
   reader.requireKnown(json,
                       {"format", "version", "camera", "light", "ambient", "solids", "meshes",
-                       "beziers", "volumes", "csg", "soft", "morph"},
+                       "beziers", "quadrics", "volumes", "csg", "soft", "morph"},
                       whole);
   ViewedScene viewed;
   Scene& scene = viewed.scene;
@@ -513,8 +549,11 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
   const Json& meshes = json.contains("meshes") ? json.at("meshes") : none;
   const Json& volumes = json.contains("volumes") ? json.at("volumes") : none;
   const Json& beziers = json.contains("beziers") ? json.at("beziers") : none;
-  if (!solids.is_array() || !meshes.is_array() || !volumes.is_array() || !beziers.is_array() ||
-      (solids.empty() && meshes.empty() && volumes.empty() && beziers.empty()))
+  const Json& quadrics = json.contains("quadrics") ? json.at("quadrics") : none;
+  const Json* const lists[] = {&solids, &meshes, &volumes, &beziers, &quadrics};
+  if (!std::all_of(std::begin(lists), std::end(lists),
+                   [](const Json* l) { return l->is_array(); }) ||
+      std::all_of(std::begin(lists), std::end(lists), [](const Json* l) { return l->empty(); }))
     reader.refuse(whole, "has no solids, no meshes and no volumes");
   if (volumes.size() > 1) reader.refuse(whole, "has several \"volumes\", but a scene can have one");
   Parts parts(options.progress, solids.size() + meshes.size() + volumes.size());
@@ -536,13 +575,18 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
     readBezierPart(reader, entry, file, rest, scene);
     spend(scene.beziers.back().caster.bytes());
   }
+  for (const Json& entry : quadrics) {
+    readQuadricPart(reader, entry, file, rest, scene);
+    spend(scene.quadrics.back().caster.bytes());
+  }
   for (const Json& entry : volumes) readVolumePart(reader, entry, file, rest, parts.next(), scene);
   reader.withContext(whole, [&] { requireNames(scene); });
   std::set<std::uint32_t> ids;
   const auto isNew = [&](const auto& part) { return ids.insert(part.id).second; };
   if (!std::all_of(scene.solids.begin(), scene.solids.end(), isNew) ||
       !std::all_of(scene.meshes.begin(), scene.meshes.end(), isNew) ||
-      !std::all_of(scene.beziers.begin(), scene.beziers.end(), isNew))
+      !std::all_of(scene.beziers.begin(), scene.beziers.end(), isNew) ||
+      !std::all_of(scene.quadrics.begin(), scene.quadrics.end(), isNew))
     reader.refuse(whole, "gives the same \"id\" to two solids or meshes");
   if (json.contains("csg"))
     scene.csg = CsgExpression(reader.text(json, "csg", whole), solidNames(scene));

@@ -84,13 +84,13 @@ void showVolume(const fs::path& file, const levelset::Volume& volume, const Open
        .volume = std::make_shared<const render::VolumeSurface>(model.volume->surface)});
 }
 
-/// Paths of the level sets, meshes, volumes and Bézier volumes that a scene file names. @pre
+/// Paths of the level sets, meshes, volumes, Bézier volumes and quadrics that a scene file names. @pre
 /// readScene() accepts the file
 std::vector<fs::path> solidFilesOf(const fs::path& scene) {
   std::vector<fs::path> files;
   std::ifstream stream(scene);
   const auto json = nlohmann::json::parse(stream, nullptr, false);
-  for (const char* list : {"solids", "meshes", "volumes", "beziers"}) {
+  for (const char* list : {"solids", "meshes", "volumes", "beziers", "quadrics"}) {
     if (!json.is_object() || !json.contains(list) || !json[list].is_array()) continue;
     for (const auto& part : json[list])
       if (part.is_object() && part.contains("file") && part["file"].is_string())

@@ -368,6 +368,11 @@ Json valueInfo(const Value& value, Invocation& in) {
                                  {"id", part.id},
                                  {"patches", part.caster.volume().patches.size()},
                                  {"attributes", part.caster.volume().attributeCount()}});
+    for (const render::QuadricPart& part : scene.quadrics)
+      json["quadrics"].push_back({{"name", part.name},
+                                  {"id", part.id},
+                                  {"quadrics", part.caster.count()},
+                                  {"bytes", part.caster.bytes()}});
     for (const render::MappedTexture& texture : scene.mapped)
       json["mapped"].push_back({{"name", texture.name},
                                 {"id", texture.id},

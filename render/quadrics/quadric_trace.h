@@ -1,0 +1,38 @@
+#pragma once
+
+// Private to the ray casting of quadrics: the search on the processor.
+
+#include <cstdint>
+#include <optional>
+
+#include "render/camera.h"
+#include "render/quadrics/quadric_tables.h"
+
+namespace render {
+
+/// Nearest intersection; `slot` is kNoSlot if there is none.
+struct NearestQuadric {
+  static constexpr std::uint32_t kNoSlot = 0xffffffffU;
+  double t = QuadricKernel::kNoRoot;
+  std::uint32_t slot = kNoSlot;
+};
+
+/// True if the processor has vectors of eight floats.
+[[nodiscard]] bool hasWideVectors();
+
+/// Finds the nearest intersection of a ray, or any if `any`. The bits of the nearest one do not
+/// depend on `isWide`.
+/// @param isWide  uses vectors of eight floats. @pre false, or hasWideVectors()
+[[nodiscard]] NearestQuadric traceQuadrics(const QuadricTables& tables, const Camera::Ray& ray,
+                                           bool any, bool isWide);
+
+/// The ray relative to the origin of the tables.
+[[nodiscard]] QuadricKernel::QuadricRay relativeRay(const QuadricTables& tables,
+                                                    const Camera::Ray& ray);
+
+/// Distance at which a ray enters the sphere around all quadrics, at least its near end; nothing if
+/// it misses the sphere.
+[[nodiscard]] std::optional<double> startAt(const QuadricTables& tables,
+                                            const QuadricKernel::QuadricRay& ray);
+
+}  // namespace render
