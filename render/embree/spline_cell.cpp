@@ -9,7 +9,7 @@ namespace {
 using Imath::V3d;
 using openvdb::Coord;
 
-constexpr int kDepth = 40;  // largest number of halvings of a segment
+constexpr int kMostSegmentHalvings = 40;  // largest number of halvings of a segment
 
 /// Values w of the four cubic basis functions at a in [0, 1], or of their derivatives.
 /// @param isBernstein  true: Bernstein polynomials; false: uniform B-splines
@@ -190,7 +190,7 @@ double SplineCell::value(const V3d& p) const {
 std::optional<double> SplineCell::firstSignChange(const V3d& p, const V3d& q) const {
   std::optional<double> first;
   LineSearch line(c_, isBernstein_, p, q - p);
-  line.search(0, value(p) < 0, 1, value(q) < 0, kDepth, [&](double at) {
+  line.search(0, value(p) < 0, 1, value(q) < 0, kMostSegmentHalvings, [&](double at) {
     first = at;
     return false;
   });
@@ -199,7 +199,7 @@ std::optional<double> SplineCell::firstSignChange(const V3d& p, const V3d& q) co
 
 void SplineCell::addSignChanges(const V3d& p, const V3d& q, std::vector<double>& found) const {
   LineSearch line(c_, isBernstein_, p, q - p);
-  line.search(0, value(p) < 0, 1, value(q) < 0, kDepth, [&](double at) {
+  line.search(0, value(p) < 0, 1, value(q) < 0, kMostSegmentHalvings, [&](double at) {
     found.push_back(at);
     return true;
   });

@@ -88,7 +88,8 @@ bool QuadricCaster::isOccluded(const Camera::Ray& ray) const {
 QuadricHit QuadricCaster::hitAt(const Camera::Ray& ray, double distance,
                                 std::uint32_t slot) const {
   const QuadricKernel::QuadricRay relative = relativeRay(*tables_, ray);
-  const int face = tables_->rootIn(slot, relative).face;
+  const int face =
+      slot < tables_->firstStick() ? QuadricKernel::kSide : tables_->rootIn(slot, relative).face;
   const V3d at = V3d(relative.x, relative.y, relative.z) + ray.direction * distance;
   return {true, distance, tables_->normalAt(slot, face, at), slot};
 }

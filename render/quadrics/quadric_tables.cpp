@@ -165,22 +165,8 @@ std::size_t QuadricTables::bytes() const {
 
 QuadricKernel::QuadricRoot QuadricTables::rootIn(std::size_t slot,
                                                  const QuadricKernel::QuadricRay& ray) const {
-  QuadricKernel kernel;
-  const std::size_t lane = slot % kQuadricLanes;
-  if (slot < firstStick()) {
-    const BallBlock& block = balls[slot / kQuadricLanes];
-    return {kernel.ballRoot(ray, static_cast<double>(block.x[lane]),
-                            static_cast<double>(block.y[lane]), static_cast<double>(block.z[lane]),
-                            static_cast<double>(block.radius[lane])),
-            QuadricKernel::kSide};
-  }
-  if (slot < firstQuadric()) {
-    const StickBlock& block = sticks[(slot - firstStick()) / kQuadricLanes];
-    const V3d a = vectorOf(block.a, lane), b = vectorOf(block.b, lane);
-    return kernel.stickRoot(ray, a.x, a.y, a.z, b.x, b.y, b.z,
-                            static_cast<double>(block.radius[lane]));
-  }
-  return kernel.quadricRoot(ray, shapeOf(quadrics[slot - firstQuadric()]));
+  if (slot < firstStick()) return rootOf<0>(slot, ray);
+  return slot < firstQuadric() ? rootOf<1>(slot, ray) : rootOf<2>(slot, ray);
 }
 
 V3d QuadricTables::normalAt(std::size_t slot, int face, const V3d& at) const {

@@ -69,6 +69,11 @@ struct QuadricTables {
   /// the primitives.
   [[nodiscard]] double pad() const { return 2e-6 * reach; }
 
+  /// First intersection of a ray with the sphere, cylinder or general quadric of a slot.
+  /// @tparam kind  0, 1 or 2
+  template <int kind>
+  [[nodiscard]] QuadricKernel::QuadricRoot rootOf(std::size_t slot,
+                                                  const QuadricKernel::QuadricRay& ray) const;
   /// First intersection of a ray with the primitive of a slot.
   [[nodiscard]] QuadricKernel::QuadricRoot rootIn(std::size_t slot,
                                                   const QuadricKernel::QuadricRay& ray) const;
@@ -77,6 +82,28 @@ struct QuadricTables {
 };
 
 [[nodiscard]] QuadricKernel::QuadricShape shapeOf(const StoredQuadric& quadric);
+
+template <int kind>
+QuadricKernel::QuadricRoot QuadricTables::rootOf(std::size_t slot,
+                                                 const QuadricKernel::QuadricRay& ray) const {
+  QuadricKernel kernel;
+  const std::size_t lane = slot % kQuadricLanes;
+  const auto number = [](float x) { return static_cast<double>(x); };
+  if constexpr (kind == 0) {
+    const BallBlock& block = balls[slot / kQuadricLanes];
+    return {kernel.ballRoot(ray, number(block.x[lane]), number(block.y[lane]),
+                            number(block.z[lane]), number(block.radius[lane])),
+            QuadricKernel::kSide};
+  } else if constexpr (kind == 1) {
+    const StickBlock& block = sticks[(slot - firstStick()) / kQuadricLanes];
+    return kernel.stickRoot(ray, number(block.a[0][lane]), number(block.a[1][lane]),
+                            number(block.a[2][lane]), number(block.b[0][lane]),
+                            number(block.b[1][lane]), number(block.b[2][lane]),
+                            number(block.radius[lane]));
+  } else {
+    return kernel.quadricRoot(ray, shapeOf(quadrics[slot - firstQuadric()]));
+  }
+}
 
 /// Stores a checked model and builds the trees. The result does not depend on the number of
 /// threads.
