@@ -121,13 +121,14 @@ class KernelScene {
 
   [[nodiscard]] const std::vector<KernelSolid>& solids() const { return solids_; }
   /// World-space box of the meshes, the shells of mapped textures, the Bézier volumes, the
-  /// quadrics, the interfaces of a segmented field and the grid cells that the solids' surfaces cross; empty when
-  /// there are none. For a blended scene: Scene::bounds(). If a volume has no surface and nothing
-  /// else is drawn: Scene::volumeBounds().
+  /// quadrics, the interfaces of a segmented field and the grid cells that the solids' surfaces
+  /// cross; empty when there are none. For a blended scene: Scene::bounds(). If a volume has no
+  /// surface and nothing else is drawn: Scene::volumeBounds().
   [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }
   /// World-space box of the meshes, the shells of mapped textures, the Bézier volumes, the
-  /// quadrics, the interfaces of a segmented field and the blocks that the solids' surfaces cross. For a blended
-  /// scene: Scene::bounds(). Its size determines the absolute error of single-precision positions.
+  /// quadrics, the interfaces of a segmented field and the blocks that the solids' surfaces cross.
+  /// For a blended scene: Scene::bounds(). Its size determines the absolute error of
+  /// single-precision positions.
   [[nodiscard]] const Imath::Box3d& tableBounds() const { return tableBounds_; }
   [[nodiscard]] const MeshRays& meshes() const { return meshes_; }
   [[nodiscard]] const MappedRays& mapped() const { return mapped_; }

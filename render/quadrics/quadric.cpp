@@ -31,9 +31,10 @@ bool isUsable(const V3d& v) {
 
 void requireUsable(const V3d& v, const char* list, std::size_t number, const char* what) {
   if (!isUsable(v))
-    refuseQuadric(list, number,
-                  fmt::format("has {} ({}, {}, {}) with a number that is not finite or exceeds 1e15",
-                              what, v.x, v.y, v.z));
+    refuseQuadric(
+        list, number,
+        fmt::format("has {} ({}, {}, {}) with a number that is not finite or exceeds 1e15", what,
+                    v.x, v.y, v.z));
 }
 
 void requireRadius(float radius, const char* list, std::size_t number) {
@@ -58,27 +59,33 @@ void requireQuadric(const Quadric& quadric, std::size_t number) {
   const auto& [low, high] = quadric.range;
   if (!(std::abs(low) <= kLargestCoordinate) || !(std::abs(high) <= kLargestCoordinate) ||
       !(low < high))
-    refuseQuadric(kList, number,
-                  fmt::format("has the range {} … {}; give finite ends, the lower one first", low,
-                              high));
+    refuseQuadric(
+        kList, number,
+        fmt::format("has the range {} … {}; give finite ends, the lower one first", low, high));
   const bool isBelow = quadric.kind == QuadricKind::Paraboloid && !(high > 0);
   const bool isBetween = quadric.kind == QuadricKind::TwoSheet && !(high > 1) && !(low < -1);
   if (isBelow || isBetween)
-    refuseQuadric(kList, number,
-                  fmt::format("has no point in the range {} … {}, because a {} {}", low, high,
-                              nameOf(quadric.kind),
-                              isBelow ? "begins at 0" : "has none between -1 and 1"));
+    refuseQuadric(
+        kList, number,
+        fmt::format("has no point in the range {} … {}, because a {} {}", low, high,
+                    nameOf(quadric.kind), isBelow ? "begins at 0" : "has none between -1 and 1"));
 }
 
 /// Square of the radius at a height in parameter space.
 double radiusSquare(QuadricKind kind, double z) {
   switch (kind) {
-    case QuadricKind::Cylinder: return 1;
-    case QuadricKind::Cone: return z * z;
-    case QuadricKind::Paraboloid: return z;
-    case QuadricKind::OneSheet: return 1 + z * z;
-    case QuadricKind::TwoSheet: return z * z - 1;
-    default: return 1 - z * z;
+    case QuadricKind::Cylinder:
+      return 1;
+    case QuadricKind::Cone:
+      return z * z;
+    case QuadricKind::Paraboloid:
+      return z;
+    case QuadricKind::OneSheet:
+      return 1 + z * z;
+    case QuadricKind::TwoSheet:
+      return z * z - 1;
+    default:
+      return 1 - z * z;
   }
 }
 
@@ -130,9 +137,12 @@ struct ExtentSearch {
     const auto product = [&](const HomogeneousRow& m, const HomogeneousRow& n) {
       const double across = m[0] * n[0] + m[1] * n[1];
       switch (kind) {
-        case QuadricKind::Paraboloid: return across - 2 * (m[2] * n[3] + m[3] * n[2]);
-        case QuadricKind::TwoSheet: return across - m[2] * n[2] + m[3] * n[3];
-        default: return across + m[2] * n[2] - m[3] * n[3];
+        case QuadricKind::Paraboloid:
+          return across - 2 * (m[2] * n[3] + m[3] * n[2]);
+        case QuadricKind::TwoSheet:
+          return across - m[2] * n[2] + m[3] * n[3];
+        default:
+          return across + m[2] * n[2] - m[3] * n[3];
       }
     };
     roots(product, kind == QuadricKind::Ellipsoid, [&](double b) {
@@ -156,7 +166,9 @@ std::optional<QuadricExtent> search(const Quadric& quadric, const HomogeneousRow
                       inParameters(quadric, denominator)};
   const auto& [low, high] = quadric.range;
   switch (quadric.kind) {
-    case QuadricKind::Ellipsoid: result.addSurface(); break;
+    case QuadricKind::Ellipsoid:
+      result.addSurface();
+      break;
     case QuadricKind::Paraboloid:
     case QuadricKind::TwoSheet:  // they bulge between their ends
       result.addSurface();
@@ -172,18 +184,24 @@ std::optional<QuadricExtent> search(const Quadric& quadric, const HomogeneousRow
 }  // namespace
 
 const char* nameOf(QuadricKind kind) {
-  constexpr std::array<const char*, kQuadricKinds> kNames = {
-      "ellipsoid",  "cylinder", "cone", "paraboloid", "one-sheet hyperboloid",
-      "two-sheet hyperboloid"};
+  constexpr std::array<const char*, kQuadricKinds> kNames = {"ellipsoid",
+                                                             "cylinder",
+                                                             "cone",
+                                                             "paraboloid",
+                                                             "one-sheet hyperboloid",
+                                                             "two-sheet hyperboloid"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 
 QuadricRange defaultRange(QuadricKind kind) {
   switch (kind) {
     case QuadricKind::Cone:
-    case QuadricKind::Paraboloid: return {0, 1};
-    case QuadricKind::TwoSheet: return {-2, 2};
-    default: return {-1, 1};
+    case QuadricKind::Paraboloid:
+      return {0, 1};
+    case QuadricKind::TwoSheet:
+      return {-2, 2};
+    default:
+      return {-1, 1};
   }
 }
 

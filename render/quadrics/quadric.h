@@ -31,8 +31,8 @@ inline constexpr int kQuadricKinds = 6;
 struct QuadricRange {
   double low = -1, high = 1;
 };
-/// Default range: of a cone and a paraboloid 0 … 1, of a hyperboloid of two sheets −2 … 2, otherwise
-/// −1 … 1.
+/// Default range: of a cone and a paraboloid 0 … 1, of a hyperboloid of two sheets −2 … 2,
+/// otherwise −1 … 1.
 [[nodiscard]] QuadricRange defaultRange(QuadricKind kind);
 
 /// A piece of a quadric: position + x·axes[0] + y·axes[1] + z·axes[2] for the points (x, y, z) of
@@ -42,7 +42,7 @@ struct Quadric {
   Imath::V3d position{0};  ///< world units
   std::array<Imath::V3d, 3> axes{Imath::V3d(1, 0, 0), Imath::V3d(0, 1, 0), Imath::V3d(0, 0, 1)};
   QuadricRange range = {};
-  bool isCapped = true;  ///< flat disks close the ends of the range
+  bool isCapped = true;                    ///< flat disks close the ends of the range
   Imath::C3f colour{0.66f, 0.62f, 0.56f};  ///< linear, 0 … 1
 };
 

@@ -85,8 +85,7 @@ bool QuadricCaster::isOccluded(const Camera::Ray& ray) const {
   return traceQuadrics(*tables_, ray, true, hasWideVectors()).slot != NearestQuadric::kNoSlot;
 }
 
-QuadricHit QuadricCaster::hitAt(const Camera::Ray& ray, double distance,
-                                std::uint32_t slot) const {
+QuadricHit QuadricCaster::hitAt(const Camera::Ray& ray, double distance, std::uint32_t slot) const {
   const QuadricKernel::QuadricRay relative = relativeRay(*tables_, ray);
   const int face =
       slot < tables_->firstStick() ? QuadricKernel::kSide : tables_->rootIn(slot, relative).face;

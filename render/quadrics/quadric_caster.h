@@ -21,19 +21,19 @@ struct QuadricTables;
 /// First intersection of a ray with quadrics.
 struct QuadricHit {
   bool found = false;
-  double distance = 0;  ///< along the ray, world units
-  Imath::V3d normal{0};  ///< outward unit normal of the quadric
+  double distance = 0;     ///< along the ray, world units
+  Imath::V3d normal{0};    ///< outward unit normal of the quadric
   std::uint32_t slot = 0;  ///< place of the primitive in the tables
 };
 
 /// Quadrics prepared for ray casting, in a tree of boxes with eight children.
 ///
 /// Numbers are stored in single precision, relative to the middle of the model. So a position is
-/// rounded to 2^-24 of the model's half diagonal, wherever the model lies. Tests in single precision
-/// only find the primitives that a ray may meet, with a margin for rounding. The intersections of
-/// these are computed in double precision (render/shaders/quadrics.glsl). The result is the nearest
-/// intersection of all primitives, at equal distances that of the lowest slot, whatever the order
-/// of the tests.
+/// rounded to 2^-24 of the model's half diagonal, wherever the model lies. Tests in single
+/// precision only find the primitives that a ray may meet, with a margin for rounding. The
+/// intersections of these are computed in double precision (render/shaders/exact/quadrics.glsl). The
+/// result is the nearest intersection of all primitives, at equal distances that of the lowest
+/// slot, whatever the order of the tests.
 ///
 /// The class has value semantics. Copies share the data. All methods may run concurrently.
 class QuadricCaster {
@@ -63,8 +63,7 @@ class QuadricCaster {
   /// Colour of the primitive of a hit, linear.
   [[nodiscard]] Imath::C3f colourOf(const QuadricHit& hit) const;
   /// Hit at a distance that a kernel found. @param slot  place of its primitive
-  [[nodiscard]] QuadricHit hitAt(const Camera::Ray& ray, double distance,
-                                 std::uint32_t slot) const;
+  [[nodiscard]] QuadricHit hitAt(const Camera::Ray& ray, double distance, std::uint32_t slot) const;
 
   /// Data for the back ends of the kernel.
   [[nodiscard]] const std::shared_ptr<const QuadricTables>& tables() const { return tables_; }

@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to the ray casting of quadrics: render/shaders/quadrics.glsl as a C++ class.
+// Private to the ray casting of quadrics: render/shaders/exact/quadrics.glsl as a C++ class.
 
 #include <cmath>
 
@@ -13,7 +13,7 @@ struct QuadricKernel {
   static constexpr double kNoRoot = 1e300;
   [[nodiscard]] static double rootOf(double a) { return std::sqrt(a); }
 
-#include "render/shaders/quadrics.glsl"
+#include "render/shaders/exact/quadrics.glsl"
 };
 
 #undef VAR

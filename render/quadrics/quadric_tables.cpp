@@ -209,8 +209,7 @@ QuadricTables makeQuadricTables(const QuadricModel& model, std::size_t maxBytes)
   box.extendBy(boxAroundAll(model.quadrics));
   tables.origin = box.center();
   tables.reach = 0.5 * box.size().length();
-  std::vector<std::uint32_t> order =
-      treeOf(model.balls, tables, kQuadricLanes, tables.trees[0]);
+  std::vector<std::uint32_t> order = treeOf(model.balls, tables, kQuadricLanes, tables.trees[0]);
   tables.balls = emptyBlocks<BallBlock>(order.size() / kQuadricLanes);
   tables.colours.resize(order.size());
   storeAll(order, [&](std::size_t slot, std::uint32_t number) {

@@ -30,8 +30,7 @@ std::optional<double> startAt(const QuadricTables& tables, const QuadricKernel::
   const double px = ray.x + middle * ray.dx, py = ray.y + middle * ray.dy,
                pz = ray.z + middle * ray.dz;
   const double reach = 1.0001 * tables.reach + tables.pad();
-  if (px * px + py * py + pz * pz > reach * reach || middle + reach < ray.near)
-    return std::nullopt;
+  if (px * px + py * py + pz * pz > reach * reach || middle + reach < ray.near) return std::nullopt;
   return std::max(ray.near, middle - reach);
 }
 

@@ -1,8 +1,8 @@
 #include "render/quadrics/quadric_tree.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
-#include <tbb/blocked_range.h>
 
 #include <algorithm>
 #include <array>
@@ -136,7 +136,9 @@ class TreeBuilder {
     if (range.size() < kParallelRange) return add(range.begin, range.end, {});
     return tbb::parallel_reduce(
         tbb::blocked_range<std::size_t>(range.begin, range.end, kParallelRange / 2), SplitBins(),
-        [&](const auto& part, const SplitBins& bins) { return add(part.begin(), part.end(), bins); },
+        [&](const auto& part, const SplitBins& bins) {
+          return add(part.begin(), part.end(), bins);
+        },
         [](SplitBins a, const SplitBins& b) {
           a.add(b);
           return a;
@@ -180,9 +182,9 @@ class TreeBuilder {
       }
     }
     if (bestAxis < 0) return splitSorted(range);
-    const auto middle = std::partition(
-        at(range.begin), at(range.end),
-        [&](const PrimitiveBox& box) { return scale.of(box, bestAxis) < bestBin; });
+    const auto middle =
+        std::partition(at(range.begin), at(range.end),
+                       [&](const PrimitiveBox& box) { return scale.of(box, bestAxis) < bestBin; });
     const auto place = static_cast<std::size_t>(middle - boxes_.begin());
     return {measured(range.begin, place), measured(place, range.end)};
   }
@@ -195,8 +197,8 @@ class TreeBuilder {
     return unit;
   }
 
-  /// Sorts a range along its longest axis, and splits it so that blocks and nodes are full as far as
-  /// possible.
+  /// Sorts a range along its longest axis, and splits it so that blocks and nodes are full as far
+  /// as possible.
   [[nodiscard]] std::pair<BoxRange, BoxRange> splitSorted(const BoxRange& range) {
     int axis = 0;
     for (int c = 1; c < 3; ++c)

@@ -17,8 +17,8 @@
 ///
 /// Kinds are "sphere", "ellipsoid", "cylinder", "cone", "paraboloid", "one-sheet hyperboloid" and
 /// "two-sheet hyperboloid". All but the sphere have a position, three axes, and the range of z in
-/// their own coordinates (Quadric). Two ends and a radius stand for a circular cylinder. Colours are
-/// linear, from 0 to 1.
+/// their own coordinates (Quadric). Two ends and a radius stand for a circular cylinder. Colours
+/// are linear, from 0 to 1.
 namespace render {
 
 /// Returns true if a file is a JSON document whose member "format" names quadrics.

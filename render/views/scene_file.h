@@ -43,8 +43,8 @@ struct ReadSceneOptions {
   levelset::Progress progress = {};
 };
 
-/// Reads a scene. The file of a Bézier volume (bezier_file.h) is a scene with that volume alone, and
-/// a file of quadrics (quadric_file.h) is a scene with these.
+/// Reads a scene. The file of a Bézier volume (bezier_file.h) is a scene with that volume alone,
+/// and a file of quadrics (quadric_file.h) is a scene with these.
 /// @throws levelset::IoError when a file cannot be read
 /// @throws levelset::InvalidInput for a file that is not a scene; the message names the reason and
 ///         the location

@@ -1,6 +1,7 @@
-// Ray casting of spheres and cylinders beside Embree's own primitives, in one run: time of the build,
-// rays a second of CPU time on one thread, memory. Then scenes of the published sizes [Sigg06].
-// Usage: quadrics_bench [COUNT …]; without counts 10^4, 10^5 and 10^6, then the published scenes.
+// Ray casting of spheres and cylinders beside Embree's own primitives, in one run: time of the
+// build, rays a second of CPU time on one thread, memory. Then scenes of the published sizes
+// [Sigg06]. Usage: quadrics_bench [COUNT …]; without counts 10^4, 10^5 and 10^6, then the published
+// scenes.
 #include <embree3/rtcore.h>
 #include <fmt/core.h>
 #include <sys/resource.h>
@@ -91,9 +92,9 @@ struct Peer {
   void add(const std::vector<Stick>& sticks) {
     if (sticks.empty()) return;
     const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_CONE_LINEAR_CURVE);
-    auto* to = static_cast<float*>(
-        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4,
-                                4 * sizeof(float), 2 * sticks.size()));
+    auto* to = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
+                                                           RTC_FORMAT_FLOAT4, 4 * sizeof(float),
+                                                           2 * sticks.size()));
     auto* index = static_cast<unsigned*>(rtcSetNewGeometryBuffer(
         geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, sizeof(unsigned), sticks.size()));
     for (std::size_t n = 0; n < sticks.size(); ++n) {
@@ -255,7 +256,8 @@ void compare(const char* name, const QuadricModel& model) {
   const double peerWall = wallSeconds() - wall, peerCpu = cpuSeconds() - cpu;
   const std::size_t count = model.size();
   fmt::print(
-      "{} {}: build {:.3f} s (CPU {:.3f} s), Embree {:.3f} s (CPU {:.3f} s); {:.1f} bytes each ({:.0f} MB "
+      "{} {}: build {:.3f} s (CPU {:.3f} s), Embree {:.3f} s (CPU {:.3f} s); {:.1f} bytes each "
+      "({:.0f} MB "
       "resident), Embree {:.1f}\n",
       count, name, ownWall, ownCpu, peerWall, peerCpu,
       static_cast<double>(caster.bytes()) / static_cast<double>(count),
@@ -266,13 +268,10 @@ void compare(const char* name, const QuadricModel& model) {
   const std::vector<Camera::Ray> sky = skyRays(caster, views);
   constexpr int kRepetitions = 3;
   const auto both = [&](const char* what, const std::vector<Camera::Ray>& rays, bool occlusion) {
-    const Casting mine =
-        bestOf(kRepetitions, [&] { return castOwn(caster, rays, occlusion); });
-    Casting other =
-        bestOf(kRepetitions, [&] { return castSingle(peer.scene, rays, occlusion); });
+    const Casting mine = bestOf(kRepetitions, [&] { return castOwn(caster, rays, occlusion); });
+    Casting other = bestOf(kRepetitions, [&] { return castSingle(peer.scene, rays, occlusion); });
     if (!occlusion) {
-      const Casting eight =
-          bestOf(kRepetitions, [&] { return castPackets<8>(peer.scene, rays); });
+      const Casting eight = bestOf(kRepetitions, [&] { return castPackets<8>(peer.scene, rays); });
       const Casting sixteen =
           bestOf(kRepetitions, [&] { return castPackets<16>(peer.scene, rays); });
       fmt::print("  Embree alone: single {:.2f}, packets of 8 {:.2f}, of 16 {:.2f}\n",
@@ -306,10 +305,11 @@ void published(const char* name, std::size_t balls, std::size_t sticks) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  fmt::print("million rays a second of CPU time on one thread; the peer is the fastest of Embree's "
-             "single rays and packets\n"
-             "  {:<28} {:>9} {:>9} {:>9} {:>6}\n",
-             "rays", "count", "own", "Embree", "ratio");
+  fmt::print(
+      "million rays a second of CPU time on one thread; the peer is the fastest of Embree's "
+      "single rays and packets\n"
+      "  {:<28} {:>9} {:>9} {:>9} {:>6}\n",
+      "rays", "count", "own", "Embree", "ratio");
   if (argc > 1) {
     for (int n = 1; n < argc; ++n) compareAt(std::strtoull(argv[n], nullptr, 10));
     return 0;

@@ -52,8 +52,7 @@ inline render::Quadric randomQuadric(render::QuadricKind kind, const V3d& positi
   quadric.position = position;
   const V3d x = numbers.unit(), y = x.cross(numbers.unit()).normalized(), z = x.cross(y);
   const V3d frame[3] = {x, y, z};
-  for (std::size_t n = 0; n < 3; ++n)
-    quadric.axes[n] = frame[n] * std::pow(ratio, -numbers());
+  for (std::size_t n = 0; n < 3; ++n) quadric.axes[n] = frame[n] * std::pow(ratio, -numbers());
   quadric.axes[1] += quadric.axes[0] * numbers.between(-0.3, 0.3);  // not orthogonal
   quadric.range = render::defaultRange(kind);
   if (kind != render::QuadricKind::Ellipsoid) {

@@ -84,8 +84,8 @@ void showVolume(const fs::path& file, const levelset::Volume& volume, const Open
        .volume = std::make_shared<const render::VolumeSurface>(model.volume->surface)});
 }
 
-/// Paths of the level sets, meshes, volumes, Bézier volumes and quadrics that a scene file names. @pre
-/// readScene() accepts the file
+/// Paths of the level sets, meshes, volumes, Bézier volumes and quadrics that a scene file names.
+/// @pre readScene() accepts the file
 std::vector<fs::path> solidFilesOf(const fs::path& scene) {
   std::vector<fs::path> files;
   std::ifstream stream(scene);

@@ -91,8 +91,12 @@ MatrixQuadric matrixOf(const Quadric& quadric) {
       result.addSquare(rows[2], 1);
       result.constant = -1;
       break;
-    case QuadricKind::Cylinder: result.constant = -1; break;
-    case QuadricKind::Cone: result.addSquare(rows[2], -1); break;
+    case QuadricKind::Cylinder:
+      result.constant = -1;
+      break;
+    case QuadricKind::Cone:
+      result.addSquare(rows[2], -1);
+      break;
     case QuadricKind::Paraboloid:
       for (std::size_t i = 0; i < 3; ++i) result.linear[i] = -rows[2][i] / 2;
       break;
@@ -119,10 +123,16 @@ Box3d looseBox(const Quadric& quadric) {
   QuadricRange range = quadric.range;
   const double most = std::max(std::abs(range.low), std::abs(range.high));
   switch (quadric.kind) {
-    case QuadricKind::Ellipsoid: range = {-1, 1}; break;
-    case QuadricKind::Paraboloid: radius = std::sqrt(most); break;
-    case QuadricKind::Cylinder: break;
-    default: radius = std::hypot(most, 1.0);
+    case QuadricKind::Ellipsoid:
+      range = {-1, 1};
+      break;
+    case QuadricKind::Paraboloid:
+      radius = std::sqrt(most);
+      break;
+    case QuadricKind::Cylinder:
+      break;
+    default:
+      radius = std::hypot(most, 1.0);
   }
   Box3d box;
   for (const double x : {-radius, radius})

@@ -17,8 +17,8 @@ struct JudgedQuadric {
   Imath::C3f colour{0};
 };
 
-/// The judge of quadrics: Embree finds the primitives whose boxes a ray meets, and each is solved in
-/// extended precision by its symmetric matrix in world space. It shares no code with the kernel.
+/// The judge of quadrics: Embree finds the primitives whose boxes a ray meets, and each is solved
+/// in extended precision by its symmetric matrix in world space. It shares no code with the kernel.
 /// Methods may run concurrently.
 class QuadricJudge {
  public:

@@ -179,9 +179,8 @@ void listBoxes(const std::vector<QuadricNode>& nodes, std::uint32_t number, std:
     }
     const std::uint32_t child = node.child[n];
     const bool isLeaf = (child & QuadricNode::kLeaf) != 0;
-    box.first = isLeaf ? static_cast<std::int32_t>(firstSlot +
-                                                   width * (child & ~QuadricNode::kLeaf))
-                       : -1;
+    box.first =
+        isLeaf ? static_cast<std::int32_t>(firstSlot + width * (child & ~QuadricNode::kLeaf)) : -1;
     if (!isLeaf) listBoxes(nodes, child, firstSlot, width, list);
     list[at].skip = static_cast<std::int32_t>(list.size());
   }
@@ -234,9 +233,9 @@ void GpuQuadrics::upload(const QuadricTables& tables) {
   // The limit counts texels of four bytes.
   const auto add = [&](const void* data, std::size_t bytes, GLenum format, std::size_t texel) {
     constexpr std::uint32_t kNone = 0;  // an empty texture is not allowed
-    textures_[next++] =
-        bytes > 0 ? makeTexels(context_, largestTable_ / 4 * texel, data, bytes, format)
-                  : makeTexels(context_, largestTable_, &kNone, sizeof kNone, GL_R32I);
+    textures_[next++] = bytes > 0
+                            ? makeTexels(context_, largestTable_ / 4 * texel, data, bytes, format)
+                            : makeTexels(context_, largestTable_, &kNone, sizeof kNone, GL_R32I);
   };
   add(boxes.data(), boxes.size() * sizeof(ListedBox), GL_RGBA32I, 16);
   add(tables.balls.data(), tables.balls.size() * sizeof(BallBlock), GL_R32I, 4);

@@ -226,8 +226,8 @@ Value draw(Invocation& in) {
                         : isBoth            ? drawByKernel(in, scene, options)
                                             : render::renderEmbree(scene, options);
   const auto read = image.attributes.find("ls:read");
-  if (read != image.attributes.end() &&
-      (!scene.solids.empty() || !scene.meshes.empty() || !scene.quadrics.empty() || scene.segmented))
+  if (read != image.attributes.end() && (!scene.solids.empty() || !scene.meshes.empty() ||
+                                         !scene.quadrics.empty() || scene.segmented))
     in.notes.notes.push_back(fmt::format("render: {}", read->second));
   if (const auto cast = image.attributes.find("ls:onProcessor"); cast != image.attributes.end())
     in.notes.notes.push_back(fmt::format("render: {}", cast->second));

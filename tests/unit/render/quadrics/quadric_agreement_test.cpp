@@ -78,8 +78,9 @@ Differences differencesOf(QuadricKind kind, std::size_t count, double ratio, con
     const QuadricCaster caster(model);
     for (const Camera& camera : camerasOf(caster, size, numbers)) compare(caster, camera, all);
   }
-  std::printf("%s: %zu rays, %zu hits (%zu from within), %zu by one only, distance %.2g, normal %.2g\n",
-              nameOf(kind), all.rays, all.hits, all.within, all.oneOnly, all.distance, all.normal);
+  std::printf(
+      "%s: %zu rays, %zu hits (%zu from within), %zu by one only, distance %.2g, normal %.2g\n",
+      nameOf(kind), all.rays, all.hits, all.within, all.oneOnly, all.distance, all.normal);
   return all;
 }
 
@@ -114,9 +115,9 @@ class SlowQuadricKinds : public testing::TestWithParam<int> {};
 TEST_P(SlowQuadricKinds, ThousandAgreeWithTheJudge) {
   // A third of them have axes of equal length, a third ratios up to 1e4, a third lie far away.
   const auto kind = static_cast<QuadricKind>(GetParam());
-  for (const Differences& all : {differencesOf(kind, 334, 1, V3d(0), 32),
-                                 differencesOf(kind, 333, 1e4, V3d(0), 32),
-                                 differencesOf(kind, 333, 3, V3d(1e6, 1e6, -1e6), 32)}) {
+  for (const Differences& all :
+       {differencesOf(kind, 334, 1, V3d(0), 32), differencesOf(kind, 333, 1e4, V3d(0), 32),
+        differencesOf(kind, 333, 3, V3d(1e6, 1e6, -1e6), 32)}) {
     EXPECT_EQ(all.oneOnly, 0U);
     EXPECT_GT(all.hits, all.rays / 10);
   }
@@ -126,8 +127,8 @@ INSTANTIATE_TEST_SUITE_P(All, SlowQuadricKinds, testing::Range(0, kQuadricKinds)
 
 TEST(QuadricCaster, FindsTheNearestOfMany) {
   Numbers numbers(5);
-  QuadricModel model{quadric_scenes::ballsInCube(700, numbers),
-                     quadric_scenes::sticksInCube(600, numbers), {}};
+  QuadricModel model{
+      quadric_scenes::ballsInCube(700, numbers), quadric_scenes::sticksInCube(600, numbers), {}};
   for (int n = 0; n < 60; ++n)
     model.quadrics.push_back(quadric_scenes::randomQuadric(static_cast<QuadricKind>(n % 6),
                                                            numbers.inBox(1), 3, numbers));
@@ -143,9 +144,8 @@ TEST(QuadricCaster, FindsTheNearestOfMany) {
 
 TEST(QuadricCaster, HasTheBitsOfATestOfAllOnBothInstructionSets) {
   Numbers numbers(6);
-  const QuadricModel model{quadric_scenes::ballsInCube(3000, numbers),
-                           quadric_scenes::sticksInCube(2000, numbers),
-                           {}};
+  const QuadricModel model{
+      quadric_scenes::ballsInCube(3000, numbers), quadric_scenes::sticksInCube(2000, numbers), {}};
   const QuadricCaster caster(model);
   const QuadricTables& tables = *caster.tables();
   std::size_t hits = 0;

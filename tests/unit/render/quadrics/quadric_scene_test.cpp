@@ -28,12 +28,11 @@ const RenderOptions kPlain{.samples = 1, .ambientSamples = 0, .shadowSamples = 0
 
 QuadricModel mixedModel() {
   Numbers numbers(11);
-  QuadricModel model{quadric_scenes::ballsInCube(40, numbers),
-                     quadric_scenes::sticksInCube(30, numbers),
-                     {}};
+  QuadricModel model{
+      quadric_scenes::ballsInCube(40, numbers), quadric_scenes::sticksInCube(30, numbers), {}};
   for (int n = 0; n < 6; ++n) {
-    Quadric quadric = quadric_scenes::randomQuadric(static_cast<QuadricKind>(n),
-                                                    numbers.inBox(1), 2, numbers);
+    Quadric quadric =
+        quadric_scenes::randomQuadric(static_cast<QuadricKind>(n), numbers.inBox(1), 2, numbers);
     for (V3d& axis : quadric.axes) axis *= 0.3;
     model.quadrics.push_back(quadric);
   }

@@ -23,12 +23,18 @@ using namespace render;
 
 double radiusAt(QuadricKind kind, double z) {
   switch (kind) {
-    case QuadricKind::Ellipsoid: return std::sqrt(std::max(0.0, 1 - z * z));
-    case QuadricKind::Cylinder: return 1;
-    case QuadricKind::Cone: return std::abs(z);
-    case QuadricKind::Paraboloid: return z >= 0 ? std::sqrt(z) : -1;
-    case QuadricKind::OneSheet: return std::sqrt(1 + z * z);
-    case QuadricKind::TwoSheet: return std::abs(z) >= 1 ? std::sqrt(z * z - 1) : -1;
+    case QuadricKind::Ellipsoid:
+      return std::sqrt(std::max(0.0, 1 - z * z));
+    case QuadricKind::Cylinder:
+      return 1;
+    case QuadricKind::Cone:
+      return std::abs(z);
+    case QuadricKind::Paraboloid:
+      return z >= 0 ? std::sqrt(z) : -1;
+    case QuadricKind::OneSheet:
+      return std::sqrt(1 + z * z);
+    case QuadricKind::TwoSheet:
+      return std::abs(z) >= 1 ? std::sqrt(z * z - 1) : -1;
   }
   return -1;
 }
@@ -109,8 +115,8 @@ TEST(QuadricBox, ContainsAllPixelsAndNoEmptyBorder) {
   // The pixels that the caster draws, against the box: at most one pixel of it is empty on a side.
   Numbers numbers(3);
   for (int n = 0; n < 60; ++n) {
-    const Quadric quadric = quadric_scenes::randomQuadric(static_cast<QuadricKind>(n % 6), V3d(0),
-                                                          3, numbers);
+    const Quadric quadric =
+        quadric_scenes::randomQuadric(static_cast<QuadricKind>(n % 6), V3d(0), 3, numbers);
     Quadric capped = quadric;
     capped.isCapped = true;
     Camera camera;
@@ -152,8 +158,8 @@ TEST(QuadricBox, IsThatOfTheSameSolidInCompactForm) {
   for (int n = 0; n < 50; ++n) {
     const Stick stick{numbers.inBox(2), numbers.inBox(2), static_cast<float>(numbers()), 0};
     const Imath::Box3d box = boundsOf(quadricOf(stick));
-    const std::vector<double> extents = QuadricCaster({{}, {stick}, {}})
-                                            .extents({V3d(1, 0, 0), V3d(0, 1, 0), V3d(0, 0, -1)});
+    const std::vector<double> extents =
+        QuadricCaster({{}, {stick}, {}}).extents({V3d(1, 0, 0), V3d(0, 1, 0), V3d(0, 0, -1)});
     EXPECT_NEAR(extents[0], box.max.x, 1e-6);
     EXPECT_NEAR(extents[1], box.max.y, 1e-6);
     EXPECT_NEAR(extents[2], -box.min.z, 1e-6);

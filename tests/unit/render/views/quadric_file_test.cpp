@@ -45,12 +45,11 @@ TEST(QuadricFile, ReadsAllKinds) {
 TEST(QuadricFile, IsReadAsItWasWritten) {
   const support::TemporaryFolder folder;
   quadric_scenes::Numbers numbers(3);
-  QuadricModel model{quadric_scenes::ballsInCube(20, numbers),
-                     quadric_scenes::sticksInCube(20, numbers),
-                     {}};
+  QuadricModel model{
+      quadric_scenes::ballsInCube(20, numbers), quadric_scenes::sticksInCube(20, numbers), {}};
   for (int n = 0; n < kQuadricKinds; ++n)
-    model.quadrics.push_back(quadric_scenes::randomQuadric(static_cast<QuadricKind>(n),
-                                                           numbers.inBox(2), 5, numbers));
+    model.quadrics.push_back(
+        quadric_scenes::randomQuadric(static_cast<QuadricKind>(n), numbers.inBox(2), 5, numbers));
   const auto file = folder.path() / "some.json";
   writeQuadrics(file, model);
   EXPECT_TRUE(isQuadricFile(file));
@@ -106,12 +105,13 @@ TEST(QuadricFile, NamesTheEntryThatIsWrong) {
          "has an unknown \"id\"");
   expect(documentWith(R"({"kind": "cylinder", "ends": [[0, 0, 0]], "radius": 1})"),
          "has \"ends\" that are not 2 lists");
-  expect(documentWith(
-             R"({"kind": "sphere", "centre": [0, 0, 0], "radius": 1, "colour": [0, 2, 0]})"),
-         "has a \"colour\" with a number outside 0 … 1");
-  expect(documentWith(
-             R"({"kind": "cone", "position": [0, 0, 0], "axes": [[1, 0, 0], [0, 1, 0], [1, 1, 0]]})"),
-         "quadric 0 has axes in one plane");
+  expect(
+      documentWith(R"({"kind": "sphere", "centre": [0, 0, 0], "radius": 1, "colour": [0, 2, 0]})"),
+      "has a \"colour\" with a number outside 0 … 1");
+  expect(
+      documentWith(
+          R"({"kind": "cone", "position": [0, 0, 0], "axes": [[1, 0, 0], [0, 1, 0], [1, 1, 0]]})"),
+      "quadric 0 has axes in one plane");
 }
 
 }  // namespace quadric_file_test
