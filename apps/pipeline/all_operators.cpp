@@ -1,6 +1,7 @@
 #include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/flow/morph_action.h"
 #include "apps/pipeline/operators/level_set_operator.h"
+#include "apps/pipeline/operators/pictures/effect_operator.h"
 #include "apps/pipeline/operators/solids/adaptive_actions.h"
 #include "apps/pipeline/operators/solids/deform_action.h"
 #include "apps/pipeline/operators/solids/mesh_action.h"
@@ -108,6 +109,7 @@ std::vector<Operator> allOperators() {
       sliceOperator(),
       renderOperator(),
       compareImagesOperator(),
+      effectOperator(),
       regressOperator(),
       cacheOperator(),
   };

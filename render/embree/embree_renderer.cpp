@@ -59,6 +59,20 @@ struct PixelPainter {
     if (!hit.found) return;
     layers.setHit(i, scene.camera, hit);
     layers.setCurvature(i, hit);
+    if (!layers.light[0]) return;
+    std::vector<LightRay> lights;
+    const PointLight found = traced(shader.addPixelRays(hit, ray.direction, x, y, lights), lights);
+    layers.setLight(i, found.sky, found.key);
+  }
+
+  /// Traces light rays. @param range  all of `lights`
+  [[nodiscard]] PointLight traced(const LightRays& range,
+                                  const std::vector<LightRay>& lights) const {
+    std::vector<double> transmittances;
+    for (const LightRay& light : lights)
+      transmittances.push_back(
+          rays.transmittance(light.origin, light.direction, light.maxDistance));
+    return Shader::lightOf(range, lights, transmittances);
   }
 
   /// Light of the scene's volume on a part of a ray.
@@ -71,16 +85,10 @@ struct PixelPainter {
   void paintColour(int x, int y, std::size_t i) const {
     const PixelSequence area = PixelSequence::overArea(x, y);
     std::vector<LightRay> lights;
-    std::vector<double> transmittances;
     ColourSum sum;
     const auto lightAt = [&](const Hit& hit, const V3d& direction, int s) {
       lights.clear();
-      const LightRays range = shader.addRays(hit, direction, x, y, s, lights);
-      transmittances.clear();
-      for (const LightRay& light : lights)
-        transmittances.push_back(
-            rays.transmittance(light.origin, light.direction, light.maxDistance));
-      return Shader::lightOf(range, lights, transmittances);
+      return traced(shader.addRays(hit, direction, x, y, s, lights), lights);
     };
     for (int s = 0; s < options.samples; ++s) {
       const V2d at = area.at(s);

@@ -141,16 +141,8 @@ std::vector<char> encodeExr(const Image& image) {
 
 // === PNG
 
-/// Display value in [0, 1] of a linear colour component: linear up to kKnee, then a smooth approach
-/// to 1, so that highlights do not clip. The sRGB curve is applied last.
-double toneCurve(double linear) {
-  constexpr double kKnee = 0.6;
-  if (!(linear > 0)) return 0;
-  const double x = linear <= kKnee
-                       ? linear
-                       : kKnee + (1 - kKnee) * (1 - std::exp(-(linear - kKnee) / (1 - kKnee)));
-  return x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055;
-}
+// Linear colours up to this value are displayed without compression.
+constexpr double kKnee = 0.6;
 
 std::uint8_t toByte(double unit) {
   return static_cast<std::uint8_t>(std::lround(255 * std::clamp(unit, 0.0, 1.0)));
@@ -222,6 +214,24 @@ std::vector<float>& Image::addChannel(const std::string& name, float fill) {
   return channel;
 }
 
+// Linear up to kKnee, then a smooth approach to 1, so that highlights do not clip. The sRGB curve
+// is applied last.
+double displayOfLinear(double linear) {
+  if (!(linear > 0)) return 0;
+  const double x = linear <= kKnee
+                       ? linear
+                       : kKnee + (1 - kKnee) * (1 - std::exp(-(linear - kKnee) / (1 - kKnee)));
+  return x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055;
+}
+
+double linearOfDisplay(double display) {
+  constexpr double kBrightest = 0.9985;  // the curve reaches 1 at infinity
+  const double shown = std::clamp(display, 0.0, kBrightest);
+  const double x =
+      shown <= 12.92 * 0.0031308 ? shown / 12.92 : std::pow((shown + 0.055) / 1.055, 2.4);
+  return x <= kKnee ? x : kKnee - (1 - kKnee) * std::log(1 - (x - kKnee) / (1 - kKnee));
+}
+
 std::string imageFormat(const std::filesystem::path& path, const std::string& format) {
   std::string kind = format;
   if (kind.empty() && path.has_extension()) kind = path.extension().string().substr(1);
@@ -246,7 +256,8 @@ std::vector<std::uint8_t> displayColours(const Image& image) {
   for (std::size_t i = 0; i < image.pixelCount(); ++i) {
     const double a = alpha == image.channels.end() ? 1 : static_cast<double>(alpha->second[i]);
     for (std::size_t c = 0; c < 3; ++c)
-      pixels[4 * i + c] = a > 0 ? toByte(toneCurve(static_cast<double>((*colour[c])[i]) / a)) : 0;
+      pixels[4 * i + c] =
+          a > 0 ? toByte(displayOfLinear(static_cast<double>((*colour[c])[i]) / a)) : 0;
     pixels[4 * i + 3] = toByte(std::isfinite(a) ? a : 0);
   }
   return pixels;

@@ -55,6 +55,12 @@ struct Image {
 void writeImage(const std::filesystem::path& path, const Image& image,
                 const std::string& format = {});
 
+/// Display value in [0, 1] of a linear colour component, as in the PNG of an image.
+[[nodiscard]] double displayOfLinear(double linear);
+/// Linear colour component that is displayed as `display`. Values at 1 become a number that a PNG
+/// of 8 bits shows as 255.
+[[nodiscard]] double linearOfDisplay(double display);
+
 /// Computes the pixels of the PNG of an image: red, green, blue and alpha of 8 bits each, as in
 /// writeImage().
 /// @throws levelset::UsageError for an image without R G B

@@ -14,7 +14,7 @@ using Imath::V3d;
 FrustumCulling::FrustumCulling(const Scene& scene, const RenderOptions& options,
                                const Imath::Box3d& bounds) {
   const Camera& camera = scene.camera;
-  const bool isLit = usesLights(options.style.style);
+  const bool isLit = options.lightLayers || usesLights(options.style.style);
   // With a CSG expression, the kernel follows occlusion rays through all solids, however far, to
   // know where the rays start inside. So nothing can be culled.
   if (isLit && options.ambientSamples > 0 && !scene.csg.isEmpty()) return;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <mutex>
+#include <utility>
 
 #include "render/shading/principal_direction.h"
 #include "render/shading/surface_shape.h"
@@ -54,7 +55,8 @@ KernelPainter::KernelPainter(const Scene& scene, const KernelScene& surfaces,
 void KernelPainter::paint(const KernelTracer& tracer, const PixelBox& box) const {
   const std::vector<Pixel> pixels = pixelsOf(box);
   const LightLattice lattice = latticeOf(tracer, box);
-  const bool isColoursOnly = !options_.layers && !usesLights(options_.style.style);
+  const bool isColoursOnly =
+      !options_.layers && !options_.lightLayers && !usesLights(options_.style.style);
   const std::vector<char> contradicts =
       isColoursOnly ? std::vector<char>(pixels.size(), 0) : paintData(tracer, pixels, lattice);
   paintColours(tracer, pixels, lattice, contradicts);
@@ -244,6 +246,7 @@ std::vector<char> KernelPainter::paintData(const KernelTracer& tracer,
   const PixelHits hits = surfaces_.castPixels(tracer, at);
   const FirstHits first = firstHits(tracer, views);
   std::vector<VolumeSegment> inVolume;  // from the camera to the first surfaces
+  std::vector<Hit> seen;                // for the layers of light
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     const auto& [x, y] = pixels[i];
     const std::size_t number = numberOf(pixels[i]);
@@ -251,6 +254,7 @@ std::vector<char> KernelPainter::paintData(const KernelTracer& tracer,
     Hit hit = hitOf(ray, ray.near, hits, first, i);
     if (layers_.volume[0])
       inVolume.push_back({ray.origin, ray.direction, ray.near, hit.found ? hit.distance : ray.far});
+    if (layers_.light[0]) seen.push_back(hit);
     if (hit.found) {
       layers_.setHit(number, scene_.camera, hit);
       layers_.setCurvature(number, hit);
@@ -264,6 +268,7 @@ std::vector<char> KernelPainter::paintData(const KernelTracer& tracer,
       probes.push_back({i, estimate.light.key,
                         shader_.addShadowRays(hit, ray.direction, x, y, kProbes, shadowRays)});
   }
+  if (layers_.light[0]) paintLight(tracer, pixels, views, seen);
   if (layers_.volume[0]) {
     const std::vector<VolumeLight> light = lightOfVolume(tracer, inVolume);
     for (std::size_t i = 0; i < pixels.size(); ++i)
@@ -277,6 +282,30 @@ std::vector<char> KernelPainter::paintData(const KernelTracer& tracer,
     contradicts[probe.pixel] = std::abs(found - probe.expected) > 0.9 ? 1 : 0;
   }
   return contradicts;
+}
+
+void KernelPainter::paintLight(const KernelTracer& tracer, const std::vector<Pixel>& pixels,
+                               const std::vector<Camera::Ray>& views,
+                               const std::vector<Hit>& seen) const {
+  std::vector<LightRay> rays;
+  std::vector<std::pair<std::size_t, LightRays>> ranges;  // with the numbers of the pixels
+  const auto trace = [&] {
+    const std::vector<double> light = surfaces_.transmittances(tracer, rays);
+    for (const auto& [number, range] : ranges) {
+      const PointLight found = Shader::lightOf(range, rays, light);
+      layers_.setLight(number, found.sky, found.key);
+    }
+    rays.clear();
+    ranges.clear();
+  };
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    if (!seen[i].found) continue;
+    if (rays.size() > kMostLightRays) trace();
+    const auto& [x, y] = pixels[i];
+    ranges.emplace_back(numberOf(pixels[i]),
+                        shader_.addPixelRays(seen[i], views[i].direction, x, y, rays));
+  }
+  trace();
 }
 
 void KernelPainter::paintColours(const KernelTracer& tracer, const std::vector<Pixel>& pixels,

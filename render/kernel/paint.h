@@ -51,6 +51,10 @@ class KernelPainter {
   /// @return for each pixel: nonzero if a shadow ray from its centre contradicts the lattice
   std::vector<char> paintData(const KernelTracer& tracer, const std::vector<Pixel>& pixels,
                               const LightLattice& lattice) const;
+  /// Traces the light of the pixels' first surfaces, for its layers. @param seen  a hit or none for
+  /// each pixel
+  void paintLight(const KernelTracer& tracer, const std::vector<Pixel>& pixels,
+                  const std::vector<Camera::Ray>& views, const std::vector<Hit>& seen) const;
   /// Paints the mean colours of samples spread over the pixels' areas.
   /// @param contradicts  result of paintData()
   void paintColours(const KernelTracer& tracer, const std::vector<Pixel>& pixels,

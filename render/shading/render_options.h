@@ -40,6 +40,9 @@ struct RenderOptions {
   [[nodiscard]] bool hasDirections() const {
     return directions || style.style == Style::CurvatureLines;
   }
+  /// Adds the layers light.sky and light.key: shares of the light that reaches the first surface.
+  /// They are traced with ambientSamples and shadowSamples rays for each colour sample.
+  bool lightLayers = false;
   /// Adds the layers volume.R .G .B .A to a picture with Scene::volumePart.
   bool volumeLight = true;
   /// Memory limit, bytes. It applies to the image and, separately, to the kernel's tables of the

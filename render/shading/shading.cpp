@@ -190,6 +190,18 @@ LightRays Shader::addShadowRays(const Hit& hit, const V3d& direction, int x, int
   return range;
 }
 
+LightRays Shader::addPixelRays(const Hit& hit, const V3d& direction, int x, int y,
+                               std::vector<LightRay>& rays) const {
+  LightRays range;
+  range.first = rays.size();
+  const Frame frame = frameOf(hit, direction);
+  for (int s = 0; s < options_.samples; ++s) addSkyRays(frame, x, y, s, rays);
+  range.sky = rays.size() - range.first;
+  range.behind = addKeyRays(frame, x, y, 0, options_.samples * options_.shadowSamples, rays);
+  range.key = rays.size() - range.first - range.sky;
+  return range;
+}
+
 PointLight Shader::lightOf(const LightRays& range, const std::vector<LightRay>& rays,
                            const std::vector<double>& transmittances) {
   const auto shareOf = [&](std::size_t first, std::size_t count, double behind) {
@@ -332,11 +344,8 @@ C3f Shader::matcapColour(const Frame& frame) const {
 }
 
 C3f Shader::reflectionColour(const Frame& frame, const V3d& direction) const {
-  const V3d mirrored = direction - frame.normal * (2 * direction.dot(frame.normal));
-  const double line = reflectionLineAt(mirrored, up_, right_, options_.style.reflectionLines);
-  // A little light from above shows the shape between the lines.
-  const double upward = 0.75 + 0.25 * frame.normal.dot(up_);
-  return scaled(C3f(0.03f) + C3f(0.80f, 0.82f, 0.85f) * static_cast<float>(line), upward);
+  return reflectionLinesColour(frame.normal, direction, up_, right_,
+                               options_.style.reflectionLines);
 }
 
 }  // namespace render

@@ -78,6 +78,11 @@ class Shader {
   [[nodiscard]] LightRays addShadowRays(const Hit& hit, const Imath::V3d& direction, int x, int y,
                                         int count, std::vector<LightRay>& rays) const;
 
+  /// Appends the light rays of a hit for all samples of a pixel, for the layers of light. Traces
+  /// light for styles without lights, too.
+  [[nodiscard]] LightRays addPixelRays(const Hit& hit, const Imath::V3d& direction, int x, int y,
+                                       std::vector<LightRay>& rays) const;
+
   /// Computes the light that reaches a hit. @param range  light rays of the hit, from addRays()
   /// @param transmittances  for each of `rays`: share of its light that reaches the hit
   [[nodiscard]] static PointLight lightOf(const LightRays& range, const std::vector<LightRay>& rays,

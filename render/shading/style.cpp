@@ -126,6 +126,16 @@ double accessibilityOf(const CurvatureSample& sample, double range) {
   return 1 - ramp(0, 1, squeezed(std::max(0.0, -sample.k2), range));
 }
 
+Imath::C3f reflectionLinesColour(const Imath::V3d& normal, const Imath::V3d& direction,
+                                 const Imath::V3d& up, const Imath::V3d& side, int lines) {
+  const Imath::V3d mirrored = direction - normal * (2 * direction.dot(normal));
+  const double line = reflectionLineAt(mirrored, up, side, lines);
+  // A little light from above shows the shape between the lines.
+  const double upward = 0.75 + 0.25 * normal.dot(up);
+  return (Imath::C3f(0.03f) + Imath::C3f(0.80f, 0.82f, 0.85f) * static_cast<float>(line)) *
+         static_cast<float>(upward);
+}
+
 double silhouetteOf(double cosine, double viewCurvature, double width) {
   // The line covers the points that appear within `width` of the outline of the surface. A surface
   // that is concave along the view has no outline nearby.

@@ -117,6 +117,13 @@ struct StyleOptions {
 [[nodiscard]] double reflectionLineAt(const Imath::V3d& direction, const Imath::V3d& up,
                                       const Imath::V3d& side, int lines);
 
+/// Linear colour of a mirroring surface that reflects parallel lines, see reflectionLineAt().
+/// @param normal  unit normal, towards the eye
+/// @param direction  unit direction of the view ray
+[[nodiscard]] Imath::C3f reflectionLinesColour(const Imath::V3d& normal,
+                                               const Imath::V3d& direction, const Imath::V3d& up,
+                                               const Imath::V3d& side, int lines);
+
 /// Weight of a silhouette line at a point: 1 on the line, 0 beside it. The curvature along the view
 /// is used to keep the line width constant [Kindlmann03].
 /// @param cosine  cosine of the angle between normal and direction to the eye, from 0 to 1

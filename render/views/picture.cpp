@@ -38,6 +38,10 @@ PictureLayers::PictureLayers(Image& image, const Scene& scene, const RenderOptio
     for (int i = 0; i < 3; ++i)
       direction[k][i] = image.addChannel(fmt::format("direction{}.{}", k + 1, axes[i])).data();
   if (options.thickness) thickness = image.addChannel("thickness").data();
+  if (options.lightLayers) {
+    light[0] = image.addChannel("light.sky", 1).data();
+    light[1] = image.addChannel("light.key", 1).data();
+  }
   const char* lights[4] = {"R", "G", "B", "A"};
   for (int c = 0; scene.volumePart && options.volumeLight && c < 4; ++c)
     volume[c] = image.addChannel(fmt::format("volume.{}", lights[c])).data();
@@ -90,9 +94,14 @@ void PictureLayers::setCurvature(std::size_t i, const Hit& hit) const {
     for (int axis = 0; axis < 3; ++axis) direction[k][axis][i] = static_cast<float>(lines[k][axis]);
 }
 
-void PictureLayers::setVolume(std::size_t i, const VolumeLight& light) const {
-  for (int c = 0; c < 3; ++c) volume[c][i] = static_cast<float>(light.colour[c]);
-  volume[3][i] = static_cast<float>(1 - light.transmittance);
+void PictureLayers::setLight(std::size_t i, double sky, double key) const {
+  light[0][i] = static_cast<float>(sky);
+  light[1][i] = static_cast<float>(key);
+}
+
+void PictureLayers::setVolume(std::size_t i, const VolumeLight& lit) const {
+  for (int c = 0; c < 3; ++c) volume[c][i] = static_cast<float>(lit.colour[c]);
+  volume[3][i] = static_cast<float>(1 - lit.transmittance);
 }
 
 void PictureLayers::setColour(std::size_t i, const ColourSum& sum, int samples) const {
@@ -236,6 +245,7 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
   const double pixels = static_cast<double>(scene.camera.width) * scene.camera.height;
   const double channels = 12 + (options.hasCurvature() ? 4 : 0) +
                           (options.hasDirections() ? 6 : 0) + (options.thickness ? 1 : 0) +
+                          (options.lightLayers ? 2 : 0) +
                           (scene.volumePart && options.volumeLight ? 4 : 0);
   // The line field, and the noise while it is made.
   const double streaks = options.style.style == Style::CurvatureLines ? 30 : 0;

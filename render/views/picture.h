@@ -40,6 +40,7 @@ struct PictureLayers {
   float* curvature[4] = {};
   float* direction[2][3] = {};  ///< first and second principal direction
   float* thickness = nullptr;
+  float* light[2] = {};   ///< shares of sky light and key light
   float* volume[4] = {};  ///< light of the volume in front of the first surface, and its opacity
   std::uint32_t* id;
   mutable std::atomic<std::size_t> beyondBand =
@@ -55,8 +56,10 @@ struct PictureLayers {
   /// Writes the curvatures and the principal directions of pixel `i`, of the layers that the
   /// picture has. @pre the normals of the hit are set
   void setCurvature(std::size_t i, const Hit& hit) const;
+  /// @pre the picture has the layers of the light
+  void setLight(std::size_t i, double sky, double key) const;
   /// @pre the picture has the layers of a volume
-  void setVolume(std::size_t i, const VolumeLight& light) const;
+  void setVolume(std::size_t i, const VolumeLight& lit) const;
   /// Adds the header attribute ls:warning if rays gave up in a Bézier volume, and if pixels show a
   /// blended surface outside the band of a solid that contributes to it. It contains both warnings.
   void addWarnings(Image& image, const Scene& scene) const;

@@ -10,6 +10,7 @@
 #include "apps/pipeline/operators/json_output.h"
 #include "apps/pipeline/operators/pictures/camera_options.h"
 #include "apps/pipeline/operators/pictures/comparison_json.h"
+#include "apps/pipeline/operators/pictures/picture_look.h"
 #include "apps/pipeline/operators/pictures/segmented_pictures.h"
 #include "apps/pipeline/operators/pictures/volume_pictures.h"
 #include "apps/pipeline/registry/invocation.h"
@@ -56,8 +57,10 @@ render::Style styleNamed(const std::string& name) {
 
 constexpr long kMostSamples = 4096;
 
-void validateDraw(const Invocation& in) {
+void validateDraw(const Invocation& asked) {
+  const Invocation in = withPreset(asked);
   validateCamera(in);
+  validateLook(in);
   if (in.integer("samples") > kMostSamples)
     throw UsageError(fmt::format("render: --samples {} is too many; give at most {}",
                                  in.text("samples"), kMostSamples));
@@ -67,7 +70,7 @@ void validateDraw(const Invocation& in) {
                          ? "render: --matcap applies only to --style matcap; leave it out, or give "
                            "--style matcap"
                          : "render: --style matcap needs --matcap with a PNG of a shaded ball");
-  for (const char* layer : {"thickness", "directions"})
+  for (const char* layer : {"thickness", "directions", "light-layers"})
     if (in.flag(layer) && render::imageFormat(in.text("file"), in.text("format")) != "exr")
       throw UsageError(
           fmt::format("render: a PNG has no layers, so --{} is lost; name an .exr", layer));
@@ -186,8 +189,9 @@ void coarsen(Invocation& in, render::Scene& scene) {
       bits, most.largest, most.rms));
 }
 
-Value draw(Invocation& in) {
+Value drawWithPreset(Invocation& in) {
   render::Scene scene = sceneOf(in);
+  applyLookTo(in, scene);
   coarsen(in, scene);
   if (in.flag("ground") && scene.volumePart)
     throw UsageError("render: a volume with a transfer function has no shadow; leave --ground out");
@@ -219,6 +223,7 @@ Value draw(Invocation& in) {
   const bool isExr = render::imageFormat(in.text("file"), in.text("format")) != "png";
   options.layers = isBoth || scene.isBlended() || isExr;
   options.volumeLight = isBoth || isExr;
+  applyLookTo(in, options);
   const double surfaceShare = isBoth ? 0.5 : 1;
   options.progress = levelset::subProgress(in.progress, 0, surfaceShare);
   render::Image image = renderer == "cpu"   ? render::renderCpu(scene, options)
@@ -239,13 +244,20 @@ Value draw(Invocation& in) {
         fmt::format("render: pixels that show a double root of a Bézier volume, or a point where "
                     "its map is singular: {}",
                     count->second));
-  render::writeImage(in.text("file"), image, in.text("format"));
-  if (in.given("png")) render::writeImage(in.text("png"), image, "png");
+  const auto write = [&](const render::Image& finished) {
+    render::writeImage(in.text("file"), finished, in.text("format"));
+    if (in.given("png")) render::writeImage(in.text("png"), finished, "png");
+  };
+  if (hasLook(in))
+    write(finishLook(in, image));
+  else
+    write(image);
   if (isBoth) {
     // One sample without lights suffices for the comparison: geometric layers are sampled at the
     // centres of pixels, and colours have no tolerance.
     options.samples = 1;
     options.ambientSamples = options.shadowSamples = 0;
+    options.lightLayers = false;
     options.progress = levelset::subProgress(in.progress, surfaceShare, 1);
     const render::ImageComparison found =
         render::compareImages(image, render::renderEmbree(scene, options));
@@ -263,11 +275,25 @@ Value draw(Invocation& in) {
   return in.operands[0];
 }
 
+Value draw(Invocation& in) {
+  Invocation all = withPreset(in);
+  try {
+    Value drawn = drawWithPreset(all);
+    in.notes = std::move(all.notes);
+    return drawn;
+  } catch (...) {
+    in.notes = std::move(all.notes);
+    throw;
+  }
+}
+
 /// Returns the box of the solid that is inside the frame of the picture, if this part alone
 /// determines the picture; otherwise the complete solid. Shadows depend on parts outside the frame.
 /// The default view, the default range of curvatures and quantized values depend on the size of the
 /// complete solid.
-RegionOfInterest roiOfDraw(Invocation& in, std::size_t, const RegionOfInterest&) {
+RegionOfInterest roiOfDraw(Invocation& asked, std::size_t, const RegionOfInterest&) {
+  Invocation in = withPreset(asked);
+  if (hasLook(in) || in.flag("light-layers")) return {};
   const render::Style style = styleNamed(in.text("style"));
   const bool isFramed = in.operands[0].kind() == Kind::Band && in.given("from") && in.given("to") &&
                         in.text("value-bits") == "32";
@@ -319,7 +345,8 @@ Operator renderOperator() {
           "independent code in double precision. 'both' draws with the kernel, writes that "
           "picture, compares the layers with "
           "those of embree, and ends with exit code 5 where they differ by more than two correct "
-          "renderers may.",
+          "renderers may. A preset sets these options unless they are given: " +
+          presetText() + ".",
       .example =
           "levelsmith torus --radius 2 --tube 0.8 --voxel 0.05 ! render torus.png --size "
           "320x240 --from 5,4,6 --to 0,0,0",
@@ -440,6 +467,7 @@ Operator renderOperator() {
   const auto filter = std::find_if(picture.params.begin(), picture.params.end(),
                                    [](const Param& param) { return param.name == "filter"; });
   picture.params.insert(std::next(filter), ofKinds.begin(), ofKinds.end());
+  addLookParams(picture.params);
   addCameraParams(picture.params);
   return picture;
 }

@@ -1,0 +1,79 @@
+#include "render/effects/environment_map.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "levelset/error.h"
+#include "render/effects/picture_view.h"
+
+namespace render {
+namespace {
+
+using Imath::V3d;
+
+double smoothStep(double low, double high, double x) {
+  const double t = std::clamp((x - low) / (high - low), 0.0, 1.0);
+  return t * t * (3 - 2 * t);
+}
+
+/// Brightness of a rectangular lamp: 1 inside, with soft edges.
+double lampAt(const V3d& d, const V3d& middle, double halfWidth, double halfHeight) {
+  const V3d axis = middle.normalized();
+  const double along = d.dot(axis);
+  if (along <= 0) return 0;
+  const V3d side = axis.cross(V3d(0, 1, 0.001)).normalized(), top = side.cross(axis);
+  const double u = std::abs(d.dot(side) / along), v = std::abs(d.dot(top) / along);
+  constexpr double kSoft = 0.06;
+  return (1 - smoothStep(halfWidth - kSoft, halfWidth + kSoft, u)) *
+         (1 - smoothStep(halfHeight - kSoft, halfHeight + kSoft, v));
+}
+
+V3d studioLight(const V3d& d) {
+  const V3d floor(0.10, 0.095, 0.09), wall(0.34, 0.37, 0.42), ceiling(0.62, 0.66, 0.72);
+  V3d light = d.y < 0 ? wall + (floor - wall) * smoothStep(0.0, 0.25, -d.y)
+                      : wall + (ceiling - wall) * smoothStep(0.0, 0.9, d.y);
+  light += V3d(3.4, 3.2, 2.9) * lampAt(d, V3d(-0.9, 0.8, 0.7), 0.35, 0.55);
+  light += V3d(1.5, 1.7, 2.0) * lampAt(d, V3d(1.2, 0.35, 0.3), 0.18, 0.7);
+  light += V3d(2.2, 2.2, 2.2) * lampAt(d, V3d(0.1, 1.0, -0.2), 0.5, 0.3);
+  return light;
+}
+
+}  // namespace
+
+EnvironmentMap::EnvironmentMap(const std::string& name, std::size_t maxMemory) {
+  if (name == "studio") return;
+  picture_ = readExr(name, maxMemory);
+  requireChannels(picture_, {"R", "G", "B"}, "--environment");
+  if (picture_.width != 2 * picture_.height)
+    throw levelset::InvalidInput(fmt::format(
+        "{} has {}x{} pixels, but a picture of all directions is twice as wide as high; give a "
+        "picture of longitudes and latitudes",
+        name, picture_.width, picture_.height));
+}
+
+V3d EnvironmentMap::pixel(int x, int y) const {
+  const int column = (x % picture_.width + picture_.width) % picture_.width,
+            row = std::clamp(y, 0, picture_.height - 1);
+  const std::size_t i = static_cast<std::size_t>(row) * static_cast<std::size_t>(picture_.width) +
+                        static_cast<std::size_t>(column);
+  const auto channel = [&](const char* name) {
+    return static_cast<double>(picture_.channels.at(name)[i]);
+  };
+  return {channel("R"), channel("G"), channel("B")};
+}
+
+V3d EnvironmentMap::light(const V3d& d) const {
+  if (picture_.width == 0) return studioLight(d);
+  const double longitude = std::atan2(d.x, -d.z), latitude = std::asin(std::clamp(d.y, -1.0, 1.0));
+  const double x = (0.5 + 0.5 * longitude / std::numbers::pi) * picture_.width - 0.5,
+               y = (0.5 - latitude / std::numbers::pi) * picture_.height - 0.5;
+  const int left = static_cast<int>(std::floor(x)), top = static_cast<int>(std::floor(y));
+  const double u = x - left, v = y - top;
+  return (pixel(left, top) * (1 - u) + pixel(left + 1, top) * u) * (1 - v) +
+         (pixel(left, top + 1) * (1 - u) + pixel(left + 1, top + 1) * u) * v;
+}
+
+}  // namespace render
