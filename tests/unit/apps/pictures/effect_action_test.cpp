@@ -1,0 +1,108 @@
+// The action `effect`, and presets and lights of `render`.
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "render/images/compare_images.h"
+#include "render/images/image.h"
+#include "tests/support/action_test.h"
+
+namespace effect_action_test {
+
+class EffectAction : public support::ActionTest {
+ protected:
+  void draw(const std::string& options = "") {
+    const support::Outcome outcome = levelsmith(
+        "torus --radius 2 --tube 0.8 --voxel 0.1 ! render in.exr --size 96x72 --samples 1 " +
+        options);
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+  }
+  render::Image read(const std::string& name) { return render::readExr(folder_ / name); }
+};
+
+TEST_F(EffectAction, WritesPicturesWithLayers) {
+  draw();
+  support::Outcome outcome = levelsmith(
+      "effect in.exr out.exr --outline 2 --occlusion 0.5 --shadow 0.5 --depth-cue 0.5 --halo 3 "
+      "--solid-texture wood --reflect 0.1 --background 1,1,1");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const render::Image image = read("out.exr");
+  for (const char* layer : {"outline", "light.sky", "light.key", "Z", "N.X", "A"})
+    EXPECT_TRUE(image.channels.contains(layer)) << layer;
+  EXPECT_EQ(image.channels.at("A")[0], 1.0f);
+  outcome = levelsmith("effect in.exr --write half.png --reduce 2 --stereo anaglyph");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_TRUE(exists("half.png"));
+}
+
+TEST_F(EffectAction, HasTheSameBitsOnBothProcessors) {
+  draw();
+  for (const char* renderer : {"cpu", "gpu"}) {
+    const support::Outcome outcome =
+        levelsmith(std::string("effect in.exr ") + renderer +
+                   ".exr --outline 2 --occlusion 1 --shadow 1 --renderer " + renderer);
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+  }
+  EXPECT_EQ(levelsmith("compare-images cpu.exr gpu.exr --exact").code, 0);
+}
+
+TEST_F(EffectAction, ComparesLightInThePictureWithTracedLight) {
+  draw("--light-layers");
+  ASSERT_EQ(levelsmith("effect in.exr out.exr --occlusion 1 --shadow 1").code, 0);
+  const nlohmann::json found = json("compare-images in.exr out.exr --difference d.exr --json");
+  bool hasSky = false;
+  for (const auto& layer : found["layers"]) hasSky = hasSky || layer["layer"] == "light.sky";
+  EXPECT_TRUE(hasSky) << found.dump();
+  EXPECT_TRUE(read("d.exr").channels.contains("light.key"));
+}
+
+TEST_F(EffectAction, RefusesWithASentence) {
+  draw();
+  expectRefusal("effect in.exr out.png --xray 1", 3, "--thickness");
+  expectRefusal("effect in.exr out.gif --outline 1", 2, "format");
+  expectRefusal("effect in.exr out.png --occlusion 3", 2, "from 0 to 1");
+  expectRefusal("effect missing.exr out.png --outline 1", 6, "missing.exr");
+  expectRefusal("effect in.exr out.png --right in.exr", 2, "--stereo");
+  expectRefusal("effect in.exr out.png --reflect 1 --environment in.exr", 3, "twice as wide");
+  expectRefusal("effect in.exr out.png --reduce 100", 2, "at most 16");
+  EXPECT_FALSE(exists("out.png"));
+}
+
+TEST_F(EffectAction, CombinesTwoDrawnPictures) {
+  draw();
+  ASSERT_EQ(levelsmith("effect in.exr both.exr --right in.exr --stereo side-by-side").code, 0);
+  EXPECT_EQ(read("both.exr").width, 192);
+}
+
+TEST_F(EffectAction, PresetsSetOptionsThatAreNotGiven) {
+  const std::string torus = "torus --radius 2 --tube 0.8 --voxel 0.1 ! render ";
+  for (const char* preset : {"paper", "clay", "technical", "molecule", "xray"}) {
+    const support::Outcome outcome =
+        levelsmith(torus + preset + ".exr --size 60x45 --preset " + preset);
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    const render::Image image = read(std::string(preset) + ".exr");
+    EXPECT_EQ(image.width, 60) << preset;
+    EXPECT_EQ(image.channels.at("A")[0], 1.0f) << preset;
+  }
+  // The preset is its options.
+  ASSERT_EQ(levelsmith(torus + "same.exr --size 60x45 --style tone --outline 2 --crease-angle 25 "
+                               "--background 1,1,1 --reduce 3 --samples 1")
+                .code,
+            0);
+  EXPECT_EQ(read("same.exr").channels, read("technical.exr").channels);
+  ASSERT_EQ(levelsmith(torus + "other.exr --size 60x45 --preset clay --style tone --reduce 1").code,
+            0);
+  EXPECT_EQ(read("other.exr").attributes.at("ls:style"), "tone");
+  expectRefusal(torus + "x.png --preset cake", 2, "paper");
+}
+
+TEST_F(EffectAction, LightsOfRenderAreChecked) {
+  const std::string torus = "torus --radius 2 --tube 0.8 --voxel 0.1 ! render x.png --size 32x24 ";
+  expectRefusal(torus + "--light-radius 90", 2, "85 degrees");
+  expectRefusal(torus + "--colour 1,2,3", 2, "from 0 to 1");
+  expectRefusal(torus + "--light-layers", 2, "PNG has no layers");
+  expectRefusal(torus + "--light 0,0,0", 2, "light");
+}
+
+}  // namespace effect_action_test

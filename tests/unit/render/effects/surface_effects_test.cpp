@@ -1,0 +1,268 @@
+// Effects that replace or mix colours: patterns in space, environment, lines, fog and reduction.
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include "levelset/error.h"
+#include "render/effects/effects.h"
+#include "render/effects/picture_view.h"
+#include "render/effects/solid_pattern.h"
+#include "render/shading/style.h"
+#include "tests/support/effect_pictures.h"
+
+namespace surface_effects_test {
+
+using Imath::V3d;
+using support::onBall;
+using support::onPlane;
+using support::pictureOf;
+using support::straightCamera;
+using namespace render;
+
+const CpuScreenRunner kRunner;
+
+double at(const Image& image, const char* channel, int x, int y) {
+  return static_cast<double>(image.channels.at(
+      channel)[static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) +
+               static_cast<std::size_t>(x)]);
+}
+
+Image ball(const Camera& camera) {
+  return pictureOf(
+      camera, [](const Camera::Ray& ray) { return onBall(ray, V3d(0), 12); }, 24);
+}
+
+/// Writes an environment whose light is (1 + direction) / 2, and returns its name.
+struct DirectionMap {
+  std::filesystem::path file;
+  DirectionMap() {
+    Image map(512, 256);
+    for (const char* name : {"R", "G", "B"}) map.addChannel(name);
+    for (int y = 0; y < map.height; ++y)
+      for (int x = 0; x < map.width; ++x) {
+        const double longitude = ((x + 0.5) / map.width - 0.5) * 2 * std::numbers::pi,
+                     latitude = (0.5 - (y + 0.5) / map.height) * std::numbers::pi;
+        const V3d d(std::cos(latitude) * std::sin(longitude), std::sin(latitude),
+                    -std::cos(latitude) * std::cos(longitude));
+        const auto i = static_cast<std::size_t>(y * map.width + x);
+        map.channels["R"][i] = static_cast<float>(0.5 + 0.5 * d.x);
+        map.channels["G"][i] = static_cast<float>(0.5 + 0.5 * d.y);
+        map.channels["B"][i] = static_cast<float>(0.5 + 0.5 * d.z);
+      }
+    file = std::filesystem::temp_directory_path() /
+           ("levelsmith-directions-" + std::to_string(::getpid()) + ".exr");
+    writeImage(file, map);
+  }
+  ~DirectionMap() { std::filesystem::remove(file); }
+  DirectionMap(const DirectionMap&) = delete;
+  DirectionMap& operator=(const DirectionMap&) = delete;
+};
+
+TEST(DisplayCurve, HasItsInverse) {
+  for (int i = 0; i <= 998; ++i) {
+    const double shown = i / 1000.0;
+    EXPECT_NEAR(displayOfLinear(linearOfDisplay(shown)), shown, 1e-14);
+  }
+  Image white(1, 1);
+  for (const char* name : {"R", "G", "B"})
+    white.addChannel(name, static_cast<float>(linearOfDisplay(1)));
+  EXPECT_EQ(displayColours(white)[0], 255);
+}
+
+TEST(SolidPattern, NoiseIsSmoothBoundedAndZeroOnTheLattice) {
+  double most = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const V3d p(0.37 * i - 300, std::sin(i) * 20, std::cos(2.3 * i) * 20);
+    EXPECT_EQ(gradientNoise(V3d(std::floor(p.x), std::floor(p.y), std::floor(p.z))), 0);
+    most = std::max(most, std::abs(gradientNoise(p)));
+    // The slope is at most 4 or so, so a small step changes little, across cells, too.
+    EXPECT_LT(std::abs(gradientNoise(p) - gradientNoise(p + V3d(1e-6))), 1e-5);
+  }
+  EXPECT_LE(most, 1);
+  EXPECT_GT(most, 0.6);
+}
+
+TEST(SolidPattern, OfACheckerHasTheParityOfTheCell) {
+  const V3d bright = patternColour(SolidTexture::Checker, V3d(0.5));
+  EXPECT_EQ(patternColour(SolidTexture::Checker, V3d(1.5, 0.5, 0.5)),
+            patternColour(SolidTexture::Checker, V3d(-0.5, 0.5, 0.5)));
+  EXPECT_NE(patternColour(SolidTexture::Checker, V3d(1.5, 0.5, 0.5)), bright);
+  EXPECT_EQ(patternColour(SolidTexture::Checker, V3d(1.5, 1.5, 0.5)), bright);
+}
+
+TEST(SolidPattern, StaysInSpaceWhenTheCameraMoves) {
+  Camera a = straightCamera(40, 40), b = a;
+  b.from.x += 3;
+  b.to.x += 3;
+  EffectOptions options;
+  options.solidTexture = SolidTexture::Marble;
+  options.textureSize = 7;
+  const auto drawn = [&](const Camera& camera) {
+    return withEffects(ball(camera), {}, options, kRunner);
+  };
+  const Image first = drawn(a), second = drawn(b);
+  for (int y = 10; y < 30; ++y)
+    for (int x = 12; x < 28; ++x)
+      EXPECT_NEAR(at(first, "R", x, y), at(second, "R", x - 3, y), 1e-4) << x << "," << y;
+}
+
+TEST(Environment, IsMirroredByTheLawOfReflection) {
+  const DirectionMap map;
+  EffectOptions options;
+  options.reflect = 1;
+  options.environment = map.file.string();
+  const Image image = ball(straightCamera(40, 40));
+  const Image mirrored = withEffects(image, {}, options, kRunner);
+  double worst = 0;
+  for (int y = 10; y < 30; ++y)
+    for (int x = 10; x < 30; ++x) {
+      if (!std::isfinite(at(image, "Z", x, y))) continue;
+      const V3d n(at(image, "N.X", x, y), at(image, "N.Y", x, y), at(image, "N.Z", x, y));
+      const V3d exact = V3d(0, 0, -1) + n * (2 * n.z);
+      worst = std::max({worst, std::abs(at(mirrored, "R", x, y) - 0.5 - 0.5 * exact.x),
+                        std::abs(at(mirrored, "G", x, y) - 0.5 - 0.5 * exact.y),
+                        std::abs(at(mirrored, "B", x, y) - 0.5 - 0.5 * exact.z)});
+    }
+  EXPECT_LT(worst, 1.5e-4) << worst;  // bilinear interpolation in 512 pixels
+}
+
+TEST(Environment, IsRefractedBySnellsLaw) {
+  const DirectionMap map;
+  EffectOptions options;
+  options.refract = 1;
+  options.environment = map.file.string();
+  for (const double index : {1.0, 1.33, 2.4}) {
+    options.index = index;
+    const Image image = ball(straightCamera(40, 40));
+    const Image seen = withEffects(image, {}, options, kRunner);
+    for (int x = 20; x < 31; ++x) {
+      const V3d n(at(image, "N.X", x, 20), at(image, "N.Y", x, 20), at(image, "N.Z", x, 20));
+      const V3d d(2 * at(seen, "R", x, 20) - 1, 2 * at(seen, "G", x, 20) - 1,
+                  2 * at(seen, "B", x, 20) - 1);
+      const double sineOut = std::sqrt(n.x * n.x + n.y * n.y),
+                   sineIn = d.normalized().cross(n).length();
+      EXPECT_NEAR(sineIn * index, sineOut, 2e-3) << index << " " << x;
+    }
+  }
+}
+
+TEST(Environment, RefusesOtherPictures) {
+  Image narrow(8, 8);
+  for (const char* name : {"R", "G", "B"}) narrow.addChannel(name);
+  const std::filesystem::path file = std::filesystem::temp_directory_path() /
+                                     ("levelsmith-narrow-" + std::to_string(::getpid()) + ".exr");
+  writeImage(file, narrow);
+  EffectOptions options;
+  options.reflect = 1;
+  options.environment = file.string();
+  EXPECT_THROW((void)withEffects(ball(straightCamera(8, 8)), {}, options, kRunner),
+               levelset::InvalidInput);
+  std::filesystem::remove(file);
+  EXPECT_THROW((void)withEffects(ball(straightCamera(8, 8)), {}, options, kRunner),
+               levelset::IoError);
+}
+
+TEST(ReflectionLines, AreThoseOfTheStyle) {
+  const Image image = ball(straightCamera(40, 40));
+  EffectOptions options;
+  options.reflectionLines = 8;
+  const Image lines = withEffects(image, {}, options, kRunner);
+  for (int x = 12; x < 28; ++x) {
+    const V3d n =
+        V3d(at(image, "N.X", x, 15), at(image, "N.Y", x, 15), at(image, "N.Z", x, 15)).normalized();
+    const Imath::C3f exact = reflectionLinesColour(n, V3d(0, 0, -1), V3d(0, 1, 0), V3d(1, 0, 0), 8);
+    EXPECT_NEAR(at(lines, "G", x, 15), static_cast<double>(exact.y), 2e-5) << x;
+  }
+}
+
+TEST(DepthCue, FadesLinearlyToTheBackground) {
+  const Image image = pictureOf(
+      straightCamera(32, 32),
+      [](const Camera::Ray& ray) { return onPlane(ray, V3d(0), V3d(-1, 0, 1).normalized()); }, 50);
+  LookOptions look;
+  look.depthCue = 1;
+  look.background = V3d(0.2, 0.4, 0.6);
+  const Image cued = withLook(image, look, 1, kRunner);
+  // The plane rises to the right, so the left edge is the farthest.
+  const double plain = displayOfLinear(0.5);
+  for (int x = 0; x < 32; ++x) {
+    const double share = 1 - x / 31.0;
+    EXPECT_NEAR(displayOfLinear(at(cued, "B", x, 5)), plain + (0.6 - plain) * share, 2e-6);
+  }
+  look.depthCueNear = 10;
+  look.depthCueFar = 20;  // nearer than all surfaces: only background is left
+  EXPECT_NEAR(displayOfLinear(at(withLook(image, look, 1, kRunner), "R", 31, 5)), 0.2, 1e-6);
+}
+
+TEST(Halo, IsOnFartherSurfacesOnly) {
+  const Image image = pictureOf(
+      straightCamera(32, 16),
+      [](const Camera::Ray& ray) {
+        return onPlane(ray, V3d(0, 0, ray.origin.x < 0 ? 0 : -10), V3d(0, 0, 1));
+      },
+      50);
+  LookOptions look;
+  look.halo = 4;
+  const Image rimmed = withLook(image, look, 1, kRunner);
+  const double plain = displayOfLinear(0.5);
+  for (int x = 0; x < 16; ++x) EXPECT_EQ(at(rimmed, "R", x, 8), 0.5);
+  for (int x = 16; x < 32; ++x) {
+    const double share = std::clamp((4.5 - (x - 15)) / 4, 0.0, 1.0);
+    EXPECT_NEAR(displayOfLinear(at(rimmed, "R", x, 8)), plain + (1 - plain) * share, 2e-3) << x;
+  }
+}
+
+TEST(Xray, ShowsTheThickness) {
+  Image image = ball(straightCamera(32, 32));
+  LookOptions look;
+  look.xray = 10;
+  EXPECT_THROW((void)withLook(image, look, 1, kRunner), levelset::InvalidInput);
+  image.addChannel("thickness", 10);
+  const Image seen = withLook(image, look, 1, kRunner);
+  EXPECT_NEAR(displayOfLinear(at(seen, "B", 3, 3)), 1 - std::exp(-1), 1e-6);
+}
+
+TEST(Reduction, KeepsEvenColoursAndTheMiddleOfLayers) {
+  const Image image = ball(straightCamera(33, 33));
+  const Image small = reducedPicture(image, 3);
+  EXPECT_EQ(small.width, 11);
+  EXPECT_EQ(small.matrices, image.matrices);
+  EXPECT_NEAR(at(small, "R", 5, 5), 0.5, 1e-6);
+  EXPECT_EQ(at(small, "A", 5, 5), 1);
+  EXPECT_EQ(at(small, "Z", 5, 5), at(image, "Z", 16, 16));
+  // The opacity at the outline is the share of covered pixels.
+  double sum = 0, all = 0;
+  for (const float a : small.channels.at("A")) sum += static_cast<double>(a);
+  for (const float a : image.channels.at("A")) all += static_cast<double>(a);
+  EXPECT_NEAR(9 * sum, all, 1e-4);
+  EXPECT_THROW((void)reducedPicture(image, 34), levelset::UsageError);
+}
+
+TEST(Effects, WithoutOptionsKeepThePicture) {
+  const Image image = ball(straightCamera(16, 16));
+  EXPECT_EQ(withEffects(image, {}, {}, kRunner).channels, image.channels);
+}
+
+TEST(Effects, RefuseNumbersOutOfRange) {
+  LookOptions look;
+  look.depthCue = 1.5;
+  EXPECT_THROW(validate(look), levelset::UsageError);
+  look = {};
+  look.background = V3d(0, 0, 2);
+  EXPECT_THROW(validate(look), levelset::UsageError);
+  EffectOptions options;
+  options.occlusion = 2;
+  EXPECT_THROW(validate(options), levelset::UsageError);
+  options = {};
+  options.light = V3d(0);
+  EXPECT_THROW(validate(options), levelset::UsageError);
+  options = {};
+  options.index = 0.5;
+  EXPECT_THROW(validate(options), levelset::UsageError);
+}
+
+}  // namespace surface_effects_test
