@@ -49,7 +49,7 @@ class QuadricCaster {
   [[nodiscard]] std::vector<double> extents(const std::vector<Imath::V3d>& directions) const;
   /// Number of the quadrics.
   [[nodiscard]] std::size_t count() const;
-  /// Memory of the tables, bytes: about 26 for a sphere and 40 for a cylinder of a large model.
+  /// Memory of the tables, bytes: about 30 for a sphere and 43 for a cylinder of a large model.
   [[nodiscard]] std::size_t bytes() const;
   /// The quadrics as stored. Spheres, cylinders and general quadrics keep their kinds, not their
   /// order.

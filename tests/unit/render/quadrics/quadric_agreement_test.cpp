@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <vector>
 
@@ -78,9 +77,6 @@ Differences differencesOf(QuadricKind kind, std::size_t count, double ratio, con
     const QuadricCaster caster(model);
     for (const Camera& camera : camerasOf(caster, size, numbers)) compare(caster, camera, all);
   }
-  std::printf(
-      "%s: %zu rays, %zu hits (%zu from within), %zu by one only, distance %.2g, normal %.2g\n",
-      nameOf(kind), all.rays, all.hits, all.within, all.oneOnly, all.distance, all.normal);
   return all;
 }
 

@@ -144,7 +144,7 @@ TEST(QuadricScene, IsReadAndWritten) {
   const ImageComparison found =
       compareImages(renderCpu(scene, kPlain), renderCpu(again.scene, kPlain));
   EXPECT_TRUE(found.agrees()) << found.reason();
-  const ViewedScene alone = readScene(folder.path() / "scene.quadrics.json");
+  const ViewedScene alone = readScene(folder.path() / "scene-quadrics.json");
   EXPECT_EQ(alone.scene.quadrics.at(0).caster.count(), 76U);
 }
 

@@ -73,7 +73,6 @@ TEST(QuadricBox, TouchesTheSurfaceOnAllSides) {
                           (tight.max[c] - sampled.max[c]) / size});
     }
   }
-  std::printf("loosest box: %.2g of the diagonal\n", loosest);
   EXPECT_LT(loosest, 1e-4) << "the distance of the samples";
 }
 
@@ -105,7 +104,6 @@ TEST(QuadricBox, TouchesThePictureOnAllSides) {
       loosest = std::max({loosest, sampled.min[c] - tight->min[c], tight->max[c] - sampled.max[c]});
     }
   }
-  std::printf("%d boxes, %.2g pixels cut off, %.2g pixels loose\n", boxes, outside, loosest);
   EXPECT_GT(boxes, 250);
   EXPECT_LT(outside, 1e-9) << "pixels";
   EXPECT_LT(loosest, 0.1) << "pixels; issue 31 allows one";
@@ -213,7 +211,6 @@ TEST(QuadricModel, NeedsTheStatedMemory) {
   const QuadricCaster caster(balls);
   EXPECT_EQ(caster.count(), 50'000U);
   const double each = static_cast<double>(caster.bytes()) / 50'000;
-  std::printf("%.1f bytes for each sphere\n", each);
   EXPECT_LT(each, 33);
   EXPECT_THROW(QuadricCaster(balls, 1'000'000), levelset::ResourceLimit);
 }
