@@ -31,8 +31,8 @@ struct QuadricHit {
 /// Numbers are stored in single precision, relative to the middle of the model. So a position is
 /// rounded to 2^-24 of the model's half diagonal, wherever the model lies. Tests in single
 /// precision only find the primitives that a ray may meet, with a margin for rounding. The
-/// intersections of these are computed in double precision (render/shaders/exact/quadrics.glsl). The
-/// result is the nearest intersection of all primitives, at equal distances that of the lowest
+/// intersections of these are computed in double precision (render/shaders/exact/quadrics.glsl).
+/// The result is the nearest intersection of all primitives, at equal distances that of the lowest
 /// slot, whatever the order of the tests.
 ///
 /// The class has value semantics. Copies share the data. All methods may run concurrently.
