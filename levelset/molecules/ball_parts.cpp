@@ -228,7 +228,7 @@ class SphereLoops {
 
 std::vector<double> powerVolumes(const std::vector<Ball>& balls, const BallLists& overlaps,
                                  const std::vector<double>& areas) {
-  // Of each pair, the ball of the lower index computes the face.
+  // The ball of the lower index computes the face of a pair.
   std::vector<std::vector<CellFace>> faces(balls.size());
   tbb::parallel_for(std::size_t{0}, balls.size(), [&](std::size_t n) {
     const auto first = static_cast<std::uint32_t>(n);

@@ -79,7 +79,7 @@ class AtomGrid {
 
   double cell_;
   std::size_t mask_;
-  std::vector<Cell> cells_;  ///< of the atoms
+  std::vector<Cell> cells_;  ///< cells of the atoms
   std::vector<std::uint32_t> first_, items_;
 };
 

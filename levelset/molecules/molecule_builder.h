@@ -87,7 +87,7 @@ class MoleculeBuilder {
   std::unordered_map<std::string, std::size_t> alternates_;
   /// Residues of alternate locations, by chain, number and insertion code.
   std::map<std::string, std::vector<std::uint32_t>> places_;
-  std::vector<std::int64_t> serials_;  ///< of the atoms
+  std::vector<std::int64_t> serials_;  ///< by atom
   std::vector<std::array<std::int64_t, 2>> serialBonds_;
   std::vector<std::array<AtomPlace, 2>> placeBonds_;
   std::unordered_map<std::string_view, std::vector<std::array<std::string_view, 2>>> residueBonds_;

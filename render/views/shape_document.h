@@ -15,7 +15,7 @@ using ShapeJson = nlohmann::ordered_json;
 /// Reads the members of a document. Its errors end with a reference to the documentation.
 struct ShapeDocument {
   const char* format;  ///< value of the member "format"
-  const char* noun;    ///< what a file of another format is not
+  const char* noun;    ///< object of the format, for messages: "a Bézier volume"
   const char* help;    ///< last part of messages
   static constexpr int kVersion = 1;
 

@@ -27,10 +27,10 @@ struct RodShape {
 /// to π/2. The function is smooth.
 struct MeetingCurve {
   std::uint32_t first = 0, second = 0;  ///< indices of the shapes
-  bool isCircle = false;                ///< of two balls
+  bool isCircle = false;                ///< circle of two balls
   Imath::V3d origin{0};         ///< centre of the circle, or begin of the axis of the first shape
   Imath::V3d u{0}, v{0}, w{0};  ///< orthonormal; `w` along the axis
-  double radius = 0;            ///< of the circle, or of the first shape
+  double radius = 0;            ///< radius of the circle, or of the first shape
   double middle = 0, half = 0;  ///< range of the angle: middle ± half
   double sign = 1;              ///< which of two points on a line along the first shape
 

@@ -328,7 +328,7 @@ class SegmentedFileReader {
   double halfWidth_ = 0;
   float background_ = 0;
   FloatTree::Ptr labels_;
-  std::vector<const FloatLeaf*> leaves_;  ///< of labels_, by x, y, z
+  std::vector<const FloatLeaf*> leaves_;  ///< leaves of labels_, by x, y, z
   std::vector<Layer> layers_;
   std::atomic<std::size_t> damaged_ = 0;
 };
