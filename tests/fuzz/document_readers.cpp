@@ -10,6 +10,7 @@
 #include "levelset/shapes/shapes.h"
 #include "mapping/patches/patch_file.h"
 #include "render/views/bezier_file.h"
+#include "render/views/quadric_file.h"
 #include "render/views/scene_file.h"
 #include "tests/fuzz/readers.h"
 
@@ -41,6 +42,19 @@ void readBezier(std::string_view bytes) {
     writeBezierVolume(file, volume);
     require(render::readBezierVolume(file).bytes() == volume.bytes(),
             "a Bézier volume is read as it was written");
+  });
+}
+
+void readQuadrics(std::string_view bytes) {
+  const std::filesystem::path file = scratchFile("quadrics.json", bytes);
+  accepts([&] {
+    const render::QuadricModel model = render::readQuadrics(file, kMaxMemory);
+    const std::size_t count = model.balls.size() + model.sticks.size() + model.quadrics.size();
+    require(count > 0, "a file of quadrics has one");
+    writeQuadrics(file, model);
+    const render::QuadricModel again = render::readQuadrics(file);
+    require(again.balls.size() + again.sticks.size() + again.quadrics.size() == count,
+            "quadrics are read as they were written");
   });
 }
 
@@ -107,8 +121,9 @@ void readCache(std::string_view bytes) {
 }  // namespace
 
 std::vector<Reader> documentReaders() {
-  return {{"patch", readPatch}, {"lattice", readLattice}, {"bezier", readBezier}, {"pdb", readPdb},
-          {"cif", readCif},     {"scene", readScene},     {"cache", readCache}};
+  return {{"patch", readPatch},       {"lattice", readLattice}, {"bezier", readBezier},
+          {"quadrics", readQuadrics}, {"pdb", readPdb},         {"cif", readCif},
+          {"scene", readScene},       {"cache", readCache}};
 }
 
 }  // namespace fuzz

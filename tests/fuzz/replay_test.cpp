@@ -78,6 +78,7 @@ TEST(FuzzDepth, NestedListsAreRefusedBeforeStackOverflow) {
       {"lattice", R"({"format": "levelsmith lattice", "version": 1, "points": )" + lists + "}"},
       {"bezier",
        R"({"format": "levelsmith bezier volume", "version": 1, "patches": )" + lists + "}"},
+      {"quadrics", R"({"format": "levelsmith quadrics", "version": 1, "quadrics": )" + lists + "}"},
       {"scene", R"({"format": "levelsmith scene", "version": 1, "solids": )" + lists + "}"},
       {"cache", R"({"version": 1, "action": )" + lists + "}"}};
   for (const auto& [name, text] : documents)

@@ -17,7 +17,7 @@ case $reader in
   vdb|nvdb|points_vdb) words=vdb ;;
   png|exr) words=picture ;;
   graph) words="json actions" ;;
-  patch|lattice|bezier|scene|cache) words=json ;;
+  patch|lattice|bezier|quadrics|scene|cache) words=json ;;
   script|chain) words="script actions" ;;
   formula) words=formula ;;
   *) words="" ;;

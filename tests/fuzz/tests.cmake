@@ -3,7 +3,7 @@
 # `./dev test` builds it earlier, so that its time counts to the build.
 set(fuzz_readers
   ply obj stl off points points_ply points_obj points_vdb gzip vdb nvdb nifti metaimage nrrd mrc png exr heights
-  patch lattice bezier pdb cif scene cache graph script chain formula)
+  patch lattice bezier quadrics pdb cif scene cache graph script chain formula)
 set(fuzz_program ${PROJECT_SOURCE_DIR}/build/fuzz/tests/fuzz/levelsmith_fuzz)
 add_test(NAME fuzz.build COMMAND ${CMAKE_CURRENT_LIST_DIR}/build.sh ${PROJECT_BINARY_DIR})
 set_tests_properties(fuzz.build PROPERTIES TIMEOUT 1200 SKIP_RETURN_CODE 77 FIXTURES_SETUP fuzz COST 90)

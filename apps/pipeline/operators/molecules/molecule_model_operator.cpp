@@ -6,6 +6,7 @@
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/json_output.h"
+#include "apps/pipeline/operators/pictures/molecule_pictures.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
 #include "levelset/molecules/solids/molecule_solid.h"
@@ -18,10 +19,7 @@ using levelset::MoleculeStyle;
 using levelset::UsageError;
 
 MoleculeStyle modelStyleOf(const Invocation& in) {
-  const std::string word = in.text("style");
-  if (word == "balls") return MoleculeStyle::Balls;
-  if (word == "sticks") return MoleculeStyle::Sticks;
-  return word == "van-der-waals" ? MoleculeStyle::VanDerWaals : MoleculeStyle::BallAndStick;
+  return moleculeStyleNamed(in.text("style"));
 }
 
 MoleculeModelOptions modelOptionsOf(Invocation& in) {
@@ -107,7 +105,7 @@ Operator moleculeModelOperator() {
                   .type = ParamType::Choice,
                   .doc = "parts of the solid",
                   .fallback = "ball-and-stick",
-                  .choices = {"balls", "sticks", "ball-and-stick", "van-der-waals"}},
+                  .choices = moleculeStyleNames()},
                  {.name = "ball-scale",
                   .type = ParamType::Number,
                   .doc =

@@ -10,6 +10,7 @@
 #include "apps/pipeline/operators/json_output.h"
 #include "apps/pipeline/operators/pictures/camera_options.h"
 #include "apps/pipeline/operators/pictures/comparison_json.h"
+#include "apps/pipeline/operators/pictures/molecule_pictures.h"
 #include "apps/pipeline/operators/pictures/picture_look.h"
 #include "apps/pipeline/operators/pictures/segmented_pictures.h"
 #include "apps/pipeline/operators/pictures/volume_pictures.h"
@@ -37,6 +38,7 @@ render::Scene sceneOf(Invocation& in) {
   requireVolumeOptions(in);
   render::ViewedScene viewed = isVolumeKind(drawn.kind())           ? volumeScene(in)
                                : drawn.kind() == Kind::Segmentation ? segmentedScene(in)
+                               : drawn.kind() == Kind::Molecule     ? moleculeScene(in)
                                                                     : sceneOf(drawn);
   viewed.scene.camera = cameraOf(in, drawn.plan().bounds,
                                  viewed.hasCamera ? &viewed.scene.camera : nullptr, &viewed.scene);
@@ -102,6 +104,7 @@ void validateDraw(const Invocation& asked) {
     throw UsageError(fmt::format("render: --style {} has no shadows; leave --ground out", style));
   validateVolumePicture(in);
   validateHide(in);
+  validateMoleculePicture(in);
   if (in.given("reflection-lines") && style != "reflection-lines")
     throw UsageError(fmt::format(
         "render: --style {} shows no reflections; leave --reflection-lines out", style));
@@ -334,8 +337,8 @@ Operator renderOperator() {
       .name = "render",
       .group = "Pictures",
       .summary =
-          "draw a level set, isosurface, mesh, segmentation or scene to an EXR with all layers, or "
-          "a PNG",
+          "draw a level set, isosurface, mesh, segmentation, molecule or scene to an EXR with all "
+          "layers, or a PNG",
       .details =
           "Layers of the EXR: R G B A, Z (along the view axis, +inf for a miss), N.X N.Y N.Z, P.X "
           "P.Y P.Z, curvature.mean .gauss .k1 .k2, id. Without --from, the view is the scene's "
@@ -449,7 +452,7 @@ Operator renderOperator() {
             .type = ParamType::Text,
             .doc = "format of the picture: exr or png; default: by its extension"}},
       .operands = {{Kind::Band, Kind::Mesh, Kind::Scene, Kind::Volume, Kind::Field, Kind::Adaptive,
-                    Kind::Segmentation}},
+                    Kind::Segmentation, Kind::Molecule}},
       .flow = Flow::PassesThrough,
       .run = draw,
       .plan = planDraw,
@@ -464,6 +467,7 @@ Operator renderOperator() {
   };
   std::vector<Param> ofKinds = volumePictureParams();
   ofKinds.push_back(hideParam());
+  for (Param& param : moleculePictureParams()) ofKinds.push_back(std::move(param));
   const auto filter = std::find_if(picture.params.begin(), picture.params.end(),
                                    [](const Param& param) { return param.name == "filter"; });
   picture.params.insert(std::next(filter), ofKinds.begin(), ofKinds.end());

@@ -32,11 +32,11 @@ using levelset::UsageError;
 
 /// Behaviour of an action on segmentations.
 struct SegmentedAction {
-  std::string details;              ///< for the help
-  std::vector<Param> params = {};   ///< that only segmentations have
-  std::vector<std::string> shared;  ///< other options that segmentations have too
-  std::vector<std::string> needed;  ///< options that must be given
-  bool takesSolids = false;         ///< the further operands are level sets
+  std::string details;                   ///< for the help
+  std::vector<Param> params = {};        ///< that only segmentations have
+  std::vector<std::string> shared = {};  ///< other options that segmentations have too
+  std::vector<std::string> needed = {};  ///< options that must be given
+  bool takesSolids = false;              ///< the further operands are level sets
   std::function<void(const Invocation&)> validate = {};
   std::function<Value(Invocation&)> run;
 };

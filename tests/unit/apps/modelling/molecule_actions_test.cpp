@@ -43,6 +43,29 @@ TEST_F(MoleculeActions, ReadDescribesAMolecule) {
   EXPECT_EQ(json("read - --format pdb <a.pdb ! info --json")["atoms"], 3);
 }
 
+/// A carbon and an oxygen atom with a bond.
+TEST_F(MoleculeActions, RenderDrawsAtomsAndBonds) {
+  writeFile("co.pdb",
+            "ATOM      1  C   GLY A   1       0.000   0.000   0.000  1.00  5.00           C\n"
+            "ATOM      2  O   GLY A   1       1.200   0.000   0.000  1.00 25.00           O\n"
+            "END\n");
+  const std::string view = " --size 64x48 --from 0.6,-6,0 --to 0.6,0,0 --fov 30 --up 0,0,1";
+  for (const char* style : {"balls", "sticks", "ball-and-stick", "van-der-waals"}) {
+    const Outcome drawn =
+        levelsmith("read co.pdb ! render a.exr --renderer both" + view + " --atoms " + style);
+    EXPECT_EQ(drawn.code, 0) << style << drawn.err;
+  }
+  const auto draw = [&](const std::string& file, const std::string& colours) {
+    EXPECT_EQ(levelsmith("read co.pdb ! render " + file + view + " --colour-by " + colours).code,
+              0);
+    return support::readText(folder_ / file);
+  };
+  EXPECT_NE(draw("element.png", "element"), draw("factor.png", "b-factor"));
+  EXPECT_EQ(draw("chain.png", "chain"), draw("again.png", "chain"));
+  expectRefusal("sphere --radius 1 --voxel 0.2 ! render a.png --atoms balls", 2,
+                "--atoms is for molecules");
+}
+
 TEST_F(MoleculeActions, MoleculeSurfaceMakesASolid) {
   const double pi = std::numbers::pi;
   // Balls of 1.7 Å that meet in a circle at 1.5 Å, and one of 1.75 Å.
