@@ -51,7 +51,7 @@ TEST_F(MoleculeActions, RenderDrawsAtomsAndBonds) {
             "END\n");
   const std::string view = " --size 64x48 --from 0.6,-6,0 --to 0.6,0,0 --fov 30 --up 0,0,1";
   for (const char* style : {"balls", "sticks", "ball-and-stick", "van-der-waals"}) {
-    const Outcome drawn =
+    const support::Outcome drawn =
         levelsmith("read co.pdb ! render a.exr --renderer both" + view + " --atoms " + style);
     EXPECT_EQ(drawn.code, 0) << style << drawn.err;
   }
