@@ -36,8 +36,13 @@ run effect "$out/marble.exr" "$gallery/marble-dragon.png" --solid-texture marble
 run read "$models/ch2.nii.gz" ! isosurface 92 ! render "$gallery/xray-head.png" --preset xray --up 0,0,1 --size 400x300
 
 # 6. A technical illustration.
-run cylinder --radius 3 --height 0.8 --axis 0,1,0 --voxel 0.04 --as base \
-  ! cylinder --radius 1.4 --height 3 --center 0,1.4,0 --axis 0,1,0 --voxel 0.04 --as neck \
+run cylinder --radius 3 --height 0.8 --axis 0,1,0 --voxel 0.02 --as base \
+  ! cylinder --radius 1.4 --height 3 --center 0,1.4,0 --axis 0,1,0 --voxel 0.02 --as neck \
   ! smooth-union @base @neck --radius 0.1 --as body \
-  ! cylinder --radius 0.9 --height 9 --axis 0,1,0 --voxel 0.04 --as bore ! difference @body @bore ! write "$out/flange.vdb"
-run read "$out/flange.vdb" ! render "$gallery/technical-flange.png" --preset technical --size 400x300 --from 4,5.6,8
+  ! cylinder --radius 0.9 --height 9 --axis 0,1,0 --voxel 0.02 --as bore \
+  ! cylinder --radius 0.3 --height 3 --center 2.2,0,0 --axis 0,1,0 --voxel 0.02 --as bolt1 \
+  ! cylinder --radius 0.3 --height 3 --center=-2.2,0,0 --axis 0,1,0 --voxel 0.02 --as bolt2 \
+  ! cylinder --radius 0.3 --height 3 --center 0,0,2.2 --axis 0,1,0 --voxel 0.02 --as bolt3 \
+  ! cylinder --radius 0.3 --height 3 --center 0,0,-2.2 --axis 0,1,0 --voxel 0.02 --as bolt4 \
+  ! difference @body @bore @bolt1 @bolt2 @bolt3 @bolt4 ! write "$out/flange.vdb"
+run read "$out/flange.vdb" ! render "$gallery/technical-flange.png" --preset technical --size 400x300 --from 7,8.5,11 --to 0,1,0 --fov 27
