@@ -291,9 +291,12 @@ Molecule MoleculeBuilder::finish() {
   if (options_.model != 0 && !hasModel_)
     failFile(file_, fmt::format("has no model {}; choose one of its models", options_.model));
   if (molecule_.atoms.empty()) {
-    failFile(file_, water_ + hydrogens_ > 0
-                        ? "has no atoms but water and hydrogen that were left out; keep them"
-                        : "has no atoms; check that it is a molecule");
+    failFile(
+        file_,
+        water_ + hydrogens_ > 0
+            ? "has only water and hydrogen atoms, which are left out; give --solvent, or leave "
+              "--no-hydrogens out"
+            : "has no atoms; check that it is a molecule");
   }
   if (options_.notes) {
     const auto note = [&](std::size_t count, const char* what) {
@@ -303,7 +306,8 @@ Molecule MoleculeBuilder::finish() {
     note(hydrogens_, "{} hydrogen atoms were left out");
     note(dropped_, "{} alternate locations of atoms were left out");
     note(guessed_, "the elements of {} atoms follow from their names");
-    note(lostBonds_, "{} records of bonds have an end that is missing, ambiguous or left out");
+    note(lostBonds_,
+         "{} records of bonds were ignored: one of their atoms is missing, not unique or left out");
     note(unknown_, "{} atoms have no known element and count as carbon");
   }
   return std::move(molecule_);

@@ -69,7 +69,13 @@ void checkMoleculeModel(const Molecule& molecule, const MoleculeModelOptions& op
   if (!(options.stickRadius > 0) || !std::isfinite(options.stickRadius))
     throw UsageError(fmt::format("the radius of sticks is {}; give a positive, finite length",
                                  options.stickRadius));
-  if (options.bFactors && !((*options.bFactors)[0] < (*options.bFactors)[1]))
+  constexpr double kMostStickRadius = 3;
+  if (options.stickRadius > kMostStickRadius)
+    throw UsageError(fmt::format("the radius of sticks is {} Å; give at most {} Å",
+                                 options.stickRadius, kMostStickRadius));
+  if (options.bFactors &&
+      !(std::isfinite((*options.bFactors)[0]) && std::isfinite((*options.bFactors)[1]) &&
+        (*options.bFactors)[0] < (*options.bFactors)[1]))
     throw UsageError(fmt::format(
         "the range of temperature factors is {} to {}; give two finite numbers, the lesser first",
         (*options.bFactors)[0], (*options.bFactors)[1]));

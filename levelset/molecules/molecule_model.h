@@ -57,7 +57,7 @@ struct MoleculeModelOptions {
   /// Radius of small balls as a share of the van der Waals radius, positive, at most 1. Balls at
   /// the ends of sticks have at least the radius of the sticks.
   double ballScale = 0.25;
-  double stickRadius = 0.15;  ///< Å, positive
+  double stickRadius = 0.15;  ///< Å, positive, at most 3
   /// Temperature factors of blue and red, Å². Default: the least and the largest one.
   std::optional<std::array<double, 2>> bFactors = {};
   BondOptions bonds = {};

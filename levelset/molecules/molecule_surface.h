@@ -29,7 +29,8 @@ struct MoleculeSurfaceOptions {
 /// A void inside a molecule that its surface encloses.
 struct MoleculeCavity {
   /// Å³ and Å². Exact for the van der Waals and the accessible surface; those of the mesh of the
-  /// band for the excluded one. Atoms that float in the cavity are not subtracted.
+  /// band for the excluded one. Atoms in the cavity that touch no other atom are not
+  /// subtracted.
   double volume = 0, area = 0;
   std::vector<std::uint32_t> atoms = {};  ///< atoms that bound it, sorted
 };

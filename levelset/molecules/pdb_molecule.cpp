@@ -43,17 +43,36 @@ std::int64_t serialNumber(std::string_view text) {
   return error == std::errc() && next == text.data() + text.size() ? value : -1;
 }
 
-/// Adds the bonds of a record CONECT, which has a bond of a higher order several times.
-void addBondsOf(std::string_view line, MoleculeBuilder& builder) {
-  const std::int64_t first = serialNumber(columns(line, 7, 11));
-  for (std::size_t at = 12; at <= 27; at += 5) {
-    const std::string_view other = columns(line, at, at + 4);
-    if (!trimmed(other).empty()) builder.addBond(first, serialNumber(other));
-  }
-}
-
 bool isBlank(std::string_view text) {
   return trimmed(text).empty();
+}
+
+/// Number of columns of a serial number in a record CONECT. It is 5, or 6 in files of programs that
+/// write six digits; 0 if both may be. @param text  all serial numbers
+std::size_t widthOfSerials(std::string_view text) {
+  while (!text.empty() && isBlank(text.substr(text.size() - 1))) text.remove_suffix(1);
+  const bool isDense = text.find(' ') == std::string_view::npos;
+  const bool fitsFive = text.size() % 5 == 0, fitsSix = text.size() % 6 == 0;
+  if (fitsSix && !fitsFive) {
+    bool areNumbers = true;
+    for (std::size_t at = 0; at < text.size(); at += 6) {
+      const std::string_view serial = text.substr(at, 6);
+      areNumbers = areNumbers && (isBlank(serial) || serialNumber(serial) >= 0);
+    }
+    if (areNumbers) return 6;
+  }
+  return isDense && fitsFive == fitsSix && !text.empty() ? 0 : 5;
+}
+
+/// Adds the bonds of a record CONECT, which has a bond of a higher order several times.
+void addBondsOf(std::string_view line, MoleculeBuilder& builder) {
+  const std::size_t width = widthOfSerials(columns(line, 7, 80));
+  if (width == 0) return builder.addBond(-1, -1);
+  const std::int64_t first = serialNumber(columns(line, 7, 6 + width));
+  for (std::size_t n = 1; n <= 4; ++n) {
+    const std::string_view other = columns(line, 7 + n * width, 6 + (n + 1) * width);
+    if (!isBlank(other)) builder.addBond(first, serialNumber(other));
+  }
 }
 
 }  // namespace

@@ -26,6 +26,10 @@ constexpr double kDifference = 1e-4;
 constexpr double kConverged = 1e-7;   // last step of Newton's method
 constexpr double kLeastStep = 3e-11;  // last step of the search where Newton's method fails
 constexpr double kWidestStep = 0.2;   // radians
+// At a cusp, second differences are not proportional to the square of their step.
+constexpr double kCuspChange = 0.3;
+// There, angles are as the square of the step or a higher power.
+constexpr double kLeastCuspStep = 3e-16;
 
 double squaredLength(const V3d& a, const V3d& b) {
   return (a - b).length2();
@@ -162,10 +166,11 @@ double SphericalProduct::descend(const V3d& point, double theta, double phi) con
   const auto clamped = [](double angle) { return std::clamp(angle, -kPi / 2, kPi / 2); };
   double step = spacing_ / 4;  // world units
   bool isSmooth = false;       // Newton's method has ended at a minimum
+  bool isCusp = false;         // Newton's method is of no use
   V3d along(0), aside(0);      // differences along the surface there
   double least = squaredLength(at(theta, phi), point);
-  constexpr int kMostSteps = 200;
-  for (int n = 0; n < kMostSteps && step > kLeastStep * size_; ++n) {
+  constexpr int kMostSteps = 800;
+  for (int n = 0; n < kMostSteps && step > (isCusp ? kLeastCuspStep : kLeastStep) * size_; ++n) {
     // Angles of about one step along the surface.
     const V3d here = at(theta, phi);
     constexpr double kProbe = 1e-6;
@@ -192,9 +197,21 @@ double SphericalProduct::descend(const V3d& point, double theta, double phi) con
     aside = product(us[1], vs[2]) - product(us[1], vs[0]);
     const double gu = (f[2][1] - f[0][1]) / 2, gv = (f[1][2] - f[1][0]) / 2;
     const double huu = f[2][1] - 2 * f[1][1] + f[0][1], hvv = f[1][2] - 2 * f[1][1] + f[1][0];
+    if (!isCusp && step <= 2 * kDifference * size_ && step > kDifference / 100 * size_) {
+      const auto valueAt = [&](const Row& u, const Row& v) {
+        return squaredLength(product(u, v), point);
+      };
+      const double halfU = valueAt(rowAt(aroundCurve_, theta - du / 2), vs[1]) - 2 * f[1][1] +
+                           valueAt(rowAt(aroundCurve_, theta + du / 2), vs[1]);
+      const double halfV = valueAt(us[1], rowAt(uprightCurve_, clamped(phi - dv / 2))) -
+                           2 * f[1][1] +
+                           valueAt(us[1], rowAt(uprightCurve_, clamped(phi + dv / 2)));
+      isCusp = std::abs(4 * halfU - huu) > kCuspChange * std::abs(huu) ||
+               std::abs(4 * halfV - hvv) > kCuspChange * std::abs(hvv);
+    }
     const double huv = (f[2][2] - f[2][0] - f[0][2] + f[0][0]) / 4;
     const double determinant = huu * hvv - huv * huv;
-    if (huu > 0 && determinant > 1e-6 * huu * hvv) {
+    if (!isCusp && huu > 0 && determinant > 1e-6 * huu * hvv) {
       const double su = (huv * gv - hvv * gu) / determinant,
                    sv = (huv * gu - huu * gv) / determinant;
       const double length = std::max(std::abs(su), std::abs(sv));  // in steps
@@ -208,7 +225,7 @@ double SphericalProduct::descend(const V3d& point, double theta, double phi) con
           least = std::min(least, squared);
           isSmooth = isFine && length * step < kConverged * size_;
           if (isSmooth) break;
-          step = std::clamp(length * step, kDifference * size_, step);
+          step = std::min(step, std::max(length * step, kDifference * size_));
           continue;
         }
         // At the minimum, values differ by rounding errors only.

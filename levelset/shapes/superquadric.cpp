@@ -127,7 +127,7 @@ const OperatorText SuperquadricOperator::text{
         "The superellipsoid (|2x/a|^(2/h) + |2y/b|^(2/h))^(h/v) + |2z/c|^(2/v) <= 1, with the "
         "extents a,b,c and the exponents h (horizontal) and v (vertical). The signed distances are "
         "those of the closest points on both sides, to 1e-8 of the size; with exponents above 2, "
-        "to 1e-5.",
+        "to 1e-7.",
     .example =
         "levelsmith superquadric --size 40,40,20 --horizontal 0.3 --vertical 0.5 --voxel 0.5 ! "
         "measure"};
@@ -139,7 +139,7 @@ const OperatorText SupershapeOperator::text{
     .details =
         "Two curves r(a) = (|cos(m a / 4)|^n2 + |sin(m a / 4)|^n3)^(-1 / n1) multiply: one around "
         "the z axis, and one from pole to pole. The signed distances are those of the closest "
-        "points on both sides, to 1e-8 of the size.",
+        "points on both sides, to 1e-8 of the size; beside cusps, to 1e-7.",
     .example =
         "levelsmith supershape --radius 10 --around 5 --around-exponents 2,3,3 --voxel 0.5 ! "
         "measure"};

@@ -6,8 +6,8 @@
 #include "levelset/shapes/shapes.h"
 
 /// Superquadrics and shapes of the superformula, with signed distances on both sides. A distance is
-/// that of the closest point up to 1e-8 of the size; up to 1e-5 beside the cusps of superquadrics
-/// with exponents above 2.
+/// that of the closest point up to 1e-8 of the size; up to 1e-7 beside cusps, as those of
+/// superquadrics with exponents above 2.
 namespace levelset {
 
 /// A closed curve in polar coordinates [Gielis03]:

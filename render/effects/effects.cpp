@@ -34,15 +34,28 @@ void requireUnit(const char* option, double value) {
       fmt::format("--{} {} is out of range; give a number from 0 to 1", option, value));
 }
 
+bool hasFiniteParts(const V3d& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+/// Requires that squares of pixels cover the picture.
+void requireDivisor(const Image& image, int edge) {
+  if (image.width % edge == 0 && image.height % edge == 0) return;
+  throw UsageError(
+      fmt::format("--reduce {} does not divide the edges of the picture of {}x{} pixels; give a "
+                  "divisor of both edges",
+                  edge, image.width, image.height));
+}
+
 void carve(Image& image, const EffectOptions& options, double diagonal) {
   const VectorLayer positions(image, "P", "--solid-texture");
   const double size = options.textureSize.value_or(kPatternShare * diagonal);
   const PictureView view(image);
   Canvas canvas(image, "--solid-texture");
   forPixels(image, [&](int, int, std::size_t i) {
-    if (!view.isHit(i)) return;
-    canvas.set(i, canvas.colour(i) * patternColour(options.solidTexture, positions.at(i) / size) /
-                      kSolidColour);
+    const V3d place = positions.at(i) / size;
+    if (!view.isHit(i) || !hasFiniteParts(place)) return;
+    canvas.set(i, canvas.colour(i) * patternColour(options.solidTexture, place) / kSolidColour);
   });
 }
 
@@ -64,6 +77,7 @@ void mirror(Image& image, const EffectOptions& options, std::size_t maxMemory) {
     if (!view.isHit(i)) return;
     const V3d d = view.direction(x, y);
     V3d n = normals.at(i).normalized();
+    if (!hasFiniteParts(n)) return;
     if (n.dot(d) > 0) n = -n;
     const double cosine = std::clamp(-n.dot(d), 0.0, 1.0), a = canvas.alpha(i);
     V3d colour = canvas.colour(i);
@@ -87,6 +101,7 @@ void drawReflectionLines(Image& image, const EffectOptions& options) {
     if (!view.isHit(i)) return;
     const V3d d = view.direction(x, y);
     V3d n = normals.at(i).normalized();
+    if (!hasFiniteParts(n)) return;
     if (n.dot(d) > 0) n = -n;
     const Imath::C3f lines =
         reflectionLinesColour(n, d, view.up(), view.right(), options.reflectionLines);
@@ -130,11 +145,8 @@ void shade(Image& image, const EffectOptions& options, const ScreenRunner& runne
 }  // namespace
 
 Image reducedPicture(Image image, int edge) {
+  requireDivisor(image, edge);
   Image small(image.width / edge, image.height / edge);
-  if (small.width == 0 || small.height == 0)
-    throw UsageError(
-        fmt::format("--reduce {} is more than the edge of the picture of {}x{} pixels; give less",
-                    edge, image.width, image.height));
   small.attributes = image.attributes;
   small.matrices = image.matrices;
   const Canvas from(image, "--reduce");
@@ -171,7 +183,9 @@ void validate(const EffectOptions& options) {
   requireUnit("reflect", options.reflect);
   requireUnit("refract", options.refract);
   if (!(options.light.length() > 0) || !std::isfinite(options.light.length()))
-    throw UsageError("--light 0,0,0 is no direction; give for example -0.4,0.7,0.6");
+    throw UsageError(
+        fmt::format("--light {},{},{} is not a direction; give for example -0.4,0.7,0.6",
+                    options.light.x, options.light.y, options.light.z));
   if (!(options.lightRadius < 85))
     throw UsageError(fmt::format("--light-radius {} is too wide; give less than 85 degrees",
                                  options.lightRadius));
@@ -185,8 +199,9 @@ void validate(const EffectOptions& options) {
 
 Image withEffects(Image image, const LookOptions& look, const EffectOptions& options,
                   const ScreenRunner& runner, std::size_t maxMemory) {
-  validate(look);
   validate(options);
+  validate(look, options.reduce);
+  requireDivisor(image, options.reduce);
   if (options.solidTexture != SolidTexture::None)
     carve(image, options, PictureView(image).diagonal());
   if (options.reflect > 0 || options.refract > 0) mirror(image, options, maxMemory);
@@ -194,10 +209,9 @@ Image withEffects(Image image, const LookOptions& look, const EffectOptions& opt
   shade(image, options, runner);
   image = withLook(std::move(image), look, options.reduce, runner);
   if (options.stereo != Stereo::None)
-    image = stereoOf(image, options.stereo, options.eyeDistance.value_or(0),
-                     options.screenDepth.value_or(0));
-  if (options.reduce > 1) image = reducedPicture(std::move(image), options.reduce);
-  return image;
+    return stereoOf(image, options.stereo, options.eyeDistance.value_or(0),
+                    options.screenDepth.value_or(0), options.reduce);
+  return options.reduce > 1 ? reducedPicture(std::move(image), options.reduce) : image;
 }
 
 }  // namespace render

@@ -47,11 +47,11 @@ struct LookOptions {
            .allowsVoxels = false});
     visit("line-colour", &LookOptions::lineColour,
           {.help = "with --outline: display colour of the lines, red, green and blue from 0 to 1"});
-    visit(
-        "halo", &LookOptions::halo,
-        {.help = "width of the fading rim, in pixels, by which nearer surfaces set themselves off "
-                 "from those behind; it has the colour of the background, or else white",
-         .range = OptionRange::NonNegative});
+    visit("halo", &LookOptions::halo,
+          {.help = "width, in pixels, of a rim around nearer surfaces. It is drawn on the surfaces "
+                   "behind them, and fades outwards. It has the colour of the background, or else "
+                   "white",
+           .range = OptionRange::NonNegative});
     visit("depth-cue", &LookOptions::depthCue,
           {.help = "share, from 0 to 1, by which the farthest surfaces fade to the background, or "
                    "else to white",
@@ -137,8 +137,7 @@ struct EffectOptions {
            {"noise", SolidTexture::Noise},
            {"marble", SolidTexture::Marble},
            {"wood", SolidTexture::Wood}},
-          {.help = "pattern in space from which the surfaces are carved; its colours replace the "
-                   "default colour of solids"});
+          {.help = "pattern in space that gives the surfaces their colours"});
     visit("texture-size", &EffectOptions::textureSize,
           {.help = "with --solid-texture: size of its pattern; default: a tenth of the diagonal of "
                    "the scene",
@@ -187,26 +186,29 @@ struct EffectOptions {
   }
 };
 
+/// Checks the options before a picture is read.
+/// @param pixelScale  as withLook()
+/// @throws levelset::UsageError
+void validate(const LookOptions& look, int pixelScale);
 /// Checks the options before a picture is read. @throws levelset::UsageError
-void validate(const LookOptions& look);
 void validate(const EffectOptions& options);
 
 /// Applies lines, depth cues, x-ray and background.
 /// @param pixelScale  edge of the squares of pixels that will become one pixel; widths of lines are
-/// in
-///        pixels after that
+///        in pixels after that
 /// @throws levelset::InvalidInput for a picture without the layers or the camera that they need
 [[nodiscard]] Image withLook(Image image, const LookOptions& look, int pixelScale,
                              const ScreenRunner& runner);
 
 /// Averages the colours of squares of pixels, as displayed. The other layers keep the pixel in the
-/// middle of each square.
-/// @throws levelset::UsageError for squares larger than the picture
+/// middle of each square. If `edge` is even, its middle lies half a pixel of `image` to the right
+/// of the middle of the square, and half a pixel below.
+/// @throws levelset::UsageError unless `edge` divides both edges of the picture
 [[nodiscard]] Image reducedPicture(Image image, int edge);
 
 /// Applies all effects, in this order: solid texture, environment, reflection lines, shadow and
-/// occlusion, those of LookOptions, stereo, reduction. Adds the layers outline, light.sky and
-/// light.key of the effects that are asked for.
+/// occlusion, those of LookOptions, stereo, reduction (of each eye). Adds the layers outline,
+/// light.sky and light.key of the effects that are asked for.
 /// @param maxMemory  limit for the environment's picture, bytes
 /// @throws levelset::InvalidInput for a picture without the layers or the camera that they need
 /// @throws as readExr() for the environment

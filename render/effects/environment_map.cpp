@@ -66,6 +66,7 @@ V3d EnvironmentMap::pixel(int x, int y) const {
 }
 
 V3d EnvironmentMap::light(const V3d& d) const {
+  if (!std::isfinite(d.x + d.y + d.z)) return V3d(0);
   if (picture_.width == 0) return studioLight(d);
   const double longitude = std::atan2(d.x, -d.z), latitude = std::asin(std::clamp(d.y, -1.0, 1.0));
   const double x = (0.5 + 0.5 * longitude / std::numbers::pi) * picture_.width - 0.5,

@@ -17,7 +17,6 @@ namespace {
 using Imath::V3d;
 using levelset::UsageError;
 
-constexpr double kWidestHalo = 100;  // pixels
 constexpr double kStepShare = 0.01;  // default of --outline-step: share of the scene's diagonal
 
 void requireShare(const char* option, double value) {
@@ -29,12 +28,20 @@ void requireShare(const char* option, double value) {
 void requireColour(const char* option, const V3d& colour) {
   for (int c = 0; c < 3; ++c)
     if (!(colour[c] >= 0 && colour[c] <= 1))
-      throw UsageError(fmt::format("--{} {},{},{} is no colour; give three numbers from 0 to 1",
+      throw UsageError(fmt::format("--{} {},{},{} is not a colour; give three numbers from 0 to 1",
                                    option, colour.x, colour.y, colour.z));
 }
 
 double outlineStep(const PictureView& view, const LookOptions& look) {
   return look.outlineStep.value_or(kStepShare * view.diagonal());
+}
+
+/// @param pixelScale  edge of the squares of pixels that will become one pixel
+void requireWidth(const char* option, double width, int pixelScale) {
+  if (width * pixelScale <= kWidestOutline) return;
+  throw UsageError(fmt::format("--{} {} is too wide{}; give at most {} pixels", option, width,
+                               pixelScale > 1 ? fmt::format(" for --reduce {}", pixelScale) : "",
+                               kWidestOutline / pixelScale));
 }
 
 void drawXray(Image& image, const LookOptions& look) {
@@ -44,7 +51,7 @@ void drawXray(Image& image, const LookOptions& look) {
   forPixels(image, [&](int, int, std::size_t i) {
     const double length = std::max(0.0, static_cast<double>(thickness[i]));
     const double bright = 1 - std::exp(-length / *look.xray);
-    canvas.setShown(i, V3d(0.9, 0.95, 1) * bright, 1);
+    canvas.setShown(i, V3d(0.9, 0.95, 1) * bright, canvas.alpha(i));
   });
 }
 
@@ -55,8 +62,10 @@ void fadeWithDepth(Image& image, const PictureView& view, const LookOptions& loo
   Canvas canvas(image, "--depth-cue");
   forPixels(image, [&](int, int, std::size_t i) {
     if (!view.isHit(i)) return;
-    const double way = far > near ? std::clamp((view.depth(i) - near) / (far - near), 0.0, 1.0) : 0;
+    double way = look.depthCueFar && view.depth(i) >= far ? 1 : 0;
+    if (far > near) way = std::clamp((view.depth(i) - near) / (far - near), 0.0, 1.0);
     const double share = look.depthCue * way;
+    if (!(share > 0)) return;  // setShown() would clamp bright colours
     canvas.setShown(i, canvas.shown(i) * (1 - share) + fog * share, canvas.alpha(i));
   });
 }
@@ -125,32 +134,28 @@ void paintBackground(Image& image, const V3d& background) {
   Canvas canvas(image, "--background");
   forPixels(image, [&](int, int, std::size_t i) {
     const double a = std::clamp(canvas.alpha(i), 0.0, 1.0);
+    if (a >= 1) return;  // setShown() would clamp bright colours
     canvas.setShown(i, canvas.shown(i) * a + background * (1 - a), 1);
   });
 }
 
 }  // namespace
 
-void validate(const LookOptions& look) {
+void validate(const LookOptions& look, int pixelScale) {
   requireShare("depth-cue", look.depthCue);
   requireColour("line-colour", look.lineColour);
   if (look.background) requireColour("background", *look.background);
-  if (!(look.outline <= kWidestOutline) || !(look.halo <= kWidestHalo))
-    throw UsageError(
-        fmt::format("--outline {} or --halo {} is too wide; give at most {} and {} pixels",
-                    look.outline, look.halo, kWidestOutline, kWidestHalo));
+  requireWidth("outline", look.outline, pixelScale);
+  requireWidth("halo", look.halo, pixelScale);
   if (look.creaseAngle > 180)
     throw UsageError(
         fmt::format("--crease-angle {} is more than 180 degrees; give less", look.creaseAngle));
   if (look.depthCueNear && look.depthCueFar && !(*look.depthCueNear < *look.depthCueFar))
-    throw UsageError("--depth-cue-far must be more than --depth-cue-near; exchange them");
+    throw UsageError("--depth-cue-far must be more than --depth-cue-near; swap the two numbers");
 }
 
 Image withLook(Image image, const LookOptions& look, int pixelScale, const ScreenRunner& runner) {
-  validate(look);
-  if (look.outline * pixelScale > kWidestOutline)
-    throw UsageError(fmt::format("--outline {} is too wide for --reduce {}; give at most {} pixels",
-                                 look.outline, pixelScale, kWidestOutline / pixelScale));
+  validate(look, pixelScale);
   if (look.xray) drawXray(image, look);
   drawLines(image, look, pixelScale, runner);
   if (look.background) paintBackground(image, *look.background);

@@ -20,6 +20,8 @@ constexpr int kSets = ScreenKernel::kSetEdge * ScreenKernel::kSetEdge;
 constexpr int kOcclusionRays = 16, kShadowRays = 64;  // in a set
 // Growth of the steps along a ray, for each pixel from its start.
 constexpr double kGrowth = 0.05;
+// Difference of normals that no two normals have, for outlines without creases.
+constexpr double kNoCrease = 1e30;
 
 /// Numbers of the kernel, without sets of rays.
 std::vector<double> numbersOf(const PictureView& view) {
@@ -118,7 +120,8 @@ std::vector<float> outlineLayer(const PictureView& view, const OutlineNumbers& o
   tables.numbers[ScreenKernel::kOutlineHalf] = 0.5 * of.width;
   tables.numbers[ScreenKernel::kOutlineSpacing] = of.spacing;
   tables.numbers[ScreenKernel::kOutlineStep] = of.step;
-  tables.numbers[ScreenKernel::kOutlineCrease] = 2 * std::sin(0.5 * of.crease);
+  tables.numbers[ScreenKernel::kOutlineCrease] =
+      of.crease >= std::numbers::pi ? kNoCrease : 2 * std::sin(0.5 * of.crease);
   return runner.run(tables, ScreenPass::Outline,
                     runner.run(tables, ScreenPass::OutlineStrength, {}));
 }

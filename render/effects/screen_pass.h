@@ -51,9 +51,9 @@ struct OutlineNumbers {
   double width = 2;              ///< width of the lines, pixels, at most kWidestOutline
   int spacing = 1;               ///< distance of the samples of the masks, pixels
   double step = 0;               ///< jump of depth that is an outline, world units
-  double crease = 0.6981317008;  ///< angle between normals that is a crease, radians
+  double crease = 0.6981317008;  ///< angle between normals that is a crease, radians; π: no creases
 };
-inline constexpr double kWidestOutline = 120;
+inline constexpr double kWidestOutline = 120;  // also of halos
 
 /// Ambient occlusion by rays in the picture.
 struct OcclusionNumbers {

@@ -64,8 +64,10 @@ V3d wood(const V3d& p) {
 
 double gradientNoise(const V3d& p) {
   const V3d low(std::floor(p.x), std::floor(p.y), std::floor(p.z)), d = p - low;
-  const auto x = static_cast<std::int64_t>(low.x), y = static_cast<std::int64_t>(low.y),
-             z = static_cast<std::int64_t>(low.z);
+  if (!std::isfinite(low.x) || !std::isfinite(low.y) || !std::isfinite(low.z)) return 0;
+  // The hash depends on the lowest 32 bits. Numbers above 2^63 have no std::int64_t.
+  const auto cell = [](double c) { return static_cast<std::int64_t>(std::fmod(c, 0x1p32)); };
+  const std::int64_t x = cell(low.x), y = cell(low.y), z = cell(low.z);
   double sum = 0;
   for (int corner = 0; corner < 8; ++corner) {
     const int i = corner & 1, j = corner >> 1 & 1, k = corner >> 2;

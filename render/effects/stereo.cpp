@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "levelset/error.h"
@@ -138,15 +139,19 @@ Image stereoPicture(const Image& left, const Image& right, Stereo kind) {
   return result;
 }
 
-Image stereoOf(const Image& image, Stereo kind, double eyeDistance, double screenDepth) {
+Image stereoOf(const Image& image, Stereo kind, double eyeDistance, double screenDepth,
+               int reduce) {
   const PictureView view(image);
   const Imath::V2d range = view.depthRange();
   if (!(range.y > 0))
     throw InvalidInput("a stereo picture needs a surface, but the picture shows none");
   const double eyes = eyeDistance > 0 ? eyeDistance : kEyeShare * range.x;
   const double screen = screenDepth > 0 ? screenDepth : 0.5 * (range.x + range.y);
-  return stereoPicture(seenFromBeside(image, -0.5 * eyes, screen),
-                       seenFromBeside(image, 0.5 * eyes, screen), kind);
+  const auto eye = [&](double shift) {
+    Image seen = seenFromBeside(image, shift, screen);
+    return reduce > 1 ? reducedPicture(std::move(seen), reduce) : seen;
+  };
+  return stereoPicture(eye(-0.5 * eyes), eye(0.5 * eyes), kind);
 }
 
 }  // namespace render

@@ -19,7 +19,8 @@ namespace render {
 
 /// Stereo picture from the depth layer of one picture.
 /// @param eyeDistance, screenDepth  as EffectOptions; 0: their defaults
+/// @param reduce  edge of the squares of pixels of each eye that become one pixel
 [[nodiscard]] Image stereoOf(const Image& image, Stereo kind, double eyeDistance,
-                             double screenDepth);
+                             double screenDepth, int reduce = 1);
 
 }  // namespace render

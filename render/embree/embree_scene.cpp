@@ -409,7 +409,10 @@ Hit EmbreeScene::Impl::intersectOpaque(const V3d& origin, const V3d& direction, 
   for (std::size_t n = 0; n < quadrics.size(); ++n) {
     const Camera::Ray ray{origin, direction, near, nearest.found ? nearest.distance : far};
     const JudgedQuadric found = quadricJudges[n].firstHit(ray);
-    if (found.found)
+    // Of two parts with the same surface the first one is seen, as in the kernel.
+    const bool isFirst = !nearest.found || nearest.solid < bezierSolid + beziers.size() ||
+                         found.distance < nearest.distance;
+    if (found.found && isFirst)
       nearest = quadrics[n].hitOf(ray, found.distance, found.normal, found.colour,
                                   bezierSolid + beziers.size() + n);
   }

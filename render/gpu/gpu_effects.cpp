@@ -76,12 +76,12 @@ class GpuScreenRunner : public ScreenRunner {
                std::vector<float>& answers) const {
     constexpr float kNothing = 0;
     const std::size_t largest = context_.largestTable();
-    const Texels pixels = makeTexels(context_, 4 * largest, tables.pixels.data(),
-                                     tables.pixels.size() * sizeof(float), GL_RGBA32F);
-    const Texels before =
-        makeTexels(context_, largest, earlier.empty() ? &kNothing : earlier.data(),
-                   std::max<std::size_t>(earlier.size(), 1) * sizeof(float), GL_R32F);
+    Texels pixels, before;
     try {
+      pixels = makeTexels(context_, 4 * largest, tables.pixels.data(),
+                          tables.pixels.size() * sizeof(float), GL_RGBA32F);
+      before = makeTexels(context_, largest, earlier.empty() ? &kNothing : earlier.data(),
+                          std::max<std::size_t>(earlier.size(), 1) * sizeof(float), GL_R32F);
       dispatch(tables, programOf(pass), pixels, before, answers);
     } catch (...) {
       releaseTexels(context_, pixels);

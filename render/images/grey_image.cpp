@@ -28,7 +28,11 @@ struct PngReader {
 
   PngReader() {
     png = png_create_read_struct(PNG_LIBPNG_VER_STRING, this, &fail, &ignore);
-    if (png) info = png_create_info_struct(png);
+    if (!png) return;
+    // A chunk states its length, and libpng allocates it before it reads the chunk.
+    constexpr png_alloc_size_t kLongestChunk = 1 << 23;
+    png_set_chunk_malloc_max(png, kLongestChunk);
+    info = png_create_info_struct(png);
   }
   ~PngReader() { png_destroy_read_struct(&png, &info, nullptr); }
   PngReader(const PngReader&) = delete;

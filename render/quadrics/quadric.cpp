@@ -16,8 +16,9 @@ using levelset::InvalidInput;
 
 constexpr double kLargestCoordinate = 1e15;
 constexpr std::size_t kMostQuadrics = std::size_t{1} << 30;
-// Least volume of the axes, as a share of the product of their lengths.
-constexpr double kFlattest = 1e-9;
+// Least volume of the axes, as a share of the product of their lengths. Their rounding to single
+// precision changes it by about 1e-7.
+constexpr double kFlattest = 1e-5;
 
 bool isUsable(const V3d& v) {
   for (int c = 0; c < 3; ++c)
@@ -25,16 +26,20 @@ bool isUsable(const V3d& v) {
   return true;
 }
 
+/// Number of a quadric that messages call "the sphere".
+constexpr std::size_t kUnnumbered = static_cast<std::size_t>(-1);
+
 [[noreturn]] void refuseQuadric(const char* list, std::size_t number, const std::string& what) {
-  throw InvalidInput(fmt::format("{} {} {}", list, number, what));
+  if (number == kUnnumbered) throw InvalidInput(fmt::format("the {} {}", list, what));
+  throw InvalidInput(fmt::format("{} {} {}", list, number + 1, what));
 }
 
 void requireUsable(const V3d& v, const char* list, std::size_t number, const char* what) {
   if (!isUsable(v))
-    refuseQuadric(
-        list, number,
-        fmt::format("has {} ({}, {}, {}) with a number that is not finite or exceeds 1e15", what,
-                    v.x, v.y, v.z));
+    refuseQuadric(list, number,
+                  fmt::format("has {} ({}, {}, {}) with a number that is not finite or exceeds "
+                              "1e15; give finite numbers up to 1e15",
+                              what, v.x, v.y, v.z));
 }
 
 void requireRadius(float radius, const char* list, std::size_t number) {
@@ -49,7 +54,8 @@ void requireQuadric(const Quadric& quadric, std::size_t number) {
   double product = 1;
   for (const V3d& axis : quadric.axes) {
     requireUsable(axis, kList, number, "an axis");
-    if (!(axis.length() > 0)) refuseQuadric(kList, number, "has an axis of length 0");
+    if (!(axis.length() > 0))
+      refuseQuadric(kList, number, "has an axis of length 0; give a longer one");
     product *= axis.length();
   }
   const double volume = quadric.axes[0].dot(quadric.axes[1].cross(quadric.axes[2]));
@@ -58,17 +64,20 @@ void requireQuadric(const Quadric& quadric, std::size_t number) {
   if (quadric.kind == QuadricKind::Ellipsoid) return;
   const auto& [low, high] = quadric.range;
   if (!(std::abs(low) <= kLargestCoordinate) || !(std::abs(high) <= kLargestCoordinate) ||
-      !(low < high))
-    refuseQuadric(
-        kList, number,
-        fmt::format("has the range {} … {}; give finite ends, the lower one first", low, high));
+      !(static_cast<float>(low) < static_cast<float>(high)))
+    refuseQuadric(kList, number,
+                  fmt::format("has the range {} … {}; give finite ends, the lower one first, that "
+                              "differ in single precision",
+                              low, high));
   const bool isBelow = quadric.kind == QuadricKind::Paraboloid && !(high > 0);
   const bool isBetween = quadric.kind == QuadricKind::TwoSheet && !(high > 1) && !(low < -1);
   if (isBelow || isBetween)
     refuseQuadric(
         kList, number,
         fmt::format("has no point in the range {} … {}, because a {} {}", low, high,
-                    nameOf(quadric.kind), isBelow ? "begins at 0" : "has none between -1 and 1"));
+                    nameOf(quadric.kind),
+                    isBelow ? "begins at 0; give a range that reaches above 0"
+                            : "has none between -1 and 1; give a range that reaches beyond"));
 }
 
 /// Square of the radius at a height in parameter space.
@@ -245,23 +254,27 @@ Quadric quadricOf(const Stick& stick) {
   return quadric;
 }
 
-void requireQuadrics(const QuadricModel& model) {
+void requireQuadrics(const QuadricModel& model, bool isNumbered) {
   if (model.size() == 0) throw InvalidInput("there is no quadric; give at least one");
   if (model.size() > kMostQuadrics)
     throw InvalidInput(
         fmt::format("there are {} quadrics; a part has at most 2^30 of them", model.size()));
+  const auto numberOf = [&](std::size_t n) { return isNumbered ? n : kUnnumbered; };
   for (std::size_t n = 0; n < model.balls.size(); ++n) {
-    requireUsable(model.balls[n].centre, "sphere", n, "a centre");
-    requireRadius(model.balls[n].radius, "sphere", n);
+    requireUsable(model.balls[n].centre, "sphere", numberOf(n), "a centre");
+    requireRadius(model.balls[n].radius, "sphere", numberOf(n));
   }
   for (std::size_t n = 0; n < model.sticks.size(); ++n) {
     const Stick& stick = model.sticks[n];
-    requireUsable(stick.a, "cylinder", n, "an end");
-    requireUsable(stick.b, "cylinder", n, "an end");
-    requireRadius(stick.radius, "cylinder", n);
-    if (stick.a == stick.b) refuseQuadric("cylinder", n, "has ends at the same position");
+    requireUsable(stick.a, "cylinder", numberOf(n), "an end");
+    requireUsable(stick.b, "cylinder", numberOf(n), "an end");
+    requireRadius(stick.radius, "cylinder", numberOf(n));
+    if (stick.a == stick.b)
+      refuseQuadric("cylinder", numberOf(n),
+                    "has ends at the same position; give two different ones");
   }
-  for (std::size_t n = 0; n < model.quadrics.size(); ++n) requireQuadric(model.quadrics[n], n);
+  for (std::size_t n = 0; n < model.quadrics.size(); ++n)
+    requireQuadric(model.quadrics[n], numberOf(n));
 }
 
 std::optional<QuadricExtent> extentOf(const Quadric& quadric, const HomogeneousRow& numerator,

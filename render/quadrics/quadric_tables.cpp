@@ -1,5 +1,6 @@
 #include "render/quadrics/quadric_tables.h"
 
+#include <fmt/core.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
@@ -9,6 +10,7 @@
 #include <limits>
 #include <utility>
 
+#include "levelset/error.h"
 #include "levelset/memory_limit.h"
 #include "levelset/progress.h"
 #include "render/quadrics/quadric_tree.h"
@@ -132,6 +134,21 @@ V3d vectorOf(const float* three) {
           static_cast<double>(three[2])};
 }
 
+/// @throws InvalidInput for a cylinder whose ends are equal after rounding to single precision
+void requireStoredSticks(const std::vector<Stick>& sticks, const V3d& origin, double reach) {
+  for (std::size_t n = 0; n < sticks.size(); ++n) {
+    bool isPoint = true;
+    for (int c = 0; c < 3; ++c)
+      isPoint = isPoint && static_cast<float>(sticks[n].a[c] - origin[c]) ==
+                               static_cast<float>(sticks[n].b[c] - origin[c]);
+    if (isPoint)
+      throw levelset::InvalidInput(
+          fmt::format("cylinder {} has a length of {:.3g}, which single precision rounds to 0 in a "
+                      "part with the half diagonal {:.3g}; put it into a smaller part",
+                      n + 1, (sticks[n].b - sticks[n].a).length(), reach));
+  }
+}
+
 V3d centreOf(const BallBlock& block, std::size_t lane) {
   return {static_cast<double>(block.x[lane]), static_cast<double>(block.y[lane]),
           static_cast<double>(block.z[lane])};
@@ -209,6 +226,7 @@ QuadricTables makeQuadricTables(const QuadricModel& model, std::size_t maxBytes)
   box.extendBy(boxAroundAll(model.quadrics));
   tables.origin = box.center();
   tables.reach = 0.5 * box.size().length();
+  requireStoredSticks(model.sticks, tables.origin, tables.reach);
   std::vector<std::uint32_t> order = treeOf(model.balls, tables, kQuadricLanes, tables.trees[0]);
   tables.balls = emptyBlocks<BallBlock>(order.size() / kQuadricLanes);
   tables.colours.resize(order.size());

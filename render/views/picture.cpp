@@ -118,11 +118,12 @@ void requireOpacity(const Scene& scene) {
       if (!(part.opacity > 0 && part.opacity <= 1))
         throw levelset::UsageError(
             fmt::format("an opacity of {} is out of range; give more than 0 and at most 1, or "
-                        "leave the solid or mesh out",
+                        "leave the part out",
                         part.opacity));
   };
   require(scene.solids);
   require(scene.meshes);
+  require(scene.beziers);
 }
 
 void requireLight(const Scene& scene) {

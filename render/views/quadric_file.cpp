@@ -56,12 +56,16 @@ Imath::C3f readQuadricColour(const ShapeJson& json) {
 QuadricKind kindNamed(const std::string& name) {
   for (int n = 0; n < kQuadricKinds; ++n)
     if (name == nameOf(static_cast<QuadricKind>(n))) return static_cast<QuadricKind>(n);
-  kQuadricDocument.refuse(fmt::format("has the unknown kind \"{}\"", name));
+  std::string known = "sphere";
+  for (int n = 0; n < kQuadricKinds; ++n)
+    known += std::string(", ") + nameOf(static_cast<QuadricKind>(n));
+  kQuadricDocument.refuse(
+      fmt::format("has the unknown kind \"{}\"; the kinds are {}", name, known));
 }
 
 void addQuadric(const ShapeJson& json, QuadricModel& model) {
   const ShapeJson& kind = kQuadricDocument.member(json, "kind");
-  if (!kind.is_string()) kQuadricDocument.refuse("has a \"kind\" that is no text");
+  if (!kind.is_string()) kQuadricDocument.refuse("has a \"kind\" that is not a text");
   const auto name = kind.get<std::string>();
   const Imath::C3f colour = readQuadricColour(json);
   if (name == "sphere") {
@@ -107,8 +111,14 @@ QuadricModel modelOfText(const std::string& text) {
   if (!list.is_array()) kQuadricDocument.refuse("has \"quadrics\" that are not a list");
   QuadricModel model;
   for (std::size_t n = 0; n < list.size(); ++n)
-    levelset::withContext(fmt::format("entry {} of \"quadrics\"", n),
-                          [&] { addQuadric(list[n], model); });
+    levelset::withContext(fmt::format("entry {} of \"quadrics\"", n + 1), [&] {
+      QuadricModel one;
+      addQuadric(list[n], one);
+      requireQuadrics(one, false);
+      model.balls.insert(model.balls.end(), one.balls.begin(), one.balls.end());
+      model.sticks.insert(model.sticks.end(), one.sticks.begin(), one.sticks.end());
+      model.quadrics.insert(model.quadrics.end(), one.quadrics.begin(), one.quadrics.end());
+    });
   requireQuadrics(model);
   return model;
 }

@@ -3,6 +3,7 @@
 #include <Imath/ImathVec.h>
 
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "levelset/deform/control_lattice.h"
@@ -23,7 +24,8 @@ struct MotionCertificateOptions {
 struct MotionCertificate {
   FoldVerdict verdict = FoldVerdict::Undecided;
   /// Bracket of the least Jacobian determinant in the box and in the interval, as FoldCertificate.
-  double leastLow = 0, leastHigh = 0;
+  double leastLow = -std::numeric_limits<double>::infinity(),
+         leastHigh = std::numeric_limits<double>::infinity();
   Imath::V3d place{0};    ///< point of `leastHigh`, world coordinates before the deformation
   double time = 0;        ///< time of `leastHigh`, in [0, 1] over the interval
   std::size_t boxes = 0;  ///< boxes of parameters and time that were bounded

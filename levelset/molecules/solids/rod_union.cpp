@@ -46,8 +46,33 @@ namespace {
 
 using Imath::V3d;
 
-constexpr double kSampleSpacing = 0.2;  // of the radius of the curve
-constexpr double kCovered = 1e-9;       // a point this deep in another shape is covered
+constexpr double kParallelSticks = 1e-2;  // square of the sine of the angle between two rods
+constexpr double kSampleSpacing = 0.2;    // of the radius of the curve
+constexpr double kCovered = 1e-9;         // a point this deep in another shape is covered
+
+/// Returns true for two nearly parallel rods whose surfaces meet along their sides. Their curve is
+/// too long and thin for samples.
+bool lieSideBySide(const RodShape& a, const RodShape& b) {
+  if (a.isBall() || b.isBall()) return false;
+  const V3d w = (a.to - a.from).normalized(), along = (b.to - b.from).normalized();
+  if (w.cross(along).length2() >= kParallelSticks) return false;
+  const double from = (b.from - a.from).dot(w), to = (b.to - a.from).dot(w);
+  const double low = std::max(0.0, std::min(from, to)),
+               high = std::min((a.to - a.from).length(), std::max(from, to));
+  if (high - low <= std::max(a.radius, b.radius)) return false;
+  // Points of both axes in a plane across `w`. Their difference is linear in the place of the
+  // plane.
+  const auto apart = [&](double s) {
+    return b.from + (b.to - b.from) * ((s - from) / (to - from)) - (a.from + w * s);
+  };
+  const V3d first = apart(low), change = apart(high) - first;
+  const double squared = change.length2();
+  const double t = squared > 0 ? std::clamp(-first.dot(change) / squared, 0.0, 1.0) : 0;
+  const double least = (first + change * t).length(),
+               most = std::max(first.length(), (first + change).length());
+  // Where axes coincide, so do the surfaces, or one lies in the other.
+  return least < a.radius + b.radius && most > std::abs(a.radius - b.radius) + kCovered;
+}
 
 }  // namespace
 
@@ -234,6 +259,8 @@ RodUnion::RodUnion(const std::vector<Ball>& balls, const std::vector<Rod>& rods,
   // Curves of each pair whose boxes meet, by the lower index.
   const std::size_t count = data->shapes.size();
   std::vector<std::vector<MeetingCurve>> curves(count);
+  std::atomic<std::size_t> bytes = 0;
+  ProgressGate meeting(subProgress(progress, 0, 0.3), count);
   tbb::parallel_for(std::size_t{0}, count, [&](std::size_t n) {
     const RodShape& shape = data->shapes[n];
     const V3d middle = (shape.from + shape.to) / 2;
@@ -244,16 +271,22 @@ RodUnion::RodUnion(const std::vector<Ball>& balls, const std::vector<Rod>& rods,
       if (other > n) others.push_back(other);
     });
     std::sort(others.begin(), others.end());
-    for (const std::uint32_t other : others)
+    for (const std::uint32_t other : others) {
+      if (lieSideBySide(shape, data->shapes[other]))
+        throw InvalidInput(
+            "two sticks lie side by side and overlap; give a smaller --stick-radius");
       addMeetingCurves(data->shapes, static_cast<std::uint32_t>(n), other, curves[n]);
+    }
+    bytes += 2 * curves[n].size() * sizeof(MeetingCurve);  // and a copy
+    requireMemory(static_cast<double>(bytes), maxBytes);
+    meeting.advance(1);
   });
   for (auto& list : curves) {
     data->curves.insert(data->curves.end(), list.begin(), list.end());
     list = {};
   }
   std::vector<std::vector<CurveSample>> samples(data->curves.size());
-  std::atomic<std::size_t> bytes = 0;
-  ProgressGate gate(progress, data->curves.size());
+  ProgressGate gate(subProgress(progress, 0.3, 1), data->curves.size());
   tbb::parallel_for(std::size_t{0}, data->curves.size(), [&](std::size_t n) {
     data->addSamples(static_cast<std::uint32_t>(n), samples[n]);
     bytes += (2 * sizeof(CurveSample) + sizeof(PointItem)) * samples[n].size();

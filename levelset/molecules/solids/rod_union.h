@@ -27,12 +27,14 @@ struct Rod {
 /// boundary lies on the surface of the ball or rod in which the point is deepest, unless another
 /// one covers it. Then it lies on a curve where two surfaces meet. Each curve is a function of the
 /// angle around a rod or a ball. Samples of its exposed part find the minima, and a search between
-/// them the closest point, to 1e-9 of the radius. Exposed parts shorter than a quarter of a radius
-/// may be missed; distances inside, beside them, are too large.
+/// them the closest point, to 1e-9 of the radius. Exposed parts shorter than a fifth of a radius
+/// may be missed; distances inside, beside them, are too large. Nearly parallel rods whose sides
+/// overlap are refused.
 class RodUnion {
  public:
   /// @param balls  finite centres, positive finite radii; at least one
-  /// @throws InvalidInput for other balls or rods; ResourceLimit, Cancelled
+  /// @throws InvalidInput for other balls or rods, and for rods that lie side by side and overlap;
+  ///         ResourceLimit, Cancelled
   RodUnion(const std::vector<Ball>& balls, const std::vector<Rod>& rods,
            std::size_t maxBytes = kNoMemoryLimit, const Progress& progress = {});
 

@@ -57,19 +57,23 @@ class SegmentedFileReader {
  public:
   SegmentedFileReader(std::string_view file, const std::string& name,
                       const ReadSegmentedOptions& options)
-      : file_(file), name_(name), options_(options), limit_(memoryLimit(options.maxMemory)) {}
-
-  SegmentedField read() {
-    const VdbEntry* entry = findLabelGrid(entries_);
-    if (!entry)
+      : file_(file), name_(name), options_(options), limit_(memoryLimit(options.maxMemory)) {
+    labelEntry_ = findLabelGrid(entries_);
+    if (!labelEntry_)
       throw InvalidInput(fmt::format(
           "{} holds no segmentation; read it as a level set, or write it again with 'segment'",
           name_));
-    checkHeader(*entry);
-    labels_ = load<FloatTree>(*entry, 0.1, 0.3);
+    checkHeader(*labelEntry_);
+  }
+
+  /// Half width in voxels, from the header. @throws InvalidInput if the header is damaged
+  [[nodiscard]] double halfWidth() const { return halfWidth_; }
+
+  SegmentedField read() {
+    labels_ = load<FloatTree>(*labelEntry_, 0.1, 0.3);
     listBlocks();
     readInterfaces();
-    std::shared_ptr<const SheetData> sheets = readSheets(*entry);
+    std::shared_ptr<const SheetData> sheets = readSheets(*labelEntry_);
     std::vector<PackedBlock> blocks(leaves_.size());
     tbb::parallel_for(std::size_t{0}, leaves_.size(),
                       [&](std::size_t b) { blocks[b] = packed(b); });
@@ -80,7 +84,13 @@ class SegmentedFileReader {
     labels_.reset();
     layers_.clear();
     report(options_.progress, 0.95);
-    return assembleSegmented(transform_, halfWidth_, tiles, std::move(blocks), std::move(sheets));
+    const SegmentedField field =
+        assembleSegmented(transform_, halfWidth_, tiles, std::move(blocks), std::move(sheets));
+    const std::vector<RegionLabel> labels = field.labels();
+    for (const RegionLabel owner : field.sheetLabels())
+      if (owner != kVoid && !std::binary_search(labels.begin(), labels.end(), owner))
+        fail(fmt::format("region {} has sheets and no grid point", owner));
+    return field;
   }
 
  private:
@@ -182,13 +192,16 @@ class SegmentedFileReader {
   }
 
   PackedBlock packed(std::size_t b) {
-    SegmentedBlockValues values;
+    SegmentedBlockValues values{};
     values.origin = leaves_[b]->origin();
     for (std::uint32_t n = 0; n < SegmentedData::kVoxels; ++n)
       if (!toLabel(leaves_[b]->getValue(n), values.labels[n])) markDamaged(b);
     values.distances.fill(background_);
     values.neighbours.fill(kVoid);
-    if (!takeNearest(values) || !takeExtras(values)) markDamaged(b);
+    if (!takeNearest(values) || !takeExtras(values)) {
+      markDamaged(b);
+      return {};
+    }
     return packBlock(values, background_);
   }
   [[nodiscard]] bool takeNearest(SegmentedBlockValues& values) const {
@@ -324,6 +337,7 @@ class SegmentedFileReader {
   const ReadSegmentedOptions& options_;
   std::size_t limit_, used_ = 0;
   std::vector<VdbEntry> entries_ = readVdbEntries(file_, name_);
+  const VdbEntry* labelEntry_ = nullptr;  ///< the grid of labels
   openvdb::math::Transform::Ptr transform_;
   double halfWidth_ = 0;
   float background_ = 0;
@@ -355,14 +369,12 @@ SegmentedField readSegmented(const std::filesystem::path& path,
 }
 
 SegmentedFileInfo segmentedFileInfo(const std::filesystem::path& path) {
+  const std::string name = inputName(path);
   SegmentedFileInfo info;
   {
-    const std::string name = inputName(path);
     const MappedFile bytes(path);
-    const std::vector<VdbEntry> entries = readVdbEntries(bytes.view(), name);
-    const VdbEntry* labels = findLabelGrid(entries);
-    if (!labels) throw InvalidInput(fmt::format("{} holds no segmentation", name));
-    info.halfWidth = metadataOf<double>(*labels, segmented_file::kHalfWidth).value_or(0);
+    const ReadSegmentedOptions options;
+    info.halfWidth = SegmentedFileReader(bytes.view(), name, options).halfWidth();
   }
   for (const GridInfo& grid : bandFileInfo(path)) {
     if (grid.name != segmented_file::distanceGrid(0)) continue;
@@ -370,6 +382,11 @@ SegmentedFileInfo segmentedFileInfo(const std::filesystem::path& path) {
     info.activeVoxels = grid.activeVoxels;
     info.worldBounds = grid.worldBounds;
   }
+  if (!(info.voxelSize > 0))
+    throw InvalidInput(fmt::format(
+        "{} holds a damaged segmentation: grid 'distance' is missing or has no cubic voxels; "
+        "download or create the file again",
+        name));
   return info;
 }
 

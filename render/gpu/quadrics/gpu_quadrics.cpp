@@ -206,36 +206,58 @@ std::vector<std::uint32_t> wordsOf(const std::vector<StoredQuadric>& quadrics) {
 
 }  // namespace
 
-void GpuQuadrics::release() {
-  for (Texels& texels : textures_) {
+void GpuQuadrics::free(Uploaded& part) {
+  for (Texels& texels : part.textures) {
     if (texels.texture != 0) releaseTexels(context_, texels);
     texels = {};
   }
+}
+
+void GpuQuadrics::release() {
+  for (Uploaded& part : uploaded_) free(part);
+  uploaded_.clear();
   rays_.release(context_);
   fetched_.release(context_);
   if (program_ != 0) context_.gl().DeleteProgram(program_);
   program_ = 0;
-  uploaded_ = nullptr;
 }
 
-void GpuQuadrics::upload(const QuadricTables& tables) {
-  for (Texels& texels : textures_) {
-    if (texels.texture != 0) releaseTexels(context_, texels);
-    texels = {};
+const GpuQuadrics::Uploaded& GpuQuadrics::uploadedOf(
+    const std::shared_ptr<const QuadricTables>& tables) {
+  for (const Uploaded& part : uploaded_)
+    if (part.tables == tables) return part;
+  std::erase_if(uploaded_, [this](Uploaded& part) {
+    const bool isUnused = part.tables.use_count() == 1;
+    if (isUnused) free(part);
+    return isUnused;
+  });
+  Uploaded part;
+  part.tables = tables;
+  try {
+    upload(part);
+  } catch (...) {
+    free(part);
+    throw;
   }
+  uploaded_.push_back(std::move(part));
+  return uploaded_.back();
+}
+
+void GpuQuadrics::upload(Uploaded& part) {
+  const QuadricTables& tables = *part.tables;
   std::vector<ListedBox> boxes;
   const std::size_t firsts[] = {0, tables.firstStick(), tables.firstQuadric()};
   for (std::size_t kind = 0; kind < 3; ++kind)
     if (!tables.trees[kind].empty())
       listBoxes(tables.trees[kind], 0, firsts[kind], kind < 2 ? kQuadricLanes : 1, boxes);
-  boxCount_ = static_cast<int>(boxes.size());
+  part.boxCount = static_cast<int>(boxes.size());
   std::size_t next = 0;
   // The limit counts texels of four bytes.
   const auto add = [&](const void* data, std::size_t bytes, GLenum format, std::size_t texel) {
     constexpr std::uint32_t kNone = 0;  // an empty texture is not allowed
-    textures_[next++] = bytes > 0
-                            ? makeTexels(context_, largestTable_ / 4 * texel, data, bytes, format)
-                            : makeTexels(context_, largestTable_, &kNone, sizeof kNone, GL_R32I);
+    part.textures[next++] =
+        bytes > 0 ? makeTexels(context_, largestTable_ / 4 * texel, data, bytes, format)
+                  : makeTexels(context_, largestTable_, &kNone, sizeof kNone, GL_R32I);
   };
   add(boxes.data(), boxes.size() * sizeof(ListedBox), GL_RGBA32I, 16);
   add(tables.balls.data(), tables.balls.size() * sizeof(BallBlock), GL_R32I, 4);
@@ -245,7 +267,8 @@ void GpuQuadrics::upload(const QuadricTables& tables) {
   add(words.data(), words.size() * sizeof(std::uint32_t), GL_R32I, 4);
 }
 
-void GpuQuadrics::run(const QuadricTables& tables, std::vector<double>& rays) {
+void GpuQuadrics::run(const Uploaded& part, std::vector<double>& rays) {
+  const QuadricTables& tables = *part.tables;
   const GlFunctions& gl = context_.gl();
   if (program_ == 0) program_ = compileCompute(context_, quadricShaderText());
   gl.UseProgram(program_);
@@ -253,13 +276,13 @@ void GpuQuadrics::run(const QuadricTables& tables, std::vector<double>& rays) {
   rays_.upload(context_, rays);
   fetched_.reserve(context_, bytes);
   gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, rays_.name());
-  for (std::size_t n = 0; n < textures_.size(); ++n)
-    gl.BindTextureUnit(static_cast<GLuint>(n), textures_[n].texture);
+  for (std::size_t n = 0; n < part.textures.size(); ++n)
+    gl.BindTextureUnit(static_cast<GLuint>(n), part.textures[n].texture);
   const auto set = [&](const char* name, auto value) {
     gl.Uniform1i(gl.GetUniformLocation(program_, name), static_cast<GLint>(value));
   };
   set("rayCount", count);
-  set("boxCount", boxCount_);
+  set("boxCount", part.boxCount);
   set("firstStick", tables.firstStick());
   set("firstQuadric", tables.firstQuadric());
   const auto margin = static_cast<GLfloat>(tables.pad());
@@ -279,7 +302,7 @@ void GpuQuadrics::run(const QuadricTables& tables, std::vector<double>& rays) {
     std::memcpy(rays.data(), fetched_.mapped(), bytes);
     isDone = true;
     for (std::size_t n = 0; n < count && isDone; ++n)
-      isDone = rays[kQuadricNumbers * n + kNextBox] >= boxCount_;
+      isDone = rays[kQuadricNumbers * n + kNextBox] >= part.boxCount;
   }
 }
 
@@ -296,14 +319,7 @@ std::vector<QuadricHit> GpuQuadrics::firstHits(const QuadricCaster& caster,
                    {from.x, from.y, from.z, from.dx, from.dy, from.dz, from.near, ray.far, start, 0,
                     QuadricKernel::kNoRoot, static_cast<double>(INT32_MAX)});
   }
-  context_.run([&] {
-    if (uploaded_ != caster.tables()) {
-      uploaded_ = nullptr;
-      upload(tables);
-      uploaded_ = caster.tables();
-    }
-    run(tables, numbers);
-  });
+  context_.run([&] { run(uploadedOf(caster.tables()), numbers); });
   std::vector<QuadricHit> hits(rays.size());
   for (std::size_t n = 0; n < rays.size(); ++n) {
     const double* found = numbers.data() + kQuadricNumbers * n;

@@ -27,21 +27,29 @@ class GpuQuadrics {
   /// Frees all objects in the context. Runs in a job of GlContext::run().
   void release();
 
-  /// First hits of rays. The quadrics are uploaded unless they are those of the previous call.
+  /// First hits of rays. The tables of a part are uploaded by the first call, and stay as long as
+  /// something else holds them.
   /// @throws levelset::ResourceLimit for quadrics that do not fit into buffer textures
   [[nodiscard]] std::vector<QuadricHit> firstHits(const QuadricCaster& caster,
                                                   const std::vector<Camera::Ray>& rays);
 
  private:
+  /// Tables of a part in the context.
+  struct Uploaded {
+    std::shared_ptr<const QuadricTables> tables;
+    std::array<Texels, 4> textures{};  ///< boxes, spheres, cylinders, general quadrics
+    int boxCount = 0;
+  };
+
   // These run in jobs of GlContext::run().
-  void upload(const QuadricTables& tables);
-  void run(const QuadricTables& tables, std::vector<double>& rays);
+  void free(Uploaded& part);
+  const Uploaded& uploadedOf(const std::shared_ptr<const QuadricTables>& tables);
+  void upload(Uploaded& part);
+  void run(const Uploaded& part, std::vector<double>& rays);
 
   const GlContext& context_;
   std::size_t largestTable_;
-  std::shared_ptr<const QuadricTables> uploaded_;  // data of the textures
-  std::array<Texels, 4> textures_{};               // boxes, spheres, cylinders, general quadrics
-  int boxCount_ = 0;
+  std::vector<Uploaded> uploaded_;
   GrowingBuffer rays_{GrowingBuffer::Use::Upload}, fetched_{GrowingBuffer::Use::Fetch};
   GLuint program_ = 0;
 };

@@ -303,20 +303,22 @@ Json motionJson(Invocation& in, const std::vector<ControlLattice>& keys,
                   {"to", times[k + 1]},
                   {"verdict", levelset::foldVerdictName(found.verdict)},
                   {"boxes", found.boxes}};
-    if (std::isfinite(found.leastLow)) entry["least_jacobian_low"] = found.leastLow;
-    if (std::isfinite(found.leastHigh) && found.boxes > 0) {
+    if (found.boxes > 0 && std::isfinite(found.leastLow))
+      entry["least_jacobian_low"] = found.leastLow;
+    if (found.boxes > 0 && std::isfinite(found.leastHigh)) {
       entry["least_jacobian_high"] = found.leastHigh;
       entry["least_jacobian_frame"] = time;
     }
     list.push_back(std::move(entry));
     if (found.verdict == levelset::FoldVerdict::Folds)
       in.notes.warnings.push_back(fmt::format(
-          "animate: the motion folds at frame {:.4g}, between two frames; no frame shows it",
+          "animate: the motion folds at frame {:.4g}, between two frames. The frames that are "
+          "written are proven. Give a key between them if you draw more frames.",
           time));
     else if (found.verdict == levelset::FoldVerdict::Undecided)
       in.notes.warnings.push_back(fmt::format(
-          "animate: the motion between the frames {} and {} is not proven to fold nowhere; the "
-          "frames are",
+          "animate: there is no proof for the motion between frames {} and {}; it may fold there. "
+          "Each frame is proven. Use lattices without weights or of a lower degree for a proof.",
           times[k], times[k + 1]));
   }
   return list;

@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <numbers>
 #include <string>
 
 #include "apps/pipeline/operators/common.h"
@@ -30,10 +31,25 @@ MoleculeModelOptions modelOptionsOf(Invocation& in) {
           .maxMemory = in.maxMemory};
 }
 
-/// Bounds of the solid, Å, or larger ones. Small balls reach less far than those that a molecule
-/// has.
+/// Bounds of the solid, Å, or larger ones. Those of a molecule have its van der Waals balls, of 1.2
+/// Å or more.
 Imath::Box3d modelBoundsOf(Invocation& in) {
-  return in.operands[0].plan().bounds;
+  Imath::Box3d bounds = in.operands[0].plan().bounds;
+  const Imath::V3d beyond(std::max(0.0, in.length("stick-radius") - 1.2));
+  if (!levelset::hasMoleculeSticks(modelStyleOf(in)) || bounds.isEmpty()) return bounds;
+  return {bounds.min - beyond, bounds.max + beyond};
+}
+
+/// Area of the solid, Å²: carbon atoms, and a stick of 1.5 Å for each of them.
+double modelAreaOf(Invocation& in, double atoms) {
+  constexpr double kPi = std::numbers::pi;
+  const MoleculeStyle style = modelStyleOf(in);
+  // Spheres of atoms in a molecule are covered by others for the most part.
+  if (style == MoleculeStyle::VanDerWaals) return 10 * atoms + 30;
+  const double stick = levelset::hasMoleculeSticks(style) ? in.length("stick-radius") : 0;
+  const double ball =
+      style == MoleculeStyle::Sticks ? stick : std::max(stick, 1.7 * in.number("ball-scale"));
+  return atoms * (4 * kPi * ball * ball + 2 * kPi * stick * 1.5) + 1;
 }
 
 double modelVoxelOf(Invocation& in) {
@@ -60,8 +76,7 @@ Plan planMoleculeModel(Invocation& in) {
   plan.bounds = modelBoundsOf(in);
   plan.voxelSize = modelVoxelOf(in);
   plan.halfWidth = in.number("half-width");
-  // Å². Balls of a quarter of the van der Waals radius have about 2, and a stick for each atom 1.
-  plan.area = (modelStyleOf(in) == MoleculeStyle::VanDerWaals ? 10 : 3) * atoms + 30;
+  plan.area = modelAreaOf(in, atoms);
   return plan;
 }
 

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/option_params.h"
@@ -21,11 +22,51 @@ namespace {
 
 using levelset::UsageError;
 
+/// An option that has an effect only beside others.
+struct Dependence {
+  const char* option;
+  std::vector<const char*> needed;  // one of these
+};
+
+const std::vector<Dependence>& dependences() {
+  static const std::vector<Dependence> all = {{"environment", {"reflect", "refract"}},
+                                              {"index", {"refract"}},
+                                              {"light", {"shadow"}},
+                                              {"light-radius", {"shadow"}},
+                                              {"occluder-depth", {"occlusion", "shadow"}},
+                                              {"occlusion-radius", {"occlusion"}},
+                                              {"texture-size", {"solid-texture"}},
+                                              {"eye-distance", {"stereo"}},
+                                              {"screen-depth", {"stereo"}}};
+  return all;
+}
+
+/// Refuses options that would be ignored. @throws UsageError
+void validateDependences(const Invocation& in) {
+  for (const auto& [option, needed] : dependences()) {
+    bool isUsed = !in.given(option);
+    std::string names;
+    for (const char* name : needed) {
+      isUsed = isUsed || (in.given(name) && in.text(name) != "none");
+      names += fmt::format("{}--{}", names.empty() ? "" : " or ", name);
+    }
+    if (!isUsed)
+      throw UsageError(fmt::format("effect: --{} is for {}; give {}, or leave it out", option,
+                                   names, needed.size() > 1 ? "one of them" : "that, too"));
+  }
+  for (const char* option : {"eye-distance", "screen-depth"})
+    if (in.given(option) && in.given("right"))
+      throw UsageError(fmt::format(
+          "effect: --right is a drawn picture, whose eye --{0} does not move; leave --{0} out",
+          option));
+}
+
 void validateEffect(const Invocation& in) {
   Invocation all = in;
   try {
-    render::validate(readOptions<render::LookOptions>(all, OptionStage::Syntax));
-    render::validate(readOptions<render::EffectOptions>(all, OptionStage::Syntax));
+    const auto options = readOptions<render::EffectOptions>(all, OptionStage::Syntax);
+    render::validate(options);
+    render::validate(readOptions<render::LookOptions>(all, OptionStage::Syntax), options.reduce);
   } catch (const UsageError& error) {
     throw UsageError(fmt::format("effect: {}", error.what()));
   }
@@ -36,6 +77,7 @@ void validateEffect(const Invocation& in) {
   if (in.given("right") && (!in.given("stereo") || in.text("stereo") == "none"))
     throw UsageError(
         "effect: --right is the picture of the right eye; give --stereo, too, or leave it out");
+  validateDependences(in);
 }
 
 render::Image combined(Invocation& in, const render::LookOptions& look,

@@ -72,9 +72,56 @@ const std::vector<Preset>& presets() {
   return all;
 }
 
-/// Options of a preset that fit its style only.
+/// True for options of a preset that fit its style only.
 bool isOfStyle(const std::string& option) {
-  return option == "ground" || option == "line";
+  return option == "ground";
+}
+
+/// Value of an option that a preset sets; null: it sets none.
+const char* presetValue(const std::string& preset, const std::string& wanted) {
+  for (const Preset& each : presets())
+    for (const auto& [option, value] : each.options)
+      if (preset == each.name && wanted == option) return value;
+  return nullptr;
+}
+
+/// True if an option of an invocation with its preset has the value that the preset sets.
+bool isOfPreset(const Invocation& in, const std::string& option) {
+  const char* value = in.given("preset") ? presetValue(in.text("preset"), option) : nullptr;
+  return value && in.text(option) == value;
+}
+
+std::map<std::string, std::string> optionsOf(const Invocation& in) {
+  std::map<std::string, std::string> options;
+  for (const Param& param : in.op().params)
+    if (in.given(param.name)) options[param.name] = in.text(param.name);
+  return options;
+}
+
+Invocation withOptions(const Invocation& in, std::map<std::string, std::string> options) {
+  Invocation all(in.op(), std::move(options));
+  all.operands = in.operands;
+  all.operandNames = in.operandNames;
+  all.named = in.named;
+  all.roi = in.roi;
+  all.planned = in.planned;
+  all.isPartial = in.isPartial;
+  all.progress = in.progress;
+  all.maxMemory = in.maxMemory;
+  all.dryRun = in.dryRun;
+  all.voxelFollows = in.voxelFollows;
+  all.notes = in.notes;
+  return all;
+}
+
+/// Requires parts whose thickness is measured. @throws UsageError
+void requireThickness(const Invocation& in, const render::Scene& scene) {
+  if (scene.quadrics.empty() && scene.beziers.empty() && scene.mapped.empty()) return;
+  const bool isPresets = in.given("preset") && presetValue(in.text("preset"), "xray");
+  throw UsageError(
+      isPresets ? "render: --xray (of --preset xray) needs level sets or meshes; use another "
+                  "preset"
+                : "render: --xray needs level sets or meshes; leave it out");
 }
 
 render::LookOptions lookOf(Invocation& in, OptionStage stage) {
@@ -91,11 +138,23 @@ Imath::C3f linearColour(const Invocation& in) {
   for (int c = 0; c < 3; ++c) {
     if (!(colour[c] >= 0 && colour[c] <= 1))
       throw UsageError(
-          fmt::format("render: --colour {} is no colour; give red, green and blue from 0 to 1",
+          fmt::format("render: --colour {} is not a colour; give red, green and blue from 0 to 1",
                       in.text("colour")));
     linear[c] = render::linearFromSrgb(static_cast<float>(colour[c]));
   }
   return linear;
+}
+
+/// Sets the colour of --colour or of the preset.
+void colourParts(const Invocation& in, render::Scene& scene) {
+  const Imath::C3f colour = linearColour(in);
+  for (render::Solid& solid : scene.solids) solid.colour = colour;
+  for (render::MeshPart& mesh : scene.meshes) mesh.colour = colour;
+  for (render::BezierPart& part : scene.beziers) part.colour = colour;
+  const bool isColoured = !scene.solids.empty() || !scene.meshes.empty() || !scene.beziers.empty();
+  const bool hasOwnColours = !scene.quadrics.empty() || scene.segmented;
+  if (!isColoured && hasOwnColours && !isOfPreset(in, "colour"))
+    throw UsageError("render: these parts have their own colours; leave --colour out");
 }
 
 }  // namespace
@@ -158,9 +217,7 @@ void addLookParams(std::vector<Param>& params) {
 
 Invocation withPreset(const Invocation& in) {
   if (!in.given("preset")) return in;
-  std::map<std::string, std::string> options;
-  for (const Param& param : in.op().params)
-    if (in.given(param.name)) options[param.name] = in.text(param.name);
+  std::map<std::string, std::string> options = optionsOf(in);
   const std::string name = in.text("preset");
   for (const Preset& preset : presets()) {
     if (name != preset.name) continue;
@@ -168,28 +225,21 @@ Invocation withPreset(const Invocation& in) {
     for (const auto& [option, value] : preset.options)
       if (std::string(option) == "style")
         isOwnStyle = !in.given("style") || in.text("style") == value;
+    // A volume with a transfer function has no shadow on a ground.
+    const bool isGrounded = isOwnStyle && !in.given("transfer");
     for (const auto& [option, value] : preset.options)
-      if (isOwnStyle || !isOfStyle(option)) options.emplace(option, value);
+      if (isGrounded || !isOfStyle(option)) options.emplace(option, value);
   }
-  Invocation all(in.op(), std::move(options));
-  all.operands = in.operands;
-  all.operandNames = in.operandNames;
-  all.named = in.named;
-  all.roi = in.roi;
-  all.planned = in.planned;
-  all.isPartial = in.isPartial;
-  all.progress = in.progress;
-  all.maxMemory = in.maxMemory;
-  all.dryRun = in.dryRun;
-  all.voxelFollows = in.voxelFollows;
-  all.notes = in.notes;
-  return all;
+  return withOptions(in, std::move(options));
 }
 
 void validateLook(const Invocation& in) {
+  if (in.integer("reduce") > kMostReduction)
+    throw UsageError(fmt::format("render: --reduce {} is too large; give at most {}",
+                                 in.text("reduce"), kMostReduction));
   Invocation all = in;
   try {
-    render::validate(lookOf(all, OptionStage::Syntax));
+    render::validate(lookOf(all, OptionStage::Syntax), in.integerAs<int>("reduce"));
   } catch (const UsageError& error) {
     throw UsageError(fmt::format("render: {}", error.what()));
   }
@@ -197,9 +247,6 @@ void validateLook(const Invocation& in) {
   if (in.given("light-radius") && !(in.number("light-radius") < 85))
     throw UsageError(fmt::format("render: --light-radius {} is too wide; give less than 85 degrees",
                                  in.text("light-radius")));
-  if (in.integer("reduce") > kMostReduction)
-    throw UsageError(fmt::format("render: --reduce {} is too large; give at most {}",
-                                 in.text("reduce"), kMostReduction));
 }
 
 bool hasLook(const Invocation& in) {
@@ -208,10 +255,12 @@ bool hasLook(const Invocation& in) {
 }
 
 void applyLookTo(Invocation& in, render::Scene& scene) {
-  if (in.given("colour")) {
-    const Imath::C3f colour = linearColour(in);
-    for (render::Solid& solid : scene.solids) solid.colour = colour;
-    for (render::MeshPart& mesh : scene.meshes) mesh.colour = colour;
+  if (in.given("xray")) requireThickness(in, scene);
+  if (in.given("colour")) colourParts(in, scene);
+  if (scene.volumePart && in.given("ground") && isOfPreset(in, "ground")) {
+    std::map<std::string, std::string> options = optionsOf(in);
+    options.erase("ground");
+    in = withOptions(in, std::move(options));
   }
   if (in.given("light")) scene.key.direction = in.point("light");
   if (in.given("light-radius"))

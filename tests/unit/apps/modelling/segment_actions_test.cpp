@@ -120,7 +120,7 @@ TEST_F(SegmentActions, WriteTheLabelsOfBothSides) {
   EXPECT_EQ(groups.out, "g interface_0_1\ng interface_1_2\ng interface_1_3\ng interface_2_3\n");
   const support::Outcome header = shell("head -c 500 a.ply | grep -a -c 'property ushort'");
   EXPECT_EQ(header.out, "2\n");
-  expectRefusal(std::string(kThree) + "! write a.stl", 2, "write .ply or .obj");
+  expectRefusal(std::string(kThree) + "! write a.stl", 2, "write .vdb, .ply or .obj");
 }
 
 TEST_F(SegmentActions, AreDrawn) {
@@ -182,7 +182,6 @@ TEST_F(SegmentActions, RefuseWhatDoesNotApply) {
                 "--smooth is for a volume");
   expectRefusal(std::string(kThree) + "! extract 9", 3, "has no region 9; its labels are 1, 2, 3");
   expectRefusal(std::string(kThree) + "! extract", 2, "label");
-  expectRefusal(std::string(kThree) + "! write a.vdb", 2, "write .ply or .obj");
   expectRefusal(std::string(kThree) + "! smooth --sigma 1", 2, "put 'extract LABEL' before it");
   expectRefusal(std::string(kThree) + "! mesh --sharp", 2, "not to a segmentation");
   expectRefusal("sphere --radius 1 --voxel 0.1 ! mesh --label 1", 2,

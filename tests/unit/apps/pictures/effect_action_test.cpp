@@ -66,7 +66,26 @@ TEST_F(EffectAction, RefusesWithASentence) {
   expectRefusal("effect in.exr out.png --right in.exr", 2, "--stereo");
   expectRefusal("effect in.exr out.png --reflect 1 --environment in.exr", 3, "twice as wide");
   expectRefusal("effect in.exr out.png --reduce 100", 2, "at most 16");
+  expectRefusal("effect in.exr out.png --reduce 5", 2, "a divisor of both edges");
+  expectRefusal("effect in.exr out.png --reduce 16 --halo 100", 2, "--halo 100 is too wide");
+  expectRefusal("effect missing.exr out.png --reduce 16 --outline 8", 2, "at most 7.5 pixels");
+  expectRefusal("effect in.exr out.png --shadow 1 --light 0,-0,0", 2, "is not a direction");
   EXPECT_FALSE(exists("out.png"));
+}
+
+TEST_F(EffectAction, RefusesOptionsThatWouldBeIgnored) {
+  const std::string effect = "effect in.exr out.png ";
+  expectRefusal(effect + "--environment studio", 2, "--reflect or --refract");
+  expectRefusal(effect + "--index 1.3 --reflect 1", 2, "--index is for --refract");
+  expectRefusal(effect + "--light 0,1,0", 2, "--shadow");
+  expectRefusal(effect + "--light-radius 5 --occlusion 1", 2, "--shadow");
+  expectRefusal(effect + "--occluder-depth 1", 2, "--occlusion or --shadow");
+  expectRefusal(effect + "--occlusion-radius 1 --shadow 1", 2, "--occlusion");
+  expectRefusal(effect + "--texture-size 1 --solid-texture none", 2, "--solid-texture");
+  for (const char* option : {"--eye-distance 1", "--screen-depth 1"}) {
+    expectRefusal(effect + option, 2, "--stereo");
+    expectRefusal(effect + option + " --stereo anaglyph --right in.exr", 2, "--right");
+  }
 }
 
 TEST_F(EffectAction, CombinesTwoDrawnPictures) {
@@ -95,6 +114,25 @@ TEST_F(EffectAction, PresetsSetOptionsThatAreNotGiven) {
             0);
   EXPECT_EQ(read("other.exr").attributes.at("ls:style"), "tone");
   expectRefusal(torus + "x.png --preset cake", 2, "paper");
+  expectRefusal(torus + "x.png --size 60x45 --preset paper --outline 41", 2, "at most 40 pixels");
+  // A volume has no shadow on the ground of this preset.
+  const support::Outcome volume = levelsmith(
+      "volume sphere --size 12 ! render volume.png --size 32x24 --preset clay --samples 1 "
+      "--transfer auto");
+  EXPECT_EQ(volume.code, 0) << volume.err;
+}
+
+TEST_F(EffectAction, PartsWithTheirOwnColoursAreNotColoured) {
+  writeFile("co.pdb",
+            "ATOM      1  C   GLY A   1       0.000   0.000   0.000  1.00  5.00           C\n"
+            "ATOM      2  O   GLY A   1       1.200   0.000   0.000  1.00 25.00           O\n"
+            "END\n");
+  const std::string atoms = "read co.pdb ! render x.png --size 32x24 --samples 1 ";
+  expectRefusal(atoms + "--colour 1,0,0", 2, "leave --colour out");
+  expectRefusal(atoms + "--preset xray", 2, "--xray (of --preset xray) needs level sets or meshes");
+  expectRefusal(atoms + "--xray 1", 2, "leave it out");
+  const support::Outcome drawn = levelsmith(atoms + "--preset molecule");
+  EXPECT_EQ(drawn.code, 0) << drawn.err;
 }
 
 TEST_F(EffectAction, LightsOfRenderAreChecked) {

@@ -184,7 +184,8 @@ TEST(Bonds, OfAPdbFileAreReadOnce) {
   EXPECT_EQ(bondsOf(molecule), (Pairs{{0, 1}, {0, 3}, {2, 3}}));
   // The atom B of CB, the water, atom 99, and the stars.
   EXPECT_EQ(std::count(notes.begin(), notes.end(),
-                       "4 records of bonds have an end that is missing, ambiguous or left out"),
+                       "4 records of bonds were ignored: one of their atoms is missing, not unique "
+                       "or left out"),
             1);
 }
 
@@ -203,6 +204,27 @@ TEST(Bonds, OfSerialNumbersThatReturnAreLeftOut) {
                                       atom("10000", 5) + atom("3", 9) + "CONECT10000    3\n",
                                   "pdb");
   EXPECT_EQ(large.bonds, (std::vector<Bond>{{1, 2}}));
+}
+
+TEST(Bonds, OfSixDigitsHaveSixColumns) {
+  const auto atom = [](int serial, double x) {
+    return fmt::format("ATOM  {:>6}C    UNK A   1    {:8.3f}   0.000   0.000\n", serial, x);
+  };
+  const std::string atoms =
+      atom(10000, 0) + atom(11000, 5) + atom(100001, 10) + atom(100002, 15) + atom(99999, 20);
+  const auto bonds = [&](const std::string& record, std::vector<std::string>* notes = nullptr) {
+    return readText(atoms + record + "\n", "pdb", notes).bonds;
+  };
+  EXPECT_EQ(bonds("CONECT100001100002"), (std::vector<Bond>{{2, 3}}));
+  EXPECT_EQ(bonds("CONECT100001100002 99999   "), (std::vector<Bond>{{2, 3}, {2, 4}}));
+  EXPECT_EQ(bonds("CONECT1000011000"), (std::vector<Bond>{{0, 1}}));
+  // Thirty digits are five numbers of six digits or six of five.
+  std::vector<std::string> notes;
+  EXPECT_TRUE(bonds("CONECT100001100002100002100002100002", &notes).empty());
+  EXPECT_EQ(std::count(notes.begin(), notes.end(),
+                       "1 records of bonds were ignored: one of their atoms is missing, not unique "
+                       "or left out"),
+            1);
 }
 
 constexpr const char* kCifAtoms =
@@ -243,7 +265,8 @@ TEST(Bonds, OfACifFileAreReadBeforeAndAfterTheAtoms) {
                 .bonds,
             expected);
   EXPECT_EQ(notes, (std::vector<std::string>{
-                       "1 records of bonds have an end that is missing, ambiguous or left out"}));
+                       "1 records of bonds were ignored: one of their atoms is missing, not unique "
+                       "or left out"}));
   // A single bond without a loop, and bonds of a block without atoms.
   EXPECT_EQ(readText(std::string("data_a\n") + kConnections + "data_x\n" + kCifAtoms +
                          "_chem_comp_bond.comp_id CYS\n_chem_comp_bond.atom_id_1 SG\n"

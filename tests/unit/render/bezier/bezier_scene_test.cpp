@@ -17,6 +17,7 @@
 #include "render/embree/embree_renderer.h"
 #include "render/images/compare_images.h"
 #include "render/kernel/kernel_scene.h"
+#include "render/quadrics/quadric_part.h"
 #include "render/views/picture.h"
 #include "render/views/scene_file.h"
 #include "tests/support/bezier_scenes.h"
@@ -155,7 +156,16 @@ TEST(BezierScene, TransparentPartsMixInTheOrderOfTheirDepths) {
   scene.meshes.push_back({.mesh = std::make_shared<const levelset::TriMesh>(std::move(sheet)),
                           .id = 9,
                           .opacity = 0.25});
+  // Opaque balls before, inside and behind the transparent parts.
+  scene.quadrics.push_back(
+      makeQuadricPart({{V3d(1.6, 0.6, 1.2), 0.2f, packedColour({0.9f, 0.8f, 0})},
+                       {V3d(0, 0, 0), 0.35f, packedColour({0, 0.8f, 0.8f})},
+                       {V3d(-1.2, -0.8, -0.6), 0.4f, packedColour({0.5f, 0, 0.5f})}},
+                      {}));
+  scene.quadrics.back().id = 10;
   const Image image = renderCpu(scene, kPlain), judged = renderEmbree(scene, kPlain);
+  const std::vector<std::uint32_t>& ids = image.ids.at("id");
+  EXPECT_GT(std::count(ids.begin(), ids.end(), 10U), 2);
   for (const char* channel : {"R", "G", "B", "A"}) {
     const std::vector<float>&a = image.channels.at(channel), &b = judged.channels.at(channel);
     float most = 0;

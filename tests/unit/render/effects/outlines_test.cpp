@@ -110,6 +110,12 @@ TEST(Outlines, BeginAtTheCreaseAngle) {
   EXPECT_EQ(weight(51), 1);
 }
 
+TEST(Outlines, AreNotOnCreasesAtAnAngleOf180Degrees) {
+  const Image image = roof(150 * kDegree);
+  EXPECT_EQ(largestOf(outlinesOf(image, {.step = 50, .crease = 180 * kDegree})), 0);
+  EXPECT_GT(largestOf(outlinesOf(image, {.step = 50, .crease = 120 * kDegree})), 0.5);
+}
+
 TEST(Outlines, FollowTheSilhouetteOfABall) {
   constexpr double kRadius = 30, kWidth = 3;
   const Image image = pictureOf(

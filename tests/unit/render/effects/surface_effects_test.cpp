@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <numbers>
 
 #include "levelset/error.h"
@@ -94,6 +95,26 @@ TEST(SolidPattern, OfACheckerHasTheParityOfTheCell) {
   EXPECT_EQ(patternColour(SolidTexture::Checker, V3d(1.5, 1.5, 0.5)), bright);
 }
 
+TEST(SolidPattern, IsFiniteAtHugeAndUndefinedPlaces) {
+  constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(gradientNoise(V3d(1e30, -1e300, 0.5)), gradientNoise(V3d(0, 0, 0.5)));
+  EXPECT_EQ(gradientNoise(V3d(kNothing, 0.5, 0.5)), 0);
+  // The hash repeats after 2^32 cells.
+  const V3d place(0.25, -7.5, 3.75);
+  EXPECT_EQ(gradientNoise(place), gradientNoise(place + V3d(0x1p32, -0x1p32, 0x1p34)));
+  Image image = ball(straightCamera(8, 8));
+  image.channels["P.X"][27] = std::numeric_limits<float>::quiet_NaN();
+  EffectOptions options;
+  options.textureSize = 1e-20;
+  for (const SolidTexture texture :
+       {SolidTexture::Checker, SolidTexture::Noise, SolidTexture::Marble, SolidTexture::Wood}) {
+    options.solidTexture = texture;
+    const Image carved = withEffects(image, {}, options, kRunner);
+    for (const float red : carved.channels.at("R")) EXPECT_TRUE(std::isfinite(red));
+    EXPECT_EQ(carved.channels.at("R")[27], image.channels.at("R")[27]);
+  }
+}
+
 TEST(SolidPattern, StaysInSpaceWhenTheCameraMoves) {
   Camera a = straightCamera(40, 40), b = a;
   b.from.x += 3;
@@ -143,9 +164,11 @@ TEST(Environment, IsRefractedBySnellsLaw) {
       const V3d n(at(image, "N.X", x, 20), at(image, "N.Y", x, 20), at(image, "N.Z", x, 20));
       const V3d d(2 * at(seen, "R", x, 20) - 1, 2 * at(seen, "G", x, 20) - 1,
                   2 * at(seen, "B", x, 20) - 1);
-      const double sineOut = std::sqrt(n.x * n.x + n.y * n.y),
-                   sineIn = d.normalized().cross(n).length();
-      EXPECT_NEAR(sineIn * index, sineOut, 2e-3) << index << " " << x;
+      const double c = n.z;
+      const V3d exact =
+          V3d(0, 0, -1) / index + n * (c / index - std::sqrt(1 - (1 - c * c) / (index * index)));
+      EXPECT_LT((d - exact).length(), 1e-4) << index << " " << x;
+      EXPECT_LT(d.dot(n), 0) << index << " " << x;
     }
   }
 }
@@ -196,6 +219,28 @@ TEST(DepthCue, FadesLinearlyToTheBackground) {
   look.depthCueNear = 10;
   look.depthCueFar = 20;  // nearer than all surfaces: only background is left
   EXPECT_NEAR(displayOfLinear(at(withLook(image, look, 1, kRunner), "R", 31, 5)), 0.2, 1e-6);
+  look.depthCueNear.reset();  // the nearest surface, which is farther than depthCueFar
+  EXPECT_NEAR(displayOfLinear(at(withLook(image, look, 1, kRunner), "R", 31, 5)), 0.2, 1e-6);
+}
+
+TEST(Background, KeepsTheBitsOfOpaquePixels) {
+  Image image = ball(straightCamera(32, 32));
+  image.addChannel("R", 5);  // brighter than the display shows
+  LookOptions look;
+  look.background = V3d(1);
+  const Image painted = withLook(image, look, 1, kRunner);
+  EXPECT_EQ(at(painted, "R", 16, 16), 5);
+  EXPECT_EQ(at(painted, "A", 0, 0), 1);
+  EXPECT_NEAR(displayOfLinear(at(painted, "G", 0, 0)), 1, 2e-3);
+}
+
+TEST(DepthCue, KeepsTheBitsOfSurfacesThatDoNotFade) {
+  Image image = ball(straightCamera(32, 32));
+  image.addChannel("R", 5);
+  LookOptions look;
+  look.depthCue = 1;
+  look.depthCueNear = 200;  // farther than all surfaces
+  EXPECT_EQ(withLook(image, look, 1, kRunner).channels, image.channels);
 }
 
 TEST(Halo, IsOnFartherSurfacesOnly) {
@@ -223,7 +268,12 @@ TEST(Xray, ShowsTheThickness) {
   EXPECT_THROW((void)withLook(image, look, 1, kRunner), levelset::InvalidInput);
   image.addChannel("thickness", 10);
   const Image seen = withLook(image, look, 1, kRunner);
-  EXPECT_NEAR(displayOfLinear(at(seen, "B", 3, 3)), 1 - std::exp(-1), 1e-6);
+  EXPECT_NEAR(displayOfLinear(at(seen, "B", 16, 16)), 1 - std::exp(-1), 1e-6);
+  EXPECT_EQ(at(seen, "A", 3, 3), 0);
+  look.background = V3d(0.2, 0.4, 0.6);
+  const Image before = withLook(image, look, 1, kRunner);
+  EXPECT_EQ(at(before, "B", 16, 16), at(seen, "B", 16, 16));
+  EXPECT_NEAR(displayOfLinear(at(before, "B", 3, 3)), 0.6, 1e-6);
 }
 
 TEST(Reduction, KeepsEvenColoursAndTheMiddleOfLayers) {
@@ -239,7 +289,8 @@ TEST(Reduction, KeepsEvenColoursAndTheMiddleOfLayers) {
   for (const float a : small.channels.at("A")) sum += static_cast<double>(a);
   for (const float a : image.channels.at("A")) all += static_cast<double>(a);
   EXPECT_NEAR(9 * sum, all, 1e-4);
-  EXPECT_THROW((void)reducedPicture(image, 34), levelset::UsageError);
+  for (const int edge : {2, 34})
+    EXPECT_THROW((void)reducedPicture(image, edge), levelset::UsageError) << edge;
 }
 
 TEST(Effects, WithoutOptionsKeepThePicture) {
@@ -250,10 +301,18 @@ TEST(Effects, WithoutOptionsKeepThePicture) {
 TEST(Effects, RefuseNumbersOutOfRange) {
   LookOptions look;
   look.depthCue = 1.5;
-  EXPECT_THROW(validate(look), levelset::UsageError);
+  EXPECT_THROW(validate(look, 1), levelset::UsageError);
   look = {};
   look.background = V3d(0, 0, 2);
-  EXPECT_THROW(validate(look), levelset::UsageError);
+  EXPECT_THROW(validate(look, 1), levelset::UsageError);
+  look = {};
+  look.halo = 30;
+  EXPECT_NO_THROW(validate(look, 4));
+  EXPECT_THROW(validate(look, 5), levelset::UsageError);
+  look = {};
+  look.outline = 30;
+  EXPECT_NO_THROW(validate(look, 4));
+  EXPECT_THROW(validate(look, 5), levelset::UsageError);
   EffectOptions options;
   options.occlusion = 2;
   EXPECT_THROW(validate(options), levelset::UsageError);

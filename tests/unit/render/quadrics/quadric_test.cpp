@@ -182,19 +182,19 @@ TEST(QuadricModel, RefusesWhatCannotBeDrawn) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(reasonOf({}), "there is no quadric; give at least one");
   EXPECT_EQ(reasonOf({{{V3d(0), 1, 0}, {V3d(0), 0, 0}}, {}, {}}),
-            "sphere 1 has the radius 0; give a positive one up to 1e15");
-  EXPECT_NE(reasonOf({{{V3d(0, nan, 0), 1, 0}}, {}, {}}).find("sphere 0 has a centre"),
+            "sphere 2 has the radius 0; give a positive one up to 1e15");
+  EXPECT_NE(reasonOf({{{V3d(0, nan, 0), 1, 0}}, {}, {}}).find("sphere 1 has a centre"),
             std::string::npos);
   EXPECT_NE(reasonOf({{{V3d(2e15, 0, 0), 1, 0}}, {}, {}}).find("exceeds 1e15"), std::string::npos);
   EXPECT_EQ(reasonOf({{}, {{V3d(1), V3d(1), 1, 0}}, {}}),
-            "cylinder 0 has ends at the same position");
+            "cylinder 1 has ends at the same position; give two different ones");
   Quadric flat;
   flat.axes[2] = flat.axes[0] + flat.axes[1];
   EXPECT_EQ(reasonOf({{}, {}, {flat}}),
-            "quadric 0 has axes in one plane; give three independent ones");
+            "quadric 1 has axes in one plane; give three independent ones");
   Quadric empty;
   empty.axes[1] = V3d(0);
-  EXPECT_EQ(reasonOf({{}, {}, {empty}}), "quadric 0 has an axis of length 0");
+  EXPECT_EQ(reasonOf({{}, {}, {empty}}), "quadric 1 has an axis of length 0; give a longer one");
   Quadric turned;
   turned.kind = QuadricKind::Cone;
   turned.range = {1, -1};
@@ -203,6 +203,25 @@ TEST(QuadricModel, RefusesWhatCannotBeDrawn) {
   gap.kind = QuadricKind::TwoSheet;
   gap.range = {-0.5, 0.5};
   EXPECT_NE(reasonOf({{}, {}, {gap}}).find("has none between -1 and 1"), std::string::npos);
+}
+
+TEST(QuadricModel, RefusesWhatSinglePrecisionCannotHold) {
+  const QuadricModel model{{{V3d(1000, 0, 0), 1, 0}, {V3d(-1000, 0, 0), 1, 0}},
+                           {{V3d(999, 0, 0), V3d(999 + 1e-6, 0, 0), 1, 0}},
+                           {}};
+  try {
+    (void)QuadricCaster(model);
+    ADD_FAILURE() << "no error";
+  } catch (const levelset::InvalidInput& error) {
+    EXPECT_NE(std::string(error.what()).find("single precision rounds to 0"), std::string::npos);
+  }
+  Quadric flat;
+  flat.axes = {V3d(0.6, 0.8, 0), V3d(0.6 - 8e-9, 0.8 + 6e-9, 0), V3d(0, 0, 1)};
+  EXPECT_THROW(requireQuadrics({{}, {}, {flat}}), levelset::InvalidInput);
+  Quadric thin;
+  thin.kind = QuadricKind::Cylinder;
+  thin.range = {1, 1 + 1e-9};
+  EXPECT_THROW(requireQuadrics({{}, {}, {thin}}), levelset::InvalidInput);
 }
 
 TEST(QuadricModel, NeedsTheStatedMemory) {

@@ -95,12 +95,13 @@ TEST(QuadricFile, NamesTheEntryThatIsWrong) {
          "does not have version 1");
   expect(documentWith(""), "there is no quadric");
   expect(documentWith(good + R"(, {"kind": "ball"})"),
-         "entry 1 of \"quadrics\": the file has the unknown kind \"ball\"");
+         "entry 2 of \"quadrics\": the file has the unknown kind \"ball\"; the kinds are sphere, "
+         "ellipsoid, cylinder, cone");
   expect(documentWith(R"({"kind": "sphere", "centre": [0, 0], "radius": 1})"),
          "has 2 numbers in \"centre\", not 3");
   expect(documentWith(R"({"kind": "sphere", "centre": [0, 0, 0]})"), "has no \"radius\"");
   expect(documentWith(R"({"kind": "sphere", "centre": [0, 0, 0], "radius": -1})"),
-         "sphere 0 has the radius -1");
+         "entry 1 of \"quadrics\": the sphere has the radius -1");
   expect(documentWith(R"({"kind": "sphere", "centre": [0, 0, 0], "radius": 1, "id": 4})"),
          "has an unknown \"id\"");
   expect(documentWith(R"({"kind": "cylinder", "ends": [[0, 0, 0]], "radius": 1})"),
@@ -111,7 +112,7 @@ TEST(QuadricFile, NamesTheEntryThatIsWrong) {
   expect(
       documentWith(
           R"({"kind": "cone", "position": [0, 0, 0], "axes": [[1, 0, 0], [0, 1, 0], [1, 1, 0]]})"),
-      "quadric 0 has axes in one plane");
+      "the quadric has axes in one plane");
 }
 
 }  // namespace quadric_file_test

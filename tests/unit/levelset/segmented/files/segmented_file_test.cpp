@@ -187,6 +187,7 @@ TEST(SegmentedFile, RefusesGridsThatContradictEachOther) {
         return true;
       },
       "half width");
+  EXPECT_SAYS(support::refusal<InvalidInput>([&] { (void)segmentedFileInfo(bad); }), "half width");
 }
 
 TEST(SegmentedFile, SurvivesMutatedFiles) {
