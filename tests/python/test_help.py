@@ -68,7 +68,7 @@ def test_the_stub_matches_the_registry(ls):
         assert sorted(names) == sorted(inspect.signature(getattr(ls, name)).parameters), name
     solid = {n.name: n for n in classes["Solid"].body if isinstance(n, ast.FunctionDef)}
     assert ast.unparse(solid["fast_marching"].returns) == "Union[Solid, Field]"
-    assert ast.unparse(functions["transform"].returns) == "Union[Solid, Mesh, PointCloud]"
+    assert ast.unparse(functions["transform"].returns) == "Union[Solid, Mesh, PointCloud, Segmentation]"
     assert ast.unparse(solid["transform"].returns) == "Solid"
     assert all(n.args.posonlyargs + n.args.args for n in solid.values())
     public = {n for n in ls.__all__}
