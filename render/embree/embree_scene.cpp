@@ -1,35 +1,27 @@
 #include <Imath/ImathBoxAlgo.h>
 #include <embree3/rtcore.h>
 #include <fmt/core.h>
-#include <tbb/enumerable_thread_specific.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "levelset/error.h"
-#include "render/bezier/bezier_judge.h"
-#include "render/bezier/bezier_part.h"
 #include "render/embree/bcc_cell_vdb.h"
 #include "render/embree/embree_renderer.h"
 #include "render/embree/field_march.h"
 #include "render/embree/judge_blocks_vdb.h"
-#include "render/embree/quadrics/quadric_judge.h"
+#include "render/embree/parts/judged_parts.h"
 #include "render/embree/surface_spline_vdb.h"
 #include "render/embree/tetra_cell_vdb.h"
 #include "render/embree/volume_tree_vdb.h"
 #include "render/meshes/embree_space.h"
 #include "render/meshes/mesh_rays.h"
-#include "render/segmented/interface_judge.h"
-#include "render/segmented/segmented_part.h"
 #include "render/shading/principal_direction.h"
 #include "render/shading/surface_shape.h"
 
 namespace render {
 namespace {
-
-/// Hits of two Bézier patches on their common face are one, at this share of the diagonal.
-constexpr double kSameBezierHit = 1e-9;
 
 using Imath::Box3d;
 using Imath::V3d;
@@ -193,16 +185,7 @@ struct EmbreeScene::Impl {
   CsgExpression csg;  // uses indices of `solids`
   MeshRays meshes;
   std::optional<FieldMarch> fields;  // set for a blended scene; then `solids` is empty
-  // Set for a scene with a segmented field.
-  std::optional<SegmentedPart> segmented;
-  std::optional<InterfaceJudge> judge;
-  std::size_t interfaceSolid = 0;  // Hit::solid of its hits
-  // Surfaces in Bézier volumes, with judges for each thread.
-  std::vector<BezierPart> beziers;
-  std::size_t bezierSolid = 0;  // Hit::solid of the first of them
-  std::vector<QuadricPart> quadrics;
-  std::vector<QuadricJudge> quadricJudges;
-  mutable tbb::enumerable_thread_specific<std::vector<BezierJudge>> bezierJudges;
+  JudgedParts parts;
   bool isOpaque;
   Box3d allBounds;  // world-space box of the solids, meshes and interfaces
   Box3d bounds;     // world-space box of the grid cells that the solids' surfaces cross
@@ -225,31 +208,14 @@ struct EmbreeScene::Impl {
   /// @pre the direction is finite and not zero
   [[nodiscard]] Hit intersectSolids(const V3d& origin, const V3d& direction, double near,
                                     double far) const;
-  /// First hit with a segmented field or a Bézier volume.
-  /// @param onlyHiding  true: without transparent volumes
-  [[nodiscard]] Hit intersectOpaque(const V3d& origin, const V3d& direction, double near,
-                                    double far, bool onlyHiding = false) const;
-  /// Hits with a Bézier volume, in order of their distance. @param n  its index
-  [[nodiscard]] std::vector<Hit> bezierHits(std::size_t n, const V3d& origin, const V3d& direction,
-                                            double near, double far) const;
-  /// Hits with all Bézier volumes that are transparent, in order of their distance.
-  [[nodiscard]] std::vector<Hit> transparentBezierHits(const V3d& origin, const V3d& direction,
-                                                       double near, double far) const;
+  /// First hit with a part that has a judge of its own. @param onlyOpaque  as JudgedParts
+  [[nodiscard]] Hit intersectParts(const Camera::Ray& ray, bool onlyOpaque = false) const;
   void complete(Hit& hit, const RayQuery& query, const RaySolid& solid, double moved,
                 double t) const;
 };
 
 EmbreeScene::Impl::Impl(const Scene& source, Filter filter)
-    : meshes(source), isOpaque(source.isOpaque()) {
-  if (source.segmented) {
-    segmented = source.segmented;
-    judge.emplace(source.segmented->caster);
-    interfaceSolid = source.solids.size() + source.mapped.size();
-  }
-  beziers = source.beziers;
-  bezierSolid = source.solids.size() + source.mapped.size() + (segmented ? 1 : 0);
-  quadrics = source.quadrics;
-  for (const QuadricPart& part : quadrics) quadricJudges.emplace_back(part.caster.model());
+    : meshes(source), parts(source), isOpaque(source.isOpaque()) {
   if (source.isBlended()) {
     fields.emplace(source);
     allBounds = source.bounds();
@@ -258,9 +224,7 @@ EmbreeScene::Impl::Impl(const Scene& source, Filter filter)
   gather(source, filter);
   allBounds = bounds;
   allBounds.extendBy(meshes.bounds());
-  if (segmented) allBounds.extendBy(segmented->caster.bounds());
-  for (const BezierPart& part : beziers) allBounds.extendBy(part.caster.bounds());
-  for (const QuadricPart& part : quadrics) allBounds.extendBy(part.caster.bounds());
+  allBounds.extendBy(parts.bounds());
   if (allBounds.isEmpty()) allBounds = source.volumeBounds();
   if (bounds.isEmpty()) return;
   build();
@@ -391,67 +355,10 @@ EmbreeScene::EmbreeScene(const Scene& scene, Filter filter)
 EmbreeScene::~EmbreeScene() = default;
 EmbreeScene::EmbreeScene(EmbreeScene&&) noexcept = default;
 
-Hit EmbreeScene::Impl::intersectOpaque(const V3d& origin, const V3d& direction, double near,
-                                       double far, bool onlyHiding) const {
-  Hit nearest;
-  if (!judge && beziers.empty() && quadrics.empty()) return nearest;
-  requireRay(origin, direction);
-  if (judge) {
-    const InterfaceRay ray{origin, direction, near, far};
-    nearest = segmented->hitOf(ray, judge->firstHit(ray), interfaceSolid);
-  }
-  for (std::size_t n = 0; n < beziers.size(); ++n) {
-    if (onlyHiding && beziers[n].opacity < 1) continue;
-    const std::vector<Hit> hits =
-        bezierHits(n, origin, direction, near, nearest.found ? nearest.distance : far);
-    if (!hits.empty()) nearest = hits[0];
-  }
-  for (std::size_t n = 0; n < quadrics.size(); ++n) {
-    const Camera::Ray ray{origin, direction, near, nearest.found ? nearest.distance : far};
-    const JudgedQuadric found = quadricJudges[n].firstHit(ray);
-    // Of two parts with the same surface the first one is seen, as in the kernel.
-    const bool isFirst = !nearest.found || nearest.solid < bezierSolid + beziers.size() ||
-                         found.distance < nearest.distance;
-    if (found.found && isFirst)
-      nearest = quadrics[n].hitOf(ray, found.distance, found.normal, found.colour,
-                                  bezierSolid + beziers.size() + n);
-  }
-  return nearest;
-}
-
-std::vector<Hit> EmbreeScene::Impl::bezierHits(std::size_t n, const V3d& origin,
-                                               const V3d& direction, double near,
-                                               double far) const {
-  std::vector<BezierJudge>& judges = bezierJudges.local();
-  if (judges.empty())
-    for (const BezierPart& part : beziers) judges.emplace_back(part.caster.volume());
-  const Camera::Ray ray{origin, direction, near, far};
-  const double same = kSameBezierHit * beziers[n].caster.bounds().size().length();
-  std::vector<Hit> hits;
-  const JudgedRoot* last = nullptr;
-  const std::vector<JudgedRoot> roots = judges[n].roots(ray);
-  for (const JudgedRoot& root : roots) {
-    // Both sides of a common face of two patches have its roots.
-    const bool isKnown = last && last->patch != root.patch && last->attribute == root.attribute &&
-                         root.distance - last->distance < same;
-    last = &root;
-    if (!isKnown)
-      hits.push_back(beziers[n].hitOf(ray, root.distance, root.normal, bezierSolid + n));
-  }
-  return hits;
-}
-
-std::vector<Hit> EmbreeScene::Impl::transparentBezierHits(const V3d& origin, const V3d& direction,
-                                                          double near, double far) const {
-  std::vector<Hit> all;
-  for (std::size_t n = 0; n < beziers.size(); ++n) {
-    if (beziers[n].opacity == 1) continue;
-    const std::vector<Hit> hits = bezierHits(n, origin, direction, near, far);
-    all.insert(all.end(), hits.begin(), hits.end());
-  }
-  std::stable_sort(all.begin(), all.end(),
-                   [](const Hit& a, const Hit& b) { return a.distance < b.distance; });
-  return all;
+Hit EmbreeScene::Impl::intersectParts(const Camera::Ray& ray, bool onlyOpaque) const {
+  if (parts.isEmpty()) return {};
+  requireRay(ray.origin, ray.direction);
+  return parts.firstHit(ray, onlyOpaque);
 }
 
 Hit EmbreeScene::Impl::intersectSolids(const V3d& origin, const V3d& direction, double near,
@@ -486,8 +393,8 @@ Hit EmbreeScene::intersect(const V3d& origin, const V3d& direction, double near,
     const Hit onMesh = impl_->meshes.intersect(origin, direction, near, end());
     if (onMesh.found) nearest = onMesh;
   }
-  const Hit onOpaque = impl_->intersectOpaque(origin, direction, near, end());
-  return onOpaque.found ? onOpaque : nearest;
+  const Hit onPart = impl_->intersectParts({origin, direction, near, end()});
+  return onPart.found ? onPart : nearest;
 }
 
 std::vector<Hit> EmbreeScene::intersectVisible(const V3d& origin, const V3d& direction, double near,
@@ -498,9 +405,9 @@ std::vector<Hit> EmbreeScene::intersectVisible(const V3d& origin, const V3d& dir
     if (hit.found) hits.push_back(hit);
     return hits;
   }
-  const Hit onOpaque = impl_->intersectOpaque(origin, direction, near, far, /*onlyHiding=*/true);
+  const Hit onOpaque = impl_->intersectParts({origin, direction, near, far}, /*onlyOpaque=*/true);
   if (onOpaque.found) far = onOpaque.distance;
-  const std::vector<Hit> onBeziers = impl_->transparentBezierHits(origin, direction, near, far);
+  const std::vector<Hit> onBeziers = impl_->parts.transparentHits({origin, direction, near, far});
   auto nextBezier = onBeziers.begin();
   double share = 1;
   // Adds the hits with meshes and transparent Bézier volumes up to the distance `end` along the
@@ -551,7 +458,7 @@ double EmbreeScene::transmittance(const V3d& origin, const V3d& direction, doubl
 bool EmbreeScene::isOccluded(const V3d& origin, const V3d& direction, double near,
                              double far) const {
   if (impl_->meshes.isOccluded(origin + direction * near, direction, far - near)) return true;
-  if (impl_->intersectOpaque(origin, direction, near, far).found) return true;
+  if (impl_->intersectParts({origin, direction, near, far}).found) return true;
   if (impl_->fields) {
     requireRay(origin, direction);
     return impl_->fields->isOccluded(origin, direction, near, far);

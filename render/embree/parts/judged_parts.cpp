@@ -1,0 +1,90 @@
+#include "render/embree/parts/judged_parts.h"
+
+#include <algorithm>
+
+namespace render {
+namespace {
+
+/// Hits of two Bézier patches on their common face are one, at this share of the diagonal.
+constexpr double kSameBezierHit = 1e-9;
+
+}  // namespace
+
+JudgedParts::JudgedParts(const Scene& scene)
+    : segmented_(scene.segmented),
+      beziers_(scene.beziers),
+      quadrics_(scene.quadrics),
+      firstSolid_(scene.solids.size() + scene.mapped.size()) {
+  if (segmented_) {
+    interfaces_.emplace(segmented_->caster);
+    bounds_.extendBy(segmented_->caster.bounds());
+  }
+  firstBezier_ = firstSolid_ + (segmented_ ? 1 : 0);
+  firstQuadric_ = firstBezier_ + beziers_.size();
+  for (const BezierPart& part : beziers_) bounds_.extendBy(part.caster.bounds());
+  for (const QuadricPart& part : quadrics_) {
+    quadricJudges_.emplace_back(part.caster.model());
+    bounds_.extendBy(part.caster.bounds());
+  }
+}
+
+Hit JudgedParts::firstHit(const Camera::Ray& ray, bool onlyOpaque) const {
+  Hit nearest;
+  Camera::Ray rest = ray;  // up to the nearest hit
+  const auto take = [&](const Hit& hit) {
+    nearest = hit;
+    rest.far = hit.distance;
+  };
+  if (interfaces_) {
+    const InterfaceRay asked{ray.origin, ray.direction, ray.near, ray.far};
+    const Hit hit = segmented_->hitOf(asked, interfaces_->firstHit(asked), firstSolid_);
+    if (hit.found) take(hit);
+  }
+  for (std::size_t n = 0; n < beziers_.size(); ++n) {
+    if (onlyOpaque && beziers_[n].opacity < 1) continue;
+    const std::vector<Hit> hits = bezierHits(n, rest);
+    if (!hits.empty()) take(hits[0]);
+  }
+  for (std::size_t n = 0; n < quadrics_.size(); ++n) {
+    const JudgedQuadric found = quadricJudges_[n].firstHit(rest);
+    // The first of two parts with the same surface is seen, as in the kernel.
+    const bool isFirst =
+        !nearest.found || nearest.solid < firstQuadric_ || found.distance < nearest.distance;
+    if (found.found && isFirst)
+      take(quadrics_[n].hitOf(ray, found.distance, found.normal, found.colour, firstQuadric_ + n));
+  }
+  return nearest;
+}
+
+std::vector<Hit> JudgedParts::bezierHits(std::size_t n, const Camera::Ray& ray) const {
+  std::vector<BezierJudge>& judges = bezierJudges_.local();
+  if (judges.empty())
+    for (const BezierPart& part : beziers_) judges.emplace_back(part.caster.volume());
+  const double same = kSameBezierHit * beziers_[n].caster.bounds().size().length();
+  std::vector<Hit> hits;
+  const JudgedRoot* last = nullptr;
+  const std::vector<JudgedRoot> roots = judges[n].roots(ray);
+  for (const JudgedRoot& root : roots) {
+    // Both sides of a common face of two patches have its roots.
+    const bool isKnown = last && last->patch != root.patch && last->attribute == root.attribute &&
+                         root.distance - last->distance < same;
+    last = &root;
+    if (!isKnown)
+      hits.push_back(beziers_[n].hitOf(ray, root.distance, root.normal, firstBezier_ + n));
+  }
+  return hits;
+}
+
+std::vector<Hit> JudgedParts::transparentHits(const Camera::Ray& ray) const {
+  std::vector<Hit> all;
+  for (std::size_t n = 0; n < beziers_.size(); ++n) {
+    if (beziers_[n].opacity == 1) continue;
+    const std::vector<Hit> hits = bezierHits(n, ray);
+    all.insert(all.end(), hits.begin(), hits.end());
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Hit& a, const Hit& b) { return a.distance < b.distance; });
+  return all;
+}
+
+}  // namespace render
