@@ -160,6 +160,12 @@ void requireLatticeFrame(const M44d& frame) {
 
 }  // namespace
 
+double boxVolume(const LatticeData& data) {
+  const Imath::M44d& m = data.boxToWorld;
+  return V3d(m[0][0], m[0][1], m[0][2])
+      .dot(V3d(m[1][0], m[1][1], m[1][2]).cross(V3d(m[2][0], m[2][1], m[2][2])));
+}
+
 LatticeAxis uniformAxis(int degree, std::size_t count) {
   requireDegree(degree);
   const auto p = static_cast<std::size_t>(degree);

@@ -9,7 +9,7 @@
 #include <memory>
 #include <vector>
 
-#include "levelset/deform/tensor_bernstein.h"
+#include "levelset/deform/bernstein/tensor_bernstein.h"
 
 /// Free-form deformation [Sederberg86]: maps of space that a lattice of control points gives.
 namespace levelset {
@@ -51,6 +51,9 @@ struct LatticeData {
   std::vector<Imath::V3d> points = {};
   std::vector<double> weights = {};  ///< positive, one for each control point; empty: all are 1
 };
+
+/// Volume of the box of a lattice, world units³; negative for a left-handed frame.
+[[nodiscard]] double boxVolume(const LatticeData& data);
 
 /// Returns the matrix of an axis-aligned box.
 /// @throws InvalidInput for an empty or flat box

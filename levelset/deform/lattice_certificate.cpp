@@ -8,12 +8,11 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <optional>
-#include <queue>
 #include <tuple>
 #include <utility>
 #include <vector>
 
+#include "levelset/deform/bernstein/least_value_search.h"
 #include "levelset/mesh_sign/self_intersections.h"
 
 namespace levelset {
@@ -24,22 +23,6 @@ using Imath::V3d;
 /// Largest number of multiplications for the determinant of one piece. Beyond it, the piece is
 /// bounded by its derivatives alone.
 constexpr double kMostProducts = 4e9;
-
-/// Derivatives of a piece by its three parameters, each with three components.
-using Partials = std::array<TensorVector, 3>;
-
-Partials partialsOf(const std::array<TensorBernstein, 3>& map) {
-  Partials result;
-  for (int axis = 0; axis < 3; ++axis)
-    for (std::size_t c = 0; c < 3; ++c)
-      result[static_cast<std::size_t>(axis)][c] = derivative(map[c], axis);
-  return result;
-}
-
-double largestCoefficient(const TensorBernstein& form) {
-  const CoefficientRange range = rangeOf(form);
-  return std::max(std::abs(range.least), std::abs(range.most));
-}
 
 /// Numerator of the Jacobian of a rational map: the determinant of the four homogeneous coordinates
 /// and their derivatives. The denominator is the fourth power of the weight.
@@ -92,9 +75,7 @@ struct JacobianPart {
 class JacobianBounds {
  public:
   explicit JacobianBounds(const ControlLattice& lattice)
-      : pieces_(lattice),
-        isRational_(lattice.isRational()),
-        volume_(determinantOfFrame(lattice.data().boxToWorld)) {
+      : pieces_(lattice), isRational_(lattice.isRational()), volume_(boxVolume(lattice.data())) {
     const auto& axes = lattice.data().axes;
     const std::array<int, 3> degree = {axes[0].degree, axes[1].degree, axes[2].degree};
     isAffordable_ = determinantCost(degree, isRational_) <= kMostProducts;
@@ -106,11 +87,11 @@ class JacobianBounds {
   [[nodiscard]] bool isAffordable() const { return isAffordable_; }
   [[nodiscard]] bool isRational() const { return isRational_; }
 
-  /// JacobianBracket a piece without weights by the spread of its derivatives: with the Jacobian
+  /// Bounds a piece without weights by the spread of its derivatives: with the Jacobian
   /// J(c) at the centre and J = J(c) (I + E), the determinant is at least det J(c) (1 − |E|)³.
   [[nodiscard]] JacobianBracket coarse(std::size_t index) const {
     const BezierPiece piece = pieces_.piece(index);
-    const Partials partials = partialsOf(piece.numerator);
+    const TensorPartials partials = partialsOf(piece.numerator);
     const double scale = scaleOf(piece);
     Eigen::Matrix3d centre;
     for (int axis = 0; axis < 3; ++axis)
@@ -180,7 +161,7 @@ class JacobianBounds {
         error *= largest;
       }
     } else {
-      const Partials partials = partialsOf(piece.numerator);
+      const TensorPartials partials = partialsOf(piece.numerator);
       part.numerator = determinantOf(partials[0], partials[1], partials[2]);
       for (const auto& column : partials) {
         double largest = 0;
@@ -194,7 +175,7 @@ class JacobianBounds {
     return part;
   }
 
-  /// JacobianBracket the determinant on a part. The values at its corners are coefficients.
+  /// Bounds the determinant on a part. The values at its corners are coefficients.
   [[nodiscard]] static JacobianBracket boundsOf(const JacobianPart& part) {
     const CoefficientRange weight = rangeOf(part.weight);
     const auto over = [](double number, double by) { return number / (by * by * by * by); };
@@ -232,10 +213,6 @@ class JacobianBounds {
   }
 
  private:
-  static double determinantOfFrame(const Imath::M44d& m) {
-    return V3d(m[0][0], m[0][1], m[0][2])
-        .dot(V3d(m[1][0], m[1][1], m[1][2]).cross(V3d(m[2][0], m[2][1], m[2][2])));
-  }
   /// Volume of the piece before the deformation; negative for a left-handed frame.
   [[nodiscard]] double scaleOf(const BezierPiece& piece) const {
     const V3d size = piece.high - piece.low;
@@ -245,18 +222,6 @@ class JacobianBounds {
   BezierPieces pieces_;
   bool isRational_, isAffordable_ = true;
   double volume_, rounding_ = 0;
-};
-
-/// Entry of the queue. Parts that are whole pieces are made again when they are halved, so that the
-/// queue stays small.
-struct QueuedPart {
-  JacobianBracket bounds;
-  std::size_t piece = 0;
-  std::optional<JacobianPart> part = {};
-
-  bool operator<(const QueuedPart& other) const {  // the least bound is on top
-    return bounds.low != other.bounds.low ? bounds.low > other.bounds.low : piece > other.piece;
-  }
 };
 
 double bytesOf(const JacobianPart& part) {
@@ -332,13 +297,11 @@ FoldCertificate certifyLattice(const ControlLattice& lattice,
   };
   const bool hasCoarse = !bounds.isRational();
   if (hasCoarse) inParallel(all.size(), [&](std::size_t n) { all[n] = bounds.coarse(n); });
-  JacobianBracket best{-std::numeric_limits<double>::infinity()};
+  LeastValueSearch<JacobianPart, JacobianBracket, JacobianBounds> search(bounds);
+  const JacobianBracket& best = search.best;
   double sum = 0;
-  const auto offer = [&best](const JacobianBracket& one) {
-    if (one.high < best.high) best.high = one.high, best.place = one.place;
-  };
   for (const JacobianBracket& one : all) {
-    offer(one);
+    search.offer(one);
     if (hasCoarse) sum += std::abs(one.high);
   }
   report(options.progress, 0.2);
@@ -361,54 +324,32 @@ FoldCertificate certifyLattice(const ControlLattice& lattice,
       for (int j = 0; j <= samples[1]; ++j)
         for (int k = 0; k <= samples[2]; ++k) {
           const V3d u(double(i) / samples[0], double(j) / samples[1], double(k) / samples[2]);
-          offer({0, lattice.jet(lattice.worldOf(u)).determinant(), u});
+          search.offer({0, lattice.jet(lattice.worldOf(u)).determinant(), u});
         }
   }
   report(options.progress, 0.6);
-  std::priority_queue<QueuedPart> queue;
-  double settled = std::numeric_limits<double>::infinity();  // least bound of all other pieces
   std::vector<bool> isOpen(all.size(), false);
   for (const std::size_t n : open) {
     isOpen[n] = true;
-    offer(all[n]);
-    queue.push({all[n], n});
+    search.add(all[n], n);
     if (!hasCoarse) reference = std::max(reference, std::abs(all[n].high));
   }
   for (std::size_t n = 0; n < all.size(); ++n)
-    if (!isOpen[n]) settled = std::min(settled, all[n].low);
-  double bytes = 0;  // of the polynomials in the queue
-  std::size_t passes = 0;
-  while (!queue.empty() && bounds.isAffordable() &&
-         certificate.boxes < options.mostBoxes + all.size()) {
-    const double low = queue.top().bounds.low;
-    if (goal(low, reference) && (low > 0 || best.high <= 0)) break;
-    if (low >= settled) break;
-    QueuedPart top = queue.top();
-    queue.pop();
-    if (top.part)
-      bytes -= bytesOf(*top.part);
-    else
-      top.part = bounds.partOf(top.piece);
-    for (JacobianPart& half : JacobianBounds::split(*top.part)) {
-      QueuedPart next{JacobianBounds::boundsOf(half), top.piece, std::move(half)};
-      ++certificate.boxes;
-      // The least value is not above best.high, so this part is never halved.
-      if (next.bounds.low >= best.high) {
-        settled = std::min(settled, next.bounds.low);
-        continue;
-      }
-      offer(next.bounds);
-      bytes += bytesOf(*next.part);
-      queue.push(std::move(next));
-    }
-    requireMemory(bytes, options.maxMemory);
-    constexpr std::size_t kReported = 8;
-    if (++passes % kReported == 0)
-      report(options.progress, 0.6 + 0.2 * (2 * static_cast<double>(passes)) /
-                                         (static_cast<double>(options.mostBoxes) + 1));
+    if (!isOpen[n]) search.settled = std::min(search.settled, all[n].low);
+  if (bounds.isAffordable()) {
+    std::size_t passes = 0;
+    certificate.boxes += search.run(
+        options.mostBoxes, options.maxMemory,
+        [&](double low) { return goal(low, reference) && (low > 0 || best.high <= 0); },
+        [&](std::size_t boxes) {
+          constexpr std::size_t kReported = 8;
+          if (++passes % kReported == 0)
+            report(options.progress, 0.6 + 0.2 * static_cast<double>(boxes) /
+                                               (static_cast<double>(options.mostBoxes) + 1));
+        });
   }
   report(options.progress, 0.8);
-  certificate.leastLow = std::min(settled, queue.empty() ? settled : queue.top().bounds.low);
+  certificate.leastLow = search.low();
   certificate.leastHigh = best.high;
   certificate.place = lattice.worldOf(best.place);
   certificate.verdict = best.high <= 0             ? FoldVerdict::Folds

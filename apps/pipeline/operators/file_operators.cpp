@@ -96,18 +96,19 @@ Value readCloud(Invocation& in) {
 
 Value read(Invocation& in) {
   const std::filesystem::path file = in.text("file");
-  if (fileKind(in) == Kind::Points) return readCloud(in);
-  if (fileKind(in) == Kind::Patch)
+  const Kind kind = fileKind(in);
+  if (kind == Kind::Points) return readCloud(in);
+  if (kind == Kind::Patch)
     return Value(PatchValue{.patches = mapping::readPatches(file, in.maxMemory)});
-  if (fileKind(in) == Kind::Volume) {
+  if (kind == Kind::Volume) {
     levelset::ReadVolumeOptions options = volumeOptions(in);
     options.notes = &in.notes.notes;
     return Value(levelset::readVolume(file, options));
   }
-  if (fileKind(in) == Kind::Segmentation)
+  if (kind == Kind::Segmentation)
     return Value(
         levelset::readSegmented(file, {.maxMemory = in.maxMemory, .progress = in.progress}));
-  if (fileKind(in) == Kind::Molecule)
+  if (kind == Kind::Molecule)
     return Value(
         levelset::readMolecule(file, {.format = in.text("format"),
                                       .model = in.given("model") ? in.integerAs<int>("model") : 0,
@@ -116,7 +117,7 @@ Value read(Invocation& in) {
                                       .maxMemory = in.maxMemory,
                                       .notes = &in.notes.notes,
                                       .progress = in.progress}));
-  if (fileKind(in) == Kind::Scene) {
+  if (kind == Kind::Scene) {
     const auto warn = [&](const levelset::BandRepairs& repairs, const auto& source) {
       for (const std::string& told : sentencesOf(repairs, source))
         in.notes.warnings.push_back(told);
@@ -124,7 +125,7 @@ Value read(Invocation& in) {
     return Value(render::readScene(
         file, {.maxMemory = in.maxMemory, .repairs = warn, .progress = in.progress}));
   }
-  if (fileKind(in) == Kind::Mesh) {
+  if (kind == Kind::Mesh) {
     std::vector<std::string> unsupported;
     levelset::TriMesh mesh = levelset::readMesh(file, {.format = in.text("format"),
                                                        .attributes = !in.flag("no-attributes"),
@@ -155,12 +156,13 @@ Value read(Invocation& in) {
 /// Plans the value. A mesh is read completely, since lengths in % refer to its size. For a band,
 /// the header of the file suffices.
 Plan planRead(Invocation& in) {
-  if (fileKind(in) == Kind::Volume) {
+  const Kind kind = fileKind(in);
+  if (kind == Kind::Volume) {
     const levelset::VolumeFileInfo info =
         levelset::volumeFileInfo(in.text("file"), volumeOptions(in));
     return planOf(info.grid, info.type);
   }
-  if (fileKind(in) == Kind::Segmentation) {
+  if (kind == Kind::Segmentation) {
     const levelset::SegmentedFileInfo info = levelset::segmentedFileInfo(in.text("file"));
     Plan plan{.kind = Kind::Band,  // as large as a band of this half width
               .bounds = info.worldBounds,
@@ -172,7 +174,7 @@ Plan planRead(Invocation& in) {
     plan.kind = Kind::Segmentation;
     return plan;
   }
-  if (fileKind(in) != Kind::Band) return read(in).plan();
+  if (kind != Kind::Band) return read(in).plan();
   for (const levelset::GridInfo& grid : levelset::bandFileInfo(in.text("file"))) {
     if (in.given("grid") ? grid.name != in.text("grid") : !grid.isLevelSet) continue;
     if (!grid.isLevelSet) {

@@ -4,12 +4,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <optional>
-#include <queue>
 #include <tuple>
 #include <utility>
 
-#include "levelset/deform/tensor_bernstein.h"
+#include "levelset/deform/bernstein/least_value_search.h"
+#include "levelset/deform/bernstein/tensor_bernstein.h"
 
 namespace levelset {
 namespace {
@@ -34,17 +33,6 @@ struct MotionBracket {
   double time = 0;
 };
 
-/// Entry of the queue. Parts that are whole pieces are made again when they are halved.
-struct QueuedMotion {
-  MotionBracket bounds;
-  std::size_t piece = 0;
-  std::optional<MotionPart> part = {};
-
-  bool operator<(const QueuedMotion& other) const {  // the least bound is on top
-    return bounds.low != other.bounds.low ? bounds.low > other.bounds.low : piece > other.piece;
-  }
-};
-
 std::vector<double> binomials(std::size_t n) {
   std::vector<double> row{1};
   for (std::size_t k = 1; k <= n; ++k)
@@ -57,9 +45,7 @@ class MotionBounds {
   explicit MotionBounds(const std::vector<ControlLattice>& control) {
     for (const ControlLattice& lattice : control) pieces_.emplace_back(lattice);
     const LatticeData& data = control.front().data();
-    const Imath::M44d& m = data.boxToWorld;
-    volume_ = V3d(m[0][0], m[0][1], m[0][2])
-                  .dot(V3d(m[1][0], m[1][1], m[1][2]).cross(V3d(m[2][0], m[2][1], m[2][2])));
+    volume_ = boxVolume(data);
     const std::array<int, 3> degree = {data.axes[0].degree, data.axes[1].degree,
                                        data.axes[2].degree},
                              twice = {2 * degree[0], 2 * degree[1], 2 * degree[2]};
@@ -75,21 +61,17 @@ class MotionBounds {
   /// The determinant of a whole piece over the whole interval.
   [[nodiscard]] MotionPart partOf(std::size_t index) const {
     const std::size_t degree = pieces_.size() - 1;
-    std::vector<std::array<TensorVector, 3>> partials;  // by the parameters, for each lattice
+    std::vector<TensorPartials> partials;  // for each lattice
     MotionPart part;
     std::array<double, 3> largest{};
     for (const BezierPieces& pieces : pieces_) {
       const BezierPiece piece = pieces.piece(index);
       part.low = piece.low;
       part.high = piece.high;
-      std::array<TensorVector, 3>& of = partials.emplace_back();
-      for (int axis = 0; axis < 3; ++axis)
-        for (std::size_t c = 0; c < 3; ++c) {
-          const auto a = static_cast<std::size_t>(axis);
-          of[a][c] = derivative(piece.numerator[c], axis);
-          const CoefficientRange range = rangeOf(of[a][c]);
-          largest[a] = std::max({largest[a], std::abs(range.least), std::abs(range.most)});
-        }
+      partials.push_back(partialsOf(piece.numerator));
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        for (const TensorBernstein& form : partials.back()[axis])
+          largest[axis] = std::max(largest[axis], largestCoefficient(form));
     }
     const std::vector<double> one = binomials(degree), three = binomials(3 * degree);
     part.coefficients.resize(3 * degree + 1);
@@ -143,8 +125,7 @@ class MotionBounds {
     most *= static_cast<double>(part.coefficients.size() - 1);
     for (int a = 0; a < 3; ++a)
       for (const TensorBernstein& form : part.coefficients) {
-        const CoefficientRange range = rangeOf(derivative(form, a));
-        const double change = std::max(std::abs(range.least), std::abs(range.most));
+        const double change = largestCoefficient(derivative(form, a));
         if (change > most) most = change, axis = a;
       }
     return axis == 3 ? halvesInTime(std::move(part)) : halvesAlong(part, axis);
@@ -195,51 +176,26 @@ MotionCertificate certifyMotion(const std::vector<ControlLattice>& control,
   report(options.progress, 0);
   const ControlLattice& lattice = control.front();
   MotionCertificate certificate;
-  certificate.leastLow = -std::numeric_limits<double>::infinity();
-  certificate.leastHigh = std::numeric_limits<double>::infinity();
   if (lattice.isRational()) return certificate;
   const MotionBounds bounds(control);
   if (!bounds.isAffordable()) return certificate;
-  MotionBracket best{0};
-  std::priority_queue<QueuedMotion> queue;
-  const auto offer = [&best](const MotionBracket& one) {
-    if (one.high < best.high) best = one;
-  };
+  LeastValueSearch<MotionPart, MotionBracket, MotionBounds> search(bounds);
+  const MotionBracket& best = search.best;
   for (std::size_t n = 0; n < bounds.size(); ++n) {
-    const MotionBracket one = MotionBounds::boundsOf(bounds.partOf(n));
-    offer(one);
-    queue.push({one, n});
+    search.add(MotionBounds::boundsOf(bounds.partOf(n)), n);
     report(options.progress, 0.6 * static_cast<double>(n) / static_cast<double>(bounds.size()));
   }
   certificate.boxes = bounds.size();
-  double settled = std::numeric_limits<double>::infinity(), bytes = 0;
-  while (!queue.empty() && certificate.boxes < options.mostBoxes + bounds.size()) {
-    const double low = queue.top().bounds.low;
-    if (best.high <= 0 || low >= settled) break;
-    if (low > 0 && best.high - low <= options.tolerance * best.high) break;
-    QueuedMotion top = queue.top();
-    queue.pop();
-    if (top.part)
-      bytes -= bytesOf(*top.part);
-    else
-      top.part = bounds.partOf(top.piece);
-    for (MotionPart& half : MotionBounds::split(std::move(*top.part))) {
-      QueuedMotion next{MotionBounds::boundsOf(half), top.piece, std::move(half)};
-      ++certificate.boxes;
-      offer(next.bounds);
-      // The least value is not above best.high, so this part is never halved.
-      if (next.bounds.low >= best.high) {
-        settled = std::min(settled, next.bounds.low);
-        continue;
-      }
-      bytes += bytesOf(*next.part);
-      queue.push(std::move(next));
-    }
-    requireMemory(bytes, options.maxMemory);
-    report(options.progress, 0.6 + 0.4 * static_cast<double>(certificate.boxes - bounds.size()) /
-                                       static_cast<double>(options.mostBoxes + 2));
-  }
-  certificate.leastLow = std::min(settled, queue.empty() ? settled : queue.top().bounds.low);
+  certificate.boxes += search.run(
+      options.mostBoxes, options.maxMemory,
+      [&](double low) {
+        return best.high <= 0 || (low > 0 && best.high - low <= options.tolerance * best.high);
+      },
+      [&](std::size_t boxes) {
+        report(options.progress,
+               0.6 + 0.4 * static_cast<double>(boxes) / static_cast<double>(options.mostBoxes + 2));
+      });
+  certificate.leastLow = search.low();
   certificate.leastHigh = best.high;
   certificate.place = lattice.worldOf(best.place);
   certificate.time = best.time;

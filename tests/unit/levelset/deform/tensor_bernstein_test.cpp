@@ -1,4 +1,4 @@
-#include "levelset/deform/tensor_bernstein.h"
+#include "levelset/deform/bernstein/tensor_bernstein.h"
 
 #include <gtest/gtest.h>
 

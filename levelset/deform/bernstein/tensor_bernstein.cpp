@@ -1,6 +1,7 @@
-#include "levelset/deform/tensor_bernstein.h"
+#include "levelset/deform/bernstein/tensor_bernstein.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace levelset {
 namespace {
@@ -65,6 +66,11 @@ CoefficientRange rangeOf(const TensorBernstein& form) {
   const auto [least, most] =
       std::minmax_element(form.coefficients.begin(), form.coefficients.end());
   return {*least, *most};
+}
+
+double largestCoefficient(const TensorBernstein& form) {
+  const CoefficientRange range = rangeOf(form);
+  return std::max(std::abs(range.least), std::abs(range.most));
 }
 
 double valueAt(const TensorBernstein& form, const std::array<double, 3>& parameter) {

@@ -34,6 +34,8 @@ struct CoefficientRange {
   double least, most;
 };
 [[nodiscard]] CoefficientRange rangeOf(const TensorBernstein& form);
+/// Largest magnitude of a coefficient.
+[[nodiscard]] double largestCoefficient(const TensorBernstein& form);
 
 /// Evaluates by the de Casteljau algorithm.
 [[nodiscard]] double valueAt(const TensorBernstein& form, const std::array<double, 3>& parameter);
@@ -60,6 +62,19 @@ using TensorVector = std::array<TensorBernstein, 3>;
 /// Determinant of three columns. The components of each have the same degrees.
 [[nodiscard]] TensorBernstein determinantOf(const TensorVector& a, const TensorVector& b,
                                             const TensorVector& c);
+
+/// Derivatives of a map by its three parameters, each with three components.
+using TensorPartials = std::array<TensorVector, 3>;
+/// @param map  its first three components are differentiated
+template <std::size_t N>
+[[nodiscard]] TensorPartials partialsOf(const std::array<TensorBernstein, N>& map) {
+  static_assert(N >= 3);
+  TensorPartials result;
+  for (int axis = 0; axis < 3; ++axis)
+    for (std::size_t c = 0; c < 3; ++c)
+      result[static_cast<std::size_t>(axis)][c] = derivative(map[c], axis);
+  return result;
+}
 
 /// Splits at the middle of one parameter by the de Casteljau algorithm. Each half is a polynomial
 /// on the unit cube.
