@@ -13,6 +13,11 @@ std::string foldPlace(const Imath::V3d& p) {
 
 }  // namespace
 
+FoldVerdict verdictOf(double low, double high) {
+  if (high <= 0) return FoldVerdict::Folds;
+  return low > 0 ? FoldVerdict::Certified : FoldVerdict::Undecided;
+}
+
 const char* foldVerdictName(FoldVerdict verdict) {
   switch (verdict) {
     case FoldVerdict::Certified:

@@ -14,6 +14,8 @@ enum class FoldVerdict {
   Undecided   ///< no fold was found, but the bounds do not exclude one
 };
 [[nodiscard]] const char* foldVerdictName(FoldVerdict verdict);
+/// Verdict on a least Jacobian between two bounds. @param high  value that the Jacobian has
+[[nodiscard]] FoldVerdict verdictOf(double low, double high);
 
 struct FoldCertificate {
   FoldVerdict verdict = FoldVerdict::Undecided;

@@ -52,10 +52,10 @@ TensorBernstein rationalDeterminant(const std::array<TensorBernstein, 4>& map) {
   return result;
 }
 
-double determinantCost(const std::array<int, 3>& degree, bool isRational) {
+/// Number of multiplications of rationalDeterminant().
+double rationalDeterminantCost(const std::array<int, 3>& degree) {
   const std::array<int, 3> twice = {2 * degree[0], 2 * degree[1], 2 * degree[2]};
-  return isRational ? 24 * productCost(degree, degree) + 6 * productCost(twice, twice)
-                    : 6 * productCost(degree, degree) + 3 * productCost(degree, twice);
+  return 24 * productCost(degree, degree) + 6 * productCost(twice, twice);
 }
 
 /// Least Jacobian in a part of a piece: a lower bound, and the least value found.
@@ -78,7 +78,8 @@ class JacobianBounds {
       : pieces_(lattice), isRational_(lattice.isRational()), volume_(boxVolume(lattice.data())) {
     const auto& axes = lattice.data().axes;
     const std::array<int, 3> degree = {axes[0].degree, axes[1].degree, axes[2].degree};
-    isAffordable_ = determinantCost(degree, isRational_) <= kMostProducts;
+    isAffordable_ =
+        (isRational_ ? rationalDeterminantCost(degree) : determinantCost(degree)) <= kMostProducts;
     // Terms of a coefficient times some roundings each.
     rounding_ = 16 * (degree[0] + degree[1] + degree[2]) * std::numeric_limits<double>::epsilon();
   }
@@ -352,9 +353,7 @@ FoldCertificate certifyLattice(const ControlLattice& lattice,
   certificate.leastLow = search.low();
   certificate.leastHigh = best.high;
   certificate.place = lattice.worldOf(best.place);
-  certificate.verdict = best.high <= 0             ? FoldVerdict::Folds
-                        : certificate.leastLow > 0 ? FoldVerdict::Certified
-                                                   : FoldVerdict::Undecided;
+  certificate.verdict = verdictOf(certificate.leastLow, best.high);
   testFaces(lattice, certificate, subProgress(options.progress, 0.8, 1));
   report(options.progress, 1);
   return certificate;

@@ -15,11 +15,9 @@
 namespace levelset {
 namespace {
 
-/// Visits the parts of a JSON text without keeping them. Stops at a repeated key.
-class KeyVisitor : public nlohmann::json_sax<nlohmann::json> {
+/// Visits the parts of a JSON text without keeping them.
+class JsonVisitor : public nlohmann::json_sax<nlohmann::json> {
  public:
-  std::optional<std::string> repeated;
-
   bool null() override { return true; }
   bool boolean(bool) override { return true; }
   bool number_integer(number_integer_t) override { return true; }
@@ -29,6 +27,16 @@ class KeyVisitor : public nlohmann::json_sax<nlohmann::json> {
   bool binary(binary_t&) override { return true; }
   bool start_array(std::size_t) override { return true; }
   bool end_array() override { return true; }
+  bool parse_error(std::size_t, const std::string&, const nlohmann::detail::exception&) override {
+    return false;
+  }
+};
+
+/// Stops at a repeated key.
+class KeyVisitor : public JsonVisitor {
+ public:
+  std::optional<std::string> repeated;
+
   bool start_object(std::size_t) override {
     open_.emplace_back();
     return true;
@@ -41,12 +49,35 @@ class KeyVisitor : public nlohmann::json_sax<nlohmann::json> {
     if (!open_.back().insert(name).second) repeated = name;
     return !repeated;
   }
-  bool parse_error(std::size_t, const std::string&, const nlohmann::detail::exception&) override {
-    return false;
-  }
 
  private:
   std::vector<std::set<std::string>> open_;  ///< keys of the objects that are not closed
+};
+
+/// Stops at the text of the key "format" of the document.
+class FormatVisitor : public JsonVisitor {
+ public:
+  std::optional<std::string> format;
+
+  bool start_object(std::size_t) override { return open(); }
+  bool end_object() override { return close(); }
+  bool start_array(std::size_t) override { return open(); }
+  bool end_array() override { return close(); }
+  bool key(string_t& name) override {
+    isFormat_ = depth_ == 1 && name == "format";
+    return true;
+  }
+  bool string(string_t& text) override {
+    if (isFormat_ && depth_ == 1) format = text;
+    return !format;
+  }
+
+ private:
+  bool open() { return ++depth_ > 0; }
+  bool close() { return --depth_ >= 0; }
+
+  int depth_ = 0;
+  bool isFormat_ = false;
 };
 
 }  // namespace
@@ -55,6 +86,15 @@ std::optional<std::string> repeatedKey(const std::string& text) {
   KeyVisitor visitor;
   std::ignore = nlohmann::json::sax_parse(text, &visitor);
   return visitor.repeated;
+}
+
+std::optional<std::string> jsonFormat(const std::filesystem::path& file) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) return std::nullopt;
+  std::ifstream stream(file, std::ios::binary);
+  FormatVisitor visitor;
+  std::ignore = nlohmann::json::sax_parse(stream, &visitor);
+  return visitor.format;
 }
 
 std::string readJsonText(const std::filesystem::path& file, const char* wanted,

@@ -41,6 +41,10 @@ inline constexpr std::size_t kMaxJsonDepth = 64;
 /// @return the key; nullopt if there is none before the first syntax error
 [[nodiscard]] std::optional<std::string> repeatedKey(const std::string& text);
 
+/// Text of the member "format" of the document in a file. Reads the file up to that member only.
+/// @return nullopt for a file without one, or that cannot be read
+[[nodiscard]] std::optional<std::string> jsonFormat(const std::filesystem::path& file);
+
 /// Memory for each character of a JSON text, bytes: the character itself, and its share of a node
 /// with its list entry, which takes at least two characters.
 inline constexpr double kJsonBytesPerCharacter = 20;

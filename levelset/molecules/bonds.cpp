@@ -18,7 +18,8 @@ namespace {
 
 using Imath::V3d;
 
-constexpr double kLeastBond = 0.4;  // Å
+constexpr double kLeastBond = 0.4;       // Å
+constexpr double kBondTolerance = 0.45;  // Å, beyond the sum of the covalent radii
 // More atoms than this within a few ångström are no molecule. The search would be slow.
 constexpr std::size_t kMostNeighbours = 20'000;
 constexpr std::size_t kBlock = 4096;  // atoms of a task
@@ -100,7 +101,7 @@ std::vector<NearPair> nearPairs(const std::vector<Atom>& atoms, const BondOption
     radii.push_back(bondRadius(atom.element));
     largest = std::max(largest, radii.back());
   }
-  const AtomGrid grid(atoms, 2 * largest + options.tolerance + 1e-9);
+  const AtomGrid grid(atoms, 2 * largest + kBondTolerance + 1e-9);
   std::vector<std::vector<NearPair>> blocks((atoms.size() + kBlock - 1) / kBlock);
   ProgressGate gate(options.progress, blocks.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t block) {
@@ -115,7 +116,7 @@ std::vector<NearPair> nearPairs(const std::vector<Atom>& atoms, const BondOption
         const Atom &a = atoms[n], &b = atoms[other];
         if (a.alternate && b.alternate && a.alternate != b.alternate) return;
         const double distance = (a.position - b.position).length();
-        if (distance < kLeastBond || distance > radii[n] + radii[other] + options.tolerance) return;
+        if (distance < kLeastBond || distance > radii[n] + radii[other] + kBondTolerance) return;
         blocks[block].push_back({{static_cast<std::uint32_t>(n), other}, distance});
       });
       if (count > kMostNeighbours)
@@ -162,9 +163,6 @@ void limitHydrogens(const Molecule& molecule, std::vector<NearPair>& pairs) {
 }  // namespace
 
 std::vector<Bond> moleculeBonds(const Molecule& molecule, const BondOptions& options) {
-  if (!(options.tolerance >= 0) || !(options.tolerance <= 10))
-    throw UsageError(fmt::format("the tolerance of bonds is {} Å; give a length from 0 to 10",
-                                 options.tolerance));
   if (!options.isByDistance) return molecule.bonds;
   std::vector<NearPair> pairs = nearPairs(molecule.atoms, options);
   limitHydrogens(molecule, pairs);

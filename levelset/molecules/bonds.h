@@ -9,19 +9,16 @@ namespace levelset {
 
 struct BondOptions {
   bool isByDistance = true;  ///< false: only the bonds that the file gives
-  /// Two atoms are bonded if their distance is at most the sum of their covalent radii and this, Å.
-  /// At least 0. Distances under 0.4 Å are no bonds.
-  double tolerance = 0.45;
   Progress progress = {};
 };
 
-/// Finds the bonds of a molecule: those that its file gives, and those by distance. Atoms of
+/// Finds the bonds of a molecule: those that its file gives, and those by distance. Two atoms are
+/// bonded if their distance is from 0.4 Å to the sum of their covalent radii and 0.45 Å. Atoms of
 /// different alternate locations have no bond. A hydrogen atom without a bond of the file has at
 /// most one, to the nearest atom. Helium, neon, argon and the metals lithium, sodium, potassium,
 /// rubidium, caesium, calcium, strontium and barium, which are ions in molecules, have only the
 /// bonds of the file. Time and memory are linear in the number of atoms.
 /// @return each bond once, sorted
-/// @throws UsageError for a tolerance out of range
 /// @throws InvalidInput if thousands of atoms lie within a few ångström, or a position is not
 ///         finite
 /// @throws Cancelled

@@ -4,8 +4,8 @@ namespace render {
 
 Hit BezierPart::hitOf(const Camera::Ray& ray, double distance, const Imath::V3d& normal,
                       std::size_t solid) const {
-  Hit hit = opaqueHit(ray.origin + ray.direction * distance, distance, normal,
-                      caster.bounds().size().length(), colour, id, solid);
+  Hit hit = exactHit(ray.origin + ray.direction * distance, distance, normal,
+                     caster.bounds().size().length(), colour, id, solid);
   hit.opacity = opacity;
   return hit;
 }

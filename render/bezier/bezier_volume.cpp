@@ -244,7 +244,11 @@ std::vector<BezierPatch> bezierPatches(const SplineVolume& volume) {
 }
 
 void trimPatches(const SplineVolume& volume, const std::shared_ptr<const TrimRegion>& region,
-                 std::vector<BezierPatch>& patches) {
+                 std::vector<BezierPatch>& patches, const Imath::Box2d& domain) {
+  const auto placed = [&](double u, double v) {
+    return Imath::V2d(domain.min.x * (1 - u) + domain.max.x * u,
+                      domain.min.y * (1 - v) + domain.max.y * v);
+  };
   std::array<std::vector<Imath::V2d>, 3> spans;  // ends of the spans of each axis
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::vector<double>& knots = volume.axes[axis].knots;
@@ -256,7 +260,7 @@ void trimPatches(const SplineVolume& volume, const std::shared_ptr<const TrimReg
     for (const Imath::V2d& v : spans[1])
       for (std::size_t n = 0; n < spans[2].size(); ++n)
         patches[number++].trim = std::make_shared<const PatchTrim>(
-            PatchTrim{region, {Imath::V2d(u[0], v[0]), Imath::V2d(u[1], v[1])}});
+            PatchTrim{region, {placed(u[0], v[0]), placed(u[1], v[1])}});
 }
 
 Imath::Box3d BezierVolume::bounds() const {

@@ -91,9 +91,12 @@ struct SplineVolume {
 /// @throws levelset::InvalidInput as levelset::ControlLattice, and if the counts of points and
 ///         numbers of an attribute differ
 [[nodiscard]] std::vector<BezierPatch> bezierPatches(const SplineVolume& volume);
-/// Cuts patches of one spline surface. @param patches  those of bezierPatches(), in their order
+/// Cuts patches of one spline surface.
+/// @param patches  those of bezierPatches(), in their order
+/// @param domain   box of the parameters of the surface in the plane of the loops
 void trimPatches(const SplineVolume& volume, const std::shared_ptr<const TrimRegion>& region,
-                 std::vector<BezierPatch>& patches);
+                 std::vector<BezierPatch>& patches,
+                 const Imath::Box2d& domain = {Imath::V2d(0), Imath::V2d(1)});
 
 /// Patches that together are one object. A point is inside an attribute where the attribute is
 /// below the isovalue. The object is the inside of the only attribute, or an expression of several.

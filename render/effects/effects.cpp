@@ -177,6 +177,18 @@ Image reducedPicture(Image image, int edge) {
   return small;
 }
 
+void validateLightRadius(double degrees) {
+  if (!(degrees < 85))
+    throw UsageError(
+        fmt::format("--light-radius {} is too wide; give less than 85 degrees", degrees));
+}
+
+void validateReduction(long reduce) {
+  if (reduce > kLargestReduction)
+    throw UsageError(
+        fmt::format("--reduce {} is too large; give at most {}", reduce, kLargestReduction));
+}
+
 void validate(const EffectOptions& options) {
   requireUnit("occlusion", options.occlusion);
   requireUnit("shadow", options.shadow);
@@ -186,12 +198,8 @@ void validate(const EffectOptions& options) {
     throw UsageError(
         fmt::format("--light {},{},{} is not a direction; give for example -0.4,0.7,0.6",
                     options.light.x, options.light.y, options.light.z));
-  if (!(options.lightRadius < 85))
-    throw UsageError(fmt::format("--light-radius {} is too wide; give less than 85 degrees",
-                                 options.lightRadius));
-  if (options.reduce > kLargestReduction)
-    throw UsageError(fmt::format("--reduce {} is too large; give at most {}", options.reduce,
-                                 kLargestReduction));
+  validateLightRadius(options.lightRadius);
+  validateReduction(options.reduce);
   if (options.index < 1)
     throw UsageError(
         fmt::format("--index {} is less than that of a vacuum; give 1 or more", options.index));

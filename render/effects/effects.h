@@ -186,6 +186,11 @@ struct EffectOptions {
   }
 };
 
+/// @throws levelset::UsageError for a light that appears under 85 degrees or more
+void validateLightRadius(double degrees);
+/// @throws levelset::UsageError for more than 16 pixels along the edge of one
+void validateReduction(long reduce);
+
 /// Checks the options before a picture is read.
 /// @param pixelScale  as withLook()
 /// @throws levelset::UsageError

@@ -151,7 +151,7 @@ void validate(const LookOptions& look, int pixelScale) {
     throw UsageError(
         fmt::format("--crease-angle {} is more than 180 degrees; give less", look.creaseAngle));
   if (look.depthCueNear && look.depthCueFar && !(*look.depthCueNear < *look.depthCueFar))
-    throw UsageError("--depth-cue-far must be more than --depth-cue-near; swap the two numbers");
+    throw UsageError("--depth-cue-far must be more than --depth-cue-near; give a larger one");
 }
 
 Image withLook(Image image, const LookOptions& look, int pixelScale, const ScreenRunner& runner) {

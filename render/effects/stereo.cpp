@@ -144,7 +144,9 @@ Image stereoOf(const Image& image, Stereo kind, double eyeDistance, double scree
   const PictureView view(image);
   const Imath::V2d range = view.depthRange();
   if (!(range.y > 0))
-    throw InvalidInput("a stereo picture needs a surface, but the picture shows none");
+    throw InvalidInput(
+        "a stereo picture needs a surface, but the picture shows none; draw one with a surface in "
+        "its frame");
   const double eyes = eyeDistance > 0 ? eyeDistance : kEyeShare * range.x;
   const double screen = screenDepth > 0 ? screenDepth : 0.5 * (range.x + range.y);
   const auto eye = [&](double shift) {

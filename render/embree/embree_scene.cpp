@@ -412,7 +412,7 @@ std::vector<Hit> EmbreeScene::intersectVisible(const V3d& origin, const V3d& dir
   double share = 1;
   // Adds the hits with meshes and transparent Bézier volumes up to the distance `end` along the
   // ray. Returns true when a surface behind them is visible.
-  const auto addMeshes = [&](double end) {
+  const auto addTransparent = [&](double end) {
     while (share >= kLeastTransmittance) {
       const bool isBezier = nextBezier != onBeziers.end() && nextBezier->distance < end;
       const Hit onMesh =
@@ -427,7 +427,8 @@ std::vector<Hit> EmbreeScene::intersectVisible(const V3d& origin, const V3d& dir
   };
   if (impl_->fields) {  // blended surfaces are opaque
     const Hit onSolid = impl_->intersectSolids(origin, direction, near, far);
-    if (addMeshes(onSolid.found ? onSolid.distance : far) && onSolid.found) hits.push_back(onSolid);
+    if (addTransparent(onSolid.found ? onSolid.distance : far) && onSolid.found)
+      hits.push_back(onSolid);
     return hits;
   }
   double moved;
@@ -435,7 +436,7 @@ std::vector<Hit> EmbreeScene::intersectVisible(const V3d& origin, const V3d& dir
   if (auto query = impl_->prepare(origin, direction, near, far, moved, ray)) {
     std::vector<std::vector<SideChange>> changes = impl_->allChanges(*query, ray);
     walkChanges(impl_->csg, changes, [&](const CsgChange& change) {
-      if (change.t > query->limit || !addMeshes(moved + change.t)) return false;
+      if (change.t > query->limit || !addTransparent(moved + change.t)) return false;
       Hit hit;
       hit.isFlipped = change.isFlipped;
       impl_->complete(hit, *query, impl_->solids[change.solid], moved, change.t);
@@ -444,7 +445,7 @@ std::vector<Hit> EmbreeScene::intersectVisible(const V3d& origin, const V3d& dir
       return share >= kLeastTransmittance;
     });
   }
-  if (addMeshes(far) && onOpaque.found) hits.push_back(onOpaque);
+  if (addTransparent(far) && onOpaque.found) hits.push_back(onOpaque);
   return hits;
 }
 

@@ -26,58 +26,29 @@ bool isUsable(const V3d& v) {
   return true;
 }
 
-/// Number of a quadric that messages call "the sphere".
-constexpr std::size_t kUnnumbered = static_cast<std::size_t>(-1);
-
-[[noreturn]] void refuseQuadric(const char* list, std::size_t number, const std::string& what) {
-  if (number == kUnnumbered) throw InvalidInput(fmt::format("the {} {}", list, what));
-  throw InvalidInput(fmt::format("{} {} {}", list, number + 1, what));
-}
-
-void requireUsable(const V3d& v, const char* list, std::size_t number, const char* what) {
+void requireUsable(const V3d& v, const char* what) {
   if (!isUsable(v))
-    refuseQuadric(list, number,
-                  fmt::format("has {} ({}, {}, {}) with a number that is not finite or exceeds "
-                              "1e15; give finite numbers up to 1e15",
-                              what, v.x, v.y, v.z));
+    throw InvalidInput(fmt::format(
+        "has {} ({}, {}, {}) with a number that is not finite or exceeds 1e15; give finite numbers "
+        "up to 1e15",
+        what, v.x, v.y, v.z));
 }
 
-void requireRadius(float radius, const char* list, std::size_t number) {
+void requireRadius(float radius) {
   if (!(radius > 0) || !(static_cast<double>(radius) <= kLargestCoordinate))
-    refuseQuadric(list, number,
-                  fmt::format("has the radius {}; give a positive one up to 1e15", radius));
+    throw InvalidInput(fmt::format("has the radius {}; give a positive one up to 1e15", radius));
 }
 
-void requireQuadric(const Quadric& quadric, std::size_t number) {
-  constexpr const char* kList = "quadric";
-  requireUsable(quadric.position, kList, number, "a position");
-  double product = 1;
-  for (const V3d& axis : quadric.axes) {
-    requireUsable(axis, kList, number, "an axis");
-    if (!(axis.length() > 0))
-      refuseQuadric(kList, number, "has an axis of length 0; give a longer one");
-    product *= axis.length();
+/// Checks a list. Messages name the kind and the number of an entry, from 1.
+template <typename Primitive>
+void requireAll(const std::vector<Primitive>& list, const char* noun) {
+  for (std::size_t n = 0; n < list.size(); ++n) {
+    try {
+      requireQuadric(list[n]);
+    } catch (const InvalidInput& error) {
+      throw InvalidInput(fmt::format("{} {} {}", noun, n + 1, error.what()));
+    }
   }
-  const double volume = quadric.axes[0].dot(quadric.axes[1].cross(quadric.axes[2]));
-  if (!(std::abs(volume) > kFlattest * product))
-    refuseQuadric(kList, number, "has axes in one plane; give three independent ones");
-  if (quadric.kind == QuadricKind::Ellipsoid) return;
-  const auto& [low, high] = quadric.range;
-  if (!(std::abs(low) <= kLargestCoordinate) || !(std::abs(high) <= kLargestCoordinate) ||
-      !(static_cast<float>(low) < static_cast<float>(high)))
-    refuseQuadric(kList, number,
-                  fmt::format("has the range {} … {}; give finite ends, the lower one first, that "
-                              "differ in single precision",
-                              low, high));
-  const bool isBelow = quadric.kind == QuadricKind::Paraboloid && !(high > 0);
-  const bool isBetween = quadric.kind == QuadricKind::TwoSheet && !(high > 1) && !(low < -1);
-  if (isBelow || isBetween)
-    refuseQuadric(
-        kList, number,
-        fmt::format("has no point in the range {} … {}, because a {} {}", low, high,
-                    nameOf(quadric.kind),
-                    isBelow ? "begins at 0; give a range that reaches above 0"
-                            : "has none between -1 and 1; give a range that reaches beyond"));
 }
 
 /// Square of the radius at a height in parameter space.
@@ -254,27 +225,57 @@ Quadric quadricOf(const Stick& stick) {
   return quadric;
 }
 
-void requireQuadrics(const QuadricModel& model, bool isNumbered) {
+void requireQuadric(const Ball& ball) {
+  requireUsable(ball.centre, "a centre");
+  requireRadius(ball.radius);
+}
+
+void requireQuadric(const Stick& stick) {
+  requireUsable(stick.a, "an end");
+  requireUsable(stick.b, "an end");
+  requireRadius(stick.radius);
+  if (stick.a == stick.b)
+    throw InvalidInput("has ends at the same position; give two different ones");
+}
+
+void requireQuadric(const Quadric& quadric) {
+  requireUsable(quadric.position, "a position");
+  double product = 1;
+  for (const V3d& axis : quadric.axes) {
+    requireUsable(axis, "an axis");
+    if (!(axis.length() > 0)) throw InvalidInput("has an axis of length 0; give a longer one");
+    product *= axis.length();
+  }
+  const double volume = quadric.axes[0].dot(quadric.axes[1].cross(quadric.axes[2]));
+  if (!(std::abs(volume) > kFlattest * product))
+    throw InvalidInput("has axes in one plane; give three independent ones");
+  if (quadric.kind == QuadricKind::Ellipsoid) return;
+  const auto& [low, high] = quadric.range;
+  if (!(std::abs(low) <= kLargestCoordinate) || !(std::abs(high) <= kLargestCoordinate) ||
+      !(static_cast<float>(low) < static_cast<float>(high)))
+    throw InvalidInput(
+        fmt::format("has the range {} … {}; give finite ends, the lower one first, that differ in "
+                    "single precision",
+                    low, high));
+  const bool isBelow = quadric.kind == QuadricKind::Paraboloid && !(high > 0);
+  const bool isBetween = quadric.kind == QuadricKind::TwoSheet && !(high > 1) && !(low < -1);
+  if (isBelow || isBetween)
+    throw InvalidInput(fmt::format(
+        "has no point in the range {} … {}, because a {} {}", low, high, nameOf(quadric.kind),
+        isBelow ? "begins at 0; give a range that reaches above 0"
+                : "has none between -1 and 1; give a range that reaches beyond"));
+}
+
+void requireQuadrics(const QuadricModel& model) {
   if (model.size() == 0) throw InvalidInput("there is no quadric; give at least one");
   if (model.size() > kMostQuadrics)
     throw InvalidInput(
-        fmt::format("there are {} quadrics; a part has at most 2^30 of them", model.size()));
-  const auto numberOf = [&](std::size_t n) { return isNumbered ? n : kUnnumbered; };
-  for (std::size_t n = 0; n < model.balls.size(); ++n) {
-    requireUsable(model.balls[n].centre, "sphere", numberOf(n), "a centre");
-    requireRadius(model.balls[n].radius, "sphere", numberOf(n));
-  }
-  for (std::size_t n = 0; n < model.sticks.size(); ++n) {
-    const Stick& stick = model.sticks[n];
-    requireUsable(stick.a, "cylinder", numberOf(n), "an end");
-    requireUsable(stick.b, "cylinder", numberOf(n), "an end");
-    requireRadius(stick.radius, "cylinder", numberOf(n));
-    if (stick.a == stick.b)
-      refuseQuadric("cylinder", numberOf(n),
-                    "has ends at the same position; give two different ones");
-  }
-  for (std::size_t n = 0; n < model.quadrics.size(); ++n)
-    requireQuadric(model.quadrics[n], numberOf(n));
+        fmt::format("there are {} quadrics, and a part has at most 2^30; divide them into several "
+                    "parts",
+                    model.size()));
+  requireAll(model.balls, "sphere");
+  requireAll(model.sticks, "cylinder");
+  requireAll(model.quadrics, "quadric");
 }
 
 std::optional<QuadricExtent> extentOf(const Quadric& quadric, const HomogeneousRow& numerator,

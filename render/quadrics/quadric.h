@@ -77,12 +77,16 @@ struct QuadricModel {
 [[nodiscard]] Quadric quadricOf(const Ball& ball);
 [[nodiscard]] Quadric quadricOf(const Stick& stick);
 
+/// Check one quadric. Messages begin with "has".
+/// @throws levelset::InvalidInput as requireQuadrics()
+void requireQuadric(const Ball& ball);
+void requireQuadric(const Stick& stick);
+void requireQuadric(const Quadric& quadric);
 /// Checks a model. Messages count the quadrics of a kind from 1.
-/// @param isNumbered  false: messages name a quadric without its number
 /// @throws levelset::InvalidInput if it is empty or has more than 2^30 quadrics, for numbers that
 /// are not finite or exceed 1e15, for radii that are not positive, for ends that coincide, for axes
 /// that are zero or nearly in one plane, and for an empty range
-void requireQuadrics(const QuadricModel& model, bool isNumbered = true);
+void requireQuadrics(const QuadricModel& model);
 
 /// Values of a linear function on the smallest interval that contains them.
 struct QuadricExtent {

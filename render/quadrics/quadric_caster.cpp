@@ -78,7 +78,7 @@ QuadricModel QuadricCaster::model() const {
 QuadricHit QuadricCaster::firstHit(const Camera::Ray& ray) const {
   const NearestQuadric nearest = traceQuadrics(*tables_, ray, false, hasWideVectors());
   if (nearest.slot == NearestQuadric::kNoSlot) return {};
-  return hitAt(ray, nearest.t, nearest.slot);
+  return hitOn(ray, nearest.t, nearest.slot, nearest.face);
 }
 
 bool QuadricCaster::isOccluded(const Camera::Ray& ray) const {
@@ -86,9 +86,12 @@ bool QuadricCaster::isOccluded(const Camera::Ray& ray) const {
 }
 
 QuadricHit QuadricCaster::hitAt(const Camera::Ray& ray, double distance, std::uint32_t slot) const {
+  return hitOn(ray, distance, slot, tables_->rootIn(slot, relativeRay(*tables_, ray)).face);
+}
+
+QuadricHit QuadricCaster::hitOn(const Camera::Ray& ray, double distance, std::uint32_t slot,
+                                int face) const {
   const QuadricKernel::QuadricRay relative = relativeRay(*tables_, ray);
-  const int face =
-      slot < tables_->firstStick() ? QuadricKernel::kSide : tables_->rootIn(slot, relative).face;
   const V3d at = V3d(relative.x, relative.y, relative.z) + ray.direction * distance;
   return {true, distance, tables_->normalAt(slot, face, at), slot};
 }

@@ -69,6 +69,10 @@ class QuadricCaster {
   [[nodiscard]] const std::shared_ptr<const QuadricTables>& tables() const { return tables_; }
 
  private:
+  /// @param face  of the primitive, as QuadricKernel::QuadricRoot
+  [[nodiscard]] QuadricHit hitOn(const Camera::Ray& ray, double distance, std::uint32_t slot,
+                                 int face) const;
+
   std::shared_ptr<const QuadricTables> tables_;
   Imath::Box3d bounds_;
 };

@@ -6,8 +6,8 @@ namespace render {
 
 Hit QuadricPart::hitOf(const Camera::Ray& ray, double distance, const Imath::V3d& normal,
                        const Imath::C3f& colour, std::size_t solid) const {
-  return opaqueHit(ray.origin + ray.direction * distance, distance, normal,
-                   caster.bounds().size().length(), colour, id, solid);
+  return exactHit(ray.origin + ray.direction * distance, distance, normal,
+                  caster.bounds().size().length(), colour, id, solid);
 }
 
 QuadricPart makeQuadricPart(std::vector<Ball> balls, std::vector<Stick> sticks,

@@ -15,6 +15,7 @@ struct NearestQuadric {
   static constexpr std::uint32_t kNoSlot = 0xffffffffU;
   double t = QuadricKernel::kNoRoot;
   std::uint32_t slot = kNoSlot;
+  int face = QuadricKernel::kSide;
 };
 
 /// True if the processor has vectors of eight floats.

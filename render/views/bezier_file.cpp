@@ -79,8 +79,9 @@ TrimLoop trimLoop(const ShapeJson& json) {
 }
 
 /// Cuts the patches of an entry by its "trims".
+/// @param volume  the patches before them
 void addTrims(const ShapeJson& json, bool isSurface, const SplineVolume& spline,
-              std::vector<BezierPatch>& patches) {
+              const BezierVolume& volume, std::vector<BezierPatch>& patches) {
   if (!json.contains("trims")) {
     if (json.contains("domain")) kBezierDocument.refuse("has a \"domain\" without \"trims\"");
     return;
@@ -93,23 +94,18 @@ void addTrims(const ShapeJson& json, bool isSurface, const SplineVolume& spline,
     kBezierDocument.refuse("has \"trims\" that are not a list of loops");
   std::vector<TrimLoop> loops;
   for (const ShapeJson& loop : list) loops.push_back(trimLoop(loop));
-  const auto region = std::make_shared<const TrimRegion>(std::move(loops));
+  // The patches of a spline surface that was written share their loops.
+  const PatchTrim* const last = volume.patches.empty() ? nullptr : volume.patches.back().trim.get();
+  const auto region = last && last->region->loops() == loops
+                          ? last->region
+                          : std::make_shared<const TrimRegion>(std::move(loops));
   std::vector<double> domain{0, 0, 1, 1};
   if (json.contains("domain")) {
     domain = kBezierDocument.numbers(json.at("domain"), "domain");
     if (domain.size() != 4 || !(domain[0] < domain[2]) || !(domain[1] < domain[3]))
       kBezierDocument.refuse("has a \"domain\" that is not [u0, v0, u1, v1] with u0 < u1, v0 < v1");
   }
-  const auto placed = [&](const Imath::V2d& p) {
-    return Imath::V2d(domain[0] * (1 - p.x) + domain[2] * p.x,
-                      domain[1] * (1 - p.y) + domain[3] * p.y);
-  };
-  trimPatches(spline, region, patches);
-  for (BezierPatch& patch : patches) {
-    const Imath::Box2d box = patch.trim->box;
-    patch.trim =
-        std::make_shared<const PatchTrim>(PatchTrim{region, {placed(box.min), placed(box.max)}});
-  }
+  trimPatches(spline, region, patches, {{domain[0], domain[1]}, {domain[2], domain[3]}});
 }
 
 ShapeJson trimsJson(const TrimRegion& region) {
@@ -207,7 +203,7 @@ void addPatches(const ShapeJson& json, std::size_t attributes, std::size_t maxMe
                                     std::move(spline.points),
                                     std::move(spline.attributes),
                                     std::move(spline.weights)}};
-    addTrims(json, isSurface, spline, patch);
+    addTrims(json, isSurface, spline, volume, patch);
     volume.patches.push_back(std::move(patch[0]));
     return;
   }
@@ -216,7 +212,7 @@ void addPatches(const ShapeJson& json, std::size_t attributes, std::size_t maxMe
     converted *= (degree[axis] + 1.0) * (1.0 * count[axis] - degree[axis]);
   levelset::requireMemory(2 * sizeof(double) * converted, levelset::memoryLeft(maxMemory));
   std::vector<BezierPatch> patches = bezierPatches(spline);
-  addTrims(json, isSurface, spline, patches);
+  addTrims(json, isSurface, spline, volume, patches);
   for (BezierPatch& patch : patches) volume.patches.push_back(std::move(patch));
 }
 
@@ -235,7 +231,8 @@ BezierVolume volumeOfText(const std::string& text, std::size_t maxMemory) {
           fmt::format("has \"attributes\" that are not a list of 1 to {} names", kMostAttributes));
     names.clear();
     for (const ShapeJson& name : list) {
-      if (!name.is_string()) kBezierDocument.refuse("has a name in \"attributes\" that is no text");
+      if (!name.is_string())
+        kBezierDocument.refuse("has a name in \"attributes\" that is not a text");
       names.push_back(name.get<std::string>());
     }
   }
@@ -247,7 +244,7 @@ BezierVolume volumeOfText(const std::string& text, std::size_t maxMemory) {
   const ShapeJson& patches = kBezierDocument.member(json, "patches");
   if (!patches.is_array()) kBezierDocument.refuse("has \"patches\" that are not a list");
   for (std::size_t n = 0; n < patches.size(); ++n)
-    levelset::withContext(fmt::format("entry {} of \"patches\"", n),
+    levelset::withContext(fmt::format("entry {} of \"patches\"", n + 1),
                           [&] { addPatches(patches[n], names.size(), maxMemory, volume); });
   requireBezierVolume(volume);
   return volume;

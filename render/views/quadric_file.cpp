@@ -63,6 +63,17 @@ QuadricKind kindNamed(const std::string& name) {
       fmt::format("has the unknown kind \"{}\"; the kinds are {}", name, known));
 }
 
+/// Checks a primitive and appends it. @param noun  for messages
+template <typename Primitive>
+void append(std::vector<Primitive>& list, const Primitive& primitive, const char* noun) {
+  try {
+    requireQuadric(primitive);
+  } catch (const levelset::InvalidInput& error) {
+    throw levelset::InvalidInput(fmt::format("{} {}", noun, error.what()));
+  }
+  list.push_back(primitive);
+}
+
 void addQuadric(const ShapeJson& json, QuadricModel& model) {
   const ShapeJson& kind = kQuadricDocument.member(json, "kind");
   if (!kind.is_string()) kQuadricDocument.refuse("has a \"kind\" that is not a text");
@@ -70,13 +81,16 @@ void addQuadric(const ShapeJson& json, QuadricModel& model) {
   const Imath::C3f colour = readQuadricColour(json);
   if (name == "sphere") {
     kQuadricDocument.requireKnown(json, {"kind", "centre", "radius", "colour"}, "a sphere");
-    model.balls.push_back({vectorMember(json, "centre"), radiusMember(json), packedColour(colour)});
+    append(model.balls,
+           Ball{vectorMember(json, "centre"), radiusMember(json), packedColour(colour)},
+           "a sphere");
     return;
   }
   if (name == "cylinder" && json.contains("ends")) {
     kQuadricDocument.requireKnown(json, {"kind", "ends", "radius", "colour"}, "a cylinder");
     const std::vector<V3d> ends = vectorsMember(json, "ends", 2);
-    model.sticks.push_back({ends[0], ends[1], radiusMember(json), packedColour(colour)});
+    append(model.sticks, Stick{ends[0], ends[1], radiusMember(json), packedColour(colour)},
+           "a cylinder");
     return;
   }
   Quadric quadric;
@@ -101,7 +115,7 @@ void addQuadric(const ShapeJson& json, QuadricModel& model) {
       kQuadricDocument.refuse("has a \"capped\" that is neither true nor false");
     quadric.isCapped = json.at("capped").get<bool>();
   }
-  model.quadrics.push_back(quadric);
+  append(model.quadrics, quadric, "a quadric");
 }
 
 QuadricModel modelOfText(const std::string& text) {
@@ -111,15 +125,10 @@ QuadricModel modelOfText(const std::string& text) {
   if (!list.is_array()) kQuadricDocument.refuse("has \"quadrics\" that are not a list");
   QuadricModel model;
   for (std::size_t n = 0; n < list.size(); ++n)
-    levelset::withContext(fmt::format("entry {} of \"quadrics\"", n + 1), [&] {
-      QuadricModel one;
-      addQuadric(list[n], one);
-      requireQuadrics(one, false);
-      model.balls.insert(model.balls.end(), one.balls.begin(), one.balls.end());
-      model.sticks.insert(model.sticks.end(), one.sticks.begin(), one.sticks.end());
-      model.quadrics.insert(model.quadrics.end(), one.quadrics.begin(), one.quadrics.end());
-    });
-  requireQuadrics(model);
+    levelset::withContext(fmt::format("entry {} of \"quadrics\"", n + 1),
+                          [&] { addQuadric(list[n], model); });
+  if (model.size() == 0)
+    kQuadricDocument.refuse("has no quadric; list at least one in \"quadrics\"");
   return model;
 }
 

@@ -554,7 +554,9 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
   if (!std::all_of(std::begin(lists), std::end(lists),
                    [](const Json* l) { return l->is_array(); }) ||
       std::all_of(std::begin(lists), std::end(lists), [](const Json* l) { return l->empty(); }))
-    reader.refuse(whole, "has no solids, no meshes and no volumes");
+    reader.refuse(whole,
+                  "has no parts; list one in \"solids\", \"meshes\", \"volumes\", \"beziers\" or "
+                  "\"quadrics\"");
   if (volumes.size() > 1) reader.refuse(whole, "has several \"volumes\", but a scene can have one");
   Parts parts(options.progress, solids.size() + meshes.size() + volumes.size());
   // The memory limit applies to the sum of all parts, so it shrinks with each one that is read.
@@ -587,7 +589,7 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
       !std::all_of(scene.meshes.begin(), scene.meshes.end(), isNew) ||
       !std::all_of(scene.beziers.begin(), scene.beziers.end(), isNew) ||
       !std::all_of(scene.quadrics.begin(), scene.quadrics.end(), isNew))
-    reader.refuse(whole, "gives the same \"id\" to two solids or meshes");
+    reader.refuse(whole, "gives the same \"id\" to two parts; give each part its own");
   if (json.contains("csg"))
     scene.csg = CsgExpression(reader.text(json, "csg", whole), solidNames(scene));
   if (json.contains("soft")) scene.softness = reader.number(json, "soft", whole);

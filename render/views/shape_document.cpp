@@ -58,19 +58,7 @@ ShapeJson ShapeDocument::parsed(const std::string& text) const {
 }
 
 bool ShapeDocument::isIn(const std::filesystem::path& file) const {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(file, error)) return false;
-  std::ifstream stream(file, std::ios::binary);
-  bool isFormat = false, result = false;
-  const auto visit = [&](int depth, ShapeJson::parse_event_t event, ShapeJson& parsed) {
-    if (depth == 1 && event == ShapeJson::parse_event_t::key)
-      isFormat = parsed == "format";
-    else if (depth == 1 && event == ShapeJson::parse_event_t::value && isFormat)
-      result = parsed == format;
-    return depth < 2;  // keeps no nested list
-  };
-  std::ignore = ShapeJson::parse(stream, visit, /*allow_exceptions=*/false);
-  return result;
+  return levelset::jsonFormat(file) == format;
 }
 
 void writeShapeJson(const std::filesystem::path& file, const ShapeJson& json) {

@@ -74,11 +74,11 @@ std::optional<std::string> CacheKeys::contentOf(const std::filesystem::path& fil
   if (!stamp || extension == ".json") return {};
   std::string about = stampText(*stamp);
   const auto grid = node.options.find("grid");
-  const bool isGrid =
-      extension == ".vdb" && (grid != node.options.end() || !levelset::holdsSegmented(file));
-  if (isGrid && grid != node.options.end()) about += " " + grid->second;
+  const bool isNamed = extension == ".vdb" && grid != node.options.end();
+  if (isNamed) about += " " + grid->second;
   const std::string name = digestOf(about);
   if (auto known = cache_.memo(name)) return known;
+  const bool isGrid = isNamed || (extension == ".vdb" && !levelset::holdsSegmented(file));
   std::optional<std::string> content;
   if (isGrid) {
     // Two OpenVDB files of the same grid can differ in their bytes, so the content of the grid is

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -70,6 +71,16 @@ class Invocation {
   // neither a value nor a default is a programming error.
   [[nodiscard]] bool given(const std::string& name) const { return options_.contains(name); }
   [[nodiscard]] bool flag(const std::string& name) const { return given(name); }
+  /// Sets an option that is not given, as a preset does. given() is true for it then.
+  void assume(const std::string& name, const std::string& value) {
+    if (options_.emplace(name, value).second) assumed_.insert(name);
+  }
+  /// Returns true for an option that assume() has set.
+  [[nodiscard]] bool isAssumed(const std::string& name) const { return assumed_.contains(name); }
+  /// Removes an option that assume() has set; keeps a given one.
+  void dropAssumed(const std::string& name) {
+    if (assumed_.erase(name) > 0) options_.erase(name);
+  }
   [[nodiscard]] std::string text(const std::string& name) const;
   [[nodiscard]] double number(const std::string& name) const;
   [[nodiscard]] long integer(const std::string& name) const;
@@ -144,6 +155,7 @@ class Invocation {
 
   const Operator* op_;
   std::map<std::string, std::string> options_;
+  std::set<std::string> assumed_;
   std::optional<double> referenceVoxel_, referenceDiagonal_;
 };
 

@@ -6,17 +6,6 @@
 namespace levelset {
 namespace {
 
-/// Binomial coefficients of one row of Pascal's triangle. Rounded above 2^53.
-std::vector<double> binomials(int degree) {
-  std::vector<double> row{1};
-  for (int n = 1; n <= degree; ++n) {
-    row.push_back(1);
-    for (int i = n - 1; i > 0; --i)
-      row[static_cast<std::size_t>(i)] += row[static_cast<std::size_t>(i - 1)];
-  }
-  return row;
-}
-
 /// Multiplies each coefficient by the product of its three binomials, or divides by it.
 void scaleByBinomials(TensorBernstein& form, bool divides) {
   const std::vector<double> x = binomials(form.degree[0]), y = binomials(form.degree[1]),
@@ -54,6 +43,16 @@ struct CoefficientRows {
 };
 
 }  // namespace
+
+std::vector<double> binomials(int degree) {
+  std::vector<double> row{1};
+  for (int n = 1; n <= degree; ++n) {
+    row.push_back(1);
+    for (int i = n - 1; i > 0; --i)
+      row[static_cast<std::size_t>(i)] += row[static_cast<std::size_t>(i - 1)];
+  }
+  return row;
+}
 
 TensorBernstein::TensorBernstein(const std::array<int, 3>& degrees)
     : degree(degrees),
@@ -147,6 +146,11 @@ TensorBernstein difference2x2(const TensorBernstein& a, const TensorBernstein& b
   TensorBernstein result = product(a, b);
   addTo(result, product(c, d), -1);
   return result;
+}
+
+double determinantCost(const std::array<int, 3>& degree) {
+  const std::array<int, 3> twice = {2 * degree[0], 2 * degree[1], 2 * degree[2]};
+  return 6 * productCost(degree, degree) + 3 * productCost(degree, twice);
 }
 
 TensorBernstein determinantOf(const TensorVector& a, const TensorVector& b, const TensorVector& c) {

@@ -43,6 +43,9 @@ struct CoefficientRange {
 /// Differentiates by one parameter. The derivative of a constant is zero, of degree 0.
 [[nodiscard]] TensorBernstein derivative(const TensorBernstein& form, int axis);
 
+/// Binomial coefficients of one row of Pascal's triangle. Rounded above 2^53.
+[[nodiscard]] std::vector<double> binomials(int degree);
+
 /// Adds `factor` × `other`, which has the same degrees, to `form`.
 void addTo(TensorBernstein& form, const TensorBernstein& other, double factor);
 
@@ -62,6 +65,9 @@ using TensorVector = std::array<TensorBernstein, 3>;
 /// Determinant of three columns. The components of each have the same degrees.
 [[nodiscard]] TensorBernstein determinantOf(const TensorVector& a, const TensorVector& b,
                                             const TensorVector& c);
+
+/// Number of multiplications of the determinant of the derivatives of a map with these degrees.
+[[nodiscard]] double determinantCost(const std::array<int, 3>& degree);
 
 /// Derivatives of a map by its three parameters, each with three components.
 using TensorPartials = std::array<TensorVector, 3>;

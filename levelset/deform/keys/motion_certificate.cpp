@@ -33,13 +33,6 @@ struct MotionBracket {
   double time = 0;
 };
 
-std::vector<double> binomials(std::size_t n) {
-  std::vector<double> row{1};
-  for (std::size_t k = 1; k <= n; ++k)
-    row.push_back(row.back() * static_cast<double>(n + 1 - k) / static_cast<double>(k));
-  return row;
-}
-
 class MotionBounds {
  public:
   explicit MotionBounds(const std::vector<ControlLattice>& control) {
@@ -47,11 +40,9 @@ class MotionBounds {
     const LatticeData& data = control.front().data();
     volume_ = boxVolume(data);
     const std::array<int, 3> degree = {data.axes[0].degree, data.axes[1].degree,
-                                       data.axes[2].degree},
-                             twice = {2 * degree[0], 2 * degree[1], 2 * degree[2]};
+                                       data.axes[2].degree};
     const auto count = static_cast<double>(control.size());
-    products_ = static_cast<double>(size()) * count * count * count *
-                (6 * productCost(degree, degree) + 3 * productCost(degree, twice));
+    products_ = static_cast<double>(size()) * count * count * count * determinantCost(degree);
     rounding_ = 16 * (degree[0] + degree[1] + degree[2]) * std::numeric_limits<double>::epsilon();
   }
 
@@ -73,7 +64,8 @@ class MotionBounds {
         for (const TensorBernstein& form : partials.back()[axis])
           largest[axis] = std::max(largest[axis], largestCoefficient(form));
     }
-    const std::vector<double> one = binomials(degree), three = binomials(3 * degree);
+    const auto row = static_cast<int>(degree);
+    const std::vector<double> one = binomials(row), three = binomials(3 * row);
     part.coefficients.resize(3 * degree + 1);
     for (std::size_t a = 0; a <= degree; ++a)
       for (std::size_t b = 0; b <= degree; ++b)
@@ -199,9 +191,7 @@ MotionCertificate certifyMotion(const std::vector<ControlLattice>& control,
   certificate.leastHigh = best.high;
   certificate.place = lattice.worldOf(best.place);
   certificate.time = best.time;
-  certificate.verdict = best.high <= 0             ? FoldVerdict::Folds
-                        : certificate.leastLow > 0 ? FoldVerdict::Certified
-                                                   : FoldVerdict::Undecided;
+  certificate.verdict = verdictOf(certificate.leastLow, best.high);
   report(options.progress, 1);
   return certificate;
 }

@@ -24,16 +24,18 @@ using openvdb::Vec3STree;
 class SegmentedGridMaker {
  public:
   explicit SegmentedGridMaker(const SegmentedData& data) : data_(data) {
-    add([this] { return labels(); });
+    makers_.emplace_back([this] { return labels(); });
     for (std::size_t rank = 0; rank <= mostExtras(); ++rank) {
-      add([this, rank] { return distances(rank); });
-      add([this, rank] { return neighbours(rank); });
+      makers_.emplace_back([this, rank] { return distances(rank); });
+      makers_.emplace_back([this, rank] { return neighbours(rank); });
     }
     if (!data_.sheets) return;
     for (std::uint32_t slot = 0; slot < segmented_file::kEdgeSlots; ++slot)
-      if (hasSlot(data_.sheets->edges, slot)) add([this, slot] { return edges(slot); });
+      if (hasSlot(data_.sheets->edges, slot))
+        makers_.emplace_back([this, slot] { return edges(slot); });
     for (std::uint32_t slot = 0; slot < kuhn::kSlots; ++slot)
-      if (hasSlot(data_.sheets->pointKeys, slot)) add([this, slot] { return points(slot); });
+      if (hasSlot(data_.sheets->pointKeys, slot))
+        makers_.emplace_back([this, slot] { return points(slot); });
   }
 
   [[nodiscard]] std::int32_t count() const { return static_cast<std::int32_t>(makers_.size()); }
@@ -46,11 +48,6 @@ class SegmentedGridMaker {
   }
 
  private:
-  template <typename Maker>
-  void add(Maker maker) {
-    makers_.push_back(maker);
-  }
-
   static bool hasSlot(const std::vector<std::uint16_t>& keys, std::uint32_t slot) {
     return std::any_of(keys.begin(), keys.end(),
                        [&](std::uint16_t key) { return key % SheetData::kSlots == slot; });

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "levelset/deform/bernstein/tensor_bernstein.h"
 #include "levelset/error.h"
 #include "levelset/geometry/exact_predicates.h"
 
@@ -56,11 +57,8 @@ std::vector<V3d> halve(std::vector<V3d>& controls) {
 bool isMonotone(const std::vector<V3d>& controls) {
   const std::size_t d = controls.size() - 1;
   // v = N / W, and v' W² = N' W − N W', of degree 2 d − 1 as products of Bernstein polynomials.
-  std::vector<double> choose(d + 1, 1), chooseLess(d, 1);
-  for (std::size_t n = 1; n <= d; ++n)
-    choose[n] = choose[n - 1] * static_cast<double>(d + 1 - n) / static_cast<double>(n);
-  for (std::size_t n = 1; n < d; ++n)
-    chooseLess[n] = chooseLess[n - 1] * static_cast<double>(d - n) / static_cast<double>(n);
+  const std::vector<double> choose = levelset::binomials(static_cast<int>(d)),
+                            chooseLess = levelset::binomials(static_cast<int>(d) - 1);
   std::vector<double> sums(2 * d, 0.0);
   for (std::size_t i = 0; i < d; ++i)
     for (std::size_t j = 0; j <= d; ++j)

@@ -314,10 +314,11 @@ std::vector<QuadricHit> GpuQuadrics::firstHits(const QuadricCaster& caster,
   numbers.reserve(rays.size() * kQuadricNumbers);
   for (const Camera::Ray& ray : rays) {
     const QuadricKernel::QuadricRay from = relativeRay(tables, ray);
-    const double start = startAt(tables, from).value_or(ray.near);
-    numbers.insert(numbers.end(),
-                   {from.x, from.y, from.z, from.dx, from.dy, from.dz, from.near, ray.far, start, 0,
-                    QuadricKernel::kNoRoot, static_cast<double>(INT32_MAX)});
+    const std::optional<double> start = startAt(tables, from);
+    const int box = start ? 0 : INT32_MAX;  // a ray that misses the sphere of all boxes has ended
+    numbers.insert(numbers.end(), {from.x, from.y, from.z, from.dx, from.dy, from.dz, from.near,
+                                   ray.far, start.value_or(ray.near), static_cast<double>(box),
+                                   QuadricKernel::kNoRoot, static_cast<double>(INT32_MAX)});
   }
   context_.run([&] { run(uploadedOf(caster.tables()), numbers); });
   std::vector<QuadricHit> hits(rays.size());

@@ -318,7 +318,8 @@ Json motionJson(Invocation& in, const std::vector<ControlLattice>& keys,
     else if (found.verdict == levelset::FoldVerdict::Undecided)
       in.notes.warnings.push_back(fmt::format(
           "animate: there is no proof for the motion between frames {} and {}; it may fold there. "
-          "Each frame is proven. Use lattices without weights or of a lower degree for a proof.",
+          "Each frame is proven. Use lattices without weights or of a lower degree, or add a key "
+          "between them, for a proof.",
           times[k], times[k + 1]));
   }
   return list;

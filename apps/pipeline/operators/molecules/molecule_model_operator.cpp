@@ -15,20 +15,11 @@
 namespace pipeline {
 namespace {
 
-using levelset::MoleculeModelOptions;
 using levelset::MoleculeStyle;
 using levelset::UsageError;
 
 MoleculeStyle modelStyleOf(const Invocation& in) {
   return moleculeStyleNamed(in.text("style"));
-}
-
-MoleculeModelOptions modelOptionsOf(Invocation& in) {
-  return {.style = modelStyleOf(in),
-          .ballScale = in.number("ball-scale"),
-          .stickRadius = in.length("stick-radius"),
-          .bonds = {.isByDistance = !in.flag("file-bonds")},
-          .maxMemory = in.maxMemory};
 }
 
 /// Bounds of the solid, Å, or larger ones. Those of a molecule have its van der Waals balls, of 1.2
@@ -60,7 +51,7 @@ double modelVoxelOf(Invocation& in) {
 Value runMoleculeModel(Invocation& in) {
   const levelset::Molecule& molecule = in.operands[0].molecule();
   const levelset::MoleculeSolidResult result = levelset::moleculeSolid(
-      molecule, modelVoxelOf(in), modelOptionsOf(in),
+      molecule, modelVoxelOf(in), moleculeModelOptions(in, "style"),
       {.halfWidth = in.number("half-width"), .maxMemory = in.maxMemory, .progress = in.progress});
   Json details{{"balls", result.balls}, {"bonds", result.bonds}};
   if (!levelset::hasMoleculeSticks(modelStyleOf(in))) details["volume"] = result.volume;
@@ -87,23 +78,15 @@ std::optional<Cost> costOfMoleculeModel(Invocation& in) {
   return Cost{2e-4 * atoms + 2e-6 * samples, 20'000 * atoms + 20 * samples};
 }
 
-void validateMoleculeModel(const Invocation& in) {
+void validateMoleculeSolid(const Invocation& in) {
   requireVoxelSize(in);
-  const MoleculeStyle style = modelStyleOf(in);
-  const auto refuse = [&](const char* option, bool isUsed) {
-    if (in.given(option) && !isUsed)
-      throw UsageError(
-          fmt::format("molecule-model: --{} does not apply to --style {}; leave it out", option,
-                      in.text("style")));
-  };
-  refuse("ball-scale", style == MoleculeStyle::Balls || style == MoleculeStyle::BallAndStick);
-  refuse("stick-radius", levelset::hasMoleculeSticks(style));
+  validateMoleculeModel(in, "style");
 }
 
 }  // namespace
 
 Operator moleculeModelOperator() {
-  return {
+  Operator op = {
       .name = "molecule-model",
       .group = "Molecules",
       .summary = "turn a molecule into a solid of balls and sticks",
@@ -121,22 +104,6 @@ Operator moleculeModelOperator() {
                   .doc = "parts of the solid",
                   .fallback = "ball-and-stick",
                   .choices = moleculeStyleNames()},
-                 {.name = "ball-scale",
-                  .type = ParamType::Number,
-                  .doc =
-                      "radius of small balls, as a share of the van der Waals radius, at most 1; "
-                      "no ball is thinner than a stick",
-                  .fallback = "0.25",
-                  .range = Range::Positive},
-                 {.name = "stick-radius",
-                  .type = ParamType::Length,
-                  .doc = "radius of the sticks",
-                  .fallback = "0.15",
-                  .range = Range::Positive,
-                  .allowsVoxels = false},
-                 {.name = "file-bonds",
-                  .type = ParamType::Flag,
-                  .doc = "take only the bonds that the file gives"},
                  voxelParam(),
                  resolutionParam(),
                  halfWidthParam()},
@@ -145,8 +112,11 @@ Operator moleculeModelOperator() {
       .run = runMoleculeModel,
       .plan = planMoleculeModel,
       .cost = costOfMoleculeModel,
-      .validate = validateMoleculeModel,
+      .validate = validateMoleculeSolid,
   };
+  const std::vector<Param> sizes = moleculeModelParams();
+  op.params.insert(std::next(op.params.begin()), sizes.begin(), sizes.end());
+  return op;
 }
 
 }  // namespace pipeline

@@ -56,31 +56,88 @@ MoleculeStyle moleculeStyleNamed(const std::string& name) {
   return choiceNamed(kMoleculeStyles, name);
 }
 
+std::vector<Param> moleculeModelParams(const std::string& of) {
+  return {
+      {.name = "ball-scale",
+       .type = ParamType::Number,
+       .doc = of + "radius of small balls, as a share of the van der Waals radius, at most 1; no "
+                   "ball is thinner than a stick",
+       .fallback = "0.25",
+       .range = Range::Positive},
+      {.name = "stick-radius",
+       .type = ParamType::Length,
+       .doc = of + "radius of the sticks",
+       .fallback = "0.15",
+       .range = Range::Positive,
+       .allowsVoxels = false},
+      {.name = "file-bonds",
+       .type = ParamType::Flag,
+       .doc = of + "use only the bonds of the file"}};
+}
+
+void validateMoleculeModel(const Invocation& in, const std::string& style) {
+  const MoleculeStyle of = moleculeStyleNamed(in.text(style));
+  const auto refuse = [&](const char* option, bool isUsed) {
+    if (in.given(option) && !isUsed)
+      throw UsageError(fmt::format("{}: --{} does not apply to --{} {}; leave it out", in.op().name,
+                                   option, style, in.text(style)));
+  };
+  refuse("ball-scale", of == MoleculeStyle::Balls || of == MoleculeStyle::BallAndStick);
+  refuse("stick-radius", levelset::hasMoleculeSticks(of));
+  refuse("file-bonds", levelset::hasMoleculeSticks(of));
+}
+
+levelset::MoleculeModelOptions moleculeModelOptions(Invocation& in, const std::string& style) {
+  return {.style = moleculeStyleNamed(in.text(style)),
+          .ballScale = in.number("ball-scale"),
+          .stickRadius = in.length("stick-radius"),
+          .bonds = {.isByDistance = !in.flag("file-bonds")},
+          .maxMemory = in.maxMemory};
+}
+
 std::vector<Param> moleculePictureParams() {
-  return {{.name = "atoms",
-           .type = ParamType::Choice,
-           .doc = "for a molecule: how atoms and bonds are drawn; see 'molecule-model'",
-           .fallback = "ball-and-stick",
-           .choices = moleculeStyleNames()},
-          {.name = "colour-by",
-           .type = ParamType::Choice,
-           .doc = "for a molecule: property of the atoms that gives the colours",
-           .fallback = "element",
-           .choices = namesOfChoices(kMoleculeColours)}};
+  std::vector<Param> params = {
+      {.name = "atoms",
+       .type = ParamType::Choice,
+       .doc = "for a molecule: how atoms and bonds are drawn; see 'molecule-model'",
+       .fallback = "ball-and-stick",
+       .choices = moleculeStyleNames()},
+      {.name = "colour-by",
+       .type = ParamType::Choice,
+       .doc = "for a molecule: property of the atoms that gives the colours",
+       .fallback = "element",
+       .choices = namesOfChoices(kMoleculeColours)},
+      {.name = "blue-at",
+       .type = ParamType::Number,
+       .doc = "with --colour-by b-factor: temperature factor that is blue; default: the least one"},
+      {.name = "red-at",
+       .type = ParamType::Number,
+       .doc = "with --colour-by b-factor: temperature factor that is red; default: the largest "
+              "one"}};
+  for (Param& param : moleculeModelParams("for a molecule: ")) params.push_back(std::move(param));
+  return params;
 }
 
 void validateMoleculePicture(const Invocation& in) {
-  if (in.operands.empty() || in.operands[0].kind() == Kind::Molecule) return;
-  for (const char* name : {"atoms", "colour-by"})
-    if (in.given(name))
-      throw UsageError(fmt::format("render: --{} is for molecules; leave it out", name));
+  if (in.operands.empty()) return;
+  const bool isMolecule = in.operands[0].kind() == Kind::Molecule;
+  for (const Param& param : moleculePictureParams())
+    if (in.given(param.name) && !isMolecule)
+      throw UsageError(fmt::format("render: --{} is for molecules; leave it out", param.name));
+  if (!isMolecule) return;
+  validateMoleculeModel(in, "atoms");
+  for (const char* end : {"blue-at", "red-at"})
+    if (in.given(end) && in.text("colour-by") != "b-factor")
+      throw UsageError(fmt::format("render: --{} is for --colour-by b-factor; leave it out", end));
+  if (in.given("blue-at") != in.given("red-at"))
+    throw UsageError("render: one end of the colour scale is missing; give --blue-at and --red-at");
 }
 
 render::ViewedScene moleculeScene(Invocation& in) {
-  const levelset::MoleculeModel model = levelset::moleculeModel(
-      in.operands[0].molecule(), {.style = moleculeStyleNamed(in.text("atoms")),
-                                  .colour = choiceNamed(kMoleculeColours, in.text("colour-by")),
-                                  .maxMemory = in.maxMemory});
+  levelset::MoleculeModelOptions options = moleculeModelOptions(in, "atoms");
+  options.colour = choiceNamed(kMoleculeColours, in.text("colour-by"));
+  if (in.given("blue-at")) options.bFactors = {in.number("blue-at"), in.number("red-at")};
+  const levelset::MoleculeModel model = levelset::moleculeModel(in.operands[0].molecule(), options);
   std::vector<render::Ball> balls;
   balls.reserve(model.balls.size());
   for (const levelset::ModelBall& ball : model.balls)

@@ -15,7 +15,16 @@ namespace pipeline {
 /// @param name  one of moleculeStyleNames()
 [[nodiscard]] levelset::MoleculeStyle moleculeStyleNamed(const std::string& name);
 
-/// Options --atoms and --colour-by of `render`.
+/// Options --ball-scale, --stick-radius and --file-bonds. @param of  begins the help texts
+[[nodiscard]] std::vector<Param> moleculeModelParams(const std::string& of = "");
+/// Refuses these options where the style has no such parts. @param style  option with the style
+/// @throws UsageError
+void validateMoleculeModel(const Invocation& in, const std::string& style);
+/// Style and sizes of a model. @param style  option with the style
+[[nodiscard]] levelset::MoleculeModelOptions moleculeModelOptions(Invocation& in,
+                                                                  const std::string& style);
+
+/// Options --atoms, --colour-by, --blue-at, --red-at and moleculeModelParams() of `render`.
 [[nodiscard]] std::vector<Param> moleculePictureParams();
 /// Refuses these options with other operands than a molecule.
 /// @throws UsageError

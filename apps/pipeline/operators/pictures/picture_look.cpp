@@ -2,8 +2,7 @@
 
 #include <fmt/core.h>
 
-#include <array>
-#include <cmath>
+#include <algorithm>
 #include <utility>
 
 #include "apps/pipeline/operators/option_params.h"
@@ -14,8 +13,6 @@ namespace pipeline {
 namespace {
 
 using levelset::UsageError;
-
-constexpr long kMostReduction = 16;
 
 struct Preset {
   const char* name;
@@ -72,56 +69,13 @@ const std::vector<Preset>& presets() {
   return all;
 }
 
-/// True for options of a preset that fit its style only.
-bool isOfStyle(const std::string& option) {
-  return option == "ground";
-}
-
-/// Value of an option that a preset sets; null: it sets none.
-const char* presetValue(const std::string& preset, const std::string& wanted) {
-  for (const Preset& each : presets())
-    for (const auto& [option, value] : each.options)
-      if (preset == each.name && wanted == option) return value;
-  return nullptr;
-}
-
-/// True if an option of an invocation with its preset has the value that the preset sets.
-bool isOfPreset(const Invocation& in, const std::string& option) {
-  const char* value = in.given("preset") ? presetValue(in.text("preset"), option) : nullptr;
-  return value && in.text(option) == value;
-}
-
-std::map<std::string, std::string> optionsOf(const Invocation& in) {
-  std::map<std::string, std::string> options;
-  for (const Param& param : in.op().params)
-    if (in.given(param.name)) options[param.name] = in.text(param.name);
-  return options;
-}
-
-Invocation withOptions(const Invocation& in, std::map<std::string, std::string> options) {
-  Invocation all(in.op(), std::move(options));
-  all.operands = in.operands;
-  all.operandNames = in.operandNames;
-  all.named = in.named;
-  all.roi = in.roi;
-  all.planned = in.planned;
-  all.isPartial = in.isPartial;
-  all.progress = in.progress;
-  all.maxMemory = in.maxMemory;
-  all.dryRun = in.dryRun;
-  all.voxelFollows = in.voxelFollows;
-  all.notes = in.notes;
-  return all;
-}
-
 /// Requires parts whose thickness is measured. @throws UsageError
 void requireThickness(const Invocation& in, const render::Scene& scene) {
   if (scene.quadrics.empty() && scene.beziers.empty() && scene.mapped.empty()) return;
-  const bool isPresets = in.given("preset") && presetValue(in.text("preset"), "xray");
-  throw UsageError(
-      isPresets ? "render: --xray (of --preset xray) needs level sets or meshes; use another "
-                  "preset"
-                : "render: --xray needs level sets or meshes; leave it out");
+  throw UsageError(fmt::format(
+      "render: --xray needs level sets or meshes, but the scene has quadrics, Bézier volumes or "
+      "mapped textures; {}",
+      in.isAssumed("xray") ? "use another --preset" : "leave it out"));
 }
 
 render::LookOptions lookOf(Invocation& in, OptionStage stage) {
@@ -153,7 +107,7 @@ void colourParts(const Invocation& in, render::Scene& scene) {
   for (render::BezierPart& part : scene.beziers) part.colour = colour;
   const bool isColoured = !scene.solids.empty() || !scene.meshes.empty() || !scene.beziers.empty();
   const bool hasOwnColours = !scene.quadrics.empty() || scene.segmented;
-  if (!isColoured && hasOwnColours && !isOfPreset(in, "colour"))
+  if (!isColoured && hasOwnColours && !in.isAssumed("colour"))
     throw UsageError("render: these parts have their own colours; leave --colour out");
 }
 
@@ -215,38 +169,26 @@ void addLookParams(std::vector<Param>& params) {
   params.insert(params.end(), look.begin(), look.end());
 }
 
-Invocation withPreset(const Invocation& in) {
-  if (!in.given("preset")) return in;
-  std::map<std::string, std::string> options = optionsOf(in);
+void assumePreset(Invocation& in) {
+  if (!in.given("preset")) return;
   const std::string name = in.text("preset");
-  for (const Preset& preset : presets()) {
-    if (name != preset.name) continue;
-    bool isOwnStyle = true;
-    for (const auto& [option, value] : preset.options)
-      if (std::string(option) == "style")
-        isOwnStyle = !in.given("style") || in.text("style") == value;
-    // A volume with a transfer function has no shadow on a ground.
-    const bool isGrounded = isOwnStyle && !in.given("transfer");
-    for (const auto& [option, value] : preset.options)
-      if (isGrounded || !isOfStyle(option)) options.emplace(option, value);
-  }
-  return withOptions(in, std::move(options));
+  const auto preset = std::find_if(presets().begin(), presets().end(),
+                                   [&](const Preset& each) { return name == each.name; });
+  for (const auto& [option, value] : preset->options) in.assume(option, value);
+  // Another style than that of the preset, its first option, may have no shadows.
+  if (in.text("style") != preset->options.front().second) in.dropAssumed("ground");
 }
 
 void validateLook(const Invocation& in) {
-  if (in.integer("reduce") > kMostReduction)
-    throw UsageError(fmt::format("render: --reduce {} is too large; give at most {}",
-                                 in.text("reduce"), kMostReduction));
   Invocation all = in;
   try {
+    render::validateReduction(in.integer("reduce"));
     render::validate(lookOf(all, OptionStage::Syntax), in.integerAs<int>("reduce"));
+    if (in.given("light-radius")) render::validateLightRadius(in.number("light-radius"));
   } catch (const UsageError& error) {
     throw UsageError(fmt::format("render: {}", error.what()));
   }
   if (in.given("colour")) (void)linearColour(in);
-  if (in.given("light-radius") && !(in.number("light-radius") < 85))
-    throw UsageError(fmt::format("render: --light-radius {} is too wide; give less than 85 degrees",
-                                 in.text("light-radius")));
 }
 
 bool hasLook(const Invocation& in) {
@@ -257,14 +199,9 @@ bool hasLook(const Invocation& in) {
 void applyLookTo(Invocation& in, render::Scene& scene) {
   if (in.given("xray")) requireThickness(in, scene);
   if (in.given("colour")) colourParts(in, scene);
-  if (scene.volumePart && in.given("ground") && isOfPreset(in, "ground")) {
-    std::map<std::string, std::string> options = optionsOf(in);
-    options.erase("ground");
-    in = withOptions(in, std::move(options));
-  }
+  if (scene.volumePart) in.dropAssumed("ground");  // a volume has no shadow on a ground
   if (in.given("light")) scene.key.direction = in.point("light");
-  if (in.given("light-radius"))
-    scene.key.softness = in.number("light-radius") * 3.14159265358979323846 / 180;
+  if (in.given("light-radius")) scene.key.softness = in.radians("light-radius");
   const int scale = in.integerAs<int>("reduce");
   if (scale == 1) return;
   const auto enlarged = [&](int edge) {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <map>
 #include <string>
 #include <vector>
 
@@ -16,8 +15,8 @@ namespace pipeline {
 /// --reduce, and the options of render::LookOptions.
 void addLookParams(std::vector<Param>& params);
 
-/// The invocation with the options that --preset sets and that are not given.
-[[nodiscard]] Invocation withPreset(const Invocation& in);
+/// Sets the options of --preset that are not given, see Invocation::assume().
+void assumePreset(Invocation& in);
 
 /// Checks the options of this file before the operand is known. @throws UsageError
 void validateLook(const Invocation& in);

@@ -60,7 +60,8 @@ render::Style styleNamed(const std::string& name) {
 constexpr long kMostSamples = 4096;
 
 void validateDraw(const Invocation& asked) {
-  const Invocation in = withPreset(asked);
+  Invocation in = asked;
+  assumePreset(in);
   validateCamera(in);
   validateLook(in);
   if (in.integer("samples") > kMostSamples)
@@ -192,7 +193,8 @@ void coarsen(Invocation& in, render::Scene& scene) {
       bits, most.largest, most.rms));
 }
 
-Value drawWithPreset(Invocation& in) {
+Value draw(Invocation& in) {
+  assumePreset(in);
   render::Scene scene = sceneOf(in);
   applyLookTo(in, scene);
   coarsen(in, scene);
@@ -252,7 +254,7 @@ Value drawWithPreset(Invocation& in) {
     if (in.given("png")) render::writeImage(in.text("png"), finished, "png");
   };
   if (hasLook(in))
-    write(finishLook(in, image));
+    write(finishLook(in, isBoth ? image : std::move(image)));
   else
     write(image);
   if (isBoth) {
@@ -278,24 +280,12 @@ Value drawWithPreset(Invocation& in) {
   return in.operands[0];
 }
 
-Value draw(Invocation& in) {
-  Invocation all = withPreset(in);
-  try {
-    Value drawn = drawWithPreset(all);
-    in.notes = std::move(all.notes);
-    return drawn;
-  } catch (...) {
-    in.notes = std::move(all.notes);
-    throw;
-  }
-}
-
 /// Returns the box of the solid that is inside the frame of the picture, if this part alone
 /// determines the picture; otherwise the complete solid. Shadows depend on parts outside the frame.
 /// The default view, the default range of curvatures and quantized values depend on the size of the
 /// complete solid.
-RegionOfInterest roiOfDraw(Invocation& asked, std::size_t, const RegionOfInterest&) {
-  Invocation in = withPreset(asked);
+RegionOfInterest roiOfDraw(Invocation& in, std::size_t, const RegionOfInterest&) {
+  assumePreset(in);
   if (hasLook(in) || in.flag("light-layers")) return {};
   const render::Style style = styleNamed(in.text("style"));
   const bool isFramed = in.operands[0].kind() == Kind::Band && in.given("from") && in.given("to") &&

@@ -113,7 +113,7 @@ void validateVolumePicture(const Invocation& in) {
           fmt::format("render: --{} concerns the isosurface, and --transfer alone draws none; "
                       "leave --{} out, or give --isovalue",
                       name, name));
-  if (in.given("transfer") && in.flag("ground"))
+  if (in.given("transfer") && in.flag("ground") && !in.isAssumed("ground"))
     throw UsageError("render: a volume with a transfer function has no shadow; leave --ground out");
 }
 

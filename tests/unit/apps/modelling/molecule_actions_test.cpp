@@ -62,6 +62,15 @@ TEST_F(MoleculeActions, RenderDrawsAtomsAndBonds) {
   };
   EXPECT_NE(draw("element.png", "element"), draw("factor.png", "b-factor"));
   EXPECT_EQ(draw("chain.png", "chain"), draw("again.png", "chain"));
+  EXPECT_NE(draw("factor.png", "b-factor"), draw("wide.png", "b-factor --blue-at 0 --red-at 100"));
+  EXPECT_NE(draw("element.png", "element"), draw("thick.png", "element --stick-radius 0.3"));
+  expectRefusal("read co.pdb ! render a.png --blue-at 0", 2, "--colour-by b-factor");
+  expectRefusal("read co.pdb ! render a.png --colour-by b-factor --red-at 5", 2,
+                "give --blue-at and --red-at");
+  expectRefusal("read co.pdb ! render a.png --atoms van-der-waals --ball-scale 0.5", 2,
+                "does not apply to --atoms van-der-waals");
+  expectRefusal("sphere --radius 1 --voxel 0.2 ! render a.png --stick-radius 1", 2,
+                "--stick-radius is for molecules");
   expectRefusal("sphere --radius 1 --voxel 0.2 ! render a.png --atoms balls", 2,
                 "--atoms is for molecules");
 }

@@ -129,7 +129,7 @@ TEST_F(EffectAction, PartsWithTheirOwnColoursAreNotColoured) {
             "END\n");
   const std::string atoms = "read co.pdb ! render x.png --size 32x24 --samples 1 ";
   expectRefusal(atoms + "--colour 1,0,0", 2, "leave --colour out");
-  expectRefusal(atoms + "--preset xray", 2, "--xray (of --preset xray) needs level sets or meshes");
+  expectRefusal(atoms + "--preset xray", 2, "use another --preset");
   expectRefusal(atoms + "--xray 1", 2, "leave it out");
   const support::Outcome drawn = levelsmith(atoms + "--preset molecule");
   EXPECT_EQ(drawn.code, 0) << drawn.err;

@@ -277,10 +277,6 @@ TEST(Bonds, OfACifFileAreReadBeforeAndAfterTheAtoms) {
 }
 
 TEST(Bonds, Refuse) {
-  EXPECT_SAYS(refusal<levelset::UsageError>([] {
-                (void)moleculeBonds(moleculeOf({{6, V3d(0)}}), {.tolerance = -1});
-              }),
-              "tolerance");
   EXPECT_SAYS(refusal<InvalidInput>([] {
                 (void)moleculeBonds(moleculeOf({{6, V3d(NAN, 0, 0)}}));
               }),

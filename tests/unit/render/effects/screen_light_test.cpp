@@ -13,6 +13,7 @@
 #include "render/effects/picture_view.h"
 #include "render/embree/embree_renderer.h"
 #include "tests/support/effect_pictures.h"
+#include "tests/support/measured.h"
 #include "tests/support/render_scenes.h"
 
 namespace screen_light_test {
@@ -151,14 +152,16 @@ TEST(ScreenLight, IsCloseToTracedLight) {
   const struct {
     const char* name;
     Scene scene;
-    double sky, key;
-  } cases[] = {{"rings", support::sceneOf(support::rings()), 0.13, 0.17},       // 0.065, 0.087
-               {"ball on a plate", support::sceneOf(ballOnPlate), 0.09, 0.13},  // 0.044, 0.064
-               {"pot", support::sceneOf(pot), 0.03, 0.09}};                     // 0.015, 0.045
-  for (const auto& [name, scene, sky, key] : cases) {
+    double sky, key, none;  // docs/effects.md has these figures
+  } cases[] = {{"rings", support::sceneOf(support::rings()), 0.065, 0.087, 0.21},
+               {"ball on a plate", support::sceneOf(ballOnPlate), 0.044, 0.064, 0.19},
+               {"pot", support::sceneOf(pot), 0.015, 0.045, 0.014}};
+  for (const auto& [name, scene, sky, key, none] : cases) {
+    SCOPED_TRACE(name);
     const Rms found = beside(scene);
-    EXPECT_LT(found.sky, sky) << name << " sky " << found.sky << " of " << found.none;
-    EXPECT_LT(found.key, key) << name << " key " << found.key;
+    EXPECT_LT(found.sky, support::measured(sky));
+    EXPECT_LT(found.key, support::measured(key));
+    EXPECT_NEAR(found.none, none, 0.1 * none);
   }
 }
 

@@ -154,7 +154,7 @@ TEST(BezierFile, RefusesWithASentence) {
   EXPECT_EQ(refusal(document(kCube + R"(, "weights": [1,1,0,1,1,1,1,1]})")),
             "x.json: patch 0: weight 2 is 0; give positive weights from 1e-06 to 1000000");
   EXPECT_EQ(refusal(document(kCube + R"(, "weights": [1,1]})")),
-            "x.json: entry 0 of \"patches\": the file has 2 weights for 8 control points; "
+            "x.json: entry 1 of \"patches\": the file has 2 weights for 8 control points; "
             "docs/bezier.md describes the format of Bézier volumes");
   EXPECT_NE(refusal(document(kCube + R"(, "wieghts": [1]})")).find("unknown \"wieghts\""),
             std::string::npos);

@@ -93,7 +93,7 @@ TEST(QuadricFile, NamesTheEntryThatIsWrong) {
   expect(R"({"format": "levelsmith scene", "version": 1})", "is not a file of quadrics");
   expect(R"({"format": "levelsmith quadrics", "version": 2, "quadrics": []})",
          "does not have version 1");
-  expect(documentWith(""), "there is no quadric");
+  expect(documentWith(""), "has no quadric");
   expect(documentWith(good + R"(, {"kind": "ball"})"),
          "entry 2 of \"quadrics\": the file has the unknown kind \"ball\"; the kinds are sphere, "
          "ellipsoid, cylinder, cone");
@@ -101,7 +101,7 @@ TEST(QuadricFile, NamesTheEntryThatIsWrong) {
          "has 2 numbers in \"centre\", not 3");
   expect(documentWith(R"({"kind": "sphere", "centre": [0, 0, 0]})"), "has no \"radius\"");
   expect(documentWith(R"({"kind": "sphere", "centre": [0, 0, 0], "radius": -1})"),
-         "entry 1 of \"quadrics\": the sphere has the radius -1");
+         "entry 1 of \"quadrics\": a sphere has the radius -1");
   expect(documentWith(R"({"kind": "sphere", "centre": [0, 0, 0], "radius": 1, "id": 4})"),
          "has an unknown \"id\"");
   expect(documentWith(R"({"kind": "cylinder", "ends": [[0, 0, 0]], "radius": 1})"),
@@ -112,7 +112,7 @@ TEST(QuadricFile, NamesTheEntryThatIsWrong) {
   expect(
       documentWith(
           R"({"kind": "cone", "position": [0, 0, 0], "axes": [[1, 0, 0], [0, 1, 0], [1, 1, 0]]})"),
-      "the quadric has axes in one plane");
+      "a quadric has axes in one plane");
 }
 
 }  // namespace quadric_file_test
