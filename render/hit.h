@@ -71,11 +71,11 @@ struct Hit {
   [[nodiscard]] double beyond() const { return distance + 2 * surfaceError; }
 };
 
-/// Hit on a surface that is given exactly, as a Bézier volume or a quadric. It is opaque. The facet has
-/// the surface's normal. @param diagonal  of the box of the surface, world units
+/// Hit on a surface that is given exactly, as a Bézier volume or a quadric. It is opaque. The facet
+/// has the surface's normal. @param diagonal  of the box of the surface, world units
 [[nodiscard]] inline Hit exactHit(const Imath::V3d& position, double distance,
-                                   const Imath::V3d& normal, double diagonal,
-                                   const Imath::C3f& colour, std::uint32_t id, std::size_t solid) {
+                                  const Imath::V3d& normal, double diagonal,
+                                  const Imath::C3f& colour, std::uint32_t id, std::size_t solid) {
   constexpr double kHitError = 1e-10;  // of a root that is not singular, as a share of the diagonal
   Hit hit;
   hit.found = true;
