@@ -32,6 +32,8 @@ struct PngReader {
     // A chunk states its length, and libpng allocates it before it reads the chunk.
     constexpr png_alloc_size_t kLongestChunk = 1 << 23;
     png_set_chunk_malloc_max(png, kLongestChunk);
+    constexpr png_uint_32 kKeptTexts = 8;  // each may unpack to the longest chunk
+    png_set_chunk_cache_max(png, kKeptTexts);
     info = png_create_info_struct(png);
   }
   ~PngReader() { png_destroy_read_struct(&png, &info, nullptr); }
@@ -89,20 +91,23 @@ void requirePngChunks(const std::filesystem::path& path) {
   const std::uintmax_t size = std::filesystem::file_size(path, failed);
   if (failed) return;  // not a regular file, but a pipe, which can be read only once
   std::ifstream in(path, std::ios::binary);
-  constexpr std::uintmax_t kSignature = 8,
-                           kAround =
-                               12;  // bytes of a chunk beside its data: length, type and checksum
-  for (std::uintmax_t at = kSignature; at + kAround <= size;) {
-    unsigned char length[4] = {};
+  constexpr std::size_t kSignature = 8;
+  png_byte signature[kSignature] = {};
+  in.read(reinterpret_cast<char*>(signature), kSignature);
+  if (png_sig_cmp(signature, 0, kSignature) != 0) return;  // libpng says that it is no PNG
+  constexpr std::uintmax_t kFrame = 12;                    // bytes of a chunk beside its data
+  for (std::uintmax_t at = kSignature; at < size;) {
+    unsigned char head[8] = {};  // length and type
     in.seekg(static_cast<std::streamoff>(at));
-    in.read(reinterpret_cast<char*>(length), sizeof length);
-    const std::uintmax_t bytes = static_cast<std::uintmax_t>(length[0]) << 24 |
-                                 static_cast<std::uintmax_t>(length[1]) << 16 |
-                                 static_cast<std::uintmax_t>(length[2]) << 8 | length[3];
-    if (!in || bytes > size - at - kAround)
+    in.read(reinterpret_cast<char*>(head), sizeof head);
+    const std::uintmax_t bytes =
+        static_cast<std::uintmax_t>(head[0]) << 24 | static_cast<std::uintmax_t>(head[1]) << 16 |
+        static_cast<std::uintmax_t>(head[2]) << 8 | static_cast<std::uintmax_t>(head[3]);
+    if (!in || size - at < kFrame || bytes > size - at - kFrame)
       refuseDamaged(path.string(),
                     fmt::format("the chunk at byte {} extends beyond the end of the file", at));
-    at += kAround + bytes;
+    if (std::memcmp(head + 4, "IEND", 4) == 0) return;  // libpng reads nothing behind it
+    at += kFrame + bytes;
   }
 }
 

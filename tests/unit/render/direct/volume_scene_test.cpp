@@ -403,8 +403,8 @@ TEST_F(VolumeSceneFile, RefusesWhatItCannotDraw) {
   };
   const std::string file = R"("name": "ramp", "file": "ramp.mha")";
   const std::string good = file + R"(, "transfer": "0:0 40:0.1")";
-  refused("[]", "no volumes");
-  refused("{}", "no volumes");
+  refused("[]", "no parts");
+  refused("{}", "no parts");
   refused("[{" + good + "}, {" + good + "}]", "can have one");
   refused("[{" + file + "}]", "transfer");
   refused("[{" + file + R"(, "transfer": "40"}])", "VALUE:OPACITY");
