@@ -228,7 +228,7 @@ NarrowBand withSharpEdges(NarrowBand band, const NarrowBand& solid, const Deform
     return !isFeature[edge[0]] || !isFeature[edge[1]];
   });
   if (creased.creases.empty()) return band;
-  creased = fitCreases(std::move(creased), grid, subProgress(progress, 0.2, 0.4));
+  creased = fitCreases(std::move(creased), grid, maxMemory, subProgress(progress, 0.2, 0.4));
   const auto creases = std::move(creased.creases);
   TriMesh mesh = toWorld(std::move(creased), solid);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.positions.size(), 256),

@@ -15,6 +15,7 @@
 #include "levelset/deform/creases/face_fit.h"
 #include "levelset/geometry/mesh_sides.h"
 #include "levelset/geometry/search/triangle_search.h"
+#include "levelset/memory_limit.h"
 #include "levelset/meshing/cells/divide_sides.h"
 
 namespace levelset {
@@ -403,8 +404,15 @@ CreasedMesh CreaseFitter::divided() const {
 
 }  // namespace
 
-CreasedMesh fitCreases(CreasedMesh mesh, const openvdb::FloatGrid& grid, const Progress& progress) {
+CreasedMesh fitCreases(CreasedMesh mesh, const openvdb::FloatGrid& grid, std::size_t maxMemory,
+                       const Progress& progress) {
   report(progress, 0);
+  // A triangle has sides, neighbours and a place in the search. About 120 grid points lie beside a
+  // crease edge, each with samples in three lists.
+  constexpr double kTriangleBytes = 220, kEdgeBytes = 120 * 184;
+  requireMemory(kTriangleBytes * static_cast<double>(mesh.triangles.size()) +
+                    kEdgeBytes * static_cast<double>(mesh.creases.size()),
+                memoryLeft(memoryLimit(maxMemory)));
   CreaseFitter fitter(mesh, grid);
   report(progress, 0.3);
   fitter.run();

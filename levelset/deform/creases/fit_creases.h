@@ -3,6 +3,7 @@
 // Internal header of levelset: includes OpenVDB, so include it from .cpp files only.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -23,7 +24,8 @@ struct CreasedMesh : IndexMesh {
 /// a crease move to the intersection of the faces, those beside it onto their face. Where a face
 /// has no fit, vertices stay.
 /// @param mesh  near the zero set, within about 0.2 voxel
+/// @throws ResourceLimit, Cancelled
 [[nodiscard]] CreasedMesh fitCreases(CreasedMesh mesh, const openvdb::FloatGrid& grid,
-                                     const Progress& progress);
+                                     std::size_t maxMemory, const Progress& progress);
 
 }  // namespace levelset
