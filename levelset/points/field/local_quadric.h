@@ -4,7 +4,7 @@
 
 #include <Imath/ImathVec.h>
 
-#include <Eigen/Core>
+#include <array>
 
 namespace levelset::points {
 
@@ -12,14 +12,16 @@ namespace levelset::points {
 struct LocalQuadric {
   Imath::V3d centre, normal, u, v;
   double scale;  ///< 1 / radius of the fitted points
-  Eigen::Matrix<double, 6, 1> coefficients;
+  /// Factors of 1, x, y, x², xy and y².
+  std::array<double, 6> coefficients;
 
   /// Distance along the normal, divided by the secant of the slope. Beyond the fitted points, the
   /// height is that at their rim.
   [[nodiscard]] double distance(const Imath::V3d& at) const;
 };
 
-/// Weighted least-squares fit of a height function to the heights and slopes of points.
+/// Weighted least-squares fit of a height function to the heights and slopes of points. Sums
+/// moments, since the 21 entries of the normal equations repeat 15 of them.
 class QuadricFit {
  public:
   /// @param radius  of the points about the centre
@@ -28,13 +30,10 @@ class QuadricFit {
   [[nodiscard]] LocalQuadric solve() const;
 
  private:
-  using Vector6 = Eigen::Matrix<double, 6, 1>;
-  void addRow(const Vector6& row, double value, double weight);
-
   LocalQuadric frame_;
-  Eigen::Matrix<double, 6, 6> matrix_ = Eigen::Matrix<double, 6, 6>::Zero();
-  Vector6 right_ = Vector6::Zero();
-  double weights_ = 0;
+  std::array<double, 15> moments_{};      ///< of 1, x, y, x², xy, y², x³, …, y⁴
+  std::array<double, 6> slopeMoments_{};  ///< the same up to y², with the weights of slopes
+  std::array<double, 6> right_{};
 };
 
 }  // namespace levelset::points

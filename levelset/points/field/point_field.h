@@ -12,7 +12,7 @@ namespace levelset::points {
 
 /// Function of space near the points. Its zero set is the surface, it is negative inside, and its
 /// slope is about 1. Takes a position relative to OrientedPoints::centre and its closest points,
-/// nearest first. Several threads may call it at once.
+/// the nearest one first and the farthest one last. Several threads may call it at once.
 struct PointField {
   std::function<double(const Imath::V3d&, const std::vector<FoundItem>&)> value;
   std::size_t neighbours;  ///< number of closest points that `value` takes

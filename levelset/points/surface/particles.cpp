@@ -76,12 +76,35 @@ double toBalls(const Particles& particles, const std::vector<FoundItem>& found) 
 /// Value at a place that no particle reaches.
 constexpr double kOutside = std::numeric_limits<double>::infinity();
 
-points::SampledField balls(const Particles& particles, double margin) {
-  return [&particles, margin](const V3d& at, FieldMemory& memory) {
-    const double reach = particles.largest + margin;
-    particles.search.within(at, reach * reach, memory.found);
-    return toBalls(particles, memory.found);
+/// Makes the field of a function of a position and the points within a distance, by number. One
+/// search lists the candidates of a cube.
+/// @param positions  those of the search; must outlive the field
+template <class Value>
+points::SampledField fieldOfNear(const PointSearch& search, const std::vector<V3d>& positions,
+                                 double distance, Value value) {
+  return [&search, &positions, distance, value = std::move(value)](const points::CubePositions& at,
+                                                                   points::CubeValues& values,
+                                                                   FieldMemory& memory, double) {
+    constexpr double kRounding = 1 + 1e-12;
+    const double reach = kRounding * (distance + (at.back() - at.front()).length() / 2);
+    std::vector<FoundItem>& candidates = memory.candidates;
+    search.within((at.front() + at.back()) / 2, reach * reach, candidates);
+    for (std::size_t n = 0; n < at.size(); ++n) {
+      memory.found.clear();
+      for (const FoundItem& candidate : candidates)
+        if (const double squared = (positions[candidate.index] - at[n]).length2();
+            squared <= distance * distance)
+          memory.found.push_back({squared, candidate.index});
+      values[n] = value(at[n], memory.found);
+    }
   };
+}
+
+points::SampledField balls(const Particles& particles, double margin) {
+  return fieldOfNear(particles.search, particles.positions, particles.largest + margin,
+                     [&particles](const V3d&, const std::vector<FoundItem>& found) {
+                       return toBalls(particles, found);
+                     });
 }
 
 /// Sum of the Gaussians exp(−a (|x − xᵢ|² / rᵢ² − 1)), turned into a distance that is exact for a
@@ -90,40 +113,39 @@ points::SampledField balls(const Particles& particles, double margin) {
 points::SampledField blobs(const Particles& particles, double reach) {
   constexpr double kCut = 0.01;
   const double sharpness = -std::log(kCut) / (reach * reach - 1);
-  return [&particles, reach, sharpness](const V3d& at, FieldMemory& memory) {
-    const double most = reach * particles.largest;
-    particles.search.within(at, most * most, memory.found);
-    double sum = 0, radii = 0;
-    for (const FoundItem& f : memory.found) {
-      const double radius = particles.radii[f.index],
-                   value = std::exp(-sharpness * (f.squared / (radius * radius) - 1)) - kCut;
-      if (!(value > 0)) continue;
-      sum += value;
-      radii += value * radius;
-    }
-    if (!(sum > 0)) return kOutside;
-    const double squared = std::max(1 - std::log(sum + kCut) / sharpness, 0.0);
-    return radii / sum * (std::sqrt(squared) - 1);
-  };
+  return fieldOfNear(
+      particles.search, particles.positions, reach * particles.largest,
+      [&particles, reach, sharpness](const V3d&, const std::vector<FoundItem>& found) {
+        double sum = 0, radii = 0;
+        for (const FoundItem& f : found) {
+          const double radius = particles.radii[f.index],
+                       value = std::exp(-sharpness * (f.squared / (radius * radius) - 1)) - kCut;
+          if (!(value > 0)) continue;
+          sum += value;
+          radii += value * radius;
+        }
+        if (!(sum > 0)) return kOutside;
+        const double squared = std::max(1 - std::log(sum + kCut) / sharpness, 0.0);
+        return radii / sum * (std::sqrt(squared) - 1);
+      });
 }
 
 /// |x − Σ wᵢ xᵢ| − Σ wᵢ rᵢ with normalised weights [Zhu05].
 points::SampledField zhuBridson(const Particles& particles, double reach) {
-  return [&particles, reach](const V3d& at, FieldMemory& memory) {
-    const double most = reach * particles.largest;
-    particles.search.within(at, most * most, memory.found);
-    V3d centre(0);
-    double radius = 0, weights = 0;
-    for (const FoundItem& f : memory.found) {
-      const double own = reach * particles.radii[f.index],
-                   weight = particleWeight(f.squared / (own * own));
-      weights += weight;
-      centre += weight * particles.positions[f.index];
-      radius += weight * particles.radii[f.index];
-    }
-    if (!(weights > 0)) return kOutside;
-    return (at - centre / weights).length() - radius / weights;
-  };
+  return fieldOfNear(particles.search, particles.positions, reach * particles.largest,
+                     [&particles, reach](const V3d& at, const std::vector<FoundItem>& found) {
+                       V3d centre(0);
+                       double radius = 0, weights = 0;
+                       for (const FoundItem& f : found) {
+                         const double own = reach * particles.radii[f.index],
+                                      weight = particleWeight(f.squared / (own * own));
+                         weights += weight;
+                         centre += weight * particles.positions[f.index];
+                         radius += weight * particles.radii[f.index];
+                       }
+                       if (!(weights > 0)) return kOutside;
+                       return (at - centre / weights).length() - radius / weights;
+                     });
 }
 
 /// A particle that is moved towards its neighbours and flattened like their arrangement.
@@ -178,6 +200,7 @@ FlattenedParticle flatten(const Particles& particles, std::size_t i, double reac
 
 struct FlattenedParticles {
   std::vector<FlattenedParticle> particles;
+  std::vector<V3d> centres;
   PointSearch search;  ///< tree of the centres
   double most = 0;     ///< farthest reach of a particle, world units
   double level = 0;    ///< value of the sum on the surface
@@ -193,24 +216,24 @@ points::SampledField anisotropic(const Particles& particles, double reach) {
                       for (std::size_t i = range.begin(); i < range.end(); ++i)
                         all->particles[i] = flatten(particles, i, reach, found);
                     });
-  std::vector<V3d> centres;
-  for (const FlattenedParticle& p : all->particles) centres.push_back(p.centre);
-  all->search = makePointSearch(centres);
+  for (const FlattenedParticle& p : all->particles) all->centres.push_back(p.centre);
+  all->search = makePointSearch(all->centres);
   // The longest axis of a flat kernel of equal volume.
   all->most = reach * particles.largest * std::cbrt(kMostFlat * kMostFlat);
   // A single particle is its ball.
   all->level = particleWeight(1 / (reach * reach));
   all->slope = particles.largest / (2 * all->level);
-  return [all](const V3d& at, FieldMemory& memory) {
-    all->search.within(at, all->most * all->most, memory.found);
-    double sum = 0;
-    for (const FoundItem& f : memory.found) {
-      const FlattenedParticle& p = all->particles[f.index];
-      const V3d d = at - p.centre;
-      sum += particleWeight((p.toUnit * Eigen::Vector3d(d.x, d.y, d.z)).squaredNorm());
-    }
-    return sum > 0 ? all->slope * (all->level - sum) : kOutside;
-  };
+  return fieldOfNear(
+      all->search, all->centres, all->most,
+      [all](const V3d& at, const std::vector<FoundItem>& found) {
+        double sum = 0;
+        for (const FoundItem& f : found) {
+          const FlattenedParticle& p = all->particles[f.index];
+          const V3d d = at - p.centre;
+          sum += particleWeight((p.toUnit * Eigen::Vector3d(d.x, d.y, d.z)).squaredNorm());
+        }
+        return sum > 0 ? all->slope * (all->level - sum) : kOutside;
+      });
 }
 
 void checkParticleOptions(const ParticleOptions& options, double voxelSize) {

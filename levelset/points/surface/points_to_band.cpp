@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "levelset/convert/mesh_to_band.h"
@@ -84,6 +85,9 @@ struct LeafSupport {
 /// the surface, in spacings about that point. The far side of a thin sheet has no such point near.
 double gapAt(const OrientedPoints& points, const V3d& at, const V3d& normal,
              std::vector<FoundItem>& found) {
+  const FoundItem first = points.search.closest(at, std::numeric_limits<double>::infinity());
+  if (points.normals[first.index].dot(normal) > 0)
+    return std::sqrt(first.squared) / points.spacings[first.index];
   constexpr std::size_t kCandidates = 16;
   points.search.closest(at, kCandidates, found);
   for (const FoundItem& f : found)
@@ -220,7 +224,9 @@ PointsToBandResult pointsToBand(const PointCloud& cloud, double voxelSize,
   blocks.reserve(points.size());
   for (const V3d& p : points.positions) blocks.push_back(points::blockAt(frame, p));
   openvdb::FloatGrid::Ptr samples = points::sampleField(
-      [&field](const V3d& at, points::FieldMemory& memory) { return field.value(at, memory); },
+      [&field](const points::CubePositions& at, points::CubeValues& values,
+               points::FieldMemory& memory,
+               double bound) { field.values(at, values, memory, bound); },
       frame, std::move(blocks), options.maxMemory, subProgress(options.progress, 0.3, 0.7));
   const std::size_t droppedParts = points::dropPartsWithoutPoints(*samples, points);
   eikonal::DistanceRequest request;

@@ -21,7 +21,7 @@ using Leaf = openvdb::FloatTree::LeafNodeType;
 /// Distance from the surface, voxels, within which grid points are sampled. The interpolant of
 /// redistance() reads less.
 constexpr double kSampledWidth = 3;
-constexpr int kSide = static_cast<int>(Leaf::DIM);
+constexpr int kSide = static_cast<int>(Leaf::DIM), kCube = kSide / 2;
 
 /// A block and the neighbours into which its surface continues: bit 9 (dx + 1) + 3 (dy + 1) + dz +
 /// 1.
@@ -38,29 +38,60 @@ class BlockSampler {
   [[nodiscard]] SampledBlock sample(const Coord& origin) const {
     SampledBlock block{std::make_unique<Leaf>(origin)};
     FieldMemory memory;
-    const auto limit = static_cast<float>(kSampledWidth * frame_.voxelSize);
-    for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
-      const Coord local = Leaf::offsetToLocalCoord(n);
-      const auto value = static_cast<float>(at(origin + local, memory));
-      block.leaf->setValueOnly(n, std::clamp(value, -limit, limit));
-      if (!(std::abs(value) < limit)) continue;
-      for (int dx = local.x() < 3 ? -1 : 0; dx <= (local.x() >= kSide - 3 ? 1 : 0); ++dx)
-        for (int dy = local.y() < 3 ? -1 : 0; dy <= (local.y() >= kSide - 3 ? 1 : 0); ++dy)
-          for (int dz = local.z() < 3 ? -1 : 0; dz <= (local.z() >= kSide - 3 ? 1 : 0); ++dz)
-            block.continues |= 1u << (9 * (dx + 1) + 3 * (dy + 1) + dz + 1);
-    }
+    for (int n = 0; n < 8; ++n) sampleCube(block, corner(n, kCube), memory);
     return block;
   }
 
  private:
-  [[nodiscard]] double at(const Coord& index, FieldMemory& memory) const {
-    const V3d relative = frame_.voxelSize * V3d(index.x(), index.y(), index.z()) - frame_.centre;
+  [[nodiscard]] double limit() const { return kSampledWidth * frame_.voxelSize; }
+
+  /// Samples the 4³ grid points of a block from `low` on.
+  void sampleCube(SampledBlock& block, const Coord& low, FieldMemory& memory) const {
+    std::array<Coord, 64> local;
+    CubePositions at;
+    CubeValues outside, values;
+    for (std::size_t n = 0; n < at.size(); ++n) {
+      const int number = static_cast<int>(n);
+      local[n] = low + corner(number / 8, 2) + corner(number % 8, 1);
+      const Coord index = block.leaf->origin() + local[n];
+      at[n] = frame_.voxelSize * V3d(index.x(), index.y(), index.z()) - frame_.centre;
+      outside[n] = outsideBox(at[n]);
+    }
+    if (*std::min_element(outside.begin(), outside.end()) > limit())
+      values = outside;
+    else
+      field_(at, values, memory, limit());
+    const auto most = static_cast<float>(limit());
+    for (std::size_t n = 0; n < at.size(); ++n) {
+      const auto value = static_cast<float>(std::max(outside[n], values[n]));
+      block.leaf->setValueOnly(Leaf::coordToOffset(local[n]), std::clamp(value, -most, most));
+      if (std::abs(value) < most) block.continues |= neighbours(local[n]);
+    }
+  }
+
+  [[nodiscard]] static Coord corner(int n, int edge) {
+    return {(n >> 2) * edge, (n >> 1 & 1) * edge, (n & 1) * edge};
+  }
+
+  /// Blocks that grid points within the sampled width of a surface at `local` may lie in.
+  [[nodiscard]] static std::uint32_t neighbours(const Coord& local) {
+    constexpr int kWidth = static_cast<int>(kSampledWidth);
+    std::uint32_t bits = 0;
+    for (int dx = local.x() < kWidth ? -1 : 0; dx <= (local.x() >= kSide - kWidth ? 1 : 0); ++dx)
+      for (int dy = local.y() < kWidth ? -1 : 0; dy <= (local.y() >= kSide - kWidth ? 1 : 0); ++dy)
+        for (int dz = local.z() < kWidth ? -1 : 0; dz <= (local.z() >= kSide - kWidth ? 1 : 0);
+             ++dz)
+          bits |= 1u << (9 * (dx + 1) + 3 * (dy + 1) + dz + 1);
+    return bits;
+  }
+
+  /// Distance from the box of the frame, in the maximum norm; negative inside.
+  [[nodiscard]] double outsideBox(const V3d& relative) const {
     double outside = -std::numeric_limits<double>::infinity();
     for (int axis = 0; axis < 3; ++axis)
       outside = std::max(
           {outside, frame_.box.min[axis] - relative[axis], relative[axis] - frame_.box.max[axis]});
-    if (outside > kSampledWidth * frame_.voxelSize) return outside;
-    return std::max(outside, field_(relative, memory));
+    return outside;
   }
 
   const SampledField& field_;

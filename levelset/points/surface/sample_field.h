@@ -2,9 +2,11 @@
 
 // Internal header of levelset: public headers must not include it.
 
+#include <array>
 #include <functional>
 #include <vector>
 
+#include "levelset/points/field/cell_points.h"
 #include "levelset/points/field/oriented_points.h"
 #include "levelset/progress.h"
 #include "levelset/vdb.h"
@@ -13,14 +15,22 @@ namespace levelset::points {
 
 /// Memory of one thread, for positions near each other.
 struct FieldMemory {
-  std::vector<FoundItem> found = {};
+  std::vector<FoundItem> found = {}, candidates = {};
+  CellPoints cell = {};
   Imath::V3d at = Imath::V3d(0);  ///< position of the last winding number
   double winding = 0.5;
-  bool isNear = false;  ///< the last position was near the points
+  double sameSide = 0;  ///< where it holds, see SignedField
 };
 
-/// Field to sample, at positions relative to a centre. Several threads may call it at once.
-using SampledField = std::function<double(const Imath::V3d&, FieldMemory&)>;
+/// Grid points of a cube of 4³, in the order of a Z curve: each eight of them are a cube of 2³.
+using CubePositions = std::array<Imath::V3d, 64>;
+using CubeValues = std::array<double, 64>;
+
+/// Field to sample, at positions relative to a centre. The last argument bounds the values that are
+/// needed: a value beyond it may be replaced by another one of its sign beyond it. Several threads
+/// may call the field at once.
+using SampledField =
+    std::function<void(const CubePositions&, CubeValues&, FieldMemory&, double bound)>;
 
 /// Where a field is sampled.
 struct SampleFrame {

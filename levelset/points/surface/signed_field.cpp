@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace levelset::points {
 namespace {
@@ -20,6 +19,15 @@ double smoothStep(double t) {
   return t * t * (3 - 2 * t);
 }
 
+/// Distance within which the side of the surface is that of a winding number, in fractions of the
+/// distance to the closest point. A winding number changes by at most 1/2 for each of these
+/// distances, so it needs 1 − exp(−2 d) of them to change by d. 0 if the side is not certain.
+double sameSide(double winding) {
+  constexpr double kDefinite = 0.25, kSafety = 0.8;
+  const double margin = std::abs(winding - 0.5);
+  return margin < kDefinite ? 0 : kSafety * (1 - std::exp(-2 * margin));
+}
+
 }  // namespace
 
 SignedField::SignedField(const OrientedPoints& points, PointField near)
@@ -31,27 +39,16 @@ SignedField::SignedField(const OrientedPoints& points, PointField near)
       winding_(points) {}
 
 double SignedField::far(const V3d& at, double closest, FieldMemory& memory) const {
-  // The winding number changes by at most 1/2 for each `closest`. So the sign of a definite one
-  // holds in its neighbourhood.
-  constexpr double kDefinite = 0.25, kSameSide = 0.3;
-  if (std::abs(memory.winding - 0.5) < kDefinite ||
-      !((at - memory.at).length() < kSameSide * closest)) {
+  if (!((at - memory.at).length() < memory.sameSide * closest)) {
     memory.winding = winding_.at(at);
+    memory.sameSide = sameSide(memory.winding);
     memory.at = at;
   }
   return (1 - 2 * memory.winding) * closest;
 }
 
-double SignedField::value(const V3d& at, FieldMemory& memory) const {
-  std::vector<FoundItem>& found = memory.found;
-  if (!memory.isNear) {
-    // Far from the points, the closest one suffices. Neighbouring points have similar spacings.
-    const FoundItem first = points_.search.closest(at, std::numeric_limits<double>::infinity());
-    const double distance = std::sqrt(first.squared);
-    if (distance > 2 * kFarStart * reach_ * points_.spacings[first.index])
-      return far(at, distance, memory);
-  }
-  points_.search.closest(at, near_.neighbours, found);
+double SignedField::value(const V3d& at, const std::vector<FoundItem>& found,
+                          FieldMemory& memory) const {
   const double closest = std::sqrt(found.front().squared);
   double spacing = 0, weights = 0;
   for (const FoundItem& f : found) {
@@ -62,10 +59,50 @@ double SignedField::value(const V3d& at, FieldMemory& memory) const {
   spacing = weights > 0 ? spacing / weights : points_.spacings[found.front().index];
   const double share =
       smoothStep((closest / (reach_ * spacing) - kNearEnd) / (kFarStart - kNearEnd));
-  memory.isNear = share < 1;
   if (share == 0) return near_.value(at, found);
   if (share == 1) return far(at, closest, memory);
   return (1 - share) * near_.value(at, found) + share * far(at, closest, memory);
+}
+
+std::optional<double> SignedField::commonValue(const V3d& centre, double radius,
+                                               const std::vector<FoundItem>& found,
+                                               FieldMemory& memory, double bound) const {
+  // No point may be near. Where the winding number is certain in the complete ball, and the field
+  // agrees with it, the ball lies on one side of the surface.
+  const double closest = std::sqrt(found.front().squared), least = closest - radius;
+  if (!(least > bound)) return std::nullopt;
+  const double farValue = far(centre, closest, memory);
+  if (!((centre - memory.at).length() + radius < memory.sameSide * least) ||
+      !(std::abs(farValue) * least > bound * closest))
+    return std::nullopt;
+  const double result = value(centre, found, memory);
+  if (!(result * farValue > 0) || !(std::abs(result) > bound)) return std::nullopt;
+  return result;
+}
+
+void SignedField::values(const CubePositions& at, CubeValues& values, FieldMemory& memory,
+                         double bound) const {
+  const V3d centre = (at.front() + at.back()) / 2;
+  const double radius = (at.back() - at.front()).length() / 2;
+  const auto& found = memory.cell.move(points_, centre, radius, near_.neighbours);
+  if (const auto common = commonValue(centre, radius, found, memory, bound)) {
+    values.fill(*common);
+    return;
+  }
+  for (std::size_t begin = 0; begin < at.size(); begin += 8) {
+    const V3d &low = at[begin], &high = at[begin + 7], middle = (low + high) / 2;
+    const double reach = (high - low).length() / 2;
+    const auto common =
+        commonValue(middle, reach, memory.cell.moveInside(middle, reach), memory, bound);
+    for (std::size_t n = begin; n < begin + 8; ++n) {
+      if (common) {
+        values[n] = *common;
+        continue;
+      }
+      memory.cell.closest(at[n], memory.found);
+      values[n] = value(at[n], memory.found, memory);
+    }
+  }
 }
 
 }  // namespace levelset::points

@@ -2,6 +2,8 @@
 
 // Internal header of levelset: public headers must not include it.
 
+#include <optional>
+
 #include "levelset/points/field/point_field.h"
 #include "levelset/points/surface/point_winding.h"
 #include "levelset/points/surface/sample_field.h"
@@ -18,10 +20,18 @@ class SignedField {
   /// @param points  must outlive the field
   SignedField(const OrientedPoints& points, PointField near);
 
+  /// Values of a cube, as SampledField.
   /// @param at  relative to OrientedPoints::centre
-  [[nodiscard]] double value(const Imath::V3d& at, FieldMemory& memory) const;
+  void values(const CubePositions& at, CubeValues& values, FieldMemory& memory, double bound) const;
 
  private:
+  /// @param found  closest points of the position
+  [[nodiscard]] double value(const Imath::V3d& at, const std::vector<FoundItem>& found,
+                             FieldMemory& memory) const;
+  /// Value of all positions in a ball, if it is the same but for values beyond the bound.
+  [[nodiscard]] std::optional<double> commonValue(const Imath::V3d& centre, double radius,
+                                                  const std::vector<FoundItem>& found,
+                                                  FieldMemory& memory, double bound) const;
   [[nodiscard]] double far(const Imath::V3d& at, double closest, FieldMemory& memory) const;
 
   const OrientedPoints& points_;

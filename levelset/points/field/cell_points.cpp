@@ -1,0 +1,131 @@
+#include "levelset/points/field/cell_points.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace levelset::points {
+namespace {
+
+using Imath::V3d;
+
+constexpr double kRounding = 1e-12;
+/// Most candidates of a ball. With more of them, searches of the tree take less time.
+constexpr std::size_t kMostCandidates = 400;
+
+double square(double x) {
+  return x * x;
+}
+
+}  // namespace
+
+const std::vector<FoundItem>& CellPoints::move(const OrientedPoints& points, const V3d& centre,
+                                               double radius, std::size_t count) {
+  points_ = &points;
+  count_ = std::min(count, points.size());
+  points.search.closest(centre, count_, atOuter_);
+  outer_.centre = centre;
+  outer_.radius = radius;
+  outer_.farthest = std::sqrt(atOuter_.back().squared);
+  outer_.numbers.clear();
+  return atOuter_;
+}
+
+const std::vector<FoundItem>& CellPoints::moveInside(const V3d& centre, double radius) {
+  if (outer_.numbers.empty()) list(outer_);
+  if (outer_.isListed)
+    choose(outer_, centre, atInner_);
+  else
+    points_->search.closest(centre, count_, atInner_);
+  inner_.centre = centre;
+  inner_.radius = radius;
+  inner_.farthest = std::sqrt(atInner_.back().squared);
+  inner_.numbers.clear();
+  return atInner_;
+}
+
+void CellPoints::closest(const V3d& at, std::vector<FoundItem>& found) {
+  if (inner_.numbers.empty()) list(inner_);
+  if (inner_.isListed)
+    choose(inner_, at, found);
+  else
+    points_->search.closest(at, count_, found);
+}
+
+/// Lists the points that can be among the closest ones of a position in the ball.
+void CellPoints::list(Ball& ball) const {
+  // The closest points of a position reach at most a radius farther than those of the centre, and
+  // the position lies at most a radius from it.
+  double squared = square((1 + kRounding) * (ball.farthest + 2 * ball.radius));
+  ball.isListed = true;
+  if (&ball == &inner_ && outer_.isListed) {
+    for (std::size_t n = 0; n < outer_.numbers.size(); ++n) {
+      const auto i = static_cast<Eigen::Index>(n);
+      const V3d arm = V3d(outer_.x[i], outer_.y[i], outer_.z[i]) - ball.centre;
+      if (arm.length2() <= squared) ball.numbers.push_back(outer_.numbers[n]);
+    }
+  } else {
+    points_->search.visit(ball.centre, squared, [&](const PointItem& item) {
+      if (ball.numbers.size() == kMostCandidates) {
+        ball.isListed = false;
+        squared = -1;  // ends the visit
+      } else {
+        ball.numbers.push_back(item.index);
+      }
+    });
+    if (!ball.isListed) return;
+  }
+  const auto size = static_cast<Eigen::Index>(ball.numbers.size());
+  for (Eigen::ArrayXd* axis : {&ball.x, &ball.y, &ball.z}) axis->resize(size);
+  for (Eigen::Index n = 0; n < size; ++n) {
+    const V3d& p = points_->positions[ball.numbers[static_cast<std::size_t>(n)]];
+    ball.x[n] = p.x;
+    ball.y[n] = p.y;
+    ball.z[n] = p.z;
+  }
+}
+
+/// Finds the closest points of a position among the candidates of a ball that contains it.
+void CellPoints::choose(const Ball& ball, const V3d& at, std::vector<FoundItem>& found) {
+  squared_ = (ball.x - at.x).square() + (ball.y - at.y).square() + (ball.z - at.z).square();
+  // The farthest of the closest points moves no more than the position.
+  const double moved = (at - ball.centre).length();
+  const double nearer = (1 - kRounding) * (ball.farthest - moved),
+               least = nearer > 0 ? square(nearer) : 0,
+               most = square((1 + kRounding) * (ball.farthest + moved));
+  const std::size_t size = ball.numbers.size();
+  sure_.resize(size + 1);
+  possible_.resize(size + 1);
+  std::size_t sure = 0, possible = 0;
+  for (std::size_t n = 0; n < size; ++n) {  // without branches, which would be unpredictable
+    const double squared = squared_[static_cast<Eigen::Index>(n)];
+    sure_[sure] = possible_[possible] = static_cast<std::uint32_t>(n);
+    const bool isSure = squared < least;
+    sure += isSure;
+    possible += !isSure && squared <= most;
+  }
+  order_.resize(possible);
+  for (std::size_t n = 0; n < possible; ++n) order_[n] = squared_[possible_[n]];
+  const auto last = order_.begin() + static_cast<std::ptrdiff_t>(count_ - sure - 1);
+  std::nth_element(order_.begin(), last, order_.end());
+  found.resize(sure + possible);
+  std::size_t chosen = 0;
+  for (std::size_t n = 0; n < sure; ++n) {
+    const std::uint32_t i = sure_[n];
+    found[chosen++] = {squared_[i], ball.numbers[i]};
+  }
+  for (std::size_t n = 0; n < possible; ++n) {
+    const std::uint32_t i = possible_[n];
+    found[chosen] = {squared_[i], ball.numbers[i]};
+    chosen += squared_[i] <= *last;
+  }
+  found.resize(chosen);
+  // Points at one distance count by their numbers.
+  if (found.size() > count_) {
+    std::sort(found.begin(), found.end());
+    found.resize(count_);
+  }
+  std::swap(found.front(), *std::min_element(found.begin(), found.end()));
+  std::swap(found.back(), *std::max_element(found.begin(), found.end()));
+}
+
+}  // namespace levelset::points
