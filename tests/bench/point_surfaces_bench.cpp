@@ -18,7 +18,8 @@
 // to the true surface and back, the mean angle between normals in degrees, the error of the volume,
 // Euler characteristic, components, triangles, CPU seconds of the method and of the normals, peak
 // memory in MB since the start of the program, and the point spacing in fractions of the diagonal.
-// All methods run with the same point spacing; ours uses voxels of half a spacing.
+// All methods run with the same point spacing; ours uses voxels of half a spacing, or of VOXEL
+// spacings if this environment variable is set.
 
 #define CGAL_EIGEN3_ENABLED
 #include <CGAL/Advancing_front_surface_reconstruction.h>
@@ -270,12 +271,14 @@ int main(int argc, char** argv) try {
     normalSeconds = seconds() - start;
   }
   const double spacing = levelset::points::orient(cloud).medianSpacing;
+  const char* share = std::getenv("VOXEL");
+  const double voxelSize = spacing * (share ? std::stod(share) : 0.5);
   // docs/points.md recommends these for noise of 0.2 spacings, and for scans.
   const double lambda = deviation < 0.1 ? 0 : 30;
   const double rbfTolerance = count == 0 ? 0.1 : 0.02;
   const auto ours = [&](levelset::PointMethod method) {
     const bool isRbf = method == levelset::PointMethod::RadialBasis;
-    return bandToMesh(pointsToBand(cloud, spacing / 2,
+    return bandToMesh(pointsToBand(cloud, voxelSize,
                                    {.method = method,
                                     .neighbours = isRbf ? 0 : neighbours,
                                     .tolerance = isRbf ? rbfTolerance : 0.02,
@@ -294,12 +297,12 @@ int main(int argc, char** argv) try {
        [&] {
          TriMesh mesh = advancingFront(cloud);
          turnOutwards(mesh);
-         return throughBand(mesh, spacing / 2);
+         return throughBand(mesh, voxelSize);
        }},
 #ifdef LEVELSMITH_HAS_PCL
       {"pcl-poisson", [&] { return pclPoisson(cloud, spacing); }},
 #endif
-      {"truth-band", [&] { return throughBand(truth, spacing / 2); }},
+      {"truth-band", [&] { return throughBand(truth, voxelSize); }},
   };
   for (const auto& [name, run] : methods) {
     bool isAsked = argc == 6;
