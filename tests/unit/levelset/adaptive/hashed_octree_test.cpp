@@ -77,6 +77,7 @@ class HashedOctreeTest : public testing::Test {
   }
   void expectLeavesOfRandomPoints(int count);
   void expectKnownCells(int count);
+  void expectNeighbours(int count);
   void expectNodes(int count);
   int within(int count) { return static_cast<int>(random() % static_cast<unsigned>(count)); }
 
@@ -134,25 +135,36 @@ TEST_F(HashedOctreeTest, KnowsItsCells) {
   expectKnownCells(100000);
 }
 
-TEST_F(HashedOctreeTest, FindsNeighboursAcrossFaces) {
-  for (const CellKey& leaf : reference.leaves())
+/// Neighbours of random cells of all levels that are in the tree, across random faces.
+void HashedOctreeTest::expectNeighbours(int count) {
+  int larger = 0, outside = 0;
+  for (int k = 0; k < count;) {
+    const V3i inside(within(1 << kDepth), within(1 << kDepth), within(1 << kDepth));
+    CellKey cell = reference.leafAt(inside, octree.root());
+    cell = cell.ancestor(cell.level + within(kDepth - cell.level + 1));
     for (int axis = 0; axis < 3; ++axis)
       for (const int side : {-1, 1}) {
-        V3i beside = leaf.low();
-        beside[axis] += side < 0 ? -1 : int(leaf.edge());
-        const auto found = octree.neighbour(leaf, axis, side);
-        if (beside[axis] < 0 || beside[axis] >= 1 << kDepth) {
+        ++k;
+        V3i beside = cell.low();
+        beside[axis] += side < 0 ? -1 : int(cell.edge());
+        const auto found = octree.neighbour(cell, axis, side);
+        if (!Reference::holds(octree.root(), beside)) {
           ASSERT_FALSE(found);
+          ++outside;
           continue;
         }
+        const CellKey leaf = reference.leafAt(beside, octree.root());
         ASSERT_TRUE(found);
-        const CellKey expected = reference.leafAt(beside, octree.root());
-        ASSERT_GE(found->level, leaf.level);
-        if (expected.level >= leaf.level)
-          ASSERT_EQ(*found, expected);
-        else
-          ASSERT_EQ(*found, expected.ancestor(leaf.level));
+        ASSERT_EQ(*found, leaf.level >= cell.level ? leaf : leaf.ancestor(cell.level));
+        larger += leaf.level > cell.level;
       }
+  }
+  EXPECT_GT(larger, count / 100);
+  EXPECT_GT(outside, count / 100);
+}
+
+TEST_F(HashedOctreeTest, FindsNeighboursAcrossFaces) {
+  expectNeighbours(50000);
 }
 
 void HashedOctreeTest::expectNodes(int count) {
@@ -198,6 +210,7 @@ using SlowHashedOctreeTest = HashedOctreeTest;
 TEST_F(SlowHashedOctreeTest, AnswersAMillionQueries) {
   expectLeavesOfRandomPoints(1000000);
   expectKnownCells(1000000);
+  expectNeighbours(1000000);
   expectNodes(1000000);
 }
 
