@@ -18,10 +18,13 @@
 #include <vector>
 
 #include "levelset/convert/mesh_to_band.h"
+#include "levelset/csg/csg.h"
 #include "levelset/meshing/band_to_mesh.h"
 #include "levelset/segmented/segment_solids.h"
 #include "levelset/shapes/shapes.h"
+#include "render/cpu/cpu_tracer.h"
 #include "render/images/image.h"
+#include "render/kernel/kernel_scene.h"
 #include "render/segmented/interface_caster.h"
 #include "render/segmented/segmented_part.h"
 #include "render/segmented/slab_renderer.h"
@@ -79,11 +82,36 @@ SegmentedField fieldOf(const std::vector<NarrowBand>& solids, std::vector<Region
 }
 
 /// Ball of region 3 in a shell of region 1, with a ball of region 2 that reaches out of both.
-SegmentedField shellScene(int n) {
+std::vector<NarrowBand> shells(int n) {
   const double voxel = 2.3 / n;
-  return fieldOf({makeSphere(1, V3d(0), voxel), makeSphere(0.7, V3d(0.1, 0.1, 0.2), voxel),
-                  makeSphere(0.4, V3d(0.45, 0.35, 0.6), voxel)},
-                 {1, 2, 3});
+  return {makeSphere(1, V3d(0), voxel), makeSphere(0.7, V3d(0.1, 0.1, 0.2), voxel),
+          makeSphere(0.4, V3d(0.45, 0.35, 0.6), voxel)};
+}
+
+SegmentedField shellScene(int n) {
+  return fieldOf(shells(n), {1, 2, 3});
+}
+
+/// Seconds of the first hits of one isosurface, the outer surface of the shells.
+double isosurfaceSeconds(int n, const Camera& camera) {
+  const std::vector<NarrowBand> solids = shells(n);
+  Scene scene;
+  scene.camera = camera;
+  scene.solids.push_back({.band = unite(unite(solids[0], solids[1]), solids[2])});
+  const KernelScene surface(scene);
+  constexpr int kRows = 16;
+  return secondsOf([&] {
+    for (int top = 0; top < camera.height; top += kRows) {
+      PixelBlock pixels(static_cast<std::size_t>(kRows * camera.width));
+      for (std::size_t k = 0; k < pixels.size(); ++k) {
+        pixels.x[k] =
+            static_cast<float>(static_cast<int>(k) % camera.width + 0.5 - 0.5 * camera.width);
+        pixels.y[k] = static_cast<float>(top + static_cast<int>(k) / camera.width + 0.5 -
+                                         0.5 * camera.height);
+      }
+      (void)surface.castPixels(CpuTracer(), pixels);
+    }
+  });
 }
 
 /// Region 3 and region 1 without region 2 between them and the void.
@@ -96,7 +124,8 @@ SegmentedField filmScene(int n) {
 void printTable() {
   constexpr int kPixels = 256;
   const Camera camera = viewOf(kPixels);
-  fmt::print("grid,slices,slabs_ms,slabs_us_per_slice,exact_ms,exact_million_rays_per_s\n");
+  fmt::print(
+      "grid,slices,slabs_ms,slabs_us_per_slice,exact_ms,exact_million_rays_per_s,isosurface_ms\n");
   for (const int n : {128, 256}) {
     const SegmentedField field = shellScene(n);
     const PackedDistances packed = packedOf(field, n);
@@ -106,11 +135,13 @@ void printTable() {
     const double exact = secondsOf([&] {
       for (const InterfaceRay& ray : rays) hits += caster.firstHit(ray).found;
     });
+    const double isosurface = isosurfaceSeconds(n, camera);
     for (const int slices : {32, 64, 128, 256}) {
       const double slabs =
           secondsOf([&] { (void)renderSlabs(packed, camera, {.slices = slices}); });
-      fmt::print("{},{},{:.1f},{:.1f},{:.1f},{:.2f}\n", n, slices, 1e3 * slabs,
-                 1e6 * slabs / slices, 1e3 * exact, 1e-6 * double(rays.size()) / exact);
+      fmt::print("{},{},{:.1f},{:.1f},{:.1f},{:.2f},{:.1f}\n", n, slices, 1e3 * slabs,
+                 1e6 * slabs / slices, 1e3 * exact, 1e-6 * double(rays.size()) / exact,
+                 1e3 * isosurface);
     }
     if (hits == 0) fmt::print("no ray hits\n");
   }
