@@ -34,6 +34,11 @@ struct ThinPart {
   Imath::V3d position = Imath::V3d(0);  ///< thinnest place, world units
 };
 
+/// Finds the parts of regions that are thinner than a voxel along a line of the grid. Parts that
+/// hold no grid point are not in the field.
+/// @return one entry for each label with thin parts, ascending
+[[nodiscard]] std::vector<ThinPart> thinParts(const SegmentedField& field);
+
 struct SegmentSolidsResult {
   SegmentedField field;
   std::vector<std::string> notes;  ///< one for each operand that was resampled, narrowed or widened

@@ -144,4 +144,8 @@ std::vector<ThinPart> thinParts(const SegmentedField& field, std::span<const Los
   return result;
 }
 
+std::vector<ThinPart> thinParts(const SegmentedField& field) {
+  return thinParts(field, {});
+}
+
 }  // namespace levelset

@@ -63,6 +63,7 @@ class MeshRegions {
       checkSides();
       listPairs();
       result.field = makeField(nullptr);
+      result.thinParts = thinParts(result.field);
     }
     report(options_.progress, 1);
     return result;

@@ -35,26 +35,28 @@ std::string placeText(const Imath::V3d& p) {
   return fmt::format("{:.4g},{:.4g},{:.4g}", p.x, p.y, p.z);
 }
 
-/// Puts the thin and the covered regions into the certificate and the warnings.
-void reportRegions(const levelset::SegmentSolidsResult& result, Invocation& in) {
+/// Puts the thin and the empty regions into the certificate and the warnings.
+void reportRegions(const SegmentedField& field, const std::vector<levelset::ThinPart>& thinParts,
+                   const std::vector<RegionLabel>& vanished, Invocation& in) {
+  const std::string remedy =
+      kindOfParts(in) == Kind::Volume ? "give a finer volume" : "use a smaller --voxel";
   Json thin = Json::array();
-  for (const levelset::ThinPart& part : result.thinParts) {
+  for (const levelset::ThinPart& part : thinParts) {
     thin.push_back({{"label", part.label},
                     {"places", part.places},
                     {"lost", part.isLost},
                     {"thickness", part.thickness},
                     {"position", {part.position.x, part.position.y, part.position.z}}});
-    in.notes.warnings.push_back(fmt::format(
-        "region {} is thinner than a voxel at {} place{}, {:.3g} at {}{}; use a smaller --voxel",
-        part.label, part.places, part.places == 1 ? "" : "s", part.thickness,
-        placeText(part.position), part.isLost ? ", and has holes there" : ""));
+    in.notes.warnings.push_back(
+        fmt::format("region {} is thinner than a voxel at {} place{}, {:.3g} at {}{}; {}",
+                    part.label, part.places, part.places == 1 ? "" : "s", part.thickness,
+                    placeText(part.position), part.isLost ? ", and has holes there" : "", remedy));
   }
-  for (const RegionLabel label : result.vanished)
+  for (const RegionLabel label : vanished)
     in.notes.warnings.push_back(fmt::format(
         "region {} is empty: later solids cover it, or it is thinner than a voxel", label));
   in.notes.certificateJson =
-      Json{{"labels", result.field.labels()}, {"vanished", result.vanished}, {"thin", thin}}.dump();
-  in.notes.notes.insert(in.notes.notes.end(), result.notes.begin(), result.notes.end());
+      Json{{"labels", field.labels()}, {"vanished", vanished}, {"thin", thin}}.dump();
 }
 
 Value segmentByMesh(Invocation& in) {
@@ -68,16 +70,24 @@ Value segmentByMesh(Invocation& in) {
       fmt::format("the mesh has {} patches between its junctions, and encloses "
                   "{} regions",
                   result.patches, result.field.labels().size()));
-  if (in.flag("sheets")) reportSheets(result, in);
+  if (in.flag("sheets"))
+    reportSheets(result, in);
+  else
+    reportRegions(result.field, result.thinParts, {}, in);
   return Value(result.field);
 }
 
+Value segmentByLabels(Invocation& in) {
+  const SegmentedField field = levelset::segmentLabels(
+      in.operands[0].volume(), {.smooth = in.given("smooth") ? in.number("smooth") : 0,
+                                .maxMemory = in.maxMemory,
+                                .progress = in.progress});
+  reportRegions(field, levelset::thinParts(field), {}, in);
+  return Value(field);
+}
+
 Value segment(Invocation& in) {
-  if (kindOfParts(in) == Kind::Volume)
-    return Value(levelset::segmentLabels(in.operands[0].volume(),
-                                         {.smooth = in.given("smooth") ? in.number("smooth") : 0,
-                                          .maxMemory = in.maxMemory,
-                                          .progress = in.progress}));
+  if (kindOfParts(in) == Kind::Volume) return segmentByLabels(in);
   if (kindOfParts(in) == Kind::Mesh) return segmentByMesh(in);
   levelset::SegmentSolidsOptions options{
       .halfWidth = in.number("half-width"), .maxMemory = in.maxMemory, .progress = in.progress};
@@ -85,7 +95,8 @@ Value segment(Invocation& in) {
   std::vector<levelset::NarrowBand> solids;
   for (const Value& operand : in.operands) solids.push_back(operand.band());
   const levelset::SegmentSolidsResult result = levelset::segmentSolids(solids, options);
-  reportRegions(result, in);
+  reportRegions(result.field, result.thinParts, result.vanished, in);
+  in.notes.notes.insert(in.notes.notes.end(), result.notes.begin(), result.notes.end());
   return Value(result.field);
 }
 

@@ -86,6 +86,24 @@ TEST(SegmentMesh, FindsTheRoomsOfABoxWithWalls) {
     }
 }
 
+TEST(SegmentMesh, NamesRoomsThatAreThinnerThanAVoxel) {
+  const auto rooms = [](double from, double to) {
+    const V3d low(0, 0.03, 0.03), size(1);
+    TriMesh mesh;
+    for (const auto& [a, b] : {std::pair{0.0, from}, {from, to}, {to, 2.0}})
+      mesh = support::joined(mesh, support::boxMesh(low + V3d(a, 0, 0), low + V3d(b, 1, 1)));
+    return segmentMesh(mesh, 0.1);
+  };
+  const SegmentMeshResult thin = rooms(0.97, 1.03);
+  EXPECT_EQ(thin.field.labels(), (std::vector<RegionLabel>{1, 2, 3}));
+  ASSERT_EQ(thin.thinParts.size(), 1u);
+  EXPECT_EQ(thin.thinParts[0].label, 3);
+  EXPECT_EQ(thin.thinParts[0].places, 100u);
+  EXPECT_NEAR(thin.thinParts[0].thickness, 0.06, 0.025);
+  EXPECT_NEAR(thin.thinParts[0].position.x, 1, 0.015);
+  EXPECT_TRUE(rooms(0.85, 1.15).thinParts.empty());
+}
+
 TEST(SegmentMesh, RepeatsAPartitionWithSecondOrder) {
   const support::Frame frame = support::turnedFrame(V3d(0.017, -0.023, 0.031), 0.7);
   const SegmentedMesh given =
