@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "levelset/error.h"
 
@@ -64,7 +65,7 @@ CameraRays::CameraRays(const Camera& camera) : camera_(camera) {
 }
 
 Camera::Ray CameraRays::at(double x, double y) const {
-  const V3d shift = right_ * ((2 * x / camera_.width - 1) * halfWidth_) +
+  const V3d shift = right_ * ((2 * (x - camera_.axisShift) / camera_.width - 1) * halfWidth_) +
                     up_ * ((1 - 2 * y / camera_.height) * halfHeight_);
   const double end = camera_.farthest();
   if (camera_.orthoHeight) return {camera_.from + shift, forward_, camera_.near, end};
@@ -100,7 +101,8 @@ Imath::M44d Camera::worldToNdc() const {
   const double sx = 0.5 / half.x, sy = -0.5 / half.y;
   // Programs that read the matrix discard the third coordinate; the third row and column only keep
   // the matrix invertible.
-  const Imath::M44d perspective(sx, 0, 0, 0, 0, sy, 0, 0, 0.5, 0.5, 1, 1, 0, 0, -1, 0);
+  const Imath::M44d perspective(sx, 0, 0, 0, 0, sy, 0, 0, 0.5 + axisShift / width, 0.5, 1, 1, 0, 0,
+                                -1, 0);
   const Imath::M44d orthographic(sx, 0, 0, 0, 0, sy, 0, 0, 0, 0, 1, 0, 0.5, 0.5, 0, 1);
   return worldToCamera() * (orthoHeight ? orthographic : perspective);
 }
@@ -137,6 +139,11 @@ void validate(const Camera& camera) {
                     "another up",
                     text(camera.up), text(camera.from), text(camera.to)));
   }
+  if (!std::isfinite(camera.axisShift) || (camera.orthoHeight && camera.axisShift != 0))
+    throw UsageError(fmt::format(
+        "camera: a shift of the view axis by {} pixels needs a view in perspective, and "
+        "a finite number",
+        camera.axisShift));
   if (camera.orthoHeight) {
     if (!(*camera.orthoHeight > 0) || !std::isfinite(*camera.orthoHeight)) {
       throw UsageError(fmt::format("camera: the orthographic height {} must be a positive length",
@@ -154,6 +161,30 @@ void validate(const Camera& camera) {
                     "near plane at 0 or more, and a far plane behind it",
                     camera.near, camera.farthest()));
   }
+}
+
+std::array<Camera, 2> stereoCameras(const Camera& camera, double eyeDistance, double screenDepth) {
+  if (camera.orthoHeight)
+    throw levelset::UsageError(
+        "a stereo picture needs a view in perspective, but the view is orthographic; leave --ortho "
+        "out");
+  for (const auto& [name, length] :
+       {std::pair("eye-distance", eyeDistance), {"screen-depth", screenDepth}})
+    if (!(length > 0) || !std::isfinite(length))
+      throw levelset::UsageError(
+          fmt::format("--{} {} is not a positive length; give one in world units", name, length));
+  const Camera::PixelSteps step = camera.pixelSteps();
+  const double width = step.right.length();  // of a pixel, at unit depth
+  const V3d right = step.right / width;
+  std::array<Camera, 2> eyes{camera, camera};
+  for (int n = 0; n < 2; ++n) {
+    const double offset = (n == 0 ? -0.5 : 0.5) * eyeDistance;
+    Camera& eye = eyes[static_cast<std::size_t>(n)];
+    eye.from += right * offset;
+    eye.to += right * offset;
+    eye.axisShift += offset / (screenDepth * width);
+  }
+  return eyes;
 }
 
 namespace {

@@ -4,6 +4,7 @@
 #include <Imath/ImathMatrix.h>
 #include <Imath/ImathVec.h>
 
+#include <array>
 #include <functional>
 #include <optional>
 #include <vector>
@@ -24,6 +25,11 @@ struct Camera {
   double near = 0;
   std::optional<double> far = {};
   int width = 1024, height = 1024;  ///< size of the picture, pixels
+  /// Distance of the view axis to the right of the middle of the picture, pixels. Other than 0 for
+  /// the eyes of a stereo picture, whose frusta are asymmetric. Not in an orthographic view.
+  double axisShift = 0;
+  /// Horizontal position of the view axis in the picture, pixels.
+  [[nodiscard]] double middleX() const { return 0.5 * width + axisShift; }
 
   struct Ray {
     Imath::V3d origin, direction;  ///< direction of unit length
@@ -64,6 +70,15 @@ class CameraRays {
   Imath::V3d right_, up_, forward_;
   double halfWidth_, halfHeight_;
 };
+
+/// Cameras of the left and the right eye, with parallel axes. A point at the depth `screenDepth`
+/// has the same position in both pictures. A point at depth Z is further to the right in the left
+/// one, by eyeDistance (1/Z − 1/screenDepth) over the width of a pixel at unit depth.
+/// @param camera  between the eyes
+/// @param eyeDistance, screenDepth  world units, positive
+/// @throws levelset::UsageError for an orthographic camera, and lengths that are not positive
+[[nodiscard]] std::array<Camera, 2> stereoCameras(const Camera& camera, double eyeDistance,
+                                                  double screenDepth);
 
 /// Largest number of pixels of an image; larger images are refused.
 inline constexpr double kMaxPixels = 268435456;  // 2^28

@@ -1,5 +1,6 @@
 #include "render/bezier/bezier_view.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace render {
@@ -12,7 +13,8 @@ BezierView::BezierView(const Camera& camera)
       isPerspective(!camera.orthoHeight),
       near(camera.near),
       far(camera.farthest()),
-      middle(0.5 * camera.width, 0.5 * camera.height) {
+      middle(camera.middleX(), 0.5 * camera.height),
+      reach(std::max(middle.x, camera.width - middle.x), middle.y) {
   const Camera::PixelSteps steps = camera.pixelSteps();
   step = {steps.right.length(), steps.down.length()};
   right = steps.right / step.x;

@@ -15,7 +15,8 @@ struct BezierView {
   bool isPerspective = false;
   double near = -Camera::kNoDepth, far = Camera::kNoDepth;  ///< visible depths
   Imath::V2d step{1, 1};    ///< screen distance of neighbouring pixels
-  Imath::V2d middle{0, 0};  ///< image position of the centre, pixels
+  Imath::V2d middle{0, 0};  ///< image position of the view axis, pixels
+  Imath::V2d reach{0, 0};   ///< farthest distances of the picture's edges from `middle`, pixels
 
   /// World space: along z, with all depths.
   BezierView() = default;

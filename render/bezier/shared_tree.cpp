@@ -191,7 +191,7 @@ SharedTree::SharedTree(const BezierVolume& volume, const Camera& camera,
                        const TreeOptions& options) {
   const BezierView view(camera);
   data_ = std::make_unique<const Data>(
-      volume, view, V2d(view.step.x * view.middle.x, view.step.y * view.middle.y), options);
+      volume, view, V2d(view.step.x * view.reach.x, view.step.y * view.reach.y), options);
 }
 SharedTree::~SharedTree() = default;
 SharedTree::SharedTree(SharedTree&&) noexcept = default;

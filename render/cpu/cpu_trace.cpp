@@ -62,7 +62,13 @@ void findNothing(HitBlock& hits) {
 
 void traceRays(const BrickPool& pool, const RayBlock& rays, HitBlock& hits, InstructionSet set) {
   if (pool.brickCount() == 0) return findNothing(hits);
-  traceOn(set, pool, rays, hits);
+  traceOn(set, pool, rays, hits, static_cast<ShapeBlock*>(nullptr));
+}
+
+void traceRays(const BrickPool& pool, const RayBlock& rays, HitBlock& hits, ShapeBlock& shapes,
+               InstructionSet set) {
+  if (pool.brickCount() == 0) return findNothing(hits);
+  traceOn(set, pool, rays, hits, &shapes);
 }
 
 void tracePixels(const BrickPool& pool, const RayFan& fan, const PixelBlock& pixels, HitBlock& hits,

@@ -20,6 +20,12 @@ enum class InstructionSet { Sse2, Avx2, Avx512 };
 void traceRays(const BrickPool& pool, const RayBlock& rays, HitBlock& hits,
                InstructionSet set = instructionSets().back());
 
+/// Finds the first crossing of each ray, and the shape of the surface there.
+/// @param hits, shapes  must have as many entries as `rays`
+/// @pre the processor supports the set
+void traceRays(const BrickPool& pool, const RayBlock& rays, HitBlock& hits, ShapeBlock& shapes,
+               InstructionSet set = instructionSets().back());
+
 /// Finds the first crossing of the ray through each pixel, and the shape of the surface at the
 /// crossing. It is fastest when neighbouring pixels follow each other.
 /// @param hits, shapes  must have as many entries as `pixels`

@@ -15,6 +15,10 @@ class CpuTracer : public KernelTracer {
   void trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits) const override {
     traceRays(solid.pool, rays, hits, set_);
   }
+  void trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits,
+             ShapeBlock& shapes) const override {
+    traceRays(solid.pool, rays, hits, shapes, set_);
+  }
 
  private:
   InstructionSet set_ = instructionSets().back();

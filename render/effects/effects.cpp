@@ -10,10 +10,11 @@
 
 #include "levelset/error.h"
 #include "render/effects/canvas.h"
-#include "render/effects/environment_map.h"
 #include "render/effects/picture_view.h"
 #include "render/effects/solid_pattern.h"
 #include "render/effects/stereo.h"
+#include "render/optics/environment_map.h"
+#include "render/optics/fresnel.h"
 #include "render/shading/style.h"
 
 namespace render {
@@ -59,15 +60,6 @@ void carve(Image& image, const EffectOptions& options, double diagonal) {
   });
 }
 
-/// Direction of a ray behind a surface. @param normal  unit normal, towards the eye
-/// @return the mirrored direction under total reflection
-V3d refracted(const V3d& direction, const V3d& normal, double index) {
-  const double cosine = -direction.dot(normal), ratio = 1 / index;
-  const double squared = 1 - ratio * ratio * (1 - cosine * cosine);
-  if (squared < 0) return direction + normal * (2 * cosine);
-  return direction * ratio + normal * (ratio * cosine - std::sqrt(squared));
-}
-
 void mirror(Image& image, const EffectOptions& options, std::size_t maxMemory) {
   const VectorLayer normals(image, "N", options.reflect > 0 ? "--reflect" : "--refract");
   const PictureView view(image);
@@ -81,13 +73,16 @@ void mirror(Image& image, const EffectOptions& options, std::size_t maxMemory) {
     if (n.dot(d) > 0) n = -n;
     const double cosine = std::clamp(-n.dot(d), 0.0, 1.0), a = canvas.alpha(i);
     V3d colour = canvas.colour(i);
-    if (options.refract > 0)
+    const V3d inMirror = surroundings.light(mirrored(d, n));
+    if (options.refract > 0) {
+      const double share = fresnelShare(cosine, options.index);
+      const V3d behind = surroundings.light(refracted(d, n, options.index).value_or(d));
       colour = colour * (1 - options.refract) +
-               surroundings.light(refracted(d, n, options.index)) * (a * options.refract);
+               (inMirror * share + behind * (1 - share)) * (a * options.refract);
+    }
     if (options.reflect > 0) {
-      const double share =
-          options.reflect + (1 - options.reflect) * std::pow(1 - cosine, 5);  // [Schlick94]
-      colour = colour * (1 - share) + surroundings.light(d + n * (2 * cosine)) * (a * share);
+      const double share = schlickShare(options.reflect, cosine);
+      colour = colour * (1 - share) + inMirror * (a * share);
     }
     canvas.set(i, colour);
   });

@@ -82,8 +82,38 @@ struct LookOptions {
 enum class SolidTexture { None, Checker, Noise, Marble, Wood };
 enum class Stereo { None, Anaglyph, SideBySide, CrossEyed };
 
+/// Pictures for two eyes.
+struct StereoOptions {
+  Stereo stereo = Stereo::None;
+  std::optional<double> eyeDistance = {}, screenDepth = {};
+
+  template <class Visitor>
+  static void describe(Visitor& visit) {
+    using levelset::OptionRange;
+    using levelset::OptionUnit;
+    visit("stereo", &StereoOptions::stereo,
+          {{"none", Stereo::None},
+           {"anaglyph", Stereo::Anaglyph},
+           {"side-by-side", Stereo::SideBySide},
+           {"cross-eyed", Stereo::CrossEyed}},
+          {.help = "pictures for two eyes: an anaglyph for red and cyan glasses, or both beside "
+                   "each other, with the left one left or (cross-eyed) right"});
+    visit("eye-distance", &StereoOptions::eyeDistance,
+          {.help = "with --stereo: distance of the eyes; default: a thirtieth of the least depth",
+           .unit = OptionUnit::Length,
+           .range = OptionRange::Positive,
+           .allowsVoxels = false});
+    visit("screen-depth", &StereoOptions::screenDepth,
+          {.help = "with --stereo: depth that appears in the plane of the picture; default: half "
+                   "way between the nearest and the farthest surface",
+           .unit = OptionUnit::Length,
+           .range = OptionRange::Positive,
+           .allowsVoxels = false});
+  }
+};
+
 /// Effects beside those of LookOptions.
-struct EffectOptions {
+struct EffectOptions : StereoOptions {
   double occlusion = 0;
   std::optional<double> occlusionRadius = {};
   double shadow = 0;
@@ -97,8 +127,6 @@ struct EffectOptions {
   double index = 1.5;
   std::string environment = "studio";
   int reflectionLines = 0;
-  Stereo stereo = Stereo::None;
-  std::optional<double> eyeDistance = {}, screenDepth = {};
   int reduce = 1;
 
   template <class Visitor>
@@ -148,10 +176,11 @@ struct EffectOptions {
           {.help = "share of light, from 0 to 1, that the surfaces mirror straight on; more at "
                    "grazing angles, by Schlick's formula",
            .range = OptionRange::NonNegative});
-    visit("refract", &EffectOptions::refract,
-          {.help = "share of the colours, from 0 to 1, that is replaced by the environment seen "
-                   "through the surface",
-           .range = OptionRange::NonNegative});
+    visit(
+        "refract", &EffectOptions::refract,
+        {.help = "share of the colours, from 0 to 1, that is replaced by the environment as clear "
+                 "glass shows it: refracted and, by Fresnel's equations, reflected",
+         .range = OptionRange::NonNegative});
     visit("index", &EffectOptions::index,
           {.help = "with --refract: index of refraction", .range = OptionRange::Positive});
     visit("environment", &EffectOptions::environment,
@@ -161,24 +190,7 @@ struct EffectOptions {
           {.help = "number of parallel lines that a mirroring surface shows in place of the "
                    "colours; 0: none",
            .range = OptionRange::NonNegative});
-    visit("stereo", &EffectOptions::stereo,
-          {{"none", Stereo::None},
-           {"anaglyph", Stereo::Anaglyph},
-           {"side-by-side", Stereo::SideBySide},
-           {"cross-eyed", Stereo::CrossEyed}},
-          {.help = "pictures for two eyes: an anaglyph for red and cyan glasses, or both beside "
-                   "each other, with the left one left or (cross-eyed) right"});
-    visit("eye-distance", &EffectOptions::eyeDistance,
-          {.help = "with --stereo: distance of the eyes; default: a thirtieth of the least depth",
-           .unit = OptionUnit::Length,
-           .range = OptionRange::Positive,
-           .allowsVoxels = false});
-    visit("screen-depth", &EffectOptions::screenDepth,
-          {.help = "with --stereo: depth that appears in the plane of the picture; default: the "
-                   "middle of the surfaces that are seen",
-           .unit = OptionUnit::Length,
-           .range = OptionRange::Positive,
-           .allowsVoxels = false});
+    StereoOptions::describe(visit);
     visit("reduce", &EffectOptions::reduce,
           {.help = "edge of the squares of pixels of which each becomes one pixel, for smooth "
                    "edges; widths of lines are in pixels of the result",

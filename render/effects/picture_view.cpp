@@ -61,8 +61,12 @@ void PictureView::readCamera() {
   isPerspective_ = std::abs(projected(forward_, 3)) > 0.5;
   stepX_ = 1 / (projected(right_, 0) * image_.width);
   stepY_ = -1 / (projected(up_, 1) * image_.height);
-  const bool isCamera = std::isfinite(stepX_) && std::isfinite(stepY_) && stepX_ > 0 &&
-                        stepY_ > 0 && std::abs(right_.dot(forward_)) < 1e-3 &&
+  // The matrices are in single precision: smaller shifts of the axis are roundings.
+  constexpr double kLeastShift = 1e-5;
+  const double shift = isPerspective_ ? projected(forward_, 0) - 0.5 : 0;
+  middleX_ = (0.5 + (std::abs(shift) < kLeastShift ? 0 : shift)) * image_.width;
+  const bool isCamera = std::isfinite(middleX_) && std::isfinite(stepX_) && std::isfinite(stepY_) &&
+                        stepX_ > 0 && stepY_ > 0 && std::abs(right_.dot(forward_)) < 1e-3 &&
                         std::abs(right_.dot(up_)) < 1e-3 && std::abs(up_.dot(forward_)) < 1e-3;
   if (!isCamera)
     throw InvalidInput(
@@ -92,7 +96,7 @@ void PictureView::measure() {
 
 V3d PictureView::direction(int x, int y) const {
   if (!isPerspective_) return forward_;
-  const double across = (x + 0.5 - 0.5 * image_.width) * stepX_,
+  const double across = (x + 0.5 - middleX_) * stepX_,
                down = (y + 0.5 - 0.5 * image_.height) * stepY_;
   return (forward_ + right_ * across - up_ * down).normalized();
 }

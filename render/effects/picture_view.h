@@ -24,6 +24,8 @@ class PictureView {
   /// Width and height of a pixel: on the plane at unit depth (perspective), or in world units.
   [[nodiscard]] double stepX() const { return stepX_; }
   [[nodiscard]] double stepY() const { return stepY_; }
+  /// Horizontal position of the view axis in the picture, pixels.
+  [[nodiscard]] double middleX() const { return middleX_; }
   /// Unit axes of the picture, in world space.
   [[nodiscard]] const Imath::V3d& right() const { return right_; }
   [[nodiscard]] const Imath::V3d& up() const { return up_; }
@@ -48,7 +50,7 @@ class PictureView {
   const Image& image_;
   const std::vector<float>* depths_ = nullptr;
   bool isPerspective_ = true;
-  double stepX_ = 1, stepY_ = 1, diagonal_ = 0;
+  double stepX_ = 1, stepY_ = 1, middleX_ = 0, diagonal_ = 0;
   Imath::V2d depthRange_{0};
   Imath::V3d right_, up_, forward_;
 };

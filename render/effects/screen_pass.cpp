@@ -8,6 +8,7 @@
 
 #include "render/effects/picture_view.h"
 #include "render/effects/screen_kernel.h"
+#include "render/shading/sampling.h"
 #include "render/shading/shading.h"
 
 namespace render {
@@ -29,6 +30,7 @@ std::vector<double> numbersOf(const PictureView& view) {
   numbers[ScreenKernel::kStepX] = view.stepX();
   numbers[ScreenKernel::kStepY] = view.stepY();
   numbers[ScreenKernel::kRayGrowth] = kGrowth;
+  numbers[ScreenKernel::kMiddleX] = view.middleX();
   return numbers;
 }
 
@@ -55,16 +57,6 @@ ScreenTables tablesOf(const PictureView& view) {
     }
   });
   return tables;
-}
-
-/// Direction in a cone around `axis`, by a random point in [0, 1)².
-V3d coneRay(const V3d& axis, double halfAngle, const V2d& u) {
-  const V3d other = std::abs(axis.x) < 0.5 ? V3d(1, 0, 0) : V3d(0, 1, 0);
-  const V3d s = axis.cross(other).normalized(), t = axis.cross(s);
-  const double cosine = 1 - u.x * (1 - std::cos(halfAngle));
-  const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
-  const double angle = 2 * std::numbers::pi * u.y;
-  return s * (sine * std::cos(angle)) + t * (sine * std::sin(angle)) + axis * cosine;
 }
 
 /// Appends the sets of rays to the numbers of the kernel. All sets together sample the directions
@@ -131,10 +123,7 @@ std::vector<float> occlusionLayer(const PictureView& view, const OcclusionNumber
   ScreenTables tables = tablesOf(view);
   tables.numbers[ScreenKernel::kRayLength] = of.radius;
   tables.numbers[ScreenKernel::kOccluderDepth] = of.occluderDepth;
-  addRaySets(tables, kOcclusionRays, [](const V2d& u) {
-    const double r = std::sqrt(u.x), angle = 2 * std::numbers::pi * u.y;
-    return V3d(r * std::cos(angle), r * std::sin(angle), std::sqrt(1 - u.x));
-  });
+  addRaySets(tables, kOcclusionRays, [](const V2d& u) { return cosineDirection(V3d(0, 0, 1), u); });
   return runner.run(tables, ScreenPass::Smooth, runner.run(tables, ScreenPass::OpenShare, {}));
 }
 
@@ -144,7 +133,8 @@ std::vector<float> shadowLayer(const PictureView& view, const ShadowNumbers& of,
   tables.numbers[ScreenKernel::kRayLength] = of.length;
   tables.numbers[ScreenKernel::kOccluderDepth] = of.occluderDepth;
   const V3d axis = V3d(of.toLight.x, -of.toLight.y, -of.toLight.z).normalized();
-  addRaySets(tables, kShadowRays, [&](const V2d& u) { return coneRay(axis, of.softness, u); });
+  addRaySets(tables, kShadowRays,
+             [&](const V2d& u) { return coneDirection(axis, of.softness, u); });
   return runner.run(tables, ScreenPass::Smooth, runner.run(tables, ScreenPass::KeyShare, {}));
 }
 

@@ -17,21 +17,44 @@ namespace {
 using Imath::V3d;
 using levelset::InvalidInput;
 
-constexpr double kEyeShare = 1.0 / 30;  // distance of the eyes over the least depth
 // A jump of the shift by more pixels than this between two pixels is a gap between two surfaces.
 constexpr double kGap = 2;
+
+/// Nearness of each pixel, 1 / depth; 0 without a surface. The edge of a surface covers pixels in
+/// part whose middle shows none. They move with the surface, or else they would leave it.
+std::vector<double> nearnessOf(const PictureView& view) {
+  const Image& image = view.image();
+  const auto alphas = image.channels.find("A");
+  std::vector<double> nearness(image.pixelCount(), 0);
+  forPixels(image, [&](int x, int y, std::size_t i) {
+    if (view.isHit(i)) {
+      nearness[i] = 1 / view.depth(i);
+      return;
+    }
+    if (alphas == image.channels.end() || !(alphas->second[i] > 0)) return;
+    for (int dy = std::max(-1, -y); dy <= std::min(1, image.height - 1 - y); ++dy)
+      for (int dx = std::max(-1, -x); dx <= std::min(1, image.width - 1 - x); ++dx) {
+        const std::size_t other =
+            static_cast<std::size_t>(y + dy) * static_cast<std::size_t>(image.width) +
+            static_cast<std::size_t>(x + dx);
+        if (view.isHit(other)) nearness[i] = std::max(nearness[i], 1 / view.depth(other));
+      }
+  });
+  return nearness;
+}
 
 /// A row of the picture as seen by another eye: values between the moved pixels.
 class MovedRow {
  public:
-  MovedRow(const PictureView& view, int y, double shift, double screenDepth)
+  /// @param nearness  from nearnessOf()
+  MovedRow(const PictureView& view, const std::vector<double>& nearness, int y, double shift,
+           double screenDepth)
       : width_(view.image().width),
         first_(static_cast<std::size_t>(y) * static_cast<std::size_t>(width_)) {
     for (int x = 0; x < width_; ++x) {
       const std::size_t i = first_ + static_cast<std::size_t>(x);
-      const double nearness = view.isHit(i) ? 1 / view.depth(i) : 0;
-      nearness_.push_back(nearness);
-      places_.push_back(x + 0.5 - shift * (nearness - 1 / screenDepth) / view.stepX());
+      nearness_.push_back(nearness[i]);
+      places_.push_back(x + 0.5 - shift * (nearness[i] - 1 / screenDepth) / view.stepX());
     }
   }
 
@@ -87,18 +110,20 @@ Image seenFromBeside(const Image& image, double shift, double screenDepth) {
   requireChannels(image, {"R", "G", "B"}, "a stereo picture");
   Image moved(image.width, image.height);
   for (const char* name : {"R", "G", "B", "A"}) moved.addChannel(name, name[0] == 'A' ? 1 : 0);
+  std::vector<std::pair<const float*, float*>> layers;  // of the picture, and moved
+  for (auto& [name, values] : moved.channels)
+    if (const auto source = image.channels.find(name); source != image.channels.end())
+      layers.emplace_back(source->second.data(), values.data());
+  const std::vector<double> nearness = nearnessOf(view);
   tbb::parallel_for(0, image.height, [&](int y) {
-    const MovedRow row(view, y, shift, screenDepth);
+    const MovedRow row(view, nearness, y, shift, screenDepth);
     row.fill([&](int x, std::size_t from, double share) {
       const std::size_t target =
           static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) +
           static_cast<std::size_t>(x);
       const std::size_t next = share > 0 ? from + 1 : from;
-      for (auto& [name, values] : moved.channels) {
-        const auto source = image.channels.find(name);
-        if (source == image.channels.end()) continue;
-        const double a = static_cast<double>(source->second[from]),
-                     b = static_cast<double>(source->second[next]);
+      for (const auto& [source, values] : layers) {
+        const double a = static_cast<double>(source[from]), b = static_cast<double>(source[next]);
         values[target] = static_cast<float>(a + (b - a) * share);
       }
     });
@@ -118,6 +143,7 @@ Image stereoPicture(const Image& left, const Image& right, Stereo kind) {
   for (const char* name : {"R", "G", "B", "A"}) result.addChannel(name);
   const Canvas first(eyes[0], "a stereo picture"), second(eyes[1], "a stereo picture");
   Canvas canvas(result, "a stereo picture");
+  float* alphas = result.channels["A"].data();
   forPixels(result, [&](int x, int y, std::size_t i) {
     const auto width = static_cast<std::size_t>(left.width);
     const std::size_t source =
@@ -133,7 +159,7 @@ Image stereoPicture(const Image& left, const Image& right, Stereo kind) {
     const bool isSecond = (x >= left.width) == (kind == Stereo::SideBySide);
     const Canvas& eye = isSecond ? second : first;
     canvas.set(i, eye.colour(source));
-    result.channels["A"][i] = static_cast<float>(eye.alpha(source));
+    alphas[i] = static_cast<float>(eye.alpha(source));
   });
   result.attributes = left.attributes;
   return result;
@@ -147,8 +173,8 @@ Image stereoOf(const Image& image, Stereo kind, double eyeDistance, double scree
     throw InvalidInput(
         "a stereo picture needs a surface, but the picture shows none; draw one with a surface in "
         "its frame");
-  const double eyes = eyeDistance > 0 ? eyeDistance : kEyeShare * range.x;
-  const double screen = screenDepth > 0 ? screenDepth : 0.5 * (range.x + range.y);
+  const double eyes = eyeDistance > 0 ? eyeDistance : defaultEyeDistance(range);
+  const double screen = screenDepth > 0 ? screenDepth : defaultScreenDepth(range);
   const auto eye = [&](double shift) {
     Image seen = seenFromBeside(image, shift, screen);
     return reduce > 1 ? reducedPicture(std::move(seen), reduce) : seen;

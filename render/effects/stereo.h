@@ -1,9 +1,19 @@
 #pragma once
 
+#include <Imath/ImathVec.h>
+
 #include "render/effects/effects.h"
 #include "render/images/image.h"
 
 namespace render {
+
+// Defaults of StereoOptions. @param depths  of the nearest and the farthest surface, world units
+[[nodiscard]] inline double defaultEyeDistance(const Imath::V2d& depths) {
+  return depths.x / 30;
+}
+[[nodiscard]] inline double defaultScreenDepth(const Imath::V2d& depths) {
+  return 0.5 * (depths.x + depths.y);
+}
 
 /// Computes the picture of another eye from the depth layer. Surfaces that the picture does not
 /// show are filled with the colours of the farther surface beside them.

@@ -6,9 +6,11 @@
 
 #include <algorithm>
 #include <mutex>
+#include <optional>
 
 #include "levelset/error.h"
 #include "render/direct/judged_light.h"
+#include "render/optics/light_paths.h"
 #include "render/shading/shading.h"
 #include "render/views/picture.h"
 
@@ -20,11 +22,36 @@ using Imath::V3d;
 
 constexpr int kTile = 16;  // edge of a tile, pixels
 
+/// Rays of the judge, for light paths.
+class JudgedRays : public SceneRays {
+ public:
+  explicit JudgedRays(const EmbreeScene& scene) : scene_(scene) {}
+  [[nodiscard]] std::vector<Hit> firstHits(const std::vector<Camera::Ray>& rays) const override {
+    std::vector<Hit> hits;
+    hits.reserve(rays.size());
+    for (const Camera::Ray& ray : rays)
+      hits.push_back(scene_.intersect(ray.origin, ray.direction, ray.near, ray.far));
+    return hits;
+  }
+  [[nodiscard]] std::vector<double> transmittances(
+      const std::vector<LightRay>& rays) const override {
+    std::vector<double> shares;
+    shares.reserve(rays.size());
+    for (const LightRay& ray : rays)
+      shares.push_back(scene_.transmittance(ray.origin, ray.direction, ray.maxDistance));
+    return shares;
+  }
+
+ private:
+  const EmbreeScene& scene_;
+};
+
 struct PixelPainter {
   const Scene& scene;
   const EmbreeScene& rays;
   const RenderOptions& options;
   Shader shader;
+  std::optional<LightPaths> paths;  // set for traced reflection or refraction
   PictureLayers layers;
   VolumeShading shading;
 
@@ -36,6 +63,8 @@ struct PixelPainter {
         shader(scene_, rays_.bounds().size().length(), options_),
         layers(image, scene_, options_) {
     shading.toLight = keyDirection(scene_);
+    if (options.optics.isActive())
+      paths.emplace(shader, rays.bounds().size().length(), options.optics, options.maxBytes);
   }
 
   void paint(int x, int y) const {
@@ -68,11 +97,7 @@ struct PixelPainter {
   /// Traces light rays. @param range  all of `lights`
   [[nodiscard]] PointLight traced(const LightRays& range,
                                   const std::vector<LightRay>& lights) const {
-    std::vector<double> transmittances;
-    for (const LightRay& light : lights)
-      transmittances.push_back(
-          rays.transmittance(light.origin, light.direction, light.maxDistance));
-    return Shader::lightOf(range, lights, transmittances);
+    return Shader::lightOf(range, lights, JudgedRays(rays).transmittances(lights));
   }
 
   /// Light of the scene's volume on a part of a ray.
@@ -103,8 +128,10 @@ struct PixelPainter {
       };
       for (const Hit& hit : rays.intersectVisible(ray.origin, ray.direction, ray.near, ray.far)) {
         addVolume(hit.distance);
-        sum.add(shader.colour(hit, ray.direction, lightAt(hit, ray.direction, s)),
-                seen * hit.opacity);
+        Imath::C3f colour = shader.colour(hit, ray.direction, lightAt(hit, ray.direction, s));
+        if (paths)
+          colour = paths->colours(JudgedRays(rays), {{hit, ray.direction, colour, x, y, s}})[0];
+        sum.add(colour, seen * hit.opacity);
         seen *= 1 - hit.opacity;
       }
       if (seen < kLeastTransmittance) continue;

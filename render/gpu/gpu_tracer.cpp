@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "levelset/error.h"
+#include "render/cpu/cpu_trace.h"
 #include "render/gpu/device/gl_objects.h"
 #include "render/gpu/gpu_fields.h"
 #include "render/gpu/gpu_interfaces.h"
@@ -487,6 +488,11 @@ std::vector<VolumeLight> GpuTracer::volumeLight(const DirectVolume& volume,
                                                 const std::vector<VolumeSegment>& segments,
                                                 const VolumeShading* shading) const {
   return impl_->light.light(volume, segments, shading);
+}
+
+void GpuTracer::trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits,
+                      ShapeBlock& shapes) const {
+  traceRays(solid.pool, rays, hits, shapes);
 }
 
 std::vector<InterfaceHit> GpuTracer::interfaceHits(const InterfaceCaster& caster,

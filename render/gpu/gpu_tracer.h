@@ -29,6 +29,9 @@ class GpuTracer : public KernelTracer {
   void trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits,
              ShapeBlock& shapes) const override;
   void trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits) const override;
+  /// Traces on the processor: the shader computes shapes for rays of the camera only.
+  void trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits,
+             ShapeBlock& shapes) const override;
   [[nodiscard]] std::vector<double> search(const FieldTraversal& fields,
                                            const std::vector<FieldSegment>& segments,
                                            FieldQuestion question) const override;

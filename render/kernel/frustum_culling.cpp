@@ -33,13 +33,18 @@ FrustumCulling::FrustumCulling(const Scene& scene, const RenderOptions& options,
   }
   add(camera.from, axis);
   const Camera::PixelSteps step = camera.pixelSteps();
-  for (const V3d& edge : {step.right * (0.5 * camera.width), step.down * (0.5 * camera.height)})
-    for (const double side : {-1.0, 1.0}) {
-      if (camera.orthoHeight)
-        add(camera.from + edge * side, edge * -side);
-      else  // `edge` leads from the centre of the picture to its edge, at unit depth
-        add(camera.from, axis * edge.length() - edge * (side / edge.length()));
-    }
+  // Vectors from the view axis to the edges of the picture, at unit depth.
+  const V3d edges[4] = {step.right * -camera.middleX(),
+                        step.right * (camera.width - camera.middleX()),
+                        step.down * (-0.5 * camera.height), step.down * (0.5 * camera.height)};
+  for (int n = 0; n < 4; ++n) {
+    const V3d outwards = (n < 2 ? step.right : step.down) * (n % 2 == 0 ? -1.0 : 1.0);
+    if (camera.orthoHeight)
+      add(camera.from + edges[n], -outwards);
+    else
+      add(camera.from,
+          axis * (edges[n].dot(outwards) / outwards.length()) - outwards / outwards.length());
+  }
   if (!isLit) return;
   // The Shader starts light rays at a distance of twice the surface error from the hit. The error
   // is at most an eighth of the sum of the second differences of φ along the three axes. Each of

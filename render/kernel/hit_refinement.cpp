@@ -225,13 +225,12 @@ double crossingNear(const KernelSolid& solid, const V3i& cell, const V3d& origin
 
 }  // namespace
 
-double refineHit(const KernelSolid& solid, const PixelBlock& pixels, std::size_t n,
+double refineHit(const KernelSolid& solid, const std::pair<V3d, V3d>& ray, std::size_t n,
                  const HitBlock& hits, ShapeBlock& shapes) {
   shapes.flush(n);
   const V3i cell(hits.x[n], hits.y[n], hits.z[n]);
   const V3d place = V3d(cell) + shapes.placeInCell(n);
-  const auto [origin, direction] =
-      solid.fan.exactRay(static_cast<double>(pixels.x[n]), static_cast<double>(pixels.y[n]));
+  const auto& [origin, direction] = ray;
   const double t = crossingNear(solid, cell, origin, direction, place, shapes.drawnGradient(n),
                                 static_cast<double>(hits.t[n]));
   shapes.move(n, origin + direction * t - place, solid.pool.filter != Filter::Trilinear);

@@ -40,7 +40,9 @@ double largestGrowth(const M44d& map) {
 /// Depth of hit n of the rays through pixels after its refinement, world units.
 double refinedDepth(const KernelSolid& solid, const PixelBlock& pixels, std::size_t n,
                     const HitBlock& hits, ShapeBlock& shapes) {
-  return solid.fan.depthAt(refineHit(solid, pixels, n, hits, shapes));
+  const auto ray =
+      solid.fan.exactRay(static_cast<double>(pixels.x[n]), static_cast<double>(pixels.y[n]));
+  return solid.fan.depthAt(refineHit(solid, ray, n, hits, shapes));
 }
 
 }  // namespace
@@ -128,11 +130,11 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
       kCopies;
   levelset::requireMemory(leaves * kBytesOfBlock, options.maxBytes);
   // Culling knows how far light rays start from solids and meshes, but not from mapped textures,
-  // Bézier volumes and quadrics.
+  // Bézier volumes and quadrics. Mirrors show what is outside the frame.
+  const bool isKnown = !box.isEmpty() && mapped_.isEmpty() && beziers_.empty() &&
+                       quadrics_.empty() && !options.optics.isActive();
   const FrustumCulling culling =
-      isPicture && !box.isEmpty() && mapped_.isEmpty() && beziers_.empty() && quadrics_.empty()
-          ? FrustumCulling(scene, options, box)
-          : FrustumCulling();
+      isPicture && isKnown ? FrustumCulling(scene, options, box) : FrustumCulling();
   for (std::size_t i = 0; i < scene.solids.size(); ++i) {
     const Solid& source = scene.solids[i];
     if (source.isEmpty(options.filter) || (!scene.csg.isEmpty() && !scene.csg.uses(i))) continue;

@@ -52,6 +52,9 @@ class KernelTracer : public FieldTracer {
   virtual void trace(const KernelSolid& solid, const PixelBlock& pixels, HitBlock& hits,
                      ShapeBlock& shapes) const = 0;
   virtual void trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits) const = 0;
+  /// The same, with the shape of the surface at each hit. @param shapes  as for pixels
+  virtual void trace(const KernelSolid& solid, const RayBlock& rays, HitBlock& hits,
+                     ShapeBlock& shapes) const = 0;
   /// Light of a volume on parts of rays. The default integrates on the calling thread.
   /// @param shading  null: colours do not depend on the gradient
   [[nodiscard]] virtual std::vector<VolumeLight> volumeLight(
@@ -170,6 +173,14 @@ class KernelScene {
   /// First hits of the rays through pixels with the solids. Meshes, mapped textures and segmented
   /// fields are not included: the caller intersects meshes(), mapped() and segmented().
   [[nodiscard]] PixelHits castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const;
+  /// First hits of rays of any origin with the solids, between the rays' ends. `depth` of the
+  /// result is the distance along the ray. A ray that starts in a solid hits where it leaves the
+  /// solid.
+  [[nodiscard]] PixelHits castRays(const KernelTracer& tracer,
+                                   const std::vector<Camera::Ray>& rays) const;
+  /// First hits of rays of any origin with the surfaces in Bézier volumes, at most one for each
+  /// ray; empty without any.
+  [[nodiscard]] BezierHits castBeziersOf(const std::vector<Camera::Ray>& rays) const;
   [[nodiscard]] PixelTraversal startTraversal(const PixelBlock& pixels) const;
   /// Next hits of the rays that CsgTraversal::resume() has released, or first hits in the first
   /// call. All other rays keep their present hit.
@@ -184,6 +195,11 @@ class KernelScene {
 
  private:
   [[nodiscard]] PixelHits castFirst(const KernelTracer& tracer, const PixelBlock& pixels) const;
+  // Parts of castRays(), without an expression and with one, for rays without `near`.
+  void castFirstOf(const KernelTracer& tracer, const std::vector<LightRay>& rays,
+                   PixelHits& result) const;
+  void castCsgOf(const KernelTracer& tracer, const std::vector<LightRay>& rays,
+                 PixelHits& result) const;
   /// True when a point is inside the drawn shape: the result of the expression, or without one the
   /// union of the solids. @param inside  for each solid: nonzero when the point is inside the solid
   [[nodiscard]] bool isInside(const std::vector<char>& inside) const;

@@ -50,7 +50,10 @@ KernelPainter::KernelPainter(const Scene& scene, const KernelScene& surfaces,
       options_(options),
       camera_(scene.camera),
       shader_(scene, surfaces.bounds().size().length(), options),
-      layers_(image, scene, options) {}
+      layers_(image, scene, options) {
+  if (options.optics.isActive())
+    paths_.emplace(shader_, surfaces.bounds().size().length(), options.optics, options.maxBytes);
+}
 
 void KernelPainter::paint(const KernelTracer& tracer, const PixelBox& box) const {
   const std::vector<Pixel> pixels = pixelsOf(box);
@@ -74,7 +77,7 @@ LightLattice KernelPainter::latticeOf(const KernelTracer& tracer, const PixelBox
   PixelBlock at(points.size());
   std::vector<Camera::Ray> views;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    at.x[i] = static_cast<float>(points[i].x - 0.5 * camera.width);
+    at.x[i] = static_cast<float>(points[i].x - camera.middleX());
     at.y[i] = static_cast<float>(points[i].y - 0.5 * camera.height);
     views.push_back(camera_.at(points[i].x, points[i].y));
   }
@@ -137,7 +140,8 @@ std::size_t KernelPainter::numberOf(const Pixel& pixel) const {
 }
 
 KernelPainter::FirstHits KernelPainter::firstHits(const KernelTracer& tracer,
-                                                  const std::vector<Camera::Ray>& rays) const {
+                                                  const std::vector<Camera::Ray>& rays,
+                                                  bool ofCamera) const {
   FirstHits first;
   if (surfaces_.fields()) first.onFields = surfaces_.fields()->intersect(tracer, fieldRays(rays));
   if (const SegmentedPart* segmented = surfaces_.segmented()) {
@@ -152,7 +156,8 @@ KernelPainter::FirstHits KernelPainter::firstHits(const KernelTracer& tracer,
           segmented->hitOf(asked[i], hits[i], scene_.solids.size() + scene_.mapped.size()));
   }
   TreeCounts counts;
-  first.onBeziers = surfaces_.castBeziers(tracer, rays, &counts);
+  first.onBeziers =
+      ofCamera ? surfaces_.castBeziers(tracer, rays, &counts) : surfaces_.castBeziersOf(rays);
   if (counts.overruns > 0) layers_.overruns += counts.overruns;
   first.onQuadrics = surfaces_.castQuadrics(tracer, rays);
   return first;
@@ -164,7 +169,12 @@ Hit KernelPainter::hitOf(const Camera::Ray& ray, double meshNear, const PixelHit
   if (!first.onFields.empty())
     onSolid = first.onFields[i];
   else if (hits.solid[i] >= 0)
-    onSolid = hitOnSolid(ray, hits, i);
+    onSolid = hitOnSolid(ray, hits.depth[i] / ray.direction.dot(camera_.axis()), hits, i);
+  return nearestOf(ray, meshNear, onSolid, first, i, passed);
+}
+
+Hit KernelPainter::nearestOf(const Camera::Ray& ray, double meshNear, const Hit& onSolid,
+                             const FirstHits& first, std::size_t i, std::size_t passed) const {
   Hit nearest = onSolid;
   const auto farthest = [&] { return nearest.found ? nearest.distance : ray.far; };
   if (!surfaces_.meshes().isEmpty()) {
@@ -190,11 +200,12 @@ Hit KernelPainter::hitOf(const Camera::Ray& ray, double meshNear, const PixelHit
   return nearest;
 }
 
-Hit KernelPainter::hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const {
+Hit KernelPainter::hitOnSolid(const Camera::Ray& ray, double distance, const PixelHits& hits,
+                              std::size_t i) const {
   const KernelSolid& solid = surfaces_.solids()[static_cast<std::size_t>(hits.solid[i])];
   Hit hit;
   hit.found = true;
-  hit.distance = hits.depth[i] / ray.direction.dot(camera_.axis());
+  hit.distance = distance;
   hit.position = ray.origin + ray.direction * hit.distance;
   hit.id = solid.id;
   hit.solid = solid.index;
@@ -215,10 +226,44 @@ Hit KernelPainter::hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std
   return hit;
 }
 
+class KernelPainter::AnyRays : public SceneRays {
+ public:
+  AnyRays(const KernelPainter& painter, const KernelTracer& tracer)
+      : painter_(painter), tracer_(tracer) {}
+  [[nodiscard]] std::vector<Hit> firstHits(const std::vector<Camera::Ray>& rays) const override {
+    return painter_.castRays(tracer_, rays);
+  }
+  [[nodiscard]] std::vector<double> transmittances(
+      const std::vector<LightRay>& rays) const override {
+    return painter_.surfaces_.transmittances(tracer_, rays);
+  }
+
+ private:
+  const KernelPainter& painter_;
+  const KernelTracer& tracer_;
+};
+
+std::vector<Hit> KernelPainter::castRays(const KernelTracer& tracer,
+                                         const std::vector<Camera::Ray>& rays) const {
+  const FirstHits first = firstHits(tracer, rays, false);
+  const PixelHits onSolids = surfaces_.castRays(tracer, rays);
+  std::vector<Hit> hits;
+  hits.reserve(rays.size());
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    Hit onSolid;
+    if (!first.onFields.empty())
+      onSolid = first.onFields[i];
+    else if (onSolids.solid[i] >= 0)
+      onSolid = hitOnSolid(rays[i], onSolids.depth[i], onSolids, i);
+    hits.push_back(nearestOf(rays[i], rays[i].near, onSolid, first, i, 0));
+  }
+  return hits;
+}
+
 std::vector<char> KernelPainter::paintData(const KernelTracer& tracer,
                                            const std::vector<Pixel>& pixels,
                                            const LightLattice& lattice) const {
-  const double middleX = 0.5 * scene_.camera.width, middleY = 0.5 * scene_.camera.height;
+  const double middleX = scene_.camera.middleX(), middleY = 0.5 * scene_.camera.height;
   PixelBlock at(pixels.size());
   std::vector<Camera::Ray> views;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
@@ -311,7 +356,7 @@ void KernelPainter::paintLight(const KernelTracer& tracer, const std::vector<Pix
 void KernelPainter::paintColours(const KernelTracer& tracer, const std::vector<Pixel>& pixels,
                                  const LightLattice& lattice,
                                  const std::vector<char>& contradicts) const {
-  const double middleX = 0.5 * scene_.camera.width, middleY = 0.5 * scene_.camera.height;
+  const double middleX = scene_.camera.middleX(), middleY = 0.5 * scene_.camera.height;
   std::vector<ColourSum> sums(pixels.size());
   PixelBlock at(pixels.size());
   for (int s = 0; s < options_.samples; ++s) {
@@ -397,14 +442,29 @@ std::vector<std::size_t> KernelPainter::addSeen(
   std::vector<Lit> points;
   const auto addColours = [&] {
     const std::vector<double> light = surfaces_.transmittances(tracer, rays);
+    std::vector<SeenPoint> mirroring;
+    std::vector<std::pair<std::size_t, double>> shares;  // of `mirroring` in the pixels
     for (const Lit& point : points) {
       PointLight traced = Shader::lightOf(point.range, rays, light);
       if (point.estimate.isSkyKnown) traced.sky = point.estimate.light.sky;
       if (point.estimate.isKeyKnown) traced.key = point.estimate.light.key;
-      if (point.hit.isOnGround)
+      if (point.hit.isOnGround) {
         sums[point.pixel].add(C3f(0), point.share * shader_.shadowOpacity(point.hit, traced));
-      else
-        sums[point.pixel].add(shader_.colour(point.hit, point.direction, traced), point.share);
+        continue;
+      }
+      const C3f colour = shader_.colour(point.hit, point.direction, traced);
+      if (!paths_) {
+        sums[point.pixel].add(colour, point.share);
+        continue;
+      }
+      const Pixel& pixel = pixels[point.pixel];
+      mirroring.push_back({point.hit, point.direction, colour, pixel.x, pixel.y, sample});
+      shares.emplace_back(point.pixel, point.share);
+    }
+    if (paths_) {
+      const std::vector<C3f> colours = paths_->colours(AnyRays(*this, tracer), mirroring);
+      for (std::size_t n = 0; n < colours.size(); ++n)
+        sums[shares[n].first].add(colours[n], shares[n].second);
     }
     rays.clear();
     points.clear();

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "render/images/image.h"
 #include "render/kernel/kernel_scene.h"
 #include "render/kernel/light_lattice.h"
+#include "render/optics/light_paths.h"
 #include "render/scene/scene.h"
 #include "render/shading/render_options.h"
 #include "render/shading/shading.h"
@@ -37,15 +39,26 @@ class KernelPainter {
     std::vector<Hit> onFields, onInterfaces, onQuadrics;
     BezierHits onBeziers;
   };
+  /// @param ofCamera  false: the rays have any origin, and only their first hits are found
   [[nodiscard]] FirstHits firstHits(const KernelTracer& tracer,
-                                    const std::vector<Camera::Ray>& rays) const;
+                                    const std::vector<Camera::Ray>& rays,
+                                    bool ofCamera = true) const;
   /// First hit, on a solid or a mesh, of the ray with index i in `hits` and `first`.
   /// @param meshNear  mesh hits nearer than this distance are ignored, world units
   /// @param first  from firstHits()
   /// @param passed  number of hits with Bézier volumes through which the ray has passed
   [[nodiscard]] Hit hitOf(const Camera::Ray& ray, double meshNear, const PixelHits& hits,
                           const FirstHits& first, std::size_t i, std::size_t passed = 0) const;
-  [[nodiscard]] Hit hitOnSolid(const Camera::Ray& ray, const PixelHits& hits, std::size_t i) const;
+  /// The nearest of the hits of a ray. @param onSolid  its hit on a solid, or none
+  [[nodiscard]] Hit nearestOf(const Camera::Ray& ray, double meshNear, const Hit& onSolid,
+                              const FirstHits& first, std::size_t i, std::size_t passed) const;
+  /// @param distance  of the hit, along the ray
+  [[nodiscard]] Hit hitOnSolid(const Camera::Ray& ray, double distance, const PixelHits& hits,
+                               std::size_t i) const;
+  /// First hits of rays of any origin with all parts.
+  [[nodiscard]] std::vector<Hit> castRays(const KernelTracer& tracer,
+                                          const std::vector<Camera::Ray>& rays) const;
+  class AnyRays;  // rays of castRays() and KernelScene::transmittances(), for light paths
   /// Paints the layers other than the colours (depth, normal, position, id, curvature, thickness)
   /// from the rays through the pixels' centres.
   /// @return for each pixel: nonzero if a shadow ray from its centre contradicts the lattice
@@ -94,6 +107,7 @@ class KernelPainter {
   const RenderOptions& options_;
   CameraRays camera_;
   Shader shader_;
+  std::optional<LightPaths> paths_;  // set for traced reflection or refraction
   PictureLayers layers_;
 };
 

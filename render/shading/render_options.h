@@ -4,6 +4,7 @@
 
 #include "levelset/progress.h"
 #include "render/filter.h"
+#include "render/shading/optics_options.h"
 #include "render/shading/style.h"
 
 namespace render {
@@ -43,6 +44,9 @@ struct RenderOptions {
   /// Adds the layers light.sky and light.key: shares of the light that reaches the first surface.
   /// They are traced with ambientSamples and shadowSamples rays for each colour sample.
   bool lightLayers = false;
+  /// Reflection and refraction, traced on the processor. Surfaces outside the picture are in
+  /// mirrors, too.
+  OpticsOptions optics = {};
   /// Adds the layers volume.R .G .B .A to a picture with Scene::volumePart.
   bool volumeLight = true;
   /// Memory limit, bytes. It applies to the image and, separately, to the kernel's tables of the

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "render/shading/sampling.h"
+
 namespace render {
 namespace {
 
@@ -25,34 +27,6 @@ std::uint64_t scramble(std::uint64_t x) {  // the finaliser of SplitMix64
 
 double unitInterval(std::uint64_t bits) {
   return static_cast<double>(bits >> 11) * 0x1p-53;
-}
-
-/// Completes the unit vector n to an orthonormal frame (s, t, n) [Duff17].
-void tangentFrame(const V3d& n, V3d& s, V3d& t) {
-  const double sign = std::copysign(1.0, n.z);
-  const double a = -1 / (sign + n.z), b = n.x * n.y * a;
-  s = {1 + sign * n.x * n.x * a, sign * b, -sign * n.x};
-  t = {b, sign + n.y * n.y * a, -n.y};
-}
-
-/// Cosine-weighted random direction in the hemisphere around `axis`. @param u  random point in [0,
-/// 1)²
-V3d cosineDirection(const V3d& axis, const V2d& u) {
-  V3d s, t;
-  tangentFrame(axis, s, t);
-  const double r = std::sqrt(u.x), angle = 2 * std::numbers::pi * u.y;
-  return s * (r * std::cos(angle)) + t * (r * std::sin(angle)) + axis * std::sqrt(1 - u.x);
-}
-
-/// Uniformly distributed random direction in a cone around `axis`. @param u  random point in [0,
-/// 1)²
-V3d coneDirection(const V3d& axis, double halfAngle, const V2d& u) {
-  V3d s, t;
-  tangentFrame(axis, s, t);
-  const double cosine = 1 - u.x * (1 - std::cos(halfAngle));
-  const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
-  const double angle = 2 * std::numbers::pi * u.y;
-  return s * (sine * std::cos(angle)) + t * (sine * std::sin(angle)) + axis * cosine;
 }
 
 /// Mean of max(0, n·d) over the directions d of a cone, for a unit vector n. The mean over a circle

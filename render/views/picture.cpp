@@ -18,6 +18,23 @@ using Imath::V3d;
 
 constexpr int kMaxSamples = 65536;
 
+/// Requires parts and a style whose light paths can be traced.
+void requireOptics(const Scene& scene, const RenderOptions& options) {
+  validate(options.optics);
+  if (scene.volumePart)
+    throw levelset::UsageError(
+        "traced reflection and refraction do not see a volume with a transfer function; leave "
+        "--reflect and --refract out");
+  if (scene.segmented && options.optics.refract > 0)
+    throw levelset::UsageError(
+        "the surfaces of a segmentation have solids on both sides, so --refract has no index for "
+        "them; leave it out, or draw one region as a level set");
+  if (options.style.style == Style::CurvatureLines)
+    throw levelset::UsageError(
+        "the style curvature-lines draws over the colours; leave --reflect and --refract out, or "
+        "give another style");
+}
+
 }  // namespace
 
 PictureLayers::PictureLayers(Image& image, const Scene& scene, const RenderOptions& options) {
@@ -171,6 +188,7 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
           "most {} pixels",
           style.lineWidth, kWidestStreak));
   }
+  if (options.optics.isActive()) requireOptics(scene, options);
   if (style.style == Style::Matcap && !style.matcap)
     throw levelset::UsageError("the style matcap needs a picture of a shaded ball; give a PNG");
   if (options.fromNanoVdb && options.filter != Filter::Trilinear)
@@ -307,6 +325,10 @@ std::map<std::string, std::string> sceneAttributes(const Scene& scene,
     attributes["ls:transfer"] = transferText(volume.transfer().points());
   }
   attributes["ls:style"] = styleName(options.style.style);
+  if (const OpticsOptions& optics = options.optics; optics.isActive())
+    attributes["ls:optics"] =
+        fmt::format("reflect {}, refract {}, index {}, environment {}, bounces {}", optics.reflect,
+                    optics.refract, optics.index, optics.environment, optics.bounces);
   if (!scene.csg.isEmpty()) attributes["ls:csg"] = scene.csg.text();
   if (scene.softness > 0) attributes["ls:soft"] = fmt::format("{}", scene.softness);
   if (scene.morph) attributes["ls:morph"] = fmt::format("{}", *scene.morph);

@@ -19,7 +19,8 @@ CONST_INT kRayLength = 6;       // length of the rays, world units
 CONST_INT kRayGrowth = 7;       // growth of the steps along a ray, per pixel
 CONST_INT kOccluderDepth = 8;   // extent of the surfaces behind those that are seen, world units
 CONST_INT kRayCount = 9;        // rays in a set
-CONST_INT kFirstRay = 10;       // index of the first number of the sets of rays
+CONST_INT kMiddleX = 10;        // position of the view axis in the picture, pixels
+CONST_INT kFirstRay = 11;       // index of the first number of the sets of rays
 
 CONST_INT kSetEdge = 4;    // the pixels of squares of this edge have different sets of rays
 CONST_INT kTestedRays = 8; // shadow rays before the others, which are needed in penumbrae only
@@ -46,7 +47,7 @@ double pixelSize(double z) {
 Place surfaceAt(int x, int y) {
   double z = pixelDepth(x, y);
   double scale = isPerspective ? z : 1.0;
-  VAR right = (double(x) + 0.5 - 0.5 * double(width)) * number(kStepX) * scale;
+  VAR right = (double(x) + 0.5 - number(kMiddleX)) * number(kStepX) * scale;
   VAR down = (double(y) + 0.5 - 0.5 * double(height)) * number(kStepY) * scale;
   Place place;
   place.x = right;
@@ -163,9 +164,9 @@ bool isBlocked(Place from, Place along, double reach) {
   VAR toZ = from.z + along.z * extent;
   double fromScale = isPerspective ? from.z : 1.0;
   double toScale = isPerspective ? toZ : 1.0;
-  VAR startX = from.x / (fromScale * number(kStepX)) + 0.5 * double(width);
+  VAR startX = from.x / (fromScale * number(kStepX)) + number(kMiddleX);
   VAR startY = from.y / (fromScale * number(kStepY)) + 0.5 * double(height);
-  VAR endX = toX / (toScale * number(kStepX)) + 0.5 * double(width);
+  VAR endX = toX / (toScale * number(kStepX)) + number(kMiddleX);
   VAR endY = toY / (toScale * number(kStepY)) + 0.5 * double(height);
   VAR runX = endX - startX;
   VAR runY = endY - startY;

@@ -12,6 +12,7 @@
 #include "apps/pipeline/operators/pictures/comparison_json.h"
 #include "apps/pipeline/operators/pictures/molecule_pictures.h"
 #include "apps/pipeline/operators/pictures/picture_look.h"
+#include "apps/pipeline/operators/pictures/picture_optics.h"
 #include "apps/pipeline/operators/pictures/segmented_pictures.h"
 #include "apps/pipeline/operators/pictures/volume_pictures.h"
 #include "apps/pipeline/registry/invocation.h"
@@ -64,6 +65,7 @@ void validateDraw(const Invocation& asked) {
   assumePreset(in);
   validateCamera(in);
   validateLook(in);
+  validateOptics(in);
   if (in.integer("samples") > kMostSamples)
     throw UsageError(fmt::format("render: --samples {} is too many; give at most {}",
                                  in.text("samples"), kMostSamples));
@@ -214,27 +216,36 @@ Value draw(Invocation& in) {
         fmt::format("render: --renderer {} does not draw mapped textures; give --renderer cpu or "
                     "gpu, or map the texture without --instances",
                     renderer));
-  render::RenderOptions options{
-      .samples = in.integerAs<int>("samples"),
-      .lightSpacing = in.integerAs<int>("light-spacing"),
-      .filter = filterOf(in),
-      .fromNanoVdb = in.text("tables") == "nanovdb",
-      .style = styleOf(in),
-      .thickness = in.flag("thickness"),
-      .directions = in.flag("directions") ||
-                    (isBoth && render::showsDirections(styleNamed(in.text("style")))),
-      .maxBytes = in.maxMemory,
-      .progress = in.progress};
+  render::RenderOptions options;
+  options.samples = in.integerAs<int>("samples");
+  options.lightSpacing = in.integerAs<int>("light-spacing");
+  options.filter = filterOf(in);
+  options.fromNanoVdb = in.text("tables") == "nanovdb";
+  options.style = styleOf(in);
+  options.thickness = in.flag("thickness");
+  options.directions =
+      in.flag("directions") || (isBoth && render::showsDirections(styleNamed(in.text("style"))));
+  options.maxBytes = in.maxMemory;
+  options.progress = in.progress;
   const bool isExr = render::imageFormat(in.text("file"), in.text("format")) != "png";
   options.layers = isBoth || scene.isBlended() || isExr;
   options.volumeLight = isBoth || isExr;
   applyLookTo(in, options);
+  options.optics = opticsOf(in);
   const double surfaceShare = isBoth ? 0.5 : 1;
   options.progress = levelset::subProgress(in.progress, 0, surfaceShare);
-  render::Image image = renderer == "cpu"   ? render::renderCpu(scene, options)
-                        : renderer == "gpu" ? render::renderGpu(scene, options)
-                        : isBoth            ? drawByKernel(in, scene, options)
-                                            : render::renderEmbree(scene, options);
+  const auto drawn = [&](const render::Scene& seen) {
+    return renderer == "cpu"   ? render::renderCpu(seen, options)
+           : renderer == "gpu" ? render::renderGpu(seen, options)
+           : isBoth            ? drawByKernel(in, seen, options)
+                               : render::renderEmbree(seen, options);
+  };
+  const auto eyeOf = [&](const render::Scene& seen, int number) {
+    options.progress = levelset::subProgress(in.progress, 0.5 * number, 0.5 * (number + 1));
+    render::Image image = drawn(seen);
+    return hasLook(in) ? finishLook(in, std::move(image)) : image;
+  };
+  render::Image image = isStereo(in) ? drawStereo(in, scene, eyeOf) : drawn(scene);
   const auto read = image.attributes.find("ls:read");
   if (read != image.attributes.end() && (!scene.solids.empty() || !scene.meshes.empty() ||
                                          !scene.quadrics.empty() || scene.segmented))
@@ -253,7 +264,7 @@ Value draw(Invocation& in) {
     render::writeImage(in.text("file"), finished, in.text("format"));
     if (in.given("png")) render::writeImage(in.text("png"), finished, "png");
   };
-  if (hasLook(in))
+  if (hasLook(in) && !isStereo(in))
     write(finishLook(in, isBoth ? image : std::move(image)));
   else
     write(image);
@@ -263,6 +274,7 @@ Value draw(Invocation& in) {
     options.samples = 1;
     options.ambientSamples = options.shadowSamples = 0;
     options.lightLayers = false;
+    options.optics = {};
     options.progress = levelset::subProgress(in.progress, surfaceShare, 1);
     const render::ImageComparison found =
         render::compareImages(image, render::renderEmbree(scene, options));
@@ -286,7 +298,7 @@ Value draw(Invocation& in) {
 /// complete solid.
 RegionOfInterest roiOfDraw(Invocation& in, std::size_t, const RegionOfInterest&) {
   assumePreset(in);
-  if (hasLook(in) || in.flag("light-layers")) return {};
+  if (hasLook(in) || hasOptics(in) || isStereo(in) || in.flag("light-layers")) return {};
   const render::Style style = styleNamed(in.text("style"));
   const bool isFramed = in.operands[0].kind() == Kind::Band && in.given("from") && in.given("to") &&
                         in.text("value-bits") == "32";
@@ -462,6 +474,7 @@ Operator renderOperator() {
                                    [](const Param& param) { return param.name == "filter"; });
   picture.params.insert(std::next(filter), ofKinds.begin(), ofKinds.end());
   addLookParams(picture.params);
+  addOpticsParams(picture.params);
   addCameraParams(picture.params);
   return picture;
 }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <string>
 
 #include "render/images/compare_images.h"
@@ -141,6 +142,67 @@ TEST_F(EffectAction, LightsOfRenderAreChecked) {
   expectRefusal(torus + "--colour 1,2,3", 2, "from 0 to 1");
   expectRefusal(torus + "--light-layers", 2, "PNG has no layers");
   expectRefusal(torus + "--light 0,0,0", 2, "light");
+}
+
+TEST_F(EffectAction, TracesReflectionAndRefraction) {
+  draw("--reflect 0.2 --refract 0.5 --index 1.4 --bounces 3");
+  const render::Image traced = read("in.exr");
+  draw("--reflect 0.2 --refract 0.5 --index 1.4 --bounces 3 --renderer gpu");
+  EXPECT_EQ(read("in.exr").channels, traced.channels);
+  draw();
+  EXPECT_EQ(read("in.exr").channels.at("Z"), traced.channels.at("Z"));
+  EXPECT_NE(read("in.exr").channels.at("R"), traced.channels.at("R"));
+  // Zero is off.
+  const render::Image plain = read("in.exr");
+  draw("--reflect 0");
+  EXPECT_EQ(read("in.exr").channels, plain.channels);
+}
+
+TEST_F(EffectAction, DrawsBothEyes) {
+  const std::string torus = "torus --radius 2 --tube 0.8 --voxel 0.1 ! render ";
+  const std::string view = " --size 64x48 --samples 1 --from 0,2,7 --to 0,0,0 ";
+  support::Outcome outcome =
+      levelsmith(torus + "pair.exr --stereo side-by-side --outline 1 --background 1,1,1" + view);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const render::Image pair = read("pair.exr");
+  EXPECT_EQ(pair.width, 128);
+  EXPECT_EQ(pair.height, 48);
+  outcome =
+      levelsmith(torus + "glasses.png --stereo anaglyph --eye-distance 1 --screen-depth 6" + view);
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  // An eye has the picture of its own camera. At an infinite depth of the screen, that is a camera
+  // with a parallel axis.
+  outcome = levelsmith(torus +
+                       "far.exr --stereo side-by-side --eye-distance 0.5 --screen-depth "
+                       "1e12" +
+                       view + "! " + torus +
+                       "right.exr --size 64x48 --samples 1 --from 0.25,2,7 --to 0.25,0,0");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const render::Image far = read("far.exr"), right = read("right.exr");
+  std::size_t different = 0;
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 64; ++x)
+      different += std::abs(far.channels.at("A")[static_cast<std::size_t>(128 * y + 64 + x)] -
+                            right.channels.at("A")[static_cast<std::size_t>(64 * y + x)]) > 0;
+  EXPECT_EQ(different, 0u);
+}
+
+TEST_F(EffectAction, RefusesTracedEffectsWithASentence) {
+  const std::string render = "sphere --radius 1 --voxel 0.1 ! render out.exr ";
+  expectRefusal(render + "--reflect 2", 2, "--reflect 2 is out of range");
+  expectRefusal(render + "--refract 1 --index 0.5", 2, "--index 0.5");
+  expectRefusal(render + "--index 1.3 --reflect 1", 2, "--index is for --refract");
+  expectRefusal(render + "--bounces 3", 2, "--reflect or --refract");
+  expectRefusal(render + "--reflect 1 --bounces 1000", 2, "give 0 to 64");
+  expectRefusal(render + "--environment studio", 2, "--reflect or --refract");
+  expectRefusal(render + "--reflect 1 --environment none.exr", 6, "none.exr");
+  expectRefusal(render + "--reflect 1 --style curvature-lines", 2, "curvature-lines");
+  expectRefusal(render + "--eye-distance 1", 2, "--stereo");
+  expectRefusal(render + "--stereo anaglyph --ortho 3 --from 0,0,9", 2, "--ortho");
+  expectRefusal(render + "--stereo anaglyph --renderer both", 2, "two");
+  expectRefusal(render + "--stereo anaglyph --thickness", 2, "--thickness is lost");
+  expectRefusal(render + "--stereo anaglyph --from 0,0,0 --to 0,0,1", 2, "--screen-depth");
+  EXPECT_FALSE(exists("out.exr"));
 }
 
 }  // namespace effect_action_test

@@ -14,6 +14,7 @@
 #include "render/effects/solid_pattern.h"
 #include "render/shading/style.h"
 #include "tests/support/effect_pictures.h"
+#include "tests/support/environment_maps.h"
 
 namespace surface_effects_test {
 
@@ -36,32 +37,6 @@ Image ball(const Camera& camera) {
   return pictureOf(
       camera, [](const Camera::Ray& ray) { return onBall(ray, V3d(0), 12); }, 24);
 }
-
-/// Writes an environment whose light is (1 + direction) / 2, and returns its name.
-struct DirectionMap {
-  std::filesystem::path file;
-  DirectionMap() {
-    Image map(512, 256);
-    for (const char* name : {"R", "G", "B"}) map.addChannel(name);
-    for (int y = 0; y < map.height; ++y)
-      for (int x = 0; x < map.width; ++x) {
-        const double longitude = ((x + 0.5) / map.width - 0.5) * 2 * std::numbers::pi,
-                     latitude = (0.5 - (y + 0.5) / map.height) * std::numbers::pi;
-        const V3d d(std::cos(latitude) * std::sin(longitude), std::sin(latitude),
-                    -std::cos(latitude) * std::cos(longitude));
-        const auto i = static_cast<std::size_t>(y * map.width + x);
-        map.channels["R"][i] = static_cast<float>(0.5 + 0.5 * d.x);
-        map.channels["G"][i] = static_cast<float>(0.5 + 0.5 * d.y);
-        map.channels["B"][i] = static_cast<float>(0.5 + 0.5 * d.z);
-      }
-    file = std::filesystem::temp_directory_path() /
-           ("levelsmith-directions-" + std::to_string(::getpid()) + ".exr");
-    writeImage(file, map);
-  }
-  ~DirectionMap() { std::filesystem::remove(file); }
-  DirectionMap(const DirectionMap&) = delete;
-  DirectionMap& operator=(const DirectionMap&) = delete;
-};
 
 TEST(DisplayCurve, HasItsInverse) {
   for (int i = 0; i <= 998; ++i) {
@@ -132,10 +107,10 @@ TEST(SolidPattern, StaysInSpaceWhenTheCameraMoves) {
 }
 
 TEST(Environment, IsMirroredByTheLawOfReflection) {
-  const DirectionMap map;
+  const support::EnvironmentFile map(support::directionLight);
   EffectOptions options;
   options.reflect = 1;
-  options.environment = map.file.string();
+  options.environment = map.name();
   const Image image = ball(straightCamera(40, 40));
   const Image mirrored = withEffects(image, {}, options, kRunner);
   double worst = 0;
@@ -151,11 +126,11 @@ TEST(Environment, IsMirroredByTheLawOfReflection) {
   EXPECT_LT(worst, 1.5e-4) << worst;  // bilinear interpolation in 512 pixels
 }
 
-TEST(Environment, IsRefractedBySnellsLaw) {
-  const DirectionMap map;
+TEST(Environment, IsThatOfGlassBySnellsLawAndFresnelsEquations) {
+  const support::EnvironmentFile map(support::directionLight);
   EffectOptions options;
   options.refract = 1;
-  options.environment = map.file.string();
+  options.environment = map.name();
   for (const double index : {1.0, 1.33, 2.4}) {
     options.index = index;
     const Image image = ball(straightCamera(40, 40));
@@ -164,11 +139,15 @@ TEST(Environment, IsRefractedBySnellsLaw) {
       const V3d n(at(image, "N.X", x, 20), at(image, "N.Y", x, 20), at(image, "N.Z", x, 20));
       const V3d d(2 * at(seen, "R", x, 20) - 1, 2 * at(seen, "G", x, 20) - 1,
                   2 * at(seen, "B", x, 20) - 1);
-      const double c = n.z;
-      const V3d exact =
-          V3d(0, 0, -1) / index + n * (c / index - std::sqrt(1 - (1 - c * c) / (index * index)));
-      EXPECT_LT((d - exact).length(), 1e-4) << index << " " << x;
-      EXPECT_LT(d.dot(n), 0) << index << " " << x;
+      const double c = n.z, behind = std::sqrt(1 - (1 - c * c) / (index * index));
+      const V3d through = V3d(0, 0, -1) / index + n * (c / index - behind);
+      EXPECT_LT(through.dot(n), 0) << index << " " << x;
+      // Fresnel's equations, for both polarisations.
+      const double across = (c - index * behind) / (c + index * behind),
+                   along = (index * c - behind) / (index * c + behind),
+                   share = 0.5 * (across * across + along * along);
+      const V3d exact = (V3d(0, 0, -1) + n * (2 * c)) * share + through * (1 - share);
+      EXPECT_LT((d - exact).length(), 2e-4) << index << " " << x;
     }
   }
 }

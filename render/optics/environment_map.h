@@ -1,13 +1,12 @@
 #pragma once
 
-// Private to render/effects: light from all directions.
+// Private to render: light from all directions.
 
 #include <Imath/ImathVec.h>
 
 #include <cstddef>
 #include <string>
-
-#include "render/images/image.h"
+#include <vector>
 
 namespace render {
 
@@ -25,7 +24,8 @@ class EnvironmentMap {
 
  private:
   [[nodiscard]] Imath::V3d pixel(int x, int y) const;
-  Image picture_;  // without pixels: the studio
+  int width_ = 0, height_ = 0;
+  std::vector<Imath::V3f> pixels_;  // none: the studio
 };
 
 }  // namespace render

@@ -7,35 +7,14 @@
 #include <utility>
 
 #include "render/kernel/kernel_scene.h"
+#include "render/kernel/rays/packed_rays.h"
 
 namespace render {
 namespace {
 
 using Imath::V3d;
 
-// Padding of the box of a surface's blocks, voxels, so that rounding does not lose a crossing on a
-// face of the box.
-constexpr double kBesideBox = 0.0625;
-constexpr double kParallel = 1e30;
 constexpr std::size_t kRaysAtOnce = 1u << 18;
-
-/// An interval of a ray's parameter, which is the distance from its origin in voxels.
-struct Span {
-  double enter, leave;
-};
-
-Span clipped(const BrickPool& pool, const V3d& origin, const V3d& direction, double maxDistance) {
-  Span span{0, maxDistance};
-  for (int a = 0; a < 3; ++a) {
-    const auto i = static_cast<std::size_t>(a);
-    const double inverse = std::abs(direction[a]) < 1 / kParallel ? kParallel : 1 / direction[a];
-    const double t0 = (pool.low[i] - kBesideBox - origin[a]) * inverse,
-                 t1 = (pool.high[i] + kBesideBox - origin[a]) * inverse;
-    span.enter = std::max(span.enter, std::min(t0, t1));
-    span.leave = std::min(span.leave, std::max(t0, t1));
-  }
-  return span;
-}
 
 /// Orders rays by groups of similar directions. The rays of a vector then pass similar numbers of
 /// cells, so that fewer lanes are idle. The order within a group does not change.
@@ -66,55 +45,6 @@ void sortByDirection(const std::vector<LightRay>& rays, std::vector<std::size_t>
   for (std::size_t n = 0; n < order.size(); ++n) sorted[start[group[n]]++] = order[n];
   order = std::move(sorted);
 }
-
-/// The rays of a list that meet the box of a solid's blocks, as input of the kernel.
-struct PackedRays {
-  std::vector<std::size_t> number;  // index of each packed ray in the list
-  std::vector<double> enter;  // distance from each ray's origin to its start at the box, voxels
-  RayBlock block{0};
-
-  /// @param asked  indices in `rays` of the rays to pack; rays that miss the box are left out
-  /// @param hasEnd  true: rays end at their maxDistance; false: they continue to the last surface
-  PackedRays(const KernelSolid& solid, const std::vector<LightRay>& rays,
-             const std::vector<std::size_t>& asked, bool hasEnd) {
-    struct Ready {
-      V3d origin, direction;
-      Span span;
-    };
-    std::vector<Ready> ready;
-    for (const std::size_t i : asked) {
-      // Choose a voxel as the unit of the ray parameter t, so that single precision suffices for
-      // any world unit.
-      V3d origin, direction;
-      solid.worldToTable.multVecMatrix(rays[i].origin, origin);
-      solid.worldToTable.multDirMatrix(rays[i].direction * solid.voxelSize, direction);
-      const double maxDistance = hasEnd ? rays[i].maxDistance / solid.voxelSize : kParallel;
-      const Span span = clipped(solid.pool, origin, direction, maxDistance);
-      if (!(span.enter <= span.leave)) continue;
-      ready.push_back({origin + direction * span.enter, direction, span});
-      number.push_back(i);
-      enter.push_back(span.enter);
-    }
-    block = RayBlock(ready.size());
-    for (std::size_t n = 0; n < ready.size(); ++n) {
-      const Ready& ray = ready[n];
-      const auto set = [&](std::vector<float>& to, double value) {
-        to[n] = static_cast<float>(value);
-      };
-      set(block.ox, ray.origin.x);
-      set(block.oy, ray.origin.y);
-      set(block.oz, ray.origin.z);
-      set(block.dx, ray.direction.x);
-      set(block.dy, ray.direction.y);
-      set(block.dz, ray.direction.z);
-      block.ix[n] = rayInverse(block.dx[n]);
-      block.iy[n] = rayInverse(block.dy[n]);
-      block.iz[n] = rayInverse(block.dz[n]);
-      block.start[n] = 0;
-      set(block.end, ray.span.leave - ray.span.enter);
-    }
-  }
-};
 
 }  // namespace
 
@@ -224,7 +154,7 @@ void KernelScene::dimByCsg(const KernelTracer& tracer, const std::vector<LightRa
         const bool isNear = n < packed.number.size() && packed.number[n] == first + query.ray;
         if (isNear && hits.found[n])
           walk.answer(s, query,
-                      (packed.enter[n] + static_cast<double>(hits.t[n])) * solid.voxelSize,
+                      (packed.enter(n) + static_cast<double>(hits.t[n])) * solid.voxelSize,
                       hits.found[n] == HitBlock::kEnters);
         else
           walk.answerNone(s, query);

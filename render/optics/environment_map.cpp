@@ -1,4 +1,4 @@
-#include "render/effects/environment_map.h"
+#include "render/optics/environment_map.h"
 
 #include <fmt/core.h>
 
@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "levelset/error.h"
-#include "render/effects/picture_view.h"
+#include "render/images/image.h"
 
 namespace render {
 namespace {
@@ -45,32 +45,41 @@ V3d studioLight(const V3d& d) {
 
 EnvironmentMap::EnvironmentMap(const std::string& name, std::size_t maxMemory) {
   if (name == "studio") return;
-  picture_ = readExr(name, maxMemory);
-  requireChannels(picture_, {"R", "G", "B"}, "--environment");
-  if (picture_.width != 2 * picture_.height)
+  const Image picture = readExr(name, maxMemory);
+  const std::vector<float>* channels[3];
+  for (int c = 0; c < 3; ++c) {
+    const auto found = picture.channels.find(std::string(1, "RGB"[c]));
+    if (found == picture.channels.end())
+      throw levelset::InvalidInput(fmt::format(
+          "{} has no channel {}, but --environment needs the colours of all directions; give a "
+          "picture with R, G and B",
+          name, "RGB"[c]));
+    channels[c] = &found->second;
+  }
+  if (picture.width != 2 * picture.height)
     throw levelset::InvalidInput(fmt::format(
         "{} has {}x{} pixels, but a picture of all directions is twice as wide as high; give a "
         "picture of longitudes and latitudes",
-        name, picture_.width, picture_.height));
+        name, picture.width, picture.height));
+  width_ = picture.width;
+  height_ = picture.height;
+  pixels_.reserve(picture.pixelCount());
+  for (std::size_t i = 0; i < picture.pixelCount(); ++i)
+    pixels_.emplace_back((*channels[0])[i], (*channels[1])[i], (*channels[2])[i]);
 }
 
 V3d EnvironmentMap::pixel(int x, int y) const {
-  const int column = (x % picture_.width + picture_.width) % picture_.width,
-            row = std::clamp(y, 0, picture_.height - 1);
-  const std::size_t i = static_cast<std::size_t>(row) * static_cast<std::size_t>(picture_.width) +
-                        static_cast<std::size_t>(column);
-  const auto channel = [&](const char* name) {
-    return static_cast<double>(picture_.channels.at(name)[i]);
-  };
-  return {channel("R"), channel("G"), channel("B")};
+  const int column = (x % width_ + width_) % width_, row = std::clamp(y, 0, height_ - 1);
+  return V3d(pixels_[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) +
+                     static_cast<std::size_t>(column)]);
 }
 
 V3d EnvironmentMap::light(const V3d& d) const {
   if (!std::isfinite(d.x + d.y + d.z)) return V3d(0);
-  if (picture_.width == 0) return studioLight(d);
+  if (pixels_.empty()) return studioLight(d);
   const double longitude = std::atan2(d.x, -d.z), latitude = std::asin(std::clamp(d.y, -1.0, 1.0));
-  const double x = (0.5 + 0.5 * longitude / std::numbers::pi) * picture_.width - 0.5,
-               y = (0.5 - latitude / std::numbers::pi) * picture_.height - 0.5;
+  const double x = (0.5 + 0.5 * longitude / std::numbers::pi) * width_ - 0.5,
+               y = (0.5 - latitude / std::numbers::pi) * height_ - 0.5;
   const int left = static_cast<int>(std::floor(x)), top = static_cast<int>(std::floor(y));
   const double u = x - left, v = y - top;
   return (pixel(left, top) * (1 - u) + pixel(left + 1, top) * u) * (1 - v) +
