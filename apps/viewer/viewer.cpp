@@ -163,6 +163,7 @@ void Viewer::takeFrame() {
   if (!frame || frame == frame_) return;
   frame_ = frame;
   window_.setPicture(frame->canvas);
+  if (!frame->note.empty()) showMessage(frame->note);
   finishPick();
 }
 

@@ -126,6 +126,7 @@ class Viewer {
   void drawLightPart();
   void editTransfer(const Imath::V2d& place, const Imath::V2d& reach, bool isOver);
   void drawPatchPart();
+  void drawEffectPart();  // viewer_effects.cpp
   void drawPointPart();
   void drawStatus();
   void drawMarks(int width, int height);

@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <array>
-#include <numbers>
+#include <string>
 
+#include "apps/viewer/effects/shown_effects.h"
 #include "apps/viewer/panel_parts.h"
 #include "apps/viewer/viewer.h"
 
@@ -37,6 +38,7 @@ void Viewer::drawPanel() {
     if (!deformEditor_) drawPatchEditorPart();
     drawDeformPart();
   }
+  drawEffectPart();
   drawPatchPart();
   drawPointPart();
   ImGui::PopItemWidth();
@@ -74,12 +76,7 @@ void Viewer::drawViewPart() {
   if (ImGui::Checkbox("orthographic", &isOrtho)) camera_.toggleOrtho();
   const render::Camera camera = camera_.camera(pictureWidth_, pictureHeight_);
   if (ImGui::Button("Copy as options")) {
-    window_.setClipboard(fmt::format(
-        "--from {} --to {} --up {} {}", pointText(camera.from), pointText(camera.to),
-        pointText(camera.up),
-        camera.orthoHeight
-            ? fmt::format("--ortho {:.8g}", *camera.orthoHeight)
-            : fmt::format("--fov {:.8g}", camera.verticalFov * 180 / std::numbers::pi)));
+    window_.setClipboard(cameraText(camera));
     showMessage("The view was copied to the clipboard, as options of 'levelsmith render'.");
   }
 }

@@ -142,8 +142,10 @@ struct ProgressivePicture::Worker {
   std::shared_ptr<const render::Image> splatted(const std::atomic<bool>& isStale) {
     const render::Scene scene = sceneFor(kSplatPixelSize);
     render::validate(scene.camera);
-    return drawSplats(discs, scene, view.model->extent(), optionsFor({kSplatPixelSize, 1, 0, 0}),
-                      isStale);
+    std::shared_ptr<render::Image> drawn = drawSplats(
+        discs, scene, view.model->extent(), optionsFor({kSplatPixelSize, 1, 0, 0}), isStale);
+    if (drawn) render::addViewAttributes(*drawn, scene, view.model->extent());
+    return drawn;
   }
 
   [[nodiscard]] render::RenderOptions optionsFor(const Pass& how) const {
@@ -231,6 +233,7 @@ struct ProgressivePicture::Worker {
     }
     if (isStale) return nullptr;
     render::finishColours(*drawn, scene, options, surfaces->bounds().size().length());
+    render::addViewAttributes(*drawn, scene, surfaces->tableBounds().size().length());
     return drawn;
   }
 
@@ -256,8 +259,15 @@ struct ProgressivePicture::Worker {
     frame->isComplete = pass == kPasses.size();
     frame->image = image;
     Canvas& canvas = frame->canvas;
+    const render::Image* seen = image.get();
+    EffectPicture effected;
+    if (display.layer == Layer::Colour && !display.effects.isEmpty()) {
+      effected = withEffects(*image, display.effects, pixelSize);
+      frame->note = effected.note;
+      seen = &effected.image;
+    }
     canvas = {image->width, image->height,
-              layerColours(*image, display.layer, view.model->extent(), display.curvatureRange)};
+              layerColours(*seen, display.layer, view.model->extent(), display.curvatureRange)};
     if (isCut() && display.contours)
       paintPhi(*image, shrunk(view.camera, pixelSize), plane(), view.model->scene, canvas.colours);
     const bool hasSlices = view.model->volume && !display.slices.isEmpty();
@@ -314,7 +324,8 @@ std::exception_ptr ProgressivePicture::failure() const {
 bool ProgressivePicture::isBusy() const {
   const std::scoped_lock lock(mutex_);
   if (!lastRequest_ || failure_) return false;
-  return pending_ || !frame_ || !frame_->isComplete || !isSame(frame_->view, lastRequest_->view);
+  return pending_ || !frame_ || !frame_->isComplete || !isSame(frame_->view, lastRequest_->view) ||
+         !(frame_->display == lastRequest_->display);
 }
 
 std::string ProgressivePicture::rendererName() const {

@@ -7,9 +7,11 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <thread>
 #include <vector>
 
+#include "apps/viewer/effects/shown_effects.h"
 #include "apps/viewer/interaction/clip_plane.h"
 #include "apps/viewer/interaction/patch_overlay.h"
 #include "apps/viewer/model/layer_colours.h"
@@ -49,8 +51,9 @@ struct Display {
   /// surfaces.
   double curvatureRange = 40;
   PatchLines patches = PatchLines::All;
-  bool contours = true;   ///< draws contours of φ on the clip plane
-  SliceView slices = {};  ///< slices through the model's volume, if it has one
+  bool contours = true;     ///< draws contours of φ on the clip plane
+  EffectView effects = {};  ///< on the layer Colour
+  SliceView slices = {};    ///< slices through the model's volume, if it has one
   bool operator==(const Display&) const = default;
 };
 
@@ -61,7 +64,8 @@ struct Frame {
   int pixelSize = 8;  ///< edge of a pixel of `image`, in pixels of the window
   /// True after the last pass: full resolution, all samples, shadows and occlusion.
   bool isComplete = false;
-  std::shared_ptr<const render::Image> image;  ///< the picture with all layers
+  std::shared_ptr<const render::Image> image;  ///< the picture with all layers, without effects
+  std::string note = {};  ///< sentence on effects that were left out; empty: none
   Canvas
       canvas;  ///< colours to display; its size may differ from that of `image` and of the window
 };

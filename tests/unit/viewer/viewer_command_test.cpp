@@ -394,6 +394,43 @@ TEST_F(ViewerCommand, DrawsStylesAsTheCommandDoes) {
   EXPECT_LT(brightness(png("t.png").middle()), brightness(png("t.png").at(30, 10)));
 }
 
+TEST_F(ViewerCommand, AppliesEffectsWithTheMouseAndCopiesTheirCommand) {
+  const Outcome torus = levelsmith("torus --radius 1 --tube 0.4 --voxel 0.06 ! write torus.vdb");
+  ASSERT_EQ(torus.code, 0) << torus.err;
+  const std::string sliders =
+      "wait\nclick 100,540\n"  // unfolds the part
+      "drag 20,565 60,565\ndrag 20,590 90,590\ndrag 20,615 100,615\ndrag 20,640 140,640\n"
+      "click 150,691\nwait\nclick 60,716\ncopied\n";
+  writeFile("effects.play", sliders);
+  writeFile("glasses.play", sliders + "click 30,691\nwait\nclick 60,716\ncopied\n");
+  writeFile("none.play", sliders + "click 170,716\nwait\n");
+  writeFile("ortho.play", "wait\nclick 100,540\nclick 150,691\nclick 30,691\nkey o\nwait\n");
+  const std::string camera = " --from 2,8,21 --to 0,0,0 --size 180x800 --style tone";
+  const Outcome seen =
+      onDisplay("set -e; for name in effects glasses none ortho; do view torus.vdb --renderer cpu" +
+                camera + " --play $name.play --screenshot $name.png; done");
+  ASSERT_EQ(seen.code, 0) << seen.err;
+  const std::vector<std::string> lines = linesOf(seen.out);
+  ASSERT_EQ(lines.size(), 4u) << seen.out;
+  for (const char* option : {"--style tone", "--outline ", "--halo ", "--depth-cue ",
+                             "--occlusion ", "--background 1,1,1"})
+    EXPECT_NE(lines[0].find(option), std::string::npos) << option << " " << lines[0];
+  EXPECT_NE(lines[2].find("--stereo anaglyph"), std::string::npos) << lines[2];
+  // The actions make the pictures that the viewer shows.
+  for (const auto& [line, name] : {std::pair(0, "effects.png"), {2, "glasses.png"}}) {
+    const Outcome made = levelsmith("read torus.vdb ! " + lines[static_cast<std::size_t>(line)]);
+    ASSERT_EQ(made.code, 0) << made.err;
+    EXPECT_EQ(png("view.png").bytes, png(name).bytes) << name;
+  }
+  EXPECT_NE(png("effects.png").bytes, png("glasses.png").bytes);
+  const Outcome plain = levelsmith("read torus.vdb ! render plain.png" + camera);
+  ASSERT_EQ(plain.code, 0) << plain.err;
+  EXPECT_NE(png("effects.png").bytes, png("plain.png").bytes);
+  EXPECT_EQ(png("none.png").bytes, png("plain.png").bytes);
+  // An orthographic view has no anaglyph, but the other effects: a white background.
+  EXPECT_EQ(brightness(png("ortho.png").at(175, 5)), 3 * 255);
+}
+
 class SlowViewerCommand : public ViewerCommand {};
 
 /// Four corners dragged on the bunny give a textured bunny: no number is typed.
