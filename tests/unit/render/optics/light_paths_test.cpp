@@ -96,6 +96,10 @@ Scene ballOf(const std::string& kind) {
     scene.solids.push_back(
         {.band = levelset::makeSphere(kRadius + 3, V3d(0), 0.5), .id = 2, .name = "b"});
     scene.csg = CsgExpression("a & b", {"a", "b"});
+  } else if (kind == "morph") {
+    for (const std::uint32_t id : {1u, 2u})
+      scene.solids.push_back({.band = levelset::makeSphere(kRadius, V3d(0), 0.5), .id = id});
+    scene.morph = 0.5;
   } else if (kind == "quadric") {
     scene.quadrics.push_back(makeQuadricPart({{V3d(0), static_cast<float>(kRadius)}}, {}));
   } else {
@@ -114,6 +118,7 @@ TEST(LightPaths, ShowTheEnvironmentInAMirrorBall) {
     double error;
   } cases[] = {{"level set", 0.00112},
                {"expression", 0.00112},
+               {"morph", 0.00112},
                {"quadric", kMapError},
                {"Bézier", kMapError}};
   for (const auto& [kind, error] : cases) {
@@ -213,8 +218,11 @@ TEST(LightPaths, OfAGlassBallHaveTheSumOfItsInnerReflections) {
   const struct {
     const char* kind;
     double error;
-  } cases[] = {
-      {"level set", 5.9e-4}, {"expression", 5.9e-4}, {"quadric", 5.3e-4}, {"Bézier", 5.3e-4}};
+  } cases[] = {{"level set", 5.9e-4},
+               {"expression", 5.9e-4},
+               {"morph", 5.9e-4},
+               {"quadric", 5.3e-4},
+               {"Bézier", 5.3e-4}};
   for (const auto& [kind, error] : cases) {
     const Scene scene = ballOf(kind);
     const auto exact = [](const Camera::Ray& ray) { return lightOfGlassBall(ray, 1.5); };
@@ -230,7 +238,7 @@ TEST(LightPaths, OfAGlassBallHaveTheSumOfItsInnerReflections) {
 TEST(LightPaths, PassStraightThroughSolidsOfIndexOne) {
   const EnvironmentFile map(directionLight);
   const OpticsOptions optics{.refract = 1, .index = 1, .environment = map.name()};
-  for (const char* kind : {"level set", "expression", "quadric", "Bézier"}) {
+  for (const char* kind : {"level set", "expression", "morph", "quadric", "Bézier"}) {
     const Scene scene = ballOf(kind);
     EXPECT_LT(errorOf(renderCpu(scene, optionsOf(optics)), scene.camera,
                       [](const Camera::Ray& ray) { return directionLight(ray.direction); }),
