@@ -174,7 +174,7 @@ std::array<Camera, 2> stereoCameras(const Camera& camera, double eyeDistance, do
       throw levelset::UsageError(
           fmt::format("--{} {} is not a positive length; give one in world units", name, length));
   const Camera::PixelSteps step = camera.pixelSteps();
-  const double width = step.right.length();  // of a pixel, at unit depth
+  const double width = step.right.length();  // width of a pixel at unit depth
   const V3d right = step.right / width;
   std::array<Camera, 2> eyes{camera, camera};
   for (int n = 0; n < 2; ++n) {

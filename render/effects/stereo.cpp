@@ -110,7 +110,7 @@ Image seenFromBeside(const Image& image, double shift, double screenDepth) {
   requireChannels(image, {"R", "G", "B"}, "a stereo picture");
   Image moved(image.width, image.height);
   for (const char* name : {"R", "G", "B", "A"}) moved.addChannel(name, name[0] == 'A' ? 1 : 0);
-  std::vector<std::pair<const float*, float*>> layers;  // of the picture, and moved
+  std::vector<std::pair<const float*, float*>> layers;  // from, to
   for (auto& [name, values] : moved.channels)
     if (const auto source = image.channels.find(name); source != image.channels.end())
       layers.emplace_back(source->second.data(), values.data());

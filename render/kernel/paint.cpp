@@ -443,7 +443,7 @@ std::vector<std::size_t> KernelPainter::addSeen(
   const auto addColours = [&] {
     const std::vector<double> light = surfaces_.transmittances(tracer, rays);
     std::vector<SeenPoint> mirroring;
-    std::vector<std::pair<std::size_t, double>> shares;  // of `mirroring` in the pixels
+    std::vector<std::pair<std::size_t, double>> shares;  // parts of the pixels
     for (const Lit& point : points) {
       PointLight traced = Shader::lightOf(point.range, rays, light);
       if (point.estimate.isSkyKnown) traced.sky = point.estimate.light.sky;

@@ -30,7 +30,7 @@ class SceneRays {
 /// A surface point on a ray of the camera.
 struct SeenPoint {
   Hit hit;
-  Imath::V3d direction;          ///< of the ray, unit length
+  Imath::V3d direction;          ///< direction of the ray, unit length
   Imath::C3f own{0};             ///< linear colour without reflection and refraction
   int x = 0, y = 0, sample = 0;  ///< pixel, and number of its sample
 };
@@ -62,7 +62,7 @@ class LightPaths {
   struct Path {
     Camera::Ray ray;
     std::size_t point;  // index of the point that it adds light to
-    double share;       // of the point's light
+    double share;       // part of the point's light
     int bounces;        // number of surfaces behind the point, with that which the ray may hit
     int inside;         // number of solids that the ray is in
   };

@@ -32,7 +32,7 @@ using support::directionLight;
 using support::EnvironmentFile;
 using namespace render;
 
-constexpr double kMapError = 1.85e-5;  // of the interpolation in EnvironmentFile
+constexpr double kMapError = 1.85e-5;  // interpolation in EnvironmentFile
 
 RenderOptions optionsOf(const OpticsOptions& optics) {
   RenderOptions options{.samples = 1, .ambientSamples = 0, .shadowSamples = 0};
@@ -451,7 +451,7 @@ TEST(LightPaths, ShowTheErrorOfTheEffectInThePicture) {
   const auto pot = levelset::subtract(levelset::makeCylinder(20, 30, V3d(0), V3d(0, 1, 0), 0.7),
                                       levelset::makeSphere(16, V3d(0, 15, 0), 0.7));
   struct Errors {
-    double effect, none;  ///< of the picture with the effect, and of that without
+    double effect, none;  ///< errors of the pictures with and without the effect
   };
   const struct {
     const char* name;
