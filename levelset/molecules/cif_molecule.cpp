@@ -222,8 +222,8 @@ void addConnection(const Row& row, std::size_t line, MoleculeBuilder& builder) {
 constexpr std::array<std::string_view, 3> kComponentNames = {
     "_chem_comp_bond.comp_id", "_chem_comp_bond.atom_id_1", "_chem_comp_bond.atom_id_2"};
 
-void addComponentBond(const Row& row, std::size_t, MoleculeBuilder& builder) {
-  builder.addResidueBond(row[0], row[1], row[2]);
+void addComponentBond(const Row& row, std::size_t line, MoleculeBuilder& builder) {
+  builder.addResidueBond(row[0], row[1], row[2], line);
 }
 
 /// A part of a file that is read: rows of values.

@@ -52,9 +52,10 @@ class MoleculeBuilder {
     placeBonds_.push_back({first, second});
   }
   /// Adds a bond to each residue of a name. @param residue, first, second  outlive the builder
-  void addResidueBond(std::string_view residue, std::string_view first, std::string_view second) {
-    residueBonds_[residue].push_back({first, second});
-  }
+  /// @throws InvalidInput if an atom has more than kMostPartners of them
+  void addResidueBond(std::string_view residue, std::string_view first, std::string_view second,
+                      std::size_t line);
+  static constexpr std::size_t kMostPartners = 64;
   /// Removes the bonds of a part of the file that has no atoms.
   void removeBonds();
   /// @throws InvalidInput without atoms, or if the model is missing
@@ -64,6 +65,9 @@ class MoleculeBuilder {
   /// Reads a number. @throws InvalidInput if the text is none, or outside ±1e8
   [[nodiscard]] double number(std::string_view text, const char* what, std::size_t line) const;
   [[nodiscard]] int integer(std::string_view text, const char* what, std::size_t line) const;
+  /// Number of atoms and ends of bonds that finish() visited to choose residues and to find the
+  /// atoms of bonds. It grows linearly with the file, whatever that has.
+  [[nodiscard]] std::size_t steps() const { return steps_; }
 
  private:
   std::string file_;
@@ -87,13 +91,18 @@ class MoleculeBuilder {
   std::unordered_map<std::string, std::size_t> alternates_;
   /// Residues of alternate locations, by chain, number and insertion code.
   std::map<std::string, std::vector<std::uint32_t>> places_;
+  std::vector<char> isAtPlace_;        ///< by residue: true if places_ has it
   std::vector<std::int64_t> serials_;  ///< by atom
   std::vector<std::array<std::int64_t, 2>> serialBonds_;
   std::vector<std::array<AtomPlace, 2>> placeBonds_;
-  std::unordered_map<std::string_view, std::vector<std::array<std::string_view, 2>>> residueBonds_;
+  /// Names of the second atoms by those of the residue and of the first atom.
+  std::unordered_map<std::string_view,
+                     std::unordered_map<std::string_view, std::vector<std::string_view>>>
+      residueBonds_;
   int model_ = 0;  ///< the wanted one; 0: not known yet
   bool hasModel_ = false;
   std::size_t dropped_ = 0, water_ = 0, hydrogens_ = 0, unknown_ = 0, guessed_ = 0, lostBonds_ = 0;
+  std::size_t steps_ = 0;
 };
 
 /// Removes blanks at both ends.

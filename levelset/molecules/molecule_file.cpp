@@ -9,6 +9,8 @@
 #include <cmath>
 #include <new>
 #include <optional>
+#include <unordered_set>
+#include <utility>
 
 #include "levelset/error.h"
 #include "levelset/files/byte_io.h"
@@ -114,9 +116,8 @@ void MoleculeBuilder::add(const AtomRecord& record, std::size_t line) {
   last_ = std::move(key);
   atom.residue = residue->second;
   if (!record.alternate.empty()) {
-    std::vector<std::uint32_t>& alternatives = places_[place];
-    if (std::find(alternatives.begin(), alternatives.end(), atom.residue) == alternatives.end())
-      alternatives.push_back(atom.residue);
+    isAtPlace_.resize(molecule_.residues.size(), 0);
+    if (!std::exchange(isAtPlace_[atom.residue], 1)) places_[place].push_back(atom.residue);
   }
   atom.name = record.name;
   atom.position = record.position;
@@ -155,18 +156,21 @@ void MoleculeBuilder::endChain() {
 }
 
 void MoleculeBuilder::chooseResidues() {
+  std::vector<float> occupancy(molecule_.residues.size(), 0);  // the largest of an alternate atom
+  for (const auto& [key, atom] : alternates_) {
+    const Atom& of = molecule_.atoms[atom];
+    occupancy[of.residue] = std::max(occupancy[of.residue], of.occupancy);
+    ++steps_;
+  }
   std::vector<char> isLeftOut(molecule_.residues.size(), 0);
   bool isAny = false;
   for (const auto& [place, alternatives] : places_) {
     if (alternatives.size() < 2) continue;
-    std::vector<float> occupancy(alternatives.size(), 0);
-    for (const auto& [key, atom] : alternates_)
-      for (std::size_t n = 0; n < alternatives.size(); ++n)
-        if (molecule_.atoms[atom].residue == alternatives[n])
-          occupancy[n] = std::max(occupancy[n], molecule_.atoms[atom].occupancy);
-    const auto best = std::max_element(occupancy.begin(), occupancy.end()) - occupancy.begin();
-    for (std::size_t n = 0; n < alternatives.size(); ++n)
-      isLeftOut[alternatives[n]] = static_cast<std::ptrdiff_t>(n) != best;
+    const std::uint32_t best =
+        *std::max_element(alternatives.begin(), alternatives.end(),
+                          [&](auto a, auto b) { return occupancy[a] < occupancy[b]; });
+    for (const std::uint32_t residue : alternatives) isLeftOut[residue] = residue != best;
+    steps_ += alternatives.size();
     isAny = true;
   }
   if (!isAny) return;
@@ -224,37 +228,63 @@ void MoleculeBuilder::resolveSerialBonds() {
 }
 
 void MoleculeBuilder::resolvePlaceBonds() {
-  // The ends of the bonds by residue. Few residues have one.
-  constexpr std::size_t kNone = ~std::size_t{0};
-  std::unordered_map<std::string, std::vector<std::size_t>> ends;
-  const auto place = [&](std::size_t end) -> const AtomPlace& {
-    return placeBonds_[end / 2][end % 2];
+  if (placeBonds_.empty()) return;
+  const auto atomKey = [](const std::string& residue, std::string_view atom) {
+    return fmt::format("{}\n{}", residue, atom);
   };
-  for (std::size_t n = 0; n < 2 * placeBonds_.size(); ++n)
-    ends[fmt::format("{}/{} {}{}", place(n).chain, place(n).residue, place(n).number,
-                     place(n).insertion)]
-        .push_back(n);
-  if (ends.empty()) return;
-  std::vector<const std::vector<std::size_t>*> ofResidue(molecule_.residues.size(), nullptr);
-  for (std::size_t n = 0; n < ofResidue.size(); ++n)
-    if (const auto found = ends.find(molecule_.residueName(n)); found != ends.end())
-      ofResidue[n] = &found->second;
-  std::vector<std::size_t> atoms(2 * placeBonds_.size(), kNone);
+  const auto residueOf = [](const AtomPlace& place) {
+    return fmt::format("{}/{} {}{}", place.chain, place.residue, place.number, place.insertion);
+  };
+  // The first atom in each alternate location, by residue and name. Few residues have any.
+  std::unordered_map<std::string, std::vector<std::size_t>> atoms;
+  std::unordered_set<std::string> residues;
+  for (const auto& bond : placeBonds_)
+    for (const AtomPlace& place : bond) {
+      const std::string residue = residueOf(place);
+      atoms.try_emplace(atomKey(residue, place.atom));
+      residues.insert(residue);
+    }
+  std::vector<char> hasBond(molecule_.residues.size(), 0);
+  for (std::size_t n = 0; n < hasBond.size(); ++n)
+    hasBond[n] = residues.contains(molecule_.residueName(n));
   for (std::size_t n = 0; n < molecule_.atoms.size(); ++n) {
     const Atom& atom = molecule_.atoms[n];
-    if (!ofResidue[atom.residue]) continue;
-    for (const std::size_t end : *ofResidue[atom.residue]) {
-      const bool isOther = !place(end).alternate.empty() && atom.alternate != 0 &&
-                           place(end).alternate[0] != atom.alternate;
-      if (place(end).atom == atom.name && !isOther && atoms[end] == kNone) atoms[end] = n;
-    }
+    if (!hasBond[atom.residue]) continue;
+    const auto found = atoms.find(atomKey(molecule_.residueName(atom.residue), atom.name));
+    if (found == atoms.end()) continue;
+    const auto isSame = [&](std::size_t other) {
+      ++steps_;
+      return molecule_.atoms[other].alternate == atom.alternate;
+    };
+    if (std::none_of(found->second.begin(), found->second.end(), isSame))
+      found->second.push_back(n);
   }
-  for (std::size_t n = 0; n < atoms.size(); n += 2) {
-    if (atoms[n] == kNone || atoms[n + 1] == kNone)
+  constexpr std::size_t kNone = ~std::size_t{0};
+  const auto atomAt = [&](const AtomPlace& place) {
+    for (const std::size_t n : atoms.at(atomKey(residueOf(place), place.atom))) {
+      ++steps_;
+      const char alternate = molecule_.atoms[n].alternate;
+      if (place.alternate.empty() || alternate == 0 || place.alternate[0] == alternate) return n;
+    }
+    return kNone;
+  };
+  for (const auto& [first, second] : placeBonds_) {
+    const std::size_t a = atomAt(first), b = atomAt(second);
+    if (a == kNone || b == kNone)
       ++lostBonds_;
     else
-      keepBond(atoms[n], atoms[n + 1]);
+      keepBond(a, b);
   }
+}
+
+void MoleculeBuilder::addResidueBond(std::string_view residue, std::string_view first,
+                                     std::string_view second, std::size_t line) {
+  std::vector<std::string_view>& partners = residueBonds_[residue][first];
+  if (std::find(partners.begin(), partners.end(), second) != partners.end()) return;
+  if (partners.size() == kMostPartners)
+    fail(line, fmt::format("atom '{}' of the residue '{}' has bonds to more than {} atoms", first,
+                           residue, kMostPartners));
+  partners.push_back(second);
 }
 
 void MoleculeBuilder::resolveResidueBonds() {
@@ -262,16 +292,21 @@ void MoleculeBuilder::resolveResidueBonds() {
   std::vector<std::vector<std::size_t>> atoms(molecule_.residues.size());
   for (std::size_t n = 0; n < molecule_.atoms.size(); ++n)
     atoms[molecule_.atoms[n].residue].push_back(n);
-  for (std::size_t n = 0; n < atoms.size(); ++n) {
-    const auto found = residueBonds_.find(molecule_.residues[n].name);
-    if (found == residueBonds_.end()) continue;
-    const auto find = [&](std::string_view name) {
-      return std::find_if(atoms[n].begin(), atoms[n].end(),
-                          [&](std::size_t atom) { return molecule_.atoms[atom].name == name; });
-    };
-    for (const auto& [first, second] : found->second) {
-      const auto a = find(first), b = find(second);
-      if (a != atoms[n].end() && b != atoms[n].end()) keepBond(*a, *b);
+  for (std::size_t residue = 0; residue < atoms.size(); ++residue) {
+    const auto bonds = residueBonds_.find(molecule_.residues[residue].name);
+    if (bonds == residueBonds_.end()) continue;
+    std::unordered_map<std::string_view, std::size_t> named;  // the first atom of each name
+    for (const std::size_t atom : atoms[residue])
+      named.try_emplace(molecule_.atoms[atom].name, atom);
+    for (const auto& [name, atom] : named) {
+      ++steps_;
+      const auto partners = bonds->second.find(name);
+      if (partners == bonds->second.end()) continue;
+      for (const std::string_view partner : partners->second) {
+        ++steps_;
+        if (const auto other = named.find(partner); other != named.end())
+          keepBond(atom, other->second);
+      }
     }
   }
 }

@@ -1,5 +1,6 @@
 #include "levelset/molecules/molecule_file.h"
 
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,6 +9,7 @@
 #include <string>
 
 #include "levelset/error.h"
+#include "levelset/molecules/molecule_builder.h"
 #include "levelset/molecules/molecule_model.h"
 #include "tests/support/files.h"
 
@@ -217,6 +219,54 @@ void mutate(std::string& text, std::mt19937& random) {
         text.resize(at + 1);
     }
   }
+}
+
+/// An mmCIF file with many atoms at one place, and as many bonds of all kinds between them.
+/// @param residues  number of residues at the place, in turns
+std::string crowdedCif(int count, int residues) {
+  std::string text =
+      "data_x\nloop_\n_atom_site.type_symbol\n_atom_site.label_atom_id\n"
+      "_atom_site.label_comp_id\n_atom_site.label_alt_id\n_atom_site.auth_seq_id\n"
+      "_atom_site.Cartn_x\n_atom_site.Cartn_y\n_atom_site.Cartn_z\n";
+  for (int n = 0; n < count; ++n)
+    text += fmt::format("C A{} R{} {} 1 {} 0 0\n", n, n % residues, residues > 1 ? "A" : ".", n);
+  text += "loop_\n_chem_comp_bond.comp_id\n_chem_comp_bond.atom_id_1\n_chem_comp_bond.atom_id_2\n";
+  for (int n = 1; n < count; ++n) text += fmt::format("R0 A{} A{}\n", n - 1, n);
+  text +=
+      "loop_\n_struct_conn.ptnr1_auth_comp_id\n_struct_conn.ptnr1_auth_seq_id\n"
+      "_struct_conn.ptnr1_label_atom_id\n_struct_conn.ptnr2_auth_comp_id\n"
+      "_struct_conn.ptnr2_auth_seq_id\n_struct_conn.ptnr2_label_atom_id\n";
+  for (int n = 2; n < count; ++n) text += fmt::format("R0 1 A{} R0 1 A{}\n", n - 2, n);
+  return text;
+}
+
+TEST(MoleculeFile, FindsTheBondsOfACrowdInLinearTime) {
+  const auto stepsFor = [](int count, int residues) {
+    const ReadMoleculeOptions options;
+    const std::string text = crowdedCif(count, residues);  // the names of atoms refer to it
+    levelset::molecules::MoleculeBuilder builder("x.cif", options);
+    levelset::molecules::readCif(text, builder);
+    const Molecule read = builder.finish();
+    if (residues == 1) {
+      EXPECT_EQ(read.atoms.size(), static_cast<std::size_t>(count));
+      EXPECT_EQ(read.bonds.size(), static_cast<std::size_t>(2 * count - 3));
+    } else {
+      EXPECT_EQ(read.residues.size(), 1U);
+    }
+    return builder.steps();
+  };
+  EXPECT_LE(stepsFor(4000, 1), 4 * stepsFor(1000, 1) + 16);
+  EXPECT_LE(stepsFor(4000, 4000), 4 * stepsFor(1000, 1000) + 16);
+  EXPECT_GT(stepsFor(1000, 1), 3000U);
+}
+
+TEST(MoleculeFile, RefusesAnAtomWithTooManyBonds) {
+  std::string text = crowdedCif(70, 1);
+  text += "loop_\n_chem_comp_bond.comp_id\n_chem_comp_bond.atom_id_1\n_chem_comp_bond.atom_id_2\n";
+  for (int n = 1; n < 65; ++n) text += fmt::format("R0 A0 A{}\n", n);
+  EXPECT_EQ(molecule(text, "cif").bonds.size(), 2 * 70U - 3 + 62);
+  EXPECT_SAYS(refusal<InvalidInput>([&] { (void)molecule(text + "R0 A0 A65\n", "cif"); }),
+              "more than 64 atoms");
 }
 
 TEST(MoleculeFile, SurvivesThreeHundredMutationsWithBonds) {
