@@ -516,11 +516,22 @@ BallUnion::Exposure BallUnion::exposure() const {
   return exposure;
 }
 
-std::vector<double> BallUnion::volumes() const {
+std::vector<double> BallUnion::volumes(std::size_t maxBytes) const {
+  // Lists of arcs, and a face for each pair of balls that meet.
+  constexpr double kBytesOfBall = 150, kBytesOfArc = 16, kBytesOfPair = 24;
+  requireMemory(kBytesOfBall * static_cast<double>(data_->balls.size()) +
+                    kBytesOfArc * static_cast<double>(data_->arcs.size()) +
+                    kBytesOfPair * 0.5 * static_cast<double>(data_->overlaps.items.size()),
+                maxBytes);
   return powerVolumes(data_->balls, data_->overlaps, exposure().areas);
 }
 
-std::vector<BallUnion::Boundary> BallUnion::boundaries() const {
+std::vector<BallUnion::Boundary> BallUnion::boundaries(std::size_t maxBytes) const {
+  // Lists of arcs, and at most a piece of the boundary for each arc.
+  constexpr double kBytesOfBall = 100, kBytesOfArc = 150;
+  requireMemory(kBytesOfBall * static_cast<double>(data_->balls.size()) +
+                    kBytesOfArc * static_cast<double>(data_->arcs.size()),
+                maxBytes);
   return boundariesOf(data_->balls, data_->isHidden, data_->overlaps, data_->arcs);
 }
 

@@ -81,7 +81,8 @@ class BallUnion {
   [[nodiscard]] Exposure exposure() const;
   /// Volume of each given ball within its cell of the power diagram of the balls, world units³. The
   /// cells divide the union, so the sum is its volume. Balls inside another ball have none.
-  [[nodiscard]] std::vector<double> volumes() const;
+  /// @throws ResourceLimit if that needs more than `maxBytes`
+  [[nodiscard]] std::vector<double> volumes(std::size_t maxBytes = kNoMemoryLimit) const;
   /// A connected piece of the boundary.
   struct Boundary {
     double area = 0;  ///< world units²
@@ -92,7 +93,8 @@ class BallUnion {
   };
   /// Connected pieces of the boundary, in the order of their first arcs; spheres without arcs
   /// follow. The volumes add up to that of the union.
-  [[nodiscard]] std::vector<Boundary> boundaries() const;
+  /// @throws ResourceLimit if that needs more than `maxBytes`
+  [[nodiscard]] std::vector<Boundary> boundaries(std::size_t maxBytes = kNoMemoryLimit) const;
   /// Memory, bytes.
   [[nodiscard]] std::size_t bytes() const;
 

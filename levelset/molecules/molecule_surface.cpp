@@ -23,9 +23,9 @@ namespace {
 constexpr double kBlockVoxels = 7;
 
 /// Cavities of a union of balls.
-std::vector<MoleculeCavity> cavitiesOf(const BallUnion& all) {
+std::vector<MoleculeCavity> cavitiesOf(const BallUnion& all, std::size_t maxBytes) {
   std::vector<MoleculeCavity> cavities;
-  for (BallUnion::Boundary& boundary : all.boundaries())
+  for (BallUnion::Boundary& boundary : all.boundaries(maxBytes))
     if (boundary.volume < 0)
       cavities.push_back({-boundary.volume, boundary.area, std::move(boundary.balls)});
   return cavities;
@@ -33,7 +33,14 @@ std::vector<MoleculeCavity> cavitiesOf(const BallUnion& all) {
 
 /// Cavities of an excluded solid, by its mesh. The atoms are those whose spheres or arcs are
 /// closest.
-std::vector<MoleculeCavity> cavitiesOf(const NarrowBand& band, const BallUnion& accessible) {
+/// @param area  estimate of that of the solid, world units²
+std::vector<MoleculeCavity> cavitiesOf(const NarrowBand& band, const BallUnion& accessible,
+                                       double area, std::size_t maxBytes) {
+  // Vertices in a square of the edge of a voxel, on average over all directions; bytes of a vertex
+  // and its two triangles in the mesh of the grid, in that of the surface, and in its pieces.
+  constexpr double kVertices = 1.5, kBytesOfVertex = 100;
+  const double edge = band.voxelSize();
+  requireMemory(kVertices * kBytesOfVertex * area / (edge * edge), maxBytes);
   const TriMesh mesh = bandToMesh(band);
   const SurfaceComponents pieces = findSurfaceComponents(mesh.positions, mesh.triangles);
   std::vector<std::set<std::uint32_t>> atoms(pieces.figures.size());
@@ -99,9 +106,14 @@ MoleculeSurfaceResult moleculeSurface(const Molecule& molecule, double voxelSize
     result.band =
         makeShape(extent, voxelSize, shape, [&](const Imath::V3d& p) { return all.distance(p); });
   }
-  if (options.volumes) result.volumes = all.volumes();
+  const std::size_t left =
+      options.maxMemory == kNoMemoryLimit
+          ? kNoMemoryLimit
+          : shape.maxMemory - std::min(shape.maxMemory, result.band.memoryUse());
+  if (options.volumes) result.volumes = all.volumes(left);
   if (options.cavities) {
-    result.cavities = isExcluded ? cavitiesOf(result.band, all) : cavitiesOf(all);
+    result.cavities =
+        isExcluded ? cavitiesOf(result.band, all, extent.area, left) : cavitiesOf(all, left);
     std::stable_sort(result.cavities.begin(), result.cavities.end(),
                      [](const auto& a, const auto& b) { return a.volume > b.volume; });
   }

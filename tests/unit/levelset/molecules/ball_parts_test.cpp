@@ -6,7 +6,9 @@
 #include <random>
 #include <vector>
 
+#include "levelset/error.h"
 #include "levelset/molecules/ball_union.h"
+#include "tests/support/files.h"
 #include "tests/support/measured.h"
 #include "tests/support/threads.h"
 
@@ -18,6 +20,7 @@ using Imath::V3d;
 using levelset::Ball;
 using levelset::BallUnion;
 using support::measured;
+using support::refusal;
 
 constexpr double kPi = std::numbers::pi;
 
@@ -184,6 +187,14 @@ TEST(BallParts, MeasureACavity) {
   }
   sampled /= kSamples * kSamples * kSamples;
   EXPECT_NEAR(-inner.volume / sampled, 1, measured(1e-3));
+}
+
+TEST(BallParts, RefuseToExceedAMemoryLimit) {
+  const BallUnion all(scattered(10, 300, 18), 3);
+  EXPECT_FALSE(refusal<levelset::ResourceLimit>([&] { (void)all.volumes(20'000); }).empty());
+  EXPECT_FALSE(refusal<levelset::ResourceLimit>([&] { (void)all.boundaries(20'000); }).empty());
+  EXPECT_EQ(all.volumes(1'000'000), all.volumes());
+  EXPECT_EQ(all.boundaries(1'000'000).size(), all.boundaries().size());
 }
 
 TEST(BallParts, HaveTheSameBitsOnAnyNumberOfThreads) {

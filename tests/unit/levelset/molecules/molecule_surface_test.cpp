@@ -238,4 +238,19 @@ TEST(MoleculeSurface, Refuses) {
                }).empty());
 }
 
+TEST(MoleculeSurface, RefusesCavitiesThatNeedMoreMemoryThanTheBand) {
+  const auto isRefused = [](std::size_t bytes, bool cavities) {
+    try {
+      (void)moleculeSurface(chain(20), 0.2, {.cavities = cavities, .maxMemory = bytes});
+    } catch (const levelset::ResourceLimit&) {
+      return true;
+    }
+    return false;
+  };
+  std::size_t bytes = 100'000;
+  while (isRefused(bytes, false)) bytes += bytes / 4;
+  EXPECT_TRUE(isRefused(bytes, true)) << bytes;
+  EXPECT_FALSE(isRefused(3 * bytes, true)) << bytes;
+}
+
 }  // namespace molecule_surface_test
