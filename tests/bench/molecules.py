@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Compares excluded surfaces of molecules with those of PyMOL: error of volume and area, CPU seconds.
+"""Compares excluded surfaces of molecules with those of PyMOL: error of volume and area, CPU seconds, peak memory.
 
     molecules.py LEVELSMITH [CSV]
 
@@ -10,7 +10,6 @@ area are within 0.5 %, and our time is at most that of PyMOL at a tenth of its e
 import csv
 import json
 import os
-import resource
 import subprocess
 import sys
 import tempfile
@@ -43,17 +42,22 @@ print('RESULT', seconds, cmd.count_atoms('m'))
 """
 
 
-def cpu_seconds(command):
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    done = subprocess.run(command, check=True, capture_output=True, text=True)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return done.stdout, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+def run(command, **options):
+    """Output, CPU seconds and peak memory in MB of a command."""
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, **options)
+    with process.stdout:
+        text = process.stdout.read()
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        sys.exit(f"{' '.join(command)}: exit code {process.returncode}")
+    return text, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1000
 
 
 def measured(levelsmith, *chain, closed=False):
     """Volume and area of a solid; closed: without cavities and small parts."""
     filters = ["!", "fill-cavities", "!", "keep", "--largest", "1"] if closed else []
-    figures = json.loads(cpu_seconds([levelsmith, "-q", *chain, *filters, "!", "measure", "--json"])[0])
+    figures = json.loads(run([levelsmith, "-q", *chain, *filters, "!", "measure", "--json"])[0])
     return figures["volume"], figures["area"]
 
 
@@ -64,27 +68,26 @@ def main(levelsmith, table):
         for molecule in MOLECULES:
             package, _, rest = molecule.partition("/")
             path = str(pathlib.Path(FOLDERS[package], rest))
-            atoms = json.loads(cpu_seconds([levelsmith, "-q", "read", path, "!", "info", "--json"])[0])["atoms"]
+            atoms = json.loads(run([levelsmith, "-q", "read", path, "!", "info", "--json"])[0])["atoms"]
             chain = ["read", path, "!", "molecule-surface"]
             fine = str(folder / "fine.vdb")
-            cpu_seconds([levelsmith, "-q", *chain, "--voxel", str(FINE), "!", "write", fine])
+            run([levelsmith, "-q", *chain, "--voxel", str(FINE), "!", "write", fine])
             volume, area = measured(levelsmith, "read", fine)
             closed_volume, closed_area = measured(levelsmith, "read", fine, closed=True)
             ours = measured(levelsmith, *chain, "--voxel", str(VOXEL))
-            _, seconds = cpu_seconds([levelsmith, "-q", *chain, "--voxel", str(VOXEL), "!", "mesh", "!", "write",
-                                      str(folder / "ours.ply")])
+            _, seconds, megabytes = run([levelsmith, "-q", *chain, "--voxel", str(VOXEL), "!", "mesh", "!", "write",
+                                         str(folder / "ours.ply")])
             script, mesh = folder / "pymol.py", str(folder / "pymol.obj")
             script.write_text(PYMOL.format(path=path, mesh=mesh), encoding="utf-8")
             environment = dict(os.environ, PATH="/usr/bin:/bin")
-            told = subprocess.run(["pymol", "-cq", str(script)], env=environment, capture_output=True, text=True,
-                                  check=True).stdout
+            told, _, their_megabytes = run(["pymol", "-cq", str(script)], env=environment)
             _, theirs, count = next(line for line in told.splitlines() if line.startswith("RESULT")).split()
             peer = measured(levelsmith, "read", mesh, "!", "level-set", "--voxel", "0.2", "--accept-sign",
                             closed=True)
             row = {"molecule": pathlib.Path(rest).stem, "atoms": atoms, "pymol_atoms": int(count),
-                   "volume_error": abs(ours[0] / volume - 1), "area_error": abs(ours[1] / area - 1), "cpu_s": seconds,
+                   "volume_error": abs(ours[0] / volume - 1), "area_error": abs(ours[1] / area - 1), "cpu_s": seconds, "mb": megabytes,
                    "pymol_volume_error": abs(peer[0] / closed_volume - 1), "pymol_area_error": abs(peer[1] / closed_area - 1),
-                   "pymol_cpu_s": float(theirs)}
+                   "pymol_cpu_s": float(theirs), "pymol_mb": their_megabytes}
             rows.append(row)
             print(", ".join(f"{key} {value:.3g}" if isinstance(value, float) else f"{key} {value}"
                             for key, value in row.items()), flush=True)
