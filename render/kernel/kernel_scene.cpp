@@ -65,10 +65,7 @@ SharedTree::Roots KernelTracer::bezierRoots(const SharedTree& tree,
 
 std::vector<QuadricHit> KernelTracer::quadricHits(const QuadricCaster& caster,
                                                   const std::vector<Camera::Ray>& rays) const {
-  std::vector<QuadricHit> hits;
-  hits.reserve(rays.size());
-  for (const Camera::Ray& ray : rays) hits.push_back(caster.firstHit(ray));
-  return hits;
+  return caster.firstHits(rays);
 }
 
 std::vector<InterfaceHit> KernelTracer::interfaceHits(const InterfaceCaster& caster,

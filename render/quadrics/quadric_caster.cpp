@@ -1,6 +1,10 @@
 #include "render/quadrics/quadric_caster.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <type_traits>
@@ -45,11 +49,24 @@ QuadricCaster::QuadricCaster(const QuadricModel& model, std::size_t maxBytes)
 }
 
 std::vector<double> QuadricCaster::extents(const std::vector<V3d>& directions) const {
-  std::vector<double> result(directions.size(), -std::numeric_limits<double>::infinity());
-  forEachStored(*tables_, [&](const auto& primitive, std::size_t) {
-    for (std::size_t n = 0; n < directions.size(); ++n)
-      result[n] = std::max(result[n], farthestAlong(primitive, directions[n]));
-  });
+  constexpr std::size_t kGrain = 1u << 13;  // slots
+  const std::vector<double> none(directions.size(), -std::numeric_limits<double>::infinity());
+  // Maxima do not depend on the order, except for the sign of zeros.
+  std::vector<double> result = tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, tables_->slotCount(), kGrain), none,
+      [&](const auto& part, std::vector<double> most) {
+        forEachStored(*tables_, part.begin(), part.end(), [&](const auto& primitive) {
+          for (std::size_t n = 0; n < directions.size(); ++n)
+            most[n] = std::max(most[n], farthestAlong(primitive, directions[n]));
+        });
+        return most;
+      },
+      [](std::vector<double> a, const std::vector<double>& b) {
+        std::transform(a.begin(), a.end(), b.begin(), a.begin(),
+                       [](double x, double y) { return std::max(x, y); });
+        return a;
+      });
+  for (double& extent : result) extent += 0.0;
   return result;
 }
 
@@ -63,7 +80,7 @@ std::size_t QuadricCaster::bytes() const {
 
 QuadricModel QuadricCaster::model() const {
   QuadricModel model;
-  forEachStored(*tables_, [&](const auto& primitive, std::size_t) {
+  forEachStored(*tables_, 0, tables_->slotCount(), [&](const auto& primitive) {
     using Primitive = std::decay_t<decltype(primitive)>;
     if constexpr (std::is_same_v<Primitive, Ball>)
       model.balls.push_back(primitive);
@@ -79,6 +96,19 @@ QuadricHit QuadricCaster::firstHit(const Camera::Ray& ray) const {
   const NearestQuadric nearest = traceQuadrics(*tables_, ray, false, hasWideVectors());
   if (nearest.slot == NearestQuadric::kNoSlot) return {};
   return hitOn(ray, nearest.t, nearest.slot, nearest.face);
+}
+
+std::vector<QuadricHit> QuadricCaster::firstHits(std::span<const Camera::Ray> rays) const {
+  std::vector<QuadricHit> hits(rays.size());
+  std::array<NearestQuadric, kBeamRays> nearest;
+  for (std::size_t first = 0; first < rays.size(); first += kBeamRays) {
+    const std::size_t count = std::min<std::size_t>(kBeamRays, rays.size() - first);
+    traceQuadricBeam(*tables_, rays.subspan(first, count), hasWideVectors(), nearest.data());
+    for (std::size_t n = 0; n < count; ++n)
+      if (nearest[n].slot != NearestQuadric::kNoSlot)
+        hits[first + n] = hitOn(rays[first + n], nearest[n].t, nearest[n].slot, nearest[n].face);
+  }
+  return hits;
 }
 
 bool QuadricCaster::isOccluded(const Camera::Ray& ray) const {

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "levelset/progress.h"
@@ -58,6 +59,9 @@ class QuadricCaster {
   /// First intersection of a ray between its ends. A ray that starts inside a quadric meets it from
   /// within.
   [[nodiscard]] QuadricHit firstHit(const Camera::Ray& ray) const;
+  /// First intersections of rays, with the bits of firstHit(). Sixteen at a time are searched
+  /// together if they are close to each other, as the rays through a square of a picture.
+  [[nodiscard]] std::vector<QuadricHit> firstHits(std::span<const Camera::Ray> rays) const;
   /// Returns true if a ray intersects a quadric between its ends. Cheaper than firstHit().
   [[nodiscard]] bool isOccluded(const Camera::Ray& ray) const;
   /// Colour of the primitive of a hit, linear.

@@ -154,6 +154,22 @@ V3d centreOf(const BallBlock& block, std::size_t lane) {
           static_cast<double>(block.z[lane])};
 }
 
+/// Mean length of the edges of the boxes around the blocks of trees.
+double meanBlockSize(const std::array<std::vector<QuadricNode>, 3>& trees) {
+  double sum = 0;
+  std::size_t count = 0;
+  for (const std::vector<QuadricNode>& tree : trees)
+    for (const QuadricNode& node : tree)
+      for (std::size_t n = 0; n < kQuadricLanes; ++n) {
+        if ((node.child[n] & QuadricNode::kLeaf) == 0) continue;
+        for (std::size_t c = 0; c < 3; ++c)
+          sum +=
+              static_cast<double>(node.planes[c + 3][n]) - static_cast<double>(node.planes[c][n]);
+        count += 3;
+      }
+  return count > 0 ? sum / static_cast<double>(count) : 0;
+}
+
 }  // namespace
 
 QuadricKernel::QuadricShape shapeOf(const StoredQuadric& quadric) {
@@ -264,6 +280,7 @@ QuadricTables makeQuadricTables(const QuadricModel& model, std::size_t maxBytes)
     tables.quadrics[place] = storedOf(model.quadrics[number], tables.origin);
     tables.colours[first + place] = packedColour(model.quadrics[number].colour);
   });
+  tables.blockSize = meanBlockSize(tables.trees);
   return tables;
 }
 

@@ -51,7 +51,8 @@ struct StoredQuadric {
 /// and of the general quadrics follow each other. Some slots of blocks are empty.
 struct QuadricTables {
   Imath::V3d origin{0};
-  double reach = 0;  ///< bound on the distance of the primitives from the origin
+  double reach = 0;      ///< bound on the distance of the primitives from the origin
+  double blockSize = 0;  ///< mean length of the edges of the boxes around blocks
   std::vector<BallBlock> balls;
   std::vector<StickBlock> sticks;
   std::vector<StoredQuadric> quadrics;
@@ -116,15 +117,20 @@ QuadricKernel::QuadricRoot QuadricTables::rootOf(std::size_t slot,
 [[nodiscard]] Stick stickIn(const QuadricTables& tables, std::size_t slot);
 [[nodiscard]] Quadric quadricIn(const QuadricTables& tables, std::size_t slot);
 
-/// Calls use(primitive, slot) with each primitive: a Ball, a Stick or a Quadric in world space.
+/// Calls use(primitive) with each primitive of the slots from begin to end: a Ball, a Stick or a
+/// Quadric in world space.
 template <typename Use>
-void forEachStored(const QuadricTables& tables, const Use& use) {
-  for (std::size_t slot = 0; slot < tables.firstStick(); ++slot)
-    if (const Ball ball = ballIn(tables, slot); ball.radius > 0) use(ball, slot);
-  for (std::size_t slot = tables.firstStick(); slot < tables.firstQuadric(); ++slot)
-    if (const Stick stick = stickIn(tables, slot); stick.radius > 0) use(stick, slot);
-  for (std::size_t slot = tables.firstQuadric(); slot < tables.slotCount(); ++slot)
-    use(quadricIn(tables, slot), slot);
+void forEachStored(const QuadricTables& tables, std::size_t begin, std::size_t end,
+                   const Use& use) {
+  for (std::size_t slot = begin; slot < end; ++slot) {
+    if (slot < tables.firstStick()) {
+      if (const Ball ball = ballIn(tables, slot); ball.radius > 0) use(ball);
+    } else if (slot < tables.firstQuadric()) {
+      if (const Stick stick = stickIn(tables, slot); stick.radius > 0) use(stick);
+    } else {
+      use(quadricIn(tables, slot));
+    }
+  }
 }
 
 }  // namespace render

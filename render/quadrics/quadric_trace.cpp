@@ -1,5 +1,6 @@
 #include "render/quadrics/quadric_trace.h"
 
+#include <Imath/ImathVec.h>
 #include <immintrin.h>
 
 #include <algorithm>
@@ -8,16 +9,39 @@
 #include <utility>
 
 namespace render {
+namespace {
 
+using Imath::V3f;
+
+// Fewer rays are traced one by one.
+constexpr int kLeastBeamRays = 4;
+// Largest difference of the slopes of rays that are searched together.
+constexpr float kMostSlopes = 0.2f;
+// Assumed distance of an intersection from the start of a ray near the quadrics, as a share of the
+// bound on their distance from the origin. There the rays must be as close as the primitives of a
+// block: otherwise single rays are faster.
+constexpr float kMeanDepth = 0.25f;
+
+}  // namespace
+
+// GCC 12 does not define __AVX2__ after a pragma.
+#define WIDE_VECTORS 0
 namespace sse2 {
 #include "render/quadrics/quadric_lanes.inc"
+// After the lanes, which it uses.
+#include "render/quadrics/quadric_beam.inc"
 }  // namespace sse2
+#undef WIDE_VECTORS
 
 #pragma GCC push_options
-#pragma GCC target("avx2")
+#pragma GCC target("avx2,fma")
+#define WIDE_VECTORS 1
 namespace avx2 {
 #include "render/quadrics/quadric_lanes.inc"
+// After the lanes, which it uses.
+#include "render/quadrics/quadric_beam.inc"
 }  // namespace avx2
+#undef WIDE_VECTORS
 #pragma GCC pop_options
 
 QuadricKernel::QuadricRay relativeRay(const QuadricTables& tables, const Camera::Ray& ray) {
@@ -35,13 +59,21 @@ std::optional<double> startAt(const QuadricTables& tables, const QuadricKernel::
 }
 
 bool hasWideVectors() {
-  static const bool kHas = __builtin_cpu_supports("avx2") != 0;
+  static const bool kHas =
+      __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
   return kHas;
 }
 
 NearestQuadric traceQuadrics(const QuadricTables& tables, const Camera::Ray& ray, bool any,
                              bool isWide) {
   return isWide ? avx2::trace(tables, ray, any) : sse2::trace(tables, ray, any);
+}
+
+bool traceQuadricBeam(const QuadricTables& tables, std::span<const Camera::Ray> rays, bool isWide,
+                      NearestQuadric* nearest) {
+  const int count = static_cast<int>(rays.size());
+  return isWide ? avx2::traceNear(tables, rays.data(), count, nearest)
+                : sse2::traceNear(tables, rays.data(), count, nearest);
 }
 
 }  // namespace render

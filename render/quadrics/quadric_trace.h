@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "render/camera.h"
 #include "render/quadrics/quadric_tables.h"
@@ -26,6 +27,16 @@ struct NearestQuadric {
 /// @param isWide  uses vectors of eight floats. @pre false, or hasWideVectors()
 [[nodiscard]] NearestQuadric traceQuadrics(const QuadricTables& tables, const Camera::Ray& ray,
                                            bool any, bool isWide);
+
+/// Largest number of rays that are searched together.
+inline constexpr int kBeamRays = 16;
+
+/// Finds the nearest intersections of up to kBeamRays rays, with the bits of traceQuadrics(). Rays
+/// that are close to each other take less time.
+/// @param nearest  receives an intersection for each ray
+/// @return false if the rays were traced one by one
+bool traceQuadricBeam(const QuadricTables& tables, std::span<const Camera::Ray> rays, bool isWide,
+                      NearestQuadric* nearest);
 
 /// The ray relative to the origin of the tables.
 [[nodiscard]] QuadricKernel::QuadricRay relativeRay(const QuadricTables& tables,

@@ -5,7 +5,8 @@
 #include <embree3/rtcore.h>
 #include <fmt/core.h>
 #include <sys/resource.h>
-#include <tbb/global_control.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <chrono>
@@ -13,7 +14,9 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
+#include <functional>
 #include <limits>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -159,7 +162,7 @@ Casting bestOf(int repetitions, const Cast& cast) {
 }
 
 template <int width>
-std::size_t castPackets(RTCScene scene, const std::vector<Camera::Ray>& rays) {
+std::size_t castPackets(RTCScene scene, std::span<const Camera::Ray> rays) {
   using Packet = std::conditional_t<width == 8, RTCRayHit8, RTCRayHit16>;
   std::size_t hits = 0;
   alignas(64) int valid[width];
@@ -194,7 +197,7 @@ std::size_t castPackets(RTCScene scene, const std::vector<Camera::Ray>& rays) {
   return hits;
 }
 
-std::size_t castSingle(RTCScene scene, const std::vector<Camera::Ray>& rays, bool occlusion) {
+std::size_t castSingle(RTCScene scene, std::span<const Camera::Ray> rays, bool occlusion) {
   std::size_t hits = 0;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
@@ -211,12 +214,37 @@ std::size_t castSingle(RTCScene scene, const std::vector<Camera::Ray>& rays, boo
   return hits;
 }
 
-std::size_t castOwn(const QuadricCaster& caster, const std::vector<Camera::Ray>& rays,
+std::size_t castOwn(const QuadricCaster& caster, std::span<const Camera::Ray> rays,
                     bool occlusion) {
   std::size_t hits = 0;
   for (const Camera::Ray& ray : rays)
     hits += occlusion ? caster.isOccluded(ray) : caster.firstHit(ray).found;
   return hits;
+}
+
+/// First hits in blocks of rays, as of a picture.
+std::size_t castBlocks(const QuadricCaster& caster, std::span<const Camera::Ray> rays) {
+  constexpr std::size_t kBlock = 1024;
+  std::size_t hits = 0;
+  for (std::size_t first = 0; first < rays.size(); first += kBlock)
+    for (const render::QuadricHit& hit :
+         caster.firstHits(rays.subspan(first, std::min(kBlock, rays.size() - first))))
+      hits += hit.found;
+  return hits;
+}
+
+/// Casts parts of the rays on all threads.
+template <typename Cast>
+std::size_t onAllThreads(std::span<const Camera::Ray> rays, const Cast& cast) {
+  constexpr std::size_t kPart = 1u << 14;
+  return tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, rays.size() / kPart + 1), std::size_t{0},
+      [&](const auto& parts, std::size_t hits) {
+        for (std::size_t n = parts.begin(); n < parts.end(); ++n)
+          hits += cast(rays.subspan(n * kPart, std::min(kPart, rays.size() - n * kPart)));
+        return hits;
+      },
+      std::plus<>());
 }
 
 /// Rays from the hits of a picture into random directions, as for the light of the sky.
@@ -234,7 +262,7 @@ std::vector<Camera::Ray> skyRays(const QuadricCaster& caster,
   return rays;
 }
 
-void report(const char* name, std::size_t count, std::size_t rays, const Casting& own,
+void report(const std::string& name, std::size_t count, std::size_t rays, const Casting& own,
             const Casting& peer) {
   const double million = 1e-6 * static_cast<double>(rays);
   fmt::print("  {:<28} {:>9} {:>9.2f} {:>9.2f} {:>6.2f}   {} and {} hits\n", name, count,
@@ -267,25 +295,30 @@ void compare(const char* name, const QuadricModel& model) {
                                  near = raysOf(cameraAt(0.4, 1024, 768));
   const std::vector<Camera::Ray> sky = skyRays(caster, views);
   constexpr int kRepetitions = 3;
-  const auto both = [&](const char* what, const std::vector<Camera::Ray>& rays, bool occlusion) {
-    const Casting mine = bestOf(kRepetitions, [&] { return castOwn(caster, rays, occlusion); });
-    Casting other = bestOf(kRepetitions, [&] { return castSingle(peer.scene, rays, occlusion); });
-    if (!occlusion) {
-      const Casting eight = bestOf(kRepetitions, [&] { return castPackets<8>(peer.scene, rays); });
-      const Casting sixteen =
-          bestOf(kRepetitions, [&] { return castPackets<16>(peer.scene, rays); });
-      fmt::print("  Embree alone: single {:.2f}, packets of 8 {:.2f}, of 16 {:.2f}\n",
-                 1e-6 * static_cast<double>(rays.size()) / other.seconds,
-                 1e-6 * static_cast<double>(rays.size()) / eight.seconds,
-                 1e-6 * static_cast<double>(rays.size()) / sixteen.seconds);
-      for (const Casting& packets : {eight, sixteen})
-        if (packets.seconds < other.seconds) other = packets;
-    }
-    report(what, count, rays.size(), mine, other);
+  const RTCScene scene = peer.scene;
+  const auto firstHits = [&](const std::string& what, const std::vector<Camera::Ray>& rays,
+                             bool isParallel) {
+    const auto time = [&](const auto& cast) {
+      return bestOf(kRepetitions,
+                    [&] { return isParallel ? onAllThreads(rays, cast) : cast(rays); });
+    };
+    using Rays = std::span<const Camera::Ray>;
+    const Casting mine = time([&](Rays part) { return castOwn(caster, part, false); }),
+                  blocks = time([&](Rays part) { return castBlocks(caster, part); }),
+                  single = time([&](Rays part) { return castSingle(scene, part, false); }),
+                  eight = time([&](Rays part) { return castPackets<8>(scene, part); }),
+                  sixteen = time([&](Rays part) { return castPackets<16>(scene, part); });
+    report(what + ", single rays", count, rays.size(), mine, single);
+    const Casting& packets = eight.seconds < sixteen.seconds ? eight : sixteen;
+    report(what + ", best", count, rays.size(), blocks.seconds < mine.seconds ? blocks : mine,
+           packets.seconds < single.seconds ? packets : single);
   };
-  both("whole, first hits", views, false);
-  both("from within, first hits", near, false);
-  both("light of the sky", sky, true);
+  firstHits("whole", views, false);
+  firstHits("within", near, false);
+  firstHits("whole, all threads", views, true);
+  report("light of the sky", count, sky.size(),
+         bestOf(kRepetitions, [&] { return castOwn(caster, sky, true); }),
+         bestOf(kRepetitions, [&] { return castSingle(scene, sky, true); }));
 }
 
 void compareAt(std::size_t count) {

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -12,6 +15,7 @@
 #include "render/quadrics/quadric_trace.h"
 #include "tests/support/measured.h"
 #include "tests/support/quadric_scenes.h"
+#include "tests/support/threads.h"
 
 namespace quadric_agreement_test {
 
@@ -166,6 +170,77 @@ TEST(QuadricCaster, HasTheBitsOfATestOfAllOnBothInstructionSets) {
   }
   EXPECT_GT(hits, 500U);
   EXPECT_LT(hits, 1950U);
+}
+
+TEST(QuadricCaster, HasTheBitsOfSingleRaysForSeveral) {
+  Numbers numbers(8);
+  QuadricModel model{
+      quadric_scenes::ballsInCube(3000, numbers), quadric_scenes::sticksInCube(3000, numbers), {}};
+  for (int n = 0; n < 30; ++n) {
+    model.quadrics.push_back(quadric_scenes::randomQuadric(static_cast<QuadricKind>(n % 6),
+                                                           numbers.inBox(1), 3, numbers));
+    for (V3d& axis : model.quadrics.back().axes) axis *= 0.2;
+  }
+  const QuadricCaster caster(model);
+  std::vector<Camera> cameras = camerasOf(caster, 60, numbers);
+  cameras.emplace_back();  // along an axis, so that directions of a square differ in sign
+  cameras.back().width = cameras.back().height = 60;
+  cameras.push_back(cameras.back());
+  cameras.back().orthoHeight = 3;
+  std::vector<Camera::Ray> rays;
+  for (const Camera& camera : cameras)
+    for (int n = 0; n < 3600; ++n) {  // squares of four by four pixels
+      const int square = n / 16, x = square % 15 * 4 + n % 4, y = square / 15 * 4 + n % 16 / 4;
+      rays.push_back(camera.ray(x + 0.5, y + 0.5));
+      if (n % 7 == 0) rays.back().near = numbers.between(0, 4);
+      if (n % 5 == 0) rays.back().far = numbers.between(0, 5);
+    }
+  for (int n = 0; n < 1003; ++n)
+    rays.push_back({numbers.inBox(1.5), numbers.unit(), 0, numbers.between(0.1, 3)});
+  std::size_t hits = 0, together = 0;
+  for (const bool isWide : {false, true}) {
+    if (isWide && !hasWideVectors()) continue;
+    for (std::size_t first = 0; first < rays.size(); first += kBeamRays) {
+      const auto some =
+          std::span(rays).subspan(first, std::min<std::size_t>(kBeamRays, rays.size() - first));
+      std::array<NearestQuadric, kBeamRays> found;
+      together += traceQuadricBeam(*caster.tables(), some, isWide, found.data());
+      for (std::size_t n = 0; n < some.size(); ++n) {
+        const NearestQuadric alone = traceQuadrics(*caster.tables(), some[n], false, isWide);
+        ASSERT_EQ(found[n].slot, alone.slot);
+        EXPECT_EQ(found[n].t, alone.t);
+        EXPECT_EQ(found[n].face, alone.face);
+        hits += alone.slot != NearestQuadric::kNoSlot;
+      }
+    }
+  }
+  EXPECT_GT(hits, rays.size() / 2);
+  EXPECT_GT(together, rays.size() / kBeamRays / 2) << "the others are traced one by one";
+  const std::vector<QuadricHit> all = caster.firstHits(rays);
+  for (std::size_t n = 0; n < rays.size(); ++n) {
+    const QuadricHit alone = caster.firstHit(rays[n]);
+    ASSERT_EQ(all[n].found, alone.found);
+    EXPECT_EQ(all[n].distance, alone.distance);
+    EXPECT_EQ(all[n].normal, alone.normal);
+    EXPECT_EQ(all[n].slot, alone.slot);
+  }
+}
+
+TEST(QuadricCaster, HasTheSameExtentsOnAnyNumberOfThreads) {
+  Numbers numbers(11);
+  const QuadricModel model{
+      quadric_scenes::ballsInCube(30000, numbers), quadric_scenes::sticksInCube(9000, numbers), {}};
+  std::vector<V3d> directions;
+  for (int n = 0; n < 20; ++n) directions.push_back(numbers.unit());
+  const auto extents = [&] { return QuadricCaster(model).extents(directions); };
+  const std::vector<double> one = support::onThreads(1, extents);
+  EXPECT_EQ(support::onThreads(7, extents), one);
+  for (std::size_t n = 0; n < directions.size(); ++n) {
+    double most = -1e300;
+    for (const Ball& ball : model.balls)
+      most = std::max(most, ball.centre.dot(directions[n]) + static_cast<double>(ball.radius));
+    EXPECT_GE(one[n], most - 1e-7) << "single precision rounds centres";
+  }
 }
 
 TEST(QuadricCaster, MeetsTheSphereAtItsRoots) {
