@@ -56,6 +56,7 @@ struct Hit {
   /// Index in Scene::solids, or in Scene::meshes if isOnMesh. On a mapped texture: number of solids
   /// plus the index in Scene::mapped.
   std::size_t solid = 0;
+  std::uint32_t primitive = 0;  ///< QuadricHit::slot; 0 on other surfaces
   bool isOnMesh = false;
   bool isOnGround = false;  ///< the hit is on Scene::ground, which shows only shadows
   bool isFlipped = false;   ///< the drawn shape is on the outside of the hit solid, as for a

@@ -259,6 +259,7 @@ std::vector<Hit> KernelScene::castQuadrics(const KernelTracer& tracer,
       hits[i] =
           quadrics_[part].hitOf(rays[i], found[i].distance, found[i].normal,
                                 caster.colourOf(found[i]), bezierSolid_ + beziers_.size() + part);
+      hits[i].primitive = found[i].slot;
     }
   }
   return hits;

@@ -18,8 +18,8 @@ constexpr double kSkyRange = 0.1, kKeyRange = 0.3;
 constexpr double kOffPlane = 0.25;
 
 bool isSameSurface(const Hit& a, const Hit& b) {
-  return a.found && b.found && a.solid == b.solid && a.isOnMesh == b.isOnMesh &&
-         a.isOnGround == b.isOnGround;
+  return a.found && b.found && a.solid == b.solid && a.primitive == b.primitive &&
+         a.isOnMesh == b.isOnMesh && a.isOnGround == b.isOnGround;
 }
 
 }  // namespace

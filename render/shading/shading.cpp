@@ -269,7 +269,7 @@ C3f Shader::litColour(const Hit& hit, const Frame& frame, const V3d& direction,
   for (int c = 0; c < 3; ++c) {
     // Factor of the sky light with interreflection in a hollow that has the surface's colour. It is
     // 1 where nothing blocks the sky.
-    const double bounced = open / (1 - static_cast<double>(albedo[c]) * (1 - open));
+    const double bounced = open > 0 ? open / (1 - static_cast<double>(albedo[c]) * (1 - open)) : 0;
     result[c] += static_cast<float>(bounced) * static_cast<float>(scene_.ambient) * sky[c];
   }
   result += scaled(C3f(0.82f, 0.92f, 1.10f), fill * open);

@@ -11,7 +11,9 @@
 #include "render/cpu/cpu_renderer.h"
 #include "render/cpu/cpu_tracer.h"
 #include "render/kernel/paint.h"
+#include "render/quadrics/quadric_part.h"
 #include "tests/support/measured.h"
+#include "tests/support/quadric_scenes.h"
 #include "tests/support/render_scenes.h"
 
 namespace {
@@ -59,6 +61,24 @@ TEST(LightLattice, IsAsCloseToTheTruthAsTracedRays) {
   EXPECT_LT(found.rms, traced.rms);
   EXPECT_LT(std::abs(found.mean), support::measured(1.27e-4));
   EXPECT_LE(found.largest, support::measured(0.0995));
+}
+
+TEST(LightLattice, IsAsCloseToTheTruthOnQuadrics) {
+  // Flat ends of cylinders at several heights. Their normals agree, and their light differs.
+  quadric_scenes::Numbers numbers(4);
+  std::vector<render::Stick> sticks;
+  constexpr int kEdge = 20;
+  for (int n = 0; n < kEdge * kEdge; ++n) {
+    const double x = 2.0 * (n % kEdge) / kEdge - 1, y = 2.0 * (n / kEdge) / kEdge - 1,
+                 height = numbers.between(0, 0.05);
+    sticks.push_back({V3d(x, y, -1), V3d(x, y, height), 0.0525f, 0xffffff});
+  }
+  Scene scene;
+  scene.quadrics.push_back(render::makeQuadricPart({}, sticks));
+  scene.camera = {.from = {0.1, 0.15, 5}, .to = {0, 0, 0}, .width = 60, .height = 45};
+  const Difference traced = differenceOf(scene, 1, {}), found = differenceOf(scene, 4, {});
+  EXPECT_LE(found.rms, traced.rms);
+  EXPECT_LT(traced.rms, support::measured(0.0069));
 }
 
 TEST(LightLattice, LeavesAnOpenSurfaceUnchanged) {
