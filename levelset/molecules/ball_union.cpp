@@ -54,6 +54,7 @@ using Imath::V3d;
 constexpr double kSqrt3 = 1.7320508075688772;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // A cell with fewer candidates is not split.
+constexpr std::size_t kFewBallsOutside = 48;
 constexpr std::size_t kFewBalls = 6, kFewArcs = 6;
 constexpr int kMostLevels = 40;
 // The cells of this level are built as independent tasks.
@@ -213,12 +214,11 @@ void BallUnion::Data::build(std::size_t maxBytes, const Progress& progress) {
     V3d at;
     double half;
     int level;
-    std::vector<std::uint32_t> balls, arcs;
     BallOctree tree;
   };
   std::vector<Task> open, tasks;
   tree.cells.resize(1);
-  open.push_back({0, centre, half, 0, std::move(allBalls), std::move(allArcs), {}});
+  open.push_back({0, centre, half, 0, {}});
   while (!open.empty()) {
     Task task = std::move(open.back());
     open.pop_back();
@@ -234,17 +234,24 @@ void BallUnion::Data::build(std::size_t maxBytes, const Progress& progress) {
                       childCentre(task.at, task.half, n),
                       task.half / 2,
                       task.level + 1,
-                      task.balls,
-                      task.arcs,
                       {}});
   }
   Build work{ProgressGate(progress, tasks.size()), maxBytes};
   tbb::parallel_for(std::size_t{0}, tasks.size(), [&](std::size_t n) {
     Task& task = tasks[n];
     task.tree.cells.resize(1);
-    descend(task.tree, 0, task.at, task.half, task.level, task.balls, task.arcs, work);
+    descend(task.tree, 0, task.at, task.half, task.level, allBalls, allArcs, work);
     work.gate.advance(1);
   });
+  std::size_t cells = tree.cells.size(), ballCount = 0, arcCount = 0;
+  for (const Task& task : tasks) {
+    cells += task.tree.cells.size() - 1;
+    ballCount += task.tree.balls.size();
+    arcCount += task.tree.arcs.size();
+  }
+  tree.cells.reserve(cells);
+  tree.balls.reserve(ballCount);
+  tree.arcs.reserve(arcCount);
   for (Task& task : tasks) {
     // BallCell 0 of the task is the cell in the tree. Its other cells follow at the end.
     const auto cellsBefore = static_cast<std::uint32_t>(tree.cells.size()) - 1;
@@ -286,8 +293,10 @@ void BallUnion::Data::descend(BallOctree& out, std::uint32_t cell, const V3d& at
         if (arcs[n].distance(at) <= limit) nearArcs.push_back(n);
     }
   }
+  // Cells outside all balls need no arcs, and fill most of the space.
+  const std::size_t few = most + reach < 0 ? kFewBallsOutside : kFewBalls;
   const bool isFine = 2 * cellHalf <= leaf || level >= kMostLevels ||
-                      (nearBalls.size() <= kFewBalls && nearArcs.size() <= kFewArcs);
+                      (nearBalls.size() <= few && nearArcs.size() <= kFewArcs);
   if (isDeep || isFar || isFine) {
     BallCell& leafCell = out.cells[cell];
     leafCell.isDeep = isDeep;
