@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <memory>
 #include <vector>
 
 #include "levelset/error.h"
@@ -36,7 +37,14 @@ NarrowBand cropped(NarrowBand band, const RegionOfInterest& part) {
                                *tile, false);
       for (auto leaf = whole.tree().cbeginLeaf(); leaf; ++leaf)
         if (blocks.isInside(leaf->origin())) rest->tree().addLeaf(new Leaf(*leaf));
-      band = makeBand(rest);
+      if (!band.isOpenSurface()) {
+        band = makeBand(rest);
+      } else {
+        auto beyondBorder = std::make_shared<openvdb::FloatTree>(0.f);
+        for (auto leaf = band.shared()->beyond->cbeginLeaf(); leaf; ++leaf)
+          if (blocks.isInside(leaf->origin())) beyondBorder->addLeaf(new Leaf(*leaf));
+        band = makeOpenBand(rest, beyondBorder);
+      }
     }
   }
   return part.halfWidth < band.halfWidth() ? narrowed(std::move(band), part.halfWidth) : band;
