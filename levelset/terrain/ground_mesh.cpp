@@ -51,10 +51,12 @@ struct GroundFans {
 /// Builds the meshes of one height field.
 class GroundMesher {
  public:
-  explicit GroundMesher(const HeightField& field, std::size_t maxMemory)
-      : field_(field), maxMemory_(maxMemory) {
-    countTriangles();
+  GroundMesher(const HeightField& field, std::size_t maxMemory)
+      : field_(field), maxMemory_(maxMemory), isWhole_(field.missingCount() == 0) {
+    countParts();
   }
+
+  [[nodiscard]] bool isEmpty() const { return triangles_ == 0; }
 
   /// Makes the ground. @param base  makes the base and the walls, too; null: only the ground
   [[nodiscard]] TriMesh mesh(const double* base) const {
@@ -68,6 +70,12 @@ class GroundMesher {
   }
 
  private:
+  /// A corner of a triangle: its sample, and the sector of the triangle about it.
+  struct CellCorner {
+    int column, row;
+    std::size_t sector;
+  };
+
   [[nodiscard]] bool isCell(int column, int row) const {
     return column >= 0 && row >= 0 && column + 1 < field_.columns && row + 1 < field_.rows;
   }
@@ -88,48 +96,71 @@ class GroundMesher {
            static_cast<std::size_t>(hasUpper(column, row - 1)) << 5;
   }
 
-  void countTriangles() {
+  /// Calls `visit(begin, end)` for the edges with one triangle, which is on their left.
+  template <typename Visit>
+  void forEachBorderEdge(const Visit& visit) const {
+    for (int row = 0; row + 1 < field_.rows; ++row)
+      for (int column = 0; column + 1 < field_.columns; ++column) {
+        const GroundCell cell(field_, column, row);
+        const int right = column + 1, top = row + 1;
+        if (cell.hasLower()) {
+          const CellCorner a{column, row, 0}, b{right, row, 2}, c{right, top, 4};
+          if (!hasUpper(column, row - 1)) visit(a, b);
+          if (!hasUpper(right, row)) visit(b, c);
+          if (!cell.hasUpper()) visit(c, a);
+        }
+        if (cell.hasUpper()) {
+          const CellCorner a{column, row, 1}, b{right, top, 3}, c{column, top, 5};
+          if (!cell.hasLower()) visit(a, b);
+          if (!hasLower(column, top)) visit(b, c);
+          if (!hasLower(column - 1, row)) visit(c, a);
+        }
+      }
+  }
+
+  void countParts() {
     for (int row = 0; row + 1 < field_.rows; ++row)
       for (int column = 0; column + 1 < field_.columns; ++column) {
         const GroundCell cell(field_, column, row);
         triangles_ +=
             static_cast<std::size_t>(cell.hasLower()) + static_cast<std::size_t>(cell.hasUpper());
       }
+    forEachBorderEdge([&](const CellCorner&, const CellCorner&) { ++borderEdges_; });
   }
 
   [[nodiscard]] const GroundFans::Entry& fansAt(int column, int row) const {
     static const GroundFans fans;
     return fans.entries[sectorsAt(column, row)];
   }
-  [[nodiscard]] std::uint32_t vertex(const std::vector<std::uint32_t>& first, int column, int row,
-                                     std::size_t sector) const {
-    return first[field_.index(column, row)] + fansAt(column, row).fan[sector];
+  [[nodiscard]] std::uint32_t vertex(const std::vector<std::uint32_t>& first,
+                                     const CellCorner& at) const {
+    const std::uint32_t of = first[field_.index(at.column, at.row)];
+    return isWhole_ ? of : of + fansAt(at.column, at.row).fan[at.sector];
   }
 
   /// Adds a vertex for each fan. @return the first vertex of each sample
   [[nodiscard]] std::vector<std::uint32_t> addVertices(TriMesh& result, bool isSolid) const {
-    const std::size_t samples = field_.heights.size(), copies = isSolid ? 2 : 1;
-    // A solid has walls beside its two sides; their triangles are few unless the holes are many.
-    const double bytes =
-        static_cast<double>(samples) *
-            (sizeof(std::uint32_t) + sizeof(Imath::V3d) * static_cast<double>(copies)) +
-        static_cast<double>(triangles_ * copies) * 3 * sizeof(std::uint32_t);
-    requireMemory(bytes, maxMemory_);
-    // A sample has at most three fans.
-    if (3.0 * static_cast<double>(copies) * static_cast<double>(samples) >= 4294967296.0)
+    const std::size_t samples = field_.heights.size(), sides = isSolid ? 2 : 1;
+    // Each further fan of a sample ends at a border edge of its own.
+    const std::size_t vertices = sides * (samples + borderEdges_),
+                      triangles = sides * triangles_ + (isSolid ? 2 * borderEdges_ : 0);
+    requireMemory(static_cast<double>(samples) * sizeof(std::uint32_t) +
+                      static_cast<double>(vertices) * sizeof(Imath::V3d) +
+                      static_cast<double>(triangles) * 3 * sizeof(std::uint32_t),
+                  maxMemory_);
+    if (vertices >= std::size_t{1} << 32)
       throw ResourceLimit(
           fmt::format("the mesh of {} samples has more vertices than 32-bit indices can number; "
                       "crop the terrain",
                       samples));
     std::vector<std::uint32_t> first(samples, 0);
-    result.triangles.reserve(triangles_ * copies);
-    result.positions.reserve(samples * copies);
+    result.triangles.reserve(triangles);
+    result.positions.reserve(vertices);
     for (int row = 0; row < field_.rows; ++row)
       for (int column = 0; column < field_.columns; ++column) {
         first[field_.index(column, row)] = static_cast<std::uint32_t>(result.positions.size());
-        const std::uint8_t count = fansAt(column, row).count;
-        for (std::uint8_t n = 0; n < count; ++n)
-          result.positions.push_back(field_.point(column, row));
+        const int count = isWhole_ ? 1 : fansAt(column, row).count;
+        for (int n = 0; n < count; ++n) result.positions.push_back(field_.point(column, row));
       }
     return first;
   }
@@ -137,13 +168,13 @@ class GroundMesher {
   void addGround(TriMesh& result, const std::vector<std::uint32_t>& first, int column,
                  int row) const {
     const GroundCell cell(field_, column, row);
+    const int right = column + 1, top = row + 1;
     if (cell.hasLower())
-      result.triangles.push_back({vertex(first, column, row, 0), vertex(first, column + 1, row, 2),
-                                  vertex(first, column + 1, row + 1, 4)});
+      result.triangles.push_back({vertex(first, {column, row, 0}), vertex(first, {right, row, 2}),
+                                  vertex(first, {right, top, 4})});
     if (cell.hasUpper())
-      result.triangles.push_back({vertex(first, column, row, 1),
-                                  vertex(first, column + 1, row + 1, 3),
-                                  vertex(first, column, row + 1, 5)});
+      result.triangles.push_back({vertex(first, {column, row, 1}), vertex(first, {right, top, 3}),
+                                  vertex(first, {column, top, 5})});
   }
 
   /// Adds the base below the triangles so far, and walls below the edges with one triangle.
@@ -157,38 +188,17 @@ class GroundMesher {
       const auto [a, b, c] = result.triangles[n];
       result.triangles.push_back({a + depth, c + depth, b + depth});
     }
-    const auto addWall = [&](std::uint32_t from, std::uint32_t to) {
+    forEachBorderEdge([&](const CellCorner& begin, const CellCorner& end) {
+      const std::uint32_t from = vertex(first, begin), to = vertex(first, end);
       result.triangles.push_back({from + depth, to + depth, to});
       result.triangles.push_back({from + depth, to, from});
-    };
-    for (int row = 0; row + 1 < field_.rows; ++row)
-      for (int column = 0; column + 1 < field_.columns; ++column) {
-        const GroundCell cell(field_, column, row);
-        if (cell.hasLower()) {
-          const std::uint32_t a = vertex(first, column, row, 0),
-                              b = vertex(first, column + 1, row, 2),
-                              c = vertex(first, column + 1, row + 1, 4);
-          if (!hasUpper(column, row - 1)) addWall(a, b);
-          if (!hasUpper(column + 1, row)) addWall(b, c);
-          if (!cell.hasUpper()) addWall(c, a);
-        }
-        if (cell.hasUpper()) {
-          const std::uint32_t a = vertex(first, column, row, 1),
-                              b = vertex(first, column + 1, row + 1, 3),
-                              c = vertex(first, column, row + 1, 5);
-          if (!cell.hasLower()) addWall(a, b);
-          if (!hasLower(column, row + 1)) addWall(b, c);
-          if (!hasLower(column - 1, row)) addWall(c, a);
-        }
-      }
+    });
   }
 
   const HeightField& field_;
   std::size_t maxMemory_;
-  std::size_t triangles_ = 0;
-
- public:
-  [[nodiscard]] bool isEmpty() const { return triangles_ == 0; }
+  bool isWhole_;  ///< no sample is missing, so each one has a single fan
+  std::size_t triangles_ = 0, borderEdges_ = 0;
 };
 
 void requireGround(const HeightField& field, bool allowMissing) {
@@ -258,7 +268,7 @@ SurfaceBandResult groundBand(const HeightField& field, double voxelSize,
                         .maxMemory = options.maxMemory,
                         .progress = options.progress});
   }
-  if (options.box.isEmpty() || options.box.hasVolume() == false)
+  if (!options.box.hasVolume())
     throw UsageError("the box of the band is empty; give its lower corner first");
   // The blocks that meet the box reach at most 7 voxels beyond it, and their closest points lie
   // within the half width. Cells that are cut there must be complete.

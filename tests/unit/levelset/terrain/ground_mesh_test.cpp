@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "levelset/error.h"
 #include "levelset/grids/sample.h"
@@ -109,6 +110,38 @@ TEST(Solidify, HasTheVolumeOfThePrisms) {
         levelset::measure(levelset::solidify(field, -1, 0.1 / (1 << n)).band).volume - volume);
   EXPECT_LT(errors[1], support::measured(0.043));
   EXPECT_GT(std::log2(errors[0] / errors[1]), support::measuredOrder(2));
+}
+
+/// With holes that meet in single samples, points are inside where the ground is above them.
+TEST(Solidify, KnowsInsideAndOutsideBesideHoles) {
+  const HeightField field = support::randomTerrain(13, 11, 0.25, 2);
+  const levelset::MeshToBandResult result =
+      levelset::solidify(field, -1, 0.1, {.allowMissing = true});
+  EXPECT_EQ(result.certificate.boundaryEdges, 0u);
+  EXPECT_GT(result.certificate.nonManifoldEdges, 0u);  // walls that meet in an edge
+  EXPECT_EQ(result.certificate.ambiguousShare, 0);
+  const BandSampler sampler(result.band);
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::size_t inside = 0, outside = 0;
+  for (int n = 0; n < 20'000; ++n) {
+    const double x = 12 * unit(random), y = 10 * unit(random), z = -1.2 + 2.4 * unit(random);
+    const V3d p(x + field.origin.x, y + field.origin.y, z);
+    const double value = sampler.value(p);
+    if (std::abs(value) < 0.1) continue;
+    const int column = static_cast<int>(x), row = static_cast<int>(y);
+    const double u = x - column, v = y - row;
+    const auto at = [&](int c, int r) {
+      return static_cast<double>(field.at(column + c, row + r));
+    };
+    const double ground = u >= v ? at(0, 0) + (at(1, 0) - at(0, 0)) * u + (at(1, 1) - at(1, 0)) * v
+                                 : at(0, 0) + (at(0, 1) - at(0, 0)) * v + (at(1, 1) - at(0, 1)) * u;
+    const bool isInside = z > -1 && z < ground;  // no comparison with NaN is true
+    EXPECT_EQ(value < 0, isInside) << p.x << " " << p.y << " " << p.z;
+    ++(isInside ? inside : outside);
+  }
+  EXPECT_GT(inside, 3000u);
+  EXPECT_GT(outside, 3000u);
 }
 
 TEST(GroundBand, IsNegativeBelowTheGround) {
