@@ -11,7 +11,6 @@
 #include "levelset/advection/advect.h"
 #include "levelset/components/components.h"
 #include "levelset/convert/closest_triangles.h"
-#include "levelset/convert/surface_band.h"
 #include "levelset/csg/blend.h"
 #include "levelset/csg/smooth_csg.h"
 #include "levelset/curvature_flow/curvature_flow.h"
@@ -41,7 +40,7 @@ std::vector<Operator> allOperators() {
       levelSetOperator<levelset::SupershapeOperator>(),
       conversionOperator(),
       toBandOperator(),
-      levelSetOperator<levelset::SurfaceBandOperator>(),
+      surfaceBandOperator(),
       levelSetOperator<levelset::ClosestTriangleOperator>(),
       meshOperator(),
       volumeOperator(),
@@ -57,6 +56,11 @@ std::vector<Operator> allOperators() {
       moleculeSurfaceOperator(),
       moleculeModelOperator(),
       thinOperator(),
+      terrainOperator(),
+      slopeOperator(),
+      hillshadeOperator(),
+      contoursOperator(),
+      solidifyOperator(),
       unionWithSegmentations(unionOperator()),
       intersectionOperator(),
       differenceWithSegmentations(differenceOperator()),

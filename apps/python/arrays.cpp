@@ -134,6 +134,31 @@ levelset::PointCloud cloudFromArrays(const py::array& positions, const py::objec
   return cloud;
 }
 
+levelset::HeightField terrainFromArray(const py::array& heights, const Imath::V2d& spacing,
+                                       const Imath::V2d& origin) {
+  if (heights.dtype().kind() != 'f' || heights.ndim() != 2)
+    throw InvalidInput(
+        fmt::format("Terrain: the array heights has shape {}; give shape (rows, columns) of "
+                    "float32 or float64",
+                    shapeText(heights)));
+  const auto rows = py::array_t<float, py::array::c_style | py::array::forcecast>(heights);
+  constexpr py::ssize_t kMost = 1 << 30;
+  if (rows.shape(0) > kMost || rows.shape(1) > kMost)
+    throw InvalidInput("Terrain: more than 2^30 rows or columns; give a part");
+  levelset::HeightField terrain{.columns = static_cast<int>(rows.shape(1)),
+                                .rows = static_cast<int>(rows.shape(0)),
+                                .origin = origin,
+                                .spacing = spacing};
+  terrain.heights.assign(rows.data(), rows.data() + rows.size());
+  levelset::withContext("Terrain", [&] { levelset::requireHeights(terrain); });
+  return terrain;
+}
+
+py::object terrainArray(const py::object& owner, const levelset::HeightField& terrain) {
+  return rowsView<float, float, 1>(owner, terrain.heights)
+      .attr("reshape")(terrain.rows, terrain.columns);
+}
+
 py::array_t<double> distancesAt(const levelset::AdaptiveField& field, const py::array& points) {
   const auto places = floatRows(points, "distances", "points");
   const py::ssize_t count = places.shape(0);

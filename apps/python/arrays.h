@@ -41,6 +41,19 @@ namespace python {
                                           const levelset::PointCloud& cloud,
                                           const std::string& list);
 
+/// Builds a terrain from a numpy array.
+/// @param heights  rows × columns floats, the first row at the least y; NaN: missing
+/// @throws levelset::InvalidInput for other shapes and types, infinite heights, and a spacing that
+///         is not positive
+[[nodiscard]] levelset::HeightField terrainFromArray(const pybind11::array& heights,
+                                                     const Imath::V2d& spacing,
+                                                     const Imath::V2d& origin);
+
+/// Returns the heights of a terrain as a read-only numpy array that shares its memory.
+/// @param owner  Python object that keeps the terrain alive
+[[nodiscard]] pybind11::object terrainArray(const pybind11::object& owner,
+                                            const levelset::HeightField& terrain);
+
 /// Samples an adaptive field.
 /// @param points  n × 3 floats, world units
 /// @return n distances, float64; NaN for points that are not finite

@@ -115,6 +115,17 @@ MEMBERS = {
     @property
     def weights(self) -> Optional[NDArray[numpy.float32]]: ...
 ''',
+    "Terrain": '''
+    def __init__(
+        self, heights: ArrayLike, spacing: Tuple[float, float] = (1, 1), origin: Tuple[float, float] = (0, 0)
+    ) -> None: ...
+    @property
+    def heights(self) -> NDArray[numpy.float32]: ...
+    @property
+    def origin(self) -> Tuple[float, float]: ...
+    @property
+    def spacing(self) -> Tuple[float, float]: ...
+''',
 }  # fmt: skip
 
 

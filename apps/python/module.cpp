@@ -54,6 +54,8 @@ const char* className(Kind kind) {
       return "Segmentation";
     case Kind::Molecule:
       return "Molecule";
+    case Kind::Terrain:
+      return "Terrain";
   }
   return "";
 }
@@ -392,6 +394,21 @@ PYBIND11_MODULE(_core, module) {
              });
              return python::cloudArray(owner, value.cloud(), list);
            })
+      .def("terrain_array",
+           [](const py::object& self) {
+             const auto& value = valueOf(self.cast<const Handle&>());
+             const py::capsule owner(new pipeline::Value(value), [](void* held) {
+               delete static_cast<pipeline::Value*>(held);
+             });
+             return python::terrainArray(owner, value.terrain());
+           })
+      .def("terrain_place",
+           [](const Handle& node) {
+             const pipeline::Value value = valueOf(node);
+             const levelset::HeightField& terrain = value.terrain();
+             return py::make_tuple(py::make_tuple(terrain.origin.x, terrain.origin.y),
+                                   py::make_tuple(terrain.spacing.x, terrain.spacing.y));
+           })
       .def("adaptive_figures",
            [](const Handle& node) {
              const pipeline::Value value = valueOf(node);
@@ -449,6 +466,11 @@ PYBIND11_MODULE(_core, module) {
   });
   module.def("cloud", [](const py::array& positions, const py::object& normals) {
     return given(pipeline::Value(python::cloudFromArrays(positions, normals)));
+  });
+  module.def("terrain", [](const py::array& heights, const std::array<double, 2>& spacing,
+                           const std::array<double, 2>& origin) {
+    return given(pipeline::Value(python::terrainFromArray(
+        heights, Imath::V2d(spacing[0], spacing[1]), Imath::V2d(origin[0], origin[1]))));
   });
   module.def("samples", [](const Point& origin, double voxel,
                            const py::array_t<std::int32_t, py::array::c_style>& blocks,

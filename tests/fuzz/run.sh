@@ -16,6 +16,7 @@ case $reader in
   ply|obj|stl|off|gzip) words=mesh ;;
   vdb|nvdb|points_vdb) words=vdb ;;
   png|exr) words=picture ;;
+  asc|bil) words=grid ;;
   graph) words="json actions" ;;
   patch|lattice|bezier|quadrics|scene|cache) words=json ;;
   script|chain) words="script actions" ;;

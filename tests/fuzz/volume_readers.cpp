@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <cmath>
 
+#include "levelset/terrain/files/height_field_file.h"
 #include "levelset/volume_files/volume_file.h"
 #include "tests/fuzz/readers.h"
 
@@ -33,10 +35,35 @@ void readMrc(std::string_view bytes) {
   readVolumeFile("some.mrc", bytes);
 }
 
+void readTerrainFile(const std::filesystem::path& file) {
+  accepts([&] {
+    const levelset::HeightField field = levelset::readHeightField(file, {.maxMemory = kMaxMemory});
+    const std::filesystem::path again = scratchFile("again.asc", "");
+    writeHeightField(again, field);
+    const levelset::HeightField same = levelset::readHeightField(again);
+    require(
+        same.heights.size() == field.heights.size() && same.missingCount() == field.missingCount(),
+        "a terrain is read as it was written");
+  });
+}
+void readAsc(std::string_view bytes) {
+  readTerrainFile(scratchFile("some.asc", bytes));
+}
+/// Reads a grid with a header. `bytes` are the header, a zero byte, and the heights.
+void readBil(std::string_view bytes) {
+  const std::size_t zero = std::min(bytes.find('\0'), bytes.size());
+  static_cast<void>(scratchFile("some.hdr", bytes.substr(0, zero)));
+  const std::string_view heights = bytes.substr(std::min(zero + 1, bytes.size()));
+  readTerrainFile(scratchFile("some.bil", heights));
+  readTerrainFile(scratchFile("some.flt", heights));
+}
+
 }  // namespace
 
 std::vector<Reader> volumeReaders() {
-  return {{"nifti", readNifti}, {"metaimage", readMetaImage}, {"nrrd", readNrrd}, {"mrc", readMrc}};
+  return {{"nifti", readNifti}, {"metaimage", readMetaImage},
+          {"nrrd", readNrrd},   {"mrc", readMrc},
+          {"asc", readAsc},     {"bil", readBil}};
 }
 
 }  // namespace fuzz

@@ -281,3 +281,28 @@ def test_sheets_have_distances(ls):
         assert numpy.allclose(distances[:4], [0.2, 3, 1, 1], atol=1e-5) and numpy.isnan(distances[4])
     with pytest.raises(ls.InputError, match="sheet_distances: the array points has shape"):
         field.sheet_distances(numpy.zeros(3))
+
+
+def test_terrains_from_arrays(ls, tmp_path):
+    heights = numpy.arange(12, dtype=numpy.float32).reshape(3, 4)
+    ground = ls.Terrain(heights, spacing=(2, 3), origin=(10, 20))
+    assert (ground.heights == heights).all() and ground.heights.dtype == numpy.float32
+    assert ground.spacing == (2, 3) and ground.origin == (10, 20)
+    assert not ground.heights.flags.writeable
+    assert ground.measure()["projected_area"] == 36
+    solid = ground.solidify(base=-1, voxel=0.5)
+    assert isinstance(solid, ls.Solid)
+    assert isinstance(ground.surface_band(voxel=0.5), ls.Surface)
+    assert isinstance(ground.mesh(), ls.Mesh) and len(ground.mesh().faces) == 12
+    heights[1, 1] = numpy.nan
+    holed = ls.Terrain(heights)
+    assert numpy.isnan(holed.heights[1, 1]) and holed.info()["missing"] == 1
+    assert holed.terrain(fill=True).heights[1, 1] == 5
+    file = tmp_path / "a.asc"
+    holed.save(str(file))
+    assert (ls.read(str(file)).heights[0] == heights[0]).all()
+    for bad in (numpy.zeros((3, 4), int), heights[0], numpy.full((3, 4), numpy.inf)):
+        with pytest.raises(ls.InputError):
+            ls.Terrain(bad)
+    with pytest.raises(ls.InputError):
+        ls.Terrain(heights, spacing=(0, 1))

@@ -48,6 +48,15 @@ namespace pipeline {
 [[nodiscard]] Operator moleculeSurfaceOperator();
 [[nodiscard]] Operator moleculeModelOperator();
 [[nodiscard]] Operator thinOperator();
+
+[[nodiscard]] Operator terrainOperator();
+[[nodiscard]] Operator slopeOperator();
+[[nodiscard]] Operator hillshadeOperator();
+[[nodiscard]] Operator contoursOperator();
+[[nodiscard]] Operator solidifyOperator();
+/// The action `surface-band`, for open meshes and terrains.
+[[nodiscard]] Operator surfaceBandOperator();
+
 [[nodiscard]] Operator conversionOperator();
 [[nodiscard]] Operator transformOperator();
 [[nodiscard]] Operator clipOperator();

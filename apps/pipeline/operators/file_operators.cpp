@@ -6,6 +6,7 @@
 #include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/volume_params.h"
 #include "apps/pipeline/registry/invocation.h"
+#include "apps/pipeline/values/terrain_picture.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 #include "levelset/files/band_file.h"
@@ -14,6 +15,7 @@
 #include "levelset/point_files/point_file.h"
 #include "levelset/segmented/files/segmented_file.h"
 #include "levelset/segmented/files/segmented_mesh_file.h"
+#include "levelset/terrain/files/height_field_file.h"
 #include "levelset/volume_files/volume_file.h"
 #include "mapping/patches/patch_file.h"
 
@@ -55,11 +57,14 @@ Kind fileKind(const Invocation& in) {
   if (render::isSceneFormat(name)) return Kind::Scene;
   if (isRead && levelset::isVolumeFormat(name)) return Kind::Volume;
   if (isRead && levelset::holdsMolecule(name)) return Kind::Molecule;
+  if (levelset::isAsciiGridFormat(name)) return Kind::Terrain;
+  if (isRead && (levelset::isHeightFormat(name) || isTerrainPicture(name))) return Kind::Terrain;
   throw UsageError(
       fmt::format("{}: '{}' is of no known format; use ply, obj, stl, off, xyz, csv or pts (also "
-                  ".gz), vdb{}, patch or "
+                  ".gz), vdb{}, asc, patch or "
                   "json",
-                  in.op().name, name, isRead ? ", nii, mha, nrrd, mrc, raw, pdb, cif" : ", nvdb"));
+                  in.op().name, name,
+                  isRead ? ", nii, mha, nrrd, mrc, raw, pdb, cif, hgt, flt, bil, png" : ", nvdb"));
 }
 
 /// Returns the kind of the value that `read` makes. The grid that --grid names may be a field; the
@@ -117,6 +122,13 @@ Value read(Invocation& in) {
                                       .maxMemory = in.maxMemory,
                                       .notes = &in.notes.notes,
                                       .progress = in.progress}));
+  if (kind == Kind::Terrain)
+    return Value(isTerrainPicture(formatName(in))
+                     ? readTerrainPicture(file, in.maxMemory)
+                     : levelset::readHeightField(file, {.format = in.text("format"),
+                                                        .maxMemory = in.maxMemory,
+                                                        .notes = &in.notes.notes,
+                                                        .progress = in.progress}));
   if (kind == Kind::Scene) {
     const auto warn = [&](const levelset::BandRepairs& repairs, const auto& source) {
       for (const std::string& told : sentencesOf(repairs, source))
@@ -216,6 +228,9 @@ void validateRead(const Invocation& in) {
   if (!levelset::isBandFormat(formatName(in)) && in.given("grid"))
     throw UsageError(fmt::format(
         "read: --grid picks a grid of a .vdb, and this is a {}; leave it out", kindName(kind)));
+  if (kind == Kind::Terrain && isStandardStream(in) && !levelset::isAsciiGridFormat(formatName(in)))
+    throw UsageError(
+        "read: only terrain of the format asc can be read from standard input; give a file, not -");
   if (kind == Kind::Scene && isStandardStream(in))
     throw UsageError(
         "read: a scene refers to other files relative to the folder of its own file, so it cannot "
@@ -239,6 +254,7 @@ void validateWrite(const Invocation& in) {
         : held == Kind::Adaptive     ? "put 'mesh' or 'to-band' before it"
         : held == Kind::Segmentation ? "write .vdb, .ply or .obj, or put 'extract LABEL' before it"
         : held == Kind::Molecule     ? "put 'molecule-surface' before it"
+        : held == Kind::Terrain      ? "write .asc, or put 'mesh' before it"
         : held == Kind::Points       ? "write .ply, .obj, .xyz, .csv, .pts or .vdb"
         : kind == Kind::Points       ? "put 'sample' before it, or write .ply"
                                      : "put 'level-set' before it, or write .ply"));
@@ -268,6 +284,12 @@ Value write(Invocation& in) {
     mapping::writePatches(file, value.patch().patches);
   } else if (value.kind() == Kind::Scene) {
     render::writeScene(file, value.scene(), in.progress);
+  } else if (value.kind() == Kind::Terrain) {
+    levelset::writeHeightField(file, value.terrain(), {.progress = in.progress});
+    if (!value.terrain().coordinateSystem.empty())
+      in.notes.warnings.push_back(
+          fmt::format("{} does not store the coordinate system '{}'; keep its .prj file",
+                      file.string(), value.terrain().coordinateSystem));
   } else if (value.kind() == Kind::Field) {
     levelset::writeField(file, value.field(),
                          {.name = in.given("name") ? in.text("name") : value.field().name(),
@@ -319,7 +341,7 @@ Operator readOperator() {
           "volume (nii, "
           "hdr, mha, mhd, nrrd, nhdr, mrc, map, raw), points (xyz, csv, pts, ply or obj without "
           "faces, vdb with a grid of points), patches (patch), a scene (json), a molecule (pdb, "
-          "cif)",
+          "cif), a terrain (asc, hgt, flt, bil, png)",
       .details =
           "A .vdb with more than one level set needs --grid. A grid that is not a level set needs "
           "--grid, too; it becomes a field of numbers or of vectors, which may be staggered. "
@@ -332,6 +354,8 @@ Operator readOperator() {
           "points are read. Volumes keep their spacing and orientation; a .raw needs --size and "
           "--type. "
           "The json file of a Bézier volume is a scene, too. "
+          "A terrain has heights of a ground; those of a grey png are from 0 (black) to 1 (white). "
+          "Transparent pixels are missing. "
           "Of a molecule, the first model is read, without water. Of alternate locations of an "
           "atom "
           "the one with the largest occupancy counts. "
@@ -345,7 +369,8 @@ Operator readOperator() {
                  {.name = "format",
                   .type = ParamType::Text,
                   .doc = "format of the file: ply, obj, stl, off, xyz, csv, pts, vdb, nii, mha, "
-                         "nrrd, mrc, raw, patch, json, pdb or cif; default: by its extension"},
+                         "nrrd, mrc, raw, patch, json, pdb, cif, asc, hgt, flt, bil or png; "
+                         "default: by its extension"},
                  {.name = "grid",
                   .type = ParamType::Text,
                   .doc = "name of the grid to read from a .vdb"},
@@ -386,7 +411,7 @@ Operator writeOperator() {
           "write a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb, nvdb), points "
           "(ply, obj, xyz, csv, pts, also .gz, vdb), patches (patch), a scene (json), a "
           "segmentation "
-          "(vdb; ply, obj, with the labels on both sides of each face)",
+          "(vdb; ply, obj, with the labels on both sides of each face), a terrain (asc)",
       .details =
           "Data is written to a temporary file in the same folder, which replaces an existing file "
           "only when it is complete. The level sets and meshes of a scene go to .vdb and .ply "
@@ -404,7 +429,7 @@ Operator writeOperator() {
             .position = 0},
            {.name = "format",
             .type = ParamType::Text,
-            .doc = "format of the file: ply, obj, stl, off, xyz, csv, pts, vdb, nvdb, patch "
+            .doc = "format of the file: ply, obj, stl, off, xyz, csv, pts, vdb, nvdb, asc, patch "
                    "or json; default: by its extension"},
            {.name = "name",
             .type = ParamType::Text,
@@ -413,7 +438,7 @@ Operator writeOperator() {
                 "points get the name 'points'",
             .fallback = "surface"}},
       .operands = {{Kind::Mesh, Kind::Band, Kind::Field, Kind::Patch, Kind::Scene, Kind::Points,
-                    Kind::Adaptive, Kind::Segmentation, Kind::Molecule}},
+                    Kind::Adaptive, Kind::Segmentation, Kind::Molecule, Kind::Terrain}},
       .flow = Flow::PassesThrough,
       .run = write,
       .cost = costPerVoxel(50, 0, 20),

@@ -62,7 +62,8 @@ double bytesOf(const std::optional<Plan>& plan, const RegionOfInterest& roi) {
     return plan->bytes();
   const bool isTold = (plan->kind == Kind::Band && plan->voxelSize > 0) ||
                       plan->kind == Kind::Field || plan->kind == Kind::Volume ||
-                      plan->kind == Kind::Adaptive || plan->kind == Kind::Segmentation;
+                      plan->kind == Kind::Adaptive || plan->kind == Kind::Segmentation ||
+                      plan->kind == Kind::Terrain;
   return isTold ? restricted(*plan, roi).bytes() : 0;
 }
 

@@ -13,6 +13,7 @@
 #include "levelset/error.h"
 #include "levelset/geometry/vertex_normals.h"
 #include "levelset/segmented/meshing/segmented_to_mesh.h"
+#include "levelset/terrain/ground_mesh.h"
 
 namespace pipeline {
 
@@ -43,6 +44,8 @@ const char* kindName(Kind kind) {
       return "segmentation";
     case Kind::Molecule:
       return "molecule";
+    case Kind::Terrain:
+      return "terrain";
   }
   return "";
 }
@@ -75,7 +78,7 @@ double Plan::activeVoxels() const {
 
 double Plan::bytes() const {
   if (kind == Kind::Field || kind == Kind::Volume || kind == Kind::Adaptive ||
-      kind == Kind::Segmentation)
+      kind == Kind::Segmentation || kind == Kind::Terrain)
     return fieldBytes;
   if (kind == Kind::Points || kind == Kind::Molecule) return points * pointBytes;
   // Three vertex indices for each triangle, and one position for every two triangles.
@@ -96,6 +99,7 @@ Plan planOf(const levelset::VolumeGrid& grid, levelset::VolumeType type) {
   Plan plan{.kind = Kind::Volume, .bounds = grid.bounds()};
   const Imath::V3d spacing = grid.spacing();
   plan.voxelSize = std::min({spacing.x, spacing.y, spacing.z});
+  if (grid.size.z == 1) plan.samples = {grid.size.x, grid.size.y};
   plan.fieldBytes = static_cast<double>(grid.size.x) * grid.size.y * grid.size.z *
                     static_cast<double>(levelset::volumeTypeSize(type));
   return plan;
@@ -115,6 +119,8 @@ Value::Value(levelset::AdaptiveField field) : data_(std::move(field)) {}
 Value::Value(levelset::SegmentedField field) : data_(std::move(field)) {}
 Value::Value(levelset::Molecule molecule)
     : data_(std::make_shared<const levelset::Molecule>(std::move(molecule))) {}
+Value::Value(levelset::HeightField terrain)
+    : data_(std::make_shared<const levelset::HeightField>(std::move(terrain))) {}
 Value::Value(Plan plan) : plan_(plan) {}
 
 Kind Value::kind() const {
@@ -139,6 +145,8 @@ Kind Value::kind() const {
       return Kind::Segmentation;
     case 10:
       return Kind::Molecule;
+    case 11:
+      return Kind::Terrain;
     default:
       return plan_->kind;
   }
@@ -188,6 +196,10 @@ const levelset::SegmentedField& Value::segmentation() const {
 
 const levelset::Molecule& Value::molecule() const {
   return *as<std::shared_ptr<const levelset::Molecule>>(Kind::Molecule);
+}
+
+const levelset::HeightField& Value::terrain() const {
+  return *as<std::shared_ptr<const levelset::HeightField>>(Kind::Terrain);
 }
 
 const Plan& Value::plan() const {
@@ -242,6 +254,11 @@ const Plan& Value::plan() const {
       plan.bounds = molecule().bounds();
       plan.points = static_cast<double>(molecule().atoms.size());
       plan.pointBytes = sizeof(levelset::Atom);
+      break;
+    case Kind::Terrain:
+      plan.bounds = terrain().bounds();
+      plan.fieldBytes = static_cast<double>(terrain().memoryUse());
+      plan.samples = {terrain().columns, terrain().rows};
       break;
     case Kind::Scene:
       plan.bounds = scene().scene.bounds();
@@ -305,6 +322,9 @@ render::ViewedScene sceneOf(const Value& drawn) {
         {std::shared_ptr<const TriMesh>(std::shared_ptr<const void>(), &drawn.mesh())});
   else if (drawn.kind() == Kind::Adaptive)
     viewed.scene.meshes.push_back({smoothMesh(levelset::adaptiveToMesh(drawn.adaptive()))});
+  else if (drawn.kind() == Kind::Terrain)
+    viewed.scene.meshes.push_back(
+        {smoothMesh(levelset::groundMesh(drawn.terrain(), {.allowMissing = true}))});
   else if (drawn.kind() == Kind::Segmentation)
     viewed.scene.meshes = partsOf(drawn.segmentation());
   else

@@ -18,6 +18,7 @@
 #include "levelset/operator/plan.h"
 #include "levelset/points/point_cloud.h"
 #include "levelset/segmented/segmented_field.h"
+#include "levelset/terrain/height_field.h"
 #include "levelset/volumes/volume.h"
 #include "mapping/animation/animation.h"
 #include "mapping/patches/patch.h"
@@ -36,7 +37,8 @@ enum class Kind {
   Points,        ///< points without connectivity, from a scanner or a simulation
   Adaptive,      ///< a solid as distances on an octree
   Segmentation,  ///< a partition of space into regions with labels
-  Molecule       ///< atoms in residues and chains
+  Molecule,      ///< atoms in residues and chains
+  Terrain        ///< heights of a ground on a regular grid
 };
 [[nodiscard]] const char* kindName(Kind kind);
 /// Returns the name with its article: "a mesh", "an adaptive field".
@@ -50,7 +52,7 @@ struct Plan {
   double area = 0;           ///< surface area, world units²
   double voxelSize = 0;      ///< voxel size, world units; 0: the value has no voxels
   double halfWidth = 0;      ///< half width, voxels; bands and scenes only
-  /// Memory, bytes; fields, volumes, adaptive fields and segmentations only.
+  /// Memory, bytes; fields, volumes, adaptive fields, segmentations and terrains only.
   double fieldBytes = 0;
   double triangles = 0;   ///< number of triangles; meshes only; 0: unknown
   double points = 0;      ///< number of points of a point cloud, or atoms of a molecule; 0: unknown
@@ -59,6 +61,8 @@ struct Plan {
   /// is mapped will determine it.
   Imath::V3d patchSize = Imath::V3d(0);
   double patchCount = 1;  ///< patches only: number of patches
+  /// Terrains, and volumes of one layer: number of samples along x and y; 0: unknown.
+  Imath::V2i samples = Imath::V2i(0);
 
   /// Returns the plan in the form that the operators of the library levelset read.
   [[nodiscard]] levelset::ValuePlan estimate() const;
@@ -118,6 +122,7 @@ class Value {
   explicit Value(levelset::AdaptiveField field);
   explicit Value(levelset::SegmentedField field);
   explicit Value(levelset::Molecule molecule);
+  explicit Value(levelset::HeightField terrain);
   explicit Value(Plan plan);
 
   [[nodiscard]] Kind kind() const;
@@ -134,6 +139,7 @@ class Value {
   [[nodiscard]] const levelset::AdaptiveField& adaptive() const;
   [[nodiscard]] const levelset::SegmentedField& segmentation() const;
   [[nodiscard]] const levelset::Molecule& molecule() const;
+  [[nodiscard]] const levelset::HeightField& terrain() const;
 
   /// Returns the plan of the value: its kind, bounds, area and grid, which estimates need. Computes
   /// it from the value on the first call.
@@ -151,13 +157,15 @@ class Value {
                std::shared_ptr<const PatchValue>, levelset::FieldGrid,
                std::shared_ptr<const render::ViewedScene>, std::shared_ptr<const levelset::Volume>,
                std::shared_ptr<const levelset::PointCloud>, levelset::AdaptiveField,
-               levelset::SegmentedField, std::shared_ptr<const levelset::Molecule>>
+               levelset::SegmentedField, std::shared_ptr<const levelset::Molecule>,
+               std::shared_ptr<const levelset::HeightField>>
       data_;
   mutable std::optional<Plan> plan_;
 };
 
-/// Builds a scene that shows a level set, a mesh, an adaptive field, a segmentation or a scene. The
-/// value must outlive the result. Of adaptive fields and segmentations it makes meshes.
+/// Builds a scene that shows a level set, a mesh, an adaptive field, a segmentation, a terrain or a
+/// scene. The value must outlive the result. Of adaptive fields, segmentations and terrains it
+/// makes meshes.
 [[nodiscard]] render::ViewedScene sceneOf(const Value& drawn);
 
 }  // namespace pipeline

@@ -438,10 +438,37 @@ class Molecule(Value):
     __slots__ = ()
 
 
+class Terrain(Value):
+    """Heights of a ground: `Terrain(heights, spacing=(1, 1), origin=(0, 0))`.
+
+    heights is an array of (rows, columns) floats. Its first row has the least y. NaN: no data.
+    """
+
+    __slots__ = ()
+
+    def __init__(self, heights, spacing=(1, 1), origin=(0, 0)):
+        self._node = _core.terrain(numpy.asarray(heights), tuple(spacing), tuple(origin))
+
+    @property
+    def heights(self):
+        """Heights, (rows, columns) float32, read-only, no copy; NaN: no data. Computes the value."""
+        return self._known().terrain_array()
+
+    @property
+    def origin(self):
+        """Position (x, y) of the sample of least x and y."""
+        return self._known().terrain_place()[0]
+
+    @property
+    def spacing(self):
+        """Distances between samples along x and y."""
+        return self._known().terrain_place()[1]
+
+
 classes = {
     c.__name__: c
     for c in (
         Solid, Surface, Mesh, Patch, Field, Scene, Scan, PointCloud, AdaptiveField, Segmentation,
-        Molecule,
+        Molecule, Terrain,
     )  # fmt: skip
 }

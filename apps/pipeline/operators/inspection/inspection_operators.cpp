@@ -10,6 +10,7 @@
 #include "apps/pipeline/operators/json_output.h"
 #include "apps/pipeline/operators/solids/adaptive_actions.h"
 #include "apps/pipeline/operators/solids/segment_actions.h"
+#include "apps/pipeline/operators/terrain/terrain_figures.h"
 #include "apps/pipeline/operators/volume_params.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/adaptive/adaptive_to_mesh.h"
@@ -24,6 +25,7 @@
 #include "levelset/molecules/molecule_file.h"
 #include "levelset/point_files/point_file.h"
 #include "levelset/points/processing/point_spacing.h"
+#include "levelset/terrain/files/height_field_file.h"
 #include "levelset/volume_files/volume_file.h"
 
 namespace pipeline {
@@ -72,6 +74,7 @@ Value measureRegions(Invocation& in) {
 Value measure(Invocation& in) {
   const Value& value = in.operands[0];
   if (value.kind() == Kind::Segmentation) return measureRegions(in);
+  if (value.kind() == Kind::Terrain) return measureTerrain(in);
   levelset::Measurement m;
   if (value.kind() == Kind::Band)
     m = in.flag("sharp") ? levelset::measureSharp(value.band(), in.progress)
@@ -226,11 +229,11 @@ void validateInfo(const Invocation& in) {
   if (levelset::isMeshFormat(name) || levelset::isPointFormat(name)) return;
   if (levelset::isBandFormat(name) && !name.ends_with("nvdb")) return;
   if (levelset::isVolumeFormat(name) && !levelset::isRawFormat(name)) return;
-  if (levelset::holdsMolecule(name)) return;
+  if (levelset::holdsMolecule(name) || levelset::isHeightFormat(name)) return;
   throw levelset::UsageError(
       fmt::format("info: '{}' is of no known format; info reads ply, obj, stl, off, xyz, csv, pts "
                   "(also .gz), vdb, "
-                  "nii, mha, nrrd, mrc, pdb and cif",
+                  "nii, mha, nrrd, mrc, pdb, cif, asc, hgt, flt and bil",
                   name));
 }
 
@@ -240,6 +243,10 @@ Json fileInfo(const std::string& file, const std::string& format) {
   const std::string name = format.empty() ? file : format;
   if (levelset::holdsMolecule(name)) {
     addMolecule(json, levelset::readMolecule(file, {.format = format, .solvent = true}));
+    return json;
+  }
+  if (levelset::isHeightFormat(name)) {
+    addTerrain(json, levelset::readHeightField(file, {.format = format}));
     return json;
   }
   if (levelset::isPointFormat(name) || levelset::lacksFaces(file, format)) {
@@ -350,6 +357,8 @@ Json valueInfo(const Value& value, Invocation& in) {
     json["hash"] = fmt::format("{:016x}", field.contentHash());
   } else if (value.kind() == Kind::Molecule) {
     addMolecule(json, value.molecule());
+  } else if (value.kind() == Kind::Terrain) {
+    addTerrain(json, value.terrain());
   } else if (value.kind() == Kind::Points) {
     addCloud(json, value.cloud(), in);
   } else if (value.kind() == Kind::Scene) {
@@ -440,6 +449,8 @@ std::optional<Cost> costOfMeasure(Invocation& in) {
 }
 
 void validateMeasure(const Invocation& in) {
+  if (in.given("above") && !isTerrain(in))
+    throw levelset::UsageError("measure: --above is for terrains; leave it out");
   if (!in.flag("sharp") || in.operands.empty() || in.operands[0].kind() == Kind::Band) return;
   throw levelset::UsageError(
       fmt::format("measure: --sharp is for level sets, but the operand is a {}; leave it out",
@@ -471,15 +482,21 @@ Operator measureOperator() {
           "regions meet. Sheets have the same label on both sides; sheet_area is their area and "
           "rim_length the length of their borders. A level set rounds sharp edges by half a voxel² "
           "of the cross-section; --sharp measures the solid with the edges that its distances "
-          "imply.",
+          "imply. For a terrain, area and volumes are those of its triangles: volume_above lies "
+          "between the ground and a horizontal plane where the ground is above it, volume_below "
+          "where it is below. Slopes are in degrees.",
       .example = "levelsmith sphere --radius 1 --voxel 0.05 ! measure --json",
       .params = {{.name = "sharp",
                   .type = ParamType::Flag,
                   .doc =
                       "reconstruct the sharp edges and corners that the distances of a level set "
                       "imply"},
+                 {.name = "above",
+                  .type = ParamType::Number,
+                  .doc = "for terrains: height of the plane from which volumes are measured; "
+                         "default: 0"},
                  jsonParam()},
-      .operands = {{Kind::Band, Kind::Mesh, Kind::Adaptive, Kind::Segmentation}},
+      .operands = {{Kind::Band, Kind::Mesh, Kind::Adaptive, Kind::Segmentation, Kind::Terrain}},
       .flow = Flow::PassesThrough,
       .run = measure,
       .cost = costOfMeasure,
@@ -545,16 +562,16 @@ Operator infoOperator() {
       .params =
           {{.name = "file",
             .type = ParamType::Path,
-            .doc =
-                "mesh, volume, point, molecule or .vdb file to describe; default: the newest value",
+            .doc = "mesh, volume, point, molecule, terrain or .vdb file to describe; default: the "
+                   "newest value",
             .position = 0},
            {.name = "format",
             .type = ParamType::Text,
             .doc = "format of the file; default: by its extension"},
            jsonParam()},
       .operands = {{Kind::Band, Kind::Mesh, Kind::Patch, Kind::Field, Kind::Surface, Kind::Scene,
-                    Kind::Volume, Kind::Points, Kind::Adaptive, Kind::Segmentation,
-                    Kind::Molecule}},
+                    Kind::Volume, Kind::Points, Kind::Adaptive, Kind::Segmentation, Kind::Molecule,
+                    Kind::Terrain}},
       .operandsOptional = true,
       .flow = Flow::PassesThrough,
       .run = info,

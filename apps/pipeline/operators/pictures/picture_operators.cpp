@@ -454,7 +454,7 @@ Operator renderOperator() {
             .type = ParamType::Text,
             .doc = "format of the picture: exr or png; default: by its extension"}},
       .operands = {{Kind::Band, Kind::Mesh, Kind::Scene, Kind::Volume, Kind::Field, Kind::Adaptive,
-                    Kind::Segmentation, Kind::Molecule}},
+                    Kind::Segmentation, Kind::Molecule, Kind::Terrain}},
       .flow = Flow::PassesThrough,
       .run = draw,
       .plan = planDraw,

@@ -4,9 +4,11 @@
 
 #include "apps/pipeline/operators/level_set_operator.h"
 #include "apps/pipeline/operators/solids/segment_actions.h"
+#include "apps/pipeline/operators/terrain/terrain_figures.h"
 #include "levelset/adaptive/adaptive_to_mesh.h"
 #include "levelset/error.h"
 #include "levelset/meshing/band_to_mesh.h"
+#include "levelset/terrain/ground_mesh.h"
 #include "mapping/patches/patch_mesh.h"
 
 namespace pipeline {
@@ -35,9 +37,9 @@ void validateMesh(const Invocation& in) {
     if (in.operands[0].kind() != Kind::Band && in.given(option))
       throw levelset::UsageError(
           fmt::format("mesh: --{} applies to a level set, not to {}; leave it out", option,
-                      isPatch(in)      ? "a patch"
-                      : isAdaptive(in) ? "an adaptive field"
-                                       : "a segmentation"));
+                      kindPhrase(in.operands[0].kind())));
+  if (in.given("allow-missing") && !isTerrain(in))
+    throw levelset::UsageError("mesh: --allow-missing is for a terrain; leave it out");
   if (in.given("label") && !isSegmentation(in))
     throw levelset::UsageError("mesh: --label is for a segmentation; leave it out");
   if (in.given("original") && in.text("method") != "extended")
@@ -69,15 +71,22 @@ Operator meshOperator() {
                    .type = ParamType::Integer,
                    .doc = "for segmentations: make the closed surface of the region with this "
                           "label, in place of all interfaces",
-                   .range = Range::Positive}},
+                   .range = Range::Positive},
+                  {.name = "allow-missing",
+                   .type = ParamType::Flag,
+                   .doc = "for terrains: leave holes where samples have no data"}},
        .validate = validateMesh,
        .prepare = setOriginal});
-  op.operands = {{Kind::Band, Kind::Patch, Kind::Adaptive, Kind::Segmentation}};
+  op.operands = {{Kind::Band, Kind::Patch, Kind::Adaptive, Kind::Segmentation, Kind::Terrain}};
   op.run = [ofBand = op.run](Invocation& in) {
     if (isAdaptive(in))
       return Value(levelset::adaptiveToMesh(in.operands[0].adaptive(),
                                             {.maxMemory = in.maxMemory, .progress = in.progress}));
     if (isSegmentation(in)) return meshOfSegmentation(in);
+    if (isTerrain(in))
+      return Value(levelset::groundMesh(
+          in.operands[0].terrain(),
+          {.allowMissing = in.flag("allow-missing"), .maxMemory = in.maxMemory}));
     if (!isPatch(in)) return ofBand(in);
     return Value(meshOfPatches(
         in.operands[0].patch().patches,

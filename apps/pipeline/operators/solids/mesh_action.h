@@ -4,7 +4,7 @@
 
 namespace pipeline {
 
-/// The action `mesh`, for level sets and patches.
+/// The action `mesh`, for level sets, patches and other values with a surface.
 [[nodiscard]] Operator meshOperator();
 
 }  // namespace pipeline

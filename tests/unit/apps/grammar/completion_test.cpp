@@ -56,7 +56,7 @@ TEST_F(Completion, OffersOptionsOfTheAction) {
   EXPECT_EQ(offered("sphere --th"), "");  // global options only before the first action
   EXPECT_EQ(offered("sphere ! --th"), "");
   EXPECT_EQ(offered("sphere --a"), "--as");
-  EXPECT_EQ(offered("measure --a"), "");
+  EXPECT_EQ(offered("measure --as"), "");  // it makes no value
   EXPECT_TRUE(offers("sphere --radius 1 ''", "!"));
   for (const auto& op : pipeline::operators())
     if (!op.params.empty() && op.params.back().position < 0) {

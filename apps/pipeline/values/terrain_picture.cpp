@@ -1,0 +1,53 @@
+#include "apps/pipeline/values/terrain_picture.h"
+
+#include <fmt/core.h>
+
+#include "levelset/error.h"
+#include "levelset/terrain/files/height_field_file.h"
+#include "render/images/grey_image.h"
+#include "render/images/image.h"
+
+namespace pipeline {
+
+bool isTerrainPicture(const std::string& nameOrFormat) {
+  return nameOrFormat == "png" || nameOrFormat.ends_with(".png") || nameOrFormat.ends_with(".PNG");
+}
+
+levelset::HeightField readTerrainPicture(const std::filesystem::path& file, std::size_t maxMemory) {
+  const render::GreyImage image = render::readGreyPng(file, maxMemory);
+  levelset::HeightField terrain{.columns = image.width, .rows = image.height};
+  terrain.heights.resize(image.values.size());
+  for (int row = 0; row < image.height; ++row)
+    for (int column = 0; column < image.width; ++column) {
+      const std::size_t pixel =
+          static_cast<std::size_t>(image.height - 1 - row) * static_cast<std::size_t>(image.width) +
+          static_cast<std::size_t>(column);
+      float& height = terrain.heights[terrain.index(column, row)];
+      height = static_cast<float>(image.values[pixel]);
+      if (image.alpha.empty() || image.alpha[pixel] == 1) continue;
+      if (image.alpha[pixel] != 0)
+        throw levelset::InvalidInput(fmt::format(
+            "{}: the pixel in column {} and row {} is partly transparent, so its height "
+            "is unclear; make pixels opaque, or transparent where heights are missing",
+            file.string(), column + 1, image.height - row));
+      height = levelset::kMissingHeight;
+    }
+  levelset::requireHeights(terrain);
+  return terrain;
+}
+
+void writeTerrainPicture(const std::filesystem::path& file, const levelset::HeightField& terrain,
+                         const std::vector<std::uint8_t>& greys, std::size_t maxMemory) {
+  levelset::requireMemory(static_cast<double>(greys.size()) * 8, maxMemory);
+  std::vector<std::uint8_t> colours;
+  colours.reserve(greys.size() * 4);
+  for (int row = terrain.rows - 1; row >= 0; --row)
+    for (int column = 0; column < terrain.columns; ++column) {
+      const std::uint8_t grey = greys[terrain.index(column, row)];
+      const std::uint8_t alpha = grey == 0 ? 0 : 255;
+      colours.insert(colours.end(), {grey, grey, grey, alpha});
+    }
+  render::writePng(file, terrain.columns, terrain.rows, colours);
+}
+
+}  // namespace pipeline

@@ -1,0 +1,251 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/action_test.h"
+#include "tests/support/files.h"
+#include "tests/support/measured.h"
+
+namespace terrain_actions_test {
+
+using Json = nlohmann::json;
+
+/// A plane of slope 1/2 along x, over 8 × 4.
+constexpr const char* kPlane =
+    "ncols 5\nnrows 3\nxllcenter 0\nyllcenter 0\ncellsize 2\nNODATA_value -9999\n"
+    "0 1 2 3 4\n0 1 2 3 4\n0 1 2 3 4\n";
+/// The same with a hole.
+constexpr const char* kHole =
+    "ncols 5\nnrows 3\nxllcenter 0\nyllcenter 0\ncellsize 2\nNODATA_value -9999\n"
+    "0 1 2 3 4\n0 1 -9999 3 4\n0 1 2 3 4\n";
+
+class TerrainActions : public support::ActionTest {
+ protected:
+  void SetUp() override {
+    ActionTest::SetUp();
+    writeFile("plane.asc", kPlane);
+    writeFile("hole.asc", kHole);
+  }
+};
+
+TEST_F(TerrainActions, ReadDescribesATerrain) {
+  writeFile("hole.prj", "PROJCS[\"UTM 32\"]");
+  for (const char* chain : {"read hole.asc ! info --json", "info hole.asc --json"}) {
+    const Json info = json(chain);
+    EXPECT_EQ(info["columns"], 5);
+    EXPECT_EQ(info["rows"], 3);
+    EXPECT_EQ(info["origin"], (Json{0.0, 0.0}));
+    EXPECT_EQ(info["spacing"], (Json{2.0, 2.0}));
+    EXPECT_EQ(info["range"], (Json{0.0, 4.0}));
+    EXPECT_EQ(info["missing"], 1);
+    EXPECT_EQ(info["coordinate_system"], "UTM 32");
+    EXPECT_EQ(info["geographic"], false);
+  }
+  EXPECT_EQ(json("read hole.asc ! info --json")["kind"], "terrain");
+  EXPECT_EQ(json("read - --format asc <plane.asc ! info --json")["missing"], 0);
+}
+
+TEST_F(TerrainActions, TerrainPlacesAndFills) {
+  const Json info =
+      json("read hole.asc ! terrain --spacing 4,3 --origin 10,-20 --scale 2 --fill ! info --json");
+  EXPECT_EQ(info["origin"], (Json{10.0, -20.0}));
+  EXPECT_EQ(info["spacing"], (Json{4.0, 3.0}));
+  EXPECT_EQ(info["range"], (Json{0.0, 8.0}));
+  EXPECT_EQ(info["missing"], 0);
+  const Json part = json("read plane.asc ! terrain --crop '3,-1,0 8,3,1' ! info --json");
+  EXPECT_EQ(part["columns"], 3);
+  EXPECT_EQ(part["rows"], 2);
+  EXPECT_EQ(part["origin"], (Json{4.0, 0.0}));
+  EXPECT_EQ(json("read plane.asc ! terrain --no-data 3 ! info --json")["missing"], 3);
+  expectRefusal("read plane.asc ! terrain --metric", 3, "not degrees");
+  expectRefusal("read plane.asc ! terrain --scale 0", 2, "factor other than 0");
+  expectRefusal("read plane.asc ! terrain --spacing 1,1 --metric", 2, "leave one out");
+  expectRefusal("read plane.asc ! terrain --spacing 1", 2, "--spacing");
+  expectRefusal("read plane.asc ! terrain --spacing 1,0", 2, "--spacing");
+  expectRefusal("read plane.asc ! terrain --crop '90,0,0 91,1,1'", 3, "has no sample");
+  expectRefusal("read hole.asc ! terrain --crop '4,2,0 4.5,2.5,1' --fill", 3, "no sample has data");
+}
+
+TEST_F(TerrainActions, TerrainTakesARawVolume) {
+  std::ofstream(folder_ / "a.raw", std::ios::binary).write("\1\2\3\4\5\6", 6);
+  const std::string read = "read a.raw --size 3,2,1 --type u8 --spacing 2,4,1 ! terrain";
+  EXPECT_EQ(json(read + " ! info --json")["spacing"], (Json{2.0, 4.0}));
+  EXPECT_EQ(levelsmith(read + " ! write up.asc ").code, 0);
+  EXPECT_NE(support::readText(folder_ / "up.asc").find("\n4 5 6\n1 2 3\n"), std::string::npos);
+  EXPECT_EQ(levelsmith(read + " --flip ! write down.asc").code, 0);
+  EXPECT_NE(support::readText(folder_ / "down.asc").find("\n1 2 3\n4 5 6\n"), std::string::npos);
+  expectRefusal("read a.raw --size 3,1,2 --type u8 ! terrain", 3, "has 2 layers");
+}
+
+/// Bytes in hexadecimal digits.
+std::string bytesOf(const std::string& digits) {
+  std::string bytes;
+  for (std::size_t n = 0; n < digits.size(); n += 2)
+    bytes += static_cast<char>(std::stoi(digits.substr(n, 2), nullptr, 16));
+  return bytes;
+}
+
+// PNGs of 16 bits. Above: black and white, below: 1/5 and 2/5.
+constexpr const char* kGrey =
+    "89504e470d0a1a0a0000000d4948445200000002000000021000000000074d8ebb0000001249444154789c63606"
+    "0f8ff9fc1d8382d0d000f9403316da0037c0000000049454e44ae426082";
+// Black, and a pixel that is transparent; the same with one that is partly transparent.
+constexpr const char* kTransparent =
+    "89504e470d0a1a0a0000000d49484452000000020000000110040000000ebb6b420000000f49444154789c63606"
+    "0f80f040c0c0011f703fdabb502040000000049454e44ae426082";
+constexpr const char* kPartly =
+    "89504e470d0a1a0a0000000d49484452000000020000000110040000000ebb6b420000000f49444154789c63606"
+    "0f80f040cc900125a0460e87a95e00000000049454e44ae426082";
+
+TEST_F(TerrainActions, ReadTakesAGreyPicture) {
+  writeFile("grey.png", bytesOf(kGrey));
+  ASSERT_EQ(levelsmith("read grey.png ! terrain --spacing 30,30 --scale 100 ! write a.asc").code,
+            0);
+  const std::string grid = support::readText(folder_ / "a.asc");
+  EXPECT_NE(grid.find("cellsize 30"), std::string::npos);
+  EXPECT_NE(grid.find("\n0 100\n20 40\n"), std::string::npos) << grid;
+  writeFile("some.png", bytesOf(kTransparent));
+  EXPECT_EQ(json("read some.png ! info --json")["missing"], 1);
+  writeFile("some.png", bytesOf(kPartly));
+  expectRefusal("read some.png", 3, "column 2 and row 1 is partly transparent");
+  writeFile("cut.png", bytesOf(kGrey).substr(0, 50));
+  expectRefusal("read cut.png", 3, "cut.png");
+  ASSERT_EQ(levelsmith("read plane.asc ! hillshade shade.png").code, 0);
+  expectRefusal("read shade.png", 3, "convert it to grey");
+  expectRefusal("read - --format png <grey.png", 2, "give a file, not -");
+}
+
+TEST_F(TerrainActions, MeasureHasExactAreasAndVolumes) {
+  const Json m = json("read plane.asc ! measure --above 1 --json");
+  EXPECT_NEAR(m["area"], 32 * std::sqrt(1.25), support::doubleRounding(64));
+  EXPECT_EQ(m["projected_area"], 32);
+  EXPECT_EQ(m["volume_above"], 36);  // 6 × 3 / 2 × 4
+  EXPECT_EQ(m["volume_below"], 4);
+  EXPECT_EQ(m["mean_height"], 2);
+  EXPECT_NEAR(m["mean_slope"], std::atan(0.5) * 180 / M_PI, 1e-5);
+  EXPECT_EQ(m["triangles"], 16);
+  EXPECT_EQ(json("read hole.asc ! measure --json")["triangles"], 10);
+  const support::Outcome text = levelsmith("read plane.asc ! measure");
+  EXPECT_NE(text.out.find("projected_area"), std::string::npos);
+  expectRefusal("sphere --radius 1 --voxel 0.2 ! measure --above 1", 2, "--above is for terrains");
+  expectRefusal("read plane.asc ! measure --sharp", 2, "--sharp is for level sets");
+  writeFile("plane.prj", "GEOGCS[\"WGS 84\"]");
+  expectRefusal("read plane.asc ! measure", 3, "terrain --metric");
+  EXPECT_GT(json("read plane.asc ! terrain --metric ! measure --json")["area"], 1e11);
+}
+
+TEST_F(TerrainActions, SlopeMakesATerrain) {
+  ASSERT_EQ(levelsmith("read plane.asc ! slope --edges ! write slope.asc").code, 0);
+  const Json slope = json("info slope.asc --json");
+  EXPECT_NEAR(slope["range"][0], std::atan(0.5) * 180 / M_PI, 1e-5);
+  EXPECT_EQ(slope["missing"], 0);
+  EXPECT_EQ(json("read plane.asc ! slope ! info --json")["missing"], 12);
+  EXPECT_EQ(json("read plane.asc ! slope --aspect --edges ! info --json")["range"],
+            (Json{270.0, 270.0}));
+}
+
+TEST_F(TerrainActions, HillshadeWritesAPicture) {
+  ASSERT_EQ(levelsmith("read plane.asc ! hillshade a.png --edges ! hillshade b.png --edges "
+                       "--azimuth 90")
+                .code,
+            0);
+  EXPECT_NE(support::readText(folder_ / "a.png"), support::readText(folder_ / "b.png"));
+  expectRefusal("read plane.asc ! hillshade a.jpg", 2, "ends in .png");
+  expectRefusal("read plane.asc ! hillshade a.png --altitude 91", 2, "give 0 to 90");
+  expectRefusal("read plane.asc ! hillshade a.png --exaggeration 0", 2, "--exaggeration");
+}
+
+TEST_F(TerrainActions, ContoursWriteLines) {
+  const Json lines = json("read plane.asc ! contours - --format geojson --interval 1 --base 0.5");
+  EXPECT_EQ(lines["type"], "FeatureCollection");
+  ASSERT_EQ(lines["features"].size(), 4u);
+  const Json& first = lines["features"][0];
+  EXPECT_EQ(first["properties"]["height"], 0.5);
+  EXPECT_EQ(first["geometry"]["coordinates"],
+            (Json{{1.0, 4.0, 0.5}, {1.0, 2.0, 0.5}, {1.0, 0.0, 0.5}}));
+  ASSERT_EQ(levelsmith("read plane.asc ! contours a.svg --interval 1").code, 0);
+  const std::string svg = support::readText(folder_ / "a.svg");
+  EXPECT_NE(svg.find("viewBox=\"0 0 1000.00 500.00\""), std::string::npos);
+  EXPECT_NE(svg.find("M250.00 0.00L250.00 250.00L250.00 500.00"), std::string::npos);
+  expectRefusal("read plane.asc ! contours a.txt --interval 1", 2, "use geojson or svg");
+  expectRefusal("read plane.asc ! contours a.svg", 2, "--interval");
+  expectRefusal("read plane.asc ! contours a.svg --interval 1e-9", 2, "larger interval");
+  const support::Outcome none = levelsmith("read plane.asc ! contours b.svg --interval 100");
+  EXPECT_EQ(none.code, 0);
+  EXPECT_NE(none.err.find("no line crosses the terrain"), std::string::npos);
+}
+
+TEST_F(TerrainActions, SolidifyMakesASolid) {
+  const Json m = json("read plane.asc ! solidify --base -1 --voxel 0.1 ! measure --json");
+  // A level set rounds each edge by about half a voxel².
+  EXPECT_NEAR(m["volume"], 32 * 3, support::measured(0.278));
+  EXPECT_EQ(m["components"], 1);
+  EXPECT_EQ(levelsmith("read plane.asc ! solidify --base -1 --voxel 0.25 ! check").code, 0);
+  const Json bounds = json("read plane.asc ! solidify --resolution 40 ! info --json")["bounds"];
+  EXPECT_NEAR(bounds["min"][2], -0.4, 1e-3);  // a twentieth of the longer side
+  // The volume of a hole with walls: six of 16 triangles are missing.
+  const Json holed =
+      json("read hole.asc ! solidify --base -1 --voxel 0.1 --allow-missing ! measure --json");
+  EXPECT_NEAR(holed["volume"], 20 * 3, support::measured(0.395));
+  expectRefusal("read hole.asc ! solidify --voxel 0.1", 3, "1 of 15 samples have no data");
+  expectRefusal("read plane.asc ! solidify --base 0 --voxel 0.1", 3, "give a lower base");
+  expectRefusal("read plane.asc ! solidify --base -1", 2, "--voxel");
+  ASSERT_EQ(levelsmith("--report r.json read plane.asc ! solidify --base -1 --voxel 0.2").code, 0);
+  const Json report = Json::parse(support::readText(folder_ / "r.json"));
+  EXPECT_EQ(report["steps"][1]["certificate"]["closed"], true);
+}
+
+TEST_F(TerrainActions, SurfaceBandTakesABox) {
+  const std::string band = "read plane.asc ! surface-band --voxel 0.1 --half-width 5";
+  const Json whole = json(band + " ! info --json"),
+             part = json(band + " --box '1,1,0 3,3,4' ! info --json");
+  EXPECT_EQ(whole["kind"], "surface band");
+  EXPECT_EQ(part["kind"], "surface band");
+  EXPECT_LT(part["active_voxels"], whole["active_voxels"]);
+  // Patches stand upwards, on the positive side.
+  const Json patch = json(
+      "read plane.asc ! surface-band --voxel 0.1 --half-width 12 --as land ! "
+      "patch @land --at 4,2,2 --size 1,1 --height 0.4 ! mesh ! measure --json");
+  EXPECT_GT(patch["bounds"]["max"][2], 2.3);
+  expectRefusal("read hole.asc ! surface-band --voxel 0.1 --half-width 5", 3, "have no data");
+  EXPECT_EQ(
+      levelsmith("read hole.asc ! surface-band --voxel 0.1 --half-width 5 --allow-missing").code,
+      0);
+  expectRefusal(
+      "sphere --radius 1 --voxel 0.2 ! mesh ! surface-band --voxel 0.1 --box '0,0,0 1,1,1'", 2,
+      "--box is for terrains");
+}
+
+TEST_F(TerrainActions, MeshAndRenderShowTheGround) {
+  EXPECT_EQ(json("read plane.asc ! mesh ! measure --json")["triangles"], 16);
+  EXPECT_EQ(json("read hole.asc ! mesh --allow-missing ! measure --json")["triangles"], 10);
+  expectRefusal("read hole.asc ! mesh", 3, "have no data");
+  expectRefusal("read plane.asc ! mesh --sharp", 2,
+                "--sharp applies to a level set, not to a terrain");
+  expectRefusal("sphere --radius 1 --voxel 0.2 ! mesh --allow-missing", 2, "is for a terrain");
+  EXPECT_EQ(levelsmith("read hole.asc ! render a.png --size 32x24 --up 0,0,1").code, 0);
+}
+
+TEST_F(TerrainActions, WriteKeepsWhatTheFormatHolds) {
+  ASSERT_EQ(levelsmith("read hole.asc ! write again.asc").code, 0);
+  EXPECT_EQ(json("read again.asc ! info --json")["hash"],
+            json("read hole.asc ! info --json")["hash"]);
+  expectRefusal("read plane.asc ! write a.ply", 2, "write .asc, or put 'mesh' before it");
+  expectRefusal("sphere --radius 1 --voxel 0.2 ! write a.asc", 2, "a level set cannot be written");
+  expectRefusal("read plane.asc ! write a.hgt", 2, "no known format");
+  writeFile("plane.prj", "PROJCS[\"UTM 32\"]");
+  const support::Outcome warned = levelsmith("read plane.asc ! write b.asc");
+  EXPECT_NE(warned.err.find("does not store the coordinate system 'UTM 32'"), std::string::npos);
+}
+
+TEST_F(TerrainActions, PlansWithoutRunning) {
+  for (const char* chain :
+       {"read plane.asc ! terrain --spacing 30,30 ! solidify --base -9 --voxel 1",
+        "read plane.asc ! terrain --crop '0,0,0 5,5,5' ! surface-band --resolution 50",
+        "read plane.asc ! slope ! terrain --scale 2 ! info"})
+    EXPECT_EQ(levelsmith(std::string("--dry-run ") + chain).code, 0) << chain;
+}
+
+}  // namespace terrain_actions_test
