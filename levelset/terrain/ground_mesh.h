@@ -54,8 +54,8 @@ struct GroundBandOptions {
 };
 
 /// Computes the band of a ground, negative below it. Distances are those of surfaceBand(). In the
-/// box they are those of the complete ground. Blocks of 8³ grid points that meet the box are
-/// complete.
+/// box they are those of the complete ground, up to rounding. Blocks of 8³ grid points that meet
+/// the box are complete.
 /// @throws InvalidInput when the box has no ground, and as groundMesh and surfaceBand
 [[nodiscard]] SurfaceBandResult groundBand(const HeightField& field, double voxelSize,
                                            const GroundBandOptions& options = {});

@@ -13,6 +13,7 @@
 #include "levelset/file_target.h"
 #include "levelset/files/band_file.h"
 #include "levelset/segmented/files/segmented_file.h"
+#include "levelset/terrain/files/height_field_file.h"
 
 namespace pipeline {
 namespace {
@@ -50,6 +51,20 @@ std::filesystem::path programFile() {
   const std::filesystem::path file = isKnown ? about.dli_fname : "";
   std::error_code ignored;
   return std::filesystem::is_regular_file(file, ignored) ? file : "/proc/self/exe";
+}
+
+/// Adds what a terrain takes from outside its file: a tile its place from the name, and a grid the
+/// files beside it.
+void addTerrainFiles(std::string& text, const std::filesystem::path& file, const Node& node) {
+  const auto format = node.options.find("format");
+  if (!levelset::isHeightFormat(format == node.options.end() ? file.string() : format->second))
+    return;
+  add(text, "name", file.stem().string());
+  for (const char* extension : {".hdr", ".prj"}) {
+    std::filesystem::path beside = file;
+    beside.replace_extension(extension);
+    add(text, extension, digestOfFile(beside).value_or(""));
+  }
 }
 
 }  // namespace
@@ -131,6 +146,7 @@ std::optional<std::string> CacheKeys::keyOf(
     if (!content) return {};
     add(text, param.name, *content);
     add(text, "of", lowerExtension(value));
+    addTerrainFiles(text, value, node);
   }
   for (const std::size_t input : node.inputs) {
     if (!before[input]) return {};

@@ -240,6 +240,26 @@ TEST_F(TerrainActions, WriteKeepsWhatTheFormatHolds) {
   EXPECT_NE(warned.err.find("does not store the coordinate system 'UTM 32'"), std::string::npos);
 }
 
+/// The cache knows the files beside a grid, and that the name of a tile is its place.
+TEST_F(TerrainActions, CachesWhatIsBesideTheFile) {
+  const std::string measure = "--cache c read plane.asc ! measure --json";
+  EXPECT_EQ(json(measure)["volume_above"], 64);
+  EXPECT_EQ(json(measure)["volume_above"], 64);
+  writeFile("plane.prj", "GEOGCS[\"WGS 84\"]");
+  expectRefusal(measure, 3, "terrain --metric");
+  writeFile("a.flt", std::string(16, '\0'));
+  const std::string header = "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize ";
+  for (const double size : {1.0, 3.0}) {
+    writeFile("a.hdr", header + std::to_string(size));
+    EXPECT_EQ(json("--cache c read a.flt ! measure --json")["area"], size * size);
+  }
+  for (const char* name : {"N00E000.hgt", "N05E000.hgt"}) {
+    writeFile(name, std::string(2 * 1201 * 1201, '\0'));
+    EXPECT_EQ(json(std::string("--cache c read ") + name + " ! info --json")["origin"][1],
+              name[2] - '0');
+  }
+}
+
 TEST_F(TerrainActions, PlansWithoutRunning) {
   for (const char* chain :
        {"read plane.asc ! terrain --spacing 30,30 ! solidify --base -9 --voxel 1",

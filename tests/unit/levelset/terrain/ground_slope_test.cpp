@@ -130,6 +130,24 @@ TEST(Hillshade, IsTheCosineOfTheLight) {
   EXPECT_EQ(hillshade(field, {.exaggeration = 2}), hillshade(levelset::scaledHeights(field, 2)));
 }
 
+/// Results of gdaldem (GDAL 3.6.2) for the six samples inside, which it computes in float.
+TEST(GroundSlope, AgreesWithGdal) {
+  const HeightField field = levelset::flippedHeights(
+      {.columns = 5, .rows = 4, .spacing = {10, 10}, .heights = {3, 7, 1, 9, 4, 6, 2, 8, 5, 7,
+                                                                 1, 9, 4, 6, 2, 8, 3, 7, 1, 5}});
+  const double slopes[] = {5.05115271, 5.05115271, 3.64697051, 5.43800783, 5.05115271, 9.2566824};
+  const double aspects[] = {315, 315, 168.690063, 293.198608, 135, 147.528809};
+  const int shades[] = {196, 196, 171, 196, 164, 150};
+  const HeightField slope = slopeDegrees(field), aspect = aspectDegrees(field);
+  const std::vector<std::uint8_t> shade = hillshade(field);
+  for (int n = 0; n < 6; ++n) {
+    const int column = 1 + n % 3, row = 2 - n / 3;  // GDAL begins in the north
+    EXPECT_NEAR(slope.at(column, row), slopes[n], 90 * rounding(1));
+    EXPECT_NEAR(aspect.at(column, row), aspects[n], 360 * rounding(1));
+    EXPECT_EQ(shade[field.index(column, row)], shades[n]);
+  }
+}
+
 TEST(Hillshade, RefusesAnglesAndDegrees) {
   HeightField field = terrainOf(3, 3, {1, 1}, [](double x, double) { return x; });
   const auto refused = [&](const levelset::HillshadeOptions& options) {
