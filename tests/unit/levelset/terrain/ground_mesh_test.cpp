@@ -50,7 +50,7 @@ TEST(GroundSolidMesh, IsClosedWithAnyHoles) {
     const TriMesh mesh = levelset::groundSolidMesh(field, -0.5, {.allowMissing = true});
     EXPECT_TRUE(levelset::manifoldness(mesh).isClosedManifold()) << seed;
     const double volume = levelset::measureGround(field, {.height = -0.5}).volumeAbove;
-    EXPECT_NEAR(levelset::signedVolume(mesh), volume, volume * doubleRounding(32)) << seed;
+    EXPECT_NEAR(levelset::signedVolume(mesh), volume, volume * doubleRounding(1)) << seed;
     const levelset::Manifoldness open =
         levelset::manifoldness(levelset::groundMesh(field, {.allowMissing = true}));
     EXPECT_EQ(open.nonManifoldEdges + open.misorientedEdges + open.nonManifoldVertices, 0u) << seed;
@@ -94,7 +94,7 @@ TEST(Solidify, MakesABoxOfLevelGround) {
     for (double y = -1.7; y < 1.75; y += 0.1)
       for (double z = -1.2; z < 1.25; z += 0.1)
         most = std::max(most, std::abs(one.value({x, y, z}) - other.value({x, y, z})));
-  EXPECT_LT(most, support::rounding(8));
+  EXPECT_LT(most, support::rounding(1));
 }
 
 /// The volume of the solid converges to that of the prisms below its triangles. A level set rounds
@@ -159,7 +159,7 @@ TEST(GroundBand, IsNegativeBelowTheGround) {
         const V3d p = V3d(x, y, 0.5 * x - 0.25 * y) + along * normal;
         most = std::max(most, std::abs(sampler.value(p) - along));
       }
-  EXPECT_LT(most, support::rounding(16));
+  EXPECT_LT(most, support::measured(3e-8));
 }
 
 /// The band in a box has the bits of the complete band there.

@@ -112,8 +112,8 @@ TEST(HeightField, TurnsDegreesIntoMetres) {
     EXPECT_SAYS(refusal<InvalidInput>([&] { levelset::requireLengths(field); }),
                 "x and y are degrees");
     const HeightField metres = levelset::metricHeights(field);
-    EXPECT_NEAR(metres.spacing.x * 4, fact.east, 1e-3);
-    EXPECT_NEAR(metres.spacing.y * 4, fact.north, 1e-3);
+    EXPECT_NEAR(metres.spacing.x * 4, fact.east, support::measured(4.2e-4));
+    EXPECT_NEAR(metres.spacing.y * 4, fact.north, support::measured(4.2e-4));
     EXPECT_NEAR(metres.position(1, 1).length(), 0, 1e-9);
     EXPECT_FALSE(metres.isGeographic);
     EXPECT_SAYS(metres.coordinateSystem, "WGS 84");

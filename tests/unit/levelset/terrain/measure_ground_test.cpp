@@ -58,7 +58,7 @@ TEST(MeasureGround, HasTheVolumeOfAPyramid) {
   // reaches to 10.25 / 1.75 on one side and 10.25 / 1.25 on the other.
   const double inclined = (10.25 / 1.75 + 10.25 / 1.25) * r * 10.25 / 3;
   EXPECT_NEAR(measureGround(field, {.slope = {0.25, 0}}).volumeAbove, inclined,
-              inclined * doubleRounding(8));
+              inclined * doubleRounding(2));
 }
 
 TEST(MeasureGround, ConvergesInSecondOrder) {
