@@ -7,11 +7,17 @@
 
 namespace render {
 
+// GCC 12 does not define __AVX2__ after a pragma, and clang ignores the pragma.
+#define WIDE_VECTORS 0
 #define LANES 8
 namespace sse2 {
 #include "render/cpu/lanes.inc"
 }
 #undef LANES
+#ifndef __clang__
+#undef WIDE_VECTORS
+#define WIDE_VECTORS 1
+#endif
 
 #pragma GCC push_options
 #pragma GCC target("avx2")
@@ -29,6 +35,7 @@ namespace avx512 {
 #include "render/cpu/lanes.inc"
 }
 #undef LANES
+#undef WIDE_VECTORS
 #pragma GCC pop_options
 
 std::vector<InstructionSet> instructionSets() {

@@ -24,7 +24,7 @@ constexpr float kMeanDepth = 0.25f;
 
 }  // namespace
 
-// GCC 12 does not define __AVX2__ after a pragma.
+// GCC 12 does not define __AVX2__ after a pragma, and clang ignores the pragma.
 #define WIDE_VECTORS 0
 namespace sse2 {
 #include "render/quadrics/quadric_lanes.inc"
@@ -35,7 +35,11 @@ namespace sse2 {
 
 #pragma GCC push_options
 #pragma GCC target("avx2,fma")
+#ifdef __clang__
+#define WIDE_VECTORS 0
+#else
 #define WIDE_VECTORS 1
+#endif
 namespace avx2 {
 #include "render/quadrics/quadric_lanes.inc"
 // After the lanes, which it uses.
