@@ -17,8 +17,9 @@ constexpr std::uint32_t kNoHole = ~std::uint32_t{0};
 
 /// Missing samples that are joined along rows and columns.
 struct GroundHole {
-  std::vector<std::size_t> samples;                                       ///< ascending
-  double least = std::numeric_limits<double>::infinity(), most = -least;  ///< of the heights beside
+  std::vector<std::size_t> samples;  ///< ascending
+  double least = std::numeric_limits<double>::infinity(),
+         most = -least;  ///< range of the heights beside
 };
 
 /// Neighbours of a sample along rows and columns, with their weights.

@@ -9,7 +9,7 @@ namespace levelset {
 
 /// A square part of a ground at one level of a pyramid.
 struct PyramidPatch {
-  float lowest = 0, highest = 0;  ///< of the known samples that the patch covers; NaN without any
+  float lowest = 0, highest = 0;  ///< heights of known samples in the patch; NaN without any
   /// Largest vertical distance between the ground and the triangles of the patch, over all their
   /// points. It is rounded up. Infinite where a coarser level covers a missing sample.
   float error = 0;

@@ -19,7 +19,7 @@ struct GroundMeasures {
   double volumeAbove = 0;    ///< volume between ground and plane where the ground is above it
   double volumeBelow = 0;  ///< volume between ground and plane where the ground is below it, ≥ 0
   double meanHeight = 0;   ///< mean of z over the projected area; 0 without triangles
-  double lowest = 0, highest = 0;  ///< of the known samples; 0 if there are none
+  double lowest = 0, highest = 0;  ///< heights of known samples; 0 without any
   std::size_t triangles = 0;
   std::size_t missing = 0;  ///< samples without data
 };

@@ -34,7 +34,7 @@ using PatchTriangle = std::array<std::uint16_t, 3>;
 /// Numbers of the index sets for all levels and neighbours.
 struct PatchIndexCount {
   std::size_t sets = 0;
-  std::size_t triangles = 0;  ///< of all sets together
+  std::size_t triangles = 0;  ///< sum over the sets
   std::size_t bytes = 0;      ///< as lists of 16-bit numbers
 };
 /// Counts the sets that patchTriangles() makes: for each level, each side may have a neighbour of

@@ -1,5 +1,6 @@
 #include "levelset/points/field/cell_points.h"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
@@ -14,6 +15,10 @@ constexpr std::size_t kMostCandidates = 400;
 
 double square(double x) {
   return x * x;
+}
+
+Eigen::Map<const Eigen::ArrayXd> arrayOf(const std::vector<double>& list) {
+  return {list.data(), static_cast<Eigen::Index>(list.size())};
 }
 
 }  // namespace
@@ -59,8 +64,7 @@ void CellPoints::list(Ball& ball) const {
   ball.isListed = true;
   if (&ball == &inner_ && outer_.isListed) {
     for (std::size_t n = 0; n < outer_.numbers.size(); ++n) {
-      const auto i = static_cast<Eigen::Index>(n);
-      const V3d arm = V3d(outer_.x[i], outer_.y[i], outer_.z[i]) - ball.centre;
+      const V3d arm = V3d(outer_.x[n], outer_.y[n], outer_.z[n]) - ball.centre;
       if (arm.length2() <= squared) ball.numbers.push_back(outer_.numbers[n]);
     }
   } else {
@@ -74,10 +78,10 @@ void CellPoints::list(Ball& ball) const {
     });
     if (!ball.isListed) return;
   }
-  const auto size = static_cast<Eigen::Index>(ball.numbers.size());
-  for (Eigen::ArrayXd* axis : {&ball.x, &ball.y, &ball.z}) axis->resize(size);
-  for (Eigen::Index n = 0; n < size; ++n) {
-    const V3d& p = points_->positions[ball.numbers[static_cast<std::size_t>(n)]];
+  const std::size_t size = ball.numbers.size();
+  for (std::vector<double>* axis : {&ball.x, &ball.y, &ball.z}) axis->resize(size);
+  for (std::size_t n = 0; n < size; ++n) {
+    const V3d& p = points_->positions[ball.numbers[n]];
     ball.x[n] = p.x;
     ball.y[n] = p.y;
     ball.z[n] = p.z;
@@ -86,7 +90,10 @@ void CellPoints::list(Ball& ball) const {
 
 /// Finds the closest points of a position among the candidates of a ball that contains it.
 void CellPoints::choose(const Ball& ball, const V3d& at, std::vector<FoundItem>& found) {
-  squared_ = (ball.x - at.x).square() + (ball.y - at.y).square() + (ball.z - at.z).square();
+  squared_.resize(ball.numbers.size());
+  Eigen::Map<Eigen::ArrayXd>(squared_.data(), static_cast<Eigen::Index>(squared_.size())) =
+      (arrayOf(ball.x) - at.x).square() + (arrayOf(ball.y) - at.y).square() +
+      (arrayOf(ball.z) - at.z).square();
   // The farthest of the closest points moves no more than the position.
   const double moved = (at - ball.centre).length();
   const double nearer = (1 - kRounding) * (ball.farthest - moved),
@@ -97,7 +104,7 @@ void CellPoints::choose(const Ball& ball, const V3d& at, std::vector<FoundItem>&
   possible_.resize(size + 1);
   std::size_t sure = 0, possible = 0;
   for (std::size_t n = 0; n < size; ++n) {  // without branches, which would be unpredictable
-    const double squared = squared_[static_cast<Eigen::Index>(n)];
+    const double squared = squared_[n];
     sure_[sure] = possible_[possible] = static_cast<std::uint32_t>(n);
     const bool isSure = squared < least;
     sure += isSure;

@@ -2,7 +2,6 @@
 
 // Internal header of levelset: public headers must not include it.
 
-#include <Eigen/Core>
 #include <cstdint>
 #include <vector>
 
@@ -33,7 +32,7 @@ class CellPoints {
     double farthest = 0;    ///< distance of the last one of the closest points from the centre
     bool isListed = false;  ///< the candidates are known
     std::vector<std::uint32_t> numbers;
-    Eigen::ArrayXd x, y, z;
+    std::vector<double> x, y, z;
   };
 
   void list(Ball& ball) const;
@@ -43,7 +42,7 @@ class CellPoints {
   std::size_t count_ = 0;
   Ball outer_, inner_;
   std::vector<FoundItem> atOuter_, atInner_;
-  Eigen::ArrayXd squared_;
+  std::vector<double> squared_;
   std::vector<std::uint32_t> sure_, possible_;
   std::vector<double> order_;
 };

@@ -31,7 +31,7 @@ class QuadricFit {
 
  private:
   LocalQuadric frame_;
-  std::array<double, 15> moments_{};      ///< of 1, x, y, x², xy, y², x³, …, y⁴
+  std::array<double, 15> moments_{};      ///< sums of 1, x, y, x², xy, y², x³, …, y⁴
   std::array<double, 6> slopeMoments_{};  ///< the same up to y², with the weights of slopes
   std::array<double, 6> right_{};
 };
