@@ -183,6 +183,12 @@ std::array<Camera, 2> stereoCameras(const Camera& camera, double eyeDistance, do
     eye.from += right * offset;
     eye.to += right * offset;
     eye.axisShift += offset / (screenDepth * width);
+    constexpr double kMostShift = 64;  // widths of the picture, where single precision suffices
+    if (!(std::abs(eye.axisShift) <= kMostShift * camera.width))
+      throw levelset::UsageError(
+          fmt::format("--eye-distance {} at --screen-depth {} shifts the views by more than {} "
+                      "widths of the picture; give a smaller distance or a larger depth",
+                      eyeDistance, screenDepth, kMostShift));
   }
   return eyes;
 }

@@ -161,9 +161,10 @@ void Viewer::takeFrame() {
   if (const std::exception_ptr failure = picture_.failure()) showFailure(failure, "");
   const std::shared_ptr<const Frame> frame = picture_.frame();
   if (!frame || frame == frame_) return;
+  const bool isNewNote = !frame_ || frame->note != frame_->note;
   frame_ = frame;
   window_.setPicture(frame->canvas);
-  if (!frame->note.empty()) showMessage(frame->note);
+  if (isNewNote && !frame->note.empty()) showMessage(frame->note);
   finishPick();
 }
 

@@ -39,9 +39,10 @@ void Viewer::drawEffectPart() {
   if (ImGui::Button("Copy as command##effects")) {
     window_.setClipboard(
         effectText(effects, camera_.camera(pictureWidth_, pictureHeight_), style_));
-    const bool isPlain = !isClipped_ && opacity_ == 1 && !(model_ && model_->volume);
+    const bool isPlain = !isClipped_ && opacity_ == 1 && !(model_ && model_->volume) &&
+                         style_ != render::Style::Matcap;
     showMessage(std::string("The actions 'render' and 'effect' were copied to the clipboard") +
-                (isPlain ? "." : ", without clip plane, opacity and options of volumes."));
+                (isPlain ? "." : ", without clip plane, opacity, matcap and options of volumes."));
   }
   ImGui::SameLine();
   if (ImGui::Button("None##effects")) effects = {};

@@ -307,6 +307,7 @@ void BallUnion::Data::descend(BallOctree& out, std::uint32_t cell, const V3d& at
     leafCell.arcCount = static_cast<std::uint32_t>(nearArcs.size());
     out.balls.insert(out.balls.end(), nearBalls.begin(), nearBalls.end());
     out.arcs.insert(out.arcs.end(), nearArcs.begin(), nearArcs.end());
+    work.add(sizeof(std::uint32_t) * (nearBalls.size() + nearArcs.size()));
     return;
   }
   const auto child = static_cast<std::uint32_t>(out.cells.size());

@@ -172,6 +172,12 @@ std::vector<double> contourHeights(const HeightField& field, double interval, do
         fmt::format("an interval of {} gives {:.0f} heights between {:.6g} and {:.6g}, more than "
                     "the limit of {:.0f}; give a larger interval",
                     interval, last - first + 1, bounds.min.z, bounds.max.z, kMostHeights));
+  constexpr double kMostIntervals = 1e15;  // whole numbers that a double can count by one
+  if (!(std::max(std::abs(first), std::abs(last)) < kMostIntervals))
+    throw UsageError(fmt::format(
+        "an interval of {} is too small for heights from {:.6g} to {:.6g} with the base "
+        "{}; give a larger interval, or a base near the heights",
+        interval, bounds.min.z, bounds.max.z, base));
   std::vector<double> heights;
   for (double n = first; n <= last; ++n) heights.push_back(base + n * interval);
   return heights;

@@ -106,10 +106,11 @@ HeightField filledHeights(HeightField field, const FillOptions& options) {
     throw InvalidInput("no sample has data, so there is nothing to fill from; check the file");
   if (missing >= kNoHole)
     throw ResourceLimit("more than 2^32 samples are missing; crop the terrain");
-  // Triplets, matrix and factor of a hole take about 300 bytes for each sample.
+  // The result and the numbers of the samples. Triplets, matrix and factor of a hole take about 300
+  // bytes for each sample.
   requireMemory(static_cast<double>(field.heights.size()) * 8 + static_cast<double>(missing) * 300,
                 options.maxMemory);
-  const std::vector<float> known = field.heights;
+  const std::vector<float>& known = field.heights;
   std::vector<std::uint32_t> numbers(known.size(), kNoHole);
   HeightField result = field;
   std::size_t done = 0;

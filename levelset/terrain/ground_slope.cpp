@@ -44,7 +44,8 @@ std::optional<Imath::V2d> hornGradient(const HeightField& field, int column, int
           (8 * field.spacing.x),
       ((w[2][0] + 2 * w[2][1] + w[2][2]) - (w[0][0] + 2 * w[0][1] + w[0][2])) /
           (8 * field.spacing.y));
-  if (std::isnan(gradient.x + gradient.y)) return {};
+  // Differences of huge heights overflow.
+  if (!std::isfinite(gradient.x * gradient.x + gradient.y * gradient.y)) return {};
   return gradient;
 }
 

@@ -142,9 +142,9 @@ HeightField heightsOf(const Volume& volume, std::optional<double> noData, std::s
   field.heights.resize(grid.pointCount());
   for (int row = 0; row < field.rows; ++row)
     for (int column = 0; column < field.columns; ++column) {
-      const double value = volume.at(column, row, 0);
+      const auto value = static_cast<float>(volume.at(column, row, 0));
       field.heights[field.index(column, row)] =
-          noData && value == *noData ? kMissingHeight : static_cast<float>(value);
+          noData && value == static_cast<float>(*noData) ? kMissingHeight : value;
     }
   requireHeights(field);
   return field;

@@ -162,6 +162,7 @@ Image stereoPicture(const Image& left, const Image& right, Stereo kind) {
     alphas[i] = static_cast<float>(eye.alpha(source));
   });
   result.attributes = left.attributes;
+  result.attributes.insert(right.attributes.begin(), right.attributes.end());
   return result;
 }
 

@@ -41,6 +41,12 @@ V3d studioLight(const V3d& d) {
   return light;
 }
 
+/// Light of a pixel. The sun is often infinite in a file, which would spread through all weights.
+float lightIn(float value) {
+  constexpr float kBrightest = 65504;  // the largest half float
+  return std::isnan(value) ? 0 : std::clamp(value, 0.0f, kBrightest);
+}
+
 }  // namespace
 
 EnvironmentMap::EnvironmentMap(const std::string& name, std::size_t maxMemory) {
@@ -65,7 +71,8 @@ EnvironmentMap::EnvironmentMap(const std::string& name, std::size_t maxMemory) {
   height_ = picture.height;
   pixels_.reserve(picture.pixelCount());
   for (std::size_t i = 0; i < picture.pixelCount(); ++i)
-    pixels_.emplace_back((*channels[0])[i], (*channels[1])[i], (*channels[2])[i]);
+    pixels_.emplace_back(lightIn((*channels[0])[i]), lightIn((*channels[1])[i]),
+                         lightIn((*channels[2])[i]));
 }
 
 V3d EnvironmentMap::pixel(int x, int y) const {

@@ -13,8 +13,8 @@ namespace {
 using Imath::C3f;
 using Imath::V3d;
 
-// Rays are traced in groups of about this number, which bounds the memory for their light rays.
-constexpr std::size_t kMostPathsAtOnce = 1u << 14;
+// Paths, and light rays of their points, that are traced together. They bound the memory.
+constexpr std::size_t kMostPathsAtOnce = 1u << 14, kMostLightRays = 1u << 18;
 
 }  // namespace
 
@@ -127,6 +127,21 @@ std::vector<LightPaths::Path> LightPaths::follow(const SceneRays& rays,
   std::vector<Lit> lit;
   std::vector<LightRay> lights;
   std::vector<Path> next;
+  const auto shade = [&] {
+    const std::vector<double> arriving = rays.transmittances(lights);
+    for (const Lit& at : lit) {
+      const Path& path = paths[at.path];
+      const Hit& hit = hits[at.path];
+      const PointLight light = Shader::lightOf(at.range, lights, arriving);
+      // The ground shows only its shadow, in front of the environment.
+      const V3d colour = hit.isOnGround ? surroundings_.light(path.ray.direction) *
+                                              (1 - shader_.shadowOpacity(hit, light))
+                                        : V3d(shader_.colour(hit, path.ray.direction, light));
+      sums[path.point] += colour * at.share;
+    }
+    lit.clear();
+    lights.clear();
+  };
   for (std::size_t n = 0; n < paths.size(); ++n) {
     const Path& path = paths[n];
     const SeenPoint& from = points[path.point];
@@ -155,18 +170,9 @@ std::vector<LightPaths::Path> LightPaths::follow(const SceneRays& rays,
     }
     if (own > 0)
       lit.push_back({n, own, shader_.addRays(hit, direction, from.x, from.y, from.sample, lights)});
+    if (lights.size() > kMostLightRays) shade();
   }
-  const std::vector<double> arriving = rays.transmittances(lights);
-  for (const Lit& at : lit) {
-    const Path& path = paths[at.path];
-    const Hit& hit = hits[at.path];
-    const PointLight light = Shader::lightOf(at.range, lights, arriving);
-    // The ground shows only its shadow, in front of the environment.
-    const V3d colour = hit.isOnGround ? surroundings_.light(path.ray.direction) *
-                                            (1 - shader_.shadowOpacity(hit, light))
-                                      : V3d(shader_.colour(hit, path.ray.direction, light));
-    sums[path.point] += colour * at.share;
-  }
+  shade();
   return next;
 }
 

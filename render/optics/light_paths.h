@@ -40,8 +40,9 @@ struct SeenPoint {
 ///
 /// At each surface a path splits into the surface's own colour, a mirrored and a refracted ray. The
 /// shares of the three are those of the functions of fresnel.h, and sum to 1. There is no random
-/// choice. A path ends at the environment. It meets it untraced behind the last bounce, and when
-/// its share of the pixel is below kLeastTransmittance. So no light is lost.
+/// choice. A path ends at the environment. Behind the last bounce, and when the share of the pixel
+/// is below kLeastTransmittance, the path takes the environment without tracing. So no light is
+/// lost.
 ///
 /// Solids are clear, and all have one index of refraction. A path counts the solids that it is in.
 /// Where solids overlap, it is refracted at the surface of their union only. A transparent surface

@@ -286,9 +286,14 @@ Value write(Invocation& in) {
     render::writeScene(file, value.scene(), in.progress);
   } else if (value.kind() == Kind::Terrain) {
     levelset::writeHeightField(file, value.terrain(), {.progress = in.progress});
-    if (!value.terrain().coordinateSystem.empty())
+    if (value.terrain().isGeographic)
+      in.notes.warnings.push_back(fmt::format(
+          "x and y are degrees, but {} does not store this, and is read as lengths; put a file {} "
+          "beside it that holds GEOGCS[\"WGS 84\"]",
+          file.string(), std::filesystem::path(file).replace_extension(".prj").string()));
+    else if (!value.terrain().coordinateSystem.empty())
       in.notes.warnings.push_back(
-          fmt::format("{} does not store the coordinate system '{}'; keep its .prj file",
+          fmt::format("{} does not store the coordinate system '{}'; copy its .prj file beside it",
                       file.string(), value.terrain().coordinateSystem));
   } else if (value.kind() == Kind::Field) {
     levelset::writeField(file, value.field(),

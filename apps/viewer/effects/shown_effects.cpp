@@ -43,7 +43,9 @@ std::string effectText(const EffectView& effects, const render::Camera& camera,
                        render::Style style) {
   std::string text = fmt::format("render view.exr --renderer cpu --size {}x{} {}", camera.width,
                                  camera.height, cameraText(camera));
-  if (style != render::Style::Lit) text += fmt::format(" --style {}", render::styleName(style));
+  // The viewer does not know the file of a matcap.
+  if (style != render::Style::Lit && style != render::Style::Matcap)
+    text += fmt::format(" --style {}", render::styleName(style));
   text += " ! effect view.exr view.png";
   for (const auto& [name, value] : {std::pair("outline", effects.outline),
                                     {"halo", effects.halo},

@@ -96,9 +96,9 @@ void CellPoints::choose(const Ball& ball, const V3d& at, std::vector<FoundItem>&
       (arrayOf(ball.z) - at.z).square();
   // The farthest of the closest points moves no more than the position.
   const double moved = (at - ball.centre).length();
-  const double nearer = (1 - kRounding) * (ball.farthest - moved),
-               least = nearer > 0 ? square(nearer) : 0,
-               most = square((1 + kRounding) * (ball.farthest + moved));
+  const double rounding = kRounding * (ball.farthest + moved),
+               nearer = ball.farthest - moved - rounding, least = nearer > 0 ? square(nearer) : 0,
+               most = square(ball.farthest + moved + rounding);
   const std::size_t size = ball.numbers.size();
   sure_.resize(size + 1);
   possible_.resize(size + 1);

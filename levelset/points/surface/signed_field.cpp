@@ -72,11 +72,15 @@ std::optional<double> SignedField::commonValue(const V3d& centre, double radius,
   const double closest = std::sqrt(found.front().squared), least = closest - radius;
   if (!(least > bound)) return std::nullopt;
   const double farValue = far(centre, closest, memory);
-  if (!((centre - memory.at).length() + radius < memory.sameSide * least) ||
-      !(std::abs(farValue) * least > bound * closest))
-    return std::nullopt;
+  const double moved = (centre - memory.at).length() + radius;
+  if (!(moved < memory.sameSide * least)) return std::nullopt;
+  // Least values in the ball: of the far field as in sameSide(), of the near field by its slope.
+  const double margin = std::abs(memory.winding - 0.5) + 0.5 * std::log(1 - moved / least);
+  if (!(2 * margin * least > bound)) return std::nullopt;
+  constexpr double kMostSlope = 2;
   const double result = value(centre, found, memory);
-  if (!(result * farValue > 0) || !(std::abs(result) > bound)) return std::nullopt;
+  if (!(result * farValue > 0) || !(std::abs(result) - kMostSlope * radius > bound))
+    return std::nullopt;
   return result;
 }
 

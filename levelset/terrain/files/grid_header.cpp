@@ -50,15 +50,19 @@ std::string_view GridHeader::take(std::string_view text) {
   while (!text.empty()) {
     const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
     std::string_view line = text.substr(0, end);
-    const std::string word = loweredWord(takeLineWord(line));
+    const std::string word = loweredWord(takeLineWord(line).substr(0, 1000));
     // Numbers, and the word nan, are the first heights.
     if (!word.empty() && (!std::isalpha(static_cast<unsigned char>(word[0])) || word == "nan"))
       return text;
     ++lines_;
     if (!word.empty()) {
       constexpr std::size_t kMostWords = 64;
-      const std::string value = loweredWord(takeLineWord(line));
       const std::string shown = word.substr(0, 40);
+      const std::string_view given = takeLineWord(line);
+      constexpr std::size_t kLongestWord = 256;
+      if (std::max(word.size(), given.size()) > kLongestWord)
+        fail(fmt::format("line {}: '{}…' is no line of a header; check the file", lines_, shown));
+      const std::string value = loweredWord(given);
       if (value.empty())
         fail(fmt::format("line {}: '{}' has no value; repair the header", lines_, shown));
       if (!words_.emplace(word, value).second)
@@ -154,6 +158,8 @@ void readProjection(const std::filesystem::path& grid, HeightField& field) {
   if (std::filesystem::file_size(file, error) == 0) return;
   const Bytes bytes = readBytes(file, kNoMemoryLimit);
   std::string_view text = bytes.view();
+  constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   std::string_view rest = text;
   const std::string first = loweredWord(takeLineWord(rest));
   if (first == "projection") {
@@ -168,7 +174,16 @@ void readProjection(const std::filesystem::path& grid, HeightField& field) {
     throw InvalidInput(
         fmt::format("'{}' names no coordinate system; rename or remove it", file.string()));
   field.coordinateSystem = std::string(text.substr(quote + 1, end - quote - 1));
-  field.isGeographic = first.starts_with("geog");
+  // Compound systems contain a horizontal one. A projected system contains a geographic one.
+  const auto contains = [&](std::string_view word) {
+    const auto sameLetter = [](char a, char b) {
+      return std::toupper(static_cast<unsigned char>(a)) == b;
+    };
+    return std::search(text.begin(), text.end(), word.begin(), word.end(), sameLetter) !=
+           text.end();
+  };
+  field.isGeographic = (contains("GEOGCS") || contains("GEOGCRS") || contains("GEODCRS")) &&
+                       !contains("PROJCS") && !contains("PROJCRS");
 }
 
 void requireHeightMemory(const HeightField& field, double otherBytes, std::size_t maxMemory) {

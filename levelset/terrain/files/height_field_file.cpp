@@ -86,7 +86,8 @@ HeightField readAsciiGrid(const std::filesystem::path& path,
       const bool isNumber = error == std::errc() && end == word.data() + word.size();
       float& height = field.heights[field.index(column, row)];
       if (isNumber &&
-          ((field.noData && value == *field.noData) || (marksNan && std::isnan(value)))) {
+          ((field.noData && static_cast<float>(value) == static_cast<float>(*field.noData)) ||
+           (marksNan && std::isnan(value)))) {
         height = kMissingHeight;
         continue;
       }

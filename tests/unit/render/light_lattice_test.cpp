@@ -71,7 +71,7 @@ TEST(LightLattice, IsAsCloseToTheTruthOnQuadrics) {
   for (int n = 0; n < kEdge * kEdge; ++n) {
     const double x = 2.0 * (n % kEdge) / kEdge - 1, y = 2.0 * (n / kEdge) / kEdge - 1,
                  height = numbers.between(0, 0.05);
-    sticks.push_back({V3d(x, y, -1), V3d(x, y, height), 0.0525f, 0xffffff});
+    sticks.push_back({V3d(x, y, -1), V3d(x, y, height), 0.0525f, 0xb4b4b4});
   }
   Scene scene;
   scene.quadrics.push_back(render::makeQuadricPart({}, sticks));

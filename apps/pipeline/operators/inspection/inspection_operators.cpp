@@ -237,7 +237,7 @@ void validateInfo(const Invocation& in) {
                   name));
 }
 
-Json fileInfo(const std::string& file, const std::string& format) {
+Json fileInfo(const std::string& file, const std::string& format, std::size_t maxMemory) {
   Json json;
   json["file"] = file;
   const std::string name = format.empty() ? file : format;
@@ -246,7 +246,7 @@ Json fileInfo(const std::string& file, const std::string& format) {
     return json;
   }
   if (levelset::isHeightFormat(name)) {
-    addTerrain(json, levelset::readHeightField(file, {.format = format}));
+    addTerrain(json, levelset::readHeightField(file, {.format = format, .maxMemory = maxMemory}));
     return json;
   }
   if (levelset::isPointFormat(name) || levelset::lacksFaces(file, format)) {
@@ -428,7 +428,7 @@ void appendText(const Json& json, const std::string& indent, std::string& text) 
 Value info(Invocation& in) {
   Json json;
   if (in.given("file")) {
-    json = fileInfo(in.text("file"), in.text("format"));
+    json = fileInfo(in.text("file"), in.text("format"), in.maxMemory);
   } else if (!in.operands.empty()) {
     json = valueInfo(in.operands[0], in);
   } else {

@@ -228,7 +228,7 @@ Value draw(Invocation& in) {
   options.maxBytes = in.maxMemory;
   options.progress = in.progress;
   const bool isExr = render::imageFormat(in.text("file"), in.text("format")) != "png";
-  options.layers = isBoth || scene.isBlended() || isExr;
+  options.layers = isBoth || scene.isBlended() || (isExr && !isStereo(in));
   options.volumeLight = isBoth || isExr;
   applyLookTo(in, options);
   options.optics = opticsOf(in);

@@ -59,12 +59,12 @@ void validateOptics(const Invocation& in) {
     throw UsageError(fmt::format("render: {}", error.what()));
   }
   for (const char* option : {"environment", "bounces"})
-    if (in.given(option) && !in.given("reflect") && !in.given("refract"))
+    if (in.given(option) && !opticsOf(all).isActive())
       throw UsageError(
           fmt::format("render: --{} is for --reflect or --refract; give one of them, or leave it "
                       "out",
                       option));
-  if (in.given("index") && !in.given("refract"))
+  if (in.given("index") && !(opticsOf(all).refract > 0))
     throw UsageError("render: --index is for --refract; give that, too, or leave it out");
   if (!isStereo(in)) {
     for (const char* option : {"eye-distance", "screen-depth"})
@@ -82,9 +82,10 @@ void validateOptics(const Invocation& in) {
         "cpu, gpu or embree");
   for (const char* layer : {"thickness", "directions", "light-layers"})
     if (in.flag(layer))
-      throw UsageError(fmt::format(
-          "render: a stereo picture has no layers but its colours, so --{} is lost; leave it out",
-          layer));
+      throw UsageError(
+          fmt::format("render: a stereo picture has no layers but its colours, so --{} would be "
+                      "lost; leave it out",
+                      layer));
 }
 
 render::Image drawStereo(Invocation& in, const render::Scene& scene,
@@ -100,6 +101,12 @@ render::Image drawStereo(Invocation& in, const render::Scene& scene,
     render::Scene seen = scene;
     seen.camera = eyes[static_cast<std::size_t>(n)];
     pictures.push_back(draw(seen, n));
+    // The other eye needs the memory of the layers.
+    pictures.back().ids.clear();
+    std::erase_if(pictures.back().channels, [](const auto& channel) {
+      return channel.first != "R" && channel.first != "G" && channel.first != "B" &&
+             channel.first != "A";
+    });
   }
   return render::stereoPicture(pictures[0], pictures[1], options.stereo);
 }

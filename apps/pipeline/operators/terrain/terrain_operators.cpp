@@ -28,7 +28,11 @@ Imath::V2d pairOf(Invocation& in, const std::string& name) {
 HeightField placedTerrain(Invocation& in, HeightField terrain) {
   if (in.given("spacing")) {
     terrain.spacing = pairOf(in, "spacing");
+    if (terrain.isGeographic)
+      in.notes.notes.push_back(
+          "--spacing is taken as lengths, the degrees of the file are dropped");
     terrain.isGeographic = false;
+    terrain.coordinateSystem.clear();
   }
   if (in.given("origin")) terrain.origin = pairOf(in, "origin");
   if (in.flag("metric")) terrain = levelset::metricHeights(std::move(terrain));

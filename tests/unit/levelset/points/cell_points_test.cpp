@@ -102,4 +102,30 @@ TEST(CellPoints, AreOrderedByNumberAtOneDistance) {
   for (const std::size_t count : {1, 2, 3, 4, 9}) expectSearchResults(points, at, 0, count);
 }
 
+TEST(CellPoints, OfALatticeAreThoseBesideItsPoints) {
+  PointCloud cloud;
+  for (int x = 0; x < 6; ++x)
+    for (int y = 0; y < 6; ++y)
+      for (int z = 0; z < 2; ++z) {
+        cloud.positions.push_back(0.1 * V3d(x, y, z));
+        cloud.normals.emplace_back(0, 0, 1);
+      }
+  const OrientedPoints points = orient(cloud);
+  CellPoints cell;
+  std::vector<FoundItem> found, expected;
+  for (const std::size_t count : {std::size_t{1}, std::size_t{2}, std::size_t{5}})
+    for (const V3d& middle : points.positions) {
+      cell.move(points, middle, 0.05, count);
+      for (const double away : {0.0, 1e-16, 3e-16, 0.05}) {
+        const V3d centre = middle + V3d(away, 0, 0);
+        points.search.closest(centre, count, expected);
+        expectSame(cell.moveInside(centre, 0.02), expected);
+        const V3d at = centre + V3d(0, 2e-16, 0);
+        cell.closest(at, found);
+        points.search.closest(at, count, expected);
+        expectSame(found, expected);
+      }
+    }
+}
+
 }  // namespace cell_points_test

@@ -226,6 +226,30 @@ TEST(QuadricCaster, HasTheBitsOfSingleRaysForSeveral) {
   }
 }
 
+TEST(QuadricCaster, HasTheBitsOfSingleRaysForAFewAlongACylinder) {
+  // Rays along the axis of a flat cylinder meet its sides nowhere, or everywhere.
+  QuadricModel model;
+  model.sticks.push_back({V3d(0, 0, -0.01), V3d(0, 0, 0.01), 0.5f});
+  const QuadricCaster caster(model);
+  for (const bool isWide : {false, true}) {
+    if (isWide && !hasWideVectors()) continue;
+    for (std::size_t count = 4; count <= kBeamRays; ++count)
+      for (const double left : {-0.52, -0.4, 0.1, 0.4}) {
+        std::vector<Camera::Ray> rays;
+        for (std::size_t n = 0; n < count; ++n)
+          rays.push_back({V3d(left + 0.03 * double(n % 4), 0.03 * double(n / 4), 2), V3d(0, 0, -1),
+                          0, n % 3 == 2 ? 1.0 : 10.0});
+        std::array<NearestQuadric, kBeamRays> found;
+        traceQuadricBeam(*caster.tables(), rays, isWide, found.data());
+        for (std::size_t n = 0; n < count; ++n) {
+          const NearestQuadric alone = traceQuadrics(*caster.tables(), rays[n], false, isWide);
+          ASSERT_EQ(found[n].slot, alone.slot) << count << ' ' << left << ' ' << n;
+          EXPECT_EQ(found[n].t, alone.t);
+        }
+      }
+  }
+}
+
 TEST(QuadricCaster, HasTheSameExtentsOnAnyNumberOfThreads) {
   Numbers numbers(11);
   const QuadricModel model{
