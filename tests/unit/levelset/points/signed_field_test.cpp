@@ -70,7 +70,9 @@ void expectSameWithin(const PointCloud& cloud, double half, double bound) {
             const levelset::FoundItem first =
                 points.search.closest(at[n], std::numeric_limits<double>::infinity());
             if (std::sqrt(first.squared) > points.spacings[first.index]) {
-              if (std::abs(exact[n]) > 1) ASSERT_EQ(values[n] > 0, exact[n] > 0);
+              if (std::abs(exact[n]) > 1) {
+                ASSERT_EQ(values[n] > 0, exact[n] > 0);
+              }
             } else if (std::abs(exact[n]) < bound) {
               ++within;
               ASSERT_EQ(values[n], exact[n]);
