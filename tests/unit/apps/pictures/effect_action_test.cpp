@@ -200,8 +200,11 @@ TEST_F(EffectAction, RefusesTracedEffectsWithASentence) {
   expectRefusal(render + "--eye-distance 1", 2, "--stereo");
   expectRefusal(render + "--stereo anaglyph --ortho 3 --from 0,0,9", 2, "--ortho");
   expectRefusal(render + "--stereo anaglyph --renderer both", 2, "two");
-  expectRefusal(render + "--stereo anaglyph --thickness", 2, "--thickness is lost");
+  expectRefusal(render + "--stereo anaglyph --thickness", 2, "--thickness would be lost");
   expectRefusal(render + "--stereo anaglyph --from 0,0,0 --to 0,0,1", 2, "--screen-depth");
+  expectRefusal(render + "--stereo anaglyph --eye-distance 1 --screen-depth 1e-6", 2,
+                "shifts the views");
+  expectRefusal(render + "--reflect 0 --bounces 3", 2, "--bounces is for");
   EXPECT_FALSE(exists("out.exr"));
 }
 

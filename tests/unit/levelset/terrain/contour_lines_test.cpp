@@ -170,6 +170,8 @@ TEST(ContourLines, ChooseHeights) {
   EXPECT_SAYS(refused(0, 0), "positive interval");
   EXPECT_SAYS(refused(1, NAN), "finite base");
   EXPECT_SAYS(refused(1e-5, 0), "give a larger interval");
+  // Whole numbers beyond 2^53 cannot be counted by one.
+  EXPECT_SAYS(refused(1, 1e17), "is too small for heights");
 }
 
 TEST(ContourLines, RefuseHeightsAndTooLittleMemory) {

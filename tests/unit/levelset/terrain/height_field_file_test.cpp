@@ -96,6 +96,12 @@ TEST_F(HeightFieldFile, NamesTheCoordinateSystem) {
   field = read("a.asc", kGrid);
   EXPECT_EQ(field.coordinateSystem, "GEOGRAPHIC");
   EXPECT_TRUE(field.isGeographic);
+  writeText(folder_ / "a.prj",
+            "\xef\xbb\xbf"
+            "COMPD_CS[\"WGS 84 + EGM96 height\",GEOGCS[\"WGS 84\"]]");
+  field = read("a.asc", kGrid);
+  EXPECT_EQ(field.coordinateSystem, "WGS 84 + EGM96 height");
+  EXPECT_TRUE(field.isGeographic);
   writeText(folder_ / "a.prj", "nothing");
   EXPECT_SAYS(refused("a.asc", kGrid), "names no coordinate system");
   writeText(folder_ / "a.prj", std::string(70000, 'x'));
