@@ -413,11 +413,13 @@ Operator writeOperator() {
       .name = "write",
       .group = "Files",
       .summary =
-          "write a mesh (ply, obj, stl, off, also .gz), a level set or field (vdb, nvdb), points "
-          "(ply, obj, xyz, csv, pts, also .gz, vdb), patches (patch), a scene (json), a "
-          "segmentation "
-          "(vdb; ply, obj, with the labels on both sides of each face), a terrain (asc)",
+          "write meshes, level sets, fields, points, patches, scenes, segmentations and terrains",
       .details =
+          "Meshes go to ply, obj, stl or off, also with .gz. Level sets and fields go to vdb or "
+          "nvdb, "
+          "and points to ply, obj, xyz, csv or pts, also with .gz, or to vdb. Patches go to patch, "
+          "scenes to json, and terrains to asc. Segmentations go to vdb, or to ply or obj with the "
+          "labels on both sides of each face. "
           "Data is written to a temporary file in the same folder, which replaces an existing file "
           "only when it is complete. The level sets and meshes of a scene go to .vdb and .ply "
           "files in the same folder: the level set NAME of FILE.json goes to FILE-NAME.vdb. "
