@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "levelset/error.h"
+#include "levelset/memory_limit.h"
 #include "levelset/progress_gate.h"
 
 namespace levelset {
@@ -65,8 +66,13 @@ void forEachGradient(const HeightField& field, bool edges, const Progress& progr
   report(progress, 1);
 }
 
+void requireSampleMemory(const HeightField& field, std::size_t bytes, std::size_t maxMemory) {
+  requireMemory(static_cast<double>(field.heights.size()) * static_cast<double>(bytes), maxMemory);
+}
+
 /// Field of another figure at the same samples, all missing.
-HeightField missingLike(const HeightField& field) {
+HeightField missingLike(const HeightField& field, std::size_t maxMemory) {
+  requireSampleMemory(field, sizeof(float), maxMemory);
   return {.columns = field.columns,
           .rows = field.rows,
           .origin = field.origin,
@@ -78,7 +84,7 @@ HeightField missingLike(const HeightField& field) {
 }  // namespace
 
 HeightField slopeDegrees(const HeightField& field, const SlopeOptions& options) {
-  HeightField result = missingLike(field);
+  HeightField result = missingLike(field, options.maxMemory);
   forEachGradient(
       field, options.edges, options.progress, [&](std::size_t n, const Imath::V2d& gradient) {
         result.heights[n] =
@@ -88,7 +94,7 @@ HeightField slopeDegrees(const HeightField& field, const SlopeOptions& options) 
 }
 
 HeightField aspectDegrees(const HeightField& field, const SlopeOptions& options) {
-  HeightField result = missingLike(field);
+  HeightField result = missingLike(field, options.maxMemory);
   forEachGradient(field, options.edges, options.progress,
                   [&](std::size_t n, const Imath::V2d& gradient) {
                     if (gradient == Imath::V2d(0)) return;
@@ -113,6 +119,7 @@ std::vector<std::uint8_t> hillshade(const HeightField& field, const HillshadeOpt
                altitude = options.altitudeDegrees / kDegreesOfRadian;
   const double lightX = std::sin(azimuth) * std::cos(altitude),
                lightY = std::cos(azimuth) * std::cos(altitude), lightZ = std::sin(altitude);
+  requireSampleMemory(field, sizeof(std::uint8_t), options.maxMemory);
   std::vector<std::uint8_t> shades(field.heights.size(), 0);
   forEachGradient(
       field, options.edges, options.progress, [&](std::size_t n, const Imath::V2d& gradient) {

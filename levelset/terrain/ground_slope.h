@@ -21,13 +21,14 @@ struct SlopeOptions {
   /// y continues the line through the sample, as b = 2e − h. A diagonal one continues the plane, as
   /// a = b + d − e. False: the samples beside a missing one are missing in the result.
   bool edges = false;
+  std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
 
 /// Angle between the ground and a horizontal plane at each sample, degrees from 0 to 90. Samples
 /// with a missing neighbour are missing.
 /// @throws InvalidInput for a field in degrees, or one that requireHeights() refuses
-/// @throws Cancelled
+/// @throws ResourceLimit, Cancelled
 [[nodiscard]] HeightField slopeDegrees(const HeightField& field, const SlopeOptions& options = {});
 
 /// Direction in which the ground falls, degrees clockwise from north (y), from 0 to 360 without
@@ -39,13 +40,14 @@ struct HillshadeOptions {
   double altitudeDegrees = 45;  ///< height of the light above the horizon, from 0 to 90
   double exaggeration = 1;      ///< factor of the heights, > 0
   bool edges = false;           ///< as in SlopeOptions
+  std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
 
 /// Light of each sample: 1 + 254 × the cosine between normal and light, 1 for samples that face
 /// away, 0 for missing ones. Rows in the order of the field.
 /// @throws UsageError for options out of their range
-/// @throws InvalidInput as slopeDegrees
+/// @throws InvalidInput, ResourceLimit, Cancelled as slopeDegrees
 [[nodiscard]] std::vector<std::uint8_t> hillshade(const HeightField& field,
                                                   const HillshadeOptions& options = {});
 

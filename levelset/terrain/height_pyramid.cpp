@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "levelset/error.h"
+#include "levelset/memory_limit.h"
 #include "levelset/progress_gate.h"
 
 namespace levelset {
@@ -135,6 +136,10 @@ HeightPyramid heightPyramid(const HeightField& field, const PyramidOptions& opti
     const std::int64_t side = std::int64_t{options.cells} << level;
     return static_cast<int>((samples - 1 + side - 1) / side);
   };
+  // Each level has a quarter of the patches of the one before.
+  requireMemory(
+      4.0 / 3 * sizeof(PyramidPatch) * patchesAt(field.columns, 0) * patchesAt(field.rows, 0),
+      options.maxMemory);
   std::size_t total = 0;
   for (int level = 0;; ++level) {
     PyramidLevel next{.columns = patchesAt(field.columns, level),

@@ -39,13 +39,14 @@ struct HeightPyramid {
 
 struct PyramidOptions {
   int cells = 16;  ///< cells along a side of a patch: a power of two from 2 to 128
+  std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };
 
 /// Builds the pyramid of a field. The same bits for any number of threads.
 /// @throws UsageError for a number of cells out of range
 /// @throws InvalidInput for a field of less than 2x2 samples, or one that requireHeights() refuses
-/// @throws Cancelled
+/// @throws ResourceLimit, Cancelled
 [[nodiscard]] HeightPyramid heightPyramid(const HeightField& field,
                                           const PyramidOptions& options = {});
 

@@ -298,6 +298,19 @@ PixelTraversal KernelScene::startTraversal(const PixelBlock& pixels) const {
                                                  {std::vector<double>(rays), ShapeBlock(rays)})};
 }
 
+void PixelTraversal::takeMet(const CsgTraversal& walk, const std::vector<Crossings>& next,
+                             PixelHits& hits) {
+  for (std::size_t i = 0; i < hits.solid.size(); ++i) {
+    const std::int32_t met = walk.solidMet(i);
+    if (met < 0) continue;
+    const auto s = static_cast<std::size_t>(met);
+    hits.solid[i] = met;
+    hits.depth[i] = next[s].depth[i];
+    hits.flipped[i] = walk.isFlipped(i) ? 1 : 0;
+    hits.shapes.take(i, next[s].shapes, i);
+  }
+}
+
 PixelHits KernelScene::castNext(const KernelTracer& tracer, PixelTraversal& traversal) const {
   auto& [pixels, walk, next] = traversal;
   PixelHits result(pixels.size());
@@ -329,15 +342,7 @@ PixelHits KernelScene::castNext(const KernelTracer& tracer, PixelTraversal& trav
       }
     }
   } while (walk.advance());
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    const std::int32_t met = walk.solidMet(i);
-    if (met < 0) continue;
-    const auto s = static_cast<std::size_t>(met);
-    result.solid[i] = met;
-    result.depth[i] = next[s].depth[i];
-    result.flipped[i] = walk.isFlipped(i) ? 1 : 0;
-    result.shapes.take(i, next[s].shapes, i);
-  }
+  PixelTraversal::takeMet(walk, next, result);
   return result;
 }
 

@@ -97,6 +97,10 @@ struct PixelTraversal {
     ShapeBlock shapes;
   };
   std::vector<Crossings> next;
+
+  /// Hits of rays that have met the drawn shape, from the next crossings of the solids.
+  static void takeMet(const CsgTraversal& walk, const std::vector<Crossings>& next,
+                      PixelHits& hits);
 };
 
 /// A scene prepared for the kernel, independent of the back end. When two solids are hit at the

@@ -342,12 +342,16 @@ Operator readOperator() {
       .name = "read",
       .group = "Files",
       .summary =
-          "read a mesh (ply, obj, stl, off, also .gz), a level set, field or segmentation (vdb), a "
-          "volume (nii, "
-          "hdr, mha, mhd, nrrd, nhdr, mrc, map, raw), points (xyz, csv, pts, ply or obj without "
-          "faces, vdb with a grid of points), patches (patch), a scene (json), a molecule (pdb, "
-          "cif), a terrain (asc, hgt, flt, bil, png)",
+          "read a mesh, level set, field, segmentation, volume, point cloud, patches, scene, "
+          "molecule "
+          "or terrain",
       .details =
+          "Meshes are ply, obj, stl or off, also with .gz. Level sets, fields and segmentations "
+          "are "
+          "vdb. Volumes are nii, hdr, mha, mhd, nrrd, nhdr, mrc, map or raw. Points are xyz, csv "
+          "or "
+          "pts, ply or obj without faces, or a vdb with a grid of points. Patches are patch, and "
+          "scenes json. Molecules are pdb or cif, and terrains asc, hgt, flt, bil or png. "
           "A .vdb with more than one level set needs --grid. A grid that is not a level set needs "
           "--grid, too; it becomes a field of numbers or of vectors, which may be staggered. "
           "Meshes keep the normals, texture coordinates and colours of their vertices in PLY and "

@@ -76,6 +76,7 @@ void KernelScene::castCsgOf(const KernelTracer& tracer, const std::vector<LightR
     for (std::size_t s = 0; s < solids_.size(); ++s) {
       const KernelSolid& solid = solids_[s];
       const std::vector<CsgTraversal::Query> queries = walk.queriesFor(s);
+      if (queries.empty()) continue;
       std::vector<std::size_t> asked;
       for (const CsgTraversal::Query& query : queries) asked.push_back(query.ray);
       PackedRays packed(solid, rays, asked, false);
@@ -103,15 +104,7 @@ void KernelScene::castCsgOf(const KernelTracer& tracer, const std::vector<LightR
       }
     }
   } while (walk.advance());
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    const std::int32_t met = walk.solidMet(i);
-    if (met < 0) continue;
-    const auto s = static_cast<std::size_t>(met);
-    result.solid[i] = met;
-    result.depth[i] = next[s].depth[i];
-    result.flipped[i] = walk.isFlipped(i) ? 1 : 0;
-    result.shapes.take(i, next[s].shapes, i);
-  }
+  PixelTraversal::takeMet(walk, next, result);
 }
 
 BezierHits KernelScene::castBeziersOf(const std::vector<Camera::Ray>& rays) const {

@@ -19,8 +19,10 @@ Value measureTerrain(Invocation& in) {
   const double plane = in.given("above") ? in.number("above") : 0;
   const levelset::GroundMeasures m = levelset::measureGround(
       terrain, {.height = plane}, levelset::subProgress(in.progress, 0, 0.4));
-  const levelset::HeightField slopes = levelset::slopeDegrees(
-      terrain, {.edges = true, .progress = levelset::subProgress(in.progress, 0.4, 1)});
+  const levelset::HeightField slopes =
+      levelset::slopeDegrees(terrain, {.edges = true,
+                                       .maxMemory = in.maxMemory,
+                                       .progress = levelset::subProgress(in.progress, 0.4, 1)});
   double sum = 0, steepest = 0;
   std::size_t count = 0;
   for (const float slope : slopes.heights) {

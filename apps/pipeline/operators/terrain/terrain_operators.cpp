@@ -128,7 +128,8 @@ Param edgesParam() {
 }
 
 Value makeSlope(Invocation& in) {
-  const levelset::SlopeOptions options{.edges = in.flag("edges"), .progress = in.progress};
+  const levelset::SlopeOptions options{
+      .edges = in.flag("edges"), .maxMemory = in.maxMemory, .progress = in.progress};
   const HeightField& terrain = in.operands[0].terrain();
   return Value(in.flag("aspect") ? levelset::aspectDegrees(terrain, options)
                                  : levelset::slopeDegrees(terrain, options));
@@ -141,6 +142,7 @@ Value drawHillshade(Invocation& in) {
                                     .altitudeDegrees = in.number("altitude"),
                                     .exaggeration = in.number("exaggeration"),
                                     .edges = in.flag("edges"),
+                                    .maxMemory = in.maxMemory,
                                     .progress = in.progress});
   writeTerrainPicture(in.text("file"), terrain, shades, in.maxMemory);
   return in.operands[0];

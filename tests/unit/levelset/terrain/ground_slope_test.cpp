@@ -161,6 +161,13 @@ TEST(Hillshade, RefusesAnglesAndDegrees) {
               "degrees");
   EXPECT_SAYS(refusal<levelset::InvalidInput>([&] { static_cast<void>(slopeDegrees(field)); }),
               "degrees");
+  const HeightField large = support::randomTerrain(500, 500, 0, 1);
+  EXPECT_THROW(static_cast<void>(slopeDegrees(large, {.maxMemory = 900'000})),
+               levelset::ResourceLimit);
+  EXPECT_THROW(static_cast<void>(aspectDegrees(large, {.maxMemory = 900'000})),
+               levelset::ResourceLimit);
+  EXPECT_THROW(static_cast<void>(hillshade(large, {.maxMemory = 200'000})),
+               levelset::ResourceLimit);
 }
 
 TEST(GroundSlope, GivesTheSameBitsForAnyNumberOfThreads) {

@@ -146,6 +146,11 @@ TEST(HeightPyramid, RefusesOtherPatchesAndTooFewSamples) {
   EXPECT_SAYS(refusal<levelset::InvalidInput>(
                   [&] { static_cast<void>(heightPyramid(support::randomTerrain(9, 1, 0, 1))); }),
               "9x1");
+  EXPECT_SAYS(refusal<levelset::ResourceLimit>([&] {
+                static_cast<void>(heightPyramid(support::randomTerrain(513, 513, 0, 1),
+                                                {.cells = 2, .maxMemory = 1'300'000}));
+              }),
+              "");
   EXPECT_SAYS(refusal<levelset::Cancelled>([&] {
                 static_cast<void>(heightPyramid(field, {.progress = [](double) { return false; }}));
               }),

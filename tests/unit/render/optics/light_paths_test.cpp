@@ -75,6 +75,16 @@ double errorOf(const Image& image, const Camera& camera,
   return worst;
 }
 
+/// Checks the pictures of the kernel and of the judge.
+void expectError(const Scene& scene, const OpticsOptions& optics,
+                 const std::function<std::optional<V3d>(const Camera::Ray&)>& colour,
+                 double figure) {
+  EXPECT_LT(errorOf(renderCpu(scene, optionsOf(optics)), scene.camera, colour),
+            support::measured(figure));
+  EXPECT_LT(errorOf(renderEmbree(scene, optionsOf(optics)), scene.camera, colour),
+            support::measured(figure));
+}
+
 constexpr double kRadius = 20;
 
 Camera ballCamera() {
@@ -128,12 +138,8 @@ TEST(LightPaths, ShowTheEnvironmentInAMirrorBall) {
       if (!at || -ray.direction.dot(at->normal) < 0.1) return {};
       return directionLight(ray.direction - at->normal * (2 * ray.direction.dot(at->normal)));
     };
-    EXPECT_LT(errorOf(renderCpu(scene, optionsOf(optics)), scene.camera, exact),
-              support::measured(error))
-        << kind;
-    EXPECT_LT(errorOf(renderEmbree(scene, optionsOf(optics)), scene.camera, exact),
-              support::measured(error))
-        << kind;
+    SCOPED_TRACE(kind);
+    expectError(scene, optics, exact, error);
   }
 }
 
@@ -226,12 +232,8 @@ TEST(LightPaths, OfAGlassBallHaveTheSumOfItsInnerReflections) {
   for (const auto& [kind, error] : cases) {
     const Scene scene = ballOf(kind);
     const auto exact = [](const Camera::Ray& ray) { return lightOfGlassBall(ray, 1.5); };
-    EXPECT_LT(errorOf(renderCpu(scene, optionsOf(optics)), scene.camera, exact),
-              support::measured(error))
-        << kind;
-    EXPECT_LT(errorOf(renderEmbree(scene, optionsOf(optics)), scene.camera, exact),
-              support::measured(error))
-        << kind;
+    SCOPED_TRACE(kind);
+    expectError(scene, optics, exact, error);
   }
 }
 
