@@ -67,7 +67,8 @@ void forEachGradient(const HeightField& field, bool edges, const Progress& progr
 }
 
 void requireSampleMemory(const HeightField& field, std::size_t bytes, std::size_t maxMemory) {
-  requireMemory(static_cast<double>(field.heights.size()) * static_cast<double>(bytes), maxMemory);
+  requireMemory(static_cast<double>(field.heights.size()) * static_cast<double>(bytes),
+                memoryLeft(memoryLimit(maxMemory)));
 }
 
 /// Field of another figure at the same samples, all missing.

@@ -139,7 +139,7 @@ HeightPyramid heightPyramid(const HeightField& field, const PyramidOptions& opti
   // Each level has a quarter of the patches of the one before.
   requireMemory(
       4.0 / 3 * sizeof(PyramidPatch) * patchesAt(field.columns, 0) * patchesAt(field.rows, 0),
-      options.maxMemory);
+      memoryLeft(memoryLimit(options.maxMemory)));
   std::size_t total = 0;
   for (int level = 0;; ++level) {
     PyramidLevel next{.columns = patchesAt(field.columns, level),
